@@ -15,7 +15,8 @@ import numpy as np
 
 from cvt_hpc.job import Job
 from cvt_hpc.models.contract import load_model
-from cvt_hpc.models.elastic_belt.belt import TIME, State
+from cvt_hpc.models.elastic_belt import fields as f
+from cvt_hpc.models.elastic_belt.belt import State
 from cvt_hpc.simulation.batches import in_lanes
 from cvt_hpc.simulation.marching import march
 from cvt_hpc.simulation.record import record_of, recorded_model
@@ -159,8 +160,8 @@ def _at_rest(batch: Any, state: State) -> _AtRest:
     """In a state when the strands are to be disturbed, and the load has risen."""
     done = batch.plan.kick
     state = state.copy()
-    state.scalars[TIME] = done * batch.interval
-    return _AtRest(done, state.scalars[TIME], state)
+    state.scalars[f.TIME] = done * batch.interval
+    return _AtRest(done, state.scalars[f.TIME], state)
 
 
 def _run_batch(job: Job, group: list[_Started]) -> list[Attractor]:

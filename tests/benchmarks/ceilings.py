@@ -20,8 +20,8 @@ from cvt_hpc.job import build_job
 from cvt_hpc.kernels import kernel
 from cvt_hpc.lanes import LaneArray, fma, like, rings
 from cvt_hpc.models.elastic_belt import imex, imex_stations, imex_system, lane_forces, pulley_step, pulleys
+from cvt_hpc.models.elastic_belt import lane_fields as lf
 from cvt_hpc.models.elastic_belt.batch import PRECISIONS, Batch
-from cvt_hpc.models.elastic_belt.lane_belt import REPEATS
 from cvt_hpc.models.elastic_belt.step_choice import REFERENCE_STEP as STEP
 from cvt_hpc.physics import compliance, flank, friction
 from cvt_hpc.variator import course
@@ -182,10 +182,10 @@ def count(step: float, precision: str) -> collections.Counter:
     try:
         state, work, belt = (_counting_tuple(part) for part in (batch.state, batch.work, batch._belt))
         for _ in range(50):
-            passes = state.scalars.data[0, REPEATS, 0]
+            passes = state.scalars.data[0, lf.REPEATS, 0]
             Counted.tally = collections.Counter()
             imex.step_imex(belt, state, work, step)
-            if state.scalars.data[0, REPEATS, 0] == passes:
+            if state.scalars.data[0, lf.REPEATS, 0] == passes:
                 return Counted.tally
         raise RuntimeError("no step without a second pass in 50")
     finally:

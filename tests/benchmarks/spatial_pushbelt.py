@@ -19,7 +19,7 @@ import numpy as np
 sys.path.insert(0, str(Path(__file__).parents[1]))
 
 from cvt_hpc.lanes import LaneArray
-from cvt_hpc.models.pushbelt import belt as p
+from cvt_hpc.models.pushbelt import fields as planar
 from cvt_hpc.models.pushbelt.stepping import advance_by
 from cvt_hpc.models.spatial_pushbelt import belt as b
 from cvt_hpc.models.spatial_pushbelt.start import with_two_flows
@@ -53,13 +53,13 @@ def measured(state, belt, work, step, turns, flows):
         advance_by(EQUATIONS[flows], belt, newton, state, work, hold, steps, step)
         least = min(least, time.process_time() - start)
     done, spent = state.counters - counters, state.totals - before
-    left = spent[p.WORK_IN] - spent[p.WORK_OUT] - spent[p.THRUST_WORK]
-    left -= spent[p.FLANK_LOSS : p.POWER_RESIDUAL].sum() + stored(belt, state) - energy
+    left = spent[planar.WORK_IN] - spent[planar.WORK_OUT] - spent[planar.THRUST_WORK]
+    left -= spent[planar.FLANK_LOSS : planar.POWER_RESIDUAL].sum() + stored(belt, state) - energy
     return (
         least / (steps * step),
-        done[p.ITERATIONS] / done[p.STEPS],
-        done[p.FAILED_STEPS],
-        left / spent[p.TIME],
+        done[planar.ITERATIONS] / done[planar.STEPS],
+        done[planar.FAILED_STEPS],
+        left / spent[planar.TIME],
     )
 
 

@@ -124,3 +124,16 @@ def test_no_circle_of_imports():
                 reached[name] |= reached[between]
     circles = [{other for other in reached[name] if name in reached[other]} for name in files]
     assert [circle for circle in circles if circle] == []
+
+
+MOST_CONSTANTS = 7  # of a module that an import takes by name; of layouts of arrays the module itself is imported
+
+
+def test_layouts_of_arrays_are_modules_and_not_lists_of_names():
+    for path in SOURCES:
+        if room(path) not in ("models", "physics", "multibody", "solvers"):
+            continue
+        for node in statements(ast.parse(path.read_text()).body):
+            if isinstance(node, ast.ImportFrom):
+                constants = [alias.name for alias in node.names if alias.name.replace("_", "").isupper()]
+                assert len(constants) <= MOST_CONSTANTS, f"{path}: {node.module}: {constants}"

@@ -6,16 +6,8 @@ import numpy as np
 import pytest
 
 from cvt_hpc.job import build_job
-from cvt_hpc.models.elastic_belt.belt import (
-    DRIVEN_POSITION,
-    DRIVEN_SPEED,
-    V_ELEMENT,
-    V_RING,
-    U,
-    W,
-    belt_constants,
-    mesh,
-)
+from cvt_hpc.models.elastic_belt import fields as f
+from cvt_hpc.models.elastic_belt.belt import belt_constants, mesh
 from cvt_hpc.models.elastic_belt.fluctuation import ARC_PARTS, fluctuation, part_shares
 from cvt_hpc.models.elastic_belt.one_system import unpack
 from cvt_hpc.models.elastic_belt.record import fluctuation_record
@@ -152,7 +144,7 @@ def swinging(size):
     phases = 2.0 * np.pi * np.random.default_rng(3).uniform(size=BELT["stations"])
     states = [steady(100.0).state.copy() for _ in range(PHASES)]
     for k, state in enumerate(states):
-        state.fields[U] += size * np.sin(phases + 2.0 * np.pi * k / PHASES)
+        state.fields[f.U] += size * np.sin(phases + 2.0 * np.pi * k / PHASES)
     return states
 
 
@@ -170,12 +162,12 @@ def plain_feed(belt, forces, states):
     wedge, sine, cosine = 2.0 * np.tan(angle), np.sin(angle), np.cos(angle)
     history = np.zeros((4, len(states), belt.cell.size))
     for k, state in enumerate(states):
-        w, v = state.fields[W], state.fields[V_ELEMENT]
+        w, v = state.fields[f.W], state.fields[f.V_ELEMENT]
         slope = (np.roll(w, -1) - np.roll(w, 1)) * belt.per_span
         for j in np.flatnonzero(belt.arc_share):
             driven = j >= belt.driven_start
-            omega = state.scalars[DRIVEN_SPEED] if driven else belt.driving_speed
-            v_radial = state.fields[U, j] + v[j] * slope[j]
+            omega = state.scalars[f.DRIVEN_SPEED] if driven else belt.driving_speed
+            v_radial = state.fields[f.U, j] + v[j] * slope[j]
             v_tangential = v[j] - omega * ((belt.driven_radius if driven else belt.driving_radius) + w[j])
             force = forces[j]
             mu, _ = friction_coefficient(belt.law, np.hypot(v_radial / cosine, v_tangential), force / cosine)
@@ -228,7 +220,7 @@ def test_growth_is_what_is_fed_over_twice_the_energy(load):
 
 def _dampers_take(runs, belt, states):
     """Power of the layers' dampers in the fluctuation [W]: of no steps, and so of the samples."""
-    v0, v1 = (np.array([state.fields[row] for state in states]) for row in (V_ELEMENT, V_RING))
+    v0, v1 = (np.array([state.fields[row] for state in states]) for row in (f.V_ELEMENT, f.V_RING))
     opening, stretching = (np.roll(v, -1, axis=1) - v for v in (v0, v1))
     elements = -covariance(runs.profiles()["push_damping"].T, opening).sum()
     return elements + belt.ring_damping * (stretching.var(axis=0) / belt.cell).sum()
@@ -242,9 +234,9 @@ def _lag_takes(runs, belt):
 def _energy(runs, belt, states):
     """Energy of the motion, of bending and of the contact [J]; that of T and P is in the stresses' power."""
     fields = np.array([state.fields for state in states])
-    position = np.array([state.scalars[DRIVEN_POSITION] for state in states])
-    w, dual = fields[:, W], belt.dual
-    masses = ((U, belt.mass), (V_ELEMENT, belt.element_mass), (V_RING, belt.ring_mass))
+    position = np.array([state.scalars[f.DRIVEN_POSITION] for state in states])
+    w, dual = fields[:, f.W], belt.dual
+    masses = ((f.U, belt.mass), (f.V_ELEMENT, belt.element_mass), (f.V_RING, belt.ring_mass))
     moving = sum((mass * dual * fields[:, row].var(axis=0)).sum() for row, mass in masses)
     gap = 2.0 * np.tan(belt.half_wedge_angle) * w
     gap[:, belt.driven_start :] += position[:, np.newaxis]

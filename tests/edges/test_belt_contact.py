@@ -5,14 +5,8 @@ import pytest
 
 from cvt_hpc.errors import InputError
 from cvt_hpc.job import build_job
-from cvt_hpc.physics.compliance import (
-    GAP,
-    PUSH,
-    ROUNDS_OF_BLOCK_FLIPS,
-    lane_contact,
-    plain_contact,
-    solve_wrap,
-)
+from cvt_hpc.physics import compliance
+from cvt_hpc.physics.compliance import ROUNDS_OF_BLOCK_FLIPS, lane_contact, plain_contact, solve_wrap
 from cvt_hpc.physics.lane_gauss_seidel import sweep_lane_contact
 from cvt_hpc.physics.sheaves import flexibility, sheaves
 
@@ -33,8 +27,8 @@ def overlaps():
 def swept(sheave, gap, tolerance, most):
     """Forces by sweeps, and after how many of them they change by the tolerance; 0 where they do not."""
     contact = lane_contact([sheave] * LANES, np.float64, sweeps=1)
-    contact.stations.data[:, GAP] = gap[:, np.newaxis]
-    force = contact.stations.data[:, PUSH, 0]
+    contact.stations.data[:, compliance.GAP] = gap[:, np.newaxis]
+    force = contact.stations.data[:, compliance.PUSH, 0]
     for sweep in range(1, most + 1):
         before = force.copy()
         sweep_lane_contact(contact)

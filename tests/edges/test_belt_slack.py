@@ -3,17 +3,8 @@
 import numpy as np
 import pytest
 
-from cvt_hpc.models.elastic_belt.belt import (
-    FIELDS,
-    N_ELEMENT,
-    N_RING,
-    SCALARS,
-    TIME,
-    V_ELEMENT,
-    V_RING,
-    State,
-    belt_constants,
-)
+from cvt_hpc.models.elastic_belt import fields as f
+from cvt_hpc.models.elastic_belt.belt import State, belt_constants
 from cvt_hpc.models.elastic_belt.one_system import flat_belt, pack, system
 from cvt_hpc.models.elastic_belt.validity import slack_doubt
 from cvt_hpc.steppers.system import jacobian
@@ -30,11 +21,11 @@ def straight(cells, tension, push, speed=0.0, bending=0.0):
     belt = belt_constants(point("imex", **path, bending_stiffness=bending, transverse_damping=0.0))
     nothing = np.zeros(2 * cells)
     belt = belt._replace(curvature=nothing, arc_curvature=nothing, arc_share=nothing, belt_speed=speed)
-    fields, scalars = np.zeros((len(FIELDS), 2 * cells)), np.zeros(len(SCALARS))
-    fields[V_ELEMENT] = fields[V_RING] = speed
-    fields[N_RING] = 1.0 / (1.0 + tension / belt.ring_stiffness)
-    fields[N_ELEMENT] = 1.0 / (1.0 - push / belt.element_stiffness)
-    scalars[TIME] = belt.rise_time
+    fields, scalars = np.zeros((len(f.FIELDS), 2 * cells)), np.zeros(len(f.SCALARS))
+    fields[f.V_ELEMENT] = fields[f.V_RING] = speed
+    fields[f.N_RING] = 1.0 / (1.0 + tension / belt.ring_stiffness)
+    fields[f.N_ELEMENT] = 1.0 / (1.0 - push / belt.element_stiffness)
+    scalars[f.TIME] = belt.rise_time
     return belt, State(fields, scalars)
 
 

@@ -3,19 +3,19 @@
 import numpy as np
 import pytest
 
-from cvt_hpc.models.beam_pushbelt import belt as r
+from cvt_hpc.models.beam_pushbelt import fields as f
 from cvt_hpc.models.beam_pushbelt.belt import BeltState, Proximal
 from cvt_hpc.models.beam_pushbelt.start import workspace
 from cvt_hpc.models.beam_pushbelt.step import advance
-from cvt_hpc.models.pushbelt import belt as b
-from cvt_hpc.models.pushbelt.belt import CONVERGED, Belt
+from cvt_hpc.models.pushbelt import fields
+from cvt_hpc.models.pushbelt.belt import Belt
 from cvt_hpc.multibody.rcm_beam import RcmBeam, line_point
 from cvt_hpc.multibody.rcm_chain import close, relaxed_ring, straight_beam
 from support.complementarity import solve_lcp
 from support.rcm import conserved, equations
 
 MASS, INERTIA = 0.01, 2e-7  # of an element [kg], [kg m^2]
-NO_INPUTS = np.zeros((2, b.INPUTS))
+NO_INPUTS = np.zeros((2, fields.INPUTS))
 
 
 def belt_with(**values):
@@ -37,24 +37,24 @@ def under(chain, place):
 
 def state_of(chain, places, sliding, spin=0.0):
     """Elements that slide along a chain with speeds against it [m/s], upright on it, and work space."""
-    e = np.zeros((len(places), r.FIELDS))
+    e = np.zeros((len(places), f.FIELDS))
     for row, place, slip in zip(e, places, np.broadcast_to(sliding, len(places)), strict=True):
         point, rows, k = under(chain, place)
         along, across = rows @ chain.u[k : k + 8]
         t = np.array([point.cos, point.sin])
-        row[r.PLACE], row[r.PLACE_RATE], row[b.OMEGA] = place, slip / point.stretch, spin
-        row[[b.U_Y, b.U_Z]] = (along + slip) * t + across * np.array([-t[1], t[0]])
-        row[[b.HEADING_Y, b.HEADING_Z]] = t
-        row[[b.Y, b.Z]] = point.x, point.y
-    counters = np.zeros(r.COUNTERS, np.int64)
-    state = BeltState(chain, e, np.zeros(4), np.zeros(b.TOTALS), counters)
+        row[f.PLACE], row[f.PLACE_RATE], row[fields.OMEGA] = place, slip / point.stretch, spin
+        row[[fields.U_Y, fields.U_Z]] = (along + slip) * t + across * np.array([-t[1], t[0]])
+        row[[fields.HEADING_Y, fields.HEADING_Z]] = t
+        row[[fields.Y, fields.Z]] = point.x, point.y
+    counters = np.zeros(f.COUNTERS, np.int64)
+    state = BeltState(chain, e, np.zeros(4), np.zeros(fields.TOTALS), counters)
     return state, workspace(chain, len(places))
 
 
 def march(belt, state, work, steps, dt, proximal=None, inputs=NO_INPUTS):
     found = advance(belt, proximal or Proximal(), state, work, inputs, steps, dt)
-    assert found == CONVERGED
-    assert state.counters[b.FAILED_STEPS] == 0
+    assert found == fields.CONVERGED
+    assert state.counters[fields.FAILED_STEPS] == 0
 
 
 START, SPEED, TURNING = np.array([0.05, 0.28]), np.array([8.0, -8.0]), 50.0  # [m], [m/s], [rad/s]
@@ -67,7 +67,7 @@ def beads_on_a_turning_beam(dt):
     beam.u[0::5], beam.u[1::5], beam.u[2::5] = 0.0, TURNING * (beam.q[0::5] - 0.15), TURNING
     state, work = state_of(beam, START, SPEED)
     march(belt_with(), state, work, round(0.02 / dt), dt, Proximal(theta=1.0))
-    return state.elements[:, r.PLACE].copy(), state.elements[:, b.SADDLE].copy()
+    return state.elements[:, f.PLACE].copy(), state.elements[:, fields.SADDLE].copy()
 
 
 def test_beads_on_a_turning_beam():
@@ -106,9 +106,9 @@ def test_tension_of_a_spinning_ring():
     for beams in (12, 24):
         belt, state, work = spinning(beams=beams)
         march(belt, state, work, 1500, 1e-5, Proximal(theta=1.0))
-        squares = (state.elements[:, [b.U_Y, b.U_Z]] ** 2).sum(axis=1)
+        squares = (state.elements[:, [fields.U_Y, fields.U_Z]] ** 2).sum(axis=1)
         line_mass = 0.25 + 36 * MASS / (0.2 * np.pi)
-        errors.append(state.elements[:, b.TENSION] / (line_mass * squares.mean()) - 1.0)
+        errors.append(state.elements[:, fields.TENSION] / (line_mass * squares.mean()) - 1.0)
     assert abs(errors[0]).max() < 0.025
     assert abs(errors[1]).max() < 0.3 * abs(errors[0]).max()
 
@@ -116,9 +116,9 @@ def test_tension_of_a_spinning_ring():
 def whole(state):
     """Momentum, angular momentum and energy of ring and elements [N s], [N m s], [J]."""
     e = state.elements
-    (y, z), (u, w) = e[:, [b.Y, b.Z]].T, e[:, [b.U_Y, b.U_Z]].T
-    spin = MASS * (y * w - z * u) + INERTIA * e[:, b.OMEGA]
-    energy = 0.5 * (MASS * (u * u + w * w) + INERTIA * e[:, b.OMEGA] ** 2)
+    (y, z), (u, w) = e[:, [fields.Y, fields.Z]].T, e[:, [fields.U_Y, fields.U_Z]].T
+    spin = MASS * (y * w - z * u) + INERTIA * e[:, fields.OMEGA]
+    energy = 0.5 * (MASS * (u * u + w * w) + INERTIA * e[:, fields.OMEGA] ** 2)
     own = [MASS * u.sum(), MASS * w.sum(), spin.sum(), energy.sum()]
     return conserved(state.ring) + own
 
@@ -129,11 +129,11 @@ def thrown(dt, **values):
     ring = state.ring
     ring.u[:] += 0.5 * np.random.default_rng(3).normal(size=ring.u.size)
     close(ring)
-    state, work = state_of(ring, state.elements[:, r.PLACE].copy(), 5.0 + np.cos(np.arange(36)), 0.0)
+    state, work = state_of(ring, state.elements[:, f.PLACE].copy(), 5.0 + np.cos(np.arange(36)), 0.0)
     before = whole(state)
     march(belt, state, work, round(1e-3 / dt), dt)
     change = whole(state) - before
-    losses = state.totals[b.RING_LOSS] + state.totals[b.DAMPING_LOSS]
+    losses = state.totals[fields.RING_LOSS] + state.totals[fields.DAMPING_LOSS]
     change[3] += losses
     return before, change, losses
 
@@ -160,14 +160,14 @@ def test_friction_against_lemke():
     state, work = state_of(ring, places, sliding, 100.0)
     mass, force = equations(ring)
     size = force.size
-    u, old = ring.u[:size].copy(), state.elements[:, [b.U_Y, b.U_Z]].copy()
+    u, old = ring.u[:size].copy(), state.elements[:, [fields.U_Y, fields.U_Z]].copy()
     # directions at the start of the step and at its middle
     frames = []
     for ahead in (0.0, 0.5 * dt):
         ring.q[:] += ahead * ring.u
         at = np.zeros((8, 2, size))
         tangents = np.empty((8, 2))
-        for j, place in enumerate(places + ahead * state.elements[:, r.PLACE_RATE]):
+        for j, place in enumerate(places + ahead * state.elements[:, f.PLACE_RATE]):
             point, rows, k = under(ring, place)
             np.add.at(at[j, 0], np.arange(k, k + 8) % size, rows[0])
             np.add.at(at[j, 1], np.arange(k, k + 8) % size, rows[1])
@@ -201,5 +201,7 @@ def test_friction_against_lemke():
 
     march(belt, state, work, 1, dt, Proximal(theta=0.0, tolerance=1e-9))
     # within the tolerance of the laws, 1e-9 m/s of 10 g
-    np.testing.assert_allclose(state.elements[:, r.RING_IMPULSE], impulses, rtol=0, atol=1e-10)
-    np.testing.assert_allclose(state.elements[:, b.RING_SLIP], g + coupling @ impulses, rtol=0, atol=1e-8)
+    np.testing.assert_allclose(state.elements[:, f.RING_IMPULSE], impulses, rtol=0, atol=1e-10)
+    np.testing.assert_allclose(
+        state.elements[:, fields.RING_SLIP], g + coupling @ impulses, rtol=0, atol=1e-8
+    )

@@ -4,18 +4,10 @@ import numpy as np
 import pytest
 from scipy.optimize import brentq
 
+from cvt_hpc.physics import compliance
 from cvt_hpc.physics.clearance import bearing_direction, principal_axes
 from cvt_hpc.physics.compliance import (
-    CLOSED,
-    DIRECTION_ERROR,
-    GAP,
-    LEAST_LOAD,
-    LOOSE_1,
-    LOOSE_2,
-    PUSH,
     ROUNDS_OF_BLOCK_FLIPS,
-    SOLVES,
-    UNSOLVED,
     lane_contact,
     plain_contact,
     solve_contact,
@@ -37,10 +29,10 @@ def plain_force(wrap, gap):
 
 
 def lane_forces(contact, gaps):
-    contact.stations.data[:, GAP] = gaps
+    contact.stations.data[:, compliance.GAP] = gaps
     solve_contact(contact, MOST_ROUNDS)
-    closed = contact.stations.data[:, CLOSED] > 0.5
-    return np.where(closed, np.maximum(contact.stations.data[:, PUSH], 0.0), 0.0)
+    closed = contact.stations.data[:, compliance.CLOSED] > 0.5
+    return np.where(closed, np.maximum(contact.stations.data[:, compliance.PUSH], 0.0), 0.0)
 
 
 def tilting(wrap, force):
@@ -50,7 +42,7 @@ def tilting(wrap, force):
 
 def opening(wrap, gap, force, contact):
     """Gap of each station, by an opening that the law allows."""
-    s, loose = tilting(wrap, force), contact.scalars[0, [LOOSE_1, LOOSE_2]]
+    s, loose = tilting(wrap, force), contact.scalars[0, [compliance.LOOSE_1, compliance.LOOSE_2]]
     if np.linalg.norm(s) > 1e-3:  # else the direction is that of round-off
         assert loose == pytest.approx(wrap.clearance * s / np.linalg.norm(s), abs=1e-9 * wrap.clearance)
     assert np.linalg.norm(loose) <= wrap.clearance * (1.0 + 1e-12)
@@ -121,7 +113,7 @@ def test_gaps_are_closed_under_the_law(clearance, form):
             assert gap.min() > -1e-12
             assert np.abs(gap[alone > 0.0]).max(initial=0.0) < 1e-12
             bearing += np.linalg.norm(tilting(wrap, alone)) > 1.0
-        assert not contact.scalars.data[0, UNSOLVED].any()
+        assert not contact.scalars.data[0, compliance.UNSOLVED].any()
     assert (bearing > 10) == (clearance < 1e-4)  # wraps of more than half a turn hold a loose sheave
 
 
@@ -175,7 +167,7 @@ def test_no_clearance_is_the_contact_without_to_the_last_bit():
             expected, found = lane_forces(none, gaps), lane_forces(beside, gaps)
             assert np.array_equal(found[:, ::2], expected[:, ::2])
             assert not np.array_equal(found[:, 1::2], expected[:, 1::2])
-        for row in (SOLVES, UNSOLVED):
+        for row in (compliance.SOLVES, compliance.UNSOLVED):
             assert np.array_equal(beside.scalars.data[0, row, ::2], none.scalars.data[0, row, ::2])
 
 
@@ -195,7 +187,7 @@ def test_a_large_clearance_is_a_sheave_that_tilts_freely():
     expected = solve_lcp(wrap.element_stiffness * flexibility(free), wrap.element_stiffness * gap)
     assert force == pytest.approx(expected, abs=1e-4 * expected.max())
     assert force.max() > 1e4
-    assert np.linalg.norm(tilting(wrap, force)) <= plain_contact(wrap).scalars[0, LEAST_LOAD]
+    assert np.linalg.norm(tilting(wrap, force)) <= plain_contact(wrap).scalars[0, compliance.LEAST_LOAD]
 
 
 def test_a_stiff_collar_tilts_by_its_clearance_and_no_more():
@@ -239,7 +231,7 @@ def test_single_precision_knows_forces_to_its_round_off():
             # eps of the forces without clearance, times a condition of 1e4 where little resists tilting
             size = plain_force(wrap._replace(clearance=0.0), gaps[:, lane]).max()
             assert found[:, lane] == pytest.approx(exact, abs=5.0 + 6e-4 * size)
-        assert not contact.scalars.data[0, UNSOLVED].any()
+        assert not contact.scalars.data[0, compliance.UNSOLVED].any()
 
 
 def test_neighbours_do_not_change_a_bit():
@@ -277,9 +269,9 @@ def test_the_iteration_ends_from_every_load():
 def test_an_iteration_that_does_not_end_is_marked_in_its_lane_alone():
     random = np.random.default_rng(6)
     contact = lane_contact([with_clearance(random, 2e-5, stiffness=1.0) for _ in range(LANES)], np.float64)
-    contact.scalars.data[0, DIRECTION_ERROR, 3] = -10.0  # asks for what cannot be
+    contact.scalars.data[0, compliance.DIRECTION_ERROR, 3] = -10.0  # asks for what cannot be
     lane_forces(contact, np.full((STATIONS, LANES), -1e-4))
-    assert contact.scalars.data[0, UNSOLVED].tolist() == [0, 0, 0, 1, 0, 0, 0, 0]
+    assert contact.scalars.data[0, compliance.UNSOLVED].tolist() == [0, 0, 0, 1, 0, 0, 0, 0]
 
 
 @pytest.mark.parametrize("angle", [0.0, 0.4, np.pi / 4, np.pi / 2, 2.0])

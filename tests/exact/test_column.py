@@ -3,7 +3,8 @@
 import numpy as np
 import pytest
 
-from cvt_hpc.models.elastic_belt.belt import N_ELEMENT, N_RING, V_ELEMENT, V_RING, State, U, W
+from cvt_hpc.models.elastic_belt import fields as f
+from cvt_hpc.models.elastic_belt.belt import State
 from cvt_hpc.models.elastic_belt.column import column_across, column_forces, rocking_column
 from cvt_hpc.models.elastic_belt.rhs import accelerations, content_rates, strains
 from support.straight import LENGTH, MASS, moving_straight, straight_belt
@@ -118,10 +119,10 @@ def stiffness_of(belt, tension, push):
         sides = []
         for size in (1e-9, -1e-9):
             moved = fields.copy()
-            moved[W, j] = size
+            moved[f.W, j] = size
             strains(belt, moved, eps)
             accelerations(belt, State(moved, scalars), np.zeros(n), eps, rate, np.empty(n))
-            sides.append(rate[U].copy())
+            sides.append(rate[f.U].copy())
         found[:, j] = (sides[0] - sides[1]) / 2e-9
     inside = np.arange(1, n // 2)
     return found[np.ix_(inside, inside)] - found[np.ix_(inside, n - inside)]
@@ -155,7 +156,7 @@ def test_a_cut_column_is_in_balance():
     belt = pressed_belt()
     n, (fields, _) = belt.cell.size, moving_straight(belt, push=2000.0)
     place = np.arange(n) * belt.cell[0]
-    fields[W] = (
+    fields[f.W] = (
         2e-4 * np.sin(6.0 * np.pi * place / (2.0 * LENGTH)) * (place > LENGTH / 2) * (place < 1.5 * LENGTH)
     )
     eps, pressed, moment = np.empty((2, n)), np.empty(n), np.empty(n)
@@ -177,14 +178,16 @@ def stored(belt, fields):
     """Energy [J] of a straight belt at rest, tension and push of its cells, and half the squared rise over them."""
     eps, n = np.empty((2, belt.cell.size)), belt.cell.size
     strains(belt, fields, eps)
-    bent = np.array([belt.bending[j] @ fields[W][(j + np.arange(-2, 3)) % n] for j in range(n)])
-    rise = np.roll(fields[W], -1) - fields[W]
+    bent = np.array([belt.bending[j] @ fields[f.W][(j + np.arange(-2, 3)) % n] for j in range(n)])
+    rise = np.roll(fields[f.W], -1) - fields[f.W]
     turned = -(rise - np.roll(rise, 1)) / (belt.cell * belt.dual)
-    total = 0.5 * belt.dual @ (belt.mass * fields[U] ** 2 - fields[W] * bent)
+    total = 0.5 * belt.dual @ (belt.mass * fields[f.U] ** 2 - fields[f.W] * bent)
     total += (
-        0.5 * belt.dual @ (belt.element_mass * fields[V_ELEMENT] ** 2 + belt.ring_mass * fields[V_RING] ** 2)
+        0.5
+        * belt.dual
+        @ (belt.element_mass * fields[f.V_ELEMENT] ** 2 + belt.ring_mass * fields[f.V_RING] ** 2)
     )
-    total += 0.5 * belt.cell @ (fields[N_RING] * belt.ring_stiffness * eps[1] ** 2)
+    total += 0.5 * belt.cell @ (fields[f.N_RING] * belt.ring_stiffness * eps[1] ** 2)
     net, rocked = belt.ring_stiffness * eps[1], 0
     for c in range(n):
         for kappa in (turned[c], turned[(c + 1) % n]):
@@ -192,7 +195,7 @@ def stored(belt, fields):
             net[c] -= 0.5 * push
             rocked += push > 0.0 and abs(moment + EI * kappa) > 1e-3 * abs(moment)
             along = push**2 / EA + moment**2 / EI
-            total += 0.25 * belt.cell[c] * fields[N_ELEMENT, c] * along
+            total += 0.25 * belt.cell[c] * fields[f.N_ELEMENT, c] * along
     return total, net, 0.5 * rise**2 / belt.cell, rocked
 
 
@@ -202,7 +205,7 @@ def test_energy_is_kept_while_elements_rock():
     belt = pressed_belt(12, element_damping=0.0, element_mass=16.0)  # waves of 1.6 km/s, for longer steps
     n, state = belt.cell.size, moving_straight(belt, push=150.0)
     fields, place = state.fields, np.arange(belt.cell.size) * belt.cell[0]
-    fields[W] = 1e-4 * np.sin(2.0 * np.pi * place / LENGTH)
+    fields[f.W] = 1e-4 * np.sin(2.0 * np.pi * place / LENGTH)
     eps, step = np.empty((2, n)), 5e-7
 
     def rates(moved):
@@ -210,7 +213,7 @@ def test_energy_is_kept_while_elements_rock():
         strains(belt, moved, eps)
         content_rates(belt, now, eps, rate)
         accelerations(belt, now, np.zeros(n), eps, rate, np.empty(n))
-        rate[W] = moved[U]
+        rate[f.W] = moved[f.U]
         return rate
 
     total, net, half_squared, most = stored(belt, fields)
@@ -226,5 +229,5 @@ def test_energy_is_kept_while_elements_rock():
             net, half_squared, most = after, squared, max(most, rocked)
             left.append(total + net @ half_squared - first)
     # 2e-5 of what moves by then is seen, which rises from nothing
-    assert np.abs(left).max() < 1e-4 * 0.5 * belt.mass * belt.dual @ fields[U] ** 2
+    assert np.abs(left).max() < 1e-4 * 0.5 * belt.mass * belt.dual @ fields[f.U] ** 2
     assert most > n and np.ptp(net) > 50.0

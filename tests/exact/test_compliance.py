@@ -5,7 +5,8 @@ import pytest
 from hypothesis import given, settings
 from hypothesis import strategies as st
 
-from cvt_hpc.physics.compliance import CLOSED, ROUNDS_OF_BLOCK_FLIPS, plain_contact, solve_wrap
+from cvt_hpc.physics import compliance
+from cvt_hpc.physics.compliance import ROUNDS_OF_BLOCK_FLIPS, plain_contact, solve_wrap
 from cvt_hpc.physics.sheaves import flexibility, sheaves
 from support.complementarity import solve_lcp
 
@@ -23,7 +24,7 @@ def contact(sheave, gap, closed=None):
     """Forces, and the number of solves; `closed` is the set that the search starts from."""
     state, force = plain_contact(sheave), np.full(gap.size, np.nan)
     if closed is not None:
-        state.stations[:, CLOSED] = closed
+        state.stations[:, compliance.CLOSED] = closed
     return force, solve_wrap(state, gap, force), state
 
 
@@ -96,7 +97,7 @@ def test_forces_against_lemke(case):
     assert force.min() >= 0.0
     assert opening.min() >= -1e-12
     assert np.abs(force * opening).max() <= 1e-12 * max(force.max(), 1.0)
-    assert not np.any(force[state.stations[:, CLOSED] == 0.0])
+    assert not np.any(force[state.stations[:, compliance.CLOSED] == 0.0])
 
 
 @given(contacts())
@@ -108,7 +109,7 @@ def test_a_second_call_needs_one_solve_and_changes_nothing(case):
     assert solve_wrap(state, gap, again) == 1
     assert np.array_equal(again, force)
     # the history of sets leaves no trace in the forces beyond round-off
-    state.stations[:, CLOSED], state.fresh[0] = 1.0 - state.stations[:, CLOSED], False
+    state.stations[:, compliance.CLOSED], state.fresh[0] = 1.0 - state.stations[:, compliance.CLOSED], False
     assert solve_wrap(state, gap, again) > 0
     assert again == pytest.approx(force, abs=1e-5)
 
@@ -150,7 +151,7 @@ def test_overlapping_station_opens_behind_a_deep_one():
     gap[7], gap[8] = -1e-4, -1e-6
     force, _, state = contact(wrap(15, arc=0.03), gap)
     assert np.flatnonzero(force).tolist() == [7]
-    assert state.stations[8, CLOSED] == 0.0
+    assert state.stations[8, compliance.CLOSED] == 0.0
 
 
 @given(contacts())

@@ -3,13 +3,14 @@
 import numpy as np
 import pytest
 
-from cvt_hpc.models.elastic_belt.belt import N_RING, V_RING, State, U, W
+from cvt_hpc.models.elastic_belt import fields as f
+from cvt_hpc.models.elastic_belt.belt import State
 from cvt_hpc.models.elastic_belt.bending import NONE, PATH, STRAIGHT, bending_bands, bending_load
 from cvt_hpc.models.elastic_belt.rhs import accelerations, content_rates, strains
 from support.straight import moving_straight, straight_belt
 
 RADIUS, MASS, EI, CELLS = 0.048, 0.3, 0.5, 48  # of a ring whose length is that of the straight belt
-ROWS = W, U, V_RING, N_RING
+ROWS = f.W, f.U, f.V_RING, f.N_RING
 
 
 def ring(terms, speed=0.0):
@@ -45,8 +46,8 @@ def frequencies(terms, speed=0.0, foundation=0.0):
         strains(belt, fields, eps)
         content_rates(belt, state, eps, rate)
         accelerations(belt, state, np.zeros(n), eps, rate, np.empty(n))
-        rate[W] = fields[U]
-        rate[U] -= foundation / MASS * fields[W]
+        rate[f.W] = fields[f.U]
+        rate[f.U] -= foundation / MASS * fields[f.W]
         return rate[list(ROWS)].ravel()
 
     for k, (row, size) in enumerate(zip(ROWS, (1e-8, 1e-4, 1e-4, 1e-7), strict=True)):

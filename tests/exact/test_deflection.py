@@ -4,16 +4,8 @@ import numpy as np
 import pytest
 
 from cvt_hpc.lanes import LaneArray
-from cvt_hpc.physics.compliance import (
-    CLOSED,
-    GAP,
-    PUSH,
-    UNSOLVED,
-    lane_contact,
-    plain_contact,
-    solve_contact,
-    solve_wrap,
-)
+from cvt_hpc.physics import compliance
+from cvt_hpc.physics.compliance import lane_contact, plain_contact, solve_contact, solve_wrap
 from cvt_hpc.physics.deflection import cone_flexibilities, interpolated, table_matrix, table_problem
 from cvt_hpc.physics.sheaves import flexibility
 from support.complementarity import solve_lcp
@@ -32,11 +24,11 @@ def changing_sign(random):
 
 
 def forces(contact, gaps):
-    contact.stations.data[:, GAP] = gaps
+    contact.stations.data[:, compliance.GAP] = gaps
     solve_contact(contact, MOST_ROUNDS)
-    assert not contact.scalars.data[0, UNSOLVED].any()
-    closed = contact.stations.data[:, CLOSED] > 0.5
-    return np.where(closed, np.maximum(contact.stations.data[:, PUSH], 0.0), 0.0)
+    assert not contact.scalars.data[0, compliance.UNSOLVED].any()
+    closed = contact.stations.data[:, compliance.CLOSED] > 0.5
+    return np.where(closed, np.maximum(contact.stations.data[:, compliance.PUSH], 0.0), 0.0)
 
 
 def plain_force(wrap, gaps):

@@ -9,7 +9,8 @@ from functools import cache
 import numpy as np
 import pytest
 
-from cvt_hpc.models.elastic_belt.belt import DRIVEN_SPEED, mesh
+from cvt_hpc.models.elastic_belt import fields as f
+from cvt_hpc.models.elastic_belt.belt import mesh
 from cvt_hpc.models.elastic_belt.parameters import PARAMETERS
 from cvt_hpc.models.steady_variator.forces import distributions, quantities
 from cvt_hpc.models.steady_variator.walking import SteadyBelt
@@ -105,7 +106,7 @@ def errors(stations):
     return (
         np.abs(forces).max(),
         found["axial_force"][0] / exact.driving_thrust - 1.0,
-        steady.state.scalars[DRIVEN_SPEED] / exact.driven_speed - 1.0,
+        steady.state.scalars[f.DRIVEN_SPEED] / exact.driven_speed - 1.0,
     )
 
 

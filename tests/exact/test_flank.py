@@ -5,7 +5,8 @@ import pytest
 from hypothesis import assume, given
 from hypothesis import strategies as st
 
-from cvt_hpc.models.elastic_belt.belt import DRIVEN_POSITION, SCALARS, State, W, belt_constants
+from cvt_hpc.models.elastic_belt import fields as f
+from cvt_hpc.models.elastic_belt.belt import State, belt_constants
 from cvt_hpc.models.elastic_belt.parameters import PARAMETERS
 from cvt_hpc.models.elastic_belt.rhs import contact_forces, fresh_contacts
 from cvt_hpc.physics.flank import flank_forces, flank_sliding
@@ -64,14 +65,14 @@ def test_overlap_in_rigid_grooves():
     }
     belt = belt_constants(parameters)
     n, first, count = belt.cell.size, belt.driven_start, belt.driven.weight.size
-    fields, scalars, force = np.zeros((7, n)), np.zeros(len(SCALARS)), np.empty(n)
-    fields[W] = 1e-4 * np.sin(np.arange(n))
-    scalars[DRIVEN_POSITION] = -2e-5
+    fields, scalars, force = np.zeros((7, n)), np.zeros(len(f.SCALARS)), np.empty(n)
+    fields[f.W] = 1e-4 * np.sin(np.arange(n))
+    scalars[f.DRIVEN_POSITION] = -2e-5
     assert contact_forces(belt, State(fields, scalars), fresh_contacts(belt), force) > 0
 
     opening = np.full(n, np.inf)
     opening[: belt.driving.weight.size] = 3e-5
     opening[first : first + count] = -2e-5
-    overlap = np.maximum(-(opening + 2.0 * np.tan(np.deg2rad(11.0)) * fields[W]), 0.0)
+    overlap = np.maximum(-(opening + 2.0 * np.tan(np.deg2rad(11.0)) * fields[f.W]), 0.0)
     assert force == pytest.approx(3e10 * overlap, rel=1e-12)
     assert 0 < np.count_nonzero(force) < np.count_nonzero(np.isfinite(opening))

@@ -3,17 +3,8 @@
 import numpy as np
 import pytest
 
-from cvt_hpc.physics.compliance import (
-    CLOSED,
-    GAP,
-    PUSH,
-    SOLVES,
-    UNSOLVED,
-    lane_contact,
-    plain_contact,
-    solve_contact,
-    solve_wrap,
-)
+from cvt_hpc.physics import compliance
+from cvt_hpc.physics.compliance import lane_contact, plain_contact, solve_contact, solve_wrap
 from cvt_hpc.physics.sheaves import flexibility
 from support.complementarity import solve_lcp
 from support.wraps import STATIONS, courses, random_wrap
@@ -24,10 +15,10 @@ WIDTHS = {np.float64: 8, np.float32: 16}
 
 def solve(contact, gaps, most_rounds=MOST_ROUNDS):
     """Forces (stations, lanes) [N/m]."""
-    contact.stations.data[:, GAP] = gaps
+    contact.stations.data[:, compliance.GAP] = gaps
     solve_contact(contact, most_rounds)
-    closed = contact.stations.data[:, CLOSED] > 0.5
-    return np.where(closed, np.maximum(contact.stations.data[:, PUSH], 0.0), 0.0)
+    closed = contact.stations.data[:, compliance.CLOSED] > 0.5
+    return np.where(closed, np.maximum(contact.stations.data[:, compliance.PUSH], 0.0), 0.0)
 
 
 def batch(seed, dtype=np.float64, **values):
@@ -48,11 +39,11 @@ def test_each_lane_is_the_plain_solver(seed):
             force = np.empty(STATIONS)
             counts[lane] += solve_wrap(state, np.ascontiguousarray(gaps[:, lane]), force)
             assert np.array_equal(found[:, lane], force)
-            closed = state.stations[:, CLOSED]
-            assert np.array_equal(contact.stations.data[:, CLOSED, lane], closed)
+            closed = state.stations[:, compliance.CLOSED]
+            assert np.array_equal(contact.stations.data[:, compliance.CLOSED, lane], closed)
             sets.add(tuple(closed))
-        assert np.array_equal(contact.scalars.data[0, SOLVES], counts)
-        assert not contact.scalars.data[0, UNSOLVED].any()
+        assert np.array_equal(contact.scalars.data[0, compliance.SOLVES], counts)
+        assert not contact.scalars.data[0, compliance.UNSOLVED].any()
     assert len(sets) > len(wraps)
 
 
@@ -87,7 +78,7 @@ def test_single_precision_knows_forces_to_its_round_off():
             assert solve_wrap(plain_contact(wrap), given, force) > 0
             # stations may be on the wrong side by 2 N/m; eps = 6e-8 times a condition of 1e2 of forces of 1e6 N/m
             assert found[:, lane] == pytest.approx(force, abs=2.0 + 3e-5 * force.max())
-        assert not contact.scalars.data[0, UNSOLVED].any()
+        assert not contact.scalars.data[0, compliance.UNSOLVED].any()
 
 
 @pytest.mark.parametrize("bad", [np.nan, np.inf, -np.inf])
@@ -99,7 +90,7 @@ def test_a_lane_without_numbers_does_not_disturb_the_others(bad):
     for gaps, bad_gaps in zip(course, spoiled, strict=True):
         expected, found = solve(contact, gaps), solve(other, bad_gaps)
         assert np.array_equal(found[:, rest], expected[:, rest])
-        for row in (SOLVES, UNSOLVED):
+        for row in (compliance.SOLVES, compliance.UNSOLVED):
             assert np.array_equal(other.scalars.data[0, row, rest], contact.scalars.data[0, row, rest])
 
 
@@ -109,11 +100,11 @@ def test_a_search_that_does_not_end_is_marked_in_its_lane_alone():
     gaps = np.full((STATIONS, 8), -1e-4)
     gaps[9, 3] = 1e-3
     solve(contact, gaps, most_rounds=1)
-    assert contact.scalars.data[0, UNSOLVED].tolist() == [0, 0, 0, 1, 0, 0, 0, 0]
-    assert contact.scalars.data[0, SOLVES].tolist() == [1, 1, 1, 2, 1, 1, 1, 1]
+    assert contact.scalars.data[0, compliance.UNSOLVED].tolist() == [0, 0, 0, 1, 0, 0, 0, 0]
+    assert contact.scalars.data[0, compliance.SOLVES].tolist() == [1, 1, 1, 2, 1, 1, 1, 1]
     # what is marked stays so
     solve(contact, gaps)
-    assert contact.scalars.data[0, UNSOLVED].tolist() == [0, 0, 0, 1, 0, 0, 0, 0]
+    assert contact.scalars.data[0, compliance.UNSOLVED].tolist() == [0, 0, 0, 1, 0, 0, 0, 0]
 
 
 def test_neighbours_do_not_change_a_bit():

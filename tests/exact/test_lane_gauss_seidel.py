@@ -3,7 +3,8 @@
 import numpy as np
 import pytest
 
-from cvt_hpc.physics.compliance import GAP, PUSH, SOLVES, lane_contact, plain_contact, solve_wrap
+from cvt_hpc.physics import compliance
+from cvt_hpc.physics.compliance import lane_contact, plain_contact, solve_wrap
 from cvt_hpc.physics.lane_gauss_seidel import sweep_lane_contact
 from cvt_hpc.physics.sheaves import flexibility
 from support.wraps import STATIONS, courses, random_wrap
@@ -18,9 +19,9 @@ def batch(seed, sweeps, stiffness=None):
 
 
 def swept(contact, gaps):
-    contact.stations.data[:, GAP] = gaps
+    contact.stations.data[:, compliance.GAP] = gaps
     sweep_lane_contact(contact)
-    return contact.stations.data[:, PUSH].copy()
+    return contact.stations.data[:, compliance.PUSH].copy()
 
 
 def swept_densely(matrix, gap, force, sweeps):
@@ -40,7 +41,7 @@ def test_each_lane_is_swept_as_the_dense_matrix_is(sweeps):
             swept_densely(matrix, gaps[:, lane], force, sweeps)
             # round-off of forces of up to 1e7 N/m
             assert found[:, lane] == pytest.approx(force, abs=1e-5)
-        assert np.all(contact.scalars.data[0, SOLVES] == call)
+        assert np.all(contact.scalars.data[0, compliance.SOLVES] == call)
     assert 0 < np.count_nonzero(found) < found.size
 
 

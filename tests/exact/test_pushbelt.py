@@ -9,6 +9,7 @@ import pytest
 from cvt_hpc.job import build_job
 from cvt_hpc.lanes import LaneArray
 from cvt_hpc.models.pushbelt import belt as b
+from cvt_hpc.models.pushbelt import fields as pushbelt_fields
 from cvt_hpc.models.pushbelt import start as starting
 from cvt_hpc.models.pushbelt import stepping, transient
 from cvt_hpc.models.pushbelt.assembly import RIGHT
@@ -24,7 +25,7 @@ from support.pushbelts import NODES, SPEED, THRUST, given
 
 STEP = 1e-5  # [s]
 LOAD = 81.0  # [N m]
-U = slice(b.U_Y, b.V + 1)
+U = slice(pushbelt_fields.U_Y, pushbelt_fields.V + 1)
 
 
 def fields(array):
@@ -49,19 +50,19 @@ def shaken(seed, **changes):
     belt, state = start(given(nodes=64, modal_stiffness=stiffness, **smooth, **noses, **changes))
     rng = np.random.default_rng(seed)
     f = fields(state.elements)
-    f[:, [b.Y, b.Z]] += rng.normal(0.0, 2e-5, (64, 2))
+    f[:, [pushbelt_fields.Y, pushbelt_fields.Z]] += rng.normal(0.0, 2e-5, (64, 2))
     turn = rng.normal(0.0, 2e-3, 64)
-    x, z = f[:, b.HEADING_Y].copy(), f[:, b.HEADING_Z].copy()
-    f[:, b.HEADING_Y], f[:, b.HEADING_Z] = (
+    x, z = f[:, pushbelt_fields.HEADING_Y].copy(), f[:, pushbelt_fields.HEADING_Z].copy()
+    f[:, pushbelt_fields.HEADING_Y], f[:, pushbelt_fields.HEADING_Z] = (
         np.cos(turn) * x - np.sin(turn) * z,
         np.sin(turn) * x + np.cos(turn) * z,
     )
     f[:, U] += rng.normal(0.0, 0.05, (64, 4))
-    f[:, b.SADDLE] = rng.uniform(20.0, 80.0, 64)
-    f[:, b.V_FILTERED] = rng.uniform(0.0, 0.2, 64)
+    f[:, pushbelt_fields.SADDLE] = rng.uniform(20.0, 80.0, 64)
+    f[:, pushbelt_fields.V_FILTERED] = rng.uniform(0.0, 0.2, 64)
     write(state.elements, f)
     state.openings[:] = rng.normal(0.0, 1e-6, state.openings.shape)
-    state.pulleys[[b.DRIVING_RADIUS, b.DRIVEN_RADIUS]] += 1e-4
+    state.pulleys[[pushbelt_fields.DRIVING_RADIUS, pushbelt_fields.DRIVEN_RADIUS]] += 1e-4
     return belt._replace(thickness=belt.thickness + 2e-5), state, workspace(belt, 64), rng
 
 
@@ -69,7 +70,7 @@ def evaluated(belt, state, work, dt):
     """Residuals of elements and border, of an iterate evaluated twice, so that duals are those of its slips."""
     for _ in range(2):
         _evaluate(belt, state, work, LOAD, dt)
-    own = of_lanes(work.iterate)[:, b.RESIDUAL : b.RESIDUAL + 4]
+    own = of_lanes(work.iterate)[:, pushbelt_fields.RESIDUAL : pushbelt_fields.RESIDUAL + 4]
     return np.concatenate([own.ravel(), work.border[:, -1]])
 
 
@@ -80,8 +81,8 @@ def test_rates_of_gaps_strains_angles_and_depths():
     f, x = fields(state.elements), rng.normal(0.0, 1.0, (64, 4)) * [1.0, 1.0, 100.0, 1.0]
     f[:, U] = 0.0
     # the direction of the tension is its rate at rest: at strains of zero
-    points = f[:, [b.Y, b.Z]]
-    f[:, b.LENGTH] = np.linalg.norm(np.roll(points, -1, 0) - points, axis=1)
+    points = f[:, [pushbelt_fields.Y, pushbelt_fields.Z]]
+    f[:, pushbelt_fields.LENGTH] = np.linalg.norm(np.roll(points, -1, 0) - points, axis=1)
 
     small = 1e-7  # [m/s]; a step's length is a second
     measured = {}
@@ -98,21 +99,26 @@ def test_rates_of_gaps_strains_angles_and_depths():
     forces = {}
     for share in (0.0, small):
         g = fields(state.elements)
-        g[:, b.CHANGE : b.CHANGE + 4] = share * x
+        g[:, pushbelt_fields.CHANGE : pushbelt_fields.CHANGE + 4] = share * x
         write(state.elements, g)
         evaluated(belt, state, work, 1.0)
         forces[share] = fields(work.iterate), fields(state.elements)
     iterate, elements = ((forces[small][k] - forces[0.0][k]) / small for k in (0, 1))
     pairs = {
-        b.PREDICTED_TENSION: iterate[:, b.ITERATE_TENSION],
-        b.EDGE_GAP: -elements[:, b.EDGE] / belt.contact_stiffness,
-        b.HEAD_GAP: -elements[:, b.HEAD] / belt.contact_stiffness,
-        b.NOSE_OFFSET: elements[:, b.NOSE] / belt.nose_stiffness,
-        b.PREDICTED_MOMENT_I: iterate[:, b.MOMENT_I],
-        b.PREDICTED_MOMENT_J: iterate[:, b.MOMENT_J],
-        b.PREDICTED_DEPTH: elements[:, b.FLANK] / belt.flank_stiffness,
+        pushbelt_fields.PREDICTED_TENSION: iterate[:, pushbelt_fields.ITERATE_TENSION],
+        pushbelt_fields.EDGE_GAP: -elements[:, pushbelt_fields.EDGE] / belt.contact_stiffness,
+        pushbelt_fields.HEAD_GAP: -elements[:, pushbelt_fields.HEAD] / belt.contact_stiffness,
+        pushbelt_fields.NOSE_OFFSET: elements[:, pushbelt_fields.NOSE] / belt.nose_stiffness,
+        pushbelt_fields.PREDICTED_MOMENT_I: iterate[:, pushbelt_fields.MOMENT_I],
+        pushbelt_fields.PREDICTED_MOMENT_J: iterate[:, pushbelt_fields.MOMENT_J],
+        pushbelt_fields.PREDICTED_DEPTH: elements[:, pushbelt_fields.FLANK] / belt.flank_stiffness,
     }
-    one_sided = {b.EDGE_GAP: b.EDGE, b.HEAD_GAP: b.HEAD, b.NOSE_OFFSET: b.NOSE, b.PREDICTED_DEPTH: b.FLANK}
+    one_sided = {
+        pushbelt_fields.EDGE_GAP: pushbelt_fields.EDGE,
+        pushbelt_fields.HEAD_GAP: pushbelt_fields.HEAD,
+        pushbelt_fields.NOSE_OFFSET: pushbelt_fields.NOSE,
+        pushbelt_fields.PREDICTED_DEPTH: pushbelt_fields.FLANK,
+    }
     for field, rate in pairs.items():
         # 1e-7: central differences of steps of 0.1 um; angles enter by their sine, whose slope at q_k is taken
         pressed = forces[0.0][1][:, one_sided[field]] != 0.0 if field in one_sided else np.full(64, True)
@@ -125,10 +131,10 @@ def test_forces_between_elements_carry_no_force_and_no_moment():
     belt = belt._replace(flank_stiffness=0.0, ring_friction=0.0, transverse_damping=0.0)
     _prepare(belt, state, work, STEP)
     evaluated(belt, state, work, STEP)
-    f, t = fields(state.elements), fields(work.step)[:, [b.T_Y, b.T_Z]]
-    r = fields(work.iterate)[:, b.RESIDUAL : b.RESIDUAL + 4]
+    f, t = fields(state.elements), fields(work.step)[:, [pushbelt_fields.T_Y, pushbelt_fields.T_Z]]
+    r = fields(work.iterate)[:, pushbelt_fields.RESIDUAL : pushbelt_fields.RESIDUAL + 4]
     force = r[:, :2] + r[:, 3:] * t
-    moment = f[:, b.Y] * force[:, 1] - f[:, b.Z] * force[:, 0] + r[:, 2]
+    moment = f[:, pushbelt_fields.Y] * force[:, 1] - f[:, pushbelt_fields.Z] * force[:, 0] + r[:, 2]
     scale = np.abs(force).sum()
     assert scale > 1e4
     # round-off of forces, and of moments on radii below 0.3 m
@@ -144,7 +150,9 @@ def test_newton_correction_is_that_of_differences(law):
     evaluated(belt, state, work, STEP)
     f, border = fields(state.elements), state.increments.size
     base = evaluated(belt, state, work, STEP)
-    assert (f[:, [b.EDGE, b.HEAD, b.FLANK, b.NOSE]] > 0.0).any(0).all() and (f[:, b.NOSE] < 0.0).any()
+    assert (
+        f[:, [pushbelt_fields.EDGE, pushbelt_fields.HEAD, pushbelt_fields.FLANK, pushbelt_fields.NOSE]] > 0.0
+    ).any(0).all() and (f[:, pushbelt_fields.NOSE] < 0.0).any()
 
     small = 1e-7  # [m/s]; of openings and angular velocities in their own units
     slopes = np.zeros((base.size, base.size))
@@ -155,7 +163,7 @@ def test_newton_correction_is_that_of_differences(law):
             g = f.copy()
             state.increments[:] = 0.0
             if k < 256:
-                g[k // 4, b.CHANGE + k % 4] += sign * size
+                g[k // 4, pushbelt_fields.CHANGE + k % 4] += sign * size
             else:
                 state.increments[k - 256] = sign * size
             write(state.elements, g)
@@ -168,7 +176,7 @@ def test_newton_correction_is_that_of_differences(law):
     evaluated(belt, state, work, STEP)
     _assemble(belt, state, work, STEP)
     solve_bordered(EQUATIONS, belt, state, work, b.NEWTON.weights, STEP)
-    correct(state, work, b.NEWTON.weights, b.CHANGE, 1.0)
+    correct(state, work, b.NEWTON.weights, pushbelt_fields.CHANGE, 1.0)
     change = fields(work.blocks)[:, RIGHT : RIGHT + 4].ravel()
     assert border == 7
     for found, wanted in ((change, expected[:256]), (state.increments, expected[256:])):
@@ -199,30 +207,39 @@ def test_free_spinning_ring():
     radius, omega = 0.1082, 250.0
     belt, state = start(given())
     belt = belt._replace(thickness=1e-3, centre_distance=10.0, transverse_damping=0.0)
-    state.pulleys[[b.DRIVING_RADIUS, b.DRIVEN_RADIUS]] = 0.01
+    state.pulleys[[pushbelt_fields.DRIVING_RADIUS, pushbelt_fields.DRIVEN_RADIUS]] = 0.01
     angle = 2.0 * np.pi * np.arange(NODES) / NODES
     o, x = np.stack([np.cos(angle), np.sin(angle)], 1), np.stack([-np.sin(angle), np.cos(angle)], 1)
     tension = (belt.mass + belt.ring_mass) * radius * omega**2 / (2.0 * np.sin(np.pi / NODES))
     assert tension == pytest.approx(1041.79, rel=5e-4)  # of a round ring
-    f = np.zeros((NODES, b.STATE_FIELDS))
-    f[:, [b.Y, b.Z]] = radius * o + [2.0, 0.0]
-    f[:, [b.HEADING_Y, b.HEADING_Z]] = x
-    f[:, [b.U_Y, b.U_Z]], f[:, b.OMEGA], f[:, b.V] = radius * omega * x, omega, radius * omega
+    f = np.zeros((NODES, pushbelt_fields.STATE_FIELDS))
+    f[:, [pushbelt_fields.Y, pushbelt_fields.Z]] = radius * o + [2.0, 0.0]
+    f[:, [pushbelt_fields.HEADING_Y, pushbelt_fields.HEADING_Z]] = x
+    f[:, [pushbelt_fields.U_Y, pushbelt_fields.U_Z]], f[:, pushbelt_fields.OMEGA], f[:, pushbelt_fields.V] = (
+        radius * omega * x,
+        omega,
+        radius * omega,
+    )
     chord = 2.0 * radius * np.sin(np.pi / NODES)
-    f[:, b.LENGTH] = chord / (1.0 + tension / belt.ring_stiffness)
+    f[:, pushbelt_fields.LENGTH] = chord / (1.0 + tension / belt.ring_stiffness)
     write(state.elements, f)
     work = workspace(belt, NODES)
-    assert advance(belt, b.NEWTON, state, work, np.zeros((2, b.INPUTS)), 1000, STEP) == b.CONVERGED
+    assert (
+        advance(belt, b.NEWTON, state, work, np.zeros((2, pushbelt_fields.INPUTS)), 1000, STEP)
+        == pushbelt_fields.CONVERGED
+    )
     f = fields(state.elements)
     # 1e-4: speeds are those half a step before, whose start is not on the discrete orbit
-    assert f[:, b.TENSION] == pytest.approx(tension, rel=1e-4)
-    assert np.hypot(f[:, b.Y] - 2.0, f[:, b.Z]) == pytest.approx(radius, rel=1e-6)
+    assert f[:, pushbelt_fields.TENSION] == pytest.approx(tension, rel=1e-4)
+    assert np.hypot(f[:, pushbelt_fields.Y] - 2.0, f[:, pushbelt_fields.Z]) == pytest.approx(radius, rel=1e-6)
     momentum = f[:, U][:, :2].sum(0) * belt.mass
     assert momentum == pytest.approx(0.0, abs=1e-9)
-    spin = (f[:, b.Y] - 2.0) * f[:, b.U_Z] - f[:, b.Z] * f[:, b.U_Y]
-    assert (belt.mass * spin.sum() + belt.ring_mass * radius * f[:, b.V].sum()) == pytest.approx(
-        (belt.mass + belt.ring_mass) * NODES * radius**2 * omega, rel=1e-6
-    )
+    spin = (f[:, pushbelt_fields.Y] - 2.0) * f[:, pushbelt_fields.U_Z] - f[:, pushbelt_fields.Z] * f[
+        :, pushbelt_fields.U_Y
+    ]
+    assert (
+        belt.mass * spin.sum() + belt.ring_mass * radius * f[:, pushbelt_fields.V].sum()
+    ) == pytest.approx((belt.mass + belt.ring_mass) * NODES * radius**2 * omega, rel=1e-6)
 
 
 def test_a_strand_decays_by_the_transverse_damping():
@@ -236,26 +253,29 @@ def test_a_strand_decays_by_the_transverse_damping():
     def march(f, damping, steps):
         write(state.elements, f)
         damped = belt._replace(transverse_damping=damping * pitch)
-        assert advance(damped, b.NEWTON, state, work, np.zeros((2, b.INPUTS)), steps, STEP) == b.CONVERGED
+        assert (
+            advance(damped, b.NEWTON, state, work, np.zeros((2, pushbelt_fields.INPUTS)), steps, STEP)
+            == pushbelt_fields.CONVERGED
+        )
         return fields(state.elements)
 
     f = fields(state.elements)
     f[:, U] = 0.0
     f = march(f, 2e4, 4000)
-    t1 = (f[:, b.Z] < 0.0) & (np.abs(f[:, b.Y] - 0.0775) < 0.0775)
-    shape = np.where(t1, np.sin(np.pi * f[:, b.Y] / 0.155), 0.0)
-    f[:, b.U_Z] -= speed * shape
+    t1 = (f[:, pushbelt_fields.Z] < 0.0) & (np.abs(f[:, pushbelt_fields.Y] - 0.0775) < 0.0775)
+    shape = np.where(t1, np.sin(np.pi * f[:, pushbelt_fields.Y] / 0.155), 0.0)
+    f[:, pushbelt_fields.U_Z] -= speed * shape
     rates, lost = [], []
     for damping in (0.0, 500.0):
-        g, w, before = f, [], state.totals[b.BELT_LOSS]
+        g, w, before = f, [], state.totals[pushbelt_fields.BELT_LOSS]
         for _ in range(300):
             g = march(g, damping, 10)
-            w.append((g[:, b.Z] - f[:, b.Z]) @ shape)
+            w.append((g[:, pushbelt_fields.Z] - f[:, pushbelt_fields.Z]) @ shape)
         # x(t + h) = 2 r cos(w h) x(t) - r^2 x(t - h) + const, with r = exp(-rate h)
         x = np.array(w)
         known = np.stack([x[1:-1], -x[:-2], np.ones(298)], 1)
         rates.append(-np.log(np.linalg.lstsq(known, x[2:], rcond=None)[0][1]) / (20 * STEP))
-        lost.append(state.totals[b.BELT_LOSS] - before)
+        lost.append(state.totals[pushbelt_fields.BELT_LOSS] - before)
     expected = 500.0 * pitch / (2.0 * mass)
     assert abs(rates[0]) < 0.02 * expected  # by friction of the elements at the arcs' ends
     # 0.5 %: the step adds rate x step, 0.2 %
@@ -270,14 +290,14 @@ def on_a_pulley(values, speed, pressed):
     nodes = values["elements"]
     belt = belt._replace(centre_distance=10.0, thickness=1e-3, ring_stiffness=1e-9, transverse_damping=0.0)
     radius, angle = 0.1, 2.0 * np.pi * np.arange(nodes) / nodes
-    f = np.zeros((nodes, b.STATE_FIELDS))
-    f[:, b.Y], f[:, b.Z] = radius * np.cos(angle), radius * np.sin(angle)
-    f[:, b.HEADING_Y], f[:, b.HEADING_Z] = -np.sin(angle), np.cos(angle)
-    f[:, b.LENGTH] = 2.0 * radius * np.sin(np.pi / nodes)
+    f = np.zeros((nodes, pushbelt_fields.STATE_FIELDS))
+    f[:, pushbelt_fields.Y], f[:, pushbelt_fields.Z] = radius * np.cos(angle), radius * np.sin(angle)
+    f[:, pushbelt_fields.HEADING_Y], f[:, pushbelt_fields.HEADING_Z] = -np.sin(angle), np.cos(angle)
+    f[:, pushbelt_fields.LENGTH] = 2.0 * radius * np.sin(np.pi / nodes)
     write(state.elements, f)
     pitch_radius = radius - belt.pitch_depth
     state.pulleys[:] = speed / pitch_radius, 0.0, pitch_radius, 0.01
-    state.pulleys[b.DRIVING_RADIUS] += pressed / (belt.flank_stiffness * belt.sine)
+    state.pulleys[pushbelt_fields.DRIVING_RADIUS] += pressed / (belt.flank_stiffness * belt.sine)
     return belt, state, workspace(belt, nodes)
 
 
@@ -287,20 +307,22 @@ def test_friction_is_read_at_a_speed_that_follows_with_memory():
     falling = {"friction_law": "stribeck", "friction_gradient": -0.4, "friction_memory": memory}
     belt, state, work = on_a_pulley(given(**falling), sliding, force)
     belt = belt._replace(mass=1e6, inertia=1e6)
-    inputs = np.array([[state.pulleys[b.DRIVING_SPEED], 0.0, 0.0, 0.0, 0.0]] * 2)
+    inputs = np.array([[state.pulleys[pushbelt_fields.DRIVING_SPEED], 0.0, 0.0, 0.0, 0.0]] * 2)
     for k in range(1, 11):
-        assert advance(belt, b.NEWTON, state, work, inputs, 10, STEP) == b.CONVERGED
+        assert advance(belt, b.NEWTON, state, work, inputs, 10, STEP) == pushbelt_fields.CONVERGED
         f = fields(state.elements)
         # implicit Euler: n (dt / tau)^2 / 2 exp(-n dt / tau) is at most dt / (2 e tau), 0.6 %
         expected = sliding * (1.0 - np.exp(-10 * k * STEP / memory))
-        assert f[:, b.V_FILTERED] == pytest.approx(expected, abs=7e-3 * sliding)
-        mu = belt.flank_kinetic + 0.4 * 0.1 * np.exp(-f[:, b.V_FILTERED] / 0.1)
-        assert f[:, b.FLANK_FRICTION_T] == pytest.approx(-mu * f[:, b.FLANK], rel=1e-6)
-    assert f[:, b.FLANK] == pytest.approx(force, rel=1e-3)
-    state.pulleys[b.DRIVING_RADIUS] -= 1e-4  # out of contact it has no memory
+        assert f[:, pushbelt_fields.V_FILTERED] == pytest.approx(expected, abs=7e-3 * sliding)
+        mu = belt.flank_kinetic + 0.4 * 0.1 * np.exp(-f[:, pushbelt_fields.V_FILTERED] / 0.1)
+        assert f[:, pushbelt_fields.FLANK_FRICTION_T] == pytest.approx(
+            -mu * f[:, pushbelt_fields.FLANK], rel=1e-6
+        )
+    assert f[:, pushbelt_fields.FLANK] == pytest.approx(force, rel=1e-3)
+    state.pulleys[pushbelt_fields.DRIVING_RADIUS] -= 1e-4  # out of contact it has no memory
     inputs[:, 0] *= 0.5
     advance(belt, b.NEWTON, state, work, inputs, 1, STEP)
-    assert fields(state.elements)[:, b.V_FILTERED] == pytest.approx(0.5 * sliding, rel=1e-6)
+    assert fields(state.elements)[:, pushbelt_fields.V_FILTERED] == pytest.approx(0.5 * sliding, rel=1e-6)
 
 
 @pytest.mark.parametrize("memory", [0.0, 0.3e-3])
@@ -328,13 +350,15 @@ def test_the_longest_step_of_falling_friction(memory):
         left = []
         for change in (0.0, -1e-5):
             f = fields(state.elements)
-            f[:, b.CHANGE : b.CHANGE + 4] = 0.0
-            f[:, [b.CHANGE, b.CHANGE + 1]] = change * f[:, [b.HEADING_Y, b.HEADING_Z]]
+            f[:, pushbelt_fields.CHANGE : pushbelt_fields.CHANGE + 4] = 0.0
+            f[:, [pushbelt_fields.CHANGE, pushbelt_fields.CHANGE + 1]] = (
+                change * f[:, [pushbelt_fields.HEADING_Y, pushbelt_fields.HEADING_Z]]
+            )
             write(state.elements, f)
             _prepare(belt, state, work, share * limit)
             evaluated(belt, state, work, share * limit)
-            r = fields(work.iterate)[:, b.RESIDUAL : b.RESIDUAL + 2]
-            left.append((r * f[:, [b.HEADING_Y, b.HEADING_Z]]).sum(1))
+            r = fields(work.iterate)[:, pushbelt_fields.RESIDUAL : pushbelt_fields.RESIDUAL + 2]
+            left.append((r * f[:, [pushbelt_fields.HEADING_Y, pushbelt_fields.HEADING_Z]]).sum(1))
         assert ((left[1] > left[0]) == falls).all()
 
 
@@ -346,7 +370,9 @@ def driven_in(dt, **changes):
     clamped = constant(THRUST, 0.0)[0]
     for begin, end, duration in ((small, clamped, 0.02), (clamped, full, 0.02), (full, full, 0.04)):
         steps = round(duration / dt)
-        assert advance(belt, newton, state, work, np.array([begin, end]), steps, dt) == b.CONVERGED
+        assert (
+            advance(belt, newton, state, work, np.array([begin, end]), steps, dt) == pushbelt_fields.CONVERGED
+        )
     return belt, state, work
 
 
@@ -361,19 +387,28 @@ def observed(belt, state, work, dt, duration=0.0448):
     before, samples, sheaves = np.append(state.totals, stored(belt, state)), [], []
     for _ in range(64):
         steps = round(duration / 64 / dt)
-        assert advance(belt, b.NEWTON, state, work, constant(THRUST, LOAD), steps, dt) == b.CONVERGED
+        assert (
+            advance(belt, b.NEWTON, state, work, constant(THRUST, LOAD), steps, dt)
+            == pushbelt_fields.CONVERGED
+        )
         samples.append(fields(state.elements))
         sheaves.append((state.pulleys.copy(), state.openings.copy()))
     total = np.append(state.totals, stored(belt, state)) - before
     samples = np.array(samples)
-    middle = (samples[:, :, b.Y] > 0.04) & (samples[:, :, b.Y] < 0.11)
-    push = samples[:, :, b.EDGE] + samples[:, :, b.HEAD]
-    lower, upper = middle & (samples[:, :, b.Z] < 0.0), middle & (samples[:, :, b.Z] > 0.0)
+    middle = (samples[:, :, pushbelt_fields.Y] > 0.04) & (samples[:, :, pushbelt_fields.Y] < 0.11)
+    push = samples[:, :, pushbelt_fields.EDGE] + samples[:, :, pushbelt_fields.HEAD]
+    lower, upper = (
+        middle & (samples[:, :, pushbelt_fields.Z] < 0.0),
+        middle & (samples[:, :, pushbelt_fields.Z] > 0.0),
+    )
     strands = {
         "push": (push[lower].mean(), push[upper].mean()),
-        "tension": (samples[..., b.TENSION][lower].mean(), samples[..., b.TENSION][upper].mean()),
+        "tension": (
+            samples[..., pushbelt_fields.TENSION][lower].mean(),
+            samples[..., pushbelt_fields.TENSION][upper].mean(),
+        ),
     }
-    return total / total[b.TIME], strands, samples, sheaves
+    return total / total[pushbelt_fields.TIME], strands, samples, sheaves
 
 
 @pytest.fixture(scope="module", params=[(), ((6e8, 3e8, 3e8, 9e8, 9e8),) * 2], ids=["rigid", "elastic"])
@@ -384,25 +419,39 @@ def run(request):
 
 def test_power_balance_over_a_revolution(run):
     rates = run[3]
-    losses = rates[[b.FLANK_LOSS, b.RING_LOSS, b.DAMPING_LOSS, b.BELT_LOSS]]
-    damped = rates[list(b.DAMPED.values())]
-    taken = rates[b.WORK_IN] - rates[b.WORK_OUT] - rates[b.THRUST_WORK] - rates[b.TOTALS]
+    losses = rates[
+        [
+            pushbelt_fields.FLANK_LOSS,
+            pushbelt_fields.RING_LOSS,
+            pushbelt_fields.DAMPING_LOSS,
+            pushbelt_fields.BELT_LOSS,
+        ]
+    ]
+    damped = rates[list(pushbelt_fields.DAMPED.values())]
+    taken = (
+        rates[pushbelt_fields.WORK_IN]
+        - rates[pushbelt_fields.WORK_OUT]
+        - rates[pushbelt_fields.THRUST_WORK]
+        - rates[pushbelt_fields.TOTALS]
+    )
     # what Newton's method leaves; elastic sheaves lean along the arc, which has no part in the forces
     assert taken - losses.sum() - damped.sum() == pytest.approx(0.0, abs=2e-3 * losses.sum())
     assert damped.sum() > 20.0 and (damped > 0.05).all() and (losses > 1.0).all()
     # the springs of tilt and their dampers act on the same rates
     tilt = STEP * run[0].angle_stiffness / run[0].angle_damping
-    assert rates[b.TILT_DAMPED] == pytest.approx(tilt * rates[b.DAMPING_LOSS], rel=0.01)
-    assert abs(rates[b.POWER_RESIDUAL]) < 1.0
+    assert rates[pushbelt_fields.TILT_DAMPED] == pytest.approx(
+        tilt * rates[pushbelt_fields.DAMPING_LOSS], rel=0.01
+    )
+    assert abs(rates[pushbelt_fields.POWER_RESIDUAL]) < 1.0
 
 
 def test_torque_is_carried_by_push_and_tension(run):
     belt, state, _, rates, strands, *_ = run
-    radius = state.pulleys[b.DRIVING_RADIUS]
+    radius = state.pulleys[pushbelt_fields.DRIVING_RADIUS]
     push, tension = np.diff(strands["push"])[0], np.diff(strands["tension"])[0]
     moment = -push * radius + tension * (radius + belt.pitch_depth)
     # 1 %: strands vibrate, and flanks give way
-    assert rates[b.WORK_IN] / SPEED == pytest.approx(moment, rel=0.01)
+    assert rates[pushbelt_fields.WORK_IN] / SPEED == pytest.approx(moment, rel=0.01)
     assert strands["push"][0] > 600.0 and strands["push"][1] < 10.0
 
 
@@ -417,8 +466,8 @@ def test_ring_friction_is_eytelwein(run):
 
 def frame(f):
     """Saddle points, running directions and outward normals."""
-    x = f[:, [b.HEADING_Y, b.HEADING_Z]]
-    return f[:, [b.Y, b.Z]], x, np.stack([x[:, 1], -x[:, 0]], 1)
+    x = f[:, [pushbelt_fields.HEADING_Y, pushbelt_fields.HEADING_Z]]
+    return f[:, [pushbelt_fields.Y, pushbelt_fields.Z]], x, np.stack([x[:, 1], -x[:, 0]], 1)
 
 
 def pitch_points(belt, f, driven):
@@ -442,35 +491,48 @@ def test_contacts_hold_their_laws(run):
     belt, *_, samples, sheaves = run
     mu = belt.flank_kinetic
     for f, (pulleys, openings) in zip(samples, sheaves, strict=True):
-        sliding = np.hypot(f[:, b.FLANK_SLIP_M], f[:, b.FLANK_SLIP_T])
-        grip = np.hypot(f[:, b.FLANK_FRICTION_M], f[:, b.FLANK_FRICTION_T])
-        assert (f[:, [b.EDGE, b.HEAD, b.FLANK, b.SADDLE]] >= 0.0).all()
+        sliding = np.hypot(f[:, pushbelt_fields.FLANK_SLIP_M], f[:, pushbelt_fields.FLANK_SLIP_T])
+        grip = np.hypot(f[:, pushbelt_fields.FLANK_FRICTION_M], f[:, pushbelt_fields.FLANK_FRICTION_T])
+        assert (
+            f[:, [pushbelt_fields.EDGE, pushbelt_fields.HEAD, pushbelt_fields.FLANK, pushbelt_fields.SADDLE]]
+            >= 0.0
+        ).all()
         # 1e-6: within 1e-3 of the regularisation speed friction is linear
-        assert grip == pytest.approx(mu * f[:, b.FLANK] * np.tanh(sliding / belt.friction_speed), rel=1e-6)
-        along = (f[:, [b.FLANK_FRICTION_M, b.FLANK_FRICTION_T]] * f[:, [b.FLANK_SLIP_M, b.FLANK_SLIP_T]]).sum(
-            1
+        assert grip == pytest.approx(
+            mu * f[:, pushbelt_fields.FLANK] * np.tanh(sliding / belt.friction_speed), rel=1e-6
         )
+        along = (
+            f[:, [pushbelt_fields.FLANK_FRICTION_M, pushbelt_fields.FLANK_FRICTION_T]]
+            * f[:, [pushbelt_fields.FLANK_SLIP_M, pushbelt_fields.FLANK_SLIP_T]]
+        ).sum(1)
         assert along == pytest.approx(grip * sliding, abs=1e-9)
         # of the ring the normal force is that of the step before
-        assert (f[:, b.RING_FRICTION] * f[:, b.RING_SLIP] >= 0.0).all()
+        assert (f[:, pushbelt_fields.RING_FRICTION] * f[:, pushbelt_fields.RING_SLIP] >= 0.0).all()
 
         # Gaps, depths and strains of the positions reached give the forces, which are linear within a step: to
         # 1 % of the largest elastic deformation of each kind (0.3 % found)
         r, x, o = frame(f)
         rear, ahead = np.roll(r - 0.5 * belt.thickness * x, -1, 0), np.roll(x, -1, 0)
-        for height, field in ((-belt.pitch_depth, b.EDGE), (belt.head_height, b.HEAD)):
+        for height, field in (
+            (-belt.pitch_depth, pushbelt_fields.EDGE),
+            (belt.head_height, pushbelt_fields.HEAD),
+        ):
             gap = ((rear - r - 0.5 * belt.thickness * x - height * o) * ahead).sum(1)
             assert belt.contact_stiffness * np.maximum(-gap, 0.0) == near(f[:, field])
         length = np.linalg.norm(np.roll(r, -1, 0) - r, axis=1)
-        assert belt.ring_stiffness * (length / f[:, b.LENGTH] - 1.0) == near(f[:, b.TENSION])
-        driven = f[:, b.DRIVEN].astype(int)
+        assert belt.ring_stiffness * (length / f[:, pushbelt_fields.LENGTH] - 1.0) == near(
+            f[:, pushbelt_fields.TENSION]
+        )
+        driven = f[:, pushbelt_fields.DRIVEN].astype(int)
         points = pitch_points(belt, f, driven)
-        groove = pulleys[[b.DRIVING_RADIUS, b.DRIVEN_RADIUS]][driven]
+        groove = pulleys[[pushbelt_fields.DRIVING_RADIUS, pushbelt_fields.DRIVEN_RADIUS]][driven]
         back = f.copy()  # the opening counts where the elements were at the start of the step
-        back[:, [b.Y, b.Z]] -= STEP * f[:, [b.U_Y, b.U_Z]]
+        back[:, [pushbelt_fields.Y, pushbelt_fields.Z]] -= (
+            STEP * f[:, [pushbelt_fields.U_Y, pushbelt_fields.U_Z]]
+        )
         opening = (shapes(belt, pitch_points(belt, back, driven)) * openings[driven]).sum(1)
         depth = (groove - np.linalg.norm(points, axis=1)) * belt.sine - opening * belt.cosine
-        assert belt.flank_stiffness * np.maximum(depth, 0.0) == near(f[:, b.FLANK])
+        assert belt.flank_stiffness * np.maximum(depth, 0.0) == near(f[:, pushbelt_fields.FLANK])
 
 
 def test_a_step_loses_what_its_contacts_take(run):
@@ -480,32 +542,37 @@ def test_a_step_loses_what_its_contacts_take(run):
     """
     belt, state, work, *_ = run
     early = fields(state.elements)
-    assert advance(belt, b.NEWTON, state, work, constant(THRUST, LOAD), 1, STEP) == b.CONVERGED
+    assert advance(belt, b.NEWTON, state, work, constant(THRUST, LOAD), 1, STEP) == pushbelt_fields.CONVERGED
     start_, totals, turning = fields(state.elements), state.totals.copy(), [state.pulleys.copy()]
-    assert advance(belt, b.NEWTON, state, work, constant(THRUST, LOAD), 1, STEP) == b.CONVERGED
+    assert advance(belt, b.NEWTON, state, work, constant(THRUST, LOAD), 1, STEP) == pushbelt_fields.CONVERGED
     turning.append(state.pulleys.copy())
     end, found = fields(state.elements), (state.totals - totals) / STEP
-    driven = start_[:, b.DRIVEN].astype(int)
+    driven = start_[:, pushbelt_fields.DRIVEN].astype(int)
     three = early, start_, end
 
     points = [pitch_points(belt, f, driven) for f in three]
-    speeds = np.array(turning)[:, [b.DRIVING_SPEED, b.DRIVEN_SPEED]][:, driven]
+    speeds = np.array(turning)[:, [pushbelt_fields.DRIVING_SPEED, pushbelt_fields.DRIVEN_SPEED]][:, driven]
     distance = np.linalg.norm(points, axis=2)
     angle = np.array([np.arctan2(*p.T[::-1]) for p in points])
     radial = np.diff(distance, axis=0) / STEP
     mid = np.linalg.norm([0.5 * (points[k] + points[k + 1]) for k in (0, 1)], axis=2)
     tangential = mid * (np.diff(angle, axis=0) / STEP - speeds)
-    normal, grip = end[:, b.FLANK], end[:, [b.FLANK_FRICTION_M, b.FLANK_FRICTION_T]].T
+    normal, grip = (
+        end[:, pushbelt_fields.FLANK],
+        end[:, [pushbelt_fields.FLANK_FRICTION_M, pushbelt_fields.FLANK_FRICTION_T]].T,
+    )
     flank = 2.0 * (belt.cosine * grip[0] * radial.mean(0) + grip[1] * tangential.mean(0)).sum()
 
     r, x, _ = frame(start_)
     t = np.roll(r, -1, 0) - np.roll(r, 1, 0)
     t /= np.linalg.norm(t, axis=1)[:, None]
-    ways = np.diff([f[:, [b.Y, b.Z]] for f in three], axis=0) / STEP
-    slips = [f[:, b.V] - (t * way).sum(1) for f, way in zip(three[1:], ways, strict=True)]
-    grip = belt.ring_friction * start_[:, b.SADDLE] * np.tanh(slips[1] / belt.ring_friction_speed)
+    ways = np.diff([f[:, [pushbelt_fields.Y, pushbelt_fields.Z]] for f in three], axis=0) / STEP
+    slips = [f[:, pushbelt_fields.V] - (t * way).sum(1) for f, way in zip(three[1:], ways, strict=True)]
+    grip = (
+        belt.ring_friction * start_[:, pushbelt_fields.SADDLE] * np.tanh(slips[1] / belt.ring_friction_speed)
+    )
     ring = (grip * np.mean(slips, axis=0)).sum()
-    flow = (end[:, b.LENGTH] - start_[:, b.LENGTH]) / STEP
+    flow = (end[:, pushbelt_fields.LENGTH] - start_[:, pushbelt_fields.LENGTH]) / STEP
     assert flow == pytest.approx(slips[1] - np.roll(slips[1], -1), abs=1e-9)
 
     def angles(f):
@@ -519,7 +586,9 @@ def test_a_step_loses_what_its_contacts_take(run):
     tilt = 0.5 * belt.angle_damping * (rates[1] * rates.mean(0)).sum() / STEP**2
     # positions are of second order in the step, angles of first order: 1e-4 and 1e-3 found
     wanted = np.array([flank, ring, tilt])
-    assert found[[b.FLANK_LOSS, b.RING_LOSS, b.DAMPING_LOSS]] == pytest.approx(wanted, rel=3e-3)
+    assert found[
+        [pushbelt_fields.FLANK_LOSS, pushbelt_fields.RING_LOSS, pushbelt_fields.DAMPING_LOSS]
+    ] == pytest.approx(wanted, rel=3e-3)
     assert (wanted > 10.0).all()
 
     psi = shapes(belt, points[1])
@@ -533,17 +602,21 @@ def test_heads_touch_in_a_belt_bent_inside_out():
     radius, omega, push = 0.1082, 250.0, 500.0
     belt, state = start(given())
     belt = belt._replace(centre_distance=10.0, transverse_damping=0.0)
-    state.pulleys[[b.DRIVING_RADIUS, b.DRIVEN_RADIUS]] = 0.01
+    state.pulleys[[pushbelt_fields.DRIVING_RADIUS, pushbelt_fields.DRIVEN_RADIUS]] = 0.01
     angle = -2.0 * np.pi * np.arange(NODES) / NODES
     o, x = np.stack([np.cos(angle), np.sin(angle)], 1), np.stack([np.sin(angle), -np.cos(angle)], 1)
     half = np.sin(np.pi / NODES)
     centrifugal = (belt.mass + belt.ring_mass) * radius * omega**2 / (2.0 * half)
     tension = push + centrifugal
-    f = np.zeros((NODES, b.STATE_FIELDS))
-    f[:, [b.Y, b.Z]] = radius * o + [2.0, 0.0]
-    f[:, [b.HEADING_Y, b.HEADING_Z]] = x
-    f[:, [b.U_Y, b.U_Z]], f[:, b.OMEGA], f[:, b.V] = radius * omega * x, -omega, radius * omega
-    f[:, b.LENGTH] = 2.0 * radius * half / (1.0 + tension / belt.ring_stiffness)
+    f = np.zeros((NODES, pushbelt_fields.STATE_FIELDS))
+    f[:, [pushbelt_fields.Y, pushbelt_fields.Z]] = radius * o + [2.0, 0.0]
+    f[:, [pushbelt_fields.HEADING_Y, pushbelt_fields.HEADING_Z]] = x
+    f[:, [pushbelt_fields.U_Y, pushbelt_fields.U_Z]], f[:, pushbelt_fields.OMEGA], f[:, pushbelt_fields.V] = (
+        radius * omega * x,
+        -omega,
+        radius * omega,
+    )
+    f[:, pushbelt_fields.LENGTH] = 2.0 * radius * half / (1.0 + tension / belt.ring_stiffness)
     # gap of rigid elements at their heads, and what the push force takes from it
     r, x, outward = frame(f)
     lines = (np.roll(r, -1, 0) - r - belt.head_height * outward) * np.roll(x, -1, 0)
@@ -552,12 +625,15 @@ def test_heads_touch_in_a_belt_bent_inside_out():
     belt = belt._replace(thickness=thickness)
     write(state.elements, f)
     work = workspace(belt, NODES)
-    assert advance(belt, b.NEWTON, state, work, np.zeros((2, b.INPUTS)), 1000, STEP) == b.CONVERGED
+    assert (
+        advance(belt, b.NEWTON, state, work, np.zeros((2, pushbelt_fields.INPUTS)), 1000, STEP)
+        == pushbelt_fields.CONVERGED
+    )
     f = fields(state.elements)
     # 1e-4 as of the ring without push; the push itself sets with the elements' tilt
-    assert f[:, b.TENSION] - f[:, b.HEAD] == pytest.approx(centrifugal, rel=1e-4)
-    assert (f[:, b.HEAD] > 0.5 * push).all()
-    assert (f[:, b.EDGE] == 0.0).all()
+    assert f[:, pushbelt_fields.TENSION] - f[:, pushbelt_fields.HEAD] == pytest.approx(centrifugal, rel=1e-4)
+    assert (f[:, pushbelt_fields.HEAD] > 0.5 * push).all()
+    assert (f[:, pushbelt_fields.EDGE] == 0.0).all()
 
 
 def test_elements_that_turn_with_a_pulley_do_not_slide():
@@ -565,18 +641,18 @@ def test_elements_that_turn_with_a_pulley_do_not_slide():
     work, radius, omega = workspace(belt, NODES), 0.05, SPEED
     angle = 2.0 * np.pi * np.arange(NODES) / NODES
     f = fields(state.elements)
-    f[:, b.Y], f[:, b.Z] = radius * np.cos(angle), radius * np.sin(angle)
-    f[:, b.HEADING_Y], f[:, b.HEADING_Z] = -np.sin(angle), np.cos(angle)
-    f[:, b.OMEGA] = omega
-    f[:, b.U_Y] = radius * (np.cos(angle + omega * STEP) - np.cos(angle)) / STEP
-    f[:, b.U_Z] = radius * (np.sin(angle + omega * STEP) - np.sin(angle)) / STEP
+    f[:, pushbelt_fields.Y], f[:, pushbelt_fields.Z] = radius * np.cos(angle), radius * np.sin(angle)
+    f[:, pushbelt_fields.HEADING_Y], f[:, pushbelt_fields.HEADING_Z] = -np.sin(angle), np.cos(angle)
+    f[:, pushbelt_fields.OMEGA] = omega
+    f[:, pushbelt_fields.U_Y] = radius * (np.cos(angle + omega * STEP) - np.cos(angle)) / STEP
+    f[:, pushbelt_fields.U_Z] = radius * (np.sin(angle + omega * STEP) - np.sin(angle)) / STEP
     write(state.elements, f)
     _prepare(belt, state, work, STEP)
     evaluated(belt, state, work, STEP)
     f = fields(state.elements)
     # the lever at the end of the step would add d omega^2 dt / 2, 0.7 mm/s
-    assert np.abs(f[:, b.FLANK_SLIP_M]).max() < 1e-10
-    assert np.abs(f[:, b.FLANK_SLIP_T]).max() < radius * omega * (omega * STEP) ** 2 / 8.0
+    assert np.abs(f[:, pushbelt_fields.FLANK_SLIP_M]).max() < 1e-10
+    assert np.abs(f[:, pushbelt_fields.FLANK_SLIP_T]).max() < radius * omega * (omega * STEP) ** 2 / 8.0
 
 
 def test_push_force_at_half_the_step(run):
@@ -592,15 +668,19 @@ def test_slip_limit():
     overload = constant(14e3, 300.0)
     advance(belt, b.NEWTON, state, work, overload, 4500, STEP)
     before = state.totals.copy()
-    assert advance(belt, b.NEWTON, state, work, overload, 1, STEP) == b.CONVERGED
-    torque = (state.totals - before)[b.WORK_IN] / (STEP * SPEED)
+    assert advance(belt, b.NEWTON, state, work, overload, 1, STEP) == pushbelt_fields.CONVERGED
+    torque = (state.totals - before)[pushbelt_fields.WORK_IN] / (STEP * SPEED)
     f = fields(state.elements)
-    driving = (f[:, b.DRIVEN] < 0.5) & (f[:, b.FLANK] > 10.0)
-    assert (f[driving, b.FLANK_SLIP_T] < -1.0).all()
-    o = np.stack([f[:, b.HEADING_Z], -f[:, b.HEADING_Y]], 1)
-    radius = np.linalg.norm((f[:, [b.Y, b.Z]] - belt.pitch_depth * o)[driving], axis=1).mean()
+    driving = (f[:, pushbelt_fields.DRIVEN] < 0.5) & (f[:, pushbelt_fields.FLANK] > 10.0)
+    assert (f[driving, pushbelt_fields.FLANK_SLIP_T] < -1.0).all()
+    o = np.stack([f[:, pushbelt_fields.HEADING_Z], -f[:, pushbelt_fields.HEADING_Y]], 1)
+    radius = np.linalg.norm(
+        (f[:, [pushbelt_fields.Y, pushbelt_fields.Z]] - belt.pitch_depth * o)[driving], axis=1
+    ).mean()
     limit = 2.0 * belt.flank_kinetic * radius / belt.cosine
-    thrust = (belt.cosine * f[:, b.FLANK] + belt.sine * f[:, b.FLANK_FRICTION_M])[driving].sum()
+    thrust = (belt.cosine * f[:, pushbelt_fields.FLANK] + belt.sine * f[:, pushbelt_fields.FLANK_FRICTION_M])[
+        driving
+    ].sum()
     assert torque / thrust == pytest.approx(limit, rel=1e-3)
 
 
@@ -627,9 +707,12 @@ def test_a_march_is_the_same_in_lanes_and_without(monkeypatch):
     for lanes in (8, 1):
         monkeypatch.setattr(starting, "parts_of", lambda nodes, lanes=lanes: lanes)
         belt, state = start(given(modal_stiffness=((6e8, 3e8),) * 2))
-        assert advance(belt, b.NEWTON, state, workspace(belt, NODES), inputs, 200, STEP) == b.CONVERGED
+        assert (
+            advance(belt, b.NEWTON, state, workspace(belt, NODES), inputs, 200, STEP)
+            == pushbelt_fields.CONVERGED
+        )
         assert state.elements.data.shape[2] == lanes
-        found.append(fields(state.elements)[:, : b.CHANGE])
+        found.append(fields(state.elements)[:, : pushbelt_fields.CHANGE])
     scale = np.abs(found[0]).max(axis=0)
     off = np.abs(found[1] - found[0]).max(axis=0)
     # round-off, which 200 steps with stiff contacts make 1e-12 of speeds and 1e-9 of directions of friction
@@ -646,7 +729,7 @@ def test_a_march_is_the_same_in_lanes_and_without(monkeypatch):
 )
 def test_corrections_are_halved_once_they_no_longer_fall(monkeypatch, changes, halved):
     shares, left = [], list(changes)
-    fake = stepping.Equations(*6 * [lambda *_: 1.0], b.CHANGE)
+    fake = stepping.Equations(*6 * [lambda *_: 1.0], pushbelt_fields.CHANGE)
     monkeypatch.setattr(stepping, "solve_bordered", lambda *_: True)
     monkeypatch.setattr(
         stepping, "correct", lambda _, __, ___, ____, share: shares.append(share) or left.pop(0)
@@ -664,9 +747,9 @@ def test_steps_that_do_not_converge_are_named():
     belt, state = start(given())
     newton = b.NEWTON._replace(tolerance=1e-12, power_tolerance=1e-12, most_iterations=2, most_failures=3)
     status = advance(belt, newton, state, workspace(belt, NODES), constant(THRUST, 0.0), 100, STEP)
-    assert status == state.counters[b.STATUS] == b.NOT_CONVERGED
-    assert state.counters[b.STEPS] == state.counters[b.FAILED_STEPS] == 3
-    assert 0 <= state.counters[b.FAILED_ELEMENT] < NODES
+    assert status == state.counters[pushbelt_fields.STATUS] == pushbelt_fields.NOT_CONVERGED
+    assert state.counters[pushbelt_fields.STEPS] == state.counters[pushbelt_fields.FAILED_STEPS] == 3
+    assert 0 <= state.counters[pushbelt_fields.FAILED_ELEMENT] < NODES
 
 
 def test_the_fault_is_the_contact_that_the_last_iteration_has_changed_most():
@@ -677,19 +760,29 @@ def test_the_fault_is_the_contact_that_the_last_iteration_has_changed_most():
         for most in (3, 4):
             belt, state, work, _ = shaken(seed)
             newton = b.NEWTON._replace(tolerance=0.0, most_iterations=most, most_failures=1)
-            assert advance(belt, newton, state, work, constant(THRUST, LOAD), 1, STEP) == b.NOT_CONVERGED
+            assert (
+                advance(belt, newton, state, work, constant(THRUST, LOAD), 1, STEP)
+                == pushbelt_fields.NOT_CONVERGED
+            )
             ends.append(fields(state.elements))
         change = np.abs(ends[1] - ends[0])
-        corrections = change[:, b.CHANGE : b.CHANGE + 4] * newton.weights
+        corrections = change[:, pushbelt_fields.CHANGE : pushbelt_fields.CHANGE + 4] * newton.weights
         i = int(corrections.max(axis=1).argmax())
-        flank = [b.FLANK, b.FLANK_FRICTION_M, b.FLANK_FRICTION_T]
-        sizes = {("flank", i): np.linalg.norm(change[i, flank]), ("ring", i): change[i, b.RING_FRICTION]}
+        flank = [pushbelt_fields.FLANK, pushbelt_fields.FLANK_FRICTION_M, pushbelt_fields.FLANK_FRICTION_T]
+        sizes = {
+            ("flank", i): np.linalg.norm(change[i, flank]),
+            ("ring", i): change[i, pushbelt_fields.RING_FRICTION],
+        }
         for element in (i, (i - 1) % 64):  # a contact of neighbours is that of the one behind
-            between = {"edge": b.EDGE, "head": b.HEAD, "nose": b.NOSE}
+            between = {
+                "edge": pushbelt_fields.EDGE,
+                "head": pushbelt_fields.HEAD,
+                "nose": pushbelt_fields.NOSE,
+            }
             sizes |= {(name, element): change[element, field] for name, field in between.items()}
         contact, element = max(sizes, key=sizes.get)
-        assert b.CONTACTS[state.counters[b.FAILED_CONTACT]] == contact
-        assert state.counters[b.FAILED_ELEMENT] == element
+        assert pushbelt_fields.CONTACTS[state.counters[pushbelt_fields.FAILED_CONTACT]] == contact
+        assert state.counters[pushbelt_fields.FAILED_ELEMENT] == element
         names |= {contact, "of itself" if element == i else "behind"}
     assert {"edge", "flank", "of itself", "behind"} <= names
 
@@ -702,7 +795,7 @@ def test_a_correction_that_is_not_finite_is_not_passed_over():
             right = work.blocks.data[:, RIGHT : RIGHT + 4]
             right[:] = rng.normal(size=right.shape)
             right[place] = wrong
-            found = correct(state, work, b.NEWTON.weights, b.CHANGE, 1.0)
+            found = correct(state, work, b.NEWTON.weights, pushbelt_fields.CHANGE, 1.0)
             assert not np.isfinite(found)
 
 
@@ -716,13 +809,13 @@ def test_what_is_not_a_number_ends_a_march_or_has_no_effect():
         return advance(belt, b.NEWTON, state, work, inputs, 3, STEP), state
 
     clean = march()[1]
-    sizes = [b.STATE_FIELDS, *(part.size for part in clean[1:4])]
+    sizes = [pushbelt_fields.STATE_FIELDS, *(part.size for part in clean[1:4])]
     for part, place in ((k, place) for k, size in enumerate(sizes) for place in range(size)):
 
         def spoil(state, part=part, place=place):
             (state.elements.data[3, :, 2] if part == 0 else state[part].reshape(-1))[place] = np.nan
 
         status, state = march(spoil)
-        ends += status == b.NOT_FINITE
-        assert status == b.NOT_FINITE or fingerprint(state) == fingerprint(clean)
+        ends += status == pushbelt_fields.NOT_FINITE
+        assert status == pushbelt_fields.NOT_FINITE or fingerprint(state) == fingerprint(clean)
     assert 25 < ends < sum(sizes)

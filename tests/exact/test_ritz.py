@@ -4,7 +4,8 @@ import numpy as np
 import pytest
 
 from cvt_hpc.lanes import LaneArray
-from cvt_hpc.physics.compliance import CLOSED, GAP, PUSH, lane_contact, solve_contact
+from cvt_hpc.physics import compliance
+from cvt_hpc.physics.compliance import lane_contact, solve_contact
 from cvt_hpc.physics.moving_discs import AHEAD, GIVES, PLACE, lane_discs, open_gaps, settle, turn_discs
 from cvt_hpc.physics.ritz import modal_flexibilities, moving_modes
 from support.wraps import ARC, RADIUS, STATIONS, courses, random_wrap
@@ -89,12 +90,14 @@ def test_modes_at_rest_are_flexibilities():
 
 
 def solved(contact, gaps):
-    contact.stations.data[:, GAP] = gaps
+    contact.stations.data[:, compliance.GAP] = gaps
     if contact.discs.place.size:
-        open_gaps(contact.discs, contact.stations, GAP)
+        open_gaps(contact.discs, contact.stations, compliance.GAP)
     solve_contact(contact, 300)
     return np.where(
-        contact.stations.data[:, CLOSED] > 0.5, np.maximum(contact.stations.data[:, PUSH], 0.0), 0.0
+        contact.stations.data[:, compliance.CLOSED] > 0.5,
+        np.maximum(contact.stations.data[:, compliance.PUSH], 0.0),
+        0.0,
     )
 
 

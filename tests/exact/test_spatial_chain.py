@@ -6,10 +6,11 @@ import numpy as np
 import pytest
 from scipy.linalg import eigh
 
-from cvt_hpc.models.pushbelt import belt as p
+from cvt_hpc.models.pushbelt import fields as pushbelt_fields
 from cvt_hpc.models.pushbelt.start import of_lanes
 from cvt_hpc.models.pushbelt.stepping import correct, solve_bordered
 from cvt_hpc.models.spatial_pushbelt import belt as b
+from cvt_hpc.models.spatial_pushbelt import fields as spatial_fields
 from cvt_hpc.models.spatial_pushbelt.step import (
     EQUATIONS,
     _accept,
@@ -31,7 +32,15 @@ def marched(constants, fields, steps, dt):
     """Fields after so many steps, and counters."""
     state = chains.state(fields)
     assert (
-        advance(constants, b.NEWTON, state, b.workspace(constants, NODES), np.zeros((2, b.INPUTS)), steps, dt)
+        advance(
+            constants,
+            b.NEWTON,
+            state,
+            b.workspace(constants, NODES),
+            np.zeros((2, spatial_fields.INPUTS)),
+            steps,
+            dt,
+        )
         == 0
     )
     return of_lanes(state.elements).copy(), state.counters
@@ -43,9 +52,9 @@ def test_a_free_ring_spins_on():
     left = {}
     for dt in (STEP, 0.5 * STEP):
         found, counters = marched(constants, fields, round(0.02 / dt), dt)
-        assert counters[p.FAILED_STEPS] == 0
+        assert counters[pushbelt_fields.FAILED_STEPS] == 0
         # T = m' v^2, on a polygon m omega^2 R / (2 sin(pi / n)); the step's own error is 1.6e-6
-        assert found[:, b.TENSION] == pytest.approx(tension, rel=1e-5)
+        assert found[:, spatial_fields.TENSION] == pytest.approx(tension, rel=1e-5)
         assert np.hypot(found[:, 0], found[:, 1]) == pytest.approx(RADIUS, abs=1e-9)
         assert np.abs(found[:, 2]).max() < 1e-18
         energy_now, momentum_now, moment_now = chains.energy_and_momentum(constants, found)
@@ -81,19 +90,22 @@ def test_free_elements_turn_as_rigid_bodies():
     )
     rng = np.random.default_rng(4)
     fields = chains.spinning_ring(nodes, 0.02 * nodes / (2.0 * np.pi), 0.0)
-    fields[:, b.LENGTH] = 0.02
-    fields[:, b.OMEGA : b.OMEGA + 3] = rng.normal(0.0, 200.0, (nodes, 3))
+    fields[:, spatial_fields.LENGTH] = 0.02
+    fields[:, spatial_fields.OMEGA : spatial_fields.OMEGA + 3] = rng.normal(0.0, 200.0, (nodes, 3))
 
     def spin(f):
         x, o = f[:, 3:6], f[:, 6:9]
-        omega, parts = f[:, b.OMEGA : b.OMEGA + 3], zip((x, o, np.cross(o, x)), inertias, strict=True)
+        omega, parts = (
+            f[:, spatial_fields.OMEGA : spatial_fields.OMEGA + 3],
+            zip((x, o, np.cross(o, x)), inertias, strict=True),
+        )
         return sum(k * d * np.sum(d * omega, 1)[:, None] for d, k in parts)
 
     inertias = constants.roll_inertia, constants.yaw_inertia, constants.pitch_inertia
     size, errors = np.linalg.norm(spin(fields), axis=1), []
     for steps, dt in ((1000, STEP), (2000, 0.5 * STEP)):
         state, work = chains.state(fields), b.workspace(constants, nodes)
-        assert advance(constants, b.NEWTON, state, work, np.zeros((2, b.INPUTS)), steps, dt) == 0
+        assert advance(constants, b.NEWTON, state, work, np.zeros((2, spatial_fields.INPUTS)), steps, dt) == 0
         found = of_lanes(state.elements)
         assert np.abs(np.sum(found[:, 3:6] * found[:, 6:9], 1)).max() < 1e-15
         errors.append((np.linalg.norm(spin(found) - spin(fields), axis=1) / size).max())
@@ -116,10 +128,10 @@ def strand(tension, **given):
         ring_mass=0.25 * h,
         **{"ring_rotary_inertia": 1e-9} | given,
     )
-    fields = np.zeros((nodes, b.STATE_FIELDS))
+    fields = np.zeros((nodes, spatial_fields.STATE_FIELDS))
     fields[:, 0], fields[:, 1] = h * np.arange(nodes), 1.0  # far from the pulleys
     fields[:, 3], fields[:, 7] = 1.0, -1.0
-    fields[:, b.LENGTH] = h / (1.0 + tension / constants.ring_stiffness)
+    fields[:, spatial_fields.LENGTH] = h / (1.0 + tension / constants.ring_stiffness)
     return constants, fields
 
 
@@ -130,7 +142,7 @@ def held_steps(constants, fields, steps, seen, held=(0, 1, 3, 4, 5, 6)):
     """
     state, work = chains.state(fields), b.workspace(constants, len(fields))
     rows = len(work.blocks.data)
-    inputs = np.zeros(b.INPUTS)
+    inputs = np.zeros(spatial_fields.INPUTS)
     readings = []
     for _ in range(steps):
         _prepare(constants, state, work, STEP)
@@ -139,9 +151,9 @@ def held_steps(constants, fields, steps, seen, held=(0, 1, 3, 4, 5, 6)):
             _assemble(constants, state, work, STEP)
             work.blocks.data[:, 9 * np.array(held)] += 1e15
             for element in (0, *range(SEGMENTS, len(fields))):
-                work.blocks.data[element % rows, : 9 * b.SIZE : 9, element // rows] += 1e15
+                work.blocks.data[element % rows, : 9 * spatial_fields.SIZE : 9, element // rows] += 1e15
             solve_bordered(EQUATIONS[1], constants, state, work, b.NEWTON.weights, STEP)
-            correct(state, work, b.NEWTON.weights, b.CHANGE, 1.0)
+            correct(state, work, b.NEWTON.weights, spatial_fields.CHANGE, 1.0)
         _evaluate(constants, state, work, 0.0, STEP)
         _accept(constants, state, work, inputs, STEP)
         readings.append(seen(of_lanes(state.elements)))
@@ -173,7 +185,7 @@ def clamped_motion(tension, bending=47.6):
     """Amplitudes of the first mode of the clamped strand, step by step."""
     constants, fields = strand(tension, ring_bending=bending)
     _, shape, slope = clamped_mode(tension, bending)
-    fields[: SEGMENTS + 1, 2], fields[: SEGMENTS + 1, b.SLOPE] = 1e-5 * shape, 1e-5 * slope
+    fields[: SEGMENTS + 1, 2], fields[: SEGMENTS + 1, spatial_fields.SLOPE] = 1e-5 * shape, 1e-5 * slope
     return held_steps(constants, fields, 400, lambda f: shape @ f[: SEGMENTS + 1, 2]) / (shape @ shape)
 
 
@@ -231,7 +243,7 @@ def test_a_pressed_chain_buckles_by_its_closed_edges():
         )
         constants = constants._replace(thickness=h + 0.5 * share * load / contact)
         fields[: SEGMENTS + 1, 2] = 1e-5 * shape
-        for field in (b.SLOPE, b.HEADING + 2):
+        for field in (spatial_fields.SLOPE, spatial_fields.HEADING + 2):
             fields[: SEGMENTS + 1, field] = 1e-5 * slope
         amplitudes = held_steps(
             constants, fields, 400, lambda f: shape @ f[: SEGMENTS + 1, 2], held=(0, 1, 3, 5, 6)
@@ -254,16 +266,18 @@ def lateral_wave_frequency(half_wave, tension, dt):
     )
     fields = chains.spinning_ring(nodes, radius, spin)
     chord = 2.0 * radius * np.sin(np.pi / nodes)
-    fields[:, b.LENGTH] = chord / (1.0 + mass * spin**2 * radius / (2.0 * np.sin(np.pi / nodes)) / 6.0e6)
+    fields[:, spatial_fields.LENGTH] = chord / (
+        1.0 + mass * spin**2 * radius / (2.0 * np.sin(np.pi / nodes)) / 6.0e6
+    )
     place = h * np.arange(nodes)
     wave = np.pi / half_wave
     shape = np.sin(wave * place)
     fields[:, 2] = 1e-5 * shape
-    fields[:, b.SLOPE] = 1e-5 * wave / (1.0 + 47.6 * wave**2 / 2.4e6) * np.cos(wave * place)
+    fields[:, spatial_fields.SLOPE] = 1e-5 * wave / (1.0 + 47.6 * wave**2 / 2.4e6) * np.cos(wave * place)
     state, work = chains.state(fields), b.workspace(constants, nodes)
     amplitudes = []
     for _ in range(40):
-        assert advance(constants, b.NEWTON, state, work, np.zeros((2, b.INPUTS)), 10, dt) == 0
+        assert advance(constants, b.NEWTON, state, work, np.zeros((2, spatial_fields.INPUTS)), 10, dt) == 0
         amplitudes.append(shape @ of_lanes(state.elements)[:, 2])
     return np.sqrt(frequency_squared(np.array(amplitudes), 1, 10.0 * dt)) / (2.0 * np.pi)
 
@@ -288,14 +302,14 @@ def test_lateral_force_of_an_offset_strand(tension, force):
     constants, fields = strand(tension, ring_shear=2.4e7, lateral_damping=20.0, yaw_damping=0.05)
     s = np.arange(SEGMENTS + 1) / SEGMENTS
     fields[: SEGMENTS + 1, 2] = 5e-4 * s * s * (3.0 - 2.0 * s)
-    fields[: SEGMENTS + 1, b.SLOPE] = 5e-4 * 6.0 * s * (1.0 - s) / LENGTH_OF_STRAND
+    fields[: SEGMENTS + 1, spatial_fields.SLOPE] = 5e-4 * 6.0 * s * (1.0 - s) / LENGTH_OF_STRAND
     fields[SEGMENTS + 1 :, 2] = 5e-4
 
     def across(f):
         place = slice(40, 60)
         rise = (f[41:61, 2] - f[place, 2]) / constants.pitch
-        shear = rise - 0.5 * (f[41:61, b.SLOPE] + f[place, b.SLOPE])
-        return np.mean(constants.ring_shear * shear + f[place, b.TENSION] * rise)
+        shear = rise - 0.5 * (f[41:61, spatial_fields.SLOPE] + f[place, spatial_fields.SLOPE])
+        return np.mean(constants.ring_shear * shear + f[place, spatial_fields.TENSION] * rise)
 
     readings = held_steps(constants, fields, 300, across)
     assert readings[-1] == pytest.approx(readings[-50], rel=1e-3)

@@ -7,6 +7,7 @@ from scipy.optimize import brentq
 
 from cvt_hpc.models.pushbelt.start import of_lanes
 from cvt_hpc.models.spatial_pushbelt import belt as b
+from cvt_hpc.models.spatial_pushbelt import fields as f
 from cvt_hpc.models.spatial_pushbelt.chain import predict
 from cvt_hpc.models.spatial_pushbelt.faces import face_forces, face_gap, predict_faces
 from cvt_hpc.models.spatial_pushbelt.flank import flank_directions, frustum, frustum_gap
@@ -86,7 +87,7 @@ def pressed_edges(belt, push, curvature):
     Each is so close to the one behind as the push at the middle of the edge asks, and tilted, heads apart.
     """
     nodes, yaw, tilt, apart = 16, curvature * belt.pitch, 1e-3, push / belt.contact_stiffness
-    fields = np.zeros((nodes, b.STATE_FIELDS))
+    fields = np.zeros((nodes, f.STATE_FIELDS))
     r, x, o = np.zeros(3), np.array([1.0, 0.0, 0.0]), np.array([0.0, -1.0, 0.0])
     for element in fields:
         element[:9] = *r, *x, *o
@@ -102,7 +103,7 @@ def pressed_edges(belt, push, curvature):
     face_forces(belt, state.elements, work.step, work.iterate, 1e-9)
     forces, turns = (
         of_lanes(of)[:-1, k : k + n]
-        for of, k, n in ((state.elements, b.PUSH, 4), (work.iterate, b.PAIR_J + 3, 3))
+        for of, k, n in ((state.elements, f.PUSH, 4), (work.iterate, f.PAIR_J + 3, 3))
     )
     assert not forces[:, 2:].any()
     return forces[:, :2], -np.sum(turns * fields[1:, 6:9], axis=1)

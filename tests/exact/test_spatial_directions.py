@@ -4,13 +4,13 @@ import numpy as np
 import pytest
 
 from cvt_hpc.models.pushbelt.start import in_lanes, of_lanes
-from cvt_hpc.models.spatial_pushbelt import belt as b
+from cvt_hpc.models.spatial_pushbelt import fields
 from cvt_hpc.models.spatial_pushbelt.bending import bending_forces, predict_bending
 from cvt_hpc.models.spatial_pushbelt.step import _assemble, _prepare
 from support import spatial_chains as chains
 
 STEP = 1e-5
-RIGHT = b.RIGHT
+RIGHT = fields.RIGHT
 
 
 def rate(own, ahead, first, last, x):
@@ -30,17 +30,23 @@ def directions(step, f, x):
     xj = np.roll(f[:, 3:6], -1, 0)
     found = {}
     for p in range(4):
-        found[b.PUSH_GAP + p] = rate(-xj, xj, U, U, x) + rate(
-            of(b.PUSH_LEVER_I + 3 * p), of(b.PUSH_LEVER_J + 3 * p), W, W, x
+        found[fields.PUSH_GAP + p] = rate(-xj, xj, U, U, x) + rate(
+            of(fields.PUSH_LEVER_I + 3 * p), of(fields.PUSH_LEVER_J + 3 * p), W, W, x
         )
-    n = of(b.PIN_NORMAL)
-    found[b.PIN_GAP] = rate(-n, n, U, U, x) - rate(of(b.PIN_LEVER_I), -of(b.PIN_LEVER_J), W, W, x)
-    tension = rate(of(b.TENSION_I), -of(b.TENSION_J), U, U, x)
-    tension += rate(of(b.TENSION_I + 3), -of(b.TENSION_J + 3), W, W, x) + x[:, 6] - np.roll(x[:, 6], -1)
-    found[b.PREDICTED_TENSION] = tension
-    ci, cj = of(b.CHORD_I), of(b.CHORD_J)
-    found[b.PREDICTED_MOMENT_I] = rate(-ci, ci, U, U, x) + np.sum(of(b.TURN_I) * x[:, W], 1)
-    found[b.PREDICTED_MOMENT_J] = rate(-cj, cj, U, U, x) + np.sum(of(b.TURN_J) * np.roll(x, -1, 0)[:, W], 1)
+    n = of(fields.PIN_NORMAL)
+    found[fields.PIN_GAP] = rate(-n, n, U, U, x) - rate(
+        of(fields.PIN_LEVER_I), -of(fields.PIN_LEVER_J), W, W, x
+    )
+    tension = rate(of(fields.TENSION_I), -of(fields.TENSION_J), U, U, x)
+    tension += (
+        rate(of(fields.TENSION_I + 3), -of(fields.TENSION_J + 3), W, W, x) + x[:, 6] - np.roll(x[:, 6], -1)
+    )
+    found[fields.PREDICTED_TENSION] = tension
+    ci, cj = of(fields.CHORD_I), of(fields.CHORD_J)
+    found[fields.PREDICTED_MOMENT_I] = rate(-ci, ci, U, U, x) + np.sum(of(fields.TURN_I) * x[:, W], 1)
+    found[fields.PREDICTED_MOMENT_J] = rate(-cj, cj, U, U, x) + np.sum(
+        of(fields.TURN_J) * np.roll(x, -1, 0)[:, W], 1
+    )
     return found
 
 
@@ -54,19 +60,19 @@ def test_rates_of_all_gaps_and_strains():
     axial = np.cross(f[:, 6:9], f[:, 3:6])
     place, _ = chains.lines(belt, f)
     lengths = np.linalg.norm(np.roll(place, -1, axis=1) - place, axis=2).mean(axis=0)
-    f[:, b.LENGTH] = lengths  # the direction of the tension is its rate at a strain of zero
+    f[:, fields.LENGTH] = lengths  # the direction of the tension is its rate at a strain of zero
     state.leans[:] = 0.0
     small, measured = 3e-9, {}
     for sign in (-1.0, 0.0, 1.0):
         g = f.copy()
-        g[:, b.SPEED : b.SPEED + 8] = sign * small * x
+        g[:, fields.SPEED : fields.SPEED + 8] = sign * small * x
         state.elements.data[:] = in_lanes(g).data
         _prepare(belt, state, work, 1.0)
         measured[sign] = of_lanes(work.step).copy()
     step = measured[0.0]
     difference = (measured[1.0] - measured[-1.0]) / (2.0 * small)
-    difference[:, b.PREDICTED_TENSION] *= -lengths / belt.ring_stiffness
-    moments = [b.PREDICTED_MOMENT_I, b.PREDICTED_MOMENT_J]
+    difference[:, fields.PREDICTED_TENSION] *= -lengths / belt.ring_stiffness
+    moments = [fields.PREDICTED_MOMENT_I, fields.PREDICTED_MOMENT_J]
     difference[:, moments] *= 2.0 / belt.angle_stiffness
     for field, expected in directions(step, f, x).items():
         scale = np.abs(expected).max()
@@ -77,20 +83,20 @@ def test_rates_of_all_gaps_and_strains():
         side, reach = (-1.0, -1.0, 1.0, 1.0)[p], (-1.0, 1.0)[p % 2] * belt.flank_reach
         width = belt.half_width + reach * belt.sine / belt.cosine
         lever = (reach - belt.pitch_depth) * f[:, 6:9] + side * width * axial
-        n = belt.sine * step[:, b.RADIAL + 3 * p : b.RADIAL + 3 * p + 3] - side * belt.cosine * axis
+        n = belt.sine * step[:, fields.RADIAL + 3 * p : fields.RADIAL + 3 * p + 3] - side * belt.cosine * axis
         expected = np.sum(n * (x[:, U] + np.cross(x[:, W], lever)), 1)
         scale = np.abs(expected).max()
-        assert difference[:, b.FLANK_GAP + p] == pytest.approx(expected, abs=2e-7 * scale)
+        assert difference[:, fields.FLANK_GAP + p] == pytest.approx(expected, abs=2e-7 * scale)
 
 
 def moved(belt, state, work, f, x):
     """Fields of f after a motion x (nodes, 8), turned as the steps turn them."""
     g = f.copy()
-    g[:, b.SPEED : b.SPEED + 8] = x
+    g[:, fields.SPEED : fields.SPEED + 8] = x
     state.elements.data[:] = in_lanes(g).data
     _prepare(belt, state, work, 1.0)
-    g[:, : b.SLOPE] = of_lanes(work.step)[:, : b.PREDICTED_OUTWARD + 3]
-    g[:, b.SLOPE] += x[:, 7]
+    g[:, : fields.SLOPE] = of_lanes(work.step)[:, : fields.PREDICTED_OUTWARD + 3]
+    g[:, fields.SLOPE] += x[:, 7]
     return g
 
 
@@ -113,15 +119,15 @@ def test_rates_of_lateral_strains_yaw_and_ring_slip():
     _prepare(belt, state, work, STEP)
     step = of_lanes(work.step)
     rise, turning = np.roll(x[:, 2], -1) - x[:, 2], np.roll(x[:, 7], -1)
-    along = step[:, b.RING_LINE : b.RING_LINE + 6]
+    along = step[:, fields.RING_LINE : fields.RING_LINE + 6]
     expected = {
-        b.SHEAR: rise / belt.pitch - 0.5 * (x[:, 7] + turning),
-        b.BEND: turning - x[:, 7],
-        b.PREDICTED_YAW: np.sum(step[:, b.YAW : b.YAW + 3] * x[:, W], 1) - x[:, 7],
-        b.START_SLIP: f[:, b.V] - np.sum(along * f[:, b.SPEED : b.SPEED + 6], 1),
+        fields.SHEAR: rise / belt.pitch - 0.5 * (x[:, 7] + turning),
+        fields.BEND: turning - x[:, 7],
+        fields.PREDICTED_YAW: np.sum(step[:, fields.YAW : fields.YAW + 3] * x[:, W], 1) - x[:, 7],
+        fields.START_SLIP: f[:, fields.V] - np.sum(along * f[:, fields.SPEED : fields.SPEED + 6], 1),
     }
-    difference[:, b.PREDICTED_YAW] /= belt.yaw_stiffness
-    difference[:, b.START_SLIP] = step[:, b.START_SLIP]
+    difference[:, fields.PREDICTED_YAW] /= belt.yaw_stiffness
+    difference[:, fields.START_SLIP] = step[:, fields.START_SLIP]
     for field, rates in expected.items():
         assert difference[:, field] == pytest.approx(rates, abs=2e-7 * np.abs(rates).max()), field
     # the ring slips by what its lines' places move along them at an element
@@ -145,7 +151,7 @@ INTERNAL = {
 def test_internal_forces_have_no_resultant_and_no_moment(law):
     belt, state, work, rng = chains.shaken(2)
     f, forces = of_lanes(state.elements).copy(), 0.0
-    f[:, b.CHANGE : b.CHANGE + 8] = rng.normal(0.0, 0.01, (chains.SHAKEN, 8))
+    f[:, fields.CHANGE : fields.CHANGE + 8] = rng.normal(0.0, 0.01, (chains.SHAKEN, 8))
     none = belt._replace(flank_stiffness=0.0, **{k: v for off in INTERNAL.values() for k, v in off.items()})
     alone = none._replace(**{k: getattr(belt, k) for k in INTERNAL[law]})
     for sign, constants in ((1.0, alone), (-1.0, none)):
@@ -173,7 +179,7 @@ def test_lateral_bending_of_a_straight_strand_has_no_moment():
     belt, state, work, rng = chains.shaken(5)
     f = of_lanes(state.elements).copy()
     f[:, :2], f[:, 3:6] = np.outer(np.arange(chains.SHAKEN), [belt.pitch, 0.0]), [1.0, 0.0, 0.0]
-    f[:, b.CHANGE : b.CHANGE + 8] = rng.normal(0.0, 0.01, (chains.SHAKEN, 8))
+    f[:, fields.CHANGE : fields.CHANGE + 8] = rng.normal(0.0, 0.01, (chains.SHAKEN, 8))
     state.elements.data[:] = in_lanes(f).data
     predict_bending(belt, state.elements, work.step)
     work.iterate.data[:] = 0.0
@@ -182,7 +188,7 @@ def test_lateral_bending_of_a_straight_strand_has_no_moment():
     # a turn about the direction across the strand, by which its slope grows as its ends move; the last pair closes it
     x = np.zeros((chains.SHAKEN, 8))
     x[:, 2], x[:, 7] = f[:, 0], 1.0
-    own, ahead = (forces[:-1, k : k + 8] for k in (b.PAIR_I, b.PAIR_J))
+    own, ahead = (forces[:-1, k : k + 8] for k in (fields.PAIR_I, fields.PAIR_J))
     power = np.concatenate([own * x[:-1], ahead * x[1:]])
     assert abs(power.sum()) < 1e-12 * np.abs(power).sum()
 
@@ -191,13 +197,13 @@ def test_the_linear_system_is_the_slope_of_the_residuals():
     belt, state, work, rng = chains.shaken(3)
     _prepare(belt, state, work, STEP)
     f = of_lanes(state.elements).copy()
-    f[:, b.CHANGE : b.CHANGE + 8] = rng.normal(0.0, 0.01, (chains.SHAKEN, 8))
+    f[:, fields.CHANGE : fields.CHANGE + 8] = rng.normal(0.0, 0.01, (chains.SHAKEN, 8))
     state.increments[:] = [0.3, *rng.normal(0.0, 1e-7, 6)]
     state.elements.data[:] = in_lanes(f).data
     chains.evaluated(belt, state, work, STEP)
     _assemble(belt, state, work, STEP)
     blocks, iterate = of_lanes(work.blocks), of_lanes(work.iterate)
-    shapes, driven = of_lanes(work.shapes), of_lanes(state.elements)[:, b.DRIVEN]
+    shapes, driven = of_lanes(work.shapes), of_lanes(state.elements)[:, fields.DRIVEN]
     size = 8 * chains.SHAKEN
     matrix = np.zeros((size + 7, size + 7))
     for i in range(chains.SHAKEN):
@@ -207,14 +213,14 @@ def test_the_linear_system_is_the_slope_of_the_residuals():
         matrix[at, 8 * j : 8 * j + 8] += link
         matrix[8 * j : 8 * j + 8, at] += link.T
         matrix[at, size:] = blocks[i, RIGHT + 8 : RIGHT + 64].reshape(7, 8).T
-        matrix[size, 8 * i : 8 * i + 6] = iterate[i, b.TORQUE_ROW : b.TORQUE_ROW + 6]
+        matrix[size, 8 * i : 8 * i + 6] = iterate[i, fields.TORQUE_ROW : fields.TORQUE_ROW + 6]
     weights = np.hstack([(1.0 - driven)[:, None] * shapes, driven[:, None] * shapes])  # (nodes, 6)
-    matrix[size, size] = iterate[:, b.TORQUE_OWN].sum() + belt.driven_inertia / STEP
-    matrix[size, size + 1 :] = iterate[:, b.TORQUE_OPENING] @ weights
+    matrix[size, size] = iterate[:, fields.TORQUE_OWN].sum() + belt.driven_inertia / STEP
+    matrix[size, size + 1 :] = iterate[:, fields.TORQUE_OPENING] @ weights
     for k in range(6):
-        row = weights[:, k, None] * iterate[:, b.NORMAL_ROW : b.NORMAL_ROW + 6]
+        row = weights[:, k, None] * iterate[:, fields.NORMAL_ROW : fields.NORMAL_ROW + 6]
         matrix[size + 1 + k, :size] = np.hstack([row, np.zeros((chains.SHAKEN, 2))]).ravel()
-        matrix[size + 1 + k, size + 1 :] = (weights[:, k] * iterate[:, b.NORMAL_YIELD]) @ weights
+        matrix[size + 1 + k, size + 1 :] = (weights[:, k] * iterate[:, fields.NORMAL_YIELD]) @ weights
         matrix[size + 1 + k, size + 1 + k] += belt.modal_stiffness[k // 3, k % 3]
     kinds = {
         "speeds": np.concatenate([rng.normal(0.0, 1.0, size), np.zeros(7)]),
@@ -225,7 +231,9 @@ def test_the_linear_system_is_the_slope_of_the_residuals():
         found = []
         for sign in (1.0, -1.0):
             g = f.copy()
-            g[:, b.CHANGE : b.CHANGE + 8] += sign * 1e-6 * direction[:size].reshape(chains.SHAKEN, 8)
+            g[:, fields.CHANGE : fields.CHANGE + 8] += (
+                sign * 1e-6 * direction[:size].reshape(chains.SHAKEN, 8)
+            )
             increments = state.increments.copy()
             state.increments[:] += sign * 1e-6 * direction[size:]
             state.elements.data[:] = in_lanes(g).data

@@ -4,10 +4,12 @@ import numpy as np
 import pytest
 
 from cvt_hpc.models.pushbelt import belt as p
+from cvt_hpc.models.pushbelt import fields as pushbelt_fields
 from cvt_hpc.models.pushbelt.start import in_lanes, of_lanes, start
 from cvt_hpc.models.pushbelt.start import workspace as planar_workspace
 from cvt_hpc.models.pushbelt.step import advance as planar_advance
 from cvt_hpc.models.spatial_pushbelt import belt as b
+from cvt_hpc.models.spatial_pushbelt import fields as spatial_fields
 from cvt_hpc.models.spatial_pushbelt.flank import flank_forces
 from cvt_hpc.models.spatial_pushbelt.step import _accept, _evaluate, _prepare, advance
 from support import spatial_chains as chains
@@ -36,20 +38,27 @@ def test_in_its_plane_it_is_the_planar_belt(modal):
     assert not f[:, [2, 5, 8]].any()
     side = np.where(f[:, 1] < 0.0, 0, 1)
     on_strand = (f[:, 0] > 0.05) & (f[:, 0] < 0.105)
-    push, flat_push = f[:, b.PUSH : b.PUSH + 4].sum(1), g[:, p.EDGE] + g[:, p.HEAD]
+    push, flat_push = (
+        f[:, spatial_fields.PUSH : spatial_fields.PUSH + 4].sum(1),
+        g[:, pushbelt_fields.EDGE] + g[:, pushbelt_fields.HEAD],
+    )
     for strand in (0, 1):
         there = on_strand & (side == strand)
-        assert f[there, b.TENSION].mean() == pytest.approx(g[there, p.TENSION].mean(), rel=6e-3)
+        assert f[there, spatial_fields.TENSION].mean() == pytest.approx(
+            g[there, pushbelt_fields.TENSION].mean(), rel=6e-3
+        )
         assert push[there].mean() == pytest.approx(flat_push[there].mean(), rel=6e-3, abs=2.0)
-    thrust = g[:, p.FLANK] * planar.cosine + g[:, p.FLANK_FRICTION_M] * planar.sine
-    driving = float(((1.0 - g[:, p.DRIVEN]) * thrust).sum())
+    thrust = (
+        g[:, pushbelt_fields.FLANK] * planar.cosine + g[:, pushbelt_fields.FLANK_FRICTION_M] * planar.sine
+    )
+    driving = float(((1.0 - g[:, pushbelt_fields.DRIVEN]) * thrust).sum())
     # the planar belt's sliding along the meridian is v_r / cos d0, not v_r cos d0: 4 % of a part of friction
-    assert state.loads[b.DRIVING_LEFT] == pytest.approx(driving, rel=6e-3)
-    assert state.loads[b.DRIVING_RIGHT] == state.loads[b.DRIVING_LEFT]
+    assert state.loads[spatial_fields.DRIVING_LEFT] == pytest.approx(driving, rel=6e-3)
+    assert state.loads[spatial_fields.DRIVING_RIGHT] == state.loads[spatial_fields.DRIVING_LEFT]
     for spatial, flat in (
-        (p.FLANK_LOSS, p.FLANK_LOSS),
-        (p.RING_LOSS, p.RING_LOSS),
-        (p.DAMPING_LOSS, p.DAMPING_LOSS),
+        (pushbelt_fields.FLANK_LOSS, pushbelt_fields.FLANK_LOSS),
+        (pushbelt_fields.RING_LOSS, pushbelt_fields.RING_LOSS),
+        (pushbelt_fields.DAMPING_LOSS, pushbelt_fields.DAMPING_LOSS),
     ):
         assert state.totals[spatial] == pytest.approx(planar_state.totals[flat], rel=1e-2)
 
@@ -60,7 +69,7 @@ def test_what_is_symmetric_stays_in_its_plane(modal):
     _, state, _ = scene(offset=0.0, modal=modal, pin_clearance=1e-5)
     f = of_lanes(state.elements)
     assert np.array_equal(f, chains.mirrored(f))
-    assert not f[:, [2, 5, 8, b.SLOPE]].any()
+    assert not f[:, [2, 5, 8, spatial_fields.SLOPE]].any()
     assert not state.leans.any()
 
 
@@ -95,24 +104,27 @@ def test_slip_limit():
     overload = inputs((14e3, 14e3), (300.0, 300.0))
     advance(belt, b.NEWTON, state, work, overload, 4500, STEP)
     f = of_lanes(state.elements)
-    flank, driving = f[:, b.FLANK : b.FLANK + 4], f[:, b.DRIVEN] < 0.5
-    assert (f[driving, b.FLANK_SLIP_T : b.FLANK_SLIP_T + 4][flank[driving] > 10.0] < -1.0).all()
+    flank, driving = f[:, spatial_fields.FLANK : spatial_fields.FLANK + 4], f[:, spatial_fields.DRIVEN] < 0.5
+    assert (
+        f[driving, spatial_fields.FLANK_SLIP_T : spatial_fields.FLANK_SLIP_T + 4][flank[driving] > 10.0]
+        < -1.0
+    ).all()
     radius = np.linalg.norm(f[:, :2] - belt.pitch_depth * f[:, 6:8], axis=1)[:, None]
     heights = np.array([-1.0, 1.0, -1.0, 1.0]) * belt.flank_reach
     carried = (flank * (radius + heights))[driving].sum() / flank[driving].sum()
-    thrust = 0.5 * state.loads[: b.DRIVEN_LEFT].sum()
+    thrust = 0.5 * state.loads[: spatial_fields.DRIVEN_LEFT].sum()
     limit = 2.0 * belt.flank_kinetic * carried / belt.cosine
-    assert -state.loads[b.DRIVING_TORQUE] / thrust == pytest.approx(limit, rel=1e-3)
+    assert -state.loads[spatial_fields.DRIVING_TORQUE] / thrust == pytest.approx(limit, rel=1e-3)
 
 
 def test_a_clamped_element_without_friction():
     # each flank carries N: 2 N sin d0 outwards, N cos d0 along the axis, and no moment where both heights are alike
     planar, planar_state = start(given(NODES, kinetic_friction=0.0, ring_friction=0.0))
     belt, state = chains.beside_planar(planar, planar_state)
-    state.pulleys[[p.DRIVING_RADIUS, p.DRIVEN_RADIUS]] += 1e-5
+    state.pulleys[[pushbelt_fields.DRIVING_RADIUS, pushbelt_fields.DRIVEN_RADIUS]] += 1e-5
     work = b.workspace(belt, NODES)
     f = of_lanes(state.elements)
-    f[:, b.SPEED : b.SPEED + 8] = 0.0
+    f[:, spatial_fields.SPEED : spatial_fields.SPEED + 8] = 0.0
     state.elements.data[:] = in_lanes(f).data
     _prepare(belt, state, work, 1e-9)
     flank_forces(
@@ -126,13 +138,16 @@ def test_a_clamped_element_without_friction():
         work.iterate,
         1e-9,
     )
-    found, forces = of_lanes(work.iterate), of_lanes(state.elements)[:, b.FLANK : b.FLANK + 4]
+    found, forces = (
+        of_lanes(work.iterate),
+        of_lanes(state.elements)[:, spatial_fields.FLANK : spatial_fields.FLANK + 4],
+    )
     normal = forces.sum(1)
     pressed = normal > 0.0
-    outward = np.hypot(found[:, b.RESIDUAL], found[:, b.RESIDUAL + 1])
+    outward = np.hypot(found[:, spatial_fields.RESIDUAL], found[:, spatial_fields.RESIDUAL + 1])
     assert pressed.sum() > 40
     assert outward[pressed] == pytest.approx(normal[pressed] * belt.sine, rel=1e-4)
-    assert np.abs(found[:, b.RESIDUAL + 2]).max() < 1e-9 * normal.max()
+    assert np.abs(found[:, spatial_fields.RESIDUAL + 2]).max() < 1e-9 * normal.max()
     # the penetration 1e-5 sin d0 on both points of stiffness c / 2
     middle = np.argmax(pressed & (np.abs(f[:, 1]) < 1e-3) & (f[:, 0] < 0.0))
     assert forces[middle] == pytest.approx(0.5 * belt.flank_stiffness * 1e-5 * belt.sine, rel=2e-2)
@@ -140,7 +155,7 @@ def test_a_clamped_element_without_friction():
 
 def test_stiff_sheaves_are_rigid_ones():
     rigid, stiff = scene(), scene(modal=((1e14, 1e14, 1e14), (1e14, 1e14, 1e14)))
-    for k in (b.DRIVING_LEFT, b.DRIVEN_RIGHT, b.DRIVING_TORQUE):
+    for k in (spatial_fields.DRIVING_LEFT, spatial_fields.DRIVEN_RIGHT, spatial_fields.DRIVING_TORQUE):
         assert stiff[1].loads[k] == pytest.approx(rigid[1].loads[k], rel=5e-3)
     assert np.abs(stiff[1].openings).max() < 1e-9
 
@@ -152,7 +167,9 @@ def test_a_sheave_leans_with_its_lag_under_a_load_that_stays():
     _prepare(belt, state, work, STEP)
     _evaluate(belt, state, work, LOAD, STEP)
     f = of_lanes(state.elements).copy()
-    f[:, b.FLANK : b.FLANK + 4] = np.random.default_rng(5).uniform(0.0, 500.0, (NODES, 4))
+    f[:, spatial_fields.FLANK : spatial_fields.FLANK + 4] = np.random.default_rng(5).uniform(
+        0.0, 500.0, (NODES, 4)
+    )
     target = leaning_loads(belt, f, sheaves_modes(belt, state)) / belt.modal_stiffness
     assert np.abs(target).min() > 1e-8
     steps = 200
@@ -174,35 +191,47 @@ def test_pins_push_back_beyond_their_clearance():
         pin_clearance=clearance, pin_stiffness=1e6, pitch=pitch, thickness=0.9 * pitch, contact_stiffness=0.0
     )
     # a straight line, closed upon itself, far from the pulleys
-    fields = np.zeros((nodes, b.STATE_FIELDS))
+    fields = np.zeros((nodes, spatial_fields.STATE_FIELDS))
     fields[:, 0], fields[:, 1] = pitch * np.arange(nodes), 1.0
     fields[:, 3], fields[:, 7] = 1.0, -1.0
-    fields[:, b.LENGTH], fields[-1, b.LENGTH] = pitch, (nodes - 1) * pitch
+    fields[:, spatial_fields.LENGTH], fields[-1, spatial_fields.LENGTH] = pitch, (nodes - 1) * pitch
     fields[3, 1] += 1.2 * clearance
     fields[3, 2] = 1.6 * clearance
     state, work = chains.state(fields), b.workspace(belt, nodes)
     assert (
-        advance(belt, b.NEWTON._replace(tolerance=1e-12), state, work, np.zeros((2, b.INPUTS)), 1, 1e-9) == 0
+        advance(
+            belt,
+            b.NEWTON._replace(tolerance=1e-12),
+            state,
+            work,
+            np.zeros((2, spatial_fields.INPUTS)),
+            1,
+            1e-9,
+        )
+        == 0
     )
     f = of_lanes(state.elements)
     # of both pairs of element 3: stiffness times what is beyond the clearance, along the offset
-    assert f[[2, 3], b.PIN] == pytest.approx(1e6 * clearance, rel=1e-3)
-    assert np.delete(f[:, b.PIN], [2, 3]) == pytest.approx(0.0, abs=1e-12)
-    push = belt.mass * f[3, b.SPEED + 1] / 1e-9, belt.mass * f[3, b.SPEED + 2] / 1e-9
+    assert f[[2, 3], spatial_fields.PIN] == pytest.approx(1e6 * clearance, rel=1e-3)
+    assert np.delete(f[:, spatial_fields.PIN], [2, 3]) == pytest.approx(0.0, abs=1e-12)
+    push = (
+        belt.mass * f[3, spatial_fields.SPEED + 1] / 1e-9,
+        belt.mass * f[3, spatial_fields.SPEED + 2] / 1e-9,
+    )
     assert push[0] == pytest.approx(-2.0 * 0.6 * 1e6 * clearance, rel=0.3)
     _, momentum, _ = chains.energy_and_momentum(belt, f)
-    assert np.abs(momentum).max() < 1e-6 * abs(belt.mass * f[3, b.SPEED + 1])
+    assert np.abs(momentum).max() < 1e-6 * abs(belt.mass * f[3, spatial_fields.SPEED + 1])
 
 
 def test_a_step_that_is_not_solved_names_its_contact():
     belt, state, work = scene()
     hold = inputs((THRUST, THRUST), (LOAD, 1.5 * LOAD))
     strict = b.NEWTON._replace(tolerance=1e-14, most_iterations=3, most_failures=2)
-    assert advance(belt, strict, state, work, hold, 10, STEP) == p.NOT_CONVERGED
-    assert state.counters[p.IN_A_ROW] == 2
-    assert 0 <= state.counters[p.FAILED_ELEMENT] < NODES
-    assert 0 <= state.counters[p.FAILED_CONTACT] < len(b.CONTACTS)
+    assert advance(belt, strict, state, work, hold, 10, STEP) == pushbelt_fields.NOT_CONVERGED
+    assert state.counters[pushbelt_fields.IN_A_ROW] == 2
+    assert 0 <= state.counters[pushbelt_fields.FAILED_ELEMENT] < NODES
+    assert 0 <= state.counters[pushbelt_fields.FAILED_CONTACT] < len(spatial_fields.CONTACTS)
     broken = of_lanes(state.elements).copy()
-    broken[5, b.SPEED] = np.nan
+    broken[5, spatial_fields.SPEED] = np.nan
     state.elements.data[:] = in_lanes(broken).data
-    assert advance(belt, b.NEWTON, state, work, hold, 10, STEP) == p.NOT_FINITE
+    assert advance(belt, b.NEWTON, state, work, hold, 10, STEP) == pushbelt_fields.NOT_FINITE

@@ -6,9 +6,10 @@ from typing import NamedTuple
 import numpy as np
 import pytest
 
-from cvt_hpc.models.pushbelt import belt as p
+from cvt_hpc.models.pushbelt import fields as pushbelt_fields
 from cvt_hpc.models.pushbelt.start import of_lanes
 from cvt_hpc.models.spatial_pushbelt import belt as b
+from cvt_hpc.models.spatial_pushbelt import fields as spatial_fields
 from cvt_hpc.models.spatial_pushbelt.step import advance
 from cvt_hpc.physics.friction_laws import Law
 from support.pushbelts import THRUST
@@ -33,7 +34,9 @@ SCENES = {
     # elements that nothing turns with the rings yaw until their pins hold them
     "pins": {"yaw_stiffness": 0.0, "pin_clearance": 5e-5},
 }
-CONTACTS = slice(b.PUSH, b.FLANK + b.POINTS)  # fields of their normal forces, in the order of b.CONTACTS
+CONTACTS = slice(
+    spatial_fields.PUSH, spatial_fields.FLANK + spatial_fields.POINTS
+)  # fields of their normal forces, in the order of b.CONTACTS
 FRONTS, PIN, FLANKS = slice(0, 4), 4, slice(5, 9)
 
 
@@ -60,7 +63,7 @@ def revolution(name):
     loads, found = [], []
     for _ in range(OUTPUTS):
         assert advance(belt, b.NEWTON, state, work, hold, 9, STEP) == 0
-        saddle = of_lanes(state.elements)[:, b.SADDLE].copy()
+        saddle = of_lanes(state.elements)[:, spatial_fields.SADDLE].copy()
         leans, shapes = state.leans.copy(), sheaves_modes(belt, state)
         assert advance(belt, b.NEWTON, state, work, hold, 1, STEP) == 0
         loads.append(state.loads.copy())
@@ -69,31 +72,40 @@ def revolution(name):
         leaning = leaning_loads(belt, fields, shapes)
         found.append((fields, saddle, gaps(belt, state), opening, leans, leaning))
     spent = state.totals - before
-    rate = spent / spent[p.TIME]
-    rate[p.TIME] = (stored(belt, state) - energy) / spent[p.TIME]
+    rate = spent / spent[pushbelt_fields.TIME]
+    rate[pushbelt_fields.TIME] = (stored(belt, state) - energy) / spent[pushbelt_fields.TIME]
     return Revolution(belt, state, rate, np.array(loads), *map(np.array, zip(*found, strict=True)))
 
 
 def slips(f):
     """Sliding speeds of flanks and rings, (..., 5) [m/s]."""
-    m, t = (f[..., k : k + 4] for k in (b.FLANK_SLIP_M, b.FLANK_SLIP_T))
-    return np.concatenate([np.hypot(m, t), np.abs(f[..., b.RING_SLIP, None])], axis=-1)
+    m, t = (f[..., k : k + 4] for k in (spatial_fields.FLANK_SLIP_M, spatial_fields.FLANK_SLIP_T))
+    return np.concatenate([np.hypot(m, t), np.abs(f[..., spatial_fields.RING_SLIP, None])], axis=-1)
 
 
 @pytest.mark.parametrize("name", SCENES)
 def test_power_is_balanced_and_both_pulleys_take_the_same_axial_force(name):
     found = revolution(name)
     rate, loads = found.rate, found.loads.mean(axis=0)
-    lost = rate[p.FLANK_LOSS : p.POWER_RESIDUAL]
+    lost = rate[pushbelt_fields.FLANK_LOSS : pushbelt_fields.POWER_RESIDUAL]
     assert (lost >= 0.0).all()
-    left = rate[p.WORK_IN] - rate[p.WORK_OUT] - rate[p.THRUST_WORK] - lost.sum() - rate[p.TIME]
-    assert abs(left) < 3e-4 * rate[p.WORK_IN]
-    assert found.state.counters[p.FAILED_STEPS] <= 2
+    left = (
+        rate[pushbelt_fields.WORK_IN]
+        - rate[pushbelt_fields.WORK_OUT]
+        - rate[pushbelt_fields.THRUST_WORK]
+        - lost.sum()
+        - rate[pushbelt_fields.TIME]
+    )
+    assert abs(left) < 3e-4 * rate[pushbelt_fields.WORK_IN]
+    assert found.state.counters[pushbelt_fields.FAILED_STEPS] <= 2
     # what the belt does to one pulley along the axis it takes from the other
-    net = loads[b.DRIVING_RIGHT] - loads[b.DRIVING_LEFT], loads[b.DRIVEN_RIGHT] - loads[b.DRIVEN_LEFT]
+    net = (
+        loads[spatial_fields.DRIVING_RIGHT] - loads[spatial_fields.DRIVING_LEFT],
+        loads[spatial_fields.DRIVEN_RIGHT] - loads[spatial_fields.DRIVEN_LEFT],
+    )
     assert net[0] > 80.0
     assert net[0] + net[1] == pytest.approx(0.0, abs=0.01 * net[0])
-    assert -loads[b.DRIVING_TORQUE] == pytest.approx(TORQUE, rel=0.03)
+    assert -loads[spatial_fields.DRIVING_TORQUE] == pytest.approx(TORQUE, rel=0.03)
 
 
 @pytest.mark.parametrize("name", SCENES)
@@ -125,11 +137,16 @@ def test_contacts_press_by_their_gaps_at_every_output(name):
 def test_friction_keeps_its_law_and_its_cone_at_every_output(name):
     found = revolution(name)
     f, belt = found.elements, found.belt
-    sliding, size = [f[..., k : k + 4] for k in (b.FLANK_SLIP_M, b.FLANK_SLIP_T)], slips(f)
-    force = [f[..., k : k + 4] for k in (b.FLANK_FRICTION_M, b.FLANK_FRICTION_T)]
+    sliding, size = (
+        [f[..., k : k + 4] for k in (spatial_fields.FLANK_SLIP_M, spatial_fields.FLANK_SLIP_T)],
+        slips(f),
+    )
+    force = [f[..., k : k + 4] for k in (spatial_fields.FLANK_FRICTION_M, spatial_fields.FLANK_FRICTION_T)]
     mu = np.full(size.shape[:-1], 0.09)[..., None]
     if name == "falling":  # mu_k - g v_s exp(-v / v_s)
-        mu = 0.09 + 0.3 * 0.1 * np.exp(-f[..., b.V_FILTERED : b.V_FILTERED + 4] / 0.1)
+        mu = 0.09 + 0.3 * 0.1 * np.exp(
+            -f[..., spatial_fields.V_FILTERED : spatial_fields.V_FILTERED + 4] / 0.1
+        )
         assert mu.max() > 1.2 * mu.min()
     most = mu * f[..., CONTACTS][..., FLANKS]
     least = 1e-9 * most.max()  # friction is linear to 3e-7 below 1e-3 of the regularisation's speed
@@ -139,9 +156,9 @@ def test_friction_keeps_its_law_and_its_cone_at_every_output(name):
     assert np.abs(force[0] * sliding[1] - force[1] * sliding[0]).max() < least
     assert min((one * way).min() for one, way in zip(force, sliding, strict=True)) >= 0.0
     # rings: by the normal force of the step before
-    most, slip = belt.ring_friction * found.saddle_before, f[..., b.RING_SLIP]
+    most, slip = belt.ring_friction * found.saddle_before, f[..., spatial_fields.RING_SLIP]
     law = most * np.tanh(slip / belt.ring_friction_speed)
-    assert np.abs(f[..., b.RING_FRICTION] - law).max() < 1e-9 * most.max()
+    assert np.abs(f[..., spatial_fields.RING_FRICTION] - law).max() < 1e-9 * most.max()
 
 
 def changes(name):
@@ -157,10 +174,10 @@ def changes(name):
         "slips": held & ~sliding[:-1] & sliding[1:],
     }
     names = {
-        "opens": b.CONTACTS[:9],
-        "closes": b.CONTACTS[:9],
-        "sticks": b.CONTACTS[5:],
-        "slips": b.CONTACTS[5:],
+        "opens": spatial_fields.CONTACTS[:9],
+        "closes": spatial_fields.CONTACTS[:9],
+        "sticks": spatial_fields.CONTACTS[5:],
+        "slips": spatial_fields.CONTACTS[5:],
     }
     return {
         verb: {what for what, seen in zip(names[verb], found[verb].any(axis=(0, 1)), strict=True) if seen}
@@ -214,4 +231,6 @@ def test_sheaves_lean_by_the_difference_of_their_loads():
     assert found.leans.mean(axis=0) == pytest.approx(expected, abs=0.01 * largest)
     # the first mode opens a sheave evenly by force over stiffness
     loads = found.loads.mean(axis=0)
-    assert found.state.openings[0, 0] * 6e8 == pytest.approx(loads[: b.DRIVEN_LEFT].mean(), rel=0.05)
+    assert found.state.openings[0, 0] * 6e8 == pytest.approx(
+        loads[: spatial_fields.DRIVEN_LEFT].mean(), rel=0.05
+    )

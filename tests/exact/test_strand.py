@@ -7,7 +7,8 @@ import numpy as np
 import pytest
 from scipy.linalg import eigh
 
-from cvt_hpc.models.elastic_belt.belt import State, U, W
+from cvt_hpc.models.elastic_belt import fields as f
+from cvt_hpc.models.elastic_belt.belt import State
 from cvt_hpc.models.elastic_belt.rhs import accelerations, strains
 from support.straight import LENGTH, MASS, TENSION, WAVE, moving_straight, straight_belt
 
@@ -17,13 +18,13 @@ def linearise(belt, **forces):
     n = belt.cell.size
     fields, scalars = moving_straight(belt, **forces)
     eps, rate, matrices = np.empty((2, n)), np.empty((7, n)), np.empty((2, n, n))
-    for matrix, row in zip(matrices, (W, U), strict=True):
+    for matrix, row in zip(matrices, (f.W, f.U), strict=True):
         for j in range(n):
             probed = fields.copy()
             probed[row, j] = 1.0
             strains(belt, probed, eps)
             accelerations(belt, State(probed, scalars), np.zeros(n), eps, rate, np.empty(n))
-            matrix[:, j] = rate[U]
+            matrix[:, j] = rate[f.U]
     return matrices
 
 

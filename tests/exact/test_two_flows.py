@@ -5,10 +5,11 @@ from functools import cache, partial
 import numpy as np
 import pytest
 
-from cvt_hpc.models.pushbelt import belt as p
+from cvt_hpc.models.pushbelt import fields as pushbelt_fields
 from cvt_hpc.models.pushbelt.start import in_lanes, of_lanes
 from cvt_hpc.models.pushbelt.stepping import advance_by
 from cvt_hpc.models.spatial_pushbelt import belt as b
+from cvt_hpc.models.spatial_pushbelt import fields as spatial_fields
 from cvt_hpc.models.spatial_pushbelt.start import with_two_flows
 from cvt_hpc.models.spatial_pushbelt.step import EQUATIONS, advance
 from cvt_hpc.solvers.linked_blocks import field_of_right
@@ -18,7 +19,7 @@ from support.spatial_belts import LOAD, NODES, STEP, inputs, scene, stored
 
 TWO = EQUATIONS[2]
 advance_two = partial(advance_by, TWO)
-W = b.SIZE  # number of the ninth unknown
+W = spatial_fields.SIZE  # number of the ninth unknown
 FIRST = [*range(6), W]  # numbers of velocities and w
 
 
@@ -38,15 +39,18 @@ def shaken(seed):
     rng = np.random.default_rng(seed)
     f = of_lanes(state.elements).copy()
     f[:, :3] += rng.normal(0.0, 2e-5, (NODES, 3))
-    for first in (b.HEADING, b.OUTWARD):
+    for first in (spatial_fields.HEADING, spatial_fields.OUTWARD):
         f[:, first : first + 3] += rng.normal(0.0, 2e-3, (NODES, 3))
-    x, o = f[:, b.HEADING : b.HEADING + 3], f[:, b.OUTWARD : b.OUTWARD + 3]
+    x, o = (
+        f[:, spatial_fields.HEADING : spatial_fields.HEADING + 3],
+        f[:, spatial_fields.OUTWARD : spatial_fields.OUTWARD + 3],
+    )
     x /= np.linalg.norm(x, axis=1)[:, None]
     o -= np.sum(o * x, 1)[:, None] * x
     o /= np.linalg.norm(o, axis=1)[:, None]
-    f[:, b.SPEED : b.SPEED + 8] += rng.normal(0.0, 0.05, (NODES, 8))
-    f[:, b.HALF_SPEED] = rng.normal(0.0, 0.05, NODES)
-    f[:, [b.SADDLE_RIGHT, b.SADDLE_LEFT]] = rng.uniform(10.0, 40.0, (NODES, 2))
+    f[:, spatial_fields.SPEED : spatial_fields.SPEED + 8] += rng.normal(0.0, 0.05, (NODES, 8))
+    f[:, spatial_fields.HALF_SPEED] = rng.normal(0.0, 0.05, NODES)
+    f[:, [spatial_fields.SADDLE_RIGHT, spatial_fields.SADDLE_LEFT]] = rng.uniform(10.0, 40.0, (NODES, 2))
     state.elements.data[:] = in_lanes(f).data
     return belt, state, b.workspace(belt, NODES, 2), rng
 
@@ -54,10 +58,12 @@ def shaken(seed):
 def stretches(step, x):
     """Rates along x (nodes, 9) at which both packages are shortened together, and half of their difference."""
     ahead = np.roll(x, -1, 0)
-    of_both = np.sum(step[:, b.MEAN_I : b.MEAN_I + 7] * x[:, :7], 1)
-    of_both -= np.sum(step[:, b.MEAN_J : b.MEAN_J + 7] * ahead[:, :7], 1)
-    apart = np.sum(step[:, b.DIFFERENCE_I : b.DIFFERENCE_I + 7] * x[:, FIRST], 1)
-    return of_both, apart - np.sum(step[:, b.DIFFERENCE_J : b.DIFFERENCE_J + 7] * ahead[:, FIRST], 1)
+    of_both = np.sum(step[:, spatial_fields.MEAN_I : spatial_fields.MEAN_I + 7] * x[:, :7], 1)
+    of_both -= np.sum(step[:, spatial_fields.MEAN_J : spatial_fields.MEAN_J + 7] * ahead[:, :7], 1)
+    apart = np.sum(step[:, spatial_fields.DIFFERENCE_I : spatial_fields.DIFFERENCE_I + 7] * x[:, FIRST], 1)
+    return of_both, apart - np.sum(
+        step[:, spatial_fields.DIFFERENCE_J : spatial_fields.DIFFERENCE_J + 7] * ahead[:, FIRST], 1
+    )
 
 
 def test_tensions_of_both_packages_change_by_their_directions():
@@ -66,30 +72,33 @@ def test_tensions_of_both_packages_change_by_their_directions():
     place, _ = chains.lines(belt, f)
     right, left = np.linalg.norm(np.roll(place, -1, axis=1) - place, axis=2)
     # the direction of a tension is its rate at a strain of zero
-    f[:, b.LENGTH], f[:, b.HALF_LENGTH] = 0.5 * (right + left), 0.5 * (right - left)
+    f[:, spatial_fields.LENGTH], f[:, spatial_fields.HALF_LENGTH] = 0.5 * (right + left), 0.5 * (right - left)
     x = rng.normal(0.0, 1.0, (NODES, 9)) * [1, 1, 1, 100, 100, 100, 1, 0, 1]
     small, measured = 3e-9, {}
     for sign in (-1.0, 0.0, 1.0):
         g = f.copy()
-        g[:, b.SPEED : b.SPEED + 8], g[:, b.HALF_SPEED] = sign * small * x[:, :8], sign * small * x[:, W]
+        g[:, spatial_fields.SPEED : spatial_fields.SPEED + 8], g[:, spatial_fields.HALF_SPEED] = (
+            sign * small * x[:, :8],
+            sign * small * x[:, W],
+        )
         state.elements.data[:] = in_lanes(g).data
         TWO.prepare(belt, state, work, 1.0)
         measured[sign] = of_lanes(work.step).copy()
     step = measured[0.0]
     of_both, apart = stretches(step, x)
-    own, cross = step[:, b.TENSION_SLOPE], step[:, b.CROSS_SLOPE]
+    own, cross = step[:, spatial_fields.TENSION_SLOPE], step[:, spatial_fields.CROSS_SLOPE]
     assert np.abs(cross).max() > 1e-4 * own.max()
     for field, expected in (
-        (b.PREDICTED_TENSION, -own * of_both - cross * apart),
-        (b.PREDICTED_DIFFERENCE, -own * apart - cross * of_both),
+        (spatial_fields.PREDICTED_TENSION, -own * of_both - cross * apart),
+        (spatial_fields.PREDICTED_DIFFERENCE, -own * apart - cross * of_both),
     ):
         found = (measured[1.0][:, field] - measured[-1.0][:, field]) / (2.0 * small)
         # 2e-7: differences of lengths of 6 mm by 3e-9 m
         assert found == pytest.approx(expected, abs=2e-7 * np.abs(expected).max())
     # slips: v + w and v - w less the speeds of both lines along themselves
     for field, row, numbers in (
-        (b.START_SLIP, b.SLIP_BY, range(7)),
-        (b.START_HALF_SLIP, b.HALF_SLIP_BY, FIRST),
+        (spatial_fields.START_SLIP, spatial_fields.SLIP_BY, range(7)),
+        (spatial_fields.START_HALF_SLIP, spatial_fields.HALF_SLIP_BY, FIRST),
     ):
         found = (measured[1.0][:, field] - measured[-1.0][:, field]) / (2.0 * small)
         expected = np.sum(step[:, row : row + 7] * x[:, list(numbers)], 1)
@@ -102,11 +111,15 @@ def test_both_packages_slip_along_their_own_lines():
     f, step = of_lanes(state.elements), of_lanes(work.step)
     slips = []
     for side, line, t in zip((1.0, -1.0), *chains.lines(belt, f), strict=True):
-        moving = f[:, b.SPEED : b.SPEED + 3] + np.cross(f[:, b.OMEGA : b.OMEGA + 3], line - f[:, :3])
-        slips.append(f[:, b.V] + side * f[:, b.HALF_SPEED] - np.sum(t * moving, 1))
+        moving = f[:, spatial_fields.SPEED : spatial_fields.SPEED + 3] + np.cross(
+            f[:, spatial_fields.OMEGA : spatial_fields.OMEGA + 3], line - f[:, :3]
+        )
+        slips.append(f[:, spatial_fields.V] + side * f[:, spatial_fields.HALF_SPEED] - np.sum(t * moving, 1))
     scale = np.abs(slips).max()
-    assert step[:, b.START_SLIP] == pytest.approx(0.5 * (slips[0] + slips[1]), abs=1e-12 * scale)
-    assert step[:, b.START_HALF_SLIP] == pytest.approx(0.5 * (slips[0] - slips[1]), abs=1e-12 * scale)
+    assert step[:, spatial_fields.START_SLIP] == pytest.approx(0.5 * (slips[0] + slips[1]), abs=1e-12 * scale)
+    assert step[:, spatial_fields.START_HALF_SLIP] == pytest.approx(
+        0.5 * (slips[0] - slips[1]), abs=1e-12 * scale
+    )
 
 
 def evaluated(belt, state, work):
@@ -114,7 +127,12 @@ def evaluated(belt, state, work):
     for _ in range(2):
         TWO.evaluate(belt, state, work, LOAD, STEP)
     found = of_lanes(work.iterate)
-    own = np.hstack([found[:, b.RESIDUAL : b.RESIDUAL + 8], found[:, b.HALF_RESIDUAL, None]])
+    own = np.hstack(
+        [
+            found[:, spatial_fields.RESIDUAL : spatial_fields.RESIDUAL + 8],
+            found[:, spatial_fields.HALF_RESIDUAL, None],
+        ]
+    )
     return own, work.border[:, -1].copy()
 
 
@@ -122,7 +140,7 @@ def test_the_linear_system_is_the_slope_of_the_residuals():
     belt, state, work, rng = shaken(3)
     TWO.prepare(belt, state, work, STEP)
     f = of_lanes(state.elements).copy()
-    f[:, b.CHANGE : b.CHANGE + 9] = rng.normal(0.0, 0.01, (NODES, 9))
+    f[:, spatial_fields.CHANGE : spatial_fields.CHANGE + 9] = rng.normal(0.0, 0.01, (NODES, 9))
     state.increments[:] = 0.3
     state.elements.data[:] = in_lanes(f).data
     residual, _ = evaluated(belt, state, work)
@@ -131,12 +149,16 @@ def test_the_linear_system_is_the_slope_of_the_residuals():
     assert blocks[:, right : right + 9] == pytest.approx(residual)
     # tensions of the iterate, of which the recorded ones are those of the last
     step, found = of_lanes(work.step), of_lanes(work.iterate)
-    change = f[:, b.CHANGE : b.CHANGE + 9]
+    change = f[:, spatial_fields.CHANGE : spatial_fields.CHANGE + 9]
     of_both, apart = stretches(step, change)
-    own, cross = step[:, b.TENSION_SLOPE], step[:, b.CROSS_SLOPE]
+    own, cross = step[:, spatial_fields.TENSION_SLOPE], step[:, spatial_fields.CROSS_SLOPE]
     for predicted, at, expected in (
-        (b.PREDICTED_TENSION, b.ITERATE_TENSION, own * of_both + cross * apart),
-        (b.PREDICTED_DIFFERENCE, b.ITERATE_DIFFERENCE, own * apart + cross * of_both),
+        (spatial_fields.PREDICTED_TENSION, spatial_fields.ITERATE_TENSION, own * of_both + cross * apart),
+        (
+            spatial_fields.PREDICTED_DIFFERENCE,
+            spatial_fields.ITERATE_DIFFERENCE,
+            own * apart + cross * of_both,
+        ),
     ):
         assert step[:, predicted] - found[:, at] == pytest.approx(expected, abs=1e-9 * np.abs(expected).max())
     direction = rng.normal(0.0, 1.0, (NODES, 9))
@@ -147,7 +169,7 @@ def test_the_linear_system_is_the_slope_of_the_residuals():
     found = []
     for sign in (1.0, -1.0):
         g = f.copy()
-        g[:, b.CHANGE : b.CHANGE + 9] += sign * 1e-6 * direction
+        g[:, spatial_fields.CHANGE : spatial_fields.CHANGE + 9] += sign * 1e-6 * direction
         state.elements.data[:] = in_lanes(g).data
         found.append(evaluated(belt, state, work)[0])
     slope = -(found[0] - found[1]) / 2e-6
@@ -163,20 +185,22 @@ def test_a_free_ring_whose_packages_run_apart_keeps_its_energy_and_momentum():
     for dt in (1e-5, 0.5e-5):
         state = with_two_flows(constants, chains.state(fields))
         f = of_lanes(state.elements).copy()
-        f[:, b.HALF_SPEED] = 0.5
+        f[:, spatial_fields.HALF_SPEED] = 0.5
         yawing = 5.0 * np.cos(4.0 * np.pi * np.arange(nodes) / nodes)[:, None]  # [rad/s]
-        f[:, b.OMEGA : b.OMEGA + 3] += yawing * f[:, b.OUTWARD : b.OUTWARD + 3]
+        f[:, spatial_fields.OMEGA : spatial_fields.OMEGA + 3] += (
+            yawing * f[:, spatial_fields.OUTWARD : spatial_fields.OUTWARD + 3]
+        )
         before, momentum, moment = chains.energy_and_momentum(constants, f)
         state.elements.data[:] = in_lanes(f).data
-        work, rest = b.workspace(constants, nodes, 2), np.zeros((2, b.INPUTS))
+        work, rest = b.workspace(constants, nodes, 2), np.zeros((2, spatial_fields.INPUTS))
         assert advance_two(constants, b.NEWTON_OF_TWO_FLOWS, state, work, rest, round(5e-3 / dt), dt) == 0
         f = of_lanes(state.elements)
         after, momentum_now, moment_now = chains.energy_and_momentum(constants, f)
         # elements that yaw pull one package more than the other
-        assert 0.01 < np.abs(f[:, b.TENSION_DIFFERENCE]).max()
+        assert 0.01 < np.abs(f[:, spatial_fields.TENSION_DIFFERENCE]).max()
         # what pulls a package here pulls it back elsewhere
-        assert f[:, b.HALF_SPEED].mean() == pytest.approx(0.5, abs=1e-12)
-        assert np.ptp(f[:, b.HALF_SPEED]) > 1e-6
+        assert f[:, spatial_fields.HALF_SPEED].mean() == pytest.approx(0.5, abs=1e-12)
+        assert np.ptp(f[:, spatial_fields.HALF_SPEED]) > 1e-6
         assert momentum_now == pytest.approx(momentum, abs=1e-12)
         # 2e-7, 1.1e-7 with one flow: the shear of the rings keeps its axial direction where elements yaw
         assert moment_now[2] == pytest.approx(moment[2], rel=2e-7)
@@ -194,26 +218,37 @@ def test_packages_that_run_apart_are_braked_by_what_is_booked_as_loss():
     )
     state = with_two_flows(constants, chains.state(fields))
     f = of_lanes(state.elements).copy()
-    f[:, b.HALF_SPEED] = 5.0
-    f[:, b.HALF_LENGTH] = -2e-5 * f[:, b.LENGTH]  # the right package is strained more
+    f[:, spatial_fields.HALF_SPEED] = 5.0
+    f[:, spatial_fields.HALF_LENGTH] = (
+        -2e-5 * f[:, spatial_fields.LENGTH]
+    )  # the right package is strained more
     state.elements.data[:] = in_lanes(f).data
-    work, rest, found = b.workspace(constants, nodes, 2), np.zeros((2, b.INPUTS)), []
+    work, rest, found = b.workspace(constants, nodes, 2), np.zeros((2, spatial_fields.INPUTS)), []
     for _ in range(2):
         assert advance_two(constants, b.NEWTON_OF_TWO_FLOWS, state, work, rest, 50, dt) == 0
         f = of_lanes(state.elements).copy()
         energy, _, _ = chains.energy_and_momentum(constants, f)
         found.append(
-            (f, energy, state.totals[p.FLANK_LOSS : p.POWER_RESIDUAL].sum(), state.totals[p.RING_LOSS])
+            (
+                f,
+                energy,
+                state.totals[pushbelt_fields.FLANK_LOSS : pushbelt_fields.POWER_RESIDUAL].sum(),
+                state.totals[pushbelt_fields.RING_LOSS],
+            )
         )
     (f, energy, lost, at_rings), (g, energy_now, lost_now, at_rings_now) = found
     # the rings hold the elements on their circle: w' = -mu m_e omega^2 R / m_r, but for its breathing of 0.6 %
     braked = 0.06 * 50 * dt * constants.mass / constants.ring_mass * spin**2 * radius
-    assert f[:, b.HALF_SPEED] - g[:, b.HALF_SPEED] == pytest.approx(braked, rel=1e-2)
-    assert g[:, b.TENSION_DIFFERENCE] == pytest.approx(
+    assert f[:, spatial_fields.HALF_SPEED] - g[:, spatial_fields.HALF_SPEED] == pytest.approx(
+        braked, rel=1e-2
+    )
+    assert g[:, spatial_fields.TENSION_DIFFERENCE] == pytest.approx(
         2e-5 * constants.ring_stiffness, rel=0.05
     )  # less the cone
-    pressed = 2.0 * np.sin(np.pi / nodes) * g[:, b.TENSION_DIFFERENCE]
-    assert g[:, b.SADDLE_RIGHT] - g[:, b.SADDLE_LEFT] == pytest.approx(pressed, rel=1e-2)
+    pressed = 2.0 * np.sin(np.pi / nodes) * g[:, spatial_fields.TENSION_DIFFERENCE]
+    assert g[:, spatial_fields.SADDLE_RIGHT] - g[:, spatial_fields.SADDLE_LEFT] == pytest.approx(
+        pressed, rel=1e-2
+    )
     assert energy - energy_now == pytest.approx(lost_now - lost, rel=1e-3)
     assert at_rings_now - at_rings == pytest.approx(lost_now - lost, rel=1e-2)
 
@@ -223,15 +258,15 @@ def test_what_a_step_damps_of_waves_in_the_packages_is_booked():
     constants, _, fields = chains.free_ring(nodes, 0.1082, 250.0)
     state = with_two_flows(constants, chains.state(fields))
     f = of_lanes(state.elements).copy()
-    f[:, b.HALF_SPEED] = 5.0 * np.cos(6.0 * np.pi * np.arange(nodes) / nodes)
+    f[:, spatial_fields.HALF_SPEED] = 5.0 * np.cos(6.0 * np.pi * np.arange(nodes) / nodes)
     before, _, _ = chains.energy_and_momentum(constants, f)
     state.elements.data[:] = in_lanes(f).data
-    work, rest = b.workspace(constants, nodes, 2), np.zeros((2, b.INPUTS))
+    work, rest = b.workspace(constants, nodes, 2), np.zeros((2, spatial_fields.INPUTS))
     assert advance_two(constants, b.NEWTON_OF_TWO_FLOWS, state, work, rest, 60, 1e-6) == 0
     after, _, _ = chains.energy_and_momentum(constants, of_lanes(state.elements))
     assert before - after > 0.2  # of 1 J: waves of 22 kHz
     # the formula is that of waves slow against the step: (2 pi f dt)^2 is 2 %
-    assert state.totals[p.RING_DAMPED] == pytest.approx(before - after, rel=0.04)
+    assert state.totals[pushbelt_fields.RING_DAMPED] == pytest.approx(before - after, rel=0.04)
 
 
 def test_one_flow_is_two_flows_of_equal_packages_in_the_plane():
@@ -244,8 +279,16 @@ def test_one_flow_is_two_flows_of_equal_packages_in_the_plane():
         assert march(belt, newton, state, b.workspace(belt, NODES, flows), hold, 100, STEP) == 0
         found.append((of_lanes(state.elements).copy(), state.loads.copy()))
     (one, loads), (two, other_loads) = found
-    assert not two[:, [b.HALF_SPEED, b.TENSION_DIFFERENCE, b.HALF_LENGTH, b.HALF_SLIP]].any()
-    assert two[:, b.TENSION] == pytest.approx(one[:, b.TENSION], rel=1e-6)
+    assert not two[
+        :,
+        [
+            spatial_fields.HALF_SPEED,
+            spatial_fields.TENSION_DIFFERENCE,
+            spatial_fields.HALF_LENGTH,
+            spatial_fields.HALF_SLIP,
+        ],
+    ].any()
+    assert two[:, spatial_fields.TENSION] == pytest.approx(one[:, spatial_fields.TENSION], rel=1e-6)
     assert other_loads == pytest.approx(loads, rel=1e-6)
 
 
@@ -261,18 +304,26 @@ def test_power_is_balanced_and_both_pulleys_take_the_same_axial_force():
             assert march(belt, newton, state, work, hold, 10, STEP) == 0
             loads.append(state.loads.copy())
         spent = state.totals - before
-        rate = spent / spent[p.TIME]
-        lost = rate[p.FLANK_LOSS : p.POWER_RESIDUAL]
+        rate = spent / spent[pushbelt_fields.TIME]
+        lost = rate[pushbelt_fields.FLANK_LOSS : pushbelt_fields.POWER_RESIDUAL]
         assert (lost >= 0.0).all()
-        open_power = rate[p.WORK_IN] - rate[p.WORK_OUT] - rate[p.THRUST_WORK] - lost.sum()
-        open_power -= (stored(belt, state) - kept) / spent[p.TIME]
-        assert abs(open_power) < 1e-4 * rate[p.WORK_IN]
+        open_power = (
+            rate[pushbelt_fields.WORK_IN]
+            - rate[pushbelt_fields.WORK_OUT]
+            - rate[pushbelt_fields.THRUST_WORK]
+            - lost.sum()
+        )
+        open_power -= (stored(belt, state) - kept) / spent[pushbelt_fields.TIME]
+        assert abs(open_power) < 1e-4 * rate[pushbelt_fields.WORK_IN]
         mean = np.mean(loads, axis=0)
-        net = mean[b.DRIVING_RIGHT] - mean[b.DRIVING_LEFT], mean[b.DRIVEN_RIGHT] - mean[b.DRIVEN_LEFT]
+        net = (
+            mean[spatial_fields.DRIVING_RIGHT] - mean[spatial_fields.DRIVING_LEFT],
+            mean[spatial_fields.DRIVEN_RIGHT] - mean[spatial_fields.DRIVEN_LEFT],
+        )
         # 1.5 %: a window of one revolution, in which loose parts of the belt still move
         assert net[0] == pytest.approx(-net[1], rel=0.015)
         axial.append(net[0])
     # 3 %: a polygon of 104 elements; with 216 and more it is 1 % (jobs/ring_flows.toml)
     assert axial[1] == pytest.approx(axial[0], rel=0.03)
-    apart = of_lanes(state.elements)[:, b.TENSION_DIFFERENCE]
-    assert 5.0 < np.abs(apart).max() < 0.02 * of_lanes(state.elements)[:, b.TENSION].mean()
+    apart = of_lanes(state.elements)[:, spatial_fields.TENSION_DIFFERENCE]
+    assert 5.0 < np.abs(apart).max() < 0.02 * of_lanes(state.elements)[:, spatial_fields.TENSION].mean()

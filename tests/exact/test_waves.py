@@ -3,7 +3,7 @@
 import numpy as np
 import pytest
 
-from cvt_hpc.models.elastic_belt.belt import U, W
+from cvt_hpc.models.elastic_belt import fields as f
 from cvt_hpc.models.elastic_belt.sampling import Outcome
 from cvt_hpc.models.elastic_belt.step_choice import REFERENCE_STEP as STEP
 from support.fast_runs import FastRuns
@@ -27,13 +27,13 @@ def test_waves_keep_amplitude_and_frequency(share):
     phase = number * belt.cell[0] * np.arange(belt.cell.size)
     omega = downstream(number, belt.cell[0], share)
     # u half a step before w
-    state.fields[W] = SIZE * np.cos(phase)
-    state.fields[U] = SIZE * omega * np.sin(phase + 0.5 * omega * STEP)
+    state.fields[f.W] = SIZE * np.cos(phase)
+    state.fields[f.U] = SIZE * omega * np.sin(phase + 0.5 * omega * STEP)
     run = FastRuns([belt], [state])
     track, stride = [], 10
     for _ in range(8000 // stride):
         run.advance(stride, STEP)
-        track.append(2.0 * np.exp(1j * phase) @ run.state().fields[W] / (belt.cell.size * SIZE))
+        track.append(2.0 * np.exp(1j * phase) @ run.state().fields[f.W] / (belt.cell.size * SIZE))
     assert run.outcome() is Outcome.OK
     # Leapfrog and the gyroscopic term by the mean speed of a step keep amplitudes. Taken half a step late it would
     # feed k v omega dt / 2, ten per second and more.

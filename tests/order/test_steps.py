@@ -10,17 +10,8 @@ from functools import cache
 import numpy as np
 import pytest
 
-from cvt_hpc.models.elastic_belt.belt import (
-    DRIVEN_SPEED,
-    FIELDS,
-    N_ELEMENT,
-    V_ELEMENT,
-    V_RING,
-    U,
-    W,
-    belt_constants,
-    initial_state,
-)
+from cvt_hpc.models.elastic_belt import fields as f
+from cvt_hpc.models.elastic_belt.belt import belt_constants, initial_state
 from cvt_hpc.models.elastic_belt.parameters import PARAMETERS
 from cvt_hpc.models.elastic_belt.sampling import Outcome
 from cvt_hpc.models.elastic_belt.step_choice import REFERENCE_STEP as STEP
@@ -33,7 +24,7 @@ DEFAULTS |= {"duration": 0.1, "load": 100.0}
 WINDOW = 2e-4  # [s]
 STARTS = (0, 1, 2)
 CASES = {"memory": {}, "no memory": {"friction_memory": 0.0}}
-QUANTITIES = {"w": W, "u": U, "v_ring": V_RING}
+QUANTITIES = {"w": f.W, "u": f.U, "v_ring": f.V_RING}
 
 
 def march(stepper, belt, state, step, duration):
@@ -102,10 +93,10 @@ def test_both_steps_have_the_same_rates(case, law):
     # m/s in it is 1e-4 m/s^2.
     belt = belt_constants(DEFAULTS | CASES[case] | LAWS[law])
     state, random, step = moving_belt("memory")[1].copy(), np.random.default_rng(3), 1e-11
-    for row, size in ((W, 1e-6), (U, 0.05), (V_ELEMENT, 0.05), (V_RING, 0.05), (N_ELEMENT, 1e-7)):
+    for row, size in ((f.W, 1e-6), (f.U, 0.05), (f.V_ELEMENT, 0.05), (f.V_RING, 0.05), (f.N_ELEMENT, 1e-7)):
         state.fields[row] += size * random.normal(size=belt.cell.size)
     fast, plain = (march(stepper, belt, state, step, step) for stepper in ("imex", "explicit"))
-    for row, name in enumerate(FIELDS):
+    for row, name in enumerate(f.FIELDS):
         rates = (fast.fields[row] - state.fields[row]) / step, (plain.fields[row] - state.fields[row]) / step
         assert rates[0] == pytest.approx(rates[1], abs=1e-3 * np.abs(rates[1]).max()), name
     change = (plain.scalars - state.scalars) / step
@@ -153,8 +144,8 @@ def test_error_at_the_default_step():
     assert motion["w"] > 1e-5
     for name in QUANTITIES:
         assert error[name] < {"w": 0.05, "u": 0.2, "v_ring": 0.06}[name] * motion[name], name
-    change = exact.scalars[DRIVEN_SPEED] - state.scalars[DRIVEN_SPEED]
-    assert abs(fast.scalars[DRIVEN_SPEED] - exact.scalars[DRIVEN_SPEED]) < 0.05 * abs(change)
+    change = exact.scalars[f.DRIVEN_SPEED] - state.scalars[f.DRIVEN_SPEED]
+    assert abs(fast.scalars[f.DRIVEN_SPEED] - exact.scalars[f.DRIVEN_SPEED]) < 0.05 * abs(change)
 
 
 @pytest.mark.parametrize("stepper", ["imex", "explicit"])
@@ -180,7 +171,7 @@ def test_table_of_the_linear_law_is_the_linear_law(stepper):
         state = initial_state(DEFAULTS | friction, belt)
         finals.append(march(stepper, belt, state, 1e-7, 1e-4))
     line, looked_up = finals
-    assert np.abs(line.fields[U]).max() > 1e-3
+    assert np.abs(line.fields[f.U]).max() > 1e-3
     # mu differs by round-off only: 1e-16 of 1e5 N/m over 0.1 ms
     assert looked_up.fields == pytest.approx(line.fields, abs=1e-12)
 
@@ -189,7 +180,7 @@ def test_table_of_the_linear_law_is_the_linear_law(stepper):
 def test_a_state_that_is_no_number_is_said(stepper):
     belt, state = moving_belt("memory")
     broken = state.copy()
-    broken.fields[W, 3] = np.nan
+    broken.fields[f.W, 3] = np.nan
     run = FastRuns([belt], [broken], stepper=stepper)
     run.advance(1, 1e-7)
     assert run.outcome() is Outcome.NOT_FINITE

@@ -7,7 +7,7 @@ from cvt_hpc.errors import InputError
 from cvt_hpc.job import build_job
 from cvt_hpc.models.beam_pushbelt.record import judge
 from cvt_hpc.models.beam_pushbelt.transient import Transient
-from cvt_hpc.models.pushbelt import belt as b
+from cvt_hpc.models.pushbelt import fields as f
 from cvt_hpc.models.pushbelt import transient as pushbelt
 from cvt_hpc.variator import STRANDS, judging
 
@@ -63,11 +63,11 @@ def test_laws_of_friction():
         run.advance(1)
         e = run._elements()
         for size, bound, slip in (
-            (abs(e[:, b.RING_FRICTION]), 0.06 * e[:, b.SADDLE], abs(e[:, b.RING_SLIP])),
+            (abs(e[:, f.RING_FRICTION]), 0.06 * e[:, f.SADDLE], abs(e[:, f.RING_SLIP])),
             (
-                np.hypot(e[:, b.FLANK_FRICTION_M], e[:, b.FLANK_FRICTION_T]),
-                0.09 * e[:, b.FLANK],
-                np.hypot(e[:, b.FLANK_SLIP_M], e[:, b.FLANK_SLIP_T]),
+                np.hypot(e[:, f.FLANK_FRICTION_M], e[:, f.FLANK_FRICTION_T]),
+                0.09 * e[:, f.FLANK],
+                np.hypot(e[:, f.FLANK_SLIP_M], e[:, f.FLANK_SLIP_T]),
             ),
         ):
             # impulses are found up to the speed of 1e-5 m/s that they change, of 14 g in 5 us
@@ -76,7 +76,7 @@ def test_laws_of_friction():
             assert abs(size - bound)[slides].max() < 0.05
             held, slid = held + np.sum(~slides & (bound > 1.0)), slid + np.sum(slides & (bound > 1.0))
         # friction acts against sliding
-        flank = e[:, [b.FLANK_FRICTION_M, b.FLANK_FRICTION_T]] * e[:, [b.FLANK_SLIP_M, b.FLANK_SLIP_T]]
+        flank = e[:, [f.FLANK_FRICTION_M, f.FLANK_FRICTION_T]] * e[:, [f.FLANK_SLIP_M, f.FLANK_SLIP_T]]
         assert flank.sum(axis=1)[slides & (bound > 0.0)].min() > 0.0
     assert held > 300 and slid > 300
     # on some processors, by their last bits, friction of one step is not found in the iterations that it has

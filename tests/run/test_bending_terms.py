@@ -5,7 +5,8 @@ import pytest
 
 from cvt_hpc.errors import InputError
 from cvt_hpc.job import build_job
-from cvt_hpc.models.elastic_belt.belt import V_RING, U, W, belt_constants, initial_state
+from cvt_hpc.models.elastic_belt import fields as f
+from cvt_hpc.models.elastic_belt.belt import belt_constants, initial_state
 from cvt_hpc.models.elastic_belt.column import column_forces
 from cvt_hpc.models.elastic_belt.rhs import strains
 from cvt_hpc.models.elastic_belt.transient import Transient
@@ -61,13 +62,13 @@ def test_the_fast_step_has_the_limit_of_the_explicit_one(name):
     belt = belt_constants(parameters)
     before = march_fast(belt, initial_state(parameters, belt), 4e-6, 5000)
     random = np.random.default_rng(7)
-    before.fields[U] += 0.02 * random.normal(size=belt.cell.size)
+    before.fields[f.U] += 0.02 * random.normal(size=belt.cell.size)
     exact = march("explicit", belt, before, 2.5e-8, 4000).fields
     errors = []
     for steps in (100, 200, 400):
         found = march_fast(belt, before, 1e-4 / steps, steps).fields
-        errors.append([np.abs(found[row] - exact[row]).max() for row in (W, U, V_RING)])
-    moved = [np.abs(exact[row] - before.fields[row]).max() for row in (W, U, V_RING)]
+        errors.append([np.abs(found[row] - exact[row]).max() for row in (f.W, f.U, f.V_RING)])
+    moved = [np.abs(exact[row] - before.fields[row]).max() for row in (f.W, f.U, f.V_RING)]
     errors = np.array(errors) / moved
     # of first order, and within 1 % at 0.25 us
     assert np.all(errors[-1] < 0.01)

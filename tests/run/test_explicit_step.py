@@ -5,26 +5,9 @@ from functools import cache
 import numpy as np
 import pytest
 
-from cvt_hpc.models.elastic_belt.belt import (
-    DRIVEN_POSITION,
-    DRIVEN_SPEED,
-    FIELDS,
-    FIRST_STATE,
-    LAYER_WORK,
-    N_ELEMENT,
-    N_RING,
-    TIME,
-    V_ELEMENT,
-    V_FILTERED,
-    V_RING,
-    State,
-    U,
-    W,
-    belt_constants,
-    initial_state,
-)
+from cvt_hpc.models.elastic_belt import fields as f
+from cvt_hpc.models.elastic_belt.belt import State, belt_constants, initial_state
 from cvt_hpc.models.elastic_belt.one_system import driven_moment, driven_thrust, free_rates, pulled_by
-from cvt_hpc.models.elastic_belt.pulleys import DRIVEN_COS
 from cvt_hpc.models.elastic_belt.rhs import (
     accelerations,
     contact_forces,
@@ -98,15 +81,15 @@ def rough_belt(case):
     belt = belt_constants(parameters)
     state = march_fast(belt, initial_state(parameters, belt), 4e-6, 5000)
     random = np.random.default_rng(5)
-    for row, size in ((W, 2e-5), (U, 0.05), (V_ELEMENT, 0.2), (V_RING, 0.05), (V_FILTERED, 0.02)):
+    for row, size in ((f.W, 2e-5), (f.U, 0.05), (f.V_ELEMENT, 0.2), (f.V_RING, 0.05), (f.V_FILTERED, 0.02)):
         state.fields[row] += size * random.normal(size=belt.cell.size)
     # every sixth cell hardly pressed, 40 N, less than its damper's force
-    state.fields[N_ELEMENT, ::6] *= (1.0 + forces(belt, state)[1][0, ::6]) / (1.0 - 1e-6)
-    state.fields[V_FILTERED] = np.abs(state.fields[V_FILTERED])
-    state.scalars[LAYER_WORK] = 0.0
+    state.fields[f.N_ELEMENT, ::6] *= (1.0 + forces(belt, state)[1][0, ::6]) / (1.0 - 1e-6)
+    state.fields[f.V_FILTERED] = np.abs(state.fields[f.V_FILTERED])
+    state.scalars[f.LAYER_WORK] = 0.0
     if belt.pulleys.are_free:
         # not yet beyond the collar's clearance
-        state.scalars[FIRST_STATE + DRIVEN_COS : FIRST_STATE + DRIVEN_COS + 2] *= 0.02
+        state.scalars[f.FIRST_STATE + f.DRIVEN_COS : f.FIRST_STATE + f.DRIVEN_COS + 2] *= 0.02
     return belt, state
 
 
@@ -124,22 +107,22 @@ def plain_step(belt, before, step):
     (fields, scalars), rate, moments = state, np.zeros_like(before.fields), np.zeros(belt.cell.size)
     force, eps = forces(belt, state)
     accelerations(belt, state, force, eps, rate, moments)
-    for row in (U, V_ELEMENT, V_RING):
+    for row in (f.U, f.V_ELEMENT, f.V_RING):
         fields[row] += step * rate[row]
-    load = belt.ratio * load_at(belt, scalars[TIME])
+    load = belt.ratio * load_at(belt, scalars[f.TIME])
     closing = (driven_thrust(belt, force) - belt.thrust) / belt.axial_damping
     turning = (driven_moment(belt, moments) - load) / belt.driven_inertia
     if belt.pulleys.are_free:
         turning, closing, *others = free_rates(belt, before, pulled_by(belt, force, moments))
-        scalars[FIRST_STATE:] += step * np.array(others)
-    scalars[DRIVEN_SPEED] += step * turning
-    scalars[TIME] += step
+        scalars[f.FIRST_STATE :] += step * np.array(others)
+    scalars[f.DRIVEN_SPEED] += step * turning
+    scalars[f.TIME] += step
     memory_rates(belt, state, rate)
     content_rates(belt, state, eps, rate)
-    fields[W] += step * fields[U]
-    for row in (V_FILTERED, N_ELEMENT, N_RING):
+    fields[f.W] += step * fields[f.U]
+    for row in (f.V_FILTERED, f.N_ELEMENT, f.N_RING):
         fields[row] += step * rate[row]
-    scalars[DRIVEN_POSITION] += step * closing
+    scalars[f.DRIVEN_POSITION] += step * closing
     return state
 
 
@@ -150,7 +133,7 @@ def test_the_rough_state_tries_every_branch(case):
     arc = belt.arc_share > 0.0
     assert 0.05 < np.mean(force[arc] == 0.0) < 0.8
     assert 0.05 < np.mean(eps[0] > 0.0) < 0.95
-    opening = (np.roll(state.fields[V_ELEMENT], -1) - state.fields[V_ELEMENT]) / belt.cell
+    opening = (np.roll(state.fields[f.V_ELEMENT], -1) - state.fields[f.V_ELEMENT]) / belt.cell
     damped, push = belt.element_damping * opening, -belt.element_stiffness * eps[0]
     # dampers that would make elements pull, and others
     assert np.sum((push > 0.0) & (damped > push)) > 3 and np.sum((push > 0.0) & (damped < push)) > 3
@@ -162,17 +145,19 @@ def test_a_step_is_that_of_the_readable_right_hand_side(case):
     expected, found = plain_step(belt, before, STEP), march("explicit", belt, before, STEP, 1)
     # Round-off of the strains, 2e-16, is 2e-6 m/s^2 of an element's acceleration, and 1e-10 N/m of contact
     # forces less; of speeds of 10 m/s, 1 and 125 rad/s it is an ulp or two.
-    for row, name in enumerate(FIELDS):
+    for row, name in enumerate(f.FIELDS):
         change = np.abs(expected.fields[row] - before.fields[row]).max()
         size = np.abs(expected.fields[row]).max()
-        if row != V_FILTERED or belt.friction_memory > 0.0:
+        if row != f.V_FILTERED or belt.friction_memory > 0.0:
             assert change > 1e-11, name
         error = np.abs(found.fields[row] - expected.fields[row]).max()
         assert error < 1e-5 * STEP + 4e-16 * size, name
-    assert found.scalars[TIME] == expected.scalars[TIME]
-    assert found.scalars[DRIVEN_SPEED] == pytest.approx(expected.scalars[DRIVEN_SPEED], rel=4e-16)
-    assert found.scalars[DRIVEN_POSITION] == pytest.approx(expected.scalars[DRIVEN_POSITION], rel=1e-12)
-    assert found.scalars[FIRST_STATE:] == pytest.approx(expected.scalars[FIRST_STATE:], rel=1e-11, abs=1e-18)
+    assert found.scalars[f.TIME] == expected.scalars[f.TIME]
+    assert found.scalars[f.DRIVEN_SPEED] == pytest.approx(expected.scalars[f.DRIVEN_SPEED], rel=4e-16)
+    assert found.scalars[f.DRIVEN_POSITION] == pytest.approx(expected.scalars[f.DRIVEN_POSITION], rel=1e-12)
+    assert found.scalars[f.FIRST_STATE :] == pytest.approx(
+        expected.scalars[f.FIRST_STATE :], rel=1e-11, abs=1e-18
+    )
 
 
 def test_steps_follow_one_another():

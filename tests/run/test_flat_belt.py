@@ -5,24 +5,10 @@ from functools import cache
 import numpy as np
 import pytest
 
-from cvt_hpc.models.elastic_belt.belt import (
-    DRIVEN_POSITION,
-    DRIVEN_SPEED,
-    FIRST_STATE,
-    N_RING,
-    TIME,
-    V_ELEMENT,
-    V_FILTERED,
-    V_RING,
-    State,
-    U,
-    W,
-    belt_constants,
-    initial_state,
-)
+from cvt_hpc.models.elastic_belt import fields as f
+from cvt_hpc.models.elastic_belt.belt import State, belt_constants, initial_state
 from cvt_hpc.models.elastic_belt.one_system import flat_belt, pack, rates, system, unpack
 from cvt_hpc.models.elastic_belt.parameters import PARAMETERS
-from cvt_hpc.models.elastic_belt.pulleys import EXCESS
 from support.fast_runs import FastRuns, march
 
 DEFAULTS = {key: parameter.default for section in PARAMETERS.values() for key, parameter in section.items()}
@@ -51,7 +37,7 @@ def rough_belt(case):
     run, random = FastRuns([belt], [initial_state(parameters, belt)]), np.random.default_rng(5)
     run.advance(5000, 4e-6)
     state = run.state(0)
-    for row, size in ((W, 1e-6), (U, 0.05), (V_ELEMENT, 0.05), (V_RING, 0.05)):
+    for row, size in ((f.W, 1e-6), (f.U, 0.05), (f.V_ELEMENT, 0.05), (f.V_RING, 0.05)):
         state.fields[row] += size * random.normal(size=belt.cell.size)
     return belt, state
 
@@ -60,7 +46,7 @@ def flat_rates(belt, state):
     flat = flat_belt(belt)
     y = pack(flat, state)
     out = np.full_like(y, np.nan)
-    assert rates(flat, state.scalars[TIME], y, out)
+    assert rates(flat, state.scalars[f.TIME], y, out)
     return flat, y, out
 
 
@@ -70,10 +56,10 @@ def test_a_state_survives_the_vector(case):
     flat = flat_belt(belt)
     unpack(flat, 0.125, pack(flat, state))
     filtered = flat.remembering
-    for row in range(N_RING + 1):
-        here = filtered if row == V_FILTERED else slice(None)
+    for row in range(f.N_RING + 1):
+        here = filtered if row == f.V_FILTERED else slice(None)
         assert np.array_equal(flat.state.fields[row, here], state.fields[row, here])
-    assert flat.state.scalars[:3].tolist() == [0.125, *state.scalars[[DRIVEN_SPEED, DRIVEN_POSITION]]]
+    assert flat.state.scalars[:3].tolist() == [0.125, *state.scalars[[f.DRIVEN_SPEED, f.DRIVEN_POSITION]]]
     # every station of both arcs remembers but the inlets; no other does
     expected = 0 if case == "no memory" else np.count_nonzero(belt.arc_share) - 2
     assert filtered.size == expected and not {0, belt.driven_start} & set(filtered)
@@ -87,14 +73,14 @@ def test_rates_are_those_of_the_explicit_step(case):
     flat, _, out = flat_rates(belt, state)
     after, n, step = State(state.fields.copy(), state.scalars.copy()), belt.cell.size, 1e-9
     # the inlets' filtered speed is the present sliding speed in `rates`, that of the last step in the stepper
-    after.fields[V_FILTERED] = flat.state.fields[V_FILTERED]
+    after.fields[f.V_FILTERED] = flat.state.fields[f.V_FILTERED]
     after = march("explicit", belt, after, step, 1)
-    for place, row in ((1, U), (2, V_ELEMENT), (3, V_RING)):
+    for place, row in ((1, f.U), (2, f.V_ELEMENT), (3, f.V_RING)):
         change = (after.fields[row] - state.fields[row]) / step
         assert out[place * n : (place + 1) * n] == pytest.approx(change, abs=1e-5 + 1e-12 * abs(change).max())
-    speed = (after.scalars[DRIVEN_SPEED] - state.scalars[DRIVEN_SPEED]) / step
+    speed = (after.scalars[f.DRIVEN_SPEED] - state.scalars[f.DRIVEN_SPEED]) / step
     assert out[-2] == pytest.approx(speed, abs=1e-4)  # round-off of 125 rad/s
-    position = (after.scalars[DRIVEN_POSITION] - state.scalars[DRIVEN_POSITION]) / step
+    position = (after.scalars[f.DRIVEN_POSITION] - state.scalars[f.DRIVEN_POSITION]) / step
     assert out[-1] == pytest.approx(position, rel=1e-6)
     changes = (after.scalars[flat.loose] - state.scalars[flat.loose]) / step
     assert out[-2 - flat.loose.size : -2] == pytest.approx(changes, rel=1e-6, abs=1e-4)
@@ -107,9 +93,9 @@ def test_what_velocities_advance_is_by_their_new_values_in_the_explicit_step(cas
     step = 1e-9
     after = march("explicit", belt, state, step, 1)
     mixed = State(state.fields.copy(), state.scalars.copy())
-    for row in (U, V_ELEMENT, V_RING):
+    for row in (f.U, f.V_ELEMENT, f.V_RING):
         mixed.fields[row] = after.fields[row]
-    for place in (DRIVEN_SPEED, FIRST_STATE + EXCESS):
+    for place in (f.DRIVEN_SPEED, f.FIRST_STATE + f.EXCESS):
         mixed.scalars[place] = after.scalars[place]
     flat, y, out = flat_rates(belt, mixed)
     advanced = y + step * out
@@ -138,7 +124,7 @@ def test_the_history_of_contact_leaves_no_trace():
     lifted[: belt.cell.size] += 1e-3  # every station leaves the grooves
     again = np.empty_like(out)
     assert rates(flat, 0.02, lifted, again)
-    assert rates(flat, state.scalars[TIME], y, again)
+    assert rates(flat, state.scalars[f.TIME], y, again)
     # forces within 1e-5 N/m over masses of 1 kg/m
     assert again == pytest.approx(out, abs=1e-4)
 

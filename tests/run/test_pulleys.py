@@ -5,10 +5,10 @@ import pytest
 
 from cvt_hpc.errors import InputError
 from cvt_hpc.job import build_job
-from cvt_hpc.models.elastic_belt.belt import DRIVEN_POSITION, FIRST_STATE, belt_constants, initial_state
+from cvt_hpc.models.elastic_belt import fields as f
+from cvt_hpc.models.elastic_belt.belt import belt_constants, initial_state
 from cvt_hpc.models.elastic_belt.pulley_checks import ABOVE
 from cvt_hpc.models.elastic_belt.pulley_settings import oil_factor, piston_area
-from cvt_hpc.models.elastic_belt.pulleys import DRIVEN_COS, DRIVEN_TILT, DRIVING_COS, SHIFT
 from cvt_hpc.models.elastic_belt.rhs import contact_forces, fresh_contacts
 from cvt_hpc.physics.flank import flank_forces
 from support.fast_runs import FastRuns
@@ -120,7 +120,7 @@ def stored(belt, state):
 def test_springs_store_half_their_force_times_their_way():
     free = {"driving_axial": "thrust"}
     plain, state = tilted(1e-3, 4e-6, **free)
-    state.scalars[DRIVEN_POSITION], state.scalars[FIRST_STATE + SHIFT] = -3e-4, 2e-4
+    state.scalars[f.DRIVEN_POSITION], state.scalars[f.FIRST_STATE + f.SHIFT] = -3e-4, 2e-4
     sprung, _ = tilted(0.0, 4e-6, **free, driven_spring_rate=1e7, driving_spring_rate=4e7)
     gained = stored(sprung, state) - stored(plain, state)
     assert gained == pytest.approx(0.5 * (1e7 * 9e-8 + 4e7 * 4e-8), rel=1e-9)
@@ -143,21 +143,21 @@ def test_a_groove_that_opens_gives_its_axial_force_back(clearance):
     force = np.zeros(belt.cell.size)
     assert contact_forces(belt, state, fresh_contacts(belt), force) > 0
     axial = belt.driven.weight @ force[belt.driven_start :][: belt.driven.weight.size]
-    assert energy_slope(belt, state, DRIVEN_POSITION, 1e-8) == pytest.approx(-axial, rel=1e-7)
+    assert energy_slope(belt, state, f.DRIVEN_POSITION, 1e-8) == pytest.approx(-axial, rel=1e-7)
 
 
 @pytest.mark.parametrize("clearance", [0.0, 5e-4])
 def test_a_tilt_stores_what_its_spring_takes_less_what_the_contact_gives(clearance):
     """dE / dq = (|q| - c) / kappa along q less s."""
     belt, state = tilted(1e-3, 4e-6, tilt_lag=1e-3, collar_clearance=clearance)
-    place = FIRST_STATE + DRIVEN_COS
+    place = f.FIRST_STATE + f.DRIVEN_COS
     state.scalars[place : place + 2] *= 1.3  # far from rest
     force, sheave = np.zeros(belt.cell.size), belt.driven
     assert contact_forces(belt, state, fresh_contacts(belt), force) > 0
     pull = sheave.tilt @ (sheave.weight * force[belt.driven_start :][: sheave.weight.size])
     opening = state.scalars[place : place + 2].copy()
     elastic = opening * (1.0 - clearance * belt.driven_radius / np.linalg.norm(opening))
-    expected = elastic / belt.pulleys.laws[0, DRIVEN_TILT] - pull
+    expected = elastic / belt.pulleys.laws[0, f.DRIVEN_TILT] - pull
     for k in range(2):
         assert energy_slope(belt, state, place + k, 1e-7) == pytest.approx(expected[k], rel=1e-4)
         assert abs(expected[k]) > 1e3
@@ -180,7 +180,7 @@ def test_a_clearance_is_free():
     openings = []
     for clearance in (0.0, 5e-4):
         belt, state = tilted(0.0, 1e-6, tilt_lag=2e-3, collar_clearance=clearance)
-        tilts = state.scalars[FIRST_STATE + DRIVING_COS : FIRST_STATE + DRIVEN_COS + 2].reshape(2, 2)
+        tilts = state.scalars[f.FIRST_STATE + f.DRIVING_COS : f.FIRST_STATE + f.DRIVEN_COS + 2].reshape(2, 2)
         openings.append(np.linalg.norm(tilts, axis=1))
     radii = np.array([belt.driving_radius, belt.driven_radius])
     assert openings[1] - openings[0] == pytest.approx(5e-4 * radii)

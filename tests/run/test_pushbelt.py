@@ -6,7 +6,7 @@ import pytest
 from cvt_hpc.cli import main
 from cvt_hpc.errors import InputError
 from cvt_hpc.job import build_job
-from cvt_hpc.models.pushbelt import belt as b
+from cvt_hpc.models.pushbelt import fields as f
 from cvt_hpc.models.pushbelt.parameters import inert, string_limit
 from cvt_hpc.models.pushbelt.profiles import PROFILED
 from cvt_hpc.models.pushbelt.record import judge
@@ -92,10 +92,10 @@ def test_a_load_ramp_that_ends_in_gross_slip_tells_what_was_before():
 def test_a_belt_slips_through_by_the_speed_that_present_radii_give():
     run = Transient(job(load=60.0).point(0), "newton")
     pulleys = run._state.pulleys
-    pulleys[[b.DRIVING_RADIUS, b.DRIVEN_RADIUS]] = 0.030, 0.075
-    without_slip = pulleys[b.DRIVING_SPEED] * 0.030 / 0.075  # 54 % of what the ratio of the job gives
+    pulleys[[f.DRIVING_RADIUS, f.DRIVEN_RADIUS]] = 0.030, 0.075
+    without_slip = pulleys[f.DRIVING_SPEED] * 0.030 / 0.075  # 54 % of what the ratio of the job gives
     for share, words in ((0.9, None), (1.4, None), (0.49, "lost 50%"), (1.51, "gained 50%")):
-        pulleys[b.DRIVEN_SPEED] = share * without_slip
+        pulleys[f.DRIVEN_SPEED] = share * without_slip
         found = run._slipped()
         assert found is None if words is None else words in found
 
@@ -138,7 +138,7 @@ def test_a_step_that_is_not_solved_fails_with_time_element_and_contact():
 
 def test_a_state_that_is_not_a_number_names_no_contact():
     run = Transient(job(load=60.0).point(0), "newton")
-    run._state.pulleys[b.DRIVEN_SPEED] = np.nan
+    run._state.pulleys[f.DRIVEN_SPEED] = np.nan
     assert run.advance(1) == (
         Status.FAILED_NUMERICS,
         "the state is not a number, or the equations of a step are singular",
@@ -197,7 +197,7 @@ def test_profiles_shift_the_ratio_and_change_load_speed_and_thrust():
     assert run.channel("driving_speed")[-1] == pytest.approx(90.0 * np.pi)
     ratio = 1.1 * 1.35
     radius = driven_radius(ratio, run.path.path_length, 0.155) / ratio
-    assert run._state.pulleys[b.DRIVING_RADIUS] == pytest.approx(radius, rel=1e-12)
+    assert run._state.pulleys[f.DRIVING_RADIUS] == pytest.approx(radius, rel=1e-12)
     # the belt runs within 2 % of the ratio, as it does without a shift
     assert run.channel("driving_speed")[-1] / run.channel("driven_speed")[-1] == pytest.approx(
         ratio, rel=0.02

@@ -6,21 +6,11 @@ import pytest
 from cvt_hpc import simulate
 from cvt_hpc.errors import InputError
 from cvt_hpc.job import build_job
-from cvt_hpc.models.elastic_belt.belt import (
-    FIRST_STATE,
-    N_ELEMENT,
-    V_ELEMENT,
-    V_FILTERED,
-    V_RING,
-    U,
-    belt_constants,
-    initial_state,
-    mesh,
-)
+from cvt_hpc.models.elastic_belt import fields as f
+from cvt_hpc.models.elastic_belt.belt import belt_constants, initial_state, mesh
 from cvt_hpc.models.elastic_belt.one_system import flat_belt
 from cvt_hpc.models.elastic_belt.one_system import pack as flat_pack
 from cvt_hpc.models.elastic_belt.one_system import rates as flat_rates
-from cvt_hpc.models.elastic_belt.pulleys import DRIVING_COS
 from cvt_hpc.models.quasi_static_belt.basis import (
     own_frequencies,
     splines_of_belt,
@@ -83,20 +73,20 @@ def test_without_a_limit_it_is_the_whole_belt_in_the_space_of_its_splines():
     assert model.dynamic == model.shapes.shape[1]
     random = np.random.default_rng(4)
     moved.p[:] = 0.02 * random.normal(size=moved.p.size)
-    moved.state.fields[U] = model.shapes @ moved.p
+    moved.state.fields[f.U] = model.shapes @ moved.p
     moved.state.scalars[0] = 1.0
     refresh(model, moved)
     flat = flat_belt(model.belt)
     full = np.empty(flat.origin.size)
     assert flat_rates(flat, 1.0, flat_pack(flat, moved.state), full)
-    moved.state.fields[V_FILTERED] = flat.state.fields[V_FILTERED]  # where the belt enters
+    moved.state.fields[f.V_FILTERED] = flat.state.fields[f.V_FILTERED]  # where the belt enters
     before, rates = moved.state.fields.copy(), moved.p.copy()
     after = steps(model, moved, 1)
     n, weight = model.belt.cell.size, model.belt.dual
     gram = (model.shapes.T * weight) @ model.shapes
     expected = np.linalg.solve(gram, model.shapes.T @ (weight * full[n : 2 * n]))
     assert (moved.p - rates) / step == pytest.approx(expected, abs=1e-4 * np.abs(expected).max())
-    for row, place in ((V_ELEMENT, 2), (V_RING, 3)):
+    for row, place in ((f.V_ELEMENT, 2), (f.V_RING, 3)):
         found, wanted = (after - before)[row] / step, full[place * n : (place + 1) * n]
         assert found == pytest.approx(wanted, abs=1e-3 * np.abs(wanted).max())
 
@@ -138,19 +128,19 @@ def test_the_coupled_system_is_that_of_a_dense_solver():
 def test_the_steady_flow_keeps_content_and_has_one_flux():
     _, model, moved = split(longitudinal="steady_flow")
     cell = model.belt.cell
-    before = moved.state.fields[N_ELEMENT : N_ELEMENT + 2] @ cell
+    before = moved.state.fields[f.N_ELEMENT : f.N_ELEMENT + 2] @ cell
     fields = steps(model, moved, 50)
-    assert fields[N_ELEMENT : N_ELEMENT + 2] @ cell == pytest.approx(before, rel=1e-13)
-    flux = fields[V_ELEMENT : V_RING + 1] / (1.0 + np.roll(moved.eps, 1, axis=1))
+    assert fields[f.N_ELEMENT : f.N_ELEMENT + 2] @ cell == pytest.approx(before, rel=1e-13)
+    flux = fields[f.V_ELEMENT : f.V_RING + 1] / (1.0 + np.roll(moved.eps, 1, axis=1))
     assert np.ptp(flux, axis=1) == pytest.approx([0.0, 0.0], abs=1e-9)
-    assert np.ptp(fields[V_ELEMENT]) > 1e-4
+    assert np.ptp(fields[f.V_ELEMENT]) > 1e-4
 
 
 def test_with_inertia_content_is_kept_too():
     _, model, moved = split()
-    before = moved.state.fields[N_ELEMENT : N_ELEMENT + 2] @ model.belt.cell
+    before = moved.state.fields[f.N_ELEMENT : f.N_ELEMENT + 2] @ model.belt.cell
     fields = steps(model, moved, 50)
-    assert fields[N_ELEMENT : N_ELEMENT + 2] @ model.belt.cell == pytest.approx(before, rel=1e-13)
+    assert fields[f.N_ELEMENT : f.N_ELEMENT + 2] @ model.belt.cell == pytest.approx(before, rel=1e-13)
 
 
 FREE = {
@@ -188,7 +178,7 @@ def test_a_quiet_belt_has_the_forces_of_the_whole_one_and_its_powers_close(longi
             expected = whole.channel(name)[whole.judged].mean()
             assert run.channel(name)[run.judged].mean() == pytest.approx(expected, rel=5e-3)
     if "tilt_lag" in pulleys:
-        tilts = [one.state.scalars[FIRST_STATE + DRIVING_COS :][:4] for one in (run, whole)]
+        tilts = [one.state.scalars[f.FIRST_STATE + f.DRIVING_COS :][:4] for one in (run, whole)]
         assert tilts[0] == pytest.approx(tilts[1], abs=2e-5) and np.abs(tilts[1]).max() > 1e-4
     power = {name: run.channel(name)[run.judged].mean() for name in ("driving_power", "load_power")}
     losses = [

@@ -7,15 +7,9 @@ import numpy as np
 import pytest
 
 from cvt_hpc.errors import InputError
-from cvt_hpc.models.elastic_belt.belt import (
-    V_ELEMENT,
-    State,
-    U,
-    W,
-    belt_constants,
-    initial_state,
-)
-from cvt_hpc.models.elastic_belt.imex_stations import DV_1
+from cvt_hpc.models.elastic_belt import fields as f
+from cvt_hpc.models.elastic_belt import lane_fields as lf
+from cvt_hpc.models.elastic_belt.belt import State, belt_constants, initial_state
 from cvt_hpc.models.elastic_belt.one_system import flat_belt
 from cvt_hpc.models.elastic_belt.one_system import pack as pack_one
 from cvt_hpc.models.elastic_belt.one_system import rates as rates_of_one
@@ -62,7 +56,7 @@ def strains(belt, rings, state):
 
 def strain(belt, rings, state, eps):
     """Give the layers of a state strains."""
-    n, w = rings.length.size, state.fields[W]
+    n, w = rings.length.size, state.fields[f.W]
     turned = 1.0 + belt.curvature * rings.offset[:, None]
     stretched = turned + belt.curvature * 0.5 * (w + np.roll(w, -1))
     state.fields[FIRST_LAYER + n :] = stretched / (1.0 + eps) - turned
@@ -100,13 +94,13 @@ def test_layers_that_turn_about_a_pulley_with_the_elements_do_not_slide():
     eps = strains(belt, rings, state)
     for j in (3, belt.driven_start + 3):
         turning = 1.0 + rings.offset * belt.arc_curvature[j]
-        state.fields[FIRST_LAYER : FIRST_LAYER + n, j] = state.fields[V_ELEMENT, j] * turning
+        state.fields[FIRST_LAYER : FIRST_LAYER + n, j] = state.fields[f.V_ELEMENT, j] * turning
         surface_friction(belt, rings, state, eps, 1.0, j, normal, sliding)
         assert np.abs(sliding).max() < 1e-14 * belt.belt_speed
         # where all have one speed the outer one falls back by what its radius is larger
-        state.fields[FIRST_LAYER : FIRST_LAYER + n, j] = state.fields[V_ELEMENT, j]
+        state.fields[FIRST_LAYER : FIRST_LAYER + n, j] = state.fields[f.V_ELEMENT, j]
         surface_friction(belt, rings, state, eps, 1.0, j, normal, sliding)
-        kappa, speed = belt.arc_curvature[j], state.fields[V_ELEMENT, j]
+        kappa, speed = belt.arc_curvature[j], state.fields[f.V_ELEMENT, j]
         # one thickness below the middle of the stack
         surface = speed * (1.0 + (belt.ring_offset - 0.185e-3) * kappa)
         assert sliding[1] == pytest.approx(surface * 0.185e-3 * kappa / turning[:2].prod(), rel=1e-12)
@@ -126,7 +120,7 @@ def test_the_capstan_holds_in_each_layer():
     speed = belt.belt_speed
     # each layer is faster than what lies below it by 20 times the speed of regularisation
     state.fields[FIRST_LAYER : FIRST_LAYER + n] = speed + 0.2 * np.arange(1.0, n + 1.0)[:, None]
-    state.fields[V_ELEMENT] = speed
+    state.fields[f.V_ELEMENT] = speed
     rate = np.empty((2 * n + 1, cells))
     layer_rates(belt, rings, state, eps, 1.0, rate)
     inner = slice(2, arc - 2)
@@ -150,7 +144,7 @@ def test_rings_that_spin_free_press_on_nothing_and_faster_ones_on_the_ears():
     flung = 0.21 * rings.relief * belt.arc_curvature[j]
     assert normal == pytest.approx(flung * np.arange(4.0), rel=1e-6, abs=1e-9 * flung)
     # layers that run ahead of the elements pull them along at the ears
-    state.fields[FIRST_LAYER : FIRST_LAYER + 3] = state.fields[V_ELEMENT] + 0.2
+    state.fields[FIRST_LAYER : FIRST_LAYER + 3] = state.fields[f.V_ELEMENT] + 0.2
     rate = np.empty((7, belt.cell.size))
     layer_rates(belt, rings, state, eps, 1.1, rate)
     assert rate[6, j] == pytest.approx(0.08 * 3.0 * flung / belt.element_mass, rel=1e-3)
@@ -171,7 +165,7 @@ def test_friction_takes_what_its_surfaces_lose(share, bare):
     bent = belt.cell * belt.curvature
     turn = 0.5 * (bent + np.roll(bent, 1)) / belt.dual
     inertia = np.vstack([rings.mass * (1.0 + rings.offset[:, None] * turn), [[belt.element_mass] * cells]])
-    speeds = np.vstack([state.fields[FIRST_LAYER : FIRST_LAYER + n], state.fields[V_ELEMENT]])
+    speeds = np.vstack([state.fields[FIRST_LAYER : FIRST_LAYER + n], state.fields[f.V_ELEMENT]])
     power = (inertia * (rate - smooth)[[0, 1, 2, 2 * n]] * speeds).sum(axis=0)
     kinetic, normal, sliding = np.array([0.08, 0.05, 0.05, 0.08]), np.empty(n + 1), np.empty(n + 1)
     on_arcs = np.flatnonzero(belt.arc_share)
@@ -201,8 +195,8 @@ def test_layers_that_move_as_one_are_the_rings_as_one(count):
     belt, rings, state = layered(ring_layers=count, layer_thickness=0.0)
     random = np.random.default_rng(1)
     n, cells = count, belt.cell.size
-    state.fields[U] += 0.02 * random.normal(size=cells)
-    state.fields[V_ELEMENT] += 0.05 * random.normal(size=cells)
+    state.fields[f.U] += 0.02 * random.normal(size=cells)
+    state.fields[f.V_ELEMENT] += 0.05 * random.normal(size=cells)
     state.fields[FIRST_LAYER : FIRST_LAYER + n] += 0.05 * random.normal(size=cells)
     state.fields[FIRST_LAYER + n :] *= 1.0 + 1e-4 * random.normal(size=cells)
     strains(belt, rings, state)
@@ -267,7 +261,7 @@ def test_the_fast_step_is_the_plain_form_in_the_limit_of_short_steps(on_ears):
         # contents take the speeds at the end of the step; friction changes at 4e7/s
         assert np.abs(change[FIRST_LAYER + k] - found[k]).max() < 0.01 * np.abs(found[k]).max(), k
     elements = expected[2 * cells : 3 * cells]
-    assert np.abs(change[V_ELEMENT] - elements).max() < 0.01 * np.abs(elements).max()
+    assert np.abs(change[f.V_ELEMENT] - elements).max() < 0.01 * np.abs(elements).max()
 
 
 @pytest.mark.parametrize("on_ears", [False, True])
@@ -275,7 +269,7 @@ def test_layers_move_by_their_mean_from_which_they_were_eliminated(on_ears):
     *_, begun, still = stepped(4.6e-6, on_ears)
     layers = slice(FIRST_LAYER, FIRST_LAYER + 3)
     change = (still.state.fields - begun.fields)[layers].mean(axis=0)
-    expected = still.batch.work.stations.data[:, DV_1, 0]
+    expected = still.batch.work.stations.data[:, lf.DV_1, 0]
     # of speeds of 10 m/s, rounded
     assert np.abs(change - expected).max() < 1e-14 * 10.0 + 1e-12 * np.abs(expected).max()
 

@@ -7,11 +7,11 @@ import pytest
 
 from cvt_hpc import simulation
 from cvt_hpc.job import build_job
+from cvt_hpc.models.elastic_belt import lane_fields as lf
 from cvt_hpc.models.elastic_belt.batch import Batch
-from cvt_hpc.models.elastic_belt.lane_belt import POSITION, SPEED
 from cvt_hpc.models.elastic_belt.sampling import Outcome
 from cvt_hpc.models.elastic_belt.validity import FAILURES, LARGEST_POWER_RESIDUAL
-from cvt_hpc.physics.compliance import ROUND_OFF
+from cvt_hpc.physics import compliance
 from cvt_hpc.simulation import record_variables, run_point
 from cvt_hpc.simulation.record import record_of
 from cvt_hpc.study.description import describe
@@ -181,7 +181,7 @@ def test_a_state_that_is_not_a_number_never_reaches_a_done_record(monkeypatch, r
     assert_no_numbers(found)
 
 
-@pytest.mark.parametrize("index", [SPEED, POSITION])
+@pytest.mark.parametrize("index", [lf.SPEED, lf.POSITION])
 def test_nor_does_a_pulley_that_is_nowhere(monkeypatch, index):
     found = poisoned(monkeypatch, set_scalar(index, np.nan))
     assert found["status"] == Status.FAILED_NUMERICS
@@ -192,7 +192,7 @@ def test_nor_does_a_pulley_that_is_nowhere(monkeypatch, index):
 def test_a_search_for_the_closed_stations_that_does_not_end_ends_the_run(monkeypatch, stepper, step):
     # forces below no round-off: there is no station on whose side the search can settle
     def spoil(batch):
-        batch.state.contacts[1].scalars.data[0, ROUND_OFF] = -np.inf
+        batch.state.contacts[1].scalars.data[0, compliance.ROUND_OFF] = -np.inf
 
     found = poisoned(monkeypatch, spoil, stepper=stepper, step=step)
     assert found["status"] == Status.FAILED_NUMERICS

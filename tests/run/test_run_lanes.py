@@ -6,12 +6,14 @@ from functools import cache
 import numpy as np
 import pytest
 
+from cvt_hpc.models.elastic_belt import fields as f
+from cvt_hpc.models.elastic_belt import lane_fields as lf
 from cvt_hpc.models.elastic_belt.batch import Batch
-from cvt_hpc.models.elastic_belt.belt import DRIVEN_SPEED, N_RING, U, W, belt_constants, initial_state
+from cvt_hpc.models.elastic_belt.belt import belt_constants, initial_state
 from cvt_hpc.models.elastic_belt.grouping import ALONE_SHARE, cost, lane_key
-from cvt_hpc.models.elastic_belt.lane_belt import REPEATS, parts_of
+from cvt_hpc.models.elastic_belt.lane_belt import parts_of
 from cvt_hpc.models.elastic_belt.sampling import Outcome
-from cvt_hpc.physics.compliance import UNSOLVED
+from cvt_hpc.physics import compliance
 from cvt_hpc.simulation import lane_groups, run_point, run_points
 from cvt_hpc.simulation.batches import MOST_TURNS
 from cvt_hpc.variables import Status, Vibrates
@@ -87,7 +89,7 @@ def test_a_run_that_is_not_a_number_fails_alone(monkeypatch, value, method):
 
     def spoiling(batch, samples):
         if batch.done >= 300:
-            batch.state.fields.data[5, W, spoiled] = value
+            batch.state.fields.data[5, f.W, spoiled] = value
         return advance(batch, samples)
 
     monkeypatch.setattr(Batch, "advance", spoiling)
@@ -108,13 +110,13 @@ def spoiled_lanes(lanes):
     parameters = job(**SHORT, load=60.0).point(0)
     belt = belt_constants(parameters)
     states = [initial_state(parameters, belt) for _ in range(lanes)]
-    states[1].fields[W, 30] = np.nan
-    states[2].fields[W, 30] = 0.011
-    states[3].fields[N_RING, 7] *= 0.9
-    states[4].scalars[DRIVEN_SPEED] *= 0.4
-    states[6].scalars[DRIVEN_SPEED] *= 1.6
+    states[1].fields[f.W, 30] = np.nan
+    states[2].fields[f.W, 30] = 0.011
+    states[3].fields[f.N_RING, 7] *= 0.9
+    states[4].scalars[f.DRIVEN_SPEED] *= 0.4
+    states[6].scalars[f.DRIVEN_SPEED] *= 1.6
     runs = FastRuns([belt] * lanes, states)
-    runs.lanes.contacts[1].scalars.data[0, UNSOLVED, 5] = 1.0
+    runs.lanes.contacts[1].scalars.data[0, compliance.UNSOLVED, 5] = 1.0
     return runs
 
 
@@ -137,7 +139,7 @@ def test_the_first_outcome_counts():
     runs = spoiled_lanes(8)
     runs.advance(0, 1e-6)
     before = [runs.outcome(lane) for lane in range(8)]
-    runs.lanes.fields.data[3, W] = np.nan
+    runs.lanes.fields.data[3, f.W] = np.nan
     runs.advance(0, 1e-6)
     after = [runs.outcome(lane) for lane in range(8)]
     assert after[1:7] == before[1:7]
@@ -157,7 +159,7 @@ def test_work_is_counted_until_the_run_ends(method):
     for run in batch.runs:
         assert run.counters()["steps"] == run.steps
         assert run.counters()["contact_solves"] == run.contact_solves > run.steps
-    repeats = batch.state.scalars.data[0, REPEATS]
+    repeats = batch.state.scalars.data[0, lf.REPEATS]
     if method == "explicit":
         assert set(through.counters()) == {"steps", "contact_solves"}
     else:
@@ -224,7 +226,7 @@ def test_stations_in_lanes_make_the_same_steps(method):
     for samples in (3, 1):
         for batch in (several, alone):
             batch.advance(samples)
-            batch.state.fields.data[20:24, U] += 0.05  # on the strand, a wave that opens gaps
+            batch.state.fields.data[20:24, f.U] += 0.05  # on the strand, a wave that opens gaps
     for field in range(7):
         values = several.state.fields.data[:, field, 0]
         seen = alone.state.fields.data[:, field, 0]

@@ -7,20 +7,10 @@ stations, judged over 40 ms, these are 10 W: 0.03 % of the power of a loaded bel
 import numpy as np
 import pytest
 
-from cvt_hpc.models.elastic_belt.belt import (
-    DRIVEN_POSITION,
-    LAYER_WORK,
-    N_ELEMENT,
-    N_RING,
-    V_ELEMENT,
-    V_RING,
-    State,
-    U,
-    W,
-    belt_constants,
-)
+from cvt_hpc.models.elastic_belt import fields, power_terms
+from cvt_hpc.models.elastic_belt.belt import State, belt_constants
 from cvt_hpc.models.elastic_belt.lane_belt import take_lane
-from cvt_hpc.models.elastic_belt.power_terms import LAYER_LOSS, POWERS, STORED_ENERGY
+from cvt_hpc.models.elastic_belt.power_terms import POWERS
 from cvt_hpc.models.elastic_belt.record import LOSSES
 from cvt_hpc.models.elastic_belt.rhs import strains
 from cvt_hpc.models.elastic_belt.sampling import Outcome
@@ -165,13 +155,13 @@ def rough():
     run = finished(**COARSE, load=100.0)
     belt, random = run.batch.belts[0], np.random.default_rng(5)
     state = take_lane(run.batch.state, 0, belt)
-    for row, size in ((W, 1e-6), (U, 0.05), (V_ELEMENT, 1e-3), (V_RING, 0.02)):
+    for row, size in ((fields.W, 1e-6), (fields.U, 0.05), (fields.V_ELEMENT, 1e-3), (fields.V_RING, 0.02)):
         state.fields[row] += size * random.normal(size=run.mesh.cell.size)
-    state.fields[N_RING] *= 1.0 + 1e-5 * random.normal(size=run.mesh.cell.size)
+    state.fields[fields.N_RING] *= 1.0 + 1e-5 * random.normal(size=run.mesh.cell.size)
     eps = np.zeros((2, run.mesh.cell.size))
     strains(belt, state.fields, eps)
-    state.fields[N_ELEMENT] *= (1.0 + eps[0]) / (1.0 - 1e-3)  # 40 kN
-    state.scalars[DRIVEN_POSITION] += 2e-5
+    state.fields[fields.N_ELEMENT] *= (1.0 + eps[0]) / (1.0 - 1e-3)  # 40 kN
+    state.scalars[fields.DRIVEN_POSITION] += 2e-5
     return state
 
 
@@ -181,10 +171,12 @@ def powers_and_storing(state, **values):
     now, rates, works = _audited(belt, state), [], []
     for step in (TINY, 2 * TINY):
         after = march("explicit", belt, state, step, 1)
-        rates.append((_audited(belt, after)[STORED_ENERGY] - now[STORED_ENERGY]) / step)
-        works.append(after.scalars[LAYER_WORK] / step)
+        rates.append(
+            (_audited(belt, after)[power_terms.STORED_ENERGY] - now[power_terms.STORED_ENERGY]) / step
+        )
+        works.append(after.scalars[fields.LAYER_WORK] / step)
     # extrapolated to step 0; the dampers' loss is their work in steps
-    powers = dict(zip(POWERS, now, strict=True)) | {POWERS[LAYER_LOSS]: 2 * works[0] - works[1]}
+    powers = dict(zip(POWERS, now, strict=True)) | {POWERS[power_terms.LAYER_LOSS]: 2 * works[0] - works[1]}
     return powers, 2 * rates[0] - rates[1]
 
 
@@ -237,9 +229,9 @@ def explicit_damper_work(belt, state, steps, step):
     for _ in range(steps):
         eps = np.zeros((2, belt.cell.size))
         strains(belt, state.fields, eps)
-        before = state.fields[[V_ELEMENT, V_RING]]
+        before = state.fields[[fields.V_ELEMENT, fields.V_RING]]
         state = march("explicit", belt, state, step, 1)
-        after = state.fields[[V_ELEMENT, V_RING]]
+        after = state.fields[[fields.V_ELEMENT, fields.V_RING]]
         opening, mean_opening = (np.roll(v, -1, axis=1) - v for v in (before, 0.5 * (before + after)))
         elements, rings = np.array([[belt.element_damping], [belt.ring_damping]]) * opening / belt.cell
         # elements that are apart have no damper, and it never makes them pull
@@ -259,7 +251,7 @@ def test_work_of_the_dampers_is_force_times_mean_speed():
     after, expected = explicit_damper_work(belt, state, 300, 1e-7)
     assert expected > 1e-5
     # sums of the same terms in another order
-    assert after.scalars[LAYER_WORK] == pytest.approx(expected, rel=1e-9)
+    assert after.scalars[fields.LAYER_WORK] == pytest.approx(expected, rel=1e-9)
 
 
 def test_both_steps_agree_on_the_dampers_work(rough):
@@ -270,6 +262,6 @@ def test_both_steps_agree_on_the_dampers_work(rough):
         _, expected = explicit_damper_work(belt, rough, steps, duration / steps)
         run = FastRuns([belt], [rough])
         run.advance(steps, duration / steps)
-        errors.append(run.state().scalars[LAYER_WORK] / expected - 1)
+        errors.append(run.state().scalars[fields.LAYER_WORK] / expected - 1)
     assert np.all(np.divide(errors[:-1], errors[1:]) > 1.8)
     assert abs(errors[-1]) < 0.005

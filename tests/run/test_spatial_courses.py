@@ -3,7 +3,7 @@
 import numpy as np
 import pytest
 
-from cvt_hpc.models.pushbelt import belt as p
+from cvt_hpc.models.pushbelt import fields as f
 from cvt_hpc.models.spatial_pushbelt.record import judge
 from cvt_hpc.models.spatial_pushbelt.transient import Transient
 from cvt_hpc.physics.geometry import driven_radius
@@ -39,7 +39,7 @@ def test_profiles_take_ratio_and_axial_offset_along_with_thrust_load_and_speed()
     assert run.channel("driving_speed")[-1] == pytest.approx(95.0 * np.pi)
     # what is driven takes the torque that the load is at the ratio of the start
     driven = run.channel("driven_speed")[run.judged].mean()
-    assert run.mean_rate(p.WORK_OUT) == pytest.approx(1.35 * 30.0 * driven, rel=1e-3)
+    assert run.mean_rate(f.WORK_OUT) == pytest.approx(1.35 * 30.0 * driven, rel=1e-3)
     # the loose sheave closes at a finite rate, and still opens after the shift
     pressed = run.channel("sheave_force driven left")
     assert pressed[-50:].mean() == pytest.approx(0.8 * 20e3, rel=0.03)

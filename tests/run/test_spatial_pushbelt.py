@@ -8,9 +8,9 @@ import pytest
 from cvt_hpc.cli import main
 from cvt_hpc.errors import InputError
 from cvt_hpc.job import build_job
-from cvt_hpc.models.pushbelt import belt as p
+from cvt_hpc.models.pushbelt import fields as f
 from cvt_hpc.models.pushbelt.parameters import most_tension, path_length, string_limit
-from cvt_hpc.models.spatial_pushbelt import belt as b
+from cvt_hpc.models.spatial_pushbelt import fields
 from cvt_hpc.models.spatial_pushbelt.parameters import roll_limit
 from cvt_hpc.models.spatial_pushbelt.readings import ANGLES, SHEAVES
 from cvt_hpc.models.spatial_pushbelt.record import histories, judge
@@ -157,12 +157,12 @@ def test_an_aligned_belt_stays_in_its_plane_and_a_seed_leads_it_out():
 def test_a_sheave_at_its_stop_and_an_element_off_the_grooves_end_a_run():
     run = Transient(job(inner_radius=0.043, outer_radius=0.07).point(0), "newton")
     assert run._out_of_place() is None
-    run._state.pulleys[p.DRIVING_RADIUS] = 0.0429  # which no thrust moves
+    run._state.pulleys[f.DRIVING_RADIUS] = 0.0429  # which no thrust moves
     assert run.advance(1)[0] == Status.FAILED_NUMERICS
     assert run.failure[1].startswith(
         "the driving sheave has run to its stop: a pitch radius of 0.0429 m, of 0.043 to 0.07 m"
     )
-    run._state.elements.data[3, b.POSITION + 2, 1] = -0.0111
+    run._state.elements.data[3, fields.POSITION + 2, 1] = -0.0111
     assert (
         run._out_of_place()
         == f"element {run._state.elements.data.shape[0] + 3} has left the grooves: it is 11.1 mm out of the plane"

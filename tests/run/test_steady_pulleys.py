@@ -4,9 +4,9 @@ import numpy as np
 import pytest
 
 from cvt_hpc.errors import InputError
-from cvt_hpc.models.elastic_belt.belt import DRIVEN_SPEED, FIRST_STATE, LAYER_WORK, mesh
+from cvt_hpc.models.elastic_belt import fields as f
+from cvt_hpc.models.elastic_belt.belt import mesh
 from cvt_hpc.models.elastic_belt.pulley_settings import oil_factor
-from cvt_hpc.models.elastic_belt.pulleys import DRIVEN_COS, DRIVING_COS, EXCESS, SHIFT
 from cvt_hpc.models.steady_variator.forces import quantities
 from cvt_hpc.models.steady_variator.walking import NoSteadyState, SteadyBelt
 from support.fast_runs import FastRuns
@@ -49,9 +49,9 @@ def test_it_is_the_end_of_a_calm_transient(name):
         assert found["axial_force"][k] == pytest.approx(last(f"axial_force {pulley}"), rel=LEFT)
     assert found["driven_position"] == pytest.approx(last("driven_position"), abs=LEFT * 1e-3)
     course = run.parameters["driving_speed"]
-    excess = steady.state.scalars[FIRST_STATE + EXCESS]
+    excess = steady.state.scalars[f.FIRST_STATE + f.EXCESS]
     assert excess == pytest.approx(last("driving_speed") - course, abs=LEFT * course)
-    assert steady.state.scalars[DRIVEN_SPEED] == pytest.approx(last("driven_speed"), rel=LEFT)
+    assert steady.state.scalars[f.DRIVEN_SPEED] == pytest.approx(last("driven_speed"), rel=LEFT)
 
 
 @pytest.mark.parametrize("name", ["thrust", "all"])
@@ -63,23 +63,23 @@ def test_a_transient_that_begins_there_stays(name):
     moved = run.state().scalars, steady.state.scalars
     # what Newton's iteration leaves, 10 pm of w, and the sums of controllers that see it
     assert np.abs(run.state().fields[0] - steady.state.fields[0]).max() < 1e-9
-    for places in (slice(DRIVEN_SPEED, LAYER_WORK), slice(FIRST_STATE, None)):
+    for places in (slice(f.DRIVEN_SPEED, f.LAYER_WORK), slice(f.FIRST_STATE, None)):
         assert moved[0][places] == pytest.approx(moved[1][places], rel=1e-5, abs=1e-8)
 
 
 def test_thrusts_are_those_that_are_given():
     steady, found = state(**THRUST)
     assert found["axial_force"] == pytest.approx([43.2e3, 50e3], rel=1e-9)
-    assert abs(steady.state.scalars[FIRST_STATE + SHIFT]) > 1e-5
+    assert abs(steady.state.scalars[f.FIRST_STATE + f.SHIFT]) > 1e-5
     # the same opening, given: the same state
-    plain, same = state(driving_position=steady.state.scalars[FIRST_STATE + SHIFT])
+    plain, same = state(driving_position=steady.state.scalars[f.FIRST_STATE + f.SHIFT])
     assert same["axial_force"] == pytest.approx(found["axial_force"], rel=1e-7)
     assert plain.state.fields[0] == pytest.approx(steady.state.fields[0], abs=1e-10)
 
 
 def test_springs_and_oil_press_beside_the_thrust():
     steady, found = state(**SCENES["spring and oil"])
-    oil = oil_factor((0.02, 0.08), 850.0) * steady.state.scalars[DRIVEN_SPEED] ** 2
+    oil = oil_factor((0.02, 0.08), 850.0) * steady.state.scalars[f.DRIVEN_SPEED] ** 2
     assert found["axial_force"][1] == pytest.approx(50e3 + 5e6 * found["driven_position"] + oil, rel=1e-9)
 
 
@@ -92,14 +92,16 @@ def test_a_lag_changes_no_steady_state_and_a_clearance_needs_none():
     assert without.state.fields[0] == pytest.approx(clear.state.fields[0], abs=1e-10)
     assert same["axial_force"] == pytest.approx(found["axial_force"], rel=1e-8)
     radii = clear.belt.driving_radius, clear.belt.driven_radius
-    for place, radius in zip((DRIVING_COS, DRIVEN_COS), radii, strict=True):
-        tilts = [one.state.scalars[FIRST_STATE + place : FIRST_STATE + place + 2] for one in (lagging, clear)]
+    for place, radius in zip((f.DRIVING_COS, f.DRIVEN_COS), radii, strict=True):
+        tilts = [
+            one.state.scalars[f.FIRST_STATE + place : f.FIRST_STATE + place + 2] for one in (lagging, clear)
+        ]
         assert np.linalg.norm(tilts[1]) > 0.8 * 5e-4 * radius + 0.5 * np.linalg.norm(tilts[0])
 
 
 def test_controllers_hold_what_they_are_to_hold():
     steady, _ = state(driving_axial="ratio")
-    speeds = steady.belt.driving_speed / steady.state.scalars[DRIVEN_SPEED]
+    speeds = steady.belt.driving_speed / steady.state.scalars[f.DRIVEN_SPEED]
     assert speeds == pytest.approx(2.52, rel=1e-9)
     _, found = state(**SCENES["clamping"])
     assert found["torque_ratio"] == pytest.approx(0.3, rel=1e-3)  # by the coefficient at gross slip, not mu_k
@@ -150,10 +152,10 @@ def test_what_cannot_be_is_refused(model, values, message):
 def test_record():
     record = rung_record("steady_variator", **CALM | SCENES["drive"])
     steady, found = state(**SCENES["drive"])
-    speed = steady.belt.driving_speed + steady.state.scalars[FIRST_STATE + EXCESS]
+    speed = steady.belt.driving_speed + steady.state.scalars[f.FIRST_STATE + f.EXCESS]
     assert record["speed_loss"] == pytest.approx(
-        1.0 - 2.52 * steady.state.scalars[DRIVEN_SPEED] / speed, rel=1e-9
+        1.0 - 2.52 * steady.state.scalars[f.DRIVEN_SPEED] / speed, rel=1e-9
     )
-    torque = 60.0 - 5.0 * steady.state.scalars[FIRST_STATE + EXCESS]
+    torque = 60.0 - 5.0 * steady.state.scalars[f.FIRST_STATE + f.EXCESS]
     assert record["driving_power"] == pytest.approx(torque * speed, rel=1e-6)
     assert abs(record["power_residual"]) < 1e-3

@@ -5,14 +5,8 @@ from functools import cache
 import numpy as np
 import pytest
 
-from cvt_hpc.models.elastic_belt.belt import (
-    DRIVEN_SPEED,
-    N_ELEMENT,
-    W,
-    belt_constants,
-    initial_state,
-    mesh,
-)
+from cvt_hpc.models.elastic_belt import fields as f
+from cvt_hpc.models.elastic_belt.belt import belt_constants, initial_state, mesh
 from cvt_hpc.models.elastic_belt.one_system import flat_belt, pack, rates
 from cvt_hpc.models.elastic_belt.parameters import PARAMETERS
 from cvt_hpc.models.elastic_belt.sampling import Outcome
@@ -57,8 +51,8 @@ def test_nothing_changes_in_it(values):
         # Newton's last step is 1e-7 of the sizes, so strains are left by 1e-10, and the elements' stiffness 4e7 N
         # makes of that 0.6 m/s^2 in cells of 7 mm and 1 kg/m; forces of 1e5 N/m cancel
         assert np.abs(rates_of(found, belt)).max() < 1.0
-        contents = found.state.fields[N_ELEMENT : N_ELEMENT + 2] @ belt.cell
-        assert contents == pytest.approx(first.fields[N_ELEMENT : N_ELEMENT + 2] @ belt.cell, rel=1e-12)
+        contents = found.state.fields[f.N_ELEMENT : f.N_ELEMENT + 2] @ belt.cell
+        assert contents == pytest.approx(first.fields[f.N_ELEMENT : f.N_ELEMENT + 2] @ belt.cell, rel=1e-12)
 
 
 def test_a_transient_stays_there():
@@ -70,8 +64,8 @@ def test_a_transient_stays_there():
         state = run.state()
         # Where the explicit rule of parting and the step's differ, at most one cell, the step begins without its
         # push: 10 nm of the belt's 1 mm. Without that cell it is 1 pm.
-        assert state.fields[W] == pytest.approx(one.state.fields[W], abs=2e-8)
-        assert state.scalars[DRIVEN_SPEED] == pytest.approx(one.state.scalars[DRIVEN_SPEED], abs=2e-4)
+        assert state.fields[f.W] == pytest.approx(one.state.fields[f.W], abs=2e-8)
+        assert state.scalars[f.DRIVEN_SPEED] == pytest.approx(one.state.scalars[f.DRIVEN_SPEED], abs=2e-4)
 
 
 def test_pulleys_are_in_balance():

@@ -11,8 +11,9 @@ import pytest
 from cvt_hpc.errors import InputError
 from cvt_hpc.job import build_job
 from cvt_hpc.models.auto.rules import coarse
-from cvt_hpc.models.elastic_belt.belt import V_ELEMENT, V_RING, U, belt_constants, initial_state
-from cvt_hpc.models.elastic_belt.lane_forces import NOTED
+from cvt_hpc.models.elastic_belt import fields as f
+from cvt_hpc.models.elastic_belt import lane_fields as lf
+from cvt_hpc.models.elastic_belt.belt import belt_constants, initial_state
 from cvt_hpc.models.elastic_belt.parameters import check
 from cvt_hpc.models.elastic_belt.recorded_run import recording
 from cvt_hpc.models.elastic_belt.step_choice import REFERENCE_STEP, SAFE_SHARE, chosen_step, transverse_limit
@@ -118,8 +119,8 @@ def test_the_ripple_is_the_speed_that_alternates():
     belt = belt_constants(point)
     run = FastRuns([belt], [initial_state(point, belt)])
     # speeds two steps ago less twice those one step ago, as they are where nothing changes
-    noted = run.work.stations.data[:, NOTED : NOTED + 3, 0]
-    noted[:] = -run.lanes.fields.data[:, [U, V_ELEMENT, V_RING], 0]
+    noted = run.work.stations.data[:, lf.NOTED : lf.NOTED + 3, 0]
+    noted[:] = -run.lanes.fields.data[:, [f.U, f.V_ELEMENT, f.V_RING], 0]
     run.advance(0, 1e-6)
     assert run.channels()["step_ripple"] == 0.0
     # the rings to and fro by 10 mm/s: +10, -10, +10

@@ -2,17 +2,8 @@
 
 import numpy as np
 
-from cvt_hpc.models.elastic_belt.belt import (
-    DRIVEN_POSITION,
-    DRIVEN_SPEED,
-    Belt,
-    Mesh,
-    State,
-    W,
-    belt_constants,
-    initial_state,
-    mesh,
-)
+from cvt_hpc.models.elastic_belt import fields as f
+from cvt_hpc.models.elastic_belt.belt import Belt, Mesh, State, belt_constants, initial_state, mesh
 from cvt_hpc.models.elastic_belt.parameters import PARAMETERS
 from cvt_hpc.models.elastic_belt.rhs import contact_forces, fresh_contacts, strains
 from cvt_hpc.models.elastic_belt.sampling import Outcome
@@ -61,8 +52,8 @@ class Settled:
         assert run.outcome() is Outcome.OK
         self.tension, self.push, self.w, self.thrusts = (total / samples for total in sums)
         rates = (run.state().scalars - before) / (samples * stride * STEP)
-        self.spin_up = self.belt.driven_inertia * rates[DRIVEN_SPEED]
-        self.closing = self.belt.axial_damping * rates[DRIVEN_POSITION]
+        self.spin_up = self.belt.driven_inertia * rates[f.DRIVEN_SPEED]
+        self.closing = self.belt.axial_damping * rates[f.DRIVEN_POSITION]
 
     def _forces(self, state: State) -> list[np.ndarray]:
         belt, n = self.belt, self.belt.cell.size
@@ -72,7 +63,7 @@ class Settled:
         wraps = ((belt.driving, 0), (belt.driven, belt.driven_start))
         thrusts = [sheave.weight @ force[first : first + sheave.weight.size] for sheave, first in wraps]
         push = np.maximum(-belt.element_stiffness * eps[0], 0.0)
-        return [belt.ring_stiffness * eps[1], push, state.fields[W].copy(), np.array(thrusts)]
+        return [belt.ring_stiffness * eps[1], push, state.fields[f.W].copy(), np.array(thrusts)]
 
     @property
     def relief(self) -> float:

@@ -3,9 +3,10 @@
 import numpy as np
 
 from cvt_hpc.job import build_job
-from cvt_hpc.models.pushbelt import belt as p
+from cvt_hpc.models.pushbelt import fields as pushbelt_fields
 from cvt_hpc.models.pushbelt.start import of_lanes, start
 from cvt_hpc.models.spatial_pushbelt import belt as b
+from cvt_hpc.models.spatial_pushbelt import fields as spatial_fields
 from cvt_hpc.models.spatial_pushbelt.step import advance
 from support import spatial_chains as chains
 from support.pushbelts import SPEED, THRUST, given
@@ -30,12 +31,12 @@ def job(**values):
     return build_job({"name": "spatial", "model": "spatial_pushbelt"}, "spatial", COARSE | short | values)
 
 
-def inputs(thrusts, loads, fields=b.INPUTS, drift=0.0):
+def inputs(thrusts, loads, fields=spatial_fields.INPUTS, drift=0.0):
     """Inputs of a call: thrust and load at its start and end."""
     found = np.zeros((2, fields))
-    found[:, p.IN_SPEED] = SPEED
-    found[:, p.IN_DRIVEN_THRUST], found[:, p.IN_LOAD] = thrusts, loads
-    found[:, b.IN_DRIVEN_DRIFT :] = drift
+    found[:, pushbelt_fields.IN_SPEED] = SPEED
+    found[:, pushbelt_fields.IN_DRIVEN_THRUST], found[:, pushbelt_fields.IN_LOAD] = thrusts, loads
+    found[:, spatial_fields.IN_DRIVEN_DRIFT :] = drift
     return found
 
 
@@ -56,10 +57,10 @@ def scene(offset=OFFSET, modal=(), nodes=NODES, **constants):
 def stored(belt, state):
     """Kinetic energy of belt and driven pulley, and that of rings, flanks and sheaves [J]."""
     energy, _, _ = chains.energy_and_momentum(belt, of_lanes(state.elements))
-    pressed = of_lanes(state.elements)[:, b.FLANK : b.FLANK + 4]
+    pressed = of_lanes(state.elements)[:, spatial_fields.FLANK : spatial_fields.FLANK + 4]
     energy += np.sum(pressed**2) / belt.flank_stiffness
     energy += np.sum(belt.modal_stiffness * (state.openings**2 + state.leans**2))
-    return energy + 0.5 * belt.driven_inertia * state.pulleys[p.DRIVEN_SPEED] ** 2
+    return energy + 0.5 * belt.driven_inertia * state.pulleys[pushbelt_fields.DRIVEN_SPEED] ** 2
 
 
 def gaps(belt, state):
@@ -76,9 +77,12 @@ def gaps(belt, state):
     offset = r - rj + 0.5 * belt.thickness * (x + xj) + belt.pin_height * (o - oj)
     offset -= np.sum(offset * xj, axis=1)[:, None] * xj
     found.append(belt.pin_clearance - np.linalg.norm(offset, axis=1))
-    driven = f[:, b.DRIVEN].astype(int)
+    driven = f[:, spatial_fields.DRIVEN].astype(int)
     axis, centre = belt.axes[driven], driven[:, None] * [belt.centre_distance, 0.0, 0.0]
-    groove, middle = (state.pulleys[first:][driven] for first in (p.DRIVING_RADIUS, b.DRIVING_MIDDLE))
+    groove, middle = (
+        state.pulleys[first:][driven]
+        for first in (pushbelt_fields.DRIVING_RADIUS, spatial_fields.DRIVING_MIDDLE)
+    )
     opening, lean = (sheaves_opening(belt, state, modes) for modes in (state.openings, state.leans))
     for side in (-1.0, 1.0):
         for reach in (-belt.flank_reach, belt.flank_reach):
@@ -94,7 +98,7 @@ def gaps(belt, state):
 def sheaves_modes(belt, state):
     """psi_k of either pulley at its elements, 0 at those of the other one, (2, modes, nodes)."""
     f = of_lanes(state.elements)
-    driven = f[:, b.DRIVEN]
+    driven = f[:, spatial_fields.DRIVEN]
     pitch = f[:, :2] - belt.pitch_depth * f[:, 6:8] - driven[:, None] * [belt.centre_distance, 0.0]
     angle = np.arctan2(pitch[:, 1], pitch[:, 0])
     shapes = [
@@ -111,5 +115,5 @@ def sheaves_opening(belt, state, modes):
 
 def leaning_loads(belt, fields, shapes):
     """Half of what the flanks press the right sheaves more than the left ones, by modes, (2, modes) [N]."""
-    sides = fields[:, b.FLANK : b.FLANK + 4].reshape(-1, 2, 2).sum(axis=2)
+    sides = fields[:, spatial_fields.FLANK : spatial_fields.FLANK + 4].reshape(-1, 2, 2).sum(axis=2)
     return 0.5 * belt.cosine * shapes @ (sides[:, 1] - sides[:, 0])

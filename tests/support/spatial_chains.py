@@ -2,10 +2,10 @@
 
 import numpy as np
 
-from cvt_hpc.models.pushbelt import belt as p
-from cvt_hpc.models.pushbelt.belt import DRIVEN_RADIUS, DRIVING_RADIUS
+from cvt_hpc.models.pushbelt import fields as pushbelt_fields
 from cvt_hpc.models.pushbelt.start import in_lanes, of_lanes, start
 from cvt_hpc.models.spatial_pushbelt import belt as b
+from cvt_hpc.models.spatial_pushbelt import fields as spatial_fields
 from cvt_hpc.models.spatial_pushbelt.step import _evaluate
 from cvt_hpc.physics.friction_laws import Law
 from support.pushbelts import given
@@ -78,9 +78,9 @@ def state(fields, pulleys=(0.0, 0.0, 1e-6, 1e-6, 0.0, 0.0), modes=0):
         np.zeros((2, modes)),
         np.zeros((2, modes)),
         np.zeros(1 + 2 * modes),
-        np.zeros(b.LOADS),
-        np.zeros(p.TOTALS),
-        np.zeros(p.COUNTERS, np.int64),
+        np.zeros(spatial_fields.LOADS),
+        np.zeros(pushbelt_fields.TOTALS),
+        np.zeros(pushbelt_fields.COUNTERS, np.int64),
     )
 
 
@@ -88,13 +88,13 @@ def spinning_ring(nodes, radius, speed):
     """Fields of a free ring that spins in equilibrium, counter-clockwise [m], [rad/s]."""
     angle = 2.0 * np.pi * np.arange(nodes) / nodes
     none = np.zeros(nodes)
-    fields = np.zeros((nodes, b.STATE_FIELDS))
+    fields = np.zeros((nodes, spatial_fields.STATE_FIELDS))
     fields[:, :3] = radius * np.stack([np.cos(angle), np.sin(angle), none], 1)
     fields[:, 3:6] = np.stack([-np.sin(angle), np.cos(angle), none], 1)
     fields[:, 6:9] = np.stack([np.cos(angle), np.sin(angle), none], 1)
-    fields[:, b.SPEED : b.SPEED + 3] = speed * radius * fields[:, 3:6]
-    fields[:, b.OMEGA + 2] = speed
-    fields[:, b.V] = speed * radius
+    fields[:, spatial_fields.SPEED : spatial_fields.SPEED + 3] = speed * radius * fields[:, 3:6]
+    fields[:, spatial_fields.OMEGA + 2] = speed
+    fields[:, spatial_fields.V] = speed * radius
     return fields
 
 
@@ -113,21 +113,39 @@ def free_ring(nodes, radius, spin, lateral=0.0):
     )
     tension = (constants.mass + constants.ring_mass) * spin**2 * radius / (2.0 * np.sin(np.pi / nodes))
     fields = spinning_ring(nodes, radius, spin)
-    fields[:, b.LENGTH] = chord / (1.0 + tension / constants.ring_stiffness)
-    fields[:, b.TENSION] = tension
+    fields[:, spatial_fields.LENGTH] = chord / (1.0 + tension / constants.ring_stiffness)
+    fields[:, spatial_fields.TENSION] = tension
     angle = 2.0 * np.pi * np.arange(nodes) / nodes
-    fields[:, b.SPEED + 2] = lateral * np.cos(2.0 * angle)
-    fields[:, b.SLOPE_RATE] = -2.0 * lateral / radius * np.sin(2.0 * angle)
+    fields[:, spatial_fields.SPEED + 2] = lateral * np.cos(2.0 * angle)
+    fields[:, spatial_fields.SLOPE_RATE] = -2.0 * lateral / radius * np.sin(2.0 * angle)
     return constants, tension, fields
 
 
 def mirrored(f):
     """Fields (n, STATE_FIELDS) of the mirror image, left against right."""
-    odd = (2, 5, 8, b.SLOPE, b.SPEED + 2, b.OMEGA, b.OMEGA + 1, b.SLOPE_RATE)
+    odd = (
+        2,
+        5,
+        8,
+        spatial_fields.SLOPE,
+        spatial_fields.SPEED + 2,
+        spatial_fields.OMEGA,
+        spatial_fields.OMEGA + 1,
+        spatial_fields.SLOPE_RATE,
+    )
     g = f.copy()
-    g[:, [*odd, b.CHANGE + 2, b.CHANGE + 3, b.CHANGE + 4, b.CHANGE + 7]] *= -1.0
-    g[:, b.PUSH : b.PUSH + 4] = f[:, b.PUSH + np.array([1, 0, 3, 2])]
-    for first in range(b.FLANK, b.RING_SLIP, b.POINTS):
+    g[
+        :,
+        [
+            *odd,
+            spatial_fields.CHANGE + 2,
+            spatial_fields.CHANGE + 3,
+            spatial_fields.CHANGE + 4,
+            spatial_fields.CHANGE + 7,
+        ],
+    ] *= -1.0
+    g[:, spatial_fields.PUSH : spatial_fields.PUSH + 4] = f[:, spatial_fields.PUSH + np.array([1, 0, 3, 2])]
+    for first in range(spatial_fields.FLANK, spatial_fields.RING_SLIP, spatial_fields.POINTS):
         g[:, first : first + 4] = f[:, first + np.array([2, 3, 0, 1])]
     return g
 
@@ -136,8 +154,11 @@ def energy_and_momentum(constants, fields):
     """Kinetic energy, with that of lateral bending and stretching [J], momentum and its moment about 0."""
     r, x, o = fields[:, 0:3], fields[:, 3:6], fields[:, 6:9]
     a = np.cross(o, x)
-    u, w = fields[:, b.SPEED : b.SPEED + 3], fields[:, b.OMEGA : b.OMEGA + 3]
-    v, rate = fields[:, b.V], fields[:, b.SLOPE_RATE]
+    u, w = (
+        fields[:, spatial_fields.SPEED : spatial_fields.SPEED + 3],
+        fields[:, spatial_fields.OMEGA : spatial_fields.OMEGA + 3],
+    )
+    v, rate = fields[:, spatial_fields.V], fields[:, spatial_fields.SLOPE_RATE]
     inertias = constants.roll_inertia, constants.yaw_inertia, constants.pitch_inertia
     spin = sum(k * d * np.sum(d * w, 1)[:, None] for k, d in zip(inertias, (x, o, a), strict=True))
     momentum, moment = constants.mass * u, constants.mass * np.cross(r, u) + spin
@@ -153,15 +174,17 @@ def energy_and_momentum(constants, fields):
         moment = moment + 0.5 * constants.ring_mass * np.cross(p, q)
         energy += 0.25 * constants.ring_mass * np.sum(q**2)
     h = constants.pitch
-    slope = fields[:, b.SLOPE]
+    slope = fields[:, spatial_fields.SLOPE]
     shear = (np.roll(r[:, 2], -1) - r[:, 2]) / h - 0.5 * (slope + np.roll(slope, -1))
     energy += 0.5 * constants.ring_shear * h * np.sum(shear**2)
     energy += 0.5 * constants.ring_bending / h * np.sum((np.roll(slope, -1) - slope) ** 2)
-    stretched = fields[:, b.TENSION] ** 2 * fields[:, b.LENGTH]
-    if fields.shape[1] > b.STATE_FIELDS:  # two flows
-        apart, half = fields[:, b.TENSION_DIFFERENCE], fields[:, b.HALF_LENGTH]
-        stretched += apart * (apart * fields[:, b.LENGTH] + 2.0 * fields[:, b.TENSION] * half)
-        energy += 0.5 * constants.ring_mass * np.sum(fields[:, b.HALF_SPEED] ** 2)
+    stretched = fields[:, spatial_fields.TENSION] ** 2 * fields[:, spatial_fields.LENGTH]
+    if fields.shape[1] > spatial_fields.STATE_FIELDS:  # two flows
+        apart, half = fields[:, spatial_fields.TENSION_DIFFERENCE], fields[:, spatial_fields.HALF_LENGTH]
+        stretched += apart * (
+            apart * fields[:, spatial_fields.LENGTH] + 2.0 * fields[:, spatial_fields.TENSION] * half
+        )
+        energy += 0.5 * constants.ring_mass * np.sum(fields[:, spatial_fields.HALF_SPEED] ** 2)
     energy += 0.5 * np.sum(stretched) / constants.ring_stiffness
     return energy, momentum.sum(0), moment.sum(0)
 
@@ -175,7 +198,7 @@ def beside_planar(planar, planar_state, **given):
     group = 432.0 / nodes
     shared = {name: getattr(planar, name) for name in b.Belt._fields if hasattr(planar, name)}
     f = of_lanes(planar_state.elements)
-    first, last = f[0, [p.Y, p.Z]], f[1, [p.Y, p.Z]]
+    first, last = f[0, [pushbelt_fields.Y, pushbelt_fields.Z]], f[1, [pushbelt_fields.Y, pushbelt_fields.Z]]
     thickness, square = planar.thickness, planar.mass / 12.0
     constants = belt(
         **shared
@@ -190,13 +213,24 @@ def beside_planar(planar, planar_state, **given):
         }
         | given
     )
-    fields = np.zeros((nodes, b.STATE_FIELDS))
-    fields[:, 0:2], fields[:, 3:5] = f[:, [p.Y, p.Z]], f[:, [p.HEADING_Y, p.HEADING_Z]]
-    fields[:, 6:8] = np.stack([f[:, p.HEADING_Z], -f[:, p.HEADING_Y]], 1)
-    fields[:, b.SPEED : b.SPEED + 2] = f[:, [p.U_Y, p.U_Z]]
-    fields[:, b.OMEGA + 2], fields[:, b.V] = f[:, p.OMEGA], f[:, p.V]
-    fields[:, b.LENGTH], fields[:, b.TENSION] = f[:, p.LENGTH], f[:, p.TENSION]
-    fields[:, b.DRIVEN] = f[:, p.DRIVEN]
+    fields = np.zeros((nodes, spatial_fields.STATE_FIELDS))
+    fields[:, 0:2], fields[:, 3:5] = (
+        f[:, [pushbelt_fields.Y, pushbelt_fields.Z]],
+        f[:, [pushbelt_fields.HEADING_Y, pushbelt_fields.HEADING_Z]],
+    )
+    fields[:, 6:8] = np.stack([f[:, pushbelt_fields.HEADING_Z], -f[:, pushbelt_fields.HEADING_Y]], 1)
+    fields[:, spatial_fields.SPEED : spatial_fields.SPEED + 2] = f[
+        :, [pushbelt_fields.U_Y, pushbelt_fields.U_Z]
+    ]
+    fields[:, spatial_fields.OMEGA + 2], fields[:, spatial_fields.V] = (
+        f[:, pushbelt_fields.OMEGA],
+        f[:, pushbelt_fields.V],
+    )
+    fields[:, spatial_fields.LENGTH], fields[:, spatial_fields.TENSION] = (
+        f[:, pushbelt_fields.LENGTH],
+        f[:, pushbelt_fields.TENSION],
+    )
+    fields[:, spatial_fields.DRIVEN] = f[:, pushbelt_fields.DRIVEN]
     modes = constants.modal_stiffness.shape[1]
     return constants, state(fields, [*planar_state.pulleys, 0.0, 0.0], modes)
 
@@ -226,15 +260,15 @@ def shaken(seed, **changes):
     f[:, 6:9] += rng.normal(0.0, 2e-3, (SHAKEN, 3))
     f[:, 6:9] -= np.sum(f[:, 6:9] * f[:, 3:6], 1)[:, None] * f[:, 3:6]
     f[:, 6:9] /= np.linalg.norm(f[:, 6:9], axis=1)[:, None]
-    f[:, b.SLOPE] = rng.normal(0.0, 2e-3, SHAKEN)
-    f[:, b.SPEED : b.SPEED + 8] += rng.normal(0.0, 0.05, (SHAKEN, 8))
-    f[:, b.SADDLE] = rng.uniform(20.0, 80.0, SHAKEN)
-    f[:, b.V_FILTERED : b.V_FILTERED + 4] = rng.uniform(0.0, 0.2, (SHAKEN, 4))
+    f[:, spatial_fields.SLOPE] = rng.normal(0.0, 2e-3, SHAKEN)
+    f[:, spatial_fields.SPEED : spatial_fields.SPEED + 8] += rng.normal(0.0, 0.05, (SHAKEN, 8))
+    f[:, spatial_fields.SADDLE] = rng.uniform(20.0, 80.0, SHAKEN)
+    f[:, spatial_fields.V_FILTERED : spatial_fields.V_FILTERED + 4] = rng.uniform(0.0, 0.2, (SHAKEN, 4))
     state.elements.data[:] = in_lanes(f).data
     state.openings[:] = rng.normal(0.0, 1e-6, state.openings.shape)
     state.leans[:] = rng.normal(0.0, 1e-6, state.openings.shape)
-    state.pulleys[[DRIVING_RADIUS, DRIVEN_RADIUS]] += 1e-4
-    state.pulleys[[b.DRIVING_MIDDLE, b.DRIVEN_MIDDLE]] = 3e-5, -2e-5
+    state.pulleys[[pushbelt_fields.DRIVING_RADIUS, pushbelt_fields.DRIVEN_RADIUS]] += 1e-4
+    state.pulleys[[spatial_fields.DRIVING_MIDDLE, spatial_fields.DRIVEN_MIDDLE]] = 3e-5, -2e-5
     return belt, state, b.workspace(belt, SHAKEN), rng
 
 
@@ -249,5 +283,5 @@ def evaluated(belt, state, work, dt):
     """Residuals of elements and border, of an iterate evaluated twice, so that duals are those of its slips."""
     for _ in range(2):
         _evaluate(belt, state, work, 1.35 * 60.0, dt)
-    own = of_lanes(work.iterate)[:, b.RESIDUAL : b.RESIDUAL + 8]
+    own = of_lanes(work.iterate)[:, spatial_fields.RESIDUAL : spatial_fields.RESIDUAL + 8]
     return np.concatenate([own.ravel(), work.border[:, -1]])

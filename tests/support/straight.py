@@ -6,19 +6,8 @@ so that the strains, and with them T and P, do not depend on w, and the flanks w
 
 import numpy as np
 
-from cvt_hpc.models.elastic_belt.belt import (
-    DRIVEN_SPEED,
-    FIELDS,
-    N_ELEMENT,
-    N_RING,
-    SCALARS,
-    TIME,
-    V_ELEMENT,
-    V_RING,
-    Belt,
-    State,
-    belt_constants,
-)
+from cvt_hpc.models.elastic_belt import fields as f
+from cvt_hpc.models.elastic_belt.belt import Belt, State, belt_constants
 from cvt_hpc.models.elastic_belt.parameters import PARAMETERS
 
 DEFAULTS = {key: parameter.default for section in PARAMETERS.values() for key, parameter in section.items()}
@@ -50,12 +39,12 @@ def straight_belt(cells: int, speed: float = 0.0, bending: float = 0.0, damping:
 
 def moving_straight(belt: Belt, tension: float = TENSION, push: float = 0.0) -> State:
     """The undisturbed state under uniform T and P (negative P: gaps, by that much over EA_e)."""
-    fields, scalars = np.zeros((len(FIELDS), belt.cell.size)), np.zeros(len(SCALARS))
-    fields[V_ELEMENT] = fields[V_RING] = belt.belt_speed
-    fields[N_RING] = 1.0 / (1.0 + tension / belt.ring_stiffness)
-    fields[N_ELEMENT] = 1.0 / (1.0 - push / belt.element_stiffness)
-    scalars[TIME] = belt.rise_time  # the start-up's damping is over
-    scalars[DRIVEN_SPEED] = (
+    fields, scalars = np.zeros((len(f.FIELDS), belt.cell.size)), np.zeros(len(f.SCALARS))
+    fields[f.V_ELEMENT] = fields[f.V_RING] = belt.belt_speed
+    fields[f.N_RING] = 1.0 / (1.0 + tension / belt.ring_stiffness)
+    fields[f.N_ELEMENT] = 1.0 / (1.0 - push / belt.element_stiffness)
+    scalars[f.TIME] = belt.rise_time  # the start-up's damping is over
+    scalars[f.DRIVEN_SPEED] = (
         belt.driving_speed / belt.ratio
     )  # and the pulley, of which the belt is free, turns
     return State(fields, scalars)

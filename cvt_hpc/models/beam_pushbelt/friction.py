@@ -22,82 +22,42 @@ from __future__ import annotations
 import numpy as np
 
 from cvt_hpc.kernels import kernel
-from cvt_hpc.models.beam_pushbelt.belt import (
-    ACROSS,
-    ALONG,
-    CORRECTIONS,
-    COSINE,
-    FLANK_BOUND,
-    FLANK_IMPULSE_M,
-    FLANK_IMPULSE_T,
-    FLANK_STEP,
-    FREE_N,
-    FREE_T,
-    IMPULSE_N,
-    IMPULSE_T,
-    MID_ACROSS,
-    MID_ALONG,
-    MID_R_LEVER,
-    MID_R_Y,
-    MID_R_Z,
-    MID_RADIUS,
-    MID_T_LEVER,
-    MID_T_Y,
-    MID_T_Z,
-    R_LEVER,
-    R_Y,
-    R_Z,
-    RING_ACROSS,
-    RING_ALONG,
-    RING_IMPULSE,
-    RING_STEP,
-    SPIN,
-    T_LEVER,
-    T_Y,
-    T_Z,
-    TANGENT,
-)
+from cvt_hpc.models.beam_pushbelt import fields as f
 from cvt_hpc.models.beam_pushbelt.forces import rub_flanks
-from cvt_hpc.models.pushbelt.belt import (
-    CONTACTS,
-    DRIVEN,
-    DRIVEN_SPEED,
-    DRIVING_SPEED,
-    FAILED_CONTACT,
-    FAILED_ELEMENT,
-    ITERATIONS,
-)
+from cvt_hpc.models.pushbelt import fields
 from cvt_hpc.multibody.rcm_chain import PER_ELEMENT, PER_NODE, SIZE, add_to_column
 from cvt_hpc.solvers.cyclic_blocks import solve
 
-FLANK_CONTACT, RING_CONTACT = CONTACTS.index("flank"), CONTACTS.index("ring")
+FLANK_CONTACT, RING_CONTACT = fields.CONTACTS.index("flank"), fields.CONTACTS.index("ring")
 
 
 @kernel
 def element_speed(belt, step, j):
     """Speed of an element along the ring's tangent at mid step, after the step [m/s]."""
-    free = (step[j, FREE_T] + step[j, IMPULSE_T] / belt.mass) / step[j, COSINE]
-    return free + step[j, TANGENT] * step[j, RING_ACROSS]
+    free = (step[j, f.FREE_T] + step[j, f.IMPULSE_T] / belt.mass) / step[j, f.COSINE]
+    return free + step[j, f.TANGENT] * step[j, f.RING_ACROSS]
 
 
 @kernel
 def saddle_impulse(belt, step, j):
     """Impulse of the bilateral contact on an element, along the ring's normal [N s]."""
-    along = step[j, TANGENT] * (belt.mass * step[j, FREE_T] + step[j, IMPULSE_T])
-    across = belt.mass * (step[j, RING_ACROSS] / step[j, COSINE] - step[j, FREE_N])
-    return across + along - step[j, IMPULSE_N]
+    along = step[j, f.TANGENT] * (belt.mass * step[j, f.FREE_T] + step[j, f.IMPULSE_T])
+    across = belt.mass * (step[j, f.RING_ACROSS] / step[j, f.COSINE] - step[j, f.FREE_N])
+    return across + along - step[j, f.IMPULSE_N]
 
 
 @kernel
 def flank_slip(belt, pulleys, elements, step, j):
     """Sliding velocity of a flank along the meridian and in the direction of rotation [m/s]."""
-    c, w = element_speed(belt, step, j), step[j, RING_ACROSS]
-    t_y, t_z, r_y, r_z = step[j, MID_T_Y], step[j, MID_T_Z], step[j, MID_R_Y], step[j, MID_R_Z]
+    c, w = element_speed(belt, step, j), step[j, f.RING_ACROSS]
+    t_y, t_z, r_y, r_z = step[j, f.MID_T_Y], step[j, f.MID_T_Z], step[j, f.MID_R_Y], step[j, f.MID_R_Z]
     u_y, u_z = c * t_y - w * t_z, c * t_z + w * t_y
-    out = r_y * u_y + r_z * u_z + step[j, MID_R_LEVER] * step[j, SPIN]
-    on = r_y * u_z - r_z * u_y + step[j, MID_T_LEVER] * step[j, SPIN]
-    omega = pulleys[DRIVEN_SPEED] if elements[j, DRIVEN] > 0.0 else pulleys[DRIVING_SPEED]
-    return out / belt.cosine, on - omega * step[j, MID_RADIUS]
+    out = r_y * u_y + r_z * u_z + step[j, f.MID_R_LEVER] * step[j, f.SPIN]
+    on = r_y * u_z - r_z * u_y + step[j, f.MID_T_LEVER] * step[j, f.SPIN]
+    omega = (
+        pulleys[fields.DRIVEN_SPEED] if elements[j, fields.DRIVEN] > 0.0 else pulleys[fields.DRIVING_SPEED]
+    )
+    return out / belt.cosine, on - omega * step[j, f.MID_RADIUS]
 
 
 @kernel
@@ -109,14 +69,14 @@ def couple(state, work):
     for batch in range(0, 2 * n, lanes):
         data[:] = 0.0
         for lane in range(0, min(lanes, 2 * n - batch), 2):
-            f = (batch + lane) // 2
-            add_to_column(work.columns, lane, work.beams[f], 1.0, work.rows[f, ACROSS])
-            add_to_column(work.columns, lane + 1, work.beams[f], 1.0, work.rows[f, ALONG])
+            one = (batch + lane) // 2
+            add_to_column(work.columns, lane, work.beams[one], 1.0, work.rows[one, f.ACROSS])
+            add_to_column(work.columns, lane + 1, work.beams[one], 1.0, work.rows[one, f.ALONG])
         solve(state.ring.blocks, work.columns, SIZE)
         for e in range(n):
             i, j = work.beams[e], (work.beams[e] + 1) % nodes
             for kind in range(2):
-                row, found = work.rows[e, MID_ALONG if kind else MID_ACROSS], work.coupling[e, kind]
+                row, found = work.rows[e, f.MID_ALONG if kind else f.MID_ACROSS], work.coupling[e, kind]
                 for lane in range(lanes):
                     found[batch + lane] = 0.0
                 for r in range(PER_ELEMENT):
@@ -153,42 +113,49 @@ def _own(work, j, across, along):
 @kernel
 def _flank_response(belt, state, work, j, along_meridian, around):
     """Change of `flank_slip` by impulses on both flanks, where nothing else changes [m/s]."""
-    step, t = work.step, work.step[j, TANGENT]
+    step, t = work.step, work.step[j, f.TANGENT]
     out, on = 2.0 * belt.cosine * along_meridian, 2.0 * around
-    y, z = out * step[j, R_Y] - on * step[j, R_Z], out * step[j, R_Z] + on * step[j, R_Y]
-    on_t, on_n = y * step[j, T_Y] + z * step[j, T_Z], z * step[j, T_Y] - y * step[j, T_Z]
-    spin = (out * step[j, R_LEVER] + on * step[j, T_LEVER]) / belt.inertia
+    y, z = out * step[j, f.R_Y] - on * step[j, f.R_Z], out * step[j, f.R_Z] + on * step[j, f.R_Y]
+    on_t, on_n = y * step[j, f.T_Y] + z * step[j, f.T_Z], z * step[j, f.T_Y] - y * step[j, f.T_Z]
+    spin = (out * step[j, f.R_LEVER] + on * step[j, f.T_LEVER]) / belt.inertia
     w, _ = _own(work, j, on_n - t * on_t, 0.0)
-    c = on_t / (belt.mass * step[j, COSINE]) + t * w
-    u_y, u_z = c * step[j, MID_T_Y] - w * step[j, MID_T_Z], c * step[j, MID_T_Z] + w * step[j, MID_T_Y]
-    slip_m = step[j, MID_R_Y] * u_y + step[j, MID_R_Z] * u_z + step[j, MID_R_LEVER] * spin
-    slip_t = step[j, MID_R_Y] * u_z - step[j, MID_R_Z] * u_y + step[j, MID_T_LEVER] * spin
-    if state.elements[j, DRIVEN] > 0.0:
-        slip_t += on * step[j, MID_RADIUS] ** 2 / belt.driven_inertia
+    c = on_t / (belt.mass * step[j, f.COSINE]) + t * w
+    u_y, u_z = (
+        c * step[j, f.MID_T_Y] - w * step[j, f.MID_T_Z],
+        c * step[j, f.MID_T_Z] + w * step[j, f.MID_T_Y],
+    )
+    slip_m = step[j, f.MID_R_Y] * u_y + step[j, f.MID_R_Z] * u_z + step[j, f.MID_R_LEVER] * spin
+    slip_t = step[j, f.MID_R_Y] * u_z - step[j, f.MID_R_Z] * u_y + step[j, f.MID_T_LEVER] * spin
+    if state.elements[j, fields.DRIVEN] > 0.0:
+        slip_t += on * step[j, f.MID_RADIUS] ** 2 / belt.driven_inertia
     return slip_m / belt.cosine, slip_t
 
 
 @kernel
 def _proximal_steps(belt, state, work, j):
     """Lengths of the steps of an element's contacts."""
-    step, t = work.step, work.step[j, TANGENT]
+    step, t = work.step, work.step[j, f.TANGENT]
     w, z = _own(work, j, t, 1.0)
-    step[j, RING_STEP] = 1.0 / (z + 1.0 / (belt.mass * step[j, COSINE]) - t * w)
+    step[j, f.RING_STEP] = 1.0 / (z + 1.0 / (belt.mass * step[j, f.COSINE]) - t * w)
     a, beside_b = _flank_response(belt, state, work, j, 1.0, 0.0)
     beside_a, b = _flank_response(belt, state, work, j, 0.0, 1.0)
     beside_a, beside_b = abs(beside_a), abs(beside_b)
     if a - beside_a >= b - beside_b:
-        step[j, FLANK_STEP] = 2.0 / (a + b + beside_a - beside_b) if a + beside_a >= b + beside_b else 1.0 / b
+        step[j, f.FLANK_STEP] = (
+            2.0 / (a + b + beside_a - beside_b) if a + beside_a >= b + beside_b else 1.0 / b
+        )
     else:
-        step[j, FLANK_STEP] = 2.0 / (a + b - beside_a + beside_b) if a + beside_a < b + beside_b else 1.0 / a
+        step[j, f.FLANK_STEP] = (
+            2.0 / (a + b - beside_a + beside_b) if a + beside_a < b + beside_b else 1.0 / a
+        )
 
 
 @kernel
 def _correct_ring(belt, state, work, impulses, j, held, tolerance):
     """A step of the proximal point of ring friction; False where its law held already."""
     step, e = work.step, state.elements
-    slip = step[j, RING_ALONG] - element_speed(belt, step, j)
-    given, r = e[j, RING_IMPULSE], step[j, RING_STEP]
+    slip = step[j, f.RING_ALONG] - element_speed(belt, step, j)
+    given, r = e[j, f.RING_IMPULSE], step[j, f.RING_STEP]
     bound = belt.ring_friction * (work.free[j, 2] if held else abs(saddle_impulse(belt, step, j)))
     unit = tolerance * r
     if abs(slip) <= tolerance:
@@ -197,14 +164,14 @@ def _correct_ring(belt, state, work, impulses, j, held, tolerance):
     elif abs(given + (bound if slip > 0.0 else -bound)) <= unit:
         return False
     change = min(max(given - r * slip, -bound), bound) - given
-    e[j, RING_IMPULSE] += change
-    step[j, IMPULSE_T] -= change
-    across = step[j, TANGENT] * change
+    e[j, f.RING_IMPULSE] += change
+    step[j, f.IMPULSE_T] -= change
+    across = step[j, f.TANGENT] * change
     impulses[2 * j] += across
     impulses[2 * j + 1] += change
     w, z = _own(work, j, across, change)
-    step[j, RING_ACROSS] += w
-    step[j, RING_ALONG] += z
+    step[j, f.RING_ACROSS] += w
+    step[j, f.RING_ALONG] += z
     return True
 
 
@@ -213,8 +180,8 @@ def _correct_flank(belt, state, work, impulses, j, tolerance):
     """Likewise of both flanks."""
     step, e = work.step, state.elements
     slip_m, slip_t = flank_slip(belt, state.pulleys, e, step, j)
-    given_m, given_t, bound = e[j, FLANK_IMPULSE_M], e[j, FLANK_IMPULSE_T], step[j, FLANK_BOUND]
-    slip, r = np.hypot(slip_m, slip_t), step[j, FLANK_STEP]
+    given_m, given_t, bound = e[j, f.FLANK_IMPULSE_M], e[j, f.FLANK_IMPULSE_T], step[j, f.FLANK_BOUND]
+    slip, r = np.hypot(slip_m, slip_t), step[j, f.FLANK_STEP]
     unit = tolerance * r
     if slip <= tolerance:
         if np.hypot(given_m, given_t) <= bound + unit:
@@ -225,14 +192,14 @@ def _correct_flank(belt, state, work, impulses, j, tolerance):
     size = np.hypot(m, t)
     if size > bound:
         m, t = m * bound / size, t * bound / size
-    before_t, before_n = step[j, IMPULSE_T], step[j, IMPULSE_N]
+    before_t, before_n = step[j, f.IMPULSE_T], step[j, f.IMPULSE_N]
     rub_flanks(belt, state, step, j, m - given_m, t - given_t)
-    e[j, FLANK_IMPULSE_M], e[j, FLANK_IMPULSE_T] = m, t
-    across = step[j, IMPULSE_N] - before_n - step[j, TANGENT] * (step[j, IMPULSE_T] - before_t)
+    e[j, f.FLANK_IMPULSE_M], e[j, f.FLANK_IMPULSE_T] = m, t
+    across = step[j, f.IMPULSE_N] - before_n - step[j, f.TANGENT] * (step[j, f.IMPULSE_T] - before_t)
     impulses[2 * j] += across
     w, z = _own(work, j, across, 0.0)
-    step[j, RING_ACROSS] += w
-    step[j, RING_ALONG] += z
+    step[j, f.RING_ACROSS] += w
+    step[j, f.RING_ALONG] += z
     return True
 
 
@@ -251,28 +218,28 @@ def rub(belt, proximal, state, work):
         work.free[j, 2] = abs(saddle_impulse(belt, step, j))
     held = solved = False
     for sweep in range(proximal.most_sweeps):
-        counters[ITERATIONS] += 1
+        counters[fields.ITERATIONS] += 1
         held, solved = sweep >= proximal.free_sweeps, True
         for j in range(n):
-            step[j, RING_ACROSS] = work.free[j, 0] + _ring_change(work.coupling[j, 0], impulses)
-            step[j, RING_ALONG] = work.free[j, 1] + _ring_change(work.coupling[j, 1], impulses)
+            step[j, f.RING_ACROSS] = work.free[j, 0] + _ring_change(work.coupling[j, 0], impulses)
+            step[j, f.RING_ALONG] = work.free[j, 1] + _ring_change(work.coupling[j, 1], impulses)
             if belt.ring_friction > 0.0 and _correct_ring(
                 belt, state, work, impulses, j, held, proximal.tolerance
             ):
                 solved = False
-                counters[CORRECTIONS] += 1
-                counters[FAILED_ELEMENT], counters[FAILED_CONTACT] = j, RING_CONTACT
-            if step[j, FLANK_BOUND] > 0.0 and _correct_flank(
+                counters[f.CORRECTIONS] += 1
+                counters[fields.FAILED_ELEMENT], counters[fields.FAILED_CONTACT] = j, RING_CONTACT
+            if step[j, f.FLANK_BOUND] > 0.0 and _correct_flank(
                 belt, state, work, impulses, j, proximal.tolerance
             ):
                 solved = False
-                counters[CORRECTIONS] += 1
-                counters[FAILED_ELEMENT], counters[FAILED_CONTACT] = j, FLANK_CONTACT
+                counters[f.CORRECTIONS] += 1
+                counters[fields.FAILED_ELEMENT], counters[fields.FAILED_CONTACT] = j, FLANK_CONTACT
         if solved:
             break
     columns = state.ring.columns
     columns.data[:] = 0.0
     for j in range(n):
-        add_to_column(columns, 0, work.beams[j], impulses[2 * j], work.rows[j, ACROSS])
-        add_to_column(columns, 0, work.beams[j], impulses[2 * j + 1], work.rows[j, ALONG])
+        add_to_column(columns, 0, work.beams[j], impulses[2 * j], work.rows[j, f.ACROSS])
+        add_to_column(columns, 0, work.beams[j], impulses[2 * j + 1], work.rows[j, f.ALONG])
     return solved and not held

@@ -7,30 +7,10 @@ from typing import Any
 
 import numpy as np
 
-from cvt_hpc.models.beam_pushbelt.belt import (
-    COUNTERS,
-    FIELDS,
-    PLACE,
-    PLACE_RATE,
-    ROWS,
-    STEP_FIELDS,
-    BeltState,
-    Workspace,
-)
-from cvt_hpc.models.pushbelt.belt import (
-    HEADING_Y,
-    HEADING_Z,
-    INPUTS,
-    LENGTH,
-    OMEGA,
-    TOTALS,
-    U_Y,
-    U_Z,
-    Belt,
-    V,
-    Y,
-    Z,
-)
+from cvt_hpc.models.beam_pushbelt import fields as b
+from cvt_hpc.models.beam_pushbelt.belt import BeltState, Workspace
+from cvt_hpc.models.pushbelt import fields as f
+from cvt_hpc.models.pushbelt.belt import Belt
 from cvt_hpc.models.pushbelt.start import belt_of, equal_chords, pitch_line
 from cvt_hpc.multibody.rcm_beam import RcmBeam, line_point, mean_strain
 from cvt_hpc.multibody.rcm_chain import PER_ELEMENT, Chain, close, relaxed_ring
@@ -144,7 +124,7 @@ def start(given: Mapping[str, Any]) -> tuple[Belt, BeltState]:
     running = speed * around / path.path_length
     ring = ring_on_path(line, belt.centre_distance, beam, g["ring_beams"], g["ring_strain"], running)
     elements = _elements(belt, ring, g["elements"], speed)
-    return belt, BeltState(ring, elements, pitch.pulleys, np.zeros(TOTALS), np.zeros(COUNTERS, np.int64))
+    return belt, BeltState(ring, elements, pitch.pulleys, np.zeros(f.TOTALS), np.zeros(b.COUNTERS, np.int64))
 
 
 def _elements(belt: Belt, ring: Chain, n: int, speed: float) -> np.ndarray:
@@ -166,16 +146,16 @@ def _elements(belt: Belt, ring: Chain, n: int, speed: float) -> np.ndarray:
     pitch = pitch_points(places)
     along = np.roll(pitch, -1, axis=0) - np.roll(pitch, 1, axis=0)
     along /= np.linalg.norm(along, axis=1)[:, None]
-    e = np.zeros((n, FIELDS))
-    e[:, PLACE], e[:, LENGTH] = places, np.diff(np.append(places, around))
-    e[:, [HEADING_Y, HEADING_Z]] = along
+    e = np.zeros((n, b.FIELDS))
+    e[:, b.PLACE], e[:, f.LENGTH] = places, np.diff(np.append(places, around))
+    e[:, [f.HEADING_Y, f.HEADING_Z]] = along
     for j in range(n):
         p, u = on_ring(places[j])
         bend = p.bend / p.stretch
         c, w, z = speed * (1.0 + belt.pitch_depth * bend), rows[1] @ u, rows[0] @ u
-        e[j, [Y, Z]] = p.x, p.y
-        e[j, [U_Y, U_Z]] = c * p.cos - w * p.sin, c * p.sin + w * p.cos
-        e[j, OMEGA], e[j, V], e[j, PLACE_RATE] = speed * bend, z, (c - z) / p.stretch
+        e[j, [f.Y, f.Z]] = p.x, p.y
+        e[j, [f.U_Y, f.U_Z]] = c * p.cos - w * p.sin, c * p.sin + w * p.cos
+        e[j, f.OMEGA], e[j, f.V], e[j, b.PLACE_RATE] = speed * bend, z, (c - z) / p.stretch
     return e
 
 
@@ -184,13 +164,13 @@ def workspace(ring: Chain, elements: int) -> Workspace:
     n, nodes = elements, ring.blocks.data.shape[0] - 1
     whole = -(-2 * n // UNIT_IMPULSES) * UNIT_IMPULSES
     return Workspace(
-        step=np.zeros((n, STEP_FIELDS)),
+        step=np.zeros((n, b.STEP_FIELDS)),
         beams=np.zeros(n, np.int64),
-        rows=np.zeros((n, ROWS, 8)),
+        rows=np.zeros((n, b.ROWS, 8)),
         middle=np.zeros(ring.q.size),
         columns=empty_columns(nodes, PER_ELEMENT, UNIT_IMPULSES),
         coupling=np.zeros((n, 2, whole)),
         impulses=np.zeros(whole),
         free=np.zeros((n, 3)),
-        inputs=np.zeros(INPUTS),
+        inputs=np.zeros(f.INPUTS),
     )

@@ -24,29 +24,7 @@ from __future__ import annotations
 import numpy as np
 
 from cvt_hpc.kernels import kernel
-from cvt_hpc.models.beam_pushbelt.belt import (
-    ACROSS,
-    COSINE,
-    FLANK_IMPULSE_M,
-    FLANK_IMPULSE_T,
-    FREE_N,
-    FREE_T,
-    IMPULSE_N,
-    IMPULSE_T,
-    MID_ACROSS,
-    MID_ALONG,
-    MID_RADIUS,
-    MID_STRETCH,
-    MID_T_Y,
-    MID_T_Z,
-    PLACE,
-    PLACE_RATE,
-    RING_ACROSS,
-    RING_ALONG,
-    RING_IMPULSE,
-    SPIN,
-    TANGENT,
-)
+from cvt_hpc.models.beam_pushbelt import fields as b
 from cvt_hpc.models.beam_pushbelt.forces import apply_forces, dot, locate
 from cvt_hpc.models.beam_pushbelt.friction import (
     couple,
@@ -55,48 +33,7 @@ from cvt_hpc.models.beam_pushbelt.friction import (
     rub,
     saddle_impulse,
 )
-from cvt_hpc.models.pushbelt.belt import (
-    CONVERGED,
-    DRIVEN,
-    DRIVEN_RADIUS,
-    DRIVEN_SPEED,
-    DRIVING_RADIUS,
-    DRIVING_SPEED,
-    FAILED_STEPS,
-    FLANK,
-    FLANK_FRICTION_M,
-    FLANK_FRICTION_T,
-    FLANK_LOSS,
-    FLANK_SLIP_M,
-    FLANK_SLIP_T,
-    HEADING_Y,
-    HEADING_Z,
-    IN_A_ROW,
-    IN_DRIVEN_THRUST,
-    IN_DRIVING_SHIFT,
-    IN_DRIVING_THRUST,
-    IN_LOAD,
-    IN_SPEED,
-    LENGTH,
-    NOT_CONVERGED,
-    NOT_FINITE,
-    OMEGA,
-    RING_FRICTION,
-    RING_LOSS,
-    RING_SLIP,
-    SADDLE,
-    STATUS,
-    STEPS,
-    TENSION,
-    THRUST_WORK,
-    TIME,
-    U_Y,
-    U_Z,
-    V_FILTERED,
-    WORK_IN,
-    WORK_OUT,
-    V,
-)
+from cvt_hpc.models.pushbelt import fields as f
 from cvt_hpc.models.pushbelt.chain import turned
 from cvt_hpc.multibody.rcm_beam import mean_strain
 from cvt_hpc.multibody.rcm_chain import (
@@ -124,15 +61,15 @@ def _free_speeds(belt, proximal, state, work, dt):
             ring.columns.data[i, k, 0] *= dt
     apply_forces(belt, state, work, dt)
     for j in range(step.shape[0]):
-        beam, rows, tangent = work.beams[j], work.rows[j], step[j, TANGENT]
-        mass = belt.mass / step[j, COSINE]
-        before = dot(rows[MID_ACROSS], ring.u, beam * PER_ELEMENT)
-        step[j, RING_ACROSS] = before
-        step[j, RING_ALONG] = dot(rows[MID_ALONG], ring.u, beam * PER_ELEMENT)
-        across = belt.mass * step[j, FREE_N] + step[j, IMPULSE_N] - mass * before
-        across -= tangent * (belt.mass * step[j, FREE_T] + step[j, IMPULSE_T])
-        add_product(ring, beam, mass, rows[ACROSS], rows[MID_ACROSS])
-        add_to_column(ring.columns, 0, beam, across, rows[ACROSS])
+        beam, rows, tangent = work.beams[j], work.rows[j], step[j, b.TANGENT]
+        mass = belt.mass / step[j, b.COSINE]
+        before = dot(rows[b.MID_ACROSS], ring.u, beam * PER_ELEMENT)
+        step[j, b.RING_ACROSS] = before
+        step[j, b.RING_ALONG] = dot(rows[b.MID_ALONG], ring.u, beam * PER_ELEMENT)
+        across = belt.mass * step[j, b.FREE_N] + step[j, b.IMPULSE_N] - mass * before
+        across -= tangent * (belt.mass * step[j, b.FREE_T] + step[j, b.IMPULSE_T])
+        add_product(ring, beam, mass, rows[b.ACROSS], rows[b.MID_ACROSS])
+        add_to_column(ring.columns, 0, beam, across, rows[b.ACROSS])
     return factor(ring.blocks, SIZE)
 
 
@@ -144,8 +81,8 @@ def _take(state, work):
     for k in range(ring.u.size):
         ring.u[k] += ring.columns.data[k // PER_ELEMENT % nodes, k % PER_ELEMENT, 0]
     for j in range(step.shape[0]):
-        step[j, RING_ACROSS] += along_row(ring.columns, 0, work.beams[j], work.rows[j, MID_ACROSS])
-        step[j, RING_ALONG] += along_row(ring.columns, 0, work.beams[j], work.rows[j, MID_ALONG])
+        step[j, b.RING_ACROSS] += along_row(ring.columns, 0, work.beams[j], work.rows[j, b.MID_ACROSS])
+        step[j, b.RING_ALONG] += along_row(ring.columns, 0, work.beams[j], work.rows[j, b.MID_ALONG])
 
 
 @kernel
@@ -158,48 +95,50 @@ def _accept(belt, state, work, inputs, dt):
     n = e.shape[0]
     for j in range(n):
         first = work.beams[j] * PER_ELEMENT
-        e[j, TENSION] = ring.beam.axial_stiffness * mean_strain(length, ring.q[first : first + 8])
-        e[j, SADDLE] = abs(saddle_impulse(belt, step, j)) / dt
-        c, w = element_speed(belt, step, j), step[j, RING_ACROSS]
-        t_y, t_z = step[j, MID_T_Y], step[j, MID_T_Z]
-        e[j, V] = step[j, RING_ALONG]
-        slip = step[j, RING_ALONG] - c
-        e[j, RING_SLIP], e[j, RING_FRICTION] = slip, -e[j, RING_IMPULSE] / dt
-        totals[RING_LOSS] -= e[j, RING_IMPULSE] * slip
+        e[j, f.TENSION] = ring.beam.axial_stiffness * mean_strain(length, ring.q[first : first + 8])
+        e[j, f.SADDLE] = abs(saddle_impulse(belt, step, j)) / dt
+        c, w = element_speed(belt, step, j), step[j, b.RING_ACROSS]
+        t_y, t_z = step[j, b.MID_T_Y], step[j, b.MID_T_Z]
+        e[j, f.V] = step[j, b.RING_ALONG]
+        slip = step[j, b.RING_ALONG] - c
+        e[j, f.RING_SLIP], e[j, f.RING_FRICTION] = slip, -e[j, b.RING_IMPULSE] / dt
+        totals[f.RING_LOSS] -= e[j, b.RING_IMPULSE] * slip
 
         slip_m, slip_t = flank_slip(belt, pulleys, e, step, j)
-        grip_m, grip_t = -e[j, FLANK_IMPULSE_M] / dt, -e[j, FLANK_IMPULSE_T] / dt
-        e[j, FLANK_SLIP_M], e[j, FLANK_SLIP_T] = slip_m, slip_t
-        e[j, FLANK_FRICTION_M], e[j, FLANK_FRICTION_T] = grip_m, grip_t
+        grip_m, grip_t = -e[j, b.FLANK_IMPULSE_M] / dt, -e[j, b.FLANK_IMPULSE_T] / dt
+        e[j, f.FLANK_SLIP_M], e[j, f.FLANK_SLIP_T] = slip_m, slip_t
+        e[j, f.FLANK_FRICTION_M], e[j, f.FLANK_FRICTION_T] = grip_m, grip_t
         loss = belt.cosine * belt.cosine * grip_m * slip_m + grip_t * slip_t
-        totals[FLANK_LOSS] += 2.0 * dt * loss
+        totals[f.FLANK_LOSS] += 2.0 * dt * loss
         size = np.hypot(slip_m, slip_t)
-        filtered, _ = remembered(e[j, V_FILTERED], size, belt.friction_memory, dt)
-        e[j, V_FILTERED] = filtered if e[j, FLANK] > 0.0 else size
-        thrust = e[j, FLANK] * belt.cosine + grip_m * belt.sine
-        if e[j, DRIVEN] > 0.0:
+        filtered, _ = remembered(e[j, f.V_FILTERED], size, belt.friction_memory, dt)
+        e[j, f.V_FILTERED] = filtered if e[j, f.FLANK] > 0.0 else size
+        thrust = e[j, f.FLANK] * belt.cosine + grip_m * belt.sine
+        if e[j, f.DRIVEN] > 0.0:
             driven_thrust += thrust
         else:
             driving_thrust += thrust
-            totals[WORK_IN] -= 2.0 * dt * grip_t * step[j, MID_RADIUS] * pulleys[DRIVING_SPEED]
+            totals[f.WORK_IN] -= 2.0 * dt * grip_t * step[j, b.MID_RADIUS] * pulleys[f.DRIVING_SPEED]
 
-        e[j, U_Y], e[j, U_Z], e[j, OMEGA] = c * t_y - w * t_z, c * t_z + w * t_y, step[j, SPIN]
-        e[j, HEADING_Y], e[j, HEADING_Z] = turned(e[j, HEADING_Y], e[j, HEADING_Z], dt * e[j, OMEGA])
-        e[j, PLACE_RATE] = -slip / step[j, MID_STRETCH]
-        e[j, PLACE] = (e[j, PLACE] + dt * e[j, PLACE_RATE]) % around
+        e[j, f.U_Y], e[j, f.U_Z], e[j, f.OMEGA] = c * t_y - w * t_z, c * t_z + w * t_y, step[j, b.SPIN]
+        e[j, f.HEADING_Y], e[j, f.HEADING_Z] = turned(
+            e[j, f.HEADING_Y], e[j, f.HEADING_Z], dt * e[j, f.OMEGA]
+        )
+        e[j, b.PLACE_RATE] = -slip / step[j, b.MID_STRETCH]
+        e[j, b.PLACE] = (e[j, b.PLACE] + dt * e[j, b.PLACE_RATE]) % around
     for j in range(n):
-        e[j, LENGTH] = (e[(j + 1) % n, PLACE] - e[j, PLACE]) % around
+        e[j, f.LENGTH] = (e[(j + 1) % n, b.PLACE] - e[j, b.PLACE]) % around
     for k in range(ring.q.size):
         ring.q[k] += dt * ring.u[k]
-    driving = dt * belt.driving_rate * (inputs[IN_DRIVING_THRUST] - driving_thrust)
-    driving += dt * inputs[IN_DRIVING_SHIFT]
-    driven = dt * belt.driven_rate * (inputs[IN_DRIVEN_THRUST] - driven_thrust)
-    pulleys[DRIVING_RADIUS] += driving
-    pulleys[DRIVEN_RADIUS] += driven
-    totals[TIME] += dt
-    totals[WORK_OUT] += dt * inputs[IN_LOAD] * pulleys[DRIVEN_SPEED]
+    driving = dt * belt.driving_rate * (inputs[f.IN_DRIVING_THRUST] - driving_thrust)
+    driving += dt * inputs[f.IN_DRIVING_SHIFT]
+    driven = dt * belt.driven_rate * (inputs[f.IN_DRIVEN_THRUST] - driven_thrust)
+    pulleys[f.DRIVING_RADIUS] += driving
+    pulleys[f.DRIVEN_RADIUS] += driven
+    totals[f.TIME] += dt
+    totals[f.WORK_OUT] += dt * inputs[f.IN_LOAD] * pulleys[f.DRIVEN_SPEED]
     closing = 2.0 * belt.sine / belt.cosine
-    totals[THRUST_WORK] -= closing * (driving_thrust * driving + driven_thrust * driven)
+    totals[f.THRUST_WORK] -= closing * (driving_thrust * driving + driven_thrust * driven)
 
 
 @kernel
@@ -207,30 +146,30 @@ def _step(belt, proximal, state, work, inputs, dt):
     """One step; CONVERGED, NOT_CONVERGED where a set-valued law does not hold, or NOT_FINITE."""
     ring, e = state.ring, state.elements
     rubs = belt.ring_friction > 0.0 or belt.flank_kinetic > 0.0
-    state.pulleys[DRIVING_SPEED] = inputs[IN_SPEED]
-    state.pulleys[DRIVEN_SPEED] -= dt * inputs[IN_LOAD] / belt.driven_inertia
+    state.pulleys[f.DRIVING_SPEED] = inputs[f.IN_SPEED]
+    state.pulleys[f.DRIVEN_SPEED] -= dt * inputs[f.IN_LOAD] / belt.driven_inertia
     locate(belt, state, work, dt)
     if not _free_speeds(belt, proximal, state, work, dt):
-        return NOT_FINITE
+        return f.NOT_FINITE
     solve(ring.blocks, ring.columns, SIZE)
     _take(state, work)
     solved = True
     if rubs:
         couple(state, work)
         for j in range(e.shape[0]):
-            work.free[j, 0], work.free[j, 1] = work.step[j, RING_ACROSS], work.step[j, RING_ALONG]
+            work.free[j, 0], work.free[j, 1] = work.step[j, b.RING_ACROSS], work.step[j, b.RING_ALONG]
         solved = rub(belt, proximal, state, work)
         solve(ring.blocks, ring.columns, SIZE)
         for j in range(e.shape[0]):
-            work.step[j, RING_ACROSS], work.step[j, RING_ALONG] = work.free[j, 0], work.free[j, 1]
+            work.step[j, b.RING_ACROSS], work.step[j, b.RING_ALONG] = work.free[j, 0], work.free[j, 1]
         _take(state, work)
     _accept(belt, state, work, inputs, dt)
     total = 0.0
     for j in range(e.shape[0]):
-        total += abs(e[j, U_Y]) + abs(e[j, U_Z]) + abs(e[j, OMEGA])
+        total += abs(e[j, f.U_Y]) + abs(e[j, f.U_Z]) + abs(e[j, f.OMEGA])
     if not total < _LARGE:
-        return NOT_FINITE
-    return CONVERGED if solved else NOT_CONVERGED
+        return f.NOT_FINITE
+    return f.CONVERGED if solved else f.NOT_CONVERGED
 
 
 @kernel
@@ -266,11 +205,11 @@ def advance(belt, proximal, state, work, inputs, steps, dt):
         for entry in range(work.inputs.size):
             work.inputs[entry] = inputs[0, entry] + share * (inputs[1, entry] - inputs[0, entry])
         outcome = _step(belt, proximal, state, work, work.inputs, dt)
-        counters[STEPS] += 1
-        counters[IN_A_ROW] = counters[IN_A_ROW] + 1 if outcome == NOT_CONVERGED else 0
-        counters[FAILED_STEPS] += outcome == NOT_CONVERGED
-        if outcome == NOT_FINITE or counters[IN_A_ROW] == proximal.most_failures:
-            counters[STATUS] = outcome
+        counters[f.STEPS] += 1
+        counters[f.IN_A_ROW] = counters[f.IN_A_ROW] + 1 if outcome == f.NOT_CONVERGED else 0
+        counters[f.FAILED_STEPS] += outcome == f.NOT_CONVERGED
+        if outcome == f.NOT_FINITE or counters[f.IN_A_ROW] == proximal.most_failures:
+            counters[f.STATUS] = outcome
             return outcome
-    counters[STATUS] = CONVERGED
-    return CONVERGED
+    counters[f.STATUS] = f.CONVERGED
+    return f.CONVERGED

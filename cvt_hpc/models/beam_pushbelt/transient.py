@@ -8,12 +8,13 @@ from typing import Any
 import numpy as np
 
 from cvt_hpc.kernels import called_alike
-from cvt_hpc.models.beam_pushbelt.belt import CORRECTIONS, Proximal
+from cvt_hpc.models.beam_pushbelt import fields as b
+from cvt_hpc.models.beam_pushbelt.belt import Proximal
 from cvt_hpc.models.beam_pushbelt.parameters import as_pushbelt
 from cvt_hpc.models.beam_pushbelt.start import start, workspace
 from cvt_hpc.models.beam_pushbelt.step import advance
 from cvt_hpc.models.marched import batches_of_one
-from cvt_hpc.models.pushbelt import belt as fields
+from cvt_hpc.models.pushbelt import fields as f
 from cvt_hpc.models.pushbelt import transient as pushbelt
 from cvt_hpc.models.pushbelt.readings import Reading
 from cvt_hpc.models.pushbelt.run import OF_LOSS
@@ -44,11 +45,11 @@ class Transient(pushbelt.Transient):
 
     def _stored_energy(self, found: Reading) -> float:
         e, belt, ring = self._state.elements, self._belt, self._state.ring
-        kinetic = belt.mass * (e[:, [fields.U_Y, fields.U_Z]] ** 2).sum()
-        kinetic += belt.inertia * (e[:, fields.OMEGA] ** 2).sum()
-        kinetic += belt.driven_inertia * self._state.pulleys[fields.DRIVEN_SPEED] ** 2
-        pressed = (e[:, [fields.EDGE, fields.HEAD]] ** 2).sum() / belt.contact_stiffness
-        pressed += 2.0 * (e[:, fields.FLANK] ** 2).sum() / belt.flank_stiffness
+        kinetic = belt.mass * (e[:, [f.U_Y, f.U_Z]] ** 2).sum()
+        kinetic += belt.inertia * (e[:, f.OMEGA] ** 2).sum()
+        kinetic += belt.driven_inertia * self._state.pulleys[f.DRIVEN_SPEED] ** 2
+        pressed = (e[:, [f.EDGE, f.HEAD]] ** 2).sum() / belt.contact_stiffness
+        pressed += 2.0 * (e[:, f.FLANK] ** 2).sum() / belt.flank_stiffness
         parts = range(0, ring.q.size - 3, 5)
         of_ring = sum(sum(energies(ring.beam, ring.q[i : i + 8], ring.u[i : i + 8])) for i in parts)
         return of_ring + 0.5 * float(kinetic + pressed)
@@ -68,7 +69,7 @@ class Transient(pushbelt.Transient):
 
     def counters(self) -> dict[str, int]:
         """Work done so far: steps, sweeps as iterations, unsolved steps, corrections of impulses."""
-        return super().counters() | {"corrections": int(self._state.counters[CORRECTIONS])}
+        return super().counters() | {"corrections": int(self._state.counters[b.CORRECTIONS])}
 
 
 batch = batches_of_one(Transient)

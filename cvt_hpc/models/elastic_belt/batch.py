@@ -9,7 +9,8 @@ from typing import Any, NamedTuple
 import numpy as np
 
 from cvt_hpc.lanes import LaneArray, split
-from cvt_hpc.models.elastic_belt.belt import State, W, belt_constants, initial_state, random_strands
+from cvt_hpc.models.elastic_belt import fields as f
+from cvt_hpc.models.elastic_belt.belt import State, belt_constants, initial_state, random_strands
 from cvt_hpc.models.elastic_belt.explicit import ExplicitWork, explicit_work
 from cvt_hpc.models.elastic_belt.grouping import LANES, lanes
 from cvt_hpc.models.elastic_belt.imex_stations import ImexWork, imex_work
@@ -189,7 +190,7 @@ class Batch:
         if first == plan.kick and not self._disturbed:
             for lane, point in enumerate(self.points):
                 shape = random_strands(plan.mesh, point["disturbance"], point["seed"])
-                self.state.fields.data[:, W, lane] += shape
+                self.state.fields.data[:, f.W, lane] += shape
             derive(self._belt, self.state, self.work.stations)
             self._disturbed = True
         borders = plan.kick, plan.first_judged, self.momentary.first, self.samples

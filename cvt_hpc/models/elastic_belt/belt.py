@@ -13,18 +13,12 @@ from typing import Any, NamedTuple
 
 import numpy as np
 
+from cvt_hpc.models.elastic_belt import fields as f
 from cvt_hpc.models.elastic_belt.bending import bending_bands, bending_load, squared_curvature
 from cvt_hpc.models.elastic_belt.bending_settings import BENDING_DEFAULTS, CURVATURE_TERMS, has_column
 from cvt_hpc.models.elastic_belt.deflection_settings import disc_settings
 from cvt_hpc.models.elastic_belt.grouping import faded_coupling
-from cvt_hpc.models.elastic_belt.pulleys import (
-    DRIVEN_COS,
-    DRIVING_COS,
-    STATES,
-    Pulleys,
-    settled_tilt,
-    with_pulleys,
-)
+from cvt_hpc.models.elastic_belt.pulleys import Pulleys, settled_tilt, with_pulleys
 from cvt_hpc.physics.friction import FrictionLaw, given_law
 from cvt_hpc.physics.geometry import Variator, cell_counts, variator
 from cvt_hpc.physics.sheaves import (
@@ -37,12 +31,6 @@ from cvt_hpc.physics.sheaves import (
 from cvt_hpc.variator import LARGEST_DISPLACEMENT
 from cvt_hpc.variator.measures import Measures, measures, rounded
 from cvt_hpc.vibration.ramped import ramped
-
-FIELDS = ("w", "u", "v_element", "v_ring", "v_filtered", "n_element", "n_ring")
-W, U, V_ELEMENT, V_RING, V_FILTERED, N_ELEMENT, N_RING = range(len(FIELDS))
-SCALARS = ("time", "driven_speed", "driven_position", "layer_work", *STATES)
-TIME, DRIVEN_SPEED, DRIVEN_POSITION, LAYER_WORK = range(4)
-FIRST_STATE = 4  # of the pulleys' states, which are 0 where a pulley does not have them
 
 REGIONS = ("driving arc", "t1", "driven arc", "t2")
 MODES = 5  # half waves along a strand that are resolved
@@ -291,10 +279,10 @@ def initial_state(parameters: Mapping[str, Any], belt: Belt) -> State:
     pull = 2.0 * tangent * p["thrust"] / grid.path.driven_wrap
     w = np.zeros(grid.cell.size)
     arcs = []
-    states = np.zeros(len(STATES))
+    states = np.zeros(len(f.STATES))
     for region, sheave, radius, tilted in (
-        (0, belt.driving, belt.driving_radius, DRIVING_COS),
-        (2, belt.driven, belt.driven_radius, DRIVEN_COS),
+        (0, belt.driving, belt.driving_radius, f.DRIVING_COS),
+        (2, belt.driven, belt.driven_radius, f.DRIVEN_COS),
     ):
         stations = slice(grid.starts[region], grid.starts[region] + sheave.weight.size)
         force = np.full(sheave.weight.size, pull / (2.0 * tangent * radius))
@@ -313,15 +301,15 @@ def initial_state(parameters: Mapping[str, Any], belt: Belt) -> State:
 
     mean = [(weight * w[stations]).sum() / weight.sum() for stations, weight, _ in arcs]
     speed = belt.speed_start * (belt.driving_radius + mean[0])
-    fields = np.zeros((len(FIELDS), grid.cell.size))
-    fields[W] = w
-    fields[V_ELEMENT] = fields[V_RING] = speed
+    fields = np.zeros((len(f.FIELDS), grid.cell.size))
+    fields[f.W] = w
+    fields[f.V_ELEMENT] = fields[f.V_RING] = speed
     length = 1.0 + belt.curvature * 0.5 * (w + np.roll(w, -1))
     ring_length = length + belt.curvature * p["ring_offset"]
     rings = grid.cell @ (1.0 + belt.curvature * p["ring_offset"])
     rings /= 1.0 + p["reference_tension"] / p["ring_stiffness"]
-    fields[N_ELEMENT] = length * (grid.path.path_length - p["play"]) / (grid.cell @ length)
-    fields[N_RING] = ring_length * rings / (grid.cell @ ring_length)
+    fields[f.N_ELEMENT] = length * (grid.path.path_length - p["play"]) / (grid.cell @ length)
+    fields[f.N_RING] = ring_length * rings / (grid.cell @ ring_length)
     scalars = [0.0, speed / (belt.driven_radius + mean[1]), -2.0 * tangent * lift, 0.0]
     return State(fields, np.concatenate([scalars, states]))
 

@@ -31,7 +31,8 @@ import numpy as np
 
 from cvt_hpc.kernels import kernel, merged_kernel
 from cvt_hpc.lanes import absolute, fma, maximum, select
-from cvt_hpc.models.elastic_belt.belt import N_ELEMENT, Belt, W
+from cvt_hpc.models.elastic_belt import fields as f
+from cvt_hpc.models.elastic_belt.belt import Belt
 
 
 @merged_kernel
@@ -88,7 +89,7 @@ def column_forces(
     moment : (N,) array
         Result: M at the stations [N m].
     """
-    n, w = belt.cell.size, fields[W]
+    n, w = belt.cell.size, fields[f.W]
     moment[:] = 0.0
     for c in range(n):
         closed, least = 0.0, np.inf
@@ -105,7 +106,7 @@ def column_forces(
             )
             closed += 0.5 * min(strain, 0.0)
             least = min(strain, least)
-            moment[j] += 0.5 * belt.cell[c] * fields[N_ELEMENT, c] * borne / belt.dual[j]
+            moment[j] += 0.5 * belt.cell[c] * fields[f.N_ELEMENT, c] * borne / belt.dual[j]
         pressed[c] = closed if closed < 0.0 else least
 
 

@@ -24,46 +24,11 @@ from cvt_hpc.lanes import (
     reciprocals,
     select,
 )
-from cvt_hpc.models.elastic_belt.belt import N_ELEMENT, V_ELEMENT, V_FILTERED, V_RING, U, W
-from cvt_hpc.models.elastic_belt.lane_belt import (
-    BELT_SPEED,
-    BENDING_STIFFNESS,
-    COSINE,
-    DRIVEN_CARRY,
-    DRIVEN_CELL,
-    DRIVEN_RADIUS,
-    DRIVING_CARRY,
-    DRIVING_CELL,
-    DRIVING_RADIUS,
-    ELEMENT_DAMPING,
-    ELEMENT_MASS,
-    ELEMENT_STIFFNESS,
-    FORGET,
-    LAYER_WORK,
-    MASS,
-    RING_DAMPING,
-    RING_FRICTION,
-    RING_MASS,
-    RING_OFFSET,
-    RING_RELIEF,
-    RING_STIFFNESS,
-    SINE,
-    LaneBelt,
-    LaneState,
-)
+from cvt_hpc.models.elastic_belt import fields as f
+from cvt_hpc.models.elastic_belt import lane_fields as lf
+from cvt_hpc.models.elastic_belt.lane_belt import LaneBelt, LaneState
 from cvt_hpc.models.elastic_belt.lane_column import across_by_curvature, column_across
 from cvt_hpc.models.elastic_belt.lane_forces import (
-    COEFFICIENT,
-    EPS_0,
-    EPS_1,
-    FACTOR,
-    FIELDS_OF_FORCES,
-    FORCE,
-    PER_SPEED,
-    RING_FACTOR,
-    SHORT_0,
-    SLIDING_R,
-    SLIDING_T,
     arc_sliding,
     derive,
     lane_acceleration,
@@ -81,8 +46,8 @@ from cvt_hpc.models.elastic_belt.pulley_step import advance_pulleys
 from cvt_hpc.physics.flank import flank_shares
 
 # fields of ExplicitWork.stations, after those of `lane_forces`
-SLOPE, DU, DV_0, DV_1, DAMPED_0, DAMPED_1 = range(FIELDS_OF_FORCES, FIELDS_OF_FORCES + 6)
-FIELDS_OF_WORK = FIELDS_OF_FORCES + 6
+SLOPE, DU, DV_0, DV_1, DAMPED_0, DAMPED_1 = range(lf.FIELDS_OF_FORCES, lf.FIELDS_OF_FORCES + 6)
+FIELDS_OF_WORK = lf.FIELDS_OF_FORCES + 6
 
 
 class ExplicitWork(NamedTuple):
@@ -132,19 +97,19 @@ def _accelerate(belt: LaneBelt, state: LaneState, stations: LaneArray, step: flo
     The torque taken from the driving pulley, where that is free, and the moment on the driven one [N m].
     """
     n, fields, c = state.fields.rows, state.fields, belt.constants
-    sine, cosine, offset = c[0, SINE], c[0, COSINE], c[0, RING_OFFSET]
-    per_cosine, radius, driving_radius = 1.0 / cosine, c[0, DRIVEN_RADIUS], c[0, DRIVING_RADIUS]
-    element_stiffness, ring_stiffness = c[0, ELEMENT_STIFFNESS], c[0, RING_STIFFNESS]
-    element_damping, ring_damping = c[0, ELEMENT_DAMPING], c[0, RING_DAMPING]
+    sine, cosine, offset = c[0, lf.SINE], c[0, lf.COSINE], c[0, lf.RING_OFFSET]
+    per_cosine, radius, driving_radius = 1.0 / cosine, c[0, lf.DRIVEN_RADIUS], c[0, lf.DRIVING_RADIUS]
+    element_stiffness, ring_stiffness = c[0, lf.ELEMENT_STIFFNESS], c[0, lf.RING_STIFFNESS]
+    element_damping, ring_damping = c[0, lf.ELEMENT_DAMPING], c[0, lf.RING_DAMPING]
     speed_share = lane_speed_share(belt, state.time[0], sine)
-    mass, ring_mass, belt_speed = c[0, MASS], c[0, RING_MASS], speed_share * c[0, BELT_SPEED]
-    bending, ring_friction = c[0, BENDING_STIFFNESS], c[0, RING_FRICTION]
-    ring_relief = c[0, RING_RELIEF] * speed_share * speed_share
+    mass, ring_mass, belt_speed = c[0, lf.MASS], c[0, lf.RING_MASS], speed_share * c[0, lf.BELT_SPEED]
+    bending, ring_friction = c[0, lf.BENDING_STIFFNESS], c[0, lf.RING_FRICTION]
+    ring_relief = c[0, lf.RING_RELIEF] * speed_share * speed_share
     acceleration = lane_acceleration(belt, state.time[0], step)
     centrifugal, gyroscopic = mass * belt_speed * belt_speed, 2.0 * mass * belt_speed
     damping = lane_damping(belt, state.time[0])
-    mobility, element_mobility, ring_mobility = step / mass, step / c[0, ELEMENT_MASS], step / ring_mass
-    masses = c[0, ELEMENT_MASS], ring_mass
+    mobility, element_mobility, ring_mobility = step / mass, step / c[0, lf.ELEMENT_MASS], step / ring_mass
+    masses = c[0, lf.ELEMENT_MASS], ring_mass
     rise, zero = acceleration * step, like(0.0, sine)
     taken = moment = net_left = ring_left = stress_left_0 = stress_left_1 = zero
     gap_left_0 = gap_left_1 = zero
@@ -152,12 +117,12 @@ def _accelerate(belt: LaneBelt, state: LaneState, stations: LaneArray, step: flo
         # the last cell first, which is behind row 0
         j = k if k >= 0 else n - 1
         per_cell = belt.per_cell[j]
-        v0, v1 = fields[j, V_ELEMENT], fields[j, V_RING]
+        v0, v1 = fields[j, f.V_ELEMENT], fields[j, f.V_RING]
         push = element_stiffness * minimum(pressed_strain(belt, state, stations, j), 0.0)
-        ring_right = ring_stiffness * stations[j, EPS_1]
+        ring_right = ring_stiffness * stations[j, lf.EPS_1]
         net_right = push + (ring_right - centrifugal)
-        gap_0 = (ahead(fields, j, V_ELEMENT) - v0) * per_cell
-        gap_1 = (ahead(fields, j, V_RING) - v1) * per_cell
+        gap_0 = (ahead(fields, j, f.V_ELEMENT) - v0) * per_cell
+        gap_1 = (ahead(fields, j, f.V_RING) - v1) * per_cell
         # elements that are apart have no damper, and it never makes them pull
         damped_0 = select(push < 0.0, minimum(element_damping * gap_0, -push), 0.0)
         damped_1 = ring_damping * gap_1
@@ -165,10 +130,10 @@ def _accelerate(belt: LaneBelt, state: LaneState, stations: LaneArray, step: flo
         if k >= 0:
             stations[j, DAMPED_0], stations[j, DAMPED_1] = damped_0, damped_1
             span, per_dual, share = belt.per_span[j], belt.per_dual[j], belt.arc_share[j]
-            u, full_speed = fields[j, U], belt_speed + v0
-            slope = (ahead(fields, j, W) - behind(fields, j, W)) * span
+            u, full_speed = fields[j, f.U], belt_speed + v0
+            slope = (ahead(fields, j, f.W) - behind(fields, j, f.W)) * span
             across = lane_transverse(belt, fields, j, net_left, net_right, bending)
-            across = fma(-gyroscopic, (ahead(fields, j, U) - behind(fields, j, U)) * span, across)
+            across = fma(-gyroscopic, (ahead(fields, j, f.U) - behind(fields, j, f.U)) * span, across)
             across = fma(-acceleration * mass, slope, across)
             if belt.has_column:
                 across += column_across(belt, state, j)
@@ -182,20 +147,23 @@ def _accelerate(belt: LaneBelt, state: LaneState, stations: LaneArray, step: flo
                 longer = fma(offset, belt.ring_curvature[j], 1.0)
                 lever = fma(offset, belt.arc_curvature[j], 1.0)
                 grip = ring_grip(belt, j, ring_left, ring_right, ring_relief * longer, ring_friction)
-                drag = grip * stations[j, RING_FACTOR]
-                mu, per_speed = stations[j, COEFFICIENT] * stations[j, FACTOR], stations[j, PER_SPEED]
-                climb = stations[j, SLIDING_R] * per_cosine * per_speed
+                drag = grip * stations[j, lf.RING_FACTOR]
+                mu, per_speed = (
+                    stations[j, lf.COEFFICIENT] * stations[j, lf.FACTOR],
+                    stations[j, lf.PER_SPEED],
+                )
+                climb = stations[j, lf.SLIDING_R] * per_cosine * per_speed
                 axial_share, radial_share = flank_shares(mu, climb, sine, cosine)
                 per_normal, per_ring = reciprocals(axial_share, longer * ring_mass)
-                twice_normal = (2.0 * share) * stations[j, FORCE] * per_normal
+                twice_normal = (2.0 * share) * stations[j, lf.FORCE] * per_normal
                 outward = fma(twice_normal, radial_share, outward)
-                tangential = -twice_normal * (mu * (stations[j, SLIDING_T] * per_speed))
+                tangential = -twice_normal * (mu * (stations[j, lf.SLIDING_T] * per_speed))
                 is_driven = belt.on_driven[j] > 0.5
                 if anywhere(is_driven):
-                    lever_arm = select(is_driven, (radius + fields[j, W]) * belt.dual[j], zero)
+                    lever_arm = select(is_driven, (radius + fields[j, f.W]) * belt.dual[j], zero)
                     moment = fma(-tangential, lever_arm, moment)
                 if belt.is_free:
-                    lever_arm = select(is_driven, zero, (driving_radius + fields[j, W]) * belt.dual[j])
+                    lever_arm = select(is_driven, zero, (driving_radius + fields[j, f.W]) * belt.dual[j])
                     taken = fma(tangential, lever_arm, taken)
                 along_element += fma(-lever, drag, tangential)
                 along_ring = (along_ring + drag) * (per_ring * step)
@@ -228,8 +196,13 @@ def _advance_layers(belt: LaneBelt, state: LaneState, stations: LaneArray, step:
     belt_speed = lane_belt_speed(belt, state.time[0])
     work_done = like(0.0, belt_speed)
     for layer in range(2):
-        v_row, dv_row, eps_row, n_row = V_ELEMENT + layer, DV_0 + layer, EPS_0 + layer, N_ELEMENT + layer
-        short_row, damped_row = SHORT_0 + layer, DAMPED_0 + layer
+        v_row, dv_row, eps_row, n_row = (
+            f.V_ELEMENT + layer,
+            DV_0 + layer,
+            lf.EPS_0 + layer,
+            f.N_ELEMENT + layer,
+        )
+        short_row, damped_row = lf.SHORT_0 + layer, DAMPED_0 + layer
         # at the station ahead of a cell: increment, speed, and the flux of content less the belt speed
         dv_b = stations[0, dv_row]
         v_b = fields[0, v_row] + dv_b
@@ -244,37 +217,37 @@ def _advance_layers(belt: LaneBelt, state: LaneState, stations: LaneArray, step:
             fields[j, n_row] = fma(step * belt.per_cell[j], flux - flux_b, fields[j, n_row])
             fields[j, v_row] = v
             dv_b, v_b, flux_b = dv, v, flux
-    scalars[0, LAYER_WORK] = scalars[0, LAYER_WORK] + around(work_done) * step
+    scalars[0, lf.LAYER_WORK] = scalars[0, lf.LAYER_WORK] + around(work_done) * step
 
 
 @kernel
 def _advance_across(belt: LaneBelt, state: LaneState, stations: LaneArray, step: float) -> None:
     """Transverse velocity, memory by the sliding speeds of the new velocities, and displacement."""
     n, fields, c = state.fields.rows, state.fields, belt.constants
-    speed_share = lane_speed_share(belt, state.time[0], c[0, BELT_SPEED])
-    per_cosine, belt_speed = 1.0 / c[0, COSINE], speed_share * c[0, BELT_SPEED]
-    forget, pulleys = step * c[0, FORGET], lane_pulleys(belt, speed_share, state.scalars)
+    speed_share = lane_speed_share(belt, state.time[0], c[0, lf.BELT_SPEED])
+    per_cosine, belt_speed = 1.0 / c[0, lf.COSINE], speed_share * c[0, lf.BELT_SPEED]
+    forget, pulleys = step * c[0, lf.FORGET], lane_pulleys(belt, speed_share, state.scalars)
     carries = (
-        step * lane_carry(belt, DRIVING_CELL, DRIVING_CARRY, belt_speed),
-        step * lane_carry(belt, DRIVEN_CELL, DRIVEN_CARRY, belt_speed),
+        step * lane_carry(belt, lf.DRIVING_CELL, lf.DRIVING_CARRY, belt_speed),
+        step * lane_carry(belt, lf.DRIVEN_CELL, lf.DRIVEN_CARRY, belt_speed),
     )
     # an arc's second station takes the new value of its first, which may be the last of the part behind
     last = n - 1
-    u = fields[last, U] + stations[last, DU]
+    u = fields[last, f.U] + stations[last, DU]
     speed = _sliding_speed(belt, fields, stations, last, pulleys, per_cosine, belt_speed, u)
-    before = from_behind(select(belt.enters[last] > 0.5, speed, fields[last, V_FILTERED]))
+    before = from_behind(select(belt.enters[last] > 0.5, speed, fields[last, f.V_FILTERED]))
     for j in range(n):
-        u, w = fields[j, U] + stations[j, DU], fields[j, W]
+        u, w = fields[j, f.U] + stations[j, DU], fields[j, f.W]
         share = belt.arc_share[j]
         if belt.memory and anywhere(share > 0.0):
-            remembered = fields[j, V_FILTERED]
+            remembered = fields[j, f.V_FILTERED]
             speed = _sliding_speed(belt, fields, stations, j, pulleys, per_cosine, belt_speed, u)
             carry = select(belt.on_driven[j] > 0.5, carries[1], carries[0])
             change = fma(carry, before - remembered, forget * (speed - remembered))
             filtered = select(belt.enters[j] > 0.5, speed, remembered + change)
-            fields[j, V_FILTERED] = select(share > 0.0, filtered, 0.0)
+            fields[j, f.V_FILTERED] = select(share > 0.0, filtered, 0.0)
             before = select(belt.enters[j] > 0.5, speed, remembered)
-        fields[j, U], fields[j, W] = u, fma(step, u, w)
+        fields[j, f.U], fields[j, f.W] = u, fma(step, u, w)
 
 
 @merged_kernel
@@ -282,7 +255,7 @@ def _sliding_speed(
     belt: LaneBelt, fields: LaneArray, stations: LaneArray, j: int, pulleys, per_cosine, belt_speed, u
 ):
     """Sliding speed of station j of an arc at the new velocities [m/s], `u` the transverse one."""
-    v_element = fields[j, V_ELEMENT]
+    v_element = fields[j, f.V_ELEMENT]
     v_radial = fma(belt_speed + v_element, stations[j, SLOPE], u)
-    speed, along = arc_sliding(belt, j, pulleys, per_cosine, v_radial, v_element, fields[j, W])
+    speed, along = arc_sliding(belt, j, pulleys, per_cosine, v_radial, v_element, fields[j, f.W])
     return speed

@@ -8,20 +8,12 @@ from typing import Any
 import numpy as np
 
 from cvt_hpc.kernels import kernel
+from cvt_hpc.models.elastic_belt import fields as f
+from cvt_hpc.models.elastic_belt import lane_fields as lf
 from cvt_hpc.models.elastic_belt import one_system
-from cvt_hpc.models.elastic_belt.belt import (
-    V_ELEMENT,
-    V_RING,
-    Belt,
-    Mesh,
-    State,
-    W,
-    belt_constants,
-    initial_state,
-    random_strands,
-)
+from cvt_hpc.models.elastic_belt.belt import Belt, Mesh, State, belt_constants, initial_state, random_strands
 from cvt_hpc.models.elastic_belt.column import pressed_strains
-from cvt_hpc.models.elastic_belt.lane_belt import LAYER_WORK, put_lane
+from cvt_hpc.models.elastic_belt.lane_belt import put_lane
 from cvt_hpc.models.elastic_belt.one_lane_run import OneLaneRun
 from cvt_hpc.models.elastic_belt.rhs import strains
 from cvt_hpc.models.elastic_belt.ring_settings import layer_count
@@ -154,7 +146,7 @@ class GeneralTransient(Marched, OneLaneRun):
     def _disturb(self) -> None:
         """Give the strands their random displacement, once the start-up's damping has gone."""
         p, state = self.parameters, self.state
-        state.fields[W] += random_strands(self.mesh, p["disturbance"], p["seed"])
+        state.fields[f.W] += random_strands(self.mesh, p["disturbance"], p["seed"])
         self.marching.y[:] = self._form.pack(state)
         self._disturbed = True
 
@@ -188,7 +180,7 @@ class GeneralTransient(Marched, OneLaneRun):
         put_lane(lane.fields.data, lane.scalars.data, 0, self.belt, state)
         lane.time[0] = (self.done + 1) * self.interval
         # a general stepper knows nothing of dampers: their work is taken from the state, as over the interval
-        lane.scalars.data[0, LAYER_WORK] = damper_power(self.belt, state) * self.interval
+        lane.scalars.data[0, lf.LAYER_WORK] = damper_power(self.belt, state) * self.interval
         outcome = self._sample_lane()
         self._rows.data[self.done, -1, 0] = np.nan  # its steps are not seen here: no step_ripple
         self.done += int(outcome == Outcome.OK)
@@ -204,7 +196,7 @@ def damper_power(belt: Belt, state: State) -> float:
     pressed = pressed_strains(belt, state.fields, eps[0])
     power = 0.0
     for layer in range(2):
-        v = state.fields[V_ELEMENT + layer]
+        v = state.fields[f.V_ELEMENT + layer]
         damper = belt.ring_damping if layer else belt.element_damping
         for c in range(n):
             closing = v[c + 1 if c < n - 1 else 0] - v[c]
@@ -216,7 +208,7 @@ def damper_power(belt: Belt, state: State) -> float:
     for k in range(FIRST_LAYER, (FIRST_LAYER + state.fields.shape[0]) // 2):
         # beside the transport by the layers' mean speed
         share = 2.0 / (state.fields.shape[0] - FIRST_LAYER)
-        v = state.fields[k] - state.fields[V_RING]
+        v = state.fields[k] - state.fields[f.V_RING]
         for c in range(n):
             closing = v[c + 1 if c < n - 1 else 0] - v[c]
             power += share * belt.ring_damping * closing * closing / belt.cell[c]

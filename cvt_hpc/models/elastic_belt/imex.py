@@ -20,49 +20,13 @@ from __future__ import annotations
 
 from cvt_hpc.kernels import kernel
 from cvt_hpc.lanes import anywhere, around, behind, decay, fma, from_ahead, like, minimum, select
-from cvt_hpc.models.elastic_belt.belt import N_ELEMENT, N_RING, V_ELEMENT, V_FILTERED, V_RING, U, W
-from cvt_hpc.models.elastic_belt.imex_stations import (
-    DV_0,
-    DV_1,
-    FLANK,
-    FLANK_CROSS,
-    FLANK_SLOPE,
-    LAG,
-    LINK_0,
-    MEETING,
-    PUSH,
-    REVERSING,
-    RING_REVERSING,
-    SLOPE,
-    ImexWork,
-    assemble,
-)
+from cvt_hpc.models.elastic_belt import fields as f
+from cvt_hpc.models.elastic_belt import lane_fields as lf
+from cvt_hpc.models.elastic_belt.imex_stations import ImexWork, assemble
 from cvt_hpc.models.elastic_belt.imex_system import TURNS_BACK, eliminate, substitute
-from cvt_hpc.models.elastic_belt.lane_belt import (
-    BELT_SPEED,
-    COSINE,
-    DRIVEN_CARRY,
-    DRIVEN_CELL,
-    DRIVEN_RADIUS,
-    DRIVING_CARRY,
-    DRIVING_CELL,
-    DRIVING_RADIUS,
-    ELEMENT_DAMPING,
-    ELEMENT_STIFFNESS,
-    FORGET,
-    LAYER_WORK,
-    RING_DAMPING,
-    RING_OFFSET,
-    SPEED,
-    LaneBelt,
-    LaneState,
-)
+from cvt_hpc.models.elastic_belt.lane_belt import LaneBelt, LaneState
 from cvt_hpc.models.elastic_belt.lane_column import foresee_column, lane_column
 from cvt_hpc.models.elastic_belt.lane_forces import (
-    EPS_0,
-    EPS_1,
-    SHORT_0,
-    SHORT_1,
     advance_discs,
     arc_sliding,
     cell_strains,
@@ -95,7 +59,7 @@ def step_imex(belt: LaneBelt, state: LaneState, work: ImexWork, step: float) -> 
     lane_sliding(belt, state, stations)
     assemble(belt, state, work, step, False)
     if belt.has_column:
-        foresee_column(belt, state, stations, PUSH, step)
+        foresee_column(belt, state, stations, lf.PUSH, step)
     for attempt in range(MOST_PASSES):
         eliminate(belt, state, work, step, attempt > 0)
         found = substitute(belt, state, work, step)
@@ -107,14 +71,14 @@ def step_imex(belt: LaneBelt, state: LaneState, work: ImexWork, step: float) -> 
         if found & TURNS_BACK:
             assemble(belt, state, work, step, True)
             if belt.has_column:
-                foresee_column(belt, state, stations, PUSH, step)
+                foresee_column(belt, state, stations, lf.PUSH, step)
     taken, moment = advance_belt(belt, state, work, step)
     advance_pulleys(belt, state, taken, moment, step)
     state.time[0] += step
     advance_discs(belt, state, step)
     lane_contact_forces(belt, state, stations)
     if belt.has_column:
-        lane_column(belt, state, stations, EPS_0)
+        lane_column(belt, state, stations, lf.EPS_0)
 
 
 @kernel
@@ -122,7 +86,7 @@ def forget(work: ImexWork) -> None:
     """Clear the marks of repeated parts of a step."""
     stations = work.stations
     for j in range(stations.rows):
-        stations[j, REVERSING] = stations[j, RING_REVERSING] = stations[j, MEETING] = 0.0
+        stations[j, lf.REVERSING] = stations[j, lf.RING_REVERSING] = stations[j, lf.MEETING] = 0.0
 
 
 @kernel
@@ -132,84 +96,97 @@ def advance_belt(belt: LaneBelt, state: LaneState, work: ImexWork, step: float):
     The torque taken from the driving pulley, where that is free, and the moment on the driven one [N m].
     """
     n, fields, stations, c = state.fields.rows, state.fields, work.stations, belt.constants
-    per_cosine = 1.0 / c[0, COSINE]
-    speed_share = lane_speed_share(belt, state.time[0], c[0, BELT_SPEED])
-    belt_speed, forget, offset = speed_share * c[0, BELT_SPEED], c[0, FORGET], c[0, RING_OFFSET]
-    stiffness, damper_0, damper_1 = c[0, ELEMENT_STIFFNESS], c[0, ELEMENT_DAMPING], c[0, RING_DAMPING]
-    driven_speed, radius, driving_radius = state.scalars[0, SPEED], c[0, DRIVEN_RADIUS], c[0, DRIVING_RADIUS]
+    per_cosine = 1.0 / c[0, lf.COSINE]
+    speed_share = lane_speed_share(belt, state.time[0], c[0, lf.BELT_SPEED])
+    belt_speed, forget, offset = speed_share * c[0, lf.BELT_SPEED], c[0, lf.FORGET], c[0, lf.RING_OFFSET]
+    stiffness, damper_0, damper_1 = (
+        c[0, lf.ELEMENT_STIFFNESS],
+        c[0, lf.ELEMENT_DAMPING],
+        c[0, lf.RING_DAMPING],
+    )
+    driven_speed, radius, driving_radius = (
+        state.scalars[0, lf.SPEED],
+        c[0, lf.DRIVEN_RADIUS],
+        c[0, lf.DRIVING_RADIUS],
+    )
     pulleys = lane_pulleys(belt, speed_share, state.scalars)
     zero, moment, taken = like(0.0, forget), like(0.0, driven_speed), like(0.0, driven_speed)
     carries = (
-        lane_carry(belt, DRIVING_CELL, DRIVING_CARRY, belt_speed),
-        lane_carry(belt, DRIVEN_CELL, DRIVEN_CARRY, belt_speed),
+        lane_carry(belt, lf.DRIVING_CELL, lf.DRIVING_CARRY, belt_speed),
+        lane_carry(belt, lf.DRIVEN_CELL, lf.DRIVEN_CARRY, belt_speed),
     )
     rates = carries[0] + forget, carries[1] + forget
     per_rates = 1.0 / rates[0], 1.0 / rates[1]
     kept = decay(rates[0] * step), decay(rates[1] * step)
-    last_filtered = behind(fields, 0, V_FILTERED)
+    last_filtered = behind(fields, 0, f.V_FILTERED)
     # at the station ahead of a cell: speeds, increments, fluxes of content less the belt speed, displacement
-    v0_b, dv0_b, v1_b, dv1_b = fields[0, V_ELEMENT], stations[0, DV_0], fields[0, V_RING], stations[0, DV_1]
-    first_0 = fma(-belt_speed, behind(stations, 0, EPS_0), v0_b + dv0_b) * behind(stations, 0, SHORT_0)
-    first_1 = fma(-belt_speed, behind(stations, 0, EPS_1), v1_b + dv1_b) * behind(stations, 0, SHORT_1)
-    w_b = fma(step, fields[0, U] + fma(-stations[0, LAG], dv0_b, stations[0, PUSH]), fields[0, W])
+    v0_b, dv0_b, v1_b, dv1_b = (
+        fields[0, f.V_ELEMENT],
+        stations[0, lf.DV_0],
+        fields[0, f.V_RING],
+        stations[0, lf.DV_1],
+    )
+    first_0 = fma(-belt_speed, behind(stations, 0, lf.EPS_0), v0_b + dv0_b) * behind(stations, 0, lf.SHORT_0)
+    first_1 = fma(-belt_speed, behind(stations, 0, lf.EPS_1), v1_b + dv1_b) * behind(stations, 0, lf.SHORT_1)
+    w_b = fma(step, fields[0, f.U] + fma(-stations[0, lf.LAG], dv0_b, stations[0, lf.PUSH]), fields[0, f.W])
     v0_b, dv0_b, flux0_b = from_ahead(v0_b), from_ahead(dv0_b), from_ahead(first_0)
     v1_b, dv1_b, flux1_b = from_ahead(v1_b), from_ahead(dv1_b), from_ahead(first_1)
     w_b = from_ahead(w_b)
     work_done = zero
     for j in range(n - 1, -1, -1):
         per_cell = belt.per_cell[j]
-        v0, dv0, eps = fields[j, V_ELEMENT], stations[j, DV_0], pressed_strain(belt, state, stations, j)
-        v1, dv1 = fields[j, V_RING], stations[j, DV_1]
+        v0, dv0, eps = fields[j, f.V_ELEMENT], stations[j, lf.DV_0], pressed_strain(belt, state, stations, j)
+        v1, dv1 = fields[j, f.V_RING], stations[j, lf.DV_1]
         new_0, new_1 = v0 + dv0, v1 + dv1
         flux_0, flux_1 = first_0, first_1
         if j > 0:
-            flux_0 = fma(-belt_speed, stations[j - 1, EPS_0], new_0) * stations[j - 1, SHORT_0]
-            flux_1 = fma(-belt_speed, stations[j - 1, EPS_1], new_1) * stations[j - 1, SHORT_1]
+            flux_0 = fma(-belt_speed, stations[j - 1, lf.EPS_0], new_0) * stations[j - 1, lf.SHORT_0]
+            flux_1 = fma(-belt_speed, stations[j - 1, lf.EPS_1], new_1) * stations[j - 1, lf.SHORT_1]
         closing, change = v0_b - v0, dv0_b - dv0
         viscous = damper_0 * per_cell * closing
         damped = fma(damper_0 * per_cell, change, viscous)
         # the remaining push beyond the length at rest stores nothing: all of it is damping
         damped = select(eps > 0.0, minimum(fma(stiffness, eps, damped), 0.0), damped)
         damped = select(viscous > -stiffness * eps, -stiffness * minimum(eps, 0.0), damped)
-        damped = select(stations[j, LINK_0] > 0.0, damped, 0.0)
+        damped = select(stations[j, lf.LINK_0] > 0.0, damped, 0.0)
         work_done = fma(damped, fma(0.5, change, closing), work_done)
         closing, change = v1_b - v1, dv1_b - dv1
         damped = damper_1 * per_cell * (closing + change)
         work_done = fma(damped, fma(0.5, change, closing), work_done)
-        more_0 = fma(step * per_cell, flux_0 - flux0_b, fields[j, N_ELEMENT])
-        more_1 = fma(step * per_cell, flux_1 - flux1_b, fields[j, N_RING])
-        fields[j, V_ELEMENT], fields[j, V_RING] = new_0, new_1
-        fields[j, N_ELEMENT], fields[j, N_RING] = more_0, more_1
+        more_0 = fma(step * per_cell, flux_0 - flux0_b, fields[j, f.N_ELEMENT])
+        more_1 = fma(step * per_cell, flux_1 - flux1_b, fields[j, f.N_RING])
+        fields[j, f.V_ELEMENT], fields[j, f.V_RING] = new_0, new_1
+        fields[j, f.N_ELEMENT], fields[j, f.N_RING] = more_0, more_1
         v0_b, dv0_b, flux0_b, v1_b, dv1_b, flux1_b = v0, dv0, flux_0, v1, dv1, flux_1
 
-        share, du, w = belt.arc_share[j], stations[j, PUSH], fields[j, W]
+        share, du, w = belt.arc_share[j], stations[j, lf.PUSH], fields[j, f.W]
         if anywhere(share > 0.0):
-            du = fma(-stations[j, LAG], dv0, du)
-        u = fields[j, U] + du
+            du = fma(-stations[j, lf.LAG], dv0, du)
+        u = fields[j, f.U] + du
         if anywhere(share > 0.0):
             is_driven = belt.on_driven[j] > 0.5
             if belt.is_free or anywhere(is_driven):
-                slopes = fma(stations[j, FLANK_SLOPE], dv0, stations[j, FLANK_CROSS] * du)
+                slopes = fma(stations[j, lf.FLANK_SLOPE], dv0, stations[j, lf.FLANK_CROSS] * du)
                 here = select(is_driven, radius, driving_radius)
-                tangential = (stations[j, FLANK] - slopes) * (belt.dual[j] * (here + w))
+                tangential = (stations[j, lf.FLANK] - slopes) * (belt.dual[j] * (here + w))
                 moment = moment - like(select(is_driven, tangential, zero), moment)
                 if belt.is_free:
                     # beside an arc the values are of an earlier step
                     tangential = select(share > 0.0, tangential, zero)
                     taken = taken + like(select(is_driven, zero, tangential), taken)
             if belt.memory:
-                v_radial = fma(belt_speed + new_0, stations[j, SLOPE], u)
+                v_radial = fma(belt_speed + new_0, stations[j, lf.SLOPE], u)
                 speed, along = arc_sliding(belt, j, pulleys, per_cosine, v_radial, new_0, w)
-                before = fields[j - 1, V_FILTERED] if j > 0 else last_filtered
+                before = fields[j - 1, f.V_FILTERED] if j > 0 else last_filtered
                 target = fma(select(is_driven, carries[1], carries[0]), before, forget * speed)
                 target = target * select(is_driven, per_rates[1], per_rates[0])
                 keep = select(is_driven, kept[1], kept[0])
-                filtered = fma(fields[j, V_FILTERED] - target, keep, target)
+                filtered = fma(fields[j, f.V_FILTERED] - target, keep, target)
                 filtered = select(belt.enters[j] > 0.5, speed, filtered)
-                fields[j, V_FILTERED] = select(share > 0.0, filtered, 0.0)
+                fields[j, f.V_FILTERED] = select(share > 0.0, filtered, 0.0)
         w = fma(step, u, w)
-        fields[j, U], fields[j, W] = u, w
+        fields[j, f.U], fields[j, f.W] = u, w
         cell_strains(belt, stations, j, w, w_b, more_0, more_1, offset)
         w_b = w
-    state.scalars[0, LAYER_WORK] = state.scalars[0, LAYER_WORK] + around(like(work_done, moment)) * step
+    state.scalars[0, lf.LAYER_WORK] = state.scalars[0, lf.LAYER_WORK] + around(like(work_done, moment)) * step
     return around(taken), around(moment)

@@ -21,36 +21,11 @@ from cvt_hpc.lanes import (
     reciprocals,
     select,
 )
-from cvt_hpc.models.elastic_belt.belt import V_ELEMENT, V_RING, U, W
-from cvt_hpc.models.elastic_belt.lane_belt import (
-    BELT_SPEED,
-    BENDING_STIFFNESS,
-    COSINE,
-    ELEMENT_MASS,
-    ELEMENT_STIFFNESS,
-    FRICTION_SPEED,
-    MASS,
-    RING_FRICTION,
-    RING_FRICTION_SPEED,
-    RING_MASS,
-    RING_OFFSET,
-    RING_RELIEF,
-    RING_STIFFNESS,
-    SINE,
-    LaneBelt,
-    LaneState,
-)
+from cvt_hpc.models.elastic_belt import fields as f
+from cvt_hpc.models.elastic_belt import lane_fields as lf
+from cvt_hpc.models.elastic_belt.lane_belt import LaneBelt, LaneState
 from cvt_hpc.models.elastic_belt.lane_column import across_by_curvature, column_across
 from cvt_hpc.models.elastic_belt.lane_forces import (
-    COEFFICIENT,
-    EPS_1,
-    FACTOR,
-    FIELDS_OF_FORCES,
-    FORCE,
-    PER_SPEED,
-    RING_FACTOR,
-    SADDLE,
-    SLIDING_T,
     lane_acceleration,
     lane_damping,
     lane_speed_share,
@@ -60,13 +35,6 @@ from cvt_hpc.models.elastic_belt.lane_forces import (
     ring_grip,
 )
 from cvt_hpc.physics.flank import flank_shares
-
-# fields of ImexWork.stations, after those of `lane_forces`
-PUSH, LAG, SLOPE, FLANK, FLANK_SLOPE, FLANK_CROSS = range(FIELDS_OF_FORCES, 23)
-REVERSING, RING_REVERSING, MEETING, AHEAD = range(23, 27)
-D_00, D_01, D_11, Y_0, Y_1 = range(27, 32)
-I_00, I_01, I_11, DV_0, DV_1, G_00, G_01, G_10, G_11, LINK_0, LINK_1 = range(32, 43)
-FIELDS_OF_WORK = 43
 
 
 class ImexWork(NamedTuple):
@@ -91,7 +59,7 @@ class ImexWork(NamedTuple):
 def imex_work(state: LaneState) -> ImexWork:
     """Work space for a state; `derive` has to be called before the first step."""
     rows, _, lanes = state.fields.data.shape
-    return ImexWork(LaneArray(rows, FIELDS_OF_WORK, lanes, state.fields.data.dtype))
+    return ImexWork(LaneArray(rows, lf.FIELDS_OF_WORK, lanes, state.fields.data.dtype))
 
 
 @merged_kernel
@@ -118,15 +86,20 @@ def assemble(belt: LaneBelt, state: LaneState, work: ImexWork, step: float, agai
     """
     n, fields, stations, c = state.fields.rows, state.fields, work.stations, belt.constants
     per_step = 1.0 / step
-    sine, cosine, width = c[0, SINE], c[0, COSINE], c[0, FRICTION_SPEED]
+    sine, cosine, width = c[0, lf.SINE], c[0, lf.COSINE], c[0, lf.FRICTION_SPEED]
     per_cosine, per_width = 1.0 / cosine, 1.0 / width
-    element_stiffness, ring_stiffness = c[0, ELEMENT_STIFFNESS], c[0, RING_STIFFNESS]
-    element_mass, ring_mass, mass, offset = c[0, ELEMENT_MASS], c[0, RING_MASS], c[0, MASS], c[0, RING_OFFSET]
+    element_stiffness, ring_stiffness = c[0, lf.ELEMENT_STIFFNESS], c[0, lf.RING_STIFFNESS]
+    element_mass, ring_mass, mass, offset = (
+        c[0, lf.ELEMENT_MASS],
+        c[0, lf.RING_MASS],
+        c[0, lf.MASS],
+        c[0, lf.RING_OFFSET],
+    )
     speed_share = lane_speed_share(belt, state.time[0], sine)
-    belt_speed, bending = speed_share * c[0, BELT_SPEED], c[0, BENDING_STIFFNESS]
+    belt_speed, bending = speed_share * c[0, lf.BELT_SPEED], c[0, lf.BENDING_STIFFNESS]
     acceleration = lane_acceleration(belt, state.time[0], step)
-    ring_friction, per_ring_width = c[0, RING_FRICTION], 1.0 / c[0, RING_FRICTION_SPEED]
-    ring_relief = c[0, RING_RELIEF] * speed_share * speed_share
+    ring_friction, per_ring_width = c[0, lf.RING_FRICTION], 1.0 / c[0, lf.RING_FRICTION_SPEED]
+    ring_relief = c[0, lf.RING_RELIEF] * speed_share * speed_share
     centrifugal, gyroscopic = mass * belt_speed * belt_speed, 2.0 * mass * belt_speed
     half_gyroscopic, masses = -0.5 * gyroscopic, (element_mass, ring_mass)
     damping = lane_damping(belt, state.time[0])
@@ -138,18 +111,18 @@ def assemble(belt: LaneBelt, state: LaneState, work: ImexWork, step: float, agai
     for j in range(n):
         share = belt.arc_share[j]
         dual, per_left, span = belt.dual[j], behind(belt.per_cell, j, 0), belt.per_span[j]
-        u, v0, v1 = fields[j, U], fields[j, V_ELEMENT], fields[j, V_RING]
+        u, v0, v1 = fields[j, f.U], fields[j, f.V_ELEMENT], fields[j, f.V_RING]
         ring_left, ring_right = (
-            ring_stiffness * behind(stations, j, EPS_1),
-            ring_stiffness * stations[j, EPS_1],
+            ring_stiffness * behind(stations, j, lf.EPS_1),
+            ring_stiffness * stations[j, lf.EPS_1],
         )
         net_left = minimum(pressed_behind(belt, state, stations, j), 0.0)
         net_left = fma(element_stiffness, net_left, ring_left - centrifugal)
         net_right = minimum(pressed_strain(belt, state, stations, j), 0.0)
         net_right = fma(element_stiffness, net_right, ring_right - centrifugal)
-        slope = (ahead(fields, j, W) - behind(fields, j, W)) * span
+        slope = (ahead(fields, j, f.W) - behind(fields, j, f.W)) * span
         transverse = lane_transverse(belt, fields, j, net_left, net_right, bending)
-        transverse = fma(-gyroscopic, (ahead(fields, j, U) - behind(fields, j, U)) * span, transverse)
+        transverse = fma(-gyroscopic, (ahead(fields, j, f.U) - behind(fields, j, f.U)) * span, transverse)
         transverse = fma(-acceleration * mass, slope, transverse)
         if belt.has_column:
             transverse += column_across(belt, state, j)
@@ -161,23 +134,27 @@ def assemble(belt: LaneBelt, state: LaneState, work: ImexWork, step: float, agai
         longer = fma(offset, belt.ring_curvature[j], 1.0)
         ring_here = ring_mass * longer
         element, ring, coupling = element_rate, ring_here * per_step, zero
-        along_element = -full_speed * ((v0 - behind(fields, j, V_ELEMENT)) * per_left) * element_mass
-        along_ring = -(belt_speed + v1) * ((v1 - behind(fields, j, V_RING)) * per_left) * ring_here
+        along_element = -full_speed * ((v0 - behind(fields, j, f.V_ELEMENT)) * per_left) * element_mass
+        along_ring = -(belt_speed + v1) * ((v1 - behind(fields, j, f.V_RING)) * per_left) * ring_here
         along_element = fma(-acceleration, element_mass, along_element)
         along_ring = fma(-acceleration, ring_here, along_ring)
         radial_mass, cross = base_mass, zero
         if anywhere(share > 0.0):
             lever = fma(offset, belt.arc_curvature[j], 1.0)
-            v_tangential, coefficient = stations[j, SLIDING_T], stations[j, COEFFICIENT]
-            per_speed, factor = stations[j, PER_SPEED], stations[j, FACTOR]
-            ring_factor, meridian, force = stations[j, RING_FACTOR], v_radial * per_cosine, stations[j, FORCE]
+            v_tangential, coefficient = stations[j, lf.SLIDING_T], stations[j, lf.COEFFICIENT]
+            per_speed, factor = stations[j, lf.PER_SPEED], stations[j, lf.FACTOR]
+            ring_factor, meridian, force = (
+                stations[j, lf.RING_FACTOR],
+                v_radial * per_cosine,
+                stations[j, lf.FORCE],
+            )
 
             grip = ring_grip(belt, j, ring_left, ring_right, ring_relief * longer, ring_friction)
             drag = grip * ring_factor
             stiff = grip * (fma(-ring_factor, ring_factor, 1.0) * per_ring_width)
             if again:
                 # by the secant friction stops, and never turns the sliding about
-                stiff = select(stations[j, RING_REVERSING] > 0.5, drag / stations[j, SADDLE], stiff)
+                stiff = select(stations[j, lf.RING_REVERSING] > 0.5, drag / stations[j, lf.SADDLE], stiff)
 
             # with the slopes of friction along and across the sliding
             mu = coefficient * factor
@@ -189,7 +166,7 @@ def assemble(belt: LaneBelt, state: LaneState, work: ImexWork, step: float, agai
             friction = twice_normal * mu
             tangential = -friction * run
             across = friction * per_speed
-            thrown = stations[j, REVERSING] > 0.5 if again else zero > 0.0
+            thrown = stations[j, lf.REVERSING] > 0.5 if again else zero > 0.0
             along = twice_normal * coefficient * (fma(-factor, factor, 1.0) * per_width)
             along, across = implicit_shares(select(thrown, across, along), across, element_rate)
             excess = along - across
@@ -203,8 +180,8 @@ def assemble(belt: LaneBelt, state: LaneState, work: ImexWork, step: float, agai
             ring += stiff
             coupling = -lever * stiff
             if belt.is_free or anywhere(belt.on_driven[j] > 0.5):
-                stations[j, FLANK], stations[j, FLANK_SLOPE] = tangential, flank_slope
-                stations[j, FLANK_CROSS] = cross
+                stations[j, lf.FLANK], stations[j, lf.FLANK_SLOPE] = tangential, flank_slope
+                stations[j, lf.FLANK_CROSS] = cross
         along_element = fma(outward, slope, along_element)
         mobility = 1.0 / radial_mass
         push, lag = (transverse + outward) * mobility, cross * mobility
@@ -214,9 +191,9 @@ def assemble(belt: LaneBelt, state: LaneState, work: ImexWork, step: float, agai
             along_element = fma(-turning * element_mass, full_speed, along_element)
             along_ring = fma(-turning * ring_mass, belt_speed + v1, along_ring)
         if anywhere(share > 0.0):
-            stations[j, LAG], stations[j, SLOPE], stations[j, D_01] = lag, slope, dual * coupling
-        stations[j, D_00], stations[j, D_11] = dual * fma(-cross, lag, element), dual * ring
-        stations[j, Y_1] = dual * along_ring
+            stations[j, lf.LAG], stations[j, lf.SLOPE], stations[j, lf.D_01] = lag, slope, dual * coupling
+        stations[j, lf.D_00], stations[j, lf.D_11] = dual * fma(-cross, lag, element), dual * ring
+        stations[j, lf.Y_1] = dual * along_ring
         station = push, mobility * half_gyroscopic * span, dual * cross, dual * along_element
         if j == 0:
             first = station
@@ -241,5 +218,5 @@ def _put(stations: LaneArray, j: int, station, push_behind, push_ahead):
     """
     push, gyration, cross, along = station
     push = fma(gyration, push_ahead - push_behind, push)
-    stations[j, PUSH] = push
-    stations[j, Y_0] = fma(-cross, push, along)
+    stations[j, lf.PUSH] = push
+    stations[j, lf.Y_0] = fma(-cross, push, along)

@@ -18,59 +18,11 @@ from cvt_hpc.lanes import (
     ring_solution,
     select,
 )
-from cvt_hpc.models.elastic_belt.belt import V_ELEMENT, V_RING, U
-from cvt_hpc.models.elastic_belt.imex_stations import (
-    AHEAD,
-    D_00,
-    D_01,
-    D_11,
-    DV_0,
-    DV_1,
-    G_00,
-    G_01,
-    G_10,
-    G_11,
-    I_00,
-    I_01,
-    I_11,
-    LAG,
-    LINK_0,
-    LINK_1,
-    MEETING,
-    PUSH,
-    REVERSING,
-    RING_REVERSING,
-    SLOPE,
-    Y_0,
-    Y_1,
-    ImexWork,
-)
-from cvt_hpc.models.elastic_belt.lane_belt import (
-    ELEMENT_DAMPING,
-    ELEMENT_STIFFNESS,
-    FRICTION_SPEED,
-    GIVE,
-    PRESSED,
-    REPEATS,
-    RING_DAMPING,
-    RING_FRICTION_SPEED,
-    RING_OFFSET,
-    RING_STIFFNESS,
-    SHIFT,
-    LaneBelt,
-    LaneState,
-)
-from cvt_hpc.models.elastic_belt.lane_forces import (
-    EPS_0,
-    EPS_1,
-    PER_CONTENT_0,
-    PER_CONTENT_1,
-    SADDLE,
-    SHORT_0,
-    SLIDING_R,
-    SLIDING_T,
-    lane_belt_speed,
-)
+from cvt_hpc.models.elastic_belt import fields as f
+from cvt_hpc.models.elastic_belt import lane_fields as lf
+from cvt_hpc.models.elastic_belt.imex_stations import ImexWork
+from cvt_hpc.models.elastic_belt.lane_belt import LaneBelt, LaneState
+from cvt_hpc.models.elastic_belt.lane_forces import lane_belt_speed
 
 # Share of the speeds' change in a step that the rings' stress feels. From 1/4 on it is stable for any step
 # and damps nothing (Newmark); the rest keeps changing contact from exciting the shortest waves at long steps.
@@ -116,8 +68,8 @@ def eliminate(belt: LaneBelt, state: LaneState, work: ImexWork, step: float, aga
     fields, stations, c = state.fields, work.stations, belt.constants
     last, faded = fields.rows - 1, belt.faded
     belt_speed = lane_belt_speed(belt, state.time[0])
-    element_stiffness, ring_stiffness = c[0, ELEMENT_STIFFNESS], c[0, RING_STIFFNESS]
-    element_damping, ring_damping = c[0, ELEMENT_DAMPING], c[0, RING_DAMPING]
+    element_stiffness, ring_stiffness = c[0, lf.ELEMENT_STIFFNESS], c[0, lf.RING_STIFFNESS]
+    element_damping, ring_damping = c[0, lf.ELEMENT_DAMPING], c[0, lf.RING_DAMPING]
     zero = like(0.0, belt_speed)
     # of the last row: its own block and right side, and the results for the last row behind
     p = q = r = f0 = f1 = p_b = q_b = r_b = f0_b = f1_b = zero
@@ -127,22 +79,24 @@ def eliminate(belt: LaneBelt, state: LaneState, work: ImexWork, step: float, aga
         # the last cell first, which is behind row 0
         j = k if k >= 0 else last
         per_cell = belt.per_cell[j]
-        v0, v1 = fields[j, V_ELEMENT], fields[j, V_RING]
-        closing_0, closing_1 = ahead(fields, j, V_ELEMENT) - v0, ahead(fields, j, V_RING) - v1
-        eps = stations[j, EPS_0]
+        v0, v1 = fields[j, f.V_ELEMENT], fields[j, f.V_RING]
+        closing_0, closing_1 = ahead(fields, j, f.V_ELEMENT) - v0, ahead(fields, j, f.V_RING) - v1
+        eps = stations[j, lf.EPS_0]
         # flow out ahead less flow in behind, per (1 + eps): v[b] - v[j] (1 + eps) / (1 + eps_a)
-        entering = (eps - behind(stations, j, EPS_0)) * behind(stations, j, SHORT_0)
+        entering = (eps - behind(stations, j, lf.EPS_0)) * behind(stations, j, lf.SHORT_0)
         outflow = fma(-(belt_speed + v0), entering, closing_0)
         kappa = belt.curvature[j]
         if anywhere(kappa > 0.0):
-            lifts = fields[j, U] + stations[j, PUSH] + ahead(fields, j, U) + ahead(stations, j, PUSH)
+            lifts = (
+                fields[j, f.U] + stations[j, lf.PUSH] + ahead(fields, j, f.U) + ahead(stations, j, lf.PUSH)
+            )
             outflow = fma(0.5 * kappa * belt.cell[j], lifts, outflow)
-        per_length = (step * per_cell) * stations[j, PER_CONTENT_0]
+        per_length = (step * per_cell) * stations[j, lf.PER_CONTENT_0]
         at_end = fma(per_length, outflow, eps)
         if belt.has_column:
-            strained, eps = at_end - eps, state.column[j, PRESSED]
-            at_end = fma(state.column[j, GIVE], strained, eps + state.column[j, SHIFT])
-            per_length *= state.column[j, GIVE]
+            strained, eps = at_end - eps, state.column[j, lf.PRESSED]
+            at_end = fma(state.column[j, lf.GIVE], strained, eps + state.column[j, lf.SHIFT])
+            per_length *= state.column[j, lf.GIVE]
         stress_0, e0 = element_stress(
             element_stiffness,
             element_damping * per_cell,
@@ -150,25 +104,25 @@ def eliminate(belt: LaneBelt, state: LaneState, work: ImexWork, step: float, aga
             closing_0,
             at_end,
             per_length,
-            stations[j, LINK_0],
-            stations[j, MEETING] if again else zero,
+            stations[j, lf.LINK_0],
+            stations[j, lf.MEETING] if again else zero,
         )
         if anywhere(e0 <= 0.0):
-            stations[j, AHEAD] = at_end
+            stations[j, lf.AHEAD] = at_end
         grip = ring_damping * per_cell
-        stress_1 = fma(ring_stiffness, stations[j, EPS_1], grip * closing_1)
-        e1 = fma(CENTRED * ring_stiffness, (step * per_cell) * stations[j, PER_CONTENT_1], grip)
-        stations[j, LINK_0], stations[j, LINK_1] = e0, e1
+        stress_1 = fma(ring_stiffness, stations[j, lf.EPS_1], grip * closing_1)
+        e1 = fma(CENTRED * ring_stiffness, (step * per_cell) * stations[j, lf.PER_CONTENT_1], grip)
+        stations[j, lf.LINK_0], stations[j, lf.LINK_1] = e0, e1
         if k < 0:
-            p, q, r = stations[last, D_00] + e0, stations[last, D_01], stations[last, D_11] + e1
-            f0, f1 = stations[last, Y_0] + stress_0, stations[last, Y_1] + stress_1
+            p, q, r = stations[last, lf.D_00] + e0, stations[last, lf.D_01], stations[last, lf.D_11] + e1
+            f0, f1 = stations[last, lf.Y_0] + stress_0, stations[last, lf.Y_1] + stress_1
             t00, t11 = from_behind(e0), from_behind(e1)
             c00, c11 = -t00, -t11
             s0, s1 = -from_behind(stress_0), -from_behind(stress_1)
             continue
-        d00, d01 = stations[j, D_00] + (e0 + t00), stations[j, D_01] + t01
-        d11 = stations[j, D_11] + (e1 + t11)
-        y0, y1 = stations[j, Y_0] + (stress_0 + s0), stations[j, Y_1] + (stress_1 + s1)
+        d00, d01 = stations[j, lf.D_00] + (e0 + t00), stations[j, lf.D_01] + t01
+        d11 = stations[j, lf.D_11] + (e1 + t11)
+        y0, y1 = stations[j, lf.Y_0] + (stress_0 + s0), stations[j, lf.Y_1] + (stress_1 + s1)
         per_determinant = 1.0 / fma(d00, d11, -d01 * d01)
         i00, i01, i11 = d11 * per_determinant, -d01 * per_determinant, d00 * per_determinant
         z0, z1 = fma(i00, y0, i01 * y1), fma(i01, y0, i11 * y1)
@@ -179,9 +133,14 @@ def eliminate(belt: LaneBelt, state: LaneState, work: ImexWork, step: float, aga
         r_b = fma(-c01, g01, fma(-c11, g11, r_b))
         f0_b = fma(-c00, z0, fma(-c10, z1, f0_b))
         f1_b = fma(-c01, z0, fma(-c11, z1, f1_b))
-        stations[j, I_00], stations[j, I_01], stations[j, I_11] = i00, i01, i11
-        stations[j, DV_0], stations[j, DV_1] = z0, z1
-        stations[j, G_00], stations[j, G_01], stations[j, G_10], stations[j, G_11] = g00, g01, g10, g11
+        stations[j, lf.I_00], stations[j, lf.I_01], stations[j, lf.I_11] = i00, i01, i11
+        stations[j, lf.DV_0], stations[j, lf.DV_1] = z0, z1
+        stations[j, lf.G_00], stations[j, lf.G_01], stations[j, lf.G_10], stations[j, lf.G_11] = (
+            g00,
+            g01,
+            g10,
+            g11,
+        )
         t00, t01, t11 = fma(-e0 * e0, i00, e0), -e0 * e1 * i01, fma(-e1 * e1, i11, e1)
         s0, s1 = fma(e0, z0, -stress_0), fma(e1, z1, -stress_1)
         # it fades along the belt, beyond all need: kept from numbers so small that the processor slows down
@@ -199,7 +158,7 @@ def eliminate(belt: LaneBelt, state: LaneState, work: ImexWork, step: float, aga
         c11,
         faded,
     )
-    stations[last, DV_0], stations[last, DV_1] = x0, x1
+    stations[last, lf.DV_0], stations[last, lf.DV_1] = x0, x1
 
 
 @kernel
@@ -216,59 +175,59 @@ def substitute(belt: LaneBelt, state: LaneState, work: ImexWork, step: float) ->
     """
     stations, scalars, c = work.stations, state.scalars, belt.constants
     last = stations.rows - 1
-    n0, n1 = stations[last, DV_0], stations[last, DV_1]
+    n0, n1 = stations[last, lf.DV_0], stations[last, lf.DV_1]
     # of the last row behind, the ring's last one where a lane is a ring
     x0, x1 = from_behind(n0), from_behind(n1)
-    width, ring_width, offset = c[0, FRICTION_SPEED], c[0, RING_FRICTION_SPEED], c[0, RING_OFFSET]
+    width, ring_width, offset = c[0, lf.FRICTION_SPEED], c[0, lf.RING_FRICTION_SPEED], c[0, lf.RING_OFFSET]
     saturated = width * width
     turned = met = width < 0.0
     for j in range(last, -1, -1):
         if j < last:
-            z0 = fma(-stations[j, G_01], x1, fma(-stations[j, G_00], x0, stations[j, DV_0]))
-            z1 = fma(-stations[j, G_11], x1, fma(-stations[j, G_10], x0, stations[j, DV_1]))
-            link = stations[j, LINK_0]
-            e0, e1 = link * n0, stations[j, LINK_1] * n1
-            i01 = stations[j, I_01]
-            z0 = fma(stations[j, I_00], e0, fma(i01, e1, z0))
-            z1 = fma(i01, e0, fma(stations[j, I_11], e1, z1))
+            z0 = fma(-stations[j, lf.G_01], x1, fma(-stations[j, lf.G_00], x0, stations[j, lf.DV_0]))
+            z1 = fma(-stations[j, lf.G_11], x1, fma(-stations[j, lf.G_10], x0, stations[j, lf.DV_1]))
+            link = stations[j, lf.LINK_0]
+            e0, e1 = link * n0, stations[j, lf.LINK_1] * n1
+            i01 = stations[j, lf.I_01]
+            z0 = fma(stations[j, lf.I_00], e0, fma(i01, e1, z0))
+            z1 = fma(i01, e0, fma(stations[j, lf.I_11], e1, z1))
             if anywhere(link <= 0.0):
                 met |= _meeting(belt, state, stations, j, n0 - z0, step)
             n0, n1 = z0, z1
-            stations[j, DV_0], stations[j, DV_1] = n0, n1
+            stations[j, lf.DV_0], stations[j, lf.DV_1] = n0, n1
         share = belt.arc_share[j]
         if anywhere(share > 0.0):
-            v_radial, v_tangential = stations[j, SLIDING_R], stations[j, SLIDING_T]
-            rise = fma(stations[j, SLOPE] - stations[j, LAG], n0, stations[j, PUSH])
+            v_radial, v_tangential = stations[j, lf.SLIDING_R], stations[j, lf.SLIDING_T]
+            rise = fma(stations[j, lf.SLOPE] - stations[j, lf.LAG], n0, stations[j, lf.PUSH])
             turn = select(share > 0.0, fma(v_radial, rise, v_tangential * n0), 0.0)
             speed_squared = fma(v_radial, v_radial, v_tangential * v_tangential)
             back = (speed_squared > saturated) & (turn < -speed_squared)
             if anywhere(back):
-                turned |= _mark(stations, j, REVERSING, back)
-            saddle = stations[j, SADDLE]
+                turned |= _mark(stations, j, lf.REVERSING, back)
+            saddle = stations[j, lf.SADDLE]
             change = fma(fma(offset, belt.arc_curvature[j], 1.0), n0, -n1)
             after = select(share > 0.0, saddle * (saddle + change), 0.0)
             back = (absolute(saddle) > ring_width) & (after < 0.0)
             if anywhere(back):
-                turned |= _mark(stations, j, RING_REVERSING, back)
-    if anywhere(stations[last, LINK_0] <= 0.0):
-        met |= _meeting(belt, state, stations, last, from_ahead(n0) - stations[last, DV_0], step)
+                turned |= _mark(stations, j, lf.RING_REVERSING, back)
+    if anywhere(stations[last, lf.LINK_0] <= 0.0):
+        met |= _meeting(belt, state, stations, last, from_ahead(n0) - stations[last, lf.DV_0], step)
     reasons = TURNS_BACK * anywhere(turned) + MEETS * anywhere(met)
     if reasons:
-        repeats = scalars[0, REPEATS]
-        scalars[0, REPEATS] = repeats + select(around(turned | met), like(1.0, repeats), 0.0)
+        repeats = scalars[0, lf.REPEATS]
+        scalars[0, lf.REPEATS] = repeats + select(around(turned | met), like(1.0, repeats), 0.0)
     return reasons
 
 
 @merged_kernel
 def _meeting(belt: LaneBelt, state: LaneState, stations: LaneArray, j: int, opening, step: float):
     """Where elements of cell j that the step has taken as apart newly overlap, as `opening` [m/s] changes."""
-    per_length = (step * belt.per_cell[j]) * stations[j, PER_CONTENT_0]
+    per_length = (step * belt.per_cell[j]) * stations[j, lf.PER_CONTENT_0]
     if belt.has_column:
-        per_length *= state.column[j, GIVE]
-    overlap = fma(per_length, opening, stations[j, AHEAD]) < -LARGEST_OVERLAP
-    overlap &= stations[j, LINK_0] <= 0.0
+        per_length *= state.column[j, lf.GIVE]
+    overlap = fma(per_length, opening, stations[j, lf.AHEAD]) < -LARGEST_OVERLAP
+    overlap &= stations[j, lf.LINK_0] <= 0.0
     if anywhere(overlap):
-        overlap = _mark(stations, j, MEETING, overlap)
+        overlap = _mark(stations, j, lf.MEETING, overlap)
     return overlap
 
 

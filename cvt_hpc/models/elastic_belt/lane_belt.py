@@ -14,152 +14,15 @@ import numpy as np
 from numpy.typing import DTypeLike
 
 from cvt_hpc.lanes import LaneArray, split
-from cvt_hpc.models.elastic_belt.belt import (
-    DRIVEN_POSITION,
-    DRIVEN_SPEED,
-    FIELDS,
-    FIRST_STATE,
-    N_ELEMENT,
-    N_RING,
-    TIME,
-    V_ELEMENT,
-    V_RING,
-    Belt,
-    State,
-)
+from cvt_hpc.models.elastic_belt import fields as f
+from cvt_hpc.models.elastic_belt import lane_fields as lf
+from cvt_hpc.models.elastic_belt.belt import Belt, State
 from cvt_hpc.models.elastic_belt.bending import bending_bands, bending_load
-from cvt_hpc.models.elastic_belt.pulleys import LAWS, STATES
 from cvt_hpc.models.elastic_belt.rhs import contact_forces, fresh_contacts, speed_share_at
 from cvt_hpc.physics.compliance import Contact, lane_contact
 from cvt_hpc.physics.friction import FrictionLaw
 from cvt_hpc.physics.moving_discs import settle
 from cvt_hpc.physics.sheaves import disc_factor
-
-# Constants of each lane, in SI units; names that are not in `Belt` are explained where they are computed
-# below.
-CONSTANTS = (
-    "element_stiffness",
-    "ring_stiffness",
-    "element_damping",
-    "ring_damping",
-    "element_mass",
-    "ring_mass",
-    "ring_relief",
-    "mass",
-    "belt_speed",
-    "transverse_damping",
-    "bending_stiffness",
-    "ring_offset",
-    "ring_friction",
-    "ring_friction_speed",
-    "friction_speed",
-    "kinetic_friction",
-    "friction_gradient",
-    "law_speed",
-    "sine",
-    "cosine",
-    "wedge",
-    "forget",
-    "driving_carry",
-    "driven_carry",
-    "driving_radius",
-    "driven_radius",
-    "driving_speed",
-    "driving_position",
-    "driven_inertia",
-    "axial_damping",
-    "thrust",
-    "ratio",
-    "load",
-    "load_start",
-    "start_share",
-    "driving_cell",
-    "driven_cell",
-    "column_stiffness",
-    "outer_edge",
-    "inner_edge",
-    *LAWS,
-)
-FIRST_LAW = len(CONSTANTS) - len(LAWS)
-(
-    ELEMENT_STIFFNESS,
-    RING_STIFFNESS,
-    ELEMENT_DAMPING,
-    RING_DAMPING,
-    ELEMENT_MASS,
-    RING_MASS,
-    RING_RELIEF,
-    MASS,
-    BELT_SPEED,
-    TRANSVERSE_DAMPING,
-    BENDING_STIFFNESS,
-    RING_OFFSET,
-    RING_FRICTION,
-    RING_FRICTION_SPEED,
-    FRICTION_SPEED,
-    KINETIC_FRICTION,
-    FRICTION_GRADIENT,
-    LAW_SPEED,
-    SINE,
-    COSINE,
-    WEDGE,
-    FORGET,
-    DRIVING_CARRY,
-    DRIVEN_CARRY,
-    DRIVING_RADIUS,
-    DRIVEN_RADIUS,
-    DRIVING_SPEED,
-    DRIVING_POSITION,
-    DRIVEN_INERTIA,
-    AXIAL_DAMPING,
-    THRUST,
-    RATIO,
-    LOAD,
-    LOAD_START,
-    START_SHARE,
-    DRIVING_CELL,
-    DRIVEN_CELL,
-    COLUMN_STIFFNESS,
-    OUTER_EDGE,
-    INNER_EDGE,
-) = range(FIRST_LAW)
-
-# Scalars of the state, of each lane, double in any precision: the driven pulley's two, the work of the
-# layers' dampers until it is read [J], how often friction was found to reverse sliding in a step, and
-# from FIRST_STATE on the further states of free pulleys.
-LANE_SCALARS = ("driven_speed", "driven_position", "layer_work", "repeats", *STATES)
-SPEED, POSITION, LAYER_WORK, REPEATS = range(FIRST_STATE)
-
-# Of the column, in `LaneState.column`: of the stations the deviation of curvature from the path's [1/m], its
-# change within a step, and the moment [N m]; of the cells -P / EA, its slopes with the strain and with the
-# curvature at both ends [m], its change within a step by turning, the moments of both halves times their
-# content [N m^2], and the energy per content [N].
-COLUMN = (
-    "deviation",
-    "turning",
-    "column_moment",
-    "pressed",
-    "give",
-    "turn_near",
-    "turn_far",
-    "shift",
-    "bearing_near",
-    "bearing_far",
-    "column_energy",
-)
-(
-    DEVIATION,
-    TURNING,
-    COLUMN_MOMENT,
-    PRESSED,
-    GIVE,
-    TURN_NEAR,
-    TURN_FAR,
-    SHIFT,
-    BEARING_NEAR,
-    BEARING_FAR,
-    COLUMN_ENERGY,
-) = range(len(COLUMN))
 
 LEAST_ROWS = 3  # of a part of a run: bending reaches two stations
 
@@ -267,7 +130,7 @@ def lane_belt(belts: list[Belt], dtype: DTypeLike) -> LaneBelt:
         np.float64 or np.float32.
     """
     first = belts[0]
-    constants = LaneArray(1, len(CONSTANTS), len(belts), dtype)
+    constants = LaneArray(1, len(lf.CONSTANTS), len(belts), dtype)
     for lane, belt in enumerate(belts):
         constants.data[0, :, lane] = _constants_of(belt)
     cell, dual, kappa = first.cell, first.dual, first.curvature
@@ -333,9 +196,9 @@ def _constants_of(belt: Belt) -> list[float]:
         "driven_cell": belt.cell[belt.driven_start],
         # energy stored in a pulley of given speed does not count
         "driven_inertia": belt.driven_inertia if np.isfinite(belt.driven_inertia) else 0.0,
-        **dict(zip(LAWS, belt.pulleys.laws[0], strict=True)),
+        **dict(zip(f.LAWS, belt.pulleys.laws[0], strict=True)),
     }
-    return [named[key] if key in named else getattr(belt, key) for key in CONSTANTS]
+    return [named[key] if key in named else getattr(belt, key) for key in lf.CONSTANTS]
 
 
 def _carry(belt: Belt, spacing: float) -> float:
@@ -361,13 +224,13 @@ def lane_state(belts: list[Belt], states: list[State], dtype: type, sweeps: int 
     """
     n, lanes = belts[0].cell.size, len(belts)
     fields = LaneArray(n, states[0].fields.shape[0], lanes, dtype)
-    scalars = LaneArray(1, len(LANE_SCALARS), lanes)
+    scalars = LaneArray(1, len(lf.LANE_SCALARS), lanes)
     for lane, (belt, state) in enumerate(zip(belts, states, strict=True)):
         put_lane(fields.data, scalars.data, lane, belt, state)
     wraps = [[belt.driving for belt in belts], [belt.driven for belt in belts]]
     contacts = (lane_contact(wraps[0], dtype, sweeps), lane_contact(wraps[1], dtype, sweeps))
     settle_discs(contacts, belts, states)
-    column = LaneArray(n if belts[0].has_column else 0, len(COLUMN), lanes, dtype)
+    column = LaneArray(n if belts[0].has_column else 0, len(lf.COLUMN), lanes, dtype)
     return LaneState(fields, scalars, np.array([states[0].scalars[0]]), contacts, column)
 
 
@@ -433,26 +296,26 @@ def alike(array: LaneArray, parts: int) -> LaneArray:
 def put_lane(fields: np.ndarray, scalars: np.ndarray, lane: int, belt: Belt, state: State) -> None:
     """Write a run's state into its lane of a LaneState's data."""
     values = state.fields.copy()
-    belt_speed = speed_share_at(belt, state.scalars[TIME]) * belt.belt_speed
-    values[V_ELEMENT] -= belt_speed
-    values[V_RING] -= belt_speed
-    values[len(FIELDS) : (len(values) + len(FIELDS)) // 2] -= belt_speed  # ring layers, where there are
-    values[N_ELEMENT] -= 1.0
-    values[N_RING] -= 1.0 + belt.curvature * belt.ring_offset
+    belt_speed = speed_share_at(belt, state.scalars[f.TIME]) * belt.belt_speed
+    values[f.V_ELEMENT] -= belt_speed
+    values[f.V_RING] -= belt_speed
+    values[len(f.FIELDS) : (len(values) + len(f.FIELDS)) // 2] -= belt_speed  # ring layers, where there are
+    values[f.N_ELEMENT] -= 1.0
+    values[f.N_RING] -= 1.0 + belt.curvature * belt.ring_offset
     fields[:, :, lane] = values.T
-    scalars[0, SPEED, lane] = state.scalars[DRIVEN_SPEED]
-    scalars[0, POSITION, lane] = state.scalars[DRIVEN_POSITION]
-    scalars[0, FIRST_STATE:, lane] = state.scalars[FIRST_STATE:]
+    scalars[0, lf.SPEED, lane] = state.scalars[f.DRIVEN_SPEED]
+    scalars[0, lf.POSITION, lane] = state.scalars[f.DRIVEN_POSITION]
+    scalars[0, f.FIRST_STATE :, lane] = state.scalars[f.FIRST_STATE :]
 
 
 def take_lane(state: LaneState, lane: int, belt: Belt) -> State:
     """One run's state out of its lane."""
     values = state.fields.data[:, :, lane].T.astype(float, order="C")
     belt_speed = speed_share_at(belt, state.time[0]) * belt.belt_speed
-    values[V_ELEMENT] += belt_speed
-    values[V_RING] += belt_speed
-    values[len(FIELDS) : (len(values) + len(FIELDS)) // 2] += belt_speed
-    values[N_ELEMENT] += 1.0
-    values[N_RING] += 1.0 + belt.curvature * belt.ring_offset
+    values[f.V_ELEMENT] += belt_speed
+    values[f.V_RING] += belt_speed
+    values[len(f.FIELDS) : (len(values) + len(f.FIELDS)) // 2] += belt_speed
+    values[f.N_ELEMENT] += 1.0
+    values[f.N_RING] += 1.0 + belt.curvature * belt.ring_offset
     scalars = state.scalars.data[0, :, lane]
-    return State(values, np.array([state.time[0], *scalars[: LAYER_WORK + 1], *scalars[FIRST_STATE:]]))
+    return State(values, np.array([state.time[0], *scalars[: lf.LAYER_WORK + 1], *scalars[f.FIRST_STATE :]]))

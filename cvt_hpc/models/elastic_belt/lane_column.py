@@ -4,27 +4,10 @@ from __future__ import annotations
 
 from cvt_hpc.kernels import kernel, merged_kernel
 from cvt_hpc.lanes import LaneArray, ahead, behind, fma, like, minimum, select
-from cvt_hpc.models.elastic_belt.belt import N_ELEMENT, V_ELEMENT, V_RING, U, W
+from cvt_hpc.models.elastic_belt import fields as f
+from cvt_hpc.models.elastic_belt import lane_fields as lf
 from cvt_hpc.models.elastic_belt.column import rocking_column
-from cvt_hpc.models.elastic_belt.lane_belt import (
-    BEARING_FAR,
-    BEARING_NEAR,
-    COLUMN_ENERGY,
-    COLUMN_MOMENT,
-    COLUMN_STIFFNESS,
-    DEVIATION,
-    ELEMENT_STIFFNESS,
-    GIVE,
-    INNER_EDGE,
-    OUTER_EDGE,
-    PRESSED,
-    SHIFT,
-    TURN_FAR,
-    TURN_NEAR,
-    TURNING,
-    LaneBelt,
-    LaneState,
-)
+from cvt_hpc.models.elastic_belt.lane_belt import LaneBelt, LaneState
 
 
 @merged_kernel
@@ -43,19 +26,19 @@ def lane_column(belt: LaneBelt, state: LaneState, stations: LaneArray, strain: i
     `strain` is the stations' field that holds those of the elements.
     """
     fields, column, c = state.fields, state.column, belt.constants
-    stiffness, bending = c[0, ELEMENT_STIFFNESS], c[0, COLUMN_STIFFNESS]
-    outer, inner = c[0, OUTER_EDGE], c[0, INNER_EDGE]
+    stiffness, bending = c[0, lf.ELEMENT_STIFFNESS], c[0, lf.COLUMN_STIFFNESS]
+    outer, inner = c[0, lf.OUTER_EDGE], c[0, lf.INNER_EDGE]
     n, half_a_cell = fields.rows, like(0.5, outer)
     for j in range(n):
-        column[j, DEVIATION] = -curving(belt, fields, j, W)
+        column[j, lf.DEVIATION] = -curving(belt, fields, j, f.W)
     for j in range(n):
         kappa = belt.curvature[j]
         eps = fma(inner, kappa, stations[j, strain])
         near, give, turn, moment = rocking_column(
-            eps, column[j, DEVIATION] + kappa, stiffness, bending, outer, inner
+            eps, column[j, lf.DEVIATION] + kappa, stiffness, bending, outer, inner
         )
         far, give_far, turn_far, moment_far = rocking_column(
-            eps, ahead(column, j, DEVIATION) + kappa, stiffness, bending, outer, inner
+            eps, ahead(column, j, lf.DEVIATION) + kappa, stiffness, bending, outer, inner
         )
         pushed, pushed_far = minimum(near, 0.0), minimum(far, 0.0)
         closed = 0.5 * (pushed + pushed_far)
@@ -63,16 +46,16 @@ def lane_column(belt: LaneBelt, state: LaneState, stations: LaneArray, strain: i
         # where nothing is pressed both halves come to rest on each other; else those that are
         part = select(pressed & (near >= 0.0), 0.0, half_a_cell)
         part_far = select(pressed & (far >= 0.0), 0.0, half_a_cell)
-        column[j, PRESSED] = select(pressed, closed, minimum(near, far))
-        column[j, GIVE] = fma(part, give, part_far * give_far)
-        column[j, TURN_NEAR], column[j, TURN_FAR] = part * turn, part_far * turn_far
-        half = (0.5 * belt.cell[j]) * (fields[j, N_ELEMENT] + 1.0)
-        column[j, BEARING_NEAR], column[j, BEARING_FAR] = half * moment, half * moment_far
+        column[j, lf.PRESSED] = select(pressed, closed, minimum(near, far))
+        column[j, lf.GIVE] = fma(part, give, part_far * give_far)
+        column[j, lf.TURN_NEAR], column[j, lf.TURN_FAR] = part * turn, part_far * turn_far
+        half = (0.5 * belt.cell[j]) * (fields[j, f.N_ELEMENT] + 1.0)
+        column[j, lf.BEARING_NEAR], column[j, lf.BEARING_FAR] = half * moment, half * moment_far
         bent = fma(moment, moment, moment_far * moment_far) / bending
-        column[j, COLUMN_ENERGY] = 0.5 * fma(stiffness, fma(pushed, pushed, pushed_far * pushed_far), bent)
+        column[j, lf.COLUMN_ENERGY] = 0.5 * fma(stiffness, fma(pushed, pushed, pushed_far * pushed_far), bent)
     for j in range(n):
-        borne = behind(column, j, BEARING_FAR) + column[j, BEARING_NEAR]
-        column[j, COLUMN_MOMENT] = borne * belt.per_dual[j]
+        borne = behind(column, j, lf.BEARING_FAR) + column[j, lf.BEARING_NEAR]
+        column[j, lf.COLUMN_MOMENT] = borne * belt.per_dual[j]
 
 
 @kernel
@@ -84,10 +67,12 @@ def foresee_column(belt: LaneBelt, state: LaneState, stations: LaneArray, push: 
     """
     column = state.column
     for j in range(state.fields.rows):
-        column[j, TURNING] = -step * (curving(belt, state.fields, j, U) + curving(belt, stations, j, push))
+        column[j, lf.TURNING] = -step * (
+            curving(belt, state.fields, j, f.U) + curving(belt, stations, j, push)
+        )
     for j in range(state.fields.rows):
-        far = column[j, TURN_FAR] * ahead(column, j, TURNING)
-        column[j, SHIFT] = fma(column[j, TURN_NEAR], column[j, TURNING], far)
+        far = column[j, lf.TURN_FAR] * ahead(column, j, lf.TURNING)
+        column[j, lf.SHIFT] = fma(column[j, lf.TURN_NEAR], column[j, lf.TURNING], far)
 
 
 @merged_kernel
@@ -98,7 +83,7 @@ def across_by_curvature(belt: LaneBelt, state: LaneState, j: int, bending, belt_
     of the belt speed. `bending` is EI [N m^2], `masses` those of elements and rings [kg/m].
     """
     element_mass, ring_mass = masses
-    v0, v1 = state.fields[j, V_ELEMENT], state.fields[j, V_RING]
+    v0, v1 = state.fields[j, f.V_ELEMENT], state.fields[j, f.V_RING]
     faster = fma(element_mass * v0, fma(2.0, belt_speed, v0), ring_mass * v1 * fma(2.0, belt_speed, v1))
     return fma(belt.ring_curvature[j], faster, bending * belt.bending_load[j])
 
@@ -106,4 +91,4 @@ def across_by_curvature(belt: LaneBelt, state: LaneState, j: int, bending, belt_
 @merged_kernel
 def column_across(belt: LaneBelt, state: LaneState, j: int):
     """Line force of the column's moment across the belt at station j, outwards [N/m]."""
-    return -curving(belt, state.column, j, COLUMN_MOMENT)
+    return -curving(belt, state.column, j, lf.COLUMN_MOMENT)

@@ -24,47 +24,12 @@ from cvt_hpc.lanes import (
     set_station,
     sqrt,
 )
-from cvt_hpc.models.elastic_belt.belt import (
-    FIRST_STATE,
-    N_ELEMENT,
-    N_RING,
-    V_ELEMENT,
-    V_FILTERED,
-    V_RING,
-    U,
-    W,
-)
-from cvt_hpc.models.elastic_belt.lane_belt import (
-    BELT_SPEED,
-    COSINE,
-    DRIVEN_RADIUS,
-    DRIVING_POSITION,
-    DRIVING_RADIUS,
-    DRIVING_SPEED,
-    ELEMENT_MASS,
-    FORGET,
-    FRICTION_GRADIENT,
-    FRICTION_SPEED,
-    KINETIC_FRICTION,
-    LAW_SPEED,
-    LOAD,
-    LOAD_START,
-    MASS,
-    POSITION,
-    PRESSED,
-    RING_FRICTION_SPEED,
-    RING_MASS,
-    RING_OFFSET,
-    SPEED,
-    START_SHARE,
-    TRANSVERSE_DAMPING,
-    WEDGE,
-    LaneBelt,
-    LaneState,
-)
+from cvt_hpc.models.elastic_belt import fields as f
+from cvt_hpc.models.elastic_belt import lane_fields as lf
+from cvt_hpc.models.elastic_belt.lane_belt import LaneBelt, LaneState
 from cvt_hpc.models.elastic_belt.lane_column import lane_column
-from cvt_hpc.models.elastic_belt.pulleys import DRIVEN_COS, DRIVING_COS, EXCESS, SHIFT
-from cvt_hpc.physics.compliance import FORCED, GAP, contact_force, solve_contact
+from cvt_hpc.physics import compliance
+from cvt_hpc.physics.compliance import contact_force, solve_contact
 from cvt_hpc.physics.flank import flank_sliding, tangential_sliding
 from cvt_hpc.physics.friction import formula_coefficient, law_numbers, saturation, table_coefficient
 from cvt_hpc.physics.friction_laws import Law
@@ -75,16 +40,6 @@ from cvt_hpc.variator.course import faded_damping, load_course, speed_course
 MOST_CONTACT_ROUNDS = 200
 LEAST_SHARE_OF_WIDTH = 1e-3  # of friction_speed: below it friction is linear to 1e-6, and has no direction
 
-# Of a state, by `derive`: axial line force; the cells' strains, 1 / (1 + strain) and 1 / content. By
-# `lane_sliding`: sliding speeds, the law's coefficient, tanh of sliding speed over regularisation, 1 / that
-# speed, the same tanh of rings, the elements' sliding speed under them.
-FORCE, EPS_0, EPS_1, SHORT_0, SHORT_1, PER_CONTENT_0, PER_CONTENT_1 = range(7)
-SLIDING_R, SLIDING_T, COEFFICIENT, FACTOR, PER_SPEED, RING_FACTOR, SADDLE = range(7, 14)
-# By `note_speeds` in the last two steps before a sample: u, v_element and v_ring two steps ago, less twice
-# those one step ago.
-NOTED = 14
-FIELDS_OF_FORCES = 17
-
 
 @kernel
 def derive(belt: LaneBelt, state: LaneState, stations: LaneArray) -> None:
@@ -92,19 +47,19 @@ def derive(belt: LaneBelt, state: LaneState, stations: LaneArray) -> None:
     lane_contact_forces(belt, state, stations)
     lane_strains(belt, state, stations)
     if belt.has_column:
-        lane_column(belt, state, stations, EPS_0)
+        lane_column(belt, state, stations, lf.EPS_0)
 
 
 @merged_kernel
 def pressed_strain(belt: LaneBelt, state: LaneState, stations: LaneArray, j: int):
     """-P / EA of cell j, positive where its elements are apart."""
-    return state.column[j, PRESSED] if belt.has_column else stations[j, EPS_0]
+    return state.column[j, lf.PRESSED] if belt.has_column else stations[j, lf.EPS_0]
 
 
 @merged_kernel
 def pressed_behind(belt: LaneBelt, state: LaneState, stations: LaneArray, j: int):
     """As `pressed_strain`, of the cell behind station j."""
-    return behind(state.column, j, PRESSED) if belt.has_column else behind(stations, j, EPS_0)
+    return behind(state.column, j, lf.PRESSED) if belt.has_column else behind(stations, j, lf.EPS_0)
 
 
 @kernel
@@ -116,11 +71,11 @@ def note_speeds(belt: LaneBelt, state: LaneState, stations: LaneArray, taken: in
     is_first = taken == max(steps - 2, 0)
     weight = 0.0 if taken < steps - 1 else -2.0
     for j in range(fields.rows):
-        for k, row in enumerate((U, V_ELEMENT, V_RING)):
+        for k, row in enumerate((f.U, f.V_ELEMENT, f.V_RING)):
             speed = fields[j, row]
             if is_first:
-                stations[j, NOTED + k] = speed
-            stations[j, NOTED + k] = fma(weight, speed, stations[j, NOTED + k])
+                stations[j, lf.NOTED + k] = speed
+            stations[j, lf.NOTED + k] = fma(weight, speed, stations[j, lf.NOTED + k])
 
 
 @kernel
@@ -131,12 +86,15 @@ def step_ripple(belt: LaneBelt, state: LaneState, stations: LaneArray):
     amplitude A at the angular frequency w has (w step)^2 A, below A / 3000 at 600 Hz and 4.6 us.
     """
     n, fields, c = state.fields.rows, state.fields, belt.constants
-    element_mass, ring_mass, mass = c[0, ELEMENT_MASS], c[0, RING_MASS], c[0, MASS]
+    element_mass, ring_mass, mass = c[0, lf.ELEMENT_MASS], c[0, lf.RING_MASS], c[0, lf.MASS]
     total = like(0.0, mass)
     length = 0.0
     for j in range(n):
-        u = fields[j, U] + stations[j, NOTED]
-        v0, v1 = fields[j, V_ELEMENT] + stations[j, NOTED + 1], fields[j, V_RING] + stations[j, NOTED + 2]
+        u = fields[j, f.U] + stations[j, lf.NOTED]
+        v0, v1 = (
+            fields[j, f.V_ELEMENT] + stations[j, lf.NOTED + 1],
+            fields[j, f.V_RING] + stations[j, lf.NOTED + 2],
+        )
         moving = fma(mass * u, u, fma(element_mass * v0, v0, ring_mass * v1 * v1))
         total = fma(belt.dual[j], moving, total)
         length += belt.dual[j]
@@ -147,7 +105,7 @@ def step_ripple(belt: LaneBelt, state: LaneState, stations: LaneArray):
 def lane_load(belt: LaneBelt, time: float, pattern):
     """Torque at the driving pulley [N m], as `rhs.load_at` has it, in lanes like `pattern`."""
     c = belt.constants
-    start, load = like(c[0, LOAD_START], pattern), like(c[0, LOAD], pattern)
+    start, load = like(c[0, lf.LOAD_START], pattern), like(c[0, lf.LOAD], pattern)
     torque = load_course(time, belt.rise_time, belt.ramp_end, start, load)
     return torque
 
@@ -157,7 +115,7 @@ def lane_speed_share(belt: LaneBelt, time: float, pattern):
     """Speed of the driving pulley over `driving_speed`, as `rhs.speed_share_at`, in lanes like `pattern`."""
     share = like(1.0, pattern)
     if belt.speed_ramps:
-        start = like(belt.constants[0, START_SHARE], pattern)
+        start = like(belt.constants[0, lf.START_SHARE], pattern)
         share = speed_course(time, belt.rise_time, belt.ramp_end, start)
     return share
 
@@ -165,7 +123,7 @@ def lane_speed_share(belt: LaneBelt, time: float, pattern):
 @merged_kernel
 def lane_belt_speed(belt: LaneBelt, time: float):
     """Belt speed at the driving pulley's speed [m/s], from which the layers' speeds are counted."""
-    nominal = belt.constants[0, BELT_SPEED]
+    nominal = belt.constants[0, lf.BELT_SPEED]
     return lane_speed_share(belt, time, nominal) * nominal
 
 
@@ -186,12 +144,12 @@ def lane_pulleys(belt: LaneBelt, share, scalars: LaneArray):
     `share` is the result of `lane_speed_share`, whose precision they take; `scalars` are those of the state.
     """
     c = belt.constants
-    driven_speed, excess = scalars[0, SPEED], like(scalars[0, FIRST_STATE + EXCESS], share)
-    belt_speed = like(share * c[0, BELT_SPEED], driven_speed)
-    driving = share * (c[0, DRIVING_SPEED] * c[0, DRIVING_RADIUS] - c[0, BELT_SPEED])
-    driving = driving + excess * c[0, DRIVING_RADIUS]
-    driven = driven_speed * like(c[0, DRIVEN_RADIUS], driven_speed) - belt_speed
-    turning = share * c[0, DRIVING_SPEED] + excess
+    driven_speed, excess = scalars[0, lf.SPEED], like(scalars[0, f.FIRST_STATE + f.EXCESS], share)
+    belt_speed = like(share * c[0, lf.BELT_SPEED], driven_speed)
+    driving = share * (c[0, lf.DRIVING_SPEED] * c[0, lf.DRIVING_RADIUS] - c[0, lf.BELT_SPEED])
+    driving = driving + excess * c[0, lf.DRIVING_RADIUS]
+    driven = driven_speed * like(c[0, lf.DRIVEN_RADIUS], driven_speed) - belt_speed
+    turning = share * c[0, lf.DRIVING_SPEED] + excess
     return (turning, like(driven_speed, share)), (driving, like(driven, share))
 
 
@@ -219,15 +177,17 @@ def lane_carry(belt: LaneBelt, cell: int, nominal: int, belt_speed):
     carry = c[0, nominal]
     if not belt.speed_ramps:
         return carry
-    left = decay(c[0, FORGET] * c[0, cell] / belt_speed)
-    start = c[0, START_SHARE]
-    return select((start > 1.0) | (start < 1.0), c[0, FORGET] * left / (1.0 - left), carry)
+    left = decay(c[0, lf.FORGET] * c[0, cell] / belt_speed)
+    start = c[0, lf.START_SHARE]
+    return select((start > 1.0) | (start < 1.0), c[0, lf.FORGET] * left / (1.0 - left), carry)
 
 
 @merged_kernel
 def lane_damping(belt: LaneBelt, time: float):
     """Transverse damping [N s/m^2], as `rhs.damping_at`."""
-    damping = belt.constants[0, TRANSVERSE_DAMPING] + faded_damping(time, belt.rise_time, belt.start_damping)
+    damping = belt.constants[0, lf.TRANSVERSE_DAMPING] + faded_damping(
+        time, belt.rise_time, belt.start_damping
+    )
     return damping
 
 
@@ -240,8 +200,8 @@ def lane_transverse(belt: LaneBelt, fields: LaneArray, j: int, net_left, net_rig
     n = fields.rows
     # of the rows two away, those beside the neighbours
     a, b = j - 1 if j > 0 else n - 1, j + 1 if j < n - 1 else 0
-    w, w_a, w_b = fields[j, W], behind(fields, j, W), ahead(fields, j, W)
-    w_aa, w_bb = behind(fields, a, W), ahead(fields, b, W)
+    w, w_a, w_b = fields[j, f.W], behind(fields, j, f.W), ahead(fields, j, f.W)
+    w_aa, w_bb = behind(fields, a, f.W), ahead(fields, b, f.W)
     if j == 0:
         w_aa = from_behind(w_aa)
     if j == n - 1:
@@ -280,26 +240,28 @@ def ring_grip(belt: LaneBelt, j: int, ring_left, ring_right, relief, friction):
 def lane_contact_forces(belt: LaneBelt, state: LaneState, stations: LaneArray) -> None:
     """Axial line forces of both wraps into FORCE [N/m]; on the strands it stays 0."""
     n, fields, c = state.fields.rows, state.fields, belt.constants
-    wedge, scalars = c[0, WEDGE], state.scalars
+    wedge, scalars = c[0, lf.WEDGE], state.scalars
     for wrap in range(2):
         contact = state.contacts[1] if wrap else state.contacts[0]
         pushed = contact.stations
-        slope = like(wedge, pushed[0, GAP])
-        shift = scalars[0, FIRST_STATE + SHIFT]
-        opening = like(scalars[0, POSITION] if wrap else like(c[0, DRIVING_POSITION], shift) + shift, slope)
-        tilted = FIRST_STATE + (DRIVEN_COS if wrap else DRIVING_COS)
+        slope = like(wedge, pushed[0, compliance.GAP])
+        shift = scalars[0, f.FIRST_STATE + f.SHIFT]
+        opening = like(
+            scalars[0, lf.POSITION] if wrap else like(c[0, lf.DRIVING_POSITION], shift) + shift, slope
+        )
+        tilted = f.FIRST_STATE + (f.DRIVEN_COS if wrap else f.DRIVING_COS)
         first = belt.driven_start if wrap else 0
         row, part = first % n, first // n
         for k in range(contact.weight.size):
-            pushed[k, GAP] = fma(slope, at_station(fields, row, part, W), opening)
+            pushed[k, compliance.GAP] = fma(slope, at_station(fields, row, part, f.W), opening)
             row, part = _next_station(n, row, part)
         if belt.is_free:
             one, other = like(scalars[0, tilted], slope), like(scalars[0, tilted + 1], slope)
             for k in range(contact.weight.size):
                 tilt = fma(contact.sine[k], other, contact.cosine[k] * one)
-                pushed[k, GAP] = pushed[k, GAP] + tilt
+                pushed[k, compliance.GAP] = pushed[k, compliance.GAP] + tilt
         if contact.discs.place.size > 0:
-            open_gaps(contact.discs, pushed, GAP)
+            open_gaps(contact.discs, pushed, compliance.GAP)
         if contact.sweeps > 0:
             sweep_lane_contact(contact)
         else:
@@ -307,21 +269,21 @@ def lane_contact_forces(belt: LaneBelt, state: LaneState, stations: LaneArray) -
         row, part = first % n, first // n
         for k in range(contact.weight.size):
             force = contact_force(pushed, k)
-            pushed[k, FORCED] = force
-            set_station(stations, row, part, FORCE, force)
+            pushed[k, compliance.FORCED] = force
+            set_station(stations, row, part, lf.FORCE, force)
             row, part = _next_station(n, row, part)
 
 
 @kernel
 def advance_discs(belt: LaneBelt, state: LaneState, step: float) -> None:
     """Discs with inertia at the end of a step, before its forces; with the pulleys' speeds there."""
-    share = lane_speed_share(belt, state.time[0], belt.constants[0, BELT_SPEED])
+    share = lane_speed_share(belt, state.time[0], belt.constants[0, lf.BELT_SPEED])
     turnings, surfaces = lane_pulleys(belt, share, state.scalars)
     for wrap in range(2):
         contact = state.contacts[1] if wrap else state.contacts[0]
         if contact.discs.place.size > 0:
             turning = like(turnings[1] if wrap else turnings[0], contact.discs.states[0, 0])
-            turn_discs(contact.discs, contact.weight, contact.stations, FORCED, turning, step)
+            turn_discs(contact.discs, contact.weight, contact.stations, compliance.FORCED, turning, step)
 
 
 @merged_kernel
@@ -336,11 +298,11 @@ def _next_station(rows: int, row: int, part: int) -> tuple[int, int]:
 @kernel
 def lane_strains(belt: LaneBelt, state: LaneState, stations: LaneArray) -> None:
     """Strains of elements and rings in the cells, with 1 / (1 + strain) and 1 / content."""
-    fields, offset = state.fields, belt.constants[0, RING_OFFSET]
-    w_b = from_ahead(fields[0, W])
+    fields, offset = state.fields, belt.constants[0, lf.RING_OFFSET]
+    w_b = from_ahead(fields[0, f.W])
     for j in range(fields.rows - 1, -1, -1):
-        w = fields[j, W]
-        cell_strains(belt, stations, j, w, w_b, fields[j, N_ELEMENT], fields[j, N_RING], offset)
+        w = fields[j, f.W]
+        cell_strains(belt, stations, j, w, w_b, fields[j, f.N_ELEMENT], fields[j, f.N_RING], offset)
         w_b = w
 
 
@@ -354,13 +316,13 @@ def cell_strains(belt: LaneBelt, stations: LaneArray, j: int, w, w_b, more_0, mo
         bent = (w + w_b) * (0.5 * kappa)
         length_0, length_1 = bent + 1.0, fma(offset, kappa, bent + 1.0)
         per_length_0, per_length_1 = reciprocals(length_0, length_1)
-        stations[j, EPS_0], stations[j, EPS_1] = (bent - more_0) * per_0, (bent - more_1) * per_1
-        stations[j, SHORT_0] = content_0 * per_length_0
-        stations[j, SHORT_1] = content_1 * per_length_1
+        stations[j, lf.EPS_0], stations[j, lf.EPS_1] = (bent - more_0) * per_0, (bent - more_1) * per_1
+        stations[j, lf.SHORT_0] = content_0 * per_length_0
+        stations[j, lf.SHORT_1] = content_1 * per_length_1
     else:
-        stations[j, EPS_0], stations[j, EPS_1] = -more_0 * per_0, -more_1 * per_1
-        stations[j, SHORT_0], stations[j, SHORT_1] = content_0, content_1
-    stations[j, PER_CONTENT_0], stations[j, PER_CONTENT_1] = per_0, per_1
+        stations[j, lf.EPS_0], stations[j, lf.EPS_1] = -more_0 * per_0, -more_1 * per_1
+        stations[j, lf.SHORT_0], stations[j, lf.SHORT_1] = content_0, content_1
+    stations[j, lf.PER_CONTENT_0], stations[j, lf.PER_CONTENT_1] = per_0, per_1
 
 
 @kernel
@@ -373,36 +335,36 @@ def lane_sliding(belt: LaneBelt, state: LaneState, stations: LaneArray) -> None:
     n, fields, c = state.fields.rows, state.fields, belt.constants
     kind, memory = belt.law.kind, belt.memory
     table = belt.law.table_force, belt.law.table_speed, belt.law.table_mu
-    numbers = law_numbers(c[0, KINETIC_FRICTION], c[0, FRICTION_GRADIENT], c[0, LAW_SPEED])
-    share = lane_speed_share(belt, state.time[0], c[0, BELT_SPEED])
-    per_cosine, belt_speed, offset = 1.0 / c[0, COSINE], share * c[0, BELT_SPEED], c[0, RING_OFFSET]
-    least = LEAST_SHARE_OF_WIDTH * c[0, FRICTION_SPEED]
-    per_width, per_ring_width = 1.0 / c[0, FRICTION_SPEED], 1.0 / c[0, RING_FRICTION_SPEED]
+    numbers = law_numbers(c[0, lf.KINETIC_FRICTION], c[0, lf.FRICTION_GRADIENT], c[0, lf.LAW_SPEED])
+    share = lane_speed_share(belt, state.time[0], c[0, lf.BELT_SPEED])
+    per_cosine, belt_speed, offset = 1.0 / c[0, lf.COSINE], share * c[0, lf.BELT_SPEED], c[0, lf.RING_OFFSET]
+    least = LEAST_SHARE_OF_WIDTH * c[0, lf.FRICTION_SPEED]
+    per_width, per_ring_width = 1.0 / c[0, lf.FRICTION_SPEED], 1.0 / c[0, lf.RING_FRICTION_SPEED]
     pulleys = lane_pulleys(belt, share, state.scalars)
     for j in range(n):
         if not anywhere(belt.arc_share[j] > 0.0):
             continue
-        full_speed = belt_speed + fields[j, V_ELEMENT]
-        slope = (ahead(fields, j, W) - behind(fields, j, W)) * belt.per_span[j]
-        v_radial = fma(full_speed, slope, fields[j, U])
+        full_speed = belt_speed + fields[j, f.V_ELEMENT]
+        slope = (ahead(fields, j, f.W) - behind(fields, j, f.W)) * belt.per_span[j]
+        v_radial = fma(full_speed, slope, fields[j, f.U])
         speed, v_tangential = arc_sliding(
-            belt, j, pulleys, per_cosine, v_radial, fields[j, V_ELEMENT], fields[j, W]
+            belt, j, pulleys, per_cosine, v_radial, fields[j, f.V_ELEMENT], fields[j, f.W]
         )
-        v_law = fields[j, V_FILTERED] if memory else speed
+        v_law = fields[j, f.V_FILTERED] if memory else speed
         if kind == Law.TABLE:
-            coefficient, _ = table_coefficient(table, v_law, stations[j, FORCE] * per_cosine)
+            coefficient, _ = table_coefficient(table, v_law, stations[j, lf.FORCE] * per_cosine)
         else:
             coefficient, _ = formula_coefficient(kind, numbers, v_law)
         # of the flanks tanh(x) = (1 - e^-2x) / (1 + e^-2x) and 1 / speed by one division
         speed = maximum(speed, least)
-        saddle = fma(fma(offset, belt.arc_curvature[j], 1.0), full_speed, -(belt_speed + fields[j, V_RING]))
+        saddle = fma(fma(offset, belt.arc_curvature[j], 1.0), full_speed, -(belt_speed + fields[j, f.V_RING]))
         rest = decay(speed * (2.0 * per_width))
         ring_factor, _ = saturation(saddle, per_ring_width)
         per_flank = 1.0 / (speed * (1.0 + rest))
-        stations[j, SLIDING_R], stations[j, SLIDING_T] = v_radial, v_tangential
-        stations[j, COEFFICIENT] = coefficient
-        stations[j, FACTOR], stations[j, PER_SPEED] = (
+        stations[j, lf.SLIDING_R], stations[j, lf.SLIDING_T] = v_radial, v_tangential
+        stations[j, lf.COEFFICIENT] = coefficient
+        stations[j, lf.FACTOR], stations[j, lf.PER_SPEED] = (
             (1.0 - rest) * (speed * per_flank),
             (1.0 + rest) * per_flank,
         )
-        stations[j, RING_FACTOR], stations[j, SADDLE] = ring_factor, saddle
+        stations[j, lf.RING_FACTOR], stations[j, lf.SADDLE] = ring_factor, saddle

@@ -14,37 +14,15 @@ from numpy.typing import DTypeLike
 
 from cvt_hpc.kernels import kernel, merged_kernel
 from cvt_hpc.lanes import LaneArray, absolute, ahead, behind, fma, like, maximum, select
-from cvt_hpc.models.elastic_belt.belt import N_RING, V_ELEMENT, V_RING, Belt, W
-from cvt_hpc.models.elastic_belt.lane_belt import (
-    BELT_SPEED,
-    RING_OFFSET,
-    RING_STIFFNESS,
-    LaneBelt,
-    LaneState,
-    alike,
-)
+from cvt_hpc.models.elastic_belt import fields as f
+from cvt_hpc.models.elastic_belt import lane_fields as lf
+from cvt_hpc.models.elastic_belt import power_terms
+from cvt_hpc.models.elastic_belt.belt import Belt
+from cvt_hpc.models.elastic_belt.lane_belt import LaneBelt, LaneState, alike
 from cvt_hpc.models.elastic_belt.lane_forces import LEAST_SHARE_OF_WIDTH, lane_speed_share
 from cvt_hpc.models.elastic_belt.moments import SADDLE_FRICTION, SADDLE_POWER, SADDLE_SPEED, add
-from cvt_hpc.models.elastic_belt.power_terms import RING_LOSS, STORED_ENERGY
 from cvt_hpc.models.elastic_belt.rings import FIRST_LAYER, Rings
 from cvt_hpc.physics.layers import ring_friction
-
-# Constants of each lane; from FIRST_OFFSET on the layers' offsets, then by arc and surface the factors of the
-# layer above it and of the one below.
-(
-    LAYER_MASS,
-    LAYER_STIFFNESS,
-    LAYER_DAMPING,
-    LAYER_RELIEF,
-    STATIC_EXCESS,
-    PER_STRIBECK,
-    PER_WIDTH,
-    SADDLE_FRICTION_LEVEL,
-    LAYER_FRICTION_LEVEL,
-    STRESS_RATE,
-    DAMPING_RATE,
-    FIRST_OFFSET,
-) = range(12)
 
 # Sums over the judged part: of surfaces the loss [W] and the mean size of their sliding on both
 # arcs [m/s]; of layers the tension in the middle of both strands [N] and the mean speed [m/s].
@@ -84,7 +62,7 @@ def lane_rings(belts: Sequence[Belt], rings: Sequence[Rings], dtype: DTypeLike) 
         np.float64 or np.float32.
     """
     n, first = rings[0].length.size, belts[0]
-    constants = LaneArray(1, FIRST_OFFSET + n + 4 * (n + 1), len(rings), dtype)
+    constants = LaneArray(1, lf.FIRST_OFFSET + n + 4 * (n + 1), len(rings), dtype)
     for lane, (belt, ring) in enumerate(zip(belts, rings, strict=True)):
         per_cell = 1.0 / belt.cell.min() ** 2 / ring.mass
         factors = []
@@ -124,7 +102,7 @@ def parted_rings(rings: LaneRings, parts: int) -> LaneRings:
 @merged_kernel
 def surface_factors(rings: LaneRings, k: int, is_driven):
     """Factors of the layer above surface k and of the one below, on the arc where a station lies."""
-    first, c = FIRST_OFFSET + rings.number + 2 * k, rings.constants
+    first, c = lf.FIRST_OFFSET + rings.number + 2 * k, rings.constants
     second = first + 2 * (rings.number + 1)
     above = select(is_driven, c[0, second], c[0, first])
     below = select(is_driven, c[0, second + 1], c[0, first + 1])
@@ -135,7 +113,7 @@ def surface_factors(rings: LaneRings, k: int, is_driven):
 def layer_strain(rings: LaneRings, state: LaneState, j: int, k: int, kappa, bent):
     """Strain of layer k in cell j [1], which is bent by kappa w = `bent`."""
     more = state.fields[j, FIRST_LAYER + rings.number + k]
-    content = fma(rings.constants[0, FIRST_OFFSET + k], kappa, more + 1.0)
+    content = fma(rings.constants[0, lf.FIRST_OFFSET + k], kappa, more + 1.0)
     return (bent - more) / content
 
 
@@ -145,7 +123,7 @@ def unite_strains(belt: LaneBelt, rings: LaneRings, state: LaneState, layers: La
     fields = state.fields
     for j in range(fields.rows):
         kappa = belt.curvature[j]
-        bent = (fields[j, W] + ahead(fields, j, W)) * (0.5 * kappa)
+        bent = (fields[j, f.W] + ahead(fields, j, f.W)) * (0.5 * kappa)
         for k in range(rings.number):
             layers[j, k * stride] = layer_strain(rings, state, j, k, kappa, bent)
 
@@ -177,18 +155,18 @@ def audit_layers(
     """
     n, fields, c = rings.number, state.fields, rings.constants
     unite_strains(belt, rings, state, layers, 1)
-    zero = like(0.0, fields[0, W])
+    zero = like(0.0, fields[0, f.W])
     share = lane_speed_share(belt, state.time[0], zero)
-    belt_speed = share * belt.constants[0, BELT_SPEED]
-    relief = c[0, LAYER_RELIEF] * share * share
+    belt_speed = share * belt.constants[0, lf.BELT_SPEED]
+    relief = c[0, lf.LAYER_RELIEF] * share * share
     mass, stiffness, ring_stiffness = (
-        c[0, LAYER_MASS],
-        c[0, LAYER_STIFFNESS],
-        belt.constants[0, RING_STIFFNESS],
+        c[0, lf.LAYER_MASS],
+        c[0, lf.LAYER_STIFFNESS],
+        belt.constants[0, lf.RING_STIFFNESS],
     )
-    offset = belt.constants[0, RING_OFFSET]
+    offset = belt.constants[0, lf.RING_OFFSET]
     summed = profiles.rows > 0
-    least = LEAST_SHARE_OF_WIDTH / c[0, PER_WIDTH]
+    least = LEAST_SHARE_OF_WIDTH / c[0, lf.PER_WIDTH]
     loss = stored = zero
     length = driving = driven = 0.0
     for j in range(fields.rows):
@@ -199,19 +177,19 @@ def audit_layers(
             driven += belt.dual[j] if on_driven else 0.0
     for j in range(fields.rows):
         right, dual, turn = belt.cell[j], belt.dual[j], belt.ring_curvature[j]
-        kappa, united = belt.curvature[j], fields[j, V_RING]
+        kappa, united = belt.curvature[j], fields[j, f.V_RING]
         mean = zero
         for i in range(n):
             v, eps = fields[j, FIRST_LAYER + i], layers[j, i]
-            longer = fma(c[0, FIRST_OFFSET + i], turn, 1.0)
+            longer = fma(c[0, lf.FIRST_OFFSET + i], turn, 1.0)
             stored += (0.5 * dual) * mass * longer * (v - united) * (2.0 * belt_speed + v + united)
-            content = fma(c[0, FIRST_OFFSET + i], kappa, fields[j, FIRST_LAYER + n + i] + 1.0)
+            content = fma(c[0, lf.FIRST_OFFSET + i], kappa, fields[j, FIRST_LAYER + n + i] + 1.0)
             stored += (0.5 * right) * stiffness * content * eps * eps
             mean += eps
             if summed:
                 add(sums, i, SPEED_SUM, (belt_speed + v) * (right / length))
         mean = mean / n
-        content = fma(offset, kappa, fields[j, N_RING] + 1.0)
+        content = fma(offset, kappa, fields[j, f.N_RING] + 1.0)
         stored -= (0.5 * right) * ring_stiffness * content * mean * mean
         if belt.arc_share[j] == 0.0:
             continue
@@ -220,14 +198,20 @@ def audit_layers(
         for i in range(n):
             below += _inward(belt, rings, layers, j, i, stiffness, relief)
             largest = maximum(below, largest)
-        below, under = zero, fields[j, V_ELEMENT]
+        below, under = zero, fields[j, f.V_ELEMENT]
         for i in range(n + 1):
             above_factor, below_factor = surface_factors(rings, i, is_driven)
-            over = fields[j, FIRST_LAYER + i] if i < n else fields[j, V_ELEMENT]
+            over = fields[j, FIRST_LAYER + i] if i < n else fields[j, f.V_ELEMENT]
             sliding = fma(below_factor, belt_speed + under, -above_factor * (belt_speed + over))
-            level = c[0, LAYER_FRICTION_LEVEL] if 0 < i < n else c[0, SADDLE_FRICTION_LEVEL]
+            level = c[0, lf.LAYER_FRICTION_LEVEL] if 0 < i < n else c[0, lf.SADDLE_FRICTION_LEVEL]
             secant, slope = ring_friction(
-                sliding, level, rings.falls, c[0, STATIC_EXCESS], c[0, PER_STRIBECK], c[0, PER_WIDTH], least
+                sliding,
+                level,
+                rings.falls,
+                c[0, lf.STATIC_EXCESS],
+                c[0, lf.PER_STRIBECK],
+                c[0, lf.PER_WIDTH],
+                least,
             )
             drag = dual * (largest - below) * secant * sliding
             loss += drag * sliding
@@ -248,8 +232,12 @@ def audit_layers(
         for strand in range(2):
             for i in range(n):
                 add(sums, i, TENSION + strand, stiffness * layers[rings.middles[strand], i])
-    rows[k, first + RING_LOSS] = rows[k, first + RING_LOSS] + like(loss, rows[k, first])
-    rows[k, first + STORED_ENERGY] = rows[k, first + STORED_ENERGY] + like(stored, rows[k, first])
+    rows[k, first + power_terms.RING_LOSS] = rows[k, first + power_terms.RING_LOSS] + like(
+        loss, rows[k, first]
+    )
+    rows[k, first + power_terms.STORED_ENERGY] = rows[k, first + power_terms.STORED_ENERGY] + like(
+        stored, rows[k, first]
+    )
 
 
 @merged_kernel
@@ -258,6 +246,6 @@ def _inward(belt: LaneBelt, rings: LaneRings, layers: LaneArray, j: int, i: int,
     turn = belt.ring_curvature[j]
     bent = belt.cell[j] * belt.curvature[j] * layers[j, i]
     bent += behind(belt.cell, j, 0) * behind(belt.curvature, j, 0) * behind(layers, j, i)
-    weight = relief * fma(rings.constants[0, FIRST_OFFSET + i], turn, 1.0)
+    weight = relief * fma(rings.constants[0, lf.FIRST_OFFSET + i], turn, 1.0)
     inward = fma(0.5 * belt.per_dual[j] * stiffness, bent, -weight * turn)
     return inward

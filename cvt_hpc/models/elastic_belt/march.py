@@ -6,11 +6,12 @@ from typing import NamedTuple
 
 from cvt_hpc.kernels import kernel
 from cvt_hpc.lanes import LaneArray, like, merge_parts
+from cvt_hpc.models.elastic_belt import lane_fields as lf
 from cvt_hpc.models.elastic_belt.explicit import ExplicitWork, step_explicit
 from cvt_hpc.models.elastic_belt.imex import step_imex
 from cvt_hpc.models.elastic_belt.imex_stations import ImexWork
-from cvt_hpc.models.elastic_belt.lane_belt import LAYER_WORK, LaneBelt, LaneState
-from cvt_hpc.models.elastic_belt.lane_forces import FIELDS_OF_FORCES, derive, note_speeds
+from cvt_hpc.models.elastic_belt.lane_belt import LaneBelt, LaneState
+from cvt_hpc.models.elastic_belt.lane_forces import derive, note_speeds
 from cvt_hpc.models.elastic_belt.sampling import Sensors, sample
 
 
@@ -104,10 +105,12 @@ def take_sample(
     ended: LaneArray,
 ) -> None:
     """Sample the marched belt, which may be in parts."""
-    gather(state, stations, sampled, FIELDS_OF_FORCES)
+    gather(state, stations, sampled, lf.FIELDS_OF_FORCES)
     sample(sampled.belt, sampled.state, sampled.stations, sensing, rows, k, profiles, ended)
     # a sample takes it to its end
-    state.scalars[0, LAYER_WORK] = like(sampled.state.scalars[0, LAYER_WORK], state.scalars[0, LAYER_WORK])
+    state.scalars[0, lf.LAYER_WORK] = like(
+        sampled.state.scalars[0, lf.LAYER_WORK], state.scalars[0, lf.LAYER_WORK]
+    )
 
 
 @kernel

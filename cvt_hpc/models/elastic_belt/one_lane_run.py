@@ -9,9 +9,9 @@ import numpy as np
 
 from cvt_hpc.kernels import called_alike
 from cvt_hpc.lanes import LaneArray
+from cvt_hpc.models.elastic_belt import lane_fields as lf
 from cvt_hpc.models.elastic_belt.belt import Belt, State
 from cvt_hpc.models.elastic_belt.lane_belt import lane_belt, lane_state
-from cvt_hpc.models.elastic_belt.lane_forces import FIELDS_OF_FORCES
 from cvt_hpc.models.elastic_belt.lane_rings import SUMS, audit_layers, lane_rings
 from cvt_hpc.models.elastic_belt.march import sample_state
 from cvt_hpc.models.elastic_belt.momentary import Momentary
@@ -56,7 +56,7 @@ class OneLaneRun(RecordedRun):
             belt = without_saddle_friction(belt)
         self._lane_belt = lane_belt([belt], np.float64)
         self._lane = lane_state([belt], [first], np.float64)
-        self._stations = LaneArray(self.mesh.cell.size, FIELDS_OF_FORCES, 1)
+        self._stations = LaneArray(self.mesh.cell.size, lf.FIELDS_OF_FORCES, 1)
         self._ended = LaneArray(1, len(ENDED), 1)
 
     @property

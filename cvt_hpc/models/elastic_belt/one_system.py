@@ -16,24 +16,9 @@ from typing import NamedTuple
 import numpy as np
 
 from cvt_hpc.kernels import kernel
-from cvt_hpc.models.elastic_belt.belt import (
-    DRIVEN_POSITION,
-    DRIVEN_SPEED,
-    FIELDS,
-    FIRST_STATE,
-    N_ELEMENT,
-    N_RING,
-    SCALARS,
-    TIME,
-    V_ELEMENT,
-    V_FILTERED,
-    V_RING,
-    Belt,
-    State,
-    U,
-    W,
-)
-from cvt_hpc.models.elastic_belt.pulleys import EXCESS, RATIO_SUM, STATES, pulley_rates
+from cvt_hpc.models.elastic_belt import fields as f
+from cvt_hpc.models.elastic_belt.belt import Belt, State
+from cvt_hpc.models.elastic_belt.pulleys import pulley_rates
 from cvt_hpc.models.elastic_belt.rhs import (
     accelerations,
     contact_forces,
@@ -48,15 +33,23 @@ from cvt_hpc.models.elastic_belt.rhs import (
 from cvt_hpc.physics.compliance import Contact
 from cvt_hpc.steppers.system import System
 
-ROWS = (W, U, V_ELEMENT, V_RING, N_ELEMENT, N_RING)  # of the state, as they follow in y
-VELOCITIES = (U, V_ELEMENT, V_RING)
+ROWS = (f.W, f.U, f.V_ELEMENT, f.V_RING, f.N_ELEMENT, f.N_RING)  # of the state, as they follow in y
+VELOCITIES = (f.U, f.V_ELEMENT, f.V_RING)
 
 # Sizes that count alike in each unknown of the default scene: 0.1 mm off the path, 0.1 m/s of sliding, the
 # strain of the rings.
-SIZES = {W: 1e-4, U: 0.1, V_ELEMENT: 0.1, V_RING: 0.1, V_FILTERED: 0.1, N_ELEMENT: 1e-3, N_RING: 1e-3}
+SIZES = {
+    f.W: 1e-4,
+    f.U: 0.1,
+    f.V_ELEMENT: 0.1,
+    f.V_RING: 0.1,
+    f.V_FILTERED: 0.1,
+    f.N_ELEMENT: 1e-3,
+    f.N_RING: 1e-3,
+}
 SIZE_OF_SPEED, SIZE_OF_POSITION = 1.0, 1e-4  # of a pulley [rad/s], [m]
 SIZE_OF_THRUST = 1e3  # [N]
-SIZES_OF_STATES = (SIZE_OF_SPEED, *[SIZE_OF_POSITION] * (RATIO_SUM - 1), SIZE_OF_THRUST, SIZE_OF_THRUST)
+SIZES_OF_STATES = (SIZE_OF_SPEED, *[SIZE_OF_POSITION] * (f.RATIO_SUM - 1), SIZE_OF_THRUST, SIZE_OF_THRUST)
 
 
 class FlatBelt(NamedTuple):
@@ -109,20 +102,20 @@ def flat_belt(belt: Belt, start: float = 0.0) -> FlatBelt:
     arc = belt.arc_share > 0.0
     arc[[0, belt.driven_start]] = False
     remembering = np.flatnonzero(arc & (belt.friction_memory > 0.0))
-    origins = {V_ELEMENT: belt.belt_speed, V_RING: belt.belt_speed, N_ELEMENT: 1.0, N_RING: 1.0}
+    origins = {f.V_ELEMENT: belt.belt_speed, f.V_RING: belt.belt_speed, f.N_ELEMENT: 1.0, f.N_RING: 1.0}
     rows = np.repeat([origins.get(row, 0.0) for row in ROWS], n)
-    loose = FIRST_STATE + np.arange(len(STATES) if belt.pulleys.are_free else 0)
+    loose = f.FIRST_STATE + np.arange(len(f.STATES) if belt.pulleys.are_free else 0)
     driven = [belt.driving_speed / belt.ratio, 0.0]
     origin = np.concatenate([rows, np.zeros(remembering.size + loose.size), driven])
-    state = State(np.zeros((len(FIELDS), n)), np.zeros(len(SCALARS)))
-    work = np.zeros(n), np.zeros((2, n)), np.zeros((len(FIELDS), n)), np.zeros(n)
+    state = State(np.zeros((len(f.FIELDS), n)), np.zeros(len(f.SCALARS)))
+    work = np.zeros(n), np.zeros((2, n)), np.zeros((len(f.FIELDS), n)), np.zeros(n)
     return FlatBelt(belt, state, fresh_contacts(belt), remembering, loose, origin, start, *work)
 
 
 def pack(flat: FlatBelt, state: State) -> np.ndarray:
     """Vector y of a state; its time is not part of it."""
-    rows, filtered = state.fields[list(ROWS)].ravel(), state.fields[V_FILTERED, flat.remembering]
-    scalars = state.scalars[[*flat.loose, DRIVEN_SPEED, DRIVEN_POSITION]]
+    rows, filtered = state.fields[list(ROWS)].ravel(), state.fields[f.V_FILTERED, flat.remembering]
+    scalars = state.scalars[[*flat.loose, f.DRIVEN_SPEED, f.DRIVEN_POSITION]]
     return np.concatenate([rows, filtered, scalars]) - flat.origin
 
 
@@ -135,11 +128,15 @@ def unpack(flat: FlatBelt, t: float, y: np.ndarray) -> None:
             fields[row, j] = origin[k * n + j] + y[k * n + j]
     first = len(ROWS) * n
     for k in range(flat.remembering.size):
-        fields[V_FILTERED, flat.remembering[k]] = y[first + k]
+        fields[f.V_FILTERED, flat.remembering[k]] = y[first + k]
     first += flat.remembering.size
     for k in range(flat.loose.size):
         scalars[flat.loose[k]] = y[first + k]
-    scalars[TIME], scalars[DRIVEN_SPEED], scalars[DRIVEN_POSITION] = flat.start + t, origin[-2] + y[-2], y[-1]
+    scalars[f.TIME], scalars[f.DRIVEN_SPEED], scalars[f.DRIVEN_POSITION] = (
+        flat.start + t,
+        origin[-2] + y[-2],
+        y[-1],
+    )
     set_inlets(flat)
 
 
@@ -148,7 +145,7 @@ def set_inlets(flat: FlatBelt) -> None:
     """Where the belt enters an arc the filtered speed is that of sliding, in `flat.state`."""
     if flat.belt.friction_memory > 0.0:
         for j in (0, flat.belt.driven_start):
-            flat.state.fields[V_FILTERED, j] = sliding_speed(flat.belt, flat.state, j)
+            flat.state.fields[f.V_FILTERED, j] = sliding_speed(flat.belt, flat.state, j)
 
 
 @kernel
@@ -189,14 +186,14 @@ def pulled_by(belt: Belt, force: np.ndarray, moments: np.ndarray) -> np.ndarray:
 @kernel
 def free_rates(belt: Belt, state: State, pull: np.ndarray) -> np.ndarray:
     """Rates of free pulleys, (10,), by `pulled_by`: the driven one's speed and position, and STATES."""
-    scalars, time = state.scalars, state.scalars[TIME]
+    scalars, time = state.scalars, state.scalars[f.TIME]
     found = pulley_rates(
         belt.pulleys.laws,
         0,
-        scalars[FIRST_STATE:],
+        scalars[f.FIRST_STATE :],
         1.0 if time >= belt.rise_time else 0.0,
-        (driving_speed_at(belt, state), scalars[DRIVEN_SPEED]),
-        scalars[DRIVEN_POSITION],
+        (driving_speed_at(belt, state), scalars[f.DRIVEN_SPEED]),
+        scalars[f.DRIVEN_POSITION],
         (pull[0], pull[1], (pull[2], pull[3]), (pull[4], pull[5], pull[6], pull[7])),
         (load_at(belt, time), belt.ratio, belt.thrust, belt.axial_damping),
     )
@@ -240,13 +237,13 @@ def rates(flat: FlatBelt, t: float, y: np.ndarray, out: np.ndarray) -> bool:
     rates_under_forces(flat)
     n = belt.cell.size
     for j in range(n):
-        out[j] = state.fields[U, j]
+        out[j] = state.fields[f.U, j]
     for k in range(1, len(ROWS)):
         for j in range(n):
             out[k * n + j] = rate[ROWS[k], j]
     first = len(ROWS) * n
     for k in range(flat.remembering.size):
-        out[first + k] = rate[V_FILTERED, flat.remembering[k]]
+        out[first + k] = rate[f.V_FILTERED, flat.remembering[k]]
     if flat.loose.size > 0:
         found = free_rates(belt, state, pulled_by(belt, flat.force, flat.moments))
         first += flat.remembering.size
@@ -255,7 +252,7 @@ def rates(flat: FlatBelt, t: float, y: np.ndarray, out: np.ndarray) -> bool:
         out[-2], out[-1] = found[0], found[1]
         return True
     moment = driven_moment(belt, flat.moments)
-    out[-2] = (moment - belt.ratio * load_at(belt, state.scalars[TIME])) / belt.driven_inertia
+    out[-2] = (moment - belt.ratio * load_at(belt, state.scalars[f.TIME])) / belt.driven_inertia
     out[-1] = (driven_thrust(belt, flat.force) - belt.thrust) / belt.axial_damping
     return True
 
@@ -266,8 +263,10 @@ def system(flat: FlatBelt) -> System:
     Velocities are those unknowns whose rates are forces over masses: u, the layers' speeds and the pulley's.
     Of these u alone is the rate of an unknown.
     """
-    is_velocity = np.arange(len(STATES)) == EXCESS
-    moving = _by_row(flat, {row: row in VELOCITIES for row in (*ROWS, V_FILTERED)}, is_velocity, True, False)
+    is_velocity = np.arange(len(f.STATES)) == f.EXCESS
+    moving = _by_row(
+        flat, {row: row in VELOCITIES for row in (*ROWS, f.V_FILTERED)}, is_velocity, True, False
+    )
     n = flat.belt.cell.size
     position_of = np.full(moving.size, -1)
     position_of[n : 2 * n] = np.arange(n)
@@ -279,7 +278,10 @@ def system(flat: FlatBelt) -> System:
 def sizes(belt: Belt) -> dict[int, float]:
     """SIZES in the measures of a scene, by row."""
     size = belt.measures
-    factors = {W: size.length, **dict.fromkeys((U, V_ELEMENT, V_RING, V_FILTERED), size.length / size.time)}
+    factors = {
+        f.W: size.length,
+        **dict.fromkeys((f.U, f.V_ELEMENT, f.V_RING, f.V_FILTERED), size.length / size.time),
+    }
     return {row: default * factors.get(row, 1.0) for row, default in SIZES.items()}
 
 
@@ -290,7 +292,7 @@ def sizes_of_pulley(belt: Belt) -> tuple[float, float]:
 
 def sizes_of_states(belt: Belt) -> np.ndarray:
     """SIZES_OF_STATES in the measures of a scene."""
-    size, positions = belt.measures, RATIO_SUM - 1
+    size, positions = belt.measures, f.RATIO_SUM - 1
     factors = [1.0 / size.time, *[size.length] * positions, size.force, size.force]
     return np.array(SIZES_OF_STATES) * factors
 
@@ -298,5 +300,5 @@ def sizes_of_states(belt: Belt) -> np.ndarray:
 def _by_row(flat: FlatBelt, values: dict[int, float], states: np.ndarray, *scalars: float) -> np.ndarray:
     """One value for each unknown, by its row of the state, or its place in STATES."""
     rows = np.repeat([values[row] for row in ROWS], flat.belt.cell.size)
-    loose = states[flat.loose - FIRST_STATE]
-    return np.concatenate([rows, np.full(flat.remembering.size, values[V_FILTERED]), loose, scalars])
+    loose = states[flat.loose - f.FIRST_STATE]
+    return np.concatenate([rows, np.full(flat.remembering.size, values[f.V_FILTERED]), loose, scalars])

@@ -22,46 +22,12 @@ from __future__ import annotations
 
 from cvt_hpc.kernels import kernel
 from cvt_hpc.lanes import LaneArray, fma, like, maximum, minimum
-from cvt_hpc.models.elastic_belt.belt import FIRST_STATE, N_ELEMENT, V_ELEMENT, V_FILTERED, V_RING, U, W
-from cvt_hpc.models.elastic_belt.lane_belt import (
-    AXIAL_DAMPING,
-    BELT_SPEED,
-    BENDING_STIFFNESS,
-    COLUMN_ENERGY,
-    COLUMN_MOMENT,
-    COSINE,
-    DRIVEN_INERTIA,
-    DRIVEN_RADIUS,
-    DRIVING_POSITION,
-    DRIVING_RADIUS,
-    ELEMENT_DAMPING,
-    ELEMENT_MASS,
-    ELEMENT_STIFFNESS,
-    FRICTION_GRADIENT,
-    FRICTION_SPEED,
-    KINETIC_FRICTION,
-    LAW_SPEED,
-    LAYER_WORK,
-    MASS,
-    POSITION,
-    RATIO,
-    RING_FRICTION,
-    RING_FRICTION_SPEED,
-    RING_MASS,
-    RING_OFFSET,
-    RING_RELIEF,
-    RING_STIFFNESS,
-    SINE,
-    SPEED,
-    THRUST,
-    WEDGE,
-    LaneBelt,
-    LaneState,
-)
+from cvt_hpc.models.elastic_belt import fields as f
+from cvt_hpc.models.elastic_belt import lane_fields as lf
+from cvt_hpc.models.elastic_belt import power_terms
+from cvt_hpc.models.elastic_belt.lane_belt import LaneBelt, LaneState
 from cvt_hpc.models.elastic_belt.lane_column import curving
 from cvt_hpc.models.elastic_belt.lane_forces import (
-    EPS_1,
-    FORCE,
     LEAST_SHARE_OF_WIDTH,
     lane_damping,
     lane_load,
@@ -77,21 +43,7 @@ from cvt_hpc.models.elastic_belt.moments import (
     add_speeds,
     add_stresses,
 )
-from cvt_hpc.models.elastic_belt.power_terms import (
-    BELT_LOSS,
-    DRIVEN_FLANK_LOSS,
-    DRIVING_FLANK_LOSS,
-    DRIVING_POWER,
-    LAG_LOSS,
-    LAYER_LOSS,
-    LOAD_POWER,
-    RING_LOSS,
-    SEATING_LOSS,
-    STORED_ENERGY,
-    THRUST_POWER,
-)
 from cvt_hpc.models.elastic_belt.pulley_step import audit_pulleys, taken_by_clearance
-from cvt_hpc.models.elastic_belt.pulleys import SHIFT
 from cvt_hpc.physics.flank import flank_sliding, tangential_sliding
 from cvt_hpc.physics.friction import formula_coefficient, law_numbers, saturation, table_coefficient
 from cvt_hpc.physics.friction_laws import Law
@@ -127,84 +79,96 @@ def audit(
         MOMENTS of this state are added to its first fields; one without rows takes none.
     """
     n, fields, c, scalars = belt.cell.size, state.fields, belt.constants, state.scalars
-    speed = scalars[0, SPEED]
+    speed = scalars[0, lf.SPEED]
     zero = like(0.0, axial)
     speed_share = lane_speed_share(belt, state.time[0], zero)
-    belt_speed, sine, cosine, wedge = speed_share * c[0, BELT_SPEED], c[0, SINE], c[0, COSINE], c[0, WEDGE]
-    per_cosine, width = 1.0 / cosine, c[0, FRICTION_SPEED]
-    per_width, per_ring_width = 1.0 / width, 1.0 / c[0, RING_FRICTION_SPEED]
+    belt_speed, sine, cosine, wedge = (
+        speed_share * c[0, lf.BELT_SPEED],
+        c[0, lf.SINE],
+        c[0, lf.COSINE],
+        c[0, lf.WEDGE],
+    )
+    per_cosine, width = 1.0 / cosine, c[0, lf.FRICTION_SPEED]
+    per_width, per_ring_width = 1.0 / width, 1.0 / c[0, lf.RING_FRICTION_SPEED]
     kind = belt.law.kind
     table = belt.law.table_force, belt.law.table_speed, belt.law.table_mu
-    numbers = law_numbers(c[0, KINETIC_FRICTION], c[0, FRICTION_GRADIENT], c[0, LAW_SPEED])
+    numbers = law_numbers(c[0, lf.KINETIC_FRICTION], c[0, lf.FRICTION_GRADIENT], c[0, lf.LAW_SPEED])
     least = LEAST_SHARE_OF_WIDTH * width
     damping = lane_damping(belt, state.time[0])
-    element_mass, ring_mass, mass, offset = c[0, ELEMENT_MASS], c[0, RING_MASS], c[0, MASS], c[0, RING_OFFSET]
-    ring_stiffness, element_stiffness = c[0, RING_STIFFNESS], c[0, ELEMENT_STIFFNESS]
-    element_damping, centrifugal = c[0, ELEMENT_DAMPING], mass * belt_speed * belt_speed
+    element_mass, ring_mass, mass, offset = (
+        c[0, lf.ELEMENT_MASS],
+        c[0, lf.RING_MASS],
+        c[0, lf.MASS],
+        c[0, lf.RING_OFFSET],
+    )
+    ring_stiffness, element_stiffness = c[0, lf.RING_STIFFNESS], c[0, lf.ELEMENT_STIFFNESS]
+    element_damping, centrifugal = c[0, lf.ELEMENT_DAMPING], mass * belt_speed * belt_speed
     turnings, surfaces = lane_pulleys(belt, speed_share, scalars)
     omega, surface = turnings[0], surfaces[0]
-    radius = c[0, DRIVING_RADIUS]
-    opening_0 = c[0, DRIVING_POSITION] + like(scalars[0, FIRST_STATE + SHIFT], zero)
-    ring_relief = c[0, RING_RELIEF] * speed_share * speed_share
+    radius = c[0, lf.DRIVING_RADIUS]
+    opening_0 = c[0, lf.DRIVING_POSITION] + like(scalars[0, f.FIRST_STATE + f.SHIFT], zero)
+    ring_relief = c[0, lf.RING_RELIEF] * speed_share * speed_share
     summed = profiles.rows > 0
     driving = turned = driving_rub = rub = ring_loss = belt_loss = seating = zero
-    stored = 0.5 * c[0, DRIVEN_INERTIA] * turnings[1] * turnings[1]
+    stored = 0.5 * c[0, lf.DRIVEN_INERTIA] * turnings[1] * turnings[1]
     for j in range(n):
         if j == belt.driven_start:
-            omega, surface, radius = turnings[1], surfaces[1], c[0, DRIVEN_RADIUS]
-            opening_0 = like(scalars[0, POSITION], zero)
+            omega, surface, radius = turnings[1], surfaces[1], c[0, lf.DRIVEN_RADIUS]
+            opening_0 = like(scalars[0, lf.POSITION], zero)
             driving_rub, rub = rub, zero
             driving, turned = turned, zero
         a, b = j - 1 if j > 0 else n - 1, j + 1 if j < n - 1 else 0
         aa, bb = a - 1 if a > 0 else n - 1, b + 1 if b < n - 1 else 0
         right, dual = belt.cell[j], belt.dual[j]
-        w, u = fields[j, W], fields[j, U]
-        v0, v1 = belt_speed + fields[j, V_ELEMENT], belt_speed + fields[j, V_RING]
-        slope = (fields[b, W] - fields[a, W]) * belt.per_span[j]
+        w, u = fields[j, f.W], fields[j, f.U]
+        v0, v1 = belt_speed + fields[j, f.V_ELEMENT], belt_speed + fields[j, f.V_RING]
+        slope = (fields[b, f.W] - fields[a, f.W]) * belt.per_span[j]
         v_radial = fma(v0, slope, u)
         belt_loss += dual * damping * v_radial * v_radial
-        bent = belt.bending[j, 0] * fields[aa, W] + belt.bending[j, 1] * fields[a, W]
+        bent = belt.bending[j, 0] * fields[aa, f.W] + belt.bending[j, 1] * fields[a, f.W]
         bent += (
-            belt.bending[j, 2] * w + belt.bending[j, 3] * fields[b, W] + belt.bending[j, 4] * fields[bb, W]
+            belt.bending[j, 2] * w
+            + belt.bending[j, 3] * fields[b, f.W]
+            + belt.bending[j, 4] * fields[bb, f.W]
         )
         longer = fma(offset, belt.ring_curvature[j], 1.0)
         ring_here = ring_mass * longer
         moving = element_mass * v0 * v0 + ring_here * v1 * v1 + mass * u * u
-        stored += (0.5 * dual) * (moving - c[0, BENDING_STIFFNESS] * w * bent)
+        stored += (0.5 * dual) * (moving - c[0, lf.BENDING_STIFFNESS] * w * bent)
         if belt.is_curved:
-            stored -= dual * c[0, BENDING_STIFFNESS] * w * belt.bending_load[j]
+            stored -= dual * c[0, lf.BENDING_STIFFNESS] * w * belt.bending_load[j]
         pressed = minimum(pressed_strain(belt, state, stations, j), 0.0)
-        stretched = stations[j, EPS_1]
-        rings = fields[j, N_ELEMENT + 1] + 1.0 + belt.curvature[j] * offset
-        elastic = (fields[j, N_ELEMENT] + 1.0) * element_stiffness * pressed * pressed
+        stretched = stations[j, lf.EPS_1]
+        rings = fields[j, f.N_ELEMENT + 1] + 1.0 + belt.curvature[j] * offset
+        elastic = (fields[j, f.N_ELEMENT] + 1.0) * element_stiffness * pressed * pressed
         if belt.has_column:
-            elastic = (fields[j, N_ELEMENT] + 1.0) * state.column[j, COLUMN_ENERGY]
+            elastic = (fields[j, f.N_ELEMENT] + 1.0) * state.column[j, lf.COLUMN_ENERGY]
         tension, push = ring_stiffness * stretched, -element_stiffness * pressed
-        opening = fields[b, V_ELEMENT] - fields[j, V_ELEMENT]
-        lifting = 0.5 * right * belt.curvature[j] * (u + fields[b, U])
-        lifting += (fields[b, W] - w) * (fields[b, U] - u) * belt.per_cell[j]
-        working = push * opening - tension * (fields[b, V_RING] - fields[j, V_RING])
+        opening = fields[b, f.V_ELEMENT] - fields[j, f.V_ELEMENT]
+        lifting = 0.5 * right * belt.curvature[j] * (u + fields[b, f.U])
+        lifting += (fields[b, f.W] - w) * (fields[b, f.U] - u) * belt.per_cell[j]
+        working = push * opening - tension * (fields[b, f.V_RING] - fields[j, f.V_RING])
         working -= (tension - push - centrifugal) * lifting
         if belt.has_column:
-            working -= state.column[j, COLUMN_MOMENT] * dual * curving(belt, fields, j, U)
+            working -= state.column[j, lf.COLUMN_MOMENT] * dual * curving(belt, fields, j, f.U)
         damped = -element_stiffness * pressed_strain(belt, state, stations, j)
         damped -= element_damping * belt.per_cell[j] * opening
         if summed:
             add_stresses(profiles, j, working, tension, push, maximum(damped, zero) - push)
         stored += (0.5 * right) * (elastic + rings * ring_stiffness * stretched * stretched)
-        v_element, across = fields[j, V_ELEMENT], -damping * v_radial
+        v_element, across = fields[j, f.V_ELEMENT], -damping * v_radial
         if summed:
-            add_speeds(profiles, j, v_radial, u, v_element, fields[j, V_RING])
+            add_speeds(profiles, j, v_radial, u, v_element, fields[j, f.V_RING])
         share = belt.arc_share[j]
         if share == 0.0:
             if summed:
                 add_forces(profiles, j, across, u, across * slope, v_element)
             continue
-        force = stations[j, FORCE]
+        force = stations[j, lf.FORCE]
         v_tangential = tangential_sliding(v_element, w, omega, surface)
         sliding, meridian = flank_sliding(v_radial, v_tangential, per_cosine)
         sliding = maximum(sliding, least)
-        v_law = fields[j, V_FILTERED] if belt.memory else sliding
+        v_law = fields[j, f.V_FILTERED] if belt.memory else sliding
         if kind == Law.TABLE:
             mu, _ = table_coefficient(table, v_law, force * per_cosine)
         else:
@@ -226,30 +190,34 @@ def audit(
             add_flanks(profiles, j, radial, tangential, v_radial, v_tangential)
         lever = fma(offset, belt.arc_curvature[j], 1.0)
         saddle = fma(lever, v0, -v1)
-        ring_left = ring_stiffness * stations[a, EPS_1]
+        ring_left = ring_stiffness * stations[a, lf.EPS_1]
         pressure = saddle_pressure(belt, j, ring_left, tension, ring_relief * longer)
-        grip = c[0, RING_FRICTION] * 0.5 * pressure
+        grip = c[0, lf.RING_FRICTION] * 0.5 * pressure
         factor, _ = saturation(saddle, per_ring_width)
         drag = grip * factor
         ring_loss += drag * saddle
         if summed:
             add_saddles(profiles, j, drag, saddle)
         stored -= 0.5 * share * dual * force * fma(wedge, w, opening_0)
-    thrust = c[0, THRUST]
-    axial_speed = (axial - thrust) / c[0, AXIAL_DAMPING]
-    rows[k, first + DRIVING_POWER] = driving
-    rows[k, first + LOAD_POWER] = like(c[0, RATIO], speed) * lane_load(belt, state.time[0], speed) * speed
-    rows[k, first + THRUST_POWER] = thrust * axial_speed
-    rows[k, first + DRIVING_FLANK_LOSS] = driving_rub
-    rows[k, first + DRIVEN_FLANK_LOSS] = rub
-    rows[k, first + RING_LOSS] = ring_loss
-    rows[k, first + BELT_LOSS] = belt_loss
-    rows[k, first + LAYER_LOSS] = scalars[0, LAYER_WORK] / interval
-    rows[k, first + LAG_LOSS] = c[0, AXIAL_DAMPING] * axial_speed * axial_speed
-    rows[k, first + SEATING_LOSS] = seating
-    rows[k, first + STORED_ENERGY] = stored
+    thrust = c[0, lf.THRUST]
+    axial_speed = (axial - thrust) / c[0, lf.AXIAL_DAMPING]
+    rows[k, first + power_terms.DRIVING_POWER] = driving
+    rows[k, first + power_terms.LOAD_POWER] = (
+        like(c[0, lf.RATIO], speed) * lane_load(belt, state.time[0], speed) * speed
+    )
+    rows[k, first + power_terms.THRUST_POWER] = thrust * axial_speed
+    rows[k, first + power_terms.DRIVING_FLANK_LOSS] = driving_rub
+    rows[k, first + power_terms.DRIVEN_FLANK_LOSS] = rub
+    rows[k, first + power_terms.RING_LOSS] = ring_loss
+    rows[k, first + power_terms.BELT_LOSS] = belt_loss
+    rows[k, first + power_terms.LAYER_LOSS] = scalars[0, lf.LAYER_WORK] / interval
+    rows[k, first + power_terms.LAG_LOSS] = c[0, lf.AXIAL_DAMPING] * axial_speed * axial_speed
+    rows[k, first + power_terms.SEATING_LOSS] = seating
+    rows[k, first + power_terms.STORED_ENERGY] = stored
     if state.contacts[0].has_clearance or state.contacts[1].has_clearance:
-        rows[k, first + STORED_ENERGY] = rows[k, first + STORED_ENERGY] - taken_by_clearance(state)
+        rows[k, first + power_terms.STORED_ENERGY] = rows[
+            k, first + power_terms.STORED_ENERGY
+        ] - taken_by_clearance(state)
     if belt.is_free:
         audit_pulleys(belt, state, like(driving, speed), like(turned, speed), rows, k, first)
-    scalars[0, LAYER_WORK] = 0.0
+    scalars[0, lf.LAYER_WORK] = 0.0

@@ -4,54 +4,23 @@ from __future__ import annotations
 
 from cvt_hpc.kernels import kernel, merged_kernel
 from cvt_hpc.lanes import LaneArray, fma, like, select, sqrt
-from cvt_hpc.models.elastic_belt.belt import FIRST_STATE
-from cvt_hpc.models.elastic_belt.lane_belt import (
-    AXIAL_DAMPING,
-    DRIVEN_INERTIA,
-    DRIVING_SPEED,
-    FIRST_LAW,
-    POSITION,
-    RATIO,
-    SPEED,
-    THRUST,
-    LaneBelt,
-    LaneState,
-)
+from cvt_hpc.models.elastic_belt import fields as f
+from cvt_hpc.models.elastic_belt import lane_fields as lf
+from cvt_hpc.models.elastic_belt import power_terms
+from cvt_hpc.models.elastic_belt.lane_belt import LaneBelt, LaneState
 from cvt_hpc.models.elastic_belt.lane_forces import lane_load, lane_speed_share
-from cvt_hpc.models.elastic_belt.power_terms import (
-    DRIVING_POWER,
-    LAG_LOSS,
-    LOAD_POWER,
-    STORED_ENERGY,
-    THRUST_POWER,
-)
-from cvt_hpc.models.elastic_belt.pulleys import (
-    DRIVEN_COS,
-    DRIVEN_FREE,
-    DRIVEN_MOBILITY,
-    DRIVEN_SPRING_RATE,
-    DRIVEN_TILT,
-    DRIVING_COS,
-    DRIVING_FREE,
-    DRIVING_MOBILITY,
-    DRIVING_SPRING_RATE,
-    DRIVING_TILT,
-    EXCESS,
-    SHIFT,
-    beyond_clearance,
-    drive_torque,
-    pulley_rates,
-)
-from cvt_hpc.physics.compliance import COMPLIANCE, FORCED, LOOSE_1, LOOSE_2, TILT_COMPLIANCE, Contact
+from cvt_hpc.models.elastic_belt.pulleys import beyond_clearance, drive_torque, pulley_rates
+from cvt_hpc.physics import compliance
+from cvt_hpc.physics.compliance import Contact
 
 
 @kernel
 def lane_thrust(state: LaneState):
     """Axial force of the belt on the driven sheave [N]."""
     weight, pushed = state.contacts[1].weight, state.contacts[1].stations
-    total = like(0.0, pushed[0, FORCED])
+    total = like(0.0, pushed[0, compliance.FORCED])
     for k in range(weight.size):
-        total = fma(weight[k], pushed[k, FORCED], total)
+        total = fma(weight[k], pushed[k, compliance.FORCED], total)
     return total
 
 
@@ -61,7 +30,7 @@ def _pull(contact: Contact, pattern):
     pushed = contact.stations
     total, one, other = like(0.0, pattern), like(0.0, pattern), like(0.0, pattern)
     for k in range(contact.weight.size):
-        pressed = contact.weight[k] * like(pushed[k, FORCED], pattern)
+        pressed = contact.weight[k] * like(pushed[k, compliance.FORCED], pattern)
         total = total + pressed
         one, other = fma(contact.cosine[k], pressed, one), fma(contact.sine[k], pressed, other)
     return total, one, other
@@ -74,8 +43,8 @@ def lane_pulley_rates(belt: LaneBelt, state: LaneState, taken, moment):
     Then the tilting forces on the sheaves, four [N], and the axial forces, two [N].
     """
     c, scalars, time = belt.constants, state.scalars, state.time[0]
-    speed = scalars[0, SPEED]
-    first = FIRST_STATE
+    speed = scalars[0, lf.SPEED]
+    first = f.FIRST_STATE
     states = (
         scalars[0, first],
         scalars[0, first + 1],
@@ -86,20 +55,25 @@ def lane_pulley_rates(belt: LaneBelt, state: LaneState, taken, moment):
         scalars[0, first + 6],
         scalars[0, first + 7],
     )
-    course = lane_speed_share(belt, time, speed) * like(c[0, DRIVING_SPEED], speed)
+    course = lane_speed_share(belt, time, speed) * like(c[0, lf.DRIVING_SPEED], speed)
     axial_driving, driving_cos, driving_sin = _pull(state.contacts[0], speed)
     axial_driven, driven_cos, driven_sin = _pull(state.contacts[1], speed)
     tilting = (driving_cos, driving_sin, driven_cos, driven_sin)
     load = lane_load(belt, time, speed)
     found = pulley_rates(
         c,
-        FIRST_LAW,
+        lf.FIRST_LAW,
         states,
         1.0 if time >= belt.rise_time else 0.0,
-        (course + states[EXCESS], speed),
-        scalars[0, POSITION],
+        (course + states[f.EXCESS], speed),
+        scalars[0, lf.POSITION],
         (taken, moment, (axial_driving, axial_driven), tilting),
-        (load, like(c[0, RATIO], speed), like(c[0, THRUST], speed), like(c[0, AXIAL_DAMPING], speed)),
+        (
+            load,
+            like(c[0, lf.RATIO], speed),
+            like(c[0, lf.THRUST], speed),
+            like(c[0, lf.AXIAL_DAMPING], speed),
+        ),
     )
     return found, tilting, (axial_driving, axial_driven)
 
@@ -112,12 +86,12 @@ def advance_pulleys(belt: LaneBelt, state: LaneState, taken, moment, step: float
     `moment` is its torque on the driven one.
     """
     c, scalars = belt.constants, state.scalars
-    speed = scalars[0, SPEED]
+    speed = scalars[0, lf.SPEED]
     if belt.is_free:
         rates, tilting, axial = lane_pulley_rates(belt, state, taken, moment)
-        scalars[0, SPEED] = fma(step, rates[0], speed)
-        scalars[0, POSITION] = fma(step, rates[1], scalars[0, POSITION])
-        first = FIRST_STATE
+        scalars[0, lf.SPEED] = fma(step, rates[0], speed)
+        scalars[0, lf.POSITION] = fma(step, rates[1], scalars[0, lf.POSITION])
+        first = f.FIRST_STATE
         scalars[0, first] = fma(step, rates[2], scalars[0, first])
         scalars[0, first + 1] = fma(step, rates[3], scalars[0, first + 1])
         scalars[0, first + 2] = fma(step, rates[4], scalars[0, first + 2])
@@ -127,12 +101,12 @@ def advance_pulleys(belt: LaneBelt, state: LaneState, taken, moment, step: float
         scalars[0, first + 6] = fma(step, rates[8], scalars[0, first + 6])
         scalars[0, first + 7] = fma(step, rates[9], scalars[0, first + 7])
     else:
-        load = like(c[0, RATIO], speed) * lane_load(belt, state.time[0], speed)
-        scalars[0, SPEED] = speed + step * (moment - load) / like(c[0, DRIVEN_INERTIA], speed)
+        load = like(c[0, lf.RATIO], speed) * lane_load(belt, state.time[0], speed)
+        scalars[0, lf.SPEED] = speed + step * (moment - load) / like(c[0, lf.DRIVEN_INERTIA], speed)
         axial = like(lane_thrust(state), speed)
-        scalars[0, POSITION] = scalars[0, POSITION] + step * (axial - like(c[0, THRUST], speed)) / like(
-            c[0, AXIAL_DAMPING], speed
-        )
+        scalars[0, lf.POSITION] = scalars[0, lf.POSITION] + step * (
+            axial - like(c[0, lf.THRUST], speed)
+        ) / like(c[0, lf.AXIAL_DAMPING], speed)
 
 
 @kernel
@@ -140,25 +114,30 @@ def opening_by_tilt(state: LaneState, wrap: int):
     """Largest opening of a groove by the tilt of its sheaves and the bending of its shaft [m]."""
     scalars = state.scalars
     contact = state.contacts[1] if wrap else state.contacts[0]
-    total, one, other = _pull(contact, scalars[0, SPEED])
-    give = like(contact.scalars[0, COMPLIANCE] * contact.scalars[0, TILT_COMPLIANCE], total)
-    tilted = FIRST_STATE + (DRIVEN_COS if wrap else DRIVING_COS)
+    total, one, other = _pull(contact, scalars[0, lf.SPEED])
+    give = like(
+        contact.scalars[0, compliance.COMPLIANCE] * contact.scalars[0, compliance.TILT_COMPLIANCE], total
+    )
+    tilted = f.FIRST_STATE + (f.DRIVEN_COS if wrap else f.DRIVING_COS)
     one, other = fma(give, one, scalars[0, tilted]), fma(give, other, scalars[0, tilted + 1])
     if contact.has_clearance:
-        one = one + like(contact.scalars[0, LOOSE_1], total)
-        other = other + like(contact.scalars[0, LOOSE_2], total)
+        one = one + like(contact.scalars[0, compliance.LOOSE_1], total)
+        other = other + like(contact.scalars[0, compliance.LOOSE_2], total)
     return sqrt(fma(one, one, other * other))
 
 
 @kernel
 def taken_by_clearance(state: LaneState):
     """Part of half the force times overlap that closed stations do not store [J]: a loose collar takes it."""
-    energy = like(0.0, state.scalars[0, SPEED])
+    energy = like(0.0, state.scalars[0, lf.SPEED])
     for wrap in range(2):
         contact = state.contacts[1] if wrap else state.contacts[0]
         if contact.has_clearance:
             total, one, other = _pull(contact, energy)
-            loose = like(contact.scalars[0, LOOSE_1], energy), like(contact.scalars[0, LOOSE_2], energy)
+            loose = (
+                like(contact.scalars[0, compliance.LOOSE_1], energy),
+                like(contact.scalars[0, compliance.LOOSE_2], energy),
+            )
             energy = fma(0.5 * loose[0], one, fma(0.5 * loose[1], other, energy))
     return energy
 
@@ -181,36 +160,38 @@ def audit_pulleys(
         that pulley's speed [W].
     """
     c, scalars = belt.constants, state.scalars
-    speed = scalars[0, SPEED]
+    speed = scalars[0, lf.SPEED]
     excess, shift, position = (
-        scalars[0, FIRST_STATE + EXCESS],
-        scalars[0, FIRST_STATE + SHIFT],
-        scalars[0, POSITION],
+        scalars[0, f.FIRST_STATE + f.EXCESS],
+        scalars[0, f.FIRST_STATE + f.SHIFT],
+        scalars[0, lf.POSITION],
     )
-    turning = lane_speed_share(belt, state.time[0], speed) * like(c[0, DRIVING_SPEED], speed) + excess
+    turning = lane_speed_share(belt, state.time[0], speed) * like(c[0, lf.DRIVING_SPEED], speed) + excess
     rates, tilting, axial = lane_pulley_rates(belt, state, driving / turning, -driven / speed)
-    mobility = like(c[0, FIRST_LAW + DRIVING_MOBILITY], speed)
-    torque = drive_torque(c, FIRST_LAW, excess, lane_load(belt, state.time[0], speed))
-    rows[k, first + DRIVING_POWER] = select(mobility > 0.0, torque * turning, driving)
-    is_free = like(c[0, FIRST_LAW + DRIVEN_MOBILITY], speed) > 0.0
-    rows[k, first + LOAD_POWER] = select(is_free, rows[k, first + LOAD_POWER], -driven)
-    stored = rows[k, first + STORED_ENERGY]
+    mobility = like(c[0, lf.FIRST_LAW + f.DRIVING_MOBILITY], speed)
+    torque = drive_torque(c, lf.FIRST_LAW, excess, lane_load(belt, state.time[0], speed))
+    rows[k, first + power_terms.DRIVING_POWER] = select(mobility > 0.0, torque * turning, driving)
+    is_free = like(c[0, lf.FIRST_LAW + f.DRIVEN_MOBILITY], speed) > 0.0
+    rows[k, first + power_terms.LOAD_POWER] = select(
+        is_free, rows[k, first + power_terms.LOAD_POWER], -driven
+    )
+    stored = rows[k, first + power_terms.STORED_ENERGY]
     stored += select(mobility > 0.0, 0.5 * turning * turning / mobility, 0.0)
     # both sheaves along the shaft: axial force in, thrust and spring out, the rest is the lag's
-    damping = like(c[0, AXIAL_DAMPING], speed)
+    damping = like(c[0, lf.AXIAL_DAMPING], speed)
     lag = damping * fma(rates[1], rates[1], rates[3] * rates[3])
     springs = (
-        like(c[0, FIRST_LAW + DRIVING_SPRING_RATE], speed) * shift,
-        like(c[0, FIRST_LAW + DRIVEN_SPRING_RATE], speed) * position,
+        like(c[0, lf.FIRST_LAW + f.DRIVING_SPRING_RATE], speed) * shift,
+        like(c[0, lf.FIRST_LAW + f.DRIVEN_SPRING_RATE], speed) * position,
     )
     thrust_power = fma(-damping, rates[1], axial[1] - springs[1]) * rates[1]
     thrust_power += fma(-damping, rates[3], axial[0] - springs[0]) * rates[3]
-    rows[k, first + THRUST_POWER] = thrust_power
+    rows[k, first + power_terms.THRUST_POWER] = thrust_power
     stored += 0.5 * fma(springs[0], shift, springs[1] * position)
     for wrap in range(2):
-        tilted = FIRST_STATE + (DRIVEN_COS if wrap else DRIVING_COS)
-        give = like(c[0, FIRST_LAW + (DRIVEN_TILT if wrap else DRIVING_TILT)], speed)
-        free = like(c[0, FIRST_LAW + (DRIVEN_FREE if wrap else DRIVING_FREE)], speed)
+        tilted = f.FIRST_STATE + (f.DRIVEN_COS if wrap else f.DRIVING_COS)
+        give = like(c[0, lf.FIRST_LAW + (f.DRIVEN_TILT if wrap else f.DRIVING_TILT)], speed)
+        free = like(c[0, lf.FIRST_LAW + (f.DRIVEN_FREE if wrap else f.DRIVING_FREE)], speed)
         one, other = scalars[0, tilted], scalars[0, tilted + 1]
         elastic, beside = beyond_clearance(one, other, free)
         stiffness = select(give > 0.0, 1.0 / give, 0.0)
@@ -221,5 +202,5 @@ def audit_pulleys(
         stored += 0.5 * (
             stiffness * fma(elastic, elastic, beside * beside) - fma(put_in, one, across * other)
         )
-    rows[k, first + LAG_LOSS] = lag
-    rows[k, first + STORED_ENERGY] = stored
+    rows[k, first + power_terms.LAG_LOSS] = lag
+    rows[k, first + power_terms.STORED_ENERGY] = stored

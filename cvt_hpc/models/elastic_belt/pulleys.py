@@ -32,6 +32,7 @@ import numpy as np
 
 from cvt_hpc.kernels import merged_kernel
 from cvt_hpc.lanes import fma, like, maximum, minimum, select, sqrt
+from cvt_hpc.models.elastic_belt import fields as f
 from cvt_hpc.models.elastic_belt.pulley_settings import (
     PULLEY_DEFAULTS,
     are_free,
@@ -41,73 +42,6 @@ from cvt_hpc.models.elastic_belt.pulley_settings import (
 from cvt_hpc.physics import capacity
 from cvt_hpc.physics.sheaves import Sheaves
 from cvt_hpc.variator import PULLEYS
-
-# Constants of the laws, in SI units: mobilities are 1 / J, or 1 / (T_1 k) of the driving sheave, 0 where the
-# speed or the position is given; `tilt_rate` is 1 / T_1, 0 without a lag; `..._tilt` is kappa [m/N], and
-# `..._free` is c [m]; `tracking` is how fast Q_0 follows, `need` [1/m] the force per torque at r.
-LAWS = (
-    "driving_mobility",
-    "driven_mobility",
-    "drive_slope",
-    "driving_axial_mobility",
-    "driving_thrust",
-    "driving_spring_rate",
-    "driven_spring_rate",
-    "driving_oil",
-    "driven_oil",
-    "tracking",
-    "ratio_gain",
-    "ratio_rate",
-    "need",
-    "clamping_gain",
-    "clamping_rate",
-    "least_thrust",
-    "most_thrust",
-    "tilt_rate",
-    "driving_tilt",
-    "driven_tilt",
-    "driving_free",
-    "driven_free",
-)
-(
-    DRIVING_MOBILITY,
-    DRIVEN_MOBILITY,
-    DRIVE_SLOPE,
-    DRIVING_AXIAL_MOBILITY,
-    DRIVING_THRUST,
-    DRIVING_SPRING_RATE,
-    DRIVEN_SPRING_RATE,
-    DRIVING_OIL,
-    DRIVEN_OIL,
-    TRACKING,
-    RATIO_GAIN,
-    RATIO_RATE,
-    NEED,
-    CLAMPING_GAIN,
-    CLAMPING_RATE,
-    LEAST_THRUST,
-    MOST_THRUST,
-    TILT_RATE,
-    DRIVING_TILT,
-    DRIVEN_TILT,
-    DRIVING_FREE,
-    DRIVEN_FREE,
-) = range(len(LAWS))
-
-# States of the pulleys beside the driven one's speed and position: the excess of the driving pulley's speed
-# over its course, and its opening above the one given; openings q of both grooves; the controllers'
-# integrals.
-STATES = (
-    "driving_excess",
-    "driving_shift",
-    "driving_tilt_cos",
-    "driving_tilt_sin",
-    "driven_tilt_cos",
-    "driven_tilt_sin",
-    "ratio_integral",
-    "clamping_integral",
-)
-EXCESS, SHIFT, DRIVING_COS, DRIVING_SIN, DRIVEN_COS, DRIVEN_SIN, RATIO_SUM, CLAMPING_SUM = range(len(STATES))
 
 
 class Pulleys(NamedTuple):
@@ -176,7 +110,7 @@ def with_pulleys(
         "driving_free": free[0],
         "driven_free": free[1],
     }
-    laws = np.array([[named[key] if key in named else p[key] for key in LAWS]])
+    laws = np.array([[named[key] if key in named else p[key] for key in f.LAWS]])
     if lag:
         bent = [wrap._replace(tilt_compliance=0.0) for wrap in bent]
     else:
@@ -188,13 +122,13 @@ def moving_states(pulleys: Pulleys) -> np.ndarray:
     """Places in STATES of the states that can change: other states have no rate, and stay at 0."""
     laws = pulleys.laws[0]
     by = {
-        EXCESS: laws[DRIVING_MOBILITY],
-        SHIFT: laws[DRIVING_AXIAL_MOBILITY],
-        RATIO_SUM: laws[RATIO_RATE],
-        CLAMPING_SUM: laws[CLAMPING_RATE],
-        **dict.fromkeys(range(DRIVING_COS, DRIVEN_SIN + 1), laws[TILT_RATE]),
+        f.EXCESS: laws[f.DRIVING_MOBILITY],
+        f.SHIFT: laws[f.DRIVING_AXIAL_MOBILITY],
+        f.RATIO_SUM: laws[f.RATIO_RATE],
+        f.CLAMPING_SUM: laws[f.CLAMPING_RATE],
+        **dict.fromkeys(range(f.DRIVING_COS, f.DRIVEN_SIN + 1), laws[f.TILT_RATE]),
     }
-    return np.array([state for state in range(len(STATES)) if by[state] > 0.0], dtype=int)
+    return np.array([state for state in range(len(f.STATES)) if by[state] > 0.0], dtype=int)
 
 
 def settled_tilt(pulleys: Pulleys, first: int, tilting: np.ndarray) -> np.ndarray:
@@ -209,10 +143,10 @@ def settled_tilt(pulleys: Pulleys, first: int, tilting: np.ndarray) -> np.ndarra
     tilting : (2,) array
         s [N].
     """
-    laws, which = pulleys.laws[0], int(first == DRIVEN_COS)
-    if laws[TILT_RATE] == 0.0:
+    laws, which = pulleys.laws[0], int(first == f.DRIVEN_COS)
+    if laws[f.TILT_RATE] == 0.0:
         return np.zeros(2)
-    return laws[DRIVING_TILT + which] * tilting + laws[DRIVING_FREE + which] * tilting / np.linalg.norm(
+    return laws[f.DRIVING_TILT + which] * tilting + laws[f.DRIVING_FREE + which] * tilting / np.linalg.norm(
         tilting
     )
 
@@ -250,27 +184,27 @@ def thrusts(laws, first: int, states, going: float, turning, position, axial, gi
         Forces with springs and oil, and rates.
     """
     torque, ratio, thrust = given
-    least, most = like(laws[0, first + LEAST_THRUST], thrust), like(laws[0, first + MOST_THRUST], thrust)
+    least, most = like(laws[0, first + f.LEAST_THRUST], thrust), like(laws[0, first + f.MOST_THRUST], thrust)
     deviation = going * (turning[0] / turning[1] - ratio)
-    asked = like(laws[0, first + DRIVING_THRUST], thrust) + states[RATIO_SUM]
-    asked = fma(like(laws[0, first + RATIO_GAIN], thrust), deviation, asked)
+    asked = like(laws[0, first + f.DRIVING_THRUST], thrust) + states[f.RATIO_SUM]
+    asked = fma(like(laws[0, first + f.RATIO_GAIN], thrust), deviation, asked)
     driving = minimum(maximum(asked, least), most)
-    ratio_rate = like(laws[0, first + RATIO_RATE], thrust) * deviation
+    ratio_rate = like(laws[0, first + f.RATIO_RATE], thrust) * deviation
     # at a limit an integral does not grow beyond it
     ratio_rate = select(asked > most, minimum(ratio_rate, 0.0), ratio_rate)
     ratio_rate = select(asked < least, maximum(ratio_rate, 0.0), ratio_rate)
-    needed = like(laws[0, first + NEED], thrust) * maximum(torque, -torque)
+    needed = like(laws[0, first + f.NEED], thrust) * maximum(torque, -torque)
     lack = going * (needed - minimum(axial[0], axial[1]))
-    asked = fma(like(laws[0, first + CLAMPING_GAIN], thrust), lack, thrust + states[CLAMPING_SUM])
+    asked = fma(like(laws[0, first + f.CLAMPING_GAIN], thrust), lack, thrust + states[f.CLAMPING_SUM])
     driven = minimum(maximum(asked, least), most)
-    clamping_rate = like(laws[0, first + CLAMPING_RATE], thrust) * lack
+    clamping_rate = like(laws[0, first + f.CLAMPING_RATE], thrust) * lack
     clamping_rate = select(asked > most, minimum(clamping_rate, 0.0), clamping_rate)
     clamping_rate = select(asked < least, maximum(clamping_rate, 0.0), clamping_rate)
-    driving = fma(like(laws[0, first + DRIVING_SPRING_RATE], thrust), states[SHIFT], driving)
-    driving = fma(like(laws[0, first + DRIVING_OIL], thrust), turning[0] * turning[0], driving)
-    driven = fma(like(laws[0, first + DRIVEN_SPRING_RATE], thrust), position, driven)
-    driven = fma(like(laws[0, first + DRIVEN_OIL], thrust), turning[1] * turning[1], driven)
-    ratio_rate += (1.0 - going) * like(laws[0, first + TRACKING], thrust) * (axial[0] - driving)
+    driving = fma(like(laws[0, first + f.DRIVING_SPRING_RATE], thrust), states[f.SHIFT], driving)
+    driving = fma(like(laws[0, first + f.DRIVING_OIL], thrust), turning[0] * turning[0], driving)
+    driven = fma(like(laws[0, first + f.DRIVEN_SPRING_RATE], thrust), position, driven)
+    driven = fma(like(laws[0, first + f.DRIVEN_OIL], thrust), turning[1] * turning[1], driven)
+    ratio_rate += (1.0 - going) * like(laws[0, first + f.TRACKING], thrust) * (axial[0] - driving)
     return driving, driven, ratio_rate, clamping_rate
 
 
@@ -278,16 +212,16 @@ def thrusts(laws, first: int, states, going: float, turning, position, axial, gi
 def tilt_rates(laws, first: int, states, tilting):
     """Rates of the grooves' openings [m/s], four, by the tilting forces s of both pulleys [N], four."""
     pattern = tilting[0]
-    rate = like(laws[0, first + TILT_RATE], pattern)
+    rate = like(laws[0, first + f.TILT_RATE], pattern)
     one, other = beyond_clearance(
-        states[DRIVING_COS], states[DRIVING_SIN], like(laws[0, first + DRIVING_FREE], pattern)
+        states[f.DRIVING_COS], states[f.DRIVING_SIN], like(laws[0, first + f.DRIVING_FREE], pattern)
     )
     three, four = beyond_clearance(
-        states[DRIVEN_COS], states[DRIVEN_SIN], like(laws[0, first + DRIVEN_FREE], pattern)
+        states[f.DRIVEN_COS], states[f.DRIVEN_SIN], like(laws[0, first + f.DRIVEN_FREE], pattern)
     )
     driving, driven = (
-        like(laws[0, first + DRIVING_TILT], pattern),
-        like(laws[0, first + DRIVEN_TILT], pattern),
+        like(laws[0, first + f.DRIVING_TILT], pattern),
+        like(laws[0, first + f.DRIVEN_TILT], pattern),
     )
     return (
         rate * fma(driving, tilting[0], -one),
@@ -300,7 +234,7 @@ def tilt_rates(laws, first: int, states, tilting):
 @merged_kernel
 def drive_torque(laws, first: int, excess, load):
     """Torque of the drive [N m] at a speed above its course [rad/s]."""
-    return load - like(laws[0, first + DRIVE_SLOPE], excess) * excess
+    return load - like(laws[0, first + f.DRIVE_SLOPE], excess) * excess
 
 
 @merged_kernel
@@ -327,11 +261,11 @@ def pulley_rates(laws, first: int, states, going: float, turning, position, pull
     driving, driven, ratio_rate, clamping_rate = thrusts(
         laws, first, states, going, turning, position, axial, (load, ratio, thrust)
     )
-    torque = drive_torque(laws, first, states[EXCESS], load)
+    torque = drive_torque(laws, first, states[f.EXCESS], load)
     tilts = tilt_rates(laws, first, states, tilting)
-    excess_rate = like(laws[0, first + DRIVING_MOBILITY], load) * (torque - taken)
-    shift_rate = going * like(laws[0, first + DRIVING_AXIAL_MOBILITY], load) * (axial[0] - driving)
-    speed_rate = like(laws[0, first + DRIVEN_MOBILITY], load) * (moment - ratio * load)
+    excess_rate = like(laws[0, first + f.DRIVING_MOBILITY], load) * (torque - taken)
+    shift_rate = going * like(laws[0, first + f.DRIVING_AXIAL_MOBILITY], load) * (axial[0] - driving)
+    speed_rate = like(laws[0, first + f.DRIVEN_MOBILITY], load) * (moment - ratio * load)
     return (
         speed_rate,
         (axial[1] - driven) / damping,

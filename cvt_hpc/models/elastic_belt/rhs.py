@@ -25,23 +25,9 @@ from __future__ import annotations
 import numpy as np
 
 from cvt_hpc.kernels import kernel, merged_kernel
-from cvt_hpc.models.elastic_belt.belt import (
-    DRIVEN_POSITION,
-    DRIVEN_SPEED,
-    FIRST_STATE,
-    N_ELEMENT,
-    N_RING,
-    TIME,
-    V_ELEMENT,
-    V_FILTERED,
-    V_RING,
-    Belt,
-    State,
-    U,
-    W,
-)
+from cvt_hpc.models.elastic_belt import fields as f
+from cvt_hpc.models.elastic_belt.belt import Belt, State
 from cvt_hpc.models.elastic_belt.column import column_across, column_forces
-from cvt_hpc.models.elastic_belt.pulleys import DRIVEN_COS, DRIVING_COS, EXCESS, SHIFT
 from cvt_hpc.physics.compliance import Contact, plain_contact, solve_wrap
 from cvt_hpc.physics.flank import flank_forces, flank_sliding
 from cvt_hpc.physics.friction import friction_coefficient, saturation
@@ -65,8 +51,8 @@ def speed_share_at(belt: Belt, time: float) -> float:
 @merged_kernel
 def driving_speed_at(belt: Belt, state: State) -> float:
     """Speed of the driving pulley [rad/s]: that of its course, and by how much it deviates from that."""
-    course = speed_share_at(belt, state.scalars[TIME]) * belt.driving_speed
-    return course + state.scalars[FIRST_STATE + EXCESS]
+    course = speed_share_at(belt, state.scalars[f.TIME]) * belt.driving_speed
+    return course + state.scalars[f.FIRST_STATE + f.EXCESS]
 
 
 @merged_kernel
@@ -91,9 +77,9 @@ def strains(belt: Belt, fields: np.ndarray, eps: np.ndarray) -> None:
     n = belt.cell.size
     for c in range(n):
         kappa = belt.curvature[c]
-        w = 0.5 * (fields[W, c] + fields[W, (c + 1) % n])
-        eps[0, c] = (1.0 + kappa * w) / fields[N_ELEMENT, c] - 1.0
-        eps[1, c] = (1.0 + kappa * (w + belt.ring_offset)) / fields[N_RING, c] - 1.0
+        w = 0.5 * (fields[f.W, c] + fields[f.W, (c + 1) % n])
+        eps[0, c] = (1.0 + kappa * w) / fields[f.N_ELEMENT, c] - 1.0
+        eps[1, c] = (1.0 + kappa * (w + belt.ring_offset)) / fields[f.N_RING, c] - 1.0
 
 
 def fresh_contacts(belt: Belt) -> tuple[Contact, Contact]:
@@ -119,13 +105,13 @@ def wrap_contact(
 def contact_forces(belt: Belt, state: State, contacts: tuple[Contact, Contact], force: np.ndarray) -> int:
     """Axial line forces of both wraps into `force` (N,) [N/m], 0 on the strands; 0 solves: failure."""
     force[:] = 0.0
-    w = state.fields[W]
+    w = state.fields[f.W]
     last = belt.driving.weight.size
-    scalars, states = state.scalars, state.scalars[FIRST_STATE:]
-    opening, tilt = belt.driving_position + states[SHIFT], states[DRIVING_COS : DRIVING_COS + 2]
+    scalars, states = state.scalars, state.scalars[f.FIRST_STATE :]
+    opening, tilt = belt.driving_position + states[f.SHIFT], states[f.DRIVING_COS : f.DRIVING_COS + 2]
     solves = wrap_contact(belt, contacts[0], w[:last], opening, tilt, force[:last])
     first, last = belt.driven_start, belt.driven_start + belt.driven.weight.size
-    opening, tilt = scalars[DRIVEN_POSITION], states[DRIVEN_COS : DRIVEN_COS + 2]
+    opening, tilt = scalars[f.DRIVEN_POSITION], states[f.DRIVEN_COS : f.DRIVEN_COS + 2]
     more = wrap_contact(belt, contacts[1], w[first:last], opening, tilt, force[first:last])
     return solves + more if solves > 0 and more > 0 else 0
 
@@ -187,14 +173,14 @@ def accelerations(
         the torque that they take from the driving one [N m].
     """
     n = belt.cell.size
-    w, u = state.fields[W], state.fields[U]
-    v0, v1, vf = state.fields[V_ELEMENT], state.fields[V_RING], state.fields[V_FILTERED]
+    w, u = state.fields[f.W], state.fields[f.U]
+    v0, v1, vf = state.fields[f.V_ELEMENT], state.fields[f.V_RING], state.fields[f.V_FILTERED]
     sine, cosine = np.sin(belt.half_wedge_angle), np.cos(belt.half_wedge_angle)
-    speed_share = speed_share_at(belt, state.scalars[TIME])
+    speed_share = speed_share_at(belt, state.scalars[f.TIME])
     belt_speed, driving_speed = speed_share * belt.belt_speed, driving_speed_at(belt, state)
-    acceleration = belt_acceleration_at(belt, state.scalars[TIME])
+    acceleration = belt_acceleration_at(belt, state.scalars[f.TIME])
     centrifugal = belt.mass * belt_speed * belt_speed
-    damping, light = damping_at(belt, state.scalars[TIME]), belt.mass - belt.element_mass
+    damping, light = damping_at(belt, state.scalars[f.TIME]), belt.mass - belt.element_mass
     pressed, moment = eps[0], eps[0]
     if belt.has_column:
         pressed, moment = np.empty(n), np.empty(n)
@@ -239,7 +225,7 @@ def accelerations(
         if share > 0.0:
             driven = j >= belt.driven_start
             radius = (belt.driven_radius if driven else belt.driving_radius) + w[j]
-            omega = state.scalars[DRIVEN_SPEED] if driven else driving_speed
+            omega = state.scalars[f.DRIVEN_SPEED] if driven else driving_speed
             v_tangential = v0[j] - omega * radius
             speed, _ = flank_sliding(v_radial, v_tangential, 1.0 / cosine)
             v_law = speed if belt.friction_memory == 0.0 else vf[j]
@@ -254,11 +240,11 @@ def accelerations(
             along_ring += drag
             along_element -= (1.0 + belt.ring_offset * belt.arc_curvature[j]) * drag
         along_element += outward * slope
-        rate[U, j] = (transverse + outward) / belt.mass
+        rate[f.U, j] = (transverse + outward) / belt.mass
         along_element -= turning * belt.element_mass * v0[j] * u[j]
         along_ring -= turning * light * v1[j] * u[j]
-        rate[V_ELEMENT, j] = along_element / belt.element_mass - v0[j] * (v0[j] - v0[a]) / left
-        rate[V_RING, j] = along_ring / belt.ring_mass[j] - v1[j] * (v1[j] - v1[a]) / left
+        rate[f.V_ELEMENT, j] = along_element / belt.element_mass - v0[j] * (v0[j] - v0[a]) / left
+        rate[f.V_RING, j] = along_ring / belt.ring_mass[j] - v1[j] * (v1[j] - v1[a]) / left
 
 
 @kernel
@@ -266,7 +252,7 @@ def content_rates(belt: Belt, state: State, eps: np.ndarray, rate: np.ndarray) -
     """Rates of the layers' content [1/s] into rows N_ELEMENT and N_RING: upwind flux v / (1 + eps)."""
     n = belt.cell.size
     for layer in range(2):
-        v, out = state.fields[V_ELEMENT + layer], rate[N_ELEMENT + layer]
+        v, out = state.fields[f.V_ELEMENT + layer], rate[f.N_ELEMENT + layer]
         for c in range(n):
             b = c + 1 if c < n - 1 else 0
             a = c - 1 if c > 0 else n - 1
@@ -279,10 +265,10 @@ def content_rates(belt: Belt, state: State, eps: np.ndarray, rate: np.ndarray) -
 def memory_rates(belt: Belt, state: State, rate: np.ndarray) -> None:
     """Rate of the filtered sliding speed [m/s^2] on the arcs; where the belt enters it is |v| itself."""
     n = belt.cell.size
-    vf = state.fields[V_FILTERED]
-    belt_speed = speed_share_at(belt, state.scalars[TIME]) * belt.belt_speed
+    vf = state.fields[f.V_FILTERED]
+    belt_speed = speed_share_at(belt, state.scalars[f.TIME]) * belt.belt_speed
     for j in range(n):
-        rate[V_FILTERED, j] = 0.0
+        rate[f.V_FILTERED, j] = 0.0
         if belt.arc_share[j] == 0.0 or belt.friction_memory == 0.0:
             continue
         speed = sliding_speed(belt, state, j)
@@ -290,7 +276,7 @@ def memory_rates(belt: Belt, state: State, rate: np.ndarray) -> None:
             vf[j] = speed
         else:
             carried = memory_transport(belt, belt.cell[j - 1], belt_speed)
-            rate[V_FILTERED, j] = carried * (vf[j - 1] - vf[j]) + (speed - vf[j]) / belt.friction_memory
+            rate[f.V_FILTERED, j] = carried * (vf[j - 1] - vf[j]) + (speed - vf[j]) / belt.friction_memory
 
 
 @merged_kernel
@@ -304,10 +290,10 @@ def sliding_speed(belt: Belt, state: State, j: int) -> float:
     """Sliding speed |v| of the flanks at station j of an arc [m/s]."""
     n = belt.cell.size
     a, b = j - 1 if j > 0 else n - 1, j + 1 if j < n - 1 else 0
-    w, v = state.fields[W], state.fields[V_ELEMENT, j]
-    v_radial = state.fields[U, j] + v * (w[b] - w[a]) / (belt.cell[a] + belt.cell[j])
+    w, v = state.fields[f.W], state.fields[f.V_ELEMENT, j]
+    v_radial = state.fields[f.U, j] + v * (w[b] - w[a]) / (belt.cell[a] + belt.cell[j])
     if j >= belt.driven_start:
-        v_tangential = v - state.scalars[DRIVEN_SPEED] * (belt.driven_radius + w[j])
+        v_tangential = v - state.scalars[f.DRIVEN_SPEED] * (belt.driven_radius + w[j])
     else:
         v_tangential = v - driving_speed_at(belt, state) * (belt.driving_radius + w[j])
     speed, _ = flank_sliding(v_radial, v_tangential, 1.0 / np.cos(belt.half_wedge_angle))

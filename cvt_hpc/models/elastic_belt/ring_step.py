@@ -28,36 +28,15 @@ from typing import NamedTuple
 
 from cvt_hpc.kernels import kernel, merged_kernel
 from cvt_hpc.lanes import LaneArray, ahead, anywhere, around, behind, fma, like, maximum, split
-from cvt_hpc.models.elastic_belt.belt import N_RING, V_ELEMENT, V_RING, Belt, W
+from cvt_hpc.models.elastic_belt import fields as f
+from cvt_hpc.models.elastic_belt import lane_fields as lf
+from cvt_hpc.models.elastic_belt.belt import Belt
 from cvt_hpc.models.elastic_belt.imex import MOST_PASSES, advance_belt, forget
-from cvt_hpc.models.elastic_belt.imex_stations import (
-    D_00,
-    D_01,
-    D_11,
-    DV_0,
-    DV_1,
-    Y_0,
-    Y_1,
-    ImexWork,
-    assemble,
-    imex_work,
-)
+from cvt_hpc.models.elastic_belt.imex_stations import ImexWork, assemble, imex_work
 from cvt_hpc.models.elastic_belt.imex_system import TURNS_BACK, eliminate, substitute
-from cvt_hpc.models.elastic_belt.lane_belt import (
-    BELT_SPEED,
-    ELEMENT_MASS,
-    LAYER_WORK,
-    RING_FRICTION_SPEED,
-    RING_OFFSET,
-    LaneBelt,
-    LaneState,
-)
+from cvt_hpc.models.elastic_belt.lane_belt import LaneBelt, LaneState
 from cvt_hpc.models.elastic_belt.lane_forces import (
-    EPS_1,
     LEAST_SHARE_OF_WIDTH,
-    PER_CONTENT_1,
-    SADDLE,
-    SHORT_1,
     advance_discs,
     lane_acceleration,
     lane_contact_forces,
@@ -65,18 +44,6 @@ from cvt_hpc.models.elastic_belt.lane_forces import (
     lane_speed_share,
 )
 from cvt_hpc.models.elastic_belt.lane_rings import (
-    DAMPING_RATE,
-    FIRST_OFFSET,
-    LAYER_DAMPING,
-    LAYER_FRICTION_LEVEL,
-    LAYER_MASS,
-    LAYER_RELIEF,
-    LAYER_STIFFNESS,
-    PER_STRIBECK,
-    PER_WIDTH,
-    SADDLE_FRICTION_LEVEL,
-    STATIC_EXCESS,
-    STRESS_RATE,
     SUMS,
     LaneRings,
     lane_rings,
@@ -188,7 +155,7 @@ def step_rings(belt: LaneBelt, state: LaneState, work: RingWork, step: float) ->
 def heavier_by(rings: LaneRings, step: float):
     """Factor on the inertia of the layers' motion against their mean."""
     c = rings.constants
-    needed = 1.1 * (step * step * c[0, STRESS_RATE] + step * c[0, DAMPING_RATE])
+    needed = 1.1 * (step * step * c[0, lf.STRESS_RATE] + step * c[0, lf.DAMPING_RATE])
     return maximum(needed, 1.0)
 
 
@@ -204,7 +171,7 @@ def force_along(rings: LaneRings, fields: LaneArray, layers: LaneArray, j: int, 
     v_b, first = ahead(fields, j, FIRST_LAYER + k), STRIDE * k
     stress_l = fma(stiffness, behind(layers, j, first), damping * per_left * (v - v_a)) - even_l
     stress_r = fma(stiffness, layers[j, first], damping * per_cell * (v_b - v)) - even_r
-    inertia = heavy * fma(rings.constants[0, FIRST_OFFSET + k], turn, 1.0)
+    inertia = heavy * fma(rings.constants[0, lf.FIRST_OFFSET + k], turn, 1.0)
     moved = fma((belt_speed + v) * per_left, v - v_a, acceleration)
     force = fma(stress_r - stress_l, per_dual, fma(-inertia, moved, carried))
     return force, inertia
@@ -214,16 +181,16 @@ def force_along(rings: LaneRings, fields: LaneArray, layers: LaneArray, j: int, 
 def couple_layers(belt: LaneBelt, rings: LaneRings, state: LaneState, work: RingWork, step: float) -> None:
     """Eliminate the layers: their part of the blocks and right side of elements and rings as one."""
     n, fields, stations, layers, c = rings.number, state.fields, work.stations, work.layers, rings.constants
-    sine = belt.constants[0, RING_OFFSET]
+    sine = belt.constants[0, lf.RING_OFFSET]
     share = lane_speed_share(belt, state.time[0], sine)
-    belt_speed = share * belt.constants[0, BELT_SPEED]
+    belt_speed = share * belt.constants[0, lf.BELT_SPEED]
     acceleration = lane_acceleration(belt, state.time[0], step)
     per_step = 1.0 / step
-    mass, stiffness, damping = c[0, LAYER_MASS], c[0, LAYER_STIFFNESS], c[0, LAYER_DAMPING]
+    mass, stiffness, damping = c[0, lf.LAYER_MASS], c[0, lf.LAYER_STIFFNESS], c[0, lf.LAYER_DAMPING]
     heavier = heavier_by(rings, step)
-    relief = c[0, LAYER_RELIEF] * share * share
-    excess, per_stribeck, per_width = c[0, STATIC_EXCESS], c[0, PER_STRIBECK], c[0, PER_WIDTH]
-    least = LEAST_SHARE_OF_WIDTH * belt.constants[0, RING_FRICTION_SPEED]
+    relief = c[0, lf.LAYER_RELIEF] * share * share
+    excess, per_stribeck, per_width = c[0, lf.STATIC_EXCESS], c[0, lf.PER_STRIBECK], c[0, lf.PER_WIDTH]
+    least = LEAST_SHARE_OF_WIDTH * belt.constants[0, lf.RING_FRICTION_SPEED]
     zero = like(0.0, sine)
     free = 1.0 / (heavier * mass * per_step)
     # reduced masses over the step: of two layers, and of the inner one, with all it takes along, and elements
@@ -233,17 +200,17 @@ def couple_layers(belt: LaneBelt, rings: LaneRings, state: LaneState, work: Ring
     for _ in range(n):
         per_free += free
     per_free = 1.0 / per_free
-    element_mass = belt.constants[0, ELEMENT_MASS]
+    element_mass = belt.constants[0, lf.ELEMENT_MASS]
     at_saddle = inner * element_mass / (inner + element_mass) * per_step
     for j in range(fields.rows):
         dual, per_dual, turn = belt.dual[j], belt.per_dual[j], belt.ring_curvature[j]
         per_cell, per_left = belt.per_cell[j], behind(belt.per_cell, j, 0)
-        united, united_a = fields[j, V_RING], behind(fields, j, V_RING)
-        united_b = ahead(fields, j, V_RING)
+        united, united_a = fields[j, f.V_RING], behind(fields, j, f.V_RING)
+        united_b = ahead(fields, j, f.V_RING)
         # a layer's share of the stress as one, on both sides
-        even_l = fma(stiffness, behind(stations, j, EPS_1), damping * per_left * (united - united_a))
-        even_r = fma(stiffness, stations[j, EPS_1], damping * per_cell * (united_b - united))
-        longer = fma(belt.constants[0, RING_OFFSET], turn, 1.0)
+        even_l = fma(stiffness, behind(stations, j, lf.EPS_1), damping * per_left * (united - united_a))
+        even_r = fma(stiffness, stations[j, lf.EPS_1], damping * per_cell * (united_b - united))
+        longer = fma(belt.constants[0, lf.RING_OFFSET], turn, 1.0)
         carried = fma((belt_speed + united) * per_left, united - united_a, acceleration)
         carried = (heavier - 1.0) * mass * longer * carried
         beside = per_left, per_cell, even_l, even_r
@@ -256,14 +223,14 @@ def couple_layers(belt: LaneBelt, rings: LaneRings, state: LaneState, work: Ring
         )
         on_arc = anywhere(belt.arc_share[j] > 0.0)
         is_driven = belt.on_driven[j] > 0.5
-        element = fields[j, V_ELEMENT]
+        element = fields[j, f.V_ELEMENT]
         left = right = largest = below = zero
         if on_arc:
             left = (0.5 * per_dual) * behind(belt.cell, j, 0) * behind(belt.curvature, j, 0) * stiffness
             right = (0.5 * per_dual) * belt.cell[j] * belt.curvature[j] * stiffness
             for k in range(n):
                 layers[j, STRIDE * k + PART] = below
-                weight = relief * turn * fma(c[0, FIRST_OFFSET + k], turn, 1.0)
+                weight = relief * turn * fma(c[0, lf.FIRST_OFFSET + k], turn, 1.0)
                 inward = fma(left, behind(layers, j, STRIDE * k), fma(right, layers[j, STRIDE * k], -weight))
                 below += inward
                 largest = maximum(below, largest)
@@ -285,7 +252,7 @@ def couple_layers(belt: LaneBelt, rings: LaneRings, state: LaneState, work: Ring
                 under = fields[j, FIRST_LAYER + k - 1] if k > 0 else element
                 over = fields[j, FIRST_LAYER + k]
                 sliding = fma(below_factor, belt_speed + under, -above_factor * (belt_speed + over))
-                level = c[0, LAYER_FRICTION_LEVEL] if k > 0 else c[0, SADDLE_FRICTION_LEVEL]
+                level = c[0, lf.LAYER_FRICTION_LEVEL] if k > 0 else c[0, lf.SADDLE_FRICTION_LEVEL]
                 pressed = largest - layers[j, first + PART]
                 secant, slope = ring_friction(
                     sliding, level * pressed, rings.falls, excess, per_stribeck, per_width, least
@@ -303,7 +270,7 @@ def couple_layers(belt: LaneBelt, rings: LaneRings, state: LaneState, work: Ring
                 above_factor, below_factor = surface_factors(rings, n, is_driven)
                 outer = fields[j, FIRST_LAYER + n - 1]
                 sliding = fma(below_factor, belt_speed + outer, -above_factor * (belt_speed + element))
-                level = bearing * c[0, SADDLE_FRICTION_LEVEL]
+                level = bearing * c[0, lf.SADDLE_FRICTION_LEVEL]
                 secant, slope = ring_friction(
                     sliding, level, rings.falls, excess, per_stribeck, per_width, least
                 )
@@ -353,32 +320,32 @@ def couple_layers(belt: LaneBelt, rings: LaneRings, state: LaneState, work: Ring
             stiff = fma(factor_up * factor_up, stiff_up, ear_stiff - element_element)
             stiff = fma(element_sum * per_common, element_sum, stiff)
             push = fma(-own_sum * per_common, element_sum, own_element + ear_drag - taken)
-            stations[j, D_00] = fma(dual, stiff, stations[j, D_00])
-            stations[j, Y_0] = fma(dual, push, stations[j, Y_0])
+            stations[j, lf.D_00] = fma(dual, stiff, stations[j, lf.D_00])
+            stations[j, lf.Y_0] = fma(dual, push, stations[j, lf.Y_0])
         last = STRIDE * n
         layers[j, last + OWN_SUM], layers[j, last + ELEMENT_SUM] = own_sum, element_sum
         layers[j, last + PER_COMMON_SUM], layers[j, last + ON_EARS] = per_common, bearing
         # the rings as one neither rub nor turn sliding about
-        stations[j, SADDLE] = 0.0
-        stations[j, D_01] = -(n * dual) * element_sum * per_common
+        stations[j, lf.SADDLE] = 0.0
+        stations[j, lf.D_01] = -(n * dual) * element_sum * per_common
         united_rate = n * mass * longer * per_step
-        stations[j, D_11] = dual * fma(-(heavier - 1.0), united_rate, (n * n) * per_common)
-        stations[j, Y_1] = (n * dual) * own_sum * per_common
+        stations[j, lf.D_11] = dual * fma(-(heavier - 1.0), united_rate, (n * n) * per_common)
+        stations[j, lf.Y_1] = (n * dual) * own_sum * per_common
 
 
 @kernel
 def advance_layers(belt: LaneBelt, rings: LaneRings, state: LaneState, work: RingWork, step: float) -> None:
     """Apply the layers' increments; their strains, and those of the rings as one."""
     n, fields, stations, layers, c = rings.number, state.fields, work.stations, work.layers, rings.constants
-    offset = belt.constants[0, RING_OFFSET]
-    belt_speed = lane_speed_share(belt, state.time[0], offset) * belt.constants[0, BELT_SPEED]
-    damping, last = c[0, LAYER_DAMPING], STRIDE * n
-    free = step / (heavier_by(rings, step) * c[0, LAYER_MASS])
+    offset = belt.constants[0, lf.RING_OFFSET]
+    belt_speed = lane_speed_share(belt, state.time[0], offset) * belt.constants[0, lf.BELT_SPEED]
+    damping, last = c[0, lf.LAYER_DAMPING], STRIDE * n
+    free = step / (heavier_by(rings, step) * c[0, lf.LAYER_MASS])
     lost = zero = offset * 0.0
     for j in range(fields.rows + 1):
         if j < fields.rows:
-            element = stations[j, DV_0]
-            common = fma(stations[j, DV_1], n, -layers[j, last + OWN_SUM])
+            element = stations[j, lf.DV_0]
+            common = fma(stations[j, lf.DV_1], n, -layers[j, last + OWN_SUM])
             common = fma(-layers[j, last + ELEMENT_SUM], element, common) * layers[j, last + PER_COMMON_SUM]
             on_arc = anywhere(belt.arc_share[j] > 0.0)
             on_ears = on_arc and anywhere(layers[j, last + ON_EARS] > 0.0)
@@ -400,13 +367,13 @@ def advance_layers(belt: LaneBelt, rings: LaneRings, state: LaneState, work: Rin
                 eps = behind(layers, j, first)
                 short = fma(-eps, fma(-eps, 1.0 - eps, 1.0), 1.0)
                 layers[j, first + PART] = fma(-belt_speed, eps, v) * short
-            fields[j, V_RING] = total / n
+            fields[j, f.V_RING] = total / n
         if j > 0:
             # the cell behind the station, whose old strain is no longer needed
             i = j - 1
             kappa, per_cell = belt.curvature[i], belt.per_cell[i]
-            bent = (fields[i, W] + ahead(fields, i, W)) * (0.5 * kappa)
-            united, mean = ahead(fields, i, V_RING) - fields[i, V_RING], zero
+            bent = (fields[i, f.W] + ahead(fields, i, f.W)) * (0.5 * kappa)
+            united, mean = ahead(fields, i, f.V_RING) - fields[i, f.V_RING], zero
             for k in range(n):
                 first, row = STRIDE * k, FIRST_LAYER + n + k
                 outflow = ahead(layers, i, first + PART) - layers[i, first + PART]
@@ -418,8 +385,8 @@ def advance_layers(belt: LaneBelt, rings: LaneRings, state: LaneState, work: Rin
                 lost = fma(damping * per_cell * closing, closing, lost)
             mean = mean / n
             longer, short = fma(offset, kappa, 1.0), 1.0 / (mean + 1.0)
-            stations[i, EPS_1], stations[i, SHORT_1] = mean, short
-            stations[i, PER_CONTENT_1] = (mean + 1.0) / (bent + longer)
-            fields[i, N_RING] = fma(-longer, mean, bent) * short
-    work_done = state.scalars[0, LAYER_WORK]
-    state.scalars[0, LAYER_WORK] = work_done + around(like(lost, work_done)) * step
+            stations[i, lf.EPS_1], stations[i, lf.SHORT_1] = mean, short
+            stations[i, lf.PER_CONTENT_1] = (mean + 1.0) / (bent + longer)
+            fields[i, f.N_RING] = fma(-longer, mean, bent) * short
+    work_done = state.scalars[0, lf.LAYER_WORK]
+    state.scalars[0, lf.LAYER_WORK] = work_done + around(like(lost, work_done)) * step

@@ -12,8 +12,9 @@ from typing import Any, NamedTuple
 import numpy as np
 
 from cvt_hpc.kernels import kernel
+from cvt_hpc.models.elastic_belt import fields as f
 from cvt_hpc.models.elastic_belt import one_system
-from cvt_hpc.models.elastic_belt.belt import N_RING, TIME, V_ELEMENT, V_RING, Belt, Mesh, State
+from cvt_hpc.models.elastic_belt.belt import Belt, Mesh, State
 from cvt_hpc.models.elastic_belt.one_system import ROWS, FlatBelt, sizes
 from cvt_hpc.models.elastic_belt.rhs import speed_share_at
 from cvt_hpc.models.elastic_belt.rings import (
@@ -66,7 +67,7 @@ def pack(flat: FlatRings, state: State) -> np.ndarray:
     """Vector y of a state with layers; its time is not part of it."""
     n = flat.rings.length.size
     one = one_system.pack(flat.flat, State(state.fields[:FIRST_LAYER], state.scalars))
-    for row in (V_RING, N_RING):
+    for row in (f.V_RING, f.N_RING):
         first = ROWS.index(row) * state.fields.shape[1]
         one[first : first + state.fields.shape[1]] = 0.0
     layers = state.fields[FIRST_LAYER:].copy()
@@ -88,7 +89,7 @@ def unpack(flat: FlatRings, t: float, y: np.ndarray) -> None:
     unite_layers(belt, flat.rings, flat.state, flat.eps)
     for place in range(len(ROWS)):
         row = ROWS[place]
-        if row == V_RING or row == N_RING:
+        if row == f.V_RING or row == f.N_RING:
             for j in range(cells):
                 one[place * cells + j] = fields[row, j] - flat.flat.origin[place * cells + j]
     one_system.unpack(flat.flat, t, one)
@@ -103,15 +104,15 @@ def rates(flat: FlatRings, t: float, y: np.ndarray, out: np.ndarray) -> bool:
     belt, m, cells = flat.flat.belt, flat.one.size, flat.flat.belt.cell.size
     if not one_system.rates(flat.flat, t, flat.one, out[:m]):
         return False
-    share = speed_share_at(belt, flat.state.scalars[TIME])
+    share = speed_share_at(belt, flat.state.scalars[f.TIME])
     layer_rates(belt, flat.rings, flat.state, flat.eps, share, flat.rate)
     n = flat.rings.length.size
     for place in range(len(ROWS)):
         row = ROWS[place]
         for j in range(cells):
-            if row == V_RING or row == N_RING:
+            if row == f.V_RING or row == f.N_RING:
                 out[place * cells + j] = 0.0
-            elif row == V_ELEMENT:
+            elif row == f.V_ELEMENT:
                 out[place * cells + j] += flat.rate[2 * n, j]
     for k in range(2 * n):
         for j in range(cells):
@@ -124,12 +125,12 @@ def system(flat: FlatRings) -> System:
     one = one_system.system(flat.flat)
     cells, n = flat.flat.belt.cell.size, flat.rings.length.size
     velocities = one.velocities.copy()
-    first = ROWS.index(V_RING) * cells
+    first = ROWS.index(f.V_RING) * cells
     velocities[first : first + cells] = False
     moving = np.concatenate([velocities, np.repeat([True, False], n * cells)])
     position_of = np.concatenate([one.position_of, np.full(2 * n * cells, -1)])
     size = sizes(flat.flat.belt)
-    scale = np.concatenate([one.scale, np.repeat([size[V_RING], size[N_RING]], n * cells)])
+    scale = np.concatenate([one.scale, np.repeat([size[f.V_RING], size[f.N_RING]], n * cells)])
     return System(rates, flat, moving, position_of, scale)
 
 

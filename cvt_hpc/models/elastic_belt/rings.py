@@ -24,12 +24,13 @@ from typing import Any, NamedTuple
 import numpy as np
 
 from cvt_hpc.kernels import kernel
-from cvt_hpc.models.elastic_belt.belt import FIELDS, N_RING, V_ELEMENT, V_RING, Belt, State, W
+from cvt_hpc.models.elastic_belt import fields as f
+from cvt_hpc.models.elastic_belt.belt import Belt, State
 from cvt_hpc.models.elastic_belt.lane_forces import LEAST_SHARE_OF_WIDTH
 from cvt_hpc.models.elastic_belt.ring_settings import RING_DEFAULTS, layer_count
 from cvt_hpc.physics.layers import ring_friction, stack_forces
 
-FIRST_LAYER = len(FIELDS)  # row of a state with the first layer's speed
+FIRST_LAYER = len(f.FIELDS)  # row of a state with the first layer's speed
 
 
 class Rings(NamedTuple):
@@ -109,12 +110,12 @@ def with_layers(state: State, belt: Belt, rings: Rings) -> State:
     n = rings.length.size
     fields = np.zeros((FIRST_LAYER + 2 * n, belt.cell.size))
     fields[:FIRST_LAYER] = state.fields
-    w = state.fields[W]
+    w = state.fields[f.W]
     bent = belt.curvature * 0.5 * (w + np.roll(w, -1))
     for k in range(n):
         stretched = 1.0 + bent + belt.curvature * rings.offset[k]
         content = stretched * rings.length[k] / (belt.cell @ stretched)
-        fields[FIRST_LAYER + k] = state.fields[V_RING]
+        fields[FIRST_LAYER + k] = state.fields[f.V_RING]
         fields[FIRST_LAYER + n + k] = content - 1.0 - belt.curvature * rings.offset[k]
     found = State(fields, state.scalars.copy())
     unite_layers(belt, rings, found, np.empty((n, belt.cell.size)))
@@ -128,15 +129,15 @@ def unite_layers(belt: Belt, rings: Rings, state: State, eps: np.ndarray) -> Non
     cells = belt.cell.size
     for c in range(cells):
         kappa = belt.curvature[c]
-        bent = kappa * 0.5 * (fields[W, c] + fields[W, (c + 1) % cells])
+        bent = kappa * 0.5 * (fields[f.W, c] + fields[f.W, (c + 1) % cells])
         strain = speed = 0.0
         for k in range(n):
             more = fields[FIRST_LAYER + n + k, c]
             eps[k, c] = (bent - more) / (1.0 + kappa * rings.offset[k] + more)
             strain += eps[k, c]
             speed += fields[FIRST_LAYER + k, c]
-        fields[V_RING, c] = speed / n
-        fields[N_RING, c] = (1.0 + bent + kappa * belt.ring_offset) / (1.0 + strain / n)
+        fields[f.V_RING, c] = speed / n
+        fields[f.N_RING, c] = (1.0 + bent + kappa * belt.ring_offset) / (1.0 + strain / n)
 
 
 @kernel
@@ -165,7 +166,7 @@ def surface_friction(
         weight = rings.relief * share * share * (1.0 + rings.offset[k] * turn)
         inward[k] = tension - weight * turn
     stack_forces(inward, normal)
-    below = element = state.fields[V_ELEMENT, j]
+    below = element = state.fields[f.V_ELEMENT, j]
     for k in range(n + 1):
         above = state.fields[FIRST_LAYER + k, j] / (1.0 + rings.offset[k] * kappa) if k < n else element
         sliding[k] = (1.0 + rings.surface[k] * kappa) * (below - above)

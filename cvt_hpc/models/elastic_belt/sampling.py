@@ -10,25 +10,11 @@ import numpy as np
 
 from cvt_hpc.kernels import kernel
 from cvt_hpc.lanes import LaneArray, absolute, fma, like, maximum, minimum, select
-from cvt_hpc.models.elastic_belt.belt import FIELDS, FIRST_STATE, MODES, REGIONS, V_ELEMENT, Mesh, W
-from cvt_hpc.models.elastic_belt.lane_belt import (
-    BELT_SPEED,
-    DRIVING_POSITION,
-    DRIVING_SPEED,
-    ELEMENT_STIFFNESS,
-    MASS,
-    POSITION,
-    RATIO,
-    REPEATS,
-    RING_STIFFNESS,
-    SPEED,
-    LaneBelt,
-    LaneState,
-)
+from cvt_hpc.models.elastic_belt import fields as f
+from cvt_hpc.models.elastic_belt import lane_fields as lf
+from cvt_hpc.models.elastic_belt.belt import MODES, REGIONS, Mesh
+from cvt_hpc.models.elastic_belt.lane_belt import LaneBelt, LaneState
 from cvt_hpc.models.elastic_belt.lane_forces import (
-    EPS_0,
-    EPS_1,
-    FORCE,
     lane_load,
     lane_pulleys,
     lane_speed_share,
@@ -39,8 +25,7 @@ from cvt_hpc.models.elastic_belt.moments import MOMENTS, add
 from cvt_hpc.models.elastic_belt.power import audit
 from cvt_hpc.models.elastic_belt.power_terms import POWERS
 from cvt_hpc.models.elastic_belt.pulley_step import opening_by_tilt
-from cvt_hpc.models.elastic_belt.pulleys import EXCESS, SHIFT
-from cvt_hpc.physics.compliance import SOLVES, UNSOLVED
+from cvt_hpc.physics import compliance
 from cvt_hpc.physics.flank import tangential_sliding
 from cvt_hpc.variator import LEAST_SPEED, MOST_SPEED
 
@@ -216,37 +201,37 @@ def sample(
     _watch(belt, state, stations, ended)
     fields, c = state.fields, belt.constants
     sensed = sensing.matrix.shape[0]
-    zero = like(0.0, fields[0, W])
+    zero = like(0.0, fields[0, f.W])
     for s in range(sensed):
         total = zero
         for j in range(sensing.begins[s], sensing.ends[s]):
-            total = fma(sensing.matrix[s, j], fields[j, W], total)
+            total = fma(sensing.matrix[s, j], fields[j, f.W], total)
         rows[k, s] = total
-    speed = state.scalars[0, SPEED]
+    speed = state.scalars[0, lf.SPEED]
     share = lane_speed_share(belt, state.time[0], zero)
-    belt_speed = share * c[0, BELT_SPEED]
+    belt_speed = share * c[0, lf.BELT_SPEED]
     rows[k, sensed + Scalar.LOAD] = lane_load(belt, state.time[0], speed)
     rows[k, sensed + Scalar.DRIVEN_SPEED] = speed
-    rows[k, sensed + Scalar.DRIVEN_POSITION] = state.scalars[0, POSITION]
-    element_stiffness, ring_stiffness = c[0, ELEMENT_STIFFNESS], c[0, RING_STIFFNESS]
-    centrifugal = c[0, MASS] * belt_speed * belt_speed
+    rows[k, sensed + Scalar.DRIVEN_POSITION] = state.scalars[0, lf.POSITION]
+    element_stiffness, ring_stiffness = c[0, lf.ELEMENT_STIFFNESS], c[0, lf.RING_STIFFNESS]
+    centrifugal = c[0, lf.MASS] * belt_speed * belt_speed
     least = like(np.inf, zero)
     for strand in range(2):
         middle = sensing.middles[strand]
-        rows[k, sensed + Scalar.RING_TENSION_T1 + strand] = ring_stiffness * stations[middle, EPS_1]
+        rows[k, sensed + Scalar.RING_TENSION_T1 + strand] = ring_stiffness * stations[middle, lf.EPS_1]
         rows[k, sensed + Scalar.PUSH_FORCE_T1 + strand] = maximum(
             -element_stiffness * pressed_strain(belt, state, stations, middle), 0.0
         )
         for j in range(sensing.starts[strand], sensing.stops[strand]):
-            net = ring_stiffness * stations[j, EPS_1]
+            net = ring_stiffness * stations[j, lf.EPS_1]
             pressed = minimum(pressed_strain(belt, state, stations, j), 0.0)
             net = fma(element_stiffness, pressed, net)
             least = minimum(net, least)
     rows[k, sensed + Scalar.LEAST_STRAND_FORCE] = least - centrifugal
-    driving_speed = like(c[0, DRIVING_SPEED], speed) * lane_speed_share(belt, state.time[0], speed)
-    rows[k, sensed + Scalar.DRIVING_SPEED] = driving_speed + state.scalars[0, FIRST_STATE + EXCESS]
-    shift = state.scalars[0, FIRST_STATE + SHIFT]
-    rows[k, sensed + Scalar.DRIVING_POSITION] = like(c[0, DRIVING_POSITION], speed) + shift
+    driving_speed = like(c[0, lf.DRIVING_SPEED], speed) * lane_speed_share(belt, state.time[0], speed)
+    rows[k, sensed + Scalar.DRIVING_SPEED] = driving_speed + state.scalars[0, f.FIRST_STATE + f.EXCESS]
+    shift = state.scalars[0, f.FIRST_STATE + f.SHIFT]
+    rows[k, sensed + Scalar.DRIVING_POSITION] = like(c[0, lf.DRIVING_POSITION], speed) + shift
     turnings, surfaces = lane_pulleys(belt, share, state.scalars)
     axial = zero
     for wrap in range(2):
@@ -256,8 +241,10 @@ def sample(
         axial = sliding = open_length = zero
         length = 0.0
         for i in range(weight.size):
-            force = stations[first + i, FORCE]
-            slides = tangential_sliding(fields[first + i, V_ELEMENT], fields[first + i, W], turning, surface)
+            force = stations[first + i, lf.FORCE]
+            slides = tangential_sliding(
+                fields[first + i, f.V_ELEMENT], fields[first + i, f.W], turning, surface
+            )
             axial += weight[i] * force
             sliding += weight[i] * force * slides
             open_length += select(force > 0.0, zero, weight[i])
@@ -269,32 +256,34 @@ def sample(
     audit(belt, state, stations, axial, sensing.interval, rows, k, sensed + len(SCALARS), profiles)
     rows[k, sensed + STEP_RIPPLE] = step_ripple(belt, state, stations)
     for j in range(profiles.rows):
-        add(profiles, j, CONTACT_FORCE, stations[j, FORCE])
-        add(profiles, j, MEAN_DISPLACEMENT, fields[j, W])
+        add(profiles, j, CONTACT_FORCE, stations[j, lf.FORCE])
+        add(profiles, j, MEAN_DISPLACEMENT, fields[j, f.W])
 
 
 @kernel
 def _watch(belt: LaneBelt, state: LaneState, stations: LaneArray, ended: LaneArray) -> None:
     """Find the lanes whose state is out of bounds."""
     n, fields = belt.cell.size, state.fields
-    content = largest = strain = element_strain = like(0.0, fields[0, W])
+    content = largest = strain = element_strain = like(0.0, fields[0, f.W])
     for j in range(n):
-        for field in range(len(FIELDS)):
+        for field in range(len(f.FIELDS)):
             # 0 times what is not a number or infinite is not a number
             content = fma(fields[j, field], 0.0, content)
-        largest = maximum(absolute(fields[j, W]), largest)
-        strain = maximum(absolute(stations[j, EPS_1]), strain)
-        element_strain = maximum(absolute(stations[j, EPS_0]), element_strain)
-    speed, c = state.scalars[0, SPEED], belt.constants
-    total = fma(speed, 0.0, fma(state.scalars[0, POSITION], 0.0, like(content, speed)))
-    nominal = like(c[0, DRIVING_SPEED] / c[0, RATIO], speed)
+        largest = maximum(absolute(fields[j, f.W]), largest)
+        strain = maximum(absolute(stations[j, lf.EPS_1]), strain)
+        element_strain = maximum(absolute(stations[j, lf.EPS_0]), element_strain)
+    speed, c = state.scalars[0, lf.SPEED], belt.constants
+    total = fma(speed, 0.0, fma(state.scalars[0, lf.POSITION], 0.0, like(content, speed)))
+    nominal = like(c[0, lf.DRIVING_SPEED] / c[0, lf.RATIO], speed)
     nominal = nominal * lane_speed_share(belt, state.time[0], speed)
-    nominal = nominal + state.scalars[0, FIRST_STATE + EXCESS] / like(c[0, RATIO], speed)
+    nominal = nominal + state.scalars[0, f.FIRST_STATE + f.EXCESS] / like(c[0, lf.RATIO], speed)
     code = like(Outcome.OK.value, speed)
     beyond = maximum(like(element_strain, speed) - LARGEST_ELEMENT_STRAIN, 0.0)
     beyond = maximum(like(strain, speed) - LARGEST_STRAIN, beyond)
     code = select(beyond > 0.0, Outcome.OVERSTRAINED.value, code)
-    unsolved = state.contacts[0].scalars[0, UNSOLVED] + state.contacts[1].scalars[0, UNSOLVED]
+    unsolved = (
+        state.contacts[0].scalars[0, compliance.UNSOLVED] + state.contacts[1].scalars[0, compliance.UNSOLVED]
+    )
     code = select(like(unsolved, speed) > 0.0, Outcome.NO_CONTACT_SOLUTION.value, code)
     code = select(speed < LEAST_SPEED * nominal, Outcome.SLIPPED_THROUGH.value, code)
     code = select(speed > MOST_SPEED * nominal, Outcome.RAN_AWAY.value, code)
@@ -302,7 +291,7 @@ def _watch(belt: LaneBelt, state: LaneState, stations: LaneArray, ended: LaneArr
     code = select(total <= 0.0, code, Outcome.NOT_FINITE.value)
     running = ended[0, OUTCOME] < 0.5
     ended[0, ENDED_AT] = select(running, like(state.time[0], speed), ended[0, ENDED_AT])
-    solves = state.contacts[0].scalars[0, SOLVES] + state.contacts[1].scalars[0, SOLVES]
+    solves = state.contacts[0].scalars[0, compliance.SOLVES] + state.contacts[1].scalars[0, compliance.SOLVES]
     ended[0, CONTACT_SOLVES] = select(running, like(solves, speed), ended[0, CONTACT_SOLVES])
-    ended[0, REPEATED] = select(running, state.scalars[0, REPEATS], ended[0, REPEATED])
+    ended[0, REPEATED] = select(running, state.scalars[0, lf.REPEATS], ended[0, REPEATED])
     ended[0, OUTCOME] = select(running, code, ended[0, OUTCOME])

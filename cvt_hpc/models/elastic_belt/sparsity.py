@@ -9,7 +9,7 @@ from __future__ import annotations
 import numpy as np
 from scipy.sparse import csc_array
 
-from cvt_hpc.models.elastic_belt.belt import N_ELEMENT, N_RING, V_ELEMENT, V_FILTERED, V_RING, U, W
+from cvt_hpc.models.elastic_belt import fields as f
 from cvt_hpc.models.elastic_belt.one_system import ROWS, FlatBelt, rates, system
 from cvt_hpc.steppers.system import RELATIVE_INCREMENT
 
@@ -17,31 +17,38 @@ SPEED, OPENING = -1, -2  # of the driven pulley, beside the rows of the state
 
 # rate: {unknown: stations behind it (negative) to stations ahead of it that act on it}
 REACH = {
-    W: {U: (0, 0)},
-    U: {W: (-2, 2), U: (-1, 1), V_ELEMENT: (0, 0), V_FILTERED: (0, 0), N_ELEMENT: (-1, 0), N_RING: (-1, 0)},
-    V_ELEMENT: {
-        W: (-1, 1),
-        U: (0, 0),
-        V_ELEMENT: (-1, 1),
-        V_RING: (0, 0),
-        V_FILTERED: (0, 0),
-        N_ELEMENT: (-1, 0),
-        N_RING: (-1, 0),
+    f.W: {f.U: (0, 0)},
+    f.U: {
+        f.W: (-2, 2),
+        f.U: (-1, 1),
+        f.V_ELEMENT: (0, 0),
+        f.V_FILTERED: (0, 0),
+        f.N_ELEMENT: (-1, 0),
+        f.N_RING: (-1, 0),
     },
-    V_RING: {W: (-1, 1), V_ELEMENT: (0, 0), V_RING: (-1, 1), N_RING: (-1, 0)},
-    N_ELEMENT: {W: (-1, 2), V_ELEMENT: (0, 1), N_ELEMENT: (-1, 1)},
-    N_RING: {W: (-1, 2), V_RING: (0, 1), N_RING: (-1, 1)},
+    f.V_ELEMENT: {
+        f.W: (-1, 1),
+        f.U: (0, 0),
+        f.V_ELEMENT: (-1, 1),
+        f.V_RING: (0, 0),
+        f.V_FILTERED: (0, 0),
+        f.N_ELEMENT: (-1, 0),
+        f.N_RING: (-1, 0),
+    },
+    f.V_RING: {f.W: (-1, 1), f.V_ELEMENT: (0, 0), f.V_RING: (-1, 1), f.N_RING: (-1, 0)},
+    f.N_ELEMENT: {f.W: (-1, 2), f.V_ELEMENT: (0, 1), f.N_ELEMENT: (-1, 1)},
+    f.N_RING: {f.W: (-1, 2), f.V_RING: (0, 1), f.N_RING: (-1, 1)},
 }
 # With a column that bears a moment, which knows strains and turning of the cells around, and by the path's
 # curvature, which turns motion along the belt into motion across it, and back
 OF_COLUMN = {
-    U: {N_ELEMENT: (-2, 1)},
-    V_ELEMENT: {W: (-2, 2)},
+    f.U: {f.N_ELEMENT: (-2, 1)},
+    f.V_ELEMENT: {f.W: (-2, 2)},
 }
-OF_CURVATURE = {U: {V_RING: (0, 0)}, V_RING: {U: (0, 0)}}
+OF_CURVATURE = {f.U: {f.V_RING: (0, 0)}, f.V_RING: {f.U: (0, 0)}}
 # A station's flank forces and filtered speed: beyond the above they depend on the driven pulley,
 # and where the belt enters its filtered speed is that of sliding there
-ON_FLANK = {U: (-1, 0), V_ELEMENT: (-1, 0), W: (-2, 1), V_FILTERED: (-1, 0)}
+ON_FLANK = {f.U: (-1, 0), f.V_ELEMENT: (-1, 0), f.W: (-2, 1), f.V_FILTERED: (-1, 0)}
 
 
 def pattern(flat: FlatBelt) -> csc_array:
@@ -49,8 +56,8 @@ def pattern(flat: FlatBelt) -> csc_array:
     belt = flat.belt
     n, count = belt.cell.size, flat.origin.size
     place = {row: k * n + np.arange(n) for k, row in enumerate(ROWS)}
-    place[V_FILTERED] = np.full(n, -1)
-    place[V_FILTERED][flat.remembering] = len(ROWS) * n + np.arange(flat.remembering.size)
+    place[f.V_FILTERED] = np.full(n, -1)
+    place[f.V_FILTERED][flat.remembering] = len(ROWS) * n + np.arange(flat.remembering.size)
     place[SPEED], place[OPENING] = np.array([count - 2]), np.array([count - 1])
     found = np.zeros((count, count), dtype=bool)
 
@@ -67,18 +74,18 @@ def pattern(flat: FlatBelt) -> csc_array:
                 mark(row, unknown, np.arange(n), range(behind, ahead + 1))
     for sheave, first in ((belt.driving, 0), (belt.driven, belt.driven_start)):
         arc = np.arange(first, first + sheave.weight.size)
-        for row in (U, V_ELEMENT, V_FILTERED):
+        for row in (f.U, f.V_ELEMENT, f.V_FILTERED):
             for unknown, (behind, ahead) in ON_FLANK.items():
                 mark(row, unknown, arc, range(behind, ahead + 1))
-        pushed = [place[U][arc], place[V_ELEMENT][arc]]
-        moved = [place[W][arc]]
+        pushed = [place[f.U][arc], place[f.V_ELEMENT][arc]]
+        moved = [place[f.W][arc]]
         if first > 0:
             pushed += [place[SPEED], place[OPENING]]
             moved += [place[OPENING]]
-            remembered = place[V_FILTERED][arc]
+            remembered = place[f.V_FILTERED][arc]
             turned = np.concatenate([*pushed, remembered[remembered >= 0]])
             found[turned, place[SPEED]] = True
-            rim = [place[row] for row in (W, U, V_ELEMENT)]
+            rim = [place[row] for row in (f.W, f.U, f.V_ELEMENT)]
             near = np.arange(first - 1, arc[-1] + 2) % n
             found[np.ix_(place[SPEED], np.concatenate([row[near] for row in rim]))] = True
             found[np.ix_(place[SPEED], remembered[remembered >= 0])] = True

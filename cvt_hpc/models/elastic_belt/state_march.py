@@ -7,12 +7,14 @@ from collections.abc import Sequence
 import numpy as np
 
 from cvt_hpc.lanes import LaneArray
+from cvt_hpc.models.elastic_belt import fields as f
+from cvt_hpc.models.elastic_belt import power_terms
 from cvt_hpc.models.elastic_belt.batch import STEPS
-from cvt_hpc.models.elastic_belt.belt import LAYER_WORK, Belt, State
+from cvt_hpc.models.elastic_belt.belt import Belt, State
 from cvt_hpc.models.elastic_belt.lane_belt import lane_belt, lane_state, take_lane
 from cvt_hpc.models.elastic_belt.lane_forces import derive
 from cvt_hpc.models.elastic_belt.march import Sampled
-from cvt_hpc.models.elastic_belt.power_terms import LAYER_LOSS, POWERS
+from cvt_hpc.models.elastic_belt.power_terms import POWERS
 from cvt_hpc.models.elastic_belt.sampling import CHANNELS, ENDED, OUTCOME, PROFILES, Outcome, Sensors
 
 
@@ -49,7 +51,7 @@ class StateMarch:
         self._rows = LaneArray(1, len(CHANNELS), width)
         self._profiles = LaneArray(n, len(PROFILES), width)
         self._ended = LaneArray(1, len(ENDED), width)
-        self._layer_work = np.array([state.scalars[LAYER_WORK] for state in states])
+        self._layer_work = np.array([state.scalars[f.LAYER_WORK] for state in states])
 
     def advance(self, steps: int, step: float) -> None:
         """March, and take a sample at the end: with no step at all, of the state as it is."""
@@ -69,7 +71,7 @@ class StateMarch:
             self._profiles,
             self._ended,
         )
-        self._layer_work += self._rows.data[0, CHANNELS.index(POWERS[LAYER_LOSS])]
+        self._layer_work += self._rows.data[0, CHANNELS.index(POWERS[power_terms.LAYER_LOSS])]
 
     def outcome(self, lane: int = 0) -> Outcome:
         """Why the run has ended, or that it continues."""
@@ -78,7 +80,7 @@ class StateMarch:
     def state(self, lane: int = 0) -> State:
         """The state, with the dampers' work since the start."""
         state = take_lane(self.lanes, lane, self.belts[lane])
-        state.scalars[LAYER_WORK] = self._layer_work[lane]
+        state.scalars[f.LAYER_WORK] = self._layer_work[lane]
         return state
 
     def profiles(self) -> dict[str, np.ndarray]:

@@ -11,7 +11,7 @@ from numba.extending import register_jitable
 
 from cvt_hpc.kernels import kernel
 from cvt_hpc.lanes import around, like
-from cvt_hpc.models.pushbelt.belt import DRIVEN_SPEED, FLANK_DAMPED, IN_LOAD, TIME, WORK_OUT
+from cvt_hpc.models.pushbelt import fields as f
 
 
 @register_jitable
@@ -114,7 +114,7 @@ def book_openings(belt, state, work):
     modes = belt.modal_stiffness.shape[1]
     for k in range(2 * modes):
         change = 0.5 * (state.increments[1 + k] + work.increments[1 + k])
-        state.totals[FLANK_DAMPED] += 2.0 * belt.modal_stiffness[k // modes, k % modes] * change * change
+        state.totals[f.FLANK_DAMPED] += 2.0 * belt.modal_stiffness[k // modes, k % modes] * change * change
 
 
 @kernel
@@ -123,6 +123,8 @@ def accept_border(belt, state, inputs, dt):
     modes = belt.modal_stiffness.shape[1]
     for k in range(2 * modes):
         state.openings[k // modes, k % modes] += state.increments[1 + k]
-    state.pulleys[DRIVEN_SPEED] += state.increments[0]
-    state.totals[TIME] += dt
-    state.totals[WORK_OUT] += dt * inputs[IN_LOAD] * (state.pulleys[DRIVEN_SPEED] - 0.5 * state.increments[0])
+    state.pulleys[f.DRIVEN_SPEED] += state.increments[0]
+    state.totals[f.TIME] += dt
+    state.totals[f.WORK_OUT] += (
+        dt * inputs[f.IN_LOAD] * (state.pulleys[f.DRIVEN_SPEED] - 0.5 * state.increments[0])
+    )

@@ -16,59 +16,7 @@ from numba.extending import register_jitable
 
 from cvt_hpc.kernels import kernel
 from cvt_hpc.lanes import ahead, behind, like, select, sqrt
-from cvt_hpc.models.pushbelt.belt import (
-    ANGLE_I,
-    ANGLE_J,
-    DIAGONAL,
-    DRIVEN,
-    DRIVEN_RADIUS,
-    DRIVING_RADIUS,
-    EDGE_GAP,
-    EDGE_LEVER_I,
-    EDGE_LEVER_J,
-    HEAD_GAP,
-    HEAD_LEVER_I,
-    HEAD_LEVER_J,
-    HEADING_Y,
-    HEADING_Z,
-    LENGTH,
-    LINK,
-    MID_R_LEVER,
-    MID_R_Y,
-    MID_R_Z,
-    MID_RADIUS,
-    MID_T_LEVER,
-    NORMAL_Y,
-    NORMAL_Z,
-    OMEGA,
-    PREDICTED_DEPTH,
-    PREDICTED_HEADING_Y,
-    PREDICTED_HEADING_Z,
-    PREDICTED_MOMENT_I,
-    PREDICTED_MOMENT_J,
-    PREDICTED_TENSION,
-    PREDICTED_Y,
-    PREDICTED_Z,
-    R_LEVER,
-    R_Y,
-    R_Z,
-    START_SLIP,
-    T_LEVER,
-    T_Y,
-    T_Z,
-    TENSION_I_Y,
-    TENSION_I_Z,
-    TENSION_J_Y,
-    TENSION_J_Z,
-    TENSION_SLOPE,
-    TURN_Y,
-    TURN_Z,
-    U_Y,
-    U_Z,
-    V,
-    Y,
-    Z,
-)
+from cvt_hpc.models.pushbelt import fields as f
 
 
 @register_jitable
@@ -118,30 +66,30 @@ def radial(r, x, centre, pitch_depth):
 def predict(belt, state, pulleys, step, dt):
     """Everything of a step that belongs to a single element: q*, the ring's direction, normal, the flanks."""
     # of the strands, the common tangents of both pulleys
-    sine = (pulleys[DRIVEN_RADIUS] - pulleys[DRIVING_RADIUS]) / belt.centre_distance
+    sine = (pulleys[f.DRIVEN_RADIUS] - pulleys[f.DRIVING_RADIUS]) / belt.centre_distance
     cosine = np.sqrt(1.0 - sine * sine)
     for j in range(state.rows):
-        y, z = state[j, Y], state[j, Z]
-        x = (state[j, HEADING_Y], state[j, HEADING_Z])
-        u_y, u_z, omega = state[j, U_Y], state[j, U_Z], state[j, OMEGA]
+        y, z = state[j, f.Y], state[j, f.Z]
+        x = (state[j, f.HEADING_Y], state[j, f.HEADING_Z])
+        u_y, u_z, omega = state[j, f.U_Y], state[j, f.U_Z], state[j, f.OMEGA]
         predicted = (y + dt * u_y, z + dt * u_z)
         turned_y, turned_z = turned(x[0], x[1], dt * omega)
-        step[j, PREDICTED_Y], step[j, PREDICTED_Z] = predicted
-        step[j, PREDICTED_HEADING_Y], step[j, PREDICTED_HEADING_Z] = turned_y, turned_z
-        t_y, t_z = ahead(state, j, Y) - behind(state, j, Y), ahead(state, j, Z) - behind(state, j, Z)
+        step[j, f.PREDICTED_Y], step[j, f.PREDICTED_Z] = predicted
+        step[j, f.PREDICTED_HEADING_Y], step[j, f.PREDICTED_HEADING_Z] = turned_y, turned_z
+        t_y, t_z = ahead(state, j, f.Y) - behind(state, j, f.Y), ahead(state, j, f.Z) - behind(state, j, f.Z)
         per_size = 1.0 / sqrt(t_y * t_y + t_z * t_z)
         t_y, t_z = t_y * per_size, t_z * per_size
-        step[j, T_Y], step[j, T_Z] = t_y, t_z
-        step[j, START_SLIP] = state[j, V] - t_y * u_y - t_z * u_z
+        step[j, f.T_Y], step[j, f.T_Z] = t_y, t_z
+        step[j, f.START_SLIP] = state[j, f.V] - t_y * u_y - t_z * u_z
 
         driven = y > 0.5 * belt.centre_distance
         centre = select(driven, like(belt.centre_distance, y), 0.0)
-        state[j, DRIVEN] = select(driven, like(1.0, y), 0.0)
+        state[j, f.DRIVEN] = select(driven, like(1.0, y), 0.0)
         r_y, r_z, _, r_lever, t_lever = radial((y, z), x, centre, belt.pitch_depth)
-        step[j, R_Y], step[j, R_Z], step[j, R_LEVER], step[j, T_LEVER] = r_y, r_z, r_lever, t_lever
+        step[j, f.R_Y], step[j, f.R_Z], step[j, f.R_LEVER], step[j, f.T_LEVER] = r_y, r_z, r_lever, t_lever
         _, _, radius, _, _ = radial(predicted, (turned_y, turned_z), centre, belt.pitch_depth)
-        groove = select(driven, like(pulleys[DRIVEN_RADIUS], y), pulleys[DRIVING_RADIUS])
-        step[j, PREDICTED_DEPTH] = (groove - radius) * belt.sine
+        groove = select(driven, like(pulleys[f.DRIVEN_RADIUS], y), pulleys[f.DRIVING_RADIUS])
+        step[j, f.PREDICTED_DEPTH] = (groove - radius) * belt.sine
         side = select(z < 0.0, like(-1.0, y), 1.0)
         reach = cosine * y + side * sine * z
         strand = (reach > 0.0) & (reach < cosine * belt.centre_distance)
@@ -149,10 +97,10 @@ def predict(belt, state, pulleys, step, dt):
         r_y, r_z, radius, r_lever, t_lever = radial(
             middle, turned(x[0], x[1], 0.5 * dt * omega), centre, belt.pitch_depth
         )
-        step[j, MID_R_Y], step[j, MID_R_Z], step[j, MID_RADIUS] = r_y, r_z, radius
-        step[j, MID_R_LEVER], step[j, MID_T_LEVER] = r_lever, t_lever
-        step[j, NORMAL_Y] = select(strand, like(-sine, y), r_y)
-        step[j, NORMAL_Z] = select(strand, side * cosine, r_z)
+        step[j, f.MID_R_Y], step[j, f.MID_R_Z], step[j, f.MID_RADIUS] = r_y, r_z, radius
+        step[j, f.MID_R_LEVER], step[j, f.MID_T_LEVER] = r_lever, t_lever
+        step[j, f.NORMAL_Y] = select(strand, like(-sine, y), r_y)
+        step[j, f.NORMAL_Z] = select(strand, side * cosine, r_z)
 
 
 @kernel
@@ -160,28 +108,33 @@ def link(belt, state, step, dt):
     """Data of pairs of neighbours for a step: tension, contacts, angles."""
     stiffness = 0.5 * belt.angle_stiffness
     for j in range(state.rows):
-        ri, rj = (state[j, Y], state[j, Z]), (ahead(state, j, Y), ahead(state, j, Z))
-        xi = (state[j, HEADING_Y], state[j, HEADING_Z])
-        xj = (ahead(state, j, HEADING_Y), ahead(state, j, HEADING_Z))
-        si = (step[j, PREDICTED_Y], step[j, PREDICTED_Z])
-        sj = (ahead(step, j, PREDICTED_Y), ahead(step, j, PREDICTED_Z))
-        zi = (step[j, PREDICTED_HEADING_Y], step[j, PREDICTED_HEADING_Z])
-        zj = (ahead(step, j, PREDICTED_HEADING_Y), ahead(step, j, PREDICTED_HEADING_Z))
+        ri, rj = (state[j, f.Y], state[j, f.Z]), (ahead(state, j, f.Y), ahead(state, j, f.Z))
+        xi = (state[j, f.HEADING_Y], state[j, f.HEADING_Z])
+        xj = (ahead(state, j, f.HEADING_Y), ahead(state, j, f.HEADING_Z))
+        si = (step[j, f.PREDICTED_Y], step[j, f.PREDICTED_Z])
+        sj = (ahead(step, j, f.PREDICTED_Y), ahead(step, j, f.PREDICTED_Z))
+        zi = (step[j, f.PREDICTED_HEADING_Y], step[j, f.PREDICTED_HEADING_Z])
+        zj = (ahead(step, j, f.PREDICTED_HEADING_Y), ahead(step, j, f.PREDICTED_HEADING_Z))
 
         e_y, e_z = rj[0] - ri[0], rj[1] - ri[1]
         per_length = 1.0 / sqrt(e_y * e_y + e_z * e_z)
         e_y, e_z = e_y * per_length, e_z * per_length
-        step[j, TENSION_I_Y], step[j, TENSION_I_Z] = e_y - step[j, T_Y], e_z - step[j, T_Z]
-        step[j, TENSION_J_Y], step[j, TENSION_J_Z] = e_y - ahead(step, j, T_Y), e_z - ahead(step, j, T_Z)
+        step[j, f.TENSION_I_Y], step[j, f.TENSION_I_Z] = e_y - step[j, f.T_Y], e_z - step[j, f.T_Z]
+        step[j, f.TENSION_J_Y], step[j, f.TENSION_J_Z] = (
+            e_y - ahead(step, j, f.T_Y),
+            e_z - ahead(step, j, f.T_Z),
+        )
         f_y, f_z = sj[0] - si[0], sj[1] - si[1]
         length = sqrt(f_y * f_y + f_z * f_z)
-        per_unstretched = 1.0 / (state[j, LENGTH] + dt * (step[j, START_SLIP] - ahead(step, j, START_SLIP)))
-        step[j, PREDICTED_TENSION] = belt.ring_stiffness * (length * per_unstretched - 1.0)
-        step[j, TENSION_SLOPE] = dt * belt.ring_stiffness * per_unstretched
+        per_unstretched = 1.0 / (
+            state[j, f.LENGTH] + dt * (step[j, f.START_SLIP] - ahead(step, j, f.START_SLIP))
+        )
+        step[j, f.PREDICTED_TENSION] = belt.ring_stiffness * (length * per_unstretched - 1.0)
+        step[j, f.TENSION_SLOPE] = dt * belt.ring_stiffness * per_unstretched
 
         turn_y, turn_z = -e_z * per_length, e_y * per_length
         angle_i, angle_j = e_y * xi[0] + e_z * xi[1], e_y * xj[0] + e_z * xj[1]
-        step[j, TURN_Y], step[j, TURN_Z], step[j, ANGLE_I], step[j, ANGLE_J] = (
+        step[j, f.TURN_Y], step[j, f.TURN_Z], step[j, f.ANGLE_I], step[j, f.ANGLE_J] = (
             turn_y,
             turn_z,
             angle_i,
@@ -189,21 +142,21 @@ def link(belt, state, step, dt):
         )
         per_length = 1.0 / length
         f_y, f_z = f_y * per_length, f_z * per_length
-        turn = turn_y * (ahead(state, j, U_Y) - state[j, U_Y]) + turn_z * (
-            ahead(state, j, U_Z) - state[j, U_Z]
+        turn = turn_y * (ahead(state, j, f.U_Y) - state[j, f.U_Y]) + turn_z * (
+            ahead(state, j, f.U_Z) - state[j, f.U_Z]
         )
-        rate_i, rate_j = angle_i * (state[j, OMEGA] - turn), angle_j * (ahead(state, j, OMEGA) - turn)
+        rate_i, rate_j = angle_i * (state[j, f.OMEGA] - turn), angle_j * (ahead(state, j, f.OMEGA) - turn)
         damping = 0.5 * belt.angle_damping
-        step[j, PREDICTED_MOMENT_I] = stiffness * (f_y * zi[1] - f_z * zi[0]) + damping * rate_i
-        step[j, PREDICTED_MOMENT_J] = stiffness * (f_y * zj[1] - f_z * zj[0]) + damping * rate_j
+        step[j, f.PREDICTED_MOMENT_I] = stiffness * (f_y * zi[1] - f_z * zi[0]) + damping * rate_i
+        step[j, f.PREDICTED_MOMENT_J] = stiffness * (f_y * zj[1] - f_z * zj[0]) + damping * rate_j
 
         edge, head = -belt.pitch_depth, belt.head_height
-        step[j, EDGE_GAP] = contact_gap(si, zi, sj, zj, belt.thickness, edge)
-        step[j, HEAD_GAP] = contact_gap(si, zi, sj, zj, belt.thickness, head)
+        step[j, f.EDGE_GAP] = contact_gap(si, zi, sj, zj, belt.thickness, edge)
+        step[j, f.HEAD_GAP] = contact_gap(si, zi, sj, zj, belt.thickness, head)
         lever_i, lever_j = contact_levers(ri, xi, rj, xj, belt.thickness, edge)
-        step[j, EDGE_LEVER_I], step[j, EDGE_LEVER_J] = lever_i, lever_j
+        step[j, f.EDGE_LEVER_I], step[j, f.EDGE_LEVER_J] = lever_i, lever_j
         lever_i, lever_j = contact_levers(ri, xi, rj, xj, belt.thickness, head)
-        step[j, HEAD_LEVER_I], step[j, HEAD_LEVER_J] = lever_i, lever_j
+        step[j, f.HEAD_LEVER_I], step[j, f.HEAD_LEVER_J] = lever_i, lever_j
 
 
 @kernel
@@ -212,47 +165,60 @@ def linear_blocks(belt, step, dt):
     steep = 0.5 * (dt * belt.angle_stiffness + belt.angle_damping)
     for j in range(step.rows):
         for field in range(32):
-            step[j, DIAGONAL + field] = 0.0
+            step[j, f.DIAGONAL + field] = 0.0
         # o of the ring: with it ring mass moves only across
-        o_y, o_z = step[j, T_Z], -step[j, T_Y]
+        o_y, o_z = step[j, f.T_Z], -step[j, f.T_Y]
         mass, ring = belt.mass / dt, belt.ring_mass / dt
         yy, yz, zz = mass + ring * o_y * o_y, ring * o_y * o_z, mass + ring * o_z * o_z
-        n_y, n_z = step[j, NORMAL_Y], step[j, NORMAL_Z]
+        n_y, n_z = step[j, f.NORMAL_Y], step[j, f.NORMAL_Z]
         drag = belt.transverse_damping
         yy, yz, zz = yy + drag * n_y * n_y, yz + drag * n_y * n_z, zz + drag * n_z * n_z
         ww, vv = like(belt.inertia / dt, o_y), like(ring, o_y)
 
         # the segment ahead, of which this element is i
-        k, a, b = step[j, TENSION_SLOPE], step[j, TENSION_I_Y], step[j, TENSION_I_Z]
-        c, d = step[j, TENSION_J_Y], step[j, TENSION_J_Z]
+        k, a, b = step[j, f.TENSION_SLOPE], step[j, f.TENSION_I_Y], step[j, f.TENSION_I_Z]
+        c, d = step[j, f.TENSION_J_Y], step[j, f.TENSION_J_Z]
         yy, yz, zz, vv = yy + k * a * a, yz + k * a * b, zz + k * b * b, vv + k
         yv, zv = k * a, k * b
-        p, q = step[j, TURN_Y], step[j, TURN_Z]
-        ii, jj = steep * step[j, ANGLE_I] * step[j, ANGLE_I], steep * step[j, ANGLE_J] * step[j, ANGLE_J]
+        p, q = step[j, f.TURN_Y], step[j, f.TURN_Z]
+        ii, jj = (
+            steep * step[j, f.ANGLE_I] * step[j, f.ANGLE_I],
+            steep * step[j, f.ANGLE_J] * step[j, f.ANGLE_J],
+        )
         both = ii + jj
         yy, yz, zz, ww = yy + both * p * p, yz + both * p * q, zz + both * q * q, ww + ii
         yw, zw = ii * p, ii * q
 
-        step[j, LINK], step[j, LINK + 1] = -(k * a * c + both * p * p), -(k * b * c + both * p * q)
-        step[j, LINK + 2], step[j, LINK + 3] = -ii * p, -k * c
-        step[j, LINK + 4], step[j, LINK + 5] = -(k * a * d + both * p * q), -(k * b * d + both * q * q)
-        step[j, LINK + 6], step[j, LINK + 7] = -ii * q, -k * d
-        step[j, LINK + 8], step[j, LINK + 9] = jj * p, jj * q
-        step[j, LINK + 12], step[j, LINK + 13], step[j, LINK + 15] = -k * a, -k * b, -k
+        step[j, f.LINK + f.YY], step[j, f.LINK + f.ZY] = (
+            -(k * a * c + both * p * p),
+            -(k * b * c + both * p * q),
+        )
+        step[j, f.LINK + f.WY], step[j, f.LINK + f.VY] = -ii * p, -k * c
+        step[j, f.LINK + f.YZ], step[j, f.LINK + f.ZZ] = (
+            -(k * a * d + both * p * q),
+            -(k * b * d + both * q * q),
+        )
+        step[j, f.LINK + f.WZ], step[j, f.LINK + f.VZ] = -ii * q, -k * d
+        step[j, f.LINK + f.YW], step[j, f.LINK + f.ZW] = jj * p, jj * q
+        step[j, f.LINK + f.YV], step[j, f.LINK + f.ZV], step[j, f.LINK + f.VV] = -k * a, -k * b, -k
 
         # the segment behind, of which it is j
-        k, c, d = behind(step, j, TENSION_SLOPE), behind(step, j, TENSION_J_Y), behind(step, j, TENSION_J_Z)
+        k, c, d = (
+            behind(step, j, f.TENSION_SLOPE),
+            behind(step, j, f.TENSION_J_Y),
+            behind(step, j, f.TENSION_J_Z),
+        )
         yy, yz, zz, vv = yy + k * c * c, yz + k * c * d, zz + k * d * d, vv + k
         yv, zv = yv + k * c, zv + k * d
-        p, q = behind(step, j, TURN_Y), behind(step, j, TURN_Z)
-        at_i, at_j = behind(step, j, ANGLE_I), behind(step, j, ANGLE_J)
+        p, q = behind(step, j, f.TURN_Y), behind(step, j, f.TURN_Z)
+        at_i, at_j = behind(step, j, f.ANGLE_I), behind(step, j, f.ANGLE_J)
         jj = steep * at_j * at_j
         both = steep * at_i * at_i + jj
         yy, yz, zz, ww = yy + both * p * p, yz + both * p * q, zz + both * q * q, ww + jj
         yw, zw = yw - jj * p, zw - jj * q
-        step[j, DIAGONAL], step[j, DIAGONAL + 1] = yy, yz
-        step[j, DIAGONAL + 2], step[j, DIAGONAL + 3] = yw, yv
-        step[j, DIAGONAL + 4], step[j, DIAGONAL + 5] = yz, zz
-        step[j, DIAGONAL + 6], step[j, DIAGONAL + 7] = zw, zv
-        step[j, DIAGONAL + 8], step[j, DIAGONAL + 9], step[j, DIAGONAL + 10] = yw, zw, ww
-        step[j, DIAGONAL + 12], step[j, DIAGONAL + 13], step[j, DIAGONAL + 15] = yv, zv, vv
+        step[j, f.DIAGONAL + f.YY], step[j, f.DIAGONAL + f.ZY] = yy, yz
+        step[j, f.DIAGONAL + f.WY], step[j, f.DIAGONAL + f.VY] = yw, yv
+        step[j, f.DIAGONAL + f.YZ], step[j, f.DIAGONAL + f.ZZ] = yz, zz
+        step[j, f.DIAGONAL + f.WZ], step[j, f.DIAGONAL + f.VZ] = zw, zv
+        step[j, f.DIAGONAL + f.YW], step[j, f.DIAGONAL + f.ZW], step[j, f.DIAGONAL + f.WW] = yw, zw, ww
+        step[j, f.DIAGONAL + f.YV], step[j, f.DIAGONAL + f.ZV], step[j, f.DIAGONAL + f.VV] = yv, zv, vv

@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 from cvt_hpc.kernels import kernel
-from cvt_hpc.models.pushbelt.belt import FAILED_CONTACT, FAILED_ELEMENT
+from cvt_hpc.models.pushbelt import fields as f
 
 
 @kernel
@@ -53,5 +53,5 @@ def name_fault(changes, state, element, kept):
         for entry in range(len(sizes)):
             if sizes[entry] > largest:
                 largest, contact, behind_it = sizes[entry], entry, k
-    state.counters[FAILED_ELEMENT] = (element - behind_it) % (rows * parts)
-    state.counters[FAILED_CONTACT] = contact
+    state.counters[f.FAILED_ELEMENT] = (element - behind_it) % (rows * parts)
+    state.counters[f.FAILED_CONTACT] = contact

@@ -13,23 +13,7 @@ from numba.extending import register_jitable
 
 from cvt_hpc.kernels import kernel
 from cvt_hpc.lanes import ahead, behind, maximum
-from cvt_hpc.models.pushbelt.belt import (
-    CHANGE,
-    HEADING_Y,
-    HEADING_Z,
-    NOSE,
-    NOSE_LEVER_I,
-    NOSE_LEVER_J,
-    NOSE_OFFSET,
-    NOSE_REACHED,
-    NOSE_SLOPE,
-    PREDICTED_HEADING_Y,
-    PREDICTED_HEADING_Z,
-    PREDICTED_Y,
-    PREDICTED_Z,
-    Y,
-    Z,
-)
+from cvt_hpc.models.pushbelt import fields as f
 from cvt_hpc.physics.contact_laws import pressed
 
 
@@ -46,18 +30,18 @@ def predict_noses(belt, state, step):
     """Offsets at q*, and levers at q_k."""
     thickness, height = belt.thickness, belt.nose_height
     for j in range(state.rows):
-        ri, rj = (state[j, Y], state[j, Z]), (ahead(state, j, Y), ahead(state, j, Z))
-        xi = (state[j, HEADING_Y], state[j, HEADING_Z])
-        xj = (ahead(state, j, HEADING_Y), ahead(state, j, HEADING_Z))
+        ri, rj = (state[j, f.Y], state[j, f.Z]), (ahead(state, j, f.Y), ahead(state, j, f.Z))
+        xi = (state[j, f.HEADING_Y], state[j, f.HEADING_Z])
+        xj = (ahead(state, j, f.HEADING_Y), ahead(state, j, f.HEADING_Z))
         _, along = _offset(ri, xi, rj, xj, thickness, height)
         cosine, sine = xi[0] * xj[0] + xi[1] * xj[1], xi[0] * xj[1] - xi[1] * xj[0]
-        step[j, NOSE_LEVER_I] = height * sine - 0.5 * thickness * cosine
-        step[j, NOSE_LEVER_J] = along - 0.5 * thickness
-        si = (step[j, PREDICTED_Y], step[j, PREDICTED_Z])
-        sj = (ahead(step, j, PREDICTED_Y), ahead(step, j, PREDICTED_Z))
-        zi = (step[j, PREDICTED_HEADING_Y], step[j, PREDICTED_HEADING_Z])
-        zj = (ahead(step, j, PREDICTED_HEADING_Y), ahead(step, j, PREDICTED_HEADING_Z))
-        step[j, NOSE_OFFSET], _ = _offset(si, zi, sj, zj, thickness, height)
+        step[j, f.NOSE_LEVER_I] = height * sine - 0.5 * thickness * cosine
+        step[j, f.NOSE_LEVER_J] = along - 0.5 * thickness
+        si = (step[j, f.PREDICTED_Y], step[j, f.PREDICTED_Z])
+        sj = (ahead(step, j, f.PREDICTED_Y), ahead(step, j, f.PREDICTED_Z))
+        zi = (step[j, f.PREDICTED_HEADING_Y], step[j, f.PREDICTED_HEADING_Z])
+        zj = (ahead(step, j, f.PREDICTED_HEADING_Y), ahead(step, j, f.PREDICTED_HEADING_Z))
+        step[j, f.NOSE_OFFSET], _ = _offset(si, zi, sj, zj, thickness, height)
 
 
 @kernel
@@ -65,41 +49,59 @@ def nose_forces(belt, state, step, iterate, dt):
     """Forces that take the offsets back, signed as these, and their increase by the offsets' rates."""
     stiffness, clearance = belt.nose_stiffness, belt.nose_clearance
     for j in range(step.rows):
-        x_y, x_z = ahead(state, j, HEADING_Y), ahead(state, j, HEADING_Z)
-        y, z = state[j, CHANGE] - ahead(state, j, CHANGE), state[j, CHANGE + 1] - ahead(state, j, CHANGE + 1)
-        rate = x_z * y - x_y * z + step[j, NOSE_LEVER_I] * state[j, CHANGE + 2]
-        offset = step[j, NOSE_OFFSET] + dt * (rate + step[j, NOSE_LEVER_J] * ahead(state, j, CHANGE + 2))
+        x_y, x_z = ahead(state, j, f.HEADING_Y), ahead(state, j, f.HEADING_Z)
+        y, z = (
+            state[j, f.CHANGE_Y] - ahead(state, j, f.CHANGE_Y),
+            state[j, f.CHANGE_Z] - ahead(state, j, f.CHANGE_Z),
+        )
+        rate = x_z * y - x_y * z + step[j, f.NOSE_LEVER_I] * state[j, f.CHANGE_W]
+        offset = step[j, f.NOSE_OFFSET] + dt * (rate + step[j, f.NOSE_LEVER_J] * ahead(state, j, f.CHANGE_W))
         above, k = pressed(clearance - offset, stiffness)
         below, m = pressed(clearance + offset, stiffness)
-        state[j, NOSE], iterate[j, NOSE_SLOPE] = above - below, dt * maximum(k, m)
-        iterate[j, NOSE_REACHED] = offset
+        state[j, f.NOSE], iterate[j, f.NOSE_SLOPE] = above - below, dt * maximum(k, m)
+        iterate[j, f.NOSE_REACHED] = offset
 
 
 @kernel
 def add_nose_blocks(state, step, iterate, blocks):
     """Add the slopes to the blocks of both elements, as `assembly.assemble` has left them."""
     for j in range(step.rows):
-        o_y, o_z = ahead(state, j, HEADING_Z), -ahead(state, j, HEADING_Y)
-        k, a, b = iterate[j, NOSE_SLOPE], step[j, NOSE_LEVER_I], step[j, NOSE_LEVER_J]
+        o_y, o_z = ahead(state, j, f.HEADING_Z), -ahead(state, j, f.HEADING_Y)
+        k, a, b = iterate[j, f.NOSE_SLOPE], step[j, f.NOSE_LEVER_I], step[j, f.NOSE_LEVER_J]
         yy, yz, zz = k * o_y * o_y, k * o_y * o_z, k * o_z * o_z
         yw, zw, ww = k * o_y * a, k * o_z * a, k * a * a
-        blocks[j, 16], blocks[j, 17], blocks[j, 18] = (
-            blocks[j, 16] - yy,
-            blocks[j, 17] - yz,
-            blocks[j, 18] - yw,
+        blocks[j, f.LINKED + f.YY], blocks[j, f.LINKED + f.ZY], blocks[j, f.LINKED + f.WY] = (
+            blocks[j, f.LINKED + f.YY] - yy,
+            blocks[j, f.LINKED + f.ZY] - yz,
+            blocks[j, f.LINKED + f.WY] - yw,
         )
-        blocks[j, 20], blocks[j, 21], blocks[j, 22] = (
-            blocks[j, 20] - yz,
-            blocks[j, 21] - zz,
-            blocks[j, 22] - zw,
+        blocks[j, f.LINKED + f.YZ], blocks[j, f.LINKED + f.ZZ], blocks[j, f.LINKED + f.WZ] = (
+            blocks[j, f.LINKED + f.YZ] - yz,
+            blocks[j, f.LINKED + f.ZZ] - zz,
+            blocks[j, f.LINKED + f.WZ] - zw,
         )
-        blocks[j, 24], blocks[j, 25] = blocks[j, 24] + k * o_y * b, blocks[j, 25] + k * o_z * b
-        blocks[j, 26] = blocks[j, 26] + k * a * b
+        blocks[j, f.LINKED + f.YW], blocks[j, f.LINKED + f.ZW] = (
+            blocks[j, f.LINKED + f.YW] + k * o_y * b,
+            blocks[j, f.LINKED + f.ZW] + k * o_z * b,
+        )
+        blocks[j, f.LINKED + f.WW] = blocks[j, f.LINKED + f.WW] + k * a * b
 
-        o_y, o_z = state[j, HEADING_Z], -state[j, HEADING_Y]
-        k, b = behind(iterate, j, NOSE_SLOPE), behind(step, j, NOSE_LEVER_J)
+        o_y, o_z = state[j, f.HEADING_Z], -state[j, f.HEADING_Y]
+        k, b = behind(iterate, j, f.NOSE_SLOPE), behind(step, j, f.NOSE_LEVER_J)
         yy, yz, zz = yy + k * o_y * o_y, yz + k * o_y * o_z, zz + k * o_z * o_z
         yw, zw, ww = yw - k * o_y * b, zw - k * o_z * b, ww + k * b * b
-        blocks[j, 0], blocks[j, 1], blocks[j, 2] = blocks[j, 0] + yy, blocks[j, 1] + yz, blocks[j, 2] + yw
-        blocks[j, 4], blocks[j, 5], blocks[j, 6] = blocks[j, 4] + yz, blocks[j, 5] + zz, blocks[j, 6] + zw
-        blocks[j, 8], blocks[j, 9], blocks[j, 10] = blocks[j, 8] + yw, blocks[j, 9] + zw, blocks[j, 10] + ww
+        blocks[j, f.YY], blocks[j, f.ZY], blocks[j, f.WY] = (
+            blocks[j, f.YY] + yy,
+            blocks[j, f.ZY] + yz,
+            blocks[j, f.WY] + yw,
+        )
+        blocks[j, f.YZ], blocks[j, f.ZZ], blocks[j, f.WZ] = (
+            blocks[j, f.YZ] + yz,
+            blocks[j, f.ZZ] + zz,
+            blocks[j, f.WZ] + zw,
+        )
+        blocks[j, f.YW], blocks[j, f.ZW], blocks[j, f.WW] = (
+            blocks[j, f.YW] + yw,
+            blocks[j, f.ZW] + zw,
+            blocks[j, f.WW] + ww,
+        )

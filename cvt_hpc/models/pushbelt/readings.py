@@ -7,7 +7,7 @@ from typing import Any
 
 import numpy as np
 
-from cvt_hpc.models.pushbelt import belt as f
+from cvt_hpc.models.pushbelt import fields
 from cvt_hpc.models.pushbelt.belt import Belt
 from cvt_hpc.physics.geometry import variator
 from cvt_hpc.variator.history import ALONG, of_means
@@ -154,8 +154,8 @@ class Reading:
 
     def __init__(self, where: Readings, elements: np.ndarray, pulleys: np.ndarray) -> None:
         self._where, self._elements, self._pulleys = where, elements, pulleys
-        self._path = OnPath(where, elements[:, [f.Y, f.Z]])
-        self._push = elements[:, f.EDGE] + elements[:, f.HEAD]
+        self._path = OnPath(where, elements[:, [fields.Y, fields.Z]])
+        self._push = elements[:, fields.EDGE] + elements[:, fields.HEAD]
 
     def displacement(self) -> np.ndarray:
         """Displacement at the probes, outwards, (2 p,) [m]."""
@@ -164,51 +164,71 @@ class Reading:
     def scalars(self) -> list[float]:
         """SCALARS."""
         e, pulleys, belt = self._elements, self._pulleys, self._where.belt
-        driven = e[:, f.DRIVEN]
+        driven = e[:, fields.DRIVEN]
         both = np.stack([1.0 - driven, driven])
-        thrust = e[:, f.FLANK] * belt.cosine + e[:, f.FLANK_FRICTION_M] * belt.sine
+        thrust = e[:, fields.FLANK] * belt.cosine + e[:, fields.FLANK_FRICTION_M] * belt.sine
         # the meridian's speed is the radial one over the cosine, its force in radial direction has the cosine
         loss = 2.0 * (
-            belt.cosine**2 * e[:, f.FLANK_FRICTION_M] * e[:, f.FLANK_SLIP_M]
-            + e[:, f.FLANK_FRICTION_T] * e[:, f.FLANK_SLIP_T]
+            belt.cosine**2 * e[:, fields.FLANK_FRICTION_M] * e[:, fields.FLANK_SLIP_M]
+            + e[:, fields.FLANK_FRICTION_T] * e[:, fields.FLANK_SLIP_T]
         )
-        weights = both * e[:, f.FLANK]
+        weights = both * e[:, fields.FLANK]
         pressed = weights.sum(axis=1)
         weights /= np.maximum(pressed, 1e-9)[:, None]
         running = np.where(pressed > 0.0, weights @ self._contact_radii(), np.nan)
-        slip = weights @ e[:, f.FLANK_SLIP_T] / (pulleys[f.DRIVING_SPEED] * self._where.path.driving_radius)
+        slip = (
+            weights
+            @ e[:, fields.FLANK_SLIP_T]
+            / (pulleys[fields.DRIVING_SPEED] * self._where.path.driving_radius)
+        )
         inside = self._path.middles()
-        ring_loss = e[:, f.RING_FRICTION] @ e[:, f.RING_SLIP]
-        groups = (inside @ self._push, inside @ e[:, f.TENSION], both @ thrust, running, slip, both @ loss)
+        ring_loss = e[:, fields.RING_FRICTION] @ e[:, fields.RING_SLIP]
+        groups = (
+            inside @ self._push,
+            inside @ e[:, fields.TENSION],
+            both @ thrust,
+            running,
+            slip,
+            both @ loss,
+        )
         # elements over the time of a revolution: their speeds over the length of their line
-        speeds = np.hypot(e[:, f.U_Y], e[:, f.U_Z]).sum()
-        line = np.hypot(*np.diff(e[:, [f.Y, f.Z]], axis=0, prepend=e[-1:, [f.Y, f.Z]]).T).sum()
-        found = [*pulleys[[f.DRIVEN_SPEED, f.DRIVING_RADIUS, f.DRIVEN_RADIUS]], *np.concatenate(groups)]
+        speeds = np.hypot(e[:, fields.U_Y], e[:, fields.U_Z]).sum()
+        line = np.hypot(
+            *np.diff(e[:, [fields.Y, fields.Z]], axis=0, prepend=e[-1:, [fields.Y, fields.Z]]).T
+        ).sum()
+        found = [
+            *pulleys[[fields.DRIVEN_SPEED, fields.DRIVING_RADIUS, fields.DRIVEN_RADIUS]],
+            *np.concatenate(groups),
+        ]
         return [*found, ring_loss, speeds / line]
 
     def _contact_radii(self) -> np.ndarray:
         """Distances of the flanks' contact points from the shaft of the nearer pulley, (n,) [m]."""
         e, depth = self._elements, self._where.belt.pitch_depth
-        y = e[:, f.Y] - depth * e[:, f.HEADING_Z] - e[:, f.DRIVEN] * self._where.centre_distance
-        return np.hypot(y, e[:, f.Z] + depth * e[:, f.HEADING_Y])
+        y = (
+            e[:, fields.Y]
+            - depth * e[:, fields.HEADING_Z]
+            - e[:, fields.DRIVEN] * self._where.centre_distance
+        )
+        return np.hypot(y, e[:, fields.Z] + depth * e[:, fields.HEADING_Y])
 
     def profiles(self) -> np.ndarray:
         """Sums over the elements at each place: PROFILES, and their number, (profile + 1, place)."""
         e, where = self._elements, self._where
         ahead = np.roll(e, -1, axis=0)
-        across = ahead[:, [f.Y, f.Z]] - np.roll(e[:, [f.Y, f.Z]], 1, axis=0)
+        across = ahead[:, [fields.Y, fields.Z]] - np.roll(e[:, [fields.Y, fields.Z]], 1, axis=0)
         length = np.hypot(*across.T)
-        rising = (e[:, f.HEADING_Y] * across[:, 1] - e[:, f.HEADING_Z] * across[:, 0]) / length
+        rising = (e[:, fields.HEADING_Y] * across[:, 1] - e[:, fields.HEADING_Z] * across[:, 0]) / length
         rows = [
             self._push,
-            e[:, f.TENSION],
-            e[:, f.FLANK] / where.pitch,
-            e[:, f.FLANK_FRICTION_M] / where.pitch,
-            e[:, f.FLANK_FRICTION_T] / where.pitch,
-            e[:, f.SADDLE] / where.pitch,
-            e[:, f.RING_SLIP],
-            e[:, f.FLANK_SLIP_T],
-            np.abs(e[:, f.NOSE]),
+            e[:, fields.TENSION],
+            e[:, fields.FLANK] / where.pitch,
+            e[:, fields.FLANK_FRICTION_M] / where.pitch,
+            e[:, fields.FLANK_FRICTION_T] / where.pitch,
+            e[:, fields.SADDLE] / where.pitch,
+            e[:, fields.RING_SLIP],
+            e[:, fields.FLANK_SLIP_T],
+            np.abs(e[:, fields.NOSE]),
             _edge_gap(e, ahead, where.belt),
             -rising,
             self._path.offset,
@@ -219,30 +239,30 @@ class Reading:
         """Kinetic and elastic energy of belt, driven pulley and sheaves with `openings` (2, modes) [J]."""
         e, belt = self._elements, self._where.belt
         ahead = np.roll(e, -1, axis=0)
-        segment = ahead[:, [f.Y, f.Z]] - e[:, [f.Y, f.Z]]
+        segment = ahead[:, [fields.Y, fields.Z]] - e[:, [fields.Y, fields.Z]]
         t = segment + np.roll(segment, 1, axis=0)
         t /= np.hypot(*t.T)[:, None]
         segment /= np.hypot(*segment.T)[:, None]
-        u = e[:, [f.U_Y, f.U_Z]]
+        u = e[:, [fields.U_Y, fields.U_Z]]
         outward = u[:, 0] * t[:, 1] - u[:, 1] * t[:, 0]
-        kinetic = belt.mass * (u**2).sum() + belt.inertia * (e[:, f.OMEGA] ** 2).sum()
-        kinetic += belt.ring_mass * (e[:, f.V] ** 2 + outward**2).sum()
-        kinetic += belt.driven_inertia * self._pulleys[f.DRIVEN_SPEED] ** 2
-        elastic = (e[:, f.TENSION] ** 2 * e[:, f.LENGTH]).sum() / belt.ring_stiffness
-        elastic += (e[:, f.EDGE] ** 2 + e[:, f.HEAD] ** 2).sum() / belt.contact_stiffness
-        elastic += (e[:, f.NOSE] ** 2).sum() / belt.nose_stiffness
-        elastic += 2.0 * (e[:, f.FLANK] ** 2).sum() / belt.flank_stiffness
+        kinetic = belt.mass * (u**2).sum() + belt.inertia * (e[:, fields.OMEGA] ** 2).sum()
+        kinetic += belt.ring_mass * (e[:, fields.V] ** 2 + outward**2).sum()
+        kinetic += belt.driven_inertia * self._pulleys[fields.DRIVEN_SPEED] ** 2
+        elastic = (e[:, fields.TENSION] ** 2 * e[:, fields.LENGTH]).sum() / belt.ring_stiffness
+        elastic += (e[:, fields.EDGE] ** 2 + e[:, fields.HEAD] ** 2).sum() / belt.contact_stiffness
+        elastic += (e[:, fields.NOSE] ** 2).sum() / belt.nose_stiffness
+        elastic += 2.0 * (e[:, fields.FLANK] ** 2).sum() / belt.flank_stiffness
         elastic += 2.0 * (belt.modal_stiffness * openings**2).sum()
         for end in (e, ahead):  # half of the angle's stiffness at each end of a segment
-            cosine = (segment * end[:, [f.HEADING_Y, f.HEADING_Z]]).sum(axis=1)
+            cosine = (segment * end[:, [fields.HEADING_Y, fields.HEADING_Z]]).sum(axis=1)
             elastic += belt.angle_stiffness * (1.0 - cosine).sum()
         return 0.5 * float(kinetic + elastic)
 
 
 def _edge_gap(e: np.ndarray, ahead: np.ndarray, belt: Belt) -> np.ndarray:
     """Distance of neighbours at the rocking edge, (n,) [m]; negative where they press on each other."""
-    x, y = e[:, [f.HEADING_Y, f.HEADING_Z]], ahead[:, [f.HEADING_Y, f.HEADING_Z]]
+    x, y = e[:, [fields.HEADING_Y, fields.HEADING_Z]], ahead[:, [fields.HEADING_Y, fields.HEADING_Z]]
     outward = np.stack([x[:, 1], -x[:, 0]], 1)
-    edge = e[:, [f.Y, f.Z]] + 0.5 * belt.thickness * x - belt.pitch_depth * outward
-    face = ahead[:, [f.Y, f.Z]] - 0.5 * belt.thickness * y
+    edge = e[:, [fields.Y, fields.Z]] + 0.5 * belt.thickness * x - belt.pitch_depth * outward
+    face = ahead[:, [fields.Y, fields.Z]] - 0.5 * belt.thickness * y
     return ((face - edge) * y).sum(1)

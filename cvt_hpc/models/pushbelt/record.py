@@ -7,7 +7,7 @@ from typing import TYPE_CHECKING, Any
 
 import numpy as np
 
-from cvt_hpc.models.pushbelt import belt as fields
+from cvt_hpc.models.pushbelt import fields as f
 from cvt_hpc.variables import Coordinate, Variable
 from cvt_hpc.variator import PULLEYS, STRANDS, judging
 from cvt_hpc.variator.history import dataset
@@ -88,7 +88,7 @@ def coordinates(parameters: Mapping[str, Any]) -> dict[str, Coordinate]:
     return {
         **COORDINATES,
         "ramp_share": ramp.coordinate(),
-        "spring": Coordinate(np.array(tuple(fields.DAMPED)), "", "spring", "contact or elastic part"),
+        "spring": Coordinate(np.array(tuple(f.DAMPED)), "", "spring", "contact or elastic part"),
         "frequency_bin": frequency_bins(parameters),
     }
 
@@ -117,12 +117,12 @@ def judge(run: ElementRun) -> dict[str, Any]:
 def evaluate(run: ElementRun, strongest_probe: np.ndarray) -> dict[str, Any]:
     """Values of a finished run of VARIABLES beyond the verdict; as `judging.evaluate`, which has a part."""
     judged = run.judged
-    driving, load = run.mean_rate(fields.WORK_IN), run.mean_rate(fields.WORK_OUT)
-    ring = run.mean_rate(fields.RING_LOSS)
-    belt, tilt = run.mean_rate(fields.BELT_LOSS), run.mean_rate(fields.DAMPING_LOSS)
-    loss = run.mean_rate(fields.FLANK_LOSS) + ring + belt + tilt
-    damped = np.array([run.mean_rate(total) for total in fields.DAMPED.values()])
-    thrust, storing = run.mean_rate(fields.THRUST_WORK), run.mean_rate(fields.TOTALS)
+    driving, load = run.mean_rate(f.WORK_IN), run.mean_rate(f.WORK_OUT)
+    ring = run.mean_rate(f.RING_LOSS)
+    belt, tilt = run.mean_rate(f.BELT_LOSS), run.mean_rate(f.DAMPING_LOSS)
+    loss = run.mean_rate(f.FLANK_LOSS) + ring + belt + tilt
+    damped = np.array([run.mean_rate(total) for total in f.DAMPED.values()])
+    thrust, storing = run.mean_rate(f.THRUST_WORK), run.mean_rate(f.TOTALS)
     push, where = run.profiles["push_force"], regions(run.path, run.places)
     largest = np.nanmax(push)
     idle = ~(push > IDLE * largest)  # as well where no element has been

@@ -10,18 +10,7 @@ from typing import Any
 
 import numpy as np
 
-from cvt_hpc.models.pushbelt.belt import (
-    CONTACTS,
-    DRIVEN_RADIUS,
-    DRIVING_RADIUS,
-    FAILED_CONTACT,
-    FAILED_ELEMENT,
-    IN_LOAD,
-    IN_SPEED,
-    NOT_CONVERGED,
-    TIME,
-    TOTALS,
-)
+from cvt_hpc.models.pushbelt import fields as f
 from cvt_hpc.models.pushbelt.parameters import MODES, path_length
 from cvt_hpc.models.pushbelt.readings import PROFILES, SCALARS, Readings
 from cvt_hpc.models.pushbelt.start_up import StartUps, fingerprint
@@ -62,7 +51,7 @@ class ElementRun(SampledRun):
         The model's own.
     """
 
-    _contacts: tuple[str, ...] = CONTACTS  # by number, as the counters have them
+    _contacts: tuple[str, ...] = f.CONTACTS  # by number, as the counters have them
     _channels: tuple[str, ...] = (*COURSES, *SCALARS)
     _profiles: Sequence[str] = tuple(PROFILES)
     _directions: tuple[str, ...] = STRANDS  # of the displacement at the probes of the strands
@@ -79,7 +68,7 @@ class ElementRun(SampledRun):
         self._readings = Readings(p, self._belt)
         sums = len(self._profiles) + 1, self._readings.places.size
         probes = np.tile(self._readings.probes, (len(self._directions) // len(STRANDS), 1))
-        self._record(self._channels, self._directions, probes, TOTALS + 1, sums)
+        self._record(self._channels, self._directions, probes, f.TOTALS + 1, sums)
         clamped = int(CLAMPED * p["rise_time"] / self.interval + 1e-9)
         self._start_up = min(clamped, self.first_judged)
         self._start_up_key = self._key_of_start_up()
@@ -200,7 +189,7 @@ class ElementRun(SampledRun):
 
     def _take_sample(self, inputs: np.ndarray) -> None:
         found = self._read()
-        speed, torque = inputs[IN_SPEED], inputs[IN_LOAD]
+        speed, torque = inputs[f.IN_SPEED], inputs[f.IN_LOAD]
         load = torque / self.parameters["ratio"]
         stored = np.nan
         if self.done >= self.first_judged:
@@ -210,15 +199,15 @@ class ElementRun(SampledRun):
         self._keep(row, [*self._state.totals, stored])
 
     def _why(self, outcome: int) -> str:
-        if outcome == NOT_CONVERGED:
+        if outcome == f.NOT_CONVERGED:
             return f"the equations of a step were not solved, {self._fault()}"
         return "the state is not a number, or the equations of a step are singular"
 
     def _fault(self) -> str:
         """Where the last step that was not solved was not."""
         counters = self._state.counters
-        contact = self._contacts[counters[FAILED_CONTACT]]
-        return f"at the {contact} contact of element {counters[FAILED_ELEMENT]}"
+        contact = self._contacts[counters[f.FAILED_CONTACT]]
+        return f"at the {contact} contact of element {counters[f.FAILED_ELEMENT]}"
 
     def _slipped(self) -> str | None:
         """Whether the driven pulley runs far from the speed that the present radii give without slip."""
@@ -231,7 +220,7 @@ class ElementRun(SampledRun):
     def _out_of_place(self) -> str | None:
         """Whether a sheave has run to its stop, if the job gives the reach of the sheaves."""
         least, most = self.parameters["inner_radius"], self.parameters["outer_radius"]
-        radii = self._state.pulleys[[DRIVING_RADIUS, DRIVEN_RADIUS]]
+        radii = self._state.pulleys[[f.DRIVING_RADIUS, f.DRIVEN_RADIUS]]
         for pulley, radius in zip(PULLEYS, radii, strict=True):
             if not least <= radius <= most:
                 reach = f"{least:g} to {most:g} m"
@@ -243,11 +232,11 @@ class ElementRun(SampledRun):
     @property
     def time(self) -> float:
         """Simulated time [s]."""
-        return float(self._state.totals[TIME])
+        return float(self._state.totals[f.TIME])
 
     def mean_rate(self, total: int) -> float:
         """Mean rate over the judged part of one of the totals, by its index; TOTALS: of the stored energy."""
-        part, time = self._totals[self.judged], TIME
+        part, time = self._totals[self.judged], f.TIME
         return float((part[-1, total] - part[0, total]) / (part[-1, time] - part[0, time]))
 
     @property

@@ -8,28 +8,8 @@ from typing import Any, NamedTuple
 import numpy as np
 
 from cvt_hpc.lanes import LaneArray
-from cvt_hpc.models.pushbelt.belt import (
-    COUNTERS,
-    DRIVEN,
-    HEADING_Y,
-    HEADING_Z,
-    INPUTS,
-    ITERATE_FIELDS,
-    LENGTH,
-    OMEGA,
-    STATE_FIELDS,
-    STEP_FIELDS,
-    TENSION,
-    TOTALS,
-    U_Y,
-    U_Z,
-    Belt,
-    BeltState,
-    V,
-    Workspace,
-    Y,
-    Z,
-)
+from cvt_hpc.models.pushbelt import fields as f
+from cvt_hpc.models.pushbelt.belt import Belt, BeltState, Workspace
 from cvt_hpc.physics.friction_laws import Law
 from cvt_hpc.physics.geometry import Variator, driven_radius, variator
 from cvt_hpc.solvers.linked_blocks import empty_scratch, empty_system
@@ -170,22 +150,22 @@ def start(given: Mapping[str, Any]) -> tuple[Belt, BeltState]:
     belt, nodes, along, speed = belt_of(g, line.chord), g["elements"], line.along, line.speed
     points = line.points + belt.pitch_depth * np.stack([along[:, 1], -along[:, 0]], 1)
     distances = np.linalg.norm(np.roll(points, -1, axis=0) - points, axis=1)
-    fields = np.zeros((nodes, STATE_FIELDS))
-    fields[:, [Y, Z]], fields[:, [HEADING_Y, HEADING_Z]] = points, along
-    fields[:, OMEGA] = speed * line.curvature
-    fields[:, [U_Y, U_Z]] = (speed + belt.pitch_depth * fields[:, OMEGA])[:, None] * along
-    fields[:, V] = speed * distances.sum() / (nodes * line.chord)
-    fields[:, LENGTH] = distances / (1.0 + g["ring_strain"])
-    fields[:, TENSION] = belt.ring_stiffness * g["ring_strain"]
-    fields[:, DRIVEN] = points[:, 0] > 0.5 * belt.centre_distance
+    fields = np.zeros((nodes, f.STATE_FIELDS))
+    fields[:, [f.Y, f.Z]], fields[:, [f.HEADING_Y, f.HEADING_Z]] = points, along
+    fields[:, f.OMEGA] = speed * line.curvature
+    fields[:, [f.U_Y, f.U_Z]] = (speed + belt.pitch_depth * fields[:, f.OMEGA])[:, None] * along
+    fields[:, f.V] = speed * distances.sum() / (nodes * line.chord)
+    fields[:, f.LENGTH] = distances / (1.0 + g["ring_strain"])
+    fields[:, f.TENSION] = belt.ring_stiffness * g["ring_strain"]
+    fields[:, f.DRIVEN] = points[:, 0] > 0.5 * belt.centre_distance
     modes = belt.modal_stiffness.shape[1]
     state = BeltState(
         in_lanes(fields),
         line.pulleys,
         np.zeros((2, modes)),
         np.zeros(1 + 2 * modes),
-        np.zeros(TOTALS),
-        np.zeros(COUNTERS, np.int64),
+        np.zeros(f.TOTALS),
+        np.zeros(f.COUNTERS, np.int64),
     )
     return belt, state
 
@@ -207,7 +187,7 @@ def of_lanes(array: LaneArray) -> np.ndarray:
 def workspace(belt: Belt, nodes: int) -> Workspace:
     """Work space for a belt of so many nodes."""
     return empty_workspace(
-        nodes, belt.modal_stiffness.shape[1], 4, STEP_FIELDS, ITERATE_FIELDS, STATE_FIELDS, INPUTS
+        nodes, belt.modal_stiffness.shape[1], 4, f.STEP_FIELDS, f.ITERATE_FIELDS, f.STATE_FIELDS, f.INPUTS
     )
 
 

@@ -13,57 +13,13 @@ import numpy as np
 
 from cvt_hpc.kernels import kernel
 from cvt_hpc.lanes import absolute, ahead, around, behind
+from cvt_hpc.models.pushbelt import fields as f
 from cvt_hpc.models.pushbelt.assembly import (
     assemble,
     border_sums,
     element_forces,
     pair_forces,
     residuals,
-)
-from cvt_hpc.models.pushbelt.belt import (
-    CHANGE,
-    DRIVEN,
-    DRIVEN_RADIUS,
-    DRIVING_RADIUS,
-    DRIVING_SPEED,
-    EDGE,
-    FLANK,
-    FLANK_FRICTION_M,
-    FLANK_FRICTION_T,
-    FLANK_SLIP_M,
-    FLANK_SLIP_T,
-    FORCE_T,
-    HEAD,
-    HEADING_Y,
-    HEADING_Z,
-    IN_DRIVEN_THRUST,
-    IN_DRIVING_SHIFT,
-    IN_DRIVING_THRUST,
-    ITERATE_TENSION,
-    LENGTH,
-    MID_RADIUS,
-    NOSE,
-    OMEGA,
-    R_Y,
-    R_Z,
-    RING_FRICTION,
-    RING_SLIP,
-    SADDLE,
-    T_Y,
-    T_Z,
-    TENSION,
-    TENSION_I_Y,
-    TENSION_I_Z,
-    TENSION_J_Y,
-    TENSION_J_Z,
-    THRUST_WORK,
-    U_Y,
-    U_Z,
-    V_FILTERED,
-    WORK_IN,
-    V,
-    Y,
-    Z,
 )
 from cvt_hpc.models.pushbelt.border import accept_border, close_border, set_shapes
 from cvt_hpc.models.pushbelt.chain import linear_blocks, link, predict, turned
@@ -82,7 +38,7 @@ def _prepare(belt, state, work, dt):
         predict_noses(belt, state.elements, work.step)
     linear_blocks(belt, work.step, dt)
     for j in range(work.step.rows):
-        set_shapes(belt, work.step[j, R_Y], work.step[j, R_Z], work.shapes, j)
+        set_shapes(belt, work.step[j, f.R_Y], work.step[j, f.R_Z], work.shapes, j)
 
 
 @kernel
@@ -129,13 +85,13 @@ def _close(belt, state, work, dt):
 def _changes(kept, k):
     """Changes of contact forces, of the element behind (k = 1) only of those to the next one."""
     own = 1.0 - k
-    flank = kept[k, FLANK] ** 2 + kept[k, FLANK_FRICTION_M] ** 2 + kept[k, FLANK_FRICTION_T] ** 2
+    flank = kept[k, f.FLANK] ** 2 + kept[k, f.FLANK_FRICTION_M] ** 2 + kept[k, f.FLANK_FRICTION_T] ** 2
     return (
-        kept[k, EDGE],
-        kept[k, HEAD],
+        kept[k, f.EDGE],
+        kept[k, f.HEAD],
         own * np.sqrt(flank),
-        own * kept[k, RING_FRICTION],
-        kept[k, NOSE],
+        own * kept[k, f.RING_FRICTION],
+        kept[k, f.NOSE],
     )
 
 
@@ -149,46 +105,46 @@ def _accept(belt, state, work, inputs, dt):
         scratch[0, k] = 0.0
     per_dt = 1.0 / dt
     for j in range(step.rows):
-        t_y, t_z = step[j, T_Y], step[j, T_Z]
-        ahead_of_it, tension = iterate[j, ITERATE_TENSION], behind(iterate, j, ITERATE_TENSION)
-        pull = ahead_of_it * (t_z * step[j, TENSION_I_Y] - t_y * step[j, TENSION_I_Z])
-        pull -= tension * (t_z * behind(step, j, TENSION_J_Y) - t_y * behind(step, j, TENSION_J_Z))
-        across = per_dt * (t_z * elements[j, CHANGE] - t_y * elements[j, CHANGE + 1])
-        elements[j, SADDLE] = absolute(belt.ring_mass * across - pull)
-        elements[j, TENSION] = ahead_of_it
-        elements[j, LENGTH] += dt * (elements[j, RING_SLIP] - ahead(elements, j, RING_SLIP))
+        t_y, t_z = step[j, f.T_Y], step[j, f.T_Z]
+        ahead_of_it, tension = iterate[j, f.ITERATE_TENSION], behind(iterate, j, f.ITERATE_TENSION)
+        pull = ahead_of_it * (t_z * step[j, f.TENSION_I_Y] - t_y * step[j, f.TENSION_I_Z])
+        pull -= tension * (t_z * behind(step, j, f.TENSION_J_Y) - t_y * behind(step, j, f.TENSION_J_Z))
+        across = per_dt * (t_z * elements[j, f.CHANGE_Y] - t_y * elements[j, f.CHANGE_Z])
+        elements[j, f.SADDLE] = absolute(belt.ring_mass * across - pull)
+        elements[j, f.TENSION] = ahead_of_it
+        elements[j, f.LENGTH] += dt * (elements[j, f.RING_SLIP] - ahead(elements, j, f.RING_SLIP))
 
-        u_y, u_z = elements[j, U_Y] + elements[j, CHANGE], elements[j, U_Z] + elements[j, CHANGE + 1]
-        omega = elements[j, OMEGA] + elements[j, CHANGE + 2]
-        elements[j, U_Y], elements[j, U_Z], elements[j, OMEGA] = u_y, u_z, omega
-        elements[j, V] += elements[j, CHANGE + 3]
-        elements[j, Y] += dt * u_y
-        elements[j, Z] += dt * u_z
-        x_y, x_z = turned(elements[j, HEADING_Y], elements[j, HEADING_Z], dt * omega)
-        elements[j, HEADING_Y], elements[j, HEADING_Z] = x_y, x_z
+        u_y, u_z = elements[j, f.U_Y] + elements[j, f.CHANGE_Y], elements[j, f.U_Z] + elements[j, f.CHANGE_Z]
+        omega = elements[j, f.OMEGA] + elements[j, f.CHANGE_W]
+        elements[j, f.U_Y], elements[j, f.U_Z], elements[j, f.OMEGA] = u_y, u_z, omega
+        elements[j, f.V] += elements[j, f.CHANGE_V]
+        elements[j, f.Y] += dt * u_y
+        elements[j, f.Z] += dt * u_z
+        x_y, x_z = turned(elements[j, f.HEADING_Y], elements[j, f.HEADING_Z], dt * omega)
+        elements[j, f.HEADING_Y], elements[j, f.HEADING_Z] = x_y, x_z
 
-        driven = elements[j, DRIVEN]
-        thrust = elements[j, FLANK] * belt.cosine + elements[j, FLANK_FRICTION_M] * belt.sine
+        driven = elements[j, f.DRIVEN]
+        thrust = elements[j, f.FLANK] * belt.cosine + elements[j, f.FLANK_FRICTION_M] * belt.sine
         scratch[0, 0] += (1.0 - driven) * thrust
         scratch[0, 1] += driven * thrust
-        scratch[0, 2] += (1.0 - driven) * step[j, MID_RADIUS] * iterate[j, FORCE_T]
-        slip_m, slip_t = elements[j, FLANK_SLIP_M], elements[j, FLANK_SLIP_T]
-        filtered = filtered_slip(belt, slip_m, slip_t, elements[j, FLANK], elements[j, V_FILTERED], dt)
-        elements[j, V_FILTERED] = filtered
+        scratch[0, 2] += (1.0 - driven) * step[j, f.MID_RADIUS] * iterate[j, f.FORCE_T]
+        slip_m, slip_t = elements[j, f.FLANK_SLIP_M], elements[j, f.FLANK_SLIP_T]
+        filtered = filtered_slip(belt, slip_m, slip_t, elements[j, f.FLANK], elements[j, f.V_FILTERED], dt)
+        elements[j, f.V_FILTERED] = filtered
     for k in range(3):
         scratch[0, k] = around(scratch[0, k])
     driving_thrust, driven_thrust = scratch.data[0, 0, 0], scratch.data[0, 1, 0]
-    driving = dt * belt.driving_rate * (inputs[IN_DRIVING_THRUST] - driving_thrust)
-    driving += dt * inputs[IN_DRIVING_SHIFT]
-    driven = dt * belt.driven_rate * (inputs[IN_DRIVEN_THRUST] - driven_thrust)
-    pulleys[DRIVING_RADIUS] += driving
-    pulleys[DRIVEN_RADIUS] += driven
-    totals[WORK_IN] += dt * scratch.data[0, 2, 0] * pulleys[DRIVING_SPEED]
+    driving = dt * belt.driving_rate * (inputs[f.IN_DRIVING_THRUST] - driving_thrust)
+    driving += dt * inputs[f.IN_DRIVING_SHIFT]
+    driven = dt * belt.driven_rate * (inputs[f.IN_DRIVEN_THRUST] - driven_thrust)
+    pulleys[f.DRIVING_RADIUS] += driving
+    pulleys[f.DRIVEN_RADIUS] += driven
+    totals[f.WORK_IN] += dt * scratch.data[0, 2, 0] * pulleys[f.DRIVING_SPEED]
     accept_border(belt, state, inputs, dt)
     # both sheaves of a pulley close by the tangent of the wedge angle
     closing = 2.0 * belt.sine / belt.cosine
-    totals[THRUST_WORK] -= closing * (driving_thrust * driving + driven_thrust * driven)
+    totals[f.THRUST_WORK] -= closing * (driving_thrust * driving + driven_thrust * driven)
 
 
-EQUATIONS = Equations(_prepare, _evaluate, _assemble, _close, _accept, _changes, CHANGE)
+EQUATIONS = Equations(_prepare, _evaluate, _assemble, _close, _accept, _changes, f.CHANGE)
 advance = partial(advance_by, EQUATIONS)

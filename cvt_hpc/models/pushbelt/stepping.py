@@ -13,20 +13,7 @@ import numpy as np
 
 from cvt_hpc.kernels import kernel
 from cvt_hpc.lanes import absolute, like, maximum
-from cvt_hpc.models.pushbelt.belt import (
-    CONVERGED,
-    DRIVING_SPEED,
-    FAILED_STEPS,
-    IN_A_ROW,
-    IN_LOAD,
-    IN_SPEED,
-    ITERATIONS,
-    NOT_CONVERGED,
-    NOT_FINITE,
-    POWER_RESIDUAL,
-    STATUS,
-    STEPS,
-)
+from cvt_hpc.models.pushbelt import fields as f
 from cvt_hpc.models.pushbelt.faults import keep_states, most_corrected, name_fault
 from cvt_hpc.solvers.linked_blocks import solve
 from cvt_hpc.solvers.small_system import solve_small
@@ -181,22 +168,22 @@ def advance_by(equations, belt, newton, state, work, inputs, steps, dt):
         share = (k + 1.0) / steps
         for entry in range(work.inputs.size):
             work.inputs[entry] = inputs[0, entry] + share * (inputs[1, entry] - inputs[0, entry])
-        state.pulleys[DRIVING_SPEED] = work.inputs[IN_SPEED]
+        state.pulleys[f.DRIVING_SPEED] = work.inputs[f.IN_SPEED]
         for entry in range(work.increments.size):
             work.increments[entry] = state.increments[entry]
         equations.prepare(belt, state, work, dt)
-        iterations, change, power = _newton(equations, belt, newton, state, work, work.inputs[IN_LOAD], dt)
-        counters[STEPS] += 1
-        counters[ITERATIONS] += iterations
+        iterations, change, power = _newton(equations, belt, newton, state, work, work.inputs[f.IN_LOAD], dt)
+        counters[f.STEPS] += 1
+        counters[f.ITERATIONS] += iterations
         finite = abs(power) < _LARGE and change < _LARGE
         failed = not (finite and change < newton.tolerance and abs(power) < newton.power_tolerance)
-        counters[IN_A_ROW] = counters[IN_A_ROW] + 1 if failed else 0
+        counters[f.IN_A_ROW] = counters[f.IN_A_ROW] + 1 if failed else 0
         if failed:
-            counters[FAILED_STEPS] += 1
-        if not finite or counters[IN_A_ROW] == newton.most_failures:
-            counters[STATUS] = NOT_CONVERGED if finite else NOT_FINITE
-            return counters[STATUS]
-        state.totals[POWER_RESIDUAL] += dt * power
+            counters[f.FAILED_STEPS] += 1
+        if not finite or counters[f.IN_A_ROW] == newton.most_failures:
+            counters[f.STATUS] = f.NOT_CONVERGED if finite else f.NOT_FINITE
+            return counters[f.STATUS]
+        state.totals[f.POWER_RESIDUAL] += dt * power
         equations.accept(belt, state, work, work.inputs, dt)
-    counters[STATUS] = CONVERGED
-    return counters[STATUS]
+    counters[f.STATUS] = f.CONVERGED
+    return counters[f.STATUS]

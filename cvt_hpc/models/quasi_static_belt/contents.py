@@ -10,7 +10,8 @@ from __future__ import annotations
 import numpy as np
 
 from cvt_hpc.kernels import kernel
-from cvt_hpc.models.elastic_belt.belt import N_ELEMENT, V_ELEMENT, Belt, W
+from cvt_hpc.models.elastic_belt import fields as f
+from cvt_hpc.models.elastic_belt.belt import Belt
 
 MOST_ITERATIONS = 12
 CLOSE = 1e-13  # [1]: of a content
@@ -56,14 +57,14 @@ def settle_contents(
     for layer in range(2):
         stiffness = belt.ring_stiffness if layer else belt.element_stiffness
         offset = belt.ring_offset if layer else 0.0
-        content, v = fields[N_ELEMENT + layer], fields[V_ELEMENT + layer]
+        content, v = fields[f.N_ELEMENT + layer], fields[f.V_ELEMENT + layer]
         old, speed, whole = content.copy(), 0.0, 0.0
         for j in range(n):
             speed += share[layer, j] * v[j] / (1.0 + eps[layer, j - 1 if j > 0 else n - 1])
             whole += along[layer, j]
         for _ in range(MOST_ITERATIONS):
             for c in range(n):
-                mean = 0.5 * (fields[W, c] + fields[W, c + 1 if c < n - 1 else 0])
+                mean = 0.5 * (fields[f.W, c] + fields[f.W, c + 1 if c < n - 1 else 0])
                 length = 1.0 + belt.curvature[c] * (mean + offset)
                 strain = length / content[c] - 1.0
                 stress[c], steepness[c] = stiffness * strain, -stiffness * length / content[c] ** 2
@@ -90,7 +91,7 @@ def settle_contents(
             taken += belt.dual[j] * drag[layer] * shift[j] ** 2
         for j in range(n):
             c = j - 1 if j > 0 else n - 1
-            mean = 0.5 * (fields[W, c] + fields[W, j])
+            mean = 0.5 * (fields[f.W, c] + fields[f.W, j])
             v[j] = speed * (1.0 + belt.curvature[c] * (mean + offset)) / content[c]
     return taken
 

@@ -5,32 +5,12 @@ from __future__ import annotations
 import numpy as np
 
 from cvt_hpc.kernels import kernel
-from cvt_hpc.models.elastic_belt.belt import N_ELEMENT, TIME, U
+from cvt_hpc.models.elastic_belt import fields as f
 from cvt_hpc.models.elastic_belt.imex_system import LARGEST_OVERLAP
 from cvt_hpc.models.elastic_belt.rhs import speed_share_at
+from cvt_hpc.models.quasi_static_belt import fields as q
 from cvt_hpc.models.quasi_static_belt.coupled import solve_chain, solve_dense
-from cvt_hpc.models.quasi_static_belt.split_belt import (
-    ACROSS,
-    ALONG,
-    ALONG_RING,
-    CROSS_SLOPE,
-    ELEMENT_HOOP,
-    ELEMENT_STRAIN_AHEAD,
-    ELEMENT_STRESS,
-    HOOP_STRESS,
-    MEETING,
-    RADIAL_SLOPE,
-    RADIAL_SPEED,
-    REVERSING,
-    RING_HOOP,
-    RING_REVERSING,
-    RING_STRESS,
-    SADDLE_SPEED,
-    TANGENTIAL_SPEED,
-    Motion,
-    SplitBelt,
-    Work,
-)
+from cvt_hpc.models.quasi_static_belt.split_belt import Motion, SplitBelt, Work
 
 
 @kernel
@@ -38,7 +18,7 @@ def solve_increments(model: SplitBelt, moved: Motion, work: Work) -> None:
     """Increments of the coordinates' rates into `found`, of the layers' speeds into the chain's column 0."""
     belt, stations, shapes, size = model.belt, work.stations, model.shapes, model.shapes.shape[1]
     n, slow, matrix = belt.cell.size, model.dynamic, work.matrix
-    speed = speed_share_at(belt, moved.state.scalars[TIME]) * belt.belt_speed
+    speed = speed_share_at(belt, moved.state.scalars[f.TIME]) * belt.belt_speed
     whole = size + 2 if model.steady_flow else size
     np.dot(model.inertia, moved.p, work.row)
     for i in range(size):
@@ -50,13 +30,13 @@ def solve_increments(model: SplitBelt, moved: Motion, work: Work) -> None:
         matrix[:size, i] = 0.0
     if model.steady_flow:
         for j in range(n):
-            cross, blocks = stations[CROSS_SLOPE, j], work.layers.diagonal
+            cross, blocks = stations[q.CROSS_SLOPE, j], work.layers.diagonal
             matrix[size, size] += blocks[j, 0]
             matrix[size + 1, size + 1] += blocks[j, 2]
             matrix[size, size + 1] += blocks[j, 1]
             matrix[size + 1, size] += blocks[j, 1]
-            matrix[size, whole] += stations[ALONG, j]
-            matrix[size + 1, whole] += stations[ALONG_RING, j]
+            matrix[size, whole] += stations[q.ALONG, j]
+            matrix[size + 1, whole] += stations[q.ALONG_RING, j]
             for i in range(size):
                 matrix[i, size] += shapes[j, i] * cross
                 matrix[size, i] += shapes[j, i] * cross
@@ -68,7 +48,7 @@ def solve_increments(model: SplitBelt, moved: Motion, work: Work) -> None:
     columns, vector = work.layers.columns, work.vector
     vector[:] = 0.0
     vector[:size] = work.found[:size]
-    np.dot(shapes, vector, work.rate[U])
+    np.dot(shapes, vector, work.rate[f.U])
     if model.steady_flow:
         for j in range(n):
             columns[2 * j, 0], columns[2 * j + 1, 0] = work.found[size], work.found[size + 1]
@@ -95,9 +75,13 @@ def _fill_chain(model: SplitBelt, work: Work) -> None:
     columns[:] = 0.0
     for j in range(n):
         a = j - 1 if j > 0 else n - 1
-        columns[2 * j, 0] = stations[ALONG, j] + stations[ELEMENT_STRESS, j] - stations[ELEMENT_STRESS, a]
-        columns[2 * j + 1, 0] = stations[ALONG_RING, j] + stations[RING_STRESS, j] - stations[RING_STRESS, a]
-        cross = stations[CROSS_SLOPE, j]
+        columns[2 * j, 0] = (
+            stations[q.ALONG, j] + stations[q.ELEMENT_STRESS, j] - stations[q.ELEMENT_STRESS, a]
+        )
+        columns[2 * j + 1, 0] = (
+            stations[q.ALONG_RING, j] + stations[q.RING_STRESS, j] - stations[q.RING_STRESS, a]
+        )
+        cross = stations[q.CROSS_SLOPE, j]
         if cross != 0.0:
             row = columns[2 * j]
             for k in range(size):
@@ -108,7 +92,7 @@ def _fill_chain(model: SplitBelt, work: Work) -> None:
         # a cell that moves outwards is stretched, and pulls at the stations at both its ends
         b, half = j + 1 if j < n - 1 else 0, 0.5 * belt.curvature[j] * belt.cell[j]
         for layer in range(2):
-            pull = half * stations[RING_HOOP if layer else ELEMENT_HOOP, j]
+            pull = half * stations[q.RING_HOOP if layer else q.ELEMENT_HOOP, j]
             here, ahead = columns[2 * j + layer], columns[2 * b + layer]
             for k in range(size):
                 stretched = pull * (shapes[j, k] + shapes[b, k])
@@ -130,8 +114,8 @@ def _reduce(model: SplitBelt, work: Work) -> None:
     whole = size + 2 if model.steady_flow else size
     row = work.row
     for j in range(n):
-        cross, slope = stations[CROSS_SLOPE, j], stations[RADIAL_SLOPE, j]
-        right = stations[ACROSS, j]
+        cross, slope = stations[q.CROSS_SLOPE, j], stations[q.RADIAL_SLOPE, j]
+        right = stations[q.ACROSS, j]
         for k in range(size):
             row[k] = slope * shapes[j, k]
         if not model.steady_flow and belt.arc_share[j] > 0.0:
@@ -144,10 +128,10 @@ def _reduce(model: SplitBelt, work: Work) -> None:
                 if belt.curvature[c] == 0.0:
                     continue
                 b, half = c + 1 if c < n - 1 else 0, 0.5 * belt.curvature[c] * belt.cell[c]
-                pull_0, pull_1 = half * stations[ELEMENT_HOOP, c], half * stations[RING_HOOP, c]
+                pull_0, pull_1 = half * stations[q.ELEMENT_HOOP, c], half * stations[q.RING_HOOP, c]
                 stiff = half * (pull_0 + pull_1)
                 e0, e1, e2, e3 = columns[2 * b], columns[2 * c], columns[2 * b + 1], columns[2 * c + 1]
-                right -= half * stations[HOOP_STRESS, c]
+                right -= half * stations[q.HOOP_STRESS, c]
                 right -= pull_0 * (e0[0] - e1[0]) + pull_1 * (e2[0] - e3[0])
                 for k in range(size):
                     row[k] += stiff * (shapes[c, k] + shapes[b, k])
@@ -170,22 +154,22 @@ def contradicts(model: SplitBelt, moved: Motion, work: Work) -> bool:
     for j in range(n):
         dv0, dv1 = columns[2 * j, 0], columns[2 * j + 1, 0]
         if belt.arc_share[j] > 0.0:
-            v_radial, v_tangential = stations[RADIAL_SPEED, j], stations[TANGENTIAL_SPEED, j]
+            v_radial, v_tangential = stations[q.RADIAL_SPEED, j], stations[q.TANGENTIAL_SPEED, j]
             squared = v_radial * v_radial + v_tangential * v_tangential
-            back = v_radial * work.rate[U, j] + v_tangential * dv0 < -squared
+            back = v_radial * work.rate[f.U, j] + v_tangential * dv0 < -squared
             back = back and squared > belt.friction_speed * belt.friction_speed
-            if back and stations[REVERSING, j] < 0.5:
-                stations[REVERSING, j], found = 1.0, True
-            saddle = stations[SADDLE_SPEED, j]
+            if back and stations[q.REVERSING, j] < 0.5:
+                stations[q.REVERSING, j], found = 1.0, True
+            saddle = stations[q.SADDLE_SPEED, j]
             change = (1.0 + belt.ring_offset * belt.arc_curvature[j]) * dv0 - dv1
             back = abs(saddle) > belt.ring_friction_speed and saddle * (saddle + change) < 0.0
-            if back and stations[RING_REVERSING, j] < 0.5:
-                stations[RING_REVERSING, j], found = 1.0, True
+            if back and stations[q.RING_REVERSING, j] < 0.5:
+                stations[q.RING_REVERSING, j], found = 1.0, True
         if model.steady_flow or work.layers.links[0, j] > 0.0:
             continue
         b = j + 1 if j < n - 1 else 0
-        per_length = model.step / (belt.cell[j] * moved.state.fields[N_ELEMENT, j])
-        overlap = stations[ELEMENT_STRAIN_AHEAD, j] + per_length * (columns[2 * b, 0] - dv0)
-        if overlap < -LARGEST_OVERLAP and stations[MEETING, j] < 0.5:
-            stations[MEETING, j], found = 1.0, True
+        per_length = model.step / (belt.cell[j] * moved.state.fields[f.N_ELEMENT, j])
+        overlap = stations[q.ELEMENT_STRAIN_AHEAD, j] + per_length * (columns[2 * b, 0] - dv0)
+        if overlap < -LARGEST_OVERLAP and stations[q.MEETING, j] < 0.5:
+            stations[q.MEETING, j], found = 1.0, True
     return found

@@ -10,35 +10,12 @@ from typing import NamedTuple
 import numpy as np
 
 from cvt_hpc.kernels import kernel
-from cvt_hpc.models.elastic_belt.belt import Belt, Mesh, State, U, W
+from cvt_hpc.models.elastic_belt import fields as f
+from cvt_hpc.models.elastic_belt.belt import Belt, Mesh, State
 from cvt_hpc.models.elastic_belt.rhs import contact_forces, fresh_contacts, strains
 from cvt_hpc.models.quasi_static_belt.basis import Basis
 from cvt_hpc.models.quasi_static_belt.coupled import Chain, chain
 from cvt_hpc.physics.compliance import Contact
-
-# rows of Work.stations
-(
-    ACROSS,
-    ALONG,
-    ALONG_RING,
-    RADIAL_SLOPE,
-    CROSS_SLOPE,
-    TANGENTIAL_SLOPE,
-    RADIAL_SPEED,
-    TANGENTIAL_SPEED,
-    STIFFNESS_OF_SADDLE,
-    SADDLE_SPEED,
-    UNSTRESSED,
-    MEETING,
-    REVERSING,
-    RING_REVERSING,
-    ELEMENT_STRAIN_AHEAD,
-    ELEMENT_STRESS,
-    RING_STRESS,
-    HOOP_STRESS,
-    ELEMENT_HOOP,
-    RING_HOOP,
-) = range(20)
 
 
 class SplitBelt(NamedTuple):
@@ -191,13 +168,13 @@ def motion(model: SplitBelt, state: State) -> Motion:
     """Motion nearest to a state: its displacement by the shapes, its speeds by the dynamic ones."""
     belt, weight = model.belt, np.sqrt(model.belt.dual)
     fields = state.fields.copy()
-    q = np.linalg.lstsq(model.shapes * weight[:, None], weight * fields[W], rcond=None)[0]
+    q = np.linalg.lstsq(model.shapes * weight[:, None], weight * fields[f.W], rcond=None)[0]
     p, slow = np.zeros_like(q), model.dynamic
     if slow:
-        p[:slow] = np.linalg.lstsq(model.shapes[:, :slow] * weight[:, None], weight * fields[U], rcond=None)[
-            0
-        ]
-    fields[W], fields[U] = model.shapes @ q, model.shapes @ p
+        p[:slow] = np.linalg.lstsq(
+            model.shapes[:, :slow] * weight[:, None], weight * fields[f.U], rcond=None
+        )[0]
+    fields[f.W], fields[f.U] = model.shapes @ q, model.shapes @ p
     found = State(fields, state.scalars.copy())
     n = belt.cell.size
     moved = Motion(

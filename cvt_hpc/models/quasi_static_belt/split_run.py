@@ -8,17 +8,10 @@ from typing import Any
 import numpy as np
 
 from cvt_hpc.kernels import called_alike
-from cvt_hpc.models.elastic_belt.belt import (
-    LAYER_WORK,
-    State,
-    W,
-    belt_constants,
-    initial_state,
-    random_strands,
-)
-from cvt_hpc.models.elastic_belt.lane_belt import LAYER_WORK as LANE_WORK
+from cvt_hpc.models.elastic_belt import fields as f
+from cvt_hpc.models.elastic_belt import lane_fields as lf
+from cvt_hpc.models.elastic_belt.belt import State, belt_constants, initial_state, random_strands
 from cvt_hpc.models.elastic_belt.lane_belt import put_lane
-from cvt_hpc.models.elastic_belt.lane_forces import NOTED
 from cvt_hpc.models.elastic_belt.one_lane_run import OneLaneRun
 from cvt_hpc.models.elastic_belt.sampling import Outcome
 from cvt_hpc.models.elastic_belt.validity import FAILURES
@@ -147,9 +140,9 @@ class SplitRun(OneLaneRun):
     def _disturb(self) -> None:
         """Give the strands their random displacement, once the start-up's damping has gone."""
         p, moved, state = self.parameters, self._motion, self.state
-        state.fields[W] += random_strands(self.mesh, p["disturbance"], p["seed"])
+        state.fields[f.W] += random_strands(self.mesh, p["disturbance"], p["seed"])
         nearest = motion(self._model, state)
-        moved.q[:], moved.state.fields[W] = nearest.q, nearest.state.fields[W]
+        moved.q[:], moved.state.fields[f.W] = nearest.q, nearest.state.fields[f.W]
         refresh(self._model, moved)
         self._disturbed = True
 
@@ -158,12 +151,12 @@ class SplitRun(OneLaneRun):
         lane, state = self._lane, self._motion.state
         put_lane(lane.fields.data, lane.scalars.data, 0, self.belt, state)
         lane.time[0] = state.scalars[0]
-        lane.scalars.data[0, LANE_WORK] = state.scalars[LAYER_WORK]
-        state.scalars[LAYER_WORK] = 0.0
+        lane.scalars.data[0, lf.LAYER_WORK] = state.scalars[f.LAYER_WORK]
+        state.scalars[f.LAYER_WORK] = 0.0
         # the layers' speeds are counted from the belt speed there: a second difference takes that out
         noted = self._noted.copy()
         noted[1:] += state.fields[2:4] - lane.fields.data[:, 2:4, 0].T
-        self._stations.data[:, NOTED : NOTED + 3, 0] = noted.T
+        self._stations.data[:, lf.NOTED : lf.NOTED + 3, 0] = noted.T
         outcome = self._sample_lane()
         self.done += int(outcome == Outcome.OK)
         return outcome

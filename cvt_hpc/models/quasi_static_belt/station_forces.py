@@ -8,16 +8,7 @@ from __future__ import annotations
 import numpy as np
 
 from cvt_hpc.kernels import kernel
-from cvt_hpc.models.elastic_belt.belt import (
-    DRIVEN_SPEED,
-    N_ELEMENT,
-    TIME,
-    V_ELEMENT,
-    V_FILTERED,
-    V_RING,
-    U,
-    W,
-)
+from cvt_hpc.models.elastic_belt import fields as f
 from cvt_hpc.models.elastic_belt.imex_stations import implicit_shares
 from cvt_hpc.models.elastic_belt.imex_system import CENTRED, element_stress
 from cvt_hpc.models.elastic_belt.lane_forces import LEAST_SHARE_OF_WIDTH
@@ -28,29 +19,8 @@ from cvt_hpc.models.elastic_belt.rhs import (
     ring_drag,
     speed_share_at,
 )
-from cvt_hpc.models.quasi_static_belt.split_belt import (
-    ACROSS,
-    ALONG,
-    ALONG_RING,
-    CROSS_SLOPE,
-    ELEMENT_HOOP,
-    ELEMENT_STRAIN_AHEAD,
-    ELEMENT_STRESS,
-    HOOP_STRESS,
-    MEETING,
-    RADIAL_SLOPE,
-    RADIAL_SPEED,
-    REVERSING,
-    RING_HOOP,
-    RING_REVERSING,
-    RING_STRESS,
-    SADDLE_SPEED,
-    TANGENTIAL_SLOPE,
-    TANGENTIAL_SPEED,
-    Motion,
-    SplitBelt,
-    Work,
-)
+from cvt_hpc.models.quasi_static_belt import fields as q
+from cvt_hpc.models.quasi_static_belt.split_belt import Motion, SplitBelt, Work
 from cvt_hpc.physics.flank import flank_shares, flank_sliding
 from cvt_hpc.physics.friction import friction_coefficient, saturation
 
@@ -59,7 +29,7 @@ from cvt_hpc.physics.friction import friction_coefficient, saturation
 def put_forces(model: SplitBelt, moved: Motion, work: Work) -> None:
     """Forces at the stations [N] without those of the layers' stresses."""
     belt, stations, fields = model.belt, work.stations, moved.state.fields
-    n, v0, v1 = belt.cell.size, fields[V_ELEMENT], fields[V_RING]
+    n, v0, v1 = belt.cell.size, fields[f.V_ELEMENT], fields[f.V_RING]
     for j in range(n):
         a, b = j - 1 if j > 0 else n - 1, j + 1 if j < n - 1 else 0
         push_left = damped_push(belt, moved.eps[0, a], (v0[j] - v0[a]) / belt.cell[a])
@@ -67,9 +37,9 @@ def put_forces(model: SplitBelt, moved: Motion, work: Work) -> None:
         pull = belt.ring_stiffness * (moved.eps[1, j] - moved.eps[1, a])
         pull += belt.ring_damping * ((v1[b] - v1[j]) / belt.cell[j] - (v1[j] - v1[a]) / belt.cell[a])
         dual = belt.dual[j]
-        stations[ACROSS, j] = dual * belt.mass * work.rate[U, j]
-        stations[ALONG, j] = dual * belt.element_mass * work.rate[V_ELEMENT, j] + (push_right - push_left)
-        stations[ALONG_RING, j] = dual * belt.ring_mass[j] * work.rate[V_RING, j] - pull
+        stations[q.ACROSS, j] = dual * belt.mass * work.rate[f.U, j]
+        stations[q.ALONG, j] = dual * belt.element_mass * work.rate[f.V_ELEMENT, j] + (push_right - push_left)
+        stations[q.ALONG_RING, j] = dual * belt.ring_mass[j] * work.rate[f.V_RING, j] - pull
 
 
 @kernel
@@ -77,11 +47,11 @@ def put_slopes(model: SplitBelt, moved: Motion, work: Work) -> None:
     """Slopes of friction with the speeds [N s/m], and the layers' blocks, links and stresses."""
     belt, state, stations, step = model.belt, moved.state, work.stations, model.step
     n, fields, eps = belt.cell.size, state.fields, moved.eps
-    w, u, v0, v1 = fields[W], fields[U], fields[V_ELEMENT], fields[V_RING]
+    w, u, v0, v1 = fields[f.W], fields[f.U], fields[f.V_ELEMENT], fields[f.V_RING]
     sine, cosine = np.sin(belt.half_wedge_angle), np.cos(belt.half_wedge_angle)
     per_cosine, per_width = 1.0 / cosine, 1.0 / belt.friction_speed
-    damping = damping_at(belt, state.scalars[TIME])
-    speed_share = speed_share_at(belt, state.scalars[TIME])
+    damping = damping_at(belt, state.scalars[f.TIME])
+    speed_share = speed_share_at(belt, state.scalars[f.TIME])
     driving_speed = driving_speed_at(belt, state)
     blocks, links = work.layers.diagonal, work.layers.links
     for j in range(n):
@@ -94,10 +64,10 @@ def put_slopes(model: SplitBelt, moved: Motion, work: Work) -> None:
         if share > 0.0:
             lever = 1.0 + belt.ring_offset * belt.arc_curvature[j]
             driven = j >= belt.driven_start
-            turning = state.scalars[DRIVEN_SPEED] if driven else driving_speed
+            turning = state.scalars[f.DRIVEN_SPEED] if driven else driving_speed
             v_tangential = v0[j] - turning * ((belt.driven_radius if driven else belt.driving_radius) + w[j])
             speed, meridian = flank_sliding(v_radial, v_tangential, per_cosine)
-            v_law = speed if belt.friction_memory == 0.0 else fields[V_FILTERED, j]
+            v_law = speed if belt.friction_memory == 0.0 else fields[f.V_FILTERED, j]
             speed = max(speed, LEAST_SHARE_OF_WIDTH * belt.friction_speed)
             coefficient, _ = friction_coefficient(belt.law, v_law, moved.force[j] * per_cosine)
             factor, steepness = saturation(speed, per_width)
@@ -106,7 +76,7 @@ def put_slopes(model: SplitBelt, moved: Motion, work: Work) -> None:
             twice_normal = 2.0 * share * moved.force[j] / axial_share
             across = twice_normal * coefficient * factor / speed
             along = twice_normal * coefficient * steepness
-            if stations[REVERSING, j] > 0.5:
+            if stations[q.REVERSING, j] > 0.5:
                 along = across
             along, across = implicit_shares(along, across, element)
             excess = along - across
@@ -115,15 +85,15 @@ def put_slopes(model: SplitBelt, moved: Motion, work: Work) -> None:
             along_slope = across + excess * run * run
             drag, saddle = ring_drag(belt, j, a, eps, v0[j], v1[j], speed_share)
             grip, _ = saturation(saddle, 1.0 / belt.ring_friction_speed)
-            if stations[RING_REVERSING, j] > 0.5:
+            if stations[q.RING_REVERSING, j] > 0.5:
                 stiff = drag / saddle
             elif abs(grip) > 0.0:
                 stiff = drag / grip * (1.0 - grip * grip) / belt.ring_friction_speed
             stiff *= 0.5 + stiff / (2.0 * stiff + 12.0 * ring)
-            stations[RADIAL_SPEED, j], stations[TANGENTIAL_SPEED, j] = v_radial, v_tangential
-            stations[SADDLE_SPEED, j] = saddle
-        stations[RADIAL_SLOPE, j], stations[CROSS_SLOPE, j] = dual * radial_slope, dual * cross
-        stations[TANGENTIAL_SLOPE, j] = dual * along_slope
+            stations[q.RADIAL_SPEED, j], stations[q.TANGENTIAL_SPEED, j] = v_radial, v_tangential
+            stations[q.SADDLE_SPEED, j] = saddle
+        stations[q.RADIAL_SLOPE, j], stations[q.CROSS_SLOPE, j] = dual * radial_slope, dual * cross
+        stations[q.TANGENTIAL_SLOPE, j] = dual * along_slope
         blocks[j, 0] = dual * (element + along_slope + lever * lever * stiff)
         blocks[j, 1], blocks[j, 2] = -dual * lever * stiff, dual * (ring + stiff)
         # the layers' stresses at the end of the step, with the speeds that it begins with, and their slopes
@@ -131,7 +101,7 @@ def put_slopes(model: SplitBelt, moved: Motion, work: Work) -> None:
         lifted = 0.5 * belt.curvature[j] * length * (u[j] + u[b])
         closing = v0[b] - v0[j]
         outflow = closing - v0[j] * (eps[0, j] - eps[0, a]) / (1.0 + eps[0, a]) + lifted
-        per_length = step / (length * fields[N_ELEMENT, j])
+        per_length = step / (length * fields[f.N_ELEMENT, j])
         ahead = eps[0, j] + per_length * outflow
         grip = belt.element_damping / length
         stress, links[0, j] = element_stress(
@@ -142,16 +112,18 @@ def put_slopes(model: SplitBelt, moved: Motion, work: Work) -> None:
             ahead,
             per_length,
             links[0, j],
-            stations[MEETING, j],
+            stations[q.MEETING, j],
         )
-        stations[ELEMENT_STRAIN_AHEAD, j] = ahead
-        stations[ELEMENT_STRESS, j] = stress
+        stations[q.ELEMENT_STRAIN_AHEAD, j] = ahead
+        stations[q.ELEMENT_STRESS, j] = stress
         pressed = links[0, j] > 0.0
-        stations[ELEMENT_HOOP, j] = belt.element_stiffness * per_length if pressed else 0.0
+        stations[q.ELEMENT_HOOP, j] = belt.element_stiffness * per_length if pressed else 0.0
         # beyond its part in the explicit force across the belt
         hoop = belt.element_stiffness * (ahead if pressed else 0.0)
-        stations[HOOP_STRESS, j] = hoop - belt.element_stiffness * min(eps[0, j], 0.0)
+        stations[q.HOOP_STRESS, j] = hoop - belt.element_stiffness * min(eps[0, j], 0.0)
         grip = belt.ring_damping / length
-        stations[RING_STRESS, j] = belt.ring_stiffness * eps[1, j] + grip * (v1[b] - v1[j])
-        stations[RING_HOOP, j] = CENTRED * belt.ring_stiffness * step / (length * fields[N_ELEMENT + 1, j])
-        links[1, j] = stations[RING_HOOP, j] + grip
+        stations[q.RING_STRESS, j] = belt.ring_stiffness * eps[1, j] + grip * (v1[b] - v1[j])
+        stations[q.RING_HOOP, j] = (
+            CENTRED * belt.ring_stiffness * step / (length * fields[f.N_ELEMENT + 1, j])
+        )
+        links[1, j] = stations[q.RING_HOOP, j] + grip

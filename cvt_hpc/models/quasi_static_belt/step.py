@@ -19,19 +19,7 @@ from __future__ import annotations
 import numpy as np
 
 from cvt_hpc.kernels import kernel
-from cvt_hpc.models.elastic_belt.belt import (
-    DRIVEN_POSITION,
-    DRIVEN_SPEED,
-    FIRST_STATE,
-    LAYER_WORK,
-    N_ELEMENT,
-    TIME,
-    V_ELEMENT,
-    V_FILTERED,
-    V_RING,
-    U,
-    W,
-)
+from cvt_hpc.models.elastic_belt import fields as f
 from cvt_hpc.models.elastic_belt.one_system import driven_thrust, free_rates, pulled_by
 from cvt_hpc.models.elastic_belt.rhs import (
     accelerations,
@@ -40,21 +28,10 @@ from cvt_hpc.models.elastic_belt.rhs import (
     sliding_speed,
     speed_share_at,
 )
+from cvt_hpc.models.quasi_static_belt import fields as q
 from cvt_hpc.models.quasi_static_belt.contents import settle_contents
 from cvt_hpc.models.quasi_static_belt.increments import contradicts, solve_increments
-from cvt_hpc.models.quasi_static_belt.split_belt import (
-    ALONG,
-    ALONG_RING,
-    CROSS_SLOPE,
-    MEETING,
-    REVERSING,
-    RING_REVERSING,
-    TANGENTIAL_SLOPE,
-    Motion,
-    SplitBelt,
-    Work,
-    refresh,
-)
+from cvt_hpc.models.quasi_static_belt.split_belt import Motion, SplitBelt, Work, refresh
 from cvt_hpc.models.quasi_static_belt.station_forces import put_forces, put_slopes
 
 MOST_PASSES = 9
@@ -71,7 +48,7 @@ def march(model: SplitBelt, moved: Motion, work: Work, steps: int, noted: np.nda
         if taken >= steps - 2:
             is_first = taken == max(steps - 2, 0)
             weight = 0.0 if taken < steps - 1 else -2.0
-            for k, row in enumerate((U, V_ELEMENT, V_RING)):
+            for k, row in enumerate((f.U, f.V_ELEMENT, f.V_RING)):
                 for j in range(fields.shape[1]):
                     if is_first:
                         noted[k, j] = fields[row, j]
@@ -93,7 +70,7 @@ def _step(model: SplitBelt, moved: Motion, work: Work) -> bool:
         if not contradicts(model, moved, work):
             break
         moved.counts[1] += attempt == 0
-    for row in (MEETING, REVERSING, RING_REVERSING):
+    for row in (q.MEETING, q.REVERSING, q.RING_REVERSING):
         work.stations[row] = 0.0
     _advance(model, moved, work)
     return refresh(model, moved)
@@ -113,13 +90,13 @@ def _advance(model: SplitBelt, moved: Motion, work: Work) -> None:
     scalars, count, shapes = state.scalars, model.shapes.shape[1], model.shapes
     moment = taken = 0.0
     for j in range(n):
-        du, dv0 = work.rate[U, j], columns[2 * j, 0]
+        du, dv0 = work.rate[f.U, j], columns[2 * j, 0]
         if belt.arc_share[j] > 0.0:
-            slopes = stations[TANGENTIAL_SLOPE, j] * dv0 + stations[CROSS_SLOPE, j] * du
+            slopes = stations[q.TANGENTIAL_SLOPE, j] * dv0 + stations[q.CROSS_SLOPE, j] * du
             if j >= belt.driven_start:
-                moment += work.moments[j] + slopes * (belt.driven_radius + fields[W, j])
+                moment += work.moments[j] + slopes * (belt.driven_radius + fields[f.W, j])
             else:
-                taken += work.moments[j] - slopes * (belt.driving_radius + fields[W, j])
+                taken += work.moments[j] - slopes * (belt.driving_radius + fields[f.W, j])
     for k in range(size):
         moved.p[k] += work.found[k]
     work_done = 0.0
@@ -129,7 +106,7 @@ def _advance(model: SplitBelt, moved: Motion, work: Work) -> None:
     if not model.steady_flow:
         for j in range(n):
             b = j + 1 if j < n - 1 else 0
-            closing = fields[V_ELEMENT, b] - fields[V_ELEMENT, j]
+            closing = fields[f.V_ELEMENT, b] - fields[f.V_ELEMENT, j]
             change = columns[2 * b, 0] - columns[2 * j, 0]
             grip, eps = belt.element_damping / belt.cell[j], moved.eps[0, j]
             damped = 0.0
@@ -140,69 +117,69 @@ def _advance(model: SplitBelt, moved: Motion, work: Work) -> None:
                 if grip * closing > -belt.element_stiffness * eps:
                     damped = -belt.element_stiffness * min(eps, 0.0)
             work_done += damped * (closing + 0.5 * change)
-            closing = fields[V_RING, b] - fields[V_RING, j]
+            closing = fields[f.V_RING, b] - fields[f.V_RING, j]
             change = columns[2 * b + 1, 0] - columns[2 * j + 1, 0]
             work_done += belt.ring_damping / belt.cell[j] * (closing + change) * (closing + 0.5 * change)
     for j in range(n):
-        fields[V_ELEMENT, j] += columns[2 * j, 0]
-        fields[V_RING, j] += columns[2 * j + 1, 0]
+        fields[f.V_ELEMENT, j] += columns[2 * j, 0]
+        fields[f.V_RING, j] += columns[2 * j + 1, 0]
     if not model.steady_flow:
         for layer in range(2):
-            v, eps = fields[V_ELEMENT + layer], moved.eps[layer]
+            v, eps = fields[f.V_ELEMENT + layer], moved.eps[layer]
             first = v[0] / (1.0 + eps[n - 1])
             inflow = first
             for c in range(n):
                 outflow = v[c + 1] / (1.0 + eps[c]) if c < n - 1 else first
-                fields[N_ELEMENT + layer, c] += step / belt.cell[c] * (inflow - outflow)
+                fields[f.N_ELEMENT + layer, c] += step / belt.cell[c] * (inflow - outflow)
                 inflow = outflow
     for k in range(count):
         moved.q[k] += step * moved.p[k]
-    belt_speed = speed_share_at(belt, scalars[TIME]) * belt.belt_speed
-    np.dot(shapes, moved.p, fields[U])
-    np.dot(shapes, moved.q, work.rate[W])
-    last = fields[V_FILTERED, n - 1]
+    belt_speed = speed_share_at(belt, scalars[f.TIME]) * belt.belt_speed
+    np.dot(shapes, moved.p, fields[f.U])
+    np.dot(shapes, moved.q, work.rate[f.W])
+    last = fields[f.V_FILTERED, n - 1]
     for j in range(n):
         before = last
-        last = fields[V_FILTERED, j]
+        last = fields[f.V_FILTERED, j]
         if belt.friction_memory > 0.0 and belt.arc_share[j] > 0.0:
             speed = sliding_speed(belt, state, j)
             if j == 0 or j == belt.driven_start:
-                fields[V_FILTERED, j] = speed
+                fields[f.V_FILTERED, j] = speed
             else:
                 carried, forget = (
                     memory_transport(belt, belt.cell[j - 1], belt_speed),
                     1.0 / belt.friction_memory,
                 )
                 target = (carried * before + forget * speed) / (carried + forget)
-                fields[V_FILTERED, j] = target + (last - target) * np.exp(-(carried + forget) * step)
+                fields[f.V_FILTERED, j] = target + (last - target) * np.exp(-(carried + forget) * step)
     for j in range(n):
-        fields[W, j] = work.rate[W, j]
+        fields[f.W, j] = work.rate[f.W, j]
     if model.steady_flow:
         work_done += _settle(model, moved, work)
     if belt.pulleys.are_free:
         pull = pulled_by(belt, moved.force, work.moments)
         pull[0], pull[1] = taken, moment
         found = free_rates(belt, state, pull)
-        scalars[DRIVEN_SPEED] += step * found[0]
-        scalars[DRIVEN_POSITION] += step * found[1]
-        scalars[FIRST_STATE:] += step * found[2:]
+        scalars[f.DRIVEN_SPEED] += step * found[0]
+        scalars[f.DRIVEN_POSITION] += step * found[1]
+        scalars[f.FIRST_STATE :] += step * found[2:]
     else:
         thrust = driven_thrust(belt, moved.force) - belt.thrust
-        load = belt.ratio * load_at(belt, scalars[TIME])
-        scalars[DRIVEN_SPEED] += step * (moment - load) / belt.driven_inertia
-        scalars[DRIVEN_POSITION] += step * thrust / belt.axial_damping
-    scalars[LAYER_WORK] += step * work_done
-    scalars[TIME] += step
+        load = belt.ratio * load_at(belt, scalars[f.TIME])
+        scalars[f.DRIVEN_SPEED] += step * (moment - load) / belt.driven_inertia
+        scalars[f.DRIVEN_POSITION] += step * thrust / belt.axial_damping
+    scalars[f.LAYER_WORK] += step * work_done
+    scalars[f.TIME] += step
 
 
 @kernel
 def _settle(model: SplitBelt, moved: Motion, work: Work) -> float:
     """Contents by the forces at the end of the step; the power that their drag takes [W]."""
     belt, stations, blocks = model.belt, work.stations, work.layers.diagonal
-    columns, along = work.layers.columns, stations[ALONG : ALONG_RING + 1]
+    columns, along = work.layers.columns, stations[q.ALONG : q.ALONG_RING + 1]
     for j in range(belt.cell.size):
         dv0, dv1, dual = columns[2 * j, 0], columns[2 * j + 1, 0], belt.dual[j]
         rubbed = (blocks[j, 0] - dual * belt.element_mass / model.step) * dv0 + blocks[j, 1] * dv1
-        along[0, j] -= rubbed + stations[CROSS_SLOPE, j] * work.rate[U, j]
+        along[0, j] -= rubbed + stations[q.CROSS_SLOPE, j] * work.rate[f.U, j]
         along[1, j] -= (blocks[j, 2] - dual * belt.ring_mass[j] / model.step) * dv1 + blocks[j, 1] * dv0
     return settle_contents(belt, model.drag, model.share, moved.state.fields, moved.eps, along, model.step)

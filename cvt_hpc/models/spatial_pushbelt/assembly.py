@@ -12,51 +12,7 @@ from numba.extending import register_jitable
 from cvt_hpc.kernels import kernel
 from cvt_hpc.lanes import behind, fma, like
 from cvt_hpc.models.pushbelt.border import border_residuals
-from cvt_hpc.models.spatial_pushbelt.belt import (
-    CHANGE,
-    CHORD_I,
-    CHORD_J,
-    DIAGONAL,
-    DRIVEN,
-    FLANK,
-    FLANK_FRICTION_T,
-    GYROSCOPIC,
-    HEADING,
-    INERTIA,
-    LINK,
-    MID_RADIUS,
-    NORMAL,
-    NORMAL_ROW,
-    NORMAL_YIELD,
-    OMEGA,
-    PAIR_I,
-    PAIR_J,
-    PIN_LEVER_I,
-    PIN_LEVER_J,
-    PIN_NORMAL,
-    PIN_SLOPE,
-    PREDICTED_YAW,
-    RESIDUAL,
-    RIGHT,
-    RING_LINE,
-    RING_SLOPE,
-    SPEED,
-    STIFF,
-    STIFF_I,
-    STIFF_II,
-    STIFF_IJ,
-    STIFF_J,
-    STIFF_JJ,
-    TENSION_I,
-    TENSION_J,
-    TENSION_SLOPE,
-    TORQUE_OPENING,
-    TORQUE_OWN,
-    TORQUE_ROW,
-    TURN_I,
-    TURN_J,
-    YAW,
-)
+from cvt_hpc.models.spatial_pushbelt import fields as f
 from cvt_hpc.models.spatial_pushbelt.bending import BETA, bending_slopes
 from cvt_hpc.models.spatial_pushbelt.rotations import (
     dot,
@@ -126,32 +82,32 @@ def linear_blocks(belt, step, dt):
     per_pitch = 1.0 / belt.pitch
     for j in range(step.rows):
         uu, uw, ww = (
-            symmetric(step, j, INERTIA),
-            matrix(step, j, INERTIA + 6),
-            symmetric(step, j, INERTIA + 15),
+            symmetric(step, j, f.INERTIA),
+            matrix(step, j, f.INERTIA + 6),
+            symmetric(step, j, f.INERTIA + 15),
         )
         none = like(0.0, uu[0])
-        n = step[j, NORMAL], step[j, NORMAL + 1], none
+        n = step[j, f.NORMAL], step[j, f.NORMAL + 1], none
         uu = plus_square(uu, like(belt.transverse_damping, none), n)
         axial = like(belt.lateral_damping + 2.0 * shear * per_pitch * per_pitch, none)
         uu = uu[0], uu[1], uu[2], uu[3], uu[4], uu[5] + axial
-        y = vector(step, j, YAW)
+        y = vector(step, j, f.YAW)
         ww = plus_square(ww, like(yawing, none), y)
         wp = times(like(-yawing, none), y)
         up = none, none, none
         pp = like(belt.ring_rotary_inertia / dt + yawing + 0.5 * shear + 2.0 * bend, none)
 
         # the segment ahead, of which this element is i
-        k, a, b = step[j, TENSION_SLOPE], vector(step, j, TENSION_I), vector(step, j, TENSION_I + 3)
+        k, a, b = step[j, f.TENSION_SLOPE], vector(step, j, f.TENSION_I), vector(step, j, f.TENSION_I + 3)
         uu, uw, ww = plus_square(uu, k, a), plus_product(uw, k, a, b), plus_square(ww, k, b)
         uv, wv, vv = times(k, a), times(k, b), like(belt.ring_mass / dt, none) + k
-        p, q = vector(step, j, CHORD_I), vector(step, j, CHORD_J)
-        s, t = vector(step, j, TURN_I), vector(step, j, TURN_J)
+        p, q = vector(step, j, f.CHORD_I), vector(step, j, f.CHORD_J)
+        s, t = vector(step, j, f.TURN_I), vector(step, j, f.TURN_J)
         d = like(steep, none)
         uu = plus_square(plus_square(uu, d, p), d, q)
         uw, ww = plus_product(uw, -d, p, s), plus_square(ww, d, s)
 
-        e, f = vector(step, j, TENSION_J), vector(step, j, TENSION_J + 3)
+        e, h = vector(step, j, f.TENSION_J), vector(step, j, f.TENSION_J + 3)
         nothing = none, none, none, none, none, none, none, none, none
         link = plus_product(plus_product(plus_product(nothing, -k, a, e), -d, p, p), -d, q, q)
         link = (
@@ -165,46 +121,46 @@ def linear_blocks(belt, step, dt):
             link[7],
             link[8] - shear * per_pitch * per_pitch,
         )
-        _store_columns(step, j, LINK, link, 0, 0)
-        _store_columns(step, j, LINK, plus_product(plus_product(nothing, -k, b, e), d, s, p), 3, 0)
-        _store_columns(step, j, LINK, plus_product(plus_product(nothing, -k, a, f), -d, q, t), 0, 3)
-        _store_columns(step, j, LINK, plus_product(nothing, -k, b, f), 3, 3)
+        _store_columns(step, j, f.LINK, link, 0, 0)
+        _store_columns(step, j, f.LINK, plus_product(plus_product(nothing, -k, b, e), d, s, p), 3, 0)
+        _store_columns(step, j, f.LINK, plus_product(plus_product(nothing, -k, a, h), -d, q, t), 0, 3)
+        _store_columns(step, j, f.LINK, plus_product(nothing, -k, b, h), 3, 3)
         for c in range(3):
-            step[j, LINK + 8 * c + 6] = -k * step[j, TENSION_J + c]
-            step[j, LINK + 8 * c + 30] = -k * step[j, TENSION_J + 3 + c]
-            step[j, LINK + 8 * c + 7] = 0.0
-            step[j, LINK + 8 * c + 31] = 0.0
+            step[j, f.LINK + 8 * c + 6] = -k * step[j, f.TENSION_J + c]
+            step[j, f.LINK + 8 * c + 30] = -k * step[j, f.TENSION_J + 3 + c]
+            step[j, f.LINK + 8 * c + 7] = 0.0
+            step[j, f.LINK + 8 * c + 31] = 0.0
         half = 0.5 * shear * per_pitch
-        step[j, LINK + 23] = -half
-        store(step, j, LINK + 48, times(-k, a))
-        store(step, j, LINK + 51, times(-k, b))
-        step[j, LINK + 54] = -k
+        step[j, f.LINK + 23] = -half
+        store(step, j, f.LINK + 48, times(-k, a))
+        store(step, j, f.LINK + 51, times(-k, b))
+        step[j, f.LINK + 54] = -k
         for row in range(7):
-            step[j, LINK + 56 + row] = 0.0
-        step[j, LINK + 55] = 0.0
-        step[j, LINK + 58] = half
-        step[j, LINK + 63] = 0.25 * shear - bend
+            step[j, f.LINK + 56 + row] = 0.0
+        step[j, f.LINK + 55] = 0.0
+        step[j, f.LINK + 58] = half
+        step[j, f.LINK + 63] = 0.25 * shear - bend
 
         # the segment behind, of which it is j
         k, a, b = (
-            behind(step, j, TENSION_SLOPE),
-            vector_behind(step, j, TENSION_J),
-            vector_behind(step, j, TENSION_J + 3),
+            behind(step, j, f.TENSION_SLOPE),
+            vector_behind(step, j, f.TENSION_J),
+            vector_behind(step, j, f.TENSION_J + 3),
         )
         uu, uw, ww = plus_square(uu, k, a), plus_product(uw, k, a, b), plus_square(ww, k, b)
         uv, wv, vv = moved(uv, k, a), moved(wv, k, b), vv + k
-        p, q = vector_behind(step, j, CHORD_I), vector_behind(step, j, CHORD_J)
-        t = vector_behind(step, j, TURN_J)
+        p, q = vector_behind(step, j, f.CHORD_I), vector_behind(step, j, f.CHORD_J)
+        t = vector_behind(step, j, f.TURN_J)
         uu = plus_square(plus_square(uu, d, p), d, q)
         uw, ww = plus_product(uw, d, q, t), plus_square(ww, d, t)
-        _store_upper(step, j, DIAGONAL, uu, uw, ww, uv, wv, vv, up, wp, pp)
+        _store_upper(step, j, f.DIAGONAL, uu, uw, ww, uv, wv, vv, up, wp, pp)
 
 
 @register_jitable
 def side_torque(state, step, j, p):
     """Torque of the two points of a side from p on, about the axis of their pulley [N m]."""
-    low = step[j, MID_RADIUS + p] * state[j, FLANK_FRICTION_T + p]
-    return fma(step[j, MID_RADIUS + p + 1], state[j, FLANK_FRICTION_T + p + 1], low)
+    low = step[j, f.MID_RADIUS + p] * state[j, f.FLANK_FRICTION_T + p]
+    return fma(step[j, f.MID_RADIUS + p + 1], state[j, f.FLANK_FRICTION_T + p + 1], low)
 
 
 @kernel
@@ -221,43 +177,54 @@ def residuals(belt, state, increments, openings, shapes, load, step, iterate, sc
     modes = belt.modal_stiffness.shape[1]
     ring, rotary = belt.ring_mass / dt, belt.ring_rotary_inertia / dt
     yawing = BETA * dt * belt.yaw_stiffness + belt.yaw_damping
-    power = torque = like(0.0, state[0, FLANK])
+    power = torque = like(0.0, state[0, f.FLANK])
     for k in range(2 * modes):
         scratch[0, k] = 0.0
     for j in range(step.rows):
-        du, dw = vector(state, j, CHANGE), vector(state, j, CHANGE + 3)
-        dv, dp = state[j, CHANGE + 6], state[j, CHANGE + 7]
-        u, omega = plus(vector(state, j, SPEED), du), plus(vector(state, j, OMEGA), dw)
-        mass = symmetric(step, j, INERTIA)
-        coupling = matrix(step, j, INERTIA + 6)
-        f = plus(vector(iterate, j, RESIDUAL), vector(iterate, j, PAIR_I))
-        f = minus(
-            plus(f, vector_behind(iterate, j, PAIR_J)), plus(of_symmetric(mass, du), of_matrix(coupling, dw))
+        du, dw = vector(state, j, f.CHANGE), vector(state, j, f.CHANGE + 3)
+        dv, dp = state[j, f.CHANGE + 6], state[j, f.CHANGE + 7]
+        u, omega = plus(vector(state, j, f.SPEED), du), plus(vector(state, j, f.OMEGA), dw)
+        mass = symmetric(step, j, f.INERTIA)
+        coupling = matrix(step, j, f.INERTIA + 6)
+        force = plus(vector(iterate, j, f.RESIDUAL), vector(iterate, j, f.PAIR_I))
+        force = minus(
+            plus(force, vector_behind(iterate, j, f.PAIR_J)),
+            plus(of_symmetric(mass, du), of_matrix(coupling, dw)),
         )
-        drag = belt.transverse_damping * fma(step[j, NORMAL], u[0], step[j, NORMAL + 1] * u[1])
-        f = (
-            f[0] - drag * step[j, NORMAL],
-            f[1] - drag * step[j, NORMAL + 1],
-            f[2] - belt.lateral_damping * u[2],
+        drag = belt.transverse_damping * fma(step[j, f.NORMAL], u[0], step[j, f.NORMAL + 1] * u[1])
+        force = (
+            force[0] - drag * step[j, f.NORMAL],
+            force[1] - drag * step[j, f.NORMAL + 1],
+            force[2] - belt.lateral_damping * u[2],
         )
-        y = vector(step, j, YAW)
-        moment = step[j, PREDICTED_YAW] + yawing * (dot(y, dw) - dp)
-        g = plus(vector(iterate, j, RESIDUAL + 3), vector(iterate, j, PAIR_I + 3))
-        g = plus(plus(g, vector_behind(iterate, j, PAIR_J + 3)), vector(step, j, GYROSCOPIC))
-        g = minus(g, plus(of_transposed(coupling, du), of_symmetric(symmetric(step, j, INERTIA + 15), dw)))
+        y = vector(step, j, f.YAW)
+        moment = step[j, f.PREDICTED_YAW] + yawing * (dot(y, dw) - dp)
+        g = plus(vector(iterate, j, f.RESIDUAL + 3), vector(iterate, j, f.PAIR_I + 3))
+        g = plus(plus(g, vector_behind(iterate, j, f.PAIR_J + 3)), vector(step, j, f.GYROSCOPIC))
+        g = minus(g, plus(of_transposed(coupling, du), of_symmetric(symmetric(step, j, f.INERTIA + 15), dw)))
         g = moved(g, -moment, y)
-        h = iterate[j, RESIDUAL + 6] + iterate[j, PAIR_I + 6] + behind(iterate, j, PAIR_J + 6) - ring * dv
-        s = iterate[j, PAIR_I + 7] + behind(iterate, j, PAIR_J + 7) - rotary * dp + moment
-        store(iterate, j, RESIDUAL, f)
-        store(iterate, j, RESIDUAL + 3, g)
-        iterate[j, RESIDUAL + 6], iterate[j, RESIDUAL + 7] = h, s
+        h = (
+            iterate[j, f.RESIDUAL + 6]
+            + iterate[j, f.PAIR_I + 6]
+            + behind(iterate, j, f.PAIR_J + 6)
+            - ring * dv
+        )
+        s = iterate[j, f.PAIR_I + 7] + behind(iterate, j, f.PAIR_J + 7) - rotary * dp + moment
+        store(iterate, j, f.RESIDUAL, force)
+        store(iterate, j, f.RESIDUAL + 3, g)
+        iterate[j, f.RESIDUAL + 6], iterate[j, f.RESIDUAL + 7] = h, s
 
-        power += dot(u, f) + dot(omega, g) + (state[j, SPEED + 6] + dv) * h + (state[j, SPEED + 7] + dp) * s
-        driven = state[j, DRIVEN]
+        power += (
+            dot(u, force)
+            + dot(omega, g)
+            + (state[j, f.SPEED + 6] + dv) * h
+            + (state[j, f.SPEED + 7] + dp) * s
+        )
+        driven = state[j, f.DRIVEN]
         torque += driven * (side_torque(state, step, j, 0) + side_torque(state, step, j, 2))
         if modes > 0:
-            axial = 0.5 * belt.cosine * (state[j, FLANK] + state[j, FLANK + 1])
-            axial = axial + 0.5 * belt.cosine * (state[j, FLANK + 2] + state[j, FLANK + 3])
+            axial = 0.5 * belt.cosine * (state[j, f.FLANK] + state[j, f.FLANK + 1])
+            axial = axial + 0.5 * belt.cosine * (state[j, f.FLANK + 2] + state[j, f.FLANK + 3])
             for k in range(modes):
                 scratch[0, modes + k] += driven * axial * shapes[j, k]
                 scratch[0, k] += (1.0 - driven) * axial * shapes[j, k]
@@ -269,20 +236,20 @@ def assemble_pairs(belt, state, step, iterate, blocks):
     """Blocks of all but the flanks, and the first right side: what takes the residuals to zero."""
     has_pins = belt.pin_clearance < np.inf
     for j in range(step.rows):
-        x = vector_ahead(state, j, HEADING)
-        k, i, jj = iterate[j, STIFF], vector(iterate, j, STIFF_I), vector(iterate, j, STIFF_J)
-        uu = plus_product(_columns(step, j, LINK, 0, 0), -k, x, x)
-        wu = plus_product(_columns(step, j, LINK, 3, 0), like(1.0, k), i, x)
-        uw = plus_product(_columns(step, j, LINK, 0, 3), like(-1.0, k), x, jj)
-        ww = _columns(step, j, LINK, 3, 3)
+        x = vector_ahead(state, j, f.HEADING)
+        k, i, jj = iterate[j, f.STIFF], vector(iterate, j, f.STIFF_I), vector(iterate, j, f.STIFF_J)
+        uu = plus_product(_columns(step, j, f.LINK, 0, 0), -k, x, x)
+        wu = plus_product(_columns(step, j, f.LINK, 3, 0), like(1.0, k), i, x)
+        uw = plus_product(_columns(step, j, f.LINK, 0, 3), like(-1.0, k), x, jj)
+        ww = _columns(step, j, f.LINK, 3, 3)
         ww = three(
-            plus((ww[0], ww[1], ww[2]), vector(iterate, j, STIFF_IJ)),
-            plus((ww[3], ww[4], ww[5]), vector(iterate, j, STIFF_IJ + 3)),
-            plus((ww[6], ww[7], ww[8]), vector(iterate, j, STIFF_IJ + 6)),
+            plus((ww[0], ww[1], ww[2]), vector(iterate, j, f.STIFF_IJ)),
+            plus((ww[3], ww[4], ww[5]), vector(iterate, j, f.STIFF_IJ + 3)),
+            plus((ww[6], ww[7], ww[8]), vector(iterate, j, f.STIFF_IJ + 6)),
         )
         if has_pins:
-            n, k = vector(step, j, PIN_NORMAL), iterate[j, PIN_SLOPE]
-            a, b = vector(step, j, PIN_LEVER_I), vector(step, j, PIN_LEVER_J)
+            n, k = vector(step, j, f.PIN_NORMAL), iterate[j, f.PIN_SLOPE]
+            a, b = vector(step, j, f.PIN_LEVER_I), vector(step, j, f.PIN_LEVER_J)
             uu, wu = plus_product(uu, -k, n, n), plus_product(wu, -k, a, n)
             uw, ww = plus_product(uw, -k, n, b), plus_product(ww, -k, a, b)
         _store_columns(blocks, j, _U, uu, 0, 0)
@@ -291,35 +258,35 @@ def assemble_pairs(belt, state, step, iterate, blocks):
         _store_columns(blocks, j, _U, ww, 3, 3)
         for c in range(6):
             blocks[j, _U + 8 * c + 6], blocks[j, _U + 8 * c + 7] = (
-                step[j, LINK + 8 * c + 6],
-                step[j, LINK + 8 * c + 7],
+                step[j, f.LINK + 8 * c + 6],
+                step[j, f.LINK + 8 * c + 7],
             )
         for field in range(48, 64):
-            blocks[j, _U + field] = step[j, LINK + field]
+            blocks[j, _U + field] = step[j, f.LINK + field]
 
-        d = DIAGONAL
+        d = f.DIAGONAL
         uu = symmetric(step, j, d)
         uw = three(vector(step, j, d + 6), vector(step, j, d + 10), vector(step, j, d + 15))
         ww = joined((step[j, d + 9], step[j, d + 13], step[j, d + 14]), vector(step, j, d + 18))
         # the contacts ahead, of which this element is i
-        k = iterate[j, STIFF]
+        k = iterate[j, f.STIFF]
         uu, uw = plus_square(uu, k, x), plus_product(uw, like(-1.0, k), x, i)
-        ww = symmetric_sum(ww, symmetric(iterate, j, STIFF_II))
+        ww = symmetric_sum(ww, symmetric(iterate, j, f.STIFF_II))
         if has_pins:
-            n, k, a = vector(step, j, PIN_NORMAL), iterate[j, PIN_SLOPE], vector(step, j, PIN_LEVER_I)
+            n, k, a = vector(step, j, f.PIN_NORMAL), iterate[j, f.PIN_SLOPE], vector(step, j, f.PIN_LEVER_I)
             uu, uw, ww = plus_square(uu, k, n), plus_product(uw, k, n, a), plus_square(ww, k, a)
         # those behind, of which it is j
-        x, k = vector(state, j, HEADING), behind(iterate, j, STIFF)
+        x, k = vector(state, j, f.HEADING), behind(iterate, j, f.STIFF)
         uu = plus_square(uu, k, x)
-        uw = plus_product(uw, like(1.0, k), x, vector_behind(iterate, j, STIFF_J))
-        own = joined(vector_behind(iterate, j, STIFF_JJ), vector_behind(iterate, j, STIFF_JJ + 3))
+        uw = plus_product(uw, like(1.0, k), x, vector_behind(iterate, j, f.STIFF_J))
+        own = joined(vector_behind(iterate, j, f.STIFF_JJ), vector_behind(iterate, j, f.STIFF_JJ + 3))
         ww = symmetric_sum(ww, own)
         if has_pins:
-            n, k = vector_behind(step, j, PIN_NORMAL), behind(iterate, j, PIN_SLOPE)
-            b = vector_behind(step, j, PIN_LEVER_J)
+            n, k = vector_behind(step, j, f.PIN_NORMAL), behind(iterate, j, f.PIN_SLOPE)
+            b = vector_behind(step, j, f.PIN_LEVER_J)
             uu, uw, ww = plus_square(uu, k, n), plus_product(uw, k, n, b), plus_square(ww, k, b)
         # friction of the ring
-        k, t, s = iterate[j, RING_SLOPE], vector(step, j, RING_LINE), vector(step, j, RING_LINE + 3)
+        k, t, s = iterate[j, f.RING_SLOPE], vector(step, j, f.RING_LINE), vector(step, j, f.RING_LINE + 3)
         uu, uw, ww = plus_square(uu, k, t), plus_product(uw, k, t, s), plus_square(ww, k, s)
         uv, wv = moved(vector(step, j, d + 21), -k, t), moved(vector(step, j, d + 24), -k, s)
 
@@ -345,7 +312,7 @@ def assemble_pairs(belt, state, step, iterate, blocks):
         store(blocks, j, 59, wp)
         blocks[j, 62], blocks[j, 63] = step[j, d + 34], step[j, d + 35]
         for field in range(8):
-            blocks[j, RIGHT + field] = iterate[j, RESIDUAL + field]
+            blocks[j, f.RIGHT + field] = iterate[j, f.RESIDUAL + field]
 
 
 @kernel
@@ -360,12 +327,12 @@ def border_sums(belt, state, shapes, iterate, blocks, sums):
     for field in range((width - 1) * width):
         sums[0, field] = 0.0
     for j in range(iterate.rows):
-        driven = state[j, DRIVEN]
+        driven = state[j, f.DRIVEN]
         driving = 1.0 - driven
-        a, b = vector(iterate, j, TORQUE_ROW), vector(iterate, j, TORQUE_ROW + 3)
-        c, d = vector(iterate, j, NORMAL_ROW), vector(iterate, j, NORMAL_ROW + 3)
+        a, b = vector(iterate, j, f.TORQUE_ROW), vector(iterate, j, f.TORQUE_ROW + 3)
+        c, d = vector(iterate, j, f.NORMAL_ROW), vector(iterate, j, f.NORMAL_ROW + 3)
         for column in range(width):
-            at = RIGHT + 8 * column
+            at = f.RIGHT + 8 * column
             u, omega = vector(blocks, j, at), vector(blocks, j, at + 3)
             sums[0, column] -= dot(a, u) + dot(b, omega)
             if modes > 0:
@@ -375,8 +342,8 @@ def border_sums(belt, state, shapes, iterate, blocks, sums):
                     shape = shapes[j, m]
                     sums[0, width * (1 + m) + column] -= one * shape
                     sums[0, width * (1 + modes + m) + column] -= other * shape
-        sums[0, 1] += iterate[j, TORQUE_OWN]
-        by_opening, give = iterate[j, TORQUE_OPENING], iterate[j, NORMAL_YIELD]
+        sums[0, 1] += iterate[j, f.TORQUE_OWN]
+        by_opening, give = iterate[j, f.TORQUE_OPENING], iterate[j, f.NORMAL_YIELD]
         for m in range(modes):
             one, other = driving * shapes[j, m], driven * shapes[j, m]
             sums[0, 2 + m] += by_opening * one

@@ -15,69 +15,9 @@ from typing import NamedTuple
 import numpy as np
 
 from cvt_hpc.lanes import LaneArray
-from cvt_hpc.models.pushbelt.belt import DRIVEN_RADIUS, Newton, Workspace
-from cvt_hpc.models.pushbelt.belt import INPUTS as IN_THE_PLANE
+from cvt_hpc.models.pushbelt.belt import Newton, Workspace
 from cvt_hpc.models.pushbelt.start import empty_workspace
-from cvt_hpc.solvers.linked_blocks import field_of_right
-
-# Fields of the state of an element. Speeds are those at the middle of the last step.
-POSITION = 0  # 3: middle of the saddle line, which is the ring line and the assumed centre of gravity [m]
-HEADING = 3  # 3: running direction x of the element, a unit vector
-OUTWARD = 6  # 3: its outward direction o, a unit vector; a = o x x is its axial one
-SLOPE = 9  # of the ring's line in the axial direction [rad]
-SPEED = 10  # 8: velocity of that point [m/s], angular velocity [rad/s], V and SLOPE_RATE
-OMEGA = SPEED + 3
-V = SPEED + 6  # speed of the ring's material along its line [m/s]
-SLOPE_RATE = SPEED + 7  # [rad/s]
-LENGTH = 18  # unstretched length of the ring up to the next element [m]
-TENSION = 19  # of both ring packages up to the next element [N]
-SADDLE = 20  # normal force of both ring packages on the element [N]
-PUSH = 21  # 4: contact forces to the next element: edge left, edge right, head left, head right [N]
-PIN = 25  # force of the next element's hole on the pin [N]
-FLANK = 26  # 4: normal forces at the flanks: left low, left high, right low, right high [N]
-FLANK_SLIP_M = 30  # 4: sliding speed along the meridian of the sheave, outwards [m/s]
-FLANK_SLIP_T = 34  # 4: sliding speed in the direction of rotation, element over sheave [m/s]
-FLANK_FRICTION_M = 38  # 4: friction forces against these speeds [N]
-FLANK_FRICTION_T = 42  # 4
-FLANK_DUAL_M = 46  # 4: directions of friction as the Newton iteration has them, at most 1 in size
-FLANK_DUAL_T = 50  # 4
-V_FILTERED = 54  # 4: sliding speeds at which the friction law of the flanks is read [m/s]
-RING_SLIP = 58  # of the ring over the saddle, forwards [m/s]
-RING_FRICTION = 59  # friction force of the element against that [N]
-RING_DUAL = 60
-DRIVEN = 61  # 1 where the nearer pulley is the driven one, else 0
-CHANGE = 62  # 8: of the speeds in the last step, from which the next one starts
-STATE_FIELDS = CHANGE + 8
-POINTS = 4  # contact points of an element at its flanks, and at the front to the next one
-
-# Entries of the state of the pulleys beside those of `pushbelt.belt`: positions of the mid planes between
-# their sheaves along the axes [m]
-DRIVING_MIDDLE, DRIVEN_MIDDLE = range(DRIVEN_RADIUS + 1, DRIVEN_RADIUS + 3)
-PULLEY_FIELDS = DRIVEN_MIDDLE + 1
-
-# Entries of the loads of the last step: axial forces that press each sheave outwards [N], and torques of the
-# belt on the pulleys in the direction of rotation [N m]
-DRIVING_LEFT, DRIVING_RIGHT, DRIVEN_LEFT, DRIVEN_RIGHT, DRIVING_TORQUE, DRIVEN_TORQUE = range(6)
-LOADS = DRIVEN_TORQUE + 1
-
-# Entries of the inputs beside those of `pushbelt.belt`, of which thrusts are those on the loose sheaves:
-# axial speeds of the pulleys' mid planes, beside what the loose sheaves do [m/s]
-IN_DRIVING_DRIFT, IN_DRIVEN_DRIFT = range(IN_THE_PLANE, IN_THE_PLANE + 2)
-INPUTS = IN_DRIVEN_DRIFT + 1
-
-# values of FAILED_CONTACT
-CONTACTS = (
-    "edge left",
-    "edge right",
-    "head left",
-    "head right",
-    "pin",
-    "flank left low",
-    "flank left high",
-    "flank right low",
-    "flank right high",
-    "ring",
-)
+from cvt_hpc.models.spatial_pushbelt import fields as f
 
 
 class Belt(NamedTuple):
@@ -233,117 +173,15 @@ class BeltState(NamedTuple):
     counters: np.ndarray
 
 
-SIZE = 8  # unknowns of an element
-RIGHT = field_of_right(SIZE)  # field of a row of blocks at which its right sides begin
-
-# Fields of Workspace.step. Directions and levers are at q_k where not said otherwise; PREDICTED is at q*.
-PREDICTED_POSITION = 0  # 3
-PREDICTED_HEADING = 3  # 3
-PREDICTED_OUTWARD = 6  # 3
-MID_OUTWARD = 9  # 3: at mid step
-MID_AXIAL = 12  # 3
-RING_LINE = 15  # 6: gradient of the ring's speed over an element by velocity and angular velocity
-TENSION_I = 21  # 6: direction of the tension at this element, beside 1 of V, and at the next one, beside -1
-TENSION_J = 27  # 6
-PREDICTED_TENSION = 33
-TENSION_SLOPE = 34
-START_SLIP = 35  # of the ring at the old speeds
-CHORD_I = 36  # 3: gradient of the pitch against the segment ahead by the velocity of the next element
-CHORD_J = 39  # 3: of that of the next element
-TURN_I = 42  # 3: by its own angular velocity
-TURN_J = 45  # 3
-PREDICTED_MOMENT_I = 48
-PREDICTED_MOMENT_J = 49
-SHEAR = 50  # of the ring at q_k [rad]
-BEND = 51  # change of its slope up to the next element at q_k [rad]
-YAW = 52  # 3: gradient of yaw by angular velocity
-PREDICTED_YAW = 55  # moment of the yaw spring at q_k and of its damper at the old speeds
-NORMAL = 56  # 2: across the path in the plane, of the strand or radial
-PUSH_LEVER_I = 58  # 12: rates of the gaps at the front by angular velocities
-PUSH_LEVER_J = 70  # 12
-PUSH_GAP = 82  # 4
-PIN_NORMAL = 86  # 3
-PIN_LEVER_I = 89  # 3
-PIN_LEVER_J = 92  # 3
-PIN_GAP = 95
-RADIAL = 96  # 12: e_r of the flanks' points
-MID_RADIAL = 108  # 12: at mid step
-MID_RADIUS = 120  # 4
-FLANK_GAP = 124  # 4: without opening of the sheaves
-INERTIA = 128  # 21: mass of element and ring, 6 x 6, the upper half by columns; over the step
-GYROSCOPIC = 149  # 3: moment
-DIAGONAL = 152  # 36: blocks of the linear laws, the upper half by columns: of an element,
-LINK = DIAGONAL + 36  # 64: and of it with the next one, by columns
-STEP_FIELDS = LINK + 64
-
-# Fields of Workspace.iterate
-ITERATE_TENSION = 0
-PAIR_I = 1  # 8: forces between an element and the next one, on this one and on that one
-PAIR_J = 9  # 8
-STIFF = 17  # sums of the slopes of contacts at the front: 1, levers, and products of levers
-STIFF_I = 18  # 3
-STIFF_J = 21  # 3
-STIFF_II = 24  # 6: upper half by columns
-STIFF_JJ = 30  # 6
-STIFF_IJ = 36  # 9: by columns
-PIN_SLOPE = 45
-PUSH_REACHED = 46  # 4: gaps [m]
-PIN_REACHED = 50
-FLANK_REACHED = 51  # 4
-RING_SLOPE = 55  # decrease of the ring's friction by its slip
-BY_NORMAL = 56  # 12: forces of the flanks' points by their normal forces
-YIELD = 68  # 4: decrease of normal forces by the opening of the sheaves
-FRICTION_SLOPES = 72  # 16: of the friction forces M, T by the slips M, T, at each point mm, mt, tm, tt
-RESIDUAL = 88  # 8
-TORQUE_ROW = 96  # 6: decrease of the driven pulley's torque by the speeds of an element, and by their own
-TORQUE_OWN = 102  # by the speed of the pulley,
-TORQUE_OPENING = 103  # and by the opening of the sheaves
-NORMAL_ROW = 104  # 6: decrease of a flank's axial force by the speeds of an element,
-NORMAL_YIELD = 110  # and by the opening of the sheaves
-ITERATE_FIELDS = 111
-
-
-# With two flows of ring material, one for each package, an element has one more unknown, w, and more fields.
-WIDE = SIZE + 1
 NEWTON_OF_TWO_FLOWS = NEWTON._replace(weights=(*NEWTON.weights, 1.0))
-
-# Fields of its state behind those of one flow; the first is the change of w in the last step
-CHANGE_OF_HALF = CHANGE + SIZE
-HALF_SPEED = STATE_FIELDS + 1  # w, half of the right package's speed less the left one's [m/s]
-HALF_LENGTH = HALF_SPEED + 1  # half of the right package's unstretched length less the left one's [m]
-TENSION_DIFFERENCE = HALF_LENGTH + 1  # D, the right package's tension less the left one's [N]
-HALF_SLIP = TENSION_DIFFERENCE + 1  # delta, half of the right package's slip less the left one's [m/s]
-FRICTION_DIFFERENCE = HALF_SLIP + 1  # of the elements on the right package, less that on the left one [N]
-SADDLE_RIGHT, SADDLE_LEFT = FRICTION_DIFFERENCE + 1, FRICTION_DIFFERENCE + 2  # normal forces of each [N]
-DUAL_RIGHT, DUAL_LEFT = SADDLE_LEFT + 1, SADDLE_LEFT + 2
-WIDE_STATE_FIELDS = DUAL_LEFT + 1
-
-# Fields of Workspace.step behind those of one flow. Rows of seven are by velocity, angular velocity, and v in
-# laws of both packages together, w in laws of their difference.
-SLIP_BY = STEP_FIELDS  # gradient of sigma, and of delta
-HALF_SLIP_BY = SLIP_BY + 7
-MEAN_I = HALF_SLIP_BY + 7  # direction of T at this element, and at the next one, where T acts against it
-MEAN_J = MEAN_I + 7
-MEAN_BEHIND = MEAN_J + 7  # that of the element behind at this one
-DIFFERENCE_I = MEAN_BEHIND + 7  # the same of D
-DIFFERENCE_J = DIFFERENCE_I + 7
-DIFFERENCE_BEHIND = DIFFERENCE_J + 7
-START_HALF_SLIP = DIFFERENCE_BEHIND + 7
-PREDICTED_DIFFERENCE = START_HALF_SLIP + 1
-CROSS_SLOPE = PREDICTED_DIFFERENCE + 1  # of T by D's direction and of D by T's; TENSION_SLOPE is their own
-WIDE_STEP_FIELDS = CROSS_SLOPE + 1
-
-# Fields of Workspace.iterate behind those of one flow
-ITERATE_DIFFERENCE = ITERATE_FIELDS
-SLOPE_DIFFERENCE = ITERATE_DIFFERENCE + 1  # RING_SLOPE is the sum of both packages' slopes
-HALF_RESIDUAL = SLOPE_DIFFERENCE + 1  # of the equation of w
-WIDE_ITERATE_FIELDS = HALF_RESIDUAL + 1
 
 
 def workspace(belt: Belt, nodes: int, flows: int = 1) -> Workspace:
     """Work space for a belt of so many nodes, and flows of ring material."""
     modes = belt.modal_stiffness.shape[1]
     if flows == 1:
-        return empty_workspace(nodes, modes, SIZE, STEP_FIELDS, ITERATE_FIELDS, STATE_FIELDS, INPUTS)
-    fields = WIDE_STEP_FIELDS, WIDE_ITERATE_FIELDS, WIDE_STATE_FIELDS
-    return empty_workspace(nodes, modes, WIDE, *fields, INPUTS, narrow=SIZE)
+        return empty_workspace(
+            nodes, modes, f.SIZE, f.STEP_FIELDS, f.ITERATE_FIELDS, f.STATE_FIELDS, f.INPUTS
+        )
+    fields = f.WIDE_STEP_FIELDS, f.WIDE_ITERATE_FIELDS, f.WIDE_STATE_FIELDS
+    return empty_workspace(nodes, modes, f.WIDE, *fields, f.INPUTS, narrow=f.SIZE)

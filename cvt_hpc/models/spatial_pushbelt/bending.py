@@ -12,15 +12,7 @@ from numba.extending import register_jitable
 
 from cvt_hpc.kernels import kernel
 from cvt_hpc.lanes import ahead
-from cvt_hpc.models.spatial_pushbelt.belt import (
-    BEND,
-    CHANGE,
-    PAIR_I,
-    PAIR_J,
-    POSITION,
-    SHEAR,
-    SLOPE,
-)
+from cvt_hpc.models.spatial_pushbelt import fields as f
 
 BETA = 0.25
 
@@ -36,10 +28,10 @@ def predict_bending(belt, state, step):
     """Shear and change of slope at q_k."""
     per_pitch = 1.0 / belt.pitch
     for j in range(state.rows):
-        here, there = state[j, SLOPE], ahead(state, j, SLOPE)
-        rise = ahead(state, j, POSITION + 2) - state[j, POSITION + 2]
-        step[j, SHEAR] = per_pitch * rise - 0.5 * (here + there)
-        step[j, BEND] = there - here
+        here, there = state[j, f.SLOPE], ahead(state, j, f.SLOPE)
+        rise = ahead(state, j, f.POSITION + 2) - state[j, f.POSITION + 2]
+        step[j, f.SHEAR] = per_pitch * rise - 0.5 * (here + there)
+        step[j, f.BEND] = there - here
 
 
 @kernel
@@ -49,12 +41,12 @@ def bending_forces(belt, state, step, iterate, dt):
     for_shear, for_bend = belt.ring_shear * belt.pitch, belt.ring_bending / belt.pitch
     steep, steep_bend = bending_slopes(belt, dt)
     for j in range(step.rows):
-        here, there = state[j, CHANGE + 7], ahead(state, j, CHANGE + 7)
-        rise = ahead(state, j, CHANGE + 2) - state[j, CHANGE + 2]
-        shear = for_shear * step[j, SHEAR] + steep * (per_pitch * rise - 0.5 * (here + there))
-        moment = for_bend * step[j, BEND] + steep_bend * (there - here)
+        here, there = state[j, f.CHANGE + 7], ahead(state, j, f.CHANGE + 7)
+        rise = ahead(state, j, f.CHANGE + 2) - state[j, f.CHANGE + 2]
+        shear = for_shear * step[j, f.SHEAR] + steep * (per_pitch * rise - 0.5 * (here + there))
+        moment = for_bend * step[j, f.BEND] + steep_bend * (there - here)
         force = per_pitch * shear
-        iterate[j, PAIR_I + 2] += force
-        iterate[j, PAIR_J + 2] -= force
-        iterate[j, PAIR_I + 7] = 0.5 * shear + moment
-        iterate[j, PAIR_J + 7] = 0.5 * shear - moment
+        iterate[j, f.PAIR_I + 2] += force
+        iterate[j, f.PAIR_J + 2] -= force
+        iterate[j, f.PAIR_I + 7] = 0.5 * shear + moment
+        iterate[j, f.PAIR_J + 7] = 0.5 * shear - moment

@@ -10,29 +10,7 @@ from numba.extending import register_jitable
 
 from cvt_hpc.kernels import kernel
 from cvt_hpc.lanes import fma, like
-from cvt_hpc.models.spatial_pushbelt.belt import (
-    CHANGE,
-    HEADING,
-    OUTWARD,
-    PAIR_I,
-    PAIR_J,
-    POINTS,
-    POSITION,
-    PREDICTED_HEADING,
-    PREDICTED_OUTWARD,
-    PREDICTED_POSITION,
-    PUSH,
-    PUSH_GAP,
-    PUSH_LEVER_I,
-    PUSH_LEVER_J,
-    PUSH_REACHED,
-    STIFF,
-    STIFF_I,
-    STIFF_II,
-    STIFF_IJ,
-    STIFF_J,
-    STIFF_JJ,
-)
+from cvt_hpc.models.spatial_pushbelt import fields as f
 from cvt_hpc.models.spatial_pushbelt.rotations import (
     accumulate,
     cross,
@@ -75,29 +53,29 @@ def predict_faces(belt, state, step):
     """Gaps at q*, and levers at q_k."""
     thickness = belt.thickness
     for j in range(state.rows):
-        ri, rj = vector(state, j, POSITION), vector_ahead(state, j, POSITION)
-        xi, xj = vector(state, j, HEADING), vector_ahead(state, j, HEADING)
-        oi = vector(state, j, OUTWARD)
-        si, sj = vector(step, j, PREDICTED_POSITION), vector_ahead(step, j, PREDICTED_POSITION)
-        yi, yj = vector(step, j, PREDICTED_HEADING), vector_ahead(step, j, PREDICTED_HEADING)
-        pi = vector(step, j, PREDICTED_OUTWARD)
-        for p in range(POINTS):
+        ri, rj = vector(state, j, f.POSITION), vector_ahead(state, j, f.POSITION)
+        xi, xj = vector(state, j, f.HEADING), vector_ahead(state, j, f.HEADING)
+        oi = vector(state, j, f.OUTWARD)
+        si, sj = vector(step, j, f.PREDICTED_POSITION), vector_ahead(step, j, f.PREDICTED_POSITION)
+        yi, yj = vector(step, j, f.PREDICTED_HEADING), vector_ahead(step, j, f.PREDICTED_HEADING)
+        pi = vector(step, j, f.PREDICTED_OUTWARD)
+        for p in range(f.POINTS):
             height, side = front_point(belt, p)
             _, arm = face_gap(ri, xi, oi, rj, xj, thickness, height, side)
-            store(step, j, PUSH_LEVER_I + 3 * p, cross(xj, arm))
-            store(step, j, PUSH_LEVER_J + 3 * p, cross(minus(arm, minus(rj, ri)), xj))
+            store(step, j, f.PUSH_LEVER_I + 3 * p, cross(xj, arm))
+            store(step, j, f.PUSH_LEVER_J + 3 * p, cross(minus(arm, minus(rj, ri)), xj))
             gap, _ = face_gap(si, yi, pi, sj, yj, thickness, height, side)
-            step[j, PUSH_GAP + p] = gap
+            step[j, f.PUSH_GAP + p] = gap
 
 
 @register_jitable
 def _pressed_point(state, step, iterate, j, p, motion, stiffness, dt):
     """Force and slope of a point, those times its levers, and the slope times products of levers."""
     closing, wi, wj = motion
-    a, b = vector(step, j, PUSH_LEVER_I + 3 * p), vector(step, j, PUSH_LEVER_J + 3 * p)
-    gap = fma(dt, closing + dot(a, wi) + dot(b, wj), step[j, PUSH_GAP + p])
+    a, b = vector(step, j, f.PUSH_LEVER_I + 3 * p), vector(step, j, f.PUSH_LEVER_J + 3 * p)
+    gap = fma(dt, closing + dot(a, wi) + dot(b, wj), step[j, f.PUSH_GAP + p])
     push, k = pressed(gap, stiffness)
-    state[j, PUSH + p], iterate[j, PUSH_REACHED + p] = push, gap
+    state[j, f.PUSH + p], iterate[j, f.PUSH_REACHED + p] = push, gap
     k = dt * k
     none = like(0.0, k)
     zero = none, none, none, none, none, none
@@ -111,15 +89,15 @@ def face_forces(belt, state, step, iterate, dt):
     """Forces and sums of their slopes of an iterate; adds to the pairs' forces."""
     stiffness = 0.5 * belt.contact_stiffness
     for j in range(step.rows):
-        x = vector_ahead(state, j, HEADING)
-        closing = dot(x, minus(vector_ahead(state, j, CHANGE), vector(state, j, CHANGE)))
-        motion = closing, vector(state, j, CHANGE + 3), vector_ahead(state, j, CHANGE + 3)
+        x = vector_ahead(state, j, f.HEADING)
+        closing = dot(x, minus(vector_ahead(state, j, f.CHANGE), vector(state, j, f.CHANGE)))
+        motion = closing, vector(state, j, f.CHANGE + 3), vector_ahead(state, j, f.CHANGE + 3)
         none = like(0.0, closing)
         force = slope = none
         turn_i = turn_j = slope_i = slope_j = none, none, none
         ii = jj = none, none, none, none, none, none
         ij = none, none, none, none, none, none, none, none, none
-        for p in range(0, POINTS, 2):
+        for p in range(0, f.POINTS, 2):
             left, levers, products = _pressed_point(state, step, iterate, j, p, motion, stiffness, dt)
             right, others, more = _pressed_point(state, step, iterate, j, p + 1, motion, stiffness, dt)
             force, slope = force + (left[0] + right[0]), slope + (left[1] + right[1])
@@ -130,13 +108,13 @@ def face_forces(belt, state, step, iterate, dt):
             ii = symmetric_sum(ii, symmetric_sum(products[0], more[0]))
             jj = symmetric_sum(jj, symmetric_sum(products[1], more[1]))
             ij = matrix_sum(ij, matrix_sum(products[2], more[2]))
-        iterate[j, STIFF] = slope
-        store(iterate, j, STIFF_I, slope_i)
-        store(iterate, j, STIFF_J, slope_j)
-        store_symmetric(iterate, j, STIFF_II, ii)
-        store_symmetric(iterate, j, STIFF_JJ, jj)
-        store_matrix(iterate, j, STIFF_IJ, ij)
-        accumulate(iterate, j, PAIR_I, times(-force, x))
-        accumulate(iterate, j, PAIR_I + 3, turn_i)
-        accumulate(iterate, j, PAIR_J, times(force, x))
-        accumulate(iterate, j, PAIR_J + 3, turn_j)
+        iterate[j, f.STIFF] = slope
+        store(iterate, j, f.STIFF_I, slope_i)
+        store(iterate, j, f.STIFF_J, slope_j)
+        store_symmetric(iterate, j, f.STIFF_II, ii)
+        store_symmetric(iterate, j, f.STIFF_JJ, jj)
+        store_matrix(iterate, j, f.STIFF_IJ, ij)
+        accumulate(iterate, j, f.PAIR_I, times(-force, x))
+        accumulate(iterate, j, f.PAIR_I + 3, turn_i)
+        accumulate(iterate, j, f.PAIR_J, times(force, x))
+        accumulate(iterate, j, f.PAIR_J + 3, turn_j)

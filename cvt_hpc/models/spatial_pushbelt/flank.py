@@ -18,54 +18,10 @@ from numba.extending import register_jitable
 
 from cvt_hpc.kernels import kernel
 from cvt_hpc.lanes import fma, like, sqrt
-from cvt_hpc.models.pushbelt.belt import (
-    DRIVEN_RADIUS,
-    DRIVEN_SPEED,
-    DRIVING_RADIUS,
-    DRIVING_SPEED,
-)
+from cvt_hpc.models.pushbelt import fields as planar
 from cvt_hpc.models.pushbelt.border import of_pulley
 from cvt_hpc.models.pushbelt.friction import flank_friction
-from cvt_hpc.models.spatial_pushbelt.belt import (
-    BY_NORMAL,
-    CHANGE,
-    DRIVEN,
-    DRIVEN_MIDDLE,
-    DRIVING_MIDDLE,
-    FLANK,
-    FLANK_DUAL_M,
-    FLANK_DUAL_T,
-    FLANK_FRICTION_M,
-    FLANK_FRICTION_T,
-    FLANK_GAP,
-    FLANK_REACHED,
-    FLANK_SLIP_M,
-    FLANK_SLIP_T,
-    FRICTION_SLOPES,
-    HEADING,
-    MID_AXIAL,
-    MID_OUTWARD,
-    MID_RADIAL,
-    MID_RADIUS,
-    NORMAL_ROW,
-    NORMAL_YIELD,
-    OMEGA,
-    OUTWARD,
-    POINTS,
-    POSITION,
-    PREDICTED_HEADING,
-    PREDICTED_OUTWARD,
-    PREDICTED_POSITION,
-    RADIAL,
-    RESIDUAL,
-    RIGHT,
-    SPEED,
-    TORQUE_OPENING,
-    TORQUE_OWN,
-    TORQUE_ROW,
-    V_FILTERED,
-    YIELD,
-)
+from cvt_hpc.models.spatial_pushbelt import fields as f
 from cvt_hpc.models.spatial_pushbelt.rotations import (
     accumulate,
     cross,
@@ -132,9 +88,9 @@ def flank_directions(belt, radial, axis, side):
 @register_jitable
 def along_arc(belt, state, j):
     """Cosine and sine of the angle at which the pitch line of an element stands about its pulley."""
-    o = vector(state, j, OUTWARD)
-    y = state[j, POSITION] - belt.pitch_depth * o[0] - state[j, DRIVEN] * belt.centre_distance
-    z = state[j, POSITION + 1] - belt.pitch_depth * o[1]
+    o = vector(state, j, f.OUTWARD)
+    y = state[j, f.POSITION] - belt.pitch_depth * o[0] - state[j, f.DRIVEN] * belt.centre_distance
+    z = state[j, f.POSITION + 1] - belt.pitch_depth * o[1]
     per_radius = 1.0 / sqrt(y * y + z * z)
     return y * per_radius, z * per_radius
 
@@ -143,27 +99,27 @@ def along_arc(belt, state, j):
 def predict_flanks(belt, state, pulleys, step, dt):
     """Directions at q_k and at mid step, gaps at q*."""
     for j in range(state.rows):
-        driven = state[j, DRIVEN]
+        driven = state[j, f.DRIVEN]
         centre, axis = driven * belt.centre_distance, pulley_axis(belt, driven)
-        groove = of_pulley(pulleys[DRIVING_RADIUS], pulleys[DRIVEN_RADIUS], driven)
-        middle = of_pulley(pulleys[DRIVING_MIDDLE], pulleys[DRIVEN_MIDDLE], driven)
-        r, o = vector(state, j, POSITION), vector(state, j, OUTWARD)
-        a = cross(o, vector(state, j, HEADING))
-        half = moved(r, 0.5 * dt, vector(state, j, SPEED))
-        half_o, half_a = vector(step, j, MID_OUTWARD), vector(step, j, MID_AXIAL)
-        s, po = vector(step, j, PREDICTED_POSITION), vector(step, j, PREDICTED_OUTWARD)
-        pa = cross(po, vector(step, j, PREDICTED_HEADING))
-        for p in range(POINTS):
+        groove = of_pulley(pulleys[planar.DRIVING_RADIUS], pulleys[planar.DRIVEN_RADIUS], driven)
+        middle = of_pulley(pulleys[f.DRIVING_MIDDLE], pulleys[f.DRIVEN_MIDDLE], driven)
+        r, o = vector(state, j, f.POSITION), vector(state, j, f.OUTWARD)
+        a = cross(o, vector(state, j, f.HEADING))
+        half = moved(r, 0.5 * dt, vector(state, j, f.SPEED))
+        half_o, half_a = vector(step, j, f.MID_OUTWARD), vector(step, j, f.MID_AXIAL)
+        s, po = vector(step, j, f.PREDICTED_POSITION), vector(step, j, f.PREDICTED_OUTWARD)
+        pa = cross(po, vector(step, j, f.PREDICTED_HEADING))
+        for p in range(f.POINTS):
             side, height, width = flank_point(belt, p)
             radial, _, _ = frustum(plus(r, lever_of(o, a, side, height, width)), centre, axis)
-            store(step, j, RADIAL + 3 * p, radial)
+            store(step, j, f.RADIAL + 3 * p, radial)
             radial, radius, _ = frustum(
                 plus(half, lever_of(half_o, half_a, side, height, width)), centre, axis
             )
-            store(step, j, MID_RADIAL + 3 * p, radial)
-            step[j, MID_RADIUS + p] = radius
+            store(step, j, f.MID_RADIAL + 3 * p, radial)
+            step[j, f.MID_RADIUS + p] = radius
             _, radius, along = frustum(plus(s, lever_of(po, pa, side, height, width)), centre, axis)
-            step[j, FLANK_GAP + p] = frustum_gap(belt, side, radius, along, groove, middle)
+            step[j, f.FLANK_GAP + p] = frustum_gap(belt, side, radius, along, groove, middle)
 
 
 @kernel
@@ -175,9 +131,9 @@ def flank_forces(belt, state, pulleys, increments, openings, shapes, step, itera
     """
     modes = belt.modal_stiffness.shape[1]
     stiffness = 0.5 * belt.flank_stiffness
-    driving_speed, driven_speed = pulleys[DRIVING_SPEED], pulleys[DRIVEN_SPEED] + increments[0]
+    driving_speed, driven_speed = pulleys[planar.DRIVING_SPEED], pulleys[planar.DRIVEN_SPEED] + increments[0]
     for j in range(step.rows):
-        driven = state[j, DRIVEN]
+        driven = state[j, f.DRIVEN]
         axis = pulley_axis(belt, driven)
         rotation = of_pulley(driving_speed, driven_speed, driven)
         opening = like(0.0, driven)
@@ -186,49 +142,49 @@ def flank_forces(belt, state, pulleys, increments, openings, shapes, step, itera
             driven_one = openings[1, k] + increments[1 + modes + k]
             opening = opening + of_pulley(driving, driven_one, driven) * shapes[j, k]
         opening = belt.cosine * opening
-        du, dw = vector(state, j, CHANGE), vector(state, j, CHANGE + 3)
-        u, omega = plus(vector(state, j, SPEED), du), plus(vector(state, j, OMEGA), dw)
-        o = vector(state, j, OUTWARD)
-        a = cross(o, vector(state, j, HEADING))
-        half_o, half_a = vector(step, j, MID_OUTWARD), vector(step, j, MID_AXIAL)
+        du, dw = vector(state, j, f.CHANGE), vector(state, j, f.CHANGE + 3)
+        u, omega = plus(vector(state, j, f.SPEED), du), plus(vector(state, j, f.OMEGA), dw)
+        o = vector(state, j, f.OUTWARD)
+        a = cross(o, vector(state, j, f.HEADING))
+        half_o, half_a = vector(step, j, f.MID_OUTWARD), vector(step, j, f.MID_AXIAL)
         none = like(0.0, driven)
         force = turn = left = left_turn = none, none, none
-        for p in range(POINTS):
+        for p in range(f.POINTS):
             if p == 2:
                 left, left_turn = force, turn
                 force = turn = none, none, none
             side, height, half_width = flank_point(belt, p)
             lever = lever_of(o, a, side, height, half_width)
-            n, m, t = flank_directions(belt, vector(step, j, RADIAL + 3 * p), axis, side)
-            gap = fma(dt, dot(n, plus(du, cross(dw, lever))), step[j, FLANK_GAP + p] + opening)
+            n, m, t = flank_directions(belt, vector(step, j, f.RADIAL + 3 * p), axis, side)
+            gap = fma(dt, dot(n, plus(du, cross(dw, lever))), step[j, f.FLANK_GAP + p] + opening)
             normal, stiff = pressed(gap, stiffness)
-            iterate[j, FLANK_REACHED + p], iterate[j, YIELD + p] = gap, stiff
+            iterate[j, f.FLANK_REACHED + p], iterate[j, f.YIELD + p] = gap, stiff
 
             half = lever_of(half_o, half_a, side, height, half_width)
-            _, half_m, half_t = flank_directions(belt, vector(step, j, MID_RADIAL + 3 * p), axis, side)
+            _, half_m, half_t = flank_directions(belt, vector(step, j, f.MID_RADIAL + 3 * p), axis, side)
             q = plus(u, cross(omega, half))
-            along, around_it = dot(half_m, q), fma(-step[j, MID_RADIUS + p], rotation, dot(half_t, q))
-            earlier = state[j, FLANK_SLIP_M + p], state[j, FLANK_SLIP_T + p]
-            dual = state[j, FLANK_DUAL_M + p], state[j, FLANK_DUAL_T + p]
+            along, around_it = dot(half_m, q), fma(-step[j, f.MID_RADIUS + p], rotation, dot(half_t, q))
+            earlier = state[j, f.FLANK_SLIP_M + p], state[j, f.FLANK_SLIP_T + p]
+            dual = state[j, f.FLANK_DUAL_M + p], state[j, f.FLANK_DUAL_T + p]
             slip = along, around_it
-            dual, forces = flank_friction(belt, slip, earlier, dual, state[j, V_FILTERED + p], dt)
-            state[j, FLANK_DUAL_M + p], state[j, FLANK_DUAL_T + p] = dual
-            state[j, FLANK_SLIP_M + p], state[j, FLANK_SLIP_T + p] = slip
+            dual, forces = flank_friction(belt, slip, earlier, dual, state[j, f.V_FILTERED + p], dt)
+            state[j, f.FLANK_DUAL_M + p], state[j, f.FLANK_DUAL_T + p] = dual
+            state[j, f.FLANK_SLIP_M + p], state[j, f.FLANK_SLIP_T + p] = slip
             grip_m, grip_t, mm, mt, tm, tt = forces
-            state[j, FLANK + p] = normal
-            state[j, FLANK_FRICTION_M + p] = normal * grip_m
-            state[j, FLANK_FRICTION_T + p] = normal * grip_t
-            first = FRICTION_SLOPES + 4 * p
+            state[j, f.FLANK + p] = normal
+            state[j, f.FLANK_FRICTION_M + p] = normal * grip_m
+            state[j, f.FLANK_FRICTION_T + p] = normal * grip_t
+            first = f.FRICTION_SLOPES + 4 * p
             iterate[j, first], iterate[j, first + 1] = normal * mm, normal * mt
             iterate[j, first + 2], iterate[j, first + 3] = normal * tm, normal * tt
             by_normal = moved(moved(n, -grip_m, m), -grip_t, t)
-            store(iterate, j, BY_NORMAL + 3 * p, by_normal)
+            store(iterate, j, f.BY_NORMAL + 3 * p, by_normal)
             force = moved(force, normal, by_normal)
             turn = moved(turn, normal, cross(lever, by_normal))
-        store(iterate, j, RESIDUAL, plus(left, force))
-        store(iterate, j, RESIDUAL + 3, plus(left_turn, turn))
-        iterate[j, RESIDUAL + 6] = 0.0
-        iterate[j, RESIDUAL + 7] = 0.0
+        store(iterate, j, f.RESIDUAL, plus(left, force))
+        store(iterate, j, f.RESIDUAL + 3, plus(left_turn, turn))
+        iterate[j, f.RESIDUAL + 6] = 0.0
+        iterate[j, f.RESIDUAL + 7] = 0.0
 
 
 @register_jitable
@@ -240,11 +196,11 @@ def _point_slopes(belt, step, iterate, j, p, axes, dt):
     axis, o, a, half_o, half_a = axes
     side, height, half_width = flank_point(belt, p)
     lever = lever_of(o, a, side, height, half_width)
-    n, m, t = flank_directions(belt, vector(step, j, RADIAL + 3 * p), axis, side)
+    n, m, t = flank_directions(belt, vector(step, j, f.RADIAL + 3 * p), axis, side)
     half = lever_of(half_o, half_a, side, height, half_width)
-    _, half_m, half_t = flank_directions(belt, vector(step, j, MID_RADIAL + 3 * p), axis, side)
-    first = FRICTION_SLOPES + 4 * p
-    by_gap = times(dt * iterate[j, YIELD + p], vector(iterate, j, BY_NORMAL + 3 * p))
+    _, half_m, half_t = flank_directions(belt, vector(step, j, f.MID_RADIAL + 3 * p), axis, side)
+    first = f.FRICTION_SLOPES + 4 * p
+    by_gap = times(dt * iterate[j, f.YIELD + p], vector(iterate, j, f.BY_NORMAL + 3 * p))
     by_m = moved(times(iterate[j, first], m), iterate[j, first + 2], t)
     by_t = moved(times(iterate[j, first + 1], m), iterate[j, first + 3], t)
     turns = cross(lever, n), cross(half, half_m), cross(half, half_t)
@@ -294,8 +250,8 @@ def _border_of_side(belt, step, iterate, j, p, points, driven, dt):
     for q in range(2):
         if q == 1:
             forces, rows, turns, lever, t = high
-        first, by_normal = FRICTION_SLOPES + 4 * (p + q), vector(iterate, j, BY_NORMAL + 3 * (p + q))
-        stiff, radius = iterate[j, YIELD + p + q], step[j, MID_RADIUS + p + q]
+        first, by_normal = f.FRICTION_SLOPES + 4 * (p + q), vector(iterate, j, f.BY_NORMAL + 3 * (p + q))
+        stiff, radius = iterate[j, f.YIELD + p + q], step[j, f.MID_RADIUS + p + q]
         tm, tt = iterate[j, first + 2], iterate[j, first + 3]
         g = times(-radius * driven, forces[2])
         drive, drive_turn = plus(drive, g), plus_cross(drive_turn, lever, g)
@@ -322,10 +278,10 @@ def add_flank_blocks(belt, state, shapes, step, iterate, blocks, dt):
     """Add the slopes to the blocks, set the right sides of the border's unknowns and its rows."""
     modes = belt.modal_stiffness.shape[1]
     for j in range(step.rows):
-        driven = state[j, DRIVEN]
-        o = vector(state, j, OUTWARD)
-        a = cross(o, vector(state, j, HEADING))
-        axes = pulley_axis(belt, driven), o, a, vector(step, j, MID_OUTWARD), vector(step, j, MID_AXIAL)
+        driven = state[j, f.DRIVEN]
+        o = vector(state, j, f.OUTWARD)
+        a = cross(o, vector(state, j, f.HEADING))
+        axes = pulley_axis(belt, driven), o, a, vector(step, j, f.MID_OUTWARD), vector(step, j, f.MID_AXIAL)
         left = (
             _point_slopes(belt, step, iterate, j, 0, axes, dt),
             _point_slopes(belt, step, iterate, j, 1, axes, dt),
@@ -341,20 +297,20 @@ def add_flank_blocks(belt, state, shapes, step, iterate, blocks, dt):
         more, more_rows, more_own = _border_of_side(belt, step, iterate, j, 2, right, driven, dt)
         drive, drive_turn = plus(by_border[0], more[0]), plus(by_border[1], more[1])
         give, give_turn = plus(by_border[2], more[2]), plus(by_border[3], more[3])
-        store(iterate, j, NORMAL_ROW, plus(rows[0], more_rows[0]))
-        store(iterate, j, NORMAL_ROW + 3, plus(rows[1], more_rows[1]))
-        store(iterate, j, TORQUE_ROW, plus(rows[2], more_rows[2]))
-        store(iterate, j, TORQUE_ROW + 3, plus(rows[3], more_rows[3]))
-        iterate[j, TORQUE_OWN], iterate[j, TORQUE_OPENING] = own[0] + more_own[0], own[1] + more_own[1]
-        iterate[j, NORMAL_YIELD] = own[2] + more_own[2]
-        store(blocks, j, RIGHT + 8, drive)
-        store(blocks, j, RIGHT + 11, drive_turn)
-        blocks[j, RIGHT + 14] = 0.0
-        blocks[j, RIGHT + 15] = 0.0
+        store(iterate, j, f.NORMAL_ROW, plus(rows[0], more_rows[0]))
+        store(iterate, j, f.NORMAL_ROW + 3, plus(rows[1], more_rows[1]))
+        store(iterate, j, f.TORQUE_ROW, plus(rows[2], more_rows[2]))
+        store(iterate, j, f.TORQUE_ROW + 3, plus(rows[3], more_rows[3]))
+        iterate[j, f.TORQUE_OWN], iterate[j, f.TORQUE_OPENING] = own[0] + more_own[0], own[1] + more_own[1]
+        iterate[j, f.NORMAL_YIELD] = own[2] + more_own[2]
+        store(blocks, j, f.RIGHT + 8, drive)
+        store(blocks, j, f.RIGHT + 11, drive_turn)
+        blocks[j, f.RIGHT + 14] = 0.0
+        blocks[j, f.RIGHT + 15] = 0.0
         for k in range(2 * modes):
             pulley = driven if k >= modes else 1.0 - driven
             weight = pulley * shapes[j, k % modes]
-            first = RIGHT + 16 + 8 * k
+            first = f.RIGHT + 16 + 8 * k
             store(blocks, j, first, times(weight, give))
             store(blocks, j, first + 3, times(weight, give_turn))
             blocks[j, first + 6] = 0.0

@@ -15,24 +15,7 @@ from numba.extending import register_jitable
 
 from cvt_hpc.kernels import kernel
 from cvt_hpc.lanes import fma, maximum, sqrt
-from cvt_hpc.models.spatial_pushbelt.belt import (
-    CHANGE,
-    HEADING,
-    OUTWARD,
-    PAIR_I,
-    PAIR_J,
-    PIN,
-    PIN_GAP,
-    PIN_LEVER_I,
-    PIN_LEVER_J,
-    PIN_NORMAL,
-    PIN_REACHED,
-    PIN_SLOPE,
-    POSITION,
-    PREDICTED_HEADING,
-    PREDICTED_OUTWARD,
-    PREDICTED_POSITION,
-)
+from cvt_hpc.models.spatial_pushbelt import fields as f
 from cvt_hpc.models.spatial_pushbelt.rotations import (
     accumulate,
     cross,
@@ -64,34 +47,38 @@ def predict_pins(belt, state, step):
     """Gaps at q*, directions and levers at q_k."""
     thickness, height = belt.thickness, belt.pin_height
     for j in range(state.rows):
-        ri, rj = vector(state, j, POSITION), vector_ahead(state, j, POSITION)
-        xi, xj = vector(state, j, HEADING), vector_ahead(state, j, HEADING)
-        oi, oj = vector(state, j, OUTWARD), vector_ahead(state, j, OUTWARD)
+        ri, rj = vector(state, j, f.POSITION), vector_ahead(state, j, f.POSITION)
+        xi, xj = vector(state, j, f.HEADING), vector_ahead(state, j, f.HEADING)
+        oi, oj = vector(state, j, f.OUTWARD), vector_ahead(state, j, f.OUTWARD)
         d, size, arm = pin_offset(ri, xi, oi, rj, xj, oj, thickness, height)
         n = times(1.0 / maximum(size, _LEAST), d)
-        store(step, j, PIN_NORMAL, n)
-        store(step, j, PIN_LEVER_I, cross(arm, n))
-        store(step, j, PIN_LEVER_J, cross(plus(minus(ri, rj), arm), n))
-        si, sj = vector(step, j, PREDICTED_POSITION), vector_ahead(step, j, PREDICTED_POSITION)
-        yi, yj = vector(step, j, PREDICTED_HEADING), vector_ahead(step, j, PREDICTED_HEADING)
-        pi, pj = vector(step, j, PREDICTED_OUTWARD), vector_ahead(step, j, PREDICTED_OUTWARD)
+        store(step, j, f.PIN_NORMAL, n)
+        store(step, j, f.PIN_LEVER_I, cross(arm, n))
+        store(step, j, f.PIN_LEVER_J, cross(plus(minus(ri, rj), arm), n))
+        si, sj = vector(step, j, f.PREDICTED_POSITION), vector_ahead(step, j, f.PREDICTED_POSITION)
+        yi, yj = vector(step, j, f.PREDICTED_HEADING), vector_ahead(step, j, f.PREDICTED_HEADING)
+        pi, pj = vector(step, j, f.PREDICTED_OUTWARD), vector_ahead(step, j, f.PREDICTED_OUTWARD)
         _, size, _ = pin_offset(si, yi, pi, sj, yj, pj, thickness, height)
-        step[j, PIN_GAP] = belt.pin_clearance - size
+        step[j, f.PIN_GAP] = belt.pin_clearance - size
 
 
 @kernel
 def pin_forces(belt, state, step, iterate, dt):
     """Forces and their slopes of an iterate; adds to the pairs' forces."""
     for j in range(step.rows):
-        n, a, b = vector(step, j, PIN_NORMAL), vector(step, j, PIN_LEVER_I), vector(step, j, PIN_LEVER_J)
-        du = minus(vector(state, j, CHANGE), vector_ahead(state, j, CHANGE))
-        parting = (
-            dot(n, du) + dot(a, vector(state, j, CHANGE + 3)) - dot(b, vector_ahead(state, j, CHANGE + 3))
+        n, a, b = (
+            vector(step, j, f.PIN_NORMAL),
+            vector(step, j, f.PIN_LEVER_I),
+            vector(step, j, f.PIN_LEVER_J),
         )
-        gap = fma(-dt, parting, step[j, PIN_GAP])
+        du = minus(vector(state, j, f.CHANGE), vector_ahead(state, j, f.CHANGE))
+        parting = (
+            dot(n, du) + dot(a, vector(state, j, f.CHANGE + 3)) - dot(b, vector_ahead(state, j, f.CHANGE + 3))
+        )
+        gap = fma(-dt, parting, step[j, f.PIN_GAP])
         force, k = pressed(gap, belt.pin_stiffness)
-        state[j, PIN], iterate[j, PIN_REACHED], iterate[j, PIN_SLOPE] = force, gap, dt * k
-        accumulate(iterate, j, PAIR_I, times(-force, n))
-        accumulate(iterate, j, PAIR_I + 3, times(-force, a))
-        accumulate(iterate, j, PAIR_J, times(force, n))
-        accumulate(iterate, j, PAIR_J + 3, times(force, b))
+        state[j, f.PIN], iterate[j, f.PIN_REACHED], iterate[j, f.PIN_SLOPE] = force, gap, dt * k
+        accumulate(iterate, j, f.PAIR_I, times(-force, n))
+        accumulate(iterate, j, f.PAIR_I + 3, times(-force, a))
+        accumulate(iterate, j, f.PAIR_J, times(force, n))
+        accumulate(iterate, j, f.PAIR_J + 3, times(force, b))

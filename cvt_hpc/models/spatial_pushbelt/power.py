@@ -10,48 +10,9 @@ import numpy as np
 
 from cvt_hpc.kernels import kernel
 from cvt_hpc.lanes import around, like
-from cvt_hpc.models.pushbelt.belt import (
-    BELT_LOSS,
-    DAMPING_LOSS,
-    DRIVEN_SPEED,
-    DRIVING_SPEED,
-    ELEMENT_DAMPED,
-    FLANK_DAMPED,
-    FLANK_LOSS,
-    RING_DAMPED,
-    RING_LOSS,
-    TILT_DAMPED,
-)
+from cvt_hpc.models.pushbelt import fields as planar
 from cvt_hpc.models.pushbelt.border import book_openings, groove_of, of_pulley
-from cvt_hpc.models.spatial_pushbelt.belt import (
-    CHANGE,
-    CHORD_I,
-    CHORD_J,
-    DRIVEN,
-    FLANK,
-    FLANK_FRICTION_M,
-    FLANK_FRICTION_T,
-    FLANK_REACHED,
-    HEADING,
-    MID_RADIUS,
-    NORMAL,
-    OUTWARD,
-    PIN_LEVER_I,
-    PIN_LEVER_J,
-    PIN_NORMAL,
-    PIN_REACHED,
-    POINTS,
-    PUSH_LEVER_I,
-    PUSH_LEVER_J,
-    PUSH_REACHED,
-    RADIAL,
-    RING_FRICTION,
-    SPEED,
-    TENSION_SLOPE,
-    TURN_I,
-    TURN_J,
-    YAW,
-)
+from cvt_hpc.models.spatial_pushbelt import fields as f
 from cvt_hpc.models.spatial_pushbelt.chain import mean_stretch
 from cvt_hpc.models.spatial_pushbelt.flank import (
     along_arc,
@@ -72,7 +33,10 @@ from cvt_hpc.models.spatial_pushbelt.rotations import (
 from cvt_hpc.models.spatial_pushbelt.saddle import ring_slip
 from cvt_hpc.physics.contact_laws import damped
 
-_FIRST, _COUNT = FLANK_LOSS, TILT_DAMPED + 1 - FLANK_LOSS  # totals that are added up here
+_FIRST, _COUNT = (
+    planar.FLANK_LOSS,
+    planar.TILT_DAMPED + 1 - planar.FLANK_LOSS,
+)  # totals that are added up here
 
 
 @kernel
@@ -81,50 +45,53 @@ def book_pairs(belt, state, work, dt):
     elements, step, iterate, scratch = state.elements, work.step, work.iterate, work.scratch
     has_pins = belt.pin_clearance < np.inf
     contact = 0.5 * belt.contact_stiffness
-    ring = tilt = drag = between = stretching = turning = like(0.0, elements[0, FLANK])
+    ring = tilt = drag = between = stretching = turning = like(0.0, elements[0, f.FLANK])
     for j in range(step.rows):
-        du, dw = vector(elements, j, CHANGE), vector(elements, j, CHANGE + 3)
-        ju, jw = vector_ahead(elements, j, CHANGE), vector_ahead(elements, j, CHANGE + 3)
-        u, w = moved(vector(elements, j, SPEED), 0.5, du), moved(vector(elements, j, SPEED + 3), 0.5, dw)
-        next_u = moved(vector_ahead(elements, j, SPEED), 0.5, ju)
-        next_w = moved(vector_ahead(elements, j, SPEED + 3), 0.5, jw)
+        du, dw = vector(elements, j, f.CHANGE), vector(elements, j, f.CHANGE + 3)
+        ju, jw = vector_ahead(elements, j, f.CHANGE), vector_ahead(elements, j, f.CHANGE + 3)
+        u, w = moved(vector(elements, j, f.SPEED), 0.5, du), moved(vector(elements, j, f.SPEED + 3), 0.5, dw)
+        next_u = moved(vector_ahead(elements, j, f.SPEED), 0.5, ju)
+        next_w = moved(vector_ahead(elements, j, f.SPEED + 3), 0.5, jw)
         stretch = mean_stretch(elements, step, j)
-        stretching += step[j, TENSION_SLOPE] * stretch * stretch
+        stretching += step[j, f.TENSION_SLOPE] * stretch * stretch
 
         apart, more = minus(next_u, u), minus(ju, du)
-        chord_i, chord_j = vector(step, j, CHORD_I), vector(step, j, CHORD_J)
-        turn_i, turn_j = vector(step, j, TURN_I), vector(step, j, TURN_J)
+        chord_i, chord_j = vector(step, j, f.CHORD_I), vector(step, j, f.CHORD_J)
+        turn_i, turn_j = vector(step, j, f.TURN_I), vector(step, j, f.TURN_J)
         rate_i, rate_j = dot(chord_i, apart) + dot(turn_i, w), dot(chord_j, apart) + dot(turn_j, next_w)
         last_i = rate_i + 0.5 * (dot(chord_i, more) + dot(turn_i, dw))
         last_j = rate_j + 0.5 * (dot(chord_j, more) + dot(turn_j, jw))
         tilt += 0.5 * belt.angle_damping * (last_i * rate_i + last_j * rate_j)
         turning += 0.5 * dt * belt.angle_stiffness * (rate_i * rate_i + rate_j * rate_j)
-        y = vector(step, j, YAW)
-        yaw = dot(y, w) - elements[j, SPEED + 7] - 0.5 * elements[j, CHANGE + 7]
-        last = yaw + 0.5 * (dot(y, dw) - elements[j, CHANGE + 7])
+        y = vector(step, j, f.YAW)
+        yaw = dot(y, w) - elements[j, f.SPEED + 7] - 0.5 * elements[j, f.CHANGE + 7]
+        last = yaw + 0.5 * (dot(y, dw) - elements[j, f.CHANGE + 7])
         tilt += belt.yaw_damping * yaw * last
 
-        closing = dot(vector_ahead(elements, j, HEADING), apart)
-        for p in range(POINTS):
-            a, b = vector(step, j, PUSH_LEVER_I + 3 * p), vector(step, j, PUSH_LEVER_J + 3 * p)
+        closing = dot(vector_ahead(elements, j, f.HEADING), apart)
+        for p in range(f.POINTS):
+            a, b = vector(step, j, f.PUSH_LEVER_I + 3 * p), vector(step, j, f.PUSH_LEVER_J + 3 * p)
             change = dt * (closing + dot(a, w) + dot(b, next_w))
-            between += damped(iterate[j, PUSH_REACHED + p], change, contact)
+            between += damped(iterate[j, f.PUSH_REACHED + p], change, contact)
         if has_pins:
-            a, b = vector(step, j, PIN_LEVER_I), vector(step, j, PIN_LEVER_J)
-            change = dt * (dot(vector(step, j, PIN_NORMAL), apart) - dot(a, w) + dot(b, next_w))
-            between += damped(iterate[j, PIN_REACHED], change, belt.pin_stiffness)
+            a, b = vector(step, j, f.PIN_LEVER_I), vector(step, j, f.PIN_LEVER_J)
+            change = dt * (dot(vector(step, j, f.PIN_NORMAL), apart) - dot(a, w) + dot(b, next_w))
+            between += damped(iterate[j, f.PIN_REACHED], change, belt.pin_stiffness)
 
-        ring += elements[j, RING_FRICTION] * ring_slip(elements, step, j, 0.5)
-        n_y, n_z = step[j, NORMAL], step[j, NORMAL + 1]
+        ring += elements[j, f.RING_FRICTION] * ring_slip(elements, step, j, 0.5)
+        n_y, n_z = step[j, f.NORMAL], step[j, f.NORMAL + 1]
         across = n_y * u[0] + n_z * u[1]
         drag += belt.transverse_damping * across * (across + 0.5 * (n_y * du[0] + n_z * du[1]))
         drag += belt.lateral_damping * u[2] * (u[2] + 0.5 * du[2])
     for k in range(_COUNT):
         scratch[0, k] = 0.0
-    scratch[0, RING_LOSS - _FIRST] = dt * ring
-    scratch[0, DAMPING_LOSS - _FIRST], scratch[0, BELT_LOSS - _FIRST] = dt * tilt, dt * drag
-    scratch[0, ELEMENT_DAMPED - _FIRST] = between
-    scratch[0, RING_DAMPED - _FIRST], scratch[0, TILT_DAMPED - _FIRST] = dt * stretching, dt * turning
+    scratch[0, planar.RING_LOSS - _FIRST] = dt * ring
+    scratch[0, planar.DAMPING_LOSS - _FIRST], scratch[0, planar.BELT_LOSS - _FIRST] = dt * tilt, dt * drag
+    scratch[0, planar.ELEMENT_DAMPED - _FIRST] = between
+    scratch[0, planar.RING_DAMPED - _FIRST], scratch[0, planar.TILT_DAMPED - _FIRST] = (
+        dt * stretching,
+        dt * turning,
+    )
     for k in range(_COUNT):
         scratch[0, k] = around(scratch[0, k])
         state.totals[_FIRST + k] += scratch.data[0, k, 0]
@@ -134,34 +101,34 @@ def book_pairs(belt, state, work, dt):
 def book_flanks(belt, state, work, dt):
     """Add to the totals what a solved step takes at the flanks, before it is accepted."""
     elements, step, iterate, scratch = state.elements, work.step, work.iterate, work.scratch
-    driving_speed = state.pulleys[DRIVING_SPEED]
-    driven_speed = state.pulleys[DRIVEN_SPEED] + 0.5 * state.increments[0]
-    flank = sheaves = like(0.0, elements[0, FLANK])
+    driving_speed = state.pulleys[planar.DRIVING_SPEED]
+    driven_speed = state.pulleys[planar.DRIVEN_SPEED] + 0.5 * state.increments[0]
+    flank = sheaves = like(0.0, elements[0, f.FLANK])
     for j in range(step.rows):
-        u = moved(vector(elements, j, SPEED), 0.5, vector(elements, j, CHANGE))
-        w = moved(vector(elements, j, SPEED + 3), 0.5, vector(elements, j, CHANGE + 3))
-        driven = elements[j, DRIVEN]
+        u = moved(vector(elements, j, f.SPEED), 0.5, vector(elements, j, f.CHANGE))
+        w = moved(vector(elements, j, f.SPEED + 3), 0.5, vector(elements, j, f.CHANGE + 3))
+        driven = elements[j, f.DRIVEN]
         axis = pulley_axis(belt, driven)
         rotation = of_pulley(driving_speed, driven_speed, driven)
-        o = vector(elements, j, OUTWARD)
-        a = cross(o, vector(elements, j, HEADING))
+        o = vector(elements, j, f.OUTWARD)
+        a = cross(o, vector(elements, j, f.HEADING))
         # the groove opens where an element is, and is another where it gets to
         c, s = along_arc(belt, elements, j)
         opening, lean, bend = groove_of(belt, state, work, j, c, s, driven)
-        for p in range(POINTS):
+        for p in range(f.POINTS):
             side, height, width = flank_point(belt, p)
             lever = lever_of(o, a, side, height, width)
-            n, m, t = flank_directions(belt, vector(step, j, RADIAL + 3 * p), axis, side)
+            n, m, t = flank_directions(belt, vector(step, j, f.RADIAL + 3 * p), axis, side)
             q = plus(u, cross(w, lever))
-            around_it, radius = dot(t, q), step[j, MID_RADIUS + p]
-            flank += elements[j, FLANK_FRICTION_M + p] * dot(m, q)
-            flank += elements[j, FLANK_FRICTION_T + p] * (around_it - radius * rotation)
+            around_it, radius = dot(t, q), step[j, f.MID_RADIUS + p]
+            flank += elements[j, f.FLANK_FRICTION_M + p] * dot(m, q)
+            flank += elements[j, f.FLANK_FRICTION_T + p] * (around_it - radius * rotation)
             angle = dt * around_it / radius
             change = dt * dot(n, q) + belt.cosine * (opening + angle * lean)
-            sheaves += damped(iterate[j, FLANK_REACHED + p], change, 0.5 * belt.flank_stiffness)
+            sheaves += damped(iterate[j, f.FLANK_REACHED + p], change, 0.5 * belt.flank_stiffness)
             # an element presses at the step's end where it was at its start: modes lag by that angle
-            sheaves += belt.cosine * elements[j, FLANK + p] * angle * angle * bend
+            sheaves += belt.cosine * elements[j, f.FLANK + p] * angle * angle * bend
     scratch[0, 0], scratch[0, 1] = around(dt * flank), around(sheaves)
-    state.totals[FLANK_LOSS] += scratch.data[0, 0, 0]
-    state.totals[FLANK_DAMPED] += scratch.data[0, 1, 0]
+    state.totals[planar.FLANK_LOSS] += scratch.data[0, 0, 0]
+    state.totals[planar.FLANK_DAMPED] += scratch.data[0, 1, 0]
     book_openings(belt, state, work)

@@ -8,12 +8,12 @@ from __future__ import annotations
 
 import numpy as np
 
-from cvt_hpc.models.pushbelt.belt import DRIVEN_RADIUS, DRIVEN_SPEED, DRIVING_RADIUS, DRIVING_SPEED
+from cvt_hpc.models.pushbelt import fields as planar
 from cvt_hpc.models.pushbelt.readings import PROFILES as PLANAR_PROFILES
 from cvt_hpc.models.pushbelt.readings import SCALARS as PLANAR_SCALARS
 from cvt_hpc.models.pushbelt.readings import OnPath, Readings
-from cvt_hpc.models.spatial_pushbelt import belt as f
-from cvt_hpc.models.spatial_pushbelt.belt import POINTS, Belt
+from cvt_hpc.models.spatial_pushbelt import fields
+from cvt_hpc.models.spatial_pushbelt.belt import Belt
 from cvt_hpc.variator import PULLEYS, STRANDS
 
 SIDES = ("left", "right")
@@ -72,7 +72,7 @@ OF_TWO_FLOWS = {
 
 
 def _points(elements: np.ndarray, first: int) -> np.ndarray:
-    return elements[:, first : first + POINTS]
+    return elements[:, first : first + fields.POINTS]
 
 
 def _vectors(elements: np.ndarray, first: int) -> np.ndarray:
@@ -95,9 +95,9 @@ def angles(elements: np.ndarray) -> np.ndarray:
     elements : (n, fields) array
         In the order of the belt.
     """
-    position, o = _vectors(elements, f.POSITION), _vectors(elements, f.OUTWARD)
+    position, o = _vectors(elements, fields.POSITION), _vectors(elements, fields.OUTWARD)
     chord = np.roll(position, -1, axis=0) - np.roll(position, 1, axis=0)
-    return np.array([o[:, 2], elements[:, f.HEADING + 2], -_dot(_unit(chord), o)])
+    return np.array([o[:, 2], elements[:, fields.HEADING + 2], -_dot(_unit(chord), o)])
 
 
 class Reading:
@@ -118,9 +118,11 @@ class Reading:
     def __init__(self, where: Readings, elements: np.ndarray, pulleys: np.ndarray, loads: np.ndarray) -> None:
         e = elements
         self._where, self._elements, self._pulleys, self._loads = where, e, pulleys, loads
-        self._position, self._x, self._o = (_vectors(e, k) for k in (f.POSITION, f.HEADING, f.OUTWARD))
+        self._position, self._x, self._o = (
+            _vectors(e, k) for k in (fields.POSITION, fields.HEADING, fields.OUTWARD)
+        )
         self._path = OnPath(where, self._position[:, :2])
-        self._push = _points(e, f.PUSH)
+        self._push = _points(e, fields.PUSH)
         self._angles = angles(e)
 
     def displacement(self) -> np.ndarray:
@@ -130,46 +132,46 @@ class Reading:
     def scalars(self) -> list[float]:
         """SCALARS."""
         e, pulleys, loads, path = self._elements, self._pulleys, self._loads, self._where.path
-        driven = e[:, f.DRIVEN]
+        driven = e[:, fields.DRIVEN]
         both = np.stack([1.0 - driven, driven])
-        normal, slip = _points(e, f.FLANK), _points(e, f.FLANK_SLIP_T)
-        lost = _points(e, f.FLANK_FRICTION_M) * _points(e, f.FLANK_SLIP_M)
-        lost += _points(e, f.FLANK_FRICTION_T) * slip
+        normal, slip = _points(e, fields.FLANK), _points(e, fields.FLANK_SLIP_T)
+        lost = _points(e, fields.FLANK_FRICTION_M) * _points(e, fields.FLANK_SLIP_M)
+        lost += _points(e, fields.FLANK_FRICTION_T) * slip
         loss = both @ lost.reshape(-1, 2, 2).sum(axis=2)  # by pulley and side
         pressed = (both @ normal).sum(axis=1)
         weights = both * normal.sum(axis=1) / np.maximum(pressed, _LEAST_FORCE)[:, None]
         running = np.where(pressed > 0.0, weights @ self._contact_radii(), np.nan)
         sliding = (both @ (normal * slip)).sum(axis=1) / np.maximum(pressed, _LEAST_FORCE)
         middles = self._path.middles()
-        speeds = np.linalg.norm(_vectors(e, f.SPEED), axis=1).sum()
+        speeds = np.linalg.norm(_vectors(e, fields.SPEED), axis=1).sum()
         line = np.linalg.norm(np.roll(self._position, -1, axis=0) - self._position, axis=1).sum()
-        sheaves = loads[[f.DRIVING_LEFT, f.DRIVING_RIGHT, f.DRIVEN_LEFT, f.DRIVEN_RIGHT]]
+        sheaves = loads[[fields.DRIVING_LEFT, fields.DRIVING_RIGHT, fields.DRIVEN_LEFT, fields.DRIVEN_RIGHT]]
         groups = (
-            pulleys[[DRIVEN_SPEED, DRIVING_RADIUS, DRIVEN_RADIUS]],
+            pulleys[[planar.DRIVEN_SPEED, planar.DRIVING_RADIUS, planar.DRIVEN_RADIUS]],
             middles @ self._push.sum(axis=1),
-            middles @ e[:, f.TENSION],
+            middles @ e[:, fields.TENSION],
             sheaves.reshape(2, 2).mean(axis=1),
             running,
-            sliding / (pulleys[DRIVING_SPEED] * path.driving_radius),
+            sliding / (pulleys[planar.DRIVING_SPEED] * path.driving_radius),
             loss.sum(axis=1),
-            [e[:, f.RING_FRICTION] @ e[:, f.RING_SLIP], speeds / line],
+            [e[:, fields.RING_FRICTION] @ e[:, fields.RING_SLIP], speeds / line],
             sheaves,
             loss.ravel(),
-            [pulleys[f.DRIVEN_MIDDLE] - pulleys[f.DRIVING_MIDDLE]],
+            [pulleys[fields.DRIVEN_MIDDLE] - pulleys[fields.DRIVING_MIDDLE]],
             np.abs(self._angles).max(axis=1),
-            [e[:, f.PIN].max()],
-            middles @ e[:, f.TENSION_DIFFERENCE] if self._has_two_flows() else [np.nan] * len(STRANDS),
+            [e[:, fields.PIN].max()],
+            middles @ e[:, fields.TENSION_DIFFERENCE] if self._has_two_flows() else [np.nan] * len(STRANDS),
         )
         return [float(value) for group in groups for value in group]
 
     def _has_two_flows(self) -> bool:
-        return self._elements.shape[1] == f.WIDE_STATE_FIELDS
+        return self._elements.shape[1] == fields.WIDE_STATE_FIELDS
 
     def _contact_radii(self) -> np.ndarray:
         """Distances of the flanks' pitch points from the shaft of the nearer pulley, (n,) [m]."""
         where = self._where
         pitch_point = self._position - where.belt.pitch_depth * self._o
-        y = pitch_point[:, 0] - self._elements[:, f.DRIVEN] * where.centre_distance
+        y = pitch_point[:, 0] - self._elements[:, fields.DRIVEN] * where.centre_distance
         return np.hypot(y, pitch_point[:, 1])
 
     def profiles(self) -> np.ndarray:
@@ -180,17 +182,23 @@ class Reading:
         e, pitch = self._elements, self._where.pitch
         normal, grip_m, grip_t, slip_m, slip_t = (
             _points(e, k)
-            for k in (f.FLANK, f.FLANK_FRICTION_M, f.FLANK_FRICTION_T, f.FLANK_SLIP_M, f.FLANK_SLIP_T)
+            for k in (
+                fields.FLANK,
+                fields.FLANK_FRICTION_M,
+                fields.FLANK_FRICTION_T,
+                fields.FLANK_SLIP_M,
+                fields.FLANK_SLIP_T,
+            )
         )
         pairs = [slice(0, 2), slice(2, 4)]
         rows = [
             self._push.sum(axis=1),
-            e[:, f.TENSION],
+            e[:, fields.TENSION],
             *(0.5 * values.sum(axis=1) / pitch for values in (normal, grip_m, grip_t)),
-            e[:, f.SADDLE] / pitch,
-            e[:, f.RING_SLIP],
+            e[:, fields.SADDLE] / pitch,
+            e[:, fields.RING_SLIP],
             slip_t.mean(axis=1),
-            e[:, f.PIN],
+            e[:, fields.PIN],
             _edge_gap(e, self._where.belt),
             self._angles[2],
             self._path.offset,
@@ -209,10 +217,10 @@ class Reading:
             self._position[:, 2],
             self._o[:, 2],
             self._x[:, 2],
-            e[:, f.SLOPE],
+            e[:, fields.SLOPE],
         ]
         if self._has_two_flows():
-            rows += [e[:, f.TENSION_DIFFERENCE], 2.0 * e[:, f.HALF_SPEED]]
+            rows += [e[:, fields.TENSION_DIFFERENCE], 2.0 * e[:, fields.HALF_SPEED]]
         return self._path.sums(rows)
 
     def stored_energy(self, openings: np.ndarray, leans: np.ndarray) -> float:
@@ -226,12 +234,12 @@ class Reading:
         e, belt = self._elements, self._where.belt
         x, o = self._x, self._o
         a = np.cross(o, x)
-        u, omega = _vectors(e, f.SPEED), _vectors(e, f.OMEGA)
-        kinetic = belt.mass * (u**2).sum() + belt.driven_inertia * self._pulleys[DRIVEN_SPEED] ** 2
+        u, omega = _vectors(e, fields.SPEED), _vectors(e, fields.OMEGA)
+        kinetic = belt.mass * (u**2).sum() + belt.driven_inertia * self._pulleys[planar.DRIVEN_SPEED] ** 2
         for inertia, axis in ((belt.roll_inertia, x), (belt.yaw_inertia, o), (belt.pitch_inertia, a)):
             kinetic += inertia * (_dot(omega, axis) ** 2).sum()
-        kinetic += belt.ring_mass * (e[:, f.V] ** 2).sum()
-        kinetic += belt.ring_rotary_inertia * (e[:, f.SLOPE_RATE] ** 2).sum()
+        kinetic += belt.ring_mass * (e[:, fields.V] ** 2).sum()
+        kinetic += belt.ring_rotary_inertia * (e[:, fields.SLOPE_RATE] ** 2).sum()
         for side in (-1.0, 1.0):  # the rings move with the elements across their lines only
             arm = side * belt.package_distance * a
             line = self._position + arm
@@ -239,31 +247,31 @@ class Reading:
             w = u + np.cross(omega, arm)
             kinetic += 0.5 * belt.ring_mass * ((w**2).sum() - (_dot(t, w) ** 2).sum())
 
-        elastic = (e[:, f.TENSION] ** 2 * e[:, f.LENGTH]).sum() / belt.ring_stiffness
+        elastic = (e[:, fields.TENSION] ** 2 * e[:, fields.LENGTH]).sum() / belt.ring_stiffness
         if self._has_two_flows():
-            tension, difference = e[:, f.TENSION], e[:, f.TENSION_DIFFERENCE]
-            mixed = difference * (difference * e[:, f.LENGTH] + 2.0 * tension * e[:, f.HALF_LENGTH])
+            tension, difference = e[:, fields.TENSION], e[:, fields.TENSION_DIFFERENCE]
+            mixed = difference * (difference * e[:, fields.LENGTH] + 2.0 * tension * e[:, fields.HALF_LENGTH])
             elastic += mixed.sum() / belt.ring_stiffness
-            kinetic += belt.ring_mass * (e[:, f.HALF_SPEED] ** 2).sum()
+            kinetic += belt.ring_mass * (e[:, fields.HALF_SPEED] ** 2).sum()
         elastic += 2.0 * (self._push**2).sum() / belt.contact_stiffness
-        elastic += (e[:, f.PIN] ** 2).sum() / belt.pin_stiffness
-        elastic += 2.0 * (_points(e, f.FLANK) ** 2).sum() / belt.flank_stiffness
+        elastic += (e[:, fields.PIN] ** 2).sum() / belt.pin_stiffness
+        elastic += 2.0 * (_points(e, fields.FLANK) ** 2).sum() / belt.flank_stiffness
         elastic += 2.0 * (belt.modal_stiffness * (openings**2 + leans**2)).sum()
         ahead = np.roll(e, -1, axis=0)
         chord = np.roll(self._position, -1, axis=0) - self._position
         for end in (o, np.roll(o, -1, axis=0)):  # half of the pitch's stiffness at each end of a segment
             elastic += 0.5 * belt.angle_stiffness * (_dot(_unit(chord), end) ** 2).sum()
-        elastic += belt.yaw_stiffness * ((x[:, 2] - e[:, f.SLOPE]) ** 2).sum()
-        shear = chord[:, 2] / belt.pitch - 0.5 * (e[:, f.SLOPE] + ahead[:, f.SLOPE])
+        elastic += belt.yaw_stiffness * ((x[:, 2] - e[:, fields.SLOPE]) ** 2).sum()
+        shear = chord[:, 2] / belt.pitch - 0.5 * (e[:, fields.SLOPE] + ahead[:, fields.SLOPE])
         elastic += belt.ring_shear * belt.pitch * (shear**2).sum()
-        elastic += belt.ring_bending / belt.pitch * ((ahead[:, f.SLOPE] - e[:, f.SLOPE]) ** 2).sum()
+        elastic += belt.ring_bending / belt.pitch * ((ahead[:, fields.SLOPE] - e[:, fields.SLOPE]) ** 2).sum()
         return 0.5 * float(kinetic + elastic)
 
 
 def _edge_gap(e: np.ndarray, belt: Belt) -> np.ndarray:
     """Distance of neighbours at the middle of the rocking edge, (n,) [m]; negative where they are pressed."""
     ahead = np.roll(e, -1, axis=0)
-    y = _vectors(ahead, f.HEADING)
-    edge = _vectors(e, f.POSITION) + 0.5 * belt.thickness * _vectors(e, f.HEADING)
-    edge -= belt.pitch_depth * _vectors(e, f.OUTWARD)
-    return _dot(_vectors(ahead, f.POSITION) - 0.5 * belt.thickness * y - edge, y)
+    y = _vectors(ahead, fields.HEADING)
+    edge = _vectors(e, fields.POSITION) + 0.5 * belt.thickness * _vectors(e, fields.HEADING)
+    edge -= belt.pitch_depth * _vectors(e, fields.OUTWARD)
+    return _dot(_vectors(ahead, fields.POSITION) - 0.5 * belt.thickness * y - edge, y)

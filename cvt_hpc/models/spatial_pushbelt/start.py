@@ -7,33 +7,10 @@ from typing import Any
 
 import numpy as np
 
-from cvt_hpc.models.pushbelt.belt import (
-    COUNTERS,
-    TOTALS,
-)
+from cvt_hpc.models.pushbelt import fields as planar
 from cvt_hpc.models.pushbelt.start import in_lanes, of_lanes, pitch_line, shared_constants
-from cvt_hpc.models.spatial_pushbelt.belt import (
-    DRIVEN,
-    HALF_LENGTH,
-    HEADING,
-    LENGTH,
-    LOADS,
-    OMEGA,
-    OUTWARD,
-    POSITION,
-    SADDLE,
-    SADDLE_LEFT,
-    SADDLE_RIGHT,
-    SLOPE,
-    SLOPE_RATE,
-    SPEED,
-    STATE_FIELDS,
-    TENSION,
-    WIDE_STATE_FIELDS,
-    Belt,
-    BeltState,
-    V,
-)
+from cvt_hpc.models.spatial_pushbelt import fields as f
+from cvt_hpc.models.spatial_pushbelt.belt import Belt, BeltState
 from cvt_hpc.physics.geometry import Variator
 from cvt_hpc.physics.out_of_plane import SIDES
 from cvt_hpc.variator.path import points_at, regions
@@ -181,18 +158,18 @@ def start(given: Mapping[str, Any]) -> tuple[Belt, BeltState]:
     slope_rate = speed * (np.roll(slope, -1) - np.roll(slope, 1)) / (2.0 * line.chord)
     plane_outward = np.column_stack([along[:, 1], -along[:, 0], np.zeros(nodes)])
     omega = speed * line.curvature[:, None] * np.array([0.0, 0.0, 1.0]) + slope_rate[:, None] * plane_outward
-    fields = np.zeros((nodes, STATE_FIELDS))
-    fields[:, POSITION : POSITION + 3] = points
-    fields[:, HEADING : HEADING + 3], fields[:, OUTWARD : OUTWARD + 3] = heading, outward
-    fields[:, SLOPE], fields[:, SLOPE_RATE] = slope, slope_rate
+    fields = np.zeros((nodes, f.STATE_FIELDS))
+    fields[:, f.POSITION : f.POSITION + 3] = points
+    fields[:, f.HEADING : f.HEADING + 3], fields[:, f.OUTWARD : f.OUTWARD + 3] = heading, outward
+    fields[:, f.SLOPE], fields[:, f.SLOPE_RATE] = slope, slope_rate
     running = speed + belt.pitch_depth * speed * line.curvature
-    fields[:, SPEED : SPEED + 2] = running[:, None] * along
-    fields[:, SPEED + 2] = speed * slope
-    fields[:, OMEGA : OMEGA + 3] = omega
-    fields[:, V] = speed * lines.sum() / (nodes * line.chord)
-    fields[:, LENGTH] = lines / (1.0 + g["ring_strain"])
-    fields[:, TENSION] = belt.ring_stiffness * g["ring_strain"]
-    fields[:, DRIVEN] = points[:, 0] > 0.5 * belt.centre_distance
+    fields[:, f.SPEED : f.SPEED + 2] = running[:, None] * along
+    fields[:, f.SPEED + 2] = speed * slope
+    fields[:, f.OMEGA : f.OMEGA + 3] = omega
+    fields[:, f.V] = speed * lines.sum() / (nodes * line.chord)
+    fields[:, f.LENGTH] = lines / (1.0 + g["ring_strain"])
+    fields[:, f.TENSION] = belt.ring_stiffness * g["ring_strain"]
+    fields[:, f.DRIVEN] = points[:, 0] > 0.5 * belt.centre_distance
     modes = belt.modal_stiffness.shape[1]
     state = BeltState(
         in_lanes(fields),
@@ -200,9 +177,9 @@ def start(given: Mapping[str, Any]) -> tuple[Belt, BeltState]:
         np.zeros((2, modes)),
         np.zeros((2, modes)),
         np.zeros(1 + 2 * modes),
-        np.zeros(LOADS),
-        np.zeros(TOTALS),
-        np.zeros(COUNTERS, np.int64),
+        np.zeros(f.LOADS),
+        np.zeros(planar.TOTALS),
+        np.zeros(planar.COUNTERS, np.int64),
     )
     return belt, state
 
@@ -213,12 +190,12 @@ def with_two_flows(belt: Belt, state: BeltState) -> BeltState:
     Both share all but the elements.
     """
     fields = of_lanes(state.elements)
-    wide = np.zeros((len(fields), WIDE_STATE_FIELDS))
-    wide[:, :STATE_FIELDS] = fields
-    o = fields[:, OUTWARD : OUTWARD + 3]
-    arm = belt.package_distance * np.cross(o, fields[:, HEADING : HEADING + 3])
-    chord, turn = (np.roll(of, -1, axis=0) - of for of in (fields[:, POSITION : POSITION + 3], arm))
+    wide = np.zeros((len(fields), f.WIDE_STATE_FIELDS))
+    wide[:, : f.STATE_FIELDS] = fields
+    o = fields[:, f.OUTWARD : f.OUTWARD + 3]
+    arm = belt.package_distance * np.cross(o, fields[:, f.HEADING : f.HEADING + 3])
+    chord, turn = (np.roll(of, -1, axis=0) - of for of in (fields[:, f.POSITION : f.POSITION + 3], arm))
     right, left = (np.linalg.norm(chord + side * turn, axis=1) for side in (1.0, -1.0))
-    wide[:, HALF_LENGTH] = fields[:, LENGTH] * (right - left) / (right + left)
-    wide[:, SADDLE_RIGHT] = wide[:, SADDLE_LEFT] = 0.5 * fields[:, SADDLE]
+    wide[:, f.HALF_LENGTH] = fields[:, f.LENGTH] * (right - left) / (right + left)
+    wide[:, f.SADDLE_RIGHT] = wide[:, f.SADDLE_LEFT] = 0.5 * fields[:, f.SADDLE]
     return state._replace(elements=in_lanes(wide))

@@ -14,58 +14,17 @@ from numba.extending import register_jitable
 
 from cvt_hpc.kernels import kernel
 from cvt_hpc.lanes import absolute, ahead, around, like
-from cvt_hpc.models.pushbelt.belt import (
-    DRIVEN_RADIUS,
-    DRIVING_RADIUS,
-    DRIVING_SPEED,
-    IN_DRIVEN_THRUST,
-    IN_DRIVING_SHIFT,
-    IN_DRIVING_THRUST,
-    THRUST_WORK,
-    WORK_IN,
-)
+from cvt_hpc.models.pushbelt import fields as planar
 from cvt_hpc.models.pushbelt.border import accept_border, close_border, of_pulley, set_shapes
 from cvt_hpc.models.pushbelt.friction import filtered_slip
 from cvt_hpc.models.pushbelt.stepping import Equations, advance_by
+from cvt_hpc.models.spatial_pushbelt import fields as f
 from cvt_hpc.models.spatial_pushbelt.assembly import (
     assemble_pairs,
     border_sums,
     linear_blocks,
     residuals,
     side_torque,
-)
-from cvt_hpc.models.spatial_pushbelt.belt import (
-    CHANGE,
-    DRIVEN,
-    DRIVEN_MIDDLE,
-    DRIVING_MIDDLE,
-    DRIVING_TORQUE,
-    FLANK,
-    FLANK_FRICTION_M,
-    FLANK_FRICTION_T,
-    FLANK_GAP,
-    FLANK_SLIP_M,
-    FLANK_SLIP_T,
-    HEADING,
-    IN_DRIVEN_DRIFT,
-    IN_DRIVING_DRIFT,
-    ITERATE_TENSION,
-    LENGTH,
-    OMEGA,
-    OUTWARD,
-    PIN,
-    POINTS,
-    POSITION,
-    PUSH,
-    RING_FRICTION,
-    RING_LINE,
-    RING_SLIP,
-    SADDLE,
-    SIZE,
-    SLOPE,
-    SPEED,
-    TENSION,
-    V_FILTERED,
 )
 from cvt_hpc.models.spatial_pushbelt.bending import bending_forces, predict_bending
 from cvt_hpc.models.spatial_pushbelt.chain import chain_forces, link, predict, pull_across
@@ -106,15 +65,15 @@ def _open_sheaves(belt, state, leans, step, shapes):
     """psi_k at the elements; the sheaves' leans go into the gaps."""
     modes = belt.modal_stiffness.shape[1]
     for j in range(step.rows):
-        driven = state[j, DRIVEN]
+        driven = state[j, f.DRIVEN]
         c, s = along_arc(belt, state, j)
         set_shapes(belt, c, s, shapes, j)
         lean = like(0.0, c)
         for k in range(modes):
             lean = lean + of_pulley(leans[0, k], leans[1, k], driven) * shapes[j, k]
         lean = belt.cosine * lean
-        for p in range(POINTS):
-            step[j, FLANK_GAP + p] += lean if p >= 2 else -lean
+        for p in range(f.POINTS):
+            step[j, f.FLANK_GAP + p] += lean if p >= 2 else -lean
 
 
 @kernel
@@ -220,7 +179,9 @@ def _close_two_flows(belt, state, work, dt):
 def _flank_change(kept, k, p):
     """Change of the force at a point of the flanks."""
     return np.sqrt(
-        kept[k, FLANK + p] ** 2 + kept[k, FLANK_FRICTION_M + p] ** 2 + kept[k, FLANK_FRICTION_T + p] ** 2
+        kept[k, f.FLANK + p] ** 2
+        + kept[k, f.FLANK_FRICTION_M + p] ** 2
+        + kept[k, f.FLANK_FRICTION_T + p] ** 2
     )
 
 
@@ -229,16 +190,16 @@ def _changes(kept, k):
     """Changes of contact forces, of the element behind (k = 1) only of those to the next one."""
     own = 1.0 - k
     return (
-        kept[k, PUSH],
-        kept[k, PUSH + 1],
-        kept[k, PUSH + 2],
-        kept[k, PUSH + 3],
-        kept[k, PIN],
+        kept[k, f.PUSH],
+        kept[k, f.PUSH + 1],
+        kept[k, f.PUSH + 2],
+        kept[k, f.PUSH + 3],
+        kept[k, f.PIN],
         own * _flank_change(kept, k, 0),
         own * _flank_change(kept, k, 1),
         own * _flank_change(kept, k, 2),
         own * _flank_change(kept, k, 3),
-        own * kept[k, RING_FRICTION],
+        own * kept[k, f.RING_FRICTION],
     )
 
 
@@ -248,27 +209,29 @@ def _accept_elements(belt, state, work, dt):
     elements, step, iterate = state.elements, work.step, work.iterate
     per_dt = 1.0 / dt
     for j in range(step.rows):
-        x, o = vector(elements, j, HEADING), vector(elements, j, OUTWARD)
-        outward = cross(vector(step, j, RING_LINE), cross(o, x))
+        x, o = vector(elements, j, f.HEADING), vector(elements, j, f.OUTWARD)
+        outward = cross(vector(step, j, f.RING_LINE), cross(o, x))
         pull = pull_across(step, iterate, j, outward)
-        across = per_dt * dot(outward, vector(elements, j, CHANGE))
-        elements[j, SADDLE] = absolute(belt.ring_mass * across - pull)
-        elements[j, TENSION] = iterate[j, ITERATE_TENSION]
-        elements[j, LENGTH] += dt * (elements[j, RING_SLIP] - ahead(elements, j, RING_SLIP))
-        for r in range(SIZE):
-            elements[j, SPEED + r] += elements[j, CHANGE + r]
-        store(elements, j, POSITION, moved(vector(elements, j, POSITION), dt, vector(elements, j, SPEED)))
-        omega = vector(elements, j, OMEGA)
+        across = per_dt * dot(outward, vector(elements, j, f.CHANGE))
+        elements[j, f.SADDLE] = absolute(belt.ring_mass * across - pull)
+        elements[j, f.TENSION] = iterate[j, f.ITERATE_TENSION]
+        elements[j, f.LENGTH] += dt * (elements[j, f.RING_SLIP] - ahead(elements, j, f.RING_SLIP))
+        for r in range(f.SIZE):
+            elements[j, f.SPEED + r] += elements[j, f.CHANGE + r]
+        store(
+            elements, j, f.POSITION, moved(vector(elements, j, f.POSITION), dt, vector(elements, j, f.SPEED))
+        )
+        omega = vector(elements, j, f.OMEGA)
         factors = turning(omega, dt)
         x, o = squared_up(turned(x, omega, factors), turned(o, omega, factors))
-        store(elements, j, HEADING, x)
-        store(elements, j, OUTWARD, o)
-        elements[j, SLOPE] += dt * elements[j, SPEED + 7]
-        for p in range(POINTS):
-            along, around_it = elements[j, FLANK_SLIP_M + p], elements[j, FLANK_SLIP_T + p]
-            filtered = elements[j, V_FILTERED + p]
-            filtered = filtered_slip(belt, along, around_it, elements[j, FLANK + p], filtered, dt)
-            elements[j, V_FILTERED + p] = filtered
+        store(elements, j, f.HEADING, x)
+        store(elements, j, f.OUTWARD, o)
+        elements[j, f.SLOPE] += dt * elements[j, f.SPEED + 7]
+        for p in range(f.POINTS):
+            along, around_it = elements[j, f.FLANK_SLIP_M + p], elements[j, f.FLANK_SLIP_T + p]
+            filtered = elements[j, f.V_FILTERED + p]
+            filtered = filtered_slip(belt, along, around_it, elements[j, f.FLANK + p], filtered, dt)
+            elements[j, f.V_FILTERED + p] = filtered
 
 
 @kernel
@@ -280,19 +243,19 @@ def _add_loads(belt, state, work):
     for k in range(sums):
         scratch[0, k] = 0.0
     for j in range(step.rows):
-        driven = elements[j, DRIVEN]
+        driven = elements[j, f.DRIVEN]
         driving = 1.0 - driven
-        for p in range(POINTS):
+        for p in range(f.POINTS):
             side = p // 2
-            axial = elements[j, FLANK + p] * belt.cosine + elements[j, FLANK_FRICTION_M + p] * belt.sine
+            axial = elements[j, f.FLANK + p] * belt.cosine + elements[j, f.FLANK_FRICTION_M + p] * belt.sine
             scratch[0, side] += driving * axial
             scratch[0, 2 + side] += driven * axial
         torque = side_torque(elements, step, j, 0) + side_torque(elements, step, j, 2)
-        scratch[0, DRIVING_TORQUE] += driving * torque
-        scratch[0, DRIVING_TORQUE + 1] += driven * torque
+        scratch[0, f.DRIVING_TORQUE] += driving * torque
+        scratch[0, f.DRIVING_TORQUE + 1] += driven * torque
         if modes > 0:
-            left = elements[j, FLANK] + elements[j, FLANK + 1]
-            right = elements[j, FLANK + 2] + elements[j, FLANK + 3]
+            left = elements[j, f.FLANK] + elements[j, f.FLANK + 1]
+            right = elements[j, f.FLANK + 2] + elements[j, f.FLANK + 3]
             lean = 0.5 * belt.cosine * (right - left)
             for k in range(modes):
                 scratch[0, loads.size + k] += driving * lean * work.shapes[j, k]
@@ -318,7 +281,7 @@ def _accept(belt, state, work, inputs, dt):
         target = work.scratch.data[0, loads.size + k, 0] / belt.modal_stiffness[pulley, mode]
         state.leans[pulley, mode] += follow * (target - state.leans[pulley, mode])
 
-    totals[WORK_IN] -= dt * loads[DRIVING_TORQUE] * pulleys[DRIVING_SPEED]
+    totals[planar.WORK_IN] -= dt * loads[f.DRIVING_TORQUE] * pulleys[planar.DRIVING_SPEED]
     accept_border(belt, state, inputs, dt)
     tangent = belt.sine / belt.cosine
     for pulley in range(2):
@@ -327,17 +290,18 @@ def _accept(belt, state, work, inputs, dt):
         pressed = 0.5 * ((1.0 - side) * left + (1.0 + side) * right)  # on what moves
         if pulley == 0:
             closing = dt * (
-                belt.driving_rate * (inputs[IN_DRIVING_THRUST] - pressed) + inputs[IN_DRIVING_SHIFT]
+                belt.driving_rate * (inputs[planar.IN_DRIVING_THRUST] - pressed)
+                + inputs[planar.IN_DRIVING_SHIFT]
             )
-            drift = dt * inputs[IN_DRIVING_DRIFT]
-            pulleys[DRIVING_RADIUS] += closing
-            pulleys[DRIVING_MIDDLE] += drift - side * tangent * closing
+            drift = dt * inputs[f.IN_DRIVING_DRIFT]
+            pulleys[planar.DRIVING_RADIUS] += closing
+            pulleys[f.DRIVING_MIDDLE] += drift - side * tangent * closing
         else:
-            closing = dt * belt.driven_rate * (inputs[IN_DRIVEN_THRUST] - pressed)
-            drift = dt * inputs[IN_DRIVEN_DRIFT]
-            pulleys[DRIVEN_RADIUS] += closing
-            pulleys[DRIVEN_MIDDLE] += drift - side * tangent * closing
-        totals[THRUST_WORK] += (right - left) * drift - 2.0 * tangent * pressed * closing
+            closing = dt * belt.driven_rate * (inputs[planar.IN_DRIVEN_THRUST] - pressed)
+            drift = dt * inputs[f.IN_DRIVEN_DRIFT]
+            pulleys[planar.DRIVEN_RADIUS] += closing
+            pulleys[f.DRIVEN_MIDDLE] += drift - side * tangent * closing
+        totals[planar.THRUST_WORK] += (right - left) * drift - 2.0 * tangent * pressed * closing
 
 
 @kernel
@@ -350,7 +314,7 @@ def _accept_two_flows(belt, state, work, inputs, dt):
 
 # By how many flows of ring material there are
 EQUATIONS = {
-    1: Equations(_prepare, _evaluate, _assemble, _close, _accept, _changes, CHANGE),
+    1: Equations(_prepare, _evaluate, _assemble, _close, _accept, _changes, f.CHANGE),
     2: Equations(
         _prepare_two_flows,
         _evaluate_two_flows,
@@ -358,7 +322,7 @@ EQUATIONS = {
         _close_two_flows,
         _accept_two_flows,
         _changes,
-        CHANGE,
+        f.CHANGE,
     ),
 }
 advance = partial(advance_by, EQUATIONS[1])

@@ -14,7 +14,7 @@ from cvt_hpc.models.pushbelt import run
 from cvt_hpc.models.pushbelt.run import COURSES, ElementRun
 from cvt_hpc.models.pushbelt.start import of_lanes
 from cvt_hpc.models.pushbelt.stepping import advance_by
-from cvt_hpc.models.spatial_pushbelt import belt
+from cvt_hpc.models.spatial_pushbelt import fields as f
 from cvt_hpc.models.spatial_pushbelt.belt import NEWTON, NEWTON_OF_TWO_FLOWS, workspace
 from cvt_hpc.models.spatial_pushbelt.parameters import LOOSE_SIDES, package_arm
 from cvt_hpc.models.spatial_pushbelt.readings import (
@@ -43,7 +43,7 @@ class Transient(ElementRun):
     to the right.
     """
 
-    _contacts = belt.CONTACTS
+    _contacts = f.CONTACTS
     _channels = CHANNELS
     _profiles = tuple(PROFILES)
     _directions = (*STRANDS, *LATERAL)
@@ -64,7 +64,7 @@ class Transient(ElementRun):
         )
 
     def _inputs_along(self, sample: int) -> np.ndarray:
-        still = np.zeros((2, belt.INPUTS - belt.IN_DRIVING_DRIFT))
+        still = np.zeros((2, f.INPUTS - f.IN_DRIVING_DRIFT))
         return np.column_stack([super()._inputs_along(sample), still])
 
     def _read(self) -> Reading:
@@ -77,7 +77,7 @@ class Transient(ElementRun):
     def _out_of_place(self) -> str | None:
         """As in the plane; or whether an element is so far out of it that no groove and no ring holds it."""
         elements = of_lanes(self._state.elements)
-        lateral = np.abs(elements[:, belt.POSITION + 2])
+        lateral = np.abs(elements[:, f.POSITION + 2])
         most = LARGEST_DISPLACEMENT * self.parameters["centre_distance"]
         most += 0.5 * abs(self.parameters["misalignment"])
         if (largest := lateral.max()) > most:

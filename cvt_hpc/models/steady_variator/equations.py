@@ -27,18 +27,8 @@ from typing import Any
 import numpy as np
 from scipy.sparse import csc_array, csr_array, vstack
 
-from cvt_hpc.models.elastic_belt.belt import (
-    DRIVEN_POSITION,
-    DRIVEN_SPEED,
-    FIRST_STATE,
-    N_ELEMENT,
-    V_ELEMENT,
-    V_FILTERED,
-    Belt,
-    State,
-    W,
-    initial_state,
-)
+from cvt_hpc.models.elastic_belt import fields as f
+from cvt_hpc.models.elastic_belt.belt import Belt, State, initial_state
 from cvt_hpc.models.elastic_belt.one_system import ROWS, flat_belt, rates, sizes_of_states, unpack
 from cvt_hpc.models.elastic_belt.pulleys import moving_states
 from cvt_hpc.models.elastic_belt.rhs import strains
@@ -76,7 +66,7 @@ class Equations:
         self._flat = flat_belt(self.belt, LATE)
         self._linearise = Linearisation(self._flat)
         first = initial_state(parameters, belt)
-        self._contents = first.fields[N_ELEMENT : N_ELEMENT + 2] @ belt.cell
+        self._contents = first.fields[f.N_ELEMENT : f.N_ELEMENT + 2] @ belt.cell
         n, self._memories = belt.cell.size, self._flat.remembering.size
         self._moving = moving_states(belt.pulleys)
         # the filtered speeds end here, then come the pulleys' states and four scalars
@@ -94,7 +84,7 @@ class Equations:
         last = self._flat.origin.size
         filtered = np.arange(len(ROWS) * n, len(ROWS) * n + self._memories)
         self._rates = np.concatenate([np.arange(n, 4 * n), filtered, self._loose, [last - 2, last - 1]])
-        self._held_speed = first.scalars[DRIVEN_SPEED] if np.isinf(belt.driven_inertia) else None
+        self._held_speed = first.scalars[f.DRIVEN_SPEED] if np.isinf(belt.driven_inertia) else None
         self._out = np.empty(last)
 
     def under(self, **changes: Any) -> None:
@@ -107,11 +97,11 @@ class Equations:
         n = self.belt.cell.size
         eps = np.empty((2, n))
         strains(self.belt, state.fields, eps)
-        fluxes = (state.fields[V_ELEMENT : V_ELEMENT + 2] / (1.0 + np.roll(eps, 1, axis=1))).mean(axis=1)
-        filtered = state.fields[V_FILTERED, self._flat.remembering]
-        states = state.scalars[FIRST_STATE + self._moving]
-        pulley = state.scalars[[DRIVEN_SPEED, DRIVEN_POSITION]]
-        return np.concatenate([state.fields[W], *eps, filtered, states, fluxes, pulley])
+        fluxes = (state.fields[f.V_ELEMENT : f.V_ELEMENT + 2] / (1.0 + np.roll(eps, 1, axis=1))).mean(axis=1)
+        filtered = state.fields[f.V_FILTERED, self._flat.remembering]
+        states = state.scalars[f.FIRST_STATE + self._moving]
+        pulley = state.scalars[[f.DRIVEN_SPEED, f.DRIVEN_POSITION]]
+        return np.concatenate([state.fields[f.W], *eps, filtered, states, fluxes, pulley])
 
     def state(self, x: np.ndarray) -> State:
         """State of the belt; a copy, its time after any start-up."""
@@ -127,7 +117,7 @@ class Equations:
         flat = self._flat
         if not rates(flat, 0.0, y, self._out):
             return None
-        contents = flat.state.fields[N_ELEMENT : N_ELEMENT + 2] @ self.belt.cell
+        contents = flat.state.fields[f.N_ELEMENT : f.N_ELEMENT + 2] @ self.belt.cell
         left = np.concatenate([self._out[self._rates], contents - self._contents])
         if self._held_speed is not None:
             left[MOMENT] = x[SPEED] - self._held_speed

@@ -9,6 +9,7 @@ from typing import TYPE_CHECKING, Any, NamedTuple
 
 import numpy as np
 
+from cvt_hpc.models.elastic_belt import fields as f
 from cvt_hpc.models.elastic_belt.along_belt import (
     ELSEWHERE,
     SLIDING,
@@ -17,18 +18,8 @@ from cvt_hpc.models.elastic_belt.along_belt import (
     elsewhere,
     wrap_angles,
 )
-from cvt_hpc.models.elastic_belt.belt import (
-    DRIVEN_POSITION,
-    DRIVEN_SPEED,
-    FIRST_STATE,
-    REGIONS,
-    V_ELEMENT,
-    V_RING,
-    Mesh,
-    W,
-)
+from cvt_hpc.models.elastic_belt.belt import REGIONS, Mesh
 from cvt_hpc.models.elastic_belt.column import pressed_strains
-from cvt_hpc.models.elastic_belt.pulleys import EXCESS
 from cvt_hpc.models.elastic_belt.rhs import contact_forces, fresh_contacts, strains
 from cvt_hpc.models.steady_variator.sampled import sampled, sampled_profiles
 from cvt_hpc.models.steady_variator.walking import Steady
@@ -71,7 +62,7 @@ class Distributions(NamedTuple):
 
 def driving_speed(steady: Steady) -> float:
     """Speed of the driving pulley [rad/s], which follows where a drive with inertia turns it."""
-    return float(steady.belt.driving_speed + steady.state.scalars[FIRST_STATE + EXCESS])
+    return float(steady.belt.driving_speed + steady.state.scalars[f.FIRST_STATE + f.EXCESS])
 
 
 def distributions(steady: Steady) -> Distributions:
@@ -82,17 +73,17 @@ def distributions(steady: Steady) -> Distributions:
     contact_forces(belt, steady.state, fresh_contacts(belt), force)
     strains(belt, fields, eps)
     driven = np.arange(n) >= belt.driven_start
-    radius = np.where(driven, belt.driven_radius, belt.driving_radius) + fields[W]
-    turning = np.where(driven, steady.state.scalars[DRIVEN_SPEED], driving_speed(steady))
-    sliding = np.where(belt.arc_share > 0.0, fields[V_ELEMENT] - turning * radius, 0.0)
+    radius = np.where(driven, belt.driven_radius, belt.driving_radius) + fields[f.W]
+    turning = np.where(driven, steady.state.scalars[f.DRIVEN_SPEED], driving_speed(steady))
+    sliding = np.where(belt.arc_share > 0.0, fields[f.V_ELEMENT] - turning * radius, 0.0)
     return Distributions(
         belt.ring_stiffness * eps[1],
         np.maximum(-belt.element_stiffness * pressed_strains(belt, fields, eps[0]), 0.0),
         force,
-        fields[V_ELEMENT].copy(),
-        fields[V_RING].copy(),
+        fields[f.V_ELEMENT].copy(),
+        fields[f.V_RING].copy(),
         sliding,
-        fields[W].copy(),
+        fields[f.W].copy(),
     )
 
 
@@ -111,7 +102,7 @@ def layer_loss(steady: Steady) -> float:
     belt, fields = steady.belt, steady.state.fields
     eps = np.empty((2, belt.cell.size))
     strains(belt, fields, eps)
-    opening, stretching = (np.roll(v, -1) - v for v in fields[V_ELEMENT : V_RING + 1])
+    opening, stretching = (np.roll(v, -1) - v for v in fields[f.V_ELEMENT : f.V_RING + 1])
     elastic = -belt.element_stiffness * pressed_strains(belt, fields, eps[0])
     pushed = np.maximum(elastic - belt.element_damping * opening / belt.cell, 0.0)
     rings = belt.ring_damping * stretching**2 / belt.cell
@@ -144,8 +135,8 @@ def quantities(steady: Steady, grid: Mesh) -> dict[str, Any]:
         **against_slip(steady.load, carried),
         "open_share": opened,
         "thrust_ratio": axial[0] / axial[1],
-        "speed_loss": 1.0 - belt.ratio * steady.state.scalars[DRIVEN_SPEED] / driving_speed(steady),
-        "driven_position": steady.state.scalars[DRIVEN_POSITION],
+        "speed_loss": 1.0 - belt.ratio * steady.state.scalars[f.DRIVEN_SPEED] / driving_speed(steady),
+        "driven_position": steady.state.scalars[f.DRIVEN_POSITION],
         "flank_loss": flanks,
         "ring_loss": seen["ring_loss"],
         "belt_loss": seen["belt_loss"],

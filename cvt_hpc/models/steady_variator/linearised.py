@@ -13,14 +13,7 @@ import numpy as np
 from scipy.sparse import csc_array, csr_array
 
 from cvt_hpc.kernels import kernel
-from cvt_hpc.models.elastic_belt.belt import (
-    DRIVEN_POSITION,
-    DRIVEN_SPEED,
-    FIELDS,
-    FIRST_STATE,
-    V_FILTERED,
-    W,
-)
+from cvt_hpc.models.elastic_belt import fields as f
 from cvt_hpc.models.elastic_belt.one_system import (
     ROWS,
     SIZE_OF_POSITION,
@@ -33,18 +26,17 @@ from cvt_hpc.models.elastic_belt.one_system import (
     rates_under_forces,
     set_inlets,
 )
-from cvt_hpc.models.elastic_belt.pulleys import DRIVEN_COS, DRIVING_COS, EXCESS, SHIFT
-from cvt_hpc.physics.compliance import CLOSED
+from cvt_hpc.physics import compliance
 from cvt_hpc.physics.sheaves import flexibility
 
 REACH = 2  # stations to either side that a rate knows of
 STRIDE = 2 * REACH + 1
-FORCE = MOMENT = len(FIELDS)  # beside the fields: among the acting quantities, and among those acted on
+FORCE = MOMENT = len(f.FIELDS)  # beside the fields: among the acting quantities, and among those acted on
 SIZE_OF_FORCE = 1e5  # [N/m]
 # Relative to the sizes, for central differences: the third derivative's part is 1e-12 of a slope, round-off
 # 1e-10 of the steepest slopes.
 INCREMENT = 1e-6
-INCREMENTS = INCREMENT * np.array([*(SIZES[row] for row in range(len(FIELDS))), SIZE_OF_FORCE])
+INCREMENTS = INCREMENT * np.array([*(SIZES[row] for row in range(len(f.FIELDS))), SIZE_OF_FORCE])
 SIZES_OF_PULL = np.array([100.0, 100.0, *[1e4] * 6])  # of `pulled_by` [N m], [N]
 
 
@@ -85,7 +77,7 @@ def local_slopes(flat: FlatBelt, increments: np.ndarray, near: np.ndarray, turni
                     k = (j + d - REACH) % n
                     for o in range(8):
                         near[o, i, j, d] = (ahead[o, k] - behind[o, k]) / (2.0 * increments[i])
-    slopes_with_scalar(flat, DRIVEN_SPEED, SIZE_OF_SPEED, turning)
+    slopes_with_scalar(flat, f.DRIVEN_SPEED, SIZE_OF_SPEED, turning)
 
 
 @kernel
@@ -122,7 +114,7 @@ def pulley_slopes(flat: FlatBelt, pull: np.ndarray, sizes: np.ndarray) -> np.nda
         increment = INCREMENT * sizes[k]
         for sign in (1.0, -1.0):
             moved = pull.copy()
-            place = DRIVEN_SPEED if k == 8 else DRIVEN_POSITION if k == 9 else FIRST_STATE + k - 10
+            place = f.DRIVEN_SPEED if k == 8 else f.DRIVEN_POSITION if k == 9 else f.FIRST_STATE + k - 10
             unmoved = scalars[place]
             if k < 8:
                 moved[k] += sign * increment
@@ -149,10 +141,10 @@ class Linearisation:
             first + np.arange(sheave.weight.size)
             for first, sheave in ((0, belt.driving), (belt.driven_start, belt.driven))
         ]
-        place = np.full((len(FIELDS) + 1, n), -1)
+        place = np.full((len(f.FIELDS) + 1, n), -1)
         for k, row in enumerate(ROWS):
             place[row] = k * n + np.arange(n)
-        place[V_FILTERED, flat.remembering] = len(ROWS) * n + np.arange(flat.remembering.size)
+        place[f.V_FILTERED, flat.remembering] = len(ROWS) * n + np.arange(flat.remembering.size)
         unknown = place.copy()
         unknown[FORCE, np.concatenate(self._arcs)] = self._count + np.arange(sum(map(len, self._arcs)))
         o, i, j, d = np.indices((8, 8, n, STRIDE))
@@ -160,7 +152,7 @@ class Linearisation:
         place[MOMENT] = self._count - 2
         if flat.loose.size:  # torque taken from the driving pulley, and put into the driven one
             place[MOMENT] = self._count + (np.arange(n) >= belt.driven_start)
-        place[W] = -1
+        place[f.W] = -1
         rows, columns = place[o, (j + d - REACH) % n], unknown[i, j]
         self._known = (rows >= 0) & (columns >= 0)
         self._rows, self._columns = rows[self._known], columns[self._known]
@@ -199,13 +191,13 @@ class Linearisation:
         """Jacobian where pulleys have states of their own."""
         belt, count, n = flat.belt, self._count, flat.belt.cell.size
         excess = np.zeros((8, n))
-        slopes_with_scalar(flat, FIRST_STATE + EXCESS, SIZE_OF_SPEED, excess)
+        slopes_with_scalar(flat, f.FIRST_STATE + f.EXCESS, SIZE_OF_SPEED, excess)
         width, stations = count + sum(map(len, self._arcs)), np.arange(n)
         entries = [
             (self._near[self._known], self._rows, self._columns),
             (np.ones(n), stations, n + stations),  # w' = u
         ]
-        for slopes, column in ((self._turning, count - 2), (excess, self._loose[EXCESS])):
+        for slopes, column in ((self._turning, count - 2), (excess, self._loose[f.EXCESS])):
             rows = self._turned_rows
             entries.append((slopes[self._turned], rows, np.full(rows.size, column)))
         values, rows, columns = map(np.concatenate, zip(*entries, strict=True))
@@ -234,7 +226,7 @@ class Linearisation:
         wedge = 2.0 * np.tan(flat.belt.half_wedge_angle)
         wraps = zip(self._arcs, self._flexibility, flat.contacts, strict=True)
         for wrap, (arc, matrix, contact) in enumerate(wraps):
-            closed = np.flatnonzero(contact.stations[:, CLOSED])
+            closed = np.flatnonzero(contact.stations[:, compliance.CLOSED])
             stiffness = np.linalg.inv(matrix[np.ix_(closed, closed)])
             rows, columns = np.meshgrid(first + closed, arc[closed], indexing="ij")
             entries.append((-wedge * stiffness.ravel(), rows.ravel(), columns.ravel()))
@@ -252,8 +244,8 @@ class Linearisation:
     ) -> list[tuple[np.ndarray, np.ndarray, np.ndarray]]:
         """Slopes of a wrap's forces with the states that open its groove: shift and tilts."""
         sheave = flat.belt.driven if wrap else flat.belt.driving
-        tilted = self._loose[DRIVEN_COS if wrap else DRIVING_COS]
-        openings = [(np.ones(closed.size), self._loose[SHIFT])] if wrap == 0 else []
+        tilted = self._loose[f.DRIVEN_COS if wrap else f.DRIVING_COS]
+        openings = [(np.ones(closed.size), self._loose[f.SHIFT])] if wrap == 0 else []
         openings += [(sheave.tilt[k, closed], tilted + k) for k in range(2)]
         return [
             (-stiffness @ opening, first + closed, np.full(closed.size, column))

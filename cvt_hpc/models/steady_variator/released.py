@@ -13,17 +13,10 @@ from typing import Any
 import numpy as np
 from scipy.sparse import csc_array
 
-from cvt_hpc.models.elastic_belt.belt import FIRST_STATE, Belt, State
+from cvt_hpc.models.elastic_belt import fields as f
+from cvt_hpc.models.elastic_belt.belt import Belt, State
 from cvt_hpc.models.elastic_belt.one_system import pulled_by
 from cvt_hpc.models.elastic_belt.pulley_settings import DRIVEN_INERTIA, PULLEY_DEFAULTS, are_free
-from cvt_hpc.models.elastic_belt.pulleys import (
-    DRIVEN_COS,
-    DRIVEN_TILT,
-    DRIVING_COS,
-    DRIVING_TILT,
-    RATIO_RATE,
-    RATIO_SUM,
-)
 from cvt_hpc.models.elastic_belt.rhs import contact_forces, fresh_contacts
 from cvt_hpc.models.steady_variator.equations import Equations
 from cvt_hpc.variator.measures import measures
@@ -77,11 +70,11 @@ def nearest(whole: Belt, free: Belt, state: State) -> State:
     found, force = state.copy(), np.zeros(whole.cell.size)
     contact_forces(whole, state, fresh_contacts(whole), force)
     pull, laws = pulled_by(whole, force, np.zeros_like(force)), free.pulleys.laws[0]
-    for wrap, (tilted, give) in enumerate(((DRIVING_COS, DRIVING_TILT), (DRIVEN_COS, DRIVEN_TILT))):
-        place = FIRST_STATE + tilted
+    for wrap, (tilted, give) in enumerate(((f.DRIVING_COS, f.DRIVING_TILT), (f.DRIVEN_COS, f.DRIVEN_TILT))):
+        place = f.FIRST_STATE + tilted
         found.scalars[place : place + 2] = laws[give] * pull[4 + 2 * wrap : 6 + 2 * wrap]
-    if laws[RATIO_RATE] > 0.0:
-        found.scalars[FIRST_STATE + RATIO_SUM] = pull[2]  # the thrust that the held sheave needs
+    if laws[f.RATIO_RATE] > 0.0:
+        found.scalars[f.FIRST_STATE + f.RATIO_SUM] = pull[2]  # the thrust that the held sheave needs
     return found
 
 

@@ -13,7 +13,8 @@ from typing import Any
 
 import numpy as np
 
-from cvt_hpc.models.elastic_belt.belt import W, initial_state
+from cvt_hpc.models.elastic_belt import fields as f
+from cvt_hpc.models.elastic_belt.belt import initial_state
 from cvt_hpc.models.elastic_belt.rhs import contact_forces, fresh_contacts
 from cvt_hpc.models.elastic_belt.sampling import Outcome
 from cvt_hpc.models.elastic_belt.state_march import StateMarch
@@ -74,7 +75,7 @@ def settled(parameters: Mapping[str, Any], equations: Equations, tolerance: floa
         state = run.state()
         contact_forces(belt, state, fresh_contacts(belt), force)
         # as far out as flanks of the belt's own stiffness carry the same force
-        state.fields[W] += force * pressed_in
+        state.fields[f.W] += force * pressed_in
         found = newton(equations, equations.unknowns(state), tolerance)
         if found is not None:
             return found

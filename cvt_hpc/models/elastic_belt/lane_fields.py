@@ -1,0 +1,163 @@
+"""Layouts of the elastic belt's arrays of lanes: constants, scalars, stations and cells, by name."""
+
+from cvt_hpc.models.elastic_belt import fields as f
+
+# Constants of each lane, in SI units; names that are not in `Belt` are explained where they are computed
+# below.
+CONSTANTS = (
+    "element_stiffness",
+    "ring_stiffness",
+    "element_damping",
+    "ring_damping",
+    "element_mass",
+    "ring_mass",
+    "ring_relief",
+    "mass",
+    "belt_speed",
+    "transverse_damping",
+    "bending_stiffness",
+    "ring_offset",
+    "ring_friction",
+    "ring_friction_speed",
+    "friction_speed",
+    "kinetic_friction",
+    "friction_gradient",
+    "law_speed",
+    "sine",
+    "cosine",
+    "wedge",
+    "forget",
+    "driving_carry",
+    "driven_carry",
+    "driving_radius",
+    "driven_radius",
+    "driving_speed",
+    "driving_position",
+    "driven_inertia",
+    "axial_damping",
+    "thrust",
+    "ratio",
+    "load",
+    "load_start",
+    "start_share",
+    "driving_cell",
+    "driven_cell",
+    "column_stiffness",
+    "outer_edge",
+    "inner_edge",
+    *f.LAWS,
+)
+FIRST_LAW = len(CONSTANTS) - len(f.LAWS)
+(
+    ELEMENT_STIFFNESS,
+    RING_STIFFNESS,
+    ELEMENT_DAMPING,
+    RING_DAMPING,
+    ELEMENT_MASS,
+    RING_MASS,
+    RING_RELIEF,
+    MASS,
+    BELT_SPEED,
+    TRANSVERSE_DAMPING,
+    BENDING_STIFFNESS,
+    RING_OFFSET,
+    RING_FRICTION,
+    RING_FRICTION_SPEED,
+    FRICTION_SPEED,
+    KINETIC_FRICTION,
+    FRICTION_GRADIENT,
+    LAW_SPEED,
+    SINE,
+    COSINE,
+    WEDGE,
+    FORGET,
+    DRIVING_CARRY,
+    DRIVEN_CARRY,
+    DRIVING_RADIUS,
+    DRIVEN_RADIUS,
+    DRIVING_SPEED,
+    DRIVING_POSITION,
+    DRIVEN_INERTIA,
+    AXIAL_DAMPING,
+    THRUST,
+    RATIO,
+    LOAD,
+    LOAD_START,
+    START_SHARE,
+    DRIVING_CELL,
+    DRIVEN_CELL,
+    COLUMN_STIFFNESS,
+    OUTER_EDGE,
+    INNER_EDGE,
+) = range(FIRST_LAW)
+
+# Scalars of the state, of each lane, double in any precision: the driven pulley's two, the work of the
+# layers' dampers until it is read [J], how often friction was found to reverse sliding in a step, and
+# from FIRST_STATE on the further states of free pulleys.
+LANE_SCALARS = ("driven_speed", "driven_position", "layer_work", "repeats", *f.STATES)
+SPEED, POSITION, LAYER_WORK, REPEATS = range(f.FIRST_STATE)
+
+# Of the column, in `LaneState.column`: of the stations the deviation of curvature from the path's [1/m], its
+# change within a step, and the moment [N m]; of the cells -P / EA, its slopes with the strain and with the
+# curvature at both ends [m], its change within a step by turning, the moments of both halves times their
+# content [N m^2], and the energy per content [N].
+COLUMN = (
+    "deviation",
+    "turning",
+    "column_moment",
+    "pressed",
+    "give",
+    "turn_near",
+    "turn_far",
+    "shift",
+    "bearing_near",
+    "bearing_far",
+    "column_energy",
+)
+(
+    DEVIATION,
+    TURNING,
+    COLUMN_MOMENT,
+    PRESSED,
+    GIVE,
+    TURN_NEAR,
+    TURN_FAR,
+    SHIFT,
+    BEARING_NEAR,
+    BEARING_FAR,
+    COLUMN_ENERGY,
+) = range(len(COLUMN))
+
+# Of a state, by `derive`: axial line force; the cells' strains, 1 / (1 + strain) and 1 / content. By
+# `lane_sliding`: sliding speeds, the law's coefficient, tanh of sliding speed over regularisation, 1 / that
+# speed, the same tanh of rings, the elements' sliding speed under them.
+FORCE, EPS_0, EPS_1, SHORT_0, SHORT_1, PER_CONTENT_0, PER_CONTENT_1 = range(7)
+SLIDING_R, SLIDING_T, COEFFICIENT, FACTOR, PER_SPEED, RING_FACTOR, SADDLE = range(7, 14)
+# By `note_speeds` in the last two steps before a sample: u, v_element and v_ring two steps ago, less twice
+# those one step ago.
+NOTED = 14
+FIELDS_OF_FORCES = 17
+
+# fields of ImexWork.stations, after those of `lane_forces`
+PUSH, LAG, SLOPE, FLANK, FLANK_SLOPE, FLANK_CROSS = range(FIELDS_OF_FORCES, 23)
+REVERSING, RING_REVERSING, MEETING, AHEAD = range(23, 27)
+D_00, D_01, D_11, Y_0, Y_1 = range(27, 32)
+I_00, I_01, I_11, DV_0, DV_1, G_00, G_01, G_10, G_11, LINK_0, LINK_1 = range(32, 43)
+FIELDS_OF_WORK = 43
+
+# Constants of each lane; from FIRST_OFFSET on the layers' offsets, then by arc and surface the factors of the
+# layer above it and of the one below.
+(
+    LAYER_MASS,
+    LAYER_STIFFNESS,
+    LAYER_DAMPING,
+    LAYER_RELIEF,
+    STATIC_EXCESS,
+    PER_STRIBECK,
+    PER_WIDTH,
+    SADDLE_FRICTION_LEVEL,
+    LAYER_FRICTION_LEVEL,
+    STRESS_RATE,
+    DAMPING_RATE,
+    FIRST_OFFSET,
+) = range(12)
