@@ -145,7 +145,7 @@ def run(
         "part": part,
         "fresh": fresh,
         "run_limit": run_limit,
-        "retry": [status.name for status in retry],
+        "retry": [int(status) for status in retry],
         "refine": refine,
     }
 

@@ -298,7 +298,7 @@ def _add_to_border(belt, sums, row, slopes, by_opening, driven, shapes, blocks, 
         sums[0, first + 2 + m] += (1.0 - driven) * by_opening * shapes[j, m]
         sums[0, first + 2 + modes + m] += driven * by_opening * shapes[j, m]
     for column in range(width):
-        at = RIGHT + f.UNKNOWNS + f.ROW_Y * column
+        at = RIGHT + f.UNKNOWNS * column
         sums[0, first + column] -= a * blocks[j, at] + b * blocks[j, at + 1] + c * blocks[j, at + 2]
 
 
