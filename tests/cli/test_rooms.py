@@ -126,7 +126,7 @@ def test_no_circle_of_imports():
     assert [circle for circle in circles if circle] == []
 
 
-MOST_CONSTANTS = 7  # of a module that an import takes by name; of layouts of arrays the module itself is imported
+MOST_CONSTANTS = 7  # of a module that an import takes by name; a layout of arrays is imported as a whole
 
 
 def test_layouts_of_arrays_are_modules_and_not_lists_of_names():
