@@ -89,7 +89,7 @@ def test_a_batch_that_ends_before_the_first_record_leaves_no_file(tmp_path):
             os.kill(os.getpid(), signal.SIGTERM)
             raise self.Interrupted(interrupt())
 
-    assert run(JOB, tmp_path, simulator=Stopped(), progress=False).stopped == "SIGTERM"
+    assert run(JOB, tmp_path, simulator=Stopped(), progress=False, raises=False).stopped == "SIGTERM"
     assert list((tmp_path / "records").iterdir()) == []
 
 
@@ -262,7 +262,7 @@ def test_a_retry_that_goes_on_does_not_begin_again(tmp_path):
     slow = {"from": 10, "pause": 300.0}
     again = {"retry": [Status.TIMED_OUT], "run_limit": 0.02}
     sweep(tmp_path, slow=slow, run_limit=0.02)
-    report = run(JOB, tmp_path, simulator=Ended(slow), progress=False, **again)
+    report = run(JOB, tmp_path, simulator=Ended(slow), progress=False, raises=False, **again)
     assert (report.remaining, report.stopped) == (1, "SIGTERM")
     sweep(tmp_path, **again)
     records = recorded(tmp_path)
