@@ -155,7 +155,17 @@ def test_the_wheel_brings_its_revision_and_the_same_examples(tmp_path):
     )
     (wheel,) = tmp_path.glob("*.whl")
     subprocess.run(
-        [*pip, "install", *offline, "--no-compile", "--prefix", tmp_path / "own", wheel], check=True
+        [
+            *pip,
+            "install",
+            *offline,
+            "--no-compile",
+            "--ignore-installed",
+            "--prefix",
+            tmp_path / "own",
+            wheel,
+        ],
+        check=True,
     )
     (package,) = (tmp_path / "own").glob("lib*/python*/site-packages")
     program = (

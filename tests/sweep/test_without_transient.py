@@ -82,5 +82,5 @@ def test_the_command_line(tmp_path, capsys, monkeypatch):
     capsys.readouterr()
     assert main(["simulate", "x.toml", "--at", "radial_speed=0.1", "--out", "x.nc", "--plot", "x.png"]) == 0
     printed = capsys.readouterr().out
-    assert "growth_rate" in printed and "picture: none, the run has no history" in printed
+    assert "growth rate " in printed and "picture: none, the run has no history" in printed
     assert (tmp_path / "x.nc").exists()

@@ -54,6 +54,8 @@ ABSENT = (
     "ring_damping",
     "local_length",
     "disturbance",
+    "start_damping",
+    "most_step_ripple",
     "seed",
     "modal_peaks",
     "profile_duration",
