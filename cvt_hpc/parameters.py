@@ -113,8 +113,6 @@ class Parameter:
         `inf` is a legal value (rigid sheaves).
     choices : tuple of str
         The legal texts of a str parameter.
-    compared_only : bool
-        Values other than the default are for `cvt-hpc chart` alone, which shows their errors.
     gives : Substitute or None
         Another parameter that is derived if the job gives this one instead; a job that gives both is refused.
         Runs know it only where the other one follows from it: where the job gives it, or where the job gives
@@ -137,7 +135,6 @@ class Parameter:
     exclusive: bool = False
     allow_infinite: bool = False
     choices: tuple[str, ...] = ()
-    compared_only: bool = False
     gives: Substitute | None = None
     sensible: tuple[float, float] | None = None
     file: FromFile | None = None

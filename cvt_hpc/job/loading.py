@@ -63,9 +63,7 @@ def load_job(path: str | Path, overrides: Assignments = ()) -> Job:
     InputError
         If anything is wrong with the file or an override.
     """
-    job = build_job(read_document(Path(path)), str(path), overrides)
-    refuse_what_is_compared_only(job)
-    return job
+    return build_job(read_document(Path(path)), str(path), overrides)
 
 
 def build_job(
@@ -276,20 +274,6 @@ def _settled(rules: Sequence[Rule], axes: tuple[Axis, ...]) -> set[str]:
     """Return the keys linked to a former axis that an override set; each then has one given value."""
     swept = {axis.name for axis in axes}
     return {rule.key for rule in rules if isinstance(rule.source, Link) and rule.source.axis not in swept}
-
-
-def refuse_what_is_compared_only(job: Job) -> None:
-    """Raise InputError if a job of runs has a value that is there for `cvt-hpc chart` to compare."""
-    varied: dict[str, Axis | Derived] = {axis.name: axis for axis in job.axes}
-    varied |= {derived.name: derived for derived in job.derived}
-    for key, parameter in job.schema.parameters.items():
-        if not parameter.compared_only:
-            continue
-        values = varied[key].values if key in varied else (job.parameters[key],)
-        if others := [value for value in values if value != parameter.default]:
-            where = f"{job.source}: [{job.schema.section_of[key]}] {key}"
-            expected = f"{show(parameter.default)} in a job of runs; `cvt-hpc chart` compares other values"
-            raise mismatch(where, expected, show(others[0]))
 
 
 def read_name(head: Mapping[str, Any], source: str) -> str:

@@ -10,7 +10,6 @@ from cvt_hpc.errors import mismatch, show
 from cvt_hpc.job import Job, build_job
 from cvt_hpc.job.assignments import Assignments, split_assignments, structured
 from cvt_hpc.job.document import read_document
-from cvt_hpc.job.loading import refuse_what_is_compared_only
 from cvt_hpc.job.tables import read_set, read_table
 from cvt_hpc.ladder.pushbelt import PUSHBELT
 from cvt_hpc.ladder.rungs import BESIDE, MODEL, NONE, Rung, ladder
@@ -70,5 +69,4 @@ def load_ladder(path: str | Path, overrides: Assignments = ()) -> Ladder:
     if settings and reference != PUSHBELT:
         raise mismatch(f"{where} set", f'reference = "{PUSHBELT}", for which it is', show(reference))
     job = build_job(document, source, replaced, "--set")
-    refuse_what_is_compared_only(job)
     return Ladder(job, *ladder(job, settings if reference == PUSHBELT else None, beside))

@@ -76,8 +76,6 @@ class Contact(NamedTuple):
         sqrt(h) [m^(1/2)] where the sheaves have a matrix of flexibilities, else empty.
     matrix : (m, 2 m) or (0, 0) LaneArray or array
         That matrix and its factor, as in `closed_set`; else empty.
-    sweeps : int
-        Sweeps of projected Gauss-Seidel instead (`lane_gauss_seidel`); 0: none, the exact solution.
     discs : MovingDiscs
         Modes with inertia; without any, as in plain numbers, discs follow at once.
     has_clearance : bool
@@ -92,12 +90,11 @@ class Contact(NamedTuple):
     fresh: np.ndarray
     root: np.ndarray
     matrix: Any
-    sweeps: int
     discs: MovingDiscs
     has_clearance: bool
 
 
-def lane_contact(wraps: list[Sheaves], dtype: DTypeLike, sweeps: int = 0) -> Contact:
+def lane_contact(wraps: list[Sheaves], dtype: DTypeLike) -> Contact:
     """All stations closed, for wraps of the same stations, one for each lane.
 
     Parameters
@@ -106,8 +103,6 @@ def lane_contact(wraps: list[Sheaves], dtype: DTypeLike, sweeps: int = 0) -> Con
         One for each lane.
     dtype : type
         np.float64 or np.float32.
-    sweeps : int
-        As in `Contact`.
     """
     weight = wraps[0].weight
     stations = LaneArray(weight.size, 10, len(wraps), dtype)
@@ -142,7 +137,7 @@ def lane_contact(wraps: list[Sheaves], dtype: DTypeLike, sweeps: int = 0) -> Con
     discs = lane_discs([wrap.modes for wrap in wraps], [disc_factor(wrap) for wrap in wraps], dtype)
     has_clearance = any(wrap.clearance > 0.0 for wrap in wraps)
     return Contact(
-        *shared, stations, scalars, fresh, root.astype(dtype), matrix, sweeps, discs, has_clearance
+        *shared, stations, scalars, fresh, root.astype(dtype), matrix, discs, has_clearance
     )
 
 

@@ -163,15 +163,6 @@ def test_another_model_is_handed_what_follows():
     assert frequencies.point(5) == job("strand").point(5)
 
 
-def test_a_value_for_comparisons_alone_is_refused_from_a_formula(tmp_path):
-    path = tmp_path / "x.toml"
-    head = 'name = "x"\nmodel = "elastic_belt"\n[axes]\nseed = [0, 4]\n[derived]\n'
-    for formula in ("2 * 4", "2 * seed"):
-        path.write_text(f'{head}contact_sweeps = "{formula}"\n')
-        with pytest.raises(InputError, match="contact_sweeps: expected 0 in a job of runs; .* found 8"):
-            load_job(path)
-
-
 def test_what_gives_no_share_of_a_load_is_without_effect():
     found = job()
     inert = without_effect(found.schema, found.parameters, found.axes, found.rules)

@@ -130,8 +130,7 @@ class Batch:
             starts = [with_layers(*each) for each in zip(starts, self.belts, rings, strict=True)]
             self._work_space = partial(ring_work, belts=self.belts, rings=rings)
             self._march = march_rings
-        self._sweeps = p["contact_sweeps"] if stepper == "imex" else 0
-        self.state = lane_state(self.belts, starts, self.dtype, self._sweeps)
+        self.state = lane_state(self.belts, starts, self.dtype)
         self._belt = lane_belt(self.belts, self.dtype)
         self.work = self._work_space(self.state)
         derive(self._belt, self.state, self.work.stations)
@@ -238,7 +237,7 @@ class Batch:
         self._go_on_after([np.broadcast_to(run.rows, (run.done, self.rows.data.shape[1])) for run in runs])
         states = [run.state for run in runs]
         states += [states[-1].copy() for _ in self.belts[len(runs) :]]
-        self.state = lane_state(self.belts, states, self.dtype, self._sweeps)
+        self.state = lane_state(self.belts, states, self.dtype)
         self.work = self._work_space(self.state)
         derive(self._belt, self.state, self.work.stations)
         self.begun = self.ended.data[0, ENDED_AT] = runs[0].time

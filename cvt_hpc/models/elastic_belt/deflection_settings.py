@@ -170,8 +170,6 @@ def deflection_problems(parameters: Mapping[str, Any]) -> list[tuple[str, str, s
     kind = p["sheave_deformation"]
     if kind == "bending":
         return []
-    if p.get("contact_sweeps", 0) > 0:
-        return [("contact_sweeps", f"0 with sheave_deformation {kind}", f"{p['contact_sweeps']}")]
     if kind == "ritz":
         return _ritz_problems(p)
     path = variator(p["ratio"], p["driven_radius"], p["centre_distance"])
@@ -191,7 +189,7 @@ def deflection_problems(parameters: Mapping[str, Any]) -> list[tuple[str, str, s
 
 def _ritz_problems(parameters: Mapping[str, Any]) -> list[tuple[str, str, str]]:
     p = parameters
-    if "contact_sweeps" not in p:
+    if "step_error" not in p:  # a key of imex alone
         return [("sheave_deformation", "bending, cone or flexibilities but by the stepper imex", "ritz")]
     problems = []
     for pulley in PULLEYS:

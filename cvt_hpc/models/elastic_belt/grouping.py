@@ -43,7 +43,6 @@ SHARED = (
     "step",
     "precision",
     "lanes",
-    "contact_sweeps",
     "sheave_deformation",
     "ring_layers",
     "curvature_terms",

@@ -43,13 +43,5 @@ PARAMETERS = {
             choices=("double", "single"),
         ),
         "lanes": LANES,
-        "contact_sweeps": Parameter(
-            0,
-            "",
-            "sweeps of projected Gauss-Seidel in each step's contact, for comparison; 0: solved exactly",
-            minimum=0,
-            maximum=10_000,
-            compared_only=True,
-        ),
     }
 }

@@ -210,7 +210,7 @@ def _carry(belt: Belt, spacing: float) -> float:
     return np.exp(-spacing / way) / (-np.expm1(-spacing / way) * memory)
 
 
-def lane_state(belts: list[Belt], states: list[State], dtype: type, sweeps: int = 0) -> LaneState:
+def lane_state(belts: list[Belt], states: list[State], dtype: type) -> LaneState:
     """State of several runs on the same mesh, with fresh contacts.
 
     Parameters
@@ -219,8 +219,6 @@ def lane_state(belts: list[Belt], states: list[State], dtype: type, sweeps: int 
         One for each lane, all at the same time.
     dtype : type
         np.float64 or np.float32.
-    sweeps : int
-        Of the contact, as `Contact` has them.
     """
     n, lanes = belts[0].cell.size, len(belts)
     fields = LaneArray(n, states[0].fields.shape[0], lanes, dtype)
@@ -228,7 +226,7 @@ def lane_state(belts: list[Belt], states: list[State], dtype: type, sweeps: int 
     for lane, (belt, state) in enumerate(zip(belts, states, strict=True)):
         put_lane(fields.data, scalars.data, lane, belt, state)
     wraps = [[belt.driving for belt in belts], [belt.driven for belt in belts]]
-    contacts = (lane_contact(wraps[0], dtype, sweeps), lane_contact(wraps[1], dtype, sweeps))
+    contacts = (lane_contact(wraps[0], dtype), lane_contact(wraps[1], dtype))
     settle_discs(contacts, belts, states)
     column = LaneArray(n if belts[0].has_column else 0, len(lf.COLUMN), lanes, dtype)
     return LaneState(fields, scalars, np.array([states[0].scalars[0]]), contacts, column)

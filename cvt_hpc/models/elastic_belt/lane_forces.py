@@ -33,7 +33,6 @@ from cvt_hpc.physics.compliance import contact_force, solve_contact
 from cvt_hpc.physics.flank import flank_sliding, tangential_sliding
 from cvt_hpc.physics.friction import formula_coefficient, law_numbers, saturation, table_coefficient
 from cvt_hpc.physics.friction_laws import Law
-from cvt_hpc.physics.lane_gauss_seidel import sweep_lane_contact
 from cvt_hpc.physics.moving_discs import open_gaps, turn_discs
 from cvt_hpc.variator.course import faded_damping, load_course, speed_course
 
@@ -262,10 +261,7 @@ def lane_contact_forces(belt: LaneBelt, state: LaneState, stations: LaneArray) -
                 pushed[k, compliance.GAP] = pushed[k, compliance.GAP] + tilt
         if contact.discs.place.size > 0:
             open_gaps(contact.discs, pushed, compliance.GAP)
-        if contact.sweeps > 0:
-            sweep_lane_contact(contact)
-        else:
-            solve_contact(contact, MOST_CONTACT_ROUNDS)
+        solve_contact(contact, MOST_CONTACT_ROUNDS)
         row, part = first % n, first // n
         for k in range(contact.weight.size):
             force = contact_force(pushed, k)

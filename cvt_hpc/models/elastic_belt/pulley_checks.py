@@ -55,12 +55,7 @@ def pulley_problems(parameters: Mapping[str, Any]) -> list[Problem]:
     """Problems of the pulleys' freedom, in the form of a model's check."""
     p = PULLEY_DEFAULTS | dict(parameters)
     found = _piston_problems(p) + _drive_problems(p)
-    if p["tilt_lag"] == 0.0:
-        for key in ("collar_clearance", "bearing_clearance"):
-            if p[key] > 0.0 and p.get("contact_sweeps", 0) > 0:
-                expected = f"0 with {key} and no tilt_lag"
-                found.append(("contact_sweeps", expected, f"{p['contact_sweeps']}"))
-    elif p["tilt_lag"] < (least := least_tilt_lag(p)):
+    if 0.0 < p["tilt_lag"] < (least := least_tilt_lag(p)):
         expected = f"0, or {least:.2g} s and more at this step: tilting is explicit"
         found.append(("tilt_lag", expected, f"{p['tilt_lag']:g} s"))
     found += _bearing_problems(p) + _controller_problems(p)
