@@ -21,7 +21,7 @@ from cvt_hpc.job.assignments import (
 from cvt_hpc.job.axes import Axis, read_axis
 from cvt_hpc.job.crosscheck import check_grid, check_rules
 from cvt_hpc.job.csv_files import read_csv
-from cvt_hpc.job.definition import HEADER, Derived, Job
+from cvt_hpc.job.definition import HEADER, Job
 from cvt_hpc.job.derivation import ordered_rules, overridden, read_derived, read_linked, relinked
 from cvt_hpc.job.design import Design, read_design, resolve_spacing
 from cvt_hpc.job.document import read_document

@@ -136,9 +136,7 @@ def lane_contact(wraps: list[Sheaves], dtype: DTypeLike) -> Contact:
     shared = (weight.astype(dtype), wraps[0].tilt[0].astype(dtype), wraps[0].tilt[1].astype(dtype))
     discs = lane_discs([wrap.modes for wrap in wraps], [disc_factor(wrap) for wrap in wraps], dtype)
     has_clearance = any(wrap.clearance > 0.0 for wrap in wraps)
-    return Contact(
-        *shared, stations, scalars, fresh, root.astype(dtype), matrix, discs, has_clearance
-    )
+    return Contact(*shared, stations, scalars, fresh, root.astype(dtype), matrix, discs, has_clearance)
 
 
 def plain_contact(wrap: Sheaves) -> Contact:
