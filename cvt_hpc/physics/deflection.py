@@ -15,7 +15,7 @@ ROUND_OFF = 1e-6  # of the largest entry: asymmetry left by tables of six digits
 
 
 def cone_flexibilities(
-    stations: int, spacing: float, radius: float, stiffness: float, shift: float = 0.0
+    angle: np.ndarray, distance: np.ndarray, stiffness: float, shift: float = 0.0
 ) -> np.ndarray:
     """Flexibilities of a cone that tilts as a whole, the "sinus approach" (Bullinger et al. 2005, fig. 10).
 
@@ -25,12 +25,8 @@ def cone_flexibilities(
 
     Parameters
     ----------
-    stations : int
-        Their number m.
-    spacing : float
-        Their distance along the arc [m].
-    radius : float
-        Pitch radius r [m].
+    angle, distance : (m,) arrays
+        Place of the stations about the axis, from the middle of the arc [rad], and r [m].
     stiffness : float
         Of the cone against tilting, in series with that of its collar [N m/rad]; inf: rigid.
     shift : float
@@ -41,8 +37,7 @@ def cone_flexibilities(
     (m, m) array
         w [m/N], of rank two.
     """
-    phi = (np.arange(stations) - 0.5 * (stations - 1)) * spacing / radius
-    levers = np.array([radius * np.cos(phi) - shift, radius * np.sin(phi)])
+    levers = np.array([distance * np.cos(angle) - shift, distance * np.sin(angle)])
     return levers.T @ levers / stiffness
 
 
@@ -63,19 +58,17 @@ def table_matrix(angles: Sequence[float], table: Sequence[Sequence[float]]) -> n
     return values[0][np.abs(apart[:, None] - apart)]
 
 
-def interpolated(
-    angles: Sequence[float], table: Sequence[Sequence[float]], stations: int, spacing: float, radius: float
-) -> np.ndarray:
+def interpolated(angles: Sequence[float], table: Sequence[Sequence[float]], places: np.ndarray) -> np.ndarray:
     """Flexibilities of a wrap from a table: forces go to the knots beside them, openings come from there.
 
     So w stays symmetric and positive semi-definite on any mesh. Where knots are stations it is the table's.
+    Beyond the first and the last angle these hold. `places` (m,) are the stations' angles from the inlet.
 
     Returns
     -------
     (m, m) array
         w [m/N].
     """
-    places = np.arange(stations) * spacing / radius
     shares = np.array([np.interp(places, angles, unit) for unit in np.eye(len(angles))])
     found = shares.T @ table_matrix(angles, table) @ shares
     return 0.5 * (found + found.T)

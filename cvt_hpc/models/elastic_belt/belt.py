@@ -28,18 +28,24 @@ from cvt_hpc.physics.sheaves import (
     sheaves,
     stiffness_factors,
 )
-from cvt_hpc.variator import LARGEST_DISPLACEMENT
+from cvt_hpc.variator import LARGEST_DISPLACEMENT, PULLEYS
 from cvt_hpc.variator.measures import Measures, measures, rounded
 from cvt_hpc.vibration.ramped import ramped
 
 REGIONS = ("driving arc", "t1", "driven arc", "t2")
 MODES = 5  # half waves along a strand that are resolved
+# Share of a strand beyond a tangent point where the groove is tested for contact, which ends long before
+REACH = 0.1
 
 
 class Belt(NamedTuple):
     """Everything the kernels need, in SI units; N stations around the belt.
 
     Arrays of cells and stations have shape (N,), `per_...` being reciprocals, the span that of two cells;
+    `touches` is 1 where a groove may hold a station, else 0, and `on_driven` 1 from the middle of t1 to that
+    of t2; there the pulley's radial unit vector has the parts `lean` along the path, `lean_rate` less per
+    displacement [1/m], and `upright` across it, and `rise` is the path's distance from the axis beyond the
+    pitch radius (`zones`); `driving_stations` and `driven_stations` (m,) are those that each groove may hold;
     `bending` is (N, 5): force per length on station j from the displacements of stations j-2 .. j+2,
     `bending_load` that without displacement; `squared_curvature` is kappa^2 at the stations where curvature
     terms count, else 0, and `curvature_terms` the place among those in CURVATURE_TERMS;
@@ -59,7 +65,14 @@ class Belt(NamedTuple):
     per_span: np.ndarray
     curvature: np.ndarray
     arc_curvature: np.ndarray
-    arc_share: np.ndarray
+    touches: np.ndarray
+    on_driven: np.ndarray
+    rise: np.ndarray
+    lean: np.ndarray
+    lean_rate: np.ndarray
+    upright: np.ndarray
+    driving_stations: np.ndarray
+    driven_stations: np.ndarray
     bending: np.ndarray
     bending_load: np.ndarray
     squared_curvature: np.ndarray
@@ -89,7 +102,6 @@ class Belt(NamedTuple):
     half_wedge_angle: float
     driving: Sheaves
     driven: Sheaves
-    driven_start: int
     driving_radius: float
     driven_radius: float
     driving_speed: float
@@ -144,6 +156,48 @@ class Mesh(NamedTuple):
         """Region of each cell, 0..3 in the order of REGIONS, (N,)."""
         return np.repeat(np.arange(4), self.counts)
 
+    @property
+    def curvature(self) -> np.ndarray:
+        """Curvature of the path in the cells [1/m], (N,)."""
+        return np.array([1.0 / self.path.driving_radius, 0.0, 1.0 / self.path.driven_radius, 0.0])[
+            self.region
+        ]
+
+    def zone(self, region: int, reach: float = REACH) -> Zone:
+        """Stations that the groove of an arc may hold: the arc's, and those of `reach` of both strands.
+
+        On a strand, x beyond the tangent point, the pulley's axis is at the distance rho = hypot(x, R + w),
+        and its radial unit vector has the angle atan(x / (R + w)) to the path's normal. To the first order in
+        w / R that is rho = rho_0 + w R / rho_0, and x / rho_0 (1 - w R / rho_0^2) along the path.
+        """
+        n, first, count = self.cell.size, self.starts[region], self.counts[region]
+        radius = self.path.driving_radius if region == 0 else self.path.driven_radius
+        more = [max(round(reach * self.counts[strand]), 1) for strand in ((region + 3) % 4, (region + 1) % 4)]
+        stations = np.arange(first - more[0], first + count + more[1] + 1) % n
+        along = np.insert(np.cumsum(self.cell[stations[:-1]]), 0, 0.0)
+        along -= along[more[0]]  # [m] from the inlet
+        on_arc = np.clip(along, 0.0, along[more[0] + count])
+        x = along - on_arc
+        return Zone(stations, on_arc / radius + np.arctan2(x, radius), x, np.hypot(x, radius) - radius)
+
+
+class Zone(NamedTuple):
+    """Stations that one groove may hold, m of them, and their place about its axis.
+
+    Attributes
+    ----------
+    stations : (m,) int array
+        In the direction of travel.
+    angle, beyond, rise : (m,) arrays
+        Angle from the inlet's tangent point [rad], way beyond the tangent points (negative before the inlet,
+        0 on the arc) and distance from the axis beyond the pitch radius [m].
+    """
+
+    stations: np.ndarray
+    angle: np.ndarray
+    beyond: np.ndarray
+    rise: np.ndarray
+
 
 def mesh(parameters: Mapping[str, Any]) -> Mesh:
     """Cut the path into `stations` cells, equal within a region and nearly equal over all.
@@ -156,7 +210,7 @@ def mesh(parameters: Mapping[str, Any]) -> Mesh:
     Returns
     -------
     Mesh
-        With faces on the ends of the arcs, so that no cell is half in contact.
+        With faces on the ends of the arcs.
     """
     path = variator(parameters["ratio"], parameters["driven_radius"], parameters["centre_distance"])
     total = parameters["stations"]
@@ -182,16 +236,28 @@ def belt_constants(parameters: Mapping[str, Any]) -> Belt:
     p, grid = BENDING_DEFAULTS | dict(parameters), mesh(parameters)
     path, cell = grid.path, grid.cell
     dual = 0.5 * (cell + np.roll(cell, 1))
-    kappa = np.array([1.0 / path.driving_radius, 0.0, 1.0 / path.driven_radius, 0.0])[grid.region]
-    arc_share = 0.5 * (cell * (kappa > 0) + np.roll(cell * (kappa > 0), 1)) / dual
+    kappa, radii = grid.curvature, (path.driving_radius, path.driven_radius)
+    zones = grid.zone(0), grid.zone(2)
+    middles = [grid.starts[strand] + grid.counts[strand] // 2 for strand in (1, 3)]
+    stations = np.arange(cell.size)
+    beyond = {name: np.zeros(cell.size) for name in ("touches", "rise", "lean", "lean_rate")}
+    beyond["upright"] = np.ones(cell.size)
+    for zone, radius in zip(zones, radii, strict=True):
+        rho = radius + zone.rise
+        beyond["touches"][zone.stations] = 1.0
+        beyond["rise"][zone.stations] = zone.rise
+        beyond["lean"][zone.stations] = zone.beyond / rho
+        beyond["lean_rate"][zone.stations] = zone.beyond * radius / rho**3
+        beyond["upright"][zone.stations] = radius / rho
     ring_mass = p["ring_mass"] * 0.5 * _pair(cell * (1.0 + kappa * p["ring_offset"])) / dual
     belt_speed = p["driving_speed"] * path.driving_radius
     whole, disc = stiffness_factors(p)
     size = measures(p)
     wraps = [
         sheaves(
-            cell[grid.starts[region]],
-            grid.counts[region] + 1,
+            dual[zone.stations],
+            zone.angle,
+            zone.rise,
             radius,
             whole,
             p["tilt_stiffness"] * p["tilt_factor"],
@@ -200,18 +266,15 @@ def belt_constants(parameters: Mapping[str, Any]) -> Belt:
             axial_element_stiffness(p),
             disc,
         )
-        for region, radius in ((0, path.driving_radius), (2, path.driven_radius))
+        for zone, radius in zip(zones, radii, strict=True)
     ]
     line_forces = rounded(size.force / size.length)
+    turned = path.driving_wrap, path.driven_wrap
     wraps = [
-        wrap._replace(
-            line_forces=line_forces, **disc_settings(p, pulley, (wrap.weight.size, wrap.weight[1], radius))
-        )
-        for pulley, wrap, radius in zip(
-            ("driving", "driven"), wraps, (path.driving_radius, path.driven_radius), strict=True
-        )
+        wrap._replace(line_forces=line_forces, **disc_settings(p, pulley, wrap, radius, angle))
+        for pulley, wrap, radius, angle in zip(PULLEYS, wraps, radii, turned, strict=True)
     ]
-    wraps, freedom = with_pulleys(p, wraps, (path.driving_radius, path.driven_radius))
+    wraps, freedom = with_pulleys(p, wraps, radii)
     law = given_law(p)
     quantity, terms = ramped(p), CURVATURE_TERMS.index(p["curvature_terms"])
     computed = dict(
@@ -222,7 +285,10 @@ def belt_constants(parameters: Mapping[str, Any]) -> Belt:
         per_span=0.5 / dual,
         curvature=kappa,
         arc_curvature=np.maximum(kappa, np.roll(kappa, 1)),
-        arc_share=arc_share,
+        **beyond,
+        on_driven=((stations >= middles[0]) & (stations < middles[1])).astype(float),
+        driving_stations=zones[0].stations,
+        driven_stations=zones[1].stations,
         bending=bending_bands(cell, dual, p["bending_stiffness"], kappa, terms),
         bending_load=bending_load(cell, dual, p["bending_stiffness"], kappa, terms),
         squared_curvature=squared_curvature(cell, dual, kappa) * (terms > 0),
@@ -241,7 +307,6 @@ def belt_constants(parameters: Mapping[str, Any]) -> Belt:
         driving=wraps[0],
         driven=wraps[1],
         pulleys=freedom,
-        driven_start=grid.starts[2],
         driving_radius=path.driving_radius,
         driven_radius=path.driven_radius,
         axial_damping=p["sheave_lag"] * p["lag_stiffness"],
@@ -284,14 +349,15 @@ def initial_state(parameters: Mapping[str, Any], belt: Belt) -> State:
         (0, belt.driving, belt.driving_radius, f.DRIVING_COS),
         (2, belt.driven, belt.driven_radius, f.DRIVEN_COS),
     ):
-        stations = slice(grid.starts[region], grid.starts[region] + sheave.weight.size)
-        force = np.full(sheave.weight.size, pull / (2.0 * tangent * radius))
+        on_arc = sheave.rise == 0.0
+        stations = slice(grid.starts[region], grid.starts[region] + grid.counts[region] + 1)
+        force = np.where(on_arc, pull / (2.0 * tangent * radius), 0.0)
         tilting = sheave.tilt @ (sheave.weight * force)
         tilt = settled_tilt(belt.pulleys, tilted, tilting)
         states[tilted : tilted + 2] = tilt
         tilt = tilt + sheave.clearance * tilting / np.linalg.norm(tilting)
-        w[stations] = -(flexibility(sheave) @ force + tilt @ sheave.tilt) / (2.0 * tangent)
-        arcs.append((stations, sheave.weight, radius))
+        w[stations] = -(flexibility(sheave) @ force + tilt @ sheave.tilt)[on_arc] / (2.0 * tangent)
+        arcs.append((stations, sheave.weight[on_arc], radius))
     w[arcs[0][0]] -= p["driving_position"] / (2.0 * tangent)
     # the belt keeps its length: it moves inward at the driving and outward at the driven pulley
     sunk = sum((weight * w[stations]).sum() / radius for stations, weight, radius in arcs)

@@ -150,12 +150,11 @@ def steadiness(parameters: Mapping[str, Any]) -> float:
 
 def _lifting(m: dict[str, np.ndarray], grid: Mesh, p: Mapping[str, Any]) -> np.ndarray:
     """Power of the cells' mean stresses in the mean transverse motion [W], (N,)."""
-    path, speed = grid.path, p["driving_speed"] * grid.path.driving_radius
-    curvature = np.array([1.0 / path.driving_radius, 0.0, 1.0 / path.driven_radius, 0.0])[grid.region]
+    speed = p["driving_speed"] * grid.path.driving_radius
     net = m["ring_tension"] - m["push_force"] - (p["element_mass"] + p["ring_mass"]) * speed**2
     u = m["transverse_speed"]
     turning = _step(m["mean_displacement"]) * _step(u) / grid.cell
-    return net * (grid.cell * curvature * (u + 0.5 * _step(u)) + turning)
+    return net * (grid.cell * grid.curvature * (u + 0.5 * _step(u)) + turning)
 
 
 def at_stations(values: np.ndarray) -> np.ndarray:
@@ -171,8 +170,8 @@ def _step(values: np.ndarray) -> np.ndarray:
 def part_shares(grid: Mesh) -> np.ndarray:
     """Share of each station's contact that lies in each part of the arcs, (2, ARC_PARTS, N).
 
-    On an arc they add up to 1: a station's contact reaches over half of both cells beside it, as far as the
-    arc goes.
+    They add up to 1 where a groove may hold a station: its contact reaches over half of both cells beside it,
+    and beyond an arc's end it counts to the part there.
 
     Parameters
     ----------
@@ -185,5 +184,8 @@ def part_shares(grid: Mesh) -> np.ndarray:
         first, count = grid.starts[region], grid.counts[region]
         edges = np.clip((np.arange(count + 2) - 0.5) / count, 0.0, 1.0)
         inside = np.diff(np.clip(edges, borders[:-1, None], borders[1:, None]), axis=1)
+        beyond = grid.zone(region).beyond
+        shares[pulley, 0, grid.zone(region).stations[beyond < 0.0]] = 1.0
+        shares[pulley, -1, grid.zone(region).stations[beyond > 0.0]] = 1.0
         shares[pulley, :, first : first + count + 1] = inside / np.diff(edges)
     return shares

@@ -19,7 +19,7 @@ c dt / h about 5, and the transverse contact and bending.
 from __future__ import annotations
 
 from cvt_hpc.kernels import kernel
-from cvt_hpc.lanes import anywhere, around, behind, decay, fma, from_ahead, like, minimum, select
+from cvt_hpc.lanes import anywhere, around, behind, fma, from_ahead, like, minimum, select
 from cvt_hpc.models.elastic_belt import fields as f
 from cvt_hpc.models.elastic_belt import lane_fields as lf
 from cvt_hpc.models.elastic_belt.imex_stations import ImexWork, assemble
@@ -28,16 +28,17 @@ from cvt_hpc.models.elastic_belt.lane_belt import LaneBelt, LaneState
 from cvt_hpc.models.elastic_belt.lane_column import foresee_column, lane_column
 from cvt_hpc.models.elastic_belt.lane_forces import (
     advance_discs,
-    arc_sliding,
     cell_strains,
-    lane_carry,
+    groove_sliding,
     lane_contact_forces,
     lane_pulleys,
     lane_sliding,
     lane_speed_share,
     pressed_strain,
+    remembered,
 )
 from cvt_hpc.models.elastic_belt.pulley_step import advance_pulleys
+from cvt_hpc.physics.flank import flank_sliding
 
 # One, unless friction turns sliding about or elements meet; then each closes the cells beside the last ones,
 # and a push goes through c dt / h of them in a step.
@@ -98,7 +99,7 @@ def advance_belt(belt: LaneBelt, state: LaneState, work: ImexWork, step: float):
     n, fields, stations, c = state.fields.rows, state.fields, work.stations, belt.constants
     per_cosine = 1.0 / c[0, lf.COSINE]
     speed_share = lane_speed_share(belt, state.time[0], c[0, lf.BELT_SPEED])
-    belt_speed, forget, offset = speed_share * c[0, lf.BELT_SPEED], c[0, lf.FORGET], c[0, lf.RING_OFFSET]
+    belt_speed, offset = speed_share * c[0, lf.BELT_SPEED], c[0, lf.RING_OFFSET]
     stiffness, damper_0, damper_1 = (
         c[0, lf.ELEMENT_STIFFNESS],
         c[0, lf.ELEMENT_DAMPING],
@@ -110,14 +111,7 @@ def advance_belt(belt: LaneBelt, state: LaneState, work: ImexWork, step: float):
         c[0, lf.DRIVING_RADIUS],
     )
     pulleys = lane_pulleys(belt, speed_share, state.scalars)
-    zero, moment, taken = like(0.0, forget), like(0.0, driven_speed), like(0.0, driven_speed)
-    carries = (
-        lane_carry(belt, lf.DRIVING_CELL, lf.DRIVING_CARRY, belt_speed),
-        lane_carry(belt, lf.DRIVEN_CELL, lf.DRIVEN_CARRY, belt_speed),
-    )
-    rates = carries[0] + forget, carries[1] + forget
-    per_rates = 1.0 / rates[0], 1.0 / rates[1]
-    kept = decay(rates[0] * step), decay(rates[1] * step)
+    zero, moment, taken = like(0.0, offset), like(0.0, driven_speed), like(0.0, driven_speed)
     last_filtered = behind(fields, 0, f.V_FILTERED)
     # at the station ahead of a cell: speeds, increments, fluxes of content less the belt speed, displacement
     v0_b, dv0_b, v1_b, dv1_b = (
@@ -159,31 +153,30 @@ def advance_belt(belt: LaneBelt, state: LaneState, work: ImexWork, step: float):
         fields[j, f.N_ELEMENT], fields[j, f.N_RING] = more_0, more_1
         v0_b, dv0_b, flux0_b, v1_b, dv1_b, flux1_b = v0, dv0, flux_0, v1, dv1, flux_1
 
-        share, du, w = belt.arc_share[j], stations[j, lf.PUSH], fields[j, f.W]
-        if anywhere(share > 0.0):
+        touches, du, w = belt.touches[j], stations[j, lf.PUSH], fields[j, f.W]
+        if anywhere(touches > 0.0):
             du = fma(-stations[j, lf.LAG], dv0, du)
         u = fields[j, f.U] + du
-        if anywhere(share > 0.0):
+        if anywhere(touches > 0.0):
             is_driven = belt.on_driven[j] > 0.5
             if belt.is_free or anywhere(is_driven):
                 slopes = fma(stations[j, lf.FLANK_SLOPE], dv0, stations[j, lf.FLANK_CROSS] * du)
-                here = select(is_driven, radius, driving_radius)
-                tangential = (stations[j, lf.FLANK] - slopes) * (belt.dual[j] * (here + w))
+                distance = select(is_driven, radius, driving_radius) + fma(belt.upright[j], w, belt.rise[j])
+                tangential = (stations[j, lf.FLANK] - slopes) * (belt.dual[j] * distance)
+                # where no groove can hold the belt the values are of an earlier step
+                tangential = select(touches > 0.0, tangential, zero)
                 moment = moment - like(select(is_driven, tangential, zero), moment)
                 if belt.is_free:
-                    # beside an arc the values are of an earlier step
-                    tangential = select(share > 0.0, tangential, zero)
                     taken = taken + like(select(is_driven, zero, tangential), taken)
             if belt.memory:
-                v_radial = fma(belt_speed + new_0, stations[j, lf.SLOPE], u)
-                speed, along = arc_sliding(belt, j, pulleys, per_cosine, v_radial, new_0, w)
+                v_across = fma(belt_speed + new_0, stations[j, lf.SLOPE], u)
+                v_radial, along = groove_sliding(belt, j, pulleys, belt_speed, v_across, new_0, w)
+                speed, _ = flank_sliding(v_radial, along, per_cosine)
                 before = fields[j - 1, f.V_FILTERED] if j > 0 else last_filtered
-                target = fma(select(is_driven, carries[1], carries[0]), before, forget * speed)
-                target = target * select(is_driven, per_rates[1], per_rates[0])
-                keep = select(is_driven, kept[1], kept[0])
-                filtered = fma(fields[j, f.V_FILTERED] - target, keep, target)
-                filtered = select(belt.enters[j] > 0.5, speed, filtered)
-                fields[j, f.V_FILTERED] = select(share > 0.0, filtered, 0.0)
+                old, way = fields[j, f.V_FILTERED], stations[j, lf.WAY]
+                filtered = remembered(belt, j, way, belt_speed, step, speed, old, before)
+                filtered = select(stations[j, lf.FORCE] > 0.0, filtered, speed)
+                fields[j, f.V_FILTERED] = select(touches > 0.0, filtered, 0.0)
         w = fma(step, u, w)
         fields[j, f.U], fields[j, f.W] = u, w
         cell_strains(belt, stations, j, w, w_b, more_0, more_1, offset)

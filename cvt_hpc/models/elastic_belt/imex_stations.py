@@ -30,6 +30,7 @@ from cvt_hpc.models.elastic_belt.lane_forces import (
     lane_damping,
     lane_speed_share,
     lane_transverse,
+    leaning,
     pressed_behind,
     pressed_strain,
     ring_grip,
@@ -42,7 +43,7 @@ class ImexWork(NamedTuple):
 
     Attributes
     ----------
-    stations : (N, 43) LaneArray
+    stations : (N, 44) LaneArray
         The fields of `lane_forces`. Of the step: pending increment of u, its sensitivity to v_element's,
         slope w_s, of the driven pulley's stations, of free pulleys of both, the flanks' tangential force and
         its slopes, whether (1)
@@ -109,7 +110,7 @@ def assemble(belt: LaneBelt, state: LaneState, work: ImexWork, step: float, agai
     last_push, last = zero, (zero, zero, zero, zero)
     first, second_push = last, zero
     for j in range(n):
-        share = belt.arc_share[j]
+        touches = belt.touches[j]
         dual, per_left, span = belt.dual[j], behind(belt.per_cell, j, 0), belt.per_span[j]
         u, v0, v1 = fields[j, f.U], fields[j, f.V_ELEMENT], fields[j, f.V_RING]
         ring_left, ring_right = (
@@ -129,8 +130,8 @@ def assemble(belt: LaneBelt, state: LaneState, work: ImexWork, step: float, agai
         if belt.is_curved:
             transverse += across_by_curvature(belt, state, j, bending, belt_speed, masses)
         full_speed = belt_speed + v0
-        v_radial = fma(full_speed, slope, u)
-        outward = -damping * v_radial
+        v_across = fma(full_speed, slope, u)
+        outward = -damping * v_across
         longer = fma(offset, belt.ring_curvature[j], 1.0)
         ring_here = ring_mass * longer
         element, ring, coupling = element_rate, ring_here * per_step, zero
@@ -138,16 +139,14 @@ def assemble(belt: LaneBelt, state: LaneState, work: ImexWork, step: float, agai
         along_ring = -(belt_speed + v1) * ((v1 - behind(fields, j, f.V_RING)) * per_left) * ring_here
         along_element = fma(-acceleration, element_mass, along_element)
         along_ring = fma(-acceleration, ring_here, along_ring)
-        radial_mass, cross = base_mass, zero
-        if anywhere(share > 0.0):
+        radial_mass, cross, push_along = base_mass, zero, zero
+        if anywhere(touches > 0.0):
             lever = fma(offset, belt.arc_curvature[j], 1.0)
             v_tangential, coefficient = stations[j, lf.SLIDING_T], stations[j, lf.COEFFICIENT]
             per_speed, factor = stations[j, lf.PER_SPEED], stations[j, lf.FACTOR]
-            ring_factor, meridian, force = (
-                stations[j, lf.RING_FACTOR],
-                v_radial * per_cosine,
-                stations[j, lf.FORCE],
-            )
+            ring_factor, force = stations[j, lf.RING_FACTOR], stations[j, lf.FORCE]
+            meridian = stations[j, lf.SLIDING_R] * per_cosine
+            upright, lean = belt.upright[j], leaning(belt, j, fields[j, f.W])
 
             grip = ring_grip(belt, j, ring_left, ring_right, ring_relief * longer, ring_friction)
             drag = grip * ring_factor
@@ -161,8 +160,8 @@ def assemble(belt: LaneBelt, state: LaneState, work: ImexWork, step: float, agai
             climb, run = meridian * per_speed, v_tangential * per_speed
             axial_share, radial_share = flank_shares(mu, climb, sine, cosine)
             per_normal, per_stiff = reciprocals(axial_share, fma(2.0, stiff, 12.0 * ring))
-            twice_normal = (2.0 * share) * force * per_normal
-            outward += twice_normal * radial_share
+            twice_normal = select(touches > 0.0, 2.0 * force * per_normal, zero)
+            radial = twice_normal * radial_share
             friction = twice_normal * mu
             tangential = -friction * run
             across = friction * per_speed
@@ -170,18 +169,26 @@ def assemble(belt: LaneBelt, state: LaneState, work: ImexWork, step: float, agai
             along = twice_normal * coefficient * (fma(-factor, factor, 1.0) * per_width)
             along, across = implicit_shares(select(thrown, across, along), across, element_rate)
             excess = along - across
-            radial_mass = fma(fma(excess, climb * climb, across), per_cosine * per_cosine, radial_mass)
-            cross = excess * climb * run * per_cosine
-            flank_slope = fma(excess, run * run, across)
+            # slopes with radial and tangential sliding, turned into those across and along the path
+            radial_slope = fma(excess, climb * climb, across) * (per_cosine * per_cosine)
+            mixed, slope_along = excess * climb * run * per_cosine, fma(excess, run * run, across)
+            turned, square = upright * lean, fma(upright, upright, -lean * lean)
+            difference = radial_slope - slope_along
+            radial_mass += fma(lean * lean, -difference, fma(-2.0 * turned, mixed, radial_slope))
+            cross = fma(turned, difference, square * mixed)
+            flank_slope = fma(lean * lean, difference, fma(2.0 * turned, mixed, slope_along))
+            outward = fma(upright, radial, fma(-lean, tangential, outward))
+            push_along = fma(lean, radial, upright * tangential)
             stiff *= fma(stiff, per_stiff, 0.5)
-            along_element += fma(-lever, drag, tangential)
+            along_element += fma(-lever, drag, push_along)
             along_ring += drag
             element += fma(lever * lever, stiff, flank_slope)
             ring += stiff
             coupling = -lever * stiff
             if belt.is_free or anywhere(belt.on_driven[j] > 0.5):
-                stations[j, lf.FLANK], stations[j, lf.FLANK_SLOPE] = tangential, flank_slope
-                stations[j, lf.FLANK_CROSS] = cross
+                stations[j, lf.FLANK] = tangential
+                stations[j, lf.FLANK_SLOPE] = fma(upright, slope_along, lean * mixed)
+                stations[j, lf.FLANK_CROSS] = fma(upright, mixed, -lean * slope_along)
         along_element = fma(outward, slope, along_element)
         mobility = 1.0 / radial_mass
         push, lag = (transverse + outward) * mobility, cross * mobility
@@ -190,7 +197,7 @@ def assemble(belt: LaneBelt, state: LaneState, work: ImexWork, step: float, agai
             turning = belt.ring_curvature[j] * fma(0.5, push, u)
             along_element = fma(-turning * element_mass, full_speed, along_element)
             along_ring = fma(-turning * ring_mass, belt_speed + v1, along_ring)
-        if anywhere(share > 0.0):
+        if anywhere(touches > 0.0):
             stations[j, lf.LAG], stations[j, lf.SLOPE], stations[j, lf.D_01] = lag, slope, dual * coupling
         stations[j, lf.D_00], stations[j, lf.D_11] = dual * fma(-cross, lag, element), dual * ring
         stations[j, lf.Y_1] = dual * along_ring

@@ -34,7 +34,8 @@ class LaneBelt(NamedTuple):
 
     Attributes
     ----------
-    cell, dual, per_cell, per_dual, per_span, curvature, arc_curvature, arc_share : (N,) arrays
+    cell, dual, per_cell, per_dual, per_span, curvature, arc_curvature, touches, on_driven,
+    rise, lean, lean_rate, upright : (N,) arrays
         As in `Belt`.
     ring_curvature : (N,) array
         Curvature of both neighbouring cells, weighted by length [1/m]: a station's ring mass is
@@ -43,12 +44,10 @@ class LaneBelt(NamedTuple):
         As in `Belt`, for a bending stiffness of 1 N m^2.
     bending_load, squared_curvature : (N,) arrays
         As in `Belt`, the load for a bending stiffness of 1 N m^2.
-    on_driven, enters : (N,) arrays
-        Whether (1) a station lies on the driven half, from `driven_start` on, and is the first of an arc.
     constants : (1, 62) LaneArray
         CONSTANTS.
-    driven_start : int
-        First station of the driven arc.
+    places : two pairs of (m,) int arrays
+        Row and part of the stations that the driving and the driven groove may hold.
     memory : bool
         Whether friction has a memory.
     law : FrictionLaw
@@ -72,15 +71,18 @@ class LaneBelt(NamedTuple):
     per_span: np.ndarray
     curvature: np.ndarray
     arc_curvature: np.ndarray
-    arc_share: np.ndarray
+    touches: np.ndarray
+    on_driven: np.ndarray
+    rise: np.ndarray
+    lean: np.ndarray
+    lean_rate: np.ndarray
+    upright: np.ndarray
     ring_curvature: np.ndarray
     bending: np.ndarray
     bending_load: np.ndarray
     squared_curvature: np.ndarray
-    on_driven: np.ndarray
-    enters: np.ndarray
     constants: LaneArray
-    driven_start: int
+    places: tuple[tuple[np.ndarray, np.ndarray], tuple[np.ndarray, np.ndarray]]
     memory: bool
     law: FrictionLaw
     rise_time: float
@@ -134,7 +136,6 @@ def lane_belt(belts: list[Belt], dtype: DTypeLike) -> LaneBelt:
     for lane, belt in enumerate(belts):
         constants.data[0, :, lane] = _constants_of(belt)
     cell, dual, kappa = first.cell, first.dual, first.curvature
-    stations = np.arange(cell.size)
     law = first.law
     tables = (law.table_force.astype(dtype), law.table_speed.astype(dtype), law.table_mu.astype(dtype))
     shared = {
@@ -145,18 +146,19 @@ def lane_belt(belts: list[Belt], dtype: DTypeLike) -> LaneBelt:
         "per_span": first.per_span,
         "curvature": kappa,
         "arc_curvature": first.arc_curvature,
-        "arc_share": first.arc_share,
+        **{
+            name: getattr(first, name)
+            for name in ("touches", "on_driven", "rise", "lean", "lean_rate", "upright")
+        },
         "ring_curvature": _ring_curvature(first),
         "bending": bending_bands(cell, dual, 1.0, kappa, first.curvature_terms),
         "bending_load": bending_load(cell, dual, 1.0, kappa, first.curvature_terms),
         "squared_curvature": first.squared_curvature,
-        "on_driven": stations >= first.driven_start,
-        "enters": (stations == 0) | (stations == first.driven_start),
     }
     return LaneBelt(
         **{name: array.astype(dtype) for name, array in shared.items()},
         constants=constants,
-        driven_start=first.driven_start,
+        places=_places(first.driving_stations, first.driven_stations, cell.size),
         memory=first.friction_memory > 0.0,
         law=FrictionLaw(law.kind, 0.0, 0.0, 0.0, *tables),
         rise_time=first.rise_time,
@@ -169,6 +171,11 @@ def lane_belt(belts: list[Belt], dtype: DTypeLike) -> LaneBelt:
         is_curved=first.curvature_terms > 0,
         has_column=first.has_column,
     )
+
+
+def _places(driving: np.ndarray, driven: np.ndarray, rows: int) -> Any:
+    """Row and part of each groove's stations, in parts of so many rows."""
+    return (driving % rows, driving // rows), (driven % rows, driven // rows)
 
 
 def _ring_curvature(belt: Belt) -> np.ndarray:
@@ -190,10 +197,10 @@ def _constants_of(belt: Belt) -> list[float]:
         "wedge": 2.0 * np.tan(angle),
         "forget": 1.0 / memory if memory else 0.0,
         "driving_carry": _carry(belt, belt.cell[0]),
-        "driven_carry": _carry(belt, belt.cell[belt.driven_start]),
+        "driven_carry": _carry(belt, belt.cell[belt.driven_stations[belt.driven_stations.size // 2]]),
         "start_share": belt.speed_start / belt.driving_speed,
         "driving_cell": belt.cell[0],
-        "driven_cell": belt.cell[belt.driven_start],
+        "driven_cell": belt.cell[belt.driven_stations[belt.driven_stations.size // 2]],
         # energy stored in a pulley of given speed does not count
         "driven_inertia": belt.driven_inertia if np.isfinite(belt.driven_inertia) else 0.0,
         **dict(zip(f.LAWS, belt.pulleys.laws[0], strict=True)),
@@ -239,9 +246,9 @@ def settle_discs(contacts: tuple[Contact, Contact], belts: list[Belt], states: l
     for lane, (belt, state) in enumerate(zip(belts, states, strict=True)):
         force = np.zeros(belt.cell.size)
         contact_forces(belt, state, fresh_contacts(belt), force)
-        wraps = (belt.driving, 0), (belt.driven, belt.driven_start)
-        for contact, (wrap, first) in zip(contacts, wraps, strict=True):
-            pressed = wrap.weight * force[first : first + wrap.weight.size]
+        wraps = (belt.driving, belt.driving_stations), (belt.driven, belt.driven_stations)
+        for contact, (wrap, stations) in zip(contacts, wraps, strict=True):
+            pressed = wrap.weight * force[stations]
             settle(contact.discs, lane, wrap.modes, disc_factor(wrap), pressed)
 
 
@@ -274,7 +281,9 @@ def parted(belt: LaneBelt, parts: int) -> LaneBelt:
         for name, array in belt._asdict().items()
         if isinstance(array, np.ndarray)
     }
-    return belt._replace(constants=alike(belt.constants, parts), **arrays)
+    rows = belt.cell.size // parts
+    places = _places(belt.places[0][0], belt.places[1][0], rows)
+    return belt._replace(constants=alike(belt.constants, parts), places=places, **arrays)
 
 
 def _one_lane(array: np.ndarray) -> LaneArray:

@@ -128,22 +128,22 @@ COLUMN = (
     COLUMN_ENERGY,
 ) = range(len(COLUMN))
 
-# Of a state, by `derive`: axial line force; the cells' strains, 1 / (1 + strain) and 1 / content. By
+# Of a state, by `derive`: axial line force, share of the cell behind it that is in contact; the cells' strains, 1 / (1 + strain) and 1 / content. By
 # `lane_sliding`: sliding speeds, the law's coefficient, tanh of sliding speed over regularisation, 1 / that
 # speed, the same tanh of rings, the elements' sliding speed under them.
-FORCE, EPS_0, EPS_1, SHORT_0, SHORT_1, PER_CONTENT_0, PER_CONTENT_1 = range(7)
-SLIDING_R, SLIDING_T, COEFFICIENT, FACTOR, PER_SPEED, RING_FACTOR, SADDLE = range(7, 14)
+FORCE, WAY, EPS_0, EPS_1, SHORT_0, SHORT_1, PER_CONTENT_0, PER_CONTENT_1 = range(8)
+SLIDING_R, SLIDING_T, COEFFICIENT, FACTOR, PER_SPEED, RING_FACTOR, SADDLE = range(8, 15)
 # By `note_speeds` in the last two steps before a sample: u, v_element and v_ring two steps ago, less twice
 # those one step ago.
-NOTED = 14
-FIELDS_OF_FORCES = 17
+NOTED = 15
+FIELDS_OF_FORCES = 18
 
 # fields of ImexWork.stations, after those of `lane_forces`
-PUSH, LAG, SLOPE, FLANK, FLANK_SLOPE, FLANK_CROSS = range(FIELDS_OF_FORCES, 23)
-REVERSING, RING_REVERSING, MEETING, AHEAD = range(23, 27)
-D_00, D_01, D_11, Y_0, Y_1 = range(27, 32)
-I_00, I_01, I_11, DV_0, DV_1, G_00, G_01, G_10, G_11, LINK_0, LINK_1 = range(32, 43)
-FIELDS_OF_WORK = 43
+PUSH, LAG, SLOPE, FLANK, FLANK_SLOPE, FLANK_CROSS = range(FIELDS_OF_FORCES, 24)
+REVERSING, RING_REVERSING, MEETING, AHEAD = range(24, 28)
+D_00, D_01, D_11, Y_0, Y_1 = range(28, 33)
+I_00, I_01, I_11, DV_0, DV_1, G_00, G_01, G_10, G_11, LINK_0, LINK_1 = range(33, 44)
+FIELDS_OF_WORK = 44
 
 # Constants of each lane; from FIRST_OFFSET on the layers' offsets, then by arc and surface the factors of the
 # layer above it and of the one below.

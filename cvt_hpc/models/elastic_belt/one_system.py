@@ -4,8 +4,8 @@ Unknowns, in this order, for N stations: w, u, v_element, v_ring, n_element, n_r
 speed of those stations that have a memory, the states of free pulleys where they are, the driven pulley's
 speed and position. Layers' speeds are counted
 from the nominal belt speed, contents from 1 and the pulley's speed from its nominal one, so that tolerances
-relative to an unknown mean its variation. Strands have no memory, and where the belt enters an arc the
-filtered speed is the sliding speed itself: neither is an unknown; without friction memory none is. Forces,
+relative to an unknown mean its variation. Stations that no groove can hold have no memory, and without
+friction memory none has. Forces,
 contact and laws are those of `rhs`, called and not written again.
 """
 
@@ -27,7 +27,6 @@ from cvt_hpc.models.elastic_belt.rhs import (
     fresh_contacts,
     load_at,
     memory_rates,
-    sliding_speed,
     strains,
 )
 from cvt_hpc.physics.compliance import Contact
@@ -99,9 +98,7 @@ def flat_belt(belt: Belt, start: float = 0.0) -> FlatBelt:
         Simulated time at t = 0 [s].
     """
     n = belt.cell.size
-    arc = belt.arc_share > 0.0
-    arc[[0, belt.driven_start]] = False
-    remembering = np.flatnonzero(arc & (belt.friction_memory > 0.0))
+    remembering = np.flatnonzero((belt.touches > 0.0) & (belt.friction_memory > 0.0))
     origins = {f.V_ELEMENT: belt.belt_speed, f.V_RING: belt.belt_speed, f.N_ELEMENT: 1.0, f.N_RING: 1.0}
     rows = np.repeat([origins.get(row, 0.0) for row in ROWS], n)
     loose = f.FIRST_STATE + np.arange(len(f.STATES) if belt.pulleys.are_free else 0)
@@ -121,7 +118,7 @@ def pack(flat: FlatBelt, state: State) -> np.ndarray:
 
 @kernel
 def unpack(flat: FlatBelt, t: float, y: np.ndarray) -> None:
-    """Write y into `flat.state`, and the sliding speeds at the inlets into the filtered ones."""
+    """Write y into `flat.state`."""
     n, fields, scalars, origin = flat.belt.cell.size, flat.state.fields, flat.state.scalars, flat.origin
     for k, row in enumerate(ROWS):
         for j in range(n):
@@ -137,31 +134,21 @@ def unpack(flat: FlatBelt, t: float, y: np.ndarray) -> None:
         origin[-2] + y[-2],
         y[-1],
     )
-    set_inlets(flat)
-
-
-@kernel
-def set_inlets(flat: FlatBelt) -> None:
-    """Where the belt enters an arc the filtered speed is that of sliding, in `flat.state`."""
-    if flat.belt.friction_memory > 0.0:
-        for j in (0, flat.belt.driven_start):
-            flat.state.fields[f.V_FILTERED, j] = sliding_speed(flat.belt, flat.state, j)
 
 
 @kernel
 def driven_thrust(belt: Belt, force: np.ndarray) -> float:
     """Axial force of the belt on the driven sheave [N]."""
-    first = belt.driven_start
     total = 0.0
     for k in range(belt.driven.weight.size):
-        total += belt.driven.weight[k] * force[first + k]
+        total += belt.driven.weight[k] * force[belt.driven_stations[k]]
     return total
 
 
 @kernel
 def driven_moment(belt: Belt, moments: np.ndarray) -> float:
     """Moment of the belt on the driven pulley [N m]."""
-    return moments[belt.driven_start :].sum()
+    return moments @ belt.on_driven
 
 
 @kernel
@@ -172,11 +159,13 @@ def pulled_by(belt: Belt, force: np.ndarray, moments: np.ndarray) -> np.ndarray:
     the tilting forces on the sheaves, driving pulley first [N].
     """
     pull = np.zeros(8)
-    pull[0], pull[1] = moments[: belt.driven_start].sum(), driven_moment(belt, moments)
+    pull[1] = driven_moment(belt, moments)
+    pull[0] = moments.sum() - pull[1]
     for wrap in range(2):
-        sheave, first = (belt.driven, belt.driven_start) if wrap else (belt.driving, 0)
+        sheave = belt.driven if wrap else belt.driving
+        places = belt.driven_stations if wrap else belt.driving_stations
         for k in range(sheave.weight.size):
-            pressed = sheave.weight[k] * force[first + k]
+            pressed = sheave.weight[k] * force[places[k]]
             pull[2 + wrap] += pressed
             pull[4 + 2 * wrap] += pressed * sheave.tilt[0, k]
             pull[5 + 2 * wrap] += pressed * sheave.tilt[1, k]
@@ -205,7 +194,7 @@ def rates_under_forces(flat: FlatBelt) -> None:
     """Rates of the fields and moments at the stations, of `flat.state` and of `flat.force` as it stands."""
     belt, state, rate = flat.belt, flat.state, flat.rate
     strains(belt, state.fields, flat.eps)
-    memory_rates(belt, state, rate)
+    memory_rates(belt, state, flat.contacts, rate)
     content_rates(belt, state, flat.eps, rate)
     accelerations(belt, state, flat.force, flat.eps, rate, flat.moments)
 

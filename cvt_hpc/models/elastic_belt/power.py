@@ -12,10 +12,9 @@ changing tension and slope squared out. The layers' loss is not taken from a sta
 the work of their dampers in the steps since the last one: a damper acts in a cell that is just closing, for a
 step or two, and instants now and then would not meet it as often as it acts.
 
-Seating is the energy that the belt carries out of the sheaves' elastic contact at an outlet beyond the energy
-that it brings in at the inlet. Contact begins and ends at the arcs' ends here, with forces that are not zero;
-along an arc the elastic forces do no work on the whole, whatever the belt's speed, since the compliance
-depends on the distance of two stations alone.
+Seating is the energy that the belt carries out of the sheaves' elastic contact beyond the energy that it brings
+in: none, but for the mesh, since contact begins and ends without force, and between both the elastic forces do
+no work on the whole.
 """
 
 from __future__ import annotations
@@ -29,10 +28,12 @@ from cvt_hpc.models.elastic_belt.lane_belt import LaneBelt, LaneState
 from cvt_hpc.models.elastic_belt.lane_column import curving
 from cvt_hpc.models.elastic_belt.lane_forces import (
     LEAST_SHARE_OF_WIDTH,
+    groove_sliding,
     lane_damping,
     lane_load,
     lane_pulleys,
     lane_speed_share,
+    leaning,
     pressed_strain,
     saddle_pressure,
 )
@@ -44,7 +45,7 @@ from cvt_hpc.models.elastic_belt.moments import (
     add_stresses,
 )
 from cvt_hpc.models.elastic_belt.pulley_step import audit_pulleys, taken_by_clearance
-from cvt_hpc.physics.flank import flank_sliding, tangential_sliding
+from cvt_hpc.physics.flank import flank_sliding
 from cvt_hpc.physics.friction import formula_coefficient, law_numbers, saturation, table_coefficient
 from cvt_hpc.physics.friction_laws import Law
 
@@ -104,19 +105,13 @@ def audit(
     ring_stiffness, element_stiffness = c[0, lf.RING_STIFFNESS], c[0, lf.ELEMENT_STIFFNESS]
     element_damping, centrifugal = c[0, lf.ELEMENT_DAMPING], mass * belt_speed * belt_speed
     turnings, surfaces = lane_pulleys(belt, speed_share, scalars)
-    omega, surface = turnings[0], surfaces[0]
-    radius = c[0, lf.DRIVING_RADIUS]
-    opening_0 = c[0, lf.DRIVING_POSITION] + like(scalars[0, f.FIRST_STATE + f.SHIFT], zero)
+    opening_driving = c[0, lf.DRIVING_POSITION] + like(scalars[0, f.FIRST_STATE + f.SHIFT], zero)
+    opening_driven = like(scalars[0, lf.POSITION], zero)
     ring_relief = c[0, lf.RING_RELIEF] * speed_share * speed_share
     summed = profiles.rows > 0
-    driving = turned = driving_rub = rub = ring_loss = belt_loss = seating = zero
+    driving = turned = driving_rub = driven_rub = ring_loss = belt_loss = seating = zero
     stored = 0.5 * c[0, lf.DRIVEN_INERTIA] * turnings[1] * turnings[1]
     for j in range(n):
-        if j == belt.driven_start:
-            omega, surface, radius = turnings[1], surfaces[1], c[0, lf.DRIVEN_RADIUS]
-            opening_0 = like(scalars[0, lf.POSITION], zero)
-            driving_rub, rub = rub, zero
-            driving, turned = turned, zero
         a, b = j - 1 if j > 0 else n - 1, j + 1 if j < n - 1 else 0
         aa, bb = a - 1 if a > 0 else n - 1, b + 1 if b < n - 1 else 0
         right, dual = belt.cell[j], belt.dual[j]
@@ -159,14 +154,19 @@ def audit(
         v_element, across = fields[j, f.V_ELEMENT], -damping * v_radial
         if summed:
             add_speeds(profiles, j, v_radial, u, v_element, fields[j, f.V_RING])
-        share = belt.arc_share[j]
-        if share == 0.0:
+        if belt.touches[j] == 0.0:
             if summed:
                 add_forces(profiles, j, across, u, across * slope, v_element)
             continue
         force = stations[j, lf.FORCE]
-        v_tangential = tangential_sliding(v_element, w, omega, surface)
-        sliding, meridian = flank_sliding(v_radial, v_tangential, per_cosine)
+        on_driven, upright, lean = belt.on_driven[j] > 0.5, belt.upright[j], leaning(belt, j, w)
+        omega, radius = (
+            (turnings[1], c[0, lf.DRIVEN_RADIUS]) if on_driven else (turnings[0], c[0, lf.DRIVING_RADIUS])
+        )
+        v_climb, v_tangential = groove_sliding(
+            belt, j, (turnings, surfaces), belt_speed, v_radial, v_element, w
+        )
+        sliding, meridian = flank_sliding(v_climb, v_tangential, per_cosine)
         sliding = maximum(sliding, least)
         v_law = fields[j, f.V_FILTERED] if belt.memory else sliding
         if kind == Law.TABLE:
@@ -177,17 +177,26 @@ def audit(
         mu *= factor
         upward = mu * meridian / sliding
         twice_normal = 2.0 * force / fma(upward, sine, cosine)
-        elastic_radial = share * wedge * force
-        radial = share * twice_normal * (sine - upward * cosine) - elastic_radial
-        tangential = -share * twice_normal * mu * v_tangential / sliding
-        seating -= dual * elastic_radial * (v_radial - u)
-        rub -= dual * fma(radial, v_radial, tangential * v_tangential)
-        turned += dual * tangential * (radius + w) * omega
-        across += radial
-        along = fma(across + elastic_radial, slope, tangential)
+        elastic_radial = wedge * force
+        radial = twice_normal * (sine - upward * cosine) - elastic_radial
+        tangential = -twice_normal * mu * v_tangential / sliding
+        distance = radius + fma(upright, w, belt.rise[j])
+        # less the power that a change of displacement in place takes from the sheaves
+        seating -= dual * elastic_radial * (v_climb - upright * u)
+        rubbed = -dual * fma(radial, v_climb, tangential * v_tangential)
+        power = dual * tangential * distance * omega
+        if on_driven:
+            driven_rub += rubbed
+            turned += power
+        else:
+            driving_rub += rubbed
+            driving += power
+        rubbing, along = fma(upright, radial, -lean * tangential), fma(lean, radial, upright * tangential)
+        across += rubbing
+        along += fma(across + upright * elastic_radial, slope, lean * elastic_radial)
         if summed:
             add_forces(profiles, j, across, u, along, v_element)
-            add_flanks(profiles, j, radial, tangential, v_radial, v_tangential)
+            add_flanks(profiles, j, radial, tangential, v_climb, v_tangential)
         lever = fma(offset, belt.arc_curvature[j], 1.0)
         saddle = fma(lever, v0, -v1)
         ring_left = ring_stiffness * stations[a, lf.EPS_1]
@@ -198,7 +207,8 @@ def audit(
         ring_loss += drag * saddle
         if summed:
             add_saddles(profiles, j, drag, saddle)
-        stored -= 0.5 * share * dual * force * fma(wedge, w, opening_0)
+        opening_0 = opening_driven if on_driven else opening_driving
+        stored -= 0.5 * dual * force * fma(wedge, fma(upright, w, belt.rise[j]), opening_0)
     thrust = c[0, lf.THRUST]
     axial_speed = (axial - thrust) / c[0, lf.AXIAL_DAMPING]
     rows[k, first + power_terms.DRIVING_POWER] = driving
@@ -207,7 +217,7 @@ def audit(
     )
     rows[k, first + power_terms.THRUST_POWER] = thrust * axial_speed
     rows[k, first + power_terms.DRIVING_FLANK_LOSS] = driving_rub
-    rows[k, first + power_terms.DRIVEN_FLANK_LOSS] = rub
+    rows[k, first + power_terms.DRIVEN_FLANK_LOSS] = driven_rub
     rows[k, first + power_terms.RING_LOSS] = ring_loss
     rows[k, first + power_terms.BELT_LOSS] = belt_loss
     rows[k, first + power_terms.LAYER_LOSS] = scalars[0, lf.LAYER_WORK] / interval

@@ -70,7 +70,7 @@ class RingWork(NamedTuple):
 
     Attributes
     ----------
-    stations : (N, 43) LaneArray
+    stations : (N, 44) LaneArray
         As of `ImexWork`.
     layers : (N, 5 n + 4) LaneArray
         See above.
@@ -221,7 +221,7 @@ def couple_layers(belt: LaneBelt, rings: LaneRings, state: LaneState, work: Ring
             turn,
             per_dual,
         )
-        on_arc = anywhere(belt.arc_share[j] > 0.0)
+        on_arc = anywhere(belt.arc_curvature[j] > 0.0)
         is_driven = belt.on_driven[j] > 0.5
         element = fields[j, f.V_ELEMENT]
         left = right = largest = below = zero
@@ -347,7 +347,7 @@ def advance_layers(belt: LaneBelt, rings: LaneRings, state: LaneState, work: Rin
             element = stations[j, lf.DV_0]
             common = fma(stations[j, lf.DV_1], n, -layers[j, last + OWN_SUM])
             common = fma(-layers[j, last + ELEMENT_SUM], element, common) * layers[j, last + PER_COMMON_SUM]
-            on_arc = anywhere(belt.arc_share[j] > 0.0)
+            on_arc = anywhere(belt.arc_curvature[j] > 0.0)
             on_ears = on_arc and anywhere(layers[j, last + ON_EARS] > 0.0)
             change, total = element, zero
             for k in range(n):

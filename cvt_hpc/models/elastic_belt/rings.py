@@ -204,7 +204,7 @@ def layer_rates(
             right = rings.stiffness * eps[k, j] + rings.damping * (v[k, b] - v[k, j]) / belt.cell[j]
             rate[k, j] = (right - left) / belt.dual[j]
         rate[2 * n, j] = 0.0
-        if belt.arc_share[j] > 0.0:
+        if belt.arc_curvature[j] > 0.0:
             surface_friction(belt, rings, state, eps, share, j, normal, sliding)
             for k in range(n + 1):
                 secant, _ = ring_friction(

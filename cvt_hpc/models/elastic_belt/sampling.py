@@ -235,20 +235,20 @@ def sample(
     turnings, surfaces = lane_pulleys(belt, share, state.scalars)
     axial = zero
     for wrap in range(2):
-        weight = state.contacts[1].weight if wrap else state.contacts[0].weight
-        first = belt.driven_start if wrap else 0
+        contact, places = state.contacts[1] if wrap else state.contacts[0], belt.places[wrap][0]
+        weight = contact.weight
         turning, surface = turnings[wrap], surfaces[wrap]
         axial = sliding = open_length = zero
         length = 0.0
         for i in range(weight.size):
-            force = stations[first + i, lf.FORCE]
-            slides = tangential_sliding(
-                fields[first + i, f.V_ELEMENT], fields[first + i, f.W], turning, surface
-            )
+            j = places[i]
+            force, lifted = stations[j, lf.FORCE], fma(contact.upright[i], fields[j, f.W], contact.rise[i])
+            slides = tangential_sliding(fields[j, f.V_ELEMENT], lifted, turning, surface)
             axial += weight[i] * force
             sliding += weight[i] * force * slides
-            open_length += select(force > 0.0, zero, weight[i])
-            length += weight[i]
+            if contact.rise[i] == 0.0:
+                open_length += select(force > 0.0, zero, weight[i])
+                length += weight[i]
         rows[k, sensed + Scalar.AXIAL_FORCE_DRIVING + wrap] = axial
         rows[k, sensed + Scalar.SLIP_DRIVING + wrap] = sliding / (maximum(axial, LEAST_FORCE) * belt_speed)
         rows[k, sensed + Scalar.OPEN_SHARE_DRIVING + wrap] = open_length / length

@@ -72,21 +72,20 @@ def pattern(flat: FlatBelt) -> csc_array:
         for row, reaches in reach.items():
             for unknown, (behind, ahead) in reaches.items():
                 mark(row, unknown, np.arange(n), range(behind, ahead + 1))
-    for sheave, first in ((belt.driving, 0), (belt.driven, belt.driven_start)):
-        arc = np.arange(first, first + sheave.weight.size)
+    for arc, is_driven in ((belt.driving_stations, False), (belt.driven_stations, True)):
         for row in (f.U, f.V_ELEMENT, f.V_FILTERED):
             for unknown, (behind, ahead) in ON_FLANK.items():
                 mark(row, unknown, arc, range(behind, ahead + 1))
         pushed = [place[f.U][arc], place[f.V_ELEMENT][arc]]
         moved = [place[f.W][arc]]
-        if first > 0:
+        if is_driven:
             pushed += [place[SPEED], place[OPENING]]
             moved += [place[OPENING]]
             remembered = place[f.V_FILTERED][arc]
             turned = np.concatenate([*pushed, remembered[remembered >= 0]])
             found[turned, place[SPEED]] = True
             rim = [place[row] for row in (f.W, f.U, f.V_ELEMENT)]
-            near = np.arange(first - 1, arc[-1] + 2) % n
+            near = np.arange(arc[0] - 1, arc[-1] + 2) % n
             found[np.ix_(place[SPEED], np.concatenate([row[near] for row in rim]))] = True
             found[np.ix_(place[SPEED], remembered[remembered >= 0])] = True
         found[np.ix_(np.concatenate(pushed), np.concatenate(moved))] = True
