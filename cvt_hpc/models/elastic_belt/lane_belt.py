@@ -248,7 +248,7 @@ def settle_discs(contacts: tuple[Contact, Contact], belts: list[Belt], states: l
         contact_forces(belt, state, fresh_contacts(belt), force)
         wraps = (belt.driving, belt.driving_stations), (belt.driven, belt.driven_stations)
         for contact, (wrap, stations) in zip(contacts, wraps, strict=True):
-            pressed = wrap.weight * force[stations]
+            pressed = wrap.weight * np.maximum(force[stations], 0.0)
             settle(contact.discs, lane, wrap.modes, disc_factor(wrap), pressed)
 
 

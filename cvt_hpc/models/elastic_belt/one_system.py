@@ -71,7 +71,8 @@ class FlatBelt(NamedTuple):
     start : float
         Simulated time at t = 0 [s].
     force, eps, rate, moments : (N,), (2, N), (7, N), (N,) arrays
-        Work space: axial line forces, strains, rates, moments on the driven pulley.
+        Work space: axial line forces, or pulls, of `contact_forces`, strains, rates, moments on the driven
+        pulley.
     """
 
     belt: Belt
@@ -141,7 +142,7 @@ def driven_thrust(belt: Belt, force: np.ndarray) -> float:
     """Axial force of the belt on the driven sheave [N]."""
     total = 0.0
     for k in range(belt.driven.weight.size):
-        total += belt.driven.weight[k] * force[belt.driven_stations[k]]
+        total += belt.driven.weight[k] * max(force[belt.driven_stations[k]], 0.0)
     return total
 
 
@@ -165,7 +166,7 @@ def pulled_by(belt: Belt, force: np.ndarray, moments: np.ndarray) -> np.ndarray:
         sheave = belt.driven if wrap else belt.driving
         places = belt.driven_stations if wrap else belt.driving_stations
         for k in range(sheave.weight.size):
-            pressed = sheave.weight[k] * force[places[k]]
+            pressed = sheave.weight[k] * max(force[places[k]], 0.0)
             pull[2 + wrap] += pressed
             pull[4 + 2 * wrap] += pressed * sheave.tilt[0, k]
             pull[5 + 2 * wrap] += pressed * sheave.tilt[1, k]
@@ -194,7 +195,7 @@ def rates_under_forces(flat: FlatBelt) -> None:
     """Rates of the fields and moments at the stations, of `flat.state` and of `flat.force` as it stands."""
     belt, state, rate = flat.belt, flat.state, flat.rate
     strains(belt, state.fields, flat.eps)
-    memory_rates(belt, state, flat.contacts, rate)
+    memory_rates(belt, state, flat.force, rate)
     content_rates(belt, state, flat.eps, rate)
     accelerations(belt, state, flat.force, flat.eps, rate, flat.moments)
 

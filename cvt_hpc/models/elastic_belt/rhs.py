@@ -103,7 +103,8 @@ def wrap_contact(
     """Axial line forces of one wrap from its displacements; returns the solver's count, 0 where it failed.
 
     `places` (m,) are its stations, `opening` and `tilt` (2,) those of the rigid sheaves [m]; `w` and the
-    result `force` have all N stations.
+    result `force` have all N stations. Where a station does not touch, it is the pull that would close its
+    gap, negative.
     """
     gap, found = np.empty(places.size), np.empty(places.size)
     for k in range(places.size):
@@ -112,13 +113,13 @@ def wrap_contact(
     gap = gap + (contact.cosine * tilt[0] + contact.sine * tilt[1])
     solves = solve_wrap(contact, gap, found)
     for k in range(places.size):
-        force[places[k]] = found[k]
+        force[places[k]] = found[k] if found[k] > 0.0 else min(contact.stations[k, compliance.PUSH], 0.0)
     return solves
 
 
 @merged_kernel
 def contact_forces(belt: Belt, state: State, contacts: tuple[Contact, Contact], force: np.ndarray) -> int:
-    """Axial line forces of both wraps into `force` (N,) [N/m], 0 beyond their zones; 0 solves: failure."""
+    """Axial line forces of both wraps, or pulls, into `force` (N,) [N/m]; returns 0 solves where it failed."""
     force[:] = 0.0
     w = state.fields[f.W]
     scalars, states = state.scalars, state.scalars[f.FIRST_STATE :]
@@ -274,7 +275,7 @@ def content_rates(belt: Belt, state: State, eps: np.ndarray, rate: np.ndarray) -
 
 
 @kernel
-def memory_rates(belt: Belt, state: State, contacts: tuple[Contact, Contact], rate: np.ndarray) -> None:
+def memory_rates(belt: Belt, state: State, force: np.ndarray, rate: np.ndarray) -> None:
     """Rate of the filtered sliding speed [m/s^2]; where contact begins it is |v| itself.
 
     Contact begins between an open and a closed station, where the line through the open one's gap, as the
@@ -286,12 +287,12 @@ def memory_rates(belt: Belt, state: State, contacts: tuple[Contact, Contact], ra
         return
     belt_speed = speed_share_at(belt, state.scalars[f.TIME]) * belt.belt_speed
     for wrap in range(2):
-        contact, places = contacts[wrap], belt.driven_stations if wrap else belt.driving_stations
+        places = belt.driven_stations if wrap else belt.driving_stations
         before = 0.0
         for k in range(places.size):
-            j, push = places[k], contact.stations[k, compliance.PUSH]
+            j, push = places[k], force[places[k]]
             speed, cell = sliding_speed(belt, state, j), belt.cell[places[k - 1]]
-            pushed_behind = contact.stations[k - 1, compliance.PUSH] if k > 0 else -1.0
+            pushed_behind = force[places[k - 1]] if k > 0 else -1.0
             if k == 0 or push <= 0.0:
                 # as just before it touches
                 carried, entering = memory_transport(belt, LEAST_WAY * cell, belt_speed), speed

@@ -72,14 +72,16 @@ def distributions(steady: Steady) -> Distributions:
     force, eps = np.empty(n), np.empty((2, n))
     contact_forces(belt, steady.state, fresh_contacts(belt), force)
     strains(belt, fields, eps)
-    driven = np.arange(n) >= belt.driven_start
-    radius = np.where(driven, belt.driven_radius, belt.driving_radius) + fields[f.W]
+    driven = belt.on_driven > 0.0
+    radius = (
+        np.where(driven, belt.driven_radius, belt.driving_radius) + belt.rise + belt.upright * fields[f.W]
+    )
     turning = np.where(driven, steady.state.scalars[f.DRIVEN_SPEED], driving_speed(steady))
-    sliding = np.where(belt.arc_share > 0.0, fields[f.V_ELEMENT] - turning * radius, 0.0)
+    sliding = np.where(force > 0.0, belt.upright * fields[f.V_ELEMENT] - turning * radius, 0.0)
     return Distributions(
         belt.ring_stiffness * eps[1],
         np.maximum(-belt.element_stiffness * pressed_strains(belt, fields, eps[0]), 0.0),
-        force,
+        np.maximum(force, 0.0),
         fields[f.V_ELEMENT].copy(),
         fields[f.V_RING].copy(),
         sliding,
