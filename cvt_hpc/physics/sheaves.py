@@ -174,7 +174,6 @@ def elastic_matrix(sheave: Sheaves) -> np.ndarray:
     """Symmetric a (b W + r^2 / c_tilt U^T U), (m, m) [m/N]: force in, opening of disc and collar out."""
     local = sheave.flexibilities
     if not local.size:
-        m = sheave.weight.size
         inverse = np.diag(sheave.diagonal)
         beside = np.diag(sheave.off_diagonal[1:], 1)
         inverse += beside + beside.T

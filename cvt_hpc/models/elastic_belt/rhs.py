@@ -236,7 +236,7 @@ def accelerations(
         along_element = -(push_right - push_left) / dual
 
         moments[j] = 0.0
-        if force[j] > 0.0:
+        if belt.touches[j] * force[j] > 0.0:
             climb, v_tangential, radius = sliding_speeds(belt, state, j, v_radial, driving_speed)
             speed, _ = flank_sliding(climb, v_tangential, 1.0 / cosine)
             v_law = speed if belt.friction_memory == 0.0 else vf[j]
@@ -276,36 +276,38 @@ def content_rates(belt: Belt, state: State, eps: np.ndarray, rate: np.ndarray) -
 
 @kernel
 def memory_rates(belt: Belt, state: State, force: np.ndarray, rate: np.ndarray) -> None:
-    """Rate of the filtered sliding speed [m/s^2]; where contact begins it is |v| itself.
-
-    Contact begins between an open and a closed station, where the line through the open one's gap, as the
-    pull that would close it, and the closed one's force is 0.
-    """
+    """Rate of the filtered sliding speed [m/s^2]; at once |v| where a groove may hold a station but does not."""
     vf = state.fields[f.V_FILTERED]
-    rate[f.V_FILTERED] = 0.0
-    if belt.friction_memory == 0.0:
-        return
     belt_speed = speed_share_at(belt, state.scalars[f.TIME]) * belt.belt_speed
-    for wrap in range(2):
-        places = belt.driven_stations if wrap else belt.driving_stations
-        before = 0.0
-        for k in range(places.size):
-            j, push = places[k], force[places[k]]
-            speed, cell = sliding_speed(belt, state, j), belt.cell[places[k - 1]]
-            pushed_behind = force[places[k - 1]] if k > 0 else -1.0
-            if k == 0 or push <= 0.0:
-                # as just before it touches
-                carried, entering = memory_transport(belt, LEAST_WAY * cell, belt_speed), speed
-            elif pushed_behind > 0.0:
-                carried, entering = memory_transport(belt, cell, belt_speed), vf[places[k - 1]]
-            else:
-                way = max(push / (push - pushed_behind), LEAST_WAY)
-                carried, entering = (
-                    memory_transport(belt, way * cell, belt_speed),
-                    speed + way * (before - speed),
-                )
-            rate[f.V_FILTERED, j] = carried * (entering - vf[j]) + (speed - vf[j]) / belt.friction_memory
-            before = speed
+    for j in range(vf.size):
+        rate[f.V_FILTERED, j] = 0.0
+        if belt.touches[j] == 0.0 or belt.friction_memory == 0.0:
+            continue
+        speed = sliding_speed(belt, state, j)
+        if force[j] > 0.0:
+            before = vf[j - 1]
+            if force[j - 1] <= 0.0:
+                before = sliding_speed(belt, state, j - 1 if j > 0 else vf.size - 1)
+            carried, entering = transported(belt, force, j, belt_speed, speed, before)
+        else:
+            carried, entering = memory_transport(belt, LEAST_WAY * belt.cell[j - 1], belt_speed), speed
+        rate[f.V_FILTERED, j] = carried * (entering - vf[j]) + (speed - vf[j]) / belt.friction_memory
+
+
+@merged_kernel
+def transported(
+    belt: Belt, force: np.ndarray, j: int, belt_speed: float, speed: float, before: float
+) -> tuple[float, float]:
+    """Rate [1/s] of the memory's transport to station j, which touches, and the speed [m/s] that comes.
+
+    From the station behind, whose filtered speed is `before`; where that is open contact begins in between,
+    where the line from its pull to the force is 0, with the sliding speed |v| there.
+    """
+    cell, behind = belt.cell[j - 1], force[j - 1]
+    if behind > 0.0:
+        return memory_transport(belt, cell, belt_speed), before
+    way = max(force[j] / (force[j] - behind), LEAST_WAY)
+    return memory_transport(belt, way * cell, belt_speed), speed + way * (before - speed)
 
 
 @merged_kernel

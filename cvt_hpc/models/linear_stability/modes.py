@@ -84,7 +84,9 @@ def modes(
     linearise = Linearisation(flat)
     whole = linearise(flat)
     # the same without flanks and saddles: the difference is the effect of their friction and contact
-    free = linearise(flat._replace(belt=belt._replace(arc_share=np.zeros_like(belt.arc_share))))
+    nowhere = np.zeros_like(belt.touches)
+    without = belt._replace(touches=nowhere, arc_curvature=nowhere)
+    free = linearise(flat._replace(belt=without))
     values, vectors = eigenpairs(whole, 2.0 * np.pi * band[0], 2.0 * np.pi * band[1], decay, GROWTH)
     n = belt.cell.size
     velocities = slice(n, 4 * n)

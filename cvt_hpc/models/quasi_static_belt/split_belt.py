@@ -152,7 +152,7 @@ def work_space(model: SplitBelt) -> Work:
     n, size = model.belt.cell.size, model.shapes.shape[1] + 2
     width = 8 * ((size + 1 + 7) // 8)
     return Work(
-        np.zeros((20, n)),
+        np.zeros((21, n)),
         np.zeros((7, n)),
         np.zeros(n),
         chain(n, model.shapes.shape[1]),

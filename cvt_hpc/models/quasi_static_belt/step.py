@@ -24,9 +24,9 @@ from cvt_hpc.models.elastic_belt.one_system import driven_thrust, free_rates, pu
 from cvt_hpc.models.elastic_belt.rhs import (
     accelerations,
     load_at,
-    memory_transport,
     sliding_speed,
     speed_share_at,
+    transported,
 )
 from cvt_hpc.models.quasi_static_belt import fields as q
 from cvt_hpc.models.quasi_static_belt.contents import settle_contents
@@ -91,12 +91,13 @@ def _advance(model: SplitBelt, moved: Motion, work: Work) -> None:
     moment = taken = 0.0
     for j in range(n):
         du, dv0 = work.rate[f.U, j], columns[2 * j, 0]
-        if belt.arc_share[j] > 0.0:
-            slopes = stations[q.TANGENTIAL_SLOPE, j] * dv0 + stations[q.CROSS_SLOPE, j] * du
-            if j >= belt.driven_start:
-                moment += work.moments[j] + slopes * (belt.driven_radius + fields[f.W, j])
+        if moved.force[j] > 0.0:
+            slopes = stations[q.TANGENTIAL_SLOPE, j] * dv0 + stations[q.TANGENTIAL_CROSS, j] * du
+            distance = belt.rise[j] + belt.upright[j] * fields[f.W, j]
+            if belt.on_driven[j] > 0.0:
+                moment += work.moments[j] + slopes * (belt.driven_radius + distance)
             else:
-                taken += work.moments[j] - slopes * (belt.driving_radius + fields[f.W, j])
+                taken += work.moments[j] - slopes * (belt.driving_radius + distance)
     for k in range(size):
         moved.p[k] += work.found[k]
     work_done = 0.0
@@ -141,16 +142,13 @@ def _advance(model: SplitBelt, moved: Motion, work: Work) -> None:
     for j in range(n):
         before = last
         last = fields[f.V_FILTERED, j]
-        if belt.friction_memory > 0.0 and belt.arc_share[j] > 0.0:
+        if belt.friction_memory > 0.0 and belt.touches[j] > 0.0:
             speed = sliding_speed(belt, state, j)
-            if j == 0 or j == belt.driven_start:
-                fields[f.V_FILTERED, j] = speed
-            else:
-                carried, forget = (
-                    memory_transport(belt, belt.cell[j - 1], belt_speed),
-                    1.0 / belt.friction_memory,
-                )
-                target = (carried * before + forget * speed) / (carried + forget)
+            fields[f.V_FILTERED, j] = speed
+            if moved.force[j] > 0.0:
+                carried, entering = transported(belt, moved.force, j, belt_speed, speed, before)
+                forget = 1.0 / belt.friction_memory
+                target = (carried * entering + forget * speed) / (carried + forget)
                 fields[f.V_FILTERED, j] = target + (last - target) * np.exp(-(carried + forget) * step)
     for j in range(n):
         fields[f.W, j] = work.rate[f.W, j]
