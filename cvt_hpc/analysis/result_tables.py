@@ -10,6 +10,7 @@ from typing import Any
 import numpy as np
 import xarray as xr
 
+from cvt_hpc.analysis.conversion import documented_units
 from cvt_hpc.errors import mismatch
 from cvt_hpc.files import naming_refusals, read_regular
 from cvt_hpc.job.units import to_si
@@ -92,7 +93,7 @@ def _add(dataset: xr.Dataset, column: str, dims: tuple[str, ...], texts: Sequenc
         ),
         (name, ""),
     )
-    attributes = {"units": si or "1"}
+    attributes = {"units": si or documented_units(False).get(name, "1")}
     if not label:
         dataset[name] = (dims, values, attributes)
         return
