@@ -74,7 +74,7 @@ def judged(
     """
     if not runs:
         return Criticality(Kind.UNDECIDED, np.nan, np.nan, "no runs were asked for")
-    if onset.mode.frequency < lowest:
+    if onset.frequency < lowest:
         return Criticality(Kind.UNDECIDED, np.nan, np.nan, "its mode lies below the band of runs")
     if onset.others:
         return Criticality(Kind.UNDECIDED, np.nan, np.nan, "the steady state is unstable on both sides")
@@ -84,9 +84,7 @@ def judged(
     # on the stable side the steady state ends to be stable at the next mode, whatever its frequency
     ends = [load for ends in hidden for load in ends if (load < onset.load) == onset.rising]
     for other in hopf:
-        if other is not onset and (
-            other.mode.frequency >= lowest or (other.load < onset.load) == onset.rising
-        ):
+        if other is not onset and (other.frequency >= lowest or (other.load < onset.load) == onset.rising):
             ends.append(other.load)
     return criticality(
         onset.load,
