@@ -73,9 +73,6 @@ def _check_table(attributes: Mapping[Any, Any], key: str, place: str) -> None:
         table = None
     if not isinstance(table, dict):
         raise mismatch(f"{place}: {key}", "a table in JSON", "none")
-    for inner in ("axes", "vibration") if key == "job" else ():
-        if not isinstance(table.get(inner, {}), dict):
-            raise mismatch(f"{place}: {key}: {inner}", "a table", show(table[inner]))
 
 
 def _check_variable(variable: xr.Variable, place: str) -> None:

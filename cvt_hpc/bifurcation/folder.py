@@ -23,7 +23,7 @@ from cvt_hpc.study.job_difference import another_job
 
 DATASET = "branch.nc"
 _PICTURE = re.compile(r"branch(?:_([1-9]\d{0,8}))?\.png", re.ASCII)
-_LIMIT = 1 << 28  # [bytes] of a branch; one of 20 loads at 160 stations has 3.4 MB
+_LIMIT = 1 << 26  # [bytes] of a branch; one of 20 loads has some 10 kB
 _DAMAGE = (AttributeError, KeyError, OSError, RecursionError, RuntimeError, TypeError, ValueError)
 _logger = logging.getLogger(__name__)
 
