@@ -15,9 +15,9 @@ from cvt_hpc.bifurcation.costs import predicted_cost
 from cvt_hpc.bifurcation.dataset import diagram_dataset
 from cvt_hpc.bifurcation.drawing import draw_branch
 from cvt_hpc.bifurcation.folder import DiagramFolder, picture_names
-from cvt_hpc.bifurcation.followed import Followed, states_of, with_kinds
+from cvt_hpc.bifurcation.followed import Followed, states_of
 from cvt_hpc.bifurcation.job import Asked, Diagram
-from cvt_hpc.bifurcation.kinds import lowest_judged
+from cvt_hpc.bifurcation.kinds import lowest_judged, with_kinds
 from cvt_hpc.files import written_aside
 from cvt_hpc.linear_algebra import one_thread
 from cvt_hpc.models.elastic_belt.belt import State, mesh

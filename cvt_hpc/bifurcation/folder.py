@@ -6,17 +6,19 @@ import json
 import logging
 import re
 from collections.abc import Callable, Iterator
-from functools import partial
 from math import prod
 from pathlib import Path
 from typing import Any
 
 import numpy as np
 
-from cvt_hpc.archives import Archives
-from cvt_hpc.bifurcation.followed import Followed, Stability, restored
+from cvt_hpc.archives import Archives, Arrays
+from cvt_hpc.bifurcation.attractors import Attractor
+from cvt_hpc.bifurcation.followed import Followed, Stability
 from cvt_hpc.bifurcation.job import Diagram, fingerprint_of, numbers_of
+from cvt_hpc.bifurcation.kinds import with_kinds
 from cvt_hpc.files import kind_of
+from cvt_hpc.models.linear_stability.branch import Onset
 from cvt_hpc.netcdf import DIAGRAM, holds, open_netcdf
 from cvt_hpc.output_folder import Kind, OutputFolder
 from cvt_hpc.study.job_difference import another_job
@@ -59,12 +61,23 @@ class DiagramFolder(OutputFolder[Diagram]):
 
     def load_branch(self, number: int) -> Followed | None:
         """Return branch `number`, counted from 0; None if it is not done, or cannot be read."""
-        diagram, asked = self._diagram, self._diagram.branches[number]
-        return self.branches.load(f"branch_{number + 1}", partial(restored, diagram, asked))
+
+        def restored(plain: Any, states: Arrays) -> Followed:
+            if plain is None:
+                raise ValueError("of an earlier version")
+            onsets, runs = (
+                [Onset(*one) for one in plain["onsets"]],
+                [Attractor(*run) for run in plain["runs"]],
+            )
+            asked = self._diagram.branches[number]
+            return with_kinds(self._diagram, asked, states, onsets, plain["hidden"], runs)
+
+        return self.branches.load(f"branch_{number + 1}", restored)
 
     def save_branch(self, number: int, followed: Followed) -> None:
         """Keep branch `number`."""
-        self.branches.save(f"branch_{number + 1}", *followed.kept())
+        plain = {"onsets": followed.onsets, "hidden": followed.hidden, "runs": followed.runs}
+        self.branches.save(f"branch_{number + 1}", plain, followed.states)
 
     def stored_branches(self) -> int:
         """Return how many branches the dataset holds, 0 where none can be read."""

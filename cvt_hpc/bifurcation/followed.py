@@ -4,14 +4,13 @@ from __future__ import annotations
 
 from collections.abc import Callable, Sequence
 from enum import IntEnum
-from typing import Any, NamedTuple
+from typing import NamedTuple
 
 import numpy as np
 
 from cvt_hpc.archives import Arrays
 from cvt_hpc.bifurcation.attractors import Attractor
-from cvt_hpc.bifurcation.job import Asked, Diagram
-from cvt_hpc.bifurcation.kinds import kinds_of
+from cvt_hpc.bifurcation.job import Asked
 from cvt_hpc.models.elastic_belt.belt import Mesh
 from cvt_hpc.models.linear_stability.branch import Branch, Onset, tracks
 from cvt_hpc.models.linear_stability.modes import Mode
@@ -19,9 +18,8 @@ from cvt_hpc.models.steady_variator.forces import quantities
 from cvt_hpc.vibration.criticality import Criticality
 
 STRAND = "strand in which the mode is largest: 1 is t1, 2 is t2"
-OF_MODES: dict[
-    str, tuple[Callable[[Mode], float], str, str, str]
-] = {  # value, name for people, unit, comment
+# value, name for people, unit, comment
+OF_MODES: dict[str, tuple[Callable[[Mode], float], str, str, str]] = {
     "growth_rate": (lambda mode: mode.growth, "growth rate", "s-1", "of the mode"),
     "frequency": (lambda mode: mode.frequency, "frequency", "Hz", "of the mode"),
     "vibrating_strand": (lambda mode: mode.strand + 1, "vibrating strand", "1", STRAND),
@@ -68,36 +66,6 @@ class Followed(NamedTuple):
     def missed(self) -> np.ndarray:
         """Whether there is no steady state, (load,)."""
         return self.states["stability"] == Stability.NOT_FOUND
-
-    def kept(self) -> tuple[Any, Arrays]:
-        """Return the values of JSON types and the arrays from which `restored` makes the branch."""
-        return {"onsets": self.onsets, "hidden": self.hidden, "runs": self.runs}, self.states
-
-
-def restored(diagram: Diagram, asked: Asked, plain: Any, states: Arrays) -> Followed:
-    """Return a branch that was kept, with words in the units of the diagram.
-
-    Raises
-    ------
-    ValueError
-        If an earlier version has kept it, with other values.
-    """
-    if plain is None:
-        raise ValueError("of an earlier version")
-    runs = [Attractor(*run) for run in plain["runs"]]
-    return with_kinds(diagram, asked, states, [Onset(*one) for one in plain["onsets"]], plain["hidden"], runs)
-
-
-def with_kinds(
-    diagram: Diagram,
-    asked: Asked,
-    states: Arrays,
-    onsets: list[Onset],
-    hidden: list[tuple[float, float]],
-    runs: list[Attractor],
-) -> Followed:
-    """Return a branch with the kinds of its Hopf points."""
-    return Followed(asked, states, onsets, hidden, runs, kinds_of(diagram, asked, onsets, hidden, runs))
 
 
 def states_of(found: Branch, grid: Mesh, loads: Sequence[float]) -> Arrays:
