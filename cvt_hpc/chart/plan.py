@@ -233,8 +233,13 @@ class Chart:
 
     def fingerprint(self) -> str:
         """Return the SHA-256 [hex] of `resolved`; name and description do not count."""
-        document = {**self.resolved(), "name": "", "description": ""}
-        return hashlib.sha256(json.dumps(document, sort_keys=True).encode()).hexdigest()
+        return fingerprint_of(self.resolved())
+
+
+def fingerprint_of(resolved: dict[str, Any]) -> str:
+    """Return the fingerprint of a chart by the result of `Chart.resolved`."""
+    document = {**resolved, "name": "", "description": ""}
+    return hashlib.sha256(json.dumps(document, sort_keys=True).encode()).hexdigest()
 
 
 def _scene_to_json(scene: Scene) -> dict[str, Any]:

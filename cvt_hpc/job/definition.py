@@ -266,12 +266,15 @@ class Job:
 
     def fingerprint(self) -> str:
         """Return the SHA-256 [hex] of entries that determine numbers; name and description do not count."""
-        document = {
-            key: value for key, value in self.resolved().items() if key not in ("name", "description")
-        }
-        # the order of the axes counts, that of tables does not
-        document["axes"] = list(document["axes"].items())
-        return hashlib.sha256(json.dumps(document, sort_keys=True).encode()).hexdigest()
+        return fingerprint_of(self.resolved())
+
+
+def fingerprint_of(resolved: Mapping[str, Any]) -> str:
+    """Return the fingerprint of a job by the result of `Job.resolved`."""
+    document = {key: value for key, value in resolved.items() if key not in ("name", "description")}
+    # the order of the axes counts, that of tables does not
+    document["axes"] = list(document["axes"].items())
+    return hashlib.sha256(json.dumps(document, sort_keys=True).encode()).hexdigest()
 
 
 def _to_json(value: Any) -> Any:
