@@ -35,30 +35,22 @@ def _variables(name: str, quantity: Quantity) -> tuple[Variable, ...]:
     return (
         Variable(
             f"onset_{name}",
-            (),
-            "f8",
             units,
             f"{what} at which vibration sets in along a ramp; not a number where it is there from the start",
         ),
         Variable(
             f"end_{name}",
-            (),
-            "f8",
             units,
             f"{what} at which vibration ends along a ramp; not a number where it lasts to the end",
         ),
-        Variable(f"ramp_{name}", ("ramp_share",), "f8", units, f"mean {what} in parts of a ramp"),
+        Variable(f"ramp_{name}", units, f"mean {what} in parts of a ramp", dims=("ramp_share",)),
     )
 
 
 VARIABLES = (
     *(variable for name, quantity in QUANTITIES.items() for variable in _variables(name, quantity)),
     Variable(
-        "ramp_amplitude",
-        ("strand", "ramp_share"),
-        "f8",
-        "m",
-        "mean band-limited amplitude in parts of a ramp",
+        "ramp_amplitude", "m", "mean band-limited amplitude in parts of a ramp", dims=("strand", "ramp_share")
     ),
 )
 

@@ -31,11 +31,9 @@ __all__ = [
 ]
 
 VARIABLES = (
-    Variable("rung", (), "i1", "", "model of the ladder that answered", Rung),
+    Variable("rung", "", "model of the ladder that answered", dtype="i1", flags=Rung),
     Variable(
         "margin",
-        (),
-        "f8",
         "1",
         "distance of amplitude or slip from its threshold, the nearer one, in e-folds; 0: nothing decided",
     ),

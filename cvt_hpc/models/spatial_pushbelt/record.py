@@ -41,75 +41,66 @@ _OF_STRANDS = tuple(v for v in (*assessment.VARIABLES, *ramp.VARIABLES) if v.dim
 VARIABLES = (
     *pushbelt.VARIABLES,
     *(
-        Variable(f"lateral_{v.name}", v.dims, v.dtype, v.units, f"as {v.name}, out of the plane")
+        Variable(f"lateral_{v.name}", v.units, f"as {v.name}, out of the plane", dims=v.dims, dtype=v.dtype)
         for v in _OF_STRANDS
     ),
     Variable(
         "lateral_spectrum",
-        ("strand", "frequency_bin"),
-        "f8",
         "m",
         "at the probe strongest out of the plane",
+        dims=("strand", "frequency_bin"),
         words="lateral amplitude spectrum",
     ),
-    Variable("sheave_force", ("sheave",), "f8", "N", "mean axial force of the belt on each sheave, outwards"),
-    Variable("sheave_loss", ("sheave",), "f8", "W", "mean friction power of the flanks at each sheave"),
+    Variable("sheave_force", "N", "mean axial force of the belt on each sheave, outwards", dims=("sheave",)),
+    Variable("sheave_loss", "W", "mean friction power of the flanks at each sheave", dims=("sheave",)),
     Variable(
         "net_axial_force",
-        ("pulley",),
-        "f8",
         "N",
         "mean force of the belt on both sheaves along their axis, to the right",
+        dims=("pulley",),
     ),
     Variable(
         "beam_axial_force",
-        ("pulley",),
-        "f8",
         "N",
         "the same by both strands as beams under their mean forces, held without slope at the arcs",
+        dims=("pulley",),
         words="clamped strands",
     ),
     Variable(
         "string_axial_force",
-        ("pulley",),
-        "f8",
         "N",
         "the same by both strands as strings under their mean forces",
+        dims=("pulley",),
         words="strings",
     ),
     Variable(
         "strand_one_sidedness",
-        ("strand",),
-        "f8",
         "1",
         "push force of the right side less the left one's over both, means over the strand",
+        dims=("strand",),
         words="one-sided push in strands",
     ),
     Variable(
         "arc_one_sidedness",
-        ("pulley",),
-        "f8",
         "1",
         "push force of the right side less the left one's over both, means over the arc",
+        dims=("pulley",),
         words="one-sided push in arcs",
     ),
     *(
-        Variable(f"largest_{angle}", (), "f8", "rad", f"largest {words} of an element over the judged part")
+        Variable(f"largest_{angle}", "rad", f"largest {words} of an element over the judged part")
         for angle, words in zip(
             ANGLES, ("lateral lean", "yaw out of the plane", "tilt against the rings"), strict=True
         )
     ),
-    Variable("largest_nose_force", (), "f8", "N", "largest force of a nose over the judged part"),
+    Variable("largest_nose_force", "N", "largest force of a nose over the judged part"),
     Variable(
         "mean_tension_difference",
-        ("strand",),
-        "f8",
         "N",
         "ring tension of the right package less the left one's; not a number with one flow for both",
+        dims=("strand",),
     ),
-    Variable(
-        "final_misalignment", (), "f8", "m", "mean axial offset of the pulleys' mid planes as sheaves stand"
-    ),
+    Variable("final_misalignment", "m", "mean axial offset of the pulleys' mid planes as sheaves stand"),
 )
 
 
