@@ -28,11 +28,8 @@ from cvt_hpc.vibration.agreement import PairClass
 from cvt_hpc.vibration.hysteresis import StartClass
 
 Array = NDArray[np.float64]
-MOST, FAR, MANY = (
-    0.98,
-    1.5,
-    20,
-)  # share of values on a scale, where the others reach so far beyond; of so many
+# share of values on a scale, where the others reach so far beyond; of so many
+MOST, FAR, MANY = 0.98, 1.5, 20
 MOST_BORDERS = 20_000  # sides between cells of different class: more would hide the cells
 Mask = NDArray[np.bool_]
 CellClass = OccurrenceClass | StartClass | PairClass

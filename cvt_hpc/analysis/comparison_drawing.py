@@ -3,7 +3,6 @@
 from __future__ import annotations
 
 from pathlib import Path
-from textwrap import fill
 
 import numpy as np
 from matplotlib.axes import Axes
@@ -13,7 +12,7 @@ from numpy.typing import NDArray
 from cvt_hpc.analysis import cells
 from cvt_hpc.analysis.arrangement import Arrangement, arrange, first_panel
 from cvt_hpc.analysis.comparison import Comparison
-from cvt_hpc.analysis.figures import WIDTH, draw
+from cvt_hpc.analysis.figures import WIDTH, draw, entitle
 from cvt_hpc.analysis.maps import TITLE_HEIGHT, draw_block, sheet_of
 from cvt_hpc.analysis.scatter import draw_samples, is_sampled, scatter_height
 from cvt_hpc.vibration.agreement import CONTRADICTIONS, NEAR
@@ -57,7 +56,7 @@ def _figure(found: Comparison, sources: tuple[str, str]) -> Figure:
     cells.class_legend(above, kinds, 3)
     _draw_amplitudes(below, found)
     lines = _title(found, pairs, sources) + list(arrangement.notes)
-    figure.suptitle("\n".join(fill(line, 72) for line in lines))
+    entitle(figure, lines)
     return figure
 
 

@@ -11,7 +11,6 @@ from __future__ import annotations
 
 from collections.abc import Mapping
 from dataclasses import dataclass, replace
-from pathlib import Path
 from typing import Any
 
 import numpy as np
@@ -20,7 +19,7 @@ from matplotlib.axes import Axes
 from matplotlib.figure import Figure
 from numpy.typing import NDArray
 
-from cvt_hpc.analysis import cells
+from cvt_hpc.analysis import cells, figures
 from cvt_hpc.analysis.arrangement import CHOSEN, Arrangement, Ruler, Sides, arrange, ruler, value_text
 from cvt_hpc.analysis.classes import (
     OccurrenceClass,
@@ -32,18 +31,6 @@ from cvt_hpc.analysis.classes import (
 )
 from cvt_hpc.analysis.conversion import standard
 from cvt_hpc.analysis.eigenfrequencies import eigenfrequency_figure
-from cvt_hpc.analysis.figures import (
-    LONG,
-    WIDTH,
-    as_written,
-    draw,
-    fitting,
-    headline,
-    headlines,
-    in_words,
-    on_a_page,
-    styled,
-)
 from cvt_hpc.analysis.hysteresis_bands import ALONG, draw_onsets
 from cvt_hpc.analysis.scatter import is_sampled, scatter_figure
 from cvt_hpc.analysis.starts import has_starts, join_starts
@@ -60,19 +47,7 @@ TITLE_LETTERS = 78  # of titles side by side
 ONE_ROW = Ruler(np.zeros(1), np.array([-0.5, 0.5]), np.empty(0), (), "")
 
 
-def draw_map(
-    dataset: xr.Dataset,
-    out: Path,
-    at: Mapping[str, Any] | None = None,
-    source: str = "results",
-    sides: Sides = CHOSEN,
-    vmax: float | None = None,
-) -> Path:
-    """Write the figure of `map_figure`."""
-    return draw(lambda: map_figure(dataset, at, source, sides, vmax), out)
-
-
-@styled
+@figures.styled
 def map_figure(
     dataset: xr.Dataset,
     at: Mapping[str, Any] | None = None,
@@ -168,7 +143,7 @@ class Sheet:
     @property
     def smallest_cell(self) -> tuple[float, float]:
         """Width and height of the smallest cell [point]."""
-        width = (WIDTH - 1.9) / self.columns  # ticks, labels and the colour bar take the rest
+        width = (figures.WIDTH - 1.9) / self.columns  # ticks, labels and the colour bar take the rest
         height = self.panel_height - TITLE_HEIGHT
         return (
             72 * width * np.diff(self.x.edges).min() / np.ptp(self.x.edges),
@@ -185,7 +160,7 @@ class Sheet:
 def _grid_figure(arrangement: Arrangement, vmax: float | None, source: str) -> Figure:
     """Compose the map of a study over a grid; to be called within STYLE."""
     sheet = sheet_of(arrangement, source)
-    figure = Figure((WIDTH, sheet.height + FRAME), layout="constrained")
+    figure = Figure((figures.WIDTH, sheet.height + FRAME), layout="constrained")
     # not shared: matplotlib would go through all panels for each
     axes = figure.subplots(sheet.blocks * sheet.rows, sheet.columns, squeeze=False)
     norm = cells.norm_over(sheet.amplitude, 0.0, None if vmax is None else 1e6 * vmax)
@@ -203,7 +178,7 @@ def _grid_figure(arrangement: Arrangement, vmax: float | None, source: str) -> F
         )
         draw_block(figure, axes[sheet.rows :], sheet, sheet.frequency, frequency)
     onset = _draw_onsets(axes, sheet)
-    figure.suptitle(_title(sheet))
+    figures.entitle(figure, _title(sheet))
     figure.supylabel(sheet.y.label, fontsize=10)
     styles, columns = cells.STYLES, cells.LEGEND_COLUMNS
     if "starts" in arrangement.dataset.attrs:
@@ -217,7 +192,7 @@ def _grid_figure(arrangement: Arrangement, vmax: float | None, source: str) -> F
 
 def _lay_out(figure: Figure, inner: list[Axes]) -> None:
     """Find the places of all panels by the outer ones, once: to ask each takes as long as to draw it."""
-    as_written(figure)
+    figures.as_written(figure)
     for ax in inner:
         ax.set_visible(False)
     engine = figure.get_layout_engine()
@@ -280,16 +255,20 @@ def _laid_out(sheet: Sheet, source: str, frame: float) -> Sheet:
     for columns in range(1, min(ROOMY, sheet.panels) + 1):
         roomy = replace(sheet, columns=columns)
         roomy = replace(roomy, panel_height=roomy.wanted_height)
-        if roomy.height + frame <= LONG:
+        if roomy.height + frame <= figures.LONG:
             return roomy
     name = sheet.arrangement.panel
     then = f"fix an axis, as by `--at {name}=VALUE`, or choose another one by `--panel AXIS`"
     counts = range(1, min(MOST_COLUMNS, sheet.panels) + 1)
     sizes = LEAST, sheet.wanted_height
-    grid = fitting(sheet.panels, counts, sizes, 0.5 * (LONG - frame)) if sheet.has_frequency else None
+    grid = (
+        figures.fitting(sheet.panels, counts, sizes, 0.5 * (figures.LONG - frame))
+        if sheet.has_frequency
+        else None
+    )
     if grid is None:
         sheet = replace(sheet, frequency=np.full_like(sheet.frequency, np.nan))
-        grid = on_a_page(sheet.panels, counts, sizes, frame, source, then)
+        grid = figures.on_a_page(sheet.panels, counts, sizes, frame, source, then)
     return replace(sheet, columns=grid.columns, panel_height=grid.height)
 
 
@@ -318,7 +297,7 @@ def _label_panel(ax: Axes, sheet: Sheet, panel: int) -> None:
     name = sheet.arrangement.panel
     if name:
         text = value_text(sheet.arrangement.dataset[name], panel)
-        heading = f"{in_words(sheet.arrangement.dataset[name])}: " if sheet.columns <= NAMED else ""
+        heading = f"{figures.in_words(sheet.arrangement.dataset[name])}: " if sheet.columns <= NAMED else ""
         ax.set_title(shortened(f"{heading}{text}", TITLE_LETTERS // sheet.columns), loc="left", pad=3)
     sheet.x.lay_out(ax.xaxis)
     sheet.y.lay_out(ax.yaxis)
@@ -332,11 +311,14 @@ def _label_panel(ax: Axes, sheet: Sheet, panel: int) -> None:
         ax.set_xlabel(sheet.x.label)
 
 
-def _title(sheet: Sheet) -> str:
+def _title(sheet: Sheet) -> list[str]:
     """What, of which job, how many runs of each class, and what is fixed."""
     runs, inferred = sheet.classes[~sheet.inferred], sheet.classes[sheet.inferred]
     attributes = sheet.arrangement.dataset.attrs
-    lines = [headline(attributes), f"{runs.size} {'cells' if 'starts' in attributes else 'runs'}: "]
+    lines = [
+        figures.headline("Vibration occurrence", attributes),
+        f"{runs.size} {'cells' if 'starts' in attributes else 'runs'}: ",
+    ]
     lines[1] += count_classes(runs)
     if "starts" in attributes:
         lines.append(f"each from a small and a large start: disturbance {attributes['starts']}")
@@ -344,9 +326,9 @@ def _title(sheet: Sheet) -> str:
         lines.append(f"{inferred.size} cells inferred: {count_classes(inferred)}")
     lines.append(", ".join(sheet.arrangement.notes))
     if sheet.arrangement.panel and sheet.columns > NAMED:
-        lines.append(f"panels: {in_words(sheet.arrangement.dataset[sheet.arrangement.panel])}")
+        lines.append(f"panels: {figures.in_words(sheet.arrangement.dataset[sheet.arrangement.panel])}")
     if sheet.writes_frequency:
         lines.append("in the cells: dominant frequency [Hz]")
     if sheet.has_room and np.isfinite(sheet.irregular).any():
         lines.append("in irregular cells: amplitude [µm]")
-    return headlines(lines)
+    return lines

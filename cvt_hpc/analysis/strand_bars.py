@@ -13,9 +13,9 @@ from matplotlib.figure import Figure
 from cvt_hpc.analysis.arrangement import CHOSEN, Sides, arrange, check_sides, ruler
 from cvt_hpc.analysis.classes import check_results
 from cvt_hpc.analysis.curves import panels_of
-from cvt_hpc.analysis.figures import WIDTH, balanced, check_known, coordinate_unit, styled
+from cvt_hpc.analysis.figures import WIDTH, check_known, coordinate_unit, entitle, headline, styled
 from cvt_hpc.analysis.ticks import put_ticks, short_numbers
-from cvt_hpc.errors import mismatch, one_line
+from cvt_hpc.errors import mismatch
 from cvt_hpc.variables import Status
 
 HEIGHT = 3.8  # [inch]
@@ -62,9 +62,7 @@ def strand_bars_figure(
     row[0].set_ylabel("push force | ring tension [kN]")
     handles, labels = row[0].get_legend_handles_labels()
     figure.legend(handles, labels, loc="outside lower center", frameon=False, ncols=4)
-    job = one_line(dataset.attrs.get("job_name", ""))
-    lines = [f"Forces in the strands: {job}".removesuffix(": "), *notes]
-    figure.suptitle("\n".join(balanced(line, 76) for line in lines))
+    entitle(figure, [headline("Forces in the strands", dataset.attrs), *notes], 76)
     return figure
 
 

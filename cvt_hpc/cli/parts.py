@@ -34,11 +34,12 @@ _SUBJECTS = {
 
 
 def add_command(
-    commands: Any, name: str, call: Callable[[Any], int], text: str, subject: str
+    commands: Any, name: str, call: Callable[[Any], int], text: str, subject: str = "", end: str = "."
 ) -> argparse.ArgumentParser:
-    """Return a new command; `subject`, what it is about, is one of the keys of _SUBJECTS."""
-    command = commands.add_parser(name, help=text, description=f"{text[0].upper()}{text[1:]}.")
-    command.add_argument("path", type=Path, metavar=subject, help=_SUBJECTS[subject])
+    """Return a new command; `subject`, what it is about, is one of the keys of _SUBJECTS, if there is any."""
+    command = commands.add_parser(name, help=text, description=f"{text[0].upper()}{text[1:]}{end}")
+    if subject:
+        command.add_argument("path", type=Path, metavar=subject, help=_SUBJECTS[subject])
     command.set_defaults(command=call)
     return command
 

@@ -15,7 +15,7 @@ from cvt_hpc.errors import mismatch, show, unknown
 from cvt_hpc.fit.job import NUMBERS, TABLE, Case, Fit, Free, share_of
 from cvt_hpc.fit.targets import read_targets, unit_of
 from cvt_hpc.job import Job, build_job
-from cvt_hpc.job.assignments import Assignments, split_assignments, structured
+from cvt_hpc.job.assignments import Assignments, split_assignments, take_own
 from cvt_hpc.job.axes import read_values
 from cvt_hpc.job.document import read_document
 from cvt_hpc.job.notices import warn_of_notices
@@ -47,16 +47,14 @@ def load_fit(path: str | Path, overrides: Assignments = ()) -> Fit:
     source, document = str(path), read_document(Path(path))
     where = f"{source}: [{TABLE}]"
     replaced = split_assignments(overrides, source, "--set")
-    prefix = f"{TABLE}."
-    own_keys = [key for key in replaced if key.startswith(prefix)]
-    put = {key.removeprefix(prefix): structured(replaced.pop(key)) for key in own_keys}
+    put = take_own(replaced, TABLE)
     if TABLE not in document:
         then = "`cvt-hpc examples fit_lebrecht` copies a job that has one"
         raise mismatch(where, "a table of cases and targets", "nothing", then)
     table = document.pop(TABLE)
     for key in put:
         if key not in NUMBERS:
-            raise unknown(f"{source}: --set {prefix}{key}", "number of [fit]", key, NUMBERS)
+            raise unknown(f"{source}: --set {TABLE}.{key}", "number of [fit]", key, NUMBERS)
     if isinstance(table, Mapping):
         table = {**table, **put}
     own = read_table(NUMBERS, table, where, _TABLES)

@@ -21,11 +21,7 @@ from cvt_hpc.steppers.system import System, all_finite, size
 
 FACTS = Facts(
     order=5,
-    order_at_events=None,
     adaptive=True,
-    needs=frozenset({"rates"}),
-    implicit=False,
-    l_stable=False,
     width_limit=0.1,
     stability="the control keeps the step below 3.3 / d for a damping rate d (friction: "
     "d = N mu / (m v_reg), while errors allowed in a speed are below 0.1 v_reg) and 1.0 / w for a vibration "

@@ -84,13 +84,13 @@ class Facts:
     """
 
     order: int
-    order_at_events: float | None
-    adaptive: bool
-    needs: frozenset[str]
-    implicit: bool
-    l_stable: bool
     stability: str
     damping: str
+    order_at_events: float | None = None
+    adaptive: bool = False
+    needs: frozenset[str] = frozenset({"rates"})
+    implicit: bool = False
+    l_stable: bool = False
     rest_limit: float = inf
     width_limit: float = inf
     vibration_limit: float = inf

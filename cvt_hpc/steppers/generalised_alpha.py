@@ -30,10 +30,7 @@ from cvt_hpc.steppers.system import System
 FACTS = Facts(
     order=2,
     order_at_events=0.98,
-    adaptive=False,
-    needs=frozenset({"rates"}),
     implicit=True,
-    l_stable=False,
     stability="no limit; solvable in one way only while step times the steepest growth rate (falling "
     "friction: N |mu'| / m) is below (1 + r) (3 - r) / 2, r the spectral radius",
     damping="a vibration decays at the rate ((1 - r) / (1 + r))^3 step^3 w^4 / 4, what is too fast for the "

@@ -32,10 +32,7 @@ from cvt_hpc.steppers.system import SetValuedSystem
 FACTS = Facts(
     order=1,
     order_at_events=1.0,
-    adaptive=False,
     needs=frozenset({"rates", "partition", "friction"}),
-    implicit=False,
-    l_stable=False,
     vibration_limit=2.0,
     stability="step < 2 / w for a vibration of frequency w, step < 2 / d for a damping rate d (rising "
     "friction: N |mu'| / m); dry friction and rigid contact set no limit",

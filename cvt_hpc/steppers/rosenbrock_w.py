@@ -33,8 +33,6 @@ from cvt_hpc.steppers.system import System, size
 FACTS = Facts(
     order=2,
     order_at_events=0.98,
-    adaptive=False,
-    needs=frozenset({"rates"}),
     implicit=True,
     l_stable=True,
     rest_limit=4.0,

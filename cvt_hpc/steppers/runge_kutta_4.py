@@ -21,10 +21,6 @@ from cvt_hpc.steppers.system import System
 FACTS = Facts(
     order=4,
     order_at_events=0.92,
-    adaptive=False,
-    needs=frozenset({"rates"}),
-    implicit=False,
-    l_stable=False,
     rest_limit=2.785,
     vibration_limit=2.828,
     stability="step < 2.828 / w for a vibration of frequency w, step < 2.785 / d for a damping rate d "

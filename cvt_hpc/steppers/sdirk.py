@@ -29,8 +29,6 @@ from cvt_hpc.steppers.system import System
 FACTS = Facts(
     order=3,
     order_at_events=1.05,
-    adaptive=False,
-    needs=frozenset({"rates"}),
     implicit=True,
     l_stable=True,
     stability="no limit; growth is growth only while step times the steepest growth rate (falling friction: "

@@ -25,10 +25,7 @@ from cvt_hpc.steppers.system import System
 FACTS = Facts(
     order=1,
     order_at_events=0.94,
-    adaptive=False,
     needs=frozenset({"rates", "partition"}),
-    implicit=False,
-    l_stable=False,
     rest_limit=2.0,
     vibration_limit=2.0,
     stability="step < 2 / w for a vibration of frequency w, step < 2 / d for a damping rate d (friction: "

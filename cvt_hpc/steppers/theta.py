@@ -25,10 +25,7 @@ from cvt_hpc.steppers.system import System
 FACTS = Facts(
     order=2,
     order_at_events=0.97,
-    adaptive=False,
-    needs=frozenset({"rates"}),
     implicit=True,
-    l_stable=False,
     stability="no limit; solvable in one way only while theta step times the steepest growth rate (falling "
     "friction: N |mu'| / m) is below 1",
     damping="theta = 1/2: none, and none of what is too fast for the step; else at the rate "
