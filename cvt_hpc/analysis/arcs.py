@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 from collections.abc import Sequence
+from typing import Any
 
 import numpy as np
 import xarray as xr
@@ -17,6 +18,7 @@ INWARDS, OUTWARDS = "#0072b2", "#d55e00"
 PARTS = {"radial_sliding": "#0072b2", "tangential_sliding": "#009e73"}
 LINES = ("-", "--", ":")
 ARROWS = 11  # along a wrap
+ARROW: dict[str, Any] = {"angles": "xy", "scale_units": "xy", "scale": 1.0, "width": 0.009, "zorder": 3}
 LONGEST = 0.33  # of the pulley's radius: the longest arrow of a kind
 DEPTH = 0.25  # of the radius: how deep the way into the groove is drawn
 PULLEYS = ("driving", "driven")
@@ -118,17 +120,7 @@ def _draw_vectors(axes: Axes, arc: _Arc) -> None:
         (0.5 * friction, "#333333", "direction of friction on the element"),
     ):
         vector = vector[:, at] * (1e3 * LONGEST * arc.radius / (longest if name == SLIDES else 1.0))
-        axes.quiver(
-            *points[:, at],
-            *vector,
-            angles="xy",
-            scale_units="xy",
-            scale=1.0,
-            color=colour,
-            width=0.009,
-            label=name,
-            zorder=3,
-        )
+        axes.quiver(*points[:, at], *vector, color=colour, label=name, **ARROW)
         axes.update_datalim((points[:, at] + vector).T)
     arc.frame(axes)
 
@@ -164,8 +156,7 @@ def spiral_figure(history: xr.Dataset, pulley: str) -> Figure:
     vectors = speed[at] * arc.outward[:, at] * (1e3 * LONGEST * arc.radius / np.abs(speed).max())
     for sign, colour, name in ((-1.0, INWARDS, "moves inwards"), (1.0, OUTWARDS, "moves outwards")):
         which = sign * speed[at] > 0.0
-        style = {"angles": "xy", "scale_units": "xy", "scale": 1.0, "width": 0.009, "zorder": 3}
-        plane.quiver(*points[:, at[which]], *vectors[:, which], color=colour, label=name, **style)
+        plane.quiver(*points[:, at[which]], *vectors[:, which], color=colour, label=name, **ARROW)
     plane.update_datalim((points[:, at] + vectors).T)
     arc.frame(plane)
     plane.legend(loc="lower center", frameon=False, fontsize=9)

@@ -18,6 +18,7 @@ from cvt_hpc.analysis.ticks import number, put_ticks, short_numbers
 from cvt_hpc.errors import InputError, few_of, mismatch, show, unknown
 from cvt_hpc.job.shown import shown_as_read, shown_number, shown_unit
 
+At = Mapping[str, Any] | None  # axes to fix: value by name, a number [SI] or a text
 MOST_VALUES_NAMED = 12
 FEW, FEW_ON_DECADES = 12, 6  # values of an axis that have ticks of their own
 FEW_DECADES = 2.5  # on which 1, 2 and 5 have labels, not powers of ten alone
@@ -285,6 +286,9 @@ class Ruler:
             put_ticks(axis, self.ticks, self.tick_labels)
         if self.minor.size:
             axis.set_ticks(self.minor, minor=True)
+
+
+ONE_ROW = Ruler(np.zeros(1), np.array([-0.5, 0.5]), np.empty(0), (), "")
 
 
 def ruler(coordinate: xr.DataArray) -> Ruler:

@@ -120,19 +120,9 @@ def _draw_amplitudes(figure: SubFigure, found: Comparison) -> None:
     low, high = LOWEST * known, 1.5 * max(a[drawn].max(), b[drawn].max())
     for kind, style in cells.ALL_STYLES.items():
         of_kind = drawn & (found.pairs == kind)
-        axes.plot(
-            np.clip(a[of_kind], low, None),
-            np.clip(b[of_kind], low, None),
-            linestyle="",
-            marker=style.mark,
-            markersize=4.0 * style.mark_size,
-            color=style.fill,
-            markeredgecolor="#000000",
-            markeredgewidth=0.5,
-            clip_on=False,
-            zorder=2,
-            rasterized=True,
-        )
+        look = {**style.marks(4.0), "color": style.fill, "mec": "#000000", "mew": 0.5, "zorder": 2}
+        x, y = (np.clip(amplitude[of_kind], low, None) for amplitude in (a, b))
+        axes.plot(x, y, **look, clip_on=False, rasterized=True)
     _draw_guides(axes, threshold, low, high)
 
 

@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from collections.abc import Mapping, Sequence
+from collections.abc import Sequence
 from typing import Any
 
 import numpy as np
@@ -12,7 +12,7 @@ from matplotlib.figure import Figure
 from matplotlib.lines import Line2D
 
 from cvt_hpc.analysis import curves
-from cvt_hpc.analysis.arrangement import Sides, arrange, places, ruler
+from cvt_hpc.analysis.arrangement import At, Sides, arrange, places, ruler
 from cvt_hpc.analysis.classes import check_results, occurrence_classes
 from cvt_hpc.analysis.error_axes import COLOURS
 from cvt_hpc.analysis.figures import WIDTH, headline, in_words, styled
@@ -28,7 +28,7 @@ INK = "#333333"  # of styles in the legend, which colours do not tell
 def curves_figure(
     dataset: xr.Dataset,
     quantities: Sequence[str],
-    at: Mapping[str, Any] | None = None,
+    at: At = None,
     source: str = "results",
     lines: str | None = None,
 ) -> Figure:
@@ -40,11 +40,7 @@ def curves_figure(
 
 @styled
 def curve_panels_figure(
-    dataset: xr.Dataset,
-    groups: Sequence[Sequence[str]],
-    lines: str,
-    at: Mapping[str, Any] | None = None,
-    source: str = "results",
+    dataset: xr.Dataset, groups: Sequence[Sequence[str]], lines: str, at: At = None, source: str = "results"
 ) -> Figure:
     """Draw quantities over an axis, by another axis.
 

@@ -10,7 +10,16 @@ import xarray as xr
 from matplotlib.axes import Axes
 from matplotlib.figure import Figure
 
-from cvt_hpc.analysis.arrangement import Arrangement, Ruler, arrange, first_panel, places, ruler, value_text
+from cvt_hpc.analysis.arrangement import (
+    Arrangement,
+    At,
+    Ruler,
+    arrange,
+    first_panel,
+    places,
+    ruler,
+    value_text,
+)
 from cvt_hpc.analysis.cells import STYLES
 from cvt_hpc.analysis.classes import WITHOUT_RESULT, check_results, occurrence_classes
 from cvt_hpc.analysis.error_axes import COLOURS, MARKERS
@@ -29,10 +38,7 @@ MARKS = tuple(mark for mark in MARKERS if mark not in {STYLES[kind].mark for kin
 
 @styled
 def curve_figure(
-    dataset: xr.Dataset,
-    quantities: Sequence[str],
-    at: Mapping[str, Any] | None = None,
-    source: str = "results",
+    dataset: xr.Dataset, quantities: Sequence[str], at: At = None, source: str = "results"
 ) -> Figure:
     """Draw quantities over an axis.
 

@@ -9,7 +9,6 @@ amplitude is written where there is room.
 
 from __future__ import annotations
 
-from collections.abc import Mapping
 from dataclasses import dataclass, replace
 from typing import Any
 
@@ -19,8 +18,8 @@ from matplotlib.axes import Axes
 from matplotlib.figure import Figure
 from numpy.typing import NDArray
 
+from cvt_hpc.analysis import arrangement as layout
 from cvt_hpc.analysis import cells, figures
-from cvt_hpc.analysis.arrangement import CHOSEN, Arrangement, Ruler, Sides, arrange, ruler, value_text
 from cvt_hpc.analysis.classes import (
     OccurrenceClass,
     at_strongest_strand,
@@ -44,15 +43,14 @@ SMALLEST_APART = 3.0  # [point]: on smaller cells marks, and the lines between, 
 TITLE_HEIGHT = 0.42  # [inch], of a panel with the space around it
 LEAST = TITLE_HEIGHT + 0.6  # [inch], of a panel that is readable
 TITLE_LETTERS = 78  # of titles side by side
-ONE_ROW = Ruler(np.zeros(1), np.array([-0.5, 0.5]), np.empty(0), (), "")
 
 
 @figures.styled
 def map_figure(
     dataset: xr.Dataset,
-    at: Mapping[str, Any] | None = None,
+    at: layout.At = None,
     source: str = "results",
-    sides: Sides = CHOSEN,
+    sides: layout.Sides = layout.CHOSEN,
     vmax: float | None = None,
 ) -> Figure:
     """Draw where vibration occurs.
@@ -75,7 +73,7 @@ def map_figure(
     dataset = standard(dataset, source)
     check_results(dataset, source)
     if is_sampled(dataset):
-        if sides != CHOSEN:
+        if sides != layout.CHOSEN:
             raise mismatch(
                 f"{source}: x, y, panel", "results over a grid", "samples, in a panel for each pair"
             )
@@ -84,16 +82,16 @@ def map_figure(
         return eigenfrequency_figure(dataset, at or {}, source, sides)
     if has_starts(dataset, at or {}):
         dataset = join_starts(dataset)
-    return _grid_figure(arrange(dataset, at or {}, source, sides), vmax, source)
+    return _grid_figure(layout.arrange(dataset, at or {}, source, sides), vmax, source)
 
 
 @dataclass(frozen=True)
 class Sheet:
     """What the panels show, arrays of shape (panel, row, column), and where."""
 
-    arrangement: Arrangement
-    x: Ruler
-    y: Ruler
+    arrangement: layout.Arrangement
+    x: layout.Ruler
+    y: layout.Ruler
     classes: NDArray[np.int8]
     inferred: NDArray[np.bool_]  # whether the class of a cell is not that of a run
     amplitude: NDArray[np.float64]  # [um], nan where a run does not vibrate
@@ -157,7 +155,7 @@ class Sheet:
         return width >= 22 and height >= 22  # [point]
 
 
-def _grid_figure(arrangement: Arrangement, vmax: float | None, source: str) -> Figure:
+def _grid_figure(arrangement: layout.Arrangement, vmax: float | None, source: str) -> Figure:
     """Compose the map of a study over a grid; to be called within STYLE."""
     sheet = sheet_of(arrangement, source)
     figure = Figure((figures.WIDTH, sheet.height + FRAME), layout="constrained")
@@ -171,7 +169,11 @@ def _grid_figure(arrangement: Arrangement, vmax: float | None, source: str) -> F
     for kind, values in texts:
         panels = zip(axes.flat, sheet.classes, values, sheet.amplitude, strict=False)
         for ax, classes, numbers, fills in panels:
-            cells.write_values(ax, sheet.x, sheet.y, kind, classes, numbers, fills, amplitude)
+            for row, column in np.argwhere((classes == kind) & np.isfinite(numbers)):
+                (fill,) = cells.fills_of(kind, fills[row : row + 1, column], amplitude)
+                value, place = numbers[row, column], (sheet.x.centres[column], sheet.y.centres[row])
+                text = f"{value:.0f}" if value >= 10.0 else f"{value:.2g}"
+                cells.write_value(ax, place, text, fill, above=2.5)
     if sheet.blocks == 2:
         frequency = cells.Scale(
             cells.FREQUENCY_COLOURS, cells.norm_over(sheet.frequency), "dominant frequency [Hz]"
@@ -218,7 +220,7 @@ def _draw_onsets(axes: NDArray[Any], sheet: Sheet) -> list[Any]:
     return list(handles.values())
 
 
-def sheet_of(arrangement: Arrangement, source: str = "results", frame: float = FRAME) -> Sheet:
+def sheet_of(arrangement: layout.Arrangement, source: str = "results", frame: float = FRAME) -> Sheet:
     """The arranged variables with all three dimensions, missing ones of length one, laid out on a page.
 
     `frame` [inch] is what else the page holds; InputError, which names the source, where it is too small.
@@ -239,8 +241,8 @@ def sheet_of(arrangement: Arrangement, source: str = "results", frame: float = F
     amplitude = grid(at_strongest_strand(dataset, "amplitude")) * 1e6
     sheet = Sheet(
         arrangement,
-        ruler(dataset[arrangement.x]),
-        ruler(dataset[arrangement.y]) if arrangement.y else ONE_ROW,
+        layout.ruler(dataset[arrangement.x]),
+        layout.ruler(dataset[arrangement.y]) if arrangement.y else layout.ONE_ROW,
         classes,
         classes != runs,
         np.where(vibrating, amplitude, np.nan),
@@ -296,7 +298,7 @@ def _label_panel(ax: Axes, sheet: Sheet, panel: int) -> None:
     """Title and ticks of a panel."""
     name = sheet.arrangement.panel
     if name:
-        text = value_text(sheet.arrangement.dataset[name], panel)
+        text = layout.value_text(sheet.arrangement.dataset[name], panel)
         heading = f"{figures.in_words(sheet.arrangement.dataset[name])}: " if sheet.columns <= NAMED else ""
         ax.set_title(shortened(f"{heading}{text}", TITLE_LETTERS // sheet.columns), loc="left", pad=3)
     sheet.x.lay_out(ax.xaxis)

@@ -2,15 +2,12 @@
 
 from __future__ import annotations
 
-from collections.abc import Mapping
-from typing import Any
-
 import numpy as np
 import xarray as xr
 from matplotlib.axes import Axes
 from matplotlib.figure import Figure
 
-from cvt_hpc.analysis.arrangement import CHOSEN, Sides, arrange, check_sides, ruler
+from cvt_hpc.analysis.arrangement import CHOSEN, At, Sides, arrange, check_sides, ruler
 from cvt_hpc.analysis.classes import check_results
 from cvt_hpc.analysis.curves import panels_of
 from cvt_hpc.analysis.figures import WIDTH, check_known, coordinate_unit, entitle, headline, styled
@@ -27,10 +24,7 @@ NEEDED = ("mean_ring_tension", "mean_push_force")
 
 @styled
 def strand_bars_figure(
-    dataset: xr.Dataset,
-    at: Mapping[str, Any] | None = None,
-    source: str = "results",
-    sides: Sides = CHOSEN,
+    dataset: xr.Dataset, at: At = None, source: str = "results", sides: Sides = CHOSEN
 ) -> Figure:
     """Draw for each run what each strand carries: ring tension above zero, push force below.
 

@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from collections.abc import Mapping, Sequence
+from collections.abc import Sequence
 from textwrap import fill
 from typing import Any, NamedTuple
 
@@ -18,7 +18,6 @@ from cvt_hpc.analysis import arrangement as layout
 from cvt_hpc.analysis import cells, figures
 from cvt_hpc.analysis.classes import WITHOUT_RESULT, check_results, count_classes, occurrence_classes
 from cvt_hpc.analysis.curves import check_quantities
-from cvt_hpc.analysis.maps import ONE_ROW
 from cvt_hpc.analysis.scatter import is_sampled
 from cvt_hpc.errors import mismatch, one_line
 from cvt_hpc.vibration.classes import OccurrenceClass
@@ -64,7 +63,7 @@ class Panel(NamedTuple):
 def value_map_figure(
     dataset: xr.Dataset,
     quantities: Sequence[str],
-    at: Mapping[str, Any] | None = None,
+    at: layout.At = None,
     source: str = "results",
     sides: layout.Sides = layout.CHOSEN,
     vmax: float | None = None,
@@ -104,7 +103,7 @@ def value_map_figure(
     shown = arrangement.dataset
     x, y = (
         layout.ruler(shown[arrangement.x]),
-        layout.ruler(shown[arrangement.y]) if arrangement.y else ONE_ROW,
+        layout.ruler(shown[arrangement.y]) if arrangement.y else layout.ONE_ROW,
     )
     size, (columns, height) = _on_paper(len(panels), y.centres.size, source, arrangement)
     figure = Figure(size, layout="constrained")

@@ -2,9 +2,8 @@
 
 from __future__ import annotations
 
-from collections.abc import Mapping, Sequence
+from collections.abc import Sequence
 from dataclasses import replace
-from typing import Any
 
 import numpy as np
 import xarray as xr
@@ -33,7 +32,7 @@ ORDERS = (1.0, 2.0, 4.0, 8.0, 16.0)  # of the driving pulley, in a Campbell diag
 
 def campbell_figure(
     dataset: xr.Dataset,
-    at: Mapping[str, Any] | None = None,
+    at: layout.At = None,
     source: str = "results",
     orders: Sequence[float] = ORDERS,
     sides: layout.Sides = layout.CHOSEN,
@@ -53,7 +52,7 @@ def campbell_figure(
 @styled
 def waterfall_figure(
     dataset: xr.Dataset,
-    at: Mapping[str, Any] | None = None,
+    at: layout.At = None,
     source: str = "results",
     sides: layout.Sides = layout.CHOSEN,
     orders: Sequence[float] = (),

@@ -58,16 +58,9 @@ def load_chart(path: str | Path, overrides: Assignments = ()) -> Chart:
     if "budget" in table:
         choices, budgeted = budget_points(table["budget"], stages, f"{source}: [chart.budget]")
         points += choices
-    job = points[0].job
-    return Chart(
-        job.name,
-        job.description,
-        source,
-        tuple(stage.scene for stage in stages),
-        tuple(points),
-        **settings,
-        budgeted=budgeted,
-    )
+    job, chosen = points[0].job, tuple(stage.scene for stage in stages)
+    head = job.name, job.description, source
+    return Chart(*head, chosen, tuple(points), **settings, budgeted=budgeted)
 
 
 def _references(scenes: Mapping[str, Any], stages: list[Stage]) -> Iterator[Point]:

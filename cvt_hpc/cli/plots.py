@@ -77,18 +77,12 @@ def _draw(arguments: argparse.Namespace) -> int:
 
 
 def _draw_results(arguments: argparse.Namespace, words: Sequence[str], options: dict[str, Any]) -> None:
-    from cvt_hpc.analysis.conversion import standard
-    from cvt_hpc.job.assignments import read_coordinates
-    from cvt_hpc.study import open_results
-
     source = str(arguments.path)
     out = arguments.out or parts.picture_beside(
         arguments.path, parts.files_of(arguments.path), *words, *arguments.at
     )
-    with open_results(arguments.path) as opened:
-        dataset = standard(opened, source)
-        units = {str(name): array.attrs.get("units") for name, array in dataset.coords.items()}
-        at = read_coordinates(arguments.at, units, source, "--at")
+    with parts.opened_results(arguments.path) as dataset:
+        at = parts.fixed_axes(arguments, dataset, source)
         parts.say(f"picture: {_write(arguments.kind, [dataset], out, at, [source], options)}")
 
 

@@ -84,14 +84,12 @@ def _table(arguments: argparse.Namespace) -> int:
 def _map(arguments: argparse.Namespace) -> int:
     from contextlib import ExitStack
 
-    from cvt_hpc.analysis.conversion import standard
-    from cvt_hpc.job.assignments import read_coordinates, split_assignments
-    from cvt_hpc.study import open_results
+    from cvt_hpc.job.assignments import split_assignments
 
     paths = [arguments.path, *arguments.others]
     source, kind = ", ".join(map(str, paths)), "maps" if arguments.others else "map"
     with ExitStack() as opened:
-        datasets = [standard(opened.enter_context(open_results(path)), str(path)) for path in paths]
+        datasets = [opened.enter_context(parts.opened_results(path)) for path in paths]
         dataset, sides = datasets[0], parts.sides_of(arguments)
         if arguments.others:
             from cvt_hpc.analysis.studies import side_by_side
@@ -100,8 +98,7 @@ def _map(arguments: argparse.Namespace) -> int:
         from cvt_hpc.analysis.arrangement import with_spacings
 
         dataset = with_spacings(dataset, split_assignments(arguments.spacing, source, "--spacing"), source)
-        units = {str(name): array.attrs.get("units") for name, array in dataset.coords.items()}
-        at = read_coordinates(arguments.at, units, source, "--at")
+        at = parts.fixed_axes(arguments, dataset, source)
         from cvt_hpc.analysis.figures import draw
         from cvt_hpc.analysis.maps import map_figure
         from cvt_hpc.analysis.starts import has_starts, start_line
@@ -134,28 +131,23 @@ def _figure(arguments: argparse.Namespace) -> int:
 
 
 def _report(arguments: argparse.Namespace) -> int:
-    from cvt_hpc.analysis.conversion import standard
     from cvt_hpc.report import write_report
-    from cvt_hpc.study import open_results
 
     out = arguments.out or parts.folder_of(arguments.path) / "report.html"
     parts.check_output(out, (".html",))
-    source = str(arguments.path)
-    with open_results(arguments.path) as opened:
-        dataset = standard(opened, source)
-        parts.say(f"report: {write_report(dataset, out, source, parts.folder_of(arguments.path))}")
+    with parts.opened_results(arguments.path) as dataset:
+        written = write_report(dataset, out, str(arguments.path), parts.folder_of(arguments.path))
+        parts.say(f"report: {written}")
     return parts.DONE
 
 
 def _compare(arguments: argparse.Namespace) -> int:
     from cvt_hpc.analysis.comparison import compare
-    from cvt_hpc.analysis.conversion import standard
     from cvt_hpc.printing import comparison_lines
-    from cvt_hpc.study import open_results
 
     sources = str(arguments.path), str(arguments.other)
-    with open_results(arguments.path) as a, open_results(arguments.other) as b:
-        found = compare(standard(a, sources[0]), standard(b, sources[1]), sources)
+    with parts.opened_results(arguments.path) as a, parts.opened_results(arguments.other) as b:
+        found = compare(a, b, sources)
     written = leave_comparison(found, arguments.out or parts.folder_of(arguments.other), sources)
     parts.say(*comparison_lines(found, sources), *written)
     return CONTRADICTING if found.contradicts.any() and not found.are_designs else parts.DONE

@@ -2,8 +2,6 @@
 
 from __future__ import annotations
 
-import hashlib
-import json
 from collections.abc import Iterator, Sequence
 from itertools import combinations
 from pathlib import Path
@@ -18,6 +16,7 @@ from cvt_hpc.fit.confirming import Confirmed
 from cvt_hpc.fit.job import Fit
 from cvt_hpc.fit.scoring import REPRODUCED, Course, areas, verdict
 from cvt_hpc.fit.search import Found
+from cvt_hpc.job.definition import digest
 from cvt_hpc.job.units import from_si
 from cvt_hpc.netcdf import global_attributes
 from cvt_hpc.provenance import origin_lines
@@ -47,9 +46,8 @@ class Table(NamedTuple):
 
 def write_table(fit: Fit, table: Table, folder: Path) -> Path:
     """Write a table with its title and its origin."""
-    numbers = json.dumps(fit.resolved(), sort_keys=True)
-    fingerprint = hashlib.sha256(numbers.encode()).hexdigest()
-    made = global_attributes(fit.job, fit.resolved(), "fit") | {"job_fingerprint": fingerprint}
+    resolved = fit.resolved()
+    made = global_attributes(fit.job, resolved, "fit") | {"job_fingerprint": digest(resolved)}
     rows = ([_cell(cell) for cell in row] for row in table.rows)
     return write_rows(
         folder / f"{table.name}.csv", table.head, rows, [f"# {table.what}\n", *origin_lines(made)]

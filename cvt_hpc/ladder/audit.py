@@ -103,17 +103,11 @@ def audit_of(job: Job, out: Path, fraction: float) -> Repeat:
             "--audit", f"a job of model {AUDITED}, whose cheaper models can err", f"model {job.model}"
         )
     full = built(job, handed_to(job, FULL_MODEL, "done in full, to audit the cheaper models"))
-    return Repeat(
-        "audit",
-        "in full",
-        job,
-        out,
-        AUDIT,
-        full,
-        fraction,
-        _answered,
-        core_seconds=lambda: expected_cost(full, out / AUDIT)[0],
-    )
+
+    def cost() -> float:
+        return expected_cost(full, out / AUDIT)[0]
+
+    return Repeat("audit", "in full", job, out, AUDIT, full, fraction, _answered, core_seconds=cost)
 
 
 def report_audit(audit: Repeat) -> AuditReport:

@@ -20,7 +20,7 @@ import numpy as np
 from cvt_hpc.kernels import kernel
 from cvt_hpc.parameters import Parameter
 from cvt_hpc.solvers.generalised_alpha import generalised_alpha, stage_length
-from cvt_hpc.steppers.facts import RATES, Facts, Result
+from cvt_hpc.steppers.facts import NO_VALUE, RATES, Facts
 from cvt_hpc.steppers.fixed_step import march_in_equal_steps
 from cvt_hpc.steppers.frozen_jacobian import Frozen, frozen
 from cvt_hpc.steppers.newton import solve_stage
@@ -49,7 +49,6 @@ PARAMETERS = {
         "solver_tolerance": SOLVER_TOLERANCE,
     }
 }
-OK, NO_VALUE = int(Result.OK), int(Result.NO_VALUE)
 
 
 class Control(NamedTuple):

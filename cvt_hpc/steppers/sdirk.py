@@ -19,7 +19,7 @@ from typing import NamedTuple
 import numpy as np
 
 from cvt_hpc.kernels import kernel
-from cvt_hpc.steppers.facts import Facts, Result
+from cvt_hpc.steppers.facts import OK, Facts
 from cvt_hpc.steppers.fixed_step import march_in_equal_steps
 from cvt_hpc.steppers.frozen_jacobian import Frozen, frozen
 from cvt_hpc.steppers.newton import solve_stage
@@ -36,7 +36,6 @@ FACTS = Facts(
     damping="a vibration decays at the rate 0.0259 step^3 w^4",
 )
 PARAMETERS = {"numerics": {"step": STEP, "solver_tolerance": SOLVER_TOLERANCE}}
-OK = int(Result.OK)
 control = implicit_step
 
 # root of g^3 - 3 g^2 + 3 g / 2 = 1/6 for which the method is L-stable
