@@ -16,7 +16,6 @@ from cvt_hpc.job import rebuild_job
 from cvt_hpc.physics.friction import friction_coefficients, given_law
 from cvt_hpc.variables import Vibrates
 
-AXES = ("friction_gradient", "radial_speed")
 POINTS = 400
 MARKS = {
     Vibrates.YES: ({"marker": "o", "ms": 4.5}, "fed"),

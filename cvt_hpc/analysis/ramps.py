@@ -267,14 +267,7 @@ def _limits(values: np.ndarray) -> tuple[float, float]:
     return float(values.min()) - margin, float(values.max()) + margin
 
 
-def read_ramp(
-    history: xr.Dataset,
-    of: str,
-    source: str = "history",
-    band: tuple[float, float] = BAND,
-    *,
-    is_ramp: bool = True,
-) -> Ramp:
+def read_ramp(history: xr.Dataset, of: str, source: str = "history", *, is_ramp: bool = True) -> Ramp:
     """What a run does along its ramp, without the start-up before it; arguments as of `ramp_figure`.
 
     Unless it has to be a ramp, a run at constant load and speed has its time [s] in the place of that.
@@ -289,13 +282,13 @@ def read_ramp(
     rate = 1.0 / (time[1] - time[0])
     if time.size - first < WINDOW * rate:
         raise mismatch(source, f"a run of {WINDOW:g} s or more after its start-up", "a shorter one")
-    if rate < 2.0 * band[1]:
-        raise mismatch(source, f"a history of {2.0 * band[1]:g} samples per second or more", f"{rate:.4g}")
+    if rate < 2.0 * BAND[1]:
+        raise mismatch(source, f"a history of {2.0 * BAND[1]:g} samples per second or more", f"{rate:.4g}")
     if of in STRANDS:
         figures.check_known(history, ["displacement"], source)
         probes = [str(name).split()[0] == of for name in history["probe"].values]
         moved = 1e6 * history["displacement"].values[first:, probes]
-        _, amplitude = window_amplitudes(moved, rate, band, WINDOW)
+        _, amplitude = window_amplitudes(moved, rate, BAND, WINDOW)
         motion = moved[:, int(np.argmax(amplitude.max(axis=0)))]
     elif of in history and history[of].dims == ("time",):
         figures.check_known(history, [of], source)

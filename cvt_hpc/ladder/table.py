@@ -98,29 +98,26 @@ def ladder_dataset(
     values = np.full((len(NUMBERS), len(QUESTIONS), len(names)), np.nan)
     for finding in findings:
         values[:, QUESTIONS.index(finding.question), names.index(finding.rung)] = _numbers(finding)
+    units = {"error_median": "", "error_95": "", "core_seconds": "s"}
     variables = {
-        name: (("question", "rung"), array, attributes(words, _unit(name), text))
+        name: (("question", "rung"), array, attributes(words, units.get(name, "1"), text))
         for (name, (words, text)), array in zip(NUMBERS.items(), values, strict=True)
     }
     texts = {"question": np.array(QUESTIONS, object), "rung": np.array(names, object)}
     coordinates = {name: (name, labels, attributes(name)) for name, labels in texts.items()}
-    units = ("question", np.array(list(UNITS.values()), object), attributes("unit of errors"))
+    of_errors = ("question", np.array(list(UNITS.values()), object), attributes("unit of errors"))
     subject = "accuracy against cost of the ladder of models"
     told = {
         **global_attributes(job, job.resolved(), subject, makers=makers),
         "rungs": json.dumps({rung.name: rung.job.resolved() for rung in rungs}),
         "machine": json.dumps(machine()),
     }
-    return xr.Dataset({"error_unit": units, **variables}, coordinates, told)
+    return xr.Dataset({"error_unit": of_errors, **variables}, coordinates, told)
 
 
 def _numbers(finding: Finding) -> tuple[float, ...]:
     """Values of NUMBERS, in their order."""
     return (*finding.score, finding.core_seconds)
-
-
-def _unit(name: str) -> str:
-    return {"error_median": "", "error_95": "", "core_seconds": "s"}.get(name, "1")
 
 
 def _cells(finding: Finding) -> list[str]:
