@@ -10,6 +10,7 @@ from typing import Any
 import numpy as np
 import xarray as xr
 
+from cvt_hpc.analysis.conversion import documented_units
 from cvt_hpc.errors import mismatch
 from cvt_hpc.files import naming_refusals, read_regular
 from cvt_hpc.job.units import to_si
@@ -84,8 +85,10 @@ def _add(dataset: xr.Dataset, column: str, dims: tuple[str, ...], texts: Sequenc
     si = {"um": "m"}.get(unit, unit)
     values = values * (to_si(f"1 {unit}", si) if unit else 1.0)
     head, _, label = name.rpartition("_")
-    attributes = {"units": si or "1"}
     if not head or label not in _LABELS:
+        head, label = name, ""
+    attributes = {"units": si or documented_units(False).get(head, "1")}
+    if not label:
         dataset[name] = (dims, values, attributes)
         return
     extra = _LABELS[label]
