@@ -6,15 +6,10 @@ from collections.abc import Mapping
 from functools import partial
 from typing import Any, NamedTuple, TypeVar
 
-from cvt_hpc.parameters import Parameter
+from cvt_hpc.parameters import Parameter, positive
 
-STEP = Parameter(
-    1e-5,
-    "s",
-    "largest time step; a whole number of steps makes a sampling interval",
-    minimum=0.0,
-    exclusive=True,
-    sensible=(1e-10, 0.5),
+STEP = positive(
+    1e-5, "s", "largest time step; a whole number of steps makes a sampling interval", sensible=(1e-10, 0.5)
 )
 TOLERANCE = Parameter(
     1e-6,
