@@ -21,13 +21,7 @@ from cvt_hpc.models.elastic_belt.grouping import faded_coupling
 from cvt_hpc.models.elastic_belt.pulleys import Pulleys, settled_tilt, with_pulleys
 from cvt_hpc.physics.friction import FrictionLaw, given_law
 from cvt_hpc.physics.geometry import Variator, cell_counts, variator
-from cvt_hpc.physics.sheaves import (
-    Sheaves,
-    axial_element_stiffness,
-    flexibility,
-    sheaves,
-    stiffness_factors,
-)
+from cvt_hpc.physics.sheaves import Sheaves, axial_element_stiffness, flexibility, sheaves, stiffness_factors
 from cvt_hpc.variator import LARGEST_DISPLACEMENT
 from cvt_hpc.variator.measures import Measures, measures, rounded
 from cvt_hpc.vibration.ramped import ramped
@@ -279,7 +273,7 @@ def initial_state(parameters: Mapping[str, Any], belt: Belt) -> State:
     pull = 2.0 * tangent * p["thrust"] / grid.path.driven_wrap
     w = np.zeros(grid.cell.size)
     arcs = []
-    states = np.zeros(len(f.STATES))
+    states = np.zeros(f.STATES)
     for region, sheave, radius, tilted in (
         (0, belt.driving, belt.driving_radius, f.DRIVING_COS),
         (2, belt.driven, belt.driven_radius, f.DRIVEN_COS),

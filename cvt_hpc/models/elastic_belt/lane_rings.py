@@ -159,11 +159,8 @@ def audit_layers(
     share = lane_speed_share(belt, state.time[0], zero)
     belt_speed = share * belt.constants[0, lf.BELT_SPEED]
     relief = c[0, lf.LAYER_RELIEF] * share * share
-    mass, stiffness, ring_stiffness = (
-        c[0, lf.LAYER_MASS],
-        c[0, lf.LAYER_STIFFNESS],
-        belt.constants[0, lf.RING_STIFFNESS],
-    )
+    mass, stiffness = c[0, lf.LAYER_MASS], c[0, lf.LAYER_STIFFNESS]
+    ring_stiffness = belt.constants[0, lf.RING_STIFFNESS]
     offset = belt.constants[0, lf.RING_OFFSET]
     summed = profiles.rows > 0
     least = LEAST_SHARE_OF_WIDTH / c[0, lf.PER_WIDTH]

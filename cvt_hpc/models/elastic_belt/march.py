@@ -1,15 +1,12 @@
-"""Many steps and samples in one call: one loop per step kernel, since a kernel is compiled for its callee."""
+"""Many steps and samples in one call, by any of the belt's own steps."""
 
 from __future__ import annotations
 
-from typing import NamedTuple
+from typing import Any, NamedTuple
 
 from cvt_hpc.kernels import kernel
 from cvt_hpc.lanes import LaneArray, like, merge_parts
 from cvt_hpc.models.elastic_belt import lane_fields as lf
-from cvt_hpc.models.elastic_belt.explicit import ExplicitWork, step_explicit
-from cvt_hpc.models.elastic_belt.imex import step_imex
-from cvt_hpc.models.elastic_belt.imex_stations import ImexWork
 from cvt_hpc.models.elastic_belt.lane_belt import LaneBelt, LaneState
 from cvt_hpc.models.elastic_belt.lane_forces import derive, note_speeds
 from cvt_hpc.models.elastic_belt.sampling import Sensors, sample
@@ -32,10 +29,13 @@ class Sampled(NamedTuple):
 
 
 @kernel
-def march_imex(
+def march(
+    begin: Any,
+    advance: Any,
+    take: Any,
     belt: LaneBelt,
     state: LaneState,
-    work: ImexWork,
+    work: Any,
     step: float,
     steps: int,
     sampled: Sampled,
@@ -50,8 +50,11 @@ def march_imex(
 
     Parameters
     ----------
+    begin, advance, take : kernels
+        begin(belt, state, work) comes first; advance(belt, state, work, step) takes a step; take, with the
+        arguments of `take_sample`, takes a sample.
     belt, state, work
-        As the step kernel takes them.
+        As these kernels take them.
     step, steps : float, int
         Step [s] and their number between samples.
     sampled : Sampled
@@ -61,42 +64,24 @@ def march_imex(
     first, last : int
         Which rows.
     """
+    begin(belt, state, work)
     for k in range(first, last):
         for taken in range(steps):
             note_speeds(belt, state, work.stations, taken, steps)
-            step_imex(belt, state, work, step)
-        take_sample(state, work.stations, sampled, sensing, rows, k, profiles, ended)
+            advance(belt, state, work, step)
+        take(state, work, sampled, sensing, rows, k, profiles, ended)
     gather(state, work.stations, sampled, work.stations.data.shape[1])
 
 
 @kernel
-def march_explicit(
-    belt: LaneBelt,
-    state: LaneState,
-    work: ExplicitWork,
-    step: float,
-    steps: int,
-    sampled: Sampled,
-    sensing: Sensors,
-    rows: LaneArray,
-    first: int,
-    last: int,
-    profiles: LaneArray,
-    ended: LaneArray,
-) -> None:
-    """As `march_imex`, by the explicit step."""
-    for k in range(first, last):
-        for taken in range(steps):
-            note_speeds(belt, state, work.stations, taken, steps)
-            step_explicit(belt, state, work, step)
-        take_sample(state, work.stations, sampled, sensing, rows, k, profiles, ended)
-    gather(state, work.stations, sampled, work.stations.data.shape[1])
+def begin_at_once(belt: LaneBelt, state: LaneState, work: Any) -> None:
+    """Begin a march whose step needs no more than the results of `derive`."""
 
 
 @kernel
 def take_sample(
     state: LaneState,
-    stations: LaneArray,
+    work: Any,
     sampled: Sampled,
     sensing: Sensors,
     rows: LaneArray,
@@ -105,7 +90,7 @@ def take_sample(
     ended: LaneArray,
 ) -> None:
     """Sample the marched belt, which may be in parts."""
-    gather(state, stations, sampled, lf.FIELDS_OF_FORCES)
+    gather(state, work.stations, sampled, lf.FIELDS_OF_FORCES)
     sample(sampled.belt, sampled.state, sampled.stations, sensing, rows, k, profiles, ended)
     # a sample takes it to its end
     state.scalars[0, lf.LAYER_WORK] = like(

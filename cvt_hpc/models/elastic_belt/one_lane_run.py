@@ -14,11 +14,10 @@ from cvt_hpc.models.elastic_belt.belt import Belt, State
 from cvt_hpc.models.elastic_belt.lane_belt import lane_belt, lane_state
 from cvt_hpc.models.elastic_belt.lane_rings import SUMS, audit_layers, lane_rings
 from cvt_hpc.models.elastic_belt.march import sample_state
-from cvt_hpc.models.elastic_belt.momentary import Momentary
-from cvt_hpc.models.elastic_belt.recorded_run import RecordedRun, recording
+from cvt_hpc.models.elastic_belt.recorded_run import RecordedRun, Records
 from cvt_hpc.models.elastic_belt.ring_settings import layer_count
 from cvt_hpc.models.elastic_belt.rings import ring_constants, without_saddle_friction
-from cvt_hpc.models.elastic_belt.sampling import CHANNELS, ENDED, OUTCOME, PROFILES, SCALARS, Outcome
+from cvt_hpc.models.elastic_belt.sampling import OUTCOME, SCALARS, Outcome
 
 _sample, _audit_layers = called_alike(sample_state), called_alike(audit_layers)
 
@@ -36,14 +35,11 @@ class OneLaneRun(RecordedRun):
         parameters : dict
             Parameters of the run but for `duration` and `judged_fraction`.
         """
-        plan = recording(parameters, np.float64)
-        self._profiles = [LaneArray(rows, len(PROFILES), 1) for rows in (0, plan.mesh.cell.size)]
-        RecordedRun.__init__(self, parameters, plan, self._profiles[1].data[:, :, 0])
-        rows = LaneArray(self.samples, self._sensed + len(CHANNELS), 1)
+        RecordedRun.__init__(self, parameters, Records([parameters], 1, np.float64))
+        rows = LaneArray(self.samples, self._records.channels, 1)
         if self.done:
             rows.data[: self.done, :, 0] = self.rows
         self._rows = rows
-        self._momentary = Momentary([parameters], plan.mesh.cell.size)
         # of the part that is not judged, and of the judged one
         self._layer_sums = [LaneArray(layer_count(parameters) + 1, len(SUMS), 1) for _ in range(2)]
 
@@ -55,19 +51,13 @@ class OneLaneRun(RecordedRun):
             self._layers = LaneArray(self.mesh.cell.size, count, 1)
             belt = without_saddle_friction(belt)
         self._lane_belt = lane_belt([belt], np.float64)
-        self._lane = lane_state([belt], [first], np.float64)
+        self._state = lane_state([belt], [first], np.float64)
         self._stations = LaneArray(self.mesh.cell.size, lf.FIELDS_OF_FORCES, 1)
-        self._ended = LaneArray(1, len(ENDED), 1)
 
     @property
     def layer_sums(self) -> np.ndarray | None:
         """As of `RecordedRun`."""
         return self._layer_sums[1].data[:, :, 0] if layer_count(self.parameters) > 1 else None
-
-    @property
-    def momentary(self) -> np.ndarray | None:
-        """Samples of the run that `Momentary` has kept."""
-        return self._momentary.of(0)
 
     @property
     def rows(self) -> np.ndarray:
@@ -79,22 +69,17 @@ class OneLaneRun(RecordedRun):
         self.done, self._disturbed = run.done, run.done > self._plan.kick
         self._rows.data[: self.done, :, 0] = run.rows
         if self.done > self._plan.first_judged:
-            for sums in (self._profiles[1], self._layer_sums[1]):
-                sums.data[:] = np.nan  # sums of the other stepper are not known
+            self._records.without_means()
+            self._layer_sums[1].data[:] = np.nan
 
     def _sample_lane(self) -> Outcome:
         """Record the values in the lane; `done` is left to the caller."""
-        is_judged, is_kept = self.done >= self._plan.first_judged, self.done >= self._momentary.first
-        sums = self._profiles[int(is_judged)]
-        profiles = LaneArray(*self._profiles[1].data.shape) if is_kept else sums
-        place = self._plan.sensing, self._rows, self.done, profiles, self._ended
-        _sample(self._lane_belt, self._lane, self._stations, *place)
-        if layer_count(self.parameters) > 1:
-            first, layer_sums = self._sensed + len(SCALARS), self._layer_sums[int(is_judged)]
-            of_layers = self._lane_belt, self._rings, self._lane, self._layers, self._rows
-            _audit_layers(*of_layers, self.done, first, profiles, layer_sums)
-        if is_kept:
-            self._momentary.note(self.done, profiles)
-            if is_judged:
-                sums.data[:] += profiles.data
-        return Outcome(int(self._ended.data[0, OUTCOME, 0]))
+        layer_sums = self._layer_sums[int(self.done >= self._plan.first_judged)]
+        with self._records.profiles_of(self.done) as profiles:
+            place = self._plan.sensing, self._rows, self.done, profiles, self._records.ended
+            _sample(self._lane_belt, self._state, self._stations, *place)
+            if layer_count(self.parameters) > 1:
+                first = self._sensed + len(SCALARS)
+                of_layers = self._lane_belt, self._rings, self._state, self._layers, self._rows
+                _audit_layers(*of_layers, self.done, first, profiles, layer_sums)
+        return Outcome(int(self._records.ended.data[0, OUTCOME, 0]))

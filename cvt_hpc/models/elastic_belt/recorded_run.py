@@ -1,16 +1,19 @@
-"""Recording of every run of the elastic belt, with any stepper: plan of recording and its reading."""
+"""Recording of every run of the elastic belt, with any stepper: its plan, its arrays and their reading."""
 
 from __future__ import annotations
 
-from collections.abc import Mapping
+from collections.abc import Iterator, Mapping, Sequence
+from contextlib import contextmanager
 from typing import TYPE_CHECKING, Any, NamedTuple
 
 import numpy as np
 
+from cvt_hpc.lanes import LaneArray
 from cvt_hpc.models.elastic_belt.belt import REGIONS, Mesh, mesh
 from cvt_hpc.models.elastic_belt.fluctuation import Fluctuation, fluctuation
+from cvt_hpc.models.elastic_belt.momentary import Momentary
 from cvt_hpc.models.elastic_belt.pulley_settings import are_free
-from cvt_hpc.models.elastic_belt.sampling import CHANNELS, PROFILES, Probe, Sensors, probes, sensors
+from cvt_hpc.models.elastic_belt.sampling import CHANNELS, ENDED, PROFILES, Probe, Sensors, probes, sensors
 from cvt_hpc.models.elastic_belt.validity import doubt
 from cvt_hpc.physics.geometry import Variator
 from cvt_hpc.recording import sample_count, start_up_samples
@@ -74,6 +77,62 @@ def recording(parameters: Mapping[str, Any], dtype: type) -> Recording:
     )
 
 
+class Records:
+    """Arrays that runs which advance together are recorded into, each in a lane.
+
+    Parameters
+    ----------
+    points : sequence of dict
+        Resolved parameters of the runs [SI], alike in mesh, sampling and duration.
+    width : int
+        Lanes, at least one for each run.
+    dtype : type
+        np.float64 or np.float32, that of the lanes.
+
+    Attributes
+    ----------
+    plan : Recording
+        The recorded quantities.
+    channels : int
+        Values in a row of a sample.
+    profiles : (N, 21) LaneArray of doubles
+        PROFILES, summed over the judged part's samples.
+    momentary : Momentary
+        Profiles of the last samples.
+    ended : (1, 4) LaneArray of doubles
+        ENDED.
+    """
+
+    def __init__(self, points: Sequence[Mapping[str, Any]], width: int, dtype: type) -> None:
+        self.plan = recording(points[0], dtype)
+        self.channels = self.plan.sensing.matrix.shape[0] + len(CHANNELS)
+        stations = self.plan.mesh.cell.size
+        self.profiles = LaneArray(stations, len(PROFILES), width)
+        self._none = LaneArray(0, len(PROFILES), width)
+        self.momentary = Momentary(points, stations)
+        self.ended = LaneArray(1, len(ENDED), width)
+
+    @contextmanager
+    def profiles_of(self, sample: int) -> Iterator[LaneArray]:
+        """Yield the array to which PROFILES of samples from a certain one on are to be added.
+
+        Of the part that is not judged nothing is summed up. A sample of which profiles are kept comes alone.
+        """
+        is_judged = sample >= self.plan.first_judged
+        if sample < self.momentary.first:
+            yield self.profiles if is_judged else self._none
+            return
+        alone = LaneArray(*self.profiles.data.shape)
+        yield alone
+        self.momentary.note(sample, alone)
+        if is_judged:
+            self.profiles.data[:] += alone.data
+
+    def without_means(self) -> None:
+        """Forget means that another stepper has begun, whose sums are not known."""
+        self.profiles.data[:] = np.nan
+
+
 class RecordedRun:
     """One run, as it is judged and recorded.
 
@@ -81,16 +140,16 @@ class RecordedRun:
     ----------
     parameters : dict
         Resolved parameters of the run [SI].
-    plan : Recording
-        The recorded quantities.
-    sums : (N, 21) array
-        PROFILES, summed over the judged part's samples; it may be filled later.
+    records : Records
+        Of the runs among which it is.
+    lane : int
+        Its lane there.
 
     Attributes
     ----------
     parameters
         As given.
-    mesh, probes, interval, samples, kick
+    mesh, probes, interval, samples, risen
         Of the plan.
     rows : (done, S + C) array
         The sensors' displacement [m], the strands' modes [m], and CHANNELS; set by the marching class.
@@ -100,8 +159,6 @@ class RecordedRun:
         Why the run cannot continue: a failure, or a result, with the status done; set by the marching class.
     time : float
         Simulated time [s]; set by the marching class.
-    momentary : (sample, quantity, N) array or None
-        Last samples that `Momentary` has kept; set by the marching class.
     """
 
     if TYPE_CHECKING:  # set by the marching class
@@ -126,16 +183,17 @@ class RecordedRun:
         def layer_sums(self) -> np.ndarray | None:
             """`lane_rings.SUMS` of ring layers over the judged part, (n + 1, 6); None where rings are one."""
 
-        @property
-        def momentary(self) -> np.ndarray | None:
-            """Samples of the run that `Momentary` has kept."""
-
-    def __init__(self, parameters: Mapping[str, Any], plan: Recording, sums: np.ndarray) -> None:
-        self.parameters = parameters
+    def __init__(self, parameters: Mapping[str, Any], records: Records, lane: int = 0) -> None:
+        self.parameters, self._records, self._lane = parameters, records, lane
+        self._plan = plan = records.plan
         self.mesh, self.probes = plan.mesh, plan.probes
         self.interval, self.samples, self.risen = plan.interval, plan.samples, plan.kick
-        self._plan, self._sums = plan, sums
         self._sensed = plan.sensing.matrix.shape[0]
+
+    @property
+    def momentary(self) -> np.ndarray | None:
+        """Last samples that `Momentary` has kept, (sample, quantity, N)."""
+        return self._records.momentary.of(self._lane)
 
     @property
     def displacement(self) -> np.ndarray:
@@ -173,14 +231,19 @@ class RecordedRun:
 
         Not a number before that part, and where the run has failed.
         """
-        count = self.done - self._plan.first_judged if self.failure is None else 0
-        return dict(zip(PROFILES, self._sums.T / (count if count > 0 else np.nan), strict=True))
+        sums = self._records.profiles.data[:, :, self._lane]
+        return dict(zip(PROFILES, sums.T / self._judged_count, strict=True))
 
     @property
     def layer_means(self) -> np.ndarray | None:
         """As `layer_sums`, means."""
+        return None if self.layer_sums is None else self.layer_sums / self._judged_count
+
+    @property
+    def _judged_count(self) -> float:
+        """Samples of the judged part so far; not a number before it, and where the run has failed."""
         count = self.done - self._plan.first_judged if self.failure is None else 0
-        return None if self.layer_sums is None else self.layer_sums / (count if count > 0 else np.nan)
+        return count if count > 0 else np.nan
 
     @property
     def fluctuation(self) -> Fluctuation:

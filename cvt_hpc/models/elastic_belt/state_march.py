@@ -32,11 +32,7 @@ class StateMarch:
     """
 
     def __init__(
-        self,
-        belts: Sequence[Belt],
-        states: Sequence[State],
-        dtype: type = np.float64,
-        stepper: str = "imex",
+        self, belts: Sequence[Belt], states: Sequence[State], dtype: type = np.float64, stepper: str = "imex"
     ) -> None:
         self.belts = belts
         self.lanes = lane_state(list(belts), list(states), dtype)
@@ -90,3 +86,10 @@ class StateMarch:
     def channels(self, lane: int = 0) -> dict[str, float]:
         """CHANNELS by name, of the last sample."""
         return dict(zip(CHANNELS, self._rows.data[0, :, lane].tolist(), strict=True))
+
+
+def sampled(belt: Belt, state: State) -> StateMarch:
+    """A run of which one sample is taken, of a state as it is."""
+    march = StateMarch([belt], [state])
+    march.advance(0, 1.0)
+    return march
