@@ -10,42 +10,31 @@ import numpy as np
 
 from cvt_hpc.lanes import LaneArray, split
 from cvt_hpc.models.elastic_belt import fields as f
+from cvt_hpc.models.elastic_belt import lane_belt, ring_step
 from cvt_hpc.models.elastic_belt import lane_fields as lf
-from cvt_hpc.models.elastic_belt import ring_step
 from cvt_hpc.models.elastic_belt.belt import State, belt_constants, initial_state, random_strands
 from cvt_hpc.models.elastic_belt.explicit import FIELDS_OF_WORK, step_explicit
 from cvt_hpc.models.elastic_belt.grouping import LANES, lanes
 from cvt_hpc.models.elastic_belt.imex import step_imex
-from cvt_hpc.models.elastic_belt.lane_belt import (
-    LaneState,
-    Work,
-    lane_belt,
-    lane_state,
-    parted,
-    parted_state,
-    parts_of,
-    take_lane,
-    work_space,
-)
 from cvt_hpc.models.elastic_belt.lane_forces import derive
 from cvt_hpc.models.elastic_belt.march import Sampled, begin_at_once, march, take_sample
 from cvt_hpc.models.elastic_belt.recorded_run import RecordedRun, Records
 from cvt_hpc.models.elastic_belt.ring_settings import layer_count
 from cvt_hpc.models.elastic_belt.rings import ring_constants, with_layers, without_saddle_friction
-from cvt_hpc.models.elastic_belt.sampling import CONTACT_SOLVES, ENDED_AT, OUTCOME, REPEATED, Outcome
+from cvt_hpc.models.elastic_belt.sampling import CONTACT_SOLVES, ENDED_AT, OUTCOME, REPEATED, Outcome, Samples
 from cvt_hpc.models.elastic_belt.step_choice import transverse_limit
 from cvt_hpc.models.elastic_belt.validity import FAILURES, step_doubt
 from cvt_hpc.recording import steps_per_sample
 from cvt_hpc.variables import Status
 
 PRECISIONS = {"double": np.float64, "single": np.float32}
-STEPS: dict[str, tuple[Callable[[LaneState], Any], Callable[..., None]]] = {  # work space, march
+STEPS: dict[str, tuple[Callable[[lane_belt.LaneState], Any], Callable[..., None]]] = {  # work space, march
     "imex": (
-        partial(work_space, fields=lf.FIELDS_OF_WORK),
+        partial(lane_belt.work_space, fields=lf.FIELDS_OF_WORK),
         partial(march, begin_at_once, step_imex, take_sample),
     ),
     "explicit": (
-        partial(work_space, fields=FIELDS_OF_WORK),
+        partial(lane_belt.work_space, fields=FIELDS_OF_WORK),
         partial(march, begin_at_once, step_explicit, take_sample),
     ),
 }
@@ -129,8 +118,8 @@ class Batch:
             starts = [with_layers(*each) for each in zip(starts, self.belts, rings, strict=True)]
             self._work_space = partial(ring_step.ring_work, belts=self.belts, rings=rings)
             self._march = _march_rings
-        self.state = lane_state(self.belts, starts, self.dtype)
-        self._belt = lane_belt(self.belts, self.dtype)
+        self.state = lane_belt.lane_state(self.belts, starts, self.dtype)
+        self._belt = lane_belt.lane_belt(self.belts, self.dtype)
         self.work = self._work_space(self.state)
         derive(self._belt, self.state, self.work.stations)
         self.records = Records(points, width, self.dtype)
@@ -144,7 +133,7 @@ class Batch:
         if paused:
             self._resume([*paused, *[paused[-1]] * (width - len(paused))])
         most_parts = LANES[p["precision"]] if p["lanes"] == "stations" else 1
-        self._parts = parts_of(self.plan.mesh.cell.size, most_parts)
+        self._parts = lane_belt.parts_of(self.plan.mesh.cell.size, most_parts)
 
     def _go_on_after(self, rows: Sequence[np.ndarray]) -> None:
         """Take rows that have been recorded, (done, S + C) each, as the beginning of the runs' histories."""
@@ -195,24 +184,16 @@ class Batch:
         marched = self._belt, self.state, self.work
         if self._parts > 1:
             marched = (
-                parted(self._belt, self._parts),
-                parted_state(self.state, self._parts),
+                lane_belt.parted(self._belt, self._parts),
+                lane_belt.parted_state(self.state, self._parts),
                 _parted_work(self.work, self._parts),
             )
         ends = range(first + 1, last + 1) if first >= kept and last > first else [last]
         for end in ends:
-            rows = self.rows, self.done - self._recorded, end - self._recorded
+            rows = self.done - self._recorded, end - self._recorded
             with self.records.profiles_of(self.done) as profiles:
-                self._march(
-                    *marched,
-                    self.step,
-                    self.steps_per_sample,
-                    whole,
-                    plan.sensing,
-                    *rows,
-                    profiles,
-                    self.records.ended,
-                )
+                samples = Samples(plan.sensing, self.rows, profiles, self.records.ended)
+                self._march(*marched, self.step, self.steps_per_sample, whole, samples, *rows)
             self.done = end
 
     def take_over(self, runs: Sequence[Any]) -> None:
@@ -226,7 +207,7 @@ class Batch:
         self._go_on_after([np.broadcast_to(run.rows, (run.done, self.rows.data.shape[1])) for run in runs])
         states = [run.state for run in runs]
         states += [states[-1].copy() for _ in self.belts[len(runs) :]]
-        self.state = lane_state(self.belts, states, self.dtype)
+        self.state = lane_belt.lane_state(self.belts, states, self.dtype)
         self.work = self._work_space(self.state)
         derive(self._belt, self.state, self.work.stations)
         self.begun = self.records.ended.data[0, ENDED_AT] = runs[0].time
@@ -257,7 +238,7 @@ def _parted_work(work: Any, parts: int) -> Any:
     """A step's work space for linked parts."""
     if isinstance(work, ring_step.RingWork):
         return ring_step.parted_ring_work(work, parts)
-    return Work(split(work.stations, parts))
+    return lane_belt.Work(split(work.stations, parts))
 
 
 class LaneRun(RecordedRun):
@@ -309,7 +290,7 @@ class LaneRun(RecordedRun):
     @property
     def state(self) -> State:
         """The present state; a copy."""
-        return take_lane(self.batch.state, self._lane, self.batch.belts[self._lane])
+        return lane_belt.take_lane(self.batch.state, self._lane, self.batch.belts[self._lane])
 
     def paused(self) -> Paused:
         """The state from which a batch of the same point over a longer time continues."""

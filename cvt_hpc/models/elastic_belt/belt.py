@@ -178,7 +178,8 @@ def belt_constants(parameters: Mapping[str, Any]) -> Belt:
     dual = 0.5 * (cell + np.roll(cell, 1))
     kappa = np.array([1.0 / path.driving_radius, 0.0, 1.0 / path.driven_radius, 0.0])[grid.region]
     arc_share = 0.5 * (cell * (kappa > 0) + np.roll(cell * (kappa > 0), 1)) / dual
-    ring_mass = p["ring_mass"] * 0.5 * _pair(cell * (1.0 + kappa * p["ring_offset"])) / dual
+    along_rings = cell * (1.0 + kappa * p["ring_offset"])
+    ring_mass = p["ring_mass"] * 0.5 * (along_rings + np.roll(along_rings, 1)) / dual
     belt_speed = p["driving_speed"] * path.driving_radius
     whole, disc = stiffness_factors(p)
     size = measures(p)
@@ -246,11 +247,6 @@ def belt_constants(parameters: Mapping[str, Any]) -> Belt:
     # all else is a parameter of the run, by the same name
     given = {key: p[key] for key in Belt._fields if key not in computed}
     return Belt(**computed, **given)
-
-
-def _pair(values: np.ndarray) -> np.ndarray:
-    """Sum of a cell quantity over the two cells of each station."""
-    return values + np.roll(values, 1)
 
 
 def initial_state(parameters: Mapping[str, Any], belt: Belt) -> State:

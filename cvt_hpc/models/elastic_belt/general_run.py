@@ -14,7 +14,7 @@ from cvt_hpc.models.elastic_belt import one_system, ring_system
 from cvt_hpc.models.elastic_belt.belt import Belt, State, belt_constants, initial_state, random_strands
 from cvt_hpc.models.elastic_belt.column import pressed_strains
 from cvt_hpc.models.elastic_belt.lane_belt import put_lane
-from cvt_hpc.models.elastic_belt.one_lane_run import OneLaneRun
+from cvt_hpc.models.elastic_belt.recorded_run import OneLaneRun
 from cvt_hpc.models.elastic_belt.rhs import strains
 from cvt_hpc.models.elastic_belt.ring_settings import layer_count
 from cvt_hpc.models.elastic_belt.rings import FIRST_LAYER, ring_constants

@@ -17,7 +17,7 @@ from cvt_hpc.lanes import LaneArray, split
 from cvt_hpc.models.elastic_belt import fields as f
 from cvt_hpc.models.elastic_belt import lane_fields as lf
 from cvt_hpc.models.elastic_belt.belt import Belt, State
-from cvt_hpc.models.elastic_belt.bending import bending_bands, bending_load
+from cvt_hpc.models.elastic_belt.bending import bending_bands, bending_load, squared_curvature
 from cvt_hpc.models.elastic_belt.rhs import contact_forces, fresh_contacts, speed_share_at
 from cvt_hpc.physics.compliance import Contact, lane_contact
 from cvt_hpc.physics.friction import FrictionLaw
@@ -154,8 +154,8 @@ def lane_belt(belts: list[Belt], dtype: DTypeLike) -> LaneBelt:
     stations, law = np.arange(first.cell.size), first.law
     tables = (law.table_force.astype(dtype), law.table_speed.astype(dtype), law.table_mu.astype(dtype))
     bent = first.cell, first.dual, 1.0, first.curvature, first.curvature_terms
-    computed = {
-        "ring_curvature": _ring_curvature(first),
+    computed: dict[str, Any] = {
+        "ring_curvature": squared_curvature(first.cell, first.dual, first.curvature, 1),
         "bending": bending_bands(*bent),
         "bending_load": bending_load(*bent),
         "on_driven": stations >= first.driven_start,
@@ -168,23 +168,13 @@ def lane_belt(belts: list[Belt], dtype: DTypeLike) -> LaneBelt:
         "is_curved": first.curvature_terms > 0,
     }
     # all else is of the belt, by the same name
-    given = {key: getattr(first, key) for key in LaneBelt._fields if key not in computed}
-    return LaneBelt(
-        **{
-            key: value.astype(dtype) if isinstance(value, np.ndarray) else value
-            for key, value in (given | computed).items()
-        }
-    )
-
-
-def _ring_curvature(belt: Belt) -> np.ndarray:
-    weighted = belt.cell * belt.curvature
-    return 0.5 * (weighted + np.roll(weighted, 1)) / belt.dual
+    values = (computed[key] if key in computed else getattr(first, key) for key in LaneBelt._fields)
+    return LaneBelt._make(value.astype(dtype) if isinstance(value, np.ndarray) else value for value in values)
 
 
 def _constants_of(belt: Belt) -> list[float]:
     angle, memory = belt.half_wedge_angle, belt.friction_memory
-    longer = 1.0 + belt.ring_offset * _ring_curvature(belt)[0]
+    longer = 1.0 + belt.ring_offset * squared_curvature(belt.cell, belt.dual, belt.curvature, 1)[0]
     named = {
         "ring_mass": belt.ring_mass[0] / longer,
         "ring_relief": belt.ring_relief[0] / longer,

@@ -9,7 +9,7 @@ from cvt_hpc.lanes import LaneArray, like, merge_parts
 from cvt_hpc.models.elastic_belt import lane_fields as lf
 from cvt_hpc.models.elastic_belt.lane_belt import LaneBelt, LaneState
 from cvt_hpc.models.elastic_belt.lane_forces import derive, note_speeds
-from cvt_hpc.models.elastic_belt.sampling import Sensors, sample
+from cvt_hpc.models.elastic_belt.sampling import Samples, sample
 
 
 class Sampled(NamedTuple):
@@ -39,12 +39,9 @@ def march(
     step: float,
     steps: int,
     sampled: Sampled,
-    sensing: Sensors,
-    rows: LaneArray,
+    samples: Samples,
     first: int,
     last: int,
-    profiles: LaneArray,
-    ended: LaneArray,
 ) -> None:
     """Fill rows first .. last - 1 with samples, `steps` steps before each.
 
@@ -59,17 +56,17 @@ def march(
         Step [s] and their number between samples.
     sampled : Sampled
         Of the same run or runs; at the end it has all of the state.
-    sensing, rows, profiles, ended
-        As `sample` takes them.
+    samples : Samples
+        The arrays of the samples.
     first, last : int
-        Which rows.
+        Which rows of them.
     """
     begin(belt, state, work)
     for k in range(first, last):
         for taken in range(steps):
             note_speeds(belt, state, work.stations, taken, steps)
             advance(belt, state, work, step)
-        take(state, work, sampled, sensing, rows, k, profiles, ended)
+        take(state, work, sampled, samples, k)
     gather(state, work.stations, sampled, work.stations.data.shape[1])
 
 
@@ -79,19 +76,10 @@ def begin_at_once(belt: LaneBelt, state: LaneState, work: Any) -> None:
 
 
 @kernel
-def take_sample(
-    state: LaneState,
-    work: Any,
-    sampled: Sampled,
-    sensing: Sensors,
-    rows: LaneArray,
-    k: int,
-    profiles: LaneArray,
-    ended: LaneArray,
-) -> None:
+def take_sample(state: LaneState, work: Any, sampled: Sampled, samples: Samples, k: int) -> None:
     """Sample the marched belt, which may be in parts."""
     gather(state, work.stations, sampled, lf.FIELDS_OF_FORCES)
-    sample(sampled.belt, sampled.state, sampled.stations, sensing, rows, k, profiles, ended)
+    sample(sampled.belt, sampled.state, sampled.stations, samples, k)
     # a sample takes it to its end
     state.scalars[0, lf.LAYER_WORK] = like(
         sampled.state.scalars[0, lf.LAYER_WORK], state.scalars[0, lf.LAYER_WORK]
@@ -108,16 +96,7 @@ def gather(state: LaneState, stations: LaneArray, sampled: Sampled, fields: int)
 
 
 @kernel
-def sample_state(
-    belt: LaneBelt,
-    state: LaneState,
-    stations: LaneArray,
-    sensing: Sensors,
-    rows: LaneArray,
-    k: int,
-    profiles: LaneArray,
-    ended: LaneArray,
-) -> None:
+def sample_state(belt: LaneBelt, state: LaneState, stations: LaneArray, samples: Samples, k: int) -> None:
     """As `sample`, of a state whose forces are not known yet."""
     derive(belt, state, stations)
-    sample(belt, state, stations, sensing, rows, k, profiles, ended)
+    sample(belt, state, stations, samples, k)

@@ -41,7 +41,7 @@ from cvt_hpc.models.elastic_belt.lane_rings import LaneRings
 from cvt_hpc.models.elastic_belt.march import Sampled, take_sample
 from cvt_hpc.models.elastic_belt.pulley_step import advance_pulleys
 from cvt_hpc.models.elastic_belt.rings import FIRST_LAYER, Rings
-from cvt_hpc.models.elastic_belt.sampling import SCALARS, Sensors
+from cvt_hpc.models.elastic_belt.sampling import Samples
 from cvt_hpc.physics.layers import ring_friction
 
 # Fields of RingWork.layers, STRIDE of each layer: strain; of the eliminated chain the increment by its own
@@ -113,21 +113,11 @@ def begin_rings(belt: LaneBelt, state: LaneState, work: RingWork) -> None:
 
 @kernel
 def take_sample_of_rings(
-    state: LaneState,
-    work: RingWork,
-    sampled: Sampled,
-    sensing: Sensors,
-    rows: LaneArray,
-    k: int,
-    profiles: LaneArray,
-    ended: LaneArray,
+    state: LaneState, work: RingWork, sampled: Sampled, samples: Samples, k: int
 ) -> None:
     """As `take_sample`, with the layers' part."""
-    take_sample(state, work, sampled, sensing, rows, k, profiles, ended)
-    powers = sensing.matrix.shape[0] + len(SCALARS)
-    lane_rings.audit_layers(
-        sampled.belt, work.whole, sampled.state, work.audited, rows, k, powers, profiles, work.sums
-    )
+    take_sample(state, work, sampled, samples, k)
+    lane_rings.audit_layers(sampled.belt, work.whole, sampled.state, work.audited, samples, k, work.sums)
 
 
 @kernel

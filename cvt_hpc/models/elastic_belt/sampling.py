@@ -106,6 +106,27 @@ class Sensors(NamedTuple):
     interval: float
 
 
+class Samples(NamedTuple):
+    """The arrays of samples, as kernels take them.
+
+    Attributes
+    ----------
+    sensing : Sensors
+        S rows.
+    rows : (samples, S + C) LaneArray of doubles
+        Of a sample a row: the sensors, then CHANNELS.
+    profiles : (N, 21) LaneArray of doubles
+        PROFILES of each sample are added to it; one without rows takes none.
+    ended : (1, 4) LaneArray of doubles
+        ENDED of each lane.
+    """
+
+    sensing: Sensors
+    rows: LaneArray
+    profiles: LaneArray
+    ended: LaneArray
+
+
 class Probe(NamedTuple):
     """A place on the path: label, that begins with the region, and path coordinate s [m]."""
 
@@ -163,16 +184,7 @@ def sensors(grid: Mesh, places: tuple[Probe, ...], interval: float, dtype: type)
 
 
 @kernel
-def sample(
-    belt: LaneBelt,
-    state: LaneState,
-    stations: LaneArray,
-    sensing: Sensors,
-    rows: LaneArray,
-    k: int,
-    profiles: LaneArray,
-    ended: LaneArray,
-) -> None:
+def sample(belt: LaneBelt, state: LaneState, stations: LaneArray, samples: Samples, k: int) -> None:
     """Record a state.
 
     Parameters
@@ -181,18 +193,13 @@ def sample(
         Constants and state.
     stations : LaneArray
         The step's work space, with the results of `derive` for this state.
-    sensing : Sensors
-        S rows.
-    rows : (samples, S + C) LaneArray of doubles
-        Row k is set: the sensors, then CHANNELS.
+    samples : Samples
+        Row k is set.
     k : int
         Which row.
-    profiles : (N, 21) LaneArray of doubles
-        PROFILES of this state are added to it; one without rows takes none.
-    ended : (1, 4) LaneArray of doubles
-        ENDED of each lane.
     """
-    _watch(belt, state, stations, ended)
+    _watch(belt, state, stations, samples.ended)
+    sensing, rows, profiles = samples.sensing, samples.rows, samples.profiles
     fields, c = state.fields, belt.constants
     sensed = sensing.matrix.shape[0]
     zero = like(0.0, fields[0, f.W])
