@@ -12,30 +12,10 @@ def names_from(first: str, constants: Mapping[str, object]) -> tuple[str, ...]:
 # Constants of the laws, in SI units: mobilities are 1 / J, or 1 / (T_1 k) of the driving sheave, 0 where the
 # speed or the position is given; `tilt_rate` is 1 / T_1, 0 without a lag; `..._tilt` is kappa [m/N], and
 # `..._free` is c [m]; `tracking` is how fast Q_0 follows, `need` [1/m] the force per torque at r.
-(
-    DRIVING_MOBILITY,
-    DRIVEN_MOBILITY,
-    DRIVE_SLOPE,
-    DRIVING_AXIAL_MOBILITY,
-    DRIVING_THRUST,
-    DRIVING_SPRING_RATE,
-    DRIVEN_SPRING_RATE,
-    DRIVING_OIL,
-    DRIVEN_OIL,
-    TRACKING,
-    RATIO_GAIN,
-    RATIO_RATE,
-    NEED,
-    CLAMPING_GAIN,
-    CLAMPING_RATE,
-    LEAST_THRUST,
-    MOST_THRUST,
-    TILT_RATE,
-    DRIVING_TILT,
-    DRIVEN_TILT,
-    DRIVING_FREE,
-    DRIVEN_FREE,
-) = range(22)
+DRIVING_MOBILITY, DRIVEN_MOBILITY, DRIVE_SLOPE, DRIVING_AXIAL_MOBILITY = range(4)
+DRIVING_THRUST, DRIVING_SPRING_RATE, DRIVEN_SPRING_RATE, DRIVING_OIL, DRIVEN_OIL = range(4, 9)
+TRACKING, RATIO_GAIN, RATIO_RATE, NEED, CLAMPING_GAIN, CLAMPING_RATE, LEAST_THRUST, MOST_THRUST = range(9, 17)
+TILT_RATE, DRIVING_TILT, DRIVEN_TILT, DRIVING_FREE, DRIVEN_FREE = range(17, 22)
 LAWS = names_from("DRIVING_MOBILITY", globals())
 
 # States of the pulleys beside the driven one's speed and position: the excess of the driving pulley's speed

@@ -50,7 +50,6 @@ class GeneralTransient(Marched, OneLaneRun):
         is_layered = layer_count(p) > 1
         # the module that knows the unknowns, and its constants and work space
         self._equations: Any = ring_system if is_layered else one_system
-        self._flat: Any = one_system.flat_belt(self.belt)
         self._flat: Any = (
             ring_system.flat_rings(self.belt, ring_constants(p, self.belt))
             if is_layered

@@ -4,49 +4,13 @@ from cvt_hpc.models.elastic_belt import fields as f
 
 # Constants of each lane, in SI units, and from FIRST_LAW on those of the laws; `lane_belt` computes what is
 # not in `Belt`.
-(
-    ELEMENT_STIFFNESS,
-    RING_STIFFNESS,
-    ELEMENT_DAMPING,
-    RING_DAMPING,
-    ELEMENT_MASS,
-    RING_MASS,
-    RING_RELIEF,
-    MASS,
-    BELT_SPEED,
-    TRANSVERSE_DAMPING,
-    BENDING_STIFFNESS,
-    RING_OFFSET,
-    RING_FRICTION,
-    RING_FRICTION_SPEED,
-    FRICTION_SPEED,
-    KINETIC_FRICTION,
-    FRICTION_GRADIENT,
-    LAW_SPEED,
-    SINE,
-    COSINE,
-    WEDGE,
-    FORGET,
-    DRIVING_CARRY,
-    DRIVEN_CARRY,
-    DRIVING_RADIUS,
-    DRIVEN_RADIUS,
-    DRIVING_SPEED,
-    DRIVING_POSITION,
-    DRIVEN_INERTIA,
-    AXIAL_DAMPING,
-    THRUST,
-    RATIO,
-    LOAD,
-    LOAD_START,
-    START_SHARE,
-    DRIVING_CELL,
-    DRIVEN_CELL,
-    COLUMN_STIFFNESS,
-    OUTER_EDGE,
-    INNER_EDGE,
-    FIRST_LAW,
-) = range(41)
+ELEMENT_STIFFNESS, RING_STIFFNESS, ELEMENT_DAMPING, RING_DAMPING = range(4)
+ELEMENT_MASS, RING_MASS, RING_RELIEF, MASS, BELT_SPEED, TRANSVERSE_DAMPING, BENDING_STIFFNESS = range(4, 11)
+RING_OFFSET, RING_FRICTION, RING_FRICTION_SPEED = range(11, 14)
+FRICTION_SPEED, KINETIC_FRICTION, FRICTION_GRADIENT, LAW_SPEED, SINE, COSINE, WEDGE = range(14, 21)
+FORGET, DRIVING_CARRY, DRIVEN_CARRY, DRIVING_RADIUS, DRIVEN_RADIUS, DRIVING_SPEED = range(21, 27)
+DRIVING_POSITION, DRIVEN_INERTIA, AXIAL_DAMPING, THRUST, RATIO, LOAD, LOAD_START, START_SHARE = range(27, 35)
+DRIVING_CELL, DRIVEN_CELL, COLUMN_STIFFNESS, OUTER_EDGE, INNER_EDGE, FIRST_LAW = range(35, 41)
 CONSTANTS = (*f.names_from("ELEMENT_STIFFNESS", globals())[:FIRST_LAW], *f.LAWS)
 
 # Scalars of the state, of each lane, double in any precision: the driven pulley's two, the work of the
@@ -59,19 +23,8 @@ SCALARS = f.FIRST_STATE + f.STATES
 # change within a step, and the moment [N m]; of the cells -P / EA, its slopes with the strain and with the
 # curvature at both ends [m], its change within a step by turning, the moments of both halves times their
 # content [N m^2], and the energy per content [N].
-(
-    DEVIATION,
-    TURNING,
-    COLUMN_MOMENT,
-    PRESSED,
-    GIVE,
-    TURN_NEAR,
-    TURN_FAR,
-    SHIFT,
-    BEARING_NEAR,
-    BEARING_FAR,
-    COLUMN_ENERGY,
-) = range(11)
+DEVIATION, TURNING, COLUMN_MOMENT, PRESSED, GIVE, TURN_NEAR, TURN_FAR, SHIFT = range(8)
+BEARING_NEAR, BEARING_FAR, COLUMN_ENERGY = range(8, 11)
 FIELDS_OF_COLUMN = COLUMN_ENERGY + 1
 
 # Of a state, by `derive`: axial line force; the cells' strains, 1 / (1 + strain) and 1 / content. By
@@ -100,17 +53,5 @@ FIELDS_OF_WORK = 43
 
 # Constants of each lane; from FIRST_OFFSET on the layers' offsets, then by arc and surface the factors of the
 # layer above it and of the one below.
-(
-    LAYER_MASS,
-    LAYER_STIFFNESS,
-    LAYER_DAMPING,
-    LAYER_RELIEF,
-    STATIC_EXCESS,
-    PER_STRIBECK,
-    PER_WIDTH,
-    SADDLE_FRICTION_LEVEL,
-    LAYER_FRICTION_LEVEL,
-    STRESS_RATE,
-    DAMPING_RATE,
-    FIRST_OFFSET,
-) = range(12)
+LAYER_MASS, LAYER_STIFFNESS, LAYER_DAMPING, LAYER_RELIEF, STATIC_EXCESS, PER_STRIBECK, PER_WIDTH = range(7)
+SADDLE_FRICTION_LEVEL, LAYER_FRICTION_LEVEL, STRESS_RATE, DAMPING_RATE, FIRST_OFFSET = range(7, 12)

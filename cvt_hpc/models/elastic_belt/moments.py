@@ -10,27 +10,10 @@ from cvt_hpc.models.elastic_belt.fields import names_from
 # contact. Of stations but for the stresses, which are the cells' behind them [N]; `saddle_friction` is [N],
 # and powers are per length [W/m] but for `saddle_power` and `stress_power` [W]. Layers' speeds are as in
 # `LaneState`, less the belt speed.
-(
-    FLANK_POWER,
-    RADIAL_FRICTION,
-    TANGENTIAL_FRICTION,
-    RADIAL_SPEED,
-    RADIAL_SPEED_SQUARED,
-    SLIDING_SPEED,
-    SADDLE_POWER,
-    SADDLE_FRICTION,
-    SADDLE_SPEED,
-    TRANSVERSE_POWER,
-    TRANSVERSE_SPEED,
-    ELEMENT_POWER,
-    ELEMENT_FORCE,
-    ELEMENT_SPEED,
-    RING_SPEED,
-    STRESS_POWER,
-    RING_TENSION,
-    PUSH_FORCE,
-    PUSH_DAMPING,
-) = range(19)
+FLANK_POWER, RADIAL_FRICTION, TANGENTIAL_FRICTION, RADIAL_SPEED, RADIAL_SPEED_SQUARED = range(5)
+SLIDING_SPEED, SADDLE_POWER, SADDLE_FRICTION, SADDLE_SPEED, TRANSVERSE_POWER, TRANSVERSE_SPEED = range(5, 11)
+ELEMENT_POWER, ELEMENT_FORCE, ELEMENT_SPEED, RING_SPEED = range(11, 15)
+STRESS_POWER, RING_TENSION, PUSH_FORCE, PUSH_DAMPING = range(15, 19)
 MOMENTS = names_from("FLANK_POWER", globals())
 
 
