@@ -192,8 +192,8 @@ class Batch:
         for end in ends:
             rows = self.done - self._recorded, end - self._recorded
             with self.records.profiles_of(self.done) as profiles:
-                samples = Samples(plan.sensing, self.rows, profiles, self.records.ended)
-                self._march(*marched, self.step, self.steps_per_sample, whole, samples, *rows)
+                into = Samples(plan.sensing, self.rows, profiles, self.records.ended)
+                self._march(*marched, self.step, self.steps_per_sample, whole, into, *rows)
             self.done = end
 
     def take_over(self, runs: Sequence[Any]) -> None:

@@ -61,7 +61,7 @@ class GeneralTransient(Marched, OneLaneRun):
         self.marching = Marching(stepper, p, self._system, start, self.interval)
         self._stable = STABLE.get(stepper, np.inf)
         self._fastest = np.random.default_rng(0).normal(size=start.size)
-        if stepper.startswith("scipy_") and not is_layered:
+        if stepper.startswith("scipy_") and isinstance(self._flat, one_system.FlatBelt):
             jacobian = SparseJacobian(self._flat)
             dense = stepper == "scipy_lsoda"  # others take it sparse
             self.marching.tell(jac=(lambda t, y: jacobian(t, y).toarray()) if dense else jacobian)
