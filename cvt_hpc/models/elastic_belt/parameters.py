@@ -10,7 +10,8 @@ from typing import Any
 
 import numpy as np
 
-from cvt_hpc.models.elastic_belt import deflection_settings, ring_settings
+import cvt_hpc.models.elastic_belt.deflection_settings as deflection_settings
+import cvt_hpc.models.elastic_belt.ring_settings as ring_settings
 from cvt_hpc.models.elastic_belt.bending_settings import BENDING, bending_inert, bending_problems
 from cvt_hpc.models.elastic_belt.pulley_checks import pulley_inert, pulley_problems, shaft_problems
 from cvt_hpc.models.elastic_belt.pulley_settings import DRIVEN_INERTIA, DRIVEN_SHAFT, PULLEYS, SHAFT

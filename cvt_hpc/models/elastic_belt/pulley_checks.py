@@ -7,7 +7,7 @@ from typing import Any
 
 import numpy as np
 
-from cvt_hpc.models.elastic_belt import pulley_settings as settings
+import cvt_hpc.models.elastic_belt.pulley_settings as settings
 from cvt_hpc.physics import capacity
 from cvt_hpc.physics.friction_laws import largest_friction
 from cvt_hpc.physics.geometry import variator, variator_problems
