@@ -41,7 +41,11 @@ BELT = {
     "record": {"sampling_rate": "6 kHz", "spectrum_step": "50 Hz", "profile_duration": "1 ms"},
     "run": SHORT,
 }
-SLOW_BELT = BELT | {"mesh": {"stations": 48}, "run": {"duration": "22 ms", "longest_duration": "22 ms"}}
+SLOW_BELT = BELT | {
+    "scene": BELT["scene"] | {"rise_time": "10 ms"},
+    "mesh": {"stations": 48},
+    "run": {"duration": "34 ms", "longest_duration": "34 ms"},
+}
 SHAFT = {
     "shaft_lengths": ["60 mm", "100 mm", "60 mm"],
     "shaft_diameters": ["35 mm", "45 mm", "35 mm"],
@@ -119,9 +123,7 @@ STUDIES: dict[str, dict] = {
     },
     "pushbelt": ROLLING,
     "pushbelt rigid": variant(ROLLING, sheaves={"sheave_stiffness": "inf"}),
-    "quasi_static_belt": variant(
-        BELT, mesh={"stations": 48}, run={"duration": "30 ms", "longest_duration": "30 ms"}
-    ),
+    "quasi_static_belt": SLOW_BELT,
     "slip_limit": GRID,
     "spatial_pushbelt": ROLLING,
     "spatial_pushbelt flows": variant(ROLLING, sheaves={"sheave_stiffness": "inf"}, rings={"ring_flows": 2}),

@@ -160,7 +160,7 @@ FREE = {
     ids=["inertia", "steady_flow", "free pulleys", "clearance"],
 )
 def test_a_quiet_belt_has_the_forces_of_the_whole_one_and_its_powers_close(longitudinal, pulleys):
-    from cvt_hpc.models.elastic_belt.transient import Transient
+    from support.lone import Transient
 
     values = {"friction_gradient": 0.0, "friction_law": "coulomb", "stations": 64, "duration": 0.08} | pulleys
     common = values | {"judged_fraction": 0.25, "load": 100.0}

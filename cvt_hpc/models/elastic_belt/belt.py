@@ -21,13 +21,7 @@ from cvt_hpc.models.elastic_belt.grouping import faded_coupling
 from cvt_hpc.models.elastic_belt.pulleys import Pulleys, settled_tilt, with_pulleys
 from cvt_hpc.physics.friction import FrictionLaw, given_law
 from cvt_hpc.physics.geometry import Variator, cell_counts, variator
-from cvt_hpc.physics.sheaves import (
-    Sheaves,
-    axial_element_stiffness,
-    flexibility,
-    sheaves,
-    stiffness_factors,
-)
+from cvt_hpc.physics.sheaves import Sheaves, axial_element_stiffness, flexibility, sheaves, stiffness_factors
 from cvt_hpc.variator import LARGEST_DISPLACEMENT
 from cvt_hpc.variator.measures import Measures, measures, rounded
 from cvt_hpc.vibration.ramped import ramped
@@ -184,7 +178,8 @@ def belt_constants(parameters: Mapping[str, Any]) -> Belt:
     dual = 0.5 * (cell + np.roll(cell, 1))
     kappa = np.array([1.0 / path.driving_radius, 0.0, 1.0 / path.driven_radius, 0.0])[grid.region]
     arc_share = 0.5 * (cell * (kappa > 0) + np.roll(cell * (kappa > 0), 1)) / dual
-    ring_mass = p["ring_mass"] * 0.5 * _pair(cell * (1.0 + kappa * p["ring_offset"])) / dual
+    along_rings = cell * (1.0 + kappa * p["ring_offset"])
+    ring_mass = p["ring_mass"] * 0.5 * (along_rings + np.roll(along_rings, 1)) / dual
     belt_speed = p["driving_speed"] * path.driving_radius
     whole, disc = stiffness_factors(p)
     size = measures(p)
@@ -254,11 +249,6 @@ def belt_constants(parameters: Mapping[str, Any]) -> Belt:
     return Belt(**computed, **given)
 
 
-def _pair(values: np.ndarray) -> np.ndarray:
-    """Sum of a cell quantity over the two cells of each station."""
-    return values + np.roll(values, 1)
-
-
 def initial_state(parameters: Mapping[str, Any], belt: Belt) -> State:
     """Start near the steady state without load.
 
@@ -279,7 +269,7 @@ def initial_state(parameters: Mapping[str, Any], belt: Belt) -> State:
     pull = 2.0 * tangent * p["thrust"] / grid.path.driven_wrap
     w = np.zeros(grid.cell.size)
     arcs = []
-    states = np.zeros(len(f.STATES))
+    states = np.zeros(f.STATES)
     for region, sheave, radius, tilted in (
         (0, belt.driving, belt.driving_radius, f.DRIVING_COS),
         (2, belt.driven, belt.driven_radius, f.DRIVEN_COS),

@@ -17,7 +17,7 @@ from cvt_hpc.lanes import LaneArray, split
 from cvt_hpc.models.elastic_belt import fields as f
 from cvt_hpc.models.elastic_belt import lane_fields as lf
 from cvt_hpc.models.elastic_belt.belt import Belt, State
-from cvt_hpc.models.elastic_belt.bending import bending_bands, bending_load
+from cvt_hpc.models.elastic_belt.bending import bending_bands, bending_load, squared_curvature
 from cvt_hpc.models.elastic_belt.rhs import contact_forces, fresh_contacts, speed_share_at
 from cvt_hpc.physics.compliance import Contact, lane_contact
 from cvt_hpc.physics.friction import FrictionLaw
@@ -46,7 +46,7 @@ class LaneBelt(NamedTuple):
     on_driven, enters : (N,) arrays
         Whether (1) a station lies on the driven half, from `driven_start` on, and is the first of an arc.
     constants : (1, 62) LaneArray
-        CONSTANTS.
+        `lane_fields.CONSTANTS`.
     driven_start : int
         First station of the driven arc.
     memory : bool
@@ -103,13 +103,13 @@ class LaneState(NamedTuple):
         FIELDS at each station: layers' speeds less the belt speed of `time`; contents less 1 + kappa d_i. Of
         rings in n layers (N, 7 + 2 n), see `rings.py`.
     scalars : (1, 12) LaneArray of doubles
-        LANE_SCALARS.
+        Scalars of `lane_fields`.
     time : (1,) array
         [s]
     contacts : pair of Contact
         Driving and driven wrap.
     column : (N, 11) LaneArray
-        COLUMN of these fields; without rows where elements bear no moment.
+        Values of the column by `lane_fields`; without rows where elements bear no moment.
     """
 
     fields: LaneArray
@@ -117,6 +117,24 @@ class LaneState(NamedTuple):
     time: np.ndarray
     contacts: tuple[Contact, Contact]
     column: LaneArray
+
+
+class Work(NamedTuple):
+    """Work space of a step that keeps values of stations alone.
+
+    Attributes
+    ----------
+    stations : (N, fields) LaneArray
+        Fields that `lane_fields` and the step name.
+    """
+
+    stations: LaneArray
+
+
+def work_space(state: LaneState, fields: int) -> Work:
+    """Work space for a state; `derive` has to be called before the first step."""
+    rows, _, lanes = state.fields.data.shape
+    return Work(LaneArray(rows, fields, lanes, state.fields.data.dtype))
 
 
 def lane_belt(belts: list[Belt], dtype: DTypeLike) -> LaneBelt:
@@ -133,52 +151,30 @@ def lane_belt(belts: list[Belt], dtype: DTypeLike) -> LaneBelt:
     constants = LaneArray(1, len(lf.CONSTANTS), len(belts), dtype)
     for lane, belt in enumerate(belts):
         constants.data[0, :, lane] = _constants_of(belt)
-    cell, dual, kappa = first.cell, first.dual, first.curvature
-    stations = np.arange(cell.size)
-    law = first.law
+    stations, law = np.arange(first.cell.size), first.law
     tables = (law.table_force.astype(dtype), law.table_speed.astype(dtype), law.table_mu.astype(dtype))
-    shared = {
-        "cell": cell,
-        "dual": dual,
-        "per_cell": first.per_cell,
-        "per_dual": first.per_dual,
-        "per_span": first.per_span,
-        "curvature": kappa,
-        "arc_curvature": first.arc_curvature,
-        "arc_share": first.arc_share,
-        "ring_curvature": _ring_curvature(first),
-        "bending": bending_bands(cell, dual, 1.0, kappa, first.curvature_terms),
-        "bending_load": bending_load(cell, dual, 1.0, kappa, first.curvature_terms),
-        "squared_curvature": first.squared_curvature,
+    bent = first.cell, first.dual, 1.0, first.curvature, first.curvature_terms
+    computed: dict[str, Any] = {
+        "ring_curvature": squared_curvature(first.cell, first.dual, first.curvature, 1),
+        "bending": bending_bands(*bent),
+        "bending_load": bending_load(*bent),
         "on_driven": stations >= first.driven_start,
         "enters": (stations == 0) | (stations == first.driven_start),
+        "constants": constants,
+        "memory": first.friction_memory > 0.0,
+        "law": FrictionLaw(law.kind, 0.0, 0.0, 0.0, *tables),
+        "speed_ramps": any(belt.speed_start != belt.driving_speed for belt in belts),
+        "is_free": first.pulleys.are_free,
+        "is_curved": first.curvature_terms > 0,
     }
-    return LaneBelt(
-        **{name: array.astype(dtype) for name, array in shared.items()},
-        constants=constants,
-        driven_start=first.driven_start,
-        memory=first.friction_memory > 0.0,
-        law=FrictionLaw(law.kind, 0.0, 0.0, 0.0, *tables),
-        rise_time=first.rise_time,
-        start_damping=first.start_damping,
-        largest_displacement=first.largest_displacement,
-        faded=first.faded,
-        ramp_end=first.ramp_end,
-        speed_ramps=any(belt.speed_start != belt.driving_speed for belt in belts),
-        is_free=first.pulleys.are_free,
-        is_curved=first.curvature_terms > 0,
-        has_column=first.has_column,
-    )
-
-
-def _ring_curvature(belt: Belt) -> np.ndarray:
-    weighted = belt.cell * belt.curvature
-    return 0.5 * (weighted + np.roll(weighted, 1)) / belt.dual
+    # all else is of the belt, by the same name
+    values = (computed[key] if key in computed else getattr(first, key) for key in LaneBelt._fields)
+    return LaneBelt._make(value.astype(dtype) if isinstance(value, np.ndarray) else value for value in values)
 
 
 def _constants_of(belt: Belt) -> list[float]:
     angle, memory = belt.half_wedge_angle, belt.friction_memory
-    longer = 1.0 + belt.ring_offset * _ring_curvature(belt)[0]
+    longer = 1.0 + belt.ring_offset * squared_curvature(belt.cell, belt.dual, belt.curvature, 1)[0]
     named = {
         "ring_mass": belt.ring_mass[0] / longer,
         "ring_relief": belt.ring_relief[0] / longer,
@@ -222,13 +218,13 @@ def lane_state(belts: list[Belt], states: list[State], dtype: type) -> LaneState
     """
     n, lanes = belts[0].cell.size, len(belts)
     fields = LaneArray(n, states[0].fields.shape[0], lanes, dtype)
-    scalars = LaneArray(1, len(lf.LANE_SCALARS), lanes)
+    scalars = LaneArray(1, lf.SCALARS, lanes)
     for lane, (belt, state) in enumerate(zip(belts, states, strict=True)):
         put_lane(fields.data, scalars.data, lane, belt, state)
     wraps = [[belt.driving for belt in belts], [belt.driven for belt in belts]]
     contacts = (lane_contact(wraps[0], dtype), lane_contact(wraps[1], dtype))
     settle_discs(contacts, belts, states)
-    column = LaneArray(n if belts[0].has_column else 0, len(lf.COLUMN), lanes, dtype)
+    column = LaneArray(n if belts[0].has_column else 0, lf.FIELDS_OF_COLUMN, lanes, dtype)
     return LaneState(fields, scalars, np.array([states[0].scalars[0]]), contacts, column)
 
 

@@ -12,6 +12,7 @@ from cvt_hpc.models.elastic_belt.belt import MODES
 from cvt_hpc.models.elastic_belt.grouping import cost, lane_key, lanes
 from cvt_hpc.models.elastic_belt.history import histories
 from cvt_hpc.models.elastic_belt.momentary import profile_bytes
+from cvt_hpc.models.elastic_belt.power_terms import POWERS
 from cvt_hpc.models.elastic_belt.pulley_settings import PULLEY_DEFAULTS, are_free, oil_factor
 from cvt_hpc.variables import Coordinate, Variable
 from cvt_hpc.variator import PULLEYS, judging
@@ -38,15 +39,7 @@ __all__ = [
     "profile_bytes",
 ]
 
-LOSSES = (
-    "driving_flank_loss",
-    "driven_flank_loss",
-    "ring_loss",
-    "belt_loss",
-    "layer_loss",
-    "lag_loss",
-    "seating_loss",
-)
+LOSSES = tuple(name for name in POWERS if name.endswith("_loss"))
 
 VARIABLES = (
     *assessment.VARIABLES,
@@ -86,19 +79,8 @@ VARIABLES = (
         words="angle between sheaves",
     ),
     Variable("open_share", "1", "mean, out of contact", dims=("pulley",), words="open share of the wrap"),
-    *shared(
-        "flank_loss",
-        "thrust_ratio",
-        "speed_loss",
-        "driven_speed_ripple",
-        "driving_power",
-        "load_power",
-        "thrust_power",
-        "storing_power",
-        "ring_loss",
-        "belt_loss",
-    ),
-    *shared("layer_loss"),
+    *shared("flank_loss", "thrust_ratio", "speed_loss", "driven_speed_ripple", "driving_power", "load_power"),
+    *shared("thrust_power", "storing_power", "ring_loss", "belt_loss", "layer_loss"),
     Variable("lag_loss", "W", "mean power of the driven sheave's lag"),
     *shared("seating_loss", "loss", "efficiency", "power_residual"),
     Variable(

@@ -149,12 +149,7 @@ def damped_push(belt: Belt, eps: float, opening: float) -> float:
 
 @kernel
 def accelerations(
-    belt: Belt,
-    state: State,
-    force: np.ndarray,
-    eps: np.ndarray,
-    rate: np.ndarray,
-    moments: np.ndarray,
+    belt: Belt, state: State, force: np.ndarray, eps: np.ndarray, rate: np.ndarray, moments: np.ndarray
 ) -> None:
     """Accelerations of u, v_element and v_ring.
 
