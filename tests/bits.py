@@ -72,7 +72,12 @@ def variant(base: dict, **tables: object) -> dict:
 STUDIES: dict[str, dict] = {
     "auto": {key: value for key, value in BELT.items() if key != "record"} | GRID,
     "beam_pushbelt": variant(
-        ROLLING, sheaves={"sheave_stiffness": "inf"}, run={"duration": "17 ms", "longest_duration": "17 ms"}
+        ROLLING,
+        scene={"rise_time": "5 ms"},
+        numerics={"step": "3.5 us"},
+        run={"duration": "17 ms", "longest_duration": "17 ms"},
+        record={"sampling_rate": "10 kHz", "spectrum_step": "100 Hz"},
+        vibration={"band_low": "600 Hz"},
     ),
     "belt_drive": {
         "scene": {"load": "8 N m"},

@@ -75,18 +75,18 @@ def difference_forces(state, step, iterate):
     """D of an iterate, and what it leaves of T; adds to the pairs' forces."""
     for j in range(step.rows):
         slope, cross_slope = step[j, f.TENSION_SLOPE], step[j, f.CROSS_SLOPE]
-        i, j_ = vec.screw(step, j, f.DIFFERENCE_I), vec.screw(step, j, f.DIFFERENCE_J)
-        stretch = vec.both_dot(i, vec.screw(state, j, f.CHANGE)) + state[j, f.CHANGE_OF_HALF]
+        here, there = vec.screw(step, j, f.DIFFERENCE_I), vec.screw(step, j, f.DIFFERENCE_J)
+        stretch = vec.both_dot(here, vec.screw(state, j, f.CHANGE)) + state[j, f.CHANGE_OF_HALF]
         stretch = stretch - (
-            vec.both_dot(j_, vec.screw_ahead(state, j, f.CHANGE)) + ahead(state, j, f.CHANGE_OF_HALF)
+            vec.both_dot(there, vec.screw_ahead(state, j, f.CHANGE)) + ahead(state, j, f.CHANGE_OF_HALF)
         )
         of_both = (step[j, f.PREDICTED_TENSION] - iterate[j, f.ITERATE_TENSION]) / slope
         difference = fma(-slope, stretch, fma(-cross_slope, of_both, step[j, f.PREDICTED_DIFFERENCE]))
         more = -cross_slope * stretch
         iterate[j, f.ITERATE_DIFFERENCE] = difference
         iterate[j, f.ITERATE_TENSION] += more
-        own = vec.both_moved(vec.both_times(difference, i), more, vec.screw(step, j, f.TENSION_I))
-        next_one = vec.both_moved(vec.both_times(-difference, j_), -more, vec.screw(step, j, f.TENSION_J))
+        own = vec.both_moved(vec.both_times(difference, here), more, vec.screw(step, j, f.TENSION_I))
+        next_one = vec.both_moved(vec.both_times(-difference, there), -more, vec.screw(step, j, f.TENSION_J))
         vec.add_screw(iterate, j, f.PAIR_I, own)
         vec.add_screw(iterate, j, f.PAIR_J, next_one)
         iterate[j, f.PAIR_I + f.ROW_V] += more
@@ -175,10 +175,10 @@ def widen(belt, step, iterate, narrow, blocks, dt):
         blocks[j, f.WIDE_RIGHT + f.ROW_HALF] = iterate[j, f.HALF_RESIDUAL]
 
         blocks[j, f.ROW_HALF + f.WIDE * f.ROW_HALF] = like(belt.ring_mass / dt, step[j, f.TENSION_SLOPE])
-        i, i_half, j_, j_half = f.TENSION_I, f.DIFFERENCE_I, f.TENSION_J, f.DIFFERENCE_J
+        here, here_half, there, there_half = f.TENSION_I, f.DIFFERENCE_I, f.TENSION_J, f.DIFFERENCE_J
         k, m = step[j, f.TENSION_SLOPE], step[j, f.CROSS_SLOPE]
-        _add_law(blocks, j, 0, k, m, step, i, i, i_half, i_half)
-        _add_law(blocks, j, f.WIDE_LINKED, -k, -m, step, i, j_, i_half, j_half)
+        _add_law(blocks, j, 0, k, m, step, here, here, here_half, here_half)
+        _add_law(blocks, j, f.WIDE_LINKED, -k, -m, step, here, there, here_half, there_half)
         k, m = behind(step, j, f.TENSION_SLOPE), behind(step, j, f.CROSS_SLOPE)
         back, back_half = f.TENSION_BEHIND, f.DIFFERENCE_BEHIND
         _add_law(blocks, j, 0, k, m, step, back, back, back_half, back_half)
@@ -202,12 +202,12 @@ def book_difference(state, work, dt):
     elements, step, scratch = state.elements, work.step, work.scratch
     ring = stretching = like(0.0, elements[0, f.HALF_SPEED])
     for j in range(step.rows):
-        i, j_ = vec.screw(step, j, f.DIFFERENCE_I), vec.screw(step, j, f.DIFFERENCE_J)
+        here, there = vec.screw(step, j, f.DIFFERENCE_I), vec.screw(step, j, f.DIFFERENCE_J)
         half_slip = _along(vec.screw(step, j, f.HALF_SLIP_BY), elements, j, 0.5)
         ring += elements[j, f.FRICTION_DIFFERENCE] * half_slip
         w = ahead(elements, j, f.HALF_SPEED) + 0.5 * ahead(elements, j, f.CHANGE_OF_HALF)
-        next_one = vec.both_dot(j_, motion_ahead(elements, j, 0.5)) + w
-        stretch = _along(i, elements, j, 0.5) - next_one
+        next_one = vec.both_dot(there, motion_ahead(elements, j, 0.5)) + w
+        stretch = _along(here, elements, j, 0.5) - next_one
         of_both = mean_stretch(elements, step, j)
         stretching += stretch * (step[j, f.TENSION_SLOPE] * stretch + 2.0 * step[j, f.CROSS_SLOPE] * of_both)
     add_to_totals(state, scratch, planar.RING_LOSS, dt * ring)
