@@ -144,7 +144,7 @@ class Parameter:
 
 
 def positive(
-    default: float | None, unit: str, description: str, sensible: Range | None = None, **further: Any
+    default: Any, unit: str, description: str, sensible: Range | None = None, **further: Any
 ) -> Parameter:
     """Return a number above 0; `further` are other attributes of the `Parameter`."""
     further |= {"minimum": 0.0, "exclusive": True, "sensible": sensible}
@@ -152,7 +152,7 @@ def positive(
 
 
 def not_negative(
-    default: float, unit: str, description: str, sensible: Range | None = None, **further: Any
+    default: Any, unit: str, description: str, sensible: Range | None = None, **further: Any
 ) -> Parameter:
     """Return a number of 0 or more; `further` as of `positive`."""
     return Parameter(default, unit, description, minimum=0.0, sensible=sensible, **further)

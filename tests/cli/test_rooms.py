@@ -140,3 +140,48 @@ def test_layouts_of_arrays_are_modules_and_not_lists_of_names():
             if isinstance(node, ast.ImportFrom):
                 constants = [alias.name for alias in node.names if alias.name.replace("_", "").isupper()]
                 assert len(constants) <= MOST_CONSTANTS, f"{path}: {node.module}: {constants}"
+
+
+# arrays of kernels whose entries have names, and so have their rows and columns
+NAMED = {
+    "blocks",
+    "narrow",
+    "columns",
+    "rows",
+    "corner",
+    "diagonal",
+    "links",
+    "step",
+    "iterate",
+    "state",
+    "elements",
+}
+NAMED |= {"stations"}
+BY_NAME = ("pushbelt", "spatial_pushbelt", "beam_pushbelt", "quasi_static_belt", "belt_drive")  # models
+
+
+def numbers_added(node):
+    """Whether a sum has a number among its terms, and whether it has the name of a field."""
+    terms, ends = [node], []
+    while terms:
+        term = terms.pop()
+        if isinstance(term, ast.BinOp) and isinstance(term.op, ast.Add):
+            terms += [term.left, term.right]
+        else:
+            ends.append(term)
+    names = [getattr(end, "attr", getattr(end, "id", "")).isupper() for end in ends]
+    return any(isinstance(end, ast.Constant) for end in ends), any(names)
+
+
+def test_entries_of_arrays_and_of_linear_systems_have_names():
+    kernels = [path for path in SOURCES if path.parent.name in BY_NAME and "@kernel" in path.read_text()]
+    assert len(kernels) > 20
+    for path in kernels:
+        for node in ast.walk(ast.parse(path.read_text())):
+            if isinstance(node, ast.BinOp):
+                assert numbers_added(node) != (True, True), f"{path}:{node.lineno}: {ast.unparse(node)}"
+            if not isinstance(node, ast.Subscript) or not isinstance(node.slice, ast.Tuple):
+                continue
+            if getattr(node.value, "attr", getattr(node.value, "id", "")) in NAMED:
+                fields = node.slice.elts[1:]
+                assert not any(numbers_added(field)[0] for field in fields), f"{path}: {ast.unparse(node)}"

@@ -9,16 +9,9 @@ from typing import TYPE_CHECKING, Any
 import numpy as np
 
 from cvt_hpc.models.belt_drive import pulleys as fields
+from cvt_hpc.models.belt_drive import theory
 from cvt_hpc.models.belt_drive.kick import answers
 from cvt_hpc.models.belt_drive.layout import layout
-from cvt_hpc.models.belt_drive.theory import (
-    MODES,
-    creep_loss,
-    expected_loss,
-    sliding_tension,
-    strand_frequencies,
-    wrap_angles,
-)
 from cvt_hpc.physics.belt_path import regions
 from cvt_hpc.variables import Coordinate, Variable
 from cvt_hpc.variator import PULLEYS, STRANDS, judging
@@ -122,7 +115,7 @@ def coordinates(parameters: Mapping[str, Any]) -> dict[str, Coordinate]:
         "strand": _named("strand", drawn.spans),
         "pulley": _named("pulley", drawn.pulleys, roles),
     }
-    half_waves = Coordinate(np.arange(1, MODES + 1), "1", "half waves", "along the strand")
+    half_waves = Coordinate(np.arange(1, theory.MODES + 1), "1", "half waves", "along the strand")
     modes = Coordinate(np.arange(1, DRIVE_MODES + 1), "1", "mode of the drive")
     bins = frequency_bins(parameters)
     return {**names, "frequency_bin": bins, "half_waves": half_waves, "drive_mode": modes}
@@ -179,14 +172,14 @@ def evaluate(run: Transient, strongest_probe: np.ndarray) -> dict[str, Any]:
     """
     drawn, present, powers = run.drawn, run.present, _powers(run)
     work, tension = run.counters(), each(run, "tension", drawn.spans)
-    frequencies = strand_frequencies(run.parameters, present.path, tension)
+    frequencies = theory.strand_frequencies(run.parameters, present.path, tension)
     return {
         **judging.motion(run, strongest_probe, drawn.pulleys),
         "spectrum": _spectrum(run),
         **_of_arms(run),
         "speed_loss": run.speed_loss(run.whole_turns) if run.turns else np.nan,
-        "expected_speed_loss": expected_loss(run.parameters, present, tension),
-        "creep_speed_loss": creep_loss(run.parameters, drawn),
+        "expected_speed_loss": theory.expected_loss(run.parameters, present, tension),
+        "creep_speed_loss": theory.creep_loss(run.parameters, drawn),
         "strand_tension": tension,
         "eigenfrequency": frequencies,
         "drive_frequency": run.drive_frequencies(DRIVE_MODES),
@@ -272,7 +265,7 @@ def histories(run: Transient) -> xr.Dataset:
     over_time |= {name: (name, "rad", "rotation from where it is drawn") for name in names}
     profiles = {name: (values, *PROFILES[name]) for name, values in run.profiles.items()}
     tension = np.array([_late(run, f"tension {k}") for k in run.drawn.spans])
-    sliding = sliding_tension(run.parameters, run.path, tension, run.places)
+    sliding = theory.sliding_tension(run.parameters, run.path, tension, run.places)
     words = (
         "tension where it slides",
         "N",
@@ -280,7 +273,7 @@ def histories(run: Transient) -> xr.Dataset:
     )
     profiles["sliding_tension"] = sliding, *words
     words = "wrap angle", "rad", "from the inlet of the arc, arms as drawn"
-    profiles["wrap_angle"] = wrap_angles(run.path, run.places), *words
+    profiles["wrap_angle"] = theory.wrap_angles(run.path, run.places), *words
     names = [name for pair in zip(run.drawn.pulleys, run.drawn.spans, strict=True) for name in pair]
     region = np.array(names)[regions(run.path, run.places)]
     return dataset(run, over_time, profiles, run.places, region)

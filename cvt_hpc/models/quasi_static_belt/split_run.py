@@ -156,7 +156,7 @@ class SplitRun(OneLaneRun):
         # the layers' speeds are counted from the belt speed there: a second difference takes that out
         noted = self._noted.copy()
         noted[1:] += state.fields[2:4] - lane.fields.data[:, 2:4, 0].T
-        self._stations.data[:, lf.NOTED : lf.NOTED + 3, 0] = noted.T
+        self._stations.data[:, lf.NOTED : lf.NOTED + len(noted), 0] = noted.T
         outcome = self._sample_lane()
         self.done += int(outcome == Outcome.OK)
         return outcome
