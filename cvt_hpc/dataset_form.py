@@ -6,6 +6,7 @@ All that draws, reports or compares relies on it, so that it is checked once, wh
 from __future__ import annotations
 
 import json
+import math
 from collections.abc import Mapping
 from typing import TYPE_CHECKING, Any
 
@@ -32,6 +33,8 @@ TEXTS = (  # that are texts
 )
 UNITS = ("units", "job_units")  # of a variable
 WORDS = (*UNITS, "long_name", "comment", "flag_meanings", "spacing", "derived")
+PACKING = ("scale_factor", "add_offset")  # of a variable's attributes or, once applied, its encoding
+LARGEST = 1e100  # finite value of a parameter or coordinate [SI]: squares and cubes are numbers, too
 
 
 def check_form(dataset: xr.Dataset, source: str) -> None:
@@ -54,9 +57,8 @@ def check_form(dataset: xr.Dataset, source: str) -> None:
             raise mismatch(source, expected, show(name if isinstance(name, str) else str(name)))
     for name, variable in dataset.variables.items():
         _check_variable(variable, f"{source}: {name}")
-        is_text = variable.ndim == 1 and variable.dtype.kind in "OU" and isinstance(variable.data, np.ndarray)
-        if name in dataset.coords and is_text and not all(map(str.isprintable, map(str, variable.values))):
-            raise mismatch(f"{source}: {name}", "texts of printable characters", "others")
+        if name in dataset.coords:
+            _check_coordinate(variable, f"{source}: {name}")
 
 
 def _check_text(attributes: Mapping[Any, Any], key: str, place: str) -> None:
@@ -73,6 +75,9 @@ def _check_table(attributes: Mapping[Any, Any], key: str, place: str) -> None:
         table = None
     if not isinstance(table, dict):
         raise mismatch(f"{place}: {key}", "a table in JSON", "none")
+    for inner in ("axes", "vibration") if key == "job" else ():
+        if not isinstance(table.get(inner, {}), dict):
+            raise mismatch(f"{place}: {key}: {inner}", "a table", show(table[inner]))
 
 
 def _check_variable(variable: xr.Variable, place: str) -> None:
@@ -84,6 +89,17 @@ def _check_variable(variable: xr.Variable, place: str) -> None:
     for key in UNITS:
         if not (unit := attributes.get(key, "")).isprintable() or len(unit) > LONGEST_KEY:
             raise mismatch(f"{place}: {key}", "a unit", show(unit))
+    for key in PACKING:
+        number = attributes.get(key, variable.encoding.get(key, 1.0))
+        if np.ndim(number) or not isinstance(number, (int, float, np.number)) or not math.isfinite(number):
+            raise mismatch(f"{place}: {key}", "a number", show(number))
+    if "flag_meanings" in attributes:
+        values = np.atleast_1d(attributes.get("flag_values", ()))
+        count = len(attributes["flag_meanings"].split())
+        if values.dtype.kind not in "iuf" or values.shape != (count,):
+            raise mismatch(
+                f"{place}: flag_values", f"{count} numbers, as many as flag_meanings", show(values)
+            )
 
 
 def _holds_texts(variable: xr.Variable) -> bool:
@@ -92,3 +108,16 @@ def _holds_texts(variable: xr.Variable) -> bool:
         return True
     first = variable[(0,) * variable.ndim].values.item()
     return isinstance(first, (str, bytes, float, tuple))  # nan, where it is not known; of stacked axes
+
+
+def _check_coordinate(variable: xr.Variable, place: str) -> None:
+    if variable.ndim != 1 or variable.dtype.kind not in "fOU" or not isinstance(variable.data, np.ndarray):
+        return
+    if variable.dtype.kind == "f":
+        largest = np.abs(variable.values)
+        if np.any(np.isfinite(largest) & (largest > LARGEST)):
+            raise mismatch(
+                place, f"values of at most {LARGEST:g}", f"{largest[np.isfinite(largest)].max():g}"
+            )
+    elif not all(map(str.isprintable, map(str, variable.values))):
+        raise mismatch(place, "texts of printable characters", "others")

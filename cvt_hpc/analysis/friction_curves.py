@@ -12,7 +12,7 @@ from matplotlib.figure import Figure
 
 from cvt_hpc.analysis.error_axes import COLOURS, LINES
 from cvt_hpc.analysis.figures import WIDTH, entitle, headline, styled
-from cvt_hpc.job import rebuild_job
+from cvt_hpc.job import stored_job
 from cvt_hpc.physics.friction import friction_coefficients, given_law
 from cvt_hpc.variables import Vibrates
 
@@ -33,7 +33,7 @@ def curves_of(dataset: xr.Dataset, speeds: np.ndarray) -> dict[float, np.ndarray
     speeds : (n,) array
         [m/s]
     """
-    job: Any = rebuild_job(json.loads(dataset.attrs["job"]), "dataset", {})
+    job: Any = stored_job(json.loads(dataset.attrs["job"]), "dataset")
     found = {}
     for gradient in dataset["friction_gradient"].values:
         point = job.point_at({"friction_gradient": float(gradient)})

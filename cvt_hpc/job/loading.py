@@ -94,6 +94,23 @@ def build_job(
     return job
 
 
+def stored_job(document: Mapping[str, Any], source: str) -> Job:
+    """Return the job that a dataset holds, without the keys that this version does not have.
+
+    Raises
+    ------
+    InputError
+        If anything else is wrong with the document.
+    """
+    schema = load_schema(document.get("model"), document.get("stepper"), source)
+    known = {
+        name: {key: value for key, value in table.items() if key in schema.parameters}
+        for name, table in document.items()
+        if name in schema.sections and isinstance(table, Mapping)
+    }
+    return rebuild_job({**document, **known}, source, {})
+
+
 def rebuild_job(
     document: Mapping[str, Any],
     source: str,

@@ -28,7 +28,7 @@ from cvt_hpc.analysis.starts import AXIS, has_starts
 from cvt_hpc.analysis.value_maps import value_map_figure
 from cvt_hpc.errors import InputError, escaped, mismatch, one_line
 from cvt_hpc.files import written_aside
-from cvt_hpc.job import Job, rebuild_job
+from cvt_hpc.job import Job, stored_job
 from cvt_hpc.job.summary import core_time_in_words, rules_in_words, value_in_words
 from cvt_hpc.models.contract import load_model
 from cvt_hpc.netcdf import CONTENT, HISTORY
@@ -156,7 +156,7 @@ def _content(dataset: xr.Dataset, source: str, folder: Path | None) -> dict[str,
 def _job(attributes: Mapping[str, str], source: str) -> Job | None:
     """The job of a dataset; None where this version of the program cannot read it any more."""
     try:
-        return rebuild_job(json.loads(attributes["job"]), source, {})
+        return stored_job(json.loads(attributes["job"]), source)
     except (InputError, KeyError, ValueError, RecursionError):
         return None
 

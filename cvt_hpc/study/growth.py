@@ -89,7 +89,8 @@ def _in_grid(
     places = np.zeros((), np.int64)
     for name, values in columns.items():
         of = {value: place for place, value in enumerate(wanted[name])}
-        if not of.keys() >= set(values):
+        # repeated values, as a document of somebody else may have them, would make any number of runs
+        if not of.keys() >= set(values) or len(set(values)) < len(values):
             return None
         own = [of[value] for value in values]
         linked = {key: [every[place] for place in own] for key, every in others.get(name, {}).items()}
