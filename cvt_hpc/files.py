@@ -7,14 +7,16 @@ would lead elsewhere, and a pipe or a device may never answer.
 from __future__ import annotations
 
 import contextlib
+import csv
 import errno
 import os
 import pwd
 import secrets
 import stat
 import sys
-from collections.abc import Iterator
+from collections.abc import Iterable, Iterator, Sequence
 from pathlib import Path
+from typing import Any
 
 from cvt_hpc.errors import InputError
 
@@ -201,6 +203,19 @@ def written_aside(path: Path, *, parents: bool = False, advice: str = "") -> Ite
         raise storage_error(path, _refusal(aside, error), advice) from error
     finally:
         discard(aside)
+
+
+def write_rows(
+    path: Path, head: Sequence[Any], rows: Iterable[Sequence[Any]], origin: Iterable[str] = ()
+) -> Path:
+    """Write a table of comma-separated values below lines of its origin, and return its path.
+
+    Its folder is made, where there is none; errors are those of `written_aside`.
+    """
+    with written_aside(path, parents=True) as aside, aside.open("w", encoding="utf-8", newline="") as file:
+        file.writelines(origin)
+        csv.writer(file, lineterminator="\n").writerows([head, *rows])
+    return path
 
 
 def sync_folder(folder: Path) -> None:

@@ -1,7 +1,7 @@
 """An output folder: its content, the process at work in it, and the files that may be removed from it.
 
 Studies, charts and bifurcation diagrams have one each, with a job file against which all else is checked. The
-folder may come from somebody else, damaged or forged: everything read is checked, and nothing is written or
+folder may be damaged, or another user's: a checksum shows damage of the job file, and nothing is written or
 removed outside.
 """
 
@@ -33,11 +33,10 @@ from cvt_hpc.locks import is_locked, locked
 CHECKSUM = "checksum"  # key of the job file
 CHART_FILE = "chart.json"  # its folder holds nothing else, while studies and diagrams may share one
 _LIMIT = 1 << 29  # [bytes] of a job file; 10^6 samples of ten parameters are 400 MB
-_DEEPEST = 40  # levels of tables and lists; a job has six
 
 _logger = logging.getLogger(__name__)
 
-Content = TypeVar("Content")
+Content = TypeVar("Content", bound=Any)  # a job, or what describes it: with `fingerprint` and `resolved`
 
 
 class DamagedJobError(InputError):
@@ -83,11 +82,6 @@ class OutputFolder(ABC, Generic[Content]):
     ----------
     path : str or Path
         The folder; it need not exist.
-
-    Attributes
-    ----------
-    is_signed : bool
-        Whether the job file, when it was read last, had a checksum; files of earlier versions have none.
     """
 
     kind: ClassVar[Kind]
@@ -96,21 +90,20 @@ class OutputFolder(ABC, Generic[Content]):
         self.path = Path(path)
         self.job_file = self.path / self.kind.job_file
         self.lock_file = self.path / self.kind.lock_file
-        self.is_signed = False
 
-    @abstractmethod
     def document(self, content: Content) -> dict[str, Any]:
         """Return the job file of a content as JSON types, its fingerprint among them."""
+        return {"fingerprint": content.fingerprint(), "job": content.resolved()}
 
-    @abstractmethod
     def accept(self, entry: dict[str, Any]) -> Any:
         """Return the content of a sound job file, in the form in which `refuse_other` takes it.
 
         Raises
         ------
         ValueError, TypeError, KeyError
-            If it is not a result of `document`.
+            If another version has written it, names in it lead out of the folder, or it is too large.
         """
+        return entry
 
     @abstractmethod
     def refuse_other(self, found: Any, asked: Content) -> None:
@@ -154,7 +147,7 @@ class OutputFolder(ABC, Generic[Content]):
                 raise DamagedJobError(f"{expected} {error.strerror}") from error
             raise StorageError(f"{expected}: {error.strerror}") from error
         try:
-            entry = json.loads(data.decode(), parse_constant=_refuse_constant)
+            entry = json.loads(data.decode())
             if not isinstance(entry, dict):
                 raise ValueError("it is no table")
         except (ValueError, RecursionError) as error:
@@ -163,21 +156,12 @@ class OutputFolder(ABC, Generic[Content]):
             found = entry.get("format")
             quoted = json.dumps(found[:60]) if isinstance(found, str) else "none"
             raise InputError(f'{self.job_file}: expected format "{self.kind.format}", found {quoted}')
+        if entry.pop(CHECKSUM, None) != checksum(entry):
+            raise DamagedJobError(f"{expected} damage (its content does not fit its checksum)", entry)
         try:
-            _check_depth(entry)
-            stated = entry.pop(CHECKSUM, None)
-            self.is_signed = stated is not None
-            if not self.is_signed:
-                self.check_unsigned(entry)
-            elif stated != checksum(entry):
-                raise ValueError("its content does not fit its checksum")
             return self.accept(entry)
-        except (KeyError, TypeError, ValueError, AttributeError, ArithmeticError) as error:
-            words = f"no {error}" if isinstance(error, KeyError) else error
-            raise DamagedJobError(f"{expected} damage ({words})", entry) from error
-
-    def check_unsigned(self, entry: dict[str, Any]) -> None:
-        """Raise ValueError unless a job file of an earlier version, without checksum, fits itself."""
+        except (KeyError, TypeError, ValueError) as error:  # of another version
+            raise DamagedJobError(f"{expected} damage ({error})", entry) from error
 
     def check_free_for(self, asked: Content, fresh: bool) -> Any:
         """Make sure that the folder may be used for a content; touches nothing.
@@ -289,12 +273,11 @@ class OutputFolder(ABC, Generic[Content]):
             found = self.read_job()
         except DamagedJobError:
             found = None
-        agrees = found is not None and self.agrees(found, asked)
-        if agrees and self.is_signed:
-            return
-        if found is not None and not agrees:
+        if found is not None:
+            if self.agrees(found, asked):
+                return
             self.replace(found, asked)
-        elif found is None and self.results_tell() is not None:
+        elif self.results_tell() is not None:
             _logger.warning(
                 "%s: damaged or gone; written anew, since the results are of this job", self.job_file
             )
@@ -354,20 +337,3 @@ def _make_way(path: Path, kinds: tuple[str, ...], fresh: bool) -> None:
             f"{path}: expected {kinds[0]}, found {found}; remove it, or --fresh with all results"
         )
     remove_own(path)
-
-
-def _check_depth(entry: Any) -> None:
-    level, depth = [entry], 0
-    while level:
-        if (depth := depth + 1) > _DEEPEST:
-            raise ValueError("tables or lists nested too deep")
-        level = [
-            value
-            for part in level
-            for value in (part.values() if isinstance(part, dict) else part)
-            if isinstance(value, (dict, list))
-        ]
-
-
-def _refuse_constant(word: str) -> None:
-    raise ValueError(f"{word} is no number")

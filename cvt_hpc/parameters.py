@@ -6,6 +6,8 @@ from collections.abc import Callable, Mapping
 from dataclasses import dataclass, field
 from typing import Any
 
+Range = tuple[float, float]
+
 
 @dataclass(frozen=True)
 class Substitute:
@@ -142,14 +144,15 @@ class Parameter:
 
 
 def positive(
-    default: float, unit: str, description: str, sensible: tuple[float, float] | None = None
+    default: Any, unit: str, description: str, sensible: Range | None = None, **further: Any
 ) -> Parameter:
-    """Return a number above 0."""
-    return Parameter(default, unit, description, minimum=0.0, exclusive=True, sensible=sensible)
+    """Return a number above 0; `further` are other attributes of the `Parameter`."""
+    further |= {"minimum": 0.0, "exclusive": True, "sensible": sensible}
+    return Parameter(default, unit, description, **further)
 
 
 def not_negative(
-    default: float, unit: str, description: str, sensible: tuple[float, float] | None = None
+    default: Any, unit: str, description: str, sensible: Range | None = None, **further: Any
 ) -> Parameter:
-    """Return a number of 0 or more."""
-    return Parameter(default, unit, description, minimum=0.0, sensible=sensible)
+    """Return a number of 0 or more; `further` as of `positive`."""
+    return Parameter(default, unit, description, minimum=0.0, sensible=sensible, **further)

@@ -193,9 +193,7 @@ KINDS = {
         "a kept run: displacement, spectrum, load, forces and feeds around the belt",
     ),
     "phase": Kind(
-        HISTORY,
-        "histories.phase_figure",
-        "phase portraits: velocity of each strand over its displacement",
+        HISTORY, "histories.phase_figure", "phase portraits: velocity of each strand over its displacement"
     ),
     "flanks": Kind(
         HISTORY,

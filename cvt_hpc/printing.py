@@ -348,14 +348,13 @@ def _array_in_words(array: xr.DataArray, units: Mapping[str, Sequence[str]] | No
     unit = array.attrs.get("units", "")
     unit = "" if unit == "1" else unit
     told = {"units": unit, JOB_UNITS: _readable_unit(known, unit, units)}
-    texts = [_number_in_words(value, told) for value in known.values.ravel().tolist()]
+    texts = [
+        f"{shown_number(value, told):.6g}" if isinstance(value, float) else str(value)
+        for value in known.values.ravel().tolist()
+    ]
     if array.ndim:
         texts = [f"{place} {text}" for place, text in zip(known[array.dims[0]].values, texts, strict=True)]
     return f"{', '.join(texts)} {told[JOB_UNITS] or unit}".rstrip()
-
-
-def _number_in_words(value: Any, told: Mapping[str, Any]) -> str:
-    return f"{shown_number(value, told):.6g}" if isinstance(value, float) else str(value)
 
 
 def _readable_unit(array: xr.DataArray, unit: str, units: Mapping[str, Sequence[str]] | None) -> str:

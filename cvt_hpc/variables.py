@@ -66,14 +66,14 @@ class Variable:
     ----------
     name : str
         Name in the dataset.
-    dims : tuple of str
-        Dimensions beside those of the sweep's grid, e.g. ("strand",).
-    dtype : str
-        numpy type: "f8", "i8", "i1", or "S240" for a text.
     units : str
         CF unit ("1" if dimensionless, "" for flags and texts).
     comment : str
         CF comment: the meaning, in a sentence.
+    dims : tuple of str
+        Dimensions beside those of the sweep's grid, e.g. ("strand",).
+    dtype : str
+        numpy type: "f8", "i8", "i1", or "S240" for a text.
     flags : type of IntEnum or None
         Meaning of the values of a flag variable.
     volatile : bool
@@ -83,10 +83,10 @@ class Variable:
     """
 
     name: str
-    dims: tuple[str, ...]
-    dtype: str
     units: str
     comment: str
+    dims: tuple[str, ...] = ()
+    dtype: str = "f8"
     flags: type[IntEnum] | None = None
     volatile: bool = False
     words: str = ""

@@ -111,11 +111,8 @@ def _on_common_grid(a: xr.Dataset, b: xr.Dataset, sources: tuple[str, str]) -> t
     for name in axes_of(a):
         in_a, in_b = _common_places(_keys(a[name]), _keys(b[name]))
         if not in_a:
-            where, expected = (
-                f"{sources[1]}: axis {name}",
-                f"a value of {sources[0]}: {known_values(a[name])}",
-            )
-            raise mismatch(where, expected, known_values(b[name]))
+            expected = f"a value of {sources[0]}: {known_values(a[name])}"
+            raise mismatch(f"{sources[1]}: axis {name}", expected, known_values(b[name]))
         a, b = a.isel({name: in_a}), b.isel({name: in_b})
     dims = a["status"].dims
     return a.transpose(*dims, ...), b.transpose(*dims, ...)

@@ -3,20 +3,22 @@
 from __future__ import annotations
 
 from collections.abc import Sequence
+from typing import Any
 
 import numpy as np
 import xarray as xr
 from matplotlib.axes import Axes
 from matplotlib.figure import Figure
 
-from cvt_hpc.analysis.figures import WIDTH, balanced, styled
+from cvt_hpc.analysis.figures import WIDTH, styled
 from cvt_hpc.analysis.profiles import inside
-from cvt_hpc.analysis.telling_apart import on_axes, titles
+from cvt_hpc.analysis.telling_apart import entitle_runs, on_axes
 
 INWARDS, OUTWARDS = "#0072b2", "#d55e00"
 PARTS = {"radial_sliding": "#0072b2", "tangential_sliding": "#009e73"}
 LINES = ("-", "--", ":")
 ARROWS = 11  # along a wrap
+ARROW: dict[str, Any] = {"angles": "xy", "scale_units": "xy", "scale": 1.0, "width": 0.009, "zorder": 3}
 LONGEST = 0.33  # of the pulley's radius: the longest arrow of a kind
 DEPTH = 0.25  # of the radius: how deep the way into the groove is drawn
 PULLEYS = ("driving", "driven")
@@ -75,7 +77,7 @@ def sliding_figure(histories: Sequence[xr.Dataset]) -> Figure:
     Figure
         Arrows of sliding have a scale of their own on each pulley, those of friction show its direction.
     """
-    common, labels = on_axes(histories, [f"history {k + 1}" for k in range(len(histories))])
+    _, labels = on_axes(histories)
     figure = Figure((WIDTH * 1.2, 5.6), layout="constrained")
     panels = figure.subplots(2, 2, height_ratios=[1.25, 1.0])
     reach = 1e3 * max(_Arc(histories[0], pulley).radius for pulley in PULLEYS)
@@ -99,9 +101,8 @@ def sliding_figure(histories: Sequence[xr.Dataset]) -> Figure:
     entries = [axes.get_legend_handles_labels() for axes in panels[:, 0]]
     handles, texts = ([part for entry in entries for part in entry[k]] for k in (0, 1))
     figure.legend(handles, texts, loc="outside lower center", frameon=False, ncols=2)
-    lines = titles(histories, "Sliding, and friction against it", common)
-    lines.append(f"arrows: {', '.join(labels[0].values())}")
-    figure.suptitle("\n".join(balanced(line, 84) for line in lines))
+    arrows = f"arrows: {', '.join(labels[0].values())}"
+    entitle_runs(figure, histories, "Sliding, and friction against it", arrows, width=84)
     return figure
 
 
@@ -119,17 +120,7 @@ def _draw_vectors(axes: Axes, arc: _Arc) -> None:
         (0.5 * friction, "#333333", "direction of friction on the element"),
     ):
         vector = vector[:, at] * (1e3 * LONGEST * arc.radius / (longest if name == SLIDES else 1.0))
-        axes.quiver(
-            *points[:, at],
-            *vector,
-            angles="xy",
-            scale_units="xy",
-            scale=1.0,
-            color=colour,
-            width=0.009,
-            label=name,
-            zorder=3,
-        )
+        axes.quiver(*points[:, at], *vector, color=colour, label=name, **ARROW)
         axes.update_datalim((points[:, at] + vector).T)
     arc.frame(axes)
 
@@ -165,8 +156,7 @@ def spiral_figure(history: xr.Dataset, pulley: str) -> Figure:
     vectors = speed[at] * arc.outward[:, at] * (1e3 * LONGEST * arc.radius / np.abs(speed).max())
     for sign, colour, name in ((-1.0, INWARDS, "moves inwards"), (1.0, OUTWARDS, "moves outwards")):
         which = sign * speed[at] > 0.0
-        style = {"angles": "xy", "scale_units": "xy", "scale": 1.0, "width": 0.009, "zorder": 3}
-        plane.quiver(*points[:, at[which]], *vectors[:, which], color=colour, label=name, **style)
+        plane.quiver(*points[:, at[which]], *vectors[:, which], color=colour, label=name, **ARROW)
     plane.update_datalim((points[:, at] + vectors).T)
     arc.frame(plane)
     plane.legend(loc="lower center", frameon=False, fontsize=9)
@@ -178,8 +168,6 @@ def spiral_figure(history: xr.Dataset, pulley: str) -> Figure:
         axes.set_ylabel(f"radial {name}")
         axes.grid(lw=0.4, alpha=0.5)
     columns["speed"].set_xlabel("wrap angle [°]")
-    common, _ = on_axes([history], ["history"])
-    lines = titles([history], f"Elements in the {pulley} arc", common)
-    lines.append(f"left, the way into the groove is drawn {larger:.2g} times as deep as it is")
-    figure.suptitle("\n".join(balanced(line, 84) for line in lines))
+    depth = f"left, the way into the groove is drawn {larger:.2g} times as deep as it is"
+    entitle_runs(figure, [history], f"Elements in the {pulley} arc", depth, width=84)
     return figure

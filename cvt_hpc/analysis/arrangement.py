@@ -2,8 +2,9 @@
 
 from __future__ import annotations
 
-from collections.abc import Mapping
+from collections.abc import Iterator, Mapping, Sequence
 from dataclasses import dataclass, field, replace
+from itertools import product
 from typing import Any, NamedTuple
 
 import numpy as np
@@ -17,6 +18,7 @@ from cvt_hpc.analysis.ticks import number, put_ticks, short_numbers
 from cvt_hpc.errors import InputError, few_of, mismatch, show, unknown
 from cvt_hpc.job.shown import shown_as_read, shown_number, shown_unit
 
+At = Mapping[str, Any] | None  # axes to fix: value by name, a number [SI] or a text
 MOST_VALUES_NAMED = 12
 FEW, FEW_ON_DECADES = 12, 6  # values of an axis that have ticks of their own
 FEW_DECADES = 2.5  # on which 1, 2 and 5 have labels, not powers of ten alone
@@ -102,9 +104,7 @@ def arrange(dataset: xr.Dataset, at: Mapping[str, Any], source: str, sides: Side
     y = sides.y or _take(rest, "friction_gradient", avoid="sheave_stiffness")
     panel = sides.panel or _take(rest, "sheave_stiffness")
     for name in rest:
-        count = dataset.sizes[name]
-        notes.append(f"{in_words(dataset[name])} = {value_text(dataset[name], 0)} (first of {count})")
-        dataset = dataset.isel({name: 0})
+        dataset = _at_first(dataset, name, notes)
     for name in filter(None, (x, y, panel)):
         if dataset[name].dtype.kind in "iuf":
             dataset = dataset.sortby(name)
@@ -138,9 +138,7 @@ def along_x(arrangement: Arrangement) -> tuple[xr.Dataset, list[str]]:
     """The first row of the first panel of an arrangement, and what is fixed, in words."""
     dataset, notes = arrangement.dataset, list(arrangement.notes)
     for name in filter(None, (arrangement.y, arrangement.panel)):
-        count = dataset.sizes[name]
-        notes.append(f"{in_words(dataset[name])} = {value_text(dataset[name], 0)} (first of {count})")
-        dataset = dataset.isel({name: 0})
+        dataset = _at_first(dataset, name, notes)
     return dataset, notes
 
 
@@ -148,10 +146,28 @@ def first_panel(arrangement: Arrangement) -> Arrangement:
     """The arrangement with the axis of its panels, if it has one, fixed at its first value."""
     if not arrangement.panel:
         return arrangement
-    axis = arrangement.dataset[arrangement.panel]
-    note = f"{in_words(axis)} = {value_text(axis, 0)} (first of {axis.size})"
-    fixed = arrangement.dataset.isel({arrangement.panel: 0})
-    return replace(arrangement, dataset=fixed, panel=None, notes=(*arrangement.notes, note))
+    notes = list(arrangement.notes)
+    fixed = _at_first(arrangement.dataset, arrangement.panel, notes)
+    return replace(arrangement, dataset=fixed, panel=None, notes=tuple(notes))
+
+
+def _at_first(dataset: xr.Dataset, name: str, notes: list[str]) -> xr.Dataset:
+    """Results at the first value of an axis, which is added to the notes."""
+    axis = dataset[name]
+    notes.append(f"{in_words(axis)} = {value_text(axis, 0)} (first of {axis.size})")
+    return dataset.isel({name: 0})
+
+
+def places(array: xr.DataArray | xr.Dataset, dims: Sequence[str]) -> list[dict[str, int]]:
+    """Indices along dimensions, of all their combinations."""
+    sizes = (range(array.sizes[dim]) for dim in dims)
+    return [dict(zip(dims, place, strict=True)) for place in product(*sizes)]
+
+
+def labelled(array: xr.DataArray, dims: Sequence[Any]) -> Iterator[tuple[list[str], xr.DataArray]]:
+    """Yield the parts of a variable at all places along its dimensions beyond `dims`, with their labels."""
+    for at in places(array, [str(dim) for dim in array.dims if dim not in dims]):
+        yield [str(array[dim].values[k]) for dim, k in at.items()], array.isel(at)
 
 
 def with_spacings(dataset: xr.Dataset, spacings: Mapping[str, str], source: str) -> xr.Dataset:
@@ -270,6 +286,9 @@ class Ruler:
             put_ticks(axis, self.ticks, self.tick_labels)
         if self.minor.size:
             axis.set_ticks(self.minor, minor=True)
+
+
+ONE_ROW = Ruler(np.zeros(1), np.array([-0.5, 0.5]), np.empty(0), (), "")
 
 
 def ruler(coordinate: xr.DataArray) -> Ruler:

@@ -28,11 +28,8 @@ from cvt_hpc.vibration.agreement import PairClass
 from cvt_hpc.vibration.hysteresis import StartClass
 
 Array = NDArray[np.float64]
-MOST, FAR, MANY = (
-    0.98,
-    1.5,
-    20,
-)  # share of values on a scale, where the others reach so far beyond; of so many
+# share of values on a scale, where the others reach so far beyond; of so many
+MOST, FAR, MANY = 0.98, 1.5, 20
 MOST_BORDERS = 20_000  # sides between cells of different class: more would hide the cells
 Mask = NDArray[np.bool_]
 CellClass = OccurrenceClass | StartClass | PairClass
@@ -48,6 +45,11 @@ class ClassStyle:
     hatch: str
     mark: str
     mark_size: float
+
+    def marks(self, size: float) -> dict[str, Any]:
+        """Return how marks are drawn that are not joined, for the size of a dot [point]."""
+        look = {"marker": self.mark, "ms": size * self.mark_size, "color": self.ink, "mec": self.rim}
+        return {"ls": "", **look}
 
 
 # Lightness falls from not run (white) over quiet to undecided; vibrating cells follow below. Failed ones are
@@ -186,39 +188,8 @@ def draw_marks(axes: Axes, x: Ruler, y: Ruler, classes: NDArray[np.int8], marked
     """Mark grid points by class; arguments as for `draw_cells`, which ones, and the size of a dot [point]."""
     for kind, style in ALL_STYLES.items():
         rows, columns = np.nonzero((classes == kind) & marked)
-        axes.plot(
-            x.centres[columns],
-            y.centres[rows],
-            linestyle="",
-            marker=style.mark,
-            markersize=size * style.mark_size,
-            color=style.ink,
-            markeredgecolor=style.rim,
-            markeredgewidth=0.2 * size,
-            rasterized=True,
-            zorder=2.2,  # above lines of onset
-        )
-
-
-def write_values(
-    axes: Axes,
-    x: Ruler,
-    y: Ruler,
-    kind: OccurrenceClass,
-    classes: NDArray[np.int8],
-    values: Array,
-    fills: Array,
-    scale: Scale,
-) -> None:
-    """Write `values` above the grid points of the cells of a class that are filled by `fills`.
-
-    Whole numbers, or two digits of what is below 10.
-    """
-    for row, column in np.argwhere((classes == kind) & np.isfinite(values)):
-        (fill,) = fills_of(kind, fills[row : row + 1, column], scale)
-        value = values[row, column]
-        text = f"{value:.0f}" if value >= 10.0 else f"{value:.2g}"
-        write_value(axes, (x.centres[column], y.centres[row]), text, fill, above=2.5)
+        look = {**style.marks(size), "mew": 0.2 * size, "zorder": 2.2}  # above lines of onset
+        axes.plot(x.centres[columns], y.centres[rows], **look, rasterized=True)
 
 
 def write_value(
@@ -236,17 +207,9 @@ def write_value(
     An outline in that colour keeps it apart from hatching.
     """
     effects = [withStroke(linewidth=2.5, foreground=to_hex(fill)), Normal()] if outlined else None
-    axes.annotate(
-        text,
-        place,
-        xytext=(0, above),
-        textcoords="offset points",
-        ha="center",
-        va="bottom" if above else "center",
-        fontsize=size,
-        color=_ink_on(fill, "#000000"),
-        path_effects=effects,
-    )
+    ink = "#ffffff" if fill[:3] @ (0.299, 0.587, 0.114) < 0.45 else "#000000"  # by the lightness of the fill
+    look = {"ha": "center", "va": "bottom" if above else "center", "fontsize": size, "color": ink}
+    axes.annotate(text, place, (0, above), textcoords="offset points", path_effects=effects, **look)
 
 
 def class_legend(
@@ -263,9 +226,7 @@ def class_legend(
     for kind, style in styles.items():
         outline = style.ink if style.hatch else "#606060"
         cell = Patch(facecolor=style.fill, edgecolor=outline, hatch=style.hatch, linewidth=0.8)
-        size = 4.0 * style.mark_size
-        mark = Line2D([], [], ls="", marker=style.mark, color=style.ink, markersize=size, mec=style.rim)
-        handles.append((cell, mark))
+        handles.append((cell, Line2D([], [], **style.marks(4.0))))
         labels.append(kind.label)
     if with_inferred:
         for label, fill in (("inferred", "none"), ("inferred, vibrating", INFERRED_VIBRATION)):
@@ -304,11 +265,6 @@ def fills_of(kind: CellClass, values: Array, scale: Scale) -> Array:
         known = np.isfinite(values)
         fills[known] = scale.colours(scale.norm(values[known]))
     return fills
-
-
-def _ink_on(fill: Array, ink: str) -> str:
-    """The ink, or white where the fill is too dark for it."""
-    return "#ffffff" if fill[:3] @ (0.299, 0.587, 0.114) < 0.45 else ink
 
 
 def _borders(x: Ruler, y: Ruler, classes: NDArray[np.int8]) -> Array:

@@ -7,6 +7,7 @@ import xarray as xr
 from numpy.typing import NDArray
 
 from cvt_hpc.errors import few_of, mismatch
+from cvt_hpc.netcdf import flag_attributes
 from cvt_hpc.vibration.classes import OccurrenceClass, classify_runs
 from cvt_hpc.vibration.hysteresis import StartClass
 
@@ -53,11 +54,7 @@ def occurrence_classes(dataset: xr.Dataset) -> xr.DataArray:
         return dataset["occurrence_class"]
     flags = dataset["status"], dataset["vibrates"]
     classes = xr.apply_ufunc(classify_runs, *flags, dask="parallelized", output_dtypes=[np.int8])
-    attributes = {
-        "long_name": "vibration occurrence",
-        "flag_values": np.array(list(OccurrenceClass), np.int8),
-        "flag_meanings": " ".join(c.name.lower() for c in OccurrenceClass),
-    }
+    attributes = {"long_name": "vibration occurrence", **flag_attributes(OccurrenceClass)}
     return classes.rename("occurrence_class").assign_attrs(attributes)
 
 

@@ -2,7 +2,6 @@
 
 from __future__ import annotations
 
-import csv
 import json
 import math
 from collections.abc import Iterator, Mapping
@@ -16,21 +15,16 @@ import xarray as xr
 from numpy.typing import NDArray
 
 from cvt_hpc.analysis.alignment import COMPARED, align, axes_of, job_of
+from cvt_hpc.analysis.arrangement import labelled
 from cvt_hpc.analysis.classes import at_strongest_strand, occurrence_classes
-from cvt_hpc.files import written_aside
+from cvt_hpc.files import write_rows
 from cvt_hpc.job.shown import heading, shown, shown_number
 from cvt_hpc.models import MODELS
 from cvt_hpc.models.contract import load_model
 from cvt_hpc.study.job_difference import differences, short_pair
+from cvt_hpc.tables import number
 from cvt_hpc.variables import Status
-from cvt_hpc.vibration.agreement import (
-    CONTRADICTIONS,
-    NEAR_CONTRADICTIONS,
-    WITHOUT_RESULTS,
-    PairClass,
-    classify_pairs,
-    is_near,
-)
+from cvt_hpc.vibration import agreement
 from cvt_hpc.vibration.classes import OccurrenceClass
 
 _HEAD = (
@@ -94,7 +88,7 @@ class Cell(NamedTuple):
     @property
     def pair_label(self) -> str:
         """Name for people of `pair`."""
-        return (OccurrenceClass(self.pair) if self.pair >= 0 else PairClass(self.pair)).label
+        return (OccurrenceClass(self.pair) if self.pair >= 0 else agreement.PairClass(self.pair)).label
 
 
 @dataclass(frozen=True)
@@ -134,12 +128,12 @@ class Comparison:
     @property
     def better(self) -> NDArray[np.bool_]:
         """Whether a cell that vibrates in A is quiet in B, shape of the grid."""
-        return np.isin(self.pairs, (PairClass.A_ONLY, PairClass.A_ONLY_NEAR))
+        return np.isin(self.pairs, (agreement.PairClass.A_ONLY, agreement.PairClass.A_ONLY_NEAR))
 
     @property
     def worse(self) -> NDArray[np.bool_]:
         """Whether a cell that is quiet in A vibrates in B, shape of the grid."""
-        return np.isin(self.pairs, (PairClass.B_ONLY, PairClass.B_ONLY_NEAR))
+        return np.isin(self.pairs, (agreement.PairClass.B_ONLY, agreement.PairClass.B_ONLY_NEAR))
 
     @property
     def pairs(self) -> NDArray[np.int8]:
@@ -149,18 +143,18 @@ class Comparison:
     @property
     def contradicts(self) -> NDArray[np.bool_]:
         """Whether a cell is quiet in one study and vibrates in the other, shape of the grid."""
-        return np.isin(self.pairs, CONTRADICTIONS)
+        return np.isin(self.pairs, agreement.CONTRADICTIONS)
 
     @property
     def contradicts_beyond(self) -> NDArray[np.bool_]:
         """Whether it does so with a larger amplitude that is not near the threshold, shape of the grid."""
-        return self.contradicts & ~np.isin(self.pairs, NEAR_CONTRADICTIONS)
+        return self.contradicts & ~np.isin(self.pairs, agreement.NEAR_CONTRADICTIONS)
 
     @property
     def answered(self) -> NDArray[np.bool_]:
         """Whether both runs of a cell have ended with results, shape of the grid."""
         both = (self.cells[name].values for name in ("class_a", "class_b"))
-        return ~np.any([np.isin(classes, WITHOUT_RESULTS) for classes in both], axis=0)
+        return ~np.any([np.isin(classes, agreement.WITHOUT_RESULTS) for classes in both], axis=0)
 
     def counts(self) -> dict[tuple[OccurrenceClass, OccurrenceClass], int]:
         """Number of cells by their class in A and in B, of all pairs of classes."""
@@ -226,12 +220,14 @@ def compare(a: xr.Dataset, b: xr.Dataset, sources: tuple[str, str] = ("A", "B"))
     aligned = align(a, b, sources, _compared(a, b))
     thresholds = _threshold(a), _threshold(b)
     known = [_known(dataset) for dataset in (aligned.a, aligned.b)]
-    near = is_near(*(found["amplitude"] / least for found, least in zip(known, thresholds, strict=True)))
+    near = agreement.is_near(
+        *(found["amplitude"] / least for found, least in zip(known, thresholds, strict=True))
+    )
     frame = aligned.a["status"]
     values = {f"{name}_{study}": array for study, found in zip("ab", known, strict=True)
               for name, array in found.items()}  # fmt: skip
     values |= {"status": frame.values}
-    values |= {"occurrence_class": classify_pairs(values["class_a"], values["class_b"], near)}
+    values |= {"occurrence_class": agreement.classify_pairs(values["class_a"], values["class_b"], near)}
     quantities = [_quantities(dataset) for dataset in (aligned.a, aligned.b)]
     common = {name: unit for name, (_, unit) in quantities[0].items() if name in quantities[1]}
     for study, found in zip("ab", quantities, strict=True):
@@ -254,11 +250,8 @@ def _quantities(dataset: xr.Dataset) -> dict[str, tuple[NDArray, str]]:
     found = {}
     for name, array in dataset.drop_vars(COMPARED, errors="ignore").data_vars.items():
         unit = array.attrs.get("units", "1")
-        extra = [dim for dim in array.dims if dim not in dims]
-        for place in product(*(range(array.sizes[dim]) for dim in extra)):
-            at = dict(zip(extra, place, strict=True))
-            labels = [str(array[dim].values[k]) for dim, k in at.items()]
-            found["_".join([str(name), *labels])] = array.isel(at).transpose(*dims).values, unit
+        for labels, part in labelled(array, dims):
+            found["_".join([str(name), *labels])] = part.transpose(*dims).values, unit
     return found
 
 
@@ -276,25 +269,19 @@ def _known(dataset: xr.Dataset) -> dict[str, NDArray]:
 
 def write_comparison(found: Comparison, table: Path) -> Path:
     """Write all cells of a comparison as a CSV table, a row each, and return its path."""
-    with written_aside(table, parents=True) as path, path.open("w", newline="") as file:
-        writer = csv.writer(file, lineterminator="\n")
-        told = {name: found.cells[name].attrs for name in axes_of(found.cells)}
-        units = {name: "" if unit == "1" else f" [{unit}]" for name, unit in found.quantities.items()}
-        further = [f"{name}_{study}{unit}" for name, unit in units.items() for study in "ab"]
-        writer.writerow([*(heading(name, attributes) for name, attributes in told.items()), *_HEAD, *further])
-        for cell in found.rows(np.ones(found.pairs.shape, bool)):
-            numbers = [_number(size * 1e6, ".4g") for size in cell.amplitude]
-            numbers += [_number(frequency, ".5g") for frequency in cell.frequency]
-            numbers += [_number(value, ".6g") for pair in cell.quantities.values() for value in pair]
-            labels = [kind.label for kind in cell.classes]
-            place = [shown_number(value, told[name]) for name, value in cell.at.items()]
-            writer.writerow([*place, *labels, cell.pair_label, *numbers])
-    return table
-
-
-def _number(value: float, layout: str) -> str:
-    """Return a number as a text; no text where it is not a number."""
-    return "" if math.isnan(value) else format(value, layout)
+    told = {name: found.cells[name].attrs for name in axes_of(found.cells)}
+    units = {name: "" if unit == "1" else f" [{unit}]" for name, unit in found.quantities.items()}
+    further = [f"{name}_{study}{unit}" for name, unit in units.items() for study in "ab"]
+    rows = []
+    for cell in found.rows(np.ones(found.pairs.shape, bool)):
+        numbers = [number(size * 1e6, 4) for size in cell.amplitude]
+        numbers += [number(frequency, 5) for frequency in cell.frequency]
+        numbers += [number(value, 6) for pair in cell.quantities.values() for value in pair]
+        labels = [kind.label for kind in cell.classes]
+        place = [shown_number(value, told[name]) for name, value in cell.at.items()]
+        rows.append([*place, *labels, cell.pair_label, *numbers])
+    heads = [heading(name, attributes) for name, attributes in told.items()]
+    return write_rows(table, [*heads, *_HEAD, *further], rows)
 
 
 def _threshold(dataset: xr.Dataset) -> float:

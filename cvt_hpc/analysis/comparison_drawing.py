@@ -3,7 +3,6 @@
 from __future__ import annotations
 
 from pathlib import Path
-from textwrap import fill
 
 import numpy as np
 from matplotlib.axes import Axes
@@ -13,7 +12,7 @@ from numpy.typing import NDArray
 from cvt_hpc.analysis import cells
 from cvt_hpc.analysis.arrangement import Arrangement, arrange, first_panel
 from cvt_hpc.analysis.comparison import Comparison
-from cvt_hpc.analysis.figures import WIDTH, draw
+from cvt_hpc.analysis.figures import WIDTH, draw, entitle
 from cvt_hpc.analysis.maps import TITLE_HEIGHT, draw_block, sheet_of
 from cvt_hpc.analysis.scatter import draw_samples, is_sampled, scatter_height
 from cvt_hpc.vibration.agreement import CONTRADICTIONS, NEAR
@@ -57,7 +56,7 @@ def _figure(found: Comparison, sources: tuple[str, str]) -> Figure:
     cells.class_legend(above, kinds, 3)
     _draw_amplitudes(below, found)
     lines = _title(found, pairs, sources) + list(arrangement.notes)
-    figure.suptitle("\n".join(fill(line, 72) for line in lines))
+    entitle(figure, lines)
     return figure
 
 
@@ -121,19 +120,9 @@ def _draw_amplitudes(figure: SubFigure, found: Comparison) -> None:
     low, high = LOWEST * known, 1.5 * max(a[drawn].max(), b[drawn].max())
     for kind, style in cells.ALL_STYLES.items():
         of_kind = drawn & (found.pairs == kind)
-        axes.plot(
-            np.clip(a[of_kind], low, None),
-            np.clip(b[of_kind], low, None),
-            linestyle="",
-            marker=style.mark,
-            markersize=4.0 * style.mark_size,
-            color=style.fill,
-            markeredgecolor="#000000",
-            markeredgewidth=0.5,
-            clip_on=False,
-            zorder=2,
-            rasterized=True,
-        )
+        look = {**style.marks(4.0), "color": style.fill, "mec": "#000000", "mew": 0.5, "zorder": 2}
+        x, y = (np.clip(amplitude[of_kind], low, None) for amplitude in (a, b))
+        axes.plot(x, y, **look, clip_on=False, rasterized=True)
     _draw_guides(axes, threshold, low, high)
 
 

@@ -13,7 +13,7 @@ from xarray.indexes import PandasMultiIndex
 from cvt_hpc.dataset_form import check_form
 from cvt_hpc.errors import mismatch, show, unknown
 from cvt_hpc.job.shown import JOB_UNITS
-from cvt_hpc.job.units import UnitError, from_si, is_unit
+from cvt_hpc.job.units import factor_to, is_unit
 from cvt_hpc.models import MODELS
 from cvt_hpc.models.contract import load_model
 from cvt_hpc.variables import Status, Vibrates
@@ -61,10 +61,8 @@ def in_units(dataset: xr.Dataset, units: Mapping[str, str]) -> xr.Dataset:
         if "units" not in variable.attrs:
             raise mismatch(f"results: {name}", "a variable with a unit", "a flag or a text")
         given = str(variable.attrs["units"])
-        try:
-            factor = from_si(1.0, given, unit)
-        except UnitError:
-            raise mismatch(f"results: {name}", f"a unit of the dimension of {given}", unit) from None
+        if (factor := factor_to(given, unit)) is None:
+            raise mismatch(f"results: {name}", f"a unit of the dimension of {given}", unit)
         converted[name] = _changed_to(variable, variable.data * factor, **{"units": unit, JOB_UNITS: unit})
     return _with(dataset, converted)
 
@@ -157,21 +155,12 @@ def _in_si(variable: xr.Variable, name: str, is_axis: bool, source: str) -> xr.V
     if given == documented or (given in UNITS and not documented):
         return variable
     for unit in [documented] if documented else UNITS:
-        if factor := _factor(given, unit):
+        if factor := factor_to(given, unit):
             return _changed_to(variable, variable.data * factor, units=unit)
     if documented or not is_unit(given):
         expected = f"of the dimension of {documented}" if documented else "such as mm, kN or rpm"
         raise mismatch(f"{source}: {name}: units", f"a unit {expected}", show(given))
     return variable
-
-
-@lru_cache
-def _factor(given: str, unit: str) -> float | None:
-    """What turns numbers in a given unit into those in another one; None where nothing does."""
-    try:
-        return from_si(1.0, given, unit)
-    except UnitError:
-        return None
 
 
 @np.vectorize(otypes=[object])

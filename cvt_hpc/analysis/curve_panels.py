@@ -2,8 +2,7 @@
 
 from __future__ import annotations
 
-from collections.abc import Mapping, Sequence
-from itertools import product
+from collections.abc import Sequence
 from typing import Any
 
 import numpy as np
@@ -12,24 +11,11 @@ from matplotlib.axes import Axes
 from matplotlib.figure import Figure
 from matplotlib.lines import Line2D
 
-from cvt_hpc.analysis.arrangement import Sides, arrange, ruler
+from cvt_hpc.analysis import curves
+from cvt_hpc.analysis.arrangement import At, Sides, arrange, places, ruler
 from cvt_hpc.analysis.classes import check_results, occurrence_classes
-from cvt_hpc.analysis.curves import (
-    BESIDE,
-    MARKS,
-    check_quantities,
-    common_words,
-    curve_figure,
-    job_of,
-    mark_above,
-    panels_of,
-    place_in_words,
-    scale,
-    set_frame,
-    with_margins,
-)
 from cvt_hpc.analysis.error_axes import COLOURS
-from cvt_hpc.analysis.figures import WIDTH, in_words, styled
+from cvt_hpc.analysis.figures import WIDTH, headline, in_words, styled
 from cvt_hpc.errors import mismatch
 from cvt_hpc.variables import Status
 
@@ -42,23 +28,19 @@ INK = "#333333"  # of styles in the legend, which colours do not tell
 def curves_figure(
     dataset: xr.Dataset,
     quantities: Sequence[str],
-    at: Mapping[str, Any] | None = None,
+    at: At = None,
     source: str = "results",
     lines: str | None = None,
 ) -> Figure:
     """Draw as `curve_figure`, or with `lines` as `curve_panels_figure`, A+B in one panel."""
     if lines is None:
-        return curve_figure(dataset, quantities, at, source)
+        return curves.curve_figure(dataset, quantities, at, source)
     return curve_panels_figure(dataset, [name.split("+") for name in quantities], lines, at, source)
 
 
 @styled
 def curve_panels_figure(
-    dataset: xr.Dataset,
-    groups: Sequence[Sequence[str]],
-    lines: str,
-    at: Mapping[str, Any] | None = None,
-    source: str = "results",
+    dataset: xr.Dataset, groups: Sequence[Sequence[str]], lines: str, at: At = None, source: str = "results"
 ) -> Figure:
     """Draw quantities over an axis, by another axis.
 
@@ -82,9 +64,9 @@ def curve_panels_figure(
     """
     check_results(dataset, source)
     for group in groups:
-        check_quantities(dataset, group, source)
+        curves.check_quantities(dataset, group, source)
     arrangement = arrange(dataset, at or {}, source, Sides(y=lines))
-    curves, notes = panels_of(arrangement, source, len(COLOURS))
+    each, notes = curves.panels_of(arrangement, source, len(COLOURS))
     shown, along = arrangement.dataset, {arrangement.x, lines, arrangement.panel}
     panels = [(group, place) for group in groups for place in _places(shown, group, along, source)]
     if len(panels) > MOST_PANELS:
@@ -100,29 +82,29 @@ def curve_panels_figure(
     x = ruler(shown[arrangement.x])
     legend: dict[str, Any] = {
         title: Line2D([], [], color=colour, marker=mark, ms=5, lw=0.7)
-        for (title, _), colour, mark in zip(curves, COLOURS, MARKS, strict=False)
+        for (title, _), colour, mark in zip(each, COLOURS, curves.MARKS, strict=False)
     }
     for axes, (group, place) in zip(all_axes, panels, strict=False):
-        factor, unit = scale(shown, group)
-        labels = [place_in_words(shown[dim], k) for dim, k in place.items()]
-        title = " ".join([common_words(shown, group), *labels])
+        factor, unit = curves.scale(shown, group)
+        labels = [curves.place_in_words(shown[dim], k) for dim, k in place.items()]
+        title = " ".join([curves.common_words(shown, group), *labels])
         axes.set_title(f"{title} [{unit}]" if unit else title, loc="left", pad=6)
-        for k, (_, results) in enumerate(curves):
+        for k, (_, results) in enumerate(each):
             values = [factor * results[name].isel(place).values for name in group]
             _draw(axes, x.centres, values, results["status"].values == Status.DONE, k)
-            mark_above(axes, x.centres, occurrence_classes(results).values)
-        for name, style in zip(group[1:], BESIDE, strict=False):
+            curves.mark_above(axes, x.centres, occurrence_classes(results).values)
+        for name, style in zip(group[1:], curves.BESIDE, strict=False):
             legend[in_words(shown[name])] = Line2D([], [], color=INK, ls=style, lw=1.2)
         handles, told = axes.get_legend_handles_labels()
         legend |= dict(zip(told, handles, strict=True))
-        axes.set_xlim(with_margins(x))
+        axes.set_xlim(curves.with_margins(x))
         x.lay_out(axes.xaxis)
         axes.grid(linewidth=0.4, alpha=0.5)
     for axes in all_axes[len(panels) - columns : len(panels)]:
         axes.set_xlabel(x.label)
         axes.tick_params(labelbottom=True)
-    title = f"Over {in_words(shown[arrangement.x])}, by {in_words(shown[lines])}: {job_of(dataset)}"
-    set_frame(figure, legend, [title.rstrip(": "), *notes])
+    title = f"Over {in_words(shown[arrangement.x])}, by {in_words(shown[lines])}"
+    curves.set_frame(figure, legend, [headline(title, dataset.attrs), *notes])
     return figure
 
 
@@ -135,16 +117,13 @@ def _places(
         if dims != first:
             expected = f"the dimensions of {group[0]}: {', '.join(map(str, first)) or 'none'}"
             raise mismatch(f"{source}: {name}", expected, ", ".join(map(str, dims)) or "none")
-    return [
-        {str(dim): k for dim, k in zip(first, place, strict=True)}
-        for place in product(*(range(dataset.sizes[dim]) for dim in first))
-    ]
+    return places(dataset, list(map(str, first)))
 
 
 def _draw(axes: Axes, x: np.ndarray, values: Sequence[np.ndarray], is_done: np.ndarray, k: int) -> None:
     """The k-th curve of a panel: marks of the first quantity, lines of the others, in one colour."""
-    colour, mark = COLOURS[k], MARKS[k % len(MARKS)]
+    colour, mark = COLOURS[k], curves.MARKS[k % len(curves.MARKS)]
     first, *others = (np.where(is_done, value, np.nan) for value in values)
     axes.plot(x, first, color=colour, marker=mark, ms=4, lw=0.7, zorder=2.5)
-    for value, style in zip(others, BESIDE, strict=False):
+    for value, style in zip(others, curves.BESIDE, strict=False):
         axes.plot(x, value, color=colour, ls=style, lw=1.2, zorder=1.5)

@@ -3,8 +3,6 @@
 from __future__ import annotations
 
 from collections.abc import Iterator, Mapping, Sequence
-from itertools import product
-from textwrap import fill
 from typing import Any
 
 import numpy as np
@@ -12,12 +10,21 @@ import xarray as xr
 from matplotlib.axes import Axes
 from matplotlib.figure import Figure
 
-from cvt_hpc.analysis.arrangement import Arrangement, Ruler, arrange, ruler, value_text
+from cvt_hpc.analysis.arrangement import (
+    Arrangement,
+    At,
+    Ruler,
+    arrange,
+    first_panel,
+    places,
+    ruler,
+    value_text,
+)
 from cvt_hpc.analysis.cells import STYLES
 from cvt_hpc.analysis.classes import WITHOUT_RESULT, check_results, occurrence_classes
 from cvt_hpc.analysis.error_axes import COLOURS, MARKERS
-from cvt_hpc.analysis.figures import WIDTH, check_known, in_words, legend_columns, styled
-from cvt_hpc.errors import mismatch, one_line, unknown
+from cvt_hpc.analysis.figures import WIDTH, check_known, entitle, headline, in_words, legend_columns, styled
+from cvt_hpc.errors import mismatch, unknown
 from cvt_hpc.variables import Status
 
 HEIGHT = 3.8  # [inch]
@@ -31,10 +38,7 @@ MARKS = tuple(mark for mark in MARKERS if mark not in {STYLES[kind].mark for kin
 
 @styled
 def curve_figure(
-    dataset: xr.Dataset,
-    quantities: Sequence[str],
-    at: Mapping[str, Any] | None = None,
-    source: str = "results",
+    dataset: xr.Dataset, quantities: Sequence[str], at: At = None, source: str = "results"
 ) -> Figure:
     """Draw quantities over an axis.
 
@@ -79,27 +83,17 @@ def curve_figure(
     for axes in all_axes:
         handles, labels = axes.get_legend_handles_labels()
         legend |= dict(zip(labels, handles, strict=True))
-    set_frame(figure, legend, [f"{label[0].upper()}{label[1:]}: {job_of(dataset)}".rstrip(": "), *notes])
+    set_frame(figure, legend, [headline(f"{label[0].upper()}{label[1:]}", dataset.attrs), *notes])
     return figure
-
-
-def job_of(dataset: xr.Dataset) -> str:
-    """Name of the job, for a title."""
-    return one_line(dataset.attrs.get("job_name", ""))
 
 
 def set_frame(figure: Figure, legend: Mapping[str, Any], lines: Sequence[str]) -> None:
     """Title and legend of a figure of curves, which grows by the legend; `legend` has handles by label."""
     columns = legend_columns(list(legend))
     figure.set_figheight(figure.get_figheight() + 0.2 * (len(legend) // columns))
-    figure.legend(
-        legend.values(),
-        legend.keys(),
-        loc="outside lower center",
-        frameon=False,
-        ncols=columns,
-    )
-    figure.suptitle("\n".join(fill(line, 72) for line in lines))
+    place = {"loc": "outside lower center", "frameon": False, "ncols": columns}
+    figure.legend(legend.values(), legend.keys(), **place)
+    entitle(figure, lines)
 
 
 def check_quantities(
@@ -120,12 +114,8 @@ def panels_of(
     arrangement: Arrangement, source: str, most: int = MOST_PANELS
 ) -> tuple[list[tuple[str, xr.Dataset]], list[str]]:
     """Title and results over x of each value along y, `most` at most, and what is fixed, in words."""
+    arrangement = first_panel(arrangement)
     dataset, notes = arrangement.dataset, list(arrangement.notes)
-    if arrangement.panel:
-        notes.append(
-            f"{in_words(dataset[arrangement.panel])} = {value_text(dataset[arrangement.panel], 0)} (first)"
-        )
-        dataset = dataset.isel({arrangement.panel: 0})
     if arrangement.y is None:
         return [("", dataset)], notes
     y = dataset[arrangement.y]
@@ -142,8 +132,7 @@ def _curves(
     """Name of the quantity, label of the curve, with it or without, and values over x by a factor."""
     extra = [str(dim) for dim in array.dims if dim != x]
     words = [in_words(array)] if is_named or not extra else []
-    for place in product(*(range(array.sizes[dim]) for dim in extra)):
-        at = dict(zip(extra, place, strict=True))
+    for at in places(array, extra):
         labels = [place_in_words(array[dim], k) for dim, k in at.items()]
         yield str(array.name), " ".join([*words, *labels]), factor * array.isel(at).values
 

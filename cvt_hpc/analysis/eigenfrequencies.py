@@ -4,7 +4,6 @@ from __future__ import annotations
 
 import json
 from collections.abc import Mapping
-from textwrap import fill
 from typing import Any
 
 import numpy as np
@@ -13,8 +12,7 @@ from matplotlib.axes import Axes
 from matplotlib.figure import Figure
 
 from cvt_hpc.analysis.arrangement import CHOSEN, Sides, along_x, arrange, ruler
-from cvt_hpc.analysis.figures import WIDTH, axis_label
-from cvt_hpc.errors import one_line
+from cvt_hpc.analysis.figures import WIDTH, axis_label, entitle, headline
 from cvt_hpc.physics.geometry import variator
 from cvt_hpc.variator import STRANDS
 
@@ -134,9 +132,8 @@ def eigenfrequency_figure(
         along.lay_out(axes.xaxis)
     panels[0].set_ylabel(axis_label(dataset["eigenfrequency"], "Hz"))
     panels[0].set_ylim(bottom=0.0)
-    headline = f"Eigenfrequencies: {one_line(dataset.attrs.get('job_name', ''))}".rstrip(": ")
-    lines = [headline, *notes, "beside the lines: half waves along the strand"]
-    figure.suptitle("\n".join(fill(line, 72) for line in lines))
+    first = headline("Eigenfrequencies", dataset.attrs)
+    entitle(figure, [first, *notes, "beside the lines: half waves along the strand"])
     return figure
 
 

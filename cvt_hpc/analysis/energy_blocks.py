@@ -12,11 +12,13 @@ from matplotlib.axes import Axes
 from matplotlib.figure import Figure
 from matplotlib.patches import FancyArrowPatch, FancyBboxPatch
 
-from cvt_hpc.analysis.figures import WIDTH, balanced, styled
-from cvt_hpc.analysis.telling_apart import on_axes, titles
+from cvt_hpc.analysis.figures import WIDTH, styled
+from cvt_hpc.analysis.telling_apart import entitle_runs, on_axes
+from cvt_hpc.analysis.ticks import number
 
 ROW = 1.9  # [inch]
 SILENT = 1e-7  # [m]
+SIGNED = "+.2g"
 FEEDING, TAKING = "#d55e00", "#0072b2"
 TAKEN = ("belt", "ring", "layer", "lag")
 
@@ -67,14 +69,13 @@ def blocks_figure(histories: Sequence[xr.Dataset]) -> Figure:
     histories : sequence of Dataset
         Of the elastic belt, with what feeds the fluctuations.
     """
-    common, labels = on_axes(histories, [f"history {k + 1}" for k in range(len(histories))])
+    _, labels = on_axes(histories)
     figure = Figure((WIDTH * 1.2, ROW * len(histories) + 0.7), layout="constrained")
     rows = figure.subplots(len(histories), 1, squeeze=False)[:, 0]
     for axes, history, label in zip(rows, histories, labels, strict=True):
         _draw_blocks(axes, history)
         axes.set_title(", ".join(label.values()), loc="left", pad=2)
-    lines = titles(histories, "Source, switch, oscillator", common)
-    figure.suptitle("\n".join(balanced(line, 84) for line in lines))
+    entitle_runs(figure, histories, "Source, switch, oscillator", width=84)
     return figure
 
 
@@ -101,8 +102,7 @@ def _draw_blocks(axes: Axes, history: xr.Dataset) -> None:
     fed = found.outlet
     ends = ((1.76, 0.42), (1.96, 0.42)) if fed > 0.0 else ((1.96, 0.42), (1.76, 0.42))
     _arrow(axes, *ends, FEEDING if fed > 0.0 else TAKING)
-    words = f"driven outlet {_signed(fed)}"
-    axes.text(1.86, 0.7, words, ha="center", va="bottom", fontsize=8.5)
+    axes.text(1.86, 0.7, f"driven outlet {number(fed, SIGNED)} W", ha="center", va="bottom", fontsize=8.5)
     _arrow(axes, (2.36, -0.04), (1.36, -0.04), "#333333", "arc3,rad=-0.25")
     axes.text(1.86, -0.35, "its state sets the switch", ha="center", va="top", fontsize=8.5)
     _arrow(axes, (2.76, 0.31), (2.96, 0.31), TAKING)
@@ -111,14 +111,10 @@ def _draw_blocks(axes: Axes, history: xr.Dataset) -> None:
         ("push, tension", found.stresses),
         ("dampers, rings", -found.taken),
     )
-    losses = "\n".join(f"{name} {_signed(power)}" for name, power in rest)
+    losses = "\n".join(f"{name} {number(power, SIGNED)} W" for name, power in rest)
     axes.text(2.99, 0.31, losses, va="center", fontsize=8.5)
     axes.set(xlim=(-0.05, 3.65), ylim=(-0.5, 0.85))
     axes.set_axis_off()
-
-
-def _signed(power: float) -> str:
-    return f"{power:+.2g} W".replace("-", "−")
 
 
 def _arrow(

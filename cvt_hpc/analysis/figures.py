@@ -135,10 +135,9 @@ def check_known(dataset: xr.Dataset, names: Iterable[str], source: str) -> None:
         raise mismatch(source, f"known values of {' or '.join(names)}", "none")
 
 
-def headline(attributes: Mapping[str, Any]) -> str:
-    """First line above a map of a dataset with these attributes."""
-    job = one_line(attributes.get("job_name", ""))
-    return f"Vibration occurrence: {job}" if job else "Vibration occurrence"
+def headline(subject: str, attributes: Mapping[str, Any]) -> str:
+    """First line above a picture of a dataset with these attributes: its subject, and the job."""
+    return f"{subject}: {one_line(attributes.get('job_name', ''))}".removesuffix(": ")
 
 
 def draw(compose: Callable[[], Figure], out: Path) -> Path:
@@ -264,9 +263,10 @@ def balanced(line: str, width: int) -> str:
     return "\n".join(lines)
 
 
-def headlines(lines: Sequence[str], width: int = 72) -> str:
-    """Text above a picture: lines that are not empty, each broken as by `balanced`."""
-    return "\n".join(balanced(line, width) for line in lines if line).replace("\u00a0", " ")
+def entitle(figure: Figure, lines: Sequence[str], width: int = 72) -> None:
+    """Put lines that are not empty above a picture, each broken as by `balanced`."""
+    text = "\n".join(balanced(line, width) for line in lines if line)
+    figure.suptitle(text.replace("\u00a0", " "))
 
 
 def legend_columns(labels: Sequence[str]) -> int:

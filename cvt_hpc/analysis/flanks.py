@@ -9,9 +9,9 @@ import xarray as xr
 from matplotlib.axes import Axes
 from matplotlib.figure import Figure
 
-from cvt_hpc.analysis.figures import NARROW, balanced, in_words, styled
+from cvt_hpc.analysis.figures import NARROW, in_words, styled
 from cvt_hpc.analysis.profiles import ARC, regions, shown_unit
-from cvt_hpc.analysis.telling_apart import check_holds, on_axes, titles
+from cvt_hpc.analysis.telling_apart import check_holds, entitle_runs
 
 SIDES = ("left", "right")
 QUANTITIES = ("contact_force", "flank_slip", "radial_slip")
@@ -117,9 +117,7 @@ def flanks_figure(history: xr.Dataset, source: str = "history") -> Figure:
                 axes.set_title(f"{end.name}\n{told}", loc="left", pad=4)
     handles, told = whole.get_legend_handles_labels()
     figure.legend(handles, told, loc="outside lower center", frameon=False, ncols=2)
-    common, _ = on_axes([history], [source])
-    lines = titles([history], "Left and right flank", common)
-    figure.suptitle("\n".join(balanced(line, 80) for line in lines))
+    entitle_runs(figure, [history], "Left and right flank", width=80)
     return figure
 
 

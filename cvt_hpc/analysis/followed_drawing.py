@@ -8,10 +8,10 @@ import numpy as np
 import xarray as xr
 from matplotlib.figure import Figure
 
-from cvt_hpc.analysis.figures import WIDTH, balanced, check_known, styled
+from cvt_hpc.analysis.figures import WIDTH, check_known, styled
 from cvt_hpc.analysis.followed import around, follow_element, passages
 from cvt_hpc.analysis.profiles import ARC, regions
-from cvt_hpc.analysis.telling_apart import on_axes, titles
+from cvt_hpc.analysis.telling_apart import entitle_runs
 from cvt_hpc.errors import mismatch
 
 COLOURS = {"radial_sliding": "#0072b2", "tangential_sliding": "#009e73", "sliding_speed": "#d55e00"}
@@ -69,9 +69,7 @@ def element_figure(
     begin = f"time since the element entered the {region} arc [ms]" if region else "time [ms]"
     axes.set(xlabel=begin, ylabel="sliding on the sheaves [mm/s]", xlim=time[[0, -1]])
     figure.legend(loc="outside lower center", frameon=False, ncols=4)
-    common, _ = on_axes([history], [source])
-    lines = titles([history], "One element along its path", common)
-    figure.suptitle("\n".join(balanced(line, 76) for line in lines))
+    entitle_runs(figure, [history], "One element along its path")
     return figure
 
 
@@ -108,9 +106,7 @@ def swinging_figure(history: xr.Dataset, marks: Mapping[str, Sequence[float]]) -
     right.legend(frameon=False)
     for axes in (left, right):
         axes.grid(linewidth=0.4, alpha=0.5)
-    common, _ = on_axes([history], ["history"])
-    words = titles([history], "Sliding in the driven arc", common)
-    figure.suptitle("\n".join(balanced(line, 84) for line in words))
+    entitle_runs(figure, [history], "Sliding in the driven arc", width=84)
     return figure
 
 

@@ -11,13 +11,11 @@ import xarray as xr
 from matplotlib.figure import Figure
 
 from cvt_hpc.analysis.error_axes import COLOURS, LINES
-from cvt_hpc.analysis.figures import WIDTH, balanced, styled
-from cvt_hpc.errors import one_line
-from cvt_hpc.job import rebuild_job
+from cvt_hpc.analysis.figures import WIDTH, entitle, headline, styled
+from cvt_hpc.job import stored_job
 from cvt_hpc.physics.friction import friction_coefficients, given_law
 from cvt_hpc.variables import Vibrates
 
-AXES = ("friction_gradient", "radial_speed")
 POINTS = 400
 MARKS = {
     Vibrates.YES: ({"marker": "o", "ms": 4.5}, "fed"),
@@ -35,7 +33,7 @@ def curves_of(dataset: xr.Dataset, speeds: np.ndarray) -> dict[float, np.ndarray
     speeds : (n,) array
         [m/s]
     """
-    job: Any = rebuild_job(json.loads(dataset.attrs["job"]), "dataset", {})
+    job: Any = stored_job(json.loads(dataset.attrs["job"]), "dataset")
     found = {}
     for gradient in dataset["friction_gradient"].values:
         point = job.point_at({"friction_gradient": float(gradient)})
@@ -76,7 +74,6 @@ def friction_figure(dataset: xr.Dataset) -> Figure:
     axes.set_ylim(bottom=0.0)
     axes.grid(lw=0.4, alpha=0.5)
     figure.legend(loc="outside lower center", frameon=False, ncols=3)
-    job = one_line(dataset.attrs.get("job_name", ""))
-    lines = [f"Curves of friction: {job}", "marks: by the energy criterion, of radial sliding at that speed"]
-    figure.suptitle("\n".join(balanced(line, 76) for line in lines))
+    marks = "marks: by the energy criterion, of radial sliding at that speed"
+    entitle(figure, [headline("Curves of friction", dataset.attrs), marks], 76)
     return figure

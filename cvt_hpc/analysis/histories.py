@@ -15,8 +15,8 @@ from scipy.interpolate import CubicSpline
 
 from cvt_hpc.analysis import history_panels as panels
 from cvt_hpc.analysis.conversion import standard
-from cvt_hpc.analysis.figures import LONG, WIDTH, balanced, draw, styled
-from cvt_hpc.errors import mismatch, one_line
+from cvt_hpc.analysis.figures import LONG, WIDTH, balanced, draw, entitle, headline, styled
+from cvt_hpc.errors import mismatch
 from cvt_hpc.job.schema import load_schema
 from cvt_hpc.job.shown import JOB_UNITS, POINT_UNITS, shown
 from cvt_hpc.variables import Status, Vibrates, flag_in_words, shortened
@@ -142,10 +142,9 @@ def phase_figure(dataset: xr.Dataset, source: str = "history") -> Figure:
         axes.set_title(f"{strand.probes[strand.strongest]}, {frequency:.0f} Hz", loc="left", pad=3)
         axes.set(xlabel="displacement [µm]", ylabel="velocity [mm/s]")
         axes.grid(lw=0.4, alpha=0.5)
-    name = one_line(dataset.attrs.get("job_name", ""))
-    lines = [f"Phase portraits: {name}".removesuffix(": "), ", ".join(place_of(dataset.attrs))]
+    lines = [headline("Phase portraits", dataset.attrs), ", ".join(place_of(dataset.attrs))]
     lines.append(f"motion above {band[0]:.0f} Hz; bold: last {SHOWN_PERIODS} periods, dot: their end")
-    figure.suptitle("\n".join(balanced(line, 76) for line in lines if line))
+    entitle(figure, lines, 76)
     return figure
 
 
@@ -187,8 +186,7 @@ def _vibration_settings(dataset: xr.Dataset) -> dict[str, float]:
 
 def _title(dataset: xr.Dataset) -> str:
     """Which run, and what became of it."""
-    name = one_line(dataset.attrs.get("job_name", ""))
-    lines = [f"One run: {name}" if name else "One run"]
+    lines = [headline("One run", dataset.attrs)]
     if place := place_of(dataset.attrs):
         lines.append(", ".join(place))
     if "rung" in dataset:

@@ -120,21 +120,13 @@ def read_strands(dataset: xr.Dataset, judged_fraction: float, band: tuple[float,
         return []
     displacement = displacement[:length] - displacement[:length].mean(axis=0)
     labels = [str(label) for label in dataset["probe"].values]
+    time, first_judged = dataset["time"].values[:length], length - round(judged_fraction * length)
     strands = []
     names = dict.fromkeys(label.split()[0] for label in labels if " arc " not in label)
     for k, name in enumerate(names):
         columns = [i for i, label in enumerate(labels) if label.split()[0] == name]
-        strands.append(
-            Strand(
-                name,
-                tuple(labels[i] for i in columns),
-                dataset["time"].values[:length],
-                displacement[:, columns],
-                length - round(judged_fraction * length),
-                band,
-                COLOURS[k % len(COLOURS)],
-            )
-        )
+        probes, moved = tuple(labels[i] for i in columns), displacement[:, columns]
+        strands.append(Strand(name, probes, time, moved, first_judged, band, COLOURS[k % len(COLOURS)]))
     return strands
 
 
@@ -226,16 +218,9 @@ def _label_peaks(axes: Axes, strands: list[Strand], marked: list[tuple[float, fl
         if told or any(abs(side - a) < _APART[0] and abs(y - b) < _APART[1] for a, b, _ in taken):
             continue
         taken.append((side, y, x))
-        axes.annotate(
-            f"{frequency:.0f} Hz",
-            (frequency, amplitude),
-            xytext=(-5 if is_left else 5, 0),
-            textcoords="offset points",
-            ha="right" if is_left else "left",
-            va="center",
-            fontsize=8,
-            color=strands[i].colour,
-        )
+        look = {"ha": "right" if is_left else "left", "va": "center", "fontsize": 8}
+        off, place = (-5 if is_left else 5, 0), {"textcoords": "offset points", "color": strands[i].colour}
+        axes.annotate(f"{frequency:.0f} Hz", (frequency, amplitude), off, **place, **look)
 
 
 def _peaks(signal: Array, strand: Strand, bins: Array, spectrum: Array) -> list[tuple[float, float]]:

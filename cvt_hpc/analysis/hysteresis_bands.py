@@ -2,7 +2,6 @@
 
 from __future__ import annotations
 
-from collections.abc import Mapping
 from typing import Any
 
 import numpy as np
@@ -15,21 +14,11 @@ from matplotlib.patches import Patch
 from matplotlib.patheffects import Normal, withStroke
 from numpy.typing import NDArray
 
-from cvt_hpc.analysis.arrangement import CHOSEN, Ruler, Sides, arrange, check_sides, ruler, value_text
+from cvt_hpc.analysis import arrangement as layout
+from cvt_hpc.analysis import figures
 from cvt_hpc.analysis.cells import OF_STARTS, STYLES
 from cvt_hpc.analysis.classes import OccurrenceClass, check_results
-from cvt_hpc.analysis.figures import (
-    STYLE,
-    WIDTH,
-    axis_label,
-    balanced,
-    coordinate_unit,
-    in_words,
-    legend_columns,
-    on_a_page,
-    styled,
-)
-from cvt_hpc.errors import mismatch, one_line
+from cvt_hpc.errors import mismatch
 from cvt_hpc.variables import Status, Vibrates
 from cvt_hpc.vibration.hysteresis import StartClass
 from cvt_hpc.vibration.onsets import levels, onsets
@@ -44,7 +33,7 @@ LEAST, FRAME = 0.9, 1.8  # [inch]: a panel at least, and title, labels and legen
 OUTLINE = [withStroke(linewidth=4.0, foreground="white"), Normal()]
 
 
-def onset_line(along: Ruler, across: Ruler, classes: NDArray[np.int8]) -> NDArray[np.float64]:
+def onset_line(along: layout.Ruler, across: layout.Ruler, classes: NDArray[np.int8]) -> NDArray[np.float64]:
     """The lowest onset of each row, as a line from border to border of the rows.
 
     Parameters
@@ -87,7 +76,9 @@ def of_each_start(classes: NDArray[np.int8]) -> list[tuple[str, str, NDArray[np.
     return [("onset from a small start", "-", small), ("onset from a large start", "--", large)]
 
 
-def draw_onsets(axes: Axes, x: Ruler, y: Ruler, classes: NDArray[np.int8], along_y: bool) -> list[Line2D]:
+def draw_onsets(
+    axes: Axes, x: layout.Ruler, y: layout.Ruler, classes: NDArray[np.int8], along_y: bool
+) -> list[Line2D]:
     """Draw the onset line of a panel, and that of the large starts beside it; return handles of a legend.
 
     Parameters
@@ -164,7 +155,7 @@ def vibration_ranges(dataset: xr.Dataset, source: str = "results") -> xr.DataArr
     return ranges.rename("driving_speed" if name == "speed" else name).assign_attrs(units)
 
 
-def draw_bands(axes: Axes, y: Ruler, ranges: NDArray[np.float64]) -> list[Any]:
+def draw_bands(axes: Axes, y: layout.Ruler, ranges: NDArray[np.float64]) -> list[Any]:
     """Draw the limits of vibration along both ramps and hatch what lies between; return handles of a legend.
 
     Parameters
@@ -197,12 +188,9 @@ def draw_bands(axes: Axes, y: Ruler, ranges: NDArray[np.float64]) -> list[Any]:
     return handles
 
 
-@styled
+@figures.styled
 def hysteresis_figure(
-    dataset: xr.Dataset,
-    at: Mapping[str, Any] | None = None,
-    source: str = "results",
-    sides: Sides = CHOSEN,
+    dataset: xr.Dataset, at: layout.At = None, source: str = "results", sides: layout.Sides = layout.CHOSEN
 ) -> Figure:
     """Draw between which loads or speeds runs vibrate along ramps up and down, and where the two differ.
 
@@ -212,29 +200,25 @@ def hysteresis_figure(
     """
     ranges = vibration_ranges(dataset, source)
     axes_left = ranges.isel(ramp=0, limit=0, drop=True)
-    check_sides(sides, list(map(str, axes_left.dims)), at or {}, source)
+    layout.check_sides(sides, list(map(str, axes_left.dims)), at or {}, source)
     notes: tuple[str, ...] = ()
     y_name = panel = None
     if axes_left.dims:
-        along = Sides(sides.y, sides.panel)
-        shown = arrange(xr.Dataset({"status": axes_left}), at or {}, source, along)
+        along = layout.Sides(sides.y, sides.panel)
+        shown = layout.first_panel(layout.arrange(xr.Dataset({"status": axes_left}), at or {}, source, along))
         names = [name for name in (shown.x, shown.y) if name]
         # what runs along x of a map runs along y here, because x is what is ramped
         y_name, panel = names[0], names[1] if len(names) > 1 else None
         notes = shown.notes
-        for name in filter(None, (shown.panel,)):
-            notes += (f"{in_words(shown.dataset[name])} = {value_text(shown.dataset[name], 0)} (first)",)
-        kept = {name: shown.dataset[name] for name in names}
-        fixed = {name: shown.dataset[name] for name in axes_left.dims if name not in names}
-        ranges = ranges.sel({**kept, **{k: (v if v.ndim == 0 else v[0]) for k, v in fixed.items()}})
+        ranges = ranges.sel({name: shown.dataset[name] for name in axes_left.dims})
     count = ranges.sizes[panel] if panel else 1
-    factor, unit = coordinate_unit(ranges.attrs)
-    y = ruler(ranges[y_name]) if y_name else Ruler(np.zeros(1), np.array([-0.5, 0.5]), np.empty(0), (), "")
+    factor, unit = figures.coordinate_unit(ranges.attrs)
+    y = layout.ruler(ranges[y_name]) if y_name else layout.ONE_ROW
     wanted = float(np.clip(0.35 * y.centres.size, 0.6, 2.2)) + 0.35
     then = f"fix an axis, as by `--at {panel}=VALUE`, or choose another one by `--panel AXIS`"
-    grid = on_a_page(count, (1, 2), (LEAST, wanted), FRAME, source, then)
+    grid = figures.on_a_page(count, (1, 2), (LEAST, wanted), FRAME, source, then)
     rows = -(-count // grid.columns)
-    figure = Figure((WIDTH, rows * grid.height + FRAME), layout="constrained")
+    figure = Figure((figures.WIDTH, rows * grid.height + FRAME), layout="constrained")
     panels = figure.subplots(rows, grid.columns, sharex=True, squeeze=False)
     for axes in panels.flat[count:]:
         axes.set_axis_off()
@@ -247,16 +231,9 @@ def hysteresis_figure(
         start, stop = values[:, 0].max(axis=0), values[:, 1].min(axis=0)
         lasting = np.isfinite(start) & np.isfinite(stop)
         if lasting.any():
-            bars = axes.barh(
-                y.centres[lasting],
-                (stop - start)[lasting],
-                np.diff(y.edges)[lasting],
-                start[lasting],
-                color=both,
-                alpha=0.55,
-                lw=0,
-            )
-            legend["vibrates either way"] = bars
+            widths, heights = (stop - start)[lasting], np.diff(y.edges)[lasting]
+            look = {"left": start[lasting], "color": both, "alpha": 0.55, "lw": 0}
+            legend["vibrates either way"] = axes.barh(y.centres[lasting], widths, heights, **look)
         for handle in draw_bands(axes, y, values):
             legend.setdefault(handle.get_label(), handle)
         axes.set_ylim(*y.edges[[0, -1]])
@@ -265,20 +242,15 @@ def hysteresis_figure(
         y.lay_out(axes.yaxis)
         axes.grid(axis="x", lw=0.4, alpha=0.5)
         if panel:
-            axes.set_title(f"{in_words(ranges[panel])}: {value_text(ranges[panel], k)}", loc="left", pad=3)
+            axes.set_title(
+                f"{figures.in_words(ranges[panel])}: {layout.value_text(ranges[panel], k)}", loc="left", pad=3
+            )
     for axes in panels.flat[:count][-grid.columns :]:
-        axes.set_xlabel(axis_label(ranges, unit))
+        axes.set_xlabel(figures.axis_label(ranges, unit))
         axes.tick_params(labelbottom=True)
     if count > 1:
-        figure.supylabel(y.label, fontsize=STYLE["axes.labelsize"])
-    job = one_line(dataset.attrs.get("job_name", ""))
-    lines = [f"Vibration along ramps up and down: {job}".removesuffix(": "), *notes]
-    figure.suptitle("\n".join(balanced(line, 72) for line in lines))
-    figure.legend(
-        legend.values(),
-        legend.keys(),
-        loc="outside lower center",
-        frameon=False,
-        ncols=legend_columns(list(legend)),
-    )
+        figure.supylabel(y.label, fontsize=figures.STYLE["axes.labelsize"])
+    figures.entitle(figure, [figures.headline("Vibration along ramps up and down", dataset.attrs), *notes])
+    place = {"loc": "outside lower center", "frameon": False, "ncols": figures.legend_columns(list(legend))}
+    figure.legend(legend.values(), legend.keys(), **place)
     return figure

@@ -67,9 +67,8 @@ def name_lines(axes: Axes, lines: Sequence[Named], size: tuple[float, float]) ->
             _write(axes, line, (x[last], y[last]), "data", (3, 0), ha="left", va="center", bbox=paper)
     letters = max((len(line.name) for _, line in above), default=1)
     gaps = LINE / (72.0 * size[1]) * top, (LETTER * letters + 3.0) / (72.0 * size[0]) * (end - left)
-    for (_, line), place in zip(
-        sorted(right, key=_place), _apart(right, gaps[0], (0.0, top - 0.5 * gaps[0])), strict=True
-    ):
+    places = _apart(right, gaps[0], (0.0, top - 0.5 * gaps[0]))
+    for (_, line), place in zip(sorted(right, key=_place), places, strict=True):
         _write(axes, line, (1.0, place), axes.get_yaxis_transform(), (3, 0), ha="left", va="center")
     for (_, line), place in zip(sorted(above, key=_place), _apart(above, gaps[1], (left, end)), strict=True):
         _write(axes, line, (place, 1.0), axes.get_xaxis_transform(), (0, 1), ha="center", va="bottom")
@@ -94,14 +93,5 @@ def _apart(
 def _write(
     axes: Axes, line: Named, place: tuple[float, float], within: Any, off: tuple[float, float], **how: Any
 ) -> None:
-    axes.annotate(
-        line.name,
-        place,
-        off,
-        xycoords=within,
-        textcoords="offset points",
-        color=line.colour,
-        fontsize=8,
-        annotation_clip=False,
-        **how,
-    )
+    how |= {"textcoords": "offset points", "color": line.colour, "fontsize": 8, "annotation_clip": False}
+    axes.annotate(line.name, place, off, xycoords=within, **how)

@@ -9,9 +9,7 @@ amplitude is written where there is room.
 
 from __future__ import annotations
 
-from collections.abc import Mapping
 from dataclasses import dataclass, replace
-from pathlib import Path
 from typing import Any
 
 import numpy as np
@@ -20,8 +18,8 @@ from matplotlib.axes import Axes
 from matplotlib.figure import Figure
 from numpy.typing import NDArray
 
-from cvt_hpc.analysis import cells
-from cvt_hpc.analysis.arrangement import CHOSEN, Arrangement, Ruler, Sides, arrange, ruler, value_text
+from cvt_hpc.analysis import arrangement as layout
+from cvt_hpc.analysis import cells, figures
 from cvt_hpc.analysis.classes import (
     OccurrenceClass,
     at_strongest_strand,
@@ -32,18 +30,6 @@ from cvt_hpc.analysis.classes import (
 )
 from cvt_hpc.analysis.conversion import standard
 from cvt_hpc.analysis.eigenfrequencies import eigenfrequency_figure
-from cvt_hpc.analysis.figures import (
-    LONG,
-    WIDTH,
-    as_written,
-    draw,
-    fitting,
-    headline,
-    headlines,
-    in_words,
-    on_a_page,
-    styled,
-)
 from cvt_hpc.analysis.hysteresis_bands import ALONG, draw_onsets
 from cvt_hpc.analysis.scatter import is_sampled, scatter_figure
 from cvt_hpc.analysis.starts import has_starts, join_starts
@@ -57,27 +43,14 @@ SMALLEST_APART = 3.0  # [point]: on smaller cells marks, and the lines between, 
 TITLE_HEIGHT = 0.42  # [inch], of a panel with the space around it
 LEAST = TITLE_HEIGHT + 0.6  # [inch], of a panel that is readable
 TITLE_LETTERS = 78  # of titles side by side
-ONE_ROW = Ruler(np.zeros(1), np.array([-0.5, 0.5]), np.empty(0), (), "")
 
 
-def draw_map(
-    dataset: xr.Dataset,
-    out: Path,
-    at: Mapping[str, Any] | None = None,
-    source: str = "results",
-    sides: Sides = CHOSEN,
-    vmax: float | None = None,
-) -> Path:
-    """Write the figure of `map_figure`."""
-    return draw(lambda: map_figure(dataset, at, source, sides, vmax), out)
-
-
-@styled
+@figures.styled
 def map_figure(
     dataset: xr.Dataset,
-    at: Mapping[str, Any] | None = None,
+    at: layout.At = None,
     source: str = "results",
-    sides: Sides = CHOSEN,
+    sides: layout.Sides = layout.CHOSEN,
     vmax: float | None = None,
 ) -> Figure:
     """Draw where vibration occurs.
@@ -100,7 +73,7 @@ def map_figure(
     dataset = standard(dataset, source)
     check_results(dataset, source)
     if is_sampled(dataset):
-        if sides != CHOSEN:
+        if sides != layout.CHOSEN:
             raise mismatch(
                 f"{source}: x, y, panel", "results over a grid", "samples, in a panel for each pair"
             )
@@ -109,16 +82,16 @@ def map_figure(
         return eigenfrequency_figure(dataset, at or {}, source, sides)
     if has_starts(dataset, at or {}):
         dataset = join_starts(dataset)
-    return _grid_figure(arrange(dataset, at or {}, source, sides), vmax, source)
+    return _grid_figure(layout.arrange(dataset, at or {}, source, sides), vmax, source)
 
 
 @dataclass(frozen=True)
 class Sheet:
     """What the panels show, arrays of shape (panel, row, column), and where."""
 
-    arrangement: Arrangement
-    x: Ruler
-    y: Ruler
+    arrangement: layout.Arrangement
+    x: layout.Ruler
+    y: layout.Ruler
     classes: NDArray[np.int8]
     inferred: NDArray[np.bool_]  # whether the class of a cell is not that of a run
     amplitude: NDArray[np.float64]  # [um], nan where a run does not vibrate
@@ -168,7 +141,7 @@ class Sheet:
     @property
     def smallest_cell(self) -> tuple[float, float]:
         """Width and height of the smallest cell [point]."""
-        width = (WIDTH - 1.9) / self.columns  # ticks, labels and the colour bar take the rest
+        width = (figures.WIDTH - 1.9) / self.columns  # ticks, labels and the colour bar take the rest
         height = self.panel_height - TITLE_HEIGHT
         return (
             72 * width * np.diff(self.x.edges).min() / np.ptp(self.x.edges),
@@ -182,10 +155,10 @@ class Sheet:
         return width >= 22 and height >= 22  # [point]
 
 
-def _grid_figure(arrangement: Arrangement, vmax: float | None, source: str) -> Figure:
+def _grid_figure(arrangement: layout.Arrangement, vmax: float | None, source: str) -> Figure:
     """Compose the map of a study over a grid; to be called within STYLE."""
     sheet = sheet_of(arrangement, source)
-    figure = Figure((WIDTH, sheet.height + FRAME), layout="constrained")
+    figure = Figure((figures.WIDTH, sheet.height + FRAME), layout="constrained")
     # not shared: matplotlib would go through all panels for each
     axes = figure.subplots(sheet.blocks * sheet.rows, sheet.columns, squeeze=False)
     norm = cells.norm_over(sheet.amplitude, 0.0, None if vmax is None else 1e6 * vmax)
@@ -196,14 +169,18 @@ def _grid_figure(arrangement: Arrangement, vmax: float | None, source: str) -> F
     for kind, values in texts:
         panels = zip(axes.flat, sheet.classes, values, sheet.amplitude, strict=False)
         for ax, classes, numbers, fills in panels:
-            cells.write_values(ax, sheet.x, sheet.y, kind, classes, numbers, fills, amplitude)
+            for row, column in np.argwhere((classes == kind) & np.isfinite(numbers)):
+                (fill,) = cells.fills_of(kind, fills[row : row + 1, column], amplitude)
+                value, place = numbers[row, column], (sheet.x.centres[column], sheet.y.centres[row])
+                text = f"{value:.0f}" if value >= 10.0 else f"{value:.2g}"
+                cells.write_value(ax, place, text, fill, above=2.5)
     if sheet.blocks == 2:
         frequency = cells.Scale(
             cells.FREQUENCY_COLOURS, cells.norm_over(sheet.frequency), "dominant frequency [Hz]"
         )
         draw_block(figure, axes[sheet.rows :], sheet, sheet.frequency, frequency)
     onset = _draw_onsets(axes, sheet)
-    figure.suptitle(_title(sheet))
+    figures.entitle(figure, _title(sheet))
     figure.supylabel(sheet.y.label, fontsize=10)
     styles, columns = cells.STYLES, cells.LEGEND_COLUMNS
     if "starts" in arrangement.dataset.attrs:
@@ -217,7 +194,7 @@ def _grid_figure(arrangement: Arrangement, vmax: float | None, source: str) -> F
 
 def _lay_out(figure: Figure, inner: list[Axes]) -> None:
     """Find the places of all panels by the outer ones, once: to ask each takes as long as to draw it."""
-    as_written(figure)
+    figures.as_written(figure)
     for ax in inner:
         ax.set_visible(False)
     engine = figure.get_layout_engine()
@@ -243,7 +220,7 @@ def _draw_onsets(axes: NDArray[Any], sheet: Sheet) -> list[Any]:
     return list(handles.values())
 
 
-def sheet_of(arrangement: Arrangement, source: str = "results", frame: float = FRAME) -> Sheet:
+def sheet_of(arrangement: layout.Arrangement, source: str = "results", frame: float = FRAME) -> Sheet:
     """The arranged variables with all three dimensions, missing ones of length one, laid out on a page.
 
     `frame` [inch] is what else the page holds; InputError, which names the source, where it is too small.
@@ -264,8 +241,8 @@ def sheet_of(arrangement: Arrangement, source: str = "results", frame: float = F
     amplitude = grid(at_strongest_strand(dataset, "amplitude")) * 1e6
     sheet = Sheet(
         arrangement,
-        ruler(dataset[arrangement.x]),
-        ruler(dataset[arrangement.y]) if arrangement.y else ONE_ROW,
+        layout.ruler(dataset[arrangement.x]),
+        layout.ruler(dataset[arrangement.y]) if arrangement.y else layout.ONE_ROW,
         classes,
         classes != runs,
         np.where(vibrating, amplitude, np.nan),
@@ -280,16 +257,20 @@ def _laid_out(sheet: Sheet, source: str, frame: float) -> Sheet:
     for columns in range(1, min(ROOMY, sheet.panels) + 1):
         roomy = replace(sheet, columns=columns)
         roomy = replace(roomy, panel_height=roomy.wanted_height)
-        if roomy.height + frame <= LONG:
+        if roomy.height + frame <= figures.LONG:
             return roomy
     name = sheet.arrangement.panel
     then = f"fix an axis, as by `--at {name}=VALUE`, or choose another one by `--panel AXIS`"
     counts = range(1, min(MOST_COLUMNS, sheet.panels) + 1)
     sizes = LEAST, sheet.wanted_height
-    grid = fitting(sheet.panels, counts, sizes, 0.5 * (LONG - frame)) if sheet.has_frequency else None
+    grid = (
+        figures.fitting(sheet.panels, counts, sizes, 0.5 * (figures.LONG - frame))
+        if sheet.has_frequency
+        else None
+    )
     if grid is None:
         sheet = replace(sheet, frequency=np.full_like(sheet.frequency, np.nan))
-        grid = on_a_page(sheet.panels, counts, sizes, frame, source, then)
+        grid = figures.on_a_page(sheet.panels, counts, sizes, frame, source, then)
     return replace(sheet, columns=grid.columns, panel_height=grid.height)
 
 
@@ -317,8 +298,8 @@ def _label_panel(ax: Axes, sheet: Sheet, panel: int) -> None:
     """Title and ticks of a panel."""
     name = sheet.arrangement.panel
     if name:
-        text = value_text(sheet.arrangement.dataset[name], panel)
-        heading = f"{in_words(sheet.arrangement.dataset[name])}: " if sheet.columns <= NAMED else ""
+        text = layout.value_text(sheet.arrangement.dataset[name], panel)
+        heading = f"{figures.in_words(sheet.arrangement.dataset[name])}: " if sheet.columns <= NAMED else ""
         ax.set_title(shortened(f"{heading}{text}", TITLE_LETTERS // sheet.columns), loc="left", pad=3)
     sheet.x.lay_out(ax.xaxis)
     sheet.y.lay_out(ax.yaxis)
@@ -332,11 +313,14 @@ def _label_panel(ax: Axes, sheet: Sheet, panel: int) -> None:
         ax.set_xlabel(sheet.x.label)
 
 
-def _title(sheet: Sheet) -> str:
+def _title(sheet: Sheet) -> list[str]:
     """What, of which job, how many runs of each class, and what is fixed."""
     runs, inferred = sheet.classes[~sheet.inferred], sheet.classes[sheet.inferred]
     attributes = sheet.arrangement.dataset.attrs
-    lines = [headline(attributes), f"{runs.size} {'cells' if 'starts' in attributes else 'runs'}: "]
+    lines = [
+        figures.headline("Vibration occurrence", attributes),
+        f"{runs.size} {'cells' if 'starts' in attributes else 'runs'}: ",
+    ]
     lines[1] += count_classes(runs)
     if "starts" in attributes:
         lines.append(f"each from a small and a large start: disturbance {attributes['starts']}")
@@ -344,9 +328,9 @@ def _title(sheet: Sheet) -> str:
         lines.append(f"{inferred.size} cells inferred: {count_classes(inferred)}")
     lines.append(", ".join(sheet.arrangement.notes))
     if sheet.arrangement.panel and sheet.columns > NAMED:
-        lines.append(f"panels: {in_words(sheet.arrangement.dataset[sheet.arrangement.panel])}")
+        lines.append(f"panels: {figures.in_words(sheet.arrangement.dataset[sheet.arrangement.panel])}")
     if sheet.writes_frequency:
         lines.append("in the cells: dominant frequency [Hz]")
     if sheet.has_room and np.isfinite(sheet.irregular).any():
         lines.append("in irregular cells: amplitude [µm]")
-    return headlines(lines)
+    return lines

@@ -15,12 +15,12 @@ from matplotlib.figure import Figure
 from matplotlib.patches import Circle
 
 from cvt_hpc.analysis.cells import colours_of
-from cvt_hpc.analysis.figures import WIDTH, axis_label, balanced, check_known, on_a_page, styled
+from cvt_hpc.analysis.figures import WIDTH, axis_label, check_known, on_a_page, styled
 from cvt_hpc.analysis.followed import lengths_of
 from cvt_hpc.analysis.history_panels import FEEDS
 from cvt_hpc.analysis.power_balance import balance_of, draw_balance
 from cvt_hpc.analysis.profiles import regions, shown_unit
-from cvt_hpc.analysis.telling_apart import on_axes, titles
+from cvt_hpc.analysis.telling_apart import entitle_runs
 from cvt_hpc.errors import mismatch, unknown
 from cvt_hpc.models.belt_drive.layout import layout
 from cvt_hpc.physics.belt_path import BeltPath, belt_path, points_at
@@ -137,9 +137,7 @@ def variator_figure(history: xr.Dataset, quantities: Sequence[str] = (), source:
         _draw_belt(figure, axes, history[name], found)
     for axes in panels.flat[len(quantities) :]:
         axes.set_axis_off()
-    common, _ = on_axes([history], [source])
-    lines = titles([history], "On the pulleys", common)
-    figure.suptitle("\n".join(balanced(line, 72) for line in lines))
+    entitle_runs(figure, [history], "On the pulleys", width=72)
     return figure
 
 
@@ -240,9 +238,7 @@ def energy_figure(history: xr.Dataset, source: str = "history") -> Figure:
         axes.set_ylabel("power [W]")
     if has_feeds and powers is not None:
         _draw_feeds(panels[0], powers, whole_powers(history))
-    common, _ = on_axes([history], [source])
-    lines = titles([history], "Energy around the belt", common)
-    figure.suptitle("\n".join(balanced(line, 72) for line in lines))
+    entitle_runs(figure, [history], "Energy around the belt", width=72)
     return figure
 
 

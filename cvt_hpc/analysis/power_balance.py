@@ -10,6 +10,7 @@ import xarray as xr
 from matplotlib.axes import Axes
 
 from cvt_hpc.analysis.figures import in_words
+from cvt_hpc.analysis.ticks import number
 
 IN, OUT, LOST, KEPT = "#0072b2", "#d55e00", "#8a8a8a", "#e4e8ec"
 INK = "#333333"
@@ -97,12 +98,8 @@ def draw_balance(whole: Axes, parts: Axes, balance: Balance) -> None:
 
 def _draw_bars(axes: Axes, powers: dict[str, float], colours: Sequence[str], unit: str) -> None:
     """A bar for each power, below each other; its number stands with its name, where no bar reaches."""
-    names = [f"{name}  {_number(power)}" for name, power in powers.items()]
+    names = [f"{name}  {number(power, '.4g')}" for name, power in powers.items()]
     axes.barh(names, list(powers.values()), 0.7, color=colours, edgecolor=INK, lw=0.6)
     axes.axvline(0.0, color=INK, lw=0.8)
     axes.invert_yaxis()
     axes.set_xlabel(f"power [{unit}]")
-
-
-def _number(power: float) -> str:
-    return f"{power:.4g}".replace("-", "−")

@@ -10,20 +10,9 @@ import xarray as xr
 from matplotlib.axes import Axes
 from matplotlib.figure import Figure
 
+from cvt_hpc.analysis import figures
 from cvt_hpc.analysis.error_axes import COLOURS
-from cvt_hpc.analysis.figures import (
-    NARROW,
-    STYLE,
-    WIDTH,
-    balanced,
-    check_known,
-    in_words,
-    legend_columns,
-    on_a_page,
-    styled,
-    value_unit,
-)
-from cvt_hpc.analysis.telling_apart import on_axes, titles
+from cvt_hpc.analysis.telling_apart import entitle_runs, named, on_axes
 from cvt_hpc.errors import InputError, mismatch, unknown
 
 # Drawn where nothing else is asked for: of each group the first that all runs have.
@@ -36,7 +25,7 @@ _UNITS = {"N m-1": (1e-3, "kN/m"), "m s-1": (1e3, "mm/s")}
 _REFERENCES = {"sliding_angle": 90.0}  # [°]: where sliding turns from one hand to the other
 
 
-@styled
+@figures.styled
 def profile_figure(
     histories: Sequence[xr.Dataset],
     quantities: Sequence[str] = (),
@@ -67,15 +56,19 @@ def profile_figure(
     """
     if not histories:
         raise InputError("profile: expected one history or more, found none")
-    names = list(sources) or [f"history {k + 1}" for k in range(len(histories))]
+    names = named(histories, sources)
     quantities = quantities or _usual(histories)
     _check(histories, names, quantities, region)
-    common, labels = on_axes(histories, names)
+    _, labels = on_axes(histories, names)
     groups = _groups(labels, columns, MOST_COLUMNS * (2 if len(quantities) == 1 else 1))
     beside = min(len(groups), MOST_COLUMNS)
     rows = max(len(quantities), -(-len(groups) // beside))
-    height = on_a_page(rows, (1,), (LEAST, HEIGHT), FRAME, names[0], "name fewer quantities by `--of`").height
-    figure = Figure((NARROW if beside > 1 else WIDTH, height * rows + FRAME), layout="constrained")
+    height = figures.on_a_page(
+        rows, (1,), (LEAST, HEIGHT), FRAME, names[0], "name fewer quantities by `--of`"
+    ).height
+    figure = Figure(
+        (figures.NARROW if beside > 1 else figures.WIDTH, height * rows + FRAME), layout="constrained"
+    )
     share = "all" if len(quantities) == 1 else "row"
     panels = figure.subplots(rows, beside, sharex="col", sharey=share, squeeze=False)
     # one quantity has its panels row by row
@@ -98,15 +91,16 @@ def profile_figure(
         axes.tick_params(labelbottom=True)
     for row, name in zip(panels, np.resize(quantities, rows), strict=True):
         _, unit = shown_unit(histories[0][name])
-        row[0].set_ylabel(f"{in_words(histories[0][name])}\n[{unit}]")
+        row[0].set_ylabel(f"{figures.in_words(histories[0][name])}\n[{unit}]")
     handles, told = max(
         (axes.get_legend_handles_labels() for axes in stacks[: len(groups), 0]), key=lambda pair: len(pair[1])
     )
     if told:
-        figure.legend(handles, told, loc="outside lower center", frameon=False, ncols=legend_columns(told))
+        figure.legend(
+            handles, told, loc="outside lower center", frameon=False, ncols=figures.legend_columns(told)
+        )
     where = f" of the {region} pulley" if region else ""
-    lines = titles(histories, f"Along the belt{where}", common)
-    figure.suptitle("\n".join(balanced(line, 76) for line in lines), fontsize=STYLE["figure.titlesize"])
+    entitle_runs(figure, histories, f"Along the belt{where}")
     return figure
 
 
@@ -123,7 +117,7 @@ def _check(
         for quantity in quantities:
             if quantity not in known:
                 raise unknown(f"{name}: {quantity}", "quantity along the belt", quantity, known)
-            check_known(dataset, [quantity], name)
+            figures.check_known(dataset, [quantity], name)
         if region is not None and not inside(dataset, region).any():
             found = ", ".join(dict.fromkeys(dataset["region"].values.astype(str)))
             raise mismatch(f"{name}: --region", "a pulley of the belt's path", f"{region}; it has {found}")
@@ -153,7 +147,7 @@ def inside(dataset: xr.Dataset, region: str) -> np.ndarray:
 
 def shown_unit(array: xr.DataArray) -> tuple[float, str]:
     """Factor and unit in which a quantity along the belt is shown."""
-    return _UNITS.get(str(array.attrs.get("units", ""))) or value_unit(array)
+    return _UNITS.get(str(array.attrs.get("units", ""))) or figures.value_unit(array)
 
 
 def _draw(
@@ -188,12 +182,5 @@ def regions(dataset: xr.Dataset) -> list[tuple[float, float, str]]:
 
 def _name_regions(axes: Axes, dataset: xr.Dataset) -> None:
     for start, stop, name in regions(dataset):
-        place = (500.0 * (start + stop), 1.02)
-        axes.text(
-            *place,
-            name.removesuffix(" arc"),
-            transform=axes.get_xaxis_transform(),
-            ha="center",
-            va="bottom",
-            fontsize=9,
-        )
+        look = {"transform": axes.get_xaxis_transform(), "ha": "center", "va": "bottom", "fontsize": 9}
+        axes.text(500.0 * (start + stop), 1.02, name.removesuffix(" arc"), **look)

@@ -11,22 +11,10 @@ import numpy as np
 import xarray as xr
 from matplotlib.figure import Figure
 
-from cvt_hpc.analysis import cells
+from cvt_hpc.analysis import cells, figures
 from cvt_hpc.analysis.eigenfrequencies import strand_frequencies
-from cvt_hpc.analysis.figures import (
-    NARROW,
-    STYLE,
-    WIDTH,
-    balanced,
-    check_known,
-    coordinate_unit,
-    headlines,
-    in_words,
-    on_a_page,
-    styled,
-)
 from cvt_hpc.analysis.line_names import name_lines
-from cvt_hpc.analysis.telling_apart import on_axes, titles
+from cvt_hpc.analysis.telling_apart import entitle_runs, named, on_axes
 from cvt_hpc.analysis.waterfall import COLOURS, ORDERS, draw_eigenfrequencies, draw_orders, spectra_norm
 from cvt_hpc.errors import mismatch
 from cvt_hpc.variator import STRANDS
@@ -63,7 +51,7 @@ class Ramp(NamedTuple):
     rate: float
 
 
-@styled
+@figures.styled
 def ramp_figure(
     histories: Sequence[xr.Dataset],
     of: str = "t1",
@@ -88,11 +76,11 @@ def ramp_figure(
     InputError
         A history has no ramp, no such strand or variable; or there are more than a page holds.
     """
-    names = list(sources) or [f"history {k + 1}" for k in range(len(histories))]
+    names = named(histories, sources)
     ramps = [read_ramp(history, of, name) for history, name in zip(histories, names, strict=True)]
-    common, labels = on_axes(histories, names)
-    grid = on_a_page(len(ramps), (1,), (LEAST, ROW), 1.1, names[0], THEN)
-    figure = Figure((NARROW, grid.height * len(ramps) + 1.1), layout="constrained")
+    _, labels = on_axes(histories, names)
+    grid = figures.on_a_page(len(ramps), (1,), (LEAST, ROW), 1.1, names[0], THEN)
+    figure = Figure((figures.NARROW, grid.height * len(ramps) + 1.1), layout="constrained")
     panels = figure.subplots(len(ramps), 2, sharex=True, sharey="col", squeeze=False)
     spectra = [spectrogram(ramp) for ramp in ramps]
     scale = 1e6 if of in STRANDS else 1.0
@@ -111,7 +99,7 @@ def ramp_figure(
         right.set_ylabel(fill("frequency [Hz]", LETTERS - 1))
         left.set_xlim(np.sort(ramp.values[[0, -1]]))
     unit = "µm" if of in STRANDS else str(histories[0][of].attrs.get("units", ""))
-    name = f"strand {of}" if of in STRANDS else in_words(histories[0][of])
+    name = f"strand {of}" if of in STRANDS else figures.in_words(histories[0][of])
     for left, _ in panels:
         left.set_ylabel(fill(f"{name} [{unit}]", LETTERS))
     for axes in panels[-1]:
@@ -119,12 +107,11 @@ def ramp_figure(
     bar = cells.Scale(COLOURS, norm, f"amplitude [{unit}]")
     drawn = np.concatenate([amplitude.ravel() for *_, amplitude in spectra])
     cells.colour_bar(figure, bar, drawn, ax=list(panels[:, 1]), aspect=15 * len(ramps), pad=0.02)
-    lines = [*titles(histories, f"Along the ramp, {name}", common), "dashed: 500 and 700 Hz"]
-    figure.suptitle(headlines(lines, 80))
+    entitle_runs(figure, histories, f"Along the ramp, {name}", "dashed: 500 and 700 Hz", width=80)
     return figure
 
 
-@styled
+@figures.styled
 def spectrogram_figure(
     histories: Sequence[xr.Dataset], sources: Sequence[str] = (), vmax: float | None = None
 ) -> Figure:
@@ -147,7 +134,7 @@ def spectrogram_figure(
     InputError
         A history has no motion of strands, or is too short; or there are more than a page holds.
     """
-    names = list(sources) or [f"history {k + 1}" for k in range(len(histories))]
+    names = named(histories, sources)
     for history, name in zip(histories, names, strict=True):
         if "displacement" not in history or "probe" not in history["displacement"].dims:
             raise mismatch(name, "the history of a run with the displacement of strands", "none")
@@ -157,7 +144,7 @@ def spectrogram_figure(
     strands = [name for name in dict.fromkeys(probe.split()[0] for probe in probes) if name in STRANDS]
     if not strands:
         raise mismatch(names[0], "probes on the strands t1 and t2", "none")
-    common, labels = on_axes(histories, names)
+    _, labels = on_axes(histories, names)
     ramps = [
         [read_ramp(history, strand, name, is_ramp=False) for strand in strands]
         for history, name in zip(histories, names, strict=True)
@@ -165,11 +152,11 @@ def spectrogram_figure(
     spectra = [[spectrogram(ramp) for ramp in row] for row in ramps]
     drawn = [amplitude.T for row in spectra for *_, amplitude in row]
     norm = spectra_norm(drawn, None if vmax is None else 1e6 * vmax)
-    grid = on_a_page(len(ramps), (1, 2), (LEAST_HEIGHT, HEIGHT), 1.4, names[0], THEN)
+    grid = figures.on_a_page(len(ramps), (1, 2), (LEAST_HEIGHT, HEIGHT), 1.4, names[0], THEN)
     count, beside = -(-len(ramps) // grid.columns), grid.columns * len(strands)
-    figure = Figure((WIDTH, grid.height * count + 1.4), layout="constrained")
+    figure = Figure((figures.WIDTH, grid.height * count + 1.4), layout="constrained")
     panels = figure.subplots(count, beside, sharey=True, squeeze=False)
-    size, told, each = (0.8 * WIDTH / beside, grid.height - 0.7), set(), iter(panels.flat)
+    size, told, each = (0.8 * figures.WIDTH / beside, grid.height - 0.7), set(), iter(panels.flat)
     pads = np.full(panels.shape, 0.0)
     for axes in panels.flat[len(ramps) * len(strands) :]:
         axes.set_axis_off()
@@ -196,11 +183,11 @@ def spectrogram_figure(
     if count == 1:
         panels[0, 0].set_ylabel("frequency [Hz]")
     else:
-        figure.supylabel("frequency [Hz]", fontsize=STYLE["axes.labelsize"])
+        figure.supylabel("frequency [Hz]", fontsize=figures.STYLE["axes.labelsize"])
     scale = cells.Scale(COLOURS, norm, "amplitude [µm]")
     values = np.concatenate([each.ravel() for each in drawn])
     cells.colour_bar(figure, scale, values, ax=panels, aspect=20 * count, pad=0.02)
-    figure.suptitle(headlines([*titles(histories, "Spectrogram", common), *sorted(told)]))
+    entitle_runs(figure, histories, "Spectrogram", *sorted(told), width=72)
     return figure
 
 
@@ -227,7 +214,7 @@ def _lines_along(history: xr.Dataset, ramp: Ramp) -> tuple[_Lines | None, _Lines
     return turns, (ramp.values[at], known) if np.isfinite(known).any() else None
 
 
-@styled
+@figures.styled
 def course_figure(history: xr.Dataset, of: str) -> Figure:
     """Draw a quantity over the time of a ramp, and below how far it swings, beside strand t1.
 
@@ -239,9 +226,9 @@ def course_figure(history: xr.Dataset, of: str) -> Figure:
         A variable over `time`.
     """
     unit = str(history[of].attrs.get("units", ""))
-    name = in_words(history[of])
+    name = figures.in_words(history[of])
     time, values = history["time"].values, history[of].values
-    figure = Figure((WIDTH, 4.6), layout="constrained")
+    figure = Figure((figures.WIDTH, 4.6), layout="constrained")
     upper, lower = figure.subplots(2, 1, sharex=True)
     upper.plot(time, values, color="#0072b2", lw=0.3, rasterized=True)
     upper.set_ylabel(f"{name} [{unit}]")
@@ -270,10 +257,8 @@ def course_figure(history: xr.Dataset, of: str) -> Figure:
     upper.set_ylim(*_limits(values[time >= begun]))
     for axes in (upper, lower):
         axes.grid(lw=0.4, alpha=0.5)
-    common, _ = on_axes([history], ["history"])
-    lines = titles([history], f"{name[0].upper()}{name[1:]} over time", common)
-    lines.append("amplitudes: the moment's at 400 to 800 Hz, the strand's at 300 to 1500 Hz")
-    figure.suptitle("\n".join(balanced(line, 76) for line in lines))
+    bands = "amplitudes: the moment's at 400 to 800 Hz, the strand's at 300 to 1500 Hz"
+    entitle_runs(figure, [history], f"{name[0].upper()}{name[1:]} over time", bands)
     return figure
 
 
@@ -282,14 +267,7 @@ def _limits(values: np.ndarray) -> tuple[float, float]:
     return float(values.min()) - margin, float(values.max()) + margin
 
 
-def read_ramp(
-    history: xr.Dataset,
-    of: str,
-    source: str = "history",
-    band: tuple[float, float] = BAND,
-    *,
-    is_ramp: bool = True,
-) -> Ramp:
+def read_ramp(history: xr.Dataset, of: str, source: str = "history", *, is_ramp: bool = True) -> Ramp:
     """What a run does along its ramp, without the start-up before it; arguments as of `ramp_figure`.
 
     Unless it has to be a ramp, a run at constant load and speed has its time [s] in the place of that.
@@ -300,25 +278,28 @@ def read_ramp(
     time = history["time"].values
     course = history["time"] if changing is None else history[changing]
     first = int(np.searchsorted(time, _start_up(history)))
-    factor, unit = coordinate_unit(course.attrs) if changing else (1.0, "s")
+    factor, unit = figures.coordinate_unit(course.attrs) if changing else (1.0, "s")
     rate = 1.0 / (time[1] - time[0])
     if time.size - first < WINDOW * rate:
         raise mismatch(source, f"a run of {WINDOW:g} s or more after its start-up", "a shorter one")
-    if rate < 2.0 * band[1]:
-        raise mismatch(source, f"a history of {2.0 * band[1]:g} samples per second or more", f"{rate:.4g}")
+    if rate < 2.0 * BAND[1]:
+        raise mismatch(source, f"a history of {2.0 * BAND[1]:g} samples per second or more", f"{rate:.4g}")
     if of in STRANDS:
-        check_known(history, ["displacement"], source)
+        figures.check_known(history, ["displacement"], source)
         probes = [str(name).split()[0] == of for name in history["probe"].values]
         moved = 1e6 * history["displacement"].values[first:, probes]
-        _, amplitude = window_amplitudes(moved, rate, band, WINDOW)
+        _, amplitude = window_amplitudes(moved, rate, BAND, WINDOW)
         motion = moved[:, int(np.argmax(amplitude.max(axis=0)))]
     elif of in history and history[of].dims == ("time",):
-        check_known(history, [of], source)
+        figures.check_known(history, [of], source)
         motion = history[of].values[first:]
     else:
         raise mismatch(source, "t1, t2 or a variable over time", of)
     return Ramp(
-        factor * course.values[first:], f"{in_words(course)} [{unit}]", _without_drift(motion, rate), rate
+        factor * course.values[first:],
+        f"{figures.in_words(course)} [{unit}]",
+        _without_drift(motion, rate),
+        rate,
     )
 
 

@@ -10,16 +10,18 @@ from typing import Any
 import numpy as np
 import xarray as xr
 
+from cvt_hpc.analysis.conversion import documented_units
 from cvt_hpc.errors import mismatch
 from cvt_hpc.files import naming_refusals, read_regular
 from cvt_hpc.job.units import to_si
 from cvt_hpc.models import MODELS
 from cvt_hpc.models.contract import load_model
+from cvt_hpc.netcdf import flag_attributes
 from cvt_hpc.tables import below_origin
 from cvt_hpc.variables import Status, Vibrates
 
 _LARGEST_TABLE = 16 << 20  # [byte]
-_LABELS = {"strand": ("t1", "t2"), "pulley": ("driving", "driven")}
+_LABELS = {"t1": "strand", "t2": "strand", "driving": "pulley", "driven": "pulley"}
 
 
 def read_table(path: str | Path) -> xr.Dataset:
@@ -67,8 +69,7 @@ def read_table(path: str | Path) -> xr.Dataset:
     for name, flags in (("status", Status), ("vibrates", Vibrates)):
         known = {flag.name.lower(): flag for flag in flags}
         values = [known.get(word, Vibrates.UNDECIDED) for word in columns[name]]
-        meanings = {"flag_values": np.array(list(flags), np.int8), "flag_meanings": " ".join(known)}
-        dataset[name] = (tuple(axes), grid(np.array(values, np.int8)), meanings)
+        dataset[name] = (tuple(axes), grid(np.array(values, np.int8)), flag_attributes(flags))
     for column in head[head.index("vibrates") + 1 :]:
         _add(dataset, column, tuple(axes), columns[column], grid)
     return dataset.assign_attrs(job_name=Path(path).stem)
@@ -83,25 +84,19 @@ def _add(dataset: xr.Dataset, column: str, dims: tuple[str, ...], texts: Sequenc
         return  # of texts
     si = {"um": "m"}.get(unit, unit)
     values = values * (to_si(f"1 {unit}", si) if unit else 1.0)
-    name, label = next(
-        (
-            (name.removesuffix(f"_{one}"), one)
-            for labels in _LABELS.values()
-            for one in labels
-            if name.endswith(f"_{one}")
-        ),
-        (name, ""),
-    )
-    attributes = {"units": si or "1"}
+    head, _, label = name.rpartition("_")
+    if not head or label not in _LABELS:
+        head, label = name, ""
+    attributes = {"units": si or documented_units(False).get(head, "1")}
     if not label:
         dataset[name] = (dims, values, attributes)
         return
-    extra = next(dim for dim, labels in _LABELS.items() if label in labels)
-    if name not in dataset:
-        labels = list(_LABELS[extra])
-        dataset[name] = ((*dims, extra), np.full((*values.shape, len(labels)), np.nan), attributes)
+    extra = _LABELS[label]
+    if head not in dataset:
+        labels = [one for one, dim in _LABELS.items() if dim == extra]
+        dataset[head] = ((*dims, extra), np.full((*values.shape, len(labels)), np.nan), attributes)
         dataset[extra] = labels
-    dataset[name].loc[{extra: label}] = values
+    dataset[head].loc[{extra: label}] = values
 
 
 def _numbers(texts: Sequence[str]) -> np.ndarray:

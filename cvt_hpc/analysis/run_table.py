@@ -2,13 +2,13 @@
 
 from __future__ import annotations
 
-from itertools import product
 from pathlib import Path
 from typing import TYPE_CHECKING, Any
 
 import numpy as np
 import xarray as xr
 
+from cvt_hpc.analysis.arrangement import labelled
 from cvt_hpc.analysis.classes import check_results, map_classes
 from cvt_hpc.errors import mismatch
 from cvt_hpc.files import written_aside
@@ -60,11 +60,8 @@ def run_table(dataset: xr.Dataset, source: str = "results") -> DataFrame:
         array = loaded[name]
         unit = str(array.attrs.get("units", "1"))
         of_unit = "" if unit in ("", "1") else f" [{unit}]"
-        extra = [dim for dim in array.dims if dim not in dims]
-        for place in product(*(range(array.sizes[dim]) for dim in extra)):
-            at = dict(zip(extra, place, strict=True))
-            labels = [str(array[dim].values[k]) for dim, k in at.items()]
-            values = _flat(array.isel(at).broadcast_like(status), dims)
+        for labels, part in labelled(array, dims):
+            values = _flat(part.broadcast_like(status), dims)
             columns["_".join([str(name), *labels]) + of_unit] = _in_words(values, array.attrs)
     return DataFrame(columns)
 

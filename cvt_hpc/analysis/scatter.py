@@ -4,7 +4,6 @@ from __future__ import annotations
 
 from collections.abc import Mapping
 from itertools import combinations
-from textwrap import fill
 from typing import Any
 
 import numpy as np
@@ -18,7 +17,7 @@ from numpy.typing import NDArray
 
 from cvt_hpc.analysis import cells
 from cvt_hpc.analysis.classes import OccurrenceClass, at_strongest_strand, count_classes, occurrence_classes
-from cvt_hpc.analysis.figures import WIDTH, axis_label, coordinate_unit, headline
+from cvt_hpc.analysis.figures import WIDTH, axis_label, coordinate_unit, entitle, headline
 from cvt_hpc.errors import mismatch
 
 MOST_AXES = 4  # six pairs; the first axes of the job
@@ -66,11 +65,14 @@ def scatter_figure(
     panels = draw_samples(figure, dataset, classes, amplitude, scale)
     if np.isfinite(amplitude).any():
         cells.colour_bar(figure, scale, amplitude, ax=panels, pad=0.02)
-    title = [headline(dataset.attrs), f"{classes.size} samples: {count_classes(classes)}"]
+    title = [
+        headline("Vibration occurrence", dataset.attrs),
+        f"{classes.size} samples: {count_classes(classes)}",
+    ]
     names = sample_axes(dataset)
     if len(names) > MOST_AXES:
         title.append(f"the first {MOST_AXES} of {len(names)} axes")
-    figure.suptitle("\n".join(fill(line, 72) for line in title))
+    entitle(figure, title)
     figure.legend(
         *panels[0, 0].get_legend_handles_labels(),
         loc="outside lower center",

@@ -6,8 +6,7 @@ import numpy as np
 import xarray as xr
 from matplotlib.figure import Figure
 
-from cvt_hpc.analysis.figures import WIDTH, balanced, styled
-from cvt_hpc.errors import one_line
+from cvt_hpc.analysis.figures import WIDTH, entitle, headline, styled
 
 COLOURS = {"t1": "#0072b2", "t2": "#d55e00"}
 LINES = {"t1": "-", "t2": "--"}
@@ -44,6 +43,5 @@ def spectrum_figure(run: xr.Dataset) -> Figure:
     axes.set_ylim(bottom=0.0)
     axes.grid(lw=0.4, alpha=0.5)
     figure.legend(loc="outside lower center", frameon=False, ncols=3)
-    job = one_line(run.attrs.get("job_name", ""))
-    figure.suptitle(balanced(f"Spectra of the strands: {job}".removesuffix(": "), 76))
+    entitle(figure, [headline("Spectra of the strands", run.attrs)], 76)
     return figure

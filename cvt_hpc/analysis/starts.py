@@ -45,7 +45,7 @@ def join_starts(dataset: xr.Dataset) -> xr.Dataset:
 
 
 def start_line(dataset: xr.Dataset, at: Mapping[str, Any], source: str) -> str:
-    """How many cells of a map vibrate from the large start only, in words; as `draw_map` takes results."""
+    """How many cells of a map vibrate from the large start only, in words; as `map_figure` takes results."""
     drawn = arrange(join_starts(dataset), at, source).dataset
     classes = map_classes(drawn)
     found = int(np.count_nonzero(classes == StartClass.LARGE_START_ONLY))

@@ -2,20 +2,17 @@
 
 from __future__ import annotations
 
-from collections.abc import Mapping
-from typing import Any
-
 import numpy as np
 import xarray as xr
 from matplotlib.axes import Axes
 from matplotlib.figure import Figure
 
-from cvt_hpc.analysis.arrangement import CHOSEN, Sides, arrange, check_sides, ruler
+from cvt_hpc.analysis.arrangement import CHOSEN, At, Sides, arrange, check_sides, ruler
 from cvt_hpc.analysis.classes import check_results
 from cvt_hpc.analysis.curves import panels_of
-from cvt_hpc.analysis.figures import WIDTH, balanced, check_known, coordinate_unit, styled
+from cvt_hpc.analysis.figures import WIDTH, check_known, coordinate_unit, entitle, headline, styled
 from cvt_hpc.analysis.ticks import put_ticks, short_numbers
-from cvt_hpc.errors import mismatch, one_line
+from cvt_hpc.errors import mismatch
 from cvt_hpc.variables import Status
 
 HEIGHT = 3.8  # [inch]
@@ -27,10 +24,7 @@ NEEDED = ("mean_ring_tension", "mean_push_force")
 
 @styled
 def strand_bars_figure(
-    dataset: xr.Dataset,
-    at: Mapping[str, Any] | None = None,
-    source: str = "results",
-    sides: Sides = CHOSEN,
+    dataset: xr.Dataset, at: At = None, source: str = "results", sides: Sides = CHOSEN
 ) -> Figure:
     """Draw for each run what each strand carries: ring tension above zero, push force below.
 
@@ -62,9 +56,7 @@ def strand_bars_figure(
     row[0].set_ylabel("push force | ring tension [kN]")
     handles, labels = row[0].get_legend_handles_labels()
     figure.legend(handles, labels, loc="outside lower center", frameon=False, ncols=4)
-    job = one_line(dataset.attrs.get("job_name", ""))
-    lines = [f"Forces in the strands: {job}".removesuffix(": "), *notes]
-    figure.suptitle("\n".join(balanced(line, 76) for line in lines))
+    entitle(figure, [headline("Forces in the strands", dataset.attrs), *notes], 76)
     return figure
 
 

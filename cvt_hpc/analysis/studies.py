@@ -2,15 +2,14 @@
 
 from __future__ import annotations
 
-from collections.abc import Collection, Mapping, Sequence
-from typing import Any
+from collections.abc import Collection, Sequence
 
 import numpy as np
 import xarray as xr
 from matplotlib.figure import Figure
 
 from cvt_hpc.analysis.alignment import COMPARED, axes_of
-from cvt_hpc.analysis.arrangement import CHOSEN, Sides
+from cvt_hpc.analysis.arrangement import CHOSEN, At, Sides
 from cvt_hpc.analysis.classes import check_results
 from cvt_hpc.analysis.conversion import standard
 from cvt_hpc.analysis.scatter import is_sampled
@@ -78,7 +77,7 @@ def side_by_side(
 def maps_figure(
     datasets: Sequence[xr.Dataset],
     quantities: Sequence[str] = (),
-    at: Mapping[str, Any] | None = None,
+    at: At = None,
     sources: Sequence[str] = (),
     sides: Sides = CHOSEN,
     vmax: float | None = None,

@@ -7,12 +7,18 @@ from collections.abc import Sequence
 from pathlib import Path
 
 import xarray as xr
+from matplotlib.figure import Figure
 
 from cvt_hpc.analysis.arrangement import infinity_in_words
-from cvt_hpc.analysis.figures import check_known
+from cvt_hpc.analysis.figures import check_known, entitle
 from cvt_hpc.analysis.histories import place_of, values_of
 from cvt_hpc.errors import InputError, mismatch, one_line
 from cvt_hpc.files import kind_of
+
+
+def named(histories: Sequence[xr.Dataset], sources: Sequence[str] = ()) -> list[str]:
+    """Names of runs: where they are from, or else their numbers."""
+    return list(sources) or [f"history {k + 1}" for k in range(len(histories))]
 
 
 def told_apart(histories: Sequence[xr.Dataset], names: Sequence[str]) -> tuple[str, list[str]]:
@@ -27,7 +33,9 @@ def told_apart(histories: Sequence[xr.Dataset], names: Sequence[str]) -> tuple[s
     return ", ".join(common), labels
 
 
-def on_axes(histories: Sequence[xr.Dataset], names: Sequence[str]) -> tuple[list[str], list[dict[str, str]]]:
+def on_axes(
+    histories: Sequence[xr.Dataset], names: Sequence[str] = ()
+) -> tuple[list[str], list[dict[str, str]]]:
     """As `told_apart`, by models and axes of the jobs alone: common parts, and for each run text by axis.
 
     Runs that do not differ there are told apart by their names, under the axis "".
@@ -36,7 +44,7 @@ def on_axes(histories: Sequence[xr.Dataset], names: Sequence[str]) -> tuple[list
     common = {key for key in parts[0] if len({part.get(key) for part in parts}) == 1}
     labels = [{key: text for key, text in part.items() if key not in common} for part in parts]
     if len(histories) > 1 and len({tuple(label.items()) for label in labels}) < len(labels):
-        labels = [{"": name} for name in names]
+        labels = [{"": name} for name in named(histories, names)]
     return [parts[0][key] for key in parts[0] if key in common and key != "model"], labels
 
 
@@ -49,11 +57,21 @@ def _axes_of(dataset: xr.Dataset) -> dict[str, str]:
     return model | {key: f"{key} {texts[key]}".replace("_", " ") for key in axes if key in texts}
 
 
-def titles(histories: Sequence[xr.Dataset], subject: str, common: Sequence[str]) -> list[str]:
-    """First lines above a picture of runs: its subject with the jobs. names, and what they have in common."""
+def entitle_runs(
+    figure: Figure, histories: Sequence[xr.Dataset], subject: str, *further: str, width: int = 76
+) -> None:
+    """Title of a picture of runs: subject with the names of jobs, what they have in common, further lines."""
+    common, _ = on_axes(histories)
+    entitle_jobs(figure, histories, [subject, ", ".join(common), *further], width)
+
+
+def entitle_jobs(
+    figure: Figure, histories: Sequence[xr.Dataset], lines: Sequence[str], width: int = 76
+) -> None:
+    """Title of a picture of runs: the first line with the names of their jobs, and further lines."""
     jobs = dict.fromkeys(one_line(dataset.attrs.get("job_name", "")) for dataset in histories)
-    lines = [f"{subject}: {', '.join(filter(None, jobs))}".removesuffix(": "), ", ".join(common)]
-    return [line for line in lines if line]
+    first = f"{lines[0]}: {', '.join(filter(None, jobs))}".removesuffix(": ")
+    entitle(figure, [first, *lines[1:]], width)
 
 
 def check_holds(histories: Sequence[xr.Dataset], names: Sequence[str], wanted: dict[str, str]) -> None:

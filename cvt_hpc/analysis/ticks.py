@@ -15,9 +15,9 @@ LETTER, LINE, GAP = 5.6, 11.0, 5.0  # [point]: width and height of a tick's lett
 TEXTS = 55  # letters of texts side by side along x; more stand upright
 
 
-def number(value: float) -> str:
-    """A number in at most six digits, with a true minus."""
-    return f"{value:.6g}".replace("-", "−")
+def number(value: float, layout: str = ".6g") -> str:
+    """A number in at most six digits, or in another layout, with a true minus."""
+    return format(value, layout).replace("-", "−")
 
 
 def short_numbers(values: NDArray[np.float64], *, is_log: bool = False) -> tuple[str, ...]:

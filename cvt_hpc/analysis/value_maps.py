@@ -2,9 +2,7 @@
 
 from __future__ import annotations
 
-from collections.abc import Mapping, Sequence
-from itertools import product
-from pathlib import Path
+from collections.abc import Sequence
 from textwrap import fill
 from typing import Any, NamedTuple
 
@@ -16,35 +14,13 @@ from matplotlib.figure import Figure
 from matplotlib.patches import Patch, PathPatch
 from numpy.typing import NDArray
 
-from cvt_hpc.analysis import cells
-from cvt_hpc.analysis.arrangement import (
-    CHOSEN,
-    Arrangement,
-    Ruler,
-    Sides,
-    arrange,
-    first_panel,
-    ruler,
-    value_text,
-)
-from cvt_hpc.analysis.classes import OccurrenceClass, check_results, count_classes, occurrence_classes
+from cvt_hpc.analysis import arrangement as layout
+from cvt_hpc.analysis import cells, figures
+from cvt_hpc.analysis.classes import WITHOUT_RESULT, check_results, count_classes, occurrence_classes
 from cvt_hpc.analysis.curves import check_quantities
-from cvt_hpc.analysis.figures import (
-    NARROW,
-    WIDTH,
-    Grid,
-    axis_label,
-    draw,
-    fitting,
-    headlines,
-    in_words,
-    on_a_page,
-    styled,
-    value_unit,
-)
-from cvt_hpc.analysis.maps import ONE_ROW
 from cvt_hpc.analysis.scatter import is_sampled
 from cvt_hpc.errors import mismatch, one_line
+from cvt_hpc.vibration.classes import OccurrenceClass
 
 COLOURS = cells.colours_of("viridis_r", 0.05, 0.85)
 OTHER_SIGN = 0.05  # of the largest size: values of the other sign from here on have colours of their own
@@ -58,11 +34,7 @@ NEGATIVE, INK = "---", "#5a5a5a"  # lines over cells below zero that hold no num
 HATCH = cells.STYLES[OccurrenceClass.SLIPPING].hatch
 EQUAL = 1e-6  # of a quantity: what differs less is the same
 NARROWEST, LOWEST = 24.0, 11.0  # [point]: cells into which numbers are written
-OTHERS = (
-    OccurrenceClass.SLIPPING,
-    OccurrenceClass.FAILED,
-    OccurrenceClass.NOT_RUN,
-)  # which runs are marked
+OTHERS = tuple(WITHOUT_RESULT)  # which runs are marked
 
 
 class Panel(NamedTuple):
@@ -87,26 +59,13 @@ class Panel(NamedTuple):
     alike: NDArray[np.float64]
 
 
-def draw_value_map(
-    dataset: xr.Dataset,
-    quantities: Sequence[str],
-    out: Path,
-    at: Mapping[str, Any] | None = None,
-    source: str = "results",
-    sides: Sides = CHOSEN,
-    vmax: float | None = None,
-) -> Path:
-    """Write the figure of `value_map_figure`."""
-    return draw(lambda: value_map_figure(dataset, quantities, at, source, sides, vmax), out)
-
-
-@styled
+@figures.styled
 def value_map_figure(
     dataset: xr.Dataset,
     quantities: Sequence[str],
-    at: Mapping[str, Any] | None = None,
+    at: layout.At = None,
     source: str = "results",
-    sides: Sides = CHOSEN,
+    sides: layout.Sides = layout.CHOSEN,
     vmax: float | None = None,
 ) -> Figure:
     """Draw quantities over two axes of a study: panels for each, its further dimensions and a third axis.
@@ -136,13 +95,16 @@ def value_map_figure(
     check_quantities(dataset, quantities, source, of_one_unit=False)
     if vmax is not None and len(quantities) > 1:
         raise mismatch(f"{source}: vmax", "one quantity", ", ".join(quantities))
-    arrangement = arrange(dataset, at or {}, source, sides)
+    arrangement = layout.arrange(dataset, at or {}, source, sides)
     panels = _panels(arrangement, quantities)
     if len(panels) > MOST_PANELS and not sides.panel:
-        arrangement = first_panel(arrangement)
+        arrangement = layout.first_panel(arrangement)
         panels = _panels(arrangement, quantities)
     shown = arrangement.dataset
-    x, y = ruler(shown[arrangement.x]), ruler(shown[arrangement.y]) if arrangement.y else ONE_ROW
+    x, y = (
+        layout.ruler(shown[arrangement.x]),
+        layout.ruler(shown[arrangement.y]) if arrangement.y else layout.ONE_ROW,
+    )
     size, (columns, height) = _on_paper(len(panels), y.centres.size, source, arrangement)
     figure = Figure(size, layout="constrained")
     all_axes = figure.subplots(-(-len(panels) // columns), columns, squeeze=False)
@@ -159,7 +121,7 @@ def value_map_figure(
     job = one_line(dataset.attrs.get("job_name", ""))
     kinds = occurrence_classes(shown)
     lines = [f"{job}: {_counted(kinds)}".removeprefix(": "), ", ".join(arrangement.notes)]
-    figure.suptitle(headlines(lines, int(72 * size[0] / WIDTH)))
+    figures.entitle(figure, lines, int(72 * size[0] / figures.WIDTH))
     marked: dict[cells.CellClass, cells.ClassStyle] = {
         kind: cells.STYLES[kind] for kind in OTHERS if (kinds == kind).any()
     }
@@ -174,23 +136,23 @@ def value_map_figure(
 
 
 def _on_paper(
-    count: int, rows: int, source: str, arrangement: Arrangement
-) -> tuple[tuple[float, float], Grid]:
+    count: int, rows: int, source: str, arrangement: layout.Arrangement
+) -> tuple[tuple[float, float], figures.Grid]:
     """Size of the picture [inch] and its panels: on a page on its side, else on one upright.
 
     The panels of an axis of three values stand side by side.
     """
     wanted = min(ROW * rows + 0.3, HIGHEST) + FRAME
     if count == 1:
-        return (WIDTH, wanted + FRAME), Grid(1, wanted)
+        return (figures.WIDTH, wanted + FRAME), figures.Grid(1, wanted)
     sizes, then = (LEAST + FRAME, wanted), "show fewer quantities, or fix an axis by `--at`"
     if panel := arrangement.panel:
         then = f"fix an axis, as by `--at {panel}=VALUE`, or choose another one by `--panel AXIS`"
     is_row = arrangement.dataset.sizes.get(panel) == BESIDE
-    width, least = 1.6 * WIDTH, sizes[0] if is_row else wanted
-    grid = fitting(count, (BESIDE if is_row else 2,), (least, wanted), NARROW - FRAME)
+    width, least = 1.6 * figures.WIDTH, sizes[0] if is_row else wanted
+    grid = figures.fitting(count, (BESIDE if is_row else 2,), (least, wanted), figures.NARROW - FRAME)
     if grid is None:
-        width, grid = NARROW, on_a_page(count, (2, BESIDE), sizes, FRAME, source, then)
+        width, grid = figures.NARROW, figures.on_a_page(count, (2, BESIDE), sizes, FRAME, source, then)
     return (width, grid.height * -(-count // grid.columns) + FRAME), grid
 
 
@@ -200,29 +162,32 @@ def _counted(kinds: xr.DataArray) -> str:
     return f"{kinds.size} runs" + (f", of them {count_classes(others)}" if others.size else "")
 
 
-def _of_grid(array: xr.DataArray, arrangement: Arrangement) -> NDArray[Any]:
+def _of_grid(array: xr.DataArray, arrangement: layout.Arrangement) -> NDArray[Any]:
     """Values (row, column) of a variable over x, or over y and x."""
     names = [name for name in (arrangement.y, arrangement.x) if name]
     return np.atleast_2d(array.transpose(*names).values)
 
 
-def _panels(arrangement: Arrangement, quantities: Sequence[str]) -> list[Panel]:
+def _panels(arrangement: layout.Arrangement, quantities: Sequence[str]) -> list[Panel]:
     """Panels of all quantities, by the axis of panels and by labels of further dimensions."""
     dataset = arrangement.dataset
     kinds, found = occurrence_classes(dataset), []
     for name in quantities:
         array = dataset[name]
-        factor, unit = value_unit(array)
+        factor, unit = figures.value_unit(array)
         over = [arrangement.panel] if arrangement.panel else []
         labelled = [str(dim) for dim in array.dims if dim not in (arrangement.x, arrangement.y, *over)]
         alike = factor * array.values
-        for labels in _places(array, labelled):
+        for labels in layout.places(array, labelled):
             told = [str(array[dim].values[k]) for dim, k in labels.items()]
-            for at in _places(dataset, over):
-                here = [f"{in_words(dataset[dim])} {value_text(dataset[dim], k)}" for dim, k in at.items()]
+            for at in layout.places(dataset, over):
+                here = [
+                    f"{figures.in_words(dataset[dim])} {layout.value_text(dataset[dim], k)}"
+                    for dim, k in at.items()
+                ]
                 found.append(
                     Panel(
-                        ", ".join([axis_label(array, unit), *told, *here]),
+                        ", ".join([figures.axis_label(array, unit), *told, *here]),
                         unit,
                         factor,
                         factor * _of_grid(array.isel(labels | at), arrangement),
@@ -233,16 +198,10 @@ def _panels(arrangement: Arrangement, quantities: Sequence[str]) -> list[Panel]:
     return found
 
 
-def _places(array: xr.DataArray | xr.Dataset, dims: Sequence[str]) -> list[dict[str, int]]:
-    """Indices along dimensions, of all their combinations."""
-    sizes = (range(array.sizes[dim]) for dim in dims)
-    return [dict(zip(dims, place, strict=True)) for place in product(*sizes)]
-
-
 def _draw_panel(
     figure: Figure,
     axes: Axes,
-    rulers: tuple[Ruler, Ruler],
+    rulers: tuple[layout.Ruler, layout.Ruler],
     panel: Panel,
     vmax: float | None,
     room: NDArray[np.float64],
@@ -279,7 +238,9 @@ def _draw_panel(
         cells.colour_bar(figure, scale, values, ax=axes, pad=0.02)
 
 
-def _hatch(axes: Axes, x: Ruler, y: Ruler, inside: NDArray[np.bool_], hatch: str, ink: str) -> None:
+def _hatch(
+    axes: Axes, x: layout.Ruler, y: layout.Ruler, inside: NDArray[np.bool_], hatch: str, ink: str
+) -> None:
     """Hatch some cells over their colours."""
     lines = {"facecolor": "none", "edgecolor": ink, "linewidth": 0, "hatch": hatch, "rasterized": True}
     if inside.any():

@@ -2,9 +2,8 @@
 
 from __future__ import annotations
 
-from collections.abc import Mapping, Sequence
+from collections.abc import Sequence
 from dataclasses import replace
-from typing import Any
 
 import numpy as np
 import xarray as xr
@@ -13,22 +12,13 @@ from matplotlib.colors import ListedColormap, LogNorm
 from matplotlib.figure import Figure
 from numpy.typing import NDArray
 
+from cvt_hpc.analysis import arrangement as layout
 from cvt_hpc.analysis import cells
-from cvt_hpc.analysis.arrangement import (
-    CHOSEN,
-    Arrangement,
-    Ruler,
-    Sides,
-    along_x,
-    arrange,
-    ruler,
-    value_text,
-)
 from cvt_hpc.analysis.classes import WITHOUT_RESULT, check_results, occurrence_classes
 from cvt_hpc.analysis.eigenfrequencies import along_axis
-from cvt_hpc.analysis.figures import WIDTH, check_known, headlines, in_words, on_a_page, styled
+from cvt_hpc.analysis.figures import WIDTH, check_known, entitle, headline, in_words, on_a_page, styled
 from cvt_hpc.analysis.line_names import OUTLINE, Named, name_lines
-from cvt_hpc.errors import few_of, mismatch, one_line
+from cvt_hpc.errors import few_of, mismatch
 
 LEAST, HEIGHT, FRAME = 1.3, 2.8, 1.2  # [inch]: a row of panels, and title and labels
 # white ground, on which weak ridges are seen
@@ -42,10 +32,10 @@ ORDERS = (1.0, 2.0, 4.0, 8.0, 16.0)  # of the driving pulley, in a Campbell diag
 
 def campbell_figure(
     dataset: xr.Dataset,
-    at: Mapping[str, Any] | None = None,
+    at: layout.At = None,
     source: str = "results",
     orders: Sequence[float] = ORDERS,
-    sides: Sides = CHOSEN,
+    sides: layout.Sides = layout.CHOSEN,
     vmax: float | None = None,
 ) -> Figure:
     """Draw a Campbell diagram: `waterfall_figure` over the driving speed, with orders of that speed."""
@@ -54,15 +44,17 @@ def campbell_figure(
         found = ", ".join(map(str, dataset["status"].dims)) or "a single run"
         then = "`cvt-hpc plot waterfall` draws spectra over any axis"
         raise mismatch(source, "results over the axis driving_speed", found, then)
-    return waterfall_figure(dataset, at, source, Sides("driving_speed", panel=sides.panel), orders, vmax)
+    return waterfall_figure(
+        dataset, at, source, layout.Sides("driving_speed", panel=sides.panel), orders, vmax
+    )
 
 
 @styled
 def waterfall_figure(
     dataset: xr.Dataset,
-    at: Mapping[str, Any] | None = None,
+    at: layout.At = None,
     source: str = "results",
-    sides: Sides = CHOSEN,
+    sides: layout.Sides = layout.CHOSEN,
     orders: Sequence[float] = (),
     vmax: float | None = None,
 ) -> Figure:
@@ -81,10 +73,10 @@ def waterfall_figure(
         found = few_of(list(map(str, dataset.data_vars)), 6)
         then = "runs of a belt that marches in time record it, up to band_high in [vibration]"
         raise mismatch(source, "results with the variable spectrum", found, then)
-    arrangement = arrange(dataset, at or {}, source, sides)
+    arrangement = layout.arrange(dataset, at or {}, source, sides)
     check_known(arrangement.dataset, ["spectrum"], source)
     rows, notes = _rows(arrangement, sides.panel)
-    x, y = ruler(arrangement.dataset[arrangement.x]), ruler(dataset["frequency_bin"])
+    x, y = layout.ruler(arrangement.dataset[arrangement.x]), layout.ruler(dataset["frequency_bin"])
     over = ("strand", "frequency_bin", arrangement.x)
     amplitude = [1e6 * shown["spectrum"].transpose(*over).values for _, shown in rows]
     norm = spectra_norm([of for row in amplitude for of in row], None if vmax is None else 1e6 * vmax)
@@ -102,7 +94,9 @@ def waterfall_figure(
     for (title, shown), of_row, modes in zip(rows, amplitude, known, strict=True):
         for strand, values in zip(strands, of_row, strict=True):
             axes, lines = next(each), []
-            _draw_spectra(axes, x, y, values, norm)
+            axes.set_facecolor(UNKNOWN)
+            cut = np.ma.masked_invalid(np.maximum(values, norm.vmin))  # zero has no logarithm
+            axes.pcolormesh(x.edges, y.edges, cut, norm=norm, cmap=COLOURS, rasterized=True)
             axes.set(xlim=x.edges[[0, -1]], ylim=(0.0, y.edges[-1]))
             if modes is not None:
                 of_strand = modes.sel(strand=strand).values
@@ -120,7 +114,6 @@ def waterfall_figure(
         axes.set_ylabel("frequency [Hz]")
     scale = cells.Scale(COLOURS, norm, "amplitude [µm]")
     cells.colour_bar(figure, scale, np.stack(amplitude), ax=panels, aspect=20 * count, pad=0.02)
-    job = one_line(dataset.attrs.get("job_name", ""))
     subject = "Campbell diagram" if orders else "Spectra of the strands"
     told = []
     if arrangement.x == "driving_speed" and orders:
@@ -128,20 +121,22 @@ def waterfall_figure(
     if any(modes is not None for modes in known):
         told.append("dashed: eigenfrequencies, with their half waves along the strand")
     told += _without_spectrum(rows, amplitude)
-    figure.suptitle(headlines([f"{subject}: {job}".rstrip(": "), ", ".join(notes), *told]))
+    entitle(figure, [headline(subject, dataset.attrs), ", ".join(notes), *told])
     return figure
 
 
-def _rows(arrangement: Arrangement, panel: str | None) -> tuple[list[tuple[str, xr.Dataset]], list[str]]:
+def _rows(
+    arrangement: layout.Arrangement, panel: str | None
+) -> tuple[list[tuple[str, xr.Dataset]], list[str]]:
     """Title and results over x of each row of panels, and what is fixed, in words."""
     if panel is None:
-        shown, notes = along_x(arrangement)
+        shown, notes = layout.along_x(arrangement)
         return [("", shown)], notes
     axis, rows = arrangement.dataset[panel], []
     for k in range(axis.size):
         one = replace(arrangement, dataset=arrangement.dataset.isel({panel: k}), panel=None)
-        shown, notes = along_x(one)
-        rows.append((f"{in_words(axis)} {value_text(axis, k)}", shown))
+        shown, notes = layout.along_x(one)
+        rows.append((f"{in_words(axis)} {layout.value_text(axis, k)}", shown))
     return rows, notes
 
 
@@ -178,7 +173,9 @@ def spectra_norm(spectra: Sequence[NDArray[np.float64]], highest: float | None =
     return LogNorm(float(np.clip(low, DEEPEST * top, SHALLOWEST * top)), top)
 
 
-def _draw_spectra(axes: Axes, x: Ruler, y: Ruler, values: NDArray[np.float64], norm: LogNorm) -> None:
+def _draw_spectra(
+    axes: Axes, x: layout.Ruler, y: layout.Ruler, values: NDArray[np.float64], norm: LogNorm
+) -> None:
     """Cells of one strand, of amplitudes (frequency, x) [um]."""
     axes.set_facecolor(UNKNOWN)
     shown = np.ma.masked_invalid(np.maximum(values, norm.vmin))  # zero has no logarithm

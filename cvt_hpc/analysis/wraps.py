@@ -12,10 +12,10 @@ from matplotlib.figure import Figure
 from matplotlib.lines import Line2D
 
 from cvt_hpc.analysis.error_axes import COLOURS
-from cvt_hpc.analysis.figures import STYLE, WIDTH, balanced, check_known, styled
+from cvt_hpc.analysis.figures import STYLE, WIDTH, check_known, styled
 from cvt_hpc.analysis.profiles import inside
-from cvt_hpc.analysis.telling_apart import told_apart
-from cvt_hpc.errors import InputError, mismatch, one_line
+from cvt_hpc.analysis.telling_apart import entitle_jobs, named, told_apart
+from cvt_hpc.errors import InputError, mismatch
 
 # rows: variable, label with unit, factor, and what stands beside it
 ROWS = (
@@ -56,7 +56,7 @@ def wrap_figure(histories: Sequence[xr.Dataset], sources: Sequence[str] = ()) ->
     """
     if not histories:
         raise InputError("wrap: expected one history or more, found none")
-    names = list(sources) or [f"history {k + 1}" for k in range(len(histories))]
+    names = named(histories, sources)
     for dataset, name in zip(histories, names, strict=True):
         missing = [key for key in ("normal_force", "friction_force", "wrap_angle") if key not in dataset]
         if missing:
@@ -83,7 +83,8 @@ def wrap_figure(histories: Sequence[xr.Dataset], sources: Sequence[str] = ()) ->
         axes.set_title(f"{pulley.removesuffix(' arc')} pulley", loc="left", pad=3)
     panels.supxlabel("wrap angle from inlet [°]", fontsize=STYLE["axes.labelsize"])
     _add_legend(figure, grid[-1, 0], [THEORY] if "sliding_tension" in histories[0] else [])
-    figure.suptitle(_title(histories, common, without_torque))
+    further = [f"without torque, not drawn: {', '.join(without_torque)}"] if without_torque else []
+    entitle_jobs(figure, histories, ["Forces over the wrap", common, *further])
     return figure
 
 
@@ -117,11 +118,3 @@ def _add_legend(figure: Figure, axes: Axes, theory: Sequence[str]) -> None:
     handles += [Line2D([], [], ls=":", lw=1.6, color=INK) for _ in theory]
     if len(labels := [*labels, *theory]) > 1:
         figure.legend(handles, labels, loc="outside lower center", frameon=False, ncols=min(len(labels), 3))
-
-
-def _title(histories: Sequence[xr.Dataset], common: str, without_torque: Sequence[str]) -> str:
-    jobs = dict.fromkeys(one_line(dataset.attrs.get("job_name", "")) for dataset in histories)
-    lines = [f"Forces over the wrap: {', '.join(filter(None, jobs))}".rstrip(": "), common]
-    if without_torque:
-        lines.append(f"without torque, not drawn: {', '.join(without_torque)}")
-    return "\n".join(balanced(line, 76) for line in lines if line)

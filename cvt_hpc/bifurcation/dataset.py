@@ -4,46 +4,25 @@ from __future__ import annotations
 
 from collections.abc import Mapping, Sequence
 from enum import IntEnum
-from typing import TYPE_CHECKING, Any
+from typing import Any
 
 import numpy as np
 import xarray as xr
 
+from cvt_hpc.bifurcation.followed import OF_MODES, STRAND, Followed, Stability
 from cvt_hpc.bifurcation.job import LOAD, Diagram, load_attributes
-from cvt_hpc.models.linear_stability.branch import Branch, tracks
-from cvt_hpc.models.linear_stability.modes import Mode
-from cvt_hpc.models.steady_variator.forces import quantities
 from cvt_hpc.models.steady_variator.record import VARIABLES, coordinates
 from cvt_hpc.netcdf import CONTENT, DIAGRAM, attributes, flag_attributes, global_attributes
 from cvt_hpc.study.dimensions import axis_dimension, derived_coordinate
 from cvt_hpc.vibration.classes import OccurrenceClass
 from cvt_hpc.vibration.criticality import Kind
 
-if TYPE_CHECKING:
-    from cvt_hpc.bifurcation.followed import Followed
+_Numbered = Sequence[tuple[int, Followed]]
 
-    _Numbered = Sequence[tuple[int, Followed]]
-
-STRAND = "strand in which the mode is largest: 1 is t1, 2 is t2"
-OF_MODES = {  # attributes of a mode: value, unit, name for people, comment
-    "growth_rate": (lambda mode: mode.growth, "s-1", "growth rate", "of the mode"),
-    "frequency": (lambda mode: mode.frequency, "Hz", "frequency", "of the mode"),
-    "vibrating_strand": (lambda mode: mode.strand + 1, "1", "vibrating strand", STRAND),
-    "half_waves": (lambda mode: mode.half_waves, "1", "half waves", "of the mode along its vibrating strand"),
-}
 BRANCH = "number of the branch in the grid of the axes, counted in C order"
 OF_KIND = "why the Hopf point is found to be of its kind"
 START = "0: near the steady state; 1: the large disturbance"
 REASON = "why the run failed, or was found to vibrate or not"
-
-
-class Stability(IntEnum):
-    """Of a steady state."""
-
-    STABLE = 0
-    UNSTABLE = 1
-    NOT_FOUND = 2
-    NOT_COMPUTED = 3
 
 
 class Direction(IntEnum):
@@ -90,56 +69,35 @@ def diagram_dataset(
     subject = f"bifurcations of model {diagram.job.model}"
     told = {**global_attributes(diagram.job, diagram.resolved(), subject, makers=makers), CONTENT: DIAGRAM}
     rows = sorted(followed.items())
-    variables = _steady(diagram, rows) | _modes(diagram, rows) | _onsets(rows) | _runs(rows)
+    variables = _states(diagram, rows) | _onsets(rows) | _runs(rows)
     return xr.Dataset(variables, axes | labels, told)
 
 
-def _steady(diagram: Diagram, followed: _Numbered) -> dict[str, Any]:
-    """Numbers of the steady states over axes and load, and whether they are stable."""
-    sizes = {name: c.values.size for name, c in coordinates(diagram.job.parameters).items()}
-    grid, dims = _grid(diagram)
-    stability = np.full((len(diagram.branches), len(diagram.loads)), Stability.NOT_COMPUTED, np.int8)
-    stability[[row for row, _ in followed]] = Stability.NOT_FOUND
-    values = {v.name: np.full((*stability.shape, *(sizes[d] for d in v.dims)), np.nan) for v in VARIABLES}
-    for row, one in followed:
-        for point in one.branch.points:
-            place = row, diagram.loads.index(point.steady.load)
-            stability[place] = Stability.UNSTABLE if point.growth > 0.0 else Stability.STABLE
-            for name, value in quantities(point.steady, one.grid).items():
-                values[name][place] = value
-    told = {
-        v.name: ((*dims, *v.dims), values[v.name].reshape(*grid, *values[v.name].shape[2:]),
-                 attributes(v.long_name, v.units, v.comment))
-        for v in VARIABLES
-    }  # fmt: skip
+def _states(diagram: Diagram, followed: _Numbered) -> dict[str, Any]:
+    """Steady states and modes over axes and load, and whether the states are stable."""
+    axes = [(len(axis.values), axis.name) for axis in diagram.axes] + [(len(diagram.loads), "load")]
+    grid, dims = zip(*axes, strict=True)
+    states = [(number, one.states) for number, one in followed]
+
+    def over(name: str, shape: tuple[int, ...], blank: Any) -> np.ndarray:
+        array = np.full((len(diagram.branches), len(diagram.loads), *shape), blank)
+        for number, values in states:
+            if name in values:
+                array[number][tuple(map(slice, values[name].shape))] = values[name]
+        return array.reshape(*grid, *shape)
+
     flags = attributes("stability", comment="of the steady state") | flag_attributes(Stability)
-    return {"stability": (dims, stability.reshape(grid), flags)} | told
-
-
-def _modes(diagram: Diagram, followed: _Numbered) -> dict[str, Any]:
-    """Attributes of the modes over axes, load and mode."""
-    grid, dims = _grid(diagram)
-    lines = [(row, mode_lines(one.branch)) for row, one in followed]
-    most = max((len(of_one) for _, of_one in lines), default=0)
-    told = {}
-    for name, (value, *named) in OF_MODES.items():
-        array = np.full((len(diagram.branches), len(diagram.loads), most), np.nan)
-        for row, of_one in lines:
-            for column, line in enumerate(of_one):
-                for load, mode in line.items():
-                    array[row, diagram.loads.index(load), column] = value(mode)
-        told[name] = (*dims, "mode"), array.reshape(*grid, most), _named(*named)
+    told: dict[str, Any] = {
+        "stability": (dims, over("stability", (), np.int8(Stability.NOT_COMPUTED)), flags)
+    }
+    sizes = {name: c.values.size for name, c in coordinates(diagram.job.parameters).items()}
+    for v in VARIABLES:
+        array = over(v.name, tuple(sizes[dim] for dim in v.dims), np.nan)
+        told[v.name] = (*dims, *v.dims), array, attributes(v.long_name, v.units, v.comment)
+    most = max((values["growth_rate"].shape[1] for _, values in states), default=0)
+    for name, (_, *named) in OF_MODES.items():
+        told[name] = (*dims, "mode"), over(name, (most,), np.nan), attributes(*named)
     return told
-
-
-def mode_lines(branch: Branch) -> list[dict[float, Mode]]:
-    """Modes of a branch by load [N m], each followed as far as there are states; the most unstable first."""
-    lines = [
-        {piece[place].steady.load: mode for place, mode in track.items()}
-        for piece in branch.pieces()
-        for track in tracks(piece)
-    ]
-    return sorted(lines, key=lambda line: -max(mode.growth for mode in line.values()))
 
 
 def _onsets(followed: _Numbered) -> dict[str, Any]:
@@ -149,13 +107,14 @@ def _onsets(followed: _Numbered) -> dict[str, Any]:
         for number, one in followed
         for onset, kind in zip(one.onsets, one.kinds, strict=True)
     ]
-    columns = {
+    sides = [Direction.GROWS_ABOVE if o.rising else Direction.GROWS_BELOW for _, o, _ in rows]
+    columns: dict[str, tuple[list[Any], Any, str, str, str]] = {
         "onset_branch": ([n for n, *_ in rows], np.int32, "1", "branch", BRANCH),
         "onset_load": ([o.load for _, o, _ in rows], float, "N m", "onset load", "load at the Hopf point"),
-        "onset_frequency": ([o.mode.frequency for _, o, _ in rows], float, "Hz", "onset frequency",
+        "onset_frequency": ([o.frequency for _, o, _ in rows], float, "Hz", "onset frequency",
                             "frequency of the mode whose growth rate is 0 at the Hopf point"),
-        "onset_strand": ([o.mode.strand + 1 for _, o, _ in rows], np.int8, "1", "vibrating strand", STRAND),
-        "onset_half_waves": ([o.mode.half_waves for _, o, _ in rows], np.int8, "1", "half waves",
+        "onset_strand": ([o.strand + 1 for _, o, _ in rows], np.int8, "1", "vibrating strand", STRAND),
+        "onset_half_waves": ([o.half_waves for _, o, _ in rows], np.int8, "1", "half waves",
                              "of the mode along its vibrating strand"),
         "onset_others": ([o.others for _, o, _ in rows], np.int8, "1", "other growing modes",
                          "number of them; 0: stability is lost or regained at this Hopf point"),
@@ -163,60 +122,34 @@ def _onsets(followed: _Numbered) -> dict[str, Any]:
                              "from the Hopf point to where vibration from the large start ends"),
         "hysteresis_error": ([k.error for *_, k in rows], float, "N m", "error of the hysteresis width",
                              "half the spacing of runs there, and the Hopf point's own error"),
+        "onset_direction": (sides, Direction, "", "side of growth",
+                            "whether the mode grows above or below the Hopf point"),
+        "onset_kind": ([k.kind for *_, k in rows], Kind, "", "kind of Hopf point", ""),
+        "onset_reason": ([k.reason for *_, k in rows], object, "", "reason", OF_KIND),
     }  # fmt: skip
-    told = {
-        name: ("onset", np.array(values, dtype), _named(*named))
-        for name, (values, dtype, *named) in columns.items()
-    }
-    directions = [Direction.GROWS_ABOVE if o.rising else Direction.GROWS_BELOW for _, o, _ in rows]
-    told["onset_direction"] = (
-        "onset",
-        np.array(directions, np.int8),
-        attributes("side of growth", comment="whether the mode grows above or below the Hopf point")
-        | flag_attributes(Direction),
-    )
-    kinds = np.array([kind.kind for *_, kind in rows], np.int8)
-    told["onset_kind"] = "onset", kinds, attributes("kind of Hopf point") | flag_attributes(Kind)
-    reasons = np.array([kind.reason for *_, kind in rows], object)
-    told["onset_reason"] = (
-        "onset",
-        reasons,
-        attributes("reason", comment=OF_KIND),
-    )
-    return told
+    return {name: ("onset", *_column(*column)) for name, column in columns.items()}
 
 
 def _runs(followed: _Numbered) -> dict[str, Any]:
     """The runs of all branches, one after the other."""
     rows = [(number, run) for number, one in followed for run in one.runs]
-    columns = {
+    columns: dict[str, tuple[list[Any], Any, str, str, str]] = {
         "run_branch": ([n for n, _ in rows], np.int32, "1", "branch", BRANCH),
         "run_load": ([run.value for _, run in rows], float, "N m", "load", LOAD),
         "run_start": ([run.start for _, run in rows], np.int8, "1", "start", START),
         "run_amplitude": ([run.amplitude for _, run in rows], float, "m", "amplitude", "in the band"),
         "run_frequency": ([run.frequency for _, run in rows], float, "Hz", "dominant frequency", ""),
-    }
-    told = {
-        name: ("run", np.array(values, dtype), _named(*named))
-        for name, (values, dtype, *named) in columns.items()
-    }
-    classes = np.array([run.occurrence for _, run in rows], np.int8)
-    told["run_occurrence"] = (
-        "run",
-        classes,
-        attributes("vibration occurrence") | flag_attributes(OccurrenceClass),
-    )
-    reasons = np.array([run.reason for _, run in rows], object)
-    told["run_reason"] = "run", reasons, attributes("reason", comment=REASON)
-    return told
+        "run_occurrence": ([run.occurrence for _, run in rows], OccurrenceClass, "", "vibration occurrence",
+                           ""),
+        "run_reason": ([run.reason for _, run in rows], object, "", "reason", REASON),
+    }  # fmt: skip
+    return {name: ("run", *_column(*column)) for name, column in columns.items()}
 
 
-def _grid(diagram: Diagram) -> tuple[tuple[int, ...], tuple[str, ...]]:
-    """Lengths and names of the dimensions of a steady state."""
-    axes = [(len(axis.values), axis.name) for axis in diagram.axes] + [(len(diagram.loads), "load")]
-    lengths, names = zip(*axes, strict=True)
-    return lengths, names
-
-
-def _named(units: str, long_name: str, comment: str) -> dict[str, str]:
-    return attributes(long_name, units, comment)
+def _column(
+    values: list[Any], kind: Any, units: str, long_name: str, comment: str
+) -> tuple[np.ndarray, dict[str, Any]]:
+    """Return values, and attributes, of a type of numpy or of flags."""
+    is_flag = isinstance(kind, type) and issubclass(kind, IntEnum)
+    flags = flag_attributes(kind) if is_flag else {}
+    return np.array(values, np.int8 if is_flag else kind), attributes(long_name, units, comment) | flags

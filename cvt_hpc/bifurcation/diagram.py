@@ -15,9 +15,9 @@ from cvt_hpc.bifurcation.costs import predicted_cost
 from cvt_hpc.bifurcation.dataset import diagram_dataset
 from cvt_hpc.bifurcation.drawing import draw_branch
 from cvt_hpc.bifurcation.folder import DiagramFolder, picture_names
-from cvt_hpc.bifurcation.followed import Followed
+from cvt_hpc.bifurcation.followed import Followed, states_of
 from cvt_hpc.bifurcation.job import Asked, Diagram
-from cvt_hpc.bifurcation.kinds import kinds_of, lowest_judged
+from cvt_hpc.bifurcation.kinds import lowest_judged, with_kinds
 from cvt_hpc.files import written_aside
 from cvt_hpc.linear_algebra import one_thread
 from cvt_hpc.models.elastic_belt.belt import State, mesh
@@ -117,9 +117,9 @@ def _follow(diagram: Diagram, asked: Asked) -> Followed:
         small, large = ({"disturbance": size} for size in diagram.disturbance)
         # the load that rises within tens of milliseconds is itself a large disturbance
         starts = (Start(small, partial(_steady_state, belt, found)), Start(large))
-        places = [onset.load for onset in hopf if onset.mode.frequency >= lowest_judged(asked)]
+        places = [onset.load for onset in hopf if onset.frequency >= lowest_judged(asked)]
         runs = attractors(asked.runs, "load", starts, diagram.loads, places, diagram.resolution)
-    return Followed(asked, grid, found, hopf, hidden, runs, kinds_of(diagram, asked, hopf, hidden, runs))
+    return with_kinds(diagram, asked, states_of(found, grid, diagram.loads), hopf, hidden, runs)
 
 
 def _steady_state(belt: SteadyBelt, found: Branch, load: float) -> State | None:

@@ -8,7 +8,6 @@ steady state nothing is drawn. Runs that failed or slip have no limit cycle: the
 from __future__ import annotations
 
 from pathlib import Path
-from typing import TYPE_CHECKING
 
 import numpy as np
 from matplotlib.axes import Axes
@@ -18,15 +17,12 @@ from matplotlib.patches import Patch
 
 from cvt_hpc.analysis.figures import WIDTH, balanced, coordinate_unit, draw
 from cvt_hpc.bifurcation.attractors import FROM, Attractor
-from cvt_hpc.bifurcation.dataset import mode_lines
+from cvt_hpc.bifurcation.followed import OF_MODES, Followed, Stability
 from cvt_hpc.bifurcation.job import Diagram, load_attributes
 from cvt_hpc.bifurcation.table import gap_lines, place_text
-from cvt_hpc.models.linear_stability.branch import Onset, Point
+from cvt_hpc.models.linear_stability.branch import Onset
 from cvt_hpc.vibration.classes import OccurrenceClass
 from cvt_hpc.vibration.criticality import Kind
-
-if TYPE_CHECKING:
-    from cvt_hpc.bifurcation.followed import Followed
 
 STRANDS = ("#0072b2", "#d55e00")  # t1 and t2
 HOPF, GAP = "#c00000", "#e6e6e6"
@@ -57,9 +53,9 @@ def branch_figure(diagram: Diagram, followed: Followed) -> Figure:
     scale, unit = coordinate_unit(load_attributes(diagram.job))
     _draw_attractors(upper, followed, scale)
     _draw_modes(middle, lower, followed, scale)
-    loads = np.array(diagram.loads)
+    loads = followed.states["load"]
     for axes in (upper, middle, lower):
-        for low, high in _gaps(loads, followed):
+        for low, high in _gaps(loads, followed.missed):
             axes.axvspan(scale * low, scale * high, color=GAP, linewidth=0, zorder=0)
         for onset in followed.onsets:
             axes.axvline(scale * onset.load, color=HOPF, linewidth=0.8, linestyle=":", zorder=1)
@@ -72,13 +68,15 @@ def branch_figure(diagram: Diagram, followed: Followed) -> Figure:
     return figure
 
 
-def stable_parts(piece: list[Point], onsets: list[Onset]) -> list[tuple[float, float, bool]]:
-    """Loads between which the states of a piece are stable, or not.
+def stable_parts(loads: np.ndarray, is_stable: bool, onsets: list[Onset]) -> list[tuple[float, float, bool]]:
+    """Loads between which steady states are stable, or not.
 
     Parameters
     ----------
-    piece : list of Point
-        Without a gap between them.
+    loads : array, shape (n,)
+        Ascending, without a gap between them [N m].
+    is_stable : bool
+        Whether the state under the first one is stable.
     onsets : list of Onset
         Hopf points of the branch, except those of states that are unstable anyway.
 
@@ -87,18 +85,19 @@ def stable_parts(piece: list[Point], onsets: list[Onset]) -> list[tuple[float, f
     list of (float, float, bool)
         From one load to another [N m], and whether states are stable there.
     """
-    first, last = piece[0].steady.load, piece[-1].steady.load
+    first, last = loads[0], loads[-1]
     turns = [onset for onset in onsets if first < onset.load < last and not onset.others]
     ends = [first, *(onset.load for onset in turns), last]
-    stable = [turns[0].rising if turns else piece[0].growth <= 0.0]
+    stable = [turns[0].rising if turns else is_stable]
     stable += [not onset.rising for onset in turns]
     return list(zip(ends[:-1], ends[1:], stable, strict=True))
 
 
 def _draw_attractors(axes: Axes, followed: Followed, scale: float) -> None:
     """The steady state, its Hopf points, and the results of runs, over `scale` times the load."""
-    for piece in followed.branch.pieces():
-        for low, high, stable in stable_parts(piece, followed.onsets):
+    loads, is_stable = followed.states["load"], followed.states["stability"] == Stability.STABLE
+    for piece in np.ma.clump_unmasked(np.ma.array(loads, mask=followed.missed)):
+        for low, high, stable in stable_parts(loads[piece], is_stable[piece][0], followed.onsets):
             style = "-" if stable else (0, (4, 3))
             ends = [scale * low, scale * high]
             axes.plot(ends, [0.0, 0.0], color="black", linewidth=1.8, linestyle=style, clip_on=False)
@@ -146,16 +145,19 @@ def _at_edge(followed: Followed) -> list[Attractor]:
 def _draw_modes(growth: Axes, frequency: Axes, followed: Followed, scale: float) -> None:
     """Growth rate and frequency of the modes over `scale` times the load, unstable ones drawn thick."""
     growth.axhline(0.0, color="black", linewidth=0.8)
-    for line in mode_lines(followed.branch):
-        loads, modes = [scale * load for load in line], list(line.values())
-        leading = max(modes, key=lambda mode: mode.growth)
-        style = {"color": STRANDS[leading.strand], "marker": ".", "markersize": 4.0}
-        style["linewidth"] = 1.8 if leading.growth > 0.0 else 0.8
-        growth.plot(loads, [mode.growth for mode in modes], **style)
-        frequency.plot(loads, [mode.frequency for mode in modes], **style)
-        if leading.growth > 0.0:
-            at = loads[modes.index(leading)], leading.frequency
-            frequency.annotate(_waves(leading.half_waves), at, (0, 5), textcoords="offset points", fontsize=8)
+    values = [followed.states[name].T for name in OF_MODES]
+    for line in zip(*values, strict=True):
+        there = np.isfinite(line[0])
+        loads = scale * followed.states["load"][there]
+        rates, frequencies, strands, waves = (value[there] for value in line)
+        leading = rates.argmax()
+        style = {"color": STRANDS[int(strands[leading]) - 1], "marker": ".", "markersize": 4.0}
+        style["linewidth"] = 1.8 if rates[leading] > 0.0 else 0.8
+        growth.plot(loads, rates, **style)
+        frequency.plot(loads, frequencies, **style)
+        if rates[leading] > 0.0:
+            at, told = (loads[leading], frequencies[leading]), _waves(int(waves[leading]))
+            frequency.annotate(told, at, (0, 5), textcoords="offset points", fontsize=8)
     growth.set_ylabel("growth rate [1/s]")
     frequency.set_ylabel("frequency [Hz]")
 
@@ -164,15 +166,11 @@ def _waves(count: int) -> str:
     return f"{count} half wave{'s' if count > 1 else ''}"
 
 
-def _gaps(loads: np.ndarray, followed: Followed) -> list[tuple[float, float]]:
+def _gaps(loads: np.ndarray, missed: np.ndarray) -> list[tuple[float, float]]:
     """Loads between which there is no steady state: from the last load with a state to the next."""
-    found = np.array([point.steady.load for point in followed.branch.points])
-    gaps = []
-    for load in sorted(followed.branch.missed):
-        low, high = found[found < load].max(initial=loads[0]), found[found > load].min(initial=loads[-1])
-        if (low, high) not in gaps:
-            gaps.append((float(low), float(high)))
-    return gaps
+    gaps = np.ma.clump_masked(np.ma.array(loads, mask=missed))
+    last = len(loads) - 1
+    return [(loads[max(gap.start - 1, 0)], loads[min(gap.stop, last)]) for gap in gaps]
 
 
 def _legend(followed: Followed) -> list[Line2D | Patch]:
@@ -203,6 +201,6 @@ def _legend(followed: Followed) -> list[Line2D | Patch]:
         Line2D([], [], color=colour, marker=".", label=f"mode of strand t{k}")
         for k, colour in enumerate(STRANDS, 1)
     ]
-    if followed.branch.missed:
+    if followed.missed.any():
         handles.append(Patch(color=GAP, label="no steady state found"))
     return handles

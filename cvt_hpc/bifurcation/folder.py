@@ -2,7 +2,6 @@
 
 from __future__ import annotations
 
-import hashlib
 import json
 import logging
 import re
@@ -13,20 +12,20 @@ from typing import Any
 
 import numpy as np
 
-from cvt_hpc.archives import Archives
-from cvt_hpc.bifurcation.dataset import Stability
-from cvt_hpc.bifurcation.followed import Followed
-from cvt_hpc.bifurcation.job import Diagram
-from cvt_hpc.bifurcation.kept import packed, unpacked
+from cvt_hpc.archives import Archives, Arrays
+from cvt_hpc.bifurcation.attractors import Attractor
+from cvt_hpc.bifurcation.followed import Followed, Stability
+from cvt_hpc.bifurcation.job import Diagram, fingerprint_of, numbers_of
+from cvt_hpc.bifurcation.kinds import with_kinds
 from cvt_hpc.files import kind_of
+from cvt_hpc.models.linear_stability.branch import Onset
 from cvt_hpc.netcdf import DIAGRAM, holds, open_netcdf
 from cvt_hpc.output_folder import Kind, OutputFolder
 from cvt_hpc.study.job_difference import another_job
 
 DATASET = "branch.nc"
-LABELS = ("name", "description")  # of a job, without effect on any number
 _PICTURE = re.compile(r"branch(?:_([1-9]\d{0,8}))?\.png", re.ASCII)
-_LIMIT = 1 << 28  # [bytes] of a branch; one of 20 loads at 160 stations has 3.4 MB
+_LIMIT = 1 << 26  # [bytes] of a branch; one of 20 loads has some 10 kB
 _DAMAGE = (AttributeError, KeyError, OSError, RecursionError, RuntimeError, TypeError, ValueError)
 _logger = logging.getLogger(__name__)
 
@@ -57,17 +56,28 @@ class DiagramFolder(OutputFolder[Diagram]):
     def __init__(self, path: Path, diagram: Diagram) -> None:
         super().__init__(path)
         self.dataset = self.path / DATASET
-        self.branches = Archives(self.path / "branches", _fingerprint(diagram), _LIMIT)
+        self.branches = Archives(self.path / "branches", diagram.fingerprint(), _LIMIT)
         self._diagram = diagram
 
     def load_branch(self, number: int) -> Followed | None:
         """Return branch `number`, counted from 0; None if it is not done, or cannot be read."""
-        diagram, asked = self._diagram, self._diagram.branches[number]
-        return self.branches.load(f"branch_{number + 1}", lambda _, arrays: unpacked(diagram, asked, arrays))
+
+        def restored(plain: Any, states: Arrays) -> Followed:
+            if plain is None:
+                raise ValueError("of an earlier version")
+            onsets, runs = (
+                [Onset(*one) for one in plain["onsets"]],
+                [Attractor(*run) for run in plain["runs"]],
+            )
+            asked = self._diagram.branches[number]
+            return with_kinds(self._diagram, asked, states, onsets, plain["hidden"], runs)
+
+        return self.branches.load(f"branch_{number + 1}", restored)
 
     def save_branch(self, number: int, followed: Followed) -> None:
         """Keep branch `number`."""
-        self.branches.save(f"branch_{number + 1}", None, packed(followed))
+        plain = {"onsets": followed.onsets, "hidden": followed.hidden, "runs": followed.runs}
+        self.branches.save(f"branch_{number + 1}", plain, followed.states)
 
     def stored_branches(self) -> int:
         """Return how many branches the dataset holds, 0 where none can be read."""
@@ -81,34 +91,15 @@ class DiagramFolder(OutputFolder[Diagram]):
             _logger.warning("%s: damaged (%s); made again", self.dataset, error)
             return 0
 
-    def read_job(self) -> dict[str, Any] | None:
-        """Return the content of branch.json, or the dataset of an earlier version, which had no such file."""
-        found = super().read_job()
-        if found is None and kind_of(self.dataset) is not None:
-            self.is_signed = False
-            found = self._job_of_dataset()
-        return found
-
-    def document(self, content: Diagram) -> dict[str, Any]:
-        """Return the content of a diagram's branch.json."""
-        return {"fingerprint": _fingerprint(content), "job": content.resolved()}
-
-    def accept(self, entry: dict[str, Any]) -> dict[str, Any]:
-        """Return a sound branch.json."""
-        if not isinstance(entry["fingerprint"], str) or not entry["job"]["axes"].keys():
-            raise ValueError("no axes")
-        return entry
-
     def refuse_other(self, found: dict[str, Any], asked: Diagram) -> None:
         """Raise InputError unless the folder is that of the diagram."""
-        there, here = _numbers(found["job"]), _numbers(asked.resolved())
-        if there != here:
-            raise another_job(self.path, there, here)
+        if found["fingerprint"] != asked.fingerprint():
+            raise another_job(self.path, numbers_of(found["job"]), numbers_of(asked.resolved()))
 
     def unexplained(self) -> str | None:
         """Return files that neither a branch.json nor a dataset explains."""
         if kind_of(self.dataset):
-            return f"{DATASET}, which is no such diagram"
+            return f"{DATASET} without a {self.job_file.name}"
         return f"branches without a {self.job_file.name}" if self.branches.written() else None
 
     def results_tell(self) -> Callable[[Diagram], bool] | None:
@@ -116,16 +107,12 @@ class DiagramFolder(OutputFolder[Diagram]):
 
         None, too, if the dataset is something else, which is not to be written over.
         """
-        found = self._job_of_dataset()
-        if found is None and kind_of(self.dataset) is not None:
+        stored, fingerprints = self._job_of_dataset(), self.branches.fingerprints()
+        if stored is not None:
+            fingerprints.add(fingerprint_of(stored))
+        elif kind_of(self.dataset) is not None:
             return None
-        stored = None if found is None else _numbers(found["job"])
-        fingerprints = self.branches.fingerprints()
-        if stored is None and not fingerprints:
-            return None
-        return lambda diagram: (
-            stored in (None, _numbers(diagram.resolved())) and fingerprints <= {_fingerprint(diagram)}
-        )
+        return (lambda diagram: fingerprints == {diagram.fingerprint()}) if fingerprints else None
 
     def written(self, found: dict[str, Any] | None) -> Iterator[Path]:
         """Yield the files of a diagram: branches, dataset, and pictures of as many branches as it has."""
@@ -147,19 +134,9 @@ class DiagramFolder(OutputFolder[Diagram]):
         return self.dataset
 
     def _job_of_dataset(self) -> dict[str, Any] | None:
+        """Return the job of the dataset; None where there is none, or another dataset."""
         try:
             with open_netcdf(self._stored(), decode_cf=False) as dataset:
-                return self.accept({"fingerprint": "", "job": json.loads(dataset.attrs["job"])})
+                return dict(json.loads(dataset.attrs["job"]))
         except _DAMAGE:
             return None
-
-
-def _fingerprint(diagram: Diagram) -> str:
-    """Return the SHA-256 [hex] of all entries that determine the numbers of a diagram."""
-    numbers = json.dumps(_numbers(diagram.resolved()), sort_keys=True)
-    return hashlib.sha256(numbers.encode()).hexdigest()
-
-
-def _numbers(job: dict[str, Any]) -> dict[str, Any]:
-    """Return a resolved job without the entries that have no effect on any number."""
-    return {key: value for key, value in job.items() if key not in LABELS}

@@ -2,6 +2,8 @@
 
 from __future__ import annotations
 
+import hashlib
+import json
 from dataclasses import dataclass
 from itertools import product
 from pathlib import Path
@@ -90,6 +92,20 @@ class Diagram:
             "set": self.settings,
         }
         return {**self.job.resolved(), "branch": table}
+
+    def fingerprint(self) -> str:
+        """Return the SHA-256 [hex] of all entries that determine the numbers."""
+        return fingerprint_of(self.resolved())
+
+
+def fingerprint_of(job: dict[str, Any]) -> str:
+    """Return the fingerprint of a diagram by the result of `Diagram.resolved`."""
+    return hashlib.sha256(json.dumps(numbers_of(job), sort_keys=True).encode()).hexdigest()
+
+
+def numbers_of(job: dict[str, Any]) -> dict[str, Any]:
+    """Return a resolved job without the entries that have no effect on any number."""
+    return {key: value for key, value in job.items() if key not in ("name", "description")}
 
 
 def load_attributes(job: Job) -> dict[str, Any]:

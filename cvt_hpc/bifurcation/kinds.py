@@ -7,7 +7,9 @@ from functools import partial
 
 import numpy as np
 
+from cvt_hpc.archives import Arrays
 from cvt_hpc.bifurcation.attractors import Attractor
+from cvt_hpc.bifurcation.followed import Followed
 from cvt_hpc.bifurcation.job import Asked, Diagram
 from cvt_hpc.bifurcation.table import load_text
 from cvt_hpc.models.linear_stability.branch import CLOSE, Onset
@@ -29,24 +31,28 @@ def lowest_judged(asked: Asked) -> float:
     return SEEN * float(asked.parameters["band_low"])
 
 
-def kinds_of(
+def with_kinds(
     diagram: Diagram,
     asked: Asked,
+    states: Arrays,
     hopf: list[Onset],
     hidden: list[tuple[float, float]],
     runs: list[Attractor],
-) -> list[Criticality]:
-    """Whether Hopf points of a branch are super- or subcritical, with loads in the unit of the job.
+) -> Followed:
+    """A branch with the kinds of its Hopf points, super- or subcritical, with loads in the unit of the job.
 
     Parameters
     ----------
     diagram, asked : Diagram, Asked
         The diagram, and the branch of it.
+    states : dict of array
+        As of `states_of`.
     hopf, hidden, runs
         As `judged` takes them.
     """
     lowest, in_words = lowest_judged(asked), partial(load_text, diagram)
-    return [judged(onset, hopf, hidden, runs, lowest, in_words) for onset in hopf]
+    kinds = [judged(onset, hopf, hidden, runs, lowest, in_words) for onset in hopf]
+    return Followed(asked, states, hopf, hidden, runs, kinds)
 
 
 def judged(
@@ -74,7 +80,7 @@ def judged(
     """
     if not runs:
         return Criticality(Kind.UNDECIDED, np.nan, np.nan, "no runs were asked for")
-    if onset.mode.frequency < lowest:
+    if onset.frequency < lowest:
         return Criticality(Kind.UNDECIDED, np.nan, np.nan, "its mode lies below the band of runs")
     if onset.others:
         return Criticality(Kind.UNDECIDED, np.nan, np.nan, "the steady state is unstable on both sides")
@@ -84,9 +90,7 @@ def judged(
     # on the stable side the steady state ends to be stable at the next mode, whatever its frequency
     ends = [load for ends in hidden for load in ends if (load < onset.load) == onset.rising]
     for other in hopf:
-        if other is not onset and (
-            other.mode.frequency >= lowest or (other.load < onset.load) == onset.rising
-        ):
+        if other is not onset and (other.frequency >= lowest or (other.load < onset.load) == onset.rising):
             ends.append(other.load)
     return criticality(
         onset.load,

@@ -48,11 +48,10 @@ def onset_lines(diagram: Diagram, followed: Followed) -> Iterator[str]:
     """Yield a line for each Hopf point."""
     along = load_attributes(diagram.job)
     for onset, kind in zip(followed.onsets, followed.kinds, strict=True):
-        mode = onset.mode
-        waves = f"{mode.half_waves} half wave{'s' if mode.half_waves > 1 else ''} in t{mode.strand + 1}"
+        waves = f"{onset.half_waves} half wave{'s' if onset.half_waves > 1 else ''} in t{onset.strand + 1}"
         yield (
             f"Hopf point at {number_within(onset.load, CLOSE, along)} {shown_unit(along)}, "
-            f"{mode.frequency:.0f} Hz, {waves}: {_direction(onset)}; {kind_text(diagram, kind)}"
+            f"{onset.frequency:.0f} Hz, {waves}: {_direction(onset)}; {kind_text(diagram, kind)}"
         )
 
 
@@ -78,8 +77,7 @@ def kind_text(diagram: Diagram, kind: Criticality) -> str:
 
 def gap_lines(diagram: Diagram, followed: Followed) -> Iterator[str]:
     """Yield the lines that state where states were not found, and where stability changes unseen."""
-    missed = sorted(followed.branch.missed)
-    if missed:
+    if missed := followed.states["load"][followed.missed].tolist():
         yield f"no steady state found at {load_text(diagram, *missed, most=len(missed))}"
     for low, high in followed.hidden:
         between = f"{load_number(diagram, low)} and {load_text(diagram, high)}"

@@ -31,7 +31,7 @@ def check_prospects(chart: Chart) -> None:
         if scene.lead is not None:
             _check_lead(point, where)
     for point in chart.points:
-        most = most_lanes(point.job.model, point.job.stepper, point.parameters(0))
+        most = most_lanes(point.job)
         if point.lanes > most:
             where = f"{chart.source}: [chart.methods.{point.series}] lanes"
             raise mismatch(where, f"at most {most} with stepper {point.job.stepper}", f"{point.lanes}")

@@ -77,6 +77,11 @@ class Comparison:
     shown: tuple[str, ...]
     verdict: str
 
+    @property
+    def results(self) -> tuple[Result, ...]:
+        """All results: of the reference, of the methods, of the choices."""
+        return (self.reference, *self.methods, *self.choices)
+
 
 def compare(chart: Chart, measurements: Mapping[str, Measurement]) -> tuple[Comparison, ...]:
     """Return the results of all scenes.

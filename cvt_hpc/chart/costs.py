@@ -7,7 +7,7 @@ from collections.abc import Iterator
 
 from cvt_hpc.chart.measuring import LONG
 from cvt_hpc.chart.plan import Chart, Point
-from cvt_hpc.chart.timed_runs import most_lanes
+from cvt_hpc.chart.timed_runs import lanes_of
 from cvt_hpc.job import Job
 from cvt_hpc.job.summary import core_time_in_words
 from cvt_hpc.models.contract import load_model
@@ -32,9 +32,7 @@ def predicted_cost(chart: Chart, point: Point) -> float:
     if not load_model(point.job.model).is_recorded:
         return math.nan
     scene = chart.scene(point.scene)
-    most = most_lanes(point.job.model, point.job.stepper, point.parameters(0))
-    lanes = point.lanes or min(most, point.starts)
-    batches = math.ceil(point.starts / lanes)
+    batches = math.ceil(point.starts / lanes_of(point))
     first = _march_cost(point.job, point.until)
     if point.timed:
         first = min(first, chart.time_limit, scene.time_limit)

@@ -38,7 +38,7 @@ def chart_dataset(
     Dataset
         Along the dimension `point`.
     """
-    rows = [r for c in comparisons for r in (c.reference, *c.methods, *c.choices)]
+    rows = [result for comparison in comparisons for result in comparison.results]
     variables: dict[str, Any] = _descriptions(rows) | _costs(rows)
     for name in KINDS:
         if not any(name in row.errors for row in rows):
@@ -78,23 +78,13 @@ def _descriptions(rows: Sequence[Result]) -> dict[str, Any]:
 
 
 def _costs(rows: Sequence[Result]) -> dict[str, Any]:
+    found = [row.measurement for row in rows]
+    least, first = f"of methods the least of all repeats; {VOLATILE}", f"of the first pass; {VOLATILE}"
     variables = {
-        "core_seconds_per_simulated_second": _along(
-            [row.measurement.cost for row in rows],
-            "1",
-            "cost of a run",
-            f"of methods the least of all repeats; {VOLATILE}",
-        ),
-        "core_seconds": _along(
-            [row.measurement.core_seconds for row in rows],
-            "s",
-            "processor time",
-            f"of the first pass; {VOLATILE}",
-        ),
-        "simulated_seconds": _along(
-            [row.measurement.simulated for row in rows], "s", "simulated time", "of a run"
-        ),
-        "starts": _along([float(row.point.starts) for row in rows], "1", "starts", "number of pooled runs"),
+        "core_seconds_per_simulated_second": _along([m.cost for m in found], "1", "cost of a run", least),
+        "core_seconds": _along([m.core_seconds for m in found], "s", "processor time", first),
+        "simulated_seconds": _along([m.simulated for m in found], "s", "simulated time", "of a run"),
+        "starts": _along([row.point.starts for row in rows], "1", "starts", "number of pooled runs"),
     }
     for name in dict.fromkeys(name for row in rows for name in row.measurement.counters):
         counts = [row.measurement.counters.get(name, np.nan) for row in rows]

@@ -4,34 +4,25 @@ from __future__ import annotations
 
 import math
 
-from cvt_hpc.parameters import Parameter
+from cvt_hpc.parameters import Parameter, positive
 
 CHART = {
     "repeats": Parameter(3, "", "how often a quick run is timed; the shortest time counts", minimum=1),
-    "time_limit": Parameter(
-        300.0,
-        "s",
-        "core-seconds after which a run is given up",
-        minimum=0.0,
-        exclusive=True,
-        sensible=(0.01, 100000.0),
+    "time_limit": positive(
+        300.0, "s", "core-seconds after which a run is given up", sensible=(0.01, 100000.0)
     ),
 }
 LEAD = {
     "stepper": Parameter(None, "", "stepper"),
-    "until": Parameter(
-        None, "s", "when the methods take over", minimum=0.0, exclusive=True, sensible=(1e-05, 1000.0)
-    ),
+    "until": positive(None, "s", "when the methods take over", sensible=(1e-05, 1000.0)),
 }
 SCENE = {
-    "time_limit": Parameter(
+    "time_limit": positive(
         math.inf,
         "s",
         "core-seconds after which a run of this scene is given up, where the chart allows more",
-        minimum=0.0,
-        exclusive=True,
-        allow_infinite=True,
         sensible=(0.01, 100000.0),
+        allow_infinite=True,
     ),
     "title": Parameter("", "", "heading of the scene's picture"),
     "model": Parameter(

@@ -2,14 +2,12 @@
 
 from __future__ import annotations
 
-from collections.abc import Iterator, Mapping
 from pathlib import Path
-from typing import Any
 
 from cvt_hpc.chart.declarations import CHART
 from cvt_hpc.chart.plan import Chart, Point
 from cvt_hpc.chart.points import budget_points, method_points, reference_points
-from cvt_hpc.chart.scenes import Stage, read_stage
+from cvt_hpc.chart.scenes import read_stage
 from cvt_hpc.errors import InputError, mismatch
 from cvt_hpc.job.assignments import Assignments, split_assignments
 from cvt_hpc.job.definition import HEADER
@@ -53,28 +51,15 @@ def load_chart(path: str | Path, overrides: Assignments = ()) -> Chart:
     settings = read_table(CHART, table, where, ("scenes", "methods", "budget"))
     scenes = read_tables(table.get("scenes"), f"{where} scenes", "scenes")
     stages = [read_stage(name, raw, document, replaced, source) for name, raw in scenes.items()]
-    points = [*_references(scenes, stages), *_methods(table.get("methods"), stages, source)]
+    points: list[Point] = []
+    for stage, raw in zip(stages, scenes.values(), strict=True):
+        points += reference_points(stage, raw.get("reference"))
+    for name, raw in read_tables(table.get("methods"), f"{where} methods", "methods").items():
+        points += method_points(name, raw, stages, f"{source}: [chart.methods.{name}]")
     budgeted: tuple[str, ...] = ()
     if "budget" in table:
         choices, budgeted = budget_points(table["budget"], stages, f"{source}: [chart.budget]")
         points += choices
-    job = points[0].job
-    return Chart(
-        job.name,
-        job.description,
-        source,
-        tuple(stage.scene for stage in stages),
-        tuple(points),
-        **settings,
-        budgeted=budgeted,
-    )
-
-
-def _references(scenes: Mapping[str, Any], stages: list[Stage]) -> Iterator[Point]:
-    for stage, raw in zip(stages, scenes.values(), strict=True):
-        yield from reference_points(stage, raw.get("reference"))
-
-
-def _methods(raw: Any, stages: list[Stage], source: str) -> Iterator[Point]:
-    for name, table in read_tables(raw, f"{source}: [chart] methods", "methods").items():
-        yield from method_points(name, table, stages, f"{source}: [chart.methods.{name}]")
+    job, chosen = points[0].job, tuple(stage.scene for stage in stages)
+    head = job.name, job.description, source
+    return Chart(*head, chosen, tuple(points), **settings, budgeted=budgeted)

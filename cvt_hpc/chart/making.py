@@ -87,8 +87,7 @@ def make_chart(
         measurements = _fill(chart, folder, processes or len(os.sched_getaffinity(0)), tell)
         comparisons = compare(chart, measurements)
         dataset = chart_dataset(chart, comparisons, folder.points.makers)
-        with written_aside(folder.table) as aside:
-            write_table(comparisons, dataset.attrs, aside)
+        write_table(comparisons, dataset.attrs, folder.table)
         with written_aside(folder.dataset) as aside:
             write_netcdf(dataset, aside)
         pictures = [draw_scene(c, folder.picture(c.scene.name)) for c in comparisons]

@@ -11,7 +11,7 @@ from numpy.typing import NDArray
 
 from cvt_hpc.chart.plan import Point, Scene, start_parameters
 from cvt_hpc.chart.quantities import History, observe, strand_of
-from cvt_hpc.chart.timed_runs import Marched, lead, march, most_lanes, warm_up
+from cvt_hpc.chart.timed_runs import Marched, lanes_of, march, most_lanes, warm_up
 from cvt_hpc.models.contract import Failure, Run, load_model
 from cvt_hpc.variables import Status
 
@@ -63,22 +63,21 @@ def measure(point: Point, scene: Scene, repeats: int, time_limit: float) -> Meas
     """
     if scene.exact and point.series == "exact":
         return _exact(point, scene)
-    model, stepper = point.job.model, point.job.stepper
-    lanes = point.lanes or min(most_lanes(model, stepper, point.parameters(0)), point.starts)
+    job, lanes = point.job, lanes_of(point)
     # costs are those of full lanes: further starts, if needed, count for the time alone
     runs = math.ceil(point.starts / lanes) * lanes if point.timed else point.starts
     points = [point.parameters(k) for k in range(runs)]
-    warm_up(model, stepper, points[:lanes])
+    warm_up(job, points[:lanes])
     led = _led(point, scene, runs)
     for run in led:
         if run.failure is not None:
             return Measurement(f"{_explained(run, run.failure)}, before the method takes over")
-    marched = march(model, stepper, points, lanes, point.until, time_limit, led)
+    marched = march(job, points, lanes, point.until, time_limit, led)
     reason, values = _outcome(point, scene, marched)
     cost = marched.cost
     if point.timed and not reason:
         again = repeats if marched.core_seconds < LONG * runs / lanes else 0
-        costs = [march(model, stepper, points, lanes, point.until, led=led).cost for _ in range(again)]
+        costs = [march(job, points, lanes, point.until, led=led).cost for _ in range(again)]
         cost = min([marched.cost, *costs])
     counters = _mean_counters(marched)
     return Measurement(reason, values, cost, marched.core_seconds, marched.simulated, counters)
@@ -89,7 +88,7 @@ def _led(point: Point, scene: Scene, runs: int) -> tuple[Any, ...]:
     if scene.lead is None:
         return ()
     job, until = scene.lead.job, scene.lead.until
-    return lead(job.model, job.stepper, [start_parameters(job, k) for k in range(runs)], until)
+    return march(job, [start_parameters(job, k) for k in range(runs)], most_lanes(job), until).runs
 
 
 def exact_displacement(point: Point, start: int) -> tuple[Any, NDArray[np.float64]]:

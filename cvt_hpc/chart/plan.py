@@ -2,14 +2,13 @@
 
 from __future__ import annotations
 
-import hashlib
-import json
 import math
 from dataclasses import asdict, dataclass, replace
 from enum import Enum
 from typing import Any
 
 from cvt_hpc.job import Job
+from cvt_hpc.job.definition import digest
 
 _PREFIXES = ((1.0, ""), (1e-3, "m"), (1e-6, "µ"), (1e-9, "n"))
 
@@ -238,8 +237,7 @@ class Chart:
 
 def fingerprint_of(resolved: dict[str, Any]) -> str:
     """Return the fingerprint of a chart by the result of `Chart.resolved`."""
-    document = {**resolved, "name": "", "description": ""}
-    return hashlib.sha256(json.dumps(document, sort_keys=True).encode()).hexdigest()
+    return digest({**resolved, "name": "", "description": ""})
 
 
 def _scene_to_json(scene: Scene) -> dict[str, Any]:

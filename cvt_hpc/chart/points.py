@@ -86,26 +86,15 @@ def method_points(name: str, raw: Any, stages: list[Stage], where: str) -> Itera
     key = _setting_key(raw, where)
     if not isinstance(raw[key], list) or not raw[key]:
         raise mismatch(f"{where} {key}", "a list of values", show(raw[key]))
+    stepper, model = own["stepper"], own["model"]
     for stage in _chosen_stages(raw.get("scenes"), stages, where):
+        scene, both = stage.scene, {"lanes": own["lanes"], "until": stage.until}
         for i, value in enumerate(raw[key], 1):
-            setting: dict[str, Any] = {
-                key: stage.setting(
-                    own["stepper"], key, value, where, f"{where} {key}, value {i}", own["model"]
-                )
-            }
-            job = stage.job(where, own["model"], stepper=own["stepper"], **read_set(raw, where), **setting)
-            yield Point(
-                f"{stage.scene.name}-{name}-{i}",
-                stage.scene.name,
-                Role.METHOD,
-                name,
-                label,
-                key,
-                job,
-                stage.scene.starts,
-                own["lanes"],
-                stage.until,
-            )
+            place = f"{where} {key}, value {i}"
+            setting: dict[str, Any] = {key: stage.setting(stepper, key, value, where, place, model)}
+            job = stage.job(where, model, stepper=stepper, **read_set(raw, where), **setting)
+            point = f"{scene.name}-{name}-{i}"
+            yield Point(point, scene.name, Role.METHOD, name, label, key, job, scene.starts, **both)
 
 
 def budget_points(raw: Any, stages: list[Stage], where: str) -> tuple[list[Point], tuple[str, ...]]:
@@ -124,19 +113,9 @@ def budget_points(raw: Any, stages: list[Stage], where: str) -> tuple[list[Point
         # keys set for the base's stepper may be unknown to another
         changed = {**({} if choice["stepper"] else base), **read_set(table, place)}
         job = stage.job(place, choice["model"], stepper=choice["stepper"] or stepper, **changed)
-        points.append(
-            Point(
-                f"{scene}-choice-{name}",
-                scene,
-                Role.CHOICE,
-                name,
-                choice["label"] or in_words(name),
-                "",
-                job,
-                min(choice["starts"] or starts, starts),
-                refines=choice["refines"],
-            )
-        )
+        point, label = f"{scene}-choice-{name}", choice["label"] or in_words(name)
+        counted, refines = min(choice["starts"] or starts, starts), choice["refines"]
+        points.append(Point(point, scene, Role.CHOICE, name, label, "", job, counted, refines=refines))
     return points, _budgeted(raw.get("quantities"), stage.scene, f"{where} quantities")
 
 

@@ -19,7 +19,7 @@ from numpy.typing import NDArray
 from cvt_hpc.chart.plan import Quantity
 from cvt_hpc.errors import mismatch, unknown
 from cvt_hpc.job.tables import read_table
-from cvt_hpc.parameters import Parameter
+from cvt_hpc.parameters import Parameter, not_negative, positive
 from cvt_hpc.vibration import signals
 from cvt_hpc.vibration.assessment import assess
 from cvt_hpc.vibration.settings import fitting_window
@@ -102,18 +102,6 @@ def _trajectory(history: History, quantity: Quantity) -> Array:
     return history.displacement[history.part(quantity.since, quantity.until)]
 
 
-def _amplitude(history: History, quantity: Quantity) -> Array:
-    return _assessed(history).amplitude
-
-
-def _frequency(history: History, quantity: Quantity) -> Array:
-    return _assessed(history).frequency
-
-
-def _occurrence(history: History, quantity: Quantity) -> Array:
-    return np.array([float(_assessed(history).vibrates)])
-
-
 def _growth_rate(history: History, quantity: Quantity) -> Array:
     part = history.displacement[history.part(quantity.since, quantity.until)]
     return _at_strongest(history, signals.envelope_growth(part, history.rate, history.band).rate)
@@ -162,10 +150,10 @@ _DRIVING_SHEAVES = ("sheave_force driving left", "sheave_force driving right")
 _TIMES = (1e-6, 1e3)  # [s]
 KINDS: dict[str, Kind] = {
     "trajectory": Kind("m", "trajectory", _trajectory, takes_part=True, needs_part=True),
-    "amplitude": Kind("m", "amplitude", _amplitude),
-    "frequency": Kind("Hz", "dominant frequency", _frequency),
+    "amplitude": Kind("m", "amplitude", lambda history, _: _assessed(history).amplitude),
+    "frequency": Kind("Hz", "dominant frequency", lambda history, _: _assessed(history).frequency),
     "growth_rate": Kind("s-1", "growth rate", _growth_rate, takes_part=True),
-    "occurrence": Kind("1", "occurrence", _occurrence),
+    "occurrence": Kind("1", "occurrence", lambda history, _: np.array([float(_assessed(history).vibrates)])),
     "onset": Kind("N m", "onset load", _onset, takes_part=True),
     "push_force": _means("N", "push force", "push_force t1", "push_force t2"),
     "ring_tension": _means("N", "ring tension", "ring_tension t1", "ring_tension t2"),
@@ -188,31 +176,18 @@ def read_quantity(name: str, raw: Any, where: str) -> Quantity:
         raise unknown(where, "quantity", name, KINDS)
     kind = KINDS[name]
     declared = {
-        "tolerance": Parameter(
+        "tolerance": not_negative(
             0.0 if name == "occurrence" else math.inf,
             "",
             "largest error allowed; of the occurrence the share of starts that are judged differently",
-            minimum=0.0,
             allow_infinite=True,
         ),
-        "scale": Parameter(
-            0.0, kind.unit, "what errors are divided by; 0: the reference's size", minimum=0.0
-        ),
+        "scale": not_negative(0.0, kind.unit, "what errors are divided by; 0: the reference's size"),
     }
     if kind.takes_part:
         end = None if kind.needs_part else math.inf
-        declared["since"] = Parameter(
-            0.0, "s", "start of the part that is looked at", minimum=0.0, sensible=_TIMES
-        )
-        declared["until"] = Parameter(
-            end,
-            "s",
-            "end of it",
-            minimum=0.0,
-            exclusive=True,
-            allow_infinite=end is not None,
-            sensible=_TIMES,
-        )
+        declared["since"] = not_negative(0.0, "s", "start of the part that is looked at", sensible=_TIMES)
+        declared["until"] = positive(end, "s", "end of it", allow_infinite=end is not None, sensible=_TIMES)
     if name == "onset":
         declared["channel"] = Parameter("load", "", "recorded channel whose value is the onset")
     values = read_table(declared, raw, where)

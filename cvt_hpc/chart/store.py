@@ -8,9 +8,9 @@ from dataclasses import fields
 from pathlib import Path
 from typing import Any
 
-from cvt_hpc.archives import Archives, Arrays
+from cvt_hpc.archives import Archives
 from cvt_hpc.chart.measuring import Measurement
-from cvt_hpc.chart.plan import Chart, fingerprint_of
+from cvt_hpc.chart.plan import Chart
 from cvt_hpc.files import kind_of
 from cvt_hpc.output_folder import CHART_FILE, Kind, OutputFolder
 from cvt_hpc.study.job_difference import another_job
@@ -49,22 +49,11 @@ class ChartFolder(OutputFolder[Chart]):
         """Return where the picture of a scene goes, or "budget"."""
         return self.path / f"{name}.png"
 
-    def document(self, content: Chart) -> dict[str, Any]:
-        """Return the content of chart.json."""
-        return {"fingerprint": content.fingerprint(), "job": content.resolved()}
-
     def accept(self, entry: dict[str, Any]) -> dict[str, Any]:
         """Return a sound chart.json."""
-        if not isinstance(entry["fingerprint"], str):
-            raise ValueError("no fingerprint")
         if not all(_NAME.fullmatch(name) for name in entry["job"]["scenes"].keys()):
             raise ValueError("scenes without a name")  # of which names of files are made
         return entry
-
-    def check_unsigned(self, entry: dict[str, Any]) -> None:
-        """Raise ValueError unless the job of an earlier version gives the fingerprint that stands there."""
-        if fingerprint_of(entry["job"]) != entry["fingerprint"]:
-            raise ValueError("it has no checksum, and its job does not give its fingerprint")
 
     def refuse_other(self, found: dict[str, Any], asked: Chart) -> None:
         """Raise InputError unless the folder is that of the chart."""
@@ -92,27 +81,9 @@ class ChartFolder(OutputFolder[Chart]):
 
     def load_point(self, name: str) -> Measurement | None:
         """Return the result of a point, None if there is none, or no readable one."""
-        return self.points.load(name, _unpack)
+        return self.points.load(name, lambda plain, values: Measurement(values=values, **plain))
 
     def save_point(self, name: str, measurement: Measurement) -> None:
         """Keep the result of a point."""
         plain = {key: getattr(measurement, key) for key in _PLAIN}
         self.points.save(name, plain, measurement.values)
-
-
-def _unpack(plain: Any, values: Arrays) -> Measurement:
-    """Return the measurement that an archive holds."""
-    measurement = Measurement(values=values, **plain)
-    numbers = [
-        measurement.cost,
-        measurement.core_seconds,
-        measurement.simulated,
-        *measurement.counters.values(),
-    ]
-    if not isinstance(measurement.reason, str) or not all(
-        isinstance(number, (int, float)) for number in numbers
-    ):
-        raise ValueError("no measurement")
-    if any(array.dtype.kind != "f" for array in values.values()):
-        raise ValueError("no measurement")
-    return measurement

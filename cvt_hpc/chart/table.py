@@ -2,9 +2,8 @@
 
 from __future__ import annotations
 
-import csv
-import math
-from collections.abc import Iterator, Mapping, Sequence
+from collections.abc import Callable, Iterator, Mapping, Sequence
+from math import nan
 from pathlib import Path
 from textwrap import shorten
 from typing import Any
@@ -12,36 +11,38 @@ from typing import Any
 from cvt_hpc.chart.comparing import Comparison, Result
 from cvt_hpc.chart.plan import Role
 from cvt_hpc.chart.quantities import KINDS
+from cvt_hpc.files import write_rows
 from cvt_hpc.provenance import origin_lines
 from cvt_hpc.tables import columns, number, short
 
-_HEAD = (
-    "scene",
-    "role",
-    "method",
-    "stepper",
-    "setting",
-    "value",
-    "chosen",
-    "outcome",
-    "core_s_per_s",
-    "starts",
-)
-
+_FIRST: dict[str, Callable[[Result], str]] = {  # columns that all charts have
+    "scene": lambda r: r.point.scene,
+    "role": lambda r: "refinement" if r.point.refines else r.point.role.value,
+    "method": lambda r: r.point.label,
+    "stepper": lambda r: "" if r.point.series == "exact" else r.point.job.stepper or "",
+    "setting": lambda r: r.point.key,
+    "value": lambda r: number(r.point.setting),
+    "chosen": lambda r: "yes" if r.chosen else "",
+    "outcome": lambda r: r.measurement.reason or "done",
+    "core_s_per_s": lambda r: number(r.measurement.cost, 3),
+    "starts": lambda r: str(r.point.starts),
+}
 _LONGEST_NOTE = 90  # letters; the whole reason is in the file
 
 
 def write_table(comparisons: Sequence[Comparison], made: Mapping[str, Any], path: Path) -> None:
     """Write all results as comma-separated values, a row for each point, below their origin."""
-    rows = [result for comparison in comparisons for result in _results(comparison)]
-    names = [name for name in KINDS if any(name in row.errors for row in rows)]
-    counters = list(dict.fromkeys(name for row in rows for name in row.measurement.counters))
-    with path.open("w", encoding="utf-8", newline="") as file:
-        file.writelines(origin_lines(made))
-        writer = csv.writer(file, lineterminator="\n")
-        writer.writerow([*_HEAD, *_quantity_heads(names), "below_reference", *counters])
-        for row in rows:
-            writer.writerow([*_head(row), *_quantities(row, names), *_tail(row, counters)])
+    results = [result for comparison in comparisons for result in comparison.results]
+    columns = {head: [read(result) for result in results] for head, read in _FIRST.items()}
+    for name in (name for name in KINDS if any(name in result.errors for result in results)):
+        if name not in ("trajectory", "occurrence"):
+            head = f"{name} [{KINDS[name].unit}]"
+            columns[head] = [number(result.values.get(name, nan), 6) for result in results]
+        columns[f"{name}_error"] = [number(result.errors.get(name, nan), 3) for result in results]
+    columns["below_reference"] = [" ".join(sorted(result.below)) for result in results]
+    for name in dict.fromkeys(name for result in results for name in result.measurement.counters):
+        columns[name] = [number(result.measurement.counters.get(name, nan), 8) for result in results]
+    write_rows(path, list(columns), zip(*columns.values(), strict=True), origin_lines(made))
 
 
 def table_lines(comparison: Comparison) -> Iterator[str]:
@@ -51,7 +52,10 @@ def table_lines(comparison: Comparison) -> Iterator[str]:
     own = [short(comparison.reference.errors[name]) for name in names]
     label, setting = comparison.reference.point.label, comparison.reference.point.setting_in_words
     rows = [heads, [f"reference: {label}", setting, "-", *own, comparison.reference.measurement.reason]]
-    rows += [_line(result, names) for result in comparison.methods]
+    rows += [
+        [r.point.label, r.point.setting_in_words, _cost(r), *_errors(r, names), _note(r)]
+        for r in comparison.methods
+    ]
     yield comparison.scene.title
     yield from columns(rows)
     if any(result.below for result in comparison.methods):
@@ -63,50 +67,6 @@ def table_lines(comparison: Comparison) -> Iterator[str]:
         rows = [[f"error budget, against {comparison.base}", "core-s/s", *words, ""]]
         rows += [[r.point.label, _cost(r), *_errors(r, shown), _note(r)] for r in comparison.choices]
         yield from columns(rows)
-
-
-def _results(comparison: Comparison) -> tuple[Result, ...]:
-    return (comparison.reference, *comparison.methods, *comparison.choices)
-
-
-def _quantity_heads(names: Sequence[str]) -> Iterator[str]:
-    for name in names:
-        if name not in ("trajectory", "occurrence"):
-            yield f"{name} [{KINDS[name].unit}]"
-        yield f"{name}_error"
-
-
-def _head(result: Result) -> list[str]:
-    point, measurement = result.point, result.measurement
-    return [
-        point.scene,
-        "refinement" if point.refines else point.role.value,
-        point.label,
-        "" if point.series == "exact" else point.job.stepper or "",
-        point.key,
-        number(point.setting),
-        "yes" if result.chosen else "",
-        measurement.reason or "done",
-        number(measurement.cost, 3),
-        str(point.starts),
-    ]
-
-
-def _quantities(result: Result, names: Sequence[str]) -> Iterator[str]:
-    for name in names:
-        if name not in ("trajectory", "occurrence"):
-            yield number(result.values.get(name, math.nan), 6)
-        yield number(result.errors.get(name, math.nan), 3)
-
-
-def _tail(result: Result, counters: Sequence[str]) -> list[str]:
-    counts = result.measurement.counters
-    return [" ".join(sorted(result.below)), *(number(counts.get(name, math.nan), 8) for name in counters)]
-
-
-def _line(result: Result, names: Sequence[str]) -> list[str]:
-    point = result.point
-    return [point.label, point.setting_in_words, _cost(result), *_errors(result, names), _note(result)]
 
 
 def _cost(result: Result) -> str:

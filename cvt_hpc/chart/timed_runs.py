@@ -8,6 +8,8 @@ from collections.abc import Callable, Sequence
 from dataclasses import dataclass
 from typing import Any
 
+from cvt_hpc.chart.plan import Point
+from cvt_hpc.job import Job
 from cvt_hpc.models.contract import Failure, Run, load_model
 from cvt_hpc.simulation import marching
 from cvt_hpc.variables import Status
@@ -42,19 +44,23 @@ class Marched:
         return self.core_seconds / self.simulated if self.simulated > 0.0 else math.nan
 
 
-def warm_up(model: str, stepper: str | None, points: Sequence[dict[str, Any]]) -> None:
+def warm_up(job: Job, points: Sequence[dict[str, Any]]) -> None:
     """Compile or load all that a group of runs needs; this does not count as their cost."""
-    load_model(model).batch(points, stepper).advance(1)
+    load_model(job.model).batch(points, job.stepper).advance(1)
 
 
-def most_lanes(model: str, stepper: str | None, parameters: dict[str, Any]) -> int:
-    """Return how many runs of a model can advance together, in the lanes of the processor's registers."""
-    return load_model(model).lanes(parameters, stepper)
+def most_lanes(job: Job) -> int:
+    """Return how many runs of a job can advance together, in the lanes of the processor's registers."""
+    return load_model(job.model).lanes(job.parameters, job.stepper)
+
+
+def lanes_of(point: Point) -> int:
+    """Return how many runs of a point advance together: as many as it asks for, or as can."""
+    return point.lanes or min(most_lanes(point.job), point.starts)
 
 
 def march(
-    model: str,
-    stepper: str | None,
+    job: Job,
     points: Sequence[dict[str, Any]],
     lanes: int,
     until: float,
@@ -65,8 +71,8 @@ def march(
 
     Parameters
     ----------
-    model, stepper : str
-        Their names.
+    job : Job
+        With their model and stepper.
     points : sequence of dict
         Flat parameters of each run [SI]; those of a group may differ as the model's batches allow.
     lanes : int
@@ -83,8 +89,9 @@ def march(
     failures: list[Failure | None] = []
     seconds = simulated = 0.0
     for first in range(0, len(points), lanes):
-        load_model(model).forget()
-        batch = load_model(model).batch(points[first : first + lanes], stepper)
+        model = load_model(job.model)
+        model.forget()
+        batch = model.batch(points[first : first + lanes], job.stepper)
         if led:
             batch.take_over(led[first : first + lanes])
         begun = batch.done
@@ -95,20 +102,6 @@ def march(
         simulated += sum(run.time - begun * batch.interval for run in batch.runs)
         failures += [run.failure or (_TOO_LONG if stopped else None) for run in batch.runs]
     return Marched(tuple(runs), tuple(failures), seconds, simulated)
-
-
-def lead(model: str, stepper: str | None, points: Sequence[dict[str, Any]], until: float) -> tuple[Any, ...]:
-    """Return runs that have been brought to a time, from where others can take over.
-
-    Parameters
-    ----------
-    model, stepper, points
-        As for `march`.
-    until : float
-        The time [s].
-    """
-    lanes = most_lanes(model, stepper, points[0])
-    return march(model, stepper, points, lanes, until).runs
 
 
 def _stop_after(seconds: float) -> Callable[[], str | None] | None:

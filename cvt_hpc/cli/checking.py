@@ -7,17 +7,7 @@ from collections.abc import Iterator
 from pathlib import Path
 from typing import TYPE_CHECKING, Any
 
-from cvt_hpc.cli.parts import (
-    DONE,
-    PICTURES,
-    REPLACE,
-    add_assignments,
-    add_command,
-    check_output,
-    output_folder,
-    say,
-    speaks,
-)
+from cvt_hpc.cli import parts
 from cvt_hpc.errors import mismatch
 
 if TYPE_CHECKING:
@@ -27,7 +17,7 @@ if TYPE_CHECKING:
 def add(commands: Any) -> None:
     """Declare the command."""
     text = "validate a job, show its defaults and estimate its cost"
-    check = add_command(commands, "check", _check, text, "JOB")
+    check = parts.add_command(commands, "check", _check, text, "JOB")
     ranks = "forecast the sweep on so many ranks: makespan, efficiency, core-hours, disk and Slurm's --time"
     check.add_argument("--ranks", type=int, nargs="+", default=[], metavar="N", help=ranks)
     pilots = "forecast by K batches that are done for it, shortened (default: by records, else by prediction)"
@@ -35,7 +25,7 @@ def add(commands: Any) -> None:
     check.add_argument("--plot", type=Path, metavar="PNG", help="picture of the forecast, 1 to 10 000 ranks")
     command = "command that is to take the job (default: chart, branch, fit or ladder by its table, else run)"
     check.add_argument("--for", dest="command_for", choices=(RUN, *_PLANS), help=command)
-    add_assignments(check, "--set", REPLACE)
+    parts.add_assignments(check, "--set", parts.REPLACE)
 
 
 def _check(arguments: argparse.Namespace) -> int:
@@ -50,33 +40,33 @@ def _check(arguments: argparse.Namespace) -> int:
                 "--ranks, --pilots, --plot", "a job of `cvt-hpc run`", f"one of `cvt-hpc {command}`"
             )
         lines = list(_PLANS[command](arguments))
-        if speaks():
+        if parts.speaks():
             print(*lines, sep="\n")
-        return DONE
+        return parts.DONE
     _check_ranks(arguments.ranks)
     if arguments.pilots < 0:
         raise mismatch("--pilots", "a number of batches", str(arguments.pilots))
     if (arguments.pilots or arguments.plot) and not arguments.ranks:
         raise mismatch("--pilots" if arguments.pilots else "--plot", "--ranks beside it", "none")
-    check_output(arguments.plot, PICTURES)
+    parts.check_output(arguments.plot, parts.PICTURES)
     job = load_job(arguments.path, arguments.set)
     show_job(job, None)
-    if arguments.ranks and speaks():
+    if arguments.ranks and parts.speaks():
         from cvt_hpc.printing import disk_line, forecast_lines
         from cvt_hpc.study.forecast.resources import expect
         from cvt_hpc.study.forecast.simulate import CURVE
 
         ranks = [*arguments.ranks, *(CURVE if arguments.plot else ())]
-        expected = expect(job, output_folder(None, job), ranks, arguments.pilots)
+        expected = expect(job, parts.output_folder(None, job), ranks, arguments.pilots)
         asked, curve = expected.forecasts[: len(arguments.ranks)], expected.forecasts[len(arguments.ranks) :]
-        say("", *forecast_lines(asked, job, expected.basis))
-        say(disk_line(expected.disk, len(job.histories)))
+        parts.say("", *forecast_lines(asked, job, expected.basis))
+        parts.say(disk_line(expected.disk, len(job.histories)))
         if arguments.plot is not None:
             from cvt_hpc.analysis.efficiency import draw_efficiency
 
             title = f"{job.name}: {job.size} runs"
-            say(f"picture: {draw_efficiency(curve, title, expected.basis, arguments.plot)}")
-    return DONE
+            parts.say(f"picture: {draw_efficiency(curve, title, expected.basis, arguments.plot)}")
+    return parts.DONE
 
 
 def _chart_lines(arguments: argparse.Namespace) -> Iterator[str]:
@@ -94,7 +84,7 @@ def _ladder_lines(arguments: argparse.Namespace) -> Iterator[str]:
     from cvt_hpc.ladder.loading import load_ladder
 
     asked = load_ladder(arguments.path, arguments.set)
-    return plan_lines(asked, output_folder(None, asked.job))
+    return plan_lines(asked, parts.output_folder(None, asked.job))
 
 
 def _branch_lines(arguments: argparse.Namespace) -> Iterator[str]:
@@ -124,12 +114,12 @@ def show_job(job: Job, out: Path | None) -> None:
     from cvt_hpc.study.simulator import default_simulator
 
     check_names(job, default_simulator())
-    needed = refuse_too_large(job, default_simulator(), output_folder(out, job))
-    if speaks():
+    needed = refuse_too_large(job, default_simulator(), parts.output_folder(out, job))
+    if parts.speaks():
         from cvt_hpc.study.status import expected_cost
 
-        say(*summarize(job, *expected_cost(job, output_folder(out, job))).split("\n"))
-        say(needs_line(needed, len(job.histories)))
+        parts.say(*summarize(job, *expected_cost(job, parts.output_folder(out, job))).split("\n"))
+        parts.say(needs_line(needed, len(job.histories)))
 
 
 def _check_ranks(ranks: list[int]) -> None:

@@ -5,54 +5,40 @@ from __future__ import annotations
 import argparse
 from typing import Any
 
-from cvt_hpc.cli.parts import (
-    DONE,
-    REPLACE,
-    SOME_FAILED,
-    add_assignments,
-    add_command,
-    add_folder,
-    alike,
-    check_output,
-    complain,
-    output_folder,
-    refuse_ranks,
-    say,
-    speaks,
-)
+from cvt_hpc.cli import parts
 
 
 def add(commands: Any) -> None:
     """Declare the commands."""
-    chart = add_command(commands, "chart", _chart, "measure speed against accuracy, and draw it", "JOB")
-    add_folder(chart, "earlier results of the folder")
-    add_assignments(chart, "--set", "replace a value of the job and of all its scenes")
+    chart = parts.add_command(commands, "chart", _chart, "measure speed against accuracy, and draw it", "JOB")
+    parts.add_folder(chart, "earlier results of the folder")
+    parts.add_assignments(chart, "--set", "replace a value of the job and of all its scenes")
     text = "do the runs of a job with every model of the ladder, and compare them"
-    ladder = add_command(commands, "ladder", _ladder, text, "JOB")
-    add_folder(ladder, "earlier results of all models")
-    add_assignments(ladder, "--set", f"{REPLACE}; ladder.KEY replaces a key of [ladder]")
+    ladder = parts.add_command(commands, "ladder", _ladder, text, "JOB")
+    parts.add_folder(ladder, "earlier results of all models")
+    parts.add_assignments(ladder, "--set", f"{parts.REPLACE}; ladder.KEY replaces a key of [ladder]")
     text = "follow steady states along the load, to their Hopf points"
-    branch = add_command(commands, "branch", _branch, text, "JOB")
-    add_folder(branch, "an earlier diagram of the folder")
-    add_assignments(branch, "--set", REPLACE)
+    branch = parts.add_command(commands, "branch", _branch, text, "JOB")
+    parts.add_folder(branch, "an earlier diagram of the folder")
+    parts.add_assignments(branch, "--set", parts.REPLACE)
     text = "look for the parameters that meet the targets of a job best"
-    fit = add_command(commands, "fit", _fit, text, "JOB")
-    add_folder(fit, "earlier studies of the folder")
-    add_assignments(fit, "--set", f"{REPLACE}; fit.KEY replaces a number of [fit]")
+    fit = parts.add_command(commands, "fit", _fit, text, "JOB")
+    parts.add_folder(fit, "earlier studies of the folder")
+    parts.add_assignments(fit, "--set", f"{parts.REPLACE}; fit.KEY replaces a number of [fit]")
 
 
 def _chart(arguments: argparse.Namespace) -> int:
     from cvt_hpc.chart import load_chart, make_chart
     from cvt_hpc.chart.table import table_lines
 
-    refuse_ranks("chart", "measures times")
+    parts.refuse_ranks("chart", "measures times")
     chart = load_chart(arguments.path, arguments.set)
-    report = make_chart(chart, arguments.out, fresh=arguments.fresh, tell=complain)
+    report = make_chart(chart, arguments.out, fresh=arguments.fresh, tell=parts.complain)
     for comparison in report.comparisons:
-        say(*table_lines(comparison), "")
-    say(f"table: {report.table}", f"dataset: {report.dataset}")
-    say(*(f"picture: {picture}" for picture in report.pictures))
-    return DONE
+        parts.say(*table_lines(comparison), "")
+    parts.say(f"table: {report.table}", f"dataset: {report.dataset}")
+    parts.say(*(f"picture: {picture}" for picture in report.pictures))
+    return parts.DONE
 
 
 def _ladder(arguments: argparse.Namespace) -> int:
@@ -63,20 +49,20 @@ def _ladder(arguments: argparse.Namespace) -> int:
     from cvt_hpc.study.ranks.launch import end_process
     from cvt_hpc.study.report import STALLED
 
-    job, rungs, refusals = alike(arguments, lambda: load_ladder(arguments.path, arguments.set))
-    out = output_folder(arguments.out, job)
-    complain(*(f"{name} left out: {why}" for name, why in refusals.items()))
+    job, rungs, refusals = parts.alike(arguments, lambda: load_ladder(arguments.path, arguments.set))
+    out = parts.output_folder(arguments.out, job)
+    parts.complain(*(f"{name} left out: {why}" for name, why in refusals.items()))
     status = run_ladder(
         rungs,
         out,
         fresh=arguments.fresh,
-        tell=lambda rung, report: complain(*(f"{rung.name}: {line}" for line in trouble_lines(report))),
-        announce=complain,
+        tell=lambda rung, report: parts.complain(*(f"{rung.name}: {line}" for line in trouble_lines(report))),
+        announce=parts.complain,
     )
-    if status < STALLED and speaks():
+    if status < STALLED and parts.speaks():
         report = report_ladder(job, rungs, out)
-        say(*ladder_lines(job, report.findings))
-        say(f"table: {report.table}", f"dataset: {report.dataset}", f"picture: {report.picture}")
+        parts.say(*ladder_lines(job, report.findings))
+        parts.say(f"table: {report.table}", f"dataset: {report.dataset}", f"picture: {report.picture}")
     return end_process(status)
 
 
@@ -85,17 +71,17 @@ def _branch(arguments: argparse.Namespace) -> int:
     from cvt_hpc.bifurcation.folder import DATASET
     from cvt_hpc.bifurcation.table import branch_lines, failure_lines
 
-    refuse_ranks("branch", "walks along the load")
+    parts.refuse_ranks("branch", "walks along the load")
     diagram = load_diagram(arguments.path, arguments.set)
-    folder = output_folder(arguments.out, diagram.job)
-    check_output(folder / DATASET, (".nc",))
-    report = make_diagram(diagram, folder, fresh=arguments.fresh, tell=complain)
+    folder = parts.output_folder(arguments.out, diagram.job)
+    parts.check_output(folder / DATASET, (".nc",))
+    report = make_diagram(diagram, folder, fresh=arguments.fresh, tell=parts.complain)
     failures = [line for followed in report.followed for line in failure_lines(diagram, followed)]
-    complain(*failures)
+    parts.complain(*failures)
     for followed in report.followed:
-        say(*branch_lines(diagram, followed), "")
-    say(f"dataset: {report.dataset}", *(f"picture: {picture}" for picture in report.pictures))
-    return SOME_FAILED if failures else DONE
+        parts.say(*branch_lines(diagram, followed), "")
+    parts.say(f"dataset: {report.dataset}", *(f"picture: {picture}" for picture in report.pictures))
+    return parts.SOME_FAILED if failures else parts.DONE
 
 
 def _fit(arguments: argparse.Namespace) -> int:
@@ -104,12 +90,12 @@ def _fit(arguments: argparse.Namespace) -> int:
     from cvt_hpc.fit.making import make_fit
     from cvt_hpc.study.ranks.launch import end_process
 
-    fit = alike(arguments, lambda: load_fit(arguments.path, arguments.set))
-    folder = output_folder(arguments.out, fit.job)
+    fit = parts.alike(arguments, lambda: load_fit(arguments.path, arguments.set))
+    folder = parts.output_folder(arguments.out, fit.job)
     try:
-        report = make_fit(fit, folder, fresh=arguments.fresh, tell=complain)
+        report = make_fit(fit, folder, fresh=arguments.fresh, tell=parts.complain)
     except Stopped as stopped:
         return end_process(stopped.status)
-    if speaks():
-        say(*report.lines, *(f"table: {table}" for table in report.tables))
-    return end_process(DONE)
+    if parts.speaks():
+        parts.say(*report.lines, *(f"table: {table}" for table in report.tables))
+    return end_process(parts.DONE)

@@ -6,13 +6,16 @@ import argparse
 import os
 import re
 import sys
-from collections.abc import Callable, Sequence
+from collections.abc import Callable, Iterator, Sequence
+from contextlib import contextmanager
 from pathlib import Path
 from typing import TYPE_CHECKING, Any, TypeVar
 
 from cvt_hpc.errors import mismatch, one_line
 
 if TYPE_CHECKING:
+    import xarray as xr
+
     from cvt_hpc.analysis.arrangement import Sides
     from cvt_hpc.job import Job
 
@@ -34,11 +37,12 @@ _SUBJECTS = {
 
 
 def add_command(
-    commands: Any, name: str, call: Callable[[Any], int], text: str, subject: str
+    commands: Any, name: str, call: Callable[[Any], int], text: str, subject: str = "", end: str = "."
 ) -> argparse.ArgumentParser:
-    """Return a new command; `subject`, what it is about, is one of the keys of _SUBJECTS."""
-    command = commands.add_parser(name, help=text, description=f"{text[0].upper()}{text[1:]}.")
-    command.add_argument("path", type=Path, metavar=subject, help=_SUBJECTS[subject])
+    """Return a new command; `subject`, what it is about, is one of the keys of _SUBJECTS, if there is any."""
+    command = commands.add_parser(name, help=text, description=f"{text[0].upper()}{text[1:]}{end}")
+    if subject:
+        command.add_argument("path", type=Path, metavar=subject, help=_SUBJECTS[subject])
     command.set_defaults(command=call)
     return command
 
@@ -91,6 +95,24 @@ def output_folder(out: Path | None, job: Job) -> Path:
 def folder_of(results: Path) -> Path:
     """Return the folder of results that are given as a folder or as a dataset in it."""
     return results if results.is_dir() else results.parent
+
+
+@contextmanager
+def opened_results(path: Path) -> Iterator[xr.Dataset]:
+    """Results of a study in the form in which this program writes them, open within."""
+    from cvt_hpc.analysis.conversion import standard
+    from cvt_hpc.study import open_results
+
+    with open_results(path) as opened:
+        yield standard(opened, str(path))
+
+
+def fixed_axes(arguments: argparse.Namespace, dataset: xr.Dataset, source: str) -> dict[str, Any]:
+    """Return the values [SI] at which --at fixes axes of results."""
+    from cvt_hpc.job.assignments import read_coordinates
+
+    units = {str(name): array.attrs.get("units") for name, array in dataset.coords.items()}
+    return read_coordinates(arguments.at, units, source, "--at")
 
 
 def alike(arguments: argparse.Namespace, load: Callable[[], Result]) -> Result:

@@ -8,20 +8,7 @@ from contextlib import ExitStack, contextmanager
 from pathlib import Path
 from typing import Any
 
-from cvt_hpc.cli.parts import (
-    DONE,
-    PICTURES,
-    SOME_FAILED,
-    add_assignments,
-    add_command,
-    add_sides,
-    check_output,
-    colour_end,
-    complain,
-    files_of,
-    picture_beside,
-    say,
-)
+from cvt_hpc.cli import parts
 from cvt_hpc.errors import InputError
 from cvt_hpc.files import StorageError
 from cvt_hpc.picture_kinds import END, HISTORIES, KINDS, RESULTS, Kind
@@ -34,13 +21,15 @@ def add(commands: Any) -> None:
     for name, kind in KINDS.items():
         _add_kind(kinds, name, kind)
     text = "the belt in the last periods of a run, magnified, as a moving picture"
-    animation = add_command(kinds, "animation", _animation, text, HISTORIES)
+    animation = parts.add_command(kinds, "animation", _animation, text, HISTORIES)
     text = "FILE.gif, or FILE.mp4 where there is ffmpeg (default: HISTORY_animation.gif beside the dataset)"
     animation.add_argument("--out", type=Path, metavar="GIF", help=text)
 
 
 def _add_kind(kinds: Any, name: str, kind: Kind) -> None:
-    command = add_command(kinds, name, _draw, kind.text, RESULTS if kind.subject == RESULTS else HISTORIES)
+    command = parts.add_command(
+        kinds, name, _draw, kind.text, RESULTS if kind.subject == RESULTS else HISTORIES
+    )
     command.set_defaults(kind=name)
     for option in kind.options:
         place: dict[str, Any] = {"dest": option.key} if option.flag else {}
@@ -53,9 +42,9 @@ def _add_kind(kinds: Any, name: str, kind: Kind) -> None:
     named = "".join(f"_{option.key.upper()}" for option in kind.options if option.is_named)
     text = f"default: {'' if kind.subject == RESULTS else 'HISTORY_'}{name}{named}.png beside the dataset"
     command.add_argument("--out", type=Path, metavar="PNG", help=text)
-    add_sides(command, kind.sides)
+    parts.add_sides(command, kind.sides)
     if kind.subject == RESULTS:
-        add_assignments(command, "--at", "fix an axis at a value")
+        parts.add_assignments(command, "--at", "fix an axis at a value")
 
 
 def _draw(arguments: argparse.Namespace) -> int:
@@ -64,18 +53,15 @@ def _draw(arguments: argparse.Namespace) -> int:
     options = {key: value for key in keys if (value := getattr(arguments, key)) not in (None, [])}
     named = [options[option.key] for option in kind.options if option.is_named and option.key in options]
     words = [name, *(word for value in named for word in ([value] if isinstance(value, str) else value))]
-    check_output(arguments.out, PICTURES)
-    if kind.subject == RESULTS:
-        _draw_results(arguments, words, options)
-        return DONE
-    if kind.subject == HISTORIES:
-        _draw_together(arguments, words, options)
-        return DONE
+    parts.check_output(arguments.out, parts.PICTURES)
+    if kind.subject in (RESULTS, HISTORIES):
+        (_draw_results if kind.subject == RESULTS else _draw_together)(arguments, words, options)
+        return parts.DONE
     data = getattr(arguments, "data", None)
-    check_output(data, (".nc",))
+    parts.check_output(data, (".nc",))
 
     def beside(file: Path) -> Path:
-        return picture_beside(arguments.path, [file], *words)
+        return parts.picture_beside(arguments.path, [file], *words)
 
     def write(history: Any, out: Path, source: str, of_several: str) -> list[str]:
         written = [f"picture: {_write(name, [history], out, None, [source], options)}"]
@@ -91,17 +77,13 @@ def _draw(arguments: argparse.Namespace) -> int:
 
 
 def _draw_results(arguments: argparse.Namespace, words: Sequence[str], options: dict[str, Any]) -> None:
-    from cvt_hpc.analysis.conversion import standard
-    from cvt_hpc.job.assignments import read_coordinates
-    from cvt_hpc.study import open_results
-
     source = str(arguments.path)
-    out = arguments.out or picture_beside(arguments.path, files_of(arguments.path), *words, *arguments.at)
-    with open_results(arguments.path) as opened:
-        dataset = standard(opened, source)
-        units = {str(name): array.attrs.get("units") for name, array in dataset.coords.items()}
-        at = read_coordinates(arguments.at, units, source, "--at")
-        say(f"picture: {_write(arguments.kind, [dataset], out, at, [source], options)}")
+    out = arguments.out or parts.picture_beside(
+        arguments.path, parts.files_of(arguments.path), *words, *arguments.at
+    )
+    with parts.opened_results(arguments.path) as dataset:
+        at = parts.fixed_axes(arguments, dataset, source)
+        parts.say(f"picture: {_write(arguments.kind, [dataset], out, at, [source], options)}")
 
 
 def _draw_together(arguments: argparse.Namespace, words: Sequence[str], options: dict[str, Any]) -> None:
@@ -109,9 +91,9 @@ def _draw_together(arguments: argparse.Namespace, words: Sequence[str], options:
 
     files = history_files([arguments.path, *arguments.others])
     names = [file.stem for file in files]
-    out = arguments.out or picture_beside(arguments.path, files, *words)
+    out = arguments.out or parts.picture_beside(arguments.path, files, *words)
     with _opened(files) as histories:
-        say(f"picture: {_write(arguments.kind, histories, out, None, names, options)}")
+        parts.say(f"picture: {_write(arguments.kind, histories, out, None, names, options)}")
 
 
 def _write(
@@ -123,7 +105,7 @@ def _write(
     if END in options:
         shown = datasets[0].get(options.get("of"))  # else the motion of a strand
         unit = "m" if shown is None else str(shown.attrs.get("units", ""))
-        options = options | {END: colour_end(options[END], unit)}
+        options = options | {END: parts.colour_end(options[END], unit)}
     return draw(lambda: compose(name, datasets, at, sources, **options), out)
 
 
@@ -136,7 +118,7 @@ def _animation(arguments: argparse.Namespace) -> int:
     check_animation(arguments.out or Path("belt.gif"))
 
     def beside(file: Path) -> Path:
-        return picture_beside(arguments.path, [file], "animation").with_suffix(".gif")
+        return parts.picture_beside(arguments.path, [file], "animation").with_suffix(".gif")
 
     return _each(arguments, beside, write)
 
@@ -158,21 +140,21 @@ def _each(
     """
     from cvt_hpc.analysis.telling_apart import history_files
 
-    files, status = history_files([arguments.path]), DONE
+    files, status = history_files([arguments.path]), parts.DONE
     for file in files:
         of_several = f"_{file.stem}" if len(files) > 1 else ""
         out = arguments.out
         out = beside(file) if out is None else out.with_stem(out.stem + of_several)
         try:
             with _opened([file]) as (history,):
-                say(*write(history, out, str(file), of_several))
+                parts.say(*write(history, out, str(file), of_several))
         except StorageError:
             raise
         except InputError as error:
             if len(files) == 1:
                 raise
-            complain(str(error))
-            status = SOME_FAILED
+            parts.complain(str(error))
+            status = parts.SOME_FAILED
     return status
 
 

@@ -8,20 +8,7 @@ from dataclasses import asdict
 from pathlib import Path
 from typing import TYPE_CHECKING, Any
 
-from cvt_hpc.cli.parts import (
-    DONE,
-    add_assignments,
-    add_command,
-    add_sides,
-    check_output,
-    colour_end,
-    complain,
-    files_of,
-    folder_of,
-    picture_beside,
-    say,
-    sides_of,
-)
+from cvt_hpc.cli import parts
 
 if TYPE_CHECKING:
     from cvt_hpc.analysis.comparison import Comparison
@@ -31,34 +18,34 @@ CONTRADICTING = 1  # exit status of `compare`: by one method some cells are quie
 
 def add(commands: Any) -> None:
     """Declare the commands."""
-    status = add_command(commands, "status", _status, "how far a study is", "DIR")
+    status = parts.add_command(commands, "status", _status, "how far a study is", "DIR")
     status.add_argument("--json", action="store_true", help="for programs: one line of JSON, times in s")
-    add_command(commands, "gather", _gather, "write DIR/results.nc again, from the records", "DIR")
+    parts.add_command(commands, "gather", _gather, "write DIR/results.nc again, from the records", "DIR")
     text = "write the results as a table with a row for each run: axes, class, and what each run gave"
-    table = add_command(commands, "table", _table, text, "RESULTS")
+    table = parts.add_command(commands, "table", _table, text, "RESULTS")
     text = "FILE.csv, or FILE.xlsx for a spreadsheet (default: table.csv beside the dataset)"
     table.add_argument("--out", type=Path, metavar="FILE", help=text)
     text = "draw where vibration occurs, or quantities over two axes"
-    picture = add_command(commands, "map", _map, text, "RESULTS")
+    picture = parts.add_command(commands, "map", _map, text, "RESULTS")
     text = "further studies over the same axes: a panel for each, on one scale of colours"
     picture.add_argument("others", type=Path, nargs="*", metavar="RESULTS", help=text)
     text = "variable of the results, such as efficiency, instead of where vibration occurs; may be repeated"
     picture.add_argument("--show", action="append", default=[], metavar="QUANTITY", help=text)
     text = "default: map.png, map_QUANTITY.png or, of several studies, maps.png beside the first dataset"
     picture.add_argument("--out", type=Path, metavar="PNG", help=text)
-    add_assignments(picture, "--at", "fix an axis at a value")
-    add_sides(picture)
+    parts.add_assignments(picture, "--at", "fix an axis at a value")
+    parts.add_sides(picture)
     text = "value at which the colours end, such as '20 um' (default: that of 98 %% of the cells)"
     picture.add_argument("--vmax", metavar="VALUE", help=text)
     text = "draw an axis log or linear (default: log where its values are spread so); may be repeated"
     picture.add_argument("--spacing", action="append", default=[], metavar="AXIS=SPACING", help=text)
     text = "draw the figure of a paper that a study repeats, and measure what the paper says of it"
-    add_command(commands, "figure", _figure, text, "DIR")
+    parts.add_command(commands, "figure", _figure, text, "DIR")
     text = "write a page about a study: what was found, a map with values, failed runs, cost, assumptions"
-    page = add_command(commands, "report", _report, text, "RESULTS")
+    page = parts.add_command(commands, "report", _report, text, "RESULTS")
     page.add_argument("--out", type=Path, metavar="HTML", help="default: report.html beside the dataset")
     text = "compare two methods or two designs, cell by cell; exit status 1: two methods contradict somewhere"
-    compare = add_command(commands, "compare", _compare, text, "RESULTS")
+    compare = parts.add_command(commands, "compare", _compare, text, "RESULTS")
     compare.add_argument("other", type=Path, metavar="RESULTS", help="the one to compare with it")
     folder = "folder of compare.csv and compare.png (default: that of the second study)"
     compare.add_argument("--out", type=Path, metavar="DIR", help=folder)
@@ -69,16 +56,16 @@ def _status(arguments: argparse.Namespace) -> int:
     from cvt_hpc.study import read_status
 
     status = read_status(arguments.path)
-    complain(*status.warnings)
-    say(*([json.dumps(asdict(status))] if arguments.json else status_lines(status)))
-    return DONE
+    parts.complain(*status.warnings)
+    parts.say(*([json.dumps(asdict(status))] if arguments.json else status_lines(status)))
+    return parts.DONE
 
 
 def _gather(arguments: argparse.Namespace) -> int:
     from cvt_hpc.study import gather
 
-    say(f"results: {gather(arguments.path)}")
-    return DONE
+    parts.say(f"results: {gather(arguments.path)}")
+    return parts.DONE
 
 
 def _table(arguments: argparse.Namespace) -> int:
@@ -86,26 +73,24 @@ def _table(arguments: argparse.Namespace) -> int:
     from cvt_hpc.analysis.run_table import FORMATS, run_table, write_table
     from cvt_hpc.study import open_results
 
-    out = arguments.out or folder_of(arguments.path) / "table.csv"
-    check_output(out, FORMATS)
+    out = arguments.out or parts.folder_of(arguments.path) / "table.csv"
+    parts.check_output(out, FORMATS)
     with open_results(arguments.path) as dataset:
         frame = run_table(plain(dataset, str(arguments.path)), str(arguments.path))
-    say(f"table: {write_table(frame, out)}")
-    return DONE
+    parts.say(f"table: {write_table(frame, out)}")
+    return parts.DONE
 
 
 def _map(arguments: argparse.Namespace) -> int:
     from contextlib import ExitStack
 
-    from cvt_hpc.analysis.conversion import standard
-    from cvt_hpc.job.assignments import read_coordinates, split_assignments
-    from cvt_hpc.study import open_results
+    from cvt_hpc.job.assignments import split_assignments
 
     paths = [arguments.path, *arguments.others]
     source, kind = ", ".join(map(str, paths)), "maps" if arguments.others else "map"
     with ExitStack() as opened:
-        datasets = [standard(opened.enter_context(open_results(path)), str(path)) for path in paths]
-        dataset, sides = datasets[0], sides_of(arguments)
+        datasets = [opened.enter_context(parts.opened_results(path)) for path in paths]
+        dataset, sides = datasets[0], parts.sides_of(arguments)
         if arguments.others:
             from cvt_hpc.analysis.studies import side_by_side
 
@@ -113,62 +98,59 @@ def _map(arguments: argparse.Namespace) -> int:
         from cvt_hpc.analysis.arrangement import with_spacings
 
         dataset = with_spacings(dataset, split_assignments(arguments.spacing, source, "--spacing"), source)
-        units = {str(name): array.attrs.get("units") for name, array in dataset.coords.items()}
-        at = read_coordinates(arguments.at, units, source, "--at")
-        from cvt_hpc.analysis.maps import draw_map
+        at = parts.fixed_axes(arguments, dataset, source)
+        from cvt_hpc.analysis.figures import draw
+        from cvt_hpc.analysis.maps import map_figure
         from cvt_hpc.analysis.starts import has_starts, start_line
-        from cvt_hpc.analysis.value_maps import draw_value_map
+        from cvt_hpc.analysis.value_maps import value_map_figure
 
-        files = [file for path in paths for file in files_of(path)]
+        files = [file for path in paths for file in parts.files_of(path)]
         words = (kind, *arguments.show, *arguments.at)
-        out = arguments.out or picture_beside(arguments.path, files, *words)
+        out = arguments.out or parts.picture_beside(arguments.path, files, *words)
         vmax, shown = None, arguments.show[0] if arguments.show else "amplitude"
         if shown in dataset:  # what draws it refuses a quantity that is not known
-            vmax = colour_end(arguments.vmax, str(dataset[shown].attrs.get("units", "")))
+            vmax = parts.colour_end(arguments.vmax, str(dataset[shown].attrs.get("units", "")))
         if arguments.show:
-            say(f"map: {draw_value_map(dataset, arguments.show, out, at, source, sides, vmax)}")
-            return DONE
-        picture = draw_map(dataset, out, at, source, sides, vmax)
+            shown = arguments.show
+            draw(lambda: value_map_figure(dataset, shown, at, source, sides, vmax), out)
+            parts.say(f"map: {out}")
+            return parts.DONE
+        draw(lambda: map_figure(dataset, at, source, sides, vmax), out)
         if has_starts(dataset, at) and not arguments.others:
-            say(start_line(dataset, at, source))
-        say(f"map: {picture}")
-    return DONE
+            parts.say(start_line(dataset, at, source))
+        parts.say(f"map: {out}")
+    return parts.DONE
 
 
 def _figure(arguments: argparse.Namespace) -> int:
     from cvt_hpc.analysis.statements.figures import figure_of, finding_lines
 
     picture, table, findings = figure_of(arguments.path)
-    say(*finding_lines(findings), f"picture: {picture}", f"table: {table}")
-    return DONE
+    parts.say(*finding_lines(findings), f"picture: {picture}", f"table: {table}")
+    return parts.DONE
 
 
 def _report(arguments: argparse.Namespace) -> int:
-    from cvt_hpc.analysis.conversion import standard
     from cvt_hpc.report import write_report
-    from cvt_hpc.study import open_results
 
-    out = arguments.out or folder_of(arguments.path) / "report.html"
-    check_output(out, (".html",))
-    source = str(arguments.path)
-    with open_results(arguments.path) as opened:
-        dataset = standard(opened, source)
-        say(f"report: {write_report(dataset, out, source, folder_of(arguments.path))}")
-    return DONE
+    out = arguments.out or parts.folder_of(arguments.path) / "report.html"
+    parts.check_output(out, (".html",))
+    with parts.opened_results(arguments.path) as dataset:
+        written = write_report(dataset, out, str(arguments.path), parts.folder_of(arguments.path))
+        parts.say(f"report: {written}")
+    return parts.DONE
 
 
 def _compare(arguments: argparse.Namespace) -> int:
     from cvt_hpc.analysis.comparison import compare
-    from cvt_hpc.analysis.conversion import standard
     from cvt_hpc.printing import comparison_lines
-    from cvt_hpc.study import open_results
 
     sources = str(arguments.path), str(arguments.other)
-    with open_results(arguments.path) as a, open_results(arguments.other) as b:
-        found = compare(standard(a, sources[0]), standard(b, sources[1]), sources)
-    written = leave_comparison(found, arguments.out or folder_of(arguments.other), sources)
-    say(*comparison_lines(found, sources), *written)
-    return CONTRADICTING if found.contradicts.any() and not found.are_designs else DONE
+    with parts.opened_results(arguments.path) as a, parts.opened_results(arguments.other) as b:
+        found = compare(a, b, sources)
+    written = leave_comparison(found, arguments.out or parts.folder_of(arguments.other), sources)
+    parts.say(*comparison_lines(found, sources), *written)
+    return CONTRADICTING if found.contradicts.any() and not found.are_designs else parts.DONE
 
 
 def leave_comparison(found: Comparison, folder: Path, sources: tuple[str, str]) -> list[str]:

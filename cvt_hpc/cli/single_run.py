@@ -6,30 +6,20 @@ import argparse
 from pathlib import Path
 from typing import Any
 
-from cvt_hpc.cli.parts import (
-    DONE,
-    PICTURES,
-    REPLACE,
-    SOME_FAILED,
-    add_assignments,
-    add_command,
-    check_output,
-    complain,
-    say,
-)
+from cvt_hpc.cli import parts
 from cvt_hpc.errors import mismatch
 
 
 def add(commands: Any) -> None:
     """Declare the command."""
-    simulate = add_command(commands, "simulate", _simulate, "one run with its full history", "JOB")
+    simulate = parts.add_command(commands, "simulate", _simulate, "one run with its full history", "JOB")
     simulate.add_argument("--out", type=Path, metavar="FILE.nc", help="dataset of the history")
     simulate.add_argument("--plot", type=Path, metavar="PNG", help="picture of the history")
     text = "print all numbers of the run, not only those that matter most"
     simulate.add_argument("--all", action="store_true", help=text)
-    add_assignments(simulate, "--set", REPLACE)
+    parts.add_assignments(simulate, "--set", parts.REPLACE)
     at = "where to run; an axis that is not named takes the value of its table, or else its first one"
-    add_assignments(simulate, "--at", at)
+    parts.add_assignments(simulate, "--at", at)
 
 
 def _simulate(arguments: argparse.Namespace) -> int:
@@ -39,8 +29,8 @@ def _simulate(arguments: argparse.Namespace) -> int:
     job = load_job(arguments.path, arguments.set).with_units_of(arguments.at, "--at")
     at = read_assignments(arguments.at, job.schema, job.source, "--at")
     job.point_at(at, "--at")
-    check_output(arguments.out, (".nc",))
-    check_output(arguments.plot, PICTURES)
+    parts.check_output(arguments.out, (".nc",))
+    parts.check_output(arguments.plot, parts.PICTURES)
     from cvt_hpc.netcdf import is_history, write_history
     from cvt_hpc.printing import MOST_OUTCOMES, outcome_lines, point_lines, units_of
     from cvt_hpc.simulation import simulate
@@ -60,9 +50,9 @@ def _simulate(arguments: argparse.Namespace) -> int:
     elif arguments.plot is not None:
         written.append("picture: none, the run has no history")
     most = None if arguments.all else MOST_OUTCOMES
-    say(*point_lines(job, at), *outcome_lines(dataset, units_of(job), most), *written)
+    parts.say(*point_lines(job, at), *outcome_lines(dataset, units_of(job), most), *written)
     status = Status(int(dataset["status"]))
     if status != Status.DONE:
-        complain(f"the run failed: {status.name.lower()}: {dataset['reason'].item()}")
-        return SOME_FAILED
-    return DONE
+        parts.complain(f"the run failed: {status.name.lower()}: {dataset['reason'].item()}")
+        return parts.SOME_FAILED
+    return parts.DONE

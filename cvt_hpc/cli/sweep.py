@@ -8,19 +8,8 @@ from collections.abc import Callable
 from functools import partial
 from typing import TYPE_CHECKING, Any
 
+from cvt_hpc.cli import parts
 from cvt_hpc.cli.checking import show_job
-from cvt_hpc.cli.parts import (
-    DONE,
-    REPLACE,
-    add_assignments,
-    add_command,
-    add_folder,
-    alike,
-    complain,
-    output_folder,
-    say,
-    speaks,
-)
 from cvt_hpc.cli.results import leave_comparison
 from cvt_hpc.errors import mismatch
 
@@ -34,10 +23,10 @@ RETRIED = ("timed_out", "failed_error", "failed_numerics")
 
 def add(commands: Any) -> None:
     """Declare the command."""
-    run = add_command(
+    run = parts.add_command(
         commands, "run", _run, "do all runs of a job, or those that an earlier start has left", "JOB"
     )
-    add_folder(run, "earlier results of the folder")
+    parts.add_folder(run, "earlier results of the folder")
     run.add_argument(
         "--part",
         metavar="K/N",
@@ -68,12 +57,12 @@ def add(commands: Any) -> None:
     run.add_argument("--check-step", type=float, metavar="FRACTION", help=check_step)
     check_by = "how --check-step repeats them: at half the step (default), or by the stepper explicit"
     run.add_argument("--check-step-by", choices=("half", "explicit"), help=check_by)
-    add_assignments(run, "--set", REPLACE)
+    parts.add_assignments(run, "--set", parts.REPLACE)
 
 
 def _run(arguments: argparse.Namespace) -> int:
     load = partial(_load, arguments)
-    job, options, repeats = load() if arguments.dry_run else alike(arguments, load)
+    job, options, repeats = load() if arguments.dry_run else parts.alike(arguments, load)
 
     from cvt_hpc.printing import next_lines, repeat_line, report_lines, trouble_lines
     from cvt_hpc.study import run
@@ -81,15 +70,15 @@ def _run(arguments: argparse.Namespace) -> int:
 
     if arguments.dry_run:
         show_job(job, arguments.out)
-        if speaks():
+        if parts.speaks():
             for repeat, _ in repeats:
-                say(repeat_line(repeat))
-        return DONE
+                parts.say(repeat_line(repeat))
+        return parts.DONE
     started = time.monotonic()
     report = run(job, arguments.out, part=arguments.part, **options)
-    complain(*trouble_lines(report))
-    if speaks():
-        say(*report_lines(report))
+    parts.complain(*trouble_lines(report))
+    if parts.speaks():
+        parts.say(*report_lines(report))
     latest, statuses = report, [report.exit_status]
     for repeat, show in repeats:
         if stopped := latest.status_of_more:
@@ -97,8 +86,8 @@ def _run(arguments: argparse.Namespace) -> int:
             break
         latest = _repeat(repeat, show, options, started)
         statuses.append(latest.exit_status)
-    if speaks():
-        say(*next_lines(report))
+    if parts.speaks():
+        parts.say(*next_lines(report))
     return end_process(max(statuses))
 
 
@@ -139,7 +128,7 @@ def _repeats(job: Job, arguments: argparse.Namespace) -> list[tuple[Repeat, Call
     from cvt_hpc.study.repeats import check_fraction
     from cvt_hpc.study.step_check import step_check
 
-    out = output_folder(arguments.out, job)
+    out = parts.output_folder(arguments.out, job)
     repeats: list[tuple[Repeat, Callable[[Repeat], None]]] = []
     if arguments.audit is not None:
         check_fraction("--audit", arguments.audit, arguments.part)
@@ -163,8 +152,8 @@ def _repeat(
         left = options["time_limit"] - (time.monotonic() - started)
         options = {**options, "time_limit": max(left, 0.0)}
     report = repeat.run(**options)
-    complain(*(f"{repeat.label}: {line}" for line in trouble_lines(report)))
-    if speaks() and not report.remaining:
+    parts.complain(*(f"{repeat.label}: {line}" for line in trouble_lines(report)))
+    if parts.speaks() and not report.remaining:
         show(repeat)
     return report
 
@@ -173,7 +162,7 @@ def _show_audit(audit: Repeat) -> None:
     from cvt_hpc.ladder.audit import report_audit
     from cvt_hpc.printing import audit_lines
 
-    say(*audit_lines(report_audit(audit)))
+    parts.say(*audit_lines(report_audit(audit)))
 
 
 def _show_step_check(check: Repeat) -> None:
@@ -182,10 +171,10 @@ def _show_step_check(check: Repeat) -> None:
     from cvt_hpc.study import open_results
 
     if not check.sample.any():
-        say("step check: none of the runs has taken steps, none is done again")
+        parts.say("step check: none of the runs has taken steps, none is done again")
         return
     sources = str(check.out), str(check.place)
     with open_results(check.out) as a, open_results(check.place) as b:
         found = compare(a, only(b, check.sample), sources)
     written = leave_comparison(found, check.place, sources)
-    say(*step_check_lines(check, found), *written)
+    parts.say(*step_check_lines(check, found), *written)

@@ -15,7 +15,7 @@ from cvt_hpc.errors import mismatch, show, unknown
 from cvt_hpc.fit.job import NUMBERS, TABLE, Case, Fit, Free, share_of
 from cvt_hpc.fit.targets import read_targets, unit_of
 from cvt_hpc.job import Job, build_job
-from cvt_hpc.job.assignments import Assignments, split_assignments, structured
+from cvt_hpc.job.assignments import Assignments, split_assignments, take_own
 from cvt_hpc.job.axes import read_values
 from cvt_hpc.job.document import read_document
 from cvt_hpc.job.notices import warn_of_notices
@@ -47,16 +47,14 @@ def load_fit(path: str | Path, overrides: Assignments = ()) -> Fit:
     source, document = str(path), read_document(Path(path))
     where = f"{source}: [{TABLE}]"
     replaced = split_assignments(overrides, source, "--set")
-    prefix = f"{TABLE}."
-    own_keys = [key for key in replaced if key.startswith(prefix)]
-    put = {key.removeprefix(prefix): structured(replaced.pop(key)) for key in own_keys}
+    put = take_own(replaced, TABLE)
     if TABLE not in document:
         then = "`cvt-hpc examples fit_lebrecht` copies a job that has one"
         raise mismatch(where, "a table of cases and targets", "nothing", then)
     table = document.pop(TABLE)
     for key in put:
         if key not in NUMBERS:
-            raise unknown(f"{source}: --set {prefix}{key}", "number of [fit]", key, NUMBERS)
+            raise unknown(f"{source}: --set {TABLE}.{key}", "number of [fit]", key, NUMBERS)
     if isinstance(table, Mapping):
         table = {**table, **put}
     own = read_table(NUMBERS, table, where, _TABLES)
@@ -119,15 +117,22 @@ def _read_free(axes: Any, job: Job, source: str) -> tuple[tuple[Free, ...], dict
     where = f"{source}: [axes]"
     found, units = [], {}
     for name, raw in read_tables(axes, where, "ranges of the free parameters").items():
-        key, place = job.schema.find(name, f"{where} {name}"), f"{where} {name}"
-        parameter = job.schema.parameters[key]
-        if kind_of(parameter) is not float:
-            raise mismatch(place, "a parameter with continuous values, to fit it", "another one")
+        place = f"{where} {name}"
+        key, parameter = _continuous(name, job, place, ", to fit it")
         low, high, spacing = read_range(parameter, raw, place)
         warn_of_bare_numbers(parameter, raw, place)
         found.append(Free(key, low, high, spacing))
         units[key] = unit_in(raw)
     return tuple(found), {key: unit for key, unit in units.items() if unit}
+
+
+def _continuous(name: str, job: Job, where: str, why: str = "") -> tuple[str, Parameter]:
+    """Return the key that a name means, of a parameter with continuous values, and its declaration."""
+    key = job.schema.find(name, where)
+    parameter = job.schema.parameters[key]
+    if kind_of(parameter) is not float:
+        raise mismatch(where, f"a parameter with continuous values{why}", "another one")
+    return key, parameter
 
 
 def _read_along(raw: Any, job: Job, where: str) -> tuple[str, NDArray[np.float64]]:
@@ -136,10 +141,8 @@ def _read_along(raw: Any, job: Job, where: str) -> tuple[str, NDArray[np.float64
     if len(table) != 1:
         raise mismatch(where, "one parameter", f"{len(table)}")
     ((name, values),) = table.items()
-    key = job.schema.find(name, f"{where} {name}")
-    if kind_of(job.schema.parameters[key]) is not float:
-        raise mismatch(f"{where} {name}", "a parameter with continuous values", "another one")
-    read = read_values(job.schema.parameters[key], values, f"{where} {name}")
+    key, parameter = _continuous(name, job, f"{where} {name}")
+    read = read_values(parameter, values, f"{where} {name}")
     if list(read) != sorted(set(read)):
         raise mismatch(f"{where} {name}", "values that rise all the way", "others")
     return key, np.array(read)
@@ -157,10 +160,7 @@ def _read_cases(raw: Any, job: Job, where: str) -> dict[str, Case]:
                 raise mismatch(f"{place} {part}", "a table", show(entries))
             for key, value in entries.items():
                 spot = f"{place} {part} {key}"
-                key = job.schema.find(key, spot)
-                parameter = job.schema.parameters[key]
-                if kind_of(parameter) is not float:
-                    raise mismatch(spot, "a parameter with continuous values", "another one")
+                key, parameter = _continuous(key, job, spot)
                 declared = parameter if part == "set" else positive(1.0, "", "factor")
                 of_part[key] = read_value(declared, value, spot)
         found[name] = Case(**parts)

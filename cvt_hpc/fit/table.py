@@ -2,9 +2,6 @@
 
 from __future__ import annotations
 
-import csv
-import hashlib
-import json
 from collections.abc import Iterator, Sequence
 from itertools import combinations
 from pathlib import Path
@@ -13,12 +10,13 @@ from typing import NamedTuple
 import numpy as np
 from numpy.typing import NDArray
 
-from cvt_hpc.files import written_aside
+from cvt_hpc.files import write_rows
 from cvt_hpc.fit.around import Around, reach
 from cvt_hpc.fit.confirming import Confirmed
 from cvt_hpc.fit.job import Fit
 from cvt_hpc.fit.scoring import REPRODUCED, Course, areas, verdict
 from cvt_hpc.fit.search import Found
+from cvt_hpc.job.definition import digest
 from cvt_hpc.job.units import from_si
 from cvt_hpc.netcdf import global_attributes
 from cvt_hpc.provenance import origin_lines
@@ -48,16 +46,12 @@ class Table(NamedTuple):
 
 def write_table(fit: Fit, table: Table, folder: Path) -> Path:
     """Write a table with its title and its origin."""
-    numbers = json.dumps(fit.resolved(), sort_keys=True)
-    fingerprint = hashlib.sha256(numbers.encode()).hexdigest()
-    made = global_attributes(fit.job, fit.resolved(), "fit") | {"job_fingerprint": fingerprint}
-    path = folder / f"{table.name}.csv"
-    with written_aside(path) as aside, aside.open("w", encoding="utf-8", newline="") as file:
-        file.writelines([f"# {table.what}\n", *origin_lines(made)])
-        writer = csv.writer(file, lineterminator="\n")
-        writer.writerow(table.head)
-        writer.writerows([_cell(cell) for cell in row] for row in table.rows)
-    return path
+    resolved = fit.resolved()
+    made = global_attributes(fit.job, resolved, "fit") | {"job_fingerprint": digest(resolved)}
+    rows = ([_cell(cell) for cell in row] for row in table.rows)
+    return write_rows(
+        folder / f"{table.name}.csv", table.head, rows, [f"# {table.what}\n", *origin_lines(made)]
+    )
 
 
 def set_table(fit: Fit, found: Found, best: Confirmed, around: Around) -> Table:

@@ -2,7 +2,7 @@
 
 from cvt_hpc.job.axes import Axis
 from cvt_hpc.job.definition import Job
-from cvt_hpc.job.loading import build_job, load_job, rebuild_job
+from cvt_hpc.job.loading import build_job, load_job, rebuild_job, stored_job
 from cvt_hpc.job.schema import known_keys
 
-__all__ = ["Axis", "Job", "build_job", "known_keys", "load_job", "rebuild_job"]
+__all__ = ["Axis", "Job", "build_job", "known_keys", "load_job", "rebuild_job", "stored_job"]

@@ -145,6 +145,12 @@ def read_coordinates(
     return values
 
 
+def take_own(assignments: dict[str, Any], table: str) -> dict[str, Any]:
+    """Take the values of a command's own table, TABLE.KEY, off the assignments, and return them by KEY."""
+    own = [key for key in assignments if key.startswith(f"{table}.")]
+    return {key.removeprefix(f"{table}."): structured(assignments.pop(key)) for key in own}
+
+
 def structured(raw: Any) -> Any:
     """Return the list or the table that a text of the command line holds, or the value as it is."""
     if not isinstance(raw, str) or not raw.startswith(("[", "{")):

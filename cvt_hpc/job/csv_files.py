@@ -17,7 +17,7 @@ from typing import Any, NamedTuple
 
 from cvt_hpc.errors import InputError, JobWarning, did_you_mean, few_of, mismatch, show
 from cvt_hpc.files import read_regular
-from cvt_hpc.job.units import UnitError, to_si
+from cvt_hpc.job.units import factor_to, to_si
 from cvt_hpc.parameters import Column, FromFile, RowError
 
 MOST_BYTES = 2**20
@@ -108,15 +108,20 @@ def read_csv(file: FromFile, name: str, source: str, where: str) -> dict[str, An
     return raw
 
 
+def content_of(path: Path, limit: int, place: str, what: str, suffix: str) -> bytes:
+    """Return the content of a file beside a job, or raise InputError, which says `what` was expected."""
+    try:
+        return read_regular(path, limit)
+    except FileNotFoundError:
+        near = did_you_mean(str(path), sorted(map(str, path.parent.glob(f"*{suffix}"))))
+        raise mismatch(place, what, f"nothing{near}") from None
+    except (OSError, ValueError) as error:  # a NUL in the path
+        raise mismatch(place, what, getattr(error, "strerror", None) or str(error)) from None
+
+
 def _text(path: Path, place: str) -> tuple[str, str]:
     """Return the content of a file, and its encoding where that is not UTF-8."""
-    try:
-        content = read_regular(path, MOST_BYTES)
-    except FileNotFoundError:
-        near = did_you_mean(str(path), sorted(map(str, path.parent.glob("*.csv"))))
-        raise mismatch(place, "a CSV file", f"nothing{near}") from None
-    except (OSError, ValueError) as error:  # a NUL in the path
-        raise mismatch(place, "a CSV file", getattr(error, "strerror", None) or str(error)) from None
+    content = content_of(path, MOST_BYTES, place, "a CSV file", ".csv")
     wide = content.startswith((codecs.BOM_UTF16_LE, codecs.BOM_UTF16_BE))
     # the letters of units that are not ASCII stand in Latin-1 where Windows has them
     encodings = {"utf-16": "UTF-16 letters"} if wide else {"utf-8-sig": "", "cp1252": "Latin-1 letters"}
@@ -184,7 +189,7 @@ def _are_units(cells: Sequence[str]) -> bool:
 def _columns(file: FromFile, of_names: Row, of_units: Row, place: str) -> list[_Column]:
     """Return the columns that have a name."""
     line, names = of_names
-    where, legal = f"{place}: line {line}", ", ".join(_told(name, file) for name in file.columns)
+    where, legal = f"{place}: line {line}", ", ".join(told(name, file) for name in file.columns)
     if unknown := [cell for cell in names if cell and _key(file, cell) is None]:
         near = did_you_mean(_split(unknown[0])[0], file.columns)
         found = few_of([show(cell) for cell in unknown], _MOST_NAMED) + near
@@ -204,29 +209,22 @@ def _columns(file: FromFile, of_names: Row, of_units: Row, place: str) -> list[_
     for name in file.required:
         if name not in [column.name for column in columns]:
             found = ", ".join(column.name for column in columns)
-            raise mismatch(where, f"a column {_told(name, file)}", f"none among {found}")
+            raise mismatch(where, f"a column {told(name, file)}", f"none among {found}")
     return columns
 
 
 def _si_unit(file: FromFile, name: str, unit: str, place: str) -> str:
     for si in file.columns[name]:
         # a bare number is legal to `to_si`, but a column states its unit
-        if (unit or not si) and _is_unit(unit, si):
+        if (unit or not si) and factor_to(unit, si):
             return si
-    weighs = any(_is_unit(f"{unit}f", si) for si in file.columns[name])
+    weighs = any(factor_to(f"{unit}f", si) for si in file.columns[name])
     then = f'write "{unit}f" for the weight of this mass' if unit and weighs else ""
-    raise mismatch(place, _told(name, file), show(f"{name} [{unit}]" if unit else name), then)
+    raise mismatch(place, told(name, file), show(f"{name} [{unit}]" if unit else name), then)
 
 
-def _is_unit(unit: str, si: str) -> bool:
-    try:
-        to_si(f"1 {unit}", si)
-    except UnitError:
-        return False
-    return True
-
-
-def _told(name: str, file: FromFile) -> str:
+def told(name: str, file: FromFile) -> str:
+    """Return a column with the units that it may have, for an error."""
     return " or ".join(f"{name} [{unit}]" if unit else name for unit in file.columns[name])
 
 

@@ -274,6 +274,11 @@ def fingerprint_of(resolved: Mapping[str, Any]) -> str:
     document = {key: value for key, value in resolved.items() if key not in ("name", "description")}
     # the order of the axes counts, that of tables does not
     document["axes"] = list(document["axes"].items())
+    return digest(document)
+
+
+def digest(document: Any) -> str:
+    """Return the SHA-256 [hex] of a document of JSON types, whatever the order of its keys."""
     return hashlib.sha256(json.dumps(document, sort_keys=True).encode()).hexdigest()
 
 

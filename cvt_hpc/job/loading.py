@@ -9,15 +9,9 @@ from pathlib import Path
 from typing import Any
 
 from cvt_hpc.errors import InputError, did_you_mean, mismatch, show
+from cvt_hpc.job import assignments
 from cvt_hpc.job.arrays import plain
-from cvt_hpc.job.assignments import (
-    Assignments,
-    AxisEntry,
-    read_assignments,
-    split_assignments,
-    split_axes,
-    structured,
-)
+from cvt_hpc.job.assignments import Assignments, AxisEntry
 from cvt_hpc.job.axes import Axis, read_axis
 from cvt_hpc.job.crosscheck import check_grid, check_rules
 from cvt_hpc.job.csv_files import read_csv
@@ -38,7 +32,6 @@ from cvt_hpc.job.values import expectation, kind_of, read_value
 from cvt_hpc.models.contract import load_model
 
 OF_COMMANDS = ("branch", "chart", "fit", "ladder")  # tables that a command of the same name reads
-_OF_DESIGN = "design."
 _NAME = re.compile(r"[A-Za-z0-9][A-Za-z0-9._-]{0,99}")
 
 
@@ -96,15 +89,32 @@ def build_job(
     InputError
         If anything is wrong with the document or an override.
     """
-    job = _build(document, source, overrides, label)
+    job = rebuild_job(document, source, None, overrides, label)
     warn_of_notices(job)
     return job
+
+
+def stored_job(document: Mapping[str, Any], source: str) -> Job:
+    """Return the job that a dataset holds, without the keys that this version does not have.
+
+    Raises
+    ------
+    InputError
+        If anything else is wrong with the document.
+    """
+    schema = load_schema(document.get("model"), document.get("stepper"), source)
+    known = {
+        name: {key: value for key, value in table.items() if key in schema.parameters}
+        for name, table in document.items()
+        if name in schema.sections and isinstance(table, Mapping)
+    }
+    return rebuild_job({**document, **known}, source, {})
 
 
 def rebuild_job(
     document: Mapping[str, Any],
     source: str,
-    units: Mapping[str, str],
+    units: Mapping[str, str] | None,
     overrides: Assignments = (),
     label: str | None = None,
 ) -> Job:
@@ -114,27 +124,17 @@ def rebuild_job(
     ----------
     document, source, overrides, label
         As of `build_job`.
-    units : mapping
-        Units for people: those of the other job.
+    units : mapping or None
+        Units for people: those of the other job. None: the document is a user's own, as of `build_job`.
 
     Raises
     ------
     InputError
         If anything is wrong with the document or an override.
     """
-    return _build(document, source, overrides, label, units)
-
-
-def _build(
-    document: Mapping[str, Any],
-    source: str,
-    overrides: Assignments = (),
-    label: str | None = None,
-    units: Mapping[str, str] | None = None,
-) -> Job:
     document = plain(document)
     label = label or ("override" if isinstance(overrides, Mapping) else "--set")
-    pairs = split_assignments(overrides, source, label)
+    pairs = assignments.split_assignments(overrides, source, label)
     head = {**document, **{key: value for key, value in pairs.items() if key in HEADER}}
     name, description = read_name(head, source), _read_description(head, source)
     schema = load_schema(head.get("model"), head.get("stepper"), source)
@@ -146,11 +146,10 @@ def _build(
         units = {key: unit for key, unit in found.items() if unit}
     schema = replace(schema, units=units)
     tables = _read_tables(document, schema, source)
-    of_design = {key: structured(value) for key, value in pairs.items() if key.startswith(_OF_DESIGN)}
-    others = {key: value for key, value in pairs.items() if key not in (*HEADER, *of_design)}
-    put_axes, others = split_axes(others, schema, source, label)
-    replaced = read_assignments(others, schema, source, label)
-    changed = {key.removeprefix(_OF_DESIGN): value for key, value in of_design.items()}
+    changed = assignments.take_own(pairs, "design")
+    others = {key: value for key, value in pairs.items() if key not in HEADER}
+    put_axes, others = assignments.split_axes(others, schema, source, label)
+    replaced = assignments.read_assignments(others, schema, source, label)
     design = read_design({**document.get("design", {}), **changed}, source)
     put = {*replaced, *put_axes}
     put |= {given for key in replaced if (file := schema.parameters[key].file) for given in file.gives}
@@ -169,15 +168,9 @@ def _build(
     scene = follow(rules, scene)
     parameters = {key: scene[key] for key in schema.parameters if key in scene}
     settled = _settled(rules, axes)
-    without = check_grid(
-        schema,
-        parameters,
-        axes,
-        source,
-        rules=rules,
-        sampled=sampled,
-        given=[*given, *sorted(settled)] if is_users else (),
-    )
+    own = [*given, *sorted(settled)]
+    checked = own if is_users else ()
+    without = check_grid(schema, parameters, axes, source, rules=rules, sampled=sampled, given=checked)
     tell_of_no_effect(schema, parameters, files, without, source)
     histories = document.get(KEY[0], {}).get(KEY[1], [])
     replacing = {key: replaced.get(key) for key in gone}
@@ -189,7 +182,7 @@ def _build(
         source,
         parameters,
         axes,
-        frozenset([*given, *sorted(settled)]),
+        frozenset(own),
         design,
         read_histories(histories, schema, axes, replacing, source, design.get("runs")),
         tuple(rule for rule in rules if rule.key not in settled),
@@ -213,7 +206,7 @@ def _written(
         for name, raw in schema.flatten(table) if isinstance(table, Mapping) else ():
             key = name.rpartition(".")[2]
             if key in schema.parameters and kind_of(schema.parameters[key]) in (float, tuple):
-                found[key] = structured(raw), f"{source}: {place} {name}"
+                found[key] = assignments.structured(raw), f"{source}: {place} {name}"
     return found
 
 

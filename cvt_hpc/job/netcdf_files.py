@@ -14,8 +14,8 @@ from typing import TYPE_CHECKING, Any
 import numpy as np
 
 from cvt_hpc.errors import InputError, did_you_mean, mismatch, show
-from cvt_hpc.files import read_regular
-from cvt_hpc.job.units import UnitError, to_si
+from cvt_hpc.job.csv_files import content_of, told
+from cvt_hpc.job.units import factor_to
 from cvt_hpc.parameters import Column, FromFile, RowError
 
 if TYPE_CHECKING:
@@ -47,13 +47,7 @@ def read_netcdf(file: FromFile, name: str, source: str, where: str) -> dict[str,
     """
     path = Path(source).parent / name
     place = f"{where}: {path}"
-    try:
-        content = read_regular(path, MOST_BYTES)
-    except FileNotFoundError:
-        near = did_you_mean(str(path), sorted(map(str, path.parent.glob(f"*{SUFFIX}"))))
-        raise mismatch(place, "a netCDF file", f"nothing{near}") from None
-    except (OSError, ValueError) as error:  # a NUL in the path
-        raise mismatch(place, "a netCDF file", getattr(error, "strerror", None) or str(error)) from None
+    content = content_of(path, MOST_BYTES, place, "a netCDF file", SUFFIX)
     try:
         columns = _columns(file, content, place)
         return file.arrange(columns)
@@ -78,9 +72,7 @@ def _columns(file: FromFile, content: bytes, place: str) -> dict[str, Column]:
             for name in file.required:
                 if name not in known:
                     found = f"none among {', '.join(known)}" if known else "no variables"
-                    raise mismatch(
-                        place, f"a variable {_told(name, file)}", found + did_you_mean(name, known)
-                    )
+                    raise mismatch(place, f"a variable {told(name, file)}", found + did_you_mean(name, known))
             return _in_rows(file, {name: known[name] for name in file.columns if name in known}, place)
     except (OSError, RuntimeError) as error:
         raise mismatch(place, "a netCDF file", getattr(error, "strerror", None) or str(error)) from None
@@ -116,12 +108,12 @@ def _dimensions(
 ) -> tuple[str, ...]:
     """Dimensions of a variable; those of a matrix are columns."""
     own = tuple(variables[name].dimensions)
-    told = " x ".join(own) or "none"
+    found = " x ".join(own) or "none"
     if len(own) == 2 and own[0] == own[1]:
         own = (f"other_{own[0]}", own[1])
     if not own or (len(own) > 1 and not set(own) <= set(file.columns) - {name}):
         legal = ", ".join(key for key in file.columns if key != name)
-        raise mismatch(f"{place}, {name}", f"dimensions among {legal}", told)
+        raise mismatch(f"{place}, {name}", f"dimensions among {legal}", found)
     return own
 
 
@@ -144,18 +136,10 @@ def _values(file: FromFile, name: str, variable: netCDF4.Variable, place: str) -
     return unit, values
 
 
-def _unit(file: FromFile, name: str, told: Any, place: str) -> tuple[str, float]:
-    text = told if isinstance(told, str) else str(told)
+def _unit(file: FromFile, name: str, given: Any, place: str) -> tuple[str, float]:
+    text = str(given)
     for si in file.columns[name]:
         bare = text.strip() in ("", "1")
-        if bare != (not si):
-            continue
-        try:
-            return si, 1.0 if bare else to_si(f"1 {text}", si)
-        except UnitError:
-            continue
-    raise mismatch(place, f"units {_told(name, file)}", show(text) if text else "none")
-
-
-def _told(name: str, file: FromFile) -> str:
-    return " or ".join(f"{name} [{unit}]" if unit else name for unit in file.columns[name])
+        if bare == (not si) and (factor := 1.0 if bare else factor_to(text.strip(), si)):
+            return si, factor
+    raise mismatch(place, f"units {told(name, file)}", show(text) if text else "none")

@@ -74,11 +74,12 @@ def tell_of_no_effect(
             continue
         if isinstance(value, tuple):
             found, nothing = (files[shown], '""') if shown in files else (value, "[]")
-            where, expected = (
-                f"{source}: [{schema.section_of[key]}] {shown}",
+            where = f"{source}: [{schema.section_of[key]}] {shown}"
+            expected, then = (
                 f"nothing, as it has no effect with {setting}",
+                f"delete it, or set {shown} = {nothing}",
             )
-            raise mismatch(where, expected, show(found), f"delete it, or set {shown} = {nothing}")
+            raise mismatch(where, expected, show(found), then)
         told.append(f"{key} (with {setting})")
     if told:
         warnings.warn(

@@ -27,6 +27,9 @@ Check = Callable[[dict[str, Any]], list[Problem]]
 Inert = Callable[[dict[str, Any]], dict[str, str]]
 
 
+RETIRED = {"contact_sweeps": "contact is solved exactly; delete the line"}  # keys of earlier versions
+
+
 @dataclass(frozen=True)
 class Schema:
     """The parameters of a job with a certain model and stepper.
@@ -125,6 +128,8 @@ class Schema:
         return f"; did you mean {near}{'' if home == section else f' in [{home}]'}?"
 
     def _unknown_key(self, name: str, where: str, section: str | None) -> InputError:
+        if name in RETIRED:
+            return InputError(f"{where}: no key of this version; {RETIRED[name]}")
         hint = self.nearest(name, section)
         if not hint:
             known = self.sections.get(section or "", {}) or self.parameters

@@ -4,10 +4,9 @@ from __future__ import annotations
 
 import math
 from collections.abc import Mapping
-from functools import lru_cache
 from typing import Any
 
-from cvt_hpc.job.units import UnitError, from_si
+from cvt_hpc.job.units import factor_to, from_si
 from cvt_hpc.job.values import in_words
 
 JOB_UNITS = "job_units"  # attribute of a coordinate, beside `units`
@@ -23,7 +22,8 @@ def si_unit(attributes: Mapping[str, Any]) -> str:
 def shown_unit(attributes: Mapping[str, Any]) -> str:
     """Return the unit in which a coordinate is shown: that of the job, else the SI unit."""
     unit, wanted = si_unit(attributes), str(attributes.get(JOB_UNITS, ""))
-    return wanted if wanted and _is_of(unit, wanted) else unit
+    # a dataset may be that of anybody
+    return wanted if wanted and (factor_to(unit, wanted) or 0.0) > 0.0 else unit
 
 
 def shown_number(value: Any, attributes: Mapping[str, Any]) -> Any:
@@ -52,12 +52,3 @@ def heading(name: str, attributes: Mapping[str, Any]) -> str:
     """Return the head of a table's column of `shown_number`, such as "driving_speed [rpm]"."""
     unit = shown_unit(attributes)
     return f"{name} [{unit}]" if unit else name
-
-
-@lru_cache
-def _is_of(unit: str, wanted: str) -> bool:
-    """Whether a unit, of a dataset that anybody may have written, is one of the same dimension."""
-    try:
-        return from_si(1.0, unit, wanted) > 0.0
-    except UnitError:
-        return False

@@ -159,6 +159,5 @@ def cost_in_words(core_seconds: float, runs: int) -> str:
 
 def core_time_in_words(core_seconds: float) -> str:
     """Return a processor time."""
-    return (
-        f"{core_seconds:.3g} core-seconds" if core_seconds < 3600 else f"{core_seconds / 3600:.3g} core-hours"
-    )
+    is_short = core_seconds < 3600
+    return f"{core_seconds:.3g} core-seconds" if is_short else f"{core_seconds / 3600:.3g} core-hours"

@@ -79,6 +79,15 @@ def from_si(value: float, unit: str, wanted: str) -> float:
     return float(_convert(Decimal(repr(float(value))), unit, wanted))
 
 
+@lru_cache
+def factor_to(given: str, unit: str) -> float | None:
+    """Return what turns numbers in a given unit into those in another one; None where nothing does."""
+    try:
+        return from_si(1.0, given, unit)
+    except UnitError:
+        return None
+
+
 def is_unit(text: str) -> bool:
     """Return whether a text is a unit, of whatever dimension."""
     try:

@@ -8,11 +8,12 @@ from typing import Any
 
 import numpy as np
 
-from cvt_hpc.dataset_form import LARGEST
 from cvt_hpc.errors import InputError, did_you_mean, mismatch, show
 from cvt_hpc.job.plausibility import meant
 from cvt_hpc.job.units import UnitError, from_si, to_si, unit_in
 from cvt_hpc.parameters import Parameter
+
+LARGEST = 1e100  # finite value of a parameter [SI]: squares and cubes are numbers, too
 
 
 def read_value(parameter: Parameter, raw: Any, where: str) -> Any:
@@ -91,7 +92,7 @@ def expectation(parameter: Parameter) -> str:
     if kind is bool:
         return "true or false"
     if kind is tuple:
-        return _with_unit("a list of numbers", parameter, " in ")
+        return _with_unit("a list of numbers", parameter)
     return _number_in_words(parameter)
 
 
@@ -127,9 +128,9 @@ def _read_number(parameter: Parameter, raw: Any, where: str) -> float:
     except OverflowError:
         value = math.inf
     if math.isnan(value) or (math.isinf(value) and not parameter.allow_infinite):
-        raise mismatch(where, _with_unit("a finite value", parameter, " in "), show(raw))
+        raise mismatch(where, _with_unit("a finite value", parameter), show(raw))
     if LARGEST < abs(value) < math.inf:
-        raise mismatch(where, _with_unit(f"a value of at most {LARGEST:g}", parameter, " in "), show(raw))
+        raise mismatch(where, _with_unit(f"a value of at most {LARGEST:g}", parameter), show(raw))
     _check_bounds(parameter, value, raw, where)
     return value + 0.0  # -0.0 and 0.0 are one value, and shall be one job
 
@@ -188,5 +189,5 @@ def _number_in_words(parameter: Parameter) -> str:
     return f'a value in {unit} (such as "1 {unit}" or a bare number in {unit})' if unit else "a number"
 
 
-def _with_unit(text: str, parameter: Parameter, joint: str = " ") -> str:
-    return f"{text}{joint}{parameter.unit}" if parameter.unit else text
+def _with_unit(text: str, parameter: Parameter) -> str:
+    return f"{text} in {parameter.unit}" if parameter.unit else text

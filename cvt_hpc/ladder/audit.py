@@ -2,7 +2,6 @@
 
 from __future__ import annotations
 
-import csv
 import math
 from collections.abc import Sequence
 from pathlib import Path
@@ -11,7 +10,7 @@ from typing import TYPE_CHECKING, NamedTuple
 import numpy as np
 
 from cvt_hpc.errors import mismatch
-from cvt_hpc.files import written_aside
+from cvt_hpc.files import write_rows
 from cvt_hpc.job.for_model import handed_to
 from cvt_hpc.job.shown import heading, shown_number
 from cvt_hpc.models.auto.rules import Rung
@@ -104,17 +103,11 @@ def audit_of(job: Job, out: Path, fraction: float) -> Repeat:
             "--audit", f"a job of model {AUDITED}, whose cheaper models can err", f"model {job.model}"
         )
     full = built(job, handed_to(job, FULL_MODEL, "done in full, to audit the cheaper models"))
-    return Repeat(
-        "audit",
-        "in full",
-        job,
-        out,
-        AUDIT,
-        full,
-        fraction,
-        _answered,
-        core_seconds=lambda: expected_cost(full, out / AUDIT)[0],
-    )
+
+    def cost() -> float:
+        return expected_cost(full, out / AUDIT)[0]
+
+    return Repeat("audit", "in full", job, out, AUDIT, full, fraction, _answered, core_seconds=cost)
 
 
 def report_audit(audit: Repeat) -> AuditReport:
@@ -171,14 +164,12 @@ def _write(
     axes = {axis.name: axis.attributes for axis in study.axes}
     heads = [heading(name, attributes) for name, attributes in axes.items()]
     low, full = (records.read(runs) for records in both)
-    with written_aside(table) as path, path.open("w", newline="") as file:
-        writer = csv.writer(file, lineterminator="\n")
-        writer.writerow(
-            ["run", *heads, "rung", "class", "class in full", "margin", "reason", "reason in full"]
-        )
-        for k, index in enumerate(runs):
-            place = [shown_number(value, axes[name]) for name, value in study.place(int(index)).items()]
-            words = [OccurrenceClass(int(found[k])).label for found in classes]
-            reasons = [rows[k]["reason"].decode(errors="replace") for rows in (low, full)]
-            rung, margin = Rung(int(low[k]["rung"])).name.lower(), f"{low[k]['margin']:.3g}"
-            writer.writerow([index, *place, rung, *words, margin, *reasons])
+    rows = []
+    for k, index in enumerate(runs):
+        place = [shown_number(value, axes[name]) for name, value in study.place(int(index)).items()]
+        words = [OccurrenceClass(int(found[k])).label for found in classes]
+        reasons = [records[k]["reason"].decode(errors="replace") for records in (low, full)]
+        rung, margin = Rung(int(low[k]["rung"])).name.lower(), f"{low[k]['margin']:.3g}"
+        rows.append([index, *place, rung, *words, margin, *reasons])
+    head = ["run", *heads, "rung", "class", "class in full", "margin", "reason", "reason in full"]
+    write_rows(table, head, rows)

@@ -8,7 +8,7 @@ from typing import NamedTuple
 
 from cvt_hpc.errors import mismatch, show
 from cvt_hpc.job import Job, build_job
-from cvt_hpc.job.assignments import Assignments, split_assignments, structured
+from cvt_hpc.job.assignments import Assignments, split_assignments, take_own
 from cvt_hpc.job.document import read_document
 from cvt_hpc.job.tables import read_set, read_table
 from cvt_hpc.ladder.pushbelt import PUSHBELT
@@ -57,12 +57,11 @@ def load_ladder(path: str | Path, overrides: Assignments = ()) -> Ladder:
         If anything is wrong with the file or an override, or there is no such ladder of the job.
     """
     source, document = str(path), read_document(Path(path))
-    where, prefix = f"{source}: [{TABLE}]", f"{TABLE}."
+    where = f"{source}: [{TABLE}]"
     replaced = split_assignments(overrides, source, "--set")
-    own = {key.removeprefix(prefix): replaced.pop(key) for key in [*replaced] if key.startswith(prefix)}
-    table = document.pop(TABLE, {})
+    own, table = take_own(replaced, TABLE), document.pop(TABLE, {})
     if isinstance(table, Mapping):
-        table = {**table, **{key: structured(value) for key, value in own.items()}}
+        table = {**table, **own}
     read = read_table(_KEYS, table, where, ("set",))
     reference, beside = read["reference"], read["beside"]
     settings = read_set(table, where)

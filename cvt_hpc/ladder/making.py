@@ -129,8 +129,7 @@ def report_ladder(job: Job, rungs: Sequence[Rung], out: Path) -> LadderReport:
         for found in results.values()
     ]
     dataset = ladder_dataset(job, rungs, findings, makers)
-    with written_aside(report.table) as aside:
-        write_ladder(job, findings, dataset.attrs | {"job_fingerprint": job.fingerprint()}, aside)
+    write_ladder(job, findings, dataset.attrs | {"job_fingerprint": job.fingerprint()}, report.table)
     with written_aside(report.dataset) as aside:
         write_netcdf(dataset, aside)
     draw_ladder(job, findings, report.picture)

@@ -2,7 +2,6 @@
 
 from __future__ import annotations
 
-import csv
 import json
 from collections.abc import Iterator, Mapping, Sequence
 from pathlib import Path
@@ -12,6 +11,7 @@ import numpy as np
 import xarray as xr
 
 from cvt_hpc.analysis.figures import coordinate_unit
+from cvt_hpc.files import write_rows
 from cvt_hpc.job import Job
 from cvt_hpc.job.shown import JOB_UNITS
 from cvt_hpc.ladder.comparing import Finding
@@ -59,13 +59,12 @@ def write_ladder(job: Job, findings: Sequence[Finding], made: Mapping[str, Any],
     """Write the findings as comma-separated values, a row for each model and question, below their origin."""
     findings, unit = in_job_unit(job, findings)
     units = UNITS | {"onset": unit}
-    with path.open("w", encoding="utf-8", newline="") as file:
-        file.writelines(origin_lines(made))
-        writer = csv.writer(file, lineterminator="\n")
-        writer.writerow(["question", "rung", "error_unit", *NUMBERS])
-        for finding in findings:
-            values = (number(value, 3) if isinstance(value, float) else value for value in _numbers(finding))
-            writer.writerow([finding.question, finding.rung, units[finding.question], *values])
+    rows = (
+        [one.question, one.rung, units[one.question]]
+        + [number(value, 3) if isinstance(value, float) else value for value in _numbers(one)]
+        for one in findings
+    )
+    write_rows(path, ["question", "rung", "error_unit", *NUMBERS], rows, origin_lines(made))
 
 
 def ladder_lines(job: Job, findings: Sequence[Finding]) -> Iterator[str]:
@@ -99,29 +98,26 @@ def ladder_dataset(
     values = np.full((len(NUMBERS), len(QUESTIONS), len(names)), np.nan)
     for finding in findings:
         values[:, QUESTIONS.index(finding.question), names.index(finding.rung)] = _numbers(finding)
+    units = {"error_median": "", "error_95": "", "core_seconds": "s"}
     variables = {
-        name: (("question", "rung"), array, attributes(words, _unit(name), text))
+        name: (("question", "rung"), array, attributes(words, units.get(name, "1"), text))
         for (name, (words, text)), array in zip(NUMBERS.items(), values, strict=True)
     }
     texts = {"question": np.array(QUESTIONS, object), "rung": np.array(names, object)}
     coordinates = {name: (name, labels, attributes(name)) for name, labels in texts.items()}
-    units = ("question", np.array(list(UNITS.values()), object), attributes("unit of errors"))
+    of_errors = ("question", np.array(list(UNITS.values()), object), attributes("unit of errors"))
     subject = "accuracy against cost of the ladder of models"
     told = {
         **global_attributes(job, job.resolved(), subject, makers=makers),
         "rungs": json.dumps({rung.name: rung.job.resolved() for rung in rungs}),
         "machine": json.dumps(machine()),
     }
-    return xr.Dataset({"error_unit": units, **variables}, coordinates, told)
+    return xr.Dataset({"error_unit": of_errors, **variables}, coordinates, told)
 
 
 def _numbers(finding: Finding) -> tuple[float, ...]:
     """Values of NUMBERS, in their order."""
     return (*finding.score, finding.core_seconds)
-
-
-def _unit(name: str) -> str:
-    return {"error_median": "", "error_95": "", "core_seconds": "s"}.get(name, "1")
 
 
 def _cells(finding: Finding) -> list[str]:

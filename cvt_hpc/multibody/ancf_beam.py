@@ -28,7 +28,10 @@ from typing import NamedTuple
 import numpy as np
 from numba.extending import register_jitable
 
-PER_NODE = 4
+# Coordinates of a node: its position, and the slope of the line there, each by axes
+X, Y = range(2)
+AXES = 2
+PER_NODE = 2 * AXES
 POINTS = 5  # exact to degree 9
 _X, _W = np.polynomial.legendre.leggauss(POINTS)
 PLACES, WEIGHTS = 0.5 + 0.5 * _X, 0.5 * _W

@@ -104,63 +104,6 @@ def kinematics(l0: float, q: np.ndarray) -> Kinematics:
     )
 
 
-@kernel
-def internal_coordinates(l0: float, q: np.ndarray, internal: np.ndarray) -> None:
-    """Coordinates in the frame of the element's centre.
-
-    Parameters
-    ----------
-    l0 : float
-        Length of the element [m].
-    q : (8,) array
-        Coordinates [m, rad].
-    internal : (8,) array
-        Place for x, y, phi of the centre, eps, and deflection and slope of the first end and of the second,
-        against the tangent at the other end of the half, both positive where the element bends to the left.
-    """
-    shape = kinematics(l0, q)
-    bend = 8 / 9 * (q[3] + q[4]) + 5 / 72 * shape.psi
-    slope = (11 / 4 * shape.delta - 4.0 * (q[3] - q[4])) / l0
-    half = 0.5 * shape.psi / l0
-    internal[4], internal[5] = bend + 0.5 * shape.delta, half + slope
-    internal[6], internal[7] = bend - 0.5 * shape.delta, half - slope
-    c, s = math.cos(q[2]), math.sin(q[2])
-    ahead = 0.5 * l0 * shape.stretch
-    internal[0] = q[0] + ahead * c - internal[4] * s
-    internal[1] = q[1] + ahead * s + internal[4] * c
-    internal[2], internal[3] = q[2] + internal[5], shape.stretch - 1.0
-
-
-@kernel
-def material_point(l0: float, q: np.ndarray, s: float) -> tuple[float, float, float]:
-    """Position x, y [m] and angle of the section [rad] of a material point.
-
-    Parameters
-    ----------
-    l0 : float
-        Length of the element [m].
-    q : (8,) array
-        Coordinates [m, rad].
-    s : float
-        Where the point lies without load, -l0/2 to l0/2 from the centre [m].
-    """
-    shape = kinematics(l0, q)
-    first = s < 0.0
-    side = 1.0 if first else -1.0
-    node = 0 if first else 5
-    v1, v2 = (q[3], q[4]) if first else (q[4], q[3])
-    x = 0.5 - abs(s) / l0
-    w = slope = 0.0
-    v = (v1, v2, shape.psi, side * shape.delta)
-    for j in range(4):
-        k0, k1, k2 = SHAPE[j]
-        w += v[j] * x * x * (k0 + x * (k1 + x * k2))
-        slope += v[j] * x * (2.0 * k0 + x * (3.0 * k1 + x * 4.0 * k2))
-    c, sn = math.cos(q[node + 2]), math.sin(q[node + 2])
-    along = side * shape.stretch * l0 * x
-    return q[node] + along * c - w * sn, q[node + 1] + along * sn + w * c, q[node + 2] + side * slope / l0
-
-
 class LinePoint(NamedTuple):
     """A material point of the line, and the line's direction there.
 
@@ -189,7 +132,7 @@ def line_point(l0: float, q: np.ndarray, s: float, along: np.ndarray, across: np
     """A material point, and its motion by the rates of the coordinates.
 
     The angle here is that of the line, to which the tangent t and the normal n to its left belong; that of
-    the section (`material_point`) differs from it where the slope against the nodes' tangents is not small.
+    the section differs from it where the slope against the nodes' tangents is not small.
 
     Parameters
     ----------

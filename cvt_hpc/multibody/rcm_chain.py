@@ -1,4 +1,4 @@
-"""Rings and open beams of planar RCM elements: equations of all elements, and steps in time.
+"""Rings and open beams of planar RCM elements: the equations of all elements.
 
 The coordinates lie one after the other, five for each element and three for the last node:
 x, y, phi, a1, a2, x, y, phi, ... An element takes eight of them from its node on, so that mass matrices join
@@ -22,8 +22,6 @@ from cvt_hpc.solvers.cyclic_blocks import (
     block_size,
     empty_blocks,
     empty_columns,
-    factor,
-    solve,
 )
 
 PER_ELEMENT, PER_NODE = 5, 3
@@ -76,25 +74,17 @@ def relaxed_ring(beam: RcmBeam, elements: int) -> Chain:
     radius = beam.length / step
     nodes = np.zeros((elements + 1, PER_ELEMENT))
     angle = step * np.arange(elements + 1)
-    nodes[:, 0], nodes[:, 1], nodes[:, 2] = (
-        radius * np.cos(angle),
-        radius * np.sin(angle),
-        angle + math.pi / 2,
-    )
+    nodes[:, 0] = radius * np.cos(angle)
+    nodes[:, 1] = radius * np.sin(angle)
+    nodes[:, 2] = angle + math.pi / 2
     nodes[:, 3:] = math.hypot(radius, 0.25 * beam.length) - radius
-    ring = _chain(beam, 2.0 * math.pi, nodes, elements)
+    ring = chain_of(beam, 2.0 * math.pi, nodes, elements)
     close(ring)
     return ring
 
 
-def straight_beam(beam: RcmBeam, elements: int) -> Chain:
-    """An open beam at rest, straight along x from the origin on."""
-    nodes = np.zeros((elements + 1, PER_ELEMENT))
-    nodes[:, 0] = beam.length * np.arange(elements + 1)
-    return _chain(beam, 0.0, nodes, elements + 1)
-
-
-def _chain(beam: RcmBeam, turn: float, nodes: np.ndarray, blocks: int) -> Chain:
+def chain_of(beam: RcmBeam, turn: float, nodes: np.ndarray, blocks: int) -> Chain:
+    """A chain at rest, from its nodes (k + 1, 5) with quarter points, with so many blocks of equations."""
     q = nodes.ravel()[: nodes.size - (PER_ELEMENT - PER_NODE)].copy()
     return Chain(
         beam,
@@ -191,43 +181,3 @@ def along_row(columns: LaneArray, column: int, element: int, row: np.ndarray) ->
     for r in range(PER_NODE):
         total += columns.data[j, r, column] * row[PER_ELEMENT + r]
     return total
-
-
-@kernel
-def advance(chain: Chain, dt: float, theta: float, steps: int) -> int:
-    """Advance by steps of first order: u+ = u + dt (M + theta dt D + theta^2 dt^2 K)^-1 h, q+ = q + dt u+.
-
-    With `theta` 0 this is the symplectic Euler method, half explicit: stable while dt < 2 / omega_max, where
-    the axial vibration of an element has omega_max = sqrt(12 EA / line_mass) / length, and its bending
-    379 sqrt(EI / line_mass) / length^2 (a free element; 306 in a chain). From 1/2 on neither sets a limit;
-    the change of directions under tension still does, at dt < 0.3 length / sqrt(tension / line_mass).
-    A vibration that dt does not resolve loses a factor (1 - theta) / theta in amplitude a step: with 1/2 it
-    lasts, with 1 it vanishes. One of angular frequency omega that dt does resolve is damped at a rate of
-    (theta - 1/2) omega^2 dt, since elastic forces are taken (2 theta - 1) dt ahead.
-
-    Parameters
-    ----------
-    chain : Chain
-        At a state; then at the last one.
-    dt : float
-        Step [s].
-    theta : float
-        0 or 1/2 to 1.
-    steps : int
-        How many.
-
-    Returns
-    -------
-    int
-        Steps done; fewer than `steps` where a matrix was singular or not finite.
-    """
-    q, u = chain.q, chain.u
-    for step in range(steps):
-        assemble(chain, max(2.0 * theta - 1.0, 0.0) * dt, (theta * dt) ** 2, theta * dt)
-        if not factor(chain.blocks, SIZE):
-            return step
-        solve(chain.blocks, chain.columns, SIZE)
-        for k in range(q.size):
-            u[k] += dt * chain.columns.data[k // PER_ELEMENT % (chain.blocks.rows - 1), k % PER_ELEMENT, 0]
-            q[k] += dt * u[k]
-    return steps

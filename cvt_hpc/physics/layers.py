@@ -71,8 +71,6 @@ def ring_friction(speed, kinetic, falls, static_excess, per_stribeck, per_width,
     rest = halving(size * (2.0 * PER_LN_2 * per_width))
     per_both = 1.0 / ((1.0 + rest) * size)
     per_sum = size * per_both
-    secant, slope = (
-        level * ((1.0 - rest) * per_both),
-        (level * (4.0 * per_width)) * (rest * per_sum * per_sum),
-    )
+    secant = level * ((1.0 - rest) * per_both)
+    slope = (level * (4.0 * per_width)) * (rest * per_sum * per_sum)
     return secant, slope

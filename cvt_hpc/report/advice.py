@@ -11,6 +11,7 @@ import xarray as xr
 from cvt_hpc.analysis.arrangement import value_text
 from cvt_hpc.analysis.classes import OccurrenceClass, at_strongest_strand, map_classes, occurrence_classes
 from cvt_hpc.analysis.figures import coordinate_unit, in_words
+from cvt_hpc.analysis.ticks import number
 from cvt_hpc.job import Job
 from cvt_hpc.job.shown import shown
 from cvt_hpc.models.contract import load_model
@@ -82,9 +83,7 @@ def _along(axis: xr.DataArray, classes: xr.DataArray) -> Iterator[str]:
     if ends and steps.max() > COARSE * steps.sum():
         factor, unit = coordinate_unit(axis.attrs)
         behind = f" {unit}" if unit else ""
-        low, high, step = (
-            f"{factor * value:.4g}".replace("-", "−") for value in (ends[0], ends[-1], steps.max())
-        )
+        low, high, step = (number(factor * value, ".4g") for value in (ends[0], ends[-1], steps.max()))
         between = f"near {low}" if low == high else f"between {low} and {high}"
         closer = f"Steps of {name} below {step}{behind} {between}{behind}"
         yield f"{closer} would tell better where windows begin and end."

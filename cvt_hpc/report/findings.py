@@ -12,18 +12,13 @@ import xarray as xr
 from numpy.typing import NDArray
 
 from cvt_hpc.analysis.arrangement import infinity_in_words, value_text
-from cvt_hpc.analysis.classes import (
-    OccurrenceClass,
-    at_strongest_strand,
-    count_classes,
-    map_classes,
-    occurrence_classes,
-)
+from cvt_hpc.analysis.classes import at_strongest_strand, count_classes, map_classes, occurrence_classes
 from cvt_hpc.analysis.figures import coordinate_unit, in_words
 from cvt_hpc.analysis.scatter import is_sampled
+from cvt_hpc.analysis.ticks import number
 from cvt_hpc.report.quantities import OF_COMPUTATION, length_unit, quantities
 from cvt_hpc.variables import Status
-from cvt_hpc.vibration.classes import DECIDED
+from cvt_hpc.vibration.classes import DECIDED, OccurrenceClass
 from cvt_hpc.vibration.onsets import levels, onsets
 
 MOST_LINES = 12  # lines of the map that are told apart
@@ -35,20 +30,16 @@ STATUS = {int(status): status.name.lower() for status in Status}
 def summary(dataset: xr.Dataset) -> str:
     """Return how many runs there are, of which classes; of a trace also how many cells are inferred."""
     runs = occurrence_classes(dataset).values
+    text = f"{counted(runs.size, 'run')}: {count_classes(runs)}."
     if not is_judged(dataset):
-        return (
-            f"{counted(runs.size, 'run')}: {count_classes(runs)}. No run is known to be quiet or to vibrate."
-        )
+        return f"{text} No run is known to be quiet or to vibrate."
     if "inferred_class" not in dataset:
-        return f"{counted(runs.size, 'run')}: {count_classes(runs)}."
+        return text
     inferred = map_classes(dataset).values[runs != map_classes(dataset).values]
     known = runs[runs != OccurrenceClass.NOT_RUN]
     text = f"{counted(known.size, 'run')}: {count_classes(known)}."
-    return (
-        f"{text} {counted(inferred.size, 'cell')} inferred: {count_classes(inferred)}."
-        if inferred.size
-        else text
-    )
+    beside = f" {counted(inferred.size, 'cell')} inferred: {count_classes(inferred)}."
+    return text + beside if inferred.size else text
 
 
 def is_judged(dataset: xr.Dataset) -> bool:
@@ -64,7 +55,7 @@ def range_sentences(dataset: xr.Dataset) -> Iterator[str]:
         known = np.where(np.isfinite(one.values) & (dataset["status"] == Status.DONE), one.values, np.nan)
         if np.isnan(known).all():
             continue
-        ends = [_number(value) for value in (np.nanmin(known), np.nanmax(known))]
+        ends = [number(value, ".4g") for value in (np.nanmin(known), np.nanmax(known))]
         unit = f" {one.unit}" if one.unit else ""
         place = ""
         if not is_sampled(dataset):
@@ -80,12 +71,8 @@ def slip_sentence(dataset: xr.Dataset, x: str) -> str:
         return ""
     other = [dim for dim in slipping.dims if dim != x]
     lowest = int(np.argmax(slipping.any(other).values))
-    least = (
-        f", the first at {in_words(dataset[x])} {value_text(dataset[x], lowest)}"
-        if _is_number(dataset[x])
-        else ""
-    )
-    return f"The belt slips or lifts off in {counted(count, 'run')}{least}."
+    least = f", the first at {in_words(dataset[x])} {value_text(dataset[x], lowest)}"
+    return f"The belt slips or lifts off in {counted(count, 'run')}{least if _is_number(dataset[x]) else ''}."
 
 
 def counted(count: int, noun: str) -> str:
@@ -166,7 +153,7 @@ def _windows(axis: xr.DataArray, level: NDArray[np.float64]) -> str:
 
     def at(value: float) -> str:
         if np.isfinite(value):
-            return _number(factor * value)
+            return number(factor * value, ".4g")
         return f"a value between {factor * last:.4g} and {infinity_in_words(str(axis.name))}"
 
     parts = []
@@ -175,9 +162,8 @@ def _windows(axis: xr.DataArray, level: NDArray[np.float64]) -> str:
         if one.rising:
             start = at(one.load)
         else:
-            parts.append(
-                f"from {start} to {at(one.load)}{behind}" if start else f"up to {at(one.load)}{behind}"
-            )
+            end = f"{at(one.load)}{behind}"
+            parts.append(f"from {start} to {end}" if start else f"up to {end}")
             start = ""
     if start:
         parts.append(f"from {start}{behind} on")
@@ -223,10 +209,6 @@ def failures(dataset: xr.Dataset) -> list[Failure]:
 
 def _without_numbers(reason: str) -> str:
     return "".join(letter for letter in reason if not letter.isdigit())
-
-
-def _number(value: float) -> str:
-    return f"{value:.4g}".replace("-", "−")
 
 
 def _is_number(axis: xr.DataArray) -> bool:

@@ -28,20 +28,12 @@ from cvt_hpc.analysis.starts import AXIS, has_starts
 from cvt_hpc.analysis.value_maps import value_map_figure
 from cvt_hpc.errors import InputError, escaped, mismatch, one_line
 from cvt_hpc.files import written_aside
-from cvt_hpc.job import Job, rebuild_job
+from cvt_hpc.job import Job, stored_job
 from cvt_hpc.job.summary import core_time_in_words, rules_in_words, value_in_words
 from cvt_hpc.models.contract import load_model
 from cvt_hpc.netcdf import CONTENT, HISTORY
+from cvt_hpc.report import findings
 from cvt_hpc.report.advice import next_steps
-from cvt_hpc.report.findings import (
-    counted,
-    failures,
-    is_judged,
-    range_sentences,
-    slip_sentence,
-    summary,
-    window_sentences,
-)
 from cvt_hpc.report.interactive import KEPT, as_script, map_data
 from cvt_hpc.report.quantities import quantities
 
@@ -118,20 +110,20 @@ def _content(dataset: xr.Dataset, source: str, folder: Path | None) -> dict[str,
     if joined:  # the attributes are those of one of several studies
         job = None
     arrangement = _arrangement(dataset, source)
-    found = failures(dataset)
+    found = findings.failures(dataset)
     parameters = _parameters(job) if job else {}
     sentences: list[str] = []
     beyond: list[str] = []
-    judged, x = is_judged(dataset), None
+    judged, x = findings.is_judged(dataset), None
     if arrangement:
         axes = [name for name in (arrangement.panel, arrangement.y) if name]
         beyond = [name for name in map(str, dataset["status"].dims) if name not in (arrangement.x, *axes)]
         x = arrangement.x if dataset[arrangement.x].dtype.kind in "iuf" else None
         if judged:
-            sentences = list(window_sentences(dataset, arrangement.x, [*beyond, *axes]))
-            sentences += filter(None, [slip_sentence(dataset, arrangement.x)])
+            sentences = list(findings.window_sentences(dataset, arrangement.x, [*beyond, *axes]))
+            sentences += filter(None, [findings.slip_sentence(dataset, arrangement.x)])
     if not judged:
-        sentences = list(range_sentences(dataset))
+        sentences = list(findings.range_sentences(dataset))
     combinations = int(np.prod([dataset.sizes[name] for name in beyond]))
     return {
         "name": one_line(attributes.get("job_name", source)),
@@ -139,7 +131,7 @@ def _content(dataset: xr.Dataset, source: str, folder: Path | None) -> dict[str,
         "model": f"{job.model}: {load_model(job.model).title}" if job else "",
         "axes": _axes(dataset, job),
         "joined": " and ".join(joined),
-        "summary": summary(dataset),
+        "summary": findings.summary(dataset),
         "sentences": list(map(_with_code, sentences)),
         "windows": any("vibration from" in line or "vibration up to" in line for line in sentences),
         "next_steps": list(map(_with_code, next_steps(dataset, job, x))),
@@ -150,7 +142,7 @@ def _content(dataset: xr.Dataset, source: str, folder: Path | None) -> dict[str,
         "not_drawn": max(0, combinations - MOST_MAPS),
         "beyond": " and ".join(beyond),
         "failures": found[:MOST_FAILURES],
-        "failed": counted(sum(one.runs for one in found), "run"),
+        "failed": findings.counted(sum(one.runs for one in found), "run"),
         "cost": _cost(dataset),
         "quality": _quality(dataset),
         "samples": _samples(dataset, folder, source),
@@ -164,7 +156,7 @@ def _content(dataset: xr.Dataset, source: str, folder: Path | None) -> dict[str,
 def _job(attributes: Mapping[str, str], source: str) -> Job | None:
     """The job of a dataset; None where this version of the program cannot read it any more."""
     try:
-        return rebuild_job(json.loads(attributes["job"]), source, {})
+        return stored_job(json.loads(attributes["job"]), source)
     except (InputError, KeyError, ValueError, RecursionError):
         return None
 
@@ -191,7 +183,7 @@ def _pictures(
         for place in islice(product(*(dataset[name].values.tolist() for name in beyond)), MOST_MAPS):
             at = dict(zip(beyond, place, strict=True))
             part = arrange(dataset, at, source, sides)
-            found = summary(part.dataset)
+            found = findings.summary(part.dataset)
             pictures.append(Picture("; ".join(part.notes), found, _picture(dataset, at, source)))
     return [one for one in pictures if one.picture]
 
@@ -224,7 +216,7 @@ def _picture(dataset: xr.Dataset, at: Mapping[str, Any], source: str) -> str:
 
     It shows quantities where nothing was judged.
     """
-    shown = () if is_judged(dataset) else dict.fromkeys(one.key for one in quantities(dataset))
+    shown = () if findings.is_judged(dataset) else dict.fromkeys(one.key for one in quantities(dataset))
     drawn = [key for key in shown if dataset[key].dtype.kind in "iuf"][:MOST_VALUE_MAPS]
     if drawn:
         return _encoded(lambda: value_map_figure(dataset, drawn, at, source))

@@ -157,23 +157,13 @@ def in_lanes(
     apart : callable
         Further values that the runs of a group have in common.
     """
-    for group in _grouped(model, runs, parameters, apart):
-        most = model.lanes(parameters(group[0]), stepper)
-        for first in range(0, len(group), most):
-            yield group[first : first + most]
-
-
-def _grouped(
-    model: Model,
-    runs: Iterable[Item],
-    parameters: Callable[[Item], Parameters],
-    apart: Callable[[Item], Any] = lambda run: None,
-) -> Iterable[list[Item]]:
-    """Runs of equal lane keys."""
     groups: dict[Any, list[Item]] = {}
     for run in runs:
         groups.setdefault((model.lane_key(parameters(run)), apart(run)), []).append(run)
-    return groups.values()
+    for group in groups.values():
+        most = model.lanes(parameters(group[0]), stepper)
+        for first in range(0, len(group), most):
+            yield group[first : first + most]
 
 
 def _batch_size(job: Job, parameters: dict[str, Any]) -> int:

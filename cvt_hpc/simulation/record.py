@@ -15,17 +15,19 @@ if TYPE_CHECKING:
     from cvt_hpc.job import Job
 
 _VERDICT = (
-    Variable("status", (), "i1", "", "how the run ended", Status),
+    Variable("status", "", "how the run ended", dtype="i1", flags=Status),
     Variable(
-        "vibrates", (), "i1", "", "whether the belt vibrates; has a meaning where status is done", Vibrates
+        "vibrates",
+        "",
+        "whether the belt vibrates; has a meaning where status is done",
+        dtype="i1",
+        flags=Vibrates,
     ),
-    Variable("reason", (), f"S{LONGEST_REASON}", "", "why the run failed, or was found to vibrate or not"),
+    Variable("reason", "", "why the run failed, or was found to vibrate or not", dtype=f"S{LONGEST_REASON}"),
 )
 _COST = (
     Variable(
         "core_seconds",
-        (),
-        "f8",
         "s",
         "processor time, all tries; of runs that advance together, their time divided by their number",
         volatile=True,
@@ -35,16 +37,14 @@ _COST = (
 _MARCH = (
     Variable(
         "simulated_seconds",
-        (),
-        "f8",
         "s",
         "more than asked where a run was prolonged, less where it failed or slipped through",
         words="simulated time",
     ),
-    Variable("time_step", (), "f8", "s", "time step of the run that counts"),
-    Variable("refinements", (), "i1", "1", "times that the run was done again at half the step"),
-    Variable("steps", (), "i8", "1", "time steps taken, all tries"),
-    Variable("contact_solves", (), "i8", "1", "linear solves of the contact problem, all tries"),
+    Variable("time_step", "s", "time step of the run that counts"),
+    Variable("refinements", "1", "times that the run was done again at half the step", dtype="i1"),
+    Variable("steps", "1", "time steps taken, all tries", dtype="i8"),
+    Variable("contact_solves", "1", "linear solves of the contact problem, all tries", dtype="i8"),
 )
 COMMON = (*_VERDICT, *_COST, *_MARCH)  # of all models; those without a march have none of its
 

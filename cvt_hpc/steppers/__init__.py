@@ -17,19 +17,11 @@ march(system, control, interval, rows, clock, y, work, counts) -> int
 
 from collections.abc import Collection
 
-STEPPERS = {
-    "symplectic_euler": "cvt_hpc.steppers.symplectic_euler",
-    "runge_kutta_4": "cvt_hpc.steppers.runge_kutta_4",
-    "dormand_prince": "cvt_hpc.steppers.dormand_prince",
-    "theta": "cvt_hpc.steppers.theta",
-    "generalised_alpha": "cvt_hpc.steppers.generalised_alpha",
-    "sdirk": "cvt_hpc.steppers.sdirk",
-    "rosenbrock_w": "cvt_hpc.steppers.rosenbrock_w",
-    "moreau": "cvt_hpc.steppers.moreau",
-    "scipy_lsoda": "cvt_hpc.steppers.scipy_lsoda",
-    "scipy_bdf": "cvt_hpc.steppers.scipy_bdf",
-    "scipy_radau": "cvt_hpc.steppers.scipy_radau",
-}
+_NAMES = (
+    *("symplectic_euler", "runge_kutta_4", "dormand_prince", "theta", "generalised_alpha", "sdirk"),
+    *("rosenbrock_w", "moreau", "scipy_lsoda", "scipy_bdf", "scipy_radau"),
+)
+STEPPERS = {name: f"cvt_hpc.steppers.{name}" for name in _NAMES}  # the module of each
 
 
 def taken(refused: Collection[str]) -> dict[str, str]:

@@ -15,17 +15,23 @@ from typing import NamedTuple
 import numpy as np
 
 from cvt_hpc.kernels import kernel
-from cvt_hpc.steppers.facts import RATES, REJECTED, STEPS, Facts, Result
+from cvt_hpc.steppers.facts import (
+    NO_VALUE,
+    NOT_FINITE,
+    OK,
+    RATES,
+    REJECTED,
+    STEP_TOO_SMALL,
+    STEPS,
+    TOO_MANY_STEPS,
+    Facts,
+)
 from cvt_hpc.steppers.settings import MOST_STEPS, TOLERANCE, Tolerance, tolerance
 from cvt_hpc.steppers.system import System, all_finite, size
 
 FACTS = Facts(
     order=5,
-    order_at_events=None,
     adaptive=True,
-    needs=frozenset({"rates"}),
-    implicit=False,
-    l_stable=False,
     width_limit=0.1,
     stability="the control keeps the step below 3.3 / d for a damping rate d (friction: "
     "d = N mu / (m v_reg), while errors allowed in a speed are below 0.1 v_reg) and 1.0 / w for a vibration "
@@ -33,8 +39,6 @@ FACTS = Facts(
     damping="below the tolerance",
 )
 PARAMETERS = {"numerics": {"tolerance": TOLERANCE, "most_steps": MOST_STEPS}}
-OK, NO_VALUE, NOT_FINITE = int(Result.OK), int(Result.NO_VALUE), int(Result.NOT_FINITE)
-STEP_TOO_SMALL, TOO_MANY_STEPS = int(Result.STEP_TOO_SMALL), int(Result.TOO_MANY_STEPS)
 control = tolerance
 
 STAGES = 7

@@ -22,6 +22,10 @@ class Result(IntEnum):
     NOT_UNIQUE = 7
 
 
+# the same as plain numbers, for kernels
+OK, NOT_FINITE, NO_VALUE, STEP_TOO_SMALL, NO_CONVERGENCE, SINGULAR, TOO_MANY_STEPS, NOT_UNIQUE = map(
+    int, Result
+)
 MESSAGES: dict[Result, str] = {
     Result.NOT_FINITE: "the state is not a number",
     Result.NO_VALUE: "the right-hand side has no value",
@@ -84,13 +88,13 @@ class Facts:
     """
 
     order: int
-    order_at_events: float | None
-    adaptive: bool
-    needs: frozenset[str]
-    implicit: bool
-    l_stable: bool
     stability: str
     damping: str
+    order_at_events: float | None = None
+    adaptive: bool = False
+    needs: frozenset[str] = frozenset({"rates"})
+    implicit: bool = False
+    l_stable: bool = False
     rest_limit: float = inf
     width_limit: float = inf
     vibration_limit: float = inf

@@ -7,10 +7,8 @@ from typing import Any
 import numpy as np
 
 from cvt_hpc.kernels import kernel
-from cvt_hpc.steppers.facts import STEPS, Result
+from cvt_hpc.steppers.facts import NOT_FINITE, OK, STEPS
 from cvt_hpc.steppers.system import all_finite
-
-OK, NOT_FINITE = int(Result.OK), int(Result.NOT_FINITE)
 
 
 @kernel

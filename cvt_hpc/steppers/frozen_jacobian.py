@@ -13,11 +13,9 @@ from typing import NamedTuple
 import numpy as np
 
 from cvt_hpc.kernels import kernel
-from cvt_hpc.steppers.facts import FACTORISATIONS, JACOBIANS, RATES, Result
+from cvt_hpc.steppers.facts import FACTORISATIONS, JACOBIANS, NO_VALUE, NOT_FINITE, OK, RATES, SINGULAR
 from cvt_hpc.steppers.system import System, all_finite, jacobian
 
-OK, NOT_FINITE, NO_VALUE = int(Result.OK), int(Result.NOT_FINITE), int(Result.NO_VALUE)
-SINGULAR = int(Result.SINGULAR)
 SHIFT, SIGN = range(2)
 
 

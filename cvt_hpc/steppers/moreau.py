@@ -24,7 +24,7 @@ from typing import NamedTuple
 import numpy as np
 
 from cvt_hpc.kernels import kernel
-from cvt_hpc.steppers.facts import RATES, SOLVES, Facts, Result
+from cvt_hpc.steppers.facts import NO_CONVERGENCE, NO_VALUE, OK, RATES, SOLVES, Facts
 from cvt_hpc.steppers.fixed_step import march_in_equal_steps
 from cvt_hpc.steppers.settings import STEP, FixedStep, fixed_step
 from cvt_hpc.steppers.system import SetValuedSystem
@@ -32,17 +32,13 @@ from cvt_hpc.steppers.system import SetValuedSystem
 FACTS = Facts(
     order=1,
     order_at_events=1.0,
-    adaptive=False,
     needs=frozenset({"rates", "partition", "friction"}),
-    implicit=False,
-    l_stable=False,
     vibration_limit=2.0,
     stability="step < 2 / w for a vibration of frequency w, step < 2 / d for a damping rate d (rising "
     "friction: N |mu'| / m); dry friction and rigid contact set no limit",
     damping="none where smooth forces depend on positions only",
 )
 PARAMETERS = {"numerics": {"step": STEP}}
-OK, NO_VALUE, NO_CONVERGENCE = int(Result.OK), int(Result.NO_VALUE), int(Result.NO_CONVERGENCE)
 control = fixed_step
 
 MOST_SWEEPS = 10_000

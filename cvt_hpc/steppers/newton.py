@@ -17,12 +17,9 @@ from __future__ import annotations
 import numpy as np
 
 from cvt_hpc.kernels import kernel
-from cvt_hpc.steppers.facts import RATES, SOLVES, Result
+from cvt_hpc.steppers.facts import NO_CONVERGENCE, NO_VALUE, NOT_FINITE, NOT_UNIQUE, OK, RATES, SOLVES
 from cvt_hpc.steppers.frozen_jacobian import SHIFT, SIGN, Frozen, renew
 from cvt_hpc.steppers.system import System, size
-
-OK, NOT_FINITE, NO_VALUE = int(Result.OK), int(Result.NOT_FINITE), int(Result.NO_VALUE)
-NO_CONVERGENCE, NOT_UNIQUE = int(Result.NO_CONVERGENCE), int(Result.NOT_UNIQUE)
 
 ENOUGH = 0.5  # reduction of the correction in a pass with which a frozen matrix is kept
 LEAST_SHARE = 1e-9  # of the correction: the interval at which the search along it ends

@@ -24,7 +24,7 @@ from typing import NamedTuple
 import numpy as np
 
 from cvt_hpc.kernels import kernel
-from cvt_hpc.steppers.facts import RATES, REJECTED, SOLVES, Facts, Result
+from cvt_hpc.steppers.facts import NO_VALUE, NOT_UNIQUE, OK, RATES, REJECTED, SOLVES, Facts
 from cvt_hpc.steppers.fixed_step import march_in_equal_steps
 from cvt_hpc.steppers.frozen_jacobian import SHIFT, SIGN, Frozen, frozen, renew
 from cvt_hpc.steppers.settings import STEP, FixedStep, fixed_step
@@ -33,8 +33,6 @@ from cvt_hpc.steppers.system import System, size
 FACTS = Facts(
     order=2,
     order_at_events=0.98,
-    adaptive=False,
-    needs=frozenset({"rates"}),
     implicit=True,
     l_stable=True,
     rest_limit=4.0,
@@ -44,7 +42,6 @@ FACTS = Facts(
     damping="a vibration decays at the rate 0.0037 step^3 w^4",
 )
 PARAMETERS = {"numerics": {"step": STEP}}
-OK, NO_VALUE, NOT_UNIQUE = int(Result.OK), int(Result.NO_VALUE), int(Result.NOT_UNIQUE)
 control = fixed_step
 
 G = 1.0 - np.sqrt(0.5)

@@ -13,7 +13,7 @@ from typing import NamedTuple
 import numpy as np
 
 from cvt_hpc.kernels import kernel
-from cvt_hpc.steppers.facts import RATES, Facts, Result
+from cvt_hpc.steppers.facts import NO_VALUE, OK, RATES, Facts
 from cvt_hpc.steppers.fixed_step import march_in_equal_steps
 from cvt_hpc.steppers.settings import STEP, FixedStep, fixed_step
 from cvt_hpc.steppers.system import System
@@ -21,10 +21,6 @@ from cvt_hpc.steppers.system import System
 FACTS = Facts(
     order=4,
     order_at_events=0.92,
-    adaptive=False,
-    needs=frozenset({"rates"}),
-    implicit=False,
-    l_stable=False,
     rest_limit=2.785,
     vibration_limit=2.828,
     stability="step < 2.828 / w for a vibration of frequency w, step < 2.785 / d for a damping rate d "
@@ -32,7 +28,6 @@ FACTS = Facts(
     damping="a vibration decays at the rate (step w)^6 / (144 step)",
 )
 PARAMETERS = {"numerics": {"step": STEP}}
-OK, NO_VALUE = int(Result.OK), int(Result.NO_VALUE)
 control = fixed_step
 
 

@@ -18,16 +18,7 @@ from cvt_hpc.steppers.settings import MOST_STEPS, TOLERANCE, Tolerance, toleranc
 from cvt_hpc.steppers.system import System
 
 # Common facts of the three; each states its own.
-FACTS = Facts(
-    order=5,
-    order_at_events=None,
-    adaptive=True,
-    needs=frozenset({"rates"}),
-    implicit=True,
-    l_stable=False,
-    stability="",
-    damping="below the tolerance",
-)
+FACTS = Facts(order=5, adaptive=True, implicit=True, stability="", damping="below the tolerance")
 PARAMETERS = {"numerics": {"tolerance": TOLERANCE, "most_steps": MOST_STEPS}}
 control = tolerance
 

@@ -19,7 +19,7 @@ from typing import NamedTuple
 import numpy as np
 
 from cvt_hpc.kernels import kernel
-from cvt_hpc.steppers.facts import Facts, Result
+from cvt_hpc.steppers.facts import OK, Facts
 from cvt_hpc.steppers.fixed_step import march_in_equal_steps
 from cvt_hpc.steppers.frozen_jacobian import Frozen, frozen
 from cvt_hpc.steppers.newton import solve_stage
@@ -29,8 +29,6 @@ from cvt_hpc.steppers.system import System
 FACTS = Facts(
     order=3,
     order_at_events=1.05,
-    adaptive=False,
-    needs=frozenset({"rates"}),
     implicit=True,
     l_stable=True,
     stability="no limit; growth is growth only while step times the steepest growth rate (falling friction: "
@@ -38,7 +36,6 @@ FACTS = Facts(
     damping="a vibration decays at the rate 0.0259 step^3 w^4",
 )
 PARAMETERS = {"numerics": {"step": STEP, "solver_tolerance": SOLVER_TOLERANCE}}
-OK = int(Result.OK)
 control = implicit_step
 
 # root of g^3 - 3 g^2 + 3 g / 2 = 1/6 for which the method is L-stable

@@ -6,16 +6,20 @@ from collections.abc import Mapping
 from functools import partial
 from typing import Any, NamedTuple, TypeVar
 
-from cvt_hpc.parameters import Parameter
+from cvt_hpc.parameters import Parameter, positive
 
-STEP = Parameter(
-    1e-5,
-    "s",
-    "largest time step; a whole number of steps makes a sampling interval",
-    minimum=0.0,
-    exclusive=True,
-    sensible=(1e-10, 0.5),
+STEP = positive(
+    1e-5, "s", "largest time step; a whole number of steps makes a sampling interval", sensible=(1e-10, 0.5)
 )
+SPEED_TOLERANCE = Parameter(
+    1e-3,
+    "m/s",
+    "largest correction of a speed with which the equations of a step count as solved",
+    minimum=1e-12,
+    maximum=1.0,
+    sensible=(1e-12, 0.1),
+)
+MOST_ITERATIONS = Parameter(40, "", "iterations of a step", minimum=2, maximum=1000)
 TOLERANCE = Parameter(
     1e-6,
     "",
@@ -33,6 +37,12 @@ SOLVER_TOLERANCE = Parameter(
     minimum=1e-14,
     maximum=1e-2,
 )
+
+
+def own_step(default: float, least: float, longest: float) -> Parameter:
+    """The step [s] of a model's own method, with its bounds."""
+    bounds = least, longest
+    return Parameter(default, "s", STEP.description, minimum=least, maximum=longest, sensible=bounds)
 
 
 Kind = TypeVar("Kind", bound=NamedTuple)

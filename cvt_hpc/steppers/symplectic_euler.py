@@ -17,7 +17,7 @@ from typing import NamedTuple
 import numpy as np
 
 from cvt_hpc.kernels import kernel
-from cvt_hpc.steppers.facts import RATES, Facts, Result
+from cvt_hpc.steppers.facts import NO_VALUE, OK, RATES, Facts
 from cvt_hpc.steppers.fixed_step import march_in_equal_steps
 from cvt_hpc.steppers.settings import STEP, FixedStep, fixed_step
 from cvt_hpc.steppers.system import System
@@ -25,10 +25,7 @@ from cvt_hpc.steppers.system import System
 FACTS = Facts(
     order=1,
     order_at_events=0.94,
-    adaptive=False,
     needs=frozenset({"rates", "partition"}),
-    implicit=False,
-    l_stable=False,
     rest_limit=2.0,
     vibration_limit=2.0,
     stability="step < 2 / w for a vibration of frequency w, step < 2 / d for a damping rate d (friction: "
@@ -36,7 +33,6 @@ FACTS = Facts(
     damping="none where forces depend on positions only",
 )
 PARAMETERS = {"numerics": {"step": STEP}}
-OK, NO_VALUE = int(Result.OK), int(Result.NO_VALUE)
 control = fixed_step
 
 

@@ -15,7 +15,7 @@ import numpy as np
 
 from cvt_hpc.kernels import kernel
 from cvt_hpc.parameters import Parameter
-from cvt_hpc.steppers.facts import RATES, Facts, Result
+from cvt_hpc.steppers.facts import NO_VALUE, RATES, Facts
 from cvt_hpc.steppers.fixed_step import march_in_equal_steps
 from cvt_hpc.steppers.frozen_jacobian import Frozen, frozen
 from cvt_hpc.steppers.newton import solve_stage
@@ -25,10 +25,7 @@ from cvt_hpc.steppers.system import System
 FACTS = Facts(
     order=2,
     order_at_events=0.97,
-    adaptive=False,
-    needs=frozenset({"rates"}),
     implicit=True,
-    l_stable=False,
     stability="no limit; solvable in one way only while theta step times the steepest growth rate (falling "
     "friction: N |mu'| / m) is below 1",
     damping="theta = 1/2: none, and none of what is too fast for the step; else at the rate "
@@ -47,7 +44,6 @@ PARAMETERS = {
         "solver_tolerance": SOLVER_TOLERANCE,
     }
 }
-OK, NO_VALUE = int(Result.OK), int(Result.NO_VALUE)
 
 
 class Control(NamedTuple):

@@ -70,7 +70,6 @@ class Dimension:
         entry = dict(entry)
         if not entry.pop("texts"):
             entry["values"] = [float(v) if isinstance(v, str) else v for v in entry["values"]]
-        # folders of earlier versions have fewer keys; missing ones have defaults
         fields: dict[str, Any] = {
             key: tuple(value) if isinstance(value, list) else value for key, value in entry.items()
         }

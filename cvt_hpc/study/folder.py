@@ -12,7 +12,6 @@ from typing import Any
 
 from cvt_hpc.errors import InputError, few_of, mismatch, nearest
 from cvt_hpc.files import kind_of, make_own_folder, naming_refusals, sync_folder
-from cvt_hpc.job.definition import fingerprint_of
 from cvt_hpc.locks import BusyError, is_locked, locked
 from cvt_hpc.output_folder import DamagedJobError, Kind, OutputFolder
 from cvt_hpc.study.description import Study
@@ -21,11 +20,12 @@ from cvt_hpc.study.part import Part
 from cvt_hpc.study.record.frames import MAGIC
 from cvt_hpc.study.record.index import Records, open_log
 from cvt_hpc.study.record.recovery import Places, read_records
-from cvt_hpc.study.stored import check_stored
 
 MOST_NAMED = 5
 _PART_LOCKS = ".part-*.lock"
 _EARLIER = f"job-{'[0-9a-f]' * 16}"  # files of jobs from which the study has grown
+_MOST_RUNS = 10**8
+_LARGEST_RECORD = 1 << 26  # [bytes]
 
 _logger = logging.getLogger(__name__)
 
@@ -132,13 +132,11 @@ class StudyFolder(OutputFolder[Study]):
 
     def accept(self, entry: dict[str, Any]) -> Study:
         """Return the study of a sound job.json."""
-        check_stored(entry)
-        return Study.from_json(entry)
-
-    def check_unsigned(self, entry: dict[str, Any]) -> None:
-        """Raise ValueError unless the job of an earlier version gives the fingerprint that stands there."""
-        if fingerprint_of(entry["job"]) != entry["fingerprint"]:
-            raise ValueError("it has no checksum, and its job does not give its fingerprint")
+        study = Study.from_json(entry)
+        if study.size > _MOST_RUNS or study.record_dtype.itemsize > _LARGEST_RECORD:
+            most = f"{_MOST_RUNS} runs, and records of {_LARGEST_RECORD >> 20} MiB"
+            raise ValueError(f"it has more than {most}")
+        return study
 
     def refuse_other(self, found: Study, asked: Study) -> None:
         """Raise InputError unless the folder is that of the study, with the quantities of this version."""

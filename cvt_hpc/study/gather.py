@@ -20,7 +20,7 @@ from cvt_hpc.study.description import Study
 from cvt_hpc.study.dimensions import Dimension
 from cvt_hpc.study.folder import StudyFolder, study_instead
 from cvt_hpc.study.growth import places_in
-from cvt_hpc.study.job_difference import difference_in_words, flatten
+from cvt_hpc.study.job_difference import difference_in_words
 from cvt_hpc.study.record.index import Records
 from cvt_hpc.study.record.log import KEPT
 from cvt_hpc.study.tracing import inferred_classes
@@ -33,11 +33,10 @@ if TYPE_CHECKING:
 
 _INFERRED = Variable(
     "inferred_class",
-    (),
-    "i1",
     "",
     "class of the run; where status is not_run, the class of the runs around it, which is inferred",
-    OccurrenceClass,
+    dtype="i1",
+    flags=OccurrenceClass,
 )
 PATIENCE = 600.0  # [s]; 10^6 runs are gathered within a minute
 _logger = logging.getLogger(__name__)
@@ -133,9 +132,7 @@ def _read_held(path: Path) -> tuple[dict[str, Any], np.ndarray]:
     try:
         check_hdf5(path, path.stat().st_size, str(path))
         with h5py.File(path, "r", locking=False) as file:  # whoever else has locked it
-            job = json.loads(file.attrs["job"])
-            flatten(job)  # not nested too deep
-            return job, np.ravel(file["status"][()])
+            return json.loads(file.attrs["job"]), np.ravel(file["status"][()])
     except (InputError, *DAMAGE):
         return nothing
 

@@ -25,12 +25,10 @@ def _closing_radius(parameters: Mapping[str, Any]) -> float:
 SCENE: dict[str, Parameter] = {
     "ratio": positive(2.52, "", "speed ratio, driven radius / driving radius (Lebrecht 2004: LOW stop)"),
     "driven_radius": positive(0.075, "m", "pitch radius on the driven pulley", sensible=(0.01, 0.5)),
-    "belt_length": Parameter(
+    "belt_length": positive(
         None,
         "m",
         "length of the closed pitch line, in the place of driven_radius, which follows at each ratio",
-        minimum=0.0,
-        exclusive=True,
         gives=Substitute("driven_radius", ("ratio", "centre_distance"), _closing_radius),
         sensible=(0.1, 5.0),
     ),
@@ -134,10 +132,7 @@ def course_inert(parameters: Mapping[str, Any]) -> dict[str, str]:
 
 FRICTION: dict[str, Parameter] = {
     "friction_law": Parameter(
-        "stribeck",
-        "",
-        "friction of the flanks over sliding speed",
-        choices=FRICTION_LAWS,
+        "stribeck", "", "friction of the flanks over sliding speed", choices=FRICTION_LAWS
     ),
     "friction_gradient": Parameter(
         -0.8,

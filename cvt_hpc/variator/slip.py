@@ -42,13 +42,11 @@ GAINED = f"the belt slips through: the driven pulley has gained {MOST_SPEED - 1:
 VARIABLES = (
     Variable(
         "carried_torque",
-        (),
-        "f8",
         "N m",
         "at the driving pulley, torque that friction carries at nominal radii under these axial forces",
     ),
-    Variable("torque_ratio", (), "f8", "1", "load over carried_torque, with the load's sign"),
-    Variable("slip_margin", (), "f8", "1", "size of torque_ratio, less 1; slips from about 0"),
+    Variable("torque_ratio", "1", "load over carried_torque, with the load's sign"),
+    Variable("slip_margin", "1", "size of torque_ratio, less 1; slips from about 0"),
 )
 
 

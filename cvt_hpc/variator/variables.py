@@ -18,46 +18,37 @@ COORDINATES = {
 _SHARED = (
     Variable(
         "spectrum",
-        ("strand", "frequency_bin"),
-        "f8",
         "m",
         "at the strongest probe",
+        dims=("strand", "frequency_bin"),
         words="amplitude spectrum",
     ),
-    Variable("mean_ring_tension", ("strand",), "f8", "N", "mean ring tension in the middle of the strand"),
-    Variable("mean_push_force", ("strand",), "f8", "N", "mean push force in the middle of the strand"),
-    Variable("axial_force", ("pulley",), "f8", "N", "mean axial force of the belt on a sheave"),
+    Variable("mean_ring_tension", "N", "mean ring tension in the middle of the strand", dims=("strand",)),
+    Variable("mean_push_force", "N", "mean push force in the middle of the strand", dims=("strand",)),
+    Variable("axial_force", "N", "mean axial force of the belt on a sheave", dims=("pulley",)),
     Variable(
-        "slip", ("pulley",), "f8", "1", "mean tangential sliding over belt speed, weighted by contact force"
+        "slip", "1", "mean tangential sliding over belt speed, weighted by contact force", dims=("pulley",)
     ),
-    Variable("flank_loss", ("pulley",), "f8", "W", "mean friction power of the flanks"),
-    Variable("thrust_ratio", (), "f8", "1", "mean axial force of the driving over that of the driven pulley"),
-    Variable("speed_loss", (), "f8", "1", "1 - ratio x driven speed / driving speed, mean"),
-    Variable("driven_speed_ripple", (), "f8", "rad s-1", "standard deviation of the driven pulley's speed"),
-    Variable("driving_power", (), "f8", "W", "mean power of the driving pulley"),
-    Variable("load_power", (), "f8", "W", "mean power of the load"),
-    Variable("thrust_power", (), "f8", "W", "mean power that the thrust takes up"),
-    Variable("storing_power", (), "f8", "W", "mean rate of the stored energy"),
-    Variable("ring_loss", (), "f8", "W", "mean friction power between rings and elements"),
-    Variable("belt_loss", (), "f8", "W", "mean power of the belt's transverse damping"),
-    Variable("layer_loss", (), "f8", "W", "mean power of the layers' longitudinal dampers"),
-    Variable(
-        "seating_loss", (), "f8", "W", "mean elastic power carried out of the contact at the arcs' ends"
-    ),
-    Variable("loss", (), "f8", "W", "mean of all losses", words="total loss"),
+    Variable("flank_loss", "W", "mean friction power of the flanks", dims=("pulley",)),
+    Variable("thrust_ratio", "1", "mean axial force of the driving over that of the driven pulley"),
+    Variable("speed_loss", "1", "1 - ratio x driven speed / driving speed, mean"),
+    Variable("driven_speed_ripple", "rad s-1", "standard deviation of the driven pulley's speed"),
+    Variable("driving_power", "W", "mean power of the driving pulley"),
+    Variable("load_power", "W", "mean power of the load"),
+    Variable("thrust_power", "W", "mean power that the thrust takes up"),
+    Variable("storing_power", "W", "mean rate of the stored energy"),
+    Variable("ring_loss", "W", "mean friction power between rings and elements"),
+    Variable("belt_loss", "W", "mean power of the belt's transverse damping"),
+    Variable("layer_loss", "W", "mean power of the layers' longitudinal dampers"),
+    Variable("seating_loss", "W", "mean elastic power carried out of the contact at the arcs' ends"),
+    Variable("loss", "W", "mean of all losses", words="total loss"),
     Variable(
         "efficiency",
-        (),
-        "f8",
         "1",
         "share of the power put in that is not lost, by the driving pulley or by a load that drives",
     ),
     Variable(
-        "power_residual",
-        (),
-        "f8",
-        "1",
-        "power that the balance leaves open, over the larger of drive and losses",
+        "power_residual", "1", "power that the balance leaves open, over the larger of drive and losses"
     ),
 )
 

@@ -46,13 +46,8 @@ _LABELS = {
     PairClass.OTHERWISE: "other classes",
     PairClass.FAILED_IN_ONE: "failed in one",
 }
-CONTRADICTIONS = (
-    PairClass.A_ONLY,
-    PairClass.B_ONLY,
-    PairClass.A_ONLY_NEAR,
-    PairClass.B_ONLY_NEAR,
-)
 NEAR_CONTRADICTIONS = (PairClass.A_ONLY_NEAR, PairClass.B_ONLY_NEAR)
+CONTRADICTIONS = (PairClass.A_ONLY, PairClass.B_ONLY, *NEAR_CONTRADICTIONS)
 
 
 def classify_pairs(a: NDArray, b: NDArray, near: NDArray[np.bool_]) -> NDArray[np.int8]:

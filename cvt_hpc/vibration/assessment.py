@@ -16,16 +16,15 @@ from cvt_hpc.vibration.occurrence import classify, margin
 from cvt_hpc.vibration.settings import fitting_window
 
 VARIABLES = (
-    Variable("amplitude", ("strand",), "f8", "m", "band-limited peak amplitude at the strongest probe"),
-    Variable("frequency", ("strand",), "f8", "Hz", "at the strongest probe", words="dominant frequency"),
-    Variable("growth_rate", ("strand",), "f8", "s-1", "growth rate of the amplitude over the judged part"),
-    Variable("growth_error", ("strand",), "f8", "s-1", "standard error of the growth rate"),
+    Variable("amplitude", "m", "band-limited peak amplitude at the strongest probe", dims=("strand",)),
+    Variable("frequency", "Hz", "at the strongest probe", dims=("strand",), words="dominant frequency"),
+    Variable("growth_rate", "s-1", "growth rate of the amplitude over the judged part", dims=("strand",)),
+    Variable("growth_error", "s-1", "standard error of the growth rate", dims=("strand",)),
     Variable(
         "amplitude_scatter",
-        ("strand",),
-        "f8",
         "1",
         "standard deviation over mean of the amplitudes in successive windows",
+        dims=("strand",),
     ),
 )
 

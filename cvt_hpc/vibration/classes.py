@@ -28,19 +28,14 @@ class OccurrenceClass(IntEnum):
         return self.name.lower().replace("_", " ")
 
 
-# Classes that a longer run would not change: irregular motion is among them, undecided runs are not.
-DECIDED = (
-    OccurrenceClass.QUIET,
-    OccurrenceClass.VIBRATING,
-    OccurrenceClass.SLIPPING,
-    OccurrenceClass.IRREGULAR,
-)
+# Verdicts that a longer run would not change: irregular motion is among them, undecided runs are not.
 _OF_VERDICTS = {
     Vibrates.NO: OccurrenceClass.QUIET,
     Vibrates.YES: OccurrenceClass.VIBRATING,
     Vibrates.SLIPS: OccurrenceClass.SLIPPING,
     Vibrates.IRREGULAR: OccurrenceClass.IRREGULAR,
 }
+DECIDED = tuple(_OF_VERDICTS.values())
 
 
 def classify_runs(status: NDArray, vibrates: NDArray) -> NDArray[np.int8]:

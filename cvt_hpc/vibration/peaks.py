@@ -22,13 +22,19 @@ MARGIN = 2.0  # above side lobes
 LEAST = 0.05  # of a strand's highest peak in the band
 
 VARIABLES = (
-    Variable("peak_frequency", ("strand", "peak"), "f8", "Hz", "of the largest peaks of the strand's motion"),
+    Variable("peak_frequency", "Hz", "of the largest peaks of the strand's motion", dims=("strand", "peak")),
     Variable(
-        "peak_amplitude", ("strand", "peak"), "f8", "m", "amplitude of the largest mode at that frequency"
+        "peak_amplitude", "m", "amplitude of the largest mode at that frequency", dims=("strand", "peak")
     ),
-    Variable("peak_mode", ("strand", "peak"), "i1", "1", "its half waves along the strand; 0: no such peak"),
     Variable(
-        "frequency_ratio", ("peak",), "f8", "1", "frequency of each peak of t2 over that of the first of t1"
+        "peak_mode",
+        "1",
+        "its half waves along the strand; 0: no such peak",
+        dims=("strand", "peak"),
+        dtype="i1",
+    ),
+    Variable(
+        "frequency_ratio", "1", "frequency of each peak of t2 over that of the first of t1", dims=("peak",)
     ),
 )
 

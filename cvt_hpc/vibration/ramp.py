@@ -35,30 +35,22 @@ def _variables(name: str, quantity: Quantity) -> tuple[Variable, ...]:
     return (
         Variable(
             f"onset_{name}",
-            (),
-            "f8",
             units,
             f"{what} at which vibration sets in along a ramp; not a number where it is there from the start",
         ),
         Variable(
             f"end_{name}",
-            (),
-            "f8",
             units,
             f"{what} at which vibration ends along a ramp; not a number where it lasts to the end",
         ),
-        Variable(f"ramp_{name}", ("ramp_share",), "f8", units, f"mean {what} in parts of a ramp"),
+        Variable(f"ramp_{name}", units, f"mean {what} in parts of a ramp", dims=("ramp_share",)),
     )
 
 
 VARIABLES = (
     *(variable for name, quantity in QUANTITIES.items() for variable in _variables(name, quantity)),
     Variable(
-        "ramp_amplitude",
-        ("strand", "ramp_share"),
-        "f8",
-        "m",
-        "mean band-limited amplitude in parts of a ramp",
+        "ramp_amplitude", "m", "mean band-limited amplitude in parts of a ramp", dims=("strand", "ramp_share")
     ),
 )
 
@@ -145,13 +137,16 @@ def assess_ramp(
     bins = np.minimum((centres * rate / samples * BINS).astype(int), BINS - 1)
     verdict = Passages(levels, at, QUANTITIES[quantity], parameters)
     vibrates, reason = verdict.classify(names)
-    unknown = np.full(len(names), np.nan)
+    unknown, frequencies = np.full(len(names), np.nan), []
+    for probe in strongest:  # in the window that moves most
+        first = round(centres[np.argmax(windows[:, probe])] * rate - (width - 1) / 2)
+        frequencies.append(signals.dominant_frequency(w[first : first + width, probe], rate, band))
     return RampOccurrence(
         vibrates,
         reason,
         names,
         levels.max(axis=0),
-        _frequencies(w, rate, band, strongest, windows, centres, width),
+        np.array(frequencies, dtype=float),
         unknown,
         unknown,
         unknown,
@@ -245,23 +240,6 @@ def _sustained(above: NDArray[np.bool_]) -> NDArray[np.bool_]:
     for first, last in borders.reshape(-1, 2):
         kept[first:last] = last - first >= SUSTAINED
     return kept
-
-
-def _frequencies(
-    w: Array,
-    rate: float,
-    band: tuple[float, float],
-    strongest: NDArray[np.int64],
-    windows: Array,
-    centres: Array,
-    width: int,
-) -> Array:
-    """Dominant frequency of each strand in the window that moves most [Hz], (strand,)."""
-    found = []
-    for probe in strongest:
-        first = round(centres[np.argmax(windows[:, probe])] * rate - (width - 1) / 2)
-        found.append(signals.dominant_frequency(w[first : first + width, probe], rate, band))
-    return np.array(found, dtype=float)
 
 
 def _means(values: Array, bins: NDArray[np.int64]) -> Array:

@@ -30,40 +30,20 @@ from __future__ import annotations
 from collections.abc import Mapping
 from typing import Any
 
-from cvt_hpc.parameters import Parameter
+from cvt_hpc.parameters import Parameter, not_negative, positive
 from cvt_hpc.vibration.ramped import ramped
 
 PARAMETERS: dict[str, dict[str, Parameter]] = {
     "vibration": {
-        "band_low": Parameter(
-            300.0,
-            "Hz",
-            "lowest frequency of a vibration",
-            minimum=0.0,
-            exclusive=True,
-            sensible=(1.0, 20000.0),
+        "band_low": positive(300.0, "Hz", "lowest frequency of a vibration", sensible=(1.0, 20000.0)),
+        "band_high": positive(1500.0, "Hz", "highest frequency of a vibration", sensible=(1.0, 20000.0)),
+        "amplitude_threshold": positive(
+            5e-6, "m", "peak amplitude from which a strand vibrates", sensible=(1e-09, 0.1)
         ),
-        "band_high": Parameter(
-            1500.0,
-            "Hz",
-            "highest frequency of a vibration",
-            minimum=0.0,
-            exclusive=True,
-            sensible=(1.0, 20000.0),
-        ),
-        "amplitude_threshold": Parameter(
-            5e-6,
-            "m",
-            "peak amplitude from which a strand vibrates",
-            minimum=0.0,
-            exclusive=True,
-            sensible=(1e-09, 0.1),
-        ),
-        "negligible_amplitude": Parameter(
+        "negligible_amplitude": not_negative(
             1e-8,
             "m",
             "peak amplitude below which a strand is quiet whatever its trend",
-            minimum=0.0,
             sensible=(1e-12, 0.01),
         ),
         "judged_fraction": Parameter(
@@ -73,26 +53,14 @@ PARAMETERS: dict[str, dict[str, Parameter]] = {
             minimum=0.05,
             maximum=1.0,
         ),
-        "window_length": Parameter(
-            0.04,
-            "s",
-            "length of the windows in which the amplitude is taken",
-            minimum=0.0,
-            exclusive=True,
-            sensible=(0.0001, 10.0),
+        "window_length": positive(
+            0.04, "s", "length of the windows in which the amplitude is taken", sensible=(0.0001, 10.0)
         ),
-        "decay_tolerance": Parameter(
-            0.25,
-            "",
-            "largest loss of amplitude over the judged part, in e-folds, of a settled vibration",
-            minimum=0.0,
+        "decay_tolerance": not_negative(
+            0.25, "", "largest loss of amplitude over the judged part, in e-folds, of a settled vibration"
         ),
-        "growth_tolerance": Parameter(
-            1.0,
-            "",
-            "gain of amplitude, in e-folds, from which a strand is growing",
-            minimum=0.0,
-            exclusive=True,
+        "growth_tolerance": positive(
+            1.0, "", "gain of amplitude, in e-folds, from which a strand is growing"
         ),
     }
 }

@@ -9,7 +9,8 @@ from matplotlib.figure import Figure
 
 from cvt_hpc.analysis.arrangement import arrange, ruler, value_text, with_spacings
 from cvt_hpc.analysis.classes import OccurrenceClass, occurrence_classes
-from cvt_hpc.analysis.maps import draw_map
+from cvt_hpc.analysis.figures import draw
+from cvt_hpc.analysis.maps import map_figure
 from cvt_hpc.errors import InputError
 from cvt_hpc.variables import Status
 from support.studies import study
@@ -108,7 +109,7 @@ def test_panels_and_rows_are_sorted_with_their_values():
 def test_what_cannot_be_fixed_is_refused(at, message, tmp_path):
     out = tmp_path / "map.png"
     with pytest.raises(InputError, match=f"^out/x: .*{message}"):
-        draw_map(study(), out, at, "out/x")
+        draw(lambda: map_figure(study(), at, "out/x"), out)
     assert not any(tmp_path.iterdir())
 
 

@@ -6,7 +6,8 @@ from PIL import Image
 
 from cvt_hpc.analysis.cells import INFERRED_VIBRATION, LINES, STYLES
 from cvt_hpc.analysis.classes import OccurrenceClass, map_classes, occurrence_classes
-from cvt_hpc.analysis.maps import draw_map, map_figure
+from cvt_hpc.analysis.figures import draw
+from cvt_hpc.analysis.maps import map_figure
 from cvt_hpc.analysis.scatter import is_sampled, scatter_figure
 from cvt_hpc.errors import InputError
 from support.studies import GRADIENTS, LOADS, fills_of, sampled, study, traced
@@ -132,8 +133,8 @@ def test_of_many_axes_the_first_are_drawn_and_that_is_said():
 
 def test_samples_are_drawn_by_the_same_call_as_grids(tmp_path):
     finite = sampled().where(np.isfinite(sampled()["sheave_stiffness"]), drop=True)
-    with Image.open(draw_map(finite, tmp_path / "map.png")) as picture:
+    with Image.open(draw(lambda: map_figure(finite), tmp_path / "map.png")) as picture:
         assert len(picture.convert("RGB").getcolors(1 << 20)) > 20
     with pytest.raises(InputError, match="^x.nc: at load: expected results over a grid, found samples"):
-        draw_map(finite, tmp_path / "other.png", {"load": 20.0}, "x.nc")
+        draw(lambda: map_figure(finite, {"load": 20.0}, "x.nc"), tmp_path / "other.png")
     assert not (tmp_path / "other.png").exists()

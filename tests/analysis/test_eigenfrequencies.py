@@ -5,8 +5,8 @@ import numpy as np
 import pytest
 
 from cvt_hpc.analysis.eigenfrequencies import eigenfrequency_figure
-from cvt_hpc.analysis.figures import STYLE, save_figure
-from cvt_hpc.analysis.maps import draw_map
+from cvt_hpc.analysis.figures import STYLE, draw, save_figure
+from cvt_hpc.analysis.maps import map_figure
 from cvt_hpc.study import open_results, run
 from support.rungs import rung_job
 
@@ -56,5 +56,5 @@ def test_the_map_of_strands_is_that_picture(results, tmp_path):
     at = {"driving_speed": 2000.0}
     with matplotlib.rc_context(STYLE):
         save_figure(eigenfrequency_figure(results, at, "results"), tmp_path / "wanted.png")
-    draw_map(results, tmp_path / "map.png", at)
+    draw(lambda: map_figure(results, at), tmp_path / "map.png")
     assert (tmp_path / "map.png").read_bytes() == (tmp_path / "wanted.png").read_bytes()

@@ -4,6 +4,7 @@ import os
 import subprocess
 import sys
 import time
+from functools import partial
 from pathlib import Path
 
 import matplotlib
@@ -16,8 +17,8 @@ from PIL import Image
 import cvt_hpc
 from cvt_hpc.analysis.cells import AMPLITUDE_COLOURS, FREQUENCY_COLOURS, STYLES
 from cvt_hpc.analysis.classes import OccurrenceClass, at_strongest_strand, occurrence_classes
-from cvt_hpc.analysis.figures import STYLE
-from cvt_hpc.analysis.maps import draw_map, map_figure
+from cvt_hpc.analysis.figures import STYLE, draw
+from cvt_hpc.analysis.maps import map_figure
 from cvt_hpc.errors import InputError
 from cvt_hpc.variables import Status, Vibrates
 from support.studies import GRADIENTS, LOADS, STIFFNESSES, fills_of, flags, study, two_flags
@@ -70,7 +71,7 @@ def small_study():
 @pytest.fixture(scope="module")
 def plain(tmp_path_factory):
     """The picture of the small study, as a file."""
-    return draw_map(small_study(), tmp_path_factory.mktemp("plain") / "map.png")
+    return draw(lambda: map_figure(small_study()), tmp_path_factory.mktemp("plain") / "map.png")
 
 
 def test_cells_show_their_class_at_their_place():
@@ -211,7 +212,7 @@ def test_one_axis_gives_one_row():
 @pytest.mark.parametrize("suffix", [".png", ".svg", ".pdf"])
 def test_pictures_are_small_in_every_format(suffix, tmp_path):
     out = tmp_path / "new" / f"map{suffix}"
-    assert draw_map(study(**FINE), out) == out
+    assert draw(lambda: map_figure(study(**FINE)), out) == out
     # 960 runs shown twice; an SVG, whose letters and pictures are written as text, may have a third more.
     assert out.stat().st_size < (4 / 3 * LIMIT if suffix == ".svg" else LIMIT)
     start = {".png": b"\x89PNG", ".svg": b"<?xml", ".pdf": b"%PDF"}[suffix]
@@ -220,7 +221,7 @@ def test_pictures_are_small_in_every_format(suffix, tmp_path):
 
 
 def test_the_file_is_as_wide_as_a_telephone_and_the_same_every_time(plain, tmp_path):
-    assert draw_map(small_study(), tmp_path / "again.png").read_bytes() == plain.read_bytes()
+    assert draw(lambda: map_figure(small_study()), tmp_path / "again.png").read_bytes() == plain.read_bytes()
     with Image.open(plain) as picture:
         assert 1000 <= picture.width <= 1300
         assert 150 <= picture.info["dpi"][0] <= 200
@@ -237,12 +238,12 @@ def test_a_picture_that_cannot_be_drawn_leaves_the_old_one(tmp_path):
     ):
         message = f"^x.nc: expected results of a study, with the variable status, found {found}$"
         with pytest.raises(InputError, match=message):
-            draw_map(dataset, out, source="x.nc")
+            draw(partial(map_figure, dataset, source="x.nc"), out)
     with pytest.raises(InputError, match=r"[.]png, [.]svg, [.]pdf, found [.]jpg"):
-        draw_map(study(), tmp_path / "map.jpg")
+        draw(lambda: map_figure(study()), tmp_path / "map.jpg")
     (tmp_path / "file").write_text("")
     with pytest.raises(InputError, match="expected to be able to write"):
-        draw_map(study(), tmp_path / "file" / "map.png")
+        draw(lambda: map_figure(study()), tmp_path / "file" / "map.png")
     assert out.read_text() == "old"
     assert sorted(path.name for path in tmp_path.iterdir()) == ["file", "map.png"]
 
@@ -250,14 +251,14 @@ def test_a_picture_that_cannot_be_drawn_leaves_the_old_one(tmp_path):
 def test_the_plotting_library_keeps_its_state(tmp_path):
     with matplotlib.rc_context({"font.size": 7.25, "hatch.linewidth": 3.5}):
         before = dict(matplotlib.rcParams)
-        draw_map(study(loads=LOADS[:2]), tmp_path / "map.png")
+        draw(lambda: map_figure(study(loads=LOADS[:2])), tmp_path / "map.png")
         assert dict(matplotlib.rcParams) == before
 
 
 def test_results_read_back_from_a_file_give_the_same_map(plain, tmp_path):
     small_study().to_netcdf(tmp_path / "results.nc", engine="netcdf4")
     with xr.open_dataset(tmp_path / "results.nc", engine="netcdf4") as stored:
-        drawn = draw_map(stored, tmp_path / "a.png").read_bytes()
+        drawn = draw(lambda: map_figure(stored), tmp_path / "a.png").read_bytes()
     assert drawn == plain.read_bytes()
 
 
@@ -271,8 +272,9 @@ import sys
 import cvt_hpc.analysis.histories, cvt_hpc.bifurcation, cvt_hpc.chart, cvt_hpc.ladder.making
 import xarray as xr
 from pathlib import Path
-from cvt_hpc.analysis.maps import draw_map
-draw_map(xr.open_dataset(sys.argv[1]), Path("map.png"))
+from cvt_hpc.analysis.figures import draw
+from cvt_hpc.analysis.maps import map_figure
+draw(lambda: map_figure(xr.open_dataset(sys.argv[1])), Path("map.png"))
 sys.exit("matplotlib.pyplot" in sys.modules)
 """
 
@@ -294,10 +296,10 @@ def test_a_matplotlibrc_that_cannot_be_read_changes_nothing_and_pyplot_is_left_a
 @pytest.mark.parametrize("suffix", ["png", "svg"])
 def test_settings_of_the_plotting_library_change_nothing(tmp_path, suffix):
     small = study(stiffnesses=(1.0,))
-    plain = draw_map(small, tmp_path / f"plain.{suffix}").read_bytes()
+    plain = draw(lambda: map_figure(small), tmp_path / f"plain.{suffix}").read_bytes()
     odd = {"text.usetex": True, "font.family": "Nowhere", "svg.fonttype": "none", "axes.facecolor": "red"}
     with matplotlib.rc_context(odd):
-        assert draw_map(small, tmp_path / f"odd.{suffix}").read_bytes() == plain
+        assert draw(lambda: map_figure(small), tmp_path / f"odd.{suffix}").read_bytes() == plain
 
 
 def test_a_large_map_is_drawn_in_a_second_and_its_small_cells_are_not_hidden():

@@ -8,7 +8,8 @@ import xarray as xr
 
 from cvt_hpc.analysis.cells import OF_STARTS, STYLES
 from cvt_hpc.analysis.classes import OccurrenceClass, map_classes, occurrence_classes
-from cvt_hpc.analysis.maps import draw_map, map_figure
+from cvt_hpc.analysis.figures import draw
+from cvt_hpc.analysis.maps import map_figure
 from cvt_hpc.analysis.starts import has_starts, join_starts, start_line
 from cvt_hpc.variables import Status, Vibrates
 from cvt_hpc.vibration.hysteresis import StartClass, classify_starts
@@ -110,9 +111,9 @@ def test_the_map_has_one_panel_for_both_starts_and_counts_cells():
 
 def test_a_map_of_one_start_is_as_without_the_axis(tmp_path):
     dataset, large, _ = two_starts()
-    draw_map(large.assign_attrs(job_name="x"), tmp_path / "alone.png")
+    draw(lambda: map_figure(large.assign_attrs(job_name="x")), tmp_path / "alone.png")
     one = dataset.assign_attrs(job_name="x").isel(disturbance=0, drop=True)
-    draw_map(one, tmp_path / "one.png")
+    draw(lambda: map_figure(one), tmp_path / "one.png")
     assert (tmp_path / "one.png").read_bytes() == (tmp_path / "alone.png").read_bytes()
     assert not has_starts(dataset, {"disturbance": 3e-4}) and has_starts(dataset, {})
     assert not has_starts(dataset.isel(disturbance=[0]), {})
@@ -138,4 +139,4 @@ def test_of_a_trace_inferred_cells_are_joined_as_well():
 
 @pytest.mark.parametrize("at", [{}, {"friction_gradient": -2.4}])
 def test_the_picture_is_written(at, tmp_path):
-    assert draw_map(two_starts()[0], tmp_path / "map.png", at).stat().st_size > 10_000
+    assert draw(lambda: map_figure(two_starts()[0], at), tmp_path / "map.png").stat().st_size > 10_000

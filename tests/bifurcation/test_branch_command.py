@@ -7,10 +7,10 @@ import pytest
 import xarray as xr
 
 from cvt_hpc.bifurcation.attractors import Attractor, Start, attractors
-from cvt_hpc.bifurcation.dataset import Direction, Stability
+from cvt_hpc.bifurcation.dataset import Direction
 from cvt_hpc.bifurcation.folder import DiagramFolder
+from cvt_hpc.bifurcation.followed import Stability
 from cvt_hpc.bifurcation.job import load_diagram
-from cvt_hpc.bifurcation.kept import packed
 from cvt_hpc.cli import main
 from cvt_hpc.job import build_job
 from cvt_hpc.models.steady_variator.walking import SteadyBelt
@@ -119,56 +119,12 @@ def test_a_kept_branch_is_told_of_in_the_unit_of_the_job_that_asks(made, tmp_pat
     assert again == kind._replace(reason="both attractors from 92000 N mm to 94000 N mm")
 
 
-def with_rows(value, dtype=None):
-    """Put the same into all rows of an array."""
-    return lambda array: np.full(array.shape, value, dtype or array.dtype)
-
-
-OF_NO_BRANCH = {
-    "third strand": ("mode strand", with_rows(5)),
-    "half waves beyond what the dataset holds": ("mode half_waves", with_rows(300)),
-    "no half wave": ("mode half_waves", with_rows(0)),
-    "displacement of another mesh": ("mode displacement", lambda array: array[:, :-1]),
-    "displacement without any": ("mode displacement", with_rows(0.0)),
-    "friction of another mesh": ("mode fed", lambda array: array[:, :-1]),
-    "vector of another mesh": ("mode vector", lambda array: array[:, :-1]),
-    "amplitudes of three regions": ("mode amplitudes", lambda array: array[:, :-1]),
-    "growth of no number": ("mode growth", with_rows(np.nan)),
-    "frequency in words": ("mode frequency", with_rows("500", str)),
-    "others beyond what the dataset holds": ("onset others", with_rows(300)),
-    "Hopf point beyond the loads": ("onset load", with_rows(121.0)),
-    "eighth start": ("run start", with_rows(7)),
-    "unknown class": ("run occurrence", with_rows(99)),
-    "run beyond the loads": ("run value", with_rows(np.nan)),
-    "unknowns that are texts": ("point unknowns", with_rows("1", str)),
-    "unknowns that are complex": ("point unknowns", with_rows(1.0, complex)),
-    "unknowns of no number": ("point unknowns", with_rows(np.inf)),
-    "loads that are whole": ("point load", lambda array: array.astype(int)),
-    "loads in another order": ("point load", lambda array: array[::-1]),
-    "part of a mode": ("point modes", with_rows(1.0, float)),
-    "three ends of a gap": ("hidden", lambda array: np.zeros((0, 3))),
-}  # fmt: skip
-
-
-@pytest.mark.parametrize(("name", "change"), [*OF_NO_BRANCH.values()], ids=[*OF_NO_BRANCH])
-def test_a_made_up_branch_is_damage(name, change, made, tmp_path, caplog):
-    (tmp_path / "x.toml").write_text(JOB + RUNS)
-    diagram = load_diagram(tmp_path / "x.toml")
-    whole = DiagramFolder(made[2], diagram).load_branch(0)
-    folder = DiagramFolder(tmp_path, diagram)
-    folder.branches.folder.mkdir()
-    arrays = packed(whole)
-    folder.branches.save("branch_1", None, {**arrays, name: change(arrays[name])})
-    assert folder.load_branch(0) is None
-    assert "branch_1.npz: damaged (" in caplog.text
-
-
 def test_another_file_in_its_place_is_left_alone(tmp_path, capsys):
     (tmp_path / "x.toml").write_text(JOB)
     xr.Dataset({"mine": 1.0}).to_netcdf(tmp_path / "branch.nc")
     before = (tmp_path / "branch.nc").read_bytes()
     assert main(["branch", str(tmp_path / "x.toml"), "--out", str(tmp_path)]) == 2
-    assert "found branch.nc, which is no such diagram" in capsys.readouterr().err
+    assert "found branch.nc without a branch.json" in capsys.readouterr().err
     assert (tmp_path / "branch.nc").read_bytes() == before
 
 

@@ -8,8 +8,10 @@ import numpy as np
 import pytest
 
 from cvt_hpc.analysis.figures import STYLE
+from cvt_hpc.bifurcation import followed as kept
 from cvt_hpc.bifurcation.attractors import Attractor
 from cvt_hpc.bifurcation.drawing import GAP, HOPF, STARTS, branch_figure, stable_parts
+from cvt_hpc.bifurcation.followed import Followed, states_of
 from cvt_hpc.bifurcation.table import branch_lines, failure_lines, gap_lines
 from cvt_hpc.job.schema import load_schema
 from cvt_hpc.models.linear_stability.branch import Branch, Onset, Point, branch, onsets, tracks
@@ -37,13 +39,14 @@ def point(load, *growths):
 
 POINTS = [point(10.0, -50.0, -90.0), point(20.0, 30.0, -60.0), point(30.0, 60.0, -20.0), point(50.0, -70.0, -80.0),
           point(60.0, -75.0, -60.0)]  # fmt: skip
-ONSET = Onset(16.0, POINTS[1].modes[0], True, 0)
+ONSET = Onset(16.0, 420.0, 0, 1, True, 0)
+LOADS = (10.0, 20.0, 30.0, 40.0, 50.0, 60.0)
 FOUND = Branch(POINTS, {40.0: "no steady state found"})
 
 
 def diagram(**units):
     job = SimpleNamespace(name="x", schema=replace(load_schema("linear_stability", None, "x"), units=units))
-    return SimpleNamespace(loads=(10.0, 20.0, 30.0, 40.0, 50.0, 60.0), axes=(), job=job)
+    return SimpleNamespace(loads=LOADS, axes=(), job=job)
 
 
 def run(load, start, occurrence, amplitude=np.nan, reason=""):
@@ -55,9 +58,10 @@ def followed(onsets=(ONSET,)):
             run(50.0, 1, U, 3e-6), run(60.0, 0, F, reason="slips"), run(60.0, 1, F, reason="slips through")]  # fmt: skip
     kinds = [Criticality(Kind.SUBCRITICAL, 6.0, 1.0, "both attractors")] * len(onsets)
     asked = SimpleNamespace(place={}, parameters={"friction_gradient": -0.8, "sheave_stiffness": np.inf})
-    return SimpleNamespace(
-        asked=asked, branch=FOUND, onsets=list(onsets), hidden=[(30.0, 50.0)], runs=runs, kinds=kinds
-    )
+    with pytest.MonkeyPatch.context() as patch:
+        patch.setattr(kept, "quantities", lambda steady, grid: {})
+        states = states_of(FOUND, None, LOADS)
+    return Followed(asked, states, list(onsets), [(30.0, 50.0)], runs, kinds)
 
 
 @pytest.fixture(scope="module")
@@ -189,8 +193,8 @@ def test_loads_are_in_the_unit_of_the_job():
 
 
 def test_a_hopf_point_of_an_unstable_state_does_not_make_it_stable():
-    both = [Onset(12.0, POINTS[1].modes[0], True, 0), Onset(25.0, POINTS[1].modes[1], True, 1)]
-    assert stable_parts(POINTS[:3], both) == [(10.0, 12.0, True), (12.0, 30.0, False)]
+    both = [Onset(12.0, 420.0, 0, 1, True, 0), Onset(25.0, 520.0, 1, 2, True, 1)]
+    assert stable_parts(np.array(LOADS[:3]), True, both) == [(10.0, 12.0, True), (12.0, 30.0, False)]
 
 
 def test_modes_are_followed_by_shape_where_their_order_changes():
@@ -224,7 +228,7 @@ def on_a_line(monkeypatch):
 def test_every_mode_that_crosses_the_axis_has_its_hopf_point(on_a_line):
     for loads in ((10.0, 20.0, 30.0), (10.0, 30.0)):
         found, hidden = onsets(on_a_line, None, branch(on_a_line, None, loads))
-        assert [(one.rising, one.others, one.mode.half_waves) for one in found] == [
+        assert [(one.rising, one.others, one.half_waves) for one in found] == [
             (True, 0, 1),
             (True, 1, 2),
         ]

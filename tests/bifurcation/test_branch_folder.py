@@ -10,8 +10,7 @@ import xarray as xr
 
 from cvt_hpc.bifurcation import diagram
 from cvt_hpc.bifurcation.attractors import Attractor
-from cvt_hpc.bifurcation.dataset import Stability
-from cvt_hpc.bifurcation.followed import Followed
+from cvt_hpc.bifurcation.followed import Followed, Stability, states_of
 from cvt_hpc.cli import main
 from cvt_hpc.locks import locked
 from cvt_hpc.models.linear_stability.branch import Branch
@@ -44,7 +43,8 @@ def branch(tmp_path, monkeypatch):
             if end is not None and asked is not diagram.branches[0]:
                 end()
             followed.append(diagram.branches.index(asked))
-            return Followed(asked, None, Branch([], dict.fromkeys(diagram.loads, "none")), [], [], [run], [])
+            none = Branch([], dict.fromkeys(diagram.loads, "none"))
+            return Followed(asked, states_of(none, None, diagram.loads), [], [], [run], [])
 
         with monkeypatch.context() as patch:
             patch.setattr(diagram, "_follow", follow)
@@ -197,7 +197,7 @@ def test_a_diagram_of_an_earlier_version_has_no_job_file(branch, tmp_path, capsy
     assert branch() == 0
     (tmp_path / "out" / "branch.json").unlink()
     assert branch("--set", "friction_gradient=-0.6") == 2
-    assert "found that of another (" in capsys.readouterr().err
+    assert "branch.nc without a branch.json; choose another --out, or --fresh" in capsys.readouterr().err
     assert branch() == 0
     assert (tmp_path / "out" / "branch.json").exists()
 

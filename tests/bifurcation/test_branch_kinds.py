@@ -1,7 +1,5 @@
 """Which runs of a branch a Hopf point is judged by: made-up runs about one at 20.3 N m, below which it is stable."""
 
-from types import SimpleNamespace
-
 import numpy as np
 import pytest
 
@@ -16,7 +14,7 @@ CLASSES = {"q": OccurrenceClass.QUIET, "V": OccurrenceClass.VIBRATING}
 
 
 def hopf(load, frequency=500.0, rising=True, others=0):
-    return Onset(load, SimpleNamespace(frequency=frequency), rising, others)
+    return Onset(load, frequency, 0, 1, rising, others)
 
 
 def runs(start, first, without=()):

@@ -363,47 +363,6 @@ def repacked(whole, compression=zipfile.ZIP_DEFLATED, **replaced):
     return made.getvalue()
 
 
-def bare_array(dtype, shape):
-    """A file of an array that has no content."""
-    made = io.BytesIO()
-    np.lib.format.write_array_header_1_0(made, {"descr": dtype, "fortran_order": False, "shape": shape})
-    return made.getvalue()
-
-
-def head_with_versions(whole, versions):
-    with np.load(io.BytesIO(whole)) as file:
-        head = json.loads(str(file["head"]))
-    head["maker"]["versions"] = versions
-    return np.array(json.dumps(head))
-
-
-MADE_UP = {
-    "items of no bytes": (lambda whole: repacked(whole, more=bare_array("<U0", (10**12,))), "has no content"),
-    "rows of no items": (lambda whole: repacked(whole, more=bare_array("<f8", (10**12, 0))), "has no content"),
-    "bzip2": (lambda whole: repacked(whole, zipfile.ZIP_BZIP2), "compressed as no archive is"),
-    "damaged LZMA": (
-        lambda whole: flipped(repacked(whole, zipfile.ZIP_LZMA)), "compressed as no archive is",
-    ),
-    "versions that are lists": (
-        lambda whole: repacked(whole, head=head_with_versions(whole, {"numpy": ["2"]})), "that are no texts",
-    ),
-}  # fmt: skip
-
-
-def flipped(whole, places=range(90, 100)):
-    return bytes(byte ^ 0xFF if place in places else byte for place, byte in enumerate(whole))
-
-
-@pytest.mark.parametrize(("make_up", "told"), [*MADE_UP.values()], ids=[*MADE_UP])
-def test_a_point_that_is_made_up_is_measured_again(report, tmp_path, caplog, make_up, told):
-    before = report.table.read_bytes()
-    point = tmp_path / "out/bells/points/ringing-soft-3.npz"
-    point.write_bytes(make_up(point.read_bytes()))
-    (tmp_path / "out/bells/chart.json").unlink()  # then it is asked of all points whose they are
-    assert made("c.toml").table.read_bytes() == before
-    assert caplog.text.count("ringing-soft-3.npz: damaged (") == 1 and told in caplog.text
-
-
 def test_a_point_whose_archive_is_in_order_is_kept_however_it_was_packed(report, tmp_path, caplog):
     point = tmp_path / "out/bells/points/ringing-soft-3.npz"
     point.write_bytes(repacked(point.read_bytes(), zipfile.ZIP_STORED))

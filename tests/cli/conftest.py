@@ -22,9 +22,9 @@ class Interrupted(Exception):
 
 def record_variables(job):
     return (
-        Variable("status", (), "i1", "", "how the run ended", Status),
-        Variable("vibrates", (), "i1", "", "whether the belt vibrates", Vibrates),
-        Variable("reason", (), "S240", "", "why the run failed"),
+        Variable("status", "", "how the run ended", dtype="i1", flags=Status),
+        Variable("vibrates", "", "whether the belt vibrates", dtype="i1", flags=Vibrates),
+        Variable("reason", "", "why the run failed", dtype="S240"),
     )
 
 

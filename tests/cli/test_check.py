@@ -72,8 +72,8 @@ def test_an_axis_that_the_dataset_could_not_hold_is_refused_by_all(
     write_job, call, tmp_path, monkeypatch, command
 ):
     write_job(GRID)
-    recorded = (Variable("status", (), "i1", "", "how the run ended", Status),
-                Variable("load", (), "f8", "N m", "mean torque"))  # fmt: skip
+    recorded = (Variable("status", "", "how the run ended", dtype="i1", flags=Status),
+                Variable("load", "N m", "mean torque"))  # fmt: skip
     monkeypatch.setattr(sys.modules["cvt_hpc.simulation"], "record_variables", lambda job: recorded)
     status, out, err = call(command[0], "x.toml", *command[1:])
     assert (status, out) == (2, [])

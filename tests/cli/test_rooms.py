@@ -13,6 +13,10 @@ from cvt_hpc.models import MODELS
 PACKAGE = Path(cvt_hpc.__file__).parent
 BUILT = (PACKAGE.parent / "docs" / "guide" / "structure.md").read_text()
 SOURCES = sorted(PACKAGE.rglob("*.py"))
+FILES = {
+    ".".join(path.relative_to(PACKAGE.parent).with_suffix("").parts).removesuffix(".__init__"): path
+    for path in SOURCES
+}
 
 
 def room(path):
@@ -30,13 +34,14 @@ def statements(block):
 
 @cache
 def imported(path):
-    """Modules that a file names in its imports."""
+    """Modules that a file names in its imports; a module of a package is imported without the package's own names."""
     names = set()
     for node in statements(ast.parse(path.read_text()).body):
         if isinstance(node, ast.Import):
             names.update(alias.name for alias in node.names)
         elif isinstance(node, ast.ImportFrom):
-            names.update([node.module, *(f"{node.module}.{alias.name}" for alias in node.names)])
+            taken = {f"{node.module}.{alias.name}" for alias in node.names}
+            names |= taken if taken <= set(FILES) else {node.module, *taken}
     return names
 
 
@@ -68,7 +73,7 @@ def test_imports_run_downwards():
     [
         ({"mpi4py"}, {"study"}),
         (
-            {"cvt_hpc.files.written_aside"},
+            {"cvt_hpc.files.written_aside", "cvt_hpc.files.write_rows"},
             {
                 "job",
                 "study",
@@ -114,15 +119,13 @@ def test_what_test_modules_share_lies_in_support():
 
 def test_no_circle_of_imports():
     # those for a type checker included: a file that cannot be read without another one is no part of its own
-    names = (".".join(path.relative_to(PACKAGE.parent).with_suffix("").parts) for path in SOURCES)
-    files = dict(zip((name.removesuffix(".__init__") for name in names), SOURCES, strict=True))
-    reached = {name: imported(path) & set(files) - {name} for name, path in files.items()}
+    reached = {name: imported(path) & set(FILES) - {name} for name, path in FILES.items()}
     assert sum(map(len, reached.values())) > 500  # the files' imports are seen
-    for between in files:
-        for name in files:
+    for between in FILES:
+        for name in FILES:
             if between in reached[name]:
                 reached[name] |= reached[between]
-    circles = [{other for other in reached[name] if name in reached[other]} for name in files]
+    circles = [{other for other in reached[name] if name in reached[other]} for name in FILES]
     assert [circle for circle in circles if circle] == []
 
 
@@ -137,3 +140,48 @@ def test_layouts_of_arrays_are_modules_and_not_lists_of_names():
             if isinstance(node, ast.ImportFrom):
                 constants = [alias.name for alias in node.names if alias.name.replace("_", "").isupper()]
                 assert len(constants) <= MOST_CONSTANTS, f"{path}: {node.module}: {constants}"
+
+
+# arrays of kernels whose entries have names, and so have their rows and columns
+NAMED = {
+    "blocks",
+    "narrow",
+    "columns",
+    "rows",
+    "corner",
+    "diagonal",
+    "links",
+    "step",
+    "iterate",
+    "state",
+    "elements",
+}
+NAMED |= {"stations"}
+BY_NAME = ("pushbelt", "spatial_pushbelt", "beam_pushbelt", "quasi_static_belt", "belt_drive")  # models
+
+
+def numbers_added(node):
+    """Whether a sum has a number among its terms, and whether it has the name of a field."""
+    terms, ends = [node], []
+    while terms:
+        term = terms.pop()
+        if isinstance(term, ast.BinOp) and isinstance(term.op, ast.Add):
+            terms += [term.left, term.right]
+        else:
+            ends.append(term)
+    names = [getattr(end, "attr", getattr(end, "id", "")).isupper() for end in ends]
+    return any(isinstance(end, ast.Constant) for end in ends), any(names)
+
+
+def test_entries_of_arrays_and_of_linear_systems_have_names():
+    kernels = [path for path in SOURCES if path.parent.name in BY_NAME and "@kernel" in path.read_text()]
+    assert len(kernels) > 20
+    for path in kernels:
+        for node in ast.walk(ast.parse(path.read_text())):
+            if isinstance(node, ast.BinOp):
+                assert numbers_added(node) != (True, True), f"{path}:{node.lineno}: {ast.unparse(node)}"
+            if not isinstance(node, ast.Subscript) or not isinstance(node.slice, ast.Tuple):
+                continue
+            if getattr(node.value, "attr", getattr(node.value, "id", "")) in NAMED:
+                fields = node.slice.elts[1:]
+                assert not any(numbers_added(field)[0] for field in fields), f"{path}: {ast.unparse(node)}"

@@ -23,12 +23,12 @@ SENSITIVE = (5, 6)  # loads at which runs vibrate at long steps only
 FAILING = 7  # load at which the run fails at steps below that of the job
 STRAND = ("strand",)
 VARIABLES = (
-    Variable("status", (), "i1", "", "how the run ended", Status),
-    Variable("vibrates", (), "i1", "", "whether the belt vibrates", Vibrates),
-    Variable("reason", (), "S240", "", "why the run failed"),
-    Variable("amplitude", STRAND, "f8", "m", "amplitude"),
-    Variable("frequency", STRAND, "f8", "Hz", "frequency"),
-    Variable("time_step", (), "f8", "s", "time step"),
+    Variable("status", "", "how the run ended", dtype="i1", flags=Status),
+    Variable("vibrates", "", "whether the belt vibrates", dtype="i1", flags=Vibrates),
+    Variable("reason", "", "why the run failed", dtype="S240"),
+    Variable("amplitude", "m", "amplitude", dims=STRAND),
+    Variable("frequency", "Hz", "frequency", dims=STRAND),
+    Variable("time_step", "s", "time step"),
 )
 
 

@@ -11,13 +11,13 @@ from cvt_hpc.models.elastic_belt.belt import belt_constants, mesh
 from cvt_hpc.models.elastic_belt.fluctuation import ARC_PARTS, fluctuation, part_shares
 from cvt_hpc.models.elastic_belt.one_system import unpack
 from cvt_hpc.models.elastic_belt.record import fluctuation_record
-from cvt_hpc.models.elastic_belt.transient import Transient
 from cvt_hpc.models.linear_stability.modes import modes
 from cvt_hpc.models.steady_variator.walking import SteadyBelt
 from cvt_hpc.physics.flank import flank_forces
 from cvt_hpc.physics.friction import friction_coefficient
 from support.fast_runs import FastRuns
 from support.growing import at_rest
+from support.lone import Transient
 from support.settled import DEFAULTS
 
 BELT = DEFAULTS | {"stations": 96}

@@ -4,8 +4,8 @@ import numpy as np
 import pytest
 
 from cvt_hpc.multibody.rcm_beam import RcmBeam
-from cvt_hpc.multibody.rcm_chain import advance, close, relaxed_ring, straight_beam
-from support.rcm import conserved
+from cvt_hpc.multibody.rcm_chain import close, relaxed_ring
+from support.rcm import advance, conserved, straight_beam
 
 GRAVITY = np.array([2.0, -9.81])
 

@@ -4,9 +4,9 @@ import numpy as np
 import pytest
 
 from cvt_hpc.models.elastic_belt.step_choice import transverse_limit
-from cvt_hpc.models.elastic_belt.transient import Transient
 from cvt_hpc.variables import Status
 from support.belts import point
+from support.lone import Transient
 
 CASES = {
     "bending": {"bending_stiffness": 200.0, "stations": 64},

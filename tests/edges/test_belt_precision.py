@@ -2,9 +2,9 @@
 
 import pytest
 
-from cvt_hpc.models.elastic_belt.transient import Transient
 from cvt_hpc.vibration.signals import band_amplitude
 from support.belts import point
+from support.lone import Transient
 
 THRESHOLD, NEGLIGIBLE = 5e-6, 1e-8  # [m]: defaults of what vibrates, and of what is at rest
 

@@ -21,7 +21,7 @@ def straight(cells, tension, push, speed=0.0, bending=0.0):
     belt = belt_constants(point("imex", **path, bending_stiffness=bending, transverse_damping=0.0))
     nothing = np.zeros(2 * cells)
     belt = belt._replace(curvature=nothing, arc_curvature=nothing, arc_share=nothing, belt_speed=speed)
-    fields, scalars = np.zeros((len(f.FIELDS), 2 * cells)), np.zeros(len(f.SCALARS))
+    fields, scalars = np.zeros((len(f.FIELDS), 2 * cells)), np.zeros(f.SCALARS)
     fields[f.V_ELEMENT] = fields[f.V_RING] = speed
     fields[f.N_RING] = 1.0 / (1.0 + tension / belt.ring_stiffness)
     fields[f.N_ELEMENT] = 1.0 / (1.0 - push / belt.element_stiffness)

@@ -10,9 +10,9 @@ from cvt_hpc.models.beam_pushbelt.step import advance
 from cvt_hpc.models.pushbelt import fields
 from cvt_hpc.models.pushbelt.belt import Belt
 from cvt_hpc.multibody.rcm_beam import RcmBeam, line_point
-from cvt_hpc.multibody.rcm_chain import close, relaxed_ring, straight_beam
+from cvt_hpc.multibody.rcm_chain import close, relaxed_ring
 from support.complementarity import solve_lcp
-from support.rcm import conserved, equations
+from support.rcm import conserved, equations, straight_beam
 
 MASS, INERTIA = 0.01, 2e-7  # of an element [kg], [kg m^2]
 NO_INPUTS = np.zeros((2, fields.INPUTS))

@@ -14,7 +14,7 @@ from cvt_hpc.models.elastic_belt.belt import mesh
 from cvt_hpc.models.elastic_belt.parameters import PARAMETERS
 from cvt_hpc.models.steady_variator.forces import distributions, quantities
 from cvt_hpc.models.steady_variator.walking import SteadyBelt
-from cvt_hpc.physics.elastic_band import elastic_band
+from support.elastic_band import elastic_band
 
 RADII = 30.687090662822e-3, 76.717726657055e-3
 RINGS = 18 * 0.185e-3 * 9.75e-3  # section [m^2]

@@ -65,7 +65,7 @@ def test_overlap_in_rigid_grooves():
     }
     belt = belt_constants(parameters)
     n, first, count = belt.cell.size, belt.driven_start, belt.driven.weight.size
-    fields, scalars, force = np.zeros((7, n)), np.zeros(len(f.SCALARS)), np.empty(n)
+    fields, scalars, force = np.zeros((7, n)), np.zeros(f.SCALARS), np.empty(n)
     fields[f.W] = 1e-4 * np.sin(np.arange(n))
     scalars[f.DRIVEN_POSITION] = -2e-5
     assert contact_forces(belt, State(fields, scalars), fresh_contacts(belt), force) > 0

@@ -8,13 +8,18 @@ from cvt_hpc.multibody.rcm_beam import (
     RcmBeam,
     energies,
     equations_of_motion,
-    internal_coordinates,
     line_point,
-    material_point,
     mean_strain,
 )
-from cvt_hpc.multibody.rcm_chain import close, relaxed_ring, straight_beam
-from support.rcm import conserved, equations, tangent_stiffness
+from cvt_hpc.multibody.rcm_chain import close, relaxed_ring
+from support.rcm import (
+    conserved,
+    equations,
+    internal_coordinates,
+    material_point,
+    straight_beam,
+    tangent_stiffness,
+)
 
 BEAM = RcmBeam(0.7, 0.9, 300.0, 2.0, 0.6, 0.0, (0.0, -9.81))
 Q = np.array([0, 0, 0.35, 0.02, 0.015, 0.68, 0.30, 0.52])

@@ -19,8 +19,7 @@ from support.spatial_belts import LOAD, NODES, STEP, inputs, scene, stored
 
 TWO = EQUATIONS[2]
 advance_two = partial(advance_by, TWO)
-W = spatial_fields.SIZE  # number of the ninth unknown
-FIRST = [*range(6), W]  # numbers of velocities and w
+V, W = spatial_fields.ROW_V, spatial_fields.ROW_HALF  # numbers of these unknowns
 
 
 loaded = cache(scene)
@@ -55,15 +54,17 @@ def shaken(seed):
     return belt, state, b.workspace(belt, NODES, 2), rng
 
 
+def along(step, direction, x, number):
+    """Rates along x (nodes, 9) by a direction of six numbers, and 1 of a further unknown."""
+    return np.sum(step[:, direction : direction + 6] * x[:, :6], 1) + x[:, number]
+
+
 def stretches(step, x):
     """Rates along x (nodes, 9) at which both packages are shortened together, and half of their difference."""
     ahead = np.roll(x, -1, 0)
-    of_both = np.sum(step[:, spatial_fields.MEAN_I : spatial_fields.MEAN_I + 7] * x[:, :7], 1)
-    of_both -= np.sum(step[:, spatial_fields.MEAN_J : spatial_fields.MEAN_J + 7] * ahead[:, :7], 1)
-    apart = np.sum(step[:, spatial_fields.DIFFERENCE_I : spatial_fields.DIFFERENCE_I + 7] * x[:, FIRST], 1)
-    return of_both, apart - np.sum(
-        step[:, spatial_fields.DIFFERENCE_J : spatial_fields.DIFFERENCE_J + 7] * ahead[:, FIRST], 1
-    )
+    of_both = along(step, spatial_fields.TENSION_I, x, V) - along(step, spatial_fields.TENSION_J, ahead, V)
+    apart = along(step, spatial_fields.DIFFERENCE_I, x, W)
+    return of_both, apart - along(step, spatial_fields.DIFFERENCE_J, ahead, W)
 
 
 def test_tensions_of_both_packages_change_by_their_directions():
@@ -96,12 +97,12 @@ def test_tensions_of_both_packages_change_by_their_directions():
         # 2e-7: differences of lengths of 6 mm by 3e-9 m
         assert found == pytest.approx(expected, abs=2e-7 * np.abs(expected).max())
     # slips: v + w and v - w less the speeds of both lines along themselves
-    for field, row, numbers in (
-        (spatial_fields.START_SLIP, spatial_fields.SLIP_BY, range(7)),
-        (spatial_fields.START_HALF_SLIP, spatial_fields.HALF_SLIP_BY, FIRST),
+    for field, direction, number in (
+        (spatial_fields.START_SLIP, spatial_fields.SLIP_BY, V),
+        (spatial_fields.START_HALF_SLIP, spatial_fields.HALF_SLIP_BY, W),
     ):
         found = (measured[1.0][:, field] - measured[-1.0][:, field]) / (2.0 * small)
-        expected = np.sum(step[:, row : row + 7] * x[:, list(numbers)], 1)
+        expected = along(step, direction, x, number)
         assert found == pytest.approx(expected, abs=1e-9 * np.abs(expected).max())
 
 

@@ -17,13 +17,13 @@ class Interrupted(Exception):
 
 def record_variables(job):
     return (
-        Variable("status", (), "i1", "", "how the run ended", Status),
-        Variable("vibrates", (), "i1", "", "whether the belt vibrates", Vibrates),
-        Variable("reason", (), "S240", "", "why the run failed"),
-        Variable("amplitude", ("strand",), "f8", "m", "amplitude"),
-        Variable("frequency", ("strand",), "f8", "Hz", "frequency"),
-        Variable("slip_margin", (), "f8", "1", "margin"),
-        Variable("core_seconds", (), "f8", "s", "processor time", volatile=True),
+        Variable("status", "", "how the run ended", dtype="i1", flags=Status),
+        Variable("vibrates", "", "whether the belt vibrates", dtype="i1", flags=Vibrates),
+        Variable("reason", "", "why the run failed", dtype="S240"),
+        Variable("amplitude", "m", "amplitude", dims=("strand",)),
+        Variable("frequency", "Hz", "frequency", dims=("strand",)),
+        Variable("slip_margin", "1", "margin"),
+        Variable("core_seconds", "s", "processor time", volatile=True),
     )
 
 

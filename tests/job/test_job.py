@@ -13,7 +13,7 @@ from hypothesis import strategies as st
 import cvt_hpc
 from cvt_hpc import errors
 from cvt_hpc.errors import InputError
-from cvt_hpc.job import build_job, crosscheck, known_keys, load_job, rebuild_job
+from cvt_hpc.job import build_job, crosscheck, known_keys, load_job, rebuild_job, stored_job
 from cvt_hpc.job.summary import summarize
 from cvt_hpc.models import MODELS
 from cvt_hpc.printing import point_lines
@@ -424,3 +424,13 @@ def test_found_values_are_shown_in_the_words_of_a_job_file(value, words):
 
 def test_numbers_that_python_refuses_to_print_are_named():
     assert errors.show(10**5000) == "a number of too many digits"
+
+
+def test_a_key_of_an_earlier_version_is_named_in_a_job_and_left_out_of_a_dataset(tmp_path):
+    document = {"name": "x", "model": "elastic_belt", "numerics": {"contact_sweeps": 0}}
+    with pytest.raises(InputError, match="contact_sweeps: no key of this version; contact is solved exactly"):
+        build_job(document, "x.toml")
+    assert (
+        stored_job(document, "x.nc").fingerprint()
+        == build_job({"name": "x", "model": "elastic_belt"}).fingerprint()
+    )

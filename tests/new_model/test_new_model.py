@@ -4,7 +4,8 @@ import numpy as np
 import pytest
 
 from cvt_hpc import open_results, run, simulate
-from cvt_hpc.analysis.maps import draw_map
+from cvt_hpc.analysis.figures import draw
+from cvt_hpc.analysis.maps import map_figure
 from cvt_hpc.job import build_job
 from cvt_hpc.models import MODELS
 from cvt_hpc.variables import Vibrates
@@ -36,6 +37,6 @@ def test_a_new_model_is_swept_mapped_and_simulated(job, tmp_path):
     assert np.allclose(cycles.amplitude / cycles["size"], 2.0, rtol=1e-2)
     expected = 600.0 * (1.0 - cycles.excitation**2 / 16.0)
     assert np.allclose(cycles.frequency / expected, 1.0, rtol=1e-3)
-    assert draw_map(results, tmp_path / "map.png").stat().st_size > 0
+    assert draw(lambda: map_figure(results), tmp_path / "map.png").stat().st_size > 0
     history = simulate(job, {"excitation": 0.2, "size": 2e-5})
     assert history.vibrates == Vibrates.YES and history.frequency == cycles.frequency[1, 1]

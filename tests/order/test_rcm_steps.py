@@ -4,7 +4,7 @@ import numpy as np
 import pytest
 
 from cvt_hpc.multibody.rcm_beam import RcmBeam
-from cvt_hpc.multibody.rcm_chain import advance, straight_beam
+from support.rcm import advance, straight_beam
 
 
 def end(theta, steps):

@@ -9,8 +9,8 @@ from cvt_hpc.models.elastic_belt import fields as f
 from cvt_hpc.models.elastic_belt.belt import belt_constants, initial_state
 from cvt_hpc.models.elastic_belt.column import column_forces
 from cvt_hpc.models.elastic_belt.rhs import strains
-from cvt_hpc.models.elastic_belt.transient import Transient
 from support.fast_runs import march, march_fast
+from support.lone import Transient
 from support.marched import job, record
 
 SCENE = {"stations": 48, "duration": 0.06, "rise_time": 0.01, "load": 110.0}

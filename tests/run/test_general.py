@@ -8,9 +8,9 @@ import pytest
 from cvt_hpc.models.elastic_belt.general_run import GeneralTransient
 from cvt_hpc.models.elastic_belt.one_system import flat_belt, pack, rates, system
 from cvt_hpc.models.elastic_belt.sparsity import SparseJacobian, groups, pattern
-from cvt_hpc.models.elastic_belt.transient import Transient
 from cvt_hpc.steppers.system import jacobian
 from cvt_hpc.variables import Status
+from support.lone import Transient
 from support.marched import CHEAP, job
 
 SAMPLES = 30

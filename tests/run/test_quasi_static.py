@@ -107,8 +107,9 @@ def test_the_coupled_system_is_that_of_a_dense_solver():
     work = chain(n, size)
     work.links[:] = random.uniform(0.5, 3.0, (2, n))
     work.diagonal[:] = random.uniform(0.2, 1.0, (n, 3)) * [1.0, -0.1, 1.0]
-    work.columns[:, :5] = random.normal(size=(2 * n, 5))
-    matrix, right = np.zeros((2 * n, 2 * n)), work.columns[:, :5].copy()
+    columns = work.columns.reshape(2 * n, -1)
+    columns[:, :5] = random.normal(size=(2 * n, 5))
+    matrix, right = np.zeros((2 * n, 2 * n)), columns[:, :5].copy()
     for j in range(n):
         b = (j + 1) % n
         matrix[2 * j : 2 * j + 2, 2 * j : 2 * j + 2] += work.diagonal[j][[[0, 1], [1, 2]]]
@@ -116,7 +117,7 @@ def test_the_coupled_system_is_that_of_a_dense_solver():
             ends = [2 * j + layer, 2 * b + layer]
             matrix[np.ix_(ends, ends)] += work.links[layer, j] * np.array([[1.0, -1.0], [-1.0, 1.0]])
     solve_chain(work)
-    assert work.columns[:, :5] == pytest.approx(np.linalg.solve(matrix, right), rel=1e-10)
+    assert columns[:, :5] == pytest.approx(np.linalg.solve(matrix, right), rel=1e-10)
     dense = np.zeros((size, 8))
     dense[:, :4] = random.normal(size=(4, 4)) * 0.2 + np.eye(4)
     dense[:, 4] = random.normal(size=4)
@@ -160,7 +161,7 @@ FREE = {
     ids=["inertia", "steady_flow", "free pulleys", "clearance"],
 )
 def test_a_quiet_belt_has_the_forces_of_the_whole_one_and_its_powers_close(longitudinal, pulleys):
-    from cvt_hpc.models.elastic_belt.transient import Transient
+    from support.lone import Transient
 
     values = {"friction_gradient": 0.0, "friction_law": "coulomb", "stations": 64, "duration": 0.08} | pulleys
     common = values | {"judged_fraction": 0.25, "load": 100.0}

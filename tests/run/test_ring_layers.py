@@ -23,8 +23,8 @@ from cvt_hpc.models.elastic_belt.rings import (
     unite_layers,
     with_layers,
 )
-from cvt_hpc.models.elastic_belt.transient import Transient
 from cvt_hpc.physics.layers import stack_forces
+from support.lone import Transient
 from support.marched import job
 
 SCENE = {"stations": 48, "duration": 0.04, "rise_time": 0.01, "load": 60.0}

@@ -17,10 +17,10 @@ from cvt_hpc.models.elastic_belt.belt import belt_constants, initial_state
 from cvt_hpc.models.elastic_belt.parameters import check
 from cvt_hpc.models.elastic_belt.recorded_run import recording
 from cvt_hpc.models.elastic_belt.step_choice import REFERENCE_STEP, SAFE_SHARE, chosen_step, transverse_limit
-from cvt_hpc.models.elastic_belt.transient import Transient
 from cvt_hpc.models.elastic_belt.validity import doubt, step_doubt
 from cvt_hpc.variables import Status, Vibrates
 from support.fast_runs import FastRuns
+from support.lone import Transient
 from support.marched import fresh_record, job, record
 
 ONE_BELT = {"belt_length": 0.6612, "centre_distance": 0.155, "stations": 48}

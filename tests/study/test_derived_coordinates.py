@@ -11,7 +11,6 @@ from cvt_hpc.analysis.scatter import scatter_figure
 from cvt_hpc.cli import main
 from cvt_hpc.errors import InputError
 from cvt_hpc.job import load_job
-from cvt_hpc.job.definition import fingerprint_of
 from cvt_hpc.study import gather, open_results, run
 from cvt_hpc.study.folder import StudyFolder
 from support.study_double import Axis, Job, Simulator
@@ -125,21 +124,6 @@ def test_values_of_every_kind_survive_the_folder(tmp_path):
         assert results["kind"].values.tolist() == ["a", "bc"]
         assert (results["thrust"].dims, results["kind"].dims) == (("load",), ("law",))
         assert "units" not in results["kind"].attrs
-
-
-def test_a_folder_of_an_earlier_version_has_none(tmp_path):
-    run(Job(), tmp_path, simulator=Simulator(), progress=False)
-    folder = StudyFolder(tmp_path)
-    entry = json.loads(folder.job_file.read_text())
-    del entry["derived"], entry["checksum"]
-    entry["fingerprint"] = fingerprint_of(entry["job"])  # which the double counts otherwise
-    for axis in entry["axes"]:
-        del axis["spacing"]
-    folder.job_file.write_text(json.dumps(entry))
-    folder.results.unlink()  # of runs that are on record under the other fingerprint
-    gather(tmp_path)
-    with open_results(tmp_path) as results:
-        assert results["load"].dims == ("load",)
 
 
 def test_what_follows_must_not_have_the_name_of_a_recorded_quantity(tmp_path):

@@ -1,13 +1,11 @@
-"""Output folders of somebody else: changed, made up, or full of links; what is not believed is one clear line."""
+"""Output folders that are damaged, or hold links, pipes and devices; what is not believed is one clear line."""
 
 import json
 import os
-import random
 import signal
 import sys
 import threading
 import time
-import zlib
 from types import SimpleNamespace
 
 import pytest
@@ -15,30 +13,19 @@ import xarray as xr
 
 from cvt_hpc.cli import main
 from cvt_hpc.errors import InputError
-from cvt_hpc.job import load_job
 from cvt_hpc.ladder.making import run_ladder
 from cvt_hpc.locks import BusyError, locked
 from cvt_hpc.netcdf import write_history
 from cvt_hpc.output_folder import checksum
 from cvt_hpc.study import gather, open_results, read_status, run
 from cvt_hpc.study.folder import StudyFolder
-from cvt_hpc.study.record.frames import FORMAT_VERSION, PREAMBLE, RECORD, RecordFormat
 from cvt_hpc.study.repeats import Repeat
-from support.recorded import assert_same_numbers
 from support.study_double import Job, Simulator
 from support.study_processes import wait_until
 
 JOB = Job(histories=(3,))
 GATHERING = sys.modules["cvt_hpc.study.gather"]  # whose name is that of its function
 READERS = {"status": read_status, "gather": gather, "map": open_results}
-STRAND = """
-name = "strand"
-model = "strand"
-[axes]
-load = ["40 N m", "80 N m"]
-[mesh]
-ritz_functions = 5
-"""
 
 
 def sweep(out, job=JOB, **options):
@@ -112,40 +99,14 @@ class TestChangedJobFile:
         assert sweep(out, fresh=fresh).gained == 12
         assert read_status(out).done == 12
 
-    @pytest.mark.parametrize("use", READERS.values(), ids=READERS)
-    def test_axes_and_job_that_differ_are_refused_whatever_the_checksum(self, out, use):
-        change(out, shift, signed=True)
-        with pytest.raises(InputError, match="load: not the values of its job"):
-            use(out)
 
-
-class TestJobFileWithoutChecksum:
-    """Of an earlier version; of a real job, whose fingerprint follows from what the file says."""
-
-    @pytest.fixture
-    def out(self, tmp_path):
-        (tmp_path / "strand.toml").write_text(STRAND)
-        run(load_job(tmp_path / "strand.toml"), tmp_path / "out", progress=False)
-        change(tmp_path / "out", lambda entry: entry.pop("checksum"))
-        return tmp_path / "out"
-
-    def test_it_is_read_and_gets_one_by_the_next_run(self, out):
-        assert read_status(out).done == 2
-        gather(out)
-        assert "checksum" not in json.loads((out / "job.json").read_text())
-        assert run(load_job(out.parent / "strand.toml"), out, progress=False).gained == 0
-        assert "checksum" in json.loads((out / "job.json").read_text())
-
-    @pytest.mark.parametrize("use", READERS.values(), ids=READERS)
-    def test_a_changed_one_is_refused(self, out, use):
-        def edit(entry):
-            entry["axes"][0]["values"][1] = entry["job"]["axes"]["load"][1] = 90.0
-
-        change(out, edit)
-        with pytest.raises(
-            InputError, match="its job does not give its fingerprint.; `cvt-hpc run` of its job"
-        ):
-            use(out)
+@pytest.mark.parametrize("use", READERS.values(), ids=READERS)
+def test_a_job_file_of_an_earlier_version_without_checksum_is_written_anew(out, use):
+    change(out, lambda entry: entry.pop("checksum"))
+    with pytest.raises(InputError, match="does not fit its checksum.*`cvt-hpc run` of its job goes on"):
+        use(out)
+    assert sweep(out).gained == 0
+    use(out)
 
 
 class TestLinks:
@@ -278,47 +239,6 @@ class TestHeldGatherLock:
         assert "not gathered" in finished.stderr
 
 
-def odd(value):
-    """Values that are not what stands there."""
-    deep = value
-    for _ in range(60):
-        deep = [deep]
-    found = [None, True, -1, 1e300, 10**30, "", "\x1b[31m", "../../x", [], {}, [value], {"a": value}, deep]
-    return [one for one in found if one != value]
-
-
-def places(entry, path=()):
-    """Yield the places of all values of a document."""
-    for key in entry if isinstance(entry, dict) else range(len(entry)):
-        yield (*path, key)
-        if isinstance(entry[key], (dict, list)):
-            yield from places(entry[key], (*path, key))
-
-
-def test_a_job_file_of_odd_types_with_a_checksum_is_one_line(out, capsys, caplog):
-    whole = (out / "job.json").read_text()
-    document = json.loads(whole)
-    every = [place for place in places(document) if place[0] not in ("format", "checksum")]
-    chance = random.Random(1)
-    refused = 0
-    for place in chance.sample(every, 60):
-        *inner, last = place
-        entry = json.loads(whole)
-        at = entry
-        for key in inner:
-            at = at[key]
-        at[last] = chance.choice(odd(at[last]))
-        del entry["checksum"]
-        (out / "job.json").write_text(json.dumps({**entry, "checksum": checksum(entry)}))
-        for command in ("status", "gather"):
-            status = main([command, str(out)])
-            told = capsys.readouterr().err
-            assert status in (0, 2), (place, told)
-            assert status == 0 or (told.count("\n") == 1 and "\x1b" not in told), (place, told)
-            refused += status == 2
-    assert refused > 60  # texts may be others
-
-
 def test_a_name_that_does_not_print_is_escaped(out, capsys):
     entry = json.loads((out / "job.json").read_text())
     del entry["checksum"]
@@ -330,8 +250,8 @@ def test_a_name_that_does_not_print_is_escaped(out, capsys):
 
 @pytest.mark.parametrize(
     "text",
-    [b"[" * 10**5, b'{"format": ' + b"[" * 10**5, b"9" * 5000, b'{"format": "cvt_hpc study 1", "axes": NaN}'],
-    ids=["lists", "format", "digits", "nan"],
+    [b"[" * 10**5, b"9" * 5000, b"5", b'{"format": "cvt_hpc study 1", "axes": NaN}'],
+    ids=["lists", "digits", "number", "nan"],
 )
 def test_a_job_file_that_json_cannot_read_is_one_line(out, text):
     (out / "job.json").write_bytes(text)
@@ -340,74 +260,8 @@ def test_a_job_file_that_json_cannot_read_is_one_line(out, text):
             use(out)
 
 
-def sign(study, header):
-    """Return a log that begins with any header."""
-    text = json.dumps(header).encode() if not isinstance(header, bytes) else header
-    check = zlib.crc32(text, FORMAT_VERSION)
-    return PREAMBLE.pack(b"\x89CVTREC\n", FORMAT_VERSION, len(text), check) + text
-
-
-HEADERS = {
-    "a number": 5,
-    "empty": {},
-    "deep": b"[" * 10**5,
-    "fingerprint": {"fingerprint": 5, "dtype": [], "session": {}},
-    "no session": {"session": None},
-    "list": {"session": []},
-    "times": {"session": {"started": "x", "id": 5}},
-    "versions": {"session": {"versions": 5}},
-    "refine": {"session": {"refine": "x"}},
-    "far": {"session": {"started": 1e300}},
-}
-
-
-@pytest.mark.parametrize("header", HEADERS.values(), ids=HEADERS)
-def test_a_log_header_of_odd_content_with_a_checksum_costs_no_record(out, header, caplog):
-    study = StudyFolder(out).load()
-    (log,) = (out / "records").iterdir()
-    data = log.read_bytes()
-    length = PREAMBLE.unpack_from(data)[2]
-    sound = json.loads(data[PREAMBLE.size : PREAMBLE.size + length])
-    if isinstance(header, dict) and "session" in header and "dtype" not in header:
-        session = header["session"]
-        header = {
-            **sound,
-            "session": {**sound["session"], **session} if isinstance(session, dict) and session else session,
-        }
-    log.write_bytes(sign(study, header) + data[PREAMBLE.size + length :])
-    gather(out)
-    with open_results(out) as found:
-        assert (found["status"] == 1).all()
-    assert "the header is damaged" in caplog.text
-    assert sweep(out).gained == 0
-
-
-def test_frames_that_no_sweep_writes_do_not_count(out):
-    study = StudyFolder(out).load()
-    layout = RecordFormat(study.fingerprint, study.record_dtype)
-    row = study.pack_failure("made up")
-    unknown = row.copy()
-    unknown["status"] = 77
-    frames = [
-        layout.record((1, 2**32 - 1), 1.0, row),
-        layout.record((1, 0), 1.0, row),
-        layout.record((1, 1), float("nan"), row),
-        layout.record((1, 1), 1e300, row),
-        layout.record((1, 1), 1.0, unknown),
-        layout.mark(b"\xf5AGN", [(1, 2**32 - 1)], 1.0),
-    ]
-    with open_results(out) as found:
-        before = found.load()
-    (out / "records" / "rank-9.log").write_bytes(layout.preamble({}, 9) + b"".join(frames))
-    (warning,) = read_status(out).warnings
-    assert "rank-9.log: left out: no record of this study in it" in warning
-    assert sweep(out, retry=[3]).gained == 0
-    with open_results(out) as found:
-        assert_same_numbers(found, before)
-
-
 class TestNotRegular:
-    """What would be waited for, or read for ever, among the logs."""
+    """What would be waited for, or read for ever."""
 
     @staticmethod
     def make(path, kind):
@@ -418,19 +272,13 @@ class TestNotRegular:
         elif kind == "sparse":
             with path.open("wb") as file:
                 file.truncate(1 << 40)
-        elif kind == "markers":
-            path.write_bytes((RECORD + b"\0\0\0\0") * (1 << 20))
-        elif kind == "marks":
-            path.write_bytes((b"\xf5BEG" + (12 << 20).to_bytes(4, "little")) * (1 << 20))
 
-    @pytest.mark.parametrize("kind", ["pipe", "device", "sparse", "markers", "marks"])
+    @pytest.mark.parametrize("kind", ["pipe", "device"])
     def test_among_the_logs(self, out, kind):
         self.make(out / "records" / "rank-7.log", kind)
-        began = time.monotonic()
         status = read_status(out)
         assert status.done == 12 and len(status.warnings) == 1
         assert "rank-7.log: left out" in status.warnings[0]
-        assert time.monotonic() - began < 15.0  # [s]; half an hour for 1 TB, minutes for a file of markers
         assert sweep(out).gained == 0
 
     @pytest.mark.parametrize("kind", ["pipe", "device", "sparse"])

@@ -256,5 +256,3 @@ def test_samples_and_linked_values_are_found_by_all_that_varies():
 def test_a_document_that_is_no_job_has_no_runs(odd):
     assert places_in(odd, SMALL.resolved()) is None
     assert places_in({**SMALL.resolved(), "linked": 4}, LARGE.resolved()) is None
-    repeated = {"load": [1, 1], "ratio": [0.5, 2.0]}  # of long lists all memory would be taken
-    assert places_in({**SMALL.resolved(), "axes": repeated}, LARGE.resolved()) is None

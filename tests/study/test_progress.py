@@ -17,7 +17,7 @@ from cvt_hpc.locks import locked
 from cvt_hpc.provenance import new_session
 from cvt_hpc.study import read_status, run
 from cvt_hpc.study.folder import StudyFolder
-from cvt_hpc.study.ranks.counter import SerialCounter
+from cvt_hpc.study.ranks.counter import Counter
 from cvt_hpc.study.ranks.progress import Progress, Steps, show_duration
 from cvt_hpc.study.record.frames import RecordFormat
 from cvt_hpc.study.record.log import RecordLog
@@ -133,7 +133,7 @@ def test_lines_where_there_is_no_terminal(start, tmp_path):
 
 
 def test_progress_counts_all_ranks_and_earlier_sessions(capsys):
-    counter = SerialCounter()
+    counter = Counter()
     progress = Progress(counter, total=100, recorded=40, failed=2, visible=True, costs=np.ones(60))
     counter.report(8, failed=0)
     counter.report(3, failed=1)
@@ -146,7 +146,7 @@ def test_progress_counts_all_ranks_and_earlier_sessions(capsys):
 def test_time_to_go_is_by_cost_not_by_number(capsys, monkeypatch):
     now = 1000.0
     monkeypatch.setattr(time, "monotonic", lambda: now)
-    counter = SerialCounter()
+    counter = Counter()
     progress = Progress(
         counter, total=5, recorded=1, failed=0, visible=True, costs=np.array([6.0, 2.0, 1.0, 1.0])
     )
@@ -166,7 +166,7 @@ def test_a_bar_on_a_terminal(monkeypatch):
     termios.tcsetwinsize(theirs, (25, 80))
     with os.fdopen(theirs, "w") as terminal:
         monkeypatch.setattr("sys.stderr", terminal)
-        counter = SerialCounter()
+        counter = Counter()
         progress = Progress(counter, total=10, recorded=2, failed=0, visible=True, costs=np.ones(8))
         logging.getLogger("cvt_hpc.kernels").warning("compiling")
         counter.report(5, failed=5)

@@ -79,7 +79,10 @@ def test_a_stored_table_says_where_it_comes_from(path):
 
 def test_a_stored_table_is_read_as_a_dataset():
     assert len(TABLES) >= 94
-    assert read_table(ROOT / "jobs/results/lebrecht_2004.csv")["status"].shape == (5, 4, 19)
+    dataset = read_table(ROOT / "jobs/results/lebrecht_2004.csv")
+    assert dataset["status"].shape == (5, 4, 19)
+    assert dataset["amplitude"].attrs["units"] == "m" and dataset["core_seconds"].attrs["units"] == "s"
+    assert dataset.cvt.strongest("amplitude").max() > 1e-5
 
 
 def test_a_table_tells_the_origin_of_its_dataset_in_one_line_each():

@@ -3,7 +3,7 @@
 import json
 
 from cvt_hpc.study.batches import Assignment
-from cvt_hpc.study.ranks.counter import SerialCounter
+from cvt_hpc.study.ranks.counter import Counter
 from cvt_hpc.study.ranks.schedule import claimed_batches
 
 PLAN = [Assignment((5, 2)), Assignment((9,)), Assignment((0, 1, 3))]
@@ -20,7 +20,7 @@ def claim_under_mpi(start, ranks, options, environment=None):
 
 
 def test_serial_claims_follow_the_plan():
-    with SerialCounter() as counter:
+    with Counter() as counter:
         assert claimed(counter) == PLAN
         assert claimed(counter) == []
         counter.rewind()
@@ -28,14 +28,14 @@ def test_serial_claims_follow_the_plan():
 
 
 def test_no_claim_when_it_is_not_allowed():
-    counter = SerialCounter()
+    counter = Counter()
     answers = iter([True, True, False])
     assert claimed(counter, lambda: next(answers)) == PLAN[:2]
     assert counter.claim() == 2  # the refusal has cost no number
 
 
 def test_serial_interruption_is_beyond_every_plan():
-    counter = SerialCounter()
+    counter = Counter()
     assert not counter.is_interrupted()
     counter.interrupt_all()
     counter.rewind()
@@ -74,7 +74,7 @@ def test_a_counter_that_miscounts_is_refused(start):
 
 
 def test_a_batch_that_does_not_fit_is_passed_over():
-    counter = SerialCounter()
+    counter = Counter()
     assert claimed(counter, fits=lambda batch: batch != (5, 2)) == PLAN[1:]
     assert claimed(counter) == []  # nobody else does it either
 
@@ -82,7 +82,7 @@ def test_a_batch_that_does_not_fit_is_passed_over():
 def test_runs_that_are_to_be_done_alone_come_one_by_one():
     plan = [Assignment((4, 5, 6), alone=True), Assignment((1, 2))]
     singles = [Assignment((index,), alone=True) for index in (4, 5, 6)]
-    assert claimed(SerialCounter(), plan=plan) == [*singles, plan[1]]
-    assert claimed(SerialCounter(), fits=lambda batch: batch != (5,), plan=plan) == [*singles[::2], plan[1]]
+    assert claimed(Counter(), plan=plan) == [*singles, plan[1]]
+    assert claimed(Counter(), fits=lambda batch: batch != (5,), plan=plan) == [*singles[::2], plan[1]]
     answers = iter([True, True, False])
-    assert claimed(SerialCounter(), lambda: next(answers), plan=plan) == singles[:2]
+    assert claimed(Counter(), lambda: next(answers), plan=plan) == singles[:2]

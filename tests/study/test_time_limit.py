@@ -10,7 +10,7 @@ import pytest
 from cvt_hpc.study import run
 from cvt_hpc.study.folder import StudyFolder
 from cvt_hpc.study.forecast.cost_model import CostModel, Fit, fit_recorded
-from cvt_hpc.study.ranks.counter import SerialCounter
+from cvt_hpc.study.ranks.counter import Counter
 from cvt_hpc.study.ranks.stopping import SignalWatch, Stop
 from cvt_hpc.study.ranks.time_limit import TimeLimit, find_time_limit, gathering_margin
 from cvt_hpc.study.record.frames import RecordFormat
@@ -121,7 +121,7 @@ def test_a_run_at_work_is_broken_off_when_time_is_up(start, tmp_path):
 
 
 def test_time_that_runs_out_when_all_is_done_is_no_early_end():
-    stop = Stop(SerialCounter(), SignalWatch(), TimeLimit(-1.0), lambda: None)
+    stop = Stop(Counter(), SignalWatch(), TimeLimit(-1.0), lambda: None)
     stop.look()
     assert stop.reason is None
     assert not stop.fits(0.0)

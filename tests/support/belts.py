@@ -8,10 +8,10 @@ from numba import typeof
 
 from cvt_hpc.models.elastic_belt.general_run import GeneralTransient
 from cvt_hpc.models.elastic_belt.one_system import flat_belt, pack, system
-from cvt_hpc.models.elastic_belt.transient import Transient
 from cvt_hpc.steppers.facts import Result
 from cvt_hpc.steppers.marching import Marching
 from cvt_hpc.steppers.system import RELATIVE_INCREMENT, System
+from support.lone import Transient
 from support.rungs import rung_job
 
 COARSE = {"stations": 48, "duration": 0.04, "rise_time": 0.01, "load": 60.0}

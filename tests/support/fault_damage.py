@@ -11,13 +11,11 @@ import json
 import os
 import threading
 import time
-import zlib
 from collections.abc import Callable, Iterator
 from pathlib import Path
 from random import Random
 
 from cvt_hpc.locks import locked
-from cvt_hpc.study.record.frames import PREAMBLE, RECORD
 
 Damage = Callable[[Path, Path, Random], contextlib.AbstractContextManager[bool]]
 HELD = 1.0  # [s]
@@ -96,22 +94,6 @@ def _odd_log(make: Callable[[Path, Path, Random], None]) -> Damage:
     return damage
 
 
-def _sparse(path: Path, records: Path, chance: Random) -> None:
-    path.touch()
-    os.truncate(path, 1 << 40)
-
-
-def _header(path: Path, records: Path, chance: Random) -> None:
-    log = chance.choice(sorted(records.glob("rank-*.log")))
-    data = log.read_bytes()
-    magic, version, length, _ = PREAMBLE.unpack_from(data)
-    header = json.loads(data[PREAMBLE.size : PREAMBLE.size + length])
-    header[chance.choice([*header])] = chance.choice([None, 5, [], {}, {"id": 5, "started": "x"}])
-    text = json.dumps(header).encode()
-    check = zlib.crc32(text, version)
-    path.write_bytes(PREAMBLE.pack(magic, version, len(text), check) + text + data[PREAMBLE.size + length :])
-
-
 DAMAGE: dict[str, Damage] = {
     "a value of an axis changed": _job_file(_shift),
     "an entry of another type": _job_file(_mistype),
@@ -123,7 +105,4 @@ DAMAGE: dict[str, Damage] = {
     "crash.log a link": _link_file("crash.log", False),
     "a pipe among the logs": _odd_log(lambda path, records, chance: os.mkfifo(path)),
     "a device among the logs": _odd_log(lambda path, records, chance: path.symlink_to("/dev/zero")),
-    "a sparse file among the logs": _odd_log(_sparse),
-    "markers among the logs": _odd_log(lambda path, records, chance: path.write_bytes(RECORD * (1 << 20))),
-    "a log with another header": _odd_log(_header),
 }

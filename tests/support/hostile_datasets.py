@@ -129,13 +129,6 @@ def to(target):
     return make
 
 
-def set_values(name, values):
-    def change(file):
-        file[name][...] = values
-
-    return of_hdf5(change)
-
-
 def several_lines(file):
     file["strand"].set_auto_chartostring(False)
     file["strand"][:] = np.array([[b"\n", b"1"], [b"t", b"2"]])
@@ -194,20 +187,11 @@ FORMS = {
     "numeric units": (attribute("units", 5, "loss"), "loss: units: expected a text, found 5"),
     "units of several lines": (attribute("units", "W\n\u202e", "loss"), "loss: units: expected a unit"),
     "list of units": (attribute("units", np.array(["W", "m"], h5py.string_dtype()), "load"), "units: expected a text"),
-    "text for flags": (attribute("flag_values", "x", "status"), "status: flag_values: expected 5 numbers"),
-    "too few flags": (attribute("flag_values", np.int8([0, 1]), "status"), "status: flag_values: expected 5 numbers"),
     "number for meanings": (attribute("flag_meanings", 1.0, "vibrates"), "flag_meanings: expected a text"),
-    "text to scale by": (attribute("scale_factor", "x", "loss"), "loss: scale_factor: expected a number"),
-    "text to scale flags by": (attribute("scale_factor", "x", "status"), "status: scale_factor: expected a number"),
     "numbers to add": (attribute("add_offset", [1.0, 2.0], "loss"), "one that xarray cannot read"),
-    "nothing to scale by": (attribute("scale_factor", np.nan, "loss"), "loss: scale_factor: expected a number"),
-    "axis of 1e308": (set_values("load", [1e308, 1.2e308, 1.7e308]), "load: expected values of at most 1e+100"),
     "axis of several lines": (of_netcdf(several_lines), "strand: expected texts of printable characters"),
     "job that is no table": (attribute("job", "[1]"), "job: expected a table in JSON"),
     "deep job": (attribute("job", "[" * 50_000), "job: expected a table in JSON"),
     "changed name": (lambda path: path.write_bytes(path.read_bytes().replace(b"loss", b"lo\x1bs")), "one that is damaged"),
 }  # fmt: skip
-FLAGS = {
-    "flags of texts": (replaced("status", 2, 2, 3, dtype="S1"), "status: expected flags as numbers"),
-}
 HOSTILE = PLACES | SIZES | TYPES | FORMS

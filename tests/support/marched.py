@@ -8,9 +8,9 @@ import numpy as np
 from cvt_hpc.job import Job
 from cvt_hpc.models.elastic_belt.batch import LaneRun
 from cvt_hpc.models.elastic_belt.record import evaluate
-from cvt_hpc.models.elastic_belt.transient import Transient
 from cvt_hpc.simulation import record_variables, run_point
 from cvt_hpc.simulation.marching import march_runs
+from support.lone import Transient
 from support.rungs import rung_job
 
 # A coarse belt that is loaded within 10 ms, judged over the shortest part that is allowed: 0.1 s of computing.

@@ -39,7 +39,7 @@ def straight_belt(cells: int, speed: float = 0.0, bending: float = 0.0, damping:
 
 def moving_straight(belt: Belt, tension: float = TENSION, push: float = 0.0) -> State:
     """The undisturbed state under uniform T and P (negative P: gaps, by that much over EA_e)."""
-    fields, scalars = np.zeros((len(f.FIELDS), belt.cell.size)), np.zeros(len(f.SCALARS))
+    fields, scalars = np.zeros((len(f.FIELDS), belt.cell.size)), np.zeros(f.SCALARS)
     fields[f.V_ELEMENT] = fields[f.V_RING] = belt.belt_speed
     fields[f.N_RING] = 1.0 / (1.0 + tension / belt.ring_stiffness)
     fields[f.N_ELEMENT] = 1.0 / (1.0 - push / belt.element_stiffness)

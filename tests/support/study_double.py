@@ -64,6 +64,10 @@ class Job:
     def shape(self) -> tuple[int, ...]:
         return tuple(len(axis.values) for axis in self.axes)
 
+    @property
+    def size(self) -> int:
+        return math.prod(self.shape)
+
     def point(self, index: int) -> dict[str, Any]:
         place = np.unravel_index(index, self.shape) if self.shape else ()
         return {**self.parameters, **{a.name: a.values[i] for a, i in zip(self.axes, place, strict=True)}}
@@ -102,13 +106,13 @@ class Simulator:
 
     def record_variables(self, job: Job) -> tuple[Variable, ...]:
         return (
-            Variable("status", (), "i1", "", "how the run ended", Status),
-            Variable("vibrates", (), "i1", "", "whether the belt vibrates", Vibrates),
-            Variable("reason", (), "S240", "", "why the run failed"),
-            Variable("amplitude", ("strand",), "f8", "m", "amplitude of the strand's vibration"),
-            Variable("spectrum", ("strand", "frequency_bin"), "f8", "m", "amplitude spectrum"),
-            Variable("steps", (), "i8", "1", "number of time steps"),
-            Variable("core_seconds", (), "f8", "s", "computing time", volatile=True),
+            Variable("status", "", "how the run ended", dtype="i1", flags=Status),
+            Variable("vibrates", "", "whether the belt vibrates", dtype="i1", flags=Vibrates),
+            Variable("reason", "", "why the run failed", dtype="S240"),
+            Variable("amplitude", "m", "amplitude of the strand's vibration", dims=("strand",)),
+            Variable("spectrum", "m", "amplitude spectrum", dims=("strand", "frequency_bin")),
+            Variable("steps", "1", "number of time steps", dtype="i8"),
+            Variable("core_seconds", "s", "computing time", volatile=True),
         )
 
     def record_coordinates(self, job: Job) -> dict[str, Coordinate]:

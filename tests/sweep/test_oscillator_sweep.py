@@ -8,8 +8,9 @@ from pathlib import Path
 import numpy as np
 import pytest
 
+from cvt_hpc.analysis.figures import draw
 from cvt_hpc.analysis.histories import draw_history
-from cvt_hpc.analysis.maps import draw_map
+from cvt_hpc.analysis.maps import map_figure
 from cvt_hpc.job import build_job
 from cvt_hpc.simulation import simulate
 from cvt_hpc.study import open_results, run
@@ -49,7 +50,7 @@ def test_both_starts_are_swept(results):
 
 
 def test_it_has_a_map(results, tmp_path):
-    assert draw_map(results, tmp_path / "map.png").stat().st_size > 0
+    assert draw(lambda: map_figure(results), tmp_path / "map.png").stat().st_size > 0
 
 
 def test_it_has_a_table(results):

@@ -2,7 +2,6 @@
 
 from __future__ import annotations
 
-import csv
 from collections.abc import Callable, Iterator, Sequence
 from pathlib import Path
 from typing import NamedTuple
@@ -30,7 +29,7 @@ from cvt_hpc.analysis.statements.verdicts import Finding, Statement, judged
 from cvt_hpc.analysis.strand_bars import strand_bars_figure
 from cvt_hpc.analysis.waterfall import waterfall_figure
 from cvt_hpc.errors import unknown
-from cvt_hpc.files import written_aside
+from cvt_hpc.files import write_rows
 from cvt_hpc.provenance import origin_lines
 
 SLIDING = ("radial_sliding", "sliding_speed")
@@ -127,15 +126,8 @@ def figure_of(folder: Path) -> tuple[Path, Path, list[Finding]]:
         picture = draw(lambda: figure.compose(kept), folder / "figure.png")
         findings = [judged(statement, kept) for statement in figure.statements]
         origin = list(origin_lines(kept.results.attrs))
-    table = folder / "statements.csv"
-    with written_aside(table, parents=True) as aside, aside.open("w", encoding="utf-8", newline="") as out:
-        out.writelines(origin)
-        writer = csv.writer(out, lineterminator="\n")
-        writer.writerow(COLUMNS)
-        for finding in findings:
-            writer.writerow(
-                [figure.source, finding.text, finding.verdict.value, finding.numbers, finding.why]
-            )
+    rows = [(figure.source, one.text, one.verdict.value, one.numbers, one.why) for one in findings]
+    table = write_rows(folder / "statements.csv", COLUMNS, rows, origin)
     return picture, table, findings
 
 

@@ -48,14 +48,14 @@ def _two_areas(kept: Kept, stiffness: float) -> Measured:
 
 
 def _lower_area_goes(kept: Kept) -> Measured:
-    inside = [size for stiffness in (1.0, 1.5) for size in [_largest_between(kept, stiffness, 80.0, 120.0)]]
+    inside = [_largest_inside(kept, stiffness) for stiffness in (1.0, 1.5)]
     return Measured([inside[0] > THRESHOLD, inside[1] < THRESHOLD],
                     f"80-120 N m: {inside[0]:.2g} um at x1, {inside[1]:.2g} um at x1.5")  # fmt: skip
 
 
-def _largest_between(kept: Kept, stiffness: float, low: float, high: float) -> float:
+def _largest_inside(kept: Kept, stiffness: float) -> float:
     loads, amplitude = envelope(read_ramp(kept.history(sheave_stiffness=stiffness), "t1"))
-    return float(amplitude[(loads >= low) & (loads <= high)].max())
+    return float(amplitude[(loads >= 80.0) & (loads <= 120.0)].max())
 
 
 def _starts_at_200(kept: Kept) -> Measured:

@@ -26,7 +26,7 @@ PARAMETERS = {table: keys for table, keys in elastic_belt.PARAMETERS.items() if 
         "least_margin": not_negative(
             0.7, "", "distance from amplitude_threshold, in e-folds, from which a coarse run decides"
         ),
-    },
+    }
 }
 DEFAULT_STEPPER = "imex"
 STEPPERS = {"imex": elastic_belt.STEPPERS["imex"]}
@@ -34,13 +34,4 @@ REFUSED = elastic_belt.REFUSED | {
     name: "its rules were measured with imex" for name in elastic_belt.STEPPERS if name not in STEPPERS
 }
 
-__all__ = [
-    "ANSWERED_BY",
-    "DEFAULT_STEPPER",
-    "GIVES",
-    "PARAMETERS",
-    "REFUSED",
-    "STEPPERS",
-    "check",
-    "inert",
-]
+__all__ = ["ANSWERED_BY", "DEFAULT_STEPPER", "GIVES", "PARAMETERS", "REFUSED", "STEPPERS", "check", "inert"]

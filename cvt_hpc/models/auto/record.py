@@ -8,7 +8,7 @@ from typing import TYPE_CHECKING, Any
 from cvt_hpc.models.auto.rules import COARSENESS, SHARE, Rung, coarse, is_clear, is_passive, is_settled
 from cvt_hpc.models.elastic_belt import grouping
 from cvt_hpc.models.elastic_belt import record as belt_record
-from cvt_hpc.models.elastic_belt.record import coordinates, lane_key
+from cvt_hpc.models.elastic_belt.record import coordinates, lane_key, lanes
 from cvt_hpc.variables import Status, Variable, Vibrates, shortened
 
 if TYPE_CHECKING:
@@ -31,11 +31,9 @@ __all__ = [
 ]
 
 VARIABLES = (
-    Variable("rung", (), "i1", "", "model of the ladder that answered", Rung),
+    Variable("rung", "", "model of the ladder that answered", dtype="i1", flags=Rung),
     Variable(
         "margin",
-        (),
-        "f8",
         "1",
         "distance of amplitude or slip from its threshold, the nearer one, in e-folds; 0: nothing decided",
     ),
@@ -49,11 +47,6 @@ def cost(parameters: Mapping[str, Any], stepper: str) -> Any:
     """Core-seconds of runs that fill the lanes once."""
     coarse = COARSENESS**2 * SHARE
     return (coarse + REFINED) * grouping.cost(parameters, stepper)
-
-
-def lanes(parameters: Mapping[str, Any], stepper: str) -> int:
-    """Most runs that can advance together."""
-    return grouping.lanes(parameters, stepper)
 
 
 def known(parameters: Mapping[str, Any]) -> dict[str, Any] | None:

@@ -19,7 +19,7 @@ class Proximal(NamedTuple):
     Attributes
     ----------
     theta : float
-        0: the ring's elasticity is explicit; 1/2 to 1: linearly implicit (`rcm_chain.advance`).
+        0: the ring's elasticity is explicit; 1/2 to 1: linearly implicit (`step`).
     tolerance : float
         Speed up to which a law counts as fulfilled [m/s]; impulses count by the speed that they change.
     most_sweeps : int

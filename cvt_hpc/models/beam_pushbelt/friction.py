@@ -120,10 +120,8 @@ def _flank_response(belt, state, work, j, along_meridian, around):
     spin = (out * step[j, f.R_LEVER] + on * step[j, f.T_LEVER]) / belt.inertia
     w, _ = _own(work, j, on_n - t * on_t, 0.0)
     c = on_t / (belt.mass * step[j, f.COSINE]) + t * w
-    u_y, u_z = (
-        c * step[j, f.MID_T_Y] - w * step[j, f.MID_T_Z],
-        c * step[j, f.MID_T_Z] + w * step[j, f.MID_T_Y],
-    )
+    u_y = c * step[j, f.MID_T_Y] - w * step[j, f.MID_T_Z]
+    u_z = c * step[j, f.MID_T_Z] + w * step[j, f.MID_T_Y]
     slip_m = step[j, f.MID_R_Y] * u_y + step[j, f.MID_R_Z] * u_z + step[j, f.MID_R_LEVER] * spin
     slip_t = step[j, f.MID_R_Y] * u_z - step[j, f.MID_R_Z] * u_y + step[j, f.MID_T_LEVER] * spin
     if state.elements[j, fields.DRIVEN] > 0.0:

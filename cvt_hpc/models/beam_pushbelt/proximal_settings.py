@@ -8,6 +8,7 @@ linearly implicit unless theta is 0.
 
 from cvt_hpc.parameters import Parameter
 from cvt_hpc.steppers.facts import Facts
+from cvt_hpc.steppers.settings import own_step
 
 FACTS = Facts(
     order=1,
@@ -21,14 +22,7 @@ FACTS = Facts(
 )
 PARAMETERS = {
     "numerics": {
-        "step": Parameter(
-            1e-6,
-            "s",
-            "largest time step; a whole number of steps makes a sampling interval",
-            minimum=1e-8,
-            maximum=1e-4,
-            sensible=(1e-8, 1e-4),
-        ),
+        "step": own_step(1e-6, 1e-8, 1e-4),
         "theta": Parameter(
             0.5,
             "",

@@ -95,7 +95,7 @@ def start(given: Mapping[str, Any]) -> tuple[Belt, BeltState]:
     ----------
     given : mapping
         Values [SI] as `pushbelt.start.start` takes them; beside them `ring_beams`, their number, and
-        `bending_stiffness`, of the ring [N m^2].
+        `ring_bending_stiffness` [N m^2].
 
     Returns
     -------
@@ -118,7 +118,7 @@ def start(given: Mapping[str, Any]) -> tuple[Belt, BeltState]:
         around / g["ring_beams"],
         line_mass,
         g["ring_stiffness"],
-        g["bending_stiffness"],
+        g["ring_bending_stiffness"],
         2.0 * np.pi * (1.0 + g["ring_strain"]) / around,
     )
     running = speed * around / path.path_length

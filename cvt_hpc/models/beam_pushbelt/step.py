@@ -25,25 +25,12 @@ import numpy as np
 
 from cvt_hpc.kernels import kernel
 from cvt_hpc.models.beam_pushbelt import fields as b
+from cvt_hpc.models.beam_pushbelt import friction
 from cvt_hpc.models.beam_pushbelt.forces import apply_forces, dot, locate
-from cvt_hpc.models.beam_pushbelt.friction import (
-    couple,
-    element_speed,
-    flank_slip,
-    rub,
-    saddle_impulse,
-)
 from cvt_hpc.models.pushbelt import fields as f
 from cvt_hpc.models.pushbelt.chain import turned
+from cvt_hpc.multibody import rcm_chain
 from cvt_hpc.multibody.rcm_beam import mean_strain
-from cvt_hpc.multibody.rcm_chain import (
-    PER_ELEMENT,
-    SIZE,
-    add_product,
-    add_to_column,
-    along_row,
-    assemble,
-)
 from cvt_hpc.physics.contact_laws import remembered
 from cvt_hpc.solvers.cyclic_blocks import factor, solve
 
@@ -55,22 +42,22 @@ def _free_speeds(belt, proximal, state, work, dt):
     """Speeds after the step with friction as in the last one; False where the matrix is singular."""
     ring, step = state.ring, work.step
     theta = proximal.theta
-    assemble(ring, max(2.0 * theta - 1.0, 0.0) * dt, (theta * dt) ** 2, theta * dt)
+    rcm_chain.assemble(ring, max(2.0 * theta - 1.0, 0.0) * dt, (theta * dt) ** 2, theta * dt)
     for i in range(ring.columns.rows):
-        for k in range(PER_ELEMENT):
+        for k in range(rcm_chain.PER_ELEMENT):
             ring.columns.data[i, k, 0] *= dt
     apply_forces(belt, state, work, dt)
     for j in range(step.shape[0]):
         beam, rows, tangent = work.beams[j], work.rows[j], step[j, b.TANGENT]
         mass = belt.mass / step[j, b.COSINE]
-        before = dot(rows[b.MID_ACROSS], ring.u, beam * PER_ELEMENT)
+        before = dot(rows[b.MID_ACROSS], ring.u, beam * rcm_chain.PER_ELEMENT)
         step[j, b.RING_ACROSS] = before
-        step[j, b.RING_ALONG] = dot(rows[b.MID_ALONG], ring.u, beam * PER_ELEMENT)
+        step[j, b.RING_ALONG] = dot(rows[b.MID_ALONG], ring.u, beam * rcm_chain.PER_ELEMENT)
         across = belt.mass * step[j, b.FREE_N] + step[j, b.IMPULSE_N] - mass * before
         across -= tangent * (belt.mass * step[j, b.FREE_T] + step[j, b.IMPULSE_T])
-        add_product(ring, beam, mass, rows[b.ACROSS], rows[b.MID_ACROSS])
-        add_to_column(ring.columns, 0, beam, across, rows[b.ACROSS])
-    return factor(ring.blocks, SIZE)
+        rcm_chain.add_product(ring, beam, mass, rows[b.ACROSS], rows[b.MID_ACROSS])
+        rcm_chain.add_to_column(ring.columns, 0, beam, across, rows[b.ACROSS])
+    return factor(ring.blocks, rcm_chain.SIZE)
 
 
 @kernel
@@ -79,10 +66,11 @@ def _take(state, work):
     ring, step = state.ring, work.step
     nodes = ring.blocks.rows - 1
     for k in range(ring.u.size):
-        ring.u[k] += ring.columns.data[k // PER_ELEMENT % nodes, k % PER_ELEMENT, 0]
+        ring.u[k] += ring.columns.data[k // rcm_chain.PER_ELEMENT % nodes, k % rcm_chain.PER_ELEMENT, 0]
     for j in range(step.shape[0]):
-        step[j, b.RING_ACROSS] += along_row(ring.columns, 0, work.beams[j], work.rows[j, b.MID_ACROSS])
-        step[j, b.RING_ALONG] += along_row(ring.columns, 0, work.beams[j], work.rows[j, b.MID_ALONG])
+        beam, rows = work.beams[j], work.rows[j]
+        step[j, b.RING_ACROSS] += rcm_chain.along_row(ring.columns, 0, beam, rows[b.MID_ACROSS])
+        step[j, b.RING_ALONG] += rcm_chain.along_row(ring.columns, 0, beam, rows[b.MID_ALONG])
 
 
 @kernel
@@ -90,21 +78,21 @@ def _accept(belt, state, work, inputs, dt):
     """Advance the state to the end of the step, and add up the works."""
     ring, e, step, totals, pulleys = state.ring, state.elements, work.step, state.totals, state.pulleys
     length = ring.beam.length
-    around = length * ((ring.q.size - 3) // PER_ELEMENT)
+    around = length * ((ring.q.size - 3) // rcm_chain.PER_ELEMENT)
     driving_thrust = driven_thrust = 0.0
     n = e.shape[0]
     for j in range(n):
-        first = work.beams[j] * PER_ELEMENT
+        first = work.beams[j] * rcm_chain.PER_ELEMENT
         e[j, f.TENSION] = ring.beam.axial_stiffness * mean_strain(length, ring.q[first : first + 8])
-        e[j, f.SADDLE] = abs(saddle_impulse(belt, step, j)) / dt
-        c, w = element_speed(belt, step, j), step[j, b.RING_ACROSS]
+        e[j, f.SADDLE] = abs(friction.saddle_impulse(belt, step, j)) / dt
+        c, w = friction.element_speed(belt, step, j), step[j, b.RING_ACROSS]
         t_y, t_z = step[j, b.MID_T_Y], step[j, b.MID_T_Z]
         e[j, f.V] = step[j, b.RING_ALONG]
         slip = step[j, b.RING_ALONG] - c
         e[j, f.RING_SLIP], e[j, f.RING_FRICTION] = slip, -e[j, b.RING_IMPULSE] / dt
         totals[f.RING_LOSS] -= e[j, b.RING_IMPULSE] * slip
 
-        slip_m, slip_t = flank_slip(belt, pulleys, e, step, j)
+        slip_m, slip_t = friction.flank_slip(belt, pulleys, e, step, j)
         grip_m, grip_t = -e[j, b.FLANK_IMPULSE_M] / dt, -e[j, b.FLANK_IMPULSE_T] / dt
         e[j, f.FLANK_SLIP_M], e[j, f.FLANK_SLIP_T] = slip_m, slip_t
         e[j, f.FLANK_FRICTION_M], e[j, f.FLANK_FRICTION_T] = grip_m, grip_t
@@ -151,15 +139,15 @@ def _step(belt, proximal, state, work, inputs, dt):
     locate(belt, state, work, dt)
     if not _free_speeds(belt, proximal, state, work, dt):
         return f.NOT_FINITE
-    solve(ring.blocks, ring.columns, SIZE)
+    solve(ring.blocks, ring.columns, rcm_chain.SIZE)
     _take(state, work)
     solved = True
     if rubs:
-        couple(state, work)
+        friction.couple(state, work)
         for j in range(e.shape[0]):
             work.free[j, 0], work.free[j, 1] = work.step[j, b.RING_ACROSS], work.step[j, b.RING_ALONG]
-        solved = rub(belt, proximal, state, work)
-        solve(ring.blocks, ring.columns, SIZE)
+        solved = friction.rub(belt, proximal, state, work)
+        solve(ring.blocks, ring.columns, rcm_chain.SIZE)
         for j in range(e.shape[0]):
             work.step[j, b.RING_ACROSS], work.step[j, b.RING_ALONG] = work.free[j, 0], work.free[j, 1]
         _take(state, work)

@@ -29,10 +29,8 @@ class Transient(pushbelt.Transient):
     """One run, as `pushbelt.transient.Transient` has it."""
 
     def _begin(self, p: Mapping[str, Any]) -> None:
-        given = pushbelt.given(as_pushbelt(p))
-        given |= {"ring_beams": p["ring_beams"], "bending_stiffness": p["ring_bending_stiffness"]}
         self._advance = called_alike(advance)
-        self._belt, self._state = start(given)
+        self._belt, self._state = start(pushbelt.given(as_pushbelt(p)))
         self._work = workspace(self._state.ring, p["elements"])
         self._method = Proximal(p["theta"], p["law_tolerance"], p["most_sweeps"])
 

@@ -20,7 +20,7 @@ import numpy as np
 from cvt_hpc.kernels import kernel, merged_kernel
 from cvt_hpc.models.belt_drive.friction import Friction, Memory, begin_iterate, empty_memory, laws_hold, rub
 from cvt_hpc.models.belt_drive.pulleys import CONTACT_LOSS, FRICTION_LOSS, WORK_IN, Pulleys, Wheels
-from cvt_hpc.multibody.ancf_beam import PER_NODE, shapes
+from cvt_hpc.multibody.ancf_beam import AXES, PER_NODE, X, Y, shapes
 from cvt_hpc.multibody.ancf_chain import Chain
 from cvt_hpc.solvers.cyclic_blocks import DIAGONAL, LOWER, UPPER
 
@@ -133,12 +133,10 @@ def add_contacts(
             centre_vx, centre_vy = wheels.centre_speed[p, 0], wheels.centre_speed[p, 1]
             turning = wheels.stage_speed[0, p]
             for c in range(points):
-                s0, s1, s2, s3 = (
-                    contact.shape[c, 0],
-                    l0 * contact.shape[c, 1],
-                    contact.shape[c, 2],
-                    l0 * contact.shape[c, 3],
-                )
+                s0 = contact.shape[c, 0]
+                s1 = l0 * contact.shape[c, 1]
+                s2 = contact.shape[c, 2]
+                s3 = l0 * contact.shape[c, 3]
                 x = s0 * q[i, 0] + s1 * q[i, 2] + s2 * q[j, 0] + s3 * q[j, 2]
                 y = s0 * q[i, 1] + s1 * q[i, 3] + s2 * q[j, 1] + s3 * q[j, 3]
                 away_x, away_y = x - centre_x, y - centre_y
@@ -235,23 +233,20 @@ def _add_to_belt(
     for node in range(2):
         at = i if node == 0 else j
         for kind in range(2):
-            s, k = shape[2 * node + kind], 2 * kind
-            columns[at, k, last] += s * force[0]
-            columns[at, k + 1, last] += s * force[1]
+            s, k = shape[2 * node + kind], AXES * kind
+            columns[at, k + X, last] += s * force[0]
+            columns[at, k + Y, last] += s * force[1]
             for other in range(2):
                 block = DIAGONAL
                 if other != node:
                     block = UPPER if node == 0 else LOWER
                 row = block * PER_NODE + k
-                a, b = s * shape[2 * other], s * shape[2 * other + 1]
-                blocks[at, row, 0] += a * xx
-                blocks[at, row, 1] += a * xy
-                blocks[at, row, 2] += b * xx
-                blocks[at, row, 3] += b * xy
-                blocks[at, row + 1, 0] += a * yx
-                blocks[at, row + 1, 1] += a * yy
-                blocks[at, row + 1, 2] += b * yx
-                blocks[at, row + 1, 3] += b * yy
+                for other_kind in range(2):
+                    a, column = s * shape[2 * other + other_kind], AXES * other_kind
+                    blocks[at, row + X, column + X] += a * xx
+                    blocks[at, row + X, column + Y] += a * xy
+                    blocks[at, row + Y, column + X] += a * yx
+                    blocks[at, row + Y, column + Y] += a * yy
 
 
 @merged_kernel
@@ -269,8 +264,8 @@ def _add_to_border(
     for node in range(2):
         at = i if node == 0 else j
         for kind in range(2):
-            s, x = shape[2 * node + kind], 2 * kind
-            columns[at, x, k] += s * column[0]
-            columns[at, x + 1, k] += s * column[1]
-            rows[at, k, x] += s * row[0]
-            rows[at, k, x + 1] += s * row[1]
+            s, first = shape[2 * node + kind], AXES * kind
+            columns[at, first + X, k] += s * column[0]
+            columns[at, first + Y, k] += s * column[1]
+            rows[at, k, first + X] += s * row[0]
+            rows[at, k, first + Y] += s * row[1]

@@ -7,19 +7,9 @@ from typing import NamedTuple
 import numpy as np
 
 from cvt_hpc.kernels import kernel
+from cvt_hpc.models.belt_drive import pulleys as rotating
 from cvt_hpc.models.belt_drive.contact import Contact, Touch, add_contacts, first_touch
 from cvt_hpc.models.belt_drive.friction import begin_friction, finish_friction
-from cvt_hpc.models.belt_drive.pulleys import (
-    BELT_LOSS,
-    Pulleys,
-    Wheels,
-    add_pulleys,
-    begin_wheels,
-    correct_wheels,
-    finish_wheels,
-    place_wheels,
-    wheels_at,
-)
 from cvt_hpc.multibody.ancf_beam import AncfBeam
 from cvt_hpc.multibody.ancf_chain import SIZE, Chain, begin_stage, chain, correct, finish_stage, place, set_up
 from cvt_hpc.solvers.cyclic_blocks import factor, solve_bordered
@@ -42,7 +32,7 @@ class Drive(NamedTuple):
     """
 
     beam: AncfBeam
-    pulleys: Pulleys
+    pulleys: rotating.Pulleys
     contact: Contact
 
 
@@ -62,7 +52,7 @@ class State(NamedTuple):
     """
 
     chain: Chain
-    wheels: Wheels
+    wheels: rotating.Wheels
     touch: Touch
     counters: np.ndarray
     totals: np.ndarray
@@ -85,7 +75,7 @@ def state(
         Of the arms [rad]; by default as drawn.
     """
     count, n = len(speeds), len(q)
-    turning = wheels_at(
+    turning = rotating.wheels_at(
         drive.pulleys, speeds, np.zeros(len(drive.pulleys.arms.pivot)) if angles is None else angles, n
     )
     return State(
@@ -140,14 +130,14 @@ def advance(
         begin_stage(belt, scheme, dt)
         begin_friction(friction, memory, scheme, dt)
         share = (step + scheme.alpha_f) / steps
-        begin_wheels(wheels, scheme, dt, inputs[0, 0] + share * (inputs[1, 0] - inputs[0, 0]))
+        rotating.begin_wheels(wheels, scheme, dt, inputs[0, 0] + share * (inputs[1, 0] - inputs[0, 0]))
         is_solved = False
         for iteration in range(most):
             place(belt, tau)
-            place_wheels(drive.pulleys, wheels, tau)
+            rotating.place_wheels(drive.pulleys, wheels, tau)
             wheels.power[:] = 0.0
-            wheels.power[BELT_LOSS] = set_up(drive.beam, belt, tau, last)
-            add_pulleys(drive.pulleys, wheels, inputs, share, tau)
+            wheels.power[rotating.BELT_LOSS] = set_up(drive.beam, belt, tau, last)
+            rotating.add_pulleys(drive.pulleys, wheels, inputs, share, tau)
             laws_hold = add_contacts(
                 drive.contact,
                 state.touch,
@@ -164,7 +154,7 @@ def advance(
             if not solve_bordered(belt.blocks, belt.columns, wheels.rows, wheels.corner, SIZE):
                 return False
             largest = correct(belt, last)
-            correct_wheels(wheels)
+            rotating.correct_wheels(wheels)
             if not np.isfinite(largest):
                 return False
             is_solved = laws_hold and largest <= tolerance
@@ -172,7 +162,7 @@ def advance(
                 break
         finish_stage(belt, scheme, dt)
         finish_friction(friction, memory, state.touch.normal, scheme, dt)
-        finish_wheels(drive.pulleys, wheels, scheme, dt)
+        rotating.finish_wheels(drive.pulleys, wheels, scheme, dt)
         for k in range(state.totals.size):
             state.totals[k] += dt * wheels.power[k]
         state.counters[STEPS] += 1

@@ -9,16 +9,9 @@ from typing import TYPE_CHECKING, Any
 import numpy as np
 
 from cvt_hpc.models.belt_drive import pulleys as fields
+from cvt_hpc.models.belt_drive import theory
 from cvt_hpc.models.belt_drive.kick import answers
 from cvt_hpc.models.belt_drive.layout import layout
-from cvt_hpc.models.belt_drive.theory import (
-    MODES,
-    creep_loss,
-    expected_loss,
-    sliding_tension,
-    strand_frequencies,
-    wrap_angles,
-)
 from cvt_hpc.physics.belt_path import regions
 from cvt_hpc.variables import Coordinate, Variable
 from cvt_hpc.variator import PULLEYS, STRANDS, judging
@@ -42,8 +35,8 @@ DRIVE_MODES = 8
 VARIABLES = (
     *assessment.VARIABLES,
     replace(shared("spectrum")[0], comment="largest of the strand's probes"),
-    Variable("strand_tension", ("strand",), "f8", "N", "mean tension in the middle half of the strand"),
-    Variable("tension_ripple", ("strand",), "f8", "N", "standard deviation of that mean"),
+    Variable("strand_tension", "N", "mean tension in the middle half of the strand", dims=("strand",)),
+    Variable("tension_ripple", "N", "standard deviation of that mean", dims=("strand",)),
     *shared("slip"),
     replace(
         shared("speed_loss")[0],
@@ -52,68 +45,56 @@ VARIABLES = (
     ),
     Variable(
         "expected_speed_loss",
-        (),
-        "f8",
         "1",
         "by creep and radial compliance, with the mean tensions of the strands",
         words="creep and compliance",
     ),
     Variable(
         "creep_speed_loss",
-        (),
-        "f8",
         "1",
         "by creep alone, from tension at rest and torque; of two pulleys",
         words="creep alone",
     ),
     Variable(
         "eigenfrequency",
-        ("strand", "half_waves"),
-        "f8",
         "Hz",
         "of a running beam under the strand's mean tension, pinned where tangents touch the pulleys; "
         "arms at their mean angles",
+        dims=("strand", "half_waves"),
     ),
     Variable(
         "drive_frequency",
-        ("drive_mode",),
-        "f8",
         "Hz",
         "of strands, sticking arcs and driven pulleys together, linearised at the end; arms stand still",
+        dims=("drive_mode",),
     ),
     Variable(
         "answered_frequency",
-        ("strand", "half_waves"),
-        "f8",
         "Hz",
         "peak near each eigenfrequency after a kick, where it exceeds three times the unrest before",
+        dims=("strand", "half_waves"),
     ),
-    Variable("arm_angle", ("pulley",), "f8", "rad", "mean rotation of the arm from where it is drawn"),
-    Variable("arm_ripple", ("pulley",), "f8", "rad", "standard deviation of that rotation"),
-    Variable("stop_share", ("pulley",), "f8", "1", "share of the judged part in which the arm is at a stop"),
+    Variable("arm_angle", "rad", "mean rotation of the arm from where it is drawn", dims=("pulley",)),
+    Variable("arm_ripple", "rad", "standard deviation of that rotation", dims=("pulley",)),
+    Variable("stop_share", "1", "share of the judged part in which the arm is at a stop", dims=("pulley",)),
     Variable(
-        "lifted",
-        ("pulley",),
-        "f8",
-        "1",
-        "1 where the belt has left the pulley, which ends a run as slip does",
+        "lifted", "1", "1 where the belt has left the pulley, which ends a run as slip does", dims=("pulley",)
     ),
     *shared("driven_speed_ripple"),
-    Variable("friction_loss", ("pulley",), "f8", "W", "mean friction power of the belt on the pulley"),
-    Variable("contact_loss", (), "f8", "W", "mean power of the contacts' normal damping"),
+    Variable("friction_loss", "W", "mean friction power of the belt on the pulley", dims=("pulley",)),
+    Variable("contact_loss", "W", "mean power of the contacts' normal damping"),
     replace(shared("belt_loss")[0], comment="mean power of the belt's damping along, across and in bending"),
     *shared("driving_power", "load_power", "storing_power", "loss", "power_residual"),
-    Variable("arm_loss", (), "f8", "W", "mean power of the tensioners' dashpots"),
-    Variable("efficiency", (), "f8", "1", "share of the power put in that is not lost"),
+    Variable("arm_loss", "W", "mean power of the tensioners' dashpots"),
+    Variable("efficiency", "1", "share of the power put in that is not lost"),
     Variable(
         "turns",
-        (),
-        "i8",
         "1",
         "whole revolutions of the belt over which speed_loss is the mean, roughly so with speed_ripple",
+        dtype="i8",
     ),
-    Variable("unsolved_share", (), "f8", "1", "share of steps that were not solved to the tolerance"),
-    Variable("iterations", (), "f8", "1", "of Newton's method in a step, mean"),
+    Variable("unsolved_share", "1", "share of steps that were not solved to the tolerance"),
+    Variable("iterations", "1", "of Newton's method in a step, mean"),
 )
 
 
@@ -134,7 +115,7 @@ def coordinates(parameters: Mapping[str, Any]) -> dict[str, Coordinate]:
         "strand": _named("strand", drawn.spans),
         "pulley": _named("pulley", drawn.pulleys, roles),
     }
-    half_waves = Coordinate(np.arange(1, MODES + 1), "1", "half waves", "along the strand")
+    half_waves = Coordinate(np.arange(1, theory.MODES + 1), "1", "half waves", "along the strand")
     modes = Coordinate(np.arange(1, DRIVE_MODES + 1), "1", "mode of the drive")
     bins = frequency_bins(parameters)
     return {**names, "frequency_bin": bins, "half_waves": half_waves, "drive_mode": modes}
@@ -191,14 +172,14 @@ def evaluate(run: Transient, strongest_probe: np.ndarray) -> dict[str, Any]:
     """
     drawn, present, powers = run.drawn, run.present, _powers(run)
     work, tension = run.counters(), each(run, "tension", drawn.spans)
-    frequencies = strand_frequencies(run.parameters, present.path, tension)
+    frequencies = theory.strand_frequencies(run.parameters, present.path, tension)
     return {
         **judging.motion(run, strongest_probe, drawn.pulleys),
         "spectrum": _spectrum(run),
         **_of_arms(run),
         "speed_loss": run.speed_loss(run.whole_turns) if run.turns else np.nan,
-        "expected_speed_loss": expected_loss(run.parameters, present, tension),
-        "creep_speed_loss": creep_loss(run.parameters, drawn),
+        "expected_speed_loss": theory.expected_loss(run.parameters, present, tension),
+        "creep_speed_loss": theory.creep_loss(run.parameters, drawn),
         "strand_tension": tension,
         "eigenfrequency": frequencies,
         "drive_frequency": run.drive_frequencies(DRIVE_MODES),
@@ -284,7 +265,7 @@ def histories(run: Transient) -> xr.Dataset:
     over_time |= {name: (name, "rad", "rotation from where it is drawn") for name in names}
     profiles = {name: (values, *PROFILES[name]) for name, values in run.profiles.items()}
     tension = np.array([_late(run, f"tension {k}") for k in run.drawn.spans])
-    sliding = sliding_tension(run.parameters, run.path, tension, run.places)
+    sliding = theory.sliding_tension(run.parameters, run.path, tension, run.places)
     words = (
         "tension where it slides",
         "N",
@@ -292,7 +273,7 @@ def histories(run: Transient) -> xr.Dataset:
     )
     profiles["sliding_tension"] = sliding, *words
     words = "wrap angle", "rad", "from the inlet of the arc, arms as drawn"
-    profiles["wrap_angle"] = wrap_angles(run.path, run.places), *words
+    profiles["wrap_angle"] = theory.wrap_angles(run.path, run.places), *words
     names = [name for pair in zip(run.drawn.pulleys, run.drawn.spans, strict=True) for name in pair]
     region = np.array(names)[regions(run.path, run.places)]
     return dataset(run, over_time, profiles, run.places, region)

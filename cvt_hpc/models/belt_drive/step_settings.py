@@ -5,8 +5,11 @@ Needs of a model: a step kernel with Newton's method and dual slopes of friction
 Order 2 between contacts' events, 1 at these. It resolves motion slower than the step and damps the rest.
 """
 
+from dataclasses import replace
+
 from cvt_hpc.parameters import Parameter
 from cvt_hpc.steppers.facts import Facts
+from cvt_hpc.steppers.settings import MOST_ITERATIONS, SPEED_TOLERANCE, own_step
 
 FACTS = Facts(
     order=2,
@@ -20,14 +23,7 @@ FACTS = Facts(
 )
 PARAMETERS = {
     "numerics": {
-        "step": Parameter(
-            1e-4,
-            "s",
-            "largest time step; a whole number of steps makes a sampling interval",
-            minimum=1e-8,
-            maximum=1e-3,
-            sensible=(1e-8, 1e-3),
-        ),
+        "step": own_step(1e-4, 1e-8, 1e-3),
         "spectral_radius": Parameter(
             0.6,
             "",
@@ -35,14 +31,7 @@ PARAMETERS = {
             minimum=0.0,
             maximum=1.0,
         ),
-        "speed_tolerance": Parameter(
-            1e-5,
-            "m/s",
-            "largest correction of a speed with which the equations of a step count as solved",
-            minimum=1e-12,
-            maximum=1.0,
-            sensible=(1e-12, 0.1),
-        ),
-        "most_iterations": Parameter(20, "", "iterations of a step", minimum=2, maximum=1000),
+        "speed_tolerance": replace(SPEED_TOLERANCE, default=1e-5),
+        "most_iterations": replace(MOST_ITERATIONS, default=20),
     }
 }

@@ -8,21 +8,13 @@ from typing import Any
 import numpy as np
 
 from cvt_hpc.kernels import called_alike
-from cvt_hpc.models.belt_drive import courses
+from cvt_hpc.models.belt_drive import courses, readings
 from cvt_hpc.models.belt_drive.drive import advance
 from cvt_hpc.models.belt_drive.kick import kick
 from cvt_hpc.models.belt_drive.layout import Layout, layout
 from cvt_hpc.models.belt_drive.linearised import drive_frequencies
 from cvt_hpc.models.belt_drive.mesh import mesh_amplitude
 from cvt_hpc.models.belt_drive.pulleys import Pulleys, axes
-from cvt_hpc.models.belt_drive.readings import (
-    PLACES,
-    PROFILES,
-    Reading,
-    Readings,
-    scalars_of,
-    stored_energy,
-)
 from cvt_hpc.models.belt_drive.start import start
 from cvt_hpc.models.marched import batches_of_one
 from cvt_hpc.models.sampled import MOST_UNSOLVED, SampledRun
@@ -69,10 +61,10 @@ class Transient(SampledRun):
         super().__init__(p)
         self._scheme = generalised_alpha(p["spectral_radius"])
         self.drawn = layout(p)
-        self._readings = Readings(p, self.drawn)
+        self._readings = readings.Readings(p, self.drawn)
         self._drive, self._state, is_settled = start(p, self.drawn, self._readings.mean_tension)
-        channels = ("load", "driving_speed", *scalars_of(self.drawn, len(self.pulleys.arms.pivot)))
-        sums, totals = (len(PROFILES) + 2, PLACES), self._state.totals.size + 1
+        channels = ("load", "driving_speed", *readings.scalars_of(self.drawn, len(self.pulleys.arms.pivot)))
+        sums, totals = (len(readings.PROFILES) + 2, readings.PLACES), self._state.totals.size + 1
         self._record(channels, self.drawn.spans, self._readings.probes, totals, sums)
         self._advance = called_alike(advance)
         self._lifted = np.zeros(len(self.drawn.pulleys), int)
@@ -104,7 +96,7 @@ class Transient(SampledRun):
                 break
             self._take_sample()
             if (ended := self._slipped() or self._left()) is not None:
-                self._totals[self.done - 1, -1] = stored_energy(self._drive, self._state)
+                self._totals[self.done - 1, -1] = readings.stored_energy(self._drive, self._state)
                 self.failure = self._early_end(ended)
                 break
         return self.failure
@@ -131,14 +123,14 @@ class Transient(SampledRun):
 
     def _take_sample(self) -> None:
         sums = self._sums if self.done >= self.first_judged else None
-        found = Reading(self._readings, self._drive, self._state, sums)
+        found = readings.Reading(self._readings, self._drive, self._state, sums)
         time = self.time
         speed = self.driving_speed(time)
         row = [*found.displacement, self.load(time), speed, *found.scalars()]
         self._lifted = np.where(found.lifted, self._lifted + 1, 0)
         stored = np.nan
         if self.done in (0, self.whole_turns.start - 1, self.samples - 1):
-            stored = stored_energy(self._drive, self._state)
+            stored = readings.stored_energy(self._drive, self._state)
         self._keep(row, [*self._state.totals, stored])
 
     def _slipped(self) -> str | None:
@@ -222,7 +214,7 @@ class Transient(SampledRun):
         length, tension, offset, normal, friction, samples = self._sums
         with np.errstate(invalid="ignore", divide="ignore"):
             means = tension / length, normal / samples, friction / samples, offset / length
-        return dict(zip(PROFILES, means, strict=True))
+        return dict(zip(readings.PROFILES, means, strict=True))
 
     @property
     def path(self) -> Any:

@@ -52,7 +52,7 @@ PARAMETERS: dict[str, dict[str, Parameter]] = {
             "energy balance (fed - taken) / (fed + taken) up to which nothing is decided, either way",
             minimum=0.0,
             maximum=1.0,
-        ),
+        )
     },
 }
 

@@ -18,24 +18,19 @@ HARMONIC = 0.1  # damping ratio: a motion that grows by more than half in a cycl
 ROUNDING = 1e-12  # of the friction's work in a cycle: as little energy as that is none
 
 VARIABLES = (
-    Variable("amplitude", (), "f8", "m", "amplitude of the limit cycle in harmonic balance; none: nan"),
-    Variable("frequency", (), "f8", "Hz", "frequency of the radial vibration"),
-    Variable("growth_rate", (), "f8", "s-1", "growth rate of small motions, damping over twice the mass"),
-    Variable("damping", (), "f8", "N s m-2", "radial damping per length of belt; negative: fed by friction"),
-    Variable("damping_ratio", (), "f8", "1", "damping over its critical value"),
-    Variable("energy_balance", (), "f8", "1", "(fed - taken) / (fed + taken) of small motions"),
-    Variable(
-        "sliding_gradient", (), "f8", "s m-1", "slope of friction at the sliding speed, as far as in phase"
-    ),
-    Variable(
-        "critical_gradient", (), "f8", "s m-1", "slope below which small motions grow; -inf: none is enough"
-    ),
+    Variable("amplitude", "m", "amplitude of the limit cycle in harmonic balance; none: nan"),
+    Variable("frequency", "Hz", "frequency of the radial vibration"),
+    Variable("growth_rate", "s-1", "growth rate of small motions, damping over twice the mass"),
+    Variable("damping", "N s m-2", "radial damping per length of belt; negative: fed by friction"),
+    Variable("damping_ratio", "1", "damping over its critical value"),
+    Variable("energy_balance", "1", "(fed - taken) / (fed + taken) of small motions"),
+    Variable("sliding_gradient", "s m-1", "slope of friction at the sliding speed, as far as in phase"),
+    Variable("critical_gradient", "s m-1", "slope below which small motions grow; -inf: none is enough"),
     Variable(
         "energy_per_cycle",
-        ("relative_amplitude",),
-        "f8",
         "J m-1",
         "energy that a cycle gains, per length of belt",
+        dims=("relative_amplitude",),
     ),
 )
 

@@ -10,7 +10,7 @@ from cvt_hpc.steppers import taken
 DEFAULT_STEPPER = "imex"
 REFUSED = {
     "moreau": "friction of the belt is regularised and has two directions, its contact is elastic: the belt "
-    "has no set-valued forces",
+    "has no set-valued forces"
 }
 OWN_STEPPERS = {
     "imex": "cvt_hpc.models.elastic_belt.imex_settings",
@@ -20,13 +20,4 @@ STEPPERS = OWN_STEPPERS | taken(REFUSED)
 
 GIVES = {"imex": {"step_error": CHOICE}}  # by stepper: values of its parameters for a scene
 
-__all__ = [
-    "DEFAULT_STEPPER",
-    "GIVES",
-    "OWN_STEPPERS",
-    "PARAMETERS",
-    "REFUSED",
-    "STEPPERS",
-    "check",
-    "inert",
-]
+__all__ = ["DEFAULT_STEPPER", "GIVES", "OWN_STEPPERS", "PARAMETERS", "REFUSED", "STEPPERS", "check", "inert"]

@@ -57,10 +57,7 @@ SLIDING = {
 }
 WRAP_ANGLE = ("wrap angle", "rad", "from the inlet of the arc")
 # everywhere, of an instant or of a state that does not change
-ELSEWHERE = {
-    **ALONG,
-    "contact_force": ("contact force", "N m-1", "axial line force of one flank"),
-}
+ELSEWHERE = {**ALONG, "contact_force": ("contact force", "N m-1", "axial line force of one flank")}
 
 
 def along_belt(

@@ -10,46 +10,35 @@ import numpy as np
 
 from cvt_hpc.lanes import LaneArray, split
 from cvt_hpc.models.elastic_belt import fields as f
+from cvt_hpc.models.elastic_belt import lane_belt, ring_step
+from cvt_hpc.models.elastic_belt import lane_fields as lf
 from cvt_hpc.models.elastic_belt.belt import State, belt_constants, initial_state, random_strands
-from cvt_hpc.models.elastic_belt.explicit import ExplicitWork, explicit_work
+from cvt_hpc.models.elastic_belt.explicit import FIELDS_OF_WORK, step_explicit
 from cvt_hpc.models.elastic_belt.grouping import LANES, lanes
-from cvt_hpc.models.elastic_belt.imex_stations import ImexWork, imex_work
-from cvt_hpc.models.elastic_belt.lane_belt import (
-    LaneState,
-    lane_belt,
-    lane_state,
-    parted,
-    parted_state,
-    parts_of,
-    take_lane,
-)
+from cvt_hpc.models.elastic_belt.imex import step_imex
 from cvt_hpc.models.elastic_belt.lane_forces import derive
-from cvt_hpc.models.elastic_belt.march import Sampled, march_explicit, march_imex
-from cvt_hpc.models.elastic_belt.momentary import Momentary
-from cvt_hpc.models.elastic_belt.recorded_run import RecordedRun, recording
-from cvt_hpc.models.elastic_belt.ring_march import march_rings
+from cvt_hpc.models.elastic_belt.march import Sampled, begin_at_once, march, take_sample
+from cvt_hpc.models.elastic_belt.recorded_run import RecordedRun, Records
 from cvt_hpc.models.elastic_belt.ring_settings import layer_count
-from cvt_hpc.models.elastic_belt.ring_step import RingWork, parted_ring_work, ring_work
 from cvt_hpc.models.elastic_belt.rings import ring_constants, with_layers, without_saddle_friction
-from cvt_hpc.models.elastic_belt.sampling import (
-    CHANNELS,
-    CONTACT_SOLVES,
-    ENDED,
-    ENDED_AT,
-    OUTCOME,
-    PROFILES,
-    REPEATED,
-    Outcome,
-)
+from cvt_hpc.models.elastic_belt.sampling import CONTACT_SOLVES, ENDED_AT, OUTCOME, REPEATED, Outcome, Samples
 from cvt_hpc.models.elastic_belt.step_choice import transverse_limit
 from cvt_hpc.models.elastic_belt.validity import FAILURES, step_doubt
 from cvt_hpc.recording import steps_per_sample
 from cvt_hpc.variables import Status
 
 PRECISIONS = {"double": np.float64, "single": np.float32}
-# work space, march
-Step = tuple[Callable[[LaneState], ImexWork | ExplicitWork | RingWork], Callable[..., None]]
-STEPS: dict[str, Step] = {"imex": (imex_work, march_imex), "explicit": (explicit_work, march_explicit)}
+STEPS: dict[str, tuple[Callable[[lane_belt.LaneState], Any], Callable[..., None]]] = {  # work space, march
+    "imex": (
+        partial(lane_belt.work_space, fields=lf.FIELDS_OF_WORK),
+        partial(march, begin_at_once, step_imex, take_sample),
+    ),
+    "explicit": (
+        partial(lane_belt.work_space, fields=FIELDS_OF_WORK),
+        partial(march, begin_at_once, step_explicit, take_sample),
+    ),
+}
+_march_rings = partial(march, ring_step.begin_rings, ring_step.step_rings, ring_step.take_sample_of_rings)
 
 
 class Paused(NamedTuple):
@@ -96,8 +85,8 @@ class Batch:
     ----------
     points, stepper
         As given.
-    plan : Recording
-        The recorded quantities.
+    records : Records
+        The arrays into which it records.
     samples : int
         Samples of a whole run.
     done : int
@@ -123,32 +112,28 @@ class Batch:
         self.dtype = PRECISIONS[p["precision"]]
         starts = [initial_state(point, belt) for point, belt in zip(padded, self.belts, strict=True)]
         self._work_space, self._march = STEPS[stepper]
-        self.is_layered = layer_count(p) > 1
-        if self.is_layered:
+        if layer_count(p) > 1:
             rings = [ring_constants(point, belt) for point, belt in zip(padded, self.belts, strict=True)]
             self.belts = [without_saddle_friction(belt) for belt in self.belts]
             starts = [with_layers(*each) for each in zip(starts, self.belts, rings, strict=True)]
-            self._work_space = partial(ring_work, belts=self.belts, rings=rings)
-            self._march = march_rings
-        self.state = lane_state(self.belts, starts, self.dtype)
-        self._belt = lane_belt(self.belts, self.dtype)
+            self._work_space = partial(ring_step.ring_work, belts=self.belts, rings=rings)
+            self._march = _march_rings
+        self.state = lane_belt.lane_state(self.belts, starts, self.dtype)
+        self._belt = lane_belt.lane_belt(self.belts, self.dtype)
         self.work = self._work_space(self.state)
         derive(self._belt, self.state, self.work.stations)
-        self.plan = recording(p, self.dtype)
+        self.records = Records(points, width, self.dtype)
+        self.plan = self.records.plan
         self.interval, self.samples = self.plan.interval, self.plan.samples
         self.steps_per_sample = steps_per_sample(self.interval, p["step"])
         self.step = self.interval / self.steps_per_sample
         self.begun = 0.0
-        n = self.plan.mesh.cell.size
-        # of the part that is not judged nothing is summed up
-        self.profiles = [LaneArray(rows, len(PROFILES), width) for rows in (0, n)]
-        self.momentary = Momentary(points, n)
-        self.ended = LaneArray(1, len(ENDED), width)
-        columns = self.plan.sensing.matrix.shape[0] + len(CHANNELS)
-        self._go_on_after([run.rows for run in paused] or [np.zeros((0, columns))] * len(points))
+        nothing = np.zeros((0, self.records.channels))
+        self._go_on_after([run.rows for run in paused] or [nothing] * len(points))
         if paused:
             self._resume([*paused, *[paused[-1]] * (width - len(paused))])
-        self._parts = parts_of(n, LANES[p["precision"]]) if p["lanes"] == "stations" else 1
+        most_parts = LANES[p["precision"]] if p["lanes"] == "stations" else 1
+        self._parts = lane_belt.parts_of(self.plan.mesh.cell.size, most_parts)
 
     def _go_on_after(self, rows: Sequence[np.ndarray]) -> None:
         """Take rows that have been recorded, (done, S + C) each, as the beginning of the runs' histories."""
@@ -160,10 +145,10 @@ class Batch:
 
     def _resume(self, paused: Sequence[Paused]) -> None:
         """Put the runs' states into the lanes, with all data that the step keeps."""
-        for k, array in enumerate(lane_arrays(self.state, self.work, self.ended)):
+        for k, array in enumerate(lane_arrays(self.state, self.work, self.records.ended)):
             array.data[:] = np.stack([run.lane[k] for run in paused], axis=-1)
         self.state.time[0] = paused[0].time
-        if isinstance(self.work, RingWork):
+        if isinstance(self.work, ring_step.RingWork):
             self.work.sums.data[:] = 0.0  # of a judged part that has yet to come
 
     @property
@@ -174,7 +159,7 @@ class Batch:
     @property
     def running(self) -> bool:
         """Whether any run has not ended."""
-        outcomes = self.ended.data[0, OUTCOME, : len(self.points)]
+        outcomes = self.records.ended.data[0, OUTCOME, : len(self.points)]
         return self.done < self.samples and bool((outcomes == Outcome.OK).any())
 
     def advance(self, samples: int) -> None:
@@ -192,38 +177,23 @@ class Batch:
                 self.state.fields.data[:, f.W, lane] += shape
             derive(self._belt, self.state, self.work.stations)
             self._disturbed = True
-        borders = plan.kick, plan.first_judged, self.momentary.first, self.samples
+        kept = self.records.momentary.first
+        borders = plan.kick, plan.first_judged, kept, self.samples
         last = min(first + samples, *(border for border in borders if border > first))
         whole = Sampled(self._belt, self.state, self.work.stations)
         marched = self._belt, self.state, self.work
         if self._parts > 1:
             marched = (
-                parted(self._belt, self._parts),
-                parted_state(self.state, self._parts),
+                lane_belt.parted(self._belt, self._parts),
+                lane_belt.parted_state(self.state, self._parts),
                 _parted_work(self.work, self._parts),
             )
-        by_sample = first >= self.momentary.first and last > first
-        ends = range(first + 1, last + 1) if by_sample else [last]
+        ends = range(first + 1, last + 1) if first >= kept and last > first else [last]
         for end in ends:
-            profiles = self.profiles[int(first >= plan.first_judged)]
-            if by_sample:
-                profiles = LaneArray(*self.profiles[1].data.shape)
-            self._march(
-                *marched,
-                self.step,
-                self.steps_per_sample,
-                whole,
-                plan.sensing,
-                self.rows,
-                self.done - self._recorded,
-                end - self._recorded,
-                profiles,
-                self.ended,
-            )
-            if by_sample:
-                self.momentary.note(self.done, profiles)
-                if first >= plan.first_judged:
-                    self.profiles[1].data[:] += profiles.data
+            rows = self.done - self._recorded, end - self._recorded
+            with self.records.profiles_of(self.done) as profiles:
+                into = Samples(plan.sensing, self.rows, profiles, self.records.ended)
+                self._march(*marched, self.step, self.steps_per_sample, whole, into, *rows)
             self.done = end
 
     def take_over(self, runs: Sequence[Any]) -> None:
@@ -237,13 +207,13 @@ class Batch:
         self._go_on_after([np.broadcast_to(run.rows, (run.done, self.rows.data.shape[1])) for run in runs])
         states = [run.state for run in runs]
         states += [states[-1].copy() for _ in self.belts[len(runs) :]]
-        self.state = lane_state(self.belts, states, self.dtype)
+        self.state = lane_belt.lane_state(self.belts, states, self.dtype)
         self.work = self._work_space(self.state)
         derive(self._belt, self.state, self.work.stations)
-        self.begun = self.ended.data[0, ENDED_AT] = runs[0].time
+        self.begun = self.records.ended.data[0, ENDED_AT] = runs[0].time
         if self.done > self.plan.first_judged:
-            self.profiles[1].data[:] = np.nan  # sums of the other stepper are not known
-            if isinstance(self.work, RingWork):
+            self.records.without_means()
+            if isinstance(self.work, ring_step.RingWork):
                 self.work.sums.data[:] = np.nan
 
     def history(self, lane: int) -> np.ndarray:
@@ -266,9 +236,9 @@ class Batch:
 
 def _parted_work(work: Any, parts: int) -> Any:
     """A step's work space for linked parts."""
-    if isinstance(work, RingWork):
-        return parted_ring_work(work, parts)
-    return type(work)(split(work.stations, parts))
+    if isinstance(work, ring_step.RingWork):
+        return ring_step.parted_ring_work(work, parts)
+    return lane_belt.Work(split(work.stations, parts))
 
 
 class LaneRun(RecordedRun):
@@ -290,9 +260,8 @@ class LaneRun(RecordedRun):
     """
 
     def __init__(self, batch: Batch, lane: int) -> None:
-        super().__init__(batch.points[lane], batch.plan, batch.profiles[1].data[:, :, lane])
+        super().__init__(batch.points[lane], batch.records, lane)
         self.batch, self.step = batch, batch.step
-        self._lane = lane
 
     @property
     def failure(self) -> tuple[Status, str] | None:
@@ -311,12 +280,7 @@ class LaneRun(RecordedRun):
     def layer_sums(self) -> np.ndarray | None:
         """As of `RecordedRun`."""
         work = self.batch.work
-        return work.sums.data[:, :, self._lane] if isinstance(work, RingWork) else None
-
-    @property
-    def momentary(self) -> np.ndarray | None:
-        """Samples of the run that `Momentary` has kept."""
-        return self.batch.momentary.of(self._lane)
+        return work.sums.data[:, :, self._lane] if isinstance(work, ring_step.RingWork) else None
 
     @property
     def time(self) -> float:
@@ -326,11 +290,11 @@ class LaneRun(RecordedRun):
     @property
     def state(self) -> State:
         """The present state; a copy."""
-        return take_lane(self.batch.state, self._lane, self.batch.belts[self._lane])
+        return lane_belt.take_lane(self.batch.state, self._lane, self.batch.belts[self._lane])
 
     def paused(self) -> Paused:
         """The state from which a batch of the same point over a longer time continues."""
-        kept = lane_arrays(self.batch.state, self.batch.work, self.batch.ended)
+        kept = lane_arrays(self.batch.state, self.batch.work, self._records.ended)
         lane = tuple(array.data[:, :, self._lane].copy() for array in kept)
         return Paused(float(self.batch.state.time[0]), lane, self.rows.copy(order="K"))
 
@@ -363,4 +327,4 @@ class LaneRun(RecordedRun):
         return self.batch.history(self._lane)[: self.done]
 
     def _ended(self, what: int) -> float:
-        return float(self.batch.ended.data[0, what, self._lane])
+        return float(self._records.ended.data[0, what, self._lane])

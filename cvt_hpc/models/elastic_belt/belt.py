@@ -249,7 +249,8 @@ def belt_constants(parameters: Mapping[str, Any]) -> Belt:
         beyond["lean"][zone.stations] = zone.beyond / rho
         beyond["lean_rate"][zone.stations] = zone.beyond * radius / rho**3
         beyond["upright"][zone.stations] = radius / rho
-    ring_mass = p["ring_mass"] * 0.5 * _pair(cell * (1.0 + kappa * p["ring_offset"])) / dual
+    along_rings = cell * (1.0 + kappa * p["ring_offset"])
+    ring_mass = p["ring_mass"] * 0.5 * (along_rings + np.roll(along_rings, 1)) / dual
     belt_speed = p["driving_speed"] * path.driving_radius
     whole, disc = stiffness_factors(p)
     size = measures(p)
@@ -319,11 +320,6 @@ def belt_constants(parameters: Mapping[str, Any]) -> Belt:
     return Belt(**computed, **given)
 
 
-def _pair(values: np.ndarray) -> np.ndarray:
-    """Sum of a cell quantity over the two cells of each station."""
-    return values + np.roll(values, 1)
-
-
 def initial_state(parameters: Mapping[str, Any], belt: Belt) -> State:
     """Start near the steady state without load.
 
@@ -344,7 +340,7 @@ def initial_state(parameters: Mapping[str, Any], belt: Belt) -> State:
     pull = 2.0 * tangent * p["thrust"] / grid.path.driven_wrap
     w = np.zeros(grid.cell.size)
     arcs = []
-    states = np.zeros(len(f.STATES))
+    states = np.zeros(f.STATES)
     for region, sheave, radius, tilted in (
         (0, belt.driving, belt.driving_radius, f.DRIVING_COS),
         (2, belt.driven, belt.driven_radius, f.DRIVEN_COS),

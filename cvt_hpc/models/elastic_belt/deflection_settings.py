@@ -3,7 +3,6 @@
 from __future__ import annotations
 
 from collections.abc import Mapping
-from dataclasses import replace
 from functools import partial
 from typing import Any
 
@@ -15,8 +14,8 @@ from cvt_hpc.physics.geometry import variator
 from cvt_hpc.physics.ritz import modal_flexibilities, moving_modes
 from cvt_hpc.physics.sheaves import Sheaves
 from cvt_hpc.recording import steps_per_sample
+from cvt_hpc.variator import PULLEYS
 
-PULLEYS = ("driving", "driven")
 CONE = ("cone_stiffness", "cone_shift")
 RITZ = ("ritz_limit", "ritz_modes", "disc_damping")
 TABLE_KEYS = tuple(f"{pulley}_flexibility{end}" for pulley in PULLEYS for end in ("_file", "_angle", ""))
@@ -79,17 +78,13 @@ def _modes(pulley: str) -> dict[str, Parameter]:
         harmonic: Parameter(
             (), "", f"waves around the {pulley} discs of each of their modes, of both discs of the groove"
         ),
-        flexibility: Parameter(
+        flexibility: positive(
             (),
             "m/N",
             "opening of the groove by these modes at rest, at the place of a force on both flanks",
-            minimum=0.0,
-            exclusive=True,
             sensible=(1e-30, 1e-5),
         ),
-        mass: Parameter(
-            (), "kg", "masses of these modes; 0: without inertia", minimum=0.0, sensible=(1e-9, 1e9)
-        ),
+        mass: not_negative((), "kg", "masses of these modes; 0: without inertia", sensible=(1e-9, 1e9)),
     }
 
 
@@ -101,9 +96,8 @@ DEFLECTION: dict[str, Parameter] = {
         "flexibilities of a table, or modes with inertia",
         choices=("bending", "cone", "flexibilities", "ritz"),
     ),
-    "cone_stiffness": replace(
-        positive(3e5, "N m/rad", "stiffness of a cone against tilting", sensible=(100.0, 1e9)),
-        allow_infinite=True,
+    "cone_stiffness": positive(
+        3e5, "N m/rad", "stiffness of a cone against tilting", sensible=(100.0, 1e9), allow_infinite=True
     ),
     "cone_shift": not_negative(
         0.0, "m", "shift of a cone's axis of tilting towards the middle of the arc", sensible=(1e-5, 0.2)

@@ -7,8 +7,6 @@ deviations, each cell's stresses computed once.
 
 from __future__ import annotations
 
-from typing import NamedTuple
-
 from cvt_hpc.kernels import kernel
 from cvt_hpc.lanes import (
     LaneArray,
@@ -26,52 +24,20 @@ from cvt_hpc.lanes import (
 )
 from cvt_hpc.models.elastic_belt import fields as f
 from cvt_hpc.models.elastic_belt import lane_fields as lf
-from cvt_hpc.models.elastic_belt.lane_belt import LaneBelt, LaneState
+from cvt_hpc.models.elastic_belt import lane_forces as forces
+from cvt_hpc.models.elastic_belt.lane_belt import LaneBelt, LaneState, Work
 from cvt_hpc.models.elastic_belt.lane_column import across_by_curvature, column_across
-from cvt_hpc.models.elastic_belt.lane_forces import (
-    derive,
-    groove_sliding,
-    lane_acceleration,
-    lane_belt_speed,
-    lane_damping,
-    lane_pulleys,
-    lane_sliding,
-    lane_speed_share,
-    lane_transverse,
-    leaning,
-    pressed_strain,
-    remembered,
-    ring_grip,
-)
 from cvt_hpc.models.elastic_belt.pulley_step import advance_pulleys
 from cvt_hpc.physics.flank import flank_shares, flank_sliding
 
-# fields of ExplicitWork.stations, after those of `lane_forces`
+# Fields of Work.stations, after those of `lane_forces`: slope w_s; a step's increments of u, v_element and
+# v_ring; forces of the layers' dampers in the cells
 SLOPE, DU, DV_0, DV_1, DAMPED_0, DAMPED_1 = range(lf.FIELDS_OF_FORCES, lf.FIELDS_OF_FORCES + 6)
 FIELDS_OF_WORK = lf.FIELDS_OF_FORCES + 6
 
 
-class ExplicitWork(NamedTuple):
-    """Work space of the step.
-
-    Attributes
-    ----------
-    stations : (N, 23) LaneArray
-        The fields of `lane_forces`; slope w_s; a step's increments of u, v_element and v_ring; forces of the
-        layers' dampers in the cells.
-    """
-
-    stations: LaneArray
-
-
-def explicit_work(state: LaneState) -> ExplicitWork:
-    """Work space for a state; `derive` has to be called before the first step."""
-    rows, _, lanes = state.fields.data.shape
-    return ExplicitWork(LaneArray(rows, FIELDS_OF_WORK, lanes))
-
-
 @kernel
-def step_explicit(belt: LaneBelt, state: LaneState, work: ExplicitWork, step: float) -> None:
+def step_explicit(belt: LaneBelt, state: LaneState, work: Work, step: float) -> None:
     """One step.
 
     Parameters
@@ -82,13 +48,13 @@ def step_explicit(belt: LaneBelt, state: LaneState, work: ExplicitWork, step: fl
         Step [s]; stable below 2 / (largest rate), some 0.2 us with the default belt.
     """
     stations = work.stations
-    lane_sliding(belt, state, stations)
+    forces.lane_sliding(belt, state, stations)
     taken, moment = _accelerate(belt, state, stations, step)
     advance_pulleys(belt, state, taken, moment, step)
     state.time[0] += step
     _advance_layers(belt, state, stations, step)
     _advance_across(belt, state, stations, step)
-    derive(belt, state, stations)
+    forces.derive(belt, state, stations)
 
 
 @kernel
@@ -102,13 +68,13 @@ def _accelerate(belt: LaneBelt, state: LaneState, stations: LaneArray, step: flo
     per_cosine, radius, driving_radius = 1.0 / cosine, c[0, lf.DRIVEN_RADIUS], c[0, lf.DRIVING_RADIUS]
     element_stiffness, ring_stiffness = c[0, lf.ELEMENT_STIFFNESS], c[0, lf.RING_STIFFNESS]
     element_damping, ring_damping = c[0, lf.ELEMENT_DAMPING], c[0, lf.RING_DAMPING]
-    speed_share = lane_speed_share(belt, state.time[0], sine)
+    speed_share = forces.lane_speed_share(belt, state.time[0], sine)
     mass, ring_mass, belt_speed = c[0, lf.MASS], c[0, lf.RING_MASS], speed_share * c[0, lf.BELT_SPEED]
     bending, ring_friction = c[0, lf.BENDING_STIFFNESS], c[0, lf.RING_FRICTION]
     ring_relief = c[0, lf.RING_RELIEF] * speed_share * speed_share
-    acceleration = lane_acceleration(belt, state.time[0], step)
+    acceleration = forces.lane_acceleration(belt, state.time[0], step)
     centrifugal, gyroscopic = mass * belt_speed * belt_speed, 2.0 * mass * belt_speed
-    damping = lane_damping(belt, state.time[0])
+    damping = forces.lane_damping(belt, state.time[0])
     mobility, element_mobility, ring_mobility = step / mass, step / c[0, lf.ELEMENT_MASS], step / ring_mass
     masses = c[0, lf.ELEMENT_MASS], ring_mass
     rise, zero = acceleration * step, like(0.0, sine)
@@ -119,7 +85,7 @@ def _accelerate(belt: LaneBelt, state: LaneState, stations: LaneArray, step: flo
         j = k if k >= 0 else n - 1
         per_cell = belt.per_cell[j]
         v0, v1 = fields[j, f.V_ELEMENT], fields[j, f.V_RING]
-        push = element_stiffness * minimum(pressed_strain(belt, state, stations, j), 0.0)
+        push = element_stiffness * minimum(forces.pressed_strain(belt, state, stations, j), 0.0)
         ring_right = ring_stiffness * stations[j, lf.EPS_1]
         net_right = push + (ring_right - centrifugal)
         gap_0 = (ahead(fields, j, f.V_ELEMENT) - v0) * per_cell
@@ -133,7 +99,7 @@ def _accelerate(belt: LaneBelt, state: LaneState, stations: LaneArray, step: flo
             span, per_dual, touches = belt.per_span[j], belt.per_dual[j], belt.touches[j]
             u, full_speed = fields[j, f.U], belt_speed + v0
             slope = (ahead(fields, j, f.W) - behind(fields, j, f.W)) * span
-            across = lane_transverse(belt, fields, j, net_left, net_right, bending)
+            across = forces.lane_transverse(belt, fields, j, net_left, net_right, bending)
             across = fma(-gyroscopic, (ahead(fields, j, f.U) - behind(fields, j, f.U)) * span, across)
             across = fma(-acceleration * mass, slope, across)
             if belt.has_column:
@@ -146,12 +112,10 @@ def _accelerate(belt: LaneBelt, state: LaneState, stations: LaneArray, step: flo
             if anywhere(touches > 0.0):
                 longer = fma(offset, belt.ring_curvature[j], 1.0)
                 lever = fma(offset, belt.arc_curvature[j], 1.0)
-                grip = ring_grip(belt, j, ring_left, ring_right, ring_relief * longer, ring_friction)
+                grip = forces.ring_grip(belt, j, ring_left, ring_right, ring_relief * longer, ring_friction)
                 drag = grip * stations[j, lf.RING_FACTOR]
-                mu, per_speed = (
-                    stations[j, lf.COEFFICIENT] * stations[j, lf.FACTOR],
-                    stations[j, lf.PER_SPEED],
-                )
+                mu = stations[j, lf.COEFFICIENT] * stations[j, lf.FACTOR]
+                per_speed = stations[j, lf.PER_SPEED]
                 climb = stations[j, lf.SLIDING_R] * per_cosine * per_speed
                 axial_share, radial_share = flank_shares(mu, climb, sine, cosine)
                 per_normal, per_ring = reciprocals(axial_share, longer * ring_mass)
@@ -160,7 +124,7 @@ def _accelerate(belt: LaneBelt, state: LaneState, stations: LaneArray, step: flo
                 radial = twice_normal * radial_share
                 tangential = -twice_normal * (mu * (stations[j, lf.SLIDING_T] * per_speed))
                 is_driven = belt.on_driven[j] > 0.5
-                upright, lean = belt.upright[j], leaning(belt, j, fields[j, f.W])
+                upright, lean = belt.upright[j], forces.leaning(belt, j, fields[j, f.W])
                 outward = fma(upright, radial, fma(-lean, tangential, outward))
                 distance = select(is_driven, radius, driving_radius)
                 distance += fma(upright, fields[j, f.W], belt.rise[j])
@@ -195,15 +159,11 @@ def _accelerate(belt: LaneBelt, state: LaneState, stations: LaneArray, step: flo
 def _advance_layers(belt: LaneBelt, state: LaneState, stations: LaneArray, step: float) -> None:
     """Speeds of both layers, contents by the fluxes of the new speeds, work of the layers' dampers."""
     n, fields, scalars = state.fields.rows, state.fields, state.scalars
-    belt_speed = lane_belt_speed(belt, state.time[0])
+    belt_speed = forces.lane_belt_speed(belt, state.time[0])
     work_done = like(0.0, belt_speed)
     for layer in range(2):
-        v_row, dv_row, eps_row, n_row = (
-            f.V_ELEMENT + layer,
-            DV_0 + layer,
-            lf.EPS_0 + layer,
-            f.N_ELEMENT + layer,
-        )
+        v_row, dv_row, eps_row = f.V_ELEMENT + layer, DV_0 + layer, lf.EPS_0 + layer
+        n_row = f.N_ELEMENT + layer
         short_row, damped_row = lf.SHORT_0 + layer, DAMPED_0 + layer
         # at the station ahead of a cell: increment, speed, and the flux of content less the belt speed
         dv_b = stations[0, dv_row]
@@ -226,9 +186,9 @@ def _advance_layers(belt: LaneBelt, state: LaneState, stations: LaneArray, step:
 def _advance_across(belt: LaneBelt, state: LaneState, stations: LaneArray, step: float) -> None:
     """Transverse velocity, memory by the sliding speeds of the new velocities, and displacement."""
     n, fields, c = state.fields.rows, state.fields, belt.constants
-    speed_share = lane_speed_share(belt, state.time[0], c[0, lf.BELT_SPEED])
+    speed_share = forces.lane_speed_share(belt, state.time[0], c[0, lf.BELT_SPEED])
     per_cosine, belt_speed = 1.0 / c[0, lf.COSINE], speed_share * c[0, lf.BELT_SPEED]
-    pulleys = lane_pulleys(belt, speed_share, state.scalars)
+    pulleys = forces.lane_pulleys(belt, speed_share, state.scalars)
     before = behind(fields, 0, f.V_FILTERED)
     for j in range(n):
         u, w = fields[j, f.U] + stations[j, DU], fields[j, f.W]
@@ -236,9 +196,9 @@ def _advance_across(belt: LaneBelt, state: LaneState, stations: LaneArray, step:
         if belt.memory and anywhere(touches > 0.0):
             v_element = fields[j, f.V_ELEMENT]
             v_across = fma(belt_speed + v_element, stations[j, SLOPE], u)
-            v_radial, along = groove_sliding(belt, j, pulleys, belt_speed, v_across, v_element, w)
+            v_radial, along = forces.groove_sliding(belt, j, pulleys, belt_speed, v_across, v_element, w)
             speed, _ = flank_sliding(v_radial, along, per_cosine)
-            filtered = remembered(belt, j, stations[j, lf.WAY], belt_speed, step, speed, old, before)
+            filtered = forces.remembered(belt, j, stations[j, lf.WAY], belt_speed, step, speed, old, before)
             filtered = select(stations[j, lf.FORCE] > 0.0, filtered, speed)
             fields[j, f.V_FILTERED] = select(touches > 0.0, filtered, 0.0)
         before = old

@@ -7,6 +7,9 @@ waves. Over the map of jobs/lebrecht_2004.toml the limit is 0.19 us where fricti
 where it falls least.
 """
 
+from dataclasses import replace
+
+from cvt_hpc.models.elastic_belt.imex_settings import LARGEST_STEP
 from cvt_hpc.models.elastic_belt.ring_settings import refuse_layers
 from cvt_hpc.parameters import Parameter
 from cvt_hpc.steppers.facts import LANES, Facts
@@ -25,14 +28,7 @@ FACTS = Facts(
 )
 PARAMETERS = {
     "numerics": {
-        "step": Parameter(
-            1e-7,
-            "s",
-            "largest time step; a whole number of steps makes a sampling interval",
-            minimum=1e-9,
-            maximum=1e-3,
-            sensible=(1e-09, 0.001),
-        ),
+        "step": replace(LARGEST_STEP, default=1e-7),
         "precision": Parameter(
             "double",
             "",

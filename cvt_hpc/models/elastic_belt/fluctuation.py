@@ -44,26 +44,23 @@ ARC_PARTS = 4  # of each wrap, of equal length, from its inlet to its outlet
 
 VARIABLES = (
     Variable(
-        "part_flank_loss", ("pulley", "arc_part"), "f8", "W", "mean friction power of the flanks by arc part"
+        "part_flank_loss", "W", "mean friction power of the flanks by arc part", dims=("pulley", "arc_part")
     ),
     Variable(
         "flank_fed",
-        ("pulley", "arc_part"),
-        "f8",
         "W",
         "power that friction of the flanks feeds into the fluctuation by arc part; negative: takes",
+        dims=("pulley", "arc_part"),
         words="feed by flank friction",
     ),
     Variable(
         "stress_fed",
-        (),
-        "f8",
         "W",
         "power that push and tension feed into the fluctuation, where gaps open and close",
         words="feed by push and tension",
     ),
     *(
-        Variable(f"{name}_taken", (), "f8", "W", f"power that {what} from the fluctuation", words=words)
+        Variable(f"{name}_taken", "W", f"power that {what} from the fluctuation", words=words)
         for name, what, words in (
             ("belt", "the belt's transverse damping takes", "taken by belt damping"),
             ("ring", "friction between rings and elements takes", "taken by ring friction"),
@@ -73,16 +70,12 @@ VARIABLES = (
     ),
     Variable(
         "carried_power",
-        (),
-        "f8",
         "W",
         "power that goes from the fluctuation to the mean motion",
         words="power to the mean motion",
     ),
     Variable(
         "fluctuation_remainder",
-        (),
-        "f8",
         "W",
         "power that is fed into the fluctuation less the power taken and carried",
     ),

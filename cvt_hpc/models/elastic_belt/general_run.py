@@ -10,15 +10,14 @@ import numpy as np
 from cvt_hpc.kernels import kernel
 from cvt_hpc.models.elastic_belt import fields as f
 from cvt_hpc.models.elastic_belt import lane_fields as lf
-from cvt_hpc.models.elastic_belt import one_system
-from cvt_hpc.models.elastic_belt.belt import Belt, Mesh, State, belt_constants, initial_state, random_strands
+from cvt_hpc.models.elastic_belt import one_system, ring_system
+from cvt_hpc.models.elastic_belt.belt import Belt, State, belt_constants, initial_state, random_strands
 from cvt_hpc.models.elastic_belt.column import pressed_strains
 from cvt_hpc.models.elastic_belt.lane_belt import put_lane
-from cvt_hpc.models.elastic_belt.one_lane_run import OneLaneRun
+from cvt_hpc.models.elastic_belt.recorded_run import OneLaneRun
 from cvt_hpc.models.elastic_belt.rhs import strains
 from cvt_hpc.models.elastic_belt.ring_settings import layer_count
-from cvt_hpc.models.elastic_belt.ring_system import LayeredForm
-from cvt_hpc.models.elastic_belt.rings import FIRST_LAYER
+from cvt_hpc.models.elastic_belt.rings import FIRST_LAYER, ring_constants
 from cvt_hpc.models.elastic_belt.sampling import Outcome
 from cvt_hpc.models.elastic_belt.sparsity import SparseJacobian
 from cvt_hpc.models.elastic_belt.validity import FAILURES
@@ -29,43 +28,6 @@ from cvt_hpc.steppers.marching import Marching
 from cvt_hpc.variables import Status
 
 SAMPLES_TOGETHER = 20  # between two checks of the samples: a run that has left its path goes not far
-
-
-class Form:
-    """The belt as a system of equations, and the way between their unknowns and its state.
-
-    Parameters
-    ----------
-    belt, grid
-        Constants and mesh.
-    parameters : dict
-        Resolved parameters of the run [SI].
-
-    Attributes
-    ----------
-    system : System
-        The equations.
-    """
-
-    def __init__(self, belt: Belt, grid: Mesh, parameters: Mapping[str, Any]) -> None:
-        self._flat = one_system.flat_belt(belt)
-        self.system = one_system.system(self._flat)
-
-    def pack(self, state: State) -> np.ndarray:
-        """Unknowns of a state."""
-        return one_system.pack(self._flat, state)
-
-    def state(self, time: float, y: np.ndarray) -> State:
-        """State of unknowns; overwritten by the next call, and by the next evaluation of rates."""
-        one_system.unpack(self._flat, time, y)
-        return self._flat.state
-
-    def hints(self, stepper: str) -> dict[str, Any]:
-        """Options for SciPy's integrators: the Jacobian, sparse where they take it so."""
-        jacobian = SparseJacobian(self._flat)
-        if stepper == "scipy_lsoda":
-            return {"jac": lambda t, y: jacobian(t, y).toarray()}
-        return {"jac": jacobian}
 
 
 class GeneralTransient(Marched, OneLaneRun):
@@ -85,21 +47,35 @@ class GeneralTransient(Marched, OneLaneRun):
         self.prolong(p)
         self.belt = belt_constants(p)
         self._disturbed = False
-        form: type[Any] = LayeredForm if layer_count(p) > 1 else Form
-        self._form = form(self.belt, self.mesh, p)
-        start = self._form.pack(initial_state(p, self.belt))
-        self._make_lane(self.belt, self._form.state(0.0, start))
-        self.marching = Marching(stepper, p, self._form.system, start, self.interval)
+        is_layered = layer_count(p) > 1
+        # the module that knows the unknowns, and its constants and work space
+        self._equations: Any = ring_system if is_layered else one_system
+        self._flat: Any = (
+            ring_system.flat_rings(self.belt, ring_constants(p, self.belt))
+            if is_layered
+            else one_system.flat_belt(self.belt)
+        )
+        self._system = self._equations.system(self._flat)
+        start = self._equations.pack(self._flat, initial_state(p, self.belt))
+        self._make_lane(self.belt, self._unpacked(0.0, start))
+        self.marching = Marching(stepper, p, self._system, start, self.interval)
         self._stable = STABLE.get(stepper, np.inf)
         self._fastest = np.random.default_rng(0).normal(size=start.size)
-        if stepper.startswith("scipy_"):
-            self.marching.tell(**self._form.hints(stepper))
+        if stepper.startswith("scipy_") and isinstance(self._flat, one_system.FlatBelt):
+            jacobian = SparseJacobian(self._flat)
+            dense = stepper == "scipy_lsoda"  # others take it sparse
+            self.marching.tell(jac=(lambda t, y: jacobian(t, y).toarray()) if dense else jacobian)
         self.failure: tuple[Status, str] | None = None
 
     @property
     def state(self) -> State:
         """The present state; a copy."""
-        return self._form.state(self.time, self.marching.y).copy()
+        return self._unpacked(self.time, self.marching.y).copy()
+
+    def _unpacked(self, time: float, y: np.ndarray) -> State:
+        """State of unknowns; overwritten by the next call, and by the next evaluation of rates."""
+        self._equations.unpack(self._flat, time, y)
+        return self._flat.state
 
     @property
     def contact_solves(self) -> int:
@@ -116,7 +92,7 @@ class GeneralTransient(Marched, OneLaneRun):
         """
         (run,) = runs
         self._go_on_from(run)
-        self.marching.begin(run.time, self._form.pack(run.state))
+        self.marching.begin(run.time, self._equations.pack(self._flat, run.state))
 
     def advance(self, samples: int) -> tuple[Status, str] | None:
         """March on.
@@ -147,7 +123,7 @@ class GeneralTransient(Marched, OneLaneRun):
         """Give the strands their random displacement, once the start-up's damping has gone."""
         p, state = self.parameters, self.state
         state.fields[f.W] += random_strands(self.mesh, p["disturbance"], p["seed"])
-        self.marching.y[:] = self._form.pack(state)
+        self.marching.y[:] = self._equations.pack(self._flat, state)
         self._disturbed = True
 
     def _march(self, count: int) -> tuple[Status, str] | None:
@@ -166,7 +142,7 @@ class GeneralTransient(Marched, OneLaneRun):
 
     def _too_long(self) -> tuple[Status, str] | None:
         """Whether an explicit step is beyond its limit, where friction only hums and nothing diverges."""
-        rate = fastest_rate(self._form.system, self.time, self.marching.y, self._fastest)
+        rate = fastest_rate(self._system, self.time, self.marching.y, self._fastest)
         if self.marching.step * rate <= self._stable:
             return None
         step, limit = self.marching.step, self._stable / rate
@@ -175,8 +151,8 @@ class GeneralTransient(Marched, OneLaneRun):
 
     def _sample(self, y: np.ndarray) -> int:
         """Record one state."""
-        state = self._form.state((self.done + 1) * self.interval, y)
-        lane = self._lane
+        state = self._unpacked((self.done + 1) * self.interval, y)
+        lane = self._state
         put_lane(lane.fields.data, lane.scalars.data, 0, self.belt, state)
         lane.time[0] = (self.done + 1) * self.interval
         # a general stepper knows nothing of dampers: their work is taken from the state, as over the interval

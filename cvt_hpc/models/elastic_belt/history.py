@@ -6,16 +6,10 @@ from typing import TYPE_CHECKING
 
 import numpy as np
 
-from cvt_hpc.models.elastic_belt.along_belt import (
-    ELSEWHERE,
-    SLIDING,
-    WRAP_ANGLE,
-    along_belt,
-    elsewhere,
-    wrap_angles,
-)
+from cvt_hpc.models.elastic_belt import along_belt as along
 from cvt_hpc.models.elastic_belt.fluctuation import at_stations
-from cvt_hpc.models.elastic_belt.momentary import PREFIX, last_profiles
+from cvt_hpc.models.elastic_belt.momentary import PRECISION, WORDS
+from cvt_hpc.models.elastic_belt.pulley_settings import PULLEY_DEFAULTS
 from cvt_hpc.netcdf import attributes
 from cvt_hpc.variator import PULLEYS
 from cvt_hpc.variator.history import dataset, of_means
@@ -26,6 +20,7 @@ if TYPE_CHECKING:
     from cvt_hpc.models.elastic_belt.recorded_run import RecordedRun
 
 FED = "power into the fluctuation of the belt"
+PREFIX = "momentary_"  # of the names of quantities over time and position
 
 
 def histories(run: RecordedRun) -> xr.Dataset:
@@ -68,20 +63,38 @@ def _profiles(run: RecordedRun) -> dict[str, tuple[np.ndarray, str, str, str]]:
     means, fed = run.means, run.fluctuation
     dual = at_stations(run.mesh.cell)
     damping = (fed.belt + fed.rings) / dual
-    sliding = along_belt(means, run.mesh, run.parameters)
+    sliding = along.along_belt(means, run.mesh, run.parameters)
     return {
-        **{name: (values, *of_means(ELSEWHERE[name])) for name, values in elsewhere(means).items()},
+        **{
+            name: (values, *of_means(along.ELSEWHERE[name]))
+            for name, values in along.elsewhere(means).items()
+        },
         "flank_feed": (fed.flanks / dual, "feed by flank friction", "W m-1", FED),
-        "stress_feed": (
-            at_stations(fed.stresses) / dual,
-            "feed by push and tension",
-            "W m-1",
-            FED,
-        ),
+        "stress_feed": (at_stations(fed.stresses) / dual, "feed by push and tension", "W m-1", FED),
         "damping_feed": (damping, "feed by damping and rings", "W m-1", f"{FED}; negative: taken"),
-        "wrap_angle": (wrap_angles(run.mesh), *WRAP_ANGLE),
+        "wrap_angle": (along.wrap_angles(run.mesh), *along.WRAP_ANGLE),
         **{
             name: (sliding[name], words, unit, f"{comment}; of means")
-            for name, (words, unit, comment) in SLIDING.items()
+            for name, (words, unit, comment) in along.SLIDING.items()
         },
     }
+
+
+def last_profiles(run: RecordedRun) -> dict[str, tuple[np.ndarray, str, str, str]]:
+    """Quantities of WORDS over the last samples of a run as far as it came, (sample, N), with their words.
+
+    Empty where its profiles are not kept, or the run ended before them.
+    """
+    kept = run.momentary
+    if kept is None or (count := len(kept) - (run.samples - run.done)) <= 0:
+        return {}
+    sample = dict(zip(along.NEEDED, kept[:count].transpose(1, 0, 2), strict=True))
+    samples = slice(run.done - count, run.done)
+    # speeds are counted from the course of the driving speed, which is constant where the drive has inertia
+    is_given = np.isinf((PULLEY_DEFAULTS | dict(run.parameters))["driving_inertia"])
+    course = run.channel("driving_speed")[samples, None] if is_given else run.parameters["driving_speed"]
+    belt_speed = course * run.path.driving_radius
+    lengthened = 1.0 + along.curvature_at_stations(run.mesh) * sample["mean_displacement"]
+    found = along.elsewhere(sample) | along.along_belt(sample, run.mesh, run.parameters)
+    found["element_speed"] = (belt_speed + sample["element_speed"]) / lengthened
+    return {name: (found[name].astype(PRECISION), *words) for name, words in WORDS.items()}

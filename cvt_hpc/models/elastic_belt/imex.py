@@ -22,21 +22,11 @@ from cvt_hpc.kernels import kernel
 from cvt_hpc.lanes import anywhere, around, behind, fma, from_ahead, like, minimum, select
 from cvt_hpc.models.elastic_belt import fields as f
 from cvt_hpc.models.elastic_belt import lane_fields as lf
-from cvt_hpc.models.elastic_belt.imex_stations import ImexWork, assemble
+from cvt_hpc.models.elastic_belt import lane_forces as forces
+from cvt_hpc.models.elastic_belt.imex_stations import assemble
 from cvt_hpc.models.elastic_belt.imex_system import TURNS_BACK, eliminate, substitute
-from cvt_hpc.models.elastic_belt.lane_belt import LaneBelt, LaneState
+from cvt_hpc.models.elastic_belt.lane_belt import LaneBelt, LaneState, Work
 from cvt_hpc.models.elastic_belt.lane_column import foresee_column, lane_column
-from cvt_hpc.models.elastic_belt.lane_forces import (
-    advance_discs,
-    cell_strains,
-    groove_sliding,
-    lane_contact_forces,
-    lane_pulleys,
-    lane_sliding,
-    lane_speed_share,
-    pressed_strain,
-    remembered,
-)
 from cvt_hpc.models.elastic_belt.pulley_step import advance_pulleys
 from cvt_hpc.physics.flank import flank_sliding
 
@@ -46,7 +36,7 @@ MOST_PASSES = 9
 
 
 @kernel
-def step_imex(belt: LaneBelt, state: LaneState, work: ImexWork, step: float) -> None:
+def step_imex(belt: LaneBelt, state: LaneState, work: Work, step: float) -> None:
     """One step.
 
     Parameters
@@ -57,7 +47,7 @@ def step_imex(belt: LaneBelt, state: LaneState, work: ImexWork, step: float) -> 
         Step [s].
     """
     stations = work.stations
-    lane_sliding(belt, state, stations)
+    forces.lane_sliding(belt, state, stations)
     assemble(belt, state, work, step, False)
     if belt.has_column:
         foresee_column(belt, state, stations, lf.PUSH, step)
@@ -76,14 +66,14 @@ def step_imex(belt: LaneBelt, state: LaneState, work: ImexWork, step: float) -> 
     taken, moment = advance_belt(belt, state, work, step)
     advance_pulleys(belt, state, taken, moment, step)
     state.time[0] += step
-    advance_discs(belt, state, step)
-    lane_contact_forces(belt, state, stations)
+    forces.advance_discs(belt, state, step)
+    forces.lane_contact_forces(belt, state, stations)
     if belt.has_column:
         lane_column(belt, state, stations, lf.EPS_0)
 
 
 @kernel
-def forget(work: ImexWork) -> None:
+def forget(work: Work) -> None:
     """Clear the marks of repeated parts of a step."""
     stations = work.stations
     for j in range(stations.rows):
@@ -91,14 +81,14 @@ def forget(work: ImexWork) -> None:
 
 
 @kernel
-def advance_belt(belt: LaneBelt, state: LaneState, work: ImexWork, step: float):
+def advance_belt(belt: LaneBelt, state: LaneState, work: Work, step: float):
     """Apply the increments, and find the new strains; the flanks' torques.
 
     The torque taken from the driving pulley, where that is free, and the moment on the driven one [N m].
     """
     n, fields, stations, c = state.fields.rows, state.fields, work.stations, belt.constants
     per_cosine = 1.0 / c[0, lf.COSINE]
-    speed_share = lane_speed_share(belt, state.time[0], c[0, lf.BELT_SPEED])
+    speed_share = forces.lane_speed_share(belt, state.time[0], c[0, lf.BELT_SPEED])
     belt_speed, offset = speed_share * c[0, lf.BELT_SPEED], c[0, lf.RING_OFFSET]
     stiffness, damper_0, damper_1 = (
         c[0, lf.ELEMENT_STIFFNESS],
@@ -110,16 +100,12 @@ def advance_belt(belt: LaneBelt, state: LaneState, work: ImexWork, step: float):
         c[0, lf.DRIVEN_RADIUS],
         c[0, lf.DRIVING_RADIUS],
     )
-    pulleys = lane_pulleys(belt, speed_share, state.scalars)
+    pulleys = forces.lane_pulleys(belt, speed_share, state.scalars)
     zero, moment, taken = like(0.0, offset), like(0.0, driven_speed), like(0.0, driven_speed)
     last_filtered = behind(fields, 0, f.V_FILTERED)
     # at the station ahead of a cell: speeds, increments, fluxes of content less the belt speed, displacement
-    v0_b, dv0_b, v1_b, dv1_b = (
-        fields[0, f.V_ELEMENT],
-        stations[0, lf.DV_0],
-        fields[0, f.V_RING],
-        stations[0, lf.DV_1],
-    )
+    v0_b, dv0_b = fields[0, f.V_ELEMENT], stations[0, lf.DV_0]
+    v1_b, dv1_b = fields[0, f.V_RING], stations[0, lf.DV_1]
     first_0 = fma(-belt_speed, behind(stations, 0, lf.EPS_0), v0_b + dv0_b) * behind(stations, 0, lf.SHORT_0)
     first_1 = fma(-belt_speed, behind(stations, 0, lf.EPS_1), v1_b + dv1_b) * behind(stations, 0, lf.SHORT_1)
     w_b = fma(step, fields[0, f.U] + fma(-stations[0, lf.LAG], dv0_b, stations[0, lf.PUSH]), fields[0, f.W])
@@ -129,7 +115,11 @@ def advance_belt(belt: LaneBelt, state: LaneState, work: ImexWork, step: float):
     work_done = zero
     for j in range(n - 1, -1, -1):
         per_cell = belt.per_cell[j]
-        v0, dv0, eps = fields[j, f.V_ELEMENT], stations[j, lf.DV_0], pressed_strain(belt, state, stations, j)
+        v0, dv0, eps = (
+            fields[j, f.V_ELEMENT],
+            stations[j, lf.DV_0],
+            forces.pressed_strain(belt, state, stations, j),
+        )
         v1, dv1 = fields[j, f.V_RING], stations[j, lf.DV_1]
         new_0, new_1 = v0 + dv0, v1 + dv1
         flux_0, flux_1 = first_0, first_1
@@ -170,16 +160,16 @@ def advance_belt(belt: LaneBelt, state: LaneState, work: ImexWork, step: float):
                     taken = taken + like(select(is_driven, zero, tangential), taken)
             if belt.memory:
                 v_across = fma(belt_speed + new_0, stations[j, lf.SLOPE], u)
-                v_radial, along = groove_sliding(belt, j, pulleys, belt_speed, v_across, new_0, w)
+                v_radial, along = forces.groove_sliding(belt, j, pulleys, belt_speed, v_across, new_0, w)
                 speed, _ = flank_sliding(v_radial, along, per_cosine)
                 before = fields[j - 1, f.V_FILTERED] if j > 0 else last_filtered
                 old, way = fields[j, f.V_FILTERED], stations[j, lf.WAY]
-                filtered = remembered(belt, j, way, belt_speed, step, speed, old, before)
+                filtered = forces.remembered(belt, j, way, belt_speed, step, speed, old, before)
                 filtered = select(stations[j, lf.FORCE] > 0.0, filtered, speed)
                 fields[j, f.V_FILTERED] = select(touches > 0.0, filtered, 0.0)
         w = fma(step, u, w)
         fields[j, f.U], fields[j, f.W] = u, w
-        cell_strains(belt, stations, j, w, w_b, more_0, more_1, offset)
+        forces.cell_strains(belt, stations, j, w, w_b, more_0, more_1, offset)
         w_b = w
     state.scalars[0, lf.LAYER_WORK] = state.scalars[0, lf.LAYER_WORK] + around(like(work_done, moment)) * step
     return around(taken), around(moment)

@@ -19,6 +19,14 @@ FACTS = Facts(
     stability="bending, tension and contact of the strands: step < 2 / their fastest frequency",
     damping="none in strands and rings; pressed elements like a damper EA step [N s]",
 )
+LARGEST_STEP = Parameter(
+    None,
+    "s",
+    "largest time step; a whole number of steps makes a sampling interval",
+    minimum=1e-9,
+    maximum=1e-3,
+    sensible=(1e-09, 0.001),
+)
 PARAMETERS = {
     "numerics": {
         "step_error": Parameter(
@@ -28,14 +36,7 @@ PARAMETERS = {
             minimum=1e-4,
             maximum=0.2,
         ),
-        "step": Parameter(
-            None,
-            "s",
-            "largest time step; a whole number of steps makes a sampling interval",
-            minimum=1e-9,
-            maximum=1e-3,
-            sensible=(1e-09, 0.001),
-        ),
+        "step": LARGEST_STEP,
         "precision": Parameter(
             "single",
             "",

@@ -1,11 +1,6 @@
-"""The fast step at each station: forces, and slopes with the speeds, without the stresses T and P.
-
-And the step's work space: its values at each station beside the state.
-"""
+"""The fast step at each station: forces, and slopes with the speeds, without the stresses T and P."""
 
 from __future__ import annotations
-
-from typing import NamedTuple
 
 from cvt_hpc.kernels import kernel, merged_kernel
 from cvt_hpc.lanes import (
@@ -23,44 +18,10 @@ from cvt_hpc.lanes import (
 )
 from cvt_hpc.models.elastic_belt import fields as f
 from cvt_hpc.models.elastic_belt import lane_fields as lf
-from cvt_hpc.models.elastic_belt.lane_belt import LaneBelt, LaneState
+from cvt_hpc.models.elastic_belt import lane_forces as forces
+from cvt_hpc.models.elastic_belt.lane_belt import LaneBelt, LaneState, Work
 from cvt_hpc.models.elastic_belt.lane_column import across_by_curvature, column_across
-from cvt_hpc.models.elastic_belt.lane_forces import (
-    lane_acceleration,
-    lane_damping,
-    lane_speed_share,
-    lane_transverse,
-    leaning,
-    pressed_behind,
-    pressed_strain,
-    ring_grip,
-)
 from cvt_hpc.physics.flank import flank_shares
-
-
-class ImexWork(NamedTuple):
-    """Work space of the step.
-
-    Attributes
-    ----------
-    stations : (N, 44) LaneArray
-        The fields of `lane_forces`. Of the step: pending increment of u, its sensitivity to v_element's,
-        slope w_s, of the driven pulley's stations, of free pulleys of both, the flanks' tangential force and
-        its slopes, whether (1)
-        linearised friction would turn the sliding of the flanks, or of the saddle, about, whether (1) the
-        elements of the cell ahead of a station meet within the step, and, where they are apart, their strain
-        at its end with the speeds that it begins with; the blocks of the system and its right side;
-        the eliminated system: inverse pivots, the increments of v_element and v_ring, the border, the
-        stresses' slopes with the speeds' differences.
-    """
-
-    stations: LaneArray
-
-
-def imex_work(state: LaneState) -> ImexWork:
-    """Work space for a state; `derive` has to be called before the first step."""
-    rows, _, lanes = state.fields.data.shape
-    return ImexWork(LaneArray(rows, lf.FIELDS_OF_WORK, lanes, state.fields.data.dtype))
 
 
 @merged_kernel
@@ -75,7 +36,7 @@ def implicit_shares(one, other, inertia):
 
 
 @kernel
-def assemble(belt: LaneBelt, state: LaneState, work: ImexWork, step: float, again: bool) -> None:
+def assemble(belt: LaneBelt, state: LaneState, work: Work, step: float, again: bool) -> None:
     """Forces and slopes at the stations, but for the stresses T and P: the system's blocks and right side.
 
     `again` takes the secant of friction where a pass before has found that it would turn sliding about.
@@ -90,20 +51,16 @@ def assemble(belt: LaneBelt, state: LaneState, work: ImexWork, step: float, agai
     sine, cosine, width = c[0, lf.SINE], c[0, lf.COSINE], c[0, lf.FRICTION_SPEED]
     per_cosine, per_width = 1.0 / cosine, 1.0 / width
     element_stiffness, ring_stiffness = c[0, lf.ELEMENT_STIFFNESS], c[0, lf.RING_STIFFNESS]
-    element_mass, ring_mass, mass, offset = (
-        c[0, lf.ELEMENT_MASS],
-        c[0, lf.RING_MASS],
-        c[0, lf.MASS],
-        c[0, lf.RING_OFFSET],
-    )
-    speed_share = lane_speed_share(belt, state.time[0], sine)
+    element_mass, ring_mass, mass = c[0, lf.ELEMENT_MASS], c[0, lf.RING_MASS], c[0, lf.MASS]
+    offset = c[0, lf.RING_OFFSET]
+    speed_share = forces.lane_speed_share(belt, state.time[0], sine)
     belt_speed, bending = speed_share * c[0, lf.BELT_SPEED], c[0, lf.BENDING_STIFFNESS]
-    acceleration = lane_acceleration(belt, state.time[0], step)
+    acceleration = forces.lane_acceleration(belt, state.time[0], step)
     ring_friction, per_ring_width = c[0, lf.RING_FRICTION], 1.0 / c[0, lf.RING_FRICTION_SPEED]
     ring_relief = c[0, lf.RING_RELIEF] * speed_share * speed_share
     centrifugal, gyroscopic = mass * belt_speed * belt_speed, 2.0 * mass * belt_speed
     half_gyroscopic, masses = -0.5 * gyroscopic, (element_mass, ring_mass)
-    damping = lane_damping(belt, state.time[0])
+    damping = forces.lane_damping(belt, state.time[0])
     base_mass = fma(mass, per_step, 0.5 * damping)
     element_rate = element_mass * per_step
     zero = like(0.0, sine)
@@ -113,16 +70,14 @@ def assemble(belt: LaneBelt, state: LaneState, work: ImexWork, step: float, agai
         touches = belt.touches[j]
         dual, per_left, span = belt.dual[j], behind(belt.per_cell, j, 0), belt.per_span[j]
         u, v0, v1 = fields[j, f.U], fields[j, f.V_ELEMENT], fields[j, f.V_RING]
-        ring_left, ring_right = (
-            ring_stiffness * behind(stations, j, lf.EPS_1),
-            ring_stiffness * stations[j, lf.EPS_1],
-        )
-        net_left = minimum(pressed_behind(belt, state, stations, j), 0.0)
+        ring_left = ring_stiffness * behind(stations, j, lf.EPS_1)
+        ring_right = ring_stiffness * stations[j, lf.EPS_1]
+        net_left = minimum(forces.pressed_behind(belt, state, stations, j), 0.0)
         net_left = fma(element_stiffness, net_left, ring_left - centrifugal)
-        net_right = minimum(pressed_strain(belt, state, stations, j), 0.0)
+        net_right = minimum(forces.pressed_strain(belt, state, stations, j), 0.0)
         net_right = fma(element_stiffness, net_right, ring_right - centrifugal)
         slope = (ahead(fields, j, f.W) - behind(fields, j, f.W)) * span
-        transverse = lane_transverse(belt, fields, j, net_left, net_right, bending)
+        transverse = forces.lane_transverse(belt, fields, j, net_left, net_right, bending)
         transverse = fma(-gyroscopic, (ahead(fields, j, f.U) - behind(fields, j, f.U)) * span, transverse)
         transverse = fma(-acceleration * mass, slope, transverse)
         if belt.has_column:
@@ -146,9 +101,9 @@ def assemble(belt: LaneBelt, state: LaneState, work: ImexWork, step: float, agai
             per_speed, factor = stations[j, lf.PER_SPEED], stations[j, lf.FACTOR]
             ring_factor, force = stations[j, lf.RING_FACTOR], stations[j, lf.FORCE]
             meridian = stations[j, lf.SLIDING_R] * per_cosine
-            upright, lean = belt.upright[j], leaning(belt, j, fields[j, f.W])
+            upright, lean = belt.upright[j], forces.leaning(belt, j, fields[j, f.W])
 
-            grip = ring_grip(belt, j, ring_left, ring_right, ring_relief * longer, ring_friction)
+            grip = forces.ring_grip(belt, j, ring_left, ring_right, ring_relief * longer, ring_friction)
             drag = grip * ring_factor
             stiff = grip * (fma(-ring_factor, ring_factor, 1.0) * per_ring_width)
             if again:

@@ -20,8 +20,7 @@ from cvt_hpc.lanes import (
 )
 from cvt_hpc.models.elastic_belt import fields as f
 from cvt_hpc.models.elastic_belt import lane_fields as lf
-from cvt_hpc.models.elastic_belt.imex_stations import ImexWork
-from cvt_hpc.models.elastic_belt.lane_belt import LaneBelt, LaneState
+from cvt_hpc.models.elastic_belt.lane_belt import LaneBelt, LaneState, Work
 from cvt_hpc.models.elastic_belt.lane_forces import lane_belt_speed
 
 # Share of the speeds' change in a step that the rings' stress feels. From 1/4 on it is stable for any step
@@ -60,7 +59,7 @@ def element_stress(stiffness, grip, eps, closing, ahead, per_length, last, meet)
 
 
 @kernel
-def eliminate(belt: LaneBelt, state: LaneState, work: ImexWork, step: float, again: bool) -> None:
+def eliminate(belt: LaneBelt, state: LaneState, work: Work, step: float, again: bool) -> None:
     """Stresses into the rows, and forward elimination; the last row, that closes the ring, is solved.
 
     `again` takes those elements as closed that a pass before has found to meet.
@@ -135,12 +134,8 @@ def eliminate(belt: LaneBelt, state: LaneState, work: ImexWork, step: float, aga
         f1_b = fma(-c01, z0, fma(-c11, z1, f1_b))
         stations[j, lf.I_00], stations[j, lf.I_01], stations[j, lf.I_11] = i00, i01, i11
         stations[j, lf.DV_0], stations[j, lf.DV_1] = z0, z1
-        stations[j, lf.G_00], stations[j, lf.G_01], stations[j, lf.G_10], stations[j, lf.G_11] = (
-            g00,
-            g01,
-            g10,
-            g11,
-        )
+        stations[j, lf.G_00], stations[j, lf.G_01], stations[j, lf.G_10] = g00, g01, g10
+        stations[j, lf.G_11] = g11
         t00, t01, t11 = fma(-e0 * e0, i00, e0), -e0 * e1 * i01, fma(-e1 * e1, i11, e1)
         s0, s1 = fma(e0, z0, -stress_0), fma(e1, z1, -stress_1)
         # it fades along the belt, beyond all need: kept from numbers so small that the processor slows down
@@ -162,7 +157,7 @@ def eliminate(belt: LaneBelt, state: LaneState, work: ImexWork, step: float, aga
 
 
 @kernel
-def substitute(belt: LaneBelt, state: LaneState, work: ImexWork, step: float) -> int:
+def substitute(belt: LaneBelt, state: LaneState, work: Work, step: float) -> int:
     """Back substitution: DV become the increments of v_element and v_ring. Why the step has to be done again.
 
     0: it has not. Else it marks the places and returns the sum of its reasons:

@@ -17,7 +17,7 @@ from cvt_hpc.lanes import LaneArray, split
 from cvt_hpc.models.elastic_belt import fields as f
 from cvt_hpc.models.elastic_belt import lane_fields as lf
 from cvt_hpc.models.elastic_belt.belt import Belt, State
-from cvt_hpc.models.elastic_belt.bending import bending_bands, bending_load
+from cvt_hpc.models.elastic_belt.bending import bending_bands, bending_load, squared_curvature
 from cvt_hpc.models.elastic_belt.rhs import contact_forces, fresh_contacts, speed_share_at
 from cvt_hpc.physics.compliance import Contact, lane_contact
 from cvt_hpc.physics.friction import FrictionLaw
@@ -105,13 +105,13 @@ class LaneState(NamedTuple):
         FIELDS at each station: layers' speeds less the belt speed of `time`; contents less 1 + kappa d_i. Of
         rings in n layers (N, 7 + 2 n), see `rings.py`.
     scalars : (1, 12) LaneArray of doubles
-        LANE_SCALARS.
+        Scalars of `lane_fields`.
     time : (1,) array
         [s]
     contacts : pair of Contact
         Driving and driven wrap.
     column : (N, 11) LaneArray
-        COLUMN of these fields; without rows where elements bear no moment.
+        Values of the column by `lane_fields`; without rows where elements bear no moment.
     """
 
     fields: LaneArray
@@ -119,6 +119,24 @@ class LaneState(NamedTuple):
     time: np.ndarray
     contacts: tuple[Contact, Contact]
     column: LaneArray
+
+
+class Work(NamedTuple):
+    """Work space of a step that keeps values of stations alone.
+
+    Attributes
+    ----------
+    stations : (N, fields) LaneArray
+        Fields that `lane_fields` and the step name.
+    """
+
+    stations: LaneArray
+
+
+def work_space(state: LaneState, fields: int) -> Work:
+    """Work space for a state; `derive` has to be called before the first step."""
+    rows, _, lanes = state.fields.data.shape
+    return Work(LaneArray(rows, fields, lanes, state.fields.data.dtype))
 
 
 def lane_belt(belts: list[Belt], dtype: DTypeLike) -> LaneBelt:
@@ -185,7 +203,7 @@ def _ring_curvature(belt: Belt) -> np.ndarray:
 
 def _constants_of(belt: Belt) -> list[float]:
     angle, memory = belt.half_wedge_angle, belt.friction_memory
-    longer = 1.0 + belt.ring_offset * _ring_curvature(belt)[0]
+    longer = 1.0 + belt.ring_offset * squared_curvature(belt.cell, belt.dual, belt.curvature, 1)[0]
     named = {
         "ring_mass": belt.ring_mass[0] / longer,
         "ring_relief": belt.ring_relief[0] / longer,
@@ -229,13 +247,13 @@ def lane_state(belts: list[Belt], states: list[State], dtype: type) -> LaneState
     """
     n, lanes = belts[0].cell.size, len(belts)
     fields = LaneArray(n, states[0].fields.shape[0], lanes, dtype)
-    scalars = LaneArray(1, len(lf.LANE_SCALARS), lanes)
+    scalars = LaneArray(1, lf.SCALARS, lanes)
     for lane, (belt, state) in enumerate(zip(belts, states, strict=True)):
         put_lane(fields.data, scalars.data, lane, belt, state)
     wraps = [[belt.driving for belt in belts], [belt.driven for belt in belts]]
     contacts = (lane_contact(wraps[0], dtype), lane_contact(wraps[1], dtype))
     settle_discs(contacts, belts, states)
-    column = LaneArray(n if belts[0].has_column else 0, len(lf.COLUMN), lanes, dtype)
+    column = LaneArray(n if belts[0].has_column else 0, lf.FIELDS_OF_COLUMN, lanes, dtype)
     return LaneState(fields, scalars, np.array([states[0].scalars[0]]), contacts, column)
 
 

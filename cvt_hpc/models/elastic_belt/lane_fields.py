@@ -2,135 +2,35 @@
 
 from cvt_hpc.models.elastic_belt import fields as f
 
-# Constants of each lane, in SI units; names that are not in `Belt` are explained where they are computed
-# below.
-CONSTANTS = (
-    "element_stiffness",
-    "ring_stiffness",
-    "element_damping",
-    "ring_damping",
-    "element_mass",
-    "ring_mass",
-    "ring_relief",
-    "mass",
-    "belt_speed",
-    "transverse_damping",
-    "bending_stiffness",
-    "ring_offset",
-    "ring_friction",
-    "ring_friction_speed",
-    "friction_speed",
-    "kinetic_friction",
-    "friction_gradient",
-    "law_speed",
-    "sine",
-    "cosine",
-    "wedge",
-    "forget",
-    "driving_carry",
-    "driven_carry",
-    "driving_radius",
-    "driven_radius",
-    "driving_speed",
-    "driving_position",
-    "driven_inertia",
-    "axial_damping",
-    "thrust",
-    "ratio",
-    "load",
-    "load_start",
-    "start_share",
-    "driving_cell",
-    "driven_cell",
-    "column_stiffness",
-    "outer_edge",
-    "inner_edge",
-    *f.LAWS,
-)
-FIRST_LAW = len(CONSTANTS) - len(f.LAWS)
-(
-    ELEMENT_STIFFNESS,
-    RING_STIFFNESS,
-    ELEMENT_DAMPING,
-    RING_DAMPING,
-    ELEMENT_MASS,
-    RING_MASS,
-    RING_RELIEF,
-    MASS,
-    BELT_SPEED,
-    TRANSVERSE_DAMPING,
-    BENDING_STIFFNESS,
-    RING_OFFSET,
-    RING_FRICTION,
-    RING_FRICTION_SPEED,
-    FRICTION_SPEED,
-    KINETIC_FRICTION,
-    FRICTION_GRADIENT,
-    LAW_SPEED,
-    SINE,
-    COSINE,
-    WEDGE,
-    FORGET,
-    DRIVING_CARRY,
-    DRIVEN_CARRY,
-    DRIVING_RADIUS,
-    DRIVEN_RADIUS,
-    DRIVING_SPEED,
-    DRIVING_POSITION,
-    DRIVEN_INERTIA,
-    AXIAL_DAMPING,
-    THRUST,
-    RATIO,
-    LOAD,
-    LOAD_START,
-    START_SHARE,
-    DRIVING_CELL,
-    DRIVEN_CELL,
-    COLUMN_STIFFNESS,
-    OUTER_EDGE,
-    INNER_EDGE,
-) = range(FIRST_LAW)
+# Constants of each lane, in SI units, and from FIRST_LAW on those of the laws; `lane_belt` computes what is
+# not in `Belt`.
+ELEMENT_STIFFNESS, RING_STIFFNESS, ELEMENT_DAMPING, RING_DAMPING = range(4)
+ELEMENT_MASS, RING_MASS, RING_RELIEF, MASS, BELT_SPEED, TRANSVERSE_DAMPING, BENDING_STIFFNESS = range(4, 11)
+RING_OFFSET, RING_FRICTION, RING_FRICTION_SPEED = range(11, 14)
+FRICTION_SPEED, KINETIC_FRICTION, FRICTION_GRADIENT, LAW_SPEED, SINE, COSINE, WEDGE = range(14, 21)
+FORGET, DRIVING_CARRY, DRIVEN_CARRY, DRIVING_RADIUS, DRIVEN_RADIUS, DRIVING_SPEED = range(21, 27)
+DRIVING_POSITION, DRIVEN_INERTIA, AXIAL_DAMPING, THRUST, RATIO, LOAD, LOAD_START, START_SHARE = range(27, 35)
+DRIVING_CELL, DRIVEN_CELL, COLUMN_STIFFNESS, OUTER_EDGE, INNER_EDGE, FIRST_LAW = range(35, 41)
+CONSTANTS = (*f.names_from("ELEMENT_STIFFNESS", globals())[:FIRST_LAW], *f.LAWS)
 
 # Scalars of the state, of each lane, double in any precision: the driven pulley's two, the work of the
 # layers' dampers until it is read [J], how often friction was found to reverse sliding in a step, and
-# from FIRST_STATE on the further states of free pulleys.
-LANE_SCALARS = ("driven_speed", "driven_position", "layer_work", "repeats", *f.STATES)
+# from f.FIRST_STATE on the further states of free pulleys.
 SPEED, POSITION, LAYER_WORK, REPEATS = range(f.FIRST_STATE)
+SCALARS = f.FIRST_STATE + f.STATES
 
 # Of the column, in `LaneState.column`: of the stations the deviation of curvature from the path's [1/m], its
 # change within a step, and the moment [N m]; of the cells -P / EA, its slopes with the strain and with the
 # curvature at both ends [m], its change within a step by turning, the moments of both halves times their
 # content [N m^2], and the energy per content [N].
-COLUMN = (
-    "deviation",
-    "turning",
-    "column_moment",
-    "pressed",
-    "give",
-    "turn_near",
-    "turn_far",
-    "shift",
-    "bearing_near",
-    "bearing_far",
-    "column_energy",
-)
-(
-    DEVIATION,
-    TURNING,
-    COLUMN_MOMENT,
-    PRESSED,
-    GIVE,
-    TURN_NEAR,
-    TURN_FAR,
-    SHIFT,
-    BEARING_NEAR,
-    BEARING_FAR,
-    COLUMN_ENERGY,
-) = range(len(COLUMN))
+DEVIATION, TURNING, COLUMN_MOMENT, PRESSED, GIVE, TURN_NEAR, TURN_FAR, SHIFT = range(8)
+BEARING_NEAR, BEARING_FAR, COLUMN_ENERGY = range(8, 11)
+FIELDS_OF_COLUMN = COLUMN_ENERGY + 1
 
-# Of a state, by `derive`: axial line force, share of the cell behind it that is in contact; the cells' strains, 1 / (1 + strain) and 1 / content. By
-# `lane_sliding`: sliding speeds, the law's coefficient, tanh of sliding speed over regularisation, 1 / that
-# speed, the same tanh of rings, the elements' sliding speed under them.
+# Of a state, by `derive`: axial line force, and the share of the cell behind it that is in contact; the cells'
+# strains, 1 / (1 + strain) and 1 / content. By `lane_sliding`: sliding speeds, the law's coefficient, tanh of
+# sliding speed over regularisation, 1 / that speed, the same tanh of rings, the elements' sliding speed under
+# them.
 FORCE, WAY, EPS_0, EPS_1, SHORT_0, SHORT_1, PER_CONTENT_0, PER_CONTENT_1 = range(8)
 SLIDING_R, SLIDING_T, COEFFICIENT, FACTOR, PER_SPEED, RING_FACTOR, SADDLE = range(8, 15)
 # By `note_speeds` in the last two steps before a sample: u, v_element and v_ring two steps ago, less twice
@@ -147,17 +47,5 @@ FIELDS_OF_WORK = 44
 
 # Constants of each lane; from FIRST_OFFSET on the layers' offsets, then by arc and surface the factors of the
 # layer above it and of the one below.
-(
-    LAYER_MASS,
-    LAYER_STIFFNESS,
-    LAYER_DAMPING,
-    LAYER_RELIEF,
-    STATIC_EXCESS,
-    PER_STRIBECK,
-    PER_WIDTH,
-    SADDLE_FRICTION_LEVEL,
-    LAYER_FRICTION_LEVEL,
-    STRESS_RATE,
-    DAMPING_RATE,
-    FIRST_OFFSET,
-) = range(12)
+LAYER_MASS, LAYER_STIFFNESS, LAYER_DAMPING, LAYER_RELIEF, STATIC_EXCESS, PER_STRIBECK, PER_WIDTH = range(7)
+SADDLE_FRICTION_LEVEL, LAYER_FRICTION_LEVEL, STRESS_RATE, DAMPING_RATE, FIRST_OFFSET = range(7, 12)

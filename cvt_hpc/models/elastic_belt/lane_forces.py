@@ -92,10 +92,8 @@ def step_ripple(belt: LaneBelt, state: LaneState, stations: LaneArray):
     length = 0.0
     for j in range(n):
         u = fields[j, f.U] + stations[j, lf.NOTED]
-        v0, v1 = (
-            fields[j, f.V_ELEMENT] + stations[j, lf.NOTED + 1],
-            fields[j, f.V_RING] + stations[j, lf.NOTED + 2],
-        )
+        v0 = fields[j, f.V_ELEMENT] + stations[j, lf.NOTED + 1]
+        v1 = fields[j, f.V_RING] + stations[j, lf.NOTED + 2]
         moving = fma(mass * u, u, fma(element_mass * v0, v0, ring_mass * v1 * v1))
         total = fma(belt.dual[j], moving, total)
         length += belt.dual[j]
@@ -366,8 +364,6 @@ def lane_sliding(belt: LaneBelt, state: LaneState, stations: LaneArray) -> None:
         per_flank = 1.0 / (speed * (1.0 + rest))
         stations[j, lf.SLIDING_R], stations[j, lf.SLIDING_T] = v_radial, v_tangential
         stations[j, lf.COEFFICIENT] = coefficient
-        stations[j, lf.FACTOR], stations[j, lf.PER_SPEED] = (
-            (1.0 - rest) * (speed * per_flank),
-            (1.0 + rest) * per_flank,
-        )
+        stations[j, lf.FACTOR] = (1.0 - rest) * (speed * per_flank)
+        stations[j, lf.PER_SPEED] = (1.0 + rest) * per_flank
         stations[j, lf.RING_FACTOR], stations[j, lf.SADDLE] = ring_factor, saddle

@@ -22,6 +22,7 @@ from cvt_hpc.models.elastic_belt.lane_belt import LaneBelt, LaneState, alike
 from cvt_hpc.models.elastic_belt.lane_forces import LEAST_SHARE_OF_WIDTH, lane_speed_share
 from cvt_hpc.models.elastic_belt.moments import SADDLE_FRICTION, SADDLE_POWER, SADDLE_SPEED, add
 from cvt_hpc.models.elastic_belt.rings import FIRST_LAYER, Rings
+from cvt_hpc.models.elastic_belt.sampling import SCALARS, Samples
 from cvt_hpc.physics.layers import ring_friction
 
 # Sums over the judged part: of surfaces the loss [W] and the mean size of their sliding on both
@@ -135,10 +136,8 @@ def audit_layers(
     rings: LaneRings,
     state: LaneState,
     layers: LaneArray,
-    rows: LaneArray,
+    samples: Samples,
     k: int,
-    first: int,
-    profiles: LaneArray,
     sums: LaneArray,
 ) -> None:
     """Part of the layers in the audit of a belt whose rings as one do not rub, and in sums over samples.
@@ -149,22 +148,20 @@ def audit_layers(
         Constants and state, not in parts.
     layers : (N, n) LaneArray
         Work space.
-    rows, k, first, profiles
-        As of `power.audit`, which comes before.
+    samples, k
+        As of `sample`, which comes before.
     sums : (n + 1, 6) LaneArray of doubles
-        SUMS of this state are added to it where `profiles` takes any.
+        SUMS of this state are added to it where the samples' profiles take any.
     """
+    rows, profiles, first = samples.rows, samples.profiles, samples.sensing.matrix.shape[0] + len(SCALARS)
     n, fields, c = rings.number, state.fields, rings.constants
     unite_strains(belt, rings, state, layers, 1)
     zero = like(0.0, fields[0, f.W])
     share = lane_speed_share(belt, state.time[0], zero)
     belt_speed = share * belt.constants[0, lf.BELT_SPEED]
     relief = c[0, lf.LAYER_RELIEF] * share * share
-    mass, stiffness, ring_stiffness = (
-        c[0, lf.LAYER_MASS],
-        c[0, lf.LAYER_STIFFNESS],
-        belt.constants[0, lf.RING_STIFFNESS],
-    )
+    mass, stiffness = c[0, lf.LAYER_MASS], c[0, lf.LAYER_STIFFNESS]
+    ring_stiffness = belt.constants[0, lf.RING_STIFFNESS]
     offset = belt.constants[0, lf.RING_OFFSET]
     summed = profiles.rows > 0
     least = LEAST_SHARE_OF_WIDTH / c[0, lf.PER_WIDTH]

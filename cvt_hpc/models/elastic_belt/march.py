@@ -1,18 +1,15 @@
-"""Many steps and samples in one call: one loop per step kernel, since a kernel is compiled for its callee."""
+"""Many steps and samples in one call, by any of the belt's own steps."""
 
 from __future__ import annotations
 
-from typing import NamedTuple
+from typing import Any, NamedTuple
 
 from cvt_hpc.kernels import kernel
 from cvt_hpc.lanes import LaneArray, like, merge_parts
 from cvt_hpc.models.elastic_belt import lane_fields as lf
-from cvt_hpc.models.elastic_belt.explicit import ExplicitWork, step_explicit
-from cvt_hpc.models.elastic_belt.imex import step_imex
-from cvt_hpc.models.elastic_belt.imex_stations import ImexWork
 from cvt_hpc.models.elastic_belt.lane_belt import LaneBelt, LaneState
 from cvt_hpc.models.elastic_belt.lane_forces import derive, note_speeds
-from cvt_hpc.models.elastic_belt.sampling import Sensors, sample
+from cvt_hpc.models.elastic_belt.sampling import Samples, sample
 
 
 class Sampled(NamedTuple):
@@ -32,81 +29,57 @@ class Sampled(NamedTuple):
 
 
 @kernel
-def march_imex(
+def march(
+    begin: Any,
+    advance: Any,
+    take: Any,
     belt: LaneBelt,
     state: LaneState,
-    work: ImexWork,
+    work: Any,
     step: float,
     steps: int,
     sampled: Sampled,
-    sensing: Sensors,
-    rows: LaneArray,
+    samples: Samples,
     first: int,
     last: int,
-    profiles: LaneArray,
-    ended: LaneArray,
 ) -> None:
     """Fill rows first .. last - 1 with samples, `steps` steps before each.
 
     Parameters
     ----------
+    begin, advance, take : kernels
+        begin(belt, state, work) comes first; advance(belt, state, work, step) takes a step; take, with the
+        arguments of `take_sample`, takes a sample.
     belt, state, work
-        As the step kernel takes them.
+        As these kernels take them.
     step, steps : float, int
         Step [s] and their number between samples.
     sampled : Sampled
         Of the same run or runs; at the end it has all of the state.
-    sensing, rows, profiles, ended
-        As `sample` takes them.
+    samples : Samples
+        The arrays of the samples.
     first, last : int
-        Which rows.
+        Which rows of them.
     """
+    begin(belt, state, work)
     for k in range(first, last):
         for taken in range(steps):
             note_speeds(belt, state, work.stations, taken, steps)
-            step_imex(belt, state, work, step)
-        take_sample(state, work.stations, sampled, sensing, rows, k, profiles, ended)
+            advance(belt, state, work, step)
+        take(state, work, sampled, samples, k)
     gather(state, work.stations, sampled, work.stations.data.shape[1])
 
 
 @kernel
-def march_explicit(
-    belt: LaneBelt,
-    state: LaneState,
-    work: ExplicitWork,
-    step: float,
-    steps: int,
-    sampled: Sampled,
-    sensing: Sensors,
-    rows: LaneArray,
-    first: int,
-    last: int,
-    profiles: LaneArray,
-    ended: LaneArray,
-) -> None:
-    """As `march_imex`, by the explicit step."""
-    for k in range(first, last):
-        for taken in range(steps):
-            note_speeds(belt, state, work.stations, taken, steps)
-            step_explicit(belt, state, work, step)
-        take_sample(state, work.stations, sampled, sensing, rows, k, profiles, ended)
-    gather(state, work.stations, sampled, work.stations.data.shape[1])
+def begin_at_once(belt: LaneBelt, state: LaneState, work: Any) -> None:
+    """Begin a march whose step needs no more than the results of `derive`."""
 
 
 @kernel
-def take_sample(
-    state: LaneState,
-    stations: LaneArray,
-    sampled: Sampled,
-    sensing: Sensors,
-    rows: LaneArray,
-    k: int,
-    profiles: LaneArray,
-    ended: LaneArray,
-) -> None:
+def take_sample(state: LaneState, work: Any, sampled: Sampled, samples: Samples, k: int) -> None:
     """Sample the marched belt, which may be in parts."""
-    gather(state, stations, sampled, lf.FIELDS_OF_FORCES)
-    sample(sampled.belt, sampled.state, sampled.stations, sensing, rows, k, profiles, ended)
+    gather(state, work.stations, sampled, lf.FIELDS_OF_FORCES)
+    sample(sampled.belt, sampled.state, sampled.stations, samples, k)
     # a sample takes it to its end
     state.scalars[0, lf.LAYER_WORK] = like(
         sampled.state.scalars[0, lf.LAYER_WORK], state.scalars[0, lf.LAYER_WORK]
@@ -123,16 +96,7 @@ def gather(state: LaneState, stations: LaneArray, sampled: Sampled, fields: int)
 
 
 @kernel
-def sample_state(
-    belt: LaneBelt,
-    state: LaneState,
-    stations: LaneArray,
-    sensing: Sensors,
-    rows: LaneArray,
-    k: int,
-    profiles: LaneArray,
-    ended: LaneArray,
-) -> None:
+def sample_state(belt: LaneBelt, state: LaneState, stations: LaneArray, samples: Samples, k: int) -> None:
     """As `sample`, of a state whose forces are not known yet."""
     derive(belt, state, stations)
-    sample(belt, state, stations, sensing, rows, k, profiles, ended)
+    sample(belt, state, stations, samples, k)

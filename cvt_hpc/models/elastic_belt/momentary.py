@@ -11,26 +11,16 @@ from typing import TYPE_CHECKING, Any
 
 import numpy as np
 
-from cvt_hpc.models.elastic_belt.along_belt import (
-    ELSEWHERE,
-    NEEDED,
-    SLIDING,
-    along_belt,
-    curvature_at_stations,
-    elsewhere,
-)
-from cvt_hpc.models.elastic_belt.pulley_settings import PULLEY_DEFAULTS
+from cvt_hpc.models.elastic_belt.along_belt import ELSEWHERE, NEEDED, SLIDING
 from cvt_hpc.models.elastic_belt.sampling import PROFILES
 from cvt_hpc.recording import sample_count
 
 if TYPE_CHECKING:
     from cvt_hpc.lanes import LaneArray
-    from cvt_hpc.models.elastic_belt.recorded_run import RecordedRun
 
 COLUMNS = [PROFILES.index(name) for name in NEEDED]
 PATH_SPEED = ("element speed", "m s-1", "rate of an element's path coordinate: v_0 / (1 + kappa w)")
 WORDS = {**ELSEWHERE, **SLIDING, "element_speed": PATH_SPEED}
-PREFIX = "momentary_"  # of the names of quantities over time and position
 PRECISION = np.dtype(np.float32)
 
 
@@ -76,23 +66,3 @@ class Momentary:
     def of(self, lane: int) -> np.ndarray | None:
         """NEEDED of the last samples of a run, (sample, quantity, N); None where none are kept."""
         return self._values[:, self._kept.index(lane)] if lane in self._kept else None
-
-
-def last_profiles(run: RecordedRun) -> dict[str, tuple[np.ndarray, str, str, str]]:
-    """Quantities of WORDS over the last samples of a run as far as it came, (sample, N), with their words.
-
-    Empty where its profiles are not kept, or the run ended before them.
-    """
-    kept = run.momentary
-    if kept is None or (count := len(kept) - (run.samples - run.done)) <= 0:
-        return {}
-    sample = dict(zip(NEEDED, kept[:count].transpose(1, 0, 2), strict=True))
-    samples = slice(run.done - count, run.done)
-    # speeds are counted from the course of the driving speed, which is constant where the drive has inertia
-    is_given = np.isinf((PULLEY_DEFAULTS | dict(run.parameters))["driving_inertia"])
-    course = run.channel("driving_speed")[samples, None] if is_given else run.parameters["driving_speed"]
-    belt_speed = course * run.path.driving_radius
-    lengthened = 1.0 + curvature_at_stations(run.mesh) * sample["mean_displacement"]
-    found = elsewhere(sample) | along_belt(sample, run.mesh, run.parameters)
-    found["element_speed"] = (belt_speed + sample["element_speed"]) / lengthened
-    return {name: (found[name].astype(PRECISION), *words) for name, words in WORDS.items()}

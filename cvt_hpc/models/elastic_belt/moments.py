@@ -4,53 +4,17 @@ from __future__ import annotations
 
 from cvt_hpc.kernels import merged_kernel
 from cvt_hpc.lanes import LaneArray, fma, like
+from cvt_hpc.models.elastic_belt.fields import names_from
 
 # Line forces at stations [N/m] are those on their whole length, also at an arc's end, where half of it is in
 # contact. Of stations but for the stresses, which are the cells' behind them [N]; `saddle_friction` is [N],
 # and powers are per length [W/m] but for `saddle_power` and `stress_power` [W]. Layers' speeds are as in
 # `LaneState`, less the belt speed.
-MOMENTS = (
-    "flank_power",
-    "radial_friction",
-    "tangential_friction",
-    "radial_speed",
-    "radial_speed_squared",
-    "sliding_speed",
-    "saddle_power",
-    "saddle_friction",
-    "saddle_speed",
-    "transverse_power",
-    "transverse_speed",
-    "element_power",
-    "element_force",
-    "element_speed",
-    "ring_speed",
-    "stress_power",
-    "ring_tension",
-    "push_force",
-    "push_damping",
-)
-(
-    FLANK_POWER,
-    RADIAL_FRICTION,
-    TANGENTIAL_FRICTION,
-    RADIAL_SPEED,
-    RADIAL_SPEED_SQUARED,
-    SLIDING_SPEED,
-    SADDLE_POWER,
-    SADDLE_FRICTION,
-    SADDLE_SPEED,
-    TRANSVERSE_POWER,
-    TRANSVERSE_SPEED,
-    ELEMENT_POWER,
-    ELEMENT_FORCE,
-    ELEMENT_SPEED,
-    RING_SPEED,
-    STRESS_POWER,
-    RING_TENSION,
-    PUSH_FORCE,
-    PUSH_DAMPING,
-) = range(len(MOMENTS))
+FLANK_POWER, RADIAL_FRICTION, TANGENTIAL_FRICTION, RADIAL_SPEED, RADIAL_SPEED_SQUARED = range(5)
+SLIDING_SPEED, SADDLE_POWER, SADDLE_FRICTION, SADDLE_SPEED, TRANSVERSE_POWER, TRANSVERSE_SPEED = range(5, 11)
+ELEMENT_POWER, ELEMENT_FORCE, ELEMENT_SPEED, RING_SPEED = range(11, 15)
+STRESS_POWER, RING_TENSION, PUSH_FORCE, PUSH_DAMPING = range(15, 19)
+MOMENTS = names_from("FLANK_POWER", globals())
 
 
 @merged_kernel

@@ -17,18 +17,9 @@ import numpy as np
 
 from cvt_hpc.kernels import kernel
 from cvt_hpc.models.elastic_belt import fields as f
+from cvt_hpc.models.elastic_belt import rhs
 from cvt_hpc.models.elastic_belt.belt import Belt, State
 from cvt_hpc.models.elastic_belt.pulleys import pulley_rates
-from cvt_hpc.models.elastic_belt.rhs import (
-    accelerations,
-    contact_forces,
-    content_rates,
-    driving_speed_at,
-    fresh_contacts,
-    load_at,
-    memory_rates,
-    strains,
-)
 from cvt_hpc.physics.compliance import Contact
 from cvt_hpc.steppers.system import System
 
@@ -102,12 +93,12 @@ def flat_belt(belt: Belt, start: float = 0.0) -> FlatBelt:
     remembering = np.flatnonzero((belt.touches > 0.0) & (belt.friction_memory > 0.0))
     origins = {f.V_ELEMENT: belt.belt_speed, f.V_RING: belt.belt_speed, f.N_ELEMENT: 1.0, f.N_RING: 1.0}
     rows = np.repeat([origins.get(row, 0.0) for row in ROWS], n)
-    loose = f.FIRST_STATE + np.arange(len(f.STATES) if belt.pulleys.are_free else 0)
+    loose = f.FIRST_STATE + np.arange(f.STATES if belt.pulleys.are_free else 0)
     driven = [belt.driving_speed / belt.ratio, 0.0]
     origin = np.concatenate([rows, np.zeros(remembering.size + loose.size), driven])
-    state = State(np.zeros((len(f.FIELDS), n)), np.zeros(len(f.SCALARS)))
+    state = State(np.zeros((len(f.FIELDS), n)), np.zeros(f.SCALARS))
     work = np.zeros(n), np.zeros((2, n)), np.zeros((len(f.FIELDS), n)), np.zeros(n)
-    return FlatBelt(belt, state, fresh_contacts(belt), remembering, loose, origin, start, *work)
+    return FlatBelt(belt, state, rhs.fresh_contacts(belt), remembering, loose, origin, start, *work)
 
 
 def pack(flat: FlatBelt, state: State) -> np.ndarray:
@@ -182,10 +173,10 @@ def free_rates(belt: Belt, state: State, pull: np.ndarray) -> np.ndarray:
         0,
         scalars[f.FIRST_STATE :],
         1.0 if time >= belt.rise_time else 0.0,
-        (driving_speed_at(belt, state), scalars[f.DRIVEN_SPEED]),
+        (rhs.driving_speed_at(belt, state), scalars[f.DRIVEN_SPEED]),
         scalars[f.DRIVEN_POSITION],
         (pull[0], pull[1], (pull[2], pull[3]), (pull[4], pull[5], pull[6], pull[7])),
-        (load_at(belt, time), belt.ratio, belt.thrust, belt.axial_damping),
+        (rhs.load_at(belt, time), belt.ratio, belt.thrust, belt.axial_damping),
     )
     return np.array(found)
 
@@ -194,10 +185,10 @@ def free_rates(belt: Belt, state: State, pull: np.ndarray) -> np.ndarray:
 def rates_under_forces(flat: FlatBelt) -> None:
     """Rates of the fields and moments at the stations, of `flat.state` and of `flat.force` as it stands."""
     belt, state, rate = flat.belt, flat.state, flat.rate
-    strains(belt, state.fields, flat.eps)
-    memory_rates(belt, state, flat.force, rate)
-    content_rates(belt, state, flat.eps, rate)
-    accelerations(belt, state, flat.force, flat.eps, rate, flat.moments)
+    rhs.strains(belt, state.fields, flat.eps)
+    rhs.memory_rates(belt, state, flat.force, rate)
+    rhs.content_rates(belt, state, flat.eps, rate)
+    rhs.accelerations(belt, state, flat.force, flat.eps, rate, flat.moments)
 
 
 @kernel
@@ -222,7 +213,7 @@ def rates(flat: FlatBelt, t: float, y: np.ndarray, out: np.ndarray) -> bool:
     """
     belt, state, rate = flat.belt, flat.state, flat.rate
     unpack(flat, t, y)
-    if contact_forces(belt, state, flat.contacts, flat.force) == 0:
+    if rhs.contact_forces(belt, state, flat.contacts, flat.force) == 0:
         return False
     rates_under_forces(flat)
     n = belt.cell.size
@@ -242,7 +233,7 @@ def rates(flat: FlatBelt, t: float, y: np.ndarray, out: np.ndarray) -> bool:
         out[-2], out[-1] = found[0], found[1]
         return True
     moment = driven_moment(belt, flat.moments)
-    out[-2] = (moment - belt.ratio * load_at(belt, state.scalars[f.TIME])) / belt.driven_inertia
+    out[-2] = (moment - belt.ratio * rhs.load_at(belt, state.scalars[f.TIME])) / belt.driven_inertia
     out[-1] = (driven_thrust(belt, flat.force) - belt.thrust) / belt.axial_damping
     return True
 
@@ -253,7 +244,7 @@ def system(flat: FlatBelt) -> System:
     Velocities are those unknowns whose rates are forces over masses: u, the layers' speeds and the pulley's.
     Of these u alone is the rate of an unknown.
     """
-    is_velocity = np.arange(len(f.STATES)) == f.EXCESS
+    is_velocity = np.arange(f.STATES) == f.EXCESS
     moving = _by_row(
         flat, {row: row in VELOCITIES for row in (*ROWS, f.V_FILTERED)}, is_velocity, True, False
     )

@@ -6,48 +6,23 @@ are those of a common passenger-car belt; every other default is an assumption, 
 
 from __future__ import annotations
 
-from dataclasses import replace
 from typing import Any
 
 import numpy as np
 
+import cvt_hpc.models.elastic_belt.deflection_settings as deflection_settings
+import cvt_hpc.models.elastic_belt.ring_settings as ring_settings
 from cvt_hpc.models.elastic_belt.bending_settings import BENDING, bending_inert, bending_problems
-from cvt_hpc.models.elastic_belt.deflection_settings import (
-    DEFLECTION,
-    deflection_inert,
-    deflection_problems,
-)
 from cvt_hpc.models.elastic_belt.pulley_checks import pulley_inert, pulley_problems, shaft_problems
 from cvt_hpc.models.elastic_belt.pulley_settings import DRIVEN_INERTIA, DRIVEN_SHAFT, PULLEYS, SHAFT
-from cvt_hpc.models.elastic_belt.ring_settings import (
-    RINGS,
-    ring_inert,
-    ring_problems,
-    rings_rub,
-    stack_problems,
-)
 from cvt_hpc.parameters import Notice, Parameter, not_negative, positive
 from cvt_hpc.physics.friction_laws import friction_inert, friction_problems
 from cvt_hpc.physics.geometry import variator, variator_problems
 from cvt_hpc.physics.sheaves import STIFFNESS_OF, stiffness_factors
-from cvt_hpc.variator.scene import (
-    FRICTION,
-    HALF_WEDGE_ANGLE,
-    SCENE,
-    TRANSVERSE_DAMPING,
-    course_inert,
-    course_problems,
-)
-
-
-def _stiffness(
-    default: float, unit: str, description: str, sensible: tuple[float, float] | None = None
-) -> Parameter:
-    return replace(positive(default, unit, description, sensible), allow_infinite=True)
-
+from cvt_hpc.variator import scene
 
 PARAMETERS: dict[str, dict[str, Parameter]] = {
-    "scene": SCENE
+    "scene": scene.SCENE
     | {
         "start_damping": not_negative(
             1e4,
@@ -82,7 +57,7 @@ PARAMETERS: dict[str, dict[str, Parameter]] = {
         "ring_friction_speed": positive(
             0.01, "m/s", "regularisation speed of that friction", sensible=(1e-05, 5.0)
         ),
-        "transverse_damping": TRANSVERSE_DAMPING,
+        "transverse_damping": scene.TRANSVERSE_DAMPING,
         "element_damping": not_negative(
             20.0, "N s", "longitudinal damping of the pressed elements", sensible=(0.001, 100000.0)
         ),
@@ -94,12 +69,11 @@ PARAMETERS: dict[str, dict[str, Parameter]] = {
         ),
     },
     "sheaves": {
-        "sheave_stiffness": replace(
-            _stiffness(
-                1.0,
-                "",
-                "stiffness of the sheaves' discs, multiple of the reference; inf: rigid; see stiffness_of",
-            ),
+        "sheave_stiffness": positive(
+            1.0,
+            "",
+            "stiffness of the sheaves' discs, multiple of the reference; inf: rigid; see stiffness_of",
+            allow_infinite=True,
             notice=Notice(
                 "stiffness_of",
                 'scales the discs alone; stiffness_of = "sheave" keeps the earlier meaning, disc and tilt; '
@@ -113,14 +87,18 @@ PARAMETERS: dict[str, dict[str, Parameter]] = {
             "whole sheave, disc and tilt of its collar",
             choices=STIFFNESS_OF,
         ),
-        "tilt_stiffness": _stiffness(
+        "tilt_stiffness": positive(
             3e5,
             "N m/rad",
             "reference stiffness against tilting, shaft bending included",
             sensible=(100.0, 1000000000.0),
+            allow_infinite=True,
         ),
-        "tilt_factor": _stiffness(
-            1.0, "", "factor on tilt_stiffness, whatever sheave_stiffness scales; inf: no tilt"
+        "tilt_factor": positive(
+            1.0,
+            "",
+            "factor on tilt_stiffness, whatever sheave_stiffness scales; inf: no tilt",
+            allow_infinite=True,
         ),
         "local_stiffness": positive(
             4e9,
@@ -136,7 +114,7 @@ PARAMETERS: dict[str, dict[str, Parameter]] = {
             sensible=(1000000.0, 100000000000000.0),
         ),
         "element_factor": positive(1.0, "", "factor on flank_stiffness"),
-        "half_wedge_angle": HALF_WEDGE_ANGLE,
+        "half_wedge_angle": scene.HALF_WEDGE_ANGLE,
         "driving_position": Parameter(
             0.0, "m", "axial opening of the driving pulley, prescribed (LOW stop)", sensible=(1e-07, 0.1)
         ),
@@ -149,15 +127,13 @@ PARAMETERS: dict[str, dict[str, Parameter]] = {
         "driven_inertia": DRIVEN_INERTIA,
     },
     "bending": BENDING,
-    "deflection": DEFLECTION,
+    "deflection": deflection_settings.DEFLECTION,
     "pulleys": PULLEYS,
     "shaft": SHAFT,
     "driven_shaft": DRIVEN_SHAFT,
-    "rings": RINGS,
-    "friction": FRICTION,
-    "mesh": {
-        "stations": Parameter(160, "", "cells around the belt", minimum=24, maximum=4096),
-    },
+    "rings": ring_settings.RINGS,
+    "friction": scene.FRICTION,
+    "mesh": {"stations": Parameter(160, "", "cells around the belt", minimum=24, maximum=4096)},
     # Sound runs have 0.001-0.8 mm/s (random scenes up to 1.9), chatter of friction 10 mm/s and more: its
     # speeds are those over which friction is regularised.
     "numerics": {
@@ -166,7 +142,7 @@ PARAMETERS: dict[str, dict[str, Parameter]] = {
             "m/s",
             "speed that alternates from step to step, root mean square, beyond which a run fails",
             sensible=(1e-6, 1.0),
-        ),
+        )
     },
     "record": {
         "profile_duration": not_negative(
@@ -199,7 +175,7 @@ def check(parameters: dict[str, Any]) -> list[tuple[str, str, str]]:
         Empty where all is well.
     """
     p = parameters
-    found = shape_problems(p) + course_problems(p) + friction_problems(p)
+    found = shape_problems(p) + scene.course_problems(p) + friction_problems(p)
     return found or pulley_problems(p)
 
 
@@ -212,8 +188,10 @@ def shape_problems(parameters: dict[str, Any]) -> list[tuple[str, str, str]]:
         if abs(p["play"]) > 0.02 * path.path_length:
             expected = f"within 2 % of the belt's length {path.path_length:.4g} m"
             problems.append(("play", expected, f"{p['play']:g} m"))
-        problems += deflection_problems(p) + stack_problems(p, min(path.driving_radius, path.driven_radius))
-    return problems + shaft_problems(p) + bending_problems(p) + ring_problems(p)
+        problems += deflection_settings.deflection_problems(p) + ring_settings.stack_problems(
+            p, min(path.driving_radius, path.driven_radius)
+        )
+    return problems + shaft_problems(p) + bending_problems(p) + ring_settings.ring_problems(p)
 
 
 def inert(parameters: dict[str, Any]) -> dict[str, str]:
@@ -234,7 +212,7 @@ def inert(parameters: dict[str, Any]) -> dict[str, str]:
     of_disc, of_tilt = ("local_stiffness", "local_length"), ("tilt_stiffness", "tilt_factor")
     cases = (
         (p["disturbance"] == 0.0, ("seed",), "disturbance 0"),
-        (not rings_rub(p), ("ring_friction_speed",), "ring_friction 0"),
+        (not ring_settings.rings_rub(p), ("ring_friction_speed",), "ring_friction 0"),
         (p["sheave_stiffness"] == 1.0, ("stiffness_of",), "sheave_stiffness 1"),
         (np.isinf(p["tilt_factor"]), of_tilt[:1], "tilt_factor inf"),
         (np.isinf(p["tilt_stiffness"]), of_tilt[1:], "tilt_stiffness inf"),
@@ -242,5 +220,12 @@ def inert(parameters: dict[str, Any]) -> dict[str, str]:
         (np.isinf(whole), of_disc + of_tilt, "sheave_stiffness inf"),
     )
     found = {key: setting for holds, keys, setting in cases if holds for key in keys}
-    parts = friction_inert, course_inert, pulley_inert, deflection_inert, bending_inert, ring_inert
+    parts = (
+        friction_inert,
+        scene.course_inert,
+        pulley_inert,
+        deflection_settings.deflection_inert,
+        bending_inert,
+        ring_settings.ring_inert,
+    )
     return {key: why for part in parts for key, why in part(p).items()} | found

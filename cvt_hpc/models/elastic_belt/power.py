@@ -12,9 +12,9 @@ changing tension and slope squared out. The layers' loss is not taken from a sta
 the work of their dampers in the steps since the last one: a damper acts in a cell that is just closing, for a
 step or two, and instants now and then would not meet it as often as it acts.
 
-Seating is the energy that the belt carries out of the sheaves' elastic contact beyond the energy that it brings
-in: none, but for the mesh, since contact begins and ends without force, and between both the elastic forces do
-no work on the whole.
+Seating is the energy that the belt carries out of the sheaves' elastic contact beyond the energy that it
+brings in: none, but for the mesh, since contact begins and ends without force, and between both the elastic
+forces do no work on the whole.
 """
 
 from __future__ import annotations
@@ -23,27 +23,10 @@ from cvt_hpc.kernels import kernel
 from cvt_hpc.lanes import LaneArray, fma, like, maximum, minimum
 from cvt_hpc.models.elastic_belt import fields as f
 from cvt_hpc.models.elastic_belt import lane_fields as lf
-from cvt_hpc.models.elastic_belt import power_terms
+from cvt_hpc.models.elastic_belt import lane_forces as forces
+from cvt_hpc.models.elastic_belt import moments, power_terms
 from cvt_hpc.models.elastic_belt.lane_belt import LaneBelt, LaneState
 from cvt_hpc.models.elastic_belt.lane_column import curving
-from cvt_hpc.models.elastic_belt.lane_forces import (
-    LEAST_SHARE_OF_WIDTH,
-    groove_sliding,
-    lane_damping,
-    lane_load,
-    lane_pulleys,
-    lane_speed_share,
-    leaning,
-    pressed_strain,
-    saddle_pressure,
-)
-from cvt_hpc.models.elastic_belt.moments import (
-    add_flanks,
-    add_forces,
-    add_saddles,
-    add_speeds,
-    add_stresses,
-)
 from cvt_hpc.models.elastic_belt.pulley_step import audit_pulleys, taken_by_clearance
 from cvt_hpc.physics.flank import flank_sliding
 from cvt_hpc.physics.friction import formula_coefficient, law_numbers, saturation, table_coefficient
@@ -82,29 +65,21 @@ def audit(
     n, fields, c, scalars = belt.cell.size, state.fields, belt.constants, state.scalars
     speed = scalars[0, lf.SPEED]
     zero = like(0.0, axial)
-    speed_share = lane_speed_share(belt, state.time[0], zero)
-    belt_speed, sine, cosine, wedge = (
-        speed_share * c[0, lf.BELT_SPEED],
-        c[0, lf.SINE],
-        c[0, lf.COSINE],
-        c[0, lf.WEDGE],
-    )
+    speed_share = forces.lane_speed_share(belt, state.time[0], zero)
+    belt_speed, sine, cosine = speed_share * c[0, lf.BELT_SPEED], c[0, lf.SINE], c[0, lf.COSINE]
+    wedge = c[0, lf.WEDGE]
     per_cosine, width = 1.0 / cosine, c[0, lf.FRICTION_SPEED]
     per_width, per_ring_width = 1.0 / width, 1.0 / c[0, lf.RING_FRICTION_SPEED]
     kind = belt.law.kind
     table = belt.law.table_force, belt.law.table_speed, belt.law.table_mu
     numbers = law_numbers(c[0, lf.KINETIC_FRICTION], c[0, lf.FRICTION_GRADIENT], c[0, lf.LAW_SPEED])
-    least = LEAST_SHARE_OF_WIDTH * width
-    damping = lane_damping(belt, state.time[0])
-    element_mass, ring_mass, mass, offset = (
-        c[0, lf.ELEMENT_MASS],
-        c[0, lf.RING_MASS],
-        c[0, lf.MASS],
-        c[0, lf.RING_OFFSET],
-    )
+    least = forces.LEAST_SHARE_OF_WIDTH * width
+    damping = forces.lane_damping(belt, state.time[0])
+    element_mass, ring_mass, mass = c[0, lf.ELEMENT_MASS], c[0, lf.RING_MASS], c[0, lf.MASS]
+    offset = c[0, lf.RING_OFFSET]
     ring_stiffness, element_stiffness = c[0, lf.RING_STIFFNESS], c[0, lf.ELEMENT_STIFFNESS]
     element_damping, centrifugal = c[0, lf.ELEMENT_DAMPING], mass * belt_speed * belt_speed
-    turnings, surfaces = lane_pulleys(belt, speed_share, scalars)
+    turnings, surfaces = forces.lane_pulleys(belt, speed_share, scalars)
     opening_driving = c[0, lf.DRIVING_POSITION] + like(scalars[0, f.FIRST_STATE + f.SHIFT], zero)
     opening_driven = like(scalars[0, lf.POSITION], zero)
     ring_relief = c[0, lf.RING_RELIEF] * speed_share * speed_share
@@ -132,7 +107,7 @@ def audit(
         stored += (0.5 * dual) * (moving - c[0, lf.BENDING_STIFFNESS] * w * bent)
         if belt.is_curved:
             stored -= dual * c[0, lf.BENDING_STIFFNESS] * w * belt.bending_load[j]
-        pressed = minimum(pressed_strain(belt, state, stations, j), 0.0)
+        pressed = minimum(forces.pressed_strain(belt, state, stations, j), 0.0)
         stretched = stations[j, lf.EPS_1]
         rings = fields[j, f.N_ELEMENT + 1] + 1.0 + belt.curvature[j] * offset
         elastic = (fields[j, f.N_ELEMENT] + 1.0) * element_stiffness * pressed * pressed
@@ -146,24 +121,24 @@ def audit(
         working -= (tension - push - centrifugal) * lifting
         if belt.has_column:
             working -= state.column[j, lf.COLUMN_MOMENT] * dual * curving(belt, fields, j, f.U)
-        damped = -element_stiffness * pressed_strain(belt, state, stations, j)
+        damped = -element_stiffness * forces.pressed_strain(belt, state, stations, j)
         damped -= element_damping * belt.per_cell[j] * opening
         if summed:
-            add_stresses(profiles, j, working, tension, push, maximum(damped, zero) - push)
+            moments.add_stresses(profiles, j, working, tension, push, maximum(damped, zero) - push)
         stored += (0.5 * right) * (elastic + rings * ring_stiffness * stretched * stretched)
         v_element, across = fields[j, f.V_ELEMENT], -damping * v_radial
         if summed:
-            add_speeds(profiles, j, v_radial, u, v_element, fields[j, f.V_RING])
+            moments.add_speeds(profiles, j, v_radial, u, v_element, fields[j, f.V_RING])
         if belt.touches[j] == 0.0:
             if summed:
-                add_forces(profiles, j, across, u, across * slope, v_element)
+                moments.add_forces(profiles, j, across, u, across * slope, v_element)
             continue
         force = stations[j, lf.FORCE]
-        on_driven, upright, lean = belt.on_driven[j] > 0.5, belt.upright[j], leaning(belt, j, w)
+        on_driven, upright, lean = belt.on_driven[j] > 0.5, belt.upright[j], forces.leaning(belt, j, w)
         omega, radius = (
             (turnings[1], c[0, lf.DRIVEN_RADIUS]) if on_driven else (turnings[0], c[0, lf.DRIVING_RADIUS])
         )
-        v_climb, v_tangential = groove_sliding(
+        v_climb, v_tangential = forces.groove_sliding(
             belt, j, (turnings, surfaces), belt_speed, v_radial, v_element, w
         )
         sliding, meridian = flank_sliding(v_climb, v_tangential, per_cosine)
@@ -195,25 +170,25 @@ def audit(
         across += rubbing
         along += fma(across + upright * elastic_radial, slope, lean * elastic_radial)
         if summed:
-            add_forces(profiles, j, across, u, along, v_element)
-            add_flanks(profiles, j, radial, tangential, v_climb, v_tangential)
+            moments.add_forces(profiles, j, across, u, along, v_element)
+            moments.add_flanks(profiles, j, radial, tangential, v_climb, v_tangential)
         lever = fma(offset, belt.arc_curvature[j], 1.0)
         saddle = fma(lever, v0, -v1)
         ring_left = ring_stiffness * stations[a, lf.EPS_1]
-        pressure = saddle_pressure(belt, j, ring_left, tension, ring_relief * longer)
+        pressure = forces.saddle_pressure(belt, j, ring_left, tension, ring_relief * longer)
         grip = c[0, lf.RING_FRICTION] * 0.5 * pressure
         factor, _ = saturation(saddle, per_ring_width)
         drag = grip * factor
         ring_loss += drag * saddle
         if summed:
-            add_saddles(profiles, j, drag, saddle)
+            moments.add_saddles(profiles, j, drag, saddle)
         opening_0 = opening_driven if on_driven else opening_driving
         stored -= 0.5 * dual * force * fma(wedge, fma(upright, w, belt.rise[j]), opening_0)
     thrust = c[0, lf.THRUST]
     axial_speed = (axial - thrust) / c[0, lf.AXIAL_DAMPING]
     rows[k, first + power_terms.DRIVING_POWER] = driving
     rows[k, first + power_terms.LOAD_POWER] = (
-        like(c[0, lf.RATIO], speed) * lane_load(belt, state.time[0], speed) * speed
+        like(c[0, lf.RATIO], speed) * forces.lane_load(belt, state.time[0], speed) * speed
     )
     rows[k, first + power_terms.THRUST_POWER] = thrust * axial_speed
     rows[k, first + power_terms.DRIVING_FLANK_LOSS] = driving_rub

@@ -7,13 +7,7 @@ from typing import Any
 
 import numpy as np
 
-from cvt_hpc.models.elastic_belt.pulley_settings import (
-    OWN,
-    PULLEY_DEFAULTS,
-    oil_factor,
-    shaft_deflection,
-    shaft_keys,
-)
+import cvt_hpc.models.elastic_belt.pulley_settings as settings
 from cvt_hpc.physics import capacity
 from cvt_hpc.physics.friction_laws import largest_friction
 from cvt_hpc.physics.geometry import variator, variator_problems
@@ -29,8 +23,8 @@ ABOVE = 1.1
 
 def shaft_problems(parameters: Mapping[str, Any]) -> list[Problem]:
     """Problems of a shaft, in the form of a model's check."""
-    p = PULLEY_DEFAULTS | dict(parameters)
-    return _problems_of_shaft(p, "") or _problems_of_shaft(p, OWN)
+    p = settings.PULLEY_DEFAULTS | dict(parameters)
+    return _problems_of_shaft(p, "") or _problems_of_shaft(p, settings.OWN)
 
 
 def _problems_of_shaft(p: Mapping[str, Any], prefix: str) -> list[Problem]:
@@ -53,7 +47,7 @@ def _problems_of_shaft(p: Mapping[str, Any], prefix: str) -> list[Problem]:
 
 def pulley_problems(parameters: Mapping[str, Any]) -> list[Problem]:
     """Problems of the pulleys' freedom, in the form of a model's check."""
-    p = PULLEY_DEFAULTS | dict(parameters)
+    p = settings.PULLEY_DEFAULTS | dict(parameters)
     found = _piston_problems(p) + _drive_problems(p)
     if 0.0 < p["tilt_lag"] < (least := least_tilt_lag(p)):
         expected = f"0, or {least:.2g} s and more at this step: tilting is explicit"
@@ -64,7 +58,7 @@ def pulley_problems(parameters: Mapping[str, Any]) -> list[Problem]:
 
 def steady_pulley_problems(parameters: Mapping[str, Any]) -> list[Problem]:
     """Problems of pulleys in a steady state: lags count for nothing there, but something has to hold each."""
-    p = PULLEY_DEFAULTS | dict(parameters)
+    p = settings.PULLEY_DEFAULTS | dict(parameters)
     found = _piston_problems(p) + _drive_problems(p) + _bearing_problems(p) + _controller_problems(p)
     is_driven, is_held = np.isfinite(p["driving_inertia"]), np.isinf(p["driven_inertia"])
     if is_driven and p["drive_slope"] == 0.0 and not is_held:
@@ -78,7 +72,7 @@ def steady_pulley_problems(parameters: Mapping[str, Any]) -> list[Problem]:
 
 def slipping_pulley_problems(parameters: Mapping[str, Any]) -> list[Problem]:
     """Problems of pulleys whose driven one is slowed down until the belt slips, and no other moves freely."""
-    p = PULLEY_DEFAULTS | dict(parameters)
+    p = settings.PULLEY_DEFAULTS | dict(parameters)
     found = _piston_problems(p) + _bearing_problems(p)
     if p["driving_axial"] != "position":
         expected = "position: a driving sheave that is free shifts before the belt slips"
@@ -100,7 +94,7 @@ def overload_problems(parameters: Mapping[str, Any]) -> list[Problem]:
     each pulley's flanks, whatever the belt does. Near it a belt slips through long since, which is a result.
     A ramp may end there, and shows where the belt slips; its start may not lie there.
     """
-    p = PULLEY_DEFAULTS | dict(parameters)
+    p = settings.PULLEY_DEFAULTS | dict(parameters)
     key = "load_start" if p.get("load_history") == "ramp" else "load"
     mu, radius = largest_friction(p), p["driven_radius"] / p["ratio"]
     for pulley, force in _most_axial_force(p).items():
@@ -125,7 +119,7 @@ def _most_axial_force(p: Mapping[str, Any]) -> dict[str, float]:
     return {
         pulley: thrust
         + p[f"{pulley}_spring_rate"] * moved
-        + oil_factor(p[f"{pulley}_piston"], p["oil_density"]) * (MOST_SPEED * speeds[pulley]) ** 2
+        + settings.oil_factor(p[f"{pulley}_piston"], p["oil_density"]) * (MOST_SPEED * speeds[pulley]) ** 2
         for pulley, thrust in thrusts.items()
     }
 
@@ -146,12 +140,14 @@ def least_tilt_lag(parameters: Mapping[str, Any]) -> float:
     sizes = (path.driving_radius, path.driving_wrap), (path.driven_radius, path.driven_wrap)
     for pulley, (radius, wrap) in zip(PULLEYS, sizes, strict=True):
         tilt = radius * radius / (p["tilt_stiffness"] * p["tilt_factor"] * whole)
-        gains.append(stiffness * radius * wrap * (tilt + shaft_deflection(p, pulley, radius)[0] / whole))
+        gains.append(
+            stiffness * radius * wrap * (tilt + settings.shaft_deflection(p, pulley, radius)[0] / whole)
+        )
     return float(p["step"] * (1.0 + max(gains)))
 
 
 def _bearing_problems(p: Mapping[str, Any]) -> list[Problem]:
-    if p["bearing_clearance"] == 0.0 or p["shaft_lengths"] or p[f"{OWN}shaft_lengths"]:
+    if p["bearing_clearance"] == 0.0 or p["shaft_lengths"] or p[f"{settings.OWN}shaft_lengths"]:
         return []
     return [("bearing_clearance", "0, or shaft_lengths", f"{p['bearing_clearance']:g} m")]
 
@@ -196,7 +192,7 @@ def _controller_problems(p: Mapping[str, Any]) -> list[Problem]:
 
 def pulley_inert(parameters: Mapping[str, Any]) -> dict[str, str]:
     """Settings of pulleys without effect, each with the setting that makes it so."""
-    p = PULLEY_DEFAULTS | dict(parameters)
+    p = settings.PULLEY_DEFAULTS | dict(parameters)
     controlled = p["driving_axial"] == "ratio", p["clamping"] == "torque_ratio"
     cases = (
         (np.isinf(p["driving_inertia"]), ("drive_slope",), "driving_inertia inf"),
@@ -207,8 +203,8 @@ def pulley_inert(parameters: Mapping[str, Any]) -> dict[str, str]:
         (not any(controlled), ("least_thrust", "most_thrust"), "no controller"),
         (not p["driving_piston"] and not p["driven_piston"], ("oil_density",), "no piston"),
         *(
-            (not p[f"{prefix}shaft_lengths"], shaft_keys(prefix)[1:], f"no {prefix}shaft_lengths")
-            for prefix in ("", OWN)
+            (not p[f"{prefix}shaft_lengths"], settings.shaft_keys(prefix)[1:], f"no {prefix}shaft_lengths")
+            for prefix in ("", settings.OWN)
         ),
     )
     return {key: setting for holds, keys, setting in cases if holds for key in keys}

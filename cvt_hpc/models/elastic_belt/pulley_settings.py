@@ -6,7 +6,6 @@ No paper gives numbers of these: every default is an assumption, plausible and n
 from __future__ import annotations
 
 from collections.abc import Mapping
-from dataclasses import replace
 from typing import Any
 
 import numpy as np
@@ -52,17 +51,16 @@ def _of_each(make: Any) -> dict[str, Parameter]:
 
 def _axial(pulley: str) -> dict[str, Parameter]:
     return {
-        f"{pulley}_piston": Parameter(
+        f"{pulley}_piston": not_negative(
             (), "m", f"inner and outer radius of the {pulley} pulley's piston; none: its oil has no weight",
-            minimum=0.0, sensible=LENGTHS,
+            sensible=LENGTHS,
         ),
-        f"{pulley}_pressure": Parameter(
+        f"{pulley}_pressure": not_negative(
             None,
             "Pa",
             f"of the {pulley} pulley's oil, in the place of its thrust, which follows with its spring",
-            minimum=0.0,
-            gives=_pressed(pulley),
             sensible=(1e3, 1e9),
+            gives=_pressed(pulley),
         ),
         f"{pulley}_spring_force": not_negative(
             0.0, "N", f"of the {pulley} pulley's spring where it is not shifted, beside a pressure", FORCES
@@ -73,23 +71,21 @@ def _axial(pulley: str) -> dict[str, Parameter]:
     }  # fmt: skip
 
 
-DRIVEN_INERTIA = replace(
-    positive(
-        0.02,
-        "kg m^2",
-        "moment of inertia of the driven pulley; inf: it keeps the speed that it has without load",
-        sensible=(1e-05, 100.0),
-    ),
+DRIVEN_INERTIA = positive(
+    0.02,
+    "kg m^2",
+    "moment of inertia of the driven pulley; inf: it keeps the speed that it has without load",
+    sensible=(1e-05, 100.0),
     allow_infinite=True,
 )
 
 PULLEYS: dict[str, Parameter] = {
-    "driving_inertia": replace(
-        positive(
-            np.inf, "kg m^2", "moment of inertia of the driving pulley and its drive; inf: its speed is given"
-        ),
-        allow_infinite=True,
+    "driving_inertia": positive(
+        np.inf,
+        "kg m^2",
+        "moment of inertia of the driving pulley and its drive; inf: its speed is given",
         sensible=(1e-05, np.inf),
+        allow_infinite=True,
     ),
     "drive_slope": not_negative(
         0.0,
@@ -148,35 +144,18 @@ OWN = "driven_"  # before the keys of a shaft that the driven pulley has of its 
 
 def _shaft(prefix: str, of: str, none: str) -> dict[str, Parameter]:
     keys = {
-        "shaft_lengths": Parameter(
-            (),
-            "m",
-            f"lengths of a shaft's sections, {of}; none: {none}",
-            minimum=0.0,
-            exclusive=True,
-            sensible=LENGTHS,
-        ),
-        "shaft_diameters": Parameter(
-            (), "m", "diameters of these sections", minimum=0.0, exclusive=True, sensible=LENGTHS
-        ),
+        "shaft_lengths": positive((), "m", f"lengths of a shaft's sections, {of}; none: {none}", LENGTHS),
+        "shaft_diameters": positive((), "m", "diameters of these sections", LENGTHS),
         "shaft_modulus": positive(2.1e11, "Pa", "Young's modulus of that shaft", sensible=(1e9, 1e13)),
-        "shaft_factor": replace(
-            positive(1.0, "", "factor on the stiffness of that shaft and its bearings; inf: rigid"),
-            allow_infinite=True,
+        "shaft_factor": positive(
+            1.0, "", "factor on the stiffness of that shaft and its bearings; inf: rigid", allow_infinite=True
         ),
-        "seat_positions": Parameter(
-            (),
-            "m",
-            "where the fixed and the movable sheave sit along that shaft",
-            minimum=0.0,
-            sensible=LENGTHS,
+        "seat_positions": not_negative(
+            (), "m", "where the fixed and the movable sheave sit along that shaft", LENGTHS
         ),
-        "bearing_positions": Parameter(
-            (), "m", "where the two bearings sit along that shaft", minimum=0.0, sensible=LENGTHS
-        ),
-        "bearing_stiffness": replace(
-            positive(2e8, "N/m", "radial stiffness of such a bearing", sensible=(1e5, 1e12)),
-            allow_infinite=True,
+        "bearing_positions": not_negative((), "m", "where the two bearings sit along that shaft", LENGTHS),
+        "bearing_stiffness": positive(
+            2e8, "N/m", "radial stiffness of such a bearing", sensible=(1e5, 1e12), allow_infinite=True
         ),
     }
     return {f"{prefix}{key}": parameter for key, parameter in keys.items()}

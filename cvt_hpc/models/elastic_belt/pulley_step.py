@@ -91,15 +91,8 @@ def advance_pulleys(belt: LaneBelt, state: LaneState, taken, moment, step: float
         rates, tilting, axial = lane_pulley_rates(belt, state, taken, moment)
         scalars[0, lf.SPEED] = fma(step, rates[0], speed)
         scalars[0, lf.POSITION] = fma(step, rates[1], scalars[0, lf.POSITION])
-        first = f.FIRST_STATE
-        scalars[0, first] = fma(step, rates[2], scalars[0, first])
-        scalars[0, first + 1] = fma(step, rates[3], scalars[0, first + 1])
-        scalars[0, first + 2] = fma(step, rates[4], scalars[0, first + 2])
-        scalars[0, first + 3] = fma(step, rates[5], scalars[0, first + 3])
-        scalars[0, first + 4] = fma(step, rates[6], scalars[0, first + 4])
-        scalars[0, first + 5] = fma(step, rates[7], scalars[0, first + 5])
-        scalars[0, first + 6] = fma(step, rates[8], scalars[0, first + 6])
-        scalars[0, first + 7] = fma(step, rates[9], scalars[0, first + 7])
+        for k in range(f.STATES):
+            scalars[0, f.FIRST_STATE + k] = fma(step, rates[2 + k], scalars[0, f.FIRST_STATE + k])
     else:
         load = like(c[0, lf.RATIO], speed) * lane_load(belt, state.time[0], speed)
         scalars[0, lf.SPEED] = speed + step * (moment - load) / like(c[0, lf.DRIVEN_INERTIA], speed)
@@ -161,11 +154,8 @@ def audit_pulleys(
     """
     c, scalars = belt.constants, state.scalars
     speed = scalars[0, lf.SPEED]
-    excess, shift, position = (
-        scalars[0, f.FIRST_STATE + f.EXCESS],
-        scalars[0, f.FIRST_STATE + f.SHIFT],
-        scalars[0, lf.POSITION],
-    )
+    excess, shift = scalars[0, f.FIRST_STATE + f.EXCESS], scalars[0, f.FIRST_STATE + f.SHIFT]
+    position = scalars[0, lf.POSITION]
     turning = lane_speed_share(belt, state.time[0], speed) * like(c[0, lf.DRIVING_SPEED], speed) + excess
     rates, tilting, axial = lane_pulley_rates(belt, state, driving / turning, -driven / speed)
     mobility = like(c[0, lf.FIRST_LAW + f.DRIVING_MOBILITY], speed)

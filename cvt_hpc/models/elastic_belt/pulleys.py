@@ -128,7 +128,7 @@ def moving_states(pulleys: Pulleys) -> np.ndarray:
         f.CLAMPING_SUM: laws[f.CLAMPING_RATE],
         **dict.fromkeys(range(f.DRIVING_COS, f.DRIVEN_SIN + 1), laws[f.TILT_RATE]),
     }
-    return np.array([state for state in range(len(f.STATES)) if by[state] > 0.0], dtype=int)
+    return np.array([state for state in range(f.STATES) if by[state] > 0.0], dtype=int)
 
 
 def settled_tilt(pulleys: Pulleys, first: int, tilting: np.ndarray) -> np.ndarray:
@@ -219,10 +219,8 @@ def tilt_rates(laws, first: int, states, tilting):
     three, four = beyond_clearance(
         states[f.DRIVEN_COS], states[f.DRIVEN_SIN], like(laws[0, first + f.DRIVEN_FREE], pattern)
     )
-    driving, driven = (
-        like(laws[0, first + f.DRIVING_TILT], pattern),
-        like(laws[0, first + f.DRIVEN_TILT], pattern),
-    )
+    driving = like(laws[0, first + f.DRIVING_TILT], pattern)
+    driven = like(laws[0, first + f.DRIVEN_TILT], pattern)
     return (
         rate * fma(driving, tilting[0], -one),
         rate * fma(driving, tilting[1], -other),

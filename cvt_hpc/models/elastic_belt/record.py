@@ -12,6 +12,7 @@ from cvt_hpc.models.elastic_belt.belt import MODES
 from cvt_hpc.models.elastic_belt.grouping import cost, lane_key, lanes
 from cvt_hpc.models.elastic_belt.history import histories
 from cvt_hpc.models.elastic_belt.momentary import profile_bytes
+from cvt_hpc.models.elastic_belt.power_terms import POWERS
 from cvt_hpc.models.elastic_belt.pulley_settings import PULLEY_DEFAULTS, are_free, oil_factor
 from cvt_hpc.variables import Coordinate, Variable
 from cvt_hpc.variator import PULLEYS, judging
@@ -38,83 +39,58 @@ __all__ = [
     "profile_bytes",
 ]
 
-LOSSES = (
-    "driving_flank_loss",
-    "driven_flank_loss",
-    "ring_loss",
-    "belt_loss",
-    "layer_loss",
-    "lag_loss",
-    "seating_loss",
-)
+LOSSES = tuple(name for name in POWERS if name.endswith("_loss"))
 
 VARIABLES = (
     *assessment.VARIABLES,
     *ramp.VARIABLES,
     Variable(
         "mode",
-        ("strand",),
-        "i1",
         "1",
         "half waves of the strongest mode of the strand in the band; 0: none",
+        dims=("strand",),
+        dtype="i1",
         words="strongest mode",
     ),
     Variable(
-        "modal_amplitude", ("strand", "half_waves"), "f8", "m", "amplitude of each sine mode in the band"
+        "modal_amplitude", "m", "amplitude of each sine mode in the band", dims=("strand", "half_waves")
     ),
     *peaks.VARIABLES,
     *shared("spectrum", "mean_ring_tension", "mean_push_force", "axial_force", "slip"),
     *AGAINST_SLIP,
     Variable(
         "slip_load",
-        (),
-        "f8",
         "N m",
         "load from which on a pulley of a run that slips through slips grossly for good",
         words="load at gross slip",
     ),
     Variable(
         "piston_force",
-        ("pulley",),
-        "f8",
         "N",
         "mean force of a piston's pressure, or force required: axial force less spring and centrifugal oil",
+        dims=("pulley",),
         words="piston force",
     ),
     Variable(
         "sheave_tilt",
-        ("pulley",),
-        "f8",
         "rad",
         "mean angle that the tilt of the collar and the bending of the shaft put between the sheaves",
+        dims=("pulley",),
         words="angle between sheaves",
     ),
-    Variable("open_share", ("pulley",), "f8", "1", "mean, out of contact", words="open share of the wrap"),
-    *shared(
-        "flank_loss",
-        "thrust_ratio",
-        "speed_loss",
-        "driven_speed_ripple",
-        "driving_power",
-        "load_power",
-        "thrust_power",
-        "storing_power",
-        "ring_loss",
-        "belt_loss",
-    ),
-    *shared("layer_loss"),
-    Variable("lag_loss", (), "f8", "W", "mean power of the driven sheave's lag"),
+    Variable("open_share", "1", "mean, out of contact", dims=("pulley",), words="open share of the wrap"),
+    *shared("flank_loss", "thrust_ratio", "speed_loss", "driven_speed_ripple", "driving_power", "load_power"),
+    *shared("thrust_power", "storing_power", "ring_loss", "belt_loss", "layer_loss"),
+    Variable("lag_loss", "W", "mean power of the driven sheave's lag"),
     *shared("seating_loss", "loss", "efficiency", "power_residual"),
     Variable(
         "step_ripple",
-        (),
-        "f8",
         "m s-1",
         "speed that alternates from step to step, root mean square over the belt's mass and the judged part",
     ),
     *ring_record.VARIABLES,
     *fluctuation.VARIABLES,
-    Variable("least_strand_force", (), "f8", "N", "smallest T - P - m v^2 in a strand: below 0 it is slack"),
+    Variable("least_strand_force", "N", "smallest T - P - m v^2 in a strand: below 0 it is slack"),
 )
 
 

@@ -1,21 +1,33 @@
-"""Recording of every run of the elastic belt, with any stepper: plan of recording and its reading."""
+"""Recording of every run of the elastic belt, with any stepper: its plan, its arrays and their reading."""
 
 from __future__ import annotations
 
-from collections.abc import Mapping
+from collections.abc import Iterator, Mapping, Sequence
+from contextlib import contextmanager
 from typing import TYPE_CHECKING, Any, NamedTuple
 
 import numpy as np
 
-from cvt_hpc.models.elastic_belt.belt import REGIONS, Mesh, mesh
+from cvt_hpc.kernels import called_alike
+from cvt_hpc.lanes import LaneArray
+from cvt_hpc.models.elastic_belt import lane_fields as lf
+from cvt_hpc.models.elastic_belt import lane_rings, sampling
+from cvt_hpc.models.elastic_belt.belt import REGIONS, Belt, Mesh, State, mesh
 from cvt_hpc.models.elastic_belt.fluctuation import Fluctuation, fluctuation
+from cvt_hpc.models.elastic_belt.lane_belt import lane_belt, lane_state
+from cvt_hpc.models.elastic_belt.march import sample_state
+from cvt_hpc.models.elastic_belt.momentary import Momentary
 from cvt_hpc.models.elastic_belt.pulley_settings import are_free
-from cvt_hpc.models.elastic_belt.sampling import CHANNELS, PROFILES, Probe, Sensors, probes, sensors
+from cvt_hpc.models.elastic_belt.ring_settings import layer_count
+from cvt_hpc.models.elastic_belt.rings import ring_constants, without_saddle_friction
+from cvt_hpc.models.elastic_belt.sampling import CHANNELS, ENDED, PROFILES, Outcome, Probe, Sensors
 from cvt_hpc.models.elastic_belt.validity import doubt
 from cvt_hpc.physics.geometry import Variator
 from cvt_hpc.recording import sample_count, start_up_samples
 from cvt_hpc.variables import Status
 from cvt_hpc.vibration.ramped import ramped
+
+_sample, _audit_layers = called_alike(sample_state), called_alike(lane_rings.audit_layers)
 
 
 class Recording(NamedTuple):
@@ -62,16 +74,72 @@ def recording(parameters: Mapping[str, Any], dtype: type) -> Recording:
     p, grid = parameters, mesh(parameters)
     interval = 1.0 / p["sampling_rate"]
     samples = sample_count(p)
-    places = probes(grid, p["strand_probes"], p["arc_probes"])
+    places = sampling.probes(grid, p["strand_probes"], p["arc_probes"])
     return Recording(
         grid,
         places,
-        sensors(grid, places, interval, dtype),
+        sampling.sensors(grid, places, interval, dtype),
         interval,
         samples,
         start_up_samples(p),
         samples - round(p["judged_fraction"] * samples),
     )
+
+
+class Records:
+    """Arrays that runs which advance together are recorded into, each in a lane.
+
+    Parameters
+    ----------
+    points : sequence of dict
+        Resolved parameters of the runs [SI], alike in mesh, sampling and duration.
+    width : int
+        Lanes, at least one for each run.
+    dtype : type
+        np.float64 or np.float32, that of the lanes.
+
+    Attributes
+    ----------
+    plan : Recording
+        The recorded quantities.
+    channels : int
+        Values in a row of a sample.
+    profiles : (N, 21) LaneArray of doubles
+        PROFILES, summed over the judged part's samples.
+    momentary : Momentary
+        Profiles of the last samples.
+    ended : (1, 4) LaneArray of doubles
+        ENDED.
+    """
+
+    def __init__(self, points: Sequence[Mapping[str, Any]], width: int, dtype: type) -> None:
+        self.plan = recording(points[0], dtype)
+        self.channels = self.plan.sensing.matrix.shape[0] + len(CHANNELS)
+        stations = self.plan.mesh.cell.size
+        self.profiles = LaneArray(stations, len(PROFILES), width)
+        self._none = LaneArray(0, len(PROFILES), width)
+        self.momentary = Momentary(points, stations)
+        self.ended = LaneArray(1, len(ENDED), width)
+
+    @contextmanager
+    def profiles_of(self, sample: int) -> Iterator[LaneArray]:
+        """Yield the array to which PROFILES of samples from a certain one on are to be added.
+
+        Of the part that is not judged nothing is summed up. A sample of which profiles are kept comes alone.
+        """
+        is_judged = sample >= self.plan.first_judged
+        if sample < self.momentary.first:
+            yield self.profiles if is_judged else self._none
+            return
+        alone = LaneArray(*self.profiles.data.shape)
+        yield alone
+        self.momentary.note(sample, alone)
+        if is_judged:
+            self.profiles.data[:] += alone.data
+
+    def without_means(self) -> None:
+        """Forget means that another stepper has begun, whose sums are not known."""
+        self.profiles.data[:] = np.nan
 
 
 class RecordedRun:
@@ -81,16 +149,16 @@ class RecordedRun:
     ----------
     parameters : dict
         Resolved parameters of the run [SI].
-    plan : Recording
-        The recorded quantities.
-    sums : (N, 21) array
-        PROFILES, summed over the judged part's samples; it may be filled later.
+    records : Records
+        Of the runs among which it is.
+    lane : int
+        Its lane there.
 
     Attributes
     ----------
     parameters
         As given.
-    mesh, probes, interval, samples, kick
+    mesh, probes, interval, samples, risen
         Of the plan.
     rows : (done, S + C) array
         The sensors' displacement [m], the strands' modes [m], and CHANNELS; set by the marching class.
@@ -100,8 +168,6 @@ class RecordedRun:
         Why the run cannot continue: a failure, or a result, with the status done; set by the marching class.
     time : float
         Simulated time [s]; set by the marching class.
-    momentary : (sample, quantity, N) array or None
-        Last samples that `Momentary` has kept; set by the marching class.
     """
 
     if TYPE_CHECKING:  # set by the marching class
@@ -126,16 +192,17 @@ class RecordedRun:
         def layer_sums(self) -> np.ndarray | None:
             """`lane_rings.SUMS` of ring layers over the judged part, (n + 1, 6); None where rings are one."""
 
-        @property
-        def momentary(self) -> np.ndarray | None:
-            """Samples of the run that `Momentary` has kept."""
-
-    def __init__(self, parameters: Mapping[str, Any], plan: Recording, sums: np.ndarray) -> None:
-        self.parameters = parameters
+    def __init__(self, parameters: Mapping[str, Any], records: Records, lane: int = 0) -> None:
+        self.parameters, self._records, self._lane = parameters, records, lane
+        self._plan = plan = records.plan
         self.mesh, self.probes = plan.mesh, plan.probes
         self.interval, self.samples, self.risen = plan.interval, plan.samples, plan.kick
-        self._plan, self._sums = plan, sums
         self._sensed = plan.sensing.matrix.shape[0]
+
+    @property
+    def momentary(self) -> np.ndarray | None:
+        """Last samples that `Momentary` has kept, (sample, quantity, N)."""
+        return self._records.momentary.of(self._lane)
 
     @property
     def displacement(self) -> np.ndarray:
@@ -173,14 +240,19 @@ class RecordedRun:
 
         Not a number before that part, and where the run has failed.
         """
-        count = self.done - self._plan.first_judged if self.failure is None else 0
-        return dict(zip(PROFILES, self._sums.T / (count if count > 0 else np.nan), strict=True))
+        sums = self._records.profiles.data[:, :, self._lane]
+        return dict(zip(PROFILES, sums.T / self._judged_count, strict=True))
 
     @property
     def layer_means(self) -> np.ndarray | None:
         """As `layer_sums`, means."""
+        return None if self.layer_sums is None else self.layer_sums / self._judged_count
+
+    @property
+    def _judged_count(self) -> float:
+        """Samples of the judged part so far; not a number before it, and where the run has failed."""
         count = self.done - self._plan.first_judged if self.failure is None else 0
-        return None if self.layer_sums is None else self.layer_sums / (count if count > 0 else np.nan)
+        return count if count > 0 else np.nan
 
     @property
     def fluctuation(self) -> Fluctuation:
@@ -206,3 +278,68 @@ class RecordedRun:
             The reason.
         """
         return doubt(record, self.parameters, self.mesh)
+
+
+class OneLaneRun(RecordedRun):
+    """A run by a step that knows nothing of lanes: sampled as a single lane, as every other run.
+
+    Attributes are those of `RecordedRun`.
+    """
+
+    done: int
+
+    def prolong(self, parameters: Mapping[str, Any]) -> None:
+        """Make room for the samples of a longer duration, whose judged part has yet to come.
+
+        Parameters
+        ----------
+        parameters : dict
+            Parameters of the run but for `duration` and `judged_fraction`.
+        """
+        RecordedRun.__init__(self, parameters, Records([parameters], 1, np.float64))
+        rows = LaneArray(self.samples, self._records.channels, 1)
+        if self.done:
+            rows.data[: self.done, :, 0] = self.rows
+        self._rows = rows
+        # of the part that is not judged, and of the judged one
+        self._layer_sums = [LaneArray(layer_count(parameters) + 1, len(lane_rings.SUMS), 1) for _ in range(2)]
+
+    def _make_lane(self, belt: Belt, first: State) -> None:
+        """The same run as a single lane, which can be sampled."""
+        count = layer_count(self.parameters)
+        if count > 1:
+            self._rings = lane_rings.lane_rings([belt], [ring_constants(self.parameters, belt)], np.float64)
+            self._layers = LaneArray(self.mesh.cell.size, count, 1)
+            belt = without_saddle_friction(belt)
+        self._lane_belt = lane_belt([belt], np.float64)
+        self._state = lane_state([belt], [first], np.float64)
+        self._stations = LaneArray(self.mesh.cell.size, lf.FIELDS_OF_FORCES, 1)
+
+    @property
+    def layer_sums(self) -> np.ndarray | None:
+        """As of `RecordedRun`."""
+        return self._layer_sums[1].data[:, :, 0] if layer_count(self.parameters) > 1 else None
+
+    @property
+    def rows(self) -> np.ndarray:
+        """The sensors' displacement [m], the strands' modes [m], and CHANNELS, (done, S + C)."""
+        return self._rows.data[: self.done, :, 0]
+
+    def _go_on_from(self, run: Any) -> None:
+        """Take over the history of a run by another stepper, except for means that began before."""
+        self.done, self._disturbed = run.done, run.done > self._plan.kick
+        self._rows.data[: self.done, :, 0] = run.rows
+        if self.done > self._plan.first_judged:
+            self._records.without_means()
+            self._layer_sums[1].data[:] = np.nan
+
+    def _sample_lane(self) -> Outcome:
+        """Record the values in the lane; `done` is left to the caller."""
+        layer_sums = self._layer_sums[int(self.done >= self._plan.first_judged)]
+        with self._records.profiles_of(self.done) as profiles:
+            samples = sampling.Samples(self._plan.sensing, self._rows, profiles, self._records.ended)
+            _sample(self._lane_belt, self._state, self._stations, samples, self.done)
+            if layer_count(self.parameters) > 1:
+                of_layers = self._lane_belt, self._rings, self._state, self._layers
+                _audit_layers(*of_layers, samples, self.done, layer_sums)
+        return Outcome(int(self._records.ended.data[0, sampling.OUTCOME, 0]))

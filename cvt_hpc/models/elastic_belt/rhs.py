@@ -9,7 +9,7 @@ outward):
     elements       m_0 (v_0,t + v_0 v_0,s) = -P,s + f_t - (1 + kappa d_1) q + (p_r - d_b (w_t + v_0 w_s)) w_s
     rings          m_1 (v_1,t + v_1 v_1,s) =  T,s + q
     transverse     m (w_tt + 2 v w_ts + v' w_s) = (F w_s),s - EI w_ssss - F kappa - d_b (w_t + v_0 w_s) + p_r
-    memory         v_f,t + v v_f,s = (|v| - v_f) / tau_f on the arcs, v_f = |v| where the belt enters
+    memory         v_f,t + v v_f,s = (|v| - v_f) / tau_f in contact, v_f = |v| where that begins
     pulleys        J omega_dn' = -sum f_t (r + w) - i M,   T_1 k z_dn' = sum f_ax - F_dn   (and `pulleys.py`)
 
 with q the friction of the rings on the elements' saddle, p_r, f_t the flanks' forces, |v| their sliding
@@ -119,7 +119,7 @@ def wrap_contact(
 
 @merged_kernel
 def contact_forces(belt: Belt, state: State, contacts: tuple[Contact, Contact], force: np.ndarray) -> int:
-    """Axial line forces of both wraps, or pulls, into `force` (N,) [N/m]; returns 0 solves where it failed."""
+    """Axial line forces, or pulls, of both wraps into `force` (N,) [N/m]; 0 solves: failure."""
     force[:] = 0.0
     w = state.fields[f.W]
     scalars, states = state.scalars, state.scalars[f.FIRST_STATE :]
@@ -163,12 +163,7 @@ def damped_push(belt: Belt, eps: float, opening: float) -> float:
 
 @kernel
 def accelerations(
-    belt: Belt,
-    state: State,
-    force: np.ndarray,
-    eps: np.ndarray,
-    rate: np.ndarray,
-    moments: np.ndarray,
+    belt: Belt, state: State, force: np.ndarray, eps: np.ndarray, rate: np.ndarray, moments: np.ndarray
 ) -> None:
     """Accelerations of u, v_element and v_ring.
 
@@ -276,7 +271,7 @@ def content_rates(belt: Belt, state: State, eps: np.ndarray, rate: np.ndarray) -
 
 @kernel
 def memory_rates(belt: Belt, state: State, force: np.ndarray, rate: np.ndarray) -> None:
-    """Rate of the filtered sliding speed [m/s^2]; at once |v| where a groove may hold a station but does not."""
+    """Rate of the filtered sliding speed [m/s^2]; where a station does not touch it is |v| at once."""
     vf = state.fields[f.V_FILTERED]
     belt_speed = speed_share_at(belt, state.scalars[f.TIME]) * belt.belt_speed
     for j in range(vf.size):

@@ -17,34 +17,30 @@ if TYPE_CHECKING:
 VARIABLES = (
     Variable(
         "layer_tension",
-        ("ring_layer", "strand"),
-        "f8",
         "N",
         "mean tension of each ring layer in the middle of the strand; nan: no such layer",
+        dims=("ring_layer", "strand"),
         words="tension by ring layer",
     ),
     Variable(
         "layer_speed",
-        ("ring_layer",),
-        "f8",
         "m s-1",
         "mean speed of each ring layer around the belt",
+        dims=("ring_layer",),
         words="speed by ring layer",
     ),
     Variable(
         "surface_loss",
-        ("ring_surface",),
-        "f8",
         "W",
         "mean loss of each sliding surface of the rings; together they are ring_loss",
+        dims=("ring_surface",),
         words="loss by ring surface",
     ),
     Variable(
         "surface_sliding",
-        ("ring_surface", "pulley"),
-        "f8",
         "m s-1",
         "mean size of the sliding speed of each surface of the rings on the arc",
+        dims=("ring_surface", "pulley"),
         words="sliding by ring surface",
     ),
 )

@@ -30,29 +30,18 @@ from cvt_hpc.kernels import kernel, merged_kernel
 from cvt_hpc.lanes import LaneArray, ahead, anywhere, around, behind, fma, like, maximum, split
 from cvt_hpc.models.elastic_belt import fields as f
 from cvt_hpc.models.elastic_belt import lane_fields as lf
+from cvt_hpc.models.elastic_belt import lane_forces as forces
+from cvt_hpc.models.elastic_belt import lane_rings
 from cvt_hpc.models.elastic_belt.belt import Belt
 from cvt_hpc.models.elastic_belt.imex import MOST_PASSES, advance_belt, forget
-from cvt_hpc.models.elastic_belt.imex_stations import ImexWork, assemble, imex_work
+from cvt_hpc.models.elastic_belt.imex_stations import assemble
 from cvt_hpc.models.elastic_belt.imex_system import TURNS_BACK, eliminate, substitute
-from cvt_hpc.models.elastic_belt.lane_belt import LaneBelt, LaneState
-from cvt_hpc.models.elastic_belt.lane_forces import (
-    LEAST_SHARE_OF_WIDTH,
-    advance_discs,
-    lane_acceleration,
-    lane_contact_forces,
-    lane_sliding,
-    lane_speed_share,
-)
-from cvt_hpc.models.elastic_belt.lane_rings import (
-    SUMS,
-    LaneRings,
-    lane_rings,
-    layer_strain,
-    parted_rings,
-    surface_factors,
-)
+from cvt_hpc.models.elastic_belt.lane_belt import LaneBelt, LaneState, Work, work_space
+from cvt_hpc.models.elastic_belt.lane_rings import LaneRings
+from cvt_hpc.models.elastic_belt.march import Sampled, take_sample
 from cvt_hpc.models.elastic_belt.pulley_step import advance_pulleys
 from cvt_hpc.models.elastic_belt.rings import FIRST_LAYER, Rings
+from cvt_hpc.models.elastic_belt.sampling import Samples
 from cvt_hpc.physics.layers import ring_friction
 
 # Fields of RingWork.layers, STRIDE of each layer: strain; of the eliminated chain the increment by its own
@@ -96,14 +85,14 @@ def ring_work(state: LaneState, belts: Sequence[Belt], rings: Sequence[Rings]) -
     """Work space for a state; `derive` has to be called before the first step."""
     rows, _, lanes = state.fields.data.shape
     dtype, count = state.fields.data.dtype, rings[0].length.size
-    constants = lane_rings(belts, rings, dtype)
+    constants = lane_rings.lane_rings(belts, rings, dtype)
     return RingWork(
-        imex_work(state).stations,
+        work_space(state, lf.FIELDS_OF_WORK).stations,
         LaneArray(rows, STRIDE * count + len(FIELDS_OF_STATION), lanes, dtype),
         constants,
         constants,
         LaneArray(rows, count, lanes, dtype),
-        LaneArray(count + 1, len(SUMS), lanes),
+        LaneArray(count + 1, len(lane_rings.SUMS), lanes),
     )
 
 
@@ -112,8 +101,23 @@ def parted_ring_work(work: RingWork, parts: int) -> RingWork:
     return work._replace(
         stations=split(work.stations, parts),
         layers=split(work.layers, parts),
-        rings=parted_rings(work.rings, parts),
+        rings=lane_rings.parted_rings(work.rings, parts),
     )
+
+
+@kernel
+def begin_rings(belt: LaneBelt, state: LaneState, work: RingWork) -> None:
+    """Find the layers' strains, from which a step begins."""
+    lane_rings.unite_strains(belt, work.rings, state, work.layers, STRIDE)
+
+
+@kernel
+def take_sample_of_rings(
+    state: LaneState, work: RingWork, sampled: Sampled, samples: Samples, k: int
+) -> None:
+    """As `take_sample`, with the layers' part."""
+    take_sample(state, work, sampled, samples, k)
+    lane_rings.audit_layers(sampled.belt, work.whole, sampled.state, work.audited, samples, k, work.sums)
 
 
 @kernel
@@ -128,8 +132,8 @@ def step_rings(belt: LaneBelt, state: LaneState, work: RingWork, step: float) ->
     step : float
         Step [s].
     """
-    one = ImexWork(work.stations)
-    lane_sliding(belt, state, work.stations)
+    one = Work(work.stations)
+    forces.lane_sliding(belt, state, work.stations)
     assemble(belt, state, one, step, False)
     couple_layers(belt, work.rings, state, work, step)
     for attempt in range(MOST_PASSES):
@@ -147,8 +151,8 @@ def step_rings(belt: LaneBelt, state: LaneState, work: RingWork, step: float) ->
     advance_layers(belt, work.rings, state, work, step)
     advance_pulleys(belt, state, taken, moment, step)
     state.time[0] += step
-    advance_discs(belt, state, step)
-    lane_contact_forces(belt, state, work.stations)
+    forces.advance_discs(belt, state, step)
+    forces.lane_contact_forces(belt, state, work.stations)
 
 
 @merged_kernel
@@ -182,15 +186,15 @@ def couple_layers(belt: LaneBelt, rings: LaneRings, state: LaneState, work: Ring
     """Eliminate the layers: their part of the blocks and right side of elements and rings as one."""
     n, fields, stations, layers, c = rings.number, state.fields, work.stations, work.layers, rings.constants
     sine = belt.constants[0, lf.RING_OFFSET]
-    share = lane_speed_share(belt, state.time[0], sine)
+    share = forces.lane_speed_share(belt, state.time[0], sine)
     belt_speed = share * belt.constants[0, lf.BELT_SPEED]
-    acceleration = lane_acceleration(belt, state.time[0], step)
+    acceleration = forces.lane_acceleration(belt, state.time[0], step)
     per_step = 1.0 / step
     mass, stiffness, damping = c[0, lf.LAYER_MASS], c[0, lf.LAYER_STIFFNESS], c[0, lf.LAYER_DAMPING]
     heavier = heavier_by(rings, step)
     relief = c[0, lf.LAYER_RELIEF] * share * share
     excess, per_stribeck, per_width = c[0, lf.STATIC_EXCESS], c[0, lf.PER_STRIBECK], c[0, lf.PER_WIDTH]
-    least = LEAST_SHARE_OF_WIDTH * belt.constants[0, lf.RING_FRICTION_SPEED]
+    least = forces.LEAST_SHARE_OF_WIDTH * belt.constants[0, lf.RING_FRICTION_SPEED]
     zero = like(0.0, sine)
     free = 1.0 / (heavier * mass * per_step)
     # reduced masses over the step: of two layers, and of the inner one, with all it takes along, and elements
@@ -248,7 +252,7 @@ def couple_layers(belt: LaneBelt, rings: LaneRings, state: LaneState, work: Ring
             # several of them at a time only where no elimination is in between.
             for k in range(n):
                 first = STRIDE * k
-                above_factor, below_factor = surface_factors(rings, k, is_driven)
+                above_factor, below_factor = lane_rings.surface_factors(rings, k, is_driven)
                 under = fields[j, FIRST_LAYER + k - 1] if k > 0 else element
                 over = fields[j, FIRST_LAYER + k]
                 sliding = fma(below_factor, belt_speed + under, -above_factor * (belt_speed + over))
@@ -267,7 +271,7 @@ def couple_layers(belt: LaneBelt, rings: LaneRings, state: LaneState, work: Ring
             ear_drag = ear_stiff = ear_cross = zero
             on_ears = anywhere(bearing > 0.0)
             if on_ears:
-                above_factor, below_factor = surface_factors(rings, n, is_driven)
+                above_factor, below_factor = lane_rings.surface_factors(rings, n, is_driven)
                 outer = fields[j, FIRST_LAYER + n - 1]
                 sliding = fma(below_factor, belt_speed + outer, -above_factor * (belt_speed + element))
                 level = bearing * c[0, lf.SADDLE_FRICTION_LEVEL]
@@ -286,7 +290,7 @@ def couple_layers(belt: LaneBelt, rings: LaneRings, state: LaneState, work: Ring
                 first = STRIDE * k
                 force, inertia = force_along(rings, fields, layers, j, k, along)
                 drag, stiff = layers[j, first + DRAG], layers[j, first + STIFF]
-                above_factor, below_factor = surface_factors(rings, k, is_driven)
+                above_factor, below_factor = lane_rings.surface_factors(rings, k, is_driven)
                 by_common = fma(link, common, 1.0)
                 if on_ears:
                     by_elements = ear_cross if k == n - 1 else link * elements
@@ -338,7 +342,7 @@ def advance_layers(belt: LaneBelt, rings: LaneRings, state: LaneState, work: Rin
     """Apply the layers' increments; their strains, and those of the rings as one."""
     n, fields, stations, layers, c = rings.number, state.fields, work.stations, work.layers, rings.constants
     offset = belt.constants[0, lf.RING_OFFSET]
-    belt_speed = lane_speed_share(belt, state.time[0], offset) * belt.constants[0, lf.BELT_SPEED]
+    belt_speed = forces.lane_speed_share(belt, state.time[0], offset) * belt.constants[0, lf.BELT_SPEED]
     damping, last = c[0, lf.LAYER_DAMPING], STRIDE * n
     free = step / (heavier_by(rings, step) * c[0, lf.LAYER_MASS])
     lost = zero = offset * 0.0
@@ -378,7 +382,7 @@ def advance_layers(belt: LaneBelt, rings: LaneRings, state: LaneState, work: Rin
                 first, row = STRIDE * k, FIRST_LAYER + n + k
                 outflow = ahead(layers, i, first + PART) - layers[i, first + PART]
                 fields[i, row] = fma(-step * per_cell, outflow, fields[i, row])
-                eps = layer_strain(rings, state, i, k, kappa, bent)
+                eps = lane_rings.layer_strain(rings, state, i, k, kappa, bent)
                 layers[i, first] = eps
                 mean += eps
                 closing = ahead(fields, i, FIRST_LAYER + k) - fields[i, FIRST_LAYER + k] - united

@@ -6,22 +6,20 @@ the layers' speeds less the nominal belt speed, (n, N), and their contents less 
 
 from __future__ import annotations
 
-from collections.abc import Mapping
-from typing import Any, NamedTuple
+from typing import NamedTuple
 
 import numpy as np
 
 from cvt_hpc.kernels import kernel
 from cvt_hpc.models.elastic_belt import fields as f
 from cvt_hpc.models.elastic_belt import one_system
-from cvt_hpc.models.elastic_belt.belt import Belt, Mesh, State
+from cvt_hpc.models.elastic_belt.belt import Belt, State
 from cvt_hpc.models.elastic_belt.one_system import ROWS, FlatBelt, sizes
 from cvt_hpc.models.elastic_belt.rhs import speed_share_at
 from cvt_hpc.models.elastic_belt.rings import (
     FIRST_LAYER,
     Rings,
     layer_rates,
-    ring_constants,
     unite_layers,
     with_layers,
     without_saddle_friction,
@@ -64,7 +62,9 @@ def flat_rings(belt: Belt, rings: Rings) -> FlatRings:
 
 
 def pack(flat: FlatRings, state: State) -> np.ndarray:
-    """Vector y of a state with layers; its time is not part of it."""
+    """Vector y of a state, with layers or without, as at the start; its time is not part of it."""
+    if state.fields.shape[0] == FIRST_LAYER:
+        state = with_layers(state, flat.flat.belt, flat.rings)
     n = flat.rings.length.size
     one = one_system.pack(flat.flat, State(state.fields[:FIRST_LAYER], state.scalars))
     for row in (f.V_RING, f.N_RING):
@@ -132,26 +132,3 @@ def system(flat: FlatRings) -> System:
     size = sizes(flat.flat.belt)
     scale = np.concatenate([one.scale, np.repeat([size[f.V_RING], size[f.N_RING]], n * cells)])
     return System(rates, flat, moving, position_of, scale)
-
-
-class LayeredForm:
-    """As `general_run.Form`, of a belt whose rings are layers."""
-
-    def __init__(self, belt: Belt, grid: Mesh, parameters: Mapping[str, Any]) -> None:
-        self._flat = flat_rings(belt, ring_constants(parameters, belt))
-        self.system = system(self._flat)
-
-    def pack(self, state: State) -> np.ndarray:
-        """Unknowns of a state, with layers or at the start without."""
-        if state.fields.shape[0] == FIRST_LAYER:
-            state = with_layers(state, self._flat.flat.belt, self._flat.rings)
-        return pack(self._flat, state)
-
-    def state(self, time: float, y: np.ndarray) -> State:
-        """State of unknowns; overwritten by the next call, and by the next evaluation of rates."""
-        unpack(self._flat, time, y)
-        return self._flat.state
-
-    def hints(self, stepper: str) -> dict[str, Any]:
-        """No pattern of the Jacobian is known: SciPy's integrators find it by differences."""
-        return {}

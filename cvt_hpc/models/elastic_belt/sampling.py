@@ -12,15 +12,9 @@ from cvt_hpc.kernels import kernel
 from cvt_hpc.lanes import LaneArray, absolute, fma, like, maximum, minimum, select
 from cvt_hpc.models.elastic_belt import fields as f
 from cvt_hpc.models.elastic_belt import lane_fields as lf
+from cvt_hpc.models.elastic_belt import lane_forces as forces
 from cvt_hpc.models.elastic_belt.belt import MODES, REGIONS, Mesh
 from cvt_hpc.models.elastic_belt.lane_belt import LaneBelt, LaneState
-from cvt_hpc.models.elastic_belt.lane_forces import (
-    lane_load,
-    lane_pulleys,
-    lane_speed_share,
-    pressed_strain,
-    step_ripple,
-)
 from cvt_hpc.models.elastic_belt.moments import MOMENTS, add
 from cvt_hpc.models.elastic_belt.power import audit
 from cvt_hpc.models.elastic_belt.power_terms import POWERS
@@ -112,6 +106,27 @@ class Sensors(NamedTuple):
     interval: float
 
 
+class Samples(NamedTuple):
+    """The arrays of samples, as kernels take them.
+
+    Attributes
+    ----------
+    sensing : Sensors
+        S rows.
+    rows : (samples, S + C) LaneArray of doubles
+        Of a sample a row: the sensors, then CHANNELS.
+    profiles : (N, 21) LaneArray of doubles
+        PROFILES of each sample are added to it; one without rows takes none.
+    ended : (1, 4) LaneArray of doubles
+        ENDED of each lane.
+    """
+
+    sensing: Sensors
+    rows: LaneArray
+    profiles: LaneArray
+    ended: LaneArray
+
+
 class Probe(NamedTuple):
     """A place on the path: label, that begins with the region, and path coordinate s [m]."""
 
@@ -169,16 +184,7 @@ def sensors(grid: Mesh, places: tuple[Probe, ...], interval: float, dtype: type)
 
 
 @kernel
-def sample(
-    belt: LaneBelt,
-    state: LaneState,
-    stations: LaneArray,
-    sensing: Sensors,
-    rows: LaneArray,
-    k: int,
-    profiles: LaneArray,
-    ended: LaneArray,
-) -> None:
+def sample(belt: LaneBelt, state: LaneState, stations: LaneArray, samples: Samples, k: int) -> None:
     """Record a state.
 
     Parameters
@@ -187,18 +193,13 @@ def sample(
         Constants and state.
     stations : LaneArray
         The step's work space, with the results of `derive` for this state.
-    sensing : Sensors
-        S rows.
-    rows : (samples, S + C) LaneArray of doubles
-        Row k is set: the sensors, then CHANNELS.
+    samples : Samples
+        Row k is set.
     k : int
         Which row.
-    profiles : (N, 21) LaneArray of doubles
-        PROFILES of this state are added to it; one without rows takes none.
-    ended : (1, 4) LaneArray of doubles
-        ENDED of each lane.
     """
-    _watch(belt, state, stations, ended)
+    _watch(belt, state, stations, samples.ended)
+    sensing, rows, profiles = samples.sensing, samples.rows, samples.profiles
     fields, c = state.fields, belt.constants
     sensed = sensing.matrix.shape[0]
     zero = like(0.0, fields[0, f.W])
@@ -208,9 +209,9 @@ def sample(
             total = fma(sensing.matrix[s, j], fields[j, f.W], total)
         rows[k, s] = total
     speed = state.scalars[0, lf.SPEED]
-    share = lane_speed_share(belt, state.time[0], zero)
+    share = forces.lane_speed_share(belt, state.time[0], zero)
     belt_speed = share * c[0, lf.BELT_SPEED]
-    rows[k, sensed + Scalar.LOAD] = lane_load(belt, state.time[0], speed)
+    rows[k, sensed + Scalar.LOAD] = forces.lane_load(belt, state.time[0], speed)
     rows[k, sensed + Scalar.DRIVEN_SPEED] = speed
     rows[k, sensed + Scalar.DRIVEN_POSITION] = state.scalars[0, lf.POSITION]
     element_stiffness, ring_stiffness = c[0, lf.ELEMENT_STIFFNESS], c[0, lf.RING_STIFFNESS]
@@ -220,19 +221,19 @@ def sample(
         middle = sensing.middles[strand]
         rows[k, sensed + Scalar.RING_TENSION_T1 + strand] = ring_stiffness * stations[middle, lf.EPS_1]
         rows[k, sensed + Scalar.PUSH_FORCE_T1 + strand] = maximum(
-            -element_stiffness * pressed_strain(belt, state, stations, middle), 0.0
+            -element_stiffness * forces.pressed_strain(belt, state, stations, middle), 0.0
         )
         for j in range(sensing.starts[strand], sensing.stops[strand]):
             net = ring_stiffness * stations[j, lf.EPS_1]
-            pressed = minimum(pressed_strain(belt, state, stations, j), 0.0)
+            pressed = minimum(forces.pressed_strain(belt, state, stations, j), 0.0)
             net = fma(element_stiffness, pressed, net)
             least = minimum(net, least)
     rows[k, sensed + Scalar.LEAST_STRAND_FORCE] = least - centrifugal
-    driving_speed = like(c[0, lf.DRIVING_SPEED], speed) * lane_speed_share(belt, state.time[0], speed)
+    driving_speed = like(c[0, lf.DRIVING_SPEED], speed) * forces.lane_speed_share(belt, state.time[0], speed)
     rows[k, sensed + Scalar.DRIVING_SPEED] = driving_speed + state.scalars[0, f.FIRST_STATE + f.EXCESS]
     shift = state.scalars[0, f.FIRST_STATE + f.SHIFT]
     rows[k, sensed + Scalar.DRIVING_POSITION] = like(c[0, lf.DRIVING_POSITION], speed) + shift
-    turnings, surfaces = lane_pulleys(belt, share, state.scalars)
+    turnings, surfaces = forces.lane_pulleys(belt, share, state.scalars)
     axial = zero
     for wrap in range(2):
         contact, places = state.contacts[1] if wrap else state.contacts[0], belt.places[wrap][0]
@@ -254,7 +255,7 @@ def sample(
         rows[k, sensed + Scalar.OPEN_SHARE_DRIVING + wrap] = open_length / length
         rows[k, sensed + Scalar.TILT_DRIVING + wrap] = opening_by_tilt(state, wrap)
     audit(belt, state, stations, axial, sensing.interval, rows, k, sensed + len(SCALARS), profiles)
-    rows[k, sensed + STEP_RIPPLE] = step_ripple(belt, state, stations)
+    rows[k, sensed + STEP_RIPPLE] = forces.step_ripple(belt, state, stations)
     for j in range(profiles.rows):
         add(profiles, j, CONTACT_FORCE, stations[j, lf.FORCE])
         add(profiles, j, MEAN_DISPLACEMENT, fields[j, f.W])
@@ -275,7 +276,7 @@ def _watch(belt: LaneBelt, state: LaneState, stations: LaneArray, ended: LaneArr
     speed, c = state.scalars[0, lf.SPEED], belt.constants
     total = fma(speed, 0.0, fma(state.scalars[0, lf.POSITION], 0.0, like(content, speed)))
     nominal = like(c[0, lf.DRIVING_SPEED] / c[0, lf.RATIO], speed)
-    nominal = nominal * lane_speed_share(belt, state.time[0], speed)
+    nominal = nominal * forces.lane_speed_share(belt, state.time[0], speed)
     nominal = nominal + state.scalars[0, f.FIRST_STATE + f.EXCESS] / like(c[0, lf.RATIO], speed)
     code = like(Outcome.OK.value, speed)
     beyond = maximum(like(element_strain, speed) - LARGEST_ELEMENT_STRAIN, 0.0)

@@ -41,10 +41,7 @@ REACH = {
 }
 # With a column that bears a moment, which knows strains and turning of the cells around, and by the path's
 # curvature, which turns motion along the belt into motion across it, and back
-OF_COLUMN = {
-    f.U: {f.N_ELEMENT: (-2, 1)},
-    f.V_ELEMENT: {f.W: (-2, 2)},
-}
+OF_COLUMN = {f.U: {f.N_ELEMENT: (-2, 1)}, f.V_ELEMENT: {f.W: (-2, 2)}}
 OF_CURVATURE = {f.U: {f.V_RING: (0, 0)}, f.V_RING: {f.U: (0, 0)}}
 # A station's flank forces and filtered speed: beyond the above they depend on the driven pulley,
 # and where the belt enters its filtered speed is that of sliding there

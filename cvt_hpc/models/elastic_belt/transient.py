@@ -6,12 +6,11 @@ from collections.abc import Mapping, Sequence
 from typing import Any
 
 from cvt_hpc.models.elastic_belt import OWN_STEPPERS
-from cvt_hpc.models.elastic_belt.batch import Batch, LaneRun
+from cvt_hpc.models.elastic_belt.batch import Batch
 from cvt_hpc.models.elastic_belt.sampling import CHANNELS
 from cvt_hpc.models.marched import BatchOfOne, batches_of_one
-from cvt_hpc.variables import Status
 
-__all__ = ["CHANNELS", "TAKES_OVER", "Transient", "batch"]
+__all__ = ["CHANNELS", "TAKES_OVER", "batch"]
 
 TAKES_OVER = True  # runs continue from the state of others
 
@@ -40,34 +39,3 @@ def batch(
     from cvt_hpc.models.elastic_belt.general_run import GeneralTransient
 
     return batches_of_one(GeneralTransient)(points, stepper, paused)
-
-
-class Transient(LaneRun):
-    """One run, alone in a batch of its own; attributes as of `LaneRun`.
-
-    Parameters
-    ----------
-    parameters : dict
-        Resolved parameters of the run [SI].
-    stepper : str
-        "imex" or "explicit".
-    """
-
-    def __init__(self, parameters: Mapping[str, Any], stepper: str) -> None:
-        super().__init__(Batch([parameters], stepper), 0)
-
-    def advance(self, samples: int) -> tuple[Status, str] | None:
-        """March on.
-
-        Parameters
-        ----------
-        samples : int
-            How many samples at most.
-
-        Returns
-        -------
-        (Status, str) or None
-            The failure, where the run cannot continue.
-        """
-        self.batch.advance(samples)
-        return self.failure

@@ -6,11 +6,7 @@ from collections.abc import Mapping
 from typing import Any
 
 from cvt_hpc.models.elastic_belt.belt import Mesh
-from cvt_hpc.models.elastic_belt.sampling import (
-    LARGEST_ELEMENT_STRAIN,
-    LARGEST_STRAIN,
-    Outcome,
-)
+from cvt_hpc.models.elastic_belt.sampling import LARGEST_ELEMENT_STRAIN, LARGEST_STRAIN, Outcome
 from cvt_hpc.variables import Status
 from cvt_hpc.variator import LARGEST_DISPLACEMENT
 from cvt_hpc.variator.slip import GAINED, LOST

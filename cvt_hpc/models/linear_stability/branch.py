@@ -66,16 +66,20 @@ class Onset(NamedTuple):
     ----------
     load : float
         [N m]
-    mode : Mode
-        The one that neither grows nor decays there.
+    frequency : float
+        Of the mode that neither grows nor decays there [Hz].
+    strand, half_waves : int
+        The strand that moves most in that mode, 0 or 1, and half waves along it.
     rising : bool
-        Whether it grows above that load, or else below.
+        Whether the mode grows above that load, or else below.
     others : int
         Number of other modes that grow there: where there are none, stability is lost or regained.
     """
 
     load: float
-    mode: Mode
+    frequency: float
+    strand: int
+    half_waves: int
     rising: bool
     others: int
 
@@ -197,7 +201,11 @@ def _onsets(
     load = 0.5 * (low + high)
     if is_close:
         others = sum(len(grown) == 2 for grown in growing)
-        return [Onset(load, growing[k][0], growing[k][0] is pairs[k][1], others) for k in crossing]
+        grown = [(growing[k][0], growing[k][0] is pairs[k][1]) for k in crossing]
+        return [
+            Onset(load, float(mode.frequency), int(mode.strand), int(mode.half_waves), rising, others)
+            for mode, rising in grown
+        ]
     steady = belt.at(load, before.steady)
     middle = Point(steady, modes(steady, grid, band))
     return [*_onsets(belt, grid, before, middle, band), *_onsets(belt, grid, middle, after, band)]

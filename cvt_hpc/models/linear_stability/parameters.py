@@ -22,7 +22,7 @@ PARAMETERS: dict[str, dict[str, Parameter]] = steady_variator.PARAMETERS | {
             "growth or decay of the fastest growing mode up to which nothing is decided",
             sensible=(0.001, 100000.0),
         ),
-    },
+    }
 }
 
 

@@ -11,25 +11,23 @@ from cvt_hpc.models.steady_variator import record as steady_record
 from cvt_hpc.variables import Coordinate, Status, Variable, Vibrates
 
 VARIABLES = (
-    Variable("growth_rate", (), "f8", "s-1", "of the mode that grows fastest; none found: nan"),
-    Variable("frequency", (), "f8", "Hz", "of the mode that grows fastest"),
+    Variable("growth_rate", "s-1", "of the mode that grows fastest; none found: nan"),
+    Variable("frequency", "Hz", "of the mode that grows fastest"),
     Variable(
         "vibrating_strand",
-        (),
-        "i1",
         "1",
         "strand in which the mode that grows fastest is largest: 1 is t1, 2 is t2; 0: no mode",
+        dtype="i1",
     ),
     Variable(
-        "mode", (), "i1", "1", "of that mode along its vibrating strand; 0: no mode", words="half waves"
+        "mode", "1", "of that mode along its vibrating strand; 0: no mode", dtype="i1", words="half waves"
     ),
-    Variable("relative_amplitude", ("region",), "f8", "1", "largest displacement of that mode by region"),
+    Variable("relative_amplitude", "1", "largest displacement of that mode by region", dims=("region",)),
     Variable(
         "fed",
-        ("region",),
-        "f8",
         "s-1",
         "part of the growth rate of that mode that friction in each region adds",
+        dims=("region",),
         words="feed by friction",
     ),
     *steady_record.VARIABLES,

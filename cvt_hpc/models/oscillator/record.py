@@ -32,24 +32,20 @@ class Sticks(IntEnum):
 
 VARIABLES = (
     *(replace(variable, dims=()) for variable in assessment.VARIABLES),
-    Variable("sticks", (), "i1", "", "whether the mass sticks to the belt in the judged part", Sticks),
-    Variable("stuck_share", (), "f8", "1", "share of the samples at which the mass sticks, in whole cycles"),
-    Variable("half_stroke", (), "f8", "m", "half of the way between the extremes of the judged part"),
-    Variable("cycles", (), "i8", "1", "whole cycles in the judged part; 0 of a motion too small for any"),
-    Variable("friction_work", (), "f8", "J", "work of friction on the mass, mean of a cycle"),
-    Variable("damping_loss", (), "f8", "J", "energy that the damper takes, mean of a cycle"),
     Variable(
-        "energy_residual",
-        (),
-        "f8",
-        "1",
-        "work that the balance of these cycles leaves open, over the work converted",
+        "sticks", "", "whether the mass sticks to the belt in the judged part", dtype="i1", flags=Sticks
     ),
-    Variable("steady_displacement", (), "f8", "m", "displacement in steady sliding"),
+    Variable("stuck_share", "1", "share of the samples at which the mass sticks, in whole cycles"),
+    Variable("half_stroke", "m", "half of the way between the extremes of the judged part"),
+    Variable("cycles", "1", "whole cycles in the judged part; 0 of a motion too small for any", dtype="i8"),
+    Variable("friction_work", "J", "work of friction on the mass, mean of a cycle"),
+    Variable("damping_loss", "J", "energy that the damper takes, mean of a cycle"),
     Variable(
-        "linear_growth_rate", (), "f8", "s-1", "growth rate of small motions about steady sliding, exact"
+        "energy_residual", "1", "work that the balance of these cycles leaves open, over the work converted"
     ),
-    Variable("linear_frequency", (), "f8", "Hz", "frequency of small motions about steady sliding, exact"),
+    Variable("steady_displacement", "m", "displacement in steady sliding"),
+    Variable("linear_growth_rate", "s-1", "growth rate of small motions about steady sliding, exact"),
+    Variable("linear_frequency", "Hz", "frequency of small motions about steady sliding, exact"),
 )
 
 

@@ -12,7 +12,10 @@ from cvt_hpc.models.pushbelt.friction import flank_friction, ring_friction
 from cvt_hpc.physics.contact_laws import pressed
 from cvt_hpc.solvers.linked_blocks import field_of_right
 
-RIGHT = field_of_right(4)
+# Fields of a row of blocks at which right sides begin: the residual, then by the border's unknowns
+RIGHT = field_of_right(f.UNKNOWNS)
+RIGHT_SPEED = RIGHT + f.UNKNOWNS
+RIGHT_OPENINGS = RIGHT_SPEED + f.UNKNOWNS
 
 
 @kernel
@@ -80,10 +83,8 @@ def element_forces(belt, state, pulleys, increments, openings, shapes, step, ite
         r_y, r_z, r_lever = step[j, f.R_Y], step[j, f.R_Z], step[j, f.R_LEVER]
         deep = step[j, f.PREDICTED_DEPTH] - dt * belt.sine * (r_y * dy + r_z * dz + r_lever * dw)
         for k in range(modes):
-            driving, driven_one = (
-                openings[0, k] + increments[1 + k],
-                openings[1, k] + increments[1 + modes + k],
-            )
+            driving = openings[0, k] + increments[1 + k]
+            driven_one = openings[1, k] + increments[1 + modes + k]
             deep = deep - belt.cosine * of_pulley(driving, driven_one, driven) * shapes[j, k]
         normal, stiff = pressed(-deep, belt.flank_stiffness)
         iterate[j, f.DEPTH_REACHED] = deep
@@ -123,7 +124,7 @@ def element_forces(belt, state, pulleys, increments, openings, shapes, step, ite
 
 
 @kernel
-def residuals(belt, state, pulleys, increments, openings, shapes, load, step, iterate, scratch, border, dt):
+def residuals(belt, state, increments, openings, shapes, load, step, iterate, scratch, border, dt):
     """Residuals of all equations: of elements in `iterate`, of the border in the last column of `border`.
 
     Returns
@@ -148,11 +149,9 @@ def residuals(belt, state, pulleys, increments, openings, shapes, load, step, it
         f_w, f_v = -per_dt * belt.inertia * dw, -per_dt * belt.ring_mass * dv
 
         tension = iterate[j, f.ITERATE_TENSION]
-        f_y, f_z, f_v = (
-            f_y + tension * step[j, f.TENSION_I_Y],
-            f_z + tension * step[j, f.TENSION_I_Z],
-            f_v + tension,
-        )
+        f_y += tension * step[j, f.TENSION_I_Y]
+        f_z += tension * step[j, f.TENSION_I_Z]
+        f_v += tension
         moment = iterate[j, f.MOMENT_I] * step[j, f.ANGLE_I]
         both = moment + iterate[j, f.MOMENT_J] * step[j, f.ANGLE_J]
         f_y, f_z, f_w = f_y - both * step[j, f.TURN_Y], f_z - both * step[j, f.TURN_Z], f_w - moment
@@ -198,6 +197,14 @@ def residuals(belt, state, pulleys, increments, openings, shapes, load, step, it
     return border_residuals(belt, increments, openings, load, torque, power, scratch, border, dt)
 
 
+@register_jitable
+def _store_opening(blocks, j, first, weight, forces):
+    """Set the right side of an opening."""
+    f_y, f_z, f_w = forces
+    blocks[j, first + f.ROW_Y], blocks[j, first + f.ROW_Z] = f_y * weight, f_z * weight
+    blocks[j, first + f.ROW_W], blocks[j, first + f.ROW_V] = f_w * weight, 0.0
+
+
 @kernel
 def assemble(belt, state, shapes, step, iterate, blocks):
     """Blocks and right sides of the elements' equations: the corrections that take the residuals to zero.
@@ -211,27 +218,19 @@ def assemble(belt, state, shapes, step, iterate, blocks):
         k, ki, kj = iterate[j, f.STIFF], iterate[j, f.STIFF_I], iterate[j, f.STIFF_J]
         yy, yz, zz = k * x_y * x_y, k * x_y * x_z, k * x_z * x_z
         yw, zw, ww = -ki * x_y, -ki * x_z, iterate[j, f.STIFF_II]
-        blocks[j, f.LINKED + f.YY], blocks[j, f.LINKED + f.ZY], blocks[j, f.LINKED + f.WY] = (
-            step[j, f.LINK + f.YY] - yy,
-            step[j, f.LINK + f.ZY] - yz,
-            step[j, f.LINK + f.WY] - yw,
-        )
+        blocks[j, f.LINKED + f.YY] = step[j, f.LINK + f.YY] - yy
+        blocks[j, f.LINKED + f.ZY] = step[j, f.LINK + f.ZY] - yz
+        blocks[j, f.LINKED + f.WY] = step[j, f.LINK + f.WY] - yw
         blocks[j, f.LINKED + f.VY] = step[j, f.LINK + f.VY]
-        blocks[j, f.LINKED + f.YZ], blocks[j, f.LINKED + f.ZZ], blocks[j, f.LINKED + f.WZ] = (
-            step[j, f.LINK + f.YZ] - yz,
-            step[j, f.LINK + f.ZZ] - zz,
-            step[j, f.LINK + f.WZ] - zw,
-        )
+        blocks[j, f.LINKED + f.YZ] = step[j, f.LINK + f.YZ] - yz
+        blocks[j, f.LINKED + f.ZZ] = step[j, f.LINK + f.ZZ] - zz
+        blocks[j, f.LINKED + f.WZ] = step[j, f.LINK + f.WZ] - zw
         blocks[j, f.LINKED + f.VZ] = step[j, f.LINK + f.VZ]
-        blocks[j, f.LINKED + f.YW], blocks[j, f.LINKED + f.ZW] = (
-            step[j, f.LINK + f.YW] - kj * x_y,
-            step[j, f.LINK + f.ZW] - kj * x_z,
-        )
+        blocks[j, f.LINKED + f.YW] = step[j, f.LINK + f.YW] - kj * x_y
+        blocks[j, f.LINKED + f.ZW] = step[j, f.LINK + f.ZW] - kj * x_z
         blocks[j, f.LINKED + f.WW], blocks[j, f.LINKED + f.VW] = iterate[j, f.STIFF_IJ], 0.0
-        blocks[j, f.LINKED + f.YV], blocks[j, f.LINKED + f.ZV] = (
-            step[j, f.LINK + f.YV],
-            step[j, f.LINK + f.ZV],
-        )
+        blocks[j, f.LINKED + f.YV] = step[j, f.LINK + f.YV]
+        blocks[j, f.LINKED + f.ZV] = step[j, f.LINK + f.ZV]
         blocks[j, f.LINKED + f.WV], blocks[j, f.LINKED + f.VV] = 0.0, step[j, f.LINK + f.VV]
 
         x_y, x_z = state[j, f.HEADING_Y], state[j, f.HEADING_Z]
@@ -257,34 +256,25 @@ def assemble(belt, state, shapes, step, iterate, blocks):
         blocks[j, f.WW] = step[j, f.DIAGONAL + f.WW] + ww + r_w * a + t_w * b
         yv, zv = step[j, f.DIAGONAL + f.VY] - k * t_y, step[j, f.DIAGONAL + f.VZ] - k * t_z
         blocks[j, f.VY], blocks[j, f.VZ], blocks[j, f.VW] = yv, zv, 0.0
-        blocks[j, f.YV], blocks[j, f.ZV], blocks[j, f.WV], blocks[j, f.VV] = (
-            yv,
-            zv,
-            0.0,
-            step[j, f.DIAGONAL + f.VV] + k,
-        )
+        blocks[j, f.YV] = yv
+        blocks[j, f.ZV] = zv
+        blocks[j, f.WV] = 0.0
+        blocks[j, f.VV] = step[j, f.DIAGONAL + f.VV] + k
 
         for field in range(4):
             blocks[j, RIGHT + field] = iterate[j, f.RESIDUAL + field]
         a, b = iterate[j, f.DRIVEN_R], iterate[j, f.DRIVEN_T]
-        blocks[j, RIGHT + f.UNKNOWNS + f.ROW_Y], blocks[j, RIGHT + f.UNKNOWNS + f.ROW_Z] = (
-            r_z * b - r_y * a,
-            -(r_z * a + r_y * b),
-        )
-        blocks[j, RIGHT + f.UNKNOWNS + f.ROW_W], blocks[j, RIGHT + f.UNKNOWNS + f.ROW_V] = (
-            -(r_w * a + t_w * b),
-            0.0,
-        )
+        blocks[j, RIGHT_SPEED + f.ROW_Y] = r_z * b - r_y * a
+        blocks[j, RIGHT_SPEED + f.ROW_Z] = -(r_z * a + r_y * b)
+        blocks[j, RIGHT_SPEED + f.ROW_W] = -(r_w * a + t_w * b)
+        blocks[j, RIGHT_SPEED + f.ROW_V] = 0.0
         a, b = iterate[j, f.OPENING_R], iterate[j, f.OPENING_T]
         f_y, f_z, f_w = r_y * a - r_z * b, r_z * a + r_y * b, r_w * a + t_w * b
         driven = state[j, f.DRIVEN]
         for m in range(modes):
             one, other = (1.0 - driven) * shapes[j, m], driven * shapes[j, m]
-            first, second = RIGHT + 8 + 4 * m, RIGHT + 8 + 4 * (modes + m)
-            blocks[j, first], blocks[j, first + 1] = f_y * one, f_z * one
-            blocks[j, first + 2], blocks[j, first + 3] = f_w * one, 0.0
-            blocks[j, second], blocks[j, second + 1] = f_y * other, f_z * other
-            blocks[j, second + 2], blocks[j, second + 3] = f_w * other, 0.0
+            _store_opening(blocks, j, RIGHT_OPENINGS + f.UNKNOWNS * m, one, (f_y, f_z, f_w))
+            _store_opening(blocks, j, RIGHT_OPENINGS + f.UNKNOWNS * (modes + m), other, (f_y, f_z, f_w))
 
 
 @register_jitable
@@ -299,7 +289,8 @@ def _add_to_border(belt, sums, row, slopes, by_opening, driven, shapes, blocks, 
         sums[0, first + 2 + modes + m] += driven * by_opening * shapes[j, m]
     for column in range(width):
         at = RIGHT + f.UNKNOWNS * column
-        sums[0, first + column] -= a * blocks[j, at] + b * blocks[j, at + 1] + c * blocks[j, at + 2]
+        y, z = blocks[j, at + f.ROW_Y], blocks[j, at + f.ROW_Z]
+        sums[0, first + column] -= a * y + b * z + c * blocks[j, at + f.ROW_W]
 
 
 @kernel

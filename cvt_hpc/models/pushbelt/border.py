@@ -34,6 +34,13 @@ def set_shapes(belt, c, s, shapes, j):
             shapes[j, k] = 1.0
 
 
+@register_jitable
+def add_to_totals(state, scratch, total, share):
+    """Add what each part of the ring has to one of the totals."""
+    scratch[0, 0] = around(share)
+    state.totals[total] += scratch.data[0, 0, 0]
+
+
 @kernel
 def border_residuals(belt, increments, openings, load, torque, power, scratch, border, dt):
     """Set the last column of `border`; return the power residual of the belt [W].

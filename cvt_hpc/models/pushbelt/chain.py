@@ -120,10 +120,8 @@ def link(belt, state, step, dt):
         per_length = 1.0 / sqrt(e_y * e_y + e_z * e_z)
         e_y, e_z = e_y * per_length, e_z * per_length
         step[j, f.TENSION_I_Y], step[j, f.TENSION_I_Z] = e_y - step[j, f.T_Y], e_z - step[j, f.T_Z]
-        step[j, f.TENSION_J_Y], step[j, f.TENSION_J_Z] = (
-            e_y - ahead(step, j, f.T_Y),
-            e_z - ahead(step, j, f.T_Z),
-        )
+        step[j, f.TENSION_J_Y] = e_y - ahead(step, j, f.T_Y)
+        step[j, f.TENSION_J_Z] = e_z - ahead(step, j, f.T_Z)
         f_y, f_z = sj[0] - si[0], sj[1] - si[1]
         length = sqrt(f_y * f_y + f_z * f_z)
         per_unstretched = 1.0 / (
@@ -134,12 +132,10 @@ def link(belt, state, step, dt):
 
         turn_y, turn_z = -e_z * per_length, e_y * per_length
         angle_i, angle_j = e_y * xi[0] + e_z * xi[1], e_y * xj[0] + e_z * xj[1]
-        step[j, f.TURN_Y], step[j, f.TURN_Z], step[j, f.ANGLE_I], step[j, f.ANGLE_J] = (
-            turn_y,
-            turn_z,
-            angle_i,
-            angle_j,
-        )
+        step[j, f.TURN_Y] = turn_y
+        step[j, f.TURN_Z] = turn_z
+        step[j, f.ANGLE_I] = angle_i
+        step[j, f.ANGLE_J] = angle_j
         per_length = 1.0 / length
         f_y, f_z = f_y * per_length, f_z * per_length
         turn = turn_y * (ahead(state, j, f.U_Y) - state[j, f.U_Y]) + turn_z * (
@@ -181,33 +177,25 @@ def linear_blocks(belt, step, dt):
         yy, yz, zz, vv = yy + k * a * a, yz + k * a * b, zz + k * b * b, vv + k
         yv, zv = k * a, k * b
         p, q = step[j, f.TURN_Y], step[j, f.TURN_Z]
-        ii, jj = (
-            steep * step[j, f.ANGLE_I] * step[j, f.ANGLE_I],
-            steep * step[j, f.ANGLE_J] * step[j, f.ANGLE_J],
-        )
+        ii = steep * step[j, f.ANGLE_I] * step[j, f.ANGLE_I]
+        jj = steep * step[j, f.ANGLE_J] * step[j, f.ANGLE_J]
         both = ii + jj
         yy, yz, zz, ww = yy + both * p * p, yz + both * p * q, zz + both * q * q, ww + ii
         yw, zw = ii * p, ii * q
 
-        step[j, f.LINK + f.YY], step[j, f.LINK + f.ZY] = (
-            -(k * a * c + both * p * p),
-            -(k * b * c + both * p * q),
-        )
+        step[j, f.LINK + f.YY] = -(k * a * c + both * p * p)
+        step[j, f.LINK + f.ZY] = -(k * b * c + both * p * q)
         step[j, f.LINK + f.WY], step[j, f.LINK + f.VY] = -ii * p, -k * c
-        step[j, f.LINK + f.YZ], step[j, f.LINK + f.ZZ] = (
-            -(k * a * d + both * p * q),
-            -(k * b * d + both * q * q),
-        )
+        step[j, f.LINK + f.YZ] = -(k * a * d + both * p * q)
+        step[j, f.LINK + f.ZZ] = -(k * b * d + both * q * q)
         step[j, f.LINK + f.WZ], step[j, f.LINK + f.VZ] = -ii * q, -k * d
         step[j, f.LINK + f.YW], step[j, f.LINK + f.ZW] = jj * p, jj * q
         step[j, f.LINK + f.YV], step[j, f.LINK + f.ZV], step[j, f.LINK + f.VV] = -k * a, -k * b, -k
 
         # the segment behind, of which it is j
-        k, c, d = (
-            behind(step, j, f.TENSION_SLOPE),
-            behind(step, j, f.TENSION_J_Y),
-            behind(step, j, f.TENSION_J_Z),
-        )
+        k = behind(step, j, f.TENSION_SLOPE)
+        c = behind(step, j, f.TENSION_J_Y)
+        d = behind(step, j, f.TENSION_J_Z)
         yy, yz, zz, vv = yy + k * c * c, yz + k * c * d, zz + k * d * d, vv + k
         yv, zv = yv + k * c, zv + k * d
         p, q = behind(step, j, f.TURN_Y), behind(step, j, f.TURN_Z)

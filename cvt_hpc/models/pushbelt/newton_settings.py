@@ -9,6 +9,7 @@ along a strand take an iteration each, so that a step of 20 us may need 25.
 
 from cvt_hpc.parameters import Parameter
 from cvt_hpc.steppers.facts import Facts
+from cvt_hpc.steppers.settings import MOST_ITERATIONS, SPEED_TOLERANCE, own_step
 
 FACTS = Facts(
     order=1,
@@ -22,22 +23,8 @@ FACTS = Facts(
 )
 PARAMETERS = {
     "numerics": {
-        "step": Parameter(
-            1e-5,
-            "s",
-            "largest time step; a whole number of steps makes a sampling interval",
-            minimum=1e-8,
-            maximum=1e-3,
-            sensible=(1e-08, 0.001),
-        ),
-        "speed_tolerance": Parameter(
-            1e-3,
-            "m/s",
-            "largest correction of a speed with which the equations of a step count as solved",
-            minimum=1e-12,
-            maximum=1.0,
-            sensible=(1e-12, 0.1),
-        ),
+        "step": own_step(1e-5, 1e-8, 1e-3),
+        "speed_tolerance": SPEED_TOLERANCE,
         "power_tolerance": Parameter(
             1.0,
             "W",
@@ -46,6 +33,6 @@ PARAMETERS = {
             maximum=1e6,
             sensible=(1e-9, 1e3),
         ),
-        "most_iterations": Parameter(40, "", "iterations of a step", minimum=2, maximum=1000),
+        "most_iterations": MOST_ITERATIONS,
     }
 }

@@ -50,10 +50,8 @@ def nose_forces(belt, state, step, iterate, dt):
     stiffness, clearance = belt.nose_stiffness, belt.nose_clearance
     for j in range(step.rows):
         x_y, x_z = ahead(state, j, f.HEADING_Y), ahead(state, j, f.HEADING_Z)
-        y, z = (
-            state[j, f.CHANGE_Y] - ahead(state, j, f.CHANGE_Y),
-            state[j, f.CHANGE_Z] - ahead(state, j, f.CHANGE_Z),
-        )
+        y = state[j, f.CHANGE_Y] - ahead(state, j, f.CHANGE_Y)
+        z = state[j, f.CHANGE_Z] - ahead(state, j, f.CHANGE_Z)
         rate = x_z * y - x_y * z + step[j, f.NOSE_LEVER_I] * state[j, f.CHANGE_W]
         offset = step[j, f.NOSE_OFFSET] + dt * (rate + step[j, f.NOSE_LEVER_J] * ahead(state, j, f.CHANGE_W))
         above, k = pressed(clearance - offset, stiffness)
@@ -70,38 +68,26 @@ def add_nose_blocks(state, step, iterate, blocks):
         k, a, b = iterate[j, f.NOSE_SLOPE], step[j, f.NOSE_LEVER_I], step[j, f.NOSE_LEVER_J]
         yy, yz, zz = k * o_y * o_y, k * o_y * o_z, k * o_z * o_z
         yw, zw, ww = k * o_y * a, k * o_z * a, k * a * a
-        blocks[j, f.LINKED + f.YY], blocks[j, f.LINKED + f.ZY], blocks[j, f.LINKED + f.WY] = (
-            blocks[j, f.LINKED + f.YY] - yy,
-            blocks[j, f.LINKED + f.ZY] - yz,
-            blocks[j, f.LINKED + f.WY] - yw,
-        )
-        blocks[j, f.LINKED + f.YZ], blocks[j, f.LINKED + f.ZZ], blocks[j, f.LINKED + f.WZ] = (
-            blocks[j, f.LINKED + f.YZ] - yz,
-            blocks[j, f.LINKED + f.ZZ] - zz,
-            blocks[j, f.LINKED + f.WZ] - zw,
-        )
-        blocks[j, f.LINKED + f.YW], blocks[j, f.LINKED + f.ZW] = (
-            blocks[j, f.LINKED + f.YW] + k * o_y * b,
-            blocks[j, f.LINKED + f.ZW] + k * o_z * b,
-        )
-        blocks[j, f.LINKED + f.WW] = blocks[j, f.LINKED + f.WW] + k * a * b
+        blocks[j, f.LINKED + f.YY] -= yy
+        blocks[j, f.LINKED + f.ZY] -= yz
+        blocks[j, f.LINKED + f.WY] -= yw
+        blocks[j, f.LINKED + f.YZ] -= yz
+        blocks[j, f.LINKED + f.ZZ] -= zz
+        blocks[j, f.LINKED + f.WZ] -= zw
+        blocks[j, f.LINKED + f.YW] += k * o_y * b
+        blocks[j, f.LINKED + f.ZW] += k * o_z * b
+        blocks[j, f.LINKED + f.WW] += k * a * b
 
         o_y, o_z = state[j, f.HEADING_Z], -state[j, f.HEADING_Y]
         k, b = behind(iterate, j, f.NOSE_SLOPE), behind(step, j, f.NOSE_LEVER_J)
         yy, yz, zz = yy + k * o_y * o_y, yz + k * o_y * o_z, zz + k * o_z * o_z
         yw, zw, ww = yw - k * o_y * b, zw - k * o_z * b, ww + k * b * b
-        blocks[j, f.YY], blocks[j, f.ZY], blocks[j, f.WY] = (
-            blocks[j, f.YY] + yy,
-            blocks[j, f.ZY] + yz,
-            blocks[j, f.WY] + yw,
-        )
-        blocks[j, f.YZ], blocks[j, f.ZZ], blocks[j, f.WZ] = (
-            blocks[j, f.YZ] + yz,
-            blocks[j, f.ZZ] + zz,
-            blocks[j, f.WZ] + zw,
-        )
-        blocks[j, f.YW], blocks[j, f.ZW], blocks[j, f.WW] = (
-            blocks[j, f.YW] + yw,
-            blocks[j, f.ZW] + zw,
-            blocks[j, f.WW] + ww,
-        )
+        blocks[j, f.YY] += yy
+        blocks[j, f.ZY] += yz
+        blocks[j, f.WY] += yw
+        blocks[j, f.YZ] += yz
+        blocks[j, f.ZZ] += zz
+        blocks[j, f.WZ] += zw
+        blocks[j, f.YW] += yw
+        blocks[j, f.ZW] += zw
+        blocks[j, f.WW] += ww

@@ -18,15 +18,8 @@ from cvt_hpc.models.pushbelt.profiles import extremes, profile_inert, profile_pr
 from cvt_hpc.parameters import Parameter, Substitute, not_negative, positive
 from cvt_hpc.physics.friction_laws import FRICTION_LAWS, friction_inert, friction_problems
 from cvt_hpc.physics.geometry import driven_radius, variator, variator_problems
-from cvt_hpc.variator import PULLEYS
+from cvt_hpc.variator import PULLEYS, scene
 from cvt_hpc.variator.profiles import nested
-from cvt_hpc.variator.scene import (
-    FRICTION,
-    HALF_WEDGE_ANGLE,
-    SCENE,
-    TRANSVERSE_DAMPING,
-    course_inert,
-)
 from cvt_hpc.vibration.ramped import ramped
 
 FEWEST_ELEMENTS = 100
@@ -54,16 +47,16 @@ def path_length(parameters: Mapping[str, Any]) -> float:
 
 PARAMETERS: dict[str, dict[str, Parameter]] = {
     "scene": {
-        **{key: entry for key, entry in SCENE.items() if key not in NOT_HERE},
+        **{key: entry for key, entry in scene.SCENE.items() if key not in NOT_HERE},
         "ratio": replace(
-            SCENE["ratio"], default=1.35, description="speed ratio, driven radius / driving radius"
+            scene.SCENE["ratio"], default=1.35, description="speed ratio, driven radius / driving radius"
         ),
-        "driven_radius": replace(SCENE["driven_radius"], default=0.063896),
-        "driving_speed": replace(SCENE["driving_speed"], default=100.0 * np.pi),
-        "thrust": replace(SCENE["thrust"], default=20e3),
+        "driven_radius": replace(scene.SCENE["driven_radius"], default=0.063896),
+        "driving_speed": replace(scene.SCENE["driving_speed"], default=100.0 * np.pi),
+        "thrust": replace(scene.SCENE["thrust"], default=20e3),
         # elements stick radially until they have come round: with less, a load near the limit slips through
         "rise_time": replace(
-            SCENE["rise_time"],
+            scene.SCENE["rise_time"],
             default=0.12,
             description="start-up: thrust rises in its first half, load in its second",
         ),
@@ -137,7 +130,7 @@ PARAMETERS: dict[str, dict[str, Parameter]] = {
         "ring_friction_speed": positive(
             5e-4, "m/s", "regularisation speed of that friction", sensible=(1e-06, 5.0)
         ),
-        "transverse_damping": TRANSVERSE_DAMPING,
+        "transverse_damping": scene.TRANSVERSE_DAMPING,
         "tilt_spring": not_negative(
             3267.0,
             "N",
@@ -175,7 +168,7 @@ PARAMETERS: dict[str, dict[str, Parameter]] = {
             "axial stiffness of the elements, per length",
             sensible=(1000000.0, 100000000000000.0),
         ),
-        "half_wedge_angle": HALF_WEDGE_ANGLE,
+        "half_wedge_angle": scene.HALF_WEDGE_ANGLE,
         "inner_radius": not_negative(
             0.0, "m", "pitch radius at the inner end of the sheaves of both pulleys", sensible=(1e-3, 0.5)
         ),
@@ -199,13 +192,13 @@ PARAMETERS: dict[str, dict[str, Parameter]] = {
         ),
     },
     "friction": {
-        **{key: entry for key, entry in FRICTION.items() if key not in NO_TABLE},
+        **{key: entry for key, entry in scene.FRICTION.items() if key not in NO_TABLE},
         "friction_law": replace(
-            FRICTION["friction_law"], choices=tuple(law for law in FRICTION_LAWS if law != "table")
+            scene.FRICTION["friction_law"], choices=tuple(law for law in FRICTION_LAWS if law != "table")
         ),
-        "friction_gradient": replace(FRICTION["friction_gradient"], default=0.0),
-        "kinetic_friction": replace(FRICTION["kinetic_friction"], default=0.09),
-        "friction_speed": replace(FRICTION["friction_speed"], default=5e-4),
+        "friction_gradient": replace(scene.FRICTION["friction_gradient"], default=0.0),
+        "kinetic_friction": replace(scene.FRICTION["kinetic_friction"], default=0.09),
+        "friction_speed": replace(scene.FRICTION["friction_speed"], default=5e-4),
     },
     "record": {
         "profile_places": Parameter(
@@ -370,4 +363,4 @@ def inert(parameters: dict[str, Any]) -> dict[str, str]:
         (True, "arc_probes", "model pushbelt, which is probed on its strands"),
     )
     found = {key: setting for holds, key, setting in cases if holds}
-    return friction_inert(p | dict.fromkeys(NO_TABLE, ())) | course_inert(p) | profile_inert(p) | found
+    return friction_inert(p | dict.fromkeys(NO_TABLE, ())) | scene.course_inert(p) | profile_inert(p) | found

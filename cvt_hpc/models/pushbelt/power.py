@@ -15,12 +15,10 @@ from __future__ import annotations
 import numpy as np
 
 from cvt_hpc.kernels import kernel
-from cvt_hpc.lanes import ahead, around, like
+from cvt_hpc.lanes import ahead, like
 from cvt_hpc.models.pushbelt import fields as f
-from cvt_hpc.models.pushbelt.border import book_openings, groove_of, of_pulley
+from cvt_hpc.models.pushbelt.border import add_to_totals, book_openings, groove_of, of_pulley
 from cvt_hpc.physics.contact_laws import damped
-
-_FIRST, _COUNT = f.FLANK_LOSS, f.TILT_DAMPED + 1 - f.FLANK_LOSS  # totals that are added up here
 
 
 @kernel
@@ -33,16 +31,12 @@ def book(belt, state, work, dt):
     for j in range(step.rows):
         dy, dz = elements[j, f.CHANGE_Y], elements[j, f.CHANGE_Z]
         dw = elements[j, f.CHANGE_W]
-        next_dy, next_dz, next_dw = (
-            ahead(elements, j, f.CHANGE_Y),
-            ahead(elements, j, f.CHANGE_Z),
-            ahead(elements, j, f.CHANGE_W),
-        )
-        y, z, w = (
-            elements[j, f.U_Y] + 0.5 * dy,
-            elements[j, f.U_Z] + 0.5 * dz,
-            elements[j, f.OMEGA] + 0.5 * dw,
-        )
+        next_dy = ahead(elements, j, f.CHANGE_Y)
+        next_dz = ahead(elements, j, f.CHANGE_Z)
+        next_dw = ahead(elements, j, f.CHANGE_W)
+        y = elements[j, f.U_Y] + 0.5 * dy
+        z = elements[j, f.U_Z] + 0.5 * dz
+        w = elements[j, f.OMEGA] + 0.5 * dw
         v = elements[j, f.V] + 0.5 * elements[j, f.CHANGE_V]
         next_y, next_z = ahead(elements, j, f.U_Y) + 0.5 * next_dy, ahead(elements, j, f.U_Z) + 0.5 * next_dz
         next_w = ahead(elements, j, f.OMEGA) + 0.5 * next_dw
@@ -94,11 +88,12 @@ def book(belt, state, work, dt):
         n_y, n_z = step[j, f.NORMAL_Y], step[j, f.NORMAL_Z]
         across = n_y * y + n_z * z
         drag += belt.transverse_damping * across * (across + 0.5 * (n_y * dy + n_z * dz))
-    scratch[0, f.FLANK_LOSS - _FIRST], scratch[0, f.RING_LOSS - _FIRST] = dt * flank, dt * ring
-    scratch[0, f.DAMPING_LOSS - _FIRST], scratch[0, f.BELT_LOSS - _FIRST] = dt * tilt, dt * drag
-    scratch[0, f.ELEMENT_DAMPED - _FIRST], scratch[0, f.FLANK_DAMPED - _FIRST] = between, sheaves
-    scratch[0, f.RING_DAMPED - _FIRST], scratch[0, f.TILT_DAMPED - _FIRST] = dt * stretching, dt * turning
-    for k in range(_COUNT):
-        scratch[0, k] = around(scratch[0, k])
-        state.totals[_FIRST + k] += scratch.data[0, k, 0]
+    add_to_totals(state, scratch, f.FLANK_LOSS, dt * flank)
+    add_to_totals(state, scratch, f.RING_LOSS, dt * ring)
+    add_to_totals(state, scratch, f.DAMPING_LOSS, dt * tilt)
+    add_to_totals(state, scratch, f.BELT_LOSS, dt * drag)
+    add_to_totals(state, scratch, f.ELEMENT_DAMPED, between)
+    add_to_totals(state, scratch, f.FLANK_DAMPED, sheaves)
+    add_to_totals(state, scratch, f.RING_DAMPED, dt * stretching)
+    add_to_totals(state, scratch, f.TILT_DAMPED, dt * turning)
     book_openings(belt, state, work)

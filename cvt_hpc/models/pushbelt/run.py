@@ -290,39 +290,21 @@ class ElementRun(SampledRun):
 
 
 def given(parameters: Mapping[str, Any]) -> dict[str, Any]:
-    """Input of `start`, from flat parameters of a run [SI]."""
+    """Input of `start`: flat parameters of a run [SI], and what follows from them for each element."""
     p, length = parameters, path_length(parameters)
     pitch = length / p["elements"]
     rigid = np.isinf(p["sheave_stiffness"])
     return {
-        "ratio": p["ratio"],
-        "centre_distance": p["centre_distance"],
+        **p,
         "belt_length": length,
-        "elements": p["elements"],
         "element_mass": p["element_mass"] * pitch,
-        "element_height": p["element_height"],
         "pitch_depth": p["ring_offset"],
-        "head_height": p["head_height"],
-        "play": p["play"],
         "ring_mass": p["ring_mass"] * length,
-        "ring_stiffness": p["ring_stiffness"],
         "ring_strain": 1e-4,
-        "half_wedge_angle": p["half_wedge_angle"],
         "flank_stiffness": p["flank_stiffness"] * pitch,
         "contact_stiffness": p["edge_stiffness"] / pitch,
-        **{key: p[key] for key in ("nose_height", "nose_clearance", "nose_stiffness")},
         "angle_stiffness": p["tilt_spring"] * pitch,
         "angle_damping": p["tilt_damper"] * pitch,
-        "transverse_damping": p["transverse_damping"],
-        "friction_law": p["friction_law"],
-        "kinetic_friction": p["kinetic_friction"],
-        "friction_gradient": p["friction_gradient"],
-        "stribeck_velocity": p["stribeck_velocity"],
-        "friction_memory": p["friction_memory"],
-        "ring_friction": p["ring_friction"],
-        "friction_speed": p["friction_speed"],
-        "ring_friction_speed": p["ring_friction_speed"],
-        "driven_inertia": p["driven_inertia"],
         "driving_rate": p["sheave_rate"] if p["driving_thrust"] > 0.0 else 0.0,
         "driven_rate": p["sheave_rate"],
         "modal_stiffness": () if rigid else p["sheave_stiffness"] * np.array([p[key] for key in MODES]),

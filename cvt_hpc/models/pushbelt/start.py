@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from collections.abc import Callable, Mapping
+from collections.abc import Callable, Mapping, Sequence
 from typing import Any, NamedTuple
 
 import numpy as np
@@ -27,28 +27,10 @@ def path_of(given: Mapping[str, Any]) -> Variator:
     return variator(given["ratio"], radius, given["centre_distance"])
 
 
-def shared_constants(given: Mapping[str, Any], chord: float) -> dict[str, Any]:
-    """Constants by name that a belt has in its plane and out of it; as `belt_of`."""
+def shared_constants(given: Mapping[str, Any], chord: float, names: Sequence[str]) -> dict[str, Any]:
+    """Constants that a belt has in its plane and out of it, and what is given of `names`; as `belt_of`."""
     g, angle = given, given["half_wedge_angle"]
-    same = (
-        "centre_distance",
-        "pitch_depth",
-        "head_height",
-        "ring_stiffness",
-        "flank_stiffness",
-        "contact_stiffness",
-        "angle_stiffness",
-        "angle_damping",
-        "friction_memory",
-        "ring_friction",
-        "friction_speed",
-        "ring_friction_speed",
-        "driven_inertia",
-        "driving_rate",
-        "driven_rate",
-    )
-    return {
-        **{key: float(g[key]) for key in same},
+    found = {
         "sine": float(np.sin(angle)),
         "cosine": float(np.cos(angle)),
         "thickness": float(chord - g["play"] / g["elements"]),
@@ -61,18 +43,14 @@ def shared_constants(given: Mapping[str, Any], chord: float) -> dict[str, Any]:
         "flank_speed": float(g["stribeck_velocity"]),
         "modal_stiffness": np.array(g["modal_stiffness"], dtype=np.float64).reshape(2, -1),
     }
+    return {name: float(g[name]) for name in names if name in g and name not in found} | found
 
 
 def belt_of(given: Mapping[str, Any], chord: float) -> Belt:
     """Constants from values as `start` takes them, and the distance of neighbours [m]."""
-    g, shared = given, shared_constants(given, chord)
-    return Belt(
-        **shared,
-        inertia=float(shared["mass"] * (g["element_height"] ** 2 + shared["thickness"] ** 2) / 12.0),
-        nose_height=float(g["nose_height"]),
-        nose_clearance=float(g["nose_clearance"]),
-        nose_stiffness=float(g["nose_stiffness"]),
-    )
+    shared = shared_constants(given, chord, Belt._fields)
+    square = given["element_height"] ** 2 + shared["thickness"] ** 2
+    return Belt(**shared, inertia=float(shared["mass"] * square / 12.0))
 
 
 def equal_chords(

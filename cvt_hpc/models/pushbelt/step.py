@@ -13,14 +13,8 @@ import numpy as np
 
 from cvt_hpc.kernels import kernel
 from cvt_hpc.lanes import absolute, ahead, around, behind
+from cvt_hpc.models.pushbelt import assembly
 from cvt_hpc.models.pushbelt import fields as f
-from cvt_hpc.models.pushbelt.assembly import (
-    assemble,
-    border_sums,
-    element_forces,
-    pair_forces,
-    residuals,
-)
 from cvt_hpc.models.pushbelt.border import accept_border, close_border, set_shapes
 from cvt_hpc.models.pushbelt.chain import linear_blocks, link, predict, turned
 from cvt_hpc.models.pushbelt.friction import filtered_slip
@@ -44,32 +38,21 @@ def _prepare(belt, state, work, dt):
 @kernel
 def _evaluate(belt, state, work, load, dt):
     """Forces of the iterate, and the residuals that they leave; return the power residual [W]."""
-    elements, step, iterate = state.elements, work.step, work.iterate
+    elements, step, iterate, scratch = state.elements, work.step, work.iterate, work.scratch
     pulleys, increments, openings, shapes = state.pulleys, state.increments, state.openings, work.shapes
-    pair_forces(belt, elements, step, iterate, dt)
+    assembly.pair_forces(belt, elements, step, iterate, dt)
     if belt.nose_clearance < np.inf:
         nose_forces(belt, elements, step, iterate, dt)
-    element_forces(belt, elements, pulleys, increments, openings, shapes, step, iterate, dt)
-    return residuals(
-        belt,
-        elements,
-        pulleys,
-        increments,
-        openings,
-        shapes,
-        load,
-        step,
-        iterate,
-        work.scratch,
-        work.border,
-        dt,
+    assembly.element_forces(belt, elements, pulleys, increments, openings, shapes, step, iterate, dt)
+    return assembly.residuals(
+        belt, elements, increments, openings, shapes, load, step, iterate, scratch, work.border, dt
     )
 
 
 @kernel
 def _assemble(belt, state, work, dt):
     """The linear system of the elements."""
-    assemble(belt, state.elements, work.shapes, work.step, work.iterate, work.blocks)
+    assembly.assemble(belt, state.elements, work.shapes, work.step, work.iterate, work.blocks)
     if belt.nose_clearance < np.inf:
         add_nose_blocks(state.elements, work.step, work.iterate, work.blocks)
 
@@ -77,7 +60,8 @@ def _assemble(belt, state, work, dt):
 @kernel
 def _close(belt, state, work, dt):
     """That of the border."""
-    border_sums(belt, state.elements, work.shapes, work.step, work.iterate, work.blocks, work.sums, dt)
+    step, iterate, blocks = work.step, work.iterate, work.blocks
+    assembly.border_sums(belt, state.elements, work.shapes, step, iterate, blocks, work.sums, dt)
     close_border(belt, work.sums, work.border, dt)
 
 

@@ -15,6 +15,7 @@ from typing import NamedTuple
 import numpy as np
 
 from cvt_hpc.kernels import kernel
+from cvt_hpc.models.quasi_static_belt import fields as f
 
 
 class Chain(NamedTuple):
@@ -28,8 +29,8 @@ class Chain(NamedTuple):
         Slopes of the stresses in the cells with the speeds' differences, by layer [N s/m].
     inverse : (N, 3) array
         Of the eliminated blocks.
-    columns : (2 N, C) array
-        The right side, c R, and the two that close the ring; then the solution.
+    columns : (N, 2, C) array
+        By station and layer the right side, c R, and the two that close the ring; then the solution.
     """
 
     diagonal: np.ndarray
@@ -45,71 +46,79 @@ def chain(stations: int, coordinates: int) -> Chain:
         np.zeros((stations, 3)),
         np.zeros((2, stations)),
         np.zeros((stations, 3)),
-        np.zeros((2 * stations, width)),
+        np.zeros((stations, 2, width)),
     )
 
 
 @kernel
 def solve_chain(work: Chain) -> None:
     """Replace all columns but the last two by A^-1 times them."""
-    n, width = work.diagonal.shape[0], work.columns.shape[1]
-    x, e, inverse = work.columns, work.links, work.inverse
-    last = n - 1
+    n, width = work.diagonal.shape[0], work.columns.shape[2]
+    x, inverse, last = work.columns, work.inverse, n - 1
+    of_element, of_ring = work.links[f.ELEMENT], work.links[f.RING]
+    to_element, to_ring = width - 2, width - 1  # columns by the last station's speeds
     for j in range(last):
-        d00 = work.diagonal[j, 0] + e[0, j] + e[0, j - 1]
-        d01 = work.diagonal[j, 1]
-        d11 = work.diagonal[j, 2] + e[1, j] + e[1, j - 1]
+        d00 = work.diagonal[j, f.ELEMENT_ELEMENT] + of_element[j] + of_element[j - 1]
+        d01 = work.diagonal[j, f.ELEMENT_RING]
+        d11 = work.diagonal[j, f.RING_RING] + of_ring[j] + of_ring[j - 1]
         if j > 0:
-            d00 -= e[0, j - 1] * e[0, j - 1] * inverse[j - 1, 0]
-            d01 -= e[0, j - 1] * e[1, j - 1] * inverse[j - 1, 1]
-            d11 -= e[1, j - 1] * e[1, j - 1] * inverse[j - 1, 2]
+            d00 -= of_element[j - 1] * of_element[j - 1] * inverse[j - 1, f.ELEMENT_ELEMENT]
+            d01 -= of_element[j - 1] * of_ring[j - 1] * inverse[j - 1, f.ELEMENT_RING]
+            d11 -= of_ring[j - 1] * of_ring[j - 1] * inverse[j - 1, f.RING_RING]
         scale = 1.0 / (d00 * d11 - d01 * d01)
         i00, i01, i11 = d11 * scale, -d01 * scale, d00 * scale
-        inverse[j, 0], inverse[j, 1], inverse[j, 2] = i00, i01, i11
+        inverse[j, f.ELEMENT_ELEMENT], inverse[j, f.ELEMENT_RING], inverse[j, f.RING_RING] = i00, i01, i11
         # the last station's speeds act on the first one and on the one behind it
-        x[2 * j, width - 2] = x[2 * j + 1, width - 1] = 0.0
-        x[2 * j, width - 1] = x[2 * j + 1, width - 2] = 0.0
+        element, ring = x[j, f.ELEMENT], x[j, f.RING]
+        element[to_element] = ring[to_ring] = 0.0
+        element[to_ring] = ring[to_element] = 0.0
         if j == 0:
-            x[0, width - 2], x[1, width - 1] = e[0, last], e[1, last]
+            element[to_element], ring[to_ring] = of_element[last], of_ring[last]
         if j == last - 1:
-            x[2 * j, width - 2] += e[0, j]
-            x[2 * j + 1, width - 1] += e[1, j]
-        row_0, row_1 = x[2 * j], x[2 * j + 1]
+            element[to_element] += of_element[j]
+            ring[to_ring] += of_ring[j]
         if j > 0:
-            e0, e1 = e[0, j - 1], e[1, j - 1]
-            back_0, back_1 = x[2 * j - 2], x[2 * j - 1]
+            e0, e1 = of_element[j - 1], of_ring[j - 1]
+            back_0, back_1 = x[j - 1, f.ELEMENT], x[j - 1, f.RING]
             for k in range(width):
-                r0, r1 = row_0[k] + e0 * back_0[k], row_1[k] + e1 * back_1[k]
-                row_0[k], row_1[k] = i00 * r0 + i01 * r1, i01 * r0 + i11 * r1
+                r0, r1 = element[k] + e0 * back_0[k], ring[k] + e1 * back_1[k]
+                element[k], ring[k] = i00 * r0 + i01 * r1, i01 * r0 + i11 * r1
         else:
             for k in range(width):
-                r0, r1 = row_0[k], row_1[k]
-                row_0[k], row_1[k] = i00 * r0 + i01 * r1, i01 * r0 + i11 * r1
+                r0, r1 = element[k], ring[k]
+                element[k], ring[k] = i00 * r0 + i01 * r1, i01 * r0 + i11 * r1
     for j in range(last - 2, -1, -1):
-        e0, e1 = e[0, j], e[1, j]
-        a, b, c, d = inverse[j, 0] * e0, inverse[j, 1] * e1, inverse[j, 1] * e0, inverse[j, 2] * e1
-        row_0, row_1, next_0, next_1 = x[2 * j], x[2 * j + 1], x[2 * j + 2], x[2 * j + 3]
+        e0, e1, i01 = of_element[j], of_ring[j], inverse[j, f.ELEMENT_RING]
+        a, b = inverse[j, f.ELEMENT_ELEMENT] * e0, i01 * e1
+        c, d = i01 * e0, inverse[j, f.RING_RING] * e1
+        element, ring, next_0, next_1 = x[j, f.ELEMENT], x[j, f.RING], x[j + 1, f.ELEMENT], x[j + 1, f.RING]
         for k in range(width):
-            row_0[k] += a * next_0[k] + b * next_1[k]
-            row_1[k] += c * next_0[k] + d * next_1[k]
+            element[k] += a * next_0[k] + b * next_1[k]
+            ring[k] += c * next_0[k] + d * next_1[k]
     # the last station closes the ring
-    h0, h1, g0, g1 = e[0, last - 1], e[1, last - 1], e[0, last], e[1, last]
-    p, q = width - 2, width - 1
-    s00 = work.diagonal[last, 0] + h0 + g0 - h0 * x[2 * last - 2, p] - g0 * x[0, p]
-    s01 = work.diagonal[last, 1] - h0 * x[2 * last - 2, q] - g0 * x[0, q]
-    s11 = work.diagonal[last, 2] + h1 + g1 - h1 * x[2 * last - 1, q] - g1 * x[1, q]
+    h0, h1, g0, g1 = of_element[last - 1], of_ring[last - 1], of_element[last], of_ring[last]
+    back_0, back_1, first_0, first_1 = (
+        x[last - 1, f.ELEMENT],
+        x[last - 1, f.RING],
+        x[0, f.ELEMENT],
+        x[0, f.RING],
+    )
+    diagonal = work.diagonal[last]
+    s00 = diagonal[f.ELEMENT_ELEMENT] + h0 + g0 - h0 * back_0[to_element] - g0 * first_0[to_element]
+    s01 = diagonal[f.ELEMENT_RING] - h0 * back_0[to_ring] - g0 * first_0[to_ring]
+    s11 = diagonal[f.RING_RING] + h1 + g1 - h1 * back_1[to_ring] - g1 * first_1[to_ring]
     scale = 1.0 / (s00 * s11 - s01 * s01)
-    row_0, row_1 = x[2 * last], x[2 * last + 1]
-    for k in range(p):
-        r0 = row_0[k] + h0 * x[2 * last - 2, k] + g0 * x[0, k]
-        r1 = row_1[k] + h1 * x[2 * last - 1, k] + g1 * x[1, k]
-        row_0[k], row_1[k] = scale * (s11 * r0 - s01 * r1), scale * (s00 * r1 - s01 * r0)
+    element, ring = x[last, f.ELEMENT], x[last, f.RING]
+    for k in range(to_element):
+        r0 = element[k] + h0 * back_0[k] + g0 * first_0[k]
+        r1 = ring[k] + h1 * back_1[k] + g1 * first_1[k]
+        element[k], ring[k] = scale * (s11 * r0 - s01 * r1), scale * (s00 * r1 - s01 * r0)
     for j in range(last):
-        a0, b0, a1, b1 = x[2 * j, p], x[2 * j, q], x[2 * j + 1, p], x[2 * j + 1, q]
-        to_0, to_1 = x[2 * j], x[2 * j + 1]
-        for k in range(p):
-            to_0[k] += a0 * row_0[k] + b0 * row_1[k]
-            to_1[k] += a1 * row_0[k] + b1 * row_1[k]
+        to_0, to_1 = x[j, f.ELEMENT], x[j, f.RING]
+        a0, b0, a1, b1 = to_0[to_element], to_0[to_ring], to_1[to_element], to_1[to_ring]
+        for k in range(to_element):
+            to_0[k] += a0 * element[k] + b0 * ring[k]
+            to_1[k] += a1 * element[k] + b1 * ring[k]
 
 
 @kernel

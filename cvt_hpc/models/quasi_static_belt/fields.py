@@ -1,6 +1,14 @@
-"""Layout of the work space of stations of the split belt, by name."""
+"""Layouts of the work space of a split belt, by name."""
 
-# rows of Work.stations
+# Layers of a station, and the entries of a symmetric block of both in Chain
+ELEMENT, RING = range(2)
+LAYERS = 2
+ELEMENT_ELEMENT, ELEMENT_RING, RING_RING = range(3)
+
+# Columns of Chain: the right side, and from there on c R by coordinates
+RIGHT, BY_COORDINATE = range(2)
+
+# Rows of Work.stations
 (
     ACROSS,
     ALONG,
@@ -11,9 +19,7 @@
     TANGENTIAL_CROSS,
     RADIAL_SPEED,
     TANGENTIAL_SPEED,
-    STIFFNESS_OF_SADDLE,
     SADDLE_SPEED,
-    UNSTRESSED,
     MEETING,
     REVERSING,
     RING_REVERSING,
@@ -23,4 +29,5 @@
     HOOP_STRESS,
     ELEMENT_HOOP,
     RING_HOOP,
-) = range(21)
+) = range(19)
+STATIONS = RING_HOOP + 1

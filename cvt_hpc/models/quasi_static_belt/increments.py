@@ -15,10 +15,11 @@ from cvt_hpc.models.quasi_static_belt.split_belt import Motion, SplitBelt, Work
 
 @kernel
 def solve_increments(model: SplitBelt, moved: Motion, work: Work) -> None:
-    """Increments of the coordinates' rates into `found`, of the layers' speeds into the chain's column 0."""
+    """Increments of the coordinates' rates into `found`, of the layers' speeds into RIGHT of the chain."""
     belt, stations, shapes, size = model.belt, work.stations, model.shapes, model.shapes.shape[1]
     n, slow, matrix = belt.cell.size, model.dynamic, work.matrix
     speed = speed_share_at(belt, moved.state.scalars[f.TIME]) * belt.belt_speed
+    element, ring = size + q.ELEMENT, size + q.RING  # with the steady flow each layer has one speed
     whole = size + 2 if model.steady_flow else size
     np.dot(model.inertia, moved.p, work.row)
     for i in range(size):
@@ -31,15 +32,15 @@ def solve_increments(model: SplitBelt, moved: Motion, work: Work) -> None:
     if model.steady_flow:
         for j in range(n):
             cross, blocks = stations[q.CROSS_SLOPE, j], work.layers.diagonal
-            matrix[size, size] += blocks[j, 0]
-            matrix[size + 1, size + 1] += blocks[j, 2]
-            matrix[size, size + 1] += blocks[j, 1]
-            matrix[size + 1, size] += blocks[j, 1]
-            matrix[size, whole] += stations[q.ALONG, j]
-            matrix[size + 1, whole] += stations[q.ALONG_RING, j]
+            matrix[element, element] += blocks[j, q.ELEMENT_ELEMENT]
+            matrix[ring, ring] += blocks[j, q.RING_RING]
+            matrix[element, ring] += blocks[j, q.ELEMENT_RING]
+            matrix[ring, element] += blocks[j, q.ELEMENT_RING]
+            matrix[element, whole] += stations[q.ALONG, j]
+            matrix[ring, whole] += stations[q.ALONG_RING, j]
             for i in range(size):
-                matrix[i, size] += shapes[j, i] * cross
-                matrix[size, i] += shapes[j, i] * cross
+                matrix[i, element] += shapes[j, i] * cross
+                matrix[element, i] += shapes[j, i] * cross
     else:
         _fill_chain(model, work)
         solve_chain(work.layers)
@@ -51,65 +52,56 @@ def solve_increments(model: SplitBelt, moved: Motion, work: Work) -> None:
     np.dot(shapes, vector, work.rate[f.U])
     if model.steady_flow:
         for j in range(n):
-            columns[2 * j, 0], columns[2 * j + 1, 0] = work.found[size], work.found[size + 1]
+            columns[j, q.ELEMENT, q.RIGHT], columns[j, q.RING, q.RIGHT] = (
+                work.found[element],
+                work.found[ring],
+            )
         return
     # the solution for the right side less those for the coordinates
     closing = work.closing
     closing[:] = 0.0
-    closing[0] = 1.0
-    closing[1 : size + 1] = -work.found[:size]
-    columns[:, 0] = np.dot(columns, closing)
+    closing[q.RIGHT] = 1.0
+    closing[q.BY_COORDINATE : q.BY_COORDINATE + size] = -work.found[:size]
+    flat = columns.reshape(-1, columns.shape[2])
+    flat[:, q.RIGHT] = np.dot(flat, closing)
 
 
 @kernel
 def _fill_chain(model: SplitBelt, work: Work) -> None:
     """Right side of the layers' system, and its coupling with the coordinates."""
-    belt, stations, shapes, columns, size = (
-        model.belt,
-        work.stations,
-        model.shapes,
-        work.layers.columns,
-        model.shapes.shape[1],
-    )
+    belt, shapes, size = model.belt, model.shapes, model.shapes.shape[1]
+    stations, columns = work.stations, work.layers.columns
     n = belt.cell.size
     columns[:] = 0.0
     for j in range(n):
         a = j - 1 if j > 0 else n - 1
-        columns[2 * j, 0] = (
-            stations[q.ALONG, j] + stations[q.ELEMENT_STRESS, j] - stations[q.ELEMENT_STRESS, a]
-        )
-        columns[2 * j + 1, 0] = (
-            stations[q.ALONG_RING, j] + stations[q.RING_STRESS, j] - stations[q.RING_STRESS, a]
-        )
+        stress, ring_stress = stations[q.ELEMENT_STRESS, j], stations[q.RING_STRESS, j]
+        columns[j, q.ELEMENT, q.RIGHT] = stations[q.ALONG, j] + stress - stations[q.ELEMENT_STRESS, a]
+        columns[j, q.RING, q.RIGHT] = stations[q.ALONG_RING, j] + ring_stress - stations[q.RING_STRESS, a]
         cross = stations[q.CROSS_SLOPE, j]
         if cross != 0.0:
-            row = columns[2 * j]
+            row = columns[j, q.ELEMENT]
             for k in range(size):
-                row[1 + k] += cross * shapes[j, k]
+                row[q.BY_COORDINATE + k] += cross * shapes[j, k]
     for j in range(n):
         if belt.curvature[j] == 0.0:
             continue
         # a cell that moves outwards is stretched, and pulls at the stations at both its ends
         b, half = j + 1 if j < n - 1 else 0, 0.5 * belt.curvature[j] * belt.cell[j]
         for layer in range(2):
-            pull = half * stations[q.RING_HOOP if layer else q.ELEMENT_HOOP, j]
-            here, ahead = columns[2 * j + layer], columns[2 * b + layer]
+            pull = half * stations[q.RING_HOOP if layer == q.RING else q.ELEMENT_HOOP, j]
+            here, ahead = columns[j, layer], columns[b, layer]
             for k in range(size):
                 stretched = pull * (shapes[j, k] + shapes[b, k])
-                here[1 + k] -= stretched
-                ahead[1 + k] += stretched
+                here[q.BY_COORDINATE + k] -= stretched
+                ahead[q.BY_COORDINATE + k] += stretched
 
 
 @kernel
 def _reduce(model: SplitBelt, work: Work) -> None:
     """Add the forces at the stations and their slopes to the dense system, with the layers' remainder."""
-    belt, stations, shapes, columns, size = (
-        model.belt,
-        work.stations,
-        model.shapes,
-        work.layers.columns,
-        model.shapes.shape[1],
-    )
+    belt, shapes, size = model.belt, model.shapes, model.shapes.shape[1]
+    stations, columns = work.stations, work.layers.columns
     n, matrix = belt.cell.size, work.matrix
     whole = size + 2 if model.steady_flow else size
     row = work.row
@@ -119,10 +111,10 @@ def _reduce(model: SplitBelt, work: Work) -> None:
         for k in range(size):
             row[k] = slope * shapes[j, k]
         if not model.steady_flow and belt.touches[j] > 0.0:
-            done = columns[2 * j]
-            right -= cross * done[0]
+            done = columns[j, q.ELEMENT]
+            right -= cross * done[q.RIGHT]
             for k in range(size):
-                row[k] -= cross * done[1 + k]
+                row[k] -= cross * done[q.BY_COORDINATE + k]
             for side in range(2):
                 c = j if side == 0 else (j - 1 if j > 0 else n - 1)
                 if belt.curvature[c] == 0.0:
@@ -130,12 +122,14 @@ def _reduce(model: SplitBelt, work: Work) -> None:
                 b, half = c + 1 if c < n - 1 else 0, 0.5 * belt.curvature[c] * belt.cell[c]
                 pull_0, pull_1 = half * stations[q.ELEMENT_HOOP, c], half * stations[q.RING_HOOP, c]
                 stiff = half * (pull_0 + pull_1)
-                e0, e1, e2, e3 = columns[2 * b], columns[2 * c], columns[2 * b + 1], columns[2 * c + 1]
+                e0, e1 = columns[b, q.ELEMENT], columns[c, q.ELEMENT]
+                e2, e3 = columns[b, q.RING], columns[c, q.RING]
                 right -= half * stations[q.HOOP_STRESS, c]
-                right -= pull_0 * (e0[0] - e1[0]) + pull_1 * (e2[0] - e3[0])
+                right -= pull_0 * (e0[q.RIGHT] - e1[q.RIGHT]) + pull_1 * (e2[q.RIGHT] - e3[q.RIGHT])
                 for k in range(size):
                     row[k] += stiff * (shapes[c, k] + shapes[b, k])
-                    row[k] -= pull_0 * (e0[1 + k] - e1[1 + k]) + pull_1 * (e2[1 + k] - e3[1 + k])
+                    i = q.BY_COORDINATE + k
+                    row[k] -= pull_0 * (e0[i] - e1[i]) + pull_1 * (e2[i] - e3[i])
         for i in range(size):
             shape = shapes[j, i]
             if shape == 0.0:
@@ -152,7 +146,7 @@ def contradicts(model: SplitBelt, moved: Motion, work: Work) -> bool:
     belt, stations, columns = model.belt, work.stations, work.layers.columns
     n, found = belt.cell.size, False
     for j in range(n):
-        dv0, dv1 = columns[2 * j, 0], columns[2 * j + 1, 0]
+        dv0, dv1 = columns[j, q.ELEMENT, q.RIGHT], columns[j, q.RING, q.RIGHT]
         if moved.force[j] > 0.0:
             v_radial, v_tangential = stations[q.RADIAL_SPEED, j], stations[q.TANGENTIAL_SPEED, j]
             squared = v_radial * v_radial + v_tangential * v_tangential
@@ -168,11 +162,11 @@ def contradicts(model: SplitBelt, moved: Motion, work: Work) -> bool:
             back = abs(saddle) > belt.ring_friction_speed and saddle * (saddle + change) < 0.0
             if back and stations[q.RING_REVERSING, j] < 0.5:
                 stations[q.RING_REVERSING, j], found = 1.0, True
-        if model.steady_flow or work.layers.links[0, j] > 0.0:
+        if model.steady_flow or work.layers.links[q.ELEMENT, j] > 0.0:
             continue
         b = j + 1 if j < n - 1 else 0
         per_length = model.step / (belt.cell[j] * moved.state.fields[f.N_ELEMENT, j])
-        overlap = stations[q.ELEMENT_STRAIN_AHEAD, j] + per_length * (columns[2 * b, 0] - dv0)
+        overlap = stations[q.ELEMENT_STRAIN_AHEAD, j] + per_length * (columns[b, q.ELEMENT, q.RIGHT] - dv0)
         if overlap < -LARGEST_OVERLAP and stations[q.MEETING, j] < 0.5:
             stations[q.MEETING, j], found = 1.0, True
     return found

@@ -13,6 +13,7 @@ from cvt_hpc.kernels import kernel
 from cvt_hpc.models.elastic_belt import fields as f
 from cvt_hpc.models.elastic_belt.belt import Belt, Mesh, State
 from cvt_hpc.models.elastic_belt.rhs import contact_forces, fresh_contacts, strains
+from cvt_hpc.models.quasi_static_belt import fields as q
 from cvt_hpc.models.quasi_static_belt.basis import Basis
 from cvt_hpc.models.quasi_static_belt.coupled import Chain, chain
 from cvt_hpc.physics.compliance import Contact
@@ -83,7 +84,7 @@ class Motion(NamedTuple):
 
 
 class Work(NamedTuple):
-    """Work space: at the stations (20, N), rates (7, N), moments (N,); the layers; the dense system."""
+    """Work space: at the stations (STATIONS, N), rates (7, N), moments (N,); the layers; the dense system."""
 
     stations: np.ndarray
     rate: np.ndarray
@@ -152,7 +153,7 @@ def work_space(model: SplitBelt) -> Work:
     n, size = model.belt.cell.size, model.shapes.shape[1] + 2
     width = 8 * ((size + 1 + 7) // 8)
     return Work(
-        np.zeros((21, n)),
+        np.zeros((q.STATIONS, n)),
         np.zeros((7, n)),
         np.zeros(n),
         chain(n, model.shapes.shape[1]),

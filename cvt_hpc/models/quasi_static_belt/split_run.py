@@ -12,7 +12,7 @@ from cvt_hpc.models.elastic_belt import fields as f
 from cvt_hpc.models.elastic_belt import lane_fields as lf
 from cvt_hpc.models.elastic_belt.belt import State, belt_constants, initial_state, random_strands
 from cvt_hpc.models.elastic_belt.lane_belt import put_lane
-from cvt_hpc.models.elastic_belt.one_lane_run import OneLaneRun
+from cvt_hpc.models.elastic_belt.recorded_run import OneLaneRun
 from cvt_hpc.models.elastic_belt.sampling import Outcome
 from cvt_hpc.models.elastic_belt.validity import FAILURES
 from cvt_hpc.models.quasi_static_belt.basis import split_basis
@@ -148,7 +148,7 @@ class SplitRun(OneLaneRun):
 
     def _record(self) -> Outcome:
         """Record the present state."""
-        lane, state = self._lane, self._motion.state
+        lane, state = self._state, self._motion.state
         put_lane(lane.fields.data, lane.scalars.data, 0, self.belt, state)
         lane.time[0] = state.scalars[0]
         lane.scalars.data[0, lf.LAYER_WORK] = state.scalars[f.LAYER_WORK]
@@ -156,7 +156,7 @@ class SplitRun(OneLaneRun):
         # the layers' speeds are counted from the belt speed there: a second difference takes that out
         noted = self._noted.copy()
         noted[1:] += state.fields[2:4] - lane.fields.data[:, 2:4, 0].T
-        self._stations.data[:, lf.NOTED : lf.NOTED + 3, 0] = noted.T
+        self._stations.data[:, lf.NOTED : lf.NOTED + len(noted), 0] = noted.T
         outcome = self._sample_lane()
         self.done += int(outcome == Outcome.OK)
         return outcome

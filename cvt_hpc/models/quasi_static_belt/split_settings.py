@@ -5,8 +5,8 @@ Needs of a model: the shapes with inertia, the lagging shapes, and its stiff for
 Order 1 (the push force by backward Euler; the dynamic coordinates are a leapfrog, without numerical damping).
 """
 
-from cvt_hpc.parameters import Parameter
 from cvt_hpc.steppers.facts import Facts
+from cvt_hpc.steppers.settings import own_step
 
 FACTS = Facts(
     order=1,
@@ -20,13 +20,6 @@ FACTS = Facts(
 )
 PARAMETERS = {
     "numerics": {
-        "step": Parameter(
-            50e-6 / 3.0,
-            "s",
-            "largest time step; a whole number of steps makes a sampling interval",
-            minimum=1e-9,
-            maximum=1e-3,
-            sensible=(1e-09, 0.001),
-        ),
+        "step": own_step(50e-6 / 3.0, 1e-9, 1e-3),
     }
 }

@@ -9,18 +9,10 @@ import numpy as np
 
 from cvt_hpc.kernels import kernel
 from cvt_hpc.models.elastic_belt import fields as f
+from cvt_hpc.models.elastic_belt import rhs
 from cvt_hpc.models.elastic_belt.imex_stations import implicit_shares
 from cvt_hpc.models.elastic_belt.imex_system import CENTRED, element_stress
 from cvt_hpc.models.elastic_belt.lane_forces import LEAST_SHARE_OF_WIDTH
-from cvt_hpc.models.elastic_belt.rhs import (
-    damped_push,
-    damping_at,
-    driving_speed_at,
-    leaning,
-    ring_drag,
-    sliding_speeds,
-    speed_share_at,
-)
 from cvt_hpc.models.quasi_static_belt import fields as q
 from cvt_hpc.models.quasi_static_belt.split_belt import Motion, SplitBelt, Work
 from cvt_hpc.physics.flank import flank_shares, flank_sliding
@@ -34,9 +26,9 @@ def put_forces(model: SplitBelt, moved: Motion, work: Work) -> None:
     n, v0, v1 = belt.cell.size, fields[f.V_ELEMENT], fields[f.V_RING]
     for j in range(n):
         a, b = j - 1 if j > 0 else n - 1, j + 1 if j < n - 1 else 0
-        push_left = damped_push(belt, moved.eps[0, a], (v0[j] - v0[a]) / belt.cell[a])
-        push_right = damped_push(belt, moved.eps[0, j], (v0[b] - v0[j]) / belt.cell[j])
-        pull = belt.ring_stiffness * (moved.eps[1, j] - moved.eps[1, a])
+        push_left = rhs.damped_push(belt, moved.eps[q.ELEMENT, a], (v0[j] - v0[a]) / belt.cell[a])
+        push_right = rhs.damped_push(belt, moved.eps[q.ELEMENT, j], (v0[b] - v0[j]) / belt.cell[j])
+        pull = belt.ring_stiffness * (moved.eps[q.RING, j] - moved.eps[q.RING, a])
         pull += belt.ring_damping * ((v1[b] - v1[j]) / belt.cell[j] - (v1[j] - v1[a]) / belt.cell[a])
         dual = belt.dual[j]
         stations[q.ACROSS, j] = dual * belt.mass * work.rate[f.U, j]
@@ -52,9 +44,9 @@ def put_slopes(model: SplitBelt, moved: Motion, work: Work) -> None:
     w, u, v0, v1 = fields[f.W], fields[f.U], fields[f.V_ELEMENT], fields[f.V_RING]
     sine, cosine = np.sin(belt.half_wedge_angle), np.cos(belt.half_wedge_angle)
     per_cosine, per_width = 1.0 / cosine, 1.0 / belt.friction_speed
-    damping = damping_at(belt, state.scalars[f.TIME])
-    speed_share = speed_share_at(belt, state.scalars[f.TIME])
-    driving_speed = driving_speed_at(belt, state)
+    damping = rhs.damping_at(belt, state.scalars[f.TIME])
+    speed_share = rhs.speed_share_at(belt, state.scalars[f.TIME])
+    driving_speed = rhs.driving_speed_at(belt, state)
     blocks, links = work.layers.diagonal, work.layers.links
     for j in range(n):
         a, b = j - 1 if j > 0 else n - 1, j + 1 if j < n - 1 else 0
@@ -64,7 +56,9 @@ def put_slopes(model: SplitBelt, moved: Motion, work: Work) -> None:
         radial_slope, cross, along_slope, stiff, lever = 0.5 * damping, 0.0, 0.0, 0.0, 1.0
         tangential_slope = tangential_cross = 0.0
         if moved.force[j] > 0.0:
-            v_radial, v_tangential, _ = sliding_speeds(belt, state, j, u[j] + v0[j] * slope, driving_speed)
+            v_radial, v_tangential, _ = rhs.sliding_speeds(
+                belt, state, j, u[j] + v0[j] * slope, driving_speed
+            )
             speed, meridian = flank_sliding(v_radial, v_tangential, per_cosine)
             v_law = speed if belt.friction_memory == 0.0 else fields[f.V_FILTERED, j]
             speed = max(speed, LEAST_SHARE_OF_WIDTH * belt.friction_speed)
@@ -82,7 +76,7 @@ def put_slopes(model: SplitBelt, moved: Motion, work: Work) -> None:
             # with radial and tangential sliding, turned into slopes across and along the path
             radial = (across + excess * climb * climb) * per_cosine * per_cosine
             mixed, tangential = excess * climb * run * per_cosine, across + excess * run * run
-            upright, lean = belt.upright[j], leaning(belt, j, w[j])
+            upright, lean = belt.upright[j], rhs.leaning(belt, j, w[j])
             radial_slope += upright**2 * radial - 2.0 * upright * lean * mixed + lean**2 * tangential
             cross = upright * lean * (radial - tangential) + (upright**2 - lean**2) * mixed
             along_slope = lean**2 * radial + 2.0 * upright * lean * mixed + upright**2 * tangential
@@ -91,7 +85,7 @@ def put_slopes(model: SplitBelt, moved: Motion, work: Work) -> None:
             stations[q.RADIAL_SPEED, j], stations[q.TANGENTIAL_SPEED, j] = v_radial, v_tangential
         if belt.arc_curvature[j] > 0.0:
             lever = 1.0 + belt.ring_offset * belt.arc_curvature[j]
-            drag, saddle = ring_drag(belt, j, a, eps, v0[j], v1[j], speed_share)
+            drag, saddle = rhs.ring_drag(belt, j, a, eps, v0[j], v1[j], speed_share)
             grip, _ = saturation(saddle, 1.0 / belt.ring_friction_speed)
             if stations[q.RING_REVERSING, j] > 0.5:
                 stiff = drag / saddle
@@ -102,36 +96,38 @@ def put_slopes(model: SplitBelt, moved: Motion, work: Work) -> None:
         stations[q.RADIAL_SLOPE, j], stations[q.CROSS_SLOPE, j] = dual * radial_slope, dual * cross
         stations[q.TANGENTIAL_SLOPE, j] = dual * tangential_slope
         stations[q.TANGENTIAL_CROSS, j] = dual * tangential_cross
-        blocks[j, 0] = dual * (element + along_slope + lever * lever * stiff)
-        blocks[j, 1], blocks[j, 2] = -dual * lever * stiff, dual * (ring + stiff)
+        blocks[j, q.ELEMENT_ELEMENT] = dual * (element + along_slope + lever * lever * stiff)
+        blocks[j, q.ELEMENT_RING], blocks[j, q.RING_RING] = -dual * lever * stiff, dual * (ring + stiff)
         # the layers' stresses at the end of the step, with the speeds that it begins with, and their slopes
         length = belt.cell[j]
         lifted = 0.5 * belt.curvature[j] * length * (u[j] + u[b])
         closing = v0[b] - v0[j]
-        outflow = closing - v0[j] * (eps[0, j] - eps[0, a]) / (1.0 + eps[0, a]) + lifted
+        outflow = (
+            closing - v0[j] * (eps[q.ELEMENT, j] - eps[q.ELEMENT, a]) / (1.0 + eps[q.ELEMENT, a]) + lifted
+        )
         per_length = step / (length * fields[f.N_ELEMENT, j])
-        ahead = eps[0, j] + per_length * outflow
+        ahead = eps[q.ELEMENT, j] + per_length * outflow
         grip = belt.element_damping / length
-        stress, links[0, j] = element_stress(
+        stress, links[q.ELEMENT, j] = element_stress(
             belt.element_stiffness,
             grip,
-            eps[0, j],
+            eps[q.ELEMENT, j],
             closing,
             ahead,
             per_length,
-            links[0, j],
+            links[q.ELEMENT, j],
             stations[q.MEETING, j],
         )
         stations[q.ELEMENT_STRAIN_AHEAD, j] = ahead
         stations[q.ELEMENT_STRESS, j] = stress
-        pressed = links[0, j] > 0.0
+        pressed = links[q.ELEMENT, j] > 0.0
         stations[q.ELEMENT_HOOP, j] = belt.element_stiffness * per_length if pressed else 0.0
         # beyond its part in the explicit force across the belt
         hoop = belt.element_stiffness * (ahead if pressed else 0.0)
-        stations[q.HOOP_STRESS, j] = hoop - belt.element_stiffness * min(eps[0, j], 0.0)
+        stations[q.HOOP_STRESS, j] = hoop - belt.element_stiffness * min(eps[q.ELEMENT, j], 0.0)
         grip = belt.ring_damping / length
-        stations[q.RING_STRESS, j] = belt.ring_stiffness * eps[1, j] + grip * (v1[b] - v1[j])
+        stations[q.RING_STRESS, j] = belt.ring_stiffness * eps[q.RING, j] + grip * (v1[b] - v1[j])
         stations[q.RING_HOOP, j] = (
-            CENTRED * belt.ring_stiffness * step / (length * fields[f.N_ELEMENT + 1, j])
+            CENTRED * belt.ring_stiffness * step / (length * fields[f.N_ELEMENT + q.RING, j])
         )
-        links[1, j] = stations[q.RING_HOOP, j] + grip
+        links[q.RING, j] = stations[q.RING_HOOP, j] + grip

@@ -20,14 +20,8 @@ import numpy as np
 
 from cvt_hpc.kernels import kernel
 from cvt_hpc.models.elastic_belt import fields as f
+from cvt_hpc.models.elastic_belt import rhs
 from cvt_hpc.models.elastic_belt.one_system import driven_thrust, free_rates, pulled_by
-from cvt_hpc.models.elastic_belt.rhs import (
-    accelerations,
-    load_at,
-    sliding_speed,
-    speed_share_at,
-    transported,
-)
 from cvt_hpc.models.quasi_static_belt import fields as q
 from cvt_hpc.models.quasi_static_belt.contents import settle_contents
 from cvt_hpc.models.quasi_static_belt.increments import contradicts, solve_increments
@@ -62,7 +56,7 @@ def march(model: SplitBelt, moved: Motion, work: Work, steps: int, noted: np.nda
 @kernel
 def _step(model: SplitBelt, moved: Motion, work: Work) -> bool:
     belt, state = model.belt, moved.state
-    accelerations(belt, state, moved.force, moved.eps, work.rate, work.moments)
+    rhs.accelerations(belt, state, moved.force, moved.eps, work.rate, work.moments)
     put_forces(model, moved, work)
     for attempt in range(MOST_PASSES):
         put_slopes(model, moved, work)
@@ -80,17 +74,11 @@ def _step(model: SplitBelt, moved: Motion, work: Work) -> bool:
 def _advance(model: SplitBelt, moved: Motion, work: Work) -> None:
     """Apply the increments."""
     belt, state, stations, step = model.belt, moved.state, work.stations, model.step
-    n, fields, columns, size, slow = (
-        belt.cell.size,
-        state.fields,
-        work.layers.columns,
-        model.shapes.shape[1],
-        model.dynamic,
-    )
-    scalars, count, shapes = state.scalars, model.shapes.shape[1], model.shapes
+    n, fields, scalars, columns = belt.cell.size, state.fields, state.scalars, work.layers.columns
+    shapes, count, slow = model.shapes, model.shapes.shape[1], model.dynamic
     moment = taken = 0.0
     for j in range(n):
-        du, dv0 = work.rate[f.U, j], columns[2 * j, 0]
+        du, dv0 = work.rate[f.U, j], columns[j, q.ELEMENT, q.RIGHT]
         if moved.force[j] > 0.0:
             slopes = stations[q.TANGENTIAL_SLOPE, j] * dv0 + stations[q.TANGENTIAL_CROSS, j] * du
             distance = belt.rise[j] + belt.upright[j] * fields[f.W, j]
@@ -98,7 +86,7 @@ def _advance(model: SplitBelt, moved: Motion, work: Work) -> None:
                 moment += work.moments[j] + slopes * (belt.driven_radius + distance)
             else:
                 taken += work.moments[j] - slopes * (belt.driving_radius + distance)
-    for k in range(size):
+    for k in range(count):
         moved.p[k] += work.found[k]
     work_done = 0.0
     np.dot(model.inertia, moved.p, work.row)
@@ -108,10 +96,10 @@ def _advance(model: SplitBelt, moved: Motion, work: Work) -> None:
         for j in range(n):
             b = j + 1 if j < n - 1 else 0
             closing = fields[f.V_ELEMENT, b] - fields[f.V_ELEMENT, j]
-            change = columns[2 * b, 0] - columns[2 * j, 0]
-            grip, eps = belt.element_damping / belt.cell[j], moved.eps[0, j]
+            change = columns[b, q.ELEMENT, q.RIGHT] - columns[j, q.ELEMENT, q.RIGHT]
+            grip, eps = belt.element_damping / belt.cell[j], moved.eps[q.ELEMENT, j]
             damped = 0.0
-            if work.layers.links[0, j] > 0.0:
+            if work.layers.links[q.ELEMENT, j] > 0.0:
                 damped = grip * (closing + change)
                 if eps > 0.0:
                     damped = min(belt.element_stiffness * eps + damped, 0.0)
@@ -119,11 +107,11 @@ def _advance(model: SplitBelt, moved: Motion, work: Work) -> None:
                     damped = -belt.element_stiffness * min(eps, 0.0)
             work_done += damped * (closing + 0.5 * change)
             closing = fields[f.V_RING, b] - fields[f.V_RING, j]
-            change = columns[2 * b + 1, 0] - columns[2 * j + 1, 0]
+            change = columns[b, q.RING, q.RIGHT] - columns[j, q.RING, q.RIGHT]
             work_done += belt.ring_damping / belt.cell[j] * (closing + change) * (closing + 0.5 * change)
     for j in range(n):
-        fields[f.V_ELEMENT, j] += columns[2 * j, 0]
-        fields[f.V_RING, j] += columns[2 * j + 1, 0]
+        fields[f.V_ELEMENT, j] += columns[j, q.ELEMENT, q.RIGHT]
+        fields[f.V_RING, j] += columns[j, q.RING, q.RIGHT]
     if not model.steady_flow:
         for layer in range(2):
             v, eps = fields[f.V_ELEMENT + layer], moved.eps[layer]
@@ -135,7 +123,7 @@ def _advance(model: SplitBelt, moved: Motion, work: Work) -> None:
                 inflow = outflow
     for k in range(count):
         moved.q[k] += step * moved.p[k]
-    belt_speed = speed_share_at(belt, scalars[f.TIME]) * belt.belt_speed
+    belt_speed = rhs.speed_share_at(belt, scalars[f.TIME]) * belt.belt_speed
     np.dot(shapes, moved.p, fields[f.U])
     np.dot(shapes, moved.q, work.rate[f.W])
     last = fields[f.V_FILTERED, n - 1]
@@ -143,10 +131,10 @@ def _advance(model: SplitBelt, moved: Motion, work: Work) -> None:
         before = last
         last = fields[f.V_FILTERED, j]
         if belt.friction_memory > 0.0 and belt.touches[j] > 0.0:
-            speed = sliding_speed(belt, state, j)
+            speed = rhs.sliding_speed(belt, state, j)
             fields[f.V_FILTERED, j] = speed
             if moved.force[j] > 0.0:
-                carried, entering = transported(belt, moved.force, j, belt_speed, speed, before)
+                carried, entering = rhs.transported(belt, moved.force, j, belt_speed, speed, before)
                 forget = 1.0 / belt.friction_memory
                 target = (carried * entering + forget * speed) / (carried + forget)
                 fields[f.V_FILTERED, j] = target + (last - target) * np.exp(-(carried + forget) * step)
@@ -163,7 +151,7 @@ def _advance(model: SplitBelt, moved: Motion, work: Work) -> None:
         scalars[f.FIRST_STATE :] += step * found[2:]
     else:
         thrust = driven_thrust(belt, moved.force) - belt.thrust
-        load = belt.ratio * load_at(belt, scalars[f.TIME])
+        load = belt.ratio * rhs.load_at(belt, scalars[f.TIME])
         scalars[f.DRIVEN_SPEED] += step * (moment - load) / belt.driven_inertia
         scalars[f.DRIVEN_POSITION] += step * thrust / belt.axial_damping
     scalars[f.LAYER_WORK] += step * work_done
@@ -174,10 +162,12 @@ def _advance(model: SplitBelt, moved: Motion, work: Work) -> None:
 def _settle(model: SplitBelt, moved: Motion, work: Work) -> float:
     """Contents by the forces at the end of the step; the power that their drag takes [W]."""
     belt, stations, blocks = model.belt, work.stations, work.layers.diagonal
-    columns, along = work.layers.columns, stations[q.ALONG : q.ALONG_RING + 1]
+    columns, along = work.layers.columns, stations[q.ALONG : q.ALONG + q.LAYERS]
     for j in range(belt.cell.size):
-        dv0, dv1, dual = columns[2 * j, 0], columns[2 * j + 1, 0], belt.dual[j]
-        rubbed = (blocks[j, 0] - dual * belt.element_mass / model.step) * dv0 + blocks[j, 1] * dv1
-        along[0, j] -= rubbed + stations[q.CROSS_SLOPE, j] * work.rate[f.U, j]
-        along[1, j] -= (blocks[j, 2] - dual * belt.ring_mass[j] / model.step) * dv1 + blocks[j, 1] * dv0
+        dv0, dv1, dual = columns[j, q.ELEMENT, q.RIGHT], columns[j, q.RING, q.RIGHT], belt.dual[j]
+        of_element = blocks[j, q.ELEMENT_ELEMENT] - dual * belt.element_mass / model.step
+        of_ring = blocks[j, q.RING_RING] - dual * belt.ring_mass[j] / model.step
+        rubbed = of_element * dv0 + blocks[j, q.ELEMENT_RING] * dv1
+        along[q.ELEMENT, j] -= rubbed + stations[q.CROSS_SLOPE, j] * work.rate[f.U, j]
+        along[q.RING, j] -= of_ring * dv1 + blocks[j, q.ELEMENT_RING] * dv0
     return settle_contents(belt, model.drag, model.share, moved.state.fields, moved.eps, along, model.step)

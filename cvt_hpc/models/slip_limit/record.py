@@ -16,14 +16,14 @@ if TYPE_CHECKING:
     from cvt_hpc.models.steady_variator.walking import Steady, SteadyBelt
 
 VARIABLES = (
-    Variable("limit_torque", (), "f8", "N m", "at the driving pulley, where the belt begins to slip grossly"),
-    Variable("limit_thrust", (), "f8", "N", "on the driven pulley, where the belt begins to slip grossly"),
-    Variable("formula_ratio", (), "f8", "1", "limit torque over that of Bullinger et al. 2005, eq. 2"),
-    Variable("limit_slip", ("pulley",), "f8", "1", "at the limit, tangential sliding over belt speed"),
-    Variable("working_torque", (), "f8", "N m", "at the driving pulley, safe by the factor"),
-    Variable("axial_force", ("pulley",), "f8", "N", "necessary thrust at the working point"),
-    Variable("thrust_ratio", (), "f8", "1", "axial force of the driving over that of the driven pulley"),
-    Variable("slip", ("pulley",), "f8", "1", "at the working point, tangential sliding over belt speed"),
+    Variable("limit_torque", "N m", "at the driving pulley, where the belt begins to slip grossly"),
+    Variable("limit_thrust", "N", "on the driven pulley, where the belt begins to slip grossly"),
+    Variable("formula_ratio", "1", "limit torque over that of Bullinger et al. 2005, eq. 2"),
+    Variable("limit_slip", "1", "at the limit, tangential sliding over belt speed", dims=("pulley",)),
+    Variable("working_torque", "N m", "at the driving pulley, safe by the factor"),
+    Variable("axial_force", "N", "necessary thrust at the working point", dims=("pulley",)),
+    Variable("thrust_ratio", "1", "axial force of the driving over that of the driven pulley"),
+    Variable("slip", "1", "at the working point, tangential sliding over belt speed", dims=("pulley",)),
     *shared("flank_loss", "driving_power", "load_power", "ring_loss", "belt_loss"),
     *shared("layer_loss", "seating_loss", "loss", "efficiency", "power_residual"),
 )

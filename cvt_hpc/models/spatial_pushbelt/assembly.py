@@ -13,64 +13,58 @@ from cvt_hpc.kernels import kernel
 from cvt_hpc.lanes import behind, fma, like
 from cvt_hpc.models.pushbelt.border import border_residuals
 from cvt_hpc.models.spatial_pushbelt import fields as f
+from cvt_hpc.models.spatial_pushbelt import vectors as vec
 from cvt_hpc.models.spatial_pushbelt.bending import BETA, bending_slopes
-from cvt_hpc.models.spatial_pushbelt.rotations import (
-    dot,
-    joined,
-    matrix,
-    minus,
-    moved,
-    of_matrix,
-    of_symmetric,
-    of_transposed,
-    plus,
-    plus_product,
-    plus_square,
-    store,
-    symmetric,
-    symmetric_sum,
-    three,
-    times,
-    vector,
-    vector_ahead,
-    vector_behind,
-)
-
-_U = 64  # field of a row of blocks at which the block with the next element begins
+from cvt_hpc.models.spatial_pushbelt.chain import motion
 
 
 @register_jitable
-def _store_upper(array, j, first, uu, uw, ww, uv, wv, vv, up, wp, pp):
-    """Set the upper half of a symmetric block by columns: u, omega, v, psi."""
-    store(array, j, first, (uu[0], uu[1], uu[2]))
-    store(array, j, first + 3, (uu[3], uu[4], uu[5]))
-    store(array, j, first + 6, (uw[0], uw[1], uw[2]))
-    array[j, first + 9] = ww[0]
-    store(array, j, first + 10, (uw[3], uw[4], uw[5]))
-    array[j, first + 13], array[j, first + 14] = ww[1], ww[2]
-    store(array, j, first + 15, (uw[6], uw[7], uw[8]))
-    store(array, j, first + 18, (ww[3], ww[4], ww[5]))
-    store(array, j, first + 21, uv)
-    store(array, j, first + 24, wv)
-    array[j, first + 27] = vv
-    store(array, j, first + 28, up)
-    store(array, j, first + 31, wp)
-    array[j, first + 34], array[j, first + 35] = like(0.0, vv), pp
+def _store_part(array, j, first, m):
+    """Set a part of 3 x 3 of a block."""
+    vec.store(array, j, first, m[:3])
+    vec.store(array, j, first + f.SIZE, m[3:6])
+    vec.store(array, j, first + 2 * f.SIZE, m[6:])
 
 
 @register_jitable
-def _store_columns(array, j, first, m, row, column):
-    """Set a part of 3 x 3 of a block of 8 x 8."""
-    store(array, j, first + 8 * column + row, (m[0], m[1], m[2]))
-    store(array, j, first + 8 * column + 8 + row, (m[3], m[4], m[5]))
-    store(array, j, first + 8 * column + 16 + row, (m[6], m[7], m[8]))
+def _part(array, j, first):
+    """A part of 3 x 3 of a block."""
+    two, three = first + f.SIZE, first + 2 * f.SIZE
+    return vec.three(vec.at(array, j, first), vec.at(array, j, two), vec.at(array, j, three))
 
 
 @register_jitable
-def _columns(array, j, first, row, column):
-    """A part of 3 x 3 of a block of 8 x 8."""
-    first += 8 * column + row
-    return three(vector(array, j, first), vector(array, j, first + 8), vector(array, j, first + 16))
+def _store_row(array, j, first, v):
+    """Set a part of a block that is a row."""
+    array[j, first], array[j, first + f.SIZE], array[j, first + 2 * f.SIZE] = v
+
+
+@register_jitable
+def _store_link(array, j, first, link):
+    """Set the parts of a block by velocities and angular velocities."""
+    _store_part(array, j, first + f.UU, link[0])
+    _store_part(array, j, first + f.WU, link[1])
+    _store_part(array, j, first + f.UW, link[2])
+    _store_part(array, j, first + f.WW, link[3])
+
+
+@register_jitable
+def _store_symmetric(array, j, first, block, by_v, by_p):
+    """Set a symmetric block of 8 x 8: the part of 6 x 6, and the last columns, by V and by SLOPE_RATE."""
+    uu, uw, ww = block
+    uv, wv, vv = by_v
+    up, wp, pp = by_p
+    _store_link(array, j, first, (vec.full(uu), vec.transposed(uw), uw, vec.full(ww)))
+    _store_row(array, j, first + f.VU, uv)
+    _store_row(array, j, first + f.VW, wv)
+    _store_row(array, j, first + f.PU, up)
+    _store_row(array, j, first + f.PW, wp)
+    vec.store(array, j, first + f.UV, uv)
+    vec.store(array, j, first + f.WV, wv)
+    vec.store(array, j, first + f.UP, up)
+    vec.store(array, j, first + f.WP, wp)
+    array[j, first + f.VV], array[j, first + f.PP] = vv, pp
+    array[j, first + f.PV] = array[j, first + f.VP] = like(0.0, vv)
 
 
 @kernel
@@ -81,86 +75,62 @@ def linear_blocks(belt, step, dt):
     shear, bend = bending_slopes(belt, dt)
     per_pitch = 1.0 / belt.pitch
     for j in range(step.rows):
-        uu, uw, ww = (
-            symmetric(step, j, f.INERTIA),
-            matrix(step, j, f.INERTIA + 6),
-            symmetric(step, j, f.INERTIA + 15),
-        )
+        uu, uw = vec.symmetric(step, j, f.INERTIA), vec.matrix(step, j, f.INERTIA_UW)
         none = like(0.0, uu[0])
-        n = step[j, f.NORMAL], step[j, f.NORMAL + 1], none
-        uu = plus_square(uu, like(belt.transverse_damping, none), n)
+        n = step[j, f.NORMAL_Y], step[j, f.NORMAL_Z], none
+        uu = vec.plus_square(uu, like(belt.transverse_damping, none), n)
         axial = like(belt.lateral_damping + 2.0 * shear * per_pitch * per_pitch, none)
-        uu = uu[0], uu[1], uu[2], uu[3], uu[4], uu[5] + axial
-        y = vector(step, j, f.YAW)
-        ww = plus_square(ww, like(yawing, none), y)
-        wp = times(like(-yawing, none), y)
-        up = none, none, none
+        y = vec.at(step, j, f.YAW)
+        ww = vec.plus_square(vec.symmetric(step, j, f.INERTIA_WW), like(yawing, none), y)
         pp = like(belt.ring_rotary_inertia / dt + yawing + 0.5 * shear + 2.0 * bend, none)
+        by_p = (none, none, none), vec.times(like(-yawing, none), y), pp
 
         # the segment ahead, of which this element is i
-        k, a, b = step[j, f.TENSION_SLOPE], vector(step, j, f.TENSION_I), vector(step, j, f.TENSION_I + 3)
-        uu, uw, ww = plus_square(uu, k, a), plus_product(uw, k, a, b), plus_square(ww, k, b)
-        uv, wv, vv = times(k, a), times(k, b), like(belt.ring_mass / dt, none) + k
-        p, q = vector(step, j, f.CHORD_I), vector(step, j, f.CHORD_J)
-        s, t = vector(step, j, f.TURN_I), vector(step, j, f.TURN_J)
+        k, a, b = step[j, f.TENSION_SLOPE], vec.screw(step, j, f.TENSION_I), vec.screw(step, j, f.TENSION_J)
+        uu = vec.joined(uu[:3], (uu[3], uu[4], uu[5] + axial))
+        uu, uw, ww = vec.plus_law((uu, uw, ww), k, a)
+        v = vec.both_times(k, a)
+        vv = like(belt.ring_mass / dt, none) + k
+        p, q = vec.at(step, j, f.CHORD_I), vec.at(step, j, f.CHORD_J)
+        s, t = vec.at(step, j, f.TURN_I), vec.at(step, j, f.TURN_J)
         d = like(steep, none)
-        uu = plus_square(plus_square(uu, d, p), d, q)
-        uw, ww = plus_product(uw, -d, p, s), plus_square(ww, d, s)
+        uu = vec.plus_square(vec.plus_square(uu, d, p), d, q)
+        uw, ww = vec.plus_product(uw, -d, p, s), vec.plus_square(ww, d, s)
 
-        e, h = vector(step, j, f.TENSION_J), vector(step, j, f.TENSION_J + 3)
-        nothing = none, none, none, none, none, none, none, none, none
-        link = plus_product(plus_product(plus_product(nothing, -k, a, e), -d, p, p), -d, q, q)
-        link = (
-            link[0],
-            link[1],
-            link[2],
-            link[3],
-            link[4],
-            link[5],
-            link[6],
-            link[7],
-            link[8] - shear * per_pitch * per_pitch,
-        )
-        _store_columns(step, j, f.LINK, link, 0, 0)
-        _store_columns(step, j, f.LINK, plus_product(plus_product(nothing, -k, b, e), d, s, p), 3, 0)
-        _store_columns(step, j, f.LINK, plus_product(plus_product(nothing, -k, a, h), -d, q, t), 0, 3)
-        _store_columns(step, j, f.LINK, plus_product(nothing, -k, b, h), 3, 3)
-        for c in range(3):
-            step[j, f.LINK + 8 * c + 6] = -k * step[j, f.TENSION_J + c]
-            step[j, f.LINK + 8 * c + 30] = -k * step[j, f.TENSION_J + 3 + c]
-            step[j, f.LINK + 8 * c + 7] = 0.0
-            step[j, f.LINK + 8 * c + 31] = 0.0
+        zero = vec.zero9(none)
+        link_uu, link_wu, link_uw, link_ww = vec.plus_link((zero, zero, zero, zero), -k, a, b)
+        link_uu = vec.plus_product(vec.plus_product(link_uu, -d, p, p), -d, q, q)
+        link_wu, link_uw = vec.plus_product(link_wu, d, s, p), vec.plus_product(link_uw, -d, q, t)
+        _store_link(step, j, f.LINK, (link_uu, link_wu, link_uw, link_ww))
+        step[j, f.LINK + f.UU + f.AXIAL + f.SIZE * f.AXIAL] -= shear * per_pitch * per_pitch
+        for column in range(f.SIZE):
+            step[j, f.LINK + f.PU + f.SIZE * column] = 0.0
+            step[j, f.LINK + f.UP + column] = 0.0
+        _store_row(step, j, f.LINK + f.VU, vec.times(-k, b[0]))
+        _store_row(step, j, f.LINK + f.VW, vec.times(-k, b[1]))
+        vec.store_screw(step, j, f.LINK + f.UV, vec.both_times(-k, a))
+        step[j, f.LINK + f.VV] = -k
         half = 0.5 * shear * per_pitch
-        step[j, f.LINK + 23] = -half
-        store(step, j, f.LINK + 48, times(-k, a))
-        store(step, j, f.LINK + 51, times(-k, b))
-        step[j, f.LINK + 54] = -k
-        for row in range(7):
-            step[j, f.LINK + 56 + row] = 0.0
-        step[j, f.LINK + 55] = 0.0
-        step[j, f.LINK + 58] = half
-        step[j, f.LINK + 63] = 0.25 * shear - bend
+        step[j, f.LINK + f.PU + f.SIZE * f.AXIAL], step[j, f.LINK + f.UP + f.AXIAL] = -half, half
+        step[j, f.LINK + f.PP] = 0.25 * shear - bend
 
         # the segment behind, of which it is j
-        k, a, b = (
-            behind(step, j, f.TENSION_SLOPE),
-            vector_behind(step, j, f.TENSION_J),
-            vector_behind(step, j, f.TENSION_J + 3),
-        )
-        uu, uw, ww = plus_square(uu, k, a), plus_product(uw, k, a, b), plus_square(ww, k, b)
-        uv, wv, vv = moved(uv, k, a), moved(wv, k, b), vv + k
-        p, q = vector_behind(step, j, f.CHORD_I), vector_behind(step, j, f.CHORD_J)
-        t = vector_behind(step, j, f.TURN_J)
-        uu = plus_square(plus_square(uu, d, p), d, q)
-        uw, ww = plus_product(uw, d, q, t), plus_square(ww, d, t)
-        _store_upper(step, j, f.DIAGONAL, uu, uw, ww, uv, wv, vv, up, wp, pp)
+        k, a = behind(step, j, f.TENSION_SLOPE), vec.screw_behind(step, j, f.TENSION_J)
+        uu, uw, ww = vec.plus_law((uu, uw, ww), k, a)
+        uv, wv = vec.both_moved(v, k, a)
+        p, q = vec.behind(step, j, f.CHORD_I), vec.behind(step, j, f.CHORD_J)
+        t = vec.behind(step, j, f.TURN_J)
+        uu = vec.plus_square(vec.plus_square(uu, d, p), d, q)
+        uw, ww = vec.plus_product(uw, d, q, t), vec.plus_square(ww, d, t)
+        _store_symmetric(step, j, f.DIAGONAL, (uu, uw, ww), (uv, wv, vv + k), by_p)
 
 
 @register_jitable
 def side_torque(state, step, j, p):
     """Torque of the two points of a side from p on, about the axis of their pulley [N m]."""
-    low = step[j, f.MID_RADIUS + p] * state[j, f.FLANK_FRICTION_T + p]
-    return fma(step[j, f.MID_RADIUS + p + 1], state[j, f.FLANK_FRICTION_T + p + 1], low)
+    low, high = f.LEFT_LOW + p, f.LEFT_HIGH + p
+    torque = step[j, f.MID_RADIUS + low] * state[j, f.FLANK_FRICTION_T + low]
+    return fma(step[j, f.MID_RADIUS + high], state[j, f.FLANK_FRICTION_T + high], torque)
 
 
 @kernel
@@ -181,50 +151,38 @@ def residuals(belt, state, increments, openings, shapes, load, step, iterate, sc
     for k in range(2 * modes):
         scratch[0, k] = 0.0
     for j in range(step.rows):
-        du, dw = vector(state, j, f.CHANGE), vector(state, j, f.CHANGE + 3)
-        dv, dp = state[j, f.CHANGE + 6], state[j, f.CHANGE + 7]
-        u, omega = plus(vector(state, j, f.SPEED), du), plus(vector(state, j, f.OMEGA), dw)
-        mass = symmetric(step, j, f.INERTIA)
-        coupling = matrix(step, j, f.INERTIA + 6)
-        force = plus(vector(iterate, j, f.RESIDUAL), vector(iterate, j, f.PAIR_I))
-        force = minus(
-            plus(force, vector_behind(iterate, j, f.PAIR_J)),
-            plus(of_symmetric(mass, du), of_matrix(coupling, dw)),
+        change = vec.screw(state, j, f.CHANGE)
+        dv, dp = state[j, f.CHANGE + f.ROW_V], state[j, f.CHANGE + f.ROW_P]
+        u, omega = motion(state, j, 1.0)
+        mass, coupling = vec.symmetric(step, j, f.INERTIA), vec.matrix(step, j, f.INERTIA_UW)
+        force, g = vec.both_plus(vec.screw(iterate, j, f.RESIDUAL), vec.screw(iterate, j, f.PAIR_I))
+        force, g = vec.both_plus((force, g), vec.screw_behind(iterate, j, f.PAIR_J))
+        force = vec.minus(
+            force, vec.plus(vec.of_symmetric(mass, change[0]), vec.of_matrix(coupling, change[1]))
         )
-        drag = belt.transverse_damping * fma(step[j, f.NORMAL], u[0], step[j, f.NORMAL + 1] * u[1])
-        force = (
-            force[0] - drag * step[j, f.NORMAL],
-            force[1] - drag * step[j, f.NORMAL + 1],
-            force[2] - belt.lateral_damping * u[2],
-        )
-        y = vector(step, j, f.YAW)
-        moment = step[j, f.PREDICTED_YAW] + yawing * (dot(y, dw) - dp)
-        g = plus(vector(iterate, j, f.RESIDUAL + 3), vector(iterate, j, f.PAIR_I + 3))
-        g = plus(plus(g, vector_behind(iterate, j, f.PAIR_J + 3)), vector(step, j, f.GYROSCOPIC))
-        g = minus(g, plus(of_transposed(coupling, du), of_symmetric(symmetric(step, j, f.INERTIA + 15), dw)))
-        g = moved(g, -moment, y)
-        h = (
-            iterate[j, f.RESIDUAL + 6]
-            + iterate[j, f.PAIR_I + 6]
-            + behind(iterate, j, f.PAIR_J + 6)
-            - ring * dv
-        )
-        s = iterate[j, f.PAIR_I + 7] + behind(iterate, j, f.PAIR_J + 7) - rotary * dp + moment
-        store(iterate, j, f.RESIDUAL, force)
-        store(iterate, j, f.RESIDUAL + 3, g)
-        iterate[j, f.RESIDUAL + 6], iterate[j, f.RESIDUAL + 7] = h, s
+        n_y, n_z = step[j, f.NORMAL_Y], step[j, f.NORMAL_Z]
+        drag = belt.transverse_damping * fma(n_y, u[0], n_z * u[1])
+        force = force[0] - drag * n_y, force[1] - drag * n_z, force[2] - belt.lateral_damping * u[2]
+        y = vec.at(step, j, f.YAW)
+        moment = step[j, f.PREDICTED_YAW] + yawing * (vec.dot(y, change[1]) - dp)
+        swing = vec.of_symmetric(vec.symmetric(step, j, f.INERTIA_WW), change[1])
+        g = vec.plus(g, vec.at(step, j, f.GYROSCOPIC))
+        g = vec.minus(g, vec.plus(vec.of_transposed(coupling, change[0]), swing))
+        g = vec.moved(g, -moment, y)
+        h = iterate[j, f.RESIDUAL + f.ROW_V] + iterate[j, f.PAIR_I + f.ROW_V]
+        h = h + behind(iterate, j, f.PAIR_J + f.ROW_V) - ring * dv
+        s = iterate[j, f.PAIR_I + f.ROW_P] + behind(iterate, j, f.PAIR_J + f.ROW_P) - rotary * dp + moment
+        vec.store_screw(iterate, j, f.RESIDUAL, (force, g))
+        iterate[j, f.RESIDUAL + f.ROW_V], iterate[j, f.RESIDUAL + f.ROW_P] = h, s
 
-        power += (
-            dot(u, force)
-            + dot(omega, g)
-            + (state[j, f.SPEED + 6] + dv) * h
-            + (state[j, f.SPEED + 7] + dp) * s
-        )
+        v, slope_rate = state[j, f.V] + dv, state[j, f.SLOPE_RATE] + dp
+        power += vec.both_dot((u, omega), (force, g)) + v * h + slope_rate * s
         driven = state[j, f.DRIVEN]
-        torque += driven * (side_torque(state, step, j, 0) + side_torque(state, step, j, 2))
+        left, right = f.LEFT_LOW, f.RIGHT_LOW
+        torque += driven * (side_torque(state, step, j, left) + side_torque(state, step, j, right))
         if modes > 0:
-            axial = 0.5 * belt.cosine * (state[j, f.FLANK] + state[j, f.FLANK + 1])
-            axial = axial + 0.5 * belt.cosine * (state[j, f.FLANK + 2] + state[j, f.FLANK + 3])
+            axial = 0.5 * belt.cosine * (state[j, f.FLANK + left] + state[j, f.FLANK + f.LEFT_HIGH])
+            axial += 0.5 * belt.cosine * (state[j, f.FLANK + right] + state[j, f.FLANK + f.RIGHT_HIGH])
             for k in range(modes):
                 scratch[0, modes + k] += driven * axial * shapes[j, k]
                 scratch[0, k] += (1.0 - driven) * axial * shapes[j, k]
@@ -236,83 +194,51 @@ def assemble_pairs(belt, state, step, iterate, blocks):
     """Blocks of all but the flanks, and the first right side: what takes the residuals to zero."""
     has_pins = belt.pin_clearance < np.inf
     for j in range(step.rows):
-        x = vector_ahead(state, j, f.HEADING)
-        k, i, jj = iterate[j, f.STIFF], vector(iterate, j, f.STIFF_I), vector(iterate, j, f.STIFF_J)
-        uu = plus_product(_columns(step, j, f.LINK, 0, 0), -k, x, x)
-        wu = plus_product(_columns(step, j, f.LINK, 3, 0), like(1.0, k), i, x)
-        uw = plus_product(_columns(step, j, f.LINK, 0, 3), like(-1.0, k), x, jj)
-        ww = _columns(step, j, f.LINK, 3, 3)
-        ww = three(
-            plus((ww[0], ww[1], ww[2]), vector(iterate, j, f.STIFF_IJ)),
-            plus((ww[3], ww[4], ww[5]), vector(iterate, j, f.STIFF_IJ + 3)),
-            plus((ww[6], ww[7], ww[8]), vector(iterate, j, f.STIFF_IJ + 6)),
-        )
+        x = vec.ahead(state, j, f.HEADING)
+        k, i, jj = iterate[j, f.STIFF], vec.at(iterate, j, f.STIFF_I), vec.at(iterate, j, f.STIFF_J)
+        one, ahead_of_it = like(1.0, k), k
+        uu = vec.plus_product(_part(step, j, f.LINK + f.UU), -k, x, x)
+        wu = vec.plus_product(_part(step, j, f.LINK + f.WU), one, i, x)
+        uw = vec.plus_product(_part(step, j, f.LINK + f.UW), -one, x, jj)
+        ww = vec.matrix_sum(_part(step, j, f.LINK + f.WW), vec.matrix(iterate, j, f.STIFF_IJ))
+        link = uu, wu, uw, ww
         if has_pins:
-            n, k = vector(step, j, f.PIN_NORMAL), iterate[j, f.PIN_SLOPE]
-            a, b = vector(step, j, f.PIN_LEVER_I), vector(step, j, f.PIN_LEVER_J)
-            uu, wu = plus_product(uu, -k, n, n), plus_product(wu, -k, a, n)
-            uw, ww = plus_product(uw, -k, n, b), plus_product(ww, -k, a, b)
-        _store_columns(blocks, j, _U, uu, 0, 0)
-        _store_columns(blocks, j, _U, wu, 3, 0)
-        _store_columns(blocks, j, _U, uw, 0, 3)
-        _store_columns(blocks, j, _U, ww, 3, 3)
-        for c in range(6):
-            blocks[j, _U + 8 * c + 6], blocks[j, _U + 8 * c + 7] = (
-                step[j, f.LINK + 8 * c + 6],
-                step[j, f.LINK + 8 * c + 7],
-            )
-        for field in range(48, 64):
-            blocks[j, _U + field] = step[j, f.LINK + field]
+            n, k = vec.at(step, j, f.PIN_NORMAL), iterate[j, f.PIN_SLOPE]
+            a, b = vec.at(step, j, f.PIN_LEVER_I), vec.at(step, j, f.PIN_LEVER_J)
+            link = vec.plus_link(link, -k, (n, a), (n, b))
+        _store_link(blocks, j, f.LINKED, link)
+        for column in range(f.ROW_V):
+            v, p = f.VU + f.SIZE * column, f.PU + f.SIZE * column
+            blocks[j, f.LINKED + v], blocks[j, f.LINKED + p] = step[j, f.LINK + v], step[j, f.LINK + p]
+        for field in range(f.UV, f.SIZE * f.SIZE):
+            blocks[j, f.LINKED + field] = step[j, f.LINK + field]
 
-        d = f.DIAGONAL
-        uu = symmetric(step, j, d)
-        uw = three(vector(step, j, d + 6), vector(step, j, d + 10), vector(step, j, d + 15))
-        ww = joined((step[j, d + 9], step[j, d + 13], step[j, d + 14]), vector(step, j, d + 18))
+        uu = vec.upper(_part(step, j, f.DIAGONAL + f.UU))
+        uw = _part(step, j, f.DIAGONAL + f.UW)
+        ww = vec.upper(_part(step, j, f.DIAGONAL + f.WW))
         # the contacts ahead, of which this element is i
-        k = iterate[j, f.STIFF]
-        uu, uw = plus_square(uu, k, x), plus_product(uw, like(-1.0, k), x, i)
-        ww = symmetric_sum(ww, symmetric(iterate, j, f.STIFF_II))
+        uu, uw = vec.plus_square(uu, ahead_of_it, x), vec.plus_product(uw, -one, x, i)
+        block = uu, uw, vec.symmetric_sum(ww, vec.symmetric(iterate, j, f.STIFF_II))
         if has_pins:
-            n, k, a = vector(step, j, f.PIN_NORMAL), iterate[j, f.PIN_SLOPE], vector(step, j, f.PIN_LEVER_I)
-            uu, uw, ww = plus_square(uu, k, n), plus_product(uw, k, n, a), plus_square(ww, k, a)
+            n, a = vec.at(step, j, f.PIN_NORMAL), vec.at(step, j, f.PIN_LEVER_I)
+            block = vec.plus_law(block, iterate[j, f.PIN_SLOPE], (n, a))
         # those behind, of which it is j
-        x, k = vector(state, j, f.HEADING), behind(iterate, j, f.STIFF)
-        uu = plus_square(uu, k, x)
-        uw = plus_product(uw, like(1.0, k), x, vector_behind(iterate, j, f.STIFF_J))
-        own = joined(vector_behind(iterate, j, f.STIFF_JJ), vector_behind(iterate, j, f.STIFF_JJ + 3))
-        ww = symmetric_sum(ww, own)
+        uu, uw, ww = block
+        x, k = vec.at(state, j, f.HEADING), behind(iterate, j, f.STIFF)
+        uu, uw = vec.plus_square(uu, k, x), vec.plus_product(uw, one, x, vec.behind(iterate, j, f.STIFF_J))
+        block = uu, uw, vec.symmetric_sum(ww, vec.joined(*vec.screw_behind(iterate, j, f.STIFF_JJ)))
         if has_pins:
-            n, k = vector_behind(step, j, f.PIN_NORMAL), behind(iterate, j, f.PIN_SLOPE)
-            b = vector_behind(step, j, f.PIN_LEVER_J)
-            uu, uw, ww = plus_square(uu, k, n), plus_product(uw, k, n, b), plus_square(ww, k, b)
+            n, b = vec.behind(step, j, f.PIN_NORMAL), vec.behind(step, j, f.PIN_LEVER_J)
+            block = vec.plus_law(block, behind(iterate, j, f.PIN_SLOPE), (n, b))
         # friction of the ring
-        k, t, s = iterate[j, f.RING_SLOPE], vector(step, j, f.RING_LINE), vector(step, j, f.RING_LINE + 3)
-        uu, uw, ww = plus_square(uu, k, t), plus_product(uw, k, t, s), plus_square(ww, k, s)
-        uv, wv = moved(vector(step, j, d + 21), -k, t), moved(vector(step, j, d + 24), -k, s)
-
-        store(blocks, j, 0, (uu[0], uu[1], uu[3]))
-        store(blocks, j, 8, (uu[1], uu[2], uu[4]))
-        store(blocks, j, 16, (uu[3], uu[4], uu[5]))
-        store(blocks, j, 3, (uw[0], uw[3], uw[6]))
-        store(blocks, j, 11, (uw[1], uw[4], uw[7]))
-        store(blocks, j, 19, (uw[2], uw[5], uw[8]))
-        _store_columns(blocks, j, 0, uw, 0, 3)
-        store(blocks, j, 27, (ww[0], ww[1], ww[3]))
-        store(blocks, j, 35, (ww[1], ww[2], ww[4]))
-        store(blocks, j, 43, (ww[3], ww[4], ww[5]))
-        up, wp = vector(step, j, d + 28), vector(step, j, d + 31)
-        blocks[j, 6], blocks[j, 14], blocks[j, 22] = uv
-        blocks[j, 30], blocks[j, 38], blocks[j, 46] = wv
-        blocks[j, 7], blocks[j, 15], blocks[j, 23] = up
-        blocks[j, 31], blocks[j, 39], blocks[j, 47] = wp
-        store(blocks, j, 48, uv)
-        store(blocks, j, 51, wv)
-        blocks[j, 54], blocks[j, 55] = step[j, d + 27] + k, step[j, d + 34]
-        store(blocks, j, 56, up)
-        store(blocks, j, 59, wp)
-        blocks[j, 62], blocks[j, 63] = step[j, d + 34], step[j, d + 35]
-        for field in range(8):
-            blocks[j, f.RIGHT + field] = iterate[j, f.RESIDUAL + field]
+        k, line = iterate[j, f.RING_SLOPE], vec.screw(step, j, f.RING_LINE)
+        block = vec.plus_law(block, k, line)
+        uv, wv = vec.both_moved(vec.screw(step, j, f.DIAGONAL + f.UV), -k, line)
+        up, wp = vec.screw(step, j, f.DIAGONAL + f.UP)
+        by_v = uv, wv, step[j, f.DIAGONAL + f.VV] + k
+        _store_symmetric(blocks, j, 0, block, by_v, (up, wp, step[j, f.DIAGONAL + f.PP]))
+        for row in range(f.SIZE):
+            blocks[j, f.RIGHT + row] = iterate[j, f.RESIDUAL + row]
 
 
 @kernel
@@ -329,14 +255,12 @@ def border_sums(belt, state, shapes, iterate, blocks, sums):
     for j in range(iterate.rows):
         driven = state[j, f.DRIVEN]
         driving = 1.0 - driven
-        a, b = vector(iterate, j, f.TORQUE_ROW), vector(iterate, j, f.TORQUE_ROW + 3)
-        c, d = vector(iterate, j, f.NORMAL_ROW), vector(iterate, j, f.NORMAL_ROW + 3)
+        torque, normal = vec.screw(iterate, j, f.TORQUE_ROW), vec.screw(iterate, j, f.NORMAL_ROW)
         for column in range(width):
-            at = f.RIGHT + 8 * column
-            u, omega = vector(blocks, j, at), vector(blocks, j, at + 3)
-            sums[0, column] -= dot(a, u) + dot(b, omega)
+            solution = vec.screw(blocks, j, f.RIGHT + f.SIZE * column)
+            sums[0, column] -= vec.both_dot(torque, solution)
             if modes > 0:
-                push = dot(c, u) + dot(d, omega)
+                push = vec.both_dot(normal, solution)
                 one, other = driving * push, driven * push
                 for m in range(modes):
                     shape = shapes[j, m]

@@ -29,7 +29,7 @@ def predict_bending(belt, state, step):
     per_pitch = 1.0 / belt.pitch
     for j in range(state.rows):
         here, there = state[j, f.SLOPE], ahead(state, j, f.SLOPE)
-        rise = ahead(state, j, f.POSITION + 2) - state[j, f.POSITION + 2]
+        rise = ahead(state, j, f.POSITION + f.AXIAL) - state[j, f.POSITION + f.AXIAL]
         step[j, f.SHEAR] = per_pitch * rise - 0.5 * (here + there)
         step[j, f.BEND] = there - here
 
@@ -41,12 +41,12 @@ def bending_forces(belt, state, step, iterate, dt):
     for_shear, for_bend = belt.ring_shear * belt.pitch, belt.ring_bending / belt.pitch
     steep, steep_bend = bending_slopes(belt, dt)
     for j in range(step.rows):
-        here, there = state[j, f.CHANGE + 7], ahead(state, j, f.CHANGE + 7)
-        rise = ahead(state, j, f.CHANGE + 2) - state[j, f.CHANGE + 2]
+        here, there = state[j, f.CHANGE + f.ROW_P], ahead(state, j, f.CHANGE + f.ROW_P)
+        rise = ahead(state, j, f.CHANGE + f.AXIAL) - state[j, f.CHANGE + f.AXIAL]
         shear = for_shear * step[j, f.SHEAR] + steep * (per_pitch * rise - 0.5 * (here + there))
         moment = for_bend * step[j, f.BEND] + steep_bend * (there - here)
         force = per_pitch * shear
-        iterate[j, f.PAIR_I + 2] += force
-        iterate[j, f.PAIR_J + 2] -= force
-        iterate[j, f.PAIR_I + 7] = 0.5 * shear + moment
-        iterate[j, f.PAIR_J + 7] = 0.5 * shear - moment
+        iterate[j, f.PAIR_I + f.AXIAL] += force
+        iterate[j, f.PAIR_J + f.AXIAL] -= force
+        iterate[j, f.PAIR_I + f.ROW_P] = 0.5 * shear + moment
+        iterate[j, f.PAIR_J + f.ROW_P] = 0.5 * shear - moment

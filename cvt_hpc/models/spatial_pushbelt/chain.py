@@ -17,45 +17,36 @@ from cvt_hpc.kernels import kernel
 from cvt_hpc.lanes import ahead, behind, fma, like, select
 from cvt_hpc.models.pushbelt import fields as planar
 from cvt_hpc.models.spatial_pushbelt import fields as f
-from cvt_hpc.models.spatial_pushbelt.rotations import (
-    cross,
-    dot,
-    matrix_sum,
-    minus,
-    moved,
-    of_symmetric,
-    plus,
-    plus_product,
-    plus_square,
-    store,
-    store_matrix,
-    store_symmetric,
-    symmetric_sum,
-    times,
-    turned,
-    turning,
-    unit,
-    vector,
-    vector_ahead,
-    vector_behind,
-)
+from cvt_hpc.models.spatial_pushbelt import vectors as vec
+
+
+@register_jitable
+def motion(state, j, share):
+    """Velocity and angular velocity of an element before a step and a share of their changes in it."""
+    return vec.both_moved(vec.screw(state, j, f.SPEED), share, vec.screw(state, j, f.CHANGE))
+
+
+@register_jitable
+def motion_ahead(state, j, share):
+    """Those of the next one."""
+    return vec.both_moved(vec.screw_ahead(state, j, f.SPEED), share, vec.screw_ahead(state, j, f.CHANGE))
 
 
 @register_jitable
 def package_lines(d, turn, b):
     """Directions and sizes of d + b turn and d - b turn."""
-    right, right_size = unit(moved(d, b, turn))
-    left, left_size = unit(moved(d, -b, turn))
+    right, right_size = vec.unit(vec.moved(d, b, turn))
+    left, left_size = vec.unit(vec.moved(d, -b, turn))
     return right, left, right_size, left_size
 
 
 @register_jitable
 def lines_at(belt, state, j):
     """Directions of the right and the left package at an element."""
-    front = cross(vector_ahead(state, j, f.OUTWARD), vector_ahead(state, j, f.HEADING))
-    back = cross(vector_behind(state, j, f.OUTWARD), vector_behind(state, j, f.HEADING))
-    d = minus(vector_ahead(state, j, f.POSITION), vector_behind(state, j, f.POSITION))
-    right, left, _, _ = package_lines(d, minus(front, back), belt.package_distance)
+    front = vec.cross(vec.ahead(state, j, f.OUTWARD), vec.ahead(state, j, f.HEADING))
+    back = vec.cross(vec.behind(state, j, f.OUTWARD), vec.behind(state, j, f.HEADING))
+    d = vec.minus(vec.ahead(state, j, f.POSITION), vec.behind(state, j, f.POSITION))
+    right, left, _, _ = package_lines(d, vec.minus(front, back), belt.package_distance)
     return right, left
 
 
@@ -65,10 +56,10 @@ def lines_to_next(array, j, position, heading, outward, b):
 
     Position and directions are those at these fields of the array.
     """
-    ai = cross(vector(array, j, outward), vector(array, j, heading))
-    aj = cross(vector_ahead(array, j, outward), vector_ahead(array, j, heading))
-    chord = minus(vector_ahead(array, j, position), vector(array, j, position))
-    return ai, aj, chord, package_lines(chord, minus(aj, ai), b)
+    ai = vec.cross(vec.at(array, j, outward), vec.at(array, j, heading))
+    aj = vec.cross(vec.ahead(array, j, outward), vec.ahead(array, j, heading))
+    chord = vec.minus(vec.ahead(array, j, position), vec.at(array, j, position))
+    return ai, aj, chord, package_lines(chord, vec.minus(aj, ai), b)
 
 
 @kernel
@@ -82,56 +73,47 @@ def predict(belt, state, pulleys, step, dt):
     mass, roll = belt.mass / dt, belt.roll_inertia / dt
     yaw, pitch = belt.yaw_inertia / dt, belt.pitch_inertia / dt
     for j in range(state.rows):
-        r, x, o = vector(state, j, f.POSITION), vector(state, j, f.HEADING), vector(state, j, f.OUTWARD)
-        u, omega = vector(state, j, f.SPEED), vector(state, j, f.OMEGA)
-        a = cross(o, x)
-        store(step, j, f.PREDICTED_POSITION, moved(r, dt, u))
-        factors = turning(omega, dt)
-        store(step, j, f.PREDICTED_HEADING, turned(x, omega, factors))
-        store(step, j, f.PREDICTED_OUTWARD, turned(o, omega, factors))
-        factors = turning(omega, 0.5 * dt)
-        middle_o = turned(o, omega, factors)
-        store(step, j, f.MID_OUTWARD, middle_o)
-        store(step, j, f.MID_AXIAL, turned(a, omega, factors))
+        r, x, o = vec.at(state, j, f.POSITION), vec.at(state, j, f.HEADING), vec.at(state, j, f.OUTWARD)
+        u, omega = vec.at(state, j, f.SPEED), vec.at(state, j, f.OMEGA)
+        a = vec.cross(o, x)
+        vec.store(step, j, f.PREDICTED_POSITION, vec.moved(r, dt, u))
+        factors = vec.turning(omega, dt)
+        vec.store(step, j, f.PREDICTED_HEADING, vec.turned(x, omega, factors))
+        vec.store(step, j, f.PREDICTED_OUTWARD, vec.turned(o, omega, factors))
+        factors = vec.turning(omega, 0.5 * dt)
+        middle_o = vec.turned(o, omega, factors)
+        vec.store(step, j, f.MID_OUTWARD, middle_o)
+        vec.store(step, j, f.MID_AXIAL, vec.turned(a, omega, factors))
 
         right, left = lines_at(belt, state, j)
-        right_lever, left_lever = cross(times(b, a), right), cross(times(-b, a), left)
-        line = times(0.5, plus(right, left))
-        line_lever = times(0.5, plus(right_lever, left_lever))
-        store(step, j, f.RING_LINE, line)
-        store(step, j, f.RING_LINE + 3, line_lever)
-        step[j, f.START_SLIP] = state[j, f.V] - dot(line, u) - dot(line_lever, omega)
+        right, left = (right, vec.cross(vec.times(b, a), right)), (left, vec.cross(vec.times(-b, a), left))
+        line = vec.both_times(0.5, vec.both_plus(right, left))
+        vec.store_screw(step, j, f.RING_LINE, line)
+        step[j, f.START_SLIP] = state[j, f.V] - vec.dot(line[0], u) - vec.dot(line[1], omega)
 
         # ring mass goes with the element only across its lines
         none = like(0.0, r[0])
         total = like(mass + 2.0 * half, none)
         uu = total, none, total, none, none, total
-        zero = none, none, none, none, none, none
-        both = symmetric_sum(plus_square(zero, -half, right), plus_square(zero, -half, left))
-        uu = symmetric_sum(uu, both)
-        empty = none, none, none, none, none, none, none, none, none
-        one, other = (
-            plus_product(empty, -half, right, right_lever),
-            plus_product(empty, -half, left, left_lever),
-        )
-        uw = matrix_sum(one, other)
+        zero, empty = vec.zero6(none), (vec.zero6(none), vec.zero9(none), vec.zero6(none))
+        one, other = vec.plus_law(empty, -half, right), vec.plus_law(empty, -half, left)
         swing = like(2.0 * half * b * b, none)
         ww = swing, none, swing, none, none, swing
-        ww = plus_square(ww, -2.0 * half * b * b, a)
-        both = symmetric_sum(plus_square(zero, -half, right_lever), plus_square(zero, -half, left_lever))
-        own = plus_square(plus_square(plus_square(zero, roll, x), yaw, o), pitch, a)
+        ww = vec.plus_square(ww, -2.0 * half * b * b, a)
+        own = vec.plus_square(vec.plus_square(vec.plus_square(zero, roll, x), yaw, o), pitch, a)
         # at the middle between the last two speeds and the next one
-        spin = moved(omega, 0.5, vector(state, j, f.CHANGE + 3))
-        store(step, j, f.GYROSCOPIC, times(-dt, cross(spin, of_symmetric(own, spin))))
-        ww = symmetric_sum(symmetric_sum(ww, both), own)
-        store_symmetric(step, j, f.INERTIA, uu)
-        store_matrix(step, j, f.INERTIA + 6, uw)
-        store_symmetric(step, j, f.INERTIA + 15, ww)
+        spin = vec.moved(omega, 0.5, vec.at(state, j, f.CHANGE + f.ROW_W))
+        vec.store(step, j, f.GYROSCOPIC, vec.times(-dt, vec.cross(spin, vec.of_symmetric(own, spin))))
+        ww = vec.symmetric_sum(vec.symmetric_sum(ww, vec.symmetric_sum(one[2], other[2])), own)
+        uu = vec.symmetric_sum(uu, vec.symmetric_sum(one[0], other[0]))
+        vec.store_symmetric(step, j, f.INERTIA, uu)
+        vec.store_matrix(step, j, f.INERTIA_UW, vec.matrix_sum(one[1], other[1]))
+        vec.store_symmetric(step, j, f.INERTIA_WW, ww)
 
         # yaw x_3 - psi
         y = x[1], -x[0], none
-        store(step, j, f.YAW, y)
-        rate = dot(y, omega) - state[j, f.SLOPE_RATE]
+        vec.store(step, j, f.YAW, y)
+        rate = vec.dot(y, omega) - state[j, f.SLOPE_RATE]
         step[j, f.PREDICTED_YAW] = belt.yaw_stiffness * (x[2] - state[j, f.SLOPE]) + belt.yaw_damping * rate
 
         driven = r[0] > 0.5 * belt.centre_distance
@@ -140,10 +122,10 @@ def predict(belt, state, pulleys, step, dt):
         side = select(r[1] < 0.0, like(-1.0, none), 1.0)
         reach = cosine * r[0] + side * sine * r[1]
         strand = (reach > 0.0) & (reach < cosine * belt.centre_distance)
-        p = moved(moved(r, 0.5 * dt, u), -belt.pitch_depth, middle_o)
-        radial, _ = unit((p[0] - centre, p[1], none))
-        step[j, f.NORMAL] = select(strand, like(-sine, none), radial[0])
-        step[j, f.NORMAL + 1] = select(strand, side * cosine, radial[1])
+        p = vec.moved(vec.moved(r, 0.5 * dt, u), -belt.pitch_depth, middle_o)
+        radial, _ = vec.unit((p[0] - centre, p[1], none))
+        step[j, f.NORMAL_Y] = select(strand, like(-sine, none), radial[0])
+        step[j, f.NORMAL_Z] = select(strand, side * cosine, radial[1])
 
 
 @kernel
@@ -152,17 +134,16 @@ def link(belt, state, step, dt):
     b = belt.package_distance
     stiffness, damping = 0.5 * belt.angle_stiffness, 0.5 * belt.angle_damping
     for j in range(state.rows):
-        oi, oj = vector(state, j, f.OUTWARD), vector_ahead(state, j, f.OUTWARD)
+        oi, oj = vec.at(state, j, f.OUTWARD), vec.ahead(state, j, f.OUTWARD)
         ai, aj, chord, lines = lines_to_next(state, j, f.POSITION, f.HEADING, f.OUTWARD, b)
         right, left, _, _ = lines
-        e = times(0.5, plus(right, left))
-        roll = times(0.5 * b, minus(right, left))
-        store(step, j, f.TENSION_I, minus(e, vector(step, j, f.RING_LINE)))
-        store(step, j, f.TENSION_I + 3, minus(cross(ai, roll), vector(step, j, f.RING_LINE + 3)))
-        store(step, j, f.TENSION_J, minus(e, vector_ahead(step, j, f.RING_LINE)))
-        store(step, j, f.TENSION_J + 3, minus(cross(aj, roll), vector_ahead(step, j, f.RING_LINE + 3)))
+        e = vec.times(0.5, vec.plus(right, left))
+        roll = vec.times(0.5 * b, vec.minus(right, left))
+        own, next_one = vec.screw(step, j, f.RING_LINE), vec.screw_ahead(step, j, f.RING_LINE)
+        vec.store_screw(step, j, f.TENSION_I, vec.both_minus((e, vec.cross(ai, roll)), own))
+        vec.store_screw(step, j, f.TENSION_J, vec.both_minus((e, vec.cross(aj, roll)), next_one))
 
-        pi, pj = vector(step, j, f.PREDICTED_OUTWARD), vector_ahead(step, j, f.PREDICTED_OUTWARD)
+        pi, pj = vec.at(step, j, f.PREDICTED_OUTWARD), vec.ahead(step, j, f.PREDICTED_OUTWARD)
         _, _, predicted, lines = lines_to_next(
             step, j, f.PREDICTED_POSITION, f.PREDICTED_HEADING, f.PREDICTED_OUTWARD, b
         )
@@ -175,21 +156,21 @@ def link(belt, state, step, dt):
         step[j, f.TENSION_SLOPE] = dt * belt.ring_stiffness * per_unstretched
 
         # sine e . o of the angle between the chord and an element
-        e, size = unit(chord)
+        e, size = vec.unit(chord)
         per_length = 1.0 / size
-        chord_i = times(per_length, moved(oi, -dot(e, oi), e))
-        chord_j = times(per_length, moved(oj, -dot(e, oj), e))
-        turn_i, turn_j = cross(oi, e), cross(oj, e)
-        store(step, j, f.CHORD_I, chord_i)
-        store(step, j, f.CHORD_J, chord_j)
-        store(step, j, f.TURN_I, turn_i)
-        store(step, j, f.TURN_J, turn_j)
-        line, _ = unit(predicted)
-        du = minus(vector_ahead(state, j, f.SPEED), vector(state, j, f.SPEED))
-        rate_i = dot(chord_i, du) + dot(turn_i, vector(state, j, f.OMEGA))
-        rate_j = dot(chord_j, du) + dot(turn_j, vector_ahead(state, j, f.OMEGA))
-        step[j, f.PREDICTED_MOMENT_I] = stiffness * dot(line, pi) + damping * rate_i
-        step[j, f.PREDICTED_MOMENT_J] = stiffness * dot(line, pj) + damping * rate_j
+        chord_i = vec.times(per_length, vec.moved(oi, -vec.dot(e, oi), e))
+        chord_j = vec.times(per_length, vec.moved(oj, -vec.dot(e, oj), e))
+        turn_i, turn_j = vec.cross(oi, e), vec.cross(oj, e)
+        vec.store(step, j, f.CHORD_I, chord_i)
+        vec.store(step, j, f.CHORD_J, chord_j)
+        vec.store(step, j, f.TURN_I, turn_i)
+        vec.store(step, j, f.TURN_J, turn_j)
+        line, _ = vec.unit(predicted)
+        du = vec.minus(vec.ahead(state, j, f.SPEED), vec.at(state, j, f.SPEED))
+        rate_i = vec.dot(chord_i, du) + vec.dot(turn_i, vec.at(state, j, f.OMEGA))
+        rate_j = vec.dot(chord_j, du) + vec.dot(turn_j, vec.ahead(state, j, f.OMEGA))
+        step[j, f.PREDICTED_MOMENT_I] = stiffness * vec.dot(line, pi) + damping * rate_i
+        step[j, f.PREDICTED_MOMENT_J] = stiffness * vec.dot(line, pj) + damping * rate_j
 
 
 @kernel
@@ -197,51 +178,41 @@ def chain_forces(belt, state, step, iterate, dt):
     """Tension and moments of pitch of an iterate; sets the pairs' forces."""
     steep = 0.5 * (dt * belt.angle_stiffness + belt.angle_damping)
     for j in range(step.rows):
-        ui, uj = vector(state, j, f.CHANGE), vector_ahead(state, j, f.CHANGE)
-        wi, wj = vector(state, j, f.CHANGE + 3), vector_ahead(state, j, f.CHANGE + 3)
-        ti, tj = vector(step, j, f.TENSION_I), vector(step, j, f.TENSION_J)
-        li, lj = vector(step, j, f.TENSION_I + 3), vector(step, j, f.TENSION_J + 3)
-        stretch = dot(ti, ui) + dot(li, wi) + state[j, f.CHANGE + 6]
-        stretch -= dot(tj, uj) + dot(lj, wj) + ahead(state, j, f.CHANGE + 6)
+        own, next_one = vec.screw(state, j, f.CHANGE), vec.screw_ahead(state, j, f.CHANGE)
+        (ui, wi), (uj, wj) = own, next_one
+        ti, tj = vec.screw(step, j, f.TENSION_I), vec.screw(step, j, f.TENSION_J)
+        stretch = vec.both_dot(ti, own) + state[j, f.CHANGE + f.ROW_V]
+        stretch -= vec.both_dot(tj, next_one) + ahead(state, j, f.CHANGE + f.ROW_V)
         tension = fma(-step[j, f.TENSION_SLOPE], stretch, step[j, f.PREDICTED_TENSION])
         iterate[j, f.ITERATE_TENSION] = tension
 
-        du = minus(uj, ui)
-        ci, cj = vector(step, j, f.CHORD_I), vector(step, j, f.CHORD_J)
-        si, sj = vector(step, j, f.TURN_I), vector(step, j, f.TURN_J)
-        moment_i = fma(steep, dot(ci, du) + dot(si, wi), step[j, f.PREDICTED_MOMENT_I])
-        moment_j = fma(steep, dot(cj, du) + dot(sj, wj), step[j, f.PREDICTED_MOMENT_J])
-        push = moved(times(moment_i, ci), moment_j, cj)
-        store(iterate, j, f.PAIR_I, moved(push, tension, ti))
-        store(iterate, j, f.PAIR_I + 3, moved(times(tension, li), -moment_i, si))
-        iterate[j, f.PAIR_I + 6] = tension
-        store(iterate, j, f.PAIR_J, moved(times(-tension, tj), -1.0, push))
-        store(iterate, j, f.PAIR_J + 3, moved(times(-tension, lj), -moment_j, sj))
-        iterate[j, f.PAIR_J + 6] = -tension
+        du = vec.minus(uj, ui)
+        ci, cj = vec.at(step, j, f.CHORD_I), vec.at(step, j, f.CHORD_J)
+        si, sj = vec.at(step, j, f.TURN_I), vec.at(step, j, f.TURN_J)
+        moment_i = fma(steep, vec.dot(ci, du) + vec.dot(si, wi), step[j, f.PREDICTED_MOMENT_I])
+        moment_j = fma(steep, vec.dot(cj, du) + vec.dot(sj, wj), step[j, f.PREDICTED_MOMENT_J])
+        push = vec.moved(vec.times(moment_i, ci), moment_j, cj)
+        turn = vec.moved(vec.times(tension, ti[1]), -moment_i, si)
+        vec.store_screw(iterate, j, f.PAIR_I, (vec.moved(push, tension, ti[0]), turn))
+        force, turn = vec.both_times(-tension, tj)
+        force, turn = vec.moved(force, -1.0, push), vec.moved(turn, -moment_j, sj)
+        vec.store_screw(iterate, j, f.PAIR_J, (force, turn))
+        iterate[j, f.PAIR_I + f.ROW_V], iterate[j, f.PAIR_J + f.ROW_V] = tension, -tension
 
 
 @register_jitable
 def mean_stretch(state, step, j):
     """Mean rate within a step at which the ring between an element and the next one is shortened [m/s]."""
-    u = moved(vector(state, j, f.SPEED), 0.5, vector(state, j, f.CHANGE))
-    w = moved(vector(state, j, f.OMEGA), 0.5, vector(state, j, f.CHANGE + 3))
-    next_u = moved(vector_ahead(state, j, f.SPEED), 0.5, vector_ahead(state, j, f.CHANGE))
-    next_w = moved(vector_ahead(state, j, f.OMEGA), 0.5, vector_ahead(state, j, f.CHANGE + 3))
-    v = state[j, f.V] + 0.5 * state[j, f.CHANGE + 6]
-    next_v = ahead(state, j, f.V) + 0.5 * ahead(state, j, f.CHANGE + 6)
-    here = dot(vector(step, j, f.TENSION_I), u) + dot(vector(step, j, f.TENSION_I + 3), w) + v
-    return (
-        here
-        - dot(vector(step, j, f.TENSION_J), next_u)
-        - dot(vector(step, j, f.TENSION_J + 3), next_w)
-        - next_v
-    )
+    u, w = motion_ahead(state, j, 0.5)
+    v = state[j, f.V] + 0.5 * state[j, f.CHANGE + f.ROW_V]
+    next_v = ahead(state, j, f.V) + 0.5 * ahead(state, j, f.CHANGE + f.ROW_V)
+    here = vec.both_dot(vec.screw(step, j, f.TENSION_I), motion(state, j, 0.5)) + v
+    t, lever = vec.screw(step, j, f.TENSION_J)
+    return here - vec.dot(t, u) - vec.dot(lever, w) - next_v
 
 
 @register_jitable
 def pull_across(step, iterate, j, o):
     """Force of the ring's tension on an element along o [N]."""
-    ahead_of_it, behind_it = iterate[j, f.ITERATE_TENSION], behind(iterate, j, f.ITERATE_TENSION)
-    return ahead_of_it * dot(vector(step, j, f.TENSION_I), o) - behind_it * dot(
-        vector_behind(step, j, f.TENSION_J), o
-    )
+    pull = iterate[j, f.ITERATE_TENSION] * vec.dot(vec.at(step, j, f.TENSION_I), o)
+    return pull - behind(iterate, j, f.ITERATE_TENSION) * vec.dot(vec.behind(step, j, f.TENSION_J), o)

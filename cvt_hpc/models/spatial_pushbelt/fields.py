@@ -6,15 +6,40 @@ A field that is a vector or a matrix is named by its first number; their count s
 from cvt_hpc.models.pushbelt import fields as planar
 from cvt_hpc.solvers.linked_blocks import field_of_right
 
+# An element's unknowns are the changes of its velocity, angular velocity, V and SLOPE_RATE: the order of rows
+# and columns of its equations. With two flows of ring material, one for each package, w comes behind them.
+SIZE, WIDE = 8, 9
+ROW_U, ROW_W, ROW_V, ROW_P, ROW_HALF = 0, 3, 6, 7, 8
+# The parts of a block by columns, each named by its first row and its first column
+ROWS = ROW_U, ROW_W, ROW_V, ROW_P
+UU, WU, VU, PU, UW, WW, VW, PW, UV, WV, VV, PV, UP, WP, VP, PP = (
+    row + SIZE * column for column in ROWS for row in ROWS
+)
+# A row of `Workspace.blocks` (`solvers.linked_blocks`) begins with the element's own block and that of its
+# link to the next one. Its right sides are the residual, and those by the border's unknowns.
+LINKED = SIZE**2
+RIGHT = field_of_right(SIZE)
+RIGHT_SPEED = RIGHT + SIZE
+RIGHT_OPENINGS = RIGHT_SPEED + SIZE
+WIDE_LINKED = WIDE**2
+WIDE_RIGHT = field_of_right(WIDE)
+
+AXIAL = 2  # coordinate of a vector out of the plane
+
+# Points of an element, of which there are as many at its flanks as at the front to the next one
+LEFT_LOW, LEFT_HIGH, RIGHT_LOW, RIGHT_HIGH = range(4)
+EDGE_LEFT, EDGE_RIGHT, HEAD_LEFT, HEAD_RIGHT = range(4)
+POINTS = 4
+
 # Fields of the state of an element. Speeds are those at the middle of the last step.
 POSITION = 0  # 3: middle of the saddle line, which is the ring line and the assumed centre of gravity [m]
 HEADING = 3  # 3: running direction x of the element, a unit vector
 OUTWARD = 6  # 3: its outward direction o, a unit vector; a = o x x is its axial one
 SLOPE = 9  # of the ring's line in the axial direction [rad]
 SPEED = 10  # 8: velocity of that point [m/s], angular velocity [rad/s], V and SLOPE_RATE
-OMEGA = SPEED + 3
-V = SPEED + 6  # speed of the ring's material along its line [m/s]
-SLOPE_RATE = SPEED + 7  # [rad/s]
+OMEGA = SPEED + ROW_W
+V = SPEED + ROW_V  # speed of the ring's material along its line [m/s]
+SLOPE_RATE = SPEED + ROW_P  # [rad/s]
 LENGTH = 18  # unstretched length of the ring up to the next element [m]
 TENSION = 19  # of both ring packages up to the next element [N]
 SADDLE = 20  # normal force of both ring packages on the element [N]
@@ -33,8 +58,7 @@ RING_FRICTION = 59  # friction force of the element against that [N]
 RING_DUAL = 60
 DRIVEN = 61  # 1 where the nearer pulley is the driven one, else 0
 CHANGE = 62  # 8: of the speeds in the last step, from which the next one starts
-STATE_FIELDS = CHANGE + 8
-POINTS = 4  # contact points of an element at its flanks, and at the front to the next one
+STATE_FIELDS = CHANGE + SIZE
 
 # Entries of the state of the pulleys beside those of `pushbelt.belt`: positions of the mid planes between
 # their sheaves along the axes [m]
@@ -65,9 +89,6 @@ CONTACTS = (
     "ring",
 )
 
-SIZE = 8  # unknowns of an element
-RIGHT = field_of_right(SIZE)  # field of a row of blocks at which its right sides begin
-
 # Fields of Workspace.step. Directions and levers are at q_k where not said otherwise; PREDICTED is at q*.
 PREDICTED_POSITION = 0  # 3
 PREDICTED_HEADING = 3  # 3
@@ -90,7 +111,7 @@ SHEAR = 50  # of the ring at q_k [rad]
 BEND = 51  # change of its slope up to the next element at q_k [rad]
 YAW = 52  # 3: gradient of yaw by angular velocity
 PREDICTED_YAW = 55  # moment of the yaw spring at q_k and of its damper at the old speeds
-NORMAL = 56  # 2: across the path in the plane, of the strand or radial
+NORMAL_Y, NORMAL_Z = 56, 57  # across the path in the plane, of the strand or radial
 PUSH_LEVER_I = 58  # 12: rates of the gaps at the front by angular velocities
 PUSH_LEVER_J = 70  # 12
 PUSH_GAP = 82  # 4
@@ -102,11 +123,13 @@ RADIAL = 96  # 12: e_r of the flanks' points
 MID_RADIAL = 108  # 12: at mid step
 MID_RADIUS = 120  # 4
 FLANK_GAP = 124  # 4: without opening of the sheaves
-INERTIA = 128  # 21: mass of element and ring, 6 x 6, the upper half by columns; over the step
+INERTIA = 128  # 6: mass of element and ring over the step, by velocities, the upper half by columns,
+INERTIA_UW = 134  # 9: of velocities by angular velocities, by columns,
+INERTIA_WW = 143  # 6: and by angular velocities
 GYROSCOPIC = 149  # 3: moment
-DIAGONAL = 152  # 36: blocks of the linear laws, the upper half by columns: of an element,
-LINK = DIAGONAL + 36  # 64: and of it with the next one, by columns
-STEP_FIELDS = LINK + 64
+DIAGONAL = 152  # blocks of the linear laws: of an element,
+LINK = DIAGONAL + SIZE**2  # and of it with the next one
+STEP_FIELDS = LINK + SIZE**2
 
 # Fields of Workspace.iterate
 ITERATE_TENSION = 0
@@ -125,7 +148,9 @@ FLANK_REACHED = 51  # 4
 RING_SLOPE = 55  # decrease of the ring's friction by its slip
 BY_NORMAL = 56  # 12: forces of the flanks' points by their normal forces
 YIELD = 68  # 4: decrease of normal forces by the opening of the sheaves
-FRICTION_SLOPES = 72  # 16: of the friction forces M, T by the slips M, T, at each point mm, mt, tm, tt
+SLOPE_MM, SLOPE_MT, SLOPE_TM, SLOPE_TT = range(
+    72, 88, POINTS
+)  # 4 each: of friction forces M, T by slips M, T
 RESIDUAL = 88  # 8
 TORQUE_ROW = 96  # 6: decrease of the driven pulley's torque by the speeds of an element, and by their own
 TORQUE_OWN = 102  # by the speed of the pulley,
@@ -134,11 +159,8 @@ NORMAL_ROW = 104  # 6: decrease of a flank's axial force by the speeds of an ele
 NORMAL_YIELD = 110  # and by the opening of the sheaves
 ITERATE_FIELDS = 111
 
-# With two flows of ring material, one for each package, an element has one more unknown, w, and more fields.
-WIDE = SIZE + 1
-
-# Fields of its state behind those of one flow; the first is the change of w in the last step
-CHANGE_OF_HALF = CHANGE + SIZE
+# Fields of the state with two flows behind those of one flow; the first is the change of w in the last step
+CHANGE_OF_HALF = CHANGE + ROW_HALF
 HALF_SPEED = STATE_FIELDS + 1  # w, half of the right package's speed less the left one's [m/s]
 HALF_LENGTH = HALF_SPEED + 1  # half of the right package's unstretched length less the left one's [m]
 TENSION_DIFFERENCE = HALF_LENGTH + 1  # D, the right package's tension less the left one's [N]
@@ -148,17 +170,17 @@ SADDLE_RIGHT, SADDLE_LEFT = FRICTION_DIFFERENCE + 1, FRICTION_DIFFERENCE + 2  # 
 DUAL_RIGHT, DUAL_LEFT = SADDLE_LEFT + 1, SADDLE_LEFT + 2
 WIDE_STATE_FIELDS = DUAL_LEFT + 1
 
-# Fields of Workspace.step behind those of one flow. Rows of seven are by velocity, angular velocity, and v in
-# laws of both packages together, w in laws of their difference.
+# Fields of Workspace.step behind those of one flow. Directions have six numbers, by velocity and angular
+# velocity; beside them laws of both packages together have 1 of v, and laws of their difference 1 of w.
 SLIP_BY = STEP_FIELDS  # gradient of sigma, and of delta
-HALF_SLIP_BY = SLIP_BY + 7
-MEAN_I = HALF_SLIP_BY + 7  # direction of T at this element, and at the next one, where T acts against it
-MEAN_J = MEAN_I + 7
-MEAN_BEHIND = MEAN_J + 7  # that of the element behind at this one
-DIFFERENCE_I = MEAN_BEHIND + 7  # the same of D
-DIFFERENCE_J = DIFFERENCE_I + 7
-DIFFERENCE_BEHIND = DIFFERENCE_J + 7
-START_HALF_SLIP = DIFFERENCE_BEHIND + 7
+HALF_SLIP_BY = SLIP_BY + 6
+DIFFERENCE_I = (
+    HALF_SLIP_BY + 6
+)  # direction of D at this element, and at the next one, where D acts against it
+DIFFERENCE_J = DIFFERENCE_I + 6
+TENSION_BEHIND = DIFFERENCE_J + 6  # of the element behind TENSION_J
+DIFFERENCE_BEHIND = TENSION_BEHIND + 6  # and DIFFERENCE_J
+START_HALF_SLIP = DIFFERENCE_BEHIND + 6
 PREDICTED_DIFFERENCE = START_HALF_SLIP + 1
 CROSS_SLOPE = PREDICTED_DIFFERENCE + 1  # of T by D's direction and of D by T's; TENSION_SLOPE is their own
 WIDE_STEP_FIELDS = CROSS_SLOPE + 1
@@ -168,3 +190,8 @@ ITERATE_DIFFERENCE = ITERATE_FIELDS
 SLOPE_DIFFERENCE = ITERATE_DIFFERENCE + 1  # RING_SLOPE is the sum of both packages' slopes
 HALF_RESIDUAL = SLOPE_DIFFERENCE + 1  # of the equation of w
 WIDE_ITERATE_FIELDS = HALF_RESIDUAL + 1
+
+
+def vector(first: int) -> slice:
+    """The three fields of a vector."""
+    return slice(first, first + 3)

@@ -22,18 +22,8 @@ from cvt_hpc.models.pushbelt import fields as planar
 from cvt_hpc.models.pushbelt.border import of_pulley
 from cvt_hpc.models.pushbelt.friction import flank_friction
 from cvt_hpc.models.spatial_pushbelt import fields as f
-from cvt_hpc.models.spatial_pushbelt.rotations import (
-    accumulate,
-    cross,
-    dot,
-    moved,
-    plus,
-    plus_cross,
-    store,
-    times,
-    unit,
-    vector,
-)
+from cvt_hpc.models.spatial_pushbelt import vectors as vec
+from cvt_hpc.models.spatial_pushbelt.chain import motion
 from cvt_hpc.physics.contact_laws import pressed
 
 
@@ -48,15 +38,15 @@ def flank_point(belt, p):
 @register_jitable
 def lever_of(o, a, side, height, width):
     """Q - r."""
-    return moved(times(height, o), side * width, a)
+    return vec.moved(vec.times(height, o), side * width, a)
 
 
 @register_jitable
 def frustum(q, centre, axis):
     """e_r, rho and axial position of a point."""
     d = q[0] - centre, q[1], q[2]
-    along = dot(d, axis)
-    radial, radius = unit(moved(d, -along, axis))
+    along = vec.dot(d, axis)
+    radial, radius = vec.unit(vec.moved(d, -along, axis))
     return radial, radius, along
 
 
@@ -80,17 +70,17 @@ def pulley_axis(belt, driven):
 @register_jitable
 def flank_directions(belt, radial, axis, side):
     """n, m and e_t from e_r."""
-    n = moved(times(belt.sine, radial), -side * belt.cosine, axis)
-    m = moved(times(belt.cosine, radial), side * belt.sine, axis)
-    return n, m, cross(axis, radial)
+    n = vec.moved(vec.times(belt.sine, radial), -side * belt.cosine, axis)
+    m = vec.moved(vec.times(belt.cosine, radial), side * belt.sine, axis)
+    return n, m, vec.cross(axis, radial)
 
 
 @register_jitable
 def along_arc(belt, state, j):
     """Cosine and sine of the angle at which the pitch line of an element stands about its pulley."""
-    o = vector(state, j, f.OUTWARD)
-    y = state[j, f.POSITION] - belt.pitch_depth * o[0] - state[j, f.DRIVEN] * belt.centre_distance
-    z = state[j, f.POSITION + 1] - belt.pitch_depth * o[1]
+    r, o = vec.at(state, j, f.POSITION), vec.at(state, j, f.OUTWARD)
+    y = r[0] - belt.pitch_depth * o[0] - state[j, f.DRIVEN] * belt.centre_distance
+    z = r[1] - belt.pitch_depth * o[1]
     per_radius = 1.0 / sqrt(y * y + z * z)
     return y * per_radius, z * per_radius
 
@@ -103,22 +93,22 @@ def predict_flanks(belt, state, pulleys, step, dt):
         centre, axis = driven * belt.centre_distance, pulley_axis(belt, driven)
         groove = of_pulley(pulleys[planar.DRIVING_RADIUS], pulleys[planar.DRIVEN_RADIUS], driven)
         middle = of_pulley(pulleys[f.DRIVING_MIDDLE], pulleys[f.DRIVEN_MIDDLE], driven)
-        r, o = vector(state, j, f.POSITION), vector(state, j, f.OUTWARD)
-        a = cross(o, vector(state, j, f.HEADING))
-        half = moved(r, 0.5 * dt, vector(state, j, f.SPEED))
-        half_o, half_a = vector(step, j, f.MID_OUTWARD), vector(step, j, f.MID_AXIAL)
-        s, po = vector(step, j, f.PREDICTED_POSITION), vector(step, j, f.PREDICTED_OUTWARD)
-        pa = cross(po, vector(step, j, f.PREDICTED_HEADING))
+        r, o = vec.at(state, j, f.POSITION), vec.at(state, j, f.OUTWARD)
+        a = vec.cross(o, vec.at(state, j, f.HEADING))
+        half = vec.moved(r, 0.5 * dt, vec.at(state, j, f.SPEED))
+        half_o, half_a = vec.at(step, j, f.MID_OUTWARD), vec.at(step, j, f.MID_AXIAL)
+        s, po = vec.at(step, j, f.PREDICTED_POSITION), vec.at(step, j, f.PREDICTED_OUTWARD)
+        pa = vec.cross(po, vec.at(step, j, f.PREDICTED_HEADING))
         for p in range(f.POINTS):
             side, height, width = flank_point(belt, p)
-            radial, _, _ = frustum(plus(r, lever_of(o, a, side, height, width)), centre, axis)
-            store(step, j, f.RADIAL + 3 * p, radial)
+            radial, _, _ = frustum(vec.plus(r, lever_of(o, a, side, height, width)), centre, axis)
+            vec.store(step, j, f.RADIAL + 3 * p, radial)
             radial, radius, _ = frustum(
-                plus(half, lever_of(half_o, half_a, side, height, width)), centre, axis
+                vec.plus(half, lever_of(half_o, half_a, side, height, width)), centre, axis
             )
-            store(step, j, f.MID_RADIAL + 3 * p, radial)
+            vec.store(step, j, f.MID_RADIAL + 3 * p, radial)
             step[j, f.MID_RADIUS + p] = radius
-            _, radius, along = frustum(plus(s, lever_of(po, pa, side, height, width)), centre, axis)
+            _, radius, along = frustum(vec.plus(s, lever_of(po, pa, side, height, width)), centre, axis)
             step[j, f.FLANK_GAP + p] = frustum_gap(belt, side, radius, along, groove, middle)
 
 
@@ -142,28 +132,31 @@ def flank_forces(belt, state, pulleys, increments, openings, shapes, step, itera
             driven_one = openings[1, k] + increments[1 + modes + k]
             opening = opening + of_pulley(driving, driven_one, driven) * shapes[j, k]
         opening = belt.cosine * opening
-        du, dw = vector(state, j, f.CHANGE), vector(state, j, f.CHANGE + 3)
-        u, omega = plus(vector(state, j, f.SPEED), du), plus(vector(state, j, f.OMEGA), dw)
-        o = vector(state, j, f.OUTWARD)
-        a = cross(o, vector(state, j, f.HEADING))
-        half_o, half_a = vector(step, j, f.MID_OUTWARD), vector(step, j, f.MID_AXIAL)
+        du, dw = vec.screw(state, j, f.CHANGE)
+        u, omega = motion(state, j, 1.0)
+        o = vec.at(state, j, f.OUTWARD)
+        a = vec.cross(o, vec.at(state, j, f.HEADING))
+        half_o, half_a = vec.at(step, j, f.MID_OUTWARD), vec.at(step, j, f.MID_AXIAL)
         none = like(0.0, driven)
-        force = turn = left = left_turn = none, none, none
+        nothing = (none, none, none), (none, none, none)
+        left = force = nothing
         for p in range(f.POINTS):
-            if p == 2:
-                left, left_turn = force, turn
-                force = turn = none, none, none
+            if p == f.RIGHT_LOW:
+                left, force = force, nothing
             side, height, half_width = flank_point(belt, p)
             lever = lever_of(o, a, side, height, half_width)
-            n, m, t = flank_directions(belt, vector(step, j, f.RADIAL + 3 * p), axis, side)
-            gap = fma(dt, dot(n, plus(du, cross(dw, lever))), step[j, f.FLANK_GAP + p] + opening)
+            n, m, t = flank_directions(belt, vec.at(step, j, f.RADIAL + 3 * p), axis, side)
+            gap = fma(dt, vec.dot(n, vec.plus(du, vec.cross(dw, lever))), step[j, f.FLANK_GAP + p] + opening)
             normal, stiff = pressed(gap, stiffness)
             iterate[j, f.FLANK_REACHED + p], iterate[j, f.YIELD + p] = gap, stiff
 
             half = lever_of(half_o, half_a, side, height, half_width)
-            _, half_m, half_t = flank_directions(belt, vector(step, j, f.MID_RADIAL + 3 * p), axis, side)
-            q = plus(u, cross(omega, half))
-            along, around_it = dot(half_m, q), fma(-step[j, f.MID_RADIUS + p], rotation, dot(half_t, q))
+            _, half_m, half_t = flank_directions(belt, vec.at(step, j, f.MID_RADIAL + 3 * p), axis, side)
+            q = vec.plus(u, vec.cross(omega, half))
+            along, around_it = (
+                vec.dot(half_m, q),
+                fma(-step[j, f.MID_RADIUS + p], rotation, vec.dot(half_t, q)),
+            )
             earlier = state[j, f.FLANK_SLIP_M + p], state[j, f.FLANK_SLIP_T + p]
             dual = state[j, f.FLANK_DUAL_M + p], state[j, f.FLANK_DUAL_T + p]
             slip = along, around_it
@@ -174,17 +167,14 @@ def flank_forces(belt, state, pulleys, increments, openings, shapes, step, itera
             state[j, f.FLANK + p] = normal
             state[j, f.FLANK_FRICTION_M + p] = normal * grip_m
             state[j, f.FLANK_FRICTION_T + p] = normal * grip_t
-            first = f.FRICTION_SLOPES + 4 * p
-            iterate[j, first], iterate[j, first + 1] = normal * mm, normal * mt
-            iterate[j, first + 2], iterate[j, first + 3] = normal * tm, normal * tt
-            by_normal = moved(moved(n, -grip_m, m), -grip_t, t)
-            store(iterate, j, f.BY_NORMAL + 3 * p, by_normal)
-            force = moved(force, normal, by_normal)
-            turn = moved(turn, normal, cross(lever, by_normal))
-        store(iterate, j, f.RESIDUAL, plus(left, force))
-        store(iterate, j, f.RESIDUAL + 3, plus(left_turn, turn))
-        iterate[j, f.RESIDUAL + 6] = 0.0
-        iterate[j, f.RESIDUAL + 7] = 0.0
+            iterate[j, f.SLOPE_MM + p], iterate[j, f.SLOPE_MT + p] = normal * mm, normal * mt
+            iterate[j, f.SLOPE_TM + p], iterate[j, f.SLOPE_TT + p] = normal * tm, normal * tt
+            by_normal = vec.moved(vec.moved(n, -grip_m, m), -grip_t, t)
+            vec.store(iterate, j, f.BY_NORMAL + 3 * p, by_normal)
+            force = vec.both_moved(force, normal, (by_normal, vec.cross(lever, by_normal)))
+        vec.store_screw(iterate, j, f.RESIDUAL, vec.both_plus(left, force))
+        iterate[j, f.RESIDUAL + f.ROW_V] = 0.0
+        iterate[j, f.RESIDUAL + f.ROW_P] = 0.0
 
 
 @register_jitable
@@ -196,21 +186,22 @@ def _point_slopes(belt, step, iterate, j, p, axes, dt):
     axis, o, a, half_o, half_a = axes
     side, height, half_width = flank_point(belt, p)
     lever = lever_of(o, a, side, height, half_width)
-    n, m, t = flank_directions(belt, vector(step, j, f.RADIAL + 3 * p), axis, side)
+    n, m, t = flank_directions(belt, vec.at(step, j, f.RADIAL + 3 * p), axis, side)
     half = lever_of(half_o, half_a, side, height, half_width)
-    _, half_m, half_t = flank_directions(belt, vector(step, j, f.MID_RADIAL + 3 * p), axis, side)
-    first = f.FRICTION_SLOPES + 4 * p
-    by_gap = times(dt * iterate[j, f.YIELD + p], vector(iterate, j, f.BY_NORMAL + 3 * p))
-    by_m = moved(times(iterate[j, first], m), iterate[j, first + 2], t)
-    by_t = moved(times(iterate[j, first + 1], m), iterate[j, first + 3], t)
-    turns = cross(lever, n), cross(half, half_m), cross(half, half_t)
+    _, half_m, half_t = flank_directions(belt, vec.at(step, j, f.MID_RADIAL + 3 * p), axis, side)
+    by_gap = vec.times(dt * iterate[j, f.YIELD + p], vec.at(iterate, j, f.BY_NORMAL + 3 * p))
+    by_m = vec.moved(vec.times(iterate[j, f.SLOPE_MM + p], m), iterate[j, f.SLOPE_TM + p], t)
+    by_t = vec.moved(vec.times(iterate[j, f.SLOPE_MT + p], m), iterate[j, f.SLOPE_TT + p], t)
+    turns = vec.cross(lever, n), vec.cross(half, half_m), vec.cross(half, half_t)
     return (by_gap, by_m, by_t), (n, half_m, half_t), turns, lever, t
 
 
 @register_jitable
 def _by(forces, rows, k):
     """The forces times entry k of their rows; k is a plain number of the source."""
-    return moved(moved(times(rows[0][k], forces[0]), rows[1][k], forces[1]), rows[2][k], forces[2])
+    return vec.moved(
+        vec.moved(vec.times(rows[0][k], forces[0]), rows[1][k], forces[1]), rows[2][k], forces[2]
+    )
 
 
 @register_jitable
@@ -218,20 +209,23 @@ def _columns(points, k):
     """Forces of the two points of a side and their moments, by entry k of the velocity and of turning."""
     (forces, rows, turns, lever, _), (more, more_rows, more_turns, more_lever, _) = points
     low, high = _by(forces, rows, k), _by(more, more_rows, k)
-    moving = plus(low, high), plus_cross(cross(lever, low), more_lever, high)
+    moving = vec.plus(low, high), vec.plus_cross(vec.cross(lever, low), more_lever, high)
     low, high = _by(forces, turns, k), _by(more, more_turns, k)
-    return moving, (plus(low, high), plus_cross(cross(lever, low), more_lever, high))
+    return moving, (vec.plus(low, high), vec.plus_cross(vec.cross(lever, low), more_lever, high))
 
 
 @register_jitable
 def _add_columns(blocks, j, k, left, right):
     """Add what both sides have by entry k of the velocity and of turning to an element's block."""
     (left, left_turning), (right, right_turning) = _columns(left, k), _columns(right, k)
-    first = 8 * k
-    accumulate(blocks, j, first, plus(left[0], right[0]))
-    accumulate(blocks, j, first + 3, plus(left[1], right[1]))
-    accumulate(blocks, j, first + 24, plus(left_turning[0], right_turning[0]))
-    accumulate(blocks, j, first + 27, plus(left_turning[1], right_turning[1]))
+    vec.add_screw(blocks, j, f.UU + f.SIZE * k, vec.both_plus(left, right))
+    vec.add_screw(blocks, j, f.UW + f.SIZE * k, vec.both_plus(left_turning, right_turning))
+
+
+@register_jitable
+def _with_force(total, lever, g):
+    """A force and a moment, and another force at a lever."""
+    return vec.plus(total[0], g), vec.plus_cross(total[1], lever, g)
 
 
 @register_jitable
@@ -243,34 +237,30 @@ def _border_of_side(belt, step, iterate, j, p, points, driven, dt):
     own speed and by an opening, and of the axial force by an opening.
     """
     none = like(0.0, driven)
-    drive = drive_turn = give = give_turn = none, none, none
-    torque = torque_turn = press = press_turn = none, none, none
+    drive = give = torque = press = (none, none, none), (none, none, none)
     own = by_opening = yielding = none
     (forces, rows, turns, lever, t), high = points
     for q in range(2):
         if q == 1:
             forces, rows, turns, lever, t = high
-        first, by_normal = f.FRICTION_SLOPES + 4 * (p + q), vector(iterate, j, f.BY_NORMAL + 3 * (p + q))
+        by_normal = vec.at(iterate, j, f.BY_NORMAL + 3 * (p + q))
         stiff, radius = iterate[j, f.YIELD + p + q], step[j, f.MID_RADIUS + p + q]
-        tm, tt = iterate[j, first + 2], iterate[j, first + 3]
-        g = times(-radius * driven, forces[2])
-        drive, drive_turn = plus(drive, g), plus_cross(drive_turn, lever, g)
+        tm, tt = iterate[j, f.SLOPE_TM + p + q], iterate[j, f.SLOPE_TT + p + q]
+        drive = _with_force(drive, lever, vec.times(-radius * driven, forces[2]))
         if belt.modal_stiffness.shape[1] > 0:
-            g = times(belt.cosine * stiff, by_normal)
-            give, give_turn = plus(give, g), plus_cross(give_turn, lever, g)
-            push = 0.5 * belt.cosine * dt * stiff
-            press, press_turn = moved(press, push, rows[0]), moved(press_turn, push, turns[0])
+            give = _with_force(give, lever, vec.times(belt.cosine * stiff, by_normal))
+            press = vec.both_moved(press, 0.5 * belt.cosine * dt * stiff, (rows[0], turns[0]))
             yielding += 0.5 * belt.cosine * belt.cosine * stiff
         # decrease of the torque by the speeds of the element
-        grip, weight = -dot(t, by_normal), radius * driven
+        grip, weight = -vec.dot(t, by_normal), radius * driven
         held = weight * grip * dt * stiff
         slide, swing = -weight * tm, -weight * tt
-        torque = moved(moved(moved(torque, held, rows[0]), slide, rows[1]), swing, rows[2])
-        torque_turn = moved(moved(moved(torque_turn, held, turns[0]), slide, turns[1]), swing, turns[2])
+        torque = vec.both_moved(torque, held, (rows[0], turns[0]))
+        torque = vec.both_moved(torque, slide, (rows[1], turns[1]))
+        torque = vec.both_moved(torque, swing, (rows[2], turns[2]))
         own += weight * radius * tt
         by_opening += weight * grip * belt.cosine * stiff
-    by_border = drive, drive_turn, give, give_turn
-    return by_border, (press, press_turn, torque, torque_turn), (own, by_opening, yielding)
+    return (drive, give), (press, torque), (own, by_opening, yielding)
 
 
 @kernel
@@ -279,39 +269,33 @@ def add_flank_blocks(belt, state, shapes, step, iterate, blocks, dt):
     modes = belt.modal_stiffness.shape[1]
     for j in range(step.rows):
         driven = state[j, f.DRIVEN]
-        o = vector(state, j, f.OUTWARD)
-        a = cross(o, vector(state, j, f.HEADING))
-        axes = pulley_axis(belt, driven), o, a, vector(step, j, f.MID_OUTWARD), vector(step, j, f.MID_AXIAL)
+        o = vec.at(state, j, f.OUTWARD)
+        a = vec.cross(o, vec.at(state, j, f.HEADING))
+        axes = pulley_axis(belt, driven), o, a, vec.at(step, j, f.MID_OUTWARD), vec.at(step, j, f.MID_AXIAL)
         left = (
-            _point_slopes(belt, step, iterate, j, 0, axes, dt),
-            _point_slopes(belt, step, iterate, j, 1, axes, dt),
+            _point_slopes(belt, step, iterate, j, f.LEFT_LOW, axes, dt),
+            _point_slopes(belt, step, iterate, j, f.LEFT_HIGH, axes, dt),
         )
         right = (
-            _point_slopes(belt, step, iterate, j, 2, axes, dt),
-            _point_slopes(belt, step, iterate, j, 3, axes, dt),
+            _point_slopes(belt, step, iterate, j, f.RIGHT_LOW, axes, dt),
+            _point_slopes(belt, step, iterate, j, f.RIGHT_HIGH, axes, dt),
         )
         _add_columns(blocks, j, 0, left, right)
         _add_columns(blocks, j, 1, left, right)
         _add_columns(blocks, j, 2, left, right)
-        by_border, rows, own = _border_of_side(belt, step, iterate, j, 0, left, driven, dt)
-        more, more_rows, more_own = _border_of_side(belt, step, iterate, j, 2, right, driven, dt)
-        drive, drive_turn = plus(by_border[0], more[0]), plus(by_border[1], more[1])
-        give, give_turn = plus(by_border[2], more[2]), plus(by_border[3], more[3])
-        store(iterate, j, f.NORMAL_ROW, plus(rows[0], more_rows[0]))
-        store(iterate, j, f.NORMAL_ROW + 3, plus(rows[1], more_rows[1]))
-        store(iterate, j, f.TORQUE_ROW, plus(rows[2], more_rows[2]))
-        store(iterate, j, f.TORQUE_ROW + 3, plus(rows[3], more_rows[3]))
+        by_border, rows, own = _border_of_side(belt, step, iterate, j, f.LEFT_LOW, left, driven, dt)
+        more, more_rows, more_own = _border_of_side(belt, step, iterate, j, f.RIGHT_LOW, right, driven, dt)
+        drive, give = vec.both_plus(by_border[0], more[0]), vec.both_plus(by_border[1], more[1])
+        vec.store_screw(iterate, j, f.NORMAL_ROW, vec.both_plus(rows[0], more_rows[0]))
+        vec.store_screw(iterate, j, f.TORQUE_ROW, vec.both_plus(rows[1], more_rows[1]))
         iterate[j, f.TORQUE_OWN], iterate[j, f.TORQUE_OPENING] = own[0] + more_own[0], own[1] + more_own[1]
         iterate[j, f.NORMAL_YIELD] = own[2] + more_own[2]
-        store(blocks, j, f.RIGHT + 8, drive)
-        store(blocks, j, f.RIGHT + 11, drive_turn)
-        blocks[j, f.RIGHT + 14] = 0.0
-        blocks[j, f.RIGHT + 15] = 0.0
+        vec.store_screw(blocks, j, f.RIGHT_SPEED, drive)
+        blocks[j, f.RIGHT_SPEED + f.ROW_V] = 0.0
+        blocks[j, f.RIGHT_SPEED + f.ROW_P] = 0.0
         for k in range(2 * modes):
             pulley = driven if k >= modes else 1.0 - driven
-            weight = pulley * shapes[j, k % modes]
-            first = f.RIGHT + 16 + 8 * k
-            store(blocks, j, first, times(weight, give))
-            store(blocks, j, first + 3, times(weight, give_turn))
-            blocks[j, first + 6] = 0.0
-            blocks[j, first + 7] = 0.0
+            right_side = f.RIGHT_OPENINGS + f.SIZE * k
+            vec.store_screw(blocks, j, right_side, vec.both_times(pulley * shapes[j, k % modes], give))
+            blocks[j, right_side + f.ROW_V] = 0.0
+            blocks[j, right_side + f.ROW_P] = 0.0

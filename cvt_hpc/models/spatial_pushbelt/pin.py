@@ -16,18 +16,7 @@ from numba.extending import register_jitable
 from cvt_hpc.kernels import kernel
 from cvt_hpc.lanes import fma, maximum, sqrt
 from cvt_hpc.models.spatial_pushbelt import fields as f
-from cvt_hpc.models.spatial_pushbelt.rotations import (
-    accumulate,
-    cross,
-    dot,
-    minus,
-    moved,
-    plus,
-    store,
-    times,
-    vector,
-    vector_ahead,
-)
+from cvt_hpc.models.spatial_pushbelt import vectors as vec
 from cvt_hpc.physics.contact_laws import pressed
 
 _LEAST = 1e-12  # offset that has a direction [m]
@@ -36,10 +25,10 @@ _LEAST = 1e-12  # offset that has a direction [m]
 @register_jitable
 def pin_offset(ri, xi, oi, rj, xj, oj, thickness, height):
     """Offset of pin and hole across x_j, its size [m], and P - r_i."""
-    arm = moved(times(0.5 * thickness, xi), height, oi)
-    d = moved(moved(plus(minus(ri, rj), arm), 0.5 * thickness, xj), -height, oj)
-    d = moved(d, -dot(d, xj), xj)
-    return d, sqrt(dot(d, d)), arm
+    arm = vec.moved(vec.times(0.5 * thickness, xi), height, oi)
+    d = vec.moved(vec.moved(vec.plus(vec.minus(ri, rj), arm), 0.5 * thickness, xj), -height, oj)
+    d = vec.moved(d, -vec.dot(d, xj), xj)
+    return d, sqrt(vec.dot(d, d)), arm
 
 
 @kernel
@@ -47,17 +36,17 @@ def predict_pins(belt, state, step):
     """Gaps at q*, directions and levers at q_k."""
     thickness, height = belt.thickness, belt.pin_height
     for j in range(state.rows):
-        ri, rj = vector(state, j, f.POSITION), vector_ahead(state, j, f.POSITION)
-        xi, xj = vector(state, j, f.HEADING), vector_ahead(state, j, f.HEADING)
-        oi, oj = vector(state, j, f.OUTWARD), vector_ahead(state, j, f.OUTWARD)
+        ri, rj = vec.at(state, j, f.POSITION), vec.ahead(state, j, f.POSITION)
+        xi, xj = vec.at(state, j, f.HEADING), vec.ahead(state, j, f.HEADING)
+        oi, oj = vec.at(state, j, f.OUTWARD), vec.ahead(state, j, f.OUTWARD)
         d, size, arm = pin_offset(ri, xi, oi, rj, xj, oj, thickness, height)
-        n = times(1.0 / maximum(size, _LEAST), d)
-        store(step, j, f.PIN_NORMAL, n)
-        store(step, j, f.PIN_LEVER_I, cross(arm, n))
-        store(step, j, f.PIN_LEVER_J, cross(plus(minus(ri, rj), arm), n))
-        si, sj = vector(step, j, f.PREDICTED_POSITION), vector_ahead(step, j, f.PREDICTED_POSITION)
-        yi, yj = vector(step, j, f.PREDICTED_HEADING), vector_ahead(step, j, f.PREDICTED_HEADING)
-        pi, pj = vector(step, j, f.PREDICTED_OUTWARD), vector_ahead(step, j, f.PREDICTED_OUTWARD)
+        n = vec.times(1.0 / maximum(size, _LEAST), d)
+        vec.store(step, j, f.PIN_NORMAL, n)
+        vec.store(step, j, f.PIN_LEVER_I, vec.cross(arm, n))
+        vec.store(step, j, f.PIN_LEVER_J, vec.cross(vec.plus(vec.minus(ri, rj), arm), n))
+        si, sj = vec.at(step, j, f.PREDICTED_POSITION), vec.ahead(step, j, f.PREDICTED_POSITION)
+        yi, yj = vec.at(step, j, f.PREDICTED_HEADING), vec.ahead(step, j, f.PREDICTED_HEADING)
+        pi, pj = vec.at(step, j, f.PREDICTED_OUTWARD), vec.ahead(step, j, f.PREDICTED_OUTWARD)
         _, size, _ = pin_offset(si, yi, pi, sj, yj, pj, thickness, height)
         step[j, f.PIN_GAP] = belt.pin_clearance - size
 
@@ -66,19 +55,13 @@ def predict_pins(belt, state, step):
 def pin_forces(belt, state, step, iterate, dt):
     """Forces and their slopes of an iterate; adds to the pairs' forces."""
     for j in range(step.rows):
-        n, a, b = (
-            vector(step, j, f.PIN_NORMAL),
-            vector(step, j, f.PIN_LEVER_I),
-            vector(step, j, f.PIN_LEVER_J),
-        )
-        du = minus(vector(state, j, f.CHANGE), vector_ahead(state, j, f.CHANGE))
-        parting = (
-            dot(n, du) + dot(a, vector(state, j, f.CHANGE + 3)) - dot(b, vector_ahead(state, j, f.CHANGE + 3))
-        )
+        n = vec.at(step, j, f.PIN_NORMAL)
+        a, b = vec.at(step, j, f.PIN_LEVER_I), vec.at(step, j, f.PIN_LEVER_J)
+        wi, wj = vec.at(state, j, f.CHANGE + f.ROW_W), vec.ahead(state, j, f.CHANGE + f.ROW_W)
+        du = vec.minus(vec.at(state, j, f.CHANGE), vec.ahead(state, j, f.CHANGE))
+        parting = vec.dot(n, du) + vec.dot(a, wi) - vec.dot(b, wj)
         gap = fma(-dt, parting, step[j, f.PIN_GAP])
         force, k = pressed(gap, belt.pin_stiffness)
         state[j, f.PIN], iterate[j, f.PIN_REACHED], iterate[j, f.PIN_SLOPE] = force, gap, dt * k
-        accumulate(iterate, j, f.PAIR_I, times(-force, n))
-        accumulate(iterate, j, f.PAIR_I + 3, times(-force, a))
-        accumulate(iterate, j, f.PAIR_J, times(force, n))
-        accumulate(iterate, j, f.PAIR_J + 3, times(force, b))
+        vec.add_screw(iterate, j, f.PAIR_I, vec.both_times(-force, (n, a)))
+        vec.add_screw(iterate, j, f.PAIR_J, vec.both_times(force, (n, b)))

@@ -76,7 +76,7 @@ def _points(elements: np.ndarray, first: int) -> np.ndarray:
 
 
 def _vectors(elements: np.ndarray, first: int) -> np.ndarray:
-    return elements[:, first : first + 3]
+    return elements[:, fields.vector(first)]
 
 
 def _dot(a: np.ndarray, b: np.ndarray) -> np.ndarray:
@@ -97,7 +97,7 @@ def angles(elements: np.ndarray) -> np.ndarray:
     """
     position, o = _vectors(elements, fields.POSITION), _vectors(elements, fields.OUTWARD)
     chord = np.roll(position, -1, axis=0) - np.roll(position, 1, axis=0)
-    return np.array([o[:, 2], elements[:, fields.HEADING + 2], -_dot(_unit(chord), o)])
+    return np.array([o[:, 2], elements[:, fields.HEADING + fields.AXIAL], -_dot(_unit(chord), o)])
 
 
 class Reading:

@@ -8,15 +8,7 @@ from typing import TYPE_CHECKING, Any
 import numpy as np
 
 from cvt_hpc.models.pushbelt import record as pushbelt
-from cvt_hpc.models.spatial_pushbelt.readings import (
-    ANGLES,
-    EXTREMES,
-    LATERAL,
-    OF_TWO_FLOWS,
-    PROFILES,
-    SHEAVES,
-    SIDES,
-)
+from cvt_hpc.models.spatial_pushbelt import readings
 from cvt_hpc.physics.out_of_plane import clamped_force
 from cvt_hpc.variables import Coordinate, Variable
 from cvt_hpc.variator import PULLEYS, STRANDS, judging
@@ -41,75 +33,66 @@ _OF_STRANDS = tuple(v for v in (*assessment.VARIABLES, *ramp.VARIABLES) if v.dim
 VARIABLES = (
     *pushbelt.VARIABLES,
     *(
-        Variable(f"lateral_{v.name}", v.dims, v.dtype, v.units, f"as {v.name}, out of the plane")
+        Variable(f"lateral_{v.name}", v.units, f"as {v.name}, out of the plane", dims=v.dims, dtype=v.dtype)
         for v in _OF_STRANDS
     ),
     Variable(
         "lateral_spectrum",
-        ("strand", "frequency_bin"),
-        "f8",
         "m",
         "at the probe strongest out of the plane",
+        dims=("strand", "frequency_bin"),
         words="lateral amplitude spectrum",
     ),
-    Variable("sheave_force", ("sheave",), "f8", "N", "mean axial force of the belt on each sheave, outwards"),
-    Variable("sheave_loss", ("sheave",), "f8", "W", "mean friction power of the flanks at each sheave"),
+    Variable("sheave_force", "N", "mean axial force of the belt on each sheave, outwards", dims=("sheave",)),
+    Variable("sheave_loss", "W", "mean friction power of the flanks at each sheave", dims=("sheave",)),
     Variable(
         "net_axial_force",
-        ("pulley",),
-        "f8",
         "N",
         "mean force of the belt on both sheaves along their axis, to the right",
+        dims=("pulley",),
     ),
     Variable(
         "beam_axial_force",
-        ("pulley",),
-        "f8",
         "N",
         "the same by both strands as beams under their mean forces, held without slope at the arcs",
+        dims=("pulley",),
         words="clamped strands",
     ),
     Variable(
         "string_axial_force",
-        ("pulley",),
-        "f8",
         "N",
         "the same by both strands as strings under their mean forces",
+        dims=("pulley",),
         words="strings",
     ),
     Variable(
         "strand_one_sidedness",
-        ("strand",),
-        "f8",
         "1",
         "push force of the right side less the left one's over both, means over the strand",
+        dims=("strand",),
         words="one-sided push in strands",
     ),
     Variable(
         "arc_one_sidedness",
-        ("pulley",),
-        "f8",
         "1",
         "push force of the right side less the left one's over both, means over the arc",
+        dims=("pulley",),
         words="one-sided push in arcs",
     ),
     *(
-        Variable(f"largest_{angle}", (), "f8", "rad", f"largest {words} of an element over the judged part")
+        Variable(f"largest_{angle}", "rad", f"largest {words} of an element over the judged part")
         for angle, words in zip(
-            ANGLES, ("lateral lean", "yaw out of the plane", "tilt against the rings"), strict=True
+            readings.ANGLES, ("lateral lean", "yaw out of the plane", "tilt against the rings"), strict=True
         )
     ),
-    Variable("largest_nose_force", (), "f8", "N", "largest force of a nose over the judged part"),
+    Variable("largest_nose_force", "N", "largest force of a nose over the judged part"),
     Variable(
         "mean_tension_difference",
-        ("strand",),
-        "f8",
         "N",
         "ring tension of the right package less the left one's; not a number with one flow for both",
+        dims=("strand",),
     ),
-    Variable(
-        "final_misalignment", (), "f8", "m", "mean axial offset of the pulleys' mid planes as sheaves stand"
-    ),
+    Variable("final_misalignment", "m", "mean axial offset of the pulleys' mid planes as sheaves stand"),
 )
 
 
@@ -121,7 +104,7 @@ def coordinates(parameters: Mapping[str, Any]) -> dict[str, Coordinate]:
     parameters : dict
         Flat parameters of the job.
     """
-    sheave = Coordinate(np.array(SHEAVES), "", "sheave", "pulley and side")
+    sheave = Coordinate(np.array(readings.SHEAVES), "", "sheave", "pulley and side")
     return {**pushbelt.coordinates(parameters), "sheave": sheave}
 
 
@@ -143,7 +126,7 @@ def judge(run: ElementRun) -> dict[str, Any]:
     run : ElementRun
         With all samples recorded, or those until it slipped through.
     """
-    both = (*STRANDS, *LATERAL)
+    both = (*STRANDS, *readings.LATERAL)
     if run.failure is not None:
         return _by_plane(judging.slipped(run, both)) | pushbelt.speeds(run, slide(run))
     found = judging.assess(run, both)
@@ -164,11 +147,9 @@ def _by_plane(record: dict[str, Any]) -> dict[str, Any]:
 
 def _evaluate(run: ElementRun) -> dict[str, Any]:
     """Values of a finished run that the planar pushbelt has not."""
-    forces = each(run, "sheave_force", SHEAVES)
-    largest = {
-        f"largest_{what}": float(run.channel(f"extreme_{what}")[run.judged].max()) for what in EXTREMES
-    }
-    left, right = (run.profiles[f"push_force_{side}"] for side in SIDES)
+    forces = each(run, "sheave_force", readings.SHEAVES)
+    extremes = {what: run.channel(f"extreme_{what}")[run.judged].max() for what in readings.EXTREMES}
+    left, right = (run.profiles[f"push_force_{side}"] for side in readings.SIDES)
     where = regions(run.path, run.places)
 
     def one_sided(name: str) -> float:
@@ -188,11 +169,11 @@ def _evaluate(run: ElementRun) -> dict[str, Any]:
         "beam_axial_force": signs * sum(held),
         "string_axial_force": signs * offset / path.strand_length * np.maximum(net, 0.0).sum(),
         "sheave_force": forces,
-        "sheave_loss": each(run, "sheave_loss", SHEAVES),
+        "sheave_loss": each(run, "sheave_loss", readings.SHEAVES),
         "net_axial_force": forces[1::2] - forces[::2],
         "strand_one_sidedness": np.array([one_sided(strand) for strand in STRANDS]),
         "arc_one_sidedness": np.array([one_sided(pulley) for pulley in PULLEYS]),
-        **largest,
+        **{f"largest_{what}": float(value) for what, value in extremes.items()},
         "mean_tension_difference": each(run, "tension_difference", STRANDS),
         "final_misalignment": mean(run, "axial_offset"),
     }
@@ -212,11 +193,11 @@ def histories(run: ElementRun) -> xr.Dataset:
         That of the planar pushbelt; probes of t1_lateral and t2_lateral move out of the plane, to the right.
     """
     outwards = "of the belt on the sheave, outwards"
-    over_time = {f"sheave_force {k}": (f"axial force {k}", "N", outwards) for k in SHEAVES}
+    over_time = {f"sheave_force {k}": (f"axial force {k}", "N", outwards) for k in readings.SHEAVES}
     over_time["axial_offset"] = ("axial offset", "m", "of the pulleys' mid planes")
-    for angle in ANGLES:
+    for angle in readings.ANGLES:
         over_time[f"extreme_{angle}"] = (f"largest {angle}", "rad", "of any element")
     over_time["extreme_nose_force"] = ("largest force of a nose", "N", "of any element")
-    found = pushbelt.history(run, {**PROFILES, **OF_TWO_FLOWS}, over_time)
+    found = pushbelt.history(run, {**readings.PROFILES, **readings.OF_TWO_FLOWS}, over_time)
     found["displacement"].attrs["comment"] = "transverse, outward; of lateral probes axial, to the right"
     return found

@@ -11,16 +11,16 @@ from numba.extending import register_jitable
 from cvt_hpc.kernels import kernel
 from cvt_hpc.models.pushbelt.friction import ring_friction
 from cvt_hpc.models.spatial_pushbelt import fields as f
-from cvt_hpc.models.spatial_pushbelt.rotations import accumulate, dot, moved, times, vector
+from cvt_hpc.models.spatial_pushbelt import vectors as vec
+from cvt_hpc.models.spatial_pushbelt.chain import motion
 
 
 @register_jitable
 def ring_slip(state, step, j, share):
     """Slip at the old speeds and a share of their change [m/s]."""
-    u = moved(vector(state, j, f.SPEED), share, vector(state, j, f.CHANGE))
-    omega = moved(vector(state, j, f.SPEED + 3), share, vector(state, j, f.CHANGE + 3))
-    v = state[j, f.SPEED + 6] + share * state[j, f.CHANGE + 6]
-    return v - dot(vector(step, j, f.RING_LINE), u) - dot(vector(step, j, f.RING_LINE + 3), omega)
+    (u, omega), (line, lever) = motion(state, j, share), vec.screw(step, j, f.RING_LINE)
+    v = state[j, f.V] + share * state[j, f.CHANGE + f.ROW_V]
+    return v - vec.dot(line, u) - vec.dot(lever, omega)
 
 
 @kernel
@@ -33,6 +33,5 @@ def saddle_forces(belt, state, step, iterate):
         force = normal * grip
         iterate[j, f.RING_SLOPE] = normal * slope
         state[j, f.RING_SLIP], state[j, f.RING_FRICTION], state[j, f.RING_DUAL] = slip, force, dual
-        accumulate(iterate, j, f.RESIDUAL, times(force, vector(step, j, f.RING_LINE)))
-        accumulate(iterate, j, f.RESIDUAL + 3, times(force, vector(step, j, f.RING_LINE + 3)))
-        iterate[j, f.RESIDUAL + 6] -= force
+        vec.add_screw(iterate, j, f.RESIDUAL, vec.both_times(force, vec.screw(step, j, f.RING_LINE)))
+        iterate[j, f.RESIDUAL + f.ROW_V] -= force

@@ -20,16 +20,16 @@ SEED_MODES = 5  # half waves of a strand that the disturbance at the start is ma
 
 def belt_of(given: Mapping[str, Any], chord: float) -> Belt:
     """Constants from values as `start` takes them, and the distance of neighbours [m]."""
-    g, shared = given, shared_constants(given, chord)
+    g, shared = given, shared_constants(given, chord, Belt._fields)
     mass, thickness, ring_mass = shared["mass"], shared["thickness"], shared["ring_mass"]
     height, width = g["element_height"], g["element_width"]
+    shared["lateral_damping"] = float(g["lateral_damping"] * chord)
     turned = np.array([[0.0, 0.0, 1.0], [np.tan(g["axis_tilt"]), np.tan(g["axis_skew"]), 1.0]])
     return Belt(
         **shared,
         axes=turned / np.linalg.norm(turned, axis=1)[:, None],
         loose_side=np.array([float(SIDES[side]) for side in g["loose_sides"]]),
         half_width=float(0.5 * width),
-        flank_reach=float(g["flank_reach"]),
         pitch=float(chord),
         edge_width=float(g["edge_half_width"]),
         head_width=float(g["head_half_width"]),
@@ -41,12 +41,6 @@ def belt_of(given: Mapping[str, Any], chord: float) -> Belt:
         yaw_inertia=float(mass * (width**2 + thickness**2) / 12.0),
         pitch_inertia=float(mass * (height**2 + thickness**2) / 12.0),
         ring_rotary_inertia=float(ring_mass * g["strip_width"] ** 2 / 12.0),
-        ring_bending=float(g["ring_bending"]),
-        ring_shear=float(g["ring_shear"]),
-        yaw_stiffness=float(g["yaw_stiffness"]),
-        yaw_damping=float(g["yaw_damping"]),
-        lateral_damping=float(g["lateral_damping"] * chord),
-        lean_lag=float(g["lean_lag"]),
     )
 
 
@@ -159,13 +153,12 @@ def start(given: Mapping[str, Any]) -> tuple[Belt, BeltState]:
     plane_outward = np.column_stack([along[:, 1], -along[:, 0], np.zeros(nodes)])
     omega = speed * line.curvature[:, None] * np.array([0.0, 0.0, 1.0]) + slope_rate[:, None] * plane_outward
     fields = np.zeros((nodes, f.STATE_FIELDS))
-    fields[:, f.POSITION : f.POSITION + 3] = points
-    fields[:, f.HEADING : f.HEADING + 3], fields[:, f.OUTWARD : f.OUTWARD + 3] = heading, outward
+    fields[:, f.vector(f.POSITION)] = points
+    fields[:, f.vector(f.HEADING)], fields[:, f.vector(f.OUTWARD)] = heading, outward
     fields[:, f.SLOPE], fields[:, f.SLOPE_RATE] = slope, slope_rate
     running = speed + belt.pitch_depth * speed * line.curvature
-    fields[:, f.SPEED : f.SPEED + 2] = running[:, None] * along
-    fields[:, f.SPEED + 2] = speed * slope
-    fields[:, f.OMEGA : f.OMEGA + 3] = omega
+    fields[:, f.vector(f.SPEED)] = np.column_stack([running[:, None] * along, speed * slope])
+    fields[:, f.vector(f.OMEGA)] = omega
     fields[:, f.V] = speed * lines.sum() / (nodes * line.chord)
     fields[:, f.LENGTH] = lines / (1.0 + g["ring_strain"])
     fields[:, f.TENSION] = belt.ring_stiffness * g["ring_strain"]
@@ -192,9 +185,9 @@ def with_two_flows(belt: Belt, state: BeltState) -> BeltState:
     fields = of_lanes(state.elements)
     wide = np.zeros((len(fields), f.WIDE_STATE_FIELDS))
     wide[:, : f.STATE_FIELDS] = fields
-    o = fields[:, f.OUTWARD : f.OUTWARD + 3]
-    arm = belt.package_distance * np.cross(o, fields[:, f.HEADING : f.HEADING + 3])
-    chord, turn = (np.roll(of, -1, axis=0) - of for of in (fields[:, f.POSITION : f.POSITION + 3], arm))
+    o = fields[:, f.vector(f.OUTWARD)]
+    arm = belt.package_distance * np.cross(o, fields[:, f.vector(f.HEADING)])
+    chord, turn = (np.roll(of, -1, axis=0) - of for of in (fields[:, f.vector(f.POSITION)], arm))
     right, left = (np.linalg.norm(chord + side * turn, axis=1) for side in (1.0, -1.0))
     wide[:, f.HALF_LENGTH] = fields[:, f.LENGTH] * (right - left) / (right + left)
     wide[:, f.SADDLE_RIGHT] = wide[:, f.SADDLE_LEFT] = 0.5 * fields[:, f.SADDLE]

@@ -18,46 +18,15 @@ from cvt_hpc.models.pushbelt import fields as planar
 from cvt_hpc.models.pushbelt.border import accept_border, close_border, of_pulley, set_shapes
 from cvt_hpc.models.pushbelt.friction import filtered_slip
 from cvt_hpc.models.pushbelt.stepping import Equations, advance_by
+from cvt_hpc.models.spatial_pushbelt import assembly, flank, two_flows
 from cvt_hpc.models.spatial_pushbelt import fields as f
-from cvt_hpc.models.spatial_pushbelt.assembly import (
-    assemble_pairs,
-    border_sums,
-    linear_blocks,
-    residuals,
-    side_torque,
-)
+from cvt_hpc.models.spatial_pushbelt import vectors as vec
 from cvt_hpc.models.spatial_pushbelt.bending import bending_forces, predict_bending
 from cvt_hpc.models.spatial_pushbelt.chain import chain_forces, link, predict, pull_across
 from cvt_hpc.models.spatial_pushbelt.faces import face_forces, predict_faces
-from cvt_hpc.models.spatial_pushbelt.flank import (
-    add_flank_blocks,
-    along_arc,
-    flank_forces,
-    predict_flanks,
-)
 from cvt_hpc.models.spatial_pushbelt.pin import pin_forces, predict_pins
 from cvt_hpc.models.spatial_pushbelt.power import book_flanks, book_pairs
-from cvt_hpc.models.spatial_pushbelt.rotations import (
-    cross,
-    dot,
-    moved,
-    squared_up,
-    store,
-    turned,
-    turning,
-    vector,
-)
 from cvt_hpc.models.spatial_pushbelt.saddle import saddle_forces
-from cvt_hpc.models.spatial_pushbelt.two_flows import (
-    accept_difference,
-    book_difference,
-    difference_forces,
-    half_residuals,
-    narrow_solutions,
-    predict_flows,
-    saddle_forces_of_two,
-    widen,
-)
 
 
 @kernel
@@ -66,14 +35,14 @@ def _open_sheaves(belt, state, leans, step, shapes):
     modes = belt.modal_stiffness.shape[1]
     for j in range(step.rows):
         driven = state[j, f.DRIVEN]
-        c, s = along_arc(belt, state, j)
+        c, s = flank.along_arc(belt, state, j)
         set_shapes(belt, c, s, shapes, j)
         lean = like(0.0, c)
         for k in range(modes):
             lean = lean + of_pulley(leans[0, k], leans[1, k], driven) * shapes[j, k]
         lean = belt.cosine * lean
         for p in range(f.POINTS):
-            step[j, f.FLANK_GAP + p] += lean if p >= 2 else -lean
+            step[j, f.FLANK_GAP + p] += lean if p >= f.RIGHT_LOW else -lean
 
 
 @kernel
@@ -86,7 +55,7 @@ def _place(belt, state, work, dt):
     predict_faces(belt, elements, step)
     if belt.pin_clearance < np.inf:
         predict_pins(belt, elements, step)
-    predict_flanks(belt, elements, state.pulleys, step, dt)
+    flank.predict_flanks(belt, elements, state.pulleys, step, dt)
     _open_sheaves(belt, elements, state.leans, step, work.shapes)
 
 
@@ -94,15 +63,15 @@ def _place(belt, state, work, dt):
 def _prepare(belt, state, work, dt):
     """What all iterates of a step have in common."""
     _place(belt, state, work, dt)
-    linear_blocks(belt, work.step, dt)
+    assembly.linear_blocks(belt, work.step, dt)
 
 
 @kernel
 def _prepare_two_flows(belt, state, work, dt):
     """The same with two flows."""
     _place(belt, state, work, dt)
-    predict_flows(belt, state.elements, work.step, dt)
-    linear_blocks(belt, work.step, dt)
+    two_flows.predict_flows(belt, state.elements, work.step, dt)
+    assembly.linear_blocks(belt, work.step, dt)
 
 
 @kernel
@@ -115,7 +84,7 @@ def _press(belt, state, work, dt):
     face_forces(belt, elements, step, iterate, dt)
     if belt.pin_clearance < np.inf:
         pin_forces(belt, elements, step, iterate, dt)
-    flank_forces(belt, elements, state.pulleys, increments, openings, shapes, step, iterate, dt)
+    flank.flank_forces(belt, elements, state.pulleys, increments, openings, shapes, step, iterate, dt)
 
 
 @kernel
@@ -123,7 +92,7 @@ def _sum_up(belt, state, work, load, dt):
     """The residuals that forces leave, but for those of a second flow; return the power residual [W]."""
     elements, increments, openings = state.elements, state.increments, state.openings
     step, iterate, scratch, border = work.step, work.iterate, work.scratch, work.border
-    return residuals(
+    return assembly.residuals(
         belt, elements, increments, openings, work.shapes, load, step, iterate, scratch, border, dt
     )
 
@@ -141,37 +110,37 @@ def _evaluate_two_flows(belt, state, work, load, dt):
     """The same with two flows."""
     elements, step, iterate = state.elements, work.step, work.iterate
     _press(belt, state, work, dt)
-    difference_forces(belt, elements, step, iterate)
-    saddle_forces_of_two(belt, elements, step, iterate)
+    two_flows.difference_forces(elements, step, iterate)
+    two_flows.saddle_forces_of_two(belt, elements, step, iterate)
     power = _sum_up(belt, state, work, load, dt)
-    return power + half_residuals(belt, elements, step, iterate, work.scratch, dt)
+    return power + two_flows.half_residuals(belt, elements, step, iterate, work.scratch, dt)
 
 
 @kernel
 def _assemble(belt, state, work, dt):
     """The linear system of the elements, of the unknowns of one flow."""
-    assemble_pairs(belt, state.elements, work.step, work.iterate, work.narrow)
-    add_flank_blocks(belt, state.elements, work.shapes, work.step, work.iterate, work.narrow, dt)
+    assembly.assemble_pairs(belt, state.elements, work.step, work.iterate, work.narrow)
+    flank.add_flank_blocks(belt, state.elements, work.shapes, work.step, work.iterate, work.narrow, dt)
 
 
 @kernel
 def _assemble_two_flows(belt, state, work, dt):
     """The same with two flows."""
     _assemble(belt, state, work, dt)
-    widen(belt, work.step, work.iterate, work.narrow, work.blocks, dt)
+    two_flows.widen(belt, work.step, work.iterate, work.narrow, work.blocks, dt)
 
 
 @kernel
 def _close(belt, state, work, dt):
     """That of the border."""
-    border_sums(belt, state.elements, work.shapes, work.iterate, work.narrow, work.sums)
+    assembly.border_sums(belt, state.elements, work.shapes, work.iterate, work.narrow, work.sums)
     close_border(belt, work.sums, work.border, dt)
 
 
 @kernel
 def _close_two_flows(belt, state, work, dt):
     """The same with two flows."""
-    narrow_solutions(work.blocks, work.narrow)
+    two_flows.narrow_solutions(work.blocks, work.narrow)
     _close(belt, state, work, dt)
 
 
@@ -190,15 +159,15 @@ def _changes(kept, k):
     """Changes of contact forces, of the element behind (k = 1) only of those to the next one."""
     own = 1.0 - k
     return (
-        kept[k, f.PUSH],
-        kept[k, f.PUSH + 1],
-        kept[k, f.PUSH + 2],
-        kept[k, f.PUSH + 3],
+        kept[k, f.PUSH + f.EDGE_LEFT],
+        kept[k, f.PUSH + f.EDGE_RIGHT],
+        kept[k, f.PUSH + f.HEAD_LEFT],
+        kept[k, f.PUSH + f.HEAD_RIGHT],
         kept[k, f.PIN],
-        own * _flank_change(kept, k, 0),
-        own * _flank_change(kept, k, 1),
-        own * _flank_change(kept, k, 2),
-        own * _flank_change(kept, k, 3),
+        own * _flank_change(kept, k, f.LEFT_LOW),
+        own * _flank_change(kept, k, f.LEFT_HIGH),
+        own * _flank_change(kept, k, f.RIGHT_LOW),
+        own * _flank_change(kept, k, f.RIGHT_HIGH),
         own * kept[k, f.RING_FRICTION],
     )
 
@@ -209,24 +178,22 @@ def _accept_elements(belt, state, work, dt):
     elements, step, iterate = state.elements, work.step, work.iterate
     per_dt = 1.0 / dt
     for j in range(step.rows):
-        x, o = vector(elements, j, f.HEADING), vector(elements, j, f.OUTWARD)
-        outward = cross(vector(step, j, f.RING_LINE), cross(o, x))
+        x, o = vec.at(elements, j, f.HEADING), vec.at(elements, j, f.OUTWARD)
+        outward = vec.cross(vec.at(step, j, f.RING_LINE), vec.cross(o, x))
         pull = pull_across(step, iterate, j, outward)
-        across = per_dt * dot(outward, vector(elements, j, f.CHANGE))
+        across = per_dt * vec.dot(outward, vec.at(elements, j, f.CHANGE))
         elements[j, f.SADDLE] = absolute(belt.ring_mass * across - pull)
         elements[j, f.TENSION] = iterate[j, f.ITERATE_TENSION]
         elements[j, f.LENGTH] += dt * (elements[j, f.RING_SLIP] - ahead(elements, j, f.RING_SLIP))
         for r in range(f.SIZE):
             elements[j, f.SPEED + r] += elements[j, f.CHANGE + r]
-        store(
-            elements, j, f.POSITION, moved(vector(elements, j, f.POSITION), dt, vector(elements, j, f.SPEED))
-        )
-        omega = vector(elements, j, f.OMEGA)
-        factors = turning(omega, dt)
-        x, o = squared_up(turned(x, omega, factors), turned(o, omega, factors))
-        store(elements, j, f.HEADING, x)
-        store(elements, j, f.OUTWARD, o)
-        elements[j, f.SLOPE] += dt * elements[j, f.SPEED + 7]
+        u, omega = vec.screw(elements, j, f.SPEED)
+        vec.store(elements, j, f.POSITION, vec.moved(vec.at(elements, j, f.POSITION), dt, u))
+        factors = vec.turning(omega, dt)
+        x, o = vec.squared_up(vec.turned(x, omega, factors), vec.turned(o, omega, factors))
+        vec.store(elements, j, f.HEADING, x)
+        vec.store(elements, j, f.OUTWARD, o)
+        elements[j, f.SLOPE] += dt * elements[j, f.SLOPE_RATE]
         for p in range(f.POINTS):
             along, around_it = elements[j, f.FLANK_SLIP_M + p], elements[j, f.FLANK_SLIP_T + p]
             filtered = elements[j, f.V_FILTERED + p]
@@ -248,15 +215,16 @@ def _add_loads(belt, state, work):
         for p in range(f.POINTS):
             side = p // 2
             axial = elements[j, f.FLANK + p] * belt.cosine + elements[j, f.FLANK_FRICTION_M + p] * belt.sine
-            scratch[0, side] += driving * axial
-            scratch[0, 2 + side] += driven * axial
-        torque = side_torque(elements, step, j, 0) + side_torque(elements, step, j, 2)
+            scratch[0, f.DRIVING_LEFT + side] += driving * axial
+            scratch[0, f.DRIVEN_LEFT + side] += driven * axial
+        torque = assembly.side_torque(elements, step, j, f.LEFT_LOW)
+        torque = torque + assembly.side_torque(elements, step, j, f.RIGHT_LOW)
         scratch[0, f.DRIVING_TORQUE] += driving * torque
-        scratch[0, f.DRIVING_TORQUE + 1] += driven * torque
+        scratch[0, f.DRIVEN_TORQUE] += driven * torque
         if modes > 0:
-            left = elements[j, f.FLANK] + elements[j, f.FLANK + 1]
-            right = elements[j, f.FLANK + 2] + elements[j, f.FLANK + 3]
-            lean = 0.5 * belt.cosine * (right - left)
+            low_left, high_left = elements[j, f.FLANK + f.LEFT_LOW], elements[j, f.FLANK + f.LEFT_HIGH]
+            low_right, high_right = elements[j, f.FLANK + f.RIGHT_LOW], elements[j, f.FLANK + f.RIGHT_HIGH]
+            lean = 0.5 * belt.cosine * ((low_right + high_right) - (low_left + high_left))
             for k in range(modes):
                 scratch[0, loads.size + k] += driving * lean * work.shapes[j, k]
                 scratch[0, loads.size + modes + k] += driven * lean * work.shapes[j, k]
@@ -307,8 +275,8 @@ def _accept(belt, state, work, inputs, dt):
 @kernel
 def _accept_two_flows(belt, state, work, inputs, dt):
     """The same with two flows."""
-    book_difference(state, work, dt)
-    accept_difference(belt, state, work, dt)
+    two_flows.book_difference(state, work, dt)
+    two_flows.accept_difference(belt, state, work, dt)
     _accept(belt, state, work, inputs, dt)
 
 

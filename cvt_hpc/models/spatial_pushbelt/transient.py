@@ -15,22 +15,14 @@ from cvt_hpc.models.pushbelt.run import COURSES, ElementRun
 from cvt_hpc.models.pushbelt.start import of_lanes
 from cvt_hpc.models.pushbelt.stepping import advance_by
 from cvt_hpc.models.spatial_pushbelt import fields as f
+from cvt_hpc.models.spatial_pushbelt import readings
 from cvt_hpc.models.spatial_pushbelt.belt import NEWTON, NEWTON_OF_TWO_FLOWS, workspace
 from cvt_hpc.models.spatial_pushbelt.parameters import LOOSE_SIDES, package_arm
-from cvt_hpc.models.spatial_pushbelt.readings import (
-    ANGLES,
-    LATERAL,
-    OF_TWO_FLOWS,
-    PROFILES,
-    SCALARS,
-    Reading,
-    angles,
-)
 from cvt_hpc.models.spatial_pushbelt.start import start, with_two_flows
 from cvt_hpc.models.spatial_pushbelt.step import EQUATIONS
 from cvt_hpc.variator import LARGEST_DISPLACEMENT, STRANDS
 
-CHANNELS = (*COURSES, *SCALARS)
+CHANNELS = (*COURSES, *readings.SCALARS)
 # Turned by this, the flanks of an element have moved by a quarter of its half width, and no saddle holds the
 # rings. Elements of sound runs turn by 0.05 at most, also where the belt slips through.
 LARGEST_TURN = 0.25  # [1], sine
@@ -45,8 +37,8 @@ class Transient(ElementRun):
 
     _contacts = f.CONTACTS
     _channels = CHANNELS
-    _profiles = tuple(PROFILES)
-    _directions = (*STRANDS, *LATERAL)
+    _profiles = tuple(readings.PROFILES)
+    _directions = (*STRANDS, *readings.LATERAL)
 
     def _begin(self, p: Mapping[str, Any]) -> None:
         flows = p["ring_flows"]
@@ -55,7 +47,7 @@ class Transient(ElementRun):
         method = NEWTON
         if flows == 2:
             self._state, method = with_two_flows(self._belt, self._state), NEWTON_OF_TWO_FLOWS
-            self._profiles = (*PROFILES, *OF_TWO_FLOWS)
+            self._profiles = (*readings.PROFILES, *readings.OF_TWO_FLOWS)
         self._work = workspace(self._belt, p["elements"], flows)
         self._method = method._replace(
             tolerance=p["speed_tolerance"],
@@ -67,9 +59,9 @@ class Transient(ElementRun):
         still = np.zeros((2, f.INPUTS - f.IN_DRIVING_DRIFT))
         return np.column_stack([super()._inputs_along(sample), still])
 
-    def _read(self) -> Reading:
+    def _read(self) -> readings.Reading:
         state = self._state
-        return Reading(self._readings, of_lanes(state.elements), state.pulleys, state.loads)
+        return readings.Reading(self._readings, of_lanes(state.elements), state.pulleys, state.loads)
 
     def _tilting_inertia(self) -> float:
         return self._belt.pitch_inertia
@@ -77,20 +69,20 @@ class Transient(ElementRun):
     def _out_of_place(self) -> str | None:
         """As in the plane; or whether an element is so far out of it that no groove and no ring holds it."""
         elements = of_lanes(self._state.elements)
-        lateral = np.abs(elements[:, f.POSITION + 2])
+        lateral = np.abs(elements[:, f.POSITION + f.AXIAL])
         most = LARGEST_DISPLACEMENT * self.parameters["centre_distance"]
         most += 0.5 * abs(self.parameters["misalignment"])
         if (largest := lateral.max()) > most:
             element = int(lateral.argmax())
             return f"element {element} has left the grooves: it is {largest * 1e3:.3g} mm out of the plane"
-        turned = np.abs(angles(elements))
+        turned = np.abs(readings.angles(elements))
         if (largest := turned.max()) > LARGEST_TURN:
             angle, element = np.unravel_index(turned.argmax(), turned.shape)
             found = np.arcsin(min(largest, 1.0))
-            return f"element {element} has left the rings: its {ANGLES[angle]} is {found:.3g} rad"
+            return f"element {element} has left the rings: its {readings.ANGLES[angle]} is {found:.3g} rad"
         return super()._out_of_place()
 
-    def _stored_energy(self, found: Reading) -> float:
+    def _stored_energy(self, found: readings.Reading) -> float:
         return found.stored_energy(self._state.openings, self._state.leans)
 
 
@@ -98,11 +90,8 @@ def given(parameters: Mapping[str, Any]) -> dict[str, Any]:
     """What `start` takes, from flat parameters of a run [SI]."""
     p, shared = parameters, run.given(parameters)
     pitch = shared["belt_length"] / p["elements"]
-    same = ("element_width", "flank_reach", "edge_half_width", "head_half_width", "strip_width")
-    scene = ("misalignment", "axis_tilt", "axis_skew", "disturbance", "seed", "lateral_damping", "lean_lag")
     return {
         **shared,
-        **{key: p[key] for key in (*same, *scene)},
         "package_arm": package_arm(p),
         "ring_bending": p["lateral_bending_stiffness"],
         "ring_shear": p["lateral_shear_stiffness"],

@@ -9,19 +9,12 @@ from typing import TYPE_CHECKING, Any, NamedTuple
 
 import numpy as np
 
+from cvt_hpc.models.elastic_belt import along_belt as along
 from cvt_hpc.models.elastic_belt import fields as f
-from cvt_hpc.models.elastic_belt.along_belt import (
-    ELSEWHERE,
-    SLIDING,
-    WRAP_ANGLE,
-    along_belt,
-    elsewhere,
-    wrap_angles,
-)
 from cvt_hpc.models.elastic_belt.belt import REGIONS, Mesh
 from cvt_hpc.models.elastic_belt.column import pressed_strains
 from cvt_hpc.models.elastic_belt.rhs import contact_forces, fresh_contacts, strains
-from cvt_hpc.models.steady_variator.sampled import sampled, sampled_profiles
+from cvt_hpc.models.elastic_belt.state_march import sampled
 from cvt_hpc.models.steady_variator.walking import Steady
 from cvt_hpc.variator import PULLEYS
 from cvt_hpc.variator.history import along_path
@@ -91,11 +84,12 @@ def distributions(steady: Steady) -> Distributions:
 
 def profiles(steady: Steady, grid: Mesh) -> xr.Dataset:
     """Speeds and forces by `position`, named as in a history of the elastic belt."""
-    sample = sampled_profiles(steady.belt, steady.state)
-    sliding = along_belt(sample, grid, {"half_wedge_angle": steady.belt.half_wedge_angle})
-    values, words = elsewhere(sample) | sliding, ELSEWHERE | SLIDING
+    found = sampled(steady.belt, steady.state).profiles()
+    sample = {name: values[:, 0] for name, values in found.items()}
+    sliding = along.along_belt(sample, grid, {"half_wedge_angle": steady.belt.half_wedge_angle})
+    values, words = along.elsewhere(sample) | sliding, along.ELSEWHERE | along.SLIDING
     named = {name: (values[name], *words[name]) for name in words}
-    named["wrap_angle"] = wrap_angles(grid), *WRAP_ANGLE
+    named["wrap_angle"] = along.wrap_angles(grid), *along.WRAP_ANGLE
     return along_path(named, grid.position, np.array(REGIONS)[grid.region])
 
 
@@ -115,17 +109,14 @@ def quantities(steady: Steady, grid: Mesh) -> dict[str, Any]:
     """Numbers of strands (t1, t2) and pulleys (driving, driven), named as in the elastic belt's record."""
     belt, around = steady.belt, distributions(steady)
     middles = [grid.starts[region] + grid.counts[region] // 2 for region in (1, 3)]
-    seen = sampled(belt, steady.state)
+    seen = sampled(belt, steady.state).channels()
     axial, slip, opened, flanks = (
         np.array([seen[name.format(pulley)] for pulley in PULLEYS])
         for name in ("axial_force {}", "slip {}", "open_share {}", "{}_flank_loss")
     )
     layers = layer_loss(steady)
-    driving, load, loss = (
-        seen["driving_power"],
-        seen["load_power"],
-        layers + sum(seen[name] for name in LOSSES),
-    )
+    driving, load = seen["driving_power"], seen["load_power"]
+    loss = layers + sum(seen[name] for name in LOSSES)
     powers = power_balance(driving, load, loss, 0.0)
     del powers["storing_power"]
     carried = largest_torque(belt.law, belt.half_wedge_angle, grid.path, belt.belt_speed, axial)

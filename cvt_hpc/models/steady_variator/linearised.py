@@ -14,17 +14,7 @@ from scipy.sparse import csc_array, csr_array
 
 from cvt_hpc.kernels import kernel
 from cvt_hpc.models.elastic_belt import fields as f
-from cvt_hpc.models.elastic_belt.one_system import (
-    ROWS,
-    SIZE_OF_POSITION,
-    SIZE_OF_SPEED,
-    SIZES,
-    SIZES_OF_STATES,
-    FlatBelt,
-    free_rates,
-    pulled_by,
-    rates_under_forces,
-)
+from cvt_hpc.models.elastic_belt import one_system as one
 from cvt_hpc.physics import compliance
 from cvt_hpc.physics.sheaves import flexibility
 
@@ -35,12 +25,12 @@ SIZE_OF_FORCE = 1e5  # [N/m]
 # Relative to the sizes, for central differences: the third derivative's part is 1e-12 of a slope, round-off
 # 1e-10 of the steepest slopes.
 INCREMENT = 1e-6
-INCREMENTS = INCREMENT * np.array([*(SIZES[row] for row in range(len(f.FIELDS))), SIZE_OF_FORCE])
+INCREMENTS = INCREMENT * np.array([*(one.SIZES[row] for row in range(len(f.FIELDS))), SIZE_OF_FORCE])
 SIZES_OF_PULL = np.array([100.0, 100.0, *[1e4] * 6])  # of `pulled_by` [N m], [N]
 
 
 @kernel
-def local_slopes(flat: FlatBelt, increments: np.ndarray, near: np.ndarray, turning: np.ndarray) -> None:
+def local_slopes(flat: one.FlatBelt, increments: np.ndarray, near: np.ndarray, turning: np.ndarray) -> None:
     """Slopes of all rates with the axial forces held, about `flat.state` under `flat.force`.
 
     Parameters
@@ -76,11 +66,11 @@ def local_slopes(flat: FlatBelt, increments: np.ndarray, near: np.ndarray, turni
                     k = (j + d - REACH) % n
                     for o in range(8):
                         near[o, i, j, d] = (ahead[o, k] - behind[o, k]) / (2.0 * increments[i])
-    slopes_with_scalar(flat, f.DRIVEN_SPEED, SIZE_OF_SPEED, turning)
+    slopes_with_scalar(flat, f.DRIVEN_SPEED, one.SIZE_OF_SPEED, turning)
 
 
 @kernel
-def slopes_with_scalar(flat: FlatBelt, place: int, size: float, slopes: np.ndarray) -> None:
+def slopes_with_scalar(flat: one.FlatBelt, place: int, size: float, slopes: np.ndarray) -> None:
     """Slopes of all rates and moments with one of the state's scalars, forces held, into `slopes` (8, N)."""
     ahead, behind = np.zeros(slopes.shape), np.zeros(slopes.shape)
     scalars = flat.state.scalars
@@ -93,15 +83,15 @@ def slopes_with_scalar(flat: FlatBelt, place: int, size: float, slopes: np.ndarr
 
 
 @kernel
-def _evaluate(flat: FlatBelt, out: np.ndarray) -> None:
-    rates_under_forces(flat)
+def _evaluate(flat: one.FlatBelt, out: np.ndarray) -> None:
+    one.rates_under_forces(flat)
     out[:MOMENT], out[MOMENT] = flat.rate, flat.moments
     if flat.loose.size == 0:
         out[MOMENT] *= flat.belt.on_driven
 
 
 @kernel
-def pulley_slopes(flat: FlatBelt, pull: np.ndarray, sizes: np.ndarray) -> np.ndarray:
+def pulley_slopes(flat: one.FlatBelt, pull: np.ndarray, sizes: np.ndarray) -> np.ndarray:
     """Slopes of `free_rates`, (10, 18): with `pulled_by`, driven speed, driven position, and STATES.
 
     `sizes` (18,) are those of the acting quantities, from which increments follow.
@@ -117,7 +107,7 @@ def pulley_slopes(flat: FlatBelt, pull: np.ndarray, sizes: np.ndarray) -> np.nda
                 moved[k] += sign * increment
             else:
                 scalars[place] = unmoved + sign * increment
-            found[:, k] += sign * free_rates(flat.belt, flat.state, moved) / (2.0 * increment)
+            found[:, k] += sign * one.free_rates(flat.belt, flat.state, moved) / (2.0 * increment)
             scalars[place] = unmoved
     return found
 
@@ -131,18 +121,18 @@ class Linearisation:
         One of them.
     """
 
-    def __init__(self, flat: FlatBelt) -> None:
+    def __init__(self, flat: one.FlatBelt) -> None:
         belt = flat.belt
         n, self._count = belt.cell.size, flat.origin.size
         self._arcs = [belt.driving_stations, belt.driven_stations]
         place = np.full((len(f.FIELDS) + 1, n), -1)
-        for k, row in enumerate(ROWS):
+        for k, row in enumerate(one.ROWS):
             place[row] = k * n + np.arange(n)
-        place[f.V_FILTERED, flat.remembering] = len(ROWS) * n + np.arange(flat.remembering.size)
+        place[f.V_FILTERED, flat.remembering] = len(one.ROWS) * n + np.arange(flat.remembering.size)
         unknown = place.copy()
         unknown[FORCE, np.concatenate(self._arcs)] = self._count + np.arange(sum(map(len, self._arcs)))
         o, i, j, d = np.indices((8, 8, n, STRIDE))
-        self._loose = len(ROWS) * n + flat.remembering.size + np.arange(flat.loose.size)
+        self._loose = len(one.ROWS) * n + flat.remembering.size + np.arange(flat.loose.size)
         place[MOMENT] = self._count - 2
         if flat.loose.size:  # torque taken from the driving pulley, and put into the driven one
             place[MOMENT] = self._count + belt.on_driven.astype(int)
@@ -155,7 +145,7 @@ class Linearisation:
         self._flexibility = [flexibility(belt.driving), flexibility(belt.driven)]
         self._near, self._turning = np.zeros(o.shape), np.zeros((8, n))
 
-    def __call__(self, flat: FlatBelt) -> csc_array:
+    def __call__(self, flat: one.FlatBelt) -> csc_array:
         """Jacobian of `flat.rates`, (n, n), about the state of its last call."""
         belt, count, n = flat.belt, self._count, flat.belt.cell.size
         local_slopes(flat, INCREMENTS, self._near, self._turning)
@@ -181,11 +171,11 @@ class Linearisation:
         slopes = csc_array((values[there], (rows[there], columns[there])), shape=(count, count + forces))
         return slopes[:, :count] + slopes[:, count:] @ self._forces(flat)
 
-    def _of_free_pulleys(self, flat: FlatBelt) -> csc_array:
+    def _of_free_pulleys(self, flat: one.FlatBelt) -> csc_array:
         """Jacobian where pulleys have states of their own."""
         belt, count, n = flat.belt, self._count, flat.belt.cell.size
         excess = np.zeros((8, n))
-        slopes_with_scalar(flat, f.FIRST_STATE + f.EXCESS, SIZE_OF_SPEED, excess)
+        slopes_with_scalar(flat, f.FIRST_STATE + f.EXCESS, one.SIZE_OF_SPEED, excess)
         width, stations = count + sum(map(len, self._arcs)), np.arange(n)
         entries = [
             (self._near[self._known], self._rows, self._columns),
@@ -208,13 +198,13 @@ class Linearisation:
             first = own.stop
         own_rows = [count - 2, count - 1, *self._loose]
         acting[8 + np.arange(10), own_rows] = 1.0
-        sizes = np.array([*SIZES_OF_PULL, SIZE_OF_SPEED, SIZE_OF_POSITION, *SIZES_OF_STATES])
-        found = pulley_slopes(flat, pulled_by(belt, flat.force, flat.moments), sizes) @ acting
+        sizes = np.array([*SIZES_OF_PULL, one.SIZE_OF_SPEED, one.SIZE_OF_POSITION, *one.SIZES_OF_STATES])
+        found = pulley_slopes(flat, one.pulled_by(belt, flat.force, flat.moments), sizes) @ acting
         place = csr_array((np.ones(10), (own_rows, np.arange(10))), shape=(count, 10))
         slopes = (local[:count] + place @ csr_array(found)).tocsc()
         return slopes[:, :count] + slopes[:, count:] @ self._forces(flat)
 
-    def _forces(self, flat: FlatBelt) -> csc_array:
+    def _forces(self, flat: one.FlatBelt) -> csc_array:
         """Slopes of the axial forces, and of open stations' pulls, with the closed stations of the last call.
 
         With gaps g of the rigid bodies those of closed stations are -C_cc^-1 g_c, and pulls c_e times
@@ -242,7 +232,7 @@ class Linearisation:
                 tilted = self._loose[f.DRIVEN_COS if wrap else f.DRIVING_COS]
                 openings += [(sheave.tilt[k], tilted + k) for k in range(2)]
             acting += [(slopes @ opening, rows, np.full(arc.size, column)) for opening, column in openings]
-            entries += [[part.ravel() for part in np.broadcast_arrays(*one)] for one in acting]
+            entries += [[part.ravel() for part in np.broadcast_arrays(*entry)] for entry in acting]
             first += arc.size
         values, rows, columns = map(np.concatenate, zip(*entries, strict=True))
         there = values != 0.0

@@ -19,15 +19,15 @@ if TYPE_CHECKING:
     from cvt_hpc.models.steady_variator.walking import Steady
 
 VARIABLES = (
-    Variable("mean_ring_tension", ("strand",), "f8", "N", "ring tension in the middle of the strand"),
-    Variable("mean_push_force", ("strand",), "f8", "N", "push force in the middle of the strand"),
-    Variable("axial_force", ("pulley",), "f8", "N", "axial force of the belt on a sheave"),
-    Variable("slip", ("pulley",), "f8", "1", "tangential sliding over belt speed, weighted by contact force"),
+    Variable("mean_ring_tension", "N", "ring tension in the middle of the strand", dims=("strand",)),
+    Variable("mean_push_force", "N", "push force in the middle of the strand", dims=("strand",)),
+    Variable("axial_force", "N", "axial force of the belt on a sheave", dims=("pulley",)),
+    Variable("slip", "1", "tangential sliding over belt speed, weighted by contact force", dims=("pulley",)),
     *AGAINST_SLIP,
-    Variable("open_share", ("pulley",), "f8", "1", "out of contact", words="open share of the wrap"),
-    Variable("thrust_ratio", (), "f8", "1", "axial force of the driving over that of the driven pulley"),
-    Variable("speed_loss", (), "f8", "1", "1 - ratio x driven speed / driving speed"),
-    Variable("driven_position", (), "f8", "m", "axial opening of the driven pulley"),
+    Variable("open_share", "1", "out of contact", dims=("pulley",), words="open share of the wrap"),
+    Variable("thrust_ratio", "1", "axial force of the driving over that of the driven pulley"),
+    Variable("speed_loss", "1", "1 - ratio x driven speed / driving speed"),
+    Variable("driven_position", "m", "axial opening of the driven pulley"),
     *shared("flank_loss", "driving_power", "load_power", "ring_loss", "belt_loss"),
     *shared("layer_loss", "seating_loss", "loss", "efficiency", "power_residual"),
 )

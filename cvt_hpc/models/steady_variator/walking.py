@@ -12,6 +12,7 @@ from typing import Any, NamedTuple
 import numpy as np
 
 from cvt_hpc.models.elastic_belt.belt import Belt, State, belt_constants
+from cvt_hpc.models.elastic_belt.state_march import sampled
 from cvt_hpc.models.steady_variator.braked import Braked
 from cvt_hpc.models.steady_variator.continuation import AT_HOME, Continuation, NoSteadyState, PathEnds
 from cvt_hpc.models.steady_variator.equations import SPEED, Equations
@@ -19,8 +20,7 @@ from cvt_hpc.models.steady_variator.first_states import FirstStates, SlipsThroug
 from cvt_hpc.models.steady_variator.newton import newton
 from cvt_hpc.models.steady_variator.parameters import OF_THE_COURSE
 from cvt_hpc.models.steady_variator.released import Released, freed, held, nearest
-from cvt_hpc.models.steady_variator.sampled import largest_slip
-from cvt_hpc.variator import GROSS_SLIP
+from cvt_hpc.variator import GROSS_SLIP, PULLEYS
 
 __all__ = ["NoSteadyState", "SlipsThrough", "Steady", "SteadyBelt"]
 
@@ -49,6 +49,12 @@ class Steady(NamedTuple):
     belt: Belt
     state: State
     unknowns: np.ndarray
+
+    @property
+    def largest_slip(self) -> float:
+        """Tangential sliding over belt speed, of the pulley that slips more [1]."""
+        seen = sampled(self.belt, self.state).channels()
+        return max(abs(seen[f"slip {pulley}"]) for pulley in PULLEYS)
 
 
 class SteadyBelt:
@@ -176,7 +182,7 @@ class SteadyBelt:
         direction = -1.0 if near.load < 0.0 else 1.0
         most = last = near
         for state in self.braked(near, -direction):
-            if largest_slip(state.belt, state.state) > GROSS_SLIP:
+            if state.largest_slip > GROSS_SLIP:
                 state = self._at_slip(last, state)
                 return state if direction * state.load > direction * most.load else most
             last = state
@@ -191,7 +197,7 @@ class SteadyBelt:
     def _at_slip(self, below: Steady, beyond: Steady) -> Steady:
         """State at which a pulley just does not slip grossly, between two states."""
         self._own.under(load=0.0, load_start=0.0)
-        slips = [largest_slip(state.belt, state.state) for state in (below, beyond)]
+        slips = [state.largest_slip for state in (below, beyond)]
         share = (GROSS_SLIP - slips[0]) / (slips[1] - slips[0])
         x = below.unknowns + share * (beyond.unknowns - below.unknowns)
         found = Braked(self._own).at(x[SPEED], x, AT_HOME)
@@ -213,7 +219,7 @@ class SteadyBelt:
                 return self._between(before, state, load)
             before = state
             farthest = min(farthest, state.load) if load < reached else max(farthest, state.load)
-            if largest_slip(state.belt, state.state) > SLIDING:
+            if state.largest_slip > SLIDING:
                 break
         reach = f"from {start:.4g} N m they reach to {farthest:.4g} N m"
         raise NoSteadyState(f"no steady state found at {load:g} N m", reach)

@@ -61,7 +61,7 @@ PARAMETERS: dict[str, dict[str, Parameter]] = {
     "mesh": {
         "ritz_functions": Parameter(
             48, "", "half waves along the strand in the Ritz model", minimum=5, maximum=512
-        ),
+        )
     },
 }
 

@@ -17,20 +17,19 @@ from cvt_hpc.variator.variables import COORDINATES
 MODES = 5  # that are recorded
 
 VARIABLES = (
-    Variable("eigenfrequency", ("strand", "half_waves"), "f8", "Hz", "of the running strand"),
+    Variable("eigenfrequency", "Hz", "of the running strand", dims=("strand", "half_waves")),
     Variable(
         "resting_frequency",
-        ("strand", "half_waves"),
-        "f8",
         "Hz",
         "eigenfrequency without the terms of the belt's speed",
+        dims=("strand", "half_waves"),
     ),
     Variable(
-        "critical_speed", ("strand",), "f8", "m s-1", "speed from which the strand does not hold its shape"
+        "critical_speed", "m s-1", "speed from which the strand does not hold its shape", dims=("strand",)
     ),
-    Variable("net_force", ("strand",), "f8", "N", "ring tension less push force"),
-    Variable("belt_speed", (), "f8", "m s-1", "speed of the belt"),
-    Variable("strand_length", (), "f8", "m", "length of a strand"),
+    Variable("net_force", "N", "ring tension less push force", dims=("strand",)),
+    Variable("belt_speed", "m s-1", "speed of the belt"),
+    Variable("strand_length", "m", "length of a strand"),
 )
 
 

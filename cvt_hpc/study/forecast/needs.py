@@ -9,7 +9,7 @@ from pathlib import Path
 from typing import TYPE_CHECKING, NamedTuple
 
 from cvt_hpc.errors import mismatch
-from cvt_hpc.study.description import record_layout, record_type, runs_along
+from cvt_hpc.study.description import record_layout, record_type
 from cvt_hpc.study.record.frames import HEAD, PLACE
 from cvt_hpc.study.simulator import Simulator
 
@@ -54,7 +54,7 @@ def needs(job: Job, simulator: Simulator) -> Needs:
     """Return the needs of a sweep of all runs of a job, without the marks of its batches."""
     variables, coordinates = record_layout(job, simulator)
     record = record_type(variables, coordinates).itemsize
-    size = runs_along(job, [axis.name for axis in job.axes])
+    size = job.size
     named = len(variables) + len(coordinates) + len(job.axes) + len(job.rules)
     disk = Disk((HEAD.size + PLACE.size + record) * size, most_of_results(size * record, named), math.nan)
     disk = disk if job.histories else disk._replace(histories=0.0)
@@ -84,8 +84,7 @@ def refuse_too_large(job: Job, simulator: Simulator, out: Path) -> Needs:
         If this machine has less memory, or less disk is free. Of a trace it is not known how many cells it
         runs, and disk is no reason.
     """
-    needed, size = needs(job, simulator), runs_along(job, [axis.name for axis in job.axes])
-    where = f"{job.source}: {size} runs"
+    needed, where = needs(job, simulator), f"{job.source}: {job.size} runs"
     memory = os.sysconf("SC_PAGE_SIZE") * os.sysconf("SC_PHYS_PAGES")
     if needed.memory > memory:
         found = f"{size_in_words(memory)} in this machine"

@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from typing import NamedTuple, Protocol, Self
+from typing import NamedTuple, Self
 
 INTERRUPTED = 2**40  # claims count from here when all are interrupted: beyond every plan
 
@@ -14,68 +14,40 @@ class Tally(NamedTuple):
     failed: int
 
 
-class Counter(Protocol):
-    """The one thing that ranks share while they compute."""
-
-    def claim(self) -> int:
-        """Return a position that no other claim gets: 0, 1, 2, ... over all ranks."""
-
-    def rewind(self) -> None:
-        """Let claims begin at 0 again, unless all are interrupted; by one rank, while none claims."""
-
-    def report(self, finished: int, failed: int) -> None:
-        """Count finished runs, and the failed ones among them."""
-
-    def tally(self) -> Tally:
-        """Return the reports of all ranks."""
-
-    def interrupt_all(self) -> None:
-        """Let no rank claim another batch, and let all stop their present one."""
-
-    def is_interrupted(self) -> bool:
-        """Return whether some rank has interrupted all."""
-
-    def __enter__(self) -> Self: ...
-
-    def __exit__(self, kind: type[BaseException] | None, /, *others: object) -> None: ...
-
-
-class SerialCounter:
-    """The counter of a process alone."""
+class Counter:
+    """The one thing that ranks share while they compute; this one is of a process alone."""
 
     def __init__(self) -> None:
         self._next = 0
-        self._finished = 0
-        self._failed = 0
+        self._tally = Tally(0, 0)
 
     def claim(self) -> int:
-        """Return the next position."""
+        """Return a position that no other claim gets: 0, 1, 2, ... over all ranks."""
         self._next += 1
         return self._next - 1
 
     def rewind(self) -> None:
-        """Let claims begin at 0 again, unless interrupted."""
+        """Let claims begin at 0 again, unless all are interrupted; by one rank, while none claims."""
         self._next = 0 if self._next < INTERRUPTED else INTERRUPTED
 
     def report(self, finished: int, failed: int) -> None:
         """Count finished runs, and the failed ones among them."""
-        self._finished += finished
-        self._failed += failed
+        self._tally = Tally(self._tally.finished + finished, self._tally.failed + failed)
 
     def tally(self) -> Tally:
-        """Return the reports."""
-        return Tally(self._finished, self._failed)
+        """Return the reports of all ranks."""
+        return self._tally
 
     def interrupt_all(self) -> None:
-        """Let no further position be one of a plan."""
+        """Let no rank claim another batch, and let all stop their present one."""
         self._next = INTERRUPTED
 
     def is_interrupted(self) -> bool:
-        """Return whether the sweep is interrupted."""
+        """Return whether some rank has interrupted all."""
         return self._next >= INTERRUPTED
 
     def __enter__(self) -> Self:
         return self
 
-    def __exit__(self, *exception: object) -> None:
+    def __exit__(self, kind: type[BaseException] | None, *others: object) -> None:
         return

@@ -10,7 +10,7 @@ from contextlib import ExitStack, suppress
 
 import numpy as np
 
-from cvt_hpc.study.ranks.counter import Counter, SerialCounter, Tally
+from cvt_hpc.study.ranks.counter import Counter, Tally
 
 _BAR_INTERVAL = 0.5  # [s]
 _FIRST_LINE = 5.0  # [s]; lines then come less and less often, so that a day's output stays readable
@@ -148,7 +148,7 @@ class Steps:
         mean = max(sum(known) / len(known), 1e-9)
         filled = np.array([mean if math.isnan(cost) else max(cost, 1e-3 * mean) for cost in costs])
         self._total, self._before, self._tell = done + len(costs), done, tell
-        self._counter = SerialCounter()
+        self._counter = Counter()
         visible = bool(costs) and sys.stderr.isatty()
         self._progress = Progress(self._counter, self._total, done, 0, visible, filled, unit)
 

@@ -5,14 +5,14 @@ from __future__ import annotations
 from collections.abc import Callable, Iterator, Sequence
 
 from cvt_hpc.study.batches import Assignment, Batch
-from cvt_hpc.study.ranks.counter import Counter, SerialCounter
+from cvt_hpc.study.ranks.counter import Counter
 from cvt_hpc.study.ranks.launch import Team
 
 
 def open_counter(team: Team) -> Counter:
     """Return the counter of a team, at zero."""
     if team.communicator is None:
-        return SerialCounter()
+        return Counter()
     from cvt_hpc.study.ranks.shared_counter import SharedCounter
 
     return SharedCounter(team.communicator)

@@ -9,20 +9,19 @@ from __future__ import annotations
 
 import threading
 from contextlib import suppress
-from typing import Self
 
 import numpy as np
 from mpi4py import MPI
 
 from cvt_hpc.errors import InputError
-from cvt_hpc.study.ranks.counter import INTERRUPTED, Tally
+from cvt_hpc.study.ranks.counter import INTERRUPTED, Counter, Tally
 from cvt_hpc.study.ranks.launch import RankDied, noticing_deaths
 
 _PROGRESS_INTERVAL = 1e-3  # [s]
 _TEST_CLAIMS = 16  # of each rank in the self-test
 
 
-class SharedCounter:
+class SharedCounter(Counter):
     """The counter of all ranks of a communicator, by one-sided MPI.
 
     Parameters
@@ -84,10 +83,7 @@ class SharedCounter:
         """Return whether some rank has interrupted all."""
         return self._fetch(self._NEXT, 0, MPI.NO_OP) >= INTERRUPTED
 
-    def __enter__(self) -> Self:
-        return self
-
-    def __exit__(self, kind: type[BaseException] | None, *_: object) -> None:
+    def __exit__(self, kind: type[BaseException] | None, *others: object) -> None:
         # After an unexpected error the other ranks are elsewhere, and would be waited for without end.
         if kind is None or issubclass(kind, InputError):
             self._release()

@@ -8,7 +8,6 @@ can take up again at the next frame after a damaged stretch.
 
 from __future__ import annotations
 
-import errno
 import json
 import os
 import re
@@ -19,8 +18,6 @@ from struct import Struct
 from typing import Any, NamedTuple
 
 import numpy as np
-
-from cvt_hpc.study.time_steps import MOST_REFINED
 
 MAGIC = b"\x89CVTREC\n"
 FORMAT_VERSION = 2
@@ -35,14 +32,8 @@ ALONE = b"\xf5ALO"  # the same of a run that is done alone, because its process 
 AGAIN = b"\xf5AGN"  # payload: the places of runs that are to be done again, with their new attempt
 MARK_LIMIT = 1 << 28  # [bytes] of payload: 22 million runs
 
-MOST_ATTEMPTS = 1_000_000
-LATEST = 1e11  # [s] since 1970: no frame is of the year 5138
 PREAMBLE_LIMIT = 1 << 20  # [bytes]; none is longer
 WINDOW = 1 << 22  # [bytes] of a log that are read at a time
-# Limit of the search for frames in damage [bytes]: some seconds. By chance a marker comes once in 1 GB, but
-# a file can be made of nothing else.
-_TOLERATED = 1 << 31
-_CANDIDATE = 1 << 13  # [bytes] that could be read in the time that a marker takes which begins no frame
 _MARKERS = re.compile(b"\xf5(?:RUN|BEG|ALO|AGN)")
 
 Place = tuple[int, int]  # run index, and the attempt, counted from 1
@@ -128,8 +119,7 @@ class RecordFormat:
             Where the first frame begins, and the size of the file [bytes].
         """
         data, base, place, damaged = b"", start, start, None  # window and its place; where damage begins
-        cost = 0
-        while place < size and cost < _TOLERATED:
+        while place < size:
             at = place - base
             frame = self.unframe(data, at)
             if frame is not None:
@@ -140,15 +130,11 @@ class RecordFormat:
                 place += frame.size
             elif at + self._span(data, at) > len(data) and base + len(data) < size:
                 wanted = max(WINDOW, self._span(data, at))
-                if damaged is not None:
-                    place = _next_data(file, place, size)
-                    cost += wanted - WINDOW
                 data, base = os.pread(file.fileno(), wanted, place), place
                 if len(data) < wanted:  # the end; bytes beyond `size` are not searched
                     size = min(size, base + len(data))
             else:
                 damaged = place if damaged is None else damaged
-                cost += _CANDIDATE + self._span(data, at)
                 ahead = _MARKERS.search(data, at + 1)
                 place = base + (ahead.start() if ahead else max(len(data) - len(RECORD) + 1, at + 1))
         if damaged is not None:
@@ -198,36 +184,12 @@ def read_preamble(data: bytes, layout: RecordFormat) -> tuple[dict[str, Any] | N
         return None, len(MAGIC)
     if version != FORMAT_VERSION:
         raise ForeignLog(f"expected format {FORMAT_VERSION} of the record log, found {version}")
-    try:
-        header = json.loads(text)
-        fingerprint, descr, session = str(header["fingerprint"]), header["dtype"], header["session"]
-        _check_session(session)
-    except (ValueError, TypeError, KeyError, RecursionError):  # whoever gave it a checksum
-        return None, PREAMBLE.size + length
-    if fingerprint != layout.fingerprint:
-        raise ForeignLog(f"a record log of another job (fingerprint {ascii(fingerprint[:12])[1:-1]})")
-    if descr != layout.descr:
+    header = json.loads(text)
+    if header["fingerprint"] != layout.fingerprint:
+        raise ForeignLog(f"a record log of another job (fingerprint {header['fingerprint'][:12]})")
+    if header["dtype"] != layout.descr:
         raise ForeignLog("a record log of this job with other recorded quantities")
-    return session, PREAMBLE.size + length
-
-
-def _check_session(session: Any) -> None:
-    """Raise ValueError, TypeError or KeyError unless this is a session, as of `provenance.new_session`."""
-    texts = [session[key] for key in ("id", "command", "host", "git_revision")]
-    versions = session["versions"]
-    texts += [*versions.keys(), *versions.values()] if isinstance(versions, dict) else [None]
-    if not all(isinstance(text, str) for text in texts) or not isinstance(session["ranks"], int):
-        raise ValueError("not a session")
-    if not (0.0 <= session["started"] < LATEST and 1.0 <= session.get("refine", 1.0) <= MOST_REFINED):
-        raise ValueError("not a time, or not a factor")
-
-
-def _next_data(file: FileIO, place: int, size: int) -> int:
-    """Return where the next bytes are that a file has on the disk, from a place on: holes hold no frame."""
-    try:
-        return os.lseek(file.fileno(), place, os.SEEK_DATA)
-    except OSError as error:
-        return size if error.errno == errno.ENXIO else place
+    return header["session"], PREAMBLE.size + length
 
 
 def _header_check(version: int, text: bytes) -> int:

@@ -17,9 +17,7 @@ from cvt_hpc.study.record.frames import (
     AGAIN,
     ALONE,
     HEAD,
-    LATEST,
     MAGIC,
-    MOST_ATTEMPTS,
     PLACE,
     PREAMBLE_LIMIT,
     RECORD,
@@ -30,11 +28,8 @@ from cvt_hpc.study.record.frames import (
     read_preamble,
 )
 from cvt_hpc.study.record.index import ENTRY, Records, Timing, choose, open_log
-from cvt_hpc.variables import Status
 
 Places = range | NDArray[np.int64]  # the index in a study of each run of another, or of itself
-
-_ENDED = [int(status) for status in Status if status != Status.NOT_RUN]
 
 
 class _Death(NamedTuple):
@@ -153,22 +148,16 @@ class _Reader:
     def _sound_frames(
         self, layout: RecordFormat, places: Places, file: FileIO, start: int, flaws: list[str]
     ) -> Iterator[tuple[int, Frame]]:
-        """Yield place and content of the frames that name runs of the study; the rest goes to `flaws`."""
+        """Yield place and content of sound frames, with runs as the study numbers them; others are flaws."""
         size = os.fstat(file.fileno()).st_size
         for begin, end, frame in layout.frames(file, start, size):
-            if frame is not None and self._is_sound(frame, len(places)):
+            if frame is not None:
                 named = [(int(places[run]), attempt) for run, attempt in frame.places]
                 yield begin, frame._replace(places=named)
             elif end == size and end - begin < layout.record_size:
                 flaws.append(f"the last {end - begin} bytes are an unfinished record")
             else:
                 flaws.append(f"bytes {begin} to {end} are damaged")
-
-    def _is_sound(self, frame: Frame, runs: int) -> bool:
-        """Whether a frame with a right checksum holds what a sweep of so many runs may have written."""
-        places = all(0 <= run < runs and 0 < attempt <= MOST_ATTEMPTS for run, attempt in frame.places)
-        ended = frame.kind != RECORD or frame.row[self._status] in _ENDED
-        return places and ended and 0.0 <= frame.written < LATEST
 
     def _entries(
         self, frames: Iterable[tuple[int, Frame]], number: int, trace: _Trace

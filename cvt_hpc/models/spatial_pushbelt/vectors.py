@@ -11,35 +11,44 @@ from __future__ import annotations
 
 from numba.extending import register_jitable
 
-from cvt_hpc.lanes import ahead, behind, fma, sqrt
+from cvt_hpc import lanes
+from cvt_hpc.lanes import fma, sqrt
 
 
 @register_jitable
-def vector(array, j, first):
+def at(array, j, first):
     """Three fields of a row."""
     return array[j, first], array[j, first + 1], array[j, first + 2]
 
 
 @register_jitable
-def vector_ahead(array, j, first):
+def ahead(array, j, first):
     """Three fields of the row ahead."""
-    return ahead(array, j, first), ahead(array, j, first + 1), ahead(array, j, first + 2)
+    return (
+        lanes.ahead(array, j, first),
+        lanes.ahead(array, j, first + 1),
+        lanes.ahead(array, j, first + 2),
+    )
 
 
 @register_jitable
-def vector_behind(array, j, first):
+def behind(array, j, first):
     """Three fields of the row behind."""
-    return behind(array, j, first), behind(array, j, first + 1), behind(array, j, first + 2)
+    return (
+        lanes.behind(array, j, first),
+        lanes.behind(array, j, first + 1),
+        lanes.behind(array, j, first + 2),
+    )
 
 
 @register_jitable
 def store(array, j, first, v):
     """Set three fields of a row."""
-    array[j, first], array[j, first + 1], array[j, first + 2] = v[0], v[1], v[2]
+    array[j, first], array[j, first + 1], array[j, first + 2] = v
 
 
 @register_jitable
-def accumulate(array, j, first, v):
+def add(array, j, first, v):
     """Add to three fields of a row."""
     array[j, first] += v[0]
     array[j, first + 1] += v[1]
@@ -162,6 +171,18 @@ def plus_product(m, k, u, v):
 
 
 @register_jitable
+def zero6(none):
+    """A symmetric matrix of zeros, from one."""
+    return none, none, none, none, none, none
+
+
+@register_jitable
+def zero9(none):
+    """A matrix of zeros, from one."""
+    return none, none, none, none, none, none, none, none, none
+
+
+@register_jitable
 def joined(a, b):
     """A symmetric matrix of two halves."""
     return a[0], a[1], a[2], b[0], b[1], b[2]
@@ -171,6 +192,24 @@ def joined(a, b):
 def three(a, b, c):
     """A matrix of three columns."""
     return a[0], a[1], a[2], b[0], b[1], b[2], c[0], c[1], c[2]
+
+
+@register_jitable
+def full(m):
+    """A symmetric matrix by columns, from the upper half."""
+    return m[0], m[1], m[3], m[1], m[2], m[4], m[3], m[4], m[5]
+
+
+@register_jitable
+def upper(m):
+    """The upper half of a matrix that is symmetric."""
+    return m[0], m[3], m[4], m[6], m[7], m[8]
+
+
+@register_jitable
+def transposed(m):
+    """M'."""
+    return m[0], m[3], m[6], m[1], m[4], m[7], m[2], m[5], m[8]
 
 
 @register_jitable
@@ -192,13 +231,13 @@ def matrix_sum(m, n):
 @register_jitable
 def symmetric(array, j, first):
     """Six fields of a row as a symmetric matrix."""
-    return joined(vector(array, j, first), vector(array, j, first + 3))
+    return joined(at(array, j, first), at(array, j, first + 3))
 
 
 @register_jitable
 def matrix(array, j, first):
     """Nine fields of a row as a matrix."""
-    return three(vector(array, j, first), vector(array, j, first + 3), vector(array, j, first + 6))
+    return three(at(array, j, first), at(array, j, first + 3), at(array, j, first + 6))
 
 
 @register_jitable
@@ -243,4 +282,93 @@ def of_transposed(m, v):
         fma(m[0], v[0], fma(m[1], v[1], m[2] * v[2])),
         fma(m[3], v[0], fma(m[4], v[1], m[5] * v[2])),
         fma(m[6], v[0], fma(m[7], v[1], m[8] * v[2])),
+    )
+
+
+# Screws, which are pairs of vectors in six fields of a row: a velocity with an angular velocity, a force with
+# a moment, or the direction of a law by both. A law of slope k along a direction s adds k s s' to a matrix of
+# 6 x 6: a symmetric matrix by velocities, one by velocities and angular velocities, a symmetric one by these.
+
+
+@register_jitable
+def screw(array, j, first):
+    """Six fields of a row."""
+    return at(array, j, first), at(array, j, first + 3)
+
+
+@register_jitable
+def screw_ahead(array, j, first):
+    """Six fields of the row ahead."""
+    return ahead(array, j, first), ahead(array, j, first + 3)
+
+
+@register_jitable
+def screw_behind(array, j, first):
+    """Six fields of the row behind."""
+    return behind(array, j, first), behind(array, j, first + 3)
+
+
+@register_jitable
+def store_screw(array, j, first, s):
+    """Set six fields of a row."""
+    store(array, j, first, s[0])
+    store(array, j, first + 3, s[1])
+
+
+@register_jitable
+def add_screw(array, j, first, s):
+    """Add to six fields of a row."""
+    add(array, j, first, s[0])
+    add(array, j, first + 3, s[1])
+
+
+@register_jitable
+def both_plus(s, t):
+    """S + T."""
+    return plus(s[0], t[0]), plus(s[1], t[1])
+
+
+@register_jitable
+def both_minus(s, t):
+    """S - T."""
+    return minus(s[0], t[0]), minus(s[1], t[1])
+
+
+@register_jitable
+def both_times(k, s):
+    """K S."""
+    return times(k, s[0]), times(k, s[1])
+
+
+@register_jitable
+def both_moved(s, k, t):
+    """S + k T."""
+    return moved(s[0], k, t[0]), moved(s[1], k, t[1])
+
+
+@register_jitable
+def both_dot(s, t):
+    """S . T, which is the power of a force and a moment."""
+    return dot(s[0], t[0]) + dot(s[1], t[1])
+
+
+@register_jitable
+def plus_law(m, k, s):
+    """M + k s s' of a law that stands alone, or between two elements on the side of either."""
+    uu, uw, ww = m
+    return plus_square(uu, k, s[0]), plus_product(uw, k, s[0], s[1]), plus_square(ww, k, s[1])
+
+
+@register_jitable
+def plus_link(m, k, s, t):
+    """M + k s t' of a law between two elements, by the rows of one and the columns of the other.
+
+    M is four matrices: by velocities, of moments by velocities, of forces by angular velocities, by these.
+    """
+    uu, wu, uw, ww = m
+    return (
+        plus_product(uu, k, s[0], t[0]),
+        plus_product(wu, k, s[1], t[0]),
+        plus_product(uw, k, s[0], t[1]),
+        plus_product(ww, k, s[1], t[1]),
     )
