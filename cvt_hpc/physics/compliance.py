@@ -65,8 +65,8 @@ class Contact(NamedTuple):
         axis beyond the pitch radius [m], and its slope with the belt's displacement.
     stations : (m, 11) LaneArray or array
         Gap of the rigid bodies [m] (set by the caller), -c_e times the opening without f / c_e [N/m]; the
-        local kernel's diagonal and the entry beside it, factors, the tilt's response, work space, closed set (1 or 0), and the force
-        that the caller takes from it [N/m].
+        local kernel's diagonal and the entry beside it, factors, the tilt's response, work space, closed set
+        (1 or 0), and the force that the caller takes from it [N/m].
     scalars : (1, 19) LaneArray or array
         Constants of the wrap, the inverse of the tilt's 2x2 system, the round-off of forces [N/m]; linear
         solves so far, and whether (1) a search for the closed set did not end. Of a collar with clearance:
