@@ -156,7 +156,7 @@ branch = { resolution = "10 N m", set = { duration = "60 ms" } }
     "chart": """
 name = "tiny"
 model = "oscillator"
-run = { duration = "20 ms" }
+run = { duration = "40 ms" }
 [chart]
 repeats = 1
 scenes.one = { reference = "exact", set = { friction_law = "coulomb", kinetic_friction = 0.6, static_friction = 1.0, \
@@ -168,12 +168,13 @@ methods.rk4 = { stepper = "runge_kutta_4", step = ["50 us", "10 us"] }
     )
     + """
 [fit]
-screened = 4
-population = 4
+screened = 8
+population = 5
 generations = 1
 confirmed = 1
 samples = 0
 along = { load = [60, 110] }
+cases = { as_built = {} }
 targets = [{ name = "one", measure = "vibrating", from = "100 N m", to = "120 N m", statement = "noise at 110 N m" }]
 """,
     "ladder": TINY,
