@@ -179,7 +179,7 @@ targets = [{ name = "one", measure = "vibrating", from = "100 N m", to = "120 N 
 """,
     "ladder": TINY,
 }
-VOLATILE = re.compile("core|seconds|wall|memory|steps_per", re.IGNORECASE)  # in the head of a table's column
+VOLATILE = re.compile("core|seconds|wall|memory|steps_per", re.IGNORECASE)  # in names of columns and variables
 
 
 def digests(wanted: list[str]) -> dict[str, str]:
@@ -254,7 +254,7 @@ def of_dataset(path: Path) -> dict[str, str]:
                 np.ascontiguousarray(variable.values).tobytes(), str(variable.dtype), variable.dims
             )
             for name, variable in dataset.variables.items()
-            if variable.attrs.get("volatile") != "yes"
+            if variable.attrs.get("volatile") != "yes" and not VOLATILE.search(str(name))
         }
 
 
