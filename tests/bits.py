@@ -111,7 +111,6 @@ STUDIES: dict[str, dict] = {
     "elastic_belt explicit": SLOW_BELT | {"stepper": "explicit"},
     "elastic_belt rosenbrock_w": SLOW_BELT | {"stepper": "rosenbrock_w", "mesh": {"stations": 24}},
     "linear_stability": {"mesh": {"stations": 96}} | GRID,
-    "moving_string": {"run": {"duration": "50 ms", "longest_duration": "50 ms"}},
     **{
         f"oscillator {stepper}": {
             "stepper": stepper,
@@ -179,7 +178,9 @@ targets = [{ name = "one", measure = "vibrating", from = "100 N m", to = "120 N 
 """,
     "ladder": TINY,
 }
-VOLATILE = re.compile("core|seconds|wall|memory|steps_per", re.IGNORECASE)  # in names of columns and variables
+VOLATILE = re.compile(
+    "core|seconds|wall|memory|steps_per", re.IGNORECASE
+)  # in names of columns and variables
 
 
 def digests(wanted: list[str]) -> dict[str, str]:
