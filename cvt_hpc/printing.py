@@ -8,11 +8,13 @@ from collections.abc import Iterator, Mapping, Sequence
 from itertools import islice
 from typing import TYPE_CHECKING, Any
 
+import numpy as np
+
 from cvt_hpc.job.shown import JOB_UNITS, shown_number
 from cvt_hpc.job.summary import cost_in_words
 from cvt_hpc.job.template import CUSTOMARY
 from cvt_hpc.tables import columns
-from cvt_hpc.variables import Status, flag_in_words
+from cvt_hpc.variables import Outcome, Status, flag_in_words
 from cvt_hpc.vibration.agreement import NEAR, NEAR_CONTRADICTIONS
 
 if TYPE_CHECKING:
@@ -307,8 +309,17 @@ def _with_powers(unit: str) -> str:
 _CUSTOMARY = {_with_powers(unit): [wanted for _, wanted in known] for unit, known in CUSTOMARY.items()}
 
 
+def outcomes_of(dataset: xr.Dataset) -> list[Outcome]:
+    """Return what the dataset of a run has without a dimension or along one."""
+    return [
+        Outcome(str(name), one.values, one.dims, one.attrs, one[one.dims[0]].values if one.ndim else ())
+        for name, one in dataset.data_vars.items()
+        if one.ndim <= 1
+    ]
+
+
 def outcome_lines(
-    dataset: xr.Dataset, units: Mapping[str, Sequence[str]] | None = None, most: int | None = None
+    outcomes: Sequence[Outcome], units: Mapping[str, Sequence[str]] | None = None, most: int | None = None
 ) -> Iterator[str]:
     """Yield the lines that say what one run gave: its scalars, and what is per strand or pulley.
 
@@ -316,55 +327,60 @@ def outcome_lines(
 
     Parameters
     ----------
-    dataset : Dataset
-        A run.
+    outcomes : sequence of Outcome
+        Of a run, its status among them.
     units : mapping, optional
         By SI unit those that are preferred, as of `units_of`; without it all numbers are in SI units.
     most : int, optional
         Number of lines, with what matters first; all by default, and where one line alone would be left out.
     """
-    names = [
-        str(name)
-        for name, array in dataset.data_vars.items()
-        if array.ndim <= 1
-        and (set(array.dims) <= _ALWAYS_SHOWN or array.size <= _LARGEST_LINE)
-        and array.notnull().any()
+    told = [
+        one
+        for one in outcomes
+        if (set(one.dims) <= _ALWAYS_SHOWN or one.values.size <= _LARGEST_LINE) and _known(one.values).any()
     ]
-    if int(dataset["status"]) != Status.DONE:
-        names = [name for name in names if name in _KNOWN_OF_FAILURES]
-    names.sort(key=lambda name: _FIRST.index(name) if name in _FIRST else len(_FIRST))
-    rows = [(name, words) for name in names if (words := _array_in_words(dataset[name], units))]
-    shown = rows[: None if most is None or len(rows) <= most + 1 else most]
-    yield from columns([(name.replace("_", " "), words) for name, words in shown], indent="")
-    if left := len(rows) - len(shown):
+    if any(one.name == "status" and one.values != Status.DONE for one in outcomes):
+        told = [one for one in told if one.name in _KNOWN_OF_FAILURES]
+    told.sort(key=lambda one: _FIRST.index(one.name) if one.name in _FIRST else len(_FIRST))
+    shown = told[: None if most is None or len(told) <= most + 1 else most]
+    yield from columns([(one.name.replace("_", " "), _in_words(one, units)) for one in shown], indent="")
+    if left := len(told) - len(shown):
         yield f"{left} more by --all"
 
 
-def _array_in_words(array: xr.DataArray, units: Mapping[str, Sequence[str]] | None) -> str:
-    """Return the values of a small array, each with its place where there are several, and the unit."""
-    if "flag_meanings" in array.attrs:
-        return flag_in_words(array)
-    known = array[array.notnull()] if array.ndim else array
-    unit = array.attrs.get("units", "")
+def _known(values: np.ndarray) -> np.ndarray:
+    """Return which values are no nan, and no empty text."""
+    return ~np.isnan(values) if values.dtype.kind == "f" else np.asarray(values != "")
+
+
+def _in_words(outcome: Outcome, units: Mapping[str, Sequence[str]] | None) -> str:
+    """Return the values of an outcome, each with its place where there are several, and the unit."""
+    values, attributes = outcome.values, outcome.attributes
+    if "flag_meanings" in attributes:
+        return flag_in_words(values.item(), attributes)
+    known = _known(values)
+    unit = attributes.get("units", "")
     unit = "" if unit == "1" else unit
-    told = {"units": unit, JOB_UNITS: _readable_unit(known, unit, units)}
+    told = {"units": unit, JOB_UNITS: _readable_unit(values[known], unit, units)}
     texts = [
         f"{shown_number(value, told):.6g}" if isinstance(value, float) else str(value)
-        for value in known.values.ravel().tolist()
+        for value in values[known].ravel().tolist()
     ]
-    if array.ndim:
-        texts = [f"{place} {text}" for place, text in zip(known[array.dims[0]].values, texts, strict=True)]
+    if outcome.dims:
+        texts = [
+            f"{place} {text}" for place, text in zip(np.asarray(outcome.places)[known], texts, strict=True)
+        ]
     return f"{', '.join(texts)} {told[JOB_UNITS] or unit}".rstrip()
 
 
-def _readable_unit(array: xr.DataArray, unit: str, units: Mapping[str, Sequence[str]] | None) -> str:
+def _readable_unit(values: np.ndarray, unit: str, units: Mapping[str, Sequence[str]] | None) -> str:
     """Return the first unit, of the job and then of engineers, in which the largest value is readable.
 
     It is "" for the SI unit, which comes last.
     """
-    if units is None or array.dtype.kind != "f":
+    if units is None or values.dtype.kind != "f":
         return ""
-    largest = float(abs(array).max())
+    largest = float(abs(values).max())
     for least in _LEAST:
         for wanted in dict.fromkeys([*units.get(unit, ()), *_CUSTOMARY.get(unit, ()), ""]):
             if least <= shown_number(largest, {"units": unit, JOB_UNITS: wanted}) < _MOST:

@@ -3,15 +3,16 @@
 from __future__ import annotations
 
 import re
+from collections.abc import Mapping
 from dataclasses import dataclass
 from enum import IntEnum
 from textwrap import shorten
-from typing import TYPE_CHECKING, NamedTuple
+from typing import TYPE_CHECKING, Any, NamedTuple
 
 import numpy as np
 
 if TYPE_CHECKING:
-    import xarray as xr
+    pass
 
 
 class Status(IntEnum):
@@ -113,10 +114,34 @@ class Variable:
         return blanks.get(np.dtype(self.dtype).kind, 0)
 
 
-def flag_in_words(flag: xr.DataArray) -> str:
-    """Return the meaning of a scalar flag by the attributes that it has in a dataset."""
-    meanings = dict(zip(flag.attrs["flag_values"], flag.attrs["flag_meanings"].split(), strict=True))
-    return meanings[flag.item()]
+def flag_in_words(flag: int, attributes: Mapping[str, Any]) -> str:
+    """Return the meaning of a flag by the attributes that it has in a dataset."""
+    meanings = dict(zip(attributes["flag_values"], attributes["flag_meanings"].split(), strict=True))
+    return str(meanings[flag])
+
+
+class Outcome(NamedTuple):
+    """A number, a text or a flag that a run leaves, or one for each place of a dimension.
+
+    Attributes
+    ----------
+    name : str
+        Its name in a dataset.
+    values : array
+        Of no or one dimension [SI].
+    dims : tuple of str
+        The dimension.
+    attributes : mapping
+        Units and flags, as in a dataset.
+    places : array or ()
+        Labels along the dimension.
+    """
+
+    name: str
+    values: np.ndarray
+    dims: tuple[Any, ...]
+    attributes: Mapping[str, Any]
+    places: np.ndarray | tuple[()]
 
 
 class Coordinate(NamedTuple):

@@ -190,7 +190,7 @@ def _title(dataset: xr.Dataset) -> str:
     if place := place_of(dataset.attrs):
         lines.append(", ".join(place))
     if "rung" in dataset:
-        rung = flag_in_words(dataset["rung"])
+        rung = flag_in_words(dataset["rung"].item(), dataset["rung"].attrs)
         lines.append(f"decided by the {rung} run of model auto, {float(dataset['simulated_seconds']):.3g} s")
     status = Status(int(dataset["status"])) if "status" in dataset else None
     reason = dataset["reason"].item() if "reason" in dataset else ""

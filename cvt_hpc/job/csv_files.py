@@ -26,6 +26,7 @@ _BINARY = re.compile(r"[\x00-\x08\x0b\x0e-\x1f\x7f]")
 _HEAD = re.compile(r"(?P<name>[^[(]*)(?:\[(?P<square>[^]]*)\]|\((?P<round>.*)\))?")
 _NUMBER = re.compile(r"[+-]?(?:\d+[.,]?\d*|[.,]\d+)(?:[eE][+-]?\d+)?", re.ASCII)
 _AMBIGUOUS = re.compile(r"[+-]?[1-9]\d{0,2}[.,]\d{3}", re.ASCII)  # a fraction, or a thousand and more
+_GROUPED = re.compile(r"[+-]?\d[\d.,' ]*", re.ASCII)
 _LINES = "a line of column names and lines of numbers"
 _MOST_NAMED = 8
 
@@ -183,7 +184,9 @@ def _key(file: FromFile, cell: str) -> str | None:
 
 
 def _are_units(cells: Sequence[str]) -> bool:
-    return all(cell == "1" or not _NUMBER.fullmatch(cell) for cell in cells) and set(cells) != {"1"}
+    """Return whether no cell but "1" is a number, be it with separators of thousands."""
+    others = [cell for cell in cells if cell != "1"]
+    return bool(others) and not any(_NUMBER.fullmatch(cell) or _GROUPED.fullmatch(cell) for cell in others)
 
 
 def _columns(file: FromFile, of_names: Row, of_units: Row, place: str) -> list[_Column]:

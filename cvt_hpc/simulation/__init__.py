@@ -9,7 +9,7 @@ from cvt_hpc.simulation.batches import (
     run_costs,
     turns,
 )
-from cvt_hpc.simulation.history import run_points_keeping, simulate
+from cvt_hpc.simulation.history import alone, run_points_keeping, simulate
 from cvt_hpc.simulation.record import declared_record, record_coordinates, record_variables
 from cvt_hpc.simulation.running import Interrupted, run_point, run_points
 
@@ -28,5 +28,6 @@ __all__ = [
     "run_points",
     "run_points_keeping",
     "simulate",
+    "alone",
     "turns",
 ]

@@ -4,7 +4,7 @@ from __future__ import annotations
 
 import json
 from collections.abc import Callable, Collection, Sequence
-from typing import TYPE_CHECKING, Any
+from typing import TYPE_CHECKING, Any, NamedTuple
 
 import numpy as np
 
@@ -15,6 +15,7 @@ from cvt_hpc.models.contract import load_model
 from cvt_hpc.netcdf import attributes, global_attributes, variable_attributes
 from cvt_hpc.simulation.record import record_coordinates, record_variables
 from cvt_hpc.simulation.running import do
+from cvt_hpc.variables import Outcome
 
 if TYPE_CHECKING:
     import xarray as xr
@@ -46,6 +47,49 @@ def simulate(job: Job, at: Assignments | None = None) -> xr.Dataset:
     InputError
         If a value is not fit for its key.
     """
+    return alone(job, at).history()
+
+
+class Alone(NamedTuple):
+    """A single run that has ended.
+
+    Attributes
+    ----------
+    job, point
+        Its job and parameters [SI].
+    run
+        What its histories are made of.
+    record : dict
+        Value of each of `record_variables`.
+    """
+
+    job: Job
+    point: dict[str, Any]
+    run: Any
+    record: dict[str, Any]
+
+    def outcomes(self) -> list[Outcome]:
+        """Return what its record has without a dimension or along one."""
+        places = record_coordinates(self.job)
+        return [
+            Outcome(
+                one.name,
+                np.asarray(self.record[one.name]),
+                one.dims,
+                variable_attributes(one),
+                places[one.dims[0]].values if one.dims else (),
+            )
+            for one in record_variables(self.job)
+            if len(one.dims) <= 1
+        ]
+
+    def history(self) -> xr.Dataset:
+        """Return the dataset of `simulate`."""
+        return _history(*self)
+
+
+def alone(job: Job, at: Assignments | None = None) -> Alone:
+    """Do one run as `simulate`, without a dataset."""
     given, schema = at or {}, job.schema
     job = job.with_units_of(given, "at")
     at = read_assignments(given, schema, job.source, "at")
@@ -55,7 +99,7 @@ def simulate(job: Job, at: Assignments | None = None) -> xr.Dataset:
     if "lanes" in point and "lanes" not in {*at, *job.given, *(axis.name for axis in job.axes)}:
         point["lanes"] = "stations"
     ((run, record),) = do(job, [point], lambda: None, kept=(0,))
-    return _history(job, point, run, record)
+    return Alone(job, point, run, record)
 
 
 def run_points_keeping(

@@ -166,7 +166,7 @@ class Study:
             tuple(Dimension.from_json(axis) for axis in entry["axes"]),
             tuple(_variable_from_json(variable) for variable in entry["variables"]),
             tuple(Dimension.from_json(dimension) for dimension in entry["coordinates"]),
-            tuple(DerivedCoordinate.from_json(derived) for derived in entry["derived"]),
+            tuple(DerivedCoordinate.from_json(derived) for derived in entry.get("derived", ())),
         )
 
 
@@ -243,4 +243,6 @@ def _variable_from_json(entry: Mapping[str, Any]) -> Variable:
     meanings = entry["flags"]
     flags = meanings and IntEnum(meanings["name"], meanings["members"])
     entry = {**entry, "dims": tuple(entry["dims"]), "flags": flags}
-    return Variable(words=entry.pop("long_name"), **entry)
+    # folders of earlier versions have the sentence in the place of the name
+    name = "words" if "comment" in entry else "comment"
+    return Variable(**{name: entry.pop("long_name")}, **entry)

@@ -8,6 +8,7 @@ import pytest
 import xarray as xr
 
 from cvt_hpc.cli import main
+from cvt_hpc.printing import outcomes_of
 from cvt_hpc.variables import Status, Variable, Vibrates
 
 FLAGS = {
@@ -57,6 +58,20 @@ def simulate(job, at):
     return xr.Dataset(data, {"strand": ["t1", "t2"], "time": np.arange(9.0)})
 
 
+class Alone:
+    """The double of a single run."""
+
+    def __init__(self, job, at):
+        self.made = sys.modules["cvt_hpc.simulation"].simulate(job, at)
+        self.record = {name: self.made[name].item() for name in ("status", "reason")}
+
+    def history(self):
+        return self.made
+
+    def outcomes(self):
+        return outcomes_of(self.made)
+
+
 @pytest.fixture
 def mechanics(monkeypatch):
     """Put the double in place; return the lists of what was written and drawn."""
@@ -73,11 +88,12 @@ def mechanics(monkeypatch):
         profile_bytes=lambda job: 0,
         run_points=run_points,
         simulate=simulate,
+        alone=Alone,
         estimate_cost=lambda job: 30.0,
     )
     histories = ModuleType("cvt_hpc.analysis.histories")
     calls = {"written": [], "drawn": []}
-    histories.place_of = lambda attributes: []
+    histories.place_of = histories.values_of = lambda attributes: []
     histories.draw_history = lambda dataset, path: calls["drawn"].append((dataset, path)) or path
     monkeypatch.setitem(sys.modules, "cvt_hpc.simulation", double)
     monkeypatch.setitem(sys.modules, "cvt_hpc.analysis.histories", histories)

@@ -7,7 +7,7 @@ from dataclasses import dataclass
 from decimal import Decimal
 
 import pytest
-from hypothesis import given, settings
+from hypothesis import example, given, settings
 from hypothesis import strategies as st
 
 from cvt_hpc.errors import InputError, JobWarning
@@ -243,6 +243,7 @@ def may_be_a_thousand(text):
 
 
 @settings(max_examples=60)
+@example(Dialect(",", ".", True, False, "[]", "utf-8", "\n", 0, [], None), [(Decimal(1), Decimal("1000.0"))])
 @given(dialects, st.lists(st.tuples(values, values), min_size=1, max_size=4))
 def test_a_table_in_any_dialect_gives_its_numbers_or_is_refused(tmp_path_factory, dialect, rows):
     path = tmp_path_factory.mktemp("dialect") / "mu.csv"

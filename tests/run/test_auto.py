@@ -8,7 +8,7 @@ import pytest
 from cvt_hpc.models.auto.rules import Rung, coarse, is_passive, is_settled
 from cvt_hpc.models.elastic_belt import transient
 from cvt_hpc.models.elastic_belt.batch import LaneRun
-from cvt_hpc.printing import outcome_lines
+from cvt_hpc.printing import outcome_lines, outcomes_of
 from cvt_hpc.simulation import (
     estimate_cost,
     lane_groups,
@@ -93,7 +93,7 @@ def test_what_needs_no_run_says_nothing_but_the_class():
             assert np.isnan(record[variable.name]).all(), variable.name
     alone = simulate(job)
     assert not alone.sizes.get("time")
-    lines = list(outcome_lines(alone))
+    lines = list(outcome_lines(outcomes_of(alone)))
     assert "rung               passive" in lines and not any("nan" in line for line in lines)
 
 

@@ -16,7 +16,7 @@ from cvt_hpc.models.belt_drive.pulleys import arms_energy, axes
 from cvt_hpc.models.belt_drive.readings import Reading, Readings, stored_energy
 from cvt_hpc.models.belt_drive.start import start
 from cvt_hpc.physics.belt_path import belt_path, span_starts, tangents
-from cvt_hpc.printing import outcome_lines
+from cvt_hpc.printing import outcome_lines, outcomes_of
 from cvt_hpc.simulation import simulate
 from cvt_hpc.variables import Status, Vibrates
 
@@ -239,11 +239,15 @@ def test_a_fault_in_a_file_is_told_by_its_line(tmp_path, row, message):
 
 def test_what_is_per_pulley_is_printed(started):
     """However many pulleys there are; of arms those that are there."""
-    lines = dict(re.split(r"\s{2,}", line, maxsplit=1) for line in outcome_lines(started))
+    lines = dict(re.split(r"\s{2,}", line, maxsplit=1) for line in outcome_lines(outcomes_of(started)))
     assert lines["arm angle"].startswith("P2 ") and "P1" not in lines["arm angle"]
     assert lines["slip"].count("P") == 3 and "spectrum" not in lines
     wider = xr.Dataset({"status": started.status, "slip": ("pulley", np.arange(9.0), {"units": "1"})})
-    (slip,) = (line for line in outcome_lines(wider.assign_coords(pulley=np.arange(9))) if "slip" in line)
+    (slip,) = (
+        line
+        for line in outcome_lines(outcomes_of(wider.assign_coords(pulley=np.arange(9))))
+        if "slip" in line
+    )
     assert slip.endswith("7 7, 8 8")
 
 

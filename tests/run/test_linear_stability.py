@@ -148,7 +148,7 @@ def test_onset():
     assert onset.rising and 90.0 < onset.load < 120.0 and hidden == []
     below, above = (modes(belt.at(onset.load + d, found.points[0].steady), grid)[0] for d in (-1.0, 1.0))
     assert below.growth < 0.0 < above.growth
-    assert onset.mode.frequency == pytest.approx(above.frequency, rel=0.05)
+    assert onset.frequency == pytest.approx(above.frequency, rel=0.05)
 
 
 def test_record():

@@ -185,7 +185,7 @@ def test_a_start_up_that_fails_is_not_kept(model):
 def test_runs_whose_time_tells_of_others_march_their_own_start_up(model, taken):
     asked = job(model, {"load": [0.0, 40.0]})
     for _ in range(2):
-        march(model, "newton", [asked.point(0)], 1, 4e-3)
+        march(asked, [asked.point(0)], 1, 4e-3)
     assert taken == 2 * list(range(ALL // 4))
     del taken[:]
     run_pilots(asked, simulation, [(0,), (1,)], 2)  # a quarter of each

@@ -6,6 +6,7 @@ import signal
 import sys
 import threading
 import time
+from contextlib import suppress
 
 import psutil
 import pytest
@@ -145,8 +146,12 @@ def test_signals_end_ranks_that_wait_for_mpi_to_start(side_by_side, number):
 
 
 def children(sweep):
-    """Return the command lines of all processes that a launcher has started."""
-    return [process.cmdline() for process in psutil.Process(sweep.process.pid).children(recursive=True)]
+    """Return the command lines of all processes that a launcher has started and that have not ended."""
+    found = []
+    for process in psutil.Process(sweep.process.pid).children(recursive=True):
+        with suppress(psutil.Error):
+            found.append(process.cmdline())
+    return found
 
 
 def test_a_sweep_on_one_of_several_ranks_is_refused(start, tmp_path):

@@ -187,10 +187,17 @@ def deflection_problems(parameters: Mapping[str, Any]) -> list[tuple[str, str, s
     return problems
 
 
+def refuse_moving_discs(parameters: Mapping[str, Any]) -> list[tuple[str, str, str]]:
+    """Refuse discs with inertia, of which a method knows nothing."""
+    if (DEFLECTION_DEFAULTS | dict(parameters))["sheave_deformation"] != "ritz":
+        return []
+    return [("sheave_deformation", "bending, cone or flexibilities but by the stepper imex", "ritz")]
+
+
 def _ritz_problems(parameters: Mapping[str, Any]) -> list[tuple[str, str, str]]:
     p = parameters
-    if "step_error" not in p:  # a key of imex alone
-        return [("sheave_deformation", "bending, cone or flexibilities but by the stepper imex", "ritz")]
+    if "lanes" not in p:  # a general method
+        return refuse_moving_discs(p)
     problems = []
     for pulley in PULLEYS:
         sizes = [len(p[f"{pulley}_{key}"]) for key in OF_MODE]

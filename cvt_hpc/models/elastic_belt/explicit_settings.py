@@ -7,8 +7,11 @@ waves. Over the map of jobs/lebrecht_2004.toml the limit is 0.19 us where fricti
 where it falls least.
 """
 
+from collections.abc import Mapping
 from dataclasses import replace
+from typing import Any
 
+from cvt_hpc.models.elastic_belt.deflection_settings import refuse_moving_discs
 from cvt_hpc.models.elastic_belt.imex_settings import LARGEST_STEP
 from cvt_hpc.models.elastic_belt.ring_settings import refuse_layers
 from cvt_hpc.parameters import Parameter
@@ -40,4 +43,6 @@ PARAMETERS = {
 }
 
 
-check = refuse_layers  # its kernels know the rings as one
+def check(parameters: Mapping[str, Any]) -> list[tuple[str, str, str]]:
+    """Problems of a run: the step's kernels know the rings as one, and discs without inertia."""
+    return refuse_layers(parameters) + refuse_moving_discs(parameters)

@@ -66,17 +66,14 @@ def bounded_start(rank: int, size: int) -> Iterator[None]:
         f"waits for others: look above for one that has ended or hangs; {_VARIABLE}=20min would wait longer"
     )
     program = Path(__file__).with_name("watcher.py")
-    watcher = subprocess.Popen(
-        [sys.executable, "-I", "-S", str(program), str(seconds * (1.0 + _SPREAD * rank / size)), line],
-        stdin=subprocess.PIPE,
-        stdout=subprocess.DEVNULL,
-    )
-    try:
-        with _default_actions():
+    command = [sys.executable, "-I", "-S", str(program), str(seconds * (1.0 + _SPREAD * rank / size)), line]
+    with _default_actions():
+        watcher = subprocess.Popen(command, stdin=subprocess.PIPE, stdout=subprocess.DEVNULL)
+        try:
             yield
-    finally:
-        watcher.kill()
-        watcher.communicate()
+        finally:
+            watcher.kill()
+            watcher.communicate()
 
 
 @contextmanager
