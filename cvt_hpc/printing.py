@@ -19,7 +19,6 @@ from cvt_hpc.vibration.agreement import NEAR, NEAR_CONTRADICTIONS
 
 if TYPE_CHECKING:
     import numpy as np
-    import xarray as xr
     from numpy.typing import NDArray
 
     from cvt_hpc.analysis.comparison import Cell, Comparison
@@ -307,15 +306,6 @@ def _with_powers(unit: str) -> str:
 
 
 _CUSTOMARY = {_with_powers(unit): [wanted for _, wanted in known] for unit, known in CUSTOMARY.items()}
-
-
-def outcomes_of(dataset: xr.Dataset) -> list[Outcome]:
-    """Return what the dataset of a run has without a dimension or along one."""
-    return [
-        Outcome(str(name), one.values, one.dims, one.attrs, one[one.dims[0]].values if one.ndim else ())
-        for name, one in dataset.data_vars.items()
-        if one.ndim <= 1
-    ]
 
 
 def outcome_lines(

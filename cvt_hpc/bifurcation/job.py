@@ -2,8 +2,6 @@
 
 from __future__ import annotations
 
-import hashlib
-import json
 from dataclasses import dataclass
 from itertools import product
 from pathlib import Path
@@ -13,6 +11,7 @@ from cvt_hpc.errors import mismatch
 from cvt_hpc.job import Job, build_job, rebuild_job
 from cvt_hpc.job.assignments import Assignments, split_assignments
 from cvt_hpc.job.axes import Axis
+from cvt_hpc.job.definition import digest
 from cvt_hpc.job.document import read_document
 from cvt_hpc.job.rules import varied_by
 from cvt_hpc.job.shown import JOB_UNITS
@@ -100,7 +99,7 @@ class Diagram:
 
 def fingerprint_of(job: dict[str, Any]) -> str:
     """Return the fingerprint of a diagram by the result of `Diagram.resolved`."""
-    return hashlib.sha256(json.dumps(numbers_of(job), sort_keys=True).encode()).hexdigest()
+    return digest(numbers_of(job))
 
 
 def numbers_of(job: dict[str, Any]) -> dict[str, Any]:

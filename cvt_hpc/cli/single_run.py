@@ -32,7 +32,7 @@ def _simulate(arguments: argparse.Namespace) -> int:
     parts.check_output(arguments.out, (".nc",))
     parts.check_output(arguments.plot, parts.PICTURES)
     from cvt_hpc.netcdf import is_history, write_history
-    from cvt_hpc.printing import MOST_OUTCOMES, outcome_lines, outcomes_of, point_lines, units_of
+    from cvt_hpc.printing import MOST_OUTCOMES, outcome_lines, point_lines, units_of
     from cvt_hpc.simulation import alone
     from cvt_hpc.variables import Status
 
@@ -41,11 +41,8 @@ def _simulate(arguments: argparse.Namespace) -> int:
     run = alone(job, arguments.at)
     # files first: whoever reads the lines may close the pipe
     written: list[str] = []
-    if arguments.out is None and arguments.plot is None and not arguments.all:
-        outcomes = run.outcomes()  # without a dataset, which takes as long as a short run
-    else:
-        dataset = run.history()
-        outcomes = outcomes_of(dataset)
+    if arguments.out is not None or arguments.plot is not None:
+        dataset = run.history()  # it takes as long as a short run
     if arguments.out is not None:
         written.append(f"history: {write_history(dataset, arguments.out)}")
     if arguments.plot is not None and dataset.sizes.get("time", 0) > 1:
@@ -55,7 +52,7 @@ def _simulate(arguments: argparse.Namespace) -> int:
     elif arguments.plot is not None:
         written.append("picture: none, the run has no history")
     most = None if arguments.all else MOST_OUTCOMES
-    parts.say(*point_lines(job, at), *outcome_lines(outcomes, units_of(job), most), *written)
+    parts.say(*point_lines(job, at), *outcome_lines(run.outcomes(), units_of(job), most), *written)
     status = Status(int(run.record["status"]))
     if status != Status.DONE:
         parts.complain(f"the run failed: {status.name.lower()}: {run.record['reason']}")

@@ -8,12 +8,11 @@ from typing import Any
 
 import numpy as np
 
+from cvt_hpc.dataset_form import LARGEST
 from cvt_hpc.errors import InputError, did_you_mean, mismatch, show
 from cvt_hpc.job.plausibility import meant
 from cvt_hpc.job.units import UnitError, from_si, to_si, unit_in
 from cvt_hpc.parameters import Parameter
-
-LARGEST = 1e100  # finite value of a parameter [SI]: squares and cubes are numbers, too
 
 
 def read_value(parameter: Parameter, raw: Any, where: str) -> Any:

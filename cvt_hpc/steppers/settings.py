@@ -39,7 +39,7 @@ SOLVER_TOLERANCE = Parameter(
 )
 
 
-def own_step(default: float, least: float, longest: float) -> Parameter:
+def own_step(default: float | None, least: float, longest: float) -> Parameter:
     """The step [s] of a model's own method, with its bounds."""
     bounds = least, longest
     return Parameter(default, "s", STEP.description, minimum=least, maximum=longest, sensible=bounds)

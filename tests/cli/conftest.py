@@ -8,8 +8,8 @@ import pytest
 import xarray as xr
 
 from cvt_hpc.cli import main
-from cvt_hpc.printing import outcomes_of
 from cvt_hpc.variables import Status, Variable, Vibrates
+from support.outcomes import outcomes_of
 
 FLAGS = {
     "status": ([0, 1, 2, 3, 4], "not_run done failed_numerics failed_error timed_out"),

@@ -8,7 +8,7 @@ import pytest
 from cvt_hpc.models.auto.rules import Rung, coarse, is_passive, is_settled
 from cvt_hpc.models.elastic_belt import transient
 from cvt_hpc.models.elastic_belt.batch import LaneRun
-from cvt_hpc.printing import outcome_lines, outcomes_of
+from cvt_hpc.printing import outcome_lines
 from cvt_hpc.simulation import (
     estimate_cost,
     lane_groups,
@@ -21,6 +21,7 @@ from cvt_hpc.simulation import (
 from cvt_hpc.simulation.batches import MOST_TURNS
 from cvt_hpc.variables import Status, Vibrates
 from cvt_hpc.vibration.assessment import Occurrence
+from support.outcomes import outcomes_of
 from support.rungs import rung_job
 
 # cells of the reference map by what is known of them: the middle of a window, outside of all, push changing strands

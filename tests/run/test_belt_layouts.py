@@ -16,9 +16,10 @@ from cvt_hpc.models.belt_drive.pulleys import arms_energy, axes
 from cvt_hpc.models.belt_drive.readings import Reading, Readings, stored_energy
 from cvt_hpc.models.belt_drive.start import start
 from cvt_hpc.physics.belt_path import belt_path, span_starts, tangents
-from cvt_hpc.printing import outcome_lines, outcomes_of
+from cvt_hpc.printing import outcome_lines
 from cvt_hpc.simulation import simulate
 from cvt_hpc.variables import Status, Vibrates
+from support.outcomes import outcomes_of
 
 # coarse elements shake the strands
 SHORT = {"duration": 0.25, "longest_duration": 0.25, "most_refinements": 0, "amplitude_threshold": 0.01}

@@ -8,6 +8,7 @@ Stable where the explicit part is. Without a step of the job's own the model cho
 
 from cvt_hpc.parameters import Parameter
 from cvt_hpc.steppers.facts import LANES, Facts
+from cvt_hpc.steppers.settings import own_step
 
 FACTS = Facts(
     order=1,
@@ -19,14 +20,7 @@ FACTS = Facts(
     stability="bending, tension and contact of the strands: step < 2 / their fastest frequency",
     damping="none in strands and rings; pressed elements like a damper EA step [N s]",
 )
-LARGEST_STEP = Parameter(
-    None,
-    "s",
-    "largest time step; a whole number of steps makes a sampling interval",
-    minimum=1e-9,
-    maximum=1e-3,
-    sensible=(1e-09, 0.001),
-)
+LARGEST_STEP = own_step(None, 1e-9, 1e-3)
 PARAMETERS = {
     "numerics": {
         "step_error": Parameter(
