@@ -47,7 +47,7 @@ def table_matrix(angles: Sequence[float], table: Sequence[Sequence[float]]) -> n
     Parameters
     ----------
     angles : sequence of n floats
-        Ascending angles from the inlet [rad]; of a single row equidistant and from 0.
+        Ascending angles from the inlet [rad], those before it negative; of a single row equidistant, from 0.
     table : n rows of n floats, or one row of n
         w [m/N] of each pair of angles, or of a body of revolution over the angle between both.
     """
@@ -58,18 +58,31 @@ def table_matrix(angles: Sequence[float], table: Sequence[Sequence[float]]) -> n
     return values[0][np.abs(apart[:, None] - apart)]
 
 
-def interpolated(angles: Sequence[float], table: Sequence[Sequence[float]], places: np.ndarray) -> np.ndarray:
+def interpolated(
+    angles: Sequence[float], table: Sequence[Sequence[float]], places: np.ndarray, wrap: float
+) -> np.ndarray:
     """Flexibilities of a wrap from a table: forces go to the knots beside them, openings come from there.
 
     So w stays symmetric and positive semi-definite on any mesh. Where knots are stations it is the table's.
-    Beyond the first and the last angle these hold. `places` (m,) are the stations' angles from the inlet.
+    Stations beyond the first and the last angle have their flexibilities. A single row that is longer than
+    the wrap reaches as far beyond the inlet as beyond the outlet.
+
+    Parameters
+    ----------
+    angles, table : sequences
+        As of `table_matrix`.
+    places : (m,) array
+        Angles of the stations from the inlet [rad].
+    wrap : float
+        Angle of the wrap [rad].
 
     Returns
     -------
     (m, m) array
         w [m/N].
     """
-    shares = np.array([np.interp(places, angles, unit) for unit in np.eye(len(angles))])
+    before = 0.5 * (angles[-1] - wrap) if len(table) == 1 else 0.0
+    shares = np.array([np.interp(places + before, angles, unit) for unit in np.eye(len(angles))])
     found = shares.T @ table_matrix(angles, table) @ shares
     return 0.5 * (found + found.T)
 
@@ -90,7 +103,7 @@ def table_problem(
     if n < 2 or {len(row) for row in table} != {n} or len(table) not in (1, n):
         rows = " x ".join(str(size) for size in (len(table), len(table[0]) if table else 0))
         return f"1 or n rows of n flexibilities, n >= 2 being the number of angles, {n}", rows
-    if angles[0] != 0.0 or steps.min() <= 0.0:
+    if angles[0] > 0.0 or steps.min() <= 0.0 or (len(table) == 1 and angles[0] < 0.0):
         return "angles that ascend from 0", f"{angles[0]:g} to {angles[-1]:g} rad"
     if len(table) == 1 and np.ptp(steps) > ROUND_OFF * steps.max():
         return (

@@ -8,7 +8,7 @@ import pytest
 
 from cvt_hpc.errors import InputError
 from cvt_hpc.job import load_job
-from cvt_hpc.models.elastic_belt.belt import mesh
+from cvt_hpc.models.elastic_belt.belt import belt_constants
 from cvt_hpc.physics.ritz import modal_flexibilities
 from cvt_hpc.simulation import run_points
 from support.marched import fresh_record, job, never
@@ -21,20 +21,14 @@ RECORD = SCENE | {"precision": "double"}
 def local_bending(collar=False):
     """Tables of the default's local kernel at the stations; with the tilt of its collar, too, where asked for."""
     p = job(**SCENE).parameters
-    grid, found = mesh(p), {"sheave_deformation": "flexibilities"}
-    for pulley, region, radius in (
-        ("driving", 0, grid.path.driving_radius),
-        ("driven", 2, grid.path.driven_radius),
-    ):
-        angles = np.arange(grid.counts[region] + 1) * grid.cell[grid.starts[region]] / radius
-        length = p["local_length"]
-        row = np.exp(-angles * radius / length) / (2.0 * length * p["local_stiffness"])
+    belt, found = belt_constants(p | {"duration": 1.0}), {"sheave_deformation": "flexibilities"}
+    for pulley in ("driving", "driven"):
+        wrap, radius, length = getattr(belt, pulley), getattr(belt, f"{pulley}_radius"), p["local_length"]
+        apart = np.abs(wrap.angle[:, None] - wrap.angle)
+        table = np.exp(-apart * radius / length) / (2.0 * length * p["local_stiffness"])
         if collar:
-            row += radius**2 / p["tilt_stiffness"] * np.cos(angles)
-        found |= {
-            f"{pulley}_flexibility_angle": angles.tolist(),
-            f"{pulley}_flexibility": [row.tolist()],
-        }
+            table += radius**2 / p["tilt_stiffness"] * wrap.tilt.T @ wrap.tilt
+        found |= {f"{pulley}_flexibility_angle": wrap.angle.tolist(), f"{pulley}_flexibility": table.tolist()}
     return found
 
 
@@ -52,16 +46,14 @@ MODES = {
 
 def modes_as_tables():
     """Tables of these modes at the stations."""
-    p = job(**SCENE).parameters
-    grid, found = mesh(p), {"sheave_deformation": "flexibilities"}
-    for pulley, region, radius in (
-        ("driving", 0, grid.path.driving_radius),
-        ("driven", 2, grid.path.driven_radius),
-    ):
-        spacing, stations = grid.cell[grid.starts[region]], grid.counts[region] + 1
-        matrix = modal_flexibilities(np.arange(21.0), np.array(FLEXIBILITIES), stations, spacing, radius)
-        found[f"{pulley}_flexibility_angle"] = (np.arange(stations) * spacing / radius).tolist()
-        found[f"{pulley}_flexibility"] = [matrix[0].tolist()]
+    belt = belt_constants(job(**SCENE).parameters | {"duration": 1.0})
+    found = {"sheave_deformation": "flexibilities"}
+    for pulley in ("driving", "driven"):
+        wrap, radius = getattr(belt, pulley), getattr(belt, f"{pulley}_radius")
+        place = wrap.angle, wrap.weight / radius
+        matrix = modal_flexibilities(np.arange(21.0), np.array(FLEXIBILITIES), *place)
+        found[f"{pulley}_flexibility_angle"] = wrap.angle.tolist()
+        found[f"{pulley}_flexibility"] = matrix.tolist()
     return found
 
 
@@ -129,15 +121,14 @@ def test_the_job_of_finite_elements_takes_its_discs_by_each_description():
     path = jobs / "sheave_deformation.toml"
     found = {name: load_job(path, part).parameters for name, part in parts.items()}
     # w_ij and the modes are of one disc: the table is that of the modes at its knots
-    for pulley, radius in (("driving", 0.075 / 2.52), ("driven", 0.075)):
+    for pulley in ("driving", "driven"):
         p = found["ritz"]
         angles = found["w_ij"][f"{pulley}_flexibility_angle"]
         matrix = modal_flexibilities(
             np.array(p[f"{pulley}_mode_harmonic"]),
             np.array(p[f"{pulley}_mode_flexibility"]),
-            len(angles),
-            radius * angles[1],
-            radius,
+            np.array(angles),
+            np.full(len(angles), angles[1]),
         )
         (row,) = found["w_ij"][f"{pulley}_flexibility"]
         assert matrix[0] == pytest.approx(row, rel=1e-9, abs=1e-9 * row[0])

@@ -92,7 +92,7 @@ def test_layers_that_turn_about_a_pulley_with_the_elements_do_not_slide():
     belt, rings, state = layered(ring_layers=4)
     n, normal, sliding = 4, np.empty(5), np.empty(5)
     eps = strains(belt, rings, state)
-    for j in (3, belt.driven_start + 3):
+    for j in (3, int(np.flatnonzero(belt.curvature * belt.on_driven)[3])):
         turning = 1.0 + rings.offset * belt.arc_curvature[j]
         state.fields[FIRST_LAYER : FIRST_LAYER + n, j] = state.fields[f.V_ELEMENT, j] * turning
         surface_friction(belt, rings, state, eps, 1.0, j, normal, sliding)
@@ -112,7 +112,7 @@ def test_the_capstan_holds_in_each_layer():
         ring_layers=3, layer_thickness=0.0, ring_offset=0.0, stations=160, driving_speed=1.0
     )
     n, cells, mu = 3, belt.cell.size, 0.08
-    arc = int(np.count_nonzero(belt.curvature[: belt.driven_start]))
+    arc = int(np.count_nonzero(belt.curvature * (belt.on_driven == 0.0)))
     angle = (np.arange(cells) + 0.5) * belt.cell[0] * belt.curvature[0]
     share = np.array([0.5, 0.3, 0.2])[:, None]
     tension = 5e3 * share * np.exp(mu * np.minimum(angle, np.pi))
@@ -168,7 +168,7 @@ def test_friction_takes_what_its_surfaces_lose(share, bare):
     speeds = np.vstack([state.fields[FIRST_LAYER : FIRST_LAYER + n], state.fields[f.V_ELEMENT]])
     power = (inertia * (rate - smooth)[[0, 1, 2, 2 * n]] * speeds).sum(axis=0)
     kinetic, normal, sliding = np.array([0.08, 0.05, 0.05, 0.08]), np.empty(n + 1), np.empty(n + 1)
-    on_arcs = np.flatnonzero(belt.arc_share)
+    on_arcs = np.flatnonzero(belt.arc_curvature)
     assert on_arcs.size > cells / 2
     for j in on_arcs:
         surface_friction(belt, rings, state, eps, share, j, normal, sliding)

@@ -60,8 +60,8 @@ class Settled:
         force, eps = np.empty(n), np.empty((2, n))
         assert contact_forces(belt, state, fresh_contacts(belt), force) > 0
         strains(belt, state.fields, eps)
-        wraps = ((belt.driving, 0), (belt.driven, belt.driven_start))
-        thrusts = [sheave.weight @ force[first : first + sheave.weight.size] for sheave, first in wraps]
+        wraps = ((belt.driving, belt.driving_stations), (belt.driven, belt.driven_stations))
+        thrusts = [sheave.weight @ np.maximum(force[held], 0.0) for sheave, held in wraps]
         push = np.maximum(-belt.element_stiffness * eps[0], 0.0)
         return [belt.ring_stiffness * eps[1], push, state.fields[f.W].copy(), np.array(thrusts)]
 

@@ -34,7 +34,7 @@ def straight_belt(cells: int, speed: float = 0.0, bending: float = 0.0, damping:
     )
     assert np.ptp(belt.cell) < 1e-15
     nothing = np.zeros(2 * cells)
-    return belt._replace(curvature=nothing, arc_curvature=nothing, arc_share=nothing, belt_speed=speed)
+    return belt._replace(curvature=nothing, arc_curvature=nothing, touches=nothing, belt_speed=speed)
 
 
 def moving_straight(belt: Belt, tension: float = TENSION, push: float = 0.0) -> State:

@@ -154,7 +154,7 @@ def disc_settings(
         return {"flexibilities": cone_flexibilities(from_middle, distance, *shifted)}
     if p["sheave_deformation"] == "flexibilities":
         angles, table = p[f"{pulley}_flexibility_angle"], p[f"{pulley}_flexibility"]
-        return {"flexibilities": interpolated(angles, table, wrap.angle)}
+        return {"flexibilities": interpolated(angles, table, wrap.angle, turned)}
     if p["sheave_deformation"] == "ritz":
         kept, interval = kept_modes(p, pulley), 1.0 / p["sampling_rate"]
         step = interval / steps_per_sample(interval, p["step"])
