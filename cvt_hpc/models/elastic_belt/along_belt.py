@@ -119,5 +119,5 @@ def wrap_angles(grid: Mesh) -> np.ndarray:
     found = np.full(grid.cell.size, np.nan)
     for region, radius in ((0, grid.path.driving_radius), (2, grid.path.driven_radius)):
         first, count = grid.starts[region], grid.counts[region]
-        found[first : first + count + 1] = grid.cell[first] * np.arange(count + 1) / radius
+        found[first : first + count + 1] = grid.along(region) / radius
     return found

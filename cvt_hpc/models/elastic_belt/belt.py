@@ -9,6 +9,7 @@ left face of cell j); the content n_i, the strains and the forces in cells. Rows
 from __future__ import annotations
 
 from collections.abc import Mapping
+from itertools import accumulate
 from typing import Any, NamedTuple
 
 import numpy as np
@@ -20,7 +21,7 @@ from cvt_hpc.models.elastic_belt.deflection_settings import disc_settings
 from cvt_hpc.models.elastic_belt.grouping import faded_coupling
 from cvt_hpc.models.elastic_belt.pulleys import Pulleys, settled_tilt, with_pulleys
 from cvt_hpc.physics.friction import FrictionLaw, given_law
-from cvt_hpc.physics.geometry import Variator, cell_counts, variator
+from cvt_hpc.physics.geometry import Variator, cut_path, variator
 from cvt_hpc.physics.sheaves import (
     Sheaves,
     axial_element_stiffness,
@@ -163,6 +164,11 @@ class Mesh(NamedTuple):
             self.region
         ]
 
+    def along(self, region: int) -> np.ndarray:
+        """Way of a region's stations, its end included, from its start [m], (count + 1,)."""
+        first = self.starts[region]
+        return np.insert(np.cumsum(self.cell[first : first + self.counts[region]]), 0, 0.0)
+
     def zone(self, region: int, reach: float = REACH) -> Zone:
         """Stations that the groove of an arc may hold: the arc's, and those of `reach` of both strands.
 
@@ -172,7 +178,8 @@ class Mesh(NamedTuple):
         """
         n, first, count = self.cell.size, self.starts[region], self.counts[region]
         radius = self.path.driving_radius if region == 0 else self.path.driven_radius
-        more = [max(round(reach * self.counts[strand]), 1) for strand in ((region + 3) % 4, (region + 1) % 4)]
+        way = self.along((region + 1) % 4)  # both strands are cut alike
+        more = [int(np.count_nonzero(way[1:] <= max(reach * way[-1], way[1])))] * 2
         stations = np.arange(first - more[0], first + count + more[1] + 1) % n
         along = np.insert(np.cumsum(self.cell[stations[:-1]]), 0, 0.0)
         along -= along[more[0]]  # [m] from the inlet
@@ -200,7 +207,7 @@ class Zone(NamedTuple):
 
 
 def mesh(parameters: Mapping[str, Any]) -> Mesh:
-    """Cut the path into `stations` cells, equal within a region and nearly equal over all.
+    """Cut the path into `stations` cells, shorter by `end_refinement` at the ends of the arcs (`cut_path`).
 
     Parameters
     ----------
@@ -213,11 +220,9 @@ def mesh(parameters: Mapping[str, Any]) -> Mesh:
         With faces on the ends of the arcs.
     """
     path = variator(parameters["ratio"], parameters["driven_radius"], parameters["centre_distance"])
-    total = parameters["stations"]
-    lengths = np.array(path.lengths)
-    counts = np.array(cell_counts(path, total))
-    starts = np.concatenate([[0], np.cumsum(counts)[:-1]])
-    return Mesh(tuple(map(int, counts)), tuple(map(int, starts)), np.repeat(lengths / counts, counts), path)
+    cells = cut_path(path, parameters["stations"], parameters["end_refinement"])
+    counts = [part.size for part in cells]
+    return Mesh(tuple(counts), (0, *accumulate(counts[:-1])), np.concatenate(cells), path)
 
 
 def belt_constants(parameters: Mapping[str, Any]) -> Belt:
@@ -380,8 +385,8 @@ def _fill_strands(w: np.ndarray, grid: Mesh) -> None:
     """Straight lines between the arcs' ends."""
     for region in (1, 3):
         first, count = grid.starts[region], grid.counts[region]
-        ends = w[first], w[(first + count) % w.size]
-        w[first : first + count] = np.linspace(*ends, count, endpoint=False)
+        share = grid.along(region) / grid.path.lengths[region]
+        w[first : first + count] = ((1.0 - share) * w[first] + share * w[(first + count) % w.size])[:-1]
 
 
 def random_strands(grid: Mesh, size: float, seed: int) -> np.ndarray:
@@ -404,7 +409,7 @@ def random_strands(grid: Mesh, size: float, seed: int) -> np.ndarray:
     random = np.random.default_rng(seed)
     shape = np.zeros(grid.cell.size)
     for region in (1, 3):
-        x = np.arange(grid.counts[region]) / grid.counts[region]
+        x = grid.along(region)[:-1] / grid.path.lengths[region]
         stations = slice(grid.starts[region], grid.starts[region] + grid.counts[region])
         shape[stations] = sum(random.normal() * np.sin(k * np.pi * x) for k in range(1, 7))
     return size * shape / np.abs(shape).max()

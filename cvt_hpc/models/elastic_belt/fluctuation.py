@@ -175,7 +175,8 @@ def part_shares(grid: Mesh) -> np.ndarray:
     borders = np.linspace(0.0, 1.0, ARC_PARTS + 1)
     for pulley, region in enumerate((0, 2)):
         first, count = grid.starts[region], grid.counts[region]
-        edges = np.clip((np.arange(count + 2) - 0.5) / count, 0.0, 1.0)
+        along = grid.along(region) / grid.path.lengths[region]
+        edges = np.concatenate([[0.0], 0.5 * (along[1:] + along[:-1]), [1.0]])
         inside = np.diff(np.clip(edges, borders[:-1, None], borders[1:, None]), axis=1)
         beyond = grid.zone(region).beyond
         shares[pulley, 0, grid.zone(region).stations[beyond < 0.0]] = 1.0

@@ -173,12 +173,13 @@ def assemble(belt: LaneBelt, state: LaneState, work: Work, step: float, again: b
 
 @merged_kernel
 def _put(stations: LaneArray, j: int, station, push_behind, push_ahead):
-    """Store the increment of u and the right side of station j, with the gyroscopic force's correction.
+    """Store the increment of u, before it is spread, and the right side of station j without its share.
+
+    The increment has the gyroscopic force's correction.
 
     `station` is its increment of u [m/s], that per difference of its neighbours' increments, the length times
     the cross slope of friction [N s/m], and the force along the belt [N].
     """
     push, gyration, cross, along = station
     push = fma(gyration, push_ahead - push_behind, push)
-    stations[j, lf.PUSH] = push
-    stations[j, lf.Y_0] = fma(-cross, push, along)
+    stations[j, lf.PUSH], stations[j, lf.CROSS], stations[j, lf.Y_0] = push, cross, along

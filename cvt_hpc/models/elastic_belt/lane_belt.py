@@ -214,25 +214,12 @@ def _constants_of(belt: Belt) -> list[float]:
         "cosine": np.cos(angle),
         "wedge": 2.0 * np.tan(angle),
         "forget": 1.0 / memory if memory else 0.0,
-        "driving_carry": _carry(belt, belt.cell[0]),
-        "driven_carry": _carry(belt, belt.cell[belt.driven_stations[belt.driven_stations.size // 2]]),
         "start_share": belt.speed_start / belt.driving_speed,
-        "driving_cell": belt.cell[0],
-        "driven_cell": belt.cell[belt.driven_stations[belt.driven_stations.size // 2]],
         # energy stored in a pulley of given speed does not count
         "driven_inertia": belt.driven_inertia if np.isfinite(belt.driven_inertia) else 0.0,
         **dict(zip(f.LAWS, belt.pulleys.laws[0], strict=True)),
     }
     return [named[key] if key in named else getattr(belt, key) for key in lf.CONSTANTS]
-
-
-def _carry(belt: Belt, spacing: float) -> float:
-    """Rate of the memory's transport, as `rhs.memory_transport` has it."""
-    memory, way = belt.friction_memory, belt.belt_speed * belt.friction_memory
-    if way == 0.0:
-        return 0.0
-    # exp(-x) / (1 - exp(-x)): a belt that hardly moves makes exp(x) too large for a number
-    return np.exp(-spacing / way) / (-np.expm1(-spacing / way) * memory)
 
 
 def lane_state(belts: list[Belt], states: list[State], dtype: type) -> LaneState:

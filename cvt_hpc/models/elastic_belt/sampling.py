@@ -167,9 +167,10 @@ def sensors(grid: Mesh, places: tuple[Probe, ...], interval: float, dtype: type)
         rows.append(row)
     for region in (1, 3):
         first, count = grid.starts[region], grid.counts[region]
-        x = np.arange(count) / count
+        length = grid.path.lengths[region]
+        x, dual = grid.along(region)[:-1] / length, 0.5 * (grid.cell + np.roll(grid.cell, 1))
         for k in range(1, MODES + 1):
-            shape = np.sin(k * np.pi * x) * 2.0 / count
+            shape = np.sin(k * np.pi * x) * 2.0 * dual[first : first + count] / length
             row = np.zeros(n)
             row[first : first + count] = shape
             row[first] -= shape @ (1.0 - x)

@@ -75,8 +75,8 @@ def power_limit(grid: Mesh) -> float:
 
 
 def _strand_cell(grid: Mesh) -> float:
-    """Length of the cells of the first strand [m]."""
-    return float(grid.cell[grid.starts[1]])
+    """Length of the longest cell of a strand [m]."""
+    return float(grid.cell[grid.region == 1].max())
 
 
 def step_doubt(step: float, limit: float) -> tuple[Status, str] | None:

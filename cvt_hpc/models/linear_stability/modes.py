@@ -114,8 +114,9 @@ def _shape(w: np.ndarray, grid: Mesh) -> tuple[np.ndarray, int, int]:
         first, count = grid.starts[region], grid.counts[region]
         part = np.append(w[first : first + count], w[(first + count) % w.size])
         largest[region] = np.abs(part).max()
-        along = np.linspace(0.0, 1.0, count + 1)
-        sines = np.sin(np.pi * np.outer(np.arange(1, MODES + 1), along))
+        along = grid.along(region) / grid.path.lengths[region]
+        weights = np.append(0.0, 0.5 * (np.diff(along)[1:] + np.diff(along)[:-1]))
+        sines = np.sin(np.pi * np.outer(np.arange(1, MODES + 1), along)) * np.append(weights, 0.0)
         chord = part[0] + along * (part[-1] - part[0])
         waves[region] = 1 + np.abs(sines @ (part - chord)).argmax()
     strand = int(largest[3] > largest[1])
