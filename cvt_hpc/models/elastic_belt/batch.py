@@ -15,7 +15,7 @@ from cvt_hpc.models.elastic_belt import lane_fields as lf
 from cvt_hpc.models.elastic_belt.belt import State, belt_constants, initial_state, random_strands
 from cvt_hpc.models.elastic_belt.explicit import FIELDS_OF_WORK, step_explicit
 from cvt_hpc.models.elastic_belt.grouping import LANES, lanes
-from cvt_hpc.models.elastic_belt.imex import begin_imex, step_imex
+from cvt_hpc.models.elastic_belt.imex import step_imex
 from cvt_hpc.models.elastic_belt.lane_forces import derive
 from cvt_hpc.models.elastic_belt.march import Sampled, begin_at_once, march, take_sample
 from cvt_hpc.models.elastic_belt.recorded_run import RecordedRun, Records
@@ -31,7 +31,7 @@ PRECISIONS = {"double": np.float64, "single": np.float32}
 STEPS: dict[str, tuple[Callable[[lane_belt.LaneState], Any], Callable[..., None]]] = {  # work space, march
     "imex": (
         partial(lane_belt.work_space, fields=lf.FIELDS_OF_WORK),
-        partial(march, begin_imex, step_imex, take_sample),
+        partial(march, begin_at_once, step_imex, take_sample),
     ),
     "explicit": (
         partial(lane_belt.work_space, fields=FIELDS_OF_WORK),

@@ -23,7 +23,7 @@ from cvt_hpc.lanes import anywhere, around, behind, fma, from_ahead, like, minim
 from cvt_hpc.models.elastic_belt import fields as f
 from cvt_hpc.models.elastic_belt import lane_fields as lf
 from cvt_hpc.models.elastic_belt import lane_forces as forces
-from cvt_hpc.models.elastic_belt.imex_bending import factorise_bending, spread
+from cvt_hpc.models.elastic_belt.imex_bending import move_across
 from cvt_hpc.models.elastic_belt.imex_stations import assemble
 from cvt_hpc.models.elastic_belt.imex_system import TURNS_BACK, eliminate, substitute
 from cvt_hpc.models.elastic_belt.lane_belt import LaneBelt, LaneState, Work
@@ -34,12 +34,6 @@ from cvt_hpc.physics.flank import flank_sliding
 # One, unless friction turns sliding about or elements meet; then each closes the cells beside the last ones,
 # and a push goes through c dt / h of them in a step.
 MOST_PASSES = 9
-
-
-@kernel
-def begin_imex(belt: LaneBelt, state: LaneState, work: Work, step: float) -> None:
-    """Find the factors that steps of this length have in common."""
-    factorise_bending(belt, work, step)
 
 
 @kernel
@@ -56,7 +50,7 @@ def step_imex(belt: LaneBelt, state: LaneState, work: Work, step: float) -> None
     stations = work.stations
     forces.lane_sliding(belt, state, stations)
     assemble(belt, state, work, step, False)
-    spread(belt, work, step)
+    move_across(belt, state, work, step)
     if belt.has_column:
         foresee_column(belt, state, stations, lf.PUSH, step)
     for attempt in range(MOST_PASSES):
@@ -69,7 +63,7 @@ def step_imex(belt: LaneBelt, state: LaneState, work: Work, step: float) -> None
             break
         if found & TURNS_BACK:
             assemble(belt, state, work, step, True)
-            spread(belt, work, step)
+            move_across(belt, state, work, step)
             if belt.has_column:
                 foresee_column(belt, state, stations, lf.PUSH, step)
     taken, moment = advance_belt(belt, state, work, step)

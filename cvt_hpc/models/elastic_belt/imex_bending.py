@@ -1,121 +1,124 @@
-"""Bending in the fast step: increments of u are spread along the belt, so that short waves limit no step.
+"""Bending in the fast step: implicit, so that the shortest waves limit no step.
 
 Explicit bending is stable up to dt = 2 / w of the shortest waves, w^2 = 16 EI / (m h^4): steps would fall with
-the square of the cells. In the place of a mass m the increments of a step have
+the square of the cells. The increments of a step have, with the slope r of friction and damping,
 
-    (m + IMPLICIT dt^2 EI d^4/ds^4) du = dt F,
+    (m / dt + r) du + IMPLICIT dt EI d^4/ds^4 du = F,
 
 by which no wave of bending turns by more than 1 / sqrt(IMPLICIT) rad in a step. States at rest stay what they
 are, nothing is damped, and waves of a frequency w are slower by the share IMPLICIT (w dt)^2 / 2 of what bending
-has in their stiffness: 2e-5 at 600 Hz and 8 us, if all of it were bending.
+has in their stiffness: 2e-5 at 600 Hz and 8 us, if all of it were bending. Pressed elements that bear a moment
+count into EI.
 
-With g = dt (IMPLICIT EI / m)^1/2 and the second difference D of the mesh it is 1 + g^2 D^2 = (1 + i g D)(1 - i g D), so
-that du is the real part of (1 + i g D)^-1 dt F / m: one complex system with three diagonals, whose factors are
-those of the step's length alone. Pressed elements that bear a moment count into EI.
+With M = -q d^2/ds^2 du and q^2 = IMPLICIT dt EI it is one symmetric system of blocks [du, M] along the belt. The
+increments of the layers change u by the slope of friction at their station alone, and the force F changes them
+by the same slope: so the step stays that of a symmetric mass, which feeds nothing.
 """
 
 from __future__ import annotations
 
 from cvt_hpc.kernels import kernel, merged_kernel
-from cvt_hpc.lanes import fma, from_ahead, from_behind, like, ring_solution, sqrt
+from cvt_hpc.lanes import ahead, behind, fma, from_ahead, from_behind, like, ring_solution, sqrt
 from cvt_hpc.models.elastic_belt import lane_fields as lf
-from cvt_hpc.models.elastic_belt.lane_belt import LaneBelt, Work
+from cvt_hpc.models.elastic_belt.lane_belt import LaneBelt, LaneState, Work
+from cvt_hpc.models.elastic_belt.lane_forces import lane_belt_speed
 
-IMPLICIT = 0.5  # from 1/4 on no step is too long for bending; here it takes half of what a step allows
+IMPLICIT = 0.5  # from 1/4 on no step is too long for bending
 
 
-@merged_kernel
-def _reach(belt: LaneBelt, step: float):
-    """g [m^2]."""
-    c = belt.constants
-    stiffness = c[0, lf.BENDING_STIFFNESS]
+@kernel
+def move_across(belt: LaneBelt, state: LaneState, work: Work, step: float) -> None:
+    """Increments of u without those of the layers, PUSH, from ACROSS and MASS_ACROSS.
+
+    The gyroscopic force is taken with the mean of u over the step: it then neither damps nor feeds. By one
+    correction with the increments without it, since it changes them little: by v step / h, some 0.02.
+    Extrapolated from earlier steps it feeds waves of a frequency w that run against the belt, at the rate
+    (v / h) (w step)^3 / 4.
+    """
+    stations, c = work.stations, belt.constants
+    last, stiffness = stations.rows - 1, c[0, lf.BENDING_STIFFNESS]
     if belt.has_column:
         stiffness = stiffness + c[0, lf.COLUMN_STIFFNESS]
-    return step * sqrt(IMPLICIT * stiffness / c[0, lf.MASS])
-
-
-@kernel
-def factorise_bending(belt: LaneBelt, work: Work, step: float) -> None:
-    """Factors of dual (1 + i g D), symmetric, for `spread`: of a row without those before, and of their rest.
-
-    PIVOT is 1 / pivot, CORNER the coupling to the last row of the part behind; of the last row both are those
-    of the system of last rows that `ring_solution` solves.
-    """
-    stations, reach = work.stations, _reach(belt, step)
-    last = stations.rows - 1
-    zero = like(0.0, reach)
-    link = from_behind(reach * belt.per_cell[last])  # of the cell behind a row
-    corner_r, corner_i, rest_r, rest_i, own_r, own_i = zero, link, zero, zero, zero, zero
+    q = sqrt(IMPLICIT * step * stiffness)
+    zero = like(0.0, q)
+    # of the last row, for the one behind; of a row's coupling to the last one behind; of the row before
+    own00 = own01 = own11 = c00 = c11 = t00 = t01 = t11 = zero
+    link = from_behind(q * belt.per_cell[last])
+    c01 = c10 = -link
     for j in range(last + 1):
-        ahead = reach * belt.per_cell[j]
-        pivot_r, pivot_i = like(belt.dual[j], reach) + rest_r, rest_i - (link + ahead)
+        onward = q * belt.per_cell[j]
+        dual = like(belt.dual[j], q)
+        d00, d01, d11 = fma(dual, stations[j, lf.MASS_ACROSS], -t00), link + onward - t01, -dual - t11
         if j == last:
-            pivot_r, pivot_i = pivot_r + from_ahead(own_r), pivot_i + from_ahead(own_i)
+            stations[j, lf.I_00], stations[j, lf.I_01] = d00 + from_ahead(own00), d01 + from_ahead(own01)
+            stations[j, lf.I_11] = d11 + from_ahead(own11)
+            stations[j, lf.G_00], stations[j, lf.G_01] = c00, c01
+            stations[j, lf.G_10], stations[j, lf.G_11] = c10, c11
         else:
-            per_square = 1.0 / fma(pivot_r, pivot_r, pivot_i * pivot_i)
-            pivot_r, pivot_i = pivot_r * per_square, -pivot_i * per_square
-        stations[j, lf.PIVOT_R], stations[j, lf.PIVOT_I] = pivot_r, pivot_i
-        stations[j, lf.CORNER_R], stations[j, lf.CORNER_I] = corner_r, corner_i
-        # what a row leaves: -corner^2 / pivot to the row behind the part, ahead^2 / pivot to the next one
-        moved_r = fma(pivot_r, corner_r, -pivot_i * corner_i)
-        moved_i = fma(pivot_r, corner_i, pivot_i * corner_r)
-        own_r = fma(-corner_r, moved_r, fma(corner_i, moved_i, own_r))
-        own_i = fma(-corner_r, moved_i, fma(-corner_i, moved_r, own_i))
-        rest_r, rest_i = ahead * ahead * pivot_r, ahead * ahead * pivot_i
-        faded = belt.faded
-        corner_r, corner_i = (ahead * moved_i + faded) - faded, (-ahead * moved_r + faded) - faded
-        link = ahead
-
-
-@kernel
-def spread(belt: LaneBelt, work: Work, step: float) -> None:
-    """Spread the increments PUSH along the belt, and take their share into the right sides Y_0."""
-    stations, reach = work.stations, _reach(belt, step)
-    last, zero = stations.rows - 1, like(0.0, reach)
-    rest_r = rest_i = own_r = own_i = zero
-    for j in range(last):
-        right_r = fma(belt.dual[j], stations[j, lf.PUSH], rest_r)
-        pivot_r, pivot_i = stations[j, lf.PIVOT_R], stations[j, lf.PIVOT_I]
-        z_r = fma(pivot_r, right_r, -pivot_i * rest_i)
-        z_i = fma(pivot_r, rest_i, pivot_i * right_r)
-        corner_r, corner_i = stations[j, lf.CORNER_R], stations[j, lf.CORNER_I]
-        own_r = fma(-corner_r, z_r, fma(corner_i, z_i, own_r))
-        own_i = fma(-corner_r, z_i, fma(-corner_i, z_r, own_i))
-        stations[j, lf.SPREAD_R], stations[j, lf.SPREAD_I] = z_r, z_i
-        ahead = reach * belt.per_cell[j]
-        rest_r, rest_i = ahead * z_i, -ahead * z_r
-    right_r = fma(belt.dual[last], stations[last, lf.PUSH], rest_r) + from_ahead(own_r)
-    right_i = rest_i + from_ahead(own_i)
-    # real and negative imaginary part of a row: symmetric as the complex one is
-    pivot_r, pivot_i = stations[last, lf.PIVOT_R], stations[last, lf.PIVOT_I]
-    corner_r, corner_i = stations[last, lf.CORNER_R], stations[last, lf.CORNER_I]
-    x_r, x_i = ring_solution(
-        pivot_r,
-        -pivot_i,
-        -pivot_r,
-        right_r,
-        -right_i,
-        corner_r,
-        -corner_i,
-        -corner_i,
-        -corner_r,
-        belt.faded,
-    )
-    behind_r, behind_i = from_behind(x_r), from_behind(x_i)
-    _put_increment(work, last, x_r)
-    for j in range(last - 1, -1, -1):
-        ahead = reach * belt.per_cell[j]
-        corner_r, corner_i = stations[j, lf.CORNER_R], stations[j, lf.CORNER_I]
-        t_r = fma(corner_r, behind_r, fma(-corner_i, behind_i, -ahead * x_i))
-        t_i = fma(corner_r, behind_i, fma(corner_i, behind_r, ahead * x_r))
-        pivot_r, pivot_i = stations[j, lf.PIVOT_R], stations[j, lf.PIVOT_I]
-        x_r = fma(-pivot_r, t_r, fma(pivot_i, t_i, stations[j, lf.SPREAD_R]))
-        x_i = fma(-pivot_r, t_i, fma(-pivot_i, t_r, stations[j, lf.SPREAD_I]))
-        _put_increment(work, j, x_r)
+            per_determinant = 1.0 / fma(d00, d11, -d01 * d01)
+            i00, i01, i11 = d11 * per_determinant, -d01 * per_determinant, d00 * per_determinant
+            g00, g01 = fma(i00, c00, i01 * c10), fma(i00, c01, i01 * c11)
+            g10, g11 = fma(i01, c00, i11 * c10), fma(i01, c01, i11 * c11)
+            own00 = fma(-c00, g00, fma(-c10, g10, own00))
+            own01 = fma(-c00, g01, fma(-c10, g11, own01))
+            own11 = fma(-c01, g01, fma(-c11, g11, own11))
+            stations[j, lf.I_00], stations[j, lf.I_01], stations[j, lf.I_11] = i00, i01, i11
+            stations[j, lf.G_00], stations[j, lf.G_01] = g00, g01
+            stations[j, lf.G_10], stations[j, lf.G_11] = g10, g11
+            square = onward * onward
+            t00, t01, t11 = square * i11, square * i01, square * i00
+            c00, c01 = (onward * g10 + belt.faded) - belt.faded, (onward * g11 + belt.faded) - belt.faded
+            c10, c11 = (onward * g00 + belt.faded) - belt.faded, (onward * g01 + belt.faded) - belt.faded
+        link = onward
+    _solve(belt, work, q, zero, False)
+    _solve(belt, work, q, -c[0, lf.MASS] * lane_belt_speed(belt, state.time[0]), True)
 
 
 @merged_kernel
-def _put_increment(work: Work, j: int, push):
+def _force(belt: LaneBelt, work: Work, j: int, gyration, corrects: bool):
+    """Force of a station [N], with the gyroscopic force of the increments in PUSH where asked for."""
     stations = work.stations
-    stations[j, lf.PUSH] = push
-    stations[j, lf.Y_0] = fma(-stations[j, lf.CROSS], push, stations[j, lf.Y_0])
+    force = stations[j, lf.ACROSS]
+    if corrects:
+        difference = ahead(stations, j, lf.PUSH) - behind(stations, j, lf.PUSH)
+        force = fma(gyration * belt.per_span[j], difference, force)
+    return belt.dual[j] * force
+
+
+@kernel
+def _solve(belt: LaneBelt, work: Work, q, gyration, corrects: bool) -> None:
+    stations = work.stations
+    last, zero = stations.rows - 1, like(0.0, q)
+    y1 = own0 = own1 = rest = zero
+    for j in range(last):
+        y0 = _force(belt, work, j, gyration, corrects) + rest
+        i01 = stations[j, lf.I_01]
+        z0, z1 = fma(stations[j, lf.I_00], y0, i01 * y1), fma(i01, y0, stations[j, lf.I_11] * y1)
+        own0 = fma(-stations[j, lf.G_00], y0, fma(-stations[j, lf.G_10], y1, own0))
+        own1 = fma(-stations[j, lf.G_01], y0, fma(-stations[j, lf.G_11], y1, own1))
+        stations[j, lf.DV_0], stations[j, lf.DV_1] = z0, z1
+        onward = q * belt.per_cell[j]
+        rest, y1 = onward * z1, onward * z0
+    x0, x1 = ring_solution(
+        stations[last, lf.I_00],
+        stations[last, lf.I_01],
+        stations[last, lf.I_11],
+        _force(belt, work, last, gyration, corrects) + rest + from_ahead(own0),
+        y1 + from_ahead(own1),
+        stations[last, lf.G_00],
+        stations[last, lf.G_01],
+        stations[last, lf.G_10],
+        stations[last, lf.G_11],
+        belt.faded,
+    )
+    behind0, behind1 = from_behind(x0), from_behind(x1)
+    stations[last, lf.PUSH] = x0
+    for j in range(last - 1, -1, -1):
+        onward = q * belt.per_cell[j]
+        e0, e1 = onward * x1, onward * x0
+        i01 = stations[j, lf.I_01]
+        part = fma(-stations[j, lf.G_01], behind1, fma(-stations[j, lf.G_00], behind0, stations[j, lf.DV_0]))
+        x0 = fma(stations[j, lf.I_00], e0, fma(i01, e1, part))
+        part = fma(-stations[j, lf.G_11], behind1, fma(-stations[j, lf.G_10], behind0, stations[j, lf.DV_1]))
+        x1 = fma(i01, e0, fma(stations[j, lf.I_11], e1, part))
+        stations[j, lf.PUSH] = x0

@@ -4,13 +4,10 @@ from __future__ import annotations
 
 from cvt_hpc.kernels import kernel, merged_kernel
 from cvt_hpc.lanes import (
-    LaneArray,
     ahead,
     anywhere,
     behind,
     fma,
-    from_ahead,
-    from_behind,
     like,
     minimum,
     reciprocals,
@@ -39,12 +36,8 @@ def implicit_shares(one, other, inertia):
 def assemble(belt: LaneBelt, state: LaneState, work: Work, step: float, again: bool) -> None:
     """Forces and slopes at the stations, but for the stresses T and P: the system's blocks and right side.
 
-    `again` takes the secant of friction where a pass before has found that it would turn sliding about.
-
-    The gyroscopic force is taken with the mean of u over the step: it then neither damps nor feeds. By one
-    correction with the pending increments, since it changes them little: by v step / h, some 0.02.
-    Extrapolated from earlier steps it feeds waves of a frequency w that run against the belt, at the rate
-    (v / h) (w step)^3 / 4.
+    `again` takes the secant of friction where a pass before has found that it would turn sliding about. Of the
+    increments of u this is the force ACROSS and its slope MASS_ACROSS, which `move_across` couples by bending.
     """
     n, fields, stations, c = state.fields.rows, state.fields, work.stations, belt.constants
     per_step = 1.0 / step
@@ -59,13 +52,11 @@ def assemble(belt: LaneBelt, state: LaneState, work: Work, step: float, again: b
     ring_friction, per_ring_width = c[0, lf.RING_FRICTION], 1.0 / c[0, lf.RING_FRICTION_SPEED]
     ring_relief = c[0, lf.RING_RELIEF] * speed_share * speed_share
     centrifugal, gyroscopic = mass * belt_speed * belt_speed, 2.0 * mass * belt_speed
-    half_gyroscopic, masses = -0.5 * gyroscopic, (element_mass, ring_mass)
+    masses = element_mass, ring_mass
     damping = forces.lane_damping(belt, state.time[0])
     base_mass = fma(mass, per_step, 0.5 * damping)
     element_rate = element_mass * per_step
     zero = like(0.0, sine)
-    last_push, last = zero, (zero, zero, zero, zero)
-    first, second_push = last, zero
     for j in range(n):
         touches = belt.touches[j]
         dual, per_left, span = belt.dual[j], behind(belt.per_cell, j, 0), belt.per_span[j]
@@ -155,31 +146,5 @@ def assemble(belt: LaneBelt, state: LaneState, work: Work, step: float, again: b
         if anywhere(touches > 0.0):
             stations[j, lf.LAG], stations[j, lf.SLOPE], stations[j, lf.D_01] = lag, slope, dual * coupling
         stations[j, lf.D_00], stations[j, lf.D_11] = dual * fma(-cross, lag, element), dual * ring
-        stations[j, lf.Y_1] = dual * along_ring
-        station = push, mobility * half_gyroscopic * span, dual * cross, dual * along_element
-        if j == 0:
-            first = station
-        elif j == 1:
-            second_push = push
-        else:
-            _put(stations, j - 1, last, last_push, push)
-        last_push, last = last[0], station
-    for j in (n - 1, 0):  # a loop: the compiler loses kernels merged into a function's last lines
-        if j == 0:
-            _put(stations, j, first, from_behind(last[0]), second_push)
-        else:
-            _put(stations, j, last, last_push, from_ahead(first[0]))
-
-
-@merged_kernel
-def _put(stations: LaneArray, j: int, station, push_behind, push_ahead):
-    """Store the increment of u, before it is spread, and the right side of station j without its share.
-
-    The increment has the gyroscopic force's correction.
-
-    `station` is its increment of u [m/s], that per difference of its neighbours' increments, the length times
-    the cross slope of friction [N s/m], and the force along the belt [N].
-    """
-    push, gyration, cross, along = station
-    push = fma(gyration, push_ahead - push_behind, push)
-    stations[j, lf.PUSH], stations[j, lf.CROSS], stations[j, lf.Y_0] = push, cross, along
+        stations[j, lf.Y_0], stations[j, lf.Y_1] = dual * fma(-cross, push, along_element), dual * along_ring
+        stations[j, lf.ACROSS], stations[j, lf.MASS_ACROSS] = transverse + outward, radial_mass

@@ -48,7 +48,7 @@ def march(
     Parameters
     ----------
     begin, advance, take : kernels
-        begin(belt, state, work, step) comes first; advance(belt, state, work, step) takes a step; take, with the
+        begin(belt, state, work) comes first; advance(belt, state, work, step) takes a step; take, with the
         arguments of `take_sample`, takes a sample.
     belt, state, work
         As these kernels take them.
@@ -61,7 +61,7 @@ def march(
     first, last : int
         Which rows of them.
     """
-    begin(belt, state, work, step)
+    begin(belt, state, work)
     for k in range(first, last):
         for taken in range(steps):
             note_speeds(belt, state, work.stations, taken, steps)
@@ -71,7 +71,7 @@ def march(
 
 
 @kernel
-def begin_at_once(belt: LaneBelt, state: LaneState, work: Any, step: float) -> None:
+def begin_at_once(belt: LaneBelt, state: LaneState, work: Any) -> None:
     """Begin a march whose step needs no more than the results of `derive`."""
 
 

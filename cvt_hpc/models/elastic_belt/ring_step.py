@@ -34,7 +34,7 @@ from cvt_hpc.models.elastic_belt import lane_forces as forces
 from cvt_hpc.models.elastic_belt import lane_rings
 from cvt_hpc.models.elastic_belt.belt import Belt
 from cvt_hpc.models.elastic_belt.imex import MOST_PASSES, advance_belt, forget
-from cvt_hpc.models.elastic_belt.imex_bending import factorise_bending, spread
+from cvt_hpc.models.elastic_belt.imex_bending import move_across
 from cvt_hpc.models.elastic_belt.imex_stations import assemble
 from cvt_hpc.models.elastic_belt.imex_system import TURNS_BACK, eliminate, substitute
 from cvt_hpc.models.elastic_belt.lane_belt import LaneBelt, LaneState, Work, work_space
@@ -107,9 +107,8 @@ def parted_ring_work(work: RingWork, parts: int) -> RingWork:
 
 
 @kernel
-def begin_rings(belt: LaneBelt, state: LaneState, work: RingWork, step: float) -> None:
-    """Find the layers' strains, from which a step begins, and what steps of this length have in common."""
-    factorise_bending(belt, Work(work.stations), step)
+def begin_rings(belt: LaneBelt, state: LaneState, work: RingWork) -> None:
+    """Find the layers' strains, from which a step begins."""
     lane_rings.unite_strains(belt, work.rings, state, work.layers, STRIDE)
 
 
@@ -137,7 +136,7 @@ def step_rings(belt: LaneBelt, state: LaneState, work: RingWork, step: float) ->
     one = Work(work.stations)
     forces.lane_sliding(belt, state, work.stations)
     assemble(belt, state, one, step, False)
-    spread(belt, one, step)
+    move_across(belt, state, one, step)
     couple_layers(belt, work.rings, state, work, step)
     for attempt in range(MOST_PASSES):
         eliminate(belt, state, one, step, attempt > 0)
@@ -149,7 +148,7 @@ def step_rings(belt: LaneBelt, state: LaneState, work: RingWork, step: float) ->
             break
         if found & TURNS_BACK:
             assemble(belt, state, one, step, True)
-            spread(belt, one, step)
+            move_across(belt, state, one, step)
             couple_layers(belt, work.rings, state, work, step)
     taken, moment = advance_belt(belt, state, one, step)
     advance_layers(belt, work.rings, state, work, step)
