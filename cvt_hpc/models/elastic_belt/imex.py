@@ -23,7 +23,7 @@ from cvt_hpc.lanes import anywhere, around, behind, fma, from_ahead, like, minim
 from cvt_hpc.models.elastic_belt import fields as f
 from cvt_hpc.models.elastic_belt import lane_fields as lf
 from cvt_hpc.models.elastic_belt import lane_forces as forces
-from cvt_hpc.models.elastic_belt.imex_bending import move_across
+from cvt_hpc.models.elastic_belt.imex_bending import move_across, move_with_layers
 from cvt_hpc.models.elastic_belt.imex_stations import assemble
 from cvt_hpc.models.elastic_belt.imex_system import TURNS_BACK, eliminate, substitute
 from cvt_hpc.models.elastic_belt.lane_belt import LaneBelt, LaneState, Work
@@ -66,6 +66,7 @@ def step_imex(belt: LaneBelt, state: LaneState, work: Work, step: float) -> None
             move_across(belt, state, work, step)
             if belt.has_column:
                 foresee_column(belt, state, stations, lf.PUSH, step)
+    move_with_layers(belt, state, work, step)
     taken, moment = advance_belt(belt, state, work, step)
     advance_pulleys(belt, state, taken, moment, step)
     state.time[0] += step
@@ -111,7 +112,7 @@ def advance_belt(belt: LaneBelt, state: LaneState, work: Work, step: float):
     v1_b, dv1_b = fields[0, f.V_RING], stations[0, lf.DV_1]
     first_0 = fma(-belt_speed, behind(stations, 0, lf.EPS_0), v0_b + dv0_b) * behind(stations, 0, lf.SHORT_0)
     first_1 = fma(-belt_speed, behind(stations, 0, lf.EPS_1), v1_b + dv1_b) * behind(stations, 0, lf.SHORT_1)
-    w_b = fma(step, fields[0, f.U] + fma(-stations[0, lf.LAG], dv0_b, stations[0, lf.PUSH]), fields[0, f.W])
+    w_b = fma(step, fields[0, f.U] + stations[0, lf.PUSH], fields[0, f.W])
     v0_b, dv0_b, flux0_b = from_ahead(v0_b), from_ahead(dv0_b), from_ahead(first_0)
     v1_b, dv1_b, flux1_b = from_ahead(v1_b), from_ahead(dv1_b), from_ahead(first_1)
     w_b = from_ahead(w_b)
@@ -147,8 +148,6 @@ def advance_belt(belt: LaneBelt, state: LaneState, work: Work, step: float):
         v0_b, dv0_b, flux0_b, v1_b, dv1_b, flux1_b = v0, dv0, flux_0, v1, dv1, flux_1
 
         touches, du, w = belt.touches[j], stations[j, lf.PUSH], fields[j, f.W]
-        if anywhere(touches > 0.0):
-            du = fma(-stations[j, lf.LAG], dv0, du)
         u = fields[j, f.U] + du
         if anywhere(touches > 0.0):
             is_driven = belt.on_driven[j] > 0.5

@@ -24,6 +24,21 @@ from cvt_hpc.models.elastic_belt.lane_belt import LaneBelt, LaneState, Work
 from cvt_hpc.models.elastic_belt.lane_forces import lane_belt_speed
 
 IMPLICIT = 0.5  # from 1/4 on no step is too long for bending
+# Share of friction's coupling of u and v_element that the elements' own block contains: with as much as 1 - 1 / (16
+# IMPLICIT) the effective mass of a step outweighs bending in every direction, for any mesh
+LAG_SHARE = 1.0 - 1.0 / (16.0 * IMPLICIT)
+ALONE, TURNING, WITH_LAYERS = range(
+    3
+)  # of the forces: without and with the gyroscopic one, and with friction's
+
+
+@merged_kernel
+def implicit_bending(belt: LaneBelt, step: float):
+    """IMPLICIT dt EI [N s m^2]."""
+    stiffness = belt.constants[0, lf.BENDING_STIFFNESS]
+    if belt.has_column:
+        stiffness = stiffness + belt.constants[0, lf.COLUMN_STIFFNESS]
+    return IMPLICIT * step * stiffness
 
 
 @kernel
@@ -36,10 +51,7 @@ def move_across(belt: LaneBelt, state: LaneState, work: Work, step: float) -> No
     (v / h) (w step)^3 / 4.
     """
     stations, c = work.stations, belt.constants
-    last, stiffness = stations.rows - 1, c[0, lf.BENDING_STIFFNESS]
-    if belt.has_column:
-        stiffness = stiffness + c[0, lf.COLUMN_STIFFNESS]
-    q = sqrt(IMPLICIT * step * stiffness)
+    last, q = stations.rows - 1, sqrt(implicit_bending(belt, step))
     zero = like(0.0, q)
     # of the last row, for the one behind; of a row's coupling to the last one behind; of the row before
     own00 = own01 = own11 = c00 = c11 = t00 = t01 = t11 = zero
@@ -50,10 +62,10 @@ def move_across(belt: LaneBelt, state: LaneState, work: Work, step: float) -> No
         dual = like(belt.dual[j], q)
         d00, d01, d11 = fma(dual, stations[j, lf.MASS_ACROSS], -t00), link + onward - t01, -dual - t11
         if j == last:
-            stations[j, lf.I_00], stations[j, lf.I_01] = d00 + from_ahead(own00), d01 + from_ahead(own01)
-            stations[j, lf.I_11] = d11 + from_ahead(own11)
-            stations[j, lf.G_00], stations[j, lf.G_01] = c00, c01
-            stations[j, lf.G_10], stations[j, lf.G_11] = c10, c11
+            stations[j, lf.A_00], stations[j, lf.A_01] = d00 + from_ahead(own00), d01 + from_ahead(own01)
+            stations[j, lf.A_11] = d11 + from_ahead(own11)
+            stations[j, lf.B_00], stations[j, lf.B_01] = c00, c01
+            stations[j, lf.B_10], stations[j, lf.B_11] = c10, c11
         else:
             per_determinant = 1.0 / fma(d00, d11, -d01 * d01)
             i00, i01, i11 = d11 * per_determinant, -d01 * per_determinant, d00 * per_determinant
@@ -62,53 +74,66 @@ def move_across(belt: LaneBelt, state: LaneState, work: Work, step: float) -> No
             own00 = fma(-c00, g00, fma(-c10, g10, own00))
             own01 = fma(-c00, g01, fma(-c10, g11, own01))
             own11 = fma(-c01, g01, fma(-c11, g11, own11))
-            stations[j, lf.I_00], stations[j, lf.I_01], stations[j, lf.I_11] = i00, i01, i11
-            stations[j, lf.G_00], stations[j, lf.G_01] = g00, g01
-            stations[j, lf.G_10], stations[j, lf.G_11] = g10, g11
+            stations[j, lf.A_00], stations[j, lf.A_01], stations[j, lf.A_11] = i00, i01, i11
+            stations[j, lf.B_00], stations[j, lf.B_01] = g00, g01
+            stations[j, lf.B_10], stations[j, lf.B_11] = g10, g11
             square = onward * onward
             t00, t01, t11 = square * i11, square * i01, square * i00
             c00, c01 = (onward * g10 + belt.faded) - belt.faded, (onward * g11 + belt.faded) - belt.faded
             c10, c11 = (onward * g00 + belt.faded) - belt.faded, (onward * g01 + belt.faded) - belt.faded
         link = onward
-    _solve(belt, work, q, zero, False)
-    _solve(belt, work, q, -c[0, lf.MASS] * lane_belt_speed(belt, state.time[0]), True)
+    gyration = -c[0, lf.MASS] * lane_belt_speed(belt, state.time[0])
+    _solve(belt, work, q, gyration, ALONE)
+    _solve(belt, work, q, gyration, TURNING)
+    for j in range(last + 1):
+        shared = belt.dual[j] * stations[j, lf.CROSS] * stations[j, lf.PUSH]
+        stations[j, lf.Y_0] = stations[j, lf.Y_0] - shared
+
+
+@kernel
+def move_with_layers(belt: LaneBelt, state: LaneState, work: Work, step: float) -> None:
+    """Increments of u, PUSH, with those of the elements, DV_0."""
+    gyration = -belt.constants[0, lf.MASS] * lane_belt_speed(belt, state.time[0])
+    _solve(belt, work, sqrt(implicit_bending(belt, step)), gyration, WITH_LAYERS)
 
 
 @merged_kernel
-def _force(belt: LaneBelt, work: Work, j: int, gyration, corrects: bool):
-    """Force of a station [N], with the gyroscopic force of the increments in PUSH where asked for."""
+def _force(belt: LaneBelt, work: Work, j: int, gyration, part: int):
+    """Force of a station [N]; by `part` with the gyroscopic force of PUSH, and friction's by the layers."""
     stations = work.stations
     force = stations[j, lf.ACROSS]
-    if corrects:
+    if part == WITH_LAYERS:
+        force = fma(-stations[j, lf.CROSS], stations[j, lf.DV_0], force)
+    if part != ALONE:
         difference = ahead(stations, j, lf.PUSH) - behind(stations, j, lf.PUSH)
         force = fma(gyration * belt.per_span[j], difference, force)
     return belt.dual[j] * force
 
 
 @kernel
-def _solve(belt: LaneBelt, work: Work, q, gyration, corrects: bool) -> None:
+def _solve(belt: LaneBelt, work: Work, q, gyration, part: int) -> None:
     stations = work.stations
     last, zero = stations.rows - 1, like(0.0, q)
     y1 = own0 = own1 = rest = zero
     for j in range(last):
-        y0 = _force(belt, work, j, gyration, corrects) + rest
-        i01 = stations[j, lf.I_01]
-        z0, z1 = fma(stations[j, lf.I_00], y0, i01 * y1), fma(i01, y0, stations[j, lf.I_11] * y1)
-        own0 = fma(-stations[j, lf.G_00], y0, fma(-stations[j, lf.G_10], y1, own0))
-        own1 = fma(-stations[j, lf.G_01], y0, fma(-stations[j, lf.G_11], y1, own1))
-        stations[j, lf.DV_0], stations[j, lf.DV_1] = z0, z1
+        y0 = _force(belt, work, j, gyration, part) + rest
+        i01 = stations[j, lf.A_01]
+        z0, z1 = fma(stations[j, lf.A_00], y0, i01 * y1), fma(i01, y0, stations[j, lf.A_11] * y1)
+        own0 = fma(-stations[j, lf.B_00], y0, fma(-stations[j, lf.B_10], y1, own0))
+        own1 = fma(-stations[j, lf.B_01], y0, fma(-stations[j, lf.B_11], y1, own1))
+        stations[j, lf.X_0], stations[j, lf.X_1] = z0, z1
         onward = q * belt.per_cell[j]
         rest, y1 = onward * z1, onward * z0
     x0, x1 = ring_solution(
-        stations[last, lf.I_00],
-        stations[last, lf.I_01],
-        stations[last, lf.I_11],
-        _force(belt, work, last, gyration, corrects) + rest + from_ahead(own0),
+        stations[last, lf.A_00],
+        stations[last, lf.A_01],
+        stations[last, lf.A_11],
+        _force(belt, work, last, gyration, part) + rest + from_ahead(own0),
         y1 + from_ahead(own1),
-        stations[last, lf.G_00],
-        stations[last, lf.G_01],
-        stations[last, lf.G_10],
-        stations[last, lf.G_11],
+        stations[last, lf.B_00],
+        stations[last, lf.B_01],
+        stations[last, lf.B_10],
+        stations[last, lf.B_11],
         belt.faded,
     )
     behind0, behind1 = from_behind(x0), from_behind(x1)
@@ -116,9 +141,9 @@ def _solve(belt: LaneBelt, work: Work, q, gyration, corrects: bool) -> None:
     for j in range(last - 1, -1, -1):
         onward = q * belt.per_cell[j]
         e0, e1 = onward * x1, onward * x0
-        i01 = stations[j, lf.I_01]
-        part = fma(-stations[j, lf.G_01], behind1, fma(-stations[j, lf.G_00], behind0, stations[j, lf.DV_0]))
-        x0 = fma(stations[j, lf.I_00], e0, fma(i01, e1, part))
-        part = fma(-stations[j, lf.G_11], behind1, fma(-stations[j, lf.G_10], behind0, stations[j, lf.DV_1]))
-        x1 = fma(i01, e0, fma(stations[j, lf.I_11], e1, part))
+        i01 = stations[j, lf.A_01]
+        part = fma(-stations[j, lf.B_01], behind1, fma(-stations[j, lf.B_00], behind0, stations[j, lf.X_0]))
+        x0 = fma(stations[j, lf.A_00], e0, fma(i01, e1, part))
+        part = fma(-stations[j, lf.B_11], behind1, fma(-stations[j, lf.B_10], behind0, stations[j, lf.X_1]))
+        x1 = fma(i01, e0, fma(stations[j, lf.A_11], e1, part))
         stations[j, lf.PUSH] = x0

@@ -16,6 +16,7 @@ from cvt_hpc.lanes import (
 from cvt_hpc.models.elastic_belt import fields as f
 from cvt_hpc.models.elastic_belt import lane_fields as lf
 from cvt_hpc.models.elastic_belt import lane_forces as forces
+from cvt_hpc.models.elastic_belt.imex_bending import LAG_SHARE
 from cvt_hpc.models.elastic_belt.lane_belt import LaneBelt, LaneState, Work
 from cvt_hpc.models.elastic_belt.lane_column import across_by_curvature, column_across
 from cvt_hpc.physics.flank import flank_shares
@@ -137,7 +138,7 @@ def assemble(belt: LaneBelt, state: LaneState, work: Work, step: float, again: b
                 stations[j, lf.FLANK_CROSS] = fma(upright, mixed, -lean * slope_along)
         along_element = fma(outward, slope, along_element)
         mobility = 1.0 / radial_mass
-        push, lag = (transverse + outward) * mobility, cross * mobility
+        push, lag = (transverse + outward) * mobility, LAG_SHARE * cross * mobility
         if belt.is_curved:
             # the mean velocity of the step without the part due to the layers' speeds
             turning = belt.ring_curvature[j] * fma(0.5, push, u)
@@ -146,5 +147,6 @@ def assemble(belt: LaneBelt, state: LaneState, work: Work, step: float, again: b
         if anywhere(touches > 0.0):
             stations[j, lf.LAG], stations[j, lf.SLOPE], stations[j, lf.D_01] = lag, slope, dual * coupling
         stations[j, lf.D_00], stations[j, lf.D_11] = dual * fma(-cross, lag, element), dual * ring
-        stations[j, lf.Y_0], stations[j, lf.Y_1] = dual * fma(-cross, push, along_element), dual * along_ring
+        stations[j, lf.Y_0], stations[j, lf.Y_1] = dual * along_element, dual * along_ring
         stations[j, lf.ACROSS], stations[j, lf.MASS_ACROSS] = transverse + outward, radial_mass
+        stations[j, lf.CROSS] = cross

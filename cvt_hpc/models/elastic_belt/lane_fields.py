@@ -43,9 +43,10 @@ PUSH, LAG, SLOPE, FLANK, FLANK_SLOPE, FLANK_CROSS = range(FIELDS_OF_FORCES, 24)
 REVERSING, RING_REVERSING, MEETING, AHEAD = range(24, 28)
 D_00, D_01, D_11, Y_0, Y_1 = range(28, 33)
 I_00, I_01, I_11, DV_0, DV_1, G_00, G_01, G_10, G_11, LINK_0, LINK_1 = range(33, 44)
-# of `imex_bending`: line force across the belt, and its slope with the increment of u
-ACROSS, MASS_ACROSS = range(44, 46)
-FIELDS_OF_WORK = 46
+# of `imex_bending`: line force across the belt, its slopes with the increments of u and of v_element; factors and
+# work space
+ACROSS, MASS_ACROSS, CROSS, A_00, A_01, A_11, B_00, B_01, B_10, B_11, X_0, X_1 = range(44, 56)
+FIELDS_OF_WORK = 56
 
 # Constants of each lane; from FIRST_OFFSET on the layers' offsets, then by arc and surface the factors of the
 # layer above it and of the one below.

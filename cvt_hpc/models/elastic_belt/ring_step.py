@@ -34,7 +34,7 @@ from cvt_hpc.models.elastic_belt import lane_forces as forces
 from cvt_hpc.models.elastic_belt import lane_rings
 from cvt_hpc.models.elastic_belt.belt import Belt
 from cvt_hpc.models.elastic_belt.imex import MOST_PASSES, advance_belt, forget
-from cvt_hpc.models.elastic_belt.imex_bending import move_across
+from cvt_hpc.models.elastic_belt.imex_bending import move_across, move_with_layers
 from cvt_hpc.models.elastic_belt.imex_stations import assemble
 from cvt_hpc.models.elastic_belt.imex_system import TURNS_BACK, eliminate, substitute
 from cvt_hpc.models.elastic_belt.lane_belt import LaneBelt, LaneState, Work, work_space
@@ -150,6 +150,7 @@ def step_rings(belt: LaneBelt, state: LaneState, work: RingWork, step: float) ->
             assemble(belt, state, one, step, True)
             move_across(belt, state, one, step)
             couple_layers(belt, work.rings, state, work, step)
+    move_with_layers(belt, state, one, step)
     taken, moment = advance_belt(belt, state, one, step)
     advance_layers(belt, work.rings, state, work, step)
     advance_pulleys(belt, state, taken, moment, step)
