@@ -99,7 +99,7 @@ def _accelerate(belt: LaneBelt, state: LaneState, stations: LaneArray, step: flo
             span, per_dual, touches = belt.per_span[j], belt.per_dual[j], belt.touches[j]
             u, full_speed = fields[j, f.U], belt_speed + v0
             slope = (ahead(fields, j, f.W) - behind(fields, j, f.W)) * span
-            across = forces.lane_transverse(belt, fields, j, net_left, net_right, bending)
+            across = forces.lane_transverse(belt, fields, j, net_left, net_right, bending, 0.0)
             across = fma(-gyroscopic, (ahead(fields, j, f.U) - behind(fields, j, f.U)) * span, across)
             across = fma(-acceleration * mass, slope, across)
             if belt.has_column:

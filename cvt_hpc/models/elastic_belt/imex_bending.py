@@ -24,6 +24,9 @@ from cvt_hpc.models.elastic_belt.lane_belt import LaneBelt, LaneState, Work
 from cvt_hpc.models.elastic_belt.lane_forces import lane_belt_speed
 
 IMPLICIT = 0.5  # from 1/4 on no step is too long for bending
+# Share of a step by which bending leads: a step damps waves of a frequency w by DAMPED (w dt)^2 / 2 of what
+# bending has in their stiffness
+DAMPED = 0.25
 # Share of friction's coupling of u and v_element that the elements' own block contains: with as much as 1 - 1 / (16
 # IMPLICIT) the effective mass of a step outweighs bending in every direction, for any mesh
 LAG_SHARE = 1.0 - 1.0 / (16.0 * IMPLICIT)

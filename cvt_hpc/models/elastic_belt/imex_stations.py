@@ -16,7 +16,7 @@ from cvt_hpc.lanes import (
 from cvt_hpc.models.elastic_belt import fields as f
 from cvt_hpc.models.elastic_belt import lane_fields as lf
 from cvt_hpc.models.elastic_belt import lane_forces as forces
-from cvt_hpc.models.elastic_belt.imex_bending import LAG_SHARE
+from cvt_hpc.models.elastic_belt.imex_bending import DAMPED, LAG_SHARE
 from cvt_hpc.models.elastic_belt.lane_belt import LaneBelt, LaneState, Work
 from cvt_hpc.models.elastic_belt.lane_column import across_by_curvature, column_across
 from cvt_hpc.physics.flank import flank_shares
@@ -69,7 +69,7 @@ def assemble(belt: LaneBelt, state: LaneState, work: Work, step: float, again: b
         net_right = minimum(forces.pressed_strain(belt, state, stations, j), 0.0)
         net_right = fma(element_stiffness, net_right, ring_right - centrifugal)
         slope = (ahead(fields, j, f.W) - behind(fields, j, f.W)) * span
-        transverse = forces.lane_transverse(belt, fields, j, net_left, net_right, bending)
+        transverse = forces.lane_transverse(belt, fields, j, net_left, net_right, bending, DAMPED * step)
         transverse = fma(-gyroscopic, (ahead(fields, j, f.U) - behind(fields, j, f.U)) * span, transverse)
         transverse = fma(-acceleration * mass, slope, transverse)
         if belt.has_column:

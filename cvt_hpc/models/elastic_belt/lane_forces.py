@@ -199,10 +199,11 @@ def lane_damping(belt: LaneBelt, time: float):
 
 
 @merged_kernel
-def lane_transverse(belt: LaneBelt, fields: LaneArray, j: int, net_left, net_right, bending):
+def lane_transverse(belt: LaneBelt, fields: LaneArray, j: int, net_left, net_right, bending, lead: float):
     """Line force across the belt at station j [N/m], outward, of tension and bending.
 
-    `net_left`, `net_right` are T - P - m v^2 in the cells beside it [N], `bending` is EI [N m^2].
+    `net_left`, `net_right` are T - P - m v^2 in the cells beside it [N], `bending` is EI [N m^2], that of the
+    displacement after `lead` [s].
     """
     n = fields.rows
     # of the rows two away, those beside the neighbours
@@ -213,14 +214,28 @@ def lane_transverse(belt: LaneBelt, fields: LaneArray, j: int, net_left, net_rig
         w_aa = from_behind(w_aa)
     if j == n - 1:
         w_bb = from_ahead(w_bb)
-    bent = fma(belt.bending[j, 0], w_aa, fma(belt.bending[j, 4], w_bb, belt.bending[j, 2] * w))
-    bent = fma(belt.bending[j, 1], w_a, fma(belt.bending[j, 3], w_b, bent))
+    bent = _bent(belt, j, w_aa, w_a, w, w_b, w_bb)
+    if lead > 0.0:
+        u_aa, u_bb = behind(fields, a, f.U), ahead(fields, b, f.U)
+        if j == 0:
+            u_aa = from_behind(u_aa)
+        if j == n - 1:
+            u_bb = from_ahead(u_bb)
+        u_a, u, u_b = behind(fields, j, f.U), fields[j, f.U], ahead(fields, j, f.U)
+        bent = fma(lead, _bent(belt, j, u_aa, u_a, u, u_b, u_bb), bent)
     tension = net_right * ((w_b - w) * belt.per_cell[j]) - net_left * (
         (w - w_a) * behind(belt.per_cell, j, 0)
     )
     inward = net_right * (0.5 * belt.cell[j] * belt.curvature[j])
     inward += net_left * (0.5 * behind(belt.cell, j, 0) * behind(belt.curvature, j, 0))
     return fma(tension - inward, belt.per_dual[j], bending * bent)
+
+
+@merged_kernel
+def _bent(belt: LaneBelt, j: int, w_aa, w_a, w, w_b, w_bb):
+    """Fourth derivative at station j by the displacements of five, negative."""
+    bent = fma(belt.bending[j, 0], w_aa, fma(belt.bending[j, 4], w_bb, belt.bending[j, 2] * w))
+    return fma(belt.bending[j, 1], w_a, fma(belt.bending[j, 3], w_b, bent))
 
 
 @merged_kernel
