@@ -155,7 +155,10 @@ def test_what_does_not_fit_gets_one_line(values, told):
 def test_tables_come_from_files(tmp_path):
     lists = local_bending()
     for pulley in ("driving", "driven"):
-        angles, (row,) = lists[f"{pulley}_flexibility_angle"], lists[f"{pulley}_flexibility"]
+        # of discs of revolution one row
+        angles = lists[f"{pulley}_flexibility_angle"] = np.linspace(0.0, 3.5, 12).tolist()
+        row = (1e-8 * np.exp(-np.array(angles))).tolist()
+        lists[f"{pulley}_flexibility"] = [row]
         lines = [f"{angle!r}, {1e6 * value!r}" for angle, value in zip(angles, row, strict=True)]
         (tmp_path / f"{pulley}.csv").write_text("\n".join(["angle [rad], flexibility [um/N]", *lines]))
     text = 'name = "x"\nmodel = "elastic_belt"\n[deflection]\nsheave_deformation = "flexibilities"\n'
