@@ -86,7 +86,7 @@ def test_forces_along_a_rising_ramp_are_those_of_constant_speeds():
 
 @pytest.mark.slow
 def test_onset_and_end_are_where_constant_speeds_have_them():
-    inside, outside = (2100.0, 3900.0), (1980.0, 4000.0)
+    inside, outside = (2000.0, 3800.0), (1900.0, 3900.0)
     runs = Together(*(VIBRATING | {"driving_speed": s * RPM, "duration": 0.3} for s in (*inside, *outside)))
     for speeds, expected in ((inside, Vibrates.YES), (outside, Vibrates.NO)):
         for speed in speeds:
