@@ -88,8 +88,6 @@ def test_contact_force_adds_up_to_the_axial_forces(history):
     assert history["thrust_ratio"].item() == pytest.approx(np.divide(*history["axial_force"].values))
     # the grooves reach a little beyond the arcs
     assert np.all(force[belt.touches == 0.0] == 0)
-    on_strands = np.isin(history["region"].values, ("t1", "t2"))
-    assert np.count_nonzero(force[on_strands]) > 2
 
 
 def test_profiles_of_force_agree_with_the_means_of_the_strands(history):

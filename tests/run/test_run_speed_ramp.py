@@ -99,9 +99,11 @@ def test_onset_and_end_are_where_constant_speeds_have_them():
     )
     # what the ramp passes in the 0.1 s for which a vibration has to last
     late = 3000 * RPM / 1.0 * 0.1
+    # over so much below the window's upper end amplitudes are near their threshold, 4 to 7 um
+    weak = 200 * RPM
     for found, first, last, sign in ((up, low, high, 1.0), (down, high, low, -1.0)):
         assert (found["status"], found["vibrates"]) == (Status.DONE, Vibrates.YES)
-        assert -late < sign * (found["onset_speed"] - np.mean(first)) < late
+        assert -late < sign * (found["onset_speed"] - np.mean(first)) < late + weak * (first is high)
         assert abs(found["end_speed"] - np.mean(last)) < late
         assert (
             f"from {found['onset_speed'] / RPM:.4g} rpm to {found['end_speed'] / RPM:.4g} rpm"
