@@ -88,12 +88,13 @@ def test_a_cone_is_another_disc_than_local_bending():
 
 
 def test_discs_with_inertia_settle_where_those_without_are():
-    settled = RECORD | MODES | {"duration": 0.08}
+    settled = RECORD | MODES | {"duration": 0.12, "stations": 48}
     expected, found = fresh_record(**settled, ritz_limit=0.0), fresh_record(**settled)
     for name in JUDGED:
         # frequencies of 5 kHz and more, a belt that rests; forces with or without inertia scatter by 1e-3 from step
         # to step (2 to 4.6 us), as long as the start is not quite over
-        assert found[name] == pytest.approx(expected[name], rel=3e-3), name
+        # of the push in t2 mN are left
+        assert found[name] == pytest.approx(expected[name], rel=3e-3, abs=0.1), name
     assert not np.array_equal(found["axial_force"], expected["axial_force"])
     assert found["power_residual"] < 2e-3
 
@@ -155,7 +156,10 @@ def test_what_does_not_fit_gets_one_line(values, told):
 def test_tables_come_from_files(tmp_path):
     lists = local_bending()
     for pulley in ("driving", "driven"):
-        angles, (row,) = lists[f"{pulley}_flexibility_angle"], lists[f"{pulley}_flexibility"]
+        # of discs of revolution one row
+        angles = lists[f"{pulley}_flexibility_angle"] = np.linspace(0.0, 4.0, 12).tolist()
+        row = (1e-8 * np.exp(-np.array(angles))).tolist()
+        lists[f"{pulley}_flexibility"] = [row]
         lines = [f"{angle!r}, {1e6 * value!r}" for angle, value in zip(angles, row, strict=True)]
         (tmp_path / f"{pulley}.csv").write_text("\n".join(["angle [rad], flexibility [um/N]", *lines]))
     text = 'name = "x"\nmodel = "elastic_belt"\n[deflection]\nsheave_deformation = "flexibilities"\n'

@@ -21,7 +21,7 @@ from support.growing import at_rest, measured
 from support.rungs import rung_job, rung_record
 
 DEFAULTS = {key: parameter.default for section in PARAMETERS.values() for key, parameter in section.items()}
-LOADS = (80.0, 105.0, 125.0, 140.0)
+LOADS = (95.0, 105.0, 125.0, 140.0)
 COARSE = DEFAULTS | {"stations": 96}
 
 
@@ -106,15 +106,15 @@ def test_growth_and_frequency_are_those_of_the_transient(place):
 
 
 def test_a_lag_of_the_tilt_takes_the_growth_away():
-    """As in transients of the default belt: tilts that follow within 0.1 ms let it vibrate, 0.2 ms hardly do."""
+    """As in transients of the default belt: tilts that follow within 0.1 ms let it vibrate, 0.2 ms do not."""
     grid = mesh(COARSE)
     lags = (0.0, 1e-6, 1e-4, 2e-4)
     points = [branch(SteadyBelt(COARSE | {"tilt_lag": lag}), grid, (120.0,)).points[0] for lag in lags]
     growth = np.array([point.growth for point in points])
-    # in first order of the lag, by some 3.4/s in each us
+    # in first order of the lag, by some 3.7/s in each us
     assert growth[1] == pytest.approx(growth[0], abs=5.0)
     assert np.all(np.diff(growth) < 0.0)
-    assert growth[2] > 200.0 and growth[3] < 50.0
+    assert growth[2] > 100.0 and growth[3] < 0.0
 
 
 def test_growth_with_lagging_tilts_is_that_of_the_transient():

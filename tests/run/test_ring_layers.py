@@ -275,13 +275,13 @@ def test_layers_move_by_their_mean_from_which_they_were_eliminated(on_ears):
 
 
 def test_layers_that_do_not_rub_move_as_the_rings_as_one_step_by_step():
-    """Whatever inertia is added to what layers move against their mean; 5 ms, before friction feeds on rounding."""
+    """Whatever inertia is added to what layers move against their mean; 2 ms, before friction feeds on rounding."""
     free = SCENE | {"ring_friction": 0.0}
     apart = {"ring_layers": 3, "layer_thickness": 0.0, "layer_friction": 0.0, "lanes": "stations"}
     layers, one = (Transient(job(**free | own).point(0), "imex") for own in (apart, {}))
-    while layers.done < 100:
-        layers.advance(100 - layers.done)
-        one.advance(100 - one.done)
+    while layers.done < 40:
+        layers.advance(40 - layers.done)
+        one.advance(40 - one.done)
     found, expected = layers.state.fields, one.state.fields
     for row in range(FIRST_LAYER):
         size = np.ptp(expected[row])

@@ -344,6 +344,8 @@ def initial_state(parameters: Mapping[str, Any], belt: Belt) -> State:
     tangent = np.tan(p["half_wedge_angle"])
     pull = 2.0 * tangent * p["thrust"] / grid.path.driven_wrap
     w = np.zeros(grid.cell.size)
+    bent = grid.cell * belt.curvature
+    bent = 0.5 * (bent + np.roll(bent, 1))  # angle that each station stands for [rad]
     arcs = []
     states = np.zeros(f.STATES)
     for region, sheave, radius, tilted in (
@@ -358,15 +360,14 @@ def initial_state(parameters: Mapping[str, Any], belt: Belt) -> State:
         states[tilted : tilted + 2] = tilt
         tilt = tilt + sheave.clearance * tilting / np.linalg.norm(tilting)
         w[stations] = -(flexibility(sheave) @ force + tilt @ sheave.tilt)[on_arc] / (2.0 * tangent)
-        arcs.append((stations, sheave.weight[on_arc], radius))
-    w[arcs[0][0]] -= p["driving_position"] / (2.0 * tangent)
+        arcs.append(stations)
+    w[arcs[0]] -= p["driving_position"] / (2.0 * tangent)
     # the belt keeps its length: it moves inward at the driving and outward at the driven pulley
-    sunk = sum((weight * w[stations]).sum() / radius for stations, weight, radius in arcs)
-    lift = -sunk / grid.path.driven_wrap
-    w[arcs[1][0]] += lift
+    lift = -(bent @ w) / grid.path.driven_wrap
+    w[arcs[1]] += lift
     _fill_strands(w, grid)
 
-    mean = [(weight * w[stations]).sum() / weight.sum() for stations, weight, _ in arcs]
+    mean = [bent[stations] @ w[stations] / bent[stations].sum() for stations in arcs]
     speed = belt.speed_start * (belt.driving_radius + mean[0])
     fields = np.zeros((len(f.FIELDS), grid.cell.size))
     fields[f.W] = w

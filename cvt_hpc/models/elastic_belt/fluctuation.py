@@ -8,14 +8,16 @@ mean 0. Summed over the belt,
 
     flanks + stresses = belt + rings + layers + lag + carried + remainder,
 
-    flanks     sum of <p' v_r'> + <f_t' v_t'>, fed where positive; p, f_t their radial and tangential friction
+    flanks     sum of <p' v_r'> + <f_t' v_t'>, fed where positive; p, f_t their radial and tangential
+               friction, v_r, v_t the sliding in the groove
     stresses   sum of <P' v_0,s'> - <T' v_1,s'> - <F' kappa u'> - <(F w_s)' u_s'>
-    belt       sum of d_b <v_r'^2>
+    belt       sum of d_b <v_a'^2>, v_a = w_t + v_0 w_s the speed across the belt
     rings      sum of <q' v_q'>, v_q the speed of the saddles against the rings
     layers     work of the layers' dampers, less that of their mean forces in the mean motion
     lag        T_1 k <z_dn'^2>, which is what the contact's elastic forces take from the belt
-    carried    sum of <h' v_r'> + <f_t' v_t'> - <h' u'> - <g' v_0'>, with h = p - d_b v_r and
-               g = f_t + (h + e) w_s, e the contact's elastic radial force
+    carried    flanks less belt, less the sum of <h' u'> + <g' v_0'>, with h and g the forces of friction and
+               damping across and along the belt: on an arc h = p - d_b v_a and g = f_t + (h + e) w_s, e the
+               contact's elastic radial force
 
 Stresses within a belt whose elements touch throughout hand power on, and sum up to 0. Where gaps open and
 close they feed: the mean push works in the mean opening, and elements that the mean motion has drawn apart
@@ -117,10 +119,10 @@ def fluctuation(means: dict[str, np.ndarray], grid: Mesh, parameters: Mapping[st
     """
     m, p = means, parameters
     dual = at_stations(grid.cell)
-    damping, radial, v_radial = p["transverse_damping"], m["radial_friction"], m["radial_speed"]
-    flanks = m["flank_power"] - radial * v_radial - m["tangential_friction"] * m["sliding_speed"]
-    belt = -damping * (m["radial_speed_squared"] - v_radial**2)
-    own = m["transverse_power"] - (radial - damping * v_radial) * m["transverse_speed"]
+    flanks = m["flank_power"] - m["radial_friction"] * m["radial_speed"]
+    flanks = flanks - m["tangential_friction"] * m["sliding_speed"]
+    belt = -p["transverse_damping"] * (m["across_speed_squared"] - m["across_speed"] ** 2)
+    own = m["transverse_power"] - m["transverse_force"] * m["transverse_speed"]
     own = own + m["element_power"] - m["element_force"] * m["element_speed"]
     opening, stretching = _step(m["element_speed"]), _step(m["ring_speed"])
     mean_stresses = m["push_force"] * opening - m["ring_tension"] * stretching - _lifting(m, grid, p)

@@ -93,8 +93,8 @@ def audit(
         w, u = fields[j, f.W], fields[j, f.U]
         v0, v1 = belt_speed + fields[j, f.V_ELEMENT], belt_speed + fields[j, f.V_RING]
         slope = (fields[b, f.W] - fields[a, f.W]) * belt.per_span[j]
-        v_radial = fma(v0, slope, u)
-        belt_loss += dual * damping * v_radial * v_radial
+        v_across = fma(v0, slope, u)
+        belt_loss += dual * damping * v_across * v_across
         bent = belt.bending[j, 0] * fields[aa, f.W] + belt.bending[j, 1] * fields[a, f.W]
         bent += (
             belt.bending[j, 2] * w
@@ -126,9 +126,9 @@ def audit(
         if summed:
             moments.add_stresses(profiles, j, working, tension, push, maximum(damped, zero) - push)
         stored += (0.5 * right) * (elastic + rings * ring_stiffness * stretched * stretched)
-        v_element, across = fields[j, f.V_ELEMENT], -damping * v_radial
+        v_element, across = fields[j, f.V_ELEMENT], -damping * v_across
         if summed:
-            moments.add_speeds(profiles, j, v_radial, u, v_element, fields[j, f.V_RING])
+            moments.add_speeds(profiles, j, v_across, u, v_element, fields[j, f.V_RING])
         if belt.touches[j] == 0.0:
             if summed:
                 moments.add_forces(profiles, j, across, u, across * slope, v_element)
@@ -138,10 +138,10 @@ def audit(
         omega, radius = (
             (turnings[1], c[0, lf.DRIVEN_RADIUS]) if on_driven else (turnings[0], c[0, lf.DRIVING_RADIUS])
         )
-        v_climb, v_tangential = forces.groove_sliding(
-            belt, j, (turnings, surfaces), belt_speed, v_radial, v_element, w
+        v_radial, v_tangential = forces.groove_sliding(
+            belt, j, (turnings, surfaces), belt_speed, v_across, v_element, w
         )
-        sliding, meridian = flank_sliding(v_climb, v_tangential, per_cosine)
+        sliding, meridian = flank_sliding(v_radial, v_tangential, per_cosine)
         sliding = maximum(sliding, least)
         v_law = fields[j, f.V_FILTERED] if belt.memory else sliding
         if kind == Law.TABLE:
@@ -157,8 +157,8 @@ def audit(
         tangential = -twice_normal * mu * v_tangential / sliding
         distance = radius + fma(upright, w, belt.rise[j])
         # less the power that a change of displacement in place takes from the sheaves
-        seating -= dual * elastic_radial * (v_climb - upright * u)
-        rubbed = -dual * fma(radial, v_climb, tangential * v_tangential)
+        seating -= dual * elastic_radial * (v_radial - upright * u)
+        rubbed = -dual * fma(radial, v_radial, tangential * v_tangential)
         power = dual * tangential * distance * omega
         if on_driven:
             driven_rub += rubbed
@@ -171,7 +171,7 @@ def audit(
         along += fma(across + upright * elastic_radial, slope, lean * elastic_radial)
         if summed:
             moments.add_forces(profiles, j, across, u, along, v_element)
-            moments.add_flanks(profiles, j, radial, tangential, v_climb, v_tangential)
+            moments.add_flanks(profiles, j, radial, tangential, v_radial, v_tangential)
         lever = fma(offset, belt.arc_curvature[j], 1.0)
         saddle = fma(lever, v0, -v1)
         ring_left = ring_stiffness * stations[a, lf.EPS_1]

@@ -16,17 +16,17 @@ with q the friction of the rings on the elements' saddle, p_r, f_t the flanks' f
 speed and M the load; v = r_dr omega_dr is the speed of the pitch line at the driving pulley's present speed,
 and v' its rate. The last term of the elements' equation is the radial load in the direction of the
 belt's actual tangent: it carries the power that radial sliding dissipates, and closes the balance of power.
-An element is in a groove as long as that touches it, on the arc and beyond: x past a tangent point of the pitch
-radius R the pulley's axis is at the distance rho = hypot(x, R + w), and its radial unit vector has the angle
-theta = atan(x / (R + w)) to the path's normal. So with u = w_t + v_0 w_s
+An element is in a groove as long as that touches it, on the arc and beyond: x past a tangent point of the
+pitch radius R the pulley's axis is at the distance rho = hypot(x, R + w), and its radial unit vector has the
+angle theta = atan(x / (R + w)) to the path's normal. So with u = w_t + v_0 w_s
 
     gap            g = z + 2 tan d_0 (rho - R) + C f,   f >= 0, g >= 0, f g = 0
     sliding        v_r = u cos theta + v_0 sin theta,   v_t = v_0 cos theta - u sin theta - omega rho
     on the belt    along: p_r sin theta + f_t cos theta,   across: p_r cos theta - f_t sin theta
     on the pulley  rho f_t
 
-and the equations above are those of theta = 0. Stresses of T and P enter cells, everything else stations; the content is upwinded, since centred fluxes
-leave a free checkerboard mode where P = 0.
+and the equations above are those of theta = 0. Stresses of T and P enter cells, everything else stations; the
+content is upwinded, since centred fluxes leave a free checkerboard mode where P = 0.
 """
 
 from __future__ import annotations

@@ -20,7 +20,6 @@ from cvt_hpc.models.elastic_belt.power import audit
 from cvt_hpc.models.elastic_belt.power_terms import POWERS
 from cvt_hpc.models.elastic_belt.pulley_step import opening_by_tilt
 from cvt_hpc.physics import compliance
-from cvt_hpc.physics.flank import tangential_sliding
 from cvt_hpc.variator import LEAST_SPEED, MOST_SPEED
 
 SCALARS = (
@@ -234,18 +233,22 @@ def sample(belt: LaneBelt, state: LaneState, stations: LaneArray, samples: Sampl
     rows[k, sensed + Scalar.DRIVING_SPEED] = driving_speed + state.scalars[0, f.FIRST_STATE + f.EXCESS]
     shift = state.scalars[0, f.FIRST_STATE + f.SHIFT]
     rows[k, sensed + Scalar.DRIVING_POSITION] = like(c[0, lf.DRIVING_POSITION], speed) + shift
-    turnings, surfaces = forces.lane_pulleys(belt, share, state.scalars)
+    pulleys = forces.lane_pulleys(belt, share, state.scalars)
+    n = fields.rows
     axial = zero
     for wrap in range(2):
         contact, places = state.contacts[1] if wrap else state.contacts[0], belt.places[wrap][0]
         weight = contact.weight
-        turning, surface = turnings[wrap], surfaces[wrap]
         axial = sliding = open_length = zero
         length = 0.0
         for i in range(weight.size):
             j = places[i]
-            force, lifted = stations[j, lf.FORCE], fma(contact.upright[i], fields[j, f.W], contact.rise[i])
-            slides = tangential_sliding(fields[j, f.V_ELEMENT], lifted, turning, surface)
+            a, b, force = j - 1 if j > 0 else n - 1, j + 1 if j < n - 1 else 0, stations[j, lf.FORCE]
+            slope, v_element = (fields[b, f.W] - fields[a, f.W]) * belt.per_span[j], fields[j, f.V_ELEMENT]
+            v_across = fma(belt_speed + v_element, slope, fields[j, f.U])
+            _, slides = forces.groove_sliding(
+                belt, j, pulleys, belt_speed, v_across, v_element, fields[j, f.W]
+            )
             axial += weight[i] * force
             sliding += weight[i] * force * slides
             if contact.rise[i] == 0.0:

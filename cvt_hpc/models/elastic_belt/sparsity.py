@@ -43,8 +43,8 @@ REACH = {
 # curvature, which turns motion along the belt into motion across it, and back
 OF_COLUMN = {f.U: {f.N_ELEMENT: (-2, 1)}, f.V_ELEMENT: {f.W: (-2, 2)}}
 OF_CURVATURE = {f.U: {f.V_RING: (0, 0)}, f.V_RING: {f.U: (0, 0)}}
-# A station's flank forces and filtered speed: beyond the above they depend on the driven pulley,
-# and where the belt enters its filtered speed is that of sliding there
+# A station's flank forces and filtered speed: beyond the above they depend on the driven pulley, the filtered
+# speed where contact begins on sliding at the open station behind, and on where that is, by the forces
 ON_FLANK = {f.U: (-1, 0), f.V_ELEMENT: (-1, 0), f.W: (-2, 1), f.V_FILTERED: (-1, 0)}
 
 
@@ -73,18 +73,18 @@ def pattern(flat: FlatBelt) -> csc_array:
         for row in (f.U, f.V_ELEMENT, f.V_FILTERED):
             for unknown, (behind, ahead) in ON_FLANK.items():
                 mark(row, unknown, arc, range(behind, ahead + 1))
-        pushed = [place[f.U][arc], place[f.V_ELEMENT][arc]]
+        remembered = place[f.V_FILTERED][arc]
+        remembered = remembered[remembered >= 0]
+        pushed = [place[f.U][arc], place[f.V_ELEMENT][arc], remembered]
         moved = [place[f.W][arc]]
         if is_driven:
             pushed += [place[SPEED], place[OPENING]]
             moved += [place[OPENING]]
-            remembered = place[f.V_FILTERED][arc]
-            turned = np.concatenate([*pushed, remembered[remembered >= 0]])
-            found[turned, place[SPEED]] = True
+            found[np.concatenate(pushed), place[SPEED]] = True
             rim = [place[row] for row in (f.W, f.U, f.V_ELEMENT)]
             near = np.arange(arc[0] - 1, arc[-1] + 2) % n
             found[np.ix_(place[SPEED], np.concatenate([row[near] for row in rim]))] = True
-            found[np.ix_(place[SPEED], remembered[remembered >= 0])] = True
+            found[np.ix_(place[SPEED], remembered)] = True
         found[np.ix_(np.concatenate(pushed), np.concatenate(moved))] = True
     # states of free pulleys know both wraps, and all of those know them
     if flat.loose.size > 0:
