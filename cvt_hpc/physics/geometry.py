@@ -135,8 +135,8 @@ def cut_path(path: Variator, cells: int, refinement: float = 1.0) -> tuple[np.nd
     """Cut each region of a path into cells that are the shorter the nearer they are to its ends.
 
     The number of cells per length is 1 + (r - 1) / (1 + (x / l)^2) for each end of the region, x from there,
-    times what gives their number; l = REFINED_WAY of the centre distance. Each region but the driven arc, which
-    takes the rest, has four cells or more.
+    times what gives their number; l = REFINED_WAY of the centre distance. Each region has four cells or more;
+    the driven arc takes what rounding leaves.
 
     Parameters
     ----------

@@ -1,18 +1,24 @@
 """Bending in the fast step: implicit, so that the shortest waves limit no step.
 
-Explicit bending is stable up to dt = 2 / w of the shortest waves, w^2 = 16 EI / (m h^4): steps would fall with
-the square of the cells. The increments of a step have, with the slope r of friction and damping,
+Explicit bending is stable up to dt = 2 / w of the shortest waves, w^2 = 16 EI / (m h^4): steps would fall
+with the square of the cells. Here the increments of a step have, with K = EI d^4/ds^4,
 
-    (m / dt + r) du + IMPLICIT dt EI d^4/ds^4 du = F,
+    A du + C dv_0 = F,   A = m / dt + r + IMPLICIT dt K,
 
-by which no wave of bending turns by more than 1 / sqrt(IMPLICIT) rad in a step. States at rest stay what they
-are, nothing is damped, and waves of a frequency w are slower by the share IMPLICIT (w dt)^2 / 2 of what bending
-has in their stiffness: 2e-5 at 600 Hz and 8 us, if all of it were bending. Pressed elements that bear a moment
-count into EI.
+r being the slope of friction and damping with u, C that of friction with v_0. No wave of bending turns by
+more than 1 / sqrt(IMPLICIT) rad in a step. States at rest stay what they are, and waves of a frequency w are
+slower by the share IMPLICIT (w dt)^2 / 2 of what bending has in their stiffness: 2e-4 at 600 Hz and 4.6 us,
+if all of it were bending. Pressed elements that bear a moment count into EI.
 
-With M = -q d^2/ds^2 du and q^2 = IMPLICIT dt EI it is one symmetric system of blocks [du, M] along the belt. The
-increments of the layers change u by the slope of friction at their station alone, and the force F changes them
-by the same slope: so the step stays that of a symmetric mass, which feeds nothing.
+With M = -q d^2/ds^2 du and q^2 = IMPLICIT dt EI it is one symmetric system of blocks [du, M] along the belt,
+solved without dv_0 and, once that is known, with it. The block of dv_0, with its own slope d, lacks the term
+-C A^-1 C, which couples all stations; LAG_SHARE C^2 / (m / dt + r) stands for it. That is the step of a
+symmetric mass: of A, C, and d + C (A^-1 - LAG_SHARE / (m / dt + r)) C. It is stable as long as that outweighs
+S = (1 + 2 DAMPED) dt K / 4 in every direction. With b = 4 IMPLICIT / (1 + 2 DAMPED), A contains b S, and of
+du = x - A^-1 C dv_0 the energy S is at most that of b x and b / (b - 1) A^-1 C dv_0; the latter has no more
+than dv_0.C^2 dv_0 / (4 (b - 1) (m / dt + r)), as y - y^2 <= 1/4. LAG_SHARE leaves as much, so that no wave
+grows whatever mesh and friction are. A mass that is not symmetric, as of increments that are spread after
+friction has taken its part, feeds the shortest waves.
 """
 
 from __future__ import annotations
@@ -23,16 +29,14 @@ from cvt_hpc.models.elastic_belt import lane_fields as lf
 from cvt_hpc.models.elastic_belt.lane_belt import LaneBelt, LaneState, Work
 from cvt_hpc.models.elastic_belt.lane_forces import lane_belt_speed
 
-IMPLICIT = 0.5  # from 1/4 on no step is too long for bending
-# Share of a step by which bending leads: a step damps waves of a frequency w by DAMPED (w dt)^2 / 2 of what
-# bending has in their stiffness
+IMPLICIT = 1.0
+# Share of a step by which bending leads, K (w + DAMPED dt u): in a step it damps waves of a frequency w by
+# DAMPED (w dt)^2 / 2 of what bending has in their stiffness. Without it the shortest waves, which A makes heavy
+# and contact stirs up as it ends station by station, go on for ever.
 DAMPED = 0.25
-# Share of friction's coupling of u and v_element that the elements' own block contains: with as much as 1 - 1 / (16
-# IMPLICIT) the effective mass of a step outweighs bending in every direction, for any mesh
-LAG_SHARE = 1.0 - 1.0 / (16.0 * IMPLICIT)
-ALONE, TURNING, WITH_LAYERS = range(
-    3
-)  # of the forces: without and with the gyroscopic one, and with friction's
+LAG_SHARE = 1.0 - 1.0 / (4.0 * (4.0 * IMPLICIT / (1.0 + 2.0 * DAMPED) - 1.0))
+# Forces: without and with the gyroscopic one, and with C dv_0
+ALONE, TURNING, WITH_LAYERS = range(3)
 
 
 @merged_kernel

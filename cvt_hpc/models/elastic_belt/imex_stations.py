@@ -37,8 +37,8 @@ def implicit_shares(one, other, inertia):
 def assemble(belt: LaneBelt, state: LaneState, work: Work, step: float, again: bool) -> None:
     """Forces and slopes at the stations, but for the stresses T and P: the system's blocks and right side.
 
-    `again` takes the secant of friction where a pass before has found that it would turn sliding about. Of the
-    increments of u this is the force ACROSS and its slope MASS_ACROSS, which `move_across` couples by bending.
+    `again` takes the secant of friction where a pass before has found that it would turn sliding about. For
+    the increments of u it finds the force ACROSS and its slopes, which `move_across` couples by bending.
     """
     n, fields, stations, c = state.fields.rows, state.fields, work.stations, belt.constants
     per_step = 1.0 / step

@@ -27,9 +27,9 @@ DEVIATION, TURNING, COLUMN_MOMENT, PRESSED, GIVE, TURN_NEAR, TURN_FAR, SHIFT = r
 BEARING_NEAR, BEARING_FAR, COLUMN_ENERGY = range(8, 11)
 FIELDS_OF_COLUMN = COLUMN_ENERGY + 1
 
-# Of a state, by `derive`: axial line force, and the share of the cell behind it that is in contact; the cells'
-# strains, 1 / (1 + strain) and 1 / content. By `lane_sliding`: sliding speeds, the law's coefficient, tanh of
-# sliding speed over regularisation, 1 / that speed, the same tanh of rings, the elements' sliding speed under
+# Of a state, by `derive`: axial line force, and the share of the cell behind it that is in contact; strains
+# of the cells, 1 / (1 + strain) and 1 / content. By `lane_sliding`: sliding speeds, the law's coefficient, tanh
+# of sliding speed over regularisation, 1 / that speed, the same tanh of rings, the elements' sliding speed under
 # them.
 FORCE, WAY, EPS_0, EPS_1, SHORT_0, SHORT_1, PER_CONTENT_0, PER_CONTENT_1 = range(8)
 SLIDING_R, SLIDING_T, COEFFICIENT, FACTOR, PER_SPEED, RING_FACTOR, SADDLE = range(8, 15)
@@ -43,8 +43,8 @@ PUSH, LAG, SLOPE, FLANK, FLANK_SLOPE, FLANK_CROSS = range(FIELDS_OF_FORCES, 24)
 REVERSING, RING_REVERSING, MEETING, AHEAD = range(24, 28)
 D_00, D_01, D_11, Y_0, Y_1 = range(28, 33)
 I_00, I_01, I_11, DV_0, DV_1, G_00, G_01, G_10, G_11, LINK_0, LINK_1 = range(33, 44)
-# of `imex_bending`: line force across the belt, its slopes with the increments of u and of v_element; factors and
-# work space
+# of `imex_bending`: line force across the belt, its slopes with the increments of u and of v_element; factors
+# and work space
 ACROSS, MASS_ACROSS, CROSS, A_00, A_01, A_11, B_00, B_01, B_10, B_11, X_0, X_1 = range(44, 56)
 FIELDS_OF_WORK = 56
 

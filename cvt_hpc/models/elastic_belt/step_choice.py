@@ -45,7 +45,8 @@ NEEDS = (
 def transverse_limit(parameters: Mapping[str, Any]) -> float:
     """Longest stable step of the transverse motion [s].
 
-    The fastest waves are two of the shortest cells long, in the grooves: w^2 = (4 F / h^2 + 4 c_e tan^2 delta) / m.
+    The fastest waves are two of the shortest cells long, in the grooves:
+    w^2 = (4 F / h^2 + 4 c_e tan^2 delta) / m.
     Bending, which is implicit, has no part in it.
 
     Parameters
