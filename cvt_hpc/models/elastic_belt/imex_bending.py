@@ -31,8 +31,8 @@ from cvt_hpc.models.elastic_belt.lane_forces import lane_belt_speed
 
 IMPLICIT = 1.0
 # Share of a step by which bending leads, K (w + DAMPED dt u): in a step it damps waves of a frequency w by
-# DAMPED (w dt)^2 / 2 of what bending has in their stiffness. Without it the shortest waves, which A makes heavy
-# and contact stirs up as it ends station by station, go on for ever.
+# DAMPED (w dt)^2 / 2 of what bending has in their stiffness. Without it the shortest waves, which A makes
+# heavy and contact stirs up as it ends station by station, go on for ever.
 DAMPED = 0.25
 LAG_SHARE = 1.0 - 1.0 / (4.0 * (4.0 * IMPLICIT / (1.0 + 2.0 * DAMPED) - 1.0))
 # Forces: without and with the gyroscopic one, and with C dv_0

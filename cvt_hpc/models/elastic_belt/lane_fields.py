@@ -28,9 +28,9 @@ BEARING_NEAR, BEARING_FAR, COLUMN_ENERGY = range(8, 11)
 FIELDS_OF_COLUMN = COLUMN_ENERGY + 1
 
 # Of a state, by `derive`: axial line force, and the share of the cell behind it that is in contact; strains
-# of the cells, 1 / (1 + strain) and 1 / content. By `lane_sliding`: sliding speeds, the law's coefficient, tanh
-# of sliding speed over regularisation, 1 / that speed, the same tanh of rings, the elements' sliding speed under
-# them.
+# of the cells, 1 / (1 + strain) and 1 / content. By `lane_sliding`: sliding speeds, the law's coefficient,
+# tanh of sliding speed over regularisation, 1 / that speed, the same tanh of rings, the elements' sliding
+# speed under them.
 FORCE, WAY, EPS_0, EPS_1, SHORT_0, SHORT_1, PER_CONTENT_0, PER_CONTENT_1 = range(8)
 SLIDING_R, SLIDING_T, COEFFICIENT, FACTOR, PER_SPEED, RING_FACTOR, SADDLE = range(8, 15)
 # By `note_speeds` in the last two steps before a sample: u, v_element and v_ring two steps ago, less twice
