@@ -8,15 +8,17 @@ import pytest
 from cvt_hpc.models.elastic_belt import fields as f
 from cvt_hpc.models.elastic_belt import rhs
 from cvt_hpc.models.elastic_belt.belt import Mesh, State, belt_constants, mesh
+from cvt_hpc.models.elastic_belt.validity import reach_doubt
 from cvt_hpc.physics.compliance import plain_contact, solve_wrap
 from cvt_hpc.physics.sheaves import elastic_matrix, sheaves
+from cvt_hpc.variables import Status
 from support.complementarity import solve_lcp
 from support.marched import fresh_record
 from support.settled import DEFAULTS
 
 FORCE = 5.8e3  # F = T - P - m v^2 [N]
 # Pulleys so large that the belt is a straight one on a parabola, as in the closed form: EI / R^2 is 1e-3 of F
-LARGE = {"ratio": 1.0, "driven_radius": 0.3, "centre_distance": 0.8, "stations": 320, "end_refinement": 20.0}
+LARGE = {"ratio": 1.0, "driven_radius": 0.3, "centre_distance": 0.8, "stations": 480, "end_refinement": 20.0}
 RIGID_DISCS = {"sheave_stiffness": np.inf, "stiffness_of": "sheave"}
 
 
@@ -157,3 +159,16 @@ def test_twice_the_reach_beyond_the_arcs_changes_no_digit(monkeypatch):
     for name in ("axial_force", "mean_ring_tension", "flank_loss"):
         assert found[name] == pytest.approx(expected[name], rel=1e-6), name
     assert found["amplitude"] == pytest.approx(expected["amplitude"], abs=1e-10)
+
+
+def test_contact_that_reaches_the_last_tested_station_is_a_failure():
+    grid = mesh(DEFAULTS)
+    for region in (0, 2):
+        zone = grid.zone(region)
+        for end in (0, -1):
+            force = np.zeros(grid.cell.size)
+            force[zone.stations[1:-1]] = 1e5
+            assert reach_doubt(force, grid) is None
+            force[zone.stations[end]] = 1.0
+            status, why = reach_doubt(force, grid)
+            assert status is Status.FAILED_NUMERICS and "beyond its arc" in why

@@ -1,19 +1,19 @@
-"""The fast step of the elastic belt: explicit in the strands, implicit in friction and longitudinal waves.
+"""The fast step of the elastic belt: explicit in the strands, implicit in friction, bending and layer waves.
 
-Staggered in time: w, n_i, v_f at t_k; u, v_i, omega at t_k-1/2. Transverse forces are explicit (leapfrog, no
-numerical damping of the strands). Flank and ring friction enter with their slopes, the stresses T and P by
-backward Euler, so neither the regularisation of friction nor the longitudinal waves (5-6 km/s) limit the
-step. Eliminating u and the content leaves one cyclic block-tridiagonal system, 2x2 blocks (v_element,
-v_ring), symmetric positive definite; the content then follows from the fluxes, so that each layer's total is
-kept to round-off.
+Staggered in time: w, n_i, v_f at t_k; u, v_i, omega at t_k-1/2. Tension and contact act explicitly across the
+belt (leapfrog, no numerical damping of the strands), bending implicitly (`imex_bending`). Flank and ring
+friction enter with their slopes, the stresses T and P by backward Euler, so neither the regularisation of
+friction nor the longitudinal waves (5-6 km/s) limit the step. Eliminating u and the content leaves one cyclic
+block-tridiagonal system, 2x2 blocks (v_element, v_ring), symmetric positive definite; the content then
+follows from the fluxes, so that each layer's total is kept to round-off.
 
-The rings' stress is centred in time and damps nothing; the elements' is taken at the end of the step, since
-a centred one rings where they meet and part: it damps them like EA dt [N s], in first order. The set of
+The rings' stress is centred in time and damps nothing; the elements' is taken at the end of the step, since a
+centred one rings where they meet and part: it damps them like EA dt [N s], in first order. The set of
 separated elements is frozen during a step: those that are apart and, with the old speeds, stay apart.
-Elements meet where their gap closes and part where their push, damper included, has ended: were it where
-they reach their length at rest, the cell in which gaps run into pressed elements would be neither, and rattle
-from step to step with pushes in proportion to the step (`EDGES.md`). The step is limited by accuracy,
-c dt / h about 5, and the transverse contact and bending.
+Elements meet where their gap closes and part where their push, damper included, has ended: were it where they
+reach their length at rest, the cell in which gaps run into pressed elements would be neither, and rattle from
+step to step with pushes in proportion to the step (`EDGES.md`). The step is limited by accuracy, and by
+tension and contact across the belt.
 """
 
 from __future__ import annotations
