@@ -30,7 +30,9 @@ CONSTANT = {"friction_law": "coulomb", "friction_gradient": 0.0}
 def finished(**values):
     """A coarse run, judged over 60 ms."""
     document = {"name": "test", "model": "elastic_belt", "stepper": "imex", "axes": {}}
-    shared = {"stations": 64, "duration": 0.12, "load": 120.0, "precision": "double"}
+    shared = {
+        "stations": 64, "duration": 0.12, "load": 120.0, "friction_gradient": -1.0, "precision": "double"
+    }  # fmt: skip
     asked = build_job(document, "test.toml", shared | values)
     run = Transient(asked.point(0), asked.stepper)
     while run.done < run.samples:
@@ -40,7 +42,7 @@ def finished(**values):
 
 @cache
 def steady_belts():
-    loads = (80.0, 100.0, 105.0, 125.0, 140.0)
+    loads = (95.0, 100.0, 105.0, 125.0, 140.0)
     return dict(zip(loads, SteadyBelt(BELT).along(loads), strict=True))
 
 
@@ -72,7 +74,7 @@ def flow(found):
 
 @pytest.mark.parametrize(("step", "tolerance"), [(4.6e-6, 0.04), (1e-6, 0.015)])
 def test_what_is_fed_into_a_vibration_is_taken(step, tolerance):
-    # 9 W. Backward Euler in the elements damps by EA dt/2, 90 N s at 4.6 us: -0.2 W, and -0.06 W at 1 us.
+    # 20 W. Backward Euler in the elements damps by EA dt/2, 90 N s at 4.6 us
     found = fluctuation_record(finished(step=step))
     assert flow(found) > 8.0
     assert abs(found["fluctuation_remainder"]) < tolerance * flow(found)
@@ -81,7 +83,10 @@ def test_what_is_fed_into_a_vibration_is_taken(step, tolerance):
 def test_a_term_of_the_wrong_sign_would_show():
     found = fluctuation_record(finished(step=1e-6))
     fed = [*found["flank_fed"].sum(axis=1), found["stress_fed"], *(-found[name] for name in TAKEN)]
-    for term in fed:
+    # a term below 3 % is within what may be left open
+    large = [term for term in fed if abs(term) > 0.03 * flow(found)]
+    assert len(large) >= 6
+    for term in large:
         assert abs(found["fluctuation_remainder"] - 2.0 * term) > 2.0 * 0.015 * flow(found)
 
 
@@ -216,7 +221,7 @@ def test_flanks_feed_what_their_plain_forces_do(law):
 # A small motion grows by what it is fed: the eigenvalue is known from the Jacobian alone
 
 
-@pytest.mark.parametrize("load", [80.0, 105.0, 125.0, 140.0])
+@pytest.mark.parametrize("load", [95.0, 105.0, 125.0, 140.0])
 def test_growth_is_what_is_fed_over_twice_the_energy(load):
     point, grid = steady(load), mesh(BELT)
     mode = modes(point, grid)[0]

@@ -255,7 +255,7 @@ def test_work_of_the_dampers_is_force_times_mean_speed():
     strains(belt, state.fields, eps)
     assert 0.1 < np.mean(eps[0] > 0) < 0.9
     after, expected = explicit_damper_work(belt, state, 300, 1e-7)
-    assert expected > 1e-5
+    assert expected > 5e-6
     # sums of the same terms in another order
     assert after.scalars[fields.LAYER_WORK] == pytest.approx(expected, rel=1e-9)
 
