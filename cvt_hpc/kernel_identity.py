@@ -94,6 +94,8 @@ class Walk:
             return "literal", self.value(kind.literal_value)
         if isinstance(kind, types.Array):
             return str(kind), self.type(kind.dtype)
+        if isinstance(kind, types.IntEnumMember):
+            return type(kind).__name__, self._enum_class(kind.instance_class), self.type(kind.dtype)
         if isinstance(kind, _SIMPLE_TYPES) or type(kind).__module__.startswith(_LANES):
             return str(kind)
         raise UnknownValueError(f"a value of the type {kind}")

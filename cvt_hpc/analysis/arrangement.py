@@ -106,8 +106,8 @@ def arrange(dataset: xr.Dataset, at: Mapping[str, Any], source: str, sides: Side
     for name in rest:
         dataset = _at_first(dataset, name, notes)
     for name in filter(None, (x, y, panel)):
-        if dataset[name].dtype.kind in "iuf":
-            dataset = dataset.sortby(name)
+        if dataset[name].dtype.kind in "iuf" and not dataset[name].to_index().is_monotonic_increasing:
+            dataset = dataset.sortby(name)  # which takes long
     return Arrangement(dataset, x, y, panel, tuple(notes))
 
 

@@ -14,6 +14,7 @@ from typing import ClassVar
 import matplotlib.pyplot as plt
 import pytest
 
+from cvt_hpc.analysis import animation
 from cvt_hpc.cli import main
 from cvt_hpc.job import build_job
 from cvt_hpc.job.assignments import read_assignments
@@ -39,6 +40,7 @@ ELSEWHERE = {
 BLOCKS_ELSEWHERE = {
     ("docs/guide/extend.md", "python"): "tests/new_model runs them, each in its place",
 }
+LINES = [line for page in PAGES for block in blocks(page) for line in block.text.splitlines()]
 DRAWING = "text"  # kind of a block that shows something and is no code
 # Minutes of a core, however few runs they have: `check` reads their jobs, scenes and options instead, and the tests
 # of their own packages run small ones.
@@ -177,9 +179,10 @@ def _smaller(words, page):
     by_number = f"out/{job.name}/histories/" in page.read_text()  # of a run, which is that in the whole grid
     for axis in () if by_number else job.axes:
         first, last = axis.values[0], axis.values[-1]
-        kept = [value for value in _named(axis.name, page, job) if value in axis.values] or [first]
-        if axis is longest and "first_spacing" in job.design:  # it is traced along this one
-            kept = axis.values
+        named = _named(axis.name, job, Path(words[1]).stem)
+        kept = [value for value in named if value in axis.values] or [first]
+        if axis is longest and "first_spacing" in job.design:  # traced are axes longer than two spacings
+            kept = axis.values[: 2 * job.design["first_spacing"][axis.name] + 1]
         elif "runs" in job.design:
             kept = [first, last]
         elif axis is job.axes[-1] and last not in kept and "elements" not in job.parameters:
@@ -192,9 +195,10 @@ def _smaller(words, page):
     return [*words, *(word for text in more for word in ("--set", text))]
 
 
-def _named(key, page, job):
-    """Values of an axis that commands of the page name [SI]."""
-    named = re.findall(rf'--at "?({key}=[^\s"]+(?: \w+")?)', page.read_text())
+def _named(key, job, stem):
+    """Values of an axis that commands of a job file name, on whatever page, so that pages share its study [SI]."""
+    commands = "\n".join(line for line in LINES if f"/{stem}" in line)
+    named = re.findall(rf'--at "?({key}=[^\s"]+(?: \w+")?)', commands)
     return [read_assignments([text.strip('"')], job.schema, "", "--at")[key] for text in dict.fromkeys(named)]
 
 
@@ -205,6 +209,7 @@ def folder(tmp_path, monkeypatch):
     (tmp_path / "jobs" / "results").mkdir()
     monkeypatch.chdir(tmp_path)
     monkeypatch.setattr(sys, "argv", sys.argv)
+    monkeypatch.setattr(animation, "FRAMES", 1)  # test_animation.py draws all
     return tmp_path
 
 

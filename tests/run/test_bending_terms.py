@@ -79,11 +79,13 @@ def test_the_fast_step_has_the_limit_of_the_explicit_one(name):
 def test_a_run_in_parts_is_the_run():
     runs = []
     for lanes in ("runs", "stations"):
-        run = Transient(job(**SCENE, **SWITCHES["both"], lanes=lanes).point(0), "imex")
-        assert run.advance(200) is None
+        run = Transient(job(**SCENE, **SWITCHES["both"], lanes=lanes, precision="single").point(0), "imex")
+        assert run.advance(50) is None
         runs.append(run.rows[: run.done])
-    # round-off, which sliding about makes grow
-    assert runs[1] == pytest.approx(runs[0], rel=1e-6, abs=1e-9 * np.abs(runs[0]).max())
+    # round-off of single precision, as runs in parts mostly have it, and what sliding about makes of it; a wrong
+    # neighbour changes the first digits
+    size, error = np.abs(runs[0]).max(axis=0), np.abs(runs[1] - runs[0])
+    assert (error[0] <= 1e-5 * size).all() and (error <= 5e-4 * size).all()
 
 
 @pytest.mark.parametrize(

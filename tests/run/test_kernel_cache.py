@@ -261,6 +261,7 @@ def test_types_of_arguments_count_with_the_names_of_fields():
     kinds += [numba.types.Omitted(1), numba.types.Omitted(2), numba.types.literal(1)]
     given = [kernel(made(text)) for text in ("def f(x): return x", "def f(x): return -x")]
     kinds += map(numba.typeof, given)
+    kinds += [numba.typeof(enum.IntEnum("Colour", [("RED", red)]).RED) for red in (1, 2)]
     assert len({repr(Walk().type(kind)) for kind in kinds}) == len(kinds)
     with pytest.raises(UnknownValueError, match="a value of the type"):
         Walk().type(numba.types.pyobject)
