@@ -18,7 +18,7 @@ from cvt_hpc.models.elastic_belt.parameters import check
 from cvt_hpc.models.elastic_belt.recorded_run import recording
 from cvt_hpc.models.elastic_belt.step_choice import REFERENCE_STEP, SAFE_SHARE, chosen_step, transverse_limit
 from cvt_hpc.models.elastic_belt.validity import doubt, step_doubt
-from cvt_hpc.variables import Status, Vibrates
+from cvt_hpc.variables import Status
 from support.fast_runs import FastRuns
 from support.lone import Transient
 from support.marched import fresh_record, job, record
@@ -55,7 +55,7 @@ def test_saddles_stick_however_stiff_their_friction_is(ratio):
     values = ONE_BELT | SHORT | {"ratio": ratio, "ring_friction_speed": 2e-3}
     found = record(**values)
     assert saddle_stiffness(**values) > 20.0 * CHATTER
-    assert (found["status"], found["vibrates"]) == (Status.DONE, Vibrates.NO)
+    assert found["status"] == Status.DONE and found["amplitude"].max() < 0.5e-6
     # of rings that chatter 7e-2, 60 mm/s and up to 3 um; a mesh of 48 stations leaves 1.7e-3 at ratio 0.5 at any step
     assert abs(found["power_residual"]) < 2e-3
     assert found["step_ripple"] < 0.1 * job().point(0)["most_step_ripple"]
@@ -150,7 +150,7 @@ def test_the_step_is_chosen_for_the_scene():
 
 
 def test_every_cell_of_a_grid_has_a_step_of_its_own():
-    document = {"name": "test", "model": "auto", "axes": {"bending_stiffness": [0.5, 5.0]}}
+    document = {"name": "test", "model": "auto", "axes": {"flank_stiffness": [3e10, 3e12]}}
     asked = build_job(document, "test.toml", {})
     steps = [asked.point(index)["step"] for index in range(2)]
     assert steps == [chosen_step(asked.point(index)) for index in range(2)]
@@ -159,9 +159,9 @@ def test_every_cell_of_a_grid_has_a_step_of_its_own():
 
 
 def test_a_run_by_hand_beyond_the_limit_is_done_again_shorter():
-    found = fresh_record(step=14e-6, stations=160, duration=0.04, rise_time=0.01, most_refinements=1)
+    found = fresh_record(step=28e-6, stations=160, duration=0.04, rise_time=0.01, most_refinements=1)
     assert (found["status"], found["refinements"]) == (Status.DONE, 1)
-    assert found["time_step"] <= 7e-6
+    assert found["time_step"] <= 14e-6
 
 
 BOTH = "[numerics] step_error: expected either step_error or step, found both"
