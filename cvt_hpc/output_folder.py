@@ -5,8 +5,6 @@ folder may be damaged, or another user's: a checksum shows damage of the job fil
 removed outside.
 """
 
-from __future__ import annotations
-
 import errno
 import hashlib
 import json

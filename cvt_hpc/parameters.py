@@ -1,7 +1,5 @@
 """The classes with which models and steppers declare the parameters that a job file may set."""
 
-from __future__ import annotations
-
 from collections.abc import Callable, Mapping
 from dataclasses import dataclass, field
 from typing import Any

@@ -5,8 +5,6 @@ and options of its own, and an entry here. The command line reads this table at 
 draws has been imported yet; `analysis/composing.py` draws by it.
 """
 
-from __future__ import annotations
-
 from collections.abc import Mapping
 from typing import Any, NamedTuple
 

@@ -1,7 +1,5 @@
 """Duration of a run and recorded quantities: parameters of every job, in each model."""
 
-from __future__ import annotations
-
 import math
 from collections.abc import Mapping
 from typing import Any

@@ -1,7 +1,5 @@
 """The common runs of two studies: the same axes in the same order, and on each the values that both have."""
 
-from __future__ import annotations
-
 import json
 from collections.abc import Collection, Hashable, Iterable
 from typing import Any, NamedTuple

@@ -1,7 +1,5 @@
 """Sliding in the plane of an arc: fig. 4 of Bullinger et al. 2005, fig. 4.1 of Lebrecht et al. 2004."""
 
-from __future__ import annotations
-
 from collections.abc import Sequence
 from typing import Any
 

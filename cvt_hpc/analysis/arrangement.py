@@ -1,7 +1,5 @@
 """How the axes of a study are laid out as a map: along x, along y, over panels, or fixed."""
 
-from __future__ import annotations
-
 from collections.abc import Iterator, Mapping, Sequence
 from dataclasses import dataclass, field, replace
 from itertools import product

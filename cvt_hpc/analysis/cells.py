@@ -1,7 +1,5 @@
 """The cells of a map: a run's class shows in lightness, in hatching, and in the mark on its grid point."""
 
-from __future__ import annotations
-
 from collections.abc import Mapping, Sequence
 from dataclasses import dataclass
 from typing import Any

@@ -1,7 +1,5 @@
 """One class per run of a dataset, and what a map shows of the runs that vibrate."""
 
-from __future__ import annotations
-
 import numpy as np
 import xarray as xr
 from numpy.typing import NDArray

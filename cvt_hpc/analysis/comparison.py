@@ -1,7 +1,5 @@
 """Two studies against each other, cell by cell: which classes contradict, how far numbers deviate."""
 
-from __future__ import annotations
-
 import json
 import math
 from collections.abc import Iterator, Mapping

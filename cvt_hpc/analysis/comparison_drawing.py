@@ -1,7 +1,5 @@
 """The picture of a comparison: a map of the cells in which studies differ, and amplitude B against A."""
 
-from __future__ import annotations
-
 from pathlib import Path
 
 import numpy as np

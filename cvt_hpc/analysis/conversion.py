@@ -1,7 +1,5 @@
 """Datasets as xarray and its companions leave them, in the form that this program writes, and other units."""
 
-from __future__ import annotations
-
 from collections.abc import Callable, Iterator, Mapping
 from functools import lru_cache, partial
 from typing import Any

@@ -1,7 +1,5 @@
 """Quantities of a study over one of its axes, a panel for each, with a curve for each value of another."""
 
-from __future__ import annotations
-
 from collections.abc import Sequence
 from typing import Any
 

@@ -1,7 +1,5 @@
 """Quantities of a study over one of its axes: what runs give as marks, what stands beside them as lines."""
 
-from __future__ import annotations
-
 from collections.abc import Iterator, Mapping, Sequence
 from typing import Any
 

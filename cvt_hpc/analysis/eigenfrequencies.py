@@ -1,7 +1,5 @@
 """Eigenfrequencies of the strands over an axis of a study, as fig. 3.7 of Lebrecht et al. 2004."""
 
-from __future__ import annotations
-
 import json
 from collections.abc import Mapping
 from typing import Any

@@ -1,7 +1,5 @@
 """Source of energy, switch and oscillator in watts, as fig. 4.4 of Lebrecht et al. 2004."""
 
-from __future__ import annotations
-
 import json
 from collections.abc import Sequence
 from typing import NamedTuple

@@ -1,7 +1,5 @@
 """Error over cost in pictures: lines and markers of the methods or models compared, axes of errors."""
 
-from __future__ import annotations
-
 from collections.abc import Sequence
 from typing import Any
 

@@ -13,8 +13,6 @@ raised where a dataset holds no results, a single run or not what is to be drawn
 or no value on it; what else a picture refuses its docstring says.
 """
 
-from __future__ import annotations
-
 import re
 from collections.abc import Callable, Iterable, Iterator, Mapping, Sequence
 from functools import partial, wraps

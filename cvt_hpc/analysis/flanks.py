@@ -1,7 +1,5 @@
 """Left and right flank of one run along the belt, with the ends of the arcs enlarged."""
 
-from __future__ import annotations
-
 from typing import NamedTuple
 
 import numpy as np

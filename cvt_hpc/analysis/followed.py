@@ -10,8 +10,6 @@ the `momentary_element_speed` of a history. Heun's method takes it from sample t
 between samples and stations.
 """
 
-from __future__ import annotations
-
 import numpy as np
 import xarray as xr
 

@@ -1,7 +1,5 @@
 """Sliding of one element over time, as figs 3.10 and 4.2 of Lebrecht et al. 2004."""
 
-from __future__ import annotations
-
 from collections.abc import Mapping, Sequence
 
 import numpy as np

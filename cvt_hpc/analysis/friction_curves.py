@@ -1,7 +1,5 @@
 """Curves of friction over sliding speed, and where motion is fed: fig. 3.12 of Lebrecht et al. 2004."""
 
-from __future__ import annotations
-
 import json
 from collections.abc import Mapping
 from typing import Any

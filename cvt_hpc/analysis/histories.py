@@ -1,7 +1,5 @@
 """The history of one run as a picture."""
 
-from __future__ import annotations
-
 import json
 from collections.abc import Callable, Mapping
 from pathlib import Path

@@ -1,7 +1,5 @@
 """Where vibration sets in and ends over a map: onset lines, and bands where ramps up and down differ."""
 
-from __future__ import annotations
-
 from typing import Any
 
 import numpy as np

@@ -1,7 +1,5 @@
 """Names of lines over spectra, in the margins where the lines leave the panel, clear of ridges."""
 
-from __future__ import annotations
-
 from collections.abc import Sequence
 from typing import Any, NamedTuple
 

@@ -7,8 +7,6 @@ cells where there is room, and drawn as a second set of panels where there is no
 amplitude is written where there is room.
 """
 
-from __future__ import annotations
-
 from dataclasses import dataclass, replace
 from typing import Any
 

@@ -1,7 +1,5 @@
 """Quantities along the belt drawn on the variator, and the powers in and out around it."""
 
-from __future__ import annotations
-
 import json
 from collections.abc import Sequence
 from typing import NamedTuple

@@ -1,7 +1,5 @@
 """The power balance of a run: what the pulleys put in and take out, and where the rest goes."""
 
-from __future__ import annotations
-
 from collections.abc import Sequence
 from typing import NamedTuple
 

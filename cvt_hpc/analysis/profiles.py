@@ -1,7 +1,5 @@
 """Quantities along the belt, as figs 20 to 23 of Bullinger et al. 2005 and 4.1 of Lebrecht et al. 2004."""
 
-from __future__ import annotations
-
 from collections.abc import Sequence
 from itertools import pairwise
 

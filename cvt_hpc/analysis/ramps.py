@@ -1,7 +1,5 @@
 """Motion along a ramp of load or speed, as figs 3.1, 3.2, 3.9, 3.13 and 3.14 of Lebrecht et al. 2004."""
 
-from __future__ import annotations
-
 import json
 from collections.abc import Sequence
 from textwrap import fill

@@ -1,7 +1,5 @@
 """What a sample of runs that were done again another way tells of their study, in words."""
 
-from __future__ import annotations
-
 import math
 from collections.abc import Iterator
 from pathlib import Path

@@ -1,7 +1,5 @@
 """Small tables that slow studies leave in the repository, read as datasets."""
 
-from __future__ import annotations
-
 import csv
 from collections.abc import Sequence
 from pathlib import Path

@@ -1,7 +1,5 @@
 """How the values of an axis are spread, evenly or by their logarithms, and borders between them."""
 
-from __future__ import annotations
-
 import numpy as np
 from numpy.typing import NDArray
 

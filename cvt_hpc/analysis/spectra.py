@@ -1,7 +1,5 @@
 """Spectra of the strands of one run, as fig. 3.11 of Lebrecht et al. 2004."""
 
-from __future__ import annotations
-
 import numpy as np
 import xarray as xr
 from matplotlib.figure import Figure

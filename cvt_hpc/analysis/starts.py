@@ -1,7 +1,5 @@
 """Studies whose runs begin with a small and with a large disturbance, as one map: where the start decides."""
 
-from __future__ import annotations
-
 from collections.abc import Mapping
 from typing import Any
 

@@ -1,7 +1,5 @@
 """Tension and push force of the strands over an axis of a study, as fig. 5 of Bullinger et al. 2005."""
 
-from __future__ import annotations
-
 import numpy as np
 import xarray as xr
 from matplotlib.axes import Axes

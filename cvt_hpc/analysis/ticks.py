@@ -1,7 +1,5 @@
 """Ticks at the values of an axis: numbers as short as they may be, and only those for which there is room."""
 
-from __future__ import annotations
-
 from collections.abc import Sequence
 
 import numpy as np

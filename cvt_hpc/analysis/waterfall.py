@@ -1,7 +1,5 @@
 """Spectra of the strands over an axis of a study, as figs 11 and 12 of Cepon and Boltezar 2011."""
 
-from __future__ import annotations
-
 from collections.abc import Sequence
 from dataclasses import replace
 

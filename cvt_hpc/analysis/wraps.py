@@ -1,7 +1,5 @@
 """Forces between belt and pulleys over the wrap, as figs 9 and 10 of Cepon and Boltezar 2011."""
 
-from __future__ import annotations
-
 from collections.abc import Sequence
 from typing import Any
 

@@ -5,8 +5,6 @@ it, which a belt that is loaded within tens of milliseconds does not come near. 
 where vibration begins or ends.
 """
 
-from __future__ import annotations
-
 from collections.abc import Callable, Collection, Mapping, Sequence
 from itertools import pairwise
 from typing import Any, NamedTuple

@@ -1,7 +1,5 @@
 """Expected cost of a bifurcation diagram, by the cost models of its steady states and its runs."""
 
-from __future__ import annotations
-
 from collections.abc import Iterator
 from typing import NamedTuple
 

@@ -1,7 +1,5 @@
 """The dataset of a bifurcation diagram: branches over the grid of axes, Hopf points and runs in lists."""
 
-from __future__ import annotations
-
 from collections.abc import Mapping, Sequence
 from enum import IntEnum
 from typing import Any

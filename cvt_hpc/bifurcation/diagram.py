@@ -1,7 +1,5 @@
 """A bifurcation diagram made: branches followed, Hopf points found and classified, kept, written, drawn."""
 
-from __future__ import annotations
-
 from collections.abc import Callable, Mapping
 from contextlib import closing
 from dataclasses import dataclass

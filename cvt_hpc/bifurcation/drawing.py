@@ -5,8 +5,6 @@ amplitudes of limit cycles as dots; below growth rates and frequencies of its mo
 steady state nothing is drawn. Runs that failed or slip have no limit cycle: they stand at the upper edge.
 """
 
-from __future__ import annotations
-
 from pathlib import Path
 
 import numpy as np

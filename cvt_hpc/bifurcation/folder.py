@@ -1,7 +1,5 @@
 """The output folder of a bifurcation diagram: its files, and the origin of its dataset."""
 
-from __future__ import annotations
-
 import json
 import logging
 import re

@@ -1,7 +1,5 @@
 """A branch of a bifurcation diagram with all its results, as it is kept and as all that shows it reads it."""
 
-from __future__ import annotations
-
 from collections.abc import Callable, Sequence
 from enum import IntEnum
 from typing import NamedTuple

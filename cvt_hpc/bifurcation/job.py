@@ -1,7 +1,5 @@
 """The content of a bifurcation job: branches along the load, and the runs beside them."""
 
-from __future__ import annotations
-
 from dataclasses import dataclass
 from itertools import product
 from pathlib import Path

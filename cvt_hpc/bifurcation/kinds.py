@@ -1,7 +1,5 @@
 """Kinds of the Hopf points of a branch, by the runs beside them."""
 
-from __future__ import annotations
-
 from collections.abc import Callable
 from functools import partial
 

@@ -1,7 +1,5 @@
 """The picture of an error budget: the effect of each choice."""
 
-from __future__ import annotations
-
 import math
 from collections.abc import Sequence
 from functools import partial

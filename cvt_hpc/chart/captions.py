@@ -1,7 +1,5 @@
 """The text under the panels of a scene: the chosen method, and points that are not drawn, with the reason."""
 
-from __future__ import annotations
-
 import math
 import re
 from textwrap import wrap

@@ -1,7 +1,5 @@
 """Requirements of a chart on its models, checked before anything is computed."""
 
-from __future__ import annotations
-
 from collections.abc import Iterable
 from itertools import product
 

@@ -1,7 +1,5 @@
 """Expected cost of a chart, by the cost models of its models."""
 
-from __future__ import annotations
-
 import math
 from collections.abc import Iterator
 

@@ -1,7 +1,5 @@
 """The results of a chart as netCDF, with all that is needed to repeat it."""
 
-from __future__ import annotations
-
 import json
 from collections.abc import Sequence
 from typing import Any

@@ -1,7 +1,5 @@
 """Keys of a chart job beside the tables of a job: [chart] and the tables in it."""
 
-from __future__ import annotations
-
 import math
 
 from cvt_hpc.parameters import Parameter, positive

@@ -1,7 +1,5 @@
 """From a chart job to its measurements: every run of it is built and checked before any computing."""
 
-from __future__ import annotations
-
 from pathlib import Path
 
 from cvt_hpc.chart.declarations import CHART

@@ -1,7 +1,5 @@
 """A chart made: all points measured, compared, written and drawn."""
 
-from __future__ import annotations
-
 import logging
 import math
 import multiprocessing

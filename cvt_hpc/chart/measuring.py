@@ -1,7 +1,5 @@
 """One point measured: runs from all its starts, their results, and their cost."""
 
-from __future__ import annotations
-
 import math
 from dataclasses import dataclass, field
 from typing import Any

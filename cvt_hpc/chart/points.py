@@ -1,7 +1,5 @@
 """The points of a chart from its tables: references, methods over their settings, and the error budget."""
 
-from __future__ import annotations
-
 import math
 from collections.abc import Iterator, Mapping
 from typing import Any

@@ -6,8 +6,6 @@ of everything else. Errors are relative: the norm of the difference over the nor
 stated scale.
 """
 
-from __future__ import annotations
-
 import math
 from collections.abc import Callable, Mapping, Sequence
 from dataclasses import dataclass

@@ -1,7 +1,5 @@
 """A scene of a chart job, with the data from which its runs are built."""
 
-from __future__ import annotations
-
 import math
 import re
 import warnings

@@ -1,7 +1,5 @@
 """The output folder of a chart: its origin, and the points measured so far."""
 
-from __future__ import annotations
-
 import re
 from collections.abc import Callable, Iterator
 from dataclasses import fields

@@ -1,7 +1,5 @@
 """The results of a chart as a table: for people, and as a small file that can be kept."""
 
-from __future__ import annotations
-
 from collections.abc import Callable, Iterator, Mapping, Sequence
 from math import nan
 from pathlib import Path

@@ -1,7 +1,5 @@
 """Runs marched and timed, alone or in lanes."""
 
-from __future__ import annotations
-
 import math
 import time
 from collections.abc import Callable, Sequence

@@ -1,7 +1,5 @@
 """`chart`, `ladder`, `branch` and `fit`: many runs whose results are tables and pictures of their own."""
 
-from __future__ import annotations
-
 import argparse
 from typing import Any
 

@@ -1,7 +1,5 @@
 """`plot`: pictures of results beside the map, each by its kind; `picture_kinds.py` declares them."""
 
-from __future__ import annotations
-
 import argparse
 from collections.abc import Callable, Iterator, Sequence
 from contextlib import ExitStack, contextmanager

@@ -1,7 +1,5 @@
 """`init`, `models`, `variables`, `examples`, `doctor`, `completion`: what somebody needs who begins."""
 
-from __future__ import annotations
-
 import argparse
 from pathlib import Path
 from typing import Any

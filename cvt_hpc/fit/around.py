@@ -1,7 +1,5 @@
 """Around a set: how far each parameter may be moved alone, and Sobol indices of all moved together."""
 
-from __future__ import annotations
-
 from collections.abc import Iterator, Sequence
 from typing import NamedTuple
 

@@ -1,7 +1,5 @@
 """The best candidates of a search run in full: the results that count of a set."""
 
-from __future__ import annotations
-
 from collections.abc import Mapping
 from dataclasses import dataclass
 from typing import Any

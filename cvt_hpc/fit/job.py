@@ -1,7 +1,5 @@
 """The content of a fit job: free parameters, cases, targets, and the length of the search."""
 
-from __future__ import annotations
-
 import math
 from collections.abc import Mapping
 from dataclasses import asdict, dataclass

@@ -1,7 +1,5 @@
 """A job for `cvt-hpc fit`: a job whose axes are the ranges of free parameters, with a table [fit]."""
 
-from __future__ import annotations
-
 import math
 from collections.abc import Mapping
 from dataclasses import replace

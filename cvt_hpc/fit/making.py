@@ -1,7 +1,5 @@
 """A fit made: search, confirmation, distances and sensitivities, and the tables that they leave."""
 
-from __future__ import annotations
-
 from collections.abc import Callable, Iterator
 from pathlib import Path
 from typing import NamedTuple

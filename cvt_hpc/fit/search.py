@@ -6,8 +6,6 @@ shares of runs do not have. Both follow from the seed: a search that was stopped
 again, whose studies are there.
 """
 
-from __future__ import annotations
-
 from collections.abc import Callable
 from typing import NamedTuple
 

@@ -1,7 +1,5 @@
 """The results of a fit as tables: comma-separated values below lines that state their origin."""
 
-from __future__ import annotations
-
 from collections.abc import Iterator, Sequence
 from itertools import combinations
 from pathlib import Path

@@ -1,7 +1,5 @@
 """The targets of a fit, read from a job: each measure with the keys that it takes."""
 
-from __future__ import annotations
-
 import math
 from collections.abc import Collection, Mapping
 from typing import Any

@@ -1,7 +1,5 @@
 """Arrays and quantities of other libraries in a job, as a job file has them; none of these is imported."""
 
-from __future__ import annotations
-
 from collections.abc import Mapping
 from typing import Any
 

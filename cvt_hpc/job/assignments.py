@@ -1,7 +1,5 @@
 """Values that a user sets beside the job file: KEY=VALUE on the command line, a mapping in Python."""
 
-from __future__ import annotations
-
 import tomllib
 from collections.abc import Mapping, Sequence
 from typing import Any

@@ -5,8 +5,6 @@ model's: `belt_length` gives `driven_radius`, and `step_error` gives `step` wher
 rule comes after the rules that give its sources.
 """
 
-from __future__ import annotations
-
 from collections.abc import Collection, Iterable, Mapping
 from dataclasses import replace
 from graphlib import CycleError, TopologicalSorter

@@ -1,7 +1,5 @@
 """Which points of the space of its axes a study runs: all of a grid, those along boundaries, or samples."""
 
-from __future__ import annotations
-
 from collections.abc import Mapping
 from typing import Any
 

@@ -1,7 +1,5 @@
 """The job file as it stands on the disk: one clear error for whatever is not readable TOML."""
 
-from __future__ import annotations
-
 import re
 import tomllib
 from pathlib import Path

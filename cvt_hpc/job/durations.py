@@ -1,7 +1,5 @@
 """Time spans as they are given on the command line: "2h30m", "90 min", "1 d 12 h", or a number of seconds."""
 
-from __future__ import annotations
-
 import re
 
 from cvt_hpc.errors import mismatch, show

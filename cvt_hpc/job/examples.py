@@ -1,7 +1,5 @@
 """Jobs, notebooks and batch files that come with the program, to be copied and changed."""
 
-from __future__ import annotations
-
 import json
 import os
 import re

@@ -1,7 +1,5 @@
 """The same runs for another model of the ladder, which knows fewer tables."""
 
-from __future__ import annotations
-
 from typing import Any
 
 from cvt_hpc.errors import mismatch

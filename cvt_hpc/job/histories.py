@@ -3,8 +3,6 @@
 They do not determine the numbers: a folder takes the job with any of them.
 """
 
-from __future__ import annotations
-
 import math
 from collections.abc import Mapping
 from typing import Any

@@ -1,7 +1,5 @@
 """From a job file to a job: the head, the tables, the axes and the overrides, each checked in turn."""
 
-from __future__ import annotations
-
 import re
 from collections.abc import Collection, Mapping, Sequence
 from dataclasses import replace

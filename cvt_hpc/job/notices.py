@@ -1,7 +1,5 @@
 """Messages about values whose meaning another key decides, if nothing names that key, or that it disables."""
 
-from __future__ import annotations
-
 import warnings
 from collections.abc import Mapping, Sequence
 from typing import Any

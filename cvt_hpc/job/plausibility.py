@@ -1,7 +1,5 @@
 """Numbers without a unit that are far from usual: rpm where rad/s is read, millimetres for metres."""
 
-from __future__ import annotations
-
 import math
 import numbers
 import warnings

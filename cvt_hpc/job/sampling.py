@@ -1,7 +1,5 @@
 """Samples of the space that the ranges of a job's axes span, drawn by scipy.stats.qmc."""
 
-from __future__ import annotations
-
 from collections.abc import Mapping
 from typing import Any
 

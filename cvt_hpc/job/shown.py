@@ -1,7 +1,5 @@
 """Values of axes for people: in the unit in which the job gives them, by the attributes of a coordinate."""
 
-from __future__ import annotations
-
 import math
 from collections.abc import Mapping
 from typing import Any

@@ -1,7 +1,5 @@
 """A job in words, for `cvt-hpc check`."""
 
-from __future__ import annotations
-
 import math
 from typing import Any
 

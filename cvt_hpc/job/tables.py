@@ -1,7 +1,5 @@
 """Tables of a command beside the job's own, such as [chart]: checks of keys against their declaration."""
 
-from __future__ import annotations
-
 from collections.abc import Mapping
 from typing import Any
 

@@ -1,7 +1,5 @@
 """Parameters in words: the models, the keys of one, and a commented job file to begin with."""
 
-from __future__ import annotations
-
 import math
 import os
 from pathlib import Path

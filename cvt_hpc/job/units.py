@@ -4,8 +4,6 @@ It takes a second to load, which most jobs are spared: their texts have a prefix
 are in rpm, degrees or per cent.
 """
 
-from __future__ import annotations
-
 import math
 import re
 from collections.abc import Mapping

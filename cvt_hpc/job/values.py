@@ -1,7 +1,5 @@
 """One value of a job file against the parameter that declares it: type, unit, bounds, choices."""
 
-from __future__ import annotations
-
 import math
 import numbers
 from typing import Any

@@ -4,8 +4,6 @@ Cells count that the reference decides, or in which it vibrates. A model that gi
 cell is not in error there: such cells are counted by themselves.
 """
 
-from __future__ import annotations
-
 import math
 from collections.abc import Callable, Iterator, Mapping, Sequence
 from typing import NamedTuple

@@ -1,7 +1,5 @@
 """Expected cost of the models of a ladder, by their cost models."""
 
-from __future__ import annotations
-
 from collections.abc import Iterator
 from pathlib import Path
 

@@ -1,7 +1,5 @@
 """The picture of a ladder chart: error against cost of each model, a panel for each question."""
 
-from __future__ import annotations
-
 import math
 from collections.abc import Sequence
 from pathlib import Path

@@ -1,7 +1,5 @@
 """A job for `cvt-hpc ladder`: an ordinary job of the elastic belt, with a table [ladder] or without."""
 
-from __future__ import annotations
-
 from collections.abc import Mapping
 from pathlib import Path
 from typing import NamedTuple

@@ -1,7 +1,5 @@
 """A ladder chart made: the same runs done with every model, compared, written and drawn."""
 
-from __future__ import annotations
-
 import json
 import time
 from collections.abc import Callable, Sequence

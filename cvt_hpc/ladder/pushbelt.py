@@ -1,7 +1,5 @@
 """A job of the elastic belt on the pushbelt of rigid elements, as the reference of its ladder."""
 
-from __future__ import annotations
-
 from collections.abc import Mapping
 from dataclasses import replace
 from typing import Any

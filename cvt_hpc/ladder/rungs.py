@@ -4,8 +4,6 @@ Beside them stands a model that takes longer than the elastic belt and answers t
 requests it.
 """
 
-from __future__ import annotations
-
 from collections.abc import Mapping
 from dataclasses import replace
 from typing import Any, NamedTuple

@@ -1,7 +1,5 @@
 """The results of a ladder chart as a table, for people and as files that can be kept."""
 
-from __future__ import annotations
-
 import json
 from collections.abc import Iterator, Mapping, Sequence
 from pathlib import Path

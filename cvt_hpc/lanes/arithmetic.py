@@ -1,7 +1,5 @@
 """Sums, products, comparisons and logic of lanes."""
 
-from __future__ import annotations
-
 import operator
 
 from numba import types

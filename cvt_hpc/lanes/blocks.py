@@ -12,8 +12,6 @@ Factors P D Q = A are found without exchanges of rows; P and Q have a unit diago
 of A: P below the diagonal, 1 / D on it, and Q above.
 """
 
-from __future__ import annotations
-
 from typing import Any
 
 from llvmlite import ir

@@ -1,7 +1,5 @@
 """The types of lanes, masks and arrays of lanes, as the compiler knows them."""
 
-from __future__ import annotations
-
 from typing import TYPE_CHECKING, Any
 
 import numpy as np

@@ -1,7 +1,5 @@
 """Reading and writing places of an array of lanes."""
 
-from __future__ import annotations
-
 import operator
 
 from llvmlite import ir

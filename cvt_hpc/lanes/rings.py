@@ -7,8 +7,6 @@ behind the first row of a lane comes the last row of the lane before it. What is
 such as a pulley's speed, stands in all lanes alike; a sum over rows becomes the ring's by `around`.
 """
 
-from __future__ import annotations
-
 from llvmlite import ir
 from numba import types
 from numba.extending import intrinsic, overload, overload_attribute, register_jitable

@@ -1,7 +1,5 @@
 """Chains of planar ANCF elements, open or closed, and the stages of their steps in time."""
 
-from __future__ import annotations
-
 from typing import NamedTuple
 
 import numpy as np

@@ -8,8 +8,6 @@ from z = (d, a, b) = (r2 - r1, l g1, l g2) and its rate. Strain and curvature at
 with constant H, so that forces are sums of h, and the slopes of dm/dt by the speeds are H (z + tau dz/dt).
 """
 
-from __future__ import annotations
-
 import numpy as np
 from numba.extending import register_jitable
 

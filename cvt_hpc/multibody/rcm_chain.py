@@ -5,8 +5,6 @@ x, y, phi, a1, a2, x, y, phi, ... An element takes eight of them from its node o
 to blocks of 5 x 5. In a ring the last three are those of the first node, turned once around.
 """
 
-from __future__ import annotations
-
 import math
 from typing import NamedTuple
 

@@ -1,7 +1,5 @@
 """Contacts in lanes: one-sided contact, its share in a step, and friction's coefficient and memory."""
 
-from __future__ import annotations
-
 from numba.extending import register_jitable
 
 from cvt_hpc.lanes import like, maximum, select

@@ -1,7 +1,5 @@
 """The friction table of a CSV file: a coefficient for each pair of normal force and sliding speed."""
 
-from __future__ import annotations
-
 from collections.abc import Mapping
 from functools import partial
 from typing import Any

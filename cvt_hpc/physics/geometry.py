@@ -1,7 +1,5 @@
 """Geometry of a two-pulley variator with a belt of constant length on its pitch line."""
 
-from __future__ import annotations
-
 import math
 from collections.abc import Mapping
 from dataclasses import dataclass

@@ -6,8 +6,6 @@ Timoshenko beam under tension does. It is taken at rest: a belt that runs at v h
 T in what does not move, and lower frequencies.
 """
 
-from __future__ import annotations
-
 import math
 from collections.abc import Mapping
 from typing import Any

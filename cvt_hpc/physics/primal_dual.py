@@ -7,8 +7,6 @@ unknown of its own: the linearised equation q h = v gives the slope mu N (1 - h 
 q' = dq / d|v|, and the next h, cut off at size 1.
 """
 
-from __future__ import annotations
-
 from numba.extending import register_jitable
 
 from cvt_hpc.lanes import maximum, sqrt

@@ -1,7 +1,5 @@
 """What to do next with a study: commands and changes of its job, by what came out."""
 
-from __future__ import annotations
-
 from collections.abc import Iterator
 from shlex import quote
 

@@ -1,7 +1,5 @@
 """What came out of a study, in sentences with numbers."""
 
-from __future__ import annotations
-
 from collections import Counter
 from collections.abc import Iterator, Sequence
 from itertools import islice

@@ -1,7 +1,5 @@
 """What map.js draws the map of: axes, classes and quantities of a study as numbers."""
 
-from __future__ import annotations
-
 import json
 from base64 import b64encode
 from collections.abc import Iterator

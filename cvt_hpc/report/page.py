@@ -1,7 +1,5 @@
 """One self-contained HTML page about a study."""
 
-from __future__ import annotations
-
 import base64
 import json
 from collections.abc import Callable, Mapping

@@ -1,7 +1,5 @@
 """Quantities of the runs that a page shows: numbers, one for each run, that vary over the study."""
 
-from __future__ import annotations
-
 from collections.abc import Iterator
 from typing import NamedTuple
 

@@ -26,8 +26,6 @@ A row of blocks holds [A | U | S | f], all by columns: b^2 numbers each of A, U 
 uses, and b for each right-hand side (`field_of_right`).
 """
 
-from __future__ import annotations
-
 from cvt_hpc.kernels import kernel
 from cvt_hpc.lanes import LaneArray, anywhere, behind, from_ahead, from_behind
 from cvt_hpc.lanes.blocks import (

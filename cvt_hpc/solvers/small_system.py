@@ -1,7 +1,5 @@
 """A dense system of a few equations, as the border of a chain has them."""
 
-from __future__ import annotations
-
 import numpy as np
 
 from cvt_hpc.kernels import kernel

@@ -8,8 +8,6 @@ make it take more steps than the tolerance needs. It is not for stiff friction: 
 the width of smoothed friction; with coarser tolerances it leaps over rest.
 """
 
-from __future__ import annotations
-
 from typing import NamedTuple
 
 import numpy as np

@@ -6,8 +6,6 @@ turned twice, in that of 1 - shift J_vv - shift^2 J_vx of a velocity v and its p
 growth into decay with shorter steps already has this asked of a longer shift (`reach`).
 """
 
-from __future__ import annotations
-
 from typing import NamedTuple
 
 import numpy as np

@@ -10,8 +10,6 @@ in that displacements and velocities are treated alike, which spares it the over
 Dettmer and Peric 2017). The rates are carried from step to step; a state changed from outside restarts them.
 """
 
-from __future__ import annotations
-
 from functools import partial
 from typing import NamedTuple
 

@@ -12,8 +12,6 @@ the motion leads. A Newton iteration with one matrix that converges does so wher
 J has that matrix's sign, so that it is checked once for each matrix (`frozen_jacobian`).
 """
 
-from __future__ import annotations
-
 import numpy as np
 
 from cvt_hpc.kernels import kernel

@@ -16,8 +16,6 @@ an implicit method would find the bend. From step d = 4.0 on, d = N mu / (m v_re
 solutions beside rest, at which a mass slides on.
 """
 
-from __future__ import annotations
-
 from functools import partial
 from typing import NamedTuple
 

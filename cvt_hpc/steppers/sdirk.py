@@ -11,8 +11,6 @@ stage order 1: where a stiff force moves the motion along, as friction that near
 to 2.
 """
 
-from __future__ import annotations
-
 from functools import partial
 from typing import NamedTuple
 

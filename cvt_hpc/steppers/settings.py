@@ -1,7 +1,5 @@
 """Parameters of a method that a job may set: the entries that several methods share, once."""
 
-from __future__ import annotations
-
 from collections.abc import Mapping
 from functools import partial
 from typing import Any, NamedTuple, TypeVar

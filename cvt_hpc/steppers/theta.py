@@ -6,8 +6,6 @@ faster than the step about in every step, undamped (ringing). theta = 1 damps ev
 step w^2 / 2, those that grow by themselves included: a growth rate below that is turned into decay.
 """
 
-from __future__ import annotations
-
 from functools import partial
 from typing import NamedTuple
 

@@ -1,7 +1,5 @@
 """Whether this machine can do sweeps: packages, cores, memory, kernels' cache, disk, MPI and Slurm."""
 
-from __future__ import annotations
-
 import os
 import shutil
 import subprocess

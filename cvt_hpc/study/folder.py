@@ -1,7 +1,5 @@
 """The output folder of a study: its files, and the origin of its records."""
 
-from __future__ import annotations
-
 import json
 import logging
 import re

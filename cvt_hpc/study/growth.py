@@ -1,7 +1,5 @@
 """The runs of a study within a larger one of the same job: with more values on its axes, or further axes."""
 
-from __future__ import annotations
-
 from collections.abc import Mapping
 from pathlib import Path
 from typing import Any

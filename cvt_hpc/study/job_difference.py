@@ -1,7 +1,5 @@
 """Differences between the job of an output folder and the requested one."""
 
-from __future__ import annotations
-
 import json
 import os.path
 from collections.abc import Mapping

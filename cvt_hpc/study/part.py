@@ -1,7 +1,5 @@
 """Parts of a study, for starts that work side by side in one folder, such as the tasks of a job array."""
 
-from __future__ import annotations
-
 import re
 from typing import NamedTuple
 

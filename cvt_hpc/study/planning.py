@@ -1,7 +1,5 @@
 """The records that a start of a sweep finds, and its plan; on rank 0 alone."""
 
-from __future__ import annotations
-
 import logging
 from collections.abc import Collection
 from contextlib import ExitStack

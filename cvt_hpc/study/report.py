@@ -1,7 +1,5 @@
 """How a sweep ended, for people and for the exit status."""
 
-from __future__ import annotations
-
 from dataclasses import dataclass
 from pathlib import Path
 from typing import Any

@@ -15,8 +15,6 @@ found if one of them is run. So only patches without a corner of the first boxes
 contains as many cells as the first spacing along each traced axis, side by side.
 """
 
-from __future__ import annotations
-
 from collections.abc import Iterator
 from itertools import pairwise, product
 

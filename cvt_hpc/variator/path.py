@@ -4,8 +4,6 @@ It is run through counter-clockwise around the driving pulley at (0, 0) and the 
 t1 is the lower strand. Path coordinates begin at the inlet of the driving arc.
 """
 
-from __future__ import annotations
-
 import numpy as np
 
 from cvt_hpc.physics.geometry import Variator

@@ -1,7 +1,5 @@
 """Profiles over time: lists of a job that give multiples of one of its values, linear between their times."""
 
-from __future__ import annotations
-
 from collections import Counter
 from collections.abc import Iterable, Mapping, Sequence
 from typing import Any

@@ -1,7 +1,5 @@
 """Variables that records of all models of a variator have in common."""
 
-from __future__ import annotations
-
 from collections.abc import Mapping
 from typing import Any
 

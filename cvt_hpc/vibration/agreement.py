@@ -5,8 +5,6 @@ small error is enough for one, so contradictions whose larger amplitude lies wit
 separated from those beyond.
 """
 
-from __future__ import annotations
-
 from enum import IntEnum
 
 import numpy as np

@@ -1,7 +1,5 @@
 """From a run's displacement history to its amplitudes, frequencies, growth rates, and whether it vibrates."""
 
-from __future__ import annotations
-
 from collections.abc import Mapping, Sequence
 from dataclasses import dataclass
 from typing import Any

@@ -1,7 +1,5 @@
 """One class per run: the two flags of a record, and the undecided cases, as one category."""
 
-from __future__ import annotations
-
 from enum import IntEnum
 
 import numpy as np

@@ -1,7 +1,5 @@
 """The common verdict on two starts: where a vibration needs a large start, two attractors exist."""
 
-from __future__ import annotations
-
 from enum import IntEnum
 
 import numpy as np

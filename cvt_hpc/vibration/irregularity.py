@@ -17,8 +17,6 @@ Res. 105, 7337-7356), and of these there have to be LEAST_WINDOWS. A beat of whi
 periods is undecided for that reason.
 """
 
-from __future__ import annotations
-
 import numpy as np
 from numpy.typing import ArrayLike, NDArray
 

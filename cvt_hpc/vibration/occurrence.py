@@ -11,8 +11,6 @@ is still growing. A run vibrates if a strand does, and is quiet only if all stra
 strand is, unless another one is undecided that may have a trend. The thresholds are in `criterion.py`.
 """
 
-from __future__ import annotations
-
 from collections.abc import Mapping, Sequence
 from typing import Any
 

@@ -1,7 +1,5 @@
 """Loads at which vibration sets in and ends, and the distances between the results of two studies."""
 
-from __future__ import annotations
-
 from collections.abc import Sequence
 from typing import NamedTuple
 

@@ -6,8 +6,6 @@ of their squares. Peaks nearer to a higher one than the window's main lobe, or l
 that one's own, in the band or beside it.
 """
 
-from __future__ import annotations
-
 from typing import NamedTuple
 
 import numpy as np

@@ -7,8 +7,6 @@ shorter time is undecided: a slower ramp may decide. A vibration takes time to g
 onset late, by the change of the ramped quantity meanwhile.
 """
 
-from __future__ import annotations
-
 from collections.abc import Mapping, Sequence
 from dataclasses import dataclass
 from typing import Any

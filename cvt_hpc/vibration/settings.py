@@ -25,8 +25,6 @@ itself
   grows from there; a strand that ends a hundred times below has decayed, whatever rounding does to its trend.
 """
 
-from __future__ import annotations
-
 from collections.abc import Mapping
 from typing import Any
 

@@ -8,8 +8,6 @@ A signal that is constant, or a cubic in time, up to rounding has no vibration: 
 growth rate nan. A signal with a value that is not finite yields nan in its channel.
 """
 
-from __future__ import annotations
-
 from typing import NamedTuple
 
 import numpy as np

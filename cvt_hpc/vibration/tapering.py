@@ -15,8 +15,6 @@ sine on an edge counts with 0.91 of its amplitude), sines below 3.5/L lose ampli
 and where the amplitude changes within the segment, its middle counts most.
 """
 
-from __future__ import annotations
-
 import numpy as np
 from numpy.typing import ArrayLike, NDArray
 

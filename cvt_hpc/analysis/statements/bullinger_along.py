@@ -1,7 +1,5 @@
 """Statements of Bullinger, Funk and Pfeiffer 2005 about figs 4, 20 and 21: along the belt at ratio 1."""
 
-from __future__ import annotations
-
 import numpy as np
 import xarray as xr
 

@@ -1,7 +1,5 @@
 """Statements of Bullinger, Funk and Pfeiffer 2005 about figs 5, 22 and 23: off speed ratio 1."""
 
-from __future__ import annotations
-
 import numpy as np
 
 from cvt_hpc.analysis.statements.kept import Kept, over_arc

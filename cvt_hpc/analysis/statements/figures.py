@@ -1,7 +1,5 @@
 """The figures that jobs reproduce: how each is drawn and what the paper says of it."""
 
-from __future__ import annotations
-
 from collections.abc import Callable, Iterator, Sequence
 from pathlib import Path
 from typing import NamedTuple

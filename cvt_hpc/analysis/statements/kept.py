@@ -1,7 +1,5 @@
 """What a study has left, as checks of statements read it: its results and the histories that it keeps."""
 
-from __future__ import annotations
-
 import json
 from collections.abc import Iterator, Sequence
 from contextlib import ExitStack, contextmanager

@@ -1,7 +1,5 @@
 """Statements of Lebrecht, Pfeiffer and Ulbrich 2004 about figs 3.2 to 3.4, 3.6, 3.7, 3.10, 3.11."""
 
-from __future__ import annotations
-
 from collections.abc import Sequence
 
 import numpy as np

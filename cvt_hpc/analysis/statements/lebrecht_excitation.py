@@ -1,7 +1,5 @@
 """Statements of Lebrecht, Pfeiffer and Ulbrich 2004 about the excitation: figs 3.12, 4.1, 4.2 and 4.4."""
 
-from __future__ import annotations
-
 import json
 from itertools import pairwise
 

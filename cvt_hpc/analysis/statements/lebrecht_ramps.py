@@ -1,7 +1,5 @@
 """Statements of Lebrecht, Pfeiffer and Ulbrich 2004 about their ramps: figs 3.1, 3.9, 3.13 and 3.14."""
 
-from __future__ import annotations
-
 from itertools import pairwise
 
 import numpy as np

@@ -1,7 +1,5 @@
 """A statement of a paper about one of its figures, and what measuring it in a study gives."""
 
-from __future__ import annotations
-
 from collections.abc import Callable, Iterable, Sequence
 from enum import Enum
 from typing import Any, NamedTuple

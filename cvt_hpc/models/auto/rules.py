@@ -18,8 +18,6 @@ more than the coarse transient that they could spare. Contact that never opens n
 search for the closed stations ends with its first guess, so that complementarity costs nothing then.
 """
 
-from __future__ import annotations
-
 from collections.abc import Mapping
 from enum import IntEnum
 from typing import Any

@@ -3,8 +3,6 @@
 An element takes the fields of `pushbelt.belt`, so that both models are read off alike, and those below.
 """
 
-from __future__ import annotations
-
 from typing import NamedTuple
 
 import numpy as np

@@ -5,8 +5,6 @@ of the ring there and J = dr/dq, its velocity is n (n.J u) + t v for any speed v
 = 0; and s' = (v - t.J u) / |dr/ds|.
 """
 
-from __future__ import annotations
-
 import numpy as np
 
 from cvt_hpc.kernels import kernel

@@ -17,8 +17,6 @@ r is by the response of a contact to its own impulse: 1 / G of a scalar contact;
 flank, which couple, by how far their rows are dominant (Foerg 2007).
 """
 
-from __future__ import annotations
-
 import numpy as np
 
 from cvt_hpc.kernels import kernel

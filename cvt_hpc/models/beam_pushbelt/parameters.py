@@ -1,7 +1,5 @@
 """Parameters of the pushbelt on a ring of beams: those of `pushbelt`, and those of the ring."""
 
-from __future__ import annotations
-
 from collections.abc import Mapping
 from typing import Any
 

@@ -1,7 +1,5 @@
 """Start of a pushbelt on a ring of beams from the geometry of its path."""
 
-from __future__ import annotations
-
 from collections.abc import Mapping
 from typing import Any
 

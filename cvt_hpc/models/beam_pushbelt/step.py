@@ -19,8 +19,6 @@ Directions of forces are those at q_k; sliding velocities are in the directions 
 the last one. At either end they would add v phi' dt / 2 of false sliding.
 """
 
-from __future__ import annotations
-
 import numpy as np
 
 from cvt_hpc.kernels import kernel

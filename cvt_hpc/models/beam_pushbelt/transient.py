@@ -1,7 +1,5 @@
 """A transient run of the pushbelt on a ring of beams, recorded as one of `pushbelt`."""
 
-from __future__ import annotations
-
 from collections.abc import Mapping
 from typing import Any
 

@@ -1,7 +1,5 @@
 """Readings of a sample at points along the belt: places, tension, contacts; for kernels."""
 
-from __future__ import annotations
-
 from typing import NamedTuple
 
 import numpy as np

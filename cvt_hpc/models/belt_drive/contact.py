@@ -11,8 +11,6 @@ belt's cord and the rim turns with the pulley, so that the cord slides by the sp
 Friction (`cvt_hpc.models.belt_drive.friction`) acts at the radius d: its moment turns the pulley.
 """
 
-from __future__ import annotations
-
 from typing import NamedTuple
 
 import numpy as np

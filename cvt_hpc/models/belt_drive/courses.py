@@ -4,8 +4,6 @@ Profiles are multiples of `driving_speed` and `load`, linear between their times
 and after the last one. From there on the speed has a ripple (Cepon and Boltezar 2011, eq. 5).
 """
 
-from __future__ import annotations
-
 from collections.abc import Mapping
 from typing import Any
 

@@ -1,7 +1,5 @@
 """The belt on its pulleys: the moving parts, and the step in time."""
 
-from __future__ import annotations
-
 from typing import NamedTuple
 
 import numpy as np

@@ -29,8 +29,6 @@ has coordinates. A softer grip, which comes when the number of wrong contacts fa
 of them. The laws hold to `slack`.
 """
 
-from __future__ import annotations
-
 from enum import IntEnum
 from typing import NamedTuple
 

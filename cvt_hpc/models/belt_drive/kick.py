@@ -1,7 +1,5 @@
 """A kick across the strands of a running drive, and the frequencies at which they answer."""
 
-from __future__ import annotations
-
 import numpy as np
 
 from cvt_hpc.physics.belt_path import BeltPath, regions

@@ -4,8 +4,6 @@ The belt runs around the pulleys in the order of the lists; the first one drives
 it stands in the lists as at rest.
 """
 
-from __future__ import annotations
-
 from collections.abc import Iterator, Mapping, Sequence
 from typing import Any, NamedTuple
 

@@ -12,8 +12,6 @@ Strands that bend where they leave a pulley are curved there. So their vibration
 first order and turns the driven pulleys, as Kong and Parker (2003) found of serpentine drives.
 """
 
-from __future__ import annotations
-
 import numpy as np
 from scipy.sparse import csc_matrix, lil_matrix
 from scipy.sparse.linalg import eigsh

@@ -1,7 +1,5 @@
 """Largest excitation by the mesh alone, whose elements are cubic and bend where they meet a pulley."""
 
-from __future__ import annotations
-
 from collections.abc import Mapping
 from typing import Any
 

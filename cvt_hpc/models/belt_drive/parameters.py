@@ -9,8 +9,6 @@ from which a strand vibrates: 96 elements shake the strands by 30 um. The band h
 strands, 63 to 193 Hz.
 """
 
-from __future__ import annotations
-
 from collections.abc import Mapping
 from dataclasses import replace
 from typing import Any

@@ -4,8 +4,6 @@ At a tension T the belt is longer by the factor x with EA (x^2 - 1) x / 2 = T, a
 T / (R k) on each arc, which shortens the path.
 """
 
-from __future__ import annotations
-
 from collections.abc import Mapping
 from typing import Any
 

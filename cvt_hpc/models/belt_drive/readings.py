@@ -1,7 +1,5 @@
 """Readings of a belt drive at a sample: displacement, tensions, sliding, forces along the path."""
 
-from __future__ import annotations
-
 from collections.abc import Mapping
 from typing import Any
 

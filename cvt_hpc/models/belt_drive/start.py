@@ -4,8 +4,6 @@ The length of the belt follows from its tension with the arms of tensioners as d
 the moments that hold them there; or, where these moments are given, the arms turn into equilibrium.
 """
 
-from __future__ import annotations
-
 from collections.abc import Callable, Mapping
 from typing import Any
 

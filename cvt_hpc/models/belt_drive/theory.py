@@ -1,7 +1,5 @@
 """Theory of a drive: speed loss, tension where the belt slides, frequencies of the strands."""
 
-from __future__ import annotations
-
 from collections.abc import Mapping
 from typing import Any
 

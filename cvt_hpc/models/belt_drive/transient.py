@@ -1,7 +1,5 @@
 """A transient run of the belt drive: it starts in motion from its static tension, is loaded, and recorded."""
 
-from __future__ import annotations
-
 from collections.abc import Mapping
 from typing import Any
 

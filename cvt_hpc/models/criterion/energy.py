@@ -1,7 +1,5 @@
 """A metre of flank that slides: its radial frequency and damping, and the energy that a cycle gains."""
 
-from __future__ import annotations
-
 from collections.abc import Mapping
 from typing import Any, NamedTuple
 

@@ -4,8 +4,6 @@ The defaults are assumptions: a metre of the driven wrap of the elastic belt at 
 long), on sheaves that tilt (3e5 N m/rad over arc times radius squared), which slides radially.
 """
 
-from __future__ import annotations
-
 from typing import Any
 
 from cvt_hpc.models import elastic_belt

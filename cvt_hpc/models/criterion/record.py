@@ -1,7 +1,5 @@
 """Result of the criterion: whether small motions are fed, their growth, and energy over amplitude."""
 
-from __future__ import annotations
-
 from collections.abc import Mapping
 from typing import Any, NamedTuple
 

@@ -10,8 +10,6 @@ travel. A pulse is exp(-(cos(2 pi s / P) + 1) / (2 pi width)^2), nearly a Gaussi
 upstream from within the string.
 """
 
-from __future__ import annotations
-
 from collections.abc import Mapping
 from typing import Any
 

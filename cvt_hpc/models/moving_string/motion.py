@@ -8,8 +8,6 @@ h the cell, of k (v +- c) of the string itself: dispersion alone, at rest -(k h)
 energy (u^2 + (c^2 - v^2) w_x^2) / 2 is kept by these equations as by the string's.
 """
 
-from __future__ import annotations
-
 from collections.abc import Mapping
 from typing import Any, NamedTuple
 

@@ -1,7 +1,5 @@
 """Parameters of the moving string that a job may set; the defaults are near those of a belt's strand."""
 
-from __future__ import annotations
-
 from typing import Any
 
 import numpy as np

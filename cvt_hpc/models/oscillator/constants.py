@@ -1,7 +1,5 @@
 """The constants of an oscillator, as its kernels take them."""
 
-from __future__ import annotations
-
 from collections.abc import Mapping
 from typing import Any, NamedTuple
 

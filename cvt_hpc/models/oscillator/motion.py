@@ -5,8 +5,6 @@ v_reg)), p(x) = x exp((1 - x^2) / 2): the hump p is 1 at x = 1, where the tanh i
 largest friction is mu_s whatever the width, and the law without smoothing is its limit.
 """
 
-from __future__ import annotations
-
 from collections.abc import Mapping
 from typing import Any
 

@@ -1,7 +1,5 @@
 """Parameters of the oscillator that a job may set. The defaults: stick-slip of unit mass and stiffness."""
 
-from __future__ import annotations
-
 from typing import Any
 
 from cvt_hpc.parameters import Parameter, not_negative, positive

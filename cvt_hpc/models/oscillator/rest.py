@@ -11,8 +11,6 @@ longer. Moreau's steps compare the two in their middle, so a mass that sticks ov
 if it is in the middle of the first step and of the last.
 """
 
-from __future__ import annotations
-
 from typing import NamedTuple
 
 import numpy as np

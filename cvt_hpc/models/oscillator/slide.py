@@ -5,8 +5,6 @@ swings at the rate s = -(c + (N mu)') / (2 m). A method whose damping is stronge
 decay, whatever the order, and a run by it is silent where the model vibrates.
 """
 
-from __future__ import annotations
-
 from collections.abc import Mapping
 from typing import Any
 

@@ -1,7 +1,5 @@
 """Steady sliding of the mass, and small motions about it."""
 
-from __future__ import annotations
-
 from typing import NamedTuple
 
 import numpy as np

@@ -1,7 +1,5 @@
 """A transient run of the oscillator."""
 
-from __future__ import annotations
-
 from collections.abc import Mapping
 from typing import Any
 

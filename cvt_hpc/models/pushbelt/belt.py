@@ -4,8 +4,6 @@ Arrays hold one row an element, in linked lanes (`cvt_hpc.lanes.rings`): the rin
 equal parts, one for each lane of a register.
 """
 
-from __future__ import annotations
-
 from typing import NamedTuple
 
 import numpy as np

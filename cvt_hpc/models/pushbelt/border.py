@@ -5,8 +5,6 @@ of its own. Unknowns are the changes of the driven pulley's speed, and of a_k of
 sheaves.
 """
 
-from __future__ import annotations
-
 from numba.extending import register_jitable
 
 from cvt_hpc.kernels import kernel

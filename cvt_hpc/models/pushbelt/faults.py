@@ -1,7 +1,5 @@
 """Which element a step that is not solved is at fault with, for belts of rigid elements in linked lanes."""
 
-from __future__ import annotations
-
 from cvt_hpc.kernels import kernel
 from cvt_hpc.models.pushbelt import fields as f
 

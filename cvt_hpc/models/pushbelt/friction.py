@@ -4,8 +4,6 @@ Forces are those of `physics.primal_dual`, for each newton of normal force. Thei
 friction from a dual, which the iterations carry on.
 """
 
-from __future__ import annotations
-
 from numba.extending import register_jitable
 
 from cvt_hpc.lanes import absolute, like, select, sqrt

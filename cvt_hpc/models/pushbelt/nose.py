@@ -7,8 +7,6 @@ to either side; beyond, the hole pushes back elastically and without friction.
 An offset grows by the speeds times (o_j, a, 0) of element i and (-o_j, b, 0) of j, a and b being levers.
 """
 
-from __future__ import annotations
-
 from numba.extending import register_jitable
 
 from cvt_hpc.kernels import kernel

@@ -5,8 +5,6 @@ and driving_speed are those of Geier and Schindler's measurements (2007, fig. 4)
 assumption, plausible and not measured.
 """
 
-from __future__ import annotations
-
 from collections.abc import Mapping
 from dataclasses import replace
 from typing import Any

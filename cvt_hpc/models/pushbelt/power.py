@@ -10,8 +10,6 @@ up. The difference is >= 0, as V is convex: c r^2 where a contact stays closed, 
 damps by that, and it is neither physics nor an error in the balance of power.
 """
 
-from __future__ import annotations
-
 import numpy as np
 
 from cvt_hpc.kernels import kernel

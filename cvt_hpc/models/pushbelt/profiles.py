@@ -3,8 +3,6 @@
 Between the times of a profile multiples are linear, before the first and after the last they are constant.
 """
 
-from __future__ import annotations
-
 from collections.abc import Mapping
 from typing import Any
 

@@ -1,7 +1,5 @@
 """What is read off the elements of a pushbelt at a sample: displacement, forces, losses and their places."""
 
-from __future__ import annotations
-
 from collections.abc import Mapping, Sequence
 from typing import Any
 

@@ -3,8 +3,6 @@
 It starts from geometry, is clamped and loaded, and recorded.
 """
 
-from __future__ import annotations
-
 from collections.abc import Callable, Mapping, Sequence
 from typing import Any
 

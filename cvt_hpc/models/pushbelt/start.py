@@ -1,7 +1,5 @@
 """Start of a pushbelt from the geometry of its path: constants, state and work space from given values."""
 
-from __future__ import annotations
-
 from collections.abc import Callable, Mapping, Sequence
 from typing import Any, NamedTuple
 

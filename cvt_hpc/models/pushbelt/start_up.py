@@ -4,8 +4,6 @@ A start-up is known by a key of all values that determine it. It stays in the me
 it would have to be trusted, to save each process a march of its own.
 """
 
-from __future__ import annotations
-
 from collections import OrderedDict
 from collections.abc import Mapping, Sequence
 from hashlib import sha256

@@ -5,8 +5,6 @@ dt X_{k+1/2} and all directions those at q_k: implicit Euler along the direction
 for slow motion.
 """
 
-from __future__ import annotations
-
 from functools import partial
 
 import numpy as np

@@ -4,8 +4,6 @@ A step finds the speeds at its end by Newton's method, for the elements and for 
 elements act on. A model gives its equations.
 """
 
-from __future__ import annotations
-
 from collections.abc import Callable
 from typing import NamedTuple
 

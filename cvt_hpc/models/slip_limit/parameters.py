@@ -1,7 +1,5 @@
 """Parameters of the limit of slip that a job may set: the steady belt's parameters, and the question."""
 
-from __future__ import annotations
-
 from typing import Any
 
 from cvt_hpc.models import steady_variator

@@ -4,8 +4,6 @@ Every law between two elements is a magnitude along a direction of 16 numbers, s
 element with the one behind is the transpose of that one's with it.
 """
 
-from __future__ import annotations
-
 import numpy as np
 from numba.extending import register_jitable
 

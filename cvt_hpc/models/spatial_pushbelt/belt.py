@@ -8,8 +8,6 @@ driven one at y = centre_distance, and the third coordinate is axial. Right is t
 coordinate, left the other. Vectors take three fields in that order.
 """
 
-from __future__ import annotations
-
 from typing import NamedTuple
 
 import numpy as np

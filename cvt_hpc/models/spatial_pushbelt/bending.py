@@ -6,8 +6,6 @@ any stiffness and damps nothing, and the frequency f of a mode errs by -(2 pi f 
 does the spring that turns an element with the ring's slope.
 """
 
-from __future__ import annotations
-
 from numba.extending import register_jitable
 
 from cvt_hpc.kernels import kernel

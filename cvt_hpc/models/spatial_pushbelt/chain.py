@@ -8,8 +8,6 @@ at an element, from the one behind to the one ahead, e that up to the next eleme
 through both.
 """
 
-from __future__ import annotations
-
 import numpy as np
 from numba.extending import register_jitable
 

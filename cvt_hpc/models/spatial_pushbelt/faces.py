@@ -4,8 +4,6 @@ A point P of the front, at height h and half width b, has the gap g = (r_j - P) 
 plane. It grows by the speeds times (-x_j, x_j x (P - r_i)) of element i and (x_j, (P - r_j) x x_j) of j.
 """
 
-from __future__ import annotations
-
 from numba.extending import register_jitable
 
 from cvt_hpc.kernels import kernel

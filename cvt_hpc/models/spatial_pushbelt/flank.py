@@ -12,8 +12,6 @@ of Q at mid step: at either end of a step they would add false sliding of v phi'
 omega^2 dt / 2.
 """
 
-from __future__ import annotations
-
 from numba.extending import register_jitable
 
 from cvt_hpc.kernels import kernel

@@ -4,8 +4,6 @@ Schindler's paper gives no number but "approximately 400 elements" and "nine to 
 is an assumption, plausible and not measured; those of the planar pushbelt keep its own.
 """
 
-from __future__ import annotations
-
 from collections.abc import Mapping
 from dataclasses import replace
 from typing import Any

@@ -9,8 +9,6 @@ direction. This is the contact of a circle with the ellipse in which its plane c
 2008, eq. 25), but for the clearance times 1 - cos of the tilt between both: a nanometre at 3 mrad.
 """
 
-from __future__ import annotations
-
 from numba.extending import register_jitable
 
 from cvt_hpc.kernels import kernel

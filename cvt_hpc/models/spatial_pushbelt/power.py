@@ -4,8 +4,6 @@ As in the planar pushbelt (`models.pushbelt.power`, which derives it) a force ta
 mean rate (X + X_old) / 2 along its direction. Bending of the rings and the yaw spring damp nothing.
 """
 
-from __future__ import annotations
-
 import numpy as np
 
 from cvt_hpc.kernels import kernel

@@ -4,8 +4,6 @@ The slip sigma = v - mean over both lines of t . p' grows by the speeds times (-
 ring and element are free of each other but for friction, across it the ring goes with the element.
 """
 
-from __future__ import annotations
-
 from numba.extending import register_jitable
 
 from cvt_hpc.kernels import kernel

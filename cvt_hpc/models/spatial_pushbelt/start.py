@@ -1,7 +1,5 @@
 """Start of a spatial pushbelt from the geometry of its path: constants and state from given values."""
 
-from __future__ import annotations
-
 from collections.abc import Mapping
 from typing import Any
 

@@ -5,8 +5,6 @@ X_{k+1/2} and all directions those at q_k: implicit Euler along the direction of
 for what is slow. Lateral bending of the rings has a law of its own that damps nothing (`bending`).
 """
 
-from __future__ import annotations
-
 from functools import partial
 
 import numpy as np

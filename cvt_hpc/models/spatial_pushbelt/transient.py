@@ -1,7 +1,5 @@
 """A transient run of the spatial pushbelt: it starts from geometry, is clamped and loaded, and recorded."""
 
-from __future__ import annotations
-
 from collections.abc import Mapping
 from functools import partial
 from typing import Any

@@ -8,8 +8,6 @@ same form: a magnitude along half the difference of the directions of both packa
 The linear system of the eight unknowns of one flow is assembled as for one flow, and then widened.
 """
 
-from __future__ import annotations
-
 from numba.extending import register_jitable
 
 from cvt_hpc.kernels import kernel

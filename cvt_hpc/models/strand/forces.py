@@ -14,8 +14,6 @@ Sheaves that bend let the belt slide radially, which adds force to both strands:
 (`lebrecht_2004.toml`, no fall of friction to speak of) these forces are lower by 0.9-1.3 kN of 5-11 kN.
 """
 
-from __future__ import annotations
-
 from collections.abc import Mapping
 from typing import Any
 

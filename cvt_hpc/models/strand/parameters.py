@@ -1,7 +1,5 @@
 """Parameters of the strands: quantities of the elastic belt, and the source of their forces."""
 
-from __future__ import annotations
-
 from typing import Any
 
 from cvt_hpc.models import elastic_belt

@@ -1,7 +1,5 @@
 """Variables of the strands in the record of a run: eigenfrequencies, critical speed, and their force."""
 
-from __future__ import annotations
-
 from collections.abc import Mapping
 from typing import Any, NamedTuple
 

@@ -1,7 +1,5 @@
 """The Ritz model of a running strand, in sines: its matrices, eigenfrequencies and critical speed."""
 
-from __future__ import annotations
-
 from typing import NamedTuple
 
 import numpy as np

@@ -6,8 +6,6 @@ is drawn anew in each repeat: the predicted cost times a factor, whose logarithm
 out: ranks of one node share its memory and its clock rate, and files are written.
 """
 
-from __future__ import annotations
-
 import math
 from collections.abc import Sequence
 from heapq import heapreplace

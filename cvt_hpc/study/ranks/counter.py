@@ -1,7 +1,5 @@
 """Data that ranks share while they compute: the next batch to claim, and the number of finished runs."""
 
-from __future__ import annotations
-
 from typing import NamedTuple, Self
 
 INTERRUPTED = 2**40  # claims count from here when all are interrupted: beyond every plan

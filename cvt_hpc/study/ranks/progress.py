@@ -1,7 +1,5 @@
 """How far a sweep, chart or diagram is: a bar on a terminal, plain lines where the output goes to a file."""
 
-from __future__ import annotations
-
 import math
 import sys
 import time

@@ -1,7 +1,5 @@
 """Distribution of runs: all ranks compute, and each claims its next batch from one counter."""
 
-from __future__ import annotations
-
 from collections.abc import Callable, Iterator, Sequence
 
 from cvt_hpc.study.batches import Assignment, Batch

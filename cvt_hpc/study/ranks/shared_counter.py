@@ -5,8 +5,6 @@ claim waits until rank 0 enters the MPI library; a thread on rank 0 enters it ev
 kernels, which release the interpreter lock, compute.
 """
 
-from __future__ import annotations
-
 import threading
 from contextlib import suppress
 

@@ -1,7 +1,5 @@
 """Early end of a sweep: by a signal, the time limit, or another rank that stops."""
 
-from __future__ import annotations
-
 import signal
 import time
 from collections.abc import Callable

@@ -3,8 +3,6 @@
 Elsewhere the launcher ends all ranks when one dies, and the same command continues later.
 """
 
-from __future__ import annotations
-
 import logging
 from collections.abc import Callable
 from typing import TypeVar

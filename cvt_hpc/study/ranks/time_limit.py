@@ -1,7 +1,5 @@
 """The time of a sweep: as requested, or the rest of the Slurm job that it runs in."""
 
-from __future__ import annotations
-
 import logging
 import math
 import os

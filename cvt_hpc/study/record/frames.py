@@ -6,8 +6,6 @@ and the record's type, so a frame is known to belong to its study even where the
 can take up again at the next frame after a damaged stretch.
 """
 
-from __future__ import annotations
-
 import json
 import os
 import re

@@ -1,7 +1,5 @@
 """Which record of each run counts and where it lies; the records themselves are read when they are needed."""
 
-from __future__ import annotations
-
 import os
 from collections.abc import Sequence
 from dataclasses import dataclass, field
