@@ -1,22 +1,17 @@
 """The results of a branch in words: its Hopf points, and loads without a steady state."""
 
-from __future__ import annotations
-
 from collections.abc import Iterator
-from typing import TYPE_CHECKING
 
 import numpy as np
 
 from cvt_hpc.bifurcation.attractors import FROM, Attractor
+from cvt_hpc.bifurcation.followed import Followed
 from cvt_hpc.bifurcation.job import Asked, Diagram, load_attributes
 from cvt_hpc.errors import few_of
 from cvt_hpc.job.shown import number_within, shown_number, shown_unit
 from cvt_hpc.models.linear_stability.branch import CLOSE, Onset
 from cvt_hpc.vibration.classes import OccurrenceClass
 from cvt_hpc.vibration.criticality import Criticality, Kind
-
-if TYPE_CHECKING:
-    from cvt_hpc.bifurcation.followed import Followed
 
 NAMED = ("friction_gradient", "sheave_stiffness")  # of every branch, axis or not
 MOST_NAMED = 12  # loads in a row

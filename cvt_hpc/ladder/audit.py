@@ -1,16 +1,15 @@
 """How often a cheap model errs: a sample of the runs that it answered, repeated in full."""
 
-from __future__ import annotations
-
 import math
 from collections.abc import Sequence
 from pathlib import Path
-from typing import TYPE_CHECKING, NamedTuple
+from typing import NamedTuple
 
 import numpy as np
 
 from cvt_hpc.errors import mismatch
 from cvt_hpc.files import write_rows
+from cvt_hpc.job import Job
 from cvt_hpc.job.for_model import handed_to
 from cvt_hpc.job.shown import heading, shown_number
 from cvt_hpc.models.auto.rules import Rung
@@ -22,9 +21,6 @@ from cvt_hpc.study.simulator import default_simulator
 from cvt_hpc.study.status import expected_cost
 from cvt_hpc.variables import Status
 from cvt_hpc.vibration.classes import DECIDED, OccurrenceClass, classify_runs
-
-if TYPE_CHECKING:
-    from cvt_hpc.job import Job
 
 TABLE = "audit.csv"  # in the folder of the audit
 LOWER = (Rung.PASSIVE, Rung.COARSE)

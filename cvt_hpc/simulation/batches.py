@@ -1,22 +1,18 @@
 """Groups of runs that can advance together, and their cost."""
 
-from __future__ import annotations
-
 from collections.abc import Callable, Iterable, Iterator, Mapping, Sequence
 from functools import partial
 from itertools import pairwise
-from typing import TYPE_CHECKING, Any, TypeVar
+from typing import Any, TypeVar
 
 import numpy as np
 
+from cvt_hpc.job import Job
+from cvt_hpc.job.definition import Derived
 from cvt_hpc.job.rules import Noted, places, varied_by
 from cvt_hpc.models.contract import Model, Parameters, load_model
 from cvt_hpc.recording import longest_duration
 from cvt_hpc.simulation.record import recorded_model
-
-if TYPE_CHECKING:
-    from cvt_hpc.job import Job
-    from cvt_hpc.job.definition import Derived
 
 LEFT_SHARE = 1.0  # extra cost of refined and prolonged runs in a map, as measured by lebrecht_2004.toml
 _MOST_ESTIMATED = 2_000  # runs whose costs are averaged

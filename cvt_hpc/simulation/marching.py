@@ -1,17 +1,13 @@
 """Batches marched to their ends, and runs marched together until each has its record."""
 
-from __future__ import annotations
-
 import time
 from collections.abc import Callable, Collection, Sequence
-from typing import TYPE_CHECKING, Any
+from typing import Any
 
+from cvt_hpc.job import Job
 from cvt_hpc.models.contract import Batch, load_model
 from cvt_hpc.simulation.batches import in_lanes
 from cvt_hpc.simulation.open_run import OpenRun
-
-if TYPE_CHECKING:
-    from cvt_hpc.job import Job
 
 _BETWEEN_POLLS = 0.05  # [s] of computing between checks whether to stop
 

@@ -6,19 +6,15 @@ as that is within `longest_duration`. A model that may answer by less than the f
 its record module (`contract.py`), and its answers of this kind are neither refined nor prolonged.
 """
 
-from __future__ import annotations
-
 import math
-from typing import TYPE_CHECKING, Any
+from typing import Any
 
+from cvt_hpc.job import Job
 from cvt_hpc.models.contract import load_model
 from cvt_hpc.recording import longest_duration, sample_count
 from cvt_hpc.simulation.record import record_of, record_without_run
 from cvt_hpc.variables import LONGEST_REASON, Status, Vibrates, shortened
 from cvt_hpc.vibration.ramped import ramped
-
-if TYPE_CHECKING:
-    from cvt_hpc.job import Job
 
 _COST = ("core_seconds", "steps", "contact_solves")  # of a record: sums over all tries
 

@@ -1,18 +1,14 @@
 """The record of a run: its content, and how it is made of a run that has ended."""
 
-from __future__ import annotations
-
 import time
 from collections.abc import Callable
-from typing import TYPE_CHECKING, Any
+from typing import Any
 
 import numpy as np
 
+from cvt_hpc.job import Job
 from cvt_hpc.models.contract import Model, Run, load_model
 from cvt_hpc.variables import LONGEST_REASON, Coordinate, Status, Variable, Vibrates, shortened
-
-if TYPE_CHECKING:
-    from cvt_hpc.job import Job
 
 _VERDICT = (
     Variable("status", "", "how the run ended", dtype="i1", flags=Status),

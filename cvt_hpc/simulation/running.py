@@ -1,17 +1,13 @@
 """Runs from their start to their records."""
 
-from __future__ import annotations
-
 import time
 from collections.abc import Callable, Collection, Sequence
-from typing import TYPE_CHECKING, Any
+from typing import Any
 
+from cvt_hpc.job import Job
 from cvt_hpc.models.contract import Model
 from cvt_hpc.simulation.marching import Interrupted, march_runs
 from cvt_hpc.simulation.record import record_of_solution, recorded_model
-
-if TYPE_CHECKING:
-    from cvt_hpc.job import Job
 
 
 def run_point(job: Job, point: dict[str, Any], interrupt: Callable[[], str | None]) -> dict[str, Any]:

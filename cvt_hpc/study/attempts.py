@@ -7,26 +7,22 @@ done alone, and where the process dies even then, by one rank alone, at the very
 of these deaths the run is given up.
 """
 
-from __future__ import annotations
-
 from collections.abc import Collection, Iterable, Mapping
 from functools import partial
-from typing import TYPE_CHECKING, Any
+from typing import Any
 
 import numpy as np
 
+from cvt_hpc.job import Job
 from cvt_hpc.study.batches import Assignment, share_out
 from cvt_hpc.study.description import Study
 from cvt_hpc.study.folder import StudyFolder
 from cvt_hpc.study.record.frames import RecordFormat
 from cvt_hpc.study.record.index import Records
 from cvt_hpc.study.record.log import RecordLog
+from cvt_hpc.study.simulator import Simulator
 from cvt_hpc.study.time_steps import asked_step
 from cvt_hpc.variables import Status
-
-if TYPE_CHECKING:
-    from cvt_hpc.job import Job
-    from cvt_hpc.study.simulator import Simulator
 
 DEATHS = 3  # at a run, until it is done alone
 DEATHS_ALONE = 2  # while it was done alone, until it is given up

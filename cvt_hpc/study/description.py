@@ -7,19 +7,16 @@ from collections.abc import Collection, Iterable, Mapping, Sequence
 from dataclasses import asdict, dataclass
 from enum import IntEnum
 from functools import cached_property
-from typing import TYPE_CHECKING, Any
+from typing import Any
 
 import numpy as np
 
 from cvt_hpc.errors import InputError
+from cvt_hpc.job import Job
 from cvt_hpc.job.shown import shown
 from cvt_hpc.study.dimensions import DerivedCoordinate, Dimension, axis_dimension, derived_coordinate
 from cvt_hpc.study.simulator import Simulator
 from cvt_hpc.variables import Status, Variable
-
-if TYPE_CHECKING:
-    from cvt_hpc.job import Job
-
 
 MOST_DERIVED = 200_000  # values of a parameter that follows from axes: these take some seconds
 

@@ -1,20 +1,16 @@
 """The coordinates of a dataset: axes, parameters that follow from them, and extra ones of the record."""
 
-from __future__ import annotations
-
 import math
 from collections.abc import Mapping
 from dataclasses import asdict, dataclass
-from typing import TYPE_CHECKING, Any, Self
+from typing import Any, Self
 
 import numpy as np
 
+from cvt_hpc.job import Axis, Job
+from cvt_hpc.job.definition import Derived
 from cvt_hpc.job.shown import JOB_UNITS
 from cvt_hpc.netcdf import attributes
-
-if TYPE_CHECKING:
-    from cvt_hpc.job import Axis, Job
-    from cvt_hpc.job.definition import Derived
 
 
 @dataclass(frozen=True)

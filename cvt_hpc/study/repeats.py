@@ -4,13 +4,11 @@ The sample is drawn by the runs' indices: a continued study, or a larger share, 
 with the same sample. Its runs are a study of their own, in a folder of that of the first one.
 """
 
-from __future__ import annotations
-
 from collections.abc import Callable, Mapping
 from dataclasses import dataclass
 from functools import cached_property
 from pathlib import Path
-from typing import TYPE_CHECKING, Any
+from typing import Any
 
 import numpy as np
 from numpy.typing import NDArray
@@ -18,16 +16,13 @@ from scipy.special import betaincinv
 
 from cvt_hpc.errors import mismatch, show
 from cvt_hpc.files import refuse_link
-from cvt_hpc.job import rebuild_job
+from cvt_hpc.job import Job, rebuild_job
 from cvt_hpc.study.description import Study, describe
 from cvt_hpc.study.folder import StudyFolder
 from cvt_hpc.study.record.index import Records
 from cvt_hpc.study.report import RunReport
 from cvt_hpc.study.simulator import default_simulator
 from cvt_hpc.study.sweep import check_start, run
-
-if TYPE_CHECKING:
-    from cvt_hpc.job import Job
 
 CONFIDENCE = 0.95
 AUDIT = "audit"  # folder of the runs of an audit, in that of the study

@@ -1,17 +1,14 @@
 """How far a study is, read from its folder alone; works while a sweep is running and after."""
 
-from __future__ import annotations
-
 import time
 from dataclasses import dataclass
 from itertools import pairwise
 from pathlib import Path
-from typing import TYPE_CHECKING
 
 import numpy as np
 
 from cvt_hpc.errors import InputError
-from cvt_hpc.job import rebuild_job
+from cvt_hpc.job import Job, rebuild_job
 from cvt_hpc.study.description import Study
 from cvt_hpc.study.folder import StudyFolder
 from cvt_hpc.study.record.index import Records
@@ -19,9 +16,6 @@ from cvt_hpc.study.report import count_special
 from cvt_hpc.study.simulator import default_simulator
 from cvt_hpc.study.tracing import needed_runs
 from cvt_hpc.variables import Status, Vibrates
-
-if TYPE_CHECKING:
-    from cvt_hpc.job import Job
 
 
 @dataclass(frozen=True)

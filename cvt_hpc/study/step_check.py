@@ -5,17 +5,16 @@ its full transient are both at half the step, so that an error shows that both h
 step it is done in full.
 """
 
-from __future__ import annotations
-
 from collections.abc import Iterable, Mapping
 from importlib import import_module
 from pathlib import Path
-from typing import TYPE_CHECKING, Any
+from typing import Any
 
 import numpy as np
 from numpy.typing import NDArray
 
 from cvt_hpc.errors import mismatch
+from cvt_hpc.job import Job
 from cvt_hpc.job.derivation import overridden
 from cvt_hpc.job.for_model import handed_to
 from cvt_hpc.models.auto.rules import COARSENESS, Rung
@@ -25,9 +24,6 @@ from cvt_hpc.study.repeats import AUDITED, FULL_MODEL, Repeat, built
 from cvt_hpc.study.status import expected_cost
 from cvt_hpc.study.time_steps import STEP, stepper_in_words
 from cvt_hpc.variables import Status
-
-if TYPE_CHECKING:
-    from cvt_hpc.job import Job
 
 FLAG = "--check-step"
 EXPLICIT = "explicit"

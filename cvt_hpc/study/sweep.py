@@ -1,7 +1,5 @@
 """All runs of a job, on all ranks: compute the plan, record, gather."""
 
-from __future__ import annotations
-
 import logging
 import math
 import time
@@ -10,12 +8,13 @@ from contextlib import ExitStack, closing
 from dataclasses import replace
 from functools import partial
 from pathlib import Path
-from typing import TYPE_CHECKING, Any
+from typing import Any
 
 import numpy as np
 
 from cvt_hpc.errors import mismatch
 from cvt_hpc.files import StorageError, open_missing_streams
+from cvt_hpc.job import Job
 from cvt_hpc.linear_algebra import one_thread
 from cvt_hpc.locks import BusyError
 from cvt_hpc.netcdf import library_for_sweep
@@ -42,9 +41,6 @@ from cvt_hpc.study.simulator import Simulator, default_simulator
 from cvt_hpc.study.task import Task
 from cvt_hpc.study.time_steps import check_refinement
 from cvt_hpc.variables import Status
-
-if TYPE_CHECKING:
-    from cvt_hpc.job import Job
 
 _logger = logging.getLogger(__name__)
 

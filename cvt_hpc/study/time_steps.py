@@ -1,19 +1,15 @@
 """Runs at another time step than that of their job: failed ones at a shorter one, and checks of others."""
 
-from __future__ import annotations
-
 from collections.abc import Collection, Mapping
-from typing import TYPE_CHECKING, Any
+from typing import Any
 
 import numpy as np
 from numpy.typing import NDArray
 
 from cvt_hpc.errors import mismatch, show
+from cvt_hpc.job import Job
+from cvt_hpc.study.record.index import Records
 from cvt_hpc.variables import Status
-
-if TYPE_CHECKING:
-    from cvt_hpc.job import Job
-    from cvt_hpc.study.record.index import Records
 
 STEP = "step"  # the key of the time step, of steppers that have a fixed one
 MOST_REFINED = 1000.0

@@ -1,20 +1,16 @@
 """Memory and disk that a sweep needs, and the refusal of sweeps that need too much."""
 
-from __future__ import annotations
-
 import math
 import os
 import shutil
 from pathlib import Path
-from typing import TYPE_CHECKING, NamedTuple
+from typing import NamedTuple
 
 from cvt_hpc.errors import mismatch
+from cvt_hpc.job import Job
 from cvt_hpc.study.description import record_layout, record_type
 from cvt_hpc.study.record.frames import HEAD, PLACE
 from cvt_hpc.study.simulator import Simulator
-
-if TYPE_CHECKING:
-    from cvt_hpc.job import Job
 
 # [byte] of rank 0 for each run, for the plan and the index of the records: 207 were measured with 10^6 runs
 # on one rank, and about as much again is assumed for sending the plan.

@@ -1,14 +1,13 @@
 """Known times of a job before its sweep: by records, by a few short batches, or by prediction."""
 
-from __future__ import annotations
-
 import math
 from collections.abc import Sequence
 from dataclasses import replace
 from functools import partial
 from pathlib import Path
-from typing import TYPE_CHECKING, NamedTuple
+from typing import NamedTuple
 
+from cvt_hpc.job import Job
 from cvt_hpc.study.attempts import predicted_costs
 from cvt_hpc.study.batches import Batch, in_parts
 from cvt_hpc.study.description import describe
@@ -17,9 +16,6 @@ from cvt_hpc.study.simulator import Simulator
 from cvt_hpc.study.status import find_records
 from cvt_hpc.study.task import Task
 from cvt_hpc.study.time_steps import refined_steps
-
-if TYPE_CHECKING:
-    from cvt_hpc.job import Job
 
 
 class Knowledge(NamedTuple):

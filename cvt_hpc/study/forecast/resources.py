@@ -1,13 +1,12 @@
 """Resources to request on a cluster: time limit and space on the disk."""
 
-from __future__ import annotations
-
 import math
 from collections.abc import Sequence
 from functools import partial
 from pathlib import Path
-from typing import TYPE_CHECKING, NamedTuple
+from typing import NamedTuple
 
+from cvt_hpc.job import Job
 from cvt_hpc.study.description import Study, describe
 from cvt_hpc.study.forecast.needs import Disk, most_of_results
 from cvt_hpc.study.forecast.pilots import find_out
@@ -15,9 +14,6 @@ from cvt_hpc.study.forecast.simulate import Forecast, forecast
 from cvt_hpc.study.ranks.time_limit import gathering_margin
 from cvt_hpc.study.record.frames import HEAD, PLACE, RecordFormat
 from cvt_hpc.study.simulator import default_simulator
-
-if TYPE_CHECKING:
-    from cvt_hpc.job import Job
 
 _START_UP = 60.0  # [s] for MPI, Python and kernels; assumed, with room for slow file systems
 _STEP = 300.0  # [s] to which a time limit is rounded up
