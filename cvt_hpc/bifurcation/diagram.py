@@ -1,29 +1,45 @@
-"""A bifurcation diagram made: branches followed, Hopf points found and classified, kept, written, drawn."""
+"""A bifurcation diagram made: branches followed, Hopf points found and classified, kept, written, drawn.
 
-from collections.abc import Callable, Mapping
+The dataset of a bifurcation diagram: branches over the grid of axes, Hopf points and runs in lists.
+"""
+
+from collections.abc import Callable, Mapping, Sequence
 from contextlib import closing
 from dataclasses import dataclass
+from enum import IntEnum
 from functools import partial
 from pathlib import Path
+from typing import Any
 
 import numpy as np
+import xarray as xr
 
 from cvt_hpc.bifurcation.attractors import Attractor, Start, attractors
 from cvt_hpc.bifurcation.costs import predicted_cost
-from cvt_hpc.bifurcation.dataset import diagram_dataset
 from cvt_hpc.bifurcation.drawing import draw_branch
 from cvt_hpc.bifurcation.folder import DiagramFolder, picture_names
-from cvt_hpc.bifurcation.followed import Followed, states_of
-from cvt_hpc.bifurcation.job import Asked, Diagram
+from cvt_hpc.bifurcation.followed import OF_MODES, STRAND, Followed, Stability, states_of
+from cvt_hpc.bifurcation.job import LOAD, Asked, Diagram, load_attributes
 from cvt_hpc.bifurcation.kinds import lowest_judged, with_kinds
 from cvt_hpc.files import written_aside
 from cvt_hpc.linear_algebra import one_thread
 from cvt_hpc.models.elastic_belt.belt import State, mesh
 from cvt_hpc.models.linear_stability.branch import Branch, branch, onsets
 from cvt_hpc.models.linear_stability.modes import LOW
+from cvt_hpc.models.steady_variator.record import VARIABLES, coordinates
 from cvt_hpc.models.steady_variator.walking import NoSteadyState, SteadyBelt
-from cvt_hpc.netcdf import write_netcdf
+from cvt_hpc.netcdf import CONTENT, DIAGRAM, attributes, flag_attributes, global_attributes, write_netcdf
+from cvt_hpc.study.dimensions import axis_dimension, derived_coordinate
 from cvt_hpc.study.ranks.progress import Steps
+from cvt_hpc.vibration.classes import OccurrenceClass
+from cvt_hpc.vibration.criticality import Kind
+
+_Numbered = Sequence[tuple[int, Followed]]
+
+BRANCH = "number of the branch in the grid of the axes, counted in C order"
+OF_KIND = "why the Hopf point is found to be of its kind"
+START = "0: near the steady state; 1: the large disturbance"
+REASON = "why the run failed, or was found to vibrate or not"
 
 
 @dataclass(frozen=True)
@@ -138,3 +154,133 @@ def _beside_gap(found: Branch, load: float) -> bool:
     at = np.searchsorted(loads, load)
     beside = loads[at : at + 1] if load in loads else loads[max(at - 1, 0) : at + 1]
     return any(float(one) in found.missed for one in beside)
+
+
+class Direction(IntEnum):
+    """Where the mode of a Hopf point grows."""
+
+    GROWS_ABOVE = 0
+    GROWS_BELOW = 1
+
+
+def diagram_dataset(
+    diagram: Diagram, followed: Mapping[int, Followed], makers: Sequence[Mapping[str, Any]] = ()
+) -> xr.Dataset:
+    """All branches in one dataset.
+
+    Parameters
+    ----------
+    diagram : Diagram
+        The requested diagram.
+    followed : mapping
+        Branches by their place in `diagram.branches`: all, or the finished ones.
+    makers : sequence of mapping
+        Origin of the results, as `global_attributes` takes it.
+
+    Returns
+    -------
+    Dataset
+        Over the axes and `load` the steady states; with `mode` the modes, each followed from one load to
+        the next; along `onset` the Hopf points and along `run` the runs, with the number of their branch in
+        the grid of the axes, counted in C order.
+    """
+    axes: dict[str, Any] = {
+        axis.name: (axis.name, list(axis.values), axis_dimension(axis, diagram.job).attributes)
+        for axis in diagram.axes
+    }
+    lengths = {axis.name: len(axis.values) for axis in diagram.axes}
+    for derived in diagram.job.derived:  # none of them along the load
+        values = np.array(derived.values).reshape([lengths[name] for name in derived.axes])
+        axes[derived.name] = derived.axes, values, derived_coordinate(derived, diagram.job).attributes
+    axes["load"] = ("load", list(diagram.loads), load_attributes(diagram.job))
+    labels = {
+        name: (name, c.values.astype(object), attributes(c.long_name, c.units, c.comment))
+        for name, c in coordinates(diagram.job.parameters).items()
+    }
+    subject = f"bifurcations of model {diagram.job.model}"
+    told = {**global_attributes(diagram.job, diagram.resolved(), subject, makers=makers), CONTENT: DIAGRAM}
+    rows = sorted(followed.items())
+    variables = _states(diagram, rows) | _onsets(rows) | _runs(rows)
+    return xr.Dataset(variables, axes | labels, told)
+
+
+def _states(diagram: Diagram, followed: _Numbered) -> dict[str, Any]:
+    """Steady states and modes over axes and load, and whether the states are stable."""
+    axes = [(len(axis.values), axis.name) for axis in diagram.axes] + [(len(diagram.loads), "load")]
+    grid, dims = zip(*axes, strict=True)
+    states = [(number, one.states) for number, one in followed]
+
+    def over(name: str, shape: tuple[int, ...], blank: Any) -> np.ndarray:
+        array = np.full((len(diagram.branches), len(diagram.loads), *shape), blank)
+        for number, values in states:
+            if name in values:
+                array[number][tuple(map(slice, values[name].shape))] = values[name]
+        return array.reshape(*grid, *shape)
+
+    flags = attributes("stability", comment="of the steady state") | flag_attributes(Stability)
+    told: dict[str, Any] = {
+        "stability": (dims, over("stability", (), np.int8(Stability.NOT_COMPUTED)), flags)
+    }
+    sizes = {name: c.values.size for name, c in coordinates(diagram.job.parameters).items()}
+    for v in VARIABLES:
+        array = over(v.name, tuple(sizes[dim] for dim in v.dims), np.nan)
+        told[v.name] = (*dims, *v.dims), array, attributes(v.long_name, v.units, v.comment)
+    most = max((values["growth_rate"].shape[1] for _, values in states), default=0)
+    for name, (_, *named) in OF_MODES.items():
+        told[name] = (*dims, "mode"), over(name, (most,), np.nan), attributes(*named)
+    return told
+
+
+def _onsets(followed: _Numbered) -> dict[str, Any]:
+    """The Hopf points of all branches, one after the other."""
+    rows = [
+        (number, onset, kind)
+        for number, one in followed
+        for onset, kind in zip(one.onsets, one.kinds, strict=True)
+    ]
+    sides = [Direction.GROWS_ABOVE if o.rising else Direction.GROWS_BELOW for _, o, _ in rows]
+    columns: dict[str, tuple[list[Any], Any, str, str, str]] = {
+        "onset_branch": ([n for n, *_ in rows], np.int32, "1", "branch", BRANCH),
+        "onset_load": ([o.load for _, o, _ in rows], float, "N m", "onset load", "load at the Hopf point"),
+        "onset_frequency": ([o.frequency for _, o, _ in rows], float, "Hz", "onset frequency",
+                            "frequency of the mode whose growth rate is 0 at the Hopf point"),
+        "onset_strand": ([o.strand + 1 for _, o, _ in rows], np.int8, "1", "vibrating strand", STRAND),
+        "onset_half_waves": ([o.half_waves for _, o, _ in rows], np.int8, "1", "half waves",
+                             "of the mode along its vibrating strand"),
+        "onset_others": ([o.others for _, o, _ in rows], np.int8, "1", "other growing modes",
+                         "number of them; 0: stability is lost or regained at this Hopf point"),
+        "hysteresis_width": ([k.width for *_, k in rows], float, "N m", "hysteresis width",
+                             "from the Hopf point to where vibration from the large start ends"),
+        "hysteresis_error": ([k.error for *_, k in rows], float, "N m", "error of the hysteresis width",
+                             "half the spacing of runs there, and the Hopf point's own error"),
+        "onset_direction": (sides, Direction, "", "side of growth",
+                            "whether the mode grows above or below the Hopf point"),
+        "onset_kind": ([k.kind for *_, k in rows], Kind, "", "kind of Hopf point", ""),
+        "onset_reason": ([k.reason for *_, k in rows], object, "", "reason", OF_KIND),
+    }  # fmt: skip
+    return {name: ("onset", *_column(*column)) for name, column in columns.items()}
+
+
+def _runs(followed: _Numbered) -> dict[str, Any]:
+    """The runs of all branches, one after the other."""
+    rows = [(number, run) for number, one in followed for run in one.runs]
+    columns: dict[str, tuple[list[Any], Any, str, str, str]] = {
+        "run_branch": ([n for n, _ in rows], np.int32, "1", "branch", BRANCH),
+        "run_load": ([run.value for _, run in rows], float, "N m", "load", LOAD),
+        "run_start": ([run.start for _, run in rows], np.int8, "1", "start", START),
+        "run_amplitude": ([run.amplitude for _, run in rows], float, "m", "amplitude", "in the band"),
+        "run_frequency": ([run.frequency for _, run in rows], float, "Hz", "dominant frequency", ""),
+        "run_occurrence": ([run.occurrence for _, run in rows], OccurrenceClass, "", "vibration occurrence",
+                           ""),
+        "run_reason": ([run.reason for _, run in rows], object, "", "reason", REASON),
+    }  # fmt: skip
+    return {name: ("run", *_column(*column)) for name, column in columns.items()}
+
+
+def _column(
+    values: list[Any], kind: Any, units: str, long_name: str, comment: str
+) -> tuple[np.ndarray, dict[str, Any]]:
+    """Return values, and attributes, of a type of numpy or of flags."""
+    is_flag = isinstance(kind, type) and issubclass(kind, IntEnum)
+    flags = flag_attributes(kind) if is_flag else {}
+    return np.array(values, np.int8 if is_flag else kind), attributes(long_name, units, comment) | flags

@@ -7,7 +7,7 @@ import pytest
 import xarray as xr
 
 from cvt_hpc.bifurcation.attractors import Attractor, Start, attractors
-from cvt_hpc.bifurcation.dataset import Direction
+from cvt_hpc.bifurcation.diagram import Direction
 from cvt_hpc.bifurcation.folder import DiagramFolder
 from cvt_hpc.bifurcation.followed import Stability
 from cvt_hpc.bifurcation.job import load_diagram
