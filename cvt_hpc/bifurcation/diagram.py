@@ -29,7 +29,7 @@ from cvt_hpc.models.linear_stability.modes import LOW
 from cvt_hpc.models.steady_variator.record import VARIABLES, coordinates
 from cvt_hpc.models.steady_variator.walking import NoSteadyState, SteadyBelt
 from cvt_hpc.netcdf import CONTENT, DIAGRAM, attributes, flag_attributes, global_attributes, write_netcdf
-from cvt_hpc.study.dimensions import axis_dimension, derived_coordinate
+from cvt_hpc.study.description import axis_dimension, derived_coordinate
 from cvt_hpc.study.ranks.progress import Steps
 from cvt_hpc.vibration.classes import OccurrenceClass
 from cvt_hpc.vibration.criticality import Kind

@@ -10,10 +10,9 @@ from cvt_hpc.job import Job, build_job, rebuild_job
 from cvt_hpc.job.assignments import Assignments, split_assignments
 from cvt_hpc.job.axes import Axis
 from cvt_hpc.job.definition import digest
-from cvt_hpc.job.document import read_document
+from cvt_hpc.job.document import read_document, read_set, read_table
 from cvt_hpc.job.rules import varied_by
 from cvt_hpc.job.shown import JOB_UNITS
-from cvt_hpc.job.tables import read_set, read_table
 from cvt_hpc.netcdf import attributes
 from cvt_hpc.parameters import Parameter, positive
 

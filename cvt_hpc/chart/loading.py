@@ -9,8 +9,7 @@ from cvt_hpc.chart.scenes import read_stage
 from cvt_hpc.errors import InputError, mismatch
 from cvt_hpc.job.assignments import Assignments, split_assignments
 from cvt_hpc.job.definition import HEADER
-from cvt_hpc.job.document import read_document
-from cvt_hpc.job.tables import read_table, read_tables
+from cvt_hpc.job.document import read_document, read_table, read_tables
 
 
 def load_chart(path: str | Path, overrides: Assignments = ()) -> Chart:

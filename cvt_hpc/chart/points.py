@@ -9,8 +9,8 @@ from cvt_hpc.chart.plan import Point, Role, Scene
 from cvt_hpc.chart.scenes import Stage, check_word, in_words
 from cvt_hpc.errors import mismatch, show, unknown
 from cvt_hpc.job import Job
+from cvt_hpc.job.document import read_set, read_table, read_tables
 from cvt_hpc.job.schema import load_schema
-from cvt_hpc.job.tables import read_set, read_table, read_tables
 
 _COARSER = {"step": 2.0, "tolerance": 10.0}  # by which the coarser reference is coarser
 

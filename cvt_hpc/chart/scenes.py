@@ -12,8 +12,8 @@ from cvt_hpc.chart.quantities import read_quantity
 from cvt_hpc.errors import NoEffectWarning, mismatch, show, unknown
 from cvt_hpc.job import Job, build_job
 from cvt_hpc.job.assignments import read_assignments
+from cvt_hpc.job.document import read_set, read_table, read_tables
 from cvt_hpc.job.schema import load_schema
-from cvt_hpc.job.tables import read_set, read_table, read_tables
 from cvt_hpc.job.values import read_value
 from cvt_hpc.models.contract import load_model
 

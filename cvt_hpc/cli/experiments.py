@@ -45,7 +45,7 @@ def _ladder(arguments: argparse.Namespace) -> int:
     from cvt_hpc.ladder.table import ladder_lines
     from cvt_hpc.printing import trouble_lines
     from cvt_hpc.study.ranks.launch import end_process
-    from cvt_hpc.study.report import STALLED
+    from cvt_hpc.study.status import STALLED
 
     job, rungs, refusals = parts.alike(arguments, lambda: load_ladder(arguments.path, arguments.set))
     out = parts.output_folder(arguments.out, job)

@@ -8,8 +8,7 @@ from typing import Any
 
 from cvt_hpc.errors import InputError, did_you_mean, mismatch, show
 from cvt_hpc.job import assignments
-from cvt_hpc.job.arrays import plain
-from cvt_hpc.job.assignments import Assignments, AxisEntry
+from cvt_hpc.job.assignments import Assignments, AxisEntry, plain
 from cvt_hpc.job.axes import Axis, read_axis
 from cvt_hpc.job.crosscheck import check_grid, check_rules
 from cvt_hpc.job.csv_files import read_csv
@@ -21,12 +20,11 @@ from cvt_hpc.job.for_model import answering_model, handed_to
 from cvt_hpc.job.histories import KEY, read_histories
 from cvt_hpc.job.netcdf_files import SUFFIX, read_netcdf
 from cvt_hpc.job.notices import tell_of_no_effect, warn_of_notices
-from cvt_hpc.job.plausibility import warn_of_bare_numbers
 from cvt_hpc.job.rules import Link, Rule, follow
 from cvt_hpc.job.sampling import sampled_axes
 from cvt_hpc.job.schema import Schema, load_schema
 from cvt_hpc.job.units import unit_in
-from cvt_hpc.job.values import expectation, kind_of, read_value
+from cvt_hpc.job.values import expectation, kind_of, read_value, warn_of_bare_numbers
 from cvt_hpc.models.contract import load_model
 
 OF_COMMANDS = ("branch", "chart", "fit", "ladder")  # tables that a command of the same name reads

@@ -7,9 +7,8 @@ from cvt_hpc.errors import one_line
 from cvt_hpc.job.axes import Axis
 from cvt_hpc.job.crosscheck import without_effect
 from cvt_hpc.job.definition import Derived, Job
-from cvt_hpc.job.plausibility import angle_in_words
 from cvt_hpc.job.schema import Schema
-from cvt_hpc.job.values import in_words
+from cvt_hpc.job.values import angle_in_words, in_words
 from cvt_hpc.models import MODELS
 from cvt_hpc.models.contract import load_model
 from cvt_hpc.tables import columns

@@ -7,10 +7,9 @@ from pathlib import Path
 from cvt_hpc.errors import mismatch
 from cvt_hpc.files import written_aside
 from cvt_hpc.job.loading import read_name
-from cvt_hpc.job.plausibility import angle_in_words
 from cvt_hpc.job.schema import Schema, load_schema
 from cvt_hpc.job.units import to_si
-from cvt_hpc.job.values import in_words, kind_of
+from cvt_hpc.job.values import angle_in_words, in_words, kind_of
 from cvt_hpc.models import MODELS
 from cvt_hpc.models.contract import load_model
 from cvt_hpc.parameters import Parameter

@@ -7,8 +7,7 @@ from typing import NamedTuple
 from cvt_hpc.errors import mismatch, show
 from cvt_hpc.job import Job, build_job
 from cvt_hpc.job.assignments import Assignments, split_assignments, take_own
-from cvt_hpc.job.document import read_document
-from cvt_hpc.job.tables import read_set, read_table
+from cvt_hpc.job.document import read_document, read_set, read_table
 from cvt_hpc.ladder.pushbelt import PUSHBELT
 from cvt_hpc.ladder.rungs import BESIDE, MODEL, NONE, Rung, ladder
 from cvt_hpc.parameters import Parameter

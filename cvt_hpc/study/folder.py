@@ -1,4 +1,7 @@
-"""The output folder of a study: its files, and the origin of its records."""
+"""The output folder of a study: its files, and the origin of its records.
+
+Parts of a study, for starts that work side by side in one folder, such as the tasks of a job array.
+"""
 
 import json
 import logging
@@ -6,7 +9,9 @@ import re
 from collections.abc import Callable, Iterator
 from contextlib import AbstractContextManager, contextmanager, suppress
 from pathlib import Path
-from typing import Any
+from typing import Any, NamedTuple
+
+import numpy as np
 
 from cvt_hpc.errors import InputError, few_of, mismatch, nearest
 from cvt_hpc.files import kind_of, make_own_folder, naming_refusals, sync_folder
@@ -14,9 +19,8 @@ from cvt_hpc.locks import BusyError, is_locked, locked
 from cvt_hpc.output_folder import DamagedJobError, Kind, OutputFolder
 from cvt_hpc.study.description import Study
 from cvt_hpc.study.growth import have_one_layout, places_in, refuse_other
-from cvt_hpc.study.part import Part
-from cvt_hpc.study.record.frames import MAGIC
 from cvt_hpc.study.record.index import Records, open_log
+from cvt_hpc.study.record.log import MAGIC
 from cvt_hpc.study.record.recovery import Places, read_records
 
 MOST_NAMED = 5
@@ -26,6 +30,51 @@ _MOST_RUNS = 10**8
 _LARGEST_RECORD = 1 << 26  # [bytes]
 
 _logger = logging.getLogger(__name__)
+
+
+class Part(NamedTuple):
+    """One of several parts of a study; every run belongs to exactly one of them.
+
+    Attributes
+    ----------
+    number : int
+        Which one, from 1.
+    parts : int
+        How many there are.
+    """
+
+    number: int
+    parts: int
+
+    def __str__(self) -> str:
+        return f"{self.number}/{self.parts}"
+
+    def holds(self, index: np.ndarray) -> np.ndarray:
+        """Return whether runs belong to this part, by their index alone, without communication.
+
+        The runs are dealt out in turn, and each round begins one part further: otherwise an axis with as many
+        values as there are parts would give all runs at its costliest value to one of them.
+        """
+        return (index + index // self.parts) % self.parts == self.number - 1
+
+
+def read_part(text: str) -> Part:
+    """Return the part that is written as "K/N".
+
+    Parameters
+    ----------
+    text : str
+        Such as "3/16".
+
+    Raises
+    ------
+    InputError
+        If it is none.
+    """
+    numbers = re.fullmatch(r"([1-9]\d*)/([1-9]\d*)", text, re.ASCII)
+    if numbers is None or int(numbers[1]) > int(numbers[2]):
+        raise mismatch("part", "K/N with K from 1 to N, such as 3/16", f'"{text}"')
+    return Part(int(numbers[1]), int(numbers[2]))
 
 
 def study_instead(path: Path) -> str:

@@ -20,8 +20,8 @@ from cvt_hpc.job import Job, rebuild_job
 from cvt_hpc.study.description import Study, describe
 from cvt_hpc.study.folder import StudyFolder
 from cvt_hpc.study.record.index import Records
-from cvt_hpc.study.report import RunReport
 from cvt_hpc.study.simulator import default_simulator
+from cvt_hpc.study.status import RunReport
 from cvt_hpc.study.sweep import check_start, run
 
 CONFIDENCE = 0.95

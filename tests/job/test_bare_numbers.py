@@ -11,7 +11,7 @@ from cvt_hpc.cli import main
 from cvt_hpc.errors import JobWarning, NoEffectWarning, UnitWarning
 from cvt_hpc.fit.loading import load_fit
 from cvt_hpc.job import build_job, load_job, rebuild_job
-from cvt_hpc.job.plausibility import warn_of_bare_numbers
+from cvt_hpc.job.values import warn_of_bare_numbers
 from cvt_hpc.parameters import Parameter
 from cvt_hpc.simulation import history
 

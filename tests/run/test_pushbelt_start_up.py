@@ -15,7 +15,7 @@ from cvt_hpc.models.pushbelt.start import of_lanes
 from cvt_hpc.models.pushbelt.start_up import StartUps, fingerprint
 from cvt_hpc.models.spatial_pushbelt import fields
 from cvt_hpc.simulation import run_point, run_points
-from cvt_hpc.study.forecast.pilots import run_pilots
+from cvt_hpc.study.forecast.resources import run_pilots
 from cvt_hpc.variables import Status
 from cvt_hpc.variator import PULLEYS
 

@@ -8,8 +8,7 @@ import pytest
 from cvt_hpc.files import StorageError
 from cvt_hpc.study.description import describe
 from cvt_hpc.study.record import frames
-from cvt_hpc.study.record.frames import BEGUN, HEAD, PLACE, RECORD, RecordFormat
-from cvt_hpc.study.record.log import RecordLog
+from cvt_hpc.study.record.log import BEGUN, HEAD, PLACE, RECORD, RecordFormat, RecordLog
 from cvt_hpc.study.record.recovery import read_records
 from cvt_hpc.variables import Status
 from support.study_double import Axis, Job, Simulator
@@ -50,7 +49,7 @@ def write_log(folder, study, rows, indices, session=SESSION):
 @pytest.fixture(autouse=True, params=[1 << 22, 100])
 def window(request, monkeypatch):
     """Logs are read as a whole, and in windows of which several lie in one frame."""
-    monkeypatch.setattr("cvt_hpc.study.record.frames.WINDOW", request.param)
+    monkeypatch.setattr("cvt_hpc.study.record.log.WINDOW", request.param)
 
 
 @pytest.fixture

@@ -13,7 +13,7 @@ import pytest
 from cvt_hpc.study import open_results, run
 from cvt_hpc.study.folder import StudyFolder
 from cvt_hpc.study.ranks.starting import SIGNALS
-from cvt_hpc.study.record.frames import PLACE, RECORD
+from cvt_hpc.study.record.log import PLACE, RECORD
 from cvt_hpc.study.record.recovery import read_records
 from support.recorded import assert_same_numbers
 from support.study_double import Axis, Job, Simulator

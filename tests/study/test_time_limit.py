@@ -13,8 +13,7 @@ from cvt_hpc.study.forecast.cost_model import CostModel, Fit, fit_recorded
 from cvt_hpc.study.ranks.counter import Counter
 from cvt_hpc.study.ranks.stopping import SignalWatch, Stop
 from cvt_hpc.study.ranks.time_limit import TimeLimit, find_time_limit, gathering_margin
-from cvt_hpc.study.record.frames import RecordFormat
-from cvt_hpc.study.record.log import RecordLog
+from cvt_hpc.study.record.log import RecordFormat, RecordLog
 from cvt_hpc.study.record.recovery import read_records
 from cvt_hpc.variables import Status
 from support.study_double import Axis, Job, Simulator

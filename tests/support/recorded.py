@@ -5,7 +5,7 @@ from pathlib import Path
 import numpy as np
 
 from cvt_hpc.study.folder import StudyFolder
-from cvt_hpc.study.record.frames import RECORD
+from cvt_hpc.study.record.log import RECORD
 from cvt_hpc.study.record.recovery import read_records
 
 

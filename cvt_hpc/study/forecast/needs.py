@@ -9,7 +9,7 @@ from typing import NamedTuple
 from cvt_hpc.errors import mismatch
 from cvt_hpc.job import Job
 from cvt_hpc.study.description import record_layout, record_type
-from cvt_hpc.study.record.frames import HEAD, PLACE
+from cvt_hpc.study.record.log import HEAD, PLACE
 from cvt_hpc.study.simulator import Simulator
 
 # [byte] of rank 0 for each run, for the plan and the index of the records: 207 were measured with 10^6 runs

@@ -1,16 +1,25 @@
-"""Early end of a sweep: by a signal, the time limit, or another rank that stops."""
+"""Early end of a sweep: by a signal, the time limit, or another rank that stops.
 
+Going on without ranks that have died, where MPI tolerates it (ULFM; Open MPI: `mpirun --with-ft ulfm`).
+
+Elsewhere the launcher ends all ranks when one dies, and the same command continues later.
+"""
+
+import logging
 import signal
 import time
 from collections.abc import Callable
 from types import FrameType
-from typing import Any, NoReturn, Self
+from typing import Any, NoReturn, Self, TypeVar
 
 from cvt_hpc.study.ranks.counter import Counter
-from cvt_hpc.study.ranks.launch import RankDied
+from cvt_hpc.study.ranks.launch import RankDied, Team, is_tolerated
 from cvt_hpc.study.ranks.progress import show_duration
 from cvt_hpc.study.ranks.starting import SIGNALS
 from cvt_hpc.study.ranks.time_limit import TimeLimit
+
+Result = TypeVar("Result")
+_logger = logging.getLogger(__name__)
 
 _LOOK_INTERVAL = 0.5  # [s] between checks of the other ranks
 _IMPATIENCE = 1.0  # [s]; a Ctrl-C later than this after the first one ends the process at once
@@ -165,3 +174,34 @@ class Stop:
         if not self._told:
             self._told = True
             self._counter.interrupt_all()
+
+
+def outlive(team: Team, work: Callable[[Team], Result]) -> Result:
+    """Return the result of `work`; when a rank dies during it, the remaining ranks do it again.
+
+    Parameters
+    ----------
+    team : Team
+        All ranks.
+    work : callable
+        Their joint work. The shared counter dies with the rank that holds it, and the claims of the dead rank
+        are nowhere but in their logs: so `work` has to begin with the records.
+    """
+    if team.communicator is None or not is_tolerated():
+        return work(team)
+    while True:
+        death = None
+        try:
+            result = work(team)
+        except RankDied as caught:
+            team.revoke()  # ranks that wait for the dead one learn of it
+            death = caught
+        # Some ranks may have come through before the death, and must not leave the others.
+        if team.agree(death is None):
+            return result
+        size = team.size
+        team = team.survivors()
+        if team.size == size:
+            raise death or RankDied("an error of MPI on another rank, and no death")
+        if team.rank == 0:
+            _logger.warning("a rank has died; %d go on", team.size)

@@ -13,7 +13,8 @@ from numpy.typing import NDArray
 
 from cvt_hpc.files import naming_refusals
 from cvt_hpc.study.description import Study
-from cvt_hpc.study.record.frames import (
+from cvt_hpc.study.record.index import ENTRY, Records, Timing, choose, open_log
+from cvt_hpc.study.record.log import (
     AGAIN,
     ALONE,
     HEAD,
@@ -27,7 +28,6 @@ from cvt_hpc.study.record.frames import (
     RecordFormat,
     read_preamble,
 )
-from cvt_hpc.study.record.index import ENTRY, Records, Timing, choose, open_log
 
 Places = range | NDArray[np.int64]  # the index in a study of each run of another, or of itself
 
