@@ -10,9 +10,9 @@ from typing import TYPE_CHECKING, Any
 
 import numpy as np
 
-from cvt_hpc.job.shown import JOB_UNITS, shown_number
 from cvt_hpc.job.summary import cost_in_words
 from cvt_hpc.job.template import CUSTOMARY
+from cvt_hpc.job.values import JOB_UNITS, shown_number
 from cvt_hpc.tables import columns
 from cvt_hpc.variables import Outcome, Status, flag_in_words
 from cvt_hpc.vibration.agreement import NEAR, NEAR_CONTRADICTIONS
@@ -25,8 +25,8 @@ if TYPE_CHECKING:
     from cvt_hpc.job import Job
     from cvt_hpc.ladder.audit import AuditReport
     from cvt_hpc.study import RunReport, StudyStatus
+    from cvt_hpc.study.forecast.cost_model import Forecast
     from cvt_hpc.study.forecast.needs import Disk, Needs
-    from cvt_hpc.study.forecast.simulate import Forecast
     from cvt_hpc.study.repeats import Repeat
 
 MOST_FAILURES_NAMED = 10

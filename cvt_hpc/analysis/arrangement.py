@@ -16,7 +16,7 @@ from numpy.typing import NDArray
 from cvt_hpc.analysis.figures import axis_label, coordinate_unit, in_words
 from cvt_hpc.analysis.ticks import number, put_ticks, short_numbers
 from cvt_hpc.errors import InputError, few_of, mismatch, show, unknown
-from cvt_hpc.job.shown import shown_as_read, shown_number, shown_unit
+from cvt_hpc.job.values import shown_as_read, shown_number, shown_unit
 
 EVEN, EQUAL = 1.5, 1.01  # of steps: largest over smallest, below which they are taken for even
 LEAST_SPAN = 4.0  # last over first value of a logarithmic axis

@@ -34,7 +34,7 @@ from PIL import Image
 
 from cvt_hpc.errors import mismatch, one_line
 from cvt_hpc.files import written_aside
-from cvt_hpc.job.shown import JOB_UNITS, shown_number, shown_unit
+from cvt_hpc.job.values import JOB_UNITS, shown_number, shown_unit
 
 P = ParamSpec("P")
 _AS_WRITTEN: WeakSet[Figure] = WeakSet()

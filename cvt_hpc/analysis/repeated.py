@@ -9,8 +9,7 @@ import xarray as xr
 
 from cvt_hpc.analysis.comparison import Comparison, compare
 from cvt_hpc.study import open_results
-from cvt_hpc.study.repeats import AUDIT, interval
-from cvt_hpc.study.step_check import WAYS
+from cvt_hpc.study.repeats import AUDIT, WAYS, interval
 from cvt_hpc.vibration.agreement import PairClass
 from cvt_hpc.vibration.classes import OccurrenceClass
 

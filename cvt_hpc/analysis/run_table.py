@@ -11,7 +11,7 @@ from cvt_hpc.analysis.arrangement import labelled
 from cvt_hpc.analysis.classes import check_results, map_classes
 from cvt_hpc.errors import mismatch
 from cvt_hpc.files import written_aside
-from cvt_hpc.job.shown import heading, shown_number
+from cvt_hpc.job.values import heading, shown_number
 
 FORMATS = (".csv", ".xlsx")
 MOST_ROWS = (1 << 20) - 1  # of a sheet, below its head

@@ -14,13 +14,20 @@ from typing import Any
 import numpy as np
 import xarray as xr
 
-from cvt_hpc.bifurcation.attractors import Attractor, Start, attractors
-from cvt_hpc.bifurcation.costs import predicted_cost
+from cvt_hpc.bifurcation.attractors import (
+    OF_MODES,
+    STRAND,
+    Attractor,
+    Followed,
+    Stability,
+    Start,
+    attractors,
+    states_of,
+)
 from cvt_hpc.bifurcation.drawing import draw_branch
 from cvt_hpc.bifurcation.folder import DiagramFolder, picture_names
-from cvt_hpc.bifurcation.followed import OF_MODES, STRAND, Followed, Stability, states_of
-from cvt_hpc.bifurcation.job import LOAD, Asked, Diagram, load_attributes
-from cvt_hpc.bifurcation.kinds import lowest_judged, with_kinds
+from cvt_hpc.bifurcation.job import LOAD, Asked, Diagram, load_attributes, predicted_cost
+from cvt_hpc.bifurcation.table import lowest_judged, with_kinds
 from cvt_hpc.files import written_aside
 from cvt_hpc.linear_algebra import one_thread
 from cvt_hpc.models.elastic_belt.belt import State, mesh

@@ -14,8 +14,7 @@ from matplotlib.lines import Line2D
 from matplotlib.patches import Patch
 
 from cvt_hpc.analysis.figures import WIDTH, balanced, coordinate_unit, draw
-from cvt_hpc.bifurcation.attractors import FROM, Attractor
-from cvt_hpc.bifurcation.followed import OF_MODES, Followed, Stability
+from cvt_hpc.bifurcation.attractors import FROM, OF_MODES, Attractor, Followed, Stability
 from cvt_hpc.bifurcation.job import Diagram, load_attributes
 from cvt_hpc.bifurcation.table import gap_lines, place_text
 from cvt_hpc.models.linear_stability.branch import Onset

@@ -11,10 +11,9 @@ from typing import Any
 import numpy as np
 
 from cvt_hpc.archives import Archives, Arrays
-from cvt_hpc.bifurcation.attractors import Attractor
-from cvt_hpc.bifurcation.followed import Followed, Stability
+from cvt_hpc.bifurcation.attractors import Attractor, Followed, Stability
 from cvt_hpc.bifurcation.job import Diagram, fingerprint_of, numbers_of
-from cvt_hpc.bifurcation.kinds import with_kinds
+from cvt_hpc.bifurcation.table import with_kinds
 from cvt_hpc.files import kind_of
 from cvt_hpc.models.linear_stability.branch import Onset
 from cvt_hpc.netcdf import DIAGRAM, holds, open_netcdf

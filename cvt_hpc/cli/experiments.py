@@ -27,7 +27,7 @@ def add(commands: Any) -> None:
 
 def _chart(arguments: argparse.Namespace) -> int:
     from cvt_hpc.chart import load_chart, make_chart
-    from cvt_hpc.chart.table import table_lines
+    from cvt_hpc.chart.making import table_lines
 
     parts.refuse_ranks("chart", "measures times")
     chart = load_chart(arguments.path, arguments.set)
@@ -41,8 +41,7 @@ def _chart(arguments: argparse.Namespace) -> int:
 
 def _ladder(arguments: argparse.Namespace) -> int:
     from cvt_hpc.ladder.loading import load_ladder
-    from cvt_hpc.ladder.making import report_ladder, run_ladder
-    from cvt_hpc.ladder.table import ladder_lines
+    from cvt_hpc.ladder.making import ladder_lines, report_ladder, run_ladder
     from cvt_hpc.printing import trouble_lines
     from cvt_hpc.study.ranks.launch import end_process
     from cvt_hpc.study.status import STALLED

@@ -12,12 +12,9 @@ import numpy as np
 from numpy.typing import NDArray
 
 from cvt_hpc.files import write_rows
-from cvt_hpc.fit.around import Around, look_around, reach
-from cvt_hpc.fit.confirming import Confirmed, confirm
 from cvt_hpc.fit.evaluating import Evaluation
-from cvt_hpc.fit.job import Fit
-from cvt_hpc.fit.scoring import REPRODUCED, Course, areas, verdict
-from cvt_hpc.fit.search import Found, search
+from cvt_hpc.fit.job import REPRODUCED, Course, Fit, areas, verdict
+from cvt_hpc.fit.search import Around, Confirmed, Found, confirm, look_around, reach, search
 from cvt_hpc.job.definition import digest
 from cvt_hpc.job.summary import core_time_in_words
 from cvt_hpc.job.units import from_si

@@ -1,4 +1,7 @@
-"""A validated job: its runs, with every default resolved."""
+"""A validated job: its runs, with every default resolved.
+
+The same runs for another model of the ladder, which knows fewer tables.
+"""
 
 from __future__ import annotations
 
@@ -14,12 +17,12 @@ from cvt_hpc.errors import mismatch
 from cvt_hpc.job.assignments import Assignments, read_assignments, split_assignments
 from cvt_hpc.job.axes import Axis, thinned
 from cvt_hpc.job.crosscheck import check_point, complete_point
-from cvt_hpc.job.derivation import ordered_rules, overridden
 from cvt_hpc.job.design import Design
 from cvt_hpc.job.formula import Formula
-from cvt_hpc.job.rules import Link, Rule, follow, needed_rules, places, varied_by
+from cvt_hpc.job.rules import Link, Rule, follow, needed_rules, ordered_rules, overridden, places, varied_by
 from cvt_hpc.job.schema import Schema, load_schema
 from cvt_hpc.job.units import unit_in
+from cvt_hpc.models.contract import load_model
 
 HEADER = ("name", "model", "stepper", "description")
 
@@ -286,3 +289,57 @@ def _to_json(value: Any) -> Any:
     if isinstance(value, tuple):
         return [_to_json(item) for item in value]
     return str(value) if isinstance(value, float) and math.isinf(value) else value
+
+
+def answering_model(job: Job) -> tuple[str, str] | None:
+    """Return the model that answers the job's question, and the reason; None for its own model.
+
+    Raises
+    ------
+    InputError
+        If the runs have different questions.
+    """
+    answered_by = load_model(job.model).answered_by
+    if any(axis.name == "question" for axis in job.axes):
+        raise mismatch(f"{job.source}: [axes] question", "one question for all runs", "several")
+    return answered_by.get(job.parameters.get("question", ""))
+
+
+def handed_to(job: Job, model: str, why: str) -> dict[str, Any]:
+    """Return a document of the same runs for another model, with the keys that it knows.
+
+    Parameters
+    ----------
+    job : Job
+        A validated job.
+    model : str
+        The other model.
+    why : str
+        The purpose, for the description and the error.
+
+    Raises
+    ------
+    InputError
+        If the other model does not know an axis. A formula may still name keys that it does not know.
+    """
+    document, known = job.resolved(), load_schema(model, None, job.source).section_of
+    for axis in job.axes:
+        if axis.name not in known:
+            where = f"{job.source}: [axes] {axis.name}"
+            raise mismatch(where, f"a key of {model}, since {why}", "one without effect there")
+    tables: dict[str, dict[str, Any]] = {}
+    for section in job.schema.sections:
+        for key, value in document[section].items():
+            if key in job.given and key in known:
+                tables.setdefault(known[key], {})[key] = value  # it may belong in another table there
+    derived = {key: text for key, text in document.get("derived", {}).items() if key in known}
+    linked = {
+        axis: {key: values for key, values in table.items() if key in known}
+        for axis, table in document.get("linked", {}).items()
+    }
+    text = f"{job.description}{'; ' if job.description else ''}{model}: {why}"
+    head = {"name": job.name, "model": model, "description": text}
+    rest = {key: document[key] for key in ("axes", "design") if key in document}
+    tables |= {"derived": derived, "linked": {axis: table for axis, table in linked.items() if table}}
+    tables = {name: table for name, table in tables.items() if table}
+    return head | tables | rest

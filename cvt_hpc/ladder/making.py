@@ -1,34 +1,61 @@
 """A ladder chart made: the same runs done with every model, compared, written and drawn.
 
 The picture of a ladder chart: error against cost of each model, a panel for each question.
+
+The results of a ladder chart as a table, for people and as files that can be kept.
 """
 
 import json
 import math
 import time
-from collections.abc import Callable, Sequence
+from collections.abc import Callable, Iterator, Mapping, Sequence
 from pathlib import Path
-from typing import NamedTuple
+from typing import Any, NamedTuple
 
+import numpy as np
+import xarray as xr
 from matplotlib.axes import Axes
 from matplotlib.figure import Figure
 from matplotlib.lines import Line2D
 from matplotlib.patches import Patch
 
 from cvt_hpc.analysis.error_axes import line_style, set_error_axis
-from cvt_hpc.analysis.figures import WIDTH, draw
-from cvt_hpc.files import refuse_link, written_aside
+from cvt_hpc.analysis.figures import WIDTH, coordinate_unit, draw
+from cvt_hpc.files import refuse_link, write_rows, written_aside
 from cvt_hpc.job import Job
+from cvt_hpc.job.values import JOB_UNITS
 from cvt_hpc.ladder.comparing import Finding, compare
-from cvt_hpc.ladder.costs import cost_left
+from cvt_hpc.ladder.loading import cost_left
 from cvt_hpc.ladder.rungs import QUESTIONS, REFERENCE, Rung
-from cvt_hpc.ladder.table import in_job_unit, ladder_dataset, write_ladder
 from cvt_hpc.linear_algebra import one_thread
-from cvt_hpc.netcdf import write_netcdf
+from cvt_hpc.netcdf import attributes, global_attributes, write_netcdf
+from cvt_hpc.provenance import machine, origin_lines
 from cvt_hpc.simulation import simulate
 from cvt_hpc.study import RunReport, check_start, open_results, run
 from cvt_hpc.study.ranks.launch import detect_launch
 from cvt_hpc.study.ranks.progress import show_duration
+from cvt_hpc.tables import columns, number, short
+
+UNITS = dict.fromkeys(QUESTIONS, "1") | {"onset": "N m"}
+# Column -> its name and meaning; `error_unit` gives the unit of error columns
+NUMBERS = {
+    "cells": ("cells", "cells behind the errors; of onsets, pairs of them"),
+    "error_median": ("median error", "in the unit error_unit"),
+    "error_95": ("error of 95 %", "error that 95 % of the cells keep, in the unit error_unit"),
+    "wrong_share": (
+        "wrong cells",
+        "share of cells that are quiet here and vibrate in the reference, or the other way round",
+    ),
+    "undecided_share": (
+        "undecided cells",
+        "share of cells, or of the reference's onsets, of which the model says nothing",
+    ),
+    "additional": (
+        "additional onsets",
+        "onsets that the reference does not have, though it decides below and above them",
+    ),
+    "core_seconds": ("processor time", "of a run, mean"),
+}
 
 HEIGHT = 7.2  # [inch]
 ROOM = 1.15  # length of a linear axis over its largest error
@@ -102,14 +129,14 @@ def run_ladder(
     left = {rung.name: cost_left(rung, None if fresh else out) for rung in rungs}
     done, spent = 0.0, 0.0
     predicted = sum(cost for _, cost in left.values())
-    for number, rung in enumerate(rungs, 1):
+    for place, rung in enumerate(rungs, 1):
         runs, cost = left[rung.name]
         if runs:
-            to_go = sum(left[later.name][1] for later in rungs[number - 1 :])
+            to_go = sum(left[later.name][1] for later in rungs[place - 1 :])
             # by the time of earlier models, as far as they count beside all; at first by prediction alone
             to_go *= (spent + predicted / detect_launch().size) / (done + predicted)
             expected = f"{runs} runs, {show_duration(to_go)} to go in all"
-            announce(f"model {number}/{len(rungs)} {rung.name}: {expected}")
+            announce(f"model {place}/{len(rungs)} {rung.name}: {expected}")
         started = time.monotonic()
         # threads of the linear algebra wait for each other in loops, which would count as a model's own time
         with one_thread():
@@ -244,3 +271,87 @@ def _legend(styles: dict[str, dict]) -> list[Line2D | Patch]:
         Line2D([], [], color="black", lw=1.0, label=span),
         Patch(**HATCHED, label="below the reference's own error"),
     ]
+
+
+def in_job_unit(job: Job, findings: Sequence[Finding]) -> tuple[list[Finding], str]:
+    """Return findings with errors of onsets in the unit in which the job gives the load, and that unit."""
+    scale, unit = coordinate_unit({"units": UNITS["onset"], JOB_UNITS: job.units.get("load", "")})
+    shown = []
+    for finding in findings:
+        if finding.question == "onset":
+            score = finding.score
+            score = score._replace(median=scale * score.median, high=scale * score.high)
+            finding = finding._replace(score=score)
+        shown.append(finding)
+    return shown, unit
+
+
+def write_ladder(job: Job, findings: Sequence[Finding], made: Mapping[str, Any], path: Path) -> None:
+    """Write the findings as comma-separated values, a row for each model and question, below their origin."""
+    findings, unit = in_job_unit(job, findings)
+    units = UNITS | {"onset": unit}
+    rows = (
+        [one.question, one.rung, units[one.question]]
+        + [number(value, 3) if isinstance(value, float) else value for value in _numbers(one)]
+        for one in findings
+    )
+    write_rows(path, ["question", "rung", "error_unit", *NUMBERS], rows, origin_lines(made))
+
+
+def ladder_lines(job: Job, findings: Sequence[Finding]) -> Iterator[str]:
+    """Yield the lines that show the findings to people."""
+    findings, of_onsets = in_job_unit(job, findings)
+    heads = ["", "cells", "median", "95 %", "wrong", "silent", "more", "core-s/run", ""]
+    for question in QUESTIONS:
+        found = [finding for finding in findings if finding.question == question]
+        unit = f" [{of_onsets}]" if question == "onset" else ""
+        yield f"{question}: error{unit}; that of the reference is estimated"
+        yield from columns([heads, *([f.rung, *_cells(f), ""] for f in found)])
+
+
+def ladder_dataset(
+    job: Job, rungs: Sequence[Rung], findings: Sequence[Finding], makers: Sequence[Mapping[str, Any]] = ()
+) -> xr.Dataset:
+    """Return the findings as a dataset over `question` and `rung`, with all that is needed to repeat it.
+
+    Parameters
+    ----------
+    job : Job
+        The job of the ladder.
+    rungs : sequence of Rung
+        Its models.
+    findings : sequence of Finding
+        The results.
+    makers : sequence of mapping
+        By whom the runs were made, as of `netcdf.global_attributes`.
+    """
+    names = list(dict.fromkeys(finding.rung for finding in findings))
+    values = np.full((len(NUMBERS), len(QUESTIONS), len(names)), np.nan)
+    for finding in findings:
+        values[:, QUESTIONS.index(finding.question), names.index(finding.rung)] = _numbers(finding)
+    units = {"error_median": "", "error_95": "", "core_seconds": "s"}
+    variables = {
+        name: (("question", "rung"), array, attributes(words, units.get(name, "1"), text))
+        for (name, (words, text)), array in zip(NUMBERS.items(), values, strict=True)
+    }
+    texts = {"question": np.array(QUESTIONS, object), "rung": np.array(names, object)}
+    coordinates = {name: (name, labels, attributes(name)) for name, labels in texts.items()}
+    of_errors = ("question", np.array(list(UNITS.values()), object), attributes("unit of errors"))
+    subject = "accuracy against cost of the ladder of models"
+    told = {
+        **global_attributes(job, job.resolved(), subject, makers=makers),
+        "rungs": json.dumps({rung.name: rung.job.resolved() for rung in rungs}),
+        "machine": json.dumps(machine()),
+    }
+    return xr.Dataset({"error_unit": of_errors, **variables}, coordinates, told)
+
+
+def _numbers(finding: Finding) -> tuple[float, ...]:
+    """Values of NUMBERS, in their order."""
+    return (*finding.score, finding.core_seconds)
+
+
+def _cells(finding: Finding) -> list[str]:
+    s = finding.score
+    more = str(s.additional) if finding.question == "onset" else ""
+    return [str(s.cells), *map(short, s[1:5]), more, short(finding.core_seconds)]

@@ -18,8 +18,7 @@ from cvt_hpc.analysis.hysteresis_bands import ALONG, INK, lowest_onsets, of_each
 from cvt_hpc.analysis.scatter import is_sampled, sample_axes
 from cvt_hpc.analysis.starts import AXIS, has_starts, join_starts
 from cvt_hpc.errors import escaped
-from cvt_hpc.report.findings import is_judged
-from cvt_hpc.report.quantities import AMPLITUDE, Quantity, quantities
+from cvt_hpc.report.findings import AMPLITUDE, Quantity, is_judged, quantities
 from cvt_hpc.vibration.hysteresis import StartClass
 
 LARGEST = 3e38  # in 4 bytes

@@ -9,9 +9,8 @@ from cvt_hpc.simulation.batches import (
     run_costs,
     turns,
 )
-from cvt_hpc.simulation.history import alone, run_points_keeping, simulate
 from cvt_hpc.simulation.record import declared_record, record_coordinates, record_variables
-from cvt_hpc.simulation.running import Interrupted, run_point, run_points
+from cvt_hpc.simulation.running import Interrupted, alone, run_point, run_points, run_points_keeping, simulate
 
 __all__ = [
     "declared_record",

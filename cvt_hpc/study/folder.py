@@ -1,27 +1,38 @@
 """The output folder of a study: its files, and the origin of its records.
 
 Parts of a study, for starts that work side by side in one folder, such as the tasks of a job array.
+
+Histories of chosen runs, a file each beside the records.
 """
+
+from __future__ import annotations
 
 import json
 import logging
 import re
-from collections.abc import Callable, Iterator
+from collections.abc import Callable, Iterable, Iterator
 from contextlib import AbstractContextManager, contextmanager, suppress
 from pathlib import Path
-from typing import Any, NamedTuple
+from typing import TYPE_CHECKING, Any, NamedTuple
 
 import numpy as np
 
 from cvt_hpc.errors import InputError, few_of, mismatch, nearest
 from cvt_hpc.files import kind_of, make_own_folder, naming_refusals, sync_folder
 from cvt_hpc.locks import BusyError, is_locked, locked
+from cvt_hpc.netcdf import store_history
 from cvt_hpc.output_folder import DamagedJobError, Kind, OutputFolder
 from cvt_hpc.study.description import Study
-from cvt_hpc.study.growth import have_one_layout, places_in, refuse_other
+from cvt_hpc.study.job_difference import have_one_layout, places_in, refuse_other
 from cvt_hpc.study.record.index import Records, open_log
 from cvt_hpc.study.record.log import MAGIC
 from cvt_hpc.study.record.recovery import Places, read_records
+from cvt_hpc.variables import Status
+
+if TYPE_CHECKING:
+    import xarray as xr
+
+    from cvt_hpc.job import Job
 
 MOST_NAMED = 5
 _PART_LOCKS = ".part-*.lock"
@@ -324,3 +335,27 @@ def _numbers(study: Study) -> str:
         del table["job_units"]
     job = {key: value for key, value in entry["job"].items() if key not in ("name", "description")}
     return json.dumps({**entry, "job": job, "name": "", "description": ""})
+
+
+def keep_histories(folder: StudyFolder, histories: Iterable[tuple[int, xr.Dataset]]) -> None:
+    """Write histories, by run index; before the records, so that a run on record has its history.
+
+    Raises
+    ------
+    StorageError
+        If the system refuses.
+    """
+    for index, history in histories:
+        folder.make_histories()
+        store_history(history, folder.history(index))
+
+
+def leave_out_missing(job: Job, folder: StudyFolder, records: Records) -> None:
+    """Mark runs as not recorded that are done, but lack a requested history; the logs stay.
+
+    The history was requested later, or has been removed.
+    """
+    done = records.status == Status.DONE
+    missing = [index for index in job.histories if done[index] and not folder.history(index).exists()]
+    records.written[missing] = np.nan
+    records.status[missing] = Status.NOT_RUN

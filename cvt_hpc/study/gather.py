@@ -26,8 +26,7 @@ from cvt_hpc.netcdf import global_attributes, open_netcdf, refuse_beside_sweep, 
 from cvt_hpc.provenance import history_line
 from cvt_hpc.study.description import Dimension, Study
 from cvt_hpc.study.folder import StudyFolder, study_instead
-from cvt_hpc.study.growth import places_in
-from cvt_hpc.study.job_difference import difference_in_words
+from cvt_hpc.study.job_difference import difference_in_words, places_in
 from cvt_hpc.study.record.index import Records, block_length
 from cvt_hpc.study.record.log import KEPT
 from cvt_hpc.study.tracing import inferred_classes

@@ -22,11 +22,9 @@ from cvt_hpc.job import Job
 from cvt_hpc.provenance import new_session
 from cvt_hpc.study.batches import Assignment, share_out
 from cvt_hpc.study.description import Study
-from cvt_hpc.study.folder import Part, StudyFolder
+from cvt_hpc.study.folder import Part, StudyFolder, leave_out_missing
 from cvt_hpc.study.forecast.cost_model import Fit
-from cvt_hpc.study.histories import leave_out_missing
-from cvt_hpc.study.ranks.counter import Counter
-from cvt_hpc.study.ranks.progress import Progress
+from cvt_hpc.study.ranks.progress import Counter, Progress
 from cvt_hpc.study.ranks.time_limit import TimeLimit
 from cvt_hpc.study.record.index import Records
 from cvt_hpc.study.record.log import RecordFormat, RecordLog

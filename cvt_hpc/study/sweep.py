@@ -20,15 +20,13 @@ from cvt_hpc.locks import BusyError
 from cvt_hpc.netcdf import library_for_sweep
 from cvt_hpc.provenance import program_identity
 from cvt_hpc.study.description import Study, describe
-from cvt_hpc.study.folder import Part, StudyFolder, read_part
+from cvt_hpc.study.folder import Part, StudyFolder, keep_histories, leave_out_missing, read_part
 from cvt_hpc.study.forecast.cost_model import CostModel
 from cvt_hpc.study.forecast.needs import refuse_too_large
 from cvt_hpc.study.gather import LossError, gather_records
-from cvt_hpc.study.histories import keep_histories, leave_out_missing
 from cvt_hpc.study.planning import Plan, asked_runs, next_round, prepare
-from cvt_hpc.study.ranks.counter import Counter
 from cvt_hpc.study.ranks.launch import Ranks, Team, assembled_team
-from cvt_hpc.study.ranks.progress import Progress
+from cvt_hpc.study.ranks.progress import Counter, Progress
 from cvt_hpc.study.ranks.schedule import claimed_batches, open_counter
 from cvt_hpc.study.ranks.stopping import ELSEWHERE, SignalWatch, Stop, outlive, raise_again
 from cvt_hpc.study.ranks.time_limit import find_time_limit, planning_within

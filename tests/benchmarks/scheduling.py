@@ -25,9 +25,9 @@ sys.path.insert(0, str(TESTS))
 
 from cvt_hpc.study import process_rank, run  # noqa: E402
 from cvt_hpc.study.batches import share_out  # noqa: E402
-from cvt_hpc.study.forecast.cost_model import Fit  # noqa: E402
-from cvt_hpc.study.forecast.simulate import (  # noqa: E402
+from cvt_hpc.study.forecast.cost_model import (  # noqa: E402
     ClaimTimes,
+    Fit,  # noqa: E402
     Forecast,
     forecast,
     least_makespan,

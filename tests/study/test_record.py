@@ -7,7 +7,7 @@ import pytest
 
 from cvt_hpc.files import StorageError
 from cvt_hpc.study.description import describe
-from cvt_hpc.study.record import frames
+from cvt_hpc.study.record import log
 from cvt_hpc.study.record.log import BEGUN, HEAD, PLACE, RECORD, RecordFormat, RecordLog
 from cvt_hpc.study.record.recovery import read_records
 from cvt_hpc.variables import Status
@@ -163,7 +163,7 @@ def test_a_folder_among_the_logs_is_named(tmp_path, study, rows):
 
 
 def test_a_log_of_another_version_is_named(tmp_path, study, rows, monkeypatch):
-    monkeypatch.setattr(frames, "FORMAT_VERSION", 1)
+    monkeypatch.setattr(log, "FORMAT_VERSION", 1)
     path = write_log(tmp_path / "r", study, rows, [2])
     monkeypatch.undo()
     records = read_records(tmp_path / "r", study)

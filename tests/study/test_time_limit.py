@@ -10,7 +10,7 @@ import pytest
 from cvt_hpc.study import run
 from cvt_hpc.study.folder import StudyFolder
 from cvt_hpc.study.forecast.cost_model import CostModel, Fit, fit_recorded
-from cvt_hpc.study.ranks.counter import Counter
+from cvt_hpc.study.ranks.progress import Counter
 from cvt_hpc.study.ranks.stopping import SignalWatch, Stop
 from cvt_hpc.study.ranks.time_limit import TimeLimit, find_time_limit, gathering_margin
 from cvt_hpc.study.record.log import RecordFormat, RecordLog

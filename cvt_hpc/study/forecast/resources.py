@@ -13,9 +13,8 @@ from typing import NamedTuple
 from cvt_hpc.job import Job
 from cvt_hpc.study.batches import Batch, in_parts
 from cvt_hpc.study.description import Study, describe
-from cvt_hpc.study.forecast.cost_model import CostModel, Fit
+from cvt_hpc.study.forecast.cost_model import CostModel, Fit, Forecast, forecast
 from cvt_hpc.study.forecast.needs import Disk, most_of_results
-from cvt_hpc.study.forecast.simulate import Forecast, forecast
 from cvt_hpc.study.planning import predicted_costs
 from cvt_hpc.study.ranks.time_limit import gathering_margin
 from cvt_hpc.study.record.log import HEAD, PLACE, RecordFormat

@@ -3,8 +3,8 @@
 from collections.abc import Callable, Iterator, Sequence
 
 from cvt_hpc.study.batches import Assignment, Batch
-from cvt_hpc.study.ranks.counter import Counter
 from cvt_hpc.study.ranks.launch import Team
+from cvt_hpc.study.ranks.progress import Counter
 
 
 def open_counter(team: Team) -> Counter:

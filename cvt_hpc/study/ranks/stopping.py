@@ -12,9 +12,8 @@ from collections.abc import Callable
 from types import FrameType
 from typing import Any, NoReturn, Self, TypeVar
 
-from cvt_hpc.study.ranks.counter import Counter
 from cvt_hpc.study.ranks.launch import RankDied, Team, is_tolerated
-from cvt_hpc.study.ranks.progress import show_duration
+from cvt_hpc.study.ranks.progress import Counter, show_duration
 from cvt_hpc.study.ranks.starting import SIGNALS
 from cvt_hpc.study.ranks.time_limit import TimeLimit
 
