@@ -29,7 +29,7 @@ from cvt_hpc.analysis.conversion import in_units, plain, standard
 from cvt_hpc.errors import mismatch, unknown
 from cvt_hpc.picture_kinds import END, HISTORIES, HISTORY, KINDS, RESULTS, Kind
 from cvt_hpc.study import open_results
-from cvt_hpc.vibration.onsets import levels, onsets
+from cvt_hpc.vibration.classes import levels, onsets
 
 if TYPE_CHECKING:
     from matplotlib.figure import Figure

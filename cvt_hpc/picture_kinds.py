@@ -114,7 +114,7 @@ KINDS = {
     ),
     "curve": Kind(
         RESULTS,
-        "curve_panels.curves_figure",
+        "curves.curves_figure",
         "a quantity over an axis as marks, and others of its unit as lines beside it",
         (
             Option(
@@ -195,7 +195,7 @@ KINDS = {
     ),
     "flanks": Kind(
         HISTORY,
-        "flanks.flanks_figure",
+        "profiles.flanks_figure",
         "left and right flank of a spatial pushbelt, with the ends of the arcs enlarged",
     ),
     "energy": Kind(

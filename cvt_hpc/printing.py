@@ -15,7 +15,7 @@ from cvt_hpc.job.template import CUSTOMARY
 from cvt_hpc.job.values import JOB_UNITS, shown_number
 from cvt_hpc.tables import columns
 from cvt_hpc.variables import Outcome, Status, flag_in_words
-from cvt_hpc.vibration.agreement import NEAR, NEAR_CONTRADICTIONS
+from cvt_hpc.vibration.classes import NEAR, NEAR_CONTRADICTIONS
 
 if TYPE_CHECKING:
     import numpy as np
@@ -114,7 +114,7 @@ def audit_lines(report: AuditReport) -> Iterator[str]:
 
 def step_check_lines(check: Repeat, found: Comparison) -> Iterator[str]:
     """Yield the lines that say how far a sample of runs depends on the time step."""
-    from cvt_hpc.analysis.repeated import contradictions, deviations
+    from cvt_hpc.analysis.comparison import contradictions, deviations
 
     drawn, eligible = int(check.sample.sum()), int(check.may_be_drawn.sum())
     yield f"step check: {drawn} of {eligible} runs that took steps done again {check.way}"
@@ -125,7 +125,7 @@ def step_check_lines(check: Repeat, found: Comparison) -> Iterator[str]:
 
 def comparison_lines(found: Comparison, sources: tuple[str, str]) -> Iterator[str]:
     """Yield the lines that say in what two studies agree: A, B, their jobs, classes, and amplitudes."""
-    from cvt_hpc.analysis.repeated import deviations
+    from cvt_hpc.analysis.comparison import deviations
 
     for label, source, left_out in zip("AB", sources, found.left_out, strict=True):
         yield f"{label}: {source}" + (f"; {left_out} of its runs left out, unknown there" if left_out else "")

@@ -13,8 +13,7 @@ import xarray as xr
 from matplotlib.axis import Axis
 from numpy.typing import NDArray
 
-from cvt_hpc.analysis.figures import axis_label, coordinate_unit, in_words
-from cvt_hpc.analysis.ticks import number, put_ticks, short_numbers
+from cvt_hpc.analysis.figures import axis_label, coordinate_unit, in_words, number, put_ticks, short_numbers
 from cvt_hpc.errors import InputError, few_of, mismatch, show, unknown
 from cvt_hpc.job.values import shown_as_read, shown_number, shown_unit
 

@@ -6,8 +6,7 @@ from numpy.typing import NDArray
 
 from cvt_hpc.errors import few_of, mismatch
 from cvt_hpc.netcdf import flag_attributes
-from cvt_hpc.vibration.classes import OccurrenceClass, classify_runs
-from cvt_hpc.vibration.hysteresis import StartClass
+from cvt_hpc.vibration.classes import OccurrenceClass, StartClass, classify_runs
 
 WITHOUT_RESULT = {  # in words, beside curves and spectra
     OccurrenceClass.SLIPPING: "slips or lifts off",

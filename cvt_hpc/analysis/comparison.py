@@ -1,4 +1,7 @@
-"""Two studies against each other, cell by cell: which classes contradict, how far numbers deviate."""
+"""Two studies against each other, cell by cell: which classes contradict, how far numbers deviate.
+
+What a sample of runs that were done again another way tells of their study, in words.
+"""
 
 import json
 import math
@@ -19,11 +22,20 @@ from cvt_hpc.files import write_rows
 from cvt_hpc.job.values import heading, shown, shown_number
 from cvt_hpc.models import MODELS
 from cvt_hpc.models.contract import load_model
+from cvt_hpc.study import open_results
 from cvt_hpc.study.job_difference import differences, short_pair
+from cvt_hpc.study.repeats import AUDIT, WAYS, interval
 from cvt_hpc.tables import number
 from cvt_hpc.variables import Status
-from cvt_hpc.vibration import agreement
-from cvt_hpc.vibration.classes import OccurrenceClass
+from cvt_hpc.vibration.classes import (
+    CONTRADICTIONS,
+    NEAR_CONTRADICTIONS,
+    WITHOUT_RESULTS,
+    OccurrenceClass,
+    PairClass,
+    classify_pairs,
+    is_near,
+)
 
 _HEAD = (
     "class_a",
@@ -40,6 +52,8 @@ _METHOD = (
     *("design", "versions"),
 )
 _METHOD_KEYS = ("seed", "disturbance", "friction_treatment", "contact_points", "coarse", "git_revision")
+
+_SAMPLES = (*WAYS.values(), ("in full", AUDIT))  # words of a way, and the folder of its runs
 
 
 class Deviation(NamedTuple):
@@ -86,7 +100,7 @@ class Cell(NamedTuple):
     @property
     def pair_label(self) -> str:
         """Name for people of `pair`."""
-        return (OccurrenceClass(self.pair) if self.pair >= 0 else agreement.PairClass(self.pair)).label
+        return (OccurrenceClass(self.pair) if self.pair >= 0 else PairClass(self.pair)).label
 
 
 @dataclass(frozen=True)
@@ -126,12 +140,12 @@ class Comparison:
     @property
     def better(self) -> NDArray[np.bool_]:
         """Whether a cell that vibrates in A is quiet in B, shape of the grid."""
-        return np.isin(self.pairs, (agreement.PairClass.A_ONLY, agreement.PairClass.A_ONLY_NEAR))
+        return np.isin(self.pairs, (PairClass.A_ONLY, PairClass.A_ONLY_NEAR))
 
     @property
     def worse(self) -> NDArray[np.bool_]:
         """Whether a cell that is quiet in A vibrates in B, shape of the grid."""
-        return np.isin(self.pairs, (agreement.PairClass.B_ONLY, agreement.PairClass.B_ONLY_NEAR))
+        return np.isin(self.pairs, (PairClass.B_ONLY, PairClass.B_ONLY_NEAR))
 
     @property
     def pairs(self) -> NDArray[np.int8]:
@@ -141,18 +155,18 @@ class Comparison:
     @property
     def contradicts(self) -> NDArray[np.bool_]:
         """Whether a cell is quiet in one study and vibrates in the other, shape of the grid."""
-        return np.isin(self.pairs, agreement.CONTRADICTIONS)
+        return np.isin(self.pairs, CONTRADICTIONS)
 
     @property
     def contradicts_beyond(self) -> NDArray[np.bool_]:
         """Whether it does so with a larger amplitude that is not near the threshold, shape of the grid."""
-        return self.contradicts & ~np.isin(self.pairs, agreement.NEAR_CONTRADICTIONS)
+        return self.contradicts & ~np.isin(self.pairs, NEAR_CONTRADICTIONS)
 
     @property
     def answered(self) -> NDArray[np.bool_]:
         """Whether both runs of a cell have ended with results, shape of the grid."""
         both = (self.cells[name].values for name in ("class_a", "class_b"))
-        return ~np.any([np.isin(classes, agreement.WITHOUT_RESULTS) for classes in both], axis=0)
+        return ~np.any([np.isin(classes, WITHOUT_RESULTS) for classes in both], axis=0)
 
     def counts(self) -> dict[tuple[OccurrenceClass, OccurrenceClass], int]:
         """Number of cells by their class in A and in B, of all pairs of classes."""
@@ -218,14 +232,12 @@ def compare(a: xr.Dataset, b: xr.Dataset, sources: tuple[str, str] = ("A", "B"))
     aligned = align(a, b, sources, _compared(a, b))
     thresholds = _threshold(a), _threshold(b)
     known = [_known(dataset) for dataset in (aligned.a, aligned.b)]
-    near = agreement.is_near(
-        *(found["amplitude"] / least for found, least in zip(known, thresholds, strict=True))
-    )
+    near = is_near(*(found["amplitude"] / least for found, least in zip(known, thresholds, strict=True)))
     frame = aligned.a["status"]
     values = {f"{name}_{study}": array for study, found in zip("ab", known, strict=True)
               for name, array in found.items()}  # fmt: skip
     values |= {"status": frame.values}
-    values |= {"occurrence_class": agreement.classify_pairs(values["class_a"], values["class_b"], near)}
+    values |= {"occurrence_class": classify_pairs(values["class_a"], values["class_b"], near)}
     quantities = [_quantities(dataset) for dataset in (aligned.a, aligned.b)]
     common = {name: unit for name, (_, unit) in quantities[0].items() if name in quantities[1]}
     for study, found in zip("ab", quantities, strict=True):
@@ -316,3 +328,76 @@ def _document(dataset: xr.Dataset) -> dict[str, Any]:
     job = {key: value for key, value in job_of(dataset).items() if key not in ("name", "description", "axes")}
     versions = json.loads(dataset.attrs.get("versions", "{}"))
     return job | {"versions": versions, "git_revision": dataset.attrs.get("git_revision")}
+
+
+def contradictions(found: Comparison, way: str) -> str:
+    """Return how many runs of a sample contradict those of the study.
+
+    Parameters
+    ----------
+    found : Comparison
+        Of the study with the runs that were done again.
+    way : str
+        How they were done again, in words.
+    """
+    runs, contradicting = int(found.answered.sum()), int(found.contradicts.sum())
+    low, high = interval(contradicting, runs)
+    share = f"{contradicting / runs:.2%}, " if runs else ""
+    others = int((found.answered & (found.pairs == PairClass.OTHERWISE)).sum())
+    failed = sum(
+        count for kinds, count in found.counts().items() if kinds[1] == OccurrenceClass.FAILED != kinds[0]
+    )
+    return (
+        f"{contradicting} of {runs} contradict (quiet against vibrating; {share}95 % interval {low:.2%} to "
+        f"{high:.2%}), {int(found.contradicts_beyond.sum())} of them beyond the threshold; "
+        f"{others} more of another class" + (f"; {failed} more failed {way}" if failed else "")
+    )
+
+
+def deviations(found: Comparison, who: str = "B deviates") -> Iterator[str]:
+    """Yield how far amplitude, frequency and what else is compared deviate; `who` is subject and verb."""
+    both = int((found.pairs == OccurrenceClass.VIBRATING).sum())
+    where = {name: f"{name} where both vibrate ({both} cells)" for name in ("amplitude", "frequency")}
+    where |= {name: f"{name} where both have ended" for name in found.quantities}
+    for name, text in where.items():
+        deviation = found.deviation(name)
+        if math.isnan(deviation.median):
+            continue
+        most = ""
+        if name in found.quantities:
+            unit = found.quantities[name]
+            most = f"; at most {found.largest_difference(name):.3g} {'' if unit == '1' else unit}".rstrip()
+        yield (
+            f"{text}: {who} by {deviation.median:.2%} (median), {deviation.high:.2%} (95 %), "
+            f"{deviation.largest:.2%} (largest){most}"
+        )
+
+
+def sample_sentences(dataset: xr.Dataset, folder: Path, source: str) -> Iterator[str]:
+    """Yield what the samples in the folder of a study tell: checks of the time step, and the audit.
+
+    Parameters
+    ----------
+    dataset : Dataset
+        Results of the study.
+    folder : Path
+        Its folder, in which `--check-step` and `--audit` leave their runs.
+    source : str
+        Where the results are from, for errors.
+
+    Raises
+    ------
+    InputError
+        If a sample cannot be read, or has nothing in common with the study.
+    """
+    for way, name in _SAMPLES:
+        if not (folder / name / "results.nc").is_file():
+            continue
+        with open_results(folder / name) as again:
+            found = compare(dataset, again, (source, str(folder / name)))
+        repeated = int(np.sum(found.cells["class_b"] != OccurrenceClass.NOT_RUN))
+        runs = "1 run was" if repeated == 1 else f"{repeated} runs were"
+        yield f"{runs} done again {way}, in `{name}`: {contradictions(found, way)}."
+        yield from (
+            f"{line[:1].upper()}{line[1:]}." for line in deviations(found, "those done again deviate")
+        )

@@ -11,9 +11,15 @@ from matplotlib.figure import Figure
 
 from cvt_hpc.analysis import cells, figures
 from cvt_hpc.analysis.eigenfrequencies import strand_frequencies
-from cvt_hpc.analysis.line_names import name_lines
 from cvt_hpc.analysis.telling_apart import entitle_runs, named, on_axes
-from cvt_hpc.analysis.waterfall import COLOURS, ORDERS, draw_eigenfrequencies, draw_orders, spectra_norm
+from cvt_hpc.analysis.waterfall import (
+    COLOURS,
+    ORDERS,
+    draw_eigenfrequencies,
+    draw_orders,
+    name_lines,
+    spectra_norm,
+)
 from cvt_hpc.errors import mismatch
 from cvt_hpc.variator import STRANDS
 from cvt_hpc.vibration.signals import window_amplitudes

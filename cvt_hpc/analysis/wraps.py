@@ -9,8 +9,7 @@ from matplotlib.axes import Axes
 from matplotlib.figure import Figure
 from matplotlib.lines import Line2D
 
-from cvt_hpc.analysis.error_axes import COLOURS
-from cvt_hpc.analysis.figures import STYLE, WIDTH, check_known, styled
+from cvt_hpc.analysis.figures import COLOURS, STYLE, WIDTH, check_known, styled
 from cvt_hpc.analysis.profiles import inside
 from cvt_hpc.analysis.telling_apart import entitle_jobs, named, told_apart
 from cvt_hpc.errors import InputError, mismatch

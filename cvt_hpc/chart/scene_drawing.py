@@ -19,8 +19,18 @@ from matplotlib.lines import Line2D
 from matplotlib.patches import Patch
 from matplotlib.ticker import LogFormatter
 
-from cvt_hpc.analysis.error_axes import COLOURS, LEGEND, MARGIN, line_style, set_error_axis
-from cvt_hpc.analysis.figures import WIDTH, balanced, display_unit, draw, with_units
+from cvt_hpc.analysis.figures import (
+    COLOURS,
+    LEGEND,
+    MARGIN,
+    WIDTH,
+    balanced,
+    display_unit,
+    draw,
+    line_style,
+    set_error_axis,
+    with_units,
+)
 from cvt_hpc.chart.comparing import Comparison, Result
 from cvt_hpc.chart.plan import Quantity
 from cvt_hpc.chart.quantities import KINDS

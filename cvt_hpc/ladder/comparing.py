@@ -17,8 +17,7 @@ from cvt_hpc.ladder.audit import FORCES
 from cvt_hpc.ladder.rungs import REFERENCE, Rung
 from cvt_hpc.models.linear_stability.modes import DECAY
 from cvt_hpc.variables import Status
-from cvt_hpc.vibration.classes import DECIDED
-from cvt_hpc.vibration.onsets import levels, onsets, paired_errors
+from cvt_hpc.vibration.classes import DECIDED, levels, onsets, paired_errors
 
 Array = NDArray[np.float64]
 

@@ -19,8 +19,7 @@ from matplotlib.figure import Figure
 from matplotlib.lines import Line2D
 from matplotlib.patches import Patch
 
-from cvt_hpc.analysis.error_axes import line_style, set_error_axis
-from cvt_hpc.analysis.figures import WIDTH, coordinate_unit, draw
+from cvt_hpc.analysis.figures import WIDTH, coordinate_unit, draw, line_style, set_error_axis
 from cvt_hpc.files import refuse_link, write_rows, written_aside
 from cvt_hpc.job import Job
 from cvt_hpc.job.values import JOB_UNITS

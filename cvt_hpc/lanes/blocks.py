@@ -19,8 +19,8 @@ from numba import types
 from numba.core import cgutils
 from numba.extending import intrinsic
 
+from cvt_hpc.lanes.arithmetic import place
 from cvt_hpc.lanes.kinds import ALIGNMENT, Mask, vector_type
-from cvt_hpc.lanes.places import place
 
 _TILE = 16  # numbers in registers at a time: half of those that the processor has
 SMALLEST_PIVOT = 1e-13  # of the number on the diagonal as it was given: rounding leaves as much of nothing

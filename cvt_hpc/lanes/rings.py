@@ -11,9 +11,9 @@ from llvmlite import ir
 from numba import types
 from numba.extending import intrinsic, overload, overload_attribute, register_jitable
 
+from cvt_hpc.lanes.arithmetic import load, place, rows_of
 from cvt_hpc.lanes.functions import anywhere, fma
 from cvt_hpc.lanes.kinds import LaneArray, LaneArrayKind, Mask, vector_type
-from cvt_hpc.lanes.places import load, place, rows_of
 
 
 def split(array: LaneArray, parts: int) -> LaneArray:

@@ -14,12 +14,10 @@ from numpy.typing import NDArray
 
 from cvt_hpc.analysis.arrangement import infinity_in_words, value_text
 from cvt_hpc.analysis.classes import at_strongest_strand, count_classes, map_classes, occurrence_classes
-from cvt_hpc.analysis.figures import coordinate_unit, in_words, value_unit
+from cvt_hpc.analysis.figures import coordinate_unit, in_words, number, value_unit
 from cvt_hpc.analysis.scatter import is_sampled
-from cvt_hpc.analysis.ticks import number
 from cvt_hpc.variables import Status
-from cvt_hpc.vibration.classes import DECIDED, OccurrenceClass
-from cvt_hpc.vibration.onsets import levels, onsets
+from cvt_hpc.vibration.classes import DECIDED, OccurrenceClass, levels, onsets
 
 MOST_NUMBERS = 1_000_000  # of all quantities together: some 5 MB of the page
 MOST_PLACES = 4  # of a dimension that the runs have in common, such as both strands: a quantity for each

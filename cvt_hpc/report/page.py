@@ -27,13 +27,11 @@ from cvt_hpc.analysis.classes import (
     map_classes,
     occurrence_classes,
 )
-from cvt_hpc.analysis.figures import RESOLUTION, coordinate_unit, in_words, with_units
+from cvt_hpc.analysis.comparison import sample_sentences
+from cvt_hpc.analysis.figures import RESOLUTION, coordinate_unit, in_words, number, with_units
 from cvt_hpc.analysis.hysteresis_bands import hysteresis_figure
-from cvt_hpc.analysis.maps import map_figure
-from cvt_hpc.analysis.repeated import sample_sentences
+from cvt_hpc.analysis.maps import AXIS, has_starts, map_figure
 from cvt_hpc.analysis.scatter import is_sampled
-from cvt_hpc.analysis.starts import AXIS, has_starts
-from cvt_hpc.analysis.ticks import number
 from cvt_hpc.analysis.value_maps import value_map_figure
 from cvt_hpc.errors import InputError, escaped, mismatch, one_line
 from cvt_hpc.files import written_aside
@@ -46,7 +44,7 @@ from cvt_hpc.report import findings
 from cvt_hpc.report.findings import quantities
 from cvt_hpc.report.interactive import KEPT, as_script, map_data
 from cvt_hpc.variables import Status
-from cvt_hpc.vibration.onsets import levels, onsets
+from cvt_hpc.vibration.classes import levels, onsets
 
 COARSE = 0.02  # of an axis: a step beyond is worth a smaller one
 _RETRIES = {

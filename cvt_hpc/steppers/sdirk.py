@@ -18,11 +18,9 @@ import numpy as np
 
 from cvt_hpc.kernels import kernel
 from cvt_hpc.steppers.facts import OK, Facts
-from cvt_hpc.steppers.fixed_step import march_in_equal_steps
-from cvt_hpc.steppers.frozen_jacobian import Frozen, frozen
-from cvt_hpc.steppers.newton import solve_stage
+from cvt_hpc.steppers.newton import Frozen, frozen, solve_stage
 from cvt_hpc.steppers.settings import SOLVER_TOLERANCE, STEP, ImplicitStep, implicit_step
-from cvt_hpc.steppers.system import System
+from cvt_hpc.steppers.system import System, march_in_equal_steps
 
 FACTS = Facts(
     order=3,

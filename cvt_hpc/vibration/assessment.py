@@ -9,8 +9,7 @@ from numpy.typing import ArrayLike, NDArray
 
 from cvt_hpc.variables import Status, Variable, Vibrates
 from cvt_hpc.vibration import signals
-from cvt_hpc.vibration.irregularity import relative_scatter
-from cvt_hpc.vibration.occurrence import classify, margin
+from cvt_hpc.vibration.occurrence import classify, margin, relative_scatter
 from cvt_hpc.vibration.settings import fitting_window
 
 VARIABLES = (

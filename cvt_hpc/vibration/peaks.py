@@ -12,7 +12,7 @@ import numpy as np
 from numpy.typing import ArrayLike
 
 from cvt_hpc.variables import Coordinate, Variable
-from cvt_hpc.vibration.tapering import Array, check_band, fine_spectrum, time_last
+from cvt_hpc.vibration.signals import Array, check_band, fine_spectrum, time_last
 
 COUNT = 3  # peaks of a strand that are recorded
 MAIN_LOBE = 4.0  # of Hann's window, in lines: between its zeros

@@ -8,8 +8,7 @@ from matplotlib.text import Text
 
 from cvt_hpc.analysis.arrangement import Sides
 from cvt_hpc.analysis.composing import compose
-from cvt_hpc.analysis.curve_panels import curve_panels_figure
-from cvt_hpc.analysis.curves import MARKS, curve_figure
+from cvt_hpc.analysis.curves import MARKS, curve_figure, curve_panels_figure
 from cvt_hpc.analysis.figures import STYLE
 from cvt_hpc.analysis.value_maps import value_map_figure
 from cvt_hpc.analysis.waterfall import waterfall_figure

@@ -8,13 +8,11 @@ from matplotlib.figure import Figure
 
 from cvt_hpc.analysis.arcs import sliding_figure, spiral_figure
 from cvt_hpc.analysis.curves import curve_figure
-from cvt_hpc.analysis.energy_blocks import blocks_figure
+from cvt_hpc.analysis.energy_blocks import blocks_figure, friction_figure, spectrum_figure, strand_bars_figure
 from cvt_hpc.analysis.figures import draw
 from cvt_hpc.analysis.followed_drawing import element_figure
-from cvt_hpc.analysis.friction_curves import friction_figure
 from cvt_hpc.analysis.profiles import profile_figure
 from cvt_hpc.analysis.ramps import course_figure, ramp_figure
-from cvt_hpc.analysis.spectra import spectrum_figure
 from cvt_hpc.analysis.statements import (
     bullinger_along,
     bullinger_ratios,
@@ -22,9 +20,7 @@ from cvt_hpc.analysis.statements import (
     lebrecht_excitation,
     lebrecht_ramps,
 )
-from cvt_hpc.analysis.statements.kept import Kept, opened
-from cvt_hpc.analysis.statements.verdicts import Finding, Statement, judged
-from cvt_hpc.analysis.strand_bars import strand_bars_figure
+from cvt_hpc.analysis.statements.verdicts import Finding, Kept, Statement, judged, opened
 from cvt_hpc.analysis.waterfall import waterfall_figure
 from cvt_hpc.errors import unknown
 from cvt_hpc.files import write_rows

@@ -6,8 +6,7 @@ import numpy as np
 from matplotlib.figure import Figure
 
 from cvt_hpc.analysis.followed_drawing import sliding_spectrum, swinging_figure
-from cvt_hpc.analysis.statements.kept import Kept
-from cvt_hpc.analysis.statements.verdicts import Measured, Statement
+from cvt_hpc.analysis.statements.verdicts import Kept, Measured, Statement
 from cvt_hpc.variables import Status, Vibrates
 
 BAND = (500.0, 700.0)  # [Hz] of the noise

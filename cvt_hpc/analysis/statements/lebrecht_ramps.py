@@ -6,8 +6,7 @@ import numpy as np
 import xarray as xr
 
 from cvt_hpc.analysis.ramps import NOISE, envelope, read_ramp
-from cvt_hpc.analysis.statements.kept import Kept
-from cvt_hpc.analysis.statements.verdicts import Measured, Statement
+from cvt_hpc.analysis.statements.verdicts import Kept, Measured, Statement
 from cvt_hpc.vibration.settings import PARAMETERS
 
 # [um] of the strand under load, from which on a run counts as vibrating

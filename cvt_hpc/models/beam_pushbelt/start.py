@@ -14,7 +14,7 @@ from cvt_hpc.multibody.rcm_beam import RcmBeam, line_point, mean_strain
 from cvt_hpc.multibody.rcm_chain import PER_ELEMENT, Chain, close, relaxed_ring
 from cvt_hpc.physics.geometry import Variator
 from cvt_hpc.solvers.cyclic_blocks import empty_columns
-from cvt_hpc.variator.path import points_at
+from cvt_hpc.variator.history import points_at
 
 UNIT_IMPULSES = 16  # on the ring, that are solved for at a time: two registers
 

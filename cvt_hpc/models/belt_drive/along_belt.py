@@ -7,7 +7,7 @@ import numpy as np
 from cvt_hpc.kernels import kernel
 from cvt_hpc.models.belt_drive.contact import Contact, Touch
 from cvt_hpc.multibody.ancf_beam import POINTS, SHAPES, WEIGHTS, AncfBeam, tension_of
-from cvt_hpc.multibody.ancf_chain import Chain
+from cvt_hpc.multibody.ancf_equations import Chain
 from cvt_hpc.physics.nearest_on_path import Way, nearest
 
 

@@ -11,7 +11,7 @@ import numpy as np
 
 from cvt_hpc.parameters import Parameter, not_negative, positive
 from cvt_hpc.variator.course import load_course
-from cvt_hpc.variator.profiles import length_problems, multiple, nested_problems
+from cvt_hpc.variator.scene import length_problems, multiple, nested_problems
 
 PROFILED = ("driving_speed", "load")
 

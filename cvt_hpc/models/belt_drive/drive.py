@@ -9,7 +9,16 @@ from cvt_hpc.models.belt_drive import pulleys as rotating
 from cvt_hpc.models.belt_drive.contact import Contact, Touch, add_contacts, first_touch
 from cvt_hpc.models.belt_drive.friction import begin_friction, finish_friction
 from cvt_hpc.multibody.ancf_beam import AncfBeam
-from cvt_hpc.multibody.ancf_chain import SIZE, Chain, begin_stage, chain, correct, finish_stage, place, set_up
+from cvt_hpc.multibody.ancf_equations import (
+    SIZE,
+    Chain,
+    begin_stage,
+    chain,
+    correct,
+    finish_stage,
+    place,
+    set_up,
+)
 from cvt_hpc.solvers.cyclic_blocks import factor, solve_bordered
 from cvt_hpc.solvers.generalised_alpha import Scheme, stage_length
 

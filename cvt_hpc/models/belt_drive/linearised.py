@@ -20,8 +20,7 @@ from cvt_hpc.models.belt_drive.contact import Contact
 from cvt_hpc.models.belt_drive.drive import Drive, State
 from cvt_hpc.models.belt_drive.friction import Memory, Treatment
 from cvt_hpc.multibody.ancf_beam import PER_NODE, AncfBeam, at_places
-from cvt_hpc.multibody.ancf_chain import chain
-from cvt_hpc.multibody.ancf_equations import assemble
+from cvt_hpc.multibody.ancf_equations import assemble, chain
 from cvt_hpc.solvers.cyclic_blocks import LOWER, UPPER
 
 STUCK = 1.5  # friction_speed: slower contacts stick

@@ -3,8 +3,7 @@
 from typing import Any
 
 from cvt_hpc.parameters import Parameter, not_negative, positive
-from cvt_hpc.physics.friction_laws import FRICTION_LAWS, friction_inert, friction_problems
-from cvt_hpc.physics.friction_table import friction_file
+from cvt_hpc.physics.friction_laws import FRICTION_LAWS, friction_file, friction_inert, friction_problems
 
 PARAMETERS: dict[str, dict[str, Parameter]] = {
     "scene": {

@@ -7,8 +7,7 @@ friction from a dual, which the iterations carry on.
 from numba.extending import register_jitable
 
 from cvt_hpc.lanes import absolute, like, select, sqrt
-from cvt_hpc.physics.contact_laws import coefficient, remembered
-from cvt_hpc.physics.primal_dual import dual_of, friction
+from cvt_hpc.physics.contact_laws import coefficient, dual_of, friction, remembered
 
 
 @register_jitable(forceinline=True)

@@ -17,7 +17,7 @@ from cvt_hpc.parameters import Parameter, Substitute, not_negative, positive
 from cvt_hpc.physics.friction_laws import FRICTION_LAWS, friction_inert, friction_problems
 from cvt_hpc.physics.geometry import driven_radius, variator, variator_problems
 from cvt_hpc.variator import PULLEYS, scene
-from cvt_hpc.variator.profiles import nested
+from cvt_hpc.variator.scene import nested
 from cvt_hpc.vibration.ramped import ramped
 
 FEWEST_ELEMENTS = 100

@@ -9,8 +9,7 @@ from typing import Any
 import numpy as np
 
 from cvt_hpc.parameters import Parameter
-from cvt_hpc.variator.profiles import nested_problems
-from cvt_hpc.variator.scene import course_problems
+from cvt_hpc.variator.scene import course_problems, nested_problems
 
 PROFILED = ("load", "driving_speed", "thrust", "driving_thrust", "ratio")
 _WHAT = {

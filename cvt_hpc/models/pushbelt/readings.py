@@ -8,8 +8,7 @@ import numpy as np
 from cvt_hpc.models.pushbelt import fields
 from cvt_hpc.models.pushbelt.belt import Belt
 from cvt_hpc.physics.geometry import variator
-from cvt_hpc.variator.history import ALONG, of_means
-from cvt_hpc.variator.path import along
+from cvt_hpc.variator.history import ALONG, along, of_means
 
 SCALARS = (
     "driven_speed",

@@ -17,7 +17,7 @@ from cvt_hpc.physics.geometry import driven_radius
 from cvt_hpc.variables import Status
 from cvt_hpc.variator import LEAST_SPEED, MOST_SPEED, PULLEYS, STRANDS
 from cvt_hpc.variator.course import load_course
-from cvt_hpc.variator.profiles import multiple
+from cvt_hpc.variator.scene import multiple
 from cvt_hpc.variator.slip import GAINED, LOST
 from cvt_hpc.vibration.ramped import ramped
 

@@ -11,7 +11,7 @@ from cvt_hpc.models.pushbelt.belt import Belt, BeltState, Workspace
 from cvt_hpc.physics.friction_laws import Law
 from cvt_hpc.physics.geometry import Variator, driven_radius, variator
 from cvt_hpc.solvers.linked_blocks import empty_scratch, empty_system
-from cvt_hpc.variator.path import points_at
+from cvt_hpc.variator.history import points_at
 
 
 def parts_of(nodes: int) -> int:

@@ -13,8 +13,7 @@ from cvt_hpc.kernels import kernel
 from cvt_hpc.lanes import absolute, like, maximum
 from cvt_hpc.models.pushbelt import fields as f
 from cvt_hpc.models.pushbelt.faults import keep_states, most_corrected, name_fault
-from cvt_hpc.solvers.linked_blocks import solve
-from cvt_hpc.solvers.small_system import solve_small
+from cvt_hpc.solvers.linked_blocks import solve, solve_small
 
 FALLS = 0.95  # of the smallest correction so far: one that is larger does not fall
 _LARGE = 1e100  # more than any speed or power that means something

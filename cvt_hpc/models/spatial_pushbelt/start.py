@@ -11,7 +11,7 @@ from cvt_hpc.models.spatial_pushbelt import fields as f
 from cvt_hpc.models.spatial_pushbelt.belt import Belt, BeltState
 from cvt_hpc.physics.geometry import Variator
 from cvt_hpc.physics.out_of_plane import SIDES
-from cvt_hpc.variator.path import points_at, regions
+from cvt_hpc.variator.history import points_at, regions
 
 SEED_MODES = 5  # half waves of a strand that the disturbance at the start is made of
 
