@@ -15,8 +15,8 @@ from cvt_hpc.models.pushbelt import stepping, transient
 from cvt_hpc.models.pushbelt.assembly import RIGHT
 from cvt_hpc.models.pushbelt.parameters import falling_limit, path_length
 from cvt_hpc.models.pushbelt.readings import Reading
+from cvt_hpc.models.pushbelt.run import fingerprint
 from cvt_hpc.models.pushbelt.start import in_lanes, of_lanes, start, workspace
-from cvt_hpc.models.pushbelt.start_up import fingerprint
 from cvt_hpc.models.pushbelt.step import EQUATIONS, _assemble, _evaluate, _prepare, advance
 from cvt_hpc.models.pushbelt.stepping import correct, solve_bordered
 from cvt_hpc.solvers.cyclic_blocks import block_size

@@ -13,8 +13,7 @@ from cvt_hpc.models.pushbelt.border import add_to_totals, book_openings, groove_
 from cvt_hpc.models.spatial_pushbelt import fields as f
 from cvt_hpc.models.spatial_pushbelt import flank
 from cvt_hpc.models.spatial_pushbelt import vectors as vec
-from cvt_hpc.models.spatial_pushbelt.chain import mean_stretch, motion, motion_ahead
-from cvt_hpc.models.spatial_pushbelt.saddle import ring_slip
+from cvt_hpc.models.spatial_pushbelt.chain import mean_stretch, motion, motion_ahead, ring_slip
 from cvt_hpc.physics.contact_laws import damped
 
 

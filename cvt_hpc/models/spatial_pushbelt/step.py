@@ -19,12 +19,10 @@ from cvt_hpc.models.pushbelt.stepping import Equations, advance_by
 from cvt_hpc.models.spatial_pushbelt import assembly, flank, two_flows
 from cvt_hpc.models.spatial_pushbelt import fields as f
 from cvt_hpc.models.spatial_pushbelt import vectors as vec
-from cvt_hpc.models.spatial_pushbelt.bending import bending_forces, predict_bending
-from cvt_hpc.models.spatial_pushbelt.chain import chain_forces, link, predict, pull_across
-from cvt_hpc.models.spatial_pushbelt.faces import face_forces, predict_faces
-from cvt_hpc.models.spatial_pushbelt.pin import pin_forces, predict_pins
+from cvt_hpc.models.spatial_pushbelt.assembly import bending_forces, predict_bending
+from cvt_hpc.models.spatial_pushbelt.chain import chain_forces, link, predict, pull_across, saddle_forces
+from cvt_hpc.models.spatial_pushbelt.faces import face_forces, pin_forces, predict_faces, predict_pins
 from cvt_hpc.models.spatial_pushbelt.power import book_flanks, book_pairs
-from cvt_hpc.models.spatial_pushbelt.saddle import saddle_forces
 
 
 @kernel

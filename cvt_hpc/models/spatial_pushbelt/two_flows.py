@@ -17,8 +17,14 @@ from cvt_hpc.models.pushbelt.border import add_to_totals
 from cvt_hpc.models.pushbelt.friction import ring_friction
 from cvt_hpc.models.spatial_pushbelt import fields as f
 from cvt_hpc.models.spatial_pushbelt import vectors as vec
-from cvt_hpc.models.spatial_pushbelt.chain import lines_at, lines_to_next, mean_stretch, motion, motion_ahead
-from cvt_hpc.models.spatial_pushbelt.saddle import ring_slip
+from cvt_hpc.models.spatial_pushbelt.chain import (
+    lines_at,
+    lines_to_next,
+    mean_stretch,
+    motion,
+    motion_ahead,
+    ring_slip,
+)
 
 
 @register_jitable
