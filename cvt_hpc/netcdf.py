@@ -14,9 +14,9 @@ from typing import TYPE_CHECKING, Any, Protocol
 
 import numpy as np
 
+from cvt_hpc.dataset_form import check_form
 from cvt_hpc.errors import InputError, mismatch
 from cvt_hpc.files import kind_of, naming_refusals, open_regular, written_aside
-from cvt_hpc.foreign_files import check_form
 from cvt_hpc.locks import refuse_locked
 from cvt_hpc.provenance import command, git_revision, history_line, merge_versions, versions
 

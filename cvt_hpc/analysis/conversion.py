@@ -8,8 +8,8 @@ import numpy as np
 import xarray as xr
 from xarray.indexes import PandasMultiIndex
 
+from cvt_hpc.dataset_form import check_form
 from cvt_hpc.errors import mismatch, show, unknown
-from cvt_hpc.foreign_files import check_form
 from cvt_hpc.job.units import factor_to, is_unit
 from cvt_hpc.job.values import JOB_UNITS
 from cvt_hpc.models import MODELS

@@ -10,9 +10,8 @@ from cvt_hpc.models.belt_drive import courses, readings
 from cvt_hpc.models.belt_drive.drive import advance, drive_frequencies
 from cvt_hpc.models.belt_drive.layout import Layout, layout
 from cvt_hpc.models.belt_drive.pulleys import Pulleys, axes
-from cvt_hpc.models.belt_drive.readings import kick
 from cvt_hpc.models.belt_drive.start import start
-from cvt_hpc.models.belt_drive.theory import mesh_amplitude
+from cvt_hpc.models.belt_drive.theory import kick, mesh_amplitude
 from cvt_hpc.models.marched import batches_of_one
 from cvt_hpc.models.sampled import MOST_UNSOLVED, SampledRun
 from cvt_hpc.physics.belt_path import belt_path
