@@ -23,8 +23,9 @@ import numpy as np
 
 from cvt_hpc.kernels import kernel
 from cvt_hpc.steppers.facts import NO_CONVERGENCE, NO_VALUE, OK, RATES, SOLVES, Facts
+from cvt_hpc.steppers.fixed_step import march_in_equal_steps
 from cvt_hpc.steppers.settings import STEP, FixedStep, fixed_step
-from cvt_hpc.steppers.system import SetValuedSystem, march_in_equal_steps
+from cvt_hpc.steppers.system import SetValuedSystem
 
 FACTS = Facts(
     order=1,

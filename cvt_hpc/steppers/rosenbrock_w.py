@@ -23,9 +23,10 @@ import numpy as np
 
 from cvt_hpc.kernels import kernel
 from cvt_hpc.steppers.facts import NO_VALUE, NOT_UNIQUE, OK, RATES, REJECTED, SOLVES, Facts
+from cvt_hpc.steppers.fixed_step import march_in_equal_steps
 from cvt_hpc.steppers.newton import SHIFT, SIGN, Frozen, frozen, renew
 from cvt_hpc.steppers.settings import STEP, FixedStep, fixed_step
-from cvt_hpc.steppers.system import System, march_in_equal_steps, size
+from cvt_hpc.steppers.system import System, size
 
 FACTS = Facts(
     order=2,

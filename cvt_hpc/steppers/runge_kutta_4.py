@@ -12,8 +12,9 @@ import numpy as np
 
 from cvt_hpc.kernels import kernel
 from cvt_hpc.steppers.facts import NO_VALUE, OK, RATES, Facts
+from cvt_hpc.steppers.fixed_step import march_in_equal_steps
 from cvt_hpc.steppers.settings import STEP, FixedStep, fixed_step
-from cvt_hpc.steppers.system import System, march_in_equal_steps
+from cvt_hpc.steppers.system import System
 
 FACTS = Facts(
     order=4,

@@ -18,9 +18,10 @@ import numpy as np
 
 from cvt_hpc.kernels import kernel
 from cvt_hpc.steppers.facts import OK, Facts
+from cvt_hpc.steppers.fixed_step import march_in_equal_steps
 from cvt_hpc.steppers.newton import Frozen, frozen, solve_stage
 from cvt_hpc.steppers.settings import SOLVER_TOLERANCE, STEP, ImplicitStep, implicit_step
-from cvt_hpc.steppers.system import System, march_in_equal_steps
+from cvt_hpc.steppers.system import System
 
 FACTS = Facts(
     order=3,

@@ -14,9 +14,10 @@ import numpy as np
 from cvt_hpc.kernels import kernel
 from cvt_hpc.parameters import Parameter
 from cvt_hpc.steppers.facts import NO_VALUE, RATES, Facts
+from cvt_hpc.steppers.fixed_step import march_in_equal_steps
 from cvt_hpc.steppers.newton import Frozen, frozen, solve_stage
 from cvt_hpc.steppers.settings import SOLVER_TOLERANCE, STEP, from_parameters
-from cvt_hpc.steppers.system import System, march_in_equal_steps
+from cvt_hpc.steppers.system import System
 
 FACTS = Facts(
     order=2,

@@ -10,8 +10,8 @@ import numpy as np
 
 from cvt_hpc.kernels import kernel
 from cvt_hpc.steppers.facts import RATES, Facts, Result
+from cvt_hpc.steppers.fixed_step import march_in_equal_steps
 from cvt_hpc.steppers.settings import STEP, fixed_step
-from cvt_hpc.steppers.system import march_in_equal_steps
 
 FACTS = Facts(
     order=3,
