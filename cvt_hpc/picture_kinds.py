@@ -135,7 +135,7 @@ KINDS = {
     ),
     "wrap": Kind(
         HISTORIES,
-        "wraps.wrap_figure",
+        "profiles.wrap_figure",
         "forces between belt and pulleys over the wrap, of one run or of several",
     ),
     "profile": Kind(

@@ -23,10 +23,10 @@ if TYPE_CHECKING:
 
     from cvt_hpc.analysis.comparison import Cell, Comparison
     from cvt_hpc.job import Job
-    from cvt_hpc.ladder.audit import AuditReport
+    from cvt_hpc.ladder.comparing import AuditReport
     from cvt_hpc.study import RunReport, StudyStatus
     from cvt_hpc.study.forecast.cost_model import Forecast
-    from cvt_hpc.study.forecast.needs import Disk, Needs
+    from cvt_hpc.study.forecast.resources import Disk, Needs
     from cvt_hpc.study.repeats import Repeat
 
 MOST_FAILURES_NAMED = 10
@@ -250,7 +250,7 @@ def forecast_lines(forecasts: Sequence[Forecast], job: Job, basis: str) -> Itera
 
 def needs_line(needed: Needs, histories: int) -> str:
     """Return the line that says what memory and disk a sweep needs."""
-    from cvt_hpc.study.forecast.needs import size_in_words
+    from cvt_hpc.study.forecast.resources import size_in_words
 
     line = (
         f"needed: {size_in_words(needed.memory)} of memory for the plan; {disk_line(needed.disk, histories)}"
@@ -264,7 +264,7 @@ def needs_line(needed: Needs, histories: int) -> str:
 
 def disk_line(disk: Disk, histories: int) -> str:
     """Return the line that says what space a study takes on the disk."""
-    from cvt_hpc.study.forecast.needs import size_in_words
+    from cvt_hpc.study.forecast.resources import size_in_words
 
     line = (
         f"disk: {size_in_words(disk.records)} of records, at most {size_in_words(disk.results)} of results.nc"

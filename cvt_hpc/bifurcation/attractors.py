@@ -23,9 +23,8 @@ from cvt_hpc.models.elastic_belt.belt import Mesh, State
 from cvt_hpc.models.linear_stability.branch import Branch, Onset, tracks
 from cvt_hpc.models.linear_stability.modes import Mode
 from cvt_hpc.models.steady_variator.forces import quantities
-from cvt_hpc.simulation.batches import in_lanes
 from cvt_hpc.simulation.marching import march
-from cvt_hpc.simulation.record import record_of, recorded_model
+from cvt_hpc.simulation.record import in_lanes, record_of, recorded_model
 from cvt_hpc.vibration.classes import OccurrenceClass, classify_runs
 from cvt_hpc.vibration.criticality import Criticality
 

@@ -28,8 +28,7 @@ import xarray as xr
 
 from cvt_hpc.archives import Archives
 from cvt_hpc.chart.comparing import Comparison, Result, compare
-from cvt_hpc.chart.costs import check_prospects, predicted_cost
-from cvt_hpc.chart.measuring import Measurement, measure
+from cvt_hpc.chart.measuring import Measurement, check_prospects, measure, predicted_cost
 from cvt_hpc.chart.plan import Chart, Point, Role
 from cvt_hpc.chart.quantities import KINDS
 from cvt_hpc.chart.scene_drawing import draw_budget, draw_scene

@@ -71,7 +71,7 @@ def _check(arguments: argparse.Namespace) -> int:
 
 def _chart_lines(arguments: argparse.Namespace) -> Iterator[str]:
     from cvt_hpc.chart import load_chart
-    from cvt_hpc.chart.costs import check_prospects, plan_lines
+    from cvt_hpc.chart.measuring import check_prospects, plan_lines
 
     chart = load_chart(arguments.path, arguments.set)
     check_prospects(chart)
@@ -108,7 +108,7 @@ def show_job(job: Job, out: Path | None) -> None:
     from cvt_hpc.job.summary import summarize
     from cvt_hpc.printing import needs_line
     from cvt_hpc.study.description import check_names
-    from cvt_hpc.study.forecast.needs import refuse_too_large
+    from cvt_hpc.study.forecast.resources import refuse_too_large
     from cvt_hpc.study.simulator import default_simulator
 
     check_names(job, default_simulator())

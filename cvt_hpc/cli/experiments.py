@@ -65,7 +65,7 @@ def _ladder(arguments: argparse.Namespace) -> int:
 
 def _branch(arguments: argparse.Namespace) -> int:
     from cvt_hpc.bifurcation import load_diagram, make_diagram
-    from cvt_hpc.bifurcation.folder import DATASET
+    from cvt_hpc.bifurcation.diagram import DATASET
     from cvt_hpc.bifurcation.table import branch_lines, failure_lines
 
     parts.refuse_ranks("branch", "walks along the load")

@@ -19,7 +19,7 @@ from cvt_hpc.job.assignments import Assignments, split_assignments, take_own
 from cvt_hpc.job.axes import read_values
 from cvt_hpc.job.design import read_range
 from cvt_hpc.job.document import read_document, read_set, read_table, read_tables
-from cvt_hpc.job.notices import warn_of_notices
+from cvt_hpc.job.summary import warn_of_notices
 from cvt_hpc.job.units import unit_in
 from cvt_hpc.job.values import expectation, kind_of, read_value, warn_of_bare_numbers
 from cvt_hpc.parameters import Parameter, positive

@@ -13,11 +13,9 @@ from cvt_hpc.job.axes import Axis, read_axis
 from cvt_hpc.job.crosscheck import check_grid, check_rules
 from cvt_hpc.job.csv_files import read_csv
 from cvt_hpc.job.definition import HEADER, Job, answering_model, handed_to
-from cvt_hpc.job.design import Design, read_design, resolve_spacing, sampled_axes
+from cvt_hpc.job.design import KEY, Design, read_design, read_histories, resolve_spacing, sampled_axes
 from cvt_hpc.job.document import read_document
-from cvt_hpc.job.histories import KEY, read_histories
 from cvt_hpc.job.netcdf_files import SUFFIX, read_netcdf
-from cvt_hpc.job.notices import tell_of_no_effect, warn_of_notices
 from cvt_hpc.job.rules import (
     Link,
     Rule,
@@ -29,6 +27,7 @@ from cvt_hpc.job.rules import (
     relinked,
 )
 from cvt_hpc.job.schema import Schema, load_schema
+from cvt_hpc.job.summary import tell_of_no_effect, warn_of_notices
 from cvt_hpc.job.units import unit_in
 from cvt_hpc.job.values import expectation, kind_of, read_value, warn_of_bare_numbers
 from cvt_hpc.models.contract import load_model

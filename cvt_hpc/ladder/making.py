@@ -24,8 +24,7 @@ from cvt_hpc.files import refuse_link, write_rows, written_aside
 from cvt_hpc.job import Job
 from cvt_hpc.job.values import JOB_UNITS
 from cvt_hpc.ladder.comparing import Finding, compare
-from cvt_hpc.ladder.loading import cost_left
-from cvt_hpc.ladder.rungs import QUESTIONS, REFERENCE, Rung
+from cvt_hpc.ladder.loading import QUESTIONS, REFERENCE, Rung, cost_left
 from cvt_hpc.linear_algebra import one_thread
 from cvt_hpc.netcdf import attributes, global_attributes, write_netcdf
 from cvt_hpc.provenance import machine, origin_lines

@@ -16,8 +16,7 @@ from typing import Any
 from cvt_hpc.job import Job
 from cvt_hpc.models.contract import Batch, load_model
 from cvt_hpc.recording import longest_duration, sample_count
-from cvt_hpc.simulation.batches import in_lanes
-from cvt_hpc.simulation.record import record_of, record_without_run
+from cvt_hpc.simulation.record import in_lanes, record_of, record_without_run
 from cvt_hpc.variables import LONGEST_REASON, Status, Vibrates, shortened
 from cvt_hpc.vibration.ramped import ramped
 

@@ -14,7 +14,7 @@ import numpy as np
 
 from cvt_hpc.job import Job
 from cvt_hpc.job.assignments import Assignments, read_assignments, warn_of_bare_assignments
-from cvt_hpc.job.notices import warn_of_notices
+from cvt_hpc.job.summary import warn_of_notices
 from cvt_hpc.job.values import POINT_UNITS
 from cvt_hpc.models.contract import Model, load_model
 from cvt_hpc.netcdf import attributes, global_attributes, variable_attributes

@@ -25,7 +25,7 @@ from cvt_hpc.study.description import Study
 from cvt_hpc.study.folder import Part, StudyFolder, leave_out_missing
 from cvt_hpc.study.forecast.cost_model import Fit
 from cvt_hpc.study.ranks.progress import Counter, Progress
-from cvt_hpc.study.ranks.time_limit import TimeLimit
+from cvt_hpc.study.ranks.stopping import TimeLimit
 from cvt_hpc.study.record.index import Records
 from cvt_hpc.study.record.log import RecordFormat, RecordLog
 from cvt_hpc.study.simulator import Simulator

@@ -1,9 +1,12 @@
-"""All runs of a job, on all ranks: compute the plan, record, gather."""
+"""All runs of a job, on all ranks: compute the plan, record, gather.
+
+Distribution of runs: all ranks compute, and each claims its next batch from one counter.
+"""
 
 import logging
 import math
 import time
-from collections.abc import Callable, Collection, Mapping
+from collections.abc import Callable, Collection, Iterator, Mapping, Sequence
 from contextlib import ExitStack, closing
 from dataclasses import replace
 from functools import partial
@@ -19,17 +22,24 @@ from cvt_hpc.linear_algebra import one_thread
 from cvt_hpc.locks import BusyError
 from cvt_hpc.netcdf import library_for_sweep
 from cvt_hpc.provenance import program_identity
+from cvt_hpc.study.batches import Assignment, Batch
 from cvt_hpc.study.description import Study, describe
 from cvt_hpc.study.folder import Part, StudyFolder, keep_histories, leave_out_missing, read_part
 from cvt_hpc.study.forecast.cost_model import CostModel
-from cvt_hpc.study.forecast.needs import refuse_too_large
+from cvt_hpc.study.forecast.resources import refuse_too_large
 from cvt_hpc.study.gather import LossError, gather_records
 from cvt_hpc.study.planning import Plan, asked_runs, next_round, prepare
 from cvt_hpc.study.ranks.launch import Ranks, Team, assembled_team
 from cvt_hpc.study.ranks.progress import Counter, Progress
-from cvt_hpc.study.ranks.schedule import claimed_batches, open_counter
-from cvt_hpc.study.ranks.stopping import ELSEWHERE, SignalWatch, Stop, outlive, raise_again
-from cvt_hpc.study.ranks.time_limit import find_time_limit, planning_within
+from cvt_hpc.study.ranks.stopping import (
+    ELSEWHERE,
+    SignalWatch,
+    Stop,
+    find_time_limit,
+    outlive,
+    planning_within,
+    raise_again,
+)
 from cvt_hpc.study.record.log import RecordFormat, RecordLog
 from cvt_hpc.study.simulator import Simulator, default_simulator
 from cvt_hpc.study.status import STOPPED, RunReport, build_report
@@ -305,3 +315,43 @@ def _conclude(
     asked = asked_runs(task, records, part)
     gained = int(records.recorded[asked].sum()) - plan.recorded
     return build_report(folder, task.study, records, asked, gathers, gained, stopped)
+
+
+def open_counter(team: Team) -> Counter:
+    """Return the counter of a team, at zero."""
+    if team.communicator is None:
+        return Counter()
+    from cvt_hpc.study.ranks.shared_counter import SharedCounter
+
+    return SharedCounter(team.communicator)
+
+
+def claimed_batches(
+    plan: Sequence[Assignment],
+    counter: Counter,
+    may_claim: Callable[[], bool],
+    fits: Callable[[Batch], bool],
+) -> Iterator[Assignment]:
+    """Yield the work of this rank, one batch at a time.
+
+    Parameters
+    ----------
+    plan : sequence of Assignment
+        All batches to be done, in the order in which they start; the same on all ranks.
+    counter : Counter
+        Where positions in `plan` are claimed.
+    may_claim : callable
+        Called before each batch; if it returns False, there are no more.
+    fits : callable
+        Whether there is time for a batch. A batch that does not fit is passed over, and no rank does it in
+        this session; shorter ones stand later in the plan.
+    """
+    while may_claim():
+        position = counter.claim()
+        if position >= len(plan):
+            return
+        for place, part in enumerate(plan[position].parts()):
+            if place > 0 and not may_claim():
+                return
+            if fits(part.runs):
+                yield part

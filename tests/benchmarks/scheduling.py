@@ -34,8 +34,8 @@ from cvt_hpc.study.forecast.cost_model import (  # noqa: E402
     simulate_schedule,
 )
 from cvt_hpc.study.ranks.launch import assembled_team  # noqa: E402
-from cvt_hpc.study.ranks.schedule import open_counter  # noqa: E402
 from cvt_hpc.study.status import find_records  # noqa: E402
+from cvt_hpc.study.sweep import open_counter  # noqa: E402
 from support.study_double import Axis, Job, Simulator  # noqa: E402
 from support.study_processes import clean_environment, find_mpirun  # noqa: E402
 

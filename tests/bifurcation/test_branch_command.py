@@ -7,8 +7,7 @@ import pytest
 import xarray as xr
 
 from cvt_hpc.bifurcation.attractors import Attractor, Stability, Start, attractors
-from cvt_hpc.bifurcation.diagram import Direction
-from cvt_hpc.bifurcation.folder import DiagramFolder
+from cvt_hpc.bifurcation.diagram import DiagramFolder, Direction
 from cvt_hpc.bifurcation.job import load_diagram
 from cvt_hpc.cli import main
 from cvt_hpc.job import build_job

@@ -5,7 +5,7 @@ import pytest
 from numba import njit
 from scipy.optimize import brentq
 
-from cvt_hpc.models.pushbelt.start import of_lanes
+from cvt_hpc.models.pushbelt.belt import of_lanes
 from cvt_hpc.models.spatial_pushbelt import belt as b
 from cvt_hpc.models.spatial_pushbelt import fields as f
 from cvt_hpc.models.spatial_pushbelt.chain import predict

@@ -3,7 +3,7 @@
 import numpy as np
 import pytest
 
-from cvt_hpc.models.pushbelt.start import in_lanes, of_lanes
+from cvt_hpc.models.pushbelt.belt import in_lanes, of_lanes
 from cvt_hpc.models.spatial_pushbelt import fields
 from cvt_hpc.models.spatial_pushbelt.assembly import bending_forces, predict_bending
 from cvt_hpc.models.spatial_pushbelt.step import _assemble, _prepare

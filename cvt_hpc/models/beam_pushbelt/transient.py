@@ -20,10 +20,9 @@ from cvt_hpc.models.beam_pushbelt.step import advance
 from cvt_hpc.models.marched import batches_of_one
 from cvt_hpc.models.pushbelt import fields as f
 from cvt_hpc.models.pushbelt import transient as pushbelt
-from cvt_hpc.models.pushbelt.belt import Belt
+from cvt_hpc.models.pushbelt.belt import Belt, belt_of, equal_chords, pitch_line
 from cvt_hpc.models.pushbelt.readings import Reading
 from cvt_hpc.models.pushbelt.run import OF_LOSS
-from cvt_hpc.models.pushbelt.start import belt_of, equal_chords, pitch_line
 from cvt_hpc.models.sampled import MOST_UNSOLVED
 from cvt_hpc.multibody.rcm_beam import RcmBeam, energies, line_point, mean_strain
 from cvt_hpc.multibody.rcm_chain import PER_ELEMENT, Chain, close, relaxed_ring

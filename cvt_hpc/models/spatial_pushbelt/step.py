@@ -22,7 +22,7 @@ from cvt_hpc.models.spatial_pushbelt import vectors as vec
 from cvt_hpc.models.spatial_pushbelt.assembly import bending_forces, predict_bending
 from cvt_hpc.models.spatial_pushbelt.chain import chain_forces, link, predict, pull_across, saddle_forces
 from cvt_hpc.models.spatial_pushbelt.faces import face_forces, pin_forces, predict_faces, predict_pins
-from cvt_hpc.models.spatial_pushbelt.power import book_flanks, book_pairs
+from cvt_hpc.models.spatial_pushbelt.flank import book_flanks, book_pairs
 
 
 @kernel

@@ -9,14 +9,13 @@ import numpy as np
 from cvt_hpc.kernels import called_alike
 from cvt_hpc.models.marched import batches_of_one
 from cvt_hpc.models.pushbelt import run
+from cvt_hpc.models.pushbelt.belt import of_lanes
 from cvt_hpc.models.pushbelt.run import COURSES, ElementRun
-from cvt_hpc.models.pushbelt.start import of_lanes
 from cvt_hpc.models.pushbelt.stepping import advance_by
 from cvt_hpc.models.spatial_pushbelt import fields as f
 from cvt_hpc.models.spatial_pushbelt import readings
-from cvt_hpc.models.spatial_pushbelt.belt import NEWTON, NEWTON_OF_TWO_FLOWS, workspace
+from cvt_hpc.models.spatial_pushbelt.belt import NEWTON, NEWTON_OF_TWO_FLOWS, start, with_two_flows, workspace
 from cvt_hpc.models.spatial_pushbelt.parameters import LOOSE_SIDES, package_arm
-from cvt_hpc.models.spatial_pushbelt.start import start, with_two_flows
 from cvt_hpc.models.spatial_pushbelt.step import EQUATIONS
 from cvt_hpc.variator import LARGEST_DISPLACEMENT, STRANDS
 
