@@ -5,6 +5,7 @@ from dataclasses import dataclass, field
 from typing import Any
 
 Range = tuple[float, float]
+Parameters = Mapping[str, Any]  # flat, of one run [SI]
 
 
 @dataclass(frozen=True)

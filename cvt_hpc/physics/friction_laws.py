@@ -15,7 +15,7 @@ from typing import Any
 
 import numpy as np
 
-from cvt_hpc.parameters import Column, FromFile, Parameter, RowError
+from cvt_hpc.parameters import Column, FromFile, Parameter, Parameters, RowError
 
 KEYS = ("table_force", "table_speed", "table_mu")
 _OTHER_NAMES = {
@@ -37,17 +37,17 @@ TABLE_PARAMETERS = ("table_force", "table_speed", "table_mu")
 _ALL_PARAMETERS = (*FORMULA_PARAMETERS, "table_file", *TABLE_PARAMETERS)
 
 
-def _no_problems(p: Mapping[str, Any]) -> Problems:
+def _no_problems(p: Parameters) -> Problems:
     return []
 
 
-def _coulomb_problems(p: Mapping[str, Any]) -> Problems:
+def _coulomb_problems(p: Parameters) -> Problems:
     if p["friction_gradient"] == 0.0:
         return []
     return [("friction_gradient", "0 with friction_law coulomb", f"{p['friction_gradient']:g} s/m")]
 
 
-def _table_problems(p: Mapping[str, Any]) -> Problems:
+def _table_problems(p: Parameters) -> Problems:
     """Problems of a friction table; the first one only."""
     force, speed, mu = (p[key] for key in TABLE_PARAMETERS)
     for key, grid in (("table_force", force), ("table_speed", speed)):
@@ -62,15 +62,15 @@ def _table_problems(p: Mapping[str, Any]) -> Problems:
     return []
 
 
-def _kinetic(p: Mapping[str, Any]) -> float:
+def _kinetic(p: Parameters) -> float:
     return float(p["kinetic_friction"])
 
 
-def _fallen_from(p: Mapping[str, Any], share: float = 1.0) -> float:
+def _fallen_from(p: Parameters, share: float = 1.0) -> float:
     return float(p["kinetic_friction"] - share * p["friction_gradient"] * p["stribeck_velocity"])
 
 
-def _of_table(p: Mapping[str, Any]) -> float:
+def _of_table(p: Parameters) -> float:
     return float(np.max(p["table_mu"]))
 
 
@@ -88,15 +88,15 @@ class Law(IntEnum):
     """
 
     reads: tuple[str, ...]
-    problems: Callable[[Mapping[str, Any]], Problems]
-    largest: Callable[[Mapping[str, Any]], float]
+    problems: Callable[[Parameters], Problems]
+    largest: Callable[[Parameters], float]
 
     def __new__(
         cls,
         number: int,
         reads: tuple[str, ...],
-        problems: Callable[[Mapping[str, Any]], Problems] = _no_problems,
-        largest: Callable[[Mapping[str, Any]], float] = _fallen_from,
+        problems: Callable[[Parameters], Problems] = _no_problems,
+        largest: Callable[[Parameters], float] = _fallen_from,
     ) -> Law:
         """Make the member of a number."""
         law = int.__new__(cls, number)
@@ -114,7 +114,7 @@ class Law(IntEnum):
 FRICTION_LAWS = tuple(law.name.lower() for law in Law)  # as a job names them
 
 
-def friction_problems(parameters: Mapping[str, Any]) -> Problems:
+def friction_problems(parameters: Parameters) -> Problems:
     """Problems of a friction law: (key, expected, found).
 
     Parameters
@@ -125,7 +125,7 @@ def friction_problems(parameters: Mapping[str, Any]) -> Problems:
     return _declared(parameters).problems(parameters)
 
 
-def friction_inert(parameters: Mapping[str, Any]) -> dict[str, str]:
+def friction_inert(parameters: Parameters) -> dict[str, str]:
     """Parameters of a friction law without effect, each with the setting that makes it so.
 
     Parameters
@@ -140,7 +140,7 @@ def friction_inert(parameters: Mapping[str, Any]) -> dict[str, str]:
     return inert
 
 
-def largest_friction(parameters: Mapping[str, Any]) -> float:
+def largest_friction(parameters: Parameters) -> float:
     """Largest coefficient of a friction law without problems, at any speed and force [1].
 
     Parameters
@@ -151,7 +151,7 @@ def largest_friction(parameters: Mapping[str, Any]) -> float:
     return _declared(parameters).largest(parameters)
 
 
-def _declared(parameters: Mapping[str, Any]) -> Law:
+def _declared(parameters: Parameters) -> Law:
     return Law[parameters["friction_law"].upper()]
 
 

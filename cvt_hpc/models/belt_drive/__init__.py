@@ -24,7 +24,7 @@ from cvt_hpc.errors import show
 from cvt_hpc.models.belt_drive.courses import PARAMETERS as COURSES
 from cvt_hpc.models.belt_drive.courses import course_inert, course_problems, free_length
 from cvt_hpc.models.belt_drive.layout import LAYOUT, TENSIONER, TWO, layout, layout_inert, layout_problems
-from cvt_hpc.parameters import Parameter, not_negative, positive
+from cvt_hpc.parameters import Parameter, Parameters, not_negative, positive
 from cvt_hpc.physics.friction_laws import friction_inert, friction_problems
 from cvt_hpc.steppers import STEPPERS as GENERAL
 from cvt_hpc.variator.scene import FRICTION, SCENE, rise_problems
@@ -140,7 +140,7 @@ COMPARED = ("speed_loss", "efficiency", "strand_tension", "tension_ripple")
 __all__ = ["COMPARED", "DEFAULT_STEPPER", "PARAMETERS", "REFUSED", "STEPPERS", "check", "inert"]
 
 
-def check(parameters: dict[str, Any]) -> list[tuple[str, str, str]]:
+def check(parameters: Parameters) -> list[tuple[str, str, str]]:
     """Problems that lie between parameters.
 
     Parameters
@@ -181,7 +181,7 @@ def check(parameters: dict[str, Any]) -> list[tuple[str, str, str]]:
     return problems + rise_problems(p) + course_problems(p) + friction_problems(p)
 
 
-def _beside_lists(p: Mapping[str, Any]) -> list[tuple[str, str, str]]:
+def _beside_lists(p: Parameters) -> list[tuple[str, str, str]]:
     """Settings of two pulleys, other than by default, beside lists that give all pulleys."""
     if not p["pulley_x"]:
         return []
@@ -190,7 +190,7 @@ def _beside_lists(p: Mapping[str, Any]) -> list[tuple[str, str, str]]:
     return [(key, expected, f"{show(p[key])} {entry.unit}".rstrip()) for key, entry in given.items()]
 
 
-def inert(parameters: Mapping[str, Any]) -> dict[str, str]:
+def inert(parameters: Parameters) -> dict[str, str]:
     """Parameters without effect on a run, each with the setting that makes it so.
 
     Parameters

@@ -9,14 +9,11 @@ At a tension T the belt is longer by the factor x with EA (x^2 - 1) x / 2 = T, a
 T / (R k) on each arc, which shortens the path.
 """
 
-from collections.abc import Mapping
-from typing import Any
-
 import numpy as np
 from scipy.optimize import brentq
 
 from cvt_hpc.models.belt_drive.layout import PULLEY_LISTS, TENSIONER, TWO, layout, layout_problems
-from cvt_hpc.parameters import Parameter, Substitute, not_negative, positive
+from cvt_hpc.parameters import Parameter, Parameters, Substitute, not_negative, positive
 from cvt_hpc.physics.belt_path import BeltPath
 from cvt_hpc.variator.course import load_course
 from cvt_hpc.variator.scene import length_problems, multiple, nested_problems
@@ -46,7 +43,7 @@ PARAMETERS: dict[str, Parameter] = {
 }
 
 
-def driving_speed(parameters: Mapping[str, Any], time: float) -> float:
+def driving_speed(parameters: Parameters, time: float) -> float:
     """Speed of the driving pulley at a time [rad/s], in the direction in which it drives."""
     p = parameters
     since = time - (p["profile_time"][-1] if p["profile_time"] else 0.0)
@@ -54,14 +51,14 @@ def driving_speed(parameters: Mapping[str, Any], time: float) -> float:
     return p["driving_speed"] * multiple(p, "driving_speed", time) + ripple
 
 
-def load(parameters: Mapping[str, Any], time: float) -> float:
+def load(parameters: Parameters, time: float) -> float:
     """Load at a time [N m]: it rises smoothly within `rise_time`."""
     p = parameters
     risen = load_course.py_func(time, p["rise_time"], p["rise_time"], p["load"], p["load"])
     return risen * multiple(p, "load", time)
 
 
-def course_problems(parameters: Mapping[str, Any]) -> list[tuple[str, str, str]]:
+def course_problems(parameters: Parameters) -> list[tuple[str, str, str]]:
     """Problems of courses, in the form of a model's check: (key, expected, found).
 
     Parameters
@@ -85,7 +82,7 @@ def course_problems(parameters: Mapping[str, Any]) -> list[tuple[str, str, str]]
     return found
 
 
-def course_inert(parameters: Mapping[str, Any]) -> dict[str, str]:
+def course_inert(parameters: Parameters) -> dict[str, str]:
     """Parameters of courses without effect, each with the setting that makes it so."""
     return {"ripple_frequency": "speed_ripple 0"} if parameters["speed_ripple"] == 0.0 else {}
 
@@ -103,13 +100,13 @@ def contact_compliance(path: BeltPath, contact_stiffness: float) -> float:
     return float((path.wrap / path.radius).sum()) / contact_stiffness
 
 
-def length_at(path: BeltPath, tension: float, parameters: Mapping[str, Any]) -> float:
+def length_at(path: BeltPath, tension: float, parameters: Parameters) -> float:
     """Length without load of the belt that has a tension [N] on a path, nearly [m]."""
     shortened = path.path_length - contact_compliance(path, parameters["contact_stiffness"]) * tension
     return shortened / stretch(tension, parameters["axial_stiffness"])
 
 
-def _tension(parameters: Mapping[str, Any]) -> float:
+def _tension(parameters: Parameters) -> float:
     """Tension [N] that the belt of `free_length` has."""
     p = parameters
     if layout_problems(p):

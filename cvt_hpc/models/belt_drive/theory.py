@@ -5,15 +5,13 @@ Largest excitation by the mesh alone, whose elements are cubic and bend where th
 A kick across the strands of a running drive, and the frequencies at which they answer.
 """
 
-from collections.abc import Mapping
-from typing import Any
-
 import numpy as np
 from scipy.optimize import brentq
 
 from cvt_hpc.models.belt_drive.courses import load, stretch
 from cvt_hpc.models.belt_drive.layout import Layout
 from cvt_hpc.models.strand.ritz import Strand, eigenfrequencies
+from cvt_hpc.parameters import Parameters
 from cvt_hpc.physics.belt_path import BeltPath, regions
 from cvt_hpc.physics.nearest_on_path import along
 from cvt_hpc.vibration.signals import band_amplitude, dominant_frequency
@@ -30,7 +28,7 @@ FUNCTIONS = 24  # sines of the Ritz model: more change no recorded frequency by 
 SHAKEN = 0.02
 
 
-def creep_loss(parameters: Mapping[str, Any], drawn: Layout) -> float:
+def creep_loss(parameters: Parameters, drawn: Layout) -> float:
     """Speed loss by creep alone, by tension at rest and torque at the end (Cepon and Boltezar 2011, eq. 4).
 
     Parameters
@@ -54,7 +52,7 @@ def creep_loss(parameters: Mapping[str, Any], drawn: Layout) -> float:
     return 1.0 - (held - torque) / (held + torque)
 
 
-def expected_loss(parameters: Mapping[str, Any], drawn: Layout, tension: np.ndarray) -> float:
+def expected_loss(parameters: Parameters, drawn: Layout, tension: np.ndarray) -> float:
     """Speed loss by creep, radial compliance and shear of bristles, from the tensions of a run.
 
     The belt sticks where it runs onto a pulley. The rubber under its cord turns with the pulley, so that
@@ -88,7 +86,7 @@ def expected_loss(parameters: Mapping[str, Any], drawn: Layout, tension: np.ndar
 
 
 def unsheared_tension(
-    parameters: Mapping[str, Any], inlet: float, outlet: float, radius: float, wrap: float
+    parameters: Parameters, inlet: float, outlet: float, radius: float, wrap: float
 ) -> float:
     """Tension at which a belt of the same speed would run onto a pulley without shearing its rubber.
 
@@ -137,11 +135,11 @@ def unsheared_tension(
     return inlet - rise(stuck)[0] / (np.cosh(rate * stuck) - 1.0)
 
 
-def _has_one_coefficient(p: Mapping[str, Any]) -> bool:
+def _has_one_coefficient(p: Parameters) -> bool:
     return bool(p["friction_law"] == "coulomb" and p["friction_gradient"] == 0.0)
 
 
-def centrifugal(parameters: Mapping[str, Any], path: BeltPath) -> float:
+def centrifugal(parameters: Parameters, path: BeltPath) -> float:
     """The part m v^2 of a tension, by which a running belt does not press [N]."""
     return float(parameters["line_mass"] * (parameters["driving_speed"] * path.radius[0]) ** 2)
 
@@ -155,7 +153,7 @@ def wrap_angles(path: BeltPath, position: np.ndarray) -> np.ndarray:
 
 
 def sliding_tension(
-    parameters: Mapping[str, Any], path: BeltPath, tension: np.ndarray, position: np.ndarray
+    parameters: Parameters, path: BeltPath, tension: np.ndarray, position: np.ndarray
 ) -> np.ndarray:
     """Tension over the wraps by Euler and Eytelwein.
 
@@ -194,7 +192,7 @@ def sliding_tension(
     return found
 
 
-def strand_frequencies(parameters: Mapping[str, Any], path: BeltPath, tension: np.ndarray) -> np.ndarray:
+def strand_frequencies(parameters: Parameters, path: BeltPath, tension: np.ndarray) -> np.ndarray:
     """Eigenfrequencies of the strands as running beams, pinned where the tangents touch the pulleys.
 
     Bending lifts the belt off a pulley by d = sqrt(EI / (T - m v^2)) before that point. There it is clamped,
@@ -224,7 +222,7 @@ def strand_frequencies(parameters: Mapping[str, Any], path: BeltPath, tension: n
     return np.array([eigenfrequencies(strand, FUNCTIONS)[:MODES] for strand in strands])
 
 
-def mesh_amplitude(parameters: Mapping[str, Any], path: BeltPath, tension: np.ndarray) -> float:
+def mesh_amplitude(parameters: Parameters, path: BeltPath, tension: np.ndarray) -> float:
     """Largest amplitude at which the passing elements may shake the strands [m].
 
     Where the belt runs on or off, its curvature changes from 0 to 1 / R along d = sqrt(EI / N), with

@@ -35,7 +35,7 @@ long), on sheaves that tilt (3e5 N m/rad over arc times radius squared), which s
 from typing import Any
 
 from cvt_hpc.models import elastic_belt
-from cvt_hpc.parameters import Parameter, not_negative, positive
+from cvt_hpc.parameters import Parameter, Parameters, not_negative, positive
 from cvt_hpc.physics.friction_laws import friction_inert, friction_problems
 
 _BELT, _SHEAVES = elastic_belt.PARAMETERS["belt"], elastic_belt.PARAMETERS["sheaves"]
@@ -88,7 +88,7 @@ STEPPERS: dict[str, str] = {}
 __all__ = ["DEFAULT_STEPPER", "PARAMETERS", "STEPPERS", "check", "inert"]
 
 
-def check(parameters: dict[str, Any]) -> list[tuple[str, str, str]]:
+def check(parameters: Parameters) -> list[tuple[str, str, str]]:
     """Problems that lie between parameters.
 
     Parameters
@@ -108,6 +108,6 @@ def check(parameters: dict[str, Any]) -> list[tuple[str, str, str]]:
     return problems
 
 
-def inert(parameters: dict[str, Any]) -> dict[str, str]:
+def inert(parameters: Parameters) -> dict[str, str]:
     """Parameters without effect: see `elastic_belt.inert`."""
     return friction_inert(parameters)

@@ -12,7 +12,7 @@ from typing import Any
 
 import numpy as np
 
-from cvt_hpc.parameters import Parameter, positive
+from cvt_hpc.parameters import Parameter, Parameters, positive
 from cvt_hpc.steppers import taken
 
 PARAMETERS: dict[str, dict[str, Parameter]] = {
@@ -49,7 +49,7 @@ STEPPERS = taken(REFUSED)
 __all__ = ["DEFAULT_STEPPER", "PARAMETERS", "REFUSED", "STEPPERS", "check", "inert"]
 
 
-def check(parameters: dict[str, Any]) -> list[tuple[str, str, str]]:
+def check(parameters: Parameters) -> list[tuple[str, str, str]]:
     """Problems that lie between parameters.
 
     Parameters
@@ -74,7 +74,7 @@ def check(parameters: dict[str, Any]) -> list[tuple[str, str, str]]:
     return problems
 
 
-def inert(parameters: dict[str, Any]) -> dict[str, str]:
+def inert(parameters: Parameters) -> dict[str, str]:
     """Parameters without effect on a run, each with the setting that makes it so."""
     shape = parameters["shape"]
     found = {"arc_probes": "model moving_string, which has one strand"}

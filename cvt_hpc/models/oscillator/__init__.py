@@ -24,7 +24,7 @@ Parameters of the oscillator that a job may set. The defaults: stick-slip of uni
 
 from typing import Any
 
-from cvt_hpc.parameters import Parameter, not_negative, positive
+from cvt_hpc.parameters import Parameter, Parameters, not_negative, positive
 from cvt_hpc.physics.friction_laws import FRICTION_LAWS, friction_file, friction_inert, friction_problems
 from cvt_hpc.steppers import STEPPERS
 
@@ -102,7 +102,7 @@ DEFAULT_STEPPER = "moreau"
 __all__ = ["DEFAULT_STEPPER", "PARAMETERS", "STEPPERS", "check", "inert"]
 
 
-def check(parameters: dict[str, Any]) -> list[tuple[str, str, str]]:
+def check(parameters: Parameters) -> list[tuple[str, str, str]]:
     """Problems that lie between parameters.
 
     Parameters
@@ -126,7 +126,7 @@ def check(parameters: dict[str, Any]) -> list[tuple[str, str, str]]:
     return problems
 
 
-def inert(parameters: dict[str, Any]) -> dict[str, str]:
+def inert(parameters: Parameters) -> dict[str, str]:
     """Parameters without effect on a run, each with the setting that makes it so."""
     p = parameters
     law = p["friction_law"]

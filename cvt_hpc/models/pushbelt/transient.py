@@ -15,9 +15,7 @@ to either side; beyond, the hole pushes back elastically and without friction.
 An offset grows by the speeds times (o_j, a, 0) of element i and (-o_j, b, 0) of j, a and b being levers.
 """
 
-from collections.abc import Mapping
 from functools import partial
-from typing import Any
 
 import numpy as np
 from numba.extending import register_jitable
@@ -34,6 +32,7 @@ from cvt_hpc.models.pushbelt.friction import filtered_slip
 from cvt_hpc.models.pushbelt.readings import SCALARS, Reading
 from cvt_hpc.models.pushbelt.run import COURSES, ElementRun, given
 from cvt_hpc.models.pushbelt.stepping import Equations, advance_by
+from cvt_hpc.parameters import Parameters
 from cvt_hpc.physics.contact_laws import pressed
 
 CHANNELS = (*COURSES, *SCALARS)
@@ -42,7 +41,7 @@ CHANNELS = (*COURSES, *SCALARS)
 class Transient(ElementRun):
     """One run of the planar pushbelt; parameters as of `ElementRun`."""
 
-    def _begin(self, p: Mapping[str, Any]) -> None:
+    def _begin(self, p: Parameters) -> None:
         self._advance = partial(called_alike(advance_by), EQUATIONS)
         self._belt, self._state = start(given(p))
         self._work = workspace(self._belt, p["elements"])

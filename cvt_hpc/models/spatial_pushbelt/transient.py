@@ -1,6 +1,5 @@
 """A transient run of the spatial pushbelt: it starts from geometry, is clamped and loaded, and recorded."""
 
-from collections.abc import Mapping
 from functools import partial
 from typing import Any
 
@@ -17,6 +16,7 @@ from cvt_hpc.models.spatial_pushbelt import readings
 from cvt_hpc.models.spatial_pushbelt.belt import NEWTON, NEWTON_OF_TWO_FLOWS, start, with_two_flows, workspace
 from cvt_hpc.models.spatial_pushbelt.parameters import LOOSE_SIDES, package_arm
 from cvt_hpc.models.spatial_pushbelt.step import EQUATIONS
+from cvt_hpc.parameters import Parameters
 from cvt_hpc.variator import LARGEST_DISPLACEMENT, STRANDS
 
 CHANNELS = (*COURSES, *readings.SCALARS)
@@ -37,7 +37,7 @@ class Transient(ElementRun):
     _profiles = tuple(readings.PROFILES)
     _directions = (*STRANDS, *readings.LATERAL)
 
-    def _begin(self, p: Mapping[str, Any]) -> None:
+    def _begin(self, p: Parameters) -> None:
         flows = p["ring_flows"]
         self._advance = partial(called_alike(advance_by), EQUATIONS[flows])
         self._belt, self._state = start(given(p))
@@ -83,7 +83,7 @@ class Transient(ElementRun):
         return found.stored_energy(self._state.openings, self._state.leans)
 
 
-def given(parameters: Mapping[str, Any]) -> dict[str, Any]:
+def given(parameters: Parameters) -> dict[str, Any]:
     """What `start` takes, from flat parameters of a run [SI]."""
     p, shared = parameters, run.given(parameters)
     pitch = shared["belt_length"] / p["elements"]

@@ -23,7 +23,7 @@ Parameters of the strands: quantities of the elastic belt, and the source of the
 from typing import Any
 
 from cvt_hpc.models import elastic_belt
-from cvt_hpc.parameters import Parameter, not_negative
+from cvt_hpc.parameters import Parameter, Parameters, not_negative
 from cvt_hpc.physics.capacity import carried_torque
 from cvt_hpc.physics.geometry import variator_problems
 
@@ -89,7 +89,7 @@ STEPPERS: dict[str, str] = {}
 __all__ = ["DEFAULT_STEPPER", "PARAMETERS", "STEPPERS", "check", "inert"]
 
 
-def check(parameters: dict[str, Any]) -> list[tuple[str, str, str]]:
+def check(parameters: Parameters) -> list[tuple[str, str, str]]:
     """Problems that lie between parameters.
 
     Parameters
@@ -112,7 +112,7 @@ def check(parameters: dict[str, Any]) -> list[tuple[str, str, str]]:
     return problems
 
 
-def inert(parameters: dict[str, Any]) -> dict[str, str]:
+def inert(parameters: Parameters) -> dict[str, str]:
     """Parameters without effect on a run, each with the setting that makes it so."""
     keys = _FORCES if parameters["strand_forces"] == "formulas" else _OF_FORMULAS
     return dict.fromkeys(keys, f"strand_forces {parameters['strand_forces']}")
