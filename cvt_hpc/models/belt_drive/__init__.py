@@ -13,9 +13,7 @@ from which a strand vibrates: 96 elements shake the strands by 30 um. The band h
 strands, 63 to 193 Hz.
 """
 
-from collections.abc import Mapping
 from dataclasses import replace
-from typing import Any
 
 import numpy as np
 

@@ -32,8 +32,6 @@ The defaults are assumptions: a metre of the driven wrap of the elastic belt at 
 long), on sheaves that tilt (3e5 N m/rad over arc times radius squared), which slides radially.
 """
 
-from typing import Any
-
 from cvt_hpc.models import elastic_belt
 from cvt_hpc.parameters import Parameter, Parameters, not_negative, positive
 from cvt_hpc.physics.friction_laws import friction_inert, friction_problems

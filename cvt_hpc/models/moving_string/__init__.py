@@ -8,8 +8,6 @@ from v = c on it holds no shape (critical speed).
 Parameters of the moving string that a job may set; the defaults are near those of a belt's strand.
 """
 
-from typing import Any
-
 import numpy as np
 
 from cvt_hpc.parameters import Parameter, Parameters, positive

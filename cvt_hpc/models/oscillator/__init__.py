@@ -22,8 +22,6 @@ Steppers other than `moreau` take the friction law with its jump at rest smoothe
 Parameters of the oscillator that a job may set. The defaults: stick-slip of unit mass and stiffness.
 """
 
-from typing import Any
-
 from cvt_hpc.parameters import Parameter, Parameters, not_negative, positive
 from cvt_hpc.physics.friction_laws import FRICTION_LAWS, friction_file, friction_inert, friction_problems
 from cvt_hpc.steppers import STEPPERS

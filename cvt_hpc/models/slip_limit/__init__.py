@@ -9,8 +9,6 @@ is cheap.
 Parameters of the limit of slip that a job may set: the steady belt's parameters, and the question.
 """
 
-from typing import Any
-
 from cvt_hpc.models import steady_variator
 from cvt_hpc.models.elastic_belt.pulley_checks import slipping_pulley_problems
 from cvt_hpc.models.steady_variator.parameters import belt_problems

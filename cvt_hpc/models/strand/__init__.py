@@ -20,8 +20,6 @@ energy), how far, the arcs at its ends, the neighbouring strand, and damping.
 Parameters of the strands: quantities of the elastic belt, and the source of their forces.
 """
 
-from typing import Any
-
 from cvt_hpc.models import elastic_belt
 from cvt_hpc.parameters import Parameter, Parameters, not_negative
 from cvt_hpc.physics.capacity import carried_torque
