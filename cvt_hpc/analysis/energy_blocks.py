@@ -17,22 +17,10 @@ from matplotlib.axes import Axes
 from matplotlib.figure import Figure
 from matplotlib.patches import FancyArrowPatch, FancyBboxPatch
 
+from cvt_hpc.analysis import figures
 from cvt_hpc.analysis.arrangement import CHOSEN, At, Sides, arrange, check_sides, ruler
 from cvt_hpc.analysis.classes import check_results
 from cvt_hpc.analysis.curves import panels_of
-from cvt_hpc.analysis.figures import (
-    COLOURS,
-    LINES,
-    WIDTH,
-    check_known,
-    coordinate_unit,
-    entitle,
-    headline,
-    number,
-    put_ticks,
-    short_numbers,
-    styled,
-)
 from cvt_hpc.analysis.telling_apart import entitle_runs, on_axes
 from cvt_hpc.errors import mismatch
 from cvt_hpc.job import stored_job
@@ -98,7 +86,7 @@ def powers_of(history: xr.Dataset) -> Powers:
     return Powers(spiral, outlet, float(fed.sum()) - outlet, float(history["stress_fed"]), taken)
 
 
-@styled
+@figures.styled
 def blocks_figure(histories: Sequence[xr.Dataset]) -> Figure:
     """Draw a block diagram of each run below each other.
 
@@ -108,7 +96,7 @@ def blocks_figure(histories: Sequence[xr.Dataset]) -> Figure:
         Of the elastic belt, with what feeds the fluctuations.
     """
     _, labels = on_axes(histories)
-    figure = Figure((WIDTH * 1.2, ROW * len(histories) + 0.7), layout="constrained")
+    figure = Figure((figures.WIDTH * 1.2, ROW * len(histories) + 0.7), layout="constrained")
     rows = figure.subplots(len(histories), 1, squeeze=False)[:, 0]
     for axes, history, label in zip(rows, histories, labels, strict=True):
         _draw_blocks(axes, history)
@@ -140,7 +128,9 @@ def _draw_blocks(axes: Axes, history: xr.Dataset) -> None:
     fed = found.outlet
     ends = ((1.76, 0.42), (1.96, 0.42)) if fed > 0.0 else ((1.96, 0.42), (1.76, 0.42))
     _arrow(axes, *ends, FEEDING if fed > 0.0 else TAKING)
-    axes.text(1.86, 0.7, f"driven outlet {number(fed, SIGNED)} W", ha="center", va="bottom", fontsize=8.5)
+    axes.text(
+        1.86, 0.7, f"driven outlet {figures.number(fed, SIGNED)} W", ha="center", va="bottom", fontsize=8.5
+    )
     _arrow(axes, (2.36, -0.04), (1.36, -0.04), "#333333", "arc3,rad=-0.25")
     axes.text(1.86, -0.35, "its state sets the switch", ha="center", va="top", fontsize=8.5)
     _arrow(axes, (2.76, 0.31), (2.96, 0.31), TAKING)
@@ -149,7 +139,7 @@ def _draw_blocks(axes: Axes, history: xr.Dataset) -> None:
         ("push, tension", found.stresses),
         ("dampers, rings", -found.taken),
     )
-    losses = "\n".join(f"{name} {number(power, SIGNED)} W" for name, power in rest)
+    losses = "\n".join(f"{name} {figures.number(power, SIGNED)} W" for name, power in rest)
     axes.text(2.99, 0.31, losses, va="center", fontsize=8.5)
     axes.set(xlim=(-0.05, 3.65), ylim=(-0.5, 0.85))
     axes.set_axis_off()
@@ -162,7 +152,7 @@ def _arrow(
     axes.add_patch(FancyArrowPatch(start, end, **style))
 
 
-@styled
+@figures.styled
 def spectrum_figure(run: xr.Dataset) -> Figure:
     """Draw the amplitude of each strand over frequency, with the mode of its peaks.
 
@@ -172,7 +162,7 @@ def spectrum_figure(run: xr.Dataset) -> Figure:
         Results of one run: `spectrum` [m] over `strand` and `frequency_bin` [Hz]; `peak_frequency` [Hz],
         `peak_amplitude` [m] and `peak_mode` over `strand` and `peak` (`[record] modal_peaks`).
     """
-    figure = Figure((WIDTH, 3.6), layout="constrained")
+    figure = Figure((figures.WIDTH, 3.6), layout="constrained")
     axes = figure.subplots()
     lines = run["frequency_bin"].values
     for strand in map(str, run["strand"].values):
@@ -193,11 +183,11 @@ def spectrum_figure(run: xr.Dataset) -> Figure:
     axes.set_ylim(bottom=0.0)
     axes.grid(lw=0.4, alpha=0.5)
     figure.legend(loc="outside lower center", frameon=False, ncols=3)
-    entitle(figure, [headline("Spectra of the strands", run.attrs)], 76)
+    figures.entitle(figure, [figures.headline("Spectra of the strands", run.attrs)], 76)
     return figure
 
 
-@styled
+@figures.styled
 def strand_bars_figure(
     dataset: xr.Dataset, at: At = None, source: str = "results", sides: Sides = CHOSEN
 ) -> Figure:
@@ -214,24 +204,24 @@ def strand_bars_figure(
     check_sides(sides, list(map(str, dataset["status"].dims)), at or {}, source)
     # panels here are what `panels_of` makes of the rows of a map
     arrangement = arrange(dataset, at or {}, source, Sides(sides.x, sides.panel))
-    check_known(arrangement.dataset, NEEDED, source)
+    figures.check_known(arrangement.dataset, NEEDED, source)
     panels, notes = panels_of(arrangement, source)
-    figure = Figure((WIDTH, HEIGHT), layout="constrained")
+    figure = Figure((figures.WIDTH, HEIGHT), layout="constrained")
     row = figure.subplots(1, len(panels), sharey=True, squeeze=False)[0]
     x = ruler(arrangement.dataset[arrangement.x])
     along = arrangement.dataset[arrangement.x]
     ticks = list(x.tick_labels)
     if len(ticks) != along.size:
-        ticks = list(short_numbers(coordinate_unit(along.attrs)[0] * along.values))
+        ticks = list(figures.short_numbers(figures.coordinate_unit(along.attrs)[0] * along.values))
     for axes, (title, shown) in zip(row, panels, strict=True):
         _draw_bars(axes, shown.transpose(arrangement.x, ...))
         axes.set_title(title, loc="left", pad=4)
-        put_ticks(axes.xaxis, np.arange(float(len(ticks))), ticks)
+        figures.put_ticks(axes.xaxis, np.arange(float(len(ticks))), ticks)
         axes.set_xlabel(x.label)
     row[0].set_ylabel("push force | ring tension [kN]")
     handles, labels = row[0].get_legend_handles_labels()
     figure.legend(handles, labels, loc="outside lower center", frameon=False, ncols=4)
-    entitle(figure, [headline("Forces in the strands", dataset.attrs), *notes], 76)
+    figures.entitle(figure, [figures.headline("Forces in the strands", dataset.attrs), *notes], 76)
     return figure
 
 
@@ -276,7 +266,7 @@ def regularised(point: Mapping[str, Any], speeds: np.ndarray) -> np.ndarray:
     return np.asarray(coefficients * np.tanh(speeds / point["friction_speed"]))
 
 
-@styled
+@figures.styled
 def friction_figure(dataset: xr.Dataset) -> Figure:
     """Draw the curves of a study, with marks where the criterion says that radial motion is fed.
 
@@ -287,12 +277,14 @@ def friction_figure(dataset: xr.Dataset) -> Figure:
     """
     sliding = dataset["radial_speed"].values
     along = np.linspace(0.0, sliding.max(), POINTS)
-    figure = Figure((WIDTH, 3.8), layout="constrained")
+    figure = Figure((figures.WIDTH, 3.8), layout="constrained")
     axes = figure.subplots()
     for k, (gradient, curve) in enumerate(curves_of(dataset, along).items()):
-        colour = COLOURS[k % len(COLOURS)]
+        colour = figures.COLOURS[k % len(figures.COLOURS)]
         label = f"{gradient:g} s/m".replace("-", "−")
-        axes.plot(1e3 * along, curve, color=colour, ls=LINES[k % len(LINES)], lw=1.4, label=label)
+        axes.plot(
+            1e3 * along, curve, color=colour, ls=figures.LINES[k % len(figures.LINES)], lw=1.4, label=label
+        )
         verdicts = dataset["vibrates"].sel(friction_gradient=gradient).values
         for verdict, (style, _) in MARKS.items():
             at = sliding[verdicts == verdict]
@@ -304,5 +296,5 @@ def friction_figure(dataset: xr.Dataset) -> Figure:
     axes.grid(lw=0.4, alpha=0.5)
     figure.legend(loc="outside lower center", frameon=False, ncols=3)
     marks = "marks: by the energy criterion, of radial sliding at that speed"
-    entitle(figure, [headline("Curves of friction", dataset.attrs), marks], 76)
+    figures.entitle(figure, [figures.headline("Curves of friction", dataset.attrs), marks], 76)
     return figure

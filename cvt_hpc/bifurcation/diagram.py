@@ -20,6 +20,7 @@ from typing import Any
 import numpy as np
 import xarray as xr
 
+from cvt_hpc import netcdf
 from cvt_hpc.archives import Archives, Arrays
 from cvt_hpc.bifurcation.attractors import (
     OF_MODES,
@@ -49,16 +50,6 @@ from cvt_hpc.models.linear_stability.branch import Branch, Onset, branch, onsets
 from cvt_hpc.models.linear_stability.modes import LOW
 from cvt_hpc.models.steady_variator.record import VARIABLES, coordinates
 from cvt_hpc.models.steady_variator.walking import NoSteadyState, SteadyBelt
-from cvt_hpc.netcdf import (
-    CONTENT,
-    DIAGRAM,
-    attributes,
-    flag_attributes,
-    global_attributes,
-    holds,
-    open_netcdf,
-    write_netcdf,
-)
 from cvt_hpc.output_folder import Kind as FolderKind
 from cvt_hpc.output_folder import OutputFolder
 from cvt_hpc.study.description import axis_dimension, derived_coordinate
@@ -137,7 +128,7 @@ class DiagramFolder(OutputFolder[Diagram]):
         if kind_of(self.dataset) is None:
             return 0
         try:
-            with open_netcdf(self._stored(), decode_cf=False) as dataset:
+            with netcdf.open_netcdf(self._stored(), decode_cf=False) as dataset:
                 computed = (dataset["stability"] != Stability.NOT_COMPUTED).all("load")
                 return int(np.count_nonzero(computed))
         except _DAMAGE as error:
@@ -182,14 +173,14 @@ class DiagramFolder(OutputFolder[Diagram]):
 
     def _stored(self) -> Path:
         """Return the dataset; ValueError if it is no diagram."""
-        if not holds(self.dataset, DIAGRAM):
+        if not netcdf.holds(self.dataset, netcdf.DIAGRAM):
             raise ValueError("no bifurcation diagram")
         return self.dataset
 
     def _job_of_dataset(self) -> dict[str, Any] | None:
         """Return the job of the dataset; None where there is none, or another dataset."""
         try:
-            with open_netcdf(self._stored(), decode_cf=False) as dataset:
+            with netcdf.open_netcdf(self._stored(), decode_cf=False) as dataset:
                 return dict(json.loads(dataset.attrs["job"]))
         except _DAMAGE:
             return None
@@ -270,7 +261,7 @@ def make_diagram(
 def _write(diagram: Diagram, folder: DiagramFolder, followed: Mapping[int, Followed]) -> None:
     """Write the dataset of the branches that are done."""
     with written_aside(folder.dataset) as aside:
-        write_netcdf(diagram_dataset(diagram, followed, folder.branches.makers), aside)
+        netcdf.write_netcdf(diagram_dataset(diagram, followed, folder.branches.makers), aside)
 
 
 def _follow(diagram: Diagram, asked: Asked) -> Followed:
@@ -347,11 +338,14 @@ def diagram_dataset(
         axes[derived.name] = derived.axes, values, derived_coordinate(derived, diagram.job).attributes
     axes["load"] = ("load", list(diagram.loads), load_attributes(diagram.job))
     labels = {
-        name: (name, c.values.astype(object), attributes(c.long_name, c.units, c.comment))
+        name: (name, c.values.astype(object), netcdf.attributes(c.long_name, c.units, c.comment))
         for name, c in coordinates(diagram.job.parameters).items()
     }
     subject = f"bifurcations of model {diagram.job.model}"
-    told = {**global_attributes(diagram.job, diagram.resolved(), subject, makers=makers), CONTENT: DIAGRAM}
+    told = {
+        **netcdf.global_attributes(diagram.job, diagram.resolved(), subject, makers=makers),
+        netcdf.CONTENT: netcdf.DIAGRAM,
+    }
     rows = sorted(followed.items())
     variables = _states(diagram, rows) | _onsets(rows) | _runs(rows)
     return xr.Dataset(variables, axes | labels, told)
@@ -370,17 +364,17 @@ def _states(diagram: Diagram, followed: _Numbered) -> dict[str, Any]:
                 array[number][tuple(map(slice, values[name].shape))] = values[name]
         return array.reshape(*grid, *shape)
 
-    flags = attributes("stability", comment="of the steady state") | flag_attributes(Stability)
+    flags = netcdf.attributes("stability", comment="of the steady state") | netcdf.flag_attributes(Stability)
     told: dict[str, Any] = {
         "stability": (dims, over("stability", (), np.int8(Stability.NOT_COMPUTED)), flags)
     }
     sizes = {name: c.values.size for name, c in coordinates(diagram.job.parameters).items()}
     for v in VARIABLES:
         array = over(v.name, tuple(sizes[dim] for dim in v.dims), np.nan)
-        told[v.name] = (*dims, *v.dims), array, attributes(v.long_name, v.units, v.comment)
+        told[v.name] = (*dims, *v.dims), array, netcdf.attributes(v.long_name, v.units, v.comment)
     most = max((values["growth_rate"].shape[1] for _, values in states), default=0)
     for name, (_, *named) in OF_MODES.items():
-        told[name] = (*dims, "mode"), over(name, (most,), np.nan), attributes(*named)
+        told[name] = (*dims, "mode"), over(name, (most,), np.nan), netcdf.attributes(*named)
     return told
 
 
@@ -435,5 +429,7 @@ def _column(
 ) -> tuple[np.ndarray, dict[str, Any]]:
     """Return values, and attributes, of a type of numpy or of flags."""
     is_flag = isinstance(kind, type) and issubclass(kind, IntEnum)
-    flags = flag_attributes(kind) if is_flag else {}
-    return np.array(values, np.int8 if is_flag else kind), attributes(long_name, units, comment) | flags
+    flags = netcdf.flag_attributes(kind) if is_flag else {}
+    return np.array(values, np.int8 if is_flag else kind), netcdf.attributes(
+        long_name, units, comment
+    ) | flags

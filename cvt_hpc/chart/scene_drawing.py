@@ -19,18 +19,7 @@ from matplotlib.lines import Line2D
 from matplotlib.patches import Patch
 from matplotlib.ticker import LogFormatter
 
-from cvt_hpc.analysis.figures import (
-    COLOURS,
-    LEGEND,
-    MARGIN,
-    WIDTH,
-    balanced,
-    display_unit,
-    draw,
-    line_style,
-    set_error_axis,
-    with_units,
-)
+from cvt_hpc.analysis import figures
 from cvt_hpc.chart.comparing import Comparison, Result
 from cvt_hpc.chart.plan import Quantity
 from cvt_hpc.chart.quantities import KINDS
@@ -57,7 +46,7 @@ def draw_scene(comparison: Comparison, out: Path) -> Path:
     out : Path
         `out`, result and errors are those of `save_figure`.
     """
-    return draw(lambda: scene_figure(comparison), out)
+    return figures.draw(lambda: scene_figure(comparison), out)
 
 
 def scene_figure(comparison: Comparison) -> Figure:
@@ -70,8 +59,10 @@ def scene_figure(comparison: Comparison) -> Figure:
     legend_rows = math.ceil((len(series) + 4) / 3)
     text_height = _LINE_HEIGHT * (len(lines) + 0.5)
     height = 0.5 + _PANEL_HEIGHT * rows + 0.19 * legend_rows + text_height
-    figure = Figure((WIDTH, height), layout="constrained")
-    figure.suptitle(balanced(comparison.scene.title, 64) + "\nerror against cost, lower left is better")
+    figure = Figure((figures.WIDTH, height), layout="constrained")
+    figure.suptitle(
+        figures.balanced(comparison.scene.title, 64) + "\nerror against cost, lower left is better"
+    )
     ratios = [_PANEL_HEIGHT] * rows + [text_height]
     grid = figure.add_gridspec(rows + 1, columns, height_ratios=ratios)
     first: Axes | None = None
@@ -86,7 +77,7 @@ def scene_figure(comparison: Comparison) -> Figure:
     below = figure.add_subplot(grid[rows, :])
     below.set_axis_off()
     below.text(0.0, 1.0, "\n".join(lines), va="top", fontsize=7.5, transform=below.transAxes)
-    figure.legend(handles=_legend(comparison, series), ncols=2, **LEGEND)
+    figure.legend(handles=_legend(comparison, series), ncols=2, **figures.LEGEND)
     return figure
 
 
@@ -103,7 +94,7 @@ def _draw_panel(
         drawn = [r for r in results if _is_drawn(r, quantity.name)]
         x = [max(r.errors[quantity.name], floor) for r in drawn]
         y = [r.measurement.cost for r in drawn]
-        axes.plot(x, y, **line_style(k), label=results[0].point.label)
+        axes.plot(x, y, **figures.line_style(k), label=results[0].point.label)
         for result, error, cost in zip(drawn, x, y, strict=True):
             _mark_point(axes, result, quantity.name, error, cost, k)
     _limit(axes, quantity, own, floor)
@@ -115,7 +106,7 @@ def _draw_panel(
 
 def _mark_point(axes: Axes, result: Result, name: str, error: float, cost: float, k: int) -> None:
     if name in result.below:
-        hollow = {**line_style(k), "ls": "", "mfc": "white", "mec": GREY}
+        hollow = {**figures.line_style(k), "ls": "", "mfc": "white", "mec": GREY}
         axes.plot(error, cost, **hollow, gid="below")
     if result.errors.get("occurrence", 0.0) > 0.0:
         axes.plot(error, cost, marker="x", ms=7, color="black", ls="", gid="occurrence")
@@ -127,7 +118,7 @@ def _limit(axes: Axes, quantity: Quantity, own: float, floor: float) -> None:
     """Limits of the error's axis, the tolerance, and the part where the reference itself is not known."""
     drawn = [x for line in axes.lines for x in np.atleast_1d(line.get_xdata())]
     marks = [x for x in (own, quantity.tolerance) if 0.0 < x < math.inf]
-    low = set_error_axis(axes, [*drawn, *marks])
+    low = figures.set_error_axis(axes, [*drawn, *marks])
     if 0.0 < own < math.inf:
         axes.axvspan(
             low, own, facecolor="#f3f3f3", edgecolor="#d0d0d0", hatch="////", lw=0, zorder=0, gid="reference"
@@ -146,7 +137,7 @@ def _series(results: Sequence[Result]) -> dict[str, list[Result]]:
 
 def _legend(comparison: Comparison, series: dict[str, list[Result]]) -> list[Line2D | Patch]:
     handles: list[Line2D | Patch] = [
-        Line2D([], [], **line_style(comparison.series.index(name)), label=results[0].point.label)
+        Line2D([], [], **figures.line_style(comparison.series.index(name)), label=results[0].point.label)
         for name, results in series.items()
         if any(not result.measurement.reason for result in results)
     ]
@@ -171,7 +162,7 @@ def _is_drawn(result: Result, name: str) -> bool:
 def _floor(quantity: Quantity, comparison: Comparison) -> float:
     """Where an error of 0 is drawn: a little left of the smallest one."""
     errors = [r.errors[quantity.name] for r in comparison.methods if _is_drawn(r, quantity.name)]
-    return min((e for e in errors if e > 0.0), default=1e-3) / MARGIN
+    return min((e for e in errors if e > 0.0), default=1e-3) / figures.MARGIN
 
 
 def _heading(quantity: Quantity) -> str:
@@ -186,7 +177,7 @@ def error_label(quantity: Quantity) -> str:
     if quantity.scale == 0.0:
         return "relative error"
     factor, unit = (
-        (1e6, "µm") if KINDS[quantity.name].unit == "m" else display_unit(KINDS[quantity.name].unit)
+        (1e6, "µm") if KINDS[quantity.name].unit == "m" else figures.display_unit(KINDS[quantity.name].unit)
     )
     return f"error / {factor * quantity.scale:g} {unit}"
 
@@ -200,7 +191,11 @@ def notes(comparison: Comparison) -> list[str]:
     for why, methods in _omitted(comparison).items():
         each = "; ".join(f"{label} ({', '.join(settings)})" for label, settings in methods.items())
         lines.append(f"omitted: {why}: {each}")
-    return [part for line in lines for part in wrap(with_units(line), _LINE_LENGTH, subsequent_indent="    ")]
+    return [
+        part
+        for line in lines
+        for part in wrap(figures.with_units(line), _LINE_LENGTH, subsequent_indent="    ")
+    ]
 
 
 def _omitted(comparison: Comparison) -> dict[str, dict[str, list[str]]]:
@@ -226,7 +221,7 @@ def _reasons(result: Result) -> list[str]:
 
 def draw_budget(comparison: Comparison, out: Path) -> Path:
     """Draw the error of each choice against the base; otherwise as `draw_scene`."""
-    return draw(lambda: budget_figure(comparison), out)
+    return figures.draw(lambda: budget_figure(comparison), out)
 
 
 def budget_figure(comparison: Comparison) -> Figure:
@@ -235,14 +230,14 @@ def budget_figure(comparison: Comparison) -> Figure:
         q for q in comparison.scene.quantities if q.name in comparison.shown and q.name != "occurrence"
     ]
     choices = _in_order(comparison.choices, quantities)
-    figure = Figure((WIDTH, 1.3 + _ROW_HEIGHT * len(choices)), layout="constrained")
+    figure = Figure((figures.WIDTH, 1.3 + _ROW_HEIGHT * len(choices)), layout="constrained")
     figure.suptitle(f"{comparison.scene.title}: error budget, against {comparison.base}")
     panels = np.atleast_1d(figure.subplots(1, len(quantities), sharey=True))
     for axes, quantity in zip(panels, quantities, strict=True):
         _draw_budget_panel(axes, quantity, choices)
     panels[0].set_yticks(range(len(choices)), [choice.point.label for choice in choices])
     panels[0].set_ylim(len(choices) - 0.5, -0.5)
-    figure.legend(handles=_budget_legend(comparison, quantities), ncols=2, **LEGEND)
+    figure.legend(handles=_budget_legend(comparison, quantities), ncols=2, **figures.LEGEND)
     return figure
 
 
@@ -252,9 +247,9 @@ def _budget_legend(comparison: Comparison, quantities: Sequence[Quantity]) -> li
     dot = partial(Line2D, [], [], ls="", marker="o")
     handles = []
     if any(choice.point.refines for choice in drawn):
-        handles.append(dot(color=COLOURS[1], label=f"error of {comparison.base}"))
+        handles.append(dot(color=figures.COLOURS[1], label=f"error of {comparison.base}"))
     if not all(choice.point.refines for choice in drawn):
-        handles.append(dot(color=COLOURS[0], mfc="white", label="what another choice changes"))
+        handles.append(dot(color=figures.COLOURS[0], mfc="white", label="what another choice changes"))
     if any(quantity.tolerance < math.inf for quantity in quantities):
         handles.append(Line2D([], [], ls="--", color="black", lw=0.9, label="tolerance"))
     if any(choice.errors.get("occurrence", 0.0) > 0.0 for choice in drawn):
@@ -266,19 +261,23 @@ def _draw_budget_panel(axes: Axes, quantity: Quantity, choices: Sequence[Result]
     axes.set_xscale("log")
     errors = [c.errors[quantity.name] for c in choices]
     positive = [e for e in errors if 0.0 < e < math.inf]
-    floor = min(positive, default=1e-3) / MARGIN
+    floor = min(positive, default=1e-3) / figures.MARGIN
     for row, (choice, error) in enumerate(zip(choices, errors, strict=True)):
         axes.axhline(row, color="#ececec", lw=0.6, zorder=0)
         if choice.measurement.reason or not math.isfinite(error):
             words = "failed" if choice.measurement.reason else "none"
             axes.text(0.04, row, words, va="center", fontsize=8, transform=axes.get_yaxis_transform())
             continue
-        colour, fill = (COLOURS[1], COLOURS[1]) if choice.point.refines else (COLOURS[0], "white")
+        colour, fill = (
+            (figures.COLOURS[1], figures.COLOURS[1])
+            if choice.point.refines
+            else (figures.COLOURS[0], "white")
+        )
         axes.plot(max(error, floor), row, "o", color=colour, mfc=fill, ms=5.5)
         if choice.errors.get("occurrence", 0.0) > 0.0:
             axes.plot(max(error, floor), row, "x", color="black", ms=8)
     marks = [quantity.tolerance] if 0.0 < quantity.tolerance < math.inf else []
-    set_error_axis(axes, [floor, *positive, *marks])
+    figures.set_error_axis(axes, [floor, *positive, *marks])
     if quantity.tolerance < math.inf:
         axes.axvline(quantity.tolerance, color="black", ls="--", lw=0.9)
     axes.tick_params(axis="y", length=0)

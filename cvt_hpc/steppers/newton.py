@@ -24,18 +24,7 @@ from typing import NamedTuple
 import numpy as np
 
 from cvt_hpc.kernels import kernel
-from cvt_hpc.steppers.facts import (
-    FACTORISATIONS,
-    JACOBIANS,
-    NO_CONVERGENCE,
-    NO_VALUE,
-    NOT_FINITE,
-    NOT_UNIQUE,
-    OK,
-    RATES,
-    SINGULAR,
-    SOLVES,
-)
+from cvt_hpc.steppers import facts
 from cvt_hpc.steppers.system import System, all_finite, jacobian, size
 
 SHIFT, SIGN = range(2)
@@ -85,13 +74,13 @@ def _invert(frozen: Frozen, position_of: np.ndarray, shift: float, counts: np.nd
     frozen.memory[SHIFT] = 0.0
     for i in range(n):
         if not all_finite(frozen.jacobian[i]):
-            return NOT_FINITE
+            return facts.NOT_FINITE
         for j in range(n):
             frozen.inverse[i, j] = (1.0 if i == j else 0.0) - shift * frozen.jacobian[i, j]
-    counts[FACTORISATIONS] += 1
+    counts[facts.FACTORISATIONS] += 1
     sign, logarithm = np.linalg.slogdet(frozen.inverse)
     if sign == 0.0 or not np.isfinite(logarithm):
-        return SINGULAR
+        return facts.SINGULAR
     frozen.inverse[:] = np.linalg.inv(frozen.inverse)
     frozen.memory[SHIFT], frozen.memory[SIGN] = shift, sign
     for i in range(n):
@@ -99,7 +88,7 @@ def _invert(frozen: Frozen, position_of: np.ndarray, shift: float, counts: np.nd
             stiffness, a = -frozen.jacobian[i, position_of[i]], frozen.reach * shift
             if 1.0 - a * frozen.jacobian[i, i] + a * a * stiffness < 0.0:
                 frozen.memory[SIGN] = -1.0
-    return OK
+    return facts.OK
 
 
 @kernel
@@ -129,10 +118,10 @@ def renew(
         A `Result`.
     """
     if anew:
-        counts[JACOBIANS] += 1
-        counts[RATES] += y.size
+        counts[facts.JACOBIANS] += 1
+        counts[facts.RATES] += y.size
         if not jacobian(system, t, y, frozen.rates, frozen.changed, frozen.jacobian):
-            return NO_VALUE
+            return facts.NO_VALUE
     return _invert(frozen, system.position_of, shift, counts)
 
 
@@ -150,7 +139,7 @@ def _correct(
     for i in range(z.size):
         frozen.changed[i] = base[i] + shift * frozen.rates[i] - z[i]
     np.dot(frozen.inverse, frozen.changed, correction)
-    counts[SOLVES] += 1
+    counts[facts.SOLVES] += 1
     return size(correction, system.scale)
 
 
@@ -165,7 +154,7 @@ def _overshot(system: System, frozen: Frozen) -> bool:
 
 @kernel
 def _rates(system: System, frozen: Frozen, t: float, z: np.ndarray, counts: np.ndarray) -> bool:
-    counts[RATES] += 1
+    counts[facts.RATES] += 1
     return system.rates(system.constants, t, z, frozen.rates)
 
 
@@ -207,7 +196,7 @@ def solve_stage(
         A `Result`; NOT_UNIQUE where the solution found is one of several.
     """
     if not _rates(system, frozen, t, z, counts):
-        return NO_VALUE
+        return facts.NO_VALUE
     anew = frozen.memory[SIGN] == 0.0
     begin, fresh, bracketed, crossed, leaps = True, anew, False, False, 0
     left, share, near, far = 0.0, 1.0, 0.0, 1.0
@@ -215,14 +204,14 @@ def solve_stage(
         if begin:
             if anew or frozen.memory[SHIFT] != shift:
                 outcome = renew(system, frozen, t, z, shift, anew, counts)
-                if outcome != OK:
+                if outcome != facts.OK:
                     return outcome
             left = _correct(system, frozen, base, shift, z, frozen.correction, counts)
             crossed |= frozen.memory[SIGN] < 0.0
             begin, fresh, bracketed, anew = False, anew, False, True
             share, near, far = 1.0, 0.0, 1.0
         if not np.isfinite(left):
-            return NOT_FINITE
+            return facts.NOT_FINITE
         for i in range(z.size):
             frozen.trial[i] = z[i] + share * frozen.correction[i]
         next_left = np.inf
@@ -230,7 +219,7 @@ def solve_stage(
             next_left = _correct(system, frozen, base, shift, frozen.trial, frozen.next_correction, counts)
         if share == 1.0 and next_left <= tolerance:
             z[:] = frozen.trial + frozen.next_correction
-            return OK if frozen.memory[SIGN] > 0.0 else NOT_UNIQUE
+            return facts.OK if frozen.memory[SIGN] > 0.0 else facts.NOT_UNIQUE
         reduction = next_left / left
         if reduction <= (ENOUGH if share == 1.0 else 1.0 - 0.5 * share):
             z[:] = frozen.trial
@@ -255,5 +244,5 @@ def solve_stage(
             z += frozen.correction
         begin = True
         if not _rates(system, frozen, t, z, counts):
-            return NO_VALUE
-    return NOT_UNIQUE if crossed else NO_CONVERGENCE
+            return facts.NO_VALUE
+    return facts.NOT_UNIQUE if crossed else facts.NO_CONVERGENCE

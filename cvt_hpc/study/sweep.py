@@ -29,17 +29,9 @@ from cvt_hpc.study.forecast.cost_model import CostModel
 from cvt_hpc.study.forecast.resources import refuse_too_large
 from cvt_hpc.study.gather import LossError, gather_records
 from cvt_hpc.study.planning import Plan, asked_runs, next_round, prepare
+from cvt_hpc.study.ranks import stopping
 from cvt_hpc.study.ranks.launch import Ranks, Team, assembled_team
 from cvt_hpc.study.ranks.progress import Counter, Progress
-from cvt_hpc.study.ranks.stopping import (
-    ELSEWHERE,
-    SignalWatch,
-    Stop,
-    find_time_limit,
-    outlive,
-    planning_within,
-    raise_again,
-)
 from cvt_hpc.study.record.log import RecordFormat, RecordLog
 from cvt_hpc.study.simulator import Simulator, default_simulator
 from cvt_hpc.study.status import STOPPED, RunReport, build_report
@@ -171,8 +163,8 @@ def run(
             if begins and chosen is None:
                 refuse_too_large(job, simulator, folder.path)
             asked = None if time_limit is None else time_limit - (time.monotonic() - started)
-            limit, began = find_time_limit(asked, study.size), time.monotonic()
-            with planning_within(limit.seconds, study.size):
+            limit, began = stopping.find_time_limit(asked, study.size), time.monotonic()
+            with stopping.planning_within(limit.seconds, study.size):
                 plan = prepare(folder, task, share, fresh and begins, again, team.size, held, refine)
             left = limit.seconds - (time.monotonic() - began)
             return plan._replace(limit=limit._replace(seconds=left))
@@ -185,7 +177,7 @@ def run(
                 display = Progress(
                     counter, plan.total, plan.recorded, plan.failed, visible, plan.costs[order]
                 )
-                stop = Stop(counter, signals, plan.limit, display.show)
+                stop = stopping.Stop(counter, signals, plan.limit, display.show)
                 stopped = None
                 with closing(display):
                     while plan.assignments:
@@ -203,10 +195,10 @@ def run(
     with library_for_sweep(), assembled_team(folder.crash_log, comm) as team:
         study, share = team.agreed(accept, plan_of)
         task = Task(job, study, simulator, run_limit, chosen, asked_steps)
-        with SignalWatch() as signals:
-            report, noted = outlive(team, sweep)
+        with stopping.SignalWatch() as signals:
+            report, noted = stopping.outlive(team, sweep)
     if raises and (name := noted or signals.noted):
-        raise_again(name, report.status_of_more or STOPPED, everywhere=noted is not None)
+        stopping.raise_again(name, report.status_of_more or STOPPED, everywhere=noted is not None)
     return report
 
 
@@ -241,7 +233,7 @@ def _compute(
     plan: Plan,
     rank: int,
     counter: Counter,
-    stop: Stop,
+    stop: stopping.Stop,
 ) -> str | None:
     """Do and record the runs that this rank claims; return the reason if it could not continue."""
     layout = RecordFormat(task.study.fingerprint, task.study.record_dtype)
@@ -278,7 +270,7 @@ def _settle(team: Team, trouble: str | None, reason: str | None) -> str | None:
     for found, _ in ends:
         if found:
             raise StorageError(found)
-    return next((why for _, why in ends if why and why != ELSEWHERE), None)
+    return next((why for _, why in ends if why and why != stopping.ELSEWHERE), None)
 
 
 def _conclude(
@@ -288,7 +280,7 @@ def _conclude(
     plan: Plan,
     stopped: str | None,
     held: ExitStack,
-    signals: SignalWatch,
+    signals: stopping.SignalWatch,
 ) -> RunReport:
     """Gather the dataset, unless other parts are at work, and report; on rank 0 alone."""
     if part is not None:

@@ -13,21 +13,8 @@ from numpy.typing import NDArray
 
 from cvt_hpc.files import naming_refusals
 from cvt_hpc.study.description import Study
+from cvt_hpc.study.record import log
 from cvt_hpc.study.record.index import ENTRY, Records, Timing, choose, open_log
-from cvt_hpc.study.record.log import (
-    AGAIN,
-    ALONE,
-    HEAD,
-    MAGIC,
-    PLACE,
-    PREAMBLE_LIMIT,
-    RECORD,
-    ForeignLog,
-    Frame,
-    Place,
-    RecordFormat,
-    read_preamble,
-)
 
 Places = range | NDArray[np.int64]  # the index in a study of each run of another, or of itself
 
@@ -62,7 +49,7 @@ def read_records(folder: Path, study: Study, earlier: Mapping[str, Places] | Non
         try:
             with open_log(path) as file:
                 reader.read(number, file)
-        except (OSError, ForeignLog) as error:
+        except (OSError, log.ForeignLog) as error:
             text = error.strerror if isinstance(error, OSError) else error
             reader.warnings.append(f"{path}: left out: {text}")
     return reader.result(logs)
@@ -86,7 +73,7 @@ class _Reader:
         self._attempts = np.ones(study.size, np.int64)
         self._status = study.record_dtype.fields["status"][1]  # type: ignore[index]  # where it is in a record [byte]
         self._deaths: set[_Death] = set()
-        self._refinements: dict[Place, float] = {}
+        self._refinements: dict[log.Place, float] = {}
         self._timings: list[Timing] = []
         self._sessions: dict[str, dict[str, Any]] = {}
 
@@ -98,28 +85,30 @@ class _Reader:
         ForeignLog
             If the file is no log, or a log of another job.
         """
-        head = os.pread(file.fileno(), PREAMBLE_LIMIT, 0)
+        head = os.pread(file.fileno(), log.PREAMBLE_LIMIT, 0)
         if not head:  # a process that died before its first record
             return
         refusals = []
         for fingerprint, places in self._sources.items():
             try:
-                layout = RecordFormat(fingerprint, self._study.record_dtype)
+                layout = log.RecordFormat(fingerprint, self._study.record_dtype)
                 return self._read_as(layout, places, number, file, head)
-            except ForeignLog as error:
+            except log.ForeignLog as error:
                 refusals.append(error)
         raise refusals[0]
 
-    def _read_as(self, layout: RecordFormat, places: Places, number: int, file: FileIO, head: bytes) -> None:
+    def _read_as(
+        self, layout: log.RecordFormat, places: Places, number: int, file: FileIO, head: bytes
+    ) -> None:
         """Read a log of a study whose runs have these places in this one; errors as of `read`."""
-        session, start = read_preamble(head, layout)
+        session, start = log.read_preamble(head, layout)
         flaws: list[str] = []
         trace = _Trace((session or {}).get("refine", 1.0))
         frames = self._sound_frames(layout, places, file, start, flaws)
         found = np.fromiter(self._entries(frames, number, trace), ENTRY)
         if session is None and not trace.followed:
-            known = head.startswith(MAGIC)
-            raise ForeignLog("no record of this study in it" if known else "not a record log")
+            known = head.startswith(log.MAGIC)
+            raise log.ForeignLog("no record of this study in it" if known else "not a record log")
         if session is None:
             self.warnings.append(f"{file.name}: the header is damaged; the records found in it count")
         self.warnings.extend(f"{file.name}: {flaw}; left out" for flaw in flaws)
@@ -146,8 +135,8 @@ class _Reader:
         return records
 
     def _sound_frames(
-        self, layout: RecordFormat, places: Places, file: FileIO, start: int, flaws: list[str]
-    ) -> Iterator[tuple[int, Frame]]:
+        self, layout: log.RecordFormat, places: Places, file: FileIO, start: int, flaws: list[str]
+    ) -> Iterator[tuple[int, log.Frame]]:
         """Yield place and content of sound frames, with runs as the study numbers them; others are flaws."""
         size = os.fstat(file.fileno()).st_size
         for begin, end, frame in layout.frames(file, start, size):
@@ -160,14 +149,14 @@ class _Reader:
                 flaws.append(f"bytes {begin} to {end} are damaged")
 
     def _entries(
-        self, frames: Iterable[tuple[int, Frame]], number: int, trace: _Trace
+        self, frames: Iterable[tuple[int, log.Frame]], number: int, trace: _Trace
     ) -> Iterator[tuple[int, int, float, int, int, int]]:
         """Yield the records of a log as an ENTRY has them, and follow the runs of its process."""
         for begin, frame in frames:
             trace.follow(frame)
-            if frame.kind == RECORD:
+            if frame.kind == log.RECORD:
                 ((index, attempt),) = frame.places
-                place = begin + HEAD.size + PLACE.size
+                place = begin + log.HEAD.size + log.PLACE.size
                 yield index, attempt, frame.written, number, place, frame.row[self._status]
             else:
                 for index, attempt in frame.places:
@@ -195,21 +184,21 @@ class _Trace:
     def __init__(self, refine: float) -> None:
         self.followed = 0
         self.timings: list[Timing] = []
-        self.refinements: dict[Place, float] = {}
+        self.refinements: dict[log.Place, float] = {}
         self._refine = refine
-        self._mark: Frame | None = None
+        self._mark: log.Frame | None = None
         self._at_work: dict[int, int] = {}
 
-    def follow(self, frame: Frame) -> None:
+    def follow(self, frame: log.Frame) -> None:
         """Take in the next frame."""
         self.followed += 1
-        if frame.kind == RECORD:
+        if frame.kind == log.RECORD:
             ((index, _),) = frame.places
             was_at_work = self._at_work.pop(index, None) is not None
             if self._mark is not None and was_at_work and not self._at_work:
                 batch = tuple(index for index, _ in self._mark.places)
                 self.timings.append(Timing(batch, frame.written - self._mark.written))
-        elif frame.kind == AGAIN:
+        elif frame.kind == log.AGAIN:
             self.refinements |= dict.fromkeys(frame.places, self._refine)
         else:
             self._mark, self._at_work = frame, dict(frame.places)
@@ -219,6 +208,6 @@ class _Trace:
         if self._mark is None:
             return set()
         return {
-            _Death(index, attempt, self._mark.kind == ALONE, self._mark.written)
+            _Death(index, attempt, self._mark.kind == log.ALONE, self._mark.written)
             for index, attempt in self._at_work.items()
         }
