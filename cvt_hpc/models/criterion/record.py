@@ -9,13 +9,7 @@ from typing import Any, NamedTuple
 import numpy as np
 from scipy.optimize import brentq
 
-from cvt_hpc.physics.friction import (
-    FrictionLaw,
-    friction_coefficient,
-    friction_coefficients,
-    given_law,
-    saturation,
-)
+from cvt_hpc.physics import friction as laws
 from cvt_hpc.variables import Coordinate, Status, Variable, Vibrates
 
 PHASES = 512  # of a cycle: errors of its square at a corner of the law, of 1/512 at a jump (v_reg -> 0)
@@ -69,7 +63,7 @@ class Flank(NamedTuple):
         Slope of friction over |v|, in phase with the speed [s/m].
     """
 
-    law: FrictionLaw
+    law: laws.FrictionLaw
     width: float
     memory: float
     normal_force: float
@@ -95,14 +89,14 @@ class Flank(NamedTuple):
 def flank(parameters: Mapping[str, Any]) -> Flank:
     """Steady sliding, from flat parameters [SI]."""
     p = parameters
-    law = given_law(p)
+    law = laws.given_law(p)
     tangent = np.tan(p["half_wedge_angle"])
     force = p["contact_force"]
     normal_force = force / np.cos(p["half_wedge_angle"])
     speed = float(np.hypot(p["radial_speed"], p["tangential_speed"]))
     share = p["radial_speed"] / speed
-    value, fall = friction_coefficient(law, speed, normal_force)
-    factor, rise = saturation(speed, 1.0 / p["friction_speed"])
+    value, fall = laws.friction_coefficient(law, speed, normal_force)
+    factor, rise = laws.saturation(speed, 1.0 / p["friction_speed"])
     mu = value * factor
     mass = p["element_mass"] + p["ring_mass"]
     stiffness = p["belt_stiffness"] + 2.0 * p["contact_stiffness"] * tangent * (tangent + mu * share)
@@ -156,7 +150,7 @@ def _radial_friction(f: Flank, radial: np.ndarray, tangential: float) -> np.ndar
     # where sliding comes to rest, the cut-off harmonics of a speed that is 0 there may leave less
     remembered = np.maximum(np.fft.irfft(filtered, PHASES), 0.0)
     forces = np.full(speed.size, f.normal_force)
-    mu = friction_coefficients(f.law, remembered.ravel(), forces).reshape(speed.shape)
+    mu = laws.friction_coefficients(f.law, remembered.ravel(), forces).reshape(speed.shape)
     direction = np.divide(radial, speed, out=np.zeros_like(speed), where=speed > 0.0)
     return mu * np.tanh(speed / f.width) * direction
 

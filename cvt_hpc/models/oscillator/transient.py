@@ -25,22 +25,7 @@ from typing import Any, NamedTuple
 import numpy as np
 
 from cvt_hpc.models.marched import MarchedRun, Probe, batches_of_one
-from cvt_hpc.models.oscillator.motion import (
-    HUMP,
-    Oscillator,
-    V,
-    X,
-    friction_at_rest,
-    initial_state,
-    largest_rate,
-    normal_load,
-    oscillator,
-    regularised_friction,
-    regularised_frictions,
-    set_valued_system,
-    steady_sliding,
-    system,
-)
+from cvt_hpc.models.oscillator import motion
 from cvt_hpc.physics.friction import friction_coefficient, friction_coefficients
 from cvt_hpc.steppers.facts import Facts, Result
 from cvt_hpc.steppers.marching import Marching
@@ -49,7 +34,8 @@ from cvt_hpc.steppers.system import SetValuedSystem, System
 LET_GO = "the mass was let go while friction at rest still holds it"
 HELD = "the mass was held against a pull beyond friction at rest"
 REST = 1e-9  # of the mass' largest speed: sliding that rounding may leave while friction holds
-REACH, POINTS = 2.0 * HUMP, 2401  # of the search for the peak, in units of v_reg; it is found within 1e-6
+# Of the search for the peak, in units of v_reg; it is found within 1e-6
+REACH, POINTS = 2.0 * motion.HUMP, 2401
 
 SMALL = 1e-3  # of the belt's speed: the swing, within which friction is a straight line
 
@@ -81,17 +67,17 @@ class Transient(MarchedRun):
 
     def __init__(self, parameters: Mapping[str, Any], stepper: str) -> None:
         self.is_set_valued = stepper == "moreau"
-        equations = (set_valued_system if self.is_set_valued else system)(parameters)
-        self.constants = o = oscillator(parameters)
+        equations = (motion.set_valued_system if self.is_set_valued else motion.system)(parameters)
+        self.constants = o = motion.oscillator(parameters)
         self._peak = peak(o)
         probes = (Probe("mass", 0.0),)
         frequency = np.sqrt(o.stiffness / o.mass)
-        start = initial_state(parameters)
-        super().__init__(parameters, stepper, equations, start, probes, (X,), frequency)
+        start = motion.initial_state(parameters)
+        super().__init__(parameters, stepper, equations, start, probes, (motion.X,), frequency)
         self._silenced = None
         if not self.marching.facts.adaptive:
             self._silenced = silenced(o, equations, stepper, parameters, self.interval)
-        self._typical_speed = float(equations.scale[V])
+        self._typical_speed = float(equations.scale[motion.V])
         self._allowed = parameters.get("tolerance", 0.0) * self._typical_speed
 
     def _doubt(self, first: int) -> str | None:
@@ -122,28 +108,28 @@ class Transient(MarchedRun):
         """Sliding [m/s] up to which the mass sticks or creeps."""
         if self.is_set_valued:
             return REST * float(np.abs(self.channel("speed")).max(initial=self._typical_speed))
-        return HUMP * self.constants.width
+        return motion.HUMP * self.constants.width
 
     def friction(self) -> np.ndarray:
         """Friction force on the mass at each sample so far, (done,) [N]."""
         o, x, v = self.constants, self.displacement[:, 0], self.channel("speed")
-        sliding, load = o.belt_speed - v, normal_load(o, x)
+        sliding, load = o.belt_speed - v, motion.normal_load(o, x)
         if not self.is_set_valued:
-            return regularised_frictions(o, sliding, load)
+            return motion.regularised_frictions(o, sliding, load)
         holding = o.stiffness * x + o.damping * v - o.preload
         level = load * friction_coefficients(o.law, np.abs(sliding), load)
         return np.where(self.is_stuck, holding, np.copysign(level, sliding))
 
     def channel(self, name: str) -> np.ndarray:
         """History of one of CHANNELS, (done,): speed of the mass [m/s]."""
-        return self.rows[: self.done, {"speed": V}[name]]
+        return self.rows[: self.done, {"speed": motion.V}[name]]
 
 
 batch = batches_of_one(Transient)
 
 
 def silenced(
-    o: Oscillator,
+    o: motion.Oscillator,
     system: System | SetValuedSystem,
     stepper: str,
     parameters: Mapping[str, Any],
@@ -171,12 +157,12 @@ def silenced(
     """
     if o.belt_speed == 0.0:
         return None
-    load = normal_load(o, steady_sliding(o).displacement)
+    load = motion.normal_load(o, motion.steady_sliding(o).displacement)
     speeds = [o.belt_speed * part for part in (1.0 - SMALL, 1.0, 1.0 + SMALL)]
     if isinstance(system, SetValuedSystem):
         slower, mu, faster = (friction_coefficient(o.law, speed, load)[0] for speed in speeds)
     else:
-        slower, mu, faster = (regularised_friction(o, speed, load) / load for speed in speeds)
+        slower, mu, faster = (motion.regularised_friction(o, speed, load) / load for speed in speeds)
     true = -0.5 * (o.damping + load * (faster - slower) / (2.0 * SMALL * o.belt_speed)) / o.mass
     stiffness = o.stiffness + o.normal_stiffness * mu
     frequency = np.sqrt(max(stiffness, 0.0) / o.mass)
@@ -203,7 +189,9 @@ class Peak(NamedTuple):
     mu: float
 
 
-def rest_missed(o: Oscillator, facts: Facts, step: float, allowed: float, rows: np.ndarray) -> str | None:
+def rest_missed(
+    o: motion.Oscillator, facts: Facts, step: float, allowed: float, rows: np.ndarray
+) -> str | None:
     """Decide whether the mass comes within a step of rest, by a step or tolerance too coarse to find it.
 
     Beyond the limit of the step, friction chatters instead of bringing the mass to rest: the speed jumps
@@ -228,10 +216,10 @@ def rest_missed(o: Oscillator, facts: Facts, step: float, allowed: float, rows: 
     str or None
         The reason, where it does.
     """
-    longest = facts.rest_limit / largest_rate(o)
+    longest = facts.rest_limit / motion.largest_rate(o)
     coarse = allowed / (facts.width_limit * o.width)
     if (coarse <= 1.0 if facts.adaptive else step <= longest) or not np.any(
-        np.abs(o.belt_speed - rows[:, V]) < step * friction_at_rest(o) / o.mass
+        np.abs(o.belt_speed - rows[:, motion.V]) < step * motion.friction_at_rest(o) / o.mass
     ):
         return None
     if facts.adaptive:
@@ -242,17 +230,17 @@ def rest_missed(o: Oscillator, facts: Facts, step: float, allowed: float, rows: 
     return f"the step is beyond {longest:.3g} s, {chatter}"
 
 
-def peak(o: Oscillator) -> Peak | None:
+def peak(o: motion.Oscillator) -> Peak | None:
     """Find the peak of smoothed friction; None where there is none or it moves with the load."""
     if _moves_with_load(o):
         return None
     sliding = np.linspace(0.0, REACH * o.width, POINTS)
-    mu = regularised_frictions(o, sliding, np.full(POINTS, o.normal_load)) / o.normal_load
+    mu = motion.regularised_frictions(o, sliding, np.full(POINTS, o.normal_load)) / o.normal_load
     top = int(mu.argmax())
     return Peak(float(sliding[top]), float(mu[top])) if top < POINTS - 1 else None
 
 
-def wrongly_held(o: Oscillator, peak: Peak | None, rows: np.ndarray, interval: float) -> str | None:
+def wrongly_held(o: motion.Oscillator, peak: Peak | None, rows: np.ndarray, interval: float) -> str | None:
     """Decide whether smoothed friction released the mass where it holds, or held it against a larger pull.
 
     Parameters
@@ -273,8 +261,8 @@ def wrongly_held(o: Oscillator, peak: Peak | None, rows: np.ndarray, interval: f
     """
     if peak is None or len(rows) < 2:
         return None
-    x, sliding = rows[:, X], o.belt_speed - rows[:, V]
-    pull = o.stiffness * x + o.damping * rows[:, V] - o.preload
+    x, sliding = rows[:, motion.X], o.belt_speed - rows[:, motion.V]
+    pull = o.stiffness * x + o.damping * rows[:, motion.V] - o.preload
     slow = (sliding >= 0.0) & (sliding < peak.sliding) & (pull >= 0.0)
     pull, holds = pull + o.normal_stiffness * peak.mu * x, o.normal_load * peak.mu
     # as long as it slides slowly it goes no faster than the belt, and so does the pull
@@ -292,7 +280,7 @@ def wrongly_held(o: Oscillator, peak: Peak | None, rows: np.ndarray, interval: f
 
 
 def wrongly_stuck(
-    o: Oscillator, rows: np.ndarray, interval: float, step: float, rounding: float
+    o: motion.Oscillator, rows: np.ndarray, interval: float, step: float, rounding: float
 ) -> str | None:
     """Decide whether friction as it is released the mass where it holds, or held it against a larger pull.
 
@@ -312,14 +300,14 @@ def wrongly_stuck(
     str or None
         The reason, where it was.
     """
-    x, stuck = rows[:, X], np.abs(o.belt_speed - rows[:, V]) <= rounding
+    x, stuck = rows[:, motion.X], np.abs(o.belt_speed - rows[:, motion.V]) <= rounding
     if not np.any(stuck[:-1]):
         return None
     way, half, farthest = o.belt_speed * interval, 0.5 * o.belt_speed * step, np.abs(x).max()
     # sliding counts as sticking, by which friction differs, and a mass let go, until it is faster
     slope = friction_coefficient(o.law, 0.0, o.normal_load)[1]
     unseen = np.sqrt(2.0 * o.mass * o.stiffness * o.belt_speed * rounding)
-    unseen += REST * (o.stiffness * farthest + friction_at_rest(o))
+    unseen += REST * (o.stiffness * farthest + motion.friction_at_rest(o))
     unseen += 2.0 * (o.damping + o.normal_load * abs(slope)) * rounding
     whole = stuck[:-1] & stuck[1:] & (np.abs(np.diff(x) - way) <= REST * (farthest + way))
     if np.any(whole & (_beyond_rest(o, x[:-1] + half, x[1:] - half) > unseen)):
@@ -330,16 +318,16 @@ def wrongly_stuck(
     return LET_GO if np.any(let_go & (_beyond_rest(o, x[:-1], x[:-1] + way) < -unseen)) else None
 
 
-def _beyond_rest(o: Oscillator, *places: np.ndarray) -> np.ndarray:
+def _beyond_rest(o: motion.Oscillator, *places: np.ndarray) -> np.ndarray:
     """Pull of the spring less the friction that holds the mass where it sticks: the largest of places [m]."""
     beyond = []
     for x in places:
-        load = normal_load(o, x)
+        load = motion.normal_load(o, x)
         mu = friction_coefficients(o.law, np.zeros_like(x), load) + o.excess
         beyond.append(np.abs(o.stiffness * x + o.damping * o.belt_speed - o.preload) - load * mu)
     return np.max(beyond, axis=0)
 
 
-def _moves_with_load(o: Oscillator) -> bool:
+def _moves_with_load(o: motion.Oscillator) -> bool:
     """Whether the coefficient of friction changes with the displacement."""
     return o.normal_stiffness != 0.0 and o.law.table_force.size > 1
