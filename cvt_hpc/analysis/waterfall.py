@@ -265,15 +265,6 @@ def spectra_norm(spectra: Sequence[NDArray[np.float64]], highest: float | None =
     return LogNorm(float(np.clip(low, DEEPEST * top, SHALLOWEST * top)), top)
 
 
-def _draw_spectra(
-    axes: Axes, x: layout.Ruler, y: layout.Ruler, values: NDArray[np.float64], norm: LogNorm
-) -> None:
-    """Cells of one strand, of amplitudes (frequency, x) [um]."""
-    axes.set_facecolor(UNKNOWN)
-    shown = np.ma.masked_invalid(np.maximum(values, norm.vmin))  # zero has no logarithm
-    axes.pcolormesh(x.edges, y.edges, shown, norm=norm, cmap=COLOURS, rasterized=True)
-
-
 def draw_orders(
     axes: Axes, x: NDArray[np.float64], turns: NDArray[np.float64], orders: Sequence[float]
 ) -> list[Named]:
