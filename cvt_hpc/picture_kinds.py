@@ -181,7 +181,7 @@ KINDS = {
     ),
     "strands": Kind(
         RESULTS,
-        "strand_bars.strand_bars_figure",
+        "paper_pictures.strand_bars_figure",
         "tension and push force of the strands over an axis, as bars",
         sides=("x", "panel"),
     ),

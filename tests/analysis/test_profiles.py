@@ -6,7 +6,7 @@ import numpy as np
 import pytest
 import xarray as xr
 
-from cvt_hpc.analysis.energy_blocks import strand_bars_figure
+from cvt_hpc.analysis.paper_pictures import strand_bars_figure
 from cvt_hpc.analysis.profiles import profile_figure
 from cvt_hpc.analysis.statements import bullinger_along
 from cvt_hpc.analysis.statements.verdicts import Kept, Verdict, judged

@@ -13,9 +13,14 @@ from matplotlib.axes import Axes
 from matplotlib.figure import Figure
 
 from cvt_hpc.analysis.curves import curve_figure
-from cvt_hpc.analysis.energy_blocks import blocks_figure, friction_figure, spectrum_figure, strand_bars_figure
 from cvt_hpc.analysis.figures import WIDTH, draw, styled
 from cvt_hpc.analysis.followed_drawing import element_figure
+from cvt_hpc.analysis.paper_pictures import (
+    blocks_figure,
+    friction_figure,
+    spectrum_figure,
+    strand_bars_figure,
+)
 from cvt_hpc.analysis.profiles import inside, profile_figure
 from cvt_hpc.analysis.ramps import course_figure, ramp_figure
 from cvt_hpc.analysis.statements import (

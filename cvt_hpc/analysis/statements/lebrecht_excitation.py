@@ -6,8 +6,8 @@ from itertools import pairwise
 import numpy as np
 import xarray as xr
 
-from cvt_hpc.analysis.energy_blocks import curves_of, powers_of, regularised
 from cvt_hpc.analysis.followed_drawing import mean_there, one_passage
+from cvt_hpc.analysis.paper_pictures import curves_of, powers_of, regularised
 from cvt_hpc.analysis.statements.verdicts import Kept, Measured, Statement, listed, over_arc
 from cvt_hpc.variables import Vibrates
 
