@@ -27,15 +27,7 @@ from cvt_hpc.study.job_difference import differences, short_pair
 from cvt_hpc.study.repeats import AUDIT, WAYS, interval
 from cvt_hpc.tables import number
 from cvt_hpc.variables import Status
-from cvt_hpc.vibration.classes import (
-    CONTRADICTIONS,
-    NEAR_CONTRADICTIONS,
-    WITHOUT_RESULTS,
-    OccurrenceClass,
-    PairClass,
-    classify_pairs,
-    is_near,
-)
+from cvt_hpc.vibration import classes as agreement
 
 _HEAD = (
     "class_a",
@@ -91,7 +83,7 @@ class Cell(NamedTuple):
 
     at: dict[str, Any]
     place: str
-    classes: tuple[OccurrenceClass, OccurrenceClass]
+    classes: tuple[agreement.OccurrenceClass, agreement.OccurrenceClass]
     pair: int
     amplitude: tuple[float, float]
     frequency: tuple[float, float]
@@ -100,7 +92,9 @@ class Cell(NamedTuple):
     @property
     def pair_label(self) -> str:
         """Name for people of `pair`."""
-        return (OccurrenceClass(self.pair) if self.pair >= 0 else PairClass(self.pair)).label
+        return (
+            agreement.OccurrenceClass(self.pair) if self.pair >= 0 else agreement.PairClass(self.pair)
+        ).label
 
 
 @dataclass(frozen=True)
@@ -140,12 +134,12 @@ class Comparison:
     @property
     def better(self) -> NDArray[np.bool_]:
         """Whether a cell that vibrates in A is quiet in B, shape of the grid."""
-        return np.isin(self.pairs, (PairClass.A_ONLY, PairClass.A_ONLY_NEAR))
+        return np.isin(self.pairs, (agreement.PairClass.A_ONLY, agreement.PairClass.A_ONLY_NEAR))
 
     @property
     def worse(self) -> NDArray[np.bool_]:
         """Whether a cell that is quiet in A vibrates in B, shape of the grid."""
-        return np.isin(self.pairs, (PairClass.B_ONLY, PairClass.B_ONLY_NEAR))
+        return np.isin(self.pairs, (agreement.PairClass.B_ONLY, agreement.PairClass.B_ONLY_NEAR))
 
     @property
     def pairs(self) -> NDArray[np.int8]:
@@ -155,28 +149,28 @@ class Comparison:
     @property
     def contradicts(self) -> NDArray[np.bool_]:
         """Whether a cell is quiet in one study and vibrates in the other, shape of the grid."""
-        return np.isin(self.pairs, CONTRADICTIONS)
+        return np.isin(self.pairs, agreement.CONTRADICTIONS)
 
     @property
     def contradicts_beyond(self) -> NDArray[np.bool_]:
         """Whether it does so with a larger amplitude that is not near the threshold, shape of the grid."""
-        return self.contradicts & ~np.isin(self.pairs, NEAR_CONTRADICTIONS)
+        return self.contradicts & ~np.isin(self.pairs, agreement.NEAR_CONTRADICTIONS)
 
     @property
     def answered(self) -> NDArray[np.bool_]:
         """Whether both runs of a cell have ended with results, shape of the grid."""
         both = (self.cells[name].values for name in ("class_a", "class_b"))
-        return ~np.any([np.isin(classes, WITHOUT_RESULTS) for classes in both], axis=0)
+        return ~np.any([np.isin(classes, agreement.WITHOUT_RESULTS) for classes in both], axis=0)
 
-    def counts(self) -> dict[tuple[OccurrenceClass, OccurrenceClass], int]:
+    def counts(self) -> dict[tuple[agreement.OccurrenceClass, agreement.OccurrenceClass], int]:
         """Number of cells by their class in A and in B, of all pairs of classes."""
         a, b = self.cells["class_a"].values, self.cells["class_b"].values
-        kinds = product(OccurrenceClass, repeat=2)
+        kinds = product(agreement.OccurrenceClass, repeat=2)
         return {(of_a, of_b): int(((a == of_a) & (b == of_b)).sum()) for of_a, of_b in kinds}
 
     def deviation(self, name: str) -> Deviation:
         """Return how far B deviates: "amplitude", "frequency" where both vibrate, others where both end."""
-        both = self.answered if name in self.quantities else self.pairs == OccurrenceClass.VIBRATING
+        both = self.answered if name in self.quantities else self.pairs == agreement.OccurrenceClass.VIBRATING
         a, b = (self.cells[f"{name}_{study}"].values[both] for study in "ab")
         with np.errstate(divide="ignore", invalid="ignore"):
             deviations = np.abs(b / a - 1.0)
@@ -188,7 +182,7 @@ class Comparison:
     def amplitude_ratio(self) -> float:
         """Return the median of amplitude B over amplitude A where both vibrate; not a number of none."""
         a, b = (self.cells[f"amplitude_{study}"].values for study in "ab")
-        both = (self.pairs == OccurrenceClass.VIBRATING) & (a > 0.0)
+        both = (self.pairs == agreement.OccurrenceClass.VIBRATING) & (a > 0.0)
         return float(np.median(b[both] / a[both])) if both.any() else math.nan
 
     def largest_difference(self, name: str) -> float:
@@ -208,7 +202,7 @@ class Comparison:
             yield Cell(
                 at,
                 ", ".join(f"{name} = {shown(value, along[name].attrs)}" for name, value in at.items()),
-                (OccurrenceClass(found["class_a"]), OccurrenceClass(found["class_b"])),
+                (agreement.OccurrenceClass(found["class_a"]), agreement.OccurrenceClass(found["class_b"])),
                 found["occurrence_class"],
                 (found["amplitude_a"], found["amplitude_b"]),
                 (found["frequency_a"], found["frequency_b"]),
@@ -232,12 +226,14 @@ def compare(a: xr.Dataset, b: xr.Dataset, sources: tuple[str, str] = ("A", "B"))
     aligned = align(a, b, sources, _compared(a, b))
     thresholds = _threshold(a), _threshold(b)
     known = [_known(dataset) for dataset in (aligned.a, aligned.b)]
-    near = is_near(*(found["amplitude"] / least for found, least in zip(known, thresholds, strict=True)))
+    near = agreement.is_near(
+        *(found["amplitude"] / least for found, least in zip(known, thresholds, strict=True))
+    )
     frame = aligned.a["status"]
     values = {f"{name}_{study}": array for study, found in zip("ab", known, strict=True)
               for name, array in found.items()}  # fmt: skip
     values |= {"status": frame.values}
-    values |= {"occurrence_class": classify_pairs(values["class_a"], values["class_b"], near)}
+    values |= {"occurrence_class": agreement.classify_pairs(values["class_a"], values["class_b"], near)}
     quantities = [_quantities(dataset) for dataset in (aligned.a, aligned.b)]
     common = {name: unit for name, (_, unit) in quantities[0].items() if name in quantities[1]}
     for study, found in zip("ab", quantities, strict=True):
@@ -343,9 +339,11 @@ def contradictions(found: Comparison, way: str) -> str:
     runs, contradicting = int(found.answered.sum()), int(found.contradicts.sum())
     low, high = interval(contradicting, runs)
     share = f"{contradicting / runs:.2%}, " if runs else ""
-    others = int((found.answered & (found.pairs == PairClass.OTHERWISE)).sum())
+    others = int((found.answered & (found.pairs == agreement.PairClass.OTHERWISE)).sum())
     failed = sum(
-        count for kinds, count in found.counts().items() if kinds[1] == OccurrenceClass.FAILED != kinds[0]
+        count
+        for kinds, count in found.counts().items()
+        if kinds[1] == agreement.OccurrenceClass.FAILED != kinds[0]
     )
     return (
         f"{contradicting} of {runs} contradict (quiet against vibrating; {share}95 % interval {low:.2%} to "
@@ -356,7 +354,7 @@ def contradictions(found: Comparison, way: str) -> str:
 
 def deviations(found: Comparison, who: str = "B deviates") -> Iterator[str]:
     """Yield how far amplitude, frequency and what else is compared deviate; `who` is subject and verb."""
-    both = int((found.pairs == OccurrenceClass.VIBRATING).sum())
+    both = int((found.pairs == agreement.OccurrenceClass.VIBRATING).sum())
     where = {name: f"{name} where both vibrate ({both} cells)" for name in ("amplitude", "frequency")}
     where |= {name: f"{name} where both have ended" for name in found.quantities}
     for name, text in where.items():
@@ -395,7 +393,7 @@ def sample_sentences(dataset: xr.Dataset, folder: Path, source: str) -> Iterator
             continue
         with open_results(folder / name) as again:
             found = compare(dataset, again, (source, str(folder / name)))
-        repeated = int(np.sum(found.cells["class_b"] != OccurrenceClass.NOT_RUN))
+        repeated = int(np.sum(found.cells["class_b"] != agreement.OccurrenceClass.NOT_RUN))
         runs = "1 run was" if repeated == 1 else f"{repeated} runs were"
         yield f"{runs} done again {way}, in `{name}`: {contradictions(found, way)}."
         yield from (

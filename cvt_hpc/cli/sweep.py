@@ -98,7 +98,7 @@ def _load(
     from cvt_hpc.job import load_job
     from cvt_hpc.job.units import read_duration
     from cvt_hpc.study import check_start
-    from cvt_hpc.study.time_steps import check_refinement
+    from cvt_hpc.study.task import check_refinement
     from cvt_hpc.variables import Status
 
     limits = {

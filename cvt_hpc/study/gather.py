@@ -27,9 +27,9 @@ from cvt_hpc.provenance import history_line
 from cvt_hpc.study.description import Dimension, Study
 from cvt_hpc.study.folder import StudyFolder, study_instead
 from cvt_hpc.study.job_difference import difference_in_words, places_in
+from cvt_hpc.study.planning import inferred_classes
 from cvt_hpc.study.record.index import Records, block_length
 from cvt_hpc.study.record.log import KEPT
-from cvt_hpc.study.tracing import inferred_classes
 from cvt_hpc.variables import Status, Variable
 from cvt_hpc.vibration.classes import OccurrenceClass
 

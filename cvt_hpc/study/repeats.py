@@ -34,7 +34,7 @@ from cvt_hpc.study.record.index import Records
 from cvt_hpc.study.simulator import default_simulator
 from cvt_hpc.study.status import RunReport, expected_cost
 from cvt_hpc.study.sweep import check_start, run
-from cvt_hpc.study.time_steps import STEP, stepper_in_words
+from cvt_hpc.study.task import STEP, stepper_in_words
 from cvt_hpc.variables import Status
 
 CONFIDENCE = 0.95

@@ -15,9 +15,9 @@ from cvt_hpc.errors import InputError
 from cvt_hpc.job import Job, rebuild_job
 from cvt_hpc.study.description import Study
 from cvt_hpc.study.folder import StudyFolder
+from cvt_hpc.study.planning import needed_runs
 from cvt_hpc.study.record.index import Records
 from cvt_hpc.study.simulator import default_simulator
-from cvt_hpc.study.tracing import needed_runs
 from cvt_hpc.variables import Status, Vibrates
 
 # exit statuses; 2 is bad input, raised as InputError

@@ -35,8 +35,7 @@ from cvt_hpc.study.ranks.progress import Counter, Progress
 from cvt_hpc.study.record.log import RecordFormat, RecordLog
 from cvt_hpc.study.simulator import Simulator, default_simulator
 from cvt_hpc.study.status import STOPPED, RunReport, build_report
-from cvt_hpc.study.task import Task
-from cvt_hpc.study.time_steps import check_refinement
+from cvt_hpc.study.task import Task, check_refinement
 from cvt_hpc.variables import Status
 
 _logger = logging.getLogger(__name__)

@@ -16,8 +16,7 @@ from numpy.typing import ArrayLike, NDArray
 
 from cvt_hpc.variables import Coordinate, Variable, Vibrates, shortened
 from cvt_hpc.vibration import signals
-from cvt_hpc.vibration.assessment import Occurrence
-from cvt_hpc.vibration.occurrence import LEAST_RISES
+from cvt_hpc.vibration.assessment import LEAST_RISES, Occurrence
 from cvt_hpc.vibration.ramped import QUANTITIES, Quantity
 from cvt_hpc.vibration.settings import SHORTEST_SEGMENT, fitting_window
 

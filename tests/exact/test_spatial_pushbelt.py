@@ -11,7 +11,7 @@ from cvt_hpc.models.pushbelt.transient import advance as planar_advance
 from cvt_hpc.models.spatial_pushbelt import belt as b
 from cvt_hpc.models.spatial_pushbelt import fields as spatial_fields
 from cvt_hpc.models.spatial_pushbelt.flank import flank_forces
-from cvt_hpc.models.spatial_pushbelt.step import _accept, _evaluate, _prepare, advance
+from cvt_hpc.models.spatial_pushbelt.transient import _accept, _evaluate, _prepare, advance
 from support import spatial_chains as chains
 from support.pushbelts import THRUST, given
 from support.spatial_belts import LOAD, NODES, RAMP, STEP, inputs, leaning_loads, scene, sheaves_modes

@@ -11,7 +11,7 @@ from cvt_hpc.models.pushbelt.stepping import advance_by
 from cvt_hpc.models.spatial_pushbelt import belt as b
 from cvt_hpc.models.spatial_pushbelt import fields as spatial_fields
 from cvt_hpc.models.spatial_pushbelt.belt import with_two_flows
-from cvt_hpc.models.spatial_pushbelt.step import EQUATIONS, advance
+from cvt_hpc.models.spatial_pushbelt.transient import EQUATIONS, advance
 from cvt_hpc.solvers.linked_blocks import field_of_right
 from support import spatial_chains as chains
 from support.pushbelts import THRUST

@@ -24,8 +24,7 @@ from cvt_hpc.study.ranks.stopping import gathering_margin
 from cvt_hpc.study.record.log import HEAD, PLACE, RecordFormat
 from cvt_hpc.study.simulator import Simulator, default_simulator
 from cvt_hpc.study.status import find_records
-from cvt_hpc.study.task import Task
-from cvt_hpc.study.time_steps import refined_steps
+from cvt_hpc.study.task import Task, refined_steps
 
 # [byte] of rank 0 for each run, for the plan and the index of the records: 207 were measured with 10^6 runs
 # on one rank, and about as much again is assumed for sending the plan.
