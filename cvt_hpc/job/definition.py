@@ -3,15 +3,13 @@
 The same runs for another model of the ladder, which knows fewer tables.
 """
 
-from __future__ import annotations
-
 import hashlib
 import json
 import math
 from collections.abc import Callable, Collection, Mapping
 from dataclasses import dataclass, field, replace
 from functools import cached_property, partial
-from typing import Any
+from typing import Any, Self
 
 from cvt_hpc.errors import mismatch
 from cvt_hpc.job.assignments import Assignments, read_assignments, split_assignments
@@ -147,7 +145,7 @@ class Job:
             for place in places(self.axes, along, sampled=self.is_sampled)
         )
 
-    def thinned(self, most: int) -> Job:
+    def thinned(self, most: int) -> Self:
         """Return this job with runs from all over it, as many as `most` if it has more; for estimates."""
         axes = thinned(self.axes, most, sampled=self.is_sampled)
         design = self.design | ({"runs": len(axes[0].values)} if self.is_sampled else {})
@@ -175,7 +173,7 @@ class Job:
             values[axis.name] = axis.values[place]
         return self.complete(values)
 
-    def with_units_of(self, at: Assignments, label: str = "at") -> Job:
+    def with_units_of(self, at: Assignments, label: str = "at") -> Self:
         """Return this job with the units of `at`, as of `point_at`, for its parameters without a unit."""
         written = split_assignments(at, self.source, label)
         found = {self.schema.find(name, f"{self.source}: {label} {name}"): unit_in(raw)

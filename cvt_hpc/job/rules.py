@@ -7,8 +7,6 @@ model's: `belt_length` gives `driven_radius`, and `step_error` gives `step` wher
 rule comes after the rules that give its sources.
 """
 
-from __future__ import annotations
-
 from collections.abc import Callable, Collection, Iterable, Iterator, Mapping
 from dataclasses import dataclass, field, replace
 from graphlib import CycleError, TopologicalSorter
@@ -23,6 +21,55 @@ from cvt_hpc.job.values import in_words, kind_of, read_value
 from cvt_hpc.parameters import Parameter, Substitute
 
 _MOST_NAMED = 8
+
+
+@dataclass(frozen=True)
+class Link:
+    """Values that follow those of an axis, or of a former axis, place by place."""
+
+    axis: str
+    at: tuple
+    values: tuple
+    unit: str  # of the axis
+    wanted: str = field(default="", compare=False)  # its unit in the job
+
+    @property
+    def names(self) -> tuple[str, ...]:
+        """The axis."""
+        return (self.axis,)
+
+    @property
+    def text(self) -> str:
+        """How the values follow, for people."""
+        return f"linked to {self.axis}"
+
+    def value(self, parameters: Mapping[str, Any]) -> Any:
+        """Return the value that belongs to the axis' value; ValueError if that one is not on the axis."""
+        place = parameters[self.axis]
+        if place not in self.at:
+            known = few_of([in_words(value, self.unit, self.wanted) for value in self.at], _MOST_NAMED)
+            raise ValueError(f"a value of {self.axis} that it is linked to ({known})")
+        return self.values[self.at.index(place)]
+
+
+@dataclass(frozen=True)
+class Substituted:
+    """A value that follows from a parameter given in its place."""
+
+    by: str
+    names: tuple[str, ...]
+    unit: str  # of `by`
+    substitute: Substitute = field(compare=False, repr=False)
+    wanted: str = field(default="", compare=False)  # its unit in the job
+
+    @property
+    def text(self) -> str:
+        """How the value follows, for people."""
+        return f"by {self.by}"
+
+    def value(self, parameters: Mapping[str, Any]) -> float:
+        """Return the value [SI]."""
+        return self.substitute.value(parameters)
 
 
 @dataclass(frozen=True)
@@ -85,55 +132,6 @@ class Rule:
                 raise mismatch(self.where, "a finite value", f"{show(self.words)} ({error})") from None
             blamed, unit, wanted = self.source.names[0], self.source.unit, self.source.wanted
             raise mismatch(self.where, str(error), in_words(parameters[blamed], unit, wanted)) from None
-
-
-@dataclass(frozen=True)
-class Link:
-    """Values that follow those of an axis, or of a former axis, place by place."""
-
-    axis: str
-    at: tuple
-    values: tuple
-    unit: str  # of the axis
-    wanted: str = field(default="", compare=False)  # its unit in the job
-
-    @property
-    def names(self) -> tuple[str, ...]:
-        """The axis."""
-        return (self.axis,)
-
-    @property
-    def text(self) -> str:
-        """How the values follow, for people."""
-        return f"linked to {self.axis}"
-
-    def value(self, parameters: Mapping[str, Any]) -> Any:
-        """Return the value that belongs to the axis' value; ValueError if that one is not on the axis."""
-        place = parameters[self.axis]
-        if place not in self.at:
-            known = few_of([in_words(value, self.unit, self.wanted) for value in self.at], _MOST_NAMED)
-            raise ValueError(f"a value of {self.axis} that it is linked to ({known})")
-        return self.values[self.at.index(place)]
-
-
-@dataclass(frozen=True)
-class Substituted:
-    """A value that follows from a parameter given in its place."""
-
-    by: str
-    names: tuple[str, ...]
-    unit: str  # of `by`
-    substitute: Substitute = field(compare=False, repr=False)
-    wanted: str = field(default="", compare=False)  # its unit in the job
-
-    @property
-    def text(self) -> str:
-        """How the value follows, for people."""
-        return f"by {self.by}"
-
-    def value(self, parameters: Mapping[str, Any]) -> float:
-        """Return the value [SI]."""
-        return self.substitute.value(parameters)
 
 
 class Noted(Mapping[str, Any]):

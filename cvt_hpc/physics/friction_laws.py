@@ -6,12 +6,10 @@ goes into `friction`, whose import fails where one is missing.
 The friction table of a CSV file: a coefficient for each pair of normal force and sliding speed.
 """
 
-from __future__ import annotations
-
 from collections.abc import Callable, Mapping
 from enum import IntEnum
 from functools import partial
-from typing import Any
+from typing import Any, Self
 
 import numpy as np
 
@@ -97,7 +95,7 @@ class Law(IntEnum):
         reads: tuple[str, ...],
         problems: Callable[[Parameters], Problems] = _no_problems,
         largest: Callable[[Parameters], float] = _fallen_from,
-    ) -> Law:
+    ) -> Self:
         """Make the member of a number."""
         law = int.__new__(cls, number)
         law._value_, law.reads, law.problems, law.largest = number, reads, problems, largest

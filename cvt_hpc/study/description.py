@@ -3,8 +3,6 @@
 The coordinates of a dataset: axes, parameters that follow from them, and extra ones of the record.
 """
 
-from __future__ import annotations
-
 import math
 from collections.abc import Collection, Iterable, Mapping, Sequence
 from dataclasses import asdict, dataclass
@@ -271,7 +269,7 @@ class Study:
         }
 
     @classmethod
-    def from_json(cls, entry: Mapping[str, Any]) -> Study:
+    def from_json(cls, entry: Mapping[str, Any]) -> Self:
         """Return the study that `to_json` wrote."""
         return cls(
             entry["name"],

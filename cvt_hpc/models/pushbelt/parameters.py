@@ -359,4 +359,9 @@ def inert(parameters: Parameters) -> dict[str, str]:
         (True, "arc_probes", "model pushbelt, which is probed on its strands"),
     )
     found = {key: setting for holds, key, setting in cases if holds}
-    return friction_inert(p | dict.fromkeys(NO_TABLE, ())) | scene.course_inert(p) | profile_inert(p) | found
+    return (
+        friction_inert({**p, **dict.fromkeys(NO_TABLE, ())})
+        | scene.course_inert(p)
+        | profile_inert(p)
+        | found
+    )

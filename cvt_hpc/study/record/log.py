@@ -11,8 +11,6 @@ and the record's type, so a frame is known to belong to its study even where the
 can take up again at the next frame after a damaged stretch.
 """
 
-from __future__ import annotations
-
 import json
 import os
 import platform
@@ -23,7 +21,7 @@ from collections.abc import Iterable, Iterator, Mapping, Sequence
 from io import FileIO
 from pathlib import Path
 from struct import Struct
-from typing import Any, NamedTuple
+from typing import Any, NamedTuple, Self
 
 import numpy as np
 
@@ -302,7 +300,7 @@ class RecordLog:
             os.close(self._descriptor)
             self._descriptor = _CLOSED
 
-    def __enter__(self) -> RecordLog:
+    def __enter__(self) -> Self:
         return self
 
     def __exit__(self, *_: object) -> None:

@@ -1,7 +1,5 @@
 """Reading logs, whatever happened to the files: damage is named and skipped, never fatal."""
 
-from __future__ import annotations
-
 import os
 from collections.abc import Iterable, Iterator, Mapping
 from io import FileIO
@@ -60,6 +58,56 @@ def _files(folder: Path) -> list[Path]:
     with naming_refusals(folder, "a folder that can be read"):
         entries = sorted(folder.iterdir()) if folder.is_dir() else []
     return [path for path in entries if not path.name.startswith(".")]
+
+
+class _Trace:
+    """Follows from mark to mark the runs that a process was doing.
+
+    Parameters
+    ----------
+    refine : float
+        The factor by which the retries that the process begins shorten time steps.
+
+    Attributes
+    ----------
+    followed : int
+        Number of frames.
+    timings : list of Timing
+        Of the batches that were done as a whole.
+    refinements : dict
+        That factor, by run index and attempt.
+    """
+
+    def __init__(self, refine: float) -> None:
+        self.followed = 0
+        self.timings: list[Timing] = []
+        self.refinements: dict[log.Place, float] = {}
+        self._refine = refine
+        self._mark: log.Frame | None = None
+        self._at_work: dict[int, int] = {}
+
+    def follow(self, frame: log.Frame) -> None:
+        """Take in the next frame."""
+        self.followed += 1
+        if frame.kind == log.RECORD:
+            ((index, _),) = frame.places
+            was_at_work = self._at_work.pop(index, None) is not None
+            if self._mark is not None and was_at_work and not self._at_work:
+                batch = tuple(index for index, _ in self._mark.places)
+                self.timings.append(Timing(batch, frame.written - self._mark.written))
+        elif frame.kind == log.AGAIN:
+            self.refinements |= dict.fromkeys(frame.places, self._refine)
+        else:
+            self._mark, self._at_work = frame, dict(frame.places)
+
+    def deaths(self) -> set[_Death]:
+        """Return a death at each run that the process was at in the end."""
+        if self._mark is None:
+            return set()
+        return {
+            _Death(index, attempt, self._mark.kind == log.ALONE, self._mark.written)
+            for index, attempt in self._at_work.items()
+        }
 
 
 class _Reader:
@@ -161,53 +209,3 @@ class _Reader:
             else:
                 for index, attempt in frame.places:
                     self._attempts[index] = max(self._attempts[index], attempt)
-
-
-class _Trace:
-    """Follows from mark to mark the runs that a process was doing.
-
-    Parameters
-    ----------
-    refine : float
-        The factor by which the retries that the process begins shorten time steps.
-
-    Attributes
-    ----------
-    followed : int
-        Number of frames.
-    timings : list of Timing
-        Of the batches that were done as a whole.
-    refinements : dict
-        That factor, by run index and attempt.
-    """
-
-    def __init__(self, refine: float) -> None:
-        self.followed = 0
-        self.timings: list[Timing] = []
-        self.refinements: dict[log.Place, float] = {}
-        self._refine = refine
-        self._mark: log.Frame | None = None
-        self._at_work: dict[int, int] = {}
-
-    def follow(self, frame: log.Frame) -> None:
-        """Take in the next frame."""
-        self.followed += 1
-        if frame.kind == log.RECORD:
-            ((index, _),) = frame.places
-            was_at_work = self._at_work.pop(index, None) is not None
-            if self._mark is not None and was_at_work and not self._at_work:
-                batch = tuple(index for index, _ in self._mark.places)
-                self.timings.append(Timing(batch, frame.written - self._mark.written))
-        elif frame.kind == log.AGAIN:
-            self.refinements |= dict.fromkeys(frame.places, self._refine)
-        else:
-            self._mark, self._at_work = frame, dict(frame.places)
-
-    def deaths(self) -> set[_Death]:
-        """Return a death at each run that the process was at in the end."""
-        if self._mark is None:
-            return set()
-        return {
-            _Death(index, attempt, self._mark.kind == log.ALONE, self._mark.written)
-            for index, attempt in self._at_work.items()
-        }
