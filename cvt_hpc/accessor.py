@@ -24,10 +24,9 @@ import xarray as xr
 
 from cvt_hpc.analysis.arrangement import Sides
 from cvt_hpc.analysis.classes import OccurrenceClass, at_strongest_strand, check_results, map_classes
-from cvt_hpc.analysis.composing import compose
 from cvt_hpc.analysis.conversion import in_units, plain, standard
 from cvt_hpc.errors import mismatch, unknown
-from cvt_hpc.picture_kinds import END, HISTORIES, HISTORY, KINDS, RESULTS, Kind
+from cvt_hpc.picture_kinds import END, HISTORIES, HISTORY, KINDS, RESULTS, Kind, compose
 from cvt_hpc.study import open_results
 from cvt_hpc.vibration.classes import levels, onsets
 

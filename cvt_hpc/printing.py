@@ -9,7 +9,9 @@ from itertools import islice
 from typing import TYPE_CHECKING, Any
 
 import numpy as np
+from numpy.typing import NDArray
 
+from cvt_hpc.job import Job
 from cvt_hpc.job.summary import cost_in_words
 from cvt_hpc.job.template import CUSTOMARY
 from cvt_hpc.job.values import JOB_UNITS, shown_number
@@ -18,11 +20,7 @@ from cvt_hpc.variables import Outcome, Status, flag_in_words
 from cvt_hpc.vibration.classes import NEAR, NEAR_CONTRADICTIONS
 
 if TYPE_CHECKING:
-    import numpy as np
-    from numpy.typing import NDArray
-
     from cvt_hpc.analysis.comparison import Cell, Comparison
-    from cvt_hpc.job import Job
     from cvt_hpc.ladder.comparing import AuditReport
     from cvt_hpc.study import RunReport, StudyStatus
     from cvt_hpc.study.forecast.cost_model import Forecast

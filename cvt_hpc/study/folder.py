@@ -24,9 +24,8 @@ from cvt_hpc.netcdf import store_history
 from cvt_hpc.output_folder import DamagedJobError, Kind, OutputFolder
 from cvt_hpc.study.description import Study
 from cvt_hpc.study.job_difference import have_one_layout, places_in, refuse_other
-from cvt_hpc.study.record.index import Records, open_log
+from cvt_hpc.study.record.index import Places, Records, open_log, read_records
 from cvt_hpc.study.record.log import MAGIC
-from cvt_hpc.study.record.recovery import Places, read_records
 from cvt_hpc.variables import Status
 
 if TYPE_CHECKING:

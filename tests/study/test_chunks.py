@@ -18,8 +18,8 @@ from cvt_hpc.study import gather, open_results, run
 from cvt_hpc.study.description import describe
 from cvt_hpc.study.folder import StudyFolder
 from cvt_hpc.study.gather import contiguous_part
+from cvt_hpc.study.record.index import read_records
 from cvt_hpc.study.record.log import RecordFormat, RecordLog
-from cvt_hpc.study.record.recovery import read_records
 from cvt_hpc.variables import Status
 from support.study_double import Axis, Coordinate, Job, Simulator
 from support.study_processes import clean_environment, wait_until

@@ -8,8 +8,8 @@ import pytest
 from cvt_hpc.files import StorageError
 from cvt_hpc.study.description import describe
 from cvt_hpc.study.record import log
+from cvt_hpc.study.record.index import read_records
 from cvt_hpc.study.record.log import BEGUN, HEAD, PLACE, RECORD, RecordFormat, RecordLog
-from cvt_hpc.study.record.recovery import read_records
 from cvt_hpc.variables import Status
 from support.study_double import Axis, Job, Simulator
 

@@ -12,8 +12,8 @@ from cvt_hpc.study.folder import StudyFolder
 from cvt_hpc.study.forecast.cost_model import CostModel, Fit, fit_recorded
 from cvt_hpc.study.ranks.progress import Counter
 from cvt_hpc.study.ranks.stopping import SignalWatch, Stop, TimeLimit, find_time_limit, gathering_margin
+from cvt_hpc.study.record.index import read_records
 from cvt_hpc.study.record.log import RecordFormat, RecordLog
-from cvt_hpc.study.record.recovery import read_records
 from cvt_hpc.variables import Status
 from support.study_double import Axis, Job, Simulator
 
