@@ -20,13 +20,7 @@ from markupsafe import Markup
 from matplotlib.figure import Figure
 
 from cvt_hpc.analysis.arrangement import Arrangement, Sides, arrange, known_values, value_text
-from cvt_hpc.analysis.classes import (
-    OccurrenceClass,
-    at_strongest_strand,
-    check_results,
-    map_classes,
-    occurrence_classes,
-)
+from cvt_hpc.analysis.classes import at_strongest_strand, check_results, map_classes, occurrence_classes
 from cvt_hpc.analysis.comparison import sample_sentences
 from cvt_hpc.analysis.figures import RESOLUTION, coordinate_unit, in_words, number, with_units
 from cvt_hpc.analysis.hysteresis_bands import hysteresis_figure
@@ -44,7 +38,7 @@ from cvt_hpc.report import findings
 from cvt_hpc.report.findings import quantities
 from cvt_hpc.report.interactive import KEPT, as_script, map_data
 from cvt_hpc.variables import Status
-from cvt_hpc.vibration.classes import levels, onsets
+from cvt_hpc.vibration.classes import OccurrenceClass, levels, onsets
 
 COARSE = 0.02  # of an axis: a step beyond is worth a smaller one
 _RETRIES = {
