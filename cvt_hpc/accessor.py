@@ -9,7 +9,7 @@ program, whoever opened it:
     results = xr.open_dataset("out/lebrecht_2004/results.nc")
     results.cvt.onset().sel(sheave_stiffness=1.0)
 
-Small tables that slow studies leave in the repository, read as datasets.
+`read_table` reads the small tables that slow studies leave in the repository as datasets.
 """
 
 from __future__ import annotations

@@ -1,6 +1,6 @@
 """How the axes of a study are laid out as a map: along x, along y, over panels, or fixed.
 
-How the values of an axis are spread, evenly or by their logarithms, and borders between them.
+A `Ruler` spreads the values of an axis, evenly or by their logarithms, and has the borders between them.
 """
 
 from collections.abc import Iterator, Mapping, Sequence

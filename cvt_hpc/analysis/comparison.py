@@ -1,6 +1,6 @@
 """Two studies against each other, cell by cell: which classes contradict, how far numbers deviate.
 
-What a sample of runs that were done again another way tells of their study, in words.
+`sample_sentences` says what a sample of runs that were done again another way tells of their study.
 """
 
 import json

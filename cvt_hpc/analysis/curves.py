@@ -1,6 +1,6 @@
 """Quantities of a study over one of its axes: what runs give as marks, what stands beside them as lines.
 
-Quantities of a study over one of its axes, a panel for each, with a curve for each value of another.
+`curve_panels_figure` draws a panel for each quantity, with a curve for each value of another axis.
 """
 
 from collections.abc import Iterator, Mapping, Sequence

@@ -12,9 +12,9 @@ and `draw` writes it as `save_figure` does. `picture_kinds.py` lists those drawn
 raised where a dataset holds no results, a single run or not what is to be drawn, or where `at` names no axis
 or no value on it; what else a picture refuses its docstring says.
 
-Ticks at the values of an axis: numbers as short as they may be, and only those for which there is room.
+Ticks at the values of an axis are numbers as short as they may be, and only those for which there is room.
 
-Error over cost in pictures: lines and markers of the methods or models compared, axes of errors.
+Methods and models that are compared by error and cost have the lines and markers of `line_style`.
 """
 
 import re

@@ -1,10 +1,9 @@
 """Sliding of one element over time, as figs 3.10 and 4.2 of Lebrecht et al. 2004.
 
-One element on its way through the path: what it meets over time, in Lagrange's coordinates.
-
-A history has speeds and forces at places s of the reference path, in Euler's coordinates (Bullinger et al.
-2005, eq. 11). An element at s moves along the belt at its speed v_0. Where the belt runs off the path by w it
-is 1 + kappa w times as long, so that the element's path coordinate goes by
+An element is followed on its way through the path, in Lagrange's coordinates. A history has speeds and forces
+at places s of the reference path, in Euler's coordinates (Bullinger et al. 2005, eq. 11). An element at s
+moves along the belt at its speed v_0. Where the belt runs off the path by w it is 1 + kappa w times as long,
+so that the element's path coordinate goes by
 
     ds/dt = v_0(s, t) / (1 + kappa w(s, t)),
 

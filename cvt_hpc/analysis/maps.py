@@ -6,7 +6,7 @@ Vibrating cells are coloured by amplitude, darker for larger. Their dominant fre
 cells where there is room, and drawn as a second set of panels where there is none. Into irregular cells their
 amplitude is written where there is room.
 
-Studies whose runs begin with a small and with a large disturbance, as one map: where the start decides.
+Where runs begin with a small and with a large disturbance, one map shows where the start decides.
 """
 
 from collections.abc import Mapping

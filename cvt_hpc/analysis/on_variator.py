@@ -1,6 +1,6 @@
 """Quantities along the belt drawn on the variator, and the powers in and out around it.
 
-The power balance of a run: what the pulleys put in and take out, and where the rest goes.
+The power balance of a run says what the pulleys put in and take out, and where the rest goes.
 """
 
 import json

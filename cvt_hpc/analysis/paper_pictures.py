@@ -1,10 +1,9 @@
-"""Source of energy, switch and oscillator in watts, as fig. 4.4 of Lebrecht et al. 2004.
+"""Pictures of single figures of papers.
 
-Spectra of the strands of one run, as fig. 3.11 of Lebrecht et al. 2004.
-
-Tension and push force of the strands over an axis of a study, as fig. 5 of Bullinger et al. 2005.
-
-Curves of friction over sliding speed, and where motion is fed: fig. 3.12 of Lebrecht et al. 2004.
+- Source of energy, switch and oscillator in watts, as fig. 4.4 of Lebrecht et al. 2004
+- Spectra of the strands of one run, as their fig. 3.11
+- Curves of friction over sliding speed, and where motion is fed: their fig. 3.12
+- Tension and push force of the strands over an axis of a study, as fig. 5 of Bullinger et al. 2005
 """
 
 import json

@@ -1,8 +1,7 @@
 """Quantities along the belt, as figs 20 to 23 of Bullinger et al. 2005 and 4.1 of Lebrecht et al. 2004.
 
-Left and right flank of one run along the belt, with the ends of the arcs enlarged.
-
-Forces between belt and pulleys over the wrap, as figs 9 and 10 of Cepon and Boltezar 2011.
+`flanks_figure` draws left and right flank of one run, with the ends of the arcs enlarged. `wrap_figure` draws
+forces between belt and pulleys over the wrap, as figs 9 and 10 of Cepon and Boltezar 2011.
 """
 
 from collections.abc import Sequence

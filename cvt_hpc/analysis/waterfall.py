@@ -1,6 +1,6 @@
 """Spectra of the strands over an axis of a study, as figs 11 and 12 of Cepon and Boltezar 2011.
 
-Names of lines over spectra, in the margins where the lines leave the panel, clear of ridges.
+Names of lines stand in the margins where the lines leave the panel, clear of ridges.
 """
 
 from collections.abc import Sequence

@@ -4,7 +4,7 @@ A start is a few settings of the job, such as a disturbance. Where a steady stat
 it, which a belt that is loaded within tens of milliseconds does not come near. Values lie more closely
 where vibration begins or ends.
 
-A branch of a bifurcation diagram with all its results, as it is kept and as all that shows it reads it.
+`Followed` is a branch with all its results, as it is kept and as all that shows it reads it.
 """
 
 from collections.abc import Callable, Collection, Mapping, Sequence

@@ -1,8 +1,7 @@
 """A bifurcation diagram made: branches followed, Hopf points found and classified, kept, written, drawn.
 
-The dataset of a bifurcation diagram: branches over the grid of axes, Hopf points and runs in lists.
-
-The output folder of a bifurcation diagram: its files, and the origin of its dataset.
+The dataset holds branches over the grid of axes, and Hopf points and runs in lists. The output folder knows
+its files, and the origin of its dataset.
 """
 
 import json

@@ -1,6 +1,6 @@
 """The content of a bifurcation job: branches along the load, and the runs beside them.
 
-Expected cost of a bifurcation diagram, by the cost models of its steady states and its runs.
+The expected cost follows from the cost models of steady states and runs.
 """
 
 from collections.abc import Iterator

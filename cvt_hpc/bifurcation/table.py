@@ -1,6 +1,6 @@
 """The results of a branch in words: its Hopf points, and loads without a steady state.
 
-Kinds of the Hopf points of a branch, by the runs beside them.
+`with_kinds` finds the kinds of the Hopf points of a branch, by the runs beside them.
 """
 
 from collections.abc import Callable, Iterator

@@ -1,6 +1,6 @@
 """From a chart job to its measurements: every run of it is built and checked before any computing.
 
-The points of a chart from its tables: references, methods over their settings, and the error budget.
+The points of a chart are references, methods over their settings, and the error budget.
 """
 
 import math

@@ -1,10 +1,7 @@
 """A chart made: all points measured, compared, written and drawn.
 
-The results of a chart as netCDF, with all that is needed to repeat it.
-
-The output folder of a chart: its origin, and the points measured so far.
-
-The results of a chart as a table: for people, and as a small file that can be kept.
+The output folder keeps the origin of a chart and the points measured so far. Its results are a dataset, with
+all that is needed to repeat it, and a table: for people, and as a small file that can be kept.
 """
 
 import json

@@ -1,10 +1,7 @@
 """One point measured: runs from all its starts, their results, and their cost.
 
-Runs marched and timed, alone or in lanes.
-
-Expected cost of a chart, by the cost models of its models.
-
-Requirements of a chart on its models, checked before anything is computed.
+Runs are marched and timed, alone or in lanes. Before that `check_prospects` holds models against what a chart
+requires of them, and `predicted_cost` gives its expected cost, by the cost models of its models.
 """
 
 import math

@@ -1,8 +1,7 @@
 """The picture of a scene: error against cost.
 
-The text under the panels of a scene: the chosen method, and points that are not drawn, with the reason.
-
-The picture of an error budget: the effect of each choice.
+The text under the panels names the chosen method, and points that are not drawn, with the reason. The picture
+of an error budget shows the effect of each choice.
 """
 
 import math

@@ -1,6 +1,6 @@
 """A scene of a chart job, with the data from which its runs are built.
 
-Keys of a chart job beside the tables of a job: [chart] and the tables in it.
+It also declares the keys of a chart job beside the tables of a job: [chart] and the tables in it.
 """
 
 import math

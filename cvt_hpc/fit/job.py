@@ -1,11 +1,10 @@
 """The content of a fit job: free parameters, cases, targets, and the length of the search.
 
-How well the runs of a candidate meet a statement: a score from 0 to 1, by one law for each measure.
-
-A score counts a run by its own class: a run that failed, is undecided or irregular neither vibrates
-nor is quiet. A run that slips, that the model refuses since no belt carries its load, or that lies beyond a
-bound of `counted` such as one near gross slip, does not count: it does not vibrate, whatever it does, and
-silence is required of the other runs alone.
+The runs of a candidate meet a statement by a score from 0 to 1, by one law for each measure. A score counts a
+run by its own class: a run that failed, is undecided or irregular neither vibrates nor is quiet. A run that
+slips, that the model refuses since no belt carries its load, or that lies beyond a bound of `counted` such as
+one near gross slip, does not count: it does not vibrate, whatever it does, and silence is required of the
+other runs alone.
 """
 
 from __future__ import annotations

@@ -1,6 +1,6 @@
 """A job for `cvt-hpc fit`: a job whose axes are the ranges of free parameters, with a table [fit].
 
-The targets of a fit, read from a job: each measure with the keys that it takes.
+Its targets are measures, each with the keys that it takes.
 """
 
 import math

@@ -1,6 +1,6 @@
 """A fit made: search, confirmation, distances and sensitivities, and the tables that they leave.
 
-The results of a fit as tables: comma-separated values below lines that state their origin.
+Tables are comma-separated values below lines that state their origin.
 """
 
 from collections.abc import Callable, Iterator, Sequence

@@ -5,9 +5,8 @@ of scipy, a generation at once, so that its runs fill the lanes; it needs no gra
 shares of runs do not have. Both follow from the seed: a search that was stopped requests the same candidates
 again, whose studies are there.
 
-The best candidates of a search run in full: the results that count of a set.
-
-Around a set: how far each parameter may be moved alone, and Sobol indices of all moved together.
+The best candidates are run in full, which gives the results that count of a set. Around a set `look_around`
+finds how far each parameter may be moved alone, and Sobol indices of all moved together.
 """
 
 from collections.abc import Callable, Iterator, Mapping, Sequence

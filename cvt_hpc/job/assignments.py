@@ -1,6 +1,6 @@
 """Values that a user sets beside the job file: KEY=VALUE on the command line, a mapping in Python.
 
-Arrays and quantities of other libraries in a job, as a job file has them; none of these is imported.
+Arrays and quantities of other libraries become what a job file has; none of these libraries is imported.
 """
 
 import tomllib

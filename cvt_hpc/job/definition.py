@@ -1,6 +1,6 @@
 """A validated job: its runs, with every default resolved.
 
-The same runs for another model of the ladder, which knows fewer tables.
+`handed_to` gives the same runs to another model of the ladder, which knows fewer tables.
 """
 
 import hashlib

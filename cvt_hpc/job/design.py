@@ -1,10 +1,8 @@
 """Which points of the space of its axes a study runs: all of a grid, those along boundaries, or samples.
 
-Samples of the space that the ranges of a job's axes span, drawn by scipy.stats.qmc.
-
-Runs whose whole history a sweep is to keep, as written in a job file: grid points, or run indices.
-
-They do not determine the numbers: a folder takes the job with any of them.
+Samples of the space that the ranges of axes span are drawn by scipy.stats.qmc. A job also names the runs
+whose whole history a sweep is to keep, as grid points or run indices. They do not determine the numbers: a
+folder takes the job with any of them.
 """
 
 import math

@@ -1,6 +1,6 @@
 """The job file as it stands on the disk: one clear error for whatever is not readable TOML.
 
-Tables of a command beside the job's own, such as [chart]: checks of keys against their declaration.
+Tables of a command beside the job's own, such as [chart], are checked key by key against their declaration.
 """
 
 import re

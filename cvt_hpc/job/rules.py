@@ -1,10 +1,9 @@
 """Rules by which the value of one parameter follows from others, point by point.
 
-Which parameters of a job follow from others: its tables [derived] and [linked.AXIS], and substitutes.
-
-[derived] has formulas, [linked.AXIS] the parameters that follow an axis value by value. Substitutes are the
-model's: `belt_length` gives `driven_radius`, and `step_error` gives `step` where the job gives neither. Each
-rule comes after the rules that give its sources.
+The tables [derived] and [linked.AXIS] of a job and substitutes give the rules. [derived] has formulas,
+[linked.AXIS] the parameters that follow an axis value by value. Substitutes are the model's: `belt_length`
+gives `driven_radius`, and `step_error` gives `step` where the job gives neither. Each rule comes after the
+rules that give its sources.
 """
 
 from collections.abc import Callable, Collection, Iterable, Iterator, Mapping

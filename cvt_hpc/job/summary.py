@@ -1,6 +1,6 @@
 """A job in words, for `cvt-hpc check`.
 
-Messages about values whose meaning another key decides, if nothing names that key, or that it disables.
+Messages tell of values whose meaning another key decides, if nothing names that key, or that it disables.
 """
 
 import math

@@ -1,6 +1,6 @@
 """Parameters in words: the models, the keys of one, and a commented job file to begin with.
 
-Jobs, notebooks and batch files that come with the program, to be copied and changed.
+Jobs, notebooks and batch files come with the program, to be copied and changed.
 """
 
 import json

@@ -3,7 +3,7 @@
 It takes a second to load, which most jobs are spared: their texts have a prefix before the wanted unit, or
 are in rpm, degrees or per cent.
 
-Time spans as they are given on the command line: "2h30m", "90 min", "1 d 12 h", or a number of seconds.
+`read_duration` reads time spans of the command line: "2h30m", "90 min", "1 d 12 h", or a number of seconds.
 """
 
 import math

@@ -1,8 +1,7 @@
 """One value of a job file against the parameter that declares it: type, unit, bounds, choices.
 
-Numbers without a unit that are far from usual: rpm where rad/s is read, millimetres for metres.
-
-Values of axes for people: in the unit in which the job gives them, by the attributes of a coordinate.
+A number without a unit that is far from usual draws a warning: rpm where rad/s is read, millimetres for
+metres. Values of axes are shown in the unit in which the job gives them, by the attributes of a coordinate.
 """
 
 import math

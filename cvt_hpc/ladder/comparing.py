@@ -3,7 +3,7 @@
 Cells count that the reference decides, or in which it vibrates. A model that gives no answer in a
 cell is not in error there: such cells are counted by themselves.
 
-How often a cheap model errs: a sample of the runs that it answered, repeated in full.
+An audit finds how often a cheap model errs: it repeats a sample of the runs that the model answered in full.
 """
 
 import math

@@ -1,13 +1,8 @@
 """A job for `cvt-hpc ladder`: an ordinary job of the elastic belt, with a table [ladder] or without.
 
-Expected cost of the models of a ladder, by their cost models.
-
-The models of the elastic belt's ladder with which its job can be done, from the cheapest up.
-
-Beside them stands a model that takes longer than the elastic belt and answers the same questions, if a job
-requests it.
-
-A job of the elastic belt on the pushbelt of rigid elements, as the reference of its ladder.
+`ladder` gives the models with which the job can be done, from the cheapest up. Beside them stands a model
+that takes longer than the elastic belt and answers the same questions, if a job requests it. The reference
+may be the pushbelt of rigid elements. The expected cost follows from the models' cost models.
 """
 
 from collections.abc import Iterator, Mapping

@@ -1,8 +1,7 @@
 """A ladder chart made: the same runs done with every model, compared, written and drawn.
 
-The picture of a ladder chart: error against cost of each model, a panel for each question.
-
-The results of a ladder chart as a table, for people and as files that can be kept.
+The picture shows error against cost of each model, a panel for each question. The table is for people, and
+a file that can be kept.
 """
 
 import json

@@ -1,6 +1,6 @@
 """Sums, products, comparisons and logic of lanes.
 
-Reading and writing places of an array of lanes.
+Places of an array of lanes are read and written here as well.
 """
 
 import operator

@@ -7,7 +7,7 @@ from z = (d, a, b) = (r2 - r1, l g1, l g2) and its rate. Strain and curvature at
 
 with constant H, so that forces are sums of h, and the slopes of dm/dt by the speeds are H (z + tau dz/dt).
 
-Chains of planar ANCF elements, open or closed, and the stages of their steps in time.
+`Chain` is a chain of planar elements, open or closed; below are the stages of its steps in time.
 """
 
 from typing import NamedTuple

@@ -1,12 +1,11 @@
 """Contacts in lanes: one-sided contact, its share in a step, and friction's coefficient and memory.
 
-Regularised friction in lanes, with slopes by which Newton's method converges.
-
-A friction force mu N tanh(|v| / v_reg) v / |v| has a slope that is nearly zero where it slides and very steep
-where it sticks. Newton's method with that slope goes back and forth between both. The primal-dual method of
-Chan, Golub and Mulet (1999) keeps the direction h = v / q, q = |v| / tanh(|v| / v_reg), of each contact as an
-unknown of its own: the linearised equation q h = v gives the slope mu N (1 - h q' v / |v|) / q, with
-q' = dq / d|v|, and the next h, cut off at size 1.
+Regularised friction has slopes by which Newton's method converges. A friction force mu N tanh(|v| / v_reg) v
+/ |v| has a slope that is nearly zero where it slides and very steep where it sticks. Newton's method with
+that slope goes back and forth between both. The primal-dual method of Chan, Golub and Mulet (1999) keeps the
+direction h = v / q, q = |v| / tanh(|v| / v_reg), of each contact as an unknown of its own: the linearised
+equation q h = v gives the slope mu N (1 - h q' v / |v|) / q, with q' = dq / d|v|, and the next h, cut off at
+size 1.
 """
 
 from numba.extending import register_jitable

@@ -3,7 +3,7 @@
 A law is declared by an entry in `Law`; its formula, by which this file cannot be read without a compiler,
 goes into `friction`, whose import fails where one is missing.
 
-The friction table of a CSV file: a coefficient for each pair of normal force and sliding speed.
+`friction_file` reads a table of a coefficient for each pair of normal force and sliding speed.
 """
 
 from collections.abc import Callable, Mapping

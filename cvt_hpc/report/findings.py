@@ -1,6 +1,6 @@
 """What came out of a study, in sentences with numbers.
 
-Quantities of the runs that a page shows: numbers, one for each run, that vary over the study.
+Quantities that a page shows are numbers, one for each run, that vary over the study.
 """
 
 from collections import Counter

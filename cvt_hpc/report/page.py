@@ -1,6 +1,6 @@
 """One self-contained HTML page about a study.
 
-What to do next with a study: commands and changes of its job, by what came out.
+`next_steps` says what to do next with a study: commands and changes of its job, by what came out.
 """
 
 import base64

@@ -1,6 +1,6 @@
 """The record of a run: its content, and how it is made of a run that has ended.
 
-Groups of runs that can advance together, and their cost.
+Batches are groups of runs that can advance together; their cost is here as well.
 """
 
 import time

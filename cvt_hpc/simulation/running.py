@@ -1,6 +1,6 @@
 """Runs from their start to their records.
 
-Runs with their histories, as datasets.
+Histories of runs are datasets.
 """
 
 from __future__ import annotations

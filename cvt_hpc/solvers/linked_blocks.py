@@ -25,7 +25,7 @@ of W nodes far apart, which is as kernels of a chain compute them.
 A row of blocks holds [A | U | S | f], all by columns: b^2 numbers each of A, U and S, which only the solver
 uses, and b for each right-hand side (`field_of_right`).
 
-A dense system of a few equations, as the border of a chain has them.
+`solve_small` solves a dense system of a few equations, as the border of a chain has them.
 """
 
 import numpy as np

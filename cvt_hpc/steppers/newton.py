@@ -9,14 +9,13 @@ has just grown too large for it, and only the slip far off is a solution.
 
 Where friction falls too steeply, the equations have several solutions, and the one found is not that to which
 the motion leads. A Newton iteration with one matrix that converges does so where the determinant of I - shift
-J has that matrix's sign, so that it is checked once for each matrix (`frozen_jacobian`).
+J has that matrix's sign, so that it is checked once for each matrix.
 
-A Jacobian that is kept, with the inverse of I - shift J that was made of it.
-
-Where friction falls more steeply than 1 / shift, I - shift J is no longer positive in its direction, and an
-implicit step has more than one solution. That shows in the sign of the determinant; or, should that have
-turned twice, in that of 1 - shift J_vv - shift^2 J_vx of a velocity v and its position x. A method that turns
-growth into decay with shorter steps already has this asked of a longer shift (`reach`).
+A Jacobian is kept together with the inverse of I - shift J that was made of it. Where friction falls more
+steeply than 1 / shift, I - shift J is no longer positive in its direction, and an implicit step has more than
+one solution. That shows in the sign of the determinant; or, should that have turned twice, in that of 1 -
+shift J_vv - shift^2 J_vx of a velocity v and its position x. A method that turns growth into decay with
+shorter steps already has this asked of a longer shift (`reach`).
 """
 
 from typing import NamedTuple

@@ -1,6 +1,6 @@
 """The content of a study, as its folder keeps it: enough to read and gather it without the model.
 
-The coordinates of a dataset: axes, parameters that follow from them, and extra ones of the record.
+The coordinates of its dataset are axes, parameters that follow from them, and extra ones of the record.
 """
 
 import math

@@ -1,8 +1,7 @@
 """The output folder of a study: its files, and the origin of its records.
 
-Parts of a study, for starts that work side by side in one folder, such as the tasks of a job array.
-
-Histories of chosen runs, a file each beside the records.
+Parts of a study are for starts that work side by side in one folder, such as the tasks of a job array.
+Histories of chosen runs are files beside the records.
 """
 
 from __future__ import annotations

@@ -1,9 +1,8 @@
 """From record logs to the dataset: `results.nc`, netCDF-4 with CF conventions.
 
-The values of results.nc: read block by block, compressed by all cores, written chunk by chunk.
-
-HDF5 compresses in one thread, and searches digits that look random for repetitions. The chunks written here
-are chunks as its filters shuffle and deflate would have made them, so that every netCDF library reads them.
+Values are read block by block, compressed by all cores, and written chunk by chunk. HDF5 compresses in one
+thread, and searches digits that look random for repetitions. The chunks written here are chunks as its
+filters shuffle and deflate would have made them, so that every netCDF library reads them.
 """
 
 from __future__ import annotations

@@ -1,6 +1,7 @@
 """Differences between the job of an output folder and the requested one.
 
-The runs of a study within a larger one of the same job: with more values on its axes, or further axes.
+A larger study of the same job has more values on its axes, or further axes; `places_in` finds the runs of the
+smaller one in it.
 """
 
 import json

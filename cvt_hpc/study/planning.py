@@ -1,21 +1,18 @@
 """The records that a start of a sweep finds, and its plan; on rank 0 alone.
 
-Runs that are done again, done alone, or given up: rules for retries, and for runs at which a process died.
+Rules decide which runs are done again, done alone, or given up. A process that dies, by a kill, for lack of
+memory or in compiled code, leaves no record of its runs. They are done again, after all others, so that a run
+that kills its process keeps no other from being done. A process that dies takes the other ranks along, so
+most of these runs are innocent: after `DEATHS` each is done alone, and where the process dies even then, by
+one rank alone, at the very end. After `DEATHS_ALONE` of these deaths the run is given up.
 
-A process that dies, by a kill, for lack of memory or in compiled code, leaves no record of its runs. They
-are done again, after all others, so that a run that kills its process keeps no other from being done. A
-process that dies takes the other ranks along, so most of these runs are innocent: after `DEATHS` each is
-done alone, and where the process dies even then, by one rank alone, at the very end. After `DEATHS_ALONE`
-of these deaths the run is given up.
-
-The cells of a grid that a trace has to run, and the classes that follow for the cells between them.
-
-The grid is cut into boxes that share their sides, at first as wide as the first spacing. The corners of all
-boxes are run. A box in which, sides included, runs of different classes are known is cut in halves along
-each axis, the corners of these are run as well, and so on down to neighbouring cells. Thus a boundary that
-shows in one box is followed into the next, wherever it leads. In the end every box that is wider than that
-is of one class, as far as runs know it, and this class is inferred for its inner cells. Along axes that are
-not traced nothing is inferred: each of their values has boxes of its own.
+A trace runs some cells of its grid, and infers the classes of the cells between them. The grid is cut into
+boxes that share their sides, at first as wide as the first spacing. The corners of all boxes are run. A box
+in which, sides included, runs of different classes are known is cut in halves along each axis, the corners of
+these are run as well, and so on down to neighbouring cells. Thus a boundary that shows in one box is followed
+into the next, wherever it leads. In the end every box that is wider than that is of one class, as far as runs
+know it, and this class is inferred for its inner cells. Along axes that are not traced nothing is inferred:
+each of their values has boxes of its own.
 
 A further run can only cut more boxes. Hence a trace runs in the end the least set of cells that
 requires no other one: it does not depend on the order of the runs, on rounds, ranks or interruptions.

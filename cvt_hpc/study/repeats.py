@@ -3,9 +3,8 @@
 The sample is drawn by the runs' indices: a continued study, or a larger share, continues
 with the same sample. Its runs are a study of their own, in a folder of that of the first one.
 
-How far a study depends on its time step: a sample of its runs done again at half the step, or explicitly.
-
-Both ways are repeats as `repeats.py` has them. A run of model auto is repeated by that model: its coarse and
+A step check shows how far a study depends on its time step: a sample of its runs is done again at half the
+step, or explicitly. A run of model auto is repeated by that model: its coarse and
 its full transient are both at half the step, so that an error shows that both have in common. By the explicit
 step it is done in full.
 """

@@ -1,6 +1,6 @@
 """How far a study is, read from its folder alone; works while a sweep is running and after.
 
-How a sweep ended, for people and for the exit status.
+A `RunReport` says how a sweep ended, for people and for the exit status.
 """
 
 import time

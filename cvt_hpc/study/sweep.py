@@ -1,6 +1,6 @@
 """All runs of a job, on all ranks: compute the plan, record, gather.
 
-Distribution of runs: all ranks compute, and each claims its next batch from one counter.
+All ranks compute, and each claims its next batch from one counter.
 """
 
 import logging

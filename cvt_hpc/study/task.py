@@ -1,6 +1,6 @@
 """The computing of a sweep: batches of runs, each of which ends with a record in every case.
 
-Runs at another time step than that of their job: failed ones at a shorter one, and checks of others.
+Failed runs are done again at a shorter time step, and checks of others at another one than their job's.
 """
 
 from __future__ import annotations

@@ -1,9 +1,8 @@
 """The history of a run of a variator as a dataset: quantities over time, and quantities along the path.
 
-The path of a belt in the plane: points along it, and where points lie along it and how far off.
-
-It is run through counter-clockwise around the driving pulley at (0, 0) and the driven one at (a, 0), so that
-t1 is the lower strand. Path coordinates begin at the inlet of the driving arc.
+The path of a belt in the plane has points along it, and tells where others lie along it and how far off. It
+is run through counter-clockwise around the driving pulley at (0, 0) and the driven one at (a, 0), so that t1
+is the lower strand. Path coordinates begin at the inlet of the driving arc.
 """
 
 from __future__ import annotations

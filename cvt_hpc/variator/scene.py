@@ -3,7 +3,7 @@
 Only ratio, driving_speed and thrust of the defaults are from a paper (Lebrecht et al. 2004, sec. 3.1); sizes
 are those of a common passenger-car belt; every other default is an assumption, plausible and not measured.
 
-Profiles over time: lists of a job that give multiples of one of its values, linear between their times.
+Profiles over time are lists of a job that give multiples of one of its values, linear between their times.
 """
 
 from collections import Counter

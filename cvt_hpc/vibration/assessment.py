@@ -1,12 +1,11 @@
 """From a run's displacement history to its amplitudes, frequencies, growth rates, and whether it vibrates.
 
-Whether a run vibrates: yes, no, irregularly, or undecided because the run was too short.
-
-Judged are the amplitudes of each strand within a frequency band, in successive windows of the last part of
-the run, and the growth rate fitted to them; `assessment.py` takes both from the displacement.
+A run vibrates, does not, or does so irregularly, or is undecided because it was too short. Judged are the
+amplitudes of each strand within a frequency band, in successive windows of the last part of the run, and the
+growth rate fitted to them.
 
 A strand vibrates if it is above the threshold in every window and not decaying. It is irregular if it comes
-and goes about the threshold over so many windows that a trend is ruled out (`irregularity.py`): a longer run
+and goes about the threshold over so many windows that a trend is ruled out: a longer run
 would say no more. It is quiet if it is below the threshold at the end and not on its way there. Everything
 else is undecided, and a longer run may decide: a start transient that has not died out yet, a vibration that
 is still growing. A run vibrates if a strand does, and is quiet only if all strands are. It is irregular if a

@@ -1,14 +1,12 @@
 """One class per run: the two flags of a record, and the undecided cases, as one category.
 
-The common verdict on two starts: where a vibration needs a large start, two attractors exist.
+Two starts have a common verdict (`classify_starts`): where a vibration needs a large start, two attractors
+exist. Two runs of one cell have one, too (`classify_pairs`): the same class, a contradiction, or another
+difference. A contradiction is a cell that is quiet in one run and vibrating in the other. Near the amplitude
+threshold a small error is enough for one, so contradictions whose larger amplitude lies within NEAR of the
+threshold are separated from those beyond.
 
-The common verdict on two runs of one cell: the same class, a contradiction, or another difference.
-
-A contradiction is a cell that is quiet in one run and vibrating in the other. Near the amplitude threshold a
-small error is enough for one, so contradictions whose larger amplitude lies within NEAR of the threshold are
-separated from those beyond.
-
-Loads at which vibration sets in and ends, and the distances between the results of two studies.
+`onsets` gives the loads at which vibration sets in and ends.
 """
 
 from collections.abc import Sequence

@@ -2,12 +2,10 @@
 
 All functions take `signal` with time along the first axis and any number of channels behind it, and share
 one estimator: a segment is multiplied by a Hann window, freed of its mean and slow drift, and
-transformed. Reasons and errors: `tapering.py`.
+transformed. Reasons and errors stand below.
 
 A signal that is constant, or a cubic in time, up to rounding has no vibration: amplitude 0, frequency and
 growth rate nan. A signal with a value that is not finite yields nan in its channel.
-
-The estimator behind all amplitudes: a segment times a Hann window, without drift, and its spectrum.
 
 Why a window and a spectral mask, and no recursive filter: a zero-phase filter with a corner at 100 Hz
 needs 10-20 ms to forget its start at either end, which is most of a 50 ms record, and its start-up

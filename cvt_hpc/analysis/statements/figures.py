@@ -1,6 +1,7 @@
 """The figures that jobs reproduce: how each is drawn and what the paper says of it.
 
-Sliding in the plane of an arc: fig. 4 of Bullinger et al. 2005, fig. 4.1 of Lebrecht et al. 2004.
+Sliding in the plane of an arc, fig. 4 of Bullinger et al. 2005 and 4.1 of Lebrecht et al. 2004, is drawn
+here.
 """
 
 from collections.abc import Callable, Iterator, Sequence

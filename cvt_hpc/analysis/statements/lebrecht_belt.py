@@ -1,6 +1,6 @@
-"""Statements of Lebrecht, Pfeiffer and Ulbrich 2004 about figs 3.2 to 3.4, 3.6, 3.7, 3.10, 3.11.
+"""Statements of Lebrecht, Pfeiffer and Ulbrich 2004 about their figs 3.1 to 3.14.
 
-Statements of Lebrecht, Pfeiffer and Ulbrich 2004 about their ramps: figs 3.1, 3.9, 3.13 and 3.14.
+Figs 3.1, 3.9, 3.13 and 3.14 show ramps. Fig. 3.12 is in `lebrecht_excitation.py`.
 """
 
 from collections.abc import Sequence

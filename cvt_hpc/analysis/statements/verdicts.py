@@ -1,6 +1,6 @@
 """A statement of a paper about one of its figures, and what measuring it in a study gives.
 
-What a study has left, as checks of statements read it: its results and the histories that it keeps.
+Checks of statements read `Kept`: the results of a study and the histories that it keeps.
 """
 
 import json

@@ -4,9 +4,8 @@ The saddle point of an element is a material point of the ring, r(s; q). With th
 of the ring there and J = dr/dq, its velocity is n (n.J u) + t v for any speed v along the ring, since n.dr/ds
 = 0; and s' = (v - t.J u) / |dr/ds|.
 
-Set-valued friction of ring and flanks, by proximal points.
-
-A contact with impulse P and sliding velocity g obeys Coulomb's law with the bound b = mu N dt exactly if
+Set-valued friction of ring and flanks is solved by proximal points. A contact with impulse P and sliding
+velocity g obeys Coulomb's law with the bound b = mu N dt exactly if
 
     P = prox(P - r g),    prox(x) = x where |x| <= b, else b x / |x|,
 

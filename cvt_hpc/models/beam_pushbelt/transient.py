@@ -1,10 +1,7 @@
 """A transient run of the pushbelt on a ring of beams, recorded as one of `pushbelt`.
 
-Start of a pushbelt on a ring of beams from the geometry of its path.
-
-State and work space of a pushbelt on a ring of beams, as its kernels take them.
-
-An element takes the fields of `pushbelt.belt`, so that both models are read off alike, and those below.
+A run starts from the geometry of its path. State and work space are as the kernels take them. An element
+takes the fields of `pushbelt.belt`, so that both models are read off alike, and those below.
 """
 
 from collections.abc import Mapping

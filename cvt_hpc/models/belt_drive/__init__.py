@@ -2,8 +2,6 @@
 
 Importing this package is cheap: kernels are compiled when `transient` is imported.
 
-Parameters of the belt drive that a job may set, with units, bounds and defaults.
-
 Radii, centre distance, line mass, stiffness and damping of the belt (five ribs) and the inertia of the
 pulleys are those of Cepon and Boltezar 2011, table 1; elements, contact points and the scatter of lengths are
 those of their sec. 2.2. The belt's own length follows from the tension at rest. Assumptions are friction

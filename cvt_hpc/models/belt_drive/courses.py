@@ -3,10 +3,9 @@
 Profiles are multiples of `driving_speed` and `load`, linear between their times, constant before the first
 and after the last one. From there on the speed has a ripple (Cepon and Boltezar 2011, eq. 5).
 
-The belt's own length and its tension at rest: belt and contacts in series along the path.
-
-At a tension T the belt is longer by the factor x with EA (x^2 - 1) x / 2 = T, and the contacts sink in by
-T / (R k) on each arc, which shortens the path.
+The belt's own length gives its tension at rest, with belt and contacts in series along the path. At a tension
+T the belt is longer by the factor x with EA (x^2 - 1) x / 2 = T, and the contacts sink in by T / (R k) on
+each arc, which shortens the path.
 """
 
 import numpy as np

@@ -1,6 +1,7 @@
 """The belt on its pulleys: the moving parts, and the step in time.
 
-Small free vibrations of a whole drive about an instant: strands, arcs that stick, and driven pulleys.
+Small free vibrations of a whole drive about an instant, with strands, arcs that stick and driven pulleys,
+obey
 
     M u'' + K u = 0
 

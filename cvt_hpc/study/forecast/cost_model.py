@@ -6,12 +6,11 @@ its own batches: nodes differ, and nothing has to be sent. It starts from rank 0
 record, so that the first claim of a resumed sweep is informed; that fit counts as a few batches at most, and
 soon gives way to the rank's own measurements.
 
-How long a sweep will take on any number of ranks: its schedule, simulated claim by claim.
-
-The batches are the result of `share_out` for that number of ranks, in the order in which they are claimed. A
-claim travels to the counter, waits for earlier ones, is served, and its batch begins. The duration of batches
-is drawn anew in each repeat: the predicted cost times a factor, whose logarithm scatters as in the fit. Left
-out: ranks of one node share its memory and its clock rate, and files are written.
+A forecast for any number of ranks simulates the schedule, claim by claim. The batches are the result of
+`share_out` for that number of ranks, in the order in which they are claimed. A claim travels to the counter,
+waits for earlier ones, is served, and its batch begins. The duration of batches is drawn anew in each repeat:
+the predicted cost times a factor, whose logarithm scatters as in the fit. Left out: ranks of one node share
+its memory and its clock rate, and files are written.
 """
 
 from __future__ import annotations

@@ -1,8 +1,7 @@
 """Resources to request on a cluster: time limit and space on the disk.
 
-Known times of a job before its sweep: by records, by a few short batches, or by prediction.
-
-Memory and disk that a sweep needs, and the refusal of sweeps that need too much.
+Before a sweep the times of its runs are known by records, by a few short batches, or by prediction. Sweeps
+that need too much memory or disk are refused.
 """
 
 import math

@@ -1,6 +1,6 @@
 """How far a sweep, chart or diagram is: a bar on a terminal, plain lines where the output goes to a file.
 
-Data that ranks share while they compute: the next batch to claim, and the number of finished runs.
+Ranks share the next batch to claim and the number of finished runs: `Counter`.
 """
 
 import math

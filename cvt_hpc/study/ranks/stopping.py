@@ -1,10 +1,9 @@
 """Early end of a sweep: by a signal, the time limit, or another rank that stops.
 
-Going on without ranks that have died, where MPI tolerates it (ULFM; Open MPI: `mpirun --with-ft ulfm`).
-
+Where MPI tolerates it (ULFM; Open MPI: `mpirun --with-ft ulfm`) a sweep goes on without ranks that have died.
 Elsewhere the launcher ends all ranks when one dies, and the same command continues later.
 
-The time of a sweep: as requested, or the rest of the Slurm job that it runs in.
+The time limit is as requested, or the rest of the Slurm job that the sweep runs in.
 """
 
 import logging

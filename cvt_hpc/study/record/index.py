@@ -1,6 +1,6 @@
 """Which record of each run counts and where it lies; the records themselves are read when they are needed.
 
-Reading logs, whatever happened to the files: damage is named and skipped, never fatal.
+Logs are read whatever happened to the files: damage is named and skipped, never fatal.
 """
 
 import os

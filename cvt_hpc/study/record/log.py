@@ -3,12 +3,11 @@
 Before a batch begins a mark is written. A process that dies leaves it without records after it, which shows
 the runs at which it died; a process that ends in an orderly way removes it.
 
-The bytes of a record log, format version 2; README.md of the folder above has them in a table.
-
-A log is a preamble (magic, format version, a JSON header and its checksum) and then frames: a head (marker,
-payload length, time of writing, checksum) and a payload. A frame's checksum starts from the job's fingerprint
-and the record's type, so a frame is known to belong to its study even where the header is lost, and reading
-can take up again at the next frame after a damaged stretch.
+README.md of the folder above has the bytes of a log, format version 2, in a table. A log is a preamble
+(magic, format version, a JSON header and its checksum) and then frames: a head (marker, payload length, time
+of writing, checksum) and a payload. A frame's checksum starts from the job's fingerprint and the record's
+type, so a frame is known to belong to its study even where the header is lost, and reading can take up again
+at the next frame after a damaged stretch.
 """
 
 import json
