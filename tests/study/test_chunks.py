@@ -75,7 +75,7 @@ def assert_holds(path, study, rows):
 def test_the_dataset_does_not_depend_on_its_pieces(tmp_path, monkeypatch, shape, block, chunk):
     study = describe(grid(*shape), Simulator())
     monkeypatch.setattr("cvt_hpc.study.record.index.BLOCK", block * study.record_dtype.itemsize)
-    monkeypatch.setattr("cvt_hpc.study.gather.CHUNK", chunk)
+    monkeypatch.setattr(sys.modules["cvt_hpc.study.gather"], "CHUNK", chunk)
     monkeypatch.setattr("cvt_hpc.study.record.log.WINDOW", 1000)  # less than two frames
     rows = make_rows(study)
     order = np.random.default_rng(1).permutation(study.size)
@@ -201,7 +201,7 @@ import_module("cvt_hpc.study.{module}").{function} = kill
 
 @pytest.mark.parametrize(
     ("module", "function"),
-    [("gather", "_declare"), ("gather", "fill"), ("chunks", "_pack")],
+    [("gather", "_declare"), ("gather", "fill"), ("gather", "_pack")],
 )
 def test_a_gathering_that_is_killed_leaves_the_dataset_that_was_there(tmp_path, module, function):
     job = grid(60)
