@@ -1,13 +1,11 @@
 """Geometry of a two-pulley variator with a belt of constant length on its pitch line."""
 
-from __future__ import annotations
-
 import math
-from collections.abc import Mapping
 from dataclasses import dataclass
-from typing import Any
 
 import numpy as np
+
+from cvt_hpc.parameters import Parameters
 
 
 @dataclass(frozen=True)
@@ -135,7 +133,7 @@ def cell_counts(path: Variator, cells: int) -> tuple[int, int, int, int]:
     return driving, strand, cells - driving - 2 * strand, strand
 
 
-def variator_problems(parameters: Mapping[str, Any]) -> list[tuple[str, str, str]]:
+def variator_problems(parameters: Parameters) -> list[tuple[str, str, str]]:
     """Problems of a variator's geometry, in the form of a model's check: (key, expected, found).
 
     Parameters
