@@ -4,8 +4,6 @@
 `history_figure`; what they need is imported at their first use. Datasets have `dataset.cvt` (`accessor.py`).
 """
 
-from __future__ import annotations
-
 from importlib import import_module
 from typing import Any
 

@@ -4,8 +4,6 @@ An archive holds arrays, and a head in JSON types: the job of the part, its orig
 no arrays. Nothing in it is executed, and unreadable content is damage: its entries have checksums.
 """
 
-from __future__ import annotations
-
 import io
 import json
 import logging

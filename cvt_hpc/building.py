@@ -1,7 +1,5 @@
 """The build of a wheel, as pyproject.toml names it: the revision of the sources goes with them."""
 
-from __future__ import annotations
-
 import subprocess
 from contextlib import suppress
 from pathlib import Path

@@ -1,7 +1,5 @@
 """The one error that bad input raises, and the wording that all of them share."""
 
-from __future__ import annotations
-
 import difflib
 import json
 from collections.abc import Iterable, Mapping, Sequence

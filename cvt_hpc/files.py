@@ -4,8 +4,6 @@ A folder may come from somebody else. A file that is opened in it by a fixed nam
 would lead elsewhere, and a pipe or a device may never answer.
 """
 
-from __future__ import annotations
-
 import contextlib
 import csv
 import errno

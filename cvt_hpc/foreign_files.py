@@ -5,8 +5,6 @@ stand for any number of values, a group may contain itself, and types may be nes
 files, and what this program writes needs none of it.
 """
 
-from __future__ import annotations
-
 import math
 from collections.abc import Iterator
 from pathlib import Path

@@ -8,8 +8,6 @@ numba, numpy and the like count by their versions, and `lanes` and what else has
 `extensions`. What has no value that could be compared, as an open file, is an `UnknownValueError`.
 """
 
-from __future__ import annotations
-
 import dis
 import enum
 import hashlib

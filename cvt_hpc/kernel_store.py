@@ -12,8 +12,6 @@ the user's cache. An entry that no process has used for a month is removed when 
 Of processes that need the same code at a time one compiles it, and the others wait for it.
 """
 
-from __future__ import annotations
-
 import errno
 import fcntl
 import grp

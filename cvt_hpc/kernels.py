@@ -17,8 +17,6 @@ but for functions of the compiler's own library.
 Slow steps are logged by the logger of this module: compiling as INFO, missing storage as WARNING.
 """
 
-from __future__ import annotations
-
 import functools
 import gc
 import io

@@ -1,7 +1,5 @@
 """Locks on an output folder, which end with the process that holds them."""
 
-from __future__ import annotations
-
 import fcntl
 import logging
 import os

@@ -5,8 +5,6 @@ folder may be damaged, or another user's: a checksum shows damage of the job fil
 removed outside.
 """
 
-from __future__ import annotations
-
 import errno
 import hashlib
 import json
@@ -17,17 +15,8 @@ from contextlib import AbstractContextManager, contextmanager, nullcontext
 from pathlib import Path
 from typing import Any, ClassVar, Generic, NamedTuple, TypeVar
 
+from cvt_hpc import files
 from cvt_hpc.errors import InputError
-from cvt_hpc.files import (
-    StorageError,
-    kind_of,
-    make_own_folder,
-    naming_refusals,
-    read_regular,
-    remove_own,
-    try_to_write,
-    written_aside,
-)
 from cvt_hpc.locks import is_locked, locked
 
 CHECKSUM = "checksum"  # key of the job file
@@ -136,16 +125,16 @@ class OutputFolder(ABC, Generic[Content]):
             If it is the file of something else, or cannot be read.
         """
         expected = f"{self.job_file}: expected the job of a {self.kind.what}, found"
-        if (kind := kind_of(self.job_file)) is None:
+        if (kind := files.kind_of(self.job_file)) is None:
             return None
         if kind != "a file":
             raise DamagedJobError(f"{expected} {kind}")
         try:
-            data = read_regular(self.job_file, _LIMIT)
+            data = files.read_regular(self.job_file, _LIMIT)
         except OSError as error:
             if error.errno == errno.EFBIG:
                 raise DamagedJobError(f"{expected} {error.strerror}") from error
-            raise StorageError(f"{expected}: {error.strerror}") from error
+            raise files.StorageError(f"{expected}: {error.strerror}") from error
         try:
             entry = json.loads(data.decode())
             if not isinstance(entry, dict):
@@ -185,13 +174,13 @@ class OutputFolder(ABC, Generic[Content]):
             job file nor they themselves explain.
         """
         what = self.kind.what
-        with naming_refusals(self.path, "a folder that can be read"):
+        with files.naming_refusals(self.path, "a folder that can be read"):
             if not self.path.is_dir():
-                if (kind := kind_of(self.path)) is not None:
+                if (kind := files.kind_of(self.path)) is not None:
                     raise InputError(f"{self.path}: expected a folder for the results, found {kind}")
                 return None
             expected = f"{self.path}: expected an empty folder or that of an earlier {what}, found"
-            if self.kind.job_file != CHART_FILE and kind_of(self.path / CHART_FILE):
+            if self.kind.job_file != CHART_FILE and files.kind_of(self.path / CHART_FILE):
                 raise InputError(f"{expected} that of a chart; choose another --out")
             # In this order: another start writes its job file before any results.
             unexplained = self.unexplained()
@@ -249,15 +238,15 @@ class OutputFolder(ABC, Generic[Content]):
         InputError
             If the system refuses.
         """
-        with naming_refusals(self.path, "a folder that results can be written to"):
+        with files.naming_refusals(self.path, "a folder that results can be written to"):
             self.path.mkdir(parents=True, exist_ok=True)
             folders = [self.path / name for name in self.kind.folders]
             for place in folders:
                 _make_way(place, ("a folder", "a file"), fresh)
-                make_own_folder(place)
+                files.make_own_folder(place)
             for place in self.locks():
                 _make_way(place, ("a file",), fresh)
-            try_to_write((folders or [self.path])[0])
+            files.try_to_write((folders or [self.path])[0])
 
     def locks(self) -> list[Path]:
         """Return the lock files that are, or may be, in the folder."""
@@ -287,7 +276,7 @@ class OutputFolder(ABC, Generic[Content]):
         """Write the job file of a content, with its checksum; StorageError if the system refuses."""
         entry = {"format": self.kind.format, **self.document(content)}
         text = json.dumps({**entry, CHECKSUM: checksum(entry)}, indent=1, allow_nan=False)
-        with written_aside(path) as aside:
+        with files.written_aside(path) as aside:
             aside.write_text(text)
 
     def replace(self, found: Any, asked: Content) -> None:
@@ -302,9 +291,9 @@ class OutputFolder(ABC, Generic[Content]):
         found : object
             Content of a sound job file.
         """
-        with naming_refusals(self.path, "a folder that results can be removed from"):
+        with files.naming_refusals(self.path, "a folder that results can be removed from"):
             for path in [*self.written(found), *self.leftovers(), self.job_file]:
-                remove_own(path)
+                files.remove_own(path)
 
     def leftovers(self) -> list[Path]:
         """Return the half-written files of processes that died while they wrote."""
@@ -329,11 +318,11 @@ def checksum(entry: dict[str, Any]) -> str:
 
 def _make_way(path: Path, kinds: tuple[str, ...], fresh: bool) -> None:
     """Remove files that are none of these kinds if results may be removed, or else raise InputError."""
-    found = kind_of(path)
+    found = files.kind_of(path)
     if found is None or found in kinds:
         return
     if not fresh:
         raise InputError(
             f"{path}: expected {kinds[0]}, found {found}; remove it, or --fresh with all results"
         )
-    remove_own(path)
+    files.remove_own(path)

@@ -1,12 +1,11 @@
 """The classes with which models and steppers declare the parameters that a job file may set."""
 
-from __future__ import annotations
-
 from collections.abc import Callable, Mapping
 from dataclasses import dataclass, field
 from typing import Any
 
 Range = tuple[float, float]
+Parameters = Mapping[str, Any]  # flat, of one run [SI]
 
 
 @dataclass(frozen=True)

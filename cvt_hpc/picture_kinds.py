@@ -2,13 +2,18 @@
 
 A new kind is a function that composes its figure, by the arguments of all pictures (`analysis/figures.py`)
 and options of its own, and an entry here. The command line reads this table at its start, when nothing that
-draws has been imported yet; `analysis/composing.py` draws by it.
+draws has been imported yet; what a picture needs is imported when `compose` draws it.
 """
 
 from __future__ import annotations
 
-from collections.abc import Mapping
-from typing import Any, NamedTuple
+from collections.abc import Mapping, Sequence
+from importlib import import_module
+from typing import TYPE_CHECKING, Any, NamedTuple
+
+if TYPE_CHECKING:
+    import xarray as xr
+    from matplotlib.figure import Figure
 
 # A study; runs in a picture each; runs together in one picture.
 RESULTS, HISTORY, HISTORIES = "RESULTS", "HISTORY", "HISTORIES"
@@ -116,7 +121,7 @@ KINDS = {
     ),
     "curve": Kind(
         RESULTS,
-        "curve_panels.curves_figure",
+        "curves.curves_figure",
         "a quantity over an axis as marks, and others of its unit as lines beside it",
         (
             Option(
@@ -137,7 +142,7 @@ KINDS = {
     ),
     "wrap": Kind(
         HISTORIES,
-        "wraps.wrap_figure",
+        "profiles.wrap_figure",
         "forces between belt and pulleys over the wrap, of one run or of several",
     ),
     "profile": Kind(
@@ -183,7 +188,7 @@ KINDS = {
     ),
     "strands": Kind(
         RESULTS,
-        "strand_bars.strand_bars_figure",
+        "paper_pictures.strand_bars_figure",
         "tension and push force of the strands over an axis, as bars",
         sides=("x", "panel"),
     ),
@@ -197,7 +202,7 @@ KINDS = {
     ),
     "flanks": Kind(
         HISTORY,
-        "flanks.flanks_figure",
+        "profiles.flanks_figure",
         "left and right flank of a spatial pushbelt, with the ends of the arcs enlarged",
     ),
     "energy": Kind(
@@ -212,3 +217,51 @@ KINDS = {
         (_several("default: push_force, of belt drives tension"),),
     ),
 }
+
+
+def compose(
+    name: str,
+    datasets: Sequence[xr.Dataset],
+    at: Mapping[str, Any] | None = None,
+    sources: Sequence[str] = (),
+    **options: Any,
+) -> Figure:
+    """Compose a picture of a kind.
+
+    Parameters
+    ----------
+    name : str
+        Of KINDS.
+    datasets : sequence of Dataset
+        Results of one study, one history or several, by the kind's subject.
+    at : mapping, optional
+        Axes of results to fix.
+    sources : sequence of str, optional
+        Where the datasets are from, for the errors.
+    **options
+        By their keys, and by the sides the axes put there; those left out have the defaults of the figure.
+
+    Raises
+    ------
+    InputError
+        As of the figure.
+    """
+    kind, given = KINDS[name], dict(options)
+    if sides := {side: given.pop(side) for side in kind.sides if side in given}:
+        from cvt_hpc.analysis.arrangement import Sides
+
+        given["sides"] = Sides(**sides)
+    if kind.subject == RESULTS:
+        given["at"] = at
+    subject: Any = datasets
+    if kind.subject != HISTORIES:
+        (subject,) = datasets
+    if sources:
+        given |= {"sources": sources} if kind.subject == HISTORIES else {"source": sources[0]}
+    return function_of(kind.figure)(subject, **given)
+
+
+def function_of(place: str) -> Any:
+    """A function by its module in this room and its name."""
+    module, _, name = place.partition(".")
+    return getattr(import_module(f"cvt_hpc.analysis.{module}"), name)

@@ -9,24 +9,22 @@ from itertools import islice
 from typing import TYPE_CHECKING, Any
 
 import numpy as np
+from numpy.typing import NDArray
 
-from cvt_hpc.job.shown import JOB_UNITS, shown_number
+from cvt_hpc.job import Job
 from cvt_hpc.job.summary import cost_in_words
 from cvt_hpc.job.template import CUSTOMARY
+from cvt_hpc.job.values import JOB_UNITS, shown_number
 from cvt_hpc.tables import columns
 from cvt_hpc.variables import Outcome, Status, flag_in_words
-from cvt_hpc.vibration.agreement import NEAR, NEAR_CONTRADICTIONS
+from cvt_hpc.vibration.classes import NEAR, NEAR_CONTRADICTIONS
 
 if TYPE_CHECKING:
-    import numpy as np
-    from numpy.typing import NDArray
-
     from cvt_hpc.analysis.comparison import Cell, Comparison
-    from cvt_hpc.job import Job
-    from cvt_hpc.ladder.audit import AuditReport
+    from cvt_hpc.ladder.comparing import AuditReport
     from cvt_hpc.study import RunReport, StudyStatus
-    from cvt_hpc.study.forecast.needs import Disk, Needs
-    from cvt_hpc.study.forecast.simulate import Forecast
+    from cvt_hpc.study.forecast.cost_model import Forecast
+    from cvt_hpc.study.forecast.resources import Disk, Needs
     from cvt_hpc.study.repeats import Repeat
 
 MOST_FAILURES_NAMED = 10
@@ -114,7 +112,7 @@ def audit_lines(report: AuditReport) -> Iterator[str]:
 
 def step_check_lines(check: Repeat, found: Comparison) -> Iterator[str]:
     """Yield the lines that say how far a sample of runs depends on the time step."""
-    from cvt_hpc.analysis.repeated import contradictions, deviations
+    from cvt_hpc.analysis.comparison import contradictions, deviations
 
     drawn, eligible = int(check.sample.sum()), int(check.may_be_drawn.sum())
     yield f"step check: {drawn} of {eligible} runs that took steps done again {check.way}"
@@ -125,7 +123,7 @@ def step_check_lines(check: Repeat, found: Comparison) -> Iterator[str]:
 
 def comparison_lines(found: Comparison, sources: tuple[str, str]) -> Iterator[str]:
     """Yield the lines that say in what two studies agree: A, B, their jobs, classes, and amplitudes."""
-    from cvt_hpc.analysis.repeated import deviations
+    from cvt_hpc.analysis.comparison import deviations
 
     for label, source, left_out in zip("AB", sources, found.left_out, strict=True):
         yield f"{label}: {source}" + (f"; {left_out} of its runs left out, unknown there" if left_out else "")
@@ -250,7 +248,7 @@ def forecast_lines(forecasts: Sequence[Forecast], job: Job, basis: str) -> Itera
 
 def needs_line(needed: Needs, histories: int) -> str:
     """Return the line that says what memory and disk a sweep needs."""
-    from cvt_hpc.study.forecast.needs import size_in_words
+    from cvt_hpc.study.forecast.resources import size_in_words
 
     line = (
         f"needed: {size_in_words(needed.memory)} of memory for the plan; {disk_line(needed.disk, histories)}"
@@ -264,7 +262,7 @@ def needs_line(needed: Needs, histories: int) -> str:
 
 def disk_line(disk: Disk, histories: int) -> str:
     """Return the line that says what space a study takes on the disk."""
-    from cvt_hpc.study.forecast.needs import size_in_words
+    from cvt_hpc.study.forecast.resources import size_in_words
 
     line = (
         f"disk: {size_in_words(disk.records)} of records, at most {size_in_words(disk.results)} of results.nc"

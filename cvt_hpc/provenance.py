@@ -1,7 +1,5 @@
 """The origin of numbers: the command, the host, the versions and the revision, for all that is written."""
 
-from __future__ import annotations
-
 import hashlib
 import json
 import os

@@ -1,12 +1,9 @@
 """Duration of a run and recorded quantities: parameters of every job, in each model."""
 
-from __future__ import annotations
-
 import math
-from collections.abc import Mapping
 from typing import Any
 
-from cvt_hpc.parameters import Parameter, not_negative
+from cvt_hpc.parameters import Parameter, Parameters, not_negative
 from cvt_hpc.vibration.ramped import ramped
 
 LONGEST = 4  # times the duration
@@ -58,7 +55,7 @@ PARAMETERS: dict[str, dict[str, Parameter]] = {
 }
 
 
-def check(parameters: Mapping[str, Any]) -> list[tuple[str, str, str]]:
+def check(parameters: Parameters) -> list[tuple[str, str, str]]:
     """Problems between parameters: (key, expected, found).
 
     Parameters
@@ -81,13 +78,13 @@ def check(parameters: Mapping[str, Any]) -> list[tuple[str, str, str]]:
     return problems
 
 
-def inert(parameters: Mapping[str, Any]) -> dict[str, str]:
+def inert(parameters: Parameters) -> dict[str, str]:
     """Parameters without effect on a run, each with the setting that makes it so."""
     found = {} if "step" in parameters else {"most_refinements": "a stepper that chooses its step"}
     return found | ({"longest_duration": f"{ramped(parameters)}_history ramp"} if ramped(parameters) else {})
 
 
-def sample_count(parameters: Mapping[str, Any]) -> int:
+def sample_count(parameters: Parameters) -> int:
     """Samples of a whole run.
 
     Parameters
@@ -103,7 +100,7 @@ def steps_per_sample(interval: float, step: float) -> int:
     return max(math.ceil(interval / step - 1e-9), 1)
 
 
-def start_up_samples(parameters: Mapping[str, Any]) -> int:
+def start_up_samples(parameters: Parameters) -> int:
     """Samples of a run before its load has risen.
 
     Parameters
@@ -115,7 +112,7 @@ def start_up_samples(parameters: Mapping[str, Any]) -> int:
     return min(risen, sample_count(parameters))
 
 
-def longest_duration(parameters: Mapping[str, Any]) -> Any:
+def longest_duration(parameters: Parameters) -> Any:
     """How long a run may last that stays undecided [s].
 
     Parameters

@@ -1,7 +1,5 @@
 """Tables for people, as aligned lines of text, and the lines of stored tables."""
 
-from __future__ import annotations
-
 import math
 from collections.abc import Iterable, Iterator, Sequence
 from itertools import dropwhile

@@ -1,7 +1,5 @@
 """The class with which a run's record is declared: one `Variable` per quantity, once for all packages."""
 
-from __future__ import annotations
-
 import re
 from collections.abc import Mapping
 from dataclasses import dataclass

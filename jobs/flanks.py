@@ -6,7 +6,7 @@ from pathlib import Path
 import numpy as np
 import xarray as xr
 
-from cvt_hpc.analysis.flanks import AROUND, alone, ends_of_arcs, from_end
+from cvt_hpc.analysis.profiles import AROUND, alone, ends_of_arcs, from_end
 from cvt_hpc.analysis.telling_apart import history_files, on_axes
 from cvt_hpc.provenance import origin_lines
 

@@ -1,7 +1,5 @@
 """The common runs of two studies: the same axes in the same order, and on each the values that both have."""
 
-from __future__ import annotations
-
 import json
 from collections.abc import Collection, Hashable, Iterable
 from typing import Any, NamedTuple
@@ -13,7 +11,7 @@ from cvt_hpc.analysis.arrangement import known_values
 from cvt_hpc.analysis.classes import check_results
 from cvt_hpc.analysis.scatter import is_sampled
 from cvt_hpc.errors import InputError, did_you_mean, mismatch
-from cvt_hpc.job.shown import shown
+from cvt_hpc.job.values import shown
 from cvt_hpc.study.job_difference import flatten
 
 COMPARED = ("status", "vibrates", "amplitude", "frequency")  # beside what a model adds

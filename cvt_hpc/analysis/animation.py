@@ -1,7 +1,5 @@
 """The vibrating belt as a moving picture, magnified, with its scale."""
 
-from __future__ import annotations
-
 import shutil
 from base64 import b64encode
 from collections.abc import Callable

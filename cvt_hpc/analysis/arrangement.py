@@ -1,6 +1,7 @@
-"""How the axes of a study are laid out as a map: along x, along y, over panels, or fixed."""
+"""How the axes of a study are laid out as a map: along x, along y, over panels, or fixed.
 
-from __future__ import annotations
+A `Ruler` spreads the values of an axis, evenly or by their logarithms, and has the borders between them.
+"""
 
 from collections.abc import Iterator, Mapping, Sequence
 from dataclasses import dataclass, field, replace
@@ -12,11 +13,12 @@ import xarray as xr
 from matplotlib.axis import Axis
 from numpy.typing import NDArray
 
-from cvt_hpc.analysis.figures import axis_label, coordinate_unit, in_words
-from cvt_hpc.analysis.spacing import are_few, edges_of, is_logarithmic, on_decades
-from cvt_hpc.analysis.ticks import number, put_ticks, short_numbers
+from cvt_hpc.analysis.figures import axis_label, coordinate_unit, in_words, number, put_ticks, short_numbers
 from cvt_hpc.errors import InputError, few_of, mismatch, show, unknown
-from cvt_hpc.job.shown import shown_as_read, shown_number, shown_unit
+from cvt_hpc.job.values import shown_as_read, shown_number, shown_unit
+
+EVEN, EQUAL = 1.5, 1.01  # of steps: largest over smallest, below which they are taken for even
+LEAST_SPAN = 4.0  # last over first value of a logarithmic axis
 
 At = Mapping[str, Any] | None  # axes to fix: value by name, a number [SI] or a text
 MOST_VALUES_NAMED = 12
@@ -344,3 +346,36 @@ def _logarithmic_ruler(values: NDArray[np.float64], label: str) -> Ruler:
 def _exact_ticks(centres: NDArray[np.float64]) -> tuple[NDArray[np.float64] | None, tuple[str, ...]]:
     """Ticks at the grid points where these are few and far enough apart to be labelled."""
     return (centres, short_numbers(centres)) if are_few(centres, FEW) else (None, ())
+
+
+def is_logarithmic(values: NDArray[np.float64]) -> bool:
+    """Whether sorted numbers are of one sign and evenly spread by their logarithms alone."""
+    if values.size < 3 or values[0] * values[-1] <= 0.0:
+        return False
+    sizes = np.sort(np.abs(values))
+    if sizes[-1] < LEAST_SPAN * sizes[0]:
+        return False
+    steps, ratios = np.diff(sizes), np.diff(np.log(sizes))
+    most = EVEN if values.size > 3 else EQUAL  # of three values a middle that is a little off says nothing
+    return bool(ratios.max() < most * ratios.min() and steps.max() > EVEN * steps.min())
+
+
+def on_decades(values: NDArray[np.float64]) -> NDArray[np.float64]:
+    """Places of numbers of one sign on a logarithmic axis; negative ones are mirrored."""
+    return np.sign(values) * np.log10(np.abs(values))
+
+
+def are_few(centres: NDArray[np.float64], few: int) -> bool:
+    """Whether grid points can have labelled ticks: few, and about evenly spread."""
+    if centres.size < 2:
+        return True
+    return centres.size <= few and bool(np.diff(centres).min() > 0.5 * np.ptp(centres) / (centres.size - 1))
+
+
+def edges_of(centres: NDArray[np.float64]) -> NDArray[np.float64]:
+    """Borders of the cells around points, halfway between; the outer cells are symmetric."""
+    if centres.size == 1:
+        half = 0.05 * abs(centres[0]) or 0.5
+        return np.array([centres[0] - half, centres[0] + half])
+    middles = (centres[1:] + centres[:-1]) / 2
+    return np.concatenate(([2 * centres[0] - middles[0]], middles, [2 * centres[-1] - middles[-1]]))

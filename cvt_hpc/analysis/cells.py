@@ -1,7 +1,5 @@
 """The cells of a map: a run's class shows in lightness, in hatching, and in the mark on its grid point."""
 
-from __future__ import annotations
-
 from collections.abc import Mapping, Sequence
 from dataclasses import dataclass
 from typing import Any
@@ -24,8 +22,7 @@ from numpy.typing import NDArray
 
 from cvt_hpc.analysis.arrangement import Ruler
 from cvt_hpc.analysis.classes import OccurrenceClass
-from cvt_hpc.vibration.agreement import PairClass
-from cvt_hpc.vibration.hysteresis import StartClass
+from cvt_hpc.vibration.classes import PairClass, StartClass
 
 Array = NDArray[np.float64]
 # share of values on a scale, where the others reach so far beyond; of so many

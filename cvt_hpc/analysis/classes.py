@@ -1,15 +1,12 @@
 """One class per run of a dataset, and what a map shows of the runs that vibrate."""
 
-from __future__ import annotations
-
 import numpy as np
 import xarray as xr
 from numpy.typing import NDArray
 
 from cvt_hpc.errors import few_of, mismatch
 from cvt_hpc.netcdf import flag_attributes
-from cvt_hpc.vibration.classes import OccurrenceClass, classify_runs
-from cvt_hpc.vibration.hysteresis import StartClass
+from cvt_hpc.vibration.classes import OccurrenceClass, StartClass, classify_runs
 
 WITHOUT_RESULT = {  # in words, beside curves and spectra
     OccurrenceClass.SLIPPING: "slips or lifts off",

@@ -1,6 +1,7 @@
-"""Two studies against each other, cell by cell: which classes contradict, how far numbers deviate."""
+"""Two studies against each other, cell by cell: which classes contradict, how far numbers deviate.
 
-from __future__ import annotations
+`sample_sentences` says what a sample of runs that were done again another way tells of their study.
+"""
 
 import json
 import math
@@ -18,14 +19,15 @@ from cvt_hpc.analysis.alignment import COMPARED, align, axes_of, job_of
 from cvt_hpc.analysis.arrangement import labelled
 from cvt_hpc.analysis.classes import at_strongest_strand, occurrence_classes
 from cvt_hpc.files import write_rows
-from cvt_hpc.job.shown import heading, shown, shown_number
+from cvt_hpc.job.values import heading, shown, shown_number
 from cvt_hpc.models import MODELS
 from cvt_hpc.models.contract import load_model
+from cvt_hpc.study import open_results
 from cvt_hpc.study.job_difference import differences, short_pair
+from cvt_hpc.study.repeats import AUDIT, WAYS, interval
 from cvt_hpc.tables import number
 from cvt_hpc.variables import Status
-from cvt_hpc.vibration import agreement
-from cvt_hpc.vibration.classes import OccurrenceClass
+from cvt_hpc.vibration import classes as agreement
 
 _HEAD = (
     "class_a",
@@ -42,6 +44,8 @@ _METHOD = (
     *("design", "versions"),
 )
 _METHOD_KEYS = ("seed", "disturbance", "friction_treatment", "contact_points", "coarse", "git_revision")
+
+_SAMPLES = (*WAYS.values(), ("in full", AUDIT))  # words of a way, and the folder of its runs
 
 
 class Deviation(NamedTuple):
@@ -79,7 +83,7 @@ class Cell(NamedTuple):
 
     at: dict[str, Any]
     place: str
-    classes: tuple[OccurrenceClass, OccurrenceClass]
+    classes: tuple[agreement.OccurrenceClass, agreement.OccurrenceClass]
     pair: int
     amplitude: tuple[float, float]
     frequency: tuple[float, float]
@@ -88,7 +92,9 @@ class Cell(NamedTuple):
     @property
     def pair_label(self) -> str:
         """Name for people of `pair`."""
-        return (OccurrenceClass(self.pair) if self.pair >= 0 else agreement.PairClass(self.pair)).label
+        return (
+            agreement.OccurrenceClass(self.pair) if self.pair >= 0 else agreement.PairClass(self.pair)
+        ).label
 
 
 @dataclass(frozen=True)
@@ -156,15 +162,15 @@ class Comparison:
         both = (self.cells[name].values for name in ("class_a", "class_b"))
         return ~np.any([np.isin(classes, agreement.WITHOUT_RESULTS) for classes in both], axis=0)
 
-    def counts(self) -> dict[tuple[OccurrenceClass, OccurrenceClass], int]:
+    def counts(self) -> dict[tuple[agreement.OccurrenceClass, agreement.OccurrenceClass], int]:
         """Number of cells by their class in A and in B, of all pairs of classes."""
         a, b = self.cells["class_a"].values, self.cells["class_b"].values
-        kinds = product(OccurrenceClass, repeat=2)
+        kinds = product(agreement.OccurrenceClass, repeat=2)
         return {(of_a, of_b): int(((a == of_a) & (b == of_b)).sum()) for of_a, of_b in kinds}
 
     def deviation(self, name: str) -> Deviation:
         """Return how far B deviates: "amplitude", "frequency" where both vibrate, others where both end."""
-        both = self.answered if name in self.quantities else self.pairs == OccurrenceClass.VIBRATING
+        both = self.answered if name in self.quantities else self.pairs == agreement.OccurrenceClass.VIBRATING
         a, b = (self.cells[f"{name}_{study}"].values[both] for study in "ab")
         with np.errstate(divide="ignore", invalid="ignore"):
             deviations = np.abs(b / a - 1.0)
@@ -176,7 +182,7 @@ class Comparison:
     def amplitude_ratio(self) -> float:
         """Return the median of amplitude B over amplitude A where both vibrate; not a number of none."""
         a, b = (self.cells[f"amplitude_{study}"].values for study in "ab")
-        both = (self.pairs == OccurrenceClass.VIBRATING) & (a > 0.0)
+        both = (self.pairs == agreement.OccurrenceClass.VIBRATING) & (a > 0.0)
         return float(np.median(b[both] / a[both])) if both.any() else math.nan
 
     def largest_difference(self, name: str) -> float:
@@ -196,7 +202,7 @@ class Comparison:
             yield Cell(
                 at,
                 ", ".join(f"{name} = {shown(value, along[name].attrs)}" for name, value in at.items()),
-                (OccurrenceClass(found["class_a"]), OccurrenceClass(found["class_b"])),
+                (agreement.OccurrenceClass(found["class_a"]), agreement.OccurrenceClass(found["class_b"])),
                 found["occurrence_class"],
                 (found["amplitude_a"], found["amplitude_b"]),
                 (found["frequency_a"], found["frequency_b"]),
@@ -318,3 +324,78 @@ def _document(dataset: xr.Dataset) -> dict[str, Any]:
     job = {key: value for key, value in job_of(dataset).items() if key not in ("name", "description", "axes")}
     versions = json.loads(dataset.attrs.get("versions", "{}"))
     return job | {"versions": versions, "git_revision": dataset.attrs.get("git_revision")}
+
+
+def contradictions(found: Comparison, way: str) -> str:
+    """Return how many runs of a sample contradict those of the study.
+
+    Parameters
+    ----------
+    found : Comparison
+        Of the study with the runs that were done again.
+    way : str
+        How they were done again, in words.
+    """
+    runs, contradicting = int(found.answered.sum()), int(found.contradicts.sum())
+    low, high = interval(contradicting, runs)
+    share = f"{contradicting / runs:.2%}, " if runs else ""
+    others = int((found.answered & (found.pairs == agreement.PairClass.OTHERWISE)).sum())
+    failed = sum(
+        count
+        for kinds, count in found.counts().items()
+        if kinds[1] == agreement.OccurrenceClass.FAILED != kinds[0]
+    )
+    return (
+        f"{contradicting} of {runs} contradict (quiet against vibrating; {share}95 % interval {low:.2%} to "
+        f"{high:.2%}), {int(found.contradicts_beyond.sum())} of them beyond the threshold; "
+        f"{others} more of another class" + (f"; {failed} more failed {way}" if failed else "")
+    )
+
+
+def deviations(found: Comparison, who: str = "B deviates") -> Iterator[str]:
+    """Yield how far amplitude, frequency and what else is compared deviate; `who` is subject and verb."""
+    both = int((found.pairs == agreement.OccurrenceClass.VIBRATING).sum())
+    where = {name: f"{name} where both vibrate ({both} cells)" for name in ("amplitude", "frequency")}
+    where |= {name: f"{name} where both have ended" for name in found.quantities}
+    for name, text in where.items():
+        deviation = found.deviation(name)
+        if math.isnan(deviation.median):
+            continue
+        most = ""
+        if name in found.quantities:
+            unit = found.quantities[name]
+            most = f"; at most {found.largest_difference(name):.3g} {'' if unit == '1' else unit}".rstrip()
+        yield (
+            f"{text}: {who} by {deviation.median:.2%} (median), {deviation.high:.2%} (95 %), "
+            f"{deviation.largest:.2%} (largest){most}"
+        )
+
+
+def sample_sentences(dataset: xr.Dataset, folder: Path, source: str) -> Iterator[str]:
+    """Yield what the samples in the folder of a study tell: checks of the time step, and the audit.
+
+    Parameters
+    ----------
+    dataset : Dataset
+        Results of the study.
+    folder : Path
+        Its folder, in which `--check-step` and `--audit` leave their runs.
+    source : str
+        Where the results are from, for errors.
+
+    Raises
+    ------
+    InputError
+        If a sample cannot be read, or has nothing in common with the study.
+    """
+    for way, name in _SAMPLES:
+        if not (folder / name / "results.nc").is_file():
+            continue
+        with open_results(folder / name) as again:
+            found = compare(dataset, again, (source, str(folder / name)))
+        repeated = int(np.sum(found.cells["class_b"] != agreement.OccurrenceClass.NOT_RUN))
+        runs = "1 run was" if repeated == 1 else f"{repeated} runs were"
+        yield f"{runs} done again {way}, in `{name}`: {contradictions(found, way)}."
+        yield from (
+            f"{line[:1].upper()}{line[1:]}." for line in deviations(found, "those done again deviate")
+        )

@@ -1,7 +1,5 @@
 """The picture of a comparison: a map of the cells in which studies differ, and amplitude B against A."""
 
-from __future__ import annotations
-
 from pathlib import Path
 
 import numpy as np
@@ -15,8 +13,7 @@ from cvt_hpc.analysis.comparison import Comparison
 from cvt_hpc.analysis.figures import WIDTH, draw, entitle
 from cvt_hpc.analysis.maps import TITLE_HEIGHT, draw_block, sheet_of
 from cvt_hpc.analysis.scatter import draw_samples, is_sampled, scatter_height
-from cvt_hpc.vibration.agreement import CONTRADICTIONS, NEAR
-from cvt_hpc.vibration.classes import OccurrenceClass
+from cvt_hpc.vibration.classes import CONTRADICTIONS, NEAR, OccurrenceClass
 
 SCATTER_HEIGHT, FRAME = 4.2, 6.4  # [inch], and what the page holds beside the panels of the map
 MOST_PANELS = 24  # that a page then holds

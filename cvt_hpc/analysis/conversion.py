@@ -1,7 +1,5 @@
 """Datasets as xarray and its companions leave them, in the form that this program writes, and other units."""
 
-from __future__ import annotations
-
 from collections.abc import Callable, Iterator, Mapping
 from functools import lru_cache, partial
 from typing import Any
@@ -12,8 +10,8 @@ from xarray.indexes import PandasMultiIndex
 
 from cvt_hpc.dataset_form import check_form
 from cvt_hpc.errors import mismatch, show, unknown
-from cvt_hpc.job.shown import JOB_UNITS
 from cvt_hpc.job.units import factor_to, is_unit
+from cvt_hpc.job.values import JOB_UNITS
 from cvt_hpc.models import MODELS
 from cvt_hpc.models.contract import load_model
 from cvt_hpc.variables import Status, Vibrates

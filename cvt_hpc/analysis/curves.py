@@ -1,6 +1,7 @@
-"""Quantities of a study over one of its axes: what runs give as marks, what stands beside them as lines."""
+"""Quantities of a study over one of its axes: what runs give as marks, what stands beside them as lines.
 
-from __future__ import annotations
+`curve_panels_figure` draws a panel for each quantity, with a curve for each value of another axis.
+"""
 
 from collections.abc import Iterator, Mapping, Sequence
 from typing import Any
@@ -9,23 +10,19 @@ import numpy as np
 import xarray as xr
 from matplotlib.axes import Axes
 from matplotlib.figure import Figure
+from matplotlib.lines import Line2D
 
-from cvt_hpc.analysis.arrangement import (
-    Arrangement,
-    At,
-    Ruler,
-    arrange,
-    first_panel,
-    places,
-    ruler,
-    value_text,
-)
+from cvt_hpc.analysis import arrangement as layout
+from cvt_hpc.analysis import curves, figures
 from cvt_hpc.analysis.cells import STYLES
 from cvt_hpc.analysis.classes import WITHOUT_RESULT, check_results, occurrence_classes
-from cvt_hpc.analysis.error_axes import COLOURS, MARKERS
-from cvt_hpc.analysis.figures import WIDTH, check_known, entitle, headline, in_words, legend_columns, styled
 from cvt_hpc.errors import mismatch, unknown
 from cvt_hpc.variables import Status
+
+MOST_QUANTITIES, COLUMNS = 12, 3
+PANEL_HEIGHT = 1.9  # [inch] of a panel
+FRAME = 1.0  # [inch]: what title and labels take
+INK = "#333333"  # of styles in the legend, which colours do not tell
 
 HEIGHT = 3.8  # [inch]
 MOST_PANELS = 3  # side by side
@@ -33,12 +30,12 @@ _RAISED = str.maketrans("-0123456789", "⁻⁰¹²³⁴⁵⁶⁷⁸⁹")
 _PREFIXES = {-6: "µ", -3: "m", 3: "k", 6: "M"}  # of powers of ten
 _PREFIXED = ("m", "m s-1", "s", "N", "N m", "N m-1", "W", "Hz")
 BESIDE = ("-", "--", ":", "-.")
-MARKS = tuple(mark for mark in MARKERS if mark not in {STYLES[kind].mark for kind in WITHOUT_RESULT})
+MARKS = tuple(mark for mark in figures.MARKERS if mark not in {STYLES[kind].mark for kind in WITHOUT_RESULT})
 
 
-@styled
+@figures.styled
 def curve_figure(
-    dataset: xr.Dataset, quantities: Sequence[str], at: At = None, source: str = "results"
+    dataset: xr.Dataset, quantities: Sequence[str], at: layout.At = None, source: str = "results"
 ) -> Figure:
     """Draw quantities over an axis.
 
@@ -59,11 +56,11 @@ def curve_figure(
     """
     check_results(dataset, source)
     check_quantities(dataset, quantities, source)
-    arrangement = arrange(dataset, at or {}, source)
+    arrangement = layout.arrange(dataset, at or {}, source)
     panels, notes = panels_of(arrangement, source)
-    figure = Figure((WIDTH, HEIGHT), layout="constrained")
+    figure = Figure((figures.WIDTH, HEIGHT), layout="constrained")
     all_axes = figure.subplots(1, len(panels), sharex=True, sharey=True, squeeze=False)[0]
-    x = ruler(arrangement.dataset[arrangement.x])
+    x = layout.ruler(arrangement.dataset[arrangement.x])
     factor, unit = scale(arrangement.dataset, quantities)
     for axes, (title, shown) in zip(all_axes, panels, strict=True):
         curves = [
@@ -83,17 +80,17 @@ def curve_figure(
     for axes in all_axes:
         handles, labels = axes.get_legend_handles_labels()
         legend |= dict(zip(labels, handles, strict=True))
-    set_frame(figure, legend, [headline(f"{label[0].upper()}{label[1:]}", dataset.attrs), *notes])
+    set_frame(figure, legend, [figures.headline(f"{label[0].upper()}{label[1:]}", dataset.attrs), *notes])
     return figure
 
 
 def set_frame(figure: Figure, legend: Mapping[str, Any], lines: Sequence[str]) -> None:
     """Title and legend of a figure of curves, which grows by the legend; `legend` has handles by label."""
-    columns = legend_columns(list(legend))
+    columns = figures.legend_columns(list(legend))
     figure.set_figheight(figure.get_figheight() + 0.2 * (len(legend) // columns))
     place = {"loc": "outside lower center", "frameon": False, "ncols": columns}
     figure.legend(legend.values(), legend.keys(), **place)
-    entitle(figure, lines)
+    figures.entitle(figure, lines)
 
 
 def check_quantities(
@@ -107,14 +104,14 @@ def check_quantities(
         units = [dataset[key].attrs.get("units", "") for key in (quantities[0], name)]
         if of_one_unit and units[0] != units[1]:
             raise mismatch(f"{source}: {name}", f"the unit of {quantities[0]}, {units[0]}", str(units[1]))
-    check_known(dataset, quantities, source)
+    figures.check_known(dataset, quantities, source)
 
 
 def panels_of(
-    arrangement: Arrangement, source: str, most: int = MOST_PANELS
+    arrangement: layout.Arrangement, source: str, most: int = MOST_PANELS
 ) -> tuple[list[tuple[str, xr.Dataset]], list[str]]:
     """Title and results over x of each value along y, `most` at most, and what is fixed, in words."""
-    arrangement = first_panel(arrangement)
+    arrangement = layout.first_panel(arrangement)
     dataset, notes = arrangement.dataset, list(arrangement.notes)
     if arrangement.y is None:
         return [("", dataset)], notes
@@ -122,7 +119,7 @@ def panels_of(
     if y.size > most:
         expected = f"at most {most} values, or one that --at fixes"
         raise mismatch(f"{source}: {arrangement.y}", expected, f"{y.size}")
-    titles = [f"{in_words(y)} {value_text(y, k)}" for k in range(y.size)]
+    titles = [f"{figures.in_words(y)} {layout.value_text(y, k)}" for k in range(y.size)]
     return [(title, dataset.isel({arrangement.y: k})) for k, title in enumerate(titles)], notes
 
 
@@ -131,8 +128,8 @@ def _curves(
 ) -> Iterator[tuple[str, str, np.ndarray]]:
     """Name of the quantity, label of the curve, with it or without, and values over x by a factor."""
     extra = [str(dim) for dim in array.dims if dim != x]
-    words = [in_words(array)] if is_named or not extra else []
-    for at in places(array, extra):
+    words = [figures.in_words(array)] if is_named or not extra else []
+    for at in layout.places(array, extra):
         labels = [place_in_words(array[dim], k) for dim, k in at.items()]
         yield str(array.name), " ".join([*words, *labels]), factor * array.isel(at).values
 
@@ -140,7 +137,7 @@ def _curves(
 def place_in_words(coordinate: xr.DataArray, index: int) -> str:
     """A place along a further dimension: a name speaks for itself, a number has the dimension's."""
     value = coordinate.values[index]
-    return str(value) if coordinate.dtype.kind not in "iuf" else f"{in_words(coordinate)} {value:g}"
+    return str(value) if coordinate.dtype.kind not in "iuf" else f"{figures.in_words(coordinate)} {value:g}"
 
 
 def scale(dataset: xr.Dataset, quantities: Sequence[str]) -> tuple[float, str]:
@@ -156,7 +153,7 @@ def scale(dataset: xr.Dataset, quantities: Sequence[str]) -> tuple[float, str]:
     return 10.0**-power, f"10{str(power).translate(_RAISED)} {unit}".strip()
 
 
-def with_margins(x: Ruler) -> tuple[float, float]:
+def with_margins(x: layout.Ruler) -> tuple[float, float]:
     """Limits around all values of the axis, also those where nothing is known."""
     margin = 0.05 * np.ptp(x.centres) or 0.5 * np.ptp(x.edges)
     return x.centres.min() - margin, x.centres.max() + margin
@@ -168,7 +165,7 @@ def _draw_curves(
     """Marks of the first quantity, hollow where they come again, and lines of the others."""
     first, marks = curves[0][0], 0
     for k, (name, label, values) in enumerate(curves):
-        colour = COLOURS[k % len(COLOURS)]
+        colour = figures.COLOURS[k % len(figures.COLOURS)]
         if name == first:
             known = np.where(is_done, values, np.nan)
             mark, fill = MARKS[marks % len(MARKS)], ("full", "none")[marks // len(MARKS) % 2]
@@ -191,10 +188,118 @@ def mark_above(axes: Axes, x: np.ndarray, classes: np.ndarray) -> None:
 
 def common_words(dataset: xr.Dataset, quantities: Sequence[str]) -> str:
     """Words that the names of all quantities end with, else the name of the first."""
-    words = [in_words(dataset[name]).split() for name in quantities]
+    words = [figures.in_words(dataset[name]).split() for name in quantities]
     common: list[str] = []
     for column in zip(*(reversed(each) for each in words), strict=False):
         if len(set(column)) > 1:
             break
         common.insert(0, column[0])
     return " ".join(common or words[0])
+
+
+def curves_figure(
+    dataset: xr.Dataset,
+    quantities: Sequence[str],
+    at: layout.At = None,
+    source: str = "results",
+    lines: str | None = None,
+) -> Figure:
+    """Draw as `curve_figure`, or with `lines` as `curve_panels_figure`, A+B in one panel."""
+    if lines is None:
+        return curves.curve_figure(dataset, quantities, at, source)
+    return curve_panels_figure(dataset, [name.split("+") for name in quantities], lines, at, source)
+
+
+@figures.styled
+def curve_panels_figure(
+    dataset: xr.Dataset,
+    groups: Sequence[Sequence[str]],
+    lines: str,
+    at: layout.At = None,
+    source: str = "results",
+) -> Figure:
+    """Draw quantities over an axis, by another axis.
+
+    Parameters
+    ----------
+    dataset, at, source
+        As of all pictures of results (`figures.py`). Of the axes that `lines` leaves, the one that runs along
+        x in a map does so here.
+    groups : sequence of sequences of str
+        Numeric variables: those of a group are of one unit and share a panel, the first drawn by marks, the
+        others by lines beside it. Of quantities with further dimensions, such as `pulley`, there is a panel
+        for each of their labels.
+    lines : str
+        The axis that has a colour for each of its values.
+
+    Raises
+    ------
+    InputError
+        As of all pictures; there is no such quantity or axis, quantities of a group differ in unit or
+        dimensions, or there would be more curves than colours, or more than MOST_QUANTITIES panels.
+    """
+    check_results(dataset, source)
+    for group in groups:
+        curves.check_quantities(dataset, group, source)
+    arrangement = layout.arrange(dataset, at or {}, source, layout.Sides(y=lines))
+    each, notes = curves.panels_of(arrangement, source, len(figures.COLOURS))
+    shown, along = arrangement.dataset, {arrangement.x, lines, arrangement.panel}
+    panels = [(group, place) for group in groups for place in _places(shown, group, along, source)]
+    if len(panels) > MOST_QUANTITIES:
+        then = "name fewer quantities: one of both pulleys has a panel for each"
+        raise mismatch(f"{source}: panels", f"at most {MOST_QUANTITIES}", f"{len(panels)}", then)
+    columns = min(len(panels), COLUMNS)
+    rows = -(-len(panels) // columns)
+    width = figures.WIDTH * (1.0 + 0.25 * (columns - 1) / (COLUMNS - 1))
+    figure = Figure((width, PANEL_HEIGHT * rows + FRAME), layout="constrained")
+    all_axes = figure.subplots(rows, columns, sharex=True, squeeze=False).ravel()
+    for unused in all_axes[len(panels) :]:
+        unused.set_visible(False)
+    x = layout.ruler(shown[arrangement.x])
+    legend: dict[str, Any] = {
+        title: Line2D([], [], color=colour, marker=mark, ms=5, lw=0.7)
+        for (title, _), colour, mark in zip(each, figures.COLOURS, curves.MARKS, strict=False)
+    }
+    for axes, (group, place) in zip(all_axes, panels, strict=False):
+        factor, unit = curves.scale(shown, group)
+        labels = [curves.place_in_words(shown[dim], k) for dim, k in place.items()]
+        title = " ".join([curves.common_words(shown, group), *labels])
+        axes.set_title(f"{title} [{unit}]" if unit else title, loc="left", pad=6)
+        for k, (_, results) in enumerate(each):
+            values = [factor * results[name].isel(place).values for name in group]
+            _draw(axes, x.centres, values, results["status"].values == Status.DONE, k)
+            curves.mark_above(axes, x.centres, occurrence_classes(results).values)
+        for name, style in zip(group[1:], curves.BESIDE, strict=False):
+            legend[figures.in_words(shown[name])] = Line2D([], [], color=INK, ls=style, lw=1.2)
+        handles, told = axes.get_legend_handles_labels()
+        legend |= dict(zip(told, handles, strict=True))
+        axes.set_xlim(curves.with_margins(x))
+        x.lay_out(axes.xaxis)
+        axes.grid(linewidth=0.4, alpha=0.5)
+    for axes in all_axes[len(panels) - columns : len(panels)]:
+        axes.set_xlabel(x.label)
+        axes.tick_params(labelbottom=True)
+    title = f"Over {figures.in_words(shown[arrangement.x])}, by {figures.in_words(shown[lines])}"
+    curves.set_frame(figure, legend, [figures.headline(title, dataset.attrs), *notes])
+    return figure
+
+
+def _places(
+    dataset: xr.Dataset, group: Sequence[str], along: set[str | None], source: str
+) -> list[dict[str, int]]:
+    """Indices along the further dimensions of a group's quantities, of each panel."""
+    first, *others = (tuple(dim for dim in dataset[name].dims if dim not in along) for name in group)
+    for name, dims in zip(group[1:], others, strict=True):
+        if dims != first:
+            expected = f"the dimensions of {group[0]}: {', '.join(map(str, first)) or 'none'}"
+            raise mismatch(f"{source}: {name}", expected, ", ".join(map(str, dims)) or "none")
+    return layout.places(dataset, list(map(str, first)))
+
+
+def _draw(axes: Axes, x: np.ndarray, values: Sequence[np.ndarray], is_done: np.ndarray, k: int) -> None:
+    """The k-th curve of a panel: marks of the first quantity, lines of the others, in one colour."""
+    colour, mark = figures.COLOURS[k], curves.MARKS[k % len(curves.MARKS)]
+    first, *others = (np.where(is_done, value, np.nan) for value in values)
+    axes.plot(x, first, color=colour, marker=mark, ms=4, lw=0.7, zorder=2.5)
+    for value, style in zip(others, curves.BESIDE, strict=False):
+        axes.plot(x, value, color=colour, ls=style, lw=1.2, zorder=1.5)

@@ -13,7 +13,7 @@ from matplotlib.ticker import FuncFormatter, PercentFormatter
 from cvt_hpc.analysis.figures import WIDTH, draw
 
 if TYPE_CHECKING:
-    from cvt_hpc.study.forecast.simulate import Forecast
+    from cvt_hpc.study.forecast.cost_model import Forecast
 
 _COLOUR = "#0072b2"
 

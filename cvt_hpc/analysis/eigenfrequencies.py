@@ -1,7 +1,5 @@
 """Eigenfrequencies of the strands over an axis of a study, as fig. 3.7 of Lebrecht et al. 2004."""
 
-from __future__ import annotations
-
 import json
 from collections.abc import Mapping
 from typing import Any
@@ -40,8 +38,7 @@ def strand_frequencies(
         [Hz]; nan where a strand holds no shape, where the belt slips, or where a parameter is missing.
     """
     # long to load, and maps do not ask for it
-    from cvt_hpc.models.strand.forces import net_forces
-    from cvt_hpc.models.strand.ritz import Strand, eigenfrequencies
+    from cvt_hpc.models.strand.ritz import Strand, eigenfrequencies, net_forces
 
     unknown = np.full((len(STRANDS), MODES), np.nan)
     p = {"strand_forces": "formulas", **parameters}

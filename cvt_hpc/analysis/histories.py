@@ -1,7 +1,5 @@
 """The history of one run as a picture."""
 
-from __future__ import annotations
-
 import json
 from collections.abc import Callable, Mapping
 from pathlib import Path
@@ -18,7 +16,7 @@ from cvt_hpc.analysis.conversion import standard
 from cvt_hpc.analysis.figures import LONG, WIDTH, balanced, draw, entitle, headline, styled
 from cvt_hpc.errors import mismatch
 from cvt_hpc.job.schema import load_schema
-from cvt_hpc.job.shown import JOB_UNITS, POINT_UNITS, shown
+from cvt_hpc.job.values import JOB_UNITS, POINT_UNITS, shown
 from cvt_hpc.variables import Status, Vibrates, flag_in_words, shortened
 from cvt_hpc.vibration.settings import PARAMETERS
 from cvt_hpc.vibration.signals import dominant_frequency

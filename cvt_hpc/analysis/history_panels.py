@@ -1,7 +1,5 @@
 """The panels in a picture of one run: displacement, spectrum, load, and the forces around the belt."""
 
-from __future__ import annotations
-
 from dataclasses import dataclass
 from itertools import pairwise
 from textwrap import fill

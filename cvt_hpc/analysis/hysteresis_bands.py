@@ -1,7 +1,5 @@
 """Where vibration sets in and ends over a map: onset lines, and bands where ramps up and down differ."""
 
-from __future__ import annotations
-
 from typing import Any
 
 import numpy as np
@@ -20,8 +18,7 @@ from cvt_hpc.analysis.cells import OF_STARTS, STYLES
 from cvt_hpc.analysis.classes import OccurrenceClass, check_results
 from cvt_hpc.errors import mismatch
 from cvt_hpc.variables import Status, Vibrates
-from cvt_hpc.vibration.hysteresis import StartClass
-from cvt_hpc.vibration.onsets import levels, onsets
+from cvt_hpc.vibration.classes import StartClass, levels, onsets
 from cvt_hpc.vibration.ramped import QUANTITIES
 
 ALONG = ("load", "load_share", "driving_speed")  # axes along which a vibration is said to set in

@@ -5,10 +5,11 @@ same in colour, in grey and in small print. Cells whose class is inferred have l
 Vibrating cells are coloured by amplitude, darker for larger. Their dominant frequency is written into the
 cells where there is room, and drawn as a second set of panels where there is none. Into irregular cells their
 amplitude is written where there is room.
+
+Where runs begin with a small and with a large disturbance, one map shows where the start decides.
 """
 
-from __future__ import annotations
-
+from collections.abc import Mapping
 from dataclasses import dataclass, replace
 from typing import Any
 
@@ -20,6 +21,7 @@ from numpy.typing import NDArray
 
 from cvt_hpc.analysis import arrangement as layout
 from cvt_hpc.analysis import cells, figures
+from cvt_hpc.analysis.arrangement import arrange, value_text
 from cvt_hpc.analysis.classes import (
     OccurrenceClass,
     at_strongest_strand,
@@ -32,9 +34,11 @@ from cvt_hpc.analysis.conversion import standard
 from cvt_hpc.analysis.eigenfrequencies import eigenfrequency_figure
 from cvt_hpc.analysis.hysteresis_bands import ALONG, draw_onsets
 from cvt_hpc.analysis.scatter import is_sampled, scatter_figure
-from cvt_hpc.analysis.starts import has_starts, join_starts
 from cvt_hpc.errors import mismatch
 from cvt_hpc.variables import Vibrates, shortened
+from cvt_hpc.vibration.classes import StartClass, classify_starts
+
+AXIS = "disturbance"
 
 FRAME = 1.9  # [inch]: what title, labels and legend take of a page's height
 MOST_COLUMNS, NAMED = 6, 2  # panels side by side; in how many columns each has room for the name of its axis
@@ -334,3 +338,44 @@ def _title(sheet: Sheet) -> list[str]:
     if sheet.has_room and np.isfinite(sheet.irregular).any():
         lines.append("in irregular cells: amplitude [µm]")
     return lines
+
+
+def has_starts(dataset: xr.Dataset, at: Mapping[str, Any]) -> bool:
+    """Whether a map is to join runs from several disturbances: that axis is free, and not alone."""
+    dims = dataset["status"].dims
+    return AXIS in dims and AXIS not in at and dataset.sizes[AXIS] > 1 and len(set(dims) - set(at)) > 1
+
+
+def join_starts(dataset: xr.Dataset) -> xr.Dataset:
+    """Results over the other axes: the runs from the smallest disturbance, and the classes of both.
+
+    Parameters
+    ----------
+    dataset : Dataset
+        Results of a study with the axis `disturbance` [m].
+
+    Returns
+    -------
+    Dataset
+        With `occurrence_class`, values of `StartClass`, `inferred_class` where the study is a trace, and
+        both disturbances in words in the attribute `starts`.
+    """
+    ordered = dataset.sortby(AXIS)
+    small, large = (ordered.isel({AXIS: place}, drop=True) for place in (0, -1))
+    joined = {"occurrence_class": _joined(occurrence_classes(small), occurrence_classes(large))}
+    if "inferred_class" in dataset:
+        joined["inferred_class"] = _joined(map_classes(small), map_classes(large))
+    words = " and ".join(value_text(ordered[AXIS], place) for place in (0, -1))
+    return small.assign(joined).assign_attrs(starts=words)
+
+
+def start_line(dataset: xr.Dataset, at: Mapping[str, Any], source: str) -> str:
+    """How many cells of a map vibrate from the large start only, in words; as `map_figure` takes results."""
+    drawn = arrange(join_starts(dataset), at, source).dataset
+    classes = map_classes(drawn)
+    found = int(np.count_nonzero(classes == StartClass.LARGE_START_ONLY))
+    return f"{found} of {classes.size} cells: vibration from the large start only ({drawn.attrs['starts']})"
+
+
+def _joined(small: xr.DataArray, large: xr.DataArray) -> xr.DataArray:
+    return small.copy(data=classify_starts(small.values, large.transpose(*small.dims).values))

@@ -1,18 +1,22 @@
-"""Quantities along the belt, as figs 20 to 23 of Bullinger et al. 2005 and 4.1 of Lebrecht et al. 2004."""
+"""Quantities along the belt, as figs 20 to 23 of Bullinger et al. 2005 and 4.1 of Lebrecht et al. 2004.
 
-from __future__ import annotations
+`flanks_figure` draws left and right flank of one run, with the ends of the arcs enlarged. `wrap_figure` draws
+forces between belt and pulleys over the wrap, as figs 9 and 10 of Cepon and Boltezar 2011.
+"""
 
 from collections.abc import Sequence
 from itertools import pairwise
+from typing import Any, NamedTuple
 
 import numpy as np
 import xarray as xr
 from matplotlib.axes import Axes
 from matplotlib.figure import Figure
+from matplotlib.lines import Line2D
 
 from cvt_hpc.analysis import figures
-from cvt_hpc.analysis.error_axes import COLOURS
-from cvt_hpc.analysis.telling_apart import entitle_runs, named, on_axes
+from cvt_hpc.analysis.figures import COLOURS, NARROW, STYLE, WIDTH, check_known, in_words, styled
+from cvt_hpc.analysis.telling_apart import check_holds, entitle_jobs, entitle_runs, named, on_axes, told_apart
 from cvt_hpc.errors import InputError, mismatch, unknown
 
 # Drawn where nothing else is asked for: of each group the first that all runs have.
@@ -23,6 +27,25 @@ MOST_COLUMNS = 3
 LEAST, HEIGHT, FRAME = 1.0, 1.75, 1.2  # [inch]: a panel, and title, labels and legend
 _UNITS = {"N m-1": (1e-3, "kN/m"), "m s-1": (1e3, "mm/s")}
 _REFERENCES = {"sliding_angle": 90.0}  # [°]: where sliding turns from one hand to the other
+
+SIDES = ("left", "right")
+QUANTITIES = ("contact_force", "flank_slip", "radial_slip")
+LOOKS = {"left": {"color": "#0072b2", "ls": "-"}, "right": {"color": "#d55e00", "ls": "--"}}
+AROUND = 0.02  # [m] of the path on both sides of an end
+TOUCHES = 0.05  # of the largest force: a flank that has less carries nothing
+
+# rows: variable, label with unit, factor, and what stands beside it
+ROWS = (
+    ("normal_force", "normal [N/mm]", 1e-3, None),
+    ("friction_force", "friction [N/mm]", 1e-3, None),
+    ("tension", "tension [N]", 1.0, "sliding_tension"),
+)
+RUN_LINES = ("-", "--", "-.")  # dotted is theory
+THEORY = "Euler and Eytelwein"
+INK = "#333333"
+MOST_PANELS = 3  # side by side; of more pulleys only those that carry torque have one
+LEAST_PULL = 0.05  # of the largest sum of friction forces, from which on a pulley carries torque
+FEW = 10  # places on an arc, each of which has a mark
 
 
 @figures.styled
@@ -184,3 +207,212 @@ def _name_regions(axes: Axes, dataset: xr.Dataset) -> None:
     for start, stop, name in regions(dataset):
         look = {"transform": axes.get_xaxis_transform(), "ha": "center", "va": "bottom", "fontsize": 9}
         axes.text(500.0 * (start + stop), 1.02, name.removesuffix(" arc"), **look)
+
+
+class End(NamedTuple):
+    """An end of an arc.
+
+    Attributes
+    ----------
+    name : str
+        Such as "driving inlet".
+    position : float
+        Path coordinate [m].
+    inwards : float
+        1 where the arc follows, -1 where it ends.
+    """
+
+    name: str
+    position: float
+    inwards: float
+
+
+def ends_of_arcs(history: xr.Dataset) -> list[End]:
+    """Inlet and outlet of both arcs, in the order of the path; places are those between two of `position`."""
+    half = float(history["position"].values[0])
+    arcs = [(a, b, name.split()[0]) for a, b, name in regions(history)]
+    arcs = [arc for arc in arcs if arc[2] in ("driving", "driven")]
+    return [
+        End(f"{pulley} {end}", at - half, way)
+        for a, b, pulley in arcs
+        for end, at, way in (("inlet", a, 1.0), ("outlet", b, -1.0))
+    ]
+
+
+def alone(history: xr.Dataset, end: End) -> tuple[str, float]:
+    """Which flank carries alone at an end, and how far [m].
+
+    A flank carries where its normal force is more than TOUCHES of the largest force of both.
+
+    Returns
+    -------
+    (str, float)
+        Side, and the distance between the outermost places at which the flanks carry; 0 where both begin at
+        the same place.
+    """
+    far = end.inwards * from_end(history, end)
+    forces = [history[f"contact_force_{side}"].values for side in SIDES]
+    near = np.abs(far) < AROUND
+    least = TOUCHES * np.nanmax(np.where(near, forces, 0.0))
+    begins = [float(far[near & (force > least)].min(initial=AROUND)) for force in forces]
+    return SIDES[int(np.argmin(begins))], abs(begins[0] - begins[1])
+
+
+@styled
+def flanks_figure(history: xr.Dataset, source: str = "history") -> Figure:
+    """Draw normal force and sliding of both flanks: along the belt, and where elements enter and leave arcs.
+
+    Parameters
+    ----------
+    history : Dataset
+        Of a run of a spatial pushbelt, as `simulate` returns it: QUANTITIES of SIDES over `position` [m].
+    source : str
+        Where the history is from, for the errors.
+
+    Raises
+    ------
+    InputError
+        The history has no flanks of two sides.
+    """
+    needed = [f"{name}_{side}" for name in QUANTITIES for side in SIDES]
+    check_holds([history], [source], dict.fromkeys(needed, "of a spatial pushbelt"))
+    ends = ends_of_arcs(history)
+    figure = Figure((NARROW, 1.75 * (1 + len(QUANTITIES)) + 1.0), layout="constrained")
+    grid = figure.add_gridspec(1 + len(QUANTITIES), len(ends))
+    whole = figure.add_subplot(grid[0, :])
+    position = 1e3 * history["position"].values
+    _draw_flanks(whole, history, "contact_force", position)
+    for start, stop, name in regions(history):
+        whole.text(500.0 * (start + stop), 1.02, name, transform=whole.get_xaxis_transform(), ha="center")
+        if name.split()[0] in ("driving", "driven"):
+            whole.axvspan(1e3 * start, 1e3 * stop, color=ARC, lw=0, zorder=0)
+    whole.set(xlim=(0.0, position[-1]), xlabel="position along the path [mm]")
+    for row, name in enumerate(QUANTITIES, 1):
+        first = None
+        for column, end in enumerate(ends):
+            axes = first = figure.add_subplot(grid[row, column], sharey=first)
+            distance = 1e3 * from_end(history, end)
+            order = np.argsort(distance)
+            near = order[np.abs(distance[order]) < 1e3 * AROUND]
+            _draw_flanks(axes, history.isel(position=near), name, distance[near], named=column == 0)
+            axes.axvspan(*sorted((0.0, 1e3 * end.inwards * AROUND)), color=ARC, lw=0, zorder=0)
+            axes.set_xlim(-1e3 * AROUND, 1e3 * AROUND)
+            axes.tick_params(labelleft=column == 0, labelbottom=row == len(QUANTITIES))
+            if row == len(QUANTITIES):
+                axes.set_xlabel("from its end [mm]")
+            if row == 1:
+                side, length = alone(history, end)
+                told = f"{side} alone: {1e3 * length:.2g} mm" if length else "both alike"
+                axes.set_title(f"{end.name}\n{told}", loc="left", pad=4)
+    handles, told = whole.get_legend_handles_labels()
+    figure.legend(handles, told, loc="outside lower center", frameon=False, ncols=2)
+    entitle_runs(figure, [history], "Left and right flank", width=80)
+    return figure
+
+
+def from_end(history: xr.Dataset, end: End) -> np.ndarray:
+    """Distance of places from an end along the path, forwards, (position,) [m]."""
+    position = history["position"].values
+    length = position[-1] + position[0]  # places are the middles of equal parts
+    return (position - end.position + 0.5 * length) % length - 0.5 * length
+
+
+def _draw_flanks(axes: Axes, history: xr.Dataset, name: str, over: np.ndarray, named: bool = True) -> None:
+    """A quantity of both sides."""
+    factor, unit = shown_unit(history[f"{name}_left"])
+    for side in SIDES:
+        array = history[f"{name}_{side}"]
+        axes.plot(over, factor * array.values, label=f"{side} flank", lw=1.2, **LOOKS[side])  # type: ignore[arg-type]  # of a line
+    if named:
+        axes.set_ylabel(f"{in_words(array).removesuffix(' right')}\n[{unit}]")
+    axes.axhline(0.0, color="#333333", lw=0.7, zorder=1)
+    axes.grid(lw=0.4, alpha=0.5)
+
+
+@styled
+def wrap_figure(histories: Sequence[xr.Dataset], sources: Sequence[str] = ()) -> Figure:
+    """Draw the mean forces of one or several runs over the wrap of each pulley.
+
+    Parameters
+    ----------
+    histories : sequence of Dataset
+        As `simulate` returns them: `normal_force` and `friction_force` [N/m] and `tension` [N] over
+        `position`, with `wrap_angle` [rad], nan on strands, and `region`; `sliding_tension` [N] is drawn
+        beside the tension. Of more than MOST_PANELS pulleys those without torque are left out.
+    sources : sequence of str, optional
+        Where they are from, for the errors, and for the legend where the runs' points are alike.
+
+    Returns
+    -------
+    matplotlib.figure.Figure
+        Unknown to pyplot; `figure.savefig(path)` writes it.
+
+    Raises
+    ------
+    InputError
+        There is no history, or one without these forces.
+    """
+    if not histories:
+        raise InputError("wrap: expected one history or more, found none")
+    names = named(histories, sources)
+    for dataset, name in zip(histories, names, strict=True):
+        missing = [key for key in ("normal_force", "friction_force", "wrap_angle") if key not in dataset]
+        if missing:
+            raise mismatch(name, "the history of a run with normal_force and wrap_angle", f"no {missing[0]}")
+        check_known(dataset, ["normal_force"], name)
+    pulleys, without_torque = _pulleys(histories)
+    common, labels = told_apart(histories, names)
+    rows = [row for row in ROWS if row[0] in histories[0]]
+    figure = Figure((WIDTH, 1.6 * len(rows) + 1.1), layout="constrained")
+    panels = figure.subfigures()  # the label common to them keeps clear of the figure's legend
+    grid = panels.subplots(len(rows), len(pulleys), sharex="col", sharey="row", squeeze=False)
+    for (name, label, factor, beside), line_of_axes in zip(rows, grid, strict=True):
+        for axes, pulley in zip(line_of_axes, pulleys, strict=True):
+            for k, (dataset, of_run) in enumerate(zip(histories, labels, strict=True)):
+                style = {"ls": RUN_LINES[k % len(RUN_LINES)], "lw": 1.3, "color": COLOURS[k % len(COLOURS)]}
+                _draw_force(axes, dataset, pulley, name, factor, label=of_run, **style)
+            for k, dataset in enumerate(histories):
+                if beside is not None and beside in dataset:
+                    colour = COLOURS[k % len(COLOURS)] if len(histories) > 1 else INK
+                    _draw_force(axes, dataset, pulley, beside, factor, ls=":", lw=1.6, color=colour, zorder=3)
+            axes.grid(linewidth=0.4, alpha=0.5)
+        line_of_axes[0].set_ylabel(label)
+    for axes, pulley in zip(grid[0], pulleys, strict=True):
+        axes.set_title(f"{pulley.removesuffix(' arc')} pulley", loc="left", pad=3)
+    panels.supxlabel("wrap angle from inlet [°]", fontsize=STYLE["axes.labelsize"])
+    _add_legend(figure, grid[-1, 0], [THEORY] if "sliding_tension" in histories[0] else [])
+    further = [f"without torque, not drawn: {', '.join(without_torque)}"] if without_torque else []
+    entitle_jobs(figure, histories, ["Forces over the wrap", common, *further])
+    return figure
+
+
+def _pulleys(histories: Sequence[xr.Dataset]) -> tuple[list[str], list[str]]:
+    """Pulleys that have panels, and those that have none because no run has torque there."""
+    region, angle = _regions(histories[0]), histories[0]["wrap_angle"].values
+    # the first station of a strand may be the end of the arc before it
+    pulleys = [name for name in dict.fromkeys(region) if np.isfinite(angle[region == name]).all()]
+    if len(pulleys) <= MOST_PANELS:
+        return pulleys, []
+    pulls = [[np.nansum(h["friction_force"].values[_regions(h) == p]) for p in pulleys] for h in histories]
+    largest = np.abs(pulls).max(axis=0)
+    carries = dict(zip(pulleys, largest >= LEAST_PULL * largest.max(), strict=True))
+    return [p for p in pulleys if carries[p]], [p for p in pulleys if not carries[p]]
+
+
+def _regions(dataset: xr.Dataset) -> np.ndarray:
+    return dataset["region"].values.astype(str)
+
+
+def _draw_force(axes: Axes, dataset: xr.Dataset, pulley: str, name: str, factor: float, **style: Any) -> None:
+    """A quantity over the wrap of a pulley."""
+    here = inside(dataset, pulley.removesuffix(" arc"))
+    angle = np.degrees(dataset["wrap_angle"].values[here])
+    marker = "." if angle.size < FEW else ""
+    axes.plot(angle, factor * dataset[name].values[here], marker=marker, ms=5, **style)
+
+
+def _add_legend(figure: Figure, axes: Axes, theory: Sequence[str]) -> None:
+    handles, labels = axes.get_legend_handles_labels()
+    handles += [Line2D([], [], ls=":", lw=1.6, color=INK) for _ in theory]
+    if len(labels := [*labels, *theory]) > 1:
+        figure.legend(handles, labels, loc="outside lower center", frameon=False, ncols=min(len(labels), 3))

@@ -1,7 +1,5 @@
 """Motion along a ramp of load or speed, as figs 3.1, 3.2, 3.9, 3.13 and 3.14 of Lebrecht et al. 2004."""
 
-from __future__ import annotations
-
 import json
 from collections.abc import Sequence
 from textwrap import fill
@@ -13,9 +11,15 @@ from matplotlib.figure import Figure
 
 from cvt_hpc.analysis import cells, figures
 from cvt_hpc.analysis.eigenfrequencies import strand_frequencies
-from cvt_hpc.analysis.line_names import name_lines
 from cvt_hpc.analysis.telling_apart import entitle_runs, named, on_axes
-from cvt_hpc.analysis.waterfall import COLOURS, ORDERS, draw_eigenfrequencies, draw_orders, spectra_norm
+from cvt_hpc.analysis.waterfall import (
+    COLOURS,
+    ORDERS,
+    draw_eigenfrequencies,
+    draw_orders,
+    name_lines,
+    spectra_norm,
+)
 from cvt_hpc.errors import mismatch
 from cvt_hpc.variator import STRANDS
 from cvt_hpc.vibration.signals import window_amplitudes

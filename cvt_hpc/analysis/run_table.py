@@ -1,21 +1,17 @@
 """The results of a study as one table for spreadsheets and data frames: a row for each run."""
 
-from __future__ import annotations
-
 from pathlib import Path
-from typing import TYPE_CHECKING, Any
+from typing import Any
 
 import numpy as np
 import xarray as xr
+from pandas import DataFrame
 
 from cvt_hpc.analysis.arrangement import labelled
 from cvt_hpc.analysis.classes import check_results, map_classes
 from cvt_hpc.errors import mismatch
 from cvt_hpc.files import written_aside
-from cvt_hpc.job.shown import heading, shown_number
-
-if TYPE_CHECKING:
-    from pandas import DataFrame
+from cvt_hpc.job.values import heading, shown_number
 
 FORMATS = (".csv", ".xlsx")
 MOST_ROWS = (1 << 20) - 1  # of a sheet, below its head

@@ -1,7 +1,5 @@
 """Maps of a sampled study: a mark for each run, in a panel for each pair of axes."""
 
-from __future__ import annotations
-
 from collections.abc import Mapping
 from itertools import combinations
 from typing import Any

@@ -1,7 +1,5 @@
 """Several studies as one dataset with the axis `study`, for pictures on one scale of colours."""
 
-from __future__ import annotations
-
 from collections.abc import Collection, Sequence
 
 import numpy as np

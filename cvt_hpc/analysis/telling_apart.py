@@ -1,7 +1,5 @@
 """By what runs that are drawn together differ, and what they have in common, in words."""
 
-from __future__ import annotations
-
 import json
 from collections.abc import Sequence
 from pathlib import Path

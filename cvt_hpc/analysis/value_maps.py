@@ -1,7 +1,5 @@
 """Maps of quantities over a study's grid, such as efficiency and thrust over ratio and torque ratio."""
 
-from __future__ import annotations
-
 from collections.abc import Sequence
 from textwrap import fill
 from typing import Any, NamedTuple

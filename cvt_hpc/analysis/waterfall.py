@@ -1,15 +1,18 @@
-"""Spectra of the strands over an axis of a study, as figs 11 and 12 of Cepon and Boltezar 2011."""
+"""Spectra of the strands over an axis of a study, as figs 11 and 12 of Cepon and Boltezar 2011.
 
-from __future__ import annotations
+Names of lines stand in the margins where the lines leave the panel, clear of ridges.
+"""
 
 from collections.abc import Sequence
 from dataclasses import replace
+from typing import Any, NamedTuple
 
 import numpy as np
 import xarray as xr
 from matplotlib.axes import Axes
 from matplotlib.colors import ListedColormap, LogNorm
 from matplotlib.figure import Figure
+from matplotlib.patheffects import Normal, withStroke
 from numpy.typing import NDArray
 
 from cvt_hpc.analysis import arrangement as layout
@@ -17,8 +20,14 @@ from cvt_hpc.analysis import cells
 from cvt_hpc.analysis.classes import WITHOUT_RESULT, check_results, occurrence_classes
 from cvt_hpc.analysis.eigenfrequencies import along_axis
 from cvt_hpc.analysis.figures import WIDTH, check_known, entitle, headline, in_words, on_a_page, styled
-from cvt_hpc.analysis.line_names import OUTLINE, Named, name_lines
 from cvt_hpc.errors import few_of, mismatch
+
+NAME_HEIGHT, LETTER, TITLE = (
+    9.5,
+    5.6,
+    3.0,
+)  # [point]: height of a name, width of a letter, distance of a title
+OUTLINE = [withStroke(linewidth=2.2, foreground="white"), Normal()]
 
 LEAST, HEIGHT, FRAME = 1.3, 2.8, 1.2  # [inch]: a row of panels, and title and labels
 # white ground, on which weak ridges are seen
@@ -28,6 +37,89 @@ LIGHT = 0.9  # share of all amplitudes that may have the lightest colour
 UNKNOWN = "#d0d4d8"  # of runs without a spectrum
 LINE, ORDER = "#123a6b", "#4d4d4d"
 ORDERS = (1.0, 2.0, 4.0, 8.0, 16.0)  # of the driving pulley, in a Campbell diagram
+
+
+class Named(NamedTuple):
+    """A line with its name.
+
+    Attributes
+    ----------
+    name, colour : str
+    x, y : array, shape (point,)
+        In data coordinates; nan where it is not known.
+    """
+
+    name: str
+    colour: str
+    x: NDArray[np.float64]
+    y: NDArray[np.float64]
+
+
+def name_lines(axes: Axes, lines: Sequence[Named], size: tuple[float, float]) -> float:
+    """Write the names of lines beside a panel whose limits are set; return how high its title has to stand.
+
+    Parameters
+    ----------
+    axes : Axes
+        The panel; its lower limit along y is below all lines.
+    lines : sequence of Named
+        What leaves the panel at its upper side is named there, other lines where they end.
+    size : (float, float)
+        About the width and height of the panel [inch].
+
+    Returns
+    -------
+    float
+        Distance of the title [point].
+    """
+    right: list[tuple[float, Named]] = []
+    above: list[tuple[float, Named]] = []
+    (left, end), top = sorted(axes.get_xlim()), max(axes.get_ylim())
+    for line in lines:
+        order = np.argsort(line.x)
+        x, y = line.x[order], line.y[order]
+        known = np.isfinite(y) & (np.nan_to_num(y, nan=np.inf) <= top)
+        if not known.any():
+            continue
+        last = int(np.flatnonzero(known)[-1])
+        if last + 1 < y.size and np.isfinite(y[last + 1]):
+            share = (top - y[last]) / (y[last + 1] - y[last])
+            above.append((float(x[last] + share * (x[last + 1] - x[last])), line))
+        elif last + 1 == y.size:
+            right.append((float(y[last]), line))
+        else:
+            paper = {"facecolor": "white", "edgecolor": "none", "alpha": 0.8, "pad": 0.6}
+            _write(axes, line, (x[last], y[last]), "data", (3, 0), ha="left", va="center", bbox=paper)
+    letters = max((len(line.name) for _, line in above), default=1)
+    gaps = NAME_HEIGHT / (72.0 * size[1]) * top, (LETTER * letters + 3.0) / (72.0 * size[0]) * (end - left)
+    places = _apart(right, gaps[0], (0.0, top - 0.5 * gaps[0]))
+    for (_, line), place in zip(sorted(right, key=_place), places, strict=True):
+        _write(axes, line, (1.0, place), axes.get_yaxis_transform(), (3, 0), ha="left", va="center")
+    for (_, line), place in zip(sorted(above, key=_place), _apart(above, gaps[1], (left, end)), strict=True):
+        _write(axes, line, (place, 1.0), axes.get_xaxis_transform(), (0, 1), ha="center", va="bottom")
+    return TITLE + NAME_HEIGHT if above else TITLE
+
+
+def _place(placed: tuple[float, Named]) -> float:
+    return placed[0]
+
+
+def _apart(
+    placed: Sequence[tuple[float, Named]], gap: float, limits: tuple[float, float]
+) -> NDArray[np.float64]:
+    """Places in ascending order, moved until they lie a gap apart, and within limits as far as they can."""
+    at = np.sort([place for place, _ in placed])
+    steps = gap * np.arange(at.size)
+    at = np.maximum.accumulate(at - steps) + steps
+    highest = limits[1] - steps[::-1]
+    return np.minimum(at, highest)
+
+
+def _write(
+    axes: Axes, line: Named, place: tuple[float, float], within: Any, off: tuple[float, float], **how: Any
+) -> None:
+    how |= {"textcoords": "offset points", "color": line.colour, "fontsize": 8, "annotation_clip": False}
+    axes.annotate(line.name, place, off, xycoords=within, **how)
 
 
 def campbell_figure(
@@ -171,15 +263,6 @@ def spectra_norm(spectra: Sequence[NDArray[np.float64]], highest: float | None =
     known = np.concatenate([each[np.isfinite(each)] for each in spectra])
     low = np.quantile(known, LIGHT) if known.size else 0.0
     return LogNorm(float(np.clip(low, DEEPEST * top, SHALLOWEST * top)), top)
-
-
-def _draw_spectra(
-    axes: Axes, x: layout.Ruler, y: layout.Ruler, values: NDArray[np.float64], norm: LogNorm
-) -> None:
-    """Cells of one strand, of amplitudes (frequency, x) [um]."""
-    axes.set_facecolor(UNKNOWN)
-    shown = np.ma.masked_invalid(np.maximum(values, norm.vmin))  # zero has no logarithm
-    axes.pcolormesh(x.edges, y.edges, shown, norm=norm, cmap=COLOURS, rasterized=True)
 
 
 def draw_orders(

@@ -1,31 +1,188 @@
-"""A bifurcation diagram made: branches followed, Hopf points found and classified, kept, written, drawn."""
+"""A bifurcation diagram made: branches followed, Hopf points found and classified, kept, written, drawn.
 
-from __future__ import annotations
+The dataset holds branches over the grid of axes, and Hopf points and runs in lists. The output folder knows
+its files, and the origin of its dataset.
+"""
 
-from collections.abc import Callable, Mapping
+import json
+import logging
+import re
+from collections.abc import Callable, Iterator, Mapping, Sequence
 from contextlib import closing
 from dataclasses import dataclass
+from enum import IntEnum
 from functools import partial
+from math import prod
 from pathlib import Path
+from typing import Any
 
 import numpy as np
+import xarray as xr
 
-from cvt_hpc.bifurcation.attractors import Attractor, Start, attractors
-from cvt_hpc.bifurcation.costs import predicted_cost
-from cvt_hpc.bifurcation.dataset import diagram_dataset
+from cvt_hpc import netcdf
+from cvt_hpc.archives import Archives, Arrays
+from cvt_hpc.bifurcation.attractors import (
+    OF_MODES,
+    STRAND,
+    Attractor,
+    Followed,
+    Stability,
+    Start,
+    attractors,
+    states_of,
+)
 from cvt_hpc.bifurcation.drawing import draw_branch
-from cvt_hpc.bifurcation.folder import DiagramFolder, picture_names
-from cvt_hpc.bifurcation.followed import Followed, states_of
-from cvt_hpc.bifurcation.job import Asked, Diagram
-from cvt_hpc.bifurcation.kinds import lowest_judged, with_kinds
-from cvt_hpc.files import written_aside
+from cvt_hpc.bifurcation.job import (
+    LOAD,
+    Asked,
+    Diagram,
+    fingerprint_of,
+    load_attributes,
+    numbers_of,
+    predicted_cost,
+)
+from cvt_hpc.bifurcation.table import lowest_judged, with_kinds
+from cvt_hpc.files import kind_of, written_aside
 from cvt_hpc.linear_algebra import one_thread
 from cvt_hpc.models.elastic_belt.belt import State, mesh
-from cvt_hpc.models.linear_stability.branch import Branch, branch, onsets
+from cvt_hpc.models.linear_stability.branch import Branch, Onset, branch, onsets
 from cvt_hpc.models.linear_stability.modes import LOW
+from cvt_hpc.models.steady_variator.record import VARIABLES, coordinates
 from cvt_hpc.models.steady_variator.walking import NoSteadyState, SteadyBelt
-from cvt_hpc.netcdf import write_netcdf
+from cvt_hpc.output_folder import Kind as FolderKind
+from cvt_hpc.output_folder import OutputFolder
+from cvt_hpc.study.description import axis_dimension, derived_coordinate
+from cvt_hpc.study.job_difference import another_job
 from cvt_hpc.study.ranks.progress import Steps
+from cvt_hpc.vibration.classes import OccurrenceClass
+from cvt_hpc.vibration.criticality import Kind
+
+DATASET = "branch.nc"
+_PICTURE = re.compile(r"branch(?:_([1-9]\d{0,8}))?\.png", re.ASCII)
+_LIMIT = 1 << 26  # [bytes] of a branch; one of 20 loads has some 10 kB
+_DAMAGE = (AttributeError, KeyError, OSError, RecursionError, RuntimeError, TypeError, ValueError)
+_logger = logging.getLogger(__name__)
+
+_Numbered = Sequence[tuple[int, Followed]]
+
+BRANCH = "number of the branch in the grid of the axes, counted in C order"
+OF_KIND = "why the Hopf point is found to be of its kind"
+START = "0: near the steady state; 1: the large disturbance"
+REASON = "why the run failed, or was found to vibrate or not"
+
+
+def picture_names(branches: int) -> list[str]:
+    """Names of the pictures of so many branches."""
+    return [f"branch_{number}.png" for number in range(1, branches + 1)] if branches > 1 else ["branch.png"]
+
+
+class DiagramFolder(OutputFolder[Diagram]):
+    """The output folder of a bifurcation diagram, which may lie beside a study.
+
+    Parameters
+    ----------
+    path : Path
+        The folder; it need not exist.
+    diagram : Diagram
+        The diagram that is to be made in it.
+
+    Attributes
+    ----------
+    branches : Archives
+        Finished branches, by their number in the names of pictures.
+    """
+
+    kind = FolderKind(
+        "bifurcation diagram", "branch.json", ".branch.lock", "cvt_hpc bifurcation 1", ("branches",)
+    )
+
+    def __init__(self, path: Path, diagram: Diagram) -> None:
+        super().__init__(path)
+        self.dataset = self.path / DATASET
+        self.branches = Archives(self.path / "branches", diagram.fingerprint(), _LIMIT)
+        self._diagram = diagram
+
+    def load_branch(self, number: int) -> Followed | None:
+        """Return branch `number`, counted from 0; None if it is not done, or cannot be read."""
+
+        def restored(plain: Any, states: Arrays) -> Followed:
+            if plain is None:
+                raise ValueError("of an earlier version")
+            onsets, runs = (
+                [Onset(*one) for one in plain["onsets"]],
+                [Attractor(*run) for run in plain["runs"]],
+            )
+            asked = self._diagram.branches[number]
+            return with_kinds(self._diagram, asked, states, onsets, plain["hidden"], runs)
+
+        return self.branches.load(f"branch_{number + 1}", restored)
+
+    def save_branch(self, number: int, followed: Followed) -> None:
+        """Keep branch `number`."""
+        plain = {"onsets": followed.onsets, "hidden": followed.hidden, "runs": followed.runs}
+        self.branches.save(f"branch_{number + 1}", plain, followed.states)
+
+    def stored_branches(self) -> int:
+        """Return how many branches the dataset holds, 0 where none can be read."""
+        if kind_of(self.dataset) is None:
+            return 0
+        try:
+            with netcdf.open_netcdf(self._stored(), decode_cf=False) as dataset:
+                computed = (dataset["stability"] != Stability.NOT_COMPUTED).all("load")
+                return int(np.count_nonzero(computed))
+        except _DAMAGE as error:
+            _logger.warning("%s: damaged (%s); made again", self.dataset, error)
+            return 0
+
+    def refuse_other(self, found: dict[str, Any], asked: Diagram) -> None:
+        """Raise InputError unless the folder is that of the diagram."""
+        if found["fingerprint"] != asked.fingerprint():
+            raise another_job(self.path, numbers_of(found["job"]), numbers_of(asked.resolved()))
+
+    def unexplained(self) -> str | None:
+        """Return files that neither a branch.json nor a dataset explains."""
+        if kind_of(self.dataset):
+            return f"{DATASET} without a {self.job_file.name}"
+        return f"branches without a {self.job_file.name}" if self.branches.written() else None
+
+    def results_tell(self) -> Callable[[Diagram], bool] | None:
+        """Return a function that decides whether dataset and branches are of a diagram; None without these.
+
+        None, too, if the dataset is something else, which is not to be written over.
+        """
+        stored, fingerprints = self._job_of_dataset(), self.branches.fingerprints()
+        if stored is not None:
+            fingerprints.add(fingerprint_of(stored))
+        elif kind_of(self.dataset) is not None:
+            return None
+        return (lambda diagram: fingerprints == {diagram.fingerprint()}) if fingerprints else None
+
+    def written(self, found: dict[str, Any] | None) -> Iterator[Path]:
+        """Yield the files of a diagram: branches, dataset, and pictures of as many branches as it has."""
+        axes = found["job"]["axes"] if found else {}
+        branches = prod(len(values) for name, values in axes.items() if name != "load")
+        yield from (*self.branches.written(), self.dataset)
+        for path in self.path.iterdir():
+            if (name := _PICTURE.fullmatch(path.name)) and int(name[1] or 1) <= branches:
+                yield path
+
+    def leftovers(self) -> list[Path]:
+        """Return the half-written files of processes that died while they wrote."""
+        return [*self.path.glob(f".{DATASET}.*.part"), *super().leftovers()]
+
+    def _stored(self) -> Path:
+        """Return the dataset; ValueError if it is no diagram."""
+        if not netcdf.holds(self.dataset, netcdf.DIAGRAM):
+            raise ValueError("no bifurcation diagram")
+        return self.dataset
+
+    def _job_of_dataset(self) -> dict[str, Any] | None:
+        """Return the job of the dataset; None where there is none, or another dataset."""
+        try:
+            with netcdf.open_netcdf(self._stored(), decode_cf=False) as dataset:
+                return dict(json.loads(dataset.attrs["job"]))
+        except _DAMAGE:
+            return None
 
 
 @dataclass(frozen=True)
@@ -103,7 +260,7 @@ def make_diagram(
 def _write(diagram: Diagram, folder: DiagramFolder, followed: Mapping[int, Followed]) -> None:
     """Write the dataset of the branches that are done."""
     with written_aside(folder.dataset) as aside:
-        write_netcdf(diagram_dataset(diagram, followed, folder.branches.makers), aside)
+        netcdf.write_netcdf(diagram_dataset(diagram, followed, folder.branches.makers), aside)
 
 
 def _follow(diagram: Diagram, asked: Asked) -> Followed:
@@ -140,3 +297,138 @@ def _beside_gap(found: Branch, load: float) -> bool:
     at = np.searchsorted(loads, load)
     beside = loads[at : at + 1] if load in loads else loads[max(at - 1, 0) : at + 1]
     return any(float(one) in found.missed for one in beside)
+
+
+class Direction(IntEnum):
+    """Where the mode of a Hopf point grows."""
+
+    GROWS_ABOVE = 0
+    GROWS_BELOW = 1
+
+
+def diagram_dataset(
+    diagram: Diagram, followed: Mapping[int, Followed], makers: Sequence[Mapping[str, Any]] = ()
+) -> xr.Dataset:
+    """All branches in one dataset.
+
+    Parameters
+    ----------
+    diagram : Diagram
+        The requested diagram.
+    followed : mapping
+        Branches by their place in `diagram.branches`: all, or the finished ones.
+    makers : sequence of mapping
+        Origin of the results, as `global_attributes` takes it.
+
+    Returns
+    -------
+    Dataset
+        Over the axes and `load` the steady states; with `mode` the modes, each followed from one load to
+        the next; along `onset` the Hopf points and along `run` the runs, with the number of their branch in
+        the grid of the axes, counted in C order.
+    """
+    axes: dict[str, Any] = {
+        axis.name: (axis.name, list(axis.values), axis_dimension(axis, diagram.job).attributes)
+        for axis in diagram.axes
+    }
+    lengths = {axis.name: len(axis.values) for axis in diagram.axes}
+    for derived in diagram.job.derived:  # none of them along the load
+        values = np.array(derived.values).reshape([lengths[name] for name in derived.axes])
+        axes[derived.name] = derived.axes, values, derived_coordinate(derived, diagram.job).attributes
+    axes["load"] = ("load", list(diagram.loads), load_attributes(diagram.job))
+    labels = {
+        name: (name, c.values.astype(object), netcdf.attributes(c.long_name, c.units, c.comment))
+        for name, c in coordinates(diagram.job.parameters).items()
+    }
+    subject = f"bifurcations of model {diagram.job.model}"
+    told = {
+        **netcdf.global_attributes(diagram.job, diagram.resolved(), subject, makers=makers),
+        netcdf.CONTENT: netcdf.DIAGRAM,
+    }
+    rows = sorted(followed.items())
+    variables = _states(diagram, rows) | _onsets(rows) | _runs(rows)
+    return xr.Dataset(variables, axes | labels, told)
+
+
+def _states(diagram: Diagram, followed: _Numbered) -> dict[str, Any]:
+    """Steady states and modes over axes and load, and whether the states are stable."""
+    axes = [(len(axis.values), axis.name) for axis in diagram.axes] + [(len(diagram.loads), "load")]
+    grid, dims = zip(*axes, strict=True)
+    states = [(number, one.states) for number, one in followed]
+
+    def over(name: str, shape: tuple[int, ...], blank: Any) -> np.ndarray:
+        array = np.full((len(diagram.branches), len(diagram.loads), *shape), blank)
+        for number, values in states:
+            if name in values:
+                array[number][tuple(map(slice, values[name].shape))] = values[name]
+        return array.reshape(*grid, *shape)
+
+    flags = netcdf.attributes("stability", comment="of the steady state") | netcdf.flag_attributes(Stability)
+    told: dict[str, Any] = {
+        "stability": (dims, over("stability", (), np.int8(Stability.NOT_COMPUTED)), flags)
+    }
+    sizes = {name: c.values.size for name, c in coordinates(diagram.job.parameters).items()}
+    for v in VARIABLES:
+        array = over(v.name, tuple(sizes[dim] for dim in v.dims), np.nan)
+        told[v.name] = (*dims, *v.dims), array, netcdf.attributes(v.long_name, v.units, v.comment)
+    most = max((values["growth_rate"].shape[1] for _, values in states), default=0)
+    for name, (_, *named) in OF_MODES.items():
+        told[name] = (*dims, "mode"), over(name, (most,), np.nan), netcdf.attributes(*named)
+    return told
+
+
+def _onsets(followed: _Numbered) -> dict[str, Any]:
+    """The Hopf points of all branches, one after the other."""
+    rows = [
+        (number, onset, kind)
+        for number, one in followed
+        for onset, kind in zip(one.onsets, one.kinds, strict=True)
+    ]
+    sides = [Direction.GROWS_ABOVE if o.rising else Direction.GROWS_BELOW for _, o, _ in rows]
+    columns: dict[str, tuple[list[Any], Any, str, str, str]] = {
+        "onset_branch": ([n for n, *_ in rows], np.int32, "1", "branch", BRANCH),
+        "onset_load": ([o.load for _, o, _ in rows], float, "N m", "onset load", "load at the Hopf point"),
+        "onset_frequency": ([o.frequency for _, o, _ in rows], float, "Hz", "onset frequency",
+                            "frequency of the mode whose growth rate is 0 at the Hopf point"),
+        "onset_strand": ([o.strand + 1 for _, o, _ in rows], np.int8, "1", "vibrating strand", STRAND),
+        "onset_half_waves": ([o.half_waves for _, o, _ in rows], np.int8, "1", "half waves",
+                             "of the mode along its vibrating strand"),
+        "onset_others": ([o.others for _, o, _ in rows], np.int8, "1", "other growing modes",
+                         "number of them; 0: stability is lost or regained at this Hopf point"),
+        "hysteresis_width": ([k.width for *_, k in rows], float, "N m", "hysteresis width",
+                             "from the Hopf point to where vibration from the large start ends"),
+        "hysteresis_error": ([k.error for *_, k in rows], float, "N m", "error of the hysteresis width",
+                             "half the spacing of runs there, and the Hopf point's own error"),
+        "onset_direction": (sides, Direction, "", "side of growth",
+                            "whether the mode grows above or below the Hopf point"),
+        "onset_kind": ([k.kind for *_, k in rows], Kind, "", "kind of Hopf point", ""),
+        "onset_reason": ([k.reason for *_, k in rows], object, "", "reason", OF_KIND),
+    }  # fmt: skip
+    return {name: ("onset", *_column(*column)) for name, column in columns.items()}
+
+
+def _runs(followed: _Numbered) -> dict[str, Any]:
+    """The runs of all branches, one after the other."""
+    rows = [(number, run) for number, one in followed for run in one.runs]
+    columns: dict[str, tuple[list[Any], Any, str, str, str]] = {
+        "run_branch": ([n for n, _ in rows], np.int32, "1", "branch", BRANCH),
+        "run_load": ([run.value for _, run in rows], float, "N m", "load", LOAD),
+        "run_start": ([run.start for _, run in rows], np.int8, "1", "start", START),
+        "run_amplitude": ([run.amplitude for _, run in rows], float, "m", "amplitude", "in the band"),
+        "run_frequency": ([run.frequency for _, run in rows], float, "Hz", "dominant frequency", ""),
+        "run_occurrence": ([run.occurrence for _, run in rows], OccurrenceClass, "", "vibration occurrence",
+                           ""),
+        "run_reason": ([run.reason for _, run in rows], object, "", "reason", REASON),
+    }  # fmt: skip
+    return {name: ("run", *_column(*column)) for name, column in columns.items()}
+
+
+def _column(
+    values: list[Any], kind: Any, units: str, long_name: str, comment: str
+) -> tuple[np.ndarray, dict[str, Any]]:
+    """Return values, and attributes, of a type of numpy or of flags."""
+    is_flag = isinstance(kind, type) and issubclass(kind, IntEnum)
+    flags = netcdf.flag_attributes(kind) if is_flag else {}
+    return np.array(values, np.int8 if is_flag else kind), netcdf.attributes(
+        long_name, units, comment
+    ) | flags

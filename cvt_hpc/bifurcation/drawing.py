@@ -5,8 +5,6 @@ amplitudes of limit cycles as dots; below growth rates and frequencies of its mo
 steady state nothing is drawn. Runs that failed or slip have no limit cycle: they stand at the upper edge.
 """
 
-from __future__ import annotations
-
 from pathlib import Path
 
 import numpy as np
@@ -16,8 +14,7 @@ from matplotlib.lines import Line2D
 from matplotlib.patches import Patch
 
 from cvt_hpc.analysis.figures import WIDTH, balanced, coordinate_unit, draw
-from cvt_hpc.bifurcation.attractors import FROM, Attractor
-from cvt_hpc.bifurcation.followed import OF_MODES, Followed, Stability
+from cvt_hpc.bifurcation.attractors import FROM, OF_MODES, Attractor, Followed, Stability
 from cvt_hpc.bifurcation.job import Diagram, load_attributes
 from cvt_hpc.bifurcation.table import gap_lines, place_text
 from cvt_hpc.models.linear_stability.branch import Onset

@@ -1,7 +1,5 @@
 """Measurements against their reference: errors, their meaning, and the cheapest sufficient method."""
 
-from __future__ import annotations
-
 import math
 from collections.abc import Mapping
 from dataclasses import dataclass, replace

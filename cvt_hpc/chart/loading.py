@@ -1,18 +1,33 @@
-"""From a chart job to its measurements: every run of it is built and checked before any computing."""
+"""From a chart job to its measurements: every run of it is built and checked before any computing.
 
-from __future__ import annotations
+The points of a chart are references, methods over their settings, and the error budget.
+"""
 
+import math
+from collections.abc import Iterator, Mapping
 from pathlib import Path
+from typing import Any
 
-from cvt_hpc.chart.declarations import CHART
-from cvt_hpc.chart.plan import Chart, Point
-from cvt_hpc.chart.points import budget_points, method_points, reference_points
-from cvt_hpc.chart.scenes import read_stage
-from cvt_hpc.errors import InputError, mismatch
+from cvt_hpc.chart.plan import Chart, Point, Role, Scene
+from cvt_hpc.chart.scenes import (
+    BUDGET,
+    CHART,
+    CHOICE,
+    METHOD,
+    SETTINGS,
+    Stage,
+    check_word,
+    in_words,
+    read_stage,
+)
+from cvt_hpc.errors import InputError, mismatch, show, unknown
+from cvt_hpc.job import Job
 from cvt_hpc.job.assignments import Assignments, split_assignments
 from cvt_hpc.job.definition import HEADER
-from cvt_hpc.job.document import read_document
-from cvt_hpc.job.tables import read_table, read_tables
+from cvt_hpc.job.document import read_document, read_set, read_table, read_tables
+from cvt_hpc.job.schema import load_schema
+
+_COARSER = {"step": 2.0, "tolerance": 10.0}  # by which the coarser reference is coarser
 
 
 def load_chart(path: str | Path, overrides: Assignments = ()) -> Chart:
@@ -63,3 +78,152 @@ def load_chart(path: str | Path, overrides: Assignments = ()) -> Chart:
     job, chosen = points[0].job, tuple(stage.scene for stage in stages)
     head = job.name, job.description, source
     return Chart(*head, chosen, tuple(points), **settings, budgeted=budgeted)
+
+
+def reference_points(stage: Stage, raw: Any) -> Iterator[Point]:
+    """Yield the reference of a scene and, unless it is exact, the coarser one that gives its error.
+
+    Parameters
+    ----------
+    stage : Stage
+        The scene.
+    raw : Any
+        "exact", or a table with a stepper, its step or tolerance, that of the coarser one (by default twice
+        the step or ten times the tolerance), and further keys to be set.
+
+    Raises
+    ------
+    InputError
+        If it is neither, or a quantity of the scene looks beyond the end of the runs.
+    """
+    where = f"{stage.where} reference"
+    name, starts = stage.scene.name, stage.scene.starts
+    if stage.scene.exact:
+        job = stage.job(where)
+        _check_starts(stage, job)
+        _check_quantities(stage, job)
+        yield Point(f"{name}-exact", name, Role.REFERENCE, "exact", "exact", "", job, starts)
+        return
+    if not isinstance(raw, Mapping):
+        raise mismatch(where, '"exact", or a table with a stepper and its step or tolerance', show(raw))
+    read_table({"stepper": METHOD["stepper"]}, raw, where, ("set", "coarser", *SETTINGS))
+    key = _setting_key(raw, where)
+    stepper, others = raw["stepper"], read_set(raw, where)
+    fine = stage.setting(stepper, key, raw[key], where, f"{where} {key}")
+    setting: dict[str, Any] = {key: fine}
+    job = stage.job(where, stepper=stepper, **others, **setting)
+    _check_starts(stage, job)
+    _check_quantities(stage, job)
+    coarse = raw.get("coarser", fine * _COARSER[key])
+    coarser = stage.setting(stepper, key, coarse, where, f"{where} coarser")
+    if coarser <= fine:
+        raise mismatch(f"{where} coarser", f"more than {key} = {fine:g}", f"{coarse}")
+    setting = {key: coarser}
+    coarser_job = stage.job(where, stepper=stepper, **others, **setting)
+    label = in_words(stepper)
+    both: dict[str, Any] = {"starts": starts, "until": stage.until}
+    yield Point(f"{name}-reference", name, Role.REFERENCE, stepper, label, key, job, **both)
+    yield Point(f"{name}-coarser", name, Role.COARSER, stepper, label, key, coarser_job, **both)
+
+
+def method_points(name: str, raw: Any, stages: list[Stage], where: str) -> Iterator[Point]:
+    """Yield the points of a method: its settings on each of its scenes.
+
+    Parameters
+    ----------
+    name, raw
+        Of the method: its name and its table.
+    stages : list of Stage
+        All scenes.
+    where : str
+        File and table, for the errors.
+
+    Raises
+    ------
+    InputError
+        If the table is not legal, or a scene's model does not take the stepper.
+    """
+    check_word(name, where)
+    own = read_table(METHOD, raw, where, ("set", "scenes", *SETTINGS))
+    label = own["label"] or in_words(name)
+    key = _setting_key(raw, where)
+    if not isinstance(raw[key], list) or not raw[key]:
+        raise mismatch(f"{where} {key}", "a list of values", show(raw[key]))
+    stepper, model = own["stepper"], own["model"]
+    for stage in _chosen_stages(raw.get("scenes"), stages, where):
+        scene, both = stage.scene, {"lanes": own["lanes"], "until": stage.until}
+        for i, value in enumerate(raw[key], 1):
+            place = f"{where} {key}, value {i}"
+            setting: dict[str, Any] = {key: stage.setting(stepper, key, value, where, place, model)}
+            job = stage.job(where, model, stepper=stepper, **read_set(raw, where), **setting)
+            point = f"{scene.name}-{name}-{i}"
+            yield Point(point, scene.name, Role.METHOD, name, label, key, job, scene.starts, **both)
+
+
+def budget_points(raw: Any, stages: list[Stage], where: str) -> tuple[list[Point], tuple[str, ...]]:
+    """The base and the choices of the error budget, and the quantities that it shows."""
+    own = read_table(BUDGET, raw, where, ("set", "quantities", "choices"))
+    (stage,) = _chosen_stages([own["scene"]], stages, where)
+    base = read_set(raw, where)
+    stepper = own["stepper"] or None
+    scene, starts = stage.scene.name, stage.scene.starts
+    job = stage.job(where, stepper=stepper, **base)
+    points = [Point(f"{scene}-base", scene, Role.BASE, "base", own["label"], "", job, starts)]
+    for name, table in read_tables(raw.get("choices"), f"{where} choices", "choices").items():
+        place = where.replace("budget]", f"budget.choices.{name}]")
+        check_word(name, place)
+        choice = read_table(CHOICE, table, place, ("set",))
+        # keys set for the base's stepper may be unknown to another
+        changed = {**({} if choice["stepper"] else base), **read_set(table, place)}
+        job = stage.job(place, choice["model"], stepper=choice["stepper"] or stepper, **changed)
+        point, label = f"{scene}-choice-{name}", choice["label"] or in_words(name)
+        counted, refines = min(choice["starts"] or starts, starts), choice["refines"]
+        points.append(Point(point, scene, Role.CHOICE, name, label, "", job, counted, refines=refines))
+    return points, _budgeted(raw.get("quantities"), stage.scene, f"{where} quantities")
+
+
+def _budgeted(names: Any, scene: Scene, where: str) -> tuple[str, ...]:
+    """The quantities that were named, or else all of the scene but the trajectory, which no choice keeps."""
+    known = [quantity.name for quantity in scene.quantities]
+    if names is None:
+        return tuple(name for name in known if name != "trajectory")
+    if not isinstance(names, list) or not names:
+        raise mismatch(where, "a list of quantities", show(names))
+    for name in names:
+        if name not in known:
+            raise unknown(where, f"quantity {show(name)} of scene {scene.name}", str(name), known)
+    return tuple(names)
+
+
+def _chosen_stages(names: Any, stages: list[Stage], where: str) -> list[Stage]:
+    if names is None:
+        return stages
+    if not isinstance(names, list):
+        raise mismatch(f"{where} scenes", "a list of scenes", show(names))
+    known = {stage.scene.name: stage for stage in stages}
+    for name in names:
+        if name not in known:
+            raise unknown(f"{where} scenes", f"scene {show(name)}", str(name), known)
+    return [known[name] for name in names]
+
+
+def _setting_key(raw: Mapping[str, Any], where: str) -> str:
+    keys = [key for key in SETTINGS if key in raw]
+    if len(keys) != 1:
+        raise mismatch(where, f"one of {' and '.join(SETTINGS)}", "both" if keys else "neither")
+    return keys[0]
+
+
+def _check_starts(stage: Stage, job: Job) -> None:
+    if stage.scene.starts > 1 and "seed" not in load_schema(job.model, job.stepper, stage.where).parameters:
+        raise mismatch(
+            f"{stage.where} starts", f"1, because {job.model} has no seed", f"{stage.scene.starts}"
+        )
+
+
+def _check_quantities(stage: Stage, job: Job) -> None:
+    duration = job.parameters["duration"]
+    for quantity in stage.scene.quantities:
+        if duration < quantity.until < math.inf:
+            where = f"{stage.where} quantities.{quantity.name}.until"
+            raise mismatch(where, f"a time within the run of {duration:g} s", f"{quantity.until:g} s")

@@ -1,34 +1,135 @@
-"""A chart made: all points measured, compared, written and drawn."""
+"""A chart made: all points measured, compared, written and drawn.
 
-from __future__ import annotations
+The output folder keeps the origin of a chart and the points measured so far. Its results are a dataset, with
+all that is needed to repeat it, and a table: for people, and as a small file that can be kept.
+"""
 
+import json
 import logging
 import math
 import multiprocessing
 import os
-from collections.abc import Callable, Iterator
+import re
+from collections.abc import Callable, Iterator, Mapping, Sequence
 from concurrent.futures import ProcessPoolExecutor, as_completed
 from contextlib import closing
-from dataclasses import dataclass
+from dataclasses import dataclass, fields
+from math import nan
 from multiprocessing.synchronize import Lock
 from pathlib import Path
+from textwrap import shorten
+from typing import Any
 
-from cvt_hpc.chart.budget_drawing import draw_budget
-from cvt_hpc.chart.checks import check_prospects
-from cvt_hpc.chart.comparing import Comparison, compare
-from cvt_hpc.chart.costs import predicted_cost
-from cvt_hpc.chart.dataset import chart_dataset
-from cvt_hpc.chart.measuring import Measurement, measure
-from cvt_hpc.chart.plan import Chart, Point
-from cvt_hpc.chart.scene_drawing import draw_scene
-from cvt_hpc.chart.store import ChartFolder
-from cvt_hpc.chart.table import write_table
-from cvt_hpc.files import written_aside
+import numpy as np
+import xarray as xr
+
+from cvt_hpc.archives import Archives
+from cvt_hpc.chart.comparing import Comparison, Result, compare
+from cvt_hpc.chart.measuring import Measurement, check_prospects, measure, predicted_cost
+from cvt_hpc.chart.plan import Chart, Point, Role
+from cvt_hpc.chart.quantities import KINDS
+from cvt_hpc.chart.scene_drawing import draw_budget, draw_scene
+from cvt_hpc.files import kind_of, write_rows, written_aside
 from cvt_hpc.linear_algebra import one_thread
-from cvt_hpc.netcdf import write_netcdf
+from cvt_hpc.netcdf import VOLATILE, attributes, global_attributes, write_netcdf
+from cvt_hpc.output_folder import CHART_FILE, Kind, OutputFolder
+from cvt_hpc.provenance import origin_lines
+from cvt_hpc.study.job_difference import another_job
 from cvt_hpc.study.ranks.progress import Steps
+from cvt_hpc.tables import columns, number, short
+
+_FIRST: dict[str, Callable[[Result], str]] = {  # columns that all charts have
+    "scene": lambda r: r.point.scene,
+    "role": lambda r: "refinement" if r.point.refines else r.point.role.value,
+    "method": lambda r: r.point.label,
+    "stepper": lambda r: "" if r.point.series == "exact" else r.point.job.stepper or "",
+    "setting": lambda r: r.point.key,
+    "value": lambda r: number(r.point.setting),
+    "chosen": lambda r: "yes" if r.chosen else "",
+    "outcome": lambda r: r.measurement.reason or "done",
+    "core_s_per_s": lambda r: number(r.measurement.cost, 3),
+    "starts": lambda r: str(r.point.starts),
+}
+_LONGEST_NOTE = 90  # letters; the whole reason is in the file
+
+_LIMIT = 1 << 26  # [bytes] of a point
+_NAME = re.compile(r"[\w-][\w.-]*")
+_PLAIN = tuple(f.name for f in fields(Measurement) if f.name != "values")
+
+CHOSEN = "cheapest point of its scene that meets all tolerances"
+REFINES = "whether a choice is nearer to the truth than the base"
+_Variable = tuple[str, np.ndarray, dict[str, Any]]
 
 _COMPILING = "cvt_hpc.kernels"  # the logger of messages about it
+
+
+class ChartFolder(OutputFolder[Chart]):
+    """The output folder of a chart, and the places in it.
+
+    Parameters
+    ----------
+    path : Path
+        The folder; it need not exist.
+    chart : Chart
+        The chart that is to be made in it.
+
+    Attributes
+    ----------
+    points : Archives
+        Result of each point, by its name.
+    """
+
+    kind = Kind("chart", CHART_FILE, ".chart.lock", "cvt_hpc chart 2", ("points",))
+
+    def __init__(self, path: Path, chart: Chart) -> None:
+        super().__init__(path)
+        self.points = Archives(path / "points", chart.fingerprint(), _LIMIT)
+        self.table = path / "chart.csv"
+        self.dataset = path / "chart.nc"
+        self._chart = chart
+
+    def picture(self, name: str) -> Path:
+        """Return where the picture of a scene goes, or "budget"."""
+        return self.path / f"{name}.png"
+
+    def accept(self, entry: dict[str, Any]) -> dict[str, Any]:
+        """Return a sound chart.json."""
+        if not all(_NAME.fullmatch(name) for name in entry["job"]["scenes"].keys()):
+            raise ValueError("scenes without a name")  # of which names of files are made
+        return entry
+
+    def refuse_other(self, found: dict[str, Any], asked: Chart) -> None:
+        """Raise InputError unless the folder is that of the chart."""
+        if found["fingerprint"] != asked.fingerprint():
+            raise another_job(self.path, found["job"], asked.resolved())
+
+    def unexplained(self) -> str | None:
+        """Return files that no start of a chart leaves without a chart.json."""
+        own = {self.lock_file, *self.leftovers()}
+        points = self.points.folder
+        if kind_of(points) == "a folder" and not any(path.name[0] != "." for path in points.iterdir()):
+            own.add(points)
+        return None if own.issuperset(self.path.iterdir()) else f"one without a {self.job_file.name}"
+
+    def results_tell(self) -> Callable[[Chart], bool] | None:
+        """Return a function that decides whether the points are of a chart; None if there are none."""
+        fingerprints = self.points.fingerprints()
+        return (lambda chart: chart.fingerprint() in fingerprints) if fingerprints else None
+
+    def written(self, found: dict[str, Any] | None) -> Iterator[Path]:
+        """Yield the files of a chart: points, table, dataset, and the pictures of its scenes."""
+        scenes = found["job"]["scenes"] if found else (scene.name for scene in self._chart.scenes)
+        pictures = (self.picture(name) for name in (*scenes, "budget"))
+        yield from (*self.points.written(), self.table, self.dataset, *pictures)
+
+    def load_point(self, name: str) -> Measurement | None:
+        """Return the result of a point, None if there is none, or no readable one."""
+        return self.points.load(name, lambda plain, values: Measurement(values=values, **plain))
+
+    def save_point(self, name: str, measurement: Measurement) -> None:
+        """Keep the result of a point."""
+        plain = {key: getattr(measurement, key) for key in _PLAIN}
+        self.points.save(name, plain, measurement.values)
 
 
 @dataclass(frozen=True)
@@ -154,3 +255,152 @@ def _measure(chart: Chart, point: Point) -> Measurement:
     # threads of the linear algebra wait for each other in loops, which would count as a method's own time
     with one_thread():
         return measure(point, scene, chart.repeats, limit)
+
+
+def chart_dataset(
+    chart: Chart, comparisons: Sequence[Comparison], makers: Sequence[dict[str, Any]]
+) -> xr.Dataset:
+    """Return the results as a dataset: errors, values, cost and work of each point, and how it ended.
+
+    Parameters
+    ----------
+    chart : Chart
+        The job, which goes into the attributes.
+    comparisons : sequence of Comparison
+        The results.
+    makers : sequence of dict
+        Origin of the measurements: versions, revision and machine, each of them once.
+
+    Returns
+    -------
+    Dataset
+        Along the dimension `point`.
+    """
+    rows = [result for comparison in comparisons for result in comparison.results]
+    variables: dict[str, Any] = _descriptions(rows) | _costs(rows)
+    for name in KINDS:
+        if not any(name in row.errors for row in rows):
+            continue
+        words = name.replace("_", " ")
+        errors = [row.errors.get(name, np.nan) for row in rows]
+        variables[f"{name}_error"] = _along(errors, "1", f"{words} error", "of a reference its own")
+        below = np.array([name in row.below for row in rows], "i1")
+        text = "whether the error is below the reference's own"
+        variables[f"{name}_below_reference"] = _flag(below, f"{words} below the reference", text)
+        if name not in ("trajectory", "occurrence"):
+            values = [row.values.get(name, np.nan) for row in rows]
+            variables[name] = _along(values, KINDS[name].unit, words, "pooled over the starts")
+    points = ("point", np.array([row.point.name for row in rows], dtype=object), attributes("point"))
+    return xr.Dataset(variables, {"point": points}, _attributes(chart, comparisons, makers))
+
+
+def _descriptions(rows: Sequence[Result]) -> dict[str, Any]:
+    texts = {
+        "scene": ("", lambda r: r.point.scene),
+        "role": ("what the point was measured for", lambda r: r.point.role.value),
+        "method": ("method or choice", lambda r: r.point.label),
+        "stepper": ("", lambda r: r.point.job.stepper),
+        "reason": ("why the point failed", lambda r: r.measurement.reason),
+    }
+    variables: dict[str, Any] = {
+        name: ("point", np.array([read(row) for row in rows], dtype=object), attributes(name, comment=text))
+        for name, (text, read) in texts.items()
+    }
+    for key, unit in (("step", "s"), ("tolerance", "1")):
+        settings = [row.point.setting if row.point.key == key else np.nan for row in rows]
+        variables[key] = _along(settings, unit, key, "of the method")
+    variables["chosen"] = _flag([r.chosen for r in rows], "chosen", CHOSEN)
+    variables["failed"] = _flag([bool(r.measurement.reason) for r in rows], "failed", "see reason")
+    variables["refines"] = _flag([r.point.refines for r in rows], "refines", REFINES)
+    return variables
+
+
+def _costs(rows: Sequence[Result]) -> dict[str, Any]:
+    found = [row.measurement for row in rows]
+    least, first = f"of methods the least of all repeats; {VOLATILE}", f"of the first pass; {VOLATILE}"
+    variables = {
+        "core_seconds_per_simulated_second": _along([m.cost for m in found], "1", "cost of a run", least),
+        "core_seconds": _along([m.core_seconds for m in found], "s", "processor time", first),
+        "simulated_seconds": _along([m.simulated for m in found], "s", "simulated time", "of a run"),
+        "starts": _along([row.point.starts for row in rows], "1", "starts", "number of pooled runs"),
+    }
+    for name in dict.fromkeys(name for row in rows for name in row.measurement.counters):
+        counts = [row.measurement.counters.get(name, np.nan) for row in rows]
+        variables[f"work_{name}"] = _along(counts, "1", name.replace("_", " "), "mean over the starts")
+    return variables
+
+
+def _along(values: Sequence[float], units: str, long_name: str, comment: str) -> _Variable:
+    return "point", np.array(values, float), attributes(long_name, units, comment)
+
+
+def _flag(values: Sequence[bool] | np.ndarray, long_name: str, comment: str) -> _Variable:
+    flags = {"flag_values": np.array([0, 1], "i1"), "flag_meanings": "no yes"}
+    return "point", np.array(values, "i1"), attributes(long_name, comment=comment) | flags
+
+
+def _attributes(
+    chart: Chart, comparisons: Sequence[Comparison], makers: Sequence[dict[str, Any]]
+) -> dict[str, str]:
+    return {
+        **global_attributes(chart, chart.resolved(), "speed against accuracy", makers=makers),
+        "job_fingerprint": chart.fingerprint(),
+        "verdicts": json.dumps({c.scene.name: c.verdict for c in comparisons}),
+        "machine": json.dumps([*{str(m["machine"]): m["machine"] for m in makers}.values()]),
+    }
+
+
+def write_table(comparisons: Sequence[Comparison], made: Mapping[str, Any], path: Path) -> None:
+    """Write all results as comma-separated values, a row for each point, below their origin."""
+    results = [result for comparison in comparisons for result in comparison.results]
+    columns = {head: [read(result) for result in results] for head, read in _FIRST.items()}
+    for name in (name for name in KINDS if any(name in result.errors for result in results)):
+        if name not in ("trajectory", "occurrence"):
+            head = f"{name} [{KINDS[name].unit}]"
+            columns[head] = [number(result.values.get(name, nan), 6) for result in results]
+        columns[f"{name}_error"] = [number(result.errors.get(name, nan), 3) for result in results]
+    columns["below_reference"] = [" ".join(sorted(result.below)) for result in results]
+    for name in dict.fromkeys(name for result in results for name in result.measurement.counters):
+        columns[name] = [number(result.measurement.counters.get(name, nan), 8) for result in results]
+    write_rows(path, list(columns), zip(*columns.values(), strict=True), origin_lines(made))
+
+
+def table_lines(comparison: Comparison) -> Iterator[str]:
+    """Yield the lines that show the results of a scene to people."""
+    names = [quantity.name for quantity in comparison.scene.quantities]
+    heads = ["method", "", "core-s/s", *(f"{name.replace('_', ' ')} error" for name in names), ""]
+    own = [short(comparison.reference.errors[name]) for name in names]
+    label, setting = comparison.reference.point.label, comparison.reference.point.setting_in_words
+    rows = [heads, [f"reference: {label}", setting, "-", *own, comparison.reference.measurement.reason]]
+    rows += [
+        [r.point.label, r.point.setting_in_words, _cost(r), *_errors(r, names), _note(r)]
+        for r in comparison.methods
+    ]
+    yield comparison.scene.title
+    yield from columns(rows)
+    if any(result.below for result in comparison.methods):
+        yield "  *: no larger than the reference's own error"
+    yield f"  chosen: {comparison.verdict}"
+    if comparison.choices:
+        shown = comparison.shown
+        words = [name.replace("_", " ") for name in shown]
+        rows = [[f"error budget, against {comparison.base}", "core-s/s", *words, ""]]
+        rows += [[r.point.label, _cost(r), *_errors(r, shown), _note(r)] for r in comparison.choices]
+        yield from columns(rows)
+
+
+def _cost(result: Result) -> str:
+    return short(result.measurement.cost) or "-"
+
+
+def _errors(result: Result, names: Sequence[str]) -> list[str]:
+    return [short(result.errors[name]) + ("*" if name in result.below else "") for name in names]
+
+
+def _note(result: Result) -> str:
+    """Further remarks on a point."""
+    if result.measurement.reason:
+        return shorten(f"failed: {result.measurement.reason}", _LONGEST_NOTE, placeholder=" ...")
+    if result.point.role is Role.CHOICE:
+        return "is an error of it" if result.point.refines else ""
+    return "<- chosen" if result.chosen else ""

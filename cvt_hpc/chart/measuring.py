@@ -1,21 +1,127 @@
-"""One point measured: runs from all its starts, their results, and their cost."""
+"""One point measured: runs from all its starts, their results, and their cost.
 
-from __future__ import annotations
+Runs are marched and timed, alone or in lanes. Before that `check_prospects` holds models against what a chart
+requires of them, and `predicted_cost` gives its expected cost, by the cost models of its models.
+"""
 
 import math
+import time
+from collections.abc import Callable, Iterable, Iterator, Sequence
 from dataclasses import dataclass, field
+from itertools import product
 from typing import Any
 
 import numpy as np
 from numpy.typing import NDArray
 
-from cvt_hpc.chart.plan import Point, Scene, start_parameters
-from cvt_hpc.chart.quantities import History, observe, strand_of
-from cvt_hpc.chart.timed_runs import Marched, lanes_of, march, most_lanes, warm_up
+from cvt_hpc.chart.plan import Chart, Point, Role, Scene, start_parameters
+from cvt_hpc.chart.quantities import History, channels_needed, observe, strand_of
+from cvt_hpc.errors import InputError, mismatch
+from cvt_hpc.job import Job
+from cvt_hpc.job.summary import core_time_in_words
 from cvt_hpc.models.contract import Failure, Run, load_model
+from cvt_hpc.simulation import marching
+from cvt_hpc.tables import columns, short
 from cvt_hpc.variables import Status
 
+_TOO_LONG = (Status.TIMED_OUT, "takes longer than the chart's time_limit")
+
 LONG = 2.0  # [s] of processor time: beyond, a run is timed once, because noise averages out within it
+
+
+@dataclass(frozen=True)
+class Marched:
+    """Runs from several starts.
+
+    Attributes
+    ----------
+    runs : tuple of Transient
+        Of the model, in the order of the points.
+    failures : tuple of (Status, str) or None
+        The failure of each.
+    core_seconds : float
+        Processor time of all of them [s], without compiling.
+    simulated : float
+        Their simulated time together [s].
+    """
+
+    runs: tuple[Run, ...]
+    failures: tuple[Failure | None, ...]
+    core_seconds: float
+    simulated: float
+
+    @property
+    def cost(self) -> float:
+        """Core-seconds for each simulated second of a run."""
+        return self.core_seconds / self.simulated if self.simulated > 0.0 else math.nan
+
+
+def warm_up(job: Job, points: Sequence[dict[str, Any]]) -> None:
+    """Compile or load all that a group of runs needs; this does not count as their cost."""
+    load_model(job.model).batch(points, job.stepper).advance(1)
+
+
+def most_lanes(job: Job) -> int:
+    """Return how many runs of a job can advance together, in the lanes of the processor's registers."""
+    return load_model(job.model).lanes(job.parameters, job.stepper)
+
+
+def lanes_of(point: Point) -> int:
+    """Return how many runs of a point advance together: as many as it asks for, or as can."""
+    return point.lanes or min(most_lanes(point.job), point.starts)
+
+
+def march(
+    job: Job,
+    points: Sequence[dict[str, Any]],
+    lanes: int,
+    until: float,
+    time_limit: float = math.inf,
+    led: Sequence[Any] = (),
+) -> Marched:
+    """Do several runs, in groups that advance together.
+
+    Parameters
+    ----------
+    job : Job
+        With their model and stepper.
+    points : sequence of dict
+        Flat parameters of each run [SI]; those of a group may differ as the model's batches allow.
+    lanes : int
+        Runs of a group.
+    until : float
+        How far they are marched [s]; inf: to their ends.
+    time_limit : float
+        Core-seconds after which a group is given up and counts as failed [s]; without one nothing but the
+        runs is in their time.
+    led : sequence of Transient
+        Runs from which the runs take over, one for each; none: they start by themselves.
+    """
+    runs: list[Run] = []
+    failures: list[Failure | None] = []
+    seconds = simulated = 0.0
+    for first in range(0, len(points), lanes):
+        model = load_model(job.model)
+        model.forget()
+        batch = model.batch(points[first : first + lanes], job.stepper)
+        if led:
+            batch.take_over(led[first : first + lanes])
+        begun = batch.done
+        samples = batch.samples if math.isinf(until) else round(until / batch.interval)
+        needed, stopped = marching.march(batch, samples, _stop_after(time_limit))
+        seconds += needed
+        runs += batch.runs
+        simulated += sum(run.time - begun * batch.interval for run in batch.runs)
+        failures += [run.failure or (_TOO_LONG if stopped else None) for run in batch.runs]
+    return Marched(tuple(runs), tuple(failures), seconds, simulated)
+
+
+def _stop_after(seconds: float) -> Callable[[], str | None] | None:
+    """A function that ends a march after so much processor time; None where there is no limit."""
+    if math.isinf(seconds):
+        return None
+    end = time.process_time() + seconds
+    return lambda: _TOO_LONG[1] if time.process_time() > end else None
 
 
 @dataclass(frozen=True)
@@ -161,3 +267,104 @@ def _stacked(observed: list[dict[str, NDArray[np.float64]]]) -> dict[str, NDArra
 def _mean_counters(marched: Marched) -> dict[str, float]:
     each = [run.counters() for run in marched.runs]
     return {name: float(np.mean([counters[name] for counters in each])) for name in each[0]}
+
+
+def predicted_cost(chart: Chart, point: Point) -> float:
+    """Core-seconds that a point takes, at most as many as its time limit allows.
+
+    Little is known of methods that choose their step. Not known (nan) of a model without records; an exact
+    solution takes next to nothing.
+
+    Parameters
+    ----------
+    chart : Chart
+        The chart.
+    point : Point
+        One of its points.
+    """
+    if point.series == "exact":
+        return 0.0
+    if not load_model(point.job.model).is_recorded:
+        return math.nan
+    scene = chart.scene(point.scene)
+    batches = math.ceil(point.starts / lanes_of(point))
+    first = _march_cost(point.job, point.until)
+    if point.timed:
+        first = min(first, chart.time_limit, scene.time_limit)
+        first *= 1 + (chart.repeats if first < LONG else 0)
+    led = _march_cost(scene.lead.job, scene.lead.until) if scene.lead else 0.0
+    return batches * (first + led)
+
+
+def _march_cost(job: Job, until: float) -> float:
+    """Core-seconds of a batch up to a time [s]; inf: to its end."""
+    whole = float(load_model(job.model).cost(job.parameters, job.stepper))
+    return whole * min(until / job.parameters["duration"], 1.0)
+
+
+def plan_lines(chart: Chart) -> Iterator[str]:
+    """Yield the lines that describe the measurements of a chart, scene by scene, and their expected cost."""
+    yield f"chart {chart.name} ({chart.source}): {len(chart.scenes)} scenes, {len(chart.points)} points"
+    if chart.description:
+        yield chart.description
+    rows, total, unknown = [], 0.0, 0
+    for scene in chart.scenes:
+        points = [point for point in chart.points if point.scene == scene.name]
+        costs = [predicted_cost(chart, point) for point in points]
+        known = [cost for cost in costs if not math.isnan(cost)]
+        unknown += len(costs) - len(known)
+        total += sum(known)
+        methods = ", ".join(dict.fromkeys(point.series for point in points if point.timed))
+        cells = str(len(points)), str(sum(point.starts for point in points))
+        rows.append([scene.name, *cells, short(sum(known)) if any(known) else "not known", methods])
+    yield from columns([["scene", "points", "runs", "core-s", "methods"], *rows])
+    beside = f"; not known of {unknown} points" if unknown else ""
+    yield f"estimated cost: {core_time_in_words(total)}, by methods that choose their step roughly{beside}"
+
+
+def check_prospects(chart: Chart) -> None:
+    """Check that the models record the judged quantities, have the exact solution if used, and the lanes.
+
+    Raises
+    ------
+    InputError
+        If one does not.
+    """
+    for scene in chart.scenes:
+        where = f"{chart.source}: [chart.scenes.{scene.name}]"
+        (point,) = chart.points_of(scene.name, Role.REFERENCE)
+        if scene.exact:
+            _check_exact(point, where)
+        models = dict.fromkeys(p.job.model for p in chart.points if p.scene == scene.name)
+        _check_channels(models, scene, where)
+        if scene.lead is not None:
+            _check_lead(point, where)
+    for point in chart.points:
+        most = most_lanes(point.job)
+        if point.lanes > most:
+            where = f"{chart.source}: [chart.methods.{point.series}] lanes"
+            raise mismatch(where, f"at most {most} with stepper {point.job.stepper}", f"{point.lanes}")
+
+
+def _check_exact(point: Point, where: str) -> None:
+    if not load_model(point.job.model).has_exact:
+        found = f"{point.job.model}, which has none"
+        raise mismatch(f"{where} reference", "a model with an exact solution", found)
+    try:
+        exact_displacement(point, 0)
+    except InputError as error:
+        raise InputError(f"{where} reference: {error}") from error
+
+
+def _check_lead(point: Point, where: str) -> None:
+    if not load_model(point.job.model).takes_over:
+        raise mismatch(f"{where} lead", "a model whose runs can take over from others", point.job.model)
+
+
+def _check_channels(models: Iterable[str], scene: Scene, where: str) -> None:
+    needed = channels_needed(scene.quantities)
+    if scene.exact and needed:
+        raise mismatch(f"{where} quantities", "those that an exact solution has", f"channel {needed[0]}")
+    for channel, model in product(needed, models):
+        if channel not in load_model(model).channels:
+            raise mismatch(f"{where} quantities", f"a model that records {channel}", model)

@@ -1,7 +1,5 @@
 """The content of a chart: scenes, their judged quantities, and the points to be measured."""
 
-from __future__ import annotations
-
 import math
 from dataclasses import asdict, dataclass, replace
 from enum import Enum

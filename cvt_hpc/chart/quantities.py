@@ -6,8 +6,6 @@ of everything else. Errors are relative: the norm of the difference over the nor
 stated scale.
 """
 
-from __future__ import annotations
-
 import math
 from collections.abc import Callable, Mapping, Sequence
 from dataclasses import dataclass
@@ -18,7 +16,7 @@ from numpy.typing import NDArray
 
 from cvt_hpc.chart.plan import Quantity
 from cvt_hpc.errors import mismatch, unknown
-from cvt_hpc.job.tables import read_table
+from cvt_hpc.job.document import read_table
 from cvt_hpc.parameters import Parameter, not_negative, positive
 from cvt_hpc.vibration import signals
 from cvt_hpc.vibration.assessment import assess

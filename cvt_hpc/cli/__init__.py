@@ -3,8 +3,6 @@
 A module for each group of commands: `add` declares them and their options, and a function does each.
 """
 
-from __future__ import annotations
-
 import argparse
 import logging
 import os

@@ -53,8 +53,8 @@ def _check(arguments: argparse.Namespace) -> int:
     show_job(job, None)
     if arguments.ranks and parts.speaks():
         from cvt_hpc.printing import disk_line, forecast_lines
+        from cvt_hpc.study.forecast.cost_model import CURVE
         from cvt_hpc.study.forecast.resources import expect
-        from cvt_hpc.study.forecast.simulate import CURVE
 
         ranks = [*arguments.ranks, *(CURVE if arguments.plot else ())]
         expected = expect(job, parts.output_folder(None, job), ranks, arguments.pilots)
@@ -71,8 +71,7 @@ def _check(arguments: argparse.Namespace) -> int:
 
 def _chart_lines(arguments: argparse.Namespace) -> Iterator[str]:
     from cvt_hpc.chart import load_chart
-    from cvt_hpc.chart.checks import check_prospects
-    from cvt_hpc.chart.costs import plan_lines
+    from cvt_hpc.chart.measuring import check_prospects, plan_lines
 
     chart = load_chart(arguments.path, arguments.set)
     check_prospects(chart)
@@ -80,8 +79,7 @@ def _chart_lines(arguments: argparse.Namespace) -> Iterator[str]:
 
 
 def _ladder_lines(arguments: argparse.Namespace) -> Iterator[str]:
-    from cvt_hpc.ladder.costs import plan_lines
-    from cvt_hpc.ladder.loading import load_ladder
+    from cvt_hpc.ladder.loading import load_ladder, plan_lines
 
     asked = load_ladder(arguments.path, arguments.set)
     return plan_lines(asked, parts.output_folder(None, asked.job))
@@ -89,7 +87,7 @@ def _ladder_lines(arguments: argparse.Namespace) -> Iterator[str]:
 
 def _branch_lines(arguments: argparse.Namespace) -> Iterator[str]:
     from cvt_hpc.bifurcation import load_diagram
-    from cvt_hpc.bifurcation.costs import plan_lines
+    from cvt_hpc.bifurcation.job import plan_lines
 
     return plan_lines(load_diagram(arguments.path, arguments.set))
 
@@ -110,7 +108,7 @@ def show_job(job: Job, out: Path | None) -> None:
     from cvt_hpc.job.summary import summarize
     from cvt_hpc.printing import needs_line
     from cvt_hpc.study.description import check_names
-    from cvt_hpc.study.forecast.needs import refuse_too_large
+    from cvt_hpc.study.forecast.resources import refuse_too_large
     from cvt_hpc.study.simulator import default_simulator
 
     check_names(job, default_simulator())
@@ -123,7 +121,7 @@ def show_job(job: Job, out: Path | None) -> None:
 
 
 def _check_ranks(ranks: list[int]) -> None:
-    from cvt_hpc.study.forecast.simulate import MOST_RANKS
+    from cvt_hpc.study.forecast.cost_model import MOST_RANKS
 
     for number in ranks:
         if not 1 <= number <= MOST_RANKS:

@@ -1,7 +1,5 @@
 """`chart`, `ladder`, `branch` and `fit`: many runs whose results are tables and pictures of their own."""
 
-from __future__ import annotations
-
 import argparse
 from typing import Any
 
@@ -29,7 +27,7 @@ def add(commands: Any) -> None:
 
 def _chart(arguments: argparse.Namespace) -> int:
     from cvt_hpc.chart import load_chart, make_chart
-    from cvt_hpc.chart.table import table_lines
+    from cvt_hpc.chart.making import table_lines
 
     parts.refuse_ranks("chart", "measures times")
     chart = load_chart(arguments.path, arguments.set)
@@ -43,11 +41,10 @@ def _chart(arguments: argparse.Namespace) -> int:
 
 def _ladder(arguments: argparse.Namespace) -> int:
     from cvt_hpc.ladder.loading import load_ladder
-    from cvt_hpc.ladder.making import report_ladder, run_ladder
-    from cvt_hpc.ladder.table import ladder_lines
+    from cvt_hpc.ladder.making import ladder_lines, report_ladder, run_ladder
     from cvt_hpc.printing import trouble_lines
     from cvt_hpc.study.ranks.launch import end_process
-    from cvt_hpc.study.report import STALLED
+    from cvt_hpc.study.status import STALLED
 
     job, rungs, refusals = parts.alike(arguments, lambda: load_ladder(arguments.path, arguments.set))
     out = parts.output_folder(arguments.out, job)
@@ -68,7 +65,7 @@ def _ladder(arguments: argparse.Namespace) -> int:
 
 def _branch(arguments: argparse.Namespace) -> int:
     from cvt_hpc.bifurcation import load_diagram, make_diagram
-    from cvt_hpc.bifurcation.folder import DATASET
+    from cvt_hpc.bifurcation.diagram import DATASET
     from cvt_hpc.bifurcation.table import branch_lines, failure_lines
 
     parts.refuse_ranks("branch", "walks along the load")

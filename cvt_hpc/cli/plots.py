@@ -1,7 +1,5 @@
 """`plot`: pictures of results beside the map, each by its kind; `picture_kinds.py` declares them."""
 
-from __future__ import annotations
-
 import argparse
 from collections.abc import Callable, Iterator, Sequence
 from contextlib import ExitStack, contextmanager
@@ -66,8 +64,8 @@ def _draw(arguments: argparse.Namespace) -> int:
     def write(history: Any, out: Path, source: str, of_several: str) -> list[str]:
         written = [f"picture: {_write(name, [history], out, None, [source], options)}"]
         if data:
-            from cvt_hpc.analysis.composing import function_of
             from cvt_hpc.netcdf import write_history
+            from cvt_hpc.picture_kinds import function_of
 
             shown = function_of(kind.data)(history, source=source, **options)
             written.append(f"data: {write_history(shown, data.with_stem(data.stem + of_several))}")
@@ -99,8 +97,8 @@ def _draw_together(arguments: argparse.Namespace, words: Sequence[str], options:
 def _write(
     name: str, datasets: Sequence[Any], out: Path, at: Any, sources: Sequence[str], options: dict[str, Any]
 ) -> Path:
-    from cvt_hpc.analysis.composing import compose
     from cvt_hpc.analysis.figures import draw
+    from cvt_hpc.picture_kinds import compose
 
     if END in options:
         shown = datasets[0].get(options.get("of"))  # else the motion of a strand

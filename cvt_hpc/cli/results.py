@@ -100,8 +100,7 @@ def _map(arguments: argparse.Namespace) -> int:
         dataset = with_spacings(dataset, split_assignments(arguments.spacing, source, "--spacing"), source)
         at = parts.fixed_axes(arguments, dataset, source)
         from cvt_hpc.analysis.figures import draw
-        from cvt_hpc.analysis.maps import map_figure
-        from cvt_hpc.analysis.starts import has_starts, start_line
+        from cvt_hpc.analysis.maps import has_starts, map_figure, start_line
         from cvt_hpc.analysis.value_maps import value_map_figure
 
         files = [file for path in paths for file in parts.files_of(path)]

@@ -1,7 +1,5 @@
 """`simulate`: one run with its history."""
 
-from __future__ import annotations
-
 import argparse
 from pathlib import Path
 from typing import Any

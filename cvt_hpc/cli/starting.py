@@ -1,7 +1,5 @@
 """`init`, `models`, `variables`, `examples`, `doctor`, `completion`: what somebody needs who begins."""
 
-from __future__ import annotations
-
 import argparse
 from pathlib import Path
 from typing import Any
@@ -71,7 +69,7 @@ def _variables(arguments: argparse.Namespace) -> int:
 
 
 def _examples(arguments: argparse.Namespace) -> int:
-    from cvt_hpc.job.examples import copy_examples, example_lines
+    from cvt_hpc.job.template import copy_examples, example_lines
 
     if arguments.names:
         parts.say(*(f"example: {path}" for path in copy_examples(arguments.names, arguments.out)))

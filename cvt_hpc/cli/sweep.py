@@ -96,9 +96,9 @@ def _load(
 ) -> tuple[Job, dict[str, Any], list[tuple[Repeat, Callable[[Repeat], None]]]]:
     """Return the job, the options of its sweep, and the samples that are to be done again."""
     from cvt_hpc.job import load_job
-    from cvt_hpc.job.durations import read_duration
+    from cvt_hpc.job.units import read_duration
     from cvt_hpc.study import check_start
-    from cvt_hpc.study.time_steps import check_refinement
+    from cvt_hpc.study.task import check_refinement
     from cvt_hpc.variables import Status
 
     limits = {
@@ -124,9 +124,8 @@ def _repeats(job: Job, arguments: argparse.Namespace) -> list[tuple[Repeat, Call
         raise mismatch("--check-step-by", "--check-step FRACTION beside it", "none")
     if arguments.audit is None and arguments.check_step is None:
         return []
-    from cvt_hpc.ladder.audit import audit_of
-    from cvt_hpc.study.repeats import check_fraction
-    from cvt_hpc.study.step_check import step_check
+    from cvt_hpc.ladder.comparing import audit_of
+    from cvt_hpc.study.repeats import check_fraction, step_check
 
     out = parts.output_folder(arguments.out, job)
     repeats: list[tuple[Repeat, Callable[[Repeat], None]]] = []
@@ -159,7 +158,7 @@ def _repeat(
 
 
 def _show_audit(audit: Repeat) -> None:
-    from cvt_hpc.ladder.audit import report_audit
+    from cvt_hpc.ladder.comparing import report_audit
     from cvt_hpc.printing import audit_lines
 
     parts.say(*audit_lines(report_audit(audit)))

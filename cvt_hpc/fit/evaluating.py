@@ -11,8 +11,7 @@ from numpy.typing import NDArray
 
 from cvt_hpc.errors import InputError
 from cvt_hpc.files import refuse_link
-from cvt_hpc.fit.job import Case, Fit
-from cvt_hpc.fit.scoring import Course, score, total
+from cvt_hpc.fit.job import Case, Course, Fit, score, total
 from cvt_hpc.job import Job, rebuild_job
 from cvt_hpc.study import open_results, run
 from cvt_hpc.variables import Status

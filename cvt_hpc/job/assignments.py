@@ -1,18 +1,21 @@
-"""Values that a user sets beside the job file: KEY=VALUE on the command line, a mapping in Python."""
+"""Values that a user sets beside the job file: KEY=VALUE on the command line, a mapping in Python.
 
-from __future__ import annotations
+Arrays and quantities of other libraries become what a job file has; none of these libraries is imported.
+"""
 
 import tomllib
 from collections.abc import Mapping, Sequence
 from typing import Any
 
+import numpy as np
+
 from cvt_hpc.errors import check_keys, mismatch, show, unknown
-from cvt_hpc.job.arrays import plain
 from cvt_hpc.job.axes import is_axis
-from cvt_hpc.job.plausibility import warn_of_bare_numbers
 from cvt_hpc.job.schema import Schema
-from cvt_hpc.job.values import kind_of, read_value
+from cvt_hpc.job.values import kind_of, read_value, warn_of_bare_numbers
 from cvt_hpc.parameters import Parameter
+
+_PLAIN = {bool, int, float, str}
 
 Assignments = Mapping[str, Any] | Sequence[str]
 AxisEntry = tuple[Parameter, Any, str]  # declaration of an axis, its list or range, and file and key
@@ -163,3 +166,38 @@ def structured(raw: Any) -> Any:
 
 def _plain(parameter: Parameter, raw: Any) -> Any:
     return raw if kind_of(parameter) is str and parameter.choices == () else structured(raw)
+
+
+def plain(value: Any) -> Any:
+    """Return a value of a job in which pandas, xarray and pint objects are numpy arrays, lists and texts.
+
+    Parameters
+    ----------
+    value : Any
+        As a job has it, tables and lists included. A quantity, or an array that names its unit in its
+        attribute `units`, gives texts with that unit.
+    """
+    if isinstance(value, Mapping):
+        return {key: plain(entry) for key, entry in value.items()}
+    if isinstance(value, (list, tuple)):
+        return value if set(map(type, value)) <= _PLAIN else [plain(entry) for entry in value]
+    if hasattr(value, "magnitude"):
+        return _with_unit(np.asarray(value.magnitude), f"{value.units:~C}")
+    if not hasattr(value, "to_numpy"):
+        return value
+    if hasattr(data := getattr(value, "data", None), "magnitude"):
+        return plain(data)
+    return _with_unit(value.to_numpy(), str(getattr(value, "attrs", {}).get("units", "")))
+
+
+def _with_unit(array: np.ndarray, unit: str) -> Any:
+    """Return an array of numbers as it is, or as texts with its unit; of a scalar or of texts its content."""
+    if array.dtype.kind not in "iuf":
+        return plain(array.tolist())
+    if unit not in ("", "1"):
+        return _texts(array.tolist(), unit)
+    return array if array.ndim else array.item()
+
+
+def _texts(value: Any, unit: str) -> Any:
+    return [_texts(entry, unit) for entry in value] if isinstance(value, list) else f"{value!r} {unit}"

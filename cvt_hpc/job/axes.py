@@ -1,7 +1,5 @@
 """The axes of a sweep: lists and ranges of a job file to the very values that runs evaluate."""
 
-from __future__ import annotations
-
 import math
 from collections.abc import Sequence
 from dataclasses import dataclass, field, replace

@@ -1,7 +1,5 @@
 """Conditions that must hold between parameters, checked for every run before any computing."""
 
-from __future__ import annotations
-
 import itertools
 import math
 from collections.abc import Iterable, Mapping, Sequence

@@ -4,8 +4,6 @@ A file is read where its meaning is certain; where it is no plain CSV file, a wa
 one error, which names the line and states what to write: `1,234` is never guessed to be 1234 or 1.234.
 """
 
-from __future__ import annotations
-
 import codecs
 import csv
 import math

@@ -1,6 +1,7 @@
-"""A validated job: its runs, with every default resolved."""
+"""A validated job: its runs, with every default resolved.
 
-from __future__ import annotations
+`handed_to` gives the same runs to another model of the ladder, which knows fewer tables.
+"""
 
 import hashlib
 import json
@@ -8,18 +9,18 @@ import math
 from collections.abc import Callable, Collection, Mapping
 from dataclasses import dataclass, field, replace
 from functools import cached_property, partial
-from typing import Any
+from typing import Any, Self
 
 from cvt_hpc.errors import mismatch
 from cvt_hpc.job.assignments import Assignments, read_assignments, split_assignments
 from cvt_hpc.job.axes import Axis, thinned
 from cvt_hpc.job.crosscheck import check_point, complete_point
-from cvt_hpc.job.derivation import ordered_rules, overridden
 from cvt_hpc.job.design import Design
 from cvt_hpc.job.formula import Formula
-from cvt_hpc.job.rules import Link, Rule, follow, needed_rules, places, varied_by
+from cvt_hpc.job.rules import Link, Rule, follow, needed_rules, ordered_rules, overridden, places, varied_by
 from cvt_hpc.job.schema import Schema, load_schema
 from cvt_hpc.job.units import unit_in
+from cvt_hpc.models.contract import load_model
 
 HEADER = ("name", "model", "stepper", "description")
 
@@ -144,7 +145,7 @@ class Job:
             for place in places(self.axes, along, sampled=self.is_sampled)
         )
 
-    def thinned(self, most: int) -> Job:
+    def thinned(self, most: int) -> Self:
         """Return this job with runs from all over it, as many as `most` if it has more; for estimates."""
         axes = thinned(self.axes, most, sampled=self.is_sampled)
         design = self.design | ({"runs": len(axes[0].values)} if self.is_sampled else {})
@@ -172,7 +173,7 @@ class Job:
             values[axis.name] = axis.values[place]
         return self.complete(values)
 
-    def with_units_of(self, at: Assignments, label: str = "at") -> Job:
+    def with_units_of(self, at: Assignments, label: str = "at") -> Self:
         """Return this job with the units of `at`, as of `point_at`, for its parameters without a unit."""
         written = split_assignments(at, self.source, label)
         found = {self.schema.find(name, f"{self.source}: {label} {name}"): unit_in(raw)
@@ -286,3 +287,57 @@ def _to_json(value: Any) -> Any:
     if isinstance(value, tuple):
         return [_to_json(item) for item in value]
     return str(value) if isinstance(value, float) and math.isinf(value) else value
+
+
+def answering_model(job: Job) -> tuple[str, str] | None:
+    """Return the model that answers the job's question, and the reason; None for its own model.
+
+    Raises
+    ------
+    InputError
+        If the runs have different questions.
+    """
+    answered_by = load_model(job.model).answered_by
+    if any(axis.name == "question" for axis in job.axes):
+        raise mismatch(f"{job.source}: [axes] question", "one question for all runs", "several")
+    return answered_by.get(job.parameters.get("question", ""))
+
+
+def handed_to(job: Job, model: str, why: str) -> dict[str, Any]:
+    """Return a document of the same runs for another model, with the keys that it knows.
+
+    Parameters
+    ----------
+    job : Job
+        A validated job.
+    model : str
+        The other model.
+    why : str
+        The purpose, for the description and the error.
+
+    Raises
+    ------
+    InputError
+        If the other model does not know an axis. A formula may still name keys that it does not know.
+    """
+    document, known = job.resolved(), load_schema(model, None, job.source).section_of
+    for axis in job.axes:
+        if axis.name not in known:
+            where = f"{job.source}: [axes] {axis.name}"
+            raise mismatch(where, f"a key of {model}, since {why}", "one without effect there")
+    tables: dict[str, dict[str, Any]] = {}
+    for section in job.schema.sections:
+        for key, value in document[section].items():
+            if key in job.given and key in known:
+                tables.setdefault(known[key], {})[key] = value  # it may belong in another table there
+    derived = {key: text for key, text in document.get("derived", {}).items() if key in known}
+    linked = {
+        axis: {key: values for key, values in table.items() if key in known}
+        for axis, table in document.get("linked", {}).items()
+    }
+    text = f"{job.description}{'; ' if job.description else ''}{model}: {why}"
+    head = {"name": job.name, "model": model, "description": text}
+    rest = {key: document[key] for key in ("axes", "design") if key in document}
+    tables |= {"derived": derived, "linked": {axis: table for axis, table in linked.items() if table}}
+    tables = {name: table for name, table in tables.items() if table}
+    return head | tables | rest

@@ -1,14 +1,24 @@
-"""Which points of the space of its axes a study runs: all of a grid, those along boundaries, or samples."""
+"""Which points of the space of its axes a study runs: all of a grid, those along boundaries, or samples.
 
-from __future__ import annotations
+Samples of the space that the ranges of axes span are drawn by scipy.stats.qmc. A job also names the runs
+whose whole history a sweep is to keep, as grid points or run indices. They do not determine the numbers: a
+folder takes the job with any of them.
+"""
 
+import math
 from collections.abc import Mapping
 from typing import Any
 
+import numpy as np
+
 from cvt_hpc.errors import mismatch, show, unknown
-from cvt_hpc.job.axes import LARGEST_AXIS, Axis
-from cvt_hpc.job.values import read_value
+from cvt_hpc.job.axes import LARGEST_AXIS, Axis, read_bounds, read_spacing, read_values, without_rounding
+from cvt_hpc.job.schema import Schema
+from cvt_hpc.job.values import kind_of, read_value
 from cvt_hpc.parameters import Parameter
+
+KEY = ("record", "history")
+_FORMS = "a list of runs, each a table {axis = value, ...} with all axes, or a run index"
 
 _KIND = Parameter(
     "grid", "", "which points are run", choices=("grid", "trace", "sobol", "latin_hypercube", "listed")
@@ -27,6 +37,8 @@ _RUNS = Parameter(64, "", "samples", minimum=1, maximum=2**24)
 _SEED = Parameter(1, "", "of the samples", minimum=0)
 
 Design = dict[str, Any]  # empty: the full grid
+
+_SAMPLED = ("from", "to", "spacing")
 
 
 def read_design(table: Mapping[str, Any], source: str) -> Design:
@@ -111,3 +123,162 @@ def resolve_spacing(design: Design, axes: tuple[Axis, ...], source: str) -> Desi
 
 def _is_numeric(axis: Axis) -> bool:
     return not isinstance(axis.values[0], (str, bool))
+
+
+def sampled_axes(
+    found: Mapping[str, tuple[Parameter, Any, str]], design: Design, source: str
+) -> tuple[Axis, ...]:
+    """Return the axes of a sampled study, each with the value of every sample.
+
+    Parameters
+    ----------
+    found : mapping
+        By name the declaration of the parameter, and the entry in the job file, a table with from, to and
+        optionally spacing; and file and key, for the error. In the place of all ranges may stand the lists of
+        drawn values, as the resolved job in a dataset gives them; with the kind "listed" they have to.
+    design : dict
+        Kind, `runs` and `seed`.
+    source : str
+        The job file, for the error.
+
+    Returns
+    -------
+    tuple of Axis
+        With `runs` values each; values at one place belong together.
+
+    Raises
+    ------
+    InputError
+        If there is no axis, or one has no continuous values or no legal range.
+    """
+    if not found:
+        raise mismatch(f"{source}: [axes]", "one axis or more, to draw samples from", "none")
+    for parameter, _, where in found.values():
+        if kind_of(parameter) is not float:
+            raise mismatch(where, "a parameter with continuous values, to draw samples from", "another one")
+    drawn = all(isinstance(raw, list) and len(raw) == design["runs"] for _, raw, _ in found.values())
+    if drawn or design["kind"] == LISTED:
+        return tuple(_read_listed(name, design["runs"], *entry) for name, entry in found.items())
+    ranges = [read_range(*entry) for entry in found.values()]
+    shares = _draw(design, len(ranges)).T
+    return tuple(
+        Axis(name, tuple(between(*ends, share).tolist()), parameter.unit, parameter.description, ends[2])
+        for (name, (parameter, _, _)), ends, share in zip(found.items(), ranges, shares, strict=True)
+    )
+
+
+def _read_listed(name: str, runs: int, parameter: Parameter, raw: Any, where: str) -> Axis:
+    """Return an axis with the value of each sample, as it stands in the job; values may come again."""
+    if not isinstance(raw, (list, tuple, np.ndarray)) or len(raw) != runs:
+        found = f"{len(raw)} values" if isinstance(raw, (list, tuple, np.ndarray)) else show(raw)
+        raise mismatch(where, f"a list of {runs} values, one for each of the runs of [design]", found)
+    return Axis(name, read_values(parameter, raw, where), parameter.unit, parameter.description)
+
+
+def read_range(parameter: Parameter, raw: Any, where: str) -> tuple[float, float, str]:
+    """Return the ends of a range and the spacing of the values drawn from it."""
+    if not isinstance(raw, dict):
+        raise mismatch(where, "a range {from=, to=}, to draw samples from", show(raw))
+    for key in raw:
+        if key not in _SAMPLED:
+            raise unknown(f"{where}.{key}", "key of a range to draw samples from", key, _SAMPLED)
+    start, stop = read_bounds(parameter, raw, where)
+    return start, stop, read_spacing(raw, start, stop, where)
+
+
+def _draw(design: Design, dimensions: int) -> np.ndarray:
+    """Return samples of the unit cube, shape (runs, dimensions)."""
+    from scipy.stats import qmc
+
+    engine = {"sobol": qmc.Sobol, "latin_hypercube": qmc.LatinHypercube}[design["kind"]]
+    return engine(dimensions, seed=np.random.default_rng(design["seed"])).random(design["runs"])
+
+
+def between(start: float, stop: float, spacing: str, share: np.ndarray) -> np.ndarray:
+    """Return the values at shares of the way from `start` to `stop`, by their spacing."""
+    return start * (stop / start) ** share if spacing == "log" else start + (stop - start) * share
+
+
+def read_histories(
+    raw: Any,
+    schema: Schema,
+    axes: tuple[Axis, ...],
+    replaced: Mapping[str, Any],
+    source: str,
+    samples: int | None = None,
+) -> tuple[int, ...]:
+    """Return the indices of the runs, in order.
+
+    Parameters
+    ----------
+    raw : Any
+        The list as TOML gives it.
+    schema : Schema
+        Of the job.
+    axes : tuple of Axis
+        Its grid.
+    replaced : mapping
+        By key the replacement of an axis or a value by overrides: a value, or None for an axis of
+        their own. A run that they have taken off the grid is left out.
+    source : str
+        The job file, for the errors.
+    samples : int, optional
+        Their number, if the runs are samples and no grid: these have an index alone.
+
+    Raises
+    ------
+    InputError
+        If it is no such list, or a run is not on the grid.
+    """
+    where = f"{source}: [record] history"
+    if not isinstance(raw, (list, tuple)):
+        raise mismatch(where, _FORMS, show(raw))
+    if samples is not None:
+        return tuple(
+            sorted({_numbered(entry, samples, f"{where}, run {i}") for i, entry in enumerate(raw, 1)})
+        )
+    found = {_index(entry, schema, axes, replaced, f"{where}, run {i}") for i, entry in enumerate(raw, 1)}
+    return tuple(sorted(index for index in found if index is not None))
+
+
+def _index(
+    entry: Any, schema: Schema, axes: tuple[Axis, ...], replaced: Mapping[str, Any], where: str
+) -> int | None:
+    size = math.prod(len(axis.values) for axis in axes)
+    if isinstance(entry, int) and not isinstance(entry, bool):
+        return _numbered(entry, size, where)
+    if not isinstance(entry, Mapping):
+        raise mismatch(where, _FORMS, show(entry))
+    values = {}
+    for name, raw in entry.items():
+        key = schema.find(name, f"{where}, {name}")
+        values[key] = without_rounding(read_value(schema.parameters[key], raw, f"{where}, {name}"))
+    index = 0
+    for axis in axes:
+        if axis.name in replaced and values.get(axis.name) not in axis.values:
+            return None
+        if axis.name not in values:
+            raise mismatch(where, "a value for each axis", f"none for {axis.name}")
+        index = index * len(axis.values) + _place(
+            axis, values.pop(axis.name), schema, f"{where}, {axis.name}"
+        )
+    for key in values.keys() - replaced.keys():
+        raise mismatch(where, f"axes of this job ({', '.join(axis.name for axis in axes)})", key)
+    return index if all(without_rounding(replaced[key]) == value for key, value in values.items()) else None
+
+
+def _numbered(entry: Any, size: int, where: str) -> int:
+    if isinstance(entry, bool) or not isinstance(entry, int) or not 0 <= entry < size:
+        raise mismatch(where, f"an index from 0 to {size - 1}", show(entry))
+    return entry
+
+
+def _place(axis: Axis, value: Any, schema: Schema, where: str) -> int:
+    if value in axis.values:
+        return axis.values.index(value)
+    if isinstance(value, str):
+        raise mismatch(where, f"one of {', '.join(axis.values)}", show(value))
+    below = max((v for v in axis.values if v < value), default=min(axis.values))
+    above = min((v for v in axis.values if v > value), default=max(axis.values))
+    near = " or ".join(dict.fromkeys(schema.in_words(axis.name, v) for v in (below, above)))
+    raise mismatch(where, f"a value of the axis, such as {near}", schema.in_words(axis.name, value))

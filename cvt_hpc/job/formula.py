@@ -4,8 +4,6 @@ Python's parser reads a formula, but nothing evaluates it as Python: only the no
 all numbers are floats, and length and depth are bounded.
 """
 
-from __future__ import annotations
-
 import ast
 import math
 import operator

@@ -1,7 +1,5 @@
 """From a job file to a job: the head, the tables, the axes and the overrides, each checked in turn."""
 
-from __future__ import annotations
-
 import re
 from collections.abc import Collection, Mapping, Sequence
 from dataclasses import replace
@@ -10,25 +8,28 @@ from typing import Any
 
 from cvt_hpc.errors import InputError, did_you_mean, mismatch, show
 from cvt_hpc.job import assignments
-from cvt_hpc.job.arrays import plain
-from cvt_hpc.job.assignments import Assignments, AxisEntry
+from cvt_hpc.job.assignments import Assignments, AxisEntry, plain
 from cvt_hpc.job.axes import Axis, read_axis
 from cvt_hpc.job.crosscheck import check_grid, check_rules
 from cvt_hpc.job.csv_files import read_csv
-from cvt_hpc.job.definition import HEADER, Job
-from cvt_hpc.job.derivation import ordered_rules, overridden, read_derived, read_linked, relinked
-from cvt_hpc.job.design import Design, read_design, resolve_spacing
+from cvt_hpc.job.definition import HEADER, Job, answering_model, handed_to
+from cvt_hpc.job.design import KEY, Design, read_design, read_histories, resolve_spacing, sampled_axes
 from cvt_hpc.job.document import read_document
-from cvt_hpc.job.for_model import answering_model, handed_to
-from cvt_hpc.job.histories import KEY, read_histories
 from cvt_hpc.job.netcdf_files import SUFFIX, read_netcdf
-from cvt_hpc.job.notices import tell_of_no_effect, warn_of_notices
-from cvt_hpc.job.plausibility import warn_of_bare_numbers
-from cvt_hpc.job.rules import Link, Rule, follow
-from cvt_hpc.job.sampling import sampled_axes
+from cvt_hpc.job.rules import (
+    Link,
+    Rule,
+    follow,
+    ordered_rules,
+    overridden,
+    read_derived,
+    read_linked,
+    relinked,
+)
 from cvt_hpc.job.schema import Schema, load_schema
+from cvt_hpc.job.summary import tell_of_no_effect, warn_of_notices
 from cvt_hpc.job.units import unit_in
-from cvt_hpc.job.values import expectation, kind_of, read_value
+from cvt_hpc.job.values import expectation, kind_of, read_value, warn_of_bare_numbers
 from cvt_hpc.models.contract import load_model
 
 OF_COMMANDS = ("branch", "chart", "fit", "ladder")  # tables that a command of the same name reads

@@ -1,19 +1,74 @@
-"""Rules by which the value of one parameter follows from others, point by point."""
+"""Rules by which the value of one parameter follows from others, point by point.
 
-from __future__ import annotations
+The tables [derived] and [linked.AXIS] of a job and substitutes give the rules. [derived] has formulas,
+[linked.AXIS] the parameters that follow an axis value by value. Substitutes are the model's: `belt_length`
+gives `driven_radius`, and `step_error` gives `step` where the job gives neither. Each rule comes after the
+rules that give its sources.
+"""
 
 from collections.abc import Callable, Collection, Iterable, Iterator, Mapping
-from dataclasses import dataclass, field
+from dataclasses import dataclass, field, replace
+from graphlib import CycleError, TopologicalSorter
 from itertools import product
 from typing import Any
 
-from cvt_hpc.errors import few_of, mismatch, show
-from cvt_hpc.job.axes import Axis
-from cvt_hpc.job.formula import Formula
-from cvt_hpc.job.values import in_words, read_value
+from cvt_hpc.errors import few_of, mismatch, show, unknown
+from cvt_hpc.job.axes import Axis, read_values
+from cvt_hpc.job.formula import Formula, read_formula
+from cvt_hpc.job.schema import Schema
+from cvt_hpc.job.values import in_words, kind_of, read_value
 from cvt_hpc.parameters import Parameter, Substitute
 
 _MOST_NAMED = 8
+
+
+@dataclass(frozen=True)
+class Link:
+    """Values that follow those of an axis, or of a former axis, place by place."""
+
+    axis: str
+    at: tuple
+    values: tuple
+    unit: str  # of the axis
+    wanted: str = field(default="", compare=False)  # its unit in the job
+
+    @property
+    def names(self) -> tuple[str, ...]:
+        """The axis."""
+        return (self.axis,)
+
+    @property
+    def text(self) -> str:
+        """How the values follow, for people."""
+        return f"linked to {self.axis}"
+
+    def value(self, parameters: Mapping[str, Any]) -> Any:
+        """Return the value that belongs to the axis' value; ValueError if that one is not on the axis."""
+        place = parameters[self.axis]
+        if place not in self.at:
+            known = few_of([in_words(value, self.unit, self.wanted) for value in self.at], _MOST_NAMED)
+            raise ValueError(f"a value of {self.axis} that it is linked to ({known})")
+        return self.values[self.at.index(place)]
+
+
+@dataclass(frozen=True)
+class Substituted:
+    """A value that follows from a parameter given in its place."""
+
+    by: str
+    names: tuple[str, ...]
+    unit: str  # of `by`
+    substitute: Substitute = field(compare=False, repr=False)
+    wanted: str = field(default="", compare=False)  # its unit in the job
+
+    @property
+    def text(self) -> str:
+        """How the value follows, for people."""
+        return f"by {self.by}"
+
+    def value(self, parameters: Mapping[str, Any]) -> float:
+        """Return the value [SI]."""
+        return self.substitute.value(parameters)
 
 
 @dataclass(frozen=True)
@@ -76,55 +131,6 @@ class Rule:
                 raise mismatch(self.where, "a finite value", f"{show(self.words)} ({error})") from None
             blamed, unit, wanted = self.source.names[0], self.source.unit, self.source.wanted
             raise mismatch(self.where, str(error), in_words(parameters[blamed], unit, wanted)) from None
-
-
-@dataclass(frozen=True)
-class Link:
-    """Values that follow those of an axis, or of a former axis, place by place."""
-
-    axis: str
-    at: tuple
-    values: tuple
-    unit: str  # of the axis
-    wanted: str = field(default="", compare=False)  # its unit in the job
-
-    @property
-    def names(self) -> tuple[str, ...]:
-        """The axis."""
-        return (self.axis,)
-
-    @property
-    def text(self) -> str:
-        """How the values follow, for people."""
-        return f"linked to {self.axis}"
-
-    def value(self, parameters: Mapping[str, Any]) -> Any:
-        """Return the value that belongs to the axis' value; ValueError if that one is not on the axis."""
-        place = parameters[self.axis]
-        if place not in self.at:
-            known = few_of([in_words(value, self.unit, self.wanted) for value in self.at], _MOST_NAMED)
-            raise ValueError(f"a value of {self.axis} that it is linked to ({known})")
-        return self.values[self.at.index(place)]
-
-
-@dataclass(frozen=True)
-class Substituted:
-    """A value that follows from a parameter given in its place."""
-
-    by: str
-    names: tuple[str, ...]
-    unit: str  # of `by`
-    substitute: Substitute = field(compare=False, repr=False)
-    wanted: str = field(default="", compare=False)  # its unit in the job
-
-    @property
-    def text(self) -> str:
-        """How the value follows, for people."""
-        return f"by {self.by}"
-
-    def value(self, parameters: Mapping[str, Any]) -> float:
-        """Return the value [SI]."""
-        return self.substitute.value(parameters)
 
 
 class Noted(Mapping[str, Any]):
@@ -190,3 +196,153 @@ def needed_rules(rules: Iterable[Rule], key: str) -> list[Rule]:
             kept.insert(0, rule)
             wanted |= set(rule.needs)
     return kept
+
+
+def read_derived(table: Mapping[str, Any], schema: Schema, source: str) -> list[Rule]:
+    """Return the rules of a job file's table [derived].
+
+    Raises
+    ------
+    InputError
+        If a key is unknown, no number, or has no legal formula.
+    """
+    rules = []
+    for name, raw in schema.flatten(table):
+        where = f"{source}: [derived] {name}"
+        key = schema.find(name, where)
+        parameter = schema.parameters[key]
+        if kind_of(parameter) not in (int, float):
+            raise mismatch(where, "a parameter that is a number", key)
+        formula = read_formula(raw, schema.parameters, where)
+        # a formula gives SI values: none is a number that may be meant in another unit
+        rules.append(Rule(key, formula, where, replace(parameter, sensible=None)))
+    return rules
+
+
+def read_linked(tables: Mapping[str, Any], axes: Iterable[Axis], schema: Schema, source: str) -> list[Rule]:
+    """Return the rules of a job file's tables [linked.AXIS].
+
+    Parameters
+    ----------
+    tables : mapping
+        By the name of an axis a table of keys, each with as many values as the axis has.
+    axes : iterable of Axis
+        The grid, as the file gives it.
+    schema : Schema
+        Parameters that may be linked.
+    source : str
+        The job file, for the error.
+
+    Raises
+    ------
+    InputError
+        If an axis or a key is unknown, or there are more or fewer values.
+    """
+    known = {axis.name: axis for axis in axes}
+    rules = []
+    for axis_name, table in tables.items():
+        where = f"{source}: [linked.{axis_name}]"
+        if not isinstance(table, Mapping):
+            raise mismatch(f"{source}: [linked] {axis_name}", f"a table [linked.{axis_name}]", show(table))
+        if axis_name not in known:
+            raise unknown(where, "axis", axis_name, known)
+        rules += [_read_link(name, raw, known[axis_name], schema, where) for name, raw in table.items()]
+    return rules
+
+
+def _read_link(name: str, raw: Any, axis: Axis, schema: Schema, where: str) -> Rule:
+    where = f"{where} {name}"
+    key = schema.find(name, where)
+    values = read_values(schema.parameters[key], raw, where)
+    if len(values) != len(axis.values):
+        raise mismatch(where, f"{len(axis.values)} values, one for each of {axis.name}", f"{len(values)}")
+    link = Link(axis.name, axis.values, values, axis.unit, schema.units.get(axis.name, ""))
+    return Rule(key, link, where, schema.parameters[key])
+
+
+def relinked(rules: Iterable[Rule], axes: Iterable[Axis]) -> list[Rule]:
+    """Return rules whose links follow the values that overrides have left of their axes.
+
+    Raises
+    ------
+    InputError
+        If an axis has a value for which a link has none.
+    """
+    left = {axis.name: axis.values for axis in axes}
+    found = []
+    for rule in rules:
+        if isinstance(link := rule.source, Link) and link.axis in left:
+            at = left[link.axis]
+            values = tuple(rule.value({link.axis: value}) for value in at)
+            rule = replace(rule, source=replace(link, at=at, values=values))
+        found.append(rule)
+    return found
+
+
+def overridden(keys: Collection[str], schema: Schema) -> set[str]:
+    """Return the keys that these keys disable: the parameters that they give, and their other sources."""
+    given = {gives.key for key in keys if (gives := schema.parameters[key].gives)}
+    return given | {key for key, p in schema.parameters.items() if p.gives and p.gives.key in keys}
+
+
+def ordered_rules(rules: Iterable[Rule], given: Collection[str], schema: Schema, source: str) -> list[Rule]:
+    """Return the rules of a job, substitutes included, in an order in which each finds its sources.
+
+    Parameters
+    ----------
+    rules : iterable of Rule
+        Of the tables [derived] and [linked].
+    given : collection of str
+        The keys that have a value of their own, or several on an axis; defaults excluded.
+    schema : Schema
+        Of the job.
+    source : str
+        The job file, for the error.
+
+    Raises
+    ------
+    InputError
+        If a parameter is given twice, or a rule needs one that has no value, or rules run in a circle.
+    """
+    found: dict[str, Rule] = {}
+    for rule in rules:
+        if rule.key in given or rule.key in found:
+            raise mismatch(rule.where, "one source of its values", f"a second one of {rule.key}")
+        found[rule.key] = rule
+    found |= _substituted({*given, *found}, schema, source)
+    giving = {rule.needs[0] for rule in found.values() if rule.is_substituted}
+    for rule in found.values():
+        _check_known(rule, {*given, *found, *giving}, schema)
+    # in the order of declaration where they are free of each other: a job's rules do not depend on its layout
+    needs = {key: found[key].needs for key in schema.parameters if key in found}
+    try:
+        order = TopologicalSorter(needs).static_order()
+        return [found[key] for key in order if key in found]
+    except CycleError as error:
+        circle = error.args[1]
+        rule = next(found[key] for key in circle if not isinstance(found[key].source, Substituted))
+        raise mismatch(rule.where, "formulas without a circle", " -> ".join(circle)) from None
+
+
+def _substituted(known: set[str], schema: Schema, source: str) -> dict[str, Rule]:
+    rules: dict[str, Rule] = {}
+    for key, parameter in schema.parameters.items():
+        substitute = parameter.gives
+        if substitute is None or (key not in known and parameter.default is None):
+            continue
+        target = substitute.key
+        is_taken = target in known or target in rules
+        where = f"{source}: [{schema.section_of[key]}] {key}"
+        if key in known and is_taken:
+            raise mismatch(where, f"either {key} or {target}", "both")
+        if not is_taken:
+            names = (key, *(need for need in substitute.needs if need in schema.parameters and need != key))
+            gives = Substituted(key, names, parameter.unit, substitute, schema.units.get(key, ""))
+            rules[target] = Rule(target, gives, where, schema.parameters[target])
+    return rules
+
+
+def _check_known(rule: Rule, known: set[str], schema: Schema) -> None:
+    for need in rule.needs:
+        if need not in known and schema.parameters[need].gives is not None:
+            raise mismatch(rule.where, "parameters that the job gives", f"{need}, which it does not")

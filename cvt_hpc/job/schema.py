@@ -1,7 +1,5 @@
 """The parameters that a job may set: tables of its model and its stepper, and tables of all transients."""
 
-from __future__ import annotations
-
 from collections.abc import Callable, Iterator, Mapping, Sequence
 from dataclasses import dataclass, field, replace
 from functools import cached_property, partial

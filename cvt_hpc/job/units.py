@@ -2,9 +2,9 @@
 
 It takes a second to load, which most jobs are spared: their texts have a prefix before the wanted unit, or
 are in rpm, degrees or per cent.
-"""
 
-from __future__ import annotations
+`read_duration` reads time spans of the command line: "2h30m", "90 min", "1 d 12 h", or a number of seconds.
+"""
 
 import math
 import re
@@ -12,6 +12,8 @@ from collections.abc import Mapping
 from decimal import Decimal
 from functools import lru_cache
 from typing import Any
+
+from cvt_hpc.errors import mismatch, show
 
 _QUANTITY = re.compile(
     r"\s*(?P<number>[+-]?(?:(?:\d+\.?\d*|\.\d+)(?:[eE][+-]?\d+)?|(?:inf|nan)(?![A-Za-z])))\s*(?P<unit>.*?)\s*"
@@ -33,6 +35,9 @@ _PLAIN = {
     ("deg", "rad"): lambda number: number * _PI / 180,
     ("%", ""): lambda number: number.scaleb(-2),
 }
+
+_PART = re.compile(r"\s*(\d+\.?\d*|\.\d+)\s*([A-Za-z]*)\s*")
+_EXPECTED = 'a time above 0, such as "2h30m", "90 min" or a bare number in s'
 
 
 class UnitError(ValueError):
@@ -212,3 +217,33 @@ def _registry() -> Any:
     # "120 Nm" is how everyone writes a torque; to pint Nm is a measure of yarn.
     registry.define("newton_metre = newton * metre = Nm")
     return registry
+
+
+def read_duration(text: str, where: str) -> float:
+    """Return a time span in seconds.
+
+    Unlike in a job file, where m is the metre, it is the minute here.
+
+    Parameters
+    ----------
+    text : str
+        Numbers with units, which are added; without a unit one number [s].
+    where : str
+        Its name in an error.
+
+    Raises
+    ------
+    InputError
+        If the text is not a time span, or none above 0.
+    """
+    parts = _PART.findall(text)
+    lonely = len(parts) == 1
+    if not parts or _PART.sub("", text) or any(not unit and not lonely for _, unit in parts):
+        raise mismatch(where, _EXPECTED, show(text))
+    try:
+        seconds = sum(to_si(f"{number} {'min' if unit == 'm' else unit}", "s") for number, unit in parts)
+    except UnitError:
+        raise mismatch(where, _EXPECTED, show(text)) from None
+    if seconds <= 0:
+        raise mismatch(where, _EXPECTED, show(text))
+    return seconds

@@ -1,18 +1,42 @@
-"""One value of a job file against the parameter that declares it: type, unit, bounds, choices."""
+"""One value of a job file against the parameter that declares it: type, unit, bounds, choices.
 
-from __future__ import annotations
+A number without a unit that is far from usual draws a warning: rpm where rad/s is read, millimetres for
+metres. Values of axes are shown in the unit in which the job gives them, by the attributes of a coordinate.
+"""
 
 import math
 import numbers
+import warnings
+from collections.abc import Iterator, Mapping
 from typing import Any
 
 import numpy as np
 
 from cvt_hpc.dataset_form import LARGEST
-from cvt_hpc.errors import InputError, did_you_mean, mismatch, show
-from cvt_hpc.job.plausibility import meant
-from cvt_hpc.job.units import UnitError, from_si, to_si, unit_in
+from cvt_hpc.errors import InputError, UnitWarning, did_you_mean, mismatch, show
+from cvt_hpc.job.units import UnitError, factor_to, from_si, to_si, unit_in
 from cvt_hpc.parameters import Parameter
+
+# Units in which people give a quantity, by the SI unit in which a bare number is read
+_CUSTOMARY = {
+    "Hz": ("kHz",),
+    "N": ("kN",),
+    "N m": ("kN m",),
+    "N m^2": ("N mm^2",),
+    "N/m": ("N/mm", "kN/m"),
+    "N/m^2": ("N/mm^2",),
+    "kg": ("g",),
+    "kg m^2": ("kg mm^2",),
+    "kg/m": ("g/m",),
+    "m": ("mm", "um"),
+    "m/s": ("mm/s",),
+    "rad": ("deg",),
+    "rad/s": ("rpm",),
+    "s": ("ms", "us"),
+}
+
+JOB_UNITS = "job_units"  # attribute of a coordinate, beside `units`
+POINT_UNITS = "point_units"  # attribute of a history: by key, beside the values `point`
 
 
 def read_value(parameter: Parameter, raw: Any, where: str) -> Any:
@@ -190,3 +214,115 @@ def _number_in_words(parameter: Parameter) -> str:
 
 def _with_unit(text: str, parameter: Parameter) -> str:
     return f"{text} in {parameter.unit}" if parameter.unit else text
+
+
+def angle_in_words(value: Any, unit: str) -> str:
+    """Return an angle or a speed of rotation [SI] as people give it, such as "11 deg"; "" of all else."""
+    wanted = {"rad": "deg", "rad/s": "rpm"}.get(unit, "")
+    return f"{from_si(value, unit, wanted):.6g} {wanted}" if wanted and value else ""
+
+
+def meant(raw: Any, parameter: Parameter) -> str:
+    """Return a number without a unit in the customary units in which it is sensible, such as '"11 deg"'.
+
+    Several are joined by "or"; "" where there is none, or the number has a unit.
+    """
+    if parameter.sensible is None or _bare(raw) is None:
+        return ""
+    low, high = parameter.sensible
+    texts = (f"{raw} {unit}" for unit in _CUSTOMARY.get(parameter.unit, ()))
+    return " or ".join(f'"{text}"' for text in texts if low <= abs(to_si(text, parameter.unit)) <= high)
+
+
+def warn_of_bare_numbers(parameter: Parameter, raw: Any, where: str) -> None:
+    """Warn of the first number without a unit that is outside the sensible range of a parameter.
+
+    Zero and infinity mean the same in any unit.
+
+    Parameters
+    ----------
+    parameter : Parameter
+        Declaration of the key.
+    raw : Any
+        The value, list, array or range found.
+    where : str
+        File and key.
+    """
+    if parameter.sensible is None:
+        return
+    low, high = parameter.sensible
+    for item in _items(raw):
+        value = _bare(item)
+        if value and math.isfinite(value) and not low <= abs(value) <= high:
+            unit = parameter.unit
+            other = meant(item, parameter)
+            text = (
+                f"{where}: {item} is read as {item} {unit}, far from the usual {low:g} to {high:g} {unit}; "
+            )
+            text += f"write {other} if that is meant, or " if other else "if that is meant write "
+            warnings.warn(f'{text}"{item} {unit}"', UnitWarning, stacklevel=2)
+            return
+
+
+def _items(raw: Any) -> Iterator[Any]:
+    """Yield the values of a list, an array or a range, at any depth."""
+    if isinstance(raw, Mapping):
+        raw = [raw.get("from"), raw.get("to")]
+    if isinstance(raw, np.ndarray):
+        raw = raw.tolist()
+    if isinstance(raw, (list, tuple)):
+        for item in raw:
+            yield from _items(item)
+    else:
+        yield raw
+
+
+def _bare(raw: Any) -> float | None:
+    """Return the value of a number without a unit, None for all else."""
+    if isinstance(raw, bool) or not isinstance(raw, (numbers.Real, str)) or unit_in(raw):
+        return None
+    try:
+        return to_si(raw, "") if isinstance(raw, str) else float(raw)
+    except (UnitError, OverflowError):
+        return None
+
+
+def si_unit(attributes: Mapping[str, Any]) -> str:
+    """Return the SI unit of a coordinate with these attributes; "" for texts and plain numbers."""
+    unit = str(attributes.get("units", ""))
+    return "" if unit == "1" else unit
+
+
+def shown_unit(attributes: Mapping[str, Any]) -> str:
+    """Return the unit in which a coordinate is shown: that of the job, else the SI unit."""
+    unit, wanted = si_unit(attributes), str(attributes.get(JOB_UNITS, ""))
+    # a dataset may be that of anybody
+    return wanted if wanted and (factor_to(unit, wanted) or 0.0) > 0.0 else unit
+
+
+def shown_number(value: Any, attributes: Mapping[str, Any]) -> Any:
+    """Return a value [SI] of a coordinate in its `shown_unit`; a text as it is."""
+    return from_si(value, si_unit(attributes), shown_unit(attributes)) if isinstance(value, float) else value
+
+
+def shown(value: Any, attributes: Mapping[str, Any]) -> str:
+    """Return a value [SI] of a coordinate with its `shown_unit`, such as "3000 rpm"."""
+    return in_words(value, si_unit(attributes), shown_unit(attributes))
+
+
+def number_within(value: float, closest: float, attributes: Mapping[str, Any]) -> str:
+    """Return `shown_number` of a value [SI] with as many decimals as show differences of `closest` [SI]."""
+    decimals = -math.floor(math.log10(shown_number(closest, attributes)) + 1e-9)
+    return f"{shown_number(value, attributes):.{max(decimals, 0)}f}"
+
+
+def shown_as_read(value: float, attributes: Mapping[str, Any]) -> str:
+    """Return the same for an error, with the value [SI], which may have been meant in another unit."""
+    in_si = in_words(value, si_unit(attributes))
+    return in_si if (text := shown(value, attributes)) == in_si else f"{text} ({in_si})"
+
+
+def heading(name: str, attributes: Mapping[str, Any]) -> str:
+    """Return the head of a table's column of `shown_number`, such as "driving_speed [rpm]"."""
+    unit = shown_unit(attributes)
+    return f"{name} [{unit}]" if unit else name

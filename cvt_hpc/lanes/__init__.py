@@ -14,7 +14,7 @@ A loop over lanes in plain arrays would be left to the compiler's vectoriser, wh
 rule out that two of many arrays overlap.
 """
 
-from cvt_hpc.lanes import arithmetic, blocks, places  # noqa: F401  they teach the compiler what + and [] mean
+from cvt_hpc.lanes import arithmetic, blocks  # noqa: F401  they teach the compiler what + and [] mean
 from cvt_hpc.lanes.functions import (
     absolute,
     anywhere,

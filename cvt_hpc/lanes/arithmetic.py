@@ -1,14 +1,17 @@
-"""Sums, products, comparisons and logic of lanes."""
+"""Sums, products, comparisons and logic of lanes.
 
-from __future__ import annotations
+Places of an array of lanes are read and written here as well.
+"""
 
 import operator
 
+from llvmlite import ir
 from numba import types
+from numba.core import cgutils
 from numba.core.typing.templates import AbstractTemplate, infer_global, signature
 from numba.extending import lower_builtin
 
-from cvt_hpc.lanes.kinds import Lanes, Mask, converted
+from cvt_hpc.lanes.kinds import ALIGNMENT, LaneArrayKind, Lanes, Mask, converted, vector_type
 
 
 def _common(a, b):
@@ -108,3 +111,79 @@ class _Inversion(AbstractTemplate):
 @lower_builtin(operator.invert, Mask)
 def _invert(context, builder, sig, arguments):
     return builder.not_(arguments[0])
+
+
+@infer_global(operator.getitem)
+class _Load(AbstractTemplate):
+    def generic(self, arguments, keywords):
+        array, index = arguments
+        if isinstance(array, LaneArrayKind):
+            place = types.intp if isinstance(index, types.Integer) else types.UniTuple(types.intp, 2)
+            return signature(array.element, array, place)
+
+
+@infer_global(operator.setitem)
+class _Store(AbstractTemplate):
+    def generic(self, arguments, keywords):
+        array, _, value = arguments
+        if isinstance(array, LaneArrayKind) and isinstance(value, Lanes | types.Number):
+            return signature(types.none, array, types.UniTuple(types.intp, 2), value)
+
+
+def _values(context, builder, kind, array):
+    """The array within a LaneArray."""
+    box = cgutils.create_struct_proxy(kind)(context, builder, value=array)
+    return cgutils.create_struct_proxy(kind.array)(context, builder, value=box.data)
+
+
+def place(context, builder, kind, array, row, field):
+    """Pointer to the lanes at a place."""
+    values = _values(context, builder, kind, array)
+    fields = cgutils.unpack_tuple(builder, values.shape)[1]
+    flat = builder.add(builder.mul(row, fields), field)
+    flat = builder.mul(flat, ir.Constant(flat.type, kind.count))
+    return builder.bitcast(builder.gep(values.data, [flat]), vector_type(kind.element).as_pointer())
+
+
+def _alignment(kind: LaneArrayKind) -> int:
+    return min(kind.dtype.bitwidth // 8 * kind.count, ALIGNMENT)
+
+
+def rows_of(context, builder, kind, array):
+    """Number of rows of a LaneArray or a plain array."""
+    plain = isinstance(kind, types.Array)
+    values = (
+        context.make_array(kind)(context, builder, array) if plain else _values(context, builder, kind, array)
+    )
+    return cgutils.unpack_tuple(builder, values.shape)[0]
+
+
+def load(context, builder, kind, array, row, field):
+    """A field of a row; of a plain array of one number a row, that number."""
+    if isinstance(kind, types.Array):
+        values = context.make_array(kind)(context, builder, array)
+        return builder.load(builder.gep(values.data, [row]))
+    return builder.load(place(context, builder, kind, array, row, field), align=_alignment(kind))
+
+
+@lower_builtin(operator.getitem, LaneArrayKind, types.UniTuple)
+def _load(context, builder, sig, arguments):
+    row, field = cgutils.unpack_tuple(builder, arguments[1])
+    return load(context, builder, sig.args[0], arguments[0], row, field)
+
+
+@lower_builtin(operator.getitem, LaneArrayKind, types.intp)
+def _load_first(context, builder, sig, arguments):
+    row = arguments[1]
+    return load(context, builder, sig.args[0], arguments[0], row, ir.Constant(row.type, 0))
+
+
+@lower_builtin(operator.setitem, LaneArrayKind, types.UniTuple, Lanes)
+@lower_builtin(operator.setitem, LaneArrayKind, types.UniTuple, types.Number)
+def _store(context, builder, sig, arguments):
+    kind = sig.args[0]
+    value = converted(context, builder, arguments[2], sig.args[2], kind.element)
+    row, field = cgutils.unpack_tuple(builder, arguments[1])
+    where = place(context, builder, kind, arguments[0], row, field)
+    builder.store(value, where, align=_alignment(kind))
+    return context.get_dummy_value()

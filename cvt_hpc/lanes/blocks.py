@@ -12,8 +12,6 @@ Factors P D Q = A are found without exchanges of rows; P and Q have a unit diago
 of A: P below the diagonal, 1 / D on it, and Q above.
 """
 
-from __future__ import annotations
-
 from typing import Any
 
 from llvmlite import ir
@@ -21,8 +19,8 @@ from numba import types
 from numba.core import cgutils
 from numba.extending import intrinsic
 
+from cvt_hpc.lanes.arithmetic import place
 from cvt_hpc.lanes.kinds import ALIGNMENT, Mask, vector_type
-from cvt_hpc.lanes.places import place
 
 _TILE = 16  # numbers in registers at a time: half of those that the processor has
 SMALLEST_PIVOT = 1e-13  # of the number on the diagonal as it was given: rounding leaves as much of nothing

@@ -1,7 +1,5 @@
 """Functions of lanes and of plain numbers: functions of the processor, and functions made of them."""
 
-from __future__ import annotations
-
 from math import factorial
 
 import numpy as np

@@ -1,21 +1,11 @@
 """The types of lanes, masks and arrays of lanes, as the compiler knows them."""
 
-from __future__ import annotations
-
 from typing import TYPE_CHECKING, Any
 
 import numpy as np
 from llvmlite import ir
-from numba import types
+from numba import extending, types
 from numba.core import cgutils
-from numba.extending import (
-    NativeValue,
-    make_attribute_wrapper,
-    models,
-    register_model,
-    typeof_impl,
-    unbox,
-)
 from numpy.typing import DTypeLike
 
 ALIGNMENT = 64  # bytes: the widest register, so that no access crosses a line of the cache
@@ -90,41 +80,41 @@ def vector_type(kind: Lanes) -> ir.VectorType:
     return ir.VectorType(ir.FloatType() if kind.dtype == types.float32 else ir.DoubleType(), kind.count)
 
 
-@register_model(Lanes)
-class _LanesModel(models.PrimitiveModel):
+@extending.register_model(Lanes)
+class _LanesModel(extending.models.PrimitiveModel):
     def __init__(self, manager, kind):
         super().__init__(manager, kind, vector_type(kind))
 
 
-@register_model(Mask)
-class _MaskModel(models.PrimitiveModel):
+@extending.register_model(Mask)
+class _MaskModel(extending.models.PrimitiveModel):
     def __init__(self, manager, kind):
         super().__init__(manager, kind, ir.VectorType(ir.IntType(1), kind.count))
 
 
-@register_model(LaneArrayKind)
-class _LaneArrayModel(models.StructModel):
+@extending.register_model(LaneArrayKind)
+class _LaneArrayModel(extending.models.StructModel):
     def __init__(self, manager, kind):
         super().__init__(manager, kind, [("data", kind.array)])
 
 
-@typeof_impl.register(LaneArray)
+@extending.typeof_impl.register(LaneArray)
 def _type_of_lane_array(value, context):
     dtype = types.float32 if value.data.dtype == np.float32 else types.float64
     return LaneArrayKind(dtype, value.data.shape[2], value.linked)
 
 
-make_attribute_wrapper(LaneArrayKind, "data", "data")
+extending.make_attribute_wrapper(LaneArrayKind, "data", "data")
 
 
-@unbox(LaneArrayKind)
+@extending.unbox(LaneArrayKind)
 def _unbox_lane_array(kind, value, context):
     data = context.pyapi.object_getattr_string(value, "data")
     native = context.unbox(kind.array, data)
     context.pyapi.decref(data)
     box = cgutils.create_struct_proxy(kind)(context.context, context.builder)
     box.data = native.value
-    return NativeValue(box._getvalue(), is_error=native.is_error)
+    return extending.NativeValue(box._getvalue(), is_error=native.is_error)
 
 
 def converted(context, builder, value, kind, wanted: Lanes):

@@ -7,15 +7,13 @@ behind the first row of a lane comes the last row of the lane before it. What is
 such as a pulley's speed, stands in all lanes alike; a sum over rows becomes the ring's by `around`.
 """
 
-from __future__ import annotations
-
 from llvmlite import ir
 from numba import types
 from numba.extending import intrinsic, overload, overload_attribute, register_jitable
 
+from cvt_hpc.lanes.arithmetic import load, place, rows_of
 from cvt_hpc.lanes.functions import anywhere, fma
 from cvt_hpc.lanes.kinds import LaneArray, LaneArrayKind, Mask, vector_type
-from cvt_hpc.lanes.places import load, place, rows_of
 
 
 def split(array: LaneArray, parts: int) -> LaneArray:

@@ -34,13 +34,12 @@ import numpy as np
 
 from cvt_hpc.errors import InputError
 from cvt_hpc.models import MODELS
-from cvt_hpc.parameters import Parameter
+from cvt_hpc.parameters import Parameter, Parameters
 from cvt_hpc.variables import Coordinate, Status, Variable
 
 if TYPE_CHECKING:
     import xarray as xr
 
-Parameters = Mapping[str, Any]  # flat, of one run [SI]
 Values = dict[str, Any]  # of a record, by the names of its variables
 Failure = tuple[Status, str]  # how a run ended before its time, and why; a result, if the status is done
 

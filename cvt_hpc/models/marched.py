@@ -3,11 +3,9 @@
 Such a run has no lanes: it is alone in its batch.
 """
 
-from __future__ import annotations
-
 from collections.abc import Callable, Mapping, Sequence
 from functools import partial
-from typing import Any, NamedTuple
+from typing import Any, NamedTuple, Self
 
 import numpy as np
 
@@ -63,7 +61,7 @@ class Marched:
         """Work done so far: steps, rejected, rates, jacobians, factorisations, solves."""
         return self.marching.counters()
 
-    def paused(self) -> Marched:
+    def paused(self) -> Self:
         """The state from which a batch of the same point over a longer time continues: the run itself."""
         return self
 

@@ -1,7 +1,5 @@
 """A run that a kernel of the model's own marches from sample to sample, and its record so far."""
 
-from __future__ import annotations
-
 from collections.abc import Mapping, Sequence
 from typing import Any
 

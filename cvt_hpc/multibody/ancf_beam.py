@@ -21,8 +21,6 @@ of less degree (Gerstmayr and Irschik 2008) smooths the forces, but not the spee
 friction acts; the README of the belt drive describes the consequences.
 """
 
-from __future__ import annotations
-
 from typing import NamedTuple
 
 import numpy as np

@@ -20,8 +20,6 @@ e = eps + (1 + eps) / (2 l0) int w'^2 ds. All integrals are those of polynomials
 mass matrix and forces are exact.
 """
 
-from __future__ import annotations
-
 import math
 from typing import NamedTuple
 

@@ -5,8 +5,6 @@ x, y, phi, a1, a2, x, y, phi, ... An element takes eight of them from its node o
 to blocks of 5 x 5. In a ring the last three are those of the first node, turned once around.
 """
 
-from __future__ import annotations
-
 import math
 from typing import NamedTuple
 
@@ -15,17 +13,10 @@ import numpy as np
 from cvt_hpc.kernels import kernel
 from cvt_hpc.lanes import LaneArray
 from cvt_hpc.multibody.rcm_beam import RcmBeam, equations_of_motion
-from cvt_hpc.solvers.cyclic_blocks import (
-    DIAGONAL,
-    LOWER,
-    UPPER,
-    block_size,
-    empty_blocks,
-    empty_columns,
-)
+from cvt_hpc.solvers import cyclic_blocks
 
 PER_ELEMENT, PER_NODE = 5, 3
-SIZE = block_size(PER_ELEMENT)
+SIZE = cyclic_blocks.block_size(PER_ELEMENT)
 
 
 class Chain(NamedTuple):
@@ -91,8 +82,8 @@ def chain_of(beam: RcmBeam, turn: float, nodes: np.ndarray, blocks: int) -> Chai
         turn,
         q,
         np.zeros_like(q),
-        empty_blocks(blocks, PER_ELEMENT),
-        empty_columns(blocks, PER_ELEMENT, 1),
+        cyclic_blocks.empty_blocks(blocks, PER_ELEMENT),
+        cyclic_blocks.empty_columns(blocks, PER_ELEMENT, 1),
         np.zeros((8, 8)),
         np.zeros(8),
     )
@@ -130,17 +121,19 @@ def assemble(chain: Chain, ahead: float, stiff: float, damp: float) -> None:
         for r in range(PER_ELEMENT):
             columns[i, r, 0] += force[r]
             for c in range(PER_ELEMENT):
-                blocks[i, DIAGONAL * PER_ELEMENT + r, c] += mass[r, c]
+                blocks[i, cyclic_blocks.DIAGONAL * PER_ELEMENT + r, c] += mass[r, c]
         for c in range(PER_NODE):
             columns[j, c, 0] += force[PER_ELEMENT + c]
             for r in range(PER_NODE):
-                blocks[j, DIAGONAL * PER_ELEMENT + r, c] += mass[PER_ELEMENT + r, PER_ELEMENT + c]
+                blocks[j, cyclic_blocks.DIAGONAL * PER_ELEMENT + r, c] += mass[
+                    PER_ELEMENT + r, PER_ELEMENT + c
+                ]
             for r in range(PER_ELEMENT):
-                blocks[i, UPPER * PER_ELEMENT + r, c] = mass[r, PER_ELEMENT + c]
-                blocks[j, LOWER * PER_ELEMENT + c, r] = mass[PER_ELEMENT + c, r]
+                blocks[i, cyclic_blocks.UPPER * PER_ELEMENT + r, c] = mass[r, PER_ELEMENT + c]
+                blocks[j, cyclic_blocks.LOWER * PER_ELEMENT + c, r] = mass[PER_ELEMENT + c, r]
     if chain.turn == 0.0:  # the last node of an open beam has no quarter points
         for c in range(PER_NODE, PER_ELEMENT):
-            blocks[nodes - 1, DIAGONAL * PER_ELEMENT + c, c] = 1.0
+            blocks[nodes - 1, cyclic_blocks.DIAGONAL * PER_ELEMENT + c, c] = 1.0
 
 
 @kernel
@@ -152,13 +145,15 @@ def add_product(chain: Chain, element: int, factor: float, left: np.ndarray, rig
         value = factor * left[r]
         for c in range(8):
             if r < PER_ELEMENT and c < PER_ELEMENT:
-                blocks[i, DIAGONAL * PER_ELEMENT + r, c] += value * right[c]
+                blocks[i, cyclic_blocks.DIAGONAL * PER_ELEMENT + r, c] += value * right[c]
             elif r < PER_ELEMENT:
-                blocks[i, UPPER * PER_ELEMENT + r, c - PER_ELEMENT] += value * right[c]
+                blocks[i, cyclic_blocks.UPPER * PER_ELEMENT + r, c - PER_ELEMENT] += value * right[c]
             elif c < PER_ELEMENT:
-                blocks[j, LOWER * PER_ELEMENT + r - PER_ELEMENT, c] += value * right[c]
+                blocks[j, cyclic_blocks.LOWER * PER_ELEMENT + r - PER_ELEMENT, c] += value * right[c]
             else:
-                blocks[j, DIAGONAL * PER_ELEMENT + r - PER_ELEMENT, c - PER_ELEMENT] += value * right[c]
+                blocks[j, cyclic_blocks.DIAGONAL * PER_ELEMENT + r - PER_ELEMENT, c - PER_ELEMENT] += (
+                    value * right[c]
+                )
 
 
 @kernel

@@ -10,8 +10,6 @@ which is an outer tangent for equal turns and an inner one for opposite turns. A
 runs onto the first circle, and offsets count to its right: outwards of a belt that runs counter-clockwise.
 """
 
-from __future__ import annotations
-
 from itertools import combinations
 from typing import NamedTuple
 

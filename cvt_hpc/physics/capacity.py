@@ -1,7 +1,5 @@
 """The torque that friction carries, by which loads of different ratios and thrusts are compared."""
 
-from __future__ import annotations
-
 import math
 from collections.abc import Mapping
 from typing import Any

@@ -28,8 +28,6 @@ strictly convex function; with any stations held open or closed they are unique,
 matrix for Murty's argument.
 """
 
-from __future__ import annotations
-
 from typing import Any
 
 from cvt_hpc.kernels import kernel

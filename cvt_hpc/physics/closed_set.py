@@ -9,8 +9,6 @@ Arrays of lanes or plain ones. `matrix` is (m, 2 m): I + K on the left, on the r
 triangle with reciprocals on its diagonal. Open stations have the rows and columns of the unit matrix in it.
 """
 
-from __future__ import annotations
-
 from typing import Any
 
 import numpy as np

@@ -1,7 +1,5 @@
 """Forces between an element's flanks and the sheaves at one station, of plain numbers and of lanes."""
 
-from __future__ import annotations
-
 from cvt_hpc.kernels import merged_kernel
 from cvt_hpc.lanes import fma, maximum, sqrt
 from cvt_hpc.physics.friction import saturation

@@ -28,8 +28,6 @@ A formula stands once, for lanes and for plain numbers. It takes coefficients th
 (`law_numbers`), which spares divisions. The two differ by the round-off of the exponential alone.
 """
 
-from __future__ import annotations
-
 from collections.abc import Callable, Mapping
 from typing import Any, NamedTuple
 

@@ -2,16 +2,31 @@
 
 A law is declared by an entry in `Law`; its formula, by which this file cannot be read without a compiler,
 goes into `friction`, whose import fails where one is missing.
-"""
 
-from __future__ import annotations
+`friction_file` reads a table of a coefficient for each pair of normal force and sliding speed.
+"""
 
 from collections.abc import Callable, Mapping
 from enum import IntEnum
 from functools import partial
-from typing import Any
+from typing import Any, Self
 
 import numpy as np
+
+from cvt_hpc.parameters import Column, FromFile, Parameter, Parameters, RowError
+
+KEYS = ("table_force", "table_speed", "table_mu")
+_OTHER_NAMES = {
+    "cof": "mu",
+    "coefficient_of_friction": "mu",
+    "friction_coefficient": "mu",
+    "\u03bc": "mu",
+    "normal_force": "force",
+    "velocity": "speed",
+    "sliding_speed": "speed",
+    "sliding_velocity": "speed",
+}
+_ANY_FORCE = (0.0, 1.0)  # knots of a table that does not depend on the force, which is held outside
 
 Problems = list[tuple[str, str, str]]  # of (key, expected, found)
 
@@ -20,17 +35,17 @@ TABLE_PARAMETERS = ("table_force", "table_speed", "table_mu")
 _ALL_PARAMETERS = (*FORMULA_PARAMETERS, "table_file", *TABLE_PARAMETERS)
 
 
-def _no_problems(p: Mapping[str, Any]) -> Problems:
+def _no_problems(p: Parameters) -> Problems:
     return []
 
 
-def _coulomb_problems(p: Mapping[str, Any]) -> Problems:
+def _coulomb_problems(p: Parameters) -> Problems:
     if p["friction_gradient"] == 0.0:
         return []
     return [("friction_gradient", "0 with friction_law coulomb", f"{p['friction_gradient']:g} s/m")]
 
 
-def _table_problems(p: Mapping[str, Any]) -> Problems:
+def _table_problems(p: Parameters) -> Problems:
     """Problems of a friction table; the first one only."""
     force, speed, mu = (p[key] for key in TABLE_PARAMETERS)
     for key, grid in (("table_force", force), ("table_speed", speed)):
@@ -45,15 +60,15 @@ def _table_problems(p: Mapping[str, Any]) -> Problems:
     return []
 
 
-def _kinetic(p: Mapping[str, Any]) -> float:
+def _kinetic(p: Parameters) -> float:
     return float(p["kinetic_friction"])
 
 
-def _fallen_from(p: Mapping[str, Any], share: float = 1.0) -> float:
+def _fallen_from(p: Parameters, share: float = 1.0) -> float:
     return float(p["kinetic_friction"] - share * p["friction_gradient"] * p["stribeck_velocity"])
 
 
-def _of_table(p: Mapping[str, Any]) -> float:
+def _of_table(p: Parameters) -> float:
     return float(np.max(p["table_mu"]))
 
 
@@ -71,16 +86,16 @@ class Law(IntEnum):
     """
 
     reads: tuple[str, ...]
-    problems: Callable[[Mapping[str, Any]], Problems]
-    largest: Callable[[Mapping[str, Any]], float]
+    problems: Callable[[Parameters], Problems]
+    largest: Callable[[Parameters], float]
 
     def __new__(
         cls,
         number: int,
         reads: tuple[str, ...],
-        problems: Callable[[Mapping[str, Any]], Problems] = _no_problems,
-        largest: Callable[[Mapping[str, Any]], float] = _fallen_from,
-    ) -> Law:
+        problems: Callable[[Parameters], Problems] = _no_problems,
+        largest: Callable[[Parameters], float] = _fallen_from,
+    ) -> Self:
         """Make the member of a number."""
         law = int.__new__(cls, number)
         law._value_, law.reads, law.problems, law.largest = number, reads, problems, largest
@@ -97,7 +112,7 @@ class Law(IntEnum):
 FRICTION_LAWS = tuple(law.name.lower() for law in Law)  # as a job names them
 
 
-def friction_problems(parameters: Mapping[str, Any]) -> Problems:
+def friction_problems(parameters: Parameters) -> Problems:
     """Problems of a friction law: (key, expected, found).
 
     Parameters
@@ -108,7 +123,7 @@ def friction_problems(parameters: Mapping[str, Any]) -> Problems:
     return _declared(parameters).problems(parameters)
 
 
-def friction_inert(parameters: Mapping[str, Any]) -> dict[str, str]:
+def friction_inert(parameters: Parameters) -> dict[str, str]:
     """Parameters of a friction law without effect, each with the setting that makes it so.
 
     Parameters
@@ -123,7 +138,7 @@ def friction_inert(parameters: Mapping[str, Any]) -> dict[str, str]:
     return inert
 
 
-def largest_friction(parameters: Mapping[str, Any]) -> float:
+def largest_friction(parameters: Parameters) -> float:
     """Largest coefficient of a friction law without problems, at any speed and force [1].
 
     Parameters
@@ -134,5 +149,79 @@ def largest_friction(parameters: Mapping[str, Any]) -> float:
     return _declared(parameters).largest(parameters)
 
 
-def _declared(parameters: Mapping[str, Any]) -> Law:
+def _declared(parameters: Parameters) -> Law:
     return Law[parameters["friction_law"].upper()]
+
+
+def friction_file(force_unit: str) -> Parameter:
+    """Return the parameter that names the file of a friction table.
+
+    Parameters
+    ----------
+    force_unit : str
+        Of the normal forces of the table [N/m, or N for a single contact]. Where it is N/m the file may have
+        the normal force of an element [N] instead, together with `element_pitch` [m]: the line force is the
+        former over the latter.
+    """
+    per_length = force_unit == "N/m"
+    columns = {"force": ("N/m", "N") if per_length else ("N",), "speed": ("m/s",), "mu": ("",)}
+    if per_length:
+        columns["element_pitch"] = ("m",)
+    told = f"{', '.join(KEYS)}; columns {', '.join(columns)}"
+    text = f"CSV or netCDF file of a friction table, in the place of {told}"
+    file = FromFile(columns, ("speed", "mu"), KEYS, partial(_arranged, force_unit), _OTHER_NAMES)
+    return Parameter("", "", text, file=file)
+
+
+def _arranged(force_unit: str, columns: Mapping[str, Column]) -> dict[str, Any]:
+    """Return knots and coefficients; the rows may come in any order."""
+    speeds, coefficients = columns["speed"].values, columns["mu"].values
+    if "force" not in columns:
+        _refuse_pitch(columns)
+        places = [(force, speed) for force in _ANY_FORCE for speed in speeds]
+        coefficients = coefficients * len(_ANY_FORCE)
+    else:
+        places = list(zip(_forces(force_unit, columns), speeds, strict=True))
+    found: dict[tuple[float, float], float] = {}
+    for row, (place, mu) in enumerate(zip(places, coefficients, strict=True)):
+        row %= len(speeds)
+        for what, value in zip(("force", "speed"), place, strict=True):
+            if value < 0.0:
+                raise RowError(row, f"a {what} of 0 or more (a magnitude)", f"{value:g}")
+        if mu <= 0.0:
+            raise RowError(row, "a coefficient of friction > 0", f"{mu:g}")
+        if place in found:
+            expected = "one coefficient for each force and speed, such as the mean of repeated measurements"
+            raise RowError(row, expected, "a second one for these")
+        found[place] = mu
+    forces, knots = (sorted({place[i] for place in found}) for i in (0, 1))
+    for force in forces:
+        for speed in knots:
+            if (force, speed) not in found:
+                missing = f"force {force:g} {force_unit} and speed {speed:g} m/s"
+                raise ValueError(f"expected a coefficient for each force and speed, found none for {missing}")
+    return {
+        "table_force": forces,
+        "table_speed": knots,
+        "table_mu": [[found[force, speed] for speed in knots] for force in forces],
+    }
+
+
+def _forces(force_unit: str, columns: Mapping[str, Column]) -> tuple[float, ...]:
+    """Return the normal forces of the rows [force_unit]."""
+    force = columns["force"]
+    if force.unit == force_unit:
+        _refuse_pitch(columns)
+        return force.values
+    if "element_pitch" not in columns:
+        raise ValueError("expected a column element_pitch [m] beside the force of an element, found none")
+    pitches = columns["element_pitch"].values
+    for row, pitch in enumerate(pitches):
+        if pitch <= 0.0:
+            raise RowError(row, "an element_pitch > 0 m", f"{pitch:g} m")
+    return tuple(one / pitch for one, pitch in zip(force.values, pitches, strict=True))
+
+
+def _refuse_pitch(columns: Mapping[str, Column]) -> None:
+    if "element_pitch" in columns:
+        raise ValueError("expected element_pitch only beside the force [N] of an element, found it alone")

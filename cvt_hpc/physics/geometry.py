@@ -1,13 +1,11 @@
 """Geometry of a two-pulley variator with a belt of constant length on its pitch line."""
 
-from __future__ import annotations
-
 import math
-from collections.abc import Mapping
 from dataclasses import dataclass
-from typing import Any
 
 import numpy as np
+
+from cvt_hpc.parameters import Parameters
 
 
 @dataclass(frozen=True)
@@ -169,7 +167,7 @@ def cut_path(path: Variator, cells: int, refinement: float = 1.0) -> tuple[np.nd
     return tuple(found)
 
 
-def variator_problems(parameters: Mapping[str, Any]) -> list[tuple[str, str, str]]:
+def variator_problems(parameters: Parameters) -> list[tuple[str, str, str]]:
     """Problems of a variator's geometry, in the form of a model's check: (key, expected, found).
 
     Parameters

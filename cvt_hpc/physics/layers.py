@@ -5,8 +5,6 @@ forces per length g_k = (T_k - m_k v^2) kappa press layer k inward. Layers are i
 not: layers that would leave the stack outward bear on the ears.
 """
 
-from __future__ import annotations
-
 import numpy as np
 
 from cvt_hpc.kernels import kernel, merged_kernel

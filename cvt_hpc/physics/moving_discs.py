@@ -1,7 +1,5 @@
 """The modes of `ritz.py` in lanes, as a step advances them."""
 
-from __future__ import annotations
-
 from typing import Any, NamedTuple
 
 import numpy as np

@@ -1,7 +1,5 @@
 """Where points lie along the path of a belt, and how far off: for kernels, and for arrays."""
 
-from __future__ import annotations
-
 from typing import NamedTuple
 
 import numpy as np

@@ -6,22 +6,19 @@ Timoshenko beam under tension does. It is taken at rest: a belt that runs at v h
 T in what does not move, and lower frequencies.
 """
 
-from __future__ import annotations
-
 import math
-from collections.abc import Mapping
-from typing import Any
 
 import numpy as np
 from scipy.optimize import brentq
 
+from cvt_hpc.parameters import Parameters
 from cvt_hpc.physics.geometry import driven_radius, variator
 
 # of a pulley the side of its loose sheave: right is where the belt is seen to run counter-clockwise
 SIDES = {"left": -1, "right": 1, "both": 0}
 
 
-def axial_offset(parameters: Mapping[str, Any], aligned_ratio: float) -> float:
+def axial_offset(parameters: Parameters, aligned_ratio: float) -> float:
     """Axial offset of the driven pulley's mid plane from the driving one's [m], towards the right.
 
     Of each pulley one sheave alone moves, on the side s_l (1: right), so that its mid plane goes along:

@@ -32,8 +32,6 @@ determinate shaft) the law is q = kappa s + c_q s / |s|, c_q = sum of |rho_b| c_
 that is a dead zone of the radius c_q in series with a spring.
 """
 
-from __future__ import annotations
-
 from collections.abc import Sequence
 from typing import NamedTuple
 

@@ -5,8 +5,6 @@ level halves the spacing and takes the splines that sit between those of the lev
 span the finer space.
 """
 
-from __future__ import annotations
-
 from typing import NamedTuple
 
 import numpy as np

@@ -1,7 +1,5 @@
 """What map.js draws the map of: axes, classes and quantities of a study as numbers."""
 
-from __future__ import annotations
-
 import json
 from base64 import b64encode
 from collections.abc import Iterator
@@ -17,12 +15,11 @@ from cvt_hpc.analysis.arrangement import arrange, ruler, value_text
 from cvt_hpc.analysis.classes import OccurrenceClass, map_classes, occurrence_classes
 from cvt_hpc.analysis.figures import axis_label, coordinate_unit, in_words
 from cvt_hpc.analysis.hysteresis_bands import ALONG, INK, lowest_onsets, of_each_start
+from cvt_hpc.analysis.maps import AXIS, has_starts, join_starts
 from cvt_hpc.analysis.scatter import is_sampled, sample_axes
-from cvt_hpc.analysis.starts import AXIS, has_starts, join_starts
 from cvt_hpc.errors import escaped
-from cvt_hpc.report.findings import is_judged
-from cvt_hpc.report.quantities import AMPLITUDE, Quantity, quantities
-from cvt_hpc.vibration.hysteresis import StartClass
+from cvt_hpc.report.findings import AMPLITUDE, Quantity, is_judged, quantities
+from cvt_hpc.vibration.classes import StartClass
 
 LARGEST = 3e38  # in 4 bytes
 KEPT = "\n\t\u00a0"  # characters on a page that do not print, and are no harm

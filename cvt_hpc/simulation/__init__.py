@@ -1,17 +1,18 @@
 """One run: a model marched by a stepper, or solved at once, judged, and turned into a record or a history."""
 
-from cvt_hpc.simulation.batches import (
+from cvt_hpc.simulation.record import (
+    declared_record,
     estimate_cost,
     forget,
     lane_groups,
     pilot_share,
     profile_bytes,
+    record_coordinates,
+    record_variables,
     run_costs,
     turns,
 )
-from cvt_hpc.simulation.history import alone, run_points_keeping, simulate
-from cvt_hpc.simulation.record import declared_record, record_coordinates, record_variables
-from cvt_hpc.simulation.running import Interrupted, run_point, run_points
+from cvt_hpc.simulation.running import Interrupted, alone, run_point, run_points, run_points_keeping, simulate
 
 __all__ = [
     "declared_record",

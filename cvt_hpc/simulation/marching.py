@@ -1,19 +1,145 @@
-"""Batches marched to their ends, and runs marched together until each has its record."""
+"""Batches marched to their ends, and runs marched together until each has its record.
 
-from __future__ import annotations
+`OpenRun` is a run on its way to its record, with its next transient and the cost of its earlier ones. Most
+runs are one transient. A run that fails by its numerics is done again from its start at half the step,
+`most_refinements` times at most. A run that is undecided is prolonged to twice its time, and again, as long
+as that is within `longest_duration`. A model that may answer by less than the full transient declares so in
+its record module (`contract.py`), and its answers of this kind are neither refined nor prolonged.
+"""
 
+import math
 import time
 from collections.abc import Callable, Collection, Sequence
-from typing import TYPE_CHECKING, Any
+from typing import Any
 
+from cvt_hpc.job import Job
 from cvt_hpc.models.contract import Batch, load_model
-from cvt_hpc.simulation.batches import in_lanes
-from cvt_hpc.simulation.open_run import OpenRun
+from cvt_hpc.recording import longest_duration, sample_count
+from cvt_hpc.simulation.record import in_lanes, record_of, record_without_run
+from cvt_hpc.variables import LONGEST_REASON, Status, Vibrates, shortened
+from cvt_hpc.vibration.ramped import ramped
 
-if TYPE_CHECKING:
-    from cvt_hpc.job import Job
+_COST = ("core_seconds", "steps", "contact_solves")  # of a record: sums over all tries
 
 _BETWEEN_POLLS = 0.05  # [s] of computing between checks whether to stop
+
+
+class OpenRun:
+    """A run from its point to its record.
+
+    Parameters
+    ----------
+    job : Job
+        For its model.
+    point : dict
+        Flat parameters of the run [SI].
+    is_kept : bool
+        Whether `run` is to be there in the end.
+
+    Attributes
+    ----------
+    next : dict
+        Flat parameters of the transient that comes next [SI].
+    paused : object or None
+        The shorter run from which the next transient continues, by its `paused`; None: it begins anew.
+    record : dict or None
+        Value of each of `record_variables`; None until they are known.
+    run : object or None
+        The transient that counts, where it is kept and there is one.
+    """
+
+    def __init__(self, job: Job, point: dict[str, Any], is_kept: bool = False) -> None:
+        if not is_kept and point.get("profile_duration"):
+            point = point | {"profile_duration": 0.0}  # only histories have profiles over time
+        self._job, self._point, self._model = job, point, load_model(job.model)
+        self._is_kept = is_kept
+        self.next, self.paused = point, None
+        self.record: dict[str, Any] | None = None
+        self.run: Any = None
+        self._refinements = 0
+        self._spent = dict.fromkeys(_COST, 0)
+        self._is_preliminary = False
+        self._begin_cheaply()
+
+    def _begin_cheaply(self) -> None:
+        values = self._model.known(self._point)
+        if values is not None:
+            self.record = record_without_run(self._job, values)
+            return
+        preliminary = self._model.preliminary(self._point)
+        if preliminary is not None:
+            self.next, self._is_preliminary = preliminary, True
+
+    def take(self, run: Any, seconds: float) -> None:
+        """Look at a transient that has ended, and decide whether it counts or which one comes next.
+
+        Parameters
+        ----------
+        run : object
+            As the model's batch has it.
+        seconds : float
+            Processor time that it has taken [s].
+        """
+        judge = self._model.settle if self._is_preliminary else self._model.judge
+        record = record_of(self._job, run, seconds, judge)
+        record |= {name: record[name] + self._spent[name] for name in _COST}
+        if self._is_preliminary and record["status"] != Status.DONE:
+            self._is_preliminary = False
+            self._begin(self._point, record)
+        elif self._is_preliminary:
+            self._end(run, record)
+        elif record["status"] == Status.FAILED_NUMERICS and (finer := self._finer(run)):
+            self._refinements += 1
+            self._begin(finer, record)
+        elif _is_undecided(record) and (longer := self._longer(run)):
+            self._spent["core_seconds"] = record["core_seconds"]  # steps and solves are counted on
+            self.next, self.paused = longer, run.paused()
+        else:
+            self._end(run, record)
+
+    def _begin(self, parameters: dict[str, Any], record: dict[str, Any]) -> None:
+        self._spent = {name: record[name] for name in _COST}
+        self.next, self.paused = parameters, None
+
+    def _end(self, run: Any, record: dict[str, Any]) -> None:
+        self.run, self.paused = run if self._is_kept else None, None
+        self.record = record | {"refinements": self._refinements}
+        if self._refinements and record["status"] == Status.FAILED_NUMERICS:
+            remedy = f"; failed at {1 + self._refinements} steps down to {record['time_step']:.3g} s"
+            remedy += _remedy(self._job, self._point)
+            self.record["reason"] = shortened(record["reason"], LONGEST_REASON - len(remedy)) + remedy
+
+    def _finer(self, run: Any) -> dict[str, Any] | None:
+        """The point at half the step of a run; None where it has no step, or has been refined enough."""
+        if "step" not in self._point or self._refinements >= run.parameters["most_refinements"]:
+            return None
+        steps = max(math.ceil(run.interval / run.parameters["step"] - 1e-9), 1)
+        return self._point | {"step": run.interval / (2 * steps)}
+
+    def _longer(self, run: Any) -> dict[str, Any] | None:
+        """The parameters of a run over twice its time; None where that is too long, or a ramp would end.
+
+        The judged part keeps its share, but begins no sooner than the run was prolonged: sums over
+        the judged part is not known of less than that.
+        """
+        p = run.parameters
+        duration = 2 * sample_count(p) / p["sampling_rate"]
+        is_too_long = duration > longest_duration(self._point) * (1.0 + 1e-9)
+        if is_too_long or ramped(p):
+            return None
+        return p | {"duration": duration, "judged_fraction": min(p["judged_fraction"], 0.5)}
+
+
+def _is_undecided(record: dict[str, Any]) -> bool:
+    return record["status"] == Status.DONE and record["vibrates"] == Vibrates.UNDECIDED
+
+
+def _remedy(job: Job, point: dict[str, Any]) -> str:
+    """Advice for a run that fails at every step, in words."""
+    others = load_model(job.model).steppers
+    ways = ['stepper = "explicit"'] if job.stepper == "imex" and "explicit" in others else []
+    ways += ["a finer or coarser mesh (stations)"] if "stations" in point else []
+    return f": try {' or '.join(ways)}" if ways else ""
 
 
 class Interrupted(Exception):

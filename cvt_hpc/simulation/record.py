@@ -1,18 +1,22 @@
-"""The record of a run: its content, and how it is made of a run that has ended."""
+"""The record of a run: its content, and how it is made of a run that has ended.
 
-from __future__ import annotations
+Batches are groups of runs that can advance together; their cost is here as well.
+"""
 
 import time
-from collections.abc import Callable
-from typing import TYPE_CHECKING, Any
+from collections.abc import Callable, Iterable, Iterator, Mapping, Sequence
+from functools import partial
+from itertools import pairwise
+from typing import Any, TypeVar
 
 import numpy as np
 
-from cvt_hpc.models.contract import Model, Run, load_model
+from cvt_hpc.job import Job
+from cvt_hpc.job.definition import Derived
+from cvt_hpc.job.rules import Noted, places, varied_by
+from cvt_hpc.models.contract import Model, Parameters, Run, load_model
+from cvt_hpc.recording import longest_duration
 from cvt_hpc.variables import LONGEST_REASON, Coordinate, Status, Variable, Vibrates, shortened
-
-if TYPE_CHECKING:
-    from cvt_hpc.job import Job
 
 _VERDICT = (
     Variable("status", "", "how the run ended", dtype="i1", flags=Status),
@@ -47,6 +51,13 @@ _MARCH = (
     Variable("contact_solves", "1", "linear solves of the contact problem, all tries", dtype="i8"),
 )
 COMMON = (*_VERDICT, *_COST, *_MARCH)  # of all models; those without a march have none of its
+
+LEFT_SHARE = 1.0  # extra cost of refined and prolonged runs in a map, as measured by lebrecht_2004.toml
+_MOST_ESTIMATED = 2_000  # runs whose costs are averaged
+BATCH_SECONDS = 30.0  # of computing in a batch, as predicted: so much a process that dies may lose
+Item = TypeVar("Item")
+
+MOST_TURNS = 16  # groups of lanes in a batch: with more, those of the runs left would be hardly fuller
 
 
 def recorded_model(job: Job) -> Model:
@@ -180,3 +191,181 @@ def _blank(job: Job) -> dict[str, Any]:
         else np.full(tuple(sizes[dim] for dim in v.dims), v.blank, v.dtype)
         for v in record_variables(job)
     }
+
+
+def run_costs(job: Job) -> np.ndarray:
+    """Core-seconds of each run: within a factor of two on processors of the last years.
+
+    Parameters
+    ----------
+    job : Job
+        A validated job.
+
+    Returns
+    -------
+    (runs,) array
+        In the order of run indices.
+    """
+    values = [np.asarray(axis.values) for axis in job.axes]
+    grids = values if job.is_sampled else np.meshgrid(*values, indexing="ij", sparse=True)
+    p = Noted(
+        {**job.parameters, **dict(zip((axis.name for axis in job.axes), grids, strict=True))},
+        {derived.name: partial(_over_the_grid, job, derived) for derived in job.derived},
+    )
+    model = recorded_model(job)
+    cost = model.cost(p, job.stepper) / model.lanes(job.parameters, job.stepper)
+    return np.broadcast_to(cost * _allowance(p), job.shape).ravel()
+
+
+def _allowance(p: Mapping[str, Any]) -> Any:
+    """Cost of a run over that of its first transient, mean of a map: a number or an array of them."""
+    if "longest_duration" not in p:
+        return 1.0
+    goes_on = longest_duration(p) > p["duration"]
+    return 1.0 + LEFT_SHARE * (goes_on | (p["most_refinements"] > 0))
+
+
+def _over_the_grid(job: Job, derived: Derived) -> np.ndarray:
+    """Values of a parameter that follows from axes, of a shape that broadcasts with that of the job."""
+    values = np.asarray(derived.values)
+    if job.is_sampled:
+        return values
+    return values.reshape([len(axis.values) if axis.name in derived.axes else 1 for axis in job.axes])
+
+
+def estimate_cost(job: Job) -> float:
+    """Core-seconds of a run, mean over the job; of a huge one, over runs from all over it.
+
+    Not known (nan) of a model that no study runs.
+
+    Parameters
+    ----------
+    job : Job
+        A validated job.
+    """
+    if not load_model(job.model).is_recorded:
+        return float("nan")
+    return float(run_costs(job.thinned(_MOST_ESTIMATED)).mean())
+
+
+def lane_groups(job: Job, indices: Sequence[int]) -> list[tuple[int, ...]]:
+    """Split runs into batches, in which lanes can be filled again with the runs that are left.
+
+    Parameters
+    ----------
+    job : Job
+        A validated job. Its model gives by `lanes` how many runs a stepper takes at once, and by `lane_key`
+        of a run's parameters which ones: runs with equal keys.
+    indices : sequence of int
+        Run indices.
+
+    Returns
+    -------
+    list of tuple of int
+        Each index once, in as few batches as can be, of nearly equal size.
+    """
+    runs = np.asarray(indices, np.int64)
+    kinds = _lane_kinds(job)[runs]
+    order = np.argsort(kinds, kind="stable")
+    ends = np.flatnonzero(np.diff(kinds[order])) + 1
+    batches = []
+    for group in sorted(np.split(runs[order], ends), key=lambda group: group[:1].tolist()):
+        if group.size:
+            parts = -(-group.size // _batch_size(job, job.point(int(group[0]))))
+            bounds = [group.size * part // parts for part in range(parts + 1)]
+            batches += [tuple(group[first:last].tolist()) for first, last in pairwise(bounds)]
+    return batches
+
+
+def _lane_kinds(job: Job) -> np.ndarray:
+    """Number of the lane key of each run, shape (runs,).
+
+    A key follows from the parameters that are read for it. It is therefore evaluated at all places along the
+    axes with which these vary, and along no other axis.
+    """
+    names, model = [axis.name for axis in job.axes], load_model(job.model)
+    varied = varied_by(job.rules, names)
+    first = {axis.name: axis.values[0] for axis in job.axes}
+    along: set[str] = set()
+    while True:
+        kinds: dict[tuple, int] = {}
+        numbers, read = [], set()
+        for place in places(job.axes, along, sampled=job.is_sampled and bool(along)):
+            point = Noted(job.complete({**first, **place}))
+            numbers.append(kinds.setdefault(model.lane_key(point), len(kinds)))
+            read |= point.read
+        asked = {axis for key in read for axis in varied.get(key, (key,)) if axis in first}
+        if asked <= along:
+            break
+        along |= asked
+    if job.is_sampled:
+        return np.broadcast_to(np.array(numbers, np.int32), job.shape)
+    lengths = [len(axis.values) if axis.name in along else 1 for axis in job.axes]
+    return np.broadcast_to(np.array(numbers, np.int32).reshape(lengths), job.shape).ravel()
+
+
+def in_lanes(
+    model: Model,
+    stepper: str | None,
+    runs: Iterable[Item],
+    parameters: Callable[[Item], Parameters],
+    apart: Callable[[Item], Any],
+) -> Iterator[list[Item]]:
+    """Yield groups of runs that can advance together, as many as there are lanes.
+
+    Parameters
+    ----------
+    model, stepper
+        Of the runs.
+    runs : iterable of object
+        Anything that stands for a run.
+    parameters : callable
+        Flat parameters of such a run [SI].
+    apart : callable
+        Further values that the runs of a group have in common.
+    """
+    groups: dict[Any, list[Item]] = {}
+    for run in runs:
+        groups.setdefault((model.lane_key(parameters(run)), apart(run)), []).append(run)
+    for group in groups.values():
+        most = model.lanes(parameters(group[0]), stepper)
+        for first in range(0, len(group), most):
+            yield group[first : first + most]
+
+
+def _batch_size(job: Job, parameters: dict[str, Any]) -> int:
+    """Most runs of a batch: several times the lanes, unless a process that dies would lose too much."""
+    model = load_model(job.model)
+    most = model.lanes(parameters, job.stepper)
+    if most == 1:
+        return 1
+    return most * int(np.clip(BATCH_SECONDS / model.cost(parameters, job.stepper), 1, MOST_TURNS))
+
+
+def turns(job: Job, runs: int) -> int:
+    """Number of groups of lanes that a batch does one after the other, including runs that are left apart.
+
+    Parameters
+    ----------
+    job : Job
+        A validated job.
+    runs : int
+        Runs of the batch.
+    """
+    return -(-runs // load_model(job.model).lanes(job.parameters, job.stepper))
+
+
+def forget(job: Job) -> None:
+    """Have the next batch take its full time, whatever runs of the job's model before it have left."""
+    load_model(job.model).forget()
+
+
+def profile_bytes(job: Job) -> int:
+    """Size of a kept history's values along the belt at each sample, of a job, at most [byte]."""
+    model = load_model(job.model)
+    return max((model.profile_bytes(job.point(index)) for index in job.histories), default=0)
+
+
+def pilot_share(job: Job) -> float:
+    """Share of a run's simulated time from which the cost of the whole run is estimated."""
+    return load_model(job.model).pilot_share

@@ -1,16 +1,30 @@
-"""Runs from their start to their records."""
+"""Runs from their start to their records.
+
+Histories of runs are datasets.
+"""
 
 from __future__ import annotations
 
+import json
 import time
 from collections.abc import Callable, Collection, Sequence
-from typing import TYPE_CHECKING, Any
+from typing import TYPE_CHECKING, Any, NamedTuple
 
-from cvt_hpc.models.contract import Model
+import numpy as np
+
+from cvt_hpc.job import Job
+from cvt_hpc.job.assignments import Assignments, read_assignments, warn_of_bare_assignments
+from cvt_hpc.job.summary import warn_of_notices
+from cvt_hpc.job.values import POINT_UNITS
+from cvt_hpc.models.contract import Model, load_model
+from cvt_hpc.netcdf import attributes, global_attributes, variable_attributes
 from cvt_hpc.simulation.marching import Interrupted, march_runs
-from cvt_hpc.simulation.record import record_of_solution, recorded_model
+from cvt_hpc.simulation.record import record_coordinates, record_of_solution, record_variables, recorded_model
+from cvt_hpc.variables import Outcome
 
 if TYPE_CHECKING:
+    import xarray as xr
+
     from cvt_hpc.job import Job
 
 
@@ -88,3 +102,130 @@ def _solve(
     started = time.process_time()
     solution = model.solve(point)
     return solution, record_of_solution(job, solution, time.process_time() - started)
+
+
+def simulate(job: Job, at: Assignments | None = None) -> xr.Dataset:
+    """Do one run and keep its history.
+
+    Where `lanes` is not given, its stations fill the lanes of the registers: it is done sooner than in a
+    sweep, and its numbers are equal to the sweep's run but for round-off.
+
+    Parameters
+    ----------
+    job : Job
+        A validated job.
+    at : mapping, or sequence of "KEY=VALUE", optional
+        Values [SI, or texts with units] by key where the run departs from the base scene.
+
+    Returns
+    -------
+    Dataset
+        The record's names as scalars of the run, and the model's further data: of a transient
+        `displacement` (time, probe), histories over `time`, and means over the judged part by `position`.
+
+    Raises
+    ------
+    InputError
+        If a value is not fit for its key.
+    """
+    return alone(job, at).history()
+
+
+class Alone(NamedTuple):
+    """A single run that has ended.
+
+    Attributes
+    ----------
+    job, point
+        Its job and parameters [SI].
+    run
+        What its histories are made of.
+    record : dict
+        Value of each of `record_variables`.
+    """
+
+    job: Job
+    point: dict[str, Any]
+    run: Any
+    record: dict[str, Any]
+
+    def outcomes(self) -> list[Outcome]:
+        """Return what its record has without a dimension or along one."""
+        places = record_coordinates(self.job)
+        return [
+            Outcome(
+                one.name,
+                np.asarray(self.record[one.name]),
+                one.dims,
+                variable_attributes(one),
+                places[one.dims[0]].values if one.dims else (),
+            )
+            for one in record_variables(self.job)
+            if len(one.dims) <= 1
+        ]
+
+    def history(self) -> xr.Dataset:
+        """Return the dataset of `simulate`."""
+        return _history(*self)
+
+
+def alone(job: Job, at: Assignments | None = None) -> Alone:
+    """Do one run as `simulate`, without a dataset."""
+    given, schema = at or {}, job.schema
+    job = job.with_units_of(given, "at")
+    at = read_assignments(given, schema, job.source, "at")
+    warn_of_bare_assignments(given, schema, job.source, "at")
+    point = job.point_at(at)
+    warn_of_notices(job, {key: (value,) for key, value in at.items()})
+    if "lanes" in point and "lanes" not in {*at, *job.given, *(axis.name for axis in job.axes)}:
+        point["lanes"] = "stations"
+    ((run, record),) = do(job, [point], lambda: None, kept=(0,))
+    return Alone(job, point, run, record)
+
+
+def run_points_keeping(
+    job: Job, points: Sequence[dict[str, Any]], interrupt: Callable[[], str | None], kept: Collection[int]
+) -> tuple[list[dict[str, Any]], dict[int, xr.Dataset]]:
+    """Do as `run_points`, and return the histories of the runs at some places of `points` as well.
+
+    Parameters
+    ----------
+    job, points, interrupt
+        As `run_points` takes them.
+    kept : collection of int
+        Places in `points`.
+
+    Returns
+    -------
+    records : list of dict
+        As of `run_points`.
+    histories : dict
+        Datasets as `simulate` returns them, by place.
+    """
+    done = do(job, points, interrupt, kept)
+    histories = {place: _history(job, points[place], *done[place]) for place in kept}
+    return [record for _, record in done], histories
+
+
+def _history(job: Job, point: dict[str, Any], run: Any, record: dict[str, Any]) -> xr.Dataset:
+    """A run that has ended, or a result without a run, as a dataset."""
+    import xarray as xr
+
+    coordinates = {
+        name: (name, c.values, attributes(c.long_name, c.units, c.comment))
+        for name, c in record_coordinates(job).items()
+    }
+    variables: dict[str, Any] = {}
+    for variable in record_variables(job):
+        value = record[variable.name]
+        value = value if variable.dtype.startswith("S") else np.asarray(value, variable.dtype)
+        variables[variable.name] = (variable.dims, value, variable_attributes(variable))
+    told: dict[str, Any] = {
+        **global_attributes(job, job.resolved(), f"model {job.model}"),
+        "point": json.dumps({key: repr(value) if value == np.inf else value for key, value in point.items()}),
+        POINT_UNITS: json.dumps(dict(job.units)),
+    }
+    if job.stepper is not None and run is not None:
+        told["judged_fraction"] = run.parameters["judged_fraction"]  # less than requested if prolonged
+    dataset = xr.Dataset(variables, coordinates, told)
+    return dataset.merge(load_model(job.model).histories(run), combine_attrs="override")

@@ -13,8 +13,6 @@ right-hand side for each of its columns, and the Schur complement D - C M^-1 B.
 Rows of blocks and rows of right-hand sides lie in lanes, which makes products of blocks vector instructions.
 """
 
-from __future__ import annotations
-
 import numpy as np
 
 from cvt_hpc.kernels import kernel, merged_kernel

@@ -9,8 +9,6 @@ from which y+ = y + (y_f - y) / alpha_f and y'+ = y' + (y'_m - y') / alpha_m. Ap
 to speeds of a mechanical system it does not overshoot (Kadapa, Dettmer and Peric 2017).
 """
 
-from __future__ import annotations
-
 from typing import NamedTuple
 
 import numpy as np

@@ -24,9 +24,11 @@ of W nodes far apart, which is as kernels of a chain compute them.
 
 A row of blocks holds [A | U | S | f], all by columns: b^2 numbers each of A, U and S, which only the solver
 uses, and b for each right-hand side (`field_of_right`).
+
+`solve_small` solves a dense system of a few equations, as the border of a chain has them.
 """
 
-from __future__ import annotations
+import numpy as np
 
 from cvt_hpc.kernels import kernel
 from cvt_hpc.lanes import LaneArray, anywhere, behind, from_ahead, from_behind
@@ -224,3 +226,24 @@ def _keep_diagonal(blocks, j, scratch, size):
 def _factor(blocks, j, scratch, size):
     """Replace A of a row by its factors; whether this could be done in all lanes."""
     return not anywhere(~factor(size, blocks, j, 0, scratch, _AHEAD, 0))
+
+
+@kernel
+def solve_small(system: np.ndarray) -> None:
+    """Solve the equations [A | f] in place, by elimination without pivoting.
+
+    Parameters
+    ----------
+    system : (size, size + 1) array
+        A, which has to be nearly symmetric and positive, and f; afterwards the solution is its last column.
+    """
+    size = system.shape[0]
+    for p in range(size):
+        per_pivot = 1.0 / system[p, p]
+        for c in range(p, size + 1):
+            system[p, c] *= per_pivot
+        for r in range(size):
+            if r != p:
+                factor = system[r, p]
+                for c in range(p, size + 1):
+                    system[r, c] -= factor * system[p, c]

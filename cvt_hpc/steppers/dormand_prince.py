@@ -8,28 +8,16 @@ make it take more steps than the tolerance needs. It is not for stiff friction: 
 the width of smoothed friction; with coarser tolerances it leaps over rest.
 """
 
-from __future__ import annotations
-
 from typing import NamedTuple
 
 import numpy as np
 
 from cvt_hpc.kernels import kernel
-from cvt_hpc.steppers.facts import (
-    NO_VALUE,
-    NOT_FINITE,
-    OK,
-    RATES,
-    REJECTED,
-    STEP_TOO_SMALL,
-    STEPS,
-    TOO_MANY_STEPS,
-    Facts,
-)
+from cvt_hpc.steppers import facts
 from cvt_hpc.steppers.settings import MOST_STEPS, TOLERANCE, Tolerance, tolerance
 from cvt_hpc.steppers.system import System, all_finite, size
 
-FACTS = Facts(
+FACTS = facts.Facts(
     order=5,
     adaptive=True,
     width_limit=0.1,
@@ -83,7 +71,7 @@ def _stages(system: System, t: float, step: float, y: np.ndarray, work: Work, co
             for r in range(s):
                 total += WEIGHTS[s, r] * work.rates[r, i]
             work.stage[i] = y[i] + step * total
-        counts[RATES] += 1
+        counts[facts.RATES] += 1
         if not system.rates(system.constants, t + NODES[s] * step, work.stage, work.rates[s]):
             return False
     return True
@@ -117,15 +105,15 @@ def _sample(
         left = end - clock[0]
         step = min(work.memory[0], left)
         if step < LEAST_STEP * abs(end):
-            return STEP_TOO_SMALL
+            return facts.STEP_TOO_SMALL
         known = _stages(system, clock[0], step, y, work, counts)
         error = _error(system, step, control.tolerance, y, work) if known else np.inf
         if not error <= 1.0:  # written so that an error that is not a number is refused too
-            counts[REJECTED] += 1
+            counts[facts.REJECTED] += 1
             factor = SAFETY * error**-INTEGRAL if np.isfinite(error) else LEAST_FACTOR
             work.memory[0] = step * max(factor, LEAST_FACTOR)
             continue
-        counts[STEPS] += 1
+        counts[facts.STEPS] += 1
         error = max(error, 1e-10)
         factor = SAFETY * error**-INTEGRAL * work.memory[1] ** PROPORTIONAL
         # a step that was cut at the end is no reason against a longer one
@@ -136,9 +124,9 @@ def _sample(
         work.rates[0] = work.rates[STAGES - 1]
         if step == left:
             clock[0] = end
-            return OK
+            return facts.OK
         clock[0] += step
-    return TOO_MANY_STEPS
+    return facts.TOO_MANY_STEPS
 
 
 @kernel
@@ -155,15 +143,15 @@ def march(
     """March; see `cvt_hpc.steppers`."""
     for k in range(rows.shape[0]):
         # anew for each sample: the state may have been changed from outside
-        counts[RATES] += 1
+        counts[facts.RATES] += 1
         if not system.rates(system.constants, clock[0], y, work.rates[0]):
-            return NO_VALUE
+            return facts.NO_VALUE
         if not all_finite(work.rates[0]):
-            return NOT_FINITE
+            return facts.NOT_FINITE
         if work.memory[0] <= 0.0:
             work.memory[0] = min(0.01 / (size(work.rates[0], system.scale) + 1e-300), interval)
         outcome = _sample(system, control, clock[0] + interval, clock, y, work, counts)
-        if outcome != OK:
+        if outcome != facts.OK:
             return outcome
         rows[k] = y
-    return OK
+    return facts.OK

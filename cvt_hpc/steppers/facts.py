@@ -1,7 +1,5 @@
 """Properties of a method of time integration, and the ways in which a march with it can end."""
 
-from __future__ import annotations
-
 from dataclasses import dataclass
 from enum import IntEnum
 from math import inf

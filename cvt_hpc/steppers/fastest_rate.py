@@ -4,8 +4,6 @@ Beyond its limit an explicit step need not diverge. Where friction saturates it 
 instead, and slow motions are wrong by no visible cause: so the limit is looked at, and not the result.
 """
 
-from __future__ import annotations
-
 import numpy as np
 
 from cvt_hpc.kernels import kernel

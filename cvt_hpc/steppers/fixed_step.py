@@ -1,7 +1,5 @@
 """The march of every method with a fixed step: so many equal steps in each sampling interval."""
 
-from __future__ import annotations
-
 from typing import Any
 
 import numpy as np

@@ -10,8 +10,6 @@ in that displacements and velocities are treated alike, which spares it the over
 Dettmer and Peric 2017). The rates are carried from step to step; a state changed from outside restarts them.
 """
 
-from __future__ import annotations
-
 from functools import partial
 from typing import NamedTuple
 
@@ -22,8 +20,7 @@ from cvt_hpc.parameters import Parameter
 from cvt_hpc.solvers.generalised_alpha import generalised_alpha, stage_length
 from cvt_hpc.steppers.facts import NO_VALUE, RATES, Facts
 from cvt_hpc.steppers.fixed_step import march_in_equal_steps
-from cvt_hpc.steppers.frozen_jacobian import Frozen, frozen
-from cvt_hpc.steppers.newton import solve_stage
+from cvt_hpc.steppers.newton import Frozen, frozen, solve_stage
 from cvt_hpc.steppers.settings import SOLVER_TOLERANCE, STEP, from_parameters
 from cvt_hpc.steppers.system import System
 

@@ -1,7 +1,5 @@
 """A march under way: a method, a system and a state, advanced sample by sample."""
 
-from __future__ import annotations
-
 from collections.abc import Mapping
 from importlib import import_module
 from typing import Any

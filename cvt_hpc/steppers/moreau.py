@@ -16,8 +16,6 @@ A contact may have a larger bound while it sticks (`held`). Where that does not 
 again with the bound of sliding.
 """
 
-from __future__ import annotations
-
 from functools import partial
 from typing import NamedTuple
 

@@ -16,8 +16,6 @@ an implicit method would find the bend. From step d = 4.0 on, d = N mu / (m v_re
 solutions beside rest, at which a mass slides on.
 """
 
-from __future__ import annotations
-
 from functools import partial
 from typing import NamedTuple
 
@@ -26,7 +24,7 @@ import numpy as np
 from cvt_hpc.kernels import kernel
 from cvt_hpc.steppers.facts import NO_VALUE, NOT_UNIQUE, OK, RATES, REJECTED, SOLVES, Facts
 from cvt_hpc.steppers.fixed_step import march_in_equal_steps
-from cvt_hpc.steppers.frozen_jacobian import SHIFT, SIGN, Frozen, frozen, renew
+from cvt_hpc.steppers.newton import SHIFT, SIGN, Frozen, frozen, renew
 from cvt_hpc.steppers.settings import STEP, FixedStep, fixed_step
 from cvt_hpc.steppers.system import System, size
 

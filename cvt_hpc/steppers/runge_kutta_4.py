@@ -5,8 +5,6 @@ along the imaginary one. It is not for stiff friction, and it damps motion that 
 of frequency w decays by itself at a rate of (step w)^6 / (144 step).
 """
 
-from __future__ import annotations
-
 from functools import partial
 from typing import NamedTuple
 

@@ -5,8 +5,6 @@ family: called from Python, with a full matrix by difference quotients. Orders a
 lightly damped vibrations at some steps, which the control answers by short ones.
 """
 
-from __future__ import annotations
-
 from dataclasses import replace
 from functools import partial
 

@@ -5,8 +5,6 @@ that people know, not one of the family: called from Python, with a full matrix 
 count as evaluations of the rates; it does not report how many matrices it made).
 """
 
-from __future__ import annotations
-
 from dataclasses import replace
 from functools import partial
 

@@ -5,8 +5,6 @@ started anew where state or time have been changed from outside. It is called fr
 10 us an evaluation: for a few unknowns that is most of its time, for a belt it is little.
 """
 
-from __future__ import annotations
-
 import warnings
 from typing import Any
 

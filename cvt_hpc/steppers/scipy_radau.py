@@ -5,8 +5,6 @@ not one of the family: called from Python, with full matrices, one real and one 
 quotients.
 """
 
-from __future__ import annotations
-
 from dataclasses import replace
 from functools import partial
 

@@ -11,8 +11,6 @@ stage order 1: where a stiff force moves the motion along, as friction that near
 to 2.
 """
 
-from __future__ import annotations
-
 from functools import partial
 from typing import NamedTuple
 
@@ -21,8 +19,7 @@ import numpy as np
 from cvt_hpc.kernels import kernel
 from cvt_hpc.steppers.facts import OK, Facts
 from cvt_hpc.steppers.fixed_step import march_in_equal_steps
-from cvt_hpc.steppers.frozen_jacobian import Frozen, frozen
-from cvt_hpc.steppers.newton import solve_stage
+from cvt_hpc.steppers.newton import Frozen, frozen, solve_stage
 from cvt_hpc.steppers.settings import SOLVER_TOLERANCE, STEP, ImplicitStep, implicit_step
 from cvt_hpc.steppers.system import System
 

@@ -1,12 +1,9 @@
 """Parameters of a method that a job may set: the entries that several methods share, once."""
 
-from __future__ import annotations
-
-from collections.abc import Mapping
 from functools import partial
-from typing import Any, NamedTuple, TypeVar
+from typing import NamedTuple, TypeVar
 
-from cvt_hpc.parameters import Parameter, positive
+from cvt_hpc.parameters import Parameter, Parameters, positive
 
 STEP = positive(
     1e-5, "s", "largest time step; a whole number of steps makes a sampling interval", sensible=(1e-10, 0.5)
@@ -48,7 +45,7 @@ def own_step(default: float | None, least: float, longest: float) -> Parameter:
 Kind = TypeVar("Kind", bound=NamedTuple)
 
 
-def from_parameters(kind: type[Kind], parameters: Mapping[str, Any]) -> Kind:
+def from_parameters(kind: type[Kind], parameters: Parameters) -> Kind:
     """Control whose fields are numbers named as the flat parameters [SI]."""
     return kind._make(float(parameters[key]) for key in kind._fields)
 
@@ -77,6 +74,6 @@ fixed_step = partial(from_parameters, FixedStep)
 implicit_step = partial(from_parameters, ImplicitStep)
 
 
-def tolerance(parameters: Mapping[str, Any]) -> Tolerance:
+def tolerance(parameters: Parameters) -> Tolerance:
     """Control of an adaptive method, from flat parameters."""
     return Tolerance(float(parameters["tolerance"]), int(parameters["most_steps"]))

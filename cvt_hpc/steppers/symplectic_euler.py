@@ -9,8 +9,6 @@ velocities: these are taken explicitly, so that damping limits the step, and gyr
 w_g feed in energy at a rate of step w_g^2 / 2.
 """
 
-from __future__ import annotations
-
 from functools import partial
 from typing import NamedTuple
 

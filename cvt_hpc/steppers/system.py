@@ -1,7 +1,5 @@
 """The input of a stepper: rates of change with their constants, and facts on the unknowns."""
 
-from __future__ import annotations
-
 from typing import Any, NamedTuple
 
 import numpy as np

@@ -6,8 +6,6 @@ faster than the step about in every step, undamped (ringing). theta = 1 damps ev
 step w^2 / 2, those that grow by themselves included: a growth rate below that is turned into decay.
 """
 
-from __future__ import annotations
-
 from functools import partial
 from typing import NamedTuple
 
@@ -17,8 +15,7 @@ from cvt_hpc.kernels import kernel
 from cvt_hpc.parameters import Parameter
 from cvt_hpc.steppers.facts import NO_VALUE, RATES, Facts
 from cvt_hpc.steppers.fixed_step import march_in_equal_steps
-from cvt_hpc.steppers.frozen_jacobian import Frozen, frozen
-from cvt_hpc.steppers.newton import solve_stage
+from cvt_hpc.steppers.newton import Frozen, frozen, solve_stage
 from cvt_hpc.steppers.settings import SOLVER_TOLERANCE, STEP, from_parameters
 from cvt_hpc.steppers.system import System
 

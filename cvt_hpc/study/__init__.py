@@ -2,8 +2,7 @@
 
 from cvt_hpc.study.gather import gather, open_results
 from cvt_hpc.study.ranks.launch import process_rank
-from cvt_hpc.study.report import FailedRun, RunReport
-from cvt_hpc.study.status import StudyStatus, read_status
+from cvt_hpc.study.status import FailedRun, RunReport, StudyStatus, read_status
 from cvt_hpc.study.sweep import check_start, run
 
 __all__ = [

@@ -1,7 +1,5 @@
 """Whether this machine can do sweeps: packages, cores, memory, kernels' cache, disk, MPI and Slurm."""
 
-from __future__ import annotations
-
 import os
 import shutil
 import subprocess
@@ -12,7 +10,7 @@ from typing import NamedTuple
 
 from cvt_hpc.files import try_to_write
 from cvt_hpc.provenance import versions
-from cvt_hpc.study.forecast.needs import size_in_words
+from cvt_hpc.study.forecast.resources import size_in_words
 
 LEAST_DISK = 1e9  # [byte]: records and results.nc of a million runs take about as much
 PATIENCE = 60.0  # [s] for a program that is tried out

@@ -1,25 +1,36 @@
-"""The output folder of a study: its files, and the origin of its records."""
+"""The output folder of a study: its files, and the origin of its records.
+
+Parts of a study are for starts that work side by side in one folder, such as the tasks of a job array.
+Histories of chosen runs are files beside the records.
+"""
 
 from __future__ import annotations
 
 import json
 import logging
 import re
-from collections.abc import Callable, Iterator
+from collections.abc import Callable, Iterable, Iterator
 from contextlib import AbstractContextManager, contextmanager, suppress
 from pathlib import Path
-from typing import Any
+from typing import TYPE_CHECKING, Any, NamedTuple
+
+import numpy as np
 
 from cvt_hpc.errors import InputError, few_of, mismatch, nearest
 from cvt_hpc.files import kind_of, make_own_folder, naming_refusals, sync_folder
 from cvt_hpc.locks import BusyError, is_locked, locked
+from cvt_hpc.netcdf import store_history
 from cvt_hpc.output_folder import DamagedJobError, Kind, OutputFolder
 from cvt_hpc.study.description import Study
-from cvt_hpc.study.growth import have_one_layout, places_in, refuse_other
-from cvt_hpc.study.part import Part
-from cvt_hpc.study.record.frames import MAGIC
-from cvt_hpc.study.record.index import Records, open_log
-from cvt_hpc.study.record.recovery import Places, read_records
+from cvt_hpc.study.job_difference import have_one_layout, places_in, refuse_other
+from cvt_hpc.study.record.index import Places, Records, open_log, read_records
+from cvt_hpc.study.record.log import MAGIC
+from cvt_hpc.variables import Status
+
+if TYPE_CHECKING:
+    import xarray as xr
+
+    from cvt_hpc.job import Job
 
 MOST_NAMED = 5
 _PART_LOCKS = ".part-*.lock"
@@ -28,6 +39,51 @@ _MOST_RUNS = 10**8
 _LARGEST_RECORD = 1 << 26  # [bytes]
 
 _logger = logging.getLogger(__name__)
+
+
+class Part(NamedTuple):
+    """One of several parts of a study; every run belongs to exactly one of them.
+
+    Attributes
+    ----------
+    number : int
+        Which one, from 1.
+    parts : int
+        How many there are.
+    """
+
+    number: int
+    parts: int
+
+    def __str__(self) -> str:
+        return f"{self.number}/{self.parts}"
+
+    def holds(self, index: np.ndarray) -> np.ndarray:
+        """Return whether runs belong to this part, by their index alone, without communication.
+
+        The runs are dealt out in turn, and each round begins one part further: otherwise an axis with as many
+        values as there are parts would give all runs at its costliest value to one of them.
+        """
+        return (index + index // self.parts) % self.parts == self.number - 1
+
+
+def read_part(text: str) -> Part:
+    """Return the part that is written as "K/N".
+
+    Parameters
+    ----------
+    text : str
+        Such as "3/16".
+
+    Raises
+    ------
+    InputError
+        If it is none.
+    """
+    numbers = re.fullmatch(r"([1-9]\d*)/([1-9]\d*)", text, re.ASCII)
+    if numbers is None or int(numbers[1]) > int(numbers[2]):
+        raise mismatch("part", "K/N with K from 1 to N, such as 3/16", f'"{text}"')
+    return Part(int(numbers[1]), int(numbers[2]))
 
 
 def study_instead(path: Path) -> str:
@@ -277,3 +333,27 @@ def _numbers(study: Study) -> str:
         del table["job_units"]
     job = {key: value for key, value in entry["job"].items() if key not in ("name", "description")}
     return json.dumps({**entry, "job": job, "name": "", "description": ""})
+
+
+def keep_histories(folder: StudyFolder, histories: Iterable[tuple[int, xr.Dataset]]) -> None:
+    """Write histories, by run index; before the records, so that a run on record has its history.
+
+    Raises
+    ------
+    StorageError
+        If the system refuses.
+    """
+    for index, history in histories:
+        folder.make_histories()
+        store_history(history, folder.history(index))
+
+
+def leave_out_missing(job: Job, folder: StudyFolder, records: Records) -> None:
+    """Mark runs as not recorded that are done, but lack a requested history; the logs stay.
+
+    The history was requested later, or has been removed.
+    """
+    done = records.status == Status.DONE
+    missing = [index for index in job.histories if done[index] and not folder.history(index).exists()]
+    records.written[missing] = np.nan
+    records.status[missing] = Status.NOT_RUN

@@ -1,6 +1,8 @@
-"""Differences between the job of an output folder and the requested one."""
+"""Differences between the job of an output folder and the requested one.
 
-from __future__ import annotations
+A larger study of the same job has more values on its axes, or further axes; `places_in` finds the runs of the
+smaller one in it.
+"""
 
 import json
 import os.path
@@ -8,9 +10,15 @@ from collections.abc import Mapping
 from pathlib import Path
 from typing import Any
 
+import numpy as np
+from numpy.typing import NDArray
+
 from cvt_hpc.errors import InputError, few_of
+from cvt_hpc.study.description import Study
 
 _LONGEST = 40  # letters of a value
+
+_FREE = ("name", "description", "axes", "linked", "design")  # compared by the runs that they make
 
 
 def another_job(path: Path, found: dict[str, Any], asked: dict[str, Any], name: str = "") -> InputError:
@@ -76,3 +84,100 @@ def short_pair(one: Any, other: Any) -> list[str]:
     texts = [json.dumps(one), json.dumps(other)]
     begin = max(len(os.path.commonprefix(texts)) - 10, 0)
     return [f"...{text[begin:][:_LONGEST]}" for text in texts]
+
+
+def refuse_other(path: Path, found: Study, asked: Study) -> None:
+    """Raise InputError unless the study in a folder is the requested one, or that one has all its runs."""
+    if found.fingerprint != asked.fingerprint and places_in(found.job, asked.job) is None:
+        raise another_job(path, found.job, asked.job, f"job {found.name}: ")
+    if not have_one_layout(found, asked):
+        raise InputError(
+            f"{path}: expected records with the quantities of this version, found others; choose "
+            "another --out, or --fresh to throw them away"
+        )
+
+
+def have_one_layout(one: Study, other: Study) -> bool:
+    """Return whether records of two studies can be of one dataset."""
+    quantities, others = ([(v.name, v.dims, v.dtype) for v in study.variables] for study in (one, other))
+    places, elsewhere = ([(d.name, d.values) for d in study.coordinates] for study in (one, other))
+    return quantities == others and places == elsewhere
+
+
+def places_in(found: Mapping[str, Any], asked: Mapping[str, Any]) -> NDArray[np.int64] | None:
+    """Return which run of one job each run of another is.
+
+    A run is the same if all its parameters are: values of axes and linked parameters are compared exactly, in
+    SI units. A constant may have become an axis, on which its value then has to be.
+
+    Parameters
+    ----------
+    found, asked : mapping
+        Resolved jobs, as of `Job.resolved`.
+
+    Returns
+    -------
+    numpy.ndarray of int, shape (runs of `found`,), or None
+        The indices of these runs in `asked`; None unless all of them are there.
+    """
+    try:
+        return _find_places(found, asked)
+    except (KeyError, TypeError, ValueError, AttributeError, IndexError):  # a document that is no job's
+        return None
+
+
+def _find_places(found: Mapping[str, Any], asked: Mapping[str, Any]) -> NDArray[np.int64] | None:
+    constants = {}  # that have become axes
+    for key, (there, here) in differences(found, asked).items():
+        name = key.rpartition(".")[2]
+        if key.partition(".")[0] in _FREE:
+            continue
+        if there is None or here is not None:
+            return None
+        constants[name] = there
+    axes, wanted = found["axes"], asked["axes"]
+    kinds = [job.get("design", {}).get("kind") for job in (found, asked)]
+    if {*axes, *constants} != {*wanted} or kinds[0] != kinds[1]:
+        return None
+    if "runs" in found.get("design", {}):
+        return _among_samples(axes, constants, wanted)
+    columns = {**{name: [value] for name, value in constants.items()}, **axes}
+    return _in_grid(columns, wanted, found.get("linked", {}), asked.get("linked", {}))
+
+
+def _in_grid(
+    columns: Mapping[str, list],
+    wanted: Mapping[str, list],
+    links: Mapping[str, Any],
+    others: Mapping[str, Any],
+) -> NDArray[np.int64] | None:
+    """Return the indices, in C order, of a grid in another one: by axes, and by what is linked to them."""
+    strides: dict[str, int] = {}
+    stride = 1
+    for name in reversed([*wanted]):
+        strides[name], stride = stride, stride * len(wanted[name])
+    places = np.zeros((), np.int64)
+    for name, values in columns.items():
+        of = {value: place for place, value in enumerate(wanted[name])}
+        # repeated values, as a document of somebody else may have them, would make any number of runs
+        if not of.keys() >= set(values) or len(set(values)) < len(values):
+            return None
+        own = [of[value] for value in values]
+        linked = {key: [every[place] for place in own] for key, every in others.get(name, {}).items()}
+        if linked != links.get(name, {}):
+            return None
+        places = np.add.outer(places, strides[name] * np.array(own, np.int64))
+    return places.ravel()
+
+
+def _among_samples(
+    columns: Mapping[str, list], constants: Mapping[str, Any], wanted: Mapping[str, list]
+) -> NDArray[np.int64] | None:
+    """Return the indices of samples among others; equal ones, which a list may have, in their order."""
+    left: dict[tuple, list[int]] = {}
+    names = [*columns, *constants]
+    for place, sample in enumerate(zip(*(wanted[name] for name in names), strict=True)):
+        left.setdefault(sample, []).append(place)
+    rows = ((*row, *constants.values()) for row in zip(*columns.values(), strict=True))
+    places = [same.pop(0) if (same := left.get(row)) else -1 for row in rows]
+    return None if -1 in places else np.array(places, np.int64)

@@ -1,36 +1,60 @@
-"""The records that a start of a sweep finds, and its plan; on rank 0 alone."""
+"""The records that a start of a sweep finds, and its plan; on rank 0 alone.
 
-from __future__ import annotations
+Rules decide which runs are done again, done alone, or given up. A process that dies, by a kill, for lack of
+memory or in compiled code, leaves no record of its runs. They are done again, after all others, so that a run
+that kills its process keeps no other from being done. A process that dies takes the other ranks along, so
+most of these runs are innocent: after `DEATHS` each is done alone, and where the process dies even then, by
+one rank alone, at the very end. After `DEATHS_ALONE` of these deaths the run is given up.
+
+A trace runs some cells of its grid, and infers the classes of the cells between them. The grid is cut into
+boxes that share their sides, at first as wide as the first spacing. The corners of all boxes are run. A box
+in which, sides included, runs of different classes are known is cut in halves along each axis, the corners of
+these are run as well, and so on down to neighbouring cells. Thus a boundary that shows in one box is followed
+into the next, wherever it leads. In the end every box that is wider than that is of one class, as far as runs
+know it, and this class is inferred for its inner cells. Along axes that are not traced nothing is inferred:
+each of their values has boxes of its own.
+
+A further run can only cut more boxes. Hence a trace runs in the end the least set of cells that
+requires no other one: it does not depend on the order of the runs, on rounds, ranks or interruptions.
+
+A trace can miss cells: of cells of one class that are connected, as neighbours along traced axes, all are
+found if one of them is run. So only patches without a corner of the first boxes are missed, hence none that
+contains as many cells as the first spacing along each traced axis, side by side.
+"""
 
 import logging
-from collections.abc import Collection
+from collections.abc import Collection, Iterable, Iterator, Mapping
 from contextlib import ExitStack
+from functools import partial
+from itertools import pairwise, product
 from typing import Any, NamedTuple
 
 import numpy as np
+from numpy.typing import NDArray
 
 from cvt_hpc.files import discard
+from cvt_hpc.job import Job
 from cvt_hpc.provenance import new_session
-from cvt_hpc.study.attempts import (
-    enter_attempts,
-    later_attempts,
-    plan_runs,
-    predicted_costs,
-    runs_to_repeat,
-)
-from cvt_hpc.study.batches import Assignment
-from cvt_hpc.study.folder import StudyFolder
+from cvt_hpc.study.batches import Assignment, share_out
+from cvt_hpc.study.description import Study
+from cvt_hpc.study.folder import Part, StudyFolder, leave_out_missing
 from cvt_hpc.study.forecast.cost_model import Fit
-from cvt_hpc.study.histories import leave_out_missing
-from cvt_hpc.study.part import Part
-from cvt_hpc.study.ranks.counter import Counter
-from cvt_hpc.study.ranks.progress import Progress
-from cvt_hpc.study.ranks.time_limit import TimeLimit
+from cvt_hpc.study.ranks.progress import Counter, Progress
+from cvt_hpc.study.ranks.stopping import TimeLimit
 from cvt_hpc.study.record.index import Records
-from cvt_hpc.study.task import Task
-from cvt_hpc.study.time_steps import refined_steps, untried_factor
-from cvt_hpc.study.tracing import needed_runs
+from cvt_hpc.study.record.log import RecordFormat, RecordLog
+from cvt_hpc.study.simulator import Simulator
+from cvt_hpc.study.task import Task, asked_step, refined_steps, untried_factor
 from cvt_hpc.variables import Status
+from cvt_hpc.vibration.classes import OccurrenceClass, classify_runs
+
+UNKNOWN = OccurrenceClass.NOT_RUN
+
+Interval = tuple[int, int]  # first and last place on an axis
+Box = tuple[Interval, ...]
+
+DEATHS = 3  # at a run, until it is done alone
+DEATHS_ALONE = 2  # while it was done alone, until it is given up
 
 _logger = logging.getLogger(__name__)
 
@@ -138,3 +162,219 @@ def _other_versions(records: Records, session: dict[str, Any]) -> list[str]:
         "earlier runs of this folder were made with other versions than these (results.nc names them in its "
         "attributes `versions` and `git_revision`); --fresh repeats them"
     ]
+
+
+def plan_runs(
+    job: Job,
+    simulator: Simulator,
+    records: Records,
+    asked: np.ndarray,
+    ranks: int,
+    steps: Mapping[int, float] | None = None,
+) -> list[Assignment]:
+    """Return the runs to be done, as assignments in the order in which to start them.
+
+    Parameters
+    ----------
+    job : Job
+        The job that is run.
+    simulator : Simulator
+        Does the runs.
+    records : Records
+        The runs on record; no run in it is to be given up.
+    asked : numpy.ndarray of bool, shape (runs,)
+        Which runs are to be on record in the end.
+    ranks : int
+        Number of processes that compute.
+    steps : mapping, optional
+        Time steps [s] of the runs that do not take that of the job, by run index: only runs of one step can
+        advance together.
+    """
+    costs = predicted_costs(job, simulator, steps or {})
+    pending = asked & ~records.recorded
+    suspect = pending & (records.died >= DEATHS)
+    groups = []
+    for struck in (False, True):
+        chosen = pending & ~suspect & ((records.died > 0) == struck)
+        for together in _by_step(np.flatnonzero(chosen).tolist(), steps or {}):
+            groups += simulator.lane_groups(job, together)
+    batches = share_out(groups, costs, ranks, partial(simulator.turns, job))
+    batches.sort(key=lambda batch: bool(records.died[batch[0]]))
+    suspects = sorted(np.flatnonzero(suspect).tolist(), key=lambda i: (-costs[i], i))
+    lethal = tuple(index for index in suspects if records.died_alone[index])
+    return [
+        *(Assignment(batch) for batch in batches),
+        *(Assignment((index,), alone=True) for index in suspects if index not in lethal),
+        *([Assignment(lethal, alone=True)] if lethal else []),
+    ]
+
+
+def predicted_costs(job: Job, simulator: Simulator, steps: Mapping[int, float]) -> np.ndarray:
+    """Return the predicted duration of each run, in any unit.
+
+    Parameters
+    ----------
+    job : Job
+        The job that is run.
+    simulator : Simulator
+        Does the runs.
+    steps : mapping
+        Time steps [s] of the runs that do not take that of the job, by run index: as much longer they take.
+    """
+    costs = np.array(simulator.run_costs(job), float)
+    for index, step in steps.items():
+        costs[index] *= asked_step(job, index) / step
+    return costs
+
+
+def _by_step(runs: list[int], steps: Mapping[int, float]) -> Iterable[list[int]]:
+    if not steps:
+        return [runs]
+    groups: dict[float | None, list[int]] = {}
+    for index in runs:
+        groups.setdefault(steps.get(index), []).append(index)
+    return groups.values()
+
+
+def given_up(records: Records, asked: np.ndarray) -> dict[int, str]:
+    """Return the runs, among those marked in `asked`, that are not tried again, with the reason."""
+    lost = np.flatnonzero(asked & ~records.recorded & (records.died_alone >= DEATHS_ALONE))
+    return {
+        int(index): f"its process died {records.died[index]} times, the last "
+        f"{records.died_alone[index]} while it did this run alone"
+        for index in lost
+    }
+
+
+def runs_to_repeat(records: Records, asked: np.ndarray, statuses: Collection[Status]) -> np.ndarray:
+    """Return the indices of recorded runs that a retry begins again.
+
+    None while runs are left of a sweep in which an earlier retry began: the same command, given again
+    after an early end, continues instead of beginning anew.
+
+    Parameters
+    ----------
+    records : Records
+        The runs on record.
+    asked : numpy.ndarray of bool, shape (runs,)
+        Which runs are in question.
+    statuses : collection of Status
+        How the runs ended that are to be done again.
+    """
+    goes_on = (records.attempts[asked] > 1).any() and not records.recorded[asked].all()
+    if goes_on:
+        return np.zeros(0, np.int64)
+    return np.flatnonzero(asked & records.recorded & np.isin(records.status, list(statuses)))
+
+
+def enter_attempts(
+    folder: StudyFolder,
+    study: Study,
+    records: Records,
+    asked: np.ndarray,
+    retry: Collection[Status],
+    session: dict[str, Any],
+    refine: float = 1.0,
+) -> Records:
+    """Record which runs are given up and which begin again, and return the records as they are then.
+
+    Only of runs marked in `asked`, shape (runs,): others may be at work just now. The factor `refine`, by
+    which the retries shorten their time step, is kept with them, so that a continuation does the same.
+    """
+    lost, again = given_up(records, asked), runs_to_repeat(records, asked, retry)
+    if not lost and not len(again):
+        return records
+    records.attempts[again] += 1
+    layout = RecordFormat(study.fingerprint, study.record_dtype)
+    with RecordLog(folder.records, layout, {**session, "refine": refine}, 0, later_attempts(records)) as log:
+        if lost:
+            log.append([(index, study.pack_failure(reason)) for index, reason in lost.items()])
+        if len(again):
+            log.begin_again(again)
+    return folder.read_records(study)
+
+
+def later_attempts(records: Records) -> dict[int, int]:
+    """Return the attempts that are not the first, by run index."""
+    return {int(index): int(records.attempts[index]) for index in np.flatnonzero(records.attempts > 1)}
+
+
+def needed_runs(study: Study, records: Records) -> NDArray[np.bool_]:
+    """Return the runs that a study needs by the records, shape (runs,): of a grid or of samples all.
+
+    Parameters
+    ----------
+    study : Study
+        With its design.
+    records : Records
+        The runs on record; these runs count as needed. Those needed now are among those needed later on.
+    """
+    if not study.is_traced:
+        return np.ones(study.size, bool)
+    classes = run_classes(study, records)
+    needed = np.zeros(study.shape, bool)
+    for box in leaf_boxes(classes, first_intervals(study)):
+        needed[np.ix_(*box)] = True
+    return needed.ravel() | records.recorded
+
+
+def inferred_classes(study: Study, records: Records) -> NDArray[np.int8]:
+    """Return the class of each cell, shape of the grid: its own, or that of the runs around it.
+
+    NOT_RUN where these do not agree, or are not all known yet.
+    """
+    classes = run_classes(study, records)
+    inferred = classes.copy()
+    for box in leaf_boxes(classes, first_intervals(study)):
+        corners = classes[np.ix_(*box)]
+        if (corners == corners.flat[0]).all():
+            inside = inferred[_cells(box)]
+            inside[inside == UNKNOWN] = corners.flat[0]
+    return inferred
+
+
+def run_classes(study: Study, records: Records) -> NDArray[np.int8]:
+    """Return the class of each run, shape of the grid; NOT_RUN where there is no record."""
+    vibrates = records.read(np.arange(study.size), "vibrates")
+    return classify_runs(records.status, vibrates).reshape(study.shape)
+
+
+def first_intervals(study: Study) -> list[list[Interval]]:
+    """Return for each axis the intervals that the first boxes are made of."""
+    spacings = study.design["first_spacing"]
+    return [_intervals(len(axis.values), spacings.get(axis.name)) for axis in study.axes]
+
+
+def leaf_boxes(classes: NDArray[np.int8], intervals: list[list[Interval]]) -> Iterator[Box]:
+    """Yield the boxes that are not cut: neighbours, and those within which all known runs are of one class.
+
+    Parameters
+    ----------
+    classes : array of int8, shape of the grid
+        `OccurrenceClass` of each run; NOT_RUN where it is not known.
+    intervals : list of list of (int, int)
+        For each axis, the places of which the first boxes are made.
+    """
+    for box in product(*intervals):
+        cells = classes[_cells(box)]
+        known = cells[cells != UNKNOWN]
+        if max((last - first for first, last in box), default=0) <= 1 or (known == known[:1]).all():
+            yield box
+        else:
+            yield from leaf_boxes(classes, [_halves(*interval) for interval in box])
+
+
+def _cells(box: Box) -> tuple[slice, ...]:
+    return tuple(slice(first, last + 1) for first, last in box)
+
+
+def _intervals(length: int, spacing: int | None) -> list[Interval]:
+    """Cut an axis into intervals that share their ends; without a spacing into single places."""
+    if spacing is None or length == 1:
+        return [(place, place) for place in range(length)]
+    return list(pairwise([*range(0, length - 1, spacing), length - 1]))
+
+
+def _halves(first: int, last: int) -> list[Interval]:
+    middle = (first + last) // 2
+    return [(first, middle), (middle, last)] if last - first > 1 else [(first, last)]

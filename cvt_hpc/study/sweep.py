@@ -1,50 +1,42 @@
-"""All runs of a job, on all ranks: compute the plan, record, gather."""
+"""All runs of a job, on all ranks: compute the plan, record, gather.
 
-from __future__ import annotations
+All ranks compute, and each claims its next batch from one counter.
+"""
 
 import logging
 import math
 import time
-from collections.abc import Callable, Collection, Mapping
+from collections.abc import Callable, Collection, Iterator, Mapping, Sequence
 from contextlib import ExitStack, closing
 from dataclasses import replace
 from functools import partial
 from pathlib import Path
-from typing import TYPE_CHECKING, Any
+from typing import Any
 
 import numpy as np
 
 from cvt_hpc.errors import mismatch
 from cvt_hpc.files import StorageError, open_missing_streams
+from cvt_hpc.job import Job
 from cvt_hpc.linear_algebra import one_thread
 from cvt_hpc.locks import BusyError
 from cvt_hpc.netcdf import library_for_sweep
 from cvt_hpc.provenance import program_identity
+from cvt_hpc.study.batches import Assignment, Batch
 from cvt_hpc.study.description import Study, describe
-from cvt_hpc.study.folder import StudyFolder
+from cvt_hpc.study.folder import Part, StudyFolder, keep_histories, leave_out_missing, read_part
 from cvt_hpc.study.forecast.cost_model import CostModel
-from cvt_hpc.study.forecast.needs import refuse_too_large
+from cvt_hpc.study.forecast.resources import refuse_too_large
 from cvt_hpc.study.gather import LossError, gather_records
-from cvt_hpc.study.histories import keep_histories, leave_out_missing
-from cvt_hpc.study.part import Part, read_part
 from cvt_hpc.study.planning import Plan, asked_runs, next_round, prepare
-from cvt_hpc.study.ranks.counter import Counter
+from cvt_hpc.study.ranks import stopping
 from cvt_hpc.study.ranks.launch import Ranks, Team, assembled_team
-from cvt_hpc.study.ranks.progress import Progress
-from cvt_hpc.study.ranks.schedule import claimed_batches, open_counter
-from cvt_hpc.study.ranks.stopping import ELSEWHERE, SignalWatch, Stop, raise_again
-from cvt_hpc.study.ranks.survival import outlive
-from cvt_hpc.study.ranks.time_limit import find_time_limit, planning_within
-from cvt_hpc.study.record.frames import RecordFormat
-from cvt_hpc.study.record.log import RecordLog
-from cvt_hpc.study.report import STOPPED, RunReport, build_report
+from cvt_hpc.study.ranks.progress import Counter, Progress
+from cvt_hpc.study.record.log import RecordFormat, RecordLog
 from cvt_hpc.study.simulator import Simulator, default_simulator
-from cvt_hpc.study.task import Task
-from cvt_hpc.study.time_steps import check_refinement
+from cvt_hpc.study.status import STOPPED, RunReport, build_report
+from cvt_hpc.study.task import Task, check_refinement
 from cvt_hpc.variables import Status
-
-if TYPE_CHECKING:
-    from cvt_hpc.job import Job
 
 _logger = logging.getLogger(__name__)
 
@@ -170,8 +162,8 @@ def run(
             if begins and chosen is None:
                 refuse_too_large(job, simulator, folder.path)
             asked = None if time_limit is None else time_limit - (time.monotonic() - started)
-            limit, began = find_time_limit(asked, study.size), time.monotonic()
-            with planning_within(limit.seconds, study.size):
+            limit, began = stopping.find_time_limit(asked, study.size), time.monotonic()
+            with stopping.planning_within(limit.seconds, study.size):
                 plan = prepare(folder, task, share, fresh and begins, again, team.size, held, refine)
             left = limit.seconds - (time.monotonic() - began)
             return plan._replace(limit=limit._replace(seconds=left))
@@ -184,7 +176,7 @@ def run(
                 display = Progress(
                     counter, plan.total, plan.recorded, plan.failed, visible, plan.costs[order]
                 )
-                stop = Stop(counter, signals, plan.limit, display.show)
+                stop = stopping.Stop(counter, signals, plan.limit, display.show)
                 stopped = None
                 with closing(display):
                     while plan.assignments:
@@ -202,10 +194,10 @@ def run(
     with library_for_sweep(), assembled_team(folder.crash_log, comm) as team:
         study, share = team.agreed(accept, plan_of)
         task = Task(job, study, simulator, run_limit, chosen, asked_steps)
-        with SignalWatch() as signals:
-            report, noted = outlive(team, sweep)
+        with stopping.SignalWatch() as signals:
+            report, noted = stopping.outlive(team, sweep)
     if raises and (name := noted or signals.noted):
-        raise_again(name, report.status_of_more or STOPPED, everywhere=noted is not None)
+        stopping.raise_again(name, report.status_of_more or STOPPED, everywhere=noted is not None)
     return report
 
 
@@ -240,7 +232,7 @@ def _compute(
     plan: Plan,
     rank: int,
     counter: Counter,
-    stop: Stop,
+    stop: stopping.Stop,
 ) -> str | None:
     """Do and record the runs that this rank claims; return the reason if it could not continue."""
     layout = RecordFormat(task.study.fingerprint, task.study.record_dtype)
@@ -277,7 +269,7 @@ def _settle(team: Team, trouble: str | None, reason: str | None) -> str | None:
     for found, _ in ends:
         if found:
             raise StorageError(found)
-    return next((why for _, why in ends if why and why != ELSEWHERE), None)
+    return next((why for _, why in ends if why and why != stopping.ELSEWHERE), None)
 
 
 def _conclude(
@@ -287,7 +279,7 @@ def _conclude(
     plan: Plan,
     stopped: str | None,
     held: ExitStack,
-    signals: SignalWatch,
+    signals: stopping.SignalWatch,
 ) -> RunReport:
     """Gather the dataset, unless other parts are at work, and report; on rank 0 alone."""
     if part is not None:
@@ -314,3 +306,43 @@ def _conclude(
     asked = asked_runs(task, records, part)
     gained = int(records.recorded[asked].sum()) - plan.recorded
     return build_report(folder, task.study, records, asked, gathers, gained, stopped)
+
+
+def open_counter(team: Team) -> Counter:
+    """Return the counter of a team, at zero."""
+    if team.communicator is None:
+        return Counter()
+    from cvt_hpc.study.ranks.shared_counter import SharedCounter
+
+    return SharedCounter(team.communicator)
+
+
+def claimed_batches(
+    plan: Sequence[Assignment],
+    counter: Counter,
+    may_claim: Callable[[], bool],
+    fits: Callable[[Batch], bool],
+) -> Iterator[Assignment]:
+    """Yield the work of this rank, one batch at a time.
+
+    Parameters
+    ----------
+    plan : sequence of Assignment
+        All batches to be done, in the order in which they start; the same on all ranks.
+    counter : Counter
+        Where positions in `plan` are claimed.
+    may_claim : callable
+        Called before each batch; if it returns False, there are no more.
+    fits : callable
+        Whether there is time for a batch. A batch that does not fit is passed over, and no rank does it in
+        this session; shorter ones stand later in the plan.
+    """
+    while may_claim():
+        position = counter.claim()
+        if position >= len(plan):
+            return
+        for place, part in enumerate(plan[position].parts()):
+            if place > 0 and not may_claim():
+                return
+            if fits(part.runs):
+                yield part

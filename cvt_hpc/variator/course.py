@@ -1,7 +1,5 @@
 """Course of a run's load, speed and start-up damping over time; of plain numbers and of lanes."""
 
-from __future__ import annotations
-
 import numpy as np
 
 from cvt_hpc.kernels import merged_kernel

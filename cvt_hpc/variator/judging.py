@@ -4,8 +4,6 @@ A run is as `slip` takes it, and has `displacement`, `probes` with labels, `fail
 `risen`, the samples before its load has risen. Of its channels, those of both strands count here, too.
 """
 
-from __future__ import annotations
-
 from collections.abc import Sequence
 from dataclasses import replace
 from typing import Any

@@ -1,7 +1,5 @@
 """How large a scene is beside the default one: limits with a unit scale with it, whatever its units are."""
 
-from __future__ import annotations
-
 from collections.abc import Mapping
 from typing import Any, NamedTuple
 

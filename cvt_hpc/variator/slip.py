@@ -20,8 +20,6 @@ A run is whatever has `parameters`, `channel(name)`, `samples`, `done`, `judged`
 pulleys.
 """
 
-from __future__ import annotations
-
 from collections.abc import Sequence
 from dataclasses import replace
 from typing import Any

@@ -1,12 +1,8 @@
 """Variables that records of all models of a variator have in common."""
 
-from __future__ import annotations
-
-from collections.abc import Mapping
-from typing import Any
-
 import numpy as np
 
+from cvt_hpc.parameters import Parameters
 from cvt_hpc.variables import Coordinate, Variable
 from cvt_hpc.variator import PULLEYS, STRANDS
 
@@ -53,7 +49,7 @@ _SHARED = (
 )
 
 
-def frequency_bins(parameters: Mapping[str, Any]) -> Coordinate:
+def frequency_bins(parameters: Parameters) -> Coordinate:
     """Frequencies of the spectra of a transient [Hz].
 
     Parameters

@@ -1,6 +1,34 @@
-"""From a run's displacement history to its amplitudes, frequencies, growth rates, and whether it vibrates."""
+"""From a run's displacement history to its amplitudes, frequencies, growth rates, and whether it vibrates.
 
-from __future__ import annotations
+A run vibrates, does not, or does so irregularly, or is undecided because it was too short. Judged are the
+amplitudes of each strand within a frequency band, in successive windows of the last part of the run, and the
+growth rate fitted to them.
+
+A strand vibrates if it is above the threshold in every window and not decaying. It is irregular if it comes
+and goes about the threshold over so many windows that a trend is ruled out: a longer run
+would say no more. It is quiet if it is below the threshold at the end and not on its way there. Everything
+else is undecided, and a longer run may decide: a start transient that has not died out yet, a vibration that
+is still growing. A run vibrates if a strand does, and is quiet only if all strands are. It is irregular if a
+strand is, unless another one is undecided that may have a trend. The thresholds are in `criterion.py`.
+
+Whether an amplitude comes and goes about a threshold without a trend: a longer run would not decide.
+
+The belt near 40 N m moves so: judder of the driven pulley rings a strand, now above the threshold and now
+below. Called irregular is a record of windows in which
+
+- the amplitude crosses the threshold LEAST_CROSSINGS times or more: growth and decay cross it once, a single
+  burst twice;
+- it scatters by LEAST_SCATTER of its mean or more: settled vibrations scatter by 2-7 %, noise in the band by
+  10-15 %, judder by 30-100 %. A steady amplitude that happens to lie at the threshold is not irregular;
+- a trend is ruled out: the 95 % confidence interval of the gain over the record, in e-folds, contains 0 and
+  lies within +-`most_gain`. So an amplitude that grows or decays by that much is called irregular in at most
+  one of 40 records. Large scatter requires more windows: some 15 if the logarithm scatters by 0.5.
+
+Windows within one burst are alike, so the interval is that of fewer independent windows: n (1 - r)/(1 + r)
+of n, r being the autocorrelation of neighbouring windows about the trend (Santer et al. 2000, J. Geophys.
+Res. 105, 7337-7356), and of these there have to be LEAST_WINDOWS. A beat of which the record holds a few
+periods is undecided for that reason.
+"""
 
 from collections.abc import Mapping, Sequence
 from dataclasses import dataclass
@@ -9,11 +37,18 @@ from typing import Any
 import numpy as np
 from numpy.typing import ArrayLike, NDArray
 
-from cvt_hpc.variables import Status, Variable, Vibrates
+from cvt_hpc.variables import Status, Variable, Vibrates, shortened
 from cvt_hpc.vibration import signals
-from cvt_hpc.vibration.irregularity import relative_scatter
-from cvt_hpc.vibration.occurrence import classify, margin
 from cvt_hpc.vibration.settings import fitting_window
+
+LEAST_WINDOWS = 12  # that are independent
+LEAST_CROSSINGS = 4
+LEAST_SCATTER = 0.2
+_CONFIDENCE = 0.975  # one-sided
+
+CONFIDENCE = 0.975  # one-sided, by Student's t: few windows know their own scatter badly
+STEADY_LOSS = 0.05  # e-folds over the judged part that a settled vibration may lose, scatter apart
+LEAST_RISES = 3  # windows in a row, none below the one before: irregular motion does that once in 24 times
 
 VARIABLES = (
     Variable("amplitude", "m", "band-limited peak amplitude at the strongest probe", dims=("strand",)),
@@ -27,6 +62,191 @@ VARIABLES = (
         dims=("strand",),
     ),
 )
+
+
+def classify(
+    amplitudes: ArrayLike,
+    growth_rate: Sequence[float] | NDArray[np.float64],
+    growth_error: Sequence[float] | NDArray[np.float64],
+    *,
+    judged_time: float,
+    record_time: float,
+    parameters: Mapping[str, Any],
+    strands: Sequence[str] = ("t1", "t2"),
+) -> tuple[Vibrates, str]:
+    """Decide whether a run vibrates.
+
+    Parameters
+    ----------
+    amplitudes : array, shape (window, strand)
+        Band-limited amplitudes in successive windows of the judged part [m].
+    growth_rate, growth_error : array, shape (strand,)
+        Growth rate fitted to them and its standard error [1/s]; nan where there is none.
+    judged_time, record_time : float
+        Length of the judged part and of the whole run [s].
+    parameters : mapping
+        With `amplitude_threshold` [m], `decay_tolerance` and `growth_tolerance` [e-folds].
+    strands : sequence of str, length strand
+        Their names, for the reason.
+
+    Returns
+    -------
+    Vibrates
+        YES if a strand vibrates, UNDECIDED where a longer run may decide, IRREGULAR where it would not, NO if
+        all strands are quiet.
+    str
+        The reason, in one line, the strongest strand first.
+
+    Raises
+    ------
+    ValueError
+        There is no window, or an amplitude is not finite: such a run has failed and has no class.
+    """
+    windows = np.asarray(amplitudes, dtype=float)
+    if windows.ndim != 2 or len(windows) == 0 or not np.all(np.isfinite(windows)):
+        raise ValueError("expected finite amplitudes of one window or more, shape (window, strand)")
+    each = list(zip(strands, windows.T, growth_rate, growth_error, strict=True))
+    each.sort(key=lambda strand: -strand[1][-1])  # of a long reason the first ones stay
+    judged = {
+        name: _judge_strand(strand, rate, error, judged_time, record_time, parameters)
+        for name, strand, rate, error in each
+    }
+    left_open = [
+        strand
+        for (_, strand, *_), (vibrates, _) in zip(each, judged.values(), strict=True)
+        if vibrates is Vibrates.UNDECIDED
+    ]
+    order = [Vibrates.YES, Vibrates.UNDECIDED, Vibrates.IRREGULAR, Vibrates.NO]
+    if all(is_stationary(strand, parameters["growth_tolerance"]) for strand in left_open):
+        order[1:3] = order[2], order[1]
+    for outcome in order:
+        told = [f"{name} {text}" for name, (vibrates, text) in judged.items() if vibrates is outcome]
+        if told:
+            return outcome, shortened("; ".join(told))
+    raise ValueError("expected one strand or more")
+
+
+def margin(amplitudes: ArrayLike, vibrates: Vibrates, threshold: float) -> float:
+    """How far the amplitudes that decided lie from the threshold [e-folds]; 0 where nothing is decided.
+
+    Parameters
+    ----------
+    amplitudes : array, shape (window, strand)
+        As `classify` takes them [m].
+    vibrates : Vibrates
+        Its verdict.
+    threshold : float
+        From which amplitude a strand vibrates [m].
+
+    Returns
+    -------
+    float
+        Of a vibration by how much the smallest window of the strand that keeps highest is above it, of
+        silence by how much the largest of the last half of the windows is below it; infinite at rest.
+    """
+    windows = np.asarray(amplitudes, dtype=float)
+    with np.errstate(divide="ignore"):
+        if vibrates is Vibrates.YES:
+            return float(np.log(windows.min(axis=0).max() / threshold))
+        if vibrates is Vibrates.NO:
+            return float(-np.log(windows[len(windows) // 2 :].max() / threshold))
+    return 0.0
+
+
+def _judge_strand(
+    windows: NDArray[np.float64],
+    rate: float,
+    error: float,
+    judged_time: float,
+    record_time: float,
+    parameters: Mapping[str, Any],
+) -> tuple[Vibrates, str]:
+    """Verdict and reason for one strand from its amplitudes in successive windows [m]."""
+    threshold = parameters["amplitude_threshold"]
+    last = windows[-1]
+    size = f"{last * 1e6:.3g} um at the end"
+    from scipy.special import stdtrit  # takes long, and quiet runs do without
+
+    margin = error * stdtrit(max(len(windows) - 2, 1), CONFIDENCE)
+    if np.all(windows >= threshold):
+        loss = -rate * judged_time
+        excused = min(parameters["decay_tolerance"], STEADY_LOSS + margin * judged_time)
+        if loss <= excused:
+            return Vibrates.YES, f"vibrates for the last {judged_time:.3g} s, {size}, growth {rate:.2g} 1/s"
+        why = "in too few windows to tell decay" if np.isnan(rate) else f"but decays at {-rate:.3g} 1/s"
+        return Vibrates.UNDECIDED, f"is above the threshold, {size}, {why}"
+    if is_irregular(windows, threshold, parameters["growth_tolerance"]):
+        spread = f"{windows.min() * 1e6:.3g} to {windows.max() * 1e6:.3g} um"
+        return Vibrates.IRREGULAR, f"is irregular, {spread} in {len(windows)} windows without a trend"
+    if last == 0:
+        return Vibrates.NO, "is at rest"
+    late = windows[len(windows) // 2 :]
+    if np.all(late < parameters["negligible_amplitude"]):
+        return Vibrates.NO, f"is quiet, {size}"
+    if last >= threshold or (np.any(late >= threshold) and not rate + margin < 0):
+        return Vibrates.UNDECIDED, f"is above the threshold only at times, {size}"
+    since = windows[np.argmin(windows) :]
+    rising = len(since) > LEAST_RISES and bool(np.all(np.diff(since) >= 0.0))
+    with np.errstate(divide="ignore"):
+        gain = max(np.log(last / since[0]) if rising else 0.0, (rate - margin) * record_time)
+    if gain >= parameters["growth_tolerance"]:
+        return Vibrates.UNDECIDED, f"is below the threshold, {size}, but growing"
+    if not (rate + error) * record_time < np.log(threshold / last):
+        return Vibrates.UNDECIDED, f"is below the threshold, {size}, but may cross it in {record_time:.3g} s"
+    return Vibrates.NO, f"is quiet, {size}"
+
+
+def relative_scatter(windows: ArrayLike) -> NDArray[np.float64]:
+    """Standard deviation of amplitudes (window, ...) over their mean, (...); nan where nothing moves."""
+    amplitudes = np.asarray(windows, dtype=float)
+    with np.errstate(invalid="ignore"):
+        return np.std(amplitudes, axis=0) / np.mean(amplitudes, axis=0)
+
+
+def is_irregular(windows: ArrayLike, threshold: float, most_gain: float) -> bool:
+    """Whether an amplitude comes and goes about a threshold, and a trend is ruled out.
+
+    Parameters
+    ----------
+    windows : array, shape (window,)
+        Amplitudes in successive windows, equally spaced in time.
+    threshold : float
+        From which amplitude a strand vibrates, in the same unit.
+    most_gain : float
+        Growth or decay over the record that has to be ruled out [e-folds].
+    """
+    amplitudes = np.asarray(windows, dtype=float)
+    crossings = np.count_nonzero(np.diff(amplitudes >= threshold))
+    if crossings < LEAST_CROSSINGS or relative_scatter(amplitudes) < LEAST_SCATTER:
+        return False
+    return is_stationary(amplitudes, most_gain)
+
+
+def is_stationary(windows: ArrayLike, most_gain: float) -> bool:
+    """Whether a trend of an amplitude is ruled out; arguments as of `is_irregular`."""
+    amplitudes = np.asarray(windows, dtype=float)
+    if len(amplitudes) < LEAST_WINDOWS or not np.all(amplitudes > 0.0):
+        return False
+    gain, error = _gain(np.log(amplitudes))
+    return abs(gain) < error and abs(gain) + error < most_gain
+
+
+def _gain(levels: NDArray[np.float64]) -> tuple[float, float]:
+    """Gain of levels (window,) along their straight line, and how far it is uncertain; inf: not known."""
+    n = len(levels)
+    t = np.linspace(-0.5, 0.5, n)
+    slope = t @ levels / (t @ t)
+    scatter = levels - levels.mean() - slope * t
+    # about a fitted line neighbours seem less alike than they are, by (2 + 4 r)/n
+    found = (scatter[1:] @ scatter[:-1]) / (scatter @ scatter)
+    alike = float(np.clip((n * found + 2.0) / (n - 4.0), 0.0, 1.0))
+    freedom = n * (1.0 - alike) / (1.0 + alike) - 2.0
+    if freedom < LEAST_WINDOWS - 2:
+        return float(slope), np.inf
+    from scipy.special import stdtrit  # takes long, and quiet runs do without
+
+    error = np.sqrt(scatter @ scatter / (freedom * (t @ t)))
+    return float(slope), float(stdtrit(freedom, _CONFIDENCE) * error)
 
 
 @dataclass(frozen=True)

@@ -10,8 +10,6 @@ One run where both attractors are found proves nothing: beside a Hopf point a vi
 than a run shows. Two are required.
 """
 
-from __future__ import annotations
-
 from collections.abc import Callable
 from enum import IntEnum
 from typing import NamedTuple

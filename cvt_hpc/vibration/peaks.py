@@ -6,15 +6,13 @@ of their squares. Peaks nearer to a higher one than the window's main lobe, or l
 that one's own, in the band or beside it.
 """
 
-from __future__ import annotations
-
 from typing import NamedTuple
 
 import numpy as np
 from numpy.typing import ArrayLike
 
 from cvt_hpc.variables import Coordinate, Variable
-from cvt_hpc.vibration.tapering import Array, check_band, fine_spectrum, time_last
+from cvt_hpc.vibration.signals import Array, check_band, fine_spectrum, time_last
 
 COUNT = 3  # peaks of a strand that are recorded
 MAIN_LOBE = 4.0  # of Hann's window, in lines: between its zeros

@@ -7,8 +7,6 @@ shorter time is undecided: a slower ramp may decide. A vibration takes time to g
 onset late, by the change of the ramped quantity meanwhile.
 """
 
-from __future__ import annotations
-
 from collections.abc import Mapping, Sequence
 from dataclasses import dataclass
 from typing import Any
@@ -18,8 +16,7 @@ from numpy.typing import ArrayLike, NDArray
 
 from cvt_hpc.variables import Coordinate, Variable, Vibrates, shortened
 from cvt_hpc.vibration import signals
-from cvt_hpc.vibration.assessment import Occurrence
-from cvt_hpc.vibration.occurrence import LEAST_RISES
+from cvt_hpc.vibration.assessment import LEAST_RISES, Occurrence
 from cvt_hpc.vibration.ramped import QUANTITIES, Quantity
 from cvt_hpc.vibration.settings import SHORTEST_SEGMENT, fitting_window
 

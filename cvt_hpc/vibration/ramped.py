@@ -1,7 +1,5 @@
 """The quantity that a run changes all along, by its parameters."""
 
-from __future__ import annotations
-
 import math
 from collections.abc import Mapping
 from typing import Any, NamedTuple

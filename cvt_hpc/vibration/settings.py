@@ -25,12 +25,7 @@ itself
   grows from there; a strand that ends a hundred times below has decayed, whatever rounding does to its trend.
 """
 
-from __future__ import annotations
-
-from collections.abc import Mapping
-from typing import Any
-
-from cvt_hpc.parameters import Parameter, not_negative, positive
+from cvt_hpc.parameters import Parameter, Parameters, not_negative, positive
 from cvt_hpc.vibration.ramped import ramped
 
 PARAMETERS: dict[str, dict[str, Parameter]] = {
@@ -75,7 +70,7 @@ def fitting_window(duration: float, wanted: float) -> float:
     return min(wanted, 0.39 * duration)
 
 
-def check(parameters: Mapping[str, Any]) -> list[tuple[str, str, str]]:
+def check(parameters: Parameters) -> list[tuple[str, str, str]]:
     """Problems between parameters: (key, expected, found), in the form of a model's check.
 
     Parameters
@@ -102,6 +97,6 @@ def check(parameters: Mapping[str, Any]) -> list[tuple[str, str, str]]:
     return problems
 
 
-def inert(parameters: Mapping[str, Any]) -> dict[str, str]:
+def inert(parameters: Parameters) -> dict[str, str]:
     """Parameters without effect on a run, each with the setting that makes it so."""
     return {"decay_tolerance": f"{ramped(parameters)}_history ramp"} if ramped(parameters) else {}

@@ -6,8 +6,7 @@ import numpy as np
 import pytest
 
 from cvt_hpc.analysis.statements.figures import FIGURES
-from cvt_hpc.analysis.statements.kept import Kept
-from cvt_hpc.analysis.statements.verdicts import Verdict, judged
+from cvt_hpc.analysis.statements.verdicts import Kept, Verdict, judged
 from cvt_hpc.variables import Vibrates
 from support import stated
 

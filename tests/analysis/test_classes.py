@@ -6,7 +6,7 @@ import xarray as xr
 
 from cvt_hpc.analysis.classes import OccurrenceClass, at_strongest_strand, occurrence_classes
 from cvt_hpc.variables import Status, Vibrates
-from cvt_hpc.vibration.hysteresis import StartClass
+from cvt_hpc.vibration.classes import StartClass
 from support.studies import study, two_flags
 
 QUIET, VIBRATING, UNDECIDED, FAILED, NOT_RUN, SLIPPING, IRREGULAR = OccurrenceClass

@@ -5,7 +5,7 @@ from itertools import combinations
 import numpy as np
 import pytest
 
-from cvt_hpc.analysis import cells, error_axes, on_variator, value_maps, waterfall
+from cvt_hpc.analysis import cells, figures, on_variator, value_maps, waterfall
 from support.eyes import EYES, lightness, seen
 
 STEPS = np.linspace(0.0, 1.0, 24)
@@ -49,6 +49,6 @@ def test_classes_of_maps_differ_in_colour_or_in_hatching(eyes):
 
 @pytest.mark.parametrize("eyes", EYES)
 def test_colours_of_lines_differ(eyes):
-    looks = seen(error_axes.COLOURS[:MOST_METHODS], eyes)
+    looks = seen(figures.COLOURS[:MOST_METHODS], eyes)
     for one, other in combinations(looks, 2):
         assert np.linalg.norm(one - other) > APART

@@ -14,8 +14,7 @@ from cvt_hpc.analysis.comparison_drawing import draw_comparison
 from cvt_hpc.errors import InputError
 from cvt_hpc.printing import comparison_lines
 from cvt_hpc.variables import Status, Vibrates
-from cvt_hpc.vibration.agreement import PairClass, classify_pairs
-from cvt_hpc.vibration.classes import OccurrenceClass
+from cvt_hpc.vibration.classes import OccurrenceClass, PairClass, classify_pairs
 from support.studies import STIFFNESSES, sampled, study, two_flags
 
 JOB = {

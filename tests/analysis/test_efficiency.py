@@ -5,7 +5,7 @@ import pytest
 
 from cvt_hpc.analysis.efficiency import draw_efficiency, efficiency_figure
 from cvt_hpc.errors import InputError
-from cvt_hpc.study.forecast.simulate import Forecast
+from cvt_hpc.study.forecast.cost_model import Forecast
 
 FORECASTS = [
     Forecast(1, 10, (100.0, 90.0, 120.0), 100.0, (1.0, 0.99, 1.0)),

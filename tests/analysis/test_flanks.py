@@ -9,7 +9,7 @@ import numpy as np
 import pytest
 import xarray as xr
 
-from cvt_hpc.analysis.flanks import QUANTITIES, SIDES, alone, ends_of_arcs, flanks_figure
+from cvt_hpc.analysis.profiles import QUANTITIES, SIDES, alone, ends_of_arcs, flanks_figure
 from cvt_hpc.errors import InputError
 from cvt_hpc.physics.geometry import variator
 

@@ -4,8 +4,7 @@ import numpy as np
 import pytest
 import xarray as xr
 
-from cvt_hpc.analysis.followed import follow_element, path_of
-from cvt_hpc.analysis.followed_drawing import element_figure, one_passage
+from cvt_hpc.analysis.followed_drawing import element_figure, follow_element, one_passage, path_of
 from cvt_hpc.errors import InputError
 from cvt_hpc.vibration.peaks import modal_peaks
 

@@ -3,7 +3,7 @@
 import numpy as np
 import pytest
 
-from cvt_hpc.analysis.spectra import spectrum_figure
+from cvt_hpc.analysis.paper_pictures import spectrum_figure
 from cvt_hpc.analysis.statements.figures import FIGURES
 from support import stated
 

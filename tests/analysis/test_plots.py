@@ -7,15 +7,13 @@ import xarray as xr
 from matplotlib.text import Text
 
 from cvt_hpc.analysis.arrangement import Sides
-from cvt_hpc.analysis.composing import compose
-from cvt_hpc.analysis.curve_panels import curve_panels_figure
-from cvt_hpc.analysis.curves import MARKS, curve_figure
+from cvt_hpc.analysis.curves import MARKS, curve_figure, curve_panels_figure
 from cvt_hpc.analysis.figures import STYLE
+from cvt_hpc.analysis.profiles import wrap_figure
 from cvt_hpc.analysis.value_maps import value_map_figure
 from cvt_hpc.analysis.waterfall import waterfall_figure
-from cvt_hpc.analysis.wraps import wrap_figure
 from cvt_hpc.errors import InputError
-from cvt_hpc.picture_kinds import KINDS, RESULTS
+from cvt_hpc.picture_kinds import KINDS, RESULTS, compose
 from cvt_hpc.variables import Status, Vibrates
 from support import pictured
 

@@ -6,11 +6,10 @@ import numpy as np
 import pytest
 import xarray as xr
 
+from cvt_hpc.analysis.paper_pictures import strand_bars_figure
 from cvt_hpc.analysis.profiles import profile_figure
 from cvt_hpc.analysis.statements import bullinger_along
-from cvt_hpc.analysis.statements.kept import Kept
-from cvt_hpc.analysis.statements.verdicts import Verdict, judged
-from cvt_hpc.analysis.strand_bars import strand_bars_figure
+from cvt_hpc.analysis.statements.verdicts import Kept, Verdict, judged
 from cvt_hpc.errors import InputError
 
 NAMES = np.repeat(["driving arc", "t1", "driven arc", "t2"], [10, 3, 10, 3])

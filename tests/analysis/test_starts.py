@@ -9,10 +9,9 @@ import xarray as xr
 from cvt_hpc.analysis.cells import OF_STARTS, STYLES
 from cvt_hpc.analysis.classes import OccurrenceClass, map_classes, occurrence_classes
 from cvt_hpc.analysis.figures import draw
-from cvt_hpc.analysis.maps import map_figure
-from cvt_hpc.analysis.starts import has_starts, join_starts, start_line
+from cvt_hpc.analysis.maps import has_starts, join_starts, map_figure, start_line
 from cvt_hpc.variables import Status, Vibrates
-from cvt_hpc.vibration.hysteresis import StartClass, classify_starts
+from cvt_hpc.vibration.classes import StartClass, classify_starts
 from support.studies import fills_of, study, traced
 
 Q, V, U, F, N, S, IRR = OccurrenceClass

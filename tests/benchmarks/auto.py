@@ -16,7 +16,7 @@ import numpy as np
 import xarray as xr
 
 from cvt_hpc.job import Job, build_job, load_job
-from cvt_hpc.job.for_model import handed_to
+from cvt_hpc.job.definition import handed_to
 from cvt_hpc.models.auto.rules import Rung
 from cvt_hpc.provenance import origin_lines
 from cvt_hpc.study import open_results, run

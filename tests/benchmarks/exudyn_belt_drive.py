@@ -36,9 +36,8 @@ from typing import Any
 import numpy as np
 
 from cvt_hpc.job import build_job
-from cvt_hpc.models.belt_drive.kick import answers, kick
-from cvt_hpc.models.belt_drive.preload import stretch
-from cvt_hpc.models.belt_drive.theory import expected_loss, strand_frequencies
+from cvt_hpc.models.belt_drive.courses import stretch
+from cvt_hpc.models.belt_drive.theory import answers, expected_loss, kick, strand_frequencies
 from cvt_hpc.models.belt_drive.transient import Transient
 from cvt_hpc.multibody.ancf_beam import SHAPES, WEIGHTS, at_places
 from cvt_hpc.physics.nearest_on_path import along

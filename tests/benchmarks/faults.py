@@ -28,7 +28,7 @@ sys.path.insert(0, str(TESTS))
 from cvt_hpc import load_job, open_results, run  # noqa: E402
 from cvt_hpc.provenance import origin_lines  # noqa: E402
 from cvt_hpc.study.folder import StudyFolder  # noqa: E402
-from cvt_hpc.study.record.recovery import read_records  # noqa: E402
+from cvt_hpc.study.record.index import read_records  # noqa: E402
 from support.cluster import JOB, TWO_NODES, Cluster, missing, wait_until  # noqa: E402
 from support.fault_cases import Outcome, make_reference  # noqa: E402
 from support.fault_kinds import KINDS, NEED_MOUNT, NEED_MPI, can_mount, play  # noqa: E402

@@ -26,11 +26,9 @@ from cvt_hpc import simulation
 from cvt_hpc.job import build_job
 from cvt_hpc.provenance import new_session, origin_lines
 from cvt_hpc.study import gather, open_results, read_status
-from cvt_hpc.study.description import Study, describe
-from cvt_hpc.study.dimensions import Dimension
+from cvt_hpc.study.description import Dimension, Study, describe
 from cvt_hpc.study.folder import StudyFolder
-from cvt_hpc.study.record.frames import RecordFormat
-from cvt_hpc.study.record.log import RecordLog
+from cvt_hpc.study.record.log import RecordFormat, RecordLog
 from cvt_hpc.variables import Status
 
 BINS = 256

@@ -25,17 +25,17 @@ sys.path.insert(0, str(TESTS))
 
 from cvt_hpc.study import process_rank, run  # noqa: E402
 from cvt_hpc.study.batches import share_out  # noqa: E402
-from cvt_hpc.study.forecast.cost_model import Fit  # noqa: E402
-from cvt_hpc.study.forecast.simulate import (  # noqa: E402
+from cvt_hpc.study.forecast.cost_model import (  # noqa: E402
     ClaimTimes,
+    Fit,  # noqa: E402
     Forecast,
     forecast,
     least_makespan,
     simulate_schedule,
 )
 from cvt_hpc.study.ranks.launch import assembled_team  # noqa: E402
-from cvt_hpc.study.ranks.schedule import open_counter  # noqa: E402
 from cvt_hpc.study.status import find_records  # noqa: E402
+from cvt_hpc.study.sweep import open_counter  # noqa: E402
 from support.study_double import Axis, Job, Simulator  # noqa: E402
 from support.study_processes import clean_environment, find_mpirun  # noqa: E402
 

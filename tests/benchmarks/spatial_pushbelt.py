@@ -22,8 +22,8 @@ from cvt_hpc.lanes import LaneArray
 from cvt_hpc.models.pushbelt import fields as planar
 from cvt_hpc.models.pushbelt.stepping import advance_by
 from cvt_hpc.models.spatial_pushbelt import belt as b
-from cvt_hpc.models.spatial_pushbelt.start import with_two_flows
-from cvt_hpc.models.spatial_pushbelt.step import EQUATIONS
+from cvt_hpc.models.spatial_pushbelt.belt import with_two_flows
+from cvt_hpc.models.spatial_pushbelt.transient import EQUATIONS
 from support.pushbelts import THRUST
 from support.spatial_belts import LOAD, inputs, scene, stored
 

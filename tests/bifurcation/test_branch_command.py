@@ -6,10 +6,8 @@ import numpy as np
 import pytest
 import xarray as xr
 
-from cvt_hpc.bifurcation.attractors import Attractor, Start, attractors
-from cvt_hpc.bifurcation.dataset import Direction
-from cvt_hpc.bifurcation.folder import DiagramFolder
-from cvt_hpc.bifurcation.followed import Stability
+from cvt_hpc.bifurcation.attractors import Attractor, Stability, Start, attractors
+from cvt_hpc.bifurcation.diagram import DiagramFolder, Direction
 from cvt_hpc.bifurcation.job import load_diagram
 from cvt_hpc.cli import main
 from cvt_hpc.job import build_job

@@ -8,10 +8,9 @@ import numpy as np
 import pytest
 
 from cvt_hpc.analysis.figures import STYLE
-from cvt_hpc.bifurcation import followed as kept
-from cvt_hpc.bifurcation.attractors import Attractor
+from cvt_hpc.bifurcation import attractors
+from cvt_hpc.bifurcation.attractors import Attractor, Followed, states_of
 from cvt_hpc.bifurcation.drawing import GAP, HOPF, STARTS, branch_figure, stable_parts
-from cvt_hpc.bifurcation.followed import Followed, states_of
 from cvt_hpc.bifurcation.table import branch_lines, failure_lines, gap_lines
 from cvt_hpc.job.schema import load_schema
 from cvt_hpc.models.linear_stability.branch import Branch, Onset, Point, branch, onsets, tracks
@@ -59,7 +58,7 @@ def followed(onsets=(ONSET,)):
     kinds = [Criticality(Kind.SUBCRITICAL, 6.0, 1.0, "both attractors")] * len(onsets)
     asked = SimpleNamespace(place={}, parameters={"friction_gradient": -0.8, "sheave_stiffness": np.inf})
     with pytest.MonkeyPatch.context() as patch:
-        patch.setattr(kept, "quantities", lambda steady, grid: {})
+        patch.setattr(attractors, "quantities", lambda steady, grid: {})
         states = states_of(FOUND, None, LOADS)
     return Followed(asked, states, list(onsets), [(30.0, 50.0)], runs, kinds)
 

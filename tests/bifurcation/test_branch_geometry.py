@@ -2,7 +2,7 @@
 
 import pytest
 
-from cvt_hpc.bifurcation.dataset import diagram_dataset
+from cvt_hpc.bifurcation.diagram import diagram_dataset
 from cvt_hpc.bifurcation.job import load_diagram
 from cvt_hpc.errors import InputError
 

@@ -6,7 +6,7 @@ from pathlib import Path
 import pytest
 
 from cvt_hpc.chart import load_chart
-from cvt_hpc.chart.checks import check_prospects
+from cvt_hpc.chart.measuring import check_prospects
 from cvt_hpc.chart.plan import Role
 from cvt_hpc.cli import main
 

@@ -7,9 +7,9 @@ import pytest
 
 from cvt_hpc.chart import load_chart
 from cvt_hpc.chart.comparing import compare, error, scatter
+from cvt_hpc.chart.making import table_lines
 from cvt_hpc.chart.measuring import Measurement, measure
 from cvt_hpc.chart.quantities import Quantity
-from cvt_hpc.chart.table import table_lines
 
 
 def quantity(name, tolerance=math.inf, scale=0.0):

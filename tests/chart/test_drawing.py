@@ -9,10 +9,9 @@ from PIL import Image
 
 from cvt_hpc.analysis.figures import STYLE
 from cvt_hpc.chart import load_chart, make_chart
-from cvt_hpc.chart.budget_drawing import budget_figure
 from cvt_hpc.chart.comparing import compare
 from cvt_hpc.chart.measuring import measure
-from cvt_hpc.chart.scene_drawing import GREY, scene_figure
+from cvt_hpc.chart.scene_drawing import GREY, budget_figure, scene_figure
 
 
 def comparison_of(job):

@@ -12,9 +12,7 @@ import xarray as xr
 
 from cvt_hpc.cli import main
 from cvt_hpc.job import load_job
-from cvt_hpc.ladder.costs import cost_left
-from cvt_hpc.ladder.loading import load_ladder
-from cvt_hpc.ladder.rungs import ladder
+from cvt_hpc.ladder.loading import cost_left, ladder, load_ladder
 from cvt_hpc.models.elastic_belt.step_choice import transverse_limit
 from cvt_hpc.tables import below_origin
 from support.cf import cf_findings

@@ -4,7 +4,7 @@ import pytest
 
 from cvt_hpc.errors import InputError
 from cvt_hpc.job import build_job
-from cvt_hpc.ladder.rungs import ladder
+from cvt_hpc.ladder.loading import ladder
 
 DOCUMENT = {
     "name": "x",

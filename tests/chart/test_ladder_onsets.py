@@ -3,7 +3,7 @@
 import numpy as np
 import pytest
 
-from cvt_hpc.vibration.onsets import Onset, onsets, paired_errors
+from cvt_hpc.vibration.classes import Onset, onsets, paired_errors
 
 NAN = np.nan
 LOADS = np.array([10.0, 20.0, 30.0, 40.0, 50.0, 60.0])

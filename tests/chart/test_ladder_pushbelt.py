@@ -8,8 +8,7 @@ import pytest
 from cvt_hpc.cli import main
 from cvt_hpc.errors import InputError, UnitWarning
 from cvt_hpc.job import build_job
-from cvt_hpc.ladder.loading import load_ladder
-from cvt_hpc.ladder.rungs import QUESTIONS, ladder
+from cvt_hpc.ladder.loading import QUESTIONS, ladder, load_ladder
 
 JOBS = Path(__file__).parents[2] / "jobs"
 DOCUMENT = {

@@ -15,9 +15,7 @@ import xarray as xr
 from threadpoolctl import threadpool_info, threadpool_limits
 
 from cvt_hpc.chart import load_chart, make_chart
-from cvt_hpc.chart.making import _tell_compiling
-from cvt_hpc.chart.store import ChartFolder
-from cvt_hpc.chart.table import table_lines
+from cvt_hpc.chart.making import ChartFolder, _tell_compiling, table_lines
 from cvt_hpc.errors import InputError
 from cvt_hpc.output_folder import checksum
 from cvt_hpc.provenance import git_revision, machine

@@ -6,8 +6,7 @@ import numpy as np
 import pytest
 
 from cvt_hpc.chart import load_chart
-from cvt_hpc.chart.checks import check_prospects
-from cvt_hpc.chart.measuring import measure
+from cvt_hpc.chart.measuring import check_prospects, measure
 from cvt_hpc.chart.quantities import History, Quantity, observe
 from cvt_hpc.errors import InputError
 from cvt_hpc.models import MODELS

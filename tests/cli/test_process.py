@@ -120,7 +120,7 @@ def test_exports_are_there_whatever_was_imported_before(tmp_path):
     """
     done = call(sys.executable, "-c", textwrap.dedent(program), cwd=tmp_path)
     assert done.stdout.splitlines() == [
-        "cvt_hpc.job.loading cvt_hpc.study.sweep cvt_hpc.study.gather cvt_hpc.simulation.history",
+        "cvt_hpc.job.loading cvt_hpc.study.sweep cvt_hpc.study.gather cvt_hpc.simulation.running",
         "True True",
         "module 'cvt_hpc' has no attribute 'simulat'",
     ], done.stderr

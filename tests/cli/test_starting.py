@@ -14,8 +14,7 @@ import pytest
 import cvt_hpc
 from cvt_hpc.errors import InputError
 from cvt_hpc.job import build_job
-from cvt_hpc.job.examples import example_files
-from cvt_hpc.job.template import job_template
+from cvt_hpc.job.template import example_files, job_template
 from cvt_hpc.models import MODELS
 from cvt_hpc.models.contract import load_model
 from cvt_hpc.study import doctor
@@ -169,7 +168,7 @@ def test_the_wheel_brings_its_revision_and_the_same_examples(tmp_path):
     )
     (package,) = (tmp_path / "own").glob("lib*/python*/site-packages")
     program = (
-        "import json, cvt_hpc; from cvt_hpc.job.examples import example_files;"
+        "import json, cvt_hpc; from cvt_hpc.job.template import example_files;"
         "from cvt_hpc.provenance import git_revision;"
         "files = {name: str(path) for name, path in example_files().items()};"
         "print(json.dumps([cvt_hpc.__file__, git_revision(), files]))"
@@ -191,7 +190,7 @@ def test_the_wheel_brings_its_revision_and_the_same_examples(tmp_path):
 
 def test_a_package_without_examples_says_so(tmp_path, monkeypatch):
     monkeypatch.setattr(cvt_hpc, "__file__", str(tmp_path / "cvt_hpc" / "__init__.py"))
-    monkeypatch.setattr("cvt_hpc.job.examples.metadata.files", lambda _: None)
+    monkeypatch.setattr("cvt_hpc.job.template.metadata.files", lambda _: None)
     with pytest.raises(InputError, match="examples: expected those of a wheel, or of a checkout"):
         example_files()
 

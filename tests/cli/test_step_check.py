@@ -10,7 +10,7 @@ import xarray as xr
 import cvt_hpc.job.schema as schema
 from cvt_hpc.job import build_job
 from cvt_hpc.simulation import estimate_cost
-from cvt_hpc.study.step_check import step_check
+from cvt_hpc.study.repeats import step_check
 from cvt_hpc.variables import Coordinate, Status, Variable, Vibrates
 
 STEP = 1e-6

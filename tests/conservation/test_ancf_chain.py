@@ -4,7 +4,7 @@ import numpy as np
 import pytest
 
 from cvt_hpc.multibody.ancf_beam import SHAPES, WEIGHTS, at_places, beam, energies
-from cvt_hpc.multibody.ancf_chain import chain
+from cvt_hpc.multibody.ancf_equations import chain
 from cvt_hpc.solvers.generalised_alpha import Scheme, generalised_alpha
 from support.ancf import accelerate, advance, cross, ring, straight
 

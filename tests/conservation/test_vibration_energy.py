@@ -3,7 +3,7 @@
 import numpy as np
 import pytest
 
-from cvt_hpc.models.moving_string import motion
+from cvt_hpc.models.moving_string import transient as motion
 from cvt_hpc.steppers import symplectic_euler
 from cvt_hpc.steppers.facts import COUNTERS
 from support.small_systems import FACTS, begin, scene

@@ -4,9 +4,8 @@ import numpy as np
 import pytest
 
 from cvt_hpc.models.beam_pushbelt import fields as f
-from cvt_hpc.models.beam_pushbelt.belt import BeltState, Proximal
-from cvt_hpc.models.beam_pushbelt.start import workspace
 from cvt_hpc.models.beam_pushbelt.step import advance
+from cvt_hpc.models.beam_pushbelt.transient import BeltState, Proximal, workspace
 from cvt_hpc.models.pushbelt import fields
 from cvt_hpc.models.pushbelt.belt import Belt
 from cvt_hpc.multibody.rcm_beam import RcmBeam, line_point

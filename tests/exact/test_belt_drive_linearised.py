@@ -4,9 +4,8 @@ import numpy as np
 import pytest
 
 from cvt_hpc.models.belt_drive import contact, pulleys
-from cvt_hpc.models.belt_drive.drive import Drive, state
+from cvt_hpc.models.belt_drive.drive import Drive, matrices, state
 from cvt_hpc.models.belt_drive.friction import Friction, Treatment
-from cvt_hpc.models.belt_drive.linearised import matrices
 from cvt_hpc.multibody.ancf_beam import at_places, beam, energies
 from cvt_hpc.physics.friction import friction_law
 from support.ancf import ring

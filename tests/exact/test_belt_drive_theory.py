@@ -8,8 +8,8 @@ from scipy.optimize import newton
 
 from cvt_hpc.job import build_job
 from cvt_hpc.models.belt_drive import theory
-from cvt_hpc.models.belt_drive.kick import MIDDLE, WIDTH, answers, kick
 from cvt_hpc.models.belt_drive.layout import layout
+from cvt_hpc.models.belt_drive.theory import MIDDLE, WIDTH, answers, kick
 from cvt_hpc.multibody.ancf_beam import SHAPES, WEIGHTS, at_places, beam
 from cvt_hpc.physics.belt_path import points_at, regions
 from cvt_hpc.physics.nearest_on_path import along

@@ -6,8 +6,7 @@ from scipy.integrate import quad, solve_ivp
 from scipy.optimize import brentq
 
 from cvt_hpc.errors import InputError
-from cvt_hpc.models.criterion.energy import energy_per_cycle, flank
-from cvt_hpc.models.criterion.record import RELATIVE_AMPLITUDES
+from cvt_hpc.models.criterion.record import RELATIVE_AMPLITUDES, energy_per_cycle, flank
 from cvt_hpc.variables import Status, Vibrates
 from support.rungs import rung_job, rung_record
 

@@ -5,7 +5,7 @@ import pytest
 
 from cvt_hpc.job import build_job
 from cvt_hpc.models.moving_string.exact import exact, frequency, travelling
-from cvt_hpc.models.moving_string.motion import initial_state, moving_string, system
+from cvt_hpc.models.moving_string.transient import initial_state, moving_string, system
 from support.small_systems import finished, order, scene
 
 UNIT = scene("moving_string", length=1.0, tension=1.0, line_mass=1.0)

@@ -7,11 +7,8 @@ import pytest
 from scipy.integrate import solve_ivp
 
 from cvt_hpc.errors import InputError
-from cvt_hpc.models.oscillator.constants import oscillator
-from cvt_hpc.models.oscillator.cycles import cycle_starts, work_per_cycle
-from cvt_hpc.models.oscillator.motion import system
-from cvt_hpc.models.oscillator.record import Sticks, judge
-from cvt_hpc.models.oscillator.steady import steady_sliding
+from cvt_hpc.models.oscillator.motion import oscillator, steady_sliding, system
+from cvt_hpc.models.oscillator.record import Sticks, cycle_starts, judge, work_per_cycle
 from cvt_hpc.simulation import record_variables, simulate
 from cvt_hpc.variables import Status, Vibrates
 from support.rungs import rung_job, rung_record

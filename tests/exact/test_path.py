@@ -4,7 +4,7 @@ import numpy as np
 import pytest
 
 from cvt_hpc.physics.geometry import driven_radius, variator
-from cvt_hpc.variator.path import along, points_at, regions
+from cvt_hpc.variator.history import along, points_at, regions
 
 
 @pytest.mark.parametrize("ratio", [0.4, 1.0, 1.35, 2.6])

@@ -7,11 +7,11 @@ import pytest
 from scipy.linalg import eigh
 
 from cvt_hpc.models.pushbelt import fields as pushbelt_fields
-from cvt_hpc.models.pushbelt.start import of_lanes
+from cvt_hpc.models.pushbelt.belt import of_lanes
 from cvt_hpc.models.pushbelt.stepping import correct, solve_bordered
 from cvt_hpc.models.spatial_pushbelt import belt as b
 from cvt_hpc.models.spatial_pushbelt import fields as spatial_fields
-from cvt_hpc.models.spatial_pushbelt.step import (
+from cvt_hpc.models.spatial_pushbelt.transient import (
     EQUATIONS,
     _accept,
     _assemble,

@@ -5,13 +5,12 @@ import pytest
 from numba import njit
 from scipy.optimize import brentq
 
-from cvt_hpc.models.pushbelt.start import of_lanes
+from cvt_hpc.models.pushbelt.belt import of_lanes
 from cvt_hpc.models.spatial_pushbelt import belt as b
 from cvt_hpc.models.spatial_pushbelt import fields as f
 from cvt_hpc.models.spatial_pushbelt.chain import predict
-from cvt_hpc.models.spatial_pushbelt.faces import face_forces, face_gap, predict_faces
+from cvt_hpc.models.spatial_pushbelt.faces import face_forces, face_gap, pin_offset, predict_faces
 from cvt_hpc.models.spatial_pushbelt.flank import flank_directions, frustum, frustum_gap
-from cvt_hpc.models.spatial_pushbelt.pin import pin_offset
 from support import spatial_chains as chains
 
 

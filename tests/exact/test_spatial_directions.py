@@ -3,10 +3,10 @@
 import numpy as np
 import pytest
 
-from cvt_hpc.models.pushbelt.start import in_lanes, of_lanes
+from cvt_hpc.models.pushbelt.belt import in_lanes, of_lanes
 from cvt_hpc.models.spatial_pushbelt import fields
-from cvt_hpc.models.spatial_pushbelt.bending import bending_forces, predict_bending
-from cvt_hpc.models.spatial_pushbelt.step import _assemble, _prepare
+from cvt_hpc.models.spatial_pushbelt.assembly import bending_forces, predict_bending
+from cvt_hpc.models.spatial_pushbelt.transient import _assemble, _prepare
 from support import spatial_chains as chains
 
 STEP = 1e-5

@@ -5,13 +5,13 @@ import pytest
 
 from cvt_hpc.models.pushbelt import belt as p
 from cvt_hpc.models.pushbelt import fields as pushbelt_fields
-from cvt_hpc.models.pushbelt.start import in_lanes, of_lanes, start
-from cvt_hpc.models.pushbelt.start import workspace as planar_workspace
-from cvt_hpc.models.pushbelt.step import advance as planar_advance
+from cvt_hpc.models.pushbelt.belt import in_lanes, of_lanes, start
+from cvt_hpc.models.pushbelt.belt import workspace as planar_workspace
+from cvt_hpc.models.pushbelt.transient import advance as planar_advance
 from cvt_hpc.models.spatial_pushbelt import belt as b
 from cvt_hpc.models.spatial_pushbelt import fields as spatial_fields
 from cvt_hpc.models.spatial_pushbelt.flank import flank_forces
-from cvt_hpc.models.spatial_pushbelt.step import _accept, _evaluate, _prepare, advance
+from cvt_hpc.models.spatial_pushbelt.transient import _accept, _evaluate, _prepare, advance
 from support import spatial_chains as chains
 from support.pushbelts import THRUST, given
 from support.spatial_belts import LOAD, NODES, RAMP, STEP, inputs, leaning_loads, scene, sheaves_modes

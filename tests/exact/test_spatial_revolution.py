@@ -7,10 +7,10 @@ import numpy as np
 import pytest
 
 from cvt_hpc.models.pushbelt import fields as pushbelt_fields
-from cvt_hpc.models.pushbelt.start import of_lanes
+from cvt_hpc.models.pushbelt.belt import of_lanes
 from cvt_hpc.models.spatial_pushbelt import belt as b
 from cvt_hpc.models.spatial_pushbelt import fields as spatial_fields
-from cvt_hpc.models.spatial_pushbelt.step import advance
+from cvt_hpc.models.spatial_pushbelt.transient import advance
 from cvt_hpc.physics.friction_laws import Law
 from support.pushbelts import THRUST
 from support.spatial_belts import (

@@ -3,11 +3,11 @@
 import numpy as np
 import pytest
 
-from cvt_hpc.models.pushbelt.start import in_lanes, of_lanes
+from cvt_hpc.models.pushbelt.belt import in_lanes, of_lanes
 from cvt_hpc.models.spatial_pushbelt import belt as b
 from cvt_hpc.models.spatial_pushbelt import fields as spatial_fields
-from cvt_hpc.models.spatial_pushbelt.saddle import saddle_forces
-from cvt_hpc.models.spatial_pushbelt.step import _prepare, advance
+from cvt_hpc.models.spatial_pushbelt.chain import saddle_forces
+from cvt_hpc.models.spatial_pushbelt.transient import _prepare, advance
 from support import spatial_chains as chains
 
 STEP = 1e-5  # [s]

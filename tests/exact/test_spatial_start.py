@@ -4,11 +4,11 @@ import numpy as np
 import pytest
 
 from cvt_hpc.models.pushbelt import fields as f
-from cvt_hpc.models.pushbelt.start import equal_chords, of_lanes, path_of
+from cvt_hpc.models.pushbelt.belt import equal_chords, of_lanes, path_of
 from cvt_hpc.models.spatial_pushbelt import fields as spatial_fields
-from cvt_hpc.models.spatial_pushbelt.start import start
+from cvt_hpc.models.spatial_pushbelt.belt import start
 from cvt_hpc.physics.out_of_plane import clamped_force
-from cvt_hpc.variator.path import points_at, regions
+from cvt_hpc.variator.history import points_at, regions
 
 OFFSET, EI = 5e-4, 47.6  # [m], [N m^2]
 NODES = 432

@@ -6,12 +6,12 @@ import numpy as np
 import pytest
 
 from cvt_hpc.models.pushbelt import fields as pushbelt_fields
-from cvt_hpc.models.pushbelt.start import in_lanes, of_lanes
+from cvt_hpc.models.pushbelt.belt import in_lanes, of_lanes
 from cvt_hpc.models.pushbelt.stepping import advance_by
 from cvt_hpc.models.spatial_pushbelt import belt as b
 from cvt_hpc.models.spatial_pushbelt import fields as spatial_fields
-from cvt_hpc.models.spatial_pushbelt.start import with_two_flows
-from cvt_hpc.models.spatial_pushbelt.step import EQUATIONS, advance
+from cvt_hpc.models.spatial_pushbelt.belt import with_two_flows
+from cvt_hpc.models.spatial_pushbelt.transient import EQUATIONS, advance
 from cvt_hpc.solvers.linked_blocks import field_of_right
 from support import spatial_chains as chains
 from support.pushbelts import THRUST

@@ -8,11 +8,10 @@ import pytest
 
 from cvt_hpc.cli import main
 from cvt_hpc.errors import InputError
-from cvt_hpc.fit.around import sensitivities
 from cvt_hpc.fit.evaluating import Evaluation
 from cvt_hpc.fit.loading import load_fit
-from cvt_hpc.fit.search import Found
-from cvt_hpc.fit.table import conflict_table
+from cvt_hpc.fit.making import conflict_table
+from cvt_hpc.fit.search import Found, sensitivities
 from cvt_hpc.study import run
 from cvt_hpc.tables import below_origin
 from cvt_hpc.vibration.classes import OccurrenceClass

@@ -11,9 +11,9 @@ from cvt_hpc.cli import main
 from cvt_hpc.errors import JobWarning, NoEffectWarning, UnitWarning
 from cvt_hpc.fit.loading import load_fit
 from cvt_hpc.job import build_job, load_job, rebuild_job
-from cvt_hpc.job.plausibility import warn_of_bare_numbers
+from cvt_hpc.job.values import warn_of_bare_numbers
 from cvt_hpc.parameters import Parameter
-from cvt_hpc.simulation import history
+from cvt_hpc.simulation import running
 
 SPEED = Parameter(300.0, "rad/s", "", sensible=(1.0, 800.0))
 LENGTH = Parameter(0.1, "m", "", sensible=(1e-3, 1.0), allow_infinite=True)
@@ -111,8 +111,8 @@ def test_notices_speak_of_a_single_run_and_of_the_ranges_of_a_fit(tmp_path, monk
             'meaning, disc and tilt; stiffness_of = "disc" silences this line'
         ]
 
-    monkeypatch.setattr(history, "_history", lambda *_: None)
-    monkeypatch.setattr(history, "do", lambda *_, **__: [(None, {})])
+    monkeypatch.setattr(running, "_history", lambda *_: None)
+    monkeypatch.setattr(running, "do", lambda *_, **__: [(None, {})])
     document = {"name": "x", "model": "elastic_belt"}
     plain = build_job(document)
     assert warned(simulate, plain, {"sheave_stiffness": 1.5}) == told("build_job")

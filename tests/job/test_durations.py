@@ -3,7 +3,7 @@
 import pytest
 
 from cvt_hpc.errors import InputError
-from cvt_hpc.job.durations import read_duration
+from cvt_hpc.job.units import read_duration
 
 
 @pytest.mark.parametrize(

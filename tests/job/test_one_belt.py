@@ -7,7 +7,7 @@ import pytest
 from cvt_hpc.errors import InputError
 from cvt_hpc.job import build_job, known_keys
 from cvt_hpc.job.crosscheck import without_effect
-from cvt_hpc.job.for_model import handed_to
+from cvt_hpc.job.definition import handed_to
 from cvt_hpc.job.schema import load_schema
 from cvt_hpc.job.summary import summarize
 from cvt_hpc.models import MODELS

@@ -12,7 +12,7 @@ import pytest
 from scipy.integrate import solve_ivp
 from scipy.linalg import expm
 
-from cvt_hpc.models.moving_string import motion as string_motion
+from cvt_hpc.models.moving_string import transient as string_motion
 from cvt_hpc.models.oscillator import motion as oscillator_motion
 from support.small_systems import ADAPTIVE, FACTS, FIXED, begin, finished, order, scene
 

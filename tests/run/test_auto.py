@@ -18,7 +18,7 @@ from cvt_hpc.simulation import (
     simulate,
     turns,
 )
-from cvt_hpc.simulation.batches import MOST_TURNS
+from cvt_hpc.simulation.record import MOST_TURNS
 from cvt_hpc.variables import Status, Vibrates
 from cvt_hpc.vibration.assessment import Occurrence
 from support.outcomes import outcomes_of

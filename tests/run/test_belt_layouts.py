@@ -10,8 +10,8 @@ from scipy.optimize import brentq
 from cvt_hpc.analysis.histories import history_figure
 from cvt_hpc.errors import InputError
 from cvt_hpc.job import build_job
+from cvt_hpc.models.belt_drive.courses import length_at
 from cvt_hpc.models.belt_drive.layout import layout
-from cvt_hpc.models.belt_drive.preload import length_at
 from cvt_hpc.models.belt_drive.pulleys import arms_energy, axes
 from cvt_hpc.models.belt_drive.readings import Reading, Readings, stored_energy
 from cvt_hpc.models.belt_drive.start import start

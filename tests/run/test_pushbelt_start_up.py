@@ -6,16 +6,15 @@ import numpy as np
 import pytest
 
 from cvt_hpc import simulation
-from cvt_hpc.chart.timed_runs import march
+from cvt_hpc.chart.measuring import march
 from cvt_hpc.job import build_job
 from cvt_hpc.models.contract import load_model
 from cvt_hpc.models.pushbelt import fields as f
-from cvt_hpc.models.pushbelt.run import ElementRun
-from cvt_hpc.models.pushbelt.start import of_lanes
-from cvt_hpc.models.pushbelt.start_up import StartUps, fingerprint
+from cvt_hpc.models.pushbelt.belt import of_lanes
+from cvt_hpc.models.pushbelt.run import ElementRun, StartUps, fingerprint
 from cvt_hpc.models.spatial_pushbelt import fields
 from cvt_hpc.simulation import run_point, run_points
-from cvt_hpc.study.forecast.pilots import run_pilots
+from cvt_hpc.study.forecast.resources import run_pilots
 from cvt_hpc.variables import Status
 from cvt_hpc.variator import PULLEYS
 

@@ -160,13 +160,13 @@ def test_stations_fill_the_lanes_where_nothing_else_is_asked_for(monkeypatch, va
         assert points[0]["lanes"] == expected
         raise Stopped
 
-    monkeypatch.setattr("cvt_hpc.simulation.history.do", do)
+    monkeypatch.setattr("cvt_hpc.simulation.running.do", do)
     with pytest.raises(Stopped):
         simulate(job(**CHEAP, **values), at)
 
 
 def test_a_value_that_is_not_fit_is_refused_before_anything_runs(monkeypatch):
-    monkeypatch.setattr("cvt_hpc.simulation.history.do", None)
+    monkeypatch.setattr("cvt_hpc.simulation.running.do", None)
     with pytest.raises(InputError, match="sheave_stifness.*did you mean sheave_stiffness"):
         simulate(job(**CHEAP), {"sheave_stifness": 1.0})
     with pytest.raises(InputError, match="ratio.*pulleys that do not overlap"):

@@ -15,7 +15,7 @@ from cvt_hpc.models.elastic_belt.lane_belt import parts_of
 from cvt_hpc.models.elastic_belt.sampling import Outcome
 from cvt_hpc.physics import compliance
 from cvt_hpc.simulation import lane_groups, run_point, run_points
-from cvt_hpc.simulation.batches import MOST_TURNS
+from cvt_hpc.simulation.record import MOST_TURNS
 from cvt_hpc.variables import Status, Vibrates
 from support.fast_runs import FastRuns
 from support.marched import CHEAP, assert_same_bits, job, never

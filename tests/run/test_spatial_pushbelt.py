@@ -19,7 +19,7 @@ from cvt_hpc.physics.out_of_plane import axial_offset, clamped_force
 from cvt_hpc.simulation import run_point, simulate
 from cvt_hpc.study import open_results, run
 from cvt_hpc.variables import Status, Vibrates
-from cvt_hpc.variator.path import regions
+from cvt_hpc.variator.history import regions
 from support.spatial_belts import COARSE, job
 
 OFFSET = 5e-4  # [m]

@@ -6,7 +6,7 @@ import getpass
 import pytest
 
 from cvt_hpc import load_job, open_results, run
-from cvt_hpc.study.part import Part
+from cvt_hpc.study.folder import Part
 from support.cluster import JOB, TWO_NODES, wait_until
 from support.recorded import assert_same_numbers, frames_written, recorded_runs, records
 

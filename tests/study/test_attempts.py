@@ -9,12 +9,11 @@ import numpy as np
 import pytest
 
 from cvt_hpc.study import open_results, read_status, run
-from cvt_hpc.study.attempts import given_up, plan_runs, runs_to_repeat
 from cvt_hpc.study.batches import Assignment
 from cvt_hpc.study.folder import StudyFolder
-from cvt_hpc.study.record.frames import RecordFormat
-from cvt_hpc.study.record.log import RecordLog
-from cvt_hpc.study.record.recovery import read_records
+from cvt_hpc.study.planning import given_up, plan_runs, runs_to_repeat
+from cvt_hpc.study.record.index import read_records
+from cvt_hpc.study.record.log import RecordFormat, RecordLog
 from cvt_hpc.variables import Status
 from support.study_double import Axis, Job, Simulator
 from support.study_processes import wait_until

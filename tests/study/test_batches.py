@@ -11,8 +11,7 @@ from hypothesis import strategies as st
 from cvt_hpc.study import open_results, run
 from cvt_hpc.study.batches import batch_cost, share_out
 from cvt_hpc.study.forecast.cost_model import CostModel
-from cvt_hpc.study.record.frames import RECORD
-from cvt_hpc.study.record.log import RecordLog
+from cvt_hpc.study.record.log import RECORD, RecordLog
 from cvt_hpc.variables import Status
 from support.recorded import assert_same_numbers
 from support.study_double import Axis, Job, Simulator

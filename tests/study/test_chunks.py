@@ -15,12 +15,11 @@ from hypothesis import strategies as st
 
 from cvt_hpc.files import StorageError
 from cvt_hpc.study import gather, open_results, run
-from cvt_hpc.study.chunks import contiguous_part
 from cvt_hpc.study.description import describe
 from cvt_hpc.study.folder import StudyFolder
-from cvt_hpc.study.record.frames import RecordFormat
-from cvt_hpc.study.record.log import RecordLog
-from cvt_hpc.study.record.recovery import read_records
+from cvt_hpc.study.gather import contiguous_part
+from cvt_hpc.study.record.index import read_records
+from cvt_hpc.study.record.log import RecordFormat, RecordLog
 from cvt_hpc.variables import Status
 from support.study_double import Axis, Coordinate, Job, Simulator
 from support.study_processes import clean_environment, wait_until
@@ -76,8 +75,8 @@ def assert_holds(path, study, rows):
 def test_the_dataset_does_not_depend_on_its_pieces(tmp_path, monkeypatch, shape, block, chunk):
     study = describe(grid(*shape), Simulator())
     monkeypatch.setattr("cvt_hpc.study.record.index.BLOCK", block * study.record_dtype.itemsize)
-    monkeypatch.setattr("cvt_hpc.study.chunks.CHUNK", chunk)
-    monkeypatch.setattr("cvt_hpc.study.record.frames.WINDOW", 1000)  # less than two frames
+    monkeypatch.setattr(sys.modules["cvt_hpc.study.gather"], "CHUNK", chunk)
+    monkeypatch.setattr("cvt_hpc.study.record.log.WINDOW", 1000)  # less than two frames
     rows = make_rows(study)
     order = np.random.default_rng(1).permutation(study.size)
     for part in (order[::2], order[1::2]):
@@ -88,7 +87,7 @@ def test_the_dataset_does_not_depend_on_its_pieces(tmp_path, monkeypatch, shape,
 def test_gaps_damage_and_repetition_cost_only_what_they_struck(tmp_path, monkeypatch, caplog):
     study = describe(grid(6, 10), Simulator())
     monkeypatch.setattr("cvt_hpc.study.record.index.BLOCK", 7 * study.record_dtype.itemsize)
-    monkeypatch.setattr("cvt_hpc.study.record.frames.WINDOW", 1000)
+    monkeypatch.setattr("cvt_hpc.study.record.log.WINDOW", 1000)
     rows, others = make_rows(study), make_rows(study, seed=1)
     first = write_log(tmp_path, study, rows, range(5, 40))
     write_log(tmp_path, study, others, range(30, 50))  # of the first ten the earlier written count
@@ -144,7 +143,7 @@ def test_memory_is_bounded_by_the_block_not_by_the_study(tmp_path, monkeypatch):
     rows["status"] = Status.DONE
     write_log(tmp_path, study, np.resize(rows, runs), range(runs))
     monkeypatch.setattr("cvt_hpc.study.record.index.BLOCK", 1 << 20)
-    monkeypatch.setattr("cvt_hpc.study.record.frames.WINDOW", 1 << 20)
+    monkeypatch.setattr("cvt_hpc.study.record.log.WINDOW", 1 << 20)
     tracemalloc.start()
     try:
         gather(tmp_path)
@@ -202,7 +201,7 @@ import_module("cvt_hpc.study.{module}").{function} = kill
 
 @pytest.mark.parametrize(
     ("module", "function"),
-    [("gather", "_declare"), ("gather", "fill"), ("chunks", "_pack")],
+    [("gather", "_declare"), ("gather", "fill"), ("gather", "_pack")],
 )
 def test_a_gathering_that_is_killed_leaves_the_dataset_that_was_there(tmp_path, module, function):
     job = grid(60)

@@ -14,18 +14,17 @@ from cvt_hpc.printing import disk_line
 from cvt_hpc.study import run
 from cvt_hpc.study.description import describe
 from cvt_hpc.study.folder import StudyFolder
-from cvt_hpc.study.forecast.cost_model import Fit
-from cvt_hpc.study.forecast.pilots import find_out
-from cvt_hpc.study.forecast.resources import Disk, disk_space, slurm_time, suggested_time
-from cvt_hpc.study.forecast.simulate import (
+from cvt_hpc.study.forecast.cost_model import (
     NETWORK,
     ClaimTimes,
+    Fit,
     Forecast,
     forecast,
     least_makespan,
     simulate_schedule,
 )
-from cvt_hpc.study.record.frames import PREAMBLE
+from cvt_hpc.study.forecast.resources import Disk, disk_space, find_out, slurm_time, suggested_time
+from cvt_hpc.study.record.log import PREAMBLE
 from support.study_double import Axis, Job, Simulator
 
 AT_ONCE = ClaimTimes(0.0, 0.0, 0.0)

@@ -13,7 +13,7 @@ from cvt_hpc.errors import InputError
 from cvt_hpc.locks import locked
 from cvt_hpc.study import gather, open_results, read_status, run
 from cvt_hpc.study.folder import StudyFolder
-from cvt_hpc.study.growth import places_in
+from cvt_hpc.study.job_difference import places_in
 from cvt_hpc.variables import Status
 from support.recorded import assert_same_numbers
 from support.study_double import Axis, Job, Simulator, logistic_numbers

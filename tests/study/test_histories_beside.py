@@ -9,7 +9,7 @@ import xarray as xr
 
 from cvt_hpc.study import open_results, run
 from cvt_hpc.study.folder import StudyFolder
-from cvt_hpc.study.record.frames import RECORD
+from cvt_hpc.study.record.log import RECORD
 from cvt_hpc.variables import Status
 from support.study_double import Axis, Job, Simulator, logistic_numbers
 from support.study_processes import wait_until

@@ -12,9 +12,9 @@ from cvt_hpc.models.elastic_belt.grouping import lane_key
 from cvt_hpc.simulation import lane_groups, run_costs
 from cvt_hpc.study import check_start, description, open_results, run
 from cvt_hpc.study.batches import share_out
-from cvt_hpc.study.forecast import needs as needs_module
-from cvt_hpc.study.forecast.needs import needs, refuse_too_large
-from cvt_hpc.study.ranks.time_limit import find_time_limit, planning_within
+from cvt_hpc.study.forecast import resources
+from cvt_hpc.study.forecast.resources import needs, refuse_too_large
+from cvt_hpc.study.ranks.stopping import find_time_limit, planning_within
 from support.study_double import Axis, Job, Simulator
 
 MANY = (Axis("load", tuple(range(1000))), Axis("speed", tuple(range(1000))), Axis("x", tuple(range(1000))))
@@ -32,7 +32,7 @@ def test_more_records_than_the_disk_holds_are_refused(tmp_path, monkeypatch):
     job, simulator = Job(), Simulator()
     disk = needs(job, simulator).disk
     room = SimpleNamespace(free=disk.results + 100)
-    monkeypatch.setattr(needs_module.shutil, "disk_usage", lambda path: room)
+    monkeypatch.setattr(resources.shutil, "disk_usage", lambda path: room)
     with pytest.raises(
         InputError,
         match="12 runs: expected .* kB on the disk for their records and results.nc, found .* kB at ",
@@ -55,7 +55,7 @@ def test_the_disk_that_is_told_is_that_of_the_records(tmp_path):
 
 
 def test_a_plan_that_takes_longer_than_its_limit_is_given_up(tmp_path, monkeypatch):
-    monkeypatch.setattr("cvt_hpc.study.ranks.time_limit._SHORTEST_PLANNING", 0.2)
+    monkeypatch.setattr("cvt_hpc.study.ranks.stopping._SHORTEST_PLANNING", 0.2)
 
     class Slow(Simulator):
         def run_costs(self, job):

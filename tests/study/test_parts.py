@@ -12,8 +12,7 @@ import pytest
 from cvt_hpc.errors import InputError
 from cvt_hpc.locks import locked
 from cvt_hpc.study import gather, open_results, read_status, run
-from cvt_hpc.study.folder import StudyFolder
-from cvt_hpc.study.part import Part, read_part
+from cvt_hpc.study.folder import Part, StudyFolder, read_part
 from support.recorded import assert_same_numbers, records
 from support.study_double import Axis, Job, Simulator
 from support.study_processes import PATIENCE, wait_until

@@ -17,10 +17,8 @@ from cvt_hpc.locks import locked
 from cvt_hpc.provenance import new_session
 from cvt_hpc.study import read_status, run
 from cvt_hpc.study.folder import StudyFolder
-from cvt_hpc.study.ranks.counter import Counter
-from cvt_hpc.study.ranks.progress import Progress, Steps, show_duration
-from cvt_hpc.study.record.frames import RecordFormat
-from cvt_hpc.study.record.log import RecordLog
+from cvt_hpc.study.ranks.progress import Counter, Progress, Steps, show_duration
+from cvt_hpc.study.record.log import RecordFormat, RecordLog
 from cvt_hpc.variables import Vibrates
 from support.study_double import Job, Simulator
 from support.study_processes import wait_until

@@ -7,10 +7,9 @@ import pytest
 
 from cvt_hpc.files import StorageError
 from cvt_hpc.study.description import describe
-from cvt_hpc.study.record import frames
-from cvt_hpc.study.record.frames import BEGUN, HEAD, PLACE, RECORD, RecordFormat
-from cvt_hpc.study.record.log import RecordLog
-from cvt_hpc.study.record.recovery import read_records
+from cvt_hpc.study.record import log
+from cvt_hpc.study.record.index import read_records
+from cvt_hpc.study.record.log import BEGUN, HEAD, PLACE, RECORD, RecordFormat, RecordLog
 from cvt_hpc.variables import Status
 from support.study_double import Axis, Job, Simulator
 
@@ -50,7 +49,7 @@ def write_log(folder, study, rows, indices, session=SESSION):
 @pytest.fixture(autouse=True, params=[1 << 22, 100])
 def window(request, monkeypatch):
     """Logs are read as a whole, and in windows of which several lie in one frame."""
-    monkeypatch.setattr("cvt_hpc.study.record.frames.WINDOW", request.param)
+    monkeypatch.setattr("cvt_hpc.study.record.log.WINDOW", request.param)
 
 
 @pytest.fixture
@@ -164,7 +163,7 @@ def test_a_folder_among_the_logs_is_named(tmp_path, study, rows):
 
 
 def test_a_log_of_another_version_is_named(tmp_path, study, rows, monkeypatch):
-    monkeypatch.setattr(frames, "FORMAT_VERSION", 1)
+    monkeypatch.setattr(log, "FORMAT_VERSION", 1)
     path = write_log(tmp_path / "r", study, rows, [2])
     monkeypatch.undo()
     records = read_records(tmp_path / "r", study)

@@ -13,9 +13,8 @@ from cvt_hpc.study import open_results, run
 from cvt_hpc.study.description import describe
 from cvt_hpc.study.folder import StudyFolder
 from cvt_hpc.study.planning import prepare
-from cvt_hpc.study.record.recovery import read_records
-from cvt_hpc.study.task import Task
-from cvt_hpc.study.time_steps import untried_factor
+from cvt_hpc.study.record.index import read_records
+from cvt_hpc.study.task import Task, untried_factor
 from cvt_hpc.variables import Status
 from support.recorded import assert_same_numbers, frames_written
 from support.study_double import Axis, Job, Simulator

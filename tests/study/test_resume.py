@@ -13,8 +13,8 @@ import pytest
 from cvt_hpc.study import open_results, run
 from cvt_hpc.study.folder import StudyFolder
 from cvt_hpc.study.ranks.starting import SIGNALS
-from cvt_hpc.study.record.frames import PLACE, RECORD
-from cvt_hpc.study.record.recovery import read_records
+from cvt_hpc.study.record.index import read_records
+from cvt_hpc.study.record.log import PLACE, RECORD
 from support.recorded import assert_same_numbers
 from support.study_double import Axis, Job, Simulator
 from support.study_processes import PATIENCE, wait_until

@@ -3,8 +3,8 @@
 import json
 
 from cvt_hpc.study.batches import Assignment
-from cvt_hpc.study.ranks.counter import Counter
-from cvt_hpc.study.ranks.schedule import claimed_batches
+from cvt_hpc.study.ranks.progress import Counter
+from cvt_hpc.study.sweep import claimed_batches
 
 PLAN = [Assignment((5, 2)), Assignment((9,)), Assignment((0, 1, 3))]
 

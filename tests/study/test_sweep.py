@@ -8,7 +8,7 @@ import pytest
 from cvt_hpc.job import load_job
 from cvt_hpc.study import open_results, run
 from cvt_hpc.study.description import Study, describe
-from cvt_hpc.study.record.recovery import read_records
+from cvt_hpc.study.record.index import read_records
 from cvt_hpc.variables import Status
 from support.recorded import assert_same_numbers
 from support.study_double import Axis, Coordinate, Job, Simulator

@@ -10,12 +10,10 @@ import pytest
 from cvt_hpc.study import run
 from cvt_hpc.study.folder import StudyFolder
 from cvt_hpc.study.forecast.cost_model import CostModel, Fit, fit_recorded
-from cvt_hpc.study.ranks.counter import Counter
-from cvt_hpc.study.ranks.stopping import SignalWatch, Stop
-from cvt_hpc.study.ranks.time_limit import TimeLimit, find_time_limit, gathering_margin
-from cvt_hpc.study.record.frames import RecordFormat
-from cvt_hpc.study.record.log import RecordLog
-from cvt_hpc.study.record.recovery import read_records
+from cvt_hpc.study.ranks.progress import Counter
+from cvt_hpc.study.ranks.stopping import SignalWatch, Stop, TimeLimit, find_time_limit, gathering_margin
+from cvt_hpc.study.record.index import read_records
+from cvt_hpc.study.record.log import RecordFormat, RecordLog
 from cvt_hpc.variables import Status
 from support.study_double import Axis, Job, Simulator
 
@@ -150,7 +148,7 @@ def test_no_limit_without_slurm():
 
 
 def test_the_end_is_read_from_the_environment(monkeypatch):
-    monkeypatch.setattr("cvt_hpc.study.ranks.time_limit.time.time", lambda: 5000.0)
+    monkeypatch.setattr("cvt_hpc.study.ranks.stopping.time.time", lambda: 5000.0)
     limit = find_time_limit(None, 10_000, {"SLURM_JOB_ID": "17", "SLURM_JOB_END_TIME": "8600"})
     assert limit.seconds == 3600.0 - gathering_margin(10_000)
     assert limit.name == "end of the Slurm job"

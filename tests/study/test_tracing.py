@@ -14,7 +14,7 @@ from cvt_hpc.errors import InputError
 from cvt_hpc.study import open_results, read_status, run
 from cvt_hpc.study.description import describe
 from cvt_hpc.study.folder import StudyFolder
-from cvt_hpc.study.tracing import inferred_classes, needed_runs
+from cvt_hpc.study.planning import inferred_classes, needed_runs
 from cvt_hpc.tables import below_origin
 from cvt_hpc.variables import Status, Vibrates
 from cvt_hpc.vibration.classes import OccurrenceClass

@@ -4,8 +4,16 @@ import numpy as np
 
 from cvt_hpc.kernels import kernel
 from cvt_hpc.multibody.ancf_beam import PER_NODE
-from cvt_hpc.multibody.ancf_chain import SIZE, begin_stage, chain, correct, finish_stage, place, set_up
-from cvt_hpc.multibody.ancf_equations import assemble
+from cvt_hpc.multibody.ancf_equations import (
+    SIZE,
+    assemble,
+    begin_stage,
+    chain,
+    correct,
+    finish_stage,
+    place,
+    set_up,
+)
 from cvt_hpc.solvers.cyclic_blocks import LOWER, UPPER, factor, solve
 from cvt_hpc.solvers.generalised_alpha import stage_length
 

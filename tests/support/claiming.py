@@ -10,9 +10,9 @@ from pathlib import Path
 from typing import Any
 
 from cvt_hpc.errors import InputError
-from cvt_hpc.study.ranks.counter import Counter
 from cvt_hpc.study.ranks.launch import Team, assembled_team
-from cvt_hpc.study.ranks.schedule import open_counter
+from cvt_hpc.study.ranks.progress import Counter
+from cvt_hpc.study.sweep import open_counter
 
 PATIENCE = 20.0  # [s] that rank 0 computes at most while it waits for the others
 

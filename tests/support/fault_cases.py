@@ -20,7 +20,7 @@ import xarray as xr
 from cvt_hpc.job import load_job
 from cvt_hpc.study import open_results, run
 from cvt_hpc.study.folder import StudyFolder
-from cvt_hpc.study.record.recovery import read_records
+from cvt_hpc.study.record.index import read_records
 from support.fault_child import ACKNOWLEDGED
 from support.fault_starts import Forked, Hang, Launched
 from support.recorded import assert_same_numbers

@@ -10,7 +10,7 @@ from matplotlib.text import Text
 from matplotlib.transforms import Bbox
 
 from cvt_hpc.analysis.eigenfrequencies import strand_frequencies
-from cvt_hpc.analysis.flanks import QUANTITIES, SIDES
+from cvt_hpc.analysis.profiles import QUANTITIES, SIDES
 from cvt_hpc.physics.geometry import variator
 from cvt_hpc.variables import Status, Vibrates
 from support.studies import flags

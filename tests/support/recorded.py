@@ -5,8 +5,8 @@ from pathlib import Path
 import numpy as np
 
 from cvt_hpc.study.folder import StudyFolder
-from cvt_hpc.study.record.frames import RECORD
-from cvt_hpc.study.record.recovery import read_records
+from cvt_hpc.study.record.index import read_records
+from cvt_hpc.study.record.log import RECORD
 
 
 def recorded_runs(out: Path) -> np.ndarray:

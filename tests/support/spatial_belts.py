@@ -4,10 +4,10 @@ import numpy as np
 
 from cvt_hpc.job import build_job
 from cvt_hpc.models.pushbelt import fields as pushbelt_fields
-from cvt_hpc.models.pushbelt.start import of_lanes, start
+from cvt_hpc.models.pushbelt.belt import of_lanes, start
 from cvt_hpc.models.spatial_pushbelt import belt as b
 from cvt_hpc.models.spatial_pushbelt import fields as spatial_fields
-from cvt_hpc.models.spatial_pushbelt.step import advance
+from cvt_hpc.models.spatial_pushbelt.transient import advance
 from support import spatial_chains as chains
 from support.pushbelts import SPEED, THRUST, given
 

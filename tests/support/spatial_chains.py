@@ -3,10 +3,10 @@
 import numpy as np
 
 from cvt_hpc.models.pushbelt import fields as pushbelt_fields
-from cvt_hpc.models.pushbelt.start import in_lanes, of_lanes, start
+from cvt_hpc.models.pushbelt.belt import in_lanes, of_lanes, start
 from cvt_hpc.models.spatial_pushbelt import belt as b
 from cvt_hpc.models.spatial_pushbelt import fields as spatial_fields
-from cvt_hpc.models.spatial_pushbelt.step import _evaluate
+from cvt_hpc.models.spatial_pushbelt.transient import _evaluate
 from cvt_hpc.physics.friction_laws import Law
 from support.pushbelts import given
 

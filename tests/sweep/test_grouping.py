@@ -9,7 +9,7 @@ from cvt_hpc import simulation
 from cvt_hpc.job import build_job
 from cvt_hpc.models.elastic_belt import grouping
 from cvt_hpc.models.elastic_belt.batch import LaneRun
-from cvt_hpc.simulation import batches
+from cvt_hpc.simulation import record
 from cvt_hpc.study import open_results, run
 from cvt_hpc.variables import Status, Vibrates
 from cvt_hpc.vibration import assessment
@@ -100,7 +100,7 @@ def test_groups_are_of_one_kind_and_no_larger_than_may_be(monkeypatch):
     assert [simulation.turns(many, runs) for runs in (1, 3, 4, 5)] == [1, 1, 2, 2]
     predicted = grouping.cost(many.parameters, "imex")
     for seconds, sizes in ((1.9 * predicted, [2, 3]), (2.1 * predicted, [5])):
-        monkeypatch.setattr(batches, "BATCH_SECONDS", seconds)
+        monkeypatch.setattr(record, "BATCH_SECONDS", seconds)
         assert list(map(len, simulation.lane_groups(many, range(5)))) == sizes
     general = job({"load": [0.0, 60.0]}, "symplectic_euler")  # takes one run at a time
     assert simulation.lane_groups(general, [0, 1]) == [(0,), (1,)]

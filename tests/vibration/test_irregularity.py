@@ -7,9 +7,14 @@ import pytest
 from scipy.stats import linregress, t
 
 from cvt_hpc.variables import Vibrates
-from cvt_hpc.vibration.assessment import assess
-from cvt_hpc.vibration.irregularity import is_irregular, is_stationary, relative_scatter
-from cvt_hpc.vibration.occurrence import classify, margin
+from cvt_hpc.vibration.assessment import (
+    assess,
+    classify,
+    is_irregular,
+    is_stationary,
+    margin,
+    relative_scatter,
+)
 from cvt_hpc.vibration.settings import PARAMETERS
 from cvt_hpc.vibration.signals import growth_fit
 

@@ -6,8 +6,7 @@ from hypothesis import given, settings
 from hypothesis import strategies as st
 
 from cvt_hpc.variables import Vibrates
-from cvt_hpc.vibration.assessment import assess
-from cvt_hpc.vibration.occurrence import classify, margin
+from cvt_hpc.vibration.assessment import assess, classify, margin
 from cvt_hpc.vibration.settings import PARAMETERS, check
 from cvt_hpc.vibration.signals import growth_fit
 

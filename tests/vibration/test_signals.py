@@ -7,7 +7,7 @@ from hypothesis import strategies as st
 
 from cvt_hpc.vibration import signals
 from cvt_hpc.vibration.settings import fitting_window
-from cvt_hpc.vibration.tapering import SHORTEST_SEGMENT
+from cvt_hpc.vibration.signals import SHORTEST_SEGMENT
 
 RATE = 20_000.0
 BAND = (100.0, 1500.0)

@@ -1,12 +1,9 @@
 """Statements of Bullinger, Funk and Pfeiffer 2005 about figs 4, 20 and 21: along the belt at ratio 1."""
 
-from __future__ import annotations
-
 import numpy as np
 import xarray as xr
 
-from cvt_hpc.analysis.statements.kept import Kept, on_strand, over_arc
-from cvt_hpc.analysis.statements.verdicts import Measured, Statement, listed
+from cvt_hpc.analysis.statements.verdicts import Kept, Measured, Statement, listed, on_strand, over_arc
 
 LOW_RATIOS, ALL_RATIOS = (0.26, 0.51), (0.26, 0.51, 0.77)  # torque ratios
 ALIKE = 0.2  # of two forces that are said to be in equilibrium

@@ -1,11 +1,8 @@
 """Statements of Bullinger, Funk and Pfeiffer 2005 about figs 5, 22 and 23: off speed ratio 1."""
 
-from __future__ import annotations
-
 import numpy as np
 
-from cvt_hpc.analysis.statements.kept import Kept, over_arc
-from cvt_hpc.analysis.statements.verdicts import Measured, Statement, listed
+from cvt_hpc.analysis.statements.verdicts import Kept, Measured, Statement, listed, over_arc
 
 APPROXIMATE = 2.0  # [%]: what is stated as equal
 APART = 1.0  # [N]: push force below which elements count as apart

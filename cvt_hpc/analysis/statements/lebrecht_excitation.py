@@ -1,18 +1,14 @@
 """Statements of Lebrecht, Pfeiffer and Ulbrich 2004 about the excitation: figs 3.12, 4.1, 4.2 and 4.4."""
 
-from __future__ import annotations
-
 import json
 from itertools import pairwise
 
 import numpy as np
 import xarray as xr
 
-from cvt_hpc.analysis.energy_blocks import powers_of
 from cvt_hpc.analysis.followed_drawing import mean_there, one_passage
-from cvt_hpc.analysis.friction_curves import curves_of, regularised
-from cvt_hpc.analysis.statements.kept import Kept, over_arc
-from cvt_hpc.analysis.statements.verdicts import Measured, Statement, listed
+from cvt_hpc.analysis.paper_pictures import curves_of, powers_of, regularised
+from cvt_hpc.analysis.statements.verdicts import Kept, Measured, Statement, listed, over_arc
 from cvt_hpc.variables import Vibrates
 
 SWING = 0.02  # of the radial speed: how far it swings at least where it is jagged

@@ -1,13 +1,89 @@
-"""A statement of a paper about one of its figures, and what measuring it in a study gives."""
+"""A statement of a paper about one of its figures, and what measuring it in a study gives.
 
-from __future__ import annotations
+Checks of statements read `Kept`: the results of a study and the histories that it keeps.
+"""
 
-from collections.abc import Callable, Iterable, Sequence
+import json
+from collections.abc import Callable, Iterable, Iterator, Sequence
+from contextlib import ExitStack, contextmanager
 from enum import Enum
+from pathlib import Path
 from typing import Any, NamedTuple
 
-from cvt_hpc.analysis.statements.kept import Kept
+import numpy as np
+import xarray as xr
+
+from cvt_hpc.analysis.profiles import inside
 from cvt_hpc.errors import InputError
+from cvt_hpc.netcdf import open_netcdf
+from cvt_hpc.variables import Status
+
+
+class Kept(NamedTuple):
+    """A study: results, and histories of runs in the order of their indices."""
+
+    results: xr.Dataset
+    histories: Sequence[xr.Dataset]
+
+    def run(self, **values: Any) -> xr.Dataset:
+        """Results of the run at values [SI] of axes; InputError where it is not done."""
+        found = self.results.sel(values, method="nearest") if values else self.results
+        if int(found["status"]) != Status.DONE:
+            raise InputError(
+                f"expected a run that is done at {values}, found {Status(int(found['status'])).name}"
+            )
+        return found
+
+    def history(self, **values: Any) -> xr.Dataset:
+        """History of the run at values [SI] of axes."""
+        for history in self.histories:
+            point = json.loads(history.attrs["point"])
+            if all(_is_near(point[key], value) for key, value in values.items()):
+                return history
+        raise InputError(f"expected the history of the run at {values}, found none")
+
+
+class Arc(NamedTuple):
+    """A quantity over the arc of a pulley: shares of the wrap from the inlet, and values, (n,) each."""
+
+    share: np.ndarray
+    values: np.ndarray
+
+    @property
+    def largest(self) -> float:
+        """Share of the wrap at which the quantity is largest."""
+        return float(self.share[np.argmax(self.values)])
+
+
+def over_arc(history: xr.Dataset, name: str, pulley: str) -> Arc:
+    """A quantity by `position` over the arc of the driving or the driven pulley, both ends included."""
+    here = inside(history, pulley)
+    angle = history["wrap_angle"].values[here]
+    return Arc(angle / angle[-1], history[name].values[here])
+
+
+def on_strand(history: xr.Dataset, name: str, strand: str) -> np.ndarray:
+    """A quantity by `position` between the ends of a strand."""
+    return history[name].values[history["region"].values.astype(str) == strand][1:-1]
+
+
+@contextmanager
+def opened(folder: Path) -> Iterator[Kept]:
+    """The study in an output folder, open within."""
+    from cvt_hpc.study import open_results
+
+    with ExitStack() as stack:
+        results = stack.enter_context(open_results(folder)).load()
+        histories = [
+            stack.enter_context(open_netcdf(path)) for path in sorted((folder / "histories").glob("run-*.nc"))
+        ]
+        yield Kept(results, histories)
+
+
+def _is_near(found: Any, value: Any) -> bool:
+    if isinstance(value, str):
+        return found == value
+    return bool(np.isclose(float(found), value, rtol=1e-6, atol=1e-12)) or float(found) == value
 
 
 class Verdict(Enum):

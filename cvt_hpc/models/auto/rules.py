@@ -18,9 +18,6 @@ more than the coarse transient that they could spare. Contact that never opens n
 search for the closed stations ends with its first guess, so that complementarity costs nothing then.
 """
 
-from __future__ import annotations
-
-from collections.abc import Mapping
 from enum import IntEnum
 from typing import Any
 
@@ -29,6 +26,7 @@ import numpy as np
 from cvt_hpc import recording
 from cvt_hpc.models import elastic_belt
 from cvt_hpc.models.elastic_belt.step_choice import SAFE_SHARE, transverse_limit
+from cvt_hpc.parameters import Parameters
 from cvt_hpc.physics.capacity import carried_torque
 from cvt_hpc.variables import Vibrates
 from cvt_hpc.vibration import settings as vibration_settings
@@ -49,7 +47,7 @@ class Rung(IntEnum):
     FULL = 3
 
 
-def is_passive(parameters: Mapping[str, Any]) -> bool:
+def is_passive(parameters: Parameters) -> bool:
     """Whether friction nowhere falls with speed and carries the load by far, and forces are not requested."""
     p = parameters
     is_table = p["friction_law"] == "table"
@@ -59,7 +57,7 @@ def is_passive(parameters: Mapping[str, Any]) -> bool:
     return bool(p["question"] != "forces" and not falls and is_carried)
 
 
-def coarse(parameters: Mapping[str, Any]) -> dict[str, Any] | None:
+def coarse(parameters: Parameters) -> dict[str, Any] | None:
     """Parameters of the coarse run; None where it would decide nothing.
 
     That is where load or speed change all the time, and where so short a run could not be judged.
@@ -79,12 +77,12 @@ def coarse(parameters: Mapping[str, Any]) -> dict[str, Any] | None:
     return p
 
 
-def is_clear(parameters: Mapping[str, Any], found: Occurrence) -> bool:
+def is_clear(parameters: Parameters, found: Occurrence) -> bool:
     """Whether the class that a coarse run has found is far enough from the other one."""
     return found.vibrates is not Vibrates.UNDECIDED and found.margin >= parameters["least_margin"]
 
 
-def is_settled(parameters: Mapping[str, Any], found: Occurrence) -> bool:
+def is_settled(parameters: Parameters, found: Occurrence) -> bool:
     """Whether the result of a coarse run answers the question.
 
     Parameters

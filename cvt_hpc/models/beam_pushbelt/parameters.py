@@ -1,14 +1,11 @@
 """Parameters of the pushbelt on a ring of beams: those of `pushbelt`, and those of the ring."""
 
-from __future__ import annotations
-
-from collections.abc import Mapping
 from typing import Any
 
 import numpy as np
 
 from cvt_hpc.models.pushbelt import parameters as pushbelt
-from cvt_hpc.parameters import Parameter, not_negative
+from cvt_hpc.parameters import Parameter, Parameters, not_negative
 
 # what the model of rigid sheaves, bare strands and set-valued friction does without, and what that is there
 _WITHOUT = {
@@ -49,12 +46,12 @@ PARAMETERS["belt"] |= {
 MOST_TURN = np.pi / 3.0  # [rad] of a beam along an arc
 
 
-def as_pushbelt(parameters: Mapping[str, Any]) -> dict[str, Any]:
+def as_pushbelt(parameters: Parameters) -> dict[str, Any]:
     """Parameters, completed by the further ones of `pushbelt`."""
     return {**_WITHOUT, **parameters}
 
 
-def step_limit(parameters: Mapping[str, Any]) -> float:
+def step_limit(parameters: Parameters) -> float:
     """Longest explicit step of elements that all press on each other at edge and head [s].
 
     The contacts' forces f obey f'' = -c G f with G = W^T M^-1 W. A contact at height h shares its two
@@ -70,7 +67,7 @@ def step_limit(parameters: Mapping[str, Any]) -> float:
     return float(2.0 / np.sqrt(p["edge_stiffness"] / pitch * rows.max()))
 
 
-def check(parameters: dict[str, Any]) -> list[tuple[str, str, str]]:
+def check(parameters: Parameters) -> list[tuple[str, str, str]]:
     """Problems that lie between parameters, in the form of `pushbelt.check`.
 
     Parameters
@@ -103,7 +100,7 @@ def check(parameters: dict[str, Any]) -> list[tuple[str, str, str]]:
     return problems
 
 
-def inert(parameters: dict[str, Any]) -> dict[str, str]:
+def inert(parameters: Parameters) -> dict[str, str]:
     """Parameters without effect on a run, by name the setting that makes them so."""
     found = pushbelt.inert(as_pushbelt(parameters))
     found["arc_probes"] = "model beam_pushbelt, which is probed on its strands"

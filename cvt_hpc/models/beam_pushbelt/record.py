@@ -1,7 +1,5 @@
 """The record of a run: that of a run of `pushbelt`, by the same judge."""
 
-from __future__ import annotations
-
 from collections.abc import Mapping
 from dataclasses import replace
 from typing import Any

@@ -19,14 +19,11 @@ Directions of forces are those at q_k; sliding velocities are in the directions 
 the last one. At either end they would add v phi' dt / 2 of false sliding.
 """
 
-from __future__ import annotations
-
 import numpy as np
 
 from cvt_hpc.kernels import kernel
 from cvt_hpc.models.beam_pushbelt import fields as b
-from cvt_hpc.models.beam_pushbelt import friction
-from cvt_hpc.models.beam_pushbelt.forces import apply_forces, dot, locate
+from cvt_hpc.models.beam_pushbelt import forces
 from cvt_hpc.models.pushbelt import fields as f
 from cvt_hpc.models.pushbelt.chain import turned
 from cvt_hpc.multibody import rcm_chain
@@ -46,13 +43,13 @@ def _free_speeds(belt, proximal, state, work, dt):
     for i in range(ring.columns.rows):
         for k in range(rcm_chain.PER_ELEMENT):
             ring.columns.data[i, k, 0] *= dt
-    apply_forces(belt, state, work, dt)
+    forces.apply_forces(belt, state, work, dt)
     for j in range(step.shape[0]):
         beam, rows, tangent = work.beams[j], work.rows[j], step[j, b.TANGENT]
         mass = belt.mass / step[j, b.COSINE]
-        before = dot(rows[b.MID_ACROSS], ring.u, beam * rcm_chain.PER_ELEMENT)
+        before = forces.dot(rows[b.MID_ACROSS], ring.u, beam * rcm_chain.PER_ELEMENT)
         step[j, b.RING_ACROSS] = before
-        step[j, b.RING_ALONG] = dot(rows[b.MID_ALONG], ring.u, beam * rcm_chain.PER_ELEMENT)
+        step[j, b.RING_ALONG] = forces.dot(rows[b.MID_ALONG], ring.u, beam * rcm_chain.PER_ELEMENT)
         across = belt.mass * step[j, b.FREE_N] + step[j, b.IMPULSE_N] - mass * before
         across -= tangent * (belt.mass * step[j, b.FREE_T] + step[j, b.IMPULSE_T])
         rcm_chain.add_product(ring, beam, mass, rows[b.ACROSS], rows[b.MID_ACROSS])
@@ -84,15 +81,15 @@ def _accept(belt, state, work, inputs, dt):
     for j in range(n):
         first = work.beams[j] * rcm_chain.PER_ELEMENT
         e[j, f.TENSION] = ring.beam.axial_stiffness * mean_strain(length, ring.q[first : first + 8])
-        e[j, f.SADDLE] = abs(friction.saddle_impulse(belt, step, j)) / dt
-        c, w = friction.element_speed(belt, step, j), step[j, b.RING_ACROSS]
+        e[j, f.SADDLE] = abs(forces.saddle_impulse(belt, step, j)) / dt
+        c, w = forces.element_speed(belt, step, j), step[j, b.RING_ACROSS]
         t_y, t_z = step[j, b.MID_T_Y], step[j, b.MID_T_Z]
         e[j, f.V] = step[j, b.RING_ALONG]
         slip = step[j, b.RING_ALONG] - c
         e[j, f.RING_SLIP], e[j, f.RING_FRICTION] = slip, -e[j, b.RING_IMPULSE] / dt
         totals[f.RING_LOSS] -= e[j, b.RING_IMPULSE] * slip
 
-        slip_m, slip_t = friction.flank_slip(belt, pulleys, e, step, j)
+        slip_m, slip_t = forces.flank_slip(belt, pulleys, e, step, j)
         grip_m, grip_t = -e[j, b.FLANK_IMPULSE_M] / dt, -e[j, b.FLANK_IMPULSE_T] / dt
         e[j, f.FLANK_SLIP_M], e[j, f.FLANK_SLIP_T] = slip_m, slip_t
         e[j, f.FLANK_FRICTION_M], e[j, f.FLANK_FRICTION_T] = grip_m, grip_t
@@ -136,17 +133,17 @@ def _step(belt, proximal, state, work, inputs, dt):
     rubs = belt.ring_friction > 0.0 or belt.flank_kinetic > 0.0
     state.pulleys[f.DRIVING_SPEED] = inputs[f.IN_SPEED]
     state.pulleys[f.DRIVEN_SPEED] -= dt * inputs[f.IN_LOAD] / belt.driven_inertia
-    locate(belt, state, work, dt)
+    forces.locate(belt, state, work, dt)
     if not _free_speeds(belt, proximal, state, work, dt):
         return f.NOT_FINITE
     solve(ring.blocks, ring.columns, rcm_chain.SIZE)
     _take(state, work)
     solved = True
     if rubs:
-        friction.couple(state, work)
+        forces.couple(state, work)
         for j in range(e.shape[0]):
             work.free[j, 0], work.free[j, 1] = work.step[j, b.RING_ACROSS], work.step[j, b.RING_ALONG]
-        solved = friction.rub(belt, proximal, state, work)
+        solved = forces.rub(belt, proximal, state, work)
         solve(ring.blocks, ring.columns, rcm_chain.SIZE)
         for j in range(e.shape[0]):
             work.step[j, b.RING_ACROSS], work.step[j, b.RING_ALONG] = work.free[j, 0], work.free[j, 1]

@@ -11,8 +11,6 @@ belt's cord and the rim turns with the pulley, so that the cord slides by the sp
 Friction (`cvt_hpc.models.belt_drive.friction`) acts at the radius d: its moment turns the pulley.
 """
 
-from __future__ import annotations
-
 from typing import NamedTuple
 
 import numpy as np
@@ -21,7 +19,7 @@ from cvt_hpc.kernels import kernel, merged_kernel
 from cvt_hpc.models.belt_drive.friction import Friction, Memory, begin_iterate, empty_memory, laws_hold, rub
 from cvt_hpc.models.belt_drive.pulleys import CONTACT_LOSS, FRICTION_LOSS, WORK_IN, Pulleys, Wheels
 from cvt_hpc.multibody.ancf_beam import AXES, PER_NODE, X, Y, shapes
-from cvt_hpc.multibody.ancf_chain import Chain
+from cvt_hpc.multibody.ancf_equations import Chain
 from cvt_hpc.solvers.cyclic_blocks import DIAGONAL, LOWER, UPPER
 
 NEAR = 1.05  # radii of a pulley, beyond which nothing touches it

@@ -2,18 +2,22 @@
 
 Profiles are multiples of `driving_speed` and `load`, linear between their times, constant before the first
 and after the last one. From there on the speed has a ripple (Cepon and Boltezar 2011, eq. 5).
+
+The belt's own length gives its tension at rest, with belt and contacts in series along the path. At a tension
+T the belt is longer by the factor x with EA (x^2 - 1) x / 2 = T, and the contacts sink in by T / (R k) on
+each arc, which shortens the path.
 """
 
-from __future__ import annotations
-
-from collections.abc import Mapping
-from typing import Any
-
 import numpy as np
+from scipy.optimize import brentq
 
-from cvt_hpc.parameters import Parameter, not_negative, positive
+from cvt_hpc.models.belt_drive.layout import PULLEY_LISTS, TENSIONER, TWO, layout, layout_problems
+from cvt_hpc.parameters import Parameter, Parameters, Substitute, not_negative, positive
+from cvt_hpc.physics.belt_path import BeltPath
 from cvt_hpc.variator.course import load_course
-from cvt_hpc.variator.profiles import length_problems, multiple, nested_problems
+from cvt_hpc.variator.scene import length_problems, multiple, nested_problems
+
+MOST_STRAIN = 0.5  # tension over axial_stiffness
 
 PROFILED = ("driving_speed", "load")
 
@@ -38,7 +42,7 @@ PARAMETERS: dict[str, Parameter] = {
 }
 
 
-def driving_speed(parameters: Mapping[str, Any], time: float) -> float:
+def driving_speed(parameters: Parameters, time: float) -> float:
     """Speed of the driving pulley at a time [rad/s], in the direction in which it drives."""
     p = parameters
     since = time - (p["profile_time"][-1] if p["profile_time"] else 0.0)
@@ -46,14 +50,14 @@ def driving_speed(parameters: Mapping[str, Any], time: float) -> float:
     return p["driving_speed"] * multiple(p, "driving_speed", time) + ripple
 
 
-def load(parameters: Mapping[str, Any], time: float) -> float:
+def load(parameters: Parameters, time: float) -> float:
     """Load at a time [N m]: it rises smoothly within `rise_time`."""
     p = parameters
     risen = load_course.py_func(time, p["rise_time"], p["rise_time"], p["load"], p["load"])
     return risen * multiple(p, "load", time)
 
 
-def course_problems(parameters: Mapping[str, Any]) -> list[tuple[str, str, str]]:
+def course_problems(parameters: Parameters) -> list[tuple[str, str, str]]:
     """Problems of courses, in the form of a model's check: (key, expected, found).
 
     Parameters
@@ -77,6 +81,52 @@ def course_problems(parameters: Mapping[str, Any]) -> list[tuple[str, str, str]]
     return found
 
 
-def course_inert(parameters: Mapping[str, Any]) -> dict[str, str]:
+def course_inert(parameters: Parameters) -> dict[str, str]:
     """Parameters of courses without effect, each with the setting that makes it so."""
     return {"ripple_frequency": "speed_ripple 0"} if parameters["speed_ripple"] == 0.0 else {}
+
+
+def stretch(tension: float, stiffness: float) -> float:
+    """Length under a tension over that without: the root of EA (x^2 - 1) x / 2 = T."""
+    x = 1.0 + tension / stiffness
+    for _ in range(20):
+        x -= (0.5 * (x**2 - 1.0) * x - tension / stiffness) / (1.5 * x**2 - 0.5)
+    return x
+
+
+def contact_compliance(path: BeltPath, contact_stiffness: float) -> float:
+    """By how much the contacts shorten a path for each newton of tension [m/N]."""
+    return float((path.wrap / path.radius).sum()) / contact_stiffness
+
+
+def length_at(path: BeltPath, tension: float, parameters: Parameters) -> float:
+    """Length without load of the belt that has a tension [N] on a path, nearly [m]."""
+    shortened = path.path_length - contact_compliance(path, parameters["contact_stiffness"]) * tension
+    return shortened / stretch(tension, parameters["axial_stiffness"])
+
+
+def _tension(parameters: Parameters) -> float:
+    """Tension [N] that the belt of `free_length` has."""
+    p = parameters
+    if layout_problems(p):
+        return 0.0  # which nobody reads: they are told first
+    path, most = layout(p).path, MOST_STRAIN * p["axial_stiffness"]
+    shortest = length_at(path, most, p)
+    if not shortest < p["free_length"] < path.path_length:
+        expected = f"more than {shortest:.6g} m, at half of axial_stiffness, and less than the path's"
+        raise ValueError(f"{expected} {path.path_length:.6g} m")
+    return float(brentq(lambda tension: length_at(path, tension, p) - p["free_length"], 0.0, most, xtol=1e-9))
+
+
+def free_length() -> Parameter:
+    """The parameter that gives the preload by the belt's own length."""
+    needs = (*TWO, *PULLEY_LISTS, *TENSIONER, "axial_stiffness", "contact_stiffness")
+    return Parameter(
+        None,
+        "m",
+        "length of the belt without load, in the place of tension, which follows",
+        minimum=0.0,
+        exclusive=True,
+        gives=Substitute("tension", needs, _tension),
+        sensible=(0.1, 50.0),
+    )

@@ -3,7 +3,7 @@
 A contact slides by the speed g of the belt's cord over the pulley, and is pressed by the force p per
 length. The friction force per length q acts against g, and all treatments bound it by mu(|g|, p) p.
 
-Regularised: q = mu p tanh(g / friction_speed), with slopes by `cvt_hpc.physics.primal_dual`. A contact that
+Regularised: q = mu p tanh(g / friction_speed), with slopes by `cvt_hpc.physics.contact_laws`. A contact that
 carries a force creeps.
 
 Set-valued: Coulomb's law. Either g = 0 and |q| <= mu(0, p) p: the contact sticks; or q = mu p g / |g|: it
@@ -29,17 +29,15 @@ has coordinates. A softer grip, which comes when the number of wrong contacts fa
 of them. The laws hold to `slack`.
 """
 
-from __future__ import annotations
-
 from enum import IntEnum
 from typing import NamedTuple
 
 import numpy as np
 
 from cvt_hpc.kernels import kernel, merged_kernel
+from cvt_hpc.physics.contact_laws import dual_of
+from cvt_hpc.physics.contact_laws import friction as smooth_friction
 from cvt_hpc.physics.friction import FrictionLaw, friction_coefficient
-from cvt_hpc.physics.primal_dual import dual_of
-from cvt_hpc.physics.primal_dual import friction as smooth_friction
 from cvt_hpc.solvers.generalised_alpha import Scheme, begin, finish
 
 PATIENCE, SOFTER = 3, 0.3  # iterates in which no fewer contacts are wrong, until the grip is so much softer

@@ -4,8 +4,6 @@ The belt runs around the pulleys in the order of the lists; the first one drives
 it stands in the lists as at rest.
 """
 
-from __future__ import annotations
-
 from collections.abc import Iterator, Mapping, Sequence
 from typing import Any, NamedTuple
 
@@ -16,7 +14,7 @@ from cvt_hpc.parameters import Column, FromFile, Parameter, RowError
 from cvt_hpc.physics.belt_path import BeltPath, belt_path
 from cvt_hpc.physics.geometry import variator_problems
 from cvt_hpc.variator import PULLEYS, STRANDS
-from cvt_hpc.variator.profiles import length_problems, nested_problems
+from cvt_hpc.variator.scene import length_problems, nested_problems
 
 Problem = tuple[str, str, str]  # key, expected, found
 

@@ -6,8 +6,6 @@ point and one of the arm, of the length l, pulls by F = F0 + k_l (l - l0) + c_l 
 -F dl/dangle, and F0 takes the place of M.
 """
 
-from __future__ import annotations
-
 from typing import NamedTuple
 
 import numpy as np

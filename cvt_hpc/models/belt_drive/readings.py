@@ -1,21 +1,22 @@
-"""Readings of a belt drive at a sample: displacement, tensions, sliding, forces along the path."""
+"""Readings of a belt drive at a sample: displacement, tensions, sliding, forces along the path.
 
-from __future__ import annotations
+Kernels read a sample at points along the belt: places, tension, contacts.
+"""
 
 from collections.abc import Mapping
-from typing import Any
+from typing import Any, NamedTuple
 
 import numpy as np
 
-from cvt_hpc.kernels import called_alike
-from cvt_hpc.models.belt_drive.along_belt import empty_line, empty_sample, read
-from cvt_hpc.models.belt_drive.contact import contact_slopes
+from cvt_hpc.kernels import called_alike, kernel
+from cvt_hpc.models.belt_drive.contact import Contact, Touch, contact_slopes
 from cvt_hpc.models.belt_drive.drive import Drive, State
 from cvt_hpc.models.belt_drive.layout import Layout
 from cvt_hpc.models.belt_drive.pulleys import arms_energy, axes
-from cvt_hpc.multibody.ancf_beam import energies
+from cvt_hpc.multibody.ancf_beam import POINTS, SHAPES, WEIGHTS, AncfBeam, energies, tension_of
+from cvt_hpc.multibody.ancf_equations import Chain
 from cvt_hpc.physics.belt_path import directions, span_starts, tangents
-from cvt_hpc.physics.nearest_on_path import way
+from cvt_hpc.physics.nearest_on_path import Way, nearest, way
 
 PROFILES = {
     "tension": ("tension", "N", "mean"),
@@ -135,3 +136,180 @@ def stored_energy(drive: Drive, state: State) -> float:
     turning = 0.5 * (pulleys.inertia[1:] * wheels.speed[0, 1:count] ** 2).sum()
     arms = arms_energy(pulleys.arms, wheels.angle[0], wheels.speed[0, count:])
     return kinetic + elastic + float(turning) + arms
+
+
+class Line(NamedTuple):
+    """The belt at the Gauss points of its k elements, (k, POINTS) arrays.
+
+    Attributes
+    ----------
+    position, offset : arrays
+        Path coordinate, and distance from the path to the right of the belt's way [m].
+    tension : array
+        [N]
+    """
+
+    position: np.ndarray
+    offset: np.ndarray
+    tension: np.ndarray
+
+
+class Sample(NamedTuple):
+    """Readings of a belt on P pulleys at p probes.
+
+    Attributes
+    ----------
+    displacement : (p,) array
+        To the right of the belt's way [m].
+    tension : (P,) array
+        Mean over the middle half of the spans [N].
+    slip : (P,) array
+        Mean sliding speed, counter-clockwise, weighed by normal forces [m/s].
+    largest : (P,) array
+        Normal force of the contact that is pressed most [N].
+    """
+
+    displacement: np.ndarray
+    tension: np.ndarray
+    slip: np.ndarray
+    largest: np.ndarray
+
+
+def empty_line(elements: int) -> Line:
+    """Room for a belt."""
+    return Line(*np.zeros((3, elements, POINTS)))
+
+
+def empty_sample(probes: int, pulleys: int) -> Sample:
+    """Room for a sample."""
+    return Sample(np.zeros(probes), *np.zeros((3, pulleys)))
+
+
+@kernel
+def read(
+    way: Way,
+    beam: AncfBeam,
+    chain: Chain,
+    contact: Contact,
+    touch: Touch,
+    slopes: np.ndarray,
+    probes: np.ndarray,
+    line: Line,
+    sample: Sample,
+    sums: np.ndarray,
+) -> None:
+    """Read a sample.
+
+    Parameters
+    ----------
+    way : Way
+        The reference path.
+    beam, chain : AncfBeam, Chain
+        The belt, and its motion.
+    contact, touch : Contact, Touch
+        Its contacts.
+    slopes : (C, 4) array
+        Derivatives of the shapes at the contact points.
+    probes : (p,) array
+        Path coordinates [m].
+    line, sample : Line, Sample
+        The readings.
+    sums : (6, place) array
+        To which profiles are added at equal shares of the path: length, tension and offset by it, normal
+        force and force forwards per length, samples; none at no places.
+    """
+    _locate(way, beam, chain.q, line)
+    _displace(line, probes, way.length, sample.displacement)
+    for p in range(sample.tension.size):
+        middle, quarter = way.begins[p, 1] + 0.5 * way.spans[p], 0.25 * way.spans[p]
+        pull, length = 0.0, 0.0
+        for i in range(beam.lengths.size):
+            for c in range(POINTS):
+                if abs(line.position[i, c] - middle) < quarter:
+                    pull += beam.lengths[i] * WEIGHTS[c] * line.tension[i, c]
+                    length += beam.lengths[i] * WEIGHTS[c]
+        sample.tension[p] = pull / length
+        pressed, slid, largest = 0.0, 0.0, 0.0
+        for i in range(beam.lengths.size):
+            for c in range(touch.normal.shape[2]):
+                force = touch.normal[p, i, c]
+                pressed += force
+                slid += force * touch.memory.slip[p, i, c]
+                largest = max(largest, force)
+        sample.slip[p], sample.largest[p] = slid / max(pressed, 1e-9), largest
+    if sums.shape[1] > 0:
+        _add_profiles(way, beam, chain.stage_q, contact, slopes, touch, line, sums)
+
+
+@kernel
+def _locate(way: Way, beam: AncfBeam, q: np.ndarray, line: Line) -> None:
+    """Fill a line, from the coordinates of the nodes (n, 4) [m], [1]."""
+    n = q.shape[0]
+    for i in range(beam.lengths.size):
+        j, l0 = (i + 1) % n, beam.lengths[i]
+        for c in range(POINTS):
+            x, y = _at(SHAPES[c, 0], q, i, j, l0)
+            sx, sy = _at(SHAPES[c, 1], q, i, j, l0)
+            line.position[i, c], line.offset[i, c] = nearest(way, x, y, sx, sy)
+            strain = 0.5 * ((sx * sx + sy * sy) / (l0 * l0) - 1.0)
+            line.tension[i, c] = tension_of(beam.axial_stiffness, strain)
+
+
+@kernel
+def _at(shape: np.ndarray, q: np.ndarray, i: int, j: int, l0: float) -> tuple[float, float]:
+    """Vector (x, y) by shapes (4,) of the element of length l0 [m] between nodes i and j of q (n, 4)."""
+    x = shape[0] * q[i, 0] + shape[2] * q[j, 0] + l0 * (shape[1] * q[i, 2] + shape[3] * q[j, 2])
+    y = shape[0] * q[i, 1] + shape[2] * q[j, 1] + l0 * (shape[1] * q[i, 3] + shape[3] * q[j, 3])
+    return x, y
+
+
+@kernel
+def _displace(line: Line, probes: np.ndarray, length: float, found: np.ndarray) -> None:
+    """Offsets (p,) at probes (p,) of a path of a length [m], linear between the points before and behind."""
+    for p in range(probes.size):
+        before, behind, of_before, of_behind = length, length, 0.0, 0.0
+        for i in range(line.position.shape[0]):
+            for c in range(POINTS):
+                ahead = line.position[i, c] - probes[p]
+                ahead = ahead + length if ahead < 0.0 else ahead
+                if ahead < behind:
+                    behind, of_behind = ahead, line.offset[i, c]
+                if length - ahead < before:
+                    before, of_before = length - ahead, line.offset[i, c]
+        found[p] = (of_before * behind + of_behind * before) / (before + behind)
+
+
+@kernel
+def _add_profiles(
+    way: Way,
+    beam: AncfBeam,
+    q: np.ndarray,
+    contact: Contact,
+    slopes: np.ndarray,
+    touch: Touch,
+    line: Line,
+    sums: np.ndarray,
+) -> None:
+    """Add a sample to the profiles; q (n, 4) are the nodes' coordinates, the rest is as in `read`."""
+    places = sums.shape[1]
+    per = places / way.length
+    for i in range(beam.lengths.size):
+        for c in range(POINTS):
+            place, weight = min(int(line.position[i, c] * per), places - 1), beam.lengths[i] * WEIGHTS[c]
+            sums[0, place] += weight
+            sums[1, place] += weight * line.tension[i, c]
+            sums[2, place] += weight * line.offset[i, c]
+        j, l0 = (i + 1) % q.shape[0], beam.lengths[i]
+        for c in range(contact.shape.shape[0]):
+            normal, forwards = 0.0, 0.0
+            for p in range(way.turn.size):
+                normal += touch.normal[p, i, c]
+                forwards += way.turn[p] * touch.tangential[p, i, c]
+            if normal > 0.0:
+                x, y = _at(contact.shape[c], q, i, j, l0)
+                sx, sy = _at(slopes[c], q, i, j, l0)
+                place = min(int(nearest(way, x, y, sx, sy)[0] * per), places - 1)
+                sums[3, place] += per * normal
+                sums[4, place] += per * forwards
+    for place in range(places):
+        sums[5, place] += 1.0

@@ -10,8 +10,8 @@ import numpy as np
 
 from cvt_hpc.models.belt_drive import pulleys as fields
 from cvt_hpc.models.belt_drive import theory
-from cvt_hpc.models.belt_drive.kick import answers
 from cvt_hpc.models.belt_drive.layout import layout
+from cvt_hpc.models.belt_drive.theory import answers
 from cvt_hpc.physics.belt_path import regions
 from cvt_hpc.variables import Coordinate, Variable
 from cvt_hpc.variator import PULLEYS, STRANDS, judging

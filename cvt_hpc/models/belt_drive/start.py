@@ -4,19 +4,16 @@ The length of the belt follows from its tension with the arms of tensioners as d
 the moments that hold them there; or, where these moments are given, the arms turn into equilibrium.
 """
 
-from __future__ import annotations
-
 from collections.abc import Callable, Mapping
 from typing import Any
 
 import numpy as np
 
 from cvt_hpc.models.belt_drive.contact import Contact, contact_shapes
-from cvt_hpc.models.belt_drive.courses import driving_speed
+from cvt_hpc.models.belt_drive.courses import contact_compliance, driving_speed, length_at
 from cvt_hpc.models.belt_drive.drive import UNSOLVED, Drive, State, advance, state
 from cvt_hpc.models.belt_drive.friction import Friction, Treatment
 from cvt_hpc.models.belt_drive.layout import Layout, pulleys_of
-from cvt_hpc.models.belt_drive.preload import contact_compliance, length_at
 from cvt_hpc.multibody.ancf_beam import at_places, beam, random_lengths
 from cvt_hpc.physics.belt_path import points_at
 from cvt_hpc.physics.friction import friction_law, given_law

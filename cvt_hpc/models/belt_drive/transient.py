@@ -1,7 +1,5 @@
 """A transient run of the belt drive: it starts in motion from its static tension, is loaded, and recorded."""
 
-from __future__ import annotations
-
 from collections.abc import Mapping
 from typing import Any
 
@@ -9,13 +7,11 @@ import numpy as np
 
 from cvt_hpc.kernels import called_alike
 from cvt_hpc.models.belt_drive import courses, readings
-from cvt_hpc.models.belt_drive.drive import advance
-from cvt_hpc.models.belt_drive.kick import kick
+from cvt_hpc.models.belt_drive.drive import advance, drive_frequencies
 from cvt_hpc.models.belt_drive.layout import Layout, layout
-from cvt_hpc.models.belt_drive.linearised import drive_frequencies
-from cvt_hpc.models.belt_drive.mesh import mesh_amplitude
 from cvt_hpc.models.belt_drive.pulleys import Pulleys, axes
 from cvt_hpc.models.belt_drive.start import start
+from cvt_hpc.models.belt_drive.theory import kick, mesh_amplitude
 from cvt_hpc.models.marched import batches_of_one
 from cvt_hpc.models.sampled import MOST_UNSOLVED, SampledRun
 from cvt_hpc.physics.belt_path import belt_path

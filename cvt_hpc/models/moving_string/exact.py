@@ -10,21 +10,18 @@ travel. A pulse is exp(-(cos(2 pi s / P) + 1) / (2 pi width)^2), nearly a Gaussi
 upstream from within the string.
 """
 
-from __future__ import annotations
-
-from collections.abc import Mapping
-from typing import Any
-
 import numpy as np
 
+from cvt_hpc.parameters import Parameters
 
-def frequency(parameters: Mapping[str, Any], mode: int = 1) -> float:
+
+def frequency(parameters: Parameters, mode: int = 1) -> float:
     """Eigenfrequency [Hz] of a mode, from flat parameters [SI]."""
     c, v = _speeds(parameters)
     return mode * (c * c - v * v) / (2.0 * c * parameters["length"])
 
 
-def exact(parameters: Mapping[str, Any], times: np.ndarray) -> np.ndarray:
+def exact(parameters: Parameters, times: np.ndarray) -> np.ndarray:
     """Displacement at the probes without numerical error.
 
     Parameters
@@ -42,16 +39,14 @@ def exact(parameters: Mapping[str, Any], times: np.ndarray) -> np.ndarray:
     return travelling(parameters, probe_positions(parameters), np.asarray(times))[0].T
 
 
-def probe_positions(parameters: Mapping[str, Any]) -> np.ndarray:
+def probe_positions(parameters: Parameters) -> np.ndarray:
     """Positions of the probes, (probe,) [m]: the nodes nearest to equal spacing."""
     cells, count = parameters["cells"], parameters["strand_probes"]
     nodes = np.round(cells * np.arange(1, count + 1) / (count + 1))
     return parameters["length"] / cells * nodes
 
 
-def travelling(
-    parameters: Mapping[str, Any], x: np.ndarray, times: np.ndarray
-) -> tuple[np.ndarray, np.ndarray]:
+def travelling(parameters: Parameters, x: np.ndarray, times: np.ndarray) -> tuple[np.ndarray, np.ndarray]:
     """Displacement [m] and speed w_t [m/s], (x, t) each.
 
     Parameters
@@ -72,7 +67,7 @@ def travelling(
     return up - down, (c - v) / period * (up_slope - down_slope)
 
 
-def _wave(p: Mapping[str, Any], s: np.ndarray) -> tuple[np.ndarray, np.ndarray]:
+def _wave(p: Parameters, s: np.ndarray) -> tuple[np.ndarray, np.ndarray]:
     """G and its derivative over s, in periods."""
     angle = 2.0 * np.pi * s
     if p["shape"] == "mode":
@@ -84,5 +79,5 @@ def _wave(p: Mapping[str, Any], s: np.ndarray) -> tuple[np.ndarray, np.ndarray]:
     return pulse, 2.0 * np.pi * sharpness * np.sin(angle) * pulse
 
 
-def _speeds(parameters: Mapping[str, Any]) -> tuple[float, float]:
+def _speeds(parameters: Parameters) -> tuple[float, float]:
     return float(np.sqrt(parameters["tension"] / parameters["line_mass"])), float(parameters["belt_speed"])

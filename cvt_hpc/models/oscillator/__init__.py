@@ -18,11 +18,119 @@ no wave that takes energy away. A run in which the normal load falls to 0 has fa
 
 Steppers other than `moreau` take the friction law with its jump at rest smoothed over `friction_speed`;
 `moreau` takes it as it is.
+
+Parameters of the oscillator that a job may set. The defaults: stick-slip of unit mass and stiffness.
 """
 
-from cvt_hpc.models.oscillator.parameters import PARAMETERS, check, inert
+from cvt_hpc.parameters import Parameter, Parameters, not_negative, positive
+from cvt_hpc.physics.friction_laws import FRICTION_LAWS, friction_file, friction_inert, friction_problems
 from cvt_hpc.steppers import STEPPERS
+
+PARAMETERS: dict[str, dict[str, Parameter]] = {
+    "scene": {
+        "belt_speed": not_negative(0.2, "m/s", "speed of the belt under the mass", sensible=(1e-06, 100.0)),
+        "normal_load": positive(
+            1.0, "N", "force that presses the mass on the belt", sensible=(1e-06, 10000000.0)
+        ),
+        "preload": Parameter(
+            0.0, "N", "constant force on the mass, in the belt's direction", sensible=(1e-06, 10000000.0)
+        ),
+        "start": Parameter(
+            "given",
+            "",
+            "as given, or initial_displacement away from steady sliding: at rest, or carried by the belt",
+            choices=("given", "sliding", "sticking"),
+        ),
+        "initial_displacement": Parameter(
+            0.0, "m", "displacement of the mass at the start", sensible=(1e-12, 100.0)
+        ),
+        "initial_speed": Parameter(
+            0.2, "m/s", "speed of the mass at the start; belt_speed: it sticks", sensible=(1e-09, 100.0)
+        ),
+    },
+    "oscillator": {
+        "mass": positive(1.0, "kg", "the mass", sensible=(1e-06, 100000.0)),
+        "stiffness": positive(1.0, "N/m", "stiffness of its spring", sensible=(1e-06, 1000000000000.0)),
+        "normal_stiffness": not_negative(
+            0.0,
+            "N/m",
+            "fall of the normal load per displacement of the mass",
+            sensible=(1e-06, 1000000000000.0),
+        ),
+        "damping": not_negative(
+            0.0, "N s/m", "viscous damping of its spring", sensible=(1e-06, 1000000000.0)
+        ),
+    },
+    "friction": {
+        "friction_law": Parameter(
+            "coulomb",
+            "",
+            "friction of the mass over sliding speed",
+            choices=FRICTION_LAWS,
+        ),
+        "friction_gradient": Parameter(
+            0.0,
+            "s/m",
+            "slope dmu/dv of the friction law at v -> 0+, its steepest fall, without regularisation",
+            maximum=0.0,
+            sensible=(0.001, 100.0),
+        ),
+        "kinetic_friction": positive(0.6, "", "the level that does not change with the gradient"),
+        "static_friction": Parameter(
+            1.0, "", "level at rest, of the coulomb law alone; the others have theirs by the law", minimum=0.0
+        ),
+        "stribeck_velocity": positive(0.05, "m/s", "speed scale of the fall", sensible=(0.0001, 10.0)),
+        "friction_speed": positive(
+            1e-3,
+            "m/s",
+            "regularisation speed of friction at rest; moreau does without",
+            sensible=(1e-09, 5.0),
+        ),
+        "table_file": friction_file("N"),
+        "table_force": Parameter(
+            (), "N", "normal loads of a friction table, ascending", sensible=(1e-06, 10000000.0)
+        ),
+        "table_speed": Parameter((), "m/s", "speeds of a friction table, ascending", sensible=(1e-07, 100.0)),
+        "table_mu": Parameter((), "", "friction table: a row of coefficients for each load"),
+    },
+}
 
 DEFAULT_STEPPER = "moreau"
 
 __all__ = ["DEFAULT_STEPPER", "PARAMETERS", "STEPPERS", "check", "inert"]
+
+
+def check(parameters: Parameters) -> list[tuple[str, str, str]]:
+    """Problems that lie between parameters.
+
+    Parameters
+    ----------
+    parameters : dict
+        Values by name, in SI units.
+
+    Returns
+    -------
+    list of (key, expected, found)
+        Empty where all is well.
+    """
+    p = parameters
+    problems = friction_problems(p)
+    if p["friction_law"] == "coulomb" and p["static_friction"] < p["kinetic_friction"]:
+        expected = f"kinetic_friction {p['kinetic_friction']:g} or more with friction_law coulomb"
+        problems.append(("static_friction", expected, f"{p['static_friction']:g}"))
+    if p["normal_stiffness"] * p["preload"] >= p["normal_load"] * p["stiffness"]:
+        most = p["normal_load"] * p["stiffness"] / p["normal_stiffness"]
+        problems.append(("preload", f"less than {most:g} N, which lifts the mass off", f"{p['preload']:g} N"))
+    return problems
+
+
+def inert(parameters: Parameters) -> dict[str, str]:
+    """Parameters without effect on a run, each with the setting that makes it so."""
+    p = parameters
+    law = p["friction_law"]
+    cases = (
+        (p["start"] != "given", "initial_speed", f"start {p['start']}"),
+        (law != "coulomb", "static_friction", f"friction_law {law}"),
+    )
+    found = dict.fromkeys(("strand_probes", "arc_probes"), "model oscillator, which has no belt")
+    return friction_inert(p) | found | {key: setting for holds, key, setting in cases if holds}

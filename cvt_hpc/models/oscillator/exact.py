@@ -9,8 +9,6 @@ The linear law, as long as the mass slides one way and below the law's floor: a 
 sliding that grows or decays at the rate -(c + N g) / (2 m), g the friction gradient.
 """
 
-from __future__ import annotations
-
 from collections.abc import Mapping
 from typing import Any, NamedTuple
 

@@ -3,23 +3,82 @@
 Coulomb friction with a higher level at rest is smoothed to mu_k tanh(s / v_reg) + (mu_s - mu_k) p(s / (6
 v_reg)), p(x) = x exp((1 - x^2) / 2): the hump p is 1 at x = 1, where the tanh is 1 but for 1e-5, so that the
 largest friction is mu_s whatever the width, and the law without smoothing is its limit.
+
+The constants of an oscillator, as its kernels take them.
+
+Steady sliding of the mass, and small motions about it.
 """
 
-from __future__ import annotations
-
 from collections.abc import Mapping
-from typing import Any
+from typing import Any, NamedTuple
 
 import numpy as np
 
 from cvt_hpc.kernels import kernel
-from cvt_hpc.models.oscillator.constants import Oscillator, normal_load, oscillator
-from cvt_hpc.models.oscillator.steady import steady_sliding
-from cvt_hpc.physics.friction import friction_coefficient, saturation
+from cvt_hpc.physics.friction import FrictionLaw, friction_coefficient, given_law, saturation
 from cvt_hpc.steppers.system import SetValuedSystem, System
+
+_MECHANICS = (
+    "mass",
+    "stiffness",
+    "damping",
+    "belt_speed",
+    "normal_load",
+    "normal_stiffness",
+    "preload",
+)
 
 X, V = range(2)
 HUMP = 6.0  # speed of the largest friction at rest, in units of v_reg
+
+MOST_ROUNDS = 200  # of a table of friction over the load, which the friction itself changes
+# Of the load: central differences are exact, N mu being of the second order in N even in a table.
+BESIDE = 1e-3
+
+
+class Oscillator(NamedTuple):
+    """Constants of the oscillator.
+
+    Attributes
+    ----------
+    mass, stiffness, damping : float
+        [kg], [N/m], [N s/m].
+    belt_speed : float
+        [m/s].
+    normal_load, normal_stiffness, preload : float
+        N_0 [N], n [N/m], P [N].
+    law : FrictionLaw
+        Friction in steady sliding.
+    excess : float
+        Level at rest above that of the law [1].
+    width : float
+        Regularisation speed [m/s].
+    """
+
+    mass: float
+    stiffness: float
+    damping: float
+    belt_speed: float
+    normal_load: float
+    normal_stiffness: float
+    preload: float
+    law: FrictionLaw
+    excess: float
+    width: float
+
+
+def oscillator(parameters: Mapping[str, Any]) -> Oscillator:
+    """Constants from flat parameters [SI]."""
+    p = parameters
+    at_rest = p["static_friction"] - p["kinetic_friction"] if p["friction_law"] == "coulomb" else 0.0
+    mechanics = {key: float(p[key]) for key in _MECHANICS}
+    return Oscillator(**mechanics, law=given_law(p), excess=float(at_rest), width=float(p["friction_speed"]))
+
+
+@kernel
+def normal_load(o: Oscillator, x: float) -> float:
+    """Normal load [N] at a displacement [m]."""
+    return o.normal_load - o.normal_stiffness * x
 
 
 @kernel
@@ -124,3 +183,38 @@ def initial_state(parameters: Mapping[str, Any]) -> np.ndarray:
         return np.array([p["initial_displacement"], p["initial_speed"]], dtype=np.float64)
     displacement = steady_sliding(oscillator(p)).displacement + p["initial_displacement"]
     return np.array([displacement, p["belt_speed"] if p["start"] == "sticking" else 0.0])
+
+
+class SteadySliding(NamedTuple):
+    """The mass at rest on the belt that slides under it, friction without regularisation.
+
+    Attributes
+    ----------
+    displacement : float
+        x_s [m].
+    eigenvalue : complex
+        Of the small motions about it the one with the larger imaginary, or else real, part [1/s].
+    """
+
+    displacement: float
+    eigenvalue: complex
+
+
+def steady_sliding(o: Oscillator) -> SteadySliding:
+    """Steady sliding of an oscillator: x_s = (P + N_0 mu) / (k + n mu)."""
+    load, displacement = o.normal_load, np.nan
+    for _ in range(MOST_ROUNDS):
+        mu, slope = friction_coefficient(o.law, o.belt_speed, load)
+        last, displacement = (
+            displacement,
+            (o.preload + o.normal_load * mu) / (o.stiffness + o.normal_stiffness * mu),
+        )
+        load = normal_load(o, displacement)
+        if displacement == last:
+            break
+    beside = [load * (1.0 + side) for side in (BESIDE, -BESIDE)]
+    forces = [n * friction_coefficient(o.law, o.belt_speed, n)[0] for n in beside]
+    by_load = (forces[0] - forces[1]) / (beside[0] - beside[1])
+    half = complex(-0.5 * (o.damping + load * slope) / o.mass)
+    stiffness = o.stiffness + o.normal_stiffness * by_load
+    return SteadySliding(displacement, complex(half + np.sqrt(half * half - stiffness / o.mass)))

@@ -1,7 +1,5 @@
 """Forces of an iterate, their residual, and the linear system of Newton's method, in lanes."""
 
-from __future__ import annotations
-
 from numba.extending import register_jitable
 
 from cvt_hpc.kernels import kernel

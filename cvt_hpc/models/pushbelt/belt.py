@@ -2,15 +2,21 @@
 
 Arrays hold one row an element, in linked lanes (`cvt_hpc.lanes.rings`): the ring of elements is cut into
 equal parts, one for each lane of a register.
+
+Start of a pushbelt from the geometry of its path: constants, state and work space from given values.
 """
 
-from __future__ import annotations
-
-from typing import NamedTuple
+from collections.abc import Callable, Mapping, Sequence
+from typing import Any, NamedTuple
 
 import numpy as np
 
 from cvt_hpc.lanes import LaneArray
+from cvt_hpc.models.pushbelt import fields as f
+from cvt_hpc.physics.friction_laws import Law
+from cvt_hpc.physics.geometry import Variator, driven_radius, variator
+from cvt_hpc.solvers.linked_blocks import empty_scratch, empty_system
+from cvt_hpc.variator.history import points_at
 
 
 class Belt(NamedTuple):
@@ -188,3 +194,185 @@ class Workspace(NamedTuple):
     inputs: np.ndarray
     increments: np.ndarray
     kept: np.ndarray
+
+
+def parts_of(nodes: int) -> int:
+    """How many lanes a ring of nodes is cut into: as many of 8, 4 or 2 as leave whole parts; else 1."""
+    return next(parts for parts in (8, 4, 2, 1) if nodes % parts == 0)
+
+
+def path_of(given: Mapping[str, Any]) -> Variator:
+    """The path of the pitch line at the start."""
+    radius = driven_radius(given["ratio"], given["belt_length"], given["centre_distance"])
+    return variator(given["ratio"], radius, given["centre_distance"])
+
+
+def shared_constants(given: Mapping[str, Any], chord: float, names: Sequence[str]) -> dict[str, Any]:
+    """Constants that a belt has in its plane and out of it, and what is given of `names`; as `belt_of`."""
+    g, angle = given, given["half_wedge_angle"]
+    found = {
+        "sine": float(np.sin(angle)),
+        "cosine": float(np.cos(angle)),
+        "thickness": float(chord - g["play"] / g["elements"]),
+        "mass": float(g["element_mass"]),
+        "ring_mass": float(g["ring_mass"] / g["elements"]),
+        "transverse_damping": float(g["transverse_damping"] * chord),
+        "flank_law": int(Law[g["friction_law"].upper()]),
+        "flank_kinetic": float(g["kinetic_friction"]),
+        "flank_gradient": float(g["friction_gradient"]),
+        "flank_speed": float(g["stribeck_velocity"]),
+        "modal_stiffness": np.array(g["modal_stiffness"], dtype=np.float64).reshape(2, -1),
+    }
+    return {name: float(g[name]) for name in names if name in g and name not in found} | found
+
+
+def belt_of(given: Mapping[str, Any], chord: float) -> Belt:
+    """Constants from values as `start` takes them, and the distance of neighbours [m]."""
+    shared = shared_constants(given, chord, Belt._fields)
+    square = given["element_height"] ** 2 + shared["thickness"] ** 2
+    return Belt(**shared, inertia=float(shared["mass"] * square / 12.0))
+
+
+def equal_chords(
+    points: Callable[[np.ndarray], np.ndarray], length: float, nodes: int
+) -> tuple[np.ndarray, float]:
+    """Places (nodes,) [m] along a closed line with equal distances of neighbours, and that distance [m].
+
+    `points` gives the points (nodes, 2) [m] of a line of that length, of which the first place is 0.
+    """
+    s = np.arange(nodes) * length / nodes
+    for _ in range(50):
+        found = points(s)
+        chords = np.linalg.norm(np.roll(found, -1, axis=0) - found, axis=1)
+        if np.ptp(chords) < 1e-13:
+            break
+        # arc lengths scaled by the mean chord over their own; it contracts, as both differ by their curvature
+        gaps = np.diff(np.append(s, length)) * (chords.mean() / chords)
+        gaps *= length / gaps.sum()
+        s = np.concatenate([[0.0], np.cumsum(gaps[:-1])])
+    return s, float(chords.mean())
+
+
+class PitchLine(NamedTuple):
+    """Where the rocking edges of a belt lie at the start, and how fast it runs.
+
+    Attributes
+    ----------
+    path : Variator
+        [m]
+    places, points, along, curvature : (n,), (n, 2), (n, 2), (n,) array
+        Of the elements, with equal chords: path coordinate [m], position [m], running direction and curvature
+        of the path [1/m].
+    chord, speed : float
+        Distance of neighbours [m], and speed along the path [m/s].
+    pulleys : (4,) array
+        Speeds [rad/s] and radii [m].
+    """
+
+    path: Variator
+    places: np.ndarray
+    points: np.ndarray
+    along: np.ndarray
+    curvature: np.ndarray
+    chord: float
+    speed: float
+    pulleys: np.ndarray
+
+
+def pitch_line(given: Mapping[str, Any]) -> PitchLine:
+    """The pitch line at the start, from values as `start` takes them."""
+    path, distance = path_of(given), given["centre_distance"]
+    s, chord = equal_chords(lambda s: points_at(path, distance, s)[0], path.path_length, given["elements"])
+    points, _, curvature = points_at(path, distance, s)
+    along = np.roll(points, -1, axis=0) - np.roll(points, 1, axis=0)
+    along /= np.linalg.norm(along, axis=1)[:, None]
+    speed = given["driving_speed"] * path.driving_radius
+    pulleys = [given["driving_speed"], speed / path.driven_radius, path.driving_radius, path.driven_radius]
+    return PitchLine(path, s, points, along, curvature, chord, speed, np.array(pulleys))
+
+
+def start(given: Mapping[str, Any]) -> tuple[Belt, BeltState]:
+    """Constants and a state from which a belt can run in: equal chords along the ideal path, at its speed.
+
+    Parameters
+    ----------
+    given : mapping
+        Values [SI] as `transient.given` names them, those of an element for each of `elements`.
+
+    Returns
+    -------
+    Belt, BeltState
+        The flanks just touch; the ring has the strain `ring_strain`.
+    """
+    g, line = given, pitch_line(given)
+    belt, nodes, along, speed = belt_of(g, line.chord), g["elements"], line.along, line.speed
+    points = line.points + belt.pitch_depth * np.stack([along[:, 1], -along[:, 0]], 1)
+    distances = np.linalg.norm(np.roll(points, -1, axis=0) - points, axis=1)
+    fields = np.zeros((nodes, f.STATE_FIELDS))
+    fields[:, [f.Y, f.Z]], fields[:, [f.HEADING_Y, f.HEADING_Z]] = points, along
+    fields[:, f.OMEGA] = speed * line.curvature
+    fields[:, [f.U_Y, f.U_Z]] = (speed + belt.pitch_depth * fields[:, f.OMEGA])[:, None] * along
+    fields[:, f.V] = speed * distances.sum() / (nodes * line.chord)
+    fields[:, f.LENGTH] = distances / (1.0 + g["ring_strain"])
+    fields[:, f.TENSION] = belt.ring_stiffness * g["ring_strain"]
+    fields[:, f.DRIVEN] = points[:, 0] > 0.5 * belt.centre_distance
+    modes = belt.modal_stiffness.shape[1]
+    state = BeltState(
+        in_lanes(fields),
+        line.pulleys,
+        np.zeros((2, modes)),
+        np.zeros(1 + 2 * modes),
+        np.zeros(f.TOTALS),
+        np.zeros(f.COUNTERS, np.int64),
+    )
+    return belt, state
+
+
+def in_lanes(fields: np.ndarray) -> LaneArray:
+    """Values (nodes, fields) as a LaneArray of linked parts."""
+    nodes, count = fields.shape
+    parts = parts_of(nodes)
+    array = LaneArray(nodes // parts, count, parts, linked=parts > 1)
+    array.data[:] = fields.reshape(parts, -1, count).transpose(1, 2, 0)
+    return array
+
+
+def of_lanes(array: LaneArray) -> np.ndarray:
+    """Values (nodes, fields) of a LaneArray of linked parts."""
+    return array.data.transpose(2, 0, 1).reshape(-1, array.data.shape[1])
+
+
+def workspace(belt: Belt, nodes: int) -> Workspace:
+    """Work space for a belt of so many nodes."""
+    return empty_workspace(
+        nodes, belt.modal_stiffness.shape[1], 4, f.STEP_FIELDS, f.ITERATE_FIELDS, f.STATE_FIELDS, f.INPUTS
+    )
+
+
+def empty_workspace(
+    nodes: int, modes: int, size: int, step: int, iterate: int, state: int, inputs: int, narrow: int = 0
+) -> Workspace:
+    """Work space for elements with `size` unknowns and so many fields, and for sheaves with so many modes.
+
+    Of these unknowns the first `narrow` are assembled apart from the others; 0: all at once.
+    """
+    parts, columns = parts_of(nodes), 2 + 2 * modes
+    rows = nodes // parts
+
+    def lanes(count: int, fields: int) -> LaneArray:
+        return LaneArray(count, fields, parts, linked=parts > 1)
+
+    blocks = empty_system(nodes, parts, size, columns)
+    return Workspace(
+        step=lanes(rows, step),
+        iterate=lanes(rows, iterate),
+        shapes=lanes(rows, max(modes, 1)),
+        blocks=blocks,
+        narrow=empty_system(nodes, parts, narrow, columns) if narrow else blocks,
+        scratch=empty_scratch(parts, size, columns),
+        border=np.zeros((columns - 1, columns)),
+        sums=lanes(1, (columns - 1) * columns),
+        inputs=np.zeros(inputs),
+        increments=np.zeros(columns - 1),
+        kept=np.zeros((2, state)),
+    )

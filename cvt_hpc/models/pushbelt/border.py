@@ -3,15 +3,26 @@
 Sheaves of a pulley open by sum a_k psi_k(phi), psi 1, cos, sin, cos 2, sin 2, ..., each mode with a stiffness
 of its own. Unknowns are the changes of the driven pulley's speed, and of a_k of the driving and of the driven
 sheaves.
+
+Power that the laws of a step take from the motion, in lanes: losses, and numerical damping.
+
+M (X - X_old) / dt = f times the mean speed (X + X_old) / 2, which belongs to q_k as the directions of all
+forces do, is the change of kinetic energy without remainder. So a force takes its magnitude times the mean
+rate along its direction: that is the loss of friction and dampers.
+
+An elastic law has its magnitude -V'(g) from the end of the step. It takes -V'(g) r for the change r within a
+step at the mean rate, and stores (V(g) - V(g - 2 r)) / 2: potentials half a step later and earlier, which add
+up. The difference is >= 0, as V is convex: c r^2 where a contact stays closed, as of a damper c dt. The step
+damps by that, and it is neither physics nor an error in the balance of power.
 """
 
-from __future__ import annotations
-
+import numpy as np
 from numba.extending import register_jitable
 
 from cvt_hpc.kernels import kernel
-from cvt_hpc.lanes import around, like
+from cvt_hpc.lanes import ahead, around, like
 from cvt_hpc.models.pushbelt import fields as f
+from cvt_hpc.physics.contact_laws import damped
 
 
 @register_jitable
@@ -135,3 +146,81 @@ def accept_border(belt, state, inputs, dt):
     state.totals[f.WORK_OUT] += (
         dt * inputs[f.IN_LOAD] * (state.pulleys[f.DRIVEN_SPEED] - 0.5 * state.increments[0])
     )
+
+
+@kernel
+def book(belt, state, work, dt):
+    """Add to the totals the work of a solved step, before it is accepted."""
+    elements, step, iterate, scratch = state.elements, work.step, work.iterate, work.scratch
+    driving_speed = state.pulleys[f.DRIVING_SPEED]
+    driven_speed = state.pulleys[f.DRIVEN_SPEED] + 0.5 * state.increments[0]
+    flank = ring = tilt = drag = between = sheaves = stretching = turning = like(0.0, elements[0, f.U_Y])
+    for j in range(step.rows):
+        dy, dz = elements[j, f.CHANGE_Y], elements[j, f.CHANGE_Z]
+        dw = elements[j, f.CHANGE_W]
+        next_dy = ahead(elements, j, f.CHANGE_Y)
+        next_dz = ahead(elements, j, f.CHANGE_Z)
+        next_dw = ahead(elements, j, f.CHANGE_W)
+        y = elements[j, f.U_Y] + 0.5 * dy
+        z = elements[j, f.U_Z] + 0.5 * dz
+        w = elements[j, f.OMEGA] + 0.5 * dw
+        v = elements[j, f.V] + 0.5 * elements[j, f.CHANGE_V]
+        next_y, next_z = ahead(elements, j, f.U_Y) + 0.5 * next_dy, ahead(elements, j, f.U_Z) + 0.5 * next_dz
+        next_w = ahead(elements, j, f.OMEGA) + 0.5 * next_dw
+        next_v = ahead(elements, j, f.V) + 0.5 * ahead(elements, j, f.CHANGE_V)
+
+        stretch = step[j, f.TENSION_I_Y] * y + step[j, f.TENSION_I_Z] * z + v
+        stretch -= step[j, f.TENSION_J_Y] * next_y + step[j, f.TENSION_J_Z] * next_z + next_v
+        stretching += step[j, f.TENSION_SLOPE] * stretch * stretch
+
+        turn = step[j, f.TURN_Y] * (next_y - y) + step[j, f.TURN_Z] * (next_z - z)
+        more = 0.5 * (step[j, f.TURN_Y] * (next_dy - dy) + step[j, f.TURN_Z] * (next_dz - dz))
+        rate_i, rate_j = step[j, f.ANGLE_I] * (w - turn), step[j, f.ANGLE_J] * (next_w - turn)
+        last_i = rate_i + step[j, f.ANGLE_I] * (0.5 * dw - more)
+        last_j = rate_j + step[j, f.ANGLE_J] * (0.5 * next_dw - more)
+        tilt += 0.5 * belt.angle_damping * (last_i * rate_i + last_j * rate_j)
+        turning += 0.5 * dt * belt.angle_stiffness * (rate_i * rate_i + rate_j * rate_j)
+
+        x_y, x_z = ahead(elements, j, f.HEADING_Y), ahead(elements, j, f.HEADING_Z)
+        opening = x_y * (next_y - y) + x_z * (next_z - z)
+        change = dt * (opening + step[j, f.EDGE_LEVER_I] * w + step[j, f.EDGE_LEVER_J] * next_w)
+        between += damped(iterate[j, f.EDGE_REACHED], change, belt.contact_stiffness)
+        change = dt * (opening + step[j, f.HEAD_LEVER_I] * w + step[j, f.HEAD_LEVER_J] * next_w)
+        between += damped(iterate[j, f.HEAD_REACHED], change, belt.contact_stiffness)
+        if belt.nose_clearance < np.inf:
+            rate = x_z * (y - next_y) - x_y * (z - next_z)
+            change = dt * (rate + step[j, f.NOSE_LEVER_I] * w + step[j, f.NOSE_LEVER_J] * next_w)
+            offset, clearance = iterate[j, f.NOSE_REACHED], belt.nose_clearance
+            between += damped(clearance - offset, -change, belt.nose_stiffness)
+            between += damped(clearance + offset, change, belt.nose_stiffness)
+
+        r_y, r_z, driven = step[j, f.R_Y], step[j, f.R_Z], elements[j, f.DRIVEN]
+        radial = r_y * y + r_z * z + step[j, f.R_LEVER] * w
+        rotation = of_pulley(driving_speed, driven_speed, driven)
+        around_it = r_y * z - r_z * y + step[j, f.T_LEVER] * w
+        sliding = around_it - step[j, f.MID_RADIUS] * rotation
+        grip_m, grip_t = elements[j, f.FLANK_FRICTION_M], elements[j, f.FLANK_FRICTION_T]
+        flank += 2.0 * (belt.cosine * grip_m * radial + grip_t * sliding)
+        # the groove opens where an element is, and is another where it gets to
+        opening, lean, bend = groove_of(belt, state, work, j, r_y, r_z, driven)
+        angle = dt * around_it / step[j, f.MID_RADIUS]
+        opening = opening + angle * lean
+        change = dt * belt.sine * radial + belt.cosine * opening
+        sheaves += 2.0 * damped(-iterate[j, f.DEPTH_REACHED], change, belt.flank_stiffness)
+        # an element presses at the step's end where it was at its start: modes lag by that angle
+        sheaves += 2.0 * belt.cosine * elements[j, f.FLANK] * angle * angle * bend
+
+        slip = v - step[j, f.T_Y] * y - step[j, f.T_Z] * z
+        ring += elements[j, f.RING_FRICTION] * slip
+        n_y, n_z = step[j, f.NORMAL_Y], step[j, f.NORMAL_Z]
+        across = n_y * y + n_z * z
+        drag += belt.transverse_damping * across * (across + 0.5 * (n_y * dy + n_z * dz))
+    add_to_totals(state, scratch, f.FLANK_LOSS, dt * flank)
+    add_to_totals(state, scratch, f.RING_LOSS, dt * ring)
+    add_to_totals(state, scratch, f.DAMPING_LOSS, dt * tilt)
+    add_to_totals(state, scratch, f.BELT_LOSS, dt * drag)
+    add_to_totals(state, scratch, f.ELEMENT_DAMPED, between)
+    add_to_totals(state, scratch, f.FLANK_DAMPED, sheaves)
+    add_to_totals(state, scratch, f.RING_DAMPED, dt * stretching)
+    add_to_totals(state, scratch, f.TILT_DAMPED, dt * turning)
+    book_openings(belt, state, work)

@@ -9,8 +9,6 @@ across the path that direction. At either end of a step the direction would add 
 motion, and the lever d omega^2 dt / 2.
 """
 
-from __future__ import annotations
-
 import numpy as np
 from numba.extending import register_jitable
 

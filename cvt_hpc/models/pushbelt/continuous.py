@@ -21,8 +21,6 @@ Elements have an inertia, a tilt and a second contact of which the continuum kno
 defaults.
 """
 
-from __future__ import annotations
-
 from collections.abc import Callable, Mapping
 from typing import Any, NamedTuple
 

@@ -4,13 +4,10 @@ Forces are those of `physics.primal_dual`, for each newton of normal force. Thei
 friction from a dual, which the iterations carry on.
 """
 
-from __future__ import annotations
-
 from numba.extending import register_jitable
 
 from cvt_hpc.lanes import absolute, like, select, sqrt
-from cvt_hpc.physics.contact_laws import coefficient, remembered
-from cvt_hpc.physics.primal_dual import dual_of, friction
+from cvt_hpc.physics.contact_laws import coefficient, dual_of, friction, remembered
 
 
 @register_jitable(forceinline=True)

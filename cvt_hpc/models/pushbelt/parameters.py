@@ -5,21 +5,17 @@ and driving_speed are those of Geier and Schindler's measurements (2007, fig. 4)
 assumption, plausible and not measured.
 """
 
-from __future__ import annotations
-
-from collections.abc import Mapping
 from dataclasses import replace
-from typing import Any
 
 import numpy as np
 
 from cvt_hpc.models.pushbelt.profiles import PARAMETERS as PROFILES
 from cvt_hpc.models.pushbelt.profiles import extremes, profile_inert, profile_problems, ratios_along
-from cvt_hpc.parameters import Parameter, Substitute, not_negative, positive
+from cvt_hpc.parameters import Parameter, Parameters, Substitute, not_negative, positive
 from cvt_hpc.physics.friction_laws import FRICTION_LAWS, friction_inert, friction_problems
 from cvt_hpc.physics.geometry import driven_radius, variator, variator_problems
 from cvt_hpc.variator import PULLEYS, scene
-from cvt_hpc.variator.profiles import nested
+from cvt_hpc.variator.scene import nested
 from cvt_hpc.vibration.ramped import ramped
 
 FEWEST_ELEMENTS = 100
@@ -29,7 +25,7 @@ MODES = ("driving_modal_stiffness", "driven_modal_stiffness")
 NO_TABLE = ("table_file", "table_force", "table_speed", "table_mu")
 
 
-def _play(parameters: Mapping[str, Any]) -> float:
+def _play(parameters: Parameters) -> float:
     play = path_length(parameters) - parameters["elements"] * parameters["thickness"]
     if not 0.0 <= play <= parameters["thickness"]:
         least, most = (path_length(parameters) / (parameters["elements"] + more) for more in (1, 0))
@@ -39,7 +35,7 @@ def _play(parameters: Mapping[str, Any]) -> float:
     return play
 
 
-def path_length(parameters: Mapping[str, Any]) -> float:
+def path_length(parameters: Parameters) -> float:
     """Length of the closed pitch line [m]."""
     p = parameters
     return variator(p["ratio"], p["driven_radius"], p["centre_distance"]).path_length
@@ -212,7 +208,7 @@ PARAMETERS: dict[str, dict[str, Parameter]] = {
 }
 
 
-def check(parameters: dict[str, Any]) -> list[tuple[str, str, str]]:
+def check(parameters: Parameters) -> list[tuple[str, str, str]]:
     """Problems that lie between parameters.
 
     Parameters
@@ -244,7 +240,7 @@ def check(parameters: dict[str, Any]) -> list[tuple[str, str, str]]:
     return problems + friction_problems(p)
 
 
-def _problems_at(parameters: Mapping[str, Any], ratio: float) -> list[tuple[str, str, str]]:
+def _problems_at(parameters: Parameters, ratio: float) -> list[tuple[str, str, str]]:
     """Problems at a ratio that the run has, or comes to along its profile."""
     key = "ratio" if ratio == parameters["ratio"] else "ratio_profile"
     at = "" if key == "ratio" else f" at a ratio of {ratio:g}"
@@ -283,19 +279,19 @@ def _problems_at(parameters: Mapping[str, Any], ratio: float) -> list[tuple[str,
     return problems
 
 
-def _driving_speeds(p: Mapping[str, Any]) -> tuple[float, float]:
+def _driving_speeds(p: Parameters) -> tuple[float, float]:
     """Lowest and highest speed of the driving pulley once it is loaded [rad/s]."""
     least, most = extremes(p, "driving_speed")
     begun = p["speed_start"] if ramped(p) == "speed" else least
     return min(least, begun), max(most, begun)
 
 
-def _most_thrust(p: Mapping[str, Any]) -> float:
+def _most_thrust(p: Parameters) -> float:
     """Greatest axial force on either pulley [N]."""
     return max(extremes(p, name)[1] for name in ("thrust", "driving_thrust"))
 
 
-def falling_limit(parameters: Mapping[str, Any]) -> float:
+def falling_limit(parameters: Parameters) -> float:
     """Longest step in which falling friction of the flanks has one solution [s], by the mean over an arc.
 
     An element that slides has m' (v - v_0) / dt = f - 2 n mu(v_f) per length, n being the normal line force
@@ -314,7 +310,7 @@ def falling_limit(parameters: Mapping[str, Any]) -> float:
     return float(0.5 * without + np.sqrt(0.25 * without**2 + without * p["friction_memory"]))
 
 
-def most_tension(parameters: Mapping[str, Any]) -> float:
+def most_tension(parameters: Parameters) -> float:
     """Tension of the tighter strand under thrust and load [N], by which explicit steps are limited.
 
     It is estimated by the equilibrium of an arc and of a pulley, times 1.5 for the effect of arcs.
@@ -327,7 +323,7 @@ def most_tension(parameters: Mapping[str, Any]) -> float:
     return float(1.5 * (held + 0.5 * max(map(abs, (*extremes(p, "load"), p["load_start"]))) / driving))
 
 
-def string_limit(parameters: Mapping[str, Any]) -> float:
+def string_limit(parameters: Parameters) -> float:
     """Longest step with which the strands' transverse motion, which is explicit, is stable [s].
 
     It is pitch / sqrt(T / m) of a string in steps of symplectic Euler, T being `most_tension`.
@@ -337,7 +333,7 @@ def string_limit(parameters: Mapping[str, Any]) -> float:
     return float(path_length(p) / p["elements"] * np.sqrt(mass / most_tension(p)))
 
 
-def inert(parameters: dict[str, Any]) -> dict[str, str]:
+def inert(parameters: Parameters) -> dict[str, str]:
     """Parameters without effect on a run, so that a study does not vary them for nothing.
 
     Parameters
@@ -363,4 +359,9 @@ def inert(parameters: dict[str, Any]) -> dict[str, str]:
         (True, "arc_probes", "model pushbelt, which is probed on its strands"),
     )
     found = {key: setting for holds, key, setting in cases if holds}
-    return friction_inert(p | dict.fromkeys(NO_TABLE, ())) | scene.course_inert(p) | profile_inert(p) | found
+    return (
+        friction_inert({**p, **dict.fromkeys(NO_TABLE, ())})
+        | scene.course_inert(p)
+        | profile_inert(p)
+        | found
+    )

@@ -3,16 +3,10 @@
 Between the times of a profile multiples are linear, before the first and after the last they are constant.
 """
 
-from __future__ import annotations
-
-from collections.abc import Mapping
-from typing import Any
-
 import numpy as np
 
-from cvt_hpc.parameters import Parameter
-from cvt_hpc.variator.profiles import nested_problems
-from cvt_hpc.variator.scene import course_problems
+from cvt_hpc.parameters import Parameter, Parameters
+from cvt_hpc.variator.scene import course_problems, nested_problems
 
 PROFILED = ("load", "driving_speed", "thrust", "driving_thrust", "ratio")
 _WHAT = {
@@ -34,20 +28,20 @@ PARAMETERS: dict[str, Parameter] = {
 }
 
 
-def extremes(parameters: Mapping[str, Any], name: str) -> tuple[float, float]:
+def extremes(parameters: Parameters, name: str) -> tuple[float, float]:
     """Least and greatest value of one of PROFILED along the run."""
     multiples = parameters[f"{name}_profile"] or (1.0,)
     values = [parameters[name] * value for value in (min(multiples), max(multiples))]
     return min(values), max(values)
 
 
-def ratios_along(parameters: Mapping[str, Any]) -> list[float]:
+def ratios_along(parameters: Parameters) -> list[float]:
     """The ratio first, then the least and greatest along its profile if that has an effect."""
     ratio, others = parameters["ratio"], extremes(parameters, "ratio")
     return [ratio, *(other for other in others if other != ratio and parameters["driving_thrust"] == 0.0)]
 
 
-def profile_problems(parameters: Mapping[str, Any]) -> list[tuple[str, str, str]]:
+def profile_problems(parameters: Parameters) -> list[tuple[str, str, str]]:
     """Problems of courses in time, in the form of a model's check: (key, expected, found).
 
     Parameters
@@ -83,7 +77,7 @@ def profile_problems(parameters: Mapping[str, Any]) -> list[tuple[str, str, str]
     return found
 
 
-def profile_inert(parameters: Mapping[str, Any]) -> dict[str, str]:
+def profile_inert(parameters: Parameters) -> dict[str, str]:
     """Profiles without effect, each with the setting that makes it so."""
     if parameters["driving_thrust"] > 0.0:
         return {"ratio_profile": "driving_thrust above 0"}

@@ -1,7 +1,5 @@
 """What is read off the elements of a pushbelt at a sample: displacement, forces, losses and their places."""
 
-from __future__ import annotations
-
 from collections.abc import Mapping, Sequence
 from typing import Any
 
@@ -10,8 +8,7 @@ import numpy as np
 from cvt_hpc.models.pushbelt import fields
 from cvt_hpc.models.pushbelt.belt import Belt
 from cvt_hpc.physics.geometry import variator
-from cvt_hpc.variator.history import ALONG, of_means
-from cvt_hpc.variator.path import along
+from cvt_hpc.variator.history import ALONG, along, of_means
 
 SCALARS = (
     "driven_speed",

@@ -10,9 +10,8 @@ import numpy as np
 from cvt_hpc.models.pushbelt import fields as f
 from cvt_hpc.variables import Coordinate, Variable
 from cvt_hpc.variator import PULLEYS, STRANDS, judging
-from cvt_hpc.variator.history import dataset
+from cvt_hpc.variator.history import REGIONS, dataset, regions
 from cvt_hpc.variator.judging import mean, power_balance
-from cvt_hpc.variator.path import REGIONS, regions
 from cvt_hpc.variator.slip import VARIABLES as AGAINST_SLIP
 from cvt_hpc.variator.slip import capacity, slide
 from cvt_hpc.variator.variables import COORDINATES, frequency_bins, shared

@@ -2,9 +2,9 @@
 
 A step finds the speeds at its end by Newton's method, for the elements and for a border of unknowns that all
 elements act on. A model gives its equations.
-"""
 
-from __future__ import annotations
+Which element a step that is not solved is at fault with, for belts of rigid elements in linked lanes.
+"""
 
 from collections.abc import Callable
 from typing import NamedTuple
@@ -14,9 +14,7 @@ import numpy as np
 from cvt_hpc.kernels import kernel
 from cvt_hpc.lanes import absolute, like, maximum
 from cvt_hpc.models.pushbelt import fields as f
-from cvt_hpc.models.pushbelt.faults import keep_states, most_corrected, name_fault
-from cvt_hpc.solvers.linked_blocks import solve
-from cvt_hpc.solvers.small_system import solve_small
+from cvt_hpc.solvers.linked_blocks import solve, solve_small
 
 FALLS = 0.95  # of the smallest correction so far: one that is larger does not fall
 _LARGE = 1e100  # more than any speed or power that means something
@@ -187,3 +185,54 @@ def advance_by(equations, belt, newton, state, work, inputs, steps, dt):
         equations.accept(belt, state, work, work.inputs, dt)
     counters[f.STATUS] = f.CONVERGED
     return counters[f.STATUS]
+
+
+@kernel
+def most_corrected(blocks, weights):
+    """The element with the largest correction.
+
+    Corrections of its speeds stand in the right side of `blocks`, and count with `weights`, the lengths that
+    make angular velocities speeds.
+    """
+    corrections = blocks.data
+    rows, parts, right = corrections.shape[0], corrections.shape[2], 3 * len(weights) ** 2
+    largest, element = -1.0, 0
+    for part in range(parts):
+        for j in range(rows):
+            for r in range(len(weights)):
+                size = abs(corrections[j, right + r, part]) * weights[r]
+                if size > largest:
+                    largest, element = size, part * rows + j
+    return element
+
+
+@kernel
+def keep_states(elements, element, kept):
+    """Keep the state of an element, and of the one behind it."""
+    rows, fields, parts = elements.data.shape
+    for k in range(2):
+        place = (element - k) % (rows * parts)
+        for field in range(fields):
+            kept[k, field] = elements.data[place % rows, field, place // rows]
+
+
+@kernel
+def name_fault(changes, state, element, kept):
+    """Enter the contact of an element whose force has changed most since its state was kept.
+
+    Contacts with the next element and with the one behind count, the latter as those of that element:
+    `changes(kept, k)` returns by how much forces of the element (k = 0) and of the one behind it (k = 1) have
+    changed, in the order of `CONTACTS`, and 0 for those of the latter that the element has no part in.
+    """
+    rows, fields, parts = state.elements.data.shape
+    largest, contact, behind_it = -1.0, 0, 0
+    for k in range(2):
+        place = (element - k) % (rows * parts)
+        for field in range(fields):
+            kept[k, field] = abs(state.elements.data[place % rows, field, place // rows] - kept[k, field])
+        sizes = changes(kept, k)
+        for entry in range(len(sizes)):
+            if sizes[entry] > largest:
+                largest, contact, behind_it = sizes[entry], entry, k
+    state.counters[f.FAILED_ELEMENT] = (element - behind_it) % (rows * parts)
+    state.counters[f.FAILED_CONTACT] = contact

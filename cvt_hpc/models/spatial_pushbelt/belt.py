@@ -6,18 +6,32 @@ equal parts, one for each lane of a register.
 The frame is global: pulleys lie side by side in the plane (y, z), the driving centre at the origin and the
 driven one at y = centre_distance, and the third coordinate is axial. Right is the side of the greater axial
 coordinate, left the other. Vectors take three fields in that order.
+
+Start of a spatial pushbelt from the geometry of its path: constants and state from given values.
 """
 
-from __future__ import annotations
-
-from typing import NamedTuple
+from collections.abc import Mapping
+from typing import Any, NamedTuple
 
 import numpy as np
 
 from cvt_hpc.lanes import LaneArray
-from cvt_hpc.models.pushbelt.belt import Newton, Workspace
-from cvt_hpc.models.pushbelt.start import empty_workspace
+from cvt_hpc.models.pushbelt import fields as planar
+from cvt_hpc.models.pushbelt.belt import (
+    Newton,
+    Workspace,
+    empty_workspace,
+    in_lanes,
+    of_lanes,
+    pitch_line,
+    shared_constants,
+)
 from cvt_hpc.models.spatial_pushbelt import fields as f
+from cvt_hpc.physics.geometry import Variator
+from cvt_hpc.physics.out_of_plane import SIDES
+from cvt_hpc.variator.history import points_at, regions
+
+SEED_MODES = 5  # half waves of a strand that the disturbance at the start is made of
 
 
 class Belt(NamedTuple):
@@ -185,3 +199,179 @@ def workspace(belt: Belt, nodes: int, flows: int = 1) -> Workspace:
         )
     fields = f.WIDE_STEP_FIELDS, f.WIDE_ITERATE_FIELDS, f.WIDE_STATE_FIELDS
     return empty_workspace(nodes, modes, f.WIDE, *fields, f.INPUTS, narrow=f.SIZE)
+
+
+def belt_of(given: Mapping[str, Any], chord: float) -> Belt:
+    """Constants from values as `start` takes them, and the distance of neighbours [m]."""
+    g, shared = given, shared_constants(given, chord, Belt._fields)
+    mass, thickness, ring_mass = shared["mass"], shared["thickness"], shared["ring_mass"]
+    height, width = g["element_height"], g["element_width"]
+    shared["lateral_damping"] = float(g["lateral_damping"] * chord)
+    turned = np.array([[0.0, 0.0, 1.0], [np.tan(g["axis_tilt"]), np.tan(g["axis_skew"]), 1.0]])
+    return Belt(
+        **shared,
+        axes=turned / np.linalg.norm(turned, axis=1)[:, None],
+        loose_side=np.array([float(SIDES[side]) for side in g["loose_sides"]]),
+        half_width=float(0.5 * width),
+        pitch=float(chord),
+        edge_width=float(g["edge_half_width"]),
+        head_width=float(g["head_half_width"]),
+        package_distance=float(g["package_arm"]),
+        pin_height=float(g["nose_height"]),
+        pin_clearance=float(g["nose_clearance"]),
+        pin_stiffness=float(g["nose_stiffness"]),
+        roll_inertia=float(mass * (height**2 + width**2) / 12.0),
+        yaw_inertia=float(mass * (width**2 + thickness**2) / 12.0),
+        pitch_inertia=float(mass * (height**2 + thickness**2) / 12.0),
+        ring_rotary_inertia=float(ring_mass * g["strip_width"] ** 2 / 12.0),
+    )
+
+
+class SideLine:
+    """Where the belt lies out of the plane at the start, along its path.
+
+    On the arcs in the mid planes of the pulleys, on the strands along cubics with the slopes of the arcs'
+    ends, as a beam without tension lies between them; there with a disturbance, whose slope vanishes at the
+    ends.
+
+    Parameters
+    ----------
+    path : Variator
+        [m]
+    belt : Belt
+        Constants.
+    middles : (float, float)
+        Axial positions of the mid planes [m].
+    disturbance : float
+        Largest displacement of it [m].
+    seed : int
+        By which the amplitudes of its modes are drawn.
+    """
+
+    def __init__(
+        self, path: Variator, belt: Belt, middles: tuple[float, float], disturbance: float, seed: int
+    ) -> None:
+        self._path, self._belt, self._middles = path, belt, middles
+        self._starts = np.concatenate([[0.0], np.cumsum(path.lengths)[:3]])
+        shares = np.linspace(0.0, 1.0, 1001)
+        self._modes = np.random.default_rng(seed).uniform(-1.0, 1.0, (2, SEED_MODES))
+        self._modes *= disturbance / np.abs([self._disturbed(k, shares)[0] for k in (0, 1)]).max()
+
+    def _disturbed(self, strand: int, share: np.ndarray) -> tuple[np.ndarray, np.ndarray]:
+        """Displacement on a strand by the share of its length, and its derivative by it."""
+        x = np.pi * share
+        found = np.zeros_like(x), np.zeros_like(x)
+        for n, size in enumerate(self._modes[strand], start=1):
+            wave, slope = np.sin(n * x), n * np.cos(n * x)
+            found = (
+                found[0] + size * np.sin(x) * wave,
+                found[1] + size * np.pi * (np.cos(x) * wave + np.sin(x) * slope),
+            )
+        return found
+
+    def _on_pulley(self, k: int, position: np.ndarray) -> tuple[np.ndarray, np.ndarray]:
+        """Axial position [m] and slope of the mid plane of a pulley at path coordinates (n,) [m]."""
+        axis = self._belt.axes[k]
+        points, angle, _ = points_at(self._path, self._belt.centre_distance, position)
+        y = points[:, 0] - k * self._belt.centre_distance
+        height = self._middles[k] / axis[2] - (axis[0] * y + axis[1] * points[:, 1]) / axis[2]
+        return height, -(axis[0] * np.cos(angle) + axis[1] * np.sin(angle)) / axis[2]
+
+    def at(self, position: np.ndarray) -> tuple[np.ndarray, np.ndarray, np.ndarray]:
+        """Axial positions (n,) [m], slopes (n,), and axes of the elements (n, 3) at path coordinates [m]."""
+        path, axes = self._path, self._belt.axes
+        region = regions(path, position)
+        height, slope = np.zeros(position.size), np.zeros(position.size)
+        direction = np.zeros((position.size, 3))
+        for k in (0, 1):
+            on_arc = region == 2 * k
+            height[on_arc], slope[on_arc] = self._on_pulley(k, position[on_arc])
+            direction[on_arc] = axes[k]
+            on_strand = region == 2 * k + 1
+            start, length = self._starts[2 * k + 1], path.strand_length
+            ends = np.array([start, np.nextafter(start + length, 0.0)])
+            (w0, s0), (w1, s1) = (self._on_pulley(p, ends[e : e + 1]) for p, e in ((k, 0), (1 - k, 1)))
+            x = (position[on_strand] - start) / length
+            rise = w1 - w0
+            m0, m1 = s0 * length, s1 * length
+            seed, seed_slope = self._disturbed(k, x)
+            cubic = w0 + m0 * x + (3.0 * rise - 2.0 * m0 - m1) * x**2 + (m0 + m1 - 2.0 * rise) * x**3
+            change = m0 + 2.0 * (3.0 * rise - 2.0 * m0 - m1) * x + 3.0 * (m0 + m1 - 2.0 * rise) * x**2
+            height[on_strand], slope[on_strand] = cubic + seed, (change + seed_slope) / length
+            smooth = (x * x * (3.0 - 2.0 * x))[:, None]
+            direction[on_strand] = (1.0 - smooth) * axes[k] + smooth * axes[1 - k]
+        return height, slope, direction
+
+
+def start(given: Mapping[str, Any]) -> tuple[Belt, BeltState]:
+    """Constants and a state from which a belt can run in: equal chords along the ideal path, at its speed.
+
+    Parameters
+    ----------
+    given : mapping
+        Values [SI] as `transient.given` names them, those of an element for each of `elements`.
+
+    Returns
+    -------
+    Belt, BeltState
+        The flanks just touch, but for the disturbance; the rings have the strain `ring_strain`. Half of the
+        misalignment is the driving pulley's.
+    """
+    g, line = given, pitch_line(given)
+    belt, nodes, along, speed = belt_of(g, line.chord), g["elements"], line.along, line.speed
+    middles = -0.5 * g["misalignment"], 0.5 * g["misalignment"]
+    height, slope, axial = SideLine(line.path, belt, middles, g["disturbance"], g["seed"]).at(line.places)
+    heading = np.column_stack([along, slope])
+    heading /= np.linalg.norm(heading, axis=1)[:, None]
+    outward = np.cross(heading, axial)
+    outward /= np.linalg.norm(outward, axis=1)[:, None]
+    axial = np.cross(outward, heading)
+    points = np.column_stack([line.points, height]) + belt.pitch_depth * outward
+
+    ahead = np.roll(points, -1, axis=0) - points
+    arms = belt.package_distance * (np.roll(axial, -1, axis=0) - axial)
+    lines = 0.5 * (np.linalg.norm(ahead + arms, axis=1) + np.linalg.norm(ahead - arms, axis=1))
+    # elements that run along the path turn as the path does, in the plane and out of it
+    slope_rate = speed * (np.roll(slope, -1) - np.roll(slope, 1)) / (2.0 * line.chord)
+    plane_outward = np.column_stack([along[:, 1], -along[:, 0], np.zeros(nodes)])
+    omega = speed * line.curvature[:, None] * np.array([0.0, 0.0, 1.0]) + slope_rate[:, None] * plane_outward
+    fields = np.zeros((nodes, f.STATE_FIELDS))
+    fields[:, f.vector(f.POSITION)] = points
+    fields[:, f.vector(f.HEADING)], fields[:, f.vector(f.OUTWARD)] = heading, outward
+    fields[:, f.SLOPE], fields[:, f.SLOPE_RATE] = slope, slope_rate
+    running = speed + belt.pitch_depth * speed * line.curvature
+    fields[:, f.vector(f.SPEED)] = np.column_stack([running[:, None] * along, speed * slope])
+    fields[:, f.vector(f.OMEGA)] = omega
+    fields[:, f.V] = speed * lines.sum() / (nodes * line.chord)
+    fields[:, f.LENGTH] = lines / (1.0 + g["ring_strain"])
+    fields[:, f.TENSION] = belt.ring_stiffness * g["ring_strain"]
+    fields[:, f.DRIVEN] = points[:, 0] > 0.5 * belt.centre_distance
+    modes = belt.modal_stiffness.shape[1]
+    state = BeltState(
+        in_lanes(fields),
+        np.append(line.pulleys, middles),
+        np.zeros((2, modes)),
+        np.zeros((2, modes)),
+        np.zeros(1 + 2 * modes),
+        np.zeros(f.LOADS),
+        np.zeros(planar.TOTALS),
+        np.zeros(planar.COUNTERS, np.int64),
+    )
+    return belt, state
+
+
+def with_two_flows(belt: Belt, state: BeltState) -> BeltState:
+    """The state of a belt with one flow as one of two flows whose packages are strained alike.
+
+    Both share all but the elements.
+    """
+    fields = of_lanes(state.elements)
+    wide = np.zeros((len(fields), f.WIDE_STATE_FIELDS))
+    wide[:, : f.STATE_FIELDS] = fields
+    o = fields[:, f.vector(f.OUTWARD)]
+    arm = belt.package_distance * np.cross(o, fields[:, f.vector(f.HEADING)])
+    chord, turn = (np.roll(of, -1, axis=0) - of for of in (fields[:, f.vector(f.POSITION)], arm))
+    right, left = (np.linalg.norm(chord + side * turn, axis=1) for side in (1.0, -1.0))
+    wide[:, f.HALF_LENGTH] = fields[:, f.LENGTH] * (right - left) / (right + left)
+    wide[:, f.SADDLE_RIGHT] = wide[:, f.SADDLE_LEFT] = 0.5 * fields[:, f.SADDLE]
+    return state._replace(elements=in_lanes(wide))

@@ -4,16 +4,12 @@ Schindler's paper gives no number but "approximately 400 elements" and "nine to 
 is an assumption, plausible and not measured; those of the planar pushbelt keep its own.
 """
 
-from __future__ import annotations
-
-from collections.abc import Mapping
 from dataclasses import replace
-from typing import Any
 
 import numpy as np
 
 from cvt_hpc.models.pushbelt import parameters as pushbelt
-from cvt_hpc.parameters import Parameter, Substitute, not_negative, positive
+from cvt_hpc.parameters import Parameter, Parameters, Substitute, not_negative, positive
 from cvt_hpc.physics.out_of_plane import SIDES, axial_offset
 from cvt_hpc.variator import PULLEYS
 from cvt_hpc.variator.scene import SCENE
@@ -21,14 +17,14 @@ from cvt_hpc.variator.scene import SCENE
 LOOSE_SIDES = tuple(f"{pulley}_loose_side" for pulley in PULLEYS)
 
 
-def _offset(parameters: Mapping[str, Any]) -> float:
+def _offset(parameters: Parameters) -> float:
     try:
         return axial_offset(parameters, parameters["aligned_ratio"])
     except ValueError:
         raise ValueError("a ratio at which the belt closes on pulleys that do not overlap") from None
 
 
-def _of_strips(parameters: Mapping[str, Any]) -> float:
+def _of_strips(parameters: Parameters) -> float:
     p = parameters
     return p["bending_share"] * p["ring_stiffness"] * p["strip_width"] ** 2 / 12.0
 
@@ -168,13 +164,13 @@ PARAMETERS["belt"] |= _BELT
 PARAMETERS["sheaves"] |= _SHEAVES
 
 
-def package_arm(parameters: Mapping[str, Any]) -> float:
+def package_arm(parameters: Parameters) -> float:
     """Distance from the middle at which a package of no width has the roll stiffness of both strips [m]."""
     p = parameters
     return float(np.sqrt(p["package_offset"] ** 2 + p["strip_width"] ** 2 / 12.0))
 
 
-def roll_limit(parameters: Mapping[str, Any]) -> float:
+def roll_limit(parameters: Parameters) -> float:
     """Longest step with which the elements' roll, which is explicit, is stable [s].
 
     Rings at +-b turn neighbours alike by T b^2 d(roll)/ds, as a string does of the inertia per length
@@ -187,7 +183,7 @@ def roll_limit(parameters: Mapping[str, Any]) -> float:
     return float(pitch * np.sqrt(inertia / (pushbelt.most_tension(p) * arm**2)))
 
 
-def check(parameters: dict[str, Any]) -> list[tuple[str, str, str]]:
+def check(parameters: Parameters) -> list[tuple[str, str, str]]:
     """Problems that lie between parameters, in the form of `pushbelt.check`.
 
     Parameters
@@ -212,7 +208,7 @@ def check(parameters: dict[str, Any]) -> list[tuple[str, str, str]]:
     return problems
 
 
-def _off_the_cone(p: Mapping[str, Any], ratio: float) -> list[tuple[str, str, str]]:
+def _off_the_cone(p: Parameters, ratio: float) -> list[tuple[str, str, str]]:
     """Whether an element that enters out of line would miss the sheaves' faces at a ratio.
 
     A flank out of line by e meets its sheave e / tan d0 further out, or in. Where the job does not say how
@@ -249,7 +245,7 @@ def _off_the_cone(p: Mapping[str, Any], ratio: float) -> list[tuple[str, str, st
     ][:1]
 
 
-def inert(parameters: dict[str, Any]) -> dict[str, str]:
+def inert(parameters: Parameters) -> dict[str, str]:
     """Parameters without effect on a run, by name the setting that makes them so."""
     p = parameters
     found = pushbelt.inert(p)

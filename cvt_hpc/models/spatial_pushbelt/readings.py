@@ -4,8 +4,6 @@ In arrays of an element's points the flanks are left low, left high, right low, 
 the next element edge left, edge right, head left, head right (`belt`).
 """
 
-from __future__ import annotations
-
 import numpy as np
 
 from cvt_hpc.models.pushbelt import fields as planar

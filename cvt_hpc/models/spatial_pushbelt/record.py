@@ -12,8 +12,8 @@ from cvt_hpc.models.spatial_pushbelt import readings
 from cvt_hpc.physics.out_of_plane import clamped_force
 from cvt_hpc.variables import Coordinate, Variable
 from cvt_hpc.variator import PULLEYS, STRANDS, judging
+from cvt_hpc.variator.history import REGIONS, regions
 from cvt_hpc.variator.judging import each, mean
-from cvt_hpc.variator.path import REGIONS, regions
 from cvt_hpc.variator.slip import slide
 from cvt_hpc.variator.variables import frequency_bins
 from cvt_hpc.vibration import assessment, ramp

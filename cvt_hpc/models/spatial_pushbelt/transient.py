@@ -1,25 +1,38 @@
-"""A transient run of the spatial pushbelt: it starts from geometry, is clamped and loaded, and recorded."""
+"""A transient run of the spatial pushbelt: it starts from geometry, is clamped and loaded, and recorded.
 
-from __future__ import annotations
+Steps of the spatial pushbelt in time.
 
-from collections.abc import Mapping
+From q_k and X_{k-1/2} a step finds X_{k+1/2}. The magnitudes of stiff laws are those at q_{k+1} = q_k + dt
+X_{k+1/2} and all directions those at q_k: implicit Euler along the direction of each law, symplectic Euler
+for what is slow. Lateral bending of the rings has a law of its own that damps nothing (`bending`).
+"""
+
 from functools import partial
 from typing import Any
 
 import numpy as np
+from numba.extending import register_jitable
 
-from cvt_hpc.kernels import called_alike
+from cvt_hpc.kernels import called_alike, kernel
+from cvt_hpc.lanes import absolute, ahead, around, like
 from cvt_hpc.models.marched import batches_of_one
+from cvt_hpc.models.pushbelt import fields as planar
 from cvt_hpc.models.pushbelt import run
+from cvt_hpc.models.pushbelt.belt import of_lanes
+from cvt_hpc.models.pushbelt.border import accept_border, close_border, of_pulley, set_shapes
+from cvt_hpc.models.pushbelt.friction import filtered_slip
 from cvt_hpc.models.pushbelt.run import COURSES, ElementRun
-from cvt_hpc.models.pushbelt.start import of_lanes
-from cvt_hpc.models.pushbelt.stepping import advance_by
+from cvt_hpc.models.pushbelt.stepping import Equations, advance_by
+from cvt_hpc.models.spatial_pushbelt import assembly, flank, readings, two_flows
 from cvt_hpc.models.spatial_pushbelt import fields as f
-from cvt_hpc.models.spatial_pushbelt import readings
-from cvt_hpc.models.spatial_pushbelt.belt import NEWTON, NEWTON_OF_TWO_FLOWS, workspace
+from cvt_hpc.models.spatial_pushbelt import vectors as vec
+from cvt_hpc.models.spatial_pushbelt.assembly import bending_forces, predict_bending
+from cvt_hpc.models.spatial_pushbelt.belt import NEWTON, NEWTON_OF_TWO_FLOWS, start, with_two_flows, workspace
+from cvt_hpc.models.spatial_pushbelt.chain import chain_forces, link, predict, pull_across, saddle_forces
+from cvt_hpc.models.spatial_pushbelt.faces import face_forces, pin_forces, predict_faces, predict_pins
+from cvt_hpc.models.spatial_pushbelt.flank import book_flanks, book_pairs
 from cvt_hpc.models.spatial_pushbelt.parameters import LOOSE_SIDES, package_arm
-from cvt_hpc.models.spatial_pushbelt.start import start, with_two_flows
-from cvt_hpc.models.spatial_pushbelt.step import EQUATIONS
+from cvt_hpc.parameters import Parameters
 from cvt_hpc.variator import LARGEST_DISPLACEMENT, STRANDS
 
 CHANNELS = (*COURSES, *readings.SCALARS)
@@ -40,7 +53,7 @@ class Transient(ElementRun):
     _profiles = tuple(readings.PROFILES)
     _directions = (*STRANDS, *readings.LATERAL)
 
-    def _begin(self, p: Mapping[str, Any]) -> None:
+    def _begin(self, p: Parameters) -> None:
         flows = p["ring_flows"]
         self._advance = partial(called_alike(advance_by), EQUATIONS[flows])
         self._belt, self._state = start(given(p))
@@ -86,7 +99,7 @@ class Transient(ElementRun):
         return found.stored_energy(self._state.openings, self._state.leans)
 
 
-def given(parameters: Mapping[str, Any]) -> dict[str, Any]:
+def given(parameters: Parameters) -> dict[str, Any]:
     """What `start` takes, from flat parameters of a run [SI]."""
     p, shared = parameters, run.given(parameters)
     pitch = shared["belt_length"] / p["elements"]
@@ -103,3 +116,270 @@ def given(parameters: Mapping[str, Any]) -> dict[str, Any]:
 
 batch = batches_of_one(Transient)
 forget = run.forget
+
+
+@kernel
+def _open_sheaves(belt, state, leans, step, shapes):
+    """psi_k at the elements; the sheaves' leans go into the gaps."""
+    modes = belt.modal_stiffness.shape[1]
+    for j in range(step.rows):
+        driven = state[j, f.DRIVEN]
+        c, s = flank.along_arc(belt, state, j)
+        set_shapes(belt, c, s, shapes, j)
+        lean = like(0.0, c)
+        for k in range(modes):
+            lean = lean + of_pulley(leans[0, k], leans[1, k], driven) * shapes[j, k]
+        lean = belt.cosine * lean
+        for p in range(f.POINTS):
+            step[j, f.FLANK_GAP + p] += lean if p >= f.RIGHT_LOW else -lean
+
+
+@kernel
+def _place(belt, state, work, dt):
+    """Geometry and directions that all iterates of a step have in common."""
+    elements, step = state.elements, work.step
+    predict(belt, elements, state.pulleys, step, dt)
+    link(belt, elements, step, dt)
+    predict_bending(belt, elements, step)
+    predict_faces(belt, elements, step)
+    if belt.pin_clearance < np.inf:
+        predict_pins(belt, elements, step)
+    flank.predict_flanks(belt, elements, state.pulleys, step, dt)
+    _open_sheaves(belt, elements, state.leans, step, work.shapes)
+
+
+@kernel
+def _prepare(belt, state, work, dt):
+    """What all iterates of a step have in common."""
+    _place(belt, state, work, dt)
+    assembly.linear_blocks(belt, work.step, dt)
+
+
+@kernel
+def _prepare_two_flows(belt, state, work, dt):
+    """The same with two flows."""
+    _place(belt, state, work, dt)
+    two_flows.predict_flows(belt, state.elements, work.step, dt)
+    assembly.linear_blocks(belt, work.step, dt)
+
+
+@kernel
+def _press(belt, state, work, dt):
+    """Forces of the iterate, but for the friction of the rings."""
+    elements, step, iterate = state.elements, work.step, work.iterate
+    increments, openings, shapes = state.increments, state.openings, work.shapes
+    chain_forces(belt, elements, step, iterate, dt)
+    bending_forces(belt, elements, step, iterate, dt)
+    face_forces(belt, elements, step, iterate, dt)
+    if belt.pin_clearance < np.inf:
+        pin_forces(belt, elements, step, iterate, dt)
+    flank.flank_forces(belt, elements, state.pulleys, increments, openings, shapes, step, iterate, dt)
+
+
+@kernel
+def _sum_up(belt, state, work, load, dt):
+    """The residuals that forces leave, but for those of a second flow; return the power residual [W]."""
+    elements, increments, openings = state.elements, state.increments, state.openings
+    step, iterate, scratch, border = work.step, work.iterate, work.scratch, work.border
+    return assembly.residuals(
+        belt, elements, increments, openings, work.shapes, load, step, iterate, scratch, border, dt
+    )
+
+
+@kernel
+def _evaluate(belt, state, work, load, dt):
+    """Forces of the iterate, and the residuals that they leave; return the power residual [W]."""
+    _press(belt, state, work, dt)
+    saddle_forces(belt, state.elements, work.step, work.iterate)
+    return _sum_up(belt, state, work, load, dt)
+
+
+@kernel
+def _evaluate_two_flows(belt, state, work, load, dt):
+    """The same with two flows."""
+    elements, step, iterate = state.elements, work.step, work.iterate
+    _press(belt, state, work, dt)
+    two_flows.difference_forces(elements, step, iterate)
+    two_flows.saddle_forces_of_two(belt, elements, step, iterate)
+    power = _sum_up(belt, state, work, load, dt)
+    return power + two_flows.half_residuals(belt, elements, step, iterate, work.scratch, dt)
+
+
+@kernel
+def _assemble(belt, state, work, dt):
+    """The linear system of the elements, of the unknowns of one flow."""
+    assembly.assemble_pairs(belt, state.elements, work.step, work.iterate, work.narrow)
+    flank.add_flank_blocks(belt, state.elements, work.shapes, work.step, work.iterate, work.narrow, dt)
+
+
+@kernel
+def _assemble_two_flows(belt, state, work, dt):
+    """The same with two flows."""
+    _assemble(belt, state, work, dt)
+    two_flows.widen(belt, work.step, work.iterate, work.narrow, work.blocks, dt)
+
+
+@kernel
+def _close(belt, state, work, dt):
+    """That of the border."""
+    assembly.border_sums(belt, state.elements, work.shapes, work.iterate, work.narrow, work.sums)
+    close_border(belt, work.sums, work.border, dt)
+
+
+@kernel
+def _close_two_flows(belt, state, work, dt):
+    """The same with two flows."""
+    two_flows.narrow_solutions(work.blocks, work.narrow)
+    _close(belt, state, work, dt)
+
+
+@register_jitable
+def _flank_change(kept, k, p):
+    """Change of the force at a point of the flanks."""
+    return np.sqrt(
+        kept[k, f.FLANK + p] ** 2
+        + kept[k, f.FLANK_FRICTION_M + p] ** 2
+        + kept[k, f.FLANK_FRICTION_T + p] ** 2
+    )
+
+
+@kernel
+def _changes(kept, k):
+    """Changes of contact forces, of the element behind (k = 1) only of those to the next one."""
+    own = 1.0 - k
+    return (
+        kept[k, f.PUSH + f.EDGE_LEFT],
+        kept[k, f.PUSH + f.EDGE_RIGHT],
+        kept[k, f.PUSH + f.HEAD_LEFT],
+        kept[k, f.PUSH + f.HEAD_RIGHT],
+        kept[k, f.PIN],
+        own * _flank_change(kept, k, f.LEFT_LOW),
+        own * _flank_change(kept, k, f.LEFT_HIGH),
+        own * _flank_change(kept, k, f.RIGHT_LOW),
+        own * _flank_change(kept, k, f.RIGHT_HIGH),
+        own * kept[k, f.RING_FRICTION],
+    )
+
+
+@kernel
+def _accept_elements(belt, state, work, dt):
+    """Take the elements to the end of the step."""
+    elements, step, iterate = state.elements, work.step, work.iterate
+    per_dt = 1.0 / dt
+    for j in range(step.rows):
+        x, o = vec.at(elements, j, f.HEADING), vec.at(elements, j, f.OUTWARD)
+        outward = vec.cross(vec.at(step, j, f.RING_LINE), vec.cross(o, x))
+        pull = pull_across(step, iterate, j, outward)
+        across = per_dt * vec.dot(outward, vec.at(elements, j, f.CHANGE))
+        elements[j, f.SADDLE] = absolute(belt.ring_mass * across - pull)
+        elements[j, f.TENSION] = iterate[j, f.ITERATE_TENSION]
+        elements[j, f.LENGTH] += dt * (elements[j, f.RING_SLIP] - ahead(elements, j, f.RING_SLIP))
+        for r in range(f.SIZE):
+            elements[j, f.SPEED + r] += elements[j, f.CHANGE + r]
+        u, omega = vec.screw(elements, j, f.SPEED)
+        vec.store(elements, j, f.POSITION, vec.moved(vec.at(elements, j, f.POSITION), dt, u))
+        factors = vec.turning(omega, dt)
+        x, o = vec.squared_up(vec.turned(x, omega, factors), vec.turned(o, omega, factors))
+        vec.store(elements, j, f.HEADING, x)
+        vec.store(elements, j, f.OUTWARD, o)
+        elements[j, f.SLOPE] += dt * elements[j, f.SLOPE_RATE]
+        for p in range(f.POINTS):
+            along, around_it = elements[j, f.FLANK_SLIP_M + p], elements[j, f.FLANK_SLIP_T + p]
+            filtered = elements[j, f.V_FILTERED + p]
+            filtered = filtered_slip(belt, along, around_it, elements[j, f.FLANK + p], filtered, dt)
+            elements[j, f.V_FILTERED + p] = filtered
+
+
+@kernel
+def _add_loads(belt, state, work):
+    """Axial forces on the sheaves and torques on the pulleys, and how far sheaves would lean under them."""
+    elements, step, scratch, loads = state.elements, work.step, work.scratch, state.loads
+    modes = belt.modal_stiffness.shape[1]
+    sums = loads.size + 2 * modes
+    for k in range(sums):
+        scratch[0, k] = 0.0
+    for j in range(step.rows):
+        driven = elements[j, f.DRIVEN]
+        driving = 1.0 - driven
+        for p in range(f.POINTS):
+            side = p // 2
+            axial = elements[j, f.FLANK + p] * belt.cosine + elements[j, f.FLANK_FRICTION_M + p] * belt.sine
+            scratch[0, f.DRIVING_LEFT + side] += driving * axial
+            scratch[0, f.DRIVEN_LEFT + side] += driven * axial
+        torque = assembly.side_torque(elements, step, j, f.LEFT_LOW)
+        torque = torque + assembly.side_torque(elements, step, j, f.RIGHT_LOW)
+        scratch[0, f.DRIVING_TORQUE] += driving * torque
+        scratch[0, f.DRIVEN_TORQUE] += driven * torque
+        if modes > 0:
+            low_left, high_left = elements[j, f.FLANK + f.LEFT_LOW], elements[j, f.FLANK + f.LEFT_HIGH]
+            low_right, high_right = elements[j, f.FLANK + f.RIGHT_LOW], elements[j, f.FLANK + f.RIGHT_HIGH]
+            lean = 0.5 * belt.cosine * ((low_right + high_right) - (low_left + high_left))
+            for k in range(modes):
+                scratch[0, loads.size + k] += driving * lean * work.shapes[j, k]
+                scratch[0, loads.size + modes + k] += driven * lean * work.shapes[j, k]
+    for k in range(sums):
+        scratch[0, k] = around(scratch[0, k])
+    for k in range(loads.size):
+        loads[k] = scratch.data[0, k, 0]
+
+
+@kernel
+def _accept(belt, state, work, inputs, dt):
+    """Take the state to the end of the step, and add up what it has done."""
+    totals, pulleys, loads = state.totals, state.pulleys, state.loads
+    book_pairs(belt, state, work, dt)
+    book_flanks(belt, state, work, dt)
+    _accept_elements(belt, state, work, dt)
+    _add_loads(belt, state, work)
+    modes = belt.modal_stiffness.shape[1]
+    follow = dt / belt.lean_lag
+    for k in range(2 * modes):
+        pulley, mode = k // modes, k % modes
+        target = work.scratch.data[0, loads.size + k, 0] / belt.modal_stiffness[pulley, mode]
+        state.leans[pulley, mode] += follow * (target - state.leans[pulley, mode])
+
+    totals[planar.WORK_IN] -= dt * loads[f.DRIVING_TORQUE] * pulleys[planar.DRIVING_SPEED]
+    accept_border(belt, state, inputs, dt)
+    tangent = belt.sine / belt.cosine
+    for pulley in range(2):
+        left, right = loads[2 * pulley], loads[2 * pulley + 1]
+        side = belt.loose_side[pulley]
+        pressed = 0.5 * ((1.0 - side) * left + (1.0 + side) * right)  # on what moves
+        if pulley == 0:
+            closing = dt * (
+                belt.driving_rate * (inputs[planar.IN_DRIVING_THRUST] - pressed)
+                + inputs[planar.IN_DRIVING_SHIFT]
+            )
+            drift = dt * inputs[f.IN_DRIVING_DRIFT]
+            pulleys[planar.DRIVING_RADIUS] += closing
+            pulleys[f.DRIVING_MIDDLE] += drift - side * tangent * closing
+        else:
+            closing = dt * belt.driven_rate * (inputs[planar.IN_DRIVEN_THRUST] - pressed)
+            drift = dt * inputs[f.IN_DRIVEN_DRIFT]
+            pulleys[planar.DRIVEN_RADIUS] += closing
+            pulleys[f.DRIVEN_MIDDLE] += drift - side * tangent * closing
+        totals[planar.THRUST_WORK] += (right - left) * drift - 2.0 * tangent * pressed * closing
+
+
+@kernel
+def _accept_two_flows(belt, state, work, inputs, dt):
+    """The same with two flows."""
+    two_flows.book_difference(state, work, dt)
+    two_flows.accept_difference(belt, state, work, dt)
+    _accept(belt, state, work, inputs, dt)
+
+
+# By how many flows of ring material there are
+EQUATIONS = {
+    1: Equations(_prepare, _evaluate, _assemble, _close, _accept, _changes, f.CHANGE),
+    2: Equations(
+        _prepare_two_flows,
+        _evaluate_two_flows,
+        _assemble_two_flows,
+        _close_two_flows,
+        _accept_two_flows,
+        _changes,
+        f.CHANGE,
+    ),
+}
+advance = partial(advance_by, EQUATIONS[1])

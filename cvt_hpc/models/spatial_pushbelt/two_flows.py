@@ -8,8 +8,6 @@ same form: a magnitude along half the difference of the directions of both packa
 The linear system of the eight unknowns of one flow is assembled as for one flow, and then widened.
 """
 
-from __future__ import annotations
-
 from numba.extending import register_jitable
 
 from cvt_hpc.kernels import kernel
@@ -17,17 +15,16 @@ from cvt_hpc.lanes import absolute, ahead, around, behind, fma, like
 from cvt_hpc.models.pushbelt import fields as planar
 from cvt_hpc.models.pushbelt.border import add_to_totals
 from cvt_hpc.models.pushbelt.friction import ring_friction
+from cvt_hpc.models.spatial_pushbelt import chain
 from cvt_hpc.models.spatial_pushbelt import fields as f
 from cvt_hpc.models.spatial_pushbelt import vectors as vec
-from cvt_hpc.models.spatial_pushbelt.chain import lines_at, lines_to_next, mean_stretch, motion, motion_ahead
-from cvt_hpc.models.spatial_pushbelt.saddle import ring_slip
 
 
 @register_jitable
 def _along(direction, state, j, share):
     """Product of a direction of a law of w with an element's speeds and a share of their changes."""
     w = fma(share, state[j, f.CHANGE_OF_HALF], state[j, f.HALF_SPEED])
-    return vec.both_dot(direction, motion(state, j, share)) + w
+    return vec.both_dot(direction, chain.motion(state, j, share)) + w
 
 
 @kernel
@@ -36,7 +33,7 @@ def predict_flows(belt, state, step, dt):
     b = belt.package_distance
     half_stiffness = 0.5 * belt.ring_stiffness
     for j in range(state.rows):
-        right, left = lines_at(belt, state, j)
+        right, left = chain.lines_at(belt, state, j)
         a = vec.cross(vec.at(state, j, f.OUTWARD), vec.at(state, j, f.HEADING))
         line = vec.screw(step, j, f.RING_LINE)
         half = vec.times(-0.5, vec.minus(right, left)), vec.times(-b, vec.cross(a, line[0]))
@@ -44,14 +41,14 @@ def predict_flows(belt, state, step, dt):
         vec.store_screw(step, j, f.HALF_SLIP_BY, half)
         step[j, f.START_HALF_SLIP] = _along(half, state, j, 0.0)
     for j in range(state.rows):
-        ai, aj, _, lines = lines_to_next(state, j, f.POSITION, f.HEADING, f.OUTWARD, b)
+        ai, aj, _, lines = chain.lines_to_next(state, j, f.POSITION, f.HEADING, f.OUTWARD, b)
         right, left, _, _ = lines
         half, mean = vec.times(0.5, vec.minus(right, left)), vec.times(0.5 * b, vec.plus(right, left))
         own, next_one = vec.screw(step, j, f.HALF_SLIP_BY), vec.screw_ahead(step, j, f.HALF_SLIP_BY)
         vec.store_screw(step, j, f.DIFFERENCE_I, vec.both_plus((half, vec.cross(ai, mean)), own))
         vec.store_screw(step, j, f.DIFFERENCE_J, vec.both_plus((half, vec.cross(aj, mean)), next_one))
 
-        _, _, _, lines = lines_to_next(
+        _, _, _, lines = chain.lines_to_next(
             step, j, f.PREDICTED_POSITION, f.PREDICTED_HEADING, f.PREDICTED_OUTWARD, b
         )
         _, _, right_size, left_size = lines
@@ -99,7 +96,7 @@ def saddle_forces_of_two(belt, state, step, iterate):
     for j in range(step.rows):
         before, half_before = state[j, f.RING_SLIP], state[j, f.HALF_SLIP]
         by_half = vec.screw(step, j, f.HALF_SLIP_BY)
-        slip, half = ring_slip(state, step, j, 1.0), _along(by_half, state, j, 1.0)
+        slip, half = chain.ring_slip(state, step, j, 1.0), _along(by_half, state, j, 1.0)
         right, right_slope, dual = ring_friction(
             belt, slip + half, before + half_before, state[j, f.DUAL_RIGHT]
         )
@@ -206,9 +203,9 @@ def book_difference(state, work, dt):
         half_slip = _along(vec.screw(step, j, f.HALF_SLIP_BY), elements, j, 0.5)
         ring += elements[j, f.FRICTION_DIFFERENCE] * half_slip
         w = ahead(elements, j, f.HALF_SPEED) + 0.5 * ahead(elements, j, f.CHANGE_OF_HALF)
-        next_one = vec.both_dot(there, motion_ahead(elements, j, 0.5)) + w
+        next_one = vec.both_dot(there, chain.motion_ahead(elements, j, 0.5)) + w
         stretch = _along(here, elements, j, 0.5) - next_one
-        of_both = mean_stretch(elements, step, j)
+        of_both = chain.mean_stretch(elements, step, j)
         stretching += stretch * (step[j, f.TENSION_SLOPE] * stretch + 2.0 * step[j, f.CROSS_SLOPE] * of_both)
     add_to_totals(state, scratch, planar.RING_LOSS, dt * ring)
     add_to_totals(state, scratch, planar.RING_DAMPED, dt * stretching)

@@ -7,8 +7,6 @@ What acts left and right is summed for either side first, and then both: a belt 
 stays so to the last bit, and a mirrored one moves as the mirror image.
 """
 
-from __future__ import annotations
-
 from numba.extending import register_jitable
 
 from cvt_hpc import lanes

@@ -1,14 +1,11 @@
 """Variables of the strands in the record of a run: eigenfrequencies, critical speed, and their force."""
 
-from __future__ import annotations
-
 from collections.abc import Mapping
 from typing import Any, NamedTuple
 
 import numpy as np
 
-from cvt_hpc.models.strand.forces import net_forces
-from cvt_hpc.models.strand.ritz import Strand, eigenfrequencies, resting_frequencies
+from cvt_hpc.models.strand.ritz import Strand, eigenfrequencies, net_forces, resting_frequencies
 from cvt_hpc.physics.geometry import variator
 from cvt_hpc.variables import Coordinate, Status, Variable, Vibrates
 from cvt_hpc.variator import STRANDS

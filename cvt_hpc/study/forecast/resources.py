@@ -1,26 +1,139 @@
-"""Resources to request on a cluster: time limit and space on the disk."""
+"""Resources to request on a cluster: time limit and space on the disk.
 
-from __future__ import annotations
+Before a sweep the times of its runs are known by records, by a few short batches, or by prediction. Sweeps
+that need too much memory or disk are refused.
+"""
 
 import math
+import os
+import shutil
 from collections.abc import Sequence
+from dataclasses import replace
 from functools import partial
 from pathlib import Path
-from typing import TYPE_CHECKING, NamedTuple
+from typing import NamedTuple
 
-from cvt_hpc.study.description import Study, describe
-from cvt_hpc.study.forecast.needs import Disk, most_of_results
-from cvt_hpc.study.forecast.pilots import find_out
-from cvt_hpc.study.forecast.simulate import Forecast, forecast
-from cvt_hpc.study.ranks.time_limit import gathering_margin
-from cvt_hpc.study.record.frames import HEAD, PLACE, RecordFormat
-from cvt_hpc.study.simulator import default_simulator
+from cvt_hpc.errors import mismatch
+from cvt_hpc.job import Job
+from cvt_hpc.study.batches import Batch, in_parts
+from cvt_hpc.study.description import Study, describe, record_layout, record_type
+from cvt_hpc.study.forecast.cost_model import CostModel, Fit, Forecast, forecast
+from cvt_hpc.study.planning import predicted_costs
+from cvt_hpc.study.ranks.stopping import gathering_margin
+from cvt_hpc.study.record.log import HEAD, PLACE, RecordFormat
+from cvt_hpc.study.simulator import Simulator, default_simulator
+from cvt_hpc.study.status import find_records
+from cvt_hpc.study.task import Task, refined_steps
 
-if TYPE_CHECKING:
-    from cvt_hpc.job import Job
+# [byte] of rank 0 for each run, for the plan and the index of the records: 207 were measured with 10^6 runs
+# on one rank, and about as much again is assumed for sending the plan.
+MEMORY_PER_RUN = 400
+# [byte] of results.nc for each quantity and coordinate, beside its values: 4700 at most were measured
+NAMES_AND_CHUNKS = 5000
+_PREFIXES = ((1e12, "T"), (1e9, "G"), (1e6, "M"), (1e3, "k"))
 
 _START_UP = 60.0  # [s] for MPI, Python and kernels; assumed, with room for slow file systems
 _STEP = 300.0  # [s] to which a time limit is rounded up
+
+
+class Disk(NamedTuple):
+    """Space on the disk [byte], of `results` at most; `histories` NaN where it is not known."""
+
+    records: float
+    results: float
+    histories: float
+
+
+class Needs(NamedTuple):
+    """Needs of a sweep.
+
+    Attributes
+    ----------
+    memory : int
+        Of rank 0, for the plan [byte].
+    disk : Disk
+        Space on the disk.
+    profiles : int
+        Memory of a rank, and disk at most, for a kept history's values along the belt at each sample [byte].
+    """
+
+    memory: int
+    disk: Disk
+    profiles: int = 0
+
+
+def needs(job: Job, simulator: Simulator) -> Needs:
+    """Return the needs of a sweep of all runs of a job, without the marks of its batches."""
+    variables, coordinates = record_layout(job, simulator)
+    record = record_type(variables, coordinates).itemsize
+    size = job.size
+    named = len(variables) + len(coordinates) + len(job.axes) + len(job.rules)
+    disk = Disk((HEAD.size + PLACE.size + record) * size, most_of_results(size * record, named), math.nan)
+    disk = disk if job.histories else disk._replace(histories=0.0)
+    return Needs(MEMORY_PER_RUN * size, disk, simulator.profile_bytes(job))
+
+
+def most_of_results(values: int, named: int) -> int:
+    """Return the most that results.nc takes [byte], by its values [byte] and number of quantities."""
+    return values + NAMES_AND_CHUNKS * named
+
+
+def refuse_too_large(job: Job, simulator: Simulator, out: Path) -> Needs:
+    """Return the needs of a sweep of all runs of a job.
+
+    Parameters
+    ----------
+    job : Job
+        A validated job.
+    simulator : Simulator
+        Does the runs.
+    out : Path
+        The output folder; its present content need not be written any more.
+
+    Raises
+    ------
+    InputError
+        If this machine has less memory, or less disk is free. Of a trace it is not known how many cells it
+        runs, and disk is no reason.
+    """
+    needed, where = needs(job, simulator), f"{job.source}: {job.size} runs"
+    memory = os.sysconf("SC_PAGE_SIZE") * os.sysconf("SC_PHYS_PAGES")
+    if needed.memory > memory:
+        found = f"{size_in_words(memory)} in this machine"
+        raise mismatch(where, f"{size_in_words(needed.memory)} of memory for their plan", found)
+    if needed.profiles > memory:
+        found = f"{size_in_words(memory)} in this machine"
+        raise mismatch(where, f"{size_in_words(needed.profiles)} of memory for profiles over time", found)
+    if "first_spacing" not in job.design:
+        free = _free(out) + _held(out)
+        profiles = needed.profiles * len(job.histories)
+        if (disk := needed.disk.records + needed.disk.results + profiles) > free:
+            expected = f"{size_in_words(disk)} on the disk for their records and results.nc"
+            expected += ", and for profiles over time" if profiles else ""
+            raise mismatch(where, expected, f"{size_in_words(free)} at {out}")
+    return needed
+
+
+def size_in_words(size: float) -> str:
+    """Return a size [byte] in words, to three digits."""
+    factor, prefix = next((pair for pair in _PREFIXES if size >= 0.9995 * pair[0]), _PREFIXES[-1])
+    return f"{size / factor:.3g} {prefix}B"
+
+
+def _free(out: Path) -> int:
+    """Return the space [byte] on the disk where a folder is, or will be made."""
+    try:
+        return shutil.disk_usage(next(p for p in (out, *out.absolute().parents) if p.is_dir())).free
+    except OSError:  # the start itself names it, in its own words
+        return 1 << 62
+
+
+def _held(out: Path) -> int:
+    """Return the size [byte] of the records in an output folder."""
+    try:
+        return sum(path.stat().st_size for path in (out / "records").iterdir())
+    except OSError:
+        return 0
 
 
 class Expectation(NamedTuple):
@@ -101,3 +214,93 @@ def slurm_time(seconds: float) -> str:
     hours, minutes = divmod(minutes, 60)
     days, hours = divmod(hours, 24)
     return f"{f'{days}-' if days else ''}{hours:02d}:{minutes:02d}:{rest:02d}"
+
+
+class Knowledge(NamedTuple):
+    """The times of a job's batches, as far as they are known.
+
+    Attributes
+    ----------
+    fit : Fit
+        Time [s] of a batch over its predicted cost.
+    basis : str
+        Where it is from, in words.
+    history_bytes : float
+        Size of the history of a run in memory [byte]; NaN where it is not known.
+    """
+
+    fit: Fit
+    basis: str
+    history_bytes: float = math.nan
+
+
+def find_out(job: Job, simulator: Simulator, groups: Sequence[Batch], out: Path, pilots: int) -> Knowledge:
+    """Return the known times of a job's batches.
+
+    Parameters
+    ----------
+    job : Job
+        A validated job.
+    simulator : Simulator
+        Does the runs, and predicts their cost in core-seconds.
+    groups : sequence of tuple of int
+        All runs, in full batches.
+    out : Path
+        The output folder, whose records are used if no pilots are requested.
+    pilots : int
+        Number of batches to be done for this, shortened and without a trace in the folder.
+    """
+    if pilots:
+        found = run_pilots(job, simulator, groups, pilots)
+        if found.fit.batches:
+            return found
+    else:
+        records = find_records(out, job)
+        if records is not None:
+            costs = predicted_costs(job, simulator, refined_steps(job, records, {}))
+            fit = Task(job, records.study, simulator).fit(records, costs)
+            if fit.batches:
+                return Knowledge(fit, f"batches on record ({fit.batches})")
+    # The cost of a run is its share of a full batch.
+    lanes = max(len(group) / simulator.turns(job, len(group)) for group in groups)
+    failed = "; no pilot batch came to its end" if pilots else ""
+    return Knowledge(Fit(mean=math.log(lanes)), f"predicted costs, right within a factor of two{failed}")
+
+
+def run_pilots(job: Job, simulator: Simulator, groups: Sequence[Batch], count: int) -> Knowledge:
+    """Do batches from all over the grid for a part of their duration, and compare with their predicted cost.
+
+    A shortened run is neither refined nor prolonged, and its batch fills the lanes once; what refining and
+    prolonging take is in the predicted costs alone.
+    """
+    short, share = job, simulator.pilot_share(job)
+    # Where the duration is an axis or follows from others, its values count, and without a transient there is
+    # none: done in full.
+    fixed = {axis.name for axis in job.axes} | {rule.key for rule in job.rules}
+    if share < 1.0 and "duration" in job.parameters and "duration" not in fixed:
+        duration = share * job.parameters["duration"]
+        bare = {"duration": duration, "longest_duration": duration, "most_refinements": 0}
+        known = {key: value for key, value in bare.items() if key in job.parameters}
+        short = replace(job, parameters={**job.parameters, **known})
+    else:
+        share = 1.0
+    turns = partial(simulator.turns, job)
+    if share < 1.0:
+        groups = [part for group in groups for part in in_parts(group, turns(len(group)))]
+    places = {int((k + 0.5) * len(groups) / count) for k in range(count)}
+    chosen = [groups[place] for place in sorted(places)]
+    if job.histories:
+        short = replace(short, histories=(chosen[0][0],))
+    task = Task(short, describe(short, simulator), simulator)
+    model, history_bytes = CostModel(simulator.run_costs(short), turns=turns), math.nan
+    for batch in chosen:
+        simulator.forget(job)
+        for result in task.do(batch, lambda: None, lambda batch: None):
+            if result.failed < len(result.records):
+                model.learn(result.batch, result.seconds)
+            for _, history in result.histories:
+                history_bytes = history.nbytes / share
+    noun = "pilot batch" if model.fit.batches == 1 else "pilot batches"
+    return Knowledge(
+        model.fit, f"{model.fit.batches} {noun} of {share:.0%} of the simulated time", history_bytes
+    )

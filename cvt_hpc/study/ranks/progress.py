@@ -1,22 +1,70 @@
-"""How far a sweep, chart or diagram is: a bar on a terminal, plain lines where the output goes to a file."""
+"""How far a sweep, chart or diagram is: a bar on a terminal, plain lines where the output goes to a file.
 
-from __future__ import annotations
+Ranks share the next batch to claim and the number of finished runs: `Counter`.
+"""
 
 import math
 import sys
 import time
 from collections.abc import Callable, Sequence
 from contextlib import ExitStack, suppress
+from typing import NamedTuple, Self
 
 import numpy as np
 
-from cvt_hpc.study.ranks.counter import Counter, Tally
+INTERRUPTED = 2**40  # claims count from here when all are interrupted: beyond every plan
 
 _BAR_INTERVAL = 0.5  # [s]
 _FIRST_LINE = 5.0  # [s]; lines then come less and less often, so that a day's output stays readable
 _LAST_LINE = 60.0  # [s]
 # without the time that tqdm expects by numbers alone: the longest come first
 _BAR = "{l_bar}{bar}| {n_fmt}/{total_fmt} [{elapsed}, {rate_fmt}{postfix}]"
+
+
+class Tally(NamedTuple):
+    """How many runs of this session are finished, and how many of those failed."""
+
+    finished: int
+    failed: int
+
+
+class Counter:
+    """The one thing that ranks share while they compute; this one is of a process alone."""
+
+    def __init__(self) -> None:
+        self._next = 0
+        self._tally = Tally(0, 0)
+
+    def claim(self) -> int:
+        """Return a position that no other claim gets: 0, 1, 2, ... over all ranks."""
+        self._next += 1
+        return self._next - 1
+
+    def rewind(self) -> None:
+        """Let claims begin at 0 again, unless all are interrupted; by one rank, while none claims."""
+        self._next = 0 if self._next < INTERRUPTED else INTERRUPTED
+
+    def report(self, finished: int, failed: int) -> None:
+        """Count finished runs, and the failed ones among them."""
+        self._tally = Tally(self._tally.finished + finished, self._tally.failed + failed)
+
+    def tally(self) -> Tally:
+        """Return the reports of all ranks."""
+        return self._tally
+
+    def interrupt_all(self) -> None:
+        """Let no rank claim another batch, and let all stop their present one."""
+        self._next = INTERRUPTED
+
+    def is_interrupted(self) -> bool:
+        """Return whether some rank has interrupted all."""
+        return self._next >= INTERRUPTED
+
+    def __enter__(self) -> Self:
+        return self
+
+    def __exit__(self, kind: type[BaseException] | None, *others: object) -> None:
+        return
 
 
 class Progress:

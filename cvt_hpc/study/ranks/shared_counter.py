@@ -5,8 +5,6 @@ claim waits until rank 0 enters the MPI library; a thread on rank 0 enters it ev
 kernels, which release the interpreter lock, compute.
 """
 
-from __future__ import annotations
-
 import threading
 from contextlib import suppress
 
@@ -14,8 +12,8 @@ import numpy as np
 from mpi4py import MPI
 
 from cvt_hpc.errors import InputError
-from cvt_hpc.study.ranks.counter import INTERRUPTED, Counter, Tally
 from cvt_hpc.study.ranks.launch import RankDied, noticing_deaths
+from cvt_hpc.study.ranks.progress import INTERRUPTED, Counter, Tally
 
 _PROGRESS_INTERVAL = 1e-3  # [s]
 _TEST_CLAIMS = 16  # of each rank in the self-test

@@ -51,7 +51,7 @@ def patience(environment: Mapping[str, str] = os.environ) -> float:
     """
     if _VARIABLE not in environment:
         return _PATIENCE
-    from cvt_hpc.job.durations import read_duration
+    from cvt_hpc.job.units import read_duration
 
     return read_duration(environment[_VARIABLE], _VARIABLE)
 
