@@ -5,8 +5,6 @@ with Maxwell and Betti's reciprocity: Bullinger et al. 2005, eq. 10), so w is sy
 its entries of either sign: a disc that is pressed on one side comes nearer on the other.
 """
 
-from __future__ import annotations
-
 from collections.abc import Sequence
 
 import numpy as np

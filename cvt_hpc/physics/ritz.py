@@ -14,8 +14,6 @@ omega_k^2)), all else is known before, p_k. So the contact is that of `closed_se
 the place of c_k, and gaps that p_k opens. Modes above a limit frequency have no inertia: B_k = c_k, p_k = 0.
 """
 
-from __future__ import annotations
-
 from typing import NamedTuple
 
 import numpy as np

@@ -1,7 +1,5 @@
 """Elastic sheaves under one wrap: the constants of its contact, whose equations stand in `compliance.py`."""
 
-from __future__ import annotations
-
 from collections.abc import Mapping
 from typing import Any, NamedTuple
 

@@ -17,8 +17,6 @@ belt slides into the groove: from pi/2 to 3 pi/2 the pulley drives the belt, bel
 Of means, sliding speed and angle are those of the mean sliding.
 """
 
-from __future__ import annotations
-
 from collections.abc import Mapping
 from typing import Any
 

@@ -1,7 +1,5 @@
 """Parameters of the belt's bending: curvature terms, and the moment of the pressed elements."""
 
-from __future__ import annotations
-
 from collections.abc import Mapping
 from typing import Any
 

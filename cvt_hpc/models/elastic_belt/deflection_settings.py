@@ -1,7 +1,5 @@
 """Parameters of the deflection of the sheaves' discs, and the flexibilities that result."""
 
-from __future__ import annotations
-
 from collections.abc import Mapping
 from functools import partial
 from typing import Any

@@ -5,8 +5,6 @@ Velocities by the forces of the present state, then positions by the new velocit
 deviations, each cell's stresses computed once.
 """
 
-from __future__ import annotations
-
 from cvt_hpc.kernels import kernel
 from cvt_hpc.lanes import (
     LaneArray,

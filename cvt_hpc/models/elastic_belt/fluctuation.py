@@ -31,8 +31,6 @@ meet), the energy gained while the vibration grows, and bending. Fluctuations of
 and hum of gaps too, and a trend of the mean state would: along a ramp of load or speed nothing is known.
 """
 
-from __future__ import annotations
-
 from collections.abc import Mapping
 from typing import Any, NamedTuple
 

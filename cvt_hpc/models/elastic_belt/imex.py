@@ -16,8 +16,6 @@ step to step with pushes in proportion to the step (`EDGES.md`). The step is lim
 tension and contact across the belt.
 """
 
-from __future__ import annotations
-
 from cvt_hpc.kernels import kernel
 from cvt_hpc.lanes import anywhere, around, behind, fma, from_ahead, like, minimum, select
 from cvt_hpc.models.elastic_belt import fields as f

@@ -21,8 +21,6 @@ grows whatever mesh and friction are. A mass that is not symmetric, as of increm
 friction has taken its part, feeds the shortest waves.
 """
 
-from __future__ import annotations
-
 from cvt_hpc.kernels import kernel, merged_kernel
 from cvt_hpc.lanes import ahead, behind, fma, from_ahead, from_behind, like, ring_solution, sqrt
 from cvt_hpc.models.elastic_belt import lane_fields as lf

@@ -1,7 +1,5 @@
 """The fast step at each station: forces, and slopes with the speeds, without the stresses T and P."""
 
-from __future__ import annotations
-
 from cvt_hpc.kernels import kernel, merged_kernel
 from cvt_hpc.lanes import (
     ahead,

@@ -1,7 +1,5 @@
 """The system of the fast step: stresses into its rows, elimination along the belt, and back substitution."""
 
-from __future__ import annotations
-
 from cvt_hpc.kernels import kernel, merged_kernel
 from cvt_hpc.lanes import (
     LaneArray,

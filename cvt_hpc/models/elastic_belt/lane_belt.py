@@ -6,8 +6,6 @@ present speed, contents as deviations from the reference path's, so that single 
 strains and sliding speeds in them.
 """
 
-from __future__ import annotations
-
 from typing import Any, NamedTuple
 
 import numpy as np

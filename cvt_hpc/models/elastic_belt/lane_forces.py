@@ -4,8 +4,6 @@ Steps keep it in a LaneArray of N stations, their work space: its first fields a
 ones each step's own.
 """
 
-from __future__ import annotations
-
 from cvt_hpc.kernels import kernel, merged_kernel
 from cvt_hpc.lanes import (
     LaneArray,

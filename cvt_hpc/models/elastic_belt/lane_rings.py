@@ -4,8 +4,6 @@ The equations are those of `rings.py`. Surfaces and layers are counted from 0: l
 and surface k + 1; surface 0 is the saddle, surface n that of the ears.
 """
 
-from __future__ import annotations
-
 from collections.abc import Sequence
 from typing import NamedTuple
 

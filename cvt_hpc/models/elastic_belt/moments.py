@@ -1,7 +1,5 @@
 """Sums of forces, speeds and their products at each station, for the fluctuations' audit."""
 
-from __future__ import annotations
-
 from cvt_hpc.kernels import merged_kernel
 from cvt_hpc.lanes import LaneArray, fma, like
 from cvt_hpc.models.elastic_belt.fields import names_from

@@ -9,8 +9,6 @@ friction memory none has. Forces,
 contact and laws are those of `rhs`, called and not written again.
 """
 
-from __future__ import annotations
-
 from typing import NamedTuple
 
 import numpy as np

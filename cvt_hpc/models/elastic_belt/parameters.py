@@ -4,8 +4,6 @@ Only ratio, driving_speed and thrust of the defaults are from a paper (Lebrecht 
 are those of a common passenger-car belt; every other default is an assumption, plausible and not measured.
 """
 
-from __future__ import annotations
-
 from typing import Any
 
 import numpy as np

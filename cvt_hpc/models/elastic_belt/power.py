@@ -17,8 +17,6 @@ brings in: none, but for the mesh, since contact begins and ends without force, 
 forces do no work on the whole.
 """
 
-from __future__ import annotations
-
 from cvt_hpc.kernels import kernel
 from cvt_hpc.lanes import LaneArray, fma, like, maximum, minimum
 from cvt_hpc.models.elastic_belt import fields as f

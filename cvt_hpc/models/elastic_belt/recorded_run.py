@@ -1,7 +1,5 @@
 """Recording of every run of the elastic belt, with any stepper: its plan, its arrays and their reading."""
 
-from __future__ import annotations
-
 from collections.abc import Iterator, Mapping, Sequence
 from contextlib import contextmanager
 from typing import TYPE_CHECKING, Any, NamedTuple

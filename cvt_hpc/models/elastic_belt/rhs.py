@@ -29,8 +29,6 @@ and the equations above are those of theta = 0. Stresses of T and P enter cells,
 content is upwinded, since centred fluxes leave a free checkerboard mode where P = 0.
 """
 
-from __future__ import annotations
-
 import numpy as np
 
 from cvt_hpc.kernels import kernel, merged_kernel

@@ -21,8 +21,6 @@ some 40 at 4.6 us and 160 stations, 1 below 0.75 us: the error vanishes with the
 with its slope, or where it would turn sliding about by itself with as much of the secant as prevents that.
 """
 
-from __future__ import annotations
-
 from collections.abc import Sequence
 from typing import NamedTuple
 

@@ -16,8 +16,6 @@ mean speed. Rows V_RING and N_RING of a state have these. The layers' own rows f
 n contents less 1 + kappa d_k.
 """
 
-from __future__ import annotations
-
 from collections.abc import Mapping
 from typing import Any, NamedTuple
 

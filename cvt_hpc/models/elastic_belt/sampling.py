@@ -1,7 +1,5 @@
 """The recorded quantities of the belt at each sampling instant, and when a run has to be stopped."""
 
-from __future__ import annotations
-
 from enum import IntEnum
 from fractions import Fraction
 from typing import Any, NamedTuple

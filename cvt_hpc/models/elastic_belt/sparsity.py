@@ -4,8 +4,6 @@ For integrators that can use it: SciPy's BDF and Radau factorise it as a sparse 
 the sheaves, whose deformation lets each displacement of a wrap act on every force of that wrap.
 """
 
-from __future__ import annotations
-
 import numpy as np
 from scipy.sparse import csc_array
 

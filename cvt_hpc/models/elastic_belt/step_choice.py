@@ -10,8 +10,6 @@ grow, w being their angular frequency under tension and contact (`transverse_lim
 SAFE_SHARE of that.
 """
 
-from __future__ import annotations
-
 from collections.abc import Mapping
 from typing import Any
 

@@ -1,7 +1,5 @@
 """Conditions that end a run, and checks of the numbers of a run that reached its end."""
 
-from __future__ import annotations
-
 from collections.abc import Mapping
 from typing import Any
 

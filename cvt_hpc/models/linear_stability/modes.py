@@ -10,8 +10,6 @@ is their power over twice the vibration's energy, which is twice its mean kineti
 with the damping d it is -d / (2 m).
 """
 
-from __future__ import annotations
-
 from typing import NamedTuple
 
 import numpy as np

@@ -1,7 +1,5 @@
 """The shapes across the belt, and which of them move by inertia: the split at the limit frequency."""
 
-from __future__ import annotations
-
 from typing import NamedTuple
 
 import numpy as np

@@ -1,7 +1,5 @@
 """Increments of all speeds in a step: the coordinates' dense system, into which the layers' is eliminated."""
 
-from __future__ import annotations
-
 import numpy as np
 
 from cvt_hpc.kernels import kernel

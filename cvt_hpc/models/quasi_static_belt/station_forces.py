@@ -3,8 +3,6 @@
 As in `elastic_belt/imex_stations.py`, and hoop stresses: a cell that moves outwards is stretched.
 """
 
-from __future__ import annotations
-
 import numpy as np
 
 from cvt_hpc.kernels import kernel

@@ -14,8 +14,6 @@ is eliminated (`coupled.py`). With the steady flow of eqs 29 and 30 each layer h
 N, and its contents follow by an implicit step of their own (`contents.py`).
 """
 
-from __future__ import annotations
-
 import numpy as np
 
 from cvt_hpc.kernels import kernel

@@ -7,8 +7,6 @@ the set of closed stations the forces follow from the gaps by a linear system, d
 belt by eight numbers (`pulled_by`) alone, so their rows are the slopes with these times those of them.
 """
 
-from __future__ import annotations
-
 import numpy as np
 from scipy.sparse import csc_array, csr_array
 

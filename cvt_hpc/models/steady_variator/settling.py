@@ -6,8 +6,6 @@ is dissipative where friction is constant, so that it settles near enough, unles
 friction carries: then the belt slips through.
 """
 
-from __future__ import annotations
-
 from collections.abc import Mapping
 from typing import Any
 
