@@ -86,7 +86,7 @@ def test_forces_along_a_rising_ramp_are_those_of_constant_speeds():
 
 @pytest.mark.slow
 def test_onset_and_end_are_where_constant_speeds_have_them():
-    inside, outside = (2000.0, 3800.0), (1900.0, 3900.0)
+    inside, outside = (2000.0, 3400.0), (1900.0, 3500.0)
     runs = Together(*(VIBRATING | {"driving_speed": s * RPM, "duration": 0.3} for s in (*inside, *outside)))
     for speeds, expected in ((inside, Vibrates.YES), (outside, Vibrates.NO)):
         for speed in speeds:
@@ -99,11 +99,9 @@ def test_onset_and_end_are_where_constant_speeds_have_them():
     )
     # what the ramp passes in the 0.1 s for which a vibration has to last
     late = 3000 * RPM / 1.0 * 0.1
-    # over so much below the window's upper end amplitudes are near their threshold, 4 to 7 um
-    weak = 200 * RPM
     for found, first, last, sign in ((up, low, high, 1.0), (down, high, low, -1.0)):
         assert (found["status"], found["vibrates"]) == (Status.DONE, Vibrates.YES)
-        assert -late < sign * (found["onset_speed"] - np.mean(first)) < late + weak * (first is high)
+        assert -late < sign * (found["onset_speed"] - np.mean(first)) < late
         assert abs(found["end_speed"] - np.mean(last)) < late
         assert (
             f"from {found['onset_speed'] / RPM:.4g} rpm to {found['end_speed'] / RPM:.4g} rpm"
@@ -113,7 +111,7 @@ def test_onset_and_end_are_where_constant_speeds_have_them():
         assert np.isnan(found["onset_load"]) and np.all(np.isnan(found["ramp_load"]))
         vibrating = found["ramp_amplitude"].max(axis=0) > 5e-6
         well_inside = (found["ramp_speed"] > low[1] + late) & (found["ramp_speed"] < high[1] - late)
-        assert vibrating[well_inside].all() and well_inside.sum() == 8
+        assert vibrating[well_inside].all() and well_inside.sum() == 6
 
 
 def test_a_belt_that_slips_does_so_against_the_present_speed():
