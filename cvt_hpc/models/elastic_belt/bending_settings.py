@@ -47,15 +47,6 @@ def has_column(parameters: Mapping[str, Any]) -> bool:
     return bool(parameters.get("column_bending", "off") == "rocking")
 
 
-def whole_bending_stiffness(parameters: Mapping[str, Any]) -> float:
-    """Largest bending stiffness that the belt may have [N m^2], pressed elements included.
-
-    Of the parameters it reads those alone that have an effect.
-    """
-    column = parameters["column_stiffness"] if has_column(parameters) else 0.0
-    return float(parameters["bending_stiffness"] + column)
-
-
 def bending_problems(parameters: Mapping[str, Any]) -> list[tuple[str, str, str]]:
     """Problems of the belt's bending: (key, expected, found)."""
     p = BENDING_DEFAULTS | dict(parameters)
