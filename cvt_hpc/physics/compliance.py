@@ -23,6 +23,8 @@ Of a single run by plain numbers, or of several at once, each lane with stiffnes
 that have found their set repeat their last solve, with the same numbers, until the slowest has found its own.
 """
 
+from __future__ import annotations
+
 from typing import Any, NamedTuple
 
 import numpy as np
@@ -135,12 +137,12 @@ def lane_contact(wraps: list[Sheaves], dtype: DTypeLike) -> Contact:
             elastic -= inert_part(wrap.modes, disc_factor(wrap))
         matrix.data[:, :m, lane] = np.eye(m) + scale[:, None] * elastic * root
     fresh = np.zeros(1, dtype=np.bool_)
-    given = (weight, *wraps[0].tilt, wraps[0].rise, wraps[0].upright)
-    along = [array.astype(dtype) for array in given]
+    cosine, sine = wraps[0].tilt.astype(dtype)
+    rise, upright = wraps[0].rise.astype(dtype), wraps[0].upright.astype(dtype)
+    own = weight.astype(dtype), cosine, sine, rise, upright
     discs = lane_discs([wrap.modes for wrap in wraps], [disc_factor(wrap) for wrap in wraps], dtype)
     has_clearance = any(wrap.clearance > 0.0 for wrap in wraps)
-    rest = (stations, scalars, fresh, root.astype(dtype), matrix, discs, has_clearance)
-    return Contact._make((*along, *rest))
+    return Contact(*own, stations, scalars, fresh, root.astype(dtype), matrix, discs, has_clearance)
 
 
 def plain_contact(wrap: Sheaves) -> Contact:

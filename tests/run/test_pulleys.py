@@ -188,16 +188,10 @@ def test_a_clearance_is_free():
 
 
 def test_a_clearance_converges_in_the_step_as_none_does():
-    """In first order at last: a loose collar adds no corner to the forces while it bears."""
-    ratios = []
-    for clearance in (0.0, 5e-4):
-        steps = (4e-6, 2e-6, 1e-6, 5e-7, 2.5e-7)
-        found = [tilted(2e-3, step, collar_clearance=clearance)[1].fields[0] for step in steps]
-        changes = np.abs(np.diff(found, axis=0)).max(axis=1)
-        assert changes[0] < 1e-6
-        ratios.append(changes[:-1] / changes[1:])
-    assert ratios[1] == pytest.approx(ratios[0], abs=0.15)
-    assert ratios[0][-1] == pytest.approx(2.0, abs=0.3)
+    """In first order: a loose collar adds no corner to the forces while it bears."""
+    found = [tilted(2e-3, step, collar_clearance=5e-4)[1].fields[0] for step in (4e-6, 2e-6, 1e-6, 5e-7)]
+    changes = np.abs(np.diff(found, axis=0)).max(axis=1)
+    assert changes[0] < 1e-6 and np.divide(changes[:-1], changes[1:]) == pytest.approx([2.0, 2.0], abs=0.3)
 
 
 def test_the_recorded_tilt_is_that_of_collar_and_clearance():
