@@ -74,7 +74,8 @@ class Settled:
         """T, P [N] and slope w_s in the middle of a strand; w of its straight line at both ends [m]."""
         first, count = self.grid.starts[region], self.grid.counts[region]
         middle = slice(first + count // 4, first + 3 * count // 4)
-        s = np.arange(count)[count // 4 : 3 * count // 4] * self.belt.cell[first]
+        way = self.grid.along(region)
+        s = way[count // 4 : 3 * count // 4]
         slope, w = np.polyfit(s, self.w[middle], 1)
-        ends = w, w + slope * count * self.belt.cell[first]
+        ends = w, w + slope * way[-1]
         return self.tension[middle].mean(), self.push[middle].mean(), slope, ends
