@@ -23,8 +23,6 @@ Of a single run by plain numbers, or of several at once, each lane with stiffnes
 that have found their set repeat their last solve, with the same numbers, until the slowest has found its own.
 """
 
-from __future__ import annotations
-
 from typing import Any, NamedTuple
 
 import numpy as np
