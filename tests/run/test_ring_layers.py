@@ -252,8 +252,8 @@ def stepped(step, on_ears):
 
 @pytest.mark.parametrize("on_ears", [False, True])
 def test_the_fast_step_is_the_plain_form_in_the_limit_of_short_steps(on_ears):
-    """Increments of a step of 0.1 ns over its length are the rates, for layers that slide, stick and differ."""
-    step = 1e-10
+    """Increments of a step of 0.02 ns over its length are the rates, for layers that slide, stick and differ."""
+    step = 2e-11
     belt, rings, time, begun, still = stepped(step, on_ears)
     flat = flat_rings(belt, rings)
     y = pack(flat, begun)

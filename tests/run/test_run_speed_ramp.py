@@ -43,7 +43,7 @@ def test_a_ramp_of_no_extent_is_the_constant_run_and_its_neighbours_change_no_bi
 @pytest.mark.parametrize("ends", ENDS)
 @pytest.mark.parametrize("precision", PRECISIONS)
 def test_the_power_balance_closes_while_the_speed_changes(ends, precision):
-    run = finished(**COARSE, **ramp(*ends), precision=precision)
+    run = finished(**COARSE | {"stations": 96}, **ramp(*ends), precision=precision)
     found, p, judged = balance(run), run.parameters, run.judged
     assert abs(found["power_residual"]) < 5e-4
     driving, driven = (run.channel(f"{name}_speed")[judged] for name in ("driving", "driven"))
