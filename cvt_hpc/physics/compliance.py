@@ -23,8 +23,6 @@ Of a single run by plain numbers, or of several at once, each lane with stiffnes
 that have found their set repeat their last solve, with the same numbers, until the slowest has found its own.
 """
 
-from __future__ import annotations
-
 from typing import Any, NamedTuple
 
 import numpy as np
@@ -41,12 +39,13 @@ from cvt_hpc.physics.sheaves import Sheaves, disc_factor, elastic_matrix
 ROUNDS_OF_BLOCK_FLIPS = 10
 
 # fields of Contact.stations
-GAP, PUSH, DIAGONAL, PIVOT, MULTIPLIER, RESPONSE_1, RESPONSE_2, Y, CLOSED, FORCED = range(10)
+GAP, PUSH, DIAGONAL, OFF_DIAGONAL, PIVOT, MULTIPLIER = range(6)
+RESPONSE_1, RESPONSE_2, Y, CLOSED, FORCED = range(6, 11)
 # fields of Contact.scalars
-ELEMENT_STIFFNESS, COMPLIANCE, DISC_COMPLIANCE, OFF_DIAGONAL, TILT_COMPLIANCE = range(5)
-INVERSE_11, INVERSE_12, INVERSE_22, ROUND_OFF, SOLVES, UNSOLVED = range(5, 11)
-CLEARANCE, LEAST_LOAD, DIRECTION_ERROR, AXIS_COSINE, AXIS_SINE, LARGER, LESSER = range(11, 18)
-LOOSE_1, LOOSE_2 = range(18, 20)
+ELEMENT_STIFFNESS, COMPLIANCE, DISC_COMPLIANCE, TILT_COMPLIANCE = range(4)
+INVERSE_11, INVERSE_12, INVERSE_22, ROUND_OFF, SOLVES, UNSOLVED = range(4, 10)
+CLEARANCE, LEAST_LOAD, DIRECTION_ERROR, AXIS_COSINE, AXIS_SINE, LARGER, LESSER = range(10, 17)
+LOOSE_1, LOOSE_2 = range(17, 19)
 
 # Forces of the default scene are 1e5 N/m and come from openings that are 1 % of their parts: the error [N/m]
 # that each precision leaves.
@@ -59,13 +58,14 @@ class Contact(NamedTuple):
 
     Attributes
     ----------
-    weight, cosine, sine : (m,) arrays
-        Length that a station stands for [m]; directions of the tilt.
-    stations : (m, 10) LaneArray or array
+    weight, cosine, sine, rise, upright : (m,) arrays
+        Length that a station stands for [m]; directions of the tilt; distance of the reference path from the
+        axis beyond the pitch radius [m], and its slope with the belt's displacement.
+    stations : (m, 11) LaneArray or array
         Gap of the rigid bodies [m] (set by the caller), -c_e times the opening without f / c_e [N/m]; the
-        local kernel's diagonal, factors, the tilt's response, work space, closed set (1 or 0), and the force
-        that the caller takes from it [N/m].
-    scalars : (1, 20) LaneArray or array
+        local kernel's diagonal and the entry beside it, factors, the tilt's response, work space, closed set
+        (1 or 0), and the force that the caller takes from it [N/m].
+    scalars : (1, 19) LaneArray or array
         Constants of the wrap, the inverse of the tilt's 2x2 system, the round-off of forces [N/m]; linear
         solves so far, and whether (1) a search for the closed set did not end. Of a collar with clearance:
         c [m], the load from which on it bears [N], the error of its direction, the principal axis of L and
@@ -85,6 +85,8 @@ class Contact(NamedTuple):
     weight: np.ndarray
     cosine: np.ndarray
     sine: np.ndarray
+    rise: np.ndarray
+    upright: np.ndarray
     stations: Any
     scalars: Any
     fresh: np.ndarray
@@ -105,21 +107,21 @@ def lane_contact(wraps: list[Sheaves], dtype: DTypeLike) -> Contact:
         np.float64 or np.float32.
     """
     weight = wraps[0].weight
-    stations = LaneArray(weight.size, 10, len(wraps), dtype)
-    scalars = LaneArray(1, 20, len(wraps), dtype)
+    stations = LaneArray(weight.size, 11, len(wraps), dtype)
+    scalars = LaneArray(1, 19, len(wraps), dtype)
     stations.data[:, CLOSED] = 1.0
     scalars.data[:, DIRECTION_ERROR] = _DIRECTION_ERROR[np.dtype(dtype)]
     # the inverse of a tilt that is part of a matrix
     scalars.data[:, [INVERSE_11, INVERSE_22]] = 1.0
     for lane, wrap in enumerate(wraps):
         stations.data[:, DIAGONAL, lane] = wrap.diagonal
+        stations.data[:, OFF_DIAGONAL, lane] = wrap.off_diagonal
         round_off = _ROUND_OFF[np.dtype(dtype)] * wrap.line_forces
         scalars.data[0, [ROUND_OFF, LEAST_LOAD], lane] = round_off, round_off * weight.sum()
         scalars.data[0, :INVERSE_11, lane] = (
             wrap.element_stiffness,
             wrap.compliance,
             wrap.disc_compliance,
-            wrap.off_diagonal,
             wrap.tilt_compliance,
         )
         scalars.data[0, CLEARANCE, lane] = wrap.clearance
@@ -133,10 +135,12 @@ def lane_contact(wraps: list[Sheaves], dtype: DTypeLike) -> Contact:
             elastic -= inert_part(wrap.modes, disc_factor(wrap))
         matrix.data[:, :m, lane] = np.eye(m) + scale[:, None] * elastic * root
     fresh = np.zeros(1, dtype=np.bool_)
-    shared = (weight.astype(dtype), wraps[0].tilt[0].astype(dtype), wraps[0].tilt[1].astype(dtype))
+    cosine, sine = wraps[0].tilt.astype(dtype)
+    rise, upright = wraps[0].rise.astype(dtype), wraps[0].upright.astype(dtype)
+    own = weight.astype(dtype), cosine, sine, rise, upright
     discs = lane_discs([wrap.modes for wrap in wraps], [disc_factor(wrap) for wrap in wraps], dtype)
     has_clearance = any(wrap.clearance > 0.0 for wrap in wraps)
-    return Contact(*shared, stations, scalars, fresh, root.astype(dtype), matrix, discs, has_clearance)
+    return Contact(*own, stations, scalars, fresh, root.astype(dtype), matrix, discs, has_clearance)
 
 
 def plain_contact(wrap: Sheaves) -> Contact:
@@ -179,11 +183,12 @@ def _factorise(contact: Contact) -> None:
 def _factorise_kernel(contact: Contact) -> None:
     stations, scalars, weight = contact.stations, contact.scalars, contact.weight
     m = weight.size
-    ce, off = scalars[0, ELEMENT_STIFFNESS], scalars[0, OFF_DIAGONAL]
+    ce = scalars[0, ELEMENT_STIFFNESS]
     whole = ce * scalars[0, COMPLIANCE]
     grip = whole * scalars[0, DISC_COMPLIANCE]
     pivot = like(0.0, ce)
     for j in range(m):
+        off = stations[j, OFF_DIAGONAL]
         multiplier = off * pivot
         d = stations[j, DIAGONAL] + weight[j] * grip * stations[j, CLOSED] - off * multiplier
         pivot = 1.0 / d

@@ -5,8 +5,6 @@ with Maxwell and Betti's reciprocity: Bullinger et al. 2005, eq. 10), so w is sy
 its entries of either sign: a disc that is pressed on one side comes nearer on the other.
 """
 
-from __future__ import annotations
-
 from collections.abc import Sequence
 
 import numpy as np
@@ -15,7 +13,7 @@ ROUND_OFF = 1e-6  # of the largest entry: asymmetry left by tables of six digits
 
 
 def cone_flexibilities(
-    stations: int, spacing: float, radius: float, stiffness: float, shift: float = 0.0
+    angle: np.ndarray, distance: np.ndarray, stiffness: float, shift: float = 0.0
 ) -> np.ndarray:
     """Flexibilities of a cone that tilts as a whole, the "sinus approach" (Bullinger et al. 2005, fig. 10).
 
@@ -25,12 +23,8 @@ def cone_flexibilities(
 
     Parameters
     ----------
-    stations : int
-        Their number m.
-    spacing : float
-        Their distance along the arc [m].
-    radius : float
-        Pitch radius r [m].
+    angle, distance : (m,) arrays
+        Place of the stations about the axis, from the middle of the arc [rad], and r [m].
     stiffness : float
         Of the cone against tilting, in series with that of its collar [N m/rad]; inf: rigid.
     shift : float
@@ -41,8 +35,7 @@ def cone_flexibilities(
     (m, m) array
         w [m/N], of rank two.
     """
-    phi = (np.arange(stations) - 0.5 * (stations - 1)) * spacing / radius
-    levers = np.array([radius * np.cos(phi) - shift, radius * np.sin(phi)])
+    levers = np.array([distance * np.cos(angle) - shift, distance * np.sin(angle)])
     return levers.T @ levers / stiffness
 
 
@@ -52,7 +45,7 @@ def table_matrix(angles: Sequence[float], table: Sequence[Sequence[float]]) -> n
     Parameters
     ----------
     angles : sequence of n floats
-        Ascending angles from the inlet [rad]; of a single row equidistant and from 0.
+        Ascending angles from the inlet [rad], those before it negative; of a single row equidistant, from 0.
     table : n rows of n floats, or one row of n
         w [m/N] of each pair of angles, or of a body of revolution over the angle between both.
     """
@@ -64,19 +57,30 @@ def table_matrix(angles: Sequence[float], table: Sequence[Sequence[float]]) -> n
 
 
 def interpolated(
-    angles: Sequence[float], table: Sequence[Sequence[float]], stations: int, spacing: float, radius: float
+    angles: Sequence[float], table: Sequence[Sequence[float]], places: np.ndarray, wrap: float
 ) -> np.ndarray:
     """Flexibilities of a wrap from a table: forces go to the knots beside them, openings come from there.
 
     So w stays symmetric and positive semi-definite on any mesh. Where knots are stations it is the table's.
+    Stations beyond the first and the last angle have their flexibilities. A single row that is longer than
+    the wrap reaches as far beyond the inlet as beyond the outlet.
+
+    Parameters
+    ----------
+    angles, table : sequences
+        As of `table_matrix`.
+    places : (m,) array
+        Angles of the stations from the inlet [rad].
+    wrap : float
+        Angle of the wrap [rad].
 
     Returns
     -------
     (m, m) array
         w [m/N].
     """
-    places = np.arange(stations) * spacing / radius
-    shares = np.array([np.interp(places, angles, unit) for unit in np.eye(len(angles))])
+    before = 0.5 * (angles[-1] - wrap) if len(table) == 1 else 0.0
+    shares = np.array([np.interp(places + before, angles, unit) for unit in np.eye(len(angles))])
     found = shares.T @ table_matrix(angles, table) @ shares
     return 0.5 * (found + found.T)
 
@@ -97,7 +101,7 @@ def table_problem(
     if n < 2 or {len(row) for row in table} != {n} or len(table) not in (1, n):
         rows = " x ".join(str(size) for size in (len(table), len(table[0]) if table else 0))
         return f"1 or n rows of n flexibilities, n >= 2 being the number of angles, {n}", rows
-    if angles[0] != 0.0 or steps.min() <= 0.0:
+    if angles[0] > 0.0 or steps.min() <= 0.0 or (len(table) == 1 and angles[0] < 0.0):
         return "angles that ascend from 0", f"{angles[0]:g} to {angles[-1]:g} rad"
     if len(table) == 1 and np.ptp(steps) > ROUND_OFF * steps.max():
         return (

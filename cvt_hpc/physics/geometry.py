@@ -2,6 +2,7 @@
 
 import math
 from dataclasses import dataclass
+from typing import Any
 
 import numpy as np
 
@@ -124,13 +125,47 @@ def driven_radius(ratio: float, belt_length: float, centre_distance: float) -> f
     return ratio * radius
 
 
-def cell_counts(path: Variator, cells: int) -> tuple[int, int, int, int]:
-    """Cells of each region of a path in `cells`, equal within a region and nearly equal over all.
+# Way from a tangent point over which cells become longer, as a share of the centre distance: 8 mm, some two
+# lengths over which a belt settles on its bedding
+REFINED_WAY = 0.05
 
-    At least four in each of the regions but the driven arc, which takes the rest.
+
+def cut_path(path: Variator, cells: int, refinement: float = 1.0) -> tuple[np.ndarray, ...]:
+    """Cut each region of a path into cells that are the shorter the nearer they are to its ends.
+
+    The number of cells per length is 1 + (r - 1) / (1 + (x / l)^2) for each end of the region, x from there,
+    times what gives their number; l = REFINED_WAY of the centre distance. Each region has four cells or more;
+    the driven arc takes what rounding leaves.
+
+    Parameters
+    ----------
+    path : Variator
+        The path.
+    cells : int
+        Their number, all around.
+    refinement : float
+        r: how many times as many cells a length has at the tangent points as far from them; 1: even cells.
+
+    Returns
+    -------
+    tuple of four arrays
+        Lengths of the cells [m], by region.
     """
-    driving, strand, _, _ = (max(round(cells * part / path.path_length), 4) for part in path.lengths)
-    return driving, strand, cells - driving - 2 * strand, strand
+    centre_distance = math.hypot(path.strand_length, path.driven_radius - path.driving_radius)
+    way = REFINED_WAY * centre_distance
+
+    def upto(x: np.ndarray | float, length: float) -> Any:
+        ends = np.arctan(x / way) + np.arctan(length / way) - np.arctan((length - x) / way)
+        return x + (refinement - 1.0) * way * ends
+
+    wholes = [upto(length, length) for length in path.lengths]
+    driving, strand, _, _ = (max(round(cells * part / sum(wholes)), 4) for part in wholes)
+    found = []
+    counts = (driving, strand, cells - driving - 2 * strand, strand)
+    for length, whole, count in zip(path.lengths, wholes, counts, strict=True):
+        fine = np.linspace(0.0, length, 100 * count + 1)
+        found.append(np.diff(np.interp(np.linspace(0.0, whole, count + 1), upto(fine, length), fine)))
+    return tuple(found)
 
 
 def variator_problems(parameters: Parameters) -> list[tuple[str, str, str]]:

@@ -6,15 +6,13 @@ The groove opens by y(phi, t) = sum_k (a_k cos(n_k phi) + b_k sin(n_k phi)). In 
 
 and so for b with sines: c_k is the modal flexibility [m/N], m_k the mass. At rest w_ij = sum_k c_k
 cos(n_k (phi_i - phi_j)), eq. 10. A station's force falls linearly to both neighbours, and its opening is the
-mean by the same weights: a factor sinc^2(n h / 2 r) on both sides.
+mean by the same weights: a factor sinc^2(n h / 2 r) on both sides, h being the length of a station.
 
 A step is of Newmark's mean acceleration in the axes of the disc, which turn by omega dt: of second order,
 without damping of its own. The force at its end comes in by B_k = 1 / (m_k (4 / dt^2 + 4 zeta omega_k / dt +
 omega_k^2)), all else is known before, p_k. So the contact is that of `closed_set` with flexibilities B_k in
 the place of c_k, and gaps that p_k opens. Modes above a limit frequency have no inertia: B_k = c_k, p_k = 0.
 """
-
-from __future__ import annotations
 
 from typing import NamedTuple
 
@@ -51,16 +49,23 @@ _NONE = np.empty(0)
 NO_MODES = Modes(np.empty((0, 0)), _NONE, np.empty(0, dtype=np.int64), _NONE, _NONE, 0.0, 1.0)
 
 
-def shapes(harmonics: np.ndarray, stations: int, spacing: float, radius: float) -> np.ndarray:
-    """Cosines, then sines, of harmonics at equidistant stations, spread to their neighbours, (2 H, m)."""
-    phi = np.arange(stations) * spacing / radius
-    spread = np.sinc(0.5 * harmonics * spacing / (np.pi * radius))[:, None] ** 2
-    turned = harmonics[:, None] * phi
+def shapes(harmonics: np.ndarray, angle: np.ndarray, width: np.ndarray) -> np.ndarray:
+    """Cosines, then sines, of harmonics at stations, spread to their neighbours, (2 H, m).
+
+    Parameters
+    ----------
+    harmonics : (H,) array
+        Waves around the disc.
+    angle, width : (m,) arrays
+        Place of the stations about the axis, and the angle that each stands for [rad].
+    """
+    spread = np.sinc(0.5 * harmonics[:, None] * width / np.pi) ** 2
+    turned = harmonics[:, None] * angle
     return np.concatenate([spread * np.cos(turned), spread * np.sin(turned)])
 
 
 def modal_flexibilities(
-    harmonic: np.ndarray, flexibility: np.ndarray, stations: int, spacing: float, radius: float
+    harmonic: np.ndarray, flexibility: np.ndarray, angle: np.ndarray, width: np.ndarray
 ) -> np.ndarray:
     """Flexibilities w_ij [m/N] of modes at rest, (m, m).
 
@@ -68,10 +73,10 @@ def modal_flexibilities(
     ----------
     harmonic, flexibility : (M,) arrays
         n and c [m/N].
-    stations, spacing, radius : int, float, float
-        Of the wrap [m].
+    angle, width : (m,) arrays
+        As of `shapes`.
     """
-    forms = shapes(np.asarray(harmonic, float), stations, spacing, radius)
+    forms = shapes(np.asarray(harmonic, float), angle, width)
     return (forms * np.tile(flexibility, 2)[:, None]).T @ forms
 
 
@@ -80,7 +85,7 @@ def moving_modes(
     limit: float,
     damping: float,
     step: float,
-    wrap: tuple[int, float, float],
+    wrap: tuple[np.ndarray, np.ndarray],
 ) -> Modes:
     """Return the modes of a table that have inertia: frequencies up to `limit` [Hz].
 
@@ -90,8 +95,8 @@ def moving_modes(
         Harmonic, flexibility and mass; 0: none.
     limit, damping, step : float
         Limit frequency [Hz], zeta [1], time step [s].
-    wrap : (int, float, float)
-        Stations, their spacing and the pitch radius [m].
+    wrap : pair of (m,) arrays
+        Angle and width of the stations, as of `shapes`.
     """
     harmonic, flexibility, mass = (np.asarray(values, float) for values in table)
     squares = flexibility * mass * (2.0 * np.pi * limit) ** 2

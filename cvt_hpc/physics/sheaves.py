@@ -1,7 +1,5 @@
 """Elastic sheaves under one wrap: the constants of its contact, whose equations stand in `compliance.py`."""
 
-from __future__ import annotations
-
 from collections.abc import Mapping
 from typing import Any, NamedTuple
 
@@ -19,6 +17,11 @@ class Sheaves(NamedTuple):
     ----------
     weight : (m,) array
         Length h that each station stands for [m].
+    angle : (m,) array
+        Angle about the pulley's axis from the inlet's tangent point [rad], negative before it.
+    rise, upright : (m,) arrays
+        Distance from the axis beyond the pitch radius, rho - R, of the reference path [m], 0 on the arc, and
+        its slope with the belt's displacement, R / rho.
     element_stiffness : float
         c_e [N/m^2].
     compliance : float
@@ -27,10 +30,10 @@ class Sheaves(NamedTuple):
         b [1] of the disc alone, 0 where it is rigid.
     diagonal : (m,) array
         Diagonal of the inverse of the local kernel [N/m].
-    off_diagonal : float
-        Its off-diagonal [N/m].
+    off_diagonal : (m,) array
+        Its entry between a station and the one behind it [N/m]; the first is 0.
     tilt : (2, m) array
-        U [1].
+        U [1]: rho / R times cosine and sine of the angle.
     tilt_compliance : float
         r^2 / c_tilt [m/N].
     flexibilities : (m, m) or (0, 0) array
@@ -45,11 +48,14 @@ class Sheaves(NamedTuple):
     """
 
     weight: np.ndarray
+    angle: np.ndarray
+    rise: np.ndarray
+    upright: np.ndarray
     element_stiffness: float
     compliance: float
     disc_compliance: float
     diagonal: np.ndarray
-    off_diagonal: float
+    off_diagonal: np.ndarray
     tilt: np.ndarray
     tilt_compliance: float
     flexibilities: np.ndarray
@@ -59,8 +65,9 @@ class Sheaves(NamedTuple):
 
 
 def sheaves(
-    spacing: float,
-    stations: int,
+    weight: np.ndarray,
+    angle: np.ndarray,
+    rise: np.ndarray,
     radius: float,
     sheave_stiffness: float,
     tilt_stiffness: float,
@@ -69,14 +76,17 @@ def sheaves(
     element_stiffness: float,
     disc_stiffness: float = 1.0,
 ) -> Sheaves:
-    """Constants of the contact over one wrap with equidistant stations, the first and last at its ends.
+    """Constants of the contact over one wrap.
+
+    The kernel of local bending, exp(-|s - s'| / l) / (2 l k) with s = R times the angle, is that of a Markov
+    process: its inverse over any stations is tridiagonal. With e_j = exp(-(s_j - s_j-1) / l) the pair of
+    stations j - 1 and j gives 2 l k / (1 - e_j^2) to both diagonals and -2 l k e_j / (1 - e_j^2) beside
+    them; a station between two others counts 2 l k less.
 
     Parameters
     ----------
-    spacing : float
-        Distance of the stations along the arc [m].
-    stations : int
-        Their number m.
+    weight, angle, rise : (m,) arrays
+        As of `Sheaves`, the angles ascending.
     radius : float
         Pitch radius [m].
     sheave_stiffness : float
@@ -95,21 +105,21 @@ def sheaves(
     Sheaves
         For `plain_contact` and `lane_contact`.
     """
-    decay = np.exp(-spacing / local_length)
-    scale = 2.0 * local_length * local_stiffness / (1.0 - decay * decay)
-    diagonal = np.full(stations, scale * (1.0 + decay * decay))
-    diagonal[0] = diagonal[-1] = scale
-    weight = np.full(stations, spacing)
-    weight[0] = weight[-1] = 0.5 * spacing
-    phi = np.arange(stations) * spacing / radius
+    scale = 2.0 * local_length * local_stiffness
+    decay = np.exp(-np.diff(angle) * radius / local_length)
+    pair = scale / (1.0 - decay * decay)
+    diagonal = np.append(pair, scale) + np.insert(pair, 0, scale) - scale
     return Sheaves(
         weight,
+        angle,
+        rise,
+        radius / (radius + rise),
         element_stiffness,
         1.0 / sheave_stiffness,
         1.0 / disc_stiffness,
         diagonal,
-        -scale * decay,
-        np.array([np.cos(phi), np.sin(phi)]),
+        np.insert(-pair * decay, 0, 0.0),
+        (1.0 + rise / radius) * np.array([np.cos(angle), np.sin(angle)]),
         radius * radius / tilt_stiffness,
         np.empty((0, 0)),
         NO_MODES,
@@ -162,9 +172,9 @@ def elastic_matrix(sheave: Sheaves) -> np.ndarray:
     """Symmetric a (b W + r^2 / c_tilt U^T U), (m, m) [m/N]: force in, opening of disc and collar out."""
     local = sheave.flexibilities
     if not local.size:
-        m = sheave.weight.size
         inverse = np.diag(sheave.diagonal)
-        inverse += sheave.off_diagonal * (np.eye(m, k=1) + np.eye(m, k=-1))
+        beside = np.diag(sheave.off_diagonal[1:], 1)
+        inverse += beside + beside.T
         local = np.linalg.inv(inverse)
     elastic = sheave.disc_compliance * local + sheave.tilt_compliance * sheave.tilt.T @ sheave.tilt
     return sheave.compliance * elastic

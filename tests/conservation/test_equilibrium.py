@@ -28,8 +28,8 @@ RUNS = {
 
 @cache
 def settled(name):
-    # start-up takes rise_time, 30 ms; the slowest that follows is the sheave's lag of 2 ms
-    return Settled(0.08, 0.02, **RUNS[name])
+    # start-up takes rise_time, 30 ms; the slowest that follows is the belt's way once around, 70 ms
+    return Settled(0.1, 0.02, **RUNS[name])
 
 
 def strands(run):

@@ -30,7 +30,9 @@ CONSTANT = {"friction_law": "coulomb", "friction_gradient": 0.0}
 def finished(**values):
     """A coarse run, judged over 60 ms."""
     document = {"name": "test", "model": "elastic_belt", "stepper": "imex", "axes": {}}
-    shared = {"stations": 64, "duration": 0.12, "load": 120.0, "precision": "double"}
+    shared = {
+        "stations": 64, "duration": 0.12, "load": 120.0, "friction_gradient": -1.0, "precision": "double"
+    }  # fmt: skip
     asked = build_job(document, "test.toml", shared | values)
     run = Transient(asked.point(0), asked.stepper)
     while run.done < run.samples:
@@ -40,7 +42,7 @@ def finished(**values):
 
 @cache
 def steady_belts():
-    loads = (80.0, 100.0, 105.0, 125.0, 140.0)
+    loads = (95.0, 100.0, 105.0, 125.0, 140.0)
     return dict(zip(loads, SteadyBelt(BELT).along(loads), strict=True))
 
 
@@ -72,7 +74,7 @@ def flow(found):
 
 @pytest.mark.parametrize(("step", "tolerance"), [(4.6e-6, 0.04), (1e-6, 0.015)])
 def test_what_is_fed_into_a_vibration_is_taken(step, tolerance):
-    # 9 W. Backward Euler in the elements damps by EA dt/2, 90 N s at 4.6 us: -0.2 W, and -0.06 W at 1 us.
+    # 20 W. Backward Euler in the elements damps by EA dt/2, 90 N s at 4.6 us
     found = fluctuation_record(finished(step=step))
     assert flow(found) > 8.0
     assert abs(found["fluctuation_remainder"]) < tolerance * flow(found)
@@ -81,7 +83,10 @@ def test_what_is_fed_into_a_vibration_is_taken(step, tolerance):
 def test_a_term_of_the_wrong_sign_would_show():
     found = fluctuation_record(finished(step=1e-6))
     fed = [*found["flank_fed"].sum(axis=1), found["stress_fed"], *(-found[name] for name in TAKEN)]
-    for term in fed:
+    # a term below 3 % is within what may be left open
+    large = [term for term in fed if abs(term) > 0.03 * flow(found)]
+    assert len(large) >= 6
+    for term in large:
         assert abs(found["fluctuation_remainder"] - 2.0 * term) > 2.0 * 0.015 * flow(found)
 
 
@@ -119,14 +124,21 @@ def test_parts_are_equal_shares_of_each_wrap():
     grid = mesh(BELT)
     shares = part_shares(grid)
     belt = belt_constants(BELT)
-    on_arcs = belt.arc_share > 0.0
-    assert shares.sum(axis=(0, 1)) == pytest.approx(on_arcs.astype(float), abs=1e-14)
-    lengths = shares @ (belt.arc_share * belt.dual)
+    assert shares.sum(axis=(0, 1)) == pytest.approx(belt.touches, abs=1e-14)
+    # of its stations' lengths on the arc
+    on_arc = 0.5 * (belt.cell * (belt.curvature > 0.0))
+    on_arc += np.roll(on_arc, 1)
+    lengths = shares @ on_arc
     wraps = [grid.path.lengths[region] / ARC_PARTS for region in (0, 2)]
     assert lengths == pytest.approx(np.repeat(wraps, ARC_PARTS).reshape(2, ARC_PARTS), rel=1e-12)
     # from the inlet on
-    middles = (shares @ (belt.arc_share * belt.dual * np.arange(grid.cell.size))) / lengths
+    middles = (shares @ (on_arc * np.arange(grid.cell.size))) / lengths
     assert np.all(np.diff(middles, axis=1) > 0.0)
+    # and the groove's outer stations go with the parts beside them
+    for pulley, region in enumerate((0, 2)):
+        zone = grid.zone(region)
+        for part, outside in ((0, zone.beyond < 0.0), (-1, zone.beyond > 0.0)):
+            assert outside.any() and np.all(shares[pulley, part, zone.stations[outside]] == 1.0)
 
 
 def test_a_ramp_of_load_has_no_mean_state():
@@ -164,11 +176,19 @@ def plain_feed(belt, forces, states):
     for k, state in enumerate(states):
         w, v = state.fields[f.W], state.fields[f.V_ELEMENT]
         slope = (np.roll(w, -1) - np.roll(w, 1)) * belt.per_span
-        for j in np.flatnonzero(belt.arc_share):
-            driven = j >= belt.driven_start
+        for j in np.flatnonzero(forces > 0.0):
+            driven = belt.on_driven[j] > 0.0
             omega = state.scalars[f.DRIVEN_SPEED] if driven else belt.driving_speed
-            v_radial = state.fields[f.U, j] + v[j] * slope[j]
-            v_tangential = v[j] - omega * ((belt.driven_radius if driven else belt.driving_radius) + w[j])
+            v_across = state.fields[f.U, j] + v[j] * slope[j]
+            # radial unit vector (lean, upright), along and across; rho = R + rise + upright w
+            lean = belt.lean[j] - belt.lean_rate[j] * w[j]
+            rho = (
+                (belt.driven_radius if driven else belt.driving_radius)
+                + belt.rise[j]
+                + belt.upright[j] * w[j]
+            )
+            v_radial = belt.upright[j] * v_across + lean * v[j]
+            v_tangential = belt.upright[j] * v[j] - lean * v_across - omega * rho
             force = forces[j]
             mu, _ = friction_coefficient(belt.law, np.hypot(v_radial / cosine, v_tangential), force / cosine)
             radial, tangential = flank_forces(
@@ -176,7 +196,7 @@ def plain_feed(belt, forces, states):
             )
             history[:, k, j] = radial - wedge * force, v_radial, tangential, v_tangential
     radial, v_radial, tangential, v_tangential = history
-    return belt.arc_share * belt.dual * (covariance(radial, v_radial) + covariance(tangential, v_tangential))
+    return belt.dual * (covariance(radial, v_radial) + covariance(tangential, v_tangential))
 
 
 @pytest.mark.parametrize("law", [CONSTANT, {"friction_memory": 0.0}])
@@ -201,7 +221,7 @@ def test_flanks_feed_what_their_plain_forces_do(law):
 # A small motion grows by what it is fed: the eigenvalue is known from the Jacobian alone
 
 
-@pytest.mark.parametrize("load", [80.0, 105.0, 125.0, 140.0])
+@pytest.mark.parametrize("load", [95.0, 105.0, 125.0, 140.0])
 def test_growth_is_what_is_fed_over_twice_the_energy(load):
     point, grid = steady(load), mesh(BELT)
     mode = modes(point, grid)[0]
@@ -238,8 +258,7 @@ def _energy(runs, belt, states):
     w, dual = fields[:, f.W], belt.dual
     masses = ((f.U, belt.mass), (f.V_ELEMENT, belt.element_mass), (f.V_RING, belt.ring_mass))
     moving = sum((mass * dual * fields[:, row].var(axis=0)).sum() for row, mass in masses)
-    gap = 2.0 * np.tan(belt.half_wedge_angle) * w
-    gap[:, belt.driven_start :] += position[:, np.newaxis]
-    contact = -(belt.arc_share * dual * covariance(runs.profiles()["contact_force"].T, gap)).sum()
+    gap = 2.0 * np.tan(belt.half_wedge_angle) * belt.upright * w + belt.on_driven * position[:, np.newaxis]
+    contact = -(dual * covariance(runs.profiles()["contact_force"].T, gap)).sum()
     bent = sum(belt.bending[:, k] * np.roll(w, 2 - k, axis=1) for k in range(5))
     return 0.5 * (moving + contact - (dual * covariance(bent, w)).sum())

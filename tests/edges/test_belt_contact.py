@@ -7,13 +7,14 @@ from cvt_hpc.errors import InputError
 from cvt_hpc.job import build_job
 from cvt_hpc.physics.compliance import ROUNDS_OF_BLOCK_FLIPS, plain_contact, solve_wrap
 from cvt_hpc.physics.sheaves import flexibility, sheaves
+from support.wraps import places
 
 STATIONS, ARC, RADIUS = 60, 0.27, 0.075
 DEPTH = 2e-5  # [m]
 
 
 def wrap(tilt=4e5, elements=3e10):
-    return sheaves(ARC / (STATIONS - 1), STATIONS, RADIUS, 1.0, tilt, 4e9, 0.012, elements)
+    return sheaves(*places(STATIONS, ARC, RADIUS), RADIUS, 1.0, tilt, 4e9, 0.012, elements)
 
 
 def overlaps():

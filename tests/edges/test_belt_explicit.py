@@ -46,7 +46,7 @@ def by_formula(case, values):
     belt = flat.belt
     cell = belt.cell.min()
     if case == "ring friction":
-        stations = np.flatnonzero(belt.arc_share)
+        stations = np.flatnonzero(belt.arc_curvature)
         far = [ring_drag(belt, j, j - 1, flat.eps, 1e3, 0.0, 1.0)[0] for j in stations]  # mu_r x pressure
         return max(far) / belt.ring_friction_speed * (1.0 / belt.ring_mass.min() + 1.0 / belt.element_mass)
     if case == "flank friction":

@@ -3,14 +3,14 @@
 import numpy as np
 import pytest
 
+from cvt_hpc.models.elastic_belt.belt import belt_constants
 from cvt_hpc.models.elastic_belt.step_choice import transverse_limit
 from cvt_hpc.variables import Status
 from support.belts import point
 from support.lone import Transient
 
 CASES = {
-    "bending": {"bending_stiffness": 200.0, "stations": 64},
-    "bending, half the mesh": {"bending_stiffness": 20.0, "stations": 128},
+    "tension": {"bending_stiffness": 0.0, "thrust": 2e5, "end_refinement": 1.0, "stations": 512},
     "contact": {"flank_stiffness": 1e12},
 }
 RIGID = {
@@ -22,7 +22,7 @@ RIGID = {
 
 
 def limit(values):
-    """2 / w of the shortest wave across the belt: bending, tension and, in the grooves, the elements' flanks."""
+    """2 / w of the shortest wave across the belt: tension and, in the grooves, the elements' flanks."""
     return transverse_limit(point("imex", **values))
 
 
@@ -40,8 +40,19 @@ def test_the_limit_is_that_of_the_shortest_wave(case):
     found, run = outcome(0.95 * step, values)
     assert found is None
     quiet = np.abs(run.displacement).max()
-    # Bending has no damper worth the name at the shortest wave: measured between 1.00 and 1.05 of the formula.
-    # Contact has friction, and opens instead of swinging on: 1.1 to 1.2.
-    status, reason = outcome(1.3 * step, values)[0]
+    # contact fails from 1.1 to 1.2 of the formula on, strands from 1.3 to 1.6
+    status, reason = outcome(1.6 * step, values)[0]
     assert status == Status.FAILED_NUMERICS and reason
-    assert quiet < 1e-4
+    assert quiet < 2e-4
+
+
+@pytest.mark.parametrize("bending", [0.05, 20.0])
+def test_bending_limits_no_step(bending):
+    """At the step that a scene has anyway, ten and more times as long as explicit bending bears."""
+    values = RIGID | {"bending_stiffness": bending, "stations": 128, "end_refinement": 10.0, "step": 4.6e-6}
+    p = point("imex", **values)
+    cell = belt_constants(p).cell.min()
+    assert 4.6e-6 > 2.0 * cell**2 / np.sqrt(16.0 * bending / (p["element_mass"] + p["ring_mass"]))
+    run = Transient(p, "imex")
+    assert run.advance(round(0.02 / run.interval)) is None
+    assert np.abs(run.displacement).max() < 1e-4

@@ -20,7 +20,7 @@ def straight(cells, tension, push, speed=0.0, bending=0.0):
     path = {"ratio": 1.0, "driven_radius": RADIUS, "centre_distance": np.pi * RADIUS, "stations": 2 * cells}
     belt = belt_constants(point("imex", **path, bending_stiffness=bending, transverse_damping=0.0))
     nothing = np.zeros(2 * cells)
-    belt = belt._replace(curvature=nothing, arc_curvature=nothing, arc_share=nothing, belt_speed=speed)
+    belt = belt._replace(curvature=nothing, arc_curvature=nothing, touches=nothing, belt_speed=speed)
     fields, scalars = np.zeros((len(f.FIELDS), 2 * cells)), np.zeros(f.SCALARS)
     fields[f.V_ELEMENT] = fields[f.V_RING] = speed
     fields[f.N_RING] = 1.0 / (1.0 + tension / belt.ring_stiffness)

@@ -16,7 +16,7 @@ from cvt_hpc.physics.compliance import (
 from cvt_hpc.physics.deflection import interpolated
 from cvt_hpc.physics.sheaves import flexibility, sheaves
 from support.complementarity import solve_lcp
-from support.wraps import ARC, RADIUS, STATIONS, courses, random_wrap
+from support.wraps import ARC, RADIUS, STATIONS, courses, local_kernel, places, random_wrap
 
 MOST_ROUNDS, LANES = 400, 8
 CLEARANCES = (1e-6, 3e-5, 3e-4)  # [m]: far below, at and above the overlaps of `courses`
@@ -55,10 +55,7 @@ def with_clearance(random, clearance, **values):
 
 def tabulated(wrap):
     """The same disc by a matrix of flexibilities."""
-    m = wrap.weight.size
-    inverse = np.diag(wrap.diagonal) + wrap.off_diagonal * (np.eye(m, k=1) + np.eye(m, k=-1))
-    angles = np.arange(m) * wrap.weight[1] / RADIUS
-    table = interpolated(angles, np.linalg.inv(inverse)[:1], m, wrap.weight[1], RADIUS)
+    table = interpolated(wrap.angle, local_kernel(wrap)[:1], wrap.angle, wrap.angle[-1])
     return wrap._replace(flexibilities=table)
 
 
@@ -81,7 +78,9 @@ def test_one_station_is_a_spring_behind_a_gap(place, form):
 def test_one_way_of_tilting_is_a_spring_behind_a_gap():
     """Rigid discs and collar under a symmetric load: one equation, s = c_e sum h U (overlap - U (c + kappa s))."""
     arc, clearance = np.pi * RADIUS, 2e-5
-    wrap = sheaves(arc / 20, 21, RADIUS, 1.0, 4e7, 4e9, 0.012, 3e10, np.inf)._replace(clearance=clearance)
+    wrap = sheaves(*places(21, arc, RADIUS), RADIUS, 1.0, 4e7, 4e9, 0.012, 3e10, np.inf)._replace(
+        clearance=clearance
+    )
     angles = np.arange(21) * wrap.weight[1] / RADIUS
     lever = wrap.tilt.T @ [0.0, 1.0]  # the middle of half a turn
     assert lever == pytest.approx(np.sin(angles))
@@ -208,7 +207,7 @@ def test_searches_end_where_block_flips_cycle():
     solves = []
     for _ in range(600):
         m, arc = int(random.integers(10, 60)), random.uniform(0.1, 0.3)
-        wrap = sheaves(arc / (m - 1), m, RADIUS, 0.1, 4e3, 4e9, random.uniform(0.02, 0.1), 3e10)
+        wrap = sheaves(*places(m, arc, RADIUS), RADIUS, 0.1, 4e3, 4e9, random.uniform(0.02, 0.1), 3e10)
         wrap = wrap._replace(clearance=10.0 ** random.uniform(-7.0, -3.0))
         gap, force = 2e-5 * random.normal(size=m), np.empty(m)
         contact = plain_contact(wrap)

@@ -9,6 +9,7 @@ from cvt_hpc.physics import compliance
 from cvt_hpc.physics.compliance import ROUNDS_OF_BLOCK_FLIPS, plain_contact, solve_wrap
 from cvt_hpc.physics.sheaves import flexibility, sheaves
 from support.complementarity import solve_lcp
+from support.wraps import places
 
 # A wrap of the default belt: radius [m], element stiffness c_e [N/m^2], k [N/m^2], l [m], c_tilt [N m/rad]
 RADIUS, ELEMENTS, LOCAL, LENGTH, TILT = 0.075, 3e10, 4e9, 0.012, 4e5
@@ -17,7 +18,7 @@ RADIUS, ELEMENTS, LOCAL, LENGTH, TILT = 0.075, 3e10, 4e9, 0.012, 4e5
 def wrap(
     stations=20, arc=0.27, stiffness=1.0, tilt=TILT, local=LOCAL, length=LENGTH, elements=ELEMENTS, disc=1.0
 ):
-    return sheaves(arc / (stations - 1), stations, RADIUS, stiffness, tilt, local, length, elements, disc)
+    return sheaves(*places(stations, arc, RADIUS), RADIUS, stiffness, tilt, local, length, elements, disc)
 
 
 def contact(sheave, gap, closed=None):
@@ -57,7 +58,7 @@ def test_flexibility_is_the_kernels_of_the_text(sheave):
     # condition up to (2 l / h)^2 = 10^3 here
     h, m = sheave.weight[1], sheave.weight.size
     x = h * np.arange(m)
-    length = -h / np.log(-sheave.off_diagonal / sheave.diagonal[0])
+    length = -h / np.log(-sheave.off_diagonal[1] / sheave.diagonal[0])
     apart = np.abs(x[:, None] - x)
     bending = np.exp(-apart / length) / (2.0 * length * LOCAL)
     elastic = sheave.disc_compliance * bending + sheave.tilt_compliance * np.cos(apart / RADIUS)

@@ -12,6 +12,7 @@ from cvt_hpc.models.elastic_belt import PARAMETERS
 from cvt_hpc.models.pushbelt import inert
 from cvt_hpc.models.pushbelt.continuous import ABSENT, FOLLOWS, ONLY
 from cvt_hpc.physics.sheaves import flexibility, sheaves
+from support.wraps import places
 
 JOBS = Path(__file__).parents[2] / "jobs"
 ANGLE, RADII = np.radians(11.0), {"driving": 0.03, "driven": 0.075}
@@ -33,7 +34,15 @@ def test_sheaves_and_elements_open_alike_under_the_same_force(pulley, stiffness)
     radius, count = RADII[pulley], 801
     spacing = 0.5 * radius / (count - 1)
     given = BELT | {"sheave_stiffness": stiffness}
-    wrap = sheaves(spacing, count, radius, given["sheave_stiffness"], 3e5, 4e9, 10.0 * spacing, 3e10)
+    wrap = sheaves(
+        *places(count, 0.5 * radius, radius),
+        radius,
+        given["sheave_stiffness"],
+        3e5,
+        4e9,
+        10.0 * spacing,
+        3e10,
+    )
     phi = np.arange(count) * spacing / radius
     force = 1e5 * (1.0 + 0.5 * np.cos(2.0 * phi))
     continuous = flexibility(wrap) @ force

@@ -9,7 +9,7 @@ from cvt_hpc.physics.compliance import lane_contact, plain_contact, solve_contac
 from cvt_hpc.physics.deflection import cone_flexibilities, interpolated, table_matrix, table_problem
 from cvt_hpc.physics.sheaves import flexibility
 from support.complementarity import solve_lcp
-from support.wraps import ARC, RADIUS, STATIONS, courses, random_wrap
+from support.wraps import ARC, RADIUS, STATIONS, courses, local_kernel, random_wrap
 
 SPACING, LANES, MOST_ROUNDS = ARC / (STATIONS - 1), 8, 300
 PLACES = np.arange(STATIONS) * SPACING
@@ -62,9 +62,7 @@ def test_forces_by_flexibilities_of_either_sign_are_lemkes(seed):
 def test_the_local_kernel_as_a_table_gives_the_forces_of_the_kernel(seed):
     random = np.random.default_rng(seed)
     wrap = random_wrap(random)
-    inverse = np.diag(wrap.diagonal) + wrap.off_diagonal * (np.eye(STATIONS, k=1) + np.eye(STATIONS, k=-1))
-    row = np.linalg.inv(inverse)[:1]
-    table = interpolated(PLACES / RADIUS, row, STATIONS, SPACING, RADIUS)
+    table = interpolated(PLACES / RADIUS, local_kernel(wrap)[:1], wrap.angle, wrap.angle[-1])
     for gaps in courses(random, 1):
         expected = plain_force(wrap, gaps[:, 0])
         found = plain_force(wrap._replace(flexibilities=table), gaps[:, 0])
@@ -74,7 +72,7 @@ def test_the_local_kernel_as_a_table_gives_the_forces_of_the_kernel(seed):
 def test_a_cone_about_its_centre_is_in_series_with_its_collar():
     random = np.random.default_rng(5)
     wrap = random_wrap(random, 1.0)._replace(disc_compliance=1.0, tilt_compliance=RADIUS**2 / 4e5)
-    cone = wrap._replace(flexibilities=cone_flexibilities(STATIONS, SPACING, RADIUS, 2e5))
+    cone = wrap._replace(flexibilities=cone_flexibilities(wrap.angle, RADIUS + wrap.rise, 2e5))
     series = wrap._replace(disc_compliance=0.0, tilt_compliance=RADIUS**2 / 4e5 + RADIUS**2 / 2e5)
     assert flexibility(cone) == pytest.approx(flexibility(series), rel=1e-12)
     for gaps in courses(random, 1):
@@ -85,8 +83,8 @@ def test_a_cone_about_its_centre_is_in_series_with_its_collar():
 def test_a_shifted_cone_turns_about_its_axis():
     # a force in the middle of the arc acts on the lever r - dr, and what lies beyond the axis closes
     stiffness, shift = 2e5, 0.03
-    arc = np.pi * RADIUS
-    found = cone_flexibilities(21, arc / 20, RADIUS, stiffness, shift)
+    angles = np.pi * np.linspace(-0.5, 0.5, 21)
+    found = cone_flexibilities(angles, RADIUS, stiffness, shift)
     assert found[10, 10] == pytest.approx((RADIUS - shift) ** 2 / stiffness, rel=1e-12)
     assert found[10, 0] == pytest.approx(-shift * (RADIUS - shift) / stiffness, rel=1e-12)
     assert np.linalg.matrix_rank(found, tol=1e-12 * found.max()) == 2
@@ -99,11 +97,11 @@ ROW = 1e-8 * np.exp(-ANGLES / 0.5)
 def test_a_table_is_itself_at_its_knots_and_definite_between_them():
     whole = table_matrix(ANGLES, [ROW])
     assert whole[2, 5] == ROW[3] and np.array_equal(whole, whole.T)
-    at_knots = interpolated(ANGLES, [ROW], ANGLES.size, ARC / (ANGLES.size - 1), RADIUS)
+    at_knots = interpolated(ANGLES, [ROW], ANGLES, ANGLES[-1])
     assert at_knots == pytest.approx(whole, rel=1e-12)
-    assert np.array_equal(at_knots, interpolated(ANGLES, whole, ANGLES.size, ARC / (ANGLES.size - 1), RADIUS))
+    assert np.array_equal(at_knots, interpolated(ANGLES, whole, ANGLES, ANGLES[-1]))
     for stations in (7, 40):
-        found = interpolated(ANGLES, [ROW], stations, ARC / (stations - 1), RADIUS)
+        found = interpolated(ANGLES, [ROW], np.linspace(0.0, ANGLES[-1], stations), ANGLES[-1])
         assert found == pytest.approx(found.T, rel=1e-12)
         assert np.linalg.eigvalsh(0.5 * (found + found.T))[0] > -1e-12 * found.max()
         assert found[0, 0] == ROW[0] and found[0, -1] == pytest.approx(ROW[-1], rel=1e-12)

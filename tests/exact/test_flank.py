@@ -64,15 +64,18 @@ def test_overlap_in_rigid_grooves():
         "driving_position": 3e-5,
     }
     belt = belt_constants(parameters)
-    n, first, count = belt.cell.size, belt.driven_start, belt.driven.weight.size
+    n, angle = belt.cell.size, np.deg2rad(11.0)
     fields, scalars, force = np.zeros((7, n)), np.zeros(f.SCALARS), np.empty(n)
     fields[f.W] = 1e-4 * np.sin(np.arange(n))
     scalars[f.DRIVEN_POSITION] = -2e-5
     assert contact_forces(belt, State(fields, scalars), fresh_contacts(belt), force) > 0
 
     opening = np.full(n, np.inf)
-    opening[: belt.driving.weight.size] = 3e-5
-    opening[first : first + count] = -2e-5
-    overlap = np.maximum(-(opening + 2.0 * np.tan(np.deg2rad(11.0)) * fields[f.W]), 0.0)
-    assert force == pytest.approx(3e10 * overlap, rel=1e-12)
-    assert 0 < np.count_nonzero(force) < np.count_nonzero(np.isfinite(opening))
+    for held, wrap, position in (
+        (belt.driving_stations, belt.driving, 3e-5),
+        (belt.driven_stations, belt.driven, -2e-5),
+    ):
+        opening[held] = position + 2.0 * np.tan(angle) * (wrap.rise + wrap.upright * fields[f.W, held])
+    overlap = np.maximum(-opening, 0.0)
+    assert np.maximum(force, 0.0) == pytest.approx(3e10 * overlap, rel=1e-12)
+    assert 0 < np.count_nonzero(force > 0.0) < np.count_nonzero(np.isfinite(opening))

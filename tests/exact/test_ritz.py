@@ -11,7 +11,7 @@ from cvt_hpc.physics.ritz import modal_flexibilities, moving_modes
 from support.wraps import ARC, RADIUS, STATIONS, courses, random_wrap
 
 SPACING = ARC / (STATIONS - 1)
-WRAP = (STATIONS, SPACING, RADIUS)
+WRAP = (SPACING / RADIUS * np.arange(STATIONS), np.full(STATIONS, SPACING / RADIUS))
 FLEXIBILITY, FREQUENCY, DAMPING, HARMONIC = 4e-9, 4730.0, 0.01, 2.0
 PACE = 2.0 * np.pi * FREQUENCY
 TABLE = (np.array([HARMONIC]), np.array([FLEXIBILITY]), np.array([1.0 / (FLEXIBILITY * PACE**2)]))

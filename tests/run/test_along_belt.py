@@ -5,7 +5,7 @@ import pytest
 
 from cvt_hpc import simulate
 from cvt_hpc.models.elastic_belt.along_belt import NEEDED, along_belt, sliding_angle
-from cvt_hpc.models.elastic_belt.belt import mesh
+from cvt_hpc.models.elastic_belt.belt import belt_constants, mesh
 from cvt_hpc.physics.flank import flank_forces
 from support.marched import CHEAP, job
 from support.rungs import rung_job
@@ -27,14 +27,12 @@ def test_the_normal_force_is_the_flanks_own():
     axial, v_radial, v_tangential, mu = 3e5, -0.2, 0.1, 0.09
     radial, tangential = flank_forces(mu, 1e-6, np.sin(WEDGE), np.cos(WEDGE), axial, v_radial, v_tangential)
     sample = dict.fromkeys(NEEDED, np.zeros(n))
-    on_arc = np.zeros(n) + (grid.region == 0)
-    on_arc[0] = grid.cell[0] / (
-        grid.cell[0] + grid.cell[-1]
-    )  # of that station only the half on the arc touches
+    touching = np.zeros(n)
+    touching[: grid.counts[0]] = 1.0
     sample |= {
-        "contact_force": axial * np.ones(n),
-        "radial_friction": on_arc * (radial - 2.0 * np.tan(WEDGE) * axial),
-        "tangential_friction": on_arc * tangential,
+        "contact_force": axial * touching,
+        "radial_friction": touching * (radial - 2.0 * np.tan(WEDGE) * axial),
+        "tangential_friction": touching * tangential,
         "radial_speed": v_radial * np.ones(n),
         "sliding_speed": v_tangential * np.ones(n),
     }
@@ -83,14 +81,11 @@ def test_means_of_instants_are_the_profiles(history):
 
 
 def test_forces_add_up_to_the_moments_of_the_drive(history):
-    grid = mesh(job(**LOADED).parameters)
-    dual = 0.5 * (grid.cell + np.roll(grid.cell, 1))
-    first, count = grid.starts[0], grid.counts[0]
-    here = slice(first, first + count + 1)
-    weight = dual[here].copy()
-    weight[[0, -1]] = 0.5 * grid.cell[first]
-    radius = grid.path.driving_radius + history["momentary_mean_displacement"].values[:, here]
-    moment = (history["momentary_friction_force"].values[:, here] * radius) @ weight
+    belt = belt_constants(job(**LOADED).parameters)
+    here = belt.driving_stations
+    raised = belt.rise[here] + belt.upright[here] * history["momentary_mean_displacement"].values[:, here]
+    friction = np.nan_to_num(history["momentary_friction_force"].values[:, here])
+    moment = (friction * (belt.driving_radius + raised)) @ belt.dual[here]
     recorded = history["driving_moment"].values[-400:]
     assert moment == pytest.approx(recorded, rel=1e-4, abs=1e-3 * np.abs(recorded).max())
     speed = job(**LOADED).parameters["driving_speed"]
@@ -108,6 +103,6 @@ def test_profiles_over_time_change_nothing_else(history):
 def test_a_steady_state_has_profiles_in_equilibrium():
     found = simulate(rung_job("steady_variator", load=100.0, stations=96))
     alone = (found["region"] == "driving arc").values & (found["push_force"].values < 1.0)
-    flank, ring = (found[name].values[alone][2:-2] for name in ("friction_force", "ring_friction"))
+    flank, ring = (found[name].values[alone][4:-2] for name in ("friction_force", "ring_friction"))
     # where elements are apart nothing else holds them: what is left is the radial load on the spiral path
     assert flank == pytest.approx(ring * (1.0 + 1e-3 / (0.075 / 2.52)), rel=0.15)

@@ -8,7 +8,7 @@ import pytest
 
 from cvt_hpc.errors import InputError
 from cvt_hpc.job import load_job
-from cvt_hpc.models.elastic_belt.belt import mesh
+from cvt_hpc.models.elastic_belt.belt import belt_constants
 from cvt_hpc.physics.ritz import modal_flexibilities
 from cvt_hpc.simulation import run_points
 from support.marched import fresh_record, job, never
@@ -21,20 +21,14 @@ RECORD = SCENE | {"precision": "double"}
 def local_bending(collar=False):
     """Tables of the default's local kernel at the stations; with the tilt of its collar, too, where asked for."""
     p = job(**SCENE).parameters
-    grid, found = mesh(p), {"sheave_deformation": "flexibilities"}
-    for pulley, region, radius in (
-        ("driving", 0, grid.path.driving_radius),
-        ("driven", 2, grid.path.driven_radius),
-    ):
-        angles = np.arange(grid.counts[region] + 1) * grid.cell[grid.starts[region]] / radius
-        length = p["local_length"]
-        row = np.exp(-angles * radius / length) / (2.0 * length * p["local_stiffness"])
+    belt, found = belt_constants(p | {"duration": 1.0}), {"sheave_deformation": "flexibilities"}
+    for pulley in ("driving", "driven"):
+        wrap, radius, length = getattr(belt, pulley), getattr(belt, f"{pulley}_radius"), p["local_length"]
+        apart = np.abs(wrap.angle[:, None] - wrap.angle)
+        table = np.exp(-apart * radius / length) / (2.0 * length * p["local_stiffness"])
         if collar:
-            row += radius**2 / p["tilt_stiffness"] * np.cos(angles)
-        found |= {
-            f"{pulley}_flexibility_angle": angles.tolist(),
-            f"{pulley}_flexibility": [row.tolist()],
-        }
+            table += radius**2 / p["tilt_stiffness"] * wrap.tilt.T @ wrap.tilt
+        found |= {f"{pulley}_flexibility_angle": wrap.angle.tolist(), f"{pulley}_flexibility": table.tolist()}
     return found
 
 
@@ -52,16 +46,14 @@ MODES = {
 
 def modes_as_tables():
     """Tables of these modes at the stations."""
-    p = job(**SCENE).parameters
-    grid, found = mesh(p), {"sheave_deformation": "flexibilities"}
-    for pulley, region, radius in (
-        ("driving", 0, grid.path.driving_radius),
-        ("driven", 2, grid.path.driven_radius),
-    ):
-        spacing, stations = grid.cell[grid.starts[region]], grid.counts[region] + 1
-        matrix = modal_flexibilities(np.arange(21.0), np.array(FLEXIBILITIES), stations, spacing, radius)
-        found[f"{pulley}_flexibility_angle"] = (np.arange(stations) * spacing / radius).tolist()
-        found[f"{pulley}_flexibility"] = [matrix[0].tolist()]
+    belt = belt_constants(job(**SCENE).parameters | {"duration": 1.0})
+    found = {"sheave_deformation": "flexibilities"}
+    for pulley in ("driving", "driven"):
+        wrap, radius = getattr(belt, pulley), getattr(belt, f"{pulley}_radius")
+        place = wrap.angle, wrap.weight / radius
+        matrix = modal_flexibilities(np.arange(21.0), np.array(FLEXIBILITIES), *place)
+        found[f"{pulley}_flexibility_angle"] = wrap.angle.tolist()
+        found[f"{pulley}_flexibility"] = matrix.tolist()
     return found
 
 
@@ -96,12 +88,13 @@ def test_a_cone_is_another_disc_than_local_bending():
 
 
 def test_discs_with_inertia_settle_where_those_without_are():
-    settled = RECORD | MODES | {"duration": 0.08}
+    settled = RECORD | MODES | {"duration": 0.12, "stations": 48}
     expected, found = fresh_record(**settled, ritz_limit=0.0), fresh_record(**settled)
     for name in JUDGED:
         # frequencies of 5 kHz and more, a belt that rests; forces with or without inertia scatter by 1e-3 from step
         # to step (2 to 4.6 us), as long as the start is not quite over
-        assert found[name] == pytest.approx(expected[name], rel=3e-3), name
+        # of the push in t2 mN are left
+        assert found[name] == pytest.approx(expected[name], rel=3e-3, abs=0.1), name
     assert not np.array_equal(found["axial_force"], expected["axial_force"])
     assert found["power_residual"] < 2e-3
 
@@ -129,15 +122,14 @@ def test_the_job_of_finite_elements_takes_its_discs_by_each_description():
     path = jobs / "sheave_deformation.toml"
     found = {name: load_job(path, part).parameters for name, part in parts.items()}
     # w_ij and the modes are of one disc: the table is that of the modes at its knots
-    for pulley, radius in (("driving", 0.075 / 2.52), ("driven", 0.075)):
+    for pulley in ("driving", "driven"):
         p = found["ritz"]
         angles = found["w_ij"][f"{pulley}_flexibility_angle"]
         matrix = modal_flexibilities(
             np.array(p[f"{pulley}_mode_harmonic"]),
             np.array(p[f"{pulley}_mode_flexibility"]),
-            len(angles),
-            radius * angles[1],
-            radius,
+            np.array(angles),
+            np.full(len(angles), angles[1]),
         )
         (row,) = found["w_ij"][f"{pulley}_flexibility"]
         assert matrix[0] == pytest.approx(row, rel=1e-9, abs=1e-9 * row[0])
@@ -164,7 +156,10 @@ def test_what_does_not_fit_gets_one_line(values, told):
 def test_tables_come_from_files(tmp_path):
     lists = local_bending()
     for pulley in ("driving", "driven"):
-        angles, (row,) = lists[f"{pulley}_flexibility_angle"], lists[f"{pulley}_flexibility"]
+        # of discs of revolution one row
+        angles = lists[f"{pulley}_flexibility_angle"] = np.linspace(0.0, 4.0, 12).tolist()
+        row = (1e-8 * np.exp(-np.array(angles))).tolist()
+        lists[f"{pulley}_flexibility"] = [row]
         lines = [f"{angle!r}, {1e6 * value!r}" for angle, value in zip(angles, row, strict=True)]
         (tmp_path / f"{pulley}.csv").write_text("\n".join(["angle [rad], flexibility [um/N]", *lines]))
     text = 'name = "x"\nmodel = "elastic_belt"\n[deflection]\nsheave_deformation = "flexibilities"\n'

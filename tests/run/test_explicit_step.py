@@ -14,8 +14,10 @@ from cvt_hpc.models.elastic_belt.rhs import (
     content_rates,
     fresh_contacts,
     load_at,
-    memory_rates,
+    sliding_speed,
+    speed_share_at,
     strains,
+    transported,
 )
 from support.fast_runs import march, march_fast
 from support.marched import job
@@ -101,8 +103,27 @@ def forces(belt, state):
     return force, eps
 
 
+def remembered(belt, before, state, force, step):
+    """Filtered speeds at the end of a step, at the new velocities and the old contact."""
+    old, found = before.fields[f.V_FILTERED], before.fields[f.V_FILTERED].copy()
+    belt_speed, forget = (
+        speed_share_at(belt, state.scalars[f.TIME]) * belt.belt_speed,
+        1.0 / belt.friction_memory,
+    )
+    for j in np.flatnonzero(belt.touches):
+        found[j] = speed = sliding_speed(belt, state, j)
+        if force[j] > 0.0:
+            carried, entering = transported(belt, force, j, belt_speed, speed, old[j - 1])
+            target = (carried * entering + forget * speed) / (carried + forget)
+            found[j] = target + (old[j] - target) * np.exp(-(carried + forget) * step)
+    return found
+
+
 def plain_step(belt, before, step):
-    """The state after a step of symplectic Euler: velocities by the old state, all else by the new velocities."""
+    """The state after a step of symplectic Euler: velocities by the old state, all else by the new velocities.
+
+    But for the memory, which goes to rest exactly, and at open stations at once.
+    """
     state = before.copy()
     (fields, scalars), rate, moments = state, np.zeros_like(before.fields), np.zeros(belt.cell.size)
     force, eps = forces(belt, state)
@@ -117,10 +138,11 @@ def plain_step(belt, before, step):
         scalars[f.FIRST_STATE :] += step * np.array(others)
     scalars[f.DRIVEN_SPEED] += step * turning
     scalars[f.TIME] += step
-    memory_rates(belt, state, rate)
+    if belt.friction_memory > 0.0:
+        fields[f.V_FILTERED] = remembered(belt, before, state, force, step)
     content_rates(belt, state, eps, rate)
     fields[f.W] += step * fields[f.U]
-    for row in (f.V_FILTERED, f.N_ELEMENT, f.N_RING):
+    for row in (f.N_ELEMENT, f.N_RING):
         fields[row] += step * rate[row]
     scalars[f.DRIVEN_POSITION] += step * closing
     return state
@@ -130,8 +152,7 @@ def plain_step(belt, before, step):
 def test_the_rough_state_tries_every_branch(case):
     belt, state = rough_belt(case)
     force, eps = forces(belt, state)
-    arc = belt.arc_share > 0.0
-    assert 0.05 < np.mean(force[arc] == 0.0) < 0.8
+    assert 0.05 < np.mean(force[belt.touches > 0.0] <= 0.0) < 0.8
     assert 0.05 < np.mean(eps[0] > 0.0) < 0.95
     opening = (np.roll(state.fields[f.V_ELEMENT], -1) - state.fields[f.V_ELEMENT]) / belt.cell
     damped, push = belt.element_damping * opening, -belt.element_stiffness * eps[0]

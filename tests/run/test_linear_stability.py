@@ -21,7 +21,7 @@ from support.growing import at_rest, measured
 from support.rungs import rung_job, rung_record
 
 DEFAULTS = {key: parameter.default for section in PARAMETERS.values() for key, parameter in section.items()}
-LOADS = (80.0, 105.0, 125.0, 140.0)
+LOADS = (95.0, 105.0, 125.0, 140.0)
 COARSE = DEFAULTS | {"stations": 96}
 
 
@@ -106,19 +106,19 @@ def test_growth_and_frequency_are_those_of_the_transient(place):
 
 
 def test_a_lag_of_the_tilt_takes_the_growth_away():
-    """As in transients of the default belt: tilts that follow within 0.1 ms let it vibrate, 0.2 ms hardly do."""
+    """Tilts that follow within 20 us let the belt vibrate, 0.1 ms do not."""
     grid = mesh(COARSE)
-    lags = (0.0, 1e-6, 1e-4, 2e-4)
+    lags = (0.0, 1e-6, 2e-5, 1e-4)
     points = [branch(SteadyBelt(COARSE | {"tilt_lag": lag}), grid, (120.0,)).points[0] for lag in lags]
     growth = np.array([point.growth for point in points])
-    # in first order of the lag, by some 3.4/s in each us
+    # in first order of the lag, by some 3.2/s in each us
     assert growth[1] == pytest.approx(growth[0], abs=5.0)
     assert np.all(np.diff(growth) < 0.0)
-    assert growth[2] > 200.0 and growth[3] < 50.0
+    assert growth[2] > 50.0 and growth[3] < 0.0
 
 
 def test_growth_with_lagging_tilts_is_that_of_the_transient():
-    (point,) = branch(SteadyBelt(DEFAULTS | {"tilt_lag": 1e-4}), mesh(DEFAULTS), (125.0,)).points
+    (point,) = branch(SteadyBelt(DEFAULTS | {"tilt_lag": 2e-5}), mesh(DEFAULTS), (125.0,)).points
     growth, frequency = measured(point)
     assert growth == pytest.approx(point.growth, abs=0.02 * point.growth)
     assert frequency == pytest.approx(point.modes[0].frequency, rel=2e-3)
@@ -137,7 +137,7 @@ def test_the_driven_arc_feeds_and_the_driving_arc_takes():
     for point in points()[1:]:
         mode, starts = point.modes[0], mesh(DEFAULTS).starts
         driving, t1, driven, t2 = np.add.reduceat(mode.fed, starts)
-        assert driven > 500.0 and driving < -500.0
+        assert driven > 500.0 and driving < -0.5 * driven
         # of the strands only the stations at their ends touch a sheave
         assert abs(t1) + abs(t2) < 0.15 * driven
 

@@ -79,7 +79,6 @@ def test_without_a_limit_it_is_the_whole_belt_in_the_space_of_its_splines():
     flat = flat_belt(model.belt)
     full = np.empty(flat.origin.size)
     assert flat_rates(flat, 1.0, flat_pack(flat, moved.state), full)
-    moved.state.fields[f.V_FILTERED] = flat.state.fields[f.V_FILTERED]  # where the belt enters
     before, rates = moved.state.fields.copy(), moved.p.copy()
     after = steps(model, moved, 1)
     n, weight = model.belt.cell.size, model.belt.dual

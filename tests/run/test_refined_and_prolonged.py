@@ -98,7 +98,7 @@ def test_a_long_reason_leaves_room_for_the_remedy(script, monkeypatch):
         ({"judged_fraction": 0.42}, 4),
         ({"judged_fraction": 0.5}, 4),
         ({"judged_fraction": 0.75}, 4),
-        ({"stepper": "explicit", "step": 4e-7, "stations": 24}, 2),
+        ({"stepper": "explicit", "step": 2.5e-7, "stations": 24}, 2),
     ],
 )
 def test_a_run_that_goes_on_is_the_longer_run(script, values, times):

@@ -218,7 +218,7 @@ def test_stations_in_lanes_make_the_same_steps(method):
     # with 48 stations a part begins at the second station of the driven arc, whose memory the first one feeds
     for batch in (several, alone):
         batch.advance(1)
-    round_off = 1e-5 if settings["precision"] == "single" else 1e-12  # of 11 or 250 steps
+    round_off = 2e-5 if settings["precision"] == "single" else 1e-12  # of 11 or 250 steps
     for field in range(7):
         values = several.state.fields.data[:, field, 0]
         seen = alone.state.fields.data[:, field, 0]

@@ -47,12 +47,14 @@ DEFAULT_MESH = {
     # of a step that begins at every sample in the same phase: dampers that were sampled too were 80 W off here, 4 %
     "no load, in phase": (NO_LOAD | {"step": 2.5e-6}, 2e-3),
 }
+SEATED = {"load": 120.0, "stations": 320, "duration": 0.08} | CONSTANT
 HALF_STEP = {"step": 0.5 * job().parameters["step"]}
 HALVED = ["vibrating", "quiet", "rigid", "no load"]
 RUNS = Together(
     *(COARSE | values for values, _ in SCENES.values()),
     *(COARSE | SCENES[name][0] | HALF_STEP for name in HALVED),
     *({"duration": 0.1} | values for values, _ in DEFAULT_MESH.values()),
+    SEATED,
 )
 
 
@@ -91,7 +93,7 @@ def test_half_the_step_does_not_open_it(name):
 def test_losses_are_losses(name):
     run, _ = settled(name)
     for term in LOSSES:
-        # seating alone may give back at times: contact ends with more or less force than it began with
+        # seating alone may give back at times: it is what the mesh leaves of forces at the ends of contact
         if term != "seating_loss":
             assert run.channel(term).min() >= 0, term
             assert mean(run, term) > 0, term
@@ -103,11 +105,9 @@ def test_losses_are_losses(name):
         ("vibrating", "driving_flank_loss"),
         ("vibrating", "driven_flank_loss"),
         ("vibrating", "ring_loss"),
-        ("vibrating", "seating_loss"),
         ("no load", "driving_flank_loss"),
         ("no load", "driven_flank_loss"),
         ("no load", "ring_loss"),
-        ("no load", "seating_loss"),
         ("no load, rigid", "ring_loss"),
         ("no load, damped", "belt_loss"),
     ],
@@ -117,6 +117,12 @@ def test_a_loss_of_the_wrong_sign_would_show(name, term):
     found = balance(run)
     turned = found["power_residual"] + 2 * mean(run, term) / flow(found)
     assert abs(turned) > 4 * tolerance
+
+
+def test_contact_ends_without_force():
+    """So the belt carries no elastic energy out of the sheaves but by the mesh, 4 % of the losses at 160 stations."""
+    run = RUNS.finished(**SEATED)
+    assert abs(mean(run, "seating_loss")) < 0.01 * balance(run)["loss"]
 
 
 @pytest.mark.parametrize("name", SCENES)
@@ -249,7 +255,7 @@ def test_work_of_the_dampers_is_force_times_mean_speed():
     strains(belt, state.fields, eps)
     assert 0.1 < np.mean(eps[0] > 0) < 0.9
     after, expected = explicit_damper_work(belt, state, 300, 1e-7)
-    assert expected > 1e-5
+    assert expected > 5e-6
     # sums of the same terms in another order
     assert after.scalars[fields.LAYER_WORK] == pytest.approx(expected, rel=1e-9)
 

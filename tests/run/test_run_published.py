@@ -20,7 +20,7 @@ QUIET = {
 }
 SCENES = [{}, {"seed": 2}, *QUIET.values()]
 RUNS = Together(
-    *({"load": load, "duration": 0.2} for load in (0.0, 60.0, 100.0, 160.0)),
+    *({"load": load, "duration": 0.2} for load in (0.0, 40.0, 100.0, 160.0)),
     *({"load": 120.0, "duration": 0.2} | scene for scene in SCENES),
 )
 
@@ -50,7 +50,7 @@ def test_it_is_quiet_without_the_fall_of_friction_or_without_elastic_sheaves(val
     assert np.all(found["amplitude"] < 0.1 * run(120.0)["amplitude"])
 
 
-@pytest.mark.parametrize("load", [0.0, 60.0])
+@pytest.mark.parametrize("load", [0.0, 40.0])
 def test_it_is_quiet_at_low_load(load):
     found = run(load)
     assert found["vibrates"] == Vibrates.NO
@@ -74,7 +74,7 @@ def test_without_load_the_rings_drag_is_balanced_by_push_in_the_other_strand():
 
 
 def test_push_carries_the_load_in_the_loaded_strand():
-    loads = [60.0, 100.0, 120.0, 160.0]
+    loads = [40.0, 100.0, 120.0, 160.0]
     push = np.array([run(load)["mean_push_force"] for load in loads])
     assert np.all(push[:, T2] < 1.0)
     # what the load adds at the radius of the driving pulley, 30 mm, shared by push and rings: a rise of 20 to 33 N per N m
@@ -90,7 +90,7 @@ def test_the_free_frequency_of_the_loaded_strand_falls_with_load():
     speed = p["driving_speed"] * radius
     length = np.sqrt(p["centre_distance"] ** 2 - (p["driven_radius"] - radius) ** 2)
     free = []
-    for load in (60.0, 100.0, 120.0, 160.0):
+    for load in (40.0, 100.0, 120.0, 160.0):
         found = run(load)
         force = found["mean_ring_tension"] - found["mean_push_force"]
         free.append(np.sqrt(force / mass) * (1 - mass * speed**2 / force) / (2 * length))

@@ -43,7 +43,7 @@ def test_a_ramp_of_no_extent_is_the_constant_run_and_its_neighbours_change_no_bi
 @pytest.mark.parametrize("ends", ENDS)
 @pytest.mark.parametrize("precision", PRECISIONS)
 def test_the_power_balance_closes_while_the_speed_changes(ends, precision):
-    run = finished(**COARSE, **ramp(*ends), precision=precision)
+    run = finished(**COARSE | {"stations": 96}, **ramp(*ends), precision=precision)
     found, p, judged = balance(run), run.parameters, run.judged
     assert abs(found["power_residual"]) < 5e-4
     driving, driven = (run.channel(f"{name}_speed")[judged] for name in ("driving", "driven"))
@@ -86,7 +86,7 @@ def test_forces_along_a_rising_ramp_are_those_of_constant_speeds():
 
 @pytest.mark.slow
 def test_onset_and_end_are_where_constant_speeds_have_them():
-    inside, outside = (2100.0, 3900.0), (1980.0, 4000.0)
+    inside, outside = (2000.0, 3400.0), (1900.0, 3500.0)
     runs = Together(*(VIBRATING | {"driving_speed": s * RPM, "duration": 0.3} for s in (*inside, *outside)))
     for speeds, expected in ((inside, Vibrates.YES), (outside, Vibrates.NO)):
         for speed in speeds:
@@ -111,7 +111,7 @@ def test_onset_and_end_are_where_constant_speeds_have_them():
         assert np.isnan(found["onset_load"]) and np.all(np.isnan(found["ramp_load"]))
         vibrating = found["ramp_amplitude"].max(axis=0) > 5e-6
         well_inside = (found["ramp_speed"] > low[1] + late) & (found["ramp_speed"] < high[1] - late)
-        assert vibrating[well_inside].all() and well_inside.sum() == 8
+        assert vibrating[well_inside].all() and well_inside.sum() == 6
 
 
 def test_a_belt_that_slips_does_so_against_the_present_speed():

@@ -58,13 +58,15 @@ def test_it_is_the_state_that_a_transient_comes_to(ratio, share):
 
 
 def test_at_rest_without_load_both_halves_of_a_wrap_are_alike():
-    # Bullinger et al. 2005, on their fig. 23: peaks at inlet and outlet, by the neighbours' support
-    point = rung_job("steady_variator", ratio=2.16, driving_speed=1e-2, load=0.0, **BELT).point(0)
+    # and at inlet and outlet contact ends without force, beyond the tangent points
+    point = rung_job("steady_variator", ratio=2.16, driving_speed=0.1, load=0.0, **BELT).point(0)
     steady, grid = SteadyBelt(point).at(0.0), mesh(point)
-    force = distributions(steady).contact_force[: grid.counts[0] + 1]
-    # friction at 1e-2 rad/s is 1e-4 of what it is regularised over
-    assert force == pytest.approx(force[::-1], rel=1e-3)
-    assert min(force[0], force[-1]) > 1.05 * force[1:-1].max()
+    groove = steady.belt.driving_stations
+    force = distributions(steady).contact_force[groove]
+    # friction at 0.1 rad/s is 1e-3 of what it is regularised over
+    assert force == pytest.approx(force[::-1], abs=5e-3 * force.max())
+    at_inlet = np.flatnonzero(groove == grid.starts[0])[0]
+    assert force[0] == 0.0 < force[at_inlet] < 0.9 * force.max()
 
 
 def test_more_than_friction_carries_is_told_with_what_it_does_carry():

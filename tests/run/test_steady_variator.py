@@ -78,9 +78,9 @@ def test_pulleys_are_in_balance():
         moment = 0.0
         for region, sign in ((1, -1.0), (3, 1.0)):
             stations = grid.starts[region] + np.arange(grid.counts[region] // 4, 3 * grid.counts[region] // 4)
-            cell = belt.cell[stations[0]]
-            slope, w = np.polyfit((stations - grid.starts[region]) * cell, around.displacement[stations], 1)
-            arm = belt.driven_radius + w + (slope * grid.counts[region] * cell if region == 1 else 0.0)
+            way = grid.along(region)
+            slope, w = np.polyfit(way[stations - grid.starts[region]], around.displacement[stations], 1)
+            arm = belt.driven_radius + w + (slope * way[-1] if region == 1 else 0.0)
             tension, push = around.ring_tension[stations].mean(), around.push_force[stations].mean()
             net = tension - push - belt.mass * belt.belt_speed**2
             moment += sign * (net * arm + tension * belt.ring_offset)

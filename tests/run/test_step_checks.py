@@ -18,7 +18,7 @@ from cvt_hpc.models.elastic_belt.parameters import check
 from cvt_hpc.models.elastic_belt.recorded_run import recording
 from cvt_hpc.models.elastic_belt.step_choice import REFERENCE_STEP, SAFE_SHARE, chosen_step, transverse_limit
 from cvt_hpc.models.elastic_belt.validity import doubt, step_doubt
-from cvt_hpc.variables import Status, Vibrates
+from cvt_hpc.variables import Status
 from support.fast_runs import FastRuns
 from support.lone import Transient
 from support.marched import fresh_record, job, record
@@ -55,7 +55,7 @@ def test_saddles_stick_however_stiff_their_friction_is(ratio):
     values = ONE_BELT | SHORT | {"ratio": ratio, "ring_friction_speed": 2e-3}
     found = record(**values)
     assert saddle_stiffness(**values) > 20.0 * CHATTER
-    assert (found["status"], found["vibrates"]) == (Status.DONE, Vibrates.NO)
+    assert found["status"] == Status.DONE and found["amplitude"].max() < 0.5e-6
     # of rings that chatter 7e-2, 60 mm/s and up to 3 um; a mesh of 48 stations leaves 1.7e-3 at ratio 0.5 at any step
     assert abs(found["power_residual"]) < 2e-3
     assert found["step_ripple"] < 0.1 * job().point(0)["most_step_ripple"]
@@ -84,7 +84,7 @@ def test_pushes_do_not_pile_up_in_elements_that_touch():
     assert least_force(4.6e-6) == pytest.approx(least_force(2.3e-6), rel=0.02)
 
 
-@pytest.mark.parametrize("values", [{"step": 14e-6}, {"step": 17e-6}, {"step": 12.5e-6, "element_mass": 0.5}])
+@pytest.mark.parametrize("values", [{"step": 20e-6}, {"step": 25e-6}, {"step": 16e-6, "element_mass": 0.5}])
 def test_a_belt_beyond_its_stable_step_is_never_said_to_vibrate(values):
     point = job(stations=160, **values).point(0)
     assert point["step"] > 1.05 * transverse_limit(point)
@@ -93,10 +93,11 @@ def test_a_belt_beyond_its_stable_step_is_never_said_to_vibrate(values):
 
 
 def test_the_limit_of_the_step_is_the_shortest_wave_s():
-    # a strand's wave of two cells alone: w = sqrt(16 EI / m) / h^2, when tension and contact are small beside it
-    point = job(bending_stiffness=500.0, thrust=10.0, flank_stiffness=1e3).point(0)
-    cell = recording(point, np.float64).mesh.cell.min()
-    assert transverse_limit(point) == pytest.approx(2.0 * cell**2 / np.sqrt(16 * 500.0 / 1.3), rel=1e-3)
+    # a wave of two cells alone, w^2 = 4 F / (m h^2), when contact is small beside it; bending is implicit
+    point = job(bending_stiffness=500.0, flank_stiffness=1e3).point(0)
+    grid = recording(point, np.float64).mesh
+    force = 2.0 * np.tan(point["half_wedge_angle"]) * point["thrust"] / grid.path.driven_wrap
+    assert transverse_limit(point) == pytest.approx(grid.cell.min() / np.sqrt(force / 1.3), rel=1e-3)
 
 
 def test_a_step_beyond_the_limit_is_named():
@@ -140,17 +141,16 @@ def test_the_step_is_chosen_for_the_scene():
     assert chosen() == REFERENCE_STEP
     assert chosen(band_high=3000.0) == pytest.approx(0.5 * REFERENCE_STEP)
     assert chosen(step_error=0.01) == pytest.approx(0.5 * REFERENCE_STEP)
-    fine = job(stations=288).point(0)
-    assert chosen(stations=288) == pytest.approx(
-        SAFE_SHARE * transverse_limit(fine), rel=5e-3
-    )  # three digits
-    assert chosen(stations=288) < REFERENCE_STEP
+    fine = job(stations=960).point(0)
+    expected = pytest.approx(SAFE_SHARE * transverse_limit(fine), rel=5e-3)  # three digits
+    assert chosen(stations=960) == expected
+    assert chosen(stations=288) == REFERENCE_STEP > chosen(stations=960)
     assert chosen(step=2e-6) == 2e-6
     assert chosen(stepper="explicit") == 1e-7
 
 
 def test_every_cell_of_a_grid_has_a_step_of_its_own():
-    document = {"name": "test", "model": "auto", "axes": {"bending_stiffness": [0.5, 5.0]}}
+    document = {"name": "test", "model": "auto", "axes": {"flank_stiffness": [3e10, 3e12]}}
     asked = build_job(document, "test.toml", {})
     steps = [asked.point(index)["step"] for index in range(2)]
     assert steps == [chosen_step(asked.point(index)) for index in range(2)]
@@ -159,9 +159,9 @@ def test_every_cell_of_a_grid_has_a_step_of_its_own():
 
 
 def test_a_run_by_hand_beyond_the_limit_is_done_again_shorter():
-    found = fresh_record(step=14e-6, stations=160, duration=0.04, rise_time=0.01, most_refinements=1)
+    found = fresh_record(step=28e-6, stations=160, duration=0.04, rise_time=0.01, most_refinements=1)
     assert (found["status"], found["refinements"]) == (Status.DONE, 1)
-    assert found["time_step"] <= 7e-6
+    assert found["time_step"] <= 14e-6
 
 
 BOTH = "[numerics] step_error: expected either step_error or step, found both"

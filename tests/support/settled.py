@@ -60,8 +60,8 @@ class Settled:
         force, eps = np.empty(n), np.empty((2, n))
         assert contact_forces(belt, state, fresh_contacts(belt), force) > 0
         strains(belt, state.fields, eps)
-        wraps = ((belt.driving, 0), (belt.driven, belt.driven_start))
-        thrusts = [sheave.weight @ force[first : first + sheave.weight.size] for sheave, first in wraps]
+        wraps = ((belt.driving, belt.driving_stations), (belt.driven, belt.driven_stations))
+        thrusts = [sheave.weight @ np.maximum(force[held], 0.0) for sheave, held in wraps]
         push = np.maximum(-belt.element_stiffness * eps[0], 0.0)
         return [belt.ring_stiffness * eps[1], push, state.fields[f.W].copy(), np.array(thrusts)]
 
@@ -74,7 +74,8 @@ class Settled:
         """T, P [N] and slope w_s in the middle of a strand; w of its straight line at both ends [m]."""
         first, count = self.grid.starts[region], self.grid.counts[region]
         middle = slice(first + count // 4, first + 3 * count // 4)
-        s = np.arange(count)[count // 4 : 3 * count // 4] * self.belt.cell[first]
+        way = self.grid.along(region)
+        s = way[count // 4 : 3 * count // 4]
         slope, w = np.polyfit(s, self.w[middle], 1)
-        ends = w, w + slope * count * self.belt.cell[first]
+        ends = w, w + slope * way[-1]
         return self.tension[middle].mean(), self.push[middle].mean(), slope, ends

@@ -18,7 +18,9 @@ TENSION = 5000.0  # net tension F = T - P [N]
 WAVE = np.sqrt(TENSION / MASS)
 
 
-def straight_belt(cells: int, speed: float = 0.0, bending: float = 0.0, damping: float = 0.0) -> Belt:
+def straight_belt(
+    cells: int, speed: float = 0.0, bending: float = 0.0, damping: float = 0.0, refinement: float = 1.0
+) -> Belt:
     """A straight belt of 2 LENGTH, `cells` cells (an even number) in each half."""
     belt = belt_constants(
         DEFAULTS
@@ -28,13 +30,14 @@ def straight_belt(cells: int, speed: float = 0.0, bending: float = 0.0, damping:
             "driven_radius": RADIUS,
             "centre_distance": np.pi * RADIUS,
             "stations": 2 * cells,
+            "end_refinement": refinement,
             "bending_stiffness": bending,
             "transverse_damping": damping,
         }
     )
-    assert np.ptp(belt.cell) < 1e-15
+    assert refinement > 1.0 or np.ptp(belt.cell) < 1e-15
     nothing = np.zeros(2 * cells)
-    return belt._replace(curvature=nothing, arc_curvature=nothing, arc_share=nothing, belt_speed=speed)
+    return belt._replace(curvature=nothing, arc_curvature=nothing, touches=nothing, belt_speed=speed)
 
 
 def moving_straight(belt: Belt, tension: float = TENSION, push: float = 0.0) -> State:

@@ -8,13 +8,25 @@ STATIONS, ARC, RADIUS = 20, 0.27, 0.075
 ELEMENTS = 3e10  # c_e [N/m^2] in the middle of what is tried
 
 
+def places(stations, arc, radius):
+    """Weights, angles and rises of stations at equal distances on an arc, the first and last at its ends."""
+    weight = np.full(stations, arc / (stations - 1))
+    weight[[0, -1]] *= 0.5
+    return weight, np.linspace(0.0, arc / radius, stations), np.zeros(stations)
+
+
+def local_kernel(wrap):
+    """Opening of the discs by local bending at each station per force at each other, (m, m)."""
+    beside = np.diag(wrap.off_diagonal[1:], 1)
+    return np.linalg.inv(np.diag(wrap.diagonal) + beside + beside.T)
+
+
 def random_wrap(random, stiffness=None):
     """A wrap on the common stations, all else its own."""
     if stiffness is None:
         stiffness = random.choice([0.3, 1.0, 3.0, np.inf])
     return sheaves(
-        ARC / (STATIONS - 1),
-        STATIONS,
+        *places(STATIONS, ARC, RADIUS),
         RADIUS,
         stiffness,
         random.choice([4e4, 4e5, np.inf]),

@@ -17,8 +17,6 @@ belt slides into the groove: from pi/2 to 3 pi/2 the pulley drives the belt, bel
 Of means, sliding speed and angle are those of the mean sliding.
 """
 
-from __future__ import annotations
-
 from collections.abc import Mapping
 from typing import Any
 
@@ -80,13 +78,11 @@ def along_belt(
         By name, (..., N).
     """
     angle = parameters["half_wedge_angle"]
-    dual = at_stations(grid.cell)
-    share = at_stations(grid.cell * (grid.region % 2 == 0)) / dual  # of a station's length that is on an arc
-    touching = share > 0.0
-    share = np.where(touching, share, np.nan)
-    radial, tangential = sample["radial_speed"] + 0.0 * share, sample["sliding_speed"] + 0.0 * share
+    on_arc = at_stations(grid.cell * (grid.region % 2 == 0))  # length of a station's part on an arc
     axial = sample["contact_force"]
-    pressing = 2.0 * np.tan(angle) * axial + sample["radial_friction"] / share
+    touching = np.where(axial > 0.0, 1.0, np.nan)
+    radial, tangential = sample["radial_speed"] * touching, sample["sliding_speed"] * touching
+    pressing = (2.0 * np.tan(angle) * axial + sample["radial_friction"]) * touching
     meridian = radial / np.cos(angle)
     return {
         "radial_sliding": radial,
@@ -94,8 +90,8 @@ def along_belt(
         "sliding_speed": np.hypot(meridian, tangential),
         "sliding_angle": sliding_angle(radial, tangential, angle),
         "normal_force": axial * np.cos(angle) + 0.5 * np.sin(angle) * pressing,
-        "friction_force": sample["tangential_friction"] / share,
-        "ring_friction": sample["saddle_friction"] / (dual * share),
+        "friction_force": sample["tangential_friction"] * touching,
+        "ring_friction": sample["saddle_friction"] / np.where(on_arc > 0.0, on_arc, np.nan),
     }
 
 
@@ -113,9 +109,7 @@ def sliding_angle(radial: np.ndarray, tangential: np.ndarray, half_wedge_angle: 
 
 def curvature_at_stations(grid: Mesh) -> np.ndarray:
     """Curvature of the reference path at the stations [1/m], (N,): at an arc's end that of its own length."""
-    path = grid.path
-    curvature = np.array([1.0 / path.driving_radius, 0.0, 1.0 / path.driven_radius, 0.0])[grid.region]
-    return at_stations(grid.cell * curvature) / at_stations(grid.cell)
+    return at_stations(grid.cell * grid.curvature) / at_stations(grid.cell)
 
 
 def wrap_angles(grid: Mesh) -> np.ndarray:
@@ -123,5 +117,5 @@ def wrap_angles(grid: Mesh) -> np.ndarray:
     found = np.full(grid.cell.size, np.nan)
     for region, radius in ((0, grid.path.driving_radius), (2, grid.path.driven_radius)):
         first, count = grid.starts[region], grid.counts[region]
-        found[first : first + count + 1] = grid.cell[first] * np.arange(count + 1) / radius
+        found[first : first + count + 1] = grid.along(region) / radius
     return found

@@ -9,6 +9,7 @@ left face of cell j); the content n_i, the strains and the forces in cells. Rows
 from __future__ import annotations
 
 from collections.abc import Mapping
+from itertools import accumulate
 from typing import Any, NamedTuple
 
 import numpy as np
@@ -20,20 +21,32 @@ from cvt_hpc.models.elastic_belt.deflection_settings import disc_settings
 from cvt_hpc.models.elastic_belt.grouping import faded_coupling
 from cvt_hpc.models.elastic_belt.pulleys import Pulleys, settled_tilt, with_pulleys
 from cvt_hpc.physics.friction import FrictionLaw, given_law
-from cvt_hpc.physics.geometry import Variator, cell_counts, variator
-from cvt_hpc.physics.sheaves import Sheaves, axial_element_stiffness, flexibility, sheaves, stiffness_factors
-from cvt_hpc.variator import LARGEST_DISPLACEMENT
+from cvt_hpc.physics.geometry import Variator, cut_path, variator
+from cvt_hpc.physics.sheaves import (
+    Sheaves,
+    axial_element_stiffness,
+    flexibility,
+    sheaves,
+    stiffness_factors,
+)
+from cvt_hpc.variator import LARGEST_DISPLACEMENT, PULLEYS
 from cvt_hpc.variator.measures import Measures, measures, rounded
 from cvt_hpc.vibration.ramped import ramped
 
 REGIONS = ("driving arc", "t1", "driven arc", "t2")
 MODES = 5  # half waves along a strand that are resolved
+# Share of a strand beyond a tangent point where the groove is tested for contact, which ends long before
+REACH = 0.1
 
 
 class Belt(NamedTuple):
     """Everything the kernels need, in SI units; N stations around the belt.
 
     Arrays of cells and stations have shape (N,), `per_...` being reciprocals, the span that of two cells;
+    `touches` is 1 where a groove may hold a station, else 0, and `on_driven` 1 from the middle of t1 to that
+    of t2; there the pulley's radial unit vector has the parts `lean` along the path, `lean_rate` less per
+    displacement [1/m], and `upright` across it, and `rise` is the path's distance from the axis beyond the
+    pitch radius (`zones`); `driving_stations` and `driven_stations` (m,) are those that each groove may hold;
     `bending` is (N, 5): force per length on station j from the displacements of stations j-2 .. j+2,
     `bending_load` that without displacement; `squared_curvature` is kappa^2 at the stations where curvature
     terms count, else 0, and `curvature_terms` the place among those in CURVATURE_TERMS;
@@ -53,7 +66,14 @@ class Belt(NamedTuple):
     per_span: np.ndarray
     curvature: np.ndarray
     arc_curvature: np.ndarray
-    arc_share: np.ndarray
+    touches: np.ndarray
+    on_driven: np.ndarray
+    rise: np.ndarray
+    lean: np.ndarray
+    lean_rate: np.ndarray
+    upright: np.ndarray
+    driving_stations: np.ndarray
+    driven_stations: np.ndarray
     bending: np.ndarray
     bending_load: np.ndarray
     squared_curvature: np.ndarray
@@ -83,7 +103,6 @@ class Belt(NamedTuple):
     half_wedge_angle: float
     driving: Sheaves
     driven: Sheaves
-    driven_start: int
     driving_radius: float
     driven_radius: float
     driving_speed: float
@@ -138,9 +157,57 @@ class Mesh(NamedTuple):
         """Region of each cell, 0..3 in the order of REGIONS, (N,)."""
         return np.repeat(np.arange(4), self.counts)
 
+    @property
+    def curvature(self) -> np.ndarray:
+        """Curvature of the path in the cells [1/m], (N,)."""
+        return np.array([1.0 / self.path.driving_radius, 0.0, 1.0 / self.path.driven_radius, 0.0])[
+            self.region
+        ]
+
+    def along(self, region: int) -> np.ndarray:
+        """Way of a region's stations, its end included, from its start [m], (count + 1,)."""
+        first = self.starts[region]
+        return np.insert(np.cumsum(self.cell[first : first + self.counts[region]]), 0, 0.0)
+
+    def zone(self, region: int, reach: float = REACH) -> Zone:
+        """Stations that the groove of an arc may hold: the arc's, and those of `reach` of both strands.
+
+        On a strand, x beyond the tangent point, the pulley's axis is at the distance rho = hypot(x, R + w),
+        and its radial unit vector has the angle atan(x / (R + w)) to the path's normal. To the first order in
+        w / R that is rho = rho_0 + w R / rho_0, and x / rho_0 (1 - w R / rho_0^2) along the path.
+        """
+        n, first, count = self.cell.size, self.starts[region], self.counts[region]
+        radius = self.path.driving_radius if region == 0 else self.path.driven_radius
+        way = self.along((region + 1) % 4)  # both strands are cut alike
+        more = [int(np.count_nonzero(way[1:] <= max(reach * way[-1], way[1])))] * 2
+        stations = np.arange(first - more[0], first + count + more[1] + 1) % n
+        along = np.insert(np.cumsum(self.cell[stations[:-1]]), 0, 0.0)
+        along -= along[more[0]]  # [m] from the inlet
+        on_arc = np.clip(along, 0.0, along[more[0] + count])
+        x = along - on_arc
+        return Zone(stations, on_arc / radius + np.arctan2(x, radius), x, np.hypot(x, radius) - radius)
+
+
+class Zone(NamedTuple):
+    """Stations that one groove may hold, m of them, and their place about its axis.
+
+    Attributes
+    ----------
+    stations : (m,) int array
+        In the direction of travel.
+    angle, beyond, rise : (m,) arrays
+        Angle from the inlet's tangent point [rad], way beyond the tangent points (negative before the inlet,
+        0 on the arc) and distance from the axis beyond the pitch radius [m].
+    """
+
+    stations: np.ndarray
+    angle: np.ndarray
+    beyond: np.ndarray
+    rise: np.ndarray
+
 
 def mesh(parameters: Mapping[str, Any]) -> Mesh:
-    """Cut the path into `stations` cells, equal within a region and nearly equal over all.
+    """Cut the path into `stations` cells, shorter by `end_refinement` at the ends of the arcs (`cut_path`).
 
     Parameters
     ----------
@@ -150,14 +217,12 @@ def mesh(parameters: Mapping[str, Any]) -> Mesh:
     Returns
     -------
     Mesh
-        With faces on the ends of the arcs, so that no cell is half in contact.
+        With faces on the ends of the arcs.
     """
     path = variator(parameters["ratio"], parameters["driven_radius"], parameters["centre_distance"])
-    total = parameters["stations"]
-    lengths = np.array(path.lengths)
-    counts = np.array(cell_counts(path, total))
-    starts = np.concatenate([[0], np.cumsum(counts)[:-1]])
-    return Mesh(tuple(map(int, counts)), tuple(map(int, starts)), np.repeat(lengths / counts, counts), path)
+    cells = cut_path(path, parameters["stations"], parameters["end_refinement"])
+    counts = [part.size for part in cells]
+    return Mesh(tuple(counts), (0, *accumulate(counts[:-1])), np.concatenate(cells), path)
 
 
 def belt_constants(parameters: Mapping[str, Any]) -> Belt:
@@ -176,8 +241,19 @@ def belt_constants(parameters: Mapping[str, Any]) -> Belt:
     p, grid = BENDING_DEFAULTS | dict(parameters), mesh(parameters)
     path, cell = grid.path, grid.cell
     dual = 0.5 * (cell + np.roll(cell, 1))
-    kappa = np.array([1.0 / path.driving_radius, 0.0, 1.0 / path.driven_radius, 0.0])[grid.region]
-    arc_share = 0.5 * (cell * (kappa > 0) + np.roll(cell * (kappa > 0), 1)) / dual
+    kappa, radii = grid.curvature, (path.driving_radius, path.driven_radius)
+    zones = grid.zone(0), grid.zone(2)
+    middles = [grid.starts[strand] + grid.counts[strand] // 2 for strand in (1, 3)]
+    stations = np.arange(cell.size)
+    beyond = {name: np.zeros(cell.size) for name in ("touches", "rise", "lean", "lean_rate")}
+    beyond["upright"] = np.ones(cell.size)
+    for zone, radius in zip(zones, radii, strict=True):
+        rho = radius + zone.rise
+        beyond["touches"][zone.stations] = 1.0
+        beyond["rise"][zone.stations] = zone.rise
+        beyond["lean"][zone.stations] = zone.beyond / rho
+        beyond["lean_rate"][zone.stations] = zone.beyond * radius / rho**3
+        beyond["upright"][zone.stations] = radius / rho
     along_rings = cell * (1.0 + kappa * p["ring_offset"])
     ring_mass = p["ring_mass"] * 0.5 * (along_rings + np.roll(along_rings, 1)) / dual
     belt_speed = p["driving_speed"] * path.driving_radius
@@ -185,8 +261,9 @@ def belt_constants(parameters: Mapping[str, Any]) -> Belt:
     size = measures(p)
     wraps = [
         sheaves(
-            cell[grid.starts[region]],
-            grid.counts[region] + 1,
+            dual[zone.stations],
+            zone.angle,
+            zone.rise,
             radius,
             whole,
             p["tilt_stiffness"] * p["tilt_factor"],
@@ -195,18 +272,15 @@ def belt_constants(parameters: Mapping[str, Any]) -> Belt:
             axial_element_stiffness(p),
             disc,
         )
-        for region, radius in ((0, path.driving_radius), (2, path.driven_radius))
+        for zone, radius in zip(zones, radii, strict=True)
     ]
     line_forces = rounded(size.force / size.length)
+    turned = path.driving_wrap, path.driven_wrap
     wraps = [
-        wrap._replace(
-            line_forces=line_forces, **disc_settings(p, pulley, (wrap.weight.size, wrap.weight[1], radius))
-        )
-        for pulley, wrap, radius in zip(
-            ("driving", "driven"), wraps, (path.driving_radius, path.driven_radius), strict=True
-        )
+        wrap._replace(line_forces=line_forces, **disc_settings(p, pulley, wrap, radius, angle))
+        for pulley, wrap, radius, angle in zip(PULLEYS, wraps, radii, turned, strict=True)
     ]
-    wraps, freedom = with_pulleys(p, wraps, (path.driving_radius, path.driven_radius))
+    wraps, freedom = with_pulleys(p, wraps, radii)
     law = given_law(p)
     quantity, terms = ramped(p), CURVATURE_TERMS.index(p["curvature_terms"])
     computed = dict(
@@ -217,7 +291,10 @@ def belt_constants(parameters: Mapping[str, Any]) -> Belt:
         per_span=0.5 / dual,
         curvature=kappa,
         arc_curvature=np.maximum(kappa, np.roll(kappa, 1)),
-        arc_share=arc_share,
+        **beyond,
+        on_driven=((stations >= middles[0]) & (stations < middles[1])).astype(float),
+        driving_stations=zones[0].stations,
+        driven_stations=zones[1].stations,
         bending=bending_bands(cell, dual, p["bending_stiffness"], kappa, terms),
         bending_load=bending_load(cell, dual, p["bending_stiffness"], kappa, terms),
         squared_curvature=squared_curvature(cell, dual, kappa) * (terms > 0),
@@ -236,7 +313,6 @@ def belt_constants(parameters: Mapping[str, Any]) -> Belt:
         driving=wraps[0],
         driven=wraps[1],
         pulleys=freedom,
-        driven_start=grid.starts[2],
         driving_radius=path.driving_radius,
         driven_radius=path.driven_radius,
         axial_damping=p["sheave_lag"] * p["lag_stiffness"],
@@ -268,28 +344,30 @@ def initial_state(parameters: Mapping[str, Any], belt: Belt) -> State:
     tangent = np.tan(p["half_wedge_angle"])
     pull = 2.0 * tangent * p["thrust"] / grid.path.driven_wrap
     w = np.zeros(grid.cell.size)
+    bent = grid.cell * belt.curvature
+    bent = 0.5 * (bent + np.roll(bent, 1))  # angle that each station stands for [rad]
     arcs = []
     states = np.zeros(f.STATES)
     for region, sheave, radius, tilted in (
         (0, belt.driving, belt.driving_radius, f.DRIVING_COS),
         (2, belt.driven, belt.driven_radius, f.DRIVEN_COS),
     ):
-        stations = slice(grid.starts[region], grid.starts[region] + sheave.weight.size)
-        force = np.full(sheave.weight.size, pull / (2.0 * tangent * radius))
+        on_arc = sheave.rise == 0.0
+        stations = slice(grid.starts[region], grid.starts[region] + grid.counts[region] + 1)
+        force = np.where(on_arc, pull / (2.0 * tangent * radius), 0.0)
         tilting = sheave.tilt @ (sheave.weight * force)
         tilt = settled_tilt(belt.pulleys, tilted, tilting)
         states[tilted : tilted + 2] = tilt
         tilt = tilt + sheave.clearance * tilting / np.linalg.norm(tilting)
-        w[stations] = -(flexibility(sheave) @ force + tilt @ sheave.tilt) / (2.0 * tangent)
-        arcs.append((stations, sheave.weight, radius))
-    w[arcs[0][0]] -= p["driving_position"] / (2.0 * tangent)
+        w[stations] = -(flexibility(sheave) @ force + tilt @ sheave.tilt)[on_arc] / (2.0 * tangent)
+        arcs.append(stations)
+    w[arcs[0]] -= p["driving_position"] / (2.0 * tangent)
     # the belt keeps its length: it moves inward at the driving and outward at the driven pulley
-    sunk = sum((weight * w[stations]).sum() / radius for stations, weight, radius in arcs)
-    lift = -sunk / grid.path.driven_wrap
-    w[arcs[1][0]] += lift
+    lift = -(bent @ w) / grid.path.driven_wrap
+    w[arcs[1]] += lift
     _fill_strands(w, grid)
 
-    mean = [(weight * w[stations]).sum() / weight.sum() for stations, weight, _ in arcs]
+    mean = [bent[stations] @ w[stations] / bent[stations].sum() for stations in arcs]
     speed = belt.speed_start * (belt.driving_radius + mean[0])
     fields = np.zeros((len(f.FIELDS), grid.cell.size))
     fields[f.W] = w
@@ -308,8 +386,8 @@ def _fill_strands(w: np.ndarray, grid: Mesh) -> None:
     """Straight lines between the arcs' ends."""
     for region in (1, 3):
         first, count = grid.starts[region], grid.counts[region]
-        ends = w[first], w[(first + count) % w.size]
-        w[first : first + count] = np.linspace(*ends, count, endpoint=False)
+        share = grid.along(region) / grid.path.lengths[region]
+        w[first : first + count] = ((1.0 - share) * w[first] + share * w[(first + count) % w.size])[:-1]
 
 
 def random_strands(grid: Mesh, size: float, seed: int) -> np.ndarray:
@@ -332,7 +410,7 @@ def random_strands(grid: Mesh, size: float, seed: int) -> np.ndarray:
     random = np.random.default_rng(seed)
     shape = np.zeros(grid.cell.size)
     for region in (1, 3):
-        x = np.arange(grid.counts[region]) / grid.counts[region]
+        x = grid.along(region)[:-1] / grid.path.lengths[region]
         stations = slice(grid.starts[region], grid.starts[region] + grid.counts[region])
         shape[stations] = sum(random.normal() * np.sin(k * np.pi * x) for k in range(1, 7))
     return size * shape / np.abs(shape).max()

@@ -17,8 +17,6 @@ The length of the belt over ds is (1 + kappa w) ds + w'^2/2 ds without a term ka
 adds no F kappa^2 w: what F kappa gives way by is taken up by the longer arc.
 """
 
-from __future__ import annotations
-
 import numpy as np
 
 from cvt_hpc.models.elastic_belt.bending_settings import CURVATURE_TERMS

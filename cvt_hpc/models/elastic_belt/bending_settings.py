@@ -1,7 +1,5 @@
 """Parameters of the belt's bending: curvature terms, and the moment of the pressed elements."""
 
-from __future__ import annotations
-
 from collections.abc import Mapping
 from typing import Any
 
@@ -47,15 +45,6 @@ BENDING_DEFAULTS = {key: parameter.default for key, parameter in BENDING.items()
 def has_column(parameters: Mapping[str, Any]) -> bool:
     """Whether pressed elements bear a bending moment."""
     return bool(parameters.get("column_bending", "off") == "rocking")
-
-
-def whole_bending_stiffness(parameters: Mapping[str, Any]) -> float:
-    """Largest bending stiffness that the belt may have [N m^2], pressed elements included.
-
-    Of the parameters it reads those alone that have an effect.
-    """
-    column = parameters["column_stiffness"] if has_column(parameters) else 0.0
-    return float(parameters["bending_stiffness"] + column)
 
 
 def bending_problems(parameters: Mapping[str, Any]) -> list[tuple[str, str, str]]:

@@ -25,8 +25,6 @@ On the path itself elements touch without force at eps_0 = 0, whatever k-: eps =
 halves of a cell have the cell's strain, each the curvature of its own station.
 """
 
-from __future__ import annotations
-
 import numpy as np
 
 from cvt_hpc.kernels import kernel, merged_kernel

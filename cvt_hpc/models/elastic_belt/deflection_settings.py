@@ -1,7 +1,5 @@
 """Parameters of the deflection of the sheaves' discs, and the flexibilities that result."""
 
-from __future__ import annotations
-
 from collections.abc import Mapping
 from functools import partial
 from typing import Any
@@ -12,6 +10,7 @@ from cvt_hpc.parameters import Column, FromFile, Parameter, RowError, not_negati
 from cvt_hpc.physics.deflection import cone_flexibilities, interpolated, table_problem
 from cvt_hpc.physics.geometry import variator
 from cvt_hpc.physics.ritz import modal_flexibilities, moving_modes
+from cvt_hpc.physics.sheaves import Sheaves
 from cvt_hpc.recording import steps_per_sample
 from cvt_hpc.variator import PULLEYS
 
@@ -126,7 +125,7 @@ def kept_modes(parameters: Mapping[str, Any], pulley: str) -> tuple[np.ndarray, 
 
 
 def disc_settings(
-    parameters: Mapping[str, Any], pulley: str, wrap: tuple[int, float, float]
+    parameters: Mapping[str, Any], pulley: str, wrap: Sheaves, radius: float, turned: float
 ) -> dict[str, Any]:
     """Data of the discs of one pulley for `Sheaves`, at the reference stiffness, beside local bending.
 
@@ -136,8 +135,10 @@ def disc_settings(
         Flat values of the run [SI].
     pulley : str
         driving or driven.
-    wrap : (int, float, float)
-        Stations m of the wrap, their distance along the arc, and the pitch radius [m].
+    wrap : Sheaves
+        The wrap with m stations.
+    radius, turned : float
+        Pitch radius [m] and angle of the arc [rad].
 
     Returns
     -------
@@ -146,15 +147,18 @@ def disc_settings(
     """
     p = DEFLECTION_DEFAULTS | dict(parameters)
     if p["sheave_deformation"] == "cone":
-        return {"flexibilities": cone_flexibilities(*wrap, p["cone_stiffness"], p["cone_shift"])}
+        from_middle, distance = wrap.angle - 0.5 * turned, radius + wrap.rise
+        shifted = p["cone_stiffness"], p["cone_shift"]
+        return {"flexibilities": cone_flexibilities(from_middle, distance, *shifted)}
     if p["sheave_deformation"] == "flexibilities":
         angles, table = p[f"{pulley}_flexibility_angle"], p[f"{pulley}_flexibility"]
-        return {"flexibilities": interpolated(angles, table, *wrap)}
+        return {"flexibilities": interpolated(angles, table, wrap.angle, turned)}
     if p["sheave_deformation"] == "ritz":
         kept, interval = kept_modes(p, pulley), 1.0 / p["sampling_rate"]
         step = interval / steps_per_sample(interval, p["step"])
-        modes = moving_modes(kept, p["ritz_limit"], p["disc_damping"], step, wrap)
-        return {"flexibilities": modal_flexibilities(kept[0], kept[1], *wrap), "modes": modes}
+        place = wrap.angle, wrap.weight / radius
+        modes = moving_modes(kept, p["ritz_limit"], p["disc_damping"], step, place)
+        return {"flexibilities": modal_flexibilities(kept[0], kept[1], *place), "modes": modes}
     return {}
 
 

@@ -5,9 +5,7 @@ Velocities by the forces of the present state, then positions by the new velocit
 deviations, each cell's stresses computed once.
 """
 
-from __future__ import annotations
-
-from cvt_hpc.kernels import kernel, merged_kernel
+from cvt_hpc.kernels import kernel
 from cvt_hpc.lanes import (
     LaneArray,
     ahead,
@@ -28,7 +26,7 @@ from cvt_hpc.models.elastic_belt import lane_forces as forces
 from cvt_hpc.models.elastic_belt.lane_belt import LaneBelt, LaneState, Work
 from cvt_hpc.models.elastic_belt.lane_column import across_by_curvature, column_across
 from cvt_hpc.models.elastic_belt.pulley_step import advance_pulleys
-from cvt_hpc.physics.flank import flank_shares
+from cvt_hpc.physics.flank import flank_shares, flank_sliding
 
 # Fields of Work.stations, after those of `lane_forces`: slope w_s; a step's increments of u, v_element and
 # v_ring; forces of the layers' dampers in the cells
@@ -96,21 +94,20 @@ def _accelerate(belt: LaneBelt, state: LaneState, stations: LaneArray, step: flo
         stress_0, stress_1 = push + damped_0, ring_right + damped_1
         if k >= 0:
             stations[j, DAMPED_0], stations[j, DAMPED_1] = damped_0, damped_1
-            span, per_dual, share = belt.per_span[j], belt.per_dual[j], belt.arc_share[j]
+            span, per_dual, touches = belt.per_span[j], belt.per_dual[j], belt.touches[j]
             u, full_speed = fields[j, f.U], belt_speed + v0
             slope = (ahead(fields, j, f.W) - behind(fields, j, f.W)) * span
-            across = forces.lane_transverse(belt, fields, j, net_left, net_right, bending)
+            across = forces.lane_transverse(belt, fields, j, net_left, net_right, bending, 0.0)
             across = fma(-gyroscopic, (ahead(fields, j, f.U) - behind(fields, j, f.U)) * span, across)
             across = fma(-acceleration * mass, slope, across)
             if belt.has_column:
                 across += column_across(belt, state, j)
             if belt.is_curved:
                 across += across_by_curvature(belt, state, j, bending, belt_speed, masses)
-            v_radial = fma(full_speed, slope, u)
-            outward = -damping * v_radial
+            outward = -damping * fma(full_speed, slope, u)
             along_element = (stress_0 - stress_left_0) * per_dual
             along_ring = (stress_1 - stress_left_1) * per_dual
-            if anywhere(share > 0.0):
+            if anywhere(touches > 0.0):
                 longer = fma(offset, belt.ring_curvature[j], 1.0)
                 lever = fma(offset, belt.arc_curvature[j], 1.0)
                 grip = forces.ring_grip(belt, j, ring_left, ring_right, ring_relief * longer, ring_friction)
@@ -120,17 +117,19 @@ def _accelerate(belt: LaneBelt, state: LaneState, stations: LaneArray, step: flo
                 climb = stations[j, lf.SLIDING_R] * per_cosine * per_speed
                 axial_share, radial_share = flank_shares(mu, climb, sine, cosine)
                 per_normal, per_ring = reciprocals(axial_share, longer * ring_mass)
-                twice_normal = (2.0 * share) * stations[j, lf.FORCE] * per_normal
-                outward = fma(twice_normal, radial_share, outward)
+                force = select(touches > 0.0, stations[j, lf.FORCE], zero)
+                twice_normal = 2.0 * force * per_normal
+                radial = twice_normal * radial_share
                 tangential = -twice_normal * (mu * (stations[j, lf.SLIDING_T] * per_speed))
                 is_driven = belt.on_driven[j] > 0.5
-                if anywhere(is_driven):
-                    lever_arm = select(is_driven, (radius + fields[j, f.W]) * belt.dual[j], zero)
-                    moment = fma(-tangential, lever_arm, moment)
-                if belt.is_free:
-                    lever_arm = select(is_driven, zero, (driving_radius + fields[j, f.W]) * belt.dual[j])
-                    taken = fma(tangential, lever_arm, taken)
-                along_element += fma(-lever, drag, tangential)
+                upright, lean = belt.upright[j], forces.leaning(belt, j, fields[j, f.W])
+                outward = fma(upright, radial, fma(-lean, tangential, outward))
+                distance = select(is_driven, radius, driving_radius)
+                distance += fma(upright, fields[j, f.W], belt.rise[j])
+                turning_moment = tangential * (distance * belt.dual[j])
+                moment -= select(is_driven, turning_moment, zero)
+                taken += select(is_driven, zero, turning_moment)
+                along_element += fma(-lever, drag, fma(lean, radial, upright * tangential))
                 along_ring = (along_ring + drag) * (per_ring * step)
             else:
                 along_ring *= ring_mobility
@@ -187,36 +186,18 @@ def _advance_across(belt: LaneBelt, state: LaneState, stations: LaneArray, step:
     n, fields, c = state.fields.rows, state.fields, belt.constants
     speed_share = forces.lane_speed_share(belt, state.time[0], c[0, lf.BELT_SPEED])
     per_cosine, belt_speed = 1.0 / c[0, lf.COSINE], speed_share * c[0, lf.BELT_SPEED]
-    forget, pulleys = step * c[0, lf.FORGET], forces.lane_pulleys(belt, speed_share, state.scalars)
-    carries = (
-        step * forces.lane_carry(belt, lf.DRIVING_CELL, lf.DRIVING_CARRY, belt_speed),
-        step * forces.lane_carry(belt, lf.DRIVEN_CELL, lf.DRIVEN_CARRY, belt_speed),
-    )
-    # an arc's second station takes the new value of its first, which may be the last of the part behind
-    last = n - 1
-    u = fields[last, f.U] + stations[last, DU]
-    speed = _sliding_speed(belt, fields, stations, last, pulleys, per_cosine, belt_speed, u)
-    before = from_behind(select(belt.enters[last] > 0.5, speed, fields[last, f.V_FILTERED]))
+    pulleys = forces.lane_pulleys(belt, speed_share, state.scalars)
+    before = behind(fields, 0, f.V_FILTERED)
     for j in range(n):
         u, w = fields[j, f.U] + stations[j, DU], fields[j, f.W]
-        share = belt.arc_share[j]
-        if belt.memory and anywhere(share > 0.0):
-            remembered = fields[j, f.V_FILTERED]
-            speed = _sliding_speed(belt, fields, stations, j, pulleys, per_cosine, belt_speed, u)
-            carry = select(belt.on_driven[j] > 0.5, carries[1], carries[0])
-            change = fma(carry, before - remembered, forget * (speed - remembered))
-            filtered = select(belt.enters[j] > 0.5, speed, remembered + change)
-            fields[j, f.V_FILTERED] = select(share > 0.0, filtered, 0.0)
-            before = select(belt.enters[j] > 0.5, speed, remembered)
+        touches, old = belt.touches[j], fields[j, f.V_FILTERED]
+        if belt.memory and anywhere(touches > 0.0):
+            v_element = fields[j, f.V_ELEMENT]
+            v_across = fma(belt_speed + v_element, stations[j, SLOPE], u)
+            v_radial, along = forces.groove_sliding(belt, j, pulleys, belt_speed, v_across, v_element, w)
+            speed, _ = flank_sliding(v_radial, along, per_cosine)
+            filtered = forces.remembered(belt, j, stations[j, lf.WAY], belt_speed, step, speed, old, before)
+            filtered = select(stations[j, lf.FORCE] > 0.0, filtered, speed)
+            fields[j, f.V_FILTERED] = select(touches > 0.0, filtered, 0.0)
+        before = old
         fields[j, f.U], fields[j, f.W] = u, fma(step, u, w)
-
-
-@merged_kernel
-def _sliding_speed(
-    belt: LaneBelt, fields: LaneArray, stations: LaneArray, j: int, pulleys, per_cosine, belt_speed, u
-):
-    """Sliding speed of station j of an arc at the new velocities [m/s], `u` the transverse one."""
-    v_element = fields[j, f.V_ELEMENT]
-    v_radial = fma(belt_speed + v_element, stations[j, SLOPE], u)
-    speed, along = forces.arc_sliding(belt, j, pulleys, per_cosine, v_radial, v_element, fields[j, f.W])
-    return speed

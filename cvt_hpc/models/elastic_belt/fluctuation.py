@@ -8,14 +8,16 @@ mean 0. Summed over the belt,
 
     flanks + stresses = belt + rings + layers + lag + carried + remainder,
 
-    flanks     sum of <p' v_r'> + <f_t' v_t'>, fed where positive; p, f_t their radial and tangential friction
+    flanks     sum of <p' v_r'> + <f_t' v_t'>, fed where positive; p, f_t their radial and tangential
+               friction, v_r, v_t the sliding in the groove
     stresses   sum of <P' v_0,s'> - <T' v_1,s'> - <F' kappa u'> - <(F w_s)' u_s'>
-    belt       sum of d_b <v_r'^2>
+    belt       sum of d_b <v_a'^2>, v_a = w_t + v_0 w_s the speed across the belt
     rings      sum of <q' v_q'>, v_q the speed of the saddles against the rings
     layers     work of the layers' dampers, less that of their mean forces in the mean motion
     lag        T_1 k <z_dn'^2>, which is what the contact's elastic forces take from the belt
-    carried    sum of <h' v_r'> + <f_t' v_t'> - <h' u'> - <g' v_0'>, with h = p - d_b v_r and
-               g = f_t + (h + e) w_s, e the contact's elastic radial force
+    carried    flanks less belt, less the sum of <h' u'> + <g' v_0'>, with h and g the forces of friction and
+               damping across and along the belt: on an arc h = p - d_b v_a and g = f_t + (h + e) w_s, e the
+               contact's elastic radial force
 
 Stresses within a belt whose elements touch throughout hand power on, and sum up to 0. Where gaps open and
 close they feed: the mean push works in the mean opening, and elements that the mean motion has drawn apart
@@ -28,8 +30,6 @@ The remainder is the effect of the numerics (upwinding, backward Euler, work of 
 meet), the energy gained while the vibration grows, and bending. Fluctuations of all frequencies count, judder
 and hum of gaps too, and a trend of the mean state would: along a ramp of load or speed nothing is known.
 """
-
-from __future__ import annotations
 
 from collections.abc import Mapping
 from typing import Any, NamedTuple
@@ -117,10 +117,10 @@ def fluctuation(means: dict[str, np.ndarray], grid: Mesh, parameters: Mapping[st
     """
     m, p = means, parameters
     dual = at_stations(grid.cell)
-    damping, radial, v_radial = p["transverse_damping"], m["radial_friction"], m["radial_speed"]
-    flanks = m["flank_power"] - radial * v_radial - m["tangential_friction"] * m["sliding_speed"]
-    belt = -damping * (m["radial_speed_squared"] - v_radial**2)
-    own = m["transverse_power"] - (radial - damping * v_radial) * m["transverse_speed"]
+    flanks = m["flank_power"] - m["radial_friction"] * m["radial_speed"]
+    flanks = flanks - m["tangential_friction"] * m["sliding_speed"]
+    belt = -p["transverse_damping"] * (m["across_speed_squared"] - m["across_speed"] ** 2)
+    own = m["transverse_power"] - m["transverse_force"] * m["transverse_speed"]
     own = own + m["element_power"] - m["element_force"] * m["element_speed"]
     opening, stretching = _step(m["element_speed"]), _step(m["ring_speed"])
     mean_stresses = m["push_force"] * opening - m["ring_tension"] * stretching - _lifting(m, grid, p)
@@ -143,12 +143,11 @@ def steadiness(parameters: Mapping[str, Any]) -> float:
 
 def _lifting(m: dict[str, np.ndarray], grid: Mesh, p: Mapping[str, Any]) -> np.ndarray:
     """Power of the cells' mean stresses in the mean transverse motion [W], (N,)."""
-    path, speed = grid.path, p["driving_speed"] * grid.path.driving_radius
-    curvature = np.array([1.0 / path.driving_radius, 0.0, 1.0 / path.driven_radius, 0.0])[grid.region]
+    speed = p["driving_speed"] * grid.path.driving_radius
     net = m["ring_tension"] - m["push_force"] - (p["element_mass"] + p["ring_mass"]) * speed**2
     u = m["transverse_speed"]
     turning = _step(m["mean_displacement"]) * _step(u) / grid.cell
-    return net * (grid.cell * curvature * (u + 0.5 * _step(u)) + turning)
+    return net * (grid.cell * grid.curvature * (u + 0.5 * _step(u)) + turning)
 
 
 def at_stations(values: np.ndarray) -> np.ndarray:
@@ -164,8 +163,8 @@ def _step(values: np.ndarray) -> np.ndarray:
 def part_shares(grid: Mesh) -> np.ndarray:
     """Share of each station's contact that lies in each part of the arcs, (2, ARC_PARTS, N).
 
-    On an arc they add up to 1: a station's contact reaches over half of both cells beside it, as far as the
-    arc goes.
+    They add up to 1 where a groove may hold a station: its contact reaches over half of both cells beside it,
+    and beyond an arc's end it counts to the part there.
 
     Parameters
     ----------
@@ -176,7 +175,11 @@ def part_shares(grid: Mesh) -> np.ndarray:
     borders = np.linspace(0.0, 1.0, ARC_PARTS + 1)
     for pulley, region in enumerate((0, 2)):
         first, count = grid.starts[region], grid.counts[region]
-        edges = np.clip((np.arange(count + 2) - 0.5) / count, 0.0, 1.0)
+        along = grid.along(region) / grid.path.lengths[region]
+        edges = np.concatenate([[0.0], 0.5 * (along[1:] + along[:-1]), [1.0]])
         inside = np.diff(np.clip(edges, borders[:-1, None], borders[1:, None]), axis=1)
+        beyond = grid.zone(region).beyond
+        shares[pulley, 0, grid.zone(region).stations[beyond < 0.0]] = 1.0
+        shares[pulley, -1, grid.zone(region).stations[beyond > 0.0]] = 1.0
         shares[pulley, :, first : first + count + 1] = inside / np.diff(edges)
     return shares

@@ -1,7 +1,5 @@
 """A transient run of the elastic belt by any general stepper: the belt as one system, sampled as ever."""
 
-from __future__ import annotations
-
 from collections.abc import Mapping, Sequence
 from typing import Any
 

@@ -1,7 +1,5 @@
 """Runs of the elastic belt that can advance together, and the cost of a batch of them."""
 
-from __future__ import annotations
-
 from collections.abc import Mapping
 from typing import Any
 

@@ -1,33 +1,33 @@
-"""The fast step of the elastic belt: explicit in the strands, implicit in friction and longitudinal waves.
+"""The fast step of the elastic belt: explicit in the strands, implicit in friction, bending and layer waves.
 
-Staggered in time: w, n_i, v_f at t_k; u, v_i, omega at t_k-1/2. Transverse forces are explicit (leapfrog, no
-numerical damping of the strands). Flank and ring friction enter with their slopes, the stresses T and P by
-backward Euler, so neither the regularisation of friction nor the longitudinal waves (5-6 km/s) limit the
-step. Eliminating u and the content leaves one cyclic block-tridiagonal system, 2x2 blocks (v_element,
-v_ring), symmetric positive definite; the content then follows from the fluxes, so that each layer's total is
-kept to round-off.
+Staggered in time: w, n_i, v_f at t_k; u, v_i, omega at t_k-1/2. Tension and contact act explicitly across the
+belt (leapfrog, no numerical damping of the strands), bending implicitly (`imex_bending`). Flank and ring
+friction enter with their slopes, the stresses T and P by backward Euler, so neither the regularisation of
+friction nor the longitudinal waves (5-6 km/s) limit the step. Eliminating u and the content leaves one cyclic
+block-tridiagonal system, 2x2 blocks (v_element, v_ring), symmetric positive definite; the content then
+follows from the fluxes, so that each layer's total is kept to round-off.
 
-The rings' stress is centred in time and damps nothing; the elements' is taken at the end of the step, since
-a centred one rings where they meet and part: it damps them like EA dt [N s], in first order. The set of
+The rings' stress is centred in time and damps nothing; the elements' is taken at the end of the step, since a
+centred one rings where they meet and part: it damps them like EA dt [N s], in first order. The set of
 separated elements is frozen during a step: those that are apart and, with the old speeds, stay apart.
-Elements meet where their gap closes and part where their push, damper included, has ended: were it where
-they reach their length at rest, the cell in which gaps run into pressed elements would be neither, and rattle
-from step to step with pushes in proportion to the step (`EDGES.md`). The step is limited by accuracy,
-c dt / h about 5, and the transverse contact and bending.
+Elements meet where their gap closes and part where their push, damper included, has ended: were it where they
+reach their length at rest, the cell in which gaps run into pressed elements would be neither, and rattle from
+step to step with pushes in proportion to the step (`EDGES.md`). The step is limited by accuracy, and by
+tension and contact across the belt.
 """
 
-from __future__ import annotations
-
 from cvt_hpc.kernels import kernel
-from cvt_hpc.lanes import anywhere, around, behind, decay, fma, from_ahead, like, minimum, select
+from cvt_hpc.lanes import anywhere, around, behind, fma, from_ahead, like, minimum, select
 from cvt_hpc.models.elastic_belt import fields as f
 from cvt_hpc.models.elastic_belt import lane_fields as lf
 from cvt_hpc.models.elastic_belt import lane_forces as forces
+from cvt_hpc.models.elastic_belt.imex_bending import move_across, move_with_layers
 from cvt_hpc.models.elastic_belt.imex_stations import assemble
 from cvt_hpc.models.elastic_belt.imex_system import TURNS_BACK, eliminate, substitute
 from cvt_hpc.models.elastic_belt.lane_belt import LaneBelt, LaneState, Work
 from cvt_hpc.models.elastic_belt.lane_column import foresee_column, lane_column
 from cvt_hpc.models.elastic_belt.pulley_step import advance_pulleys
+from cvt_hpc.physics.flank import flank_sliding
 
 # One, unless friction turns sliding about or elements meet; then each closes the cells beside the last ones,
 # and a push goes through c dt / h of them in a step.
@@ -48,6 +48,7 @@ def step_imex(belt: LaneBelt, state: LaneState, work: Work, step: float) -> None
     stations = work.stations
     forces.lane_sliding(belt, state, stations)
     assemble(belt, state, work, step, False)
+    move_across(belt, state, work, step)
     if belt.has_column:
         foresee_column(belt, state, stations, lf.PUSH, step)
     for attempt in range(MOST_PASSES):
@@ -60,8 +61,10 @@ def step_imex(belt: LaneBelt, state: LaneState, work: Work, step: float) -> None
             break
         if found & TURNS_BACK:
             assemble(belt, state, work, step, True)
+            move_across(belt, state, work, step)
             if belt.has_column:
                 foresee_column(belt, state, stations, lf.PUSH, step)
+    move_with_layers(belt, state, work, step)
     taken, moment = advance_belt(belt, state, work, step)
     advance_pulleys(belt, state, taken, moment, step)
     state.time[0] += step
@@ -88,27 +91,26 @@ def advance_belt(belt: LaneBelt, state: LaneState, work: Work, step: float):
     n, fields, stations, c = state.fields.rows, state.fields, work.stations, belt.constants
     per_cosine = 1.0 / c[0, lf.COSINE]
     speed_share = forces.lane_speed_share(belt, state.time[0], c[0, lf.BELT_SPEED])
-    belt_speed, forget, offset = speed_share * c[0, lf.BELT_SPEED], c[0, lf.FORGET], c[0, lf.RING_OFFSET]
-    stiffness, damper_0 = c[0, lf.ELEMENT_STIFFNESS], c[0, lf.ELEMENT_DAMPING]
-    damper_1 = c[0, lf.RING_DAMPING]
-    driven_speed, radius = state.scalars[0, lf.SPEED], c[0, lf.DRIVEN_RADIUS]
-    driving_radius = c[0, lf.DRIVING_RADIUS]
-    pulleys = forces.lane_pulleys(belt, speed_share, state.scalars)
-    zero, moment, taken = like(0.0, forget), like(0.0, driven_speed), like(0.0, driven_speed)
-    carries = (
-        forces.lane_carry(belt, lf.DRIVING_CELL, lf.DRIVING_CARRY, belt_speed),
-        forces.lane_carry(belt, lf.DRIVEN_CELL, lf.DRIVEN_CARRY, belt_speed),
+    belt_speed, offset = speed_share * c[0, lf.BELT_SPEED], c[0, lf.RING_OFFSET]
+    stiffness, damper_0, damper_1 = (
+        c[0, lf.ELEMENT_STIFFNESS],
+        c[0, lf.ELEMENT_DAMPING],
+        c[0, lf.RING_DAMPING],
     )
-    rates = carries[0] + forget, carries[1] + forget
-    per_rates = 1.0 / rates[0], 1.0 / rates[1]
-    kept = decay(rates[0] * step), decay(rates[1] * step)
+    driven_speed, radius, driving_radius = (
+        state.scalars[0, lf.SPEED],
+        c[0, lf.DRIVEN_RADIUS],
+        c[0, lf.DRIVING_RADIUS],
+    )
+    pulleys = forces.lane_pulleys(belt, speed_share, state.scalars)
+    zero, moment, taken = like(0.0, offset), like(0.0, driven_speed), like(0.0, driven_speed)
     last_filtered = behind(fields, 0, f.V_FILTERED)
     # at the station ahead of a cell: speeds, increments, fluxes of content less the belt speed, displacement
     v0_b, dv0_b = fields[0, f.V_ELEMENT], stations[0, lf.DV_0]
     v1_b, dv1_b = fields[0, f.V_RING], stations[0, lf.DV_1]
     first_0 = fma(-belt_speed, behind(stations, 0, lf.EPS_0), v0_b + dv0_b) * behind(stations, 0, lf.SHORT_0)
     first_1 = fma(-belt_speed, behind(stations, 0, lf.EPS_1), v1_b + dv1_b) * behind(stations, 0, lf.SHORT_1)
-    w_b = fma(step, fields[0, f.U] + fma(-stations[0, lf.LAG], dv0_b, stations[0, lf.PUSH]), fields[0, f.W])
+    w_b = fma(step, fields[0, f.U] + stations[0, lf.PUSH], fields[0, f.W])
     v0_b, dv0_b, flux0_b = from_ahead(v0_b), from_ahead(dv0_b), from_ahead(first_0)
     v1_b, dv1_b, flux1_b = from_ahead(v1_b), from_ahead(dv1_b), from_ahead(first_1)
     w_b = from_ahead(w_b)
@@ -143,31 +145,28 @@ def advance_belt(belt: LaneBelt, state: LaneState, work: Work, step: float):
         fields[j, f.N_ELEMENT], fields[j, f.N_RING] = more_0, more_1
         v0_b, dv0_b, flux0_b, v1_b, dv1_b, flux1_b = v0, dv0, flux_0, v1, dv1, flux_1
 
-        share, du, w = belt.arc_share[j], stations[j, lf.PUSH], fields[j, f.W]
-        if anywhere(share > 0.0):
-            du = fma(-stations[j, lf.LAG], dv0, du)
+        touches, du, w = belt.touches[j], stations[j, lf.PUSH], fields[j, f.W]
         u = fields[j, f.U] + du
-        if anywhere(share > 0.0):
+        if anywhere(touches > 0.0):
             is_driven = belt.on_driven[j] > 0.5
             if belt.is_free or anywhere(is_driven):
                 slopes = fma(stations[j, lf.FLANK_SLOPE], dv0, stations[j, lf.FLANK_CROSS] * du)
-                here = select(is_driven, radius, driving_radius)
-                tangential = (stations[j, lf.FLANK] - slopes) * (belt.dual[j] * (here + w))
+                distance = select(is_driven, radius, driving_radius) + fma(belt.upright[j], w, belt.rise[j])
+                tangential = (stations[j, lf.FLANK] - slopes) * (belt.dual[j] * distance)
+                # where no groove can hold the belt the values are of an earlier step
+                tangential = select(touches > 0.0, tangential, zero)
                 moment = moment - like(select(is_driven, tangential, zero), moment)
                 if belt.is_free:
-                    # beside an arc the values are of an earlier step
-                    tangential = select(share > 0.0, tangential, zero)
                     taken = taken + like(select(is_driven, zero, tangential), taken)
             if belt.memory:
-                v_radial = fma(belt_speed + new_0, stations[j, lf.SLOPE], u)
-                speed, along = forces.arc_sliding(belt, j, pulleys, per_cosine, v_radial, new_0, w)
+                v_across = fma(belt_speed + new_0, stations[j, lf.SLOPE], u)
+                v_radial, along = forces.groove_sliding(belt, j, pulleys, belt_speed, v_across, new_0, w)
+                speed, _ = flank_sliding(v_radial, along, per_cosine)
                 before = fields[j - 1, f.V_FILTERED] if j > 0 else last_filtered
-                target = fma(select(is_driven, carries[1], carries[0]), before, forget * speed)
-                target = target * select(is_driven, per_rates[1], per_rates[0])
-                keep = select(is_driven, kept[1], kept[0])
-                filtered = fma(fields[j, f.V_FILTERED] - target, keep, target)
-                filtered = select(belt.enters[j] > 0.5, speed, filtered)
-                fields[j, f.V_FILTERED] = select(share > 0.0, filtered, 0.0)
+                old, way = fields[j, f.V_FILTERED], stations[j, lf.WAY]
+                filtered = forces.remembered(belt, j, way, belt_speed, step, speed, old, before)
+                filtered = select(stations[j, lf.FORCE] > 0.0, filtered, speed)
+                fields[j, f.V_FILTERED] = select(touches > 0.0, filtered, 0.0)
         w = fma(step, u, w)
         fields[j, f.U], fields[j, f.W] = u, w
         forces.cell_strains(belt, stations, j, w, w_b, more_0, more_1, offset)

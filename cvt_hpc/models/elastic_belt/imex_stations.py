@@ -1,16 +1,11 @@
 """The fast step at each station: forces, and slopes with the speeds, without the stresses T and P."""
 
-from __future__ import annotations
-
 from cvt_hpc.kernels import kernel, merged_kernel
 from cvt_hpc.lanes import (
-    LaneArray,
     ahead,
     anywhere,
     behind,
     fma,
-    from_ahead,
-    from_behind,
     like,
     minimum,
     reciprocals,
@@ -19,6 +14,7 @@ from cvt_hpc.lanes import (
 from cvt_hpc.models.elastic_belt import fields as f
 from cvt_hpc.models.elastic_belt import lane_fields as lf
 from cvt_hpc.models.elastic_belt import lane_forces as forces
+from cvt_hpc.models.elastic_belt.imex_bending import DAMPED, LAG_SHARE
 from cvt_hpc.models.elastic_belt.lane_belt import LaneBelt, LaneState, Work
 from cvt_hpc.models.elastic_belt.lane_column import across_by_curvature, column_across
 from cvt_hpc.physics.flank import flank_shares
@@ -39,12 +35,8 @@ def implicit_shares(one, other, inertia):
 def assemble(belt: LaneBelt, state: LaneState, work: Work, step: float, again: bool) -> None:
     """Forces and slopes at the stations, but for the stresses T and P: the system's blocks and right side.
 
-    `again` takes the secant of friction where a pass before has found that it would turn sliding about.
-
-    The gyroscopic force is taken with the mean of u over the step: it then neither damps nor feeds. By one
-    correction with the pending increments, since it changes them little: by v step / h, some 0.02.
-    Extrapolated from earlier steps it feeds waves of a frequency w that run against the belt, at the rate
-    (v / h) (w step)^3 / 4.
+    `again` takes the secant of friction where a pass before has found that it would turn sliding about. For
+    the increments of u it finds the force ACROSS and its slopes, which `move_across` couples by bending.
     """
     n, fields, stations, c = state.fields.rows, state.fields, work.stations, belt.constants
     per_step = 1.0 / step
@@ -59,15 +51,13 @@ def assemble(belt: LaneBelt, state: LaneState, work: Work, step: float, again: b
     ring_friction, per_ring_width = c[0, lf.RING_FRICTION], 1.0 / c[0, lf.RING_FRICTION_SPEED]
     ring_relief = c[0, lf.RING_RELIEF] * speed_share * speed_share
     centrifugal, gyroscopic = mass * belt_speed * belt_speed, 2.0 * mass * belt_speed
-    half_gyroscopic, masses = -0.5 * gyroscopic, (element_mass, ring_mass)
+    masses = element_mass, ring_mass
     damping = forces.lane_damping(belt, state.time[0])
     base_mass = fma(mass, per_step, 0.5 * damping)
     element_rate = element_mass * per_step
     zero = like(0.0, sine)
-    last_push, last = zero, (zero, zero, zero, zero)
-    first, second_push = last, zero
     for j in range(n):
-        share = belt.arc_share[j]
+        touches = belt.touches[j]
         dual, per_left, span = belt.dual[j], behind(belt.per_cell, j, 0), belt.per_span[j]
         u, v0, v1 = fields[j, f.U], fields[j, f.V_ELEMENT], fields[j, f.V_RING]
         ring_left = ring_stiffness * behind(stations, j, lf.EPS_1)
@@ -77,7 +67,7 @@ def assemble(belt: LaneBelt, state: LaneState, work: Work, step: float, again: b
         net_right = minimum(forces.pressed_strain(belt, state, stations, j), 0.0)
         net_right = fma(element_stiffness, net_right, ring_right - centrifugal)
         slope = (ahead(fields, j, f.W) - behind(fields, j, f.W)) * span
-        transverse = forces.lane_transverse(belt, fields, j, net_left, net_right, bending)
+        transverse = forces.lane_transverse(belt, fields, j, net_left, net_right, bending, DAMPED * step)
         transverse = fma(-gyroscopic, (ahead(fields, j, f.U) - behind(fields, j, f.U)) * span, transverse)
         transverse = fma(-acceleration * mass, slope, transverse)
         if belt.has_column:
@@ -85,8 +75,8 @@ def assemble(belt: LaneBelt, state: LaneState, work: Work, step: float, again: b
         if belt.is_curved:
             transverse += across_by_curvature(belt, state, j, bending, belt_speed, masses)
         full_speed = belt_speed + v0
-        v_radial = fma(full_speed, slope, u)
-        outward = -damping * v_radial
+        v_across = fma(full_speed, slope, u)
+        outward = -damping * v_across
         longer = fma(offset, belt.ring_curvature[j], 1.0)
         ring_here = ring_mass * longer
         element, ring, coupling = element_rate, ring_here * per_step, zero
@@ -94,13 +84,14 @@ def assemble(belt: LaneBelt, state: LaneState, work: Work, step: float, again: b
         along_ring = -(belt_speed + v1) * ((v1 - behind(fields, j, f.V_RING)) * per_left) * ring_here
         along_element = fma(-acceleration, element_mass, along_element)
         along_ring = fma(-acceleration, ring_here, along_ring)
-        radial_mass, cross = base_mass, zero
-        if anywhere(share > 0.0):
+        radial_mass, cross, push_along = base_mass, zero, zero
+        if anywhere(touches > 0.0):
             lever = fma(offset, belt.arc_curvature[j], 1.0)
             v_tangential, coefficient = stations[j, lf.SLIDING_T], stations[j, lf.COEFFICIENT]
             per_speed, factor = stations[j, lf.PER_SPEED], stations[j, lf.FACTOR]
-            ring_factor, meridian = stations[j, lf.RING_FACTOR], v_radial * per_cosine
-            force = stations[j, lf.FORCE]
+            ring_factor, force = stations[j, lf.RING_FACTOR], stations[j, lf.FORCE]
+            meridian = stations[j, lf.SLIDING_R] * per_cosine
+            upright, lean = belt.upright[j], forces.leaning(belt, j, fields[j, f.W])
 
             grip = forces.ring_grip(belt, j, ring_left, ring_right, ring_relief * longer, ring_friction)
             drag = grip * ring_factor
@@ -114,8 +105,8 @@ def assemble(belt: LaneBelt, state: LaneState, work: Work, step: float, again: b
             climb, run = meridian * per_speed, v_tangential * per_speed
             axial_share, radial_share = flank_shares(mu, climb, sine, cosine)
             per_normal, per_stiff = reciprocals(axial_share, fma(2.0, stiff, 12.0 * ring))
-            twice_normal = (2.0 * share) * force * per_normal
-            outward += twice_normal * radial_share
+            twice_normal = select(touches > 0.0, 2.0 * force * per_normal, zero)
+            radial = twice_normal * radial_share
             friction = twice_normal * mu
             tangential = -friction * run
             across = friction * per_speed
@@ -123,53 +114,37 @@ def assemble(belt: LaneBelt, state: LaneState, work: Work, step: float, again: b
             along = twice_normal * coefficient * (fma(-factor, factor, 1.0) * per_width)
             along, across = implicit_shares(select(thrown, across, along), across, element_rate)
             excess = along - across
-            radial_mass = fma(fma(excess, climb * climb, across), per_cosine * per_cosine, radial_mass)
-            cross = excess * climb * run * per_cosine
-            flank_slope = fma(excess, run * run, across)
+            # slopes with radial and tangential sliding, turned into those across and along the path
+            radial_slope = fma(excess, climb * climb, across) * (per_cosine * per_cosine)
+            mixed, slope_along = excess * climb * run * per_cosine, fma(excess, run * run, across)
+            turned, square = upright * lean, fma(upright, upright, -lean * lean)
+            difference = radial_slope - slope_along
+            radial_mass += fma(lean * lean, -difference, fma(-2.0 * turned, mixed, radial_slope))
+            cross = fma(turned, difference, square * mixed)
+            flank_slope = fma(lean * lean, difference, fma(2.0 * turned, mixed, slope_along))
+            outward = fma(upright, radial, fma(-lean, tangential, outward))
+            push_along = fma(lean, radial, upright * tangential)
             stiff *= fma(stiff, per_stiff, 0.5)
-            along_element += fma(-lever, drag, tangential)
+            along_element += fma(-lever, drag, push_along)
             along_ring += drag
             element += fma(lever * lever, stiff, flank_slope)
             ring += stiff
             coupling = -lever * stiff
             if belt.is_free or anywhere(belt.on_driven[j] > 0.5):
-                stations[j, lf.FLANK], stations[j, lf.FLANK_SLOPE] = tangential, flank_slope
-                stations[j, lf.FLANK_CROSS] = cross
+                stations[j, lf.FLANK] = tangential
+                stations[j, lf.FLANK_SLOPE] = fma(upright, slope_along, lean * mixed)
+                stations[j, lf.FLANK_CROSS] = fma(upright, mixed, -lean * slope_along)
         along_element = fma(outward, slope, along_element)
         mobility = 1.0 / radial_mass
-        push, lag = (transverse + outward) * mobility, cross * mobility
+        push, lag = (transverse + outward) * mobility, LAG_SHARE * cross * mobility
         if belt.is_curved:
             # the mean velocity of the step without the part due to the layers' speeds
             turning = belt.ring_curvature[j] * fma(0.5, push, u)
             along_element = fma(-turning * element_mass, full_speed, along_element)
             along_ring = fma(-turning * ring_mass, belt_speed + v1, along_ring)
-        if anywhere(share > 0.0):
+        if anywhere(touches > 0.0):
             stations[j, lf.LAG], stations[j, lf.SLOPE], stations[j, lf.D_01] = lag, slope, dual * coupling
         stations[j, lf.D_00], stations[j, lf.D_11] = dual * fma(-cross, lag, element), dual * ring
-        stations[j, lf.Y_1] = dual * along_ring
-        station = push, mobility * half_gyroscopic * span, dual * cross, dual * along_element
-        if j == 0:
-            first = station
-        elif j == 1:
-            second_push = push
-        else:
-            _put(stations, j - 1, last, last_push, push)
-        last_push, last = last[0], station
-    for j in (n - 1, 0):  # a loop: the compiler loses kernels merged into a function's last lines
-        if j == 0:
-            _put(stations, j, first, from_behind(last[0]), second_push)
-        else:
-            _put(stations, j, last, last_push, from_ahead(first[0]))
-
-
-@merged_kernel
-def _put(stations: LaneArray, j: int, station, push_behind, push_ahead):
-    """Store the increment of u and the right side of station j, with the gyroscopic force's correction.
-
-    `station` is its increment of u [m/s], that per difference of its neighbours' increments, the length times
-    the cross slope of friction [N s/m], and the force along the belt [N].
-    """
-    push, gyration, cross, along = station
-    push = fma(gyration, push_ahead - push_behind, push)
-    stations[j, lf.PUSH] = push
-    stations[j, lf.Y_0] = fma(-cross, push, along)
+        stations[j, lf.Y_0], stations[j, lf.Y_1] = dual * along_element, dual * along_ring
+        stations[j, lf.ACROSS], stations[j, lf.MASS_ACROSS] = transverse + outward, radial_mass
+        stations[j, lf.CROSS] = cross

@@ -1,7 +1,5 @@
 """The system of the fast step: stresses into its rows, elimination along the belt, and back substitution."""
 
-from __future__ import annotations
-
 from cvt_hpc.kernels import kernel, merged_kernel
 from cvt_hpc.lanes import (
     LaneArray,
@@ -189,18 +187,21 @@ def substitute(belt: LaneBelt, state: LaneState, work: Work, step: float) -> int
                 met |= _meeting(belt, state, stations, j, n0 - z0, step)
             n0, n1 = z0, z1
             stations[j, lf.DV_0], stations[j, lf.DV_1] = n0, n1
-        share = belt.arc_share[j]
-        if anywhere(share > 0.0):
+        touches = belt.touches[j]
+        if anywhere(touches > 0.0):
             v_radial, v_tangential = stations[j, lf.SLIDING_R], stations[j, lf.SLIDING_T]
-            rise = fma(stations[j, lf.SLOPE] - stations[j, lf.LAG], n0, stations[j, lf.PUSH])
-            turn = select(share > 0.0, fma(v_radial, rise, v_tangential * n0), 0.0)
+            # changes of both sliding speeds
+            across = fma(stations[j, lf.SLOPE] - stations[j, lf.LAG], n0, stations[j, lf.PUSH])
+            upright, lean = belt.upright[j], belt.lean[j]
+            climb, run = fma(upright, across, lean * n0), fma(upright, n0, -lean * across)
+            turn = select(stations[j, lf.FORCE] > 0.0, fma(v_radial, climb, v_tangential * run), 0.0)
             speed_squared = fma(v_radial, v_radial, v_tangential * v_tangential)
             back = (speed_squared > saturated) & (turn < -speed_squared)
             if anywhere(back):
                 turned |= _mark(stations, j, lf.REVERSING, back)
             saddle = stations[j, lf.SADDLE]
             change = fma(fma(offset, belt.arc_curvature[j], 1.0), n0, -n1)
-            after = select(share > 0.0, saddle * (saddle + change), 0.0)
+            after = select(belt.arc_curvature[j] > 0.0, saddle * (saddle + change), 0.0)
             back = (absolute(saddle) > ring_width) & (after < 0.0)
             if anywhere(back):
                 turned |= _mark(stations, j, lf.RING_REVERSING, back)

@@ -6,8 +6,6 @@ present speed, contents as deviations from the reference path's, so that single 
 strains and sliding speeds in them.
 """
 
-from __future__ import annotations
-
 from typing import Any, NamedTuple
 
 import numpy as np
@@ -34,7 +32,8 @@ class LaneBelt(NamedTuple):
 
     Attributes
     ----------
-    cell, dual, per_cell, per_dual, per_span, curvature, arc_curvature, arc_share : (N,) arrays
+    cell, dual, per_cell, per_dual, per_span, curvature, arc_curvature, touches, on_driven,
+    rise, lean, lean_rate, upright : (N,) arrays
         As in `Belt`.
     ring_curvature : (N,) array
         Curvature of both neighbouring cells, weighted by length [1/m]: a station's ring mass is
@@ -43,12 +42,10 @@ class LaneBelt(NamedTuple):
         As in `Belt`, for a bending stiffness of 1 N m^2.
     bending_load, squared_curvature : (N,) arrays
         As in `Belt`, the load for a bending stiffness of 1 N m^2.
-    on_driven, enters : (N,) arrays
-        Whether (1) a station lies on the driven half, from `driven_start` on, and is the first of an arc.
     constants : (1, 62) LaneArray
-        `lane_fields.CONSTANTS`.
-    driven_start : int
-        First station of the driven arc.
+        CONSTANTS.
+    places : two pairs of (m,) int arrays
+        Row and part of the stations that the driving and the driven groove may hold.
     memory : bool
         Whether friction has a memory.
     law : FrictionLaw
@@ -72,15 +69,18 @@ class LaneBelt(NamedTuple):
     per_span: np.ndarray
     curvature: np.ndarray
     arc_curvature: np.ndarray
-    arc_share: np.ndarray
+    touches: np.ndarray
+    on_driven: np.ndarray
+    rise: np.ndarray
+    lean: np.ndarray
+    lean_rate: np.ndarray
+    upright: np.ndarray
     ring_curvature: np.ndarray
     bending: np.ndarray
     bending_load: np.ndarray
     squared_curvature: np.ndarray
-    on_driven: np.ndarray
-    enters: np.ndarray
     constants: LaneArray
-    driven_start: int
+    places: tuple[tuple[np.ndarray, np.ndarray], tuple[np.ndarray, np.ndarray]]
     memory: bool
     law: FrictionLaw
     rise_time: float
@@ -151,25 +151,52 @@ def lane_belt(belts: list[Belt], dtype: DTypeLike) -> LaneBelt:
     constants = LaneArray(1, len(lf.CONSTANTS), len(belts), dtype)
     for lane, belt in enumerate(belts):
         constants.data[0, :, lane] = _constants_of(belt)
-    stations, law = np.arange(first.cell.size), first.law
+    cell, dual, kappa = first.cell, first.dual, first.curvature
+    law = first.law
     tables = (law.table_force.astype(dtype), law.table_speed.astype(dtype), law.table_mu.astype(dtype))
-    bent = first.cell, first.dual, 1.0, first.curvature, first.curvature_terms
-    computed: dict[str, Any] = {
-        "ring_curvature": squared_curvature(first.cell, first.dual, first.curvature, 1),
-        "bending": bending_bands(*bent),
-        "bending_load": bending_load(*bent),
-        "on_driven": stations >= first.driven_start,
-        "enters": (stations == 0) | (stations == first.driven_start),
-        "constants": constants,
-        "memory": first.friction_memory > 0.0,
-        "law": FrictionLaw(law.kind, 0.0, 0.0, 0.0, *tables),
-        "speed_ramps": any(belt.speed_start != belt.driving_speed for belt in belts),
-        "is_free": first.pulleys.are_free,
-        "is_curved": first.curvature_terms > 0,
+    shared = {
+        "cell": cell,
+        "dual": dual,
+        "per_cell": first.per_cell,
+        "per_dual": first.per_dual,
+        "per_span": first.per_span,
+        "curvature": kappa,
+        "arc_curvature": first.arc_curvature,
+        **{
+            name: getattr(first, name)
+            for name in ("touches", "on_driven", "rise", "lean", "lean_rate", "upright")
+        },
+        "ring_curvature": _ring_curvature(first),
+        "bending": bending_bands(cell, dual, 1.0, kappa, first.curvature_terms),
+        "bending_load": bending_load(cell, dual, 1.0, kappa, first.curvature_terms),
+        "squared_curvature": first.squared_curvature,
     }
-    # all else is of the belt, by the same name
-    values = (computed[key] if key in computed else getattr(first, key) for key in LaneBelt._fields)
-    return LaneBelt._make(value.astype(dtype) if isinstance(value, np.ndarray) else value for value in values)
+    return LaneBelt(
+        **{name: array.astype(dtype) for name, array in shared.items()},
+        constants=constants,
+        places=_places(first.driving_stations, first.driven_stations, cell.size),
+        memory=first.friction_memory > 0.0,
+        law=FrictionLaw(law.kind, 0.0, 0.0, 0.0, *tables),
+        rise_time=first.rise_time,
+        start_damping=first.start_damping,
+        largest_displacement=first.largest_displacement,
+        faded=first.faded,
+        ramp_end=first.ramp_end,
+        speed_ramps=any(belt.speed_start != belt.driving_speed for belt in belts),
+        is_free=first.pulleys.are_free,
+        is_curved=first.curvature_terms > 0,
+        has_column=first.has_column,
+    )
+
+
+def _places(driving: np.ndarray, driven: np.ndarray, rows: int) -> Any:
+    """Row and part of each groove's stations, in parts of so many rows."""
+    return (driving % rows, driving // rows), (driven % rows, driven // rows)
+
+
+def _ring_curvature(belt: Belt) -> np.ndarray:
+    weighted = belt.cell * belt.curvature
+    return 0.5 * (weighted + np.roll(weighted, 1)) / belt.dual
 
 
 def _constants_of(belt: Belt) -> list[float]:
@@ -185,25 +212,12 @@ def _constants_of(belt: Belt) -> list[float]:
         "cosine": np.cos(angle),
         "wedge": 2.0 * np.tan(angle),
         "forget": 1.0 / memory if memory else 0.0,
-        "driving_carry": _carry(belt, belt.cell[0]),
-        "driven_carry": _carry(belt, belt.cell[belt.driven_start]),
         "start_share": belt.speed_start / belt.driving_speed,
-        "driving_cell": belt.cell[0],
-        "driven_cell": belt.cell[belt.driven_start],
         # energy stored in a pulley of given speed does not count
         "driven_inertia": belt.driven_inertia if np.isfinite(belt.driven_inertia) else 0.0,
         **dict(zip(f.LAWS, belt.pulleys.laws[0], strict=True)),
     }
     return [named[key] if key in named else getattr(belt, key) for key in lf.CONSTANTS]
-
-
-def _carry(belt: Belt, spacing: float) -> float:
-    """Rate of the memory's transport, as `rhs.memory_transport` has it."""
-    memory, way = belt.friction_memory, belt.belt_speed * belt.friction_memory
-    if way == 0.0:
-        return 0.0
-    # exp(-x) / (1 - exp(-x)): a belt that hardly moves makes exp(x) too large for a number
-    return np.exp(-spacing / way) / (-np.expm1(-spacing / way) * memory)
 
 
 def lane_state(belts: list[Belt], states: list[State], dtype: type) -> LaneState:
@@ -235,9 +249,9 @@ def settle_discs(contacts: tuple[Contact, Contact], belts: list[Belt], states: l
     for lane, (belt, state) in enumerate(zip(belts, states, strict=True)):
         force = np.zeros(belt.cell.size)
         contact_forces(belt, state, fresh_contacts(belt), force)
-        wraps = (belt.driving, 0), (belt.driven, belt.driven_start)
-        for contact, (wrap, first) in zip(contacts, wraps, strict=True):
-            pressed = wrap.weight * force[first : first + wrap.weight.size]
+        wraps = (belt.driving, belt.driving_stations), (belt.driven, belt.driven_stations)
+        for contact, (wrap, stations) in zip(contacts, wraps, strict=True):
+            pressed = wrap.weight * np.maximum(force[stations], 0.0)
             settle(contact.discs, lane, wrap.modes, disc_factor(wrap), pressed)
 
 
@@ -270,7 +284,9 @@ def parted(belt: LaneBelt, parts: int) -> LaneBelt:
         for name, array in belt._asdict().items()
         if isinstance(array, np.ndarray)
     }
-    return belt._replace(constants=alike(belt.constants, parts), **arrays)
+    rows = belt.cell.size // parts
+    places = _places(belt.places[0][0], belt.places[1][0], rows)
+    return belt._replace(constants=alike(belt.constants, parts), places=places, **arrays)
 
 
 def _one_lane(array: np.ndarray) -> LaneArray:

@@ -1,7 +1,5 @@
 """The column of pressed elements in lanes: the functions of `column.py` for one run."""
 
-from __future__ import annotations
-
 from cvt_hpc.kernels import kernel, merged_kernel
 from cvt_hpc.lanes import LaneArray, ahead, behind, fma, like, minimum, select
 from cvt_hpc.models.elastic_belt import fields as f

@@ -4,8 +4,6 @@ Steps keep it in a LaneArray of N stations, their work space: its first fields a
 ones each step's own.
 """
 
-from __future__ import annotations
-
 from cvt_hpc.kernels import kernel, merged_kernel
 from cvt_hpc.lanes import (
     LaneArray,
@@ -28,6 +26,7 @@ from cvt_hpc.models.elastic_belt import fields as f
 from cvt_hpc.models.elastic_belt import lane_fields as lf
 from cvt_hpc.models.elastic_belt.lane_belt import LaneBelt, LaneState
 from cvt_hpc.models.elastic_belt.lane_column import lane_column
+from cvt_hpc.models.elastic_belt.rhs import LEAST_WAY
 from cvt_hpc.physics import compliance
 from cvt_hpc.physics.compliance import contact_force, solve_contact
 from cvt_hpc.physics.flank import flank_sliding, tangential_sliding
@@ -37,6 +36,7 @@ from cvt_hpc.physics.moving_discs import open_gaps, turn_discs
 from cvt_hpc.variator.course import faded_damping, load_course, speed_course
 
 MOST_CONTACT_ROUNDS = 200
+LEAST_FORCE = 1e-12  # [N/m]: for a quotient of forces that may both be 0
 LEAST_SHARE_OF_WIDTH = 1e-3  # of friction_speed: below it friction is linear to 1e-6, and has no direction
 
 
@@ -151,32 +151,40 @@ def lane_pulleys(belt: LaneBelt, share, scalars: LaneArray):
 
 
 @merged_kernel
-def arc_sliding(belt: LaneBelt, j: int, pulleys, per_cosine, v_radial, v_element, w):
-    """Sliding speed of station j of an arc [m/s], and the part of it along the belt.
+def leaning(belt: LaneBelt, j: int, w):
+    """Part along the path of the pulley's radial unit vector, as `rhs.leaning`."""
+    return fma(-belt.lean_rate[j], w, belt.lean[j])
 
-    `pulleys` are those of `lane_pulleys`, `v_radial`, `v_element`, `w` the station's own.
+
+@merged_kernel
+def groove_sliding(belt: LaneBelt, j: int, pulleys, belt_speed, v_across, v_element, w):
+    """Radial and tangential sliding of station j in its groove [m/s], as `rhs.sliding_speeds`.
+
+    `pulleys` are those of `lane_pulleys`, `v_across`, `v_element`, `w` the station's own.
     """
     turnings, surfaces = pulleys
     is_driven = belt.on_driven[j] > 0.5
     turning = select(is_driven, turnings[1], turnings[0])
-    v_tangential = tangential_sliding(v_element, w, turning, select(is_driven, surfaces[1], surfaces[0]))
-    speed, meridian = flank_sliding(v_radial, v_tangential, per_cosine)
-    return speed, v_tangential
+    surface = select(is_driven, surfaces[1], surfaces[0])
+    upright, lean = belt.upright[j], leaning(belt, j, w)
+    v_radial = fma(upright, v_across, lean * (belt_speed + v_element))
+    v_along = fma(upright - 1.0, belt_speed, upright * v_element) - lean * v_across
+    return v_radial, tangential_sliding(v_along, fma(upright, w, belt.rise[j]), turning, surface)
 
 
 @merged_kernel
-def lane_carry(belt: LaneBelt, cell: int, nominal: int, belt_speed):
-    """Rate of the memory's transport along an arc [1/s], as `rhs.memory_transport`.
+def remembered(belt: LaneBelt, j: int, way, belt_speed, step: float, speed, old, before):
+    """Filtered sliding speed of station j at the end of a step [m/s], as `rhs.memory_rates` has its rate.
 
-    `cell` and `nominal` are the constants that hold the arc's cells and the rate at `driving_speed`.
+    `way` is WAY, `speed` the station's sliding speed; `old` and `before` are its filtered speed and that of
+    the station behind it, which is its sliding speed where it does not touch.
     """
-    c = belt.constants
-    carry = c[0, nominal]
-    if not belt.speed_ramps:
-        return carry
-    left = decay(c[0, lf.FORGET] * c[0, cell] / belt_speed)
-    start = c[0, lf.START_SHARE]
-    return select((start > 1.0) | (start < 1.0), c[0, lf.FORGET] * left / (1.0 - left), carry)
+    forget = belt.constants[0, lf.FORGET]
+    left = decay(forget * way * behind(belt.cell, j, 0) / belt_speed)
+    carry = forget * left / (1.0 - left)
+    entering = select(way < 1.0, fma(way, before - speed, speed), before)
+    target = fma(carry, entering, forget * speed) / (carry + forget)
+    return fma(old - target, decay((carry + forget) * step), target)
 
 
 @merged_kernel
@@ -189,10 +197,11 @@ def lane_damping(belt: LaneBelt, time: float):
 
 
 @merged_kernel
-def lane_transverse(belt: LaneBelt, fields: LaneArray, j: int, net_left, net_right, bending):
+def lane_transverse(belt: LaneBelt, fields: LaneArray, j: int, net_left, net_right, bending, lead: float):
     """Line force across the belt at station j [N/m], outward, of tension and bending.
 
-    `net_left`, `net_right` are T - P - m v^2 in the cells beside it [N], `bending` is EI [N m^2].
+    `net_left`, `net_right` are T - P - m v^2 in the cells beside it [N], `bending` is EI [N m^2], that of the
+    displacement after `lead` [s].
     """
     n = fields.rows
     # of the rows two away, those beside the neighbours
@@ -203,14 +212,28 @@ def lane_transverse(belt: LaneBelt, fields: LaneArray, j: int, net_left, net_rig
         w_aa = from_behind(w_aa)
     if j == n - 1:
         w_bb = from_ahead(w_bb)
-    bent = fma(belt.bending[j, 0], w_aa, fma(belt.bending[j, 4], w_bb, belt.bending[j, 2] * w))
-    bent = fma(belt.bending[j, 1], w_a, fma(belt.bending[j, 3], w_b, bent))
+    bent = _bent(belt, j, w_aa, w_a, w, w_b, w_bb)
+    if lead > 0.0:
+        u_aa, u_bb = behind(fields, a, f.U), ahead(fields, b, f.U)
+        if j == 0:
+            u_aa = from_behind(u_aa)
+        if j == n - 1:
+            u_bb = from_ahead(u_bb)
+        u_a, u, u_b = behind(fields, j, f.U), fields[j, f.U], ahead(fields, j, f.U)
+        bent = fma(lead, _bent(belt, j, u_aa, u_a, u, u_b, u_bb), bent)
     tension = net_right * ((w_b - w) * belt.per_cell[j]) - net_left * (
         (w - w_a) * behind(belt.per_cell, j, 0)
     )
     inward = net_right * (0.5 * belt.cell[j] * belt.curvature[j])
     inward += net_left * (0.5 * behind(belt.cell, j, 0) * behind(belt.curvature, j, 0))
     return fma(tension - inward, belt.per_dual[j], bending * bent)
+
+
+@merged_kernel
+def _bent(belt: LaneBelt, j: int, w_aa, w_a, w, w_b, w_bb):
+    """Fourth derivative at station j by the displacements of five, negative."""
+    bent = fma(belt.bending[j, 0], w_aa, fma(belt.bending[j, 4], w_bb, belt.bending[j, 2] * w))
+    return fma(belt.bending[j, 1], w_a, fma(belt.bending[j, 3], w_b, bent))
 
 
 @merged_kernel
@@ -235,8 +258,11 @@ def ring_grip(belt: LaneBelt, j: int, ring_left, ring_right, relief, friction):
 
 @kernel
 def lane_contact_forces(belt: LaneBelt, state: LaneState, stations: LaneArray) -> None:
-    """Axial line forces of both wraps into FORCE [N/m]; on the strands it stays 0."""
-    n, fields, c = state.fields.rows, state.fields, belt.constants
+    """Axial line forces of both wraps into FORCE [N/m], where contact begins into WAY.
+
+    Both stay 0 where no groove can hold the belt.
+    """
+    fields, c = state.fields, belt.constants
     wedge, scalars = c[0, lf.WEDGE], state.scalars
     for wrap in range(2):
         contact = state.contacts[1] if wrap else state.contacts[0]
@@ -247,11 +273,10 @@ def lane_contact_forces(belt: LaneBelt, state: LaneState, stations: LaneArray) -
             scalars[0, lf.POSITION] if wrap else like(c[0, lf.DRIVING_POSITION], shift) + shift, slope
         )
         tilted = f.FIRST_STATE + (f.DRIVEN_COS if wrap else f.DRIVING_COS)
-        first = belt.driven_start if wrap else 0
-        row, part = first % n, first // n
+        rows, parts = belt.places[wrap]
         for k in range(contact.weight.size):
-            pushed[k, compliance.GAP] = fma(slope, at_station(fields, row, part, f.W), opening)
-            row, part = _next_station(n, row, part)
+            lifted = fma(contact.upright[k], at_station(fields, rows[k], parts[k], f.W), contact.rise[k])
+            pushed[k, compliance.GAP] = fma(slope, lifted, opening)
         if belt.is_free:
             one, other = like(scalars[0, tilted], slope), like(scalars[0, tilted + 1], slope)
             for k in range(contact.weight.size):
@@ -260,12 +285,15 @@ def lane_contact_forces(belt: LaneBelt, state: LaneState, stations: LaneArray) -
         if contact.discs.place.size > 0:
             open_gaps(contact.discs, pushed, compliance.GAP)
         solve_contact(contact, MOST_CONTACT_ROUNDS)
-        row, part = first % n, first // n
+        before = like(-1.0, slope)
         for k in range(contact.weight.size):
-            force = contact_force(pushed, k)
+            force, push = contact_force(pushed, k), pushed[k, compliance.PUSH]
             pushed[k, compliance.FORCED] = force
-            set_station(stations, row, part, lf.FORCE, force)
-            row, part = _next_station(n, row, part)
+            set_station(stations, rows[k], parts[k], lf.FORCE, force)
+            begins = maximum(push / maximum(push - before, LEAST_FORCE), LEAST_WAY)
+            way = select(before > 0.0, 1.0, begins)
+            set_station(stations, rows[k], parts[k], lf.WAY, select(push > 0.0, way, LEAST_WAY))
+            before = push
 
 
 @kernel
@@ -278,15 +306,6 @@ def advance_discs(belt: LaneBelt, state: LaneState, step: float) -> None:
         if contact.discs.place.size > 0:
             turning = like(turnings[1] if wrap else turnings[0], contact.discs.states[0, 0])
             turn_discs(contact.discs, contact.weight, contact.stations, compliance.FORCED, turning, step)
-
-
-@merged_kernel
-def _next_station(rows: int, row: int, part: int) -> tuple[int, int]:
-    """Row and part of the station ahead."""
-    row += 1
-    if row == rows:
-        row, part = 0, part + 1
-    return row, part
 
 
 @kernel
@@ -336,14 +355,15 @@ def lane_sliding(belt: LaneBelt, state: LaneState, stations: LaneArray) -> None:
     per_width, per_ring_width = 1.0 / c[0, lf.FRICTION_SPEED], 1.0 / c[0, lf.RING_FRICTION_SPEED]
     pulleys = lane_pulleys(belt, share, state.scalars)
     for j in range(n):
-        if not anywhere(belt.arc_share[j] > 0.0):
+        if not anywhere(belt.touches[j] > 0.0):
             continue
         full_speed = belt_speed + fields[j, f.V_ELEMENT]
         slope = (ahead(fields, j, f.W) - behind(fields, j, f.W)) * belt.per_span[j]
-        v_radial = fma(full_speed, slope, fields[j, f.U])
-        speed, v_tangential = arc_sliding(
-            belt, j, pulleys, per_cosine, v_radial, fields[j, f.V_ELEMENT], fields[j, f.W]
+        v_across = fma(full_speed, slope, fields[j, f.U])
+        v_radial, v_tangential = groove_sliding(
+            belt, j, pulleys, belt_speed, v_across, fields[j, f.V_ELEMENT], fields[j, f.W]
         )
+        speed, _ = flank_sliding(v_radial, v_tangential, per_cosine)
         v_law = fields[j, f.V_FILTERED] if memory else speed
         if kind == Law.TABLE:
             coefficient, _ = table_coefficient(table, v_law, stations[j, lf.FORCE] * per_cosine)

@@ -4,8 +4,6 @@ The equations are those of `rings.py`. Surfaces and layers are counted from 0: l
 and surface k + 1; surface 0 is the saddle, surface n that of the ears.
 """
 
-from __future__ import annotations
-
 from collections.abc import Sequence
 from typing import NamedTuple
 
@@ -90,7 +88,8 @@ def lane_rings(belts: Sequence[Belt], rings: Sequence[Rings], dtype: DTypeLike) 
         ]
     stations = np.arange(first.cell.size)
     straight = first.curvature == 0.0
-    strands = (stations[straight & (beyond == (stations > first.driven_start))] for beyond in (False, True))
+    middle = first.driven_stations[first.driven_stations.size // 2]
+    strands = (stations[straight & (beyond == (stations > middle))] for beyond in (False, True))
     falls = any(ring.static_excess > 0.0 for ring in rings)
     return LaneRings(constants, n, falls, np.array([strand[strand.size // 2] for strand in strands]))
 
@@ -168,7 +167,7 @@ def audit_layers(
     length = driving = driven = 0.0
     for j in range(fields.rows):
         length += belt.cell[j]
-        if belt.arc_share[j] > 0.0:
+        if belt.arc_curvature[j] > 0.0:
             on_driven = belt.on_driven[j] > 0.5
             driving += 0.0 if on_driven else belt.dual[j]
             driven += belt.dual[j] if on_driven else 0.0
@@ -188,7 +187,7 @@ def audit_layers(
         mean = mean / n
         content = fma(offset, kappa, fields[j, f.N_RING] + 1.0)
         stored -= (0.5 * right) * ring_stiffness * content * mean * mean
-        if belt.arc_share[j] == 0.0:
+        if belt.arc_curvature[j] == 0.0:
             continue
         is_driven = belt.on_driven[j] > 0.5
         below = largest = zero

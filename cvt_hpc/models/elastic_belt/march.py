@@ -1,7 +1,5 @@
 """Many steps and samples in one call, by any of the belt's own steps."""
 
-from __future__ import annotations
-
 from typing import Any, NamedTuple
 
 from cvt_hpc.kernels import kernel

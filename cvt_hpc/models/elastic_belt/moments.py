@@ -1,19 +1,18 @@
 """Sums of forces, speeds and their products at each station, for the fluctuations' audit."""
 
-from __future__ import annotations
-
 from cvt_hpc.kernels import merged_kernel
 from cvt_hpc.lanes import LaneArray, fma, like
 from cvt_hpc.models.elastic_belt.fields import names_from
 
-# Line forces at stations [N/m] are those on their whole length, also at an arc's end, where half of it is in
-# contact. Of stations but for the stresses, which are the cells' behind them [N]; `saddle_friction` is [N],
-# and powers are per length [W/m] but for `saddle_power` and `stress_power` [W]. Layers' speeds are as in
-# `LaneState`, less the belt speed.
-FLANK_POWER, RADIAL_FRICTION, TANGENTIAL_FRICTION, RADIAL_SPEED, RADIAL_SPEED_SQUARED = range(5)
-SLIDING_SPEED, SADDLE_POWER, SADDLE_FRICTION, SADDLE_SPEED, TRANSVERSE_POWER, TRANSVERSE_SPEED = range(5, 11)
-ELEMENT_POWER, ELEMENT_FORCE, ELEMENT_SPEED, RING_SPEED = range(11, 15)
-STRESS_POWER, RING_TENSION, PUSH_FORCE, PUSH_DAMPING = range(15, 19)
+# Line forces at stations [N/m] are those on their whole length. Of stations but for the stresses, which are
+# the cells' behind them [N]; `saddle_friction` is [N], and powers are per length [W/m] but for `saddle_power`
+# and `stress_power` [W]. Layers' speeds are as in `LaneState`, less the belt speed; radial and sliding
+# speed are those in the groove, and the elements' speed across is w_t + v_0 w_s.
+FLANK_POWER, RADIAL_FRICTION, TANGENTIAL_FRICTION, RADIAL_SPEED, SLIDING_SPEED = range(5)
+ACROSS_SPEED, ACROSS_SPEED_SQUARED, SADDLE_POWER, SADDLE_FRICTION, SADDLE_SPEED = range(5, 10)
+TRANSVERSE_POWER, TRANSVERSE_FORCE, TRANSVERSE_SPEED = range(10, 13)
+ELEMENT_POWER, ELEMENT_FORCE, ELEMENT_SPEED, RING_SPEED = range(13, 17)
+STRESS_POWER, RING_TENSION, PUSH_FORCE, PUSH_DAMPING = range(17, 21)
 MOMENTS = names_from("FLANK_POWER", globals())
 
 
@@ -29,6 +28,7 @@ def add_flanks(profiles: LaneArray, j: int, radial, tangential, v_radial, v_tang
     add(profiles, j, FLANK_POWER, fma(radial, v_radial, tangential * v_tangential))
     add(profiles, j, RADIAL_FRICTION, radial)
     add(profiles, j, TANGENTIAL_FRICTION, tangential)
+    add(profiles, j, RADIAL_SPEED, v_radial)
     add(profiles, j, SLIDING_SPEED, v_tangential)
 
 
@@ -41,10 +41,10 @@ def add_saddles(profiles: LaneArray, j: int, drag, sliding) -> None:
 
 
 @merged_kernel
-def add_speeds(profiles: LaneArray, j: int, v_radial, u, v_element, v_ring) -> None:
+def add_speeds(profiles: LaneArray, j: int, v_across, u, v_element, v_ring) -> None:
     """Speeds of a station [m/s]."""
-    add(profiles, j, RADIAL_SPEED, v_radial)
-    add(profiles, j, RADIAL_SPEED_SQUARED, v_radial * v_radial)
+    add(profiles, j, ACROSS_SPEED, v_across)
+    add(profiles, j, ACROSS_SPEED_SQUARED, v_across * v_across)
     add(profiles, j, TRANSVERSE_SPEED, u)
     add(profiles, j, ELEMENT_SPEED, v_element)
     add(profiles, j, RING_SPEED, v_ring)
@@ -54,6 +54,7 @@ def add_speeds(profiles: LaneArray, j: int, v_radial, u, v_element, v_ring) -> N
 def add_forces(profiles: LaneArray, j: int, across, u, along, v_element) -> None:
     """Line forces that are no stresses: across the belt but for the contact's own, and along the elements."""
     add(profiles, j, TRANSVERSE_POWER, across * u)
+    add(profiles, j, TRANSVERSE_FORCE, across)
     add(profiles, j, ELEMENT_POWER, along * v_element)
     add(profiles, j, ELEMENT_FORCE, along)
 

@@ -4,12 +4,10 @@ Unknowns, in this order, for N stations: w, u, v_element, v_ring, n_element, n_r
 speed of those stations that have a memory, the states of free pulleys where they are, the driven pulley's
 speed and position. Layers' speeds are counted
 from the nominal belt speed, contents from 1 and the pulley's speed from its nominal one, so that tolerances
-relative to an unknown mean its variation. Strands have no memory, and where the belt enters an arc the
-filtered speed is the sliding speed itself: neither is an unknown; without friction memory none is. Forces,
+relative to an unknown mean its variation. Stations that no groove can hold have no memory, and without
+friction memory none has. Forces,
 contact and laws are those of `rhs`, called and not written again.
 """
-
-from __future__ import annotations
 
 from typing import NamedTuple
 
@@ -62,7 +60,8 @@ class FlatBelt(NamedTuple):
     start : float
         Simulated time at t = 0 [s].
     force, eps, rate, moments : (N,), (2, N), (7, N), (N,) arrays
-        Work space: axial line forces, strains, rates, moments on the driven pulley.
+        Work space: axial line forces, or pulls, of `contact_forces`, strains, rates, moments on the driven
+        pulley.
     """
 
     belt: Belt
@@ -89,9 +88,7 @@ def flat_belt(belt: Belt, start: float = 0.0) -> FlatBelt:
         Simulated time at t = 0 [s].
     """
     n = belt.cell.size
-    arc = belt.arc_share > 0.0
-    arc[[0, belt.driven_start]] = False
-    remembering = np.flatnonzero(arc & (belt.friction_memory > 0.0))
+    remembering = np.flatnonzero((belt.touches > 0.0) & (belt.friction_memory > 0.0))
     origins = {f.V_ELEMENT: belt.belt_speed, f.V_RING: belt.belt_speed, f.N_ELEMENT: 1.0, f.N_RING: 1.0}
     rows = np.repeat([origins.get(row, 0.0) for row in ROWS], n)
     loose = f.FIRST_STATE + np.arange(f.STATES if belt.pulleys.are_free else 0)
@@ -111,7 +108,7 @@ def pack(flat: FlatBelt, state: State) -> np.ndarray:
 
 @kernel
 def unpack(flat: FlatBelt, t: float, y: np.ndarray) -> None:
-    """Write y into `flat.state`, and the sliding speeds at the inlets into the filtered ones."""
+    """Write y into `flat.state`."""
     n, fields, scalars, origin = flat.belt.cell.size, flat.state.fields, flat.state.scalars, flat.origin
     for k, row in enumerate(ROWS):
         for j in range(n):
@@ -122,33 +119,26 @@ def unpack(flat: FlatBelt, t: float, y: np.ndarray) -> None:
     first += flat.remembering.size
     for k in range(flat.loose.size):
         scalars[flat.loose[k]] = y[first + k]
-    scalars[f.TIME], scalars[f.DRIVEN_SPEED] = flat.start + t, origin[-2] + y[-2]
-    scalars[f.DRIVEN_POSITION] = y[-1]
-    set_inlets(flat)
-
-
-@kernel
-def set_inlets(flat: FlatBelt) -> None:
-    """Where the belt enters an arc the filtered speed is that of sliding, in `flat.state`."""
-    if flat.belt.friction_memory > 0.0:
-        for j in (0, flat.belt.driven_start):
-            flat.state.fields[f.V_FILTERED, j] = rhs.sliding_speed(flat.belt, flat.state, j)
+    scalars[f.TIME], scalars[f.DRIVEN_SPEED], scalars[f.DRIVEN_POSITION] = (
+        flat.start + t,
+        origin[-2] + y[-2],
+        y[-1],
+    )
 
 
 @kernel
 def driven_thrust(belt: Belt, force: np.ndarray) -> float:
     """Axial force of the belt on the driven sheave [N]."""
-    first = belt.driven_start
     total = 0.0
     for k in range(belt.driven.weight.size):
-        total += belt.driven.weight[k] * force[first + k]
+        total += belt.driven.weight[k] * max(force[belt.driven_stations[k]], 0.0)
     return total
 
 
 @kernel
 def driven_moment(belt: Belt, moments: np.ndarray) -> float:
     """Moment of the belt on the driven pulley [N m]."""
-    return moments[belt.driven_start :].sum()
+    return moments @ belt.on_driven
 
 
 @kernel
@@ -159,11 +149,13 @@ def pulled_by(belt: Belt, force: np.ndarray, moments: np.ndarray) -> np.ndarray:
     the tilting forces on the sheaves, driving pulley first [N].
     """
     pull = np.zeros(8)
-    pull[0], pull[1] = moments[: belt.driven_start].sum(), driven_moment(belt, moments)
+    pull[1] = driven_moment(belt, moments)
+    pull[0] = moments.sum() - pull[1]
     for wrap in range(2):
-        sheave, first = (belt.driven, belt.driven_start) if wrap else (belt.driving, 0)
+        sheave = belt.driven if wrap else belt.driving
+        places = belt.driven_stations if wrap else belt.driving_stations
         for k in range(sheave.weight.size):
-            pressed = sheave.weight[k] * force[first + k]
+            pressed = sheave.weight[k] * max(force[places[k]], 0.0)
             pull[2 + wrap] += pressed
             pull[4 + 2 * wrap] += pressed * sheave.tilt[0, k]
             pull[5 + 2 * wrap] += pressed * sheave.tilt[1, k]
@@ -192,7 +184,7 @@ def rates_under_forces(flat: FlatBelt) -> None:
     """Rates of the fields and moments at the stations, of `flat.state` and of `flat.force` as it stands."""
     belt, state, rate = flat.belt, flat.state, flat.rate
     rhs.strains(belt, state.fields, flat.eps)
-    rhs.memory_rates(belt, state, rate)
+    rhs.memory_rates(belt, state, flat.force, rate)
     rhs.content_rates(belt, state, flat.eps, rate)
     rhs.accelerations(belt, state, flat.force, flat.eps, rate, flat.moments)
 

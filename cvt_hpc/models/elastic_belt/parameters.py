@@ -4,8 +4,6 @@ Only ratio, driving_speed and thrust of the defaults are from a paper (Lebrecht 
 are those of a common passenger-car belt; every other default is an assumption, plausible and not measured.
 """
 
-from __future__ import annotations
-
 from typing import Any
 
 import numpy as np
@@ -133,7 +131,16 @@ PARAMETERS: dict[str, dict[str, Parameter]] = {
     "driven_shaft": DRIVEN_SHAFT,
     "rings": ring_settings.RINGS,
     "friction": scene.FRICTION,
-    "mesh": {"stations": Parameter(160, "", "cells around the belt", minimum=24, maximum=4096)},
+    "mesh": {
+        "stations": Parameter(160, "", "cells around the belt", minimum=24, maximum=4096),
+        "end_refinement": Parameter(
+            4.0,
+            "",
+            "cells per length at the arcs' ends over those far from them; 1: even cells",
+            minimum=1.0,
+            maximum=20.0,
+        ),
+    },
     # Sound runs have 0.001-0.8 mm/s (random scenes up to 1.9), chatter of friction 10 mm/s and more: its
     # speeds are those over which friction is regularised.
     "numerics": {

@@ -12,13 +12,10 @@ changing tension and slope squared out. The layers' loss is not taken from a sta
 the work of their dampers in the steps since the last one: a damper acts in a cell that is just closing, for a
 step or two, and instants now and then would not meet it as often as it acts.
 
-Seating is the energy that the belt carries out of the sheaves' elastic contact at an outlet beyond the energy
-that it brings in at the inlet. Contact begins and ends at the arcs' ends here, with forces that are not zero;
-along an arc the elastic forces do no work on the whole, whatever the belt's speed, since the compliance
-depends on the distance of two stations alone.
+Seating is the energy that the belt carries out of the sheaves' elastic contact beyond the energy that it
+brings in: none, but for the mesh, since contact begins and ends without force, and between both the elastic
+forces do no work on the whole.
 """
-
-from __future__ import annotations
 
 from cvt_hpc.kernels import kernel
 from cvt_hpc.lanes import LaneArray, fma, like, maximum, minimum
@@ -29,7 +26,7 @@ from cvt_hpc.models.elastic_belt import moments, power_terms
 from cvt_hpc.models.elastic_belt.lane_belt import LaneBelt, LaneState
 from cvt_hpc.models.elastic_belt.lane_column import curving
 from cvt_hpc.models.elastic_belt.pulley_step import audit_pulleys, taken_by_clearance
-from cvt_hpc.physics.flank import flank_sliding, tangential_sliding
+from cvt_hpc.physics.flank import flank_sliding
 from cvt_hpc.physics.friction import formula_coefficient, law_numbers, saturation, table_coefficient
 from cvt_hpc.physics.friction_laws import Law
 
@@ -81,27 +78,21 @@ def audit(
     ring_stiffness, element_stiffness = c[0, lf.RING_STIFFNESS], c[0, lf.ELEMENT_STIFFNESS]
     element_damping, centrifugal = c[0, lf.ELEMENT_DAMPING], mass * belt_speed * belt_speed
     turnings, surfaces = forces.lane_pulleys(belt, speed_share, scalars)
-    omega, surface = turnings[0], surfaces[0]
-    radius = c[0, lf.DRIVING_RADIUS]
-    opening_0 = c[0, lf.DRIVING_POSITION] + like(scalars[0, f.FIRST_STATE + f.SHIFT], zero)
+    opening_driving = c[0, lf.DRIVING_POSITION] + like(scalars[0, f.FIRST_STATE + f.SHIFT], zero)
+    opening_driven = like(scalars[0, lf.POSITION], zero)
     ring_relief = c[0, lf.RING_RELIEF] * speed_share * speed_share
     summed = profiles.rows > 0
-    driving = turned = driving_rub = rub = ring_loss = belt_loss = seating = zero
+    driving = turned = driving_rub = driven_rub = ring_loss = belt_loss = seating = zero
     stored = 0.5 * c[0, lf.DRIVEN_INERTIA] * turnings[1] * turnings[1]
     for j in range(n):
-        if j == belt.driven_start:
-            omega, surface, radius = turnings[1], surfaces[1], c[0, lf.DRIVEN_RADIUS]
-            opening_0 = like(scalars[0, lf.POSITION], zero)
-            driving_rub, rub = rub, zero
-            driving, turned = turned, zero
         a, b = j - 1 if j > 0 else n - 1, j + 1 if j < n - 1 else 0
         aa, bb = a - 1 if a > 0 else n - 1, b + 1 if b < n - 1 else 0
         right, dual = belt.cell[j], belt.dual[j]
         w, u = fields[j, f.W], fields[j, f.U]
         v0, v1 = belt_speed + fields[j, f.V_ELEMENT], belt_speed + fields[j, f.V_RING]
         slope = (fields[b, f.W] - fields[a, f.W]) * belt.per_span[j]
-        v_radial = fma(v0, slope, u)
-        belt_loss += dual * damping * v_radial * v_radial
+        v_across = fma(v0, slope, u)
+        belt_loss += dual * damping * v_across * v_across
         bent = belt.bending[j, 0] * fields[aa, f.W] + belt.bending[j, 1] * fields[a, f.W]
         bent += (
             belt.bending[j, 2] * w
@@ -133,16 +124,21 @@ def audit(
         if summed:
             moments.add_stresses(profiles, j, working, tension, push, maximum(damped, zero) - push)
         stored += (0.5 * right) * (elastic + rings * ring_stiffness * stretched * stretched)
-        v_element, across = fields[j, f.V_ELEMENT], -damping * v_radial
+        v_element, across = fields[j, f.V_ELEMENT], -damping * v_across
         if summed:
-            moments.add_speeds(profiles, j, v_radial, u, v_element, fields[j, f.V_RING])
-        share = belt.arc_share[j]
-        if share == 0.0:
+            moments.add_speeds(profiles, j, v_across, u, v_element, fields[j, f.V_RING])
+        if belt.touches[j] == 0.0:
             if summed:
                 moments.add_forces(profiles, j, across, u, across * slope, v_element)
             continue
         force = stations[j, lf.FORCE]
-        v_tangential = tangential_sliding(v_element, w, omega, surface)
+        on_driven, upright, lean = belt.on_driven[j] > 0.5, belt.upright[j], forces.leaning(belt, j, w)
+        omega, radius = (
+            (turnings[1], c[0, lf.DRIVEN_RADIUS]) if on_driven else (turnings[0], c[0, lf.DRIVING_RADIUS])
+        )
+        v_radial, v_tangential = forces.groove_sliding(
+            belt, j, (turnings, surfaces), belt_speed, v_across, v_element, w
+        )
         sliding, meridian = flank_sliding(v_radial, v_tangential, per_cosine)
         sliding = maximum(sliding, least)
         v_law = fields[j, f.V_FILTERED] if belt.memory else sliding
@@ -154,14 +150,23 @@ def audit(
         mu *= factor
         upward = mu * meridian / sliding
         twice_normal = 2.0 * force / fma(upward, sine, cosine)
-        elastic_radial = share * wedge * force
-        radial = share * twice_normal * (sine - upward * cosine) - elastic_radial
-        tangential = -share * twice_normal * mu * v_tangential / sliding
-        seating -= dual * elastic_radial * (v_radial - u)
-        rub -= dual * fma(radial, v_radial, tangential * v_tangential)
-        turned += dual * tangential * (radius + w) * omega
-        across += radial
-        along = fma(across + elastic_radial, slope, tangential)
+        elastic_radial = wedge * force
+        radial = twice_normal * (sine - upward * cosine) - elastic_radial
+        tangential = -twice_normal * mu * v_tangential / sliding
+        distance = radius + fma(upright, w, belt.rise[j])
+        # less the power that a change of displacement in place takes from the sheaves
+        seating -= dual * elastic_radial * (v_radial - upright * u)
+        rubbed = -dual * fma(radial, v_radial, tangential * v_tangential)
+        power = dual * tangential * distance * omega
+        if on_driven:
+            driven_rub += rubbed
+            turned += power
+        else:
+            driving_rub += rubbed
+            driving += power
+        rubbing, along = fma(upright, radial, -lean * tangential), fma(lean, radial, upright * tangential)
+        across += rubbing
+        along += fma(across + upright * elastic_radial, slope, lean * elastic_radial)
         if summed:
             moments.add_forces(profiles, j, across, u, along, v_element)
             moments.add_flanks(profiles, j, radial, tangential, v_radial, v_tangential)
@@ -175,7 +180,8 @@ def audit(
         ring_loss += drag * saddle
         if summed:
             moments.add_saddles(profiles, j, drag, saddle)
-        stored -= 0.5 * share * dual * force * fma(wedge, w, opening_0)
+        opening_0 = opening_driven if on_driven else opening_driving
+        stored -= 0.5 * dual * force * fma(wedge, fma(upright, w, belt.rise[j]), opening_0)
     thrust = c[0, lf.THRUST]
     axial_speed = (axial - thrust) / c[0, lf.AXIAL_DAMPING]
     rows[k, first + power_terms.DRIVING_POWER] = driving
@@ -184,7 +190,7 @@ def audit(
     )
     rows[k, first + power_terms.THRUST_POWER] = thrust * axial_speed
     rows[k, first + power_terms.DRIVING_FLANK_LOSS] = driving_rub
-    rows[k, first + power_terms.DRIVEN_FLANK_LOSS] = rub
+    rows[k, first + power_terms.DRIVEN_FLANK_LOSS] = driven_rub
     rows[k, first + power_terms.RING_LOSS] = ring_loss
     rows[k, first + power_terms.BELT_LOSS] = belt_loss
     rows[k, first + power_terms.LAYER_LOSS] = scalars[0, lf.LAYER_WORK] / interval

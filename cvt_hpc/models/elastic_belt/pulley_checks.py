@@ -1,7 +1,5 @@
 """Conflicts between the pulleys' settings, and settings without effect."""
 
-from __future__ import annotations
-
 from collections.abc import Mapping
 from typing import Any
 

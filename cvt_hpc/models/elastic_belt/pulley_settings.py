@@ -3,8 +3,6 @@
 No paper gives numbers of these: every default is an assumption, plausible and not measured.
 """
 
-from __future__ import annotations
-
 from collections.abc import Mapping
 from typing import Any
 

@@ -1,7 +1,5 @@
 """The pulleys' part of a step in lanes, and of the audit of power; their laws stand in `pulleys.py`."""
 
-from __future__ import annotations
-
 from cvt_hpc.kernels import kernel, merged_kernel
 from cvt_hpc.lanes import LaneArray, fma, like, select, sqrt
 from cvt_hpc.models.elastic_belt import fields as f

@@ -23,8 +23,6 @@ All of this stands for plain numbers as for lanes. Layers' speeds are counted fr
 speed, also where the pulley deviates from it, and so is m v^2: it is off by twice that deviation.
 """
 
-from __future__ import annotations
-
 from collections.abc import Mapping, Sequence
 from typing import Any, NamedTuple
 

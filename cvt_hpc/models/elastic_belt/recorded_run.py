@@ -1,7 +1,5 @@
 """Recording of every run of the elastic belt, with any stepper: its plan, its arrays and their reading."""
 
-from __future__ import annotations
-
 from collections.abc import Iterator, Mapping, Sequence
 from contextlib import contextmanager
 from typing import TYPE_CHECKING, Any, NamedTuple
@@ -21,7 +19,7 @@ from cvt_hpc.models.elastic_belt.pulley_settings import are_free
 from cvt_hpc.models.elastic_belt.ring_settings import layer_count
 from cvt_hpc.models.elastic_belt.rings import ring_constants, without_saddle_friction
 from cvt_hpc.models.elastic_belt.sampling import CHANNELS, ENDED, PROFILES, Outcome, Probe, Sensors
-from cvt_hpc.models.elastic_belt.validity import doubt
+from cvt_hpc.models.elastic_belt.validity import doubt, reach_doubt
 from cvt_hpc.physics.geometry import Variator
 from cvt_hpc.recording import sample_count, start_up_samples
 from cvt_hpc.variables import Status
@@ -277,7 +275,8 @@ class RecordedRun:
         (Status, str) or None
             The reason.
         """
-        return doubt(record, self.parameters, self.mesh)
+        found = doubt(record, self.parameters, self.mesh)
+        return found or reach_doubt(self.means["contact_force"], self.mesh)
 
 
 class OneLaneRun(RecordedRun):

@@ -9,18 +9,25 @@ outward):
     elements       m_0 (v_0,t + v_0 v_0,s) = -P,s + f_t - (1 + kappa d_1) q + (p_r - d_b (w_t + v_0 w_s)) w_s
     rings          m_1 (v_1,t + v_1 v_1,s) =  T,s + q
     transverse     m (w_tt + 2 v w_ts + v' w_s) = (F w_s),s - EI w_ssss - F kappa - d_b (w_t + v_0 w_s) + p_r
-    memory         v_f,t + v v_f,s = (|v| - v_f) / tau_f on the arcs, v_f = |v| where the belt enters
+    memory         v_f,t + v v_f,s = (|v| - v_f) / tau_f in contact, v_f = |v| where that begins
     pulleys        J omega_dn' = -sum f_t (r + w) - i M,   T_1 k z_dn' = sum f_ax - F_dn   (and `pulleys.py`)
 
 with q the friction of the rings on the elements' saddle, p_r, f_t the flanks' forces, |v| their sliding
 speed and M the load; v = r_dr omega_dr is the speed of the pitch line at the driving pulley's present speed,
 and v' its rate. The last term of the elements' equation is the radial load in the direction of the
 belt's actual tangent: it carries the power that radial sliding dissipates, and closes the balance of power.
-Stresses of T and P enter cells, everything else stations; the content is upwinded, since centred fluxes
-leave a free checkerboard mode where P = 0.
-"""
+An element is in a groove as long as that touches it, on the arc and beyond: x past a tangent point of the
+pitch radius R the pulley's axis is at the distance rho = hypot(x, R + w), and its radial unit vector has the
+angle theta = atan(x / (R + w)) to the path's normal. So with u = w_t + v_0 w_s
 
-from __future__ import annotations
+    gap            g = z + 2 tan d_0 (rho - R) + C f,   f >= 0, g >= 0, f g = 0
+    sliding        v_r = u cos theta + v_0 sin theta,   v_t = v_0 cos theta - u sin theta - omega rho
+    on the belt    along: p_r sin theta + f_t cos theta,   across: p_r cos theta - f_t sin theta
+    on the pulley  rho f_t
+
+and the equations above are those of theta = 0. Stresses of T and P enter cells, everything else stations; the
+content is upwinded, since centred fluxes leave a free checkerboard mode where P = 0.
+"""
 
 import numpy as np
 
@@ -28,10 +35,13 @@ from cvt_hpc.kernels import kernel, merged_kernel
 from cvt_hpc.models.elastic_belt import fields as f
 from cvt_hpc.models.elastic_belt.belt import Belt, State
 from cvt_hpc.models.elastic_belt.column import column_across, column_forces
+from cvt_hpc.physics import compliance
 from cvt_hpc.physics.compliance import Contact, plain_contact, solve_wrap
 from cvt_hpc.physics.flank import flank_forces, flank_sliding
 from cvt_hpc.physics.friction import friction_coefficient, saturation
 from cvt_hpc.variator.course import faded_damping, load_course, speed_course
+
+LEAST_WAY = 0.02  # share of a cell from the place where contact begins to a station, for its memory
 
 
 @merged_kernel
@@ -89,30 +99,41 @@ def fresh_contacts(belt: Belt) -> tuple[Contact, Contact]:
 
 @merged_kernel
 def wrap_contact(
-    belt: Belt, contact: Contact, w: np.ndarray, opening: float, tilt: np.ndarray, force: np.ndarray
+    belt: Belt,
+    contact: Contact,
+    places: np.ndarray,
+    w: np.ndarray,
+    opening: float,
+    tilt: np.ndarray,
+    force: np.ndarray,
 ) -> int:
     """Axial line forces of one wrap from its displacements; returns the solver's count, 0 where it failed.
 
-    `opening` and `tilt` (2,) are those of the rigid sheaves [m].
+    `places` (m,) are its stations, `opening` and `tilt` (2,) those of the rigid sheaves [m]; `w` and the
+    result `force` have all N stations. Where a station does not touch, it is the pull that would close its
+    gap, negative.
     """
-    gap = opening + 2.0 * np.tan(belt.half_wedge_angle) * w
+    gap, found = np.empty(places.size), np.empty(places.size)
+    for k in range(places.size):
+        gap[k] = contact.rise[k] + contact.upright[k] * w[places[k]]
+    gap = opening + 2.0 * np.tan(belt.half_wedge_angle) * gap
     gap = gap + (contact.cosine * tilt[0] + contact.sine * tilt[1])
-    solves = solve_wrap(contact, gap, force)
+    solves = solve_wrap(contact, gap, found)
+    for k in range(places.size):
+        force[places[k]] = found[k] if found[k] > 0.0 else min(contact.stations[k, compliance.PUSH], 0.0)
     return solves
 
 
 @merged_kernel
 def contact_forces(belt: Belt, state: State, contacts: tuple[Contact, Contact], force: np.ndarray) -> int:
-    """Axial line forces of both wraps into `force` (N,) [N/m], 0 on the strands; 0 solves: failure."""
+    """Axial line forces, or pulls, of both wraps into `force` (N,) [N/m]; 0 solves: failure."""
     force[:] = 0.0
     w = state.fields[f.W]
-    last = belt.driving.weight.size
     scalars, states = state.scalars, state.scalars[f.FIRST_STATE :]
     opening, tilt = belt.driving_position + states[f.SHIFT], states[f.DRIVING_COS : f.DRIVING_COS + 2]
-    solves = wrap_contact(belt, contacts[0], w[:last], opening, tilt, force[:last])
-    first, last = belt.driven_start, belt.driven_start + belt.driven.weight.size
+    solves = wrap_contact(belt, contacts[0], belt.driving_stations, w, opening, tilt, force)
     opening, tilt = scalars[f.DRIVEN_POSITION], states[f.DRIVEN_COS : f.DRIVEN_COS + 2]
-    more = wrap_contact(belt, contacts[1], w[first:last], opening, tilt, force[first:last])
+    more = wrap_contact(belt, contacts[1], belt.driven_stations, w, opening, tilt, force)
     return solves + more if solves > 0 and more > 0 else 0
 
 
@@ -164,8 +185,8 @@ def accelerations(
     rate : (7, N) array
         Rows U, V_ELEMENT and V_RING are set [m/s^2].
     moments : (N,) array
-        Result: moments of the stations' flanks on the driven pulley, and, of those before `driven_start`,
-        the torque that they take from the driving one [N m].
+        Result: moments of the stations' flanks on the driven pulley, and, of those that the driving one
+        holds, the torque that they take from it [N m].
     """
     n = belt.cell.size
     w, u = state.fields[f.W], state.fields[f.U]
@@ -216,21 +237,20 @@ def accelerations(
         push_right = damped_push(belt, pressed[j], (v0[b] - v0[j]) / right)
         along_element = -(push_right - push_left) / dual
 
-        share, moments[j] = belt.arc_share[j], 0.0
-        if share > 0.0:
-            driven = j >= belt.driven_start
-            radius = (belt.driven_radius if driven else belt.driving_radius) + w[j]
-            omega = state.scalars[f.DRIVEN_SPEED] if driven else driving_speed
-            v_tangential = v0[j] - omega * radius
-            speed, _ = flank_sliding(v_radial, v_tangential, 1.0 / cosine)
+        moments[j] = 0.0
+        if belt.touches[j] * force[j] > 0.0:
+            climb, v_tangential, radius = sliding_speeds(belt, state, j, v_radial, driving_speed)
+            speed, _ = flank_sliding(climb, v_tangential, 1.0 / cosine)
             v_law = speed if belt.friction_memory == 0.0 else vf[j]
             coefficient, _ = friction_coefficient(belt.law, v_law, force[j] / cosine)
             radial, tangential = flank_forces(
-                coefficient, belt.friction_speed, sine, cosine, force[j], v_radial, v_tangential
+                coefficient, belt.friction_speed, sine, cosine, force[j], climb, v_tangential
             )
-            outward += share * radial
-            along_element += share * tangential
-            moments[j] = (-1.0 if driven else 1.0) * share * dual * tangential * radius
+            lean = leaning(belt, j, w[j])
+            outward += belt.upright[j] * radial - lean * tangential
+            along_element += belt.upright[j] * tangential + lean * radial
+            moments[j] = (1.0 - 2.0 * belt.on_driven[j]) * dual * tangential * radius
+        if belt.arc_curvature[j] > 0.0:
             drag, _ = ring_drag(belt, j, a, eps, v0[j], v1[j], speed_share)
             along_ring += drag
             along_element -= (1.0 + belt.ring_offset * belt.arc_curvature[j]) * drag
@@ -257,21 +277,39 @@ def content_rates(belt: Belt, state: State, eps: np.ndarray, rate: np.ndarray) -
 
 
 @kernel
-def memory_rates(belt: Belt, state: State, rate: np.ndarray) -> None:
-    """Rate of the filtered sliding speed [m/s^2] on the arcs; where the belt enters it is |v| itself."""
-    n = belt.cell.size
+def memory_rates(belt: Belt, state: State, force: np.ndarray, rate: np.ndarray) -> None:
+    """Rate of the filtered sliding speed [m/s^2]; where a station does not touch it is |v| at once."""
     vf = state.fields[f.V_FILTERED]
     belt_speed = speed_share_at(belt, state.scalars[f.TIME]) * belt.belt_speed
-    for j in range(n):
+    for j in range(vf.size):
         rate[f.V_FILTERED, j] = 0.0
-        if belt.arc_share[j] == 0.0 or belt.friction_memory == 0.0:
+        if belt.touches[j] == 0.0 or belt.friction_memory == 0.0:
             continue
         speed = sliding_speed(belt, state, j)
-        if j == 0 or j == belt.driven_start:
-            vf[j] = speed
+        if force[j] > 0.0:
+            before = vf[j - 1]
+            if force[j - 1] <= 0.0:
+                before = sliding_speed(belt, state, j - 1 if j > 0 else vf.size - 1)
+            carried, entering = transported(belt, force, j, belt_speed, speed, before)
         else:
-            carried = memory_transport(belt, belt.cell[j - 1], belt_speed)
-            rate[f.V_FILTERED, j] = carried * (vf[j - 1] - vf[j]) + (speed - vf[j]) / belt.friction_memory
+            carried, entering = memory_transport(belt, LEAST_WAY * belt.cell[j - 1], belt_speed), speed
+        rate[f.V_FILTERED, j] = carried * (entering - vf[j]) + (speed - vf[j]) / belt.friction_memory
+
+
+@merged_kernel
+def transported(
+    belt: Belt, force: np.ndarray, j: int, belt_speed: float, speed: float, before: float
+) -> tuple[float, float]:
+    """Rate [1/s] of the memory's transport to station j, which touches, and the speed [m/s] that comes.
+
+    From the station behind, whose filtered speed is `before`; where that is open contact begins in between,
+    where the line from its pull to the force is 0, with the sliding speed |v| there.
+    """
+    cell, behind = belt.cell[j - 1], force[j - 1]
+    if behind > 0.0:
+        return memory_transport(belt, cell, belt_speed), before
+    way = max(force[j] / (force[j] - behind), LEAST_WAY)
+    return memory_transport(belt, way * cell, belt_speed), speed + way * (before - speed)
 
 
 @merged_kernel
@@ -286,10 +324,35 @@ def sliding_speed(belt: Belt, state: State, j: int) -> float:
     n = belt.cell.size
     a, b = j - 1 if j > 0 else n - 1, j + 1 if j < n - 1 else 0
     w, v = state.fields[f.W], state.fields[f.V_ELEMENT, j]
-    v_radial = state.fields[f.U, j] + v * (w[b] - w[a]) / (belt.cell[a] + belt.cell[j])
-    if j >= belt.driven_start:
-        v_tangential = v - state.scalars[f.DRIVEN_SPEED] * (belt.driven_radius + w[j])
-    else:
-        v_tangential = v - driving_speed_at(belt, state) * (belt.driving_radius + w[j])
-    speed, _ = flank_sliding(v_radial, v_tangential, 1.0 / np.cos(belt.half_wedge_angle))
+    v_across = state.fields[f.U, j] + v * (w[b] - w[a]) / (belt.cell[a] + belt.cell[j])
+    climb, v_tangential, _ = sliding_speeds(belt, state, j, v_across, driving_speed_at(belt, state))
+    speed, _ = flank_sliding(climb, v_tangential, 1.0 / np.cos(belt.half_wedge_angle))
     return speed
+
+
+@merged_kernel
+def leaning(belt: Belt, j: int, w: float) -> float:
+    """Part along the path of the pulley's radial unit vector at station j, displaced by w [1]."""
+    return belt.lean[j] - belt.lean_rate[j] * w
+
+
+@merged_kernel
+def sliding_speeds(
+    belt: Belt, state: State, j: int, v_across: float, driving_speed: float
+) -> tuple[float, float, float]:
+    """Sliding of station j in its groove: radial, tangential [m/s], and the distance from the axis [m].
+
+    With the element's velocities v_0 along the path and u = w_t + v_0 w_s across it
+
+        v_r = u cos(theta) + v_0 sin(theta),    v_t = v_0 cos(theta) - u sin(theta) - omega rho.
+    """
+    w, v = state.fields[f.W, j], state.fields[f.V_ELEMENT, j]
+    lean, upright = leaning(belt, j, w), belt.upright[j]
+    omega = state.scalars[f.DRIVEN_SPEED] if belt.on_driven[j] > 0.0 else driving_speed
+    distance = (belt.driven_radius if belt.on_driven[j] > 0.0 else belt.driving_radius) + belt.rise[j]
+    distance += upright * w
+    return (
+        v_across * upright + v * lean,
+        v * upright - v_across * lean - omega * distance,
+        distance,
+    )

@@ -3,8 +3,6 @@
 No paper gives numbers: thickness and friction are assumptions, those of common belts.
 """
 
-from __future__ import annotations
-
 from collections.abc import Mapping
 from typing import Any
 

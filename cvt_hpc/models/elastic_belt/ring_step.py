@@ -21,8 +21,6 @@ some 40 at 4.6 us and 160 stations, 1 below 0.75 us: the error vanishes with the
 with its slope, or where it would turn sliding about by itself with as much of the secant as prevents that.
 """
 
-from __future__ import annotations
-
 from collections.abc import Sequence
 from typing import NamedTuple
 
@@ -34,6 +32,7 @@ from cvt_hpc.models.elastic_belt import lane_forces as forces
 from cvt_hpc.models.elastic_belt import lane_rings
 from cvt_hpc.models.elastic_belt.belt import Belt
 from cvt_hpc.models.elastic_belt.imex import MOST_PASSES, advance_belt, forget
+from cvt_hpc.models.elastic_belt.imex_bending import move_across, move_with_layers
 from cvt_hpc.models.elastic_belt.imex_stations import assemble
 from cvt_hpc.models.elastic_belt.imex_system import TURNS_BACK, eliminate, substitute
 from cvt_hpc.models.elastic_belt.lane_belt import LaneBelt, LaneState, Work, work_space
@@ -59,8 +58,8 @@ class RingWork(NamedTuple):
 
     Attributes
     ----------
-    stations : (N, 43) LaneArray
-        As of `imex`.
+    stations : (N, 44) LaneArray
+        As of `ImexWork`.
     layers : (N, 5 n + 4) LaneArray
         See above.
     rings : LaneRings
@@ -135,6 +134,7 @@ def step_rings(belt: LaneBelt, state: LaneState, work: RingWork, step: float) ->
     one = Work(work.stations)
     forces.lane_sliding(belt, state, work.stations)
     assemble(belt, state, one, step, False)
+    move_across(belt, state, one, step)
     couple_layers(belt, work.rings, state, work, step)
     for attempt in range(MOST_PASSES):
         eliminate(belt, state, one, step, attempt > 0)
@@ -146,7 +146,9 @@ def step_rings(belt: LaneBelt, state: LaneState, work: RingWork, step: float) ->
             break
         if found & TURNS_BACK:
             assemble(belt, state, one, step, True)
+            move_across(belt, state, one, step)
             couple_layers(belt, work.rings, state, work, step)
+    move_with_layers(belt, state, one, step)
     taken, moment = advance_belt(belt, state, one, step)
     advance_layers(belt, work.rings, state, work, step)
     advance_pulleys(belt, state, taken, moment, step)
@@ -225,7 +227,7 @@ def couple_layers(belt: LaneBelt, rings: LaneRings, state: LaneState, work: Ring
             turn,
             per_dual,
         )
-        on_arc = anywhere(belt.arc_share[j] > 0.0)
+        on_arc = anywhere(belt.arc_curvature[j] > 0.0)
         is_driven = belt.on_driven[j] > 0.5
         element = fields[j, f.V_ELEMENT]
         left = right = largest = below = zero
@@ -351,7 +353,7 @@ def advance_layers(belt: LaneBelt, rings: LaneRings, state: LaneState, work: Rin
             element = stations[j, lf.DV_0]
             common = fma(stations[j, lf.DV_1], n, -layers[j, last + OWN_SUM])
             common = fma(-layers[j, last + ELEMENT_SUM], element, common) * layers[j, last + PER_COMMON_SUM]
-            on_arc = anywhere(belt.arc_share[j] > 0.0)
+            on_arc = anywhere(belt.arc_curvature[j] > 0.0)
             on_ears = on_arc and anywhere(layers[j, last + ON_EARS] > 0.0)
             change, total = element, zero
             for k in range(n):

@@ -4,8 +4,6 @@ Unknowns are those of `one_system`, of which the rings as one are left alone and
 the layers' speeds less the nominal belt speed, (n, N), and their contents less 1 + kappa d_k, (n, N).
 """
 
-from __future__ import annotations
-
 from typing import NamedTuple
 
 import numpy as np

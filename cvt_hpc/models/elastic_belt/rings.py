@@ -16,8 +16,6 @@ mean speed. Rows V_RING and N_RING of a state have these. The layers' own rows f
 n contents less 1 + kappa d_k.
 """
 
-from __future__ import annotations
-
 from collections.abc import Mapping
 from typing import Any, NamedTuple
 
@@ -204,7 +202,7 @@ def layer_rates(
             right = rings.stiffness * eps[k, j] + rings.damping * (v[k, b] - v[k, j]) / belt.cell[j]
             rate[k, j] = (right - left) / belt.dual[j]
         rate[2 * n, j] = 0.0
-        if belt.arc_share[j] > 0.0:
+        if belt.arc_curvature[j] > 0.0:
             surface_friction(belt, rings, state, eps, share, j, normal, sliding)
             for k in range(n + 1):
                 secant, _ = ring_friction(

@@ -1,7 +1,5 @@
 """The recorded quantities of the belt at each sampling instant, and when a run has to be stopped."""
 
-from __future__ import annotations
-
 from enum import IntEnum
 from fractions import Fraction
 from typing import Any, NamedTuple
@@ -20,7 +18,6 @@ from cvt_hpc.models.elastic_belt.power import audit
 from cvt_hpc.models.elastic_belt.power_terms import POWERS
 from cvt_hpc.models.elastic_belt.pulley_step import opening_by_tilt
 from cvt_hpc.physics import compliance
-from cvt_hpc.physics.flank import tangential_sliding
 from cvt_hpc.variator import LEAST_SPEED, MOST_SPEED
 
 SCALARS = (
@@ -167,9 +164,10 @@ def sensors(grid: Mesh, places: tuple[Probe, ...], interval: float, dtype: type)
         rows.append(row)
     for region in (1, 3):
         first, count = grid.starts[region], grid.counts[region]
-        x = np.arange(count) / count
+        length = grid.path.lengths[region]
+        x, dual = grid.along(region)[:-1] / length, 0.5 * (grid.cell + np.roll(grid.cell, 1))
         for k in range(1, MODES + 1):
-            shape = np.sin(k * np.pi * x) * 2.0 / count
+            shape = np.sin(k * np.pi * x) * 2.0 * dual[first : first + count] / length
             row = np.zeros(n)
             row[first : first + count] = shape
             row[first] -= shape @ (1.0 - x)
@@ -233,23 +231,27 @@ def sample(belt: LaneBelt, state: LaneState, stations: LaneArray, samples: Sampl
     rows[k, sensed + Scalar.DRIVING_SPEED] = driving_speed + state.scalars[0, f.FIRST_STATE + f.EXCESS]
     shift = state.scalars[0, f.FIRST_STATE + f.SHIFT]
     rows[k, sensed + Scalar.DRIVING_POSITION] = like(c[0, lf.DRIVING_POSITION], speed) + shift
-    turnings, surfaces = forces.lane_pulleys(belt, share, state.scalars)
+    pulleys = forces.lane_pulleys(belt, share, state.scalars)
+    n = fields.rows
     axial = zero
     for wrap in range(2):
-        weight = state.contacts[1].weight if wrap else state.contacts[0].weight
-        first = belt.driven_start if wrap else 0
-        turning, surface = turnings[wrap], surfaces[wrap]
+        contact, places = state.contacts[1] if wrap else state.contacts[0], belt.places[wrap][0]
+        weight = contact.weight
         axial = sliding = open_length = zero
         length = 0.0
         for i in range(weight.size):
-            force = stations[first + i, lf.FORCE]
-            slides = tangential_sliding(
-                fields[first + i, f.V_ELEMENT], fields[first + i, f.W], turning, surface
+            j = places[i]
+            a, b, force = j - 1 if j > 0 else n - 1, j + 1 if j < n - 1 else 0, stations[j, lf.FORCE]
+            slope, v_element = (fields[b, f.W] - fields[a, f.W]) * belt.per_span[j], fields[j, f.V_ELEMENT]
+            v_across = fma(belt_speed + v_element, slope, fields[j, f.U])
+            _, slides = forces.groove_sliding(
+                belt, j, pulleys, belt_speed, v_across, v_element, fields[j, f.W]
             )
             axial += weight[i] * force
             sliding += weight[i] * force * slides
-            open_length += select(force > 0.0, zero, weight[i])
-            length += weight[i]
+            if contact.rise[i] == 0.0:
+                open_length += select(force > 0.0, zero, weight[i])
+                length += weight[i]
         rows[k, sensed + Scalar.AXIAL_FORCE_DRIVING + wrap] = axial
         rows[k, sensed + Scalar.SLIP_DRIVING + wrap] = sliding / (maximum(axial, LEAST_FORCE) * belt_speed)
         rows[k, sensed + Scalar.OPEN_SHARE_DRIVING + wrap] = open_length / length

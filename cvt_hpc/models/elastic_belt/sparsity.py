@@ -4,8 +4,6 @@ For integrators that can use it: SciPy's BDF and Radau factorise it as a sparse 
 the sheaves, whose deformation lets each displacement of a wrap act on every force of that wrap.
 """
 
-from __future__ import annotations
-
 import numpy as np
 from scipy.sparse import csc_array
 
@@ -43,8 +41,8 @@ REACH = {
 # curvature, which turns motion along the belt into motion across it, and back
 OF_COLUMN = {f.U: {f.N_ELEMENT: (-2, 1)}, f.V_ELEMENT: {f.W: (-2, 2)}}
 OF_CURVATURE = {f.U: {f.V_RING: (0, 0)}, f.V_RING: {f.U: (0, 0)}}
-# A station's flank forces and filtered speed: beyond the above they depend on the driven pulley,
-# and where the belt enters its filtered speed is that of sliding there
+# A station's flank forces and filtered speed: beyond the above they depend on the driven pulley, the filtered
+# speed where contact begins on sliding at the open station behind, and on where that is, by the forces
 ON_FLANK = {f.U: (-1, 0), f.V_ELEMENT: (-1, 0), f.W: (-2, 1), f.V_FILTERED: (-1, 0)}
 
 
@@ -69,23 +67,22 @@ def pattern(flat: FlatBelt) -> csc_array:
         for row, reaches in reach.items():
             for unknown, (behind, ahead) in reaches.items():
                 mark(row, unknown, np.arange(n), range(behind, ahead + 1))
-    for sheave, first in ((belt.driving, 0), (belt.driven, belt.driven_start)):
-        arc = np.arange(first, first + sheave.weight.size)
+    for arc, is_driven in ((belt.driving_stations, False), (belt.driven_stations, True)):
         for row in (f.U, f.V_ELEMENT, f.V_FILTERED):
             for unknown, (behind, ahead) in ON_FLANK.items():
                 mark(row, unknown, arc, range(behind, ahead + 1))
-        pushed = [place[f.U][arc], place[f.V_ELEMENT][arc]]
+        remembered = place[f.V_FILTERED][arc]
+        remembered = remembered[remembered >= 0]
+        pushed = [place[f.U][arc], place[f.V_ELEMENT][arc], remembered]
         moved = [place[f.W][arc]]
-        if first > 0:
+        if is_driven:
             pushed += [place[SPEED], place[OPENING]]
             moved += [place[OPENING]]
-            remembered = place[f.V_FILTERED][arc]
-            turned = np.concatenate([*pushed, remembered[remembered >= 0]])
-            found[turned, place[SPEED]] = True
+            found[np.concatenate(pushed), place[SPEED]] = True
             rim = [place[row] for row in (f.W, f.U, f.V_ELEMENT)]
-            near = np.arange(first - 1, arc[-1] + 2) % n
+            near = np.arange(arc[0] - 1, arc[-1] + 2) % n
             found[np.ix_(place[SPEED], np.concatenate([row[near] for row in rim]))] = True
-            found[np.ix_(place[SPEED], remembered[remembered >= 0])] = True
+            found[np.ix_(place[SPEED], remembered)] = True
         found[np.ix_(np.concatenate(pushed), np.concatenate(moved))] = True
     # states of free pulleys know both wraps, and all of those know them
     if flat.loose.size > 0:

@@ -1,7 +1,5 @@
 """The belt's own steps from states of one's choice: runs without a job, a recording or a verdict."""
 
-from __future__ import annotations
-
 from collections.abc import Sequence
 
 import numpy as np

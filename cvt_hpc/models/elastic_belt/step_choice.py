@@ -5,21 +5,18 @@ length over the period. REFERENCE_STEP changes it by REFERENCE_ERROR at the work
 vibrations are below REFERENCE_BAND. Elsewhere that is no bound: of 81 random scenes that vibrate it changes
 half by more than 1.2 %, a tenth by more than 9 % (`README.md`).
 
-**Stability.** Transverse motion is explicit: beyond 2 / w the shortest waves grow, w being their angular
-frequency under bending, tension and contact (`transverse_limit`). Measured limits are 1.00 to 1.2 of that
-(`EDGES.md`); the step chosen stays at SAFE_SHARE of it.
+**Stability.** Transverse motion is explicit but for bending (`imex_bending`): beyond 2 / w the shortest waves
+grow, w being their angular frequency under tension and contact (`transverse_limit`). The step chosen stays at
+SAFE_SHARE of that.
 """
-
-from __future__ import annotations
 
 from collections.abc import Mapping
 from typing import Any
 
 import numpy as np
 
-from cvt_hpc.models.elastic_belt.bending_settings import whole_bending_stiffness
 from cvt_hpc.parameters import Substitute
-from cvt_hpc.physics.geometry import cell_counts, variator, variator_problems
+from cvt_hpc.physics.geometry import cut_path, variator, variator_problems
 from cvt_hpc.physics.sheaves import axial_element_stiffness
 
 REFERENCE_STEP, REFERENCE_ERROR = 4.6e-6, 0.02  # [s], share of the amplitude
@@ -33,23 +30,22 @@ NEEDS = (
     "driven_radius",
     "centre_distance",
     "stations",
+    "end_refinement",
     "thrust",
     "element_mass",
     "ring_mass",
-    "bending_stiffness",
     "flank_stiffness",
     "element_factor",
     "half_wedge_angle",
-    "column_bending",
-    "column_stiffness",
 )
 
 
 def transverse_limit(parameters: Mapping[str, Any]) -> float:
     """Longest stable step of the transverse motion [s].
 
-    The fastest waves are two cells long, in the grooves:
-    w^2 = (16 EI / h^4 + 4 F / h^2 + 4 c_e tan^2 delta) / m.
+    The fastest waves are two of the shortest cells long, in the grooves:
+    w^2 = (4 F / h^2 + 4 c_e tan^2 delta) / m.
+    Bending, which is implicit, has no part in it.
 
     Parameters
     ----------
@@ -58,12 +54,10 @@ def transverse_limit(parameters: Mapping[str, Any]) -> float:
     """
     p = parameters
     path = variator(p["ratio"], p["driven_radius"], p["centre_distance"])
-    counts = cell_counts(path, p["stations"])
-    cell = min(length / count for length, count in zip(path.lengths, counts, strict=True))
+    cell = min(cells.min() for cells in cut_path(path, p["stations"], p["end_refinement"]))
     slope = np.tan(p["half_wedge_angle"])
     force = 2.0 * slope * p["thrust"] / path.driven_wrap
-    stiffness = 16.0 * whole_bending_stiffness(p) / cell**4 + 4.0 * force / cell**2
-    stiffness += 4.0 * slope**2 * axial_element_stiffness(p)
+    stiffness = 4.0 * force / cell**2 + 4.0 * slope**2 * axial_element_stiffness(p)
     return float(2.0 / np.sqrt(stiffness / (p["element_mass"] + p["ring_mass"])))
 
 

@@ -1,7 +1,5 @@
 """Transient runs of the elastic belt: state, stepper and recording in one object, for one run or a batch."""
 
-from __future__ import annotations
-
 from collections.abc import Mapping, Sequence
 from typing import Any
 

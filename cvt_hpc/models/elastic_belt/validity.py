@@ -1,9 +1,9 @@
 """Conditions that end a run, and checks of the numbers of a run that reached its end."""
 
-from __future__ import annotations
-
 from collections.abc import Mapping
 from typing import Any
+
+import numpy as np
 
 from cvt_hpc.models.elastic_belt.belt import Mesh
 from cvt_hpc.models.elastic_belt.sampling import LARGEST_ELEMENT_STRAIN, LARGEST_STRAIN, Outcome
@@ -75,8 +75,8 @@ def power_limit(grid: Mesh) -> float:
 
 
 def _strand_cell(grid: Mesh) -> float:
-    """Length of the cells of the first strand [m]."""
-    return float(grid.cell[grid.starts[1]])
+    """Length of the longest cell of a strand [m]."""
+    return float(grid.cell[grid.region == 1].max())
 
 
 def step_doubt(step: float, limit: float) -> tuple[Status, str] | None:
@@ -85,6 +85,30 @@ def step_doubt(step: float, limit: float) -> tuple[Status, str] | None:
         return None
     why = f"the step {step:.3g} s is beyond the longest that is stable, {limit:.3g} s"
     return Status.FAILED_NUMERICS, f"{why}: shorter waves across the belt grow from step to step"
+
+
+def reach_doubt(force: np.ndarray, grid: Mesh) -> tuple[Status, str] | None:
+    """Whether contact went on to the last stations that a groove may hold, and so might go on beyond them.
+
+    Parameters
+    ----------
+    force : (N,) array
+        Mean axial line force of the flanks [N/m].
+    grid : Mesh
+        The belt's mesh.
+
+    Returns
+    -------
+    (Status, str) or None
+        The reason.
+    """
+    for region in (0, 2):
+        zone = grid.zone(region)
+        for end in (0, -1):
+            if force[zone.stations[end]] > 0.0:
+                found = f"the belt touches a groove {abs(zone.beyond[end]) * 1e3:.3g} mm beyond its arc"
+                return Status.FAILED_NUMERICS, f"{found}, where contact is not tested any further"
+    return None
 
 
 def doubt(record: dict[str, Any], parameters: Mapping[str, Any], grid: Mesh) -> tuple[Status, str] | None:

@@ -7,8 +7,6 @@ that matter: one that enters it looks as if it had crossed the axis. A load at w
 is a gap: nothing is joined across it.
 """
 
-from __future__ import annotations
-
 from collections.abc import Iterator, Sequence
 from itertools import pairwise
 from typing import NamedTuple

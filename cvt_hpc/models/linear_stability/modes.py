@@ -10,8 +10,6 @@ is their power over twice the vibration's energy, which is twice its mean kineti
 with the damping d it is -d / (2 m).
 """
 
-from __future__ import annotations
-
 from typing import NamedTuple
 
 import numpy as np
@@ -84,7 +82,9 @@ def modes(
     linearise = Linearisation(flat)
     whole = linearise(flat)
     # the same without flanks and saddles: the difference is the effect of their friction and contact
-    free = linearise(flat._replace(belt=belt._replace(arc_share=np.zeros_like(belt.arc_share))))
+    nowhere = np.zeros_like(belt.touches)
+    without = belt._replace(touches=nowhere, arc_curvature=nowhere)
+    free = linearise(flat._replace(belt=without))
     values, vectors = eigenpairs(whole, 2.0 * np.pi * band[0], 2.0 * np.pi * band[1], decay, GROWTH)
     n = belt.cell.size
     velocities = slice(n, 4 * n)
@@ -112,8 +112,9 @@ def _shape(w: np.ndarray, grid: Mesh) -> tuple[np.ndarray, int, int]:
         first, count = grid.starts[region], grid.counts[region]
         part = np.append(w[first : first + count], w[(first + count) % w.size])
         largest[region] = np.abs(part).max()
-        along = np.linspace(0.0, 1.0, count + 1)
-        sines = np.sin(np.pi * np.outer(np.arange(1, MODES + 1), along))
+        along = grid.along(region) / grid.path.lengths[region]
+        weights = np.append(0.0, 0.5 * (np.diff(along)[1:] + np.diff(along)[:-1]))
+        sines = np.sin(np.pi * np.outer(np.arange(1, MODES + 1), along)) * np.append(weights, 0.0)
         chord = part[0] + along * (part[-1] - part[0])
         waves[region] = 1 + np.abs(sines @ (part - chord)).argmax()
     strand = int(largest[3] > largest[1])

@@ -1,7 +1,5 @@
 """Parameters of linear stability: the steady belt's parameters, and the limits of the verdict."""
 
-from __future__ import annotations
-
 from typing import Any
 
 from cvt_hpc.models import steady_variator

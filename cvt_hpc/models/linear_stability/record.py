@@ -1,7 +1,5 @@
 """The record of linear stability: the verdict, and the mode that grows fastest."""
 
-from __future__ import annotations
-
 from collections.abc import Mapping
 from typing import Any, NamedTuple
 

@@ -5,8 +5,6 @@ other lies in the disc up to the farthest of them. Discs are laid up along the m
 was requested, each as far on as the last one reaches, until they cover it: so nothing in it can be missed.
 """
 
-from __future__ import annotations
-
 import numpy as np
 from scipy.sparse import csc_array, eye_array
 from scipy.sparse.linalg import LinearOperator, eigs, splu

@@ -1,7 +1,5 @@
 """The shapes across the belt, and which of them move by inertia: the split at the limit frequency."""
 
-from __future__ import annotations
-
 from typing import NamedTuple
 
 import numpy as np
@@ -91,7 +89,7 @@ def free_stiffness(belt: Belt) -> np.ndarray:
     for j in range(n):
         for k in range(5):
             stiffness[j, (j + k - 2) % n] -= belt.dual[j] * belt.bending[j, k]
-    wrap = belt.driven.weight.sum() / belt.driven_radius
+    wrap = (belt.cell * belt.curvature * belt.on_driven).sum()
     gradient = np.diag(1.0 / belt.cell) @ (np.roll(np.eye(n), 1, axis=1) - np.eye(n))
     tension = 2.0 * np.tan(belt.half_wedge_angle) * belt.thrust / wrap
     stiffness += tension * (gradient.T * belt.cell) @ gradient
@@ -102,11 +100,11 @@ def transverse_stiffness(belt: Belt) -> np.ndarray:
     """Stiffness of the stations at rest in closed grooves, without sliding, (N, N) symmetric [N/m]."""
     stiffness = free_stiffness(belt)
     tangent = np.tan(belt.half_wedge_angle)
-    for sheave, first in ((belt.driving, 0), (belt.driven, belt.driven_start)):
-        stations = slice(first, first + sheave.weight.size)
-        stiffness[stations, stations] += (
-            4.0 * tangent**2 * sheave.weight[:, None] * np.linalg.inv(flexibility(sheave))
-        )
+    for sheave, zone in ((belt.driving, belt.driving_stations), (belt.driven, belt.driven_stations)):
+        on_arc = sheave.rise == 0.0
+        stations, closed = zone[on_arc], np.ix_(on_arc, on_arc)
+        held = sheave.weight[on_arc, None] * np.linalg.inv(flexibility(sheave)[closed])
+        stiffness[np.ix_(stations, stations)] += 4.0 * tangent**2 * held
     return 0.5 * (stiffness + stiffness.T)
 
 

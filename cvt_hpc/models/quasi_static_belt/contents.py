@@ -5,8 +5,6 @@ against a drag, d xi' = N,s + f - mean; content is conserved, n' = -xi'_s. Conte
 follow by Newton's iteration, in which the corner of the push force opens and closes cells.
 """
 
-from __future__ import annotations
-
 import numpy as np
 
 from cvt_hpc.kernels import kernel

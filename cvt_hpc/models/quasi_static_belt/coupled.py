@@ -8,8 +8,6 @@ block-tridiagonal, symmetric positive definite: the layers are chains of masses.
 columns of c R at once, and the remaining system is dense and small.
 """
 
-from __future__ import annotations
-
 from typing import NamedTuple
 
 import numpy as np

@@ -1,7 +1,5 @@
 """Increments of all speeds in a step: the coordinates' dense system, into which the layers' is eliminated."""
 
-from __future__ import annotations
-
 import numpy as np
 
 from cvt_hpc.kernels import kernel
@@ -110,7 +108,7 @@ def _reduce(model: SplitBelt, work: Work) -> None:
         right = stations[q.ACROSS, j]
         for k in range(size):
             row[k] = slope * shapes[j, k]
-        if not model.steady_flow and belt.arc_share[j] > 0.0:
+        if not model.steady_flow and belt.touches[j] > 0.0:
             done = columns[j, q.ELEMENT]
             right -= cross * done[q.RIGHT]
             for k in range(size):
@@ -147,13 +145,16 @@ def contradicts(model: SplitBelt, moved: Motion, work: Work) -> bool:
     n, found = belt.cell.size, False
     for j in range(n):
         dv0, dv1 = columns[j, q.ELEMENT, q.RIGHT], columns[j, q.RING, q.RIGHT]
-        if belt.arc_share[j] > 0.0:
+        if moved.force[j] > 0.0:
             v_radial, v_tangential = stations[q.RADIAL_SPEED, j], stations[q.TANGENTIAL_SPEED, j]
             squared = v_radial * v_radial + v_tangential * v_tangential
-            back = v_radial * work.rate[f.U, j] + v_tangential * dv0 < -squared
+            du, upright, lean = work.rate[f.U, j], belt.upright[j], belt.lean[j]
+            turned = v_radial * (upright * du + lean * dv0) + v_tangential * (upright * dv0 - lean * du)
+            back = turned < -squared
             back = back and squared > belt.friction_speed * belt.friction_speed
             if back and stations[q.REVERSING, j] < 0.5:
                 stations[q.REVERSING, j], found = 1.0, True
+        if belt.arc_curvature[j] > 0.0:
             saddle = stations[q.SADDLE_SPEED, j]
             change = (1.0 + belt.ring_offset * belt.arc_curvature[j]) * dv0 - dv1
             back = abs(saddle) > belt.ring_friction_speed and saddle * (saddle + change) < 0.0

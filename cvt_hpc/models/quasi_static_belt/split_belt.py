@@ -3,8 +3,6 @@
 Rows of `Work.stations` are named here: the values of a step at each station.
 """
 
-from __future__ import annotations
-
 from typing import NamedTuple
 
 import numpy as np

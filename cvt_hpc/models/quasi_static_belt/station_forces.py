@@ -3,8 +3,6 @@
 As in `elastic_belt/imex_stations.py`, and hoop stresses: a cell that moves outwards is stretched.
 """
 
-from __future__ import annotations
-
 import numpy as np
 
 from cvt_hpc.kernels import kernel
@@ -50,16 +48,15 @@ def put_slopes(model: SplitBelt, moved: Motion, work: Work) -> None:
     blocks, links = work.layers.diagonal, work.layers.links
     for j in range(n):
         a, b = j - 1 if j > 0 else n - 1, j + 1 if j < n - 1 else 0
-        dual, share = belt.dual[j], belt.arc_share[j]
+        dual = belt.dual[j]
         element, ring = belt.element_mass / step, belt.ring_mass[j] / step
         slope = (w[b] - w[a]) / (belt.cell[a] + belt.cell[j])
-        v_radial = u[j] + v0[j] * slope
         radial_slope, cross, along_slope, stiff, lever = 0.5 * damping, 0.0, 0.0, 0.0, 1.0
-        if share > 0.0:
-            lever = 1.0 + belt.ring_offset * belt.arc_curvature[j]
-            driven = j >= belt.driven_start
-            turning = state.scalars[f.DRIVEN_SPEED] if driven else driving_speed
-            v_tangential = v0[j] - turning * ((belt.driven_radius if driven else belt.driving_radius) + w[j])
+        tangential_slope = tangential_cross = 0.0
+        if moved.force[j] > 0.0:
+            v_radial, v_tangential, _ = rhs.sliding_speeds(
+                belt, state, j, u[j] + v0[j] * slope, driving_speed
+            )
             speed, meridian = flank_sliding(v_radial, v_tangential, per_cosine)
             v_law = speed if belt.friction_memory == 0.0 else fields[f.V_FILTERED, j]
             speed = max(speed, LEAST_SHARE_OF_WIDTH * belt.friction_speed)
@@ -67,16 +64,25 @@ def put_slopes(model: SplitBelt, moved: Motion, work: Work) -> None:
             factor, steepness = saturation(speed, per_width)
             climb, run = meridian / speed, v_tangential / speed
             axial_share, _ = flank_shares(coefficient * factor, climb, sine, cosine)
-            twice_normal = 2.0 * share * moved.force[j] / axial_share
+            twice_normal = 2.0 * moved.force[j] / axial_share
             across = twice_normal * coefficient * factor / speed
             along = twice_normal * coefficient * steepness
             if stations[q.REVERSING, j] > 0.5:
                 along = across
             along, across = implicit_shares(along, across, element)
             excess = along - across
-            radial_slope += (across + excess * climb * climb) * per_cosine * per_cosine
-            cross = excess * climb * run * per_cosine
-            along_slope = across + excess * run * run
+            # with radial and tangential sliding, turned into slopes across and along the path
+            radial = (across + excess * climb * climb) * per_cosine * per_cosine
+            mixed, tangential = excess * climb * run * per_cosine, across + excess * run * run
+            upright, lean = belt.upright[j], rhs.leaning(belt, j, w[j])
+            radial_slope += upright**2 * radial - 2.0 * upright * lean * mixed + lean**2 * tangential
+            cross = upright * lean * (radial - tangential) + (upright**2 - lean**2) * mixed
+            along_slope = lean**2 * radial + 2.0 * upright * lean * mixed + upright**2 * tangential
+            tangential_slope = upright * tangential + lean * mixed
+            tangential_cross = upright * mixed - lean * tangential
+            stations[q.RADIAL_SPEED, j], stations[q.TANGENTIAL_SPEED, j] = v_radial, v_tangential
+        if belt.arc_curvature[j] > 0.0:
+            lever = 1.0 + belt.ring_offset * belt.arc_curvature[j]
             drag, saddle = rhs.ring_drag(belt, j, a, eps, v0[j], v1[j], speed_share)
             grip, _ = saturation(saddle, 1.0 / belt.ring_friction_speed)
             if stations[q.RING_REVERSING, j] > 0.5:
@@ -84,10 +90,10 @@ def put_slopes(model: SplitBelt, moved: Motion, work: Work) -> None:
             elif abs(grip) > 0.0:
                 stiff = drag / grip * (1.0 - grip * grip) / belt.ring_friction_speed
             stiff *= 0.5 + stiff / (2.0 * stiff + 12.0 * ring)
-            stations[q.RADIAL_SPEED, j], stations[q.TANGENTIAL_SPEED, j] = v_radial, v_tangential
             stations[q.SADDLE_SPEED, j] = saddle
         stations[q.RADIAL_SLOPE, j], stations[q.CROSS_SLOPE, j] = dual * radial_slope, dual * cross
-        stations[q.TANGENTIAL_SLOPE, j] = dual * along_slope
+        stations[q.TANGENTIAL_SLOPE, j] = dual * tangential_slope
+        stations[q.TANGENTIAL_CROSS, j] = dual * tangential_cross
         blocks[j, q.ELEMENT_ELEMENT] = dual * (element + along_slope + lever * lever * stiff)
         blocks[j, q.ELEMENT_RING], blocks[j, q.RING_RING] = -dual * lever * stiff, dual * (ring + stiff)
         # the layers' stresses at the end of the step, with the speeds that it begins with, and their slopes

@@ -14,8 +14,6 @@ is eliminated (`coupled.py`). With the steady flow of eqs 29 and 30 each layer h
 N, and its contents follow by an implicit step of their own (`contents.py`).
 """
 
-from __future__ import annotations
-
 import numpy as np
 
 from cvt_hpc.kernels import kernel
@@ -79,12 +77,13 @@ def _advance(model: SplitBelt, moved: Motion, work: Work) -> None:
     moment = taken = 0.0
     for j in range(n):
         du, dv0 = work.rate[f.U, j], columns[j, q.ELEMENT, q.RIGHT]
-        if belt.arc_share[j] > 0.0:
-            slopes = stations[q.TANGENTIAL_SLOPE, j] * dv0 + stations[q.CROSS_SLOPE, j] * du
-            if j >= belt.driven_start:
-                moment += work.moments[j] + slopes * (belt.driven_radius + fields[f.W, j])
+        if moved.force[j] > 0.0:
+            slopes = stations[q.TANGENTIAL_SLOPE, j] * dv0 + stations[q.TANGENTIAL_CROSS, j] * du
+            distance = belt.rise[j] + belt.upright[j] * fields[f.W, j]
+            if belt.on_driven[j] > 0.0:
+                moment += work.moments[j] + slopes * (belt.driven_radius + distance)
             else:
-                taken += work.moments[j] - slopes * (belt.driving_radius + fields[f.W, j])
+                taken += work.moments[j] - slopes * (belt.driving_radius + distance)
     for k in range(count):
         moved.p[k] += work.found[k]
     work_done = 0.0
@@ -129,14 +128,13 @@ def _advance(model: SplitBelt, moved: Motion, work: Work) -> None:
     for j in range(n):
         before = last
         last = fields[f.V_FILTERED, j]
-        if belt.friction_memory > 0.0 and belt.arc_share[j] > 0.0:
+        if belt.friction_memory > 0.0 and belt.touches[j] > 0.0:
             speed = rhs.sliding_speed(belt, state, j)
-            if j == 0 or j == belt.driven_start:
-                fields[f.V_FILTERED, j] = speed
-            else:
-                carried = rhs.memory_transport(belt, belt.cell[j - 1], belt_speed)
+            fields[f.V_FILTERED, j] = speed
+            if moved.force[j] > 0.0:
+                carried, entering = rhs.transported(belt, moved.force, j, belt_speed, speed, before)
                 forget = 1.0 / belt.friction_memory
-                target = (carried * before + forget * speed) / (carried + forget)
+                target = (carried * entering + forget * speed) / (carried + forget)
                 fields[f.V_FILTERED, j] = target + (last - target) * np.exp(-(carried + forget) * step)
     for j in range(n):
         fields[f.W, j] = work.rate[f.W, j]

@@ -11,8 +11,6 @@ M(omega) has small folds where single cells open. Steps that do not come through
 does not help the continuation leaps ahead, onto the curve behind such a fold.
 """
 
-from __future__ import annotations
-
 from collections.abc import Iterator
 
 import numpy as np

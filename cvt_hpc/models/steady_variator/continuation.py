@@ -1,7 +1,5 @@
 """The steady equations of a belt, and paths along which their constants change while a solution follows."""
 
-from __future__ import annotations
-
 from collections.abc import Callable, Mapping
 from typing import Any
 

@@ -19,8 +19,6 @@ right-hand side jumps at eps_0 = 0, and a push between 0 and D |v_0,s| has no ot
 is 10 to 50 nm.
 """
 
-from __future__ import annotations
-
 from collections.abc import Mapping
 from typing import Any
 

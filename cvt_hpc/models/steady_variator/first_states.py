@@ -7,8 +7,6 @@ where the belt slips through, since constant friction carries less than a fallin
 another load. In the last place it begins at the belt in its grooves without load.
 """
 
-from __future__ import annotations
-
 import math
 from collections.abc import Callable, Mapping
 from typing import Any

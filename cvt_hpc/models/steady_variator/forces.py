@@ -38,8 +38,6 @@ class Distributions(NamedTuple):
         Axial line force of one flank [N/m].
     element_speed, ring_speed : (N,) arrays
         Along the path [m/s].
-    tangential_sliding : (N,) array
-        Of the elements against the sheaves; 0 on the strands [m/s].
     displacement : (N,) array
         Off the reference path, outward [m].
     """
@@ -49,7 +47,6 @@ class Distributions(NamedTuple):
     contact_force: np.ndarray
     element_speed: np.ndarray
     ring_speed: np.ndarray
-    tangential_sliding: np.ndarray
     displacement: np.ndarray
 
 
@@ -65,17 +62,12 @@ def distributions(steady: Steady) -> Distributions:
     force, eps = np.empty(n), np.empty((2, n))
     contact_forces(belt, steady.state, fresh_contacts(belt), force)
     strains(belt, fields, eps)
-    driven = np.arange(n) >= belt.driven_start
-    radius = np.where(driven, belt.driven_radius, belt.driving_radius) + fields[f.W]
-    turning = np.where(driven, steady.state.scalars[f.DRIVEN_SPEED], driving_speed(steady))
-    sliding = np.where(belt.arc_share > 0.0, fields[f.V_ELEMENT] - turning * radius, 0.0)
     return Distributions(
         belt.ring_stiffness * eps[1],
         np.maximum(-belt.element_stiffness * pressed_strains(belt, fields, eps[0]), 0.0),
-        force,
+        np.maximum(force, 0.0),
         fields[f.V_ELEMENT].copy(),
         fields[f.V_RING].copy(),
-        sliding,
         fields[f.W].copy(),
     )
 

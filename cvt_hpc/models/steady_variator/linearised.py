@@ -7,8 +7,6 @@ the set of closed stations the forces follow from the gaps by a linear system, d
 belt by eight numbers (`pulled_by`) alone, so their rows are the slopes with these times those of them.
 """
 
-from __future__ import annotations
-
 import numpy as np
 from scipy.sparse import csc_array, csr_array
 
@@ -80,16 +78,14 @@ def slopes_with_scalar(flat: one.FlatBelt, place: int, size: float, slopes: np.n
         _evaluate(flat, out)
     slopes[:] = (ahead - behind) / (2.0 * INCREMENT * size)
     scalars[place] = unmoved
-    one.set_inlets(flat)
 
 
 @kernel
 def _evaluate(flat: one.FlatBelt, out: np.ndarray) -> None:
-    one.set_inlets(flat)
     one.rates_under_forces(flat)
     out[:MOMENT], out[MOMENT] = flat.rate, flat.moments
     if flat.loose.size == 0:
-        out[MOMENT, : flat.belt.driven_start] = 0.0
+        out[MOMENT] *= flat.belt.on_driven
 
 
 @kernel
@@ -126,10 +122,7 @@ class Linearisation:
     def __init__(self, flat: one.FlatBelt) -> None:
         belt = flat.belt
         n, self._count = belt.cell.size, flat.origin.size
-        self._arcs = [
-            first + np.arange(sheave.weight.size)
-            for first, sheave in ((0, belt.driving), (belt.driven_start, belt.driven))
-        ]
+        self._arcs = [belt.driving_stations, belt.driven_stations]
         place = np.full((len(f.FIELDS) + 1, n), -1)
         for k, row in enumerate(one.ROWS):
             place[row] = k * n + np.arange(n)
@@ -140,7 +133,7 @@ class Linearisation:
         self._loose = len(one.ROWS) * n + flat.remembering.size + np.arange(flat.loose.size)
         place[MOMENT] = self._count - 2
         if flat.loose.size:  # torque taken from the driving pulley, and put into the driven one
-            place[MOMENT] = self._count + (np.arange(n) >= belt.driven_start)
+            place[MOMENT] = self._count + belt.on_driven.astype(int)
         place[f.W] = -1
         rows, columns = place[o, (j + d - REACH) % n], unknown[i, j]
         self._known = (rows >= 0) & (columns >= 0)
@@ -166,7 +159,7 @@ class Linearisation:
             (self._turning[self._turned], self._turned_rows, np.full(self._turned_rows.size, count - 2)),
             (np.ones(n), stations, n + stations),  # w' = u
             (
-                belt.driven.weight / belt.axial_damping,
+                belt.driven.weight * (flat.force[belt.driven_stations] > 0.0) / belt.axial_damping,
                 np.full(driven, count - 1),
                 count + forces - driven + np.arange(driven),
             ),
@@ -196,10 +189,10 @@ class Linearisation:
         acting = np.zeros((18, width))
         acting[:2] = local[count:].toarray()
         first = count
-        for wrap, sheave in enumerate((belt.driving, belt.driven)):
-            own = slice(first, first + sheave.weight.size)
-            acting[2 + wrap, own] = sheave.weight
-            acting[4 + 2 * wrap : 6 + 2 * wrap, own] = sheave.weight * sheave.tilt
+        for wrap, (sheave, arc) in enumerate(zip((belt.driving, belt.driven), self._arcs, strict=True)):
+            own, weight = slice(first, first + arc.size), sheave.weight * (flat.force[arc] > 0.0)
+            acting[2 + wrap, own] = weight
+            acting[4 + 2 * wrap : 6 + 2 * wrap, own] = weight * sheave.tilt
             first = own.stop
         own_rows = [count - 2, count - 1, *self._loose]
         acting[8 + np.arange(10), own_rows] = 1.0
@@ -210,33 +203,35 @@ class Linearisation:
         return slopes[:, :count] + slopes[:, count:] @ self._forces(flat)
 
     def _forces(self, flat: one.FlatBelt) -> csc_array:
-        """Slopes of the axial forces with the unknowns, with the closed stations of the last call."""
+        """Slopes of the axial forces, and of open stations' pulls, with the closed stations of the last call.
+
+        With gaps g of the rigid bodies those of closed stations are -C_cc^-1 g_c, and pulls c_e times
+        -(g_o + C_oc f_c).
+        """
         entries, first = [], 0
         wedge = 2.0 * np.tan(flat.belt.half_wedge_angle)
         wraps = zip(self._arcs, self._flexibility, flat.contacts, strict=True)
         for wrap, (arc, matrix, contact) in enumerate(wraps):
-            closed = np.flatnonzero(contact.stations[:, compliance.CLOSED])
-            stiffness = np.linalg.inv(matrix[np.ix_(closed, closed)])
-            rows, columns = np.meshgrid(first + closed, arc[closed], indexing="ij")
-            entries.append((-wedge * stiffness.ravel(), rows.ravel(), columns.ravel()))
-            if first > 0:
-                opening = np.full(closed.size, self._count - 1)
-                entries.append((-stiffness.sum(axis=1), first + closed, opening))
+            sheave = flat.belt.driven if wrap else flat.belt.driving
+            is_closed = contact.stations[:, compliance.CLOSED] > 0.5
+            closed, opened = np.flatnonzero(is_closed), np.flatnonzero(~is_closed)
+            slopes = np.zeros(matrix.shape)
+            slopes[np.ix_(closed, closed)] = -np.linalg.inv(matrix[np.ix_(closed, closed)])
+            slopes[opened, opened] = -sheave.element_stiffness
+            slopes[np.ix_(opened, closed)] -= sheave.element_stiffness * (
+                matrix[np.ix_(opened, closed)] @ slopes[np.ix_(closed, closed)]
+            )
+            rows = first + np.arange(arc.size)
+            # of the stations' displacements, of the groove's opening, and of the states that open it
+            acting = [(wedge * slopes * sheave.upright, rows[:, None], arc[None, :])]
+            openings = [(np.ones(arc.size), self._count - 1)] if wrap else []
             if self._loose.size:
-                entries += self._by_states(flat, wrap, closed, stiffness, first)
+                openings += [] if wrap else [(np.ones(arc.size), self._loose[f.SHIFT])]
+                tilted = self._loose[f.DRIVEN_COS if wrap else f.DRIVING_COS]
+                openings += [(sheave.tilt[k], tilted + k) for k in range(2)]
+            acting += [(slopes @ opening, rows, np.full(arc.size, column)) for opening, column in openings]
+            entries += [[part.ravel() for part in np.broadcast_arrays(*entry)] for entry in acting]
             first += arc.size
         values, rows, columns = map(np.concatenate, zip(*entries, strict=True))
-        return csc_array((values, (rows, columns)), shape=(first, self._count))
-
-    def _by_states(
-        self, flat: one.FlatBelt, wrap: int, closed: np.ndarray, stiffness: np.ndarray, first: int
-    ) -> list[tuple[np.ndarray, np.ndarray, np.ndarray]]:
-        """Slopes of a wrap's forces with the states that open its groove: shift and tilts."""
-        sheave = flat.belt.driven if wrap else flat.belt.driving
-        tilted = self._loose[f.DRIVEN_COS if wrap else f.DRIVING_COS]
-        openings = [(np.ones(closed.size), self._loose[f.SHIFT])] if wrap == 0 else []
-        openings += [(sheave.tilt[k, closed], tilted + k) for k in range(2)]
-        return [
-            (-stiffness @ opening, first + closed, np.full(closed.size, column))
-            for opening, column in openings
-        ]
+        there = values != 0.0
+        return csc_array((values[there], (rows[there], columns[there])), shape=(first, self._count))

@@ -5,8 +5,6 @@ set follows from its signs: the active-set iteration of complementarity problems
 Shortening its steps, or rounding off the corners, only hinders it.
 """
 
-from __future__ import annotations
-
 from typing import Protocol
 
 import numpy as np

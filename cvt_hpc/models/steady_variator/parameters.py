@@ -1,7 +1,5 @@
 """Parameters of the steady belt: the elastic belt's parameters, but for those of a run's course."""
 
-from __future__ import annotations
-
 from typing import Any
 
 from cvt_hpc.models import elastic_belt

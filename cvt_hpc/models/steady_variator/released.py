@@ -5,8 +5,6 @@ state is taken down along a path (Newton's homotopy), r(x) = (1 - share) r(x_hel
 equations have one to begin with.
 """
 
-from __future__ import annotations
-
 from collections.abc import Mapping
 from typing import Any
 

@@ -6,8 +6,6 @@ is dissipative where friction is constant, so that it settles near enough, unles
 friction carries: then the belt slips through.
 """
 
-from __future__ import annotations
-
 from collections.abc import Mapping
 from typing import Any
 
@@ -75,7 +73,7 @@ def settled(parameters: Mapping[str, Any], equations: Equations, tolerance: floa
         state = run.state()
         contact_forces(belt, state, fresh_contacts(belt), force)
         # as far out as flanks of the belt's own stiffness carry the same force
-        state.fields[f.W] += force * pressed_in
+        state.fields[f.W] += np.maximum(force, 0.0) * pressed_in
         found = newton(equations, equations.unknowns(state), tolerance)
         if found is not None:
             return found

@@ -4,8 +4,6 @@ Corners of the push force are sharp: each state begins at the one before, and a 
 in quarters. Near the limit of friction the load does not separate states, and the driven speed does.
 """
 
-from __future__ import annotations
-
 from collections.abc import Iterator, Mapping, Sequence
 from typing import Any, NamedTuple
 
