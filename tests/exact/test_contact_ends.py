@@ -111,6 +111,7 @@ def test_radial_forces_turn_the_belt_by_half_a_turn(bending, flanks):
     assert belt.driving.weight @ (radial * np.sin(zone.angle)) == pytest.approx(2.0 * FORCE, rel=2e-3)
 
 
+@pytest.mark.slow
 @pytest.mark.parametrize("ratio", [0.52, 1.06, 2.52])
 def test_local_bending_at_the_ends_is_that_of_a_ten_times_finer_mesh(ratio):
     """A groove that presses evenly on its arc and widens beyond it, by Lemke's algorithm."""
