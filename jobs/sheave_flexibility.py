@@ -49,7 +49,7 @@ from cvt_hpc.errors import InputError, mismatch
 from cvt_hpc.files import written_aside
 from cvt_hpc.job.units import to_si
 from cvt_hpc.netcdf import attributes, write_netcdf
-from cvt_hpc.physics.geometry import cell_counts, variator
+from cvt_hpc.physics.geometry import cut_path, variator
 from cvt_hpc.provenance import history_line
 
 DISCS = 2  # of a groove, alike
@@ -79,7 +79,7 @@ class Scene:
     ratio: float = 2.52
     driven_radius: float = 0.075
     centre_distance: float = 0.155
-    stations: int = 160  # of the belt's mesh: knots of the tables lie on it
+    stations: int = 160  # around the belt, of even cells: the knots of the tables are their ends
     least_wave: float = 0.004  # around the arc: two elements
     highest_frequency: float = 30e3  # modes above it have no mass
 
@@ -274,11 +274,11 @@ def both(disc: Disc, scene: Scene) -> dict[str, xr.Dataset]:
         if not disc.inner_radius < radius - half < radius + half <= disc.outer_radius:
             found = f"{radius - half:g} to {radius + half:g} m"
             raise mismatch("flank", f"within {disc.inner_radius:g} to {disc.outer_radius:g} m", found)
-    sectors, counts = Sectors(disc, radii), cell_counts(path, scene.stations)
-    wraps = ((path.driving_wrap, counts[0]), (path.driven_wrap, counts[2]))
+    sectors, cells = Sectors(disc, radii), cut_path(path, scene.stations)
+    wraps = ((path.driving_wrap, cells[0].size), (path.driven_wrap, cells[2].size))
     return {
-        name: pulley(sectors, scene, radius, np.linspace(0.0, wrap, cells + 1))
-        for name, radius, (wrap, cells) in zip(("driving", "driven"), radii, wraps, strict=True)
+        name: pulley(sectors, scene, radius, np.linspace(0.0, wrap, count + 1))
+        for name, radius, (wrap, count) in zip(("driving", "driven"), radii, wraps, strict=True)
     }
 
 

@@ -211,8 +211,9 @@ def follow_element(history: xr.Dataset, start: float, source: str = "history") -
 def around(history: xr.Dataset) -> np.ndarray:
     """Path coordinates of all stations and of the path's end [m], (N + 1,)."""
     position = history["position"].values
-    # cells of a region are alike, and the last station is not the first one of its region
-    return np.append(position, 2.0 * position[-1] - position[-2])
+    # a strand, which is the last region, is cut alike from both of its ends
+    first = np.flatnonzero(history["region"].values == history["region"].values[-1])[0]
+    return np.append(position, position[-1] + position[first + 1] - position[first])
 
 
 def lengths_of(history: xr.Dataset) -> np.ndarray:

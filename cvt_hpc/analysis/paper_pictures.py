@@ -20,6 +20,7 @@ from cvt_hpc.analysis import figures
 from cvt_hpc.analysis.arrangement import CHOSEN, At, Sides, arrange, check_sides, ruler
 from cvt_hpc.analysis.classes import check_results
 from cvt_hpc.analysis.curves import panels_of
+from cvt_hpc.analysis.followed_drawing import lengths_of
 from cvt_hpc.analysis.telling_apart import entitle_runs, on_axes
 from cvt_hpc.errors import mismatch
 from cvt_hpc.job import stored_job
@@ -77,8 +78,7 @@ def powers_of(history: xr.Dataset) -> Powers:
     angle = json.loads(history.attrs["point"])["half_wedge_angle"]
     # f_P,n = f_ax cos d + (p_r / 2) sin d, of which p_r less 2 f_ax tan d is friction
     friction = 2.0 * (history["normal_force"] - history["contact_force"] / np.cos(angle)) / np.sin(angle)
-    cell = float(np.diff(history["position"].values).mean())
-    spiral = -cell * float((friction * history["radial_sliding"]).sum())
+    spiral = -float(np.nansum(lengths_of(history) * (friction * history["radial_sliding"]).values))
     fed = history["flank_fed"]
     outlet = float(fed.sel(pulley="driven").values[-1])
     taken = sum(float(history[f"{name}_taken"]) for name in TAKEN)

@@ -102,7 +102,7 @@ def table_problem(
         rows = " x ".join(str(size) for size in (len(table), len(table[0]) if table else 0))
         return f"1 or n rows of n flexibilities, n >= 2 being the number of angles, {n}", rows
     if angles[0] > 0.0 or steps.min() <= 0.0 or (len(table) == 1 and angles[0] < 0.0):
-        return "angles that ascend from 0", f"{angles[0]:g} to {angles[-1]:g} rad"
+        return "angles that ascend, from 0 or before the inlet", f"{angles[0]:g} to {angles[-1]:g} rad"
     if len(table) == 1 and np.ptp(steps) > ROUND_OFF * steps.max():
         return (
             "equidistant angles of a disc of revolution",

@@ -160,8 +160,10 @@ def cut_path(path: Variator, cells: int, refinement: float = 1.0) -> tuple[np.nd
 
     wholes = [upto(length, length) for length in path.lengths]
     driving, strand, _, _ = (max(round(cells * part / sum(wholes)), 4) for part in wholes)
-    found = []
+    strand = min(strand, (cells - 8) // 2)
+    driving = min(driving, cells - 2 * strand - 4)
     counts = (driving, strand, cells - driving - 2 * strand, strand)
+    found = []
     for length, whole, count in zip(path.lengths, wholes, counts, strict=True):
         fine = np.linspace(0.0, length, 100 * count + 1)
         found.append(np.diff(np.interp(np.linspace(0.0, whole, count + 1), upto(fine, length), fine)))

@@ -36,7 +36,7 @@ _SHARED = (
     Variable("ring_loss", "W", "mean friction power between rings and elements"),
     Variable("belt_loss", "W", "mean power of the belt's transverse damping"),
     Variable("layer_loss", "W", "mean power of the layers' longitudinal dampers"),
-    Variable("seating_loss", "W", "mean elastic power carried out of the contact at the arcs' ends"),
+    Variable("seating_loss", "W", "mean elastic power lost by the mesh where contact ends"),
     Variable("loss", "W", "mean of all losses", words="total loss"),
     Variable(
         "efficiency",

@@ -113,7 +113,7 @@ def test_a_table_is_itself_at_its_knots_and_definite_between_them():
         (ANGLES, [ROW[:-1]], "1 or n rows of n flexibilities", "1 x 8"),
         ((), (), "1 or n rows of n flexibilities", "0 x 0"),
         (ANGLES, [ROW, ROW], "number of angles, 9", "2 x 9"),
-        (ANGLES[::-1], [ROW], "angles that ascend from 0", "3.6 to 0 rad"),
+        (ANGLES[::-1], [ROW], "angles that ascend, from 0 or before the inlet", "3.6 to 0 rad"),
         (np.r_[0.0, ANGLES[2:], 5.0], [ROW], "equidistant angles", "steps of"),
         (0.5 * ANGLES, [ROW], "angles over the whole wrap, 3.6 rad", "up to 1.8 rad"),
         (ANGLES, np.diag(ROW) + 1e-9 * np.eye(9, k=1), "a symmetric matrix", "1e-09 and 0 m/N between angles 1 and 2"),

@@ -80,7 +80,7 @@ def along_belt(
     angle = parameters["half_wedge_angle"]
     on_arc = at_stations(grid.cell * (grid.region % 2 == 0))  # length of a station's part on an arc
     axial = sample["contact_force"]
-    touching = np.where(axial > 0.0, 1.0, np.nan)
+    touching = np.where((on_arc > 0.0) | (axial > 0.0), 1.0, np.nan)  # or in a groove that is open there
     radial, tangential = sample["radial_speed"] * touching, sample["sliding_speed"] * touching
     pressing = (2.0 * np.tan(angle) * axial + sample["radial_friction"]) * touching
     meridian = radial / np.cos(angle)

@@ -46,17 +46,16 @@ class Belt(NamedTuple):
     `touches` is 1 where a groove may hold a station, else 0, and `on_driven` 1 from the middle of t1 to that
     of t2; there the pulley's radial unit vector has the parts `lean` along the path, `lean_rate` less per
     displacement [1/m], and `upright` across it, and `rise` is the path's distance from the axis beyond the
-    pitch radius (`zones`); `driving_stations` and `driven_stations` (m,) are those that each groove may hold;
-    `bending` is (N, 5): force per length on station j from the displacements of stations j-2 .. j+2,
+    pitch radius (`Mesh.zone`); `driving_stations` and `driven_stations` (m,) are those that each groove may
+    hold; `bending` is (N, 5): force per length on station j from the displacements of stations j-2 .. j+2,
     `bending_load` that without displacement; `squared_curvature` is kappa^2 at the stations where curvature
-    terms count, else 0, and `curvature_terms` the place among those in CURVATURE_TERMS;
-    `measures` are those of the scene, `faded` is the coupling that counts for nothing, and a belt that is
-    further than `largest_displacement` off its path has left its grooves;
-    `ring_relief` is the tension at which the rings' own weight bears them. `belt_speed` is that of the pitch
-    line at `driving_speed`; along a ramp of speed both follow `rhs.speed_share_at`. `element_mass` and
-    `ring_mass` are the inertia along the path, `mass` that across it. Across a gap the elements' damper may
-    push against `bridging_stiffness` times the gap's strain; inf, as in every run: elements that are apart
-    have no damper.
+    terms count, else 0, and `curvature_terms` the place among those in CURVATURE_TERMS; `measures` are those
+    of the scene, `faded` is the coupling that counts for nothing, and a belt that is further than
+    `largest_displacement` off its path has left its grooves; `ring_relief` is the tension at which the rings'
+    own weight bears them. `belt_speed` is that of the pitch line at `driving_speed`; along a ramp of speed
+    both follow `rhs.speed_share_at`. `element_mass` and `ring_mass` are the inertia along the path, `mass`
+    that across it. Across a gap the elements' damper may push against `bridging_stiffness` times the gap's
+    strain; inf, as in every run: elements that are apart have no damper.
     """
 
     cell: np.ndarray

@@ -49,9 +49,7 @@ def _table(pulley: str) -> dict[str, Parameter]:
     file = FromFile(columns, ("angle", "flexibility"), gives, partial(_arranged, pulley))
     return {
         f"{pulley}_flexibility_file": Parameter("", "", text, file=file),
-        angle: Parameter(
-            (), "rad", "angles of these flexibilities from the inlet, from 0 on", sensible=(1e-4, 7.0)
-        ),
+        angle: Parameter((), "rad", "angles of these flexibilities from the inlet", sensible=(1e-4, 7.0)),
         flexibility: Parameter(
             (),
             "m/N",

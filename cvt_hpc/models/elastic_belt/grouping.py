@@ -25,6 +25,7 @@ SHARED = (
     "driven_radius",
     "centre_distance",
     "stations",
+    "end_refinement",
     "friction_law",
     "table_force",
     "table_speed",

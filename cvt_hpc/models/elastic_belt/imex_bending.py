@@ -6,9 +6,9 @@ with the square of the cells. Here the increments of a step have, with K = EI d^
     A du + C dv_0 = F,   A = m / dt + r + IMPLICIT dt K,
 
 r being the slope of friction and damping with u, C that of friction with v_0. No wave of bending turns by
-more than 1 / sqrt(IMPLICIT) rad in a step. States at rest stay what they are, and waves of a frequency w are
-slower by the share IMPLICIT (w dt)^2 / 2 of what bending has in their stiffness: 2e-4 at 600 Hz and 4.6 us,
-if all of it were bending. Pressed elements that bear a moment count into EI.
+more than 2 asin(1 / sqrt(4 IMPLICIT)) in a step. States at rest stay what they are, and waves of a frequency
+w are slower by the share IMPLICIT (w dt)^2 / 2 of what bending has in their stiffness: 2e-4 at 600 Hz and 4.6
+us, if all of it were bending. Pressed elements that bear a moment count into EI.
 
 With M = -q d^2/ds^2 du and q^2 = IMPLICIT dt EI it is one symmetric system of blocks [du, M] along the belt,
 solved without dv_0 and, once that is known, with it. The block of dv_0, with its own slope d, lacks the term
@@ -23,6 +23,7 @@ friction has taken its part, feeds the shortest waves.
 
 from cvt_hpc.kernels import kernel, merged_kernel
 from cvt_hpc.lanes import ahead, behind, fma, from_ahead, from_behind, like, ring_solution, sqrt
+from cvt_hpc.models.elastic_belt import fields as f
 from cvt_hpc.models.elastic_belt import lane_fields as lf
 from cvt_hpc.models.elastic_belt.lane_belt import LaneBelt, LaneState, Work
 from cvt_hpc.models.elastic_belt.lane_forces import lane_belt_speed
@@ -90,9 +91,17 @@ def move_across(belt: LaneBelt, state: LaneState, work: Work, step: float) -> No
     gyration = -c[0, lf.MASS] * lane_belt_speed(belt, state.time[0])
     _solve(belt, work, q, gyration, ALONE)
     _solve(belt, work, q, gyration, TURNING)
+    belt_speed, fields = lane_belt_speed(belt, state.time[0]), state.fields
     for j in range(last + 1):
-        shared = belt.dual[j] * stations[j, lf.CROSS] * stations[j, lf.PUSH]
-        stations[j, lf.Y_0] = stations[j, lf.Y_0] - shared
+        push = stations[j, lf.PUSH]
+        along = -stations[j, lf.CROSS] * push
+        if belt.is_curved:
+            # of the mean velocity of the step without the part due to the layers' speeds
+            turning = belt.ring_curvature[j] * fma(0.5, push, fields[j, f.U])
+            along = fma(-turning * c[0, lf.ELEMENT_MASS], belt_speed + fields[j, f.V_ELEMENT], along)
+            ring = turning * c[0, lf.RING_MASS] * (belt_speed + fields[j, f.V_RING])
+            stations[j, lf.Y_1] = fma(-belt.dual[j], ring, stations[j, lf.Y_1])
+        stations[j, lf.Y_0] = fma(belt.dual[j], along, stations[j, lf.Y_0])
 
 
 @kernel

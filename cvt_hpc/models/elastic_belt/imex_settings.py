@@ -1,8 +1,9 @@
-"""Linearly implicit, explicit in the strands: the step that friction and longitudinal waves do not limit.
+"""Linearly implicit, explicit in the strands: the step that friction, bending and layer waves do not limit.
 
 Needs of a model: a step kernel that treats its stiff forces by their linearisation and the rest explicitly.
 
-Order 1 (the push force by backward Euler; the transverse motion is a leapfrog, without numerical damping).
+Order 1: the push force by backward Euler, bending a quarter step ahead; the rest of the transverse motion is
+a leapfrog, without numerical damping.
 Stable where the explicit part is. Without a step of the job's own the model chooses one for the scene.
 """
 
@@ -17,8 +18,8 @@ FACTS = Facts(
     needs=frozenset(),  # of a general system: it is a step of the belt's own
     implicit=True,
     l_stable=False,
-    stability="bending, tension and contact of the strands: step < 2 / their fastest frequency",
-    damping="none in strands and rings; pressed elements like a damper EA step [N s]",
+    stability="tension and contact of the strands: step < 2 / their fastest frequency",
+    damping="bending (w step)^2 / 8 a step, none in rings; pressed elements like a damper EA step [N s]",
 )
 LARGEST_STEP = own_step(None, 1e-9, 1e-3)
 PARAMETERS = {

@@ -135,13 +135,7 @@ def assemble(belt: LaneBelt, state: LaneState, work: Work, step: float, again: b
                 stations[j, lf.FLANK_SLOPE] = fma(upright, slope_along, lean * mixed)
                 stations[j, lf.FLANK_CROSS] = fma(upright, mixed, -lean * slope_along)
         along_element = fma(outward, slope, along_element)
-        mobility = 1.0 / radial_mass
-        push, lag = (transverse + outward) * mobility, LAG_SHARE * cross * mobility
-        if belt.is_curved:
-            # the mean velocity of the step without the part due to the layers' speeds
-            turning = belt.ring_curvature[j] * fma(0.5, push, u)
-            along_element = fma(-turning * element_mass, full_speed, along_element)
-            along_ring = fma(-turning * ring_mass, belt_speed + v1, along_ring)
+        lag = LAG_SHARE * cross / radial_mass
         if anywhere(touches > 0.0):
             stations[j, lf.LAG], stations[j, lf.SLOPE], stations[j, lf.D_01] = lag, slope, dual * coupling
         stations[j, lf.D_00], stations[j, lf.D_11] = dual * fma(-cross, lag, element), dual * ring

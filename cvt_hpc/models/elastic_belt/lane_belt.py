@@ -42,7 +42,7 @@ class LaneBelt(NamedTuple):
         As in `Belt`, for a bending stiffness of 1 N m^2.
     bending_load, squared_curvature : (N,) arrays
         As in `Belt`, the load for a bending stiffness of 1 N m^2.
-    constants : (1, 62) LaneArray
+    constants : (1, 58) LaneArray
         CONSTANTS.
     places : two pairs of (m,) int arrays
         Row and part of the stations that the driving and the driven groove may hold.

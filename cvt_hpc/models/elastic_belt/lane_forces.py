@@ -340,7 +340,7 @@ def cell_strains(belt: LaneBelt, stations: LaneArray, j: int, w, w_b, more_0, mo
 
 @kernel
 def lane_sliding(belt: LaneBelt, state: LaneState, stations: LaneArray) -> None:
-    """Sliding speeds on the arcs, and the results of friction that depend on them alone.
+    """Sliding speeds where a groove may hold the belt, and the results of friction that depend on them alone.
 
     A loop of its own: the chain of operations from a speed to the system's rows is longer than what a
     processor looks ahead, so that it would not begin a station before the last one is nearly done.

@@ -63,7 +63,6 @@ def lane_rings(belts: Sequence[Belt], rings: Sequence[Rings], dtype: DTypeLike) 
     n, first = rings[0].length.size, belts[0]
     constants = LaneArray(1, lf.FIRST_OFFSET + n + 4 * (n + 1), len(rings), dtype)
     for lane, (belt, ring) in enumerate(zip(belts, rings, strict=True)):
-        per_cell = 1.0 / belt.cell.min() ** 2 / ring.mass
         factors = []
         for radius in (belt.driving_radius, belt.driven_radius):
             surface = 1.0 + ring.surface / radius
@@ -81,8 +80,8 @@ def lane_rings(belts: Sequence[Belt], rings: Sequence[Rings], dtype: DTypeLike) 
             1.0 / ring.friction_speed,
             ring.kinetic[0],
             ring.kinetic[1] if n > 1 else 0.0,
-            ring.stiffness * per_cell,
-            2.0 * ring.damping * per_cell,
+            ring.stiffness / ring.mass,
+            2.0 * ring.damping / ring.mass,
             *ring.offset,
             *factors,
         ]

@@ -5,12 +5,12 @@ state, on average over a vibration,
 
     driving = load + thrust + losses,    losses = flanks + rings + belt + layers + lag + seating,
 
-and before that, or along a ramp, the difference goes into the stored energy; along a ramp of speed it
-is mostly the kinetic energy of the belt and of the driven pulley. The open part is the work of the
-numerics: upwinded transport, backward Euler in the layers, and the linear stretch that leaves the product of
-changing tension and slope squared out. The layers' loss is not taken from a state, as all else is, but from
-the work of their dampers in the steps since the last one: a damper acts in a cell that is just closing, for a
-step or two, and instants now and then would not meet it as often as it acts.
+and before that, or along a ramp, the difference goes into the stored energy; along a ramp of speed it is
+mostly the kinetic energy of the belt and of the driven pulley. The open part is the work of the numerics:
+upwinded transport, backward Euler in the layers, leading bending, and the linear stretch that leaves the
+product of changing tension and slope squared out. The layers' loss is not taken from a state, as all else is,
+but from the work of their dampers in the steps since the last one: a damper acts in a cell that is just
+closing, for a step or two, and instants now and then would not meet it as often as it acts.
 
 Seating is the energy that the belt carries out of the sheaves' elastic contact beyond the energy that it
 brings in: none, but for the mesh, since contact begins and ends without force, and between both the elastic

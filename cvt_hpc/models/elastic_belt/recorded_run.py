@@ -102,7 +102,7 @@ class Records:
         The recorded quantities.
     channels : int
         Values in a row of a sample.
-    profiles : (N, 21) LaneArray of doubles
+    profiles : (N, 23) LaneArray of doubles
         PROFILES, summed over the judged part's samples.
     momentary : Momentary
         Profiles of the last samples.

@@ -320,7 +320,7 @@ def memory_transport(belt: Belt, spacing: float, belt_speed: float) -> float:
 
 @merged_kernel
 def sliding_speed(belt: Belt, state: State, j: int) -> float:
-    """Sliding speed |v| of the flanks at station j of an arc [m/s]."""
+    """Sliding speed |v| of the flanks at station j, which a groove may hold [m/s]."""
     n = belt.cell.size
     a, b = j - 1 if j > 0 else n - 1, j + 1 if j < n - 1 else 0
     w, v = state.fields[f.W], state.fields[f.V_ELEMENT, j]

@@ -112,7 +112,7 @@ class Samples(NamedTuple):
         S rows.
     rows : (samples, S + C) LaneArray of doubles
         Of a sample a row: the sensors, then CHANNELS.
-    profiles : (N, 21) LaneArray of doubles
+    profiles : (N, 23) LaneArray of doubles
         PROFILES of each sample are added to it; one without rows takes none.
     ended : (1, 4) LaneArray of doubles
         ENDED of each lane.

@@ -32,6 +32,7 @@ NEEDS = (
     "stations",
     "end_refinement",
     "thrust",
+    "driving_speed",
     "element_mass",
     "ring_mass",
     "flank_stiffness",
@@ -45,7 +46,7 @@ def transverse_limit(parameters: Mapping[str, Any]) -> float:
 
     The fastest waves are two of the shortest cells long, in the grooves:
     w^2 = (4 F / h^2 + 4 c_e tan^2 delta) / m.
-    Bending, which is implicit, has no part in it.
+    Bending, which is implicit, has no part in it. What the belt carries goes on by a cell in a step at most.
 
     Parameters
     ----------
@@ -58,7 +59,8 @@ def transverse_limit(parameters: Mapping[str, Any]) -> float:
     slope = np.tan(p["half_wedge_angle"])
     force = 2.0 * slope * p["thrust"] / path.driven_wrap
     stiffness = 4.0 * force / cell**2 + 4.0 * slope**2 * axial_element_stiffness(p)
-    return float(2.0 / np.sqrt(stiffness / (p["element_mass"] + p["ring_mass"])))
+    waves = 2.0 / np.sqrt(stiffness / (p["element_mass"] + p["ring_mass"]))
+    return float(min(waves, cell / (p["driving_speed"] * path.driving_radius)))
 
 
 def chosen_step(parameters: Mapping[str, Any]) -> float:

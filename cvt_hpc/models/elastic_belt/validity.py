@@ -52,7 +52,7 @@ def slack_doubt(bending_stiffness: float, cell: float, least_force: float) -> tu
     bending_stiffness : float
         EI [N m^2].
     cell : float
-        Length of a strand's cells [m].
+        Length of a strand's longest cell [m].
     least_force : float
         Smallest F in a strand over the run [N].
 
@@ -69,9 +69,8 @@ def slack_doubt(bending_stiffness: float, cell: float, least_force: float) -> tu
 
 
 def power_limit(grid: Mesh) -> float:
-    """Largest share of the power that flows which the balance may leave open, by a strand's cells."""
-    around = grid.path.path_length / _strand_cell(grid)
-    return LARGEST_POWER_RESIDUAL * max(1.0, REFERENCE_CELLS / around)
+    """Largest share of the power that flows which the balance may leave open, by the number of cells."""
+    return LARGEST_POWER_RESIDUAL * max(1.0, REFERENCE_CELLS / grid.cell.size)
 
 
 def _strand_cell(grid: Mesh) -> float:

@@ -1,7 +1,7 @@
 """Friction at the flanks of elements and under the rings, in lanes, as an iterate of a step has it.
 
-Forces are those of `physics.primal_dual`, for each newton of normal force. Their slopes take the direction of
-friction from a dual, which the iterations carry on.
+Forces are those of `physics.contact_laws`, for each newton of normal force. Their slopes take the direction
+of friction from a dual, which the iterations carry on.
 """
 
 from numba.extending import register_jitable
