@@ -7,7 +7,7 @@ from hypothesis import strategies as st
 
 from cvt_hpc.job import build_job
 from cvt_hpc.models.elastic_belt.belt import belt_constants, mesh
-from cvt_hpc.physics.geometry import driven_radius, variator
+from cvt_hpc.physics.geometry import cut_path, driven_radius, variator
 
 # A public pushbelt set (github wangzhanrock/CVT_VelocityInit): centre distance, belt length at mid pack
 CENTRES = 0.155
@@ -136,3 +136,17 @@ def test_equal_pulleys():
 def test_overlapping_pulleys_are_refused(ratio, driven):
     with pytest.raises(ValueError, match="overlap"):
         variator(ratio, driven, CENTRES)
+
+
+@pytest.mark.parametrize("cells", [24, 25, 160, 1000])
+@pytest.mark.parametrize("ratio", [0.2, 0.4, 1.0, 2.5, 5.0])
+@pytest.mark.parametrize("refinement", [1.0, 4.0, 20.0])
+def test_a_path_is_cut_into_the_cells_that_were_asked_for(cells, ratio, refinement):
+    path = variator(ratio, 0.12 * ratio / (1.0 + ratio), 0.155)
+    parts = cut_path(path, cells, refinement)
+    assert sum(part.size for part in parts) == cells and min(part.size for part in parts) >= 4
+    for part, length in zip(parts, path.lengths, strict=True):
+        assert part.sum() == pytest.approx(length, rel=1e-12) and part.min() > 0.0
+        # shortest at both ends, and alike from either
+        assert part == pytest.approx(part[::-1], rel=1e-3)
+        assert part[0] <= part.min() * 1.001 and part[0] * (refinement + 1.0) * 2.0 > part.max()

@@ -10,8 +10,9 @@ from cvt_hpc.models.elastic_belt import fields as f
 from cvt_hpc.models.elastic_belt import lane_fields as lf
 from cvt_hpc.models.elastic_belt.batch import Batch
 from cvt_hpc.models.elastic_belt.belt import belt_constants, initial_state
-from cvt_hpc.models.elastic_belt.grouping import ALONE_SHARE, cost, lane_key
+from cvt_hpc.models.elastic_belt.grouping import ALONE_SHARE, SHARED, cost, lane_key
 from cvt_hpc.models.elastic_belt.lane_belt import parts_of
+from cvt_hpc.models.elastic_belt.parameters import PARAMETERS
 from cvt_hpc.models.elastic_belt.sampling import Outcome
 from cvt_hpc.physics import compliance
 from cvt_hpc.simulation import lane_groups, run_point, run_points
@@ -292,3 +293,7 @@ def test_single_precision_gives_the_same_vibration():
     assert vibrating["vibrates"] == Vibrates.YES
     assert vibrating["amplitude"] == pytest.approx(found["double"][2]["amplitude"], rel=0.05)
     assert vibrating["frequency"] == pytest.approx(found["double"][2]["frequency"], rel=0.01)
+
+
+def test_runs_of_a_batch_share_their_mesh():
+    assert set(PARAMETERS["mesh"]) <= set(SHARED)
