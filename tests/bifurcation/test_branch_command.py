@@ -22,6 +22,7 @@ model = "linear_stability"
 load = ["90 N m", "105 N m", "120 N m"]
 [mesh]
 stations = 96
+end_refinement = 1
 """
 RUNS = """
 [branch]

@@ -9,7 +9,9 @@ from support.settled import STEP, start
 
 
 @pytest.mark.parametrize(
-    ("stepper", "step", "steps"), [("imex", STEP, 6000), ("explicit", 0.1e-6, 6000)], ids=["imex", "explicit"]
+    ("stepper", "step", "steps"),
+    [("imex", STEP, 6000), ("explicit", 0.04e-6, 15000)],
+    ids=["imex", "explicit"],
 )
 @pytest.mark.parametrize("memory", [0.3e-3, 0.0])
 def test_content_of_both_layers_is_kept(stepper, step, steps, memory):

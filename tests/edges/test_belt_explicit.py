@@ -13,7 +13,8 @@ from cvt_hpc.steppers.fastest_rate import STABLE, fastest_rate
 from cvt_hpc.variables import Status
 from support.belts import eigenvalues, general, longest_stable_step, settled
 
-SMOOTH = {"ring_friction": 0.0, "friction_speed": 0.5, "friction_gradient": -0.05}
+# even cells: the formulas are those of layers in which all cells swing or are damped alike
+SMOOTH = {"ring_friction": 0.0, "friction_speed": 0.5, "friction_gradient": -0.05, "end_refinement": 1.0}
 CASES = {
     "ring friction": {"ring_friction_speed": 0.003},
     "flank friction": {"ring_friction": 0.0, "friction_speed": 0.01},

@@ -17,8 +17,9 @@ CELLS = (12, 24, 48)  # in each half of the path of 0.30 m
 
 def straight(cells, tension, push, speed=0.0, bending=0.0):
     """A straight periodic belt under uniform T and P: the model with its pulleys taken out."""
-    path = {"ratio": 1.0, "driven_radius": RADIUS, "centre_distance": np.pi * RADIUS, "stations": 2 * cells}
-    belt = belt_constants(point("imex", **path, bending_stiffness=bending, transverse_damping=0.0))
+    path = {"ratio": 1.0, "driven_radius": RADIUS, "centre_distance": np.pi * RADIUS}
+    mesh = {"stations": 2 * cells, "end_refinement": 1.0}
+    belt = belt_constants(point("imex", **path, **mesh, bending_stiffness=bending, transverse_damping=0.0))
     nothing = np.zeros(2 * cells)
     belt = belt._replace(curvature=nothing, arc_curvature=nothing, touches=nothing, belt_speed=speed)
     fields, scalars = np.zeros((len(f.FIELDS), 2 * cells)), np.zeros(f.SCALARS)

@@ -77,7 +77,7 @@ def test_every_parameter_of_the_continuous_belt_has_its_place():
     # the pushbelt refuses a table of friction, and pistons, without which there is no pressure
     tables = {key for key in own if key.startswith("table_") or key.endswith("_pressure")}
     led = {need for needs, _ in FOLLOWS.values() for need in needs} - shared
-    assert shared | tables | led | {*ABSENT} | {*ONLY} | {"stations", "stiffness_of"} == own
+    assert shared | tables | led | {*ABSENT} | {*ONLY} | {*PARAMETERS["mesh"], "stiffness_of"} == own
     assert FOLLOWS.keys() <= {*known_keys("pushbelt")}
 
 

@@ -63,6 +63,7 @@ def band_parameters(stations):
     defaults = {key: parameter.default for table in PARAMETERS.values() for key, parameter in table.items()}
     return defaults | {
         "stations": stations,
+        "end_refinement": 1.0,  # the order in the mesh is judged, and slopes along the arcs by even cells
         "ratio": RADII[1] / RADII[0],
         "driven_radius": RADII[1],
         "driving_speed": SPEED,

@@ -79,7 +79,7 @@ def test_increments_are_those_of_the_dense_system(step, parts):
     move_across(belt, state, work, step)
     first, right = found(lf.PUSH).copy(), found(lf.Y_0).copy()
     put(lf.DV_0, layers)
-    move_with_layers(belt, state, work, step)
+    move_with_layers(belt, state, work)
     for one, pushed, share, both in zip(belts, first, right, found(lf.PUSH), strict=True):
         wanted = expected(one, step, force, heavy, cross, layers)
         size = np.abs(wanted).max()

@@ -124,8 +124,8 @@ def test_contact_with_discs_at_rest_is_that_of_flexibilities():
         assert found == pytest.approx(expected, abs=1e-8 * size)
         # and they stay at rest
         before = moving.discs.states.data[:, AHEAD].copy()
-        moving.stations.data[:, 9] = found
-        turn_discs(moving.discs, wraps[0].weight, moving.stations, 9, 0.0, 4.6e-6)
+        moving.stations.data[:, compliance.FORCED] = found
+        turn_discs(moving.discs, wraps[0].weight, moving.stations, compliance.FORCED, 0.0, 4.6e-6)
         assert moving.discs.states.data[:, AHEAD] == pytest.approx(before, abs=1e-8 * np.abs(before).max())
 
 

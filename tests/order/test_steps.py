@@ -1,7 +1,6 @@
 """The fast step against the plain explicit one, from a common state in motion: rates, order, size of the error.
 
-A window of 0.2 ms is short against the growth of small differences, and long enough for the strands to move
-by some 10 um. The elements' speed is not judged where they are apart: there single gaps close one or the
+A window of 0.2 ms is short against the growth of small differences. The elements' speed is not judged where they are apart: there single gaps close one or the
 other step earlier.
 """
 
@@ -24,6 +23,8 @@ DEFAULTS |= {"duration": 0.1, "load": 100.0}
 WINDOW = 2e-4  # [s]
 STARTS = (0, 1, 2)
 CASES = {"memory": {}, "no memory": {"friction_memory": 0.0}}
+# friction that falls twice as steeply as by default, where the strands are quiet at this load
+SCENES = CASES | {"vibrating": {"friction_gradient": -1.6}}
 QUANTITIES = {"w": f.W, "u": f.U, "v_ring": f.V_RING}
 
 
@@ -35,10 +36,10 @@ def march(stepper, belt, state, step, duration):
 @cache
 def moving_belt(case, number=0):
     """A belt at 100 N m after 40 ms and `number` ms: falling friction, push in t1, elements apart in t2."""
-    belt = belt_constants(DEFAULTS | CASES[case])
+    belt = belt_constants(DEFAULTS | SCENES[case])
     if number > 0:
         return belt, march("imex", belt, moving_belt(case, number - 1)[1], STEP, 1e-3)
-    return belt, march("imex", belt, initial_state(DEFAULTS | CASES[case], belt), STEP, 0.04)
+    return belt, march("imex", belt, initial_state(DEFAULTS | SCENES[case], belt), STEP, 0.04)
 
 
 @cache
@@ -107,7 +108,7 @@ def test_both_steps_have_the_same_rates(case, law):
 @pytest.mark.parametrize("case", CASES)
 def test_explicit_step_is_of_first_order(case):
     # against itself, without a reference: successive differences halve, but for the luck of gaps that close
-    steps = [100e-9, 50e-9, 25e-9, 12.5e-9]
+    steps = [40e-9, 20e-9, 10e-9, 5e-9]
     ends = [[after_window(case, number, "explicit", step) for number in STARTS] for step in steps]
     changes = [differences(*pair) for pair in zip(ends, ends[1:], strict=False)]
     for name in QUANTITIES:
@@ -134,16 +135,15 @@ def test_error_falls_from_the_default_step_on(case):
 
 def test_error_at_the_default_step():
     # Over 1 ms, two thirds of a period of the strands: meshes of 128 and 160 stations differ by a twentieth
-    # of the motion, the step shall not cost more; four times that for u, where short and fast shapes count
-    # most (0.15 at 4.6 us, 0.02 at 1 us), and a little more for the rings, whose waves are the fastest.
-    # With memory: without, it is chaotic.
-    belt, state = moving_belt("memory")
-    exact = march("explicit", belt, state, 50e-9, 1e-3)
+    # of the motion, the step shall not cost more. It costs 0.003 of w, 0.008 of u, where short and fast shapes
+    # count most, and 0.02 of the rings' speed, whose waves are the fastest. With memory: without, it is chaotic.
+    belt, state = moving_belt("vibrating")
+    exact = march("explicit", belt, state, 40e-9, 1e-3)
     fast = march("imex", belt, state, STEP, 1e-3)
     error, motion = differences([fast], [exact]), differences([state], [exact])
     assert motion["w"] > 1e-5
     for name in QUANTITIES:
-        assert error[name] < {"w": 0.05, "u": 0.2, "v_ring": 0.06}[name] * motion[name], name
+        assert error[name] < 0.05 * motion[name], name
     change = exact.scalars[f.DRIVEN_SPEED] - state.scalars[f.DRIVEN_SPEED]
     assert abs(fast.scalars[f.DRIVEN_SPEED] - exact.scalars[f.DRIVEN_SPEED]) < 0.05 * abs(change)
 
@@ -169,7 +169,7 @@ def test_table_of_the_linear_law_is_the_linear_law(stepper):
     for friction in (law, table):
         belt = belt_constants(DEFAULTS | friction)
         state = initial_state(DEFAULTS | friction, belt)
-        finals.append(march(stepper, belt, state, 1e-7, 1e-4))
+        finals.append(march(stepper, belt, state, 4e-8, 1e-4))
     line, looked_up = finals
     assert np.abs(line.fields[f.U]).max() > 1e-3
     # mu differs by round-off only: 1e-16 of 1e5 N/m over 0.1 ms

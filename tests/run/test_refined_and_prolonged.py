@@ -211,7 +211,7 @@ def marched(run, samples):
 
 
 def general(duration):
-    values = {"stations": 24, "duration": duration, "rise_time": 1e-3, "load": 60.0, "step": 4e-7}
+    values = {"stations": 24, "duration": duration, "rise_time": 1e-3, "load": 60.0, "step": 2e-7}
     document = {"name": "test", "model": "elastic_belt", "stepper": "symplectic_euler"}
     checked = build_job(document, "test.toml", values | {"duration": 0.04}).point(0)
     return checked | {"duration": duration}

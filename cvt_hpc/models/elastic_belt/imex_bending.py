@@ -10,15 +10,15 @@ more than 2 asin(1 / sqrt(4 IMPLICIT)) in a step. States at rest stay what they 
 w are slower by the share IMPLICIT (w dt)^2 / 2 of what bending has in their stiffness: 2e-4 at 600 Hz and 4.6
 us, if all of it were bending. Pressed elements that bear a moment count into EI.
 
-With M = -q d^2/ds^2 du and q^2 = IMPLICIT dt EI it is one symmetric system of blocks [du, M] along the belt,
-solved without dv_0 and, once that is known, with it. The block of dv_0, with its own slope d, lacks the term
--C A^-1 C, which couples all stations; LAG_SHARE C^2 / (m / dt + r) stands for it. That is the step of a
-symmetric mass: of A, C, and d + C (A^-1 - LAG_SHARE / (m / dt + r)) C. It is stable as long as that outweighs
-S = (1 + 2 DAMPED) dt K / 4 in every direction. With b = 4 IMPLICIT / (1 + 2 DAMPED), A contains b S, and of
-du = x - A^-1 C dv_0 the energy S is at most that of b x and b / (b - 1) A^-1 C dv_0; the latter has no more
-than dv_0.C^2 dv_0 / (4 (b - 1) (m / dt + r)), as y - y^2 <= 1/4. LAG_SHARE leaves as much, so that no wave
-grows whatever mesh and friction are. A mass that is not symmetric, as of increments that are spread after
-friction has taken its part, feeds the shortest waves.
+With M = -(q dt / m) d^2/ds^2 du and q^2 = IMPLICIT EI m it is one symmetric system of blocks [du, M] along
+the belt, solved without dv_0 and, once that is known, with it. The block of dv_0, with its own slope d, lacks
+the term -C A^-1 C, which couples all stations; LAG_SHARE C^2 / (m / dt + r) stands for it. That is the step
+of a symmetric mass: of A, C, and d + C (A^-1 - LAG_SHARE / (m / dt + r)) C. It is stable as long as that
+outweighs S = (1 + 2 DAMPED) dt K / 4 in every direction. With b = 4 IMPLICIT / (1 + 2 DAMPED), A contains b
+S, and of du = x - A^-1 C dv_0 the energy S is at most that of b x and b / (b - 1) A^-1 C dv_0; the latter has
+no more than dv_0.C^2 dv_0 / (4 (b - 1) (m / dt + r)), as y - y^2 <= 1/4. LAG_SHARE leaves as much, so that no
+wave grows whatever mesh and friction are. A mass that is not symmetric, as of increments that are spread
+after friction has taken its part, feeds the shortest waves.
 """
 
 from cvt_hpc.kernels import kernel, merged_kernel
@@ -39,12 +39,12 @@ ALONE, TURNING, WITH_LAYERS = range(3)
 
 
 @merged_kernel
-def implicit_bending(belt: LaneBelt, step: float):
-    """IMPLICIT dt EI [N s m^2]."""
+def _coupling(belt: LaneBelt):
+    """Q [N s]; the square root of a product, so that it scales with the units of force as all else does."""
     stiffness = belt.constants[0, lf.BENDING_STIFFNESS]
     if belt.has_column:
         stiffness = stiffness + belt.constants[0, lf.COLUMN_STIFFNESS]
-    return IMPLICIT * step * stiffness
+    return sqrt(IMPLICIT * stiffness * belt.constants[0, lf.MASS])
 
 
 @kernel
@@ -57,7 +57,7 @@ def move_across(belt: LaneBelt, state: LaneState, work: Work, step: float) -> No
     (v / h) (w step)^3 / 4.
     """
     stations, c = work.stations, belt.constants
-    last, q = stations.rows - 1, sqrt(implicit_bending(belt, step))
+    last, q, mass_rate = stations.rows - 1, _coupling(belt), c[0, lf.MASS] * (1.0 / step)
     zero = like(0.0, q)
     # of the last row, for the one behind; of a row's coupling to the last one behind; of the row before
     own00 = own01 = own11 = c00 = c11 = t00 = t01 = t11 = zero
@@ -66,7 +66,8 @@ def move_across(belt: LaneBelt, state: LaneState, work: Work, step: float) -> No
     for j in range(last + 1):
         onward = q * belt.per_cell[j]
         dual = like(belt.dual[j], q)
-        d00, d01, d11 = fma(dual, stations[j, lf.MASS_ACROSS], -t00), link + onward - t01, -dual - t11
+        d00, d01 = fma(dual, stations[j, lf.MASS_ACROSS], -t00), link + onward - t01
+        d11 = -mass_rate * dual - t11
         if j == last:
             stations[j, lf.A_00], stations[j, lf.A_01] = d00 + from_ahead(own00), d01 + from_ahead(own01)
             stations[j, lf.A_11] = d11 + from_ahead(own11)
@@ -105,10 +106,10 @@ def move_across(belt: LaneBelt, state: LaneState, work: Work, step: float) -> No
 
 
 @kernel
-def move_with_layers(belt: LaneBelt, state: LaneState, work: Work, step: float) -> None:
+def move_with_layers(belt: LaneBelt, state: LaneState, work: Work) -> None:
     """Increments of u, PUSH, with those of the elements, DV_0."""
     gyration = -belt.constants[0, lf.MASS] * lane_belt_speed(belt, state.time[0])
-    _solve(belt, work, sqrt(implicit_bending(belt, step)), gyration, WITH_LAYERS)
+    _solve(belt, work, _coupling(belt), gyration, WITH_LAYERS)
 
 
 @merged_kernel

@@ -149,7 +149,7 @@ def step_rings(belt: LaneBelt, state: LaneState, work: RingWork, step: float) ->
             assemble(belt, state, one, step, True)
             move_across(belt, state, one, step)
             couple_layers(belt, work.rings, state, work, step)
-    move_with_layers(belt, state, one, step)
+    move_with_layers(belt, state, one)
     taken, moment = advance_belt(belt, state, one, step)
     advance_layers(belt, work.rings, state, work, step)
     advance_pulleys(belt, state, taken, moment, step)

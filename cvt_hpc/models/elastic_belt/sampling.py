@@ -166,8 +166,10 @@ def sensors(grid: Mesh, places: tuple[Probe, ...], interval: float, dtype: type)
         first, count = grid.starts[region], grid.counts[region]
         length = grid.path.lengths[region]
         x, dual = grid.along(region)[:-1] / length, 0.5 * (grid.cell + np.roll(grid.cell, 1))
-        for k in range(1, MODES + 1):
-            shape = np.sin(k * np.pi * x) * 2.0 * dual[first : first + count] / length
+        sines = np.sin(np.pi * np.outer(np.arange(1, MODES + 1), x))
+        weighted = sines * dual[first : first + count]
+        # least squares by length, which is exact for these sines on any mesh
+        for shape in np.linalg.solve(weighted @ sines.T, weighted):
             row = np.zeros(n)
             row[first : first + count] = shape
             row[first] -= shape @ (1.0 - x)
