@@ -1,7 +1,7 @@
 """The fast step against the plain explicit one, from a common state in motion: rates, order, size of the error.
 
-A window of 0.2 ms is short against the growth of small differences. The elements' speed is not judged where they are apart: there single gaps close one or the
-other step earlier.
+A window of 0.2 ms is short against the growth of small differences. The elements' speed is not judged where
+they are apart: there single gaps close one or the other step earlier.
 """
 
 from functools import cache

@@ -146,7 +146,7 @@ def test_the_step_is_chosen_for_the_scene():
     assert chosen(stations=960) == expected
     assert chosen(stations=288) == REFERENCE_STEP > chosen(stations=960)
     assert chosen(step=2e-6) == 2e-6
-    assert chosen(stepper="explicit") == 1e-7
+    assert chosen(stepper="explicit") == 4e-8
 
 
 def test_every_cell_of_a_grid_has_a_step_of_its_own():

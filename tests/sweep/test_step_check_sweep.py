@@ -33,7 +33,7 @@ def test_a_study_is_checked_by_the_explicit_step_and_compared_with_it(tmp_path, 
     assert "step check: 2 of 2 runs that took steps done again by the explicit step" in printed
     assert "  0 of 2 contradict" in printed
     with open_results("out/b/check_explicit") as dataset:
-        assert np.allclose(dataset["time_step"], 1e-7, rtol=1e-9)
+        assert np.allclose(dataset["time_step"], 4e-8, rtol=1e-9)
         assert dataset["status"].values.tolist() == [Status.DONE] * 2
     assert main(["compare", "out/b", "out/b/check_explicit"]) == 0
     assert 'differs: stepper: "imex" in A, "explicit" in B' in capsys.readouterr().out
