@@ -251,7 +251,8 @@ AXES = {
 @pytest.mark.parametrize("stepper", ["imex", "explicit"])
 def test_groups_hold_each_run_once_and_only_what_is_alike(stepper):
     axes = {k: v for k, v in AXES.items() if k != "precision" or stepper == "imex"}
-    step = {"step": 1e-7} if stepper == "explicit" else {}  # of runs so long that no group is cut for its length
+    # explicit runs of a longer step than their own: so long that no group is cut for its cost
+    step = {"step": 1e-7} if stepper == "explicit" else {}
     asked = job(stepper=stepper, axes=axes, friction_gradient=0.0, **step)
     indices = np.random.default_rng(0).permutation(asked.size).tolist()
     groups = lane_groups(asked, indices)
