@@ -7,7 +7,7 @@ from dataclasses import dataclass
 from decimal import Decimal
 
 import pytest
-from hypothesis import example, given, settings
+from hypothesis import assume, example, given, settings
 from hypothesis import strategies as st
 
 from cvt_hpc.errors import InputError, JobWarning
@@ -249,6 +249,8 @@ def test_a_table_in_any_dialect_gives_its_numbers_or_is_refused(tmp_path_factory
     path = tmp_path_factory.mktemp("dialect") / "mu.csv"
     path.write_bytes(dialect.write(rows))
     marked = [text for row in rows for text in map(dialect.number, row) if set(text) & set(".,")]
+    # 1.000 for a thousand, in a file of commas without a decimal one, is a plain number to anybody
+    assume(dialect.separator != dialect.mark or not marked or any("," in text for text in marked))
     of_thousands = dialect.grouped and any(value >= 1000 for row in rows for value in row)
     plain = dialect.separator == "," and dialect.mark == "."
     certain = not of_thousands and (plain or not marked or not all(map(may_be_a_thousand, marked)))
