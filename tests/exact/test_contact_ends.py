@@ -164,12 +164,35 @@ def test_twice_the_reach_beyond_the_arcs_changes_no_digit(monkeypatch):
 
 def test_contact_that_reaches_the_last_tested_station_is_a_failure():
     grid = mesh(DEFAULTS)
-    for region in (0, 2):
-        zone = grid.zone(region)
+    grooves = [grid.zone(region).stations for region in (0, 2)]
+    for stations in grooves:
         for end in (0, -1):
             force = np.zeros(grid.cell.size)
-            force[zone.stations[1:-1]] = 1e5
-            assert reach_doubt(force, grid) is None
-            force[zone.stations[end]] = 1.0
-            status, why = reach_doubt(force, grid)
-            assert status is Status.FAILED_NUMERICS and "beyond its arc" in why
+            force[stations[1:-1]] = 1e5
+            assert reach_doubt(force, grooves) is None
+            force[stations[end]] = 1.0
+            status, why = reach_doubt(force, grooves)
+            assert status is Status.FAILED_NUMERICS and "would be cut off" in why
+
+
+@pytest.mark.parametrize("ratio", [0.52, 1.06, 2.52])
+def test_what_turns_with_a_pulley_does_not_slide_in_its_groove(ratio):
+    """Rigid rotation, wherever the station lies: along it omega (R + w), across it -omega x."""
+    values = DEFAULTS | {"ratio": ratio, "driven_radius": 0.075 if ratio > 1.0 else 0.04, "duration": 1.0}
+    belt, grid = belt_constants(values), mesh(values)
+    state = State(np.zeros((7, belt.cell.size)), np.zeros(f.SCALARS))
+    state.scalars[f.DRIVEN_SPEED] = driven = belt.driving_speed / ratio
+    for region, omega, radius in (
+        (0, belt.driving_speed, belt.driving_radius),
+        (2, driven, belt.driven_radius),
+    ):
+        zone = grid.zone(region)
+        assert np.abs(zone.beyond).max() > 5e-3
+        for w in (0.0, 2e-4, -2e-4):
+            state.fields[f.W], state.fields[f.V_ELEMENT] = w, omega * (radius + w)
+            for j, x in zip(zone.stations, zone.beyond, strict=True):
+                climb, run, distance = rhs.sliding_speeds(belt, state, j, -omega * x, belt.driving_speed)
+                # exact on the path; of a displacement w / R (x / R)^2 and (w / R)^2 are left out
+                left_out = abs(w) / radius * ((x / radius) ** 2 + 3.0 * abs(w) / radius) + 1e-13
+                assert distance == pytest.approx(np.hypot(x, radius + w), abs=radius * left_out)
+                assert max(abs(climb), abs(run)) < omega * radius * left_out

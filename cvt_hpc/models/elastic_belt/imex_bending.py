@@ -40,7 +40,7 @@ ALONE, TURNING, WITH_LAYERS = range(3)
 
 @merged_kernel
 def _coupling(belt: LaneBelt):
-    """Q [N s]; the square root of a product, so that it scales with the units of force as all else does."""
+    """Coupling q [N s]: the root of a product, so that it scales with the units of force as all else does."""
     stiffness = belt.constants[0, lf.BENDING_STIFFNESS]
     if belt.has_column:
         stiffness = stiffness + belt.constants[0, lf.COLUMN_STIFFNESS]
@@ -157,8 +157,8 @@ def _solve(belt: LaneBelt, work: Work, q, gyration, part: int) -> None:
         onward = q * belt.per_cell[j]
         e0, e1 = onward * x1, onward * x0
         i01 = stations[j, lf.A_01]
-        part = fma(-stations[j, lf.B_01], behind1, fma(-stations[j, lf.B_00], behind0, stations[j, lf.X_0]))
-        x0 = fma(stations[j, lf.A_00], e0, fma(i01, e1, part))
-        part = fma(-stations[j, lf.B_11], behind1, fma(-stations[j, lf.B_10], behind0, stations[j, lf.X_1]))
-        x1 = fma(i01, e0, fma(stations[j, lf.A_11], e1, part))
+        z0 = fma(-stations[j, lf.B_01], behind1, fma(-stations[j, lf.B_00], behind0, stations[j, lf.X_0]))
+        z1 = fma(-stations[j, lf.B_11], behind1, fma(-stations[j, lf.B_10], behind0, stations[j, lf.X_1]))
+        x0 = fma(stations[j, lf.A_00], e0, fma(i01, e1, z0))
+        x1 = fma(i01, e0, fma(stations[j, lf.A_11], e1, z1))
         stations[j, lf.PUSH] = x0

@@ -276,7 +276,8 @@ class RecordedRun:
             The reason.
         """
         found = doubt(record, self.parameters, self.mesh)
-        return found or reach_doubt(self.means["contact_force"], self.mesh)
+        grooves = (self.mesh.zone(region).stations for region in (0, 2))
+        return found or reach_doubt(self.means["contact_force"], grooves)
 
 
 class OneLaneRun(RecordedRun):

@@ -1,6 +1,6 @@
 """Conditions that end a run, and checks of the numbers of a run that reached its end."""
 
-from collections.abc import Mapping
+from collections.abc import Iterable, Mapping
 from typing import Any
 
 import numpy as np
@@ -73,11 +73,6 @@ def power_limit(grid: Mesh) -> float:
     return LARGEST_POWER_RESIDUAL * max(1.0, REFERENCE_CELLS / grid.cell.size)
 
 
-def _strand_cell(grid: Mesh) -> float:
-    """Length of the longest cell of a strand [m]."""
-    return float(grid.cell[grid.region == 1].max())
-
-
 def step_doubt(step: float, limit: float) -> tuple[Status, str] | None:
     """Whether a step of `imex` [s] is beyond the longest stable one [s] of `transverse_limit`."""
     if step <= BEYOND_LIMIT * limit:
@@ -86,28 +81,25 @@ def step_doubt(step: float, limit: float) -> tuple[Status, str] | None:
     return Status.FAILED_NUMERICS, f"{why}: shorter waves across the belt grow from step to step"
 
 
-def reach_doubt(force: np.ndarray, grid: Mesh) -> tuple[Status, str] | None:
+def reach_doubt(force: np.ndarray, grooves: Iterable[np.ndarray]) -> tuple[Status, str] | None:
     """Whether contact went on to the last stations that a groove may hold, and so might go on beyond them.
 
     Parameters
     ----------
     force : (N,) array
-        Mean axial line force of the flanks [N/m].
-    grid : Mesh
-        The belt's mesh.
+        Axial line force of the flanks [N/m], of a state or a mean.
+    grooves : iterable of (m,) int arrays
+        Stations that each groove may hold, in the direction of travel.
 
     Returns
     -------
     (Status, str) or None
         The reason.
     """
-    for region in (0, 2):
-        zone = grid.zone(region)
-        for end in (0, -1):
-            if force[zone.stations[end]] > 0.0:
-                found = f"the belt touches a groove {abs(zone.beyond[end]) * 1e3:.3g} mm beyond its arc"
-                return Status.FAILED_NUMERICS, f"{found}, where contact is not tested any further"
-    return None
+    if not any((force[stations[[0, -1]]] > 0.0).any() for stations in grooves):
+        return None
+    why = "the belt touches a groove at the last station beyond its arc at which contact is tested"
+    return Status.FAILED_NUMERICS, f"{why}: a longer contact would be cut off"
 
 
 def doubt(record: dict[str, Any], parameters: Mapping[str, Any], grid: Mesh) -> tuple[Status, str] | None:
@@ -134,4 +126,5 @@ def doubt(record: dict[str, Any], parameters: Mapping[str, Any], grid: Mesh) -> 
     if record["step_ripple"] > parameters["most_step_ripple"]:
         why = f"speeds go to and fro from step to step, by {record['step_ripple'] * 1e3:.3g} mm/s on average"
         return Status.FAILED_NUMERICS, f"{why}: no motion of the belt is as fast"
-    return slack_doubt(parameters["bending_stiffness"], _strand_cell(grid), record["least_strand_force"])
+    longest = float(grid.cell[grid.region == 1].max())
+    return slack_doubt(parameters["bending_stiffness"], longest, record["least_strand_force"])

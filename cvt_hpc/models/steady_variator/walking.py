@@ -10,7 +10,9 @@ from typing import Any, NamedTuple
 import numpy as np
 
 from cvt_hpc.models.elastic_belt.belt import Belt, State, belt_constants
+from cvt_hpc.models.elastic_belt.rhs import contact_forces, fresh_contacts
 from cvt_hpc.models.elastic_belt.state_march import sampled
+from cvt_hpc.models.elastic_belt.validity import reach_doubt
 from cvt_hpc.models.steady_variator.braked import Braked
 from cvt_hpc.models.steady_variator.continuation import AT_HOME, Continuation, NoSteadyState, PathEnds
 from cvt_hpc.models.steady_variator.equations import SPEED, Equations
@@ -128,8 +130,12 @@ class SteadyBelt:
     @staticmethod
     def _state_of(equations: Equations, x: np.ndarray, load: float) -> Steady:
         equations.under(load=load, load_start=load)
-        belt = equations.belt._replace(bridging_stiffness=np.inf)
-        return Steady(load, belt, equations.state(x), x)
+        belt, state = equations.belt._replace(bridging_stiffness=np.inf), equations.state(x)
+        force = np.empty(belt.cell.size)
+        contact_forces(belt, state, fresh_contacts(belt), force)
+        if doubt := reach_doubt(force, (belt.driving_stations, belt.driven_stations)):
+            raise NoSteadyState(doubt[1])
+        return Steady(load, belt, state, x)
 
     def known(self, load: float, unknowns: np.ndarray) -> Steady:
         """State under a load, by unknowns that were found before; ValueError if they are not of this belt."""
