@@ -14,6 +14,12 @@ PARAMETERS: dict[str, dict[str, Parameter]] = {
         "duration": Parameter(
             0.3, "s", "simulated time of a run", minimum=0.0, exclusive=True, sensible=(0.001, 200.0)
         ),
+        "shortest_duration": not_negative(
+            0.0,
+            "s",
+            "from which on a run ends as soon as its verdict is certain; 0: the duration",
+            sensible=(0.001, 200.0),
+        ),
         "longest_duration": not_negative(
             0.0,
             "s",
@@ -68,6 +74,9 @@ def check(parameters: Parameters) -> list[tuple[str, str, str]]:
     if longest < duration * (1.0 - 1e-9):
         expected = f"duration = {duration:g} s or more, or 0 for {LONGEST} times the duration"
         problems.append(("longest_duration", expected, f"{longest:g} s"))
+    shortest = parameters["shortest_duration"]
+    if shortest > duration * (1.0 + 1e-9):
+        problems.append(("shortest_duration", f"duration = {duration:g} s or less", f"{shortest:g} s"))
     needed = LEAST_SAMPLES_PER_PERIOD * parameters["band_high"]
     if parameters["sampling_rate"] < needed:
         expected = f"{LEAST_SAMPLES_PER_PERIOD} x band_high = {needed:g} Hz or more"
@@ -81,7 +90,8 @@ def check(parameters: Parameters) -> list[tuple[str, str, str]]:
 def inert(parameters: Parameters) -> dict[str, str]:
     """Parameters without effect on a run, each with the setting that makes it so."""
     found = {} if "step" in parameters else {"most_refinements": "a stepper that chooses its step"}
-    return found | ({"longest_duration": f"{ramped(parameters)}_history ramp"} if ramped(parameters) else {})
+    names = ("shortest_duration", "longest_duration") if ramped(parameters) else ()
+    return found | dict.fromkeys(names, f"{ramped(parameters)}_history ramp")
 
 
 def sample_count(parameters: Parameters) -> int:
@@ -110,6 +120,28 @@ def start_up_samples(parameters: Parameters) -> int:
     """
     risen = math.ceil(parameters["rise_time"] * parameters["sampling_rate"])
     return min(risen, sample_count(parameters))
+
+
+def first_duration(parameters: Parameters) -> float:
+    """How long a run lasts at the least [s]: half its duration, or a quarter, and so on.
+
+    Parameters
+    ----------
+    parameters : mapping
+        Flat parameters of the run as its job has them [SI].
+
+    Returns
+    -------
+    float
+        Not below `shortest_duration`; the duration itself where that is 0 or a ramp takes the whole run.
+    """
+    samples, shortest = sample_count(parameters), parameters["shortest_duration"]
+    if shortest == 0.0 or ramped(parameters):
+        return float(parameters["duration"])
+    halvings = max(math.floor(math.log2(parameters["duration"] / shortest) + 1e-9), 0)
+    if halvings == 0:
+        return float(parameters["duration"])
+    return math.ceil(samples / 2**halvings) / float(parameters["sampling_rate"])
 
 
 def longest_duration(parameters: Parameters) -> Any:

@@ -136,7 +136,7 @@ def _check(job: Job) -> None:
     stated = [rule.key for rule in job.rules if not rule.is_substituted]
     varied = dict.fromkeys(stated, ("derived", "a formula"))
     varied |= dict.fromkeys(axes, ("axes", "an axis"))
-    for name in ("stations", "step_error", "step", "duration", "longest_duration"):
+    for name in ("stations", "step_error", "step", "duration", "shortest_duration", "longest_duration"):
         if name in varied:
             table, found = varied[name]
             raise mismatch(f"{where}: [{table}] {name}", "one value, which the reference refines", found)
@@ -158,7 +158,7 @@ def _refined(job: Job) -> dict[str, Any]:
     # a step that follows from the scene follows from that of the finer mesh
     setting = "step_error" if any(rule.key == "step" for rule in job.rules) else "step"
     document["numerics"][setting] = job.parameters[setting] / FINER
-    for name in ("duration", "longest_duration"):
+    for name in ("duration", "shortest_duration", "longest_duration"):
         document["run"][name] = LONGER * job.parameters[name]
     return document
 

@@ -3,7 +3,8 @@
 `OpenRun` is a run on its way to its record, with its next transient and the cost of its earlier ones. Most
 runs are one transient. A run that fails by its numerics is done again from its start at half the step,
 `most_refinements` times at most. A run that is undecided is prolonged to twice its time, and again, as long
-as that is within `longest_duration`. A model that may answer by less than the full transient declares so in
+as that is within `longest_duration`; with `shortest_duration` it begins with a part of its duration, at the end
+of which only a certain verdict counts. All this goes by the run alone, whatever runs beside it. A model that may answer by less than the full transient declares so in
 its record module (`contract.py`), and its answers of this kind are neither refined nor prolonged.
 """
 
@@ -14,9 +15,10 @@ from typing import Any
 
 from cvt_hpc.job import Job
 from cvt_hpc.models.contract import Batch, load_model
-from cvt_hpc.recording import longest_duration, sample_count
+from cvt_hpc.recording import first_duration, longest_duration, sample_count
 from cvt_hpc.simulation.record import in_lanes, record_of, record_without_run
 from cvt_hpc.variables import LONGEST_REASON, Status, Vibrates, shortened
+from cvt_hpc.vibration.assessment import is_certain
 from cvt_hpc.vibration.ramped import ramped
 
 _COST = ("core_seconds", "steps", "contact_solves")  # of a record: sums over all tries
@@ -53,7 +55,7 @@ class OpenRun:
             point = point | {"profile_duration": 0.0}  # only histories have profiles over time
         self._job, self._point, self._model = job, point, load_model(job.model)
         self._is_kept = is_kept
-        self.next, self.paused = point, None
+        self.next, self.paused = self._first(point), None
         self.record: dict[str, Any] | None = None
         self.run: Any = None
         self._refinements = 0
@@ -85,17 +87,32 @@ class OpenRun:
         record |= {name: record[name] + self._spent[name] for name in _COST}
         if self._is_preliminary and record["status"] != Status.DONE:
             self._is_preliminary = False
-            self._begin(self._point, record)
+            self._begin(self._first(self._point), record)
         elif self._is_preliminary:
             self._end(run, record)
         elif record["status"] == Status.FAILED_NUMERICS and (finer := self._finer(run)):
             self._refinements += 1
-            self._begin(finer, record)
-        elif _is_undecided(record) and (longer := self._longer(run)):
+            self._begin(self._first(finer), record)
+        elif self._goes_on(run, record) and (longer := self._longer(run)):
             self._spent["core_seconds"] = record["core_seconds"]  # steps and solves are counted on
             self.next, self.paused = longer, run.paused()
         else:
             self._end(run, record)
+
+    @staticmethod
+    def _first(point: dict[str, Any]) -> dict[str, Any]:
+        """Parameters of the first part of a run that may end early."""
+        early = "shortest_duration" in point and first_duration(point) < point["duration"]
+        return point | {"duration": first_duration(point)} if early else point
+
+    def _goes_on(self, run: Any, record: dict[str, Any]) -> bool:
+        """Whether more of a run may change its verdict."""
+        if record["status"] != Status.DONE:
+            return False
+        left = sample_count(self._point) - sample_count(run.parameters) if "duration" in self._point else 0
+        if left > 0:
+            return not is_certain(record, run.parameters, left / self._point["sampling_rate"])
+        return bool(record["vibrates"] == Vibrates.UNDECIDED)
 
     def _begin(self, parameters: dict[str, Any], record: dict[str, Any]) -> None:
         self._spent = {name: record[name] for name in _COST}
@@ -123,15 +140,16 @@ class OpenRun:
         the judged part is not known of less than that.
         """
         p = run.parameters
-        duration = 2 * sample_count(p) / p["sampling_rate"]
+        taken, whole = sample_count(p), sample_count(self._point)
+        samples = min(2 * taken, whole) if taken < whole else 2 * taken
+        duration = samples / p["sampling_rate"]
         is_too_long = duration > longest_duration(self._point) * (1.0 + 1e-9)
         if is_too_long or ramped(p):
             return None
-        return p | {"duration": duration, "judged_fraction": min(p["judged_fraction"], 0.5)}
-
-
-def _is_undecided(record: dict[str, Any]) -> bool:
-    return record["status"] == Status.DONE and record["vibrates"] == Vibrates.UNDECIDED
+        if samples == whole:
+            duration = self._point["duration"]
+        judged = min(self._point["judged_fraction"], 1.0 - taken / samples)
+        return p | {"duration": duration, "judged_fraction": judged}
 
 
 def _remedy(job: Job, point: dict[str, Any]) -> str:

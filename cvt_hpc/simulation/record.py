@@ -52,6 +52,7 @@ _MARCH = (
 )
 COMMON = (*_VERDICT, *_COST, *_MARCH)  # of all models; those without a march have none of its
 
+EARLY_SHARE = 0.55  # of the first transient where runs may end at a quarter of it, as measured there, too
 LEFT_SHARE = 1.0  # extra cost of refined and prolonged runs in a map, as measured by lebrecht_2004.toml
 _MOST_ESTIMATED = 2_000  # runs whose costs are averaged
 BATCH_SECONDS = 30.0  # of computing in a batch, as predicted: so much a process that dies may lose
@@ -222,7 +223,8 @@ def _allowance(p: Mapping[str, Any]) -> Any:
     if "longest_duration" not in p:
         return 1.0
     goes_on = longest_duration(p) > p["duration"]
-    return 1.0 + LEFT_SHARE * (goes_on | (p["most_refinements"] > 0))
+    early = np.where(np.equal(p["shortest_duration"], 0.0), 1.0, EARLY_SHARE)
+    return early + LEFT_SHARE * (goes_on | (p["most_refinements"] > 0))
 
 
 def _over_the_grid(job: Job, derived: Derived) -> np.ndarray:

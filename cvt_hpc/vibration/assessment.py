@@ -48,6 +48,8 @@ _CONFIDENCE = 0.975  # one-sided
 
 CONFIDENCE = 0.975  # one-sided, by Student's t: few windows know their own scatter badly
 STEADY_LOSS = 0.05  # e-folds over the judged part that a settled vibration may lose, scatter apart
+CERTAIN_FACTOR = 2.0  # between amplitude and threshold, from which a shorter run decides
+UNSETTLED = 0.1  # change of a vibration, in e-folds, that the amplitude of a map may have
 LEAST_RISES = 3  # windows in a row, none below the one before: irregular motion does that once in 24 times
 
 VARIABLES = (
@@ -194,6 +196,37 @@ def _judge_strand(
     if not (rate + error) * record_time < np.log(threshold / last):
         return Vibrates.UNDECIDED, f"is below the threshold, {size}, but may cross it in {record_time:.3g} s"
     return Vibrates.NO, f"is quiet, {size}"
+
+
+def is_certain(record: Mapping[str, Any], parameters: Mapping[str, Any], left: float) -> bool:
+    """Whether a run that goes on would not change its verdict, nor its amplitude by more than a tenth.
+
+    Its amplitude is CERTAIN_FACTOR times above or below the threshold, and stays so as it grows or decays,
+    by twice the error of its growth rate; of a vibration it changes by less than UNSETTLED.
+
+    Parameters
+    ----------
+    record : mapping
+        With `vibrates` and VARIABLES.
+    parameters : mapping
+        Of the run: those of [vibration], `duration` and `judged_fraction`.
+    left : float
+        By how much the run would go on [s].
+    """
+    if record["vibrates"] not in (Vibrates.YES, Vibrates.NO) or "growth_rate" not in record:
+        return False
+    threshold = parameters["amplitude_threshold"]
+    rate, error = (np.nan_to_num(record[name]) for name in ("growth_rate", "growth_error"))
+    with np.errstate(divide="ignore"):
+        levels = np.log(np.asarray(record["amplitude"]) / threshold)
+    if record["vibrates"] == Vibrates.NO:
+        return bool(np.all(levels + np.maximum(rate + 2.0 * error, 0.0) * left <= -np.log(CERTAIN_FACTOR)))
+    strongest = int(np.argmax(levels))
+    most, spread = rate[strongest], 2.0 * error[strongest]
+    judged = parameters["judged_fraction"] * parameters["duration"]
+    is_settled = abs(most) * judged <= UNSETTLED and record["amplitude_scatter"][strongest] <= UNSETTLED
+    lowest = levels[strongest] + min(most - spread, 0.0) * left
+    return bool(is_settled and lowest >= np.log(CERTAIN_FACTOR))
 
 
 def relative_scatter(windows: ArrayLike) -> NDArray[np.float64]:

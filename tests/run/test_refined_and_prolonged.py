@@ -6,12 +6,13 @@ from functools import partial
 import numpy as np
 import pytest
 
+from cvt_hpc.errors import InputError
 from cvt_hpc.job import build_job
 from cvt_hpc.models.elastic_belt.batch import Batch, LaneRun
 from cvt_hpc.models.elastic_belt.general_run import GeneralTransient
 from cvt_hpc.models.marched import BatchOfOne
 from cvt_hpc.models.oscillator.transient import Transient as Oscillator
-from cvt_hpc.simulation import Interrupted, run_point, run_points, simulate
+from cvt_hpc.simulation import Interrupted, marching, run_point, run_points, simulate
 from cvt_hpc.variables import Status, Vibrates
 from cvt_hpc.vibration import assessment
 from support.marched import CHEAP, assert_same_bits, job, never
@@ -131,6 +132,46 @@ def test_how_long_a_run_goes_on(script, values, until, simulated):
     assert found["simulated_seconds"] == pytest.approx(simulated)
     assert (found["vibrates"] == Vibrates.UNDECIDED) is (until > simulated)
     assert found["refinements"] == 0
+
+
+@pytest.mark.parametrize(
+    ("shortest", "certain", "simulated"),
+    [
+        (0.0, 0.0, 2 * T),
+        (2 * T, 0.0, 2 * T),
+        (T, 0.0, T),
+        (1.01 * T, 0.0, 2 * T),  # half is too short
+        (T, 2 * T, 2 * T),
+    ],
+)
+def test_a_run_that_ends_early_is_the_shorter_run(monkeypatch, shortest, certain, simulated):
+    ends = []
+
+    def scripted(record, parameters, left):
+        ends.append((record["simulated_seconds"], left))
+        return record["simulated_seconds"] > certain - 1e-9
+
+    monkeypatch.setattr(marching, "is_certain", scripted)
+    whole = {"duration": 2 * T, "longest_duration": 2 * T}
+    found = run_point(asked(), point(**whole, shortest_duration=shortest), never)
+    assert found["simulated_seconds"] == pytest.approx(simulated)
+    assert ends == ([pytest.approx((T, T))] if shortest == T else [])
+    asked_at_once = whole | {"duration": simulated}
+    assert_same_bits(found, run_point(asked(), point(**asked_at_once), never))
+
+
+def test_an_odd_number_of_samples_is_halved_and_met_again(monkeypatch):
+    monkeypatch.setattr(marching, "is_certain", lambda *_: False)
+    whole = {"duration": 2 * T + 3 / 20e3, "longest_duration": 0.0, "judged_fraction": 0.45}
+    found = run_point(asked(), point(**whole, shortest_duration=T), never)
+    assert_same_bits(found, run_point(asked(), point(**whole), never))
+
+
+def test_a_run_that_ends_early_has_been_judged_as_long_as_it_takes():
+    with pytest.raises(InputError, match=r"shortest_duration: expected 0.0\d+ s or more"):
+        asked(duration=4 * T, shortest_duration=0.5 * T)
+    with pytest.raises(InputError, match=r"shortest_duration: expected duration = 0.04 s or less"):
+        asked(shortest_duration=2 * T)
 
 
 def test_a_history_covers_the_whole_time(script):

@@ -6,7 +6,7 @@ from hypothesis import given, settings
 from hypothesis import strategies as st
 
 from cvt_hpc.variables import Vibrates
-from cvt_hpc.vibration.assessment import assess, classify, margin
+from cvt_hpc.vibration.assessment import assess, classify, is_certain, margin
 from cvt_hpc.vibration.settings import PARAMETERS, check
 from cvt_hpc.vibration.signals import growth_fit
 
@@ -228,3 +228,37 @@ def test_what_moves_below_the_band_does_not_vibrate():
 def test_the_margin_is_the_distance_from_the_threshold(windows, expected):
     vibrates, _ = verdict(*windows)
     assert margin(1e-6 * np.array(windows, float).T, vibrates, 1e-6) == pytest.approx(expected, abs=1e-12)
+
+
+CERTAIN = {"amplitude_threshold": 5e-6, "judged_fraction": 0.5, "duration": 0.1}
+
+
+@pytest.mark.parametrize(
+    ("vibrates", "amplitude", "rate", "error", "scatter", "certain"),
+    [
+        (Vibrates.NO, (2.4e-6, 1e-7), (0.0, 0.0), (0.0, 0.0), (0.0, 0.0), True),
+        (Vibrates.NO, (2.6e-6, 1e-7), (0.0, 0.0), (0.0, 0.0), (0.0, 0.0), False),  # within a factor of two
+        (Vibrates.NO, (1e-7, 1e-7), (0.0, 10.9), (0.0, 0.0), (0.0, 0.0), False),  # will have grown too far
+        (Vibrates.NO, (1e-7, 1e-7), (0.0, 10.5), (0.0, 0.0), (0.0, 0.0), True),
+        (Vibrates.NO, (1e-7, 1e-7), (0.0, 0.0), (0.0, 6.0), (0.0, 0.0), False),  # or may have
+        (Vibrates.NO, (1e-7, 0.0), (-50.0, np.nan), (0.1, np.nan), (0.0, np.nan), True),  # one is at rest
+        (Vibrates.YES, (11e-6, 1e-7), (0.0, 300.0), (0.0, 0.0), (0.02, 0.5), True),
+        (Vibrates.YES, (9e-6, 1e-7), (0.0, 0.0), (0.0, 0.0), (0.02, 0.5), False),
+        (Vibrates.YES, (50e-6, 1e-7), (2.1, 0.0), (0.0, 0.0), (0.02, 0.0), False),  # its size is not settled
+        (Vibrates.YES, (50e-6, 1e-7), (0.0, 0.0), (0.0, 0.0), (0.11, 0.0), False),
+        (Vibrates.YES, (11e-6, 1e-7), (-1.0, 0.0), (0.0, 0.0), (0.02, 0.0), False),  # will have decayed
+        (Vibrates.YES, (11e-6, 1e-7), (0.0, 0.0), (0.5, 0.0), (0.02, 0.0), False),
+        (Vibrates.UNDECIDED, (50e-6, 50e-6), (0.0, 0.0), (0.0, 0.0), (0.0, 0.0), False),
+        (Vibrates.IRREGULAR, (50e-6, 50e-6), (0.0, 0.0), (0.0, 0.0), (0.0, 0.0), False),
+        (Vibrates.SLIPS, (0.0, 0.0), (0.0, 0.0), (0.0, 0.0), (0.0, 0.0), False),
+    ],
+)
+def test_when_more_of_a_run_would_not_change_its_verdict(vibrates, amplitude, rate, error, scatter, certain):
+    values = amplitude, rate, error, scatter
+    names = "amplitude", "growth_rate", "growth_error", "amplitude_scatter"
+    record = {name: np.array(value) for name, value in zip(names, values, strict=True)}
+    assert is_certain(record | {"vibrates": vibrates}, CERTAIN, left=0.3) is certain
+
+
+def test_a_record_without_growth_is_never_certain():
+    assert not is_certain({"vibrates": Vibrates.NO, "amplitude": np.zeros(1)}, CERTAIN, left=0.3)

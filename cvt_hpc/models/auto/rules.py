@@ -66,6 +66,7 @@ def coarse(parameters: Parameters) -> dict[str, Any] | None:
         **parameters,
         "stations": round(COARSENESS * parameters["stations"]),
         "duration": SHARE * parameters["duration"],
+        "shortest_duration": 0.0,
     }
     p["step"] = min(p["step"] / COARSENESS, SAFE_SHARE * transverse_limit(p))
     least = elastic_belt.PARAMETERS["mesh"]["stations"].minimum

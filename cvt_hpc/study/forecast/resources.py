@@ -270,7 +270,7 @@ def find_out(job: Job, simulator: Simulator, groups: Sequence[Batch], out: Path,
 def run_pilots(job: Job, simulator: Simulator, groups: Sequence[Batch], count: int) -> Knowledge:
     """Do batches from all over the grid for a part of their duration, and compare with their predicted cost.
 
-    A shortened run is neither refined nor prolonged, and its batch fills the lanes once; what refining and
+    A shortened run does not end early, is neither refined nor prolonged, and its batch fills the lanes once; what refining and
     prolonging take is in the predicted costs alone.
     """
     short, share = job, simulator.pilot_share(job)
@@ -280,6 +280,7 @@ def run_pilots(job: Job, simulator: Simulator, groups: Sequence[Batch], count: i
     if share < 1.0 and "duration" in job.parameters and "duration" not in fixed:
         duration = share * job.parameters["duration"]
         bare = {"duration": duration, "longest_duration": duration, "most_refinements": 0}
+        bare["shortest_duration"] = 0.0
         known = {key: value for key, value in bare.items() if key in job.parameters}
         short = replace(job, parameters={**job.parameters, **known})
     else:
