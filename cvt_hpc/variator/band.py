@@ -10,11 +10,10 @@ from cvt_hpc.physics.running_strand import Strand, eigenfrequencies, net_forces
 from cvt_hpc.variator import STRANDS
 from cvt_hpc.vibration import settings
 from cvt_hpc.vibration.ramped import ramped
-from cvt_hpc.vibration.signals import band_amplitude, dominant_frequency
+from cvt_hpc.vibration.signals import band_amplitude
 
 MODES = 5  # of a strand, that are known
 FUNCTIONS = 24  # sines of the Ritz model, which so many modes need
-SLOWER = 0.5  # of the lowest first mode: judder is slower
 LEAST_JERK = 1e-3  # of the driven pulley's speed, amplitude from which it judders
 
 
@@ -68,16 +67,16 @@ def band(run: Any) -> tuple[float, float]:
         for name in ("ring_tension", "push_force")
     )
     means = {**p, "driving_speed": run.mean_driving_speed(run.judged)}
-    first = float(np.min(strand_frequencies(means, (tension[0] - push[0], tension[1] - push[1]))[:, 0]))
-    return settings.lower_edge(p, first, _judder(run, SLOWER * first)), p["band_high"]
+    modes = strand_frequencies(means, (tension[0] - push[0], tension[1] - push[1]))[:, 0]
+    lowest, highest = float(modes.min()), float(modes.max())
+    judders = _judders(run, settings.BELOW_MODES * lowest)
+    return settings.lower_edge(p, lowest, highest, judders), p["band_high"]
 
 
-def _judder(run: Any, below: float) -> float:
-    """Frequency of the driven pulley's jerks below another one [Hz]; 0 where there are none."""
+def _judders(run: Any, below: float) -> bool:
+    """Whether the driven pulley moves in jerks slower than a frequency [Hz]."""
     speed, rate = run.channel("driven_speed")[run.judged], run.parameters["sampling_rate"]
     slowest = settings.LEAST_PERIODS * rate / len(speed)
     if not slowest < below:
-        return 0.0
-    if not band_amplitude(speed, rate, (slowest, below)) > LEAST_JERK * abs(speed.mean()):
-        return 0.0
-    return float(np.nan_to_num(dominant_frequency(speed, rate, (slowest, below))))
+        return False
+    return bool(band_amplitude(speed, rate, (slowest, below)) > LEAST_JERK * abs(speed.mean()))

@@ -68,8 +68,7 @@ PARAMETERS: dict[str, dict[str, Parameter]] = {
 LOWEST = 300.0  # [Hz]: where a band begins that neither the job nor the strands of a run determine
 LEAST_PERIODS = 5.0  # of the band's lowest frequency in the judged part
 LEAST_IN_WINDOW = 2.0  # in a window
-FIRST_MODE_SHARE = 0.75
-JUDDER_HARMONICS = 5.5
+BELOW_MODES, ABOVE_MODES = 0.75, 1.05  # of the lower, and of the higher first mode of both strands
 SHORTEST_SEGMENT = 32  # samples of a window: its taper and the polynomial of drift must be resolved
 
 
@@ -84,31 +83,32 @@ def band(parameters: Parameters) -> tuple[float, float]:
     return parameters["band_low"] or LOWEST, parameters["band_high"]
 
 
-def lower_edge(parameters: Parameters, first_mode: float, judder: float) -> float:
+def lower_edge(parameters: Parameters, lowest_mode: float, highest_mode: float, judders: bool) -> float:
     """Lowest frequency by which a run is judged [Hz].
 
-    It is `band_low` where that is given. Else it is FIRST_MODE_SHARE of the lowest first mode of the strands:
-    they vibrate from 0.96 of that mode of theirs upwards, and a window of 40 ms is soft over 25 Hz beyond the
-    edge. It is JUDDER_HARMONICS of a judder or more, whatever the mode: jerks of the driven pulley ring the
-    strands' first modes by up to 22 um in their second to fifth harmonic, and by 4 um in higher ones. It is
-    at most half of `band_high`, and at least what the judged part and its windows resolve.
+    It is `band_low` where that is given. Else it is BELOW_MODES of the lower first mode of both strands: they
+    vibrate from 0.96 of that mode of theirs upwards, and a window of 40 ms is soft over 25 Hz beyond the
+    edge. Of a run that judders it is ABOVE_MODES of the higher one instead: jerks of the driven pulley ring
+    the first modes by up to 22 um, and move strands by up to 4 um above. It is at most half of `band_high`,
+    and at least what the judged part and its windows resolve.
 
     Parameters
     ----------
     parameters : mapping
         As `check` takes them.
-    first_mode : float
-        Lowest eigenfrequency of the strands under the run's own forces [Hz]; nan: not known, LOWEST holds.
-    judder : float
-        Frequency of the driven pulley's jerks [Hz]; 0: there are none.
+    lowest_mode, highest_mode : float
+        First eigenfrequencies of the strands under the run's own forces [Hz]; nan: not known, LOWEST holds.
+    judders : bool
+        Whether the driven pulley moves in jerks, slower than the edge is else.
     """
     p, (low, high) = parameters, band(parameters)
-    if p["band_low"] or not first_mode > 0.0:
+    if p["band_low"] or not lowest_mode > 0.0:
         return low
     resolved = max(
         LEAST_PERIODS / (p["judged_fraction"] * p["duration"]), LEAST_IN_WINDOW / p["window_length"]
     )
-    return max(min(max(FIRST_MODE_SHARE * first_mode, JUDDER_HARMONICS * judder), high / 2.0), resolved)
+    wanted = ABOVE_MODES * highest_mode if judders else BELOW_MODES * lowest_mode
+    return max(min(wanted, high / 2.0), resolved)
 
 
 def check(parameters: Parameters) -> list[tuple[str, str, str]]:

@@ -118,7 +118,7 @@ PARAMETERS: dict[str, dict[str, Parameter]] = {
     },
     "record": {"sampling_rate": replace(RECORD["sampling_rate"], default=2e3)},
     "vibration": {
-        "band_low": positive(40.0, "Hz", "lowest frequency of a vibration", sensible=(1.0, 20000.0)),
+        "band_low": replace(VIBRATION["band_low"], default=40.0),
         "band_high": replace(VIBRATION["band_high"], default=500.0),
         "amplitude_threshold": replace(VIBRATION["amplitude_threshold"], default=1e-4),
         "window_length": replace(VIBRATION["window_length"], default=0.1),
