@@ -14,6 +14,7 @@ from cvt_hpc.vibration.signals import band_amplitude
 
 MODES = 5  # of a strand, that are known
 FUNCTIONS = 24  # sines of the Ritz model, which so many modes need
+SLOWER = 0.5  # of the lower first mode: judder is slower, its second harmonic is no first mode
 LEAST_JERK = 1e-3  # of the driven pulley's speed, amplitude from which it judders
 
 
@@ -69,7 +70,7 @@ def band(run: Any) -> tuple[float, float]:
     means = {**p, "driving_speed": run.mean_driving_speed(run.judged)}
     modes = strand_frequencies(means, (tension[0] - push[0], tension[1] - push[1]))[:, 0]
     lowest, highest = float(modes.min()), float(modes.max())
-    judders = _judders(run, settings.BELOW_MODES * lowest)
+    judders = _judders(run, SLOWER * lowest)
     return settings.lower_edge(p, lowest, highest, judders), p["band_high"]
 
 

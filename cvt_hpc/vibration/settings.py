@@ -68,7 +68,7 @@ PARAMETERS: dict[str, dict[str, Parameter]] = {
 LOWEST = 300.0  # [Hz]: where a band begins that neither the job nor the strands of a run determine
 LEAST_PERIODS = 5.0  # of the band's lowest frequency in the judged part
 LEAST_IN_WINDOW = 2.0  # in a window
-BELOW_MODES, ABOVE_MODES = 0.75, 1.05  # of the lower, and of the higher first mode of both strands
+BELOW_MODES, ABOVE_MODES = 0.7, 1.05  # of the lower, and of the higher first mode of both strands
 SHORTEST_SEGMENT = 32  # samples of a window: its taper and the polynomial of drift must be resolved
 
 
@@ -87,10 +87,10 @@ def lower_edge(parameters: Parameters, lowest_mode: float, highest_mode: float, 
     """Lowest frequency by which a run is judged [Hz].
 
     It is `band_low` where that is given. Else it is BELOW_MODES of the lower first mode of both strands: they
-    vibrate from 0.96 of that mode of theirs upwards, and a window of 40 ms is soft over 25 Hz beyond the
-    edge. Of a run that judders it is ABOVE_MODES of the higher one instead: jerks of the driven pulley ring
-    the first modes by up to 22 um, and move strands by up to 4 um above. It is at most half of `band_high`,
-    and at least what the judged part and its windows resolve.
+    vibrate from 0.8 of that mode of theirs upwards, since the ends of the arcs give. Of a run that judders it
+    is ABOVE_MODES of the higher one instead: jerks of the driven pulley ring the first modes by up to 29 um,
+    and move strands by up to 4 um above. It is at most half of `band_high`, and at least what the judged part
+    and its windows resolve.
 
     Parameters
     ----------
@@ -99,7 +99,7 @@ def lower_edge(parameters: Parameters, lowest_mode: float, highest_mode: float, 
     lowest_mode, highest_mode : float
         First eigenfrequencies of the strands under the run's own forces [Hz]; nan: not known, LOWEST holds.
     judders : bool
-        Whether the driven pulley moves in jerks, slower than the edge is else.
+        Whether the driven pulley moves in jerks.
     """
     p, (low, high) = parameters, band(parameters)
     if p["band_low"] or not lowest_mode > 0.0:

@@ -60,18 +60,18 @@ def test_it_begins_below_the_lower_first_mode_of_both_strands():
 
 def test_of_a_run_that_judders_it_begins_above_both_first_modes():
     expected = ABOVE_MODES * first_mode(8e3)
-    for frequency in (61.0, 90.0, 0.65 * first_mode(5e3)):
+    for frequency in (61.0, 90.0, 0.45 * first_mode(5e3)):
         assert band(run(judder=[(frequency, 1.3 * LEAST_JERK)]))[0] == pytest.approx(expected, rel=1e-4)
     # a ripple is no judder, nor is a slow drift, nor what a vibration of the strands themselves does to the pulley
     undisturbed = band(run())[0]
-    for motion in ((61.0, 0.8 * LEAST_JERK), (2.0, 1e-2), (first_mode(5e3), 1e-2)):
+    for motion in ((61.0, 0.8 * LEAST_JERK), (2.0, 1e-2), (0.6 * first_mode(5e3), 1e-2)):
         assert band(run(judder=[motion]))[0] == undisturbed, motion
 
 
 def test_the_judged_part_and_the_windows_have_to_resolve_it():
-    least = 5.0 / (0.5 * 0.06)
+    least = 5.0 / (0.5 * 0.08)
     assert BELOW_MODES * first_mode(5e3) > least > 100.0
-    assert band(run((6e3, 6e3), (5e3, 5e3), duration=0.06))[0] == pytest.approx(least)
+    assert band(run((6e3, 6e3), (5e3, 5e3), duration=0.08))[0] == pytest.approx(least)
     assert band(run((6e3, 6e3), (5e3, 5e3), window_length=0.01))[0] == pytest.approx(200.0)
     assert band(run(band_high=305.0))[0] == pytest.approx(152.5)
 
