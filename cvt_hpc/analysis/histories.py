@@ -19,7 +19,7 @@ from cvt_hpc.job.schema import load_schema
 from cvt_hpc.job.values import JOB_UNITS, POINT_UNITS, shown
 from cvt_hpc.variables import Status, Vibrates, flag_in_words, shortened
 from cvt_hpc.vibration import settings as vibration_settings
-from cvt_hpc.vibration.signals import dominant_frequency
+from cvt_hpc.vibration.peaks import fundamental
 
 LONGEST_REASON = 120  # letters, in the title: one or two strands
 
@@ -126,7 +126,7 @@ def phase_figure(dataset: xr.Dataset, source: str = "history") -> Figure:
     figure = Figure((WIDTH, 3.7), layout="constrained")
     for axes, strand in zip(figure.subplots(1, len(strands), squeeze=False)[0], strands, strict=True):
         moved = strand.judged[:, strand.strongest]
-        frequency = float(dominant_frequency(moved, strand.rate, band))
+        frequency, _ = fundamental(moved, strand.rate, band)
         course = CubicSpline(*_above(moved, strand.rate, band[0]))
         start, end = course.x[[0, -1]]
         times = start + np.arange(int((end - start) * frequency * SAMPLES) + 1) / (frequency * SAMPLES)

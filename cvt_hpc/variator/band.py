@@ -77,7 +77,7 @@ def band(run: Any) -> tuple[float, float]:
 def _judders(run: Any, below: float) -> bool:
     """Whether the driven pulley moves in jerks slower than a frequency [Hz]."""
     speed, rate = run.channel("driven_speed")[run.judged], run.parameters["sampling_rate"]
-    slowest = settings.LEAST_PERIODS * rate / len(speed)
+    slowest = settings.LEAST_IN_WINDOW * rate / len(speed)
     if not slowest < below:
         return False
     return bool(band_amplitude(speed, rate, (slowest, below)) > LEAST_JERK * abs(speed.mean()))

@@ -62,6 +62,8 @@ def test_of_a_run_that_judders_it_begins_above_both_first_modes():
     expected = ABOVE_MODES * first_mode(8e3)
     for frequency in (61.0, 90.0, 0.45 * first_mode(5e3)):
         assert band(run(judder=[(frequency, 1.3 * LEAST_JERK)]))[0] == pytest.approx(expected, rel=1e-4)
+    # coarse runs are judged for a fifth of the time, and meet the same judder
+    assert band(run(judder=[(61.0, 4.0 * LEAST_JERK)], duration=0.09))[0] == pytest.approx(expected, rel=1e-4)
     # a ripple is no judder, nor is a slow drift, nor what a vibration of the strands themselves does to the pulley
     undisturbed = band(run())[0]
     for motion in ((61.0, 0.8 * LEAST_JERK), (2.0, 1e-2), (0.6 * first_mode(5e3), 1e-2)):
