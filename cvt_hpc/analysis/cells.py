@@ -61,6 +61,7 @@ STYLES: dict[CellClass, ClassStyle] = {
     OccurrenceClass.IRREGULAR: ClassStyle("#f3dca3", "#7a4b00", "#ffffff", "|||", "*", 1.8),
 }
 LEGEND_COLUMNS = 5
+LEADING = ClassStyle("#e8703a", "#ffffff", "#000000", "", "D", 1.2)  # vibrating, its harmonics lead
 
 # Of maps from two starts: lighter than any vibration, and hatched the other way than what is undecided.
 OF_STARTS: dict[CellClass, ClassStyle] = {

@@ -11,47 +11,11 @@ from matplotlib.figure import Figure
 
 from cvt_hpc.analysis.arrangement import CHOSEN, Sides, along_x, arrange, ruler
 from cvt_hpc.analysis.figures import WIDTH, axis_label, entitle, headline
-from cvt_hpc.physics.geometry import variator
 from cvt_hpc.variator import STRANDS
+from cvt_hpc.variator.band import MODES, strand_frequencies
 
 COLOUR = "#1f4e8c"
 HEIGHT = 3.6  # [inch]
-MODES = 5  # of a strand, that are drawn
-FUNCTIONS = 24  # sines of the Ritz model, which five lines of a picture need
-
-
-def strand_frequencies(
-    parameters: Mapping[str, Any], forces: tuple[float, float] | None = None
-) -> np.ndarray:
-    """Eigenfrequencies of both strands as running beams, by the model `strand`.
-
-    Parameters
-    ----------
-    parameters : mapping
-        Of a run of a variator by name [SI].
-    forces : (float, float), optional
-        Ring tension less push force of t1 and t2 [N]; else by belt formulas from thrust and load.
-
-    Returns
-    -------
-    array, shape (strand, MODES)
-        [Hz]; nan where a strand holds no shape, where the belt slips, or where a parameter is missing.
-    """
-    # long to load, and maps do not ask for it
-    from cvt_hpc.models.strand.ritz import Strand, eigenfrequencies, net_forces
-
-    unknown = np.full((len(STRANDS), MODES), np.nan)
-    p = {"strand_forces": "formulas", **parameters}
-    try:
-        path = variator(p["ratio"], p["driven_radius"], p["centre_distance"])
-        speed, mass = p["driving_speed"] * path.driving_radius, p["element_mass"] + p["ring_mass"]
-        held = net_forces(p) if forces is None else forces
-        strands = [Strand(path.strand_length, mass, speed, float(f), p["bending_stiffness"]) for f in held]
-    except (KeyError, TypeError, ValueError):
-        return unknown
-    if not all(np.isfinite([*strand, strand.critical_speed]).all() for strand in strands):
-        return unknown
-    return np.array([eigenfrequencies(strand, FUNCTIONS)[:MODES] for strand in strands])
 
 
 def along_axis(shown: xr.Dataset, x: str) -> xr.DataArray | None:

@@ -66,7 +66,7 @@ _INLINE = 100  # the same, between the cells of a notebook
 SETTLED = 1000  # pixels: the palette is refined until no more than these, one in a thousand, change colour
 FORMATS = (".png", ".svg", ".pdf")
 LEGEND_LETTERS, HANDLE_LETTERS = 84, 8  # across the page, and what a handle with its space takes of them
-LONGEST_NAME = 26  # letters of a name on an axis
+LONGEST_NAME = 27  # letters of a name on an axis
 
 STYLE = {
     "font.family": "DejaVu Sans",

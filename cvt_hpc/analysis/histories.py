@@ -18,8 +18,8 @@ from cvt_hpc.errors import mismatch
 from cvt_hpc.job.schema import load_schema
 from cvt_hpc.job.values import JOB_UNITS, POINT_UNITS, shown
 from cvt_hpc.variables import Status, Vibrates, flag_in_words, shortened
-from cvt_hpc.vibration.settings import PARAMETERS
-from cvt_hpc.vibration.signals import dominant_frequency
+from cvt_hpc.vibration import settings as vibration_settings
+from cvt_hpc.vibration.peaks import fundamental
 
 LONGEST_REASON = 120  # letters, in the title: one or two strands
 
@@ -57,8 +57,7 @@ def history_figure(dataset: xr.Dataset, source: str = "history") -> Figure:
         There is nothing to draw.
     """
     dataset = standard(dataset, source)
-    settings = _vibration_settings(dataset)
-    band = (settings["band_low"], settings["band_high"])
+    settings, band = _vibration_settings(dataset)
     judged = settings["judged_fraction"] if _is_judged(dataset) else 0.0
     strands = panels.read_strands(dataset, judged, band)
     with_spectrum = [strand for strand in strands if strand.has_spectrum]
@@ -119,8 +118,7 @@ def phase_figure(dataset: xr.Dataset, source: str = "history") -> Figure:
     InputError
         No motion of strands was recorded, or too little of it.
     """
-    settings = _vibration_settings(dataset)
-    band = (settings["band_low"], settings["band_high"])
+    settings, band = _vibration_settings(dataset)
     judged = settings["judged_fraction"] if _is_judged(dataset) else 0.5
     strands = [one for one in panels.read_strands(dataset, judged, band) if one.has_spectrum]
     if not strands:
@@ -128,7 +126,7 @@ def phase_figure(dataset: xr.Dataset, source: str = "history") -> Figure:
     figure = Figure((WIDTH, 3.7), layout="constrained")
     for axes, strand in zip(figure.subplots(1, len(strands), squeeze=False)[0], strands, strict=True):
         moved = strand.judged[:, strand.strongest]
-        frequency = float(dominant_frequency(moved, strand.rate, band))
+        frequency, _ = fundamental(moved, strand.rate, band)
         course = CubicSpline(*_above(moved, strand.rate, band[0]))
         start, end = course.x[[0, -1]]
         times = start + np.arange(int((end - start) * frequency * SAMPLES) + 1) / (frequency * SAMPLES)
@@ -175,11 +173,17 @@ def _is_known(dataset: xr.Dataset, name: str) -> bool:
     return name in dataset and bool(np.isfinite(dataset[name]).any())
 
 
-def _vibration_settings(dataset: xr.Dataset) -> dict[str, float]:
-    """Table [vibration] of the run's job, with what the run had of its own; else defaults."""
-    defaults = {key: parameter.default for key, parameter in PARAMETERS["vibration"].items()}
+def _vibration_settings(dataset: xr.Dataset) -> tuple[dict[str, float], tuple[float, float]]:
+    """Table [vibration] of the run's job, with what the run had of its own, else defaults; and its band."""
+    declared = vibration_settings.PARAMETERS["vibration"]
+    defaults = {key: parameter.default for key, parameter in declared.items()}
     own = {key: dataset.attrs[key] for key in defaults if key in dataset.attrs}
-    return defaults | json.loads(dataset.attrs.get("job", "{}")).get("vibration", {}) | own
+    settings = defaults | json.loads(dataset.attrs.get("job", "{}")).get("vibration", {}) | own
+    low, high = vibration_settings.band(settings)
+    return settings, (
+        float(dataset["lower_band_edge"]) if _is_known(dataset, "lower_band_edge") else low,
+        high,
+    )
 
 
 def _title(dataset: xr.Dataset) -> str:

@@ -2,9 +2,9 @@
 
 The classes differ in lightness, in hatching and in the mark on the grid point, so that a map reads the
 same in colour, in grey and in small print. Cells whose class is inferred have level lines and no mark.
-Vibrating cells are coloured by amplitude, darker for larger. Their dominant frequency is written into the
-cells where there is room, and drawn as a second set of panels where there is none. Into irregular cells their
-amplitude is written where there is room.
+Vibrating cells are coloured by amplitude, darker for larger. Their frequency is written into the cells where
+there is room, and drawn as a second set of panels where there is none. Cells whose strongest line is a higher
+harmonic of it have a diamond for a dot. Into irregular cells their amplitude is written where there is room.
 
 Where runs begin with a small and with a large disturbance, one map shows where the start decides.
 """
@@ -17,6 +17,7 @@ import numpy as np
 import xarray as xr
 from matplotlib.axes import Axes
 from matplotlib.figure import Figure
+from matplotlib.lines import Line2D
 from numpy.typing import NDArray
 
 from cvt_hpc.analysis import arrangement as layout
@@ -39,6 +40,7 @@ from cvt_hpc.variables import Vibrates, shortened
 from cvt_hpc.vibration.classes import StartClass, classify_starts
 
 AXIS = "disturbance"
+LEADS = 1.5  # strongest line over the fundamental, which is a whole number
 
 FRAME = 1.9  # [inch]: what title, labels and legend take of a page's height
 MOST_COLUMNS, NAMED = 6, 2  # panels side by side; in how many columns each has room for the name of its axis
@@ -63,11 +65,11 @@ def map_figure(
     ----------
     dataset, at, source
         As of all pictures of results (`figures.py`): `status` and `vibrates` over the job's axes;
-        `amplitude` [m] and `frequency` [Hz], per strand, where known; `inferred_class` of a trace. The
-        stronger strand is shown. Of a study of samples the axes lie along `run`: each run is a mark, there is
-        a panel for each pair of axes, and `at` has to be empty. Results that hold `eigenfrequency` but no
-        `amplitude` are drawn as lines over the axis that else runs along x. Of a study with the axis
-        `disturbance` the runs from the smallest and the largest value make one cell.
+        `amplitude` [m], `frequency` and `strongest_frequency` [Hz], per strand, where known;
+        `inferred_class` of a trace. The stronger strand is shown. Of a study of samples the axes lie along
+        `run`: each run is a mark, there is a panel for each pair of axes, and `at` has to be empty. Results
+        that hold `eigenfrequency` but no `amplitude` are drawn as lines over the axis that else runs along x.
+        Of a study with the axis `disturbance` the runs from the smallest and the largest value make one cell.
     sides : Sides
         Which axis runs along x, along y and over the panels; of a grid.
     vmax : float
@@ -100,19 +102,25 @@ class Sheet:
     inferred: NDArray[np.bool_]  # whether the class of a cell is not that of a run
     amplitude: NDArray[np.float64]  # [um], nan where a run does not vibrate
     frequency: NDArray[np.float64]  # [Hz], likewise
+    leads: NDArray[np.bool_]  # whether a harmonic is stronger than the fundamental
     irregular: NDArray[np.float64]  # amplitude [um] of runs that are irregular, nan elsewhere
     columns: int = 1  # panels side by side
     panel_height: float = LEAST  # [inch], with the title
 
     @property
     def writes_frequency(self) -> bool:
-        """Whether the dominant frequency is written into the cells; else it has panels of its own."""
+        """Whether the frequency is written into the cells; else it has panels of its own."""
         return self.has_room and self.has_frequency
 
     @property
     def has_frequency(self) -> bool:
         """Whether that of any cell is known."""
         return bool(np.isfinite(self.frequency).any())
+
+    @property
+    def frequency_label(self) -> str:
+        """Name and unit of the frequency: of datasets of earlier versions it is the dominant one."""
+        return f"{figures.in_words(self.arrangement.dataset['frequency'])} [Hz]"
 
     @property
     def blocks(self) -> int:
@@ -179,18 +187,19 @@ def _grid_figure(arrangement: layout.Arrangement, vmax: float | None, source: st
                 text = f"{value:.0f}" if value >= 10.0 else f"{value:.2g}"
                 cells.write_value(ax, place, text, fill, above=2.5)
     if sheet.blocks == 2:
-        frequency = cells.Scale(
-            cells.FREQUENCY_COLOURS, cells.norm_over(sheet.frequency), "dominant frequency [Hz]"
-        )
+        norm = cells.norm_over(sheet.frequency)
+        frequency = cells.Scale(cells.FREQUENCY_COLOURS, norm, sheet.frequency_label)
         draw_block(figure, axes[sheet.rows :], sheet, sheet.frequency, frequency)
-    onset = _draw_onsets(axes, sheet)
+    further = _draw_onsets(axes, sheet)
+    if sheet.leads.any() and min(sheet.smallest_cell) >= SMALLEST_APART:
+        further.append(Line2D([], [], **cells.LEADING.marks(4.0), label="harmonics lead"))
     figures.entitle(figure, _title(sheet))
     figure.supylabel(sheet.y.label, fontsize=10)
     styles, columns = cells.STYLES, cells.LEGEND_COLUMNS
     if "starts" in arrangement.dataset.attrs:
         styles, columns = cells.STYLES | cells.OF_STARTS, 3  # as wide as the page with the longest label
     shown = {kind: style for kind, style in styles.items() if np.any(sheet.classes == kind)}
-    cells.class_legend(figure, shown, columns, with_inferred=bool(sheet.inferred.any()), further=onset)
+    cells.class_legend(figure, shown, columns, with_inferred=bool(sheet.inferred.any()), further=further)
     if sheet.columns > NAMED:
         _lay_out(figure, [ax for ax in axes.flat if not (ax.xaxis.get_visible() or ax.yaxis.get_visible())])
     return figure
@@ -242,7 +251,10 @@ def sheet_of(arrangement: layout.Arrangement, source: str = "results", frame: fl
     if "vibrates" in dataset:
         # of a cell from two starts the amplitude is that from the small one
         irregular &= grid(dataset["vibrates"]) == Vibrates.IRREGULAR
-    amplitude = grid(at_strongest_strand(dataset, "amplitude")) * 1e6
+    amplitude, frequency, strongest = (
+        grid(at_strongest_strand(dataset, name)) for name in ("amplitude", "frequency", "strongest_frequency")
+    )
+    amplitude *= 1e6
     sheet = Sheet(
         arrangement,
         layout.ruler(dataset[arrangement.x]),
@@ -250,7 +262,8 @@ def sheet_of(arrangement: layout.Arrangement, source: str = "results", frame: fl
         classes,
         classes != runs,
         np.where(vibrating, amplitude, np.nan),
-        np.where(vibrating, grid(at_strongest_strand(dataset, "frequency")), np.nan),
+        np.where(vibrating, frequency, np.nan),
+        vibrating & (strongest > LEADS * frequency),
         np.where(irregular, amplitude, np.nan),
     )
     return _laid_out(sheet, source, frame)
@@ -293,6 +306,10 @@ def draw_block(
         if apart:
             cells.draw_grid(ax, sheet.x, sheet.y)
             cells.draw_marks(ax, sheet.x, sheet.y, classes, ~inferred, mark)
+            rows, columns = np.nonzero(sheet.leads[panel])
+            look = {**cells.LEADING.marks(mark), "mew": 0.2 * mark, "zorder": 2.3}  # over the dots
+            if rows.size:
+                ax.plot(sheet.x.centres[columns], sheet.y.centres[rows], **look, rasterized=True)
         _label_panel(ax, sheet, panel)
     if np.isfinite(values).any():
         cells.colour_bar(figure, scale, values, ax=axes, aspect=12 * len(axes), pad=0.02)
@@ -334,7 +351,7 @@ def _title(sheet: Sheet) -> list[str]:
     if sheet.arrangement.panel and sheet.columns > NAMED:
         lines.append(f"panels: {figures.in_words(sheet.arrangement.dataset[sheet.arrangement.panel])}")
     if sheet.writes_frequency:
-        lines.append("in the cells: dominant frequency [Hz]")
+        lines.append(f"in the cells: {sheet.frequency_label}")
     if sheet.has_room and np.isfinite(sheet.irregular).any():
         lines.append("in irregular cells: amplitude [µm]")
     return lines

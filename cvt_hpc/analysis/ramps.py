@@ -10,7 +10,6 @@ import xarray as xr
 from matplotlib.figure import Figure
 
 from cvt_hpc.analysis import cells, figures
-from cvt_hpc.analysis.eigenfrequencies import strand_frequencies
 from cvt_hpc.analysis.telling_apart import entitle_runs, named, on_axes
 from cvt_hpc.analysis.waterfall import (
     COLOURS,
@@ -22,6 +21,7 @@ from cvt_hpc.analysis.waterfall import (
 )
 from cvt_hpc.errors import mismatch
 from cvt_hpc.variator import STRANDS
+from cvt_hpc.variator.band import strand_frequencies
 from cvt_hpc.vibration.signals import window_amplitudes
 
 WINDOW = 0.04  # [s]: lines of the spectrogram 50 Hz wide

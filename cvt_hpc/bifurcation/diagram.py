@@ -415,7 +415,7 @@ def _runs(followed: _Numbered) -> dict[str, Any]:
         "run_load": ([run.value for _, run in rows], float, "N m", "load", LOAD),
         "run_start": ([run.start for _, run in rows], np.int8, "1", "start", START),
         "run_amplitude": ([run.amplitude for _, run in rows], float, "m", "amplitude", "in the band"),
-        "run_frequency": ([run.frequency for _, run in rows], float, "Hz", "dominant frequency", ""),
+        "run_frequency": ([run.frequency for _, run in rows], float, "Hz", "fundamental frequency", ""),
         "run_occurrence": ([run.occurrence for _, run in rows], OccurrenceClass, "", "vibration occurrence",
                            ""),
         "run_reason": ([run.reason for _, run in rows], object, "", "reason", REASON),

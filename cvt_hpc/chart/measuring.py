@@ -23,6 +23,7 @@ from cvt_hpc.models.contract import Failure, Run, load_model
 from cvt_hpc.simulation import marching
 from cvt_hpc.tables import columns, short
 from cvt_hpc.variables import Status
+from cvt_hpc.variator.band import band
 
 _TOO_LONG = (Status.TIMED_OUT, "takes longer than the chart's time_limit")
 
@@ -245,7 +246,9 @@ def _explained(run: Any, failure: tuple[Status, str], count: str = "") -> str:
 
 def _history(run: Any) -> History:
     columns, strands = _columns(run)
-    return History(np.array(run.displacement)[:, columns], strands, run.channel, run.parameters)
+    p, whole = run.parameters, run.done == run.samples
+    parameters = {**p, "band_low": band(run)[0]} if whole else p
+    return History(np.array(run.displacement)[:, columns], strands, run.channel, parameters)
 
 
 def _columns(run: Any) -> tuple[list[int], tuple[str, ...]]:

@@ -20,7 +20,7 @@ from cvt_hpc.job.document import read_table
 from cvt_hpc.parameters import Parameter, not_negative, positive
 from cvt_hpc.vibration import signals
 from cvt_hpc.vibration.assessment import assess
-from cvt_hpc.vibration.settings import fitting_window
+from cvt_hpc.vibration.settings import band, fitting_window
 
 Array = NDArray[np.float64]
 
@@ -54,7 +54,7 @@ class History:
     @property
     def band(self) -> tuple[float, float]:
         """Where vibrations are looked for [Hz]."""
-        return self.parameters["band_low"], self.parameters["band_high"]
+        return band(self.parameters)
 
     @property
     def judged(self) -> slice:
@@ -149,7 +149,7 @@ _TIMES = (1e-6, 1e3)  # [s]
 KINDS: dict[str, Kind] = {
     "trajectory": Kind("m", "trajectory", _trajectory, takes_part=True, needs_part=True),
     "amplitude": Kind("m", "amplitude", lambda history, _: _assessed(history).amplitude),
-    "frequency": Kind("Hz", "dominant frequency", lambda history, _: _assessed(history).frequency),
+    "frequency": Kind("Hz", "fundamental frequency", lambda history, _: _assessed(history).frequency),
     "growth_rate": Kind("s-1", "growth rate", _growth_rate, takes_part=True),
     "occurrence": Kind("1", "occurrence", lambda history, _: np.array([float(_assessed(history).vibrates)])),
     "onset": Kind("N m", "onset load", _onset, takes_part=True),

@@ -12,6 +12,7 @@ import numpy as np
 
 from cvt_hpc.variables import Vibrates, shortened
 from cvt_hpc.variator import PULLEYS, STRANDS
+from cvt_hpc.variator.band import band
 from cvt_hpc.variator.slip import slid, speed_loss, with_slip
 from cvt_hpc.variator.variables import frequency_bins
 from cvt_hpc.vibration import assessment, ramp
@@ -38,7 +39,8 @@ def assess(
         # None is of a run before its end
         return with_slip(run, _assess_ramp(run, names))  # type: ignore[arg-type]
     columns, strands = _on_strands(run, names)
-    found = assessment.assess(run.displacement[:, columns], p["sampling_rate"], strands, p)
+    in_band = {**p, "band_low": band(run)[0]}
+    found = assessment.assess(run.displacement[:, columns], p["sampling_rate"], strands, in_band)
     return with_slip(run, replace(found, strongest_probe=columns[found.strongest_probe]), pulleys)
 
 

@@ -39,6 +39,8 @@ from numpy.typing import ArrayLike, NDArray
 
 from cvt_hpc.variables import Status, Variable, Vibrates, shortened
 from cvt_hpc.vibration import signals
+from cvt_hpc.vibration.peaks import fundamental
+from cvt_hpc.vibration.settings import band as given_band
 from cvt_hpc.vibration.settings import fitting_window
 
 LEAST_WINDOWS = 12  # that are independent
@@ -54,7 +56,17 @@ LEAST_RISES = 3  # windows in a row, none below the one before: irregular motion
 
 VARIABLES = (
     Variable("amplitude", "m", "band-limited peak amplitude at the strongest probe", dims=("strand",)),
-    Variable("frequency", "Hz", "at the strongest probe", dims=("strand",), words="dominant frequency"),
+    Variable(
+        "frequency",
+        "Hz",
+        "spacing of the harmonics in the band at the strongest probe; without any, of its strongest line",
+        dims=("strand",),
+        words="fundamental frequency",
+    ),
+    Variable(
+        "strongest_frequency", "Hz", "of the strongest line in the band at that probe", dims=("strand",)
+    ),
+    Variable("lower_band_edge", "Hz", "lowest frequency of the motion by which the run is judged"),
     Variable("growth_rate", "s-1", "growth rate of the amplitude over the judged part", dims=("strand",)),
     Variable("growth_error", "s-1", "standard error of the growth rate", dims=("strand",)),
     Variable(
@@ -75,6 +87,7 @@ def classify(
     record_time: float,
     parameters: Mapping[str, Any],
     strands: Sequence[str] = ("t1", "t2"),
+    overall: ArrayLike | None = None,
 ) -> tuple[Vibrates, str]:
     """Decide whether a run vibrates.
 
@@ -90,6 +103,8 @@ def classify(
         With `amplitude_threshold` [m], `decay_tolerance` and `growth_tolerance` [e-folds].
     strands : sequence of str, length strand
         Their names, for the reason.
+    overall : array, shape (strand,), optional
+        Amplitudes over the whole judged part [m], for the reason; else the root mean square of the windows'.
 
     Returns
     -------
@@ -107,11 +122,12 @@ def classify(
     windows = np.asarray(amplitudes, dtype=float)
     if windows.ndim != 2 or len(windows) == 0 or not np.all(np.isfinite(windows)):
         raise ValueError("expected finite amplitudes of one window or more, shape (window, strand)")
-    each = list(zip(strands, windows.T, growth_rate, growth_error, strict=True))
+    sizes = np.sqrt(np.mean(windows**2, axis=0)) if overall is None else np.asarray(overall, dtype=float)
+    each = list(zip(strands, windows.T, growth_rate, growth_error, sizes, strict=True))
     each.sort(key=lambda strand: -strand[1][-1])  # of a long reason the first ones stay
     judged = {
-        name: _judge_strand(strand, rate, error, judged_time, record_time, parameters)
-        for name, strand, rate, error in each
+        name: _judge_strand(strand, rate, error, size, judged_time, record_time, parameters)
+        for name, strand, rate, error, size in each
     }
     left_open = [
         strand
@@ -159,14 +175,15 @@ def _judge_strand(
     windows: NDArray[np.float64],
     rate: float,
     error: float,
+    overall: float,
     judged_time: float,
     record_time: float,
     parameters: Mapping[str, Any],
 ) -> tuple[Vibrates, str]:
-    """Verdict and reason for one strand from its amplitudes in successive windows [m]."""
+    """Verdict and reason for one strand from its amplitudes in successive windows, and over all [m]."""
     threshold = parameters["amplitude_threshold"]
     last = windows[-1]
-    size = f"{last * 1e6:.3g} um at the end"
+    size = f"{last * 1e6:.3g} um in the last window"
     from scipy.special import stdtrit  # takes long, and quiet runs do without
 
     margin = error * stdtrit(max(len(windows) - 2, 1), CONFIDENCE)
@@ -174,7 +191,8 @@ def _judge_strand(
         loss = -rate * judged_time
         excused = min(parameters["decay_tolerance"], STEADY_LOSS + margin * judged_time)
         if loss <= excused:
-            return Vibrates.YES, f"vibrates for the last {judged_time:.3g} s, {size}, growth {rate:.2g} 1/s"
+            size = f"{overall * 1e6:.3g} um, growth {rate:.2g} 1/s"
+            return Vibrates.YES, f"vibrates for the last {judged_time:.3g} s, {size}"
         why = "in too few windows to tell decay" if np.isnan(rate) else f"but decays at {-rate:.3g} 1/s"
         return Vibrates.UNDECIDED, f"is above the threshold, {size}, {why}"
     if is_irregular(windows, threshold, parameters["growth_tolerance"]):
@@ -296,8 +314,11 @@ class Occurrence:
         Labels of the strands, the order of the arrays below.
     amplitude : array, shape (strand,)
         Band-limited peak amplitude over the judged part [m], at the strongest probe.
-    frequency : array, shape (strand,)
-        Dominant frequency at that probe [Hz]; nan without a peak in the band.
+    frequency, strongest_frequency : array, shape (strand,)
+        Fundamental of the periodic part at that probe, as of `peaks.fundamental`, and its strongest line in
+        the band [Hz]; nan without a peak in the band.
+    lower_band_edge : float
+        Lowest frequency of the band [Hz].
     growth_rate, growth_error : array, shape (strand,)
         Growth rate over the judged part and its standard error [1/s]; nan where nothing moves.
     amplitude_scatter : array, shape (strand,)
@@ -314,6 +335,8 @@ class Occurrence:
     strands: tuple[str, ...]
     amplitude: NDArray[np.float64]
     frequency: NDArray[np.float64]
+    strongest_frequency: NDArray[np.float64]
+    lower_band_edge: float
     growth_rate: NDArray[np.float64]
     growth_error: NDArray[np.float64]
     amplitude_scatter: NDArray[np.float64]
@@ -354,7 +377,7 @@ def assess(
     """
     w = np.asarray(displacement, dtype=float)
     judged = w[len(w) - round(parameters["judged_fraction"] * len(w)) :]
-    band = (parameters["band_low"], parameters["band_high"])
+    band = given_band(parameters)
     duration = len(judged) / rate
     window = fitting_window(duration, parameters["window_length"])
     centres, windows = signals.window_amplitudes(judged, rate, band, window)
@@ -372,17 +395,20 @@ def assess(
         record_time=len(w) / rate,
         parameters=parameters,
         strands=names,
+        overall=amplitudes[strongest],
     )
     if vibrates is Vibrates.YES and amplitudes[strongest].max() < parameters["amplitude_threshold"]:
         # a short window sees a little beyond the band: motion there is not in it
         vibrates, reason = Vibrates.UNDECIDED, "moves at the edge of the band only"
-    frequency = signals.dominant_frequency(judged[:, strongest], rate, band)
+    frequencies = np.array([fundamental(judged[:, probe], rate, band) for probe in strongest])
     return Occurrence(
         vibrates,
         reason,
         names,
         amplitudes[strongest],
-        frequency,
+        frequencies[:, 0],
+        frequencies[:, 1],
+        band[0],
         growth.rate,
         growth.standard_error,
         relative_scatter(strand_windows),

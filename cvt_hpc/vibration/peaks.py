@@ -1,4 +1,4 @@
-"""The modes in each peak of a strand's spectrum: the mode in which the strand moves at that frequency.
+"""Peaks of a strand's spectrum: the fundamental of its harmonics, and the mode in which it moves at each.
 
 Strands that move at several frequencies have a mode for each; the amplitude of a mode over the whole band
 does not show which goes with which. A peak is one of the spectrum of all modes together, the root of the sum
@@ -12,9 +12,14 @@ import numpy as np
 from numpy.typing import ArrayLike
 
 from cvt_hpc.variables import Coordinate, Variable
-from cvt_hpc.vibration.signals import Array, check_band, fine_spectrum, time_last
+from cvt_hpc.vibration.signals import Array, check_band, dominant_frequency, fine_spectrum, time_last
 
 COUNT = 3  # peaks of a strand that are recorded
+LINES = 12  # largest ones among which harmonics are looked for
+MOST_HARMONIC = 8  # number of the strongest line
+NEAR = 0.25  # of the resolution 1/L: how far a line may lie from a harmonic
+LEAST_LINE = 0.1  # of the strongest one
+ABOVE_NOISE = 4.0  # times the median of the band's spectrum, which noise alone stays below
 MAIN_LOBE = 4.0  # of Hann's window, in lines: between its zeros
 MARGIN = 2.0  # above side lobes
 LEAST = 0.05  # of a strand's highest peak in the band
@@ -99,17 +104,73 @@ def modal_peaks(modes: ArrayLike, rate: float, band: tuple[float, float]) -> Pea
     return found
 
 
-def _highest(lines: Array, height: Array, band: tuple[float, float], width: float) -> list[int]:
+def fundamental(signal: ArrayLike, rate: float, band: tuple[float, float]) -> tuple[float, float]:
+    """Fundamental of the periodic part of a signal, and its strongest line in a band.
+
+    The fundamental is the lowest frequency in the band of which the strongest line is a multiple, up to
+    MOST_HARMONIC, that has a line of its own, or three of its harmonics in a row, the strongest among them. A
+    line is a peak of LEAST_LINE of the strongest or more, and above noise. Two lines alone therefore are no
+    harmonics of a common divisor, unless one is a multiple of the other within NEAR/L, L being the length.
+
+    Parameters
+    ----------
+    signal : array, shape (time,)
+        Samples, in any unit.
+    rate : float
+        Sampling rate [Hz].
+    band : (float, float)
+        Lowest and highest frequency [Hz].
+
+    Returns
+    -------
+    fundamental, strongest : float
+        [Hz], both nan where the band holds no peak. Without harmonics both are one. The error is that of
+        `signals.dominant_frequency`, of the fundamental divided by the number of its strongest harmonic;
+        0.1/L where another line lies within 4/L.
+
+    Raises
+    ------
+    ValueError
+        As of `signals.band_amplitude`.
+    """
+    strongest = float(dominant_frequency(signal, rate, band))
+    if np.isnan(strongest):
+        return strongest, strongest
+    lines, height = fine_spectrum(time_last(signal), rate)
+    noise = np.median(height[(lines >= band[0]) & (lines <= band[1])])
+    least = max(LEAST_LINE * height[round(strongest / lines[1])], ABOVE_NOISE * noise)
+    width = rate / len(np.asarray(signal))
+    found = _highest(lines, height, band, width, LINES, least)
+    peaks = np.array([_vertex(lines, height, line) for line in found])
+    for number in range(MOST_HARMONIC, 1, -1):
+        first = strongest / number
+        orders = np.arange(1, number + 3)
+        has_line = (np.abs(peaks[:, np.newaxis] - orders * first) <= NEAR * width).any(axis=0)
+        in_a_row = has_line[:-2] & has_line[1:-1] & has_line[2:]
+        if first >= band[0] and (has_line[0] or in_a_row[max(number - 3, 0) :].any()):
+            return first, strongest
+    return strongest, strongest
+
+
+def _highest(
+    lines: Array,
+    height: Array,
+    band: tuple[float, float],
+    width: float,
+    count: int = COUNT,
+    least: float = 0.0,
+) -> list[int]:
     """Lines of the highest peaks in a band, none of them a flank or a side lobe of a higher peak anywhere.
 
-    `width` is the distance of two lines of a transform without padding [Hz].
+    `width` is the distance of two lines of a transform without padding [Hz]; `count` and `least` are the
+    largest number of them, and the least height.
     """
     is_peak = (height[1:-1] > height[:-2]) & (height[1:-1] >= height[2:])
     candidates = 1 + np.flatnonzero(is_peak)
     peaks: list[int] = []
     chosen: list[int] = []
     for line in candidates[np.argsort(height[candidates])[::-1]]:
-        if len(chosen) == COUNT:
+        if len(chosen) == count or height[line] < least:
             break
         apart = np.abs(lines[peaks] - lines[line]) / width
         if (apart < MAIN_LOBE).any():

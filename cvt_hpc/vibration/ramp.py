@@ -17,13 +17,15 @@ from numpy.typing import ArrayLike, NDArray
 from cvt_hpc.variables import Coordinate, Variable, Vibrates, shortened
 from cvt_hpc.vibration import signals
 from cvt_hpc.vibration.assessment import LEAST_RISES, Occurrence
+from cvt_hpc.vibration.peaks import fundamental
 from cvt_hpc.vibration.ramped import QUANTITIES, Quantity
 from cvt_hpc.vibration.settings import SHORTEST_SEGMENT, fitting_window
+from cvt_hpc.vibration.settings import band as given_band
 
 Array = NDArray[np.float64]
 
 SUSTAINED = 4  # windows in a row: as many as the shortest judged part of a run at constant load has
-LEAST_PERIODS = 1.9  # of `band_low` in a window; four windows in five periods, the least judged, have 1.95
+LEAST_PERIODS = 1.9  # of the lowest frequency in a window; of four windows in five periods one has 1.95
 BINS = 20  # parts of a ramp whose amplitudes are recorded
 
 
@@ -59,7 +61,7 @@ def coordinate() -> Coordinate:
 
 @dataclass(frozen=True)
 class RampOccurrence(Occurrence):
-    """As `Occurrence`, along a ramp: amplitude and frequency are those of the window that moves most.
+    """As `Occurrence`, along a ramp: amplitude and frequencies are those of the window that moves most.
 
     Attributes
     ----------
@@ -120,7 +122,7 @@ def assess_ramp(
     RampOccurrence or None
         None where the run ended before it could be judged.
     """
-    w, band = np.asarray(displacement, dtype=float), (parameters["band_low"], parameters["band_high"])
+    w, band = np.asarray(displacement, dtype=float), given_band(parameters)
     length = fitting_window(len(w) / rate, parameters["window_length"])
     width = round(length * rate)
     if width < SHORTEST_SEGMENT or length * band[0] < LEAST_PERIODS:
@@ -134,16 +136,19 @@ def assess_ramp(
     bins = np.minimum((centres * rate / samples * BINS).astype(int), BINS - 1)
     verdict = Passages(levels, at, QUANTITIES[quantity], parameters)
     vibrates, reason = verdict.classify(names)
-    unknown, frequencies = np.full(len(names), np.nan), []
+    unknown, each = np.full(len(names), np.nan), []
     for probe in strongest:  # in the window that moves most
         first = round(centres[np.argmax(windows[:, probe])] * rate - (width - 1) / 2)
-        frequencies.append(signals.dominant_frequency(w[first : first + width, probe], rate, band))
+        each.append(fundamental(w[first : first + width, probe], rate, band))
+    frequencies = np.array(each)
     return RampOccurrence(
         vibrates,
         reason,
         names,
         levels.max(axis=0),
-        np.array(frequencies, dtype=float),
+        frequencies[:, 0],
+        frequencies[:, 1],
+        band[0],
         unknown,
         unknown,
         unknown,

@@ -2,6 +2,7 @@
 
 import json
 import os
+import re
 from itertools import combinations
 from textwrap import wrap
 
@@ -10,7 +11,7 @@ import pytest
 import xarray as xr
 
 from cvt_hpc.analysis.figures import balanced
-from cvt_hpc.analysis.histories import draw_history, history_figure
+from cvt_hpc.analysis.histories import draw_history, history_figure, phase_figure
 from cvt_hpc.analysis.history_panels import read_strands
 from cvt_hpc.errors import InputError
 from cvt_hpc.job import load_job
@@ -289,6 +290,18 @@ def test_labels_stay_within_the_spectrum(frequency):
     assert len(spectrum.texts) == 1  # both strands at one place
     for box in boxes(spectrum.texts):
         assert box.x0 > spectrum.bbox.x0 and box.x1 < spectrum.bbox.x1
+
+
+def test_pictures_are_of_the_band_by_which_the_run_was_judged():
+    def told(dataset):
+        return re.search(r"motion above (\d+) Hz", phase_figure(dataset).get_suptitle())[1]
+
+    followed = run()
+    followed.attrs["job"] = json.dumps({"vibration": {"band_low": 0.0}})
+    assert told(followed) == "300"  # of a dataset without the edge
+    assert told(followed.assign(lower_band_edge=((), 168.2))) == "168"
+    followed.attrs["job"] = json.dumps({"vibration": {"band_low": 250.0}})
+    assert told(followed) == "250"
 
 
 def test_a_failed_run_is_drawn_up_to_where_it_failed():

@@ -163,7 +163,7 @@ def test_a_panel_for_each_stiffness(stiffnesses):
     assert len(panels_of(figure_of(few))) == len(stiffnesses)
     figure = figure_of(study(stiffnesses=stiffnesses, **FINE))
     assert len(panels_of(figure)) == 2 * len(stiffnesses)  # the frequency has no room in the cells
-    assert bars_of(figure) == ["amplitude [µm]", "dominant frequency [Hz]"]
+    assert bars_of(figure) == ["amplitude [µm]", "frequency [Hz]"]
 
 
 def test_frequencies_are_written_where_there_is_room():
@@ -173,8 +173,23 @@ def test_frequencies_are_written_where_there_is_room():
     classes = occurrence_classes(dataset)
     expected = at_strongest_strand(dataset, "frequency").values[classes.values == VIBRATING]
     assert sorted(int(text.get_text()) for text in axes.texts) == sorted(np.round(expected).astype(int))
-    assert "dominant frequency [Hz]" in figure.get_suptitle()
+    assert "frequency [Hz]" in figure.get_suptitle()
     assert bars_of(figure) == ["amplitude [µm]"]
+
+
+def test_cells_whose_harmonics_lead_are_marked():
+    dataset = study(stiffnesses=(1.0,))
+    (legend,) = figure_of(dataset.assign(strongest_frequency=dataset["frequency"])).legends
+    assert "harmonics lead" not in [text.get_text() for text in legend.get_texts()]
+    leading = (dataset["load"] == LOADS[4]) & (dataset["strand"] == "t1")
+    other = (dataset["load"] == LOADS[5]) & (dataset["strand"] == "t2")  # which moves less
+    strongest = dataset["frequency"] * xr.where(leading | other, 2.0, 1.0)
+    figure = figure_of(dataset.assign(strongest_frequency=strongest.transpose(*dataset["frequency"].dims)))
+    (axes,) = panels_of(figure)
+    marked = {tuple(p) for line in axes.lines if line.get_marker() == "D" for p in line.get_xydata()}
+    vibrating = occurrence_classes(dataset).isel(sheave_stiffness=0) == VIBRATING
+    assert marked == {(LOADS[4], g) for g in GRADIENTS if vibrating.sel(friction_gradient=g, load=LOADS[4])}
+    assert marked and "harmonics lead" in [text.get_text() for text in figure.legends[0].get_texts()]
 
 
 def test_every_grid_point_is_marked_at_its_true_place():

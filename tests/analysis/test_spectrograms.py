@@ -6,10 +6,11 @@ import numpy as np
 import pytest
 import xarray as xr
 
-from cvt_hpc.analysis.eigenfrequencies import along_axis, strand_frequencies
+from cvt_hpc.analysis.eigenfrequencies import along_axis
 from cvt_hpc.analysis.ramps import WINDOW, spectrogram_figure
 from cvt_hpc.analysis.waterfall import campbell_figure
 from cvt_hpc.errors import InputError
+from cvt_hpc.variator.band import strand_frequencies
 
 POINT = {
     "ratio": 2.52,

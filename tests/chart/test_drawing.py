@@ -61,7 +61,7 @@ def comparison(write_chart, kept):
 
 def test_each_quantity_has_a_panel_with_both_axes_logarithmic(figure):
     titles = [axes.get_title(loc="left") for axes in figure.axes if axes.get_title(loc="left")]
-    assert titles == ["trajectory, 0-10 ms", "amplitude", "dominant frequency"]
+    assert titles == ["trajectory, 0-10 ms", "amplitude", "fundamental frequency"]
     for axes in figure.axes[:3]:
         assert (axes.get_xscale(), axes.get_yscale()) == ("log", "log")
         assert axes.get_xlabel() == "relative error"

@@ -6,8 +6,8 @@ from scipy.integrate import quad, solve_ivp
 
 from cvt_hpc.errors import InputError
 from cvt_hpc.models.strand.record import MODES
-from cvt_hpc.models.strand.ritz import Strand, eigenfrequencies, net_forces, ritz_matrices
 from cvt_hpc.physics.capacity import carried_torque
+from cvt_hpc.physics.running_strand import Strand, eigenfrequencies, net_forces, ritz_matrices
 from cvt_hpc.variables import Status, Vibrates
 from support.rungs import rung_job, rung_record
 

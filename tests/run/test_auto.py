@@ -200,7 +200,7 @@ def test_no_coarse_run_where_it_would_tell_nothing(values):
 
 
 def occurrence(vibrates, margin):
-    return Occurrence(vibrates, "", (), *[np.zeros(0)] * 6, margin=margin)
+    return Occurrence(vibrates, "", (), *[np.zeros(0)] * 8, margin=margin)
 
 
 @pytest.mark.parametrize(

@@ -22,7 +22,7 @@ SCENES = {
     "auto": (None, BELT | {"precision": "double"}),
     "criterion": (None, {}),
     "elastic_belt": ("imex", BELT | {"precision": "double"}),
-    "oscillator": (None, {}),
+    "oscillator": (None, {"band_low": 300.0}),
     "strand": (None, {"load": 80.0}),
 }
 DEAR, ITERATED = "a run takes too long", "it iterates with sizes and tolerances of the default scene"

@@ -9,10 +9,10 @@ from matplotlib.backends.backend_agg import FigureCanvasAgg
 from matplotlib.text import Text
 from matplotlib.transforms import Bbox
 
-from cvt_hpc.analysis.eigenfrequencies import strand_frequencies
 from cvt_hpc.analysis.profiles import QUANTITIES, SIDES
 from cvt_hpc.physics.geometry import variator
 from cvt_hpc.variables import Status, Vibrates
+from cvt_hpc.variator.band import strand_frequencies
 from support.studies import flags
 
 POINT = {

@@ -113,7 +113,7 @@ def test_a_belt_at_rest_has_no_efficiency():
 
 def judged(driving, driven=0.0, vibrates=Vibrates.YES, margin=2.0):
     """What is found of a run of eight samples, the last four judged, by its slip at each."""
-    found = Occurrence(vibrates, "t1 vibrates", (), *[np.zeros(0)] * 6, margin=margin)
+    found = Occurrence(vibrates, "t1 vibrates", (), *[np.zeros(0)] * 8, margin=margin)
     return with_slip(run({"slip driving": driving, "slip driven": driven}, judged=4), found)
 
 

@@ -72,7 +72,7 @@ def test_a_run_vibrates_if_a_strand_does_and_is_quiet_if_both_are():
 def test_the_reason_names_strand_size_and_trend():
     assert verdict(STILL, TABLE["settled"][0])[1].startswith("t2 vibrates for the last 0.15 s, 10 um")
     reason = verdict(3 * np.exp(-14 * 0.02 * np.arange(-5, 1)), TABLE["noise"][0])[1]
-    assert reason.startswith("t1 is above the threshold, 3 um at the end, but decays at 14 1/s")
+    assert reason.startswith("t1 is above the threshold, 3 um in the last window, but decays at 14 1/s")
     assert "t2" not in reason
     assert verdict(STILL, STILL)[1] == "t1 is at rest; t2 is at rest"
     assert "growing" in verdict(TABLE["growing, far below"][0])[1]

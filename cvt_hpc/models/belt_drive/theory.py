@@ -10,10 +10,10 @@ from scipy.optimize import brentq
 
 from cvt_hpc.models.belt_drive.courses import load, stretch
 from cvt_hpc.models.belt_drive.layout import Layout
-from cvt_hpc.models.strand.ritz import Strand, eigenfrequencies
 from cvt_hpc.parameters import Parameters
 from cvt_hpc.physics.belt_path import BeltPath, regions
 from cvt_hpc.physics.nearest_on_path import along
+from cvt_hpc.physics.running_strand import Strand, eigenfrequencies
 from cvt_hpc.vibration.signals import band_amplitude, dominant_frequency
 
 MIDDLE, WIDTH = 0.3, 0.25  # of the strand: there no shape of up to five half waves has a node

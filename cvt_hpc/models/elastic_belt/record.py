@@ -16,6 +16,7 @@ from cvt_hpc.models.elastic_belt.power_terms import POWERS
 from cvt_hpc.models.elastic_belt.pulley_settings import PULLEY_DEFAULTS, are_free, oil_factor
 from cvt_hpc.variables import Coordinate, Variable
 from cvt_hpc.variator import PULLEYS, judging
+from cvt_hpc.variator.band import band
 from cvt_hpc.variator.judging import assess, each, efficiency, mean, power_balance
 from cvt_hpc.variator.slip import VARIABLES as AGAINST_SLIP
 from cvt_hpc.variator.slip import capacity, slide
@@ -149,8 +150,8 @@ def evaluate(run: RecordedRun, strongest_probe: np.ndarray) -> dict[str, Any]:
         Value by name.
     """
     p, judged = run.parameters, run.judged
-    rate, band = p["sampling_rate"], (p["band_low"], p["band_high"])
-    modal = band_amplitude(run.modes[judged], rate, band)
+    rate, judged_band = p["sampling_rate"], band(run)
+    modal = band_amplitude(run.modes[judged], rate, judged_band)
     of_peaks = p["modal_peaks"] == "on"
     losses = {name: mean(run, name) for name in LOSSES}
     stored = run.channel("stored_energy")[judged]
@@ -160,7 +161,7 @@ def evaluate(run: RecordedRun, strongest_probe: np.ndarray) -> dict[str, Any]:
     return {
         "mode": np.where(modal.max(axis=1) > 0.0, 1 + modal.argmax(axis=1), 0),
         "modal_amplitude": modal,
-        **(peaks.modal_peaks(run.modes[judged], rate, band).record() if of_peaks else {}),
+        **(peaks.modal_peaks(run.modes[judged], rate, judged_band).record() if of_peaks else {}),
         **judging.evaluate(run, strongest_probe),
         **capacity(run, judged),
         "open_share": each(run, "open_share"),

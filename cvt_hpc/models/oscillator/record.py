@@ -81,7 +81,7 @@ def judge(run: Transient) -> dict[str, Any]:
     """
     p, first = run.parameters, run.first_judged
     found = assessment.assess(run.displacement, p["sampling_rate"], ("mass",), p)
-    numbers = {variable.name: float(getattr(found, variable.name)[0]) for variable in assessment.VARIABLES}
+    numbers = {v.name: np.ravel(getattr(found, v.name)).item() for v in assessment.VARIABLES}
     x, is_stuck = run.displacement[first:, 0], run.is_stuck[first:]
     starts = cycle_starts(x, p["negligible_amplitude"])
     cycles = slice(starts[0], starts[-1]) if len(starts) > 1 else slice(None)

@@ -5,8 +5,8 @@ from typing import Any, NamedTuple
 
 import numpy as np
 
-from cvt_hpc.models.strand.ritz import Strand, eigenfrequencies, net_forces, resting_frequencies
 from cvt_hpc.physics.geometry import variator
+from cvt_hpc.physics.running_strand import Strand, eigenfrequencies, net_forces, resting_frequencies
 from cvt_hpc.variables import Coordinate, Status, Variable, Vibrates
 from cvt_hpc.variator import STRANDS
 from cvt_hpc.variator.variables import COORDINATES

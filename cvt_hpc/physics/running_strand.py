@@ -20,7 +20,6 @@ from collections.abc import Mapping
 from typing import Any, NamedTuple
 
 import numpy as np
-from scipy.optimize import brentq
 
 from cvt_hpc.physics.geometry import variator
 
@@ -139,6 +138,8 @@ def _entering(rise: float, friction: float, wedge: float, wrap: float) -> float:
     def excess(entering: float) -> float:
         slip = abs(np.log1p(rise / entering)) / friction
         return entering * (wrap - slip) + abs(rise) / friction - wedge
+
+    from scipy.optimize import brentq  # takes long, and runs that know their forces do without
 
     # at the least force the whole wrap slides, at the largest none does
     least = rise / np.expm1(np.copysign(friction * wrap, rise))

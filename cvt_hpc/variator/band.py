@@ -1,0 +1,83 @@
+"""The band by which a run of a variator is judged: it begins below the first modes of its own strands."""
+
+from collections.abc import Mapping
+from typing import Any
+
+import numpy as np
+
+from cvt_hpc.physics.geometry import variator
+from cvt_hpc.physics.running_strand import Strand, eigenfrequencies, net_forces
+from cvt_hpc.variator import STRANDS
+from cvt_hpc.vibration import settings
+from cvt_hpc.vibration.ramped import ramped
+from cvt_hpc.vibration.signals import band_amplitude
+
+MODES = 5  # of a strand, that are known
+FUNCTIONS = 24  # sines of the Ritz model, which so many modes need
+SLOWER = 0.5  # of the lower first mode: judder is slower, its second harmonic is no first mode
+LEAST_JERK = 1e-3  # of the driven pulley's speed, amplitude from which it judders
+
+
+def strand_frequencies(
+    parameters: Mapping[str, Any], forces: tuple[float, float] | None = None
+) -> np.ndarray:
+    """Eigenfrequencies of both strands as running beams, by the law of the model `strand`.
+
+    Parameters
+    ----------
+    parameters : mapping
+        Of a run of a variator by name [SI]; without `bending_stiffness` its strands do not resist bending.
+    forces : (float, float), optional
+        Ring tension less push force of t1 and t2 [N]; else by belt formulas from thrust and load.
+
+    Returns
+    -------
+    array, shape (strand, MODES)
+        [Hz]; nan where a strand holds no shape, where the belt slips, or where a parameter is missing.
+    """
+    unknown = np.full((len(STRANDS), MODES), np.nan)
+    p = {"strand_forces": "formulas", "bending_stiffness": 0.0, **parameters}
+    try:
+        path = variator(p["ratio"], p["driven_radius"], p["centre_distance"])
+        speed, mass = p["driving_speed"] * path.driving_radius, p["element_mass"] + p["ring_mass"]
+        held = net_forces(p) if forces is None else forces
+        strands = [Strand(path.strand_length, mass, speed, float(f), p["bending_stiffness"]) for f in held]
+    except (KeyError, TypeError, ValueError):
+        return unknown
+    if not all(np.isfinite([*strand, strand.critical_speed]).all() for strand in strands):
+        return unknown
+    return np.array([eigenfrequencies(strand, FUNCTIONS)[:MODES] for strand in strands])
+
+
+def band(run: Any) -> tuple[float, float]:
+    """Lowest and highest frequency by which a run is judged [Hz].
+
+    Where the job gives no `band_low`, `settings.lower_edge` follows from the means of the judged part. A belt
+    without rings and a ramp, along which forces change, have the band of `settings.band`.
+
+    Parameters
+    ----------
+    run : object
+        With `parameters` and, of a belt of rings and elements, all samples recorded.
+    """
+    p = run.parameters
+    if p["band_low"] or ramped(p) or "ring_mass" not in p:
+        return settings.band(p)
+    tension, push = (
+        [run.channel(f"{name} {strand}")[run.judged].mean() for strand in STRANDS]
+        for name in ("ring_tension", "push_force")
+    )
+    means = {**p, "driving_speed": run.mean_driving_speed(run.judged)}
+    modes = strand_frequencies(means, (tension[0] - push[0], tension[1] - push[1]))[:, 0]
+    lowest, highest = float(modes.min()), float(modes.max())
+    judders = _judders(run, SLOWER * lowest)
+    return settings.lower_edge(p, lowest, highest, judders), p["band_high"]
+
+
+def _judders(run: Any, below: float) -> bool:
+    """Whether the driven pulley moves in jerks slower than a frequency [Hz]."""
+    speed, rate = run.channel("driven_speed")[run.judged], run.parameters["sampling_rate"]
+    slowest = settings.LEAST_IN_WINDOW * rate / len(speed)
+    if not slowest < below:
+        return False
+    return bool(band_amplitude(speed, rate, (slowest, below)) > LEAST_JERK * abs(speed.mean()))

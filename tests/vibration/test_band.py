@@ -1,0 +1,95 @@
+"""Where the band of a run begins: below the first modes of its strands, or above what judder of its pulley rings."""
+
+from types import SimpleNamespace
+
+import numpy as np
+import pytest
+
+from cvt_hpc.variator.band import LEAST_JERK, band, strand_frequencies
+from cvt_hpc.vibration.settings import ABOVE_MODES, BELOW_MODES, LOWEST, PARAMETERS, lower_edge
+
+RATE = 20_000.0
+DEFAULTS = {key: parameter.default for key, parameter in PARAMETERS["vibration"].items()}
+# radii of 25 mm, shafts 0.15 m apart: strings of that length and 1 kg/m at 10 m/s
+P = DEFAULTS | {
+    "duration": 0.4,
+    "sampling_rate": RATE,
+    "ratio": 1.0,
+    "driven_radius": 0.025,
+    "centre_distance": 0.15,
+    "driving_speed": 400.0,
+    "element_mass": 0.8,
+    "ring_mass": 0.2,
+    "load_history": "constant",
+}
+SPEED, LENGTH = 10.0, 0.15
+
+
+def first_mode(force):
+    """(c^2 - v^2) / (2 c L) of a string of 1 kg/m under a tension [N]."""
+    return (force - SPEED**2) / (2.0 * np.sqrt(force) * LENGTH)
+
+
+def run(tension=(9e3, 8e3), push=(4e3, 0.0), judder=(), **parameters):
+    """A run with constant forces; judder as frequency [Hz] and amplitude over the speed."""
+    p = P | parameters
+    time = np.arange(round(p["duration"] * RATE)) / RATE
+    speed = 300.0 * (1.0 + sum(a * np.sin(2.0 * np.pi * f * time) for f, a in judder))
+    means = {"ring_tension t1": tension[0], "ring_tension t2": tension[1]}
+    means |= {"push_force t1": push[0], "push_force t2": push[1]}
+    channels = {name: np.full(time.size, value) for name, value in means.items()}
+    channels["driven_speed"] = np.broadcast_to(speed, time.shape)
+    judged = slice(time.size - round(p["judged_fraction"] * time.size), time.size)
+    return SimpleNamespace(
+        parameters=p,
+        judged=judged,
+        channel=channels.__getitem__,
+        mean_driving_speed=lambda samples: p["driving_speed"],
+    )
+
+
+def test_it_begins_below_the_lower_first_mode_of_both_strands():
+    assert band(run()) == pytest.approx((BELOW_MODES * first_mode(5e3), 1500.0), rel=1e-4)
+    assert band(run(push=(0.0, 4.5e3)))[0] == pytest.approx(BELOW_MODES * first_mode(3.5e3), rel=1e-4)
+    # the strands of other scenes are slower, and so is all that they do
+    for scale in (0.25, 1.0, 4.0):
+        forces = np.array([[9e3, 8e3], [4e3, 0.0]]) * scale
+        found = band(run(*forces, driving_speed=400.0 * np.sqrt(scale), band_high=3000.0))[0]
+        assert found == pytest.approx(BELOW_MODES * first_mode(5e3) * np.sqrt(scale), rel=1e-4)
+
+
+def test_of_a_run_that_judders_it_begins_above_both_first_modes():
+    expected = ABOVE_MODES * first_mode(8e3)
+    for frequency in (61.0, 90.0, 0.45 * first_mode(5e3)):
+        assert band(run(judder=[(frequency, 1.3 * LEAST_JERK)]))[0] == pytest.approx(expected, rel=1e-4)
+    # coarse runs are judged for a fifth of the time, and meet the same judder
+    assert band(run(judder=[(61.0, 4.0 * LEAST_JERK)], duration=0.09))[0] == pytest.approx(expected, rel=1e-4)
+    # a ripple is no judder, nor is a slow drift, nor what a vibration of the strands themselves does to the pulley
+    undisturbed = band(run())[0]
+    for motion in ((61.0, 0.8 * LEAST_JERK), (2.0, 1e-2), (0.6 * first_mode(5e3), 1e-2)):
+        assert band(run(judder=[motion]))[0] == undisturbed, motion
+
+
+def test_the_judged_part_and_the_windows_have_to_resolve_it():
+    least = 5.0 / (0.5 * 0.08)
+    assert BELOW_MODES * first_mode(5e3) > least > 100.0
+    assert band(run((6e3, 6e3), (5e3, 5e3), duration=0.08))[0] == pytest.approx(least)
+    assert band(run((6e3, 6e3), (5e3, 5e3), window_length=0.01))[0] == pytest.approx(200.0)
+    assert band(run(band_high=305.0))[0] == pytest.approx(152.5)
+
+
+def test_a_number_in_the_job_stays():
+    assert band(run(band_low=123.0, judder=[(61.0, 3e-3)])) == (123.0, 1500.0)
+
+
+def test_where_no_first_mode_is_known_it_is_constant():
+    slack = run(push=(9e3, 0.0))
+    without_belt = SimpleNamespace(parameters={k: v for k, v in P.items() if k != "ring_mass"})
+    ramp = SimpleNamespace(parameters=P | {"load_history": "ramp"})
+    assert {band(each) for each in (slack, without_belt, ramp)} == {(LOWEST, 1500.0)}
+    assert lower_edge(P, np.nan, np.nan, True) == LOWEST
+
+
+def test_it_has_the_eigenfrequencies_of_the_model_strand():
+    found = strand_frequencies(P, (5e3, 8e3))[:, 0]
+    assert found == pytest.approx([first_mode(5e3), first_mode(8e3)], rel=1e-4)
