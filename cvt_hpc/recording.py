@@ -5,6 +5,7 @@ from typing import Any
 
 from cvt_hpc.parameters import Parameter, Parameters, not_negative
 from cvt_hpc.vibration.ramped import ramped
+from cvt_hpc.vibration.settings import LEAST_PERIODS, band
 
 LONGEST = 4  # times the duration
 LEAST_SAMPLES_PER_PERIOD = 4  # of the band's highest frequency: amplitudes need 2, spectra and pictures more
@@ -77,6 +78,12 @@ def check(parameters: Parameters) -> list[tuple[str, str, str]]:
     shortest = parameters["shortest_duration"]
     if shortest > duration * (1.0 + 1e-9):
         problems.append(("shortest_duration", f"duration = {duration:g} s or less", f"{shortest:g} s"))
+    elif (first := first_duration(parameters)) < duration:
+        share, (low, _) = parameters["judged_fraction"], band(parameters)
+        least = max(parameters.get("rise_time", 0.0) / (1.0 - share), LEAST_PERIODS / (share * low))
+        if first < least * (1.0 - 1e-9):
+            expected = f"{least:g} s or more, of which the last {share:g} can be judged"
+            problems.append(("shortest_duration", expected, f"{shortest:g} s"))
     needed = LEAST_SAMPLES_PER_PERIOD * parameters["band_high"]
     if parameters["sampling_rate"] < needed:
         expected = f"{LEAST_SAMPLES_PER_PERIOD} x band_high = {needed:g} Hz or more"
