@@ -11,6 +11,7 @@ numba, numpy and the like count by their versions, and `lanes` and what else has
 import dis
 import enum
 import hashlib
+import inspect
 import math
 import operator
 import sys
@@ -219,7 +220,9 @@ def _code(code: CodeType) -> str:
         _code(constant) if isinstance(constant, CodeType) else _constant(constant)
         for constant in code.co_consts
     ]
-    counts = code.co_argcount, code.co_posonlyargcount, code.co_kwonlyargcount, code.co_flags
+    # the compiler takes CO_OPTIMIZED from a kernel that is called while a profiler or a tracer is at work
+    flags = code.co_flags | inspect.CO_OPTIMIZED
+    counts = code.co_argcount, code.co_posonlyargcount, code.co_kwonlyargcount, flags
     names = code.co_name, code.co_names, code.co_varnames, code.co_freevars, code.co_cellvars
     return digest((code.co_code, code.co_exceptiontable, constants, counts, names))
 

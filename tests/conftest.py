@@ -85,6 +85,13 @@ def pytest_collection_finish():
     gc.freeze()
 
 
+@pytest.hookimpl(trylast=True)
+def pytest_sessionfinish():
+    """Search for garbage once: pytest would search all that is left five times."""
+    gc.collect()
+    gc.freeze()
+
+
 @pytest.fixture
 def toy(monkeypatch):
     """Register the model "toy" and the stepper "hop", and put a table [run] in the place of all shared ones."""

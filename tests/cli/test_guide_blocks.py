@@ -176,7 +176,10 @@ def _smaller(words, page):
     changed = SMALL | SMALL_OF.get(job.model, {}) | SMALL_OF.get(job.stepper, {}) | SMALL_OF.get(job.name, {})
     changed = {key: value for key, value in changed.items() if key in job.parameters}
     longest = max(job.axes, key=lambda axis: len(axis.values), default=None)
-    by_number = f"out/{job.name}/histories/" in page.read_text()  # of a run, which is that in the whole grid
+    # of runs with a history, which are those in the whole grid
+    by_number = re.findall(rf"out/{job.name}/histories/run-(\d+)", page.read_text())
+    if by_number and len(job.axes) == 1:
+        changed[longest.name] = list(longest.values[: max(map(int, by_number)) + 1])
     for axis in () if by_number else job.axes:
         first, last = axis.values[0], axis.values[-1]
         named = _named(axis.name, job, Path(words[1]).stem)

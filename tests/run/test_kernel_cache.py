@@ -1,5 +1,6 @@
 """Which machine code is kept, what tells it apart, where it lies; and what is told while it is compiled."""
 
+import cProfile
 import enum
 import gc
 import importlib
@@ -887,3 +888,13 @@ def test_types_are_those_that_the_compiler_finds():
         assert kernels.typeof(value) == numba.typeof(value)
     with pytest.raises(ValueError, match="Cannot determine Numba type"):
         kernels.typeof((1.0, object()))
+
+
+def test_a_kernel_that_was_called_under_a_profiler_is_the_same():
+    compiled = kernel(lambda x: x + 1.0)
+    before = Walk().kernel(compiled)
+    profiler = cProfile.Profile()
+    profiler.enable()
+    assert compiled(1.0) == 2.0
+    profiler.disable()
+    assert Walk().kernel(compiled) == before

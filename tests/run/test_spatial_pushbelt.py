@@ -313,7 +313,7 @@ def test_what_ends_a_run_is_recorded_and_the_sweep_goes_on(tmp_path):
     }
     loose = {"driving_thrust": 20e3, "sheave_rate": 2e-5, "flank_reach": 1e-3}
     faces = {"inner_radius": 0.045, "outer_radius": 0.065}
-    short = {"most_refinements": 0, "longest_duration": 0.04}
+    short = {"most_refinements": 0, "longest_duration": 0.04, "most_iterations": 20}
     report = run(build_job(document, "ends.toml", COARSE | loose | faces | short), tmp_path, progress=False)
     assert report.done == 2 and len(report.failed) == 3
     with open_results(report.results) as results:

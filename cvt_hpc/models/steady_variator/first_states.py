@@ -2,13 +2,14 @@
 
 By the belt's own widths of friction it settles nearly everywhere. At some loads gaps and pushes of a fine
 mesh go round for ever: there friction is widened and dampers reach across gaps, which evens out how elements
-follow each other there, and both are led back by Newton's iteration. Where that does not settle either, or
-where the belt slips through, since constant friction carries less than a falling one, the way begins at
-another load. In the last place it begins at the belt in its grooves without load.
+follow each other there, and both are led back by Newton's iteration. Where that does not settle either, the
+way begins at the belt in its grooves without load, or else at another load. There it begins too where the
+belt slips through, since constant friction carries less than a falling one.
 """
 
 import math
 from collections.abc import Callable, Mapping
+from contextlib import suppress
 from typing import Any
 
 import numpy as np
@@ -87,6 +88,9 @@ class FirstStates:
             missed, others = error, [share * load for share in LESS]
         except NoSteadyState as error:
             missed, others = error, [load + part * carried_torque(self._parameters) for part in BESIDE]
+            with suppress(NoSteadyState):
+                x = self._unmarched()
+                return rise(x, 0.0, load) if load != 0.0 else x
         slips = isinstance(missed, SlipsThrough)
         for other in others:
             try:
@@ -100,11 +104,7 @@ class FirstStates:
                 if slips:  # loads below begin on the same curve
                     break
         if not slips:
-            try:
-                x = self._unmarched()
-                return rise(x, 0.0, load) if load != 0.0 else x
-            except NoSteadyState:
-                raise missed from None
+            raise missed
         try:  # falling friction may carry more
             return self._settle(load, OWN, 1.0)
         except SlipsThrough as error:
