@@ -5,7 +5,8 @@ runs are one transient. A run that fails by its numerics is done again from its 
 `most_refinements` times at most. A run that is undecided is prolonged to twice its time, and again, as long
 as that is within `longest_duration`; with `shortest_duration` it begins with a part of its duration, at the
 end of which only a certain verdict counts. All this goes by the run alone, whatever runs beside it. A model
-that may answer by less than the full transient declares so in its record module (`contract.py`), and its answers of this kind are neither refined nor prolonged.
+that may answer by less than the full transient declares so in its record module (`contract.py`), and its
+answers of this kind are neither refined nor prolonged.
 """
 
 import math

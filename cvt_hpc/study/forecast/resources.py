@@ -270,8 +270,8 @@ def find_out(job: Job, simulator: Simulator, groups: Sequence[Batch], out: Path,
 def run_pilots(job: Job, simulator: Simulator, groups: Sequence[Batch], count: int) -> Knowledge:
     """Do batches from all over the grid for a part of their duration, and compare with their predicted cost.
 
-    A shortened run does not end early, is neither refined nor prolonged, and its batch fills the lanes once; what
-    refining and prolonging take is in the predicted costs alone.
+    A shortened run does not end early, is neither refined nor prolonged, and its batch fills the lanes once;
+    what refining and prolonging take is in the predicted costs alone.
     """
     short, share = job, simulator.pilot_share(job)
     # Where the duration is an axis or follows from others, its values count, and without a transient there is
