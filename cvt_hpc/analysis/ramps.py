@@ -261,7 +261,8 @@ def course_figure(history: xr.Dataset, of: str) -> Figure:
     upper.set_ylim(*_limits(values[time >= begun]))
     for axes in (upper, lower):
         axes.grid(lw=0.4, alpha=0.5)
-    bands = "amplitudes: the moment's at 400 to 800 Hz, the strand's at 300 to 1500 Hz"
+    moment, strand = (f"{low:g} to {high:g} Hz" for low, high in (NOISE, BAND))
+    bands = f"amplitudes: the moment's at {moment}, the strand's at {strand}"
     entitle_runs(figure, [history], f"{name[0].upper()}{name[1:]} over time", bands)
     return figure
 
