@@ -209,6 +209,7 @@ def test_a_model_without_records_is_no_model_of_a_study(model, tmp_path):
     assert "estimated cost: not known for this model" in summarize(job, estimate_cost(job))
 
 
+DURATIONS = {"shortest_duration", "longest_duration", "decay_tolerance"}
 FILE = {"table_force": [1, 2], "table_speed": [1, 2], "table_mu": [[1, 1], [1, 1]]}
 
 
@@ -220,8 +221,8 @@ FILE = {"table_force": [1, 2], "table_speed": [1, 2], "table_mu": [[1, 1], [1, 1
          {"table_file", "table_force", "table_speed", "table_mu"}),
         ("elastic_belt", "imex", {"friction_law": "table", **FILE}, "friction_law table",
          {"friction_gradient", "kinetic_friction", "stribeck_velocity"}),
-        ("elastic_belt", "imex", {"load_history": "ramp"}, "load_history ramp", {"longest_duration", "decay_tolerance"}),
-        ("quasi_static_belt", "split", {"speed_history": "ramp"}, "speed_history ramp", {"longest_duration", "decay_tolerance"}),
+        ("elastic_belt", "imex", {"load_history": "ramp"}, "load_history ramp", DURATIONS),
+        ("quasi_static_belt", "split", {"speed_history": "ramp"}, "speed_history ramp", DURATIONS),
         ("elastic_belt", "theta", {}, "a stepper that chooses its step", set()),
         ("elastic_belt", "scipy_bdf", {}, "a stepper that chooses its step", {"most_refinements"}),
         ("moving_string", None, {}, "shape mode", {"pulse_width"}),
