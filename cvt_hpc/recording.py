@@ -143,10 +143,9 @@ def first_duration(parameters: Parameters) -> float:
         Not below `shortest_duration`; the duration itself where that is 0 or a ramp takes the whole run.
     """
     samples, shortest = sample_count(parameters), parameters["shortest_duration"]
-    if shortest == 0.0 or ramped(parameters):
-        return float(parameters["duration"])
-    halvings = max(math.floor(math.log2(parameters["duration"] / shortest) + 1e-9), 0)
-    if halvings == 0:
+    is_whole = shortest == 0.0 or ramped(parameters)
+    halvings = 0 if is_whole else math.floor(math.log2(parameters["duration"] / shortest) + 1e-9)
+    if halvings < 1:
         return float(parameters["duration"])
     return math.ceil(samples / 2**halvings) / float(parameters["sampling_rate"])
 

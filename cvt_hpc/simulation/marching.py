@@ -103,8 +103,7 @@ class OpenRun:
     @staticmethod
     def _first(point: dict[str, Any]) -> dict[str, Any]:
         """Parameters of the first part of a run that may end early."""
-        early = "shortest_duration" in point and first_duration(point) < point["duration"]
-        return point | {"duration": first_duration(point)} if early else point
+        return point | {"duration": first_duration(point)} if "shortest_duration" in point else point
 
     def _goes_on(self, run: Any, record: dict[str, Any]) -> bool:
         """Whether more of a run may change its verdict."""
