@@ -274,7 +274,7 @@ def _follow(diagram: Diagram, asked: Asked) -> Followed:
         small, large = ({"disturbance": size} for size in diagram.disturbance)
         # the load that rises within tens of milliseconds is itself a large disturbance
         starts = (Start(small, partial(_steady_state, belt, found)), Start(large))
-        places = [onset.load for onset in hopf if onset.frequency >= lowest_judged(asked)]
+        places = [onset.load for onset in hopf if onset.frequency >= lowest_judged(asked, onset.load)]
         runs = attractors(asked.runs, "load", starts, diagram.loads, places, diagram.resolution)
     return with_kinds(diagram, asked, states_of(found, grid, diagram.loads), hopf, hidden, runs)
 

@@ -14,6 +14,7 @@ from cvt_hpc.bifurcation.job import Asked, Diagram, load_attributes
 from cvt_hpc.errors import few_of
 from cvt_hpc.job.values import number_within, shown_number, shown_unit
 from cvt_hpc.models.linear_stability.branch import CLOSE, Onset
+from cvt_hpc.variator.band import steady_band
 from cvt_hpc.vibration.classes import OccurrenceClass
 from cvt_hpc.vibration.criticality import Criticality, Kind, criticality
 
@@ -123,9 +124,9 @@ def failed_runs(followed: Followed) -> list[Attractor]:
     return [run for run in followed.runs if run.occurrence == OccurrenceClass.FAILED]
 
 
-def lowest_judged(asked: Asked) -> float:
-    """Lowest frequency of a mode that the runs of a branch are judged by [Hz]."""
-    return SEEN * float(asked.parameters["band_low"])
+def lowest_judged(asked: Asked, load: float) -> float:
+    """Lowest frequency of a mode that the runs of a branch under a load [N m] are judged by [Hz]."""
+    return SEEN * steady_band(asked.parameters | {"load": load})[0]
 
 
 def with_kinds(
@@ -147,7 +148,7 @@ def with_kinds(
     hopf, hidden, runs
         As `judged` takes them.
     """
-    lowest, in_words = lowest_judged(asked), partial(load_text, diagram)
+    lowest, in_words = partial(lowest_judged, asked), partial(load_text, diagram)
     kinds = [judged(onset, hopf, hidden, runs, lowest, in_words) for onset in hopf]
     return Followed(asked, states, hopf, hidden, runs, kinds)
 
@@ -157,7 +158,7 @@ def judged(
     hopf: list[Onset],
     hidden: list[tuple[float, float]],
     runs: list[Attractor],
-    lowest: float,
+    lowest: Callable[[float], float],
     in_words: Callable[[float], str],
 ) -> Criticality:
     """Whether a Hopf point is super- or subcritical, if its mode is within the band by which runs are judged.
@@ -170,14 +171,14 @@ def judged(
         All of the branch, and where stability changes unseen, as `onsets` returns them.
     runs : list of Attractor
         From near the steady state (start 0) and from the large start (1).
-    lowest : float
-        Lowest frequency of a mode that runs are judged by [Hz].
+    lowest : callable
+        Lowest frequency of a mode that runs under a load [N m] are judged by [Hz].
     in_words : callable
         Turns a load [N m] into words.
     """
     if not runs:
         return Criticality(Kind.UNDECIDED, np.nan, np.nan, "no runs were asked for")
-    if onset.frequency < lowest:
+    if onset.frequency < lowest(onset.load):
         return Criticality(Kind.UNDECIDED, np.nan, np.nan, "its mode lies below the band of runs")
     if onset.others:
         return Criticality(Kind.UNDECIDED, np.nan, np.nan, "the steady state is unstable on both sides")
@@ -187,7 +188,9 @@ def judged(
     # on the stable side the steady state ends to be stable at the next mode, whatever its frequency
     ends = [load for ends in hidden for load in ends if (load < onset.load) == onset.rising]
     for other in hopf:
-        if other is not onset and (other.frequency >= lowest or (other.load < onset.load) == onset.rising):
+        if other is not onset and (
+            other.frequency >= lowest(other.load) or (other.load < onset.load) == onset.rising
+        ):
             ends.append(other.load)
     return criticality(
         onset.load,

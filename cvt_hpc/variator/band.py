@@ -1,4 +1,4 @@
-"""The band by which a run of a variator is judged: it begins below the first modes of its own strands."""
+"""The band by which a variator is judged: it begins below the first modes of its own strands."""
 
 from collections.abc import Mapping
 from typing import Any
@@ -47,6 +47,22 @@ def strand_frequencies(
     if not all(np.isfinite([*strand, strand.critical_speed]).all() for strand in strands):
         return unknown
     return np.array([eigenfrequencies(strand, FUNCTIONS)[:MODES] for strand in strands])
+
+
+def steady_band(
+    parameters: Mapping[str, Any], forces: tuple[float, float] | None = None
+) -> tuple[float, float]:
+    """Lowest and highest frequency of the modes by which a steady state is judged [Hz].
+
+    It is the band of a run that does not judder.
+
+    Parameters
+    ----------
+    parameters, forces
+        As `strand_frequencies` takes them.
+    """
+    lowest = float(strand_frequencies(parameters, forces)[:, 0].min())
+    return settings.edge_of_modes(parameters, lowest), parameters["band_high"]
 
 
 def band(run: Any) -> tuple[float, float]:

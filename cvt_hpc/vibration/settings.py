@@ -101,14 +101,24 @@ def lower_edge(parameters: Parameters, lowest_mode: float, highest_mode: float, 
     judders : bool
         Whether the driven pulley moves in jerks.
     """
-    p, (low, high) = parameters, band(parameters)
+    p = parameters
     if p["band_low"] or not lowest_mode > 0.0:
-        return low
+        return band(p)[0]
     resolved = max(
         LEAST_PERIODS / (p["judged_fraction"] * p["duration"]), LEAST_IN_WINDOW / p["window_length"]
     )
-    wanted = ABOVE_MODES * highest_mode if judders else BELOW_MODES * lowest_mode
-    return max(min(wanted, high / 2.0), resolved)
+    found = (
+        min(ABOVE_MODES * highest_mode, p["band_high"] / 2.0) if judders else edge_of_modes(p, lowest_mode)
+    )
+    return max(found, resolved)
+
+
+def edge_of_modes(parameters: Parameters, lowest_mode: float) -> float:
+    """Lowest frequency by which what does not judder is judged [Hz], as `lower_edge` has it."""
+    low, high = band(parameters)
+    return (
+        low if parameters["band_low"] or not lowest_mode > 0.0 else min(BELOW_MODES * lowest_mode, high / 2.0)
+    )
 
 
 def check(parameters: Parameters) -> list[tuple[str, str, str]]:

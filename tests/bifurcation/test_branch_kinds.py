@@ -29,7 +29,7 @@ def runs(start, first, without=()):
 def verdict(small=21, large=17, onset=None, others=(), hidden=(), without=()):
     onset = onset or hopf(20.3)
     found = [*runs(0, small, without), *runs(1, large)]
-    return judged(onset, sorted([onset, *others]), list(hidden), found, 200.0, "{:g} N m".format)
+    return judged(onset, sorted([onset, *others]), list(hidden), found, lambda load: 200.0, "{:g} N m".format)
 
 
 def test_the_width_is_from_the_hopf_point_with_its_bracket_in_the_error():
@@ -53,6 +53,18 @@ def test_slow_modes_and_states_that_stay_unstable_are_not_judged():
     assert verdict(onset=hopf(20.3, others=1)).reason == "the steady state is unstable on both sides"
 
 
+def test_a_mode_is_compared_with_the_band_under_its_own_load():
+    onset, slow = hopf(20.3), hopf(22.0, 150.0, rising=False)
+    found = [*runs(0, 24), *runs(1, 17)]
+    kinds = [
+        judged(
+            onset, [onset, slow], [], found, lambda load, edge=edge: edge if load > 21.0 else 200.0, str
+        ).kind
+        for edge in (140.0, 160.0)
+    ]
+    assert kinds == [Kind.UNDECIDED, Kind.SUBCRITICAL]
+
+
 def test_a_slow_mode_ends_the_stable_side_and_not_the_other():
     slow = {"frequency": 150.0, "rising": False}
     assert (
@@ -69,6 +81,6 @@ def test_where_no_run_began_in_the_steady_state_nothing_is_concluded():
 
 
 def test_without_runs_nothing_is_decided():
-    found = judged(hopf(20.3), [hopf(20.3)], [], [], 200.0, str)
+    found = judged(hopf(20.3), [hopf(20.3)], [], [], lambda load: 200.0, str)
     assert (found.kind, found.reason) == (Kind.UNDECIDED, "no runs were asked for")
     assert np.isnan(found.width)

@@ -16,6 +16,8 @@ from cvt_hpc.models.linear_stability.spectrum import eigenpairs
 from cvt_hpc.models.steady_variator.walking import SteadyBelt
 from cvt_hpc.study import open_results, run
 from cvt_hpc.variables import Vibrates
+from cvt_hpc.variator.band import strand_frequencies
+from cvt_hpc.vibration.settings import BELOW_MODES
 from support.cf import cf_findings
 from support.growing import at_rest, measured
 from support.rungs import rung_job, rung_record
@@ -158,6 +160,11 @@ def test_record():
     assert record["growth_rate"] == pytest.approx(mode.growth, rel=1e-4)
     assert record["fed"].sum() == pytest.approx(mode.fed.sum(), rel=1e-4)
     assert (record["vibrating_strand"], record["mode"]) == (mode.strand + 1, mode.half_waves)
+    forces = record["mean_ring_tension"] - record["mean_push_force"]
+    assert record["lower_band_edge"] == BELOW_MODES * strand_frequencies(COARSE, forces)[:, 0].min()
+    assert record["lower_band_edge"] < record["frequency"]
+    above = rung_record("linear_stability", load=120.0, stations=96, band_low=record["frequency"] + 1.0)
+    assert above["lower_band_edge"] == record["frequency"] + 1.0 < above["frequency"]
     assert rung_record("linear_stability", load=80.0, stations=48)["vibrates"] == Vibrates.NO
 
 

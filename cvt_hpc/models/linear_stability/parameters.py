@@ -10,8 +10,11 @@ LEAST_MEMORY = 1e-4  # [s]: compared with transients down to this, see README.md
 
 PARAMETERS: dict[str, dict[str, Parameter]] = steady_variator.PARAMETERS | {
     "judgement": {
-        "band_low": positive(
-            300.0, "Hz", "lowest frequency of a mode that counts as vibration", sensible=(1.0, 20000.0)
+        "band_low": not_negative(
+            0.0,
+            "Hz",
+            "lowest frequency of a mode that counts as vibration; 0: from the strands, as of a run",
+            sensible=(1.0, 20000.0),
         ),
         "band_high": positive(1500.0, "Hz", "highest such frequency", sensible=(1.0, 20000.0)),
         "undecided_growth": not_negative(

@@ -11,6 +11,7 @@ from cvt_hpc.variables import Coordinate, Status, Variable, Vibrates
 VARIABLES = (
     Variable("growth_rate", "s-1", "of the mode that grows fastest; none found: nan"),
     Variable("frequency", "Hz", "of the mode that grows fastest"),
+    Variable("lower_band_edge", "Hz", "lowest frequency of the modes by which the state is judged"),
     Variable(
         "vibrating_strand",
         "1",
@@ -41,6 +42,8 @@ class Solution(NamedTuple):
         Numbers of the steady state, or why there is none.
     modes : list of Mode
         In the band, the one that grows fastest first.
+    lower_edge : float
+        Where the band begins [Hz].
     starts : (4,) int array
         First station of each region.
     undecided : float
@@ -49,6 +52,7 @@ class Solution(NamedTuple):
 
     steady: dict[str, Any] | ValueError
     modes: list
+    lower_edge: float
     starts: np.ndarray
     undecided: float
 
@@ -70,23 +74,28 @@ def solve(parameters: Mapping[str, Any]) -> Solution:
     """Steady state and its modes for the parameters of a run [SI]."""
     from cvt_hpc.models.elastic_belt.belt import mesh
     from cvt_hpc.models.linear_stability.modes import modes
-    from cvt_hpc.models.steady_variator.forces import quantities
+    from cvt_hpc.models.steady_variator.forces import driving_speed, quantities
     from cvt_hpc.models.steady_variator.walking import NoSteadyState, SteadyBelt
+    from cvt_hpc.variator.band import steady_band
 
     p, grid = parameters, mesh(parameters)
     try:
         steady = SteadyBelt(p).at(p["load"])
     except NoSteadyState as error:
-        return Solution(error, [], np.array(grid.starts), p["undecided_growth"])
-    found = modes(steady, grid, (p["band_low"], p["band_high"]))
-    return Solution(quantities(steady, grid), found, np.array(grid.starts), p["undecided_growth"])
+        return Solution(error, [], np.nan, np.array(grid.starts), p["undecided_growth"])
+    means = quantities(steady, grid)
+    tension, push = means["mean_ring_tension"], means["mean_push_force"]
+    band = steady_band(
+        p | {"driving_speed": driving_speed(steady)}, (tension[0] - push[0], tension[1] - push[1])
+    )
+    return Solution(means, modes(steady, grid, band), band[0], np.array(grid.starts), p["undecided_growth"])
 
 
 def judge(solution: Solution) -> dict[str, Any]:
     """The record of a run, its cost apart."""
     if isinstance(solution.steady, ValueError):
         return {"status": Status.FAILED_NUMERICS, "reason": str(solution.steady)}
-    found = {"status": Status.DONE, **solution.steady}
+    found = {"status": Status.DONE, "lower_band_edge": solution.lower_edge, **solution.steady}
     if not solution.modes:
         return found | {"vibrates": Vibrates.NO, "reason": "every mode in the band decays fast"}
     first, margin = solution.modes[0], solution.undecided
