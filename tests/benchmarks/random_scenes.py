@@ -1,12 +1,13 @@
-"""Random scenes by the default step against a step eight times shorter: does the map show physics only?
+"""Random scenes by the default step and mesh against finer ones: does the map show physics only?
 
-    python tests/benchmarks/random_scenes.py OUT.csv [groups] [--explicit]
+    python tests/benchmarks/random_scenes.py OUT.csv [groups] [--reference step|mesh|explicit] [--further]
 
-A group is 16 scenes of one speed ratio and one friction law, which advance together; 125 groups (the default) take some
-80 minutes of processor time, on two cores. A table that is there is gone on with. Ratio and law follow one Sobol
-sequence, all else another: driving speed, thrust, load, friction gradient and memory, stiffness of the sheaves (one in
-ten rigid), masses, bending stiffness.
-With --explicit the reference is the explicit step, for the first groups alone: 16 scenes take about two minutes.
+The reference has a step four times shorter; with `mesh` twice the stations and half the step; with `explicit` the
+explicit step, of which 16 scenes take minutes. A group is 16 scenes of one speed ratio and one friction law, which
+advance together, in less than a minute of processor time. A table that is there is gone on with. Ratio and law follow
+one Sobol sequence, all else another: driving speed, thrust, load, friction gradient and memory, stiffness of the
+sheaves (one in ten rigid), masses, bending stiffness. With --further groups have in turn three ring layers, free
+pulleys, or a speed that rises, and all have a memory from 0.05 ms on.
 """
 
 import argparse
@@ -19,14 +20,30 @@ import numpy as np
 from scipy.stats import qmc
 
 from cvt_hpc.job import Job, build_job
-from cvt_hpc.models.elastic_belt.step_choice import REFERENCE_STEP
+from cvt_hpc.models.elastic_belt.step_choice import REFERENCE_ERROR
 from cvt_hpc.provenance import origin_lines
 from cvt_hpc.simulation import run_points
 from cvt_hpc.tables import below_origin
 from cvt_hpc.vibration.classes import OccurrenceClass, classify_runs
 
 LAWS = ("stribeck", "linear", "hyperbolic", "cubic")
-TOGETHER, FINER, SEED = 16, 8, 7
+TOGETHER, SEED = 16, 7
+REFERENCES = {
+    "step": ("imex", {"step_error": REFERENCE_ERROR / 4.0}),
+    "mesh": ("imex", {"step_error": REFERENCE_ERROR / 2.0, "stations": 320}),
+    "explicit": ("explicit", {}),
+}
+FURTHER = (
+    {"ring_layers": 3},
+    {
+        "driving_inertia": 0.05,
+        "drive_slope": 5.0,
+        "driving_axial": "ratio",
+        "clamping": "torque_ratio",
+        "tilt_lag": 1e-4,
+    },
+    {"speed_history": "ramp"},
+)
 BELT = {"belt_length": 0.6612, "centre_distance": 0.155, "duration": 0.4}
 THRESHOLD, NEAR = 5e-6, 0.2  # [m], and the share of it within which two classes may differ
 FOUND = (
@@ -42,27 +59,28 @@ GIVEN = ("ratio", "friction_law", "stiffness_of", "driving_speed", "thrust", "lo
          "friction_memory", "sheave_stiffness", "element_mass", "ring_mass", "bending_stiffness")  # fmt: skip
 
 
-def scenes(groups: int) -> list[list[dict]]:
+def scenes(groups: int, further: bool) -> list[list[dict]]:
     """Parameters [SI] of the scenes, by group."""
+    memory = 0.5e-4 if further else 1e-4
     power = (
         groups - 1
     ).bit_length()  # the sequences are balanced over powers of 2, of which the first are taken
     outer = qmc.Sobol(2, seed=SEED).random_base2(power)[:groups]
     inner = qmc.Sobol(9, seed=SEED + 1).random_base2(power + 4).reshape(-1, TOGETHER, 9)
     return [
-        [_scene(float(0.45 * (2.6 / 0.45) ** a), LAWS[int(b * len(LAWS))], x) for x in inner[group]]
+        [_scene(float(0.45 * (2.6 / 0.45) ** a), LAWS[int(b * len(LAWS))], memory, x) for x in inner[group]]
         for group, (a, b) in enumerate(outer)
     ]
 
 
-def _scene(ratio: float, law: str, x: np.ndarray) -> dict:
+def _scene(ratio: float, law: str, memory: float, x: np.ndarray) -> dict:
     stiffness = np.inf if x[5] > 0.9 else 0.7 * 10 ** (x[5] / 0.9)
     values = (
         500.0 * 12.0 ** x[0] * np.pi / 30.0,  # 500 to 6000 rpm
         5e3 * 16.0 ** x[1],  # to 80 kN
         0.8 * x[2],  # of what friction carries: the belt slips from about 0.7 on
         -1.2 * x[3],
-        1e-4 * 5.0 ** x[4],  # to 0.5 ms
+        memory * (5e-4 / memory) ** x[4],  # to 0.5 ms
         stiffness,
         0.7 * 2.0 ** x[6],  # each to 1.4 of the default's
         0.3 * 0.7 * 2.0 ** x[7],
@@ -72,9 +90,8 @@ def _scene(ratio: float, law: str, x: np.ndarray) -> dict:
     return common | dict(zip(GIVEN[3:], map(float, values), strict=True))
 
 
-def run_group(scenes_: list[dict], stepper: str, step: float | None) -> list[dict]:
-    """What was found of each scene of a group."""
-    values = {} if step is None else {"step": step}
+def run_group(scenes_: list[dict], stepper: str, values: dict) -> list[dict]:
+    """What was found of each scene of a group, with further values [SI]."""
     jobs = [_job(scene | values, stepper) for scene in scenes_]
     records = []
     for first in range(0, len(jobs), TOGETHER):
@@ -134,22 +151,24 @@ def main() -> None:
     parser = argparse.ArgumentParser(description=__doc__.splitlines()[0])
     parser.add_argument("table", type=Path)
     parser.add_argument("groups", type=int, nargs="?", default=125)
-    parser.add_argument("--explicit", action="store_true")
+    parser.add_argument("--reference", choices=REFERENCES, default="step")
+    parser.add_argument("--further", action="store_true")
     arguments = parser.parse_args()
-    groups = scenes(arguments.groups)
-    reference = ("explicit", None) if arguments.explicit else ("imex", REFERENCE_STEP / FINER)
-    header = _header("explicit" if arguments.explicit else "finer")
+    groups = scenes(arguments.groups, arguments.further)
+    stepper, finer_values = REFERENCES[arguments.reference]
+    header = _header(arguments.reference)
     pairs = _read(arguments.table, header, groups)
     done = len(pairs) // TOGETHER
-    with ProcessPoolExecutor(2) as pool, arguments.table.open("a", newline="") as file:
+    with ProcessPoolExecutor(1) as pool, arguments.table.open("a", newline="") as file:
         writer = csv.writer(file, lineterminator="\n")
         if not done:
             file.writelines(origin_lines())
             writer.writerow(header)
-        tasks = [
-            tuple(pool.submit(run_group, group, *how) for how in (("imex", None), reference))
-            for group in groups[done:]
-        ]
+        tasks = []
+        for number, group in enumerate(groups[done:], done):
+            own = FURTHER[number % len(FURTHER)] if arguments.further else {}
+            ways = (("imex", own), (stepper, own | finer_values))
+            tasks.append(tuple(pool.submit(run_group, group, *way) for way in ways))
         for group, (default, finer) in zip(groups[done:], tasks, strict=True):
             found = list(zip(default.result(), finer.result(), strict=True))
             pairs += found

@@ -48,7 +48,7 @@ def step_imex(belt: LaneBelt, state: LaneState, work: Work, step: float) -> None
     stations = work.stations
     forces.lane_sliding(belt, state, stations)
     assemble(belt, state, work, step, False)
-    move_across(belt, state, work, step)
+    coupled = move_across(belt, state, work, step)
     if belt.has_column:
         foresee_column(belt, state, stations, lf.PUSH, step)
     for attempt in range(MOST_PASSES):
@@ -61,10 +61,10 @@ def step_imex(belt: LaneBelt, state: LaneState, work: Work, step: float) -> None
             break
         if found & TURNS_BACK:
             assemble(belt, state, work, step, True)
-            move_across(belt, state, work, step)
+            coupled = move_across(belt, state, work, step)
             if belt.has_column:
                 foresee_column(belt, state, stations, lf.PUSH, step)
-    move_with_layers(belt, state, work)
+    move_with_layers(belt, state, work, coupled)
     taken, moment = advance_belt(belt, state, work, step)
     advance_pulleys(belt, state, taken, moment, step)
     state.time[0] += step

@@ -22,7 +22,18 @@ after friction has taken its part, feeds the shortest waves.
 """
 
 from cvt_hpc.kernels import kernel, merged_kernel
-from cvt_hpc.lanes import ahead, behind, fma, from_ahead, from_behind, like, ring_solution, sqrt
+from cvt_hpc.lanes import (
+    absolute,
+    ahead,
+    anywhere,
+    behind,
+    fma,
+    from_ahead,
+    from_behind,
+    like,
+    ring_solution,
+    sqrt,
+)
 from cvt_hpc.models.elastic_belt import fields as f
 from cvt_hpc.models.elastic_belt import lane_fields as lf
 from cvt_hpc.models.elastic_belt.lane_belt import LaneBelt, LaneState, Work
@@ -48,8 +59,11 @@ def _coupling(belt: LaneBelt):
 
 
 @kernel
-def move_across(belt: LaneBelt, state: LaneState, work: Work, step: float) -> None:
+def move_across(belt: LaneBelt, state: LaneState, work: Work, step: float) -> int:
     """Increments of u without those of the layers, PUSH, from ACROSS and MASS_ACROSS.
+
+    Returns how many rows are still coupled to the last one behind as the elimination reaches them: a dozen,
+    since bending reaches no further. Those beyond have no B.
 
     The gyroscopic force is taken with the mean of u over the step: it then neither damps nor feeds. By one
     correction with the increments without it, since it changes them little: by v step / h, some 0.02.
@@ -63,6 +77,7 @@ def move_across(belt: LaneBelt, state: LaneState, work: Work, step: float) -> No
     own00 = own01 = own11 = c00 = c11 = t00 = t01 = t11 = zero
     link = from_behind(q * belt.per_cell[last])
     c01 = c10 = -link
+    coupled = last
     for j in range(last + 1):
         onward = q * belt.per_cell[j]
         dual = like(belt.dual[j], q)
@@ -76,22 +91,25 @@ def move_across(belt: LaneBelt, state: LaneState, work: Work, step: float) -> No
         else:
             per_determinant = 1.0 / fma(d00, d11, -d01 * d01)
             i00, i01, i11 = d11 * per_determinant, -d01 * per_determinant, d00 * per_determinant
-            g00, g01 = fma(i00, c00, i01 * c10), fma(i00, c01, i01 * c11)
-            g10, g11 = fma(i01, c00, i11 * c10), fma(i01, c01, i11 * c11)
-            own00 = fma(-c00, g00, fma(-c10, g10, own00))
-            own01 = fma(-c00, g01, fma(-c10, g11, own01))
-            own11 = fma(-c01, g01, fma(-c11, g11, own11))
             stations[j, lf.A_00], stations[j, lf.A_01], stations[j, lf.A_11] = i00, i01, i11
-            stations[j, lf.B_00], stations[j, lf.B_01] = g00, g01
-            stations[j, lf.B_10], stations[j, lf.B_11] = g10, g11
             square = onward * onward
             t00, t01, t11 = square * i11, square * i01, square * i00
-            c00, c01 = (onward * g10 + belt.faded) - belt.faded, (onward * g11 + belt.faded) - belt.faded
-            c10, c11 = (onward * g00 + belt.faded) - belt.faded, (onward * g01 + belt.faded) - belt.faded
+            if j < coupled:
+                g00, g01 = fma(i00, c00, i01 * c10), fma(i00, c01, i01 * c11)
+                g10, g11 = fma(i01, c00, i11 * c10), fma(i01, c01, i11 * c11)
+                own00 = fma(-c00, g00, fma(-c10, g10, own00))
+                own01 = fma(-c00, g01, fma(-c10, g11, own01))
+                own11 = fma(-c01, g01, fma(-c11, g11, own11))
+                stations[j, lf.B_00], stations[j, lf.B_01] = g00, g01
+                stations[j, lf.B_10], stations[j, lf.B_11] = g10, g11
+                c00, c01 = (onward * g10 + belt.faded) - belt.faded, (onward * g11 + belt.faded) - belt.faded
+                c10, c11 = (onward * g00 + belt.faded) - belt.faded, (onward * g01 + belt.faded) - belt.faded
+                if not anywhere(absolute(c00) + absolute(c01) + absolute(c10) + absolute(c11) > 0.0):
+                    coupled = j + 1
         link = onward
     gyration = -c[0, lf.MASS] * lane_belt_speed(belt, state.time[0])
-    _solve(belt, work, q, gyration, ALONE)
-    _solve(belt, work, q, gyration, TURNING)
+    _solve(belt, work, q, gyration, ALONE, coupled)
+    _solve(belt, work, q, gyration, TURNING, coupled)
     belt_speed, fields = lane_belt_speed(belt, state.time[0]), state.fields
     for j in range(last + 1):
         push = stations[j, lf.PUSH]
@@ -103,13 +121,14 @@ def move_across(belt: LaneBelt, state: LaneState, work: Work, step: float) -> No
             ring = turning * c[0, lf.RING_MASS] * (belt_speed + fields[j, f.V_RING])
             stations[j, lf.Y_1] = fma(-belt.dual[j], ring, stations[j, lf.Y_1])
         stations[j, lf.Y_0] = fma(belt.dual[j], along, stations[j, lf.Y_0])
+    return coupled
 
 
 @kernel
-def move_with_layers(belt: LaneBelt, state: LaneState, work: Work) -> None:
-    """Increments of u, PUSH, with those of the elements, DV_0."""
+def move_with_layers(belt: LaneBelt, state: LaneState, work: Work, coupled: int) -> None:
+    """Increments of u, PUSH, with those of the elements, DV_0; `coupled` is the result of `move_across`."""
     gyration = -belt.constants[0, lf.MASS] * lane_belt_speed(belt, state.time[0])
-    _solve(belt, work, _coupling(belt), gyration, WITH_LAYERS)
+    _solve(belt, work, _coupling(belt), gyration, WITH_LAYERS, coupled)
 
 
 @merged_kernel
@@ -126,7 +145,7 @@ def _force(belt: LaneBelt, work: Work, j: int, gyration, part: int):
 
 
 @kernel
-def _solve(belt: LaneBelt, work: Work, q, gyration, part: int) -> None:
+def _solve(belt: LaneBelt, work: Work, q, gyration, part: int, coupled: int) -> None:
     stations = work.stations
     last, zero = stations.rows - 1, like(0.0, q)
     y1 = own0 = own1 = rest = zero
@@ -134,8 +153,9 @@ def _solve(belt: LaneBelt, work: Work, q, gyration, part: int) -> None:
         y0 = _force(belt, work, j, gyration, part) + rest
         i01 = stations[j, lf.A_01]
         z0, z1 = fma(stations[j, lf.A_00], y0, i01 * y1), fma(i01, y0, stations[j, lf.A_11] * y1)
-        own0 = fma(-stations[j, lf.B_00], y0, fma(-stations[j, lf.B_10], y1, own0))
-        own1 = fma(-stations[j, lf.B_01], y0, fma(-stations[j, lf.B_11], y1, own1))
+        if j < coupled:
+            own0 = fma(-stations[j, lf.B_00], y0, fma(-stations[j, lf.B_10], y1, own0))
+            own1 = fma(-stations[j, lf.B_01], y0, fma(-stations[j, lf.B_11], y1, own1))
         stations[j, lf.X_0], stations[j, lf.X_1] = z0, z1
         onward = q * belt.per_cell[j]
         rest, y1 = onward * z1, onward * z0
@@ -157,8 +177,10 @@ def _solve(belt: LaneBelt, work: Work, q, gyration, part: int) -> None:
         onward = q * belt.per_cell[j]
         e0, e1 = onward * x1, onward * x0
         i01 = stations[j, lf.A_01]
-        z0 = fma(-stations[j, lf.B_01], behind1, fma(-stations[j, lf.B_00], behind0, stations[j, lf.X_0]))
-        z1 = fma(-stations[j, lf.B_11], behind1, fma(-stations[j, lf.B_10], behind0, stations[j, lf.X_1]))
+        z0, z1 = stations[j, lf.X_0], stations[j, lf.X_1]
+        if j < coupled:
+            z0 = fma(-stations[j, lf.B_01], behind1, fma(-stations[j, lf.B_00], behind0, z0))
+            z1 = fma(-stations[j, lf.B_11], behind1, fma(-stations[j, lf.B_10], behind0, z1))
         x0 = fma(stations[j, lf.A_00], e0, fma(i01, e1, z0))
         x1 = fma(i01, e0, fma(stations[j, lf.A_11], e1, z1))
         stations[j, lf.PUSH] = x0

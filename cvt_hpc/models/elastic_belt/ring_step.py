@@ -135,7 +135,7 @@ def step_rings(belt: LaneBelt, state: LaneState, work: RingWork, step: float) ->
     one = Work(work.stations)
     forces.lane_sliding(belt, state, work.stations)
     assemble(belt, state, one, step, False)
-    move_across(belt, state, one, step)
+    coupled = move_across(belt, state, one, step)
     couple_layers(belt, work.rings, state, work, step)
     for attempt in range(MOST_PASSES):
         eliminate(belt, state, one, step, attempt > 0)
@@ -147,9 +147,9 @@ def step_rings(belt: LaneBelt, state: LaneState, work: RingWork, step: float) ->
             break
         if found & TURNS_BACK:
             assemble(belt, state, one, step, True)
-            move_across(belt, state, one, step)
+            coupled = move_across(belt, state, one, step)
             couple_layers(belt, work.rings, state, work, step)
-    move_with_layers(belt, state, one)
+    move_with_layers(belt, state, one, coupled)
     taken, moment = advance_belt(belt, state, one, step)
     advance_layers(belt, work.rings, state, work, step)
     advance_pulleys(belt, state, taken, moment, step)
