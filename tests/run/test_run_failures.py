@@ -105,6 +105,12 @@ def test_more_torque_than_friction_carries_slips_through():
     assert half["simulated_seconds"] == pytest.approx(found["simulated_seconds"], rel=0.02)
 
 
+def test_all_the_play_in_one_short_cell_is_slip_and_no_failure():
+    # a third of a cell of 0.9 mm: no share of a cell bounds it
+    found = record(load=210.0, duration=0.1, stations=96, stiffness_of="sheave", sheave_stiffness=np.inf)
+    assert (found["status"], found["vibrates"]) == (Status.DONE, Vibrates.SLIPS)
+
+
 def test_torque_that_friction_just_carries_does_not():
     below = RUNS.record(load=0.6 * CARRIED, duration=0.1)
     assert below["status"] == Status.DONE and below["vibrates"] != Vibrates.SLIPS

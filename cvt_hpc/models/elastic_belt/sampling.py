@@ -54,8 +54,9 @@ PROFILES = (*MOMENTS, "contact_force", "mean_displacement")
 CONTACT_FORCE, MEAN_DISPLACEMENT = range(len(MOMENTS), len(PROFILES))
 
 LEAST_FORCE = 1e-30  # [N]: less than any wrap bears, for a quotient without force
-LARGEST_STRAIN = 0.05  # of the rings, which break at 1 %
-LARGEST_ELEMENT_STRAIN = 0.2  # gaps of a fifth: all the play in a few cells
+# Of the rings, which break at 1 %, and of pressed elements; and of a cell's gap in the belt's length, as all
+# the play may gather in one cell, however short that is
+LARGEST_STRAIN = 0.05
 
 
 class Outcome(IntEnum):
@@ -269,23 +270,24 @@ def sample(belt: LaneBelt, state: LaneState, stations: LaneArray, samples: Sampl
 def _watch(belt: LaneBelt, state: LaneState, stations: LaneArray, ended: LaneArray) -> None:
     """Find the lanes whose state is out of bounds."""
     n, fields = belt.cell.size, state.fields
-    content = largest = strain = element_strain = like(0.0, fields[0, f.W])
+    content = largest = strain = gap = like(0.0, fields[0, f.W])
+    length = 0.0
     for j in range(n):
         for field in range(len(f.FIELDS)):
             # 0 times what is not a number or infinite is not a number
             content = fma(fields[j, field], 0.0, content)
         largest = maximum(absolute(fields[j, f.W]), largest)
-        strain = maximum(absolute(stations[j, lf.EPS_1]), strain)
-        element_strain = maximum(absolute(stations[j, lf.EPS_0]), element_strain)
+        strain = maximum(maximum(absolute(stations[j, lf.EPS_1]), -stations[j, lf.EPS_0]), strain)
+        gap = maximum(belt.cell[j] * stations[j, lf.EPS_0], gap)
+        length += belt.cell[j]
     speed, c = state.scalars[0, lf.SPEED], belt.constants
     total = fma(speed, 0.0, fma(state.scalars[0, lf.POSITION], 0.0, like(content, speed)))
     nominal = like(c[0, lf.DRIVING_SPEED] / c[0, lf.RATIO], speed)
     nominal = nominal * forces.lane_speed_share(belt, state.time[0], speed)
     nominal = nominal + state.scalars[0, f.FIRST_STATE + f.EXCESS] / like(c[0, lf.RATIO], speed)
     code = like(Outcome.OK.value, speed)
-    beyond = maximum(like(element_strain, speed) - LARGEST_ELEMENT_STRAIN, 0.0)
-    beyond = maximum(like(strain, speed) - LARGEST_STRAIN, beyond)
-    code = select(beyond > 0.0, Outcome.OVERSTRAINED.value, code)
+    strain = like(maximum(gap * (1.0 / length), strain), speed)
+    code = select(strain > LARGEST_STRAIN, Outcome.OVERSTRAINED.value, code)
     unsolved = (
         state.contacts[0].scalars[0, compliance.UNSOLVED] + state.contacts[1].scalars[0, compliance.UNSOLVED]
     )

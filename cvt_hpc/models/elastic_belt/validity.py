@@ -6,7 +6,7 @@ from typing import Any
 import numpy as np
 
 from cvt_hpc.models.elastic_belt.belt import Mesh
-from cvt_hpc.models.elastic_belt.sampling import LARGEST_ELEMENT_STRAIN, LARGEST_STRAIN, Outcome
+from cvt_hpc.models.elastic_belt.sampling import LARGEST_STRAIN, Outcome
 from cvt_hpc.variables import Status
 from cvt_hpc.variator import LARGEST_DISPLACEMENT
 from cvt_hpc.variator.slip import GAINED, LOST
@@ -31,7 +31,7 @@ FAILURES = {
     ),
     Outcome.OVERSTRAINED: (
         Status.FAILED_NUMERICS,
-        f"strain is beyond {LARGEST_STRAIN:.0%} in the rings or {LARGEST_ELEMENT_STRAIN:.0%} in the elements",
+        f"strain is beyond {LARGEST_STRAIN:.0%}, or elements gape by that share of the belt's length",
     ),
     # results, and no faults: the torque is more than friction carries, and nothing new would come of the rest
     Outcome.SLIPPED_THROUGH: (Status.DONE, LOST),
