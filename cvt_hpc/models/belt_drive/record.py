@@ -97,8 +97,9 @@ VARIABLES = (
         "speed_loss",
         comment="1 - ratio x driven speed / driving speed, mean of whole belt turns or ripples of the speed; "
         "none where the judged part is shorter than a turn",
-        of=lambda m: m.run.speed_loss(m.whole_turns) if m.turns else np.nan,
+        of=lambda m: m.run.speed_loss(m.whole_turns) if m.turns else None,
         early=False,
+        may_miss=True,
     ),
     Variable(
         "expected_speed_loss",
