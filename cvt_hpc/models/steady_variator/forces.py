@@ -78,7 +78,7 @@ def profiles(steady: Steady, grid: Mesh) -> xr.Dataset:
     found = sampled(steady.belt, steady.state).profiles()
     sample = {name: values[:, 0] for name, values in found.items()}
     sliding = along.along_belt(sample, grid, {"half_wedge_angle": steady.belt.half_wedge_angle})
-    values, words = along.elsewhere(sample) | sliding, along.ELSEWHERE | along.SLIDING
+    values, words = along.elsewhere(sample, grid) | sliding, along.ELSEWHERE | along.SLIDING
     named = {name: (values[name], *words[name]) for name in words}
     named["wrap_angle"] = along.wrap_angles(grid), *along.WRAP_ANGLE
     return along_path(named, grid.position, np.array(REGIONS)[grid.region])
