@@ -70,7 +70,7 @@ def solve(parameters: Mapping[str, Any]) -> Solution:
     """Steady state and its modes for the parameters of a run [SI]."""
     from cvt_hpc.models.elastic_belt.belt import mesh
     from cvt_hpc.models.linear_stability.modes import modes
-    from cvt_hpc.models.steady_variator.forces import quantities
+    from cvt_hpc.models.steady_variator.record import quantities
     from cvt_hpc.models.steady_variator.walking import NoSteadyState, SteadyBelt
 
     p, grid = parameters, mesh(parameters)

@@ -5,7 +5,7 @@ Powers and the contact's means are those that a transient of the belt records in
 
 from __future__ import annotations
 
-from typing import TYPE_CHECKING, Any, NamedTuple
+from typing import TYPE_CHECKING, NamedTuple
 
 import numpy as np
 
@@ -15,9 +15,7 @@ from cvt_hpc.models.elastic_belt.belt import REGIONS, Mesh
 from cvt_hpc.models.elastic_belt.column import pressed_strains
 from cvt_hpc.models.elastic_belt.rhs import contact_forces, fresh_contacts, strains
 from cvt_hpc.models.elastic_belt.state_march import sampled
-from cvt_hpc.models.steady_variator.record import VARIABLES
 from cvt_hpc.models.steady_variator.walking import Steady
-from cvt_hpc.variables import values
 from cvt_hpc.variator.history import along_path
 from cvt_hpc.variator.slip import against_slip, largest_torque
 from cvt_hpc.variator.variables import Means
@@ -116,8 +114,3 @@ class SteadyMeans(Means):
         names = "driving_power", "load_power", "ring_loss", "belt_loss", "seating_loss"
         loss = layers + sum(self.mean(name) for name in LOSSES)
         self.powers = {name: self.mean(name) for name in names} | {"layer_loss": layers, "loss": loss}
-
-
-def quantities(steady: Steady, grid: Mesh) -> dict[str, Any]:
-    """Values of `record.VARIABLES`, which are named as in the elastic belt's record."""
-    return values(VARIABLES, SteadyMeans(steady, grid))

@@ -8,7 +8,7 @@ from typing import TYPE_CHECKING, Any, NamedTuple
 
 import numpy as np
 
-from cvt_hpc.variables import Coordinate, Status, Variable, Vibrates, together
+from cvt_hpc.variables import Coordinate, Status, Variable, Vibrates, together, values
 from cvt_hpc.variator import GROSS_SLIP
 from cvt_hpc.variator.slip import AGAINST_SLIP
 from cvt_hpc.variator.variables import COORDINATES, each_pulley, shared
@@ -52,10 +52,16 @@ class Found(NamedTuple):
     values: dict[str, Any]
 
 
+def quantities(steady: Steady, grid: Mesh) -> dict[str, Any]:
+    """Values of VARIABLES of a steady state."""
+    from cvt_hpc.models.steady_variator.forces import SteadyMeans
+
+    return values(VARIABLES, SteadyMeans(steady, grid))
+
+
 def solve(parameters: Mapping[str, Any]) -> Found | ValueError:
     """Steady state of the parameters of a run [SI] with its results; or the reason why none was found."""
     from cvt_hpc.models.elastic_belt.belt import mesh
-    from cvt_hpc.models.steady_variator.forces import quantities
     from cvt_hpc.models.steady_variator.walking import NoSteadyState, SteadyBelt
 
     try:
