@@ -18,6 +18,9 @@ from cvt_hpc.variator.variables import Measured
 from cvt_hpc.vibration import assessment, ramp
 from cvt_hpc.vibration.ramped import ramped
 
+VIBRATION = tuple(
+    replace(v, early=True, may_miss=v in ramp.VARIABLES) for v in (*assessment.VARIABLES, *ramp.VARIABLES)
+)
 RAMPED_CHANNELS = {"load": "load", "speed": "driving_speed"}  # by the ramped quantity
 
 

@@ -122,9 +122,6 @@ def means(
 
 
 each_pulley, each_strand = partial(means, "pulley", PULLEYS), partial(means, "strand", STRANDS)
-VIBRATION = tuple(
-    replace(v, early=True, may_miss=v in ramp.VARIABLES) for v in (*assessment.VARIABLES, *ramp.VARIABLES)
-)
 _SHARED = (
     Variable(
         "spectrum",

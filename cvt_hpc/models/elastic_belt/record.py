@@ -16,15 +16,7 @@ from cvt_hpc.variables import Coordinate, Variable, together
 from cvt_hpc.variator import PULLEYS, judging
 from cvt_hpc.variator.band import band
 from cvt_hpc.variator.slip import AGAINST_SLIP
-from cvt_hpc.variator.variables import (
-    COORDINATES,
-    VIBRATION,
-    Measured,
-    each_pulley,
-    frequency_bins,
-    power,
-    shared,
-)
+from cvt_hpc.variator.variables import COORDINATES, Measured, each_pulley, frequency_bins, power, shared
 from cvt_hpc.vibration import peaks, ramp
 from cvt_hpc.vibration.signals import band_amplitude
 
@@ -83,7 +75,7 @@ def fluctuations(measured: Measured) -> tuple[Any, ...]:
 
 
 VARIABLES = (
-    *VIBRATION,
+    *judging.VIBRATION,
     *together(
         strongest_modes,
         Variable(

@@ -13,15 +13,7 @@ from cvt_hpc.variables import Coordinate, Variable
 from cvt_hpc.variator import PULLEYS, STRANDS, judging
 from cvt_hpc.variator.history import REGIONS, dataset, regions
 from cvt_hpc.variator.slip import AGAINST_SLIP
-from cvt_hpc.variator.variables import (
-    COORDINATES,
-    VIBRATION,
-    Measured,
-    each_pulley,
-    frequency_bins,
-    power,
-    shared,
-)
+from cvt_hpc.variator.variables import COORDINATES, Measured, each_pulley, frequency_bins, power, shared
 from cvt_hpc.vibration import ramp
 
 if TYPE_CHECKING:
@@ -54,7 +46,7 @@ def idle_arcs(measured: Measured) -> np.ndarray:
 
 
 VARIABLES = (
-    *VIBRATION,
+    *judging.VIBRATION,
     *shared("spectrum", "mean_ring_tension", "mean_push_force", "axial_force", "slip"),
     *AGAINST_SLIP,
     *shared("flank_loss", "thrust_ratio", "speed_loss"),

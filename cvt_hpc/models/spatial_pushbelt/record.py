@@ -15,7 +15,7 @@ from cvt_hpc.physics.out_of_plane import clamped_force
 from cvt_hpc.variables import Coordinate, Variable, together
 from cvt_hpc.variator import PULLEYS, STRANDS, judging
 from cvt_hpc.variator.history import REGIONS, regions
-from cvt_hpc.variator.variables import VIBRATION, Measured, each_strand, means
+from cvt_hpc.variator.variables import Measured, each_strand, means
 
 if TYPE_CHECKING:
     import xarray as xr
@@ -75,7 +75,7 @@ def largest(name: str, units: str, what: str) -> Variable:
 
 
 each_sheave = partial(means, "sheave", readings.SHEAVES)
-_OF_STRANDS = tuple(v for v in VIBRATION if v.dims[:1] == ("strand",))
+_OF_STRANDS = tuple(v for v in judging.VIBRATION if v.dims[:1] == ("strand",))
 VARIABLES = (
     *(of_strands(v, IN_PLANE) if v in _OF_STRANDS or v.name == "spectrum" else v for v in pushbelt.VARIABLES),
     *(
