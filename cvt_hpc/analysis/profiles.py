@@ -171,8 +171,8 @@ def inside(dataset: xr.Dataset, region: str) -> np.ndarray:
 def in_groove(dataset: xr.Dataset, region: str) -> np.ndarray:
     """Stations (n,) by the wrap angle: those of a pulley's arc, and those where contact may run on."""
     angle, here = dataset["wrap_angle"].values, inside(dataset, region)
-    beyond = (angle < 0.0) | (angle > angle[here].max(initial=0.0))
-    while (more := beyond & (np.roll(here, 1) | np.roll(here, -1)) & ~here).any():
+    before, behind = angle < 0.0, angle > angle[here].max(initial=0.0)
+    while (more := (before & np.roll(here, -1) | behind & np.roll(here, 1)) & ~here).any():
         here = here | more
     return np.flatnonzero(here)[np.argsort(angle[here])]
 
@@ -346,7 +346,7 @@ def wrap_figure(histories: Sequence[xr.Dataset], sources: Sequence[str] = ()) ->
     ----------
     histories : sequence of Dataset
         As `simulate` returns them: `normal_force` and `friction_force` [N/m] and `tension` [N] over
-        `position`, with `wrap_angle` [rad], nan on strands, and `region`; `sliding_tension` [N] is drawn
+        `position`, with `wrap_angle` [rad], nan far from arcs, and `region`; `sliding_tension` [N] is drawn
         beside the tension. Of more than MOST_PANELS pulleys those without torque are left out.
     sources : sequence of str, optional
         Where they are from, for the errors, and for the legend where the runs' points are alike.

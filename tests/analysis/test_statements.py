@@ -11,7 +11,7 @@ import xarray as xr
 
 from cvt_hpc.analysis.followed_drawing import sliding_spectrum
 from cvt_hpc.analysis.statements.bullinger_ratios import _thirds
-from cvt_hpc.analysis.statements.figures import FIGURES
+from cvt_hpc.analysis.statements.figures import ARROWS, FIGURES, _Arc
 from cvt_hpc.analysis.statements.verdicts import Measured, Statement, Verdict, judged, on_strand, over_arc
 from cvt_hpc.errors import InputError
 
@@ -80,6 +80,8 @@ def test_means_along_the_belt_are_over_its_length_whatever_its_cells():
     assert arc.values == pytest.approx(arc.share, abs=1e-12)
     # 61 places hold 20 in a third
     assert _thirds(arc.values) == pytest.approx((1.0 / 6.0, 5.0 / 6.0), abs=0.01)
+    drawn = _Arc(history, "driven")
+    assert np.diff(drawn.wrap[drawn.arrows]) == pytest.approx(3.0 / (ARROWS - 1), rel=0.5)
     assert np.diff(on_strand(history, "rise", "t1")) == pytest.approx(1.0 / 60.0, rel=0.05)
 
 
