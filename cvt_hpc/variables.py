@@ -1,16 +1,18 @@
-"""The class with which a run's record is declared: one `Variable` per quantity, once for all packages."""
+"""The class with which a run's record is declared: one `Variable` per quantity, once for all packages.
+
+A variable carries the function that gives its value of a measured run, and `values` makes the record.
+"""
 
 import re
-from collections.abc import Mapping
-from dataclasses import dataclass
+from collections.abc import Callable, Iterable, Mapping
+from dataclasses import dataclass, field, replace
 from enum import IntEnum
+from itertools import groupby
+from operator import attrgetter
 from textwrap import shorten
-from typing import TYPE_CHECKING, Any, NamedTuple
+from typing import Any, NamedTuple
 
 import numpy as np
-
-if TYPE_CHECKING:
-    pass
 
 
 class Status(IntEnum):
@@ -79,6 +81,13 @@ class Variable:
         Depends on the machine and the hour (timings): exempt from bitwise reproducibility.
     words : str
         A few words for an axis label, where `name` is not enough.
+    of : callable
+        Gives the value of what the model measures, a run or a state; None: not known of it. By default its
+        attribute of the variable's name.
+    early : bool
+        Is known of a run, too, that slips through before its end.
+    may_miss : bool
+        May be blank, as of a ramp, in the record of a run that has reached its end.
     """
 
     name: str
@@ -89,6 +98,13 @@ class Variable:
     flags: type[IntEnum] | None = None
     volatile: bool = False
     words: str = ""
+    of: Callable[[Any], Any] = field(default=None, compare=False, repr=False)  # type: ignore[assignment]
+    early: bool = field(default=False, compare=False)
+    may_miss: bool = field(default=False, compare=False)
+
+    def __post_init__(self) -> None:
+        if self.of is None:
+            object.__setattr__(self, "of", attrgetter(self.name))
 
     @property
     def long_name(self) -> str:
@@ -110,6 +126,21 @@ class Variable:
             return int(self.flags.__members__.get("UNDECIDED", 0))
         blanks: dict[str, float | str] = {"f": np.nan, "S": ""}
         return blanks.get(np.dtype(self.dtype).kind, 0)
+
+
+def together(of: Callable[[Any], Any], *variables: Variable, **changes: Any) -> tuple[Variable, ...]:
+    """Return variables whose values, in their order, one function gives."""
+    return tuple(replace(variable, of=of, **changes) for variable in variables)
+
+
+def values(variables: Iterable[Variable], measured: Any) -> dict[str, Any]:
+    """Return values by name of what a model measures, as far as they are known."""
+    found: dict[str, Any] = {}
+    for of, group in groupby(variables, lambda variable: variable.of):
+        names = [variable.name for variable in group]
+        if (value := of(measured)) is not None:
+            found |= zip(names, value if len(names) > 1 else [value], strict=True)
+    return found
 
 
 def flag_in_words(flag: int, attributes: Mapping[str, Any]) -> str:

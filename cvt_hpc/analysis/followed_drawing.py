@@ -123,7 +123,7 @@ def swinging_figure(history: xr.Dataset, marks: Mapping[str, Sequence[float]]) -
 
 
 def sliding_spectrum(history: xr.Dataset) -> tuple[np.ndarray, np.ndarray]:
-    """Lines [Hz] and amplitude [m/s] of the sliding speed's swings, rms over the stations of the driven arc.
+    """Lines [Hz] and amplitude [m/s] of the sliding speed's swings, rms over the length of the driven arc.
 
     By a Hann window over all of the profiles' time: lines that are 2 over that time apart are told apart.
     """
@@ -133,7 +133,8 @@ def sliding_spectrum(history: xr.Dataset) -> tuple[np.ndarray, np.ndarray]:
     window = np.hanning(len(motion))
     lines = np.fft.rfft(motion * window[:, None], 8 * len(motion), axis=0)
     interval = float(np.diff(history["profile_time"].values).mean())
-    amplitude = 2.0 * np.sqrt((np.abs(lines) ** 2).mean(axis=1)) / window.sum()
+    lengths = np.gradient(history["position"].values[inner])
+    amplitude = 2.0 * np.sqrt(np.average(np.abs(lines) ** 2, axis=1, weights=lengths)) / window.sum()
     return np.fft.rfftfreq(8 * len(motion), interval), amplitude
 
 

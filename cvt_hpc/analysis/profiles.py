@@ -168,6 +168,15 @@ def inside(dataset: xr.Dataset, region: str) -> np.ndarray:
     return (here | np.roll(here, 1)) & np.isfinite(angle)
 
 
+def in_groove(dataset: xr.Dataset, region: str) -> np.ndarray:
+    """Stations (n,) by the wrap angle: those of a pulley's arc, and those where contact may run on."""
+    angle, here = dataset["wrap_angle"].values, inside(dataset, region)
+    before, behind = angle < 0.0, angle > angle[here].max(initial=0.0)
+    while (more := (before & np.roll(here, -1) | behind & np.roll(here, 1)) & ~here).any():
+        here = here | more
+    return np.flatnonzero(here)[np.argsort(angle[here])]
+
+
 def shown_unit(array: xr.DataArray) -> tuple[float, str]:
     """Factor and unit in which a quantity along the belt is shown."""
     return _UNITS.get(str(array.attrs.get("units", ""))) or figures.value_unit(array)
@@ -180,7 +189,7 @@ def _draw(
     if region is None:
         axes.plot(1e3 * dataset["position"].values, values, **style)  # type: ignore[arg-type]  # of a line
     else:
-        here = inside(dataset, region)
+        here = in_groove(dataset, region)
         axes.plot(np.degrees(dataset["wrap_angle"].values[here]), values[here], **style)  # type: ignore[arg-type]
 
 
@@ -337,7 +346,7 @@ def wrap_figure(histories: Sequence[xr.Dataset], sources: Sequence[str] = ()) ->
     ----------
     histories : sequence of Dataset
         As `simulate` returns them: `normal_force` and `friction_force` [N/m] and `tension` [N] over
-        `position`, with `wrap_angle` [rad], nan on strands, and `region`; `sliding_tension` [N] is drawn
+        `position`, with `wrap_angle` [rad], nan far from arcs, and `region`; `sliding_tension` [N] is drawn
         beside the tension. Of more than MOST_PANELS pulleys those without torque are left out.
     sources : sequence of str, optional
         Where they are from, for the errors, and for the legend where the runs' points are alike.
@@ -405,7 +414,7 @@ def _regions(dataset: xr.Dataset) -> np.ndarray:
 
 def _draw_force(axes: Axes, dataset: xr.Dataset, pulley: str, name: str, factor: float, **style: Any) -> None:
     """A quantity over the wrap of a pulley."""
-    here = inside(dataset, pulley.removesuffix(" arc"))
+    here = in_groove(dataset, pulley.removesuffix(" arc"))
     angle = np.degrees(dataset["wrap_angle"].values[here])
     marker = "." if angle.size < FEW else ""
     axes.plot(angle, factor * dataset[name].values[here], marker=marker, ms=5, **style)

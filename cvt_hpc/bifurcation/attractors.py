@@ -22,7 +22,7 @@ from cvt_hpc.models.elastic_belt import fields as f
 from cvt_hpc.models.elastic_belt.belt import Mesh, State
 from cvt_hpc.models.linear_stability.branch import Branch, Onset, tracks
 from cvt_hpc.models.linear_stability.modes import Mode
-from cvt_hpc.models.steady_variator.forces import quantities
+from cvt_hpc.models.steady_variator.record import quantities
 from cvt_hpc.simulation.marching import march
 from cvt_hpc.simulation.record import in_lanes, record_of, recorded_model
 from cvt_hpc.vibration.classes import OccurrenceClass, classify_runs

@@ -136,6 +136,11 @@ class SampledRun:
         return work["unsolved"] / max(work["steps"], 1)
 
     @property
+    def iterations(self) -> float:
+        """Iterations of a step, mean."""
+        return self.contact_solves / max(self.steps, 1)
+
+    @property
     def displacement(self) -> np.ndarray:
         """Displacement at the probes, outwards, (done, probe) [m]."""
         return self._rows[: self.done, : len(self.probes)]

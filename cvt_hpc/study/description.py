@@ -348,7 +348,8 @@ def _variable_to_json(variable: Variable) -> dict[str, Any]:
     flags = variable.flags
     meanings = flags and {"name": flags.__name__, "members": {m.name: int(m) for m in flags}}
     entry = {**asdict(variable), "dims": list(variable.dims), "flags": meanings}
-    del entry["words"]
+    for name in ("words", "of", "early", "may_miss"):
+        del entry[name]
     return {**entry, "long_name": variable.long_name}
 
 

@@ -10,15 +10,17 @@ from typing import Any
 
 import numpy as np
 
-from cvt_hpc.variables import Vibrates, shortened
+from cvt_hpc.variables import Variable, Vibrates, shortened, values
 from cvt_hpc.variator import PULLEYS, STRANDS
 from cvt_hpc.variator.band import band
-from cvt_hpc.variator.slip import slid, speed_loss, with_slip
-from cvt_hpc.variator.variables import frequency_bins
+from cvt_hpc.variator.slip import slide, with_slip
+from cvt_hpc.variator.variables import Measured
 from cvt_hpc.vibration import assessment, ramp
 from cvt_hpc.vibration.ramped import ramped
-from cvt_hpc.vibration.signals import amplitude_spectrum
 
+VIBRATION = tuple(
+    replace(v, early=True, may_miss=v in ramp.VARIABLES) for v in (*assessment.VARIABLES, *ramp.VARIABLES)
+)
 RAMPED_CHANNELS = {"load": "load", "speed": "driving_speed"}  # by the ramped quantity
 
 
@@ -67,88 +69,27 @@ def slipped_through(run: Any) -> dict[str, Any]:
     return {"status": status, "vibrates": Vibrates.SLIPS, "reason": f"at {run.time * 1e3:.4g} ms: {why}"}
 
 
-def slipped(run: Any, names: Sequence[str] = STRANDS) -> dict[str, Any]:
-    """The record of a run that has slipped through before its end: what is known until then.
-
-    `names` are those of its strands, as of `assess`.
-    """
-    found = slipped_through(run)
-    before = _assess_ramp(run, names) if ramped(run.parameters) else None
-    if before is not None:
-        reason = shortened(f"{found['reason']}; before: {before.reason}")
-        found = before.record() | found | {"reason": reason}
-    return found | slid(run)
-
-
-def mean(run: Any, name: str) -> float:
-    """Mean of a channel over the judged part."""
-    return float(run.channel(name)[run.judged].mean())
-
-
-def each(run: Any, name: str, labels: Sequence[str] = PULLEYS) -> np.ndarray:
-    """Means of a channel of each pulley, or strand."""
-    return np.array([mean(run, f"{name} {label}") for label in labels])
-
-
-def motion(run: Any, strongest_probe: np.ndarray, pulleys: Sequence[str] = PULLEYS) -> dict[str, Any]:
-    """Values of a finished run of any belt on pulleys of these names; arguments as of `evaluate`."""
-    p, judged = run.parameters, run.judged
-    moved = run.displacement[judged][:, strongest_probe]
-    return {
-        "spectrum": amplitude_spectrum(moved, p["sampling_rate"], frequency_bins(p).values).T,
-        "slip": each(run, "slip", pulleys),
-        "speed_loss": speed_loss(run, judged),
-        "driven_speed_ripple": run.channel("driven_speed")[judged].std(),
-    }
-
-
-def evaluate(run: Any, strongest_probe: np.ndarray) -> dict[str, Any]:
-    """Values of a finished run that all models of a variator have.
+def judge(run: Any, variables: Sequence[Variable], names: Sequence[str] = STRANDS) -> dict[str, Any]:
+    """The record of a run that has reached its end, or slipped through before, its cost apart.
 
     Parameters
     ----------
     run : object
-        With all samples recorded.
-    strongest_probe : (2,) int array
-        Column of the displacement that vibrates most, for each strand.
+        With all samples recorded, or those until it slipped through.
+    variables : sequence of Variable
+        Of the model.
+    names : sequence of str
+        Of its strands, as of `assess`.
     """
-    axial = each(run, "axial_force")
-    return {
-        **motion(run, strongest_probe),
-        "mean_ring_tension": each(run, "ring_tension", STRANDS),
-        "mean_push_force": each(run, "push_force", STRANDS),
-        "axial_force": axial,
-        "flank_loss": np.array([mean(run, f"{pulley}_flank_loss") for pulley in PULLEYS]),
-        "thrust_ratio": axial[0] / axial[1],
-    }
+    if run.failure is None:
+        return finished(run, variables, assess(run, names))
+    record = slipped_through(run)
+    before = _assess_ramp(run, names) if ramped(run.parameters) else None
+    if before is not None:
+        record["reason"] = shortened(f"{record['reason']}; before: {before.reason}")
+    return record | values((v for v in variables if v.early), Measured(run, slide(run), before))
 
 
-def power_balance(
-    driving: float, load: float, loss: float, storing: float, thrust: float = 0.0, damped: float = 0.0
-) -> dict[str, float]:
-    """Powers of a run as its record names them [W], but that of a thrust, and the open balance.
-
-    `damped` is the numerical damping of the time step.
-    """
-    open_power = driving - load - thrust - loss - storing - damped
-    return {
-        "driving_power": driving,
-        "load_power": load,
-        "storing_power": storing,
-        "loss": loss,
-        "power_residual": open_power / max(abs(driving), loss),
-    }
-
-
-def efficiency(driving: float, load: float, loss: float) -> float:
-    """Share of the power put in that is not lost [1]: 0 without load; not a number where nothing is put in.
-
-    Parameters
-    ----------
-    driving, load : float
-        Power of the driving pulley, and power of the load [W]; negative where power flows backwards.
-    loss : float
-        [W]
-    """
-    put_in = max(driving, 0.0) + max(-load, 0.0)
-    return 1.0 - loss / put_in if put_in > 0.0 else np.nan
+def finished(run: Any, variables: Sequence[Variable], found: assessment.Occurrence) -> dict[str, Any]:
+    """The record of a run that has reached its end, and of which the verdict is found."""
+    return found.verdict() | values(variables, Measured(run, run.judged, found))

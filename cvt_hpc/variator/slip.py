@@ -30,22 +30,13 @@ from cvt_hpc.physics.capacity import torque_limit
 from cvt_hpc.physics.friction import FrictionLaw, friction_coefficients, given_law
 from cvt_hpc.physics.friction_laws import TABLE_PARAMETERS
 from cvt_hpc.physics.geometry import Variator
-from cvt_hpc.variables import Variable, Vibrates, shortened
+from cvt_hpc.variables import Variable, Vibrates, shortened, together
 from cvt_hpc.variator import GROSS_SLIP, LEAST_SPEED, MOST_SPEED, PULLEYS
+from cvt_hpc.variator.variables import Measured
 from cvt_hpc.vibration.assessment import Occurrence
 
 LOST = f"the belt slips through: the driven pulley has lost {1 - LEAST_SPEED:.0%} of its speed"
 GAINED = f"the belt slips through: the driven pulley has gained {MOST_SPEED - 1:.0%} of its speed"
-
-VARIABLES = (
-    Variable(
-        "carried_torque",
-        "N m",
-        "at the driving pulley, torque that friction carries at nominal radii under these axial forces",
-    ),
-    Variable("torque_ratio", "1", "load over carried_torque, with the load's sign"),
-    Variable("slip_margin", "1", "size of torque_ratio, less 1; slips from about 0"),
-)
 
 
 def largest_torque(
@@ -72,8 +63,8 @@ def largest_torque(
     return float(torque_limit(mu, axial_force, path.driving_radius, half_wedge_angle).min())
 
 
-def against_slip(load: float, carried: float) -> dict[str, float]:
-    """Values of VARIABLES.
+def against_slip(load: float, carried: float) -> tuple[float, float, float]:
+    """Values of AGAINST_SLIP.
 
     Without any friction ratio and margin are infinite, or without load either not numbers.
 
@@ -84,24 +75,36 @@ def against_slip(load: float, carried: float) -> dict[str, float]:
     """
     with np.errstate(divide="ignore", invalid="ignore"):
         ratio = float(np.divide(load, carried))
-    return {"carried_torque": carried, "torque_ratio": ratio, "slip_margin": abs(ratio) - 1.0}
+    return carried, ratio, abs(ratio) - 1.0
 
 
-def capacity(run: Any, samples: slice) -> dict[str, float]:
-    """Values of VARIABLES by the means of some samples."""
-    p, path = run.parameters, run.path
-    axial = np.array([run.channel(f"axial_force {pulley}")[samples].mean() for pulley in PULLEYS])
+def capacity(measured: Measured) -> tuple[float, float, float]:
+    """Values of AGAINST_SLIP of a part of a run."""
+    p, path = measured.parameters, measured.path
     # a run may slip through before a constant load has risen to its value
     is_constant = p["load_history"] == "constant" and not p.get("load_profile")
-    load = p["load"] if is_constant else run.channel("load")[samples].mean()
+    load = p["load"] if is_constant else measured.mean("load")
     carried = largest_torque(
         given_law(dict.fromkeys(TABLE_PARAMETERS, ()) | p),  # not every model has tables
         p["half_wedge_angle"],
         path,
-        run.mean_driving_speed(samples) * path.driving_radius,
-        axial,
+        measured.mean_driving_speed(measured.samples) * path.driving_radius,
+        measured.each("axial_force {}"),
     )
     return against_slip(load, carried)
+
+
+AGAINST_SLIP = together(
+    capacity,
+    Variable(
+        "carried_torque",
+        "N m",
+        "at the driving pulley, torque that friction carries at nominal radii under these axial forces",
+    ),
+    Variable("torque_ratio", "1", "load over carried_torque, with the load's sign"),
+    Variable("slip_margin", "1", "size of torque_ratio, less 1; slips from about 0"),
+    early=True,
+)
 
 
 def with_slip(run: Any, found: Occurrence, pulleys: Sequence[str] = PULLEYS) -> Occurrence:
@@ -126,26 +129,3 @@ def slide(run: Any) -> slice:
     gripping = np.flatnonzero(slips <= GROSS_SLIP)
     first = gripping[-1] + 1 if gripping.size else 0
     return slice(min(int(first), max(run.done - 1, 0)), run.done)
-
-
-def speed_loss(run: Any, samples: slice) -> float:
-    """Loss of driven speed by sliding and creep in some samples, over the speed without slip [1]."""
-    driven_speed = run.channel("driven_speed")[samples].mean()
-    return 1.0 - run.parameters["ratio"] * driven_speed / run.mean_driving_speed(samples)
-
-
-def slid(run: Any) -> dict[str, Any]:
-    """Known values of a run that has slipped through before its end: means over its slide."""
-    samples = slide(run)
-
-    def pair(name: str) -> np.ndarray:
-        return np.array([run.channel(f"{name} {pulley}")[samples].mean() for pulley in PULLEYS])
-
-    axial = pair("axial_force")
-    return {
-        "slip": pair("slip"),
-        "axial_force": axial,
-        "thrust_ratio": axial[0] / axial[1],
-        "speed_loss": speed_loss(run, samples),
-        **capacity(run, samples),
-    }

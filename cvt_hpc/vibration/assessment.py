@@ -37,7 +37,7 @@ from typing import Any
 import numpy as np
 from numpy.typing import ArrayLike, NDArray
 
-from cvt_hpc.variables import Status, Variable, Vibrates, shortened
+from cvt_hpc.variables import Status, Variable, Vibrates, shortened, values
 from cvt_hpc.vibration import signals
 from cvt_hpc.vibration.peaks import fundamental
 from cvt_hpc.vibration.settings import band as given_band
@@ -344,9 +344,12 @@ class Occurrence:
     margin: float
 
     def record(self) -> dict[str, Any]:
-        """Return the entries of a record: that the run is done, the verdict, and VARIABLES."""
-        verdict = {"status": Status.DONE, "vibrates": self.vibrates, "reason": self.reason}
-        return verdict | {variable.name: getattr(self, variable.name) for variable in VARIABLES}
+        """Return the entries of a record: the verdict, and VARIABLES."""
+        return self.verdict() | values(VARIABLES, self)
+
+    def verdict(self) -> dict[str, Any]:
+        """Return the first entries of a record: that the run is done, and the verdict."""
+        return {"status": Status.DONE, "vibrates": self.vibrates, "reason": self.reason}
 
 
 def assess(

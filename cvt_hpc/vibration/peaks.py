@@ -57,12 +57,10 @@ class Peaks(NamedTuple):
     amplitude: Array
     mode: np.ndarray
 
-    def record(self) -> dict[str, Array]:
-        """Values of VARIABLES."""
-        ratio = self.frequency[1] / self.frequency[0, 0]
-        return {f"peak_{name}": values for name, values in self._asdict().items()} | {
-            "frequency_ratio": ratio
-        }
+    @property
+    def frequency_ratio(self) -> Array:
+        """Frequency of each peak of t2 over that of the first of t1, (COUNT,)."""
+        return self.frequency[1] / self.frequency[0, 0]
 
 
 def coordinate() -> Coordinate:

@@ -14,7 +14,7 @@ from typing import Any
 import numpy as np
 from numpy.typing import ArrayLike, NDArray
 
-from cvt_hpc.variables import Coordinate, Variable, Vibrates, shortened
+from cvt_hpc.variables import Coordinate, Variable, Vibrates, shortened, together, values
 from cvt_hpc.vibration import signals
 from cvt_hpc.vibration.assessment import LEAST_RISES, Occurrence
 from cvt_hpc.vibration.peaks import fundamental
@@ -31,7 +31,8 @@ BINS = 20  # parts of a ramp whose amplitudes are recorded
 
 def _variables(name: str, quantity: Quantity) -> tuple[Variable, ...]:
     units, what = quantity.cf_units, quantity.long_name
-    return (
+    return together(
+        lambda found: (found.onset, found.end, found.ramp_mean) if found.quantity == name else None,
         Variable(
             f"onset_{name}",
             units,
@@ -70,7 +71,7 @@ class RampOccurrence(Occurrence):
     onset, end : float
         Its values between which the run vibrates; nan where it does not, and where vibration is there from
         the ramp's start, or lasts to its end.
-    mean : array, shape (BINS,)
+    ramp_mean : array, shape (BINS,)
         Its mean in equal parts of the ramp; nan where no window lies.
     ramp_amplitude : array, shape (strand, BINS)
         Mean amplitude in them [m].
@@ -79,14 +80,12 @@ class RampOccurrence(Occurrence):
     quantity: str
     onset: float
     end: float
-    mean: Array
+    ramp_mean: Array
     ramp_amplitude: Array
 
     def record(self) -> dict[str, Any]:
         """Return the entries of a record: as of `Occurrence`, and VARIABLES of its quantity."""
-        name = self.quantity
-        along = {f"onset_{name}": self.onset, f"end_{name}": self.end, f"ramp_{name}": self.mean}
-        return super().record() | along | {"ramp_amplitude": self.ramp_amplitude}
+        return super().record() | values(VARIABLES, self)
 
 
 def assess_ramp(

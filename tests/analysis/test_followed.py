@@ -74,5 +74,5 @@ def test_each_peak_has_its_mode():
     assert found.mode.tolist() == [[2, 3, 0], [3, 1, 0]]
     assert found.frequency[:, :2] == pytest.approx(np.array([[494.3, 988.6], [1010.0, 494.3]]), abs=0.05)
     assert found.amplitude[:, :2] == pytest.approx(np.array([[3e-6, 1e-6], [5e-6, 2e-6]]), rel=0.01)
-    assert found.record()["frequency_ratio"][:2] == pytest.approx([1010.0 / 494.3, 1.0], rel=1e-4)
+    assert found.frequency_ratio[:2] == pytest.approx([1010.0 / 494.3, 1.0], rel=1e-4)
     assert np.isnan(found.frequency[:, 2]).all()

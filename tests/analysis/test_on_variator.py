@@ -14,7 +14,7 @@ from cvt_hpc.models.belt_drive.layout import layout
 from cvt_hpc.netcdf import write_history
 from cvt_hpc.physics.belt_path import points_at
 from cvt_hpc.physics.geometry import variator
-from cvt_hpc.variator.judging import power_balance
+from cvt_hpc.variator.variables import Means
 
 POINT = {"ratio": 1.0, "driven_radius": 0.05, "centre_distance": 0.155}
 PATH = variator(**POINT)
@@ -152,14 +152,18 @@ def test_energy_has_losses_of_arc_parts_and_feeds_of_regions():
 
 def balanced_history():
     """With the record of a run that puts in 40 kW, whose balance is open by 20 W."""
-    record = power_balance(driving=40e3, load=37e3, loss=2.9e3, storing=50.0, thrust=20.0, damped=10.0)
+    found = Means()
+    found.powers = {"driving_power": 40e3, "load_power": 37e3, "loss": 2.9e3, "storing_power": 50.0}
+    found.powers |= {"thrust_power": 20.0, "numerical_damping": np.array([4.0, 6.0])}
     watts = {"units": "W"}
     run = history().assign_coords(pulley=["driving", "driven"])
-    run = run.assign({name: ((), value, watts) for name, value in record.items()})
+    run = run.assign(
+        {name: ((), value, watts) for name, value in found.powers.items() if np.ndim(value) == 0}
+    )
+    run["power_residual"] = ((), found.power_residual, watts)
     run["flank_loss"] = ("pulley", [800.0, 1200.0], watts)
     run["ring_loss"] = ((), 700.0, watts)  # 200 W of the loss have no cause of their own
-    run["thrust_power"] = ((), 20.0, watts)
-    run["numerical_damping"] = ("spring", [4.0, 6.0], watts)
+    run["numerical_damping"] = ("spring", found.powers["numerical_damping"], watts)
     run["speed_loss"] = ((), 0.03, {"units": "1"})
     return run
 

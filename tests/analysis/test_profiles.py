@@ -52,6 +52,17 @@ def test_quantities_are_drawn_over_the_path_of_all_runs(runs):
     assert [text.get_text() for text in figure.legends[0].get_texts()] == ["load 8 N m", "load 16 N m"]
 
 
+def test_over_a_wrap_the_contact_beyond_its_ends_is_drawn(runs):
+    run = runs[0]
+    # a station on each side of both arcs lies in its groove; that before the driving inlet is the path's last
+    angle = run["wrap_angle"].values
+    angle[[25, 11, 12, 24]] = [-0.1, 3.2, -0.1, 3.2]
+    for pulley, first in (("driving", 25), ("driven", 12)):
+        shown, push = profile_figure([run], ("push_force",), pulley).axes[0].lines[0].get_data()
+        np.testing.assert_allclose(shown, np.degrees([-0.1, *np.linspace(0.0, 3.0, 11), 3.2]))
+        np.testing.assert_allclose(push, 1e-3 * np.roll(run["push_force"].values, -first)[:13])
+
+
 def test_over_a_wrap_its_own_stations_are_drawn_with_both_ends(runs):
     figure = profile_figure(runs[:1], ("push_force",), "driven")
     angle, push = figure.axes[0].lines[0].get_data()

@@ -5,10 +5,14 @@ import sys
 import tomllib
 from pathlib import Path
 
+import numpy as np
 import pytest
+import xarray as xr
 
-from cvt_hpc.analysis.statements.figures import FIGURES
-from cvt_hpc.analysis.statements.verdicts import Measured, Statement, Verdict, judged
+from cvt_hpc.analysis.followed_drawing import sliding_spectrum
+from cvt_hpc.analysis.statements.bullinger_ratios import _thirds
+from cvt_hpc.analysis.statements.figures import ARROWS, FIGURES, _Arc
+from cvt_hpc.analysis.statements.verdicts import Measured, Statement, Verdict, judged, on_strand, over_arc
 from cvt_hpc.errors import InputError
 
 ROOT = Path(__file__).parents[2]
@@ -49,3 +53,46 @@ def test_the_page_is_made_of_the_tables(tmp_path):
     subprocess.run([sys.executable, ROOT / "jobs/paper_coverage.py", tmp_path / "page.md"], check=True)
     page = ROOT / "docs/coverage.md"
     assert (tmp_path / "page.md").read_text() == page.read_text()
+
+
+def graded(count=60):
+    """A history of a belt whose cells are a fourth as long at the ends of arcs; `rise` is the share of its region."""
+    even = np.linspace(0.0, 1.0, count + 1)
+    share = even - 0.75 * np.sin(2.0 * np.pi * even) / (2.0 * np.pi)
+    position = np.concatenate([number + share[:-1] for number in range(4)])
+    angle = np.full(4 * count, np.nan)
+    for arc in (0, 2):
+        angle[arc * count : (arc + 1) * count + 1] = 3.0 * share
+    names = np.repeat(["driving arc", "t1", "driven arc", "t2"], count)
+    rise = np.where(np.isfinite(angle), angle / 3.0, position % 1.0)
+    return xr.Dataset(
+        {"wrap_angle": ("position", angle), "rise": ("position", rise)},
+        {"position": 0.2 * position, "region": ("position", names)},
+    )
+
+
+def test_means_along_the_belt_are_over_its_length_whatever_its_cells():
+    history = graded()
+    stations = history["rise"].values[:61]
+    assert np.mean(stations**2) > 1.1 / 3.0  # of which more lie at the ends
+    arc = over_arc(history, "rise", "driven")
+    assert (arc.values[0], arc.values[-1]) == (0.0, 1.0)
+    assert arc.values == pytest.approx(arc.share, abs=1e-12)
+    # 61 places hold 20 in a third
+    assert _thirds(arc.values) == pytest.approx((1.0 / 6.0, 5.0 / 6.0), abs=0.01)
+    drawn = _Arc(history, "driven")
+    assert np.diff(drawn.wrap[drawn.arrows]) == pytest.approx(3.0 / (ARROWS - 1), rel=0.5)
+    assert np.diff(on_strand(history, "rise", "t1")) == pytest.approx(1.0 / 60.0, rel=0.05)
+
+
+def test_swings_of_sliding_are_told_over_the_length_of_the_arc():
+    history, time = graded(), np.arange(2000) / 2e4
+    # 500 Hz at 0.1 m/s in the middle half of the driven arc alone
+    share = history["wrap_angle"].fillna(0.0).values / 3.0
+    moving = (share > 0.25) & (share < 0.75)
+    speed = 0.1 * np.sin(2.0 * np.pi * 500.0 * time)[:, None] * moving
+    history["momentary_sliding_speed"] = ("profile_time", "position"), speed
+    lines, amplitude = sliding_spectrum(history.assign_coords(profile_time=time))
+    assert lines[amplitude.argmax()] == pytest.approx(500.0, abs=2.0)
+    # five stations at each end, 2 % of the arc, are left out
+    assert amplitude.max() == pytest.approx(0.1 * np.sqrt(0.5), rel=0.05)

@@ -10,7 +10,7 @@ from cvt_hpc.models.elastic_belt import fields as f
 from cvt_hpc.models.elastic_belt.belt import belt_constants, mesh
 from cvt_hpc.models.elastic_belt.fluctuation import ARC_PARTS, fluctuation, part_shares
 from cvt_hpc.models.elastic_belt.one_system import unpack
-from cvt_hpc.models.elastic_belt.record import fluctuation_record
+from cvt_hpc.models.elastic_belt.record import judge
 from cvt_hpc.models.linear_stability.modes import modes
 from cvt_hpc.models.steady_variator.walking import SteadyBelt
 from cvt_hpc.physics.flank import flank_forces
@@ -75,13 +75,13 @@ def flow(found):
 @pytest.mark.parametrize(("step", "tolerance"), [(4.6e-6, 0.04), (1e-6, 0.015)])
 def test_what_is_fed_into_a_vibration_is_taken(step, tolerance):
     # 20 W. Backward Euler in the elements damps by EA dt/2, 90 N s at 4.6 us
-    found = fluctuation_record(finished(step=step))
+    found = judge(finished(step=step))
     assert flow(found) > 8.0
     assert abs(found["fluctuation_remainder"]) < tolerance * flow(found)
 
 
 def test_a_term_of_the_wrong_sign_would_show():
-    found = fluctuation_record(finished(step=1e-6))
+    found = judge(finished(step=1e-6))
     fed = [*found["flank_fed"].sum(axis=1), found["stress_fed"], *(-found[name] for name in TAKEN)]
     # a term below 3 % is within what may be left open
     large = [term for term in fed if abs(term) > 0.03 * flow(found)]
@@ -91,16 +91,14 @@ def test_a_term_of_the_wrong_sign_would_show():
 
 
 def test_the_outlet_of_the_driven_arc_feeds_and_the_driving_arc_takes():
-    found = fluctuation_record(finished())
+    found = judge(finished())
     assert found["flank_fed"][1].argmax() == ARC_PARTS - 1
     assert found["flank_fed"][1].sum() > 3.0 and found["flank_fed"][0].sum() < -3.0
 
 
 def test_a_quiet_belt_is_not_fed():
     # elements hum at the front of the push all the same: 0.03 W, and dampers there work in blows that samples miss
-    found = fluctuation_record(
-        finished(sheave_stiffness=np.inf, stiffness_of="sheave", load=100.0, **CONSTANT)
-    )
+    found = judge(finished(sheave_stiffness=np.inf, stiffness_of="sheave", load=100.0, **CONSTANT))
     for name in ("flank_fed", "stress_fed", *TAKEN, "fluctuation_remainder"):
         assert np.all(np.abs(found[name]) < 0.1), name
     assert np.all(np.abs(found["flank_fed"][1]) < 1e-3)
@@ -109,12 +107,12 @@ def test_a_quiet_belt_is_not_fed():
 def test_parts_add_up_to_what_friction_takes():
     run = finished()
     loss = [run.channel(f"{pulley}_flank_loss")[run.judged].mean() for pulley in ("driving", "driven")]
-    assert fluctuation_record(run)["part_flank_loss"].sum(axis=1) == pytest.approx(loss, rel=1e-12)
+    assert judge(run)["part_flank_loss"].sum(axis=1) == pytest.approx(loss, rel=1e-12)
 
 
 def test_denser_samples_see_the_same():
     # the same steps, of a quarter of the shorter interval: friction's fast part would show as a difference
-    coarse, dense = (fluctuation_record(finished(step=3.125e-6, sampling_rate=rate)) for rate in (20e3, 80e3))
+    coarse, dense = (judge(finished(step=3.125e-6, sampling_rate=rate)) for rate in (20e3, 80e3))
     # means of 1200 samples, of which some 30 periods of the vibration are not a whole number
     assert coarse["flank_fed"] == pytest.approx(dense["flank_fed"], abs=0.1)
     assert coarse["stress_fed"] == pytest.approx(dense["stress_fed"], abs=0.1)
@@ -142,7 +140,7 @@ def test_parts_are_equal_shares_of_each_wrap():
 
 
 def test_a_ramp_of_load_has_no_mean_state():
-    found = fluctuation_record(finished(load_history="ramp", load_start=60.0))
+    found = judge(finished(load_history="ramp", load_start=60.0))
     for name in ("flank_fed", "stress_fed", *TAKEN, "fluctuation_remainder"):
         assert np.all(np.isnan(found[name])), name
     assert np.all(found["part_flank_loss"] > 0.0)

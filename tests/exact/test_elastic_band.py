@@ -12,7 +12,8 @@ import pytest
 from cvt_hpc.models.elastic_belt import fields as f
 from cvt_hpc.models.elastic_belt.belt import mesh
 from cvt_hpc.models.elastic_belt.parameters import PARAMETERS
-from cvt_hpc.models.steady_variator.forces import distributions, quantities
+from cvt_hpc.models.steady_variator.forces import distributions
+from cvt_hpc.models.steady_variator.record import quantities
 from cvt_hpc.models.steady_variator.walking import SteadyBelt
 from support.elastic_band import elastic_band
 

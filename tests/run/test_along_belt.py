@@ -4,7 +4,7 @@ import numpy as np
 import pytest
 
 from cvt_hpc import simulate
-from cvt_hpc.models.elastic_belt.along_belt import NEEDED, along_belt, sliding_angle
+from cvt_hpc.models.elastic_belt.along_belt import NEEDED, along_belt, elsewhere, sliding_angle, wrap_angles
 from cvt_hpc.models.elastic_belt.belt import belt_constants, mesh
 from cvt_hpc.physics.flank import flank_forces
 from support.marched import CHEAP, job
@@ -45,6 +45,31 @@ def test_the_normal_force_is_the_flanks_own():
     assert found["friction_force"][inside] == pytest.approx(-2 * mu * expected * np.cos(angle), rel=1e-9)
     strand = slice(grid.starts[1] + 1, grid.starts[2])
     assert all(np.isnan(values[strand]).all() for values in found.values())
+
+
+def test_stresses_go_in_straight_lines_between_the_middles_of_cells():
+    grid = mesh(job(**LOADED).parameters)
+    behind = np.roll(grid.cell, 1)
+    assert np.ptp(grid.cell) > 0.1 * grid.cell.mean()  # cells are graded
+    # from the middle of each cell a rise of 3 N/m, but for the cell where the path closes
+    middles = np.cumsum(grid.cell) - 0.5 * grid.cell
+    found = elsewhere(dict.fromkeys(NEEDED, 3.0 * middles), grid)
+    stations = middles - 0.5 * grid.cell
+    for name in ("ring_tension", "push_force"):
+        assert found[name][1:] == pytest.approx(3.0 * stations[1:], rel=1e-12)
+    closing = (3.0 * middles[0] * behind[0] + 3.0 * middles[-1] * grid.cell[0]) / (grid.cell[0] + behind[0])
+    assert found["push_force"][0] == pytest.approx(closing, rel=1e-12)
+
+
+def test_wrap_angles_run_on_where_a_groove_may_hold_the_belt():
+    grid = mesh(job(**LOADED).parameters)
+    found, known = wrap_angles(grid), np.zeros(grid.cell.size, bool)
+    for region, radius in ((0, grid.path.driving_radius), (2, grid.path.driven_radius)):
+        first, count = grid.starts[region], grid.counts[region]
+        assert found[first : first + count + 1] == pytest.approx(grid.along(region) / radius, abs=1e-12)
+        assert found[first - 1] < 0.0 and found[first + count + 1] > found[first + count]
+        known[grid.zone(region).stations] = True
+    assert np.array_equal(np.isfinite(found), known) and not known.all()
 
 
 @pytest.mark.parametrize(

@@ -9,7 +9,8 @@ from cvt_hpc.models.beam_pushbelt.record import judge
 from cvt_hpc.models.beam_pushbelt.transient import Transient
 from cvt_hpc.models.pushbelt import fields as f
 from cvt_hpc.models.pushbelt import transient as pushbelt
-from cvt_hpc.variator import STRANDS, judging
+from cvt_hpc.variator import STRANDS
+from cvt_hpc.variator.variables import Measured
 
 # As few elements as fit on the arcs, clamped and loaded within a third of a revolution
 BELT = {
@@ -44,8 +45,9 @@ def test_forces_are_those_of_the_pushbelt():
         asked = job(model, **values, **without, longest_duration=0.04)
         run = kind(asked.point(0), asked.stepper)
         assert run.advance(run.samples) is None
-        pull, push = (judging.each(run, name, STRANDS) for name in ("ring_tension", "push_force"))
-        forces.append(np.append(pull - push, judging.each(run, "axial_force")))
+        means = Measured(run, run.judged, None)
+        pull, push = (means.each(f"{name} {{}}", STRANDS) for name in ("ring_tension", "push_force"))
+        forces.append(np.append(pull - push, means.each("axial_force {}")))
         if model == "beam_pushbelt":
             found = judge(run)
             assert run.numerical_doubt(found) is None

@@ -10,8 +10,7 @@ import pytest
 from cvt_hpc.models.elastic_belt import fields, power_terms
 from cvt_hpc.models.elastic_belt.belt import State, belt_constants
 from cvt_hpc.models.elastic_belt.lane_belt import take_lane
-from cvt_hpc.models.elastic_belt.power_terms import POWERS
-from cvt_hpc.models.elastic_belt.record import LOSSES
+from cvt_hpc.models.elastic_belt.power_terms import LOSSES, POWERS
 from cvt_hpc.models.elastic_belt.rhs import strains
 from cvt_hpc.models.elastic_belt.sampling import Outcome
 from cvt_hpc.models.elastic_belt.validity import power_limit

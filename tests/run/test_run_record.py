@@ -1,14 +1,17 @@
 """The record of one run: what is declared is there, says how the run ended, and counts what it took."""
 
+from dataclasses import replace
+
 import numpy as np
 import pytest
 
 from cvt_hpc import simulation
 from cvt_hpc.errors import InputError
-from cvt_hpc.models.elastic_belt.record import MODES, evaluate
+from cvt_hpc.models.elastic_belt.record import MODES, VARIABLES
 from cvt_hpc.simulation import Interrupted, estimate_cost, record_coordinates, record_variables, run_point
 from cvt_hpc.study.description import describe
 from cvt_hpc.variables import Status, Vibrates
+from cvt_hpc.variator import judging
 from cvt_hpc.vibration import ramp
 from support.marched import CHEAP, finished, fresh_record, job, record
 
@@ -204,7 +207,8 @@ def test_modes_and_spectrum_are_those_of_the_displacement():
         run.rows[:, len(run.probes) : len(run.probes) + 2 * MODES] = modes.reshape(run.samples, -1)
         run.rows[:, 2] = 12e-6 * np.sin(2 * np.pi * 500 * time)
         run.rows[:, 7] = 7e-6 * np.sin(2 * np.pi * 800 * time)
-        found = evaluate(run, np.array([2, 7]))
+        verdict = replace(judging.assess(run), strongest_probe=np.array([2, 7]))
+        found = judging.finished(run, VARIABLES, verdict)
     finally:
         run.rows[:] = kept
     assert found["mode"].tolist() == [2, 1]

@@ -6,7 +6,7 @@ import pytest
 from cvt_hpc.errors import InputError
 from cvt_hpc.models.elastic_belt.belt import mesh
 from cvt_hpc.models.elastic_belt.pulley_settings import oil_factor
-from cvt_hpc.models.steady_variator.forces import quantities
+from cvt_hpc.models.steady_variator.record import quantities
 from cvt_hpc.models.steady_variator.walking import SteadyBelt
 from cvt_hpc.variables import Status
 from cvt_hpc.variator import GROSS_SLIP

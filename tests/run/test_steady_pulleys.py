@@ -7,7 +7,7 @@ from cvt_hpc.errors import InputError
 from cvt_hpc.models.elastic_belt import fields as f
 from cvt_hpc.models.elastic_belt.belt import mesh
 from cvt_hpc.models.elastic_belt.pulley_settings import oil_factor
-from cvt_hpc.models.steady_variator.forces import quantities
+from cvt_hpc.models.steady_variator.record import quantities
 from cvt_hpc.models.steady_variator.walking import NoSteadyState, SteadyBelt
 from support.fast_runs import FastRuns
 from support.marched import Together, mean

@@ -14,9 +14,9 @@ from cvt_hpc.models.steady_variator import first_states
 from cvt_hpc.models.steady_variator.continuation import OWN, Continuation
 from cvt_hpc.models.steady_variator.equations import Equations
 from cvt_hpc.models.steady_variator.first_states import FirstStates, least_sliding
-from cvt_hpc.models.steady_variator.forces import distributions, quantities
+from cvt_hpc.models.steady_variator.forces import distributions
 from cvt_hpc.models.steady_variator.newton import newton
-from cvt_hpc.models.steady_variator.record import Found, judge
+from cvt_hpc.models.steady_variator.record import Found, judge, quantities
 from cvt_hpc.models.steady_variator.walking import NoSteadyState, SlipsThrough, SteadyBelt
 from cvt_hpc.variables import Status, Vibrates
 from support.fast_runs import FastRuns

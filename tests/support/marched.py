@@ -7,7 +7,7 @@ import numpy as np
 
 from cvt_hpc.job import Job
 from cvt_hpc.models.elastic_belt.batch import LaneRun
-from cvt_hpc.models.elastic_belt.record import evaluate
+from cvt_hpc.models.elastic_belt.record import judge
 from cvt_hpc.simulation import record_variables, run_point
 from cvt_hpc.simulation.marching import march_runs
 from support.lone import Transient
@@ -87,7 +87,7 @@ def finished(**values) -> Transient:
 
 def balance(run: LaneRun) -> dict:
     """The model's part of the record of a finished run."""
-    return evaluate(run, np.array([2, 7]))  # the probes in the middles of the strands
+    return judge(run)
 
 
 def mean(run: LaneRun, name: str) -> float:

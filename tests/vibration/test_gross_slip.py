@@ -8,17 +8,9 @@ import pytest
 from cvt_hpc.models.elastic_belt.parameters import PARAMETERS
 from cvt_hpc.physics.friction import friction_law
 from cvt_hpc.physics.geometry import variator
-from cvt_hpc.variables import Vibrates
-from cvt_hpc.variator.judging import efficiency
-from cvt_hpc.variator.slip import (
-    GROSS_SLIP,
-    PULLEYS,
-    capacity,
-    largest_torque,
-    slid,
-    slide,
-    with_slip,
-)
+from cvt_hpc.variables import Vibrates, values
+from cvt_hpc.variator.slip import AGAINST_SLIP, GROSS_SLIP, PULLEYS, largest_torque, slide, with_slip
+from cvt_hpc.variator.variables import Means, Measured, shared
 from cvt_hpc.vibration.assessment import Occurrence
 
 DEFAULTS = {key: parameter.default for table in PARAMETERS.values() for key, parameter in table.items()}
@@ -77,6 +69,10 @@ def run(channels=None, *, samples=8, judged=0, done=None, **parameters):
     )
 
 
+def capacity(run, samples):
+    return values(AGAINST_SLIP, Measured(run, samples, None))
+
+
 def test_the_margin_is_the_load_over_the_torque_less_one():
     limit = carried(0.1, 40e3)
     for load in (90.0, -90.0):
@@ -92,6 +88,12 @@ def test_the_margin_is_the_load_over_the_torque_less_one():
     channels = {"load": np.arange(8.0), "axial_force driven": np.linspace(10e3, 80e3, 8)}
     found = capacity(run(channels, load_history="ramp"), slice(0, 2))
     assert found["torque_ratio"] == pytest.approx(0.5 / carried(0.1, 15e3), rel=1e-12)
+
+
+def efficiency(driving, load, loss):
+    found = Means()
+    found.powers = {"driving_power": driving, "load_power": load, "loss": loss}
+    return found.efficiency
 
 
 @pytest.mark.parametrize(
@@ -161,7 +163,10 @@ def test_of_a_slide_its_means_are_known():
         "axial_force driven": [0.0, 0.0, 30e3, 50e3],
         "driven_speed": [0.0, 0.0, 60.0, 40.0],
     }
-    found = slid(run(channels, samples=9, done=4, driving_speed=300.0, ratio=2.0))
+    sliding = run(channels, samples=9, done=4, driving_speed=300.0, ratio=2.0)
+    known = *shared("slip", "axial_force", "thrust_ratio", "speed_loss"), *AGAINST_SLIP
+    assert all(variable.early for variable in known)
+    found = values(known, Measured(sliding, slide(sliding), None))
     assert found["slip"] == pytest.approx([-0.5, 0.02])
     assert found["axial_force"] == pytest.approx([60e3, 40e3])
     assert found["thrust_ratio"] == pytest.approx(1.5)

@@ -27,8 +27,8 @@ def test_each_peak_has_its_own_mode():
     np.testing.assert_allclose(found.frequency[1, :2], [494.0, 988.0], atol=0.1)
     # Hann's window between two lines: less than 1 % low
     np.testing.assert_allclose(found.amplitude[1, :2], [20.0, 12.0], rtol=0.01)
-    np.testing.assert_allclose(found.record()["frequency_ratio"][:2], [1.0, 2.0], atol=1e-3)
-    assert np.isnan(found.frequency[0, 1:]).all() and np.isnan(found.record()["frequency_ratio"][2])
+    np.testing.assert_allclose(found.frequency_ratio[:2], [1.0, 2.0], atol=1e-3)
+    assert np.isnan(found.frequency[0, 1:]).all() and np.isnan(found.frequency_ratio[2])
 
 
 def test_side_lobes_and_what_lies_outside_the_band_are_no_peaks():

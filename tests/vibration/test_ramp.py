@@ -65,9 +65,9 @@ def test_ends_that_lie_beyond_the_ramp_are_not_known():
 
 def test_the_amplitude_is_told_along_the_ramp():
     found = ramp(lambda load: 1e-7 * load)
-    assert found.mean == pytest.approx(20.0 + 180.0 * (np.arange(BINS) + 0.5) / BINS, abs=1.5)
+    assert found.ramp_mean == pytest.approx(20.0 + 180.0 * (np.arange(BINS) + 0.5) / BINS, abs=1.5)
     # windows of a bin lie to either side of its middle
-    assert found.ramp_amplitude[0] == pytest.approx(1e-7 * found.mean, rel=0.02)
+    assert found.ramp_amplitude[0] == pytest.approx(1e-7 * found.ramp_mean, rel=0.02)
     assert (found.ramp_amplitude[1] < 1e-8).all()
 
 
@@ -133,7 +133,7 @@ def test_growth_at_the_end_of_a_ramp_is_undecided():
 def test_a_ramp_that_ended_early_tells_what_it_has_seen():
     found = ramp(window(60.0, 90.0), until=1.0)
     assert found.vibrates is Vibrates.YES and found.end == pytest.approx(90.0, abs=2.0)
-    assert np.isfinite(found.mean[:10]).all() and np.isnan(found.mean[11:]).all()
+    assert np.isfinite(found.ramp_mean[:10]).all() and np.isnan(found.ramp_mean[11:]).all()
     # five periods of 300 Hz are the least that is judged
     assert ramp(window(60.0, 90.0), until=5.0 / 300.0) is not None
     assert ramp(window(60.0, 90.0), until=0.96 * 5.0 / 300.0) is None

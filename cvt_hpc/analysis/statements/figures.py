@@ -70,8 +70,9 @@ class _Arc:
 
     @property
     def arrows(self) -> np.ndarray:
-        """Stations at which arrows are drawn."""
-        return np.linspace(1, self.wrap.size - 2, ARROWS).round().astype(int)
+        """Stations at which arrows are drawn, about equally far apart."""
+        places = np.linspace(self.wrap[1], self.wrap[-2], ARROWS)
+        return np.abs(self.wrap[:, None] - places).argmin(axis=0)
 
     def draw(self, axes: Axes, offset: np.ndarray | float = 0.0, **style: object) -> np.ndarray:
         """Draw a line around, off the circle by an offset [m], and return its points (2, n) [mm]."""

@@ -44,7 +44,10 @@ class Kept(NamedTuple):
 
 
 class Arc(NamedTuple):
-    """A quantity over the arc of a pulley: shares of the wrap from the inlet, and values, (n,) each."""
+    """A quantity over the arc of a pulley: shares of the wrap from the inlet, and values, (n,) each.
+
+    Places are equally far apart, whatever the cells of the belt: means over them are means over lengths.
+    """
 
     share: np.ndarray
     values: np.ndarray
@@ -59,12 +62,16 @@ def over_arc(history: xr.Dataset, name: str, pulley: str) -> Arc:
     """A quantity by `position` over the arc of the driving or the driven pulley, both ends included."""
     here = inside(history, pulley)
     angle = history["wrap_angle"].values[here]
-    return Arc(angle / angle[-1], history[name].values[here])
+    share = np.linspace(0.0, 1.0, angle.size)
+    return Arc(share, np.interp(share, angle / angle[-1], history[name].values[here]))
 
 
 def on_strand(history: xr.Dataset, name: str, strand: str) -> np.ndarray:
-    """A quantity by `position` between the ends of a strand."""
-    return history[name].values[history["region"].values.astype(str) == strand][1:-1]
+    """A quantity between the ends of a strand, at places equally far apart."""
+    here = np.flatnonzero(history["region"].values.astype(str) == strand)[1:-1]
+    position = history["position"].values[here]
+    even = np.linspace(position[0], position[-1], here.size)
+    return np.interp(even, position, history[name].values[here])
 
 
 @contextmanager

@@ -10,6 +10,7 @@ from cvt_hpc.models.elastic_belt import grouping
 from cvt_hpc.models.elastic_belt import record as belt_record
 from cvt_hpc.models.elastic_belt.record import coordinates, lane_key, lanes
 from cvt_hpc.variables import Status, Variable, Vibrates, shortened
+from cvt_hpc.variator import judging
 
 if TYPE_CHECKING:
     import xarray as xr
@@ -76,7 +77,7 @@ def settle(run: RecordedRun) -> dict[str, Any] | None:
     """
     if run.failure is not None:
         return None
-    found = belt_record.assess(run)
+    found = judging.assess(run)
     if not is_settled(run.parameters, found):
         return None
     values = _values(run, found, Rung.COARSE)
@@ -90,12 +91,11 @@ def judge(run: RecordedRun) -> dict[str, Any]:
     """The record of a full run that has reached its end, or slipped through before, its cost apart."""
     if run.failure is not None:
         return belt_record.judge(run) | {"rung": Rung.FULL}
-    return _values(run, belt_record.assess(run), Rung.FULL)
+    return _values(run, judging.assess(run), Rung.FULL)
 
 
 def _values(run: RecordedRun, found: Occurrence, rung: Rung) -> dict[str, Any]:
-    values = found.record() | belt_record.evaluate(run, found.strongest_probe)
-    return values | {"rung": rung, "margin": found.margin}
+    return judging.finished(run, belt_record.VARIABLES, found) | {"rung": rung, "margin": found.margin}
 
 
 def histories(run: RecordedRun | None) -> xr.Dataset:

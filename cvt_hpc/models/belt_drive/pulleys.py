@@ -18,6 +18,8 @@ from cvt_hpc.solvers.generalised_alpha import Scheme, begin, finish, stage_lengt
 
 # powers of a stage [W], and their totals [J]
 WORK_IN, WORK_OUT, CONTACT_LOSS, BELT_LOSS, ARM_LOSS, FRICTION_LOSS = range(6)  # the last of each pulley
+# Mean rates of these, by their names in the record
+POWERS = ("driving_power", "load_power", "contact_loss", "belt_loss", "arm_loss")
 
 
 class Struts(NamedTuple):

@@ -3,21 +3,18 @@
 from __future__ import annotations
 
 from collections.abc import Mapping
-from dataclasses import replace
 from typing import TYPE_CHECKING, Any
 
 import numpy as np
 
-from cvt_hpc.models.belt_drive import pulleys as fields
 from cvt_hpc.models.belt_drive import theory
 from cvt_hpc.models.belt_drive.layout import layout
 from cvt_hpc.models.belt_drive.theory import answers
 from cvt_hpc.physics.belt_path import regions
-from cvt_hpc.variables import Coordinate, Variable
+from cvt_hpc.variables import Coordinate, Variable, together, values
 from cvt_hpc.variator import PULLEYS, STRANDS, judging
 from cvt_hpc.variator.history import dataset
-from cvt_hpc.variator.judging import each
-from cvt_hpc.variator.variables import COORDINATES, frequency_bins, shared
+from cvt_hpc.variator.variables import COORDINATES, Measured, frequency_bins, power, shared
 from cvt_hpc.vibration import assessment
 from cvt_hpc.vibration.settings import SHORTEST_SEGMENT
 from cvt_hpc.vibration.signals import amplitude_spectrum
@@ -32,28 +29,91 @@ STEP_COST, SAMPLE_COST = 1.8e-6, 5e-5
 
 DRIVE_MODES = 8
 
+
+def largest_spectrum(measured: Measured) -> np.ndarray:
+    """Of each strand the largest of its probes, (strand, bin) [m]: one alone may sit on a node of a shape."""
+    m, p = measured, measured.parameters
+    spectra = amplitude_spectrum(moved(m)[m.samples], p["sampling_rate"], frequency_bins(p).values)
+    return spectra.max(axis=2).T
+
+
+def moved(measured: Measured) -> np.ndarray:
+    """Displacement, (done, strand, probe) [m]."""
+    return measured.displacement.reshape(measured.done, len(measured.drawn.spans), -1)
+
+
+def strand_tension(measured: Measured) -> np.ndarray:
+    """Mean tensions, (strand,) [N]."""
+    return measured.each("tension {}", measured.drawn.spans)
+
+
+def eigenfrequencies(measured: Measured) -> np.ndarray:
+    """Of the strands, (strand, mode) [Hz]."""
+    m = measured
+    return theory.strand_frequencies(m.parameters, m.present.path, strand_tension(m))
+
+
+def answered(measured: Measured) -> np.ndarray | None:
+    """Frequencies (strand, mode) [Hz] at which strands answer a kick; None without one."""
+    m, kicked = measured, measured.kicked
+    if kicked is None or kicked.start - m.risen < SHORTEST_SEGMENT:
+        return None
+    before, after, rate = moved(m)[m.risen : kicked.start], moved(m)[kicked], m.parameters["sampling_rate"]
+    expected = eigenfrequencies(m)
+    return np.array([answers(before[:, k], after[:, k], rate, modes) for k, modes in enumerate(expected)])
+
+
+def of_arms(measured: Measured) -> np.ndarray:
+    """Mean angle, ripple and share at a stop of the arms that carry pulleys, nan of others, (3, P)."""
+    pulleys = measured.pulleys
+    found = np.full((3, len(pulleys.arm)), np.nan)
+    for p in np.flatnonzero(pulleys.arm >= 0):
+        a = pulleys.arm[p]
+        angle = measured.part(f"arm T{a + 1}")
+        inside = (pulleys.arms.lowest[a] < angle) & (angle < pulleys.arms.highest[a])
+        found[:, p] = angle.mean(), angle.std(), 1.0 - inside.mean()
+    return found
+
+
 VARIABLES = (
     *assessment.VARIABLES,
-    replace(shared("spectrum")[0], comment="largest of the strand's probes"),
-    Variable("strand_tension", "N", "mean tension in the middle half of the strand", dims=("strand",)),
-    Variable("tension_ripple", "N", "standard deviation of that mean", dims=("strand",)),
-    *shared("slip"),
-    replace(
-        shared("speed_loss")[0],
+    *shared("spectrum", comment="largest of the strand's probes", of=largest_spectrum),
+    Variable(
+        "strand_tension",
+        "N",
+        "mean tension in the middle half of the strand",
+        dims=("strand",),
+        of=strand_tension,
+    ),
+    Variable(
+        "tension_ripple",
+        "N",
+        "standard deviation of that mean",
+        dims=("strand",),
+        of=lambda m: np.array([m.part(f"tension {k}").std() for k in m.drawn.spans]),
+    ),
+    *shared("slip", of=lambda m: m.each("slip {}", m.drawn.pulleys), early=False),
+    *shared(
+        "speed_loss",
         comment="1 - ratio x driven speed / driving speed, mean of whole belt turns or ripples of the speed; "
         "none where the judged part is shorter than a turn",
+        of=lambda m: m.run.speed_loss(m.whole_turns) if m.turns else None,
+        early=False,
+        may_miss=True,
     ),
     Variable(
         "expected_speed_loss",
         "1",
         "by creep and radial compliance, with the mean tensions of the strands",
         words="creep and compliance",
+        of=lambda m: theory.expected_loss(m.parameters, m.present, strand_tension(m)),
     ),
     Variable(
         "creep_speed_loss",
         "1",
         "by creep alone, from tension at rest and torque; of two pulleys",
         words="creep alone",
+        of=lambda m: theory.creep_loss(m.parameters, m.drawn),
     ),
     Variable(
         "eigenfrequency",
@@ -61,39 +121,54 @@ VARIABLES = (
         "of a running beam under the strand's mean tension, pinned where tangents touch the pulleys; "
         "arms at their mean angles",
         dims=("strand", "half_waves"),
+        of=eigenfrequencies,
     ),
     Variable(
         "drive_frequency",
         "Hz",
         "of strands, sticking arcs and driven pulleys together, linearised at the end; arms stand still",
         dims=("drive_mode",),
+        of=lambda m: m.drive_frequencies(DRIVE_MODES),
     ),
     Variable(
         "answered_frequency",
         "Hz",
         "peak near each eigenfrequency after a kick, where it exceeds three times the unrest before",
         dims=("strand", "half_waves"),
+        of=answered,
+        may_miss=True,
     ),
-    Variable("arm_angle", "rad", "mean rotation of the arm from where it is drawn", dims=("pulley",)),
-    Variable("arm_ripple", "rad", "standard deviation of that rotation", dims=("pulley",)),
-    Variable("stop_share", "1", "share of the judged part in which the arm is at a stop", dims=("pulley",)),
+    *together(
+        of_arms,
+        Variable("arm_angle", "rad", "mean rotation of the arm from where it is drawn", dims=("pulley",)),
+        Variable("arm_ripple", "rad", "standard deviation of that rotation", dims=("pulley",)),
+        Variable(
+            "stop_share", "1", "share of the judged part in which the arm is at a stop", dims=("pulley",)
+        ),
+        may_miss=True,
+    ),
     Variable(
-        "lifted", "1", "1 where the belt has left the pulley, which ends a run as slip does", dims=("pulley",)
+        "lifted",
+        "1",
+        "1 where the belt has left the pulley, which ends a run as slip does",
+        dims=("pulley",),
+        of=lambda m: m.lifted.astype(float),
+        early=True,
     ),
     *shared("driven_speed_ripple"),
-    Variable("friction_loss", "W", "mean friction power of the belt on the pulley", dims=("pulley",)),
-    Variable("contact_loss", "W", "mean power of the contacts' normal damping"),
-    replace(shared("belt_loss")[0], comment="mean power of the belt's damping along, across and in bending"),
-    *shared("driving_power", "load_power", "storing_power", "loss", "power_residual"),
-    Variable("arm_loss", "W", "mean power of the tensioners' dashpots"),
-    Variable("efficiency", "1", "share of the power put in that is not lost"),
+    power("friction_loss", "mean friction power of the belt on the pulley", dims=("pulley",), early=True),
+    power("contact_loss", "mean power of the contacts' normal damping", early=True),
+    *shared("belt_loss", comment="mean power of the belt's damping along, across and in bending", early=True),
+    *shared("driving_power", "load_power", "storing_power", "loss", "power_residual", early=True),
+    power("arm_loss", "mean power of the tensioners' dashpots", early=True),
+    *shared("efficiency", comment="share of the power put in that is not lost"),
     Variable(
         "turns",
         "1",
         "whole revolutions of the belt over which speed_loss is the mean, roughly so with speed_ripple",
         dtype="i8",
     ),
-    Variable("unsolved_share", "1", "share of steps that were not solved to the tolerance"),
+    Variable("unsolved_share", "1", "share of steps that were not solved to the tolerance", early=True),
     Variable("iterations", "1", "of Newton's method in a step, mean"),
 )
 
@@ -143,103 +218,9 @@ def judge(run: Transient) -> dict[str, Any]:
         With all samples recorded, or those until it slipped through or the belt left a pulley.
     """
     if run.failure is not None:
-        return (
-            judging.slipped_through(run)
-            | _powers(run)
-            | {
-                "unsolved_share": run.unsolved_share,
-                "lifted": run.lifted.astype(float),
-            }
-        )
-    found = judging.assess(run, run.drawn.spans, run.drawn.pulleys)
-    return found.record() | evaluate(run, found.strongest_probe)
-
-
-def evaluate(run: Transient, strongest_probe: np.ndarray) -> dict[str, Any]:
-    """Values from a finished run of those VARIABLES that are the drive's own.
-
-    Parameters
-    ----------
-    run : Transient
-        With all samples recorded.
-    strongest_probe : (2,) int array
-        Column of the displacement that vibrates most, for each strand.
-
-    Returns
-    -------
-    dict
-        Value by name.
-    """
-    drawn, present, powers = run.drawn, run.present, _powers(run)
-    work, tension = run.counters(), each(run, "tension", drawn.spans)
-    frequencies = theory.strand_frequencies(run.parameters, present.path, tension)
-    return {
-        **judging.motion(run, strongest_probe, drawn.pulleys),
-        "spectrum": _spectrum(run),
-        **_of_arms(run),
-        "speed_loss": run.speed_loss(run.whole_turns) if run.turns else np.nan,
-        "expected_speed_loss": theory.expected_loss(run.parameters, present, tension),
-        "creep_speed_loss": theory.creep_loss(run.parameters, drawn),
-        "strand_tension": tension,
-        "eigenfrequency": frequencies,
-        "drive_frequency": run.drive_frequencies(DRIVE_MODES),
-        "answered_frequency": _answered(run, frequencies),
-        "tension_ripple": np.array([run.channel(f"tension {k}")[run.judged].std() for k in drawn.spans]),
-        **powers,
-        "efficiency": judging.efficiency(*(powers[key] for key in ("driving_power", "load_power", "loss"))),
-        "lifted": run.lifted.astype(float),
-        "turns": run.turns,
-        "unsolved_share": run.unsolved_share,
-        "iterations": work["iterations"] / max(work["steps"], 1),
-    }
-
-
-def _powers(run: Transient) -> dict[str, Any]:
-    """Mean powers of a run and their balance."""
-    driving, load = run.mean_rate(fields.WORK_IN), run.mean_rate(fields.WORK_OUT)
-    contact, belt = run.mean_rate(fields.CONTACT_LOSS), run.mean_rate(fields.BELT_LOSS)
-    arm = run.mean_rate(fields.ARM_LOSS)
-    friction = np.array([run.mean_rate(fields.FRICTION_LOSS + k) for k in range(len(run.drawn.pulleys))])
-    losses = {"friction_loss": friction, "contact_loss": contact, "belt_loss": belt, "arm_loss": arm}
-    loss = contact + belt + arm + friction.sum()
-    return losses | judging.power_balance(driving, load, loss, run.mean_rate(-1))
-
-
-def _of_arms(run: Transient) -> dict[str, np.ndarray]:
-    """Values of the arms, for the pulleys that they carry; nan of others."""
-    pulleys, judged = run.pulleys, run.judged
-    found = {name: np.full(len(pulleys.arm), np.nan) for name in ("arm_angle", "arm_ripple", "stop_share")}
-    for p in np.flatnonzero(pulleys.arm >= 0):
-        a = pulleys.arm[p]
-        angle = run.channel(f"arm T{a + 1}")[judged]
-        inside = (pulleys.arms.lowest[a] < angle) & (angle < pulleys.arms.highest[a])
-        values = angle.mean(), angle.std(), 1.0 - inside.mean()
-        for name, value in zip(found, values, strict=True):
-            found[name][p] = value
-    return found
-
-
-def _spectrum(run: Transient) -> np.ndarray:
-    """Of each strand the largest of its probes, (strand, bin) [m]: one alone may sit on a node of a shape."""
-    p = run.parameters
-    spectra = amplitude_spectrum(_moved(run)[run.judged], p["sampling_rate"], frequency_bins(p).values)
-    largest: np.ndarray = spectra.max(axis=2).T
-    return largest
-
-
-def _moved(run: Transient) -> np.ndarray:
-    """Displacement, (done, strand, probe) [m]."""
-    return run.displacement.reshape(run.done, len(run.drawn.spans), -1)
-
-
-def _answered(run: Transient, expected: np.ndarray) -> np.ndarray:
-    """Frequencies (strand, mode) [Hz] at which strands answer a kick; nan without one."""
-    if run.kicked is None or run.kicked.start - run.risen < SHORTEST_SEGMENT:
-        return np.full(expected.shape, np.nan)
-    moved = _moved(run)
-    before, after = moved[run.risen : run.kicked.start], moved[run.kicked]
-    rate = run.parameters["sampling_rate"]
-    return np.array([answers(before[:, k], after[:, k], rate, modes) for k, modes in enumerate(expected)])
+        early = (variable for variable in VARIABLES if variable.early)
+        return judging.slipped_through(run) | values(early, Measured(run, run.judged, None))
+    return judging.finished(run, VARIABLES, judging.assess(run, run.drawn.spans, run.drawn.pulleys))
 
 
 def histories(run: Transient) -> xr.Dataset:

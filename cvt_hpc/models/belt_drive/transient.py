@@ -9,7 +9,7 @@ from cvt_hpc.kernels import called_alike
 from cvt_hpc.models.belt_drive import courses, readings
 from cvt_hpc.models.belt_drive.drive import advance, drive_frequencies
 from cvt_hpc.models.belt_drive.layout import Layout, layout
-from cvt_hpc.models.belt_drive.pulleys import Pulleys, axes
+from cvt_hpc.models.belt_drive.pulleys import FRICTION_LOSS, POWERS, Pulleys, axes
 from cvt_hpc.models.belt_drive.start import start
 from cvt_hpc.models.belt_drive.theory import kick, mesh_amplitude
 from cvt_hpc.models.marched import batches_of_one
@@ -203,6 +203,13 @@ class Transient(SampledRun):
             first, last = 0, self.done - 1
         change = self._totals[last, total] - self._totals[first, total]
         return float(change / ((last - first) * self.interval)) if last > first else np.nan
+
+    def powers(self) -> dict[str, Any]:
+        """Mean powers, as of `mean_rate`, named as in the record [W]."""
+        found = {name: self.mean_rate(total) for total, name in enumerate(POWERS)}
+        friction = np.array([self.mean_rate(FRICTION_LOSS + k) for k in range(len(self.drawn.pulleys))])
+        loss = found["contact_loss"] + found["belt_loss"] + found["arm_loss"] + friction.sum()
+        return found | {"friction_loss": friction, "loss": loss, "storing_power": self.mean_rate(-1)}
 
     @property
     def profiles(self) -> dict[str, np.ndarray]:

@@ -21,7 +21,7 @@ HARMONIC = 0.1  # damping ratio: a motion that grows by more than half in a cycl
 ROUNDING = 1e-12  # of the friction's work in a cycle: as little energy as that is none
 
 VARIABLES = (
-    Variable("amplitude", "m", "amplitude of the limit cycle in harmonic balance; none: nan"),
+    Variable("amplitude", "m", "amplitude of the limit cycle in harmonic balance; none: nan", may_miss=True),
     Variable("frequency", "Hz", "frequency of the radial vibration"),
     Variable("growth_rate", "s-1", "growth rate of small motions, damping over twice the mass"),
     Variable("damping", "N s m-2", "radial damping per length of belt; negative: fed by friction"),

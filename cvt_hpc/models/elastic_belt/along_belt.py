@@ -53,7 +53,7 @@ SLIDING = {
     "friction_force": ("friction force", "N m-1", "of both flanks on the belt, forward"),
     "ring_friction": ("ring friction", "N m-1", "of the elements' saddles on the rings, forward"),
 }
-WRAP_ANGLE = ("wrap angle", "rad", "from the inlet of the arc")
+WRAP_ANGLE = ("wrap angle", "rad", "from the inlet of the arc; negative before it")
 # everywhere, of an instant or of a state that does not change
 ELSEWHERE = {**ALONG, "contact_force": ("contact force", "N m-1", "axial line force of one flank")}
 
@@ -95,9 +95,17 @@ def along_belt(
     }
 
 
-def elsewhere(sample: Mapping[str, np.ndarray]) -> dict[str, np.ndarray]:
-    """Quantities of ELSEWHERE at the stations, (..., N) each, of a sample as `along_belt` takes it."""
-    stresses = {name: at_stations(sample[name]) for name in ("ring_tension", "push_force")}
+def elsewhere(sample: Mapping[str, np.ndarray], grid: Mesh) -> dict[str, np.ndarray]:
+    """Quantities of ELSEWHERE at the stations, (..., N) each, of a sample as `along_belt` takes it.
+
+    A stress of the cells goes in a straight line from the middle of one to that of the next.
+    """
+    shares = grid.cell / (grid.cell + np.roll(grid.cell, 1))  # of the stress behind a station
+
+    def between(stress: np.ndarray) -> np.ndarray:
+        return stress + shares * (np.roll(stress, 1, axis=-1) - stress)
+
+    stresses = {name: between(sample[name]) for name in ("ring_tension", "push_force")}
     return stresses | {name: sample[name] for name in ("contact_force", "mean_displacement")}
 
 
@@ -113,9 +121,8 @@ def curvature_at_stations(grid: Mesh) -> np.ndarray:
 
 
 def wrap_angles(grid: Mesh) -> np.ndarray:
-    """Angle of the stations from the inlet of their arc [rad], (N,); nan within strands."""
+    """Angle of the stations from the inlet of their arc [rad], (N,); nan where no groove is looked for."""
     found = np.full(grid.cell.size, np.nan)
-    for region, radius in ((0, grid.path.driving_radius), (2, grid.path.driven_radius)):
-        first, count = grid.starts[region], grid.counts[region]
-        found[first : first + count + 1] = grid.along(region) / radius
+    for zone in (grid.zone(0), grid.zone(2)):
+        found[zone.stations] = zone.angle
     return found

@@ -67,7 +67,7 @@ def _profiles(run: RecordedRun) -> dict[str, tuple[np.ndarray, str, str, str]]:
     return {
         **{
             name: (values, *of_means(along.ELSEWHERE[name]))
-            for name, values in along.elsewhere(means).items()
+            for name, values in along.elsewhere(means, run.mesh).items()
         },
         "flank_feed": (fed.flanks / dual, "feed by flank friction", "W m-1", FED),
         "stress_feed": (at_stations(fed.stresses) / dual, "feed by push and tension", "W m-1", FED),
@@ -95,6 +95,6 @@ def last_profiles(run: RecordedRun) -> dict[str, tuple[np.ndarray, str, str, str
     course = run.channel("driving_speed")[samples, None] if is_given else run.parameters["driving_speed"]
     belt_speed = course * run.path.driving_radius
     lengthened = 1.0 + along.curvature_at_stations(run.mesh) * sample["mean_displacement"]
-    found = along.elsewhere(sample) | along.along_belt(sample, run.mesh, run.parameters)
+    found = along.elsewhere(sample, run.mesh) | along.along_belt(sample, run.mesh, run.parameters)
     found["element_speed"] = (belt_speed + sample["element_speed"]) / lengthened
     return {name: (found[name].astype(PRECISION), *words) for name, words in WORDS.items()}

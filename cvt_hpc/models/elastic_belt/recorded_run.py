@@ -15,6 +15,7 @@ from cvt_hpc.models.elastic_belt.fluctuation import Fluctuation, fluctuation
 from cvt_hpc.models.elastic_belt.lane_belt import lane_belt, lane_state
 from cvt_hpc.models.elastic_belt.march import sample_state
 from cvt_hpc.models.elastic_belt.momentary import Momentary
+from cvt_hpc.models.elastic_belt.power_terms import LOSSES, POWERS
 from cvt_hpc.models.elastic_belt.pulley_settings import are_free
 from cvt_hpc.models.elastic_belt.ring_settings import layer_count
 from cvt_hpc.models.elastic_belt.rings import ring_constants, without_saddle_friction
@@ -221,6 +222,13 @@ class RecordedRun:
         if ramped(self.parameters) != "speed" and not are_free(self.parameters):
             return self.parameters["driving_speed"]
         return float(self.channel("driving_speed")[samples].mean())
+
+    def powers(self) -> dict[str, float]:
+        """Mean powers over the judged part, named as in the record [W]."""
+        found = {name: float(self.channel(name)[self.judged].mean()) for name in POWERS[:-1]}
+        stored = self.channel("stored_energy")[self.judged]
+        storing = (stored[-1] - stored[0]) / ((stored.size - 1) * self.interval)
+        return found | {"storing_power": storing, "loss": sum(found[name] for name in LOSSES)}
 
     @property
     def path(self) -> Variator:

@@ -1,20 +1,42 @@
 """Variables of ring layers in a record: tension and speed by layer, loss and sliding by surface."""
 
-from __future__ import annotations
-
 from collections.abc import Mapping
-from typing import TYPE_CHECKING, Any
+from typing import Any
 
 import numpy as np
 
 from cvt_hpc.models.elastic_belt.lane_rings import LOSS, SLIDING, SPEED_SUM, TENSION
 from cvt_hpc.models.elastic_belt.ring_settings import MOST_LAYERS, layer_count
-from cvt_hpc.variables import Coordinate, Variable
+from cvt_hpc.variables import Coordinate, Variable, together
+from cvt_hpc.variator.variables import Measured
 
-if TYPE_CHECKING:
-    from cvt_hpc.models.elastic_belt.recorded_run import RecordedRun
 
-VARIABLES = (
+def coordinates(parameters: Mapping[str, Any]) -> dict[str, Coordinate]:
+    """Dimensions of VARIABLES where the rings are layers: as many as there can be, for jobs that vary it."""
+    if layer_count(parameters) == 1:
+        return {}
+    words = "0: saddle; k: between the layers k and k + 1; behind the outermost layer the elements' ears"
+    return {
+        "ring_layer": Coordinate(np.arange(1, MOST_LAYERS + 1), "1", "ring layer", "the inner one first"),
+        "ring_surface": Coordinate(np.arange(MOST_LAYERS + 1), "1", "surface of ring layers", words),
+    }
+
+
+def of_layers(measured: Measured) -> tuple[np.ndarray, ...] | None:
+    """Values of VARIABLES; not known where the rings are one."""
+    means = measured.layer_means
+    if means is None:
+        return None
+    padded = np.full((MOST_LAYERS + 1, means.shape[1]), np.nan)
+    padded[: len(means)] = means
+    # the ears have no layer behind them
+    padded[len(means) - 1, TENSION:] = np.nan
+    tensions, sliding = padded[:MOST_LAYERS, TENSION : TENSION + 2], padded[:, SLIDING : SLIDING + 2]
+    return tensions, padded[:MOST_LAYERS, SPEED_SUM], padded[:, LOSS], sliding
+
+
+VARIABLES = together(
+    of_layers,
     Variable(
         "layer_tension",
         "N",
@@ -44,31 +66,3 @@ VARIABLES = (
         words="sliding by ring surface",
     ),
 )
-
-
-def coordinates(parameters: Mapping[str, Any]) -> dict[str, Coordinate]:
-    """Dimensions of VARIABLES where the rings are layers: as many as there can be, for jobs that vary it."""
-    if layer_count(parameters) == 1:
-        return {}
-    words = "0: saddle; k: between the layers k and k + 1; behind the outermost layer the elements' ears"
-    return {
-        "ring_layer": Coordinate(np.arange(1, MOST_LAYERS + 1), "1", "ring layer", "the inner one first"),
-        "ring_surface": Coordinate(np.arange(MOST_LAYERS + 1), "1", "surface of ring layers", words),
-    }
-
-
-def layer_record(run: RecordedRun) -> dict[str, Any]:
-    """Values of VARIABLES from a finished run; none where the rings are one."""
-    means = run.layer_means
-    if means is None:
-        return {}
-    padded = np.full((MOST_LAYERS + 1, means.shape[1]), np.nan)
-    padded[: len(means)] = means
-    # the ears have no layer behind them
-    padded[len(means) - 1, TENSION:] = np.nan
-    return {
-        "layer_tension": padded[:MOST_LAYERS, TENSION : TENSION + 2],
-        "layer_speed": padded[:MOST_LAYERS, SPEED_SUM],
-        "surface_loss": padded[:, LOSS],
-        "surface_sliding": padded[:, SLIDING : SLIDING + 2],
-    }

@@ -74,7 +74,8 @@ def solve(parameters: Mapping[str, Any]) -> Solution:
     """Steady state and its modes for the parameters of a run [SI]."""
     from cvt_hpc.models.elastic_belt.belt import mesh
     from cvt_hpc.models.linear_stability.modes import modes
-    from cvt_hpc.models.steady_variator.forces import driving_speed, quantities
+    from cvt_hpc.models.steady_variator.forces import driving_speed
+    from cvt_hpc.models.steady_variator.record import quantities
     from cvt_hpc.models.steady_variator.walking import NoSteadyState, SteadyBelt
     from cvt_hpc.variator.band import steady_band
 

@@ -40,10 +40,13 @@ VARIABLES = (
     Variable("stuck_share", "1", "share of the samples at which the mass sticks, in whole cycles"),
     Variable("half_stroke", "m", "half of the way between the extremes of the judged part"),
     Variable("cycles", "1", "whole cycles in the judged part; 0 of a motion too small for any", dtype="i8"),
-    Variable("friction_work", "J", "work of friction on the mass, mean of a cycle"),
-    Variable("damping_loss", "J", "energy that the damper takes, mean of a cycle"),
+    Variable("friction_work", "J", "work of friction on the mass, mean of a cycle", may_miss=True),
+    Variable("damping_loss", "J", "energy that the damper takes, mean of a cycle", may_miss=True),
     Variable(
-        "energy_residual", "1", "work that the balance of these cycles leaves open, over the work converted"
+        "energy_residual",
+        "1",
+        "work that the balance of these cycles leaves open, over the work converted",
+        may_miss=True,
     ),
     Variable("steady_displacement", "m", "displacement in steady sliding"),
     Variable("linear_growth_rate", "s-1", "growth rate of small motions about steady sliding, exact"),

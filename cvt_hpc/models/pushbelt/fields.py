@@ -60,6 +60,8 @@ INPUTS = IN_DRIVING_SHIFT + 1
     POWER_RESIDUAL,  # of the equations of motion as they were solved [J]
 ) = range(13)
 TOTALS = 13
+# Mean rates of totals from WORK_IN on, by their names in the record
+POWERS = ("driving_power", "load_power", "thrust_power", "flank_loss", "ring_loss", "tilt_loss", "belt_loss")
 DAMPED = {  # numerical damping of the step, by the springs and contacts where it occurs
     "elements": ELEMENT_DAMPED,
     "flanks": FLANK_DAMPED,

@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 from collections.abc import Mapping
+from functools import partial
 from typing import TYPE_CHECKING, Any
 
 import numpy as np
@@ -11,11 +12,9 @@ from cvt_hpc.models.pushbelt import fields as f
 from cvt_hpc.variables import Coordinate, Variable
 from cvt_hpc.variator import PULLEYS, STRANDS, judging
 from cvt_hpc.variator.history import REGIONS, dataset, regions
-from cvt_hpc.variator.judging import mean, power_balance
-from cvt_hpc.variator.slip import VARIABLES as AGAINST_SLIP
-from cvt_hpc.variator.slip import capacity, slide
-from cvt_hpc.variator.variables import COORDINATES, frequency_bins, shared
-from cvt_hpc.vibration import assessment, ramp
+from cvt_hpc.variator.slip import AGAINST_SLIP
+from cvt_hpc.variator.variables import COORDINATES, Measured, each_pulley, frequency_bins, power, shared
+from cvt_hpc.vibration import ramp
 
 if TYPE_CHECKING:
     import xarray as xr
@@ -26,9 +25,28 @@ IDLE = 0.02  # of the largest push force: what is below does not press
 # Measured on one core of an EPYC (Zen 5): core-seconds per element and step, and per sample
 RIGID_COST, ELASTIC_COST, SAMPLE_COST = 5.2e-7, 9.3e-7, 2e-4
 
+
+def slip_loss(measured: Measured) -> float:
+    """What sliding alone takes from the speed, mean [1]."""
+    driving, driven = (measured.part(f"{k}_speed") * measured.part(f"running_radius {k}") for k in PULLEYS)
+    return float(np.mean(1.0 - driven / driving))
+
+
+def share_left(powers: Mapping[str, Any]) -> float:
+    """Share of the driving power that is not lost [1]; not a number where the load drives."""
+    left = powers["load_power"] + powers["thrust_power"] + powers["storing_power"]
+    return left / powers["driving_power"] if powers["driving_power"] > 0.0 else np.nan
+
+
+def idle_arcs(measured: Measured) -> np.ndarray:
+    """Share of each arc without push force [1], (2,); as well where no element has been."""
+    push, where = measured.profiles["push_force"], regions(measured.path, measured.places)
+    idle = ~(push > IDLE * np.nanmax(push))
+    return np.array([idle[where == REGIONS.index(pulley)].mean() for pulley in PULLEYS])
+
+
 VARIABLES = (
-    *assessment.VARIABLES,
-    *ramp.VARIABLES,
+    *judging.VIBRATION,
     *shared("spectrum", "mean_ring_tension", "mean_push_force", "axial_force", "slip"),
     *AGAINST_SLIP,
     *shared("flank_loss", "thrust_ratio", "speed_loss"),
@@ -37,35 +55,52 @@ VARIABLES = (
         "1",
         "speed_loss by sliding alone: 1 - driven over driving speed, each times its running_radius, mean",
         words="speed loss by slip",
+        of=slip_loss,
+        early=True,
     ),
-    Variable(
+    each_pulley(
         "running_radius",
         "m",
         "mean radius of the flanks' contact points, weighted by contact force",
-        dims=("pulley",),
+        early=True,
     ),
     *shared("driven_speed_ripple", "driving_power", "load_power", "thrust_power"),
     *shared("storing_power", "ring_loss", "belt_loss"),
-    Variable("tilt_loss", "W", "mean power of the dampers of the elements' tilt"),
+    power("tilt_loss", "mean power of the dampers of the elements' tilt"),
     *shared("loss"),
-    Variable(
+    power(
         "numerical_damping",
-        "W",
         "mean power that the time step damps by itself, no loss of the belt's",
         dims=("spring",),
         words="numerical damping",
     ),
     *shared("power_residual"),
-    Variable("efficiency", "1", "what is left of driving_power for load, thrust and storing"),
-    Variable("largest_push_force", "N", "largest along the path, of means over the judged part"),
+    Variable(
+        "efficiency",
+        "1",
+        "what is left of driving_power for load, thrust and storing",
+        of=lambda m: share_left(m.powers),
+    ),
+    Variable(
+        "largest_push_force",
+        "N",
+        "largest along the path, of means over the judged part",
+        of=lambda m: np.nanmax(m.profiles["push_force"]),
+    ),
     Variable(
         "idle_arc",
         "1",
         "without push force: its mean is below 2 % of the largest along the path",
         dims=("pulley",),
         words="idle share of the arc",
+        of=idle_arcs,
     ),
-    Variable("passing_frequency", "Hz", "mean, of elements that pass a point of the path"),
+    Variable(
+        "passing_frequency",
+        "Hz",
+        "mean, of elements that pass a point of the path",
+        of=lambda m: m.mean("passing_frequency"),
+    ),
     Variable("unsolved_share", "1", "share of steps that were not solved to the tolerance"),
     Variable("iterations", "1", "of Newton's method in a step, mean"),
 )
@@ -94,58 +129,7 @@ def cost(parameters: Mapping[str, Any], stepper: str) -> Any:
     return p["duration"] * (each * p["elements"] / p["step"] + SAMPLE_COST * p["sampling_rate"])
 
 
-def judge(run: ElementRun) -> dict[str, Any]:
-    """The record of a run that has reached its end, or slipped through before, its cost apart.
-
-    Parameters
-    ----------
-    run : ElementRun
-        With all samples recorded, or those until it slipped through.
-    """
-    if run.failure is not None:
-        return judging.slipped(run) | speeds(run, slide(run))
-    found = judging.assess(run)
-    return found.record() | evaluate(run, found.strongest_probe)
-
-
-def evaluate(run: ElementRun, strongest_probe: np.ndarray) -> dict[str, Any]:
-    """Values of a finished run of VARIABLES beyond the verdict; as `judging.evaluate`, which has a part."""
-    judged = run.judged
-    driving, load = run.mean_rate(f.WORK_IN), run.mean_rate(f.WORK_OUT)
-    ring = run.mean_rate(f.RING_LOSS)
-    belt, tilt = run.mean_rate(f.BELT_LOSS), run.mean_rate(f.DAMPING_LOSS)
-    loss = run.mean_rate(f.FLANK_LOSS) + ring + belt + tilt
-    damped = np.array([run.mean_rate(total) for total in f.DAMPED.values()])
-    thrust, storing = run.mean_rate(f.THRUST_WORK), run.mean_rate(f.TOTALS)
-    push, where = run.profiles["push_force"], regions(run.path, run.places)
-    largest = np.nanmax(push)
-    idle = ~(push > IDLE * largest)  # as well where no element has been
-    work = run.counters()
-    return {
-        **judging.evaluate(run, strongest_probe),
-        **capacity(run, judged),
-        **speeds(run, judged),
-        **power_balance(driving, load, loss, storing, thrust, damped.sum()),
-        "thrust_power": thrust,
-        "numerical_damping": damped,
-        "ring_loss": ring,
-        "belt_loss": belt,
-        "tilt_loss": tilt,
-        "efficiency": (load + thrust + storing) / driving if driving > 0.0 else np.nan,
-        "largest_push_force": largest,
-        "idle_arc": np.array([idle[where == REGIONS.index(pulley)].mean() for pulley in PULLEYS]),
-        "passing_frequency": mean(run, "passing_frequency"),
-        "unsolved_share": run.unsolved_share,
-        "iterations": work["iterations"] / max(work["steps"], 1),
-    }
-
-
-def speeds(run: ElementRun, samples: slice) -> dict[str, Any]:
-    """Radii on which the belt runs, and what sliding takes from the speed, in some samples."""
-    radii = [run.channel(f"running_radius {pulley}")[samples] for pulley in PULLEYS]
-    rims = [run.channel(f"{k}_speed")[samples] * radius for k, radius in zip(PULLEYS, radii, strict=True)]
-    found = np.array([radius.mean() for radius in radii])
-    return {"slip_loss": float(np.mean(1.0 - rims[1] / rims[0])), "running_radius": found}
+judge = partial(judging.judge, variables=VARIABLES)
 
 
 def histories(run: ElementRun) -> xr.Dataset:

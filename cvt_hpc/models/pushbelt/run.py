@@ -305,6 +305,14 @@ class ElementRun(SampledRun):
         part, time = self._totals[self.judged], f.TIME
         return float((part[-1, total] - part[0, total]) / (part[-1, time] - part[0, time]))
 
+    def powers(self) -> dict[str, Any]:
+        """Mean powers over the judged part, named as in the record [W]."""
+        found = {name: self.mean_rate(f.WORK_IN + k) for k, name in enumerate(f.POWERS)}
+        loss = found["flank_loss"] + found["ring_loss"] + found["belt_loss"] + found["tilt_loss"]
+        damped = np.array([self.mean_rate(total) for total in f.DAMPED.values()])
+        storing = self.mean_rate(f.TOTALS)
+        return found | {"loss": loss, "storing_power": storing, "numerical_damping": damped}
+
     @property
     def profiles(self) -> dict[str, np.ndarray]:
         """Profiles at places along the path, (place,), means of the judged part; nan without elements."""

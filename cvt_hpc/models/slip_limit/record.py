@@ -85,7 +85,7 @@ def _by_formula(p: Mapping[str, Any]) -> dict[str, Any]:
 
 def _by_states(p: Mapping[str, Any]) -> dict[str, Any]:
     from cvt_hpc.models.elastic_belt.belt import mesh
-    from cvt_hpc.models.steady_variator.forces import quantities
+    from cvt_hpc.models.steady_variator.record import quantities
     from cvt_hpc.models.steady_variator.walking import NoSteadyState
 
     if p["sought"] == "thrust":

@@ -2,7 +2,9 @@
 
 from __future__ import annotations
 
-from collections.abc import Mapping
+from collections.abc import Mapping, Sequence
+from dataclasses import replace
+from functools import partial
 from typing import TYPE_CHECKING, Any
 
 import numpy as np
@@ -10,14 +12,10 @@ import numpy as np
 from cvt_hpc.models.pushbelt import record as pushbelt
 from cvt_hpc.models.spatial_pushbelt import readings
 from cvt_hpc.physics.out_of_plane import clamped_force
-from cvt_hpc.variables import Coordinate, Variable
+from cvt_hpc.variables import Coordinate, Variable, together
 from cvt_hpc.variator import PULLEYS, STRANDS, judging
 from cvt_hpc.variator.history import REGIONS, regions
-from cvt_hpc.variator.judging import each, mean
-from cvt_hpc.variator.slip import slide
-from cvt_hpc.variator.variables import frequency_bins
-from cvt_hpc.vibration import assessment, ramp
-from cvt_hpc.vibration.signals import amplitude_spectrum
+from cvt_hpc.variator.variables import Measured, each_strand, means
 
 if TYPE_CHECKING:
     import xarray as xr
@@ -28,12 +26,60 @@ if TYPE_CHECKING:
 RIGID_COST, ELASTIC_COST, SAMPLE_COST = 2.4e-6, 3.3e-6, 1e-3
 OF_TWO = 1.6  # cost of a step with two flows of ring material by that of one with one
 
-# told of each strand, in the plane of the belt and out of it
-_OF_STRANDS = tuple(v for v in (*assessment.VARIABLES, *ramp.VARIABLES) if v.dims[:1] == ("strand",))
+IN_PLANE, LATERAL = slice(len(STRANDS)), slice(len(STRANDS), None)  # of strands' probes
+
+
+def of_strands(variable: Variable, strands: slice, **changes: Any) -> Variable:
+    """A variable of strands in both planes, of one of these."""
+
+    def of(measured: Measured) -> Any:
+        return None if (found := variable.of(measured)) is None else found[strands]
+
+    return replace(variable, of=of, **changes)
+
+
+def net_axial_force(measured: Measured) -> np.ndarray:
+    """Force on both sheaves of each pulley, to the right [N]."""
+    forces = measured.each("sheave_force {}", readings.SHEAVES)
+    return forces[1::2] - forces[::2]
+
+
+def of_clamped_strands(measured: Measured) -> tuple[np.ndarray, np.ndarray]:
+    """Axial force on each pulley by strands as beams, and as strings [N]."""
+    m, p, path = measured, measured.parameters, measured.path
+    offset = m.mean("axial_offset")
+    speed = m.mean_driving_speed(m.samples) * path.driving_radius
+    centrifugal = (p["element_mass"] + p["ring_mass"]) * speed**2
+    net = m.each("ring_tension {}", STRANDS) - m.each("push_force {}", STRANDS) - centrifugal
+    stiffness = p["lateral_bending_stiffness"], p["lateral_shear_stiffness"]
+    # a strand that is pushed more than it is pulled is no string, and counts as one without tension
+    held = [clamped_force(offset, path.strand_length, max(force, 0.0), *stiffness) for force in net]
+    signs = np.array([1.0, -1.0])  # the driving pulley is pulled to where the driven one is
+    return signs * sum(held), signs * offset / path.strand_length * np.maximum(net, 0.0).sum()
+
+
+def one_sidedness(measured: Measured, names: Sequence[str]) -> np.ndarray:
+    """Push force of the right side less the left one's over both, in regions [1]."""
+    left, right = (measured.profiles[f"push_force_{side}"] for side in readings.SIDES)
+    where, found = regions(measured.path, measured.places), []
+    for name in names:
+        one, other = (np.nansum(push[where == REGIONS.index(name)]) for push in (left, right))
+        found.append((other - one) / (other + one) if other + one > 0.0 else np.nan)
+    return np.array(found)
+
+
+def largest(name: str, units: str, what: str) -> Variable:
+    """Largest of an extreme over the judged part, declared."""
+    comment = f"largest {what} over the judged part"
+    return Variable(f"largest_{name}", units, comment, of=lambda m: m.part(f"extreme_{name}").max())
+
+
+each_sheave = partial(means, "sheave", readings.SHEAVES)
+_OF_STRANDS = tuple(v for v in judging.VIBRATION if v.dims[:1] == ("strand",))
 VARIABLES = (
-    *pushbelt.VARIABLES,
+    *(of_strands(v, IN_PLANE) if v in _OF_STRANDS or v.name == "spectrum" else v for v in pushbelt.VARIABLES),
     *(
-        Variable(f"lateral_{v.name}", v.units, f"as {v.name}, out of the plane", dims=v.dims, dtype=v.dtype)
+        of_strands(v, LATERAL, name=f"lateral_{v.name}", comment=f"as {v.name}, out of the plane", words="")
         for v in _OF_STRANDS
     ),
     Variable(
@@ -42,28 +88,33 @@ VARIABLES = (
         "at the probe strongest out of the plane",
         dims=("strand", "frequency_bin"),
         words="lateral amplitude spectrum",
+        of=lambda m: m.spectrum[LATERAL],
     ),
-    Variable("sheave_force", "N", "mean axial force of the belt on each sheave, outwards", dims=("sheave",)),
-    Variable("sheave_loss", "W", "mean friction power of the flanks at each sheave", dims=("sheave",)),
+    each_sheave("sheave_force", "N", "mean axial force of the belt on each sheave, outwards"),
+    each_sheave("sheave_loss", "W", "mean friction power of the flanks at each sheave"),
     Variable(
         "net_axial_force",
         "N",
         "mean force of the belt on both sheaves along their axis, to the right",
         dims=("pulley",),
+        of=net_axial_force,
     ),
-    Variable(
-        "beam_axial_force",
-        "N",
-        "the same by both strands as beams under their mean forces, held without slope at the arcs",
-        dims=("pulley",),
-        words="clamped strands",
-    ),
-    Variable(
-        "string_axial_force",
-        "N",
-        "the same by both strands as strings under their mean forces",
-        dims=("pulley",),
-        words="strings",
+    *together(
+        of_clamped_strands,
+        Variable(
+            "beam_axial_force",
+            "N",
+            "the same by both strands as beams under their mean forces, held without slope at the arcs",
+            dims=("pulley",),
+            words="clamped strands",
+        ),
+        Variable(
+            "string_axial_force",
+            "N",
+            "the same by both strands as strings under their mean forces",
+            dims=("pulley",),
+            words="strings",
+        ),
     ),
     Variable(
         "strand_one_sidedness",
@@ -71,6 +122,7 @@ VARIABLES = (
         "push force of the right side less the left one's over both, means over the strand",
         dims=("strand",),
         words="one-sided push in strands",
+        of=lambda m: one_sidedness(m, STRANDS),
     ),
     Variable(
         "arc_one_sidedness",
@@ -78,21 +130,28 @@ VARIABLES = (
         "push force of the right side less the left one's over both, means over the arc",
         dims=("pulley",),
         words="one-sided push in arcs",
+        of=lambda m: one_sidedness(m, PULLEYS),
     ),
     *(
-        Variable(f"largest_{angle}", "rad", f"largest {words} of an element over the judged part")
+        largest(angle, "rad", f"{words} of an element")
         for angle, words in zip(
             readings.ANGLES, ("lateral lean", "yaw out of the plane", "tilt against the rings"), strict=True
         )
     ),
-    Variable("largest_nose_force", "N", "largest force of a nose over the judged part"),
-    Variable(
+    largest("nose_force", "N", "force of a nose"),
+    each_strand(
         "mean_tension_difference",
         "N",
         "ring tension of the right package less the left one's; not a number with one flow for both",
-        dims=("strand",),
+        "tension_difference {}",
+        may_miss=True,
     ),
-    Variable("final_misalignment", "m", "mean axial offset of the pulleys' mid planes as sheaves stand"),
+    Variable(
+        "final_misalignment",
+        "m",
+        "mean axial offset of the pulleys' mid planes as sheaves stand",
+        of=lambda m: m.mean("axial_offset"),
+    ),
 )
 
 
@@ -116,67 +175,7 @@ def cost(parameters: Mapping[str, Any], stepper: str) -> Any:
     return p["duration"] * (each_step * p["elements"] / p["step"] + SAMPLE_COST * p["sampling_rate"])
 
 
-def judge(run: ElementRun) -> dict[str, Any]:
-    """The record of a run that has reached its end, or slipped through before, its cost apart.
-
-    Both planes are judged alike, and together: a belt vibrates if a strand does in either.
-
-    Parameters
-    ----------
-    run : ElementRun
-        With all samples recorded, or those until it slipped through.
-    """
-    both = (*STRANDS, *readings.LATERAL)
-    if run.failure is not None:
-        return _by_plane(judging.slipped(run, both)) | pushbelt.speeds(run, slide(run))
-    found = judging.assess(run, both)
-    probes, lateral = np.split(found.strongest_probe, [len(STRANDS)])
-    p, moved = run.parameters, run.displacement[run.judged][:, lateral]
-    spectrum = amplitude_spectrum(moved, p["sampling_rate"], frequency_bins(p).values).T
-    evaluated = pushbelt.evaluate(run, probes) | _evaluate(run)
-    return _by_plane(found.record()) | {"lateral_spectrum": spectrum} | evaluated
-
-
-def _by_plane(record: dict[str, Any]) -> dict[str, Any]:
-    """A record whose values of strands in both planes are told of each plane."""
-    parted: dict[str, Any] = {}
-    for name in (v.name for v in _OF_STRANDS if v.name in record):
-        parted[name], parted[f"lateral_{name}"] = np.split(record[name], [len(STRANDS)])
-    return record | parted
-
-
-def _evaluate(run: ElementRun) -> dict[str, Any]:
-    """Values of a finished run that the planar pushbelt has not."""
-    forces = each(run, "sheave_force", readings.SHEAVES)
-    extremes = {what: run.channel(f"extreme_{what}")[run.judged].max() for what in readings.EXTREMES}
-    left, right = (run.profiles[f"push_force_{side}"] for side in readings.SIDES)
-    where = regions(run.path, run.places)
-
-    def one_sided(name: str) -> float:
-        inside = where == REGIONS.index(name)
-        one, other = np.nansum(left[inside]), np.nansum(right[inside])
-        return (other - one) / (other + one) if other + one > 0.0 else np.nan
-
-    p, path, offset = run.parameters, run.path, mean(run, "axial_offset")
-    speed = run.mean_driving_speed(run.judged) * path.driving_radius
-    centrifugal = (p["element_mass"] + p["ring_mass"]) * speed**2
-    net = each(run, "ring_tension", STRANDS) - each(run, "push_force", STRANDS) - centrifugal
-    stiffness = p["lateral_bending_stiffness"], p["lateral_shear_stiffness"]
-    # a strand that is pushed more than it is pulled is no string, and counts as one without tension
-    held = [clamped_force(offset, path.strand_length, max(force, 0.0), *stiffness) for force in net]
-    signs = np.array([1.0, -1.0])  # the driving pulley is pulled to where the driven one is
-    return {
-        "beam_axial_force": signs * sum(held),
-        "string_axial_force": signs * offset / path.strand_length * np.maximum(net, 0.0).sum(),
-        "sheave_force": forces,
-        "sheave_loss": each(run, "sheave_loss", readings.SHEAVES),
-        "net_axial_force": forces[1::2] - forces[::2],
-        "strand_one_sidedness": np.array([one_sided(strand) for strand in STRANDS]),
-        "arc_one_sidedness": np.array([one_sided(pulley) for pulley in PULLEYS]),
-        **{f"largest_{what}": float(value) for what, value in extremes.items()},
-        "mean_tension_difference": each(run, "tension_difference", STRANDS),
-        "final_misalignment": mean(run, "axial_offset"),
-    }
+judge = partial(judging.judge, variables=VARIABLES, names=(*STRANDS, *readings.LATERAL))
 
 
 def histories(run: ElementRun) -> xr.Dataset:

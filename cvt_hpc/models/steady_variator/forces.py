@@ -5,7 +5,7 @@ Powers and the contact's means are those that a transient of the belt records in
 
 from __future__ import annotations
 
-from typing import TYPE_CHECKING, Any, NamedTuple
+from typing import TYPE_CHECKING, NamedTuple
 
 import numpy as np
 
@@ -16,10 +16,9 @@ from cvt_hpc.models.elastic_belt.column import pressed_strains
 from cvt_hpc.models.elastic_belt.rhs import contact_forces, fresh_contacts, strains
 from cvt_hpc.models.elastic_belt.state_march import sampled
 from cvt_hpc.models.steady_variator.walking import Steady
-from cvt_hpc.variator import PULLEYS
 from cvt_hpc.variator.history import along_path
-from cvt_hpc.variator.judging import efficiency, power_balance
 from cvt_hpc.variator.slip import against_slip, largest_torque
+from cvt_hpc.variator.variables import Means
 
 if TYPE_CHECKING:
     import xarray as xr
@@ -77,7 +76,7 @@ def profiles(steady: Steady, grid: Mesh) -> xr.Dataset:
     found = sampled(steady.belt, steady.state).profiles()
     sample = {name: values[:, 0] for name, values in found.items()}
     sliding = along.along_belt(sample, grid, {"half_wedge_angle": steady.belt.half_wedge_angle})
-    values, words = along.elsewhere(sample) | sliding, along.ELSEWHERE | along.SLIDING
+    values, words = along.elsewhere(sample, grid) | sliding, along.ELSEWHERE | along.SLIDING
     named = {name: (values[name], *words[name]) for name in words}
     named["wrap_angle"] = along.wrap_angles(grid), *along.WRAP_ANGLE
     return along_path(named, grid.position, np.array(REGIONS)[grid.region])
@@ -95,36 +94,23 @@ def layer_loss(steady: Steady) -> float:
     return float((rings - (pushed - np.maximum(elastic, 0.0)) * opening).sum())
 
 
-def quantities(steady: Steady, grid: Mesh) -> dict[str, Any]:
-    """Numbers of strands (t1, t2) and pulleys (driving, driven), named as in the elastic belt's record."""
-    belt, around = steady.belt, distributions(steady)
-    middles = [grid.starts[region] + grid.counts[region] // 2 for region in (1, 3)]
-    seen = sampled(belt, steady.state).channels()
-    axial, slip, opened, flanks = (
-        np.array([seen[name.format(pulley)] for pulley in PULLEYS])
-        for name in ("axial_force {}", "slip {}", "open_share {}", "{}_flank_loss")
-    )
-    layers = layer_loss(steady)
-    driving, load = seen["driving_power"], seen["load_power"]
-    loss = layers + sum(seen[name] for name in LOSSES)
-    powers = power_balance(driving, load, loss, 0.0)
-    del powers["storing_power"]
-    carried = largest_torque(belt.law, belt.half_wedge_angle, grid.path, belt.belt_speed, axial)
-    return {
-        "mean_ring_tension": around.ring_tension[middles],
-        "mean_push_force": around.push_force[middles],
-        "axial_force": axial,
-        "slip": slip,
-        **against_slip(steady.load, carried),
-        "open_share": opened,
-        "thrust_ratio": axial[0] / axial[1],
-        "speed_loss": 1.0 - belt.ratio * steady.state.scalars[f.DRIVEN_SPEED] / driving_speed(steady),
-        "driven_position": steady.state.scalars[f.DRIVEN_POSITION],
-        "flank_loss": flanks,
-        "ring_loss": seen["ring_loss"],
-        "belt_loss": seen["belt_loss"],
-        "layer_loss": layers,
-        "seating_loss": seen["seating_loss"],
-        **powers,
-        "efficiency": efficiency(driving, load, loss),
-    }
+class SteadyMeans(Means):
+    """A steady state on its mesh, with values by their names in `record.VARIABLES`."""
+
+    def __init__(self, steady: Steady, grid: Mesh) -> None:
+        belt, scalars, around = steady.belt, steady.state.scalars, distributions(steady)
+        middles = [grid.starts[region] + grid.counts[region] // 2 for region in (1, 3)]
+        self.mean_ring_tension, self.mean_push_force = (
+            around.ring_tension[middles],
+            around.push_force[middles],
+        )
+        self.mean = sampled(belt, steady.state).channels().__getitem__
+        law, wedge, speed = belt.law, belt.half_wedge_angle, belt.belt_speed
+        carried = largest_torque(law, wedge, grid.path, speed, self.each("axial_force {}"))
+        self.against_slip = against_slip(steady.load, carried)
+        self.driven_position = scalars[f.DRIVEN_POSITION]
+        self.speed_loss = 1.0 - belt.ratio * scalars[f.DRIVEN_SPEED] / driving_speed(steady)
+        layers = layer_loss(steady)
+        names = "driving_power", "load_power", "ring_loss", "belt_loss", "seating_loss"
+        loss = layers + sum(self.mean(name) for name in LOSSES)
+        self.powers = {name: self.mean(name) for name in names} | {"layer_loss": layers, "loss": loss}

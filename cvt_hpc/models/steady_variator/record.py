@@ -3,14 +3,15 @@
 from __future__ import annotations
 
 from collections.abc import Mapping
+from operator import attrgetter
 from typing import TYPE_CHECKING, Any, NamedTuple
 
 import numpy as np
 
-from cvt_hpc.variables import Coordinate, Status, Variable, Vibrates
+from cvt_hpc.variables import Coordinate, Status, Variable, Vibrates, together, values
 from cvt_hpc.variator import GROSS_SLIP
-from cvt_hpc.variator.slip import VARIABLES as AGAINST_SLIP
-from cvt_hpc.variator.variables import COORDINATES, shared
+from cvt_hpc.variator.slip import AGAINST_SLIP
+from cvt_hpc.variator.variables import COORDINATES, each_pulley, shared
 
 if TYPE_CHECKING:
     import xarray as xr
@@ -21,10 +22,10 @@ if TYPE_CHECKING:
 VARIABLES = (
     Variable("mean_ring_tension", "N", "ring tension in the middle of the strand", dims=("strand",)),
     Variable("mean_push_force", "N", "push force in the middle of the strand", dims=("strand",)),
-    Variable("axial_force", "N", "axial force of the belt on a sheave", dims=("pulley",)),
-    Variable("slip", "1", "tangential sliding over belt speed, weighted by contact force", dims=("pulley",)),
-    *AGAINST_SLIP,
-    Variable("open_share", "1", "out of contact", dims=("pulley",), words="open share of the wrap"),
+    each_pulley("axial_force", "N", "axial force of the belt on a sheave"),
+    each_pulley("slip", "1", "tangential sliding over belt speed, weighted by contact force"),
+    *together(attrgetter("against_slip"), *AGAINST_SLIP),
+    each_pulley("open_share", "1", "out of contact", words="open share of the wrap"),
     Variable("thrust_ratio", "1", "axial force of the driving over that of the driven pulley"),
     Variable("speed_loss", "1", "1 - ratio x driven speed / driving speed"),
     Variable("driven_position", "m", "axial opening of the driven pulley"),
@@ -51,10 +52,16 @@ class Found(NamedTuple):
     values: dict[str, Any]
 
 
+def quantities(steady: Steady, grid: Mesh) -> dict[str, Any]:
+    """Values of VARIABLES of a steady state."""
+    from cvt_hpc.models.steady_variator.forces import SteadyMeans
+
+    return values(VARIABLES, SteadyMeans(steady, grid))
+
+
 def solve(parameters: Mapping[str, Any]) -> Found | ValueError:
     """Steady state of the parameters of a run [SI] with its results; or the reason why none was found."""
     from cvt_hpc.models.elastic_belt.belt import mesh
-    from cvt_hpc.models.steady_variator.forces import quantities
     from cvt_hpc.models.steady_variator.walking import NoSteadyState, SteadyBelt
 
     try:
