@@ -26,6 +26,13 @@ _COST = ("core_seconds", "steps", "contact_solves")  # of a record: sums over al
 
 _BETWEEN_POLLS = 0.05  # [s] of computing between checks whether to stop
 
+More = Callable[[], Sequence[dict[str, Any]]]
+
+
+def no_more() -> Sequence[dict[str, Any]]:
+    """Return no points: no runs join."""
+    return ()
+
 
 class OpenRun:
     """A run from its point to its record.
@@ -204,11 +211,12 @@ def march_runs(
     points: Sequence[dict[str, Any]],
     interrupt: Callable[[], str | None],
     kept: Collection[int] = (),
+    more: More = no_more,
 ) -> list[tuple[Any, dict[str, Any]]]:
     """Do runs to their records.
 
-    All do their first transient, as many together as there are lanes; then the runs that are prolonged or
-    done again fill lanes anew, and so on until none is left.
+    All do their first transient, as many together as there are lanes, and so do the runs that join. Then
+    those that are prolonged or done again fill lanes anew, and so on until none is left.
 
     Parameters
     ----------
@@ -220,11 +228,13 @@ def march_runs(
         Called every few tens of milliseconds; a text ends all runs.
     kept : collection of int
         Places in `points` whose transient is returned; the others are dropped after their verdict.
+    more : callable
+        Points of runs that join [SI]; called again and again until there are none.
 
     Returns
     -------
     list of (object or None, dict)
-        In the order of the points: the transient that counts, and the record.
+        In the order of the points, those that have joined last: the transient that counts, and the record.
 
     Raises
     ------
@@ -232,12 +242,21 @@ def march_runs(
         With the text of `interrupt`.
     """
     runs = [OpenRun(job, point, place in kept) for place, point in enumerate(points)]
-    model = load_model(job.model)
-    while left := [run for run in runs if run.record is None]:
-        groups = in_lanes(model, job.stepper, left, lambda run: run.next, lambda run: run.paused is None)
-        for group in groups:
-            _march_together(job, group, interrupt)
+    _march_once(job, runs, interrupt)
+    while joining := [OpenRun(job, point) for point in more()]:
+        _march_once(job, joining, interrupt)
+        runs += joining
+    while any(run.record is None for run in runs):
+        _march_once(job, runs, interrupt)
     return [(run.run, run.record) for run in runs]  # type: ignore[misc]  # each has its record now
+
+
+def _march_once(job: Job, runs: Sequence[OpenRun], interrupt: Callable[[], str | None]) -> None:
+    """March the next transients of runs that have no record yet to their ends."""
+    left = [run for run in runs if run.record is None]
+    model = load_model(job.model)
+    for group in in_lanes(model, job.stepper, left, lambda run: run.next, lambda run: run.paused is None):
+        _march_together(job, group, interrupt)
 
 
 def _march_together(job: Job, group: Sequence[OpenRun], interrupt: Callable[[], str | None]) -> None:

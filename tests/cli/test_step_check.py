@@ -32,7 +32,7 @@ VARIABLES = (
 )
 
 
-def run_points(job, points, interrupt):
+def run_points(job, points, interrupt, more=None):
     """Vibrate above 20 N m by 10 um, or more at long steps; what step a run takes depends on its load."""
     return [_record(point) for point in points]
 
