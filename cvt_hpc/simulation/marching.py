@@ -4,7 +4,8 @@
 runs are one transient. A run that fails by its numerics is done again from its start at half the step,
 `most_refinements` times at most. A run that is undecided is prolonged to twice its time, and again, as long
 as that is within `longest_duration`; with `shortest_duration` it begins with a part of its duration, at the
-end of which only a certain verdict counts. All this goes by the run alone, whatever runs beside it. A model
+end of which only a certain verdict counts, and a vibration only if the part before has found one as well:
+judder that sets in late may end it. All this goes by the run alone, whatever runs beside it. A model
 that may answer by less than the full transient declares so in its record module (`contract.py`), and its
 answers of this kind are neither refined nor prolonged.
 """
@@ -66,7 +67,7 @@ class OpenRun:
         self.next, self.paused = self._first(point), None
         self.record: dict[str, Any] | None = None
         self.run: Any = None
-        self._refinements = 0
+        self._refinements, self._vibrated = 0, False
         self._spent = dict.fromkeys(_COST, 0)
         self._is_preliminary = False
         self._begin_cheaply()
@@ -118,11 +119,14 @@ class OpenRun:
             return False
         left = sample_count(self._point) - sample_count(run.parameters) if "duration" in self._point else 0
         if left > 0:
+            before, self._vibrated = self._vibrated, record["vibrates"] == Vibrates.YES
+            if self._vibrated and not before:
+                return True
             return not is_certain(record, run.parameters, left / self._point["sampling_rate"])
         return bool(record["vibrates"] == Vibrates.UNDECIDED)
 
     def _begin(self, parameters: dict[str, Any], record: dict[str, Any]) -> None:
-        self._spent = {name: record[name] for name in _COST}
+        self._spent, self._vibrated = {name: record[name] for name in _COST}, False
         self.next, self.paused = parameters, None
 
     def _end(self, run: Any, record: dict[str, Any]) -> None:
