@@ -4,7 +4,8 @@
 runs are one transient. A run that fails by its numerics is done again from its start at half the step,
 `most_refinements` times at most. A run that is undecided is prolonged to twice its time, and again, as long
 as that is within `longest_duration`; with `shortest_duration` it begins with a part of its duration, at the
-end of which only a certain verdict counts. All this goes by the run alone, whatever runs beside it. A model
+end of which only a certain verdict counts, and a vibration only if the part before has found one as well:
+judder that sets in late may end it. All this goes by the run alone, whatever runs beside it. A model
 that may answer by less than the full transient declares so in its record module (`contract.py`), and its
 answers of this kind are neither refined nor prolonged.
 """
@@ -25,6 +26,13 @@ from cvt_hpc.vibration.ramped import ramped
 _COST = ("core_seconds", "steps", "contact_solves")  # of a record: sums over all tries
 
 _BETWEEN_POLLS = 0.05  # [s] of computing between checks whether to stop
+
+More = Callable[[], Sequence[dict[str, Any]]]
+
+
+def no_more() -> Sequence[dict[str, Any]]:
+    """Return no points: no runs join."""
+    return ()
 
 
 class OpenRun:
@@ -59,7 +67,7 @@ class OpenRun:
         self.next, self.paused = self._first(point), None
         self.record: dict[str, Any] | None = None
         self.run: Any = None
-        self._refinements = 0
+        self._refinements, self._vibrated = 0, False
         self._spent = dict.fromkeys(_COST, 0)
         self._is_preliminary = False
         self._begin_cheaply()
@@ -111,11 +119,14 @@ class OpenRun:
             return False
         left = sample_count(self._point) - sample_count(run.parameters) if "duration" in self._point else 0
         if left > 0:
+            before, self._vibrated = self._vibrated, record["vibrates"] == Vibrates.YES
+            if self._vibrated and not before:
+                return True
             return not is_certain(record, run.parameters, left / self._point["sampling_rate"])
         return bool(record["vibrates"] == Vibrates.UNDECIDED)
 
     def _begin(self, parameters: dict[str, Any], record: dict[str, Any]) -> None:
-        self._spent = {name: record[name] for name in _COST}
+        self._spent, self._vibrated = {name: record[name] for name in _COST}, False
         self.next, self.paused = parameters, None
 
     def _end(self, run: Any, record: dict[str, Any]) -> None:
@@ -204,11 +215,12 @@ def march_runs(
     points: Sequence[dict[str, Any]],
     interrupt: Callable[[], str | None],
     kept: Collection[int] = (),
+    more: More = no_more,
 ) -> list[tuple[Any, dict[str, Any]]]:
     """Do runs to their records.
 
-    All do their first transient, as many together as there are lanes; then the runs that are prolonged or
-    done again fill lanes anew, and so on until none is left.
+    All do their first transient, as many together as there are lanes, and so do the runs that join. Then
+    those that are prolonged or done again fill lanes anew, and so on until none is left.
 
     Parameters
     ----------
@@ -220,11 +232,13 @@ def march_runs(
         Called every few tens of milliseconds; a text ends all runs.
     kept : collection of int
         Places in `points` whose transient is returned; the others are dropped after their verdict.
+    more : callable
+        Points of runs that join [SI]; called again and again until there are none.
 
     Returns
     -------
     list of (object or None, dict)
-        In the order of the points: the transient that counts, and the record.
+        In the order of the points, those that have joined last: the transient that counts, and the record.
 
     Raises
     ------
@@ -232,12 +246,21 @@ def march_runs(
         With the text of `interrupt`.
     """
     runs = [OpenRun(job, point, place in kept) for place, point in enumerate(points)]
-    model = load_model(job.model)
-    while left := [run for run in runs if run.record is None]:
-        groups = in_lanes(model, job.stepper, left, lambda run: run.next, lambda run: run.paused is None)
-        for group in groups:
-            _march_together(job, group, interrupt)
+    _march_once(job, runs, interrupt)
+    while joining := [OpenRun(job, point) for point in more()]:
+        _march_once(job, joining, interrupt)
+        runs += joining
+    while any(run.record is None for run in runs):
+        _march_once(job, runs, interrupt)
     return [(run.run, run.record) for run in runs]  # type: ignore[misc]  # each has its record now
+
+
+def _march_once(job: Job, runs: Sequence[OpenRun], interrupt: Callable[[], str | None]) -> None:
+    """March the next transients of runs that have no record yet to their ends."""
+    left = [run for run in runs if run.record is None]
+    model = load_model(job.model)
+    for group in in_lanes(model, job.stepper, left, lambda run: run.next, lambda run: run.paused is None):
+        _march_together(job, group, interrupt)
 
 
 def _march_together(job: Job, group: Sequence[OpenRun], interrupt: Callable[[], str | None]) -> None:

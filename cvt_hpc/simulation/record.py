@@ -335,6 +335,22 @@ def in_lanes(
             yield group[first : first + most]
 
 
+def may_join(job: Job, runs: Sequence[int], others: Sequence[int]) -> bool:
+    """Whether other runs can be done in the batch of some, and fill the lanes with them.
+
+    Parameters
+    ----------
+    job : Job
+        A validated job.
+    runs, others : sequence of int
+        Run indices, of one batch each.
+    """
+    model, parameters = load_model(job.model), job.point(runs[0])
+    if len(runs) + len(others) > _batch_size(job, parameters):
+        return False
+    return model.lane_key(parameters) == model.lane_key(job.point(others[0]))
+
+
 def _batch_size(job: Job, parameters: dict[str, Any]) -> int:
     """Most runs of a batch: several times the lanes, unless a process that dies would lose too much."""
     model = load_model(job.model)

@@ -18,7 +18,7 @@ from cvt_hpc.job.summary import warn_of_notices
 from cvt_hpc.job.values import POINT_UNITS
 from cvt_hpc.models.contract import Model, load_model
 from cvt_hpc.netcdf import attributes, global_attributes, variable_attributes
-from cvt_hpc.simulation.marching import Interrupted, march_runs
+from cvt_hpc.simulation.marching import Interrupted, More, march_runs, no_more
 from cvt_hpc.simulation.record import record_coordinates, record_of_solution, record_variables, recorded_model
 from cvt_hpc.variables import Outcome
 
@@ -54,7 +54,10 @@ def run_point(job: Job, point: dict[str, Any], interrupt: Callable[[], str | Non
 
 
 def run_points(
-    job: Job, points: Sequence[dict[str, Any]], interrupt: Callable[[], str | None]
+    job: Job,
+    points: Sequence[dict[str, Any]],
+    interrupt: Callable[[], str | None],
+    more: More = no_more,
 ) -> list[dict[str, Any]]:
     """Do several runs that advance together, in the lanes of the processor's registers.
 
@@ -66,6 +69,8 @@ def run_points(
         Flat parameters of the runs [SI], as `lane_groups` puts them together.
     interrupt : callable
         As `run_point` takes it.
+    more : callable
+        As `march_runs` takes it.
 
     Returns
     -------
@@ -77,7 +82,7 @@ def run_points(
     Interrupted
         With the text of `interrupt`.
     """
-    return [record for _, record in do(job, points, interrupt)]
+    return [record for _, record in do(job, points, interrupt, more=more)]
 
 
 def do(
@@ -85,12 +90,13 @@ def do(
     points: Sequence[dict[str, Any]],
     interrupt: Callable[[], str | None],
     kept: Collection[int] = (),
+    more: More = no_more,
 ) -> list[tuple[Any, dict[str, Any]]]:
     """Do a batch of runs as `run_points`; beside each record the input of `histories`, if kept."""
     model = recorded_model(job)
     if job.stepper is None:
         return [_solve(job, model, point, interrupt) for point in points]
-    return march_runs(job, points, interrupt, kept)
+    return march_runs(job, points, interrupt, kept, more)
 
 
 def _solve(

@@ -2,11 +2,16 @@
 
 Runs that advance together take little longer than one of them alone, so full lanes cost the least processor
 time. A batch fills the lanes several times. Each filling is a turn. Runs that need more than one transient
-then fill the lanes again; with more turns these lanes are fuller. But each batch is done by one rank. The
-number of turns is therefore limited, so that each rank has `PER_RANK` batches. Where even batches of one turn
-are fewer than ranks they are cut, as evenly and as far as all can still be done at once. The sweep then ends
-sooner, or at worst at the same time, since few lanes take no longer than all. The price is processor time of
-ranks that would have waited.
+then fill the lanes again; with more turns these lanes are fuller. But each batch is done by one rank. Batches
+therefore become smaller towards the end, down to one turn: none takes more than half of its rank's share of
+the work that is left (guided self-scheduling, Polychronopoulos and Kuck 1987, who take all of it).
+
+Small batches need not cost full lanes: when the first transients of a batch are done, its rank claims the
+next one, and if this is of the same kind, its runs join. What is left of all of them then fills the lanes.
+
+Where even batches of one turn are fewer than ranks they are cut, as evenly and as far as all can still be
+done at once. The sweep then ends sooner, or at worst at the same time, since few lanes take no longer than
+all. The price is processor time of ranks that would have waited.
 """
 
 from __future__ import annotations
@@ -18,7 +23,7 @@ import numpy as np
 
 Batch = tuple[int, ...]  # run indices
 Turns = Callable[[int], int]  # how many times so many runs fill the lanes
-PER_RANK = 2  # batches, so that ranks end at about the same time
+SHARE = 0.5  # of the work that is left, which one more batch for each rank may take
 
 
 class Assignment(NamedTuple):
@@ -30,10 +35,13 @@ class Assignment(NamedTuple):
         Run indices.
     alone : bool
         Whether they are done one by one, because processes have died at them, and not together.
+    joins : bool
+        Whether runs may be done with those of other batches.
     """
 
     runs: Batch
     alone: bool = False
+    joins: bool = False
 
     def parts(self) -> list[Assignment]:
         """Return the runs of each batch."""
@@ -82,11 +90,24 @@ def share_out(groups: Sequence[Batch], costs: np.ndarray, ranks: int, turns: Tur
     list of tuple of int
         Each index of `groups` once; runs of two groups never share a batch.
     """
-    most_turns = max(sum(turns(len(group)) for group in groups) // (PER_RANK * ranks), 1)
-    groups = [part for group in groups for part in in_parts(group, -(-turns(len(group)) // most_turns))]
+    groups = list(_guided(groups, costs, ranks, turns))
     most = _largest_batch(groups, ranks)
     batches = [batch for group in groups for batch in _cut(group, most)]
     return sorted(batches, key=lambda batch: (-batch_cost(batch, costs, turns), -len(batch), batch))
+
+
+def _guided(groups: Sequence[Batch], costs: np.ndarray, ranks: int, turns: Turns) -> Iterator[Batch]:
+    """Yield the parts of groups, the longest first: none of more turns than its share of the work left."""
+    left = sum(batch_cost(group, costs, turns) for group in groups)
+    for group in sorted(groups, key=lambda group: -batch_cost(group, costs)):
+        rest, a_turn = group, batch_cost(group, costs)
+        while rest:
+            whole = turns(len(rest))
+            share = int(SHARE * left / (ranks * a_turn)) if a_turn > 0.0 else whole
+            first = len(rest) * min(max(share, 1), whole) // whole
+            yield rest[:first]
+            left -= min(max(share, 1), whole) * a_turn
+            rest = rest[first:]
 
 
 def _largest_batch(groups: Sequence[Batch], ranks: int) -> int:

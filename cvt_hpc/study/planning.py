@@ -201,9 +201,10 @@ def plan_runs(
     batches = share_out(groups, costs, ranks, partial(simulator.turns, job))
     batches.sort(key=lambda batch: bool(records.died[batch[0]]))
     suspects = sorted(np.flatnonzero(suspect).tolist(), key=lambda i: (-costs[i], i))
+    kept = {*job.histories}
     lethal = tuple(index for index in suspects if records.died_alone[index])
     return [
-        *(Assignment(batch) for batch in batches),
+        *(Assignment(batch, joins=not (records.died[batch[0]] or kept & {*batch})) for batch in batches),
         *(Assignment((index,), alone=True) for index in suspects if index not in lethal),
         *([Assignment(lethal, alone=True)] if lethal else []),
     ]

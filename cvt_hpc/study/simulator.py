@@ -8,6 +8,7 @@ from typing import TYPE_CHECKING, Any, Protocol
 
 import numpy as np
 
+from cvt_hpc.study.batches import Batch
 from cvt_hpc.variables import Coordinate, Variable
 
 if TYPE_CHECKING:
@@ -36,6 +37,9 @@ class Simulator(Protocol):
     def turns(self, job: Job, runs: int) -> int:
         """Return how many groups of lanes a batch of so many runs does one after the other."""
 
+    def may_join(self, job: Job, runs: Batch, others: Batch) -> bool:
+        """Return whether other runs can be done in the batch of some, and fill the lanes with them."""
+
     def pilot_share(self, job: Job) -> float:
         """Return the share of a run's simulated time from which the cost of the whole run is estimated."""
 
@@ -46,12 +50,17 @@ class Simulator(Protocol):
         """Have the next batch take its full time, whatever runs before it have left."""
 
     def run_points(
-        self, job: Job, points: Sequence[dict[str, Any]], interrupt: Callable[[], str | None]
+        self,
+        job: Job,
+        points: Sequence[dict[str, Any]],
+        interrupt: Callable[[], str | None],
+        more: Callable[[], Sequence[dict[str, Any]]],
     ) -> Sequence[Mapping[str, Any]]:
         """Do the runs of a batch, and return their records in the order of the points.
 
         No number of a record depends on the other runs of its batch. When `interrupt()` returns a text, all
-        runs end by `Interrupted`.
+        runs end by `Interrupted`. When all runs have done their first transients, `more()` gives the points
+        of runs that join, and again when these have, until there are none.
         """
 
     def run_points_keeping(

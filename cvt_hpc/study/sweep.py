@@ -242,10 +242,19 @@ def _compute(
         # Every core has a rank of its own: threads of linear algebra would only wait for each other.
         log = RecordLog(folder.records, layout, plan.session, rank, plan.attempts)
         with one_thread(), log:
-            for runs, alone in claimed_batches(
-                plan.assignments, counter, stop.may_claim, lambda batch: stop.fits(model.upper(batch))
-            ):
-                for result in task.do(runs, stop.interrupt, partial(log.begin, alone=alone)):
+            fits = lambda batch: stop.fits(model.upper(batch))  # noqa: E731
+            claims = Claims(plan.assignments, counter, stop.may_claim, fits)
+
+            def join(runs: Batch, seconds: float) -> Batch:
+                def may_join(others: Batch) -> bool:
+                    needed = model.upper((*runs, *others)) - seconds
+                    return needed < stop.seconds_left and task.simulator.may_join(task.job, runs, others)
+
+                return () if stop.interrupt() is not None else claims.joining(may_join)
+
+            for runs, alone, joins in claims:
+                begin = partial(log.begin, alone=alone)
+                for result in task.do(runs, stop.interrupt, begin, join if joins else None):
                     keep_histories(folder, result.histories)
                     log.append(result.records)
                     counter.report(len(result.records), result.failed)
@@ -317,13 +326,8 @@ def open_counter(team: Team) -> Counter:
     return SharedCounter(team.communicator)
 
 
-def claimed_batches(
-    plan: Sequence[Assignment],
-    counter: Counter,
-    may_claim: Callable[[], bool],
-    fits: Callable[[Batch], bool],
-) -> Iterator[Assignment]:
-    """Yield the work of this rank, one batch at a time.
+class Claims:
+    """The work of this rank: iterating yields one batch at a time.
 
     Parameters
     ----------
@@ -337,12 +341,37 @@ def claimed_batches(
         Whether there is time for a batch. A batch that does not fit is passed over, and no rank does it in
         this session; shorter ones stand later in the plan.
     """
-    while may_claim():
-        position = counter.claim()
-        if position >= len(plan):
-            return
-        for place, part in enumerate(plan[position].parts()):
-            if place > 0 and not may_claim():
-                return
-            if fits(part.runs):
-                yield part
+
+    def __init__(
+        self,
+        plan: Sequence[Assignment],
+        counter: Counter,
+        may_claim: Callable[[], bool],
+        fits: Callable[[Batch], bool],
+    ) -> None:
+        self._plan, self._counter = plan, counter
+        self._may_claim, self._fits = may_claim, fits
+        self._held: Assignment | None = None  # claimed, and not begun
+
+    def __iter__(self) -> Iterator[Assignment]:
+        while self._may_claim() and (claimed := self._claim()) is not None:
+            for place, part in enumerate(claimed.parts()):
+                if place > 0 and not self._may_claim():
+                    return
+                if self._fits(part.runs):
+                    yield part
+
+    def joining(self, may_join: Callable[[Batch], bool]) -> Batch:
+        """Claim a batch that joins the one at work; no runs if there is none, or it is to be the next one."""
+        claimed = self._claim()
+        if claimed is not None and claimed.joins and may_join(claimed.runs):
+            return claimed.runs
+        self._held = claimed
+        return ()
+
+    def _claim(self) -> Assignment | None:
+        held, self._held = self._held, None
+        if held is not None:
+            return held
+        position = self._counter.claim()
+        return self._plan[position] if position < len(self._plan) else None

@@ -36,6 +36,7 @@ MOST_REFINED = 1000.0
 
 Interrupt = Callable[[], str | None]
 Begin = Callable[[Batch], None]
+Join = Callable[[Batch, float], Batch]  # of the runs at work, and their time [s]: those that join, or none
 
 _logger = logging.getLogger(__name__)
 
@@ -66,6 +67,10 @@ class Result(NamedTuple):
     def failed(self) -> int:
         """Number of runs without results."""
         return sum(bool(row["status"] != Status.DONE) for _, row in self.records)
+
+
+class _Outside(BaseException):
+    """An error while runs join, as its cause; no `except Exception` takes it for that of a run."""
 
 
 class _Trouble(NamedTuple):
@@ -116,30 +121,35 @@ class Task:
         """Return the factor of the machine by the batches on record and the predicted costs of runs [s]."""
         return fit_recorded(costs, records.timings, records.status == Status.DONE, self.turns)
 
-    def do(self, batch: Batch, interrupt: Interrupt, begin: Begin) -> Iterator[Result]:
+    def do(
+        self, batch: Batch, interrupt: Interrupt, begin: Begin, join: Join | None = None
+    ) -> Iterator[Result]:
         """Do the runs of a batch, and yield their records as they come; none of runs that are broken off.
 
         All come at once, unless an exception or the time limit ends the batch. Then its runs are done one by
         one, so that only runs that fail alone count as failed, and each record comes when its run ends.
-        `begin` is called before with the runs.
+        `begin` is called before with the runs, and again with all of them when others have joined.
         """
+        runs = [*batch]
         try:
-            result, trouble = self._attempt(batch, interrupt, begin)
+            result, trouble = self._attempt(runs, interrupt, begin, join)
             if trouble is None:
                 yield result
-            elif len(batch) == 1:
-                yield self._failure(batch[0], trouble)
+            elif len(runs) == 1:
+                yield self._failure(runs[0], trouble)
             else:
-                yield from self._do_one_by_one(batch, trouble, interrupt, begin)
+                yield from self._do_one_by_one(runs, trouble, interrupt, begin)
         except self.simulator.Interrupted:
             return
+        except _Outside as outside:
+            raise outside.__cause__ or outside from None
 
     def _do_one_by_one(
-        self, batch: Batch, trouble: _Trouble, interrupt: Interrupt, begin: Begin
+        self, batch: Sequence[int], trouble: _Trouble, interrupt: Interrupt, begin: Begin
     ) -> Iterator[Result]:
         found = False
         for index in batch:
-            result, own_trouble = self._attempt((index,), interrupt, begin)
+            result, own_trouble = self._attempt([index], interrupt, begin)
             found = found or own_trouble is not None
             yield result if own_trouble is None else self._failure(index, own_trouble)
         if not found:
@@ -147,19 +157,35 @@ class Task:
             runs = ", ".join(map(str, batch))
             _logger.warning("runs %s, done together, %s; none of them does alone", runs, trouble.in_company)
 
-    def _attempt(self, batch: Batch, interrupt: Interrupt, begin: Begin) -> tuple[Result, _Trouble | None]:
-        """Return the records of all runs, or none and the reason why the batch ended."""
-        begin(batch)
-        watch = _Watch(interrupt, self.run_limit * self.turns(len(batch)))
+    def _attempt(
+        self, runs: list[int], interrupt: Interrupt, begin: Begin, join: Join | None = None
+    ) -> tuple[Result, _Trouble | None]:
+        """Return the records of all runs, or none and the reason why the batch ended; `runs` grows."""
+        begin(tuple(runs))
+        watch = _Watch(interrupt, self.run_limit * self.turns(len(runs)))
+
+        def more() -> Sequence[dict[str, Any]]:
+            further: Batch = ()
+            try:
+                if join is not None:
+                    further = join(tuple(runs), watch.elapsed())
+                if further:
+                    runs.extend(further)
+                    begin(tuple(runs))
+                    watch.limit = self.run_limit * self.turns(len(runs))
+            except Exception as error:
+                raise _Outside from error
+            return self._points(further)
+
         try:
-            points = [point_at_step(self.job, index, self.steps) for index in batch]
-            kept = [place for place, index in enumerate(batch) if index in self.job.histories]
+            points = self._points(runs)
+            kept = [place for place, index in enumerate(runs) if index in self.job.histories]
             if kept:
                 found, histories = self.simulator.run_points_keeping(self.job, points, watch, kept)
             else:
-                found, histories = self.simulator.run_points(self.job, points, watch), {}
-            records = [(index, self._pack(values)) for index, values in zip(batch, found, strict=True)]
-            named = [(batch[place], history) for place, history in histories.items()]
+                found, histories = self.simulator.run_points(self.job, points, watch, more), {}
+            records = [(index, self._pack(values)) for index, values in zip(runs, found, strict=True)]
+            named = [(runs[place], history) for place, history in histories.items()]
             return Result(records, watch.elapsed(), named), None
         except self.simulator.Interrupted:
             if not watch.is_over:
@@ -169,6 +195,9 @@ class Task:
         except Exception as error:  # one run's defect must not cost the others
             words = _in_words(error)
             return Result([]), _Trouble(Status.FAILED_ERROR, words, f"raised {words}")
+
+    def _points(self, runs: Sequence[int]) -> list[dict[str, Any]]:
+        return [point_at_step(self.job, index, self.steps) for index in runs]
 
     def _failure(self, index: int, trouble: _Trouble) -> Result:
         return Result([(index, self.study.pack_failure(trouble.reason, trouble.status))])
@@ -196,8 +225,8 @@ class _Watch:
 
     def __init__(self, interrupt: Interrupt, limit: float) -> None:
         self.is_over = False
+        self.limit = limit
         self._interrupt = interrupt
-        self._limit = limit
         self._started: float | None = None
 
     def __call__(self) -> str | None:
@@ -205,7 +234,7 @@ class _Watch:
         if self._started is None:
             self._started = time.monotonic()
         reason = self._interrupt()
-        if reason is None and self.elapsed() > self._limit:
+        if reason is None and self.elapsed() > self.limit:
             self.is_over = True
             reason = "run limit"
         return reason

@@ -39,7 +39,7 @@ def run_point(job, point, interrupt):
     }
 
 
-def run_points(job, points, interrupt):
+def run_points(job, points, interrupt, more=None):
     return [run_point(job, point, interrupt) for point in points]
 
 

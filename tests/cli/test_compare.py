@@ -17,7 +17,7 @@ def contrary_at(load, monkeypatch):
 
     run_points = double.run_points
 
-    def contrary(job, points, interrupt):
+    def contrary(job, points, interrupt, more):
         records = run_points(job, points, interrupt)
         for point, record in zip(points, records, strict=True):
             if point["load"] == load:

@@ -32,7 +32,7 @@ VARIABLES = (
 )
 
 
-def run_points(job, points, interrupt):
+def run_points(job, points, interrupt, more=None):
     """Vibrate above 20 N m by 10 um, or more at long steps; what step a run takes depends on its load."""
     return [_record(point) for point in points]
 
@@ -178,7 +178,7 @@ def test_a_check_that_was_stopped_goes_on(checked, undrawn, tmp_path, monkeypatc
     whole_loads, steps = loads(tmp_path / "out/x/check_step/results.nc")
     done = []
 
-    def stopping(job, points, interrupt):
+    def stopping(job, points, interrupt, more):
         if points[0]["step"] < STEP:
             done.append(points[0]["load"])
             if len(done) == 4:

@@ -52,7 +52,7 @@ def window(toy, monkeypatch, tmp_path):
     """Put the double in place, in a folder of its own; return the number of runs that it has done, in a list."""
     done = []
 
-    def run_points(job, points, interrupt):
+    def run_points(job, points, interrupt, more=None):
         done.extend(points)
         return [run_point(job, point, interrupt) for point in points]
 

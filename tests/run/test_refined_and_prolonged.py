@@ -160,6 +160,30 @@ def test_a_run_that_ends_early_is_the_shorter_run(monkeypatch, shortest, certain
     assert_same_bits(found, run_point(asked(), point(**asked_at_once), never))
 
 
+@pytest.mark.parametrize(
+    ("verdicts", "parts"),  # at one, two and four parts of a run, and how many it takes
+    [
+        ((Vibrates.NO, Vibrates.YES, Vibrates.YES), 1),
+        ((Vibrates.YES, Vibrates.YES, Vibrates.NO), 2),
+        ((Vibrates.YES, Vibrates.NO, Vibrates.YES), 2),
+        ((Vibrates.UNDECIDED, Vibrates.YES, Vibrates.NO), 4),
+    ],
+)
+def test_a_vibration_ends_a_run_early_only_if_found_twice_in_a_row(monkeypatch, verdicts, parts):
+    assess = assessment.assess
+
+    def scripted(displacement, rate, strands, parameters):
+        look = round(np.log2(len(displacement) / rate / T))
+        return replace(assess(displacement, rate, strands, parameters), vibrates=verdicts[look])
+
+    monkeypatch.setattr(assessment, "assess", scripted)
+    is_decided = lambda record, *_: record["vibrates"] != Vibrates.UNDECIDED  # noqa: E731
+    monkeypatch.setattr(marching, "is_certain", is_decided)
+    found = run_point(asked(), point(duration=4 * T, shortest_duration=T), never)
+    assert found["simulated_seconds"] == pytest.approx(parts * T)
+    assert found["vibrates"] == verdicts[round(np.log2(parts))]
+
+
 def test_an_odd_number_of_samples_is_halved_and_met_again(monkeypatch):
     monkeypatch.setattr(marching, "is_certain", lambda *_: False)
     whole = {"duration": 2 * T + 3 / 20e3, "longest_duration": 0.0, "judged_fraction": 0.45}

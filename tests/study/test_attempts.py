@@ -84,7 +84,7 @@ def test_only_a_death_counts_as_one(start, tmp_path, name, deaths):
 
 def test_a_batch_that_ends_before_the_first_record_leaves_no_file(tmp_path):
     class Stopped(Simulator):
-        def run_points(self, job, points, interrupt):
+        def run_points(self, job, points, interrupt, more=None):
             os.kill(os.getpid(), signal.SIGTERM)
             raise self.Interrupted(interrupt())
 
@@ -120,7 +120,7 @@ def test_the_plan_puts_the_suspicious_last(tmp_path):
     assert records.died.tolist() == [1, 1, 1, 1, 3, 3, 0, 3, 4, 3, 0, 0]
     assert records.died_alone.tolist() == [0] * 8 + [1] + [0] * 3
     assert plan_runs(JOB, Simulator(lanes=4), records, ALL, ranks=1) == [
-        Assignment((6, 11)),
+        Assignment((6, 11), joins=True),
         Assignment((0, 1, 2, 3)),
         *[Assignment((index,), alone=True) for index in (4, 5, 7, 9)],
         Assignment((8,), alone=True),
@@ -138,7 +138,8 @@ def test_only_the_runs_asked_for_are_planned_retried_and_given_up(tmp_path):
     marks = [((1, 2), False)] * 3 + [((1,), True), ((2,), True)] * 2 + [((4, 5), False)]
     records = marked(tmp_path, *marks, records=[(4, 5)])
     asked = np.isin(np.arange(12), (1, 4, 6))
-    planned = [index for runs, _ in plan_runs(JOB, Simulator(), records, asked, 1) for index in runs]
+    plan = plan_runs(JOB, Simulator(), records, asked, 1)
+    planned = [index for assignment in plan for index in assignment.runs]
     assert sorted(planned) == [1, 6]
     assert list(given_up(records, asked)) == [1]
     assert runs_to_repeat(records, asked, [Status.FAILED_ERROR]).tolist() == [4]
@@ -194,7 +195,7 @@ def test_groups_that_a_batch_does_one_after_the_other_have_the_limit_each(tmp_pa
         def turns(self, job, runs):
             return -(-runs // 2)
 
-        def run_points(self, job, points, interrupt):
+        def run_points(self, job, points, interrupt, more=None):
             for _ in range(-(-len(points) // 2)):
                 interrupt()
                 self.now += 2.0
@@ -212,7 +213,7 @@ def test_groups_that_a_batch_does_one_after_the_other_have_the_limit_each(tmp_pa
 
 def test_a_batch_beyond_the_limit_whose_runs_are_not_is_pointed_out(tmp_path, caplog):
     class Crowded(Simulator):
-        def run_points(self, job, points, interrupt):
+        def run_points(self, job, points, interrupt, more=None):
             while len(points) > 1 and not (reason := interrupt()):
                 pass
             if len(points) > 1:

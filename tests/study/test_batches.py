@@ -2,16 +2,21 @@
 
 import logging
 import re
+import time
+from functools import partial
 
 import numpy as np
 import pytest
 from hypothesis import given
 from hypothesis import strategies as st
 
+from cvt_hpc.files import StorageError
 from cvt_hpc.study import open_results, run
 from cvt_hpc.study.batches import batch_cost, share_out
 from cvt_hpc.study.forecast.cost_model import CostModel
 from cvt_hpc.study.record.log import RECORD, RecordLog
+from cvt_hpc.study.status import find_records
+from cvt_hpc.study.sweep import Claims
 from cvt_hpc.variables import Status
 from support.recorded import assert_same_numbers
 from support.study_double import Axis, Job, Simulator
@@ -102,7 +107,7 @@ class Listening(Simulator):
         super().__init__(**options)
         self.batches = []
 
-    def run_points(self, job, points, interrupt):
+    def run_points(self, job, points, interrupt, more=None):
         self.batches.append([point["load"] for point in points])
         return super().run_points(job, points, interrupt)
 
@@ -136,7 +141,7 @@ def test_a_run_that_raises_costs_its_batch_nothing(tmp_path):
 
 def test_a_batch_that_fails_without_a_culprit_is_pointed_out(tmp_path, caplog):
     class Crossed(Listening):
-        def run_points(self, job, points, interrupt):
+        def run_points(self, job, points, interrupt, more=None):
             records = super().run_points(job, points, interrupt)
             if self.batches[-1] == [0, 1, 2]:
                 raise FloatingPointError("lanes are crossed")
@@ -159,7 +164,7 @@ def test_a_culprit_is_reported_as_a_failed_run_and_not_twice(tmp_path, caplog):
 
 def test_a_batch_that_is_interrupted_while_it_is_done_one_by_one_keeps_what_is_done(tmp_path, caplog):
     class Stopped(Simulator):
-        def run_points(self, job, points, interrupt):
+        def run_points(self, job, points, interrupt, more=None):
             if len(points) == 1 and points[0]["load"] == 6:
                 raise self.Interrupted("SIGTERM")
             return super().run_points(job, points, interrupt)
@@ -172,7 +177,7 @@ def test_a_batch_that_is_interrupted_while_it_is_done_one_by_one_keeps_what_is_d
 
 def test_a_defective_record_costs_its_own_run_only(tmp_path):
     class Defective(Listening):
-        def run_points(self, job, points, interrupt):
+        def run_points(self, job, points, interrupt, more=None):
             records = super().run_points(job, points, interrupt)
             return [
                 r | {"steps": "many"} if p["load"] == 5 else r for r, p in zip(records, points, strict=True)
@@ -216,31 +221,122 @@ def test_the_rest_of_a_sweep_is_grouped_anew(tmp_path):
     assert batches == [[2, 7, 9]]
 
 
+TURNS = lambda count: -(-count // 16)  # noqa: E731
+
+
 @pytest.mark.parametrize(
     ("runs", "ranks", "sizes"),
     [
-        (512, 1, [256, 256]),  # at most 16 turns of 16 runs
-        (512, 4, [64] * 8),  # two batches for each rank
-        (190, 1, [95, 95]),
-        (190, 3, [32, 32, 32, 32, 31, 31]),
+        (512, 1, [256, 128, 64, 32, 16, 16]),  # at most 16 turns of 16 runs
+        (512, 4, [64] + [48] * 2 + [32] * 4 + [16] * 14),
+        (190, 1, [95, 47, 16, 16, 16]),
         (190, 12, [16] * 10 + [15] * 2),  # turns are not cut as long as ranks have one each
         (190, 13, [16] * 10 + [15] * 2),
         (190, 24, [8] * 22 + [7] * 2),
     ],
 )
-def test_batches_have_as_many_turns_as_leave_two_for_each_rank(runs, ranks, sizes):
-    groups, turns = chunks(runs, 256), lambda count: -(-count // 16)
-    batches = share_out(groups, np.ones(runs), ranks, turns)
-    assert sorted(map(len, batches), reverse=True) == sizes
+def test_batches_become_smaller_towards_the_end(runs, ranks, sizes):
+    batches = share_out(chunks(runs, 256), np.ones(runs), ranks, TURNS)
+    assert list(map(len, batches)) == sizes
     assert sorted(index for batch in batches for index in batch) == list(range(runs))
+
+
+@given(
+    st.lists(st.tuples(st.integers(1, 256), st.floats(0.0, 3.0)), min_size=1, max_size=30),
+    st.sampled_from([1, 2, 3, 16, 1000]),
+)
+def test_no_batch_takes_more_than_its_share_of_the_work_that_is_left(drawn, ranks):
+    ends = np.cumsum([size for size, _ in drawn])
+    groups = [tuple(range(end - size, end)) for (size, _), end in zip(drawn, ends, strict=True)]
+    costs = np.concatenate([np.full(size, np.exp(level)) for size, level in drawn])
+    batches = share_out(groups, costs, ranks, TURNS)
+    assert sorted(index for batch in batches for index in batch) == list(range(costs.size))
+    assert all(any(set(batch) <= set(group) for group in groups) for batch in batches)
+    taken = [batch_cost(batch, costs, TURNS) for batch in batches]
+    assert taken == sorted(taken, reverse=True)
+    for batch, cost in zip(batches, taken, strict=True):
+        assert TURNS(len(batch)) == 1 or cost <= 0.5 * sum(taken) / ranks * (1 + 1e-9)
+
+
+class Joining(Listening):
+    """Runs that others join, up to `most` turns of all lanes; notes the batches as they are in the end."""
+
+    def __init__(self, most=3, **options):
+        super().__init__(**options)
+        self.most = most
+
+    def turns(self, job, runs):
+        return -(-runs // self.lanes)
+
+    def may_join(self, job, runs, others):
+        return len(runs) + len(others) <= self.most * self.lanes
+
+    def run_points(self, job, points, interrupt, more=lambda: ()):
+        points, interrupted = [*points], interrupt()
+        while further := more():
+            points += further
+        return super().run_points(job, points, lambda: interrupted)
+
+
+@pytest.mark.parametrize(("lanes", "most", "sizes"), [(4, 3, [12, 8]), (3, 16, [20]), (7, 1, [7, 7, 6])])
+def test_batches_join_up_to_so_many_turns_and_leave_no_trace_in_the_results(tmp_path, lanes, most, sizes):
+    sweep(tmp_path / "singles", 1)
+    report, batches = batches_of(tmp_path / "joined", lanes, simulator=partial(Joining, most))
+    assert list(map(len, batches)) == sizes
+    assert report.done == RUNS
+    with open_results(tmp_path / "singles") as one, open_results(tmp_path / "joined") as other:
+        assert_same_numbers(other, one)
+
+
+def test_the_time_of_a_batch_that_others_have_joined_is_on_record_from_its_beginning(tmp_path):
+    class Ticking(Joining):
+        def run_points(self, job, points, interrupt, more=lambda: ()):
+            def later():
+                time.sleep(0.02)
+                return more()
+
+            return super().run_points(job, points, interrupt, later)
+
+    job = Job((Axis("load", tuple(range(RUNS))),))
+    sweep(tmp_path, 2, job, lambda lanes: Ticking(4, lanes=lanes))
+    timings = find_records(tmp_path, job).timings
+    assert [timing.batch for timing in timings] == [tuple(range(8, 16)), tuple(range(16, 20))]
+    assert timings[0].seconds > 4 * 0.02 - 0.005 and timings[1].seconds > 2 * 0.02 - 0.005
+
+
+def test_runs_that_have_joined_are_done_one_by_one_with_the_rest_where_one_raises(tmp_path):
+    job = Job((Axis("load", tuple(range(12))),), {"raise_at": 6})
+    report, batches = batches_of(tmp_path, 4, job, partial(Joining, 2))
+    assert batches == [[*range(8)], *([k] for k in range(8)), [8, 9, 10, 11]]
+    assert (report.done, [failed.index for failed in report.failed]) == (11, [6])
+
+
+def test_a_batch_that_is_stopped_after_others_have_joined_leaves_no_mark(tmp_path):
+    class Stopped(Joining):
+        def run_points(self, job, points, interrupt, more=lambda: ()):
+            while more():
+                pass
+            raise self.Interrupted("SIGTERM")
+
+    report = sweep(tmp_path, 4, simulator=lambda lanes: Stopped(lanes=lanes))
+    assert (report.done, report.remaining) == (0, RUNS)
+    assert list((tmp_path / "records").iterdir()) == []
+
+
+def test_an_error_of_a_claim_is_no_failure_of_the_runs_at_work(tmp_path, monkeypatch):
+    def refused(claims, may_join):
+        raise StorageError("the disk is full")
+
+    monkeypatch.setattr(Claims, "joining", refused)
+    with pytest.raises(StorageError, match="the disk is full"):
+        sweep(tmp_path, 4, simulator=lambda lanes: Joining(lanes=lanes))
+    assert find_records(tmp_path, Job((Axis("load", tuple(range(RUNS))),))).recorded.sum() == 0
 
 
 def test_a_batch_of_more_turns_is_predicted_to_take_longer():
     turns = lambda count: -(-count // 2)  # noqa: E731
     costs = np.array([1.0, 1.0, 1.0, 0.6, 0.6, 0.6, 1.5])
     assert batch_cost((0, 1), costs, turns) == 1.0 and batch_cost((0, 1, 2), costs, turns) == 2.0
-    groups = [(3, 4, 5), (6,), (0, 1, 2)]
-    assert share_out(groups, costs, 1, turns) == [(0, 1, 2), (6,), (3, 4, 5)]
     model = CostModel(costs, turns=turns)
     model.learn((0, 1, 2), 6.0)
     assert model.fit.likely() == pytest.approx(3.0)

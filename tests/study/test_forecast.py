@@ -132,7 +132,7 @@ class Timed(Simulator):
     def run_costs(self, job):
         return super().run_costs(job) * job.parameters["duration"]
 
-    def run_points(self, job, points, interrupt):
+    def run_points(self, job, points, interrupt, more=None):
         interrupt()
         self.clock.now += 3.0 * points[0]["duration"]
         self.clock.done.append(tuple(point[job.axes[0].name] for point in points))

@@ -31,7 +31,7 @@ class Counting(Simulator):
         super().__init__(lanes=4)
         self.points = []
 
-    def run_points(self, job, points, interrupt):
+    def run_points(self, job, points, interrupt, more=None):
         self.points += points
         return super().run_points(job, points, interrupt)
 

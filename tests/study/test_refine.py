@@ -153,7 +153,7 @@ def test_runs_of_different_steps_share_no_batch(tmp_path):
     batches = []
 
     class Watched(Diverging):
-        def run_points(self, job, points, interrupt):
+        def run_points(self, job, points, interrupt, more=None):
             batches.append([(point["load"], point["step"]) for point in points])
             return super().run_points(job, points, interrupt)
 

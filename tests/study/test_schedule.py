@@ -4,13 +4,13 @@ import json
 
 from cvt_hpc.study.batches import Assignment
 from cvt_hpc.study.ranks.progress import Counter
-from cvt_hpc.study.sweep import claimed_batches
+from cvt_hpc.study.sweep import Claims
 
 PLAN = [Assignment((5, 2)), Assignment((9,)), Assignment((0, 1, 3))]
 
 
 def claimed(counter, may_claim=lambda: True, fits=lambda batch: True, plan=PLAN):
-    return list(claimed_batches(plan, counter, may_claim, fits))
+    return list(Claims(plan, counter, may_claim, fits))
 
 
 def claim_under_mpi(start, ranks, options, environment=None):
@@ -86,3 +86,15 @@ def test_runs_that_are_to_be_done_alone_come_one_by_one():
     assert claimed(Counter(), fits=lambda batch: batch != (5,), plan=plan) == [*singles[::2], plan[1]]
     answers = iter([True, True, False])
     assert claimed(Counter(), lambda: next(answers), plan=plan) == singles[:2]
+
+
+def test_batches_join_in_the_order_of_the_plan_until_one_has_to_be_done_apart():
+    plan = [Assignment((k,), joins=k != 3) for k in range(6)]
+    claims = Claims(plan, Counter(), lambda: True, lambda batch: True)
+    work = iter(claims)
+    assert next(work).runs == (0,)
+    assert [claims.joining(lambda runs: runs == (1,)) for _ in range(2)] == [(1,), ()]
+    assert next(work).runs == (2,)  # claimed already, and not lost
+    assert claims.joining(lambda runs: True) == ()
+    assert [claimed.runs for claimed in work] == [(3,), (4,), (5,)]
+    assert claims.joining(lambda runs: True) == ()

@@ -140,7 +140,11 @@ class Simulator:
         pass
 
     def run_points(
-        self, job: Job, points: Sequence[dict[str, Any]], interrupt: Callable[[], str | None]
+        self,
+        job: Job,
+        points: Sequence[dict[str, Any]],
+        interrupt: Callable[[], str | None],
+        more: Callable[[], Sequence[dict[str, Any]]] | None = None,
     ) -> list[dict[str, Any]]:
         return [self.run_point(job, point, interrupt) for point in points]
 

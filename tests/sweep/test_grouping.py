@@ -44,12 +44,20 @@ class Grouped:
     def __getattr__(self, name):
         return getattr(simulation, name)
 
+    def may_join(self, job, runs, others):
+        return self.size > 1
+
     def lane_groups(self, job, indices):
         return [tuple(indices[i : i + self.size]) for i in range(0, len(indices), self.size)]
 
-    def run_points(self, job, points, interrupt):
+    def run_points(self, job, points, interrupt, more):
+        def noted():
+            joining = more()
+            self.done += [-len(joining)] if joining else []
+            return joining
+
         self.done.append(len(points))
-        return simulation.run_points(job, points, interrupt)
+        return simulation.run_points(job, points, interrupt, noted)
 
 
 @pytest.fixture(scope="module")
@@ -64,7 +72,7 @@ def swept(simulator, folder):
         return dataset.load()
 
 
-@pytest.mark.parametrize(("size", "batches"), [(4, [4, 2]), (6, [6])])
+@pytest.mark.parametrize(("size", "batches"), [(4, [4, -2]), (6, [6])])  # with a sign: that have joined
 def test_numbers_do_not_depend_on_the_batch(singles, tmp_path, size, batches):
     simulator = Grouped(size)
     dataset = swept(simulator, tmp_path)
@@ -102,8 +110,15 @@ def test_groups_are_of_one_kind_and_no_larger_than_may_be(monkeypatch):
     for seconds, sizes in ((1.9 * predicted, [2, 3]), (2.1 * predicted, [5])):
         monkeypatch.setattr(record, "BATCH_SECONDS", seconds)
         assert list(map(len, simulation.lane_groups(many, range(5)))) == sizes
+        assert simulation.may_join(many, (0, 1), (2, 3, 4)) == (sizes == [5])
     general = job({"load": [0.0, 60.0]}, "symplectic_euler")  # takes one run at a time
     assert simulation.lane_groups(general, [0, 1]) == [(0,), (1,)]
+    assert not simulation.may_join(general, (0,), (1,))
+
+
+def test_runs_of_one_kind_may_join():
+    asked = job({"load": [0.0, 20.0], "stations": [48, 64]})
+    assert simulation.may_join(asked, (0,), (2,)) and not simulation.may_join(asked, (0,), (1,))
 
 
 def test_runs_of_one_belt_advance_together_at_one_ratio_only():
@@ -147,12 +162,12 @@ class Impatient:
     def __getattr__(self, name):
         return getattr(simulation, name)
 
-    def run_points(self, job, points, interrupt):
+    def run_points(self, job, points, interrupt, more):
         def impatient():
             self.left -= 1
             return "no time" if self.left == 0 else interrupt()
 
-        return simulation.run_points(job, points, impatient)
+        return simulation.run_points(job, points, impatient, more)
 
 
 @pytest.fixture

@@ -261,9 +261,14 @@ class Stop:
             raise self._death
         return may
 
+    @property
+    def seconds_left(self) -> float:
+        """Time [s] until the limit."""
+        return self._deadline - time.monotonic()
+
     def fits(self, seconds: float) -> bool:
         """Return whether there is so much time [s] left."""
-        left = self._deadline - time.monotonic()
+        left = self.seconds_left
         late = seconds > left
         if late and not self._late:
             self._late = (

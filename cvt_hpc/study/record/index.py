@@ -266,6 +266,7 @@ class _Trace:
         self.refinements: dict[log.Place, float] = {}
         self._refine = refine
         self._mark: log.Frame | None = None
+        self._began = 0.0
         self._at_work: dict[int, int] = {}
 
     def follow(self, frame: log.Frame) -> None:
@@ -276,11 +277,14 @@ class _Trace:
             was_at_work = self._at_work.pop(index, None) is not None
             if self._mark is not None and was_at_work and not self._at_work:
                 batch = tuple(index for index, _ in self._mark.places)
-                self.timings.append(Timing(batch, frame.written - self._mark.written))
+                self.timings.append(Timing(batch, frame.written - self._began))
         elif frame.kind == log.AGAIN:
             self.refinements |= dict.fromkeys(frame.places, self._refine)
         else:
-            self._mark, self._at_work = frame, dict(frame.places)
+            places = dict(frame.places)
+            if not (self._at_work and self._at_work.keys() <= places.keys()):  # else other runs have joined
+                self._began = frame.written
+            self._mark, self._at_work = frame, places
 
     def deaths(self) -> set[_Death]:
         """Return a death at each run that the process was at in the end."""

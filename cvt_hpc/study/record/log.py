@@ -248,7 +248,7 @@ class RecordLog:
         self._open_mark: int | None = None  # where the mark of the batch at work begins [byte]
 
     def begin(self, batch: Sequence[int], *, alone: bool = False) -> None:
-        """Write that this process is at work at some runs.
+        """Write that this process is at work at some runs, and at no others.
 
         Parameters
         ----------
@@ -263,7 +263,8 @@ class RecordLog:
             If the system refuses the write.
         """
         mark = self._layout.mark(ALONE if alone else BEGUN, self._places(batch), self._now())
-        self._open_mark = self._append(mark)
+        written = self._append(mark)
+        self._open_mark = written if self._open_mark is None else self._open_mark
 
     def begin_again(self, indices: Iterable[int]) -> None:
         """Write that the earlier records of some runs count no more; errors as for `begin`."""
