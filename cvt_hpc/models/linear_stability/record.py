@@ -87,7 +87,7 @@ def solve(parameters: Mapping[str, Any]) -> Solution:
     means = quantities(steady, grid)
     tension, push = means["mean_ring_tension"], means["mean_push_force"]
     band = steady_band(
-        p | {"driving_speed": driving_speed(steady)}, (tension[0] - push[0], tension[1] - push[1])
+        {**p, "driving_speed": driving_speed(steady)}, (tension[0] - push[0], tension[1] - push[1])
     )
     return Solution(means, modes(steady, grid, band), band[0], np.array(grid.starts), p["undecided_growth"])
 
