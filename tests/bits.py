@@ -217,7 +217,7 @@ def do_study(name: str, document: dict, folder: Path) -> None:
     model = name.split()[0]
     job = build_job({"name": "bits", "model": model, **document})
     run(job, folder, progress=False)
-    if hasattr(load_model(model), "transient"):
+    if load_model(model).has_histories:
         write_history(simulate(job, job.point(0)), folder / "history.nc")
 
 
