@@ -88,7 +88,7 @@ STUDIES: dict[str, dict] = {
         "belt": {"elements": 48},
         "record": {"sampling_rate": "1 kHz"},
         "run": {"duration": "0.17 s", "longest_duration": "0.17 s"},
-        "vibration": {"band_low": "60 Hz", "band_high": "250 Hz"},
+        "vibration": {"band_low": "60 Hz", "band_high": "250 Hz", "amplitude_threshold": "10 mm"},
     },
     "criterion": {
         "axes": {"friction_gradient": ["-2.0 s/m", "-0.2 s/m"], "radial_speed": ["10 mm/s", "0.1 m/s"]}

@@ -112,6 +112,9 @@ def test_reason_amplitude_frequency_and_spectrum_are_of_one_motion(first, sizes,
     spectrum = amplitude_spectrum(moved[len(moved) // 2 :], RATE, bins)
     inside = bins >= found.lower_band_edge + 10.0
     strongest = bins[inside][np.argmax(spectrum[inside])]
-    assert abs(strongest - found.strongest_frequency[0]) <= 5.01
+    # of lines that are as strong either may be told
+    largest = np.array([f for f, a in lines.items() if a > 0.98 * max(lines.values())])
+    for told_frequency, off in ((strongest, 5.01), (found.strongest_frequency[0], 0.25)):
+        assert np.abs(largest - told_frequency).min() <= off
     assert spectrum[inside].max() == pytest.approx(max(lines.values()), rel=0.02)
     assert found.frequency[0] == pytest.approx(first, abs=0.25)
