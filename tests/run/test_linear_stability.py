@@ -11,7 +11,7 @@ from cvt_hpc.models.elastic_belt.belt import mesh
 from cvt_hpc.models.elastic_belt.one_system import rates, system
 from cvt_hpc.models.elastic_belt.parameters import PARAMETERS
 from cvt_hpc.models.linear_stability.branch import branch, onsets
-from cvt_hpc.models.linear_stability.modes import DECAY, HIGH, LOW, modes
+from cvt_hpc.models.linear_stability.modes import DECAY, HIGH, LOW, loosened, modes
 from cvt_hpc.models.linear_stability.spectrum import eigenpairs
 from cvt_hpc.models.steady_variator.walking import SteadyBelt
 from cvt_hpc.study import open_results, run
@@ -166,6 +166,22 @@ def test_record():
     above = rung_record("linear_stability", load=120.0, stations=96, band_low=record["frequency"] + 1.0)
     assert above["lower_band_edge"] == record["frequency"] + 1.0 < above["frequency"]
     assert rung_record("linear_stability", load=80.0, stations=48)["vibrates"] == Vibrates.NO
+
+
+def test_a_verdict_holds_whether_elements_that_hardly_touch_do_or_not():
+    parameters = COARSE | {"load": 120.0}
+    steady, grid = SteadyBelt(parameters).at(120.0), mesh(parameters)
+    loose = loosened(steady)
+    opened = np.flatnonzero((loose.state.fields != steady.state.fields).any(axis=0))
+    # all of t2 that no push reaches, and no element that is pressed by more
+    assert opened.size > 10 and (grid.region[opened] == 3).all()
+    assert loosened(loose) is None and loosened(SteadyBelt(parameters).at(60.0)) is None
+    closed, open_ = (modes(state, grid)[0].growth for state in (steady, loose))
+    assert 0.0 < open_ < closed - 10.0
+    record = rung_record("linear_stability", load=120.0, stations=96, undecided_growth=0.5 * (open_ + closed))
+    assert record["growth_rate"] == pytest.approx(closed, rel=1e-4)
+    assert record["loosened_growth_rate"] == pytest.approx(open_, rel=1e-4)
+    assert record["vibrates"] == Vibrates.UNDECIDED and "hardly touch" in record["reason"]
 
 
 def test_a_sweep_of_it_keeps_the_conventions(tmp_path):

@@ -14,8 +14,10 @@ from typing import NamedTuple
 
 import numpy as np
 
+from cvt_hpc.models.elastic_belt import fields as f
 from cvt_hpc.models.elastic_belt.belt import MODES, Mesh
 from cvt_hpc.models.elastic_belt.one_system import flat_belt, pack, rates
+from cvt_hpc.models.elastic_belt.rhs import strains
 from cvt_hpc.models.linear_stability.spectrum import eigenpairs
 from cvt_hpc.models.steady_variator.equations import LATE
 from cvt_hpc.models.steady_variator.linearised import Linearisation
@@ -23,6 +25,8 @@ from cvt_hpc.models.steady_variator.walking import Steady
 
 LOW, HIGH = 100.0, 1500.0  # [Hz]: the band of strands
 DECAY, GROWTH = 400.0, 5000.0  # [1/s]: modes that decay or grow faster are left out
+LOOSE = 0.1  # [N], of the default scene: a push that any vibration overcomes
+APART = 1e-8  # strain of elements that are taken as apart
 
 
 class Mode(NamedTuple):
@@ -103,6 +107,23 @@ def modes(
             Mode(float(value.real), frequency, *shape, power.reshape(3, n).sum(axis=0), vector[:n], vector)
         )
     return found
+
+
+def loosened(steady: Steady) -> Steady | None:
+    """The state with those elements apart that touch with a push below LOOSE; None where there are none.
+
+    Transverse damping alone holds the elements of an unloaded strand together, by some 0.01 N. A growth rate
+    belongs to closed elements or to open ones there, and a vibration goes through both.
+    """
+    belt, state = steady.belt, steady.state.copy()
+    eps = np.empty((2, belt.cell.size))
+    strains(belt, state.fields, eps)
+    push = -belt.element_stiffness * eps[0]
+    loose = (push >= 0.0) & (push < LOOSE * belt.measures.force)
+    if not loose.any():
+        return None
+    state.fields[f.N_ELEMENT, loose] *= (1.0 + eps[0, loose]) / (1.0 + APART)
+    return steady._replace(state=state)
 
 
 def _shape(w: np.ndarray, grid: Mesh) -> tuple[np.ndarray, int, int]:
