@@ -18,7 +18,7 @@ PARAMETERS: dict[str, dict[str, Parameter]] = {
         "shortest_duration": not_negative(
             0.0,
             "s",
-            "from which on a run ends as soon as its verdict is certain; 0: the duration",
+            "from which on a run ends once its verdict is certain, of a vibration twice; 0: the duration",
             sensible=(0.001, 200.0),
         ),
         "longest_duration": not_negative(

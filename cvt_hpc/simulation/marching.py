@@ -153,12 +153,10 @@ class OpenRun:
         p = run.parameters
         taken, whole = sample_count(p), sample_count(self._point)
         samples = min(2 * taken, whole) if taken < whole else 2 * taken
-        duration = samples / p["sampling_rate"]
+        duration = self._point["duration"] if samples == whole else samples / p["sampling_rate"]
         is_too_long = duration > longest_duration(self._point) * (1.0 + 1e-9)
         if is_too_long or ramped(p):
             return None
-        if samples == whole:
-            duration = self._point["duration"]
         judged = min(self._point["judged_fraction"], 1.0 - taken / samples)
         return p | {"duration": duration, "judged_fraction": judged}
 

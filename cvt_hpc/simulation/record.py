@@ -52,7 +52,7 @@ _MARCH = (
 )
 COMMON = (*_VERDICT, *_COST, *_MARCH)  # of all models; those without a march have none of its
 
-EARLY_SHARE = 0.55  # of the first transient where runs may end at a quarter of it, as measured there, too
+EARLY_SHARE = 0.58  # of the first transient where runs may end at a quarter of it, as measured there, too
 LEFT_SHARE = 1.0  # extra cost of refined and prolonged runs in a map, as measured by lebrecht_2004.toml
 _MOST_ESTIMATED = 2_000  # runs whose costs are averaged
 BATCH_SECONDS = 30.0  # of computing in a batch, as predicted: so much a process that dies may lose

@@ -98,9 +98,10 @@ def share_out(groups: Sequence[Batch], costs: np.ndarray, ranks: int, turns: Tur
 
 def _guided(groups: Sequence[Batch], costs: np.ndarray, ranks: int, turns: Turns) -> Iterator[Batch]:
     """Yield the parts of groups, the longest first: none of more turns than its share of the work left."""
-    left = sum(batch_cost(group, costs, turns) for group in groups)
-    for group in sorted(groups, key=lambda group: -batch_cost(group, costs)):
-        rest, a_turn = group, batch_cost(group, costs)
+    longest = [batch_cost(group, costs) for group in groups]
+    left = sum(turns(len(group)) * a_turn for group, a_turn in zip(groups, longest, strict=True))
+    for place in sorted(range(len(groups)), key=lambda place: -longest[place]):
+        rest, a_turn = groups[place], longest[place]
         while rest:
             whole = turns(len(rest))
             share = int(SHARE * left / (ranks * a_turn)) if a_turn > 0.0 else whole

@@ -30,7 +30,7 @@ from cvt_hpc.study.forecast.resources import refuse_too_large
 from cvt_hpc.study.gather import LossError, gather_records
 from cvt_hpc.study.planning import Plan, asked_runs, next_round, prepare
 from cvt_hpc.study.ranks import stopping
-from cvt_hpc.study.ranks.launch import Ranks, Team, assembled_team
+from cvt_hpc.study.ranks.launch import RankDied, Ranks, Team, assembled_team
 from cvt_hpc.study.ranks.progress import Counter, Progress
 from cvt_hpc.study.record.log import RecordFormat, RecordLog
 from cvt_hpc.study.simulator import Simulator, default_simulator
@@ -247,10 +247,15 @@ def _compute(
 
             def join(runs: Batch, seconds: float) -> Batch:
                 def may_join(others: Batch) -> bool:
-                    needed = model.upper((*runs, *others)) - seconds
-                    return needed < stop.seconds_left and task.simulator.may_join(task.job, runs, others)
+                    # beyond a limit of time a batch leaves nothing: none grows before a time is measured
+                    needed, left = model.upper((*runs, *others)), stop.seconds_left
+                    fits = left == math.inf or 0.0 < needed < seconds + left
+                    return fits and task.simulator.may_join(task.job, runs, others)
 
-                return () if stop.interrupt() is not None else claims.joining(may_join)
+                try:
+                    return () if stop.interrupt() is not None else claims.joining(may_join)
+                except RankDied:  # the batch at work goes on; the next claim tells
+                    return ()
 
             for runs, alone, joins in claims:
                 begin = partial(log.begin, alone=alone)

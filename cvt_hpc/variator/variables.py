@@ -71,6 +71,9 @@ class Measured(Means):
         The judged part; of a run that has slipped through, its slide.
     found : Occurrence or None
         How it vibrates.
+
+    All other attributes are those of the verdict of a ramp, and of the run. One that a property lacks is
+    sought there as well, so an error may name the run for it.
     """
 
     run: Any

@@ -40,8 +40,8 @@ from numpy.typing import ArrayLike, NDArray
 from cvt_hpc.variables import Status, Variable, Vibrates, shortened, values
 from cvt_hpc.vibration import signals
 from cvt_hpc.vibration.peaks import fundamental
+from cvt_hpc.vibration.settings import LEAST_PERIODS, fitting_window
 from cvt_hpc.vibration.settings import band as given_band
-from cvt_hpc.vibration.settings import fitting_window
 
 LEAST_WINDOWS = 12  # that are independent
 LEAST_CROSSINGS = 4
@@ -220,7 +220,8 @@ def is_certain(record: Mapping[str, Any], parameters: Mapping[str, Any], left: f
     """Whether a run that goes on would not change its verdict, nor its amplitude by more than a tenth.
 
     Its amplitude is CERTAIN_FACTOR times above or below the threshold, and stays so as it grows or decays,
-    by twice the error of its growth rate; of a vibration it changes by less than UNSETTLED.
+    by twice the error of its growth rate; of a vibration it changes by less than UNSETTLED. Where the judged
+    part is so short that it cuts the band off above the first modes, a slower motion may be left.
 
     Parameters
     ----------
@@ -233,6 +234,9 @@ def is_certain(record: Mapping[str, Any], parameters: Mapping[str, Any], left: f
     """
     if record["vibrates"] not in (Vibrates.YES, Vibrates.NO) or "growth_rate" not in record:
         return False
+    judged = parameters["judged_fraction"] * parameters["duration"]
+    if not parameters["band_low"] and record["lower_band_edge"] <= LEAST_PERIODS / judged * (1.0 + 1e-9):
+        return False
     threshold = parameters["amplitude_threshold"]
     rate, error = (np.nan_to_num(record[name]) for name in ("growth_rate", "growth_error"))
     with np.errstate(divide="ignore"):
@@ -241,7 +245,6 @@ def is_certain(record: Mapping[str, Any], parameters: Mapping[str, Any], left: f
         return bool(np.all(levels + np.maximum(rate + 2.0 * error, 0.0) * left <= -np.log(CERTAIN_FACTOR)))
     strongest = int(np.argmax(levels))
     most, spread = rate[strongest], 2.0 * error[strongest]
-    judged = parameters["judged_fraction"] * parameters["duration"]
     is_settled = abs(most) * judged <= UNSETTLED and record["amplitude_scatter"][strongest] <= UNSETTLED
     lowest = levels[strongest] + min(most - spread, 0.0) * left
     return bool(is_settled and lowest >= np.log(CERTAIN_FACTOR))

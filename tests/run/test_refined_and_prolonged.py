@@ -191,6 +191,13 @@ def test_an_odd_number_of_samples_is_halved_and_met_again(monkeypatch):
     assert_same_bits(found, run_point(asked(), point(**whole), never))
 
 
+def test_a_run_without_a_certain_verdict_reaches_its_duration_beyond_a_whole_number_of_samples(monkeypatch):
+    monkeypatch.setattr(marching, "is_certain", lambda *_: False)
+    whole = 2 * T + 0.4 / 20e3
+    found = run_point(asked(), point(duration=whole, longest_duration=whole, shortest_duration=T), never)
+    assert found["simulated_seconds"] == pytest.approx(2 * T)
+
+
 def test_a_run_that_ends_early_has_been_judged_as_long_as_it_takes():
     with pytest.raises(InputError, match=r"shortest_duration: expected 0.0\d+ s or more"):
         asked(duration=4 * T, shortest_duration=0.5 * T)

@@ -14,6 +14,7 @@ from cvt_hpc.files import StorageError
 from cvt_hpc.study import open_results, run
 from cvt_hpc.study.batches import batch_cost, share_out
 from cvt_hpc.study.forecast.cost_model import CostModel
+from cvt_hpc.study.ranks.launch import RankDied
 from cvt_hpc.study.record.log import RECORD, RecordLog
 from cvt_hpc.study.status import find_records
 from cvt_hpc.study.sweep import Claims
@@ -321,6 +322,22 @@ def test_a_batch_that_is_stopped_after_others_have_joined_leaves_no_mark(tmp_pat
     report = sweep(tmp_path, 4, simulator=lambda lanes: Stopped(lanes=lanes))
     assert (report.done, report.remaining) == (0, RUNS)
     assert list((tmp_path / "records").iterdir()) == []
+
+
+def test_nothing_joins_within_a_limit_of_time_before_a_time_is_measured(tmp_path):
+    job, joining = Job((Axis("load", tuple(range(RUNS))),)), Joining(16, lanes=4)
+    run(job, tmp_path, simulator=joining, progress=False, time_limit=1000.0)
+    sizes = list(map(len, joining.batches))
+    assert sizes[0] == 4 < sizes[1] and sum(sizes) == RUNS
+
+
+def test_the_batch_at_work_goes_on_where_a_rank_has_died(tmp_path, monkeypatch):
+    def died(claims, may_join):
+        raise RankDied("a rank is dead")
+
+    monkeypatch.setattr(Claims, "joining", died)
+    _, batches = batches_of(tmp_path, 4, simulator=partial(Joining, 16))
+    assert list(map(len, batches)) == [4] * 5
 
 
 def test_an_error_of_a_claim_is_no_failure_of_the_runs_at_work(tmp_path, monkeypatch):

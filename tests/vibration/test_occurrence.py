@@ -230,7 +230,7 @@ def test_the_margin_is_the_distance_from_the_threshold(windows, expected):
     assert margin(1e-6 * np.array(windows, float).T, vibrates, 1e-6) == pytest.approx(expected, abs=1e-12)
 
 
-CERTAIN = {"amplitude_threshold": 5e-6, "judged_fraction": 0.5, "duration": 0.1}
+CERTAIN = {"amplitude_threshold": 5e-6, "judged_fraction": 0.5, "duration": 0.1, "band_low": 0.0}
 
 
 @pytest.mark.parametrize(
@@ -257,7 +257,12 @@ def test_when_more_of_a_run_would_not_change_its_verdict(vibrates, amplitude, ra
     values = amplitude, rate, error, scatter
     names = "amplitude", "growth_rate", "growth_error", "amplitude_scatter"
     record = {name: np.array(value) for name, value in zip(names, values, strict=True)}
-    assert is_certain(record | {"vibrates": vibrates}, CERTAIN, left=0.3) is certain
+    record |= {"vibrates": vibrates, "lower_band_edge": 150.0}
+    assert is_certain(record, CERTAIN, left=0.3) is certain
+    # five periods of the judged part: a longer run may be judged by a lower edge
+    cut = {"lower_band_edge": 5.0 / (CERTAIN["judged_fraction"] * CERTAIN["duration"])}
+    assert not is_certain(record | cut, CERTAIN, left=0.3)
+    assert is_certain(record | cut, CERTAIN | {"band_low": cut["lower_band_edge"]}, left=0.3) is certain
 
 
 def test_a_record_without_growth_is_never_certain():

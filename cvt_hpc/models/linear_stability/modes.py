@@ -25,7 +25,7 @@ from cvt_hpc.models.steady_variator.walking import Steady
 
 LOW, HIGH = 100.0, 1500.0  # [Hz]: the band of strands
 DECAY, GROWTH = 400.0, 5000.0  # [1/s]: modes that decay or grow faster are left out
-LOOSE = 0.1  # [N], of the default scene: a push that any vibration overcomes
+LOOSE = 0.1  # [N], scaled as the scene's forces: a push that any vibration overcomes
 APART = 1e-8  # strain of elements that are taken as apart
 
 

@@ -13,7 +13,7 @@ VARIABLES = (
     Variable(
         "loosened_growth_rate",
         "s-1",
-        "growth rate with those elements apart that are pressed together by less than 0.1 N; nan: none are",
+        "growth rate with those elements apart that are hardly pressed together, by 0.1 N at most; nan: none",
         may_miss=True,
     ),
     Variable("frequency", "Hz", "of the mode that grows fastest"),
@@ -75,8 +75,8 @@ def coordinates(parameters: Mapping[str, Any]) -> dict[str, Coordinate]:
 
 
 def cost(parameters: Mapping[str, Any], stepper: None) -> Any:
-    """Core-seconds of a run: of a first steady state, and a tenth for its spectrum."""
-    return 1.1 * steady_record.cost(parameters, stepper)
+    """Core-seconds of a run: of a first steady state, and a tenth for each of two spectra."""
+    return 1.2 * steady_record.cost(parameters, stepper)
 
 
 def solve(parameters: Mapping[str, Any]) -> Solution:
