@@ -75,15 +75,12 @@ def check(parameters: Parameters) -> list[tuple[str, str, str]]:
     if longest < duration * (1.0 - 1e-9):
         expected = f"duration = {duration:g} s or more, or 0 for {LONGEST} times the duration"
         problems.append(("longest_duration", expected, f"{longest:g} s"))
-    shortest = parameters["shortest_duration"]
-    if shortest > duration * (1.0 + 1e-9):
-        problems.append(("shortest_duration", f"duration = {duration:g} s or less", f"{shortest:g} s"))
-    elif (first := first_duration(parameters)) < duration:
+    if (first := first_duration(parameters)) < duration:
         share, (low, _) = parameters["judged_fraction"], band(parameters)
         least = max(parameters.get("rise_time", 0.0) / (1.0 - share), LEAST_PERIODS / (share * low))
         if first < least * (1.0 - 1e-9):
             expected = f"{least:g} s or more, of which the last {share:g} can be judged"
-            problems.append(("shortest_duration", expected, f"{shortest:g} s"))
+            problems.append(("shortest_duration", expected, f"{parameters['shortest_duration']:g} s"))
     needed = LEAST_SAMPLES_PER_PERIOD * parameters["band_high"]
     if parameters["sampling_rate"] < needed:
         expected = f"{LEAST_SAMPLES_PER_PERIOD} x band_high = {needed:g} Hz or more"
@@ -97,6 +94,8 @@ def check(parameters: Parameters) -> list[tuple[str, str, str]]:
 def inert(parameters: Parameters) -> dict[str, str]:
     """Parameters without effect on a run, each with the setting that makes it so."""
     found = {} if "step" in parameters else {"most_refinements": "a stepper that chooses its step"}
+    if 2.0 * parameters["shortest_duration"] > parameters["duration"] * (1.0 + 1e-9):
+        found["shortest_duration"] = "a duration below twice of it"
     names = ("shortest_duration", "longest_duration") if ramped(parameters) else ()
     return found | dict.fromkeys(names, f"{ramped(parameters)}_history ramp")
 
