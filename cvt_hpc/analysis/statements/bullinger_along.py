@@ -83,6 +83,11 @@ FIGURE_4 = (
 )
 
 
+def _before(front: int) -> slice:
+    """Places inside the arc before the one where the push appears: one at least, as of a coarse belt."""
+    return slice(1, max(front - 1, 2))
+
+
 def _enters_apart(kept: Kept) -> Measured:
     push = [over_arc(history, "push_force", "driving").values[0] for history in _each(kept)]
     return Measured([force < APART for force in push], f"P at the inlet {listed(push)} N")
@@ -91,7 +96,7 @@ def _enters_apart(kept: Kept) -> Measured:
 def _balanced_before_front(kept: Kept) -> Measured:
     ratios = []
     for history in _each(kept):
-        before = slice(1, _front(history) - 1)
+        before = _before(_front(history))
         flank, ring = (over_arc(history, name, "driving").values[before].mean() for name in FORCES)
         ratios.append(flank / ring)
     return Measured(
@@ -122,7 +127,7 @@ def _raises_flank_friction(kept: Kept) -> Measured:
     steps = []
     for history in _each(kept):
         force, k = over_arc(history, "friction_force", "driving").values, _front(history)
-        steps.append(force[k + 1 : k + 3].mean() / force[1 : k - 1].mean())
+        steps.append(force[k + 1 : k + 3].mean() / force[_before(k)].mean())
     return Measured(
         [step > 1.1 for step in steps], f"f_Pt behind the front over that before it: {listed(steps)}"
     )
@@ -132,7 +137,7 @@ def _ring_friction_jumps(kept: Kept) -> Measured:
     steps, before = [], []
     for history in _each(kept):
         force, k = over_arc(history, "ring_friction", "driving").values, _front(history)
-        before.append(1e-3 * force[1 : k - 1].mean())
+        before.append(1e-3 * force[_before(k)].mean())
         steps.append(1e-3 * force[k + 2])
     holds = [abs(b - a) > 0.5 * abs(a) for a, b in zip(before, steps, strict=True)]
     return Measured(holds, f"f_Rt from {listed(before)} to {listed(steps, '.2g')} kN/m within three cells")
