@@ -4,7 +4,7 @@
 
 The reference has a step four times shorter; with `mesh` twice the stations and half the step; with `explicit` the
 explicit step, of which 16 scenes take minutes. A group is 16 scenes of one speed ratio and one friction law, which
-advance together, in less than a minute of processor time. A table that is there is gone on with. Ratio and law follow
+advance together, in two minutes of processor time. A table that is there is gone on with. Ratio and law follow
 one Sobol sequence, all else another: driving speed, thrust, load, friction gradient and memory, stiffness of the
 sheaves (one in ten rigid), masses, bending stiffness. With --further groups have in turn three ring layers, free
 pulleys, or a speed that rises, and all have a memory from 0.05 ms on.
@@ -159,7 +159,7 @@ def main() -> None:
     header = _header(arguments.reference)
     pairs = _read(arguments.table, header, groups)
     done = len(pairs) // TOGETHER
-    with ProcessPoolExecutor(1) as pool, arguments.table.open("a", newline="") as file:
+    with ProcessPoolExecutor(2) as pool, arguments.table.open("a", newline="") as file:
         writer = csv.writer(file, lineterminator="\n")
         if not done:
             file.writelines(origin_lines())
