@@ -26,8 +26,9 @@ MOST_NAMED = 12  # loads in a row
 # more. On jobs/branch.toml 2.5 and 10 N m give the same verdicts
 AGREEMENT = 5.0
 # of the lowest frequency that is judged: vibrations that a mode below the band begins may lie in it, as those
-# of 583 Hz beside a mode of 277. On jobs/branch.toml a third gives the same verdicts, since beside slow modes
-# (185 Hz and less) no run begins to vibrate; at four thirds modes of 277-346 Hz are left undecided
+# of 583 Hz beside a mode of 277. On jobs/branch.toml, judged from 300 Hz on, a third gives the same verdicts,
+# since beside slow modes (185 Hz and less) no run begins to vibrate; at four thirds modes of 277-346 Hz are
+# left undecided
 SEEN = 2.0 / 3.0
 
 
