@@ -93,12 +93,11 @@ def test_the_power_method_finds_the_fastest_rate():
         assert 0.95 * expected < rate < 1.02 * expected, case
 
 
-@pytest.mark.parametrize("stepper", STABLE)
-def test_a_step_beyond_is_named_though_nothing_diverges(stepper):
+def test_a_step_beyond_is_named_though_nothing_diverges():
     # sliding saturates friction: no number overflows, and the displacements look like a vibration of 10 um
     values = CASES["flank friction"]
-    limit = STABLE[stepper] / np.abs(eigenvalues(**values)).max()
-    run = general(stepper, step=3.0 * limit, **values)
+    limit = STABLE["symplectic_euler"] / np.abs(eigenvalues(**values)).max()
+    run = general("symplectic_euler", step=3.0 * limit, **values)
     status, reason = run.advance(220)
     assert status == Status.FAILED_NUMERICS
     assert "is beyond what is stable" in reason

@@ -32,8 +32,8 @@ def test_round_off_is_what_moves_the_strands(exact):
 
 def test_shorter_steps_round_more_often_and_stay_far_below_a_vibration(exact):
     # Bending, implicit, damps the more the longer the step is, and at first makes up for fewer roundings:
-    # 0.8, 0.5, 0.6 nm at 4.6, 2.3, 1.15 us; from there on 2.6 and 10 nm at half and a quarter.
-    step = 4.6e-6 / 16
+    # 0.8, 0.5, 0.6 nm at 4.6, 2.3, 1.15 us; from there on 2.6 nm at half.
+    step = 4.6e-6 / 8
     short = hum("single", step)
     assert short > 2.0 * hum("single", 4.6e-6)
     assert short < THRESHOLD / 100.0

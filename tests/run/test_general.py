@@ -34,7 +34,6 @@ def general(stepper, **values):
     ("stepper", "values"),
     [
         ("symplectic_euler", {"step": 1e-7}),
-        ("dormand_prince", {"tolerance": 1e-5}),
         ("scipy_bdf", {"tolerance": 1e-4}),
     ],
 )
@@ -56,7 +55,7 @@ def test_runs_are_those_of_the_explicit_step(stepper, values):
 
 def test_a_ramp_of_speed_is_that_of_the_explicit_step():
     values = CHEAP | {"rise_time": 5e-4, "speed_history": "ramp", "speed_start": 305.0, "load": 60.0}
-    run = GeneralTransient(job("dormand_prince", **values, tolerance=1e-5).point(0), "dormand_prince")
+    run = GeneralTransient(job("symplectic_euler", **values, step=1e-7).point(0), "symplectic_euler")
     assert run.advance(100) is None
     coarse, fine = (
         Transient(job("explicit", **values, step=step).point(0), "explicit") for step in (2e-7, 1e-7)

@@ -7,6 +7,7 @@ import pytest
 from scipy.sparse import csc_array
 
 from cvt_hpc.errors import InputError
+from cvt_hpc.kernels import called_alike
 from cvt_hpc.models.elastic_belt.belt import mesh
 from cvt_hpc.models.elastic_belt.one_system import rates, system
 from cvt_hpc.models.elastic_belt.parameters import PARAMETERS
@@ -23,13 +24,13 @@ from support.growing import at_rest, measured
 from support.rungs import rung_job, rung_record
 
 DEFAULTS = {key: parameter.default for section in PARAMETERS.values() for key, parameter in section.items()}
-LOADS = (95.0, 105.0, 125.0, 140.0)
+LOADS = (95.0, 125.0)
 COARSE = DEFAULTS | {"stations": 96}
 
 
 @cache
 def points():
-    return branch(SteadyBelt(DEFAULTS), mesh(DEFAULTS), LOADS).points
+    return branch(SteadyBelt(COARSE), mesh(COARSE), LOADS).points
 
 
 @cache
@@ -47,20 +48,20 @@ FREE = {
 
 @pytest.mark.parametrize(
     "values",
-    [{}, {"sheave_stiffness": np.inf, "stiffness_of": "sheave", "stations": 98}, FREE],
-    ids=["elastic", "rigid", "free pulleys"],
+    [{"sheave_stiffness": np.inf, "stiffness_of": "sheave", "stations": 50}, FREE | {"stations": 48}],
+    ids=["rigid", "free pulleys"],
 )
 def test_jacobian_is_that_of_central_differences_one_by_one(values):
     parameters = COARSE | values
     flat, y, matrix = at_rest(SteadyBelt(parameters).at(80.0))
     sizes, step = system(flat).scale, 1e-6
-    dense = np.empty((y.size, y.size))
+    dense, compiled = np.empty((y.size, y.size)), called_alike(rates)
     for j in range(y.size):
         sides = np.empty((2, y.size))
         for out, sign in zip(sides, (1.0, -1.0), strict=True):
             moved = y.copy()
             moved[j] += sign * step * sizes[j]
-            assert rates(flat, 0.0, moved, out)
+            assert compiled(flat, 0.0, moved, out)
         dense[:, j] = (sides[0] - sides[1]) / (2.0 * step)
     # both leave round-off of the same increments, 1e-9 of the steepest slopes of a row
     error = np.abs(matrix * sizes - dense) / np.abs(dense).max(axis=1, keepdims=True)
@@ -87,7 +88,7 @@ def test_spectrum_of_a_known_matrix(count):
 
 
 def test_spectrum_of_the_belt_is_that_of_the_full_matrix():
-    found = points()[2]
+    found = points()[1]
     matrix = at_rest(found.steady)[2]
     values = np.linalg.eigvals(matrix)
     wanted = (values.imag > 2e2 * np.pi) & (values.imag < 3e3 * np.pi) & (values.real > -DECAY)
@@ -120,7 +121,7 @@ def test_a_lag_of_the_tilt_takes_the_growth_away():
 
 
 def test_growth_with_lagging_tilts_is_that_of_the_transient():
-    (point,) = branch(SteadyBelt(DEFAULTS | {"tilt_lag": 2e-5}), mesh(DEFAULTS), (125.0,)).points
+    (point,) = branch(SteadyBelt(COARSE | {"tilt_lag": 2e-5}), mesh(COARSE), (125.0,)).points
     growth, frequency = measured(point)
     assert growth == pytest.approx(point.growth, abs=0.02 * point.growth)
     assert frequency == pytest.approx(point.modes[0].frequency, rel=2e-3)
@@ -128,7 +129,7 @@ def test_growth_with_lagging_tilts_is_that_of_the_transient():
 
 def test_constant_friction_and_rigid_sheaves_are_stable():
     for values in ({"friction_gradient": 0.0}, {"sheave_stiffness": np.inf, "stiffness_of": "sheave"}):
-        parameters = COARSE | values
+        parameters = COARSE | {"stations": 48} | values
         points = branch(SteadyBelt(parameters), mesh(parameters), (80.0, 125.0)).points
         assert len(points) == 2 and max(point.growth for point in points) < -50.0
 
@@ -137,7 +138,7 @@ def test_the_driven_arc_feeds_and_the_driving_arc_takes():
     # loaded as the paper has it, radial creep is largest where the belt leaves the driven pulley
     assert len(points()) == len(LOADS)
     for point in points()[1:]:
-        mode, starts = point.modes[0], mesh(DEFAULTS).starts
+        mode, starts = point.modes[0], mesh(COARSE).starts
         driving, t1, driven, t2 = np.add.reduceat(mode.fed, starts)
         assert driven > 500.0 and driving < -0.5 * driven
         # of the strands only the stations at their ends touch a sheave

@@ -1,5 +1,7 @@
 """Where the belt begins to slip: by formula and by states, for a thrust and for a torque; states without push."""
 
+from functools import cache
+
 import numpy as np
 import pytest
 
@@ -12,7 +14,13 @@ from cvt_hpc.variables import Status
 from cvt_hpc.variator import GROSS_SLIP
 from support.rungs import rung_job, rung_record
 
-STATIONS = 48
+STATIONS = 32
+
+
+@cache
+def limit(**values):
+    """The record of a search on a coarse belt."""
+    return rung_record("slip_limit", stations=STATIONS, **values)
 
 
 def test_formula_is_that_of_bullinger():
@@ -26,35 +34,32 @@ def test_formula_is_that_of_bullinger():
 
 
 def test_least_thrust_of_a_limit_torque_is_the_thrust():
-    found = rung_record("slip_limit", stations=STATIONS)
+    found = limit()
     assert found["status"] == Status.DONE, found["reason"]
     # at the limit a pulley slips by 5 %, or the load turns back before
     assert np.abs(found["limit_slip"]).max() <= GROSS_SLIP * 1.001
     assert np.abs(found["slip"]).max() < 0.5 * GROSS_SLIP
     assert abs(found["power_residual"]) < 5e-3 and 0.9 < found["efficiency"] < 1.0
-    back = rung_record("slip_limit", stations=STATIONS, sought="thrust", load=found["limit_torque"])
+    back = limit(sought="thrust", load=found["limit_torque"])
     assert back["limit_thrust"] == pytest.approx(50e3, rel=5e-3)
     assert back["axial_force"][1] == pytest.approx(1.3 * back["limit_thrust"], rel=1e-8)
 
 
 def test_free_pulleys_slip_where_held_ones_do_under_the_same_axial_force():
     """Oil presses like so much more thrust; slip slows it by some per cent more at the limit than at work."""
-    found = rung_record("slip_limit", stations=STATIONS, driven_piston=(0.02, 0.08))
+    found = limit(driven_piston=(0.02, 0.08))
     speed = found["load_power"] / (2.52 * found["working_torque"])
     oil = oil_factor((0.02, 0.08), 850.0) * speed**2
     assert found["axial_force"][1] == pytest.approx(50e3 + oil, rel=1e-9)
-    held = rung_record("slip_limit", stations=STATIONS, thrust=50e3 + oil)
+    held = limit(thrust=50e3 + oil)
     assert found["limit_torque"] == pytest.approx(held["limit_torque"], rel=0.15 * oil / 50e3)
     assert oil > 100.0 and abs(found["power_residual"]) < 5e-3
 
 
 def test_a_clearance_that_goes_to_none_leaves_the_limit():
-    none = rung_record("slip_limit", stations=STATIONS)
-    limits = [
-        rung_record("slip_limit", stations=STATIONS, collar_clearance=clearance)["limit_torque"]
-        for clearance in (1e-8, 5e-4)
-    ]
-    assert limits[0] == pytest.approx(none["limit_torque"], rel=1e-6)
+    none = limit()
+    limits = [limit(collar_clearance=clearance)["limit_torque"] for clearance in (1e-8, 5e-4)]
+    assert limits[0] == pytest.approx(none["limit_torque"], rel=1e-5)
     # a loose collar opens the groove in the middle of the arc: a little less is carried
     assert -1e-2 < limits[1] / none["limit_torque"] - 1.0 < -1e-4
 
