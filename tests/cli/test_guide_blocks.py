@@ -1,6 +1,7 @@
 """Every block of code of README, guide and the pages beside the code is done, as it stands there, in an empty folder.
 
-A study of a page is the job of that name with fewer and shorter runs: `--set` is added to the command, and nothing else.
+A study that its page reads is the job of that name with fewer and shorter runs: `--set` is added to the command, and
+nothing else. Of any other the options are parsed and the job is checked.
 """
 
 import re
@@ -15,7 +16,7 @@ import matplotlib.pyplot as plt
 import pytest
 
 from cvt_hpc.analysis import animation
-from cvt_hpc.cli import main
+from cvt_hpc.cli import _parser, main
 from cvt_hpc.job import build_job
 from cvt_hpc.job.assignments import read_assignments
 from cvt_hpc.job.document import read_document
@@ -61,6 +62,8 @@ SMALL_OF = {
     "steady_variator": {"stations": 64},
     "linear_stability": {"stations": 64},
 }
+PILOT = SMALL | {"stations": 64}  # of `check --pilots`
+PYTHON_RUN = 'duration = "0.1 s"\nlongest_duration = "0.1 s"'
 # What a page takes for granted: work of its reader, or of another page.
 BEFORE = {
     "docs/guide/tutorial.md": "cvt-hpc run jobs/quickstart.toml",
@@ -92,6 +95,7 @@ class Reader:
     """
 
     done: ClassVar[dict] = {}  # folder in the store, by job and words of a command
+    checked: ClassVar[set] = set()  # jobs and settings, of any page
 
     def __init__(self, page, store):
         self.page, self.store = page, store
@@ -124,6 +128,7 @@ class Reader:
         if words[:2] == ["mpirun", "-n"]:  # tests/sweep has the same under mpirun
             words = words[3:]
         if words[0] == "cvt-hpc":
+            _parser().parse_args(words[1:])
             status = self._main(_smaller(words[1:], self.page))
             assert status in ((0, 1) if words[1] == "doctor" else (0,))  # 1: of this machine, not of the page
         elif words[0] == "python" and words[1].startswith("jobs/"):
@@ -137,7 +142,12 @@ class Reader:
                     assert (ROOT / word).exists(), word
 
     def _main(self, words):
-        """Exit status of the command; runs that another page has had done already are taken over."""
+        """Exit status of the command; what another page has had done or checked already is taken over."""
+        if words[0] == "check":
+            asked = (Path(words[1]).read_text(), *words)
+            status = 0 if asked in self.checked else main(words)
+            self.checked.add(asked)
+            return status
         if words[0] != "run":
             return main(words)
         before, study = set(Path("out").glob("*")), (Path(words[1]).read_text(), *words)
@@ -164,6 +174,8 @@ class Reader:
 def _smaller(words, page):
     """The command with fewer and shorter runs."""
     command = words[0]
+    if "--pilots" in words:
+        return [*words, *(word for key, value in PILOT.items() for word in ("--set", f"{key}={value}"))]
     if command not in {"run", "simulate", *CHECKED_ONLY} or words[1].startswith("jobs/figures/"):
         return words  # figures take half a second each
     given = [words[i + 1] for i, word in enumerate(words) if word == "--set"]
@@ -171,8 +183,11 @@ def _smaller(words, page):
     if command in CHECKED_ONLY:
         return ["check", words[1], "--for", command, *settings]
     job = build_job(read_document(Path(words[1])), words[1], given)
-    if job.model in CHECKED_MODELS or job.parameters.get("profile_time"):
-        return ["check", words[1], *settings]  # a course of time cannot be cut short
+    code = "\n".join(block.text for block in blocks(page))
+    is_read = "--out" in words if command == "simulate" else re.search(rf"out/{job.name}(?!\w)", code)
+    # a course of time cannot be cut short
+    if not is_read or job.model in CHECKED_MODELS or job.parameters.get("profile_time"):
+        return ["check", words[1], *settings]
     changed = SMALL | SMALL_OF.get(job.model, {}) | SMALL_OF.get(job.stepper, {}) | SMALL_OF.get(job.name, {})
     changed = {key: value for key, value in changed.items() if key in job.parameters}
     longest = max(job.axes, key=lambda axis: len(axis.values), default=None)
@@ -210,6 +225,8 @@ def folder(tmp_path, monkeypatch):
     """An empty folder with the jobs alone."""
     shutil.copytree(ROOT / "jobs", tmp_path / "jobs", ignore=shutil.ignore_patterns("results", "notebooks"))
     (tmp_path / "jobs" / "results").mkdir()
+    loaded = tmp_path / "jobs" / "lebrecht_2004.toml"  # by blocks of Python, which have no options
+    loaded.write_text(loaded.read_text().replace('duration = "0.4 s"', PYTHON_RUN))
     monkeypatch.chdir(tmp_path)
     monkeypatch.setattr(sys, "argv", sys.argv)
     monkeypatch.setattr(animation, "FRAMES", 1)  # test_animation.py draws all
