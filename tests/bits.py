@@ -28,7 +28,7 @@ ROOT = Path(__file__).resolve().parents[1]
 SHORT = {"duration": "40 ms", "longest_duration": "40 ms"}
 ROLLING = {  # of both pushbelts and of the ring of beams
     "scene": {"rise_time": "10 ms", "load": "60 N m"},
-    "belt": {"elements": 100},
+    "belt": {"elements": 104},
     "record": {"sampling_rate": "5 kHz", "spectrum_step": "50 Hz"},
     "run": {"duration": "34 ms", "longest_duration": "34 ms"},
     "numerics": {"most_refinements": 0},

@@ -153,15 +153,9 @@ def test_the_end_shows_all_probes_of_a_strand(whole):
 @pytest.mark.parametrize(
     ("missing", "gone"),
     [
-        (["displacement"], {"t1 [µm]", "t2 [µm]", "amplitude [µm]"}),
-        (["load"], {"load [N m]"}),
-        (["ring_tension", "push_force"], {"force [kN]"}),
-        (["ring_tension"], set()),
-        (["contact_force"], {"contact [kN/m]"}),
-        (["flank_feed"], {"fed [W/m]"}),
-        (["stress_feed", "damping_feed"], set()),
-        (["region"], set()),
-        (["status", "vibrates", "reason"], set()),
+        (["displacement", "contact_force"], {"t1 [µm]", "t2 [µm]", "amplitude [µm]", "contact [kN/m]"}),
+        (["load", "ring_tension", "push_force", "flank_feed"], {"load [N m]", "force [kN]", "fed [W/m]"}),
+        (["ring_tension", "stress_feed", "damping_feed", "region", "status", "vibrates", "reason"], set()),
     ],
 )
 def test_what_is_absent_is_left_out(whole, missing, gone):
@@ -342,9 +336,8 @@ def test_rest_is_drawn_without_peaks():
     assert panel(history_figure(still), "amplitude [µm]").texts[:] == []
 
 
-@pytest.mark.parametrize("suffix", [".png", ".svg", ".pdf"])
-def test_pictures_are_small_in_every_format(suffix, tmp_path):
-    out = draw_history(run(), tmp_path / f"run{suffix}")
+def test_a_picture_is_small(tmp_path):
+    out = draw_history(run(), tmp_path / "run.svg")
     assert out.stat().st_size < 300_000
     with pytest.raises(InputError, match="found no suffix"):
         draw_history(run(), tmp_path / "run")

@@ -87,6 +87,9 @@ KINDS = {
 }
 
 
+DRAWN = ("map", "spectrogram", "variator", "profile")  # others are arranged as one of these
+
+
 def assert_on_a_page(figure):
     size = sorted(figure.get_size_inches())
     assert size[0] <= NARROW + MARGIN and size[1] <= LONG + MARGIN, size
@@ -95,9 +98,10 @@ def assert_on_a_page(figure):
 @pytest.mark.parametrize("kind", KINDS)
 def test_what_a_page_holds_is_drawn_with_texts_apart_and_more_is_refused(kind, monkeypatch):
     compose, most, more, advice = KINDS[kind]
-    figure = compose(most)
-    assert_on_a_page(figure)
-    assert pictured.faults_of(figure, monkeypatch) == []
+    if kind in DRAWN:
+        figure = compose(most)
+        assert_on_a_page(figure)
+        assert pictured.faults_of(figure, monkeypatch) == []
     with pytest.raises(
         InputError, match=f"at most {most} panels, which one page holds, found {more}; .*{advice}"
     ):
@@ -105,7 +109,7 @@ def test_what_a_page_holds_is_drawn_with_texts_apart_and_more_is_refused(kind, m
 
 
 def test_a_map_of_many_panels_gives_its_frequencies_up_before_it_is_refused():
-    few, many = map_figure(stiffnesses(12)), map_figure(stiffnesses(40))
+    few, many = map_figure(stiffnesses(4)), map_figure(stiffnesses(40))
     bars = [[ax.get_ylabel() for ax in one.axes if ax.get_label() == "<colorbar>"] for one in (few, many)]
     assert bars == [["amplitude [µm]", "frequency [Hz]"], ["amplitude [µm]"]]
     assert many.get_size_inches()[1] > 7 * LEAST  # of seven rows

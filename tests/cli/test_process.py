@@ -43,8 +43,7 @@ NOT_OF_A_RUN = ("matplotlib", "PIL", "plotly", "netCDF4", "h5py", "tqdm", "mpi4p
                 "scipy.interpolate", "scipy.signal", "scipy.integrate", "cvt_hpc.analysis")  # fmt: skip
 
 
-@pytest.mark.parametrize("command", ["simulate", "check"])
-@pytest.mark.parametrize("model", ["oscillator", "slip_limit"])
+@pytest.mark.parametrize(("command", "model"), [("simulate", "oscillator"), ("check", "slip_limit")])
 def test_a_run_without_a_picture_imports_nothing_of_pictures_and_sweeps(tmp_path, command, model):
     formula = '[question]\nmethod = "formula"\n' if model == "slip_limit" else "[run]\nduration = 0.2\n"
     (tmp_path / "x.toml").write_text(f'name = "x"\nmodel = "{model}"\n{formula}')
@@ -93,16 +92,14 @@ def test_a_reader_that_has_seen_enough_is_no_error(tmp_path):
     assert (done.returncode, done.stderr) == (0, "")
 
 
-@pytest.mark.parametrize("closed", ["2>&-", "<&- >&- 2>&-"])
-def test_a_closed_stream_is_no_error(tmp_path, closed):
+def test_a_closed_stream_is_no_error(tmp_path):
     """Nothing of what is printed there gets into other streams, or into files that are opened in its place."""
     (tmp_path / "x.toml").write_text('name = "x"\nmodel = "oscillator"\n[run]\nduration = 0.2\n')
     lines = []
     for command in ("run x.toml", "run missing.toml"):
-        done = call("bash", "-c", f"{sys.executable} -m cvt_hpc {command} {closed}", cwd=tmp_path)
+        done = call("bash", "-c", f"{sys.executable} -m cvt_hpc {command} <&- >&- 2>&-", cwd=tmp_path)
         lines.append((done.returncode, bool(done.stdout), done.stderr))
-    out = closed == "2>&-"
-    assert lines == [(0, out, ""), (2, False, "")]
+    assert lines == [(0, False, ""), (2, False, "")]
     assert (tmp_path / "out" / "x" / "results.nc").exists()
 
 

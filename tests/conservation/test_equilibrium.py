@@ -22,14 +22,13 @@ RUNS = {
     "overdrive": COULOMB | {"ratio": 0.6, "driven_radius": 0.045, "thrust": 20e3},
     "loaded": COULOMB | {"load": 100.0},
     "braking": COULOMB | {"load": -60.0},
-    "falling friction": {},
 }
 
 
 @cache
 def settled(name):
     # start-up takes rise_time, 30 ms; the slowest that follows is the belt's way once around, 70 ms
-    return Settled(0.1, 0.02, **RUNS[name])
+    return Settled(0.1, 0.02, stations=96, **RUNS[name])
 
 
 def strands(run):
@@ -97,11 +96,10 @@ def capstan(run, radius, wrap, taut, slack):
     return np.log((taut - relief) / (slack - relief)) / (DEFAULTS["ring_friction"] * wrap)
 
 
-@pytest.mark.parametrize("name", ["underdrive", "falling friction"])
-def test_no_load_underdrive(name):
+def test_no_load_underdrive():
     # Bullinger et al. 2005, sec. 2: the rings slip back on the small driving pulley, T_t2 > T_t1, and only
     # push in t2 can undo that moment.
-    run = settled(name)
+    run = settled("underdrive")
     (_, tension1, push1, *_), (_, tension2, push2, *_) = strands(run)
     assert tension2 > tension1 + 1000.0
     assert push2 > 1000.0

@@ -50,14 +50,14 @@ def expected(belt, step, force, heavy, cross, layers):
 
 
 @pytest.mark.parametrize("step", [1e-6, 8e-6, 5e-5])
-@pytest.mark.parametrize("parts", [1, 4, 8])
+@pytest.mark.parametrize("parts", [1, 8])
 def test_increments_are_those_of_the_dense_system(step, parts):
     random = np.random.default_rng(0)
     force, cross, layers = random.normal(size=(3, STATIONS))
     heavy = (
         BELT.mass / step * np.exp(2.0 * random.normal(size=STATIONS))
     )  # where friction holds, and where not
-    belts = [BELT] if parts > 1 else [BELT, STIFFER]
+    belts = [BELT] if parts > 1 else [BELT, STIFFER] * 4
     belt, state = lane_belt(belts, np.float64), None
     state = lane_state(
         belts, [initial_state(DEFAULTS | {"stations": STATIONS}, BELT)] * len(belts), np.float64

@@ -99,7 +99,7 @@ def test_what_needs_no_run_says_nothing_but_the_class():
 
 
 def test_without_falling_friction_transients_do_not_vibrate():
-    loads, stiffnesses, disturbances = (60.0, 100.0, 140.0, 180.0), (1.0, 1.5), (1e-6, 3e-4)
+    loads, stiffnesses, disturbances = (100.0, 140.0), (1.0, 1.5), (1e-6, 3e-4)
     grid = [
         {"load": load, "sheave_stiffness": stiffness, "disturbance": disturbance}
         for load in loads
@@ -107,12 +107,11 @@ def test_without_falling_friction_transients_do_not_vibrate():
         for disturbance in disturbances
     ]
     job = rung_job("elastic_belt", duration=0.3, stations=96, step=7.6e-6)
-    verdicts = {}
-    for gradient in (0.0, -1.0):
-        points = [job.point(0) | cell | {"friction_gradient": gradient} for cell in grid]
-        verdicts[gradient] = [record["vibrates"] for record in run_points(job, points, lambda: None)]
-    assert set(verdicts[0.0]) == {Vibrates.NO}
-    assert verdicts[-1.0].count(Vibrates.YES) >= 4  # the same cells, so that the first line says something
+    points = [job.point(0) | cell | {"friction_gradient": slope} for slope in (0.0, -1.0) for cell in grid]
+    verdicts = [record["vibrates"] for record in run_points(job, points, lambda: None)]
+    constant, falling = verdicts[: len(grid)], verdicts[len(grid) :]
+    assert set(constant) == {Vibrates.NO}
+    assert falling.count(Vibrates.YES) >= 4  # the same cells, so that the first line says something
 
 
 def test_half_of_what_rigid_pulleys_carry_is_carried():

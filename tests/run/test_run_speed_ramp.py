@@ -20,7 +20,6 @@ def ramp(start, end):
 
 
 ENDS = [(1000 * RPM, 3000 * RPM), (5000 * RPM, 3000 * RPM)]
-PRECISIONS = ["double", "single"]
 SPEEDS = [1500 * RPM, 3000 * RPM, 4500 * RPM]
 CONSTANT = Together(*(COARSE | {"driving_speed": speed, "duration": 0.2} for speed in SPEEDS))
 
@@ -40,8 +39,7 @@ def test_a_ramp_of_no_extent_is_the_constant_run_and_its_neighbours_change_no_bi
 
 # 698 rad/s^2. What is left open is that of constant speed, 2e-4: friction that followed the layers' speeds within a step,
 # but not the pulleys', would leave 0.7 %.
-@pytest.mark.parametrize("ends", ENDS)
-@pytest.mark.parametrize("precision", PRECISIONS)
+@pytest.mark.parametrize(("precision", "ends"), zip(("double", "single"), ENDS, strict=True))
 def test_the_power_balance_closes_while_the_speed_changes(ends, precision):
     run = finished(**COARSE | {"stations": 96}, **ramp(*ends), precision=precision)
     found, p, judged = balance(run), run.parameters, run.judged

@@ -40,9 +40,8 @@ def misaligned():
 
 def test_both_pulleys_take_the_lateral_force_of_misaligned_strands(misaligned):
     """The force of one pulley is that of the other, and of the order of two clamped strands under their tension."""
-    asked = job(misalignment=OFFSET)
-    found = run_point(asked, asked.point(0), lambda: None)
-    assert found["status"] == Status.DONE and found["unsolved_share"] == 0.0
+    found = judge(misaligned)
+    assert misaligned.failure is None and misaligned.counters()["unsolved"] == 0
     driving, driven = found["net_axial_force"]
     assert driving == pytest.approx(-driven, rel=0.01)
     net = (
@@ -64,12 +63,8 @@ def test_both_pulleys_take_the_lateral_force_of_misaligned_strands(misaligned):
     assert 0.5 * 1.5 * OFFSET / strand < found["largest_yaw"] < 3.0 * 1.5 * OFFSET / strand
 
 
-@pytest.mark.parametrize(
-    "values",
-    [{"load": 0.0}, {"friction_gradient": -0.3, "friction_memory": 3e-4}, {"sheave_stiffness": 1.0}],
-    ids=["no load", "falling friction", "elastic sheaves"],
-)
-def test_power_and_axial_forces_are_balanced_at_any_point(values):
+def test_power_and_axial_forces_are_balanced_with_falling_friction_between_elastic_sheaves():
+    values = {"friction_gradient": -0.3, "friction_memory": 3e-4, "sheave_stiffness": 1.0}
     found = record(misalignment=OFFSET, **values)
     assert found["status"] == Status.DONE
     driving, driven = found["net_axial_force"]
@@ -311,9 +306,10 @@ def test_what_ends_a_run_is_recorded_and_the_sweep_goes_on(tmp_path):
         "design": {"kind": "listed", "runs": 5},
         "axes": points,
     }
-    loose = {"driving_thrust": 20e3, "sheave_rate": 2e-5, "flank_reach": 1e-3}
+    loose = {"driving_thrust": 20e3, "sheave_rate": 5e-5, "flank_reach": 1e-3}
     faces = {"inner_radius": 0.045, "outer_radius": 0.065}
-    short = {"most_refinements": 0, "longest_duration": 0.04, "most_iterations": 20}
+    short = {"duration": 0.016, "longest_duration": 0.016, "rise_time": 0.004, "band_low": 700.0}
+    short |= {"most_refinements": 0, "most_iterations": 20}
     report = run(build_job(document, "ends.toml", COARSE | loose | faces | short), tmp_path, progress=False)
     assert report.done == 2 and len(report.failed) == 3
     with open_results(report.results) as results:

@@ -1,6 +1,9 @@
 """An audit finds what the lower rungs got wrong, and says how sure it is."""
 
 import csv
+import shutil
+from contextlib import redirect_stdout
+from io import StringIO
 
 import numpy as np
 import pytest
@@ -42,9 +45,18 @@ def audited(job, capsys, fraction="1", *more):
     return status, capsys.readouterr().out, out
 
 
-def test_rungs_that_are_right_are_found_right(job, capsys):
-    status, printed, out = audited(job, capsys)
-    assert status == 0
+@pytest.fixture(scope="module")
+def whole(tmp_path_factory):
+    """What is printed of a study that is audited whole, and its folder."""
+    folder = tmp_path_factory.mktemp("audited")
+    (folder / "job.toml").write_text(JOB)
+    with redirect_stdout(StringIO()) as printed:
+        assert main(["run", str(folder / "job.toml"), "--out", str(folder / "out"), "--audit", "1"]) == 0
+    return printed.getvalue(), folder / "out"
+
+
+def test_rungs_that_are_right_are_found_right(whole):
+    printed, out = whole
     assert "audit: 4 of 4 runs that cheaper models decided done again in full" in printed
     # none of four: with 97.5 % of confidence the rate is below 1 - 0.025^(1/4)
     assert "coarse: 0 of 4 runs of another class (0.00%, 95 % interval 0.00% to 60.24%)" in printed
@@ -70,8 +82,8 @@ def test_a_rung_that_errs_is_found_out(job, capsys, monkeypatch):
     ] * 2
 
 
-def test_forces_are_compared(job, capsys):
-    _, printed, out = audited(job, capsys)
+def test_forces_are_compared(whole):
+    printed, out = whole
     with xr.open_dataset(out / "results.nc") as low, xr.open_dataset(out / "audit" / "results.nc") as full:
         strands = ("mean_ring_tension", "mean_push_force")
         off = [
@@ -91,8 +103,8 @@ def test_the_smallest_sample_has_a_run(job, capsys):
     assert "audit: 1 of 4 runs that cheaper models decided done again in full" in printed
 
 
-def test_a_fresh_study_has_a_fresh_audit(job, capsys):
-    audited(job, capsys)
+def test_a_fresh_study_has_a_fresh_audit(job, whole, capsys):
+    shutil.copytree(whole[1], job.parent / "out")
     job.write_text(JOB.replace("120]", "130]"))
     status, printed, _ = audited(job, capsys, "1", "--fresh")
     assert status == 0 and "audit: 4 of 4 runs" in printed

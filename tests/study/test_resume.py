@@ -48,7 +48,7 @@ def frames_written(out):
     return sum(path.read_bytes().count(RECORD + size.to_bytes(4, "little")) for path in paths)
 
 
-@pytest.mark.parametrize(("ranks", "lanes"), [(0, 1), (2, 1), (0, 4), (2, 4)])
+@pytest.mark.parametrize(("ranks", "lanes"), [(0, 1), (2, 4)])
 def test_kill_9_at_any_moment_and_resume(start, tmp_path, reference, ranks, lanes):
     options = {"out": tmp_path / "out", "runs": RUNS, "lanes": lanes}
     endless = {"from": 50, "pause": 300.0}  # so that the sweep is at work whenever the blow comes
@@ -74,7 +74,7 @@ def test_a_rank_that_dies_takes_the_sweep_down_and_the_rest_is_done_later(start,
     assert 0 < recorded(tmp_path / "out").recorded.sum() < RUNS
 
 
-@pytest.mark.parametrize("name", ["SIGINT", "SIGHUP", "SIGTERM", "SIGUSR1"])
+@pytest.mark.parametrize("name", ["SIGINT", "SIGUSR1"])
 def test_a_signal_breaks_off_the_run_and_is_resumed(start, tmp_path, reference, name):
     # The run at work would take minutes: it has to be broken off, not waited for.
     options = {"out": tmp_path / "out", "runs": RUNS, "parameters": {"pause": 0.01}}
@@ -109,7 +109,7 @@ def test_a_batch_that_is_broken_off_leaves_no_record(start, tmp_path, reference)
         assert_same_numbers(dataset, reference)
 
 
-@pytest.mark.parametrize("target", ["rank 0", "rank 1", "mpirun"])
+@pytest.mark.parametrize("target", ["rank 0", "mpirun"])
 def test_a_signal_to_one_rank_stops_all(start, tmp_path, target):
     options = {"out": tmp_path / "out", "runs": RUNS, "parameters": {"pause": 0.01}}
     sweep = start({**options, "slow": {"from": 25, "pause": 300.0}}, ranks=2)

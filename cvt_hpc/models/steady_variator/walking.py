@@ -94,6 +94,7 @@ class SteadyBelt:
         NoSteadyState
             Where no continuation succeeds.
         """
+        load = float(load)  # kernels would be compiled anew for whole numbers
         if self._free is not None:
             return self._released(self._free, load, near)
         if near is not None:
@@ -141,6 +142,7 @@ class SteadyBelt:
         """State under a load, by unknowns that were found before; ValueError if they are not of this belt."""
         if unknowns.shape != self._own.sizes.shape:
             raise ValueError(f"{unknowns.shape} unknowns of a belt that has {self._own.sizes.shape}")
+        load = float(load)
         if self._free is not None:
             return self._state_of(self._free, unknowns, load)
         self._course.own()
