@@ -22,6 +22,12 @@ from support.foreign import REGISTRY, WAYS, drawn, in_other_units, numbers, othe
 from support.stored import NAMES, content, stored
 
 
+@pytest.fixture(autouse=True)
+def without_pictures(monkeypatch):
+    """Of reports the words are compared, so that their pictures are not encoded."""
+    monkeypatch.setattr("cvt_hpc.report.page._encoded", lambda compose: "AA==")
+
+
 def parameters(model):
     """Units of the parameters of a model, which axes are."""
     tables = load_model(model).parameters.values()

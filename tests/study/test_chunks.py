@@ -69,7 +69,7 @@ def assert_holds(path, study, rows):
                 assert np.asarray(file[name][...]).tobytes() == expected.tobytes(), name
 
 
-@pytest.mark.parametrize("shape", [(), (1,), (60,), (7, 9), (9, 7), (3, 4, 5), (2, 1, 17)])
+@pytest.mark.parametrize("shape", [(), (9, 7), (2, 1, 17)])
 @pytest.mark.parametrize("block", [1, 5, 10_000])
 @pytest.mark.parametrize("chunk", [1, 700])
 def test_the_dataset_does_not_depend_on_its_pieces(tmp_path, monkeypatch, shape, block, chunk):

@@ -106,14 +106,16 @@ def test_a_torn_tail_costs_one_record(tmp_path, study, rows, frame_size, cut):
     assert f"last {frame_size - lost} bytes are an unfinished record" in records.warnings[0]
 
 
-@pytest.mark.parametrize("place", range(HEAD.size + PLACE.size + 30))
-def test_a_flipped_bit_costs_one_record(tmp_path, study, rows, frame_size, place):
+def test_a_flipped_bit_costs_one_record(tmp_path, study, rows, frame_size):
     path = write_log(tmp_path / "r", study, rows, [4, 5, 6])
-    flip(path, path.stat().st_size - 2 * frame_size + place)
-    records = read_records(tmp_path / "r", study)
-    assert_recorded(records, rows, [4, 6])
-    assert len(records.warnings) == 1
-    assert "are damaged" in records.warnings[0]
+    whole = path.read_bytes()
+    for place in range(HEAD.size + PLACE.size + 30):
+        path.write_bytes(whole)
+        flip(path, len(whole) - 2 * frame_size + place)
+        records = read_records(tmp_path / "r", study)
+        assert_recorded(records, rows, [4, 6])
+        assert len(records.warnings) == 1, place
+        assert "are damaged" in records.warnings[0]
 
 
 def test_a_marker_among_the_numbers_misleads_nobody(tmp_path, study, rows, frame_size):
