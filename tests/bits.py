@@ -78,6 +78,7 @@ STUDIES: dict[str, dict] = {
     "beam_pushbelt": variant(
         ROLLING,
         scene={"rise_time": "5 ms"},
+        belt={"elements": 100},
         numerics={"step": "3.5 us"},
         run={"duration": "17 ms", "longest_duration": "17 ms"},
         record={"sampling_rate": "10 kHz", "spectrum_step": "100 Hz"},

@@ -22,12 +22,6 @@ from support.foreign import REGISTRY, WAYS, drawn, in_other_units, numbers, othe
 from support.stored import NAMES, content, stored
 
 
-@pytest.fixture(autouse=True)
-def without_pictures(monkeypatch):
-    """Of reports the words are compared, so that their pictures are not encoded."""
-    monkeypatch.setattr("cvt_hpc.report.page._encoded", lambda compose: "AA==")
-
-
 def parameters(model):
     """Units of the parameters of a model, which axes are."""
     tables = load_model(model).parameters.values()
@@ -148,7 +142,9 @@ def said(path):
 
 
 @pytest.mark.parametrize("way", ORDINARY)
-def test_verbs_read_what_xarray_has_made_of_a_dataset(way, path, said, tmp_path):
+def test_verbs_read_what_xarray_has_made_of_a_dataset(way, path, said, tmp_path, monkeypatch):
+    # of reports the words are compared
+    monkeypatch.setattr("matplotlib.figure.Figure.savefig", lambda figure, file, **_: file.write(b"picture"))
     expected = stored("grid")
     with ORDINARY[way](path) as dataset:
         for verb in ARRAYS:
