@@ -134,8 +134,9 @@ def _own_errors(
 ) -> dict[str, float]:
     """Error of the reference: its distance from the coarser one, and the scatter of that over the starts.
 
-    For an error in proportion to the step the distance is that of the steps, so many times the error; no
-    higher order is assumed, and none for a tolerance. The scatter is the standard error of the difference,
+    For an error in proportion to the step, or to the step and to cells that are coarser by the same factor,
+    the distance is that of the steps, so many times the error; no higher order is assumed, and none for a
+    tolerance. The scatter is the standard error of the difference,
     start by start: nothing where the two stay together, and in a chaotic scene the uncertainty of so few
     starts.
     """

@@ -89,7 +89,8 @@ def reference_points(stage: Stage, raw: Any) -> Iterator[Point]:
         The scene.
     raw : Any
         "exact", or a table with a stepper, its step or tolerance, that of the coarser one (by default twice
-        the step or ten times the tolerance), and further keys to be set.
+        the step or ten times the tolerance), and further keys to be set. Where the coarser one has a coarser
+        mesh as well, it is a table with its step or tolerance and the keys that it sets.
 
     Raises
     ------
@@ -114,12 +115,15 @@ def reference_points(stage: Stage, raw: Any) -> Iterator[Point]:
     job = stage.job(where, stepper=stepper, **others, **setting)
     _check_starts(stage, job)
     _check_quantities(stage, job)
-    coarse = raw.get("coarser", fine * _COARSER[key])
-    coarser = stage.setting(stepper, key, coarse, where, f"{where} coarser")
+    coarse, own = raw.get("coarser", fine * _COARSER[key]), f"{where} coarser"
+    if isinstance(coarse, Mapping):
+        read_table({}, coarse, own, ("set", key))
+        others |= read_set(coarse, own)
+        coarse = coarse.get(key, fine * _COARSER[key])
+    coarser = stage.setting(stepper, key, coarse, where, own)
     if coarser <= fine:
-        raise mismatch(f"{where} coarser", f"more than {key} = {fine:g}", f"{coarse}")
-    setting = {key: coarser}
-    coarser_job = stage.job(where, stepper=stepper, **others, **setting)
+        raise mismatch(own, f"more than {key} = {fine:g}", f"{coarse}")
+    coarser_job = stage.job(where, stepper=stepper, **others, **{key: coarser})
     label = in_words(stepper)
     both: dict[str, Any] = {"starts": starts, "until": stage.until}
     yield Point(f"{name}-reference", name, Role.REFERENCE, stepper, label, key, job, **both)

@@ -53,6 +53,8 @@ REFERENCE = ('reference = "exact"', 'reference = { stepper = "hard", step = "2 u
     [
         ('{ stepper = "hard", step = "2 us" }', (2e-6, 4e-6)),
         ('{ stepper = "hard", step = "2 us", coarser = "3 us" }', (2e-6, 3e-6)),
+        ('{ stepper = "hard", step = "2 us", coarser = { set = { loudness = "3 um" } } }', (2e-6, 4e-6)),
+        ('{ stepper = "hard", step = "2 us", coarser = { step = "3 us" } }', (2e-6, 3e-6)),
         ('{ stepper = "clever", tolerance = 1e-6 }', (1e-6, 1e-5)),
     ],
 )
@@ -62,6 +64,8 @@ def test_a_computed_reference_has_a_coarser_one_beside_it(write_chart, reference
     assert [point.role for point in found] == [Role.REFERENCE, Role.COARSER]
     assert tuple(point.setting for point in found) == pytest.approx(settings, rel=1e-12)
     assert not any(point.timed for point in found)
+    loud = [point.job.parameters["loudness"] for point in found]
+    assert (loud[1] == 3e-6) == (loud[1] != loud[0]) == ("loudness" in reference)
 
 
 def test_starts_differ_in_their_seeds(write_chart):
@@ -208,6 +212,8 @@ WHERE = "c.toml: [chart.scenes.ringing"
          f"{WHERE}] reference: expected one of step and tolerance, found neither"),
         ('reference = "exact"', 'reference = { stepper = "hard", step = "2 us", coarser = "1 us" }',
          f"{WHERE}] reference coarser: expected more than step = 2e-06, found 1 us"),
+        ('reference = "exact"', 'reference = { stepper = "hard", step = "2 us", coarser = { steps = "4 us" } }',
+         f"{WHERE}] reference coarser steps: unknown key; did you mean step?"),
         ('reference = "exact"', 'reference = { stepper = "hard", step = "2 kg" }',
          f'{WHERE}] reference step: expected a value in s (such as "1 s" or a bare number in s), found "2 kg"'),
         ('reference = "exact"', 'reference = { stepper = "hard", step = "2 us", coarser = "x" }',
