@@ -323,7 +323,7 @@ def plan_lines(asked: Ladder, out: Path) -> Iterator[str]:
 
 
 def rung_lines(rungs: Sequence[Rung], refusals: Mapping[str, str], out: Path) -> Iterator[str]:
-    """Yield the lines that state the runs of models, those left out, and the expected cost of what is left."""
+    """Yield the lines that state the runs of models, those left out, and the cost of what is left."""
     left = {rung.name: cost_left(rung, out) for rung in rungs}
     heads = ["name", "model", "runs", "left", "core-s left", "answers"]
     yield from columns(
