@@ -95,8 +95,9 @@ def test_an_elastic_belt_has_the_eigenvalues_of_its_steady_state(folder):
         assert min(abs(growth - one) for one in near) < error + 20.0
 
 
-def test_a_kick_of_a_pushbelt_is_a_speed_outwards_of_both_strands():
-    model = load_model("pushbelt")
+@pytest.mark.parametrize("name", ["pushbelt", "spatial_pushbelt"])
+def test_a_kick_of_a_pushbelt_is_a_speed_outwards_of_both_strands(name):
+    model = load_model(name)
     small = {
         "elements": 104,
         "band_high": 1000.0,
@@ -104,18 +105,18 @@ def test_a_kick_of_a_pushbelt_is_a_speed_outwards_of_both_strands():
         "duration": 0.04,
         "judged_fraction": 0.85,
     }
-    job = build_job({"name": "kicked", "model": "pushbelt"}, "kicked", small)
-    runs = [model.batch([job.point(0) | {"kick": kick}], "newton").runs[0] for kick in (0.0, 0.1, 0.2)]
+    job = build_job({"name": "kicked", "model": name}, "kicked", small)
+    runs = [model.batch([job.point(0) | {"kick": kick}], job.stepper).runs[0] for kick in (0.0, 0.1, 0.2)]
     for one in runs:
         one.advance(one.first_judged + 1)
     rest, half, whole = (one.displacement for one in runs)
     first = runs[0].first_judged
     np.testing.assert_array_equal(whole[:first], rest[:first])
-    moved = whole[first] - rest[first]
+    moved = (whole[first] - rest[first])[:10]
     # outwards everywhere on both strands, by nearly the largest speed at the second of five probes
     assert (moved > 0.0).all() and np.all(moved[[1, 6]] == moved.reshape(2, 5).max(axis=1))
     assert moved[[1, 6]] == pytest.approx(0.2 * runs[0].interval, rel=0.1)
-    np.testing.assert_allclose(half[first] - rest[first], 0.5 * moved, rtol=0.05)
+    np.testing.assert_allclose((half[first] - rest[first])[:10], 0.5 * moved, rtol=0.05)
 
 
 def test_what_growth_refuses(folder, capsys):
