@@ -22,7 +22,7 @@ from cvt_hpc.files import open_missing_streams
 
 __all__ = ["main"]
 
-_JOINT = ("run", "ladder", "fit")  # commands whose ranks work together
+_JOINT = ("run", "ladder", "growth", "fit")  # commands whose ranks work together
 
 # How argparse tells of a word that is none of its choices
 _UNKNOWN_WORD = re.compile(

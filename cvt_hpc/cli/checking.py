@@ -85,6 +85,15 @@ def _ladder_lines(arguments: argparse.Namespace) -> Iterator[str]:
     return plan_lines(asked, parts.output_folder(None, asked.job))
 
 
+def _growth_lines(arguments: argparse.Namespace) -> Iterator[str]:
+    from cvt_hpc.ladder.growth import load_growth
+    from cvt_hpc.ladder.loading import rung_lines
+
+    asked = load_growth(arguments.path, arguments.set)
+    yield f"growth {asked.job.name} ({asked.job.source}): {asked.job.size} cells, three runs each"
+    yield from rung_lines(asked.rungs, asked.refusals, parts.output_folder(None, asked.job))
+
+
 def _branch_lines(arguments: argparse.Namespace) -> Iterator[str]:
     from cvt_hpc.bifurcation import load_diagram
     from cvt_hpc.bifurcation.job import plan_lines
@@ -100,7 +109,13 @@ def _fit_lines(arguments: argparse.Namespace) -> Iterator[str]:
 
 
 RUN = "run"
-_PLANS = {"chart": _chart_lines, "ladder": _ladder_lines, "branch": _branch_lines, "fit": _fit_lines}
+_PLANS = {
+    "chart": _chart_lines,
+    "ladder": _ladder_lines,
+    "growth": _growth_lines,
+    "branch": _branch_lines,
+    "fit": _fit_lines,
+}
 
 
 def show_job(job: Job, out: Path | None) -> None:

@@ -1,9 +1,16 @@
-"""`chart`, `ladder`, `branch` and `fit`: many runs whose results are tables and pictures of their own."""
+"""`chart`, `ladder`, `growth`, `branch` and `fit`: many runs, with tables and pictures of their own."""
+
+from __future__ import annotations
 
 import argparse
-from typing import Any
+from collections.abc import Mapping, Sequence
+from pathlib import Path
+from typing import TYPE_CHECKING, Any
 
 from cvt_hpc.cli import parts
+
+if TYPE_CHECKING:
+    from cvt_hpc.ladder.loading import Rung
 
 
 def add(commands: Any) -> None:
@@ -15,6 +22,13 @@ def add(commands: Any) -> None:
     ladder = parts.add_command(commands, "ladder", _ladder, text, "JOB")
     parts.add_folder(ladder, "earlier results of all models")
     parts.add_assignments(ladder, "--set", f"{parts.REPLACE}; ladder.KEY replaces a key of [ladder]")
+    text = "growth rates and frequencies of a job's modes, by runs with and without a kick"
+    growth = parts.add_command(commands, "growth", _growth, text, "JOB")
+    parts.add_folder(growth, "earlier runs")
+    parts.add_assignments(growth, "--set", parts.REPLACE)
+    growth.add_argument(
+        "--kick", metavar="VALUE", help="size of the kick with its unit (default: the model's)"
+    )
     text = "follow steady states along the load, to their Hopf points"
     branch = parts.add_command(commands, "branch", _branch, text, "JOB")
     parts.add_folder(branch, "an earlier diagram of the folder")
@@ -41,25 +55,46 @@ def _chart(arguments: argparse.Namespace) -> int:
 
 def _ladder(arguments: argparse.Namespace) -> int:
     from cvt_hpc.ladder.loading import load_ladder
-    from cvt_hpc.ladder.making import ladder_lines, report_ladder, run_ladder
-    from cvt_hpc.printing import trouble_lines
+    from cvt_hpc.ladder.making import ladder_lines, report_ladder
     from cvt_hpc.study.ranks.launch import end_process
     from cvt_hpc.study.status import STALLED
 
     job, rungs, refusals = parts.alike(arguments, lambda: load_ladder(arguments.path, arguments.set))
     out = parts.output_folder(arguments.out, job)
-    parts.complain(*(f"{name} left out: {why}" for name, why in refusals.items()))
-    status = run_ladder(
-        rungs,
-        out,
-        fresh=arguments.fresh,
-        tell=lambda rung, report: parts.complain(*(f"{rung.name}: {line}" for line in trouble_lines(report))),
-        announce=parts.complain,
-    )
+    status = _run_rungs(rungs, refusals, out, arguments.fresh)
     if status < STALLED and parts.speaks():
         report = report_ladder(job, rungs, out)
         parts.say(*ladder_lines(job, report.findings))
         parts.say(f"table: {report.table}", f"dataset: {report.dataset}", f"picture: {report.picture}")
+    return end_process(status)
+
+
+def _run_rungs(rungs: Sequence[Rung], refusals: Mapping[str, str], out: Path, fresh: bool) -> int:
+    """Do the runs of models one after another, and return the exit status."""
+    from cvt_hpc.ladder.making import run_ladder
+    from cvt_hpc.printing import trouble_lines
+
+    parts.complain(*(f"{name} left out: {why}" for name, why in refusals.items()))
+    return run_ladder(
+        rungs,
+        out,
+        fresh=fresh,
+        tell=lambda rung, report: parts.complain(*(f"{rung.name}: {line}" for line in trouble_lines(report))),
+        announce=parts.complain,
+    )
+
+
+def _growth(arguments: argparse.Namespace) -> int:
+    from cvt_hpc.ladder.growth import find_growth, growth_lines, load_growth, report_growth
+    from cvt_hpc.study.ranks.launch import end_process
+    from cvt_hpc.study.status import STALLED
+
+    asked = parts.alike(arguments, lambda: load_growth(arguments.path, arguments.set, arguments.kick))
+    out = parts.output_folder(arguments.out, asked.job)
+    status = _run_rungs(asked.rungs, asked.refusals, out, arguments.fresh)
+    if status < STALLED and parts.speaks():
+        dataset, files = report_growth(asked, find_growth(asked, out), out)
+        parts.say(*growth_lines(asked, dataset), *(f"written: {path}" for path in files))
     return end_process(status)
 
 

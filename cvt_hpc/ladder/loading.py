@@ -5,7 +5,7 @@ that takes longer than the elastic belt and answers the same questions, if a job
 may be the pushbelt of rigid elements. The expected cost follows from the models' cost models.
 """
 
-from collections.abc import Iterator, Mapping
+from collections.abc import Iterator, Mapping, Sequence
 from dataclasses import replace
 from pathlib import Path
 from typing import Any, NamedTuple
@@ -108,7 +108,7 @@ def ladder(
     models = _LOWER if beside == NONE else _LOWER | {beside: (beside, {}, QUESTIONS)}
     for name, (model, table, answers) in models.items():
         try:
-            rungs.append(Rung(name, answers, _handed(job, model, table)))
+            rungs.append(Rung(name, answers, handed(job, model, table)))
         except InputError as error:
             refusals[name] = str(error)
     rungs.append(Rung(MODEL, QUESTIONS, job))
@@ -142,7 +142,7 @@ def _check(job: Job) -> None:
             raise mismatch(f"{where}: [{table}] {name}", "one value, which the reference refines", found)
 
 
-def _handed(job: Job, model: str, table: dict[str, Any]) -> Job:
+def handed(job: Job, model: str, table: dict[str, Any]) -> Job:
     """The same runs on another model, without the axes that it does not know."""
     known = known_keys(model)
     fewer = replace(job, axes=tuple(axis for axis in job.axes if axis.name in known))
@@ -317,6 +317,13 @@ def plan_lines(asked: Ladder, out: Path) -> Iterator[str]:
     yield f"ladder {job.name} ({job.source}): {job.size} runs with {len(rungs)} models"
     if job.description:
         yield job.description
+    yield from rung_lines(rungs, asked.refusals, out)
+    if rungs[-1].job.model != PUSHBELT:
+        yield f"with --set ladder.reference={PUSHBELT}: {_pushbelt_cost(job)}"
+
+
+def rung_lines(rungs: Sequence[Rung], refusals: Mapping[str, str], out: Path) -> Iterator[str]:
+    """Yield the lines that state the runs of models, those left out, and the cost of what is left."""
     left = {rung.name: cost_left(rung, out) for rung in rungs}
     heads = ["name", "model", "runs", "left", "core-s left", "answers"]
     yield from columns(
@@ -329,11 +336,9 @@ def plan_lines(asked: Ladder, out: Path) -> Iterator[str]:
             ),
         ]
     )
-    yield from (f"{name} left out: {why}" for name, why in asked.refusals.items())
+    yield from (f"{name} left out: {why}" for name, why in refusals.items())
     total = sum(core_seconds for _, core_seconds in left.values())
     yield f"estimated cost of what is left: {core_time_in_words(total)}, shared by all ranks"
-    if rungs[-1].job.model != PUSHBELT:
-        yield f"with --set ladder.reference={PUSHBELT}: {_pushbelt_cost(job)}"
 
 
 def _pushbelt_cost(job: Job) -> str:

@@ -149,8 +149,9 @@ class Declaration(Protocol):
     `inert(parameters)`, the keys without effect with the reason of each; `GIVES`, by stepper and key how a
     key of the stepper is derived for this model (`cvt_hpc.parameters.Substitute`); `REFUSED`, steppers that
     it does not take, each with the reason; `ANSWERED_BY`, questions that another model answers, each with
-    that model's name and the reason; and `COMPARED`, variables of the record, numbers per run or per strand
-    or pulley, that are compared between two studies beside class, amplitude and frequency.
+    that model's name and the reason; `COMPARED`, variables of the record, numbers per run or per strand or
+    pulley, that are compared between two studies beside class, amplitude and frequency; and `KICK`, the
+    parameter that gives the belt a push at an instant of a run, 0 for none, with a small value [SI].
     """
 
     @property
@@ -247,6 +248,11 @@ class Model:
     def compared(self) -> tuple[str, ...]:
         """Variables that are compared between two studies beside class, amplitude and frequency."""
         return _member(self._declared, "COMPARED", ())
+
+    @property
+    def kick(self) -> tuple[str, float] | None:
+        """Parameter that gives the belt a push at an instant of a run, and a small value of it [SI]."""
+        return _member(self._declared, "KICK", None)
 
     @property
     def check(self) -> Callable[[Parameters], Any]:

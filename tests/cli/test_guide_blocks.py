@@ -45,7 +45,7 @@ LINES = [line for page in PAGES for block in blocks(page) for line in block.text
 DRAWING = "text"  # kind of a block that shows something and is no code
 # Minutes of a core, however few runs they have: `check` reads their jobs, scenes and options instead, and the tests
 # of their own packages run small ones.
-CHECKED_ONLY = {"branch", "chart", "fit", "ladder"}
+CHECKED_ONLY = {"branch", "chart", "fit", "growth", "ladder"}
 CHECKED_MODELS = {"beam_pushbelt"}
 # What runs here have [SI], by key, or by model, stepper or job and key. Five periods of band_low are judged, the least that
 # there may be; slow models have a high band for that.

@@ -12,5 +12,6 @@ REFUSED = dict.fromkeys(
     "its set-valued laws are coupled by the ring: it is marched by its own step, proximal",
 )
 STEPPERS = {"proximal": "cvt_hpc.models.beam_pushbelt.proximal_settings"}
+KICK = "kick", 0.02  # [m/s]
 
-__all__ = ["DEFAULT_STEPPER", "PARAMETERS", "REFUSED", "STEPPERS", "check", "inert"]
+__all__ = ["DEFAULT_STEPPER", "KICK", "PARAMETERS", "REFUSED", "STEPPERS", "check", "inert"]

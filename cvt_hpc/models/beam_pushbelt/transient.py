@@ -134,6 +134,9 @@ class Transient(pushbelt.Transient):
     def _elements(self) -> np.ndarray:
         return self._state.elements
 
+    def _by_field(self) -> np.ndarray:
+        return self._state.elements.T
+
     def _stored_energy(self, found: Reading) -> float:
         e, belt, ring = self._state.elements, self._belt, self._state.ring
         kinetic = belt.mass * (e[:, [f.U_Y, f.U_Z]] ** 2).sum()

@@ -132,8 +132,9 @@ REFUSED = dict.fromkeys(
 )
 STEPPERS = {"cyclic_alpha": "cvt_hpc.models.belt_drive.step_settings"}
 COMPARED = ("speed_loss", "efficiency", "strand_tension", "tension_ripple")
+KICK = "kick", 0.02  # [N s]
 
-__all__ = ["COMPARED", "DEFAULT_STEPPER", "PARAMETERS", "REFUSED", "STEPPERS", "check", "inert"]
+__all__ = ["COMPARED", "DEFAULT_STEPPER", "KICK", "PARAMETERS", "REFUSED", "STEPPERS", "check", "inert"]
 
 
 def check(parameters: Parameters) -> list[tuple[str, str, str]]:

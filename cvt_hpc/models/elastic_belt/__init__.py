@@ -20,4 +20,16 @@ STEPPERS = OWN_STEPPERS | taken(REFUSED)
 
 GIVES = {"imex": {"step_error": CHOICE}}  # by stepper: values of its parameters for a scene
 
-__all__ = ["DEFAULT_STEPPER", "GIVES", "OWN_STEPPERS", "PARAMETERS", "REFUSED", "STEPPERS", "check", "inert"]
+KICK = "disturbance", 1e-5  # [m]
+
+__all__ = [
+    "DEFAULT_STEPPER",
+    "GIVES",
+    "KICK",
+    "OWN_STEPPERS",
+    "PARAMETERS",
+    "REFUSED",
+    "STEPPERS",
+    "check",
+    "inert",
+]

@@ -96,8 +96,9 @@ PARAMETERS: dict[str, dict[str, Parameter]] = {
 }
 
 DEFAULT_STEPPER = "moreau"
+KICK = "initial_displacement", 1e-6  # [m]
 
-__all__ = ["DEFAULT_STEPPER", "PARAMETERS", "STEPPERS", "check", "inert"]
+__all__ = ["DEFAULT_STEPPER", "KICK", "PARAMETERS", "STEPPERS", "check", "inert"]
 
 
 def check(parameters: Parameters) -> list[tuple[str, str, str]]:

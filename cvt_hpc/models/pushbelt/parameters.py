@@ -62,6 +62,12 @@ PARAMETERS: dict[str, dict[str, Parameter]] = {
             "axial force on the driving pulley; 0: its sheave stays where the ratio puts it",
             sensible=(500.0, 2000000.0),
         ),
+        "kick": not_negative(
+            0.0,
+            "m/s",
+            "largest speed outwards that is given to each strand when the judged part begins",
+            sensible=(1e-6, 10.0),
+        ),
     },
     "profiles": PROFILES,
     "belt": {

@@ -17,12 +17,13 @@ import numpy as np
 
 from cvt_hpc.models.pushbelt import fields as f
 from cvt_hpc.models.pushbelt.parameters import MODES, path_length
-from cvt_hpc.models.pushbelt.readings import PROFILES, SCALARS, Readings
+from cvt_hpc.models.pushbelt.readings import PROFILES, SCALARS, OnPath, Readings
 from cvt_hpc.models.sampled import MOST_UNSOLVED, SampledRun
 from cvt_hpc.physics.geometry import driven_radius
 from cvt_hpc.variables import Status
 from cvt_hpc.variator import LEAST_SPEED, MOST_SPEED, PULLEYS, STRANDS
 from cvt_hpc.variator.course import load_course
+from cvt_hpc.variator.history import points_at, regions
 from cvt_hpc.variator.scene import multiple
 from cvt_hpc.variator.slip import GAINED, LOST
 from cvt_hpc.vibration.ramped import ramped
@@ -91,6 +92,7 @@ def fingerprint(*values: Any) -> str:
 
 COURSES = ("load", "driving_speed")
 FIRST_THRUST = 500.0  # [N]: with which the run begins, so that the belt settles in the grooves
+KICK_PEAK = 32.0 / 27.0  # of sin^2 x (1 + cos x), at cos x = 1/3
 CLAMPED = 0.5  # of the rise time: until then the thrust rises, from then on the load, lest the belt slips
 # Limit of the open power balance beside the equations' tolerance: elastic sheaves lean along the arc,
 # which has no part in the elements' forces. Sound runs leave up to 0.5 % of the losses.
@@ -121,6 +123,8 @@ class ElementRun(SampledRun):
     _channels: tuple[str, ...] = (*COURSES, *SCALARS)
     _profiles: Sequence[str] = tuple(PROFILES)
     _directions: tuple[str, ...] = STRANDS  # of the displacement at the probes of the strands
+    _saddle: tuple[int, ...] = (f.Y, f.Z)  # fields of the saddle point, and of its speed with the turning
+    _speeds: tuple[int, ...] = (f.U_Y, f.U_Z, f.OMEGA)
     _belt: Any
     _method: Any  # how steps are solved, state and work space, as `_advance` takes them
     _state: Any
@@ -137,6 +141,7 @@ class ElementRun(SampledRun):
         self._record(self._channels, self._directions, probes, f.TOTALS + 1, sums)
         clamped = int(CLAMPED * p["rise_time"] / self.interval + 1e-9)
         self._start_up = min(clamped, self.first_judged)
+        self._kick_at = self.first_judged if p["kick"] > 0.0 else -1  # also of a run that is prolonged
         self._start_up_key = self._key_of_start_up()
         self._go_on_from(_start_ups.find(self._start_up_key))
 
@@ -172,6 +177,8 @@ class ElementRun(SampledRun):
         if samples == 0:
             self._compile()
         for _ in range(min(samples, self.samples - self.done)):
+            if self.done == self._kick_at:
+                self._kick()
             inputs = self._inputs_along(self.done)
             outcome = self._march(inputs, self._steps_per_sample)
             if outcome:
@@ -205,6 +212,29 @@ class ElementRun(SampledRun):
     def _reached(self) -> tuple[np.ndarray, ...]:
         """Views of all arrays that marching has changed so far, where nothing is judged yet."""
         return self._state.elements.data, *self._state[1:], *self._recorded()
+
+    def _by_field(self) -> np.ndarray:
+        """Fields of the elements in the order of the belt, a view (fields, ...)."""
+        return self._state.elements.data.transpose(1, 2, 0)
+
+    def _kick(self) -> None:
+        """Give both strands a speed outwards, and their elements the turning that goes with it.
+
+        The shape begins and ends without a kink, and has parts in odd and in even half waves.
+        """
+        elements, path = self._by_field(), self.path
+        saddles = elements[list(self._saddle)].reshape(2, -1).T
+        position = OnPath(self._readings, saddles).position
+        region = regions(path, position)
+        starts, length = np.concatenate([[0.0], np.cumsum(path.lengths)]), path.strand_length
+        phase = np.pi * np.where(region % 2 == 1, (position - starts[region]) / length, 0.0)
+        c, s = np.cos(phase), np.sin(phase)
+        size = self.parameters["kick"] / KICK_PEAK
+        speed, slope = size * s**2 * (1.0 + c), size * np.pi / length * s * (1.0 + c) * (3.0 * c - 1.0)
+        _, angle, _ = points_at(path, self.parameters["centre_distance"], position)
+        changes = speed * np.sin(angle), -speed * np.cos(angle), -slope
+        for field, change in zip(self._speeds, changes, strict=True):
+            elements[field] += change.reshape(elements[field].shape)
 
     def _march(self, inputs: np.ndarray, steps: int) -> int:
         return self._advance(self._belt, self._method, self._state, self._work, inputs, steps, self.step)

@@ -52,9 +52,11 @@ REFUSED = elastic_belt.REFUSED | dict.fromkeys(
     "the rates of what lags follow from forces that know them: the model has a step of its own",
 )
 STEPPERS = OWN_STEPPERS
+KICK = elastic_belt.KICK
 
 __all__ = [
     "DEFAULT_STEPPER",
+    "KICK",
     "OWN_STEPPERS",
     "PARAMETERS",
     "REFUSED",

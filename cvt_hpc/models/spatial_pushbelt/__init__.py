@@ -13,5 +13,6 @@ REFUSED = dict.fromkeys(
 )
 STEPPERS = {"newton": "cvt_hpc.models.spatial_pushbelt.newton_settings"}
 COMPARED = ("speed_loss", "efficiency", "loss", "net_axial_force")
+KICK = "kick", 0.02  # [m/s]
 
-__all__ = ["COMPARED", "DEFAULT_STEPPER", "PARAMETERS", "REFUSED", "STEPPERS", "check", "inert"]
+__all__ = ["COMPARED", "DEFAULT_STEPPER", "KICK", "PARAMETERS", "REFUSED", "STEPPERS", "check", "inert"]

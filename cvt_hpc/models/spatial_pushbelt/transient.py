@@ -52,6 +52,8 @@ class Transient(ElementRun):
     _channels = CHANNELS
     _profiles = tuple(readings.PROFILES)
     _directions = (*STRANDS, *readings.LATERAL)
+    _saddle = tuple(range(f.POSITION, f.POSITION + f.AXIAL))
+    _speeds = (*range(f.SPEED, f.SPEED + f.AXIAL), f.OMEGA + f.AXIAL)
 
     def _begin(self, p: Parameters) -> None:
         flows = p["ring_flows"]
