@@ -12,15 +12,17 @@ import numpy as np
 
 from cvt_hpc.variables import Variable, Vibrates, shortened, values
 from cvt_hpc.variator import PULLEYS, STRANDS
-from cvt_hpc.variator.band import band
+from cvt_hpc.variator.band import band, judder_frequency
 from cvt_hpc.variator.slip import slide, with_slip
 from cvt_hpc.variator.variables import Measured
 from cvt_hpc.vibration import assessment, ramp
 from cvt_hpc.vibration.ramped import ramped
+from cvt_hpc.vibration.signals import band_amplitude
 
 VIBRATION = tuple(
     replace(v, early=True, may_miss=v in ramp.VARIABLES) for v in (*assessment.VARIABLES, *ramp.VARIABLES)
 )
+LOCKED = 0.1  # of the resolution 1/L: how far a line of judder's may lie from a multiple of its frequency
 RAMPED_CHANNELS = {"load": "load", "speed": "driving_speed"}  # by the ramped quantity
 
 
@@ -43,7 +45,47 @@ def assess(
     columns, strands = _on_strands(run, names)
     in_band = {**p, "band_low": band(run)[0]}
     found = assessment.assess(run.displacement[:, columns], p["sampling_rate"], strands, in_band)
-    return with_slip(run, replace(found, strongest_probe=columns[found.strongest_probe]), pulleys)
+    found = with_judder(run, replace(found, strongest_probe=columns[found.strongest_probe]))
+    return with_slip(run, found, pulleys)
+
+
+def with_judder(run: Any, found: assessment.Occurrence) -> assessment.Occurrence:
+    """The verdict on a run whose driven pulley judders: harmonics of judder are no vibration of the belt.
+
+    A run does not vibrate where the strongest line of each strand above the threshold is a multiple of the
+    judder's frequency within LOCKED/L, L being the length of the judged part, and where the strands are below
+    the threshold without all such multiples. Amplitudes stay as they are; nothing else is decided by them.
+
+    Parameters
+    ----------
+    run : object
+        As `assess` takes it.
+    found : Occurrence
+        Of it, probes being columns of the displacement.
+    """
+    p = run.parameters
+    rate, threshold = p["sampling_rate"], p["amplitude_threshold"]
+    slow = judder_frequency(run) if found.vibrates is Vibrates.YES else np.nan
+    if np.isnan(slow):
+        return found
+    moved = run.displacement[run.judged][:, found.strongest_probe]
+    above = found.amplitude >= threshold
+    orders = found.strongest_frequency / slow
+    off = np.abs(orders - np.round(orders)) * slow * len(moved) / rate
+    multiples = slow * np.arange(1.0, np.floor(p["band_high"] / slow) + 1.0)
+    phases = 2.0 * np.pi / rate * np.outer(np.arange(len(moved)), multiples)
+    waves = np.hstack([np.ones((len(moved), 1)), np.cos(phases), np.sin(phases)])
+    rest = moved - waves @ np.linalg.lstsq(waves, moved, rcond=None)[0]
+    left = band_amplitude(rest, rate, (found.lower_band_edge, p["band_high"]))
+    if not np.all(off[above] <= LOCKED) or np.any(left >= threshold):
+        return found
+    told = [
+        f"{name} by {size * 1e6:.3g} um at its harmonic {order:.0f}"
+        for name, size, order in zip(found.strands, found.amplitude, orders, strict=True)
+        if size >= threshold
+    ]
+    reason = f"the driven pulley judders at {slow:.4g} Hz and moves {', '.join(told)}"
+    return replace(found, vibrates=Vibrates.NO, reason=reason, margin=0.0)
 
 
 def _assess_ramp(run: Any, names: Sequence[str]) -> ramp.RampOccurrence | None:
