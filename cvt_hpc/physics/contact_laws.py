@@ -48,6 +48,17 @@ def damped(gap, change, stiffness):
 
 
 @register_jitable
+def taken(gap, change, stiffness, force):
+    """Energy [J] that a step takes at a one-sided contact, by its mean gap and change [m], and its force [N].
+
+    By a force of that gap it is 0 where the contact stays closed or open. Where it closes, the step gives
+    what it takes where the contact opens as fast.
+    """
+    before, after = maximum(0.5 * change - gap, 0.0), maximum(-0.5 * change - gap, 0.0)
+    return 0.5 * stiffness * (before * before - after * after) - force * change
+
+
+@register_jitable
 def smoothed(size, regularisation):
     """1 / q [s/m] of a sliding speed's size [m/s], and q' over that size [s/m]."""
     size = maximum(size, LEAST_SHARE_OF_WIDTH * regularisation)

@@ -17,7 +17,7 @@ from cvt_hpc.models.pushbelt.parameters import falling_limit, path_length
 from cvt_hpc.models.pushbelt.readings import Reading
 from cvt_hpc.models.pushbelt.run import fingerprint
 from cvt_hpc.models.pushbelt.stepping import correct, solve_bordered
-from cvt_hpc.models.pushbelt.transient import EQUATIONS, _assemble, _evaluate, _prepare, advance
+from cvt_hpc.models.pushbelt.transient import EQUATIONS, _accept, _assemble, _evaluate, _prepare, advance
 from cvt_hpc.solvers.cyclic_blocks import block_size
 from cvt_hpc.solvers.linked_blocks import solve
 from support.pushbelts import NODES, SPEED, THRUST, given
@@ -84,14 +84,20 @@ def test_rates_of_gaps_strains_angles_and_depths():
     f[:, pushbelt_fields.LENGTH] = np.linalg.norm(np.roll(points, -1, 0) - points, axis=1)
 
     small = 1e-7  # [m/s]; a step's length is a second
-    measured = {}
+    measured, moved = {}, {}
     for sign in (-1.0, 1.0):
         g = f.copy()
         g[:, U] = sign * small * x
         write(state.elements, g)
         _prepare(belt, state, work, 1.0)
         measured[sign] = fields(work.step)
+        _accept(belt, state, work, np.zeros(pushbelt_fields.INPUTS), 1.0)
+        _prepare(belt, state, work, 1.0)
+        moved[sign] = fields(work.step)
     difference = (measured[1.0] - measured[-1.0]) / (2.0 * small)
+    # springs of tilt and flanks act at mean positions, of which a quarter are those that are reached
+    means = [pushbelt_fields.START_MOMENT_I, pushbelt_fields.START_MOMENT_J, pushbelt_fields.DEPTH]
+    difference[:, means] = 0.25 * (moved[1.0] - moved[-1.0])[:, means] / (2.0 * small)
 
     write(state.elements, f)
     _prepare(belt, state, work, 1.0)
@@ -108,15 +114,15 @@ def test_rates_of_gaps_strains_angles_and_depths():
         pushbelt_fields.EDGE_GAP: -elements[:, pushbelt_fields.EDGE] / belt.contact_stiffness,
         pushbelt_fields.HEAD_GAP: -elements[:, pushbelt_fields.HEAD] / belt.contact_stiffness,
         pushbelt_fields.NOSE_OFFSET: elements[:, pushbelt_fields.NOSE] / belt.nose_stiffness,
-        pushbelt_fields.PREDICTED_MOMENT_I: iterate[:, pushbelt_fields.MOMENT_I],
-        pushbelt_fields.PREDICTED_MOMENT_J: iterate[:, pushbelt_fields.MOMENT_J],
-        pushbelt_fields.PREDICTED_DEPTH: elements[:, pushbelt_fields.FLANK] / belt.flank_stiffness,
+        pushbelt_fields.START_MOMENT_I: iterate[:, pushbelt_fields.MOMENT_I],
+        pushbelt_fields.START_MOMENT_J: iterate[:, pushbelt_fields.MOMENT_J],
+        pushbelt_fields.DEPTH: elements[:, pushbelt_fields.FLANK] / belt.flank_stiffness,
     }
     one_sided = {
         pushbelt_fields.EDGE_GAP: pushbelt_fields.EDGE,
         pushbelt_fields.HEAD_GAP: pushbelt_fields.HEAD,
         pushbelt_fields.NOSE_OFFSET: pushbelt_fields.NOSE,
-        pushbelt_fields.PREDICTED_DEPTH: pushbelt_fields.FLANK,
+        pushbelt_fields.DEPTH: pushbelt_fields.FLANK,
     }
     for field, rate in pairs.items():
         # 1e-7: central differences of steps of 0.1 um; angles enter by their sine, whose slope at q_k is taken
@@ -435,12 +441,9 @@ def test_power_balance_over_a_revolution(run):
     )
     # what Newton's method leaves; elastic sheaves lean along the arc, which has no part in the forces
     assert taken - losses.sum() - damped.sum() == pytest.approx(0.0, abs=2e-3 * losses.sum())
-    assert damped.sum() > 20.0 and (damped > 0.05).all() and (losses > 1.0).all()
-    # the springs of tilt and their dampers act on the same rates
-    tilt = STEP * run[0].angle_stiffness / run[0].angle_damping
-    assert rates[pushbelt_fields.TILT_DAMPED] == pytest.approx(
-        tilt * rates[pushbelt_fields.DAMPING_LOSS], rel=0.01
-    )
+    assert damped.sum() > 5.0 and (losses > 1.0).all()
+    # flanks: as elements enter faster than they leave, -0.3 W at 10 us
+    assert abs(damped[list(pushbelt_fields.DAMPED).index("flanks")]) < 3e-3 * losses.sum()
     assert abs(rates[pushbelt_fields.POWER_RESIDUAL]) < 1.0
 
 
@@ -523,14 +526,21 @@ def test_contacts_hold_their_laws(run):
             f[:, pushbelt_fields.TENSION]
         )
         driven = f[:, pushbelt_fields.DRIVEN].astype(int)
-        points = pitch_points(belt, f, driven)
         groove = pulleys[[pushbelt_fields.DRIVING_RADIUS, pushbelt_fields.DRIVEN_RADIUS]][driven]
-        back = f.copy()  # the opening counts where the elements were at the start of the step
+        # flanks press by the mean depth before, at and after the start of the step
+        back = f.copy()
         back[:, [pushbelt_fields.Y, pushbelt_fields.Z]] -= (
             STEP * f[:, [pushbelt_fields.U_Y, pushbelt_fields.U_Z]]
         )
-        opening = (shapes(belt, pitch_points(belt, back, driven)) * openings[driven]).sum(1)
-        depth = (groove - np.linalg.norm(points, axis=1)) * belt.sine - opening * belt.cosine
+        early = back.copy()
+        early[:, [pushbelt_fields.Y, pushbelt_fields.Z]] -= STEP * (
+            f[:, [pushbelt_fields.U_Y, pushbelt_fields.U_Z]]
+            - f[:, [pushbelt_fields.CHANGE_Y, pushbelt_fields.CHANGE_Z]]
+        )
+        points = [pitch_points(belt, g, driven) for g in (early, back, f)]
+        opening = (shapes(belt, points[1]) * openings[driven]).sum(1)
+        radius = np.average(np.linalg.norm(points, axis=2), axis=0, weights=[1, 2, 1])
+        depth = (groove - radius) * belt.sine - opening * belt.cosine
         assert belt.flank_stiffness * np.maximum(depth, 0.0) == near(f[:, pushbelt_fields.FLANK])
 
 
@@ -680,7 +690,8 @@ def test_slip_limit():
     thrust = (belt.cosine * f[:, pushbelt_fields.FLANK] + belt.sine * f[:, pushbelt_fields.FLANK_FRICTION_M])[
         driving
     ].sum()
-    assert torque / thrust == pytest.approx(limit, rel=1e-3)
+    # 4e-3: an element that leaves the arc slides outwards as well
+    assert torque / thrust == pytest.approx(limit, rel=4e-3)
 
 
 @pytest.mark.parametrize(
@@ -801,3 +812,57 @@ def test_what_is_not_a_number_ends_a_march_or_has_no_effect():
         ends += status == pushbelt_fields.NOT_FINITE
         assert status == pushbelt_fields.NOT_FINITE or fingerprint(state) == fingerprint(clean)
     assert 25 < ends < sum(sizes)
+
+
+def rate_and_turn(x):
+    """Growth [1/s] of a vibration in steps x, and the angle of a step, about a mean."""
+    # x(t + dt) = 2 r cos(w dt) x(t) - r^2 x(t - dt) + const
+    known = np.stack([x[1:-1], -x[:-2], np.ones(x.size - 2)], 1)
+    both, square, _ = np.linalg.lstsq(known, x[2:], rcond=None)[0]
+    return np.log(square) / (2.0 * STEP), np.arccos(0.5 * both / np.sqrt(square))
+
+
+def test_free_vibration_of_tilt_keeps_its_energy():
+    """Elements rock on a ring at rest; the frequency errs by (w dt)^2 / 12."""
+    belt, state = start(given(angle_damping=0.0))
+    belt = belt._replace(mass=1e9, ring_mass=1e9, thickness=1e-3, ring_stiffness=1e-9, transverse_damping=0.0)
+    belt = belt._replace(centre_distance=10.0)  # away from the sheaves
+    angle = 2.0 * np.pi * np.arange(NODES) / NODES
+    f, leaning = np.zeros((NODES, pushbelt_fields.STATE_FIELDS)), angle + 1e-3
+    f[:, pushbelt_fields.Y], f[:, pushbelt_fields.Z] = 2.0 + 0.1 * np.cos(angle), 0.1 * np.sin(angle)
+    f[:, pushbelt_fields.HEADING_Y], f[:, pushbelt_fields.HEADING_Z] = -np.sin(leaning), np.cos(leaning)
+    f[:, pushbelt_fields.LENGTH] = 0.2 * np.sin(np.pi / NODES)
+    write(state.elements, f)
+    found, work = [], workspace(belt, NODES)
+    for _ in range(1000):
+        assert advance(belt, b.NEWTON, state, work, constant(0.0, 0.0), 1, STEP) == pushbelt_fields.CONVERGED
+        found.append(-fields(state.elements)[0, pushbelt_fields.HEADING_Y])
+    turn = STEP * np.sqrt(belt.angle_stiffness * np.cos(2.0 * np.pi / NODES) / belt.inertia)
+    growth, found_turn = rate_and_turn(np.array(found))
+    assert growth == pytest.approx(0.0, abs=0.1)  # -770 by the angle at the end of the step
+    assert found_turn == pytest.approx(turn * (1.0 - turn**2 / 12.0), rel=1e-4)
+
+
+def test_free_vibration_on_flanks_that_stay_shut_keeps_its_energy():
+    """A belt breathes on a pulley that holds it against its tension."""
+    pressed = 100.0
+    belt, state, work = on_a_pulley(given(kinetic_friction=0.0), 0.0, pressed)
+    tension = pressed * belt.sine / np.sin(np.pi / NODES)
+    belt = belt._replace(ring_stiffness=1.0)  # a tension that hardly changes
+    f = fields(state.elements)
+    f[:, pushbelt_fields.LENGTH] /= 1.0 + tension
+    o = np.stack([f[:, pushbelt_fields.HEADING_Z], -f[:, pushbelt_fields.HEADING_Y]], 1)
+    f[:, [pushbelt_fields.U_Y, pushbelt_fields.U_Z]] = 0.02 * o
+    write(state.elements, f)
+    found, least = [], pressed
+    for _ in range(1000):
+        assert advance(belt, b.NEWTON, state, work, constant(0.0, 0.0), 1, STEP) == pushbelt_fields.CONVERGED
+        f = fields(state.elements)
+        found.append(np.hypot(f[0, pushbelt_fields.Y], f[0, pushbelt_fields.Z]))
+        least = min(least, f[:, pushbelt_fields.FLANK].min())
+    stiffness, mass = 2.0 * belt.flank_stiffness * belt.sine**2, belt.mass + belt.ring_mass
+    turn = STEP * np.sqrt(stiffness / mass)
+    growth, found_turn = rate_and_turn(np.array(found))
+    assert 0.0 < least < 0.9 * pressed
+    assert growth == pytest.approx(0.0, abs=5.0)  # by the depth at the end of the step some -8000
+    assert found_turn == pytest.approx(turn * (1.0 - turn**2 / 12.0), rel=2e-3)

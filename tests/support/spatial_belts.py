@@ -63,8 +63,22 @@ def stored(belt, state):
     return energy + 0.5 * belt.driven_inertia * state.pulleys[pushbelt_fields.DRIVEN_SPEED] ** 2
 
 
+def moved_back(fields):
+    """Positions and directions of elements a step before, and then the speeds of that time."""
+    f, omega = fields.copy(), fields[:, spatial_fields.OMEGA : spatial_fields.OMEGA + 3]
+    f[:, 0:3] -= STEP * fields[:, spatial_fields.SPEED : spatial_fields.SPEED + 3]
+    for first in (spatial_fields.HEADING, spatial_fields.OUTWARD):
+        half = fields[:, first : first + 3] - 0.5 * STEP * np.cross(omega, fields[:, first : first + 3])
+        f[:, first : first + 3] -= STEP * np.cross(omega, half)
+    f[:, spatial_fields.SPEED : spatial_fields.SPEED + 8] -= fields[:, spatial_fields.CHANGE :][:, :8]
+    return f
+
+
 def gaps(belt, state):
-    """Gaps by the geometry of a state, of the contacts `CONTACTS[:9]`, (nodes, 9) [m]."""
+    """Gaps by the geometry of a state, of the contacts `CONTACTS[:9]`, (nodes, 9) [m].
+
+    Flanks have the mean radius of three positions, of which the state is the last one, and its axial position.
+    """
     f = of_lanes(state.elements)
     r, x, o = f[:, 0:3], f[:, 3:6], f[:, 6:9]
     a = np.cross(o, x)
@@ -84,12 +98,18 @@ def gaps(belt, state):
         for first in (pushbelt_fields.DRIVING_RADIUS, spatial_fields.DRIVING_MIDDLE)
     )
     opening, lean = (sheaves_opening(belt, state, modes) for modes in (state.openings, state.leans))
+    three = [f, moved_back(f), moved_back(moved_back(f))]
     for side in (-1.0, 1.0):
         for reach in (-belt.flank_reach, belt.flank_reach):
             width = belt.half_width + reach * belt.sine / belt.cosine
             q = r - centre + (reach - belt.pitch_depth) * o + side * width * a
             along = np.sum(q * axis, axis=1)
-            radius = np.linalg.norm(q - along[:, None] * axis, axis=1)
+            radii = []
+            for g in three:
+                sideways = np.cross(g[:, 6:9], g[:, 3:6])
+                p = g[:, 0:3] - centre + (reach - belt.pitch_depth) * g[:, 6:9] + side * width * sideways
+                radii.append(np.linalg.norm(p - np.sum(p * axis, axis=1)[:, None] * axis, axis=1))
+            radius = np.average(radii, axis=0, weights=[1, 2, 1])
             apart = belt.half_width - side * (along - middle) + opening + side * lean
             found.append(belt.cosine * apart + belt.sine * (radius - groove))
     return np.stack(found, axis=1)

@@ -6,6 +6,7 @@ from cvt_hpc.kernels import kernel
 from cvt_hpc.lanes import ahead, behind, like
 from cvt_hpc.models.pushbelt import fields as f
 from cvt_hpc.models.pushbelt.border import border_residuals, of_pulley
+from cvt_hpc.models.pushbelt.chain import BETA, angle_slope
 from cvt_hpc.models.pushbelt.friction import flank_friction, ring_friction
 from cvt_hpc.physics.contact_laws import pressed
 from cvt_hpc.solvers.linked_blocks import field_of_right
@@ -19,7 +20,7 @@ RIGHT_OPENINGS = RIGHT_SPEED + f.UNKNOWNS
 @kernel
 def pair_forces(belt, state, step, iterate, dt):
     """Tension, contact forces and moments of angles between neighbours, with the slopes of contacts."""
-    steep = 0.5 * (dt * belt.angle_stiffness + belt.angle_damping)
+    steep = angle_slope(belt, dt)
     stiffness = belt.contact_stiffness
     for j in range(step.rows):
         iy, iz = state[j, f.CHANGE_Y], state[j, f.CHANGE_Z]
@@ -32,8 +33,8 @@ def pair_forces(belt, state, step, iterate, dt):
         iterate[j, f.ITERATE_TENSION] = step[j, f.PREDICTED_TENSION] - step[j, f.TENSION_SLOPE] * stretch
 
         turn = step[j, f.TURN_Y] * (jy - iy) + step[j, f.TURN_Z] * (jz - iz)
-        iterate[j, f.MOMENT_I] = step[j, f.PREDICTED_MOMENT_I] + steep * step[j, f.ANGLE_I] * (iw - turn)
-        iterate[j, f.MOMENT_J] = step[j, f.PREDICTED_MOMENT_J] + steep * step[j, f.ANGLE_J] * (jw - turn)
+        iterate[j, f.MOMENT_I] = step[j, f.START_MOMENT_I] + steep * step[j, f.ANGLE_I] * (iw - turn)
+        iterate[j, f.MOMENT_J] = step[j, f.START_MOMENT_J] + steep * step[j, f.ANGLE_J] * (jw - turn)
 
         x_y, x_z = ahead(state, j, f.HEADING_Y), ahead(state, j, f.HEADING_Z)
         closing = x_y * (jy - iy) + x_z * (jz - iz)
@@ -63,7 +64,7 @@ def element_forces(belt, state, pulleys, increments, openings, shapes, step, ite
     and of the openings of the driving and the driven sheaves.
     """
     modes = belt.modal_stiffness.shape[1]
-    wide = 1.0 / belt.cosine
+    wide, share = 1.0 / belt.cosine, BETA * dt * belt.sine
     driving_speed, driven_speed = pulleys[f.DRIVING_SPEED], pulleys[f.DRIVEN_SPEED] + increments[0]
     for j in range(step.rows):
         dy, dz = state[j, f.CHANGE_Y], state[j, f.CHANGE_Z]
@@ -79,7 +80,7 @@ def element_forces(belt, state, pulleys, increments, openings, shapes, step, ite
 
         # the pair of flanks
         r_y, r_z, r_lever = step[j, f.R_Y], step[j, f.R_Z], step[j, f.R_LEVER]
-        deep = step[j, f.PREDICTED_DEPTH] - dt * belt.sine * (r_y * dy + r_z * dz + r_lever * dw)
+        deep = step[j, f.DEPTH] - share * (r_y * dy + r_z * dz + r_lever * dw)
         for k in range(modes):
             driving = openings[0, k] + increments[1 + k]
             driven_one = openings[1, k] + increments[1 + modes + k]
@@ -107,7 +108,7 @@ def element_forces(belt, state, pulleys, increments, openings, shapes, step, ite
         twice = 2.0 * normal
         # meridian slip has the factor `wide`, its force in radial direction the cosine
         rr, rt, tr, tt = twice * mm, twice * belt.cosine * mt, twice * wide * tm, twice * tt
-        press = dt * belt.sine * stiff
+        press = share * stiff
         lean_r, lean_t = press * by_normal_r, press * by_normal_t
         iterate[j, f.SLOPE_R] = lean_r * r_y + rr * m_y - rt * m_z
         iterate[j, f.SLOPE_R + f.ROW_Z] = lean_r * r_z + rr * m_z + rt * m_y
@@ -300,7 +301,7 @@ def border_sums(belt, state, shapes, step, iterate, blocks, sums, dt):
     """
     modes = belt.modal_stiffness.shape[1]
     width = 2 + 2 * modes
-    pressing = dt * belt.sine
+    pressing = BETA * dt * belt.sine
     for field in range((width - 1) * width):
         sums[0, field] = 0.0
     for j in range(step.rows):

@@ -10,10 +10,13 @@ M (X - X_old) / dt = f times the mean speed (X + X_old) / 2, which belongs to q_
 forces do, is the change of kinetic energy without remainder. So a force takes its magnitude times the mean
 rate along its direction: that is the loss of friction and dampers.
 
-An elastic law has its magnitude -V'(g) from the end of the step. It takes -V'(g) r for the change r within a
-step at the mean rate, and stores (V(g) - V(g - 2 r)) / 2: potentials half a step later and earlier, which add
-up. The difference is >= 0, as V is convex: c r^2 where a contact stays closed, as of a damper c dt. The step
-damps by that, and it is neither physics nor an error in the balance of power.
+Tension and contacts between elements have their magnitude -V'(g) from the end of the step. They take -V'(g) r
+for the change r within a step at the mean rate, and store (V(g) - V(g - 2 r)) / 2: potentials half a step
+later and earlier, which add up. The difference is >= 0, as V is convex: c r^2 where a contact stays closed,
+as of a damper c dt. The step damps by that, and it is neither physics nor an error in the balance of power.
+
+Springs of tilt and flanks have their magnitude from the middle of the step: there the difference is 0 but for
+flanks that close or open.
 """
 
 import numpy as np
@@ -22,7 +25,7 @@ from numba.extending import register_jitable
 from cvt_hpc.kernels import kernel
 from cvt_hpc.lanes import ahead, around, like
 from cvt_hpc.models.pushbelt import fields as f
-from cvt_hpc.physics.contact_laws import damped
+from cvt_hpc.physics.contact_laws import damped, taken
 
 
 @register_jitable
@@ -99,40 +102,15 @@ def close_border(belt, sums, border, dt):
 
 
 @register_jitable
-def groove_of(belt, state, work, j, c, s, driven):
-    """How sheaves move at an element, from cosine and sine of its angle about its pulley.
-
-    Returns
-    -------
-    lanes
-        Mean opening of each within the step [m], and slope [m] and negative curvature [m] of the opening over
-        that angle.
-    """
+def opening_of(belt, state, work, j, driven):
+    """Mean opening of each of the sheaves within a step at an element [m]."""
     modes = belt.modal_stiffness.shape[1]
-    opening, lean, bend = like(0.0, c), like(0.0, c), like(0.0, c)
-    cosine, sine = like(1.0, c), like(0.0, c)
+    opening = like(0.0, driven)
     for k in range(modes):
-        order = 0.5 * (k + k % 2)
-        if k % 2 == 1:
-            cosine, sine = cosine * c - sine * s, sine * c + cosine * s
-            slope = -order * sine
-        else:
-            slope = order * cosine
-        open_ = of_pulley(state.openings[0, k], state.openings[1, k], driven)
-        lean, bend = lean + open_ * slope, bend + open_ * order * order * work.shapes[j, k]
         driving = 0.5 * (state.increments[1 + k] + work.increments[1 + k])
         driven_one = 0.5 * (state.increments[1 + modes + k] + work.increments[1 + modes + k])
         opening = opening + of_pulley(driving, driven_one, driven) * work.shapes[j, k]
-    return opening, lean, bend
-
-
-@kernel
-def book_openings(belt, state, work):
-    """Add to the totals the numerical damping of the step by the modes of the sheaves (`power`)."""
-    modes = belt.modal_stiffness.shape[1]
-    for k in range(2 * modes):
-        change = 0.5 * (state.increments[1 + k] + work.increments[1 + k])
-        state.totals[f.FLANK_DAMPED] += 2.0 * belt.modal_stiffness[k // modes, k % modes] * change * change
+    return opening
 
 
 @kernel
@@ -154,7 +132,7 @@ def book(belt, state, work, dt):
     elements, step, iterate, scratch = state.elements, work.step, work.iterate, work.scratch
     driving_speed = state.pulleys[f.DRIVING_SPEED]
     driven_speed = state.pulleys[f.DRIVEN_SPEED] + 0.5 * state.increments[0]
-    flank = ring = tilt = drag = between = sheaves = stretching = turning = like(0.0, elements[0, f.U_Y])
+    flank = ring = tilt = drag = between = sheaves = stretching = like(0.0, elements[0, f.U_Y])
     for j in range(step.rows):
         dy, dz = elements[j, f.CHANGE_Y], elements[j, f.CHANGE_Z]
         dw = elements[j, f.CHANGE_W]
@@ -179,7 +157,6 @@ def book(belt, state, work, dt):
         last_i = rate_i + step[j, f.ANGLE_I] * (0.5 * dw - more)
         last_j = rate_j + step[j, f.ANGLE_J] * (0.5 * next_dw - more)
         tilt += 0.5 * belt.angle_damping * (last_i * rate_i + last_j * rate_j)
-        turning += 0.5 * dt * belt.angle_stiffness * (rate_i * rate_i + rate_j * rate_j)
 
         x_y, x_z = ahead(elements, j, f.HEADING_Y), ahead(elements, j, f.HEADING_Z)
         opening = x_y * (next_y - y) + x_z * (next_z - z)
@@ -201,14 +178,10 @@ def book(belt, state, work, dt):
         sliding = around_it - step[j, f.MID_RADIUS] * rotation
         grip_m, grip_t = elements[j, f.FLANK_FRICTION_M], elements[j, f.FLANK_FRICTION_T]
         flank += 2.0 * (belt.cosine * grip_m * radial + grip_t * sliding)
-        # the groove opens where an element is, and is another where it gets to
-        opening, lean, bend = groove_of(belt, state, work, j, r_y, r_z, driven)
-        angle = dt * around_it / step[j, f.MID_RADIUS]
-        opening = opening + angle * lean
+        opening = opening_of(belt, state, work, j, driven)
         change = dt * belt.sine * radial + belt.cosine * opening
-        sheaves += 2.0 * damped(-iterate[j, f.DEPTH_REACHED], change, belt.flank_stiffness)
-        # an element presses at the step's end where it was at its start: modes lag by that angle
-        sheaves += 2.0 * belt.cosine * elements[j, f.FLANK] * angle * angle * bend
+        gap = -iterate[j, f.DEPTH_REACHED]
+        sheaves += 2.0 * taken(gap, change, belt.flank_stiffness, elements[j, f.FLANK])
 
         slip = v - step[j, f.T_Y] * y - step[j, f.T_Z] * z
         ring += elements[j, f.RING_FRICTION] * slip
@@ -222,5 +195,3 @@ def book(belt, state, work, dt):
     add_to_totals(state, scratch, f.ELEMENT_DAMPED, between)
     add_to_totals(state, scratch, f.FLANK_DAMPED, sheaves)
     add_to_totals(state, scratch, f.RING_DAMPED, dt * stretching)
-    add_to_totals(state, scratch, f.TILT_DAMPED, dt * turning)
-    book_openings(belt, state, work)

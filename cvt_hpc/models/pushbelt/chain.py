@@ -1,8 +1,9 @@
 """Geometry of the chain of elements in lanes: predicted gaps and strains, and the directions of all forces.
 
 Index i is an element and j the next one. x is the running direction of an element and o = (x_z, -x_y) its
-outward normal; both turn as x' = -o, o' = x. Directions are those at q_k. Magnitudes are those at
-q* = q_k + dt X_k, from where on they are linear in the change of the speeds X.
+outward normal; both turn as x' = -o, o' = x. Directions are those at q_k. Magnitudes of tension and contacts
+between elements are those at q* = q_k + dt X_k, of tilt and flanks those at q_k. From there on they are
+linear in the change of the speeds X.
 
 Slip speeds at the flanks take the radial direction and the lever of the contact point at mid step, and speeds
 across the path that direction. At either end of a step the direction would add v phi' dt / 2 of false radial
@@ -15,6 +16,10 @@ from numba.extending import register_jitable
 from cvt_hpc.kernels import kernel
 from cvt_hpc.lanes import ahead, behind, like, select, sqrt
 from cvt_hpc.models.pushbelt import fields as f
+
+# Springs and flanks act at the mean BETA q_{k+1} + (1 - 2 BETA) q_k + BETA q_{k-1} of positions: with 1/4 the
+# step damps nothing and is stable at any stiffness
+BETA = 0.25
 
 
 @register_jitable
@@ -83,11 +88,10 @@ def predict(belt, state, pulleys, step, dt):
         driven = y > 0.5 * belt.centre_distance
         centre = select(driven, like(belt.centre_distance, y), 0.0)
         state[j, f.DRIVEN] = select(driven, like(1.0, y), 0.0)
-        r_y, r_z, _, r_lever, t_lever = radial((y, z), x, centre, belt.pitch_depth)
+        r_y, r_z, radius, r_lever, t_lever = radial((y, z), x, centre, belt.pitch_depth)
         step[j, f.R_Y], step[j, f.R_Z], step[j, f.R_LEVER], step[j, f.T_LEVER] = r_y, r_z, r_lever, t_lever
-        _, _, radius, _, _ = radial(predicted, (turned_y, turned_z), centre, belt.pitch_depth)
         groove = select(driven, like(pulleys[f.DRIVEN_RADIUS], y), pulleys[f.DRIVING_RADIUS])
-        step[j, f.PREDICTED_DEPTH] = (groove - radius) * belt.sine
+        step[j, f.DEPTH] = (groove - radius) * belt.sine
         side = select(z < 0.0, like(-1.0, y), 1.0)
         reach = cosine * y + side * sine * z
         strand = (reach > 0.0) & (reach < cosine * belt.centre_distance)
@@ -99,6 +103,12 @@ def predict(belt, state, pulleys, step, dt):
         step[j, f.MID_R_LEVER], step[j, f.MID_T_LEVER] = r_lever, t_lever
         step[j, f.NORMAL_Y] = select(strand, like(-sine, y), r_y)
         step[j, f.NORMAL_Z] = select(strand, side * cosine, r_z)
+
+
+@register_jitable
+def angle_slope(belt, dt):
+    """Increase of the moment at one end of a segment by the change of the angle's rate in a step [N m s]."""
+    return 0.5 * (BETA * dt * belt.angle_stiffness + belt.angle_damping)
 
 
 @kernel
@@ -134,15 +144,13 @@ def link(belt, state, step, dt):
         step[j, f.TURN_Z] = turn_z
         step[j, f.ANGLE_I] = angle_i
         step[j, f.ANGLE_J] = angle_j
-        per_length = 1.0 / length
-        f_y, f_z = f_y * per_length, f_z * per_length
         turn = turn_y * (ahead(state, j, f.U_Y) - state[j, f.U_Y]) + turn_z * (
             ahead(state, j, f.U_Z) - state[j, f.U_Z]
         )
         rate_i, rate_j = angle_i * (state[j, f.OMEGA] - turn), angle_j * (ahead(state, j, f.OMEGA) - turn)
         damping = 0.5 * belt.angle_damping
-        step[j, f.PREDICTED_MOMENT_I] = stiffness * (f_y * zi[1] - f_z * zi[0]) + damping * rate_i
-        step[j, f.PREDICTED_MOMENT_J] = stiffness * (f_y * zj[1] - f_z * zj[0]) + damping * rate_j
+        step[j, f.START_MOMENT_I] = stiffness * (e_y * xi[1] - e_z * xi[0]) + damping * rate_i
+        step[j, f.START_MOMENT_J] = stiffness * (e_y * xj[1] - e_z * xj[0]) + damping * rate_j
 
         edge, head = -belt.pitch_depth, belt.head_height
         step[j, f.EDGE_GAP] = contact_gap(si, zi, sj, zj, belt.thickness, edge)
@@ -156,7 +164,7 @@ def link(belt, state, step, dt):
 @kernel
 def linear_blocks(belt, step, dt):
     """Blocks of inertia, transverse damping, tension and angles: DIAGONAL and LINK of each element."""
-    steep = 0.5 * (dt * belt.angle_stiffness + belt.angle_damping)
+    steep = angle_slope(belt, dt)
     for j in range(step.rows):
         for field in range(32):
             step[j, f.DIAGONAL + field] = 0.0

@@ -54,19 +54,17 @@ INPUTS = IN_DRIVING_SHIFT + 1
     DAMPING_LOSS,  # of the rotation of elements against the ring [J]
     BELT_LOSS,  # of the transverse damping [J]
     ELEMENT_DAMPED,  # by the step itself, at contacts and noses between elements (`power`) [J]
-    FLANK_DAMPED,  # at flanks and modes of the sheaves [J]
+    FLANK_DAMPED,  # at flanks [J]
     RING_DAMPED,  # by the stretching of the ring [J]
-    TILT_DAMPED,  # by the springs of the elements' tilt [J]
     POWER_RESIDUAL,  # of the equations of motion as they were solved [J]
-) = range(13)
-TOTALS = 13
+) = range(12)
+TOTALS = 12
 # Mean rates of totals from WORK_IN on, by their names in the record
 POWERS = ("driving_power", "load_power", "thrust_power", "flank_loss", "ring_loss", "tilt_loss", "belt_loss")
 DAMPED = {  # numerical damping of the step, by the springs and contacts where it occurs
     "elements": ELEMENT_DAMPED,
     "flanks": FLANK_DAMPED,
     "ring": RING_DAMPED,
-    "tilt": TILT_DAMPED,
 }
 
 # Entries of the counters
@@ -96,8 +94,8 @@ CONTACTS = ("edge", "head", "flank", "ring", "nose")
     TURN_Z,
     ANGLE_I,  # rate of the sine of the angle between element and segment by the difference of their rates
     ANGLE_J,
-    PREDICTED_MOMENT_I,
-    PREDICTED_MOMENT_J,
+    START_MOMENT_I,  # of the angle to the segment ahead, at q_k and the old speeds
+    START_MOMENT_J,
     EDGE_LEVER_I,
     EDGE_LEVER_J,
     EDGE_GAP,
@@ -115,7 +113,7 @@ CONTACTS = ("edge", "head", "flank", "ring", "nose")
     MID_R_LEVER,
     MID_T_LEVER,
     MID_RADIUS,
-    PREDICTED_DEPTH,  # penetration of the flank without opening of the sheaves
+    DEPTH,  # penetration of the flank at q_k, without opening of the sheaves
     NOSE_OFFSET,
     NOSE_LEVER_I,
     NOSE_LEVER_J,

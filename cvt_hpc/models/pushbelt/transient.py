@@ -2,9 +2,10 @@
 
 Steps of the planar pushbelt in time.
 
-From q_k and X_{k-1/2} a step finds X_{k+1/2}. The magnitudes of stiff laws are those at q_{k+1} = q_k +
-dt X_{k+1/2} and all directions those at q_k: implicit Euler along the direction of each law, symplectic Euler
-for slow motion.
+From q_k and X_{k-1/2} a step finds X_{k+1/2}. All directions are those at q_k. The magnitudes of tension and
+of contacts between elements are those at q_{k+1} = q_k + dt X_{k+1/2}: implicit Euler along these directions,
+symplectic Euler for slow motion. Springs of tilt and flanks act at mean positions, which damps nothing
+(`chain.BETA`).
 
 The nose of each element in the hole of the next one, in lanes: it holds neighbours side by side.
 

@@ -17,11 +17,10 @@ from numba.extending import register_jitable
 from cvt_hpc.kernels import kernel
 from cvt_hpc.lanes import ahead, behind, fma, like
 from cvt_hpc.models.pushbelt.border import border_residuals
+from cvt_hpc.models.pushbelt.chain import BETA, angle_slope
 from cvt_hpc.models.spatial_pushbelt import fields as f
 from cvt_hpc.models.spatial_pushbelt import vectors as vec
 from cvt_hpc.models.spatial_pushbelt.chain import motion
-
-BETA = 0.25
 
 
 @register_jitable
@@ -76,7 +75,7 @@ def _store_symmetric(array, j, first, block, by_v, by_p):
 @kernel
 def linear_blocks(belt, step, dt):
     """Blocks of inertia, dampers, tension, pitch, yaw and bending: DIAGONAL and LINK of each element."""
-    steep = 0.5 * (dt * belt.angle_stiffness + belt.angle_damping)
+    steep = angle_slope(belt, dt)
     yawing = BETA * dt * belt.yaw_stiffness + belt.yaw_damping
     shear, bend = bending_slopes(belt, dt)
     per_pitch = 1.0 / belt.pitch

@@ -1,7 +1,7 @@
 """The free chain in lanes: positions at q*, inertia, tension in two lines, pitch and yaw of elements.
 
-Index i is an element and j the next one. Directions are those at q_k. Magnitudes are those at q* = q_k + dt
-X_k, from where on they are linear in the change of the speeds X.
+Index i is an element and j the next one. Directions are those at q_k. Magnitudes of tension are those at q* =
+q_k + dt X_k, of pitch and yaw those at q_k, from where on they are linear in the change of the speeds X.
 
 The packages lie on the lines r + b a and r - b a, b being `package_distance`. t is the direction of either
 at an element, from the one behind to the one ahead, e that up to the next element. One material flows
@@ -19,6 +19,7 @@ from numba.extending import register_jitable
 from cvt_hpc.kernels import kernel
 from cvt_hpc.lanes import ahead, behind, fma, like, select
 from cvt_hpc.models.pushbelt import fields as planar
+from cvt_hpc.models.pushbelt.chain import angle_slope
 from cvt_hpc.models.pushbelt.friction import ring_friction
 from cvt_hpc.models.spatial_pushbelt import fields as f
 from cvt_hpc.models.spatial_pushbelt import vectors as vec
@@ -147,8 +148,7 @@ def link(belt, state, step, dt):
         vec.store_screw(step, j, f.TENSION_I, vec.both_minus((e, vec.cross(ai, roll)), own))
         vec.store_screw(step, j, f.TENSION_J, vec.both_minus((e, vec.cross(aj, roll)), next_one))
 
-        pi, pj = vec.at(step, j, f.PREDICTED_OUTWARD), vec.ahead(step, j, f.PREDICTED_OUTWARD)
-        _, _, predicted, lines = lines_to_next(
+        _, _, _, lines = lines_to_next(
             step, j, f.PREDICTED_POSITION, f.PREDICTED_HEADING, f.PREDICTED_OUTWARD, b
         )
         _, _, right_size, left_size = lines
@@ -169,18 +169,17 @@ def link(belt, state, step, dt):
         vec.store(step, j, f.CHORD_J, chord_j)
         vec.store(step, j, f.TURN_I, turn_i)
         vec.store(step, j, f.TURN_J, turn_j)
-        line, _ = vec.unit(predicted)
         du = vec.minus(vec.ahead(state, j, f.SPEED), vec.at(state, j, f.SPEED))
         rate_i = vec.dot(chord_i, du) + vec.dot(turn_i, vec.at(state, j, f.OMEGA))
         rate_j = vec.dot(chord_j, du) + vec.dot(turn_j, vec.ahead(state, j, f.OMEGA))
-        step[j, f.PREDICTED_MOMENT_I] = stiffness * vec.dot(line, pi) + damping * rate_i
-        step[j, f.PREDICTED_MOMENT_J] = stiffness * vec.dot(line, pj) + damping * rate_j
+        step[j, f.START_MOMENT_I] = stiffness * vec.dot(e, oi) + damping * rate_i
+        step[j, f.START_MOMENT_J] = stiffness * vec.dot(e, oj) + damping * rate_j
 
 
 @kernel
 def chain_forces(belt, state, step, iterate, dt):
     """Tension and moments of pitch of an iterate; sets the pairs' forces."""
-    steep = 0.5 * (dt * belt.angle_stiffness + belt.angle_damping)
+    steep = angle_slope(belt, dt)
     for j in range(step.rows):
         own, next_one = vec.screw(state, j, f.CHANGE), vec.screw_ahead(state, j, f.CHANGE)
         (ui, wi), (uj, wj) = own, next_one
@@ -193,8 +192,8 @@ def chain_forces(belt, state, step, iterate, dt):
         du = vec.minus(uj, ui)
         ci, cj = vec.at(step, j, f.CHORD_I), vec.at(step, j, f.CHORD_J)
         si, sj = vec.at(step, j, f.TURN_I), vec.at(step, j, f.TURN_J)
-        moment_i = fma(steep, vec.dot(ci, du) + vec.dot(si, wi), step[j, f.PREDICTED_MOMENT_I])
-        moment_j = fma(steep, vec.dot(cj, du) + vec.dot(sj, wj), step[j, f.PREDICTED_MOMENT_J])
+        moment_i = fma(steep, vec.dot(ci, du) + vec.dot(si, wi), step[j, f.START_MOMENT_I])
+        moment_j = fma(steep, vec.dot(cj, du) + vec.dot(sj, wj), step[j, f.START_MOMENT_J])
         push = vec.moved(vec.times(moment_i, ci), moment_j, cj)
         turn = vec.moved(vec.times(tension, ti[1]), -moment_i, si)
         vec.store_screw(iterate, j, f.PAIR_I, (vec.moved(push, tension, ti[0]), turn))

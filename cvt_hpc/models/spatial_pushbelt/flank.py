@@ -14,7 +14,7 @@ omega^2 dt / 2.
 What the laws of a step take from the motion, in lanes: losses, and what the step damps by itself.
 
 As in the planar pushbelt (`models.pushbelt.power`, which derives it) a force takes its magnitude times the
-mean rate (X + X_old) / 2 along its direction. Bending of the rings and the yaw spring damp nothing.
+mean rate (X + X_old) / 2 along its direction. Bending of the rings and springs of pitch and yaw damp nothing.
 """
 
 import numpy as np
@@ -23,13 +23,14 @@ from numba.extending import register_jitable
 from cvt_hpc.kernels import kernel
 from cvt_hpc.lanes import fma, like, sqrt
 from cvt_hpc.models.pushbelt import fields as planar
-from cvt_hpc.models.pushbelt.border import add_to_totals, book_openings, groove_of, of_pulley
+from cvt_hpc.models.pushbelt.border import add_to_totals, of_pulley, opening_of
+from cvt_hpc.models.pushbelt.chain import BETA
 from cvt_hpc.models.pushbelt.friction import flank_friction
 from cvt_hpc.models.spatial_pushbelt import fields as f
 from cvt_hpc.models.spatial_pushbelt import flank
 from cvt_hpc.models.spatial_pushbelt import vectors as vec
 from cvt_hpc.models.spatial_pushbelt.chain import mean_stretch, motion, motion_ahead, ring_slip
-from cvt_hpc.physics.contact_laws import damped, pressed
+from cvt_hpc.physics.contact_laws import damped, pressed, taken
 
 
 @register_jitable
@@ -81,6 +82,16 @@ def flank_directions(belt, radial, axis, side):
 
 
 @register_jitable
+def mean_normal(belt, n, axis, side):
+    """Change of a gap by that of the speed in a step, over the step.
+
+    In the plane it is that of the mean position, which damps nothing (`pushbelt.chain.BETA`). Along the axis
+    elements vibrate on their flanks faster than steps are, and the position that is reached damps that.
+    """
+    return vec.moved(vec.times(BETA, n), -(1.0 - BETA) * side * belt.cosine, axis)
+
+
+@register_jitable
 def along_arc(belt, state, j):
     """Cosine and sine of the angle at which the pitch line of an element stands about its pulley."""
     r, o = vec.at(state, j, f.POSITION), vec.at(state, j, f.OUTWARD)
@@ -106,15 +117,15 @@ def predict_flanks(belt, state, pulleys, step, dt):
         pa = vec.cross(po, vec.at(step, j, f.PREDICTED_HEADING))
         for p in range(f.POINTS):
             side, height, width = flank_point(belt, p)
-            radial, _, _ = frustum(vec.plus(r, lever_of(o, a, side, height, width)), centre, axis)
+            radial, start, _ = frustum(vec.plus(r, lever_of(o, a, side, height, width)), centre, axis)
             vec.store(step, j, f.RADIAL + 3 * p, radial)
             radial, radius, _ = frustum(
                 vec.plus(half, lever_of(half_o, half_a, side, height, width)), centre, axis
             )
             vec.store(step, j, f.MID_RADIAL + 3 * p, radial)
             step[j, f.MID_RADIUS + p] = radius
-            _, radius, along = frustum(vec.plus(s, lever_of(po, pa, side, height, width)), centre, axis)
-            step[j, f.FLANK_GAP + p] = frustum_gap(belt, side, radius, along, groove, middle)
+            _, _, along = frustum(vec.plus(s, lever_of(po, pa, side, height, width)), centre, axis)
+            step[j, f.FLANK_GAP + p] = frustum_gap(belt, side, start, along, groove, middle)
 
 
 @kernel
@@ -151,7 +162,8 @@ def flank_forces(belt, state, pulleys, increments, openings, shapes, step, itera
             side, height, half_width = flank_point(belt, p)
             lever = lever_of(o, a, side, height, half_width)
             n, m, t = flank_directions(belt, vec.at(step, j, f.RADIAL + 3 * p), axis, side)
-            gap = fma(dt, vec.dot(n, vec.plus(du, vec.cross(dw, lever))), step[j, f.FLANK_GAP + p] + opening)
+            rate = vec.dot(mean_normal(belt, n, axis, side), vec.plus(du, vec.cross(dw, lever)))
+            gap = fma(dt, rate, step[j, f.FLANK_GAP + p] + opening)
             normal, stiff = pressed(gap, stiffness)
             iterate[j, f.FLANK_REACHED + p], iterate[j, f.YIELD + p] = gap, stiff
 
@@ -197,8 +209,9 @@ def _point_slopes(belt, step, iterate, j, p, axes, dt):
     by_gap = vec.times(dt * iterate[j, f.YIELD + p], vec.at(iterate, j, f.BY_NORMAL + 3 * p))
     by_m = vec.moved(vec.times(iterate[j, f.SLOPE_MM + p], m), iterate[j, f.SLOPE_TM + p], t)
     by_t = vec.moved(vec.times(iterate[j, f.SLOPE_MT + p], m), iterate[j, f.SLOPE_TT + p], t)
-    turns = vec.cross(lever, n), vec.cross(half, half_m), vec.cross(half, half_t)
-    return (by_gap, by_m, by_t), (n, half_m, half_t), turns, lever, t
+    mean = mean_normal(belt, n, axis, side)
+    turns = vec.cross(lever, mean), vec.cross(half, half_m), vec.cross(half, half_t)
+    return (by_gap, by_m, by_t), (mean, half_m, half_t), turns, lever, t
 
 
 @register_jitable
@@ -312,7 +325,7 @@ def book_pairs(belt, state, work, dt):
     elements, step, iterate, scratch = state.elements, work.step, work.iterate, work.scratch
     has_pins = belt.pin_clearance < np.inf
     contact = 0.5 * belt.contact_stiffness
-    ring = tilt = drag = between = stretching = turning = like(0.0, elements[0, f.FLANK])
+    ring = tilt = drag = between = stretching = like(0.0, elements[0, f.FLANK])
     for j in range(step.rows):
         (du, dw), (ju, jw) = vec.screw(elements, j, f.CHANGE), vec.screw_ahead(elements, j, f.CHANGE)
         (u, w), (next_u, next_w) = motion(elements, j, 0.5), motion_ahead(elements, j, 0.5)
@@ -329,7 +342,6 @@ def book_pairs(belt, state, work, dt):
         last_i = rate_i + 0.5 * (vec.dot(chord_i, more) + vec.dot(turn_i, dw))
         last_j = rate_j + 0.5 * (vec.dot(chord_j, more) + vec.dot(turn_j, jw))
         tilt += 0.5 * belt.angle_damping * (last_i * rate_i + last_j * rate_j)
-        turning += 0.5 * dt * belt.angle_stiffness * (rate_i * rate_i + rate_j * rate_j)
         y = vec.at(step, j, f.YAW)
         yaw = vec.dot(y, w) - elements[j, f.SLOPE_RATE] - 0.5 * elements[j, f.CHANGE + f.ROW_P]
         last = yaw + 0.5 * (vec.dot(y, dw) - elements[j, f.CHANGE + f.ROW_P])
@@ -355,7 +367,6 @@ def book_pairs(belt, state, work, dt):
     add_to_totals(state, scratch, planar.BELT_LOSS, dt * drag)
     add_to_totals(state, scratch, planar.ELEMENT_DAMPED, between)
     add_to_totals(state, scratch, planar.RING_DAMPED, dt * stretching)
-    add_to_totals(state, scratch, planar.TILT_DAMPED, dt * turning)
 
 
 @kernel
@@ -372,9 +383,7 @@ def book_flanks(belt, state, work, dt):
         rotation = of_pulley(driving_speed, driven_speed, driven)
         o = vec.at(elements, j, f.OUTWARD)
         a = vec.cross(o, vec.at(elements, j, f.HEADING))
-        # the groove opens where an element is, and is another where it gets to
-        c, s = flank.along_arc(belt, elements, j)
-        opening, lean, bend = groove_of(belt, state, work, j, c, s, driven)
+        opening = opening_of(belt, state, work, j, driven)
         for p in range(f.POINTS):
             side, height, width = flank.flank_point(belt, p)
             lever = flank.lever_of(o, a, side, height, width)
@@ -383,11 +392,9 @@ def book_flanks(belt, state, work, dt):
             around_it, radius = vec.dot(t, q), step[j, f.MID_RADIUS + p]
             rubbed += elements[j, f.FLANK_FRICTION_M + p] * vec.dot(m, q)
             rubbed += elements[j, f.FLANK_FRICTION_T + p] * (around_it - radius * rotation)
-            angle = dt * around_it / radius
-            change = dt * vec.dot(n, q) + belt.cosine * (opening + angle * lean)
-            sheaves += damped(iterate[j, f.FLANK_REACHED + p], change, 0.5 * belt.flank_stiffness)
-            # an element presses at the step's end where it was at its start: modes lag by that angle
-            sheaves += belt.cosine * elements[j, f.FLANK + p] * angle * angle * bend
+            change = dt * vec.dot(n, q) + belt.cosine * opening
+            # the mean gap, of which the axial part that is reached is ahead
+            gap = iterate[j, f.FLANK_REACHED + p] + dt * side * belt.cosine * vec.dot(axis, q)
+            sheaves += taken(gap, change, 0.5 * belt.flank_stiffness, elements[j, f.FLANK + p])
     add_to_totals(state, scratch, planar.FLANK_LOSS, dt * rubbed)
     add_to_totals(state, scratch, planar.FLANK_DAMPED, sheaves)
-    book_openings(belt, state, work)

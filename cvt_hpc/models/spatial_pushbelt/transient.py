@@ -2,9 +2,10 @@
 
 Steps of the spatial pushbelt in time.
 
-From q_k and X_{k-1/2} a step finds X_{k+1/2}. The magnitudes of stiff laws are those at q_{k+1} = q_k + dt
-X_{k+1/2} and all directions those at q_k: implicit Euler along the direction of each law, symplectic Euler
-for what is slow. Lateral bending of the rings has a law of its own that damps nothing (`bending`).
+From q_k and X_{k-1/2} a step finds X_{k+1/2}. All directions are those at q_k. The magnitudes of tension, of
+contacts between elements, and of flanks along the axis are those at q_{k+1} = q_k + dt X_{k+1/2}: implicit
+Euler along these directions, symplectic Euler for what is slow. Springs of pitch and yaw, flanks in the
+plane, and lateral bending of the rings act at mean positions, which damps nothing (`pushbelt.chain.BETA`).
 """
 
 from functools import partial
