@@ -10,7 +10,7 @@ from cvt_hpc.physics.running_strand import Strand, eigenfrequencies, net_forces
 from cvt_hpc.variator import STRANDS
 from cvt_hpc.vibration import settings
 from cvt_hpc.vibration.ramped import ramped
-from cvt_hpc.vibration.signals import band_amplitude
+from cvt_hpc.vibration.signals import band_amplitude, dominant_frequency
 
 MODES = 5  # of a strand, that are known
 FUNCTIONS = 24  # sines of the Ritz model, which so many modes need
@@ -77,23 +77,43 @@ def band(run: Any) -> tuple[float, float]:
         With `parameters` and, of a belt of rings and elements, all samples recorded.
     """
     p = run.parameters
-    if p["band_low"] or ramped(p) or "ring_mass" not in p:
+    if _is_given(p):
         return settings.band(p)
+    modes = _first_modes(run)
+    lowest, highest = float(modes.min()), float(modes.max())
+    judders = bool(np.isfinite(_jerks(run, SLOWER * lowest)))
+    return settings.lower_edge(p, lowest, highest, judders), p["band_high"]
+
+
+def judder_frequency(run: Any) -> float:
+    """Frequency of the judder of a run that `band` takes [Hz]; nan: none, or the job decides on the band."""
+    if _is_given(run.parameters):
+        return np.nan
+    return _jerks(run, SLOWER * float(_first_modes(run).min()))
+
+
+def _is_given(parameters: Mapping[str, Any]) -> bool:
+    """Whether the band of a run follows from its parameters alone."""
+    return bool(parameters["band_low"] or ramped(parameters) or "ring_mass" not in parameters)
+
+
+def _first_modes(run: Any) -> np.ndarray:
+    """First eigenfrequencies of both strands under the mean forces of the judged part [Hz], (2,)."""
+    p = run.parameters
     tension, push = (
         [run.channel(f"{name} {strand}")[run.judged].mean() for strand in STRANDS]
         for name in ("ring_tension", "push_force")
     )
     means = {**p, "driving_speed": run.mean_driving_speed(run.judged)}
-    modes = strand_frequencies(means, (tension[0] - push[0], tension[1] - push[1]))[:, 0]
-    lowest, highest = float(modes.min()), float(modes.max())
-    judders = _judders(run, SLOWER * lowest)
-    return settings.lower_edge(p, lowest, highest, judders), p["band_high"]
+    return strand_frequencies(means, (tension[0] - push[0], tension[1] - push[1]))[:, 0]
 
 
-def _judders(run: Any, below: float) -> bool:
-    """Whether the driven pulley moves in jerks slower than a frequency [Hz]."""
+def _jerks(run: Any, below: float) -> float:
+    """Frequency of the jerks in which the driven pulley moves, slower than another one [Hz]; nan: none."""
     speed, rate = run.channel("driven_speed")[run.judged], run.parameters["sampling_rate"]
     slowest = settings.LEAST_IN_WINDOW * rate / len(speed)
-    if not slowest < below:
-        return False
-    return bool(band_amplitude(speed, rate, (slowest, below)) > LEAST_JERK * abs(speed.mean()))
+    if not slowest < below or band_amplitude(speed, rate, (slowest, below)) <= LEAST_JERK * abs(speed.mean()):
+        return np.nan
+    frequency = float(dominant_frequency(speed, rate, (slowest, below)))
+    # a slow drift may leave no peak
+    return slowest if np.isnan(frequency) else frequency

@@ -12,15 +12,18 @@ import numpy as np
 
 from cvt_hpc.variables import Variable, Vibrates, shortened, values
 from cvt_hpc.variator import PULLEYS, STRANDS
-from cvt_hpc.variator.band import band
+from cvt_hpc.variator.band import band, judder_frequency
 from cvt_hpc.variator.slip import slide, with_slip
 from cvt_hpc.variator.variables import Measured
 from cvt_hpc.vibration import assessment, ramp
 from cvt_hpc.vibration.ramped import ramped
+from cvt_hpc.vibration.signals import band_amplitude
 
 VIBRATION = tuple(
     replace(v, early=True, may_miss=v in ramp.VARIABLES) for v in (*assessment.VARIABLES, *ramp.VARIABLES)
 )
+LOCKED = 0.1  # of the resolution 1/L: how far a line of judder's may lie from a multiple of its frequency
+COMB = 0.5  # of that line: least height of the multiple before it
 RAMPED_CHANNELS = {"load": "load", "speed": "driving_speed"}  # by the ramped quantity
 
 
@@ -43,7 +46,53 @@ def assess(
     columns, strands = _on_strands(run, names)
     in_band = {**p, "band_low": band(run)[0]}
     found = assessment.assess(run.displacement[:, columns], p["sampling_rate"], strands, in_band)
-    return with_slip(run, replace(found, strongest_probe=columns[found.strongest_probe]), pulleys)
+    found = with_judder(run, replace(found, strongest_probe=columns[found.strongest_probe]))
+    return with_slip(run, found, pulleys)
+
+
+def with_judder(run: Any, found: assessment.Occurrence) -> assessment.Occurrence:
+    """The verdict on a run whose driven pulley judders: harmonics of judder are no vibration of the belt.
+
+    A run does not vibrate where the strongest line of each strand above the threshold is a multiple of the
+    judder's frequency within LOCKED/L, L being the length of the judged part, and rises out of the multiples
+    before it by no more than 1/COMB, and where the strands are below the threshold without all such
+    multiples. A vibration of the belt that is locked to judder rises by three and more. Amplitudes stay as
+    they are; nothing else is decided by them.
+
+    Parameters
+    ----------
+    run : object
+        As `assess` takes it.
+    found : Occurrence
+        Of it, probes being columns of the displacement.
+    """
+    p = run.parameters
+    rate, threshold = p["sampling_rate"], p["amplitude_threshold"]
+    slow = judder_frequency(run) if found.vibrates is Vibrates.YES else np.nan
+    if np.isnan(slow):
+        return found
+    moved = run.displacement[run.judged][:, found.strongest_probe]
+    above = np.flatnonzero(found.amplitude >= threshold)
+    orders = found.strongest_frequency[above] / slow
+    nearest = np.round(orders).astype(int)
+    off = np.abs(orders - nearest) * slow * len(moved) / rate
+    multiples = slow * np.arange(1.0, np.floor(p["band_high"] / slow) + 1.0)
+    phases = 2.0 * np.pi / rate * np.outer(np.arange(len(moved)), multiples)
+    waves = np.hstack([np.ones((len(moved), 1)), np.cos(phases), np.sin(phases)])
+    parts = np.linalg.lstsq(waves, moved, rcond=None)[0]
+    left = band_amplitude(moved - waves @ parts, rate, (found.lower_band_edge, p["band_high"]))
+    if not np.all(off <= LOCKED) or np.any(left >= threshold):
+        return found
+    heights = np.hypot(*np.split(parts[1:, above], 2))  # (multiple, strand above the threshold)
+    of_strand = np.arange(above.size)
+    if np.any(heights[nearest - 2, of_strand] < COMB * heights[nearest - 1, of_strand]):
+        return found
+    told = [
+        f"{found.strands[k]} by {found.amplitude[k] * 1e6:.3g} um at its harmonic {order}"
+        for k, order in zip(above, nearest, strict=True)
+    ]
+    reason = f"the driven pulley judders at {slow:.4g} Hz and moves {', '.join(told)}"
+    return replace(found, vibrates=Vibrates.NO, reason=reason, margin=0.0)
 
 
 def _assess_ramp(run: Any, names: Sequence[str]) -> ramp.RampOccurrence | None:

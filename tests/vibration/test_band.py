@@ -1,11 +1,14 @@
-"""Where the band of a run begins: below the first modes of its strands, or above what judder of its pulley rings."""
+"""Where the band of a run begins, and what of its motion is judder: modes of the strands, jerks of the pulley."""
 
 from types import SimpleNamespace
 
 import numpy as np
 import pytest
 
-from cvt_hpc.variator.band import LEAST_JERK, band, strand_frequencies
+from cvt_hpc.variables import Vibrates
+from cvt_hpc.variator.band import LEAST_JERK, band, judder_frequency, strand_frequencies
+from cvt_hpc.variator.judging import with_judder
+from cvt_hpc.vibration.assessment import assess
 from cvt_hpc.vibration.settings import ABOVE_MODES, BELOW_MODES, LOWEST, PARAMETERS, lower_edge
 
 RATE = 20_000.0
@@ -93,3 +96,55 @@ def test_where_no_first_mode_is_known_it_is_constant():
 def test_it_has_the_eigenfrequencies_of_the_model_strand():
     found = strand_frequencies(P, (5e3, 8e3))[:, 0]
     assert found == pytest.approx([first_mode(5e3), first_mode(8e3)], rel=1e-4)
+
+
+def judged(t1=(), t2=(), judder=((61.0, 4.0 * LEAST_JERK),), **parameters):
+    """Verdict on a run of which the strands move by frequencies [Hz] and amplitudes [um], and that without judder."""
+    found = run(judder=judder, **parameters)
+    time = np.arange(round(found.parameters["duration"] * RATE)) / RATE
+    moved = [
+        sum(1e-6 * a * np.sin(2.0 * np.pi * f * time) for f, a in strand) + 0.0 * time for strand in (t1, t2)
+    ]
+    found.displacement = np.stack(moved, axis=1)
+    in_band = found.parameters | {"band_low": band(found)[0]}
+    plain = assess(found.displacement, RATE, ("t1", "t2"), in_band)
+    return with_judder(found, plain), plain
+
+
+def test_the_frequency_of_judder_is_that_of_the_pulley():
+    assert judder_frequency(run(judder=[(61.0, 3e-3)])) == pytest.approx(61.0, abs=0.01)
+    for quiet in (run(), run(judder=[(61.0, 0.8 * LEAST_JERK)]), run(judder=[(61.0, 3e-3)], band_low=123.0)):
+        assert np.isnan(judder_frequency(quiet))
+
+
+def test_strands_that_harmonics_of_judder_move_do_not_vibrate():
+    # the harmonics in the band, from 310 Hz on, are the sixth and those above
+    found, plain = judged(
+        t1=[(244.0, 30.0), (305.0, 7.0), (366.0, 7.0), (427.0, 3.0)], t2=[(305.0, 4.0), (366.0, 6.0)]
+    )
+    assert plain.vibrates is Vibrates.YES
+    assert found.vibrates is Vibrates.NO
+    assert found.margin == 0.0
+    t1, t2 = (
+        f"{name} by {a * 1e6:.3g} um at its harmonic 6"
+        for name, a in zip(("t1", "t2"), plain.amplitude, strict=True)
+    )
+    assert found.reason == f"the driven pulley judders at 61 Hz and moves {t1}, {t2}"
+    assert np.array_equal(found.amplitude, plain.amplitude)
+
+
+@pytest.mark.parametrize(
+    ("t1", "t2", "others"),
+    [
+        ([(305.0, 9.0), (366.0, 7.0)], [(411.0, 6.0)], {}),  # the other strand vibrates by itself
+        ([(305.0, 9.0), (366.0, 9.0), (411.0, 6.0)], [], {}),  # so does the same one, by less
+        ([(305.0, 9.0), (367.5, 7.0)], [], {}),  # off the harmonic by a third of the resolution
+        ([(305.0, 2.0), (366.0, 9.0)], [], {}),  # rises out of the harmonics: the belt, locked to judder
+        ([(305.0, 9.0), (366.0, 7.0)], [], {"judder": ()}),
+        ([(305.0, 9.0), (366.0, 7.0)], [], {"band_low": 250.0}),  # the job decides on what counts
+    ],
+)
+def test_a_vibration_beside_judder_stays_one(t1, t2, others):
+    found, plain = judged(t1, t2, **others)
+    assert plain.vibrates is Vibrates.YES
+    assert found is plain
