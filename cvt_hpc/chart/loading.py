@@ -123,7 +123,8 @@ def reference_points(stage: Stage, raw: Any) -> Iterator[Point]:
     coarser = stage.setting(stepper, key, coarse, where, own)
     if coarser <= fine:
         raise mismatch(own, f"more than {key} = {fine:g}", f"{coarse}")
-    coarser_job = stage.job(where, stepper=stepper, **others, **{key: coarser})
+    setting = {key: coarser}
+    coarser_job = stage.job(where, stepper=stepper, **others, **setting)
     label = in_words(stepper)
     both: dict[str, Any] = {"starts": starts, "until": stage.until}
     yield Point(f"{name}-reference", name, Role.REFERENCE, stepper, label, key, job, **both)
