@@ -43,8 +43,8 @@ def directions(step, f, x):
     )
     found[fields.PREDICTED_TENSION] = tension
     ci, cj = of(fields.CHORD_I), of(fields.CHORD_J)
-    found[fields.PREDICTED_MOMENT_I] = rate(-ci, ci, U, U, x) + np.sum(of(fields.TURN_I) * x[:, W], 1)
-    found[fields.PREDICTED_MOMENT_J] = rate(-cj, cj, U, U, x) + np.sum(
+    found[fields.START_MOMENT_I] = rate(-ci, ci, U, U, x) + np.sum(of(fields.TURN_I) * x[:, W], 1)
+    found[fields.START_MOMENT_J] = rate(-cj, cj, U, U, x) + np.sum(
         of(fields.TURN_J) * np.roll(x, -1, 0)[:, W], 1
     )
     return found
@@ -62,17 +62,28 @@ def test_rates_of_all_gaps_and_strains():
     lengths = np.linalg.norm(np.roll(place, -1, axis=1) - place, axis=2).mean(axis=0)
     f[:, fields.LENGTH] = lengths  # the direction of the tension is its rate at a strain of zero
     state.leans[:] = 0.0
-    small, measured = 3e-9, {}
+    small, measured, there = 3e-9, {}, {}
     for sign in (-1.0, 0.0, 1.0):
         g = f.copy()
         g[:, fields.SPEED : fields.SPEED + 8] = sign * small * x
         state.elements.data[:] = in_lanes(g).data
         _prepare(belt, state, work, 1.0)
         measured[sign] = of_lanes(work.step).copy()
+        g = f.copy()
+        g[:, fields.SPEED : fields.SPEED + 8] = 0.0
+        g[:, U] += sign * small * x[:, U]
+        for first in (fields.HEADING, fields.OUTWARD):
+            g[:, first : first + 3] += sign * small * np.cross(x[:, W], f[:, first : first + 3])
+        state.elements.data[:] = in_lanes(g).data
+        _prepare(belt, state, work, 1.0)
+        there[sign] = of_lanes(work.step).copy()
     step = measured[0.0]
     difference = (measured[1.0] - measured[-1.0]) / (2.0 * small)
     difference[:, fields.PREDICTED_TENSION] *= -lengths / belt.ring_stiffness
-    moments = [fields.PREDICTED_MOMENT_I, fields.PREDICTED_MOMENT_J]
+    # moments and the radii of flanks are those of the positions at the start
+    moved = (there[1.0] - there[-1.0]) / (2.0 * small)
+    moments = [fields.START_MOMENT_I, fields.START_MOMENT_J]
+    difference[:, moments] = moved[:, moments]
     difference[:, moments] *= 2.0 / belt.angle_stiffness
     for field, expected in directions(step, f, x).items():
         scale = np.abs(expected).max()
@@ -84,9 +95,10 @@ def test_rates_of_all_gaps_and_strains():
         width = belt.half_width + reach * belt.sine / belt.cosine
         lever = (reach - belt.pitch_depth) * f[:, 6:9] + side * width * axial
         n = belt.sine * step[:, fields.RADIAL + 3 * p : fields.RADIAL + 3 * p + 3] - side * belt.cosine * axis
-        expected = np.sum(n * (x[:, U] + np.cross(x[:, W], lever)), 1)
-        scale = np.abs(expected).max()
-        assert difference[:, fields.FLANK_GAP + p] == pytest.approx(expected, abs=2e-7 * scale)
+        for found, direction in ((moved, n), (difference, -side * belt.cosine * axis)):
+            expected = np.sum(direction * (x[:, U] + np.cross(x[:, W], lever)), 1)
+            scale = np.abs(expected).max()
+            assert found[:, fields.FLANK_GAP + p] == pytest.approx(expected, abs=2e-7 * scale)
 
 
 def moved(belt, state, work, f, x):

@@ -171,11 +171,12 @@ def test_the_published_map_is_traced_with_half_of_its_runs():
     truth = np.array([verdicts[row["vibrates"]] for row in rows], np.int8).reshape(5, 4, 19)
     for spacing in (4, 6, 9):
         done, inferred = traced(truth, [None, None, spacing])
-        # but for windows of one and of two loads, which lie between the loads of a wide spacing
-        assert ((inferred == VIBRATING) != (truth == VIBRATING)).sum() <= 4
         assert done.mean() < 0.5
-        # what is missed are islands
-        assert (inferred != truth).mean() < 0.05
+        # what is missed are windows between two of the first loads
+        missed = (inferred != truth).any(axis=2)
+        first = truth[..., ::spacing]
+        assert (first[missed] == QUIET).all() and (inferred[missed] == QUIET).all()
+        assert missed.sum() <= (3 if spacing == 9 else 0)
 
 
 def test_nothing_is_inferred_along_an_axis_that_is_not_traced():

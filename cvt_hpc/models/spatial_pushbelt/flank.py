@@ -103,7 +103,7 @@ def along_arc(belt, state, j):
 
 @kernel
 def predict_flanks(belt, state, pulleys, step, dt):
-    """Directions at q_k and at mid step, gaps at q*."""
+    """Directions at q_k and at mid step; gaps with the radius at q_k and the place along the axis at q*."""
     for j in range(state.rows):
         driven = state[j, f.DRIVEN]
         centre, axis = driven * belt.centre_distance, pulley_axis(belt, driven)
