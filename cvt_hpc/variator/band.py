@@ -86,7 +86,10 @@ def band(run: Any) -> tuple[float, float]:
 
 
 def judder_frequency(run: Any) -> float:
-    """Frequency of the judder of a run that `band` takes [Hz]; nan: none, or the job decides on the band."""
+    """Frequency of the judder of a run that `band` takes [Hz]; nan: none, or the job decides on the band.
+
+    It is 0 where jerks have no peak by which it could be told.
+    """
     if _is_given(run.parameters):
         return np.nan
     return _jerks(run, SLOWER * float(_first_modes(run).min()))
@@ -109,11 +112,11 @@ def _first_modes(run: Any) -> np.ndarray:
 
 
 def _jerks(run: Any, below: float) -> float:
-    """Frequency of the jerks in which the driven pulley moves, slower than another one [Hz]; nan: none."""
+    """Frequency of jerks of the driven pulley, slower than another one [Hz]; nan: none, 0: without a peak."""
     speed, rate = run.channel("driven_speed")[run.judged], run.parameters["sampling_rate"]
     slowest = settings.LEAST_IN_WINDOW * rate / len(speed)
     if not slowest < below or band_amplitude(speed, rate, (slowest, below)) <= LEAST_JERK * abs(speed.mean()):
         return np.nan
     frequency = float(dominant_frequency(speed, rate, (slowest, below)))
     # a slow drift may leave no peak
-    return slowest if np.isnan(frequency) else frequency
+    return 0.0 if np.isnan(frequency) else frequency

@@ -54,10 +54,10 @@ def with_judder(run: Any, found: assessment.Occurrence) -> assessment.Occurrence
     """The verdict on a run whose driven pulley judders: harmonics of judder are no vibration of the belt.
 
     A run does not vibrate where the strongest line of each strand above the threshold is a multiple of the
-    judder's frequency within LOCKED/L, L being the length of the judged part, and rises out of the multiples
-    before it by no more than 1/COMB, and where the strands are below the threshold without all such
-    multiples. A vibration of the belt that is locked to judder rises by three and more. Amplitudes stay as
-    they are; nothing else is decided by them.
+    judder's frequency, twice it or more, within LOCKED/L, L being the length of the judged part, and rises
+    out of the multiple before it by no more than 1/COMB, and where the strands are below the threshold
+    without all multiples up to the band's end. A vibration of the belt that is locked to judder rises by
+    three and more. Amplitudes stay as they are; nothing else is decided by them.
 
     Parameters
     ----------
@@ -69,19 +69,21 @@ def with_judder(run: Any, found: assessment.Occurrence) -> assessment.Occurrence
     p = run.parameters
     rate, threshold = p["sampling_rate"], p["amplitude_threshold"]
     slow = judder_frequency(run) if found.vibrates is Vibrates.YES else np.nan
-    if np.isnan(slow):
+    if not slow > 0.0:
         return found
     moved = run.displacement[run.judged][:, found.strongest_probe]
     above = np.flatnonzero(found.amplitude >= threshold)
-    orders = found.strongest_frequency[above] / slow
+    orders, highest = found.strongest_frequency[above] / slow, np.floor(p["band_high"] / slow)
+    off = np.abs(orders - np.round(orders)) * slow * len(moved) / rate
+    if not np.all((off <= LOCKED) & (np.round(orders) >= 2.0) & (np.round(orders) <= highest)):
+        return found
     nearest = np.round(orders).astype(int)
-    off = np.abs(orders - nearest) * slow * len(moved) / rate
-    multiples = slow * np.arange(1.0, np.floor(p["band_high"] / slow) + 1.0)
+    multiples = slow * np.arange(1.0, highest + 1.0)
     phases = 2.0 * np.pi / rate * np.outer(np.arange(len(moved)), multiples)
     waves = np.hstack([np.ones((len(moved), 1)), np.cos(phases), np.sin(phases)])
     parts = np.linalg.lstsq(waves, moved, rcond=None)[0]
     left = band_amplitude(moved - waves @ parts, rate, (found.lower_band_edge, p["band_high"]))
-    if not np.all(off <= LOCKED) or np.any(left >= threshold):
+    if np.any(left >= threshold):
         return found
     heights = np.hypot(*np.split(parts[1:, above], 2))  # (multiple, strand above the threshold)
     of_strand = np.arange(above.size)

@@ -117,6 +117,14 @@ def test_the_frequency_of_judder_is_that_of_the_pulley():
         assert np.isnan(judder_frequency(quiet))
 
 
+def test_jerks_whose_peak_a_short_part_does_not_show_have_no_known_frequency():
+    short = {"judder": [(120.0, 0.03)], "duration": 0.06}
+    assert judder_frequency(run(**short)) == 0.0
+    found, plain = judged([(400.0, 9.0)], [], **short)
+    assert plain.vibrates is Vibrates.YES
+    assert found is plain
+
+
 def test_strands_that_harmonics_of_judder_move_do_not_vibrate():
     # the harmonics in the band, from 310 Hz on, are the sixth and those above
     found, plain = judged(
@@ -142,6 +150,8 @@ def test_strands_that_harmonics_of_judder_move_do_not_vibrate():
         ([(305.0, 2.0), (366.0, 9.0)], [], {}),  # rises out of the harmonics: the belt, locked to judder
         ([(305.0, 9.0), (366.0, 7.0)], [], {"judder": ()}),
         ([(305.0, 9.0), (366.0, 7.0)], [], {"band_low": 250.0}),  # the job decides on what counts
+        ([(61.0, 9.0)], [], {"band_high": 120.0}),  # judder itself, in the band: no multiple comes before it
+        ([(305.0, 4.7), (365.8, 4.9)], [], {"band_high": 365.9}),  # the multiple itself lies above the band
     ],
 )
 def test_a_vibration_beside_judder_stays_one(t1, t2, others):
