@@ -124,7 +124,7 @@ def reference_points(stage: Stage, raw: Any) -> Iterator[Point]:
     if coarser <= fine:
         raise mismatch(own, f"more than {key} = {fine:g}", f"{coarse}")
     setting = {key: coarser}
-    coarser_job = stage.job(where, stepper=stepper, **others, **setting)
+    coarser_job = stage.job(own, stepper=stepper, **others, **setting)
     label = in_words(stepper)
     both: dict[str, Any] = {"starts": starts, "until": stage.until}
     yield Point(f"{name}-reference", name, Role.REFERENCE, stepper, label, key, job, **both)
