@@ -136,9 +136,8 @@ def _own_errors(
 
     For an error in proportion to the step, or to the step and to cells that are coarser by the same factor,
     the distance is that of the steps, so many times the error; no higher order is assumed, and none for a
-    tolerance. The scatter is the standard error of the difference,
-    start by start: nothing where the two stay together, and in a chaotic scene the uncertainty of so few
-    starts.
+    tolerance. The scatter is the standard error of the difference, start by start: nothing where the two stay
+    together, and in a chaotic scene the uncertainty of so few starts.
     """
     if scene.exact:
         return {quantity.name: 0.0 for quantity in scene.quantities}

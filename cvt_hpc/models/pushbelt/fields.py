@@ -53,7 +53,7 @@ INPUTS = IN_DRIVING_SHIFT + 1
     RING_LOSS,  # [J]
     DAMPING_LOSS,  # of the rotation of elements against the ring [J]
     BELT_LOSS,  # of the transverse damping [J]
-    ELEMENT_DAMPED,  # by the step itself, at contacts and noses between elements (`power`) [J]
+    ELEMENT_DAMPED,  # by the step itself, at contacts and noses between elements (`border`) [J]
     FLANK_DAMPED,  # at flanks [J]
     RING_DAMPED,  # by the stretching of the ring [J]
     POWER_RESIDUAL,  # of the equations of motion as they were solved [J]

@@ -13,7 +13,7 @@ omega^2 dt / 2.
 
 What the laws of a step take from the motion, in lanes: losses, and what the step damps by itself.
 
-As in the planar pushbelt (`models.pushbelt.power`, which derives it) a force takes its magnitude times the
+As in the planar pushbelt (`models.pushbelt.border`, which derives it) a force takes its magnitude times the
 mean rate (X + X_old) / 2 along its direction. Bending of the rings and springs of pitch and yaw damp nothing.
 """
 
