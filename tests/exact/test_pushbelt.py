@@ -680,18 +680,18 @@ def test_slip_limit():
     assert advance(belt, b.NEWTON, state, work, overload, 1, STEP) == pushbelt_fields.CONVERGED
     torque = (state.totals - before)[pushbelt_fields.WORK_IN] / (STEP * SPEED)
     f = fields(state.elements)
-    driving = (f[:, pushbelt_fields.DRIVEN] < 0.5) & (f[:, pushbelt_fields.FLANK] > 10.0)
+    pressed = (f[:, pushbelt_fields.DRIVEN] < 0.5) & (f[:, pushbelt_fields.FLANK] > 0.0)
+    driving = pressed & (f[:, pushbelt_fields.FLANK] > 10.0)
     assert (f[driving, pushbelt_fields.FLANK_SLIP_T] < -1.0).all()
     o = np.stack([f[:, pushbelt_fields.HEADING_Z], -f[:, pushbelt_fields.HEADING_Y]], 1)
-    radius = np.linalg.norm(
-        (f[:, [pushbelt_fields.Y, pushbelt_fields.Z]] - belt.pitch_depth * o)[driving], axis=1
-    ).mean()
-    limit = 2.0 * belt.flank_kinetic * radius / belt.cosine
-    thrust = (belt.cosine * f[:, pushbelt_fields.FLANK] + belt.sine * f[:, pushbelt_fields.FLANK_FRICTION_M])[
-        driving
-    ].sum()
-    # 4e-3: an element that leaves the arc slides outwards as well
-    assert torque / thrust == pytest.approx(limit, rel=4e-3)
+    radius = np.linalg.norm(f[:, [pushbelt_fields.Y, pushbelt_fields.Z]] - belt.pitch_depth * o, axis=1)
+    # friction against each element's own sliding: one that leaves the arc slides outwards as well
+    climb, run = f[:, pushbelt_fields.FLANK_SLIP_M], f[:, pushbelt_fields.FLANK_SLIP_T]
+    grip = 2.0 * belt.flank_kinetic * f[:, pushbelt_fields.FLANK] * -run / np.hypot(climb, run)
+    assert torque == pytest.approx((grip * radius)[pressed].sum(), rel=1e-4)
+    limit = 2.0 * belt.flank_kinetic * radius[driving].mean() / belt.cosine
+    thrust = belt.cosine * f[:, pushbelt_fields.FLANK] + belt.sine * f[:, pushbelt_fields.FLANK_FRICTION_M]
+    assert torque / thrust[driving].sum() == pytest.approx(limit, rel=4e-3)
 
 
 @pytest.mark.parametrize(

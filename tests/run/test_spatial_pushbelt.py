@@ -68,6 +68,7 @@ def test_power_and_axial_forces_are_balanced_with_falling_friction_between_elast
     found = record(misalignment=OFFSET, **values)
     assert found["status"] == Status.DONE
     driving, driven = found["net_axial_force"]
+    # 2 %: by samples; by every step they agree to 0.03 % (`exact/test_spatial_revolution.py`)
     assert driving > 80.0 and driving == pytest.approx(-driven, rel=0.02)
     assert abs(found["power_residual"]) < 3e-3
 
