@@ -70,8 +70,8 @@ def _check(arguments: argparse.Namespace) -> int:
 
 
 def _chart_lines(arguments: argparse.Namespace) -> Iterator[str]:
-    from cvt_hpc.chart import load_chart
-    from cvt_hpc.chart.measuring import check_prospects, plan_lines
+    from cvt_hpc.experiments.chart import load_chart
+    from cvt_hpc.experiments.chart.measuring import check_prospects, plan_lines
 
     chart = load_chart(arguments.path, arguments.set)
     check_prospects(chart)
@@ -79,15 +79,15 @@ def _chart_lines(arguments: argparse.Namespace) -> Iterator[str]:
 
 
 def _ladder_lines(arguments: argparse.Namespace) -> Iterator[str]:
-    from cvt_hpc.ladder.loading import load_ladder, plan_lines
+    from cvt_hpc.experiments.ladder.loading import load_ladder, plan_lines
 
     asked = load_ladder(arguments.path, arguments.set)
     return plan_lines(asked, parts.output_folder(None, asked.job))
 
 
 def _growth_lines(arguments: argparse.Namespace) -> Iterator[str]:
-    from cvt_hpc.ladder.growth import load_growth
-    from cvt_hpc.ladder.loading import rung_lines
+    from cvt_hpc.experiments.growth import load_growth
+    from cvt_hpc.experiments.ladder.loading import rung_lines
 
     asked = load_growth(arguments.path, arguments.set)
     yield f"growth {asked.job.name} ({asked.job.source}): {asked.job.size} cells, three runs each"
@@ -95,15 +95,15 @@ def _growth_lines(arguments: argparse.Namespace) -> Iterator[str]:
 
 
 def _branch_lines(arguments: argparse.Namespace) -> Iterator[str]:
-    from cvt_hpc.bifurcation import load_diagram
-    from cvt_hpc.bifurcation.job import plan_lines
+    from cvt_hpc.experiments.branch import load_diagram
+    from cvt_hpc.experiments.branch.job import plan_lines
 
     return plan_lines(load_diagram(arguments.path, arguments.set))
 
 
 def _fit_lines(arguments: argparse.Namespace) -> Iterator[str]:
-    from cvt_hpc.fit.loading import load_fit
-    from cvt_hpc.fit.making import plan_lines
+    from cvt_hpc.experiments.fit.loading import load_fit
+    from cvt_hpc.experiments.fit.making import plan_lines
 
     return plan_lines(load_fit(arguments.path, arguments.set))
 

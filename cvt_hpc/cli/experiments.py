@@ -10,7 +10,7 @@ from typing import TYPE_CHECKING, Any
 from cvt_hpc.cli import parts
 
 if TYPE_CHECKING:
-    from cvt_hpc.ladder.loading import Rung
+    from cvt_hpc.experiments.ladder.loading import Rung
 
 
 def add(commands: Any) -> None:
@@ -40,8 +40,8 @@ def add(commands: Any) -> None:
 
 
 def _chart(arguments: argparse.Namespace) -> int:
-    from cvt_hpc.chart import load_chart, make_chart
-    from cvt_hpc.chart.making import table_lines
+    from cvt_hpc.experiments.chart import load_chart, make_chart
+    from cvt_hpc.experiments.chart.making import table_lines
 
     parts.refuse_ranks("chart", "measures times")
     chart = load_chart(arguments.path, arguments.set)
@@ -54,8 +54,8 @@ def _chart(arguments: argparse.Namespace) -> int:
 
 
 def _ladder(arguments: argparse.Namespace) -> int:
-    from cvt_hpc.ladder.loading import load_ladder
-    from cvt_hpc.ladder.making import ladder_lines, report_ladder
+    from cvt_hpc.experiments.ladder.loading import load_ladder
+    from cvt_hpc.experiments.ladder.making import ladder_lines, report_ladder
     from cvt_hpc.study.ranks.launch import end_process
     from cvt_hpc.study.status import STALLED
 
@@ -71,7 +71,7 @@ def _ladder(arguments: argparse.Namespace) -> int:
 
 def _run_rungs(rungs: Sequence[Rung], refusals: Mapping[str, str], out: Path, fresh: bool) -> int:
     """Do the runs of models one after another, and return the exit status."""
-    from cvt_hpc.ladder.making import run_ladder
+    from cvt_hpc.experiments.ladder.making import run_ladder
     from cvt_hpc.printing import trouble_lines
 
     parts.complain(*(f"{name} left out: {why}" for name, why in refusals.items()))
@@ -85,7 +85,7 @@ def _run_rungs(rungs: Sequence[Rung], refusals: Mapping[str, str], out: Path, fr
 
 
 def _growth(arguments: argparse.Namespace) -> int:
-    from cvt_hpc.ladder.growth import find_growth, growth_lines, load_growth, report_growth
+    from cvt_hpc.experiments.growth import find_growth, growth_lines, load_growth, report_growth
     from cvt_hpc.study.ranks.launch import end_process
     from cvt_hpc.study.status import STALLED
 
@@ -99,9 +99,9 @@ def _growth(arguments: argparse.Namespace) -> int:
 
 
 def _branch(arguments: argparse.Namespace) -> int:
-    from cvt_hpc.bifurcation import load_diagram, make_diagram
-    from cvt_hpc.bifurcation.diagram import DATASET
-    from cvt_hpc.bifurcation.table import branch_lines, failure_lines
+    from cvt_hpc.experiments.branch import load_diagram, make_diagram
+    from cvt_hpc.experiments.branch.diagram import DATASET
+    from cvt_hpc.experiments.branch.table import branch_lines, failure_lines
 
     parts.refuse_ranks("branch", "walks along the load")
     diagram = load_diagram(arguments.path, arguments.set)
@@ -117,9 +117,9 @@ def _branch(arguments: argparse.Namespace) -> int:
 
 
 def _fit(arguments: argparse.Namespace) -> int:
-    from cvt_hpc.fit.evaluating import Stopped
-    from cvt_hpc.fit.loading import load_fit
-    from cvt_hpc.fit.making import make_fit
+    from cvt_hpc.experiments.fit.evaluating import Stopped
+    from cvt_hpc.experiments.fit.loading import load_fit
+    from cvt_hpc.experiments.fit.making import make_fit
     from cvt_hpc.study.ranks.launch import end_process
 
     fit = parts.alike(arguments, lambda: load_fit(arguments.path, arguments.set))

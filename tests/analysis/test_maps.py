@@ -284,7 +284,7 @@ def test_flags_of_the_made_up_study_are_those_of_results():
 
 DRAW = """
 import sys
-import cvt_hpc.analysis.histories, cvt_hpc.bifurcation, cvt_hpc.chart, cvt_hpc.ladder.making
+import cvt_hpc.analysis.histories, cvt_hpc.experiments.branch, cvt_hpc.experiments.chart, cvt_hpc.experiments.ladder.making
 import xarray as xr
 from pathlib import Path
 from cvt_hpc.analysis.figures import draw

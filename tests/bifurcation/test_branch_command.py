@@ -6,10 +6,10 @@ import numpy as np
 import pytest
 import xarray as xr
 
-from cvt_hpc.bifurcation.attractors import Attractor, Stability, Start, attractors
-from cvt_hpc.bifurcation.diagram import DiagramFolder, Direction
-from cvt_hpc.bifurcation.job import load_diagram
 from cvt_hpc.cli import main
+from cvt_hpc.experiments.branch.attractors import Attractor, Stability, Start, attractors
+from cvt_hpc.experiments.branch.diagram import DiagramFolder, Direction
+from cvt_hpc.experiments.branch.job import load_diagram
 from cvt_hpc.job import build_job
 from cvt_hpc.models.steady_variator.walking import SteadyBelt
 from cvt_hpc.vibration.classes import OccurrenceClass
@@ -85,7 +85,7 @@ def test_the_picture_is_there(made):
 def test_a_branch_that_is_kept_is_the_same_to_the_last_bit(made, tmp_path, monkeypatch, capsys):
     shutil.copytree(made[2], tmp_path / "out")
     (tmp_path / "x.toml").write_text(JOB + RUNS)
-    monkeypatch.setattr("cvt_hpc.bifurcation.diagram._follow", None)
+    monkeypatch.setattr("cvt_hpc.experiments.branch.diagram._follow", None)
     assert main(["branch", str(tmp_path / "x.toml"), "--out", str(tmp_path / "out")]) == 0
     lines = capsys.readouterr().out.splitlines()
     hopf = [line for line in lines if line.startswith("Hopf point")]

@@ -8,10 +8,10 @@ import numpy as np
 import pytest
 
 from cvt_hpc.analysis.figures import STYLE
-from cvt_hpc.bifurcation import attractors
-from cvt_hpc.bifurcation.attractors import Attractor, Followed, states_of
-from cvt_hpc.bifurcation.drawing import GAP, HOPF, STARTS, branch_figure, stable_parts
-from cvt_hpc.bifurcation.table import branch_lines, failure_lines, gap_lines
+from cvt_hpc.experiments.branch import attractors
+from cvt_hpc.experiments.branch.attractors import Attractor, Followed, states_of
+from cvt_hpc.experiments.branch.drawing import GAP, HOPF, STARTS, branch_figure, stable_parts
+from cvt_hpc.experiments.branch.table import branch_lines, failure_lines, gap_lines
 from cvt_hpc.job.schema import load_schema
 from cvt_hpc.models.linear_stability.branch import Branch, Onset, Point, branch, onsets, tracks
 from cvt_hpc.models.linear_stability.modes import Mode

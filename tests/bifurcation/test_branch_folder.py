@@ -8,9 +8,9 @@ import signal
 import pytest
 import xarray as xr
 
-from cvt_hpc.bifurcation import diagram
-from cvt_hpc.bifurcation.attractors import Attractor, Followed, Stability, states_of
 from cvt_hpc.cli import main
+from cvt_hpc.experiments.branch import diagram
+from cvt_hpc.experiments.branch.attractors import Attractor, Followed, Stability, states_of
 from cvt_hpc.locks import locked
 from cvt_hpc.models.linear_stability.branch import Branch
 from cvt_hpc.vibration.classes import OccurrenceClass

@@ -2,9 +2,9 @@
 
 import pytest
 
-from cvt_hpc.bifurcation.diagram import diagram_dataset
-from cvt_hpc.bifurcation.job import load_diagram
 from cvt_hpc.errors import InputError
+from cvt_hpc.experiments.branch.diagram import diagram_dataset
+from cvt_hpc.experiments.branch.job import load_diagram
 
 JOB = """
 name = "x"

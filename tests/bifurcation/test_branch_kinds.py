@@ -3,8 +3,8 @@
 import numpy as np
 import pytest
 
-from cvt_hpc.bifurcation.attractors import Attractor
-from cvt_hpc.bifurcation.table import AGREEMENT, judged
+from cvt_hpc.experiments.branch.attractors import Attractor
+from cvt_hpc.experiments.branch.table import AGREEMENT, judged
 from cvt_hpc.models.linear_stability.branch import CLOSE, Onset
 from cvt_hpc.vibration.classes import OccurrenceClass
 from cvt_hpc.vibration.criticality import Kind

@@ -24,7 +24,7 @@ def bell(monkeypatch):
     monkeypatch.setattr(Transient, "clock", clock)
     monkeypatch.setattr(Transient, "made", 0)
     monkeypatch.setattr("cvt_hpc.simulation.marching.time", clock)
-    monkeypatch.setattr("cvt_hpc.chart.measuring.time", clock)
+    monkeypatch.setattr("cvt_hpc.experiments.chart.measuring.time", clock)
     transient.TAKES_OVER = True
     for module in (model, transient, solution):
         module.__spec__ = ModuleSpec(module.__name__, None)

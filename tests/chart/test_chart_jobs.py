@@ -5,10 +5,10 @@ from pathlib import Path
 
 import pytest
 
-from cvt_hpc.chart import load_chart
-from cvt_hpc.chart.measuring import check_prospects
-from cvt_hpc.chart.plan import Role
 from cvt_hpc.cli import main
+from cvt_hpc.experiments.chart import load_chart
+from cvt_hpc.experiments.chart.measuring import check_prospects
+from cvt_hpc.experiments.chart.plan import Role
 
 FOLDER = Path(__file__).parents[2] / "jobs"
 CHARTS = [path for path in sorted(FOLDER.glob("*.toml")) if "chart" in tomllib.loads(path.read_text())]

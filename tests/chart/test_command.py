@@ -15,7 +15,7 @@ def call(capsys, monkeypatch):
         "os.sched_getaffinity", lambda process: {0}, raising=False
     )  # spawned processes know no bells
     for name in ("draw_scene", "draw_budget"):
-        monkeypatch.setattr(f"cvt_hpc.chart.making.{name}", lambda comparison, out: out)
+        monkeypatch.setattr(f"cvt_hpc.experiments.chart.making.{name}", lambda comparison, out: out)
 
     def run(*arguments, command="chart"):
         status = main([command, *map(str, arguments)])

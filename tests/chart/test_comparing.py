@@ -5,11 +5,11 @@ import math
 import numpy as np
 import pytest
 
-from cvt_hpc.chart import load_chart
-from cvt_hpc.chart.comparing import compare, error, scatter
-from cvt_hpc.chart.making import table_lines
-from cvt_hpc.chart.measuring import Measurement, measure
-from cvt_hpc.chart.quantities import Quantity
+from cvt_hpc.experiments.chart import load_chart
+from cvt_hpc.experiments.chart.comparing import compare, error, scatter
+from cvt_hpc.experiments.chart.making import table_lines
+from cvt_hpc.experiments.chart.measuring import Measurement, measure
+from cvt_hpc.experiments.chart.quantities import Quantity
 
 
 def quantity(name, tolerance=math.inf, scale=0.0):

@@ -8,10 +8,10 @@ from matplotlib.patches import Polygon, Rectangle
 from PIL import Image
 
 from cvt_hpc.analysis.figures import STYLE
-from cvt_hpc.chart import load_chart, make_chart
-from cvt_hpc.chart.comparing import compare
-from cvt_hpc.chart.measuring import measure
-from cvt_hpc.chart.scene_drawing import GREY, budget_figure, scene_figure
+from cvt_hpc.experiments.chart import load_chart, make_chart
+from cvt_hpc.experiments.chart.comparing import compare
+from cvt_hpc.experiments.chart.measuring import measure
+from cvt_hpc.experiments.chart.scene_drawing import GREY, budget_figure, scene_figure
 
 
 def comparison_of(job):

@@ -8,9 +8,9 @@ import xarray as xr
 
 from cvt_hpc.cli import main
 from cvt_hpc.errors import InputError
+from cvt_hpc.experiments.growth import find_growth, load_growth
+from cvt_hpc.experiments.ladder.loading import handed
 from cvt_hpc.job import build_job
-from cvt_hpc.ladder.growth import find_growth, load_growth
-from cvt_hpc.ladder.loading import handed
 from cvt_hpc.models.contract import load_model
 from cvt_hpc.models.linear_stability.record import solve
 from cvt_hpc.study import run

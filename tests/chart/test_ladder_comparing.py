@@ -4,8 +4,8 @@ import numpy as np
 import pytest
 import xarray as xr
 
-from cvt_hpc.ladder.comparing import Score, compare
-from cvt_hpc.ladder.loading import QUESTIONS, Rung
+from cvt_hpc.experiments.ladder.comparing import Score, compare
+from cvt_hpc.experiments.ladder.loading import QUESTIONS, Rung
 from cvt_hpc.variables import Status, Vibrates
 
 LOADS, GRADIENTS = 10.0 * np.arange(1, 9), np.array([-1.0, -0.5])

@@ -6,8 +6,8 @@ import matplotlib
 import pytest
 
 from cvt_hpc.analysis.figures import STYLE
-from cvt_hpc.ladder.comparing import Finding, Score
-from cvt_hpc.ladder.making import ladder_figure, ladder_lines, write_ladder
+from cvt_hpc.experiments.ladder.comparing import Finding, Score
+from cvt_hpc.experiments.ladder.making import ladder_figure, ladder_lines, write_ladder
 
 FINDINGS = [
     Finding("occurrence", "cheap", Score(10, wrong=0.3, undecided=0.2), 0.01),

@@ -3,8 +3,8 @@
 import pytest
 
 from cvt_hpc.errors import InputError
+from cvt_hpc.experiments.ladder.loading import ladder
 from cvt_hpc.job import build_job
-from cvt_hpc.ladder.loading import ladder
 
 DOCUMENT = {
     "name": "x",

@@ -7,8 +7,8 @@ import pytest
 
 from cvt_hpc.cli import main
 from cvt_hpc.errors import InputError, UnitWarning
+from cvt_hpc.experiments.ladder.loading import QUESTIONS, ladder, load_ladder
 from cvt_hpc.job import build_job
-from cvt_hpc.ladder.loading import QUESTIONS, ladder, load_ladder
 
 JOBS = Path(__file__).parents[2] / "jobs"
 DOCUMENT = {

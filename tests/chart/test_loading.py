@@ -5,9 +5,9 @@ import sys
 
 import pytest
 
-from cvt_hpc.chart import load_chart
-from cvt_hpc.chart.plan import Role
 from cvt_hpc.errors import InputError
+from cvt_hpc.experiments.chart import load_chart
+from cvt_hpc.experiments.chart.plan import Role
 from cvt_hpc.models import MODELS
 
 

@@ -14,9 +14,9 @@ import pytest
 import xarray as xr
 from threadpoolctl import threadpool_info, threadpool_limits
 
-from cvt_hpc.chart import load_chart, make_chart
-from cvt_hpc.chart.making import ChartFolder, _tell_compiling, table_lines
 from cvt_hpc.errors import InputError
+from cvt_hpc.experiments.chart import load_chart, make_chart
+from cvt_hpc.experiments.chart.making import ChartFolder, _tell_compiling, table_lines
 from cvt_hpc.output_folder import checksum
 from cvt_hpc.provenance import git_revision, machine
 from cvt_hpc.tables import below_origin
@@ -41,7 +41,7 @@ def made(job, **options):
 def undrawn(monkeypatch):
     """Pictures take most of the time, and are tested elsewhere."""
     for name in ("draw_scene", "draw_budget"):
-        monkeypatch.setattr(f"cvt_hpc.chart.making.{name}", lambda comparison, out: out)
+        monkeypatch.setattr(f"cvt_hpc.experiments.chart.making.{name}", lambda comparison, out: out)
 
 
 @pytest.fixture(scope="module")

@@ -5,10 +5,10 @@ import math
 import numpy as np
 import pytest
 
-from cvt_hpc.chart import load_chart
-from cvt_hpc.chart.measuring import check_prospects, measure
-from cvt_hpc.chart.quantities import History, Quantity, observe
 from cvt_hpc.errors import InputError
+from cvt_hpc.experiments.chart import load_chart
+from cvt_hpc.experiments.chart.measuring import check_prospects, measure
+from cvt_hpc.experiments.chart.quantities import History, Quantity, observe
 from cvt_hpc.models import MODELS
 from cvt_hpc.models.contract import Model
 from support.bells import CHANNELS, Transient

@@ -6,7 +6,7 @@ from pathlib import Path
 import numpy as np
 import pytest
 
-from cvt_hpc.chart import load_chart
+from cvt_hpc.experiments.chart import load_chart
 from cvt_hpc.job import known_keys, load_job
 from cvt_hpc.models.elastic_belt import PARAMETERS
 from cvt_hpc.models.pushbelt import inert

@@ -3,7 +3,7 @@
 import numpy as np
 import pytest
 
-from cvt_hpc.bifurcation.attractors import Attractor, Start, attractors, close_values
+from cvt_hpc.experiments.branch.attractors import Attractor, Start, attractors, close_values
 from cvt_hpc.models.oscillator.motion import oscillator, steady_sliding
 from cvt_hpc.vibration.classes import OccurrenceClass
 from cvt_hpc.vibration.criticality import Kind, criticality

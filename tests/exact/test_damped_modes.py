@@ -3,8 +3,8 @@
 import numpy as np
 import pytest
 
-from cvt_hpc.ladder.twins import found_modes
 from cvt_hpc.vibration.damped_modes import damped_modes, thinned
+from cvt_hpc.vibration.twins import found_modes
 
 RATE = 20e3
 HIGHEST = 1500.0

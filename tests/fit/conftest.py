@@ -72,6 +72,6 @@ def window(toy, monkeypatch, tmp_path):
     )
     monkeypatch.setitem(sys.modules, "cvt_hpc.simulation", double)
     # imported anew where another test has imported it, with the cost of the real simulation
-    monkeypatch.delitem(sys.modules, "cvt_hpc.fit.making", raising=False)
+    monkeypatch.delitem(sys.modules, "cvt_hpc.experiments.fit.making", raising=False)
     monkeypatch.chdir(tmp_path)
     return done

@@ -8,10 +8,10 @@ import pytest
 
 from cvt_hpc.cli import main
 from cvt_hpc.errors import InputError
-from cvt_hpc.fit.evaluating import Evaluation
-from cvt_hpc.fit.loading import load_fit
-from cvt_hpc.fit.making import conflict_table
-from cvt_hpc.fit.search import Found, sensitivities
+from cvt_hpc.experiments.fit.evaluating import Evaluation
+from cvt_hpc.experiments.fit.loading import load_fit
+from cvt_hpc.experiments.fit.making import conflict_table
+from cvt_hpc.experiments.fit.search import Found, sensitivities
 from cvt_hpc.study import run
 from cvt_hpc.tables import below_origin
 from cvt_hpc.vibration.classes import OccurrenceClass
@@ -203,10 +203,10 @@ def test_a_fit_that_was_stopped_goes_on(job, window, monkeypatch, capsys, tmp_pa
         report = run(*arguments, **keys)
         return replace(report, remaining=1, gained=1) if next(reports) else report
 
-    monkeypatch.setattr("cvt_hpc.fit.evaluating.run", stopped)
+    monkeypatch.setattr("cvt_hpc.experiments.fit.evaluating.run", stopped)
     assert main(small) == 99
     assert not list((tmp_path / "out" / "x").glob("*.csv"))
-    monkeypatch.setattr("cvt_hpc.fit.evaluating.run", run)
+    monkeypatch.setattr("cvt_hpc.experiments.fit.evaluating.run", run)
     assert main(small) == 0
     assert capsys.readouterr().out.split("table:")[0] == whole.split("table:")[0]
     assert len(window) == 2 * runs  # none twice

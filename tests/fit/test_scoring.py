@@ -3,7 +3,7 @@
 import numpy as np
 import pytest
 
-from cvt_hpc.fit.job import Course, Target, areas, score, total, verdict
+from cvt_hpc.experiments.fit.job import Course, Target, areas, score, total, verdict
 from cvt_hpc.vibration.classes import OccurrenceClass as Kind
 
 LETTERS = {

@@ -8,14 +8,14 @@ import numpy as np
 import pytest
 
 from cvt_hpc import models, simulate
-from cvt_hpc.bifurcation import load_diagram
-from cvt_hpc.chart import load_chart
 from cvt_hpc.cli import main
 from cvt_hpc.errors import JobWarning, NoEffectWarning, UnitWarning
-from cvt_hpc.fit.loading import load_fit
+from cvt_hpc.experiments.branch import load_diagram
+from cvt_hpc.experiments.chart import load_chart
+from cvt_hpc.experiments.fit.loading import load_fit
+from cvt_hpc.experiments.ladder.loading import load_ladder
 from cvt_hpc.job import build_job, load_job, rebuild_job
 from cvt_hpc.job.values import warn_of_bare_numbers
-from cvt_hpc.ladder.loading import load_ladder
 from cvt_hpc.parameters import Parameter
 from cvt_hpc.simulation import running
 

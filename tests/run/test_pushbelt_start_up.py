@@ -6,7 +6,7 @@ import numpy as np
 import pytest
 
 from cvt_hpc import simulation
-from cvt_hpc.chart.measuring import march
+from cvt_hpc.experiments.chart.measuring import march
 from cvt_hpc.job import build_job
 from cvt_hpc.models.contract import load_model
 from cvt_hpc.models.pushbelt import fields as f

@@ -11,7 +11,7 @@ import xarray as xr
 
 from cvt_hpc.cli import main
 from cvt_hpc.errors import InputError
-from cvt_hpc.ladder.comparing import FULL_MODEL
+from cvt_hpc.experiments.ladder.comparing import FULL_MODEL
 from cvt_hpc.models.auto import record
 from cvt_hpc.variables import Status, Vibrates
 

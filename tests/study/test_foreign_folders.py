@@ -13,7 +13,7 @@ import xarray as xr
 
 from cvt_hpc.cli import main
 from cvt_hpc.errors import InputError
-from cvt_hpc.ladder.making import run_ladder
+from cvt_hpc.experiments.ladder.making import run_ladder
 from cvt_hpc.locks import BusyError, locked
 from cvt_hpc.netcdf import write_history
 from cvt_hpc.output_folder import checksum

@@ -15,7 +15,7 @@ from typing import Any, NamedTuple
 import numpy as np
 
 from cvt_hpc.archives import Arrays
-from cvt_hpc.bifurcation.job import Asked
+from cvt_hpc.experiments.branch.job import Asked
 from cvt_hpc.job import Job
 from cvt_hpc.models.contract import load_model
 from cvt_hpc.models.elastic_belt import fields as f

@@ -14,8 +14,8 @@ from typing import Any
 import numpy as np
 from numpy.typing import NDArray
 
-from cvt_hpc.chart.plan import Quantity
 from cvt_hpc.errors import mismatch, unknown
+from cvt_hpc.experiments.chart.plan import Quantity
 from cvt_hpc.job.document import read_table
 from cvt_hpc.parameters import Parameter, not_negative, positive
 from cvt_hpc.vibration import signals

@@ -24,11 +24,11 @@ import numpy as np
 import xarray as xr
 
 from cvt_hpc.archives import Archives
-from cvt_hpc.chart.comparing import Comparison, Result, compare
-from cvt_hpc.chart.measuring import Measurement, check_prospects, measure, predicted_cost
-from cvt_hpc.chart.plan import Chart, Point, Role
-from cvt_hpc.chart.quantities import KINDS
-from cvt_hpc.chart.scene_drawing import draw_budget, draw_scene
+from cvt_hpc.experiments.chart.comparing import Comparison, Result, compare
+from cvt_hpc.experiments.chart.measuring import Measurement, check_prospects, measure, predicted_cost
+from cvt_hpc.experiments.chart.plan import Chart, Point, Role
+from cvt_hpc.experiments.chart.quantities import KINDS
+from cvt_hpc.experiments.chart.scene_drawing import draw_budget, draw_scene
 from cvt_hpc.files import kind_of, write_rows, written_aside
 from cvt_hpc.linear_algebra import one_thread
 from cvt_hpc.netcdf import VOLATILE, attributes, global_attributes, write_netcdf

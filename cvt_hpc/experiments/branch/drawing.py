@@ -14,9 +14,9 @@ from matplotlib.lines import Line2D
 from matplotlib.patches import Patch
 
 from cvt_hpc.analysis.figures import WIDTH, balanced, coordinate_unit, draw
-from cvt_hpc.bifurcation.attractors import FROM, OF_MODES, Attractor, Followed, Stability
-from cvt_hpc.bifurcation.job import Diagram, load_attributes
-from cvt_hpc.bifurcation.table import gap_lines, place_text
+from cvt_hpc.experiments.branch.attractors import FROM, OF_MODES, Attractor, Followed, Stability
+from cvt_hpc.experiments.branch.job import Diagram, load_attributes
+from cvt_hpc.experiments.branch.table import gap_lines, place_text
 from cvt_hpc.models.linear_stability.branch import Onset
 from cvt_hpc.vibration.classes import OccurrenceClass
 from cvt_hpc.vibration.criticality import Kind

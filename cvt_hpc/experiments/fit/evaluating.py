@@ -10,8 +10,8 @@ import numpy as np
 from numpy.typing import NDArray
 
 from cvt_hpc.errors import InputError
+from cvt_hpc.experiments.fit.job import Case, Course, Fit, score, total
 from cvt_hpc.files import refuse_link
-from cvt_hpc.fit.job import Case, Course, Fit, score, total
 from cvt_hpc.job import Job, rebuild_job
 from cvt_hpc.study import open_results, run
 from cvt_hpc.variables import Status

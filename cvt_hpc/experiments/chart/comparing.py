@@ -7,8 +7,8 @@ from dataclasses import dataclass, replace
 import numpy as np
 from numpy.typing import NDArray
 
-from cvt_hpc.chart.measuring import Measurement
-from cvt_hpc.chart.plan import Chart, Point, Quantity, Role, Scene
+from cvt_hpc.experiments.chart.measuring import Measurement
+from cvt_hpc.experiments.chart.plan import Chart, Point, Quantity, Role, Scene
 
 Array = NDArray[np.float64]
 

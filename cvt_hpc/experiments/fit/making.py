@@ -11,10 +11,10 @@ from typing import NamedTuple
 import numpy as np
 from numpy.typing import NDArray
 
+from cvt_hpc.experiments.fit.evaluating import Evaluation
+from cvt_hpc.experiments.fit.job import REPRODUCED, Course, Fit, areas, verdict
+from cvt_hpc.experiments.fit.search import Around, Confirmed, Found, confirm, look_around, reach, search
 from cvt_hpc.files import write_rows
-from cvt_hpc.fit.evaluating import Evaluation
-from cvt_hpc.fit.job import REPRODUCED, Course, Fit, areas, verdict
-from cvt_hpc.fit.search import Around, Confirmed, Found, confirm, look_around, reach, search
 from cvt_hpc.job.definition import digest
 from cvt_hpc.job.summary import core_time_in_words
 from cvt_hpc.job.units import from_si

@@ -19,11 +19,11 @@ from matplotlib.lines import Line2D
 from matplotlib.patches import Patch
 
 from cvt_hpc.analysis.figures import WIDTH, coordinate_unit, draw, line_style, set_error_axis
+from cvt_hpc.experiments.ladder.comparing import Finding, compare
+from cvt_hpc.experiments.ladder.loading import QUESTIONS, REFERENCE, Rung, cost_left
 from cvt_hpc.files import refuse_link, write_rows, written_aside
 from cvt_hpc.job import Job
 from cvt_hpc.job.values import JOB_UNITS
-from cvt_hpc.ladder.comparing import Finding, compare
-from cvt_hpc.ladder.loading import QUESTIONS, REFERENCE, Rung, cost_left
 from cvt_hpc.linear_algebra import one_thread
 from cvt_hpc.netcdf import attributes, global_attributes, write_netcdf
 from cvt_hpc.provenance import machine, origin_lines

@@ -28,7 +28,7 @@ class Quantity:
     Attributes
     ----------
     name : str
-        One of `cvt_hpc.chart.quantities.KINDS`.
+        One of `cvt_hpc.experiments.chart.quantities.KINDS`.
     tolerance : float
         Largest error that is allowed; inf where there is no limit.
     scale : float

@@ -17,11 +17,11 @@ from numpy.typing import NDArray
 
 from cvt_hpc.analysis.classes import at_strongest_strand, occurrence_classes
 from cvt_hpc.errors import mismatch
+from cvt_hpc.experiments.ladder.loading import REFERENCE, Rung
 from cvt_hpc.files import write_rows
 from cvt_hpc.job import Job
 from cvt_hpc.job.definition import handed_to
 from cvt_hpc.job.values import heading, shown_number
-from cvt_hpc.ladder.loading import REFERENCE, Rung
 from cvt_hpc.models.auto.rules import Rung as AutoRung
 from cvt_hpc.models.linear_stability.modes import DECAY
 from cvt_hpc.study.description import Study, describe

@@ -13,7 +13,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from cvt_hpc.errors import mismatch, show, unknown
-from cvt_hpc.fit.job import MEASURES, NUMBERS, TABLE, Case, Fit, Free, Target, share_of
+from cvt_hpc.experiments.fit.job import MEASURES, NUMBERS, TABLE, Case, Fit, Free, Target, share_of
 from cvt_hpc.job import Job, build_job
 from cvt_hpc.job.assignments import Assignments, split_assignments, take_own
 from cvt_hpc.job.axes import read_values

@@ -21,7 +21,7 @@ import xarray as xr
 
 from cvt_hpc import netcdf
 from cvt_hpc.archives import Archives, Arrays
-from cvt_hpc.bifurcation.attractors import (
+from cvt_hpc.experiments.branch.attractors import (
     OF_MODES,
     STRAND,
     Attractor,
@@ -31,8 +31,8 @@ from cvt_hpc.bifurcation.attractors import (
     attractors,
     states_of,
 )
-from cvt_hpc.bifurcation.drawing import draw_branch
-from cvt_hpc.bifurcation.job import (
+from cvt_hpc.experiments.branch.drawing import draw_branch
+from cvt_hpc.experiments.branch.job import (
     LOAD,
     Asked,
     Diagram,
@@ -41,7 +41,7 @@ from cvt_hpc.bifurcation.job import (
     numbers_of,
     predicted_cost,
 )
-from cvt_hpc.bifurcation.table import lowest_judged, with_kinds
+from cvt_hpc.experiments.branch.table import lowest_judged, with_kinds
 from cvt_hpc.files import kind_of, written_aside
 from cvt_hpc.linear_algebra import one_thread
 from cvt_hpc.models.elastic_belt.belt import State, mesh

@@ -18,8 +18,8 @@ from numpy.typing import NDArray
 from scipy.optimize import differential_evolution
 from scipy.stats import qmc, sobol_indices
 
-from cvt_hpc.fit.evaluating import Evaluation, Findings
-from cvt_hpc.fit.job import Course, Fit
+from cvt_hpc.experiments.fit.evaluating import Evaluation, Findings
+from cvt_hpc.experiments.fit.job import Course, Fit
 from cvt_hpc.vibration.classes import OccurrenceClass
 
 _DIGITS = 9  # of a share: a rounding of the optimiser is no other candidate

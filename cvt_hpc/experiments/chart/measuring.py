@@ -14,9 +14,9 @@ from typing import Any
 import numpy as np
 from numpy.typing import NDArray
 
-from cvt_hpc.chart.plan import Chart, Point, Role, Scene, start_parameters
-from cvt_hpc.chart.quantities import History, channels_needed, observe, strand_of
 from cvt_hpc.errors import InputError, mismatch
+from cvt_hpc.experiments.chart.plan import Chart, Point, Role, Scene, start_parameters
+from cvt_hpc.experiments.chart.quantities import History, channels_needed, observe, strand_of
 from cvt_hpc.job import Job
 from cvt_hpc.job.summary import core_time_in_words
 from cvt_hpc.models.contract import Failure, Run, load_model

@@ -19,9 +19,9 @@ from matplotlib.patches import Patch
 from matplotlib.ticker import LogFormatter
 
 from cvt_hpc.analysis import figures
-from cvt_hpc.chart.comparing import Comparison, Result
-from cvt_hpc.chart.plan import Quantity
-from cvt_hpc.chart.quantities import KINDS
+from cvt_hpc.experiments.chart.comparing import Comparison, Result
+from cvt_hpc.experiments.chart.plan import Quantity
+from cvt_hpc.experiments.chart.quantities import KINDS
 
 _LINE_LENGTH = 104  # [letters]
 LARGEST_ERROR = 10.0  # relative: errors beyond are named, and not drawn

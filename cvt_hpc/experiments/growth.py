@@ -13,13 +13,12 @@ import numpy as np
 import xarray as xr
 
 from cvt_hpc.errors import InputError, mismatch
+from cvt_hpc.experiments.ladder.loading import MODEL, Rung, handed
 from cvt_hpc.files import write_rows, written_aside
 from cvt_hpc.job import Job, rebuild_job
 from cvt_hpc.job.assignments import Assignments
 from cvt_hpc.job.loading import load_job
 from cvt_hpc.job.values import heading, in_words, read_value, shown_number
-from cvt_hpc.ladder.loading import MODEL, Rung, handed
-from cvt_hpc.ladder.twins import MOST_MODES, Found, found_modes, nothing
 from cvt_hpc.models import MODELS
 from cvt_hpc.models.contract import load_model
 from cvt_hpc.netcdf import attributes, global_attributes, open_netcdf, write_netcdf
@@ -27,6 +26,7 @@ from cvt_hpc.provenance import origin_lines
 from cvt_hpc.study import open_results
 from cvt_hpc.tables import columns, number, short
 from cvt_hpc.variables import Status, Vibrates
+from cvt_hpc.vibration.twins import MOST_MODES, Found, found_modes, nothing
 
 TWINS, EIGENVALUES = "twins", "linear_stability"
 SHARES = (0.0, 0.5, 1.0)  # of the kick

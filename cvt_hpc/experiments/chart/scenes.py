@@ -9,9 +9,9 @@ import warnings
 from dataclasses import dataclass, replace
 from typing import Any
 
-from cvt_hpc.chart.plan import Lead, Quantity, Scene
-from cvt_hpc.chart.quantities import read_quantity
 from cvt_hpc.errors import NoEffectWarning, mismatch, show, unknown
+from cvt_hpc.experiments.chart.plan import Lead, Quantity, Scene
+from cvt_hpc.experiments.chart.quantities import read_quantity
 from cvt_hpc.job import Job, build_job
 from cvt_hpc.job.assignments import read_assignments
 from cvt_hpc.job.document import read_set, read_table, read_tables

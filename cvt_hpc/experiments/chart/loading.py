@@ -8,8 +8,9 @@ from collections.abc import Iterator, Mapping
 from pathlib import Path
 from typing import Any
 
-from cvt_hpc.chart.plan import Chart, Point, Role, Scene
-from cvt_hpc.chart.scenes import (
+from cvt_hpc.errors import InputError, mismatch, show, unknown
+from cvt_hpc.experiments.chart.plan import Chart, Point, Role, Scene
+from cvt_hpc.experiments.chart.scenes import (
     BUDGET,
     CHART,
     CHOICE,
@@ -20,7 +21,6 @@ from cvt_hpc.chart.scenes import (
     in_words,
     read_stage,
 )
-from cvt_hpc.errors import InputError, mismatch, show, unknown
 from cvt_hpc.job import Job
 from cvt_hpc.job.assignments import Assignments, split_assignments
 from cvt_hpc.job.definition import HEADER
