@@ -21,8 +21,8 @@ from cvt_hpc.vibration.classes import NEAR, NEAR_CONTRADICTIONS
 
 if TYPE_CHECKING:
     from cvt_hpc.analysis.comparison import Cell, Comparison
-    from cvt_hpc.experiments.ladder.comparing import AuditReport
     from cvt_hpc.study import RunReport, StudyStatus
+    from cvt_hpc.study.audit import AuditReport
     from cvt_hpc.study.forecast.cost_model import Forecast
     from cvt_hpc.study.forecast.resources import Disk, Needs
     from cvt_hpc.study.repeats import Repeat

@@ -18,11 +18,13 @@ from cvt_hpc import __version__
 from cvt_hpc.cli import checking, experiments, plots, results, single_run, starting, sweep
 from cvt_hpc.cli.parts import DONE, INTERRUPTED, complain, end_all, speaks
 from cvt_hpc.errors import BAD_INPUT, CRASHED, InputError, JobWarning, did_you_mean, mismatch, one_line, show
+from cvt_hpc.experiment_kinds import EXPERIMENTS
 from cvt_hpc.files import open_missing_streams
 
 __all__ = ["main"]
 
-_JOINT = ("run", "ladder", "growth", "fit")  # commands whose ranks work together
+# Commands whose ranks work together
+_JOINT = ("run", *(name for name, experiment in EXPERIMENTS.items() if not experiment.alone))
 
 # How argparse tells of a word that is none of its choices
 _UNKNOWN_WORD = re.compile(

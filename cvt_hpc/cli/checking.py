@@ -3,15 +3,18 @@
 from __future__ import annotations
 
 import argparse
-from collections.abc import Iterator
+from importlib import import_module
 from pathlib import Path
 from typing import TYPE_CHECKING, Any
 
 from cvt_hpc.cli import parts
 from cvt_hpc.errors import mismatch
+from cvt_hpc.experiment_kinds import EXPERIMENTS, WITH_TABLE
 
 if TYPE_CHECKING:
     from cvt_hpc.job import Job
+
+RUN = "run"
 
 
 def add(commands: Any) -> None:
@@ -23,8 +26,8 @@ def add(commands: Any) -> None:
     pilots = "forecast by K batches that are done for it, shortened (default: by records, else by prediction)"
     check.add_argument("--pilots", type=int, default=0, metavar="K", help=pilots)
     check.add_argument("--plot", type=Path, metavar="PNG", help="picture of the forecast, 1 to 10 000 ranks")
-    command = "command that is to take the job (default: chart, branch, fit or ladder by its table, else run)"
-    check.add_argument("--for", dest="command_for", choices=(RUN, *_PLANS), help=command)
+    command = f"command that is to take the job (default: {' or '.join(WITH_TABLE)} by its table, else run)"
+    check.add_argument("--for", dest="command_for", choices=(RUN, *EXPERIMENTS), help=command)
     parts.add_assignments(check, "--set", parts.REPLACE)
 
 
@@ -33,13 +36,15 @@ def _check(arguments: argparse.Namespace) -> int:
     from cvt_hpc.job.document import read_document
 
     tables = read_document(arguments.path)
-    command = arguments.command_for or next((name for name in _PLANS if name in tables), RUN)
+    command = arguments.command_for or next((name for name in WITH_TABLE if name in tables), RUN)
     if command != RUN:
         if arguments.ranks or arguments.pilots or arguments.plot:
             raise mismatch(
                 "--ranks, --pilots, --plot", "a job of `cvt-hpc run`", f"one of `cvt-hpc {command}`"
             )
-        lines = list(_PLANS[command](arguments))
+        experiment = import_module(EXPERIMENTS[command].module)
+        asked = experiment.load(arguments.path, arguments.set)
+        lines = list(experiment.plan_lines(asked, parts.output_folder(None, asked.job)))
         if parts.speaks():
             print(*lines, sep="\n")
         return parts.DONE
@@ -67,55 +72,6 @@ def _check(arguments: argparse.Namespace) -> int:
             title = f"{job.name}: {job.size} runs"
             parts.say(f"picture: {draw_efficiency(curve, title, expected.basis, arguments.plot)}")
     return parts.DONE
-
-
-def _chart_lines(arguments: argparse.Namespace) -> Iterator[str]:
-    from cvt_hpc.experiments.chart import load_chart
-    from cvt_hpc.experiments.chart.measuring import check_prospects, plan_lines
-
-    chart = load_chart(arguments.path, arguments.set)
-    check_prospects(chart)
-    return plan_lines(chart)
-
-
-def _ladder_lines(arguments: argparse.Namespace) -> Iterator[str]:
-    from cvt_hpc.experiments.ladder.loading import load_ladder, plan_lines
-
-    asked = load_ladder(arguments.path, arguments.set)
-    return plan_lines(asked, parts.output_folder(None, asked.job))
-
-
-def _growth_lines(arguments: argparse.Namespace) -> Iterator[str]:
-    from cvt_hpc.experiments.growth import load_growth
-    from cvt_hpc.experiments.ladder.loading import rung_lines
-
-    asked = load_growth(arguments.path, arguments.set)
-    yield f"growth {asked.job.name} ({asked.job.source}): {asked.job.size} cells, three runs each"
-    yield from rung_lines(asked.rungs, asked.refusals, parts.output_folder(None, asked.job))
-
-
-def _branch_lines(arguments: argparse.Namespace) -> Iterator[str]:
-    from cvt_hpc.experiments.branch import load_diagram
-    from cvt_hpc.experiments.branch.job import plan_lines
-
-    return plan_lines(load_diagram(arguments.path, arguments.set))
-
-
-def _fit_lines(arguments: argparse.Namespace) -> Iterator[str]:
-    from cvt_hpc.experiments.fit.loading import load_fit
-    from cvt_hpc.experiments.fit.making import plan_lines
-
-    return plan_lines(load_fit(arguments.path, arguments.set))
-
-
-RUN = "run"
-_PLANS = {
-    "chart": _chart_lines,
-    "ladder": _ladder_lines,
-    "growth": _growth_lines,
-    "branch": _branch_lines,
-    "fit": _fit_lines,
-}
 
 
 def show_job(job: Job, out: Path | None) -> None:

@@ -124,7 +124,7 @@ def _repeats(job: Job, arguments: argparse.Namespace) -> list[tuple[Repeat, Call
         raise mismatch("--check-step-by", "--check-step FRACTION beside it", "none")
     if arguments.audit is None and arguments.check_step is None:
         return []
-    from cvt_hpc.experiments.ladder.comparing import audit_of
+    from cvt_hpc.study.audit import audit_of
     from cvt_hpc.study.repeats import check_fraction, step_check
 
     out = parts.output_folder(arguments.out, job)
@@ -158,8 +158,8 @@ def _repeat(
 
 
 def _show_audit(audit: Repeat) -> None:
-    from cvt_hpc.experiments.ladder.comparing import report_audit
     from cvt_hpc.printing import audit_lines
+    from cvt_hpc.study.audit import report_audit
 
     parts.say(*audit_lines(report_audit(audit)))
 

@@ -4,7 +4,6 @@ Each cell of a job is run three times, without a kick, with half of it and with 
 study; `twins` finds the modes. Beside those of the elastic belt stand the eigenvalues of its steady state.
 """
 
-import json
 from collections.abc import Iterator, Mapping, Sequence
 from pathlib import Path
 from typing import Any, NamedTuple
@@ -13,7 +12,8 @@ import numpy as np
 import xarray as xr
 
 from cvt_hpc.errors import InputError, mismatch
-from cvt_hpc.experiments.ladder.loading import MODEL, Rung, handed
+from cvt_hpc.experiments.outcome import Outcome, Tell
+from cvt_hpc.experiments.sweeps import Sweep, handed, load_sweep, maker_of, run_sweeps, sweep_lines
 from cvt_hpc.files import write_rows, written_aside
 from cvt_hpc.job import Job, rebuild_job
 from cvt_hpc.job.assignments import Assignments
@@ -23,7 +23,8 @@ from cvt_hpc.models import MODELS
 from cvt_hpc.models.contract import load_model
 from cvt_hpc.netcdf import attributes, global_attributes, open_netcdf, write_netcdf
 from cvt_hpc.provenance import origin_lines
-from cvt_hpc.study import open_results
+from cvt_hpc.study import process_rank
+from cvt_hpc.study.status import STALLED
 from cvt_hpc.tables import columns, number, short
 from cvt_hpc.variables import Status, Vibrates
 from cvt_hpc.vibration.twins import MOST_MODES, Found, found_modes, nothing
@@ -58,7 +59,7 @@ class Growth(NamedTuple):
         As it was given.
     kick : float
         Largest value of the model's parameter of a kick [SI].
-    rungs : tuple of Rung
+    rungs : tuple of Sweep
         The twin runs; the eigenvalues, where there are any.
     refusals : dict
         Why there are none, by the name of the model.
@@ -66,11 +67,11 @@ class Growth(NamedTuple):
 
     job: Job
     kick: float
-    rungs: tuple[Rung, ...]
+    rungs: tuple[Sweep, ...]
     refusals: dict[str, str]
 
 
-def load_growth(path: str | Path, overrides: Assignments = (), kick: str | None = None) -> Growth:
+def load(path: str | Path, overrides: Assignments = (), kick: str | None = None) -> Growth:
     """Read a job, and return the runs by which its modes are found.
 
     Parameters
@@ -95,10 +96,10 @@ def load_growth(path: str | Path, overrides: Assignments = (), kick: str | None 
         size = read_value(job.schema.parameters[key], kick, "--kick")
         if not size > 0.0:
             raise mismatch("--kick", "a value above 0", kick)
-    rungs, refusals = [Rung(TWINS, (), _twin_job(job, key, size))], {}
-    if job.model == MODEL:
+    rungs, refusals = [Sweep(TWINS, (), _twin_job(job, key, size))], {}
+    if job.model == "elastic_belt":
         try:
-            rungs.append(Rung(EIGENVALUES, (), handed(job, EIGENVALUES, {})))
+            rungs.append(Sweep(EIGENVALUES, (), handed(job, EIGENVALUES, {})))
         except InputError as error:
             refusals[EIGENVALUES] = str(error)
     return Growth(job, size, tuple(rungs), refusals)
@@ -128,6 +129,30 @@ def _twin_job(job: Job, key: str, size: float) -> Job:
     return rebuild_job(document, job.source, job.units)
 
 
+def plan_lines(asked: Growth, out: Path) -> Iterator[str]:
+    """Yield the lines that state the runs and their expected cost."""
+    yield f"growth {asked.job.name} ({asked.job.source}): {asked.job.size} cells, three runs each"
+    yield from sweep_lines(asked.rungs, asked.refusals, out)
+
+
+def make(asked: Growth, out: Path, *, fresh: bool, tell: Tell) -> Outcome:
+    """Do the runs, find the modes, and write table and dataset; see `experiment_kinds`.
+
+    Raises
+    ------
+    InputError
+        If a folder holds another job, or the system refuses to read or write a file.
+    """
+    status = run_sweeps(asked.rungs, asked.refusals, out, fresh=fresh, tell=tell)
+    if status >= STALLED or process_rank() != 0:
+        return Outcome(status=status)
+    dataset, path = growth_dataset(asked, find_growth(asked, out), out), out / "growth.nc"
+    with written_aside(path) as aside:
+        write_netcdf(dataset, aside)
+    table = _write_table(asked, dataset, out / "growth.csv")
+    return Outcome(tuple(_lines(asked, dataset)), (("written", table), ("written", path)), status)
+
+
 def find_growth(asked: Growth, out: Path) -> list[Found]:
     """Return the modes of each cell of a job, in the order of its runs.
 
@@ -143,9 +168,9 @@ def find_growth(asked: Growth, out: Path) -> list[Found]:
     InputError
         If a file cannot be read.
     """
-    with open_results(out / TWINS) as dataset:
-        status = dataset["status"].values.reshape(-1, len(SHARES))
-        reasons, verdicts = (dataset[name].values.reshape(status.shape) for name in ("reason", "vibrates"))
+    dataset = load_sweep(TWINS, out)
+    status = dataset["status"].values.reshape(-1, len(SHARES))
+    reasons, verdicts = (dataset[name].values.reshape(status.shape) for name in ("reason", "vibrates"))
     found = []
     for cell, (ended, why) in enumerate(zip(status, reasons, strict=True)):
         failed = np.flatnonzero(ended != Status.DONE)
@@ -196,59 +221,29 @@ def growth_dataset(asked: Growth, found: Sequence[Found], out: Path) -> xr.Datas
         variables[name] = (names, cells, attributes(*words))
     reasons = np.array([one.reason for one in found], object).reshape(job.shape)
     variables["reason"] = (names, reasons, attributes("reason", comment="why there are no modes"))
-    with open_results(out / TWINS) as results:
-        coordinates = {name: results[name].load() for name in names}
-        makers = [
-            {"versions": json.loads(results.attrs["versions"]), "git_revision": results.attrs["git_revision"]}
-        ]
+    results = load_sweep(TWINS, out)
+    coordinates, makers = {name: results[name] for name in names}, [maker_of(results)]
     told = global_attributes(job, job.resolved(), "modes by twin runs", makers=makers)
     dataset = xr.Dataset(variables, coordinates, {**told, "job_fingerprint": job.fingerprint()})
     if len(asked.rungs) > 1:
-        with open_results(out / EIGENVALUES) as results:
-            for name in ("growth_rate", "loosened_growth_rate", "frequency"):
-                dataset[f"linear_{name}"] = results[name].load()
+        results = load_sweep(EIGENVALUES, out)
+        for name in ("growth_rate", "loosened_growth_rate", "frequency"):
+            dataset[f"linear_{name}"] = results[name]
     return dataset
 
 
-def report_growth(asked: Growth, found: Sequence[Found], out: Path) -> tuple[xr.Dataset, list[Path]]:
-    """Write the modes as a table and as a dataset, growth.csv and growth.nc, and return it and their paths.
-
-    Parameters
-    ----------
-    asked, found, out
-        As of `growth_dataset`.
-
-    Raises
-    ------
-    InputError
-        If the system refuses to write a file.
-    """
-    dataset = growth_dataset(asked, found, out)
-    path = out / "growth.nc"
-    with written_aside(path) as aside:
-        write_netcdf(dataset, aside)
+def _write_table(asked: Growth, dataset: xr.Dataset, path: Path) -> Path:
     numbers = [*OF_MODES, *OF_CELLS, *(str(name) for name in dataset if str(name).startswith("linear_"))]
     head = [heading(str(name), dataset[name].attrs) for name in (*_axes(asked.job), *numbers)]
     rows = (
         [*place, *(number(here[name].item()) for name in numbers), here["reason"].item()]
         for place, here in _modes(asked.job, dataset)
     )
-    return dataset, [
-        write_rows(out / "growth.csv", [*head, "reason"], rows, origin_lines(dataset.attrs)),
-        path,
-    ]
+    return write_rows(path, [*head, "reason"], rows, origin_lines(dataset.attrs))
 
 
-def growth_lines(asked: Growth, dataset: xr.Dataset) -> Iterator[str]:
-    """Yield the lines that show the modes to people.
-
-    Parameters
-    ----------
-    asked : Growth
-        The job.
-    dataset : Dataset
-        As of `growth_dataset`.
-    """
+def _lines(asked: Growth, dataset: xr.Dataset) -> Iterator[str]:
+    """Yield the lines that show the modes to people."""
     job, key = asked.job, _kick_of(asked.job)[0]
     yield f"kick: {key} {job.schema.in_words(key, asked.kick)}; rms of motions in um"
     heads = [heading(name, dataset[name].attrs) for name in _axes(job)]

@@ -7,6 +7,7 @@ from pathlib import Path
 from typing import Any
 
 from cvt_hpc.errors import InputError, did_you_mean, mismatch, show
+from cvt_hpc.experiment_kinds import WITH_TABLE
 from cvt_hpc.job import assignments
 from cvt_hpc.job.assignments import Assignments, AxisEntry, plain
 from cvt_hpc.job.axes import Axis, read_axis
@@ -32,7 +33,6 @@ from cvt_hpc.job.units import unit_in
 from cvt_hpc.job.values import expectation, kind_of, read_value, warn_of_bare_numbers
 from cvt_hpc.models.contract import load_model
 
-OF_COMMANDS = ("branch", "chart", "fit", "ladder")  # tables that a command of the same name reads
 _NAME = re.compile(r"[A-Za-z0-9][A-Za-z0-9._-]{0,99}")
 
 
@@ -294,7 +294,7 @@ def _check_top_level(document: Mapping[str, Any], schema: Schema, source: str) -
         if key in tables:
             if not isinstance(value, Mapping):
                 raise mismatch(f"{source}: {key}", f"a table [{key}]", show(value))
-        elif key in OF_COMMANDS:
+        elif key in WITH_TABLE:
             raise InputError(f"{source}: [{key}]: expected a job of runs, found one for `cvt-hpc {key}`")
         elif isinstance(value, Mapping):
             hint = did_you_mean(key, tables) or f"; known: {', '.join(tables)}"

@@ -9,7 +9,7 @@ import xarray as xr
 from cvt_hpc.cli import main
 from cvt_hpc.experiments.branch.attractors import Attractor, Stability, Start, attractors
 from cvt_hpc.experiments.branch.diagram import DiagramFolder, Direction
-from cvt_hpc.experiments.branch.job import load_diagram
+from cvt_hpc.experiments.branch.job import load
 from cvt_hpc.job import build_job
 from cvt_hpc.models.steady_variator.walking import SteadyBelt
 from cvt_hpc.vibration.classes import OccurrenceClass
@@ -97,7 +97,7 @@ def test_a_branch_that_is_kept_is_the_same_to_the_last_bit(made, tmp_path, monke
 
 def test_a_kept_branch_is_told_of_in_the_unit_of_the_job_that_asks(made, tmp_path):
     (tmp_path / "x.toml").write_text(JOB + RUNS)
-    diagram = load_diagram(tmp_path / "x.toml")
+    diagram = load(tmp_path / "x.toml")
     whole = DiagramFolder(made[2], diagram).load_branch(0)
     first = {0: 96.0, 1: 92.0}  # load [N m] from which runs vibrate, by start; the Hopf point lies at 95.8
     runs = [
@@ -114,7 +114,7 @@ def test_a_kept_branch_is_told_of_in_the_unit_of_the_job_that_asks(made, tmp_pat
     (tmp_path / "x.toml").write_text(
         in_mm.replace("105 N m", "105000 N mm").replace("120 N m", "120000 N mm")
     )
-    (again,) = DiagramFolder(tmp_path, load_diagram(tmp_path / "x.toml")).load_branch(0).kinds
+    (again,) = DiagramFolder(tmp_path, load(tmp_path / "x.toml")).load_branch(0).kinds
     assert again == kind._replace(reason="both attractors from 92000 N mm to 94000 N mm")
 
 
@@ -129,7 +129,7 @@ def test_another_file_in_its_place_is_left_alone(tmp_path, capsys):
 
 def test_a_run_begins_in_the_steady_state(tmp_path):
     (tmp_path / "x.toml").write_text(JOB)
-    (asked,) = load_diagram(tmp_path / "x.toml").branches
+    (asked,) = load(tmp_path / "x.toml").branches
     job = build_job(asked.runs.resolved(), "x", {"duration": 0.1})
     state = SteadyBelt(asked.parameters).at(90.0).state
     push = {"disturbance": 1e-9}
@@ -194,7 +194,7 @@ def test_runs_have_the_scene_of_their_branch(tmp_path):
         + '[judgement]\nband_low = "250 Hz"\n[branch]\nset = { seed = 7 }\n'
     )
     (tmp_path / "x.toml").write_text(text)
-    diagram = load_diagram(tmp_path / "x.toml", ["friction_gradient=-1.0"])
+    diagram = load(tmp_path / "x.toml", ["friction_gradient=-1.0"])
     assert [branch.place for branch in diagram.branches] == [
         {"sheave_stiffness": 1.0},
         {"sheave_stiffness": np.inf},
@@ -211,5 +211,5 @@ def test_runs_have_the_scene_of_their_branch(tmp_path):
 
 
 def test_the_job_of_this_repository_is_fit(request):
-    diagram = load_diagram(request.config.rootpath / "jobs" / "branch.toml")
+    diagram = load(request.config.rootpath / "jobs" / "branch.toml")
     assert diagram.job.name == "branch" and len(diagram.branches) == 9

@@ -4,7 +4,7 @@ import pytest
 
 from cvt_hpc.errors import InputError
 from cvt_hpc.experiments.branch.diagram import diagram_dataset
-from cvt_hpc.experiments.branch.job import load_diagram
+from cvt_hpc.experiments.branch.job import load
 
 JOB = """
 name = "x"
@@ -29,7 +29,7 @@ def path(tmp_path):
 
 
 def test_each_branch_and_its_runs_have_their_own_geometry(path):
-    diagram = load_diagram(path)
+    diagram = load(path)
     for branch, radius, thrust, speed in zip(
         diagram.branches, RADII, (40e3, 50e3), (300.0, 600.0), strict=True
     ):
@@ -42,7 +42,7 @@ def test_each_branch_and_its_runs_have_their_own_geometry(path):
 
 
 def test_the_dataset_has_what_follows_along_its_axes(path):
-    dataset = diagram_dataset(load_diagram(path), {})
+    dataset = diagram_dataset(load(path), {})
     assert dataset["driven_radius"].dims == ("ratio",)
     assert dataset["driven_radius"].values == pytest.approx(RADII, rel=1e-7)
     assert dataset["thrust"].values.tolist() == [40e3, 50e3]
@@ -51,7 +51,7 @@ def test_the_dataset_has_what_follows_along_its_axes(path):
 def test_what_follows_from_the_load_is_refused(path):
     path.write_text(JOB.replace("300 * ratio", "300 + load"))
     with pytest.raises(InputError) as caught:
-        load_diagram(path)
+        load(path)
     assert str(caught.value) == (
         f"{path}: [derived] driving_speed: expected a value that does not follow from the load, along which "
         "branches go, found 300 + load"

@@ -21,6 +21,9 @@ def bell(monkeypatch):
     solution.exact = exact
     transient.batch, transient.CHANNELS = batches_of_one(Transient), CHANNELS
     clock = Clock()
+    monkeypatch.setattr(
+        "os.sched_getaffinity", lambda process: {0}, raising=False
+    )  # spawned ones know no bells
     monkeypatch.setattr(Transient, "clock", clock)
     monkeypatch.setattr(Transient, "made", 0)
     monkeypatch.setattr("cvt_hpc.simulation.marching.time", clock)

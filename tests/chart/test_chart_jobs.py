@@ -6,7 +6,7 @@ from pathlib import Path
 import pytest
 
 from cvt_hpc.cli import main
-from cvt_hpc.experiments.chart import load_chart
+from cvt_hpc.experiments.chart import load
 from cvt_hpc.experiments.chart.measuring import check_prospects
 from cvt_hpc.experiments.chart.plan import Role
 
@@ -28,7 +28,7 @@ def test_there_are_charts():
 
 @pytest.mark.parametrize("path", CHARTS, ids=lambda path: path.stem)
 def test_a_chart_is_fit_to_be_made(path):
-    chart = load_chart(path)
+    chart = load(path)
     assert chart.name == path.stem and chart.description
     check_prospects(chart)
     for scene in chart.scenes:

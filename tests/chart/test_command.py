@@ -11,9 +11,6 @@ from support.bells import JOB
 @pytest.fixture
 def call(capsys, monkeypatch):
     """Return a function that runs a command line: exit status, lines on stdout, lines on stderr."""
-    monkeypatch.setattr(
-        "os.sched_getaffinity", lambda process: {0}, raising=False
-    )  # spawned processes know no bells
     for name in ("draw_scene", "draw_budget"):
         monkeypatch.setattr(f"cvt_hpc.experiments.chart.making.{name}", lambda comparison, out: out)
 

@@ -5,7 +5,7 @@ import math
 import numpy as np
 import pytest
 
-from cvt_hpc.experiments.chart import load_chart
+from cvt_hpc.experiments.chart import load
 from cvt_hpc.experiments.chart.comparing import compare, error, scatter
 from cvt_hpc.experiments.chart.making import table_lines
 from cvt_hpc.experiments.chart.measuring import Measurement, measure
@@ -88,7 +88,7 @@ def test_scatter_is_what_differs_from_start_to_start():
 
 
 def test_errors_are_those_that_the_bell_was_given(write_chart):
-    (found,) = compared(load_chart(write_chart()))
+    (found,) = compared(load(write_chart()))
     by_name = {result.point.name: result for result in found.methods}
     assert by_name["ringing-soft-3"].errors["amplitude"] == pytest.approx(1e-3, rel=1e-6)
     assert by_name["ringing-soft-4"].errors["amplitude"] == pytest.approx(2e-2, rel=1e-6)
@@ -106,11 +106,11 @@ def test_errors_are_those_that_the_bell_was_given(write_chart):
 def test_the_cheapest_that_meets_all_tolerances_is_chosen(write_chart):
     # amplitude within 1 %: clever at 0.1 (an error of 1 %, to rounding) costs less than soft at 10 us (0.1 %)
     job = write_chart(("[0.01, 0.1, 0.5]", "[0.01, 0.09, 0.5]"))
-    (found,) = compared(load_chart(job))
+    (found,) = compared(load(job))
     assert [r.point.name for r in found.methods if r.chosen] == ["ringing-clever-2"]
     assert found.verdict == "clever at 0.09, 0.000244 core-s/s"
     (strict,) = compared(
-        load_chart(write_chart(('amplitude = { tolerance = "1 %" }', "amplitude = { tolerance = 0 }")))
+        load(write_chart(('amplitude = { tolerance = "1 %" }', "amplitude = { tolerance = 0 }")))
     )
     assert strict.verdict == "none meets all tolerances"
     assert not any(result.chosen for result in strict.methods)
@@ -120,7 +120,7 @@ def test_a_method_with_another_occurrence_is_not_chosen(write_chart):
     # 5 um are the threshold: at 0.2 ms the bell rings with 5.002 um, in truth it does not
     job = write_chart(("20 um", "4.95 um"), ('amplitude = { tolerance = "1 %" }', 'amplitude = { tolerance = "5 %" }'),
                       ('[0.01, 0.1, 0.5]', '[1e-4]'))  # fmt: skip
-    (found,) = compared(load_chart(job))
+    (found,) = compared(load(job))
     by_name = {result.point.name: result for result in found.methods}
     cheapest, next_cheapest = by_name["ringing-soft-4"], by_name["ringing-clever-1"]
     assert cheapest.measurement.cost < next_cheapest.measurement.cost
@@ -133,10 +133,10 @@ def computed(setting, extra=""):
 
 
 def test_a_computed_reference_knows_its_own_error(write_chart):
-    (found,) = compared(load_chart(write_chart(computed("2 us"))))
+    (found,) = compared(load(write_chart(computed("2 us"))))
     # 2e-4 too loud at 2 us, and 4e-4 at 4 us
     assert found.reference.errors["amplitude"] == pytest.approx(2e-4, rel=1e-3)
-    (closer,) = compared(load_chart(write_chart(computed("2 us", ', coarser = "2.5 us"'))))
+    (closer,) = compared(load(write_chart(computed("2 us", ', coarser = "2.5 us"'))))
     assert closer.reference.errors["amplitude"] == pytest.approx(2e-4, rel=1e-3)
     by_name = {result.point.name: result for result in found.methods}
     assert by_name["ringing-soft-2"].errors["amplitude"] == pytest.approx(1e-4, rel=1e-2)
@@ -149,26 +149,26 @@ def test_a_computed_reference_knows_its_own_error(write_chart):
 
 def test_the_scatter_of_few_starts_counts_as_error_of_the_reference(write_chart):
     settings = (computed("2 us"), ('title = "Ringing"', "starts = 4"))
-    (quiet,) = compared(load_chart(write_chart(*settings)))
+    (quiet,) = compared(load(write_chart(*settings)))
     # the same starts scatter alike at both steps, but for the louder ringing of the longer step
-    (noisy,) = compared(load_chart(write_chart(*settings, ('"20 um" }', '"20 um", scatter = 0.1 }'))))
+    (noisy,) = compared(load(write_chart(*settings, ('"20 um" }', '"20 um", scatter = 0.1 }'))))
     assert quiet.reference.errors["amplitude"] == pytest.approx(2e-4, rel=1e-3)
     assert quiet.reference.errors["amplitude"] < noisy.reference.errors["amplitude"] < 2.3e-4
 
 
 def test_a_blunt_or_failed_reference_chooses_nothing(write_chart):
     tolerance = ('amplitude = { tolerance = "1 %" }', 'amplitude = { tolerance = "0.01 %" }')
-    (blunt,) = compared(load_chart(write_chart(computed("2 us"), tolerance)))
+    (blunt,) = compared(load(write_chart(computed("2 us"), tolerance)))
     assert blunt.verdict == (
         "none can be chosen: the reference's own error exceeds the tolerance of amplitude (0.0002 > 0.0001)"
     )
     assert not any(result.chosen for result in blunt.methods)
-    (failed,) = compared(load_chart(write_chart(computed("0.6 ms"))))
+    (failed,) = compared(load(write_chart(computed("0.6 ms"))))
     assert failed.verdict.startswith("none can be chosen: the reference failed at 1.2 ms: failed_numerics")
     assert not any(result.chosen for result in failed.methods)
 
 
 def test_without_tolerances_nothing_is_asked(write_chart):
     job = write_chart((', tolerance = "5 %"', ""), ('{ tolerance = "1 %" }', "{}"), ("occurrence = {}", ""))
-    (found,) = compared(load_chart(job))
+    (found,) = compared(load(job))
     assert found.verdict == "none, because no tolerance is asked"

@@ -1,5 +1,7 @@
 """What the pictures show, read from their artists."""
 
+from pathlib import Path
+
 import matplotlib
 import numpy as np
 import pytest
@@ -8,14 +10,14 @@ from matplotlib.patches import Polygon, Rectangle
 from PIL import Image
 
 from cvt_hpc.analysis.figures import STYLE
-from cvt_hpc.experiments.chart import load_chart, make_chart
+from cvt_hpc.experiments.chart import load, make
 from cvt_hpc.experiments.chart.comparing import compare
 from cvt_hpc.experiments.chart.measuring import measure
 from cvt_hpc.experiments.chart.scene_drawing import GREY, budget_figure, scene_figure
 
 
 def comparison_of(job):
-    chart = load_chart(job)
+    chart = load(job)
     found = {p.name: measure(p, chart.scene(p.scene), 1, 3600.0) for p in chart.points}
     return compare(chart, found)[0]
 
@@ -91,9 +93,7 @@ quantities = { amplitude = {} }
 
 [chart.methods.soft]
 scenes = ["ringing"]"""
-    chart = load_chart(
-        write_chart(("[chart.methods.soft]", other), ('"hard"', '"hard"\nscenes = ["ringing"]'))
-    )
+    chart = load(write_chart(("[chart.methods.soft]", other), ('"hard"', '"hard"\nscenes = ["ringing"]')))
     found = {p.name: measure(p, chart.scene(p.scene), 1, 3600.0) for p in chart.points}
     looks = []
     for comparison in compare(chart, found):
@@ -208,8 +208,9 @@ def test_the_largest_error_of_the_default_is_on_top(write_chart):
 
 
 def test_pictures_are_small_and_named_after_their_scenes(write_chart):
-    report = make_chart(load_chart(write_chart()), processes=1)
-    assert [str(path) for path in report.pictures] == ["out/bells/ringing.png", "out/bells/budget.png"]
-    for path in report.pictures:
+    outcome = make(load(write_chart()), Path("out/bells"), fresh=False, tell=print)
+    pictures = [path for kind, path in outcome.files if kind == "picture"]
+    assert [str(path) for path in pictures] == ["out/bells/ringing.png", "out/bells/budget.png"]
+    for path in pictures:
         assert path.stat().st_size < 300_000
         assert Image.open(path).size[0] == 1088

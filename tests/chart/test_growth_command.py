@@ -8,8 +8,8 @@ import xarray as xr
 
 from cvt_hpc.cli import main
 from cvt_hpc.errors import InputError
-from cvt_hpc.experiments.growth import find_growth, load_growth
-from cvt_hpc.experiments.ladder.loading import handed
+from cvt_hpc.experiments.growth import find_growth, load
+from cvt_hpc.experiments.sweeps import handed
 from cvt_hpc.job import build_job
 from cvt_hpc.models.contract import load_model
 from cvt_hpc.models.linear_stability.record import solve
@@ -82,7 +82,7 @@ def test_an_oscillator_has_its_exact_growth(folder, capsys):
 
 def test_an_elastic_belt_has_the_eigenvalues_of_its_steady_state(folder):
     (folder / "belt.toml").write_text(BELT)
-    asked = load_growth("belt.toml")
+    asked = load("belt.toml")
     assert [rung.name for rung in asked.rungs] == ["twins", "linear_stability"]
     run(asked.rungs[0].job, "out/twins", progress=False)
     (found,) = find_growth(asked, folder / "out")
@@ -137,14 +137,14 @@ def test_what_growth_refuses(folder, capsys):
 
 def test_runs_of_a_twin_are_neither_ended_early_nor_prolonged_nor_refined(folder):
     (folder / "belt.toml").write_text(BELT)
-    asked = load_growth("belt.toml", {"disturbance": "1 um", "longest_duration": "1 s"}, "4 um")
+    asked = load("belt.toml", {"disturbance": "1 um", "longest_duration": "1 s"}, "4 um")
     twins = asked.rungs[0].job
     assert [axis.name for axis in twins.axes] == ["load", "disturbance"] and asked.kick == 4e-6
     assert twins.axes[1].values == (0.0, 2e-6, 4e-6) and twins.histories == (0, 1, 2)
     p = twins.parameters
     assert p["longest_duration"] == p["duration"] == 0.08 and p["most_refinements"] == 0
     assert p["precision"] == "double"
-    single = load_growth("belt.toml", {"precision": "single"}).rungs[0].job
+    single = load("belt.toml", {"precision": "single"}).rungs[0].job
     assert single.parameters["precision"] == "single"
     with pytest.raises(InputError, match=r"\[design\]: expected none"):
-        load_growth("belt.toml", {"design.kind": "sobol", "design.runs": 4, "load": {"from": 50, "to": 60}})
+        load("belt.toml", {"design.kind": "sobol", "design.runs": 4, "load": {"from": 50, "to": 60}})

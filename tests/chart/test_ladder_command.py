@@ -11,7 +11,8 @@ import pytest
 import xarray as xr
 
 from cvt_hpc.cli import main
-from cvt_hpc.experiments.ladder.loading import cost_left, ladder, load_ladder
+from cvt_hpc.experiments.ladder.loading import ladder, load
+from cvt_hpc.experiments.sweeps import cost_left
 from cvt_hpc.job import load_job
 from cvt_hpc.models.elastic_belt.step_choice import transverse_limit
 from cvt_hpc.tables import below_origin
@@ -79,7 +80,7 @@ def test_each_rung_does_the_same_runs_as_far_as_it_knows_them(job):
 
 
 def test_a_dearer_model_stands_beside_the_rungs_if_it_is_asked_for(job, capsys):
-    rungs, _ = load_ladder(job, ["ladder.beside=quasi_static_belt"])[1:]
+    rungs, _ = load(job, ["ladder.beside=quasi_static_belt"])[1:]
     assert [rung.name for rung in rungs[-3:]] == ["quasi_static_belt", "elastic_belt", "reference"]
     beside = rungs[-3].job
     assert beside.stepper == "split" and beside.parameters["stations"] == 48 and beside.size == 2

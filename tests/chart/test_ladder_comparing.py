@@ -5,7 +5,8 @@ import pytest
 import xarray as xr
 
 from cvt_hpc.experiments.ladder.comparing import Score, compare
-from cvt_hpc.experiments.ladder.loading import QUESTIONS, Rung
+from cvt_hpc.experiments.ladder.loading import QUESTIONS
+from cvt_hpc.experiments.sweeps import Sweep
 from cvt_hpc.variables import Status, Vibrates
 
 LOADS, GRADIENTS = 10.0 * np.arange(1, 9), np.array([-1.0, -0.5])
@@ -13,7 +14,7 @@ DIMS = ("friction_gradient", "load")
 NO, YES, UNDECIDED = Vibrates.NO, Vibrates.YES, Vibrates.UNDECIDED
 VERDICTS = [[NO, NO, YES, YES, YES, YES, NO, NO], [NO] * 8]  # onsets at 25 and 65 N m of the first line
 COST = 0.25
-FULL, REFERENCE = Rung("elastic_belt", QUESTIONS, None), Rung("reference", (), None)
+FULL, REFERENCE = Sweep("elastic_belt", QUESTIONS, None), Sweep("reference", (), None)
 
 
 def transient(verdicts=VERDICTS, amplitude=20e-6, frequency=500.0, force=7000.0):
@@ -46,7 +47,7 @@ def transient(verdicts=VERDICTS, amplitude=20e-6, frequency=500.0, force=7000.0)
 
 def scores(dataset, answers=QUESTIONS, full=None, rung="rung"):
     """What a rung with these results is found to be worth, by question."""
-    rungs = [Rung("rung", tuple(answers), None), FULL, REFERENCE]
+    rungs = [Sweep("rung", tuple(answers), None), FULL, REFERENCE]
     results = {
         "rung": dataset,
         "elastic_belt": transient() if full is None else full,
@@ -64,7 +65,7 @@ def test_gross_slip_and_irregular_motion_are_answers(verdict):
     score = scores(transient(verdicts))["occurrence"].score
     assert (score.cells, score.wrong, score.undecided) == (16, 2 / 16, 0.0)
     # and of the reference they are asked for
-    rungs = [Rung("rung", ("occurrence",), None), FULL, REFERENCE]
+    rungs = [Sweep("rung", ("occurrence",), None), FULL, REFERENCE]
     results = {"rung": transient(), "elastic_belt": transient(), "reference": transient(verdicts)}
     score = next(found.score for found in compare(rungs, results) if found.rung == "rung")
     assert (score.cells, score.wrong, score.undecided) == (16, 2 / 16, 0.0)
@@ -122,7 +123,7 @@ def test_what_fails_or_is_undecided_is_no_error():
 def test_what_the_reference_leaves_open_is_not_asked():
     verdicts = np.full((2, 8), UNDECIDED)
     verdicts[0, 0] = NO
-    rungs = [Rung("rung", QUESTIONS, None), FULL, REFERENCE]
+    rungs = [Sweep("rung", QUESTIONS, None), FULL, REFERENCE]
     results = dict.fromkeys(("rung", "elastic_belt"), transient()) | {"reference": transient(verdicts)}
     found = {f.question: f.score for f in compare(rungs, results) if f.rung == "rung"}
     assert found["occurrence"] == Score(1, wrong=0.0, undecided=0.0)
@@ -141,7 +142,7 @@ def test_the_reference_is_no_better_known_than_the_full_run_agrees_with_it():
 
 def test_the_reference_is_as_well_known_as_the_rung_of_which_it_is_a_refined_one():
     """A pushbelt above the elastic belt: what the elastic belt is off by says nothing of the reference."""
-    rungs = [FULL, Rung("pushbelt", QUESTIONS, None), REFERENCE]
+    rungs = [FULL, Sweep("pushbelt", QUESTIONS, None), REFERENCE]
     results = {
         "elastic_belt": transient(amplitude=40e-6, force=7900.0),
         "pushbelt": transient(amplitude=21e-6, force=7090.0),

@@ -7,7 +7,7 @@ import pytest
 
 from cvt_hpc.cli import main
 from cvt_hpc.errors import InputError, UnitWarning
-from cvt_hpc.experiments.ladder.loading import QUESTIONS, ladder, load_ladder
+from cvt_hpc.experiments.ladder.loading import QUESTIONS, ladder, load
 from cvt_hpc.job import build_job
 
 JOBS = Path(__file__).parents[2] / "jobs"
@@ -134,7 +134,7 @@ def test_a_bad_table_is_told_in_a_line(job, table, message, capsys):
 
 
 def test_settings_of_the_command_line_replace_those_of_the_table(job):
-    assert load_ladder(job).rungs[-1].job.parameters["elements"] == 432
-    asked = load_ladder(job, ["ladder.set={elements = 108}", "load=[100, 120]", "band_high=600 Hz"])
+    assert load(job).rungs[-1].job.parameters["elements"] == 432
+    asked = load(job, ["ladder.set={elements = 108}", "load=[100, 120]", "band_high=600 Hz"])
     assert asked.rungs[-1].job.parameters["elements"] == 216
     assert asked.job.size == asked.rungs[-1].job.size == 4

@@ -6,13 +6,13 @@ import sys
 import pytest
 
 from cvt_hpc.errors import InputError
-from cvt_hpc.experiments.chart import load_chart
+from cvt_hpc.experiments.chart import load
 from cvt_hpc.experiments.chart.plan import Role
 from cvt_hpc.models import MODELS
 
 
 def test_a_chart_holds_every_run_that_it_needs(write_chart):
-    chart = load_chart(write_chart())
+    chart = load(write_chart())
     assert (chart.name, chart.description, chart.repeats, chart.time_limit) == (
         "bells",
         "Two ways to ring",
@@ -59,7 +59,7 @@ REFERENCE = ('reference = "exact"', 'reference = { stepper = "hard", step = "2 u
     ],
 )
 def test_a_computed_reference_has_a_coarser_one_beside_it(write_chart, reference, settings):
-    chart = load_chart(write_chart((REFERENCE[0], f"reference = {reference}")))
+    chart = load(write_chart((REFERENCE[0], f"reference = {reference}")))
     found = chart.points_of("ringing", Role.REFERENCE, Role.COARSER)
     assert [point.role for point in found] == [Role.REFERENCE, Role.COARSER]
     assert tuple(point.setting for point in found) == pytest.approx(settings, rel=1e-12)
@@ -69,18 +69,18 @@ def test_a_computed_reference_has_a_coarser_one_beside_it(write_chart, reference
 
 
 def test_starts_differ_in_their_seeds(write_chart):
-    chart = load_chart(write_chart(('title = "Ringing"', "starts = 3")))
+    chart = load(write_chart(('title = "Ringing"', "starts = 3")))
     point = chart.points[1]
     assert [point.parameters(k)["seed"] for k in range(3)] == [1, 2, 3]
 
 
 def test_values_from_the_command_line_count_more_than_those_of_scenes(write_chart):
-    chart = load_chart(write_chart(), ["loudness=30 um", "duration=0.2 s"])
+    chart = load(write_chart(), ["loudness=30 um", "duration=0.2 s"])
     by_name = {point.name: point.job.parameters for point in chart.points}
     assert by_name["ringing-soft-1"]["loudness"] == 30e-6 and by_name["ringing-exact"]["duration"] == 0.2
     assert by_name["ringing-choice-louder"]["loudness"] == 22e-6  # what is varied stays varied
     assert by_name["ringing-soft-1"]["step"] == 2e-3
-    assert chart.fingerprint() != load_chart(write_chart()).fingerprint()
+    assert chart.fingerprint() != load(write_chart()).fingerprint()
 
 
 @pytest.mark.parametrize(
@@ -95,15 +95,15 @@ def test_values_from_the_command_line_count_more_than_those_of_scenes(write_char
 )  # fmt: skip
 def test_what_is_wrong_on_the_command_line_is_not_blamed_on_a_scene(write_chart, override, message):
     with pytest.raises(InputError) as caught:
-        load_chart(write_chart(), [override])
+        load(write_chart(), [override])
     assert str(caught.value) == f"c.toml: {message}"
 
 
 def test_names_do_not_make_another_chart(write_chart):
-    plain = load_chart(write_chart()).fingerprint()
-    assert load_chart(write_chart(("bells", "chimes"), ("Two ways", "Ways"))).fingerprint() == plain
-    assert load_chart(write_chart(("repeats = 2", "repeats = 3"))).fingerprint() != plain
-    assert load_chart(write_chart(('tolerance = "5 %"', 'tolerance = "6 %"'))).fingerprint() != plain
+    plain = load(write_chart()).fingerprint()
+    assert load(write_chart(("bells", "chimes"), ("Two ways", "Ways"))).fingerprint() == plain
+    assert load(write_chart(("repeats = 2", "repeats = 3"))).fingerprint() != plain
+    assert load(write_chart(('tolerance = "5 %"', 'tolerance = "6 %"'))).fingerprint() != plain
 
 
 A_SCENE_OF_ITS_OWN = """
@@ -121,7 +121,7 @@ def test_a_scene_may_be_of_another_model(write_chart):
         ("[chart.methods.clever]", '[chart.methods.clever]\nscenes = ["ringing"]'),
         ("[chart.methods.hard]", '[chart.methods.hard]\nscenes = ["ringing"]'),
     )
-    other = next(point for point in load_chart(job).points if point.scene == "other")
+    other = next(point for point in load(job).points if point.scene == "other")
     assert (other.job.model, other.job.name) == ("oscillator", "bells")
     assert (
         other.job.parameters["duration"] == 0.3
@@ -131,13 +131,13 @@ def test_a_scene_may_be_of_another_model(write_chart):
 def test_a_scene_needs_a_transient(write_chart):
     scene = A_SCENE_OF_ITS_OWN.replace("oscillator", "strand").replace("set = {", "# set = {")
     with pytest.raises(InputError, match="model: expected one with a transient, found strand"):
-        load_chart(write_chart(("[chart.methods.soft]", f"{scene}\n[chart.methods.soft]")))
+        load(write_chart(("[chart.methods.soft]", f"{scene}\n[chart.methods.soft]")))
 
 
 def test_methods_and_choices_may_be_of_another_model_and_choices_of_fewer_starts(write_chart, monkeypatch):
     monkeypatch.setitem(sys.modules, "gong", sys.modules["bell"])
     monkeypatch.setitem(MODELS, "gong", "gong")
-    chart = load_chart(write_chart(('title = "Ringing"', "starts = 3"),
+    chart = load(write_chart(('title = "Ringing"', "starts = 3"),
                                    ('stepper = "hard"\n', 'stepper = "hard"\nmodel = "gong"\n'),
                                    ('set = { loudness = "22 um" }', 'model = "gong"\nstepper = "hard"\nstarts = 2')))  # fmt: skip
     models = {point.name: point.job.model for point in chart.points_of("ringing", Role.METHOD)}
@@ -154,13 +154,13 @@ OTHERS = 'amplitude = { tolerance = "1 %" }\nfrequency = { tolerance = "1 %" }\n
 
 
 def test_where_methods_take_over_all_runs_end_with_what_is_judged(write_chart):
-    chart = load_chart(write_chart((REFERENCE[0], f"{REFERENCE[1]}\n{LEAD}"), PART, (OTHERS, "")))
+    chart = load(write_chart((REFERENCE[0], f"{REFERENCE[1]}\n{LEAD}"), PART, (OTHERS, "")))
     (scene,) = chart.scenes
     assert scene.lead.until == 0.04 and scene.lead.job.stepper == "hard"
     assert scene.lead.job.parameters["step"] == 1e-6 and scene.lead.job.parameters["loudness"] == 20e-6
     measured = [p for p in chart.points if p.role in (Role.REFERENCE, Role.COARSER, Role.METHOD)]
     assert {point.until for point in measured} == {0.06}
-    later = load_chart(
+    later = load(
         write_chart((REFERENCE[0], f"{REFERENCE[1]}\n{LEAD.replace('1 us', '2 us')}"), PART, (OTHERS, ""))
     )
     assert later.fingerprint() != chart.fingerprint()
@@ -182,7 +182,7 @@ def test_where_methods_take_over_all_runs_end_with_what_is_judged(write_chart):
 )  # fmt: skip
 def test_a_bad_lead_is_one_clear_error(write_chart, replacements, message):
     with pytest.raises(InputError) as caught:
-        load_chart(write_chart(*replacements))
+        load(write_chart(*replacements))
     assert str(caught.value) == f"{WHERE}] {message}"
 
 
@@ -256,7 +256,7 @@ WHERE = "c.toml: [chart.scenes.ringing"
 )  # fmt: skip
 def test_bad_input_is_one_clear_error(write_chart, old, new, message):
     with pytest.raises(InputError) as caught:
-        load_chart(write_chart((old, new)))
+        load(write_chart((old, new)))
     if message is not None:
         assert str(caught.value) == message
     assert "\n" not in str(caught.value)
@@ -264,8 +264,8 @@ def test_bad_input_is_one_clear_error(write_chart, old, new, message):
 
 def test_a_job_without_a_chart_is_refused(write_chart):
     with pytest.raises(InputError, match=r"c.toml: chart: expected a table \[chart\]"):
-        load_chart(write_chart(text='name = "x"\nmodel = "bell"\n'))
+        load(write_chart(text='name = "x"\nmodel = "bell"\n'))
     with pytest.raises(
         InputError, match="--set stepper: expected a parameter of the scenes, found the job's"
     ):
-        load_chart(write_chart(), ["stepper=hard"])
+        load(write_chart(), ["stepper=hard"])

@@ -6,7 +6,7 @@ import numpy as np
 import pytest
 
 from cvt_hpc.errors import InputError
-from cvt_hpc.experiments.chart import load_chart
+from cvt_hpc.experiments.chart import load
 from cvt_hpc.experiments.chart.measuring import check_prospects, measure
 from cvt_hpc.experiments.chart.quantities import History, Quantity, observe
 from cvt_hpc.models import MODELS
@@ -25,7 +25,7 @@ def cost(setting, rate=20e3):
 
 
 def test_a_point_has_its_values_its_cost_and_its_work(write_chart):
-    found = measured(load_chart(write_chart()), "ringing-soft-3")
+    found = measured(load(write_chart()), "ringing-soft-3")
     assert found.reason == ""
     assert found.cost == pytest.approx(cost(1e-5), rel=1e-9)
     assert found.values["trajectory"].shape == (1, 200, 2)  # starts, 10 ms at 20 kHz, rim and foot
@@ -36,7 +36,7 @@ def test_a_point_has_its_values_its_cost_and_its_work(write_chart):
 
 
 def test_compiling_costs_nothing_and_the_quickest_repeat_counts(write_chart, bell, monkeypatch):
-    chart = load_chart(write_chart())
+    chart = load(write_chart())
     slowness = iter([1000.0, 5.0, 3.0, 4.0])  # warming up, the first pass, two repeats
     factors = {}
     advance = Transient.advance
@@ -57,7 +57,7 @@ def test_compiling_costs_nothing_and_the_quickest_repeat_counts(write_chart, bel
 
 
 def test_long_runs_are_timed_once(write_chart):
-    chart = load_chart(write_chart())
+    chart = load(write_chart())
     Transient.made = 0
     measured(chart, "ringing-soft-3", repeats=5)  # 0.22 s
     assert Transient.made == 2 + 5  # warmed up, observed, repeated
@@ -70,7 +70,7 @@ def test_long_runs_are_timed_once(write_chart):
 
 
 def test_costs_are_those_of_one_run_whatever_the_number_of_starts(write_chart):
-    chart = load_chart(write_chart(('title = "Ringing"', "starts = 4")))
+    chart = load(write_chart(('title = "Ringing"', "starts = 4")))
     found = measured(chart, "ringing-soft-3")
     assert found.cost == pytest.approx(cost(1e-5), rel=1e-9)
     assert found.values["amplitude"].shape == (4, 2)
@@ -78,15 +78,15 @@ def test_costs_are_those_of_one_run_whatever_the_number_of_starts(write_chart):
 
 
 def test_a_failed_run_is_named_with_its_instant(write_chart):
-    found = measured(load_chart(write_chart()), "ringing-soft-1")
+    found = measured(load(write_chart()), "ringing-soft-1")
     assert found.reason == "failed_numerics at 50 ms: the bell has cracked (by 3 mm)"
     assert found.values == {} and found.cost == pytest.approx(cost(2e-3), rel=1e-9)  # until then
-    several = measured(load_chart(write_chart(('title = "Ringing"', "starts = 4"))), "ringing-soft-1")
+    several = measured(load(write_chart(('title = "Ringing"', "starts = 4"))), "ringing-soft-1")
     assert several.reason.startswith("failed_numerics (start 1 of 4) at 50 ms")
 
 
 def test_a_run_that_takes_too_long_is_given_up(write_chart):
-    found = measured(load_chart(write_chart()), "ringing-soft-2", time_limit=0.5)
+    found = measured(load(write_chart()), "ringing-soft-2", time_limit=0.5)
     assert found.reason.startswith("timed_out at ")
     assert found.reason.endswith("ms: takes longer than the chart's time_limit")
     assert found.core_seconds < 0.5 + 0.4  # the last slice may take twice as long as the one before it
@@ -103,7 +103,7 @@ LED = (
 
 
 def test_methods_take_over_and_what_came_before_is_no_cost_of_theirs(write_chart):
-    chart = load_chart(write_chart(*LED))
+    chart = load(write_chart(*LED))
     check_prospects(chart)
     found = measured(chart, "ringing-soft-3")
     assert found.simulated == pytest.approx(0.02) and found.cost == pytest.approx(cost(1e-5), rel=1e-9)
@@ -118,7 +118,7 @@ def test_methods_take_over_and_what_came_before_is_no_cost_of_theirs(write_chart
 
 
 def test_a_lead_that_fails_is_named_as_such(write_chart):
-    chart = load_chart(write_chart((LED[0][0], LED[0][1].replace('"40 ms", set = { step = "1 us"', '"60 ms", set = { step = "2 ms"')),
+    chart = load(write_chart((LED[0][0], LED[0][1].replace('"40 ms", set = { step = "1 us"', '"60 ms", set = { step = "2 ms"')),
                                    (LED[1][0], LED[1][1].replace("40 ms", "60 ms").replace('"60 ms", tol', '"70 ms", tol'))))  # fmt: skip
     found = measured(chart, "ringing-soft-3")
     assert found.reason == (
@@ -131,7 +131,7 @@ def test_a_model_whose_runs_cannot_take_over_is_refused(write_chart, monkeypatch
 
     monkeypatch.delattr(module, "TAKES_OVER")
     with pytest.raises(InputError, match="lead: expected a model whose runs can take over from others"):
-        check_prospects(load_chart(write_chart(*LED)))
+        check_prospects(load(write_chart(*LED)))
 
 
 class Batch:
@@ -161,14 +161,14 @@ def test_lanes_are_filled_and_share_their_time(write_chart, monkeypatch):
 
     monkeypatch.setattr(module, "batch", Batch)
     monkeypatch.setattr(Model, "lanes", lambda model, parameters, stepper: 2)
-    chart = load_chart(
+    chart = load(
         write_chart(('stepper = "soft"', 'stepper = "soft"\nlanes = 2'), ('title = "Ringing"', "starts = 3"))
     )
     check_prospects(chart)
     found = measured(chart, "ringing-soft-3")
     assert found.cost == pytest.approx(cost(1e-5) / 2, rel=1e-9)
     assert found.values["amplitude"].shape == (3, 2)  # the fourth run fills a lane, and is not judged
-    alone = load_chart(write_chart(('title = "Ringing"', "starts = 3")))
+    alone = load(write_chart(('title = "Ringing"', "starts = 3")))
     assert np.array_equal(found.values["amplitude"], measured(alone, "ringing-soft-3").values["amplitude"])
     assert measured(alone, "ringing-soft-3").cost == pytest.approx(cost(1e-5), rel=1e-9)
 
@@ -192,7 +192,7 @@ def test_models_are_asked_before_anything_is_computed(write_chart, old, new, mes
                                         for name in ("soft", "clever", "hard")))  # fmt: skip
         message = "c.toml: [chart.scenes.s] reference: exact motion: expected friction_law coulomb"
     with pytest.raises(InputError) as caught:
-        check_prospects(load_chart(job))
+        check_prospects(load(job))
     assert str(caught.value).startswith(message)
 
 
@@ -202,8 +202,8 @@ def test_a_channel_that_is_not_recorded_is_refused(write_chart, monkeypatch):
     with pytest.raises(
         InputError, match="quantities: expected a model that records push_force t1, found bell"
     ):
-        check_prospects(load_chart(job))
-    check_prospects(load_chart(write_chart(
+        check_prospects(load(job))
+    check_prospects(load(write_chart(
         ('reference = "exact"', 'reference = { stepper = "hard", step = "2 us" }'),
         ("occurrence = {}", "onset = {}"))))  # fmt: skip
     # a method may be of another model
@@ -213,7 +213,7 @@ def test_a_channel_that_is_not_recorded_is_refused(write_chart, monkeypatch):
                       ("occurrence = {}", "onset = {}"),
                       ("[chart.methods.hard]", '[chart.methods.hard]\nmodel = "gong"'))  # fmt: skip
     with pytest.raises(InputError, match="quantities: expected a model that records load, found gong"):
-        check_prospects(load_chart(job))
+        check_prospects(load(job))
 
 
 PARAMETERS = {

@@ -6,7 +6,7 @@ from pathlib import Path
 import numpy as np
 import pytest
 
-from cvt_hpc.experiments.chart import load_chart
+from cvt_hpc.experiments.chart import load
 from cvt_hpc.job import known_keys, load_job
 from cvt_hpc.models.elastic_belt import PARAMETERS
 from cvt_hpc.models.pushbelt import inert
@@ -103,7 +103,7 @@ def test_the_job_of_vibration_has_the_belt_of_lebrecht_2004():
 
 def test_the_chart_has_the_same_belt_between_rigid_sheaves():
     """On elastic ones it goes the other way: the continuum's sheaves are fitted to the modes of the pushbelt."""
-    chart = load_chart(JOBS / "chart_pushbelt.toml")
+    chart = load(JOBS / "chart_pushbelt.toml")
     points = {point.series: point.job.parameters for point in chart.points if point.scene == "rigid"}
     # the chart's pushbelt has no transverse damping, and its own rate of the sheave
     but = ("transverse_damping", "sheave_rate")

@@ -68,10 +68,8 @@ def window(toy, monkeypatch, tmp_path):
         pilot_share=lambda job: 0.25,
         profile_bytes=lambda job: 0,
         run_points=run_points,
-        estimate_cost=lambda job: 2.0,
     )
+    monkeypatch.setattr("cvt_hpc.experiments.fit.making.estimate_cost", lambda job: 2.0)
     monkeypatch.setitem(sys.modules, "cvt_hpc.simulation", double)
-    # imported anew where another test has imported it, with the cost of the real simulation
-    monkeypatch.delitem(sys.modules, "cvt_hpc.experiments.fit.making", raising=False)
     monkeypatch.chdir(tmp_path)
     return done

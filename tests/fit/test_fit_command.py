@@ -9,7 +9,7 @@ import pytest
 from cvt_hpc.cli import main
 from cvt_hpc.errors import InputError
 from cvt_hpc.experiments.fit.evaluating import Evaluation
-from cvt_hpc.experiments.fit.loading import load_fit
+from cvt_hpc.experiments.fit.loading import load
 from cvt_hpc.experiments.fit.making import conflict_table
 from cvt_hpc.experiments.fit.search import Found, sensitivities
 from cvt_hpc.study import run
@@ -135,7 +135,7 @@ def test_it_finds_the_set_that_is_known(job, window, capsys, tmp_path):
 
 
 def test_conflicts_are_pairs_that_nobody_meets_together(job):
-    fit = load_fit(job)
+    fit = load(job)
     scores = np.ones((3, len(fit.targets)))
     scores[:, 0] = 1.0, 0.2, 0.7  # of the first target and the second each is met, but never both
     scores[:, 1] = 0.1, 1.0, 0.6
@@ -148,7 +148,7 @@ def test_conflicts_are_pairs_that_nobody_meets_together(job):
 
 def test_sensitivities_are_those_of_the_law(job, tmp_path):
     """Within 30 % of the set the frequency follows from the gradient alone, and the window from the mass."""
-    fit = load_fit(job, ["fit.samples=64", "fit.nearby=0.3"])
+    fit = load(job, ["fit.samples=64", "fit.nearby=0.3"])
     indices = sensitivities(fit, Evaluation(fit, tmp_path / "out"), "around", np.array([0.25, -1.44]))
     found = {(index.score, index.parameter): index for index in indices}
     for score, decides, other in (
@@ -165,7 +165,7 @@ def test_sensitivities_are_those_of_the_law(job, tmp_path):
 
 def test_runs_that_the_model_refuses_do_not_count(job, window, tmp_path):
     job.write_text(JOB.replace("rigid = {", 'light = { set = { thrust = "15 kN" } }\nrigid = {'))
-    fit = load_fit(job)
+    fit = load(job)
     scenes, evaluation = np.array([[0.25, -1.44], [0.2, -1.44]]), Evaluation(fit, tmp_path / "out")
     for courses in evaluation.evaluate("some", scenes, {}, fit.values, ["as_built", "light"]).courses:
         whole, light = courses["as_built"], courses["light"]
@@ -213,15 +213,15 @@ def test_a_fit_that_was_stopped_goes_on(job, window, monkeypatch, capsys, tmp_pa
 
 
 def test_factors_are_set_as_a_list(job, capsys):
-    assert load_fit(job, ["fit.distances=[0.8, 1.25]"]).distances == (0.8, 1.25)
-    assert load_fit(job, {"fit.distances": [2.0]}).distances == (2.0,)
+    assert load(job, ["fit.distances=[0.8, 1.25]"]).distances == (0.8, 1.25)
+    assert load(job, {"fit.distances": [2.0]}).distances == (2.0,)
     for value, found in (("0.8", '"0.8"'), ("[0.8, -1]", "[0.8, -1.0]")):
         assert main(["fit", "x.toml", "--set", f"fit.distances={value}"]) == 2
         assert f"found {found}" in capsys.readouterr().err
 
 
 def test_shares_and_scenes_are_inverse(job):
-    fit = load_fit(job)
+    fit = load(job)
     shares = np.random.default_rng(1).random((5, 2))
     scenes = fit.scenes(shares)
     assert np.allclose(fit.shares(scenes), shares, atol=1e-12)

@@ -10,10 +10,10 @@ import pytest
 from cvt_hpc import models, simulate
 from cvt_hpc.cli import main
 from cvt_hpc.errors import JobWarning, NoEffectWarning, UnitWarning
-from cvt_hpc.experiments.branch import load_diagram
-from cvt_hpc.experiments.chart import load_chart
-from cvt_hpc.experiments.fit.loading import load_fit
-from cvt_hpc.experiments.ladder.loading import load_ladder
+from cvt_hpc.experiments.branch import load as load_diagram
+from cvt_hpc.experiments.chart import load as load_chart
+from cvt_hpc.experiments.fit import load as load_fit
+from cvt_hpc.experiments.ladder import load as load_ladder
 from cvt_hpc.job import build_job, load_job, rebuild_job
 from cvt_hpc.job.values import warn_of_bare_numbers
 from cvt_hpc.parameters import Parameter

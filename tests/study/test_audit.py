@@ -11,8 +11,8 @@ import xarray as xr
 
 from cvt_hpc.cli import main
 from cvt_hpc.errors import InputError
-from cvt_hpc.experiments.ladder.comparing import FULL_MODEL
 from cvt_hpc.models.auto import record
+from cvt_hpc.study.audit import FULL_MODEL
 from cvt_hpc.variables import Status, Vibrates
 
 # the middle of a window of the reference map and cells outside

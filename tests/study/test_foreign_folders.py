@@ -13,7 +13,7 @@ import xarray as xr
 
 from cvt_hpc.cli import main
 from cvt_hpc.errors import InputError
-from cvt_hpc.experiments.ladder.making import run_ladder
+from cvt_hpc.experiments.sweeps import run_sweeps
 from cvt_hpc.locks import BusyError, locked
 from cvt_hpc.netcdf import write_history
 from cvt_hpc.output_folder import checksum
@@ -202,7 +202,7 @@ def test_a_folder_within_that_is_a_link_is_refused_before_anything_is_run(out, m
     (out / linked).symlink_to(mine)
     with pytest.raises(InputError, match=f"{linked}: expected a folder of its own, found a link"):
         if linked == "rung":
-            run_ladder([SimpleNamespace(name="rung", job=JOB)], out, tell=None)
+            run_sweeps([SimpleNamespace(name="rung", job=JOB)], {}, out, fresh=False, tell=print)
         else:
             Repeat("audit", "in full", JOB, out, "audit", JOB, 0.5, None, None).check(fresh=False)
 

@@ -7,13 +7,15 @@ import pytest
 
 from cvt_hpc import simulation
 from cvt_hpc.cli import main
+from cvt_hpc.experiment_kinds import WITH_TABLE
 from cvt_hpc.job import load_job
 from cvt_hpc.study.description import describe
 
 FOLDER = Path(__file__).parents[2] / "jobs"
-OF_COMMANDS = {"branch", "chart", "fit", "ladder"}  # tables of jobs that `run` and `check` do not take
 JOBS = [
-    path for path in sorted(FOLDER.glob("*.toml")) if not OF_COMMANDS & tomllib.loads(path.read_text()).keys()
+    path
+    for path in sorted(FOLDER.glob("*.toml"))
+    if not set(WITH_TABLE) & tomllib.loads(path.read_text()).keys()
 ]
 
 

@@ -9,7 +9,6 @@ import logging
 import re
 from collections.abc import Callable, Iterator, Mapping, Sequence
 from contextlib import closing
-from dataclasses import dataclass
 from enum import IntEnum
 from functools import partial
 from math import prod
@@ -41,7 +40,8 @@ from cvt_hpc.experiments.branch.job import (
     numbers_of,
     predicted_cost,
 )
-from cvt_hpc.experiments.branch.table import lowest_judged, with_kinds
+from cvt_hpc.experiments.branch.table import branch_lines, failure_lines, lowest_judged, with_kinds
+from cvt_hpc.experiments.outcome import Outcome, Tell
 from cvt_hpc.files import kind_of, written_aside
 from cvt_hpc.linear_algebra import one_thread
 from cvt_hpc.models.elastic_belt.belt import State, mesh
@@ -54,6 +54,7 @@ from cvt_hpc.output_folder import OutputFolder
 from cvt_hpc.study.description import axis_dimension, derived_coordinate
 from cvt_hpc.study.job_difference import another_job
 from cvt_hpc.study.ranks.progress import Steps
+from cvt_hpc.study.status import DONE, SOME_FAILED
 from cvt_hpc.vibration.classes import OccurrenceClass
 from cvt_hpc.vibration.criticality import Kind
 
@@ -185,43 +186,11 @@ class DiagramFolder(OutputFolder[Diagram]):
             return None
 
 
-@dataclass(frozen=True)
-class DiagramReport:
-    """Results of a diagram.
+def make(diagram: Diagram, out: Path, *, fresh: bool, tell: Tell) -> Outcome:
+    """Follow the branches that are not kept in the folder, and write dataset and pictures.
 
-    Attributes
-    ----------
-    followed : tuple of Followed
-        The branches.
-    dataset : Path
-        netCDF of all of them.
-    pictures : tuple of Path
-        One for each branch.
-    """
-
-    followed: tuple[Followed, ...]
-    dataset: Path
-    pictures: tuple[Path, ...]
-
-
-def make_diagram(
-    diagram: Diagram, out: Path, *, fresh: bool = False, tell: Callable[[str], None] = lambda line: None
-) -> DiagramReport:
-    """Follow the branches that are not kept in the folder, run beside them, and write dataset and pictures.
-
-    Each branch is kept, and in the dataset, once it is done. A dataset of the same job that holds more
-    branches than are kept, as of an earlier version, is left until there are as many.
-
-    Parameters
-    ----------
-    diagram : Diagram
-        The requested diagram.
-    out : Path
-        Output folder; made if needed.
-    fresh : bool
-        Throw an earlier diagram of the folder away.
-    tell : callable
-        Given a line when a branch is done, with the time to go.
+    See `experiment_kinds`. Each branch is kept, and in the dataset, once it is done. A dataset of the same
+    job that holds more branches than are kept, as of an earlier version, is left until there are as many.
 
     Raises
     ------
@@ -254,7 +223,12 @@ def make_diagram(
                     _write(diagram, folder, followed)
                 draw_branch(diagram, one, pictures[number])
                 steps.ended(f"branches: {len(one.onsets)} Hopf points")
-    return DiagramReport(tuple(one for _, one in sorted(followed.items())), folder.dataset, tuple(pictures))
+    found = [one for _, one in sorted(followed.items())]
+    failures = [line for one in found for line in failure_lines(diagram, one)]
+    tell(*failures)
+    lines = [line for one in found for line in (*branch_lines(diagram, one), "")]
+    files = [("dataset", folder.dataset), *(("picture", picture) for picture in pictures)]
+    return Outcome(lines, files, SOME_FAILED if failures else DONE)
 
 
 def _write(diagram: Diagram, folder: DiagramFolder, followed: Mapping[int, Followed]) -> None:

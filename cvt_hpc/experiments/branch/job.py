@@ -123,7 +123,7 @@ def load_attributes(job: Job) -> dict[str, Any]:
     return attributes("load", "N m", LOAD) | ({JOB_UNITS: unit} if unit else {})
 
 
-def load_diagram(path: str | Path, overrides: Assignments = ()) -> Diagram:
+def load(path: str | Path, overrides: Assignments = ()) -> Diagram:
     """Read and validate a job of bifurcation diagrams.
 
     Parameters
@@ -232,7 +232,7 @@ def predicted_cost(diagram: Diagram, asked: Asked) -> Cost:
     return Cost(steady, runs * each, runs)
 
 
-def plan_lines(diagram: Diagram) -> Iterator[str]:
+def plan_lines(diagram: Diagram, out: Path) -> Iterator[str]:
     """Yield the lines that describe a diagram and its expected cost."""
     job, loads = diagram.job, diagram.loads
     costs = [predicted_cost(diagram, asked) for asked in diagram.branches]

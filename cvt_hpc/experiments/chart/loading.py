@@ -30,7 +30,7 @@ from cvt_hpc.job.schema import load_schema
 _COARSER = {"step": 2.0, "tolerance": 10.0}  # by which the coarser reference is coarser
 
 
-def load_chart(path: str | Path, overrides: Assignments = ()) -> Chart:
+def load(path: str | Path, overrides: Assignments = ()) -> Chart:
     """Read and validate a chart job.
 
     Parameters
@@ -75,9 +75,8 @@ def load_chart(path: str | Path, overrides: Assignments = ()) -> Chart:
     if "budget" in table:
         choices, budgeted = budget_points(table["budget"], stages, f"{source}: [chart.budget]")
         points += choices
-    job, chosen = points[0].job, tuple(stage.scene for stage in stages)
-    head = job.name, job.description, source
-    return Chart(*head, chosen, tuple(points), **settings, budgeted=budgeted)
+    chosen = tuple(stage.scene for stage in stages)
+    return Chart(points[0].job, source, chosen, tuple(points), **settings, budgeted=budgeted)
 
 
 def reference_points(stage: Stage, raw: Any) -> Iterator[Point]:

@@ -13,7 +13,7 @@ import re
 from collections.abc import Callable, Iterator, Mapping, Sequence
 from concurrent.futures import ProcessPoolExecutor, as_completed
 from contextlib import closing
-from dataclasses import dataclass, fields
+from dataclasses import fields
 from math import nan
 from multiprocessing.synchronize import Lock
 from pathlib import Path
@@ -29,6 +29,7 @@ from cvt_hpc.experiments.chart.measuring import Measurement, check_prospects, me
 from cvt_hpc.experiments.chart.plan import Chart, Point, Role
 from cvt_hpc.experiments.chart.quantities import KINDS
 from cvt_hpc.experiments.chart.scene_drawing import draw_budget, draw_scene
+from cvt_hpc.experiments.outcome import Outcome, Tell
 from cvt_hpc.files import kind_of, write_rows, written_aside
 from cvt_hpc.linear_algebra import one_thread
 from cvt_hpc.netcdf import VOLATILE, attributes, global_attributes, write_netcdf
@@ -132,49 +133,10 @@ class ChartFolder(OutputFolder[Chart]):
         self.points.save(name, plain, measurement.values)
 
 
-@dataclass(frozen=True)
-class ChartReport:
-    """Results of a chart.
+def make(chart: Chart, out: Path, *, fresh: bool, tell: Tell) -> Outcome:
+    """Measure the points that are missing, and write table, dataset and pictures; see `experiment_kinds`.
 
-    Attributes
-    ----------
-    comparisons : tuple of Comparison
-        The results, scene by scene.
-    table, dataset : Path
-        The files that hold them.
-    pictures : tuple of Path
-        One for each scene, and that of the error budget.
-    """
-
-    comparisons: tuple[Comparison, ...]
-    table: Path
-    dataset: Path
-    pictures: tuple[Path, ...]
-
-
-def make_chart(
-    chart: Chart,
-    out: Path | None = None,
-    *,
-    fresh: bool = False,
-    processes: int | None = None,
-    tell: Callable[[str], None] = lambda line: None,
-) -> ChartReport:
-    """Measure the missing points, and write table, dataset and pictures.
-
-    Parameters
-    ----------
-    chart : Chart
-        The chart to measure.
-    out : Path, optional
-        Output folder; out/<job name> by default.
-    fresh : bool
-        Throw earlier results of the folder away.
-    processes : int, optional
-        How many runs that are not timed may go on together; as many as there are cores by default. Timed
-        runs are always alone.
-    tell : callable
-        Given a line for each point that was measured, with the time to go.
+    Points that are not timed are measured together by as many processes as there are cores, others alone.
 
     Raises
     ------
@@ -183,9 +145,9 @@ def make_chart(
         the system refuses.
     """
     check_prospects(chart)
-    folder = ChartFolder(Path(out) if out is not None else Path("out") / chart.name, chart)
+    folder = ChartFolder(out, chart)
     with folder.claimed(chart, fresh=fresh):
-        measurements = _fill(chart, folder, processes or len(os.sched_getaffinity(0)), tell)
+        measurements = _fill(chart, folder, len(os.sched_getaffinity(0)), tell)
         comparisons = compare(chart, measurements)
         dataset = chart_dataset(chart, comparisons, folder.points.makers)
         write_table(comparisons, dataset.attrs, folder.table)
@@ -193,7 +155,9 @@ def make_chart(
             write_netcdf(dataset, aside)
         pictures = [draw_scene(c, folder.picture(c.scene.name)) for c in comparisons]
         pictures += [draw_budget(c, folder.picture("budget")) for c in comparisons if c.choices]
-    return ChartReport(comparisons, folder.table, folder.dataset, tuple(pictures))
+    lines = [line for comparison in comparisons for line in (*table_lines(comparison), "")]
+    files = [("table", folder.table), ("dataset", folder.dataset), *(("picture", path) for path in pictures)]
+    return Outcome(lines, files)
 
 
 def _fill(
@@ -343,7 +307,7 @@ def _attributes(
     chart: Chart, comparisons: Sequence[Comparison], makers: Sequence[dict[str, Any]]
 ) -> dict[str, str]:
     return {
-        **global_attributes(chart, chart.resolved(), "speed against accuracy", makers=makers),
+        **global_attributes(chart.job, chart.resolved(), "speed against accuracy", makers=makers),
         "job_fingerprint": chart.fingerprint(),
         "verdicts": json.dumps({c.scene.name: c.verdict for c in comparisons}),
         "machine": json.dumps([*{str(m["machine"]): m["machine"] for m in makers}.values()]),

@@ -9,6 +9,7 @@ import time
 from collections.abc import Callable, Iterable, Iterator, Sequence
 from dataclasses import dataclass, field
 from itertools import product
+from pathlib import Path
 from typing import Any
 
 import numpy as np
@@ -305,11 +306,12 @@ def _march_cost(job: Job, until: float) -> float:
     return whole * min(until / job.parameters["duration"], 1.0)
 
 
-def plan_lines(chart: Chart) -> Iterator[str]:
+def plan_lines(chart: Chart, out: Path) -> Iterator[str]:
     """Yield the lines that describe the measurements of a chart, scene by scene, and their expected cost."""
-    yield f"chart {chart.name} ({chart.source}): {len(chart.scenes)} scenes, {len(chart.points)} points"
-    if chart.description:
-        yield chart.description
+    check_prospects(chart)
+    yield f"chart {chart.job.name} ({chart.source}): {len(chart.scenes)} scenes, {len(chart.points)} points"
+    if chart.job.description:
+        yield chart.job.description
     rows, total, unknown = [], 0.0, 0
     for scene in chart.scenes:
         points = [point for point in chart.points if point.scene == scene.name]

@@ -174,8 +174,10 @@ class Chart:
 
     Attributes
     ----------
-    name, description, source : str
-        As of a job.
+    job : Job
+        The job of the first point, which has the chart's name and description.
+    source : str
+        The job file.
     scenes : tuple of Scene
         The problems.
     points : tuple of Point
@@ -188,8 +190,7 @@ class Chart:
         Quantities that the error budget shows.
     """
 
-    name: str
-    description: str
+    job: Job
     source: str
     scenes: tuple[Scene, ...]
     points: tuple[Point, ...]
@@ -208,8 +209,8 @@ class Chart:
     def resolved(self) -> dict[str, Any]:
         """Return all entries that determine the measurements, as JSON types."""
         return {
-            "name": self.name,
-            "description": self.description,
+            "name": self.job.name,
+            "description": self.job.description,
             "repeats": self.repeats,
             "time_limit": self.time_limit,
             "budgeted": list(self.budgeted),

@@ -30,7 +30,7 @@ _EACH_OF = ("strand", "pulley")  # of such a quantity that of the largest motion
 _TABLES = ("along", "starts", "coarse", "repeat", "counted", "cases", "targets")
 
 
-def load_fit(path: str | Path, overrides: Assignments = ()) -> Fit:
+def load(path: str | Path, overrides: Assignments = ()) -> Fit:
     """Read and validate a job of a fit.
 
     Parameters

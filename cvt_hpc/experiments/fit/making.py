@@ -3,7 +3,8 @@
 Tables are comma-separated values below lines that state their origin.
 """
 
-from collections.abc import Callable, Iterator, Sequence
+from collections.abc import Iterator, Sequence
+from functools import partial
 from itertools import combinations
 from pathlib import Path
 from typing import NamedTuple
@@ -11,9 +12,10 @@ from typing import NamedTuple
 import numpy as np
 from numpy.typing import NDArray
 
-from cvt_hpc.experiments.fit.evaluating import Evaluation
+from cvt_hpc.experiments.fit.evaluating import Evaluation, Stopped
 from cvt_hpc.experiments.fit.job import REPRODUCED, Course, Fit, areas, verdict
 from cvt_hpc.experiments.fit.search import Around, Confirmed, Found, confirm, look_around, reach, search
+from cvt_hpc.experiments.outcome import Outcome, Tell
 from cvt_hpc.files import write_rows
 from cvt_hpc.job.definition import digest
 from cvt_hpc.job.summary import core_time_in_words
@@ -37,51 +39,24 @@ _ORDERS = ("first", "first_low", "first_high", "total", "total_low", "total_high
 Row = Sequence[str | float]
 
 
-class FitReport(NamedTuple):
-    """Results of a fit.
+def make(fit: Fit, out: Path, *, fresh: bool, tell: Tell) -> Outcome:
+    """Search for the set of parameters that meets the targets best, and examine it; see `experiment_kinds`.
 
-    Attributes
-    ----------
-    lines : tuple of str
-        Text on the best set for people.
-    tables : tuple of Path
-        The files that hold the results; none on other ranks than the first.
-    """
-
-    lines: tuple[str, ...]
-    tables: tuple[Path, ...]
-
-
-def make_fit(
-    fit: Fit, out: Path, *, fresh: bool = False, tell: Callable[[str], None] = lambda line: None
-) -> FitReport:
-    """Search for the set of parameters that meets the targets best, and examine it.
-
-    On all ranks, by studies that continue where an earlier start has stopped.
-
-    Parameters
-    ----------
-    fit : Fit
-        The requested fit.
-    out : Path
-        Folder of the studies and tables.
-    fresh : bool
-        Throw earlier studies away.
-    tell : callable
-        Given a line after each study of the search.
+    Its studies continue where an earlier start has stopped.
 
     Raises
     ------
-    Stopped
-        If a study was stopped early.
     InputError
         If a folder holds another study or cannot be written to, or the model refuses all runs.
     """
     evaluation = Evaluation(fit, out, fresh=fresh)
-    found = search(fit, lambda name, scenes: evaluation.evaluate(name, scenes, fit.coarse, fit.thinned), tell)
-    confirmed = confirm(fit, evaluation, found)
+    try:
+        found = search(fit, partial(evaluation.evaluate, settings=fit.coarse, values=fit.thinned), tell)
+        confirmed = confirm(fit, evaluation, found)
+        looked = look_around(fit, evaluation, confirmed)
+    except Stopped as stopped:
+        return Outcome(status=stopped.status)
     best = confirmed[0]
-    looked = look_around(fit, evaluation, confirmed)
     of_set, verdicts = set_table(fit, found, best, looked[0]), verdict_table(fit, best)
     tables = (
         of_set,
@@ -93,11 +68,11 @@ def make_fit(
         sensitivity_table(fit, looked),
     )
     cost = f"{evaluation.runs} runs, {core_time_in_words(evaluation.core_seconds)}"
-    written = tuple(write_table(fit, one, out) for one in tables) if process_rank() == 0 else ()
-    return FitReport((*set_lines(best, of_set, verdicts), cost), written)
+    files = [("table", write_table(fit, one, out)) for one in tables] if process_rank() == 0 else []
+    return Outcome((*set_lines(best, of_set, verdicts), cost), files)
 
 
-def plan_lines(fit: Fit) -> Iterator[str]:
+def plan_lines(fit: Fit, out: Path) -> Iterator[str]:
     """Yield the lines that describe a fit and its expected cost."""
     job, schema, full, thin = fit.job, fit.job.schema, len(fit.values), len(fit.thinned)
     yield f"fit {job.name} ({job.source}): {len(fit.free)} free parameters, {len(fit.targets)} targets"

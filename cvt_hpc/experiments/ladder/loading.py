@@ -5,14 +5,13 @@ that takes longer than the elastic belt and answers the same questions, if a job
 may be the pushbelt of rigid elements. The expected cost follows from the models' cost models.
 """
 
-from collections.abc import Iterator, Mapping, Sequence
+from collections.abc import Iterator, Mapping
 from dataclasses import replace
 from pathlib import Path
 from typing import Any, NamedTuple
 
-import numpy as np
-
 from cvt_hpc.errors import InputError, mismatch, show
+from cvt_hpc.experiments.sweeps import Sweep, handed, sweep_lines
 from cvt_hpc.job import Job, build_job, known_keys, rebuild_job
 from cvt_hpc.job.assignments import Assignments, split_assignments, take_own, warn_of_bare_assignments
 from cvt_hpc.job.definition import handed_to
@@ -25,8 +24,6 @@ from cvt_hpc.models.pushbelt.continuous import FOLLOWS, ONLY
 from cvt_hpc.models.pushbelt.profiles import PARAMETERS as PROFILES
 from cvt_hpc.parameters import Parameter
 from cvt_hpc.simulation import run_costs
-from cvt_hpc.study.status import find_records
-from cvt_hpc.tables import columns, short
 from cvt_hpc.vibration.ramped import QUANTITIES
 
 PUSHBELT = "pushbelt"
@@ -42,24 +39,6 @@ REFERENCE = "reference"
 # and of second order by more than half, while a run costs 4.5 times as much, which keeps it below a second.
 FINER = 1.5
 LONGER = 2.0  # times as long: slow growth has its time, and the judged half begins a whole run later
-
-
-class Rung(NamedTuple):
-    """One model of the ladder.
-
-    Attributes
-    ----------
-    name : str
-        Of its folder and in the table.
-    answers : tuple of str
-        The entries of QUESTIONS that it answers.
-    job : Job
-        The same runs on it, without the axes that it does not know.
-    """
-
-    name: str
-    answers: tuple[str, ...]
-    job: Job
 
 
 # By name its model, the content of a table of that name, and the questions that it answers. Of auto, question
@@ -78,7 +57,7 @@ BESIDE = ("quasi_static_belt",)
 
 def ladder(
     job: Job, pushbelt: Mapping[str, Any] | None = None, beside: str = NONE
-) -> tuple[tuple[Rung, ...], dict[str, str]]:
+) -> tuple[tuple[Sweep, ...], dict[str, str]]:
     """Return the models of a job's ladder, and why others refuse it.
 
     Parameters
@@ -92,7 +71,7 @@ def ladder(
 
     Returns
     -------
-    rungs : tuple of Rung
+    rungs : tuple of Sweep
         From the cheapest up, then the requested model beside them, the job itself, a pushbelt if requested,
         the reference last. The reference is the model before it, refined.
     refusals : dict
@@ -108,16 +87,16 @@ def ladder(
     models = _LOWER if beside == NONE else _LOWER | {beside: (beside, {}, QUESTIONS)}
     for name, (model, table, answers) in models.items():
         try:
-            rungs.append(Rung(name, answers, handed(job, model, table)))
+            rungs.append(Sweep(name, answers, handed(job, model, table)))
         except InputError as error:
             refusals[name] = str(error)
-    rungs.append(Rung(MODEL, QUESTIONS, job))
+    rungs.append(Sweep(MODEL, QUESTIONS, job))
     if pushbelt is None:
         reference = rebuild_job(_refined(job), job.source, job.units)
     else:
         coarser, reference = pushbelt_jobs(job, pushbelt)
-        rungs.append(Rung(PUSHBELT, QUESTIONS, coarser))
-    return (*rungs, Rung(REFERENCE, (), reference)), refusals
+        rungs.append(Sweep(PUSHBELT, QUESTIONS, coarser))
+    return (*rungs, Sweep(REFERENCE, (), reference)), refusals
 
 
 def _check(job: Job) -> None:
@@ -140,16 +119,6 @@ def _check(job: Job) -> None:
         if name in varied:
             table, found = varied[name]
             raise mismatch(f"{where}: [{table}] {name}", "one value, which the reference refines", found)
-
-
-def handed(job: Job, model: str, table: dict[str, Any]) -> Job:
-    """The same runs on another model, without the axes that it does not know."""
-    known = known_keys(model)
-    fewer = replace(job, axes=tuple(axis for axis in job.axes if axis.name in known))
-    document = handed_to(fewer, model, "a model of its ladder")
-    if table:
-        document[model] = table
-    return rebuild_job(document, job.source, job.units)
 
 
 def _refined(job: Job) -> dict[str, Any]:
@@ -254,18 +223,18 @@ class Ladder(NamedTuple):
     ----------
     job : Job
         Of the elastic belt.
-    rungs : tuple of Rung
+    rungs : tuple of Sweep
         As `ladder` returns them.
     refusals : dict
         The reason, by the name of a model that is left out.
     """
 
     job: Job
-    rungs: tuple[Rung, ...]
+    rungs: tuple[Sweep, ...]
     refusals: dict[str, str]
 
 
-def load_ladder(path: str | Path, overrides: Assignments = ()) -> Ladder:
+def load(path: str | Path, overrides: Assignments = ()) -> Ladder:
     """Read and validate a job, and return its ladder.
 
     Parameters
@@ -296,49 +265,15 @@ def load_ladder(path: str | Path, overrides: Assignments = ()) -> Ladder:
     return Ladder(job, *ladder(job, settings if reference == PUSHBELT else None, beside))
 
 
-def cost_left(rung: Rung, out: Path | None) -> tuple[int, float]:
-    """Return how many runs of a model are not on record, and their predicted core-seconds.
-
-    Parameters
-    ----------
-    rung : Rung
-        The model.
-    out : Path or None
-        The folder of its ladder; None: all runs are left.
-    """
-    records = None if out is None else find_records(out / rung.name, rung.job)
-    left = np.ones(rung.job.size, bool) if records is None else ~records.recorded
-    return int(left.sum()), float(run_costs(rung.job)[left].sum())
-
-
 def plan_lines(asked: Ladder, out: Path) -> Iterator[str]:
     """Yield the lines that state the runs of a ladder on each model, and their expected cost."""
     job, rungs = asked.job, asked.rungs
     yield f"ladder {job.name} ({job.source}): {job.size} runs with {len(rungs)} models"
     if job.description:
         yield job.description
-    yield from rung_lines(rungs, asked.refusals, out)
+    yield from sweep_lines(rungs, asked.refusals, out)
     if rungs[-1].job.model != PUSHBELT:
         yield f"with --set ladder.reference={PUSHBELT}: {_pushbelt_cost(job)}"
-
-
-def rung_lines(rungs: Sequence[Rung], refusals: Mapping[str, str], out: Path) -> Iterator[str]:
-    """Yield the lines that state the runs of models, those left out, and the cost of what is left."""
-    left = {rung.name: cost_left(rung, out) for rung in rungs}
-    heads = ["name", "model", "runs", "left", "core-s left", "answers"]
-    yield from columns(
-        [
-            heads,
-            *(
-                [r.name, r.job.model, str(r.job.size), str(left[r.name][0]), short(left[r.name][1])]
-                + [", ".join(r.answers)]
-                for r in rungs
-            ),
-        ]
-    )
-    yield from (f"{name} left out: {why}" for name, why in refusals.items())
-    total = sum(core_seconds for _, core_seconds in left.values())
-    yield f"estimated cost of what is left: {core_time_in_words(total)}, shared by all ranks"
 
 
 def _pushbelt_cost(job: Job) -> str:
