@@ -80,4 +80,8 @@ EXPERIMENTS = {
         "{}; fit.KEY replaces a number of [fit]",
     ),
 }
-WITH_TABLE = tuple(name for name, experiment in EXPERIMENTS.items() if experiment.has_table)
+
+
+def with_table() -> list[str]:
+    """Return the experiments whose jobs may have a table of their name."""
+    return [name for name, experiment in EXPERIMENTS.items() if experiment.has_table]

@@ -27,7 +27,6 @@ if TYPE_CHECKING:
 
 CONTENT = "cvt_hpc_content"  # global attribute by which this program knows its own files
 HISTORY = "history of one run"
-DIAGRAM = "bifurcation diagram"
 VOLATILE = "depends on the machine and the hour; not reproduced bitwise"
 
 
@@ -220,27 +219,12 @@ def store_history(dataset: xr.Dataset, path: Path) -> None:
 
 
 def is_history(path: Path) -> bool:
-    """Whether a file that the user names is a history that this program wrote."""
-    return holds(path, HISTORY, follow=True)
-
-
-def holds(path: Path, content: str, *, follow: bool = False) -> bool:
-    """Whether a file, or a link that may be followed, is a dataset of this program with such content.
-
-    Parameters
-    ----------
-    path : Path
-        The file.
-    content : str
-        HISTORY or DIAGRAM.
-    follow : bool
-        As of `open_netcdf`.
-    """
-    if kind_of(path, follow=follow) != "a file":  # a pipe would be waited for
+    """Whether a file that the user names, or the target of a link, is a history that this program wrote."""
+    if kind_of(path, follow=True) != "a file":  # a pipe would be waited for
         return False
     from cvt_hpc.foreign_files import global_text
 
-    return global_text(path, CONTENT) == content
+    return global_text(path, CONTENT) == HISTORY
 
 
 def open_netcdf(path: Path, *, follow: bool = False, **options: Any) -> xr.Dataset:

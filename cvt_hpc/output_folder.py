@@ -1,8 +1,8 @@
 """An output folder: its content, the process at work in it, and the files that may be removed from it.
 
-Studies, charts and bifurcation diagrams have one each, with a job file against which all else is checked. The
-folder may be damaged, or another user's: a checksum shows damage of the job file, and nothing is written or
-removed outside.
+A study, a chart and a bifurcation diagram may share one, each with a job file against which all else is
+checked. The folder may be damaged, or another user's: a checksum shows damage of the job file, and nothing
+is written or removed outside.
 """
 
 import errno
@@ -20,7 +20,6 @@ from cvt_hpc.errors import InputError
 from cvt_hpc.locks import is_locked, locked
 
 CHECKSUM = "checksum"  # key of the job file
-CHART_FILE = "chart.json"  # its folder holds nothing else, while studies and diagrams may share one
 _LIMIT = 1 << 29  # [bytes] of a job file; 10^6 samples of ten parameters are 400 MB
 
 _logger = logging.getLogger(__name__)
@@ -180,8 +179,6 @@ class OutputFolder(ABC, Generic[Content]):
                     raise InputError(f"{self.path}: expected a folder for the results, found {kind}")
                 return None
             expected = f"{self.path}: expected an empty folder or that of an earlier {what}, found"
-            if self.kind.job_file != CHART_FILE and files.kind_of(self.path / CHART_FILE):
-                raise InputError(f"{expected} that of a chart; choose another --out")
             # In this order: another start writes its job file before any results.
             unexplained = self.unexplained()
             try:

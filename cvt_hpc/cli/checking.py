@@ -9,7 +9,7 @@ from typing import TYPE_CHECKING, Any
 
 from cvt_hpc.cli import parts
 from cvt_hpc.errors import mismatch
-from cvt_hpc.experiment_kinds import EXPERIMENTS, WITH_TABLE
+from cvt_hpc.experiment_kinds import EXPERIMENTS, with_table
 
 if TYPE_CHECKING:
     from cvt_hpc.job import Job
@@ -26,7 +26,7 @@ def add(commands: Any) -> None:
     pilots = "forecast by K batches that are done for it, shortened (default: by records, else by prediction)"
     check.add_argument("--pilots", type=int, default=0, metavar="K", help=pilots)
     check.add_argument("--plot", type=Path, metavar="PNG", help="picture of the forecast, 1 to 10 000 ranks")
-    command = f"command that is to take the job (default: {' or '.join(WITH_TABLE)} by its table, else run)"
+    command = f"command that is to take the job (default: {' or '.join(with_table())} by its table, else run)"
     check.add_argument("--for", dest="command_for", choices=(RUN, *EXPERIMENTS), help=command)
     parts.add_assignments(check, "--set", parts.REPLACE)
 
@@ -36,7 +36,7 @@ def _check(arguments: argparse.Namespace) -> int:
     from cvt_hpc.job.document import read_document
 
     tables = read_document(arguments.path)
-    command = arguments.command_for or next((name for name in WITH_TABLE if name in tables), RUN)
+    command = arguments.command_for or next((name for name in with_table() if name in tables), RUN)
     if command != RUN:
         if arguments.ranks or arguments.pilots or arguments.plot:
             raise mismatch(

@@ -7,7 +7,7 @@ from pathlib import Path
 from typing import Any
 
 from cvt_hpc.errors import InputError, did_you_mean, mismatch, show
-from cvt_hpc.experiment_kinds import WITH_TABLE
+from cvt_hpc.experiment_kinds import with_table
 from cvt_hpc.job import assignments
 from cvt_hpc.job.assignments import Assignments, AxisEntry, plain
 from cvt_hpc.job.axes import Axis, read_axis
@@ -294,7 +294,7 @@ def _check_top_level(document: Mapping[str, Any], schema: Schema, source: str) -
         if key in tables:
             if not isinstance(value, Mapping):
                 raise mismatch(f"{source}: {key}", f"a table [{key}]", show(value))
-        elif key in WITH_TABLE:
+        elif key in with_table():
             raise InputError(f"{source}: [{key}]: expected a job of runs, found one for `cvt-hpc {key}`")
         elif isinstance(value, Mapping):
             hint = did_you_mean(key, tables) or f"; known: {', '.join(tables)}"

@@ -148,16 +148,6 @@ def test_without_its_other_files_a_diagram_is_known_by_its_branches(branch, tmp_
     assert branch.followed == [] and stability(tmp_path / "out") == [[Stability.NOT_FOUND] * 2] * 2
 
 
-def test_a_dataset_of_an_earlier_version_is_left_until_as_many_branches_are_done(branch, tmp_path, capsys):
-    assert branch() == 0
-    for kept in (tmp_path / "out" / "branches").iterdir():
-        kept.unlink()
-    assert branch(end=interrupt) == 130
-    told = "branch.nc holds 2 branches, 0 are kept beside it; all but those are followed anew"
-    assert told in capsys.readouterr().err
-    assert stability(tmp_path / "out") == [[Stability.NOT_FOUND] * 2] * 2
-
-
 def test_failed_runs_are_named_and_make_the_exit_status(branch, tmp_path, capsys):
     assert branch(classes=(OccurrenceClass.QUIET, OccurrenceClass.FAILED), drawn=True) == 1
     told = capsys.readouterr()
@@ -192,15 +182,6 @@ def test_one_process_at_a_time_and_no_lock_through_a_link(branch, tmp_path, caps
     assert (tmp_path / "mine").read_text() == "mine"
 
 
-def test_a_diagram_of_an_earlier_version_has_no_job_file(branch, tmp_path, capsys):
-    assert branch() == 0
-    (tmp_path / "out" / "branch.json").unlink()
-    assert branch("--set", "friction_gradient=-0.6") == 2
-    assert "branch.nc without a branch.json; choose another --out, or --fresh" in capsys.readouterr().err
-    assert branch() == 0
-    assert (tmp_path / "out" / "branch.json").exists()
-
-
 def test_a_changed_job_file_is_mended_by_its_own_job_alone(branch, tmp_path, capsys):
     assert branch() == 0
     path = tmp_path / "out" / "branch.json"
@@ -213,17 +194,18 @@ def test_a_changed_job_file_is_mended_by_its_own_job_alone(branch, tmp_path, cap
     assert path.read_text() == whole
 
 
-@pytest.mark.parametrize("left", ["damaged", "foreign"])
-def test_a_dataset_that_cannot_be_read_is_made_again_where_the_job_file_vouches(
-    branch, tmp_path, capsys, left
-):
+def test_a_damaged_dataset_is_written_again(branch, tmp_path):
     assert branch() == 0
-    (tmp_path / "out" / "branch.nc").write_text("mine")
-    if left == "foreign":
-        (tmp_path / "out" / "branch.json").unlink()
-        assert branch() == 2
-        assert branch("--fresh") == 2
-        assert (tmp_path / "out" / "branch.nc").read_text() == "mine"
-    else:
-        assert branch() == 0
-        assert stability(tmp_path / "out") == [[Stability.NOT_FOUND] * 2] * 2
+    (tmp_path / "out" / "branch.nc").write_text("damaged")
+    assert branch() == 0
+    assert stability(tmp_path / "out") == [[Stability.NOT_FOUND] * 2] * 2
+
+
+@pytest.mark.parametrize("name", ["branch.nc", "branch_2.png"])
+def test_files_of_somebody_else_are_left_alone(branch, tmp_path, capsys, name):
+    (tmp_path / "out").mkdir()
+    (tmp_path / "out" / name).write_text("mine")
+    for options in ([], ["--fresh"]):
+        assert branch(*options) == 2
+        assert f"found {name} without a branch.json; choose another --out" in capsys.readouterr().err
+    assert [(path.name, path.read_text()) for path in (tmp_path / "out").iterdir()] == [(name, "mine")]

@@ -380,4 +380,4 @@ def test_whose_points_are_is_asked_of_their_heads_alone(report, tmp_path, monkey
     monkeypatch.setattr(
         np.lib.npyio.NpzFile, "__getitem__", lambda file, key: (keys.add(key), read(file, key))[1]
     )
-    assert len(folder.points.fingerprints()) == 1 and keys == {"head"}
+    assert len(folder.parts.fingerprints()) == 1 and keys == {"head"}

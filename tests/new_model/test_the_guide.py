@@ -13,6 +13,8 @@ import van_der_pol
 from van_der_pol.transient import Transient
 
 import cvt_hpc
+from cvt_hpc.cli import main
+from cvt_hpc.experiment_kinds import EXPERIMENTS, Experiment
 from cvt_hpc.job import build_job
 from cvt_hpc.models import MODELS
 from cvt_hpc.steppers import STEPPERS
@@ -25,11 +27,15 @@ BLOCKS = re.findall(r"^```python\n(.*?)^```", PAGE, re.MULTILINE | re.DOTALL)
 
 def test_the_page_shows_the_files_that_are_run():
     shown = dict(
-        re.match(r"# (?:cvt_hpc/steppers/)?(\S+\.py)\n(.*)", b, re.DOTALL).groups()
+        re.match(r"# (?:cvt_hpc/(?:steppers|experiments)/)?(\S+\.py)\n(.*)", b, re.DOTALL).groups()
         for b in BLOCKS
         if b[0] == "#"
     )
-    files = [HERE / "runge_kutta_3.py", *sorted((HERE / "van_der_pol").glob("*.py"))]
+    files = [
+        HERE / "runge_kutta_3.py",
+        HERE / "two_steppers.py",
+        *sorted((HERE / "van_der_pol").glob("*.py")),
+    ]
     assert shown == {str(file.relative_to(HERE)): file.read_text() for file in files}
 
 
@@ -46,6 +52,8 @@ def test_a_friction_law_by_its_two_blocks(tmp_path):
         module.write_text(head + text + before + tail)
     tried = """
 import numpy as np
+from cvt_hpc.cli import main
+from cvt_hpc.experiment_kinds import EXPERIMENTS, Experiment
 from cvt_hpc.job import build_job
 from cvt_hpc.physics.friction import friction_coefficient, given_law
 from cvt_hpc.physics.friction_laws import largest_friction
@@ -83,3 +91,27 @@ def test_a_stepper_is_chosen_by_a_job_and_has_its_order(monkeypatch):
     # (step w)^2 / 3 of it by the next term, 1 % at 50 us
     assert decays == pytest.approx(steps**3 * (2.0 * np.pi * 600.0) ** 4 / 24.0, rel=0.02)
     assert order(steps, decays) == pytest.approx(3.0, abs=0.02)
+
+
+def test_an_experiment_has_its_command_its_files_and_its_table(monkeypatch, tmp_path, capsys):
+    registered = next(block for block in BLOCKS if block.startswith("EXPERIMENTS"))
+    own = {"EXPERIMENTS": {}, "Experiment": Experiment}
+    exec(registered.replace("cvt_hpc.experiments.", ""), own)
+    monkeypatch.setitem(EXPERIMENTS, "two_steppers", own["EXPERIMENTS"]["two_steppers"])
+    monkeypatch.setitem(MODELS, "van_der_pol", "van_der_pol")
+    monkeypatch.chdir(tmp_path)
+    Path("x.toml").write_text(
+        'name = "x"\nmodel = "van_der_pol"\n[axes]\nexcitation = [-0.1, 0.2]\n[numerics]\nstep = "20 us"\n'
+        '[run]\nduration = "0.1 s"\n[two_steppers]\nsecond = "symplectic_euler"\n'
+    )
+    assert main(["check", "x.toml"]) == 0
+    assert capsys.readouterr().out.startswith("two_steppers x (x.toml): 2 runs by two steppers\n")
+    assert main(["run", "x.toml"]) == 2
+    assert "expected a job of runs, found one for `cvt-hpc two_steppers`" in capsys.readouterr().err
+    assert main(["two_steppers", "x.toml"]) == 0
+    printed = capsys.readouterr().out.splitlines()
+    assert [line.split()[:2] for line in printed[1:3]] == [["runge_kutta_4", "1"], ["symplectic_euler", "1"]]
+    assert printed[3:] == ["table: out/x/two_steppers.csv", "picture: out/x/two_steppers.png"]
+    assert Path("out/x/two_steppers.png").stat().st_size > 5000
+    assert main(["two_steppers", "x.toml"]) == 0  # the runs are on record
+    assert capsys.readouterr().out.splitlines() == printed

@@ -143,16 +143,6 @@ class TestDamagedJobFile:
             use(tmp_path)
 
 
-@pytest.mark.parametrize("fresh", [False, True])
-def test_a_folder_of_a_chart_is_refused(tmp_path, fresh):
-    (tmp_path / "chart.json").write_text("{}")
-    with pytest.raises(
-        InputError, match="expected an empty folder or that of an earlier run, found that of a chart"
-    ):
-        sweep(JOB, tmp_path, fresh=fresh)
-    assert content(tmp_path) == {tmp_path / "chart.json": b"{}"}
-
-
 def test_a_folder_with_other_files_may_be_used(tmp_path):
     (tmp_path / "slurm-17.out").write_text("mine")
     assert sweep(JOB, tmp_path).done == 12

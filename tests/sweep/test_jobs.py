@@ -7,7 +7,7 @@ import pytest
 
 from cvt_hpc import simulation
 from cvt_hpc.cli import main
-from cvt_hpc.experiment_kinds import WITH_TABLE
+from cvt_hpc.experiment_kinds import with_table
 from cvt_hpc.job import load_job
 from cvt_hpc.study.description import describe
 
@@ -15,7 +15,7 @@ FOLDER = Path(__file__).parents[2] / "jobs"
 JOBS = [
     path
     for path in sorted(FOLDER.glob("*.toml"))
-    if not set(WITH_TABLE) & tomllib.loads(path.read_text()).keys()
+    if not set(with_table()) & tomllib.loads(path.read_text()).keys()
 ]
 
 

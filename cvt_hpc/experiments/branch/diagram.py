@@ -1,13 +1,10 @@
 """A bifurcation diagram made: branches followed, Hopf points found and classified, kept, written, drawn.
 
-The dataset holds branches over the grid of axes, and Hopf points and runs in lists. The output folder knows
-its files, and the origin of its dataset.
+The dataset holds branches over the grid of axes, and Hopf points and runs in lists.
 """
 
-import json
-import logging
 import re
-from collections.abc import Callable, Iterator, Mapping, Sequence
+from collections.abc import Mapping, Sequence
 from contextlib import closing
 from enum import IntEnum
 from functools import partial
@@ -19,7 +16,7 @@ import numpy as np
 import xarray as xr
 
 from cvt_hpc import netcdf
-from cvt_hpc.archives import Archives, Arrays
+from cvt_hpc.archives import Arrays
 from cvt_hpc.experiments.branch.attractors import (
     OF_MODES,
     STRAND,
@@ -35,14 +32,13 @@ from cvt_hpc.experiments.branch.job import (
     LOAD,
     Asked,
     Diagram,
-    fingerprint_of,
     load_attributes,
-    numbers_of,
     predicted_cost,
 )
 from cvt_hpc.experiments.branch.table import branch_lines, failure_lines, lowest_judged, with_kinds
 from cvt_hpc.experiments.outcome import Outcome, Tell
-from cvt_hpc.files import kind_of, written_aside
+from cvt_hpc.experiments.parts import PartsFolder
+from cvt_hpc.files import written_aside
 from cvt_hpc.linear_algebra import one_thread
 from cvt_hpc.models.elastic_belt.belt import State, mesh
 from cvt_hpc.models.linear_stability.branch import Branch, Onset, branch, onsets
@@ -50,19 +46,13 @@ from cvt_hpc.models.linear_stability.modes import LOW
 from cvt_hpc.models.steady_variator.record import VARIABLES, coordinates
 from cvt_hpc.models.steady_variator.walking import NoSteadyState, SteadyBelt
 from cvt_hpc.output_folder import Kind as FolderKind
-from cvt_hpc.output_folder import OutputFolder
 from cvt_hpc.study.description import axis_dimension, derived_coordinate
-from cvt_hpc.study.job_difference import another_job
 from cvt_hpc.study.ranks.progress import Steps
 from cvt_hpc.study.status import DONE, SOME_FAILED
 from cvt_hpc.vibration.classes import OccurrenceClass
 from cvt_hpc.vibration.criticality import Kind
 
-DATASET = "branch.nc"
 _PICTURE = re.compile(r"branch(?:_([1-9]\d{0,8}))?\.png", re.ASCII)
-_LIMIT = 1 << 26  # [bytes] of a branch; one of 20 loads has some 10 kB
-_DAMAGE = (AttributeError, KeyError, OSError, RecursionError, RuntimeError, TypeError, ValueError)
-_logger = logging.getLogger(__name__)
 
 _Numbered = Sequence[tuple[int, Followed]]
 
@@ -77,120 +67,39 @@ def picture_names(branches: int) -> list[str]:
     return [f"branch_{number}.png" for number in range(1, branches + 1)] if branches > 1 else ["branch.png"]
 
 
-class DiagramFolder(OutputFolder[Diagram]):
-    """The output folder of a bifurcation diagram, which may lie beside a study.
-
-    Parameters
-    ----------
-    path : Path
-        The folder; it need not exist.
-    diagram : Diagram
-        The diagram that is to be made in it.
-
-    Attributes
-    ----------
-    branches : Archives
-        Finished branches, by their number in the names of pictures.
-    """
+class DiagramFolder(PartsFolder[Diagram]):
+    """The output folder of a bifurcation diagram. Its parts are branches, numbered as the pictures are."""
 
     kind = FolderKind(
         "bifurcation diagram", "branch.json", ".branch.lock", "cvt_hpc bifurcation 1", ("branches",)
     )
 
-    def __init__(self, path: Path, diagram: Diagram) -> None:
-        super().__init__(path)
-        self.dataset = self.path / DATASET
-        self.branches = Archives(self.path / "branches", diagram.fingerprint(), _LIMIT)
-        self._diagram = diagram
+    def is_picture(self, name: str, job: dict[str, Any]) -> bool:
+        """Return whether a file of this name is a picture of as many branches as a diagram has."""
+        branches = prod(len(values) for axis, values in job["axes"].items() if axis != "load")
+        return bool((number := _PICTURE.fullmatch(name)) and int(number[1] or 1) <= branches)
 
     def load_branch(self, number: int) -> Followed | None:
         """Return branch `number`, counted from 0; None if it is not done, or cannot be read."""
 
         def restored(plain: Any, states: Arrays) -> Followed:
-            if plain is None:
-                raise ValueError("of an earlier version")
-            onsets, runs = (
-                [Onset(*one) for one in plain["onsets"]],
-                [Attractor(*run) for run in plain["runs"]],
-            )
-            asked = self._diagram.branches[number]
-            return with_kinds(self._diagram, asked, states, onsets, plain["hidden"], runs)
+            onsets = [Onset(*one) for one in plain["onsets"]]
+            runs = [Attractor(*run) for run in plain["runs"]]
+            asked = self._asked.branches[number]
+            return with_kinds(self._asked, asked, states, onsets, plain["hidden"], runs)
 
-        return self.branches.load(f"branch_{number + 1}", restored)
+        return self.parts.load(f"branch_{number + 1}", restored)
 
     def save_branch(self, number: int, followed: Followed) -> None:
         """Keep branch `number`."""
         plain = {"onsets": followed.onsets, "hidden": followed.hidden, "runs": followed.runs}
-        self.branches.save(f"branch_{number + 1}", plain, followed.states)
-
-    def stored_branches(self) -> int:
-        """Return how many branches the dataset holds, 0 where none can be read."""
-        if kind_of(self.dataset) is None:
-            return 0
-        try:
-            with netcdf.open_netcdf(self._stored(), decode_cf=False) as dataset:
-                computed = (dataset["stability"] != Stability.NOT_COMPUTED).all("load")
-                return int(np.count_nonzero(computed))
-        except _DAMAGE as error:
-            _logger.warning("%s: damaged (%s); made again", self.dataset, error)
-            return 0
-
-    def refuse_other(self, found: dict[str, Any], asked: Diagram) -> None:
-        """Raise InputError unless the folder is that of the diagram."""
-        if found["fingerprint"] != asked.fingerprint():
-            raise another_job(self.path, numbers_of(found["job"]), numbers_of(asked.resolved()))
-
-    def unexplained(self) -> str | None:
-        """Return files that neither a branch.json nor a dataset explains."""
-        if kind_of(self.dataset):
-            return f"{DATASET} without a {self.job_file.name}"
-        return f"branches without a {self.job_file.name}" if self.branches.written() else None
-
-    def results_tell(self) -> Callable[[Diagram], bool] | None:
-        """Return a function that decides whether dataset and branches are of a diagram; None without these.
-
-        None, too, if the dataset is something else, which is not to be written over.
-        """
-        stored, fingerprints = self._job_of_dataset(), self.branches.fingerprints()
-        if stored is not None:
-            fingerprints.add(fingerprint_of(stored))
-        elif kind_of(self.dataset) is not None:
-            return None
-        return (lambda diagram: fingerprints == {diagram.fingerprint()}) if fingerprints else None
-
-    def written(self, found: dict[str, Any] | None) -> Iterator[Path]:
-        """Yield the files of a diagram: branches, dataset, and pictures of as many branches as it has."""
-        axes = found["job"]["axes"] if found else {}
-        branches = prod(len(values) for name, values in axes.items() if name != "load")
-        yield from (*self.branches.written(), self.dataset)
-        for path in self.path.iterdir():
-            if (name := _PICTURE.fullmatch(path.name)) and int(name[1] or 1) <= branches:
-                yield path
-
-    def leftovers(self) -> list[Path]:
-        """Return the half-written files of processes that died while they wrote."""
-        return [*self.path.glob(f".{DATASET}.*.part"), *super().leftovers()]
-
-    def _stored(self) -> Path:
-        """Return the dataset; ValueError if it is no diagram."""
-        if not netcdf.holds(self.dataset, netcdf.DIAGRAM):
-            raise ValueError("no bifurcation diagram")
-        return self.dataset
-
-    def _job_of_dataset(self) -> dict[str, Any] | None:
-        """Return the job of the dataset; None where there is none, or another dataset."""
-        try:
-            with netcdf.open_netcdf(self._stored(), decode_cf=False) as dataset:
-                return dict(json.loads(dataset.attrs["job"]))
-        except _DAMAGE:
-            return None
+        self.parts.save(f"branch_{number + 1}", plain, followed.states)
 
 
 def make(diagram: Diagram, out: Path, *, fresh: bool, tell: Tell) -> Outcome:
     """Follow the branches that are not kept in the folder, and write dataset and pictures.
 
-    See `experiment_kinds`. Each branch is kept, and in the dataset, once it is done. A dataset of the same
-    job that holds more branches than are kept, as of an earlier version, is left until there are as many.
+    See `experiment_kinds`. Each branch is kept, and in the dataset, once it is done.
 
     Raises
     ------
@@ -202,11 +111,7 @@ def make(diagram: Diagram, out: Path, *, fresh: bool, tell: Tell) -> Outcome:
     with folder.claimed(diagram, fresh=fresh):
         loaded = ((number, folder.load_branch(number)) for number in range(len(branches)))
         followed = {number: one for number, one in loaded if one is not None}
-        folder.branches.warn_of_others(folder.dataset)
-        stored = folder.stored_branches()
-        if stored > len(followed):
-            words = "all but those are followed anew, and it is replaced once as many are done"
-            tell(f"{folder.dataset} holds {stored} branches, {len(followed)} are kept beside it; {words}")
+        folder.parts.warn_of_others(folder.dataset)
         for number, one in followed.items():
             draw_branch(diagram, one, pictures[number])
         missing = [number for number in range(len(branches)) if number not in followed]
@@ -219,8 +124,7 @@ def make(diagram: Diagram, out: Path, *, fresh: bool, tell: Tell) -> Outcome:
                 with one_thread():
                     one = followed[number] = _follow(diagram, branches[number])
                 folder.save_branch(number, one)
-                if len(followed) >= stored:
-                    _write(diagram, folder, followed)
+                _write(diagram, folder, followed)
                 draw_branch(diagram, one, pictures[number])
                 steps.ended(f"branches: {len(one.onsets)} Hopf points")
     found = [one for _, one in sorted(followed.items())]
@@ -234,7 +138,7 @@ def make(diagram: Diagram, out: Path, *, fresh: bool, tell: Tell) -> Outcome:
 def _write(diagram: Diagram, folder: DiagramFolder, followed: Mapping[int, Followed]) -> None:
     """Write the dataset of the branches that are done."""
     with written_aside(folder.dataset) as aside:
-        netcdf.write_netcdf(diagram_dataset(diagram, followed, folder.branches.makers), aside)
+        netcdf.write_netcdf(diagram_dataset(diagram, followed, folder.parts.makers), aside)
 
 
 def _follow(diagram: Diagram, asked: Asked) -> Followed:
@@ -317,7 +221,7 @@ def diagram_dataset(
     subject = f"bifurcations of model {diagram.job.model}"
     told = {
         **netcdf.global_attributes(diagram.job, diagram.resolved(), subject, makers=makers),
-        netcdf.CONTENT: netcdf.DIAGRAM,
+        netcdf.CONTENT: "bifurcation diagram",
     }
     rows = sorted(followed.items())
     variables = _states(diagram, rows) | _onsets(rows) | _runs(rows)

@@ -12,6 +12,7 @@ from typing import Any, NamedTuple
 import numpy as np
 
 from cvt_hpc.errors import mismatch
+from cvt_hpc.experiments.parts import numbers_of
 from cvt_hpc.job import Job, build_job, rebuild_job
 from cvt_hpc.job.assignments import Assignments, split_assignments
 from cvt_hpc.job.axes import Axis
@@ -104,17 +105,7 @@ class Diagram:
 
     def fingerprint(self) -> str:
         """Return the SHA-256 [hex] of all entries that determine the numbers."""
-        return fingerprint_of(self.resolved())
-
-
-def fingerprint_of(job: dict[str, Any]) -> str:
-    """Return the fingerprint of a diagram by the result of `Diagram.resolved`."""
-    return digest(numbers_of(job))
-
-
-def numbers_of(job: dict[str, Any]) -> dict[str, Any]:
-    """Return a resolved job without the entries that have no effect on any number."""
-    return {key: value for key, value in job.items() if key not in ("name", "description")}
+        return digest(numbers_of(self.resolved()))
 
 
 def load_attributes(job: Job) -> dict[str, Any]:

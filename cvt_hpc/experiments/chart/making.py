@@ -9,7 +9,6 @@ import logging
 import math
 import multiprocessing
 import os
-import re
 from collections.abc import Callable, Iterator, Mapping, Sequence
 from concurrent.futures import ProcessPoolExecutor, as_completed
 from contextlib import closing
@@ -23,19 +22,19 @@ from typing import Any
 import numpy as np
 import xarray as xr
 
-from cvt_hpc.archives import Archives
+from cvt_hpc.archives import Arrays
 from cvt_hpc.experiments.chart.comparing import Comparison, Result, compare
 from cvt_hpc.experiments.chart.measuring import Measurement, check_prospects, measure, predicted_cost
 from cvt_hpc.experiments.chart.plan import Chart, Point, Role
 from cvt_hpc.experiments.chart.quantities import KINDS
 from cvt_hpc.experiments.chart.scene_drawing import draw_budget, draw_scene
 from cvt_hpc.experiments.outcome import Outcome, Tell
-from cvt_hpc.files import kind_of, write_rows, written_aside
+from cvt_hpc.experiments.parts import PartsFolder
+from cvt_hpc.files import write_rows, written_aside
 from cvt_hpc.linear_algebra import one_thread
 from cvt_hpc.netcdf import VOLATILE, attributes, global_attributes, write_netcdf
-from cvt_hpc.output_folder import CHART_FILE, Kind, OutputFolder
+from cvt_hpc.output_folder import Kind
 from cvt_hpc.provenance import origin_lines
-from cvt_hpc.study.job_difference import another_job
 from cvt_hpc.study.ranks.progress import Steps
 from cvt_hpc.tables import columns, number, short
 
@@ -53,8 +52,6 @@ _FIRST: dict[str, Callable[[Result], str]] = {  # columns that all charts have
 }
 _LONGEST_NOTE = 90  # letters; the whole reason is in the file
 
-_LIMIT = 1 << 26  # [bytes] of a point
-_NAME = re.compile(r"[\w-][\w.-]*")
 _PLAIN = tuple(f.name for f in fields(Measurement) if f.name != "values")
 
 CHOSEN = "cheapest point of its scene that meets all tolerances"
@@ -64,73 +61,14 @@ _Variable = tuple[str, np.ndarray, dict[str, Any]]
 _COMPILING = "cvt_hpc.kernels"  # the logger of messages about it
 
 
-class ChartFolder(OutputFolder[Chart]):
-    """The output folder of a chart, and the places in it.
+class ChartFolder(PartsFolder[Chart]):
+    """The output folder of a chart. Its parts are points by name."""
 
-    Parameters
-    ----------
-    path : Path
-        The folder; it need not exist.
-    chart : Chart
-        The chart that is to be made in it.
+    kind = Kind("chart", "chart.json", ".chart.lock", "cvt_hpc chart 2", ("points",))
 
-    Attributes
-    ----------
-    points : Archives
-        Result of each point, by its name.
-    """
-
-    kind = Kind("chart", CHART_FILE, ".chart.lock", "cvt_hpc chart 2", ("points",))
-
-    def __init__(self, path: Path, chart: Chart) -> None:
-        super().__init__(path)
-        self.points = Archives(path / "points", chart.fingerprint(), _LIMIT)
-        self.table = path / "chart.csv"
-        self.dataset = path / "chart.nc"
-        self._chart = chart
-
-    def picture(self, name: str) -> Path:
-        """Return where the picture of a scene goes, or "budget"."""
-        return self.path / f"{name}.png"
-
-    def accept(self, entry: dict[str, Any]) -> dict[str, Any]:
-        """Return a sound chart.json."""
-        if not all(_NAME.fullmatch(name) for name in entry["job"]["scenes"].keys()):
-            raise ValueError("scenes without a name")  # of which names of files are made
-        return entry
-
-    def refuse_other(self, found: dict[str, Any], asked: Chart) -> None:
-        """Raise InputError unless the folder is that of the chart."""
-        if found["fingerprint"] != asked.fingerprint():
-            raise another_job(self.path, found["job"], asked.resolved())
-
-    def unexplained(self) -> str | None:
-        """Return files that no start of a chart leaves without a chart.json."""
-        own = {self.lock_file, *self.leftovers()}
-        points = self.points.folder
-        if kind_of(points) == "a folder" and not any(path.name[0] != "." for path in points.iterdir()):
-            own.add(points)
-        return None if own.issuperset(self.path.iterdir()) else f"one without a {self.job_file.name}"
-
-    def results_tell(self) -> Callable[[Chart], bool] | None:
-        """Return a function that decides whether the points are of a chart; None if there are none."""
-        fingerprints = self.points.fingerprints()
-        return (lambda chart: chart.fingerprint() in fingerprints) if fingerprints else None
-
-    def written(self, found: dict[str, Any] | None) -> Iterator[Path]:
-        """Yield the files of a chart: points, table, dataset, and the pictures of its scenes."""
-        scenes = found["job"]["scenes"] if found else (scene.name for scene in self._chart.scenes)
-        pictures = (self.picture(name) for name in (*scenes, "budget"))
-        yield from (*self.points.written(), self.table, self.dataset, *pictures)
-
-    def load_point(self, name: str) -> Measurement | None:
-        """Return the result of a point, None if there is none, or no readable one."""
-        return self.points.load(name, lambda plain, values: Measurement(values=values, **plain))
-
-    def save_point(self, name: str, measurement: Measurement) -> None:
-        """Keep the result of a point."""
-        plain = {key: getattr(measurement, key) for key in _PLAIN}
-        self.points.save(name, plain, measurement.values)
+    def is_picture(self, name: str, job: dict[str, Any]) -> bool:
+        """Return whether a file of this name is a picture of a chart."""
+        return name in {f"{scene}.png" for scene in (*job["scenes"], "budget")}
 
 
 def make(chart: Chart, out: Path, *, fresh: bool, tell: Tell) -> Outcome:
@@ -149,12 +87,12 @@ def make(chart: Chart, out: Path, *, fresh: bool, tell: Tell) -> Outcome:
     with folder.claimed(chart, fresh=fresh):
         measurements = _fill(chart, folder, len(os.sched_getaffinity(0)), tell)
         comparisons = compare(chart, measurements)
-        dataset = chart_dataset(chart, comparisons, folder.points.makers)
+        dataset = chart_dataset(chart, comparisons, folder.parts.makers)
         write_table(comparisons, dataset.attrs, folder.table)
         with written_aside(folder.dataset) as aside:
             write_netcdf(dataset, aside)
-        pictures = [draw_scene(c, folder.picture(c.scene.name)) for c in comparisons]
-        pictures += [draw_budget(c, folder.picture("budget")) for c in comparisons if c.choices]
+        pictures = [draw_scene(c, out / f"{c.scene.name}.png") for c in comparisons]
+        pictures += [draw_budget(c, out / "budget.png") for c in comparisons if c.choices]
     lines = [line for comparison in comparisons for line in (*table_lines(comparison), "")]
     files = [("table", folder.table), ("dataset", folder.dataset), *(("picture", path) for path in pictures)]
     return Outcome(lines, files)
@@ -164,8 +102,8 @@ def _fill(
     chart: Chart, folder: ChartFolder, processes: int, tell: Callable[[str], None]
 ) -> dict[str, Measurement]:
     """Measure the points that the folder does not hold yet, and return all by name."""
-    loaded = {point.name: folder.load_point(point.name) for point in chart.points}
-    folder.points.warn_of_others(folder.dataset)
+    loaded = {point.name: folder.parts.load(point.name, _restored) for point in chart.points}
+    folder.parts.warn_of_others(folder.dataset)
     measurements = {name: found for name, found in loaded.items() if found is not None}
     missing = [point for point in chart.points if point.name not in measurements]
     missing.sort(key=lambda point: point.timed)  # the order in which they are done
@@ -173,12 +111,17 @@ def _fill(
     costs = [predicted_cost(chart, point) / (1 if point.timed else together) for point in missing]
     with closing(Steps(costs, len(measurements), "point", tell)) as steps:
         for point, measurement in _measure_all(chart, missing, processes):
-            folder.save_point(point.name, measurement)
+            plain = {key: getattr(measurement, key) for key in _PLAIN}
+            folder.parts.save(point.name, plain, measurement.values)
             measurements[point.name] = measurement
             cost = f"{measurement.core_seconds:.3g} core-s"
             ended = f"failed: {measurement.reason}" if measurement.reason else cost
             steps.ended(f"{point.name}: {ended}", failed=bool(measurement.reason))
     return measurements
+
+
+def _restored(plain: Any, values: Arrays) -> Measurement:
+    return Measurement(values=values, **plain)
 
 
 def _measure_all(chart: Chart, points: list[Point], processes: int) -> Iterator[tuple[Point, Measurement]]:

@@ -231,12 +231,7 @@ class Chart:
 
     def fingerprint(self) -> str:
         """Return the SHA-256 [hex] of `resolved`; name and description do not count."""
-        return fingerprint_of(self.resolved())
-
-
-def fingerprint_of(resolved: dict[str, Any]) -> str:
-    """Return the fingerprint of a chart by the result of `Chart.resolved`."""
-    return digest({**resolved, "name": "", "description": ""})
+        return digest({**self.resolved(), "name": "", "description": ""})
 
 
 def _scene_to_json(scene: Scene) -> dict[str, Any]:
