@@ -206,16 +206,21 @@ def write_history(dataset: xr.Dataset, path: Path) -> Path:
 
 
 def store_history(dataset: xr.Dataset, path: Path) -> None:
-    """Write the history of one run aside, and put it in the place of whatever is at `path`.
+    """Write the history of one run as `store` writes a dataset."""
+    store(dataset.assign_attrs({CONTENT: HISTORY}), path)
+
+
+def store(dataset: xr.Dataset, path: Path) -> Path:
+    """Write a dataset aside, put it in the place of whatever is at `path`, and return the path.
 
     Raises
     ------
     StorageError
         If the system refuses.
     """
-    marked = dataset.assign_attrs({CONTENT: HISTORY})
     with written_aside(path, parents=True) as aside:
-        write_netcdf(marked, aside)
+        write_netcdf(dataset, aside)
+    return path
 
 
 def is_history(path: Path) -> bool:

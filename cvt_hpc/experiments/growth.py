@@ -14,14 +14,14 @@ import xarray as xr
 from cvt_hpc.errors import InputError, mismatch
 from cvt_hpc.experiments.outcome import Outcome, Tell
 from cvt_hpc.experiments.sweeps import Sweep, handed, load_sweep, maker_of, run_sweeps, sweep_lines
-from cvt_hpc.files import write_rows, written_aside
+from cvt_hpc.files import write_rows
 from cvt_hpc.job import Job, rebuild_job
 from cvt_hpc.job.assignments import Assignments
 from cvt_hpc.job.loading import load_job
 from cvt_hpc.job.values import heading, in_words, read_value, shown_number
 from cvt_hpc.models import MODELS
 from cvt_hpc.models.contract import load_model
-from cvt_hpc.netcdf import attributes, global_attributes, open_netcdf, write_netcdf
+from cvt_hpc.netcdf import attributes, global_attributes, open_netcdf, store
 from cvt_hpc.provenance import origin_lines
 from cvt_hpc.study import process_rank
 from cvt_hpc.study.status import STALLED
@@ -35,14 +35,14 @@ SHARES = (0.0, 0.5, 1.0)  # of the kick
 # step has no twin, and chatter by rounding would hide small motions
 _RUN = {"shortest_duration": 0.0, "most_refinements": 0, "precision": "double"}
 # Variable -> its name, unit and meaning: of a mode, and of a cell
-OF_MODES = {
+_OF_MODES = {
     "frequency": ("frequency", "Hz", ""),
     "frequency_error": ("error of frequency", "Hz", "largest deviation of a decomposition"),
     "growth_rate": ("growth rate", "s-1", "negative: decay"),
     "growth_rate_error": ("error of growth rate", "s-1", "largest deviation of a decomposition"),
     "share": ("share", "1", "of the energy of the difference, in the part where the mode is strongest"),
 }
-OF_CELLS = {
+_OF_CELLS = {
     "window": ("linear record", "s", "from the kick to where twice the kick does not double the difference"),
     "difference": ("difference", "m", "rms, by the kick, within the linear record"),
     "floor": ("floor", "m", "rms that chatter and nonlinear terms leave in the difference"),
@@ -146,10 +146,8 @@ def make(asked: Growth, out: Path, *, fresh: bool, tell: Tell) -> Outcome:
     status = run_sweeps(asked.rungs, asked.refusals, out, fresh=fresh, tell=tell)
     if status >= STALLED or process_rank() != 0:
         return Outcome(status=status)
-    dataset, path = growth_dataset(asked, find_growth(asked, out), out), out / "growth.nc"
-    with written_aside(path) as aside:
-        write_netcdf(dataset, aside)
-    table = _write_table(asked, dataset, out / "growth.csv")
+    dataset = _growth_dataset(asked, find_growth(asked, out), out)
+    path, table = store(dataset, out / "growth.nc"), _write_table(asked, dataset, out / "growth.csv")
     return Outcome(tuple(_lines(asked, dataset)), (("written", table), ("written", path)), status)
 
 
@@ -194,19 +192,11 @@ def _displacement(path: Path) -> np.ndarray:
         return history["displacement"].values
 
 
-def growth_dataset(asked: Growth, found: Sequence[Found], out: Path) -> xr.Dataset:
-    """Return the modes as a dataset over the axes of the job and `mode`, the strongest first.
-
-    Parameters
-    ----------
-    asked, found
-        The job and its modes.
-    out : Path
-        The folder with its studies.
-    """
+def _growth_dataset(asked: Growth, found: Sequence[Found], out: Path) -> xr.Dataset:
+    """Return the modes over the axes of the job and `mode`, the strongest first."""
     job, size = asked.job, max(asked.job.size, 1)
     names = _axes(job)
-    values = {name: np.full((size, MOST_MODES), np.nan) for name in OF_MODES}
+    values = {name: np.full((size, MOST_MODES), np.nan) for name in _OF_MODES}
     for cell, one in enumerate(found):
         modes = one.modes
         numbers = modes.frequency, one.frequency_error, modes.growth, one.growth_error, modes.share
@@ -214,9 +204,9 @@ def growth_dataset(asked: Growth, found: Sequence[Found], out: Path) -> xr.Datas
             array[cell, : len(row)] = row
     variables: dict[str, Any] = {
         name: ((*names, "mode"), values[name].reshape(*job.shape, MOST_MODES), attributes(*words))
-        for name, words in OF_MODES.items()
+        for name, words in _OF_MODES.items()
     }
-    for name, words in OF_CELLS.items():
+    for name, words in _OF_CELLS.items():
         cells = np.array([getattr(one, name) for one in found]).reshape(job.shape)
         variables[name] = (names, cells, attributes(*words))
     reasons = np.array([one.reason for one in found], object).reshape(job.shape)
@@ -233,7 +223,7 @@ def growth_dataset(asked: Growth, found: Sequence[Found], out: Path) -> xr.Datas
 
 
 def _write_table(asked: Growth, dataset: xr.Dataset, path: Path) -> Path:
-    numbers = [*OF_MODES, *OF_CELLS, *(str(name) for name in dataset if str(name).startswith("linear_"))]
+    numbers = [*_OF_MODES, *_OF_CELLS, *(str(name) for name in dataset if str(name).startswith("linear_"))]
     head = [heading(str(name), dataset[name].attrs) for name in (*_axes(asked.job), *numbers)]
     rows = (
         [*place, *(number(here[name].item()) for name in numbers), here["reason"].item()]

@@ -48,7 +48,7 @@ def branch(tmp_path, monkeypatch):
         with monkeypatch.context() as patch:
             patch.setattr(diagram, "_follow", follow)
             if not drawn:
-                patch.setattr(diagram, "draw_branch", lambda diagram, followed, out: out.touch())
+                patch.setattr(diagram, "draw", lambda figure, out: out.touch())
             return main(["branch", str(tmp_path / "x.toml"), "--out", str(tmp_path / "out"), *options])
 
     command.followed = followed

@@ -11,8 +11,7 @@ from support.bells import JOB
 @pytest.fixture
 def call(capsys, monkeypatch):
     """Return a function that runs a command line: exit status, lines on stdout, lines on stderr."""
-    for name in ("draw_scene", "draw_budget"):
-        monkeypatch.setattr(f"cvt_hpc.experiments.chart.making.{name}", lambda comparison, out: out)
+    monkeypatch.setattr("cvt_hpc.experiments.chart.making.draw", lambda figure, out: out)
 
     def run(*arguments, command="chart"):
         status = main([command, *map(str, arguments)])

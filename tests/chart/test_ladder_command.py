@@ -226,7 +226,7 @@ def test_a_ladder_leaves_its_studies_and_what_they_say(made):
 @pytest.mark.slow
 def test_an_ended_ladder_is_only_read_again(made, capsys, monkeypatch):
     job, out, printed, _ = made
-    monkeypatch.setattr("cvt_hpc.experiments.ladder.making.draw_ladder", lambda *_: None)  # it is drawn
+    monkeypatch.setattr("cvt_hpc.experiments.ladder.making.draw", lambda *_: None)  # it is drawn
     records = sum(path.stat().st_size for path in out.glob("*/records/*"))
     assert main(["ladder", str(job), "--out", str(out)]) == 0  # nothing is done twice
     again = capsys.readouterr()

@@ -13,7 +13,7 @@ from cvt_hpc.models import MODELS
 
 def test_a_chart_holds_every_run_that_it_needs(write_chart):
     chart = load(write_chart())
-    assert (chart.name, chart.description, chart.repeats, chart.time_limit) == (
+    assert (chart.job.name, chart.job.description, chart.repeats, chart.time_limit) == (
         "bells",
         "Two ways to ring",
         2,

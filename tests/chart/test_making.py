@@ -44,8 +44,7 @@ def made(job, out="out/bells", fresh=False, tell=lambda *lines: None):
 @pytest.fixture
 def undrawn(monkeypatch):
     """Pictures take most of the time, and are tested elsewhere."""
-    for name in ("draw_scene", "draw_budget"):
-        monkeypatch.setattr(f"cvt_hpc.experiments.chart.making.{name}", lambda comparison, out: out)
+    monkeypatch.setattr("cvt_hpc.experiments.chart.making.draw", lambda figure, out: out)
 
 
 @pytest.fixture(scope="module")

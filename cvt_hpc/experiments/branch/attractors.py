@@ -29,7 +29,7 @@ from cvt_hpc.vibration.classes import OccurrenceClass, classify_runs
 from cvt_hpc.vibration.criticality import Criticality
 
 FROM = ("from the steady state", "from the large start")  # the starts of a branch, in words
-SAID = (OccurrenceClass.QUIET, OccurrenceClass.VIBRATING)
+_SAID = (OccurrenceClass.QUIET, OccurrenceClass.VIBRATING)
 
 STRAND = "strand in which the mode is largest: 1 is t1, 2 is t2"
 # value, name for people, unit, comment
@@ -127,7 +127,7 @@ def close_values(
     """Values in the intervals where runs of one start turn from quiet to vibrating, or with a bifurcation."""
     split = {pair for pair in pairwise(values) if any(pair[0] < place < pair[1] for place in bifurcations)}
     for start in {one.start for one in found}:
-        said = [one for one in found if one.start == start and one.occurrence in SAID]
+        said = [one for one in found if one.start == start and one.occurrence in _SAID]
         for one, other in pairwise(sorted(said)):
             if one.occurrence != other.occurrence:
                 split |= {pair for pair in pairwise(values) if one.value <= pair[0] < other.value}

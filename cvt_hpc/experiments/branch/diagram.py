@@ -16,6 +16,7 @@ import numpy as np
 import xarray as xr
 
 from cvt_hpc import netcdf
+from cvt_hpc.analysis.figures import draw
 from cvt_hpc.archives import Arrays
 from cvt_hpc.experiments.branch.attractors import (
     OF_MODES,
@@ -27,7 +28,7 @@ from cvt_hpc.experiments.branch.attractors import (
     attractors,
     states_of,
 )
-from cvt_hpc.experiments.branch.drawing import draw_branch
+from cvt_hpc.experiments.branch.drawing import branch_figure
 from cvt_hpc.experiments.branch.job import (
     LOAD,
     Asked,
@@ -38,7 +39,6 @@ from cvt_hpc.experiments.branch.job import (
 from cvt_hpc.experiments.branch.table import branch_lines, failure_lines, lowest_judged, with_kinds
 from cvt_hpc.experiments.outcome import Outcome, Tell
 from cvt_hpc.experiments.parts import PartsFolder
-from cvt_hpc.files import written_aside
 from cvt_hpc.linear_algebra import one_thread
 from cvt_hpc.models.elastic_belt.belt import State, mesh
 from cvt_hpc.models.linear_stability.branch import Branch, Onset, branch, onsets
@@ -56,13 +56,13 @@ _PICTURE = re.compile(r"branch(?:_([1-9]\d{0,8}))?\.png", re.ASCII)
 
 _Numbered = Sequence[tuple[int, Followed]]
 
-BRANCH = "number of the branch in the grid of the axes, counted in C order"
-OF_KIND = "why the Hopf point is found to be of its kind"
-START = "0: near the steady state; 1: the large disturbance"
-REASON = "why the run failed, or was found to vibrate or not"
+_BRANCH = "number of the branch in the grid of the axes, counted in C order"
+_OF_KIND = "why the Hopf point is found to be of its kind"
+_START = "0: near the steady state; 1: the large disturbance"
+_REASON = "why the run failed, or was found to vibrate or not"
 
 
-def picture_names(branches: int) -> list[str]:
+def _picture_names(branches: int) -> list[str]:
     """Names of the pictures of so many branches."""
     return [f"branch_{number}.png" for number in range(1, branches + 1)] if branches > 1 else ["branch.png"]
 
@@ -107,16 +107,16 @@ def make(diagram: Diagram, out: Path, *, fresh: bool, tell: Tell) -> Outcome:
         If the folder holds the diagram of another job or is in use, or the system refuses.
     """
     folder, branches = DiagramFolder(out, diagram), diagram.branches
-    pictures = [out / name for name in picture_names(len(branches))]
+    pictures = [out / name for name in _picture_names(len(branches))]
     with folder.claimed(diagram, fresh=fresh):
         loaded = ((number, folder.load_branch(number)) for number in range(len(branches)))
         followed = {number: one for number, one in loaded if one is not None}
         folder.parts.warn_of_others(folder.dataset)
         for number, one in followed.items():
-            draw_branch(diagram, one, pictures[number])
+            draw(partial(branch_figure, diagram, one), pictures[number])
         missing = [number for number in range(len(branches)) if number not in followed]
         if not missing:
-            _write(diagram, folder, followed)
+            netcdf.store(diagram_dataset(diagram, followed, folder.parts.makers), folder.dataset)
         costs = [predicted_cost(diagram, branches[number]).total for number in missing]
         with closing(Steps(costs, len(followed), "branch", tell)) as steps:
             for number in missing:
@@ -124,8 +124,8 @@ def make(diagram: Diagram, out: Path, *, fresh: bool, tell: Tell) -> Outcome:
                 with one_thread():
                     one = followed[number] = _follow(diagram, branches[number])
                 folder.save_branch(number, one)
-                _write(diagram, folder, followed)
-                draw_branch(diagram, one, pictures[number])
+                netcdf.store(diagram_dataset(diagram, followed, folder.parts.makers), folder.dataset)
+                draw(partial(branch_figure, diagram, one), pictures[number])
                 steps.ended(f"branches: {len(one.onsets)} Hopf points")
     found = [one for _, one in sorted(followed.items())]
     failures = [line for one in found for line in failure_lines(diagram, one)]
@@ -133,12 +133,6 @@ def make(diagram: Diagram, out: Path, *, fresh: bool, tell: Tell) -> Outcome:
     lines = [line for one in found for line in (*branch_lines(diagram, one), "")]
     files = [("dataset", folder.dataset), *(("picture", picture) for picture in pictures)]
     return Outcome(lines, files, SOME_FAILED if failures else DONE)
-
-
-def _write(diagram: Diagram, folder: DiagramFolder, followed: Mapping[int, Followed]) -> None:
-    """Write the dataset of the branches that are done."""
-    with written_aside(folder.dataset) as aside:
-        netcdf.write_netcdf(diagram_dataset(diagram, followed, folder.parts.makers), aside)
 
 
 def _follow(diagram: Diagram, asked: Asked) -> Followed:
@@ -264,7 +258,7 @@ def _onsets(followed: _Numbered) -> dict[str, Any]:
     ]
     sides = [Direction.GROWS_ABOVE if o.rising else Direction.GROWS_BELOW for _, o, _ in rows]
     columns: dict[str, tuple[list[Any], Any, str, str, str]] = {
-        "onset_branch": ([n for n, *_ in rows], np.int32, "1", "branch", BRANCH),
+        "onset_branch": ([n for n, *_ in rows], np.int32, "1", "branch", _BRANCH),
         "onset_load": ([o.load for _, o, _ in rows], float, "N m", "onset load", "load at the Hopf point"),
         "onset_frequency": ([o.frequency for _, o, _ in rows], float, "Hz", "onset frequency",
                             "frequency of the mode whose growth rate is 0 at the Hopf point"),
@@ -280,7 +274,7 @@ def _onsets(followed: _Numbered) -> dict[str, Any]:
         "onset_direction": (sides, Direction, "", "side of growth",
                             "whether the mode grows above or below the Hopf point"),
         "onset_kind": ([k.kind for *_, k in rows], Kind, "", "kind of Hopf point", ""),
-        "onset_reason": ([k.reason for *_, k in rows], object, "", "reason", OF_KIND),
+        "onset_reason": ([k.reason for *_, k in rows], object, "", "reason", _OF_KIND),
     }  # fmt: skip
     return {name: ("onset", *_column(*column)) for name, column in columns.items()}
 
@@ -289,14 +283,14 @@ def _runs(followed: _Numbered) -> dict[str, Any]:
     """The runs of all branches, one after the other."""
     rows = [(number, run) for number, one in followed for run in one.runs]
     columns: dict[str, tuple[list[Any], Any, str, str, str]] = {
-        "run_branch": ([n for n, _ in rows], np.int32, "1", "branch", BRANCH),
+        "run_branch": ([n for n, _ in rows], np.int32, "1", "branch", _BRANCH),
         "run_load": ([run.value for _, run in rows], float, "N m", "load", LOAD),
-        "run_start": ([run.start for _, run in rows], np.int8, "1", "start", START),
+        "run_start": ([run.start for _, run in rows], np.int8, "1", "start", _START),
         "run_amplitude": ([run.amplitude for _, run in rows], float, "m", "amplitude", "in the band"),
         "run_frequency": ([run.frequency for _, run in rows], float, "Hz", "fundamental frequency", ""),
         "run_occurrence": ([run.occurrence for _, run in rows], OccurrenceClass, "", "vibration occurrence",
                            ""),
-        "run_reason": ([run.reason for _, run in rows], object, "", "reason", REASON),
+        "run_reason": ([run.reason for _, run in rows], object, "", "reason", _REASON),
     }  # fmt: skip
     return {name: ("run", *_column(*column)) for name, column in columns.items()}
 

@@ -5,15 +5,13 @@ amplitudes of limit cycles as dots; below growth rates and frequencies of its mo
 steady state nothing is drawn. Runs that failed or slip have no limit cycle: they stand at the upper edge.
 """
 
-from pathlib import Path
-
 import numpy as np
 from matplotlib.axes import Axes
 from matplotlib.figure import Figure
 from matplotlib.lines import Line2D
 from matplotlib.patches import Patch
 
-from cvt_hpc.analysis.figures import WIDTH, balanced, coordinate_unit, draw
+from cvt_hpc.analysis.figures import WIDTH, balanced, coordinate_unit
 from cvt_hpc.experiments.branch.attractors import FROM, OF_MODES, Attractor, Followed, Stability
 from cvt_hpc.experiments.branch.job import Diagram, load_attributes
 from cvt_hpc.experiments.branch.table import gap_lines, place_text
@@ -25,12 +23,12 @@ STRANDS = ("#0072b2", "#d55e00")  # t1 and t2
 HOPF, GAP = "#c00000", "#e6e6e6"
 STARTS = (("o", "#000000"), ("D", "#009e73"))  # of runs from the steady state and from the large start
 EDGE = (0.96, 0.90)  # how high up the sheet runs without a limit cycle stand, of either start
-AT_EDGE = {  # their marks, and words
+_AT_EDGE = {  # their marks, and words
     OccurrenceClass.FAILED: ("X", "failed {} (no amplitude)"),
     OccurrenceClass.SLIPPING: (">", "slips {} (no limit cycle)"),
 }
 IRREGULAR = "#f3dca3"  # inside of the dots
-MARK = 4.5  # [point]
+_MARK = 4.5  # [point]
 KINDS = {
     Kind.SUPERCRITICAL: {"marker": "s", "markersize": 7},
     Kind.SUBCRITICAL: {"marker": "s", "markersize": 7, "markerfacecolor": "white", "markeredgewidth": 1.5},
@@ -38,13 +36,8 @@ KINDS = {
 }
 
 
-def draw_branch(diagram: Diagram, followed: Followed, out: Path) -> Path:
-    """Draw one branch; `out`, result and errors are those of `save_figure`."""
-    return draw(lambda: branch_figure(diagram, followed), out)
-
-
 def branch_figure(diagram: Diagram, followed: Followed) -> Figure:
-    """Compose the picture of `draw_branch`; to be called within STYLE."""
+    """Compose the picture of one branch; to be called within STYLE."""
     figure = Figure((WIDTH, 8.2), layout="constrained")
     upper, middle, lower = figure.subplots(3, 1, sharex=True, height_ratios=(1.2, 1.1, 1.0))
     scale, unit = coordinate_unit(load_attributes(diagram.job))
@@ -111,7 +104,7 @@ def _draw_attractors(axes: Axes, followed: Followed, scale: float) -> None:
                 [run.amplitude * 1e6 for run in shown],
                 linestyle="",
                 marker=mark,
-                markersize=MARK - 1.5 * start,
+                markersize=_MARK - 1.5 * start,
                 markeredgecolor=colour,
                 markerfacecolor=fill,
                 zorder=3 + start,
@@ -121,8 +114,8 @@ def _draw_attractors(axes: Axes, followed: Followed, scale: float) -> None:
             scale * run.value,
             EDGE[run.start],
             transform=axes.get_xaxis_transform(),
-            marker=AT_EDGE[run.occurrence][0],
-            markersize=MARK + 2.0,
+            marker=_AT_EDGE[run.occurrence][0],
+            markersize=_MARK + 2.0,
             color=STARTS[run.start][1],
             linestyle="",
             clip_on=False,
@@ -136,7 +129,7 @@ def _draw_attractors(axes: Axes, followed: Followed, scale: float) -> None:
 
 def _at_edge(followed: Followed) -> list[Attractor]:
     """Runs that have come to no limit cycle."""
-    return [run for run in followed.runs if run.occurrence in AT_EDGE]
+    return [run for run in followed.runs if run.occurrence in _AT_EDGE]
 
 
 def _draw_modes(growth: Axes, frequency: Axes, followed: Followed, scale: float) -> None:
@@ -182,17 +175,17 @@ def _legend(followed: Followed) -> list[Line2D | Patch]:
     ]
     if followed.runs:
         handles += [
-            Line2D([], [], color=colour, marker=mark, markersize=MARK, ls="", label=f"limit cycle {text}")
+            Line2D([], [], color=colour, marker=mark, markersize=_MARK, ls="", label=f"limit cycle {text}")
             for (mark, colour), text in zip(STARTS, FROM, strict=True)
         ]
         open_mark = {"marker": "o", "markerfacecolor": "none", "markeredgecolor": "black", "linestyle": ""}
-        handles.append(Line2D([], [], markersize=MARK, label="undecided", **open_mark))
+        handles.append(Line2D([], [], markersize=_MARK, label="undecided", **open_mark))
         if any(run.occurrence == OccurrenceClass.IRREGULAR for run in followed.runs):
             filled = open_mark | {"markerfacecolor": IRREGULAR}
-            handles.append(Line2D([], [], markersize=MARK, label="irregular", **filled))
+            handles.append(Line2D([], [], markersize=_MARK, label="irregular", **filled))
     for kind, start in sorted({(run.occurrence, run.start) for run in _at_edge(followed)}):
-        mark, words = AT_EDGE[kind]
-        style = {"color": STARTS[start][1], "marker": mark, "markersize": MARK + 2.0, "linestyle": ""}
+        mark, words = _AT_EDGE[kind]
+        style = {"color": STARTS[start][1], "marker": mark, "markersize": _MARK + 2.0, "linestyle": ""}
         handles.append(Line2D([], [], label=words.format(FROM[start]), **style))
     handles += [
         Line2D([], [], color=colour, marker=".", label=f"mode of strand t{k}")

@@ -35,14 +35,14 @@ SEEN = 2.0 / 3.0
 def branch_lines(diagram: Diagram, followed: Followed) -> Iterator[str]:
     """Yield the lines that describe one branch."""
     yield f"{place_text(diagram, followed.asked)}:"
-    yield from onset_lines(diagram, followed)
+    yield from _onset_lines(diagram, followed)
     if not followed.onsets:
         yield "no Hopf point between the loads that have a steady state"
     yield from gap_lines(diagram, followed)
-    yield from left_out_lines(diagram, followed)
+    yield from _left_out_lines(diagram, followed)
     loads = sorted({run.value for run in followed.runs if run.occurrence == OccurrenceClass.SLIPPING})
     if loads:
-        yield f"the belt slips at {load_text(diagram, *loads)}"
+        yield f"the belt slips at {_load_text(diagram, *loads)}"
 
 
 def place_text(diagram: Diagram, asked: Asked) -> str:
@@ -54,14 +54,14 @@ def place_text(diagram: Diagram, asked: Asked) -> str:
     )
 
 
-def onset_lines(diagram: Diagram, followed: Followed) -> Iterator[str]:
+def _onset_lines(diagram: Diagram, followed: Followed) -> Iterator[str]:
     """Yield a line for each Hopf point."""
     along = load_attributes(diagram.job)
     for onset, kind in zip(followed.onsets, followed.kinds, strict=True):
         waves = f"{onset.half_waves} half wave{'s' if onset.half_waves > 1 else ''} in t{onset.strand + 1}"
         yield (
             f"Hopf point at {number_within(onset.load, CLOSE, along)} {shown_unit(along)}, "
-            f"{onset.frequency:.0f} Hz, {waves}: {_direction(onset)}; {kind_text(diagram, kind)}"
+            f"{onset.frequency:.0f} Hz, {waves}: {_direction(onset)}; {_kind_text(diagram, kind)}"
         )
 
 
@@ -71,7 +71,7 @@ def _direction(onset: Onset) -> str:
     return "stability lost" if onset.rising else "stability regained"
 
 
-def kind_text(diagram: Diagram, kind: Criticality) -> str:
+def _kind_text(diagram: Diagram, kind: Criticality) -> str:
     """Whether a Hopf point is super- or subcritical."""
     along = load_attributes(diagram.job)
     unit = shown_unit(along)
@@ -88,39 +88,39 @@ def kind_text(diagram: Diagram, kind: Criticality) -> str:
 def gap_lines(diagram: Diagram, followed: Followed) -> Iterator[str]:
     """Yield the lines that state where states were not found, and where stability changes unseen."""
     if missed := followed.states["load"][followed.missed].tolist():
-        yield f"no steady state found at {load_text(diagram, *missed, most=len(missed))}"
+        yield f"no steady state found at {_load_text(diagram, *missed, most=len(missed))}"
     for low, high in followed.hidden:
-        between = f"{load_number(diagram, low)} and {load_text(diagram, high)}"
+        between = f"{_load_number(diagram, low)} and {_load_text(diagram, high)}"
         yield f"stability changes between {between}, where a steady state is not found"
 
 
-def load_number(diagram: Diagram, load: float) -> str:
+def _load_number(diagram: Diagram, load: float) -> str:
     """A load [N m] in the unit of the job, without that unit."""
     return f"{shown_number(load, load_attributes(diagram.job)):g}"
 
 
-def load_text(diagram: Diagram, *loads: float, most: int = MOST_NAMED) -> str:
+def _load_text(diagram: Diagram, *loads: float, most: int = MOST_NAMED) -> str:
     """Loads [N m] in the unit of the job; of many the first ones and the last."""
-    numbers = [load_number(diagram, load) for load in loads]
+    numbers = [_load_number(diagram, load) for load in loads]
     return f"{few_of(numbers, most)} {shown_unit(load_attributes(diagram.job))}"
 
 
-def left_out_lines(diagram: Diagram, followed: Followed) -> Iterator[str]:
+def _left_out_lines(diagram: Diagram, followed: Followed) -> Iterator[str]:
     """Yield the line that states where there is no run from the steady state, because none is found."""
     begun = {run.value for run in followed.runs if run.start == 0}
     loads = [run.value for run in followed.runs if run.start == 1 and run.value not in begun]
     if loads:
-        yield f"no run {FROM[0]} at {load_text(diagram, *loads)}, where none is found"
+        yield f"no run {FROM[0]} at {_load_text(diagram, *loads)}, where none is found"
 
 
 def failure_lines(diagram: Diagram, followed: Followed) -> Iterator[str]:
     """Yield a line for each run that failed."""
     place = place_text(diagram, followed.asked)
-    for run in failed_runs(followed):
-        yield f"{place}: the run {FROM[run.start]} at {load_text(diagram, run.value)} failed: {run.reason}"
+    for run in _failed_runs(followed):
+        yield f"{place}: the run {FROM[run.start]} at {_load_text(diagram, run.value)} failed: {run.reason}"
 
 
-def failed_runs(followed: Followed) -> list[Attractor]:
+def _failed_runs(followed: Followed) -> list[Attractor]:
     """Runs of a branch that ended without results."""
     return [run for run in followed.runs if run.occurrence == OccurrenceClass.FAILED]
 
@@ -149,7 +149,7 @@ def with_kinds(
     hopf, hidden, runs
         As `judged` takes them.
     """
-    lowest, in_words = partial(lowest_judged, asked), partial(load_text, diagram)
+    lowest, in_words = partial(lowest_judged, asked), partial(_load_text, diagram)
     kinds = [judged(onset, hopf, hidden, runs, lowest, in_words) for onset in hopf]
     return Followed(asked, states, hopf, hidden, runs, kinds)
 

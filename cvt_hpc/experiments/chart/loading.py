@@ -68,33 +68,23 @@ def load(path: str | Path, overrides: Assignments = ()) -> Chart:
     stages = [read_stage(name, raw, document, replaced, source) for name, raw in scenes.items()]
     points: list[Point] = []
     for stage, raw in zip(stages, scenes.values(), strict=True):
-        points += reference_points(stage, raw.get("reference"))
+        points += _reference_points(stage, raw.get("reference"))
     for name, raw in read_tables(table.get("methods"), f"{where} methods", "methods").items():
-        points += method_points(name, raw, stages, f"{source}: [chart.methods.{name}]")
+        points += _method_points(name, raw, stages, f"{source}: [chart.methods.{name}]")
     budgeted: tuple[str, ...] = ()
     if "budget" in table:
-        choices, budgeted = budget_points(table["budget"], stages, f"{source}: [chart.budget]")
+        choices, budgeted = _budget_points(table["budget"], stages, f"{source}: [chart.budget]")
         points += choices
     chosen = tuple(stage.scene for stage in stages)
     return Chart(points[0].job, source, chosen, tuple(points), **settings, budgeted=budgeted)
 
 
-def reference_points(stage: Stage, raw: Any) -> Iterator[Point]:
+def _reference_points(stage: Stage, raw: Any) -> Iterator[Point]:
     """Yield the reference of a scene and, unless it is exact, the coarser one that gives its error.
 
-    Parameters
-    ----------
-    stage : Stage
-        The scene.
-    raw : Any
-        "exact", or a table with a stepper, its step or tolerance, that of the coarser one (by default twice
-        the step or ten times the tolerance), and further keys to be set. Where the coarser one has a coarser
-        mesh as well, it is a table with its step or tolerance and the keys that it sets.
-
-    Raises
-    ------
-    InputError
-        If it is neither, or a quantity of the scene looks beyond the end of the runs.
+    The reference is "exact", or a table with a stepper, its step or tolerance, that of the coarser one (by
+    default twice the step or ten times the tolerance), and keys to be set. A coarser one on another mesh is
+    a table, too.
     """
     where = f"{stage.where} reference"
     name, starts = stage.scene.name, stage.scene.starts
@@ -130,23 +120,8 @@ def reference_points(stage: Stage, raw: Any) -> Iterator[Point]:
     yield Point(f"{name}-coarser", name, Role.COARSER, stepper, label, key, coarser_job, **both)
 
 
-def method_points(name: str, raw: Any, stages: list[Stage], where: str) -> Iterator[Point]:
-    """Yield the points of a method: its settings on each of its scenes.
-
-    Parameters
-    ----------
-    name, raw
-        Of the method: its name and its table.
-    stages : list of Stage
-        All scenes.
-    where : str
-        File and table, for the errors.
-
-    Raises
-    ------
-    InputError
-        If the table is not legal, or a scene's model does not take the stepper.
-    """
+def _method_points(name: str, raw: Any, stages: list[Stage], where: str) -> Iterator[Point]:
+    """Yield the points of a method: its settings on each of its scenes."""
     check_word(name, where)
     own = read_table(METHOD, raw, where, ("set", "scenes", *SETTINGS))
     label = own["label"] or in_words(name)
@@ -164,7 +139,7 @@ def method_points(name: str, raw: Any, stages: list[Stage], where: str) -> Itera
             yield Point(point, scene.name, Role.METHOD, name, label, key, job, scene.starts, **both)
 
 
-def budget_points(raw: Any, stages: list[Stage], where: str) -> tuple[list[Point], tuple[str, ...]]:
+def _budget_points(raw: Any, stages: list[Stage], where: str) -> tuple[list[Point], tuple[str, ...]]:
     """The base and the choices of the error budget, and the quantities that it shows."""
     own = read_table(BUDGET, raw, where, ("set", "quantities", "choices"))
     (stage,) = _chosen_stages([own["scene"]], stages, where)

@@ -13,6 +13,7 @@ from collections.abc import Callable, Iterator, Mapping, Sequence
 from concurrent.futures import ProcessPoolExecutor, as_completed
 from contextlib import closing
 from dataclasses import fields
+from functools import partial
 from math import nan
 from multiprocessing.synchronize import Lock
 from pathlib import Path
@@ -22,17 +23,18 @@ from typing import Any
 import numpy as np
 import xarray as xr
 
+from cvt_hpc.analysis.figures import draw
 from cvt_hpc.archives import Arrays
 from cvt_hpc.experiments.chart.comparing import Comparison, Result, compare
 from cvt_hpc.experiments.chart.measuring import Measurement, check_prospects, measure, predicted_cost
 from cvt_hpc.experiments.chart.plan import Chart, Point, Role
 from cvt_hpc.experiments.chart.quantities import KINDS
-from cvt_hpc.experiments.chart.scene_drawing import draw_budget, draw_scene
+from cvt_hpc.experiments.chart.scene_drawing import budget_figure, scene_figure
 from cvt_hpc.experiments.outcome import Outcome, Tell
 from cvt_hpc.experiments.parts import PartsFolder
-from cvt_hpc.files import write_rows, written_aside
+from cvt_hpc.files import write_rows
 from cvt_hpc.linear_algebra import one_thread
-from cvt_hpc.netcdf import VOLATILE, attributes, global_attributes, write_netcdf
+from cvt_hpc.netcdf import VOLATILE, attributes, global_attributes, store
 from cvt_hpc.output_folder import Kind
 from cvt_hpc.provenance import origin_lines
 from cvt_hpc.study.ranks.progress import Steps
@@ -55,7 +57,7 @@ _LONGEST_NOTE = 90  # letters; the whole reason is in the file
 _PLAIN = tuple(f.name for f in fields(Measurement) if f.name != "values")
 
 CHOSEN = "cheapest point of its scene that meets all tolerances"
-REFINES = "whether a choice is nearer to the truth than the base"
+_REFINES = "whether a choice is nearer to the truth than the base"
 _Variable = tuple[str, np.ndarray, dict[str, Any]]
 
 _COMPILING = "cvt_hpc.kernels"  # the logger of messages about it
@@ -87,12 +89,11 @@ def make(chart: Chart, out: Path, *, fresh: bool, tell: Tell) -> Outcome:
     with folder.claimed(chart, fresh=fresh):
         measurements = _fill(chart, folder, len(os.sched_getaffinity(0)), tell)
         comparisons = compare(chart, measurements)
-        dataset = chart_dataset(chart, comparisons, folder.parts.makers)
+        dataset = _chart_dataset(chart, comparisons, folder.parts.makers)
         write_table(comparisons, dataset.attrs, folder.table)
-        with written_aside(folder.dataset) as aside:
-            write_netcdf(dataset, aside)
-        pictures = [draw_scene(c, out / f"{c.scene.name}.png") for c in comparisons]
-        pictures += [draw_budget(c, out / "budget.png") for c in comparisons if c.choices]
+        store(dataset, folder.dataset)
+        pictures = [draw(partial(scene_figure, c), out / f"{c.scene.name}.png") for c in comparisons]
+        pictures += [draw(partial(budget_figure, c), out / "budget.png") for c in comparisons if c.choices]
     lines = [line for comparison in comparisons for line in (*table_lines(comparison), "")]
     files = [("table", folder.table), ("dataset", folder.dataset), *(("picture", path) for path in pictures)]
     return Outcome(lines, files)
@@ -164,25 +165,10 @@ def _measure(chart: Chart, point: Point) -> Measurement:
         return measure(point, scene, chart.repeats, limit)
 
 
-def chart_dataset(
+def _chart_dataset(
     chart: Chart, comparisons: Sequence[Comparison], makers: Sequence[dict[str, Any]]
 ) -> xr.Dataset:
-    """Return the results as a dataset: errors, values, cost and work of each point, and how it ended.
-
-    Parameters
-    ----------
-    chart : Chart
-        The job, which goes into the attributes.
-    comparisons : sequence of Comparison
-        The results.
-    makers : sequence of dict
-        Origin of the measurements: versions, revision and machine, each of them once.
-
-    Returns
-    -------
-    Dataset
-        Along the dimension `point`.
-    """
+    """Return errors, values, cost and work of each point, and how it ended, along the dimension `point`."""
     rows = [result for comparison in comparisons for result in comparison.results]
     variables: dict[str, Any] = _descriptions(rows) | _costs(rows)
     for name in KINDS:
@@ -218,7 +204,7 @@ def _descriptions(rows: Sequence[Result]) -> dict[str, Any]:
         variables[key] = _along(settings, unit, key, "of the method")
     variables["chosen"] = _flag([r.chosen for r in rows], "chosen", CHOSEN)
     variables["failed"] = _flag([bool(r.measurement.reason) for r in rows], "failed", "see reason")
-    variables["refines"] = _flag([r.point.refines for r in rows], "refines", REFINES)
+    variables["refines"] = _flag([r.point.refines for r in rows], "refines", _REFINES)
     return variables
 
 

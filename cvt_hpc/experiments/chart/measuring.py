@@ -63,14 +63,14 @@ def warm_up(job: Job, points: Sequence[dict[str, Any]]) -> None:
     load_model(job.model).batch(points, job.stepper).advance(1)
 
 
-def most_lanes(job: Job) -> int:
+def _most_lanes(job: Job) -> int:
     """Return how many runs of a job can advance together, in the lanes of the processor's registers."""
     return load_model(job.model).lanes(job.parameters, job.stepper)
 
 
-def lanes_of(point: Point) -> int:
+def _lanes_of(point: Point) -> int:
     """Return how many runs of a point advance together: as many as it asks for, or as can."""
-    return point.lanes or min(most_lanes(point.job), point.starts)
+    return point.lanes or min(_most_lanes(point.job), point.starts)
 
 
 def march(
@@ -171,7 +171,7 @@ def measure(point: Point, scene: Scene, repeats: int, time_limit: float) -> Meas
     """
     if scene.exact and point.series == "exact":
         return _exact(point, scene)
-    job, lanes = point.job, lanes_of(point)
+    job, lanes = point.job, _lanes_of(point)
     # costs are those of full lanes: further starts, if needed, count for the time alone
     runs = math.ceil(point.starts / lanes) * lanes if point.timed else point.starts
     points = [point.parameters(k) for k in range(runs)]
@@ -196,17 +196,11 @@ def _led(point: Point, scene: Scene, runs: int) -> tuple[Any, ...]:
     if scene.lead is None:
         return ()
     job, until = scene.lead.job, scene.lead.until
-    return march(job, [start_parameters(job, k) for k in range(runs)], most_lanes(job), until).runs
+    return march(job, [start_parameters(job, k) for k in range(runs)], _most_lanes(job), until).runs
 
 
-def exact_displacement(point: Point, start: int) -> tuple[Any, NDArray[np.float64]]:
-    """Return a run of a point that was not marched, and its exact displacement, (time, probe) [m].
-
-    Raises
-    ------
-    InputError
-        If the model has no closed form for these parameters.
-    """
+def _exact_displacement(point: Point, start: int) -> tuple[Any, NDArray[np.float64]]:
+    """Return a run of a point that was not marched, and its exact displacement, (time, probe) [m]."""
     parameters = point.parameters(start)
     model = load_model(point.job.model)
     (run,) = model.batch([parameters], point.job.stepper).runs
@@ -217,7 +211,7 @@ def _exact(point: Point, scene: Scene) -> Measurement:
     """The model's exact solution in the place of a run."""
     observed = []
     for start in range(point.starts):
-        run, displacement = exact_displacement(point, start)
+        run, displacement = _exact_displacement(point, start)
         columns, strands = _columns(run)
         history = History(displacement[:, columns], strands, run.channel, run.parameters)
         observed.append(observe(history, scene.quantities, whole=True))
@@ -291,7 +285,7 @@ def predicted_cost(chart: Chart, point: Point) -> float:
     if not load_model(point.job.model).is_recorded:
         return math.nan
     scene = chart.scene(point.scene)
-    batches = math.ceil(point.starts / lanes_of(point))
+    batches = math.ceil(point.starts / _lanes_of(point))
     first = _march_cost(point.job, point.until)
     if point.timed:
         first = min(first, chart.time_limit, scene.time_limit)
@@ -345,7 +339,7 @@ def check_prospects(chart: Chart) -> None:
         if scene.lead is not None:
             _check_lead(point, where)
     for point in chart.points:
-        most = most_lanes(point.job)
+        most = _most_lanes(point.job)
         if point.lanes > most:
             where = f"{chart.source}: [chart.methods.{point.series}] lanes"
             raise mismatch(where, f"at most {most} with stepper {point.job.stepper}", f"{point.lanes}")
@@ -356,7 +350,7 @@ def _check_exact(point: Point, where: str) -> None:
         found = f"{point.job.model}, which has none"
         raise mismatch(f"{where} reference", "a model with an exact solution", found)
     try:
-        exact_displacement(point, 0)
+        _exact_displacement(point, 0)
     except InputError as error:
         raise InputError(f"{where} reference: {error}") from error
 

@@ -8,7 +8,6 @@ import math
 import re
 from collections.abc import Sequence
 from functools import partial
-from pathlib import Path
 from textwrap import wrap
 
 import numpy as np
@@ -24,7 +23,7 @@ from cvt_hpc.experiments.chart.plan import Quantity
 from cvt_hpc.experiments.chart.quantities import KINDS
 
 _LINE_LENGTH = 104  # [letters]
-LARGEST_ERROR = 10.0  # relative: errors beyond are named, and not drawn
+_LARGEST_ERROR = 10.0  # relative: errors beyond are named, and not drawn
 _DETAILS = re.compile(r" \([^()]*\)$")
 
 GREY = "#a8a8a8"
@@ -35,21 +34,8 @@ _LINE_HEIGHT = 0.16  # [inch], of the text under the panels
 _ROW_HEIGHT = 0.24  # [inch], of the budget
 
 
-def draw_scene(comparison: Comparison, out: Path) -> Path:
-    """Draw error against cost, a panel for each quantity.
-
-    Parameters
-    ----------
-    comparison : Comparison
-        Results of a scene.
-    out : Path
-        `out`, result and errors are those of `save_figure`.
-    """
-    return figures.draw(lambda: scene_figure(comparison), out)
-
-
 def scene_figure(comparison: Comparison) -> Figure:
-    """Compose the picture of `draw_scene`; to be called within STYLE."""
+    """Compose the picture of a scene: error against cost, a panel for each quantity; within STYLE."""
     quantities = [q for q in comparison.scene.quantities if q.name != "occurrence"]
     columns = min(_COLUMNS, len(quantities))
     rows = math.ceil(len(quantities) / columns)
@@ -98,7 +84,7 @@ def _draw_panel(
             _mark_point(axes, result, quantity.name, error, cost, k)
     _limit(axes, quantity, own, floor)
     axes.set_title(_heading(quantity), loc="left", pad=3)
-    axes.set_xlabel(error_label(quantity))
+    axes.set_xlabel(_error_label(quantity))
     axes.grid(which="major", color="#e4e4e4", lw=0.6)
     axes.set_axisbelow(True)
 
@@ -155,7 +141,7 @@ def _legend(comparison: Comparison, series: dict[str, list[Result]]) -> list[Lin
 
 
 def _is_drawn(result: Result, name: str) -> bool:
-    return not result.measurement.reason and result.errors[name] <= LARGEST_ERROR
+    return not result.measurement.reason and result.errors[name] <= _LARGEST_ERROR
 
 
 def _floor(quantity: Quantity, comparison: Comparison) -> float:
@@ -171,7 +157,7 @@ def _heading(quantity: Quantity) -> str:
     return title
 
 
-def error_label(quantity: Quantity) -> str:
+def _error_label(quantity: Quantity) -> str:
     """Label at the axis of a quantity's errors."""
     if quantity.scale == 0.0:
         return "relative error"
@@ -213,18 +199,13 @@ def _reasons(result: Result) -> list[str]:
         return [f"failed, {_DETAILS.sub('', reason.partition(': ')[2])}"]
     errors = {name.replace("_", " "): error for name, error in result.errors.items()}
     reasons = [f"no {name}" for name, error in errors.items() if math.isinf(error)]
-    if any(LARGEST_ERROR < error < math.inf for error in errors.values()):
-        reasons.append(f"error of more than {LARGEST_ERROR:.0%}")
+    if any(_LARGEST_ERROR < error < math.inf for error in errors.values()):
+        reasons.append(f"error of more than {_LARGEST_ERROR:.0%}")
     return reasons
 
 
-def draw_budget(comparison: Comparison, out: Path) -> Path:
-    """Draw the error of each choice against the base; otherwise as `draw_scene`."""
-    return figures.draw(lambda: budget_figure(comparison), out)
-
-
 def budget_figure(comparison: Comparison) -> Figure:
-    """Compose the picture of `draw_budget`; to be called within STYLE."""
+    """Compose the picture of the error of each choice against the base; to be called within STYLE."""
     quantities = [
         q for q in comparison.scene.quantities if q.name in comparison.shown and q.name != "occurrence"
     ]
@@ -281,7 +262,7 @@ def _draw_budget_panel(axes: Axes, quantity: Quantity, choices: Sequence[Result]
         axes.axvline(quantity.tolerance, color="black", ls="--", lw=0.9)
     axes.tick_params(axis="y", length=0)
     axes.set_title(quantity.name.replace("_", " "), loc="left", pad=3)  # short: panels are narrow
-    axes.set_xlabel(error_label(quantity))
+    axes.set_xlabel(_error_label(quantity))
 
 
 def _in_order(choices: Sequence[Result], quantities: Sequence[Quantity]) -> list[Result]:

@@ -300,11 +300,6 @@ class Fit:
         columns = zip(self.free, np.moveaxis(shares, -1, 0), strict=True)
         return np.stack([between(*one[1:], share) for one, share in columns], axis=-1)
 
-    def shares(self, scenes: NDArray[np.float64]) -> NDArray[np.float64]:
-        """Shares of their ranges at values [SI] of the free parameters; the inverse of `scenes`."""
-        columns = zip(self.free, np.moveaxis(scenes, -1, 0), strict=True)
-        return np.stack([share_of(one, value) for one, value in columns], axis=-1)
-
     def resolved(self) -> dict[str, Any]:
         """Return all entries that determine the numbers, in JSON types."""
         own = {key: getattr(self, key) for key in (*NUMBERS, "along", "coarse", "repeat", "counted")}

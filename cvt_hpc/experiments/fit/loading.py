@@ -79,7 +79,7 @@ def load(path: str | Path, overrides: Assignments = ()) -> Fit:
         along=along,
         values=values,
         cases=cases,
-        targets=read_targets(table.get("targets"), job, along, values[::every], cases, where),
+        targets=_read_targets(table.get("targets"), job, along, values[::every], cases, where),
         starts=_read_starts(table.get("starts", []), free, job, where),
         coarse=read_set({"set": table.get("coarse", {})}, f"{where} coarse"),
         repeat=_read_repeat(table.get("repeat", {}), job, where),
@@ -218,7 +218,7 @@ def _read_counted(raw: Any, job: Job, where: str) -> dict[str, tuple[float, floa
     found = {}
     for name, table in raw.items():
         place = f"{where} {name}"
-        unit = unit_of(name, job, place)
+        unit = _unit_of(name, job, place)
         ends = {
             "from": Parameter(-math.inf, unit, "", allow_infinite=True),
             "to": Parameter(math.inf, unit, "", allow_infinite=True),
@@ -228,31 +228,10 @@ def _read_counted(raw: Any, job: Job, where: str) -> dict[str, tuple[float, floa
     return found
 
 
-def read_targets(
+def _read_targets(
     raw: Any, job: Job, along: str, values: NDArray[np.float64], cases: Collection[str], where: str
 ) -> tuple[Target, ...]:
-    """Return the targets of a table [fit].
-
-    Parameters
-    ----------
-    raw : Any
-        Content of the file: a list of tables.
-    job : Job
-        For units and quantities.
-    along : str
-        The swept parameter.
-    values : (runs,) array
-        The values that the search runs: some of them have to belong to each target.
-    cases : collection of str
-        Names of the cases.
-    where : str
-        File and table, for the errors.
-
-    Raises
-    ------
-    InputError
-        If a target is not legal, or there is none.
-    """
+    """Return the targets of a table [fit]; each has to have some of the `values` that the search runs."""
     if not isinstance(raw, list) or not raw:
         raise mismatch(f"{where} targets", "a list of one target or more", show(raw))
     found: list[Target] = []
@@ -286,7 +265,7 @@ def _read_target(table: Any, job: Job, along: str, cases: Collection[str], where
         name = table.get("quantity")
         if not isinstance(name, str):
             raise mismatch(f"{where} quantity", "a recorded quantity", show(name))
-        own = {"quantity": Parameter("", "", ""), **_bounds(unit_of(name, job, f"{where} quantity"))}
+        own = {"quantity": Parameter("", "", ""), **_bounds(_unit_of(name, job, f"{where} quantity"))}
     elif kind == "onset":
         own = _bounds(unit)
     elif kind == "areas":
@@ -320,14 +299,8 @@ def _bounds(unit: str) -> dict[str, Parameter]:
     }
 
 
-def unit_of(name: str, job: Job, where: str) -> str:
-    """Return the unit of a recorded quantity, such as "frequency", or "mode t1" of one strand.
-
-    Raises
-    ------
-    InputError
-        If runs record none of this name that is a number for each run, strand or pulley.
-    """
+def _unit_of(name: str, job: Job, where: str) -> str:
+    """Return the unit of a number of each run, strand or pulley, such as "frequency" or "mode t1"."""
     simulator = default_simulator()
     variables = {
         one.name: one

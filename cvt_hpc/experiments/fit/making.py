@@ -57,19 +57,19 @@ def make(fit: Fit, out: Path, *, fresh: bool, tell: Tell) -> Outcome:
     except Stopped as stopped:
         return Outcome(status=stopped.status)
     best = confirmed[0]
-    of_set, verdicts = set_table(fit, found, best, looked[0]), verdict_table(fit, best)
+    of_set, verdicts = _set_table(fit, found, best, looked[0]), _verdict_table(fit, best)
     tables = (
         of_set,
         verdicts,
-        confirmed_table(fit, confirmed),
-        candidate_table(fit, found),
+        _confirmed_table(fit, confirmed),
+        _candidate_table(fit, found),
         conflict_table(fit, found),
-        distance_table(fit, looked),
-        sensitivity_table(fit, looked),
+        _distance_table(fit, looked),
+        _sensitivity_table(fit, looked),
     )
     cost = f"{evaluation.runs} runs, {core_time_in_words(evaluation.core_seconds)}"
     files = [("table", write_table(fit, one, out)) for one in tables] if process_rank() == 0 else []
-    return Outcome((*set_lines(best, of_set, verdicts), cost), files)
+    return Outcome((*_set_lines(best, of_set, verdicts), cost), files)
 
 
 def plan_lines(fit: Fit, out: Path) -> Iterator[str]:
@@ -115,7 +115,7 @@ def write_table(fit: Fit, table: Table, folder: Path) -> Path:
     )
 
 
-def set_table(fit: Fit, found: Found, best: Confirmed, around: Around) -> Table:
+def _set_table(fit: Fit, found: Found, best: Confirmed, around: Around) -> Table:
     """The set: its equals, the distance of each parameter from silence, and its influence."""
     good = found.scenes[found.totals >= fit.accepted * found.totals.max()]
     of_total = {index.parameter: index for index in around.indices if index.score == "total"}
@@ -143,7 +143,7 @@ def set_table(fit: Fit, found: Found, best: Confirmed, around: Around) -> Table:
     return Table("set", what, (*head, "first_order", "total_order"), rows)
 
 
-def verdict_table(fit: Fit, best: Confirmed) -> Table:
+def _verdict_table(fit: Fit, best: Confirmed) -> Table:
     """Results of the best set for each statement."""
     rows = []
     for k, target in enumerate(fit.targets):
@@ -156,7 +156,7 @@ def verdict_table(fit: Fit, best: Confirmed) -> Table:
     return Table("verdicts", what, head, rows)
 
 
-def confirmed_table(fit: Fit, confirmed: Sequence[Confirmed]) -> Table:
+def _confirmed_table(fit: Fit, confirmed: Sequence[Confirmed]) -> Table:
     """The sets that were run in full, the best one first."""
     rows = [
         [one.name, *_in_units(fit, one.scene), one.coarse, one.total, *one.spread, *one.mean]
@@ -168,7 +168,7 @@ def confirmed_table(fit: Fit, confirmed: Sequence[Confirmed]) -> Table:
     )
 
 
-def candidate_table(fit: Fit, found: Found) -> Table:
+def _candidate_table(fit: Fit, found: Found) -> Table:
     """All candidates of the search, in their order."""
     rows = [
         [stage, *_in_units(fit, scene), *scores, total]
@@ -195,7 +195,7 @@ def conflict_table(fit: Fit, found: Found) -> Table:
     return Table("conflicts", what, head, sorted(rows, key=lambda row: row[-1]))
 
 
-def distance_table(fit: Fit, looked: Sequence[Around]) -> Table:
+def _distance_table(fit: Fit, looked: Sequence[Around]) -> Table:
     """Result of the first case of each set where one parameter is moved alone."""
     rows = [
         [
@@ -215,7 +215,7 @@ def distance_table(fit: Fit, looked: Sequence[Around]) -> Table:
     return Table("distances", what, head, rows)
 
 
-def sensitivity_table(fit: Fit, looked: Sequence[Around]) -> Table:
+def _sensitivity_table(fit: Fit, looked: Sequence[Around]) -> Table:
     """Sobol indices of each score around each set."""
     what = (
         f"Sobol indices with their 95 % bounds, all parameters within {fit.nearby:g} of a set; "
@@ -225,7 +225,7 @@ def sensitivity_table(fit: Fit, looked: Sequence[Around]) -> Table:
     return Table("sensitivities", what, ("around", "score", "parameter", *_ORDERS), rows)
 
 
-def set_lines(best: Confirmed, of_set: Table, verdicts: Table) -> Iterator[str]:
+def _set_lines(best: Confirmed, of_set: Table, verdicts: Table) -> Iterator[str]:
     """Yield the description of the best set for people."""
     low, high = best.spread
     scores = f"{best.total:.3f} ({low:.3f} to {high:.3f}), {best.coarse:.3f} in the search"

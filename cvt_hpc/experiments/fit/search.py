@@ -256,14 +256,14 @@ def look_around(fit: Fit, evaluation: Evaluation, confirmed: Sequence[Confirmed]
     return [
         Around(
             one.name,
-            move_each(fit, evaluation, f"distances_{study}", one.scene),
+            _move_each(fit, evaluation, f"distances_{study}", one.scene),
             sensitivities(fit, evaluation, f"sensitivities_{study}", one.scene),
         )
         for one, study in zip(chosen, studies, strict=True)
     ]
 
 
-def move_each(fit: Fit, evaluation: Evaluation, study: str, scene: NDArray[np.float64]) -> list[Moved]:
+def _move_each(fit: Fit, evaluation: Evaluation, study: str, scene: NDArray[np.float64]) -> list[Moved]:
     """Move each parameter of a set [SI] alone by each factor, and run the first case in full."""
     places = [(column, factor) for column in range(len(scene)) for factor in sorted(fit.distances)]
     if not places:

@@ -30,15 +30,15 @@ PUSHBELT = "pushbelt"
 # Of the model below the reference: half as many elements as a belt has, at the default step
 COARSER: dict[str, Any] = {"elements": 216, "step": 1e-5}
 # Errors of first order are then the distance between the two, and of second order a third of it.
-FINER_PUSHBELT = 2
+_FINER_PUSHBELT = 2
 
 QUESTIONS = ("occurrence", "onset", "frequency", "amplitude", "forces")
 MODEL, STEPPER = "elastic_belt", "imex"
 REFERENCE = "reference"
 # In the reference mesh, step and transient shrink together: by 1.5 each error of first order falls by a third
 # and of second order by more than half, while a run costs 4.5 times as much, which keeps it below a second.
-FINER = 1.5
-LONGER = 2.0  # times as long: slow growth has its time, and the judged half begins a whole run later
+_FINER = 1.5
+_LONGER = 2.0  # times as long: slow growth has its time, and the judged half begins a whole run later
 
 
 # By name its model, the content of a table of that name, and the questions that it answers. Of auto, question
@@ -65,7 +65,7 @@ def ladder(
     job : Job
         Of the elastic belt, a grid with `load` among its axes.
     pushbelt : mapping, optional
-        Further keys of the pushbelt, as `pushbelt_jobs` takes them: the reference is a pushbelt then.
+        Further keys of the pushbelt, as `_pushbelt_jobs` takes them: the reference is a pushbelt then.
     beside : str
         A requested entry of BESIDE, or NONE.
 
@@ -94,7 +94,7 @@ def ladder(
     if pushbelt is None:
         reference = rebuild_job(_refined(job), job.source, job.units)
     else:
-        coarser, reference = pushbelt_jobs(job, pushbelt)
+        coarser, reference = _pushbelt_jobs(job, pushbelt)
         rungs.append(Sweep(PUSHBELT, QUESTIONS, coarser))
     return (*rungs, Sweep(REFERENCE, (), reference)), refusals
 
@@ -123,29 +123,19 @@ def _check(job: Job) -> None:
 
 def _refined(job: Job) -> dict[str, Any]:
     document = job.resolved()
-    document["mesh"]["stations"] = round(FINER * job.parameters["stations"])
+    document["mesh"]["stations"] = round(_FINER * job.parameters["stations"])
     # a step that follows from the scene follows from that of the finer mesh
     setting = "step_error" if any(rule.key == "step" for rule in job.rules) else "step"
-    document["numerics"][setting] = job.parameters[setting] / FINER
+    document["numerics"][setting] = job.parameters[setting] / _FINER
     for name in ("duration", "shortest_duration", "longest_duration"):
-        document["run"][name] = LONGER * job.parameters[name]
+        document["run"][name] = _LONGER * job.parameters[name]
     return document
 
 
-def pushbelt_jobs(job: Job, settings: Mapping[str, Any]) -> tuple[Job, Job]:
+def _pushbelt_jobs(job: Job, settings: Mapping[str, Any]) -> tuple[Job, Job]:
     """Return the runs of a job of the elastic belt on the pushbelt, and the same refined.
 
-    Parameters
-    ----------
-    job : Job
-        Of the elastic belt.
-    settings : mapping
-        Further keys of the pushbelt: of COARSER, or keys that the elastic belt does not know.
-
-    Raises
-    ------
-    InputError
-        If the pushbelt has no counterpart of the job, or a setting is not legal.
+    Further keys of the pushbelt are of COARSER, or keys that the elastic belt does not know.
     """
     where, label = f"{job.source}: [ladder]", "set"
     _check_settings(job, settings, f"{where} {label}")
@@ -155,8 +145,8 @@ def pushbelt_jobs(job: Job, settings: Mapping[str, Any]) -> tuple[Job, Job]:
     if [axis.name for axis in coarser.axes] != [axis.name for axis in job.axes]:
         raise mismatch(f"{where} {label}", "one value for each key", "an axis")
     refined = coarser.resolved()
-    refined["belt"]["elements"] *= FINER_PUSHBELT
-    refined["numerics"]["step"] /= FINER_PUSHBELT
+    refined["belt"]["elements"] *= _FINER_PUSHBELT
+    refined["numerics"]["step"] /= _FINER_PUSHBELT
     return coarser, rebuild_job(refined, where, job.units)
 
 
@@ -279,7 +269,7 @@ def plan_lines(asked: Ladder, out: Path) -> Iterator[str]:
 def _pushbelt_cost(job: Job) -> str:
     """Additional cost of the pushbelt as the reference, or the reason why it cannot take the job."""
     try:
-        jobs = pushbelt_jobs(job, {})
+        jobs = _pushbelt_jobs(job, {})
     except InputError as error:
         return f"refused, {error}"
     total = sum(float(run_costs(each).sum()) for each in jobs)

@@ -22,10 +22,10 @@ from cvt_hpc.experiments.ladder.comparing import Finding, compare
 from cvt_hpc.experiments.ladder.loading import QUESTIONS, REFERENCE, Ladder
 from cvt_hpc.experiments.outcome import Outcome, Tell
 from cvt_hpc.experiments.sweeps import Sweep, load_sweep, maker_of, run_sweeps
-from cvt_hpc.files import write_rows, written_aside
+from cvt_hpc.files import write_rows
 from cvt_hpc.job import Job
 from cvt_hpc.job.values import JOB_UNITS
-from cvt_hpc.netcdf import attributes, global_attributes, write_netcdf
+from cvt_hpc.netcdf import attributes, global_attributes, store
 from cvt_hpc.provenance import machine, origin_lines
 from cvt_hpc.study import process_rank
 from cvt_hpc.study.status import STALLED
@@ -52,18 +52,18 @@ NUMBERS = {
     "core_seconds": ("processor time", "of a run, mean"),
 }
 
-HEIGHT = 7.2  # [inch]
-ROOM = 1.15  # length of a linear axis over its largest error
-HATCHED = {"facecolor": "#f3f3f3", "edgecolor": "#d0d0d0", "hatch": "////", "lw": 0}
+_HEIGHT = 7.2  # [inch]
+_ROOM = 1.15  # length of a linear axis over its largest error
+_HATCHED = {"facecolor": "#f3f3f3", "edgecolor": "#d0d0d0", "hatch": "////", "lw": 0}
 # Title of a panel, label and factor of its errors; errors that may well be 0 stand on a linear axis.
-PANELS = {
+_PANELS = {
     "occurrence": ("does it vibrate", "cells of the wrong class [%]", 100.0),
     "onset": ("at which load it sets in or ends", "error of the load [{unit}]", 1.0),
     "frequency": ("at which frequency", "relative error [%]", 100.0),
     "amplitude": ("how far", "relative error [%]", 100.0),
     "forces": ("mean forces", "error of the largest force [%]", 100.0),
 }
-LINEAR = ("occurrence", "onset")
+_LINEAR = ("occurrence", "onset")
 
 
 def make(asked: Ladder, out: Path, *, fresh: bool, tell: Tell) -> Outcome:
@@ -80,41 +80,24 @@ def make(asked: Ladder, out: Path, *, fresh: bool, tell: Tell) -> Outcome:
         return Outcome(status=status)
     results = {rung.name: load_sweep(rung.name, out) for rung in rungs}
     findings = tuple(compare(rungs, results))
-    table, path, picture = (out / f"ladder.{suffix}" for suffix in ("csv", "nc", "png"))
-    dataset = ladder_dataset(job, rungs, findings, [maker_of(found) for found in results.values()])
+    table, picture = out / "ladder.csv", out / "ladder.png"
+    dataset = _ladder_dataset(job, rungs, findings, [maker_of(found) for found in results.values()])
     write_ladder(job, findings, dataset.attrs | {"job_fingerprint": job.fingerprint()}, table)
-    with written_aside(path) as aside:
-        write_netcdf(dataset, aside)
-    draw_ladder(job, findings, picture)
-    files = ("table", table), ("dataset", path), ("picture", picture)
+    draw(lambda: ladder_figure(job, findings), picture)
+    files = ("table", table), ("dataset", store(dataset, out / "ladder.nc")), ("picture", picture)
     return Outcome(tuple(ladder_lines(job, findings)), files, status)
 
 
-def draw_ladder(job: Job, findings: Sequence[Finding], out: Path) -> Path:
-    """Draw error against cost.
-
-    Parameters
-    ----------
-    job : Job
-        The job of the ladder.
-    findings : sequence of Finding
-        Its results.
-    out : Path
-        Result and errors are those of `save_figure`.
-    """
-    return draw(lambda: ladder_figure(job, findings), out)
-
-
 def ladder_figure(job: Job, findings: Sequence[Finding]) -> Figure:
-    """Compose the picture of `draw_ladder`; to be called within STYLE."""
-    findings, unit = in_job_unit(job, findings)
+    """Compose the picture: error of each model against its cost; to be called within STYLE."""
+    findings, unit = _in_job_unit(job, findings)
     costs = {f.rung: f.core_seconds for f in findings if f.rung != REFERENCE}
     styles = {
         rung: {**line_style(k), "ls": "", "ms": 6.5}
         for k, rung in enumerate(sorted(costs, key=lambda rung: costs[rung]))
     }
     styles[REFERENCE] = {"color": "black", "marker": "*", "ls": "", "ms": 8}
-    figure = Figure((WIDTH, HEIGHT), layout="constrained")
+    figure = Figure((WIDTH, _HEIGHT), layout="constrained")
     figure.suptitle(f"{job.name}: error of each model against its cost, lower left is better")
     panels = figure.subplots(3, 2, sharey=True).flat
     for axes, question in zip(panels, QUESTIONS, strict=False):
@@ -131,7 +114,7 @@ def ladder_figure(job: Job, findings: Sequence[Finding]) -> Figure:
 def _draw_panel(
     axes: Axes, question: str, findings: Sequence[Finding], styles: dict[str, dict], unit: str
 ) -> None:
-    title, label, factor = PANELS[question]
+    title, label, factor = _PANELS[question]
     spans = {finding: [factor * error for error in _span(finding)] for finding in findings}
     left = _scale(
         axes, question, [error for span in spans.values() for error in span if math.isfinite(error)]
@@ -142,7 +125,7 @@ def _draw_panel(
         axes.plot([low, high], [finding.core_seconds] * 2, color=style["color"], lw=1.0, gid="span")
         axes.plot(low, finding.core_seconds, **style, gid=finding.rung, clip_on=False)
         if finding.rung == REFERENCE and low > left:
-            axes.axvspan(left, low, **HATCHED, zorder=0, gid="hatched")
+            axes.axvspan(left, low, **_HATCHED, zorder=0, gid="hatched")
     axes.set_title(f"{question}: {title}", loc="left", pad=3)
     axes.set_xlabel(label.format(unit=unit))
     axes.grid(which="major", color="#e4e4e4", lw=0.6)
@@ -159,9 +142,9 @@ def _span(finding: Finding) -> tuple[float, float]:
 
 def _scale(axes: Axes, question: str, errors: Sequence[float]) -> float:
     """Make room on the error's axis, and return its left end."""
-    if question in LINEAR:
+    if question in _LINEAR:
         largest = max(errors, default=0.0) or 1.0
-        axes.set_xlim(-0.04 * largest, ROOM * largest)
+        axes.set_xlim(-0.04 * largest, _ROOM * largest)
         return axes.get_xlim()[0]
     axes.set_xscale("log")
     left = set_error_axis(axes, [error for error in errors if error > 0.0])
@@ -175,11 +158,11 @@ def _legend(styles: dict[str, dict]) -> list[Line2D | Patch]:
     return [
         *rungs,
         Line2D([], [], color="black", lw=1.0, label=span),
-        Patch(**HATCHED, label="below the reference's own error"),
+        Patch(**_HATCHED, label="below the reference's own error"),
     ]
 
 
-def in_job_unit(job: Job, findings: Sequence[Finding]) -> tuple[list[Finding], str]:
+def _in_job_unit(job: Job, findings: Sequence[Finding]) -> tuple[list[Finding], str]:
     """Return findings with errors of onsets in the unit in which the job gives the load, and that unit."""
     scale, unit = coordinate_unit({"units": UNITS["onset"], JOB_UNITS: job.units.get("load", "")})
     shown = []
@@ -194,7 +177,7 @@ def in_job_unit(job: Job, findings: Sequence[Finding]) -> tuple[list[Finding], s
 
 def write_ladder(job: Job, findings: Sequence[Finding], made: Mapping[str, Any], path: Path) -> None:
     """Write the findings as comma-separated values, a row for each model and question, below their origin."""
-    findings, unit = in_job_unit(job, findings)
+    findings, unit = _in_job_unit(job, findings)
     units = UNITS | {"onset": unit}
     rows = (
         [one.question, one.rung, units[one.question]]
@@ -206,7 +189,7 @@ def write_ladder(job: Job, findings: Sequence[Finding], made: Mapping[str, Any],
 
 def ladder_lines(job: Job, findings: Sequence[Finding]) -> Iterator[str]:
     """Yield the lines that show the findings to people."""
-    findings, of_onsets = in_job_unit(job, findings)
+    findings, of_onsets = _in_job_unit(job, findings)
     heads = ["", "cells", "median", "95 %", "wrong", "silent", "more", "core-s/run", ""]
     for question in QUESTIONS:
         found = [finding for finding in findings if finding.question == question]
@@ -215,22 +198,10 @@ def ladder_lines(job: Job, findings: Sequence[Finding]) -> Iterator[str]:
         yield from columns([heads, *([f.rung, *_cells(f), ""] for f in found)])
 
 
-def ladder_dataset(
+def _ladder_dataset(
     job: Job, rungs: Sequence[Sweep], findings: Sequence[Finding], makers: Sequence[Mapping[str, Any]] = ()
 ) -> xr.Dataset:
-    """Return the findings as a dataset over `question` and `rung`, with all that is needed to repeat it.
-
-    Parameters
-    ----------
-    job : Job
-        The job of the ladder.
-    rungs : sequence of Sweep
-        Its models.
-    findings : sequence of Finding
-        The results.
-    makers : sequence of mapping
-        By whom the runs were made, as of `netcdf.global_attributes`.
-    """
+    """Return the findings over `question` and `rung`, with all that is needed to repeat them."""
     names = list(dict.fromkeys(finding.rung for finding in findings))
     values = np.full((len(NUMBERS), len(QUESTIONS), len(names)), np.nan)
     for finding in findings:
