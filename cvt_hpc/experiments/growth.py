@@ -106,7 +106,7 @@ def load(path: str | Path, overrides: Assignments = (), kick: str | None = None)
 
 
 def _kick_of(job: Job) -> tuple[str, float]:
-    """The parameter by which runs of a job are kicked, and a small value of it."""
+    """Return the parameter by which runs of a job are kicked, and a small value of it."""
     kick = load_model(job.model).kick
     if kick is None:
         known = ", ".join(name for name in MODELS if load_model(name).kick)
@@ -115,7 +115,7 @@ def _kick_of(job: Job) -> tuple[str, float]:
 
 
 def _twin_job(job: Job, key: str, size: float) -> Job:
-    """Three runs for each cell of a job, whose histories are kept."""
+    """Return a job of three runs for each cell, whose histories are kept."""
     document, section_of = job.resolved(), job.schema.section_of
     changed = {**_RUN, "longest_duration": job.parameters["duration"]}
     if "precision" in job.given:
@@ -264,7 +264,7 @@ def _within(value: float, error: float) -> str:
 
 
 def _eigenvalue(value: Mapping[str, Any]) -> str:
-    """That which grows fastest, in words; "" where there is none."""
+    """Return the eigenvalue that grows fastest, in words; "" where there is none."""
     growth = value.get("linear_growth_rate", np.nan)
     return "" if np.isnan(growth) else f"{number(growth, 3)} at {number(value['linear_frequency'], 4)} Hz"
 
@@ -274,7 +274,7 @@ def _axes(job: Job) -> list[str]:
 
 
 def _modes(job: Job, dataset: xr.Dataset) -> Iterator[tuple[list[str], xr.Dataset]]:
-    """Values on the axes, in the job's units, and variables of each mode; once for a cell without modes."""
+    """Yield values on the axes, in the job's units, and variables of each mode, of a cell at least once."""
     for cell in np.ndindex(job.shape):
         at = dataset.isel(dict(zip(_axes(job), cell, strict=True)))
         place = [in_words(shown_number(at[name].item(), at[name].attrs), "") for name in _axes(job)]

@@ -3,10 +3,10 @@
 from abc import abstractmethod
 from collections.abc import Callable, Iterator
 from pathlib import Path
-from typing import Any, Generic, Protocol, TypeVar
+from typing import Any
 
 from cvt_hpc.archives import Archives
-from cvt_hpc.output_folder import OutputFolder
+from cvt_hpc.output_folder import Content, OutputFolder
 from cvt_hpc.study.job_difference import another_job
 
 _LIMIT = 1 << 26  # [bytes] of a part; a branch of 20 loads has some 10 kB
@@ -15,22 +15,14 @@ _WITHOUT_EFFECT = ("name", "description")  # on any number
 Entry = dict[str, Any]  # of a job file
 
 
-class _Asked(Protocol):
-    def resolved(self) -> Entry: ...
-    def fingerprint(self) -> str: ...
-
-
-Asked = TypeVar("Asked", bound=_Asked)
-
-
-class PartsFolder(OutputFolder[Asked], Generic[Asked]):
+class PartsFolder(OutputFolder[Content]):
     """The output folder of an experiment with parts; a study or another experiment may share it.
 
     Parameters
     ----------
     path : Path
         The folder; it need not exist.
-    asked : Asked
+    asked : Content
         The content that is to be made in it.
 
     Attributes
@@ -41,7 +33,7 @@ class PartsFolder(OutputFolder[Asked], Generic[Asked]):
         Files of the results, named as the job file is.
     """
 
-    def __init__(self, path: Path, asked: Asked) -> None:
+    def __init__(self, path: Path, asked: Content) -> None:
         super().__init__(path)
         self.parts = Archives(path / self.kind.folders[0], asked.fingerprint(), _LIMIT)
         self.dataset, self.table = (self.job_file.with_suffix(suffix) for suffix in (".nc", ".csv"))
@@ -56,7 +48,7 @@ class PartsFolder(OutputFolder[Asked], Generic[Asked]):
         self.is_picture("", entry["job"])  # KeyError or TypeError where there is no such job
         return entry
 
-    def refuse_other(self, found: Entry, asked: Asked) -> None:
+    def refuse_other(self, found: Entry, asked: Content) -> None:
         """Raise InputError unless the folder is that of the content."""
         if found["fingerprint"] != asked.fingerprint():
             raise another_job(self.path, numbers_of(found["job"]), numbers_of(asked.resolved()))
@@ -64,10 +56,10 @@ class PartsFolder(OutputFolder[Asked], Generic[Asked]):
     def unexplained(self) -> str | None:
         """Return a file that only a job file explains, in words."""
         own = [*self._files(self._asked.resolved()), *([self.parts.folder] if self.parts.written() else [])]
-        names = sorted((path.suffix == ".png", path.name) for path in own)
+        names = sorted((path.suffix == ".png", path.name) for path in own)  # pictures last
         return f"{names[0][1]} without a {self.job_file.name}" if names else None
 
-    def results_tell(self) -> Callable[[Asked], bool] | None:
+    def results_tell(self) -> Callable[[Content], bool] | None:
         """Return a function that decides whether the parts are of a content; None if there are none."""
         fingerprints = self.parts.fingerprints()
         return (lambda asked: fingerprints == {asked.fingerprint()}) if fingerprints else None

@@ -29,7 +29,7 @@ def test_there_are_charts():
 @pytest.mark.parametrize("path", CHARTS, ids=lambda path: path.stem)
 def test_a_chart_is_fit_to_be_made(path):
     chart = load(path)
-    assert chart.name == path.stem and chart.description
+    assert chart.job.name == path.stem and chart.job.description
     check_prospects(chart)
     for scene in chart.scenes:
         assert any(quantity.tolerance < 1.0 for quantity in scene.quantities)

@@ -70,7 +70,7 @@ class Attractor(NamedTuple):
 
 
 class Start(NamedTuple):
-    """Where runs begin.
+    """A start of runs.
 
     Attributes
     ----------
@@ -124,7 +124,7 @@ def attractors(
 def close_values(
     values: Sequence[float], found: Sequence[Attractor], bifurcations: Collection[float], resolution: float
 ) -> list[float]:
-    """Values in the intervals where runs of one start turn from quiet to vibrating, or with a bifurcation."""
+    """Return values in the intervals where runs of one start turn, or which hold a bifurcation."""
     split = {pair for pair in pairwise(values) if any(pair[0] < place < pair[1] for place in bifurcations)}
     for start in {one.start for one in found}:
         said = [one for one in found if one.start == start and one.occurrence in _SAID]
@@ -172,7 +172,7 @@ class _AtRest(NamedTuple):
 
 
 def _at_rest(batch: Any, state: State) -> _AtRest:
-    """In a state when the strands are to be disturbed, and the load has risen."""
+    """Return a run in a state, at the time when its strands are disturbed and the load has risen."""
     done = batch.plan.kick
     state = state.copy()
     state.scalars[f.TIME] = done * batch.interval
@@ -206,7 +206,7 @@ def _run_batch(job: Job, group: list[_Started]) -> list[Attractor]:
 
 
 class Stability(IntEnum):
-    """Of a steady state."""
+    """Stability of a steady state."""
 
     STABLE = 0
     UNSTABLE = 1
@@ -242,12 +242,12 @@ class Followed(NamedTuple):
 
     @property
     def missed(self) -> np.ndarray:
-        """Whether there is no steady state, (load,)."""
+        """Tell where no steady state was found, (load,)."""
         return self.states["stability"] == Stability.NOT_FOUND
 
 
 def states_of(found: Branch, grid: Mesh, loads: Sequence[float]) -> Arrays:
-    """Steady states and modes of a branch along the load.
+    """Return steady states and modes of a branch along the load.
 
     Parameters
     ----------

@@ -63,7 +63,7 @@ _REASON = "why the run failed, or was found to vibrate or not"
 
 
 def _picture_names(branches: int) -> list[str]:
-    """Names of the pictures of so many branches."""
+    """Return the names of the pictures of so many branches."""
     return [f"branch_{number}.png" for number in range(1, branches + 1)] if branches > 1 else ["branch.png"]
 
 
@@ -76,7 +76,7 @@ class DiagramFolder(PartsFolder[Diagram]):
 
     def is_picture(self, name: str, job: dict[str, Any]) -> bool:
         """Return whether a file of this name is a picture of as many branches as a diagram has."""
-        branches = prod(len(values) for axis, values in job["axes"].items() if axis != "load")
+        branches = prod(len(values) for axis, values in dict(job["axes"]).items() if axis != "load")
         return bool((number := _PICTURE.fullmatch(name)) and int(number[1] or 1) <= branches)
 
     def load_branch(self, number: int) -> Followed | None:
@@ -152,7 +152,7 @@ def _follow(diagram: Diagram, asked: Asked) -> Followed:
 
 
 def _steady_state(belt: SteadyBelt, found: Branch, load: float) -> State | None:
-    """The steady state under a load; none beside a gap, where to look for one takes long."""
+    """Return the steady state under a load; none beside a gap, where a search takes long."""
     points = found.points
     if not points or _beside_gap(found, load):
         return None
@@ -164,7 +164,7 @@ def _steady_state(belt: SteadyBelt, found: Branch, load: float) -> State | None:
 
 
 def _beside_gap(found: Branch, load: float) -> bool:
-    """Whether the next load of the branch, on either side, is one without a steady state."""
+    """Tell whether the next load of the branch, on either side, has no steady state."""
     loads = np.array(sorted([*found.missed, *(point.steady.load for point in found.points)]))
     at = np.searchsorted(loads, load)
     beside = loads[at : at + 1] if load in loads else loads[max(at - 1, 0) : at + 1]
@@ -172,7 +172,7 @@ def _beside_gap(found: Branch, load: float) -> bool:
 
 
 class Direction(IntEnum):
-    """Where the mode of a Hopf point grows."""
+    """Side of a Hopf point on which its mode grows."""
 
     GROWS_ABOVE = 0
     GROWS_BELOW = 1
@@ -181,7 +181,7 @@ class Direction(IntEnum):
 def diagram_dataset(
     diagram: Diagram, followed: Mapping[int, Followed], makers: Sequence[Mapping[str, Any]] = ()
 ) -> xr.Dataset:
-    """All branches in one dataset.
+    """Return all branches in one dataset.
 
     Parameters
     ----------
@@ -223,7 +223,7 @@ def diagram_dataset(
 
 
 def _states(diagram: Diagram, followed: _Numbered) -> dict[str, Any]:
-    """Steady states and modes over axes and load, and whether the states are stable."""
+    """Return steady states with their stability, and modes, over axes and load."""
     axes = [(len(axis.values), axis.name) for axis in diagram.axes] + [(len(diagram.loads), "load")]
     grid, dims = zip(*axes, strict=True)
     states = [(number, one.states) for number, one in followed]
@@ -250,7 +250,7 @@ def _states(diagram: Diagram, followed: _Numbered) -> dict[str, Any]:
 
 
 def _onsets(followed: _Numbered) -> dict[str, Any]:
-    """The Hopf points of all branches, one after the other."""
+    """Return the Hopf points of all branches, one after the other."""
     rows = [
         (number, onset, kind)
         for number, one in followed
@@ -280,7 +280,7 @@ def _onsets(followed: _Numbered) -> dict[str, Any]:
 
 
 def _runs(followed: _Numbered) -> dict[str, Any]:
-    """The runs of all branches, one after the other."""
+    """Return the runs of all branches, one after the other."""
     rows = [(number, run) for number, one in followed for run in one.runs]
     columns: dict[str, tuple[list[Any], Any, str, str, str]] = {
         "run_branch": ([n for n, _ in rows], np.int32, "1", "branch", _BRANCH),

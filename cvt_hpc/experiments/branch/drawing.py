@@ -59,7 +59,7 @@ def branch_figure(diagram: Diagram, followed: Followed) -> Figure:
 
 
 def stable_parts(loads: np.ndarray, is_stable: bool, onsets: list[Onset]) -> list[tuple[float, float, bool]]:
-    """Loads between which steady states are stable, or not.
+    """Return the loads between which steady states are stable, or not.
 
     Parameters
     ----------
@@ -84,7 +84,7 @@ def stable_parts(loads: np.ndarray, is_stable: bool, onsets: list[Onset]) -> lis
 
 
 def _draw_attractors(axes: Axes, followed: Followed, scale: float) -> None:
-    """The steady state, its Hopf points, and the results of runs, over `scale` times the load."""
+    """Draw the steady state, its Hopf points and the results of runs over `scale` times the load."""
     loads, is_stable = followed.states["load"], followed.states["stability"] == Stability.STABLE
     for piece in np.ma.clump_unmasked(np.ma.array(loads, mask=followed.missed)):
         for low, high, stable in stable_parts(loads[piece], is_stable[piece][0], followed.onsets):
@@ -128,12 +128,12 @@ def _draw_attractors(axes: Axes, followed: Followed, scale: float) -> None:
 
 
 def _at_edge(followed: Followed) -> list[Attractor]:
-    """Runs that have come to no limit cycle."""
+    """Return the runs that have come to no limit cycle."""
     return [run for run in followed.runs if run.occurrence in _AT_EDGE]
 
 
 def _draw_modes(growth: Axes, frequency: Axes, followed: Followed, scale: float) -> None:
-    """Growth rate and frequency of the modes over `scale` times the load, unstable ones drawn thick."""
+    """Draw growth rate and frequency of the modes over `scale` times the load, unstable ones thick."""
     growth.axhline(0.0, color="black", linewidth=0.8)
     values = [followed.states[name].T for name in OF_MODES]
     for line in zip(*values, strict=True):
@@ -157,14 +157,14 @@ def _waves(count: int) -> str:
 
 
 def _gaps(loads: np.ndarray, missed: np.ndarray) -> list[tuple[float, float]]:
-    """Loads between which there is no steady state: from the last load with a state to the next."""
+    """Return pairs of loads with a steady state, between which there is none."""
     gaps = np.ma.clump_masked(np.ma.array(loads, mask=missed))
     last = len(loads) - 1
     return [(loads[max(gap.start - 1, 0)], loads[min(gap.stop, last)]) for gap in gaps]
 
 
 def _legend(followed: Followed) -> list[Line2D | Patch]:
-    """Caption of the sheet."""
+    """Return the entries of the legend."""
     handles: list[Line2D | Patch] = [
         Line2D([], [], color="black", linewidth=1.8, label="steady state, stable"),
         Line2D([], [], color="black", linewidth=1.8, linestyle=(0, (4, 3)), label="unstable"),

@@ -177,7 +177,7 @@ def _check_disturbance(values: tuple[float, ...], where: str) -> None:
 
 
 def _runs(job: Job, place: dict[str, Any], settings: dict[str, Any], where: str) -> Job:
-    """The job of the transients beside a branch: the same scene, judged in the same band."""
+    """Return the job of the transients beside a branch, in its scene and judged in its band."""
     alternatives = {key for key, parameter in job.schema.parameters.items() if parameter.gives}
     tables = job.tables(job.complete(place), {"load", *alternatives})
     band = tables.pop("judgement")
@@ -190,7 +190,7 @@ def _runs(job: Job, place: dict[str, Any], settings: dict[str, Any], where: str)
 
 
 class Cost(NamedTuple):
-    """Of a branch: core-seconds of its steady states and of its runs, and the number of runs."""
+    """Cost of a branch: core-seconds of its steady states and of its runs, and the number of runs."""
 
     steady: float
     transient: float

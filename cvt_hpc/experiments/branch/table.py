@@ -46,7 +46,7 @@ def branch_lines(diagram: Diagram, followed: Followed) -> Iterator[str]:
 
 
 def place_text(diagram: Diagram, asked: Asked) -> str:
-    """Values of the axes other than the load, and of the parameters on which a branch depends most."""
+    """Return the place of a branch in words: other axes than the load, and leading parameters."""
     schema = diagram.job.schema
     values = {name: asked.parameters[name] for name in NAMED} | asked.place
     return ", ".join(
@@ -72,7 +72,7 @@ def _direction(onset: Onset) -> str:
 
 
 def _kind_text(diagram: Diagram, kind: Criticality) -> str:
-    """Whether a Hopf point is super- or subcritical."""
+    """Return in words whether a Hopf point is super- or subcritical."""
     along = load_attributes(diagram.job)
     unit = shown_unit(along)
     if kind.kind is Kind.SUBCRITICAL:
@@ -95,12 +95,12 @@ def gap_lines(diagram: Diagram, followed: Followed) -> Iterator[str]:
 
 
 def _load_number(diagram: Diagram, load: float) -> str:
-    """A load [N m] in the unit of the job, without that unit."""
+    """Return a load [N m] as a number in the unit of the job."""
     return f"{shown_number(load, load_attributes(diagram.job)):g}"
 
 
 def _load_text(diagram: Diagram, *loads: float, most: int = MOST_NAMED) -> str:
-    """Loads [N m] in the unit of the job; of many the first ones and the last."""
+    """Return loads [N m] in the unit of the job; of many the first ones and the last."""
     numbers = [_load_number(diagram, load) for load in loads]
     return f"{few_of(numbers, most)} {shown_unit(load_attributes(diagram.job))}"
 
@@ -121,12 +121,12 @@ def failure_lines(diagram: Diagram, followed: Followed) -> Iterator[str]:
 
 
 def _failed_runs(followed: Followed) -> list[Attractor]:
-    """Runs of a branch that ended without results."""
+    """Return the runs of a branch that ended without results."""
     return [run for run in followed.runs if run.occurrence == OccurrenceClass.FAILED]
 
 
 def lowest_judged(asked: Asked, load: float) -> float:
-    """Lowest frequency of a mode that the runs of a branch under a load [N m] are judged by [Hz]."""
+    """Return the lowest frequency [Hz] of a mode by which runs of a branch under a load [N m] are judged."""
     return SEEN * steady_band(asked.parameters | {"load": load})[0]
 
 
@@ -138,7 +138,7 @@ def with_kinds(
     hidden: list[tuple[float, float]],
     runs: list[Attractor],
 ) -> Followed:
-    """A branch with the kinds of its Hopf points, super- or subcritical, with loads in the unit of the job.
+    """Return a branch with the kinds of its Hopf points; reasons give loads in the unit of the job.
 
     Parameters
     ----------
@@ -162,7 +162,7 @@ def judged(
     lowest: Callable[[float], float],
     in_words: Callable[[float], str],
 ) -> Criticality:
-    """Whether a Hopf point is super- or subcritical, if its mode is within the band by which runs are judged.
+    """Judge whether a Hopf point is super- or subcritical, if its mode lies in the band of the runs.
 
     Parameters
     ----------

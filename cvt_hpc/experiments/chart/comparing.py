@@ -77,7 +77,7 @@ class Comparison:
 
     @property
     def results(self) -> tuple[Result, ...]:
-        """All results: of the reference, of the methods, of the choices."""
+        """Return all results: of the reference, of the methods, of the choices."""
         return (self.reference, *self.methods, *self.choices)
 
 
@@ -132,7 +132,7 @@ def _judge(
 def _own_errors(
     chart: Chart, scene: Scene, reference: Measurement, measurements: Mapping[str, Measurement]
 ) -> dict[str, float]:
-    """Error of the reference: its distance from the coarser one, and the scatter of that over the starts.
+    """Return errors of the reference: its distance from the coarser one, and the scatter over starts.
 
     For an error in proportion to the step, or to the step and to cells that are coarser by the same factor,
     the distance is that of the steps, so many times the error; no higher order is assumed, and none for a
@@ -233,7 +233,7 @@ def choose(scene: Scene, own: Mapping[str, float], results: list[Result]) -> tup
 
 
 def _strand(name: str, values: Array, reference: Measurement) -> Array:
-    """Values (starts, strand) of the strand that is judged; all of them where all are."""
+    """Return the values (starts, strand) of the judged strand, or of all strands where all are judged."""
     if name not in _OF_ONE_STRAND or values.shape[1] == 1:
         return values
     strongest = int(np.argmax(pool("amplitude", reference.values["amplitude"])))

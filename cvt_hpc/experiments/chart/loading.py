@@ -140,7 +140,7 @@ def _method_points(name: str, raw: Any, stages: list[Stage], where: str) -> Iter
 
 
 def _budget_points(raw: Any, stages: list[Stage], where: str) -> tuple[list[Point], tuple[str, ...]]:
-    """The base and the choices of the error budget, and the quantities that it shows."""
+    """Return base and choices of the error budget, and the quantities that it shows."""
     own = read_table(BUDGET, raw, where, ("set", "quantities", "choices"))
     (stage,) = _chosen_stages([own["scene"]], stages, where)
     base = read_set(raw, where)
@@ -162,7 +162,7 @@ def _budget_points(raw: Any, stages: list[Stage], where: str) -> tuple[list[Poin
 
 
 def _budgeted(names: Any, scene: Scene, where: str) -> tuple[str, ...]:
-    """The quantities that were named, or else all of the scene but the trajectory, which no choice keeps."""
+    """Return the named quantities, or else all of the scene but the trajectory, which no choice keeps."""
     known = [quantity.name for quantity in scene.quantities]
     if names is None:
         return tuple(name for name in known if name != "trajectory")

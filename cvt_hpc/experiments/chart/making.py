@@ -291,7 +291,7 @@ def _errors(result: Result, names: Sequence[str]) -> list[str]:
 
 
 def _note(result: Result) -> str:
-    """Further remarks on a point."""
+    """Return further remarks on a point."""
     if result.measurement.reason:
         return shorten(f"failed: {result.measurement.reason}", _LONGEST_NOTE, placeholder=" ...")
     if result.point.role is Role.CHOICE:

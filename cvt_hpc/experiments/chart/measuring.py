@@ -54,7 +54,7 @@ class Marched:
 
     @property
     def cost(self) -> float:
-        """Core-seconds for each simulated second of a run."""
+        """Return core-seconds for each simulated second of a run."""
         return self.core_seconds / self.simulated if self.simulated > 0.0 else math.nan
 
 
@@ -119,7 +119,7 @@ def march(
 
 
 def _stop_after(seconds: float) -> Callable[[], str | None] | None:
-    """A function that ends a march after so much processor time; None where there is no limit."""
+    """Return a function that ends a march after so much processor time; None without a limit."""
     if math.isinf(seconds):
         return None
     end = time.process_time() + seconds
@@ -192,7 +192,7 @@ def measure(point: Point, scene: Scene, repeats: int, time_limit: float) -> Meas
 
 
 def _led(point: Point, scene: Scene, runs: int) -> tuple[Any, ...]:
-    """Runs that a point's take over from; none where they start by themselves."""
+    """Return the runs from which those of a point take over; none where they start by themselves."""
     if scene.lead is None:
         return ()
     job, until = scene.lead.job, scene.lead.until
@@ -208,7 +208,7 @@ def _exact_displacement(point: Point, start: int) -> tuple[Any, NDArray[np.float
 
 
 def _exact(point: Point, scene: Scene) -> Measurement:
-    """The model's exact solution in the place of a run."""
+    """Measure the model's exact solution in the place of a run."""
     observed = []
     for start in range(point.starts):
         run, displacement = _exact_displacement(point, start)
@@ -219,7 +219,7 @@ def _exact(point: Point, scene: Scene) -> Measurement:
 
 
 def _outcome(point: Point, scene: Scene, marched: Marched) -> tuple[str, dict[str, NDArray[np.float64]]]:
-    """Why a point failed, or else its values."""
+    """Return the reason why a point failed, or else its values."""
     whole = math.isinf(point.until) and scene.lead is None
     observed = []
     for k, run in enumerate(marched.runs[: point.starts]):
@@ -253,7 +253,7 @@ def _columns(run: Any) -> tuple[list[int], tuple[str, ...]]:
 
 
 def _doubt(name: str, run: Run) -> Failure | None:
-    """Why a run that has reached its end is not to be trusted, of models that judge their runs."""
+    """Return the reason not to trust a run at its end, if its model judges runs."""
     model = load_model(name)
     return run.numerical_doubt(model.judge(run)) if model.is_recorded else None
 
@@ -268,7 +268,7 @@ def _mean_counters(marched: Marched) -> dict[str, float]:
 
 
 def predicted_cost(chart: Chart, point: Point) -> float:
-    """Core-seconds that a point takes, at most as many as its time limit allows.
+    """Return the core-seconds that a point takes, within its time limit.
 
     Little is known of methods that choose their step. Not known (nan) of a model without records; an exact
     solution takes next to nothing.
@@ -295,7 +295,7 @@ def predicted_cost(chart: Chart, point: Point) -> float:
 
 
 def _march_cost(job: Job, until: float) -> float:
-    """Core-seconds of a batch up to a time [s]; inf: to its end."""
+    """Return the core-seconds of a batch up to a time [s]; inf: to its end."""
     whole = float(load_model(job.model).cost(job.parameters, job.stepper))
     return whole * min(until / job.parameters["duration"], 1.0)
 

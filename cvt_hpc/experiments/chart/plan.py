@@ -49,7 +49,7 @@ class Quantity:
 
 @dataclass(frozen=True)
 class Lead:
-    """How runs get to the state from which the methods of a scene march.
+    """Run to the state from which the methods of a scene march.
 
     Attributes
     ----------
@@ -137,17 +137,17 @@ class Point:
 
     @property
     def timed(self) -> bool:
-        """Whether its cost is of interest."""
+        """Tell whether the cost is of interest."""
         return self.role is Role.METHOD
 
     @property
     def setting(self) -> float:
-        """Value of the parameter `key` [SI]; nan where there is none."""
+        """Return the value of the parameter `key` [SI]; nan where there is none."""
         return float(self.job.parameters[self.key]) if self.key else math.nan
 
     @property
     def setting_in_words(self) -> str:
-        """The same for people, such as "3 µs"; "" where there is none."""
+        """Return the setting for people, such as "3 µs"; "" where there is none."""
         if not self.key:
             return ""
         schema = self.job.schema

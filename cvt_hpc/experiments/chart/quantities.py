@@ -48,17 +48,17 @@ class History:
 
     @property
     def rate(self) -> float:
-        """Sampling rate [Hz]."""
+        """Return the sampling rate [Hz]."""
         return float(self.parameters["sampling_rate"])
 
     @property
     def band(self) -> tuple[float, float]:
-        """Where vibrations are looked for [Hz]."""
+        """Return the band in which vibrations are looked for [Hz]."""
         return band(self.parameters)
 
     @property
     def judged(self) -> slice:
-        """Samples of the part of the run that is judged."""
+        """Return the samples of the judged part of the run."""
         samples = len(self.displacement)
         return slice(samples - round(self.parameters["judged_fraction"] * samples), samples)
 
@@ -126,7 +126,7 @@ def _onset(history: History, quantity: Quantity) -> Array:
 
 
 def _means(unit: str, title: str, *channels: str) -> Kind:
-    """Means of channels over the judged part."""
+    """Return the kind of quantity that is the mean of channels over the judged part."""
 
     def values(history: History, quantity: Quantity) -> Array:
         return np.array([history.channel(name)[history.judged].mean() for name in channels])
@@ -230,5 +230,5 @@ def _assessed(history: History) -> Any:
 
 
 def _at_strongest(history: History, values: Array) -> Array:
-    """Values (probe,) at the probe of each strand that moves most."""
+    """Return the values (probe,) at the probe of each strand that moves most."""
     return values[_assessed(history).strongest_probe]

@@ -100,7 +100,7 @@ def _mark_point(axes: Axes, result: Result, name: str, error: float, cost: float
 
 
 def _limit(axes: Axes, quantity: Quantity, own: float, floor: float) -> None:
-    """Limits of the error's axis, the tolerance, and the part where the reference itself is not known."""
+    """Draw the limits of the error's axis, the tolerance, and the reference's own error."""
     drawn = [x for line in axes.lines for x in np.atleast_1d(line.get_xdata())]
     marks = [x for x in (own, quantity.tolerance) if 0.0 < x < math.inf]
     low = figures.set_error_axis(axes, [*drawn, *marks])
@@ -113,7 +113,7 @@ def _limit(axes: Axes, quantity: Quantity, own: float, floor: float) -> None:
 
 
 def _series(results: Sequence[Result]) -> dict[str, list[Result]]:
-    """The methods by their name, in the job's order, each along its setting."""
+    """Return the methods by name, in the job's order, each along its setting."""
     series: dict[str, list[Result]] = {}
     for result in results:
         series.setdefault(result.point.series, []).append(result)
@@ -145,7 +145,7 @@ def _is_drawn(result: Result, name: str) -> bool:
 
 
 def _floor(quantity: Quantity, comparison: Comparison) -> float:
-    """Where an error of 0 is drawn: a little left of the smallest one."""
+    """Return the place of an error of 0: a little left of the smallest one."""
     errors = [r.errors[quantity.name] for r in comparison.methods if _is_drawn(r, quantity.name)]
     return min((e for e in errors if e > 0.0), default=1e-3) / figures.MARGIN
 
@@ -158,7 +158,7 @@ def _heading(quantity: Quantity) -> str:
 
 
 def _error_label(quantity: Quantity) -> str:
-    """Label at the axis of a quantity's errors."""
+    """Return the label at the axis of a quantity's errors."""
     if quantity.scale == 0.0:
         return "relative error"
     factor, unit = (
@@ -168,7 +168,7 @@ def _error_label(quantity: Quantity) -> str:
 
 
 def notes(comparison: Comparison) -> list[str]:
-    """Text under the panels: the chosen method, and points that are not drawn, with the reason."""
+    """Return the text under the panels: the chosen method, and reasons for points that are not drawn."""
     point = comparison.reference.point
     known = f"{point.label} at {point.setting_in_words}; its own error from a coarser one"
     lines = [f"reference: {'exact solution' if comparison.scene.exact else known}"]
@@ -184,7 +184,7 @@ def notes(comparison: Comparison) -> list[str]:
 
 
 def _omitted(comparison: Comparison) -> dict[str, dict[str, list[str]]]:
-    """Points that are not drawn in all panels: reason -> method -> settings."""
+    """Return the points that are not drawn in all panels: reason -> method -> settings."""
     omitted: dict[str, dict[str, list[str]]] = {}
     for result in comparison.methods:
         for why in _reasons(result):
@@ -194,7 +194,7 @@ def _omitted(comparison: Comparison) -> dict[str, dict[str, list[str]]]:
 
 
 def _reasons(result: Result) -> list[str]:
-    """Why a point is not drawn, in general words: where and after how many steps is in the table."""
+    """Return reasons for a point that is not drawn, in general words; the table has the details."""
     if reason := result.measurement.reason:
         return [f"failed, {_DETAILS.sub('', reason.partition(': ')[2])}"]
     errors = {name.replace("_", " "): error for name, error in result.errors.items()}
@@ -222,7 +222,7 @@ def budget_figure(comparison: Comparison) -> Figure:
 
 
 def _budget_legend(comparison: Comparison, quantities: Sequence[Quantity]) -> list[Line2D]:
-    """Description of the budget that is drawn."""
+    """Return the entries of the budget's legend."""
     drawn = [choice for choice in comparison.choices if not choice.measurement.reason]
     dot = partial(Line2D, [], [], ls="", marker="o")
     handles = []
@@ -266,7 +266,7 @@ def _draw_budget_panel(axes: Axes, quantity: Quantity, choices: Sequence[Result]
 
 
 def _in_order(choices: Sequence[Result], quantities: Sequence[Quantity]) -> list[Result]:
-    """Errors of the base first, the largest on top, then all other choices as the job lists them."""
+    """Return errors of the base, the largest first, then all other choices as the job lists them."""
 
     def size(choice: Result) -> float:
         worst = [choice.errors[q.name] / min(q.tolerance, 1.0) for q in quantities]

@@ -96,7 +96,7 @@ class Stage:
 
     @property
     def until(self) -> float:
-        """End of the march of its runs [s]: where methods take over, or the end of the judged part."""
+        """Return the end of the march of its runs [s]; inf: their own end."""
         return max(q.until for q in self.scene.quantities) if self.scene.lead else math.inf
 
     def job(self, where: str, model: str = "", **values: Any) -> Job:
@@ -183,7 +183,7 @@ def _check_replaced(replaced: dict[str, Any], model: Any, where: str, source: st
 
 
 def _read_lead(stage: Stage, raw: Any) -> Lead:
-    """The lead-in run that brings the runs of a scene to the state where its methods take over."""
+    """Return the lead-in run to the state where the methods of a scene take over."""
     where = f"{stage.where} lead"
     own = read_table(LEAD, raw, where, ("set",))
     if stage.scene.exact:

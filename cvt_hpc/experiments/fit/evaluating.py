@@ -204,7 +204,7 @@ def _is_legal(scene: Job, at: Mapping[str, float]) -> bool:
 
 
 def _fields(fit: Fit, dataset: xr.Dataset) -> dict[str, NDArray]:
-    """Arrays over the runs: class, whether they count, and the quantities of the targets."""
+    """Return arrays over the runs: class, whether they count, and the quantities of the targets."""
     status, vibrates = dataset["status"].values, dataset["vibrates"].values
     classes = classify_runs(status, vibrates)
     names = {"amplitude", *(target.quantity for target in fit.targets), *fit.counted} - {""}
@@ -217,7 +217,7 @@ def _fields(fit: Fit, dataset: xr.Dataset) -> dict[str, NDArray]:
 
 
 def _quantity(dataset: xr.Dataset, name: str) -> NDArray[np.float64]:
-    """A recorded number of each run, of the strand or pulley that is named, or else that moves most."""
+    """Return a number of each run, of the strand or pulley that is named, or else that moves most."""
     variable, _, label = name.partition(" ")
     array = dataset[variable].transpose("run", ...)
     values = array.values.astype(float)

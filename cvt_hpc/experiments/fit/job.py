@@ -77,11 +77,11 @@ class Course:
 
     @property
     def vibrates(self) -> NDArray[np.bool_]:
-        """Which runs vibrate, and count."""
+        """Tell which runs vibrate, and count."""
         return (self.classes == VIBRATING) & self.counted
 
     def between(self, low: float, high: float) -> Course:
-        """The runs from one value to another, both included but for rounding."""
+        """Return the runs from one value to another, both included but for rounding."""
         slack = 1e-9 * np.abs(self.values).max()
         chosen = (self.values >= low - slack) & (self.values <= high + slack)
         quantities = {name: values[chosen] for name, values in self.quantities.items()}
@@ -141,19 +141,19 @@ def score(target: Target, courses: Mapping[str, Course]) -> float:
 
 
 def total(targets: Sequence[Target], scores: NDArray[np.float64]) -> NDArray[np.float64]:
-    """Weighted mean of scores, shape (..., target)."""
+    """Return the weighted mean of scores, shape (..., target)."""
     return np.average(scores, axis=-1, weights=[target.weight for target in targets])
 
 
 def verdict(value: float) -> str:
-    """The meaning of a score for a statement, in words."""
+    """Return the meaning of a score for a statement, in words."""
     if value >= REPRODUCED:
         return "reproduced"
     return "not reproduced" if value <= NOT_REPRODUCED else "partly"
 
 
 def areas(course: Course) -> list[tuple[float, float]]:
-    """First and last value of each area of vibration; two areas have a quiet run between them."""
+    """Return first and last value of each area of vibration; a quiet run lies between two areas."""
     found: list[tuple[float, float]] = []
     parted = True
     for value, vibrates, kind in zip(course.values, course.vibrates, course.classes, strict=True):
@@ -165,35 +165,35 @@ def areas(course: Course) -> list[tuple[float, float]]:
 
 
 def _vibrating(target: Target, asked: Course, other: Course) -> float:
-    """Share of the runs that vibrate."""
+    """Return the share of the runs that vibrate."""
     return float(asked.vibrates.mean())
 
 
 def _quiet(target: Target, asked: Course, other: Course) -> float:
-    """Share of the counted runs that are quiet; 0 where none counts."""
+    """Return the share of the counted runs that are quiet; 0 where none counts."""
     return float((asked.classes[asked.counted] == QUIET).mean()) if asked.counted.any() else 0.0
 
 
 def _within(target: Target, asked: Course, other: Course) -> float:
-    """Mean over the vibrating runs of how near the quantity is to its bounds; 0 where none vibrates."""
+    """Return the mean score of the quantity over the vibrating runs; 0 where none vibrates."""
     if not asked.vibrates.any():
         return 0.0
     return float(_near(asked.quantities[target.quantity][asked.vibrates], target).mean())
 
 
 def _areas(target: Target, asked: Course, other: Course) -> float:
-    """Whether so many separate areas vibrate; each that is missing or too many costs its share."""
+    """Score the number of separate areas; each that is missing or too many costs its share."""
     return max(0.0, 1.0 - abs(len(areas(asked)) - target.count) / target.count)
 
 
 def _onset(target: Target, asked: Course, other: Course) -> float:
-    """How near the first vibrating run is to its bounds; 0 where none vibrates."""
+    """Score the first vibrating run by its bounds; 0 where none vibrates."""
     first = asked.values[asked.vibrates][:1]
     return float(_near(first, target).sum())
 
 
 def _larger(target: Target, asked: Course, other: Course) -> float:
-    """By how much the largest amplitude exceeds that of the other case; 0 where one of them is silent."""
+    """Score the ratio of the largest amplitudes of two cases; 0 where one of them is silent."""
     if not (asked.vibrates.any() and other.vibrates.any()):
         return 0.0
     of_each = (one.quantities["amplitude"][one.vibrates].max() for one in (asked, other))
@@ -201,7 +201,7 @@ def _larger(target: Target, asked: Course, other: Course) -> float:
 
 
 def _near(values: NDArray[np.float64], target: Target) -> NDArray[np.float64]:
-    """1 between the bounds, falling linearly to 0 at the distance `fading` from them."""
+    """Return 1 between the bounds, falling linearly to 0 at the distance `fading` from them."""
     low, high = target.bounds
     distance = np.maximum(np.maximum(low - values, values - high), 0.0)
     return np.clip(1.0 - distance / target.fading, 0.0, 1.0)
@@ -287,7 +287,7 @@ class Fit:
 
     @property
     def thinned(self) -> NDArray[np.float64]:
-        """Values along the swept parameter that the search runs."""
+        """Return the values along the swept parameter that the search runs."""
         return self.values[:: self.every]
 
     def coarse_job(self) -> Job:
@@ -296,7 +296,7 @@ class Fit:
         return rebuild_job(document, self.job.source, self.job.units, self.coarse, f"[{TABLE}] coarse")
 
     def scenes(self, shares: NDArray[np.float64]) -> NDArray[np.float64]:
-        """Values [SI] of the free parameters at shares of their ranges, shape (..., free)."""
+        """Return values [SI] of the free parameters at shares of their ranges, shape (..., free)."""
         columns = zip(self.free, np.moveaxis(shares, -1, 0), strict=True)
         return np.stack([between(*one[1:], share) for one, share in columns], axis=-1)
 

@@ -93,7 +93,7 @@ def load(path: str | Path, overrides: Assignments = ()) -> Fit:
 
 
 def _looked_at(fit: Fit) -> dict[str, list[float]]:
-    """Ends of all ranges, the swept values and those of the cases [SI], by parameter."""
+    """Return ends of all ranges, the swept values and those of the cases [SI], by parameter."""
     found: dict[str, list[float]] = {one.name: [one.low, one.high] for one in fit.free}
     found[fit.along] = list(fit.values)
     for case in fit.cases.values():

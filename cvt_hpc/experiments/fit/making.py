@@ -116,7 +116,7 @@ def write_table(fit: Fit, table: Table, folder: Path) -> Path:
 
 
 def _set_table(fit: Fit, found: Found, best: Confirmed, around: Around) -> Table:
-    """The set: its equals, the distance of each parameter from silence, and its influence."""
+    """Tabulate the set: its equals, the distance of each parameter from silence, and its influence."""
     good = found.scenes[found.totals >= fit.accepted * found.totals.max()]
     of_total = {index.parameter: index for index in around.indices if index.score == "total"}
     rows: list[Row] = []
@@ -144,7 +144,7 @@ def _set_table(fit: Fit, found: Found, best: Confirmed, around: Around) -> Table
 
 
 def _verdict_table(fit: Fit, best: Confirmed) -> Table:
-    """Results of the best set for each statement."""
+    """Tabulate the results of the best set for each statement."""
     rows = []
     for k, target in enumerate(fit.targets):
         told = "; ".join(dict.fromkeys(in_words(fit, courses[target.case]) for courses in best.courses))
@@ -157,7 +157,7 @@ def _verdict_table(fit: Fit, best: Confirmed) -> Table:
 
 
 def _confirmed_table(fit: Fit, confirmed: Sequence[Confirmed]) -> Table:
-    """The sets that were run in full, the best one first."""
+    """Tabulate the sets that were run in full, the best one first."""
     rows = [
         [one.name, *_in_units(fit, one.scene), one.coarse, one.total, *one.spread, *one.mean]
         for one in confirmed
@@ -169,7 +169,7 @@ def _confirmed_table(fit: Fit, confirmed: Sequence[Confirmed]) -> Table:
 
 
 def _candidate_table(fit: Fit, found: Found) -> Table:
-    """All candidates of the search, in their order."""
+    """Tabulate all candidates of the search, in their order."""
     rows = [
         [stage, *_in_units(fit, scene), *scores, total]
         for stage, scene, scores, total in zip(*found, strict=True)
@@ -180,7 +180,7 @@ def _candidate_table(fit: Fit, found: Found) -> Table:
 
 
 def conflict_table(fit: Fit, found: Found) -> Table:
-    """Pairs of targets that no candidate of the search meets together, the worst first.
+    """Tabulate pairs of targets that no candidate of the search meets together, the worst first.
 
     The score of a pair is the best that a candidate reaches in the one of the two that it meets less.
     """
@@ -196,7 +196,7 @@ def conflict_table(fit: Fit, found: Found) -> Table:
 
 
 def _distance_table(fit: Fit, looked: Sequence[Around]) -> Table:
-    """Result of the first case of each set where one parameter is moved alone."""
+    """Tabulate the first case of each set with one parameter moved alone."""
     rows = [
         [
             around.name,
@@ -216,7 +216,7 @@ def _distance_table(fit: Fit, looked: Sequence[Around]) -> Table:
 
 
 def _sensitivity_table(fit: Fit, looked: Sequence[Around]) -> Table:
-    """Sobol indices of each score around each set."""
+    """Tabulate Sobol indices of each score around each set."""
     what = (
         f"Sobol indices with their 95 % bounds, all parameters within {fit.nearby:g} of a set; "
         f"{fit.samples} base samples"
@@ -237,7 +237,7 @@ def _set_lines(best: Confirmed, of_set: Table, verdicts: Table) -> Iterator[str]
 
 
 def in_words(fit: Fit, course: Course) -> str:
-    """Where a course vibrates, and where the result is open."""
+    """Return in words where a course vibrates, and where the result is open."""
 
     def span(low: float, high: float) -> str:
         low, high = (_shown(fit, fit.along, end) for end in (low, high))
@@ -253,7 +253,7 @@ def in_words(fit: Fit, course: Course) -> str:
 
 
 def _free(fit: Fit) -> list[str]:
-    """Names of the free parameters with their units for people."""
+    """Return the names of the free parameters with their units for people."""
     units = {one.name: fit.job.schema.unit_in_words(one.name) for one in fit.free}
     return [f"{name} [{unit}]" if unit else name for name, unit in units.items()]
 
@@ -267,7 +267,7 @@ def _in_units(fit: Fit, scene: NDArray[np.float64]) -> list[float]:
 
 
 def _shown(fit: Fit, name: str, value: float) -> float:
-    """A value [SI] in its unit for people."""
+    """Return a value [SI] in its unit for people."""
     schema = fit.job.schema
     return from_si(value, schema.parameters[name].unit, schema.unit_in_words(name))
 

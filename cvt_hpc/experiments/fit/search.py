@@ -47,7 +47,7 @@ class Found(NamedTuple):
     totals: NDArray[np.float64]
 
     def best(self, count: int) -> NDArray[np.intp]:
-        """Places of the best candidates, the earlier one first where two are as good."""
+        """Return places of the best candidates, the earlier one first where two are as good."""
         return np.argsort(-self.totals, kind="stable")[:count]
 
 
@@ -66,7 +66,7 @@ def search(fit: Fit, evaluate: Evaluate, tell: Callable[[str], None] = lambda li
     known: dict[tuple[float, ...], tuple[str, NDArray, NDArray, float]] = {}
 
     def totals_of(name: str, shares: NDArray[np.float64]) -> NDArray[np.float64]:
-        """Total score of each candidate, shape (candidates,); known ones are not run again."""
+        """Return the total score of each candidate, (candidates,); known ones are not run again."""
         keys = [tuple(row) for row in shares.round(_DIGITS).tolist()]
         if new := [key for key in dict.fromkeys(keys) if key not in known]:
             found = evaluate(name, fit.scenes(np.array(new)))
@@ -132,22 +132,22 @@ class Confirmed:
 
     @property
     def is_start(self) -> bool:
-        """Whether the job has it as a start."""
+        """Tell whether the job has the set as a start."""
         return self.name.startswith(_START)
 
     @property
     def total(self) -> float:
-        """Mean over the repeats."""
+        """Return the mean score of the repeats."""
         return float(self.totals.mean())
 
     @property
     def spread(self) -> tuple[float, float]:
-        """Smallest and largest score of the repeats."""
+        """Return the smallest and the largest score of the repeats."""
         return float(self.totals.min()), float(self.totals.max())
 
     @property
     def mean(self) -> NDArray[np.float64]:
-        """Score of each target, mean over the repeats."""
+        """Return the score of each target, mean over the repeats."""
         return self.scores.mean(axis=0)
 
 
@@ -184,7 +184,7 @@ def confirm(fit: Fit, evaluation: Evaluation, found: Found) -> list[Confirmed]:
 
 
 def _repeats(fit: Fit) -> Mapping[str, Mapping[str, Any]]:
-    """Name and settings of the study of each repeat."""
+    """Return name and settings of the study of each repeat."""
     for key, values in fit.repeat.items():
         return {f"confirmed_{number}": {key: value} for number, value in enumerate(values, 1)}
     return {"confirmed": {}}
@@ -210,7 +210,7 @@ class Moved(NamedTuple):
 
     @property
     def is_out(self) -> bool:
-        """Whether nothing vibrates any more; undecided, failed and missing runs may vibrate."""
+        """Tell whether nothing vibrates any more; undecided, failed and missing runs may vibrate."""
         if (self.course.classes == OccurrenceClass.NOT_RUN).all():
             return False
         open_ = (OccurrenceClass.UNDECIDED, OccurrenceClass.IRREGULAR, OccurrenceClass.FAILED)
@@ -280,7 +280,7 @@ def _move_each(fit: Fit, evaluation: Evaluation, study: str, scene: NDArray[np.f
 
 
 def reach(moved: list[Moved], parameter: str) -> tuple[float, float]:
-    """Nearest factors below and above 1 at which the vibration goes out; nan where none was found."""
+    """Return the nearest factors below and above 1 that end the vibration; nan where none was found."""
     out = np.array([one.factor for one in moved if one.parameter == parameter and one.is_out])
     below, above = out[out < 1.0], out[out > 1.0]
     return (
@@ -290,7 +290,7 @@ def reach(moved: list[Moved], parameter: str) -> tuple[float, float]:
 
 
 def sensitivities(fit: Fit, evaluation: Evaluation, study: str, scene: NDArray[np.float64]) -> list[Index]:
-    """Sobol indices of the total score and of each target's, all parameters within a part of a set [SI].
+    """Return Sobol indices of the total score and of each target's around a set [SI].
 
     Parameters are spread evenly by their logarithm, from (1 - nearby) to 1 / (1 - nearby) times the set.
     """
@@ -324,7 +324,7 @@ def _indices(fit: Fit, name: str, scores: NDArray[np.float64], rng: np.random.Ge
 
 
 def _orders(scores: NDArray[np.float64]) -> NDArray[np.float64]:
-    """Indices of first and of total order, shape (2, free)."""
+    """Return indices of first and of total order, shape (2, free)."""
     given = {"f_A": scores[:1], "f_B": scores[1:2], "f_AB": scores[2:, None]}
     found = sobol_indices(func=given, n=scores.shape[1])
     return np.array([np.ravel(found.first_order), np.ravel(found.total_order)])

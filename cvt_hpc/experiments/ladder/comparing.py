@@ -24,7 +24,7 @@ Array = NDArray[np.float64]
 
 
 class Score(NamedTuple):
-    """How well a model answers a question.
+    """Score of a model's answers to a question.
 
     Attributes
     ----------
@@ -96,7 +96,7 @@ def compare(rungs: Sequence[Sweep], results: Mapping[str, xr.Dataset]) -> Iterat
 
 
 def _own(question: str, coarser: Score, reference: xr.Dataset) -> Score:
-    """Estimated error of the reference, by the score of the model that it refines."""
+    """Return the estimated error of the reference, by the score of the model that it refines."""
     if question == "onset":
         spacing = np.diff(np.sort(reference["load"].values)).max(initial=0.0)
         return Score(coarser.cells, median=float(np.fmax(coarser.median, 0.5 * spacing)))
@@ -104,7 +104,7 @@ def _own(question: str, coarser: Score, reference: xr.Dataset) -> Score:
 
 
 def _beside(dataset: xr.Dataset, reference: xr.Dataset) -> xr.Dataset:
-    """A model's results over all axes of the reference: the same along axes that it does not know."""
+    """Return a model's results over all axes of the reference, equal along axes that it does not know."""
     order = reference["status"].dims
     missing = {name: reference[name] for name in order if name not in dataset["status"].dims}
     return dataset.expand_dims(missing).transpose(*order, ...)
@@ -139,12 +139,12 @@ def _onset(found: xr.Dataset, true: xr.Dataset) -> Score:
 
 
 def _levels(dataset: xr.Dataset) -> Array:
-    """1 where a run vibrates, -1 where it is quiet, nan elsewhere."""
+    """Return 1 where a run vibrates, -1 where it is quiet, nan elsewhere."""
     return levels(occurrence_classes(dataset).values)
 
 
 def _growth(dataset: xr.Dataset) -> Array:
-    """Growth rate of the fastest mode [1/s]; where all decay faster than is looked for, that limit."""
+    """Return the growth rate of the fastest mode [1/s], at least the limit of the search for modes."""
     rate = dataset["growth_rate"].values
     return np.where(dataset["status"] == Status.DONE, np.where(np.isnan(rate), -DECAY, rate), np.nan)
 
@@ -177,7 +177,7 @@ def _relative(said: Array, own: Array) -> Score:
 
 
 def _forces(found: xr.Dataset, true: xr.Dataset) -> Score:
-    """Of each cell the larger of two deviations: of strand forces and of axial forces, over the largest."""
+    """Score the larger deviation in each cell, of strand forces or of axial forces, over the largest."""
     largest = np.zeros(true["status"].shape)
     for names in FORCES:
         one, other = (
@@ -193,7 +193,7 @@ def _where_done(dataset: xr.Dataset, name: str) -> Array:
 
 
 def _score(errors: Array, asked: int) -> Score:
-    """Score of errors, nan where the model gives no answer, for the number of requested cells."""
+    """Score errors, nan where the model gives no answer, for the number of requested cells."""
     known = errors[np.isfinite(errors)]
     undecided = 1.0 - known.size / asked if asked else math.nan
     if not known.size:

@@ -161,7 +161,7 @@ def _check_settings(job: Job, settings: Mapping[str, Any], where: str) -> None:
 
 
 def _document(job: Job) -> dict[str, Any]:
-    """The pushbelt of which the job's belt is the continuum: common keys, and keys that follow."""
+    """Return the pushbelt whose continuum is the job's belt: common keys, and keys that follow."""
     where = f"{job.source}: [ladder] reference"
     axes = {axis.name: axis for axis in job.axes}
     varied = varied_by(job.rules, axes)
@@ -267,7 +267,7 @@ def plan_lines(asked: Ladder, out: Path) -> Iterator[str]:
 
 
 def _pushbelt_cost(job: Job) -> str:
-    """Additional cost of the pushbelt as the reference, or the reason why it cannot take the job."""
+    """Return the cost of the pushbelt as the reference, or the reason why it cannot take the job."""
     try:
         jobs = _pushbelt_jobs(job, {})
     except InputError as error:

@@ -133,7 +133,7 @@ def _draw_panel(
 
 
 def _span(finding: Finding) -> tuple[float, float]:
-    """The marked error, and the end of its line: the bound that 95 % keep, or with all undecided."""
+    """Return the marked error and the end of its line: the bound that 95 % keep, or with undecided."""
     score = finding.score
     if finding.question == "occurrence":
         return score.wrong, score.wrong + score.undecided
@@ -224,7 +224,7 @@ def _ladder_dataset(
 
 
 def _numbers(finding: Finding) -> tuple[float, ...]:
-    """Values of NUMBERS, in their order."""
+    """Return the values of NUMBERS, in their order."""
     return (*finding.score, finding.core_seconds)
 
 
