@@ -106,7 +106,7 @@ def test_a_kept_branch_is_told_of_in_the_unit_of_the_job_that_asks(made, tmp_pat
         for start in first
     ]
     folder = DiagramFolder(tmp_path, diagram)
-    folder.branches.folder.mkdir()
+    folder.parts.folder.mkdir()
     folder.save_branch(0, whole._replace(runs=runs))
     (kind,) = folder.load_branch(0).kinds
     assert kind.reason == "both attractors from 92 N m to 94 N m"
