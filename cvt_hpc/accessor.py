@@ -76,7 +76,7 @@ class Results:
         return standard(self._given)
 
     def _history(self, verb: str) -> xr.Dataset:
-        """The same of a run, which a verb draws."""
+        """History of a run, which a verb draws."""
         dataset = self._dataset
         if "status" in dataset and dataset["status"].dims:
             raise mismatch("results", f"the history of a run, which {verb} draws", "a study of several")

@@ -1,4 +1,4 @@
-"""What decides the machine code of a kernel, as a text that is alike wherever the kernel is alike.
+"""Identity of a kernel's machine code, as a text that is alike wherever the kernel is alike.
 
 It is read from memory, since that is what the compiler takes, and not from files, which may have changed:
 the bytecode of a function with its constants, its defaults and closure, and the values of all globals that it

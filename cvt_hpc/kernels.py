@@ -253,7 +253,7 @@ class _Codegen(JITCPUCodegen):
 
 @cache
 def _context() -> Any:
-    """What the compiler has for the processor, with the libraries and names of kernels."""
+    """Context of the compiler for the processor, with the libraries and names of kernels."""
     return cpu_target.target_context.subtarget(
         _internal_codegen=_Codegen("cvt_hpc"), mangler=_name_of_process, target=_Target
     )
@@ -290,7 +290,7 @@ def _name_of_process(name: str, kinds: Any, *, abi_tags: Any = (), uid: Any = No
 
 
 class _Work:
-    """What has to be known of all kernels that are compiled for one call from Python.
+    """State of all kernels that are compiled for one call from Python.
 
     Meanwhile no garbage is collected: hardly any memory becomes free, and looking for it takes a tenth of the
     time.

@@ -10,7 +10,7 @@ Parameters = Mapping[str, Any]  # flat, of one run [SI]
 
 @dataclass(frozen=True)
 class Substitute:
-    """How a parameter follows from another one that a job gives instead.
+    """Rule by which a parameter follows from another one that a job gives instead.
 
     Attributes
     ----------
@@ -54,7 +54,7 @@ class Column:
 
 @dataclass(frozen=True)
 class FromFile:
-    """How a CSV or netCDF file gives other parameters.
+    """Rule by which a CSV or netCDF file gives other parameters.
 
     Attributes
     ----------

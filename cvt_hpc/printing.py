@@ -1,4 +1,4 @@
-"""What the command line prints: reports, states and outcomes in words."""
+"""Texts of the command line: reports, states and outcomes in words."""
 
 from __future__ import annotations
 

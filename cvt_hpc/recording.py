@@ -129,7 +129,7 @@ def start_up_samples(parameters: Parameters) -> int:
 
 
 def first_duration(parameters: Parameters) -> float:
-    """How long a run lasts at the least [s]: half its duration, or a quarter, and so on.
+    """Return the least time that a run lasts [s]: half its duration, or a quarter, and so on.
 
     Parameters
     ----------
@@ -150,7 +150,7 @@ def first_duration(parameters: Parameters) -> float:
 
 
 def longest_duration(parameters: Parameters) -> Any:
-    """How long a run may last that stays undecided [s].
+    """Return the longest time that an undecided run may last [s].
 
     Parameters
     ----------

@@ -16,7 +16,7 @@ import numpy as np
 
 
 class Status(IntEnum):
-    """How a run ended; the CF flags of `status` in results.nc."""
+    """End of a run; the CF flags of `status` in results.nc."""
 
     NOT_RUN = 0
     DONE = 1

@@ -1,4 +1,4 @@
-"""What runs say together and one by one: maps of a study, pictures and files of a run's history."""
+"""Maps of a study, pictures and files of a run's history."""
 
 import contextlib
 import importlib.util

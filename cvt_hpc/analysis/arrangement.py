@@ -1,4 +1,4 @@
-"""How the axes of a study are laid out as a map: along x, along y, over panels, or fixed.
+"""Layout of a study's axes as a map: along x, along y, over panels, or fixed.
 
 A `Ruler` spreads the values of an axis, evenly or by their logarithms, and has the borders between them.
 """
@@ -256,7 +256,7 @@ def infinity_in_words(name: str) -> str:
 
 @dataclass(frozen=True)
 class Ruler:
-    """Where the values of an axis lie along a side of the map.
+    """Positions of an axis's values along a side of the map.
 
     Attributes
     ----------

@@ -34,7 +34,7 @@ CellClass = OccurrenceClass | StartClass | PairClass
 
 @dataclass(frozen=True)
 class ClassStyle:
-    """How a class looks: fill and hatching of its cells, mark on the grid points with its relative size."""
+    """Look of a class: fill and hatching of its cells, mark on the grid points with its relative size."""
 
     fill: str
     ink: str
@@ -97,7 +97,7 @@ FREQUENCY_COLOURS = colours_of("viridis_r", 0.30, 1.0)
 
 @dataclass(frozen=True)
 class Scale:
-    """What colours the vibrating cells, and how."""
+    """Quantity that colours the vibrating cells, with its colour scale."""
 
     colours: Colormap
     norm: Normalize

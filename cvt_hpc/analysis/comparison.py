@@ -49,7 +49,7 @@ _SAMPLES = (*WAYS.values(), ("in full", AUDIT))  # words of a way, and the folde
 
 
 class Deviation(NamedTuple):
-    """How far B deviates from A, relative to A; not a number where nothing is known.
+    """Deviation of B from A, relative to A; not a number where nothing is known.
 
     Attributes
     ----------
@@ -268,7 +268,7 @@ def only(dataset: xr.Dataset, chosen: NDArray[np.bool_]) -> xr.Dataset:
 
 
 def _known(dataset: xr.Dataset) -> dict[str, NDArray]:
-    """What is compared of the runs of a study."""
+    """Quantities of a study's runs that are compared."""
     sizes = {name: at_strongest_strand(dataset, name).values for name in ("amplitude", "frequency")}
     return {"class": occurrence_classes(dataset).values, **sizes}
 
@@ -295,7 +295,7 @@ def _threshold(dataset: xr.Dataset) -> float:
 
 
 def _differing(a: xr.Dataset, b: xr.Dataset) -> dict[str, tuple[Any, Any]]:
-    """By key the values in A and in B of what differs beside their axes; None where there is none."""
+    """Return by key the values in A and in B that differ beside their axes; None where there is none."""
     swept = {name for dataset in (a, b) for name in axes_of(dataset)}
     found = differences(_document(a), _document(b))
     return {key: pair for key, pair in found.items() if key.rpartition(".")[2] not in swept}
@@ -320,7 +320,7 @@ def _in_words(found: Mapping[str, tuple[Any, Any]]) -> Iterator[str]:
 
 
 def _document(dataset: xr.Dataset) -> dict[str, Any]:
-    """What determines the numbers of a study, its axes apart: the resolved job and the versions."""
+    """Return what determines the numbers of a study, its axes apart: the resolved job and the versions."""
     job = {key: value for key, value in job_of(dataset).items() if key not in ("name", "description", "axes")}
     versions = json.loads(dataset.attrs.get("versions", "{}"))
     return job | {"versions": versions, "git_revision": dataset.attrs.get("git_revision")}

@@ -1,4 +1,4 @@
-"""What all pictures share: their arguments, a style, units for people, and how they are written.
+"""Common parts of all pictures: their arguments, a style, units for people, and how they are written.
 
 Pictures of results take
 
@@ -220,7 +220,7 @@ def _texts_within(artist: Artist) -> Iterator[Text]:
 
 
 class Grid(NamedTuple):
-    """How panels are laid out: how many side by side, and the height of each with its title [inch]."""
+    """Layout of panels: how many stand side by side, and the height of each with its title [inch]."""
 
     columns: int
     height: float

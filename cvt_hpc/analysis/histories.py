@@ -206,12 +206,12 @@ def _title(dataset: xr.Dataset) -> str:
 
 
 def place_of(attributes: Mapping[str, Any]) -> list[str]:
-    """Where a run stands, in words: the parts of `values_of`, such as "friction gradient -0.8 s/m"."""
+    """Name the place of a run by the parts of `values_of`, such as "friction gradient -0.8 s/m"."""
     return [f"{key.replace('_', ' ')} {text}" for key, text in values_of(attributes).items()]
 
 
 def values_of(attributes: Mapping[str, Any]) -> dict[str, str]:
-    """By key the values of a run on the axes of its job, and where else it departs from the job."""
+    """Return by key the values of a run on the axes of its job, and where else it departs from the job."""
     if not {"job", "point"} <= attributes.keys():
         return {}
     job, point = json.loads(attributes["job"]), json.loads(attributes["point"])
@@ -231,5 +231,5 @@ def values_of(attributes: Mapping[str, Any]) -> dict[str, str]:
 
 
 def _job_units(attributes: Mapping[str, Any]) -> dict[str, str]:
-    """By key the unit in which the job of a history gives a parameter, where it names one."""
+    """Return by key the unit in which the job of a history gives a parameter, where it names one."""
     return json.loads(attributes.get(POINT_UNITS, "{}"))

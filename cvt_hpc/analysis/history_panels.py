@@ -40,7 +40,7 @@ _HEADROOM = 1.6  # for a legend of one line
 
 @dataclass(frozen=True)
 class Strand:
-    """What the probes on one strand recorded.
+    """Records of the probes on one strand.
 
     Attributes
     ----------

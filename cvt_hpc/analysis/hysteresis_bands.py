@@ -1,4 +1,4 @@
-"""Where vibration sets in and ends over a map: onset lines, and bands where ramps up and down differ."""
+"""Onset and end of vibration over a map: lines, and bands where ramps up and down differ."""
 
 from typing import Any
 

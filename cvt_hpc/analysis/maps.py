@@ -93,7 +93,7 @@ def map_figure(
 
 @dataclass(frozen=True)
 class Sheet:
-    """What the panels show, arrays of shape (panel, row, column), and where."""
+    """Contents of the panels, arrays of shape (panel, row, column), and their places."""
 
     arrangement: layout.Arrangement
     x: layout.Ruler
@@ -129,7 +129,7 @@ class Sheet:
 
     @property
     def height(self) -> float:
-        """Of all panels [inch]."""
+        """Height of all panels [inch]."""
         return self.blocks * self.rows * self.panel_height
 
     @property
@@ -144,7 +144,7 @@ class Sheet:
 
     @property
     def wanted_height(self) -> float:
-        """Of a panel [inch]: rows of cells hold a line of text as long as the page allows it."""
+        """Height of a panel [inch]: rows of cells hold a line of text as long as the page allows it."""
         rows = self.y.centres.size
         tall = TITLE_HEIGHT + 0.36 * rows
         height = tall if tall * self.rows <= 6.5 else TITLE_HEIGHT + float(np.clip(0.14 * rows, 0.35, 2.0))
@@ -335,7 +335,7 @@ def _label_panel(ax: Axes, sheet: Sheet, panel: int) -> None:
 
 
 def _title(sheet: Sheet) -> list[str]:
-    """What, of which job, how many runs of each class, and what is fixed."""
+    """Title: quantity, job, number of runs of each class, and what is fixed."""
     runs, inferred = sheet.classes[~sheet.inferred], sheet.classes[sheet.inferred]
     attributes = sheet.arrangement.dataset.attrs
     lines = [
@@ -387,7 +387,7 @@ def join_starts(dataset: xr.Dataset) -> xr.Dataset:
 
 
 def start_line(dataset: xr.Dataset, at: Mapping[str, Any], source: str) -> str:
-    """How many cells of a map vibrate from the large start only, in words; as `map_figure` takes results."""
+    """State how many cells of a map vibrate from the large start only."""
     drawn = arrange(join_starts(dataset), at, source).dataset
     classes = map_classes(drawn)
     found = int(np.count_nonzero(classes == StartClass.LARGE_START_ONLY))

@@ -246,7 +246,7 @@ def energy_figure(history: xr.Dataset, source: str = "history") -> Figure:
 
 
 def whole_powers(history: xr.Dataset) -> dict[str, float]:
-    """What else the fluctuations of the whole belt get and give [W], by its name; negative: taken.
+    """Further powers of the whole belt's fluctuations [W] by name; negative: taken.
 
     With what `region_powers` sums up it is 0. "left open" is what the numerics, and a vibration that still
     grows or decays, leave over. Empty where a term is not known.

@@ -50,7 +50,7 @@ TAKEN = ("belt", "ring", "layer", "lag")
 
 
 class Powers(NamedTuple):
-    """What of a run the block diagram shows [W].
+    """Powers of a run that the block diagram shows [W].
 
     Attributes
     ----------

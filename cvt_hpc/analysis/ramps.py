@@ -35,7 +35,7 @@ LINE_POINTS = 21  # of lines over a spectrogram
 
 
 class Ramp(NamedTuple):
-    """What a run does along its ramp.
+    """Course of a run along its ramp.
 
     Attributes
     ----------
@@ -273,7 +273,7 @@ def _limits(values: np.ndarray) -> tuple[float, float]:
 
 
 def read_ramp(history: xr.Dataset, of: str, source: str = "history", *, is_ramp: bool = True) -> Ramp:
-    """What a run does along its ramp, without the start-up before it; arguments as of `ramp_figure`.
+    """Read the course of a run along its ramp, without the start-up before it; arguments as of `ramp_figure`.
 
     Unless it has to be a ramp, a run at constant load and speed has its time [s] in the place of that.
     """

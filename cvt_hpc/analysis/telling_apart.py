@@ -1,4 +1,4 @@
-"""By what runs that are drawn together differ, and what they have in common, in words."""
+"""Labels of runs that are drawn together: what they have in common, and by what they differ."""
 
 import json
 from collections.abc import Sequence
@@ -20,7 +20,7 @@ def named(histories: Sequence[xr.Dataset], sources: Sequence[str] = ()) -> list[
 
 
 def told_apart(histories: Sequence[xr.Dataset], names: Sequence[str]) -> tuple[str, list[str]]:
-    """What the runs' points have in common, and by what each differs, with its name where need be."""
+    """Return what the runs' points have in common, and by what each differs, with its name where need be."""
     if len(histories) == 1:
         return ", ".join(place_of(histories[0].attrs)), ["simulated"]
     places = [place_of(dataset.attrs) for dataset in histories]
@@ -34,7 +34,7 @@ def told_apart(histories: Sequence[xr.Dataset], names: Sequence[str]) -> tuple[s
 def on_axes(
     histories: Sequence[xr.Dataset], names: Sequence[str] = ()
 ) -> tuple[list[str], list[dict[str, str]]]:
-    """As `told_apart`, by models and axes of the jobs alone: common parts, and for each run text by axis.
+    """Tell runs apart by models and axes of the jobs alone: common parts, and for each run text by axis.
 
     Runs that do not differ there are told apart by their names, under the axis "".
     """
@@ -47,7 +47,7 @@ def on_axes(
 
 
 def _axes_of(dataset: xr.Dataset) -> dict[str, str]:
-    """By axis of the run's job its value with its name, such as "load 120 N m"; its model by "model"."""
+    """Return by axis its value with its name, such as "load 120 N m", and the model by "model"."""
     job = json.loads(dataset.attrs.get("job", "{}"))
     axes, model = job.get("axes", {}), {"model": str(job.get("model", "")).replace("_", " ")}
     told = values_of(dataset.attrs).items()

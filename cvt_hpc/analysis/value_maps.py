@@ -155,7 +155,7 @@ def _on_paper(
 
 
 def _counted(kinds: xr.DataArray) -> str:
-    """How many runs there are, and how many of the marked classes."""
+    """State how many runs there are, and how many of the marked classes."""
     others = kinds.values[np.isin(kinds, OTHERS)]
     return f"{kinds.size} runs" + (f", of them {count_classes(others)}" if others.size else "")
 

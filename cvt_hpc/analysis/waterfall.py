@@ -235,7 +235,7 @@ def _rows(
 def _without_spectrum(
     rows: Sequence[tuple[str, xr.Dataset]], amplitude: Sequence[NDArray[np.float64]]
 ) -> list[str]:
-    """What became of the runs without a spectrum, as a line; none where all have one."""
+    """State what became of the runs without a spectrum; an empty line where all have one."""
     kinds = [
         occurrence_classes(shown).values[np.isnan(values).any(axis=(0, 1))]
         for (_, shown), values in zip(rows, amplitude, strict=True)

@@ -125,7 +125,7 @@ def _by_one_rank(record: logging.LogRecord) -> bool:
 
 
 class _OneLine(logging.Formatter):
-    """What is logged names files, whose names may hold anything."""
+    """Log lines escaped to one line each, since file names may hold anything."""
 
     def format(self, record: logging.LogRecord) -> str:
         return one_line(super().format(record))

@@ -1,4 +1,4 @@
-"""What several commands share: how they are declared, whom they talk to, and which files they may write."""
+"""Common parts of several commands: their declaration, whom they talk to, and which files they may write."""
 
 from __future__ import annotations
 

@@ -39,7 +39,7 @@ class Link:
 
     @property
     def text(self) -> str:
-        """How the values follow, for people."""
+        """State how the values follow, for people."""
         return f"linked to {self.axis}"
 
     def value(self, parameters: Mapping[str, Any]) -> Any:
@@ -63,7 +63,7 @@ class Substituted:
 
     @property
     def text(self) -> str:
-        """How the value follows, for people."""
+        """State how the value follows, for people."""
         return f"by {self.by}"
 
     def value(self, parameters: Mapping[str, Any]) -> float:
@@ -73,7 +73,7 @@ class Substituted:
 
 @dataclass(frozen=True)
 class Rule:
-    """How the value of one parameter follows from others.
+    """Rule by which the value of one parameter follows from others.
 
     Attributes
     ----------
@@ -99,7 +99,7 @@ class Rule:
 
     @property
     def words(self) -> str:
-        """How it follows, for people."""
+        """State how it follows, for people."""
         return self.source.text
 
     @property

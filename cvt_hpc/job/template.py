@@ -308,7 +308,7 @@ def _read_by(name: str, known: Mapping[str, Path]) -> Iterator[str]:
 
 
 def _subject(path: Path) -> str:
-    """What an example is about, by the first sentence of its first line."""
+    """Return the subject of an example, the first sentence of its first line."""
     text = path.read_text()
     if path.suffix == ".toml":
         return str(tomllib.loads(text).get("description", ""))

@@ -74,7 +74,7 @@ class Run(Protocol):
 
     @property
     def probes(self) -> Sequence[Probe]:
-        """Where displacement is recorded."""
+        """Places at which displacement is recorded."""
 
     @property
     def done(self) -> int:
@@ -156,7 +156,7 @@ class Declaration(Protocol):
 
     @property
     def PARAMETERS(self) -> dict[str, dict[str, Parameter]]:  # noqa: N802
-        """By table and key; a key that all runs share may stand here with the model's own default."""
+        """Parameters by table and key; a key of all runs may stand here with the model's own default."""
 
     @property
     def DEFAULT_STEPPER(self) -> str | None:  # noqa: N802
@@ -164,7 +164,7 @@ class Declaration(Protocol):
 
     @property
     def STEPPERS(self) -> Mapping[str, str]:  # noqa: N802
-        """By name the module that declares it; a step of the model's own lives with the model."""
+        """Modules that declare steppers, by name; a step of the model's own lives with the model."""
 
 
 class Recorded(Protocol):
@@ -236,7 +236,7 @@ class Model:
 
     @property
     def gives(self) -> Mapping[str, Mapping[str, Any]]:
-        """By stepper and key the parameters from which the value of a key is derived for this model."""
+        """Parameters from which the value of a key is derived for this model, by stepper and key."""
         return _member(self._declared, "GIVES", {})
 
     @property

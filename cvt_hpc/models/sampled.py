@@ -100,7 +100,7 @@ class SampledRun:
         return self._rows[: self.done], self._totals[: self.done], self._unsolved[: self.done]
 
     def _early_end(self, why: str) -> tuple[Status, str]:
-        """How a run ends early: done, for a reason of physics, unless its steps were not solved."""
+        """Status of a run that ends early: done, unless its steps were not solved."""
         late = round(LATEST / self.interval)
         before = self._unsolved[self.done - 1 - late] if self.done > late else 0
         steps = min(late, self.done) * self._steps_per_sample

@@ -150,12 +150,12 @@ def _normals(angle: np.ndarray) -> np.ndarray:
 
 
 def span_starts(path: BeltPath) -> np.ndarray:
-    """Where the spans begin, (P, 2) [m]."""
+    """Starts of the spans, (P, 2) [m]."""
     return path.centre + (path.turn * path.radius)[:, None] * _normals(path.leaving)
 
 
 def tangents(centre: np.ndarray, radius: np.ndarray, turn: np.ndarray) -> tuple[np.ndarray, np.ndarray]:
-    """Where the spans between circles begin and end, (P, 2) [m]; arguments of `belt_path`, unchecked."""
+    """Starts and ends of the spans between circles, (P, 2) [m]; arguments of `belt_path`, unchecked."""
     after, aside = np.roll(centre, -1, 0) - centre, turn * radius
     steep = np.arcsin((aside - np.roll(aside, -1)) / np.hypot(*after.T))
     right = _normals(np.arctan2(after[:, 1], after[:, 0]) + steep)

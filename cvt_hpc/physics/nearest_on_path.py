@@ -1,4 +1,4 @@
-"""Where points lie along the path of a belt, and how far off: for kernels, and for arrays."""
+"""Places of points along the path of a belt, and their distances from it: for kernels, and for arrays."""
 
 from typing import NamedTuple
 
@@ -42,7 +42,7 @@ class Way(NamedTuple):
 
 
 def way(path: BeltPath) -> Way:
-    """The same path for kernels."""
+    """Path for kernels."""
     begins = np.concatenate([[0.0], path.ends[:-1]]).reshape(-1, 2)
     onto, off = directions(path.angle), directions(path.leaving)
     circles = path.radius, path.turn, path.angle, path.wrap, path.spans

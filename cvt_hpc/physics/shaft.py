@@ -57,7 +57,7 @@ class Bearing(NamedTuple):
 
 
 class Seats(NamedTuple):
-    """Where the sheaves of a pulley sit: the axial positions of both [m]."""
+    """Seats of a pulley's sheaves: the axial positions of both [m]."""
 
     fixed: float
     movable: float

@@ -1,4 +1,4 @@
-"""What a study has found, as one page to hand on: sentences, maps with values, failures, cost, quality."""
+"""Report of a study, one page to hand on: sentences, maps with values, failures, cost, quality."""
 
 from cvt_hpc.report.page import write_report
 

@@ -1,4 +1,4 @@
-"""What came out of a study, in sentences with numbers.
+"""Findings of a study, in sentences with numbers.
 
 Quantities that a page shows are numbers, one for each run, that vary over the study.
 """
@@ -126,7 +126,7 @@ def _place(dataset: xr.Dataset, names: Sequence[str], index: int) -> str:
 
 
 def _line(line: xr.Dataset, x: str, place: str) -> str:
-    """What vibrates along a line; "" where nothing does."""
+    """State what vibrates along a line; "" where nothing does."""
     classes = map_classes(line).values
     vibrating = classes == OccurrenceClass.VIBRATING
     if not vibrating.any():

@@ -1,4 +1,4 @@
-"""What map.js draws the map of: axes, classes and quantities of a study as numbers."""
+"""Data of map.js: axes, classes and quantities of a study as numbers."""
 
 import json
 from base64 import b64encode

@@ -108,7 +108,7 @@ def write_report(dataset: xr.Dataset, out: Path, source: str = "results", folder
 
 
 def _as_it_stands(value: Any) -> Any:
-    """What a page shows of a text: escapes for characters that would turn or hide what is beside them."""
+    """Escape the characters of a text that would turn or hide what is beside them."""
     return escaped(value, KEPT) if isinstance(value, str) and not isinstance(value, Markup) else value
 
 
@@ -172,7 +172,7 @@ def _job(attributes: Mapping[str, str], source: str) -> Job | None:
 
 
 def _arrangement(dataset: xr.Dataset, source: str) -> Arrangement | None:
-    """How a map lays the study out; None of samples and of single runs."""
+    """Arrangement of a map of the study; None of samples and of single runs."""
     if is_sampled(dataset) or not dataset["status"].dims:
         return None
     return arrange(dataset, {}, source)
@@ -254,7 +254,7 @@ def _with_code(text: str) -> Markup:
 
 
 def _map(dataset: xr.Dataset, source: str) -> dict[str, str] | None:
-    """What a browser draws the map of: plotting library, numbers and program; None of single runs."""
+    """Parts of which a browser draws the map: plotting library, numbers and program; None of single runs."""
     if not dataset["status"].dims:
         return None
     from plotly.offline import get_plotlyjs  # long to load
@@ -293,7 +293,7 @@ def _quality(dataset: xr.Dataset) -> list[tuple[str, str, str, str, str]]:
 
 
 def _samples(dataset: xr.Dataset, folder: Path | None, source: str) -> list[Markup]:
-    """What runs that were done again tell; where they cannot be compared, why."""
+    """State what repeated runs tell; where they cannot be compared, why."""
     if folder is None:
         return []
     try:
@@ -360,7 +360,7 @@ def next_steps(dataset: xr.Dataset, job: Job | None, x: str | None) -> Iterator[
 
 
 def _along(axis: xr.DataArray, classes: xr.DataArray) -> Iterator[str]:
-    """How far windows reach along an axis, and how well their ends are known."""
+    """State how far windows reach along an axis, and how well their ends are known."""
     classes = classes.sortby(str(axis.name)).transpose(..., str(axis.name))
     axis = axis.sortby(str(axis.name))
     values, name = axis.values.astype(float), in_words(axis)

@@ -8,7 +8,7 @@ from cvt_hpc.parameters import Parameter
 
 
 class Result(IntEnum):
-    """How a march ended, as kernels return it."""
+    """Outcome of a march, as kernels return it."""
 
     OK = 0
     NOT_FINITE = 1

@@ -72,7 +72,7 @@ class Work:
 
 
 def work(system: System) -> Work:
-    """Where the integrator is kept."""
+    """Workspace in which the integrator is kept."""
     return Work()
 
 

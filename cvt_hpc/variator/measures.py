@@ -1,4 +1,4 @@
-"""How large a scene is beside the default one: limits with a unit scale with it, whatever its units are."""
+"""Size of a scene beside the default one: limits with a unit scale with it, whatever its units are."""
 
 from collections.abc import Mapping
 from typing import Any, NamedTuple

@@ -20,7 +20,7 @@ COORDINATES = {
 
 
 class Means:
-    """What follows from mean values of a belt between pulleys.
+    """Quantities that follow from mean values of a belt between pulleys.
 
     Attributes
     ----------

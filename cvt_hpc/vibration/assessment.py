@@ -145,7 +145,7 @@ def classify(
 
 
 def margin(amplitudes: ArrayLike, vibrates: Vibrates, threshold: float) -> float:
-    """How far the amplitudes that decided lie from the threshold [e-folds]; 0 where nothing is decided.
+    """Distance of the amplitudes that decided from the threshold [e-folds]; 0 where nothing is decided.
 
     Parameters
     ----------

@@ -209,7 +209,7 @@ class Onset(NamedTuple):
 
 
 def onsets(loads: Array, level: Array) -> list[Onset]:
-    """Where a level changes its sign along the load, by a straight line between neighbours.
+    """Find where a level changes its sign along the load, by a straight line between neighbours.
 
     Parameters
     ----------

@@ -129,7 +129,7 @@ def criticality(
 
 
 def _range(places: np.ndarray, in_words: Callable[[float], str]) -> str:
-    """Where runs are, in words."""
+    """Name the places of runs."""
     low, high = in_words(places.min()), in_words(places.max())
     return f"at {low}" if low == high else f"from {low} to {high}"
 

@@ -62,7 +62,7 @@ def coordinate() -> Coordinate:
 
 @dataclass(frozen=True)
 class RampOccurrence(Occurrence):
-    """As `Occurrence`, along a ramp: amplitude and frequencies are those of the window that moves most.
+    """Occurrence along a ramp: amplitude and frequencies are those of the window that moves most.
 
     Attributes
     ----------
@@ -161,7 +161,7 @@ def assess_ramp(
 
 
 class Passages:
-    """Where amplitudes stay above the threshold.
+    """Stretches in which amplitudes stay above the threshold.
 
     Parameters
     ----------
@@ -217,7 +217,7 @@ class Passages:
         return self._crossing(vibrating[0], -1), self._crossing(vibrating[-1], 1)
 
     def margin(self, vibrates: Vibrates) -> float:
-        """As `occurrence.margin`: of the best SUSTAINED windows in a row, or of the largest window."""
+        """Margin of the best SUSTAINED windows in a row, or of the largest window."""
         over = self.low - np.log(self.threshold)
         if vibrates is Vibrates.YES:
             rows = np.lib.stride_tricks.sliding_window_view(over, SUSTAINED, axis=0)

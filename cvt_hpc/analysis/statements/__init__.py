@@ -1,1 +1,1 @@
-"""What papers say of their figures, as checks that are measured in studies: `figures.py` lists the jobs."""
+"""Statements of papers on figures, as checks that are measured in studies: `figures.py` lists the jobs."""

@@ -66,7 +66,7 @@ def _jagged(kept: Kept) -> Measured:
 
 
 def _falls_at_that_speed(kept: Kept) -> Measured:
-    """Where the element slides faster than the top of the curve of friction lies."""
+    """Mark times at which the element slides faster than the top of the curve of friction lies."""
     history = kept.histories[0]
     point = json.loads(history.attrs["point"])
     speeds = np.linspace(0.0, 1.0, 2000)

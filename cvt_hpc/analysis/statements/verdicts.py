@@ -110,7 +110,7 @@ class Measured(NamedTuple):
 
 
 class Statement(NamedTuple):
-    """What a paper says of a figure.
+    """Statement of a paper on a figure.
 
     Attributes
     ----------
@@ -128,7 +128,7 @@ class Statement(NamedTuple):
 
 
 class Finding(NamedTuple):
-    """What became of a statement."""
+    """Outcome of a statement."""
 
     text: str
     verdict: Verdict

@@ -204,7 +204,7 @@ def add_contacts(
 
 @merged_kernel
 def _reach(q, i, j, l0):
-    """How far an element between nodes i and j gets away from the first of them [m], at most.
+    """Bound the distance of an element between nodes i and j from the first of them [m].
 
     A cubic lies within the hull of its ends and of the points a third of the end's derivative inwards.
     """

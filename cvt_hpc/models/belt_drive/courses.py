@@ -95,7 +95,7 @@ def stretch(tension: float, stiffness: float) -> float:
 
 
 def contact_compliance(path: BeltPath, contact_stiffness: float) -> float:
-    """By how much the contacts shorten a path for each newton of tension [m/N]."""
+    """Return by how much the contacts shorten a path for each newton of tension [m/N]."""
     return float((path.wrap / path.radius).sum()) / contact_stiffness
 
 

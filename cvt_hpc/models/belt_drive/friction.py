@@ -45,7 +45,7 @@ WRONG, LOOSE, FEWEST, LEFT = range(4)  # pivots of a memory
 
 
 class Treatment(IntEnum):
-    """How friction is treated, as kernels know it; a job names it in lower case."""
+    """Treatment of friction, as kernels know it; a job names it in lower case."""
 
     REGULARISED = 0
     SET_VALUED = 1

@@ -136,7 +136,7 @@ def struts(
 
 
 def no_struts(arms: int) -> Struts:
-    """Of arms that have none."""
+    """Struts of arms that have none."""
     none = np.zeros(arms)
     return Struts(np.zeros((arms, 2)), np.zeros((arms, 2)), none, none, none)
 

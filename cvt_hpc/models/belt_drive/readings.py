@@ -37,7 +37,7 @@ def scalars_of(drawn: Layout, arms: int) -> tuple[str, ...]:
 
 
 class Readings:
-    """Where displacement and forces of a run are read.
+    """Places at which displacement and forces of a run are read.
 
     Parameters
     ----------

@@ -31,7 +31,7 @@ DRIVE_MODES = 8
 
 
 def largest_spectrum(measured: Measured) -> np.ndarray:
-    """Of each strand the largest of its probes, (strand, bin) [m]: one alone may sit on a node of a shape."""
+    """Largest spectrum of each strand's probes, (strand, bin) [m]: one alone may sit on a node of a shape."""
     m, p = measured, measured.parameters
     spectra = amplitude_spectrum(moved(m)[m.samples], p["sampling_rate"], frequency_bins(p).values)
     return spectra.max(axis=2).T
@@ -48,7 +48,7 @@ def strand_tension(measured: Measured) -> np.ndarray:
 
 
 def eigenfrequencies(measured: Measured) -> np.ndarray:
-    """Of the strands, (strand, mode) [Hz]."""
+    """Eigenfrequencies of the strands, (strand, mode) [Hz]."""
     m = measured
     return theory.strand_frequencies(m.parameters, m.present.path, strand_tension(m))
 

@@ -109,7 +109,7 @@ def _with_arms(drive: Drive, **values: Any) -> Drive:
 
 
 def _shares(drive: Drive) -> np.ndarray:
-    """Where the nodes are along the belt, over its length."""
+    """Places of the nodes along the belt, over its length."""
     lengths = drive.beam.lengths
     return np.concatenate([[0.0], np.cumsum(lengths)[:-1]]) / lengths.sum()
 
@@ -159,7 +159,7 @@ def _moments(drive: Drive, settled: State) -> np.ndarray:
 
 
 def _moving(drive: Drive, settled: State, p: Mapping[str, Any], drawn: Layout) -> State:
-    """The same line, along which the belt runs with the driving pulley."""
+    """Set the line in motion: the belt runs along it with the driving pulley."""
     path, q = drawn.path, settled.chain.q
     stretch = path.path_length / drive.beam.lengths.sum()
     _, angle, curvature = points_at(path, _shares(drive) * path.path_length)

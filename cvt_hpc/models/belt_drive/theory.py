@@ -125,7 +125,7 @@ def unsheared_tension(
     side = mu * np.copysign(1.0, outlet - inlet) / radius  # of dN/ds over N where the rim slides
 
     def rise(stuck: float) -> tuple[float, float]:
-        """Of N over the part that sticks: its value, and its value by the shear at the end."""
+        """Rise of N over the part that sticks: its value, and its value by the shear at the end."""
         last = outlet * np.exp(-side * (length - stuck))
         return last - inlet, side * last * np.tanh(0.5 * rate * stuck) / rate
 

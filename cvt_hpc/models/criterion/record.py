@@ -77,7 +77,7 @@ class Flank(NamedTuple):
 
     @property
     def angular_frequency(self) -> float:
-        """Of the undamped radial vibration [rad/s]."""
+        """Angular frequency of the undamped radial vibration [rad/s]."""
         return np.sqrt(max(self.stiffness, 0.0) / self.mass)
 
     @property

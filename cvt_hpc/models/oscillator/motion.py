@@ -92,7 +92,7 @@ def regularised_friction(o: Oscillator, sliding: float, load: float) -> float:
 
 @kernel
 def regularised_frictions(o: Oscillator, sliding: np.ndarray, load: np.ndarray) -> np.ndarray:
-    """As `regularised_friction`, of arrays (n,)."""
+    """Regularised friction of arrays (n,), by the law of `regularised_friction`."""
     found = np.empty_like(sliding)
     for k in range(sliding.size):
         found[k] = regularised_friction(o, sliding[k], load[k])

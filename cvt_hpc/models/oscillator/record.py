@@ -133,7 +133,7 @@ def histories(run: Transient) -> xr.Dataset:
 
 
 def cycle_starts(x: np.ndarray, least: float) -> np.ndarray:
-    """Where a displacement comes up through the middle of its range.
+    """Find where a displacement comes up through the middle of its range.
 
     Parameters
     ----------

@@ -1,4 +1,4 @@
-"""Where a belt begins to slip: the largest torque under a thrust, or the least thrust for a torque.
+"""Limit of slip of a belt: the largest torque under a thrust, or the least thrust for a torque.
 
 Two methods answer: Bullinger et al. 2005, eq. 2, in a microsecond, and steady states of the elastic belt as
 its driven pulley is slowed down, in seconds. The latter also give the working point that is safe by a factor:
