@@ -65,7 +65,7 @@ def ladder(
     job : Job
         Of the elastic belt, a grid with `load` among its axes.
     pushbelt : mapping, optional
-        Further keys of the pushbelt, as `_pushbelt_jobs` takes them: the reference is a pushbelt then.
+        Further keys of the pushbelt, as `pushbelt_jobs` takes them: the reference is a pushbelt then.
     beside : str
         A requested entry of BESIDE, or NONE.
 
@@ -94,7 +94,7 @@ def ladder(
     if pushbelt is None:
         reference = rebuild_job(_refined(job), job.source, job.units)
     else:
-        coarser, reference = _pushbelt_jobs(job, pushbelt)
+        coarser, reference = pushbelt_jobs(job, pushbelt)
         rungs.append(Sweep(PUSHBELT, QUESTIONS, coarser))
     return (*rungs, Sweep(REFERENCE, (), reference)), refusals
 
@@ -132,10 +132,11 @@ def _refined(job: Job) -> dict[str, Any]:
     return document
 
 
-def _pushbelt_jobs(job: Job, settings: Mapping[str, Any]) -> tuple[Job, Job]:
+def pushbelt_jobs(job: Job, settings: Mapping[str, Any]) -> tuple[Job, Job]:
     """Return the runs of a job of the elastic belt on the pushbelt, and the same refined.
 
-    Further keys of the pushbelt are of COARSER, or keys that the elastic belt does not know.
+    Further keys of the pushbelt are of COARSER, or keys that the elastic belt does not know. An InputError
+    names what has no counterpart there.
     """
     where, label = f"{job.source}: [ladder]", "set"
     _check_settings(job, settings, f"{where} {label}")
@@ -269,7 +270,7 @@ def plan_lines(asked: Ladder, out: Path) -> Iterator[str]:
 def _pushbelt_cost(job: Job) -> str:
     """Return the cost of the pushbelt as the reference, or the reason why it cannot take the job."""
     try:
-        jobs = _pushbelt_jobs(job, {})
+        jobs = pushbelt_jobs(job, {})
     except InputError as error:
         return f"refused, {error}"
     total = sum(float(run_costs(each).sum()) for each in jobs)
