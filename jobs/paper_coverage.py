@@ -1,41 +1,108 @@
-"""Write what holds of two papers: paper_coverage.py PAGE.md, by docs/coverage.toml and results/figures."""
+"""Write what holds of five papers: paper_coverage.py PAGE.md, by docs/coverage.toml and stored tables."""
 
 import csv
 import sys
 import tomllib
+from functools import cache
+from io import StringIO
 from pathlib import Path
+
+import numpy as np
+import pandas as pd
 
 from cvt_hpc.tables import below_origin
 
 HERE = Path(__file__).parent
-TABLES = HERE / "results" / "figures"
+RESULTS = HERE / "results"
+FIGURES = RESULTS / "figures"
 PAPERS = {
     "L": "Lebrecht, Pfeiffer, Ulbrich 2004",
     "B": "Bullinger, Funk, Pfeiffer 2005",
+    "G": "Geier, Schindler et al. 2007",
+    "C": "Cepon, Boltezar 2011",
+    "S": "Schindler et al. 2008",
 }
-HEAD = """# Two papers, statement by statement
+HEAD = """# Five papers, statement by statement
 
-What W. Lebrecht, F. Pfeiffer and H. Ulbrich (04CVT-32, 2004) and M. Bullinger, K. Funk and F. Pfeiffer
-(2005) state, the command that shows it here, what it gives, and whether that is what they state. First all
-of both papers, then each figure.
+What five papers state, the command, key or test that shows it here, what it gives, and whether that is what
+they state: first all of each paper, then each figure of the first two.
+
+- Lebrecht, Pfeiffer, Ulbrich 2004 (04CVT-32): vibration of the pushbelt
+- Bullinger, Funk, Pfeiffer 2005: forces in the pushbelt as a continuum
+- Geier, Schindler et al. 2007, "Dynamics of Pushbelt CVTs": the pushbelt of rigid elements in its plane
+- Cepon, Boltezar 2011, "Validation of a flexible multibody belt-drive model": rubber belts
+- Schindler et al. 2008, "Pushbelt CVTs - a non-smooth challenge": the pushbelt in space; it prints no result
 
 Made by `python jobs/paper_coverage.py docs/coverage.md` from `docs/coverage.toml` and from the tables in
-`jobs/results/figures`. Each of these is that of a job, below "figure `NAME`":
-`cvt-hpc run jobs/figures/NAME.toml && cvt-hpc figure out/NAME` leaves `figure.png` and `statements.csv`. A
-statement is reproduced where all parts of its measure hold, partly where some do. The papers' pictures have
-no data here: "reproduced" means every number and shape that the text states. What they do not give is
-assumed, as each job says.
+`jobs/results`. A row is measured where columns of these tables, or statements of a figure, decide at least
+a part of it. It is reproduced where all parts hold, partly where some do. Numbers are "older" where their
+table is older than the code, by its first lines. "Figure `NAME`" is `cvt-hpc run jobs/figures/NAME.toml &&
+cvt-hpc figure out/NAME`, which leaves `figure.png` and `statements.csv`. The papers' pictures have no data
+here: "reproduced" means every number and shape that the text states. What they do not give is assumed, as
+each job says. Jobs of figures have values of their own: no set of them meets all that Lebrecht et al.
+state.
 """
 REPRODUCED, PARTLY, NOT = "reproduced", "partly", "not"
+OLDER = " (older)"
+MANY = 6  # numbers, of which the least and the largest are told
 
 
-def tables():
-    """Rows of each figure's table, by its job."""
-    found = {}
-    for table in sorted(TABLES.glob("*.csv")):
-        with table.open(encoding="utf-8") as source:
-            found[table.stem] = list(csv.DictReader(below_origin(source)))
-    return found
+def age(path):
+    """What is told of the numbers of a stored table: that they are older than the code, or nothing."""
+    with path.open(encoding="utf-8") as source:
+        return OLDER if any(line.startswith("# older than the code") for line in source) else ""
+
+
+@cache
+def statements(job):
+    """Rows of the table of a figure, by its job."""
+    with (FIGURES / f"{job}.csv").open(encoding="utf-8") as source:
+        return list(csv.DictReader(below_origin(source)))
+
+
+@cache
+def stored(name):
+    """A table of jobs/results, its columns without their units."""
+    with (RESULTS / f"{name}.csv").open(encoding="utf-8") as source:
+        table = pd.read_csv(StringIO("".join(below_origin(source))))
+    return table.rename(columns=lambda column: column.partition(" [")[0])
+
+
+def measured(part):
+    """Whether a part of a row holds by a stored table, and the numbers that tell it.
+
+    Parameters
+    ----------
+    part : dict
+        `table`; `value`, an expression of its columns; `rows`, those for which it is told, by default all;
+        `beside`, the rows by whose value it is divided; what has to hold of it, `least`, `most` or `course`,
+        which "rises" or "falls"; `tell`, the words before the numbers.
+
+    Raises
+    ------
+    ValueError
+        If there are no such rows, or one of them has no number.
+    """
+    table = stored(part["table"])
+
+    def found(rows):
+        return (table.query(rows) if rows else table).eval(part["value"]).to_numpy(float)
+
+    values = found(part.get("rows"))
+    if "beside" in part:
+        values = values / found(part["beside"])
+    if not values.size or not np.isfinite(values).all():
+        raise ValueError(f"{part}: expected rows with numbers, found {values}")
+    if "course" in part:
+        holds = (np.diff(values) * {"rises": 1.0, "falls": -1.0}[part["course"]] > 0.0).all()
+        told = values[[0, -1]]
+    else:
+        holds = ((values >= part.get("least", -np.inf)) & (values <= part.get("most", np.inf))).all()
+        told = values if values.size < MANY else values[[values.argmin(), values.argmax()]]
+    numbers = [f"{value:.4g}" for value in told]
+    link = ", " if told is values else " to "
+    row = link.join(numbers) if len(set(numbers)) > 1 else numbers[0]
+    return bool(holds), f"{part['tell']}: {row}{age(RESULTS / (part['table'] + '.csv'))}"
 
 
 def joined(verdicts):
@@ -45,43 +112,58 @@ def joined(verdicts):
     return NOT if all(verdict == NOT for verdict in verdicts) else PARTLY
 
 
-def settled(row, figures):
-    """What a row gives, its verdict and the reason, of what is measured where it names statements."""
-    names = [name.split() for name in row.get("measured", [])]
-    found = [figures[job][int(place) - 1] for job, place in names]
-    if not found:
-        return row["gives"], row["verdict"], row.get("why", "")
-    numbers = [entry["measured"] for entry in found] + [row[key] for key in ("gives",) if key in row]
-    why = dict.fromkeys(entry["why"] for entry in found if entry["why"])
-    return "; ".join(numbers), joined([entry["verdict"] for entry in found]), "; ".join(why)
+def settled(row):
+    """What a row gives, its verdict and the reason where it is not reproduced."""
+    verdicts, numbers, why = [], [], []
+    for job, place in (name.split() for name in row.get("measured", [])):
+        entry = statements(job)[int(place) - 1]
+        verdicts.append(entry["verdict"])
+        numbers.append(entry["measured"] + age(FIGURES / f"{job}.csv"))
+        why.append(entry["why"])
+    for holds, told in map(measured, row.get("measures", [])):
+        verdicts.append(REPRODUCED if holds else NOT)
+        numbers.append(told)
+    verdict = joined(verdicts + [row[key] for key in ("verdict",) if key in row])
+    if verdict != REPRODUCED:
+        why.append(row.get("why", ""))
+    numbers += [row[key] for key in ("gives",) if key in row]
+    return "; ".join(numbers), verdict, "; ".join(dict.fromkeys(filter(None, why)))
+
+
+def counted(name, verdicts, by_tables):
+    """A line of the table of counts."""
+    numbers = [verdicts.count(verdict) for verdict in (REPRODUCED, PARTLY, NOT)]
+    return f"| {' | '.join(map(str, [name, len(verdicts), *numbers, by_tables]))} |"
 
 
 def lines():
     """Yield the lines of the page."""
     with (HERE.parent / "docs" / "coverage.toml").open("rb") as source:
         rows = tomllib.load(source)["row"]
-    figures = tables()
     yield HEAD
-    counts = dict.fromkeys((REPRODUCED, PARTLY, NOT), 0)
-    parts = {}
+    parts, verdicts, by_tables = {}, {}, {}
     for row in rows:
-        gives, verdict, why = settled(row, figures)
-        counts[verdict] += 1
+        letter = row["id"][0]
+        gives, verdict, why = settled(row)
+        verdicts.setdefault(letter, []).append(verdict)
+        by_tables[letter] = by_tables.get(letter, 0) + ("measured" in row or "measures" in row)
         reason = f"{verdict}: {why}" if why else verdict
         cells = row["id"], row["at"], row["states"], row["command"], gives, reason
-        parts.setdefault(row["id"][0], []).append(f"| {' | '.join(cells)} |")
-    measured = [entry["verdict"] for entries in figures.values() for entry in entries]
-    told = ", ".join(f"{count} {verdict}" for verdict, count in counts.items())
-    each = ", ".join(f"{measured.count(verdict)} {verdict}" for verdict in counts)
-    of_figures = f"Of {len(measured)} statements measured in {len(figures)} figures: {each}."
-    yield f"**{len(rows)} rows: {told}.** {of_figures}\n"
+        parts.setdefault(letter, []).append(f"| {' | '.join(cells)} |")
+    figures = {path.stem: statements(path.stem) for path in sorted(FIGURES.glob("*.csv"))}
+    yield "| paper | rows | reproduced | partly | not | of them measured |\n|---|---|---|---|---|---|"
+    for letter, paper in PAPERS.items():
+        yield counted(paper, verdicts[letter], by_tables[letter])
+    yield counted("all", sum(verdicts.values(), []), sum(by_tables.values()))
+    each = [entry["verdict"] for entries in figures.values() for entry in entries]
+    yield counted(f"statements of {len(figures)} figures", each, len(each)) + "\n"
     for letter, paper in PAPERS.items():
         yield f"## {paper}\n"
         yield "| | where | states | shown by | gives | verdict |\n|---|---|---|---|---|---|"
         yield from parts[letter]
         yield ""
     for job, entries in figures.items():
-        yield f"## {entries[0]['figure']} (`{job}`)\n"
+        yield f"## {entries[0]['figure']} (`{job}`){age(FIGURES / f'{job}.csv')}\n"
         yield "| | statement | verdict | measured |\n|---|---|---|---|"
         for k, entry in enumerate(entries, 1):
             numbers = entry["measured"] + (f"; {entry['why']}" if entry["why"] else "")

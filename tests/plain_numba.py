@@ -22,10 +22,10 @@ RUNS = {
     "elastic belt": ("quickstart.toml", "load=100 N m", ["duration=40 ms", "rise_time=4 ms"]),
     "pushbelt": (
         "push_force.toml",
-        "load=30 N m",
+        "load_share=0.3",
         [
             *("duration=40 ms", "longest_duration=40 ms", "rise_time=4 ms"),
-            *("elements=104", "band_high=1000 Hz"),
+            *("thrust=20 kN", "elements=104", "band_high=1000 Hz"),
         ],
     ),
 }
