@@ -8,6 +8,7 @@ from cvt_hpc.models.pushbelt import fields as f
 from cvt_hpc.models.pushbelt.border import border_residuals, of_pulley
 from cvt_hpc.models.pushbelt.chain import BETA, angle_slope
 from cvt_hpc.models.pushbelt.friction import flank_friction, ring_friction
+from cvt_hpc.models.pushbelt.local_bending import spread_bending
 from cvt_hpc.physics.contact_laws import pressed
 from cvt_hpc.solvers.linked_blocks import field_of_right
 
@@ -57,13 +58,36 @@ def pair_forces(belt, state, step, iterate, dt):
 
 
 @kernel
-def element_forces(belt, state, pulleys, increments, openings, shapes, step, iterate, dt):
-    """Forces of sheaves and ring friction on elements, with their slopes.
+def flank_depths(belt, state, increments, openings, shapes, step, iterate, bent, dt):
+    """Depth of the flanks in the sheaves, less what local bending spreads; other arguments of `element_forces`.
+
+    `bent` is work space of `spread_bending`.
+    """
+    modes, share = belt.modal_stiffness.shape[1], BETA * dt * belt.sine
+    for j in range(step.rows):
+        deep = step[j, f.R_Y] * state[j, f.CHANGE_Y] + step[j, f.R_Z] * state[j, f.CHANGE_Z]
+        deep = step[j, f.DEPTH] - share * (deep + step[j, f.R_LEVER] * state[j, f.CHANGE_W])
+        driven = state[j, f.DRIVEN]
+        for k in range(modes):
+            driving_one = openings[0, k] + increments[1 + k]
+            driven_one = openings[1, k] + increments[1 + modes + k]
+            deep = deep - belt.cosine * of_pulley(driving_one, driven_one, driven) * shapes[j, k]
+        iterate[j, f.DEPTH_REACHED] = deep
+    if belt.local_compliance > 0.0:
+        depth, spread = iterate.data[:, f.DEPTH_REACHED], state.data[:, f.SPREAD]
+        stiffness = belt.flank_stiffness / (1.0 - belt.flank_stiffness * belt.local_compliance)
+        spread_bending(state, depth, spread, bent, belt.local_compliance, stiffness, belt.local_decay)
+        for j in range(step.rows):
+            iterate[j, f.DEPTH_REACHED] -= state[j, f.SPREAD]
+
+
+@kernel
+def element_forces(belt, state, pulleys, increments, step, iterate, dt):
+    """Forces of sheaves and ring friction on elements, with their slopes, by the depths of the flanks.
 
     `increments` are the changes of the border's unknowns since the last step: of the driven pulley's speed,
     and of the openings of the driving and the driven sheaves.
     """
-    modes = belt.modal_stiffness.shape[1]
     wide, share = 1.0 / belt.cosine, BETA * dt * belt.sine
     driving_speed, driven_speed = pulleys[f.DRIVING_SPEED], pulleys[f.DRIVEN_SPEED] + increments[0]
     for j in range(step.rows):
@@ -80,13 +104,7 @@ def element_forces(belt, state, pulleys, increments, openings, shapes, step, ite
 
         # the pair of flanks
         r_y, r_z, r_lever = step[j, f.R_Y], step[j, f.R_Z], step[j, f.R_LEVER]
-        deep = step[j, f.DEPTH] - share * (r_y * dy + r_z * dz + r_lever * dw)
-        for k in range(modes):
-            driving = openings[0, k] + increments[1 + k]
-            driven_one = openings[1, k] + increments[1 + modes + k]
-            deep = deep - belt.cosine * of_pulley(driving, driven_one, driven) * shapes[j, k]
-        normal, stiff = pressed(-deep, belt.flank_stiffness)
-        iterate[j, f.DEPTH_REACHED] = deep
+        normal, stiff = pressed(-iterate[j, f.DEPTH_REACHED], belt.flank_stiffness)
         m_y, m_z = step[j, f.MID_R_Y], step[j, f.MID_R_Z]
         mr_lever, mt_lever = step[j, f.MID_R_LEVER], step[j, f.MID_T_LEVER]
         radius = step[j, f.MID_RADIUS]

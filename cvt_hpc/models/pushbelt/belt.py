@@ -38,7 +38,11 @@ class Belt(NamedTuple):
     ring_stiffness : float
         EA of both ring packages [N].
     flank_stiffness : float
-        Normal force at each flank by its penetration [N/m].
+        Normal force at each flank by its penetration, element and local bending of the sheave in series, where
+        neighbours have the same force [N/m].
+    local_compliance, local_decay : float
+        Local bending of a sheave along the normal by that force [m/N], 0: none; its decay from element to
+        element [1].
     contact_stiffness : float
         Of each of the two contacts between elements [N/m].
     nose_height, nose_clearance, nose_stiffness : float
@@ -76,6 +80,8 @@ class Belt(NamedTuple):
     ring_mass: float
     ring_stiffness: float
     flank_stiffness: float
+    local_compliance: float
+    local_decay: float
     contact_stiffness: float
     nose_height: float
     nose_clearance: float
@@ -181,6 +187,8 @@ class Workspace(NamedTuple):
         `BeltState.increments` at its start.
     kept : (2, STATE_FIELDS) array
         States of two elements before the last correction.
+    bent : (elements, 3) array
+        Of `local_bending`.
     """
 
     step: LaneArray
@@ -194,6 +202,7 @@ class Workspace(NamedTuple):
     inputs: np.ndarray
     increments: np.ndarray
     kept: np.ndarray
+    bent: np.ndarray
 
 
 def parts_of(nodes: int) -> int:
@@ -375,4 +384,5 @@ def empty_workspace(
         inputs=np.zeros(inputs),
         increments=np.zeros(columns - 1),
         kept=np.zeros((2, state)),
+        bent=np.zeros((nodes, 3)),
     )

@@ -31,8 +31,10 @@ Kernels read `state[j, f.TENSION]`; the arrays are those of `belt`, a row an ele
     FLANK_DUAL_T,
     V_FILTERED,  # sliding speed at which the friction law of the flanks is read [m/s]
     DRIVEN,  # 1 where the nearer pulley is the driven one, else 0
+    SPREAD,  # deflection of a sheave beyond its bedding, along the flank's normal [m]
+    LAST_SPREAD,  # of the step before [m]
     CHANGE,  # 4: of the speeds in the last step, from which the next one starts
-) = range(27)
+) = range(29)
 CHANGE_Y, CHANGE_Z, CHANGE_W, CHANGE_V = range(CHANGE, CHANGE + 4)
 STATE_FIELDS = CHANGE + 4
 

@@ -16,7 +16,7 @@ from typing import Any
 import numpy as np
 
 from cvt_hpc.models.pushbelt import fields as f
-from cvt_hpc.models.pushbelt.parameters import MODES, path_length
+from cvt_hpc.models.pushbelt.parameters import MODES, flank_compliance, local_compliance, path_length
 from cvt_hpc.models.pushbelt.readings import PROFILES, SCALARS, OnPath, Readings
 from cvt_hpc.models.sampled import MOST_UNSOLVED, SampledRun
 from cvt_hpc.physics.geometry import driven_radius
@@ -405,7 +405,9 @@ def given(parameters: Mapping[str, Any]) -> dict[str, Any]:
         "pitch_depth": p["ring_offset"],
         "ring_mass": p["ring_mass"] * length,
         "ring_strain": 1e-4,
-        "flank_stiffness": p["flank_stiffness"] * pitch,
+        "flank_stiffness": pitch / flank_compliance(p),
+        "local_compliance": local_compliance(p) / pitch,
+        "local_decay": np.exp(-pitch / p["local_length"]),
         "contact_stiffness": p["edge_stiffness"] / pitch,
         "angle_stiffness": p["tilt_spring"] * pitch,
         "angle_damping": p["tilt_damper"] * pitch,

@@ -87,7 +87,8 @@ def _evaluate(belt, state, work, load, dt):
     assembly.pair_forces(belt, elements, step, iterate, dt)
     if belt.nose_clearance < np.inf:
         nose_forces(belt, elements, step, iterate, dt)
-    assembly.element_forces(belt, elements, pulleys, increments, openings, shapes, step, iterate, dt)
+    assembly.flank_depths(belt, elements, increments, openings, shapes, step, iterate, work.bent, dt)
+    assembly.element_forces(belt, elements, pulleys, increments, step, iterate, dt)
     return assembly.residuals(
         belt, elements, increments, openings, shapes, load, step, iterate, scratch, work.border, dt
     )
@@ -159,6 +160,7 @@ def _accept(belt, state, work, inputs, dt):
         slip_m, slip_t = elements[j, f.FLANK_SLIP_M], elements[j, f.FLANK_SLIP_T]
         filtered = filtered_slip(belt, slip_m, slip_t, elements[j, f.FLANK], elements[j, f.V_FILTERED], dt)
         elements[j, f.V_FILTERED] = filtered
+        elements[j, f.LAST_SPREAD] = elements[j, f.SPREAD]
     for k in range(3):
         scratch[0, k] = around(scratch[0, k])
     driving_thrust, driven_thrust = scratch.data[0, 0, 0], scratch.data[0, 1, 0]
