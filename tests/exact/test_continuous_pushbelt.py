@@ -11,6 +11,7 @@ from cvt_hpc.job import known_keys, load_job
 from cvt_hpc.models.elastic_belt import PARAMETERS
 from cvt_hpc.models.pushbelt import inert
 from cvt_hpc.models.pushbelt.continuous import ABSENT, FOLLOWS, ONLY
+from cvt_hpc.models.pushbelt.parameters import flank_compliance
 from cvt_hpc.physics.sheaves import flexibility, sheaves
 from support.wraps import places
 
@@ -51,7 +52,8 @@ def test_sheaves_and_elements_open_alike_under_the_same_force(pulley, stiffness)
     shapes = np.array([np.ones(count), np.cos(phi), np.sin(phi)])
     modal = stiffness * np.array(found[f"{pulley}_modal_stiffness"])
     openings = (shapes @ (wrap.weight * force)) / modal  # of one flank
-    overlap = force / (found["flank_stiffness"] * np.cos(ANGLE))  # along its normal
+    # along its normal: of element and local bending
+    overlap = force / np.cos(ANGLE) * flank_compliance(found | {"half_wedge_angle": ANGLE})
     pushbelt = 2.0 * (overlap / np.cos(ANGLE) + openings @ shapes)
     # ends, where local bending reaches beyond the force, apart; it has ten stations, and the first mode opens
     # by 1e-3 of the others

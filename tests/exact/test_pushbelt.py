@@ -866,3 +866,32 @@ def test_free_vibration_on_flanks_that_stay_shut_keeps_its_energy():
     assert 0.0 < least < 0.9 * pressed
     assert growth == pytest.approx(0.0, abs=5.0)  # by the depth at the end of the step some -8000
     assert found_turn == pytest.approx(turn * (1.0 - turn**2 / 12.0), rel=2e-3)
+
+
+def test_vibration_of_neighbours_against_each_other_keeps_its_energy():
+    """Elements on flanks that stay shut, without friction; their masses move by waves of any length."""
+    pressed, decay, random = 100.0, 0.8, np.random.default_rng(1)
+    belt, state, work = on_a_pulley(given(kinetic_friction=0.0, angle_damping=0.0), 0.0, pressed)
+    belt = belt._replace(local_compliance=0.9 / belt.flank_stiffness, local_decay=decay, ring_stiffness=1.0)
+    e = fields(state.elements)
+    e[:, pushbelt_fields.LENGTH] /= 1.0 + pressed * belt.sine / np.sin(np.pi / e.shape[0])
+    outward = np.stack([e[:, pushbelt_fields.HEADING_Z], -e[:, pushbelt_fields.HEADING_Y]], 1)
+    e[:, [pushbelt_fields.U_Y, pushbelt_fields.U_Z]] = 0.01 * random.normal(size=(e.shape[0], 1)) * outward
+    write(state.elements, e)
+    solved = b.NEWTON._replace(tolerance=1e-9, power_tolerance=1e-9)
+    energy, least = [], pressed
+    for _ in range(3000):
+        before = fields(state.elements)[:, [pushbelt_fields.U_Y, pushbelt_fields.U_Z]]
+        assert advance(belt, solved, state, work, constant(0.0, 0.0), 1, STEP) == pushbelt_fields.CONVERGED
+        e = fields(state.elements)
+        force, speed = (
+            e[:, pushbelt_fields.FLANK],
+            0.5 * (before + e[:, [pushbelt_fields.U_Y, pushbelt_fields.U_Z]]),
+        )
+        least = min(least, force.min())
+        away = force - pressed
+        kinetic = 0.5 * (belt.mass + belt.ring_mass) * (speed**2).sum()
+        energy.append(kinetic + (away * (away / belt.flank_stiffness + e[:, pushbelt_fields.SPREAD])).sum())
+    energy = np.array(energy)
+    assert 0.0 < least < 0.7 * pressed
+    assert energy[-500:].mean() == pytest.approx(energy[:500].mean(), rel=0.02)

@@ -38,6 +38,8 @@ GIVEN = {
     "ring_shear": 2.4e6,
     "half_wedge_angle": np.radians(11.0),
     "flank_stiffness": 5e7,
+    "local_compliance": 0.0,
+    "local_decay": 0.5,
     "contact_stiffness": 1e9,
     "angle_stiffness": 5.0,
     "angle_damping": 5e-5,

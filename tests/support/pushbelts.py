@@ -18,6 +18,8 @@ ASSUMED = {
     "ring_strain": 1e-4,  # at the start
     "half_wedge_angle": np.radians(11.0),  # [rad]
     "flank_stiffness": 5e7,  # [N/m]
+    "local_compliance": 0.0,
+    "local_decay": 0.5,
     "contact_stiffness": 1e9,  # [N/m]
     "nose_height": 6e-3,  # [m]
     "nose_clearance": np.inf,  # [m]

@@ -46,6 +46,8 @@ def belt(**given):
         "ring_bending": 47.6,
         "ring_shear": 2.4e6,
         "flank_stiffness": 5e7,
+        "local_compliance": 0.0,
+        "local_decay": 0.5,
         "contact_stiffness": 1e9,
         "angle_stiffness": 0.0,
         "angle_damping": 0.0,

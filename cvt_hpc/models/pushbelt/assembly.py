@@ -74,9 +74,9 @@ def flank_depths(belt, state, increments, openings, shapes, step, iterate, bent,
             deep = deep - belt.cosine * of_pulley(driving_one, driven_one, driven) * shapes[j, k]
         iterate[j, f.DEPTH_REACHED] = deep
     if belt.local_compliance > 0.0:
-        depth, spread = iterate.data[:, f.DEPTH_REACHED], state.data[:, f.SPREAD]
-        stiffness = belt.flank_stiffness / (1.0 - belt.flank_stiffness * belt.local_compliance)
-        spread_bending(state, depth, spread, bent, belt.local_compliance, stiffness, belt.local_decay)
+        depths, spread = iterate.data[:, f.DEPTH_REACHED : f.DEPTH_REACHED + 1], state.data[:, f.SPREAD]
+        bend = belt.local_compliance, belt.flank_stiffness, belt.local_decay
+        spread_bending(state.data[:, f.DRIVEN], depths, spread, bent, *bend)
         for j in range(step.rows):
             iterate[j, f.DEPTH_REACHED] -= state[j, f.SPREAD]
 

@@ -187,7 +187,7 @@ class Workspace(NamedTuple):
         `BeltState.increments` at its start.
     kept : (2, STATE_FIELDS) array
         States of two elements before the last correction.
-    bent : (elements, 3) array
+    bent : (elements, 4) array
         Of `local_bending`.
     """
 
@@ -384,5 +384,5 @@ def empty_workspace(
         inputs=np.zeros(inputs),
         increments=np.zeros(columns - 1),
         kept=np.zeros((2, state)),
-        bent=np.zeros((nodes, 3)),
+        bent=np.zeros((nodes, 4)),
     )

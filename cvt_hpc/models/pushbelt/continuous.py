@@ -89,9 +89,7 @@ FOLLOWS = {
     # the driving sheave stays where the ratio puts it, as ONLY has it: what the continuum has by this name is idle
     "driving_thrust": Follows(("driving_axial",), lambda p: 0.0),
     "edge_stiffness": Follows(("element_stiffness",), lambda p: p["element_stiffness"]),
-    "flank_stiffness": Follows(
-        ("flank_stiffness", "element_factor", "half_wedge_angle"), _flank_stiffness
-    ),
+    "flank_stiffness": Follows(("flank_stiffness", "element_factor", "half_wedge_angle"), _flank_stiffness),
     "local_stiffness": Follows(
         ("sheave_stiffness", "local_stiffness"), lambda p: p["sheave_stiffness"] * p["local_stiffness"]
     ),

@@ -73,7 +73,10 @@ class Belt(NamedTuple):
     ring_stiffness, ring_bending, ring_shear : float
         EA [N], lateral EI [N m^2] and lateral k G A [N] of both packages.
     flank_stiffness : float
-        Normal force at each flank by its penetration, shared by its two points [N/m].
+        Normal force at each flank by its penetration, shared by its two points, with local bending in series as
+        in the plane [N/m].
+    local_compliance, local_decay : float
+        As in the plane [m/N], [1].
     contact_stiffness : float
         Of the contacts at an edge and at a head, shared by its two points [N/m].
     angle_stiffness, angle_damping : float
@@ -129,6 +132,8 @@ class Belt(NamedTuple):
     ring_bending: float
     ring_shear: float
     flank_stiffness: float
+    local_compliance: float
+    local_decay: float
     contact_stiffness: float
     angle_stiffness: float
     angle_damping: float

@@ -57,7 +57,9 @@ RING_SLIP = 58  # of the ring over the saddle, forwards [m/s]
 RING_FRICTION = 59  # friction force of the element against that [N]
 RING_DUAL = 60
 DRIVEN = 61  # 1 where the nearer pulley is the driven one, else 0
-CHANGE = 62  # 8: of the speeds in the last step, from which the next one starts
+SPREAD = 62  # 2: deflection of the left and the right sheave beyond its bedding, along the flank's normal [m]
+LAST_SPREAD = 64  # 2: of the step before [m]
+CHANGE = 66  # 8: of the speeds in the last step, from which the next one starts
 STATE_FIELDS = CHANGE + SIZE
 
 # Entries of the state of the pulleys beside those of `pushbelt.belt`: positions of the mid planes between

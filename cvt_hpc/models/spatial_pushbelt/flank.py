@@ -26,6 +26,7 @@ from cvt_hpc.models.pushbelt import fields as planar
 from cvt_hpc.models.pushbelt.border import add_to_totals, of_pulley, opening_of
 from cvt_hpc.models.pushbelt.chain import BETA
 from cvt_hpc.models.pushbelt.friction import flank_friction
+from cvt_hpc.models.pushbelt.local_bending import spread_bending
 from cvt_hpc.models.spatial_pushbelt import fields as f
 from cvt_hpc.models.spatial_pushbelt import flank
 from cvt_hpc.models.spatial_pushbelt import vectors as vec
@@ -128,6 +129,44 @@ def predict_flanks(belt, state, pulleys, step, dt):
             step[j, f.FLANK_GAP + p] = frustum_gap(belt, side, start, along, groove, middle)
 
 
+@register_jitable
+def _opening(belt, increments, openings, shapes, driven, j):
+    """Opening of both sheaves at an element in an iterate, along the normal of a flank [m]."""
+    modes, opening = belt.modal_stiffness.shape[1], like(0.0, driven)
+    for k in range(modes):
+        driving = openings[0, k] + increments[1 + k]
+        driven_one = openings[1, k] + increments[1 + modes + k]
+        opening = opening + of_pulley(driving, driven_one, driven) * shapes[j, k]
+    return belt.cosine * opening
+
+
+@kernel
+def bend_sheaves(belt, state, increments, openings, shapes, step, iterate, bent, dt):
+    """Set what local bending spreads on both sides; other arguments as of `flank_forces`.
+
+    `bent` is work space of `spread_bending`.
+    """
+    if belt.local_compliance == 0.0:
+        return
+    for j in range(step.rows):
+        driven = state[j, f.DRIVEN]
+        axis, opening = pulley_axis(belt, driven), _opening(belt, increments, openings, shapes, driven, j)
+        du, dw = vec.screw(state, j, f.CHANGE)
+        o = vec.at(state, j, f.OUTWARD)
+        a = vec.cross(o, vec.at(state, j, f.HEADING))
+        for p in range(f.POINTS):
+            side, height, width = flank_point(belt, p)
+            n, _, _ = flank_directions(belt, vec.at(step, j, f.RADIAL + 3 * p), axis, side)
+            turned = vec.plus(du, vec.cross(dw, lever_of(o, a, side, height, width)))
+            rate = vec.dot(mean_normal(belt, n, axis, side), turned)
+            iterate[j, f.FLANK_REACHED + p] = -fma(dt, rate, step[j, f.FLANK_GAP + p] + opening)
+    bend = belt.local_compliance, 0.5 * belt.flank_stiffness, belt.local_decay
+    depths = iterate.data[:, f.FLANK_REACHED : f.FLANK_REACHED + f.POINTS]
+    on_driven, left, right = state.data[:, f.DRIVEN], state.data[:, f.SPREAD], state.data[:, f.SPREAD + 1]
+    spread_bending(on_driven, depths[:, : f.RIGHT_LOW], left, bent, *bend)
+    spread_bending(on_driven, depths[:, f.RIGHT_LOW :], right, bent, *bend)
+
+
 @kernel
 def flank_forces(belt, state, pulleys, increments, openings, shapes, step, iterate, dt):
     """Normal and friction forces of an iterate with their slopes; sets the residuals.
@@ -135,19 +174,13 @@ def flank_forces(belt, state, pulleys, increments, openings, shapes, step, itera
     `increments` are the changes of the border's unknowns since the last step: of the driven pulley's speed,
     and of the openings of the driving and the driven sheaves.
     """
-    modes = belt.modal_stiffness.shape[1]
     stiffness = 0.5 * belt.flank_stiffness
     driving_speed, driven_speed = pulleys[planar.DRIVING_SPEED], pulleys[planar.DRIVEN_SPEED] + increments[0]
     for j in range(step.rows):
         driven = state[j, f.DRIVEN]
         axis = pulley_axis(belt, driven)
         rotation = of_pulley(driving_speed, driven_speed, driven)
-        opening = like(0.0, driven)
-        for k in range(modes):
-            driving = openings[0, k] + increments[1 + k]
-            driven_one = openings[1, k] + increments[1 + modes + k]
-            opening = opening + of_pulley(driving, driven_one, driven) * shapes[j, k]
-        opening = belt.cosine * opening
+        opening = _opening(belt, increments, openings, shapes, driven, j)
         du, dw = vec.screw(state, j, f.CHANGE)
         u, omega = motion(state, j, 1.0)
         o = vec.at(state, j, f.OUTWARD)
@@ -163,7 +196,7 @@ def flank_forces(belt, state, pulleys, increments, openings, shapes, step, itera
             lever = lever_of(o, a, side, height, half_width)
             n, m, t = flank_directions(belt, vec.at(step, j, f.RADIAL + 3 * p), axis, side)
             rate = vec.dot(mean_normal(belt, n, axis, side), vec.plus(du, vec.cross(dw, lever)))
-            gap = fma(dt, rate, step[j, f.FLANK_GAP + p] + opening)
+            gap = fma(dt, rate, step[j, f.FLANK_GAP + p] + opening) + state[j, f.SPREAD + p // 2]
             normal, stiff = pressed(gap, stiffness)
             iterate[j, f.FLANK_REACHED + p], iterate[j, f.YIELD + p] = gap, stiff
 
@@ -393,6 +426,7 @@ def book_flanks(belt, state, work, dt):
             rubbed += elements[j, f.FLANK_FRICTION_M + p] * vec.dot(m, q)
             rubbed += elements[j, f.FLANK_FRICTION_T + p] * (around_it - radius * rotation)
             change = dt * vec.dot(n, q) + belt.cosine * opening
+            change += elements[j, f.SPREAD + p // 2] - elements[j, f.LAST_SPREAD + p // 2]
             # the mean gap, of which the axial part that is reached is ahead
             gap = iterate[j, f.FLANK_REACHED + p] + dt * side * belt.cosine * vec.dot(axis, q)
             sheaves += taken(gap, change, 0.5 * belt.flank_stiffness, elements[j, f.FLANK + p])

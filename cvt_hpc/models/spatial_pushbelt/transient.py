@@ -176,6 +176,7 @@ def _press(belt, state, work, dt):
     face_forces(belt, elements, step, iterate, dt)
     if belt.pin_clearance < np.inf:
         pin_forces(belt, elements, step, iterate, dt)
+    flank.bend_sheaves(belt, elements, increments, openings, shapes, step, iterate, work.bent, dt)
     flank.flank_forces(belt, elements, state.pulleys, increments, openings, shapes, step, iterate, dt)
 
 
@@ -291,6 +292,8 @@ def _accept_elements(belt, state, work, dt):
             filtered = elements[j, f.V_FILTERED + p]
             filtered = filtered_slip(belt, along, around_it, elements[j, f.FLANK + p], filtered, dt)
             elements[j, f.V_FILTERED + p] = filtered
+        for side in range(2):
+            elements[j, f.LAST_SPREAD + side] = elements[j, f.SPREAD + side]
 
 
 @kernel
