@@ -39,6 +39,7 @@ GIVEN = {
     "half_wedge_angle": np.radians(11.0),
     "flank_stiffness": 5e7,
     "contact_stiffness": 1e9,
+    "contact_time": 13e-6,
     "angle_stiffness": 5.0,
     "angle_damping": 5e-5,
     "yaw_stiffness": 2.0,

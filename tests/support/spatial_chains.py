@@ -47,6 +47,7 @@ def belt(**given):
         "ring_shear": 2.4e6,
         "flank_stiffness": 5e7,
         "contact_stiffness": 1e9,
+        "contact_time": 13e-6,
         "angle_stiffness": 0.0,
         "angle_damping": 0.0,
         "yaw_stiffness": 0.0,

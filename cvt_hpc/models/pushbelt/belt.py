@@ -43,6 +43,8 @@ class Belt(NamedTuple):
         Of each of the two contacts between elements [N/m].
     nose_height, nose_clearance, nose_stiffness : float
         Of nose and hole above the saddle [m], play to either side [m], infinite without noses, and [N/m].
+    contact_time : float
+        Damping over stiffness of contacts and noses between elements [s].
     angle_stiffness, angle_damping : float
         Of an element's rotation against each segment of the ring, half at each end [N m/rad], [N m s/rad].
     transverse_damping : float
@@ -80,6 +82,7 @@ class Belt(NamedTuple):
     nose_height: float
     nose_clearance: float
     nose_stiffness: float
+    contact_time: float
     angle_stiffness: float
     angle_damping: float
     transverse_damping: float

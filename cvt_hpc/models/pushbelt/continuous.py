@@ -4,7 +4,9 @@ A key that both models know is one quantity: the scene, the masses, ring stiffne
 friction of the belt, the transverse damping, wedge angle and inertia, the law of friction and its memory.
 `FOLLOWS` has the rules for other keys, so that an element, a flank and a pulley deform alike:
 
-- force between neighbours: `edge_stiffness` times strain is `element_stiffness` times strain;
+- force between neighbours: `edge_stiffness` times strain is `element_stiffness` times strain. Their damper
+  is that of the continuous belt, but acts as long as a step of 10 us resolves (`LEAST_CONTACT_TIME`).
+  Impacts are as good as plastic with either, and lose the same;
 - a flank alone has half the axial compliance of a station, 1 / c_e + a / k of both flanks, elements and
   local bending in series, a being 1 / sheave_stiffness. Its own stiffness c is normal force over normal
   overlap, of which the axial one is c cos^2 d0: 1 / (c cos^2 d0) = (1 / c_e + a / k) / 2. The pushbelt's own
@@ -14,7 +16,7 @@ friction of the belt, the transverse damping, wedge angle and inertia, the law o
 - the thrust moves the driven sheave by 1 / (T_1 k) in opening, which is 2 tan d0 of radius: `sheave_rate`.
 
 Assumptions: local bending has no length of its own (`local_length`), which is exact for forces that vary
-over lengths much longer than that. The keys in ABSENT are left out: damping of the layers, bending (0.5 N m^2
+over lengths much longer than that. The keys in ABSENT are left out: damping of the rings, bending (0.5 N m^2
 adds EI q^2 = 0.9 kN to the 5.7 kN that a strand of 148 mm has in its second mode at 120 N m), and the rings'
 length, since the pushbelt's rings fit the path at a strain of 1e-4; `README.md` has the effect of that.
 Elements have an inertia, a tilt and a second contact of which the continuum knows nothing: the pushbelt's own
@@ -32,6 +34,7 @@ from cvt_hpc.models.elastic_belt.pulley_settings import PULLEY_DEFAULTS
 from cvt_hpc.models.elastic_belt.ring_settings import RINGS
 from cvt_hpc.physics.sheaves import axial_element_stiffness
 
+RESOLVED = 7.5e-6  # [s]: damping over stiffness of contacts between elements, at least
 RIGID = 1e12  # [N/m]: of a mode that does not open; it gives way by 0.1 um under 100 kN
 
 # By key of the continuum the only value that the pushbelt has a counterpart of
@@ -48,7 +51,6 @@ ONLY = {
 ABSENT = (
     "reference_tension",
     "bending_stiffness",
-    "element_damping",
     "ring_damping",
     "local_length",
     "disturbance",
@@ -90,6 +92,10 @@ def _modes(p: Mapping[str, Any], radius: float) -> tuple[float, float, float]:
 
 FOLLOWS = {
     "edge_stiffness": Follows(("element_stiffness",), lambda p: p["element_stiffness"]),
+    "element_damping": Follows(
+        ("element_damping", "element_stiffness"),
+        lambda p: max(p["element_damping"], RESOLVED * p["element_stiffness"]),
+    ),
     "flank_stiffness": Follows(
         ("flank_stiffness", "element_factor", "sheave_stiffness", "local_stiffness", "half_wedge_angle"),
         _flank_stiffness,

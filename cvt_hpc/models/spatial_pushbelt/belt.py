@@ -76,6 +76,8 @@ class Belt(NamedTuple):
         Normal force at each flank by its penetration, shared by its two points [N/m].
     contact_stiffness : float
         Of the contacts at an edge and at a head, shared by its two points [N/m].
+    contact_time : float
+        Damping over stiffness of contacts and pins between elements [s].
     angle_stiffness, angle_damping : float
         Of an element's pitch against each segment of the ring, half at each end [N m/rad], [N m s/rad].
     yaw_stiffness, yaw_damping : float
@@ -130,6 +132,7 @@ class Belt(NamedTuple):
     ring_shear: float
     flank_stiffness: float
     contact_stiffness: float
+    contact_time: float
     angle_stiffness: float
     angle_damping: float
     yaw_stiffness: float
