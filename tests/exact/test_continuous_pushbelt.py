@@ -18,9 +18,9 @@ from support.wraps import places
 JOBS = Path(__file__).parents[2] / "jobs"
 ANGLE, RADII = np.radians(11.0), {"driving": 0.03, "driven": 0.075}
 BELT = {
-    "element_stiffness": 4e7, "flank_stiffness": 2e10, "element_factor": 1.5, "local_stiffness": 4e9,
-    "sheave_stiffness": 1.5, "half_wedge_angle": ANGLE, "tilt_stiffness": 2e5, "tilt_factor": 1.5, "ratio": 2.5,
-    "driven_radius": RADII["driven"], "sheave_lag": 2e-3, "lag_stiffness": 2e8,
+    "element_stiffness": 4e7, "element_damping": 20.0, "flank_stiffness": 2e10, "element_factor": 1.5,
+    "local_stiffness": 4e9, "sheave_stiffness": 1.5, "half_wedge_angle": ANGLE, "tilt_stiffness": 2e5,
+    "tilt_factor": 1.5, "ratio": 2.5, "driven_radius": RADII["driven"], "sheave_lag": 2e-3, "lag_stiffness": 2e8,
 }  # fmt: skip
 
 
@@ -98,7 +98,7 @@ def assert_the_same_belt(pushbelt, continuous, but=()):
 def test_the_job_of_vibration_has_the_belt_of_lebrecht_2004():
     pushbelt = load_job(JOBS / "pushbelt_vibration.toml")
     axes = {axis.name: list(axis.values) for axis in pushbelt.axes}
-    continuous = load_job(JOBS / "lebrecht_2004.toml", axes | {"sheave_stiffness": 1.0, "tilt_factor": 1.0})
+    continuous = load_job(JOBS / "lebrecht_2004.toml", axes | {"sheave_stiffness": 1.0})
     for index in (0, pushbelt.size - 1):
         assert_the_same_belt(pushbelt.point(index), continuous.point(index))
 

@@ -41,6 +41,7 @@ GIVEN = {
     "local_compliance": 0.0,
     "local_decay": 0.5,
     "contact_stiffness": 1e9,
+    "contact_time": 13e-6,
     "angle_stiffness": 5.0,
     "angle_damping": 5e-5,
     "yaw_stiffness": 2.0,

@@ -24,6 +24,7 @@ ASSUMED = {
     "nose_height": 6e-3,  # [m]
     "nose_clearance": np.inf,  # [m]
     "nose_stiffness": 1e8,  # [N/m]
+    "contact_time": 13e-6,  # [s]
     "angle_stiffness": 5.0,  # [N m/rad]
     "angle_damping": 5e-5,  # [N m s]
     "transverse_damping": 500.0,  # [N s/m^2]

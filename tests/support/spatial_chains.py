@@ -49,6 +49,7 @@ def belt(**given):
         "local_compliance": 0.0,
         "local_decay": 0.5,
         "contact_stiffness": 1e9,
+        "contact_time": 13e-6,
         "angle_stiffness": 0.0,
         "angle_damping": 0.0,
         "yaw_stiffness": 0.0,

@@ -6,7 +6,7 @@ from cvt_hpc.kernels import kernel
 from cvt_hpc.lanes import ahead, behind, like
 from cvt_hpc.models.pushbelt import fields as f
 from cvt_hpc.models.pushbelt.border import border_residuals, of_pulley
-from cvt_hpc.models.pushbelt.chain import BETA, angle_slope
+from cvt_hpc.models.pushbelt.chain import BETA, angle_slope, contact_shares
 from cvt_hpc.models.pushbelt.friction import flank_friction, ring_friction
 from cvt_hpc.models.pushbelt.local_bending import spread_bending
 from cvt_hpc.physics.contact_laws import pressed
@@ -23,6 +23,8 @@ def pair_forces(belt, state, step, iterate, dt):
     """Tension, contact forces and moments of angles between neighbours, with the slopes of contacts."""
     steep = angle_slope(belt, dt)
     stiffness = belt.contact_stiffness
+    ahead_share, _, _ = contact_shares(belt, dt)
+    pressing = ahead_share * dt
     for j in range(step.rows):
         iy, iz = state[j, f.CHANGE_Y], state[j, f.CHANGE_Z]
         iw, iv = state[j, f.CHANGE_W], state[j, f.CHANGE_V]
@@ -40,17 +42,17 @@ def pair_forces(belt, state, step, iterate, dt):
         x_y, x_z = ahead(state, j, f.HEADING_Y), ahead(state, j, f.HEADING_Z)
         closing = x_y * (jy - iy) + x_z * (jz - iz)
         a, b = step[j, f.EDGE_LEVER_I], step[j, f.EDGE_LEVER_J]
-        gap = step[j, f.EDGE_GAP] + dt * (closing + a * iw + b * jw)
+        gap = step[j, f.EDGE_GAP] + pressing * (closing + a * iw + b * jw)
         edge, k = pressed(gap, stiffness)
         iterate[j, f.EDGE_REACHED] = gap
         c, d = step[j, f.HEAD_LEVER_I], step[j, f.HEAD_LEVER_J]
-        gap = step[j, f.HEAD_GAP] + dt * (closing + c * iw + d * jw)
+        gap = step[j, f.HEAD_GAP] + pressing * (closing + c * iw + d * jw)
         head, m = pressed(gap, stiffness)
         iterate[j, f.HEAD_REACHED] = gap
         state[j, f.EDGE], state[j, f.HEAD] = edge, head
         iterate[j, f.CONTACT] = edge + head
         iterate[j, f.CONTACT_I], iterate[j, f.CONTACT_J] = edge * a + head * c, edge * b + head * d
-        k, m = dt * k, dt * m
+        k, m = pressing * k, pressing * m
         iterate[j, f.STIFF] = k + m
         iterate[j, f.STIFF_I], iterate[j, f.STIFF_J] = k * a + m * c, k * b + m * d
         iterate[j, f.STIFF_II], iterate[j, f.STIFF_JJ] = k * a * a + m * c * c, k * b * b + m * d * d
@@ -59,9 +61,9 @@ def pair_forces(belt, state, step, iterate, dt):
 
 @kernel
 def flank_depths(belt, state, increments, openings, shapes, step, iterate, bent, dt):
-    """Depth of the flanks in the sheaves, less what local bending spreads; other arguments of `element_forces`.
+    """Depth of the flanks in the sheaves, less what local bending spreads.
 
-    `bent` is work space of `spread_bending`.
+    Arguments are those of `element_forces`, with `bent`, work space of `spread_bending`.
     """
     modes, share = belt.modal_stiffness.shape[1], BETA * dt * belt.sine
     for j in range(step.rows):

@@ -38,15 +38,17 @@ class Belt(NamedTuple):
     ring_stiffness : float
         EA of both ring packages [N].
     flank_stiffness : float
-        Normal force at each flank by its penetration, element and local bending of the sheave in series, where
-        neighbours have the same force [N/m].
+        Normal force at each flank by its penetration, element and local bending of the sheave in series,
+        where neighbours have the same force [N/m].
     local_compliance, local_decay : float
         Local bending of a sheave along the normal by that force [m/N], 0: none; its decay from element to
-        element [1].
+        element [1] (`local_bending`).
     contact_stiffness : float
         Of each of the two contacts between elements [N/m].
     nose_height, nose_clearance, nose_stiffness : float
         Of nose and hole above the saddle [m], play to either side [m], infinite without noses, and [N/m].
+    contact_time : float
+        Damping over stiffness of contacts and noses between elements [s].
     angle_stiffness, angle_damping : float
         Of an element's rotation against each segment of the ring, half at each end [N m/rad], [N m s/rad].
     transverse_damping : float
@@ -86,6 +88,7 @@ class Belt(NamedTuple):
     nose_height: float
     nose_clearance: float
     nose_stiffness: float
+    contact_time: float
     angle_stiffness: float
     angle_damping: float
     transverse_damping: float

@@ -1,18 +1,21 @@
 """Local bending of sheaves, which spreads along the arc: of both pushbelts.
 
 The deflection y of a sheave under the forces F of flanks follows y - l^2 y'' = b F (a plate on a bedding, of
-which the shorter of two lengths is left out): each force deflects its surroundings by exp(-|s| / l). Forces that
-are alike all along deflect as by a bedding, b F. The laws of a step have this bedding in series with the
-element, as the stiffness k of a flank, b k < 1. The rest of y is the spread, z = y - b F, by which the flank is
-less deep in the sheave: F = sum k_p max(0, depth_p - z) over the points p of a flank.
+which the shorter of two lengths is left out): each force deflects its surroundings by exp(-|s| / l). Forces
+that are alike all along deflect as by a bedding, b F. The laws of a step have this bedding in series with
+the element, as the stiffness k of a flank, b k < 1. The rest of y is the spread, z = y - b F, by which the
+flank is less deep in the sheave: F = sum k_p max(0, depth_p - z) over the points p of a flank.
 
-With K = sum k_p and D = sum k_p depth_p over the points that press, F = (D - K y) / (1 - b K), and with its place
-i along the belt on one pulley
+With K = sum k_p and D = sum k_p depth_p over the points that press, F = (D - K y) / (1 - b K), and with its
+place i along the belt on one pulley
 
     (1 + 2 a + h) y_i - a (y_{i-1} + y_{i+1}) = b D / (1 - b K),   h = b K / (1 - b K),   a = r / (1 - r)^2,
 
-r = exp(-pitch / l). Sheaves of both pulleys are apart: half way along a strand nothing is handed on. The matrix is
-an M-matrix, so that the set of pressing points settles by full steps.
+r = exp(-pitch / l). Sheaves of both pulleys are apart: half way along a strand nothing is handed on. The
+matrix is an M-matrix, so that the set of pressing points settles by full steps.
+
+Newton's method of a step takes the slope of the bedding alone: within a step the inertia of elements is far
+stiffer, so that each iteration leaves some tenth of the spread's error.
 """
 
 from numba.extending import register_jitable

@@ -99,6 +99,12 @@ PARAMETERS: dict[str, dict[str, Parameter]] = {
             "force between neighbours at rocking edge or head by their approach over the pitch",
             sensible=(1e4, 1e10),
         ),
+        "element_damping": not_negative(
+            20.0,
+            "N s",
+            "damping of these contacts, force by rate of approach over the pitch",
+            sensible=(0.001, 100000.0),
+        ),
         "ring_offset": positive(
             1.5e-3,
             "m",

@@ -338,7 +338,8 @@ class ElementRun(SampledRun):
     def powers(self) -> dict[str, Any]:
         """Mean powers over the judged part, named as in the record [W]."""
         found = {name: self.mean_rate(f.WORK_IN + k) for k, name in enumerate(f.POWERS)}
-        loss = found["flank_loss"] + found["ring_loss"] + found["belt_loss"] + found["tilt_loss"]
+        loss = found["flank_loss"] + found["ring_loss"] + found["belt_loss"]
+        loss += found["tilt_loss"] + found["element_loss"]
         damped = np.array([self.mean_rate(total) for total in f.DAMPED.values()])
         storing = self.mean_rate(f.TOTALS)
         return found | {"loss": loss, "storing_power": storing, "numerical_damping": damped}
@@ -409,6 +410,7 @@ def given(parameters: Mapping[str, Any]) -> dict[str, Any]:
         "local_compliance": local_compliance(p) / pitch,
         "local_decay": np.exp(-pitch / p["local_length"]),
         "contact_stiffness": p["edge_stiffness"] / pitch,
+        "contact_time": p["element_damping"] / p["edge_stiffness"],
         "angle_stiffness": p["tilt_spring"] * pitch,
         "angle_damping": p["tilt_damper"] * pitch,
         "driving_rate": p["sheave_rate"] if p["driving_thrust"] > 0.0 else 0.0,

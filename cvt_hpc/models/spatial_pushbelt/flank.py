@@ -23,15 +23,15 @@ from numba.extending import register_jitable
 from cvt_hpc.kernels import kernel
 from cvt_hpc.lanes import fma, like, sqrt
 from cvt_hpc.models.pushbelt import fields as planar
-from cvt_hpc.models.pushbelt.border import add_to_totals, of_pulley, opening_of
-from cvt_hpc.models.pushbelt.chain import BETA
+from cvt_hpc.models.pushbelt.border import add_to_totals, book_contacts, of_pulley, opening_of
+from cvt_hpc.models.pushbelt.chain import BETA, contact_shares
 from cvt_hpc.models.pushbelt.friction import flank_friction
 from cvt_hpc.models.pushbelt.local_bending import spread_bending
 from cvt_hpc.models.spatial_pushbelt import fields as f
 from cvt_hpc.models.spatial_pushbelt import flank
 from cvt_hpc.models.spatial_pushbelt import vectors as vec
 from cvt_hpc.models.spatial_pushbelt.chain import mean_stretch, motion, motion_ahead, ring_slip
-from cvt_hpc.physics.contact_laws import damped, pressed, taken
+from cvt_hpc.physics.contact_laws import pressed, taken
 
 
 @register_jitable
@@ -358,6 +358,8 @@ def book_pairs(belt, state, work, dt):
     elements, step, iterate, scratch = state.elements, work.step, work.iterate, work.scratch
     has_pins = belt.pin_clearance < np.inf
     contact = 0.5 * belt.contact_stiffness
+    ahead_share, _, _ = contact_shares(belt, dt)
+    half_ahead = 0.5 / ahead_share
     ring = tilt = drag = between = stretching = like(0.0, elements[0, f.FLANK])
     for j in range(step.rows):
         (du, dw), (ju, jw) = vec.screw(elements, j, f.CHANGE), vec.screw_ahead(elements, j, f.CHANGE)
@@ -384,11 +386,15 @@ def book_pairs(belt, state, work, dt):
         for p in range(f.POINTS):
             a, b = vec.at(step, j, f.PUSH_LEVER_I + 3 * p), vec.at(step, j, f.PUSH_LEVER_J + 3 * p)
             change = dt * (closing + vec.dot(a, w) + vec.dot(b, next_w))
-            between += damped(iterate[j, f.PUSH_REACHED + p], change, contact)
+            gap = half_ahead * (iterate[j, f.PUSH_REACHED + p] - step[j, f.PUSH_GAP + p])
+            gap = step[j, f.PUSH_MEAN + p] + gap - 0.5 * change
+            between += taken(gap, change, contact, elements[j, f.PUSH + p])
         if has_pins:
             a, b = vec.at(step, j, f.PIN_LEVER_I), vec.at(step, j, f.PIN_LEVER_J)
             change = dt * (vec.dot(vec.at(step, j, f.PIN_NORMAL), apart) - vec.dot(a, w) + vec.dot(b, next_w))
-            between += damped(iterate[j, f.PIN_REACHED], change, belt.pin_stiffness)
+            gap = half_ahead * (iterate[j, f.PIN_REACHED] - step[j, f.PIN_GAP])
+            gap = step[j, f.PIN_MEAN] + gap - 0.5 * change
+            between += taken(gap, change, belt.pin_stiffness, elements[j, f.PIN])
 
         ring += elements[j, f.RING_FRICTION] * ring_slip(elements, step, j, 0.5)
         n_y, n_z = step[j, f.NORMAL_Y], step[j, f.NORMAL_Z]
@@ -398,7 +404,7 @@ def book_pairs(belt, state, work, dt):
     add_to_totals(state, scratch, planar.RING_LOSS, dt * ring)
     add_to_totals(state, scratch, planar.DAMPING_LOSS, dt * tilt)
     add_to_totals(state, scratch, planar.BELT_LOSS, dt * drag)
-    add_to_totals(state, scratch, planar.ELEMENT_DAMPED, between)
+    book_contacts(belt, state, scratch, between, dt)
     add_to_totals(state, scratch, planar.RING_DAMPED, dt * stretching)
 
 
