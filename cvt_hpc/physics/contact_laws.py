@@ -41,18 +41,11 @@ def remembered(filtered, size, memory, dt):
 
 
 @register_jitable
-def damped(gap, change, stiffness):
-    """Energy [J] that a step takes at a one-sided contact, by the gap at its end and its mean change [m]."""
-    now, before = maximum(-gap, 0.0), maximum(2.0 * change - gap, 0.0)
-    return stiffness * (0.25 * (before * before - now * now) - now * change)
-
-
-@register_jitable
 def taken(gap, change, stiffness, force):
     """Energy [J] that a step takes at a one-sided contact, by its mean gap and change [m], and its force [N].
 
-    By a force of that gap it is 0 where the contact stays closed or open. Where it closes, the step gives
-    what it takes where the contact opens as fast.
+    By a force of that gap alone it is 0 where the contact stays closed or open. Where it closes, the step
+    gives what it takes where the contact opens as fast. Dampers are included.
     """
     before, after = maximum(0.5 * change - gap, 0.0), maximum(-0.5 * change - gap, 0.0)
     return 0.5 * stiffness * (before * before - after * after) - force * change

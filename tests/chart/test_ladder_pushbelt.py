@@ -7,8 +7,11 @@ import pytest
 
 from cvt_hpc.cli import main
 from cvt_hpc.errors import InputError, UnitWarning
-from cvt_hpc.experiments.ladder.loading import QUESTIONS, ladder, load
+from cvt_hpc.experiments.ladder.loading import QUESTIONS, ladder, load, pushbelt_jobs
 from cvt_hpc.job import build_job
+from cvt_hpc.models.elastic_belt import inert
+from cvt_hpc.models.pushbelt import inert as idle_in_pushbelt
+from cvt_hpc.models.pushbelt.continuous import FOLLOWS
 
 JOBS = Path(__file__).parents[2] / "jobs"
 DOCUMENT = {
@@ -44,10 +47,21 @@ def test_the_reference_is_the_same_scene_on_a_refined_pushbelt():
     assert [points[k][key] for k in (1, 2) for key in ("elements", "step", "head_height")] == [
         208, 1e-5, 5e-3, 416, 5e-6, 5e-3,
     ]  # fmt: skip
-    # flanks with local bending in series, of which rigid sheaves have none
-    flanks = np.array([reference.point(index)["flank_stiffness"] for index in range(0, 6, 2)])
-    expected = [2.0 / (1 / 3e10 + 1 / (s * 4e9)) / np.cos(np.radians(11.0)) ** 2 for s in (1.0, 2.0, np.inf)]
-    assert flanks == pytest.approx(expected)
+    # local bending, of which rigid sheaves have none
+    bending = [reference.point(index)["local_stiffness"] for index in range(0, 6, 2)]
+    assert bending == pytest.approx([4e9, 8e9, np.inf])
+
+
+def test_keys_without_effect_in_the_continuous_belt_are_not_handed_over():
+    """Its driving thrust, which a held sheave does not feel, would let that of the pushbelt go."""
+    job = build_job(DOCUMENT, "x.toml")
+    pushbelt, _ = pushbelt_jobs(job, {})
+    for index in range(job.size):
+        here, there = job.point(index), pushbelt.point(index)
+        idle = {*inert(here)} & there.keys()
+        assert "driving_thrust" in idle
+        assert idle <= {*FOLLOWS, *idle_in_pushbelt(there)}
+    assert there["driving_thrust"] == 0.0
 
 
 @pytest.mark.parametrize(
@@ -94,7 +108,7 @@ def test_its_cost_is_told_before_it_is_asked_for(job, capsys):
     assert main(["check", str(job)]) == 0  # by its table it is a job for `ladder`
     asked = capsys.readouterr().out.splitlines()
     rows = {line.split()[0]: line.split() for line in asked if line.startswith("  ")}
-    assert rows["pushbelt"][1:4] == rows["reference"][1:4] == ["pushbelt", "8", "8"]
+    assert rows["pushbelt"][1:4] == rows["reference"][1:4] == ["pushbelt", "15", "15"]
     # twice the elements at half the step, samples apart
     assert float(rows["reference"][4]) == pytest.approx(4.0 * float(rows["pushbelt"][4]), rel=0.2)
     assert "ladder.reference" not in asked[-1]
@@ -137,4 +151,4 @@ def test_settings_of_the_command_line_replace_those_of_the_table(job):
     assert load(job).rungs[-1].job.parameters["elements"] == 432
     asked = load(job, ["ladder.set={elements = 108}", "load=[100, 120]", "band_high=600 Hz"])
     assert asked.rungs[-1].job.parameters["elements"] == 216
-    assert asked.job.size == asked.rungs[-1].job.size == 4
+    assert asked.job.size == asked.rungs[-1].job.size == 6

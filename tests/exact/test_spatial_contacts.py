@@ -97,7 +97,7 @@ def pressed_edges(belt, push, curvature):
         r = edge + (0.5 * belt.thickness - apart) * x + belt.pitch_depth * o
     state, work = chains.state(fields), b.workspace(belt, nodes)
     predict(belt, state.elements, state.pulleys, work.step, 1e-9)
-    predict_faces(belt, state.elements, work.step)
+    predict_faces(belt, state.elements, work.step, 1e-9)
     work.iterate.data[:] = 0.0
     face_forces(belt, state.elements, work.step, work.iterate, 1e-9)
     forces, turns = (

@@ -29,14 +29,13 @@ def directions(step, f, x):
 
     xj = np.roll(f[:, 3:6], -1, 0)
     found = {}
+    # at mid step
     for p in range(4):
-        found[fields.PUSH_GAP + p] = rate(-xj, xj, U, U, x) + rate(
-            of(fields.PUSH_LEVER_I + 3 * p), of(fields.PUSH_LEVER_J + 3 * p), W, W, x
-        )
+        turning = rate(of(fields.PUSH_LEVER_I + 3 * p), of(fields.PUSH_LEVER_J + 3 * p), W, W, x)
+        found[fields.PUSH_MEAN + p] = 0.5 * (rate(-xj, xj, U, U, x) + turning)
     n = of(fields.PIN_NORMAL)
-    found[fields.PIN_GAP] = rate(-n, n, U, U, x) - rate(
-        of(fields.PIN_LEVER_I), -of(fields.PIN_LEVER_J), W, W, x
-    )
+    turning = rate(of(fields.PIN_LEVER_I), -of(fields.PIN_LEVER_J), W, W, x)
+    found[fields.PIN_MEAN] = 0.5 * (rate(-n, n, U, U, x) - turning)
     tension = rate(of(fields.TENSION_I), -of(fields.TENSION_J), U, U, x)
     tension += (
         rate(of(fields.TENSION_I + 3), -of(fields.TENSION_J + 3), W, W, x) + x[:, 6] - np.roll(x[:, 6], -1)

@@ -65,9 +65,10 @@ def test_power_balance_closes_with_falling_friction_and_damping():
     found = record(load=60.0, friction_gradient=-0.4, transverse_damping=1e6)
     assert found["status"] == Status.DONE and found["unsolved_share"] == 0.0
     drive, damped = found["driving_power"], found["numerical_damping"]
-    # what the step damps, and what the belt's damping takes, are a hundred times what is left open
+    # what the belt's damping and impacts of elements take are a dozen times and more of what is left open
     assert abs(found["power_residual"]) < 2e-5 < 0.5e-3 < found["belt_loss"] / drive
-    assert damped.sum() > 3e-4 * drive
+    assert np.abs(damped).sum() < 1e-5 * drive
+    assert found["element_loss"] > 3e-4 * drive
 
 
 def test_more_torque_than_friction_carries_slips_through(records):

@@ -18,10 +18,13 @@ ASSUMED = {
     "ring_strain": 1e-4,  # at the start
     "half_wedge_angle": np.radians(11.0),  # [rad]
     "flank_stiffness": 5e7,  # [N/m]
+    "local_compliance": 0.0,
+    "local_decay": 0.5,
     "contact_stiffness": 1e9,  # [N/m]
     "nose_height": 6e-3,  # [m]
     "nose_clearance": np.inf,  # [m]
     "nose_stiffness": 1e8,  # [N/m]
+    "contact_time": 13e-6,  # [s]
     "angle_stiffness": 5.0,  # [N m/rad]
     "angle_damping": 5e-5,  # [N m s]
     "transverse_damping": 500.0,  # [N s/m^2]

@@ -74,12 +74,8 @@ def moved_back(fields):
     return f
 
 
-def gaps(belt, state):
-    """Gaps by the geometry of a state, of the contacts `CONTACTS[:9]`, (nodes, 9) [m].
-
-    Flanks have the mean radius of three positions, of which the state is the last one, and its axial position.
-    """
-    f = of_lanes(state.elements)
+def gaps_between(belt, f):
+    """Gaps by positions between each element and the next one, four at the front and that of the pin, (5, nodes) [m]."""
     r, x, o = f[:, 0:3], f[:, 3:6], f[:, 6:9]
     a = np.cross(o, x)
     rj, xj, oj = (np.roll(v, -1, axis=0) for v in (r, x, o))
@@ -90,7 +86,22 @@ def gaps(belt, state):
             found.append(np.sum((rj - front) * xj, axis=1) - 0.5 * belt.thickness)
     offset = r - rj + 0.5 * belt.thickness * (x + xj) + belt.pin_height * (o - oj)
     offset -= np.sum(offset * xj, axis=1)[:, None] * xj
-    found.append(belt.pin_clearance - np.linalg.norm(offset, axis=1))
+    return np.array([*found, belt.pin_clearance - np.linalg.norm(offset, axis=1)])
+
+
+def gaps(belt, state):
+    """Gaps by the geometry of a state, of the contacts `CONTACTS[:9]`, (nodes, 9) [m].
+
+    Elements press on each other by the mean of three positions, of which the state is the last one, and by the
+    rate of the last step. Flanks have the mean radius, and the last axial position.
+    """
+    f = of_lanes(state.elements)
+    r, x, o = f[:, 0:3], f[:, 3:6], f[:, 6:9]
+    a = np.cross(o, x)
+    three = [f, moved_back(f), moved_back(moved_back(f))]
+    rate = belt.contact_time / STEP
+    weights = 0.25 + rate, 0.5 - rate, 0.25
+    found = list(np.tensordot(weights, [gaps_between(belt, g) for g in three], 1))
     driven = f[:, spatial_fields.DRIVEN].astype(int)
     axis, centre = belt.axes[driven], driven[:, None] * [belt.centre_distance, 0.0, 0.0]
     groove, middle = (
@@ -98,7 +109,6 @@ def gaps(belt, state):
         for first in (pushbelt_fields.DRIVING_RADIUS, spatial_fields.DRIVING_MIDDLE)
     )
     opening, lean = (sheaves_opening(belt, state, modes) for modes in (state.openings, state.leans))
-    three = [f, moved_back(f), moved_back(moved_back(f))]
     for side in (-1.0, 1.0):
         for reach in (-belt.flank_reach, belt.flank_reach):
             width = belt.half_width + reach * belt.sine / belt.cosine

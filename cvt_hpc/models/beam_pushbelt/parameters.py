@@ -19,6 +19,7 @@ _WITHOUT = {
         for key in (
             "nose_height",
             "nose_stiffness",
+            "element_damping",
             "ring_friction_speed",
             "friction_speed",
             *pushbelt.MODES,

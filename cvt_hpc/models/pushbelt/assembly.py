@@ -6,8 +6,9 @@ from cvt_hpc.kernels import kernel
 from cvt_hpc.lanes import ahead, behind, like
 from cvt_hpc.models.pushbelt import fields as f
 from cvt_hpc.models.pushbelt.border import border_residuals, of_pulley
-from cvt_hpc.models.pushbelt.chain import BETA, angle_slope
+from cvt_hpc.models.pushbelt.chain import BETA, angle_slope, contact_shares
 from cvt_hpc.models.pushbelt.friction import flank_friction, ring_friction
+from cvt_hpc.models.pushbelt.local_bending import spread_bending
 from cvt_hpc.physics.contact_laws import pressed
 from cvt_hpc.solvers.linked_blocks import field_of_right
 
@@ -22,6 +23,8 @@ def pair_forces(belt, state, step, iterate, dt):
     """Tension, contact forces and moments of angles between neighbours, with the slopes of contacts."""
     steep = angle_slope(belt, dt)
     stiffness = belt.contact_stiffness
+    ahead_share, _, _ = contact_shares(belt, dt)
+    pressing = ahead_share * dt
     for j in range(step.rows):
         iy, iz = state[j, f.CHANGE_Y], state[j, f.CHANGE_Z]
         iw, iv = state[j, f.CHANGE_W], state[j, f.CHANGE_V]
@@ -39,17 +42,17 @@ def pair_forces(belt, state, step, iterate, dt):
         x_y, x_z = ahead(state, j, f.HEADING_Y), ahead(state, j, f.HEADING_Z)
         closing = x_y * (jy - iy) + x_z * (jz - iz)
         a, b = step[j, f.EDGE_LEVER_I], step[j, f.EDGE_LEVER_J]
-        gap = step[j, f.EDGE_GAP] + dt * (closing + a * iw + b * jw)
+        gap = step[j, f.EDGE_GAP] + pressing * (closing + a * iw + b * jw)
         edge, k = pressed(gap, stiffness)
         iterate[j, f.EDGE_REACHED] = gap
         c, d = step[j, f.HEAD_LEVER_I], step[j, f.HEAD_LEVER_J]
-        gap = step[j, f.HEAD_GAP] + dt * (closing + c * iw + d * jw)
+        gap = step[j, f.HEAD_GAP] + pressing * (closing + c * iw + d * jw)
         head, m = pressed(gap, stiffness)
         iterate[j, f.HEAD_REACHED] = gap
         state[j, f.EDGE], state[j, f.HEAD] = edge, head
         iterate[j, f.CONTACT] = edge + head
         iterate[j, f.CONTACT_I], iterate[j, f.CONTACT_J] = edge * a + head * c, edge * b + head * d
-        k, m = dt * k, dt * m
+        k, m = pressing * k, pressing * m
         iterate[j, f.STIFF] = k + m
         iterate[j, f.STIFF_I], iterate[j, f.STIFF_J] = k * a + m * c, k * b + m * d
         iterate[j, f.STIFF_II], iterate[j, f.STIFF_JJ] = k * a * a + m * c * c, k * b * b + m * d * d
@@ -57,13 +60,36 @@ def pair_forces(belt, state, step, iterate, dt):
 
 
 @kernel
-def element_forces(belt, state, pulleys, increments, openings, shapes, step, iterate, dt):
-    """Forces of sheaves and ring friction on elements, with their slopes.
+def flank_depths(belt, state, increments, openings, shapes, step, iterate, bent, dt):
+    """Depth of the flanks in the sheaves, less what local bending spreads.
+
+    Arguments are those of `element_forces`, with `bent`, work space of `spread_bending`.
+    """
+    modes, share = belt.modal_stiffness.shape[1], BETA * dt * belt.sine
+    for j in range(step.rows):
+        deep = step[j, f.R_Y] * state[j, f.CHANGE_Y] + step[j, f.R_Z] * state[j, f.CHANGE_Z]
+        deep = step[j, f.DEPTH] - share * (deep + step[j, f.R_LEVER] * state[j, f.CHANGE_W])
+        driven = state[j, f.DRIVEN]
+        for k in range(modes):
+            driving_one = openings[0, k] + increments[1 + k]
+            driven_one = openings[1, k] + increments[1 + modes + k]
+            deep = deep - belt.cosine * of_pulley(driving_one, driven_one, driven) * shapes[j, k]
+        iterate[j, f.DEPTH_REACHED] = deep
+    if belt.local_compliance > 0.0:
+        depths, spread = iterate.data[:, f.DEPTH_REACHED : f.DEPTH_REACHED + 1], state.data[:, f.SPREAD]
+        bend = belt.local_compliance, belt.flank_stiffness, belt.local_decay
+        spread_bending(state.data[:, f.DRIVEN], depths, spread, bent, *bend)
+        for j in range(step.rows):
+            iterate[j, f.DEPTH_REACHED] -= state[j, f.SPREAD]
+
+
+@kernel
+def element_forces(belt, state, pulleys, increments, step, iterate, dt):
+    """Forces of sheaves and ring friction on elements, with their slopes, by the depths of the flanks.
 
     `increments` are the changes of the border's unknowns since the last step: of the driven pulley's speed,
     and of the openings of the driving and the driven sheaves.
     """
-    modes = belt.modal_stiffness.shape[1]
     wide, share = 1.0 / belt.cosine, BETA * dt * belt.sine
     driving_speed, driven_speed = pulleys[f.DRIVING_SPEED], pulleys[f.DRIVEN_SPEED] + increments[0]
     for j in range(step.rows):
@@ -80,13 +106,7 @@ def element_forces(belt, state, pulleys, increments, openings, shapes, step, ite
 
         # the pair of flanks
         r_y, r_z, r_lever = step[j, f.R_Y], step[j, f.R_Z], step[j, f.R_LEVER]
-        deep = step[j, f.DEPTH] - share * (r_y * dy + r_z * dz + r_lever * dw)
-        for k in range(modes):
-            driving = openings[0, k] + increments[1 + k]
-            driven_one = openings[1, k] + increments[1 + modes + k]
-            deep = deep - belt.cosine * of_pulley(driving, driven_one, driven) * shapes[j, k]
-        normal, stiff = pressed(-deep, belt.flank_stiffness)
-        iterate[j, f.DEPTH_REACHED] = deep
+        normal, stiff = pressed(-iterate[j, f.DEPTH_REACHED], belt.flank_stiffness)
         m_y, m_z = step[j, f.MID_R_Y], step[j, f.MID_R_Z]
         mr_lever, mt_lever = step[j, f.MID_R_LEVER], step[j, f.MID_T_LEVER]
         radius = step[j, f.MID_RADIUS]

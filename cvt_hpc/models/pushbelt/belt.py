@@ -38,11 +38,17 @@ class Belt(NamedTuple):
     ring_stiffness : float
         EA of both ring packages [N].
     flank_stiffness : float
-        Normal force at each flank by its penetration [N/m].
+        Normal force at each flank by its penetration, element and local bending of the sheave in series,
+        where neighbours have the same force [N/m].
+    local_compliance, local_decay : float
+        Local bending of a sheave along the normal by that force [m/N], 0: none; its decay from element to
+        element [1] (`local_bending`).
     contact_stiffness : float
         Of each of the two contacts between elements [N/m].
     nose_height, nose_clearance, nose_stiffness : float
         Of nose and hole above the saddle [m], play to either side [m], infinite without noses, and [N/m].
+    contact_time : float
+        Damping over stiffness of contacts and noses between elements [s].
     angle_stiffness, angle_damping : float
         Of an element's rotation against each segment of the ring, half at each end [N m/rad], [N m s/rad].
     transverse_damping : float
@@ -76,10 +82,13 @@ class Belt(NamedTuple):
     ring_mass: float
     ring_stiffness: float
     flank_stiffness: float
+    local_compliance: float
+    local_decay: float
     contact_stiffness: float
     nose_height: float
     nose_clearance: float
     nose_stiffness: float
+    contact_time: float
     angle_stiffness: float
     angle_damping: float
     transverse_damping: float
@@ -181,6 +190,8 @@ class Workspace(NamedTuple):
         `BeltState.increments` at its start.
     kept : (2, STATE_FIELDS) array
         States of two elements before the last correction.
+    bent : (elements, 4) array
+        Of `local_bending`.
     """
 
     step: LaneArray
@@ -194,6 +205,7 @@ class Workspace(NamedTuple):
     inputs: np.ndarray
     increments: np.ndarray
     kept: np.ndarray
+    bent: np.ndarray
 
 
 def parts_of(nodes: int) -> int:
@@ -375,4 +387,5 @@ def empty_workspace(
         inputs=np.zeros(inputs),
         increments=np.zeros(columns - 1),
         kept=np.zeros((2, state)),
+        bent=np.zeros((nodes, 4)),
     )

@@ -10,22 +10,23 @@ M (X - X_old) / dt = f times the mean speed (X + X_old) / 2, which belongs to q_
 forces do, is the change of kinetic energy without remainder. So a force takes its magnitude times the mean
 rate along its direction: that is the loss of friction and dampers.
 
-Tension and contacts between elements have their magnitude -V'(g) from the end of the step. They take -V'(g) r
-for the change r within a step at the mean rate, and store (V(g) - V(g - 2 r)) / 2: potentials half a step
-later and earlier, which add up. The difference is >= 0, as V is convex: c r^2 where a contact stays closed,
-as of a damper c dt. The step damps by that, and it is neither physics nor an error in the balance of power.
+Tension T has its magnitude from the end of the step. It takes -T r for the change r of the length within a
+step at the mean rate, and stores the potentials half a step later and earlier, which add up. The difference
+is k r^2, as of a damper k dt. The step damps by that, and it is neither physics nor an error in the balance
+of power.
 
-Springs of tilt and flanks have their magnitude from the middle of the step: there the difference is 0 but for
-flanks that close or open.
+Springs of tilt and flanks have their magnitude from the middle of the step: there the difference is 0 but
+for flanks that close or open. So have contacts between elements, whose dampers take all of the difference.
 """
 
 import numpy as np
 from numba.extending import register_jitable
 
 from cvt_hpc.kernels import kernel
-from cvt_hpc.lanes import ahead, around, like
+from cvt_hpc.lanes import ahead, around, like, maximum
 from cvt_hpc.models.pushbelt import fields as f
-from cvt_hpc.physics.contact_laws import damped, taken
+from cvt_hpc.models.pushbelt.chain import LEAST_CONTACT_TIME, contact_shares
+from cvt_hpc.physics.contact_laws import taken
 
 
 @register_jitable
@@ -53,6 +54,14 @@ def add_to_totals(state, scratch, total, share):
     """Add what each part of the ring has to one of the totals."""
     scratch[0, 0] = around(share)
     state.totals[total] += scratch.data[0, 0, 0]
+
+
+@register_jitable
+def book_contacts(belt, state, scratch, between, dt):
+    """Add what contacts between elements take: their own damper's share is a loss, the rest is the step's."""
+    own = belt.contact_time / max(belt.contact_time, LEAST_CONTACT_TIME * dt)
+    add_to_totals(state, scratch, f.ELEMENT_LOSS, own * between)
+    add_to_totals(state, scratch, f.ELEMENT_DAMPED, (1.0 - own) * between)
 
 
 @kernel
@@ -132,6 +141,8 @@ def book(belt, state, work, dt):
     elements, step, iterate, scratch = state.elements, work.step, work.iterate, work.scratch
     driving_speed = state.pulleys[f.DRIVING_SPEED]
     driven_speed = state.pulleys[f.DRIVEN_SPEED] + 0.5 * state.increments[0]
+    ahead_share, _, _ = contact_shares(belt, dt)
+    half_ahead = 0.5 / ahead_share
     flank = ring = tilt = drag = between = sheaves = stretching = like(0.0, elements[0, f.U_Y])
     for j in range(step.rows):
         dy, dz = elements[j, f.CHANGE_Y], elements[j, f.CHANGE_Z]
@@ -161,15 +172,19 @@ def book(belt, state, work, dt):
         x_y, x_z = ahead(elements, j, f.HEADING_Y), ahead(elements, j, f.HEADING_Z)
         opening = x_y * (next_y - y) + x_z * (next_z - z)
         change = dt * (opening + step[j, f.EDGE_LEVER_I] * w + step[j, f.EDGE_LEVER_J] * next_w)
-        between += damped(iterate[j, f.EDGE_REACHED], change, belt.contact_stiffness)
+        gap = step[j, f.EDGE_MEAN] + half_ahead * (iterate[j, f.EDGE_REACHED] - step[j, f.EDGE_GAP])
+        between += taken(gap - 0.5 * change, change, belt.contact_stiffness, elements[j, f.EDGE])
         change = dt * (opening + step[j, f.HEAD_LEVER_I] * w + step[j, f.HEAD_LEVER_J] * next_w)
-        between += damped(iterate[j, f.HEAD_REACHED], change, belt.contact_stiffness)
+        gap = step[j, f.HEAD_MEAN] + half_ahead * (iterate[j, f.HEAD_REACHED] - step[j, f.HEAD_GAP])
+        between += taken(gap - 0.5 * change, change, belt.contact_stiffness, elements[j, f.HEAD])
         if belt.nose_clearance < np.inf:
             rate = x_z * (y - next_y) - x_y * (z - next_z)
             change = dt * (rate + step[j, f.NOSE_LEVER_I] * w + step[j, f.NOSE_LEVER_J] * next_w)
-            offset, clearance = iterate[j, f.NOSE_REACHED], belt.nose_clearance
-            between += damped(clearance - offset, -change, belt.nose_stiffness)
-            between += damped(clearance + offset, change, belt.nose_stiffness)
+            offset = step[j, f.NOSE_MEAN] + half_ahead * (iterate[j, f.NOSE_REACHED] - step[j, f.NOSE_OFFSET])
+            offset, clearance = offset - 0.5 * change, belt.nose_clearance
+            above, below = maximum(elements[j, f.NOSE], 0.0), maximum(-elements[j, f.NOSE], 0.0)
+            between += taken(clearance - offset, -change, belt.nose_stiffness, above)
+            between += taken(clearance + offset, change, belt.nose_stiffness, below)
 
         r_y, r_z, driven = step[j, f.R_Y], step[j, f.R_Z], elements[j, f.DRIVEN]
         radial = r_y * y + r_z * z + step[j, f.R_LEVER] * w
@@ -180,6 +195,7 @@ def book(belt, state, work, dt):
         flank += 2.0 * (belt.cosine * grip_m * radial + grip_t * sliding)
         opening = opening_of(belt, state, work, j, driven)
         change = dt * belt.sine * radial + belt.cosine * opening
+        change += elements[j, f.SPREAD] - elements[j, f.LAST_SPREAD]
         gap = -iterate[j, f.DEPTH_REACHED]
         sheaves += 2.0 * taken(gap, change, belt.flank_stiffness, elements[j, f.FLANK])
 
@@ -192,6 +208,6 @@ def book(belt, state, work, dt):
     add_to_totals(state, scratch, f.RING_LOSS, dt * ring)
     add_to_totals(state, scratch, f.DAMPING_LOSS, dt * tilt)
     add_to_totals(state, scratch, f.BELT_LOSS, dt * drag)
-    add_to_totals(state, scratch, f.ELEMENT_DAMPED, between)
+    book_contacts(belt, state, scratch, between, dt)
     add_to_totals(state, scratch, f.FLANK_DAMPED, sheaves)
     add_to_totals(state, scratch, f.RING_DAMPED, dt * stretching)

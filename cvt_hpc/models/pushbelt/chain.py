@@ -1,9 +1,9 @@
 """Geometry of the chain of elements in lanes: predicted gaps and strains, and the directions of all forces.
 
 Index i is an element and j the next one. x is the running direction of an element and o = (x_z, -x_y) its
-outward normal; both turn as x' = -o, o' = x. Directions are those at q_k. Magnitudes of tension and contacts
-between elements are those at q* = q_k + dt X_k, of tilt and flanks those at q_k. From there on they are
-linear in the change of the speeds X.
+outward normal; both turn as x' = -o, o' = x. Directions are those at q_k. The magnitude of tension is that
+at q* = q_k + dt X_k, of tilt and flanks those at q_k, and of contacts between elements those of q_{k-1}, q_k
+and q*. From there on they are linear in the change of the speeds X.
 
 Slip speeds at the flanks take the radial direction and the lever of the contact point at mid step, and speeds
 across the path that direction. At either end of a step the direction would add v phi' dt / 2 of false radial
@@ -21,6 +21,20 @@ from cvt_hpc.models.pushbelt import fields as f
 # step damps nothing and is stable at any stiffness
 BETA = 0.25
 
+# Contacts between elements have at least a damper of so many steps. With 3/4 an impact within a step returns
+# at most a tenth of its energy; with less, contacts ring and return more than they take
+LEAST_CONTACT_TIME = 0.75
+
+
+@register_jitable
+def contact_shares(belt, dt):
+    """Weights of the gaps at q_{k+1}, q_k and q_{k-1} in that by which a contact between elements presses.
+
+    That is the mean gap, and the rate at the end of the step times the time of the damper.
+    """
+    share = max(belt.contact_time / dt, LEAST_CONTACT_TIME)
+    return BETA + share, 1.0 - 2.0 * BETA - share, BETA
+
 
 @register_jitable
 def turned(x_y, x_z, angle):
@@ -31,6 +45,13 @@ def turned(x_y, x_z, angle):
     y, z = cosine * x_y - sine * x_z, sine * x_y + cosine * x_z
     size = 1.5 - 0.5 * (y * y + z * z)
     return y * size, z * size
+
+
+@register_jitable
+def before_step(r, x, speeds, dt):
+    """Position and running direction at q_{k-1}, from those at q_k and the old speeds."""
+    u_y, u_z, omega = speeds
+    return (r[0] - dt * u_y, r[1] - dt * u_z), turned(x[0], x[1], -dt * omega)
 
 
 @register_jitable
@@ -115,6 +136,7 @@ def angle_slope(belt, dt):
 def link(belt, state, step, dt):
     """Data of pairs of neighbours for a step: tension, contacts, angles."""
     stiffness = 0.5 * belt.angle_stiffness
+    ahead_share, share, behind_share = contact_shares(belt, dt)
     for j in range(state.rows):
         ri, rj = (state[j, f.Y], state[j, f.Z]), (ahead(state, j, f.Y), ahead(state, j, f.Z))
         xi = (state[j, f.HEADING_Y], state[j, f.HEADING_Z])
@@ -153,8 +175,15 @@ def link(belt, state, step, dt):
         step[j, f.START_MOMENT_J] = stiffness * (e_y * xj[1] - e_z * xj[0]) + damping * rate_j
 
         edge, head = -belt.pitch_depth, belt.head_height
-        step[j, f.EDGE_GAP] = contact_gap(si, zi, sj, zj, belt.thickness, edge)
-        step[j, f.HEAD_GAP] = contact_gap(si, zi, sj, zj, belt.thickness, head)
+        bi, yi = before_step(ri, xi, (state[j, f.U_Y], state[j, f.U_Z], state[j, f.OMEGA]), dt)
+        speeds = ahead(state, j, f.U_Y), ahead(state, j, f.U_Z), ahead(state, j, f.OMEGA)
+        bj, yj = before_step(rj, xj, speeds, dt)
+        for height, gap, mean in ((edge, f.EDGE_GAP, f.EDGE_MEAN), (head, f.HEAD_GAP, f.HEAD_MEAN)):
+            reached = contact_gap(si, zi, sj, zj, belt.thickness, height)
+            now = contact_gap(ri, xi, rj, xj, belt.thickness, height)
+            before = contact_gap(bi, yi, bj, yj, belt.thickness, height)
+            step[j, gap] = ahead_share * reached + share * now + behind_share * before
+            step[j, mean] = 0.5 * (reached + now)
         lever_i, lever_j = contact_levers(ri, xi, rj, xj, belt.thickness, edge)
         step[j, f.EDGE_LEVER_I], step[j, f.EDGE_LEVER_J] = lever_i, lever_j
         lever_i, lever_j = contact_levers(ri, xi, rj, xj, belt.thickness, head)

@@ -4,17 +4,19 @@ A key that both models know is one quantity: the scene, the masses, ring stiffne
 friction of the belt, the transverse damping, wedge angle and inertia, the law of friction and its memory.
 `FOLLOWS` has the rules for other keys, so that an element, a flank and a pulley deform alike:
 
-- force between neighbours: `edge_stiffness` times strain is `element_stiffness` times strain;
-- a flank alone has half the axial compliance of a station, 1 / c_e + a / k of both flanks, elements and
-  local bending in series, a being 1 / sheave_stiffness. Its own stiffness c is normal force over normal
-  overlap, of which the axial one is c cos^2 d0: 1 / (c cos^2 d0) = (1 / c_e + a / k) / 2. The pushbelt's own
-  `sheave_stiffness` scales its modes of opening, so a value other than 1 requires `stiffness_of` "sheave";
+- force between neighbours: `edge_stiffness` times strain is `element_stiffness` times strain. Their damper
+  is that of the continuous belt, but acts as long as a step of 10 us resolves (`LEAST_CONTACT_TIME`).
+  Impacts are as good as plastic with either, and lose the same;
+- a flank alone has half the axial compliance of a station's element, 1 / c_e of both flanks. Its own
+  stiffness c is normal force over normal overlap, of which the axial one is c cos^2 d0:
+  1 / (c cos^2 d0) = 1 / (2 c_e);
+- local bending has the stiffness k sheave_stiffness, and spreads alike. The pushbelt's own `sheave_stiffness`
+  scales its modes of opening, so a value other than 1 requires `stiffness_of` "sheave";
 - tilt opens a pulley by r^2 / c_tilt cos(phi) times the sum of F cos(phi), and likewise with sin, while modes
   open each flank by 1 / S: S = 2 c_tilt / r^2 of cos and sin. Nothing opens all around alike;
 - the thrust moves the driven sheave by 1 / (T_1 k) in opening, which is 2 tan d0 of radius: `sheave_rate`.
 
-Assumptions: local bending has no length of its own (`local_length`), which is exact for forces that vary
-over lengths much longer than that. The keys in ABSENT are left out: damping of the layers, bending (0.5 N m^2
+Assumptions: the keys in ABSENT are left out: damping of the rings, bending (0.5 N m^2
 adds EI q^2 = 0.9 kN to the 5.7 kN that a strand of 148 mm has in its second mode at 120 N m), and the rings'
 length, since the pushbelt's rings fit the path at a strain of 1e-4; `README.md` has the effect of that.
 Elements have an inertia, a tilt and a second contact of which the continuum knows nothing: the pushbelt's own
@@ -32,6 +34,7 @@ from cvt_hpc.models.elastic_belt.pulley_settings import PULLEY_DEFAULTS
 from cvt_hpc.models.elastic_belt.ring_settings import RINGS
 from cvt_hpc.physics.sheaves import axial_element_stiffness
 
+RESOLVED = 7.5e-6  # [s]: damping over stiffness of contacts between elements, at least
 RIGID = 1e12  # [N/m]: of a mode that does not open; it gives way by 0.1 um under 100 kN
 
 # By key of the continuum the only value that the pushbelt has a counterpart of
@@ -48,9 +51,7 @@ ONLY = {
 ABSENT = (
     "reference_tension",
     "bending_stiffness",
-    "element_damping",
     "ring_damping",
-    "local_length",
     "disturbance",
     "start_damping",
     "most_step_ripple",
@@ -79,8 +80,7 @@ class Follows(NamedTuple):
 
 
 def _flank_stiffness(p: Mapping[str, Any]) -> float:
-    compliance = 1.0 / axial_element_stiffness(p) + 1.0 / (p["sheave_stiffness"] * p["local_stiffness"])
-    return float(2.0 / np.cos(p["half_wedge_angle"]) ** 2 / compliance)
+    return float(2.0 * axial_element_stiffness(p) / np.cos(p["half_wedge_angle"]) ** 2)
 
 
 def _modes(p: Mapping[str, Any], radius: float) -> tuple[float, float, float]:
@@ -89,10 +89,16 @@ def _modes(p: Mapping[str, Any], radius: float) -> tuple[float, float, float]:
 
 
 FOLLOWS = {
+    # the driving sheave is held, as ONLY has it: the continuum has an idle thrust by this name
+    "driving_thrust": Follows(("driving_axial",), lambda p: 0.0),
     "edge_stiffness": Follows(("element_stiffness",), lambda p: p["element_stiffness"]),
-    "flank_stiffness": Follows(
-        ("flank_stiffness", "element_factor", "sheave_stiffness", "local_stiffness", "half_wedge_angle"),
-        _flank_stiffness,
+    "element_damping": Follows(
+        ("element_damping", "element_stiffness"),
+        lambda p: max(p["element_damping"], RESOLVED * p["element_stiffness"]),
+    ),
+    "flank_stiffness": Follows(("flank_stiffness", "element_factor", "half_wedge_angle"), _flank_stiffness),
+    "local_stiffness": Follows(
+        ("sheave_stiffness", "local_stiffness"), lambda p: p["sheave_stiffness"] * p["local_stiffness"]
     ),
     "driving_modal_stiffness": Follows(
         ("tilt_stiffness", "tilt_factor", "ratio", "driven_radius"),

@@ -31,8 +31,10 @@ Kernels read `state[j, f.TENSION]`; the arrays are those of `belt`, a row an ele
     FLANK_DUAL_T,
     V_FILTERED,  # sliding speed at which the friction law of the flanks is read [m/s]
     DRIVEN,  # 1 where the nearer pulley is the driven one, else 0
+    SPREAD,  # deflection of a sheave beyond its bedding, along the flank's normal [m]
+    LAST_SPREAD,  # of the step before [m]
     CHANGE,  # 4: of the speeds in the last step, from which the next one starts
-) = range(27)
+) = range(29)
 CHANGE_Y, CHANGE_Z, CHANGE_W, CHANGE_V = range(CHANGE, CHANGE + 4)
 STATE_FIELDS = CHANGE + 4
 
@@ -53,14 +55,24 @@ INPUTS = IN_DRIVING_SHIFT + 1
     RING_LOSS,  # [J]
     DAMPING_LOSS,  # of the rotation of elements against the ring [J]
     BELT_LOSS,  # of the transverse damping [J]
+    ELEMENT_LOSS,  # of the dampers of contacts and noses between elements [J]
     ELEMENT_DAMPED,  # by the step itself, at contacts and noses between elements (`border`) [J]
     FLANK_DAMPED,  # at flanks [J]
     RING_DAMPED,  # by the stretching of the ring [J]
     POWER_RESIDUAL,  # of the equations of motion as they were solved [J]
-) = range(12)
-TOTALS = 12
+) = range(13)
+TOTALS = 13
 # Mean rates of totals from WORK_IN on, by their names in the record
-POWERS = ("driving_power", "load_power", "thrust_power", "flank_loss", "ring_loss", "tilt_loss", "belt_loss")
+POWERS = (
+    "driving_power",
+    "load_power",
+    "thrust_power",
+    "flank_loss",
+    "ring_loss",
+    "tilt_loss",
+    "belt_loss",
+    "element_loss",
+)
 DAMPED = {  # numerical damping of the step, by the springs and contacts where it occurs
     "elements": ELEMENT_DAMPED,
     "flanks": FLANK_DAMPED,
@@ -98,10 +110,12 @@ CONTACTS = ("edge", "head", "flank", "ring", "nose")
     START_MOMENT_J,
     EDGE_LEVER_I,
     EDGE_LEVER_J,
-    EDGE_GAP,
+    EDGE_GAP,  # by which it presses, and the one at mid step, both at the old speeds
+    EDGE_MEAN,
     HEAD_LEVER_I,
     HEAD_LEVER_J,
     HEAD_GAP,
+    HEAD_MEAN,
     NORMAL_Y,  # across the path: of the strand, or radial
     NORMAL_Z,
     R_Y,  # radial direction at the flank's contact point, at q_k
@@ -115,10 +129,11 @@ CONTACTS = ("edge", "head", "flank", "ring", "nose")
     MID_RADIUS,
     DEPTH,  # penetration of the flank at q_k, without opening of the sheaves
     NOSE_OFFSET,
+    NOSE_MEAN,
     NOSE_LEVER_I,
     NOSE_LEVER_J,
     DIAGONAL,  # 4 x 4 blocks of the linear laws, by columns: of an element, and of it with the next one
-) = range(41)
+) = range(44)
 LINK = DIAGONAL + 16
 STEP_FIELDS = LINK + 16
 
@@ -145,7 +160,7 @@ STEP_FIELDS = LINK + 16
     OPENING_N,  # decrease of the normal force by it
     RING_SLOPE,  # decrease of the ring's friction by its slip
     NOSE_SLOPE,
-    EDGE_REACHED,  # gaps at both contacts, offset of the nose, penetration of the flanks [m]
+    EDGE_REACHED,  # gaps by which both contacts press, offset of the nose, penetration of the flanks [m]
     HEAD_REACHED,
     NOSE_REACHED,
     DEPTH_REACHED,

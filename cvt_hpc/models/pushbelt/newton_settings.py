@@ -2,9 +2,9 @@
 
 Needs of a model: a step kernel with Newton's method and dual slopes of friction.
 
-Order 1. Contacts, tension and friction are implicit, so that they do not limit the step; transverse motion
-of the strands is a leapfrog, without numerical damping, which does. Contacts that close one after the other
-along a strand take an iteration each, so that a step of 20 us may need 25.
+Order 1. Tension, friction and dampers of contacts are implicit, so that they do not limit the step;
+transverse motion of the strands is a leapfrog, without numerical damping, which does. Contacts that close one
+after the other along a strand take an iteration each, so that a step of 20 us may need 25.
 """
 
 from cvt_hpc.parameters import Parameter
@@ -19,7 +19,7 @@ FACTS = Facts(
     implicit=True,
     l_stable=False,
     stability="transverse waves of the strands: step < pitch / sqrt(T / m)",
-    damping="none of the strands' transverse motion; contacts like a damper of stiffness x step",
+    damping="none of the strands' transverse motion; rings like a damper of stiffness x step",
 )
 PARAMETERS = {
     "numerics": {

@@ -99,6 +99,12 @@ PARAMETERS: dict[str, dict[str, Parameter]] = {
             "force between neighbours at rocking edge or head by their approach over the pitch",
             sensible=(1e4, 1e10),
         ),
+        "element_damping": not_negative(
+            20.0,
+            "N s",
+            "damping of these contacts, force by rate of approach over the pitch",
+            sensible=(0.001, 100000.0),
+        ),
         "ring_offset": positive(
             1.5e-3,
             "m",
@@ -170,6 +176,16 @@ PARAMETERS: dict[str, dict[str, Parameter]] = {
             "axial stiffness of the elements, per length",
             sensible=(1000000.0, 100000000000000.0),
         ),
+        "local_stiffness": replace(
+            positive(
+                np.inf,
+                "N/m^2",
+                "stiffness of both sheaves against local bending, per length; inf: none",
+                sensible=(100000.0, 100000000000000.0),
+            ),
+            allow_infinite=True,
+        ),
+        "local_length": positive(0.012, "m", "decay length of local bending", sensible=(0.0001, 0.3)),
         "half_wedge_angle": scene.HALF_WEDGE_ANGLE,
         "inner_radius": not_negative(
             0.0, "m", "pitch radius at the inner end of the sheaves of both pulleys", sensible=(1e-3, 0.5)
@@ -278,11 +294,25 @@ def _problems_at(parameters: Parameters, ratio: float) -> list[tuple[str, str, s
         problems.append(("step", f"at most {limit:.3g} s, {why}{at}", f"{step:g} s"))
     # a sheave moves by an explicit step against the stiffness of the flanks on the longer arc
     angle, arc = p["half_wedge_angle"], (np.pi + 2.0 * psi) * radii[1]
-    fastest = 1.0 / (step * p["flank_stiffness"] * arc * np.sin(angle) * np.cos(angle) + 1e-300)
+    fastest = flank_compliance(p) / (step * arc * np.sin(angle) * np.cos(angle) + 1e-300)
     if p["sheave_rate"] > fastest:
         expected = f"at most {fastest:.3g} m/(N s) at this step, beyond which the sheave does not settle{at}"
         problems.append(("sheave_rate", expected, f"{p['sheave_rate']:g} m/(N s)"))
     return problems
+
+
+def local_compliance(parameters: Parameters) -> float:
+    """Local bending of a sheave along its normal by the normal line force of a flank [m^2/N].
+
+    Both sheaves open by n cos(d0) / k, and each gives way along its normal by half of that times cos(d0).
+    """
+    p = parameters
+    return float(0.5 * np.cos(p["half_wedge_angle"]) ** 2 / p["local_stiffness"])
+
+
+def flank_compliance(parameters: Parameters) -> float:
+    """Penetration of a flank by a normal line force that is alike all along [m^2/N]."""
+    return 1.0 / parameters["flank_stiffness"] + local_compliance(parameters)
 
 
 def _driving_speeds(p: Parameters) -> tuple[float, float]:
@@ -356,6 +386,7 @@ def inert(parameters: Parameters) -> dict[str, str]:
     cases = (
         (p["ring_friction"] == 0.0, "ring_friction_speed", "ring_friction 0"),
         (p["friction_gradient"] == 0.0, "friction_memory", "friction_gradient 0"),
+        (np.isinf(p["local_stiffness"]), "local_length", "local_stiffness inf"),
         *((np.isinf(p["sheave_stiffness"]), key, "sheave_stiffness inf") for key in MODES),
         *(
             (np.isinf(p["nose_clearance"]), f"nose_{key}", "nose_clearance inf")

@@ -249,6 +249,7 @@ class Reading:
         elastic += (e[:, fields.EDGE] ** 2 + e[:, fields.HEAD] ** 2).sum() / belt.contact_stiffness
         elastic += (e[:, fields.NOSE] ** 2).sum() / belt.nose_stiffness
         elastic += 2.0 * (e[:, fields.FLANK] ** 2).sum() / belt.flank_stiffness
+        elastic += 2.0 * (e[:, fields.FLANK] * e[:, fields.SPREAD]).sum()
         elastic += 2.0 * (belt.modal_stiffness * openings**2).sum()
         for end in (e, ahead):  # half of the angle's stiffness at each end of a segment
             cosine = (segment * end[:, [fields.HEADING_Y, fields.HEADING_Z]]).sum(axis=1)

@@ -16,7 +16,7 @@ from typing import Any
 import numpy as np
 
 from cvt_hpc.models.pushbelt import fields as f
-from cvt_hpc.models.pushbelt.parameters import MODES, path_length
+from cvt_hpc.models.pushbelt.parameters import MODES, flank_compliance, local_compliance, path_length
 from cvt_hpc.models.pushbelt.readings import PROFILES, SCALARS, OnPath, Readings
 from cvt_hpc.models.sampled import MOST_UNSOLVED, SampledRun
 from cvt_hpc.physics.geometry import driven_radius
@@ -338,7 +338,8 @@ class ElementRun(SampledRun):
     def powers(self) -> dict[str, Any]:
         """Mean powers over the judged part, named as in the record [W]."""
         found = {name: self.mean_rate(f.WORK_IN + k) for k, name in enumerate(f.POWERS)}
-        loss = found["flank_loss"] + found["ring_loss"] + found["belt_loss"] + found["tilt_loss"]
+        loss = found["flank_loss"] + found["ring_loss"] + found["belt_loss"]
+        loss += found["tilt_loss"] + found["element_loss"]
         damped = np.array([self.mean_rate(total) for total in f.DAMPED.values()])
         storing = self.mean_rate(f.TOTALS)
         return found | {"loss": loss, "storing_power": storing, "numerical_damping": damped}
@@ -405,8 +406,11 @@ def given(parameters: Mapping[str, Any]) -> dict[str, Any]:
         "pitch_depth": p["ring_offset"],
         "ring_mass": p["ring_mass"] * length,
         "ring_strain": 1e-4,
-        "flank_stiffness": p["flank_stiffness"] * pitch,
+        "flank_stiffness": pitch / flank_compliance(p),
+        "local_compliance": local_compliance(p) / pitch,
+        "local_decay": np.exp(-pitch / p["local_length"]),
         "contact_stiffness": p["edge_stiffness"] / pitch,
+        "contact_time": p["element_damping"] / p["edge_stiffness"],
         "angle_stiffness": p["tilt_spring"] * pitch,
         "angle_damping": p["tilt_damper"] * pitch,
         "driving_rate": p["sheave_rate"] if p["driving_thrust"] > 0.0 else 0.0,

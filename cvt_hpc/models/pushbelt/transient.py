@@ -2,10 +2,10 @@
 
 Steps of the planar pushbelt in time.
 
-From q_k and X_{k-1/2} a step finds X_{k+1/2}. All directions are those at q_k. The magnitudes of tension and
-of contacts between elements are those at q_{k+1} = q_k + dt X_{k+1/2}: implicit Euler along these directions,
-symplectic Euler for slow motion. Springs of tilt and flanks act at mean positions, which damps nothing
-(`chain.BETA`).
+From q_k and X_{k-1/2} a step finds X_{k+1/2}. All directions are those at q_k. The magnitude of tension is
+that at q_{k+1} = q_k + dt X_{k+1/2}: implicit Euler along its direction, symplectic Euler for slow motion.
+Springs of tilt, flanks and contacts between elements act at mean positions, which damps nothing
+(`chain.BETA`); these contacts have dampers of their own.
 
 The nose of each element in the hole of the next one, in lanes: it holds neighbours side by side.
 
@@ -28,7 +28,7 @@ from cvt_hpc.models.pushbelt import assembly, run
 from cvt_hpc.models.pushbelt import fields as f
 from cvt_hpc.models.pushbelt.belt import NEWTON, of_lanes, start, workspace
 from cvt_hpc.models.pushbelt.border import accept_border, book, close_border, set_shapes
-from cvt_hpc.models.pushbelt.chain import linear_blocks, link, predict, turned
+from cvt_hpc.models.pushbelt.chain import before_step, contact_shares, linear_blocks, link, predict, turned
 from cvt_hpc.models.pushbelt.friction import filtered_slip
 from cvt_hpc.models.pushbelt.readings import SCALARS, Reading
 from cvt_hpc.models.pushbelt.run import COURSES, ElementRun, given
@@ -73,7 +73,7 @@ def _prepare(belt, state, work, dt):
     predict(belt, state.elements, state.pulleys, work.step, dt)
     link(belt, state.elements, work.step, dt)
     if belt.nose_clearance < np.inf:
-        predict_noses(belt, state.elements, work.step)
+        predict_noses(belt, state.elements, work.step, dt)
     linear_blocks(belt, work.step, dt)
     for j in range(work.step.rows):
         set_shapes(belt, work.step[j, f.R_Y], work.step[j, f.R_Z], work.shapes, j)
@@ -87,7 +87,8 @@ def _evaluate(belt, state, work, load, dt):
     assembly.pair_forces(belt, elements, step, iterate, dt)
     if belt.nose_clearance < np.inf:
         nose_forces(belt, elements, step, iterate, dt)
-    assembly.element_forces(belt, elements, pulleys, increments, openings, shapes, step, iterate, dt)
+    assembly.flank_depths(belt, elements, increments, openings, shapes, step, iterate, work.bent, dt)
+    assembly.element_forces(belt, elements, pulleys, increments, step, iterate, dt)
     return assembly.residuals(
         belt, elements, increments, openings, shapes, load, step, iterate, scratch, work.border, dt
     )
@@ -159,6 +160,7 @@ def _accept(belt, state, work, inputs, dt):
         slip_m, slip_t = elements[j, f.FLANK_SLIP_M], elements[j, f.FLANK_SLIP_T]
         filtered = filtered_slip(belt, slip_m, slip_t, elements[j, f.FLANK], elements[j, f.V_FILTERED], dt)
         elements[j, f.V_FILTERED] = filtered
+        elements[j, f.LAST_SPREAD] = elements[j, f.SPREAD]
     for k in range(3):
         scratch[0, k] = around(scratch[0, k])
     driving_thrust, driven_thrust = scratch.data[0, 0, 0], scratch.data[0, 1, 0]
@@ -187,14 +189,15 @@ def _offset(ri, xi, rj, xj, thickness, height):
 
 
 @kernel
-def predict_noses(belt, state, step):
-    """Offsets at q*, and levers at q_k."""
+def predict_noses(belt, state, step, dt):
+    """Offsets by which noses press at the old speeds, and levers at q_k."""
     thickness, height = belt.thickness, belt.nose_height
+    ahead_share, share, behind_share = contact_shares(belt, dt)
     for j in range(state.rows):
         ri, rj = (state[j, f.Y], state[j, f.Z]), (ahead(state, j, f.Y), ahead(state, j, f.Z))
         xi = (state[j, f.HEADING_Y], state[j, f.HEADING_Z])
         xj = (ahead(state, j, f.HEADING_Y), ahead(state, j, f.HEADING_Z))
-        _, along = _offset(ri, xi, rj, xj, thickness, height)
+        now, along = _offset(ri, xi, rj, xj, thickness, height)
         cosine, sine = xi[0] * xj[0] + xi[1] * xj[1], xi[0] * xj[1] - xi[1] * xj[0]
         step[j, f.NOSE_LEVER_I] = height * sine - 0.5 * thickness * cosine
         step[j, f.NOSE_LEVER_J] = along - 0.5 * thickness
@@ -202,22 +205,32 @@ def predict_noses(belt, state, step):
         sj = (ahead(step, j, f.PREDICTED_Y), ahead(step, j, f.PREDICTED_Z))
         zi = (step[j, f.PREDICTED_HEADING_Y], step[j, f.PREDICTED_HEADING_Z])
         zj = (ahead(step, j, f.PREDICTED_HEADING_Y), ahead(step, j, f.PREDICTED_HEADING_Z))
-        step[j, f.NOSE_OFFSET], _ = _offset(si, zi, sj, zj, thickness, height)
+        reached, _ = _offset(si, zi, sj, zj, thickness, height)
+        bi, yi = before_step(ri, xi, (state[j, f.U_Y], state[j, f.U_Z], state[j, f.OMEGA]), dt)
+        speeds = ahead(state, j, f.U_Y), ahead(state, j, f.U_Z), ahead(state, j, f.OMEGA)
+        bj, yj = before_step(rj, xj, speeds, dt)
+        before, _ = _offset(bi, yi, bj, yj, thickness, height)
+        step[j, f.NOSE_OFFSET] = ahead_share * reached + share * now + behind_share * before
+        step[j, f.NOSE_MEAN] = 0.5 * (reached + now)
 
 
 @kernel
 def nose_forces(belt, state, step, iterate, dt):
     """Forces that take the offsets back, signed as these, and their increase by the offsets' rates."""
     stiffness, clearance = belt.nose_stiffness, belt.nose_clearance
+    ahead_share, _, _ = contact_shares(belt, dt)
+    pressing = ahead_share * dt
     for j in range(step.rows):
         x_y, x_z = ahead(state, j, f.HEADING_Y), ahead(state, j, f.HEADING_Z)
         y = state[j, f.CHANGE_Y] - ahead(state, j, f.CHANGE_Y)
         z = state[j, f.CHANGE_Z] - ahead(state, j, f.CHANGE_Z)
         rate = x_z * y - x_y * z + step[j, f.NOSE_LEVER_I] * state[j, f.CHANGE_W]
-        offset = step[j, f.NOSE_OFFSET] + dt * (rate + step[j, f.NOSE_LEVER_J] * ahead(state, j, f.CHANGE_W))
+        offset = step[j, f.NOSE_OFFSET] + pressing * (
+            rate + step[j, f.NOSE_LEVER_J] * ahead(state, j, f.CHANGE_W)
+        )
         above, k = pressed(clearance - offset, stiffness)
         below, m = pressed(clearance + offset, stiffness)
-        state[j, f.NOSE], iterate[j, f.NOSE_SLOPE] = above - below, dt * maximum(k, m)
+        state[j, f.NOSE], iterate[j, f.NOSE_SLOPE] = above - below, pressing * maximum(k, m)
         iterate[j, f.NOSE_REACHED] = offset
 
 

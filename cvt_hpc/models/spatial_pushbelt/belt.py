@@ -73,9 +73,14 @@ class Belt(NamedTuple):
     ring_stiffness, ring_bending, ring_shear : float
         EA [N], lateral EI [N m^2] and lateral k G A [N] of both packages.
     flank_stiffness : float
-        Normal force at each flank by its penetration, shared by its two points [N/m].
+        Normal force at each flank by its penetration, shared by its two points, with local bending in
+        series as in the plane [N/m].
+    local_compliance, local_decay : float
+        As in the plane [m/N], [1].
     contact_stiffness : float
         Of the contacts at an edge and at a head, shared by its two points [N/m].
+    contact_time : float
+        Damping over stiffness of contacts and pins between elements [s].
     angle_stiffness, angle_damping : float
         Of an element's pitch against each segment of the ring, half at each end [N m/rad], [N m s/rad].
     yaw_stiffness, yaw_damping : float
@@ -129,7 +134,10 @@ class Belt(NamedTuple):
     ring_bending: float
     ring_shear: float
     flank_stiffness: float
+    local_compliance: float
+    local_decay: float
     contact_stiffness: float
+    contact_time: float
     angle_stiffness: float
     angle_damping: float
     yaw_stiffness: float

@@ -18,6 +18,7 @@ from numba.extending import register_jitable
 
 from cvt_hpc.kernels import kernel
 from cvt_hpc.lanes import fma, like, maximum, sqrt
+from cvt_hpc.models.pushbelt.chain import contact_shares
 from cvt_hpc.models.spatial_pushbelt import fields as f
 from cvt_hpc.models.spatial_pushbelt import vectors as vec
 from cvt_hpc.physics.contact_laws import pressed
@@ -42,10 +43,19 @@ def face_gap(ri, xi, oi, rj, xj, thickness, height, side):
     return vec.dot(vec.minus(vec.minus(rj, ri), arm), xj) - 0.5 * thickness, arm
 
 
+@register_jitable
+def before_step(screw, r, x, o, dt):
+    """Position and directions of an element at q_{k-1}, from those at q_k and its old speeds."""
+    u, omega = screw
+    factors = vec.turning(omega, -dt)
+    return vec.moved(r, -dt, u), vec.turned(x, omega, factors), vec.turned(o, omega, factors)
+
+
 @kernel
-def predict_faces(belt, state, step):
-    """Gaps at q*, and levers at q_k."""
+def predict_faces(belt, state, step, dt):
+    """Gaps by which elements press at the old speeds, and levers at q_k."""
     thickness = belt.thickness
+    ahead_share, share, behind_share = contact_shares(belt, dt)
     for j in range(state.rows):
         ri, rj = vec.at(state, j, f.POSITION), vec.ahead(state, j, f.POSITION)
         xi, xj = vec.at(state, j, f.HEADING), vec.ahead(state, j, f.HEADING)
@@ -53,24 +63,29 @@ def predict_faces(belt, state, step):
         si, sj = vec.at(step, j, f.PREDICTED_POSITION), vec.ahead(step, j, f.PREDICTED_POSITION)
         yi, yj = vec.at(step, j, f.PREDICTED_HEADING), vec.ahead(step, j, f.PREDICTED_HEADING)
         pi = vec.at(step, j, f.PREDICTED_OUTWARD)
+        bi, zi, qi = before_step(vec.screw(state, j, f.SPEED), ri, xi, oi, dt)
+        oj = vec.ahead(state, j, f.OUTWARD)
+        bj, zj, _ = before_step(vec.screw_ahead(state, j, f.SPEED), rj, xj, oj, dt)
         for p in range(f.POINTS):
             height, side = front_point(belt, p)
-            _, arm = face_gap(ri, xi, oi, rj, xj, thickness, height, side)
+            now, arm = face_gap(ri, xi, oi, rj, xj, thickness, height, side)
             vec.store(step, j, f.PUSH_LEVER_I + 3 * p, vec.cross(xj, arm))
             vec.store(step, j, f.PUSH_LEVER_J + 3 * p, vec.cross(vec.minus(arm, vec.minus(rj, ri)), xj))
-            gap, _ = face_gap(si, yi, pi, sj, yj, thickness, height, side)
-            step[j, f.PUSH_GAP + p] = gap
+            reached, _ = face_gap(si, yi, pi, sj, yj, thickness, height, side)
+            before, _ = face_gap(bi, zi, qi, bj, zj, thickness, height, side)
+            step[j, f.PUSH_GAP + p] = ahead_share * reached + share * now + behind_share * before
+            step[j, f.PUSH_MEAN + p] = 0.5 * (reached + now)
 
 
 @register_jitable
-def _pressed_point(state, step, iterate, j, p, motion, stiffness, dt):
+def _pressed_point(state, step, iterate, j, p, motion, stiffness, pressing):
     """Force and slope of a point, those times its levers, and the slope times products of levers."""
     closing, wi, wj = motion
     a, b = vec.at(step, j, f.PUSH_LEVER_I + 3 * p), vec.at(step, j, f.PUSH_LEVER_J + 3 * p)
-    gap = fma(dt, closing + vec.dot(a, wi) + vec.dot(b, wj), step[j, f.PUSH_GAP + p])
+    gap = fma(pressing, closing + vec.dot(a, wi) + vec.dot(b, wj), step[j, f.PUSH_GAP + p])
     push, k = pressed(gap, stiffness)
     state[j, f.PUSH + p], iterate[j, f.PUSH_REACHED + p] = push, gap
-    k = dt * k
+    k = pressing * k
     zero = vec.zero6(like(0.0, k))
     product = vec.plus_product(vec.zero9(like(0.0, k)), k, a, b)
     products = vec.plus_square(zero, k, a), vec.plus_square(zero, k, b), product
@@ -81,6 +96,8 @@ def _pressed_point(state, step, iterate, j, p, motion, stiffness, dt):
 def face_forces(belt, state, step, iterate, dt):
     """Forces and sums of their slopes of an iterate; adds to the pairs' forces."""
     stiffness = 0.5 * belt.contact_stiffness
+    ahead_share, _, _ = contact_shares(belt, dt)
+    pressing = ahead_share * dt
     for j in range(step.rows):
         x = vec.ahead(state, j, f.HEADING)
         closing = vec.dot(x, vec.minus(vec.ahead(state, j, f.CHANGE), vec.at(state, j, f.CHANGE)))
@@ -91,8 +108,8 @@ def face_forces(belt, state, step, iterate, dt):
         ii = jj = vec.zero6(none)
         ij = vec.zero9(none)
         for p in range(0, f.POINTS, 2):
-            left, levers, products = _pressed_point(state, step, iterate, j, p, motion, stiffness, dt)
-            right, others, more = _pressed_point(state, step, iterate, j, p + 1, motion, stiffness, dt)
+            left, levers, products = _pressed_point(state, step, iterate, j, p, motion, stiffness, pressing)
+            right, others, more = _pressed_point(state, step, iterate, j, p + 1, motion, stiffness, pressing)
             force, slope = force + (left[0] + right[0]), slope + (left[1] + right[1])
             turn_i = vec.plus(turn_i, vec.plus(levers[0], others[0]))
             turn_j = vec.plus(turn_j, vec.plus(levers[1], others[1]))
@@ -121,36 +138,44 @@ def pin_offset(ri, xi, oi, rj, xj, oj, thickness, height):
 
 
 @kernel
-def predict_pins(belt, state, step):
-    """Gaps at q*, directions and levers at q_k."""
+def predict_pins(belt, state, step, dt):
+    """Gaps by which pins press at the old speeds, directions and levers at q_k."""
     thickness, height = belt.thickness, belt.pin_height
+    ahead_share, share, behind_share = contact_shares(belt, dt)
     for j in range(state.rows):
         ri, rj = vec.at(state, j, f.POSITION), vec.ahead(state, j, f.POSITION)
         xi, xj = vec.at(state, j, f.HEADING), vec.ahead(state, j, f.HEADING)
         oi, oj = vec.at(state, j, f.OUTWARD), vec.ahead(state, j, f.OUTWARD)
-        d, size, arm = pin_offset(ri, xi, oi, rj, xj, oj, thickness, height)
-        n = vec.times(1.0 / maximum(size, _LEAST), d)
+        d, now, arm = pin_offset(ri, xi, oi, rj, xj, oj, thickness, height)
+        n = vec.times(1.0 / maximum(now, _LEAST), d)
         vec.store(step, j, f.PIN_NORMAL, n)
         vec.store(step, j, f.PIN_LEVER_I, vec.cross(arm, n))
         vec.store(step, j, f.PIN_LEVER_J, vec.cross(vec.plus(vec.minus(ri, rj), arm), n))
         si, sj = vec.at(step, j, f.PREDICTED_POSITION), vec.ahead(step, j, f.PREDICTED_POSITION)
         yi, yj = vec.at(step, j, f.PREDICTED_HEADING), vec.ahead(step, j, f.PREDICTED_HEADING)
         pi, pj = vec.at(step, j, f.PREDICTED_OUTWARD), vec.ahead(step, j, f.PREDICTED_OUTWARD)
-        _, size, _ = pin_offset(si, yi, pi, sj, yj, pj, thickness, height)
-        step[j, f.PIN_GAP] = belt.pin_clearance - size
+        _, reached, _ = pin_offset(si, yi, pi, sj, yj, pj, thickness, height)
+        bi, zi, qi = before_step(vec.screw(state, j, f.SPEED), ri, xi, oi, dt)
+        bj, zj, qj = before_step(vec.screw_ahead(state, j, f.SPEED), rj, xj, oj, dt)
+        _, before, _ = pin_offset(bi, zi, qi, bj, zj, qj, thickness, height)
+        offset = ahead_share * reached + share * now + behind_share * before
+        step[j, f.PIN_GAP] = belt.pin_clearance - offset
+        step[j, f.PIN_MEAN] = belt.pin_clearance - 0.5 * (reached + now)
 
 
 @kernel
 def pin_forces(belt, state, step, iterate, dt):
     """Forces and their slopes of an iterate; adds to the pairs' forces."""
+    ahead_share, _, _ = contact_shares(belt, dt)
+    pressing = ahead_share * dt
     for j in range(step.rows):
         n = vec.at(step, j, f.PIN_NORMAL)
         a, b = vec.at(step, j, f.PIN_LEVER_I), vec.at(step, j, f.PIN_LEVER_J)
         wi, wj = vec.at(state, j, f.CHANGE + f.ROW_W), vec.ahead(state, j, f.CHANGE + f.ROW_W)
         du = vec.minus(vec.at(state, j, f.CHANGE), vec.ahead(state, j, f.CHANGE))
         parting = vec.dot(n, du) + vec.dot(a, wi) - vec.dot(b, wj)
-        gap = fma(-dt, parting, step[j, f.PIN_GAP])
+        gap = fma(-pressing, parting, step[j, f.PIN_GAP])
         force, k = pressed(gap, belt.pin_stiffness)
-        state[j, f.PIN], iterate[j, f.PIN_REACHED], iterate[j, f.PIN_SLOPE] = force, gap, dt * k
+        state[j, f.PIN], iterate[j, f.PIN_REACHED], iterate[j, f.PIN_SLOPE] = force, gap, pressing * k
         vec.add_screw(iterate, j, f.PAIR_I, vec.both_times(-force, (n, a)))
         vec.add_screw(iterate, j, f.PAIR_J, vec.both_times(force, (n, b)))

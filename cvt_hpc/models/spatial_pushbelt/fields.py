@@ -57,7 +57,9 @@ RING_SLIP = 58  # of the ring over the saddle, forwards [m/s]
 RING_FRICTION = 59  # friction force of the element against that [N]
 RING_DUAL = 60
 DRIVEN = 61  # 1 where the nearer pulley is the driven one, else 0
-CHANGE = 62  # 8: of the speeds in the last step, from which the next one starts
+SPREAD = 62  # 2: deflection of the left and the right sheave beyond its bedding, along the flank's normal [m]
+LAST_SPREAD = 64  # 2: of the step before [m]
+CHANGE = 66  # 8: of the speeds in the last step, from which the next one starts
 STATE_FIELDS = CHANGE + SIZE
 
 # Entries of the state of the pulleys beside those of `pushbelt.belt`: positions of the mid planes between
@@ -114,7 +116,7 @@ PREDICTED_YAW = 55  # moment of the yaw spring at q_k and of its damper at the o
 NORMAL_Y, NORMAL_Z = 56, 57  # across the path in the plane, of the strand or radial
 PUSH_LEVER_I = 58  # 12: rates of the gaps at the front by angular velocities
 PUSH_LEVER_J = 70  # 12
-PUSH_GAP = 82  # 4
+PUSH_GAP = 82  # 4: gaps by which elements press, at the old speeds; PUSH_MEAN: those at mid step, likewise
 PIN_NORMAL = 86  # 3
 PIN_LEVER_I = 89  # 3
 PIN_LEVER_J = 92  # 3
@@ -129,7 +131,9 @@ INERTIA_WW = 143  # 6: and by angular velocities
 GYROSCOPIC = 149  # 3: moment
 DIAGONAL = 152  # blocks of the linear laws: of an element,
 LINK = DIAGONAL + SIZE**2  # and of it with the next one
-STEP_FIELDS = LINK + SIZE**2
+PUSH_MEAN = LINK + SIZE**2  # 4
+PIN_MEAN = PUSH_MEAN + POINTS
+STEP_FIELDS = PIN_MEAN + 1
 
 # Fields of Workspace.iterate
 ITERATE_TENSION = 0
@@ -142,7 +146,7 @@ STIFF_II = 24  # 6: upper half by columns
 STIFF_JJ = 30  # 6
 STIFF_IJ = 36  # 9: by columns
 PIN_SLOPE = 45
-PUSH_REACHED = 46  # 4: gaps [m]
+PUSH_REACHED = 46  # 4: gaps by which contacts press [m]
 PIN_REACHED = 50
 FLANK_REACHED = 51  # 4
 RING_SLOPE = 55  # decrease of the ring's friction by its slip

@@ -23,14 +23,15 @@ from numba.extending import register_jitable
 from cvt_hpc.kernels import kernel
 from cvt_hpc.lanes import fma, like, sqrt
 from cvt_hpc.models.pushbelt import fields as planar
-from cvt_hpc.models.pushbelt.border import add_to_totals, of_pulley, opening_of
-from cvt_hpc.models.pushbelt.chain import BETA
+from cvt_hpc.models.pushbelt.border import add_to_totals, book_contacts, of_pulley, opening_of
+from cvt_hpc.models.pushbelt.chain import BETA, contact_shares
 from cvt_hpc.models.pushbelt.friction import flank_friction
+from cvt_hpc.models.pushbelt.local_bending import spread_bending
 from cvt_hpc.models.spatial_pushbelt import fields as f
 from cvt_hpc.models.spatial_pushbelt import flank
 from cvt_hpc.models.spatial_pushbelt import vectors as vec
 from cvt_hpc.models.spatial_pushbelt.chain import mean_stretch, motion, motion_ahead, ring_slip
-from cvt_hpc.physics.contact_laws import damped, pressed, taken
+from cvt_hpc.physics.contact_laws import pressed, taken
 
 
 @register_jitable
@@ -128,6 +129,44 @@ def predict_flanks(belt, state, pulleys, step, dt):
             step[j, f.FLANK_GAP + p] = frustum_gap(belt, side, start, along, groove, middle)
 
 
+@register_jitable
+def _opening(belt, increments, openings, shapes, driven, j):
+    """Opening of both sheaves at an element in an iterate, along the normal of a flank [m]."""
+    modes, opening = belt.modal_stiffness.shape[1], like(0.0, driven)
+    for k in range(modes):
+        driving = openings[0, k] + increments[1 + k]
+        driven_one = openings[1, k] + increments[1 + modes + k]
+        opening = opening + of_pulley(driving, driven_one, driven) * shapes[j, k]
+    return belt.cosine * opening
+
+
+@kernel
+def bend_sheaves(belt, state, increments, openings, shapes, step, iterate, bent, dt):
+    """Set what local bending spreads on both sides; other arguments as of `flank_forces`.
+
+    `bent` is work space of `spread_bending`.
+    """
+    if belt.local_compliance == 0.0:
+        return
+    for j in range(step.rows):
+        driven = state[j, f.DRIVEN]
+        axis, opening = pulley_axis(belt, driven), _opening(belt, increments, openings, shapes, driven, j)
+        du, dw = vec.screw(state, j, f.CHANGE)
+        o = vec.at(state, j, f.OUTWARD)
+        a = vec.cross(o, vec.at(state, j, f.HEADING))
+        for p in range(f.POINTS):
+            side, height, width = flank_point(belt, p)
+            n, _, _ = flank_directions(belt, vec.at(step, j, f.RADIAL + 3 * p), axis, side)
+            turned = vec.plus(du, vec.cross(dw, lever_of(o, a, side, height, width)))
+            rate = vec.dot(mean_normal(belt, n, axis, side), turned)
+            iterate[j, f.FLANK_REACHED + p] = -fma(dt, rate, step[j, f.FLANK_GAP + p] + opening)
+    bend = belt.local_compliance, 0.5 * belt.flank_stiffness, belt.local_decay
+    depths = iterate.data[:, f.FLANK_REACHED : f.FLANK_REACHED + f.POINTS]
+    on_driven, left, right = state.data[:, f.DRIVEN], state.data[:, f.SPREAD], state.data[:, f.SPREAD + 1]
+    spread_bending(on_driven, depths[:, : f.RIGHT_LOW], left, bent, *bend)
+    spread_bending(on_driven, depths[:, f.RIGHT_LOW :], right, bent, *bend)
+
+
 @kernel
 def flank_forces(belt, state, pulleys, increments, openings, shapes, step, iterate, dt):
     """Normal and friction forces of an iterate with their slopes; sets the residuals.
@@ -135,19 +174,13 @@ def flank_forces(belt, state, pulleys, increments, openings, shapes, step, itera
     `increments` are the changes of the border's unknowns since the last step: of the driven pulley's speed,
     and of the openings of the driving and the driven sheaves.
     """
-    modes = belt.modal_stiffness.shape[1]
     stiffness = 0.5 * belt.flank_stiffness
     driving_speed, driven_speed = pulleys[planar.DRIVING_SPEED], pulleys[planar.DRIVEN_SPEED] + increments[0]
     for j in range(step.rows):
         driven = state[j, f.DRIVEN]
         axis = pulley_axis(belt, driven)
         rotation = of_pulley(driving_speed, driven_speed, driven)
-        opening = like(0.0, driven)
-        for k in range(modes):
-            driving = openings[0, k] + increments[1 + k]
-            driven_one = openings[1, k] + increments[1 + modes + k]
-            opening = opening + of_pulley(driving, driven_one, driven) * shapes[j, k]
-        opening = belt.cosine * opening
+        opening = _opening(belt, increments, openings, shapes, driven, j)
         du, dw = vec.screw(state, j, f.CHANGE)
         u, omega = motion(state, j, 1.0)
         o = vec.at(state, j, f.OUTWARD)
@@ -163,7 +196,7 @@ def flank_forces(belt, state, pulleys, increments, openings, shapes, step, itera
             lever = lever_of(o, a, side, height, half_width)
             n, m, t = flank_directions(belt, vec.at(step, j, f.RADIAL + 3 * p), axis, side)
             rate = vec.dot(mean_normal(belt, n, axis, side), vec.plus(du, vec.cross(dw, lever)))
-            gap = fma(dt, rate, step[j, f.FLANK_GAP + p] + opening)
+            gap = fma(dt, rate, step[j, f.FLANK_GAP + p] + opening) + state[j, f.SPREAD + p // 2]
             normal, stiff = pressed(gap, stiffness)
             iterate[j, f.FLANK_REACHED + p], iterate[j, f.YIELD + p] = gap, stiff
 
@@ -325,6 +358,8 @@ def book_pairs(belt, state, work, dt):
     elements, step, iterate, scratch = state.elements, work.step, work.iterate, work.scratch
     has_pins = belt.pin_clearance < np.inf
     contact = 0.5 * belt.contact_stiffness
+    ahead_share, _, _ = contact_shares(belt, dt)
+    half_ahead = 0.5 / ahead_share
     ring = tilt = drag = between = stretching = like(0.0, elements[0, f.FLANK])
     for j in range(step.rows):
         (du, dw), (ju, jw) = vec.screw(elements, j, f.CHANGE), vec.screw_ahead(elements, j, f.CHANGE)
@@ -351,11 +386,15 @@ def book_pairs(belt, state, work, dt):
         for p in range(f.POINTS):
             a, b = vec.at(step, j, f.PUSH_LEVER_I + 3 * p), vec.at(step, j, f.PUSH_LEVER_J + 3 * p)
             change = dt * (closing + vec.dot(a, w) + vec.dot(b, next_w))
-            between += damped(iterate[j, f.PUSH_REACHED + p], change, contact)
+            gap = half_ahead * (iterate[j, f.PUSH_REACHED + p] - step[j, f.PUSH_GAP + p])
+            gap = step[j, f.PUSH_MEAN + p] + gap - 0.5 * change
+            between += taken(gap, change, contact, elements[j, f.PUSH + p])
         if has_pins:
             a, b = vec.at(step, j, f.PIN_LEVER_I), vec.at(step, j, f.PIN_LEVER_J)
             change = dt * (vec.dot(vec.at(step, j, f.PIN_NORMAL), apart) - vec.dot(a, w) + vec.dot(b, next_w))
-            between += damped(iterate[j, f.PIN_REACHED], change, belt.pin_stiffness)
+            gap = half_ahead * (iterate[j, f.PIN_REACHED] - step[j, f.PIN_GAP])
+            gap = step[j, f.PIN_MEAN] + gap - 0.5 * change
+            between += taken(gap, change, belt.pin_stiffness, elements[j, f.PIN])
 
         ring += elements[j, f.RING_FRICTION] * ring_slip(elements, step, j, 0.5)
         n_y, n_z = step[j, f.NORMAL_Y], step[j, f.NORMAL_Z]
@@ -365,7 +404,7 @@ def book_pairs(belt, state, work, dt):
     add_to_totals(state, scratch, planar.RING_LOSS, dt * ring)
     add_to_totals(state, scratch, planar.DAMPING_LOSS, dt * tilt)
     add_to_totals(state, scratch, planar.BELT_LOSS, dt * drag)
-    add_to_totals(state, scratch, planar.ELEMENT_DAMPED, between)
+    book_contacts(belt, state, scratch, between, dt)
     add_to_totals(state, scratch, planar.RING_DAMPED, dt * stretching)
 
 
@@ -393,6 +432,7 @@ def book_flanks(belt, state, work, dt):
             rubbed += elements[j, f.FLANK_FRICTION_M + p] * vec.dot(m, q)
             rubbed += elements[j, f.FLANK_FRICTION_T + p] * (around_it - radius * rotation)
             change = dt * vec.dot(n, q) + belt.cosine * opening
+            change += elements[j, f.SPREAD + p // 2] - elements[j, f.LAST_SPREAD + p // 2]
             # the mean gap, of which the axial part that is reached is ahead
             gap = iterate[j, f.FLANK_REACHED + p] + dt * side * belt.cosine * vec.dot(axis, q)
             sheaves += taken(gap, change, 0.5 * belt.flank_stiffness, elements[j, f.FLANK + p])

@@ -254,6 +254,8 @@ class Reading:
         elastic += 2.0 * (self._push**2).sum() / belt.contact_stiffness
         elastic += (e[:, fields.PIN] ** 2).sum() / belt.pin_stiffness
         elastic += 2.0 * (_points(e, fields.FLANK) ** 2).sum() / belt.flank_stiffness
+        sides = _points(e, fields.FLANK).reshape(-1, 2, 2).sum(axis=2)
+        elastic += (sides * e[:, fields.SPREAD : fields.SPREAD + 2]).sum()
         elastic += 2.0 * (belt.modal_stiffness * (openings**2 + leans**2)).sum()
         ahead = np.roll(e, -1, axis=0)
         chord = np.roll(self._position, -1, axis=0) - self._position

@@ -2,10 +2,11 @@
 
 Steps of the spatial pushbelt in time.
 
-From q_k and X_{k-1/2} a step finds X_{k+1/2}. All directions are those at q_k. The magnitudes of tension, of
-contacts between elements, and of flanks along the axis are those at q_{k+1} = q_k + dt X_{k+1/2}: implicit
-Euler along these directions, symplectic Euler for what is slow. Springs of pitch and yaw, flanks in the
-plane, and lateral bending of the rings act at mean positions, which damps nothing (`pushbelt.chain.BETA`).
+From q_k and X_{k-1/2} a step finds X_{k+1/2}. All directions are those at q_k. The magnitudes of tension and
+of flanks along the axis are those at q_{k+1} = q_k + dt X_{k+1/2}: implicit Euler along these directions,
+symplectic Euler for what is slow. Springs of pitch and yaw, flanks in the plane, lateral bending of the
+rings and contacts between elements act at mean positions, which damps nothing (`pushbelt.chain.BETA`); these
+contacts have dampers of their own.
 """
 
 from functools import partial
@@ -144,9 +145,9 @@ def _place(belt, state, work, dt):
     predict(belt, elements, state.pulleys, step, dt)
     link(belt, elements, step, dt)
     predict_bending(belt, elements, step)
-    predict_faces(belt, elements, step)
+    predict_faces(belt, elements, step, dt)
     if belt.pin_clearance < np.inf:
-        predict_pins(belt, elements, step)
+        predict_pins(belt, elements, step, dt)
     flank.predict_flanks(belt, elements, state.pulleys, step, dt)
     _open_sheaves(belt, elements, state.leans, step, work.shapes)
 
@@ -176,6 +177,7 @@ def _press(belt, state, work, dt):
     face_forces(belt, elements, step, iterate, dt)
     if belt.pin_clearance < np.inf:
         pin_forces(belt, elements, step, iterate, dt)
+    flank.bend_sheaves(belt, elements, increments, openings, shapes, step, iterate, work.bent, dt)
     flank.flank_forces(belt, elements, state.pulleys, increments, openings, shapes, step, iterate, dt)
 
 
@@ -291,6 +293,8 @@ def _accept_elements(belt, state, work, dt):
             filtered = elements[j, f.V_FILTERED + p]
             filtered = filtered_slip(belt, along, around_it, elements[j, f.FLANK + p], filtered, dt)
             elements[j, f.V_FILTERED + p] = filtered
+        for side in range(2):
+            elements[j, f.LAST_SPREAD + side] = elements[j, f.SPREAD + side]
 
 
 @kernel

@@ -1,0 +1,97 @@
+"""Local bending of sheaves, which spreads along the arc: of both pushbelts.
+
+The deflection y of a sheave under the forces F of flanks follows y - l^2 y'' = b F (a plate on a bedding, of
+which the shorter of two lengths is left out): each force deflects its surroundings by exp(-|s| / l). Forces
+that are alike all along deflect as by a bedding, b F. The laws of a step have this bedding in series with
+the element, as the stiffness k of a flank, b k < 1. The rest of y is the spread, z = y - b F, by which the
+flank is less deep in the sheave: F = sum k_p max(0, depth_p - z) over the points p of a flank.
+
+With K = sum k_p and D = sum k_p depth_p over the points that press, F = (D - K y) / (1 - b K), and with its
+place i along the belt on one pulley
+
+    (1 + 2 a + h) y_i - a (y_{i-1} + y_{i+1}) = b D / (1 - b K),   h = b K / (1 - b K),   a = r / (1 - r)^2,
+
+r = exp(-pitch / l). Sheaves of both pulleys are apart: half way along a strand nothing is handed on. The
+matrix is an M-matrix, so that the set of pressing points settles by full steps.
+
+Newton's method of a step takes the slope of the bedding alone: within a step the inertia of elements is far
+stiffer, so that each iteration leaves some tenth of the spread's error.
+"""
+
+from numba.extending import register_jitable
+
+from cvt_hpc.kernels import kernel
+
+MOST_SETS = 50  # of pressing points that are tried; random depths take at most a dozen
+
+
+@register_jitable
+def _first(driven):
+    """Place of the first element on a pulley: the one behind it is on the other pulley."""
+    rows, count = driven.shape[0], driven.size
+    for place in range(count):
+        behind = (place - 1) % count
+        if driven[place % rows, place // rows] != driven[behind % rows, behind // rows]:
+            return place
+    return 0
+
+
+@register_jitable
+def _pressing(depths, j, lane, spread, stiffness):
+    """K [N/m] and D [N] of an element."""
+    held = pressed = 0.0
+    for p in range(depths.shape[1]):
+        if depths[j, p, lane] > spread:
+            held += stiffness
+            pressed += stiffness * depths[j, p, lane]
+    return held, pressed
+
+
+@kernel
+def spread_bending(driven, depths, spread, work, compliance, stiffness, decay):
+    """Set the spread at all elements by the depths of an iterate.
+
+    Parameters
+    ----------
+    driven : (rows, lanes) array
+        1 for elements on the driven pulley, else 0; element p rows + j stands in row j, lane p.
+    depths : (rows, points, lanes) array
+        Depth of each point of a flank in the sheave without local bending [m].
+    spread : (rows, lanes) array
+        The spread of the iterate before, which is set [m].
+    work : (elements, 4) array
+        Work space.
+    compliance, stiffness, decay : float
+        b [m/N] and k_p [N/m] of an element, and r [1].
+    """
+    rows, count, link = driven.shape[0], driven.size, decay / (1.0 - decay) ** 2
+    first = _first(driven)
+    # presumed: points that press by the spread of the iterate before
+    for k in range(count):
+        place = (first + k) % count
+        j, lane = place % rows, place // rows
+        work[k, 0], work[k, 1] = _pressing(depths, j, lane, spread[j, lane], stiffness)
+    for _ in range(MOST_SETS):
+        behind = y = share = 0.0
+        for k in range(count):
+            place, beyond = (first + k) % count, (first + k + 1) % count
+            alike = driven[place % rows, place // rows] == driven[beyond % rows, beyond // rows]
+            ahead = link if alike and k < count - 1 else 0.0
+            eased = compliance / (1.0 - compliance * work[k, 0])
+            per_pivot = 1.0 / (1.0 + behind * (1.0 - share) + ahead + eased * work[k, 0])
+            y = (eased * work[k, 1] + behind * y) * per_pivot
+            share = ahead * per_pivot
+            work[k, 2], work[k, 3] = share, y
+            behind = ahead
+        y, settled = 0.0, True
+        for back in range(count):
+            k = count - 1 - back
+            place = (first + k) % count
+            j, lane = place % rows, place // rows
+            held, pressed = work[k, 0], work[k, 1]
+            y = work[k, 3] + work[k, 2] * y
+            spread[j, lane] = y - compliance * (pressed - held * y) / (1.0 - compliance * held)
+            work[k, 0], work[k, 1] = _pressing(depths, j, lane, spread[j, lane], stiffness)
+            settled = settled and work[k, 0] == held and work[k, 1] == pressed
+        if settled:
+            break
