@@ -72,7 +72,7 @@ def test_at_rest_without_load_both_halves_of_a_wrap_are_alike():
 
 
 def test_where_no_march_settles_the_way_begins_at_loads_to_both_sides(monkeypatch):
-    # 240 stations at 100 N m and -0.8 s/m, collars at tilt_factor 1: of these loads only 54.5 N m leads there
+    # 240 stations at 100 N m and -0.8 s/m, collars at tilt_factor 1: 54.5 N m leads there
     def settled(self, load):
         if not 50.0 < load < 60.0:
             raise NoSteadyState("no steady state found")
