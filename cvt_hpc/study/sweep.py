@@ -244,8 +244,11 @@ def _compute(
         with one_thread(), log:
             fits = lambda batch: stop.fits(model.upper(batch))  # noqa: E731
             claims = Claims(plan.assignments, counter, stop.may_claim, fits)
+            counted = 0  # runs at work that are reported already: they have done their first transients
 
             def join(runs: Batch, seconds: float) -> Batch:
+                nonlocal counted
+
                 def may_join(others: Batch) -> bool:
                     # beyond a limit of time a batch leaves nothing: none grows before a time is measured
                     needed, left = model.upper((*runs, *others)), stop.seconds_left
@@ -253,6 +256,8 @@ def _compute(
                     return fits and task.simulator.may_join(task.job, runs, others)
 
                 try:
+                    counter.report(len(runs) - counted, 0)
+                    counted = len(runs)
                     return () if stop.interrupt() is not None else claims.joining(may_join)
                 except RankDied:  # the batch at work goes on; the next claim tells
                     return ()
@@ -262,9 +267,13 @@ def _compute(
                 for result in task.do(runs, stop.interrupt, begin, join if joins else None):
                     keep_histories(folder, result.histories)
                     log.append(result.records)
-                    counter.report(len(result.records), result.failed)
+                    counter.report(len(result.records) - counted, result.failed)
+                    counted = 0
                     if result.failed < len(result.records):  # failed ones all ended before their time
                         model.learn(result.batch, result.seconds)
+                if counted:  # they have been broken off
+                    counter.report(-counted, 0)
+                    counted = 0
     except StorageError as error:
         stop.tell_all()
         return str(error)

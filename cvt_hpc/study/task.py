@@ -128,7 +128,8 @@ class Task:
 
         All come at once, unless an exception or the time limit ends the batch. Then its runs are done one by
         one, so that only runs that fail alone count as failed, and each record comes when its run ends.
-        `begin` is called before with the runs, and again with all of them when others have joined.
+        `begin` is called with the runs before, again when kernels of a march are loaded and its clock starts,
+        and with all of them when others have joined.
         """
         runs = [*batch]
         try:
@@ -161,20 +162,29 @@ class Task:
         self, runs: list[int], interrupt: Interrupt, begin: Begin, join: Join | None = None
     ) -> tuple[Result, _Trouble | None]:
         """Return the records of all runs, or none and the reason why the batch ended; `runs` grows."""
-        begin(tuple(runs))
-        watch = _Watch(interrupt, self.run_limit * self.turns(len(runs)))
+
+        def begin_all() -> None:
+            try:
+                begin(tuple(runs))
+            except Exception as error:
+                raise _Outside from error
+
+        begin_all()
+        marches = self.job.stepper is not None  # else a run loads its kernels itself
+        limit = self.run_limit * self.turns(len(runs))
+        watch = _Watch(interrupt, limit, begin_all if marches else lambda: None)
 
         def more() -> Sequence[dict[str, Any]]:
             further: Batch = ()
             try:
                 if join is not None:
                     further = join(tuple(runs), watch.elapsed())
-                if further:
-                    runs.extend(further)
-                    begin(tuple(runs))
-                    watch.limit = self.run_limit * self.turns(len(runs))
             except Exception as error:
                 raise _Outside from error
+            if further:
+                runs.extend(further)
+                begin_all()
+                watch.limit = self.run_limit * self.turns(len(runs))
             return self._points(further)
 
         try:
@@ -221,17 +231,20 @@ class _Watch:
         Called first.
     limit : float
         Time [s] that the run may take.
+    start : callable
+        Called when the clock starts.
     """
 
-    def __init__(self, interrupt: Interrupt, limit: float) -> None:
+    def __init__(self, interrupt: Interrupt, limit: float, start: Callable[[], None]) -> None:
         self.is_over = False
         self.limit = limit
-        self._interrupt = interrupt
+        self._interrupt, self._start = interrupt, start
         self._started: float | None = None
 
     def __call__(self) -> str | None:
         """Return why the run should end, None if it should continue."""
         if self._started is None:
+            self._start()
             self._started = time.monotonic()
         reason = self._interrupt()
         if reason is None and self.elapsed() > self.limit:

@@ -23,6 +23,7 @@ VIBRATION = tuple(
     replace(v, early=True, may_miss=v in ramp.VARIABLES) for v in (*assessment.VARIABLES, *ramp.VARIABLES)
 )
 LOCKED = 0.1  # of the resolution 1/L: how far a line of judder's may lie from a multiple of its frequency
+REGULAR = 1e-8  # keeps the matrix of multiples regular where the last one lies at half the sampling rate
 COMB = 0.5  # of that line: least height of the multiple before it
 RAMPED_CHANNELS = {"load": "load", "speed": "driving_speed"}  # by the ramped quantity
 
@@ -78,14 +79,11 @@ def with_judder(run: Any, found: assessment.Occurrence) -> assessment.Occurrence
     if not np.all((off <= LOCKED) & (np.round(orders) >= 2.0) & (np.round(orders) <= highest)):
         return found
     nearest = np.round(orders).astype(int)
-    multiples = slow * np.arange(1.0, highest + 1.0)
-    phases = 2.0 * np.pi / rate * np.outer(np.arange(len(moved)), multiples)
-    waves = np.hstack([np.ones((len(moved), 1)), np.cos(phases), np.sin(phases)])
-    parts = np.linalg.lstsq(waves, moved, rcond=None)[0]
-    left = band_amplitude(moved - waves @ parts, rate, (found.lower_band_edge, p["band_high"]))
+    parts, fitted = multiples(moved, slow / rate, int(highest))
+    left = band_amplitude(moved - fitted, rate, (found.lower_band_edge, p["band_high"]))
     if np.any(left >= threshold):
         return found
-    heights = np.hypot(*np.split(parts[1:, above], 2))  # (multiple, strand above the threshold)
+    heights = np.abs(parts[1:, above])  # (multiple, strand above the threshold)
     of_strand = np.arange(above.size)
     if np.any(heights[nearest - 2, of_strand] < COMB * heights[nearest - 1, of_strand]):
         return found
@@ -95,6 +93,42 @@ def with_judder(run: Any, found: assessment.Occurrence) -> assessment.Occurrence
     ]
     reason = f"the driven pulley judders at {slow:.4g} Hz and moves {', '.join(told)}"
     return replace(found, vibrates=Vibrates.NO, reason=reason, margin=0.0)
+
+
+def multiples(moved: np.ndarray, slow: float, highest: int) -> tuple[np.ndarray, np.ndarray]:
+    """The sum of a constant and of sines of all multiples of a frequency that is nearest to motions.
+
+    With x_t = sum_k c_k exp(i k w t) over k = -highest .. highest, least squares have the matrix
+    D_(l-k) = sum_t exp(i (l - k) w t), which is Toeplitz: n^2 operations for n unknowns. All sums are
+    chirp transforms.
+
+    Parameters
+    ----------
+    moved : (time, strand) array
+        Motions.
+    slow : float
+        The frequency, in cycles a sample.
+    highest : int
+        The largest multiple, at least 1.
+
+    Returns
+    -------
+    (1 + highest, strand) complex array
+        Amplitude of the constant and of each multiple.
+    (time, strand) array
+        The sum itself.
+    """
+    from scipy.linalg import solve_toeplitz
+    from scipy.signal import czt  # scipy.signal takes long to load
+
+    turn = np.exp(2j * np.pi * slow)
+    sums = czt(moved, highest + 1, 1.0 / turn, axis=0)
+    column = czt(np.ones(len(moved)), 2 * highest + 1, 1.0 / turn)
+    column[0] *= 1.0 + REGULAR
+    both = np.concatenate([sums[:0:-1].conj(), sums])
+    parts = solve_toeplitz(column, both)[highest:]
+    parts[1:] *= 2.0
+    return parts, czt(parts, len(moved), turn, axis=0).real
 
 
 def _assess_ramp(run: Any, names: Sequence[str]) -> ramp.RampOccurrence | None:

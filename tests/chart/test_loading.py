@@ -2,6 +2,7 @@
 
 import math
 import sys
+from pathlib import Path
 
 import pytest
 
@@ -66,6 +67,31 @@ def test_a_computed_reference_has_a_coarser_one_beside_it(write_chart, reference
     assert not any(point.timed for point in found)
     loud = [point.job.parameters["loudness"] for point in found]
     assert (loud[1] == 3e-6) == (loud[1] != loud[0]) == ("loudness" in reference)
+
+
+@pytest.mark.parametrize(
+    ("coarser", "complaint"),
+    [
+        (
+            '{ step = "2.25 us", set = { stations = 640 } }',
+            "coarser set stations: expected at most 480, the mesh of",
+        ),
+        (
+            '{ set = { stations = 320, step = "1 us" } }',
+            "coarser: expected step beside set, found step in it",
+        ),
+        (
+            '{ step = "1 us", set = { stations = 320 } }',
+            "coarser: expected more than step = 1.5e-06, found 1 us",
+        ),
+    ],
+)
+def test_a_coarser_reference_is_not_finer(tmp_path, coarser, complaint):
+    text = (Path(__file__).parents[2] / "jobs/chart_ratios.toml").read_text()
+    job = tmp_path / "c.toml"
+    job.write_text(text.replace('{ step = "2.25 us", set = { stations = 320 } }', coarser, 1))
+    with pytest.raises(InputError, match=complaint):
+        load_chart(job)
 
 
 def test_starts_differ_in_their_seeds(write_chart):

@@ -4,14 +4,13 @@ import numpy as np
 import pytest
 
 from cvt_hpc.models.beam_pushbelt import fields as f
+from cvt_hpc.models.beam_pushbelt.rcm import RcmBeam, close, line_point, relaxed_ring
 from cvt_hpc.models.beam_pushbelt.step import advance
-from cvt_hpc.models.beam_pushbelt.transient import BeltState, Proximal, workspace
+from cvt_hpc.models.beam_pushbelt.transient import LAW_TOLERANCE, BeltState, workspace
 from cvt_hpc.models.pushbelt import fields
 from cvt_hpc.models.pushbelt.belt import Belt
-from cvt_hpc.multibody.rcm_beam import RcmBeam, line_point
-from cvt_hpc.multibody.rcm_chain import close, relaxed_ring
 from support.complementarity import solve_lcp
-from support.rcm import conserved, equations, straight_beam
+from support.rcm import conserved, equations
 
 MASS, INERTIA = 0.01, 2e-7  # of an element [kg], [kg m^2]
 NO_INPUTS = np.zeros((2, fields.INPUTS))
@@ -26,67 +25,39 @@ def belt_with(**values):
     return Belt(**none | common | pulleys | modes | {"thickness": 0.008, "head_height": 0.004} | values)
 
 
-def under(chain, place):
-    """The line at a place of a chain, its rows of coordinates (2, 8), and the first of these coordinates."""
-    rows, length = np.empty((2, 8)), chain.beam.length
-    i = min(int(place / length), chain.q.size // 5 - 1)
-    point = line_point(length, chain.q[5 * i : 5 * i + 8], place - (i + 0.5) * length, *rows)
+def under(ring, place):
+    """The line at a place of a ring, its rows of coordinates (2, 8), and the first of these coordinates."""
+    rows, length = np.empty((2, 8)), ring.beam.length
+    i = min(int(place / length), ring.q.size // 5 - 1)
+    point = line_point(length, ring.q[5 * i : 5 * i + 8], place - (i + 0.5) * length, *rows)
     return point, rows, 5 * i
 
 
-def state_of(chain, places, sliding, spin=0.0):
-    """Elements that slide along a chain with speeds against it [m/s], upright on it, and work space."""
+def state_of(ring, places, sliding, spin=0.0):
+    """Elements that slide along a ring with speeds against it [m/s], upright on it, and work space."""
     e = np.zeros((len(places), f.FIELDS))
     for row, place, slip in zip(e, places, np.broadcast_to(sliding, len(places)), strict=True):
-        point, rows, k = under(chain, place)
-        along, across = rows @ chain.u[k : k + 8]
+        point, rows, k = under(ring, place)
+        along, across = rows @ ring.u[k : k + 8]
         t = np.array([point.cos, point.sin])
         row[f.PLACE], row[f.PLACE_RATE], row[fields.OMEGA] = place, slip / point.stretch, spin
         row[[fields.U_Y, fields.U_Z]] = (along + slip) * t + across * np.array([-t[1], t[0]])
         row[[fields.HEADING_Y, fields.HEADING_Z]] = t
         row[[fields.Y, fields.Z]] = point.x, point.y
-    counters = np.zeros(f.COUNTERS, np.int64)
-    state = BeltState(chain, e, np.zeros(4), np.zeros(fields.TOTALS), counters)
-    return state, workspace(chain, len(places))
+    counters = np.zeros(fields.COUNTERS, np.int64)
+    state = BeltState(ring, e, np.zeros(4), np.zeros(fields.TOTALS), counters)
+    return state, workspace(ring, len(places))
 
 
-def march(belt, state, work, steps, dt, proximal=None, inputs=NO_INPUTS):
-    found = advance(belt, proximal or Proximal(), state, work, inputs, steps, dt)
+def march(belt, state, work, steps, dt, tolerance=LAW_TOLERANCE):
+    found = advance(belt, tolerance, state, work, NO_INPUTS, steps, dt)
     assert found == fields.CONVERGED
     assert state.counters[fields.FAILED_STEPS] == 0
 
 
-START, SPEED, TURNING = np.array([0.05, 0.28]), np.array([8.0, -8.0]), 50.0  # [m], [m/s], [rad/s]
-
-
-def beads_on_a_turning_beam(dt):
-    """Places and normal forces of two beads on a beam that turns about its middle, after 20 ms."""
-    # so heavy that the beads do not slow it, so stiff that it stretches by 1e-6
-    beam = straight_beam(RcmBeam(0.1, 1e6, 5e14, 1e10), 3)
-    beam.u[0::5], beam.u[1::5], beam.u[2::5] = 0.0, TURNING * (beam.q[0::5] - 0.15), TURNING
-    state, work = state_of(beam, START, SPEED)
-    march(belt_with(), state, work, round(0.02 / dt), dt, Proximal(theta=1.0))
-    return state.elements[:, f.PLACE].copy(), state.elements[:, fields.SADDLE].copy()
-
-
-def test_beads_on_a_turning_beam():
-    # s'' = omega^2 (s - middle), and Coriolis force 2 m omega s'; both pass a joint
-    grown, rising = np.cosh(1.0), np.sinh(1.0)
-    exact = 0.15 + (START - 0.15) * grown + SPEED / TURNING * rising
-    force = 2.0 * MASS * TURNING * abs((START - 0.15) * TURNING * rising + SPEED * grown)
-    assert exact[0] > 0.1 and exact[1] < 0.2
-    long, short = (
-        (place - exact, found / force - 1.0) for place, found in map(beads_on_a_turning_beam, (2e-5, 1e-5))
-    )
-    # order 1: the first speeds count as those of half a step before, the force is of a step before
-    for coarse, fine, largest in zip(long, short, (1e-4, 2e-3), strict=True):
-        assert 0.01 * largest < abs(coarse).max() < largest
-        np.testing.assert_allclose(fine, 0.5 * coarse, rtol=0.1, atol=0.02 * largest)
-
-
-def spinning(sliding=0.0, beams=12, **values):
+def spinning(sliding=0.0, beams=12, loaded=True, **values):
     """A ring in the stretch with which it turns at 100 rad/s, and elements that slide on it."""
-    line_mass, radius = 0.25 + 36 * MASS / (0.2 * np.pi), 0.1
+    line_mass, radius = 0.25 + loaded * 36 * MASS / (0.2 * np.pi), 0.1
     beam = RcmBeam(2.0 * np.pi * radius / beams, 0.25, 6e5, 0.02, 1.0 / radius)
     ring = relaxed_ring(beam, beams)
     stretched = 1.0 + line_mass * (100.0 * radius) ** 2 / 6e5
@@ -98,18 +69,34 @@ def spinning(sliding=0.0, beams=12, **values):
     return belt_with(**values), state, work
 
 
+def test_beads_on_a_turning_ring():
+    # beads without mass keep their speed along the ring, and press by m (omega r + v)^2 / r, Coriolis' force in it
+    belt, state, work = spinning(beams=24, loaded=False, mass=1e-9)
+    ring, start, speed = state.ring, np.array([0.05, 0.28]), np.array([8.0, -25.0])
+    state, work = state_of(ring, start, speed)
+    pressed = []
+    for _ in range(400):
+        march(belt, state, work, 1, 5e-6)
+        pressed.append(state.elements[:, fields.SADDLE].copy())
+    # within what a ring of 24 beams is out of round, and breathes
+    np.testing.assert_allclose(state.elements[:, f.PLACE] - start, 2e-3 * speed, rtol=0.005)
+    exact = 1e-9 * (10.0 + speed) ** 2 / 0.1
+    np.testing.assert_allclose(np.mean(pressed, axis=0), exact, rtol=0.03)
+
+
 def test_tension_of_a_spinning_ring():
-    # m v^2 of ring and elements, once theta 1 has damped the swings by which the ring takes up its elements.
-    # A beam that turns by 30 degrees has some per cent less, as its slopes count as small: of second order
-    errors = []
+    # m v^2 of ring and elements, in the mean over the swings by which the ring takes up its elements. A beam
+    # that turns by 30 degrees has less, as its slopes count as small
+    errors, line_mass = [], 0.25 + 36 * MASS / (0.2 * np.pi)
     for beams in (12, 24):
         belt, state, work = spinning(beams=beams)
-        march(belt, state, work, 1500, 1e-5, Proximal(theta=1.0))
-        squares = (state.elements[:, [fields.U_Y, fields.U_Z]] ** 2).sum(axis=1)
-        line_mass = 0.25 + 36 * MASS / (0.2 * np.pi)
-        errors.append(state.elements[:, fields.TENSION] / (line_mass * squares.mean()) - 1.0)
-    assert abs(errors[0]).max() < 0.025
-    assert abs(errors[1]).max() < 0.3 * abs(errors[0]).max()
+        pull, squares = [], []
+        for _ in range(300):
+            march(belt, state, work, 5, 1e-5)
+            pull.append(state.elements[:, fields.TENSION].copy())
+            squares.append((state.elements[:, [fields.U_Y, fields.U_Z]] ** 2).sum(axis=1))
+        errors.append(np.mean(pull, axis=0) / (line_mass * np.mean(squares)) - 1.0)
+    assert abs(errors[1]).max() < 0.7 * abs(errors[0]).max() < 0.01
 
 
 def whole(state):
@@ -157,7 +144,7 @@ def test_friction_against_lemke():
     ring.u[:] += 0.02 * np.random.default_rng(5).normal(size=ring.u.size)
     close(ring)
     state, work = state_of(ring, places, sliding, 100.0)
-    mass, force = equations(ring)
+    mass, force = equations(ring, 0.25 * dt * dt)
     size = force.size
     u, old = ring.u[:size].copy(), state.elements[:, [fields.U_Y, fields.U_Z]].copy()
     # directions at the start of the step and at its middle
@@ -198,7 +185,7 @@ def test_friction_against_lemke():
     impulses = inverse @ z[:8] + p0
     assert 2 <= np.sum(abs(g + coupling @ impulses) < 1e-9) <= 6
 
-    march(belt, state, work, 1, dt, Proximal(theta=0.0, tolerance=1e-9))
+    march(belt, state, work, 1, dt, tolerance=1e-9)
     # within the tolerance of the laws, 1e-9 m/s of 10 g
     np.testing.assert_allclose(state.elements[:, f.RING_IMPULSE], impulses, rtol=0, atol=1e-10)
     np.testing.assert_allclose(

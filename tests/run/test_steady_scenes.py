@@ -5,6 +5,8 @@ import pytest
 from scipy.stats import qmc
 
 from cvt_hpc.models.elastic_belt.belt import mesh
+from cvt_hpc.models.steady_variator.continuation import NoSteadyState
+from cvt_hpc.models.steady_variator.first_states import FirstStates
 from cvt_hpc.models.steady_variator.forces import distributions
 from cvt_hpc.models.steady_variator.walking import SteadyBelt
 from cvt_hpc.variables import Status, Vibrates
@@ -67,6 +69,20 @@ def test_at_rest_without_load_both_halves_of_a_wrap_are_alike():
     assert force == pytest.approx(force[::-1], abs=5e-3 * force.max())
     at_inlet = np.flatnonzero(groove == grid.starts[0])[0]
     assert force[0] == 0.0 < force[at_inlet] < 0.9 * force.max()
+
+
+def test_where_no_march_settles_the_way_begins_at_loads_to_both_sides(monkeypatch):
+    # 240 stations at 100 N m and -0.8 s/m, collars at tilt_factor 1: 54.5 N m leads there
+    def settled(self, load):
+        if not 50.0 < load < 60.0:
+            raise NoSteadyState("no steady state found")
+        return np.array([load])
+
+    monkeypatch.setattr(FirstStates, "_settled", settled)
+    monkeypatch.setattr(FirstStates, "_unmarched", lambda self: self._settled(0.0))
+    point = rung_job("steady_variator", load=100.0, friction_gradient=-0.8, stations=64).point(0)
+    (began,) = SteadyBelt(point)._first.under(100.0, lambda x, start, load: x)
+    assert began == pytest.approx(54.5, abs=0.1)
 
 
 def test_more_than_friction_carries_is_told_with_what_it_does_carry():

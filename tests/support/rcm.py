@@ -1,12 +1,21 @@
-"""Elements of RCM by their definition; open beams, their steps, whole matrices, and what of the motion is conserved."""
+"""Beams of RCM by their definition; steps of a ring, its whole matrices, and what of its motion is conserved."""
 
 import math
 
 import numpy as np
 
 from cvt_hpc.kernels import kernel
-from cvt_hpc.multibody.rcm_beam import SHAPE, RcmBeam, energies, kinematics
-from cvt_hpc.multibody.rcm_chain import PER_ELEMENT, SIZE, Chain, assemble, chain_of
+from cvt_hpc.models.beam_pushbelt.rcm import (
+    PER_BEAM,
+    SHAPE,
+    SIZE,
+    Ring,
+    assemble,
+    elastic_energy,
+    equations_of_motion,
+    kinematics,
+    stored_energy,
+)
 from cvt_hpc.solvers.cyclic_blocks import LOWER, UPPER, factor, solve
 
 
@@ -67,91 +76,51 @@ def material_point(l0: float, q: np.ndarray, s: float) -> tuple[float, float, fl
     return q[node] + along * c - w * sn, q[node + 1] + along * sn + w * c, q[node + 2] + side * slope / l0
 
 
-def straight_beam(beam: RcmBeam, elements: int) -> Chain:
-    """An open beam at rest, straight along x from the origin on."""
-    nodes = np.zeros((elements + 1, PER_ELEMENT))
-    nodes[:, 0] = beam.length * np.arange(elements + 1)
-    return chain_of(beam, 0.0, nodes, elements + 1)
-
-
 @kernel
-def advance(chain: Chain, dt: float, theta: float, steps: int) -> int:
-    """Advance by steps of first order: u+ = u + dt (M + theta dt D + theta^2 dt^2 K)^-1 h, q+ = q + dt u+.
-
-    With `theta` 0 this is the symplectic Euler method, half explicit: stable while dt < 2 / omega_max, where
-    the axial vibration of an element has omega_max = sqrt(12 EA / line_mass) / length, and its bending
-    379 sqrt(EI / line_mass) / length^2 (a free element; 306 in a chain). From 1/2 on neither sets a limit;
-    the change of directions under tension still does, at dt < 0.3 length / sqrt(tension / line_mass).
-    A vibration that dt does not resolve loses a factor (1 - theta) / theta in amplitude a step: with 1/2 it
-    lasts, with 1 it vanishes. One of angular frequency omega that dt does resolve is damped at a rate of
-    (theta - 1/2) omega^2 dt, since elastic forces are taken (2 theta - 1) dt ahead.
-
-    Parameters
-    ----------
-    chain : Chain
-        At a state; then at the last one.
-    dt : float
-        Step [s].
-    theta : float
-        0 or 1/2 to 1.
-    steps : int
-        How many.
-
-    Returns
-    -------
-    int
-        Steps done; fewer than `steps` where a matrix was singular or not finite.
-    """
-    q, u = chain.q, chain.u
-    for step in range(steps):
-        assemble(chain, max(2.0 * theta - 1.0, 0.0) * dt, (theta * dt) ** 2, theta * dt)
-        if not factor(chain.blocks, SIZE):
-            return step
-        solve(chain.blocks, chain.columns, SIZE)
-        for k in range(q.size):
-            u[k] += dt * chain.columns.data[k // PER_ELEMENT % (chain.blocks.rows - 1), k % PER_ELEMENT, 0]
-            q[k] += dt * u[k]
-    return steps
+def advance(ring: Ring, dt: float, steps: int) -> bool:
+    """Advance by steps u+ = u + dt (M + dt^2 / 4 K)^-1 h, q+ = q + dt u+; whether all could be solved."""
+    for _ in range(steps):
+        assemble(ring, 0.25 * dt * dt)
+        if not factor(ring.blocks, SIZE):
+            return False
+        solve(ring.blocks, ring.columns, SIZE)
+        nodes = ring.blocks.rows - 1
+        for k in range(ring.q.size):
+            ring.u[k] += dt * ring.columns.data[k // PER_BEAM % nodes, k % PER_BEAM, 0]
+            ring.q[k] += dt * ring.u[k]
+    return True
 
 
-def equations(chain):
-    """Mass matrix (n, n) and forces (n,) of a chain."""
-    assemble(chain, 0.0, 0.0, 0.0)
-    nodes = chain.blocks.data.shape[0] - 1
+def energies(beam, q, u):
+    """Kinetic and elastic energy of a beam [J]."""
+    mass, force = np.empty((8, 8)), np.empty(8)
+    equations_of_motion(beam, q, u, 0.0, mass, force)
+    return 0.5 * u @ mass @ u, elastic_energy(beam, q)
+
+
+def equations(ring, stiff=0.0):
+    """Matrix M + stiff K (5 k, 5 k) and forces (5 k,) of a ring."""
+    assemble(ring, stiff)
+    nodes = ring.blocks.data.shape[0] - 1
     matrix = np.zeros((nodes, 5, nodes, 5))
     for i in range(nodes):
         for block, j in ((0, i), (LOWER, i - 1), (UPPER, (i + 1) % nodes)):
-            matrix[i, :, j] += chain.blocks.data[i, 5 * block : 5 * block + 5, :5]
-    size = chain.q.size - (3 if chain.turn else 0)
-    return matrix.reshape(5 * nodes, -1)[:size, :size], chain.columns.data[:nodes].ravel()[:size].copy()
+            matrix[i, :, j] += ring.blocks.data[i, 5 * block : 5 * block + 5, :5]
+    return matrix.reshape(5 * nodes, -1), ring.columns.data[:nodes].ravel()[: 5 * nodes].copy()
 
 
-def tangent_stiffness(chain):
-    """Minus the change of the forces with the coordinates, by central differences."""
-    size = equations(chain)[1].size
-    at = chain.q.copy()
-    matrix = np.empty((size, size))
-    for k in range(size):
-        sides = []
-        for step in (1e-6, -1e-6):
-            chain.q[:] = at
-            chain.q[k] += step
-            if chain.turn and k < 3:
-                chain.q[size + k] += step
-            sides.append(equations(chain)[1])
-        matrix[:, k] = (sides[1] - sides[0]) / 2e-6
-    chain.q[:] = at
+def tangent_stiffness(forces, q):
+    """Minus the change of forces, by coordinates q (n,), with these, by central differences."""
+    steps = 1e-6 * np.eye(q.size)
+    matrix = np.stack([(forces(q - step) - forces(q + step)) / 2e-6 for step in steps], 1)
     return 0.5 * (matrix + matrix.T)
 
 
-def conserved(chain):
+def conserved(ring):
     """Momentum along x and y, angular momentum about the origin, total energy."""
-    mass, _ = equations(chain)
-    size = mass.shape[0]
-    q, u = chain.q[:size], chain.u[:size]
-    along, across, around = np.zeros((3, size))
+    mass, _ = equations(ring)
+    q, u = ring.q[:-3], ring.u[:-3]
+    along, across, around = np.zeros((3, q.size))
     along[0::5] = across[1::5] = around[2::5] = 1.0
     around[0::5], around[1::5] = -q[1::5], q[0::5]
-    parts = range(0, chain.q.size - 3, 5)
-    energy = sum(sum(energies(chain.beam, chain.q[i : i + 8], chain.u[i : i + 8])) for i in parts)
-    return np.array([*(np.stack([along, across, around]) @ mass @ u), energy])
+    return np.array([*(np.stack([along, across, around]) @ mass @ u), stored_energy(ring)])

@@ -1,5 +1,6 @@
 """Where the band of a run begins, and what of its motion is judder: modes of the strands, jerks of the pulley."""
 
+import time
 from types import SimpleNamespace
 
 import numpy as np
@@ -7,7 +8,7 @@ import pytest
 
 from cvt_hpc.variables import Vibrates
 from cvt_hpc.variator.band import LEAST_JERK, band, judder_frequency, strand_frequencies
-from cvt_hpc.variator.judging import with_judder
+from cvt_hpc.variator.judging import multiples, with_judder
 from cvt_hpc.vibration.assessment import assess
 from cvt_hpc.vibration.settings import ABOVE_MODES, BELOW_MODES, LOWEST, PARAMETERS, lower_edge
 
@@ -139,6 +140,25 @@ def test_strands_that_harmonics_of_judder_move_do_not_vibrate():
     )
     assert found.reason == f"the driven pulley judders at 61 Hz and moves {t1}, {t2}"
     assert np.array_equal(found.amplitude, plain.amplitude)
+
+
+@pytest.mark.parametrize(("slow", "highest", "off"), [(61.3, 24, 1e-7), (13.0, 115, 1e-7), (1250.0, 8, 1e-4)])
+def test_multiples_of_judder_are_fitted_as_by_all_waves_at_once(slow, highest, off):
+    # the last case ends at half the sampling rate, where a sine is 0 at all samples
+    moved, rate = np.random.default_rng(4).normal(size=(4000, 2)), 20_000.0
+    phases = 2.0 * np.pi * np.outer(np.arange(4000), slow / rate * np.arange(1, highest + 1))
+    waves = np.hstack([np.ones((4000, 1)), np.cos(phases), np.sin(phases)])
+    parts = np.linalg.lstsq(waves, moved, rcond=1e-10)[0]
+    found, fitted = multiples(moved, slow / rate, highest)
+    np.testing.assert_allclose(np.abs(found[1:]), np.hypot(*np.split(parts[1:], 2)), rtol=0, atol=off)
+    np.testing.assert_allclose(fitted, waves @ parts, rtol=0, atol=off)
+
+
+def test_many_multiples_of_a_slow_judder_cost_little():
+    # 750 of them in a second at 20 kHz: all waves at once take some 10 s and 240 MB
+    moved, began = np.random.default_rng(5).normal(size=(20_000, 2)), time.process_time()
+    multiples(moved, 1e-4, 750)
+    assert time.process_time() - began < 3.0
 
 
 @pytest.mark.parametrize(

@@ -28,6 +28,7 @@ from cvt_hpc.job.document import read_document, read_set, read_table, read_table
 from cvt_hpc.job.schema import load_schema
 
 _COARSER = {"step": 2.0, "tolerance": 10.0}  # by which the coarser reference is coarser
+_COUNTED = ("elements", "ring_beams")  # a mesh outside of [mesh]
 
 
 def load(path: str | Path, overrides: Assignments = ()) -> Chart:
@@ -108,12 +109,19 @@ def _reference_points(stage: Stage, raw: Any) -> Iterator[Point]:
     if isinstance(coarse, Mapping):
         read_table({}, coarse, own, ("set", key))
         others |= read_set(coarse, own)
+        if key in others:
+            raise mismatch(own, f"{key} beside set", f"{key} in it")
         coarse = coarse.get(key, fine * _COARSER[key])
     coarser = stage.setting(stepper, key, coarse, where, own)
     if coarser <= fine:
         raise mismatch(own, f"more than {key} = {fine:g}", f"{coarse}")
     setting = {key: coarser}
     coarser_job = stage.job(own, stepper=stepper, **others, **setting)
+    for mesh, section in job.schema.section_of.items():
+        if section == "mesh" or mesh in _COUNTED:
+            most, found = job.parameters[mesh], coarser_job.parameters[mesh]
+            if found > most:
+                raise mismatch(f"{own} set {mesh}", f"at most {most}, the mesh of the reference", f"{found}")
     label = in_words(stepper)
     both: dict[str, Any] = {"starts": starts, "until": stage.until}
     yield Point(f"{name}-reference", name, Role.REFERENCE, stepper, label, key, job, **both)

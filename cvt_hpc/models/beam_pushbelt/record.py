@@ -18,10 +18,7 @@ _OTHERWISE = {
     "element_loss": "0: contacts between elements have no dampers",
     "numerical_damping": "0: power that time steps damp is not separated, but left in power_residual",
 }
-VARIABLES = tuple(
-    replace(variable, comment=_OTHERWISE.get(variable.name, variable.comment))
-    for variable in pushbelt.VARIABLES
-)
+VARIABLES = tuple(replace(v, comment=_OTHERWISE.get(v.name, v.comment)) for v in pushbelt.VARIABLES)
 
 
 def cost(parameters: Mapping[str, Any], stepper: str) -> Any:

@@ -1,10 +1,11 @@
-"""Half-explicit steps of a pushbelt on a ring of beams.
+"""Half-explicit steps of a pushbelt on a ring of beams, with set-valued friction by proximal points.
 
 From q_k and u_{k-1/2} a step finds u_{k+1/2} by the forces at q_k and the impulses of the set-valued laws
-(Moreau's time stepping), and q_{k+1} = q_k + dt u_{k+1/2}. The bilateral contact of an element with the ring
-is no unknown: its force is N along the ring's normal n at q_k, and the velocity of the element after the step
+(Moreau's time stepping), and q_{k+1} = q_k + dt u_{k+1/2}. The saddle point of an element is a material point
+of the ring, r(s; q), with J = dr/dq. The bilateral contact is no unknown: its force is N along the ring's
+normal n at q_k, and the velocity of the element after the step
 
-    U = t_m v + n_m (n_m.J_m u),
+    U = t_m v + n_m (n_m.J_m u),    s' = (v - t_m.J_m u) / |dr/ds|,
 
 with the directions at mid step, so that the step moves the element along the ring. Eliminating N and v gives
 
@@ -13,83 +14,428 @@ with the directions at mid step, so that the step moves the element along the ri
 
 b = n.J, b_m = n_m.J_m, x the angle from t to t_m, and I the impulse of all other forces on the element. So
 Cartesian momentum is kept, the turn of the ring under an element (centrifugal and Coriolis force) needs no
-curvature, and the place of an element on the ring cannot drift.
+curvature, and the place of an element on the ring cannot drift. Directions of forces are those at q_k;
+sliding velocities are in the directions of mid step, by the speeds of the last one. At either end they would
+add v phi' dt / 2 of false sliding.
 
-Directions of forces are those at q_k; sliding velocities are in the directions of mid step, by the speeds of
-the last one. At either end they would add v phi' dt / 2 of false sliding.
+A contact with impulse P and sliding velocity g obeys Coulomb's law with the bound b = mu N dt exactly if
+
+    P = prox(P - r g),    prox(x) = x where |x| <= b, else b x / |x|,
+
+for any r > 0 (Alart and Curnier 1991). The contacts take this step one after the other, each with the speeds
+that the earlier ones have left, until all laws hold. Impulses on the elements change the speeds of all others
+by way of the ring: at an element e
+
+    (n.J u, t.J u)_e = (...)_e before + sum_f coupling[e, f] (impulse across, impulse along)_f.
+
+r is 1 / G of a scalar contact with the response G to its own impulse; of the two directions of a flank, which
+couple, it follows from how far their rows are dominant (Foerg 2007). The bound of ring friction follows the
+normal force of its bilateral contact, which the impulses change as well. That can run away; then bounds are
+held as they were with the impulses of the last step, and such a step counts as unsolved.
 """
 
 import numpy as np
 
 from cvt_hpc.kernels import kernel
 from cvt_hpc.models.beam_pushbelt import fields as b
-from cvt_hpc.models.beam_pushbelt import forces
+from cvt_hpc.models.beam_pushbelt import rcm
 from cvt_hpc.models.pushbelt import fields as f
-from cvt_hpc.models.pushbelt.chain import turned
-from cvt_hpc.multibody import rcm_chain
-from cvt_hpc.multibody.rcm_beam import mean_strain
-from cvt_hpc.physics.contact_laws import remembered
+from cvt_hpc.models.pushbelt.border import move_sheaves
+from cvt_hpc.models.pushbelt.chain import contact_gap, contact_levers, radial, turned
+from cvt_hpc.physics.contact_laws import coefficient, remembered
 from cvt_hpc.solvers.cyclic_blocks import factor, solve
 
-_LARGE = 1e100  # more than any speed that means something
+MOST_SWEEPS = 500  # over all contacts in a step
+FREE_SWEEPS = 200  # in which the bounds of ring friction follow its normal forces
+MOST_FAILURES = 20  # unsolved steps in a row with which a run ends
+LARGEST = 1e100  # more than any speed that means something
+FLANK_CONTACT, RING_CONTACT = f.CONTACTS.index("flank"), f.CONTACTS.index("ring")
 
 
 @kernel
-def _free_speeds(belt, proximal, state, work, dt):
+def _locate(belt, state, work, dt):
+    """Where elements are at the start of a step and, by their speeds, at its middle."""
+    ring, e, step, rows = state.ring, state.elements, work.step, work.rows
+    length = ring.beam.length
+    for k in range(ring.q.size):
+        work.middle[k] = ring.q[k] + 0.5 * dt * ring.u[k]
+    for j in range(e.shape[0]):
+        beam = min(int(e[j, b.PLACE] / length), ring.q.size // rcm.PER_BEAM - 1)
+        first, work.beams[j] = beam * rcm.PER_BEAM, beam
+        s = e[j, b.PLACE] - (beam + 0.5) * length
+        at = rcm.line_point(length, ring.q[first : first + 8], s, rows[j, b.ALONG], rows[j, b.ACROSS])
+        q = work.middle[first : first + 8]
+        s += 0.5 * dt * e[j, b.PLACE_RATE]
+        mid = rcm.line_point(length, q, s, rows[j, b.MID_ALONG], rows[j, b.MID_ACROSS])
+        e[j, f.Y], e[j, f.Z] = at.x, at.y
+        step[j, b.T_Y], step[j, b.T_Z] = at.cos, at.sin
+        step[j, b.MID_T_Y], step[j, b.MID_T_Z], step[j, b.MID_STRETCH] = mid.cos, mid.sin, mid.stretch
+        cosine = at.cos * mid.cos + at.sin * mid.sin
+        step[j, b.COSINE], step[j, b.TANGENT] = cosine, (at.cos * mid.sin - at.sin * mid.cos) / cosine
+        step[j, b.FREE_T] = at.cos * e[j, f.U_Y] + at.sin * e[j, f.U_Z]
+        step[j, b.FREE_N] = at.cos * e[j, f.U_Z] - at.sin * e[j, f.U_Y]
+        step[j, b.IMPULSE_T], step[j, b.IMPULSE_N], step[j, b.SPIN] = 0.0, 0.0, e[j, f.OMEGA]
+
+        x = e[j, f.HEADING_Y], e[j, f.HEADING_Z]
+        driven = at.x > 0.5 * belt.centre_distance
+        e[j, f.DRIVEN] = 1.0 if driven else 0.0
+        centre = belt.centre_distance if driven else 0.0
+        r_y, r_z, radius, r_lever, t_lever = radial((at.x, at.y), x, centre, belt.pitch_depth)
+        step[j, b.R_Y], step[j, b.R_Z], step[j, b.R_LEVER], step[j, b.T_LEVER] = r_y, r_z, r_lever, t_lever
+        groove = state.pulleys[f.DRIVEN_RADIUS if driven else f.DRIVING_RADIUS]
+        e[j, f.FLANK] = max(belt.flank_stiffness * (groove - radius) * belt.sine, 0.0)
+        x = turned(x[0], x[1], 0.5 * dt * e[j, f.OMEGA])
+        r_y, r_z, radius, r_lever, t_lever = radial((mid.x, mid.y), x, centre, belt.pitch_depth)
+        step[j, b.MID_R_Y], step[j, b.MID_R_Z], step[j, b.MID_RADIUS] = r_y, r_z, radius
+        step[j, b.MID_R_LEVER], step[j, b.MID_T_LEVER] = r_lever, t_lever
+
+
+@kernel
+def _push(belt, step, j, y, z, moment):
+    """Give an element an impulse at its saddle [N s] and one of rotation [N m s]."""
+    step[j, b.IMPULSE_T] += step[j, b.T_Y] * y + step[j, b.T_Z] * z
+    step[j, b.IMPULSE_N] += step[j, b.T_Y] * z - step[j, b.T_Z] * y
+    step[j, b.SPIN] += moment / belt.inertia
+
+
+@kernel
+def _rub_flanks(belt, state, step, j, along_meridian, around):
+    """Give an element impulses at each flank, and the driven pulley their reaction [N s]."""
+    out, on = 2.0 * belt.cosine * along_meridian, 2.0 * around
+    y, z = step[j, b.R_Y], step[j, b.R_Z]
+    moment = out * step[j, b.R_LEVER] + on * step[j, b.T_LEVER]
+    _push(belt, step, j, out * y - on * z, out * z + on * y, moment)
+    if state.elements[j, f.DRIVEN] > 0.0:
+        state.pulleys[f.DRIVEN_SPEED] -= on * step[j, b.MID_RADIUS] / belt.driven_inertia
+
+
+@kernel
+def _tilt(belt, state, step, i, j, dt):
+    """Impulses by the angles of two neighbours to the segment between their saddles; law of `pushbelt`."""
+    e = state.elements
+    e_y, e_z = e[j, f.Y] - e[i, f.Y], e[j, f.Z] - e[i, f.Z]
+    per_length = 1.0 / np.sqrt(e_y * e_y + e_z * e_z)
+    e_y, e_z = e_y * per_length, e_z * per_length
+    turn = (e_y * (e[j, f.U_Z] - e[i, f.U_Z]) - e_z * (e[j, f.U_Y] - e[i, f.U_Y])) * per_length
+    both = 0.0
+    for k in (i, j):
+        cosine = e_y * e[k, f.HEADING_Y] + e_z * e[k, f.HEADING_Z]
+        sine = e_y * e[k, f.HEADING_Z] - e_z * e[k, f.HEADING_Y]
+        rate = cosine * (e[k, f.OMEGA] - turn)
+        state.totals[f.DAMPING_LOSS] += 0.5 * dt * belt.angle_damping * rate * rate
+        moment = 0.5 * dt * cosine * (belt.angle_stiffness * sine + belt.angle_damping * rate)
+        _push(belt, step, k, 0.0, 0.0, -moment)
+        both += moment * per_length
+    _push(belt, step, i, both * e_z, -both * e_y, 0.0)
+    _push(belt, step, j, -both * e_z, both * e_y, 0.0)
+
+
+@kernel
+def _apply_forces(belt, state, work, dt):
+    """Impulses of contact between elements, of tilt, of flanks, and of friction as in the last step."""
+    ring, e, step = state.ring, state.elements, work.step
+    for i in range(e.shape[0]):
+        j = (i + 1) % e.shape[0]
+        ri, xi = (e[i, f.Y], e[i, f.Z]), (e[i, f.HEADING_Y], e[i, f.HEADING_Z])
+        rj, xj = (e[j, f.Y], e[j, f.Z]), (e[j, f.HEADING_Y], e[j, f.HEADING_Z])
+        for contact, height in ((f.EDGE, -belt.pitch_depth), (f.HEAD, belt.head_height)):
+            gap = contact_gap(ri, xi, rj, xj, belt.thickness, height)
+            e[i, contact] = max(-belt.contact_stiffness * gap, 0.0)
+            if e[i, contact] > 0.0:
+                lever_i, lever_j = contact_levers(ri, xi, rj, xj, belt.thickness, height)
+                given = dt * e[i, contact]
+                _push(belt, step, i, -given * xj[0], -given * xj[1], given * lever_i)
+                _push(belt, step, j, given * xj[0], given * xj[1], given * lever_j)
+        _tilt(belt, state, step, i, j, dt)
+    for j in range(e.shape[0]):
+        pressed = 2.0 * dt * e[j, f.FLANK] * belt.sine
+        _push(belt, step, j, pressed * step[j, b.R_Y], pressed * step[j, b.R_Z], pressed * step[j, b.R_LEVER])
+        speed = e[j, f.V_FILTERED]
+        mu, _ = coefficient(belt.flank_law, belt.flank_kinetic, belt.flank_gradient, belt.flank_speed, speed)
+        bound = step[j, b.FLANK_BOUND] = dt * mu * e[j, f.FLANK]
+        size = np.hypot(e[j, b.FLANK_IMPULSE_M], e[j, b.FLANK_IMPULSE_T])
+        if size > bound:
+            e[j, b.FLANK_IMPULSE_M] *= bound / size
+            e[j, b.FLANK_IMPULSE_T] *= bound / size
+        _rub_flanks(belt, state, step, j, e[j, b.FLANK_IMPULSE_M], e[j, b.FLANK_IMPULSE_T])
+        step[j, b.IMPULSE_T] -= e[j, b.RING_IMPULSE]
+        rcm.add_to_column(ring.columns, 0, work.beams[j], e[j, b.RING_IMPULSE], work.rows[j, b.ALONG])
+
+
+@kernel
+def _dot(row, values):
+    """Product of a row (8,) with the values of a beam."""
+    total = 0.0
+    for k in range(8):
+        total += row[k] * values[k]
+    return total
+
+
+@kernel
+def _free_speeds(belt, state, work, dt):
     """Speeds after the step with friction as in the last one; False where the matrix is singular."""
-    ring, step = state.ring, work.step
-    theta = proximal.theta
-    rcm_chain.assemble(ring, max(2.0 * theta - 1.0, 0.0) * dt, (theta * dt) ** 2, theta * dt)
+    ring, step, outer = state.ring, work.step, state.ring.mass
+    rcm.assemble(ring, (0.5 * dt) ** 2)  # the ring's elasticity is linearly implicit, without damping
     for i in range(ring.columns.rows):
-        for k in range(rcm_chain.PER_ELEMENT):
+        for k in range(rcm.PER_BEAM):
             ring.columns.data[i, k, 0] *= dt
-    forces.apply_forces(belt, state, work, dt)
+    _apply_forces(belt, state, work, dt)
     for j in range(step.shape[0]):
-        beam, rows, tangent = work.beams[j], work.rows[j], step[j, b.TANGENT]
-        mass = belt.mass / step[j, b.COSINE]
-        before = forces.dot(rows[b.MID_ACROSS], ring.u, beam * rcm_chain.PER_ELEMENT)
-        step[j, b.RING_ACROSS] = before
-        step[j, b.RING_ALONG] = forces.dot(rows[b.MID_ALONG], ring.u, beam * rcm_chain.PER_ELEMENT)
+        beam, rows, tangent, mass = (
+            work.beams[j],
+            work.rows[j],
+            step[j, b.TANGENT],
+            belt.mass / step[j, b.COSINE],
+        )
+        u = ring.u[beam * rcm.PER_BEAM : beam * rcm.PER_BEAM + 8]
+        before = step[j, b.RING_ACROSS] = _dot(rows[b.MID_ACROSS], u)
+        step[j, b.RING_ALONG] = _dot(rows[b.MID_ALONG], u)
         across = belt.mass * step[j, b.FREE_N] + step[j, b.IMPULSE_N] - mass * before
         across -= tangent * (belt.mass * step[j, b.FREE_T] + step[j, b.IMPULSE_T])
-        rcm_chain.add_product(ring, beam, mass, rows[b.ACROSS], rows[b.MID_ACROSS])
-        rcm_chain.add_to_column(ring.columns, 0, beam, across, rows[b.ACROSS])
-    return factor(ring.blocks, rcm_chain.SIZE)
+        for r in range(8):
+            for c in range(8):
+                outer[r, c] = mass * rows[b.ACROSS, r] * rows[b.MID_ACROSS, c]
+        rcm.add_matrix(ring.blocks, beam, outer)
+        rcm.add_to_column(ring.columns, 0, beam, across, rows[b.ACROSS])
+    regular = factor(ring.blocks, rcm.SIZE)
+    if regular:
+        _take(state, work)
+    return regular
 
 
 @kernel
 def _take(state, work):
     """Take the ring's speeds, and those of its points under the elements, on by a solution."""
     ring, step = state.ring, work.step
-    nodes = ring.blocks.rows - 1
+    solve(ring.blocks, ring.columns, rcm.SIZE)
     for k in range(ring.u.size):
-        ring.u[k] += ring.columns.data[k // rcm_chain.PER_ELEMENT % nodes, k % rcm_chain.PER_ELEMENT, 0]
+        ring.u[k] += ring.columns.data[k // rcm.PER_BEAM % (ring.blocks.rows - 1), k % rcm.PER_BEAM, 0]
     for j in range(step.shape[0]):
         beam, rows = work.beams[j], work.rows[j]
-        step[j, b.RING_ACROSS] += rcm_chain.along_row(ring.columns, 0, beam, rows[b.MID_ACROSS])
-        step[j, b.RING_ALONG] += rcm_chain.along_row(ring.columns, 0, beam, rows[b.MID_ALONG])
+        step[j, b.RING_ACROSS] += rcm.along_row(ring.columns, 0, beam, rows[b.MID_ACROSS])
+        step[j, b.RING_ALONG] += rcm.along_row(ring.columns, 0, beam, rows[b.MID_ALONG])
+
+
+@kernel
+def _element_speed(belt, step, j):
+    """Speed of an element along the ring's tangent at mid step, after the step [m/s]."""
+    free = (step[j, b.FREE_T] + step[j, b.IMPULSE_T] / belt.mass) / step[j, b.COSINE]
+    return free + step[j, b.TANGENT] * step[j, b.RING_ACROSS]
+
+
+@kernel
+def _saddle_impulse(belt, step, j):
+    """Impulse of the bilateral contact on an element, along the ring's normal [N s]."""
+    along = step[j, b.TANGENT] * (belt.mass * step[j, b.FREE_T] + step[j, b.IMPULSE_T])
+    across = belt.mass * (step[j, b.RING_ACROSS] / step[j, b.COSINE] - step[j, b.FREE_N])
+    return across + along - step[j, b.IMPULSE_N]
+
+
+@kernel
+def _at_flank(step, j, along, across, spin):
+    """Radial and circumferential speed of flanks at mid step, by the element's along and across the ring."""
+    t_y, t_z, r_y, r_z = step[j, b.MID_T_Y], step[j, b.MID_T_Z], step[j, b.MID_R_Y], step[j, b.MID_R_Z]
+    u_y, u_z = along * t_y - across * t_z, along * t_z + across * t_y
+    out = r_y * u_y + r_z * u_z + step[j, b.MID_R_LEVER] * spin
+    return out, r_y * u_z - r_z * u_y + step[j, b.MID_T_LEVER] * spin
+
+
+@kernel
+def _flank_slip(belt, state, step, j):
+    """Sliding velocity of a flank along the meridian and in the direction of rotation [m/s]."""
+    out, on = _at_flank(step, j, _element_speed(belt, step, j), step[j, b.RING_ACROSS], step[j, b.SPIN])
+    omega = state.pulleys[f.DRIVEN_SPEED if state.elements[j, f.DRIVEN] > 0.0 else f.DRIVING_SPEED]
+    return out / belt.cosine, on - omega * step[j, b.MID_RADIUS]
+
+
+@kernel
+def _couple(state, work):
+    """Find `coupling` of all elements, by unit impulses on the ring, whose matrix has been factored."""
+    n, lanes, nodes = state.elements.shape[0], work.columns.data.shape[2], state.ring.blocks.rows - 1
+    data = work.columns.data
+    for batch in range(0, 2 * n, lanes):
+        data[:] = 0.0
+        for lane in range(0, min(lanes, 2 * n - batch), 2):
+            one = (batch + lane) // 2
+            rcm.add_to_column(work.columns, lane, work.beams[one], 1.0, work.rows[one, b.ACROSS])
+            rcm.add_to_column(work.columns, lane + 1, work.beams[one], 1.0, work.rows[one, b.ALONG])
+        solve(state.ring.blocks, work.columns, rcm.SIZE)
+        for e in range(n):
+            for kind, mid in ((0, b.MID_ACROSS), (1, b.MID_ALONG)):
+                found, row = work.coupling[e, kind, batch : batch + lanes], work.rows[e, mid]
+                found[:] = 0.0
+                for r in range(8):
+                    node = (work.beams[e] + r // rcm.PER_BEAM) % nodes
+                    for lane in range(lanes):
+                        found[lane] += row[r] * data[node, r % rcm.PER_BEAM, lane]
+
+
+@kernel
+def _ring_change(row, impulses):
+    """Change of a speed of the ring by all impulses so far."""
+    a = b = c = d = 0.0
+    for k in range(0, impulses.size, 4):
+        a += row[k] * impulses[k]
+        b += row[k + 1] * impulses[k + 1]
+        c += row[k + 2] * impulses[k + 2]
+        d += row[k + 3] * impulses[k + 3]
+    return (a + b) + (c + d)
+
+
+@kernel
+def _own(work, j, across, along):
+    """Change of both speeds of the ring at an element by impulses there."""
+    g, k = work.coupling[j], 2 * j
+    return g[0, k] * across + g[0, k + 1] * along, g[1, k] * across + g[1, k + 1] * along
+
+
+@kernel
+def _flank_response(belt, state, work, j, along_meridian, around):
+    """Change of `_flank_slip` by impulses on both flanks, where nothing else changes [m/s]."""
+    step, t = work.step, work.step[j, b.TANGENT]
+    out, on = 2.0 * belt.cosine * along_meridian, 2.0 * around
+    y, z = out * step[j, b.R_Y] - on * step[j, b.R_Z], out * step[j, b.R_Z] + on * step[j, b.R_Y]
+    on_t, on_n = y * step[j, b.T_Y] + z * step[j, b.T_Z], z * step[j, b.T_Y] - y * step[j, b.T_Z]
+    spin = (out * step[j, b.R_LEVER] + on * step[j, b.T_LEVER]) / belt.inertia
+    w, _ = _own(work, j, on_n - t * on_t, 0.0)
+    c = on_t / (belt.mass * step[j, b.COSINE]) + t * w
+    slip_m, slip_t = _at_flank(step, j, c, w, spin)
+    if state.elements[j, f.DRIVEN] > 0.0:
+        slip_t += on * step[j, b.MID_RADIUS] ** 2 / belt.driven_inertia
+    return slip_m / belt.cosine, slip_t
+
+
+@kernel
+def _proximal_steps(belt, state, work, j):
+    """Lengths of the steps of an element's contacts."""
+    step, t = work.step, work.step[j, b.TANGENT]
+    w, z = _own(work, j, t, 1.0)
+    step[j, b.RING_STEP] = 1.0 / (z + 1.0 / (belt.mass * step[j, b.COSINE]) - t * w)
+    a, beside_c = _flank_response(belt, state, work, j, 1.0, 0.0)
+    beside_a, c = _flank_response(belt, state, work, j, 0.0, 1.0)
+    beside_a, beside_c = abs(beside_a), abs(beside_c)
+    if a - beside_a >= c - beside_c:
+        r = 2.0 / (a + c + beside_a - beside_c) if a + beside_a >= c + beside_c else 1.0 / c
+    else:
+        r = 2.0 / (a + c - beside_a + beside_c) if a + beside_a < c + beside_c else 1.0 / a
+    step[j, b.FLANK_STEP] = r
+
+
+@kernel
+def _respond(work, j, across, along):
+    """Take the speeds of the ring at an element on by impulses there; those at others follow in `_rub`."""
+    work.impulses[2 * j] += across
+    work.impulses[2 * j + 1] += along
+    w, z = _own(work, j, across, along)
+    work.step[j, b.RING_ACROSS] += w
+    work.step[j, b.RING_ALONG] += z
+
+
+@kernel
+def _correct_ring(belt, state, work, j, held, tolerance):
+    """A step of the proximal point of ring friction; False where its law held already."""
+    step, e = work.step, state.elements
+    slip = step[j, b.RING_ALONG] - _element_speed(belt, step, j)
+    given, r = e[j, b.RING_IMPULSE], step[j, b.RING_STEP]
+    bound = belt.ring_friction * (step[j, b.FREE_SADDLE] if held else abs(_saddle_impulse(belt, step, j)))
+    if abs(slip) <= tolerance:
+        if abs(given) <= bound + tolerance * r:
+            return False
+    elif abs(given + (bound if slip > 0.0 else -bound)) <= tolerance * r:
+        return False
+    change = min(max(given - r * slip, -bound), bound) - given
+    e[j, b.RING_IMPULSE] += change
+    step[j, b.IMPULSE_T] -= change
+    _respond(work, j, step[j, b.TANGENT] * change, change)
+    return True
+
+
+@kernel
+def _correct_flank(belt, state, work, j, tolerance):
+    """Likewise of both flanks."""
+    step, e = work.step, state.elements
+    slip_m, slip_t = _flank_slip(belt, state, step, j)
+    given_m, given_t, bound = e[j, b.FLANK_IMPULSE_M], e[j, b.FLANK_IMPULSE_T], step[j, b.FLANK_BOUND]
+    slip, r = np.hypot(slip_m, slip_t), step[j, b.FLANK_STEP]
+    if slip <= tolerance:
+        if np.hypot(given_m, given_t) <= bound + tolerance * r:
+            return False
+    elif np.hypot(given_m + bound * slip_m / slip, given_t + bound * slip_t / slip) <= tolerance * r:
+        return False
+    m, t = given_m - r * slip_m, given_t - r * slip_t
+    size = np.hypot(m, t)
+    if size > bound:
+        m, t = m * bound / size, t * bound / size
+    before_t, before_n = step[j, b.IMPULSE_T], step[j, b.IMPULSE_N]
+    _rub_flanks(belt, state, step, j, m - given_m, t - given_t)
+    e[j, b.FLANK_IMPULSE_M], e[j, b.FLANK_IMPULSE_T] = m, t
+    across = step[j, b.IMPULSE_N] - before_n - step[j, b.TANGENT] * (step[j, b.IMPULSE_T] - before_t)
+    _respond(work, j, across, 0.0)
+    return True
+
+
+@kernel
+def _rub(belt, tolerance, state, work):
+    """Find the impulses of friction of a step; whether all laws hold."""
+    step, counters, columns, impulses = work.step, state.counters, state.ring.columns, work.impulses
+    n = step.shape[0]
+    _couple(state, work)
+    impulses[:] = 0.0
+    for j in range(n):
+        _proximal_steps(belt, state, work, j)
+        step[j, b.FREE_ACROSS], step[j, b.FREE_ALONG] = step[j, b.RING_ACROSS], step[j, b.RING_ALONG]
+        step[j, b.FREE_SADDLE] = abs(_saddle_impulse(belt, step, j))
+    held = solved = False
+    for sweep in range(MOST_SWEEPS):
+        counters[f.ITERATIONS] += 1
+        held, solved = sweep >= FREE_SWEEPS, True
+        for j in range(n):
+            step[j, b.RING_ACROSS] = step[j, b.FREE_ACROSS] + _ring_change(work.coupling[j, 0], impulses)
+            step[j, b.RING_ALONG] = step[j, b.FREE_ALONG] + _ring_change(work.coupling[j, 1], impulses)
+            if belt.ring_friction > 0.0 and _correct_ring(belt, state, work, j, held, tolerance):
+                solved = False
+                counters[f.FAILED_ELEMENT], counters[f.FAILED_CONTACT] = j, RING_CONTACT
+            if step[j, b.FLANK_BOUND] > 0.0 and _correct_flank(belt, state, work, j, tolerance):
+                solved = False
+                counters[f.FAILED_ELEMENT], counters[f.FAILED_CONTACT] = j, FLANK_CONTACT
+        if solved:
+            break
+    columns.data[:] = 0.0
+    for j in range(n):
+        rcm.add_to_column(columns, 0, work.beams[j], impulses[2 * j], work.rows[j, b.ACROSS])
+        rcm.add_to_column(columns, 0, work.beams[j], impulses[2 * j + 1], work.rows[j, b.ALONG])
+        step[j, b.RING_ACROSS], step[j, b.RING_ALONG] = step[j, b.FREE_ACROSS], step[j, b.FREE_ALONG]
+    _take(state, work)
+    return solved and not held
 
 
 @kernel
 def _accept(belt, state, work, inputs, dt):
-    """Advance the state to the end of the step, and add up the works."""
+    """Advance the state to the end of the step, and add up the works; return the sum of all speeds."""
     ring, e, step, totals, pulleys = state.ring, state.elements, work.step, state.totals, state.pulleys
     length = ring.beam.length
-    around = length * ((ring.q.size - 3) // rcm_chain.PER_ELEMENT)
-    driving_thrust = driven_thrust = 0.0
+    around = length * (ring.blocks.rows - 1)
+    driving_thrust = driven_thrust = total = 0.0
     n = e.shape[0]
     for j in range(n):
-        first = work.beams[j] * rcm_chain.PER_ELEMENT
-        e[j, f.TENSION] = ring.beam.axial_stiffness * mean_strain(length, ring.q[first : first + 8])
-        e[j, f.SADDLE] = abs(forces.saddle_impulse(belt, step, j)) / dt
-        c, w = forces.element_speed(belt, step, j), step[j, b.RING_ACROSS]
-        t_y, t_z = step[j, b.MID_T_Y], step[j, b.MID_T_Z]
-        e[j, f.V] = step[j, b.RING_ALONG]
+        first = work.beams[j] * rcm.PER_BEAM
+        e[j, f.TENSION] = ring.beam.axial_stiffness * rcm.mean_strain(length, ring.q[first : first + 8])
+        e[j, f.SADDLE] = abs(_saddle_impulse(belt, step, j)) / dt
+        c, w, t_y, t_z = (
+            _element_speed(belt, step, j),
+            step[j, b.RING_ACROSS],
+            step[j, b.MID_T_Y],
+            step[j, b.MID_T_Z],
+        )
         slip = step[j, b.RING_ALONG] - c
-        e[j, f.RING_SLIP], e[j, f.RING_FRICTION] = slip, -e[j, b.RING_IMPULSE] / dt
+        e[j, f.V], e[j, f.RING_SLIP], e[j, f.RING_FRICTION] = (
+            step[j, b.RING_ALONG],
+            slip,
+            -e[j, b.RING_IMPULSE] / dt,
+        )
         totals[f.RING_LOSS] -= e[j, b.RING_IMPULSE] * slip
 
-        slip_m, slip_t = forces.flank_slip(belt, pulleys, e, step, j)
+        slip_m, slip_t = _flank_slip(belt, state, step, j)
         grip_m, grip_t = -e[j, b.FLANK_IMPULSE_M] / dt, -e[j, b.FLANK_IMPULSE_T] / dt
         e[j, f.FLANK_SLIP_M], e[j, f.FLANK_SLIP_T] = slip_m, slip_t
         e[j, f.FLANK_FRICTION_M], e[j, f.FLANK_FRICTION_T] = grip_m, grip_t
@@ -106,82 +452,56 @@ def _accept(belt, state, work, inputs, dt):
             totals[f.WORK_IN] -= 2.0 * dt * grip_t * step[j, b.MID_RADIUS] * pulleys[f.DRIVING_SPEED]
 
         e[j, f.U_Y], e[j, f.U_Z], e[j, f.OMEGA] = c * t_y - w * t_z, c * t_z + w * t_y, step[j, b.SPIN]
-        e[j, f.HEADING_Y], e[j, f.HEADING_Z] = turned(
-            e[j, f.HEADING_Y], e[j, f.HEADING_Z], dt * e[j, f.OMEGA]
-        )
+        x = turned(e[j, f.HEADING_Y], e[j, f.HEADING_Z], dt * e[j, f.OMEGA])
+        e[j, f.HEADING_Y], e[j, f.HEADING_Z] = x
         e[j, b.PLACE_RATE] = -slip / step[j, b.MID_STRETCH]
         e[j, b.PLACE] = (e[j, b.PLACE] + dt * e[j, b.PLACE_RATE]) % around
+        total += abs(e[j, f.U_Y]) + abs(e[j, f.U_Z]) + abs(e[j, f.OMEGA])
     for j in range(n):
         e[j, f.LENGTH] = (e[(j + 1) % n, b.PLACE] - e[j, b.PLACE]) % around
     for k in range(ring.q.size):
         ring.q[k] += dt * ring.u[k]
-    driving = dt * belt.driving_rate * (inputs[f.IN_DRIVING_THRUST] - driving_thrust)
-    driving += dt * inputs[f.IN_DRIVING_SHIFT]
-    driven = dt * belt.driven_rate * (inputs[f.IN_DRIVEN_THRUST] - driven_thrust)
-    pulleys[f.DRIVING_RADIUS] += driving
-    pulleys[f.DRIVEN_RADIUS] += driven
+    move_sheaves(belt, state, inputs, driving_thrust, driven_thrust, dt)
     totals[f.TIME] += dt
     totals[f.WORK_OUT] += dt * inputs[f.IN_LOAD] * pulleys[f.DRIVEN_SPEED]
-    closing = 2.0 * belt.sine / belt.cosine
-    totals[f.THRUST_WORK] -= closing * (driving_thrust * driving + driven_thrust * driven)
+    return total
 
 
 @kernel
-def _step(belt, proximal, state, work, inputs, dt):
+def _step(belt, tolerance, state, work, inputs, dt):
     """One step; CONVERGED, NOT_CONVERGED where a set-valued law does not hold, or NOT_FINITE."""
-    ring, e = state.ring, state.elements
-    rubs = belt.ring_friction > 0.0 or belt.flank_kinetic > 0.0
     state.pulleys[f.DRIVING_SPEED] = inputs[f.IN_SPEED]
     state.pulleys[f.DRIVEN_SPEED] -= dt * inputs[f.IN_LOAD] / belt.driven_inertia
-    forces.locate(belt, state, work, dt)
-    if not _free_speeds(belt, proximal, state, work, dt):
+    _locate(belt, state, work, dt)
+    if not _free_speeds(belt, state, work, dt):
         return f.NOT_FINITE
-    solve(ring.blocks, ring.columns, rcm_chain.SIZE)
-    _take(state, work)
     solved = True
-    if rubs:
-        forces.couple(state, work)
-        for j in range(e.shape[0]):
-            work.free[j, 0], work.free[j, 1] = work.step[j, b.RING_ACROSS], work.step[j, b.RING_ALONG]
-        solved = forces.rub(belt, proximal, state, work)
-        solve(ring.blocks, ring.columns, rcm_chain.SIZE)
-        for j in range(e.shape[0]):
-            work.step[j, b.RING_ACROSS], work.step[j, b.RING_ALONG] = work.free[j, 0], work.free[j, 1]
-        _take(state, work)
-    _accept(belt, state, work, inputs, dt)
-    total = 0.0
-    for j in range(e.shape[0]):
-        total += abs(e[j, f.U_Y]) + abs(e[j, f.U_Z]) + abs(e[j, f.OMEGA])
-    if not total < _LARGE:
+    if belt.ring_friction > 0.0 or belt.flank_kinetic > 0.0:
+        solved = _rub(belt, tolerance, state, work)
+    if not _accept(belt, state, work, inputs, dt) < LARGEST:
         return f.NOT_FINITE
     return f.CONVERGED if solved else f.NOT_CONVERGED
 
 
 @kernel
-def advance(belt, proximal, state, work, inputs, steps, dt):
-    """Advance a pushbelt by a number of steps, in place.
+def advance(belt, tolerance, state, work, inputs, steps, dt):
+    """Advance a pushbelt by a number of steps of dt [s], in place.
 
     Parameters
     ----------
     belt : pushbelt.belt.Belt
         Constants.
-    proximal : Proximal
-        How steps are solved.
-    state : BeltState
-        The state at the start; at the end, of its last step.
-    work : Workspace
-        Work space.
+    tolerance : float
+        Speed up to which a law counts as fulfilled [m/s]; impulses count by the speed that they change.
+    state, work : BeltState, Workspace
+        The state at the start, at the end of the last step; work space.
     inputs : (2, INPUTS) array
-        As `pushbelt.step.advance` takes them.
-    steps : int
-        Number of steps.
-    dt : float
-        Step [s].
+        Inputs at the start and at the end, between which they change linearly.
 
     Returns
     -------
     int
-        CONVERGED; NOT_CONVERGED where in `most_failures` steps in a row a set-valued law did not hold;
+        CONVERGED; NOT_CONVERGED where in MOST_FAILURES steps in a row a set-valued law did not hold;
         NOT_FINITE. The counters then name the element and the contact at fault.
     """
     counters = state.counters
@@ -189,11 +509,11 @@ def advance(belt, proximal, state, work, inputs, steps, dt):
         share = (k + 1.0) / steps
         for entry in range(work.inputs.size):
             work.inputs[entry] = inputs[0, entry] + share * (inputs[1, entry] - inputs[0, entry])
-        outcome = _step(belt, proximal, state, work, work.inputs, dt)
+        outcome = _step(belt, tolerance, state, work, work.inputs, dt)
         counters[f.STEPS] += 1
         counters[f.IN_A_ROW] = counters[f.IN_A_ROW] + 1 if outcome == f.NOT_CONVERGED else 0
         counters[f.FAILED_STEPS] += outcome == f.NOT_CONVERGED
-        if outcome == f.NOT_FINITE or counters[f.IN_A_ROW] == proximal.most_failures:
+        if outcome == f.NOT_FINITE or counters[f.IN_A_ROW] == MOST_FAILURES:
             counters[f.STATUS] = outcome
             return outcome
     counters[f.STATUS] = f.CONVERGED

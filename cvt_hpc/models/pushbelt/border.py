@@ -136,6 +136,19 @@ def accept_border(belt, state, inputs, dt):
 
 
 @kernel
+def move_sheaves(belt, state, inputs, driving_thrust, driven_thrust, dt):
+    """Take the radii to the end of the step, by the axial forces of the belt [N]."""
+    driving = dt * belt.driving_rate * (inputs[f.IN_DRIVING_THRUST] - driving_thrust)
+    driving += dt * inputs[f.IN_DRIVING_SHIFT]
+    driven = dt * belt.driven_rate * (inputs[f.IN_DRIVEN_THRUST] - driven_thrust)
+    state.pulleys[f.DRIVING_RADIUS] += driving
+    state.pulleys[f.DRIVEN_RADIUS] += driven
+    # both sheaves of a pulley close by the tangent of the wedge angle
+    closing = 2.0 * belt.sine / belt.cosine
+    state.totals[f.THRUST_WORK] -= closing * (driving_thrust * driving + driven_thrust * driven)
+
+
+@kernel
 def book(belt, state, work, dt):
     """Add to the totals the work of a solved step, before it is accepted."""
     elements, step, iterate, scratch = state.elements, work.step, work.iterate, work.scratch

@@ -372,7 +372,7 @@ class ElementRun(SampledRun):
         unsolved, open_power = record["unsolved_share"], abs(record["power_residual"])
         flow, small = max(abs(record["driving_power"]), record["loss"]), OF_LOSS * record["loss"]
         damped, most_damped = record["numerical_damping"].sum(), self._most_damped() + small
-        most_open = (small + self.parameters["power_tolerance"]) / flow
+        most_open = (small + self._most_open()) / flow
         if not unsolved <= MOST_UNSOLVED:
             why = f"{unsolved:.1%} of the steps were not solved, the last {self._fault()}"
         elif not open_power <= most_open:
@@ -382,6 +382,10 @@ class ElementRun(SampledRun):
         else:
             return None
         return Status.FAILED_NUMERICS, why
+
+    def _most_open(self) -> float:
+        """Power that the equations may leave open, beside a share of the losses [W]."""
+        return float(self.parameters["power_tolerance"])
 
     def _most_damped(self) -> float:
         """Most that the steps of a sound run without vibration damp by themselves [W]."""

@@ -27,7 +27,7 @@ from cvt_hpc.models.marched import batches_of_one
 from cvt_hpc.models.pushbelt import assembly, run
 from cvt_hpc.models.pushbelt import fields as f
 from cvt_hpc.models.pushbelt.belt import NEWTON, of_lanes, start, workspace
-from cvt_hpc.models.pushbelt.border import accept_border, book, close_border, set_shapes
+from cvt_hpc.models.pushbelt.border import accept_border, book, close_border, move_sheaves, set_shapes
 from cvt_hpc.models.pushbelt.chain import before_step, contact_shares, linear_blocks, link, predict, turned
 from cvt_hpc.models.pushbelt.friction import filtered_slip
 from cvt_hpc.models.pushbelt.readings import SCALARS, Reading
@@ -164,16 +164,9 @@ def _accept(belt, state, work, inputs, dt):
     for k in range(3):
         scratch[0, k] = around(scratch[0, k])
     driving_thrust, driven_thrust = scratch.data[0, 0, 0], scratch.data[0, 1, 0]
-    driving = dt * belt.driving_rate * (inputs[f.IN_DRIVING_THRUST] - driving_thrust)
-    driving += dt * inputs[f.IN_DRIVING_SHIFT]
-    driven = dt * belt.driven_rate * (inputs[f.IN_DRIVEN_THRUST] - driven_thrust)
-    pulleys[f.DRIVING_RADIUS] += driving
-    pulleys[f.DRIVEN_RADIUS] += driven
+    move_sheaves(belt, state, inputs, driving_thrust, driven_thrust, dt)
     totals[f.WORK_IN] += dt * scratch.data[0, 2, 0] * pulleys[f.DRIVING_SPEED]
     accept_border(belt, state, inputs, dt)
-    # both sheaves of a pulley close by the tangent of the wedge angle
-    closing = 2.0 * belt.sine / belt.cosine
-    totals[f.THRUST_WORK] -= closing * (driving_thrust * driving + driven_thrust * driven)
 
 
 EQUATIONS = Equations(_prepare, _evaluate, _assemble, _close, _accept, _changes, f.CHANGE)

@@ -57,7 +57,7 @@ class Records:
         The factor by which the attempt that counts shortens the time step that the run takes else; 1 for
         most.
     timings : list of Timing
-        Of the batches that were done as a whole, the first of each log excepted: it has loaded kernels.
+        Of the batches that were done as a whole.
     sessions : list of dict
         The starts of the sweep that left records, in order of time.
     warnings : list of str
@@ -255,7 +255,8 @@ class _Trace:
     followed : int
         Number of frames.
     timings : list of Timing
-        Of the batches that were done as a whole.
+        Of the batches that were done as a whole; of the first one only if it was marked again once its
+        kernels had been loaded.
     refinements : dict
         That factor, by run index and attempt.
     """
@@ -266,7 +267,7 @@ class _Trace:
         self.refinements: dict[log.Place, float] = {}
         self._refine = refine
         self._mark: log.Frame | None = None
-        self._began = 0.0
+        self._began, self._loads = 0.0, True
         self._at_work: dict[int, int] = {}
 
     def follow(self, frame: log.Frame) -> None:
@@ -277,12 +278,16 @@ class _Trace:
             was_at_work = self._at_work.pop(index, None) is not None
             if self._mark is not None and was_at_work and not self._at_work:
                 batch = tuple(index for index, _ in self._mark.places)
-                self.timings.append(Timing(batch, frame.written - self._began))
+                if not self._loads:
+                    self.timings.append(Timing(batch, frame.written - self._began))
+                self._loads = False
         elif frame.kind == log.AGAIN:
             self.refinements |= dict.fromkeys(frame.places, self._refine)
         else:
             places = dict(frame.places)
-            if not (self._at_work and self._at_work.keys() <= places.keys()):  # else other runs have joined
+            if places == self._at_work:
+                self._loads = False
+            if not (self._at_work and self._at_work.keys() < places.keys()):  # else other runs have joined
                 self._began = frame.written
             self._mark, self._at_work = frame, places
 
@@ -349,7 +354,7 @@ class _Reader:
         if session is not None and found.size:
             self._sessions[session["id"]] = session
         self._found.append(found)
-        self._timings += trace.timings[1:]
+        self._timings += trace.timings
         self._deaths |= trace.deaths()
         self._refinements |= trace.refinements
 

@@ -1,9 +1,8 @@
-"""A planar beam in redundant coordinates (RCM): large motions, exact inertia, one mean strain an element.
+"""A ring of planar beams in redundant coordinates (RCM): large motions, exact inertia, one mean strain each.
 
-Coordinates of an element of length l0 (Zander and Ulbrich 2006; the ring of Geier and Schindler's pushbelt):
-q = (x1, y1, phi1, a1, a2, x2, y2, phi2), both nodes with their tangent angles, and the distances a1, a2 of
-the quarter points from the tangent of the node next to them. With t = (cos, sin), n = (-sin, cos) and
-s = l0 x from the node,
+Coordinates of a beam of length l0 (Zander and Ulbrich 2006) are q = (x1, y1, phi1, a1, a2, x2, y2, phi2):
+both nodes with their tangent angles, and the distances a1, a2 of the quarter points from the tangent of the
+node next to them. With t = (cos, sin), n = (-sin, cos) and s = l0 x from the node,
 
     first half:   r = r1 + (1 + eps) s t(phi1) + w(x) n(phi1),              0 <= x <= 1/2,
     second half:  r = r2 - (1 + eps) s t(phi2) + w(x) n(phi2),    from the second node backwards,
@@ -18,6 +17,10 @@ r2 - r1 = T t(phi_m) + N n(phi_m), phi_m the mean angle and h = (phi2 - phi1) / 
 Inertia without that of rotation, elastic energy 1/2 EA l0 e^2 + 1/2 EI int (w'' - kappa0)^2 ds with
 e = eps + (1 + eps) / (2 l0) int w'^2 ds. All integrals are those of polynomials and done beforehand, so that
 mass matrix and forces are exact.
+
+In the ring the coordinates lie one after the other, five for each beam: x, y, phi, a1, a2, x, y, phi, ... The
+last three are those of the first node, turned once around. A beam takes eight from its node on, so that mass
+matrices join to blocks of 5 x 5 (`solvers.cyclic_blocks`).
 """
 
 import math
@@ -26,6 +29,11 @@ from typing import NamedTuple
 import numpy as np
 
 from cvt_hpc.kernels import kernel
+from cvt_hpc.lanes import LaneArray
+from cvt_hpc.solvers.cyclic_blocks import DIAGONAL, LOWER, UPPER, block_size, empty_blocks, empty_columns
+
+PER_BEAM, PER_NODE = 5, 3
+SIZE = block_size(PER_BEAM)
 
 # w = sum of v_j x^2 (SHAPE[j][0] + SHAPE[j][1] x + SHAPE[j][2] x^2)
 SHAPE = (
@@ -47,31 +55,13 @@ _B11, _B12, _B13, _B14, _B33, _B44 = 50432 / 81, -121088 / 405, -4096 / 405, -14
 
 
 class RcmBeam(NamedTuple):
-    """Constants of an element.
+    """Constants of a beam."""
 
-    Attributes
-    ----------
-    length : float
-        Of the element without load [m].
-    line_mass : float
-        Mass per length [kg/m].
-    axial_stiffness, bending_stiffness : float
-        EA [N], EI [N m^2].
-    curvature : float
-        Without load [1/m]; positive where the path turns to the left.
-    strain_damping : float
-        Generalised force against the rate of eps [N m s].
-    gravity : (float, float)
-        Acceleration along x and y [m/s^2].
-    """
-
-    length: float
-    line_mass: float
-    axial_stiffness: float
-    bending_stiffness: float
-    curvature: float = 0.0
-    strain_damping: float = 0.0
-    gravity: tuple[float, float] = (0.0, 0.0)
+    length: float  # without load [m]
+    line_mass: float  # [kg/m]
+    axial_stiffness: float  # EA [N]
+    bending_stiffness: float  # EI [N m^2]
+    curvature: float = 0.0  # without load [1/m], positive where the path turns to the left
 
 
 class Kinematics(NamedTuple):
@@ -103,45 +93,22 @@ def kinematics(l0: float, q: np.ndarray) -> Kinematics:
 
 
 class LinePoint(NamedTuple):
-    """A material point of the line, and the line's direction there.
+    """A material point of the line, and the line's direction there."""
 
-    Attributes
-    ----------
-    x, y : float
-        Position [m].
-    cos, sin : float
-        Of the line's angle.
-    stretch : float
-        Length of the line by length without load, |dr/ds|.
-    bend : float
-        Change of the angle by length without load [1/m].
-    """
-
-    x: float
+    x: float  # [m]
     y: float
-    cos: float
+    cos: float  # of the line's angle
     sin: float
-    stretch: float
-    bend: float
+    stretch: float  # length of the line by length without load, |dr/ds|
+    bend: float  # change of the angle by length without load [1/m]
 
 
 @kernel
 def line_point(l0: float, q: np.ndarray, s: float, along: np.ndarray, across: np.ndarray) -> LinePoint:
-    """A material point, and its motion by the rates of the coordinates.
+    """The material point `s` [m] from the centre without load, -l0/2 to l0/2, at coordinates `q` (8,).
 
-    The angle here is that of the line, to which the tangent t and the normal n to its left belong; that of
-    the section differs from it where the slope against the nodes' tangents is not small.
-
-    Parameters
-    ----------
-    l0 : float
-        Length of the element [m].
-    q : (8,) array
-        Coordinates [m, rad].
-    s : float
-        Where the point lies without load, -l0/2 to l0/2 from the centre [m].
-    along, across : (8,) arrays
-        Places for the rows t.J and n.J, J the derivative of the position by the coordinates.
+    The rows `along` and `across` (8,) become t.J and n.J, J the derivative of the position by q, t the line's
+    tangent and n the normal to its left.
     """
     shape = kinematics(l0, q)
     first = s < 0.0
@@ -203,74 +170,22 @@ def mean_strain(l0: float, q: np.ndarray) -> float:
 
 
 @kernel
-def energies(beam: RcmBeam, q: np.ndarray, u: np.ndarray) -> tuple[float, float, float]:
-    """Kinetic energy, elastic energy and potential of gravity of an element [J].
-
-    Parameters
-    ----------
-    beam : RcmBeam
-        Its constants.
-    q, u : (8,) arrays
-        Coordinates [m, rad] and their rates.
-    """
+def elastic_energy(beam: RcmBeam, q: np.ndarray) -> float:
+    """Elastic energy of a beam [J] at coordinates `q` (8,)."""
     l0 = beam.length
     shape = kinematics(l0, q)
-    rates = _rates(l0, shape, u)
-    v, r = _first_half(q, shape.psi, shape.delta), _first_half(u, rates.psi, rates.delta)
-    kinetic = potential = 0.0
-    for side, node in ((1.0, 0), (-1.0, 5)):
-        if node == 5:
-            v, r = _second_half(v), _second_half(r)
-        c, s, spin = math.cos(q[node + 2]), math.sin(q[node + 2]), u[node + 2]
-        ut, un = u[node] * c + u[node + 1] * s, u[node + 1] * c - u[node] * s
-        gv, gr = _w_w(v), _w_w(r)
-        grown, turned = side * rates.stretch, side * shape.stretch * spin
-        squares = 0.5 * (ut * ut + un * un) + 0.25 * l0 * (ut * grown + un * turned)
-        squares += l0 * l0 / 24.0 * (grown * grown + turned * turned)
-        squares += spin * spin * _dot(v, gv) + _dot(r, gr) + 2.0 * (un * _w(r) - ut * spin * _w(v))
-        squares += 2.0 * l0 * (turned * _x_w(r) - grown * spin * _x_w(v))
-        kinetic += 0.5 * l0 * squares
-        ahead, beside = side * 0.125 * l0 * shape.stretch, _w(v)
-        x = 0.5 * q[node] + ahead * c - beside * s
-        y = 0.5 * q[node + 1] + ahead * s + beside * c
-        potential -= l0 * (beam.gravity[0] * x + beam.gravity[1] * y)
-    v = _second_half(v)
-    strain = mean_strain(l0, q)
+    v = _first_half(q, shape.psi, shape.delta)
     bent = _dot(v, _curvatures(v)) / l0**3 - 2.0 * beam.curvature * shape.psi / l0 + l0 * beam.curvature**2
-    elastic = 0.5 * (beam.axial_stiffness * l0 * strain**2 + beam.bending_stiffness * bent)
-    return beam.line_mass * kinetic, elastic, beam.line_mass * potential
+    return 0.5 * (beam.axial_stiffness * l0 * mean_strain(l0, q) ** 2 + beam.bending_stiffness * bent)
 
 
 @kernel
-def equations_of_motion(
-    beam: RcmBeam,
-    q: np.ndarray,
-    u: np.ndarray,
-    ahead: float,
-    stiff: float,
-    damp: float,
-    mass: np.ndarray,
-    force: np.ndarray,
-) -> None:
-    """Mass matrix and forces of an element, M u' = h.
+def equations_of_motion(beam, q, u, stiff, mass, force):
+    """Matrix and forces of a beam, (M + stiff K) u' = h, at coordinates and rates (8,); stiff in s^2.
 
-    For steps that are implicit in the elastic forces, the matrix may be M + `stiff` K + `damp` D and the
-    forces those a time `ahead` along the rates, h - `ahead` K u. K is the tangent stiffness without the
-    change of directions: of axial strain, bending, and of tension against deflection. So it is positive
-    semidefinite. D is the strain damping along its direction.
-
-    Parameters
-    ----------
-    beam : RcmBeam
-        Its constants.
-    q, u : (8,) arrays
-        Coordinates [m, rad] and their rates.
-    ahead, stiff, damp : float
-        As above [s, s^2, s]; all zero for M and h.
-    mass : (8, 8) array
-        Place for the matrix, symmetric.
-    force : (8,) array
-        Place for the forces [N, N m]: of inertia, elasticity, strain damping and gravity.
+    Places of the results are `mass`, an (8, 8) array, and `force`, an (8,) array [N, N m]. K is the tangent
+    stiffness without the change of directions: of axial strain, of bending, and of tension against
+    deflection. So it is positive semidefinite.
     """
     l0, rho = beam.length, beam.line_mass
     shape = kinematics(l0, q)
@@ -282,29 +197,22 @@ def equations_of_motion(
     v_, r_ = _second_half(v), _second_half(r)
 
     # elasticity
-    sloped, sloped_r = _slopes(v), _slopes(r)
-    curved = _curvatures((v[0] + ahead * r[0], v[1] + ahead * r[1], v[2] + ahead * r[2], v[3] + ahead * r[3]))
+    sloped, curved = _slopes(v), _curvatures(v)
     deflected = _dot(v, sloped) / (2.0 * l0 * l0)
     lever, by_stretch = e1 / (l0 * l0), 1.0 + deflected  # of the strain's gradient
-    strain, strain_rate = e1 - 1.0 + e1 * deflected, by_stretch * rates.stretch + lever * _dot(sloped, r)
     axial, bending = beam.axial_stiffness * l0, beam.bending_stiffness / l0**3
-    push = axial * (strain + ahead * strain_rate)
-    pull, held = push * lever, max(axial * strain, 0.0) * lever
-    f1 = pull * sloped[0] + held * ahead * sloped_r[0] + bending * curved[0]
-    f2 = pull * sloped[1] + held * ahead * sloped_r[1] + bending * curved[1]
-    f3 = pull * sloped[2] + held * ahead * sloped_r[2] + bending * (curved[2] - l0 * l0 * beam.curvature)
-    f4 = pull * sloped[3] + held * ahead * sloped_r[3] + bending * curved[3]
-    f_stretch = push * by_stretch + beam.strain_damping * rates.stretch
+    push = axial * (e1 - 1.0 + e1 * deflected)
+    pull, held = push * lever, max(push, 0.0) * lever
+    f1 = pull * sloped[0] + bending * curved[0]
+    f2 = pull * sloped[1] + bending * curved[1]
+    f3 = pull * sloped[2] + bending * (curved[2] - l0 * l0 * beam.curvature)
+    f4 = pull * sloped[3] + bending * curved[3]
+    f_stretch = push * by_stretch
 
-    # inertia and gravity: accelerations where those of the coordinates vanish
-    gx, gy = beam.gravity
+    # inertia: accelerations where those of the coordinates vanish
     grown, jumped = rates.stretch_change, rates.delta_change
-    first = _inertia(
-        1.0, l0, e1, v, r, u[2], rates.stretch, grown, jumped, gx * c1 + gy * s1, gy * c1 - gx * s1
-    )
-    second = _inertia(
-        -1.0, l0, e1, v_, r_, u[7], rates.stretch, grown, -jumped, gx * c2 + gy * s2, gy * c2 - gx * s2
-    )
+    first = _inertia(1.0, l0, e1, v, r, u[2], rates.stretch, grown, jumped)
+    second = _inertia(-1.0, l0, e1, v_, r_, u[7], rates.stretch, grown, -jumped)
     f1 += rho * (first[4] + second[5])
     f2 += rho * (first[5] + second[4])
     f3 += rho * (first[6] + second[6])
@@ -334,9 +242,7 @@ def equations_of_motion(
     square = m * l0 * l0 / 24.0
     n1, n2 = m * _W1, m * _W2
     w1, w2 = m * _w(v), m * _w(v_)
-    for i in range(8):
-        for j in range(8):
-            mass[i, j] = 0.0
+    mass[:] = 0.0
     mass[0, 0] = mass[1, 1] = mass[5, 5] = mass[6, 6] = weight
     mass[0, 2], mass[1, 2] = -w1 * c1 - arm * s1, -w1 * s1 + arm * c1
     mass[0, 3], mass[1, 3], mass[0, 4], mass[1, 4] = -n1 * s1, n1 * c1, -n2 * s1, n2 * c1
@@ -354,17 +260,16 @@ def equations_of_motion(
     by_delta = m * _W4
     odd = m * (_G14 - _G24) + k14
     wound = turned * _X4
-    on_stretch = square + 0.5 * damp * beam.strain_damping
     on_delta = m * _G44 + 0.5 * k44
     shift = 0.125 * m * l0
     p = (shift * c1, shift * s1, -m * l0 * _x_w(v), 0.0, 0.0, -shift * c2, -shift * s2, m * l0 * _x_w(v_))
     o = (-by_delta * s1, by_delta * c1, wound, odd, -odd, by_delta * s2, -by_delta * c2, wound)
     a = (0.0, 0.0, -l0 * sloped[2], sloped[0], sloped[1], 0.0, 0.0, l0 * sloped[2])
     for i in range(8):
-        p_i, o_i = p[i] + on_stretch * stretch[i], o[i] + on_delta * delta[i]
+        p_i, o_i = p[i] + square * stretch[i], o[i] + on_delta * delta[i]
         grad_i = stiff * axial * (by_stretch * stretch[i] + lever * (a[i] + sloped[3] * delta[i]))
         for j in range(i, 8):
-            p_j, o_j = p[j] + on_stretch * stretch[j], o[j] + on_delta * delta[j]
+            p_j, o_j = p[j] + square * stretch[j], o[j] + on_delta * delta[j]
             grad_j = by_stretch * stretch[j] + lever * (a[j] + sloped[3] * delta[j])
             mass[i, j] += (
                 p_i * stretch[j] + stretch[i] * p_j + o_i * delta[j] + delta[i] * o_j + grad_i * grad_j
@@ -412,23 +317,23 @@ def _gradients(l0, shape):
 
 
 @kernel
-def _inertia(side, l0, e1, v, r, spin, stretch_rate, stretch_change, delta_change, gt, gn):
+def _inertia(side, l0, e1, v, r, spin, stretch_rate, stretch_change, delta_change):
     """Of a half per line mass: generalised forces on r_t, r_n, phi of its node, eps, and v."""
     along = stretch_change - e1 * spin * spin
     coriolis = 2.0 * spin * stretch_rate
     first, second = side * l0 * l0 / 8.0, l0**3 / 24.0
     w, x_w, x_r = l0 * _w(v), side * l0 * l0 * _x_w(v), side * l0 * l0 * _x_w(r)
     wv, wr = _w_w(v), _w_w(r)
-    on_t = along * first - 2.0 * spin * l0 * _w(r) - 0.5 * l0 * gt
-    on_n = coriolis * first + l0 * _W4 * delta_change - spin * spin * w - 0.5 * l0 * gn
-    on_stretch = along * second - 2.0 * spin * x_r - first * gt
-    on_phi = -along * x_w + 2.0 * spin * l0 * _dot(v, wr) + w * gt
-    on_phi += e1 * (coriolis * second + side * l0 * l0 * _X4 * delta_change - spin * spin * x_w - first * gn)
+    on_t = along * first - 2.0 * spin * l0 * _w(r)
+    on_n = coriolis * first + l0 * _W4 * delta_change - spin * spin * w
+    on_stretch = along * second - 2.0 * spin * x_r
+    on_phi = -along * x_w + 2.0 * spin * l0 * _dot(v, wr)
+    on_phi += e1 * (coriolis * second + side * l0 * l0 * _X4 * delta_change - spin * spin * x_w)
     by_x, by_delta, by_v = side * l0 * l0 * coriolis, l0 * delta_change, -l0 * spin * spin
-    on_1 = by_x * _X1 + by_delta * _G14 + by_v * wv[0] - l0 * _W1 * gn
-    on_2 = by_x * _X2 + by_delta * _G24 + by_v * wv[1] - l0 * _W2 * gn
-    on_3 = by_x * _X3 + by_delta * _G34 + by_v * wv[2] - l0 * _W3 * gn
-    on_4 = by_x * _X4 + by_delta * _G44 + by_v * wv[3] - l0 * _W4 * gn
+    on_1 = by_x * _X1 + by_delta * _G14 + by_v * wv[0]
+    on_2 = by_x * _X2 + by_delta * _G24 + by_v * wv[1]
+    on_3 = by_x * _X3 + by_delta * _G34 + by_v * wv[2]
+    on_4 = by_x * _X4 + by_delta * _G44 + by_v * wv[3]
     return on_t, on_n, on_phi, on_stretch, on_1, on_2, on_3, on_4
 
 
@@ -488,3 +393,92 @@ def _even_and_odd(m11, m12, m13, m14, m33, m44, v):
         m13 * (a + b) + m33 * c,
         m14 * (a - b) + m44 * d,
     )
+
+
+class Ring(NamedTuple):
+    """A ring of k beams, its motion, and work space of its equations."""
+
+    beam: RcmBeam
+    q: np.ndarray  # (5 k + 3,): coordinates [m, rad]
+    u: np.ndarray  # their rates
+    blocks: LaneArray  # (k + 1, 25): matrix of the equations, of k nodes
+    columns: LaneArray  # (k + 1, 5): their right-hand side
+    mass: np.ndarray  # (8, 8), (8,): equations of a beam
+    force: np.ndarray
+
+
+def relaxed_ring(beam: RcmBeam, beams: int) -> Ring:
+    """A ring at rest around the origin, counter-clockwise: nodes and quarter points on a circle."""
+    step = 2.0 * math.pi / beams
+    radius, angle = beam.length / step, step * np.arange(beams + 1)
+    nodes = np.zeros((beams + 1, PER_BEAM))
+    nodes[:, 0], nodes[:, 1] = radius * np.cos(angle), radius * np.sin(angle)
+    nodes[:, 2] = angle + math.pi / 2
+    nodes[:, 3:] = math.hypot(radius, 0.25 * beam.length) - radius
+    q = nodes.ravel()[: PER_BEAM * beams + PER_NODE].copy()
+    blocks, columns = empty_blocks(beams, PER_BEAM), empty_columns(beams, PER_BEAM, 1)
+    return Ring(beam, q, np.zeros_like(q), blocks, columns, np.zeros((8, 8)), np.zeros(8))
+
+
+@kernel
+def close(ring: Ring) -> None:
+    """Give the end of a ring the state of its first node, which has been changed."""
+    for k in range(PER_NODE):
+        ring.q[k - PER_NODE], ring.u[k - PER_NODE] = ring.q[k], ring.u[k]
+    ring.q[-1] += 2.0 * math.pi
+
+
+@kernel
+def assemble(ring: Ring, stiff: float) -> None:
+    """Set up (M + stiff K) u' = h of all beams, in `blocks` and column 0 of `columns`."""
+    ring.blocks.data[:] = 0.0
+    ring.columns.data[:] = 0.0
+    for i in range(ring.blocks.rows - 1):
+        q, u = ring.q[PER_BEAM * i : PER_BEAM * i + 8], ring.u[PER_BEAM * i : PER_BEAM * i + 8]
+        equations_of_motion(ring.beam, q, u, stiff, ring.mass, ring.force)
+        add_matrix(ring.blocks, i, ring.mass)
+        add_to_column(ring.columns, 0, i, 1.0, ring.force)
+
+
+@kernel
+def stored_energy(ring: Ring) -> float:
+    """Kinetic and elastic energy [J]."""
+    total = 0.0
+    for i in range(ring.blocks.rows - 1):
+        q, u = ring.q[PER_BEAM * i : PER_BEAM * i + 8], ring.u[PER_BEAM * i : PER_BEAM * i + 8]
+        equations_of_motion(ring.beam, q, u, 0.0, ring.mass, ring.force)
+        for r in range(8):
+            for c in range(8):
+                total += 0.5 * u[r] * ring.mass[r, c] * u[c]
+        total += elastic_energy(ring.beam, q)
+    return total
+
+
+@kernel
+def add_matrix(blocks: LaneArray, beam: int, matrix: np.ndarray) -> None:
+    """Add an (8, 8) matrix of a beam's coordinates to the ring's."""
+    for r in range(8):
+        node = beam if r < PER_BEAM else (beam + 1) % (blocks.rows - 1)
+        for c in range(8):
+            block = DIAGONAL
+            if (r < PER_BEAM) != (c < PER_BEAM):
+                block = UPPER if r < PER_BEAM else LOWER
+            blocks.data[node, block * PER_BEAM + r % PER_BEAM, c % PER_BEAM] += matrix[r, c]
+
+
+@kernel
+def add_to_column(columns: LaneArray, column: int, beam: int, factor: float, row: np.ndarray) -> None:
+    """Add factor times a row (8,) of a beam's coordinates to a right-hand side."""
+    for r in range(8):
+        node = beam if r < PER_BEAM else (beam + 1) % (columns.rows - 1)
+        columns.data[node, r % PER_BEAM, column] += factor * row[r]
+
+
+@kernel
+def along_row(columns: LaneArray, column: int, beam: int, row: np.ndarray) -> float:
+    """Product of a row (8,) of a beam's coordinates with a solution."""
+    total = 0.0
+    for r in range(8):
+        node = beam if r < PER_BEAM else (beam + 1) % (columns.rows - 1)
+        total += columns.data[node, r % PER_BEAM, column] * row[r]
+    return total
