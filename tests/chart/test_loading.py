@@ -91,7 +91,7 @@ def test_a_coarser_reference_is_not_finer(tmp_path, coarser, complaint):
     job = tmp_path / "c.toml"
     job.write_text(text.replace('{ step = "2.25 us", set = { stations = 320 } }', coarser, 1))
     with pytest.raises(InputError, match=complaint):
-        load_chart(job)
+        load(job)
 
 
 def test_starts_differ_in_their_seeds(write_chart):
