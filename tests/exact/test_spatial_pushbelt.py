@@ -154,7 +154,7 @@ def test_a_clamped_element_without_friction():
 def test_stiff_sheaves_are_rigid_ones():
     rigid, stiff = scene(), scene(modal=((1e14, 1e14, 1e14), (1e14, 1e14, 1e14)))
     for k in (spatial_fields.DRIVING_LEFT, spatial_fields.DRIVEN_RIGHT, spatial_fields.DRIVING_TORQUE):
-        assert stiff[1].loads[k] == pytest.approx(rigid[1].loads[k], rel=5e-3)
+        assert stiff[1].loads[k] == pytest.approx(rigid[1].loads[k], rel=1e-2)
     assert np.abs(stiff[1].openings).max() < 1e-9
 
 
@@ -186,7 +186,12 @@ def test_a_sheave_leans_with_its_lag_under_a_load_that_stays():
 def test_pins_push_back_beyond_their_clearance():
     nodes, clearance, pitch = 16, 1e-4, 0.02
     belt = chains.belt(
-        pin_clearance=clearance, pin_stiffness=1e6, pitch=pitch, thickness=0.9 * pitch, contact_stiffness=0.0
+        pin_clearance=clearance,
+        pin_stiffness=1e6,
+        contact_time=0.0,
+        pitch=pitch,
+        thickness=0.9 * pitch,
+        contact_stiffness=0.0,
     )
     # a straight line, closed upon itself, far from the pulleys
     fields = np.zeros((nodes, spatial_fields.STATE_FIELDS))

@@ -129,10 +129,11 @@ def test_contacts_press_by_their_gaps_at_every_output(name):
         largest = deformed[..., part].max(axis=(1, 2))
         assert (error[..., part].max(axis=(1, 2)) < 0.01 * largest).all(), part
     # Within a step a pin may run along its hole by so much that the direction of its force turns by 0.04: the gap
-    # is another by its cosine's part of the clearance, 40 nm. So few pins err by more than 1 % of the largest.
+    # is another by its cosine's part of the clearance, 40 nm, and presses by one and a half times of that. So few pins
+    # err by more than 1 % of the largest.
     of_pin, pin, largest = error[..., PIN], pressed[..., PIN], deformed[..., PIN].max()
     assert pin.any() == (name == "pins")
-    assert of_pin.max() <= 0.03 * largest and of_pin[~pin].max() <= 0.01 * largest
+    assert of_pin.max() <= 0.05 * largest and of_pin[~pin].max() <= 0.01 * largest
     if pin.any():
         assert np.percentile(of_pin[pin], 99.0) < 0.01 * largest
 

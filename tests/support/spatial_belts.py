@@ -75,7 +75,7 @@ def moved_back(fields):
 
 
 def gaps_between(belt, f):
-    """Gaps by positions between each element and the next one, four at the front and that of the pin, (5, nodes) [m]."""
+    """Gaps at the front to the next element by positions, and the offset of the pin, (5, nodes) [m]."""
     r, x, o = f[:, 0:3], f[:, 3:6], f[:, 6:9]
     a = np.cross(o, x)
     rj, xj, oj = (np.roll(v, -1, axis=0) for v in (r, x, o))
@@ -86,7 +86,7 @@ def gaps_between(belt, f):
             found.append(np.sum((rj - front) * xj, axis=1) - 0.5 * belt.thickness)
     offset = r - rj + 0.5 * belt.thickness * (x + xj) + belt.pin_height * (o - oj)
     offset -= np.sum(offset * xj, axis=1)[:, None] * xj
-    return np.array([*found, belt.pin_clearance - np.linalg.norm(offset, axis=1)])
+    return np.array([*found, np.linalg.norm(offset, axis=1)])
 
 
 def gaps(belt, state):
@@ -102,6 +102,7 @@ def gaps(belt, state):
     rate = belt.contact_time / STEP
     weights = 0.25 + rate, 0.5 - rate, 0.25
     found = list(np.tensordot(weights, [gaps_between(belt, g) for g in three], 1))
+    found[-1] = belt.pin_clearance - found[-1]
     driven = f[:, spatial_fields.DRIVEN].astype(int)
     axis, centre = belt.axes[driven], driven[:, None] * [belt.centre_distance, 0.0, 0.0]
     groove, middle = (
