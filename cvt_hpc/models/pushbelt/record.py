@@ -65,9 +65,7 @@ VARIABLES = (
         early=True,
     ),
     *shared("driven_speed_ripple", "driving_power", "load_power", "thrust_power"),
-    *shared("storing_power", "ring_loss", "belt_loss"),
-    power("tilt_loss", "mean power of the dampers of the elements' tilt"),
-    *shared("loss"),
+    *shared("storing_power", "ring_loss", "belt_loss", "tilt_loss", "loss"),
     power(
         "numerical_damping",
         "mean power that the time step damps by itself, no loss of the belt's",
