@@ -161,6 +161,22 @@ TRANSVERSE_DAMPING = not_negative(
     500.0, "N s/m^2", "viscous damping of the transverse motion", sensible=(0.1, 1000000.0)
 )
 
+# Of an element on its rings, whose saddle is ring_offset above the pitch line
+TILT: dict[str, Parameter] = {
+    "tilt_spring": not_negative(
+        3267.0,
+        "N",
+        "stiffness of the elements' tilt against the rings, moment by angle and length",
+        sensible=(1.0, 1e9),
+    ),
+    "tilt_damper": not_negative(
+        0.03267,
+        "N s",
+        "damping of the elements' tilt against the rings, moment by angular velocity and length",
+        sensible=(1e-6, 1e6),
+    ),
+}
+
 HALF_WEDGE_ANGLE = Parameter(
     np.deg2rad(11.0),
     "rad",

@@ -157,6 +157,7 @@ _SHARED = (
     power("ring_loss", "mean friction power between rings and elements"),
     power("belt_loss", "mean power of the belt's transverse damping"),
     power("layer_loss", "mean power of the layers' longitudinal dampers"),
+    power("tilt_loss", "mean power of the dampers of the elements' tilt"),
     power("seating_loss", "mean elastic power lost by the mesh where contact ends"),
     power("loss", "mean of all losses", words="total loss"),
     Variable(

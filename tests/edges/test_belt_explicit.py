@@ -48,7 +48,9 @@ def by_formula(case, values):
     cell = belt.cell.min()
     if case == "ring friction":
         stations = np.flatnonzero(belt.arc_curvature)
-        far = [ring_drag(belt, j, j - 1, flat.eps, 1e3, 0.0, 1.0)[0] for j in stations]  # mu_r x pressure
+        far = [
+            ring_drag(belt, j, j - 1, flat.eps, 1e3, 0.0, 1.0, 0.0)[0] for j in stations
+        ]  # mu_r x pressure
         return max(far) / belt.ring_friction_speed * (1.0 / belt.ring_mass.min() + 1.0 / belt.element_mass)
     if case == "flank friction":
         static = belt.law.kinetic - belt.law.gradient * belt.law.speed

@@ -21,6 +21,7 @@ BELT = {
     "element_stiffness": 4e7, "element_damping": 20.0, "flank_stiffness": 2e10, "element_factor": 1.5,
     "local_stiffness": 4e9, "sheave_stiffness": 1.5, "half_wedge_angle": ANGLE, "tilt_stiffness": 2e5,
     "tilt_factor": 1.5, "ratio": 2.5, "driven_radius": RADII["driven"], "sheave_lag": 2e-3, "lag_stiffness": 2e8,
+    "tilt_spring": np.inf,
 }  # fmt: skip
 
 
@@ -66,6 +67,11 @@ def test_the_driven_sheave_follows_the_thrust_alike():
     opening = excess / (BELT["sheave_lag"] * BELT["lag_stiffness"])  # [m/s]
     radius = followed(BELT)["sheave_rate"] * excess
     assert 2.0 * np.tan(ANGLE) * radius == pytest.approx(opening)
+
+
+def test_elements_tilt_alike():
+    assert followed(BELT | {"tilt_spring": 5e3})["tilt_spring"] == 5e3
+    assert followed(BELT)["tilt_spring"] == 3267.0  # one that does not tilt says nothing of it
 
 
 def test_a_pulley_that_cannot_tilt_is_rigid():

@@ -58,6 +58,7 @@ CASES = {
     | {"driven_inertia": np.inf, "driving_inertia": 0.05, "rise_time": 0.03},
 }
 CASES |= {
+    "elements tilt": {"tilt_spring": 3267.0},
     "path's curvature, narrow column": {
         "curvature_terms": "path",
         "column_bending": "rocking",
@@ -85,6 +86,7 @@ def rough_belt(case):
     random = np.random.default_rng(5)
     for row, size in ((f.W, 2e-5), (f.U, 0.05), (f.V_ELEMENT, 0.2), (f.V_RING, 0.05), (f.V_FILTERED, 0.02)):
         state.fields[row] += size * random.normal(size=belt.cell.size)
+    state.fields[f.ELEMENT_TILT :] += 3e-3 * random.normal(size=belt.cell.size)
     # every sixth cell hardly pressed, 40 N, less than its damper's force
     state.fields[f.N_ELEMENT, ::6] *= (1.0 + forces(belt, state)[1][0, ::6]) / (1.0 - 1e-6)
     state.fields[f.V_FILTERED] = np.abs(state.fields[f.V_FILTERED])
@@ -128,7 +130,7 @@ def plain_step(belt, before, step):
     (fields, scalars), rate, moments = state, np.zeros_like(before.fields), np.zeros(belt.cell.size)
     force, eps = forces(belt, state)
     accelerations(belt, state, force, eps, rate, moments)
-    for row in (f.U, f.V_ELEMENT, f.V_RING):
+    for row in (f.U, f.V_ELEMENT, f.V_RING, *range(f.ELEMENT_TILT, len(fields))):
         fields[row] += step * rate[row]
     load = belt.ratio * load_at(belt, scalars[f.TIME])
     closing = (driven_thrust(belt, force) - belt.thrust) / belt.axial_damping
@@ -166,7 +168,7 @@ def test_a_step_is_that_of_the_readable_right_hand_side(case):
     expected, found = plain_step(belt, before, STEP), march("explicit", belt, before, STEP, 1)
     # Round-off of the strains, 2e-16, is 2e-6 m/s^2 of an element's acceleration, and 1e-10 N/m of contact
     # forces less; of speeds of 10 m/s, 1 and 125 rad/s it is an ulp or two.
-    for row, name in enumerate(f.FIELDS):
+    for row, name in enumerate((*f.FIELDS, "element_tilt")[: len(before.fields)]):
         change = np.abs(expected.fields[row] - before.fields[row]).max()
         size = np.abs(expected.fields[row]).max()
         if row != f.V_FILTERED or belt.friction_memory > 0.0:

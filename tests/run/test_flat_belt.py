@@ -26,6 +26,7 @@ CASES = {
     "no memory": {"friction_memory": 0.0},
     "clearance without lag": {"collar_clearance": 5e-4},
     "rigid": {"sheave_stiffness": np.inf, "stiffness_of": "sheave"},
+    "elements tilt": {"tilt_spring": 3267.0},
 }
 
 
@@ -39,6 +40,7 @@ def rough_belt(case):
     state = run.state(0)
     for row, size in ((f.W, 1e-6), (f.U, 0.05), (f.V_ELEMENT, 0.05), (f.V_RING, 0.05)):
         state.fields[row] += size * random.normal(size=belt.cell.size)
+    state.fields[f.ELEMENT_TILT :] += 3e-3 * random.normal(size=belt.cell.size)
     return belt, state
 
 
@@ -56,7 +58,7 @@ def test_a_state_survives_the_vector(case):
     flat = flat_belt(belt)
     unpack(flat, 0.125, pack(flat, state))
     filtered = flat.remembering
-    for row in range(f.N_RING + 1):
+    for row in range(len(state.fields)):
         here = filtered if row == f.V_FILTERED else slice(None)
         assert np.array_equal(flat.state.fields[row, here], state.fields[row, here])
     assert flat.state.scalars[:3].tolist() == [0.125, *state.scalars[[f.DRIVEN_SPEED, f.DRIVEN_POSITION]]]
@@ -96,13 +98,16 @@ def test_what_velocities_advance_is_by_their_new_values_in_the_explicit_step(cas
     after = march("explicit", belt, mixed, step, 1)
     for row in (f.U, f.V_ELEMENT, f.V_RING):
         mixed.fields[row] = after.fields[row]
+    tilts = slice(f.ELEMENT_TILT, None)  # which goes by the old velocities
+    mixed.fields[tilts] = after.fields[tilts]
     for place in (f.DRIVEN_SPEED, f.FIRST_STATE + f.EXCESS):
         mixed.scalars[place] = after.scalars[place]
     flat, y, out = flat_rates(belt, mixed)
     advanced = y + step * out
     advanced[system(flat).velocities] = y[system(flat).velocities]
     expected = pack(flat, after)
-    first = 6 * belt.cell.size
+    first, last = 6 * belt.cell.size, (6 + belt.tilts) * belt.cell.size
+    advanced[first:last], first = y[first:last], last
     remembering = np.arange(y.size) - first < flat.remembering.size
     remembering &= np.arange(y.size) >= first
     # the sums are taken from other origins, 10 m/s, 1 and 125 rad/s: an ulp of each

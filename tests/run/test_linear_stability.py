@@ -46,10 +46,17 @@ FREE = {
 }  # fmt: skip
 
 
+TILT = {"tilt_spring": 3267.0}
+
+
 @pytest.mark.parametrize(
     "values",
-    [{"sheave_stiffness": np.inf, "stiffness_of": "sheave", "stations": 50}, FREE | {"stations": 48}],
-    ids=["rigid", "free pulleys"],
+    [
+        {"sheave_stiffness": np.inf, "stiffness_of": "sheave", "stations": 50},
+        FREE | {"stations": 48},
+        TILT | {"stations": 50},
+    ],
+    ids=["rigid", "free pulleys", "elements tilt"],
 )
 def test_jacobian_is_that_of_central_differences_one_by_one(values):
     parameters = COARSE | values
@@ -120,8 +127,9 @@ def test_a_lag_of_the_tilt_takes_the_growth_away():
     assert growth[2] > 50.0 and growth[3] < 0.0
 
 
-def test_growth_with_lagging_tilts_is_that_of_the_transient():
-    (point,) = branch(SteadyBelt(COARSE | {"tilt_lag": 2e-5}), mesh(COARSE), (125.0,)).points
+@pytest.mark.parametrize("values", [{"tilt_lag": 2e-5}, TILT], ids=["lagging sheaves", "elements tilt"])
+def test_growth_with_tilts_is_that_of_the_transient(values):
+    (point,) = branch(SteadyBelt(COARSE | values), mesh(COARSE), (125.0,)).points
     growth, frequency = measured(point)
     assert growth == pytest.approx(point.growth, abs=0.02 * point.growth)
     assert frequency == pytest.approx(point.modes[0].frequency, rel=2e-3)

@@ -95,7 +95,7 @@ def test_losses_are_losses(name):
         # seating alone may give back at times: it is what the mesh leaves of forces at the ends of contact
         if term != "seating_loss":
             assert run.channel(term).min() >= 0, term
-            assert mean(run, term) > 0, term
+            assert mean(run, term) > 0 or term == "tilt_loss", term  # elements do not tilt here
 
 
 @pytest.mark.parametrize(
@@ -173,6 +173,8 @@ def rough():
 def powers_and_storing(state, **values):
     """Audited powers [W] by name of a state under some parameters, and the rate of its stored energy [W]."""
     belt = belt_constants(job(**COARSE | {"load": 100.0} | values).parameters)
+    if belt.tilts:  # alike all around, since what is carried through the mesh leaves energy there
+        state = state._replace(fields=np.vstack([state.fields, np.full(belt.cell.size, 4e-3)]))
     now, rates, works = _audited(belt, state), [], []
     for step in (TINY, 2 * TINY):
         after = march("explicit", belt, state, step, 1)
@@ -207,6 +209,7 @@ TERMS = {
         ["driving_flank_loss", "driven_flank_loss", "driving_power"],
     ),
     "sheave": ({}, {"lag_stiffness": 2e20}, ["lag_loss", "thrust_power"]),
+    "elements' tilt": ({"tilt_spring": 3267.0}, {}, ["ring_loss", "tilt_loss"]),
     "load": ({"load": 100.0}, {"load": 0.0}, ["load_power"]),
 }
 

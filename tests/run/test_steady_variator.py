@@ -42,7 +42,12 @@ def rates_of(found, belt):
 
 
 @pytest.mark.parametrize(
-    "values", [{}, {"sheave_stiffness": np.inf, "stiffness_of": "sheave", "friction_memory": 0.0}]
+    "values",
+    [
+        {},
+        {"sheave_stiffness": np.inf, "stiffness_of": "sheave", "friction_memory": 0.0},
+        {"tilt_spring": 3267.0},
+    ],
 )
 def test_nothing_changes_in_it(values):
     first = initial_state(DEFAULTS | values, belt_constants(DEFAULTS | values))

@@ -24,9 +24,15 @@ MOST_TURN = np.pi / 3.0  # [rad] of a beam along an arc
 # what the model of rigid sheaves, bare strands and set-valued friction does without, and what that is there
 _WITHOUT = {"coarse": True, "nose_clearance": np.inf, "transverse_damping": 0.0, "sheave_stiffness": np.inf}
 _IDLE = (
-    "nose_height", "nose_stiffness", "element_damping", "local_stiffness", "local_length", "ring_friction_speed",
-    "friction_speed", *pushbelt.MODES,
-)  # fmt: skip
+    "nose_height",
+    "nose_stiffness",
+    "element_damping",
+    "local_stiffness",
+    "local_length",
+    "ring_friction_speed",
+    "friction_speed",
+    *pushbelt.MODES,
+)
 _WITHOUT |= {
     key: entry.default
     for table in pushbelt.PARAMETERS.values()

@@ -20,6 +20,7 @@ from cvt_hpc.models.elastic_belt.bending_settings import BENDING_DEFAULTS, CURVA
 from cvt_hpc.models.elastic_belt.deflection_settings import disc_settings
 from cvt_hpc.models.elastic_belt.grouping import faded_coupling
 from cvt_hpc.models.elastic_belt.pulleys import Pulleys, settled_tilt, with_pulleys
+from cvt_hpc.models.elastic_belt.tilt_settings import TILT_DEFAULTS, elements_tilt
 from cvt_hpc.physics.friction import FrictionLaw, given_law
 from cvt_hpc.physics.geometry import Variator, cut_path, variator
 from cvt_hpc.physics.sheaves import (
@@ -55,7 +56,8 @@ class Belt(NamedTuple):
     own weight bears them. `belt_speed` is that of the pitch line at `driving_speed`; along a ramp of speed
     both follow `rhs.speed_share_at`. `element_mass` and `ring_mass` are the inertia along the path, `mass`
     that across it. Across a gap the elements' damper may push against `bridging_stiffness` times the gap's
-    strain; inf, as in every run: elements that are apart have no damper.
+    strain; inf, as in every run: elements that are apart have no damper. `tilts` is whether elements tilt on
+    the rings.
     """
 
     cell: np.ndarray
@@ -92,6 +94,9 @@ class Belt(NamedTuple):
     outer_edge: float
     inner_edge: float
     ring_damping: float
+    tilts: bool
+    tilt_spring: float
+    tilt_damper: float
     transverse_damping: float
     ring_offset: float
     ring_friction: float
@@ -125,7 +130,8 @@ class Belt(NamedTuple):
 class State(NamedTuple):
     """The state: `fields` (7, N) in the order of FIELDS, `scalars` (12,) in the order of SCALARS.
 
-    Of rings in n layers `fields` is (7 + 2 n, N), see `rings.py`.
+    Of elements that tilt `fields` is (8, N), with ELEMENT_TILT; of rings in n layers (7 + 2 n, N), see
+    `rings.py`.
 
     The work of the layers' dampers [J] until it is read is no state of the belt.
     """
@@ -237,7 +243,7 @@ def belt_constants(parameters: Mapping[str, Any]) -> Belt:
     Belt
         For the kernels.
     """
-    p, grid = BENDING_DEFAULTS | dict(parameters), mesh(parameters)
+    p, grid = BENDING_DEFAULTS | TILT_DEFAULTS | dict(parameters), mesh(parameters)
     path, cell = grid.path, grid.cell
     dual = 0.5 * (cell + np.roll(cell, 1))
     kappa, radii = grid.curvature, (path.driving_radius, path.driven_radius)
@@ -299,6 +305,7 @@ def belt_constants(parameters: Mapping[str, Any]) -> Belt:
         squared_curvature=squared_curvature(cell, dual, kappa) * (terms > 0),
         curvature_terms=terms,
         has_column=has_column(p),
+        tilts=elements_tilt(p),
         ring_mass=p["longitudinal_mass"] * ring_mass,
         ring_relief=ring_mass * belt_speed * belt_speed,
         element_mass=p["longitudinal_mass"] * p["element_mass"],
@@ -368,7 +375,7 @@ def initial_state(parameters: Mapping[str, Any], belt: Belt) -> State:
 
     mean = [bent[stations] @ w[stations] / bent[stations].sum() for stations in arcs]
     speed = belt.speed_start * (belt.driving_radius + mean[0])
-    fields = np.zeros((len(f.FIELDS), grid.cell.size))
+    fields = np.zeros((len(f.FIELDS) + belt.tilts, grid.cell.size))
     fields[f.W] = w
     fields[f.V_ELEMENT] = fields[f.V_RING] = speed
     length = 1.0 + belt.curvature * 0.5 * (w + np.roll(w, -1))

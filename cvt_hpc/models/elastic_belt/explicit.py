@@ -25,6 +25,7 @@ from cvt_hpc.models.elastic_belt import lane_fields as lf
 from cvt_hpc.models.elastic_belt import lane_forces as forces
 from cvt_hpc.models.elastic_belt.lane_belt import LaneBelt, LaneState, Work
 from cvt_hpc.models.elastic_belt.lane_column import across_by_curvature, column_across
+from cvt_hpc.models.elastic_belt.lane_tilt import add_turn, carry_tilt, lane_tilt, turn_elements
 from cvt_hpc.models.elastic_belt.pulley_step import advance_pulleys
 from cvt_hpc.physics.flank import flank_shares, flank_sliding
 
@@ -47,8 +48,14 @@ def step_explicit(belt: LaneBelt, state: LaneState, work: Work, step: float) -> 
     """
     stations = work.stations
     forces.lane_sliding(belt, state, stations)
+    if belt.tilts:
+        lane_tilt(belt, state, stations, 0.0)
     taken, moment = _accelerate(belt, state, stations, step)
     advance_pulleys(belt, state, taken, moment, step)
+    if belt.tilts:
+        turn_elements(belt, state, 0.0)
+        carry_tilt(belt, state, step)
+        add_turn(state, step)
     state.time[0] += step
     _advance_layers(belt, state, stations, step)
     _advance_across(belt, state, stations, step)

@@ -27,6 +27,8 @@ STATES = CLAMPING_SUM + 1
 # Rows of a state
 W, U, V_ELEMENT, V_RING, V_FILTERED, N_ELEMENT, N_RING = range(7)
 FIELDS = names_from("W", globals())
+# One more where elements tilt: their angle against the rings, forwards with the outer end [rad]
+ELEMENT_TILT = len(FIELDS)
 
 # Scalars of a state: the time, the driven pulley's two, the work of the layers' dampers until it is read [J],
 # and from FIRST_STATE on STATES of the pulleys, which are 0 where a pulley does not have them

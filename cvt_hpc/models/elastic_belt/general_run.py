@@ -151,7 +151,7 @@ class GeneralTransient(Marched, OneLaneRun):
         """Record one state."""
         state = self._unpacked((self.done + 1) * self.interval, y)
         lane = self._state
-        put_lane(lane.fields.data, lane.scalars.data, 0, self.belt, state)
+        put_lane(lane.fields.data, lane.scalars.data, lane.tilt.data, 0, self.belt, state)
         lane.time[0] = (self.done + 1) * self.interval
         # a general stepper knows nothing of dampers: their work is taken from the state, as over the interval
         lane.scalars.data[0, lf.LAYER_WORK] = damper_power(self.belt, state) * self.interval

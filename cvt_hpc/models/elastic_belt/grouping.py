@@ -8,6 +8,7 @@ import numpy as np
 from cvt_hpc.models.elastic_belt import OWN_STEPPERS
 from cvt_hpc.models.elastic_belt.deflection_settings import MODE_KEYS, RITZ
 from cvt_hpc.models.elastic_belt.pulley_settings import are_free
+from cvt_hpc.models.elastic_belt.tilt_settings import elements_tilt
 from cvt_hpc.variator.measures import measures, rounded
 
 # Core-seconds per station and time step of a batch, measured on one core of an EPYC (Zen 5) at 160 stations.
@@ -105,4 +106,4 @@ def lane_key(parameters: Mapping[str, Any]) -> tuple:
     """
     alike = (parameters[key] for key in SHARED if key in parameters)
     common = parameters["friction_memory"] > 0.0, are_free(parameters), faded_coupling(parameters)
-    return (*alike, *common)
+    return (*alike, *common, elements_tilt(parameters))

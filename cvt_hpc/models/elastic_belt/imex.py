@@ -26,6 +26,13 @@ from cvt_hpc.models.elastic_belt.imex_stations import assemble
 from cvt_hpc.models.elastic_belt.imex_system import TURNS_BACK, eliminate, substitute
 from cvt_hpc.models.elastic_belt.lane_belt import LaneBelt, LaneState, Work
 from cvt_hpc.models.elastic_belt.lane_column import foresee_column, lane_column
+from cvt_hpc.models.elastic_belt.lane_tilt import (
+    add_turn,
+    carry_tilt,
+    follow_layers,
+    lane_tilt,
+    turn_elements,
+)
 from cvt_hpc.models.elastic_belt.pulley_step import advance_pulleys
 from cvt_hpc.physics.flank import flank_sliding
 
@@ -47,6 +54,9 @@ def step_imex(belt: LaneBelt, state: LaneState, work: Work, step: float) -> None
     """
     stations = work.stations
     forces.lane_sliding(belt, state, stations)
+    if belt.tilts:
+        carry_tilt(belt, state, step)
+        lane_tilt(belt, state, stations, step)
     assemble(belt, state, work, step, False)
     coupled = move_across(belt, state, work, step)
     if belt.has_column:
@@ -65,6 +75,10 @@ def step_imex(belt: LaneBelt, state: LaneState, work: Work, step: float) -> None
             if belt.has_column:
                 foresee_column(belt, state, stations, lf.PUSH, step)
     move_with_layers(belt, state, work, coupled)
+    if belt.tilts:
+        follow_layers(belt, state, stations)
+        turn_elements(belt, state, step)
+        add_turn(state, step)
     taken, moment = advance_belt(belt, state, work, step)
     advance_pulleys(belt, state, taken, moment, step)
     state.time[0] += step

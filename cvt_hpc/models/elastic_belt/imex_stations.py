@@ -17,6 +17,7 @@ from cvt_hpc.models.elastic_belt import lane_forces as forces
 from cvt_hpc.models.elastic_belt.imex_bending import DAMPED, LAG_SHARE
 from cvt_hpc.models.elastic_belt.lane_belt import LaneBelt, LaneState, Work
 from cvt_hpc.models.elastic_belt.lane_column import across_by_curvature, column_across
+from cvt_hpc.models.elastic_belt.lane_tilt import tilt_damping
 from cvt_hpc.physics.flank import flank_shares
 
 
@@ -99,6 +100,9 @@ def assemble(belt: LaneBelt, state: LaneState, work: Work, step: float, again: b
             if again:
                 # by the secant friction stops, and never turns the sliding about
                 stiff = select(stations[j, lf.RING_REVERSING] > 0.5, drag / stations[j, lf.SADDLE], stiff)
+            if belt.tilts:
+                yielding = tilt_damping(belt, step)
+                stiff *= yielding / (yielding + stiff)
 
             # with the slopes of friction along and across the sliding
             mu = coefficient * factor
@@ -125,6 +129,8 @@ def assemble(belt: LaneBelt, state: LaneState, work: Work, step: float, again: b
             outward = fma(upright, radial, fma(-lean, tangential, outward))
             push_along = fma(lean, radial, upright * tangential)
             stiff *= fma(stiff, per_stiff, 0.5)
+            if belt.tilts:
+                state.tilt[j, lf.DRAG_SLOPE] = select(belt.arc_curvature[j] > 0.0, stiff, zero)
             along_element += fma(-lever, drag, push_along)
             along_ring += drag
             element += fma(lever * lever, stiff, flank_slope)

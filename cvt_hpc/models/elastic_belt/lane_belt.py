@@ -42,7 +42,7 @@ class LaneBelt(NamedTuple):
         As in `Belt`, for a bending stiffness of 1 N m^2.
     bending_load, squared_curvature : (N,) arrays
         As in `Belt`, the load for a bending stiffness of 1 N m^2.
-    constants : (1, 58) LaneArray
+    constants : (1, 60) LaneArray
         CONSTANTS.
     places : two pairs of (m,) int arrays
         Row and part of the stations that the driving and the driven groove may hold.
@@ -58,8 +58,8 @@ class LaneBelt(NamedTuple):
         Whether some run's driving speed changes.
     is_free : bool
         Whether the pulleys have the states and laws of `pulleys.py`.
-    is_curved, has_column : bool
-        Whether curvature terms count, and whether pressed elements bear a bending moment.
+    is_curved, has_column, tilts : bool
+        Whether curvature terms count, pressed elements bear a bending moment, and elements tilt.
     """
 
     cell: np.ndarray
@@ -92,6 +92,7 @@ class LaneBelt(NamedTuple):
     is_free: bool
     is_curved: bool
     has_column: bool
+    tilts: bool
 
 
 class LaneState(NamedTuple):
@@ -110,6 +111,8 @@ class LaneState(NamedTuple):
         Driving and driven wrap.
     column : (N, 11) LaneArray
         Values of the column by `lane_fields`; without rows where elements bear no moment.
+    tilt : (N, 4) LaneArray
+        Values of the elements' tilt by `lane_fields`; without rows where they do not tilt.
     """
 
     fields: LaneArray
@@ -117,6 +120,7 @@ class LaneState(NamedTuple):
     time: np.ndarray
     contacts: tuple[Contact, Contact]
     column: LaneArray
+    tilt: LaneArray
 
 
 class Work(NamedTuple):
@@ -186,6 +190,7 @@ def lane_belt(belts: list[Belt], dtype: DTypeLike) -> LaneBelt:
         is_free=first.pulleys.are_free,
         is_curved=first.curvature_terms > 0,
         has_column=first.has_column,
+        tilts=first.tilts,
     )
 
 
@@ -231,15 +236,16 @@ def lane_state(belts: list[Belt], states: list[State], dtype: type) -> LaneState
         np.float64 or np.float32.
     """
     n, lanes = belts[0].cell.size, len(belts)
-    fields = LaneArray(n, states[0].fields.shape[0], lanes, dtype)
-    scalars = LaneArray(1, lf.SCALARS, lanes)
+    tilts = belts[0].tilts
+    fields = LaneArray(n, states[0].fields.shape[0] - tilts, lanes, dtype)
+    scalars, tilt = LaneArray(1, lf.SCALARS, lanes), LaneArray(n * tilts, lf.FIELDS_OF_TILT, lanes, dtype)
     for lane, (belt, state) in enumerate(zip(belts, states, strict=True)):
-        put_lane(fields.data, scalars.data, lane, belt, state)
+        put_lane(fields.data, scalars.data, tilt.data, lane, belt, state)
     wraps = [[belt.driving for belt in belts], [belt.driven for belt in belts]]
     contacts = (lane_contact(wraps[0], dtype), lane_contact(wraps[1], dtype))
     settle_discs(contacts, belts, states)
     column = LaneArray(n if belts[0].has_column else 0, lf.FIELDS_OF_COLUMN, lanes, dtype)
-    return LaneState(fields, scalars, np.array([states[0].scalars[0]]), contacts, column)
+    return LaneState(fields, scalars, np.array([states[0].scalars[0]]), contacts, column, tilt)
 
 
 def settle_discs(contacts: tuple[Contact, Contact], belts: list[Belt], states: list[State]) -> None:
@@ -265,8 +271,8 @@ def parts_of(stations: int, most: int) -> int:
 
 def parted_state(state: LaneState, parts: int) -> LaneState:
     """State of one run, its stations in linked parts; time and contacts remain those of `state`."""
-    linked = split(state.fields, parts), alike(state.scalars, parts), split(state.column, parts)
-    return state._replace(fields=linked[0], scalars=linked[1], column=linked[2])
+    fields, column, tilt = (split(array, parts) for array in (state.fields, state.column, state.tilt))
+    return state._replace(fields=fields, scalars=alike(state.scalars, parts), column=column, tilt=tilt)
 
 
 def parted(belt: LaneBelt, parts: int) -> LaneBelt:
@@ -303,9 +309,14 @@ def alike(array: LaneArray, parts: int) -> LaneArray:
     return linked
 
 
-def put_lane(fields: np.ndarray, scalars: np.ndarray, lane: int, belt: Belt, state: State) -> None:
+def put_lane(
+    fields: np.ndarray, scalars: np.ndarray, tilt: np.ndarray, lane: int, belt: Belt, state: State
+) -> None:
     """Write a run's state into its lane of a LaneState's data."""
     values = state.fields.copy()
+    if belt.tilts:
+        tilt[:, lf.ANGLE, lane] = values[f.ELEMENT_TILT]
+        values = values[: f.ELEMENT_TILT]
     belt_speed = speed_share_at(belt, state.scalars[f.TIME]) * belt.belt_speed
     values[f.V_ELEMENT] -= belt_speed
     values[f.V_RING] -= belt_speed
@@ -327,5 +338,7 @@ def take_lane(state: LaneState, lane: int, belt: Belt) -> State:
     values[len(f.FIELDS) : (len(values) + len(f.FIELDS)) // 2] += belt_speed
     values[f.N_ELEMENT] += 1.0
     values[f.N_RING] += 1.0 + belt.curvature * belt.ring_offset
+    if belt.tilts:
+        values = np.vstack([values, state.tilt.data[:, lf.ANGLE, lane].astype(float)])
     scalars = state.scalars.data[0, :, lane]
     return State(values, np.array([state.time[0], *scalars[: lf.LAYER_WORK + 1], *scalars[f.FIRST_STATE :]]))

@@ -10,7 +10,7 @@ RING_OFFSET, RING_FRICTION, RING_FRICTION_SPEED = range(11, 14)
 FRICTION_SPEED, KINETIC_FRICTION, FRICTION_GRADIENT, LAW_SPEED, SINE, COSINE, WEDGE = range(14, 21)
 FORGET, DRIVING_RADIUS, DRIVEN_RADIUS, DRIVING_SPEED = range(21, 25)
 DRIVING_POSITION, DRIVEN_INERTIA, AXIAL_DAMPING, THRUST, RATIO, LOAD, LOAD_START, START_SHARE = range(25, 33)
-COLUMN_STIFFNESS, OUTER_EDGE, INNER_EDGE, FIRST_LAW = range(33, 37)
+COLUMN_STIFFNESS, OUTER_EDGE, INNER_EDGE, TILT_SPRING, TILT_DAMPER, FIRST_LAW = range(33, 39)
 CONSTANTS = (*f.names_from("ELEMENT_STIFFNESS", globals())[:FIRST_LAW], *f.LAWS)
 
 # Scalars of the state, of each lane, double in any precision: the driven pulley's two, the work of the
@@ -26,6 +26,11 @@ SCALARS = f.FIRST_STATE + f.STATES
 DEVIATION, TURNING, COLUMN_MOMENT, PRESSED, GIVE, TURN_NEAR, TURN_FAR, SHIFT = range(8)
 BEARING_NEAR, BEARING_FAR, COLUMN_ENERGY = range(8, 11)
 FIELDS_OF_COLUMN = COLUMN_ENERGY + 1
+
+# Of elements that tilt, in `LaneState.tilt`: the angle [rad], friction of the saddle on the rings [N/m], its
+# slope with the sliding [N s/m^2], the rate of the angle of an element [rad/s].
+ANGLE, DRAG, DRAG_SLOPE, TURN = range(4)
+FIELDS_OF_TILT = TURN + 1
 
 # Of a state, by `derive`: axial line force, and the share of the cell behind it that is in contact; strains
 # of the cells, 1 / (1 + strain) and 1 / content. By `lane_sliding`: sliding speeds, the law's coefficient,

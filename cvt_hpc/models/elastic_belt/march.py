@@ -90,6 +90,7 @@ def gather(state: LaneState, stations: LaneArray, sampled: Sampled, fields: int)
     merge_parts(state.fields, sampled.state.fields, state.fields.data.shape[1])
     merge_parts(stations, sampled.stations, fields)
     merge_parts(state.column, sampled.state.column, state.column.data.shape[1])
+    merge_parts(state.tilt, sampled.state.tilt, state.tilt.data.shape[1])
     merge_parts(state.scalars, sampled.state.scalars, state.scalars.data.shape[1])
 
 

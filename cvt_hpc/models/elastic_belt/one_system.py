@@ -1,8 +1,8 @@
 """The elastic belt as one system of differential equations, y' = rates(t, y), for general integrators.
 
-Unknowns, in this order, for N stations: w, u, v_element, v_ring, n_element, n_ring (N each), the filtered
-speed of those stations that have a memory, the states of free pulleys where they are, the driven pulley's
-speed and position. Layers' speeds are counted
+Unknowns, in this order, for N stations: w, u, v_element, v_ring, n_element, n_ring (N each), the tilt of the
+elements where they tilt (N), the filtered speed of those stations that have a memory, the states of free
+pulleys where they are, the driven pulley's speed and position. Layers' speeds are counted
 from the nominal belt speed, contents from 1 and the pulley's speed from its nominal one, so that tolerances
 relative to an unknown mean its variation. Stations that no groove can hold have no memory, and without
 friction memory none has. Forces,
@@ -34,6 +34,7 @@ SIZES = {
     f.V_FILTERED: 0.1,
     f.N_ELEMENT: 1e-3,
     f.N_RING: 1e-3,
+    f.ELEMENT_TILT: 1e-2,
 }
 SIZE_OF_SPEED, SIZE_OF_POSITION = 1.0, 1e-4  # of a pulley [rad/s], [m]
 SIZE_OF_THRUST = 1e3  # [N]
@@ -59,7 +60,7 @@ class FlatBelt(NamedTuple):
         Origin from which the unknowns are counted.
     start : float
         Simulated time at t = 0 [s].
-    force, eps, rate, moments : (N,), (2, N), (7, N), (N,) arrays
+    force, eps, rate, moments : (N,), (2, N), (7 or 8, N), (N,) arrays
         Work space: axial line forces, or pulls, of `contact_forces`, strains, rates, moments on the driven
         pulley.
     """
@@ -93,17 +94,38 @@ def flat_belt(belt: Belt, start: float = 0.0) -> FlatBelt:
     rows = np.repeat([origins.get(row, 0.0) for row in ROWS], n)
     loose = f.FIRST_STATE + np.arange(f.STATES if belt.pulleys.are_free else 0)
     driven = [belt.driving_speed / belt.ratio, 0.0]
-    origin = np.concatenate([rows, np.zeros(remembering.size + loose.size), driven])
-    state = State(np.zeros((len(f.FIELDS), n)), np.zeros(f.SCALARS))
-    work = np.zeros(n), np.zeros((2, n)), np.zeros((len(f.FIELDS), n)), np.zeros(n)
+    origin = np.concatenate([rows, np.zeros(n * belt.tilts + remembering.size + loose.size), driven])
+    fields = np.zeros((len(f.FIELDS) + belt.tilts, n))
+    state = State(fields, np.zeros(f.SCALARS))
+    work = np.zeros(n), np.zeros((2, n)), np.zeros_like(fields), np.zeros(n)
     return FlatBelt(belt, state, rhs.fresh_contacts(belt), remembering, loose, origin, start, *work)
 
 
 def pack(flat: FlatBelt, state: State) -> np.ndarray:
     """Vector y of a state; its time is not part of it."""
-    rows, filtered = state.fields[list(ROWS)].ravel(), state.fields[f.V_FILTERED, flat.remembering]
-    scalars = state.scalars[[*flat.loose, f.DRIVEN_SPEED, f.DRIVEN_POSITION]]
-    return np.concatenate([rows, filtered, scalars]) - flat.origin
+    rows, scalars = (
+        state.fields[list(ROWS)].ravel(),
+        state.scalars[[*flat.loose, f.DRIVEN_SPEED, f.DRIVEN_POSITION]],
+    )
+    return np.concatenate([rows, carried(flat, state), scalars]) - flat.origin
+
+
+def carried(flat: FlatBelt, state: State) -> np.ndarray:
+    """Unknowns that the elements carry with them, after those of ROWS: tilt, and filtered speeds."""
+    filtered = state.fields[f.V_FILTERED, flat.remembering]
+    return np.concatenate([*state.fields[f.ELEMENT_TILT :], filtered]) if flat.belt.tilts else filtered
+
+
+def carried_places(flat: FlatBelt) -> dict[int, np.ndarray]:
+    """By row of the state the place in y of each station's unknown of `carried`, (N,); -1: it has none."""
+    n = flat.belt.cell.size
+    first = len(ROWS) * n
+    place = {f.V_FILTERED: np.full(n, -1)}
+    if flat.belt.tilts:
+        place[f.ELEMENT_TILT] = first + np.arange(n)
+        first += n
+    place[f.V_FILTERED][flat.remembering] = first + np.arange(flat.remembering.size)
+    return place
 
 
 @kernel
@@ -114,6 +136,10 @@ def unpack(flat: FlatBelt, t: float, y: np.ndarray) -> None:
         for j in range(n):
             fields[row, j] = origin[k * n + j] + y[k * n + j]
     first = len(ROWS) * n
+    if flat.belt.tilts:
+        for j in range(n):
+            fields[f.ELEMENT_TILT, j] = y[first + j]
+        first += n
     for k in range(flat.remembering.size):
         fields[f.V_FILTERED, flat.remembering[k]] = y[first + k]
     first += flat.remembering.size
@@ -221,6 +247,10 @@ def rates(flat: FlatBelt, t: float, y: np.ndarray, out: np.ndarray) -> bool:
         for j in range(n):
             out[k * n + j] = rate[ROWS[k], j]
     first = len(ROWS) * n
+    if belt.tilts:
+        for j in range(n):
+            out[first + j] = rate[f.ELEMENT_TILT, j]
+        first += n
     for k in range(flat.remembering.size):
         out[first + k] = rate[f.V_FILTERED, flat.remembering[k]]
     if flat.loose.size > 0:
@@ -243,9 +273,7 @@ def system(flat: FlatBelt) -> System:
     Of these u alone is the rate of an unknown.
     """
     is_velocity = np.arange(f.STATES) == f.EXCESS
-    moving = _by_row(
-        flat, {row: row in VELOCITIES for row in (*ROWS, f.V_FILTERED)}, is_velocity, True, False
-    )
+    moving = _by_row(flat, {row: row in VELOCITIES for row in SIZES}, is_velocity, True, False)
     n = flat.belt.cell.size
     position_of = np.full(moving.size, -1)
     position_of[n : 2 * n] = np.arange(n)
@@ -278,6 +306,7 @@ def sizes_of_states(belt: Belt) -> np.ndarray:
 
 def _by_row(flat: FlatBelt, values: dict[int, float], states: np.ndarray, *scalars: float) -> np.ndarray:
     """One value for each unknown, by its row of the state, or its place in STATES."""
-    rows = np.repeat([values[row] for row in ROWS], flat.belt.cell.size)
+    known = (*ROWS, f.ELEMENT_TILT) if flat.belt.tilts else ROWS
+    rows = np.repeat([values[row] for row in known], flat.belt.cell.size)
     loose = states[flat.loose - f.FIRST_STATE]
     return np.concatenate([rows, np.full(flat.remembering.size, values[f.V_FILTERED]), loose, scalars])

@@ -13,6 +13,7 @@ import cvt_hpc.models.elastic_belt.ring_settings as ring_settings
 from cvt_hpc.models.elastic_belt.bending_settings import BENDING, bending_inert, bending_problems
 from cvt_hpc.models.elastic_belt.pulley_checks import pulley_inert, pulley_problems, shaft_problems
 from cvt_hpc.models.elastic_belt.pulley_settings import DRIVEN_INERTIA, DRIVEN_SHAFT, PULLEYS, SHAFT
+from cvt_hpc.models.elastic_belt.tilt_settings import TILT, tilt_inert, tilt_problems
 from cvt_hpc.parameters import Notice, Parameter, not_negative, positive
 from cvt_hpc.physics.friction_laws import friction_inert, friction_problems
 from cvt_hpc.physics.geometry import variator, variator_problems
@@ -56,6 +57,7 @@ PARAMETERS: dict[str, dict[str, Parameter]] = {
             0.01, "m/s", "regularisation speed of that friction", sensible=(1e-05, 5.0)
         ),
         "transverse_damping": scene.TRANSVERSE_DAMPING,
+        **TILT,
         "element_damping": not_negative(
             20.0, "N s", "longitudinal damping of the pressed elements", sensible=(0.001, 100000.0)
         ),
@@ -198,7 +200,8 @@ def shape_problems(parameters: dict[str, Any]) -> list[tuple[str, str, str]]:
         problems += deflection_settings.deflection_problems(p) + ring_settings.stack_problems(
             p, min(path.driving_radius, path.driven_radius)
         )
-    return problems + shaft_problems(p) + bending_problems(p) + ring_settings.ring_problems(p)
+    problems += shaft_problems(p) + bending_problems(p) + ring_settings.ring_problems(p)
+    return problems + tilt_problems(p)
 
 
 def inert(parameters: dict[str, Any]) -> dict[str, str]:
@@ -234,5 +237,6 @@ def inert(parameters: dict[str, Any]) -> dict[str, str]:
         deflection_settings.deflection_inert,
         bending_inert,
         ring_settings.ring_inert,
+        tilt_inert,
     )
     return {key: why for part in parts for key, why in part(p).items()} | found

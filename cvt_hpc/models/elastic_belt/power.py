@@ -3,7 +3,7 @@
 The driving pulley's speed is prescribed, and its power is its moment times its momentary speed. In a steady
 state, on average over a vibration,
 
-    driving = load + thrust + losses,    losses = flanks + rings + belt + layers + lag + seating,
+    driving = load + thrust + losses,    losses = flanks + rings + belt + layers + lag + seating + tilt,
 
 and before that, or along a ramp, the difference goes into the stored energy; along a ramp of speed it is
 mostly the kinetic energy of the belt and of the driven pulley. The open part is the work of the numerics:
@@ -25,6 +25,7 @@ from cvt_hpc.models.elastic_belt import lane_forces as forces
 from cvt_hpc.models.elastic_belt import moments, power_terms
 from cvt_hpc.models.elastic_belt.lane_belt import LaneBelt, LaneState
 from cvt_hpc.models.elastic_belt.lane_column import curving
+from cvt_hpc.models.elastic_belt.lane_tilt import tilt_damping, tilted_saddle
 from cvt_hpc.models.elastic_belt.pulley_step import audit_pulleys, taken_by_clearance
 from cvt_hpc.physics.flank import flank_sliding
 from cvt_hpc.physics.friction import formula_coefficient, law_numbers, saturation, table_coefficient
@@ -82,7 +83,7 @@ def audit(
     opening_driven = like(scalars[0, lf.POSITION], zero)
     ring_relief = c[0, lf.RING_RELIEF] * speed_share * speed_share
     summed = profiles.rows > 0
-    driving = turned = driving_rub = driven_rub = ring_loss = belt_loss = seating = zero
+    driving = turned = driving_rub = driven_rub = ring_loss = belt_loss = seating = tilt_loss = zero
     stored = 0.5 * c[0, lf.DRIVEN_INERTIA] * turnings[1] * turnings[1]
     for j in range(n):
         a, b = j - 1 if j > 0 else n - 1, j + 1 if j < n - 1 else 0
@@ -127,6 +128,12 @@ def audit(
         v_element, across = fields[j, f.V_ELEMENT], -damping * v_across
         if summed:
             moments.add_speeds(profiles, j, v_across, u, v_element, fields[j, f.V_RING])
+        if belt.tilts:
+            angle = state.tilt[j, lf.ANGLE]
+            stored += (0.5 * dual) * c[0, lf.TILT_SPRING] * angle * angle
+            if belt.arc_curvature[j] == 0.0:
+                fading = c[0, lf.TILT_SPRING] * angle
+                tilt_loss += dual * fading * fading / c[0, lf.TILT_DAMPER]
         if belt.touches[j] == 0.0:
             if summed:
                 moments.add_forces(profiles, j, across, u, across * slope, v_element)
@@ -175,6 +182,9 @@ def audit(
         ring_left = ring_stiffness * stations[a, lf.EPS_1]
         pressure = forces.saddle_pressure(belt, j, ring_left, tension, ring_relief * longer)
         grip = c[0, lf.RING_FRICTION] * 0.5 * pressure
+        if belt.tilts and belt.arc_curvature[j] > 0.0:
+            free, saddle = saddle, tilted_saddle(belt, state, j, saddle, grip * belt.per_dual[j], 0.0)
+            tilt_loss += dual * tilt_damping(belt, 0.0) * (saddle - free) * (saddle - free)
         factor, _ = saturation(saddle, per_ring_width)
         drag = grip * factor
         ring_loss += drag * saddle
@@ -196,6 +206,7 @@ def audit(
     rows[k, first + power_terms.LAYER_LOSS] = scalars[0, lf.LAYER_WORK] / interval
     rows[k, first + power_terms.LAG_LOSS] = c[0, lf.AXIAL_DAMPING] * axial_speed * axial_speed
     rows[k, first + power_terms.SEATING_LOSS] = seating
+    rows[k, first + power_terms.TILT_LOSS] = tilt_loss
     rows[k, first + power_terms.STORED_ENERGY] = stored
     if state.contacts[0].has_clearance or state.contacts[1].has_clearance:
         rows[k, first + power_terms.STORED_ENERGY] = rows[

@@ -122,7 +122,7 @@ VARIABLES = (
     *shared("flank_loss", "thrust_ratio", "speed_loss", "driven_speed_ripple", "driving_power", "load_power"),
     *shared("thrust_power", "storing_power", "ring_loss", "belt_loss", "layer_loss"),
     power("lag_loss", "mean power of the driven sheave's lag"),
-    *shared("seating_loss", "loss", "efficiency", "power_residual"),
+    *shared("seating_loss", "tilt_loss", "loss", "efficiency", "power_residual"),
     Variable(
         "step_ripple",
         "m s-1",

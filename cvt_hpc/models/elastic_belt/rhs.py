@@ -10,6 +10,7 @@ outward):
     rings          m_1 (v_1,t + v_1 v_1,s) =  T,s + q
     transverse     m (w_tt + 2 v w_ts + v' w_s) = (F w_s),s - EI w_ssss - F kappa - d_b (w_t + v_0 w_s) + p_r
     memory         v_f,t + v v_f,s = (|v| - v_f) / tau_f in contact, v_f = |v| where that begins
+    tilt           d_a (th_t + v_0 th_s) = -k_a th - d_1 q, where elements tilt (`element_tilt.py`)
     pulleys        J omega_dn' = -sum f_t (r + w) - i M,   T_1 k z_dn' = sum f_ax - F_dn   (and `pulleys.py`)
 
 with q the friction of the rings on the elements' saddle, p_r, f_t the flanks' forces, |v| their sliding
@@ -35,6 +36,7 @@ from cvt_hpc.kernels import kernel, merged_kernel
 from cvt_hpc.models.elastic_belt import fields as f
 from cvt_hpc.models.elastic_belt.belt import Belt, State
 from cvt_hpc.models.elastic_belt.column import column_across, column_forces
+from cvt_hpc.models.elastic_belt.element_tilt import tilt_rate, tilted_sliding
 from cvt_hpc.physics import compliance
 from cvt_hpc.physics.compliance import Contact, plain_contact, solve_wrap
 from cvt_hpc.physics.flank import flank_forces, flank_sliding
@@ -139,12 +141,12 @@ def contact_forces(belt: Belt, state: State, contacts: tuple[Contact, Contact], 
 
 @merged_kernel
 def ring_drag(
-    belt: Belt, j: int, a: int, eps: np.ndarray, v_element: float, v_ring: float, share: float
+    belt: Belt, j: int, a: int, eps: np.ndarray, v_element: float, v_ring: float, share: float, tilt: float
 ) -> tuple[float, float]:
     """Friction of the elements' saddles on the rings at station j of an arc, between cells a and j.
 
     The rings press on the saddles with what their own weight leaves (Bullinger et al. 2005, eq. 48), at
-    `share` of the belt's nominal speed.
+    `share` of the belt's nominal speed. Where elements tilt, theirs is `tilt` [rad].
 
     Returns
     -------
@@ -152,11 +154,16 @@ def ring_drag(
         Line force on the rings [N/m] and the speed of the saddles against them [m/s].
     """
     sliding_speed = (1.0 + belt.ring_offset * belt.arc_curvature[j]) * v_element - v_ring
-    factor, _ = saturation(sliding_speed, 1.0 / belt.ring_friction_speed)
     relief = belt.ring_relief[j] * share * share
     pressure = max(belt.ring_stiffness * eps[1, j] - relief, 0.0) * belt.cell[j] * belt.curvature[j]
     pressure += max(belt.ring_stiffness * eps[1, a] - relief, 0.0) * belt.cell[a] * belt.curvature[a]
-    return 0.5 * pressure / belt.dual[j] * belt.ring_friction * factor, sliding_speed
+    grip, per_width = 0.5 * pressure / belt.dual[j] * belt.ring_friction, 1.0 / belt.ring_friction_speed
+    if belt.tilts:
+        lever = belt.ring_offset
+        held, damping = belt.tilt_spring * tilt / lever, belt.tilt_damper / (lever * lever)
+        sliding_speed = tilted_sliding(sliding_speed, held, grip, damping, per_width)
+    factor, _ = saturation(sliding_speed, per_width)
+    return grip * factor, sliding_speed
 
 
 @merged_kernel
@@ -183,7 +190,7 @@ def accelerations(
     eps : (2, N) array
         Strains of the cells.
     rate : (7, N) array
-        Rows U, V_ELEMENT and V_RING are set [m/s^2].
+        Rows U, V_ELEMENT and V_RING are set [m/s^2]; of elements that tilt (8, N), with ELEMENT_TILT [rad/s].
     moments : (N,) array
         Result: moments of the stations' flanks on the driven pulley, and, of those that the driving one
         holds, the torque that they take from it [N m].
@@ -250,11 +257,15 @@ def accelerations(
             outward += belt.upright[j] * radial - lean * tangential
             along_element += belt.upright[j] * tangential + lean * radial
             moments[j] = (1.0 - 2.0 * belt.on_driven[j]) * dual * tangential * radius
+        drag = 0.0
         if belt.arc_curvature[j] > 0.0:
-            drag, _ = ring_drag(belt, j, a, eps, v0[j], v1[j], speed_share)
+            tilt = state.fields[f.ELEMENT_TILT, j] if belt.tilts else 0.0
+            drag, _ = ring_drag(belt, j, a, eps, v0[j], v1[j], speed_share, tilt)
             along_ring += drag
             along_element -= (1.0 + belt.ring_offset * belt.arc_curvature[j]) * drag
         along_element += outward * slope
+        if belt.tilts:
+            rate[f.ELEMENT_TILT, j] = tilt_rate(belt, state, j, drag)
         rate[f.U, j] = (transverse + outward) / belt.mass
         along_element -= turning * belt.element_mass * v0[j] * u[j]
         along_ring -= turning * light * v1[j] * u[j]

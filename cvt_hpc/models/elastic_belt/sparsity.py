@@ -8,7 +8,7 @@ import numpy as np
 from scipy.sparse import csc_array
 
 from cvt_hpc.models.elastic_belt import fields as f
-from cvt_hpc.models.elastic_belt.one_system import ROWS, FlatBelt, rates, system
+from cvt_hpc.models.elastic_belt.one_system import ROWS, FlatBelt, carried_places, rates, system
 from cvt_hpc.steppers.system import RELATIVE_INCREMENT
 
 SPEED, OPENING = -1, -2  # of the driven pulley, beside the rows of the state
@@ -41,6 +41,12 @@ REACH = {
 # curvature, which turns motion along the belt into motion across it, and back
 OF_COLUMN = {f.U: {f.N_ELEMENT: (-2, 1)}, f.V_ELEMENT: {f.W: (-2, 2)}}
 OF_CURVATURE = {f.U: {f.V_RING: (0, 0)}, f.V_RING: {f.U: (0, 0)}}
+# With elements that tilt by the rings' friction, which acts on both layers
+OF_TILT = {
+    f.V_ELEMENT: {f.ELEMENT_TILT: (0, 0)},
+    f.V_RING: {f.ELEMENT_TILT: (0, 0)},
+    f.ELEMENT_TILT: REACH[f.V_RING] | {f.V_RING: (0, 0), f.ELEMENT_TILT: (-1, 0)},
+}
 # A station's flank forces and filtered speed: beyond the above they depend on the driven pulley, the filtered
 # speed where contact begins on sliding at the open station behind, and on where that is, by the forces
 ON_FLANK = {f.U: (-1, 0), f.V_ELEMENT: (-1, 0), f.W: (-2, 1), f.V_FILTERED: (-1, 0)}
@@ -51,8 +57,7 @@ def pattern(flat: FlatBelt) -> csc_array:
     belt = flat.belt
     n, count = belt.cell.size, flat.origin.size
     place = {row: k * n + np.arange(n) for k, row in enumerate(ROWS)}
-    place[f.V_FILTERED] = np.full(n, -1)
-    place[f.V_FILTERED][flat.remembering] = len(ROWS) * n + np.arange(flat.remembering.size)
+    place |= carried_places(flat)
     place[SPEED], place[OPENING] = np.array([count - 2]), np.array([count - 1])
     found = np.zeros((count, count), dtype=bool)
 
@@ -63,7 +68,7 @@ def pattern(flat: FlatBelt) -> csc_array:
             found[rows[known], columns[known]] = True
 
     more = [OF_COLUMN] * belt.has_column + [OF_CURVATURE] * (belt.curvature_terms > 0)
-    for reach in (REACH, *more):
+    for reach in (REACH, *more, *[OF_TILT] * belt.tilts):
         for row, reaches in reach.items():
             for unknown, (behind, ahead) in reaches.items():
                 mark(row, unknown, np.arange(n), range(behind, ahead + 1))

@@ -14,13 +14,17 @@ friction of the belt, the transverse damping, wedge angle and inertia, the law o
   scales its modes of opening, so a value other than 1 requires `stiffness_of` "sheave";
 - tilt opens a pulley by r^2 / c_tilt cos(phi) times the sum of F cos(phi), and likewise with sin, while modes
   open each flank by 1 / S: S = 2 c_tilt / r^2 of cos and sin. Nothing opens all around alike;
-- the thrust moves the driven sheave by 1 / (T_1 k) in opening, which is 2 tan d0 of radius: `sheave_rate`.
+- the thrust moves the driven sheave by 1 / (T_1 k) in opening, which is 2 tan d0 of radius: `sheave_rate`;
+- elements tilt against the rings by the same spring and damper. Of a continuum whose elements do not tilt, by
+  the pushbelt's default ones.
 
 Assumptions: the keys in ABSENT are left out: damping of the rings, bending (0.5 N m^2
 adds EI q^2 = 0.9 kN to the 5.7 kN that a strand of 148 mm has in its second mode at 120 N m), and the rings'
 length, since the pushbelt's rings fit the path at a strain of 1e-4; `README.md` has the effect of that.
-Elements have an inertia, a tilt and a second contact of which the continuum knows nothing: the pushbelt's own
-defaults.
+Elements have an inertia against tilting and a second contact of which the continuum knows nothing: the
+pushbelt's own defaults. The push adds P to its stiffness against tilting, k_a, and a moment P kappa t / 2, t
+being an element's thickness: (k_a + P) theta = -d (f_t - P_s) - P kappa t / 2 in a steady state, of which the
+continuum has k_a theta = -d (f_t - P_s).
 """
 
 from collections.abc import Callable, Mapping
@@ -33,6 +37,7 @@ from cvt_hpc.models.elastic_belt.deflection_settings import DEFLECTION
 from cvt_hpc.models.elastic_belt.pulley_settings import PULLEY_DEFAULTS
 from cvt_hpc.models.elastic_belt.ring_settings import RINGS
 from cvt_hpc.physics.sheaves import axial_element_stiffness
+from cvt_hpc.variator.scene import TILT
 
 RESOLVED = 7.5e-6  # [s]: damping over stiffness of contacts between elements, at least
 RIGID = 1e12  # [N/m]: of a mode that does not open; it gives way by 0.1 um under 100 kN
@@ -106,6 +111,10 @@ FOLLOWS = {
     ),
     "driven_modal_stiffness": Follows(
         ("tilt_stiffness", "tilt_factor", "driven_radius"), lambda p: _modes(p, p["driven_radius"])
+    ),
+    "tilt_spring": Follows(
+        ("tilt_spring",),
+        lambda p: p["tilt_spring"] if np.isfinite(p["tilt_spring"]) else TILT["tilt_spring"].default,
     ),
     "sheave_rate": Follows(
         ("sheave_lag", "lag_stiffness", "half_wedge_angle"),

@@ -139,18 +139,7 @@ PARAMETERS: dict[str, dict[str, Parameter]] = {
             5e-4, "m/s", "regularisation speed of that friction", sensible=(1e-06, 5.0)
         ),
         "transverse_damping": scene.TRANSVERSE_DAMPING,
-        "tilt_spring": not_negative(
-            3267.0,
-            "N",
-            "stiffness of the elements' tilt against the rings, moment by angle and length",
-            sensible=(1.0, 1e9),
-        ),
-        "tilt_damper": not_negative(
-            0.03267,
-            "N s",
-            "damping of the elements' tilt against the rings, moment by angular velocity and length",
-            sensible=(1e-6, 1e6),
-        ),
+        **scene.TILT,
     },
     "sheaves": {
         "sheave_stiffness": replace(

@@ -65,8 +65,7 @@ VARIABLES = (
         early=True,
     ),
     *shared("driven_speed_ripple", "driving_power", "load_power", "thrust_power"),
-    *shared("storing_power", "ring_loss", "belt_loss"),
-    power("tilt_loss", "mean power of the dampers of the elements' tilt"),
+    *shared("storing_power", "ring_loss", "belt_loss", "tilt_loss"),
     power("element_loss", "mean power of the dampers of contacts between elements, most of it of impacts"),
     *shared("loss"),
     power(

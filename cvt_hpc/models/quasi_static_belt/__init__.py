@@ -8,10 +8,13 @@ from cvt_hpc.models import elastic_belt
 from cvt_hpc.models.elastic_belt import check, inert
 from cvt_hpc.parameters import Parameter
 from cvt_hpc.steppers import taken
+from cvt_hpc.variator.scene import TILT
 
-# elements without a moment, no curvature terms, and the rings as one
+# elements without moment and tilt, no curvature terms, and the rings as one
 PARAMETERS = {
-    table: keys for table, keys in elastic_belt.PARAMETERS.items() if table not in ("bending", "rings")
+    table: {key: parameter for key, parameter in keys.items() if key not in TILT}
+    for table, keys in elastic_belt.PARAMETERS.items()
+    if table not in ("bending", "rings")
 } | {
     "limit": {
         "limit_frequency": Parameter(

@@ -149,7 +149,7 @@ class SplitRun(OneLaneRun):
     def _record(self) -> Outcome:
         """Record the present state."""
         lane, state = self._state, self._motion.state
-        put_lane(lane.fields.data, lane.scalars.data, 0, self.belt, state)
+        put_lane(lane.fields.data, lane.scalars.data, lane.tilt.data, 0, self.belt, state)
         lane.time[0] = state.scalars[0]
         lane.scalars.data[0, lf.LAYER_WORK] = state.scalars[f.LAYER_WORK]
         state.scalars[f.LAYER_WORK] = 0.0

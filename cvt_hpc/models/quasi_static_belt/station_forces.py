@@ -83,7 +83,7 @@ def put_slopes(model: SplitBelt, moved: Motion, work: Work) -> None:
             stations[q.RADIAL_SPEED, j], stations[q.TANGENTIAL_SPEED, j] = v_radial, v_tangential
         if belt.arc_curvature[j] > 0.0:
             lever = 1.0 + belt.ring_offset * belt.arc_curvature[j]
-            drag, saddle = rhs.ring_drag(belt, j, a, eps, v0[j], v1[j], speed_share)
+            drag, saddle = rhs.ring_drag(belt, j, a, eps, v0[j], v1[j], speed_share, 0.0)
             grip, _ = saturation(saddle, 1.0 / belt.ring_friction_speed)
             if stations[q.RING_REVERSING, j] > 0.5:
                 stiff = drag / saddle

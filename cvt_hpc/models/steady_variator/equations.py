@@ -2,8 +2,8 @@
 
 Nothing changes at any place: u = 0, and each layer's flux v_i / (1 + eps_i) = Q_i is the same everywhere,
 which makes its content balance exact. Unknown are, for N stations, w, the strains eps_0 and eps_1 of the
-cells (N each), the filtered sliding speeds, and Q_0, Q_1, the driven pulley's speed and its axial position;
-speeds and contents follow:
+cells (N each), what elements carry with them (tilt, where they tilt, and filtered sliding speeds), and Q_0,
+Q_1, the driven pulley's speed and its axial position; speeds and contents follow:
 
     v_i = Q_i (1 + eps_i),   n_i = (1 + kappa (w + d_i)) / (1 + eps_i).
 
@@ -27,7 +27,15 @@ from scipy.sparse import csc_array, csr_array, vstack
 
 from cvt_hpc.models.elastic_belt import fields as f
 from cvt_hpc.models.elastic_belt.belt import Belt, State, initial_state
-from cvt_hpc.models.elastic_belt.one_system import ROWS, flat_belt, rates, sizes_of_states, unpack
+from cvt_hpc.models.elastic_belt.one_system import (
+    ROWS,
+    carried,
+    flat_belt,
+    rates,
+    sizes_of_states,
+    unpack,
+)
+from cvt_hpc.models.elastic_belt.one_system import SIZES as SIZES_OF_ROWS
 from cvt_hpc.models.elastic_belt.pulleys import moving_states
 from cvt_hpc.models.elastic_belt.rhs import strains
 from cvt_hpc.models.steady_variator.linearised import Linearisation
@@ -65,23 +73,25 @@ class Equations:
         self._linearise = Linearisation(self._flat)
         first = initial_state(parameters, belt)
         self._contents = first.fields[f.N_ELEMENT : f.N_ELEMENT + 2] @ belt.cell
-        n, self._memories = belt.cell.size, self._flat.remembering.size
+        n, tilts = belt.cell.size, belt.cell.size * belt.tilts
+        self._memories = tilts + self._flat.remembering.size
         self._moving = moving_states(belt.pulleys)
-        # the filtered speeds end here, then come the pulleys' states and four scalars
-        self._filtered = slice(3 * n, 3 * n + self._memories)
-        self._states = slice(self._filtered.stop, self._filtered.stop + self._moving.size)
+        # tilt and filtered speeds end here, then come the pulleys' states and four scalars
+        self._carried = slice(3 * n, 3 * n + self._memories)
+        self._states = slice(self._carried.stop, self._carried.stop + self._moving.size)
         counts = (n, n, n, self._memories)
         of_states = sizes_of_states(belt)[self._moving]
         self.sizes = np.concatenate([np.repeat(SIZES, counts), of_states, SIZES_OF_SCALARS])
         length, speed = belt.measures.length, belt.measures.length / belt.measures.time
         self.sizes[:n] *= length
-        self.sizes[self._filtered] *= speed
+        self.sizes[3 * n : 3 * n + tilts] = SIZES_OF_ROWS[f.ELEMENT_TILT]
+        self.sizes[3 * n + tilts : self._carried.stop] *= speed
         self.sizes[-4:] *= speed, speed, 1.0 / belt.measures.time, length
         # of the rates: those of u, v_element and v_ring, of the filtered speeds and of the pulleys
         self._loose = len(ROWS) * n + self._memories + self._moving
         last = self._flat.origin.size
-        filtered = np.arange(len(ROWS) * n, len(ROWS) * n + self._memories)
-        self._rates = np.concatenate([np.arange(n, 4 * n), filtered, self._loose, [last - 2, last - 1]])
+        kept = np.arange(len(ROWS) * n, len(ROWS) * n + self._memories)
+        self._rates = np.concatenate([np.arange(n, 4 * n), kept, self._loose, [last - 2, last - 1]])
         self._held_speed = first.scalars[f.DRIVEN_SPEED] if np.isinf(belt.driven_inertia) else None
         self._out = np.empty(last)
 
@@ -96,10 +106,9 @@ class Equations:
         eps = np.empty((2, n))
         strains(self.belt, state.fields, eps)
         fluxes = (state.fields[f.V_ELEMENT : f.V_ELEMENT + 2] / (1.0 + np.roll(eps, 1, axis=1))).mean(axis=1)
-        filtered = state.fields[f.V_FILTERED, self._flat.remembering]
         states = state.scalars[f.FIRST_STATE + self._moving]
         pulley = state.scalars[[f.DRIVEN_SPEED, f.DRIVEN_POSITION]]
-        return np.concatenate([state.fields[f.W], *eps, filtered, states, fluxes, pulley])
+        return np.concatenate([state.fields[f.W], *eps, carried(self._flat, state), states, fluxes, pulley])
 
     def state(self, x: np.ndarray) -> State:
         """State of the belt; a copy, its time after any start-up."""
@@ -147,7 +156,7 @@ class Equations:
         contents = self._lengths(w) / (1.0 + np.array(eps))
         states = np.zeros(self._flat.loose.size)
         states[self._moving] = x[self._states]
-        y = np.concatenate([w, np.zeros(n), *speeds, *contents, x[self._filtered], states, x[-2:]])
+        y = np.concatenate([w, np.zeros(n), *speeds, *contents, x[self._carried], states, x[-2:]])
         return y - self._flat.origin
 
     def _chain(self, x: np.ndarray) -> csr_array:

@@ -23,7 +23,7 @@ from cvt_hpc.variator.variables import Means
 if TYPE_CHECKING:
     import xarray as xr
 
-LOSSES = ("driving_flank_loss", "driven_flank_loss", "ring_loss", "belt_loss", "seating_loss")
+LOSSES = ("driving_flank_loss", "driven_flank_loss", "ring_loss", "belt_loss", "seating_loss", "tilt_loss")
 
 
 class Distributions(NamedTuple):

@@ -18,12 +18,11 @@ from cvt_hpc.physics.sheaves import flexibility
 
 REACH = 2  # stations to either side that a rate knows of
 STRIDE = 2 * REACH + 1
-FORCE = MOMENT = len(f.FIELDS)  # beside the fields: among the acting quantities, and among those acted on
+FORCE = MOMENT = -1  # after the fields: among the acting quantities, and among those acted on
 SIZE_OF_FORCE = 1e5  # [N/m]
 # Relative to the sizes, for central differences: the third derivative's part is 1e-12 of a slope, round-off
 # 1e-10 of the steepest slopes.
 INCREMENT = 1e-6
-INCREMENTS = INCREMENT * np.array([*(one.SIZES[row] for row in range(len(f.FIELDS))), SIZE_OF_FORCE])
 SIZES_OF_PULL = np.array([100.0, 100.0, *[1e4] * 6])  # of `pulled_by` [N m], [N]
 
 
@@ -35,22 +34,22 @@ def local_slopes(flat: one.FlatBelt, increments: np.ndarray, near: np.ndarray, t
     ----------
     flat : FlatBelt
         The belt and its state, left as they are.
-    increments : (8,) array
-        Of the fields and the axial force.
-    near : (8, 8, N, 5) array
+    increments : (K,) array
+        Of the fields and the axial force: 8, or 9 where elements tilt.
+    near : (K, K, N, 5) array
         Result: slope of rate o (of the fields; the moment on the driven pulley) at station j + d - 2 with
         unknown i (the fields; the axial force) at station j, in [o, i, j, d].
-    turning : (8, N) array
+    turning : (K, N) array
         Result: slopes of rates and moments with the driven pulley's speed.
     """
-    n, fields = flat.belt.cell.size, flat.state.fields
+    n, fields, count = flat.belt.cell.size, flat.state.fields, increments.size
     origin, force = fields.copy(), flat.force.copy()
-    ahead, behind = np.zeros((8, n)), np.zeros((8, n))
+    ahead, behind = np.zeros((count, n)), np.zeros((count, n))
     # around the ring in strides of five stations, but the first n % 5 of six
     longer = n % STRIDE * (STRIDE + 1)
     groups = np.array([j % (STRIDE + 1) if j < longer else (j - longer) % STRIDE for j in range(n)])
-    for i in range(8):
-        moved, unmoved = (flat.force, force) if i == FORCE else (fields[i], origin[i])
+    for i in range(count):
+        moved, unmoved = (flat.force, force) if i == count - 1 else (fields[i], origin[i])
         for group in range(STRIDE + (longer > 0)):
             chosen = np.flatnonzero(groups == group)
             for sign, out in ((1.0, ahead), (-1.0, behind)):
@@ -62,14 +61,14 @@ def local_slopes(flat: one.FlatBelt, increments: np.ndarray, near: np.ndarray, t
             for j in chosen:
                 for d in range(STRIDE):
                     k = (j + d - REACH) % n
-                    for o in range(8):
+                    for o in range(count):
                         near[o, i, j, d] = (ahead[o, k] - behind[o, k]) / (2.0 * increments[i])
     slopes_with_scalar(flat, f.DRIVEN_SPEED, one.SIZE_OF_SPEED, turning)
 
 
 @kernel
 def slopes_with_scalar(flat: one.FlatBelt, place: int, size: float, slopes: np.ndarray) -> None:
-    """Slopes of all rates and moments with one of the state's scalars, forces held, into `slopes` (8, N)."""
+    """Slopes of all rates and moments with one of the state's scalars, forces held, into `slopes` (K, N)."""
     ahead, behind = np.zeros(slopes.shape), np.zeros(slopes.shape)
     scalars = flat.state.scalars
     unmoved = scalars[place]
@@ -123,14 +122,18 @@ class Linearisation:
         belt = flat.belt
         n, self._count = belt.cell.size, flat.origin.size
         self._arcs = [belt.driving_stations, belt.driven_stations]
-        place = np.full((len(f.FIELDS) + 1, n), -1)
+        fields = len(flat.state.fields)
+        sizes = [*(one.SIZES[row] for row in range(fields)), SIZE_OF_FORCE]
+        self._increments = INCREMENT * np.array(sizes)
+        place = np.full((fields + 1, n), -1)
         for k, row in enumerate(one.ROWS):
             place[row] = k * n + np.arange(n)
-        place[f.V_FILTERED, flat.remembering] = len(one.ROWS) * n + np.arange(flat.remembering.size)
+        for row, places in one.carried_places(flat).items():
+            place[row] = places
         unknown = place.copy()
         unknown[FORCE, np.concatenate(self._arcs)] = self._count + np.arange(sum(map(len, self._arcs)))
-        o, i, j, d = np.indices((8, 8, n, STRIDE))
-        self._loose = len(one.ROWS) * n + flat.remembering.size + np.arange(flat.loose.size)
+        o, i, j, d = np.indices((fields + 1, fields + 1, n, STRIDE))
+        self._loose = self._count - 2 - flat.loose.size + np.arange(flat.loose.size)
         place[MOMENT] = self._count - 2
         if flat.loose.size:  # torque taken from the driving pulley, and put into the driven one
             place[MOMENT] = self._count + belt.on_driven.astype(int)
@@ -141,12 +144,12 @@ class Linearisation:
         self._turned = place >= 0
         self._turned_rows = place[self._turned]
         self._flexibility = [flexibility(belt.driving), flexibility(belt.driven)]
-        self._near, self._turning = np.zeros(o.shape), np.zeros((8, n))
+        self._near, self._turning = np.zeros(o.shape), np.zeros((fields + 1, n))
 
     def __call__(self, flat: one.FlatBelt) -> csc_array:
         """Jacobian of `flat.rates`, (n, n), about the state of its last call."""
         belt, count, n = flat.belt, self._count, flat.belt.cell.size
-        local_slopes(flat, INCREMENTS, self._near, self._turning)
+        local_slopes(flat, self._increments, self._near, self._turning)
         if self._loose.size:
             return self._of_free_pulleys(flat)
         self._near[MOMENT] /= belt.driven_inertia
@@ -172,7 +175,7 @@ class Linearisation:
     def _of_free_pulleys(self, flat: one.FlatBelt) -> csc_array:
         """Jacobian where pulleys have states of their own."""
         belt, count, n = flat.belt, self._count, flat.belt.cell.size
-        excess = np.zeros((8, n))
+        excess = np.zeros_like(self._turning)
         slopes_with_scalar(flat, f.FIRST_STATE + f.EXCESS, one.SIZE_OF_SPEED, excess)
         width, stations = count + sum(map(len, self._arcs)), np.arange(n)
         entries = [
