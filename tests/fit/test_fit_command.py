@@ -148,7 +148,7 @@ def test_conflicts_are_pairs_that_nobody_meets_together(job):
 
 def test_sensitivities_are_those_of_the_law(job, tmp_path):
     """Within 30 % of the set the frequency follows from the gradient alone, and the window from the mass."""
-    fit = load_fit(job, ["fit.samples=64", "fit.nearby=0.3"])
+    fit = load_fit(job, ["fit.samples=32", "fit.nearby=0.3"])
     indices = sensitivities(fit, Evaluation(fit, tmp_path / "out"), "around", np.array([0.25, -1.44]))
     found = {(index.score, index.parameter): index for index in indices}
     for score, decides, other in (
