@@ -1,6 +1,5 @@
 """Which machine code is kept, what tells it apart, where it lies; and what is told while it is compiled."""
 
-import ast
 import cProfile
 import enum
 import gc
@@ -183,19 +182,6 @@ def test_every_kernel_of_the_package_can_be_told_apart():
     for each in found.values():
         # with contraction allowed the bits would depend on which kernels are merged
         assert not each.targetoptions.get("fastmath") and not each.targetoptions.get("parallel")
-
-
-def test_no_kernel_assigns_an_array_to_a_slice():
-    """Compiling the message of its error takes some 5 s of a core; `solvers.arrays.copy` has none."""
-    for path in PACKAGE.rglob("*.py"):
-        for function in ast.walk(ast.parse(path.read_text())):
-            if "kernel" not in map(ast.unparse, getattr(function, "decorator_list", ())):
-                continue
-            for node in ast.walk(function):
-                if isinstance(node, (ast.Assign, ast.AugAssign)) and not isinstance(node.value, ast.Constant):
-                    targets = getattr(node, "targets", None) or [node.target]
-                    parts = [part for target in targets for part in ast.walk(target)]
-                    assert not any(isinstance(part, ast.Slice) for part in parts), f"{path}:{node.lineno}"
 
 
 def test_what_has_taught_the_compiler_counts_and_what_it_has_loaded_itself_does_not(monkeypatch):
