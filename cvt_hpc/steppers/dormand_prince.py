@@ -13,6 +13,7 @@ from typing import NamedTuple
 import numpy as np
 
 from cvt_hpc.kernels import kernel
+from cvt_hpc.solvers.arrays import copy
 from cvt_hpc.steppers import facts
 from cvt_hpc.steppers.settings import MOST_STEPS, TOLERANCE, Tolerance, tolerance
 from cvt_hpc.steppers.system import System, all_finite, size
@@ -120,8 +121,8 @@ def _sample(
         proposed = step * min(max(factor, LEAST_FACTOR), LARGEST_FACTOR)
         work.memory[0] = max(proposed, work.memory[0]) if step == left else proposed
         work.memory[1] = error
-        y[:] = work.stage
-        work.rates[0] = work.rates[STAGES - 1]
+        copy(work.stage, y)
+        copy(work.rates[STAGES - 1], work.rates[0])
         if step == left:
             clock[0] = end
             return facts.OK
@@ -153,5 +154,5 @@ def march(
         outcome = _sample(system, control, clock[0] + interval, clock, y, work, counts)
         if outcome != facts.OK:
             return outcome
-        rows[k] = y
+        copy(y, rows[k])
     return facts.OK

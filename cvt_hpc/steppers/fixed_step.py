@@ -5,6 +5,7 @@ from typing import Any
 import numpy as np
 
 from cvt_hpc.kernels import kernel
+from cvt_hpc.solvers.arrays import copy
 from cvt_hpc.steppers.facts import NOT_FINITE, OK, STEPS
 from cvt_hpc.steppers.system import all_finite
 
@@ -48,5 +49,5 @@ def march_in_equal_steps(
                 clock[0] = start + i * step
                 return outcome
         clock[0] = start + interval
-        rows[k] = y
+        copy(y, rows[k])
     return OK

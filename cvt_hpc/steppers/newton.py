@@ -23,6 +23,7 @@ from typing import NamedTuple
 import numpy as np
 
 from cvt_hpc.kernels import kernel
+from cvt_hpc.solvers.arrays import copy
 from cvt_hpc.steppers import facts
 from cvt_hpc.steppers.system import System, all_finite, jacobian, size
 
@@ -80,7 +81,9 @@ def _invert(frozen: Frozen, position_of: np.ndarray, shift: float, counts: np.nd
     sign, logarithm = np.linalg.slogdet(frozen.inverse)
     if sign == 0.0 or not np.isfinite(logarithm):
         return facts.SINGULAR
-    frozen.inverse[:] = np.linalg.inv(frozen.inverse)
+    inverse = np.linalg.inv(frozen.inverse)
+    for i in range(n):
+        copy(inverse[i], frozen.inverse[i])
     frozen.memory[SHIFT], frozen.memory[SIGN] = shift, sign
     for i in range(n):
         if position_of[i] >= 0:
@@ -217,12 +220,13 @@ def solve_stage(
         if _rates(system, frozen, t, frozen.trial, counts):
             next_left = _correct(system, frozen, base, shift, frozen.trial, frozen.next_correction, counts)
         if share == 1.0 and next_left <= tolerance:
-            z[:] = frozen.trial + frozen.next_correction
+            for i in range(z.size):
+                z[i] = frozen.trial[i] + frozen.next_correction[i]
             return facts.OK if frozen.memory[SIGN] > 0.0 else facts.NOT_UNIQUE
         reduction = next_left / left
         if reduction <= (ENOUGH if share == 1.0 else 1.0 - 0.5 * share):
-            z[:] = frozen.trial
-            frozen.correction[:] = frozen.next_correction
+            copy(frozen.trial, z)
+            copy(frozen.next_correction, frozen.correction)
             left, share, near, far, fresh = next_left, 1.0, 0.0, 1.0, False
             # a new Jacobian costs n evaluations: less than as many passes
             begin = left * reduction ** (z.size + 2) > tolerance

@@ -22,6 +22,7 @@ from typing import NamedTuple
 import numpy as np
 
 from cvt_hpc.kernels import kernel
+from cvt_hpc.solvers.arrays import copy
 from cvt_hpc.steppers.facts import NO_VALUE, NOT_UNIQUE, OK, RATES, REJECTED, SOLVES, Facts
 from cvt_hpc.steppers.fixed_step import march_in_equal_steps
 from cvt_hpc.steppers.newton import SHIFT, SIGN, Frozen, frozen, renew
@@ -70,7 +71,7 @@ def _matrix(
     frozen, outcome = work.frozen, OK
     anew = anew or frozen.memory[SIGN] == 0.0
     if anew or frozen.memory[SHIFT] != shift:
-        frozen.rates[:] = work.first
+        copy(work.first, frozen.rates)
         outcome = renew(system, frozen, t, y, shift, anew, counts)
     return NOT_UNIQUE if outcome == OK and frozen.memory[SIGN] < 0.0 else outcome
 

@@ -17,6 +17,7 @@ from typing import NamedTuple
 import numpy as np
 
 from cvt_hpc.kernels import kernel
+from cvt_hpc.solvers.arrays import copy
 from cvt_hpc.steppers.facts import OK, Facts
 from cvt_hpc.steppers.fixed_step import march_in_equal_steps
 from cvt_hpc.steppers.newton import Frozen, frozen, solve_stage
@@ -74,9 +75,9 @@ def _advance(
     work: Work,
     counts: np.ndarray,
 ) -> int:
-    work.start[:] = y
+    copy(y, work.start)
     for s in range(3):
-        work.base[:] = work.start
+        copy(work.start, work.base)
         for r in range(s):
             for i in range(y.size):
                 work.base[i] += step * WEIGHTS[s, r] * work.rates[r, i]

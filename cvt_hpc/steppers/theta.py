@@ -13,6 +13,7 @@ import numpy as np
 
 from cvt_hpc.kernels import kernel
 from cvt_hpc.parameters import Parameter
+from cvt_hpc.solvers.arrays import copy
 from cvt_hpc.steppers.facts import NO_VALUE, RATES, Facts
 from cvt_hpc.steppers.fixed_step import march_in_equal_steps
 from cvt_hpc.steppers.newton import Frozen, frozen, solve_stage
@@ -71,7 +72,7 @@ def work(system: System) -> Work:
 def _advance(
     system: System, control: Control, step: float, t: float, y: np.ndarray, work: Work, counts: np.ndarray
 ) -> int:
-    work.base[:] = y
+    copy(y, work.base)
     if control.theta < 1.0:
         counts[RATES] += 1
         if not system.rates(system.constants, t, y, work.rates):

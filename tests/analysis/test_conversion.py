@@ -151,7 +151,7 @@ def test_verbs_read_what_xarray_has_made_of_a_dataset(way, path, said, tmp_path,
             other = getattr(expected.cvt, verb)()
             found = standard(getattr(dataset.cvt, verb)().to_dataset(name="found"))["found"]
             np.testing.assert_allclose(found.transpose(*other.dims), other, rtol=1e-6)
-        if way != "rearranged":
+        if way not in ("opened", "rearranged"):
             assert words_of(dataset.cvt.report(tmp_path / "report.html")) == said
 
 

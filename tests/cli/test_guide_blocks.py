@@ -52,12 +52,12 @@ CHECKED_MODELS = {"beam_pushbelt"}
 SMALL = {"duration": 0.04, "longest_duration": 0.04, "rise_time": 0.01}
 SHORT = {"duration": 0.022, "longest_duration": 0.022, "rise_time": 0.008, "band_low": 500.0}
 SMALL_OF = {
-    "belt_drive": {"duration": 0.26, "longest_duration": 0.26, "elements": 104},
+    "belt_drive": {"duration": 0.14, "longest_duration": 0.14, "elements": 104, "band_low": 80.0},
     "elastic_belt": {"stations": 64},
     "explicit": SHORT,
     "pushbelt": SHORT | {"elements": 104, "band_high": 600.0},
     "quasi_static_belt": SHORT,
-    "ramps": {"duration": 0.6, "longest_duration": 0.6},
+    "ramps": {"duration": 0.3, "longest_duration": 0.3},
     "spatial_pushbelt": SHORT | {"elements": 104, "band_high": 600.0},
     "steady_variator": {"stations": 64},
     "linear_stability": {"stations": 64},

@@ -29,7 +29,7 @@ friction_gradient = { from = "-2000 s/km", to = "-500 s/km" }
 [fit]
 screened = 16
 population = 10
-generations = 9
+generations = 6
 every = 2
 confirmed = 2
 distances = [0.5, 0.97, 1.03, 4.0]
@@ -116,7 +116,7 @@ def test_it_finds_the_set_that_is_known(job, window, capsys, tmp_path):
     _, confirmed = read(tmp_path / "out" / "x" / "confirmed.csv")
     assert [row["found_in"] for row in confirmed][-1] == "start 1"  # run in full, too, and worse
     _, candidates = read(tmp_path / "out" / "x" / "candidates.csv")
-    assert len(candidates) <= 1 + 16 + 9 * 10
+    assert len(candidates) <= 1 + 16 + 6 * 10
     assert {row["stage"] for row in candidates} >= {"screening", "generation_001"}
     best = max(float(row["score"]) for row in candidates)
     assert best > max(float(row["score"]) for row in candidates if row["stage"] == "screening")
@@ -149,7 +149,7 @@ def test_conflicts_are_pairs_that_nobody_meets_together(job):
 
 def test_sensitivities_are_those_of_the_law(job, tmp_path):
     """Within 30 % of the set the frequency follows from the gradient alone, and the window from the mass."""
-    fit = load(job, ["fit.samples=64", "fit.nearby=0.3"])
+    fit = load(job, ["fit.samples=32", "fit.nearby=0.3"])
     indices = sensitivities(fit, Evaluation(fit, tmp_path / "out"), "around", np.array([0.25, -1.44]))
     found = {(index.score, index.parameter): index for index in indices}
     for score, decides, other in (
@@ -234,8 +234,8 @@ def test_check_tells_targets_and_cost(job, capsys):
     assert main(["check", "x.toml"]) == 0
     out = capsys.readouterr().out
     assert "2 free parameters, 7 targets" in out and "noise from 100 to 125 N m, said somebody" in out
-    # 107 candidates x 4 cases x 21 loads of 2 core-seconds
-    assert "8988 runs" in out and "4.99 core-hours" in out
+    # 77 candidates x 4 cases x 21 loads of 2 core-seconds
+    assert "6468 runs" in out and "3.59 core-hours" in out
     assert main(["run", "x.toml"]) == 2
     assert "[fit]: expected a job of runs, found one for `cvt-hpc fit`" in capsys.readouterr().err
 
@@ -269,7 +269,7 @@ def test_check_tells_targets_and_cost(job, capsys):
         ("coarse = { stations = 40 }", "coarse = { station = 40 }", "[fit] coarse station: unknown key; did you mean stations in [mesh]?"),
         ("coarse = { stations = 40 }", "coarse = { stations = [40, 50] }", "[fit] coarse stations: expected one value, found an axis"),
         ("counted = { slip_margin", "counted = { slip_margn", "[fit] counted slip_margn: unknown quantity of a run; did you mean slip_margin?"),
-        ("generations = 9", "generation = 9", "[fit] generation: unknown key; did you mean generations?"),
+        ("generations = 6", "generation = 6", "[fit] generation: unknown key; did you mean generations?"),
         ("repeat = { stations = [80, 160] }", "repeat = { stations = 80 }", "[fit] repeat stations: expected a list"),
     ],
 )  # fmt: skip

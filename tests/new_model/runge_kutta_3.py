@@ -9,6 +9,7 @@ from typing import NamedTuple
 import numpy as np
 
 from cvt_hpc.kernels import kernel
+from cvt_hpc.solvers.arrays import copy
 from cvt_hpc.steppers.facts import RATES, Facts, Result
 from cvt_hpc.steppers.fixed_step import march_in_equal_steps
 from cvt_hpc.steppers.settings import STEP, fixed_step
@@ -48,7 +49,7 @@ def _advance(system, control, step, t, y, work, counts):
     counts[RATES] += 3
     if not system.rates(system.constants, t, y, work.first):
         return NO_VALUE
-    work.rates[:] = work.first
+    copy(work.first, work.rates)
     for share in (1.0 / 3.0, 2.0 / 3.0):
         for i in range(y.size):
             work.stage[i] = y[i] + share * step * work.rates[i]

@@ -13,7 +13,7 @@ from cvt_hpc.variables import Status
 from support.lone import Transient
 from support.marched import CHEAP, job
 
-SAMPLES = 30
+SAMPLES = 15
 
 
 @cache

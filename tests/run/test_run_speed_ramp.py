@@ -22,6 +22,11 @@ def ramp(start, end):
 ENDS = [(1000 * RPM, 3000 * RPM), (5000 * RPM, 3000 * RPM)]
 SPEEDS = [1500 * RPM, 3000 * RPM, 4500 * RPM]
 CONSTANT = Together(*(COARSE | {"driving_speed": speed, "duration": 0.2} for speed in SPEEDS))
+CHANGING = Together(*(COARSE | {"stations": 96} | ramp(*ends) for ends in ENDS))
+INSIDE, OUTSIDE = (2000.0, 3400.0), (1900.0, 3500.0)  # [rpm]
+UP, DOWN = (ramp(start * RPM, end * RPM) | {"duration": 1.0} for start, end in ((1500, 4500), (4500, 1500)))
+BESIDE = Together(*(VIBRATING | {"driving_speed": s * RPM, "duration": 0.3} for s in (*INSIDE, *OUTSIDE)))
+ALONG = Together(*(VIBRATING | values for values in (UP, DOWN)))
 
 
 def test_a_ramp_of_no_extent_is_the_constant_run_and_its_neighbours_change_no_bit():
@@ -39,9 +44,9 @@ def test_a_ramp_of_no_extent_is_the_constant_run_and_its_neighbours_change_no_bi
 
 # 698 rad/s^2. What is left open is that of constant speed, 2e-4: friction that followed the layers' speeds within a step,
 # but not the pulleys', would leave 0.7 %.
-@pytest.mark.parametrize(("precision", "ends"), zip(("double", "single"), ENDS, strict=True))
-def test_the_power_balance_closes_while_the_speed_changes(ends, precision):
-    run = finished(**COARSE | {"stations": 96}, **ramp(*ends), precision=precision)
+@pytest.mark.parametrize("ends", ENDS)
+def test_the_power_balance_closes_while_the_speed_changes(ends):
+    run = CHANGING.finished(**COARSE | {"stations": 96}, **ramp(*ends))
     found, p, judged = balance(run), run.parameters, run.judged
     assert abs(found["power_residual"]) < 5e-4
     driving, driven = (run.channel(f"{name}_speed")[judged] for name in ("driving", "driven"))
@@ -84,17 +89,12 @@ def test_forces_along_a_rising_ramp_are_those_of_constant_speeds():
 
 @pytest.mark.slow
 def test_onset_and_end_are_where_constant_speeds_have_them():
-    inside, outside = (2000.0, 3400.0), (1900.0, 3500.0)
-    runs = Together(*(VIBRATING | {"driving_speed": s * RPM, "duration": 0.3} for s in (*inside, *outside)))
-    for speeds, expected in ((inside, Vibrates.YES), (outside, Vibrates.NO)):
+    for speeds, expected in ((INSIDE, Vibrates.YES), (OUTSIDE, Vibrates.NO)):
         for speed in speeds:
-            constant = runs.record(**VIBRATING, driving_speed=speed * RPM, duration=0.3)
+            constant = BESIDE.record(**VIBRATING, driving_speed=speed * RPM, duration=0.3)
             assert constant["vibrates"] is expected, speed
-    low, high = ((a * RPM, b * RPM) for a, b in zip(outside, inside, strict=True))
-    up, down = (
-        record(**VIBRATING, **ramp(*ends), duration=1.0)
-        for ends in ((1500 * RPM, 4500 * RPM), (4500 * RPM, 1500 * RPM))
-    )
+    low, high = ((a * RPM, b * RPM) for a, b in zip(OUTSIDE, INSIDE, strict=True))
+    up, down = (ALONG.record(**VIBRATING, **values) for values in (UP, DOWN))
     # what the ramp passes in the 0.1 s for which a vibration has to last
     late = 3000 * RPM / 1.0 * 0.1
     for found, first, last, sign in ((up, low, high, 1.0), (down, high, low, -1.0)):

@@ -113,16 +113,11 @@ def test_profiles_and_histories_agree_with_the_record(misaligned):
     assert set(found["lateral_amplitude"].shape) == set(found["amplitude"].shape) == {2}
 
 
-def test_a_run_by_itself_has_record_and_history():
-    asked = job(misalignment=OFFSET, duration=0.016, rise_time=0.004, band_low=700.0)
-    dataset = simulate(asked)
-    assert dataset["sheave_force"].shape == (4,) and dataset["contact_force_left"].dims == ("position",)
-    assert float(dataset["axial_offset"][-1]) == pytest.approx(OFFSET, rel=0.2)
-
-
-def test_two_flows_show_what_one_leaves_out():
+def test_two_flows_show_what_one_leaves_out_in_record_and_history():
     values = {"misalignment": OFFSET, "duration": 0.016, "rise_time": 0.004, "band_low": 700.0}
     one, two = (simulate(job(**values, ring_flows=flows)) for flows in (1, 2))
+    assert one["sheave_force"].shape == (4,) and one["contact_force_left"].dims == ("position",)
+    assert float(one["axial_offset"][-1]) == pytest.approx(OFFSET, rel=0.2)
     assert two["unsolved_share"] == 0.0 and abs(two["power_residual"]) < 1e-3
     assert not np.isfinite(one["mean_tension_difference"]).any() and "tension_difference" not in one
     apart = two["tension_difference"]
@@ -141,11 +136,11 @@ def test_an_aligned_belt_stays_in_its_plane_and_a_seed_leads_it_out():
         "driven_loose_side": "both",
     }
     still = Transient(job(disturbance=0.0, **values).point(0), "newton")
-    still.advance(still.samples)
+    still.advance(still.samples // 2)
     lateral = still.displacement[:, len(still.probes) // 2 :]
     assert not lateral.any() and still.failure is None
     seeded = Transient(job(disturbance=1e-6, **values).point(0), "newton")
-    seeded.advance(seeded.samples)
+    seeded.advance(seeded.samples // 2)
     lateral = seeded.displacement[:, len(seeded.probes) // 2 :]
     assert 1e-8 < np.abs(lateral).max() < 1e-3
 

@@ -59,32 +59,19 @@ def assert_same_as_serial(out, serial):
 
 
 def test_a_warned_sweep_is_requeued_and_goes_on(cluster, job_file, serial, tmp_path):
-    jobs = {}  # by their output folders; side by side, on a core of each node
-    for launcher in ("srun", "mpirun"):
-        out = tmp_path / launcher
-        arguments = ("sweep.sbatch", job_file, "--out", out)
-        jobs[out] = cluster.submit(*arguments, options=TWO_NODES, CVT_HPC_LAUNCHER=launcher)
-    fresh = dict(jobs)
-
-    def all_warned():
-        for out in [out for out in fresh if records(out)]:  # each at once, lest it ends before
-            cluster.ask("scancel", "--batch", "--signal=USR1", fresh.pop(out))
-        return not fresh
-
-    wait_until(
-        all_warned, "a record of each", lambda: "".join(map(cluster.output, jobs.values())) + cluster.logs()
-    )
-    for out, job in jobs.items():
-        cluster.start_again(job)
-        assert "stopped early (SIGUSR1); the same command goes on" in cluster.output(job)
-        assert "runs remain: back into the queue" in cluster.output(job)  # that is exit status 99
-        with open_results(out) as gathered:
-            recorded = int((gathered["status"] != 0).sum())
-        assert 0 < recorded < RUNS
-    for out, job in jobs.items():
-        assert_completed(cluster, job)
-        assert list((out / "records").glob("rank-0001-*.log"))
-        assert_same_as_serial(out, serial)
+    out = tmp_path / "out"
+    job = cluster.submit("sweep.sbatch", job_file, "--out", out, options=TWO_NODES)
+    wait_for_records(cluster, job, out)
+    cluster.ask("scancel", "--batch", "--signal=USR1", job)
+    cluster.start_again(job)
+    assert "stopped early (SIGUSR1); the same command goes on" in cluster.output(job)
+    assert "runs remain: back into the queue" in cluster.output(job)  # that is exit status 99
+    with open_results(out) as gathered:
+        recorded = int((gathered["status"] != 0).sum())
+    assert 0 < recorded < RUNS
+    assert_completed(cluster, job)
+    assert list((out / "records").glob("rank-0001-*.log"))
+    assert_same_as_serial(out, serial)
 
 
 def test_a_job_that_gains_nothing_is_not_requeued(cluster, tmp_path):
@@ -106,9 +93,11 @@ def test_ranks_that_cannot_see_each_other_are_refused(cluster, job_file, tmp_pat
     assert not out.exists()
 
 
-def test_an_array_shares_a_folder(cluster, job_file, serial, tmp_path):
+def test_an_array_by_mpirun_shares_a_folder(cluster, job_file, serial, tmp_path):
     out = tmp_path / "out"
-    array = cluster.submit("array.sbatch", job_file, "--out", out, options=("--array=1-2",))
+    array = cluster.submit(
+        "array.sbatch", job_file, "--out", out, options=("--array=1-2",), CVT_HPC_LAUNCHER="mpirun"
+    )
     tasks = [f"{array}_1", f"{array}_2"]
     first = Part(1, 2)  # one that has done nothing would not be put back
     wait_until(

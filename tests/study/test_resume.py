@@ -2,6 +2,7 @@
 
 import json
 import os
+import platform
 import pty
 import random
 import signal
@@ -65,6 +66,8 @@ def test_kill_9_at_any_moment_and_resume(start, tmp_path, reference, ranks, lane
     assert frames_written(tmp_path / "out") == RUNS  # none was repeated
     with open_results(tmp_path / "out") as dataset:
         assert_same_numbers(dataset, reference)
+        # of both starts
+        assert dataset.attrs["history"].count(f"(on {platform.node()}, {max(ranks, 1)} rank(s))") == 2
 
 
 def test_a_rank_that_dies_takes_the_sweep_down_and_the_rest_is_done_later(start, tmp_path, reference):

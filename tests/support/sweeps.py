@@ -5,13 +5,10 @@ import os
 import shutil
 import subprocess
 import sys
-import time
 from pathlib import Path
 
 import psutil
 import pytest
-
-from support.recorded import records
 
 PATIENCE = 120.0  # [s] until a process that should end counts as hanging; kernels may have to be compiled
 _LAUNCHERS = ("SLURM_", "PMI", "OMPI_", "MPI_")
@@ -39,11 +36,10 @@ def mpirun(ranks: int) -> list[str]:
     return [found, "-n", str(ranks)]
 
 
-def start(*arguments, cwd: Path, ranks: int = 0, **changes: str) -> subprocess.Popen:
-    """Start `cvt-hpc` in a process group of its own; ranks 0: without a launcher."""
-    launcher = mpirun(ranks) if ranks else []
-    return subprocess.Popen(
-        [*launcher, sys.executable, "-m", "cvt_hpc", *map(str, arguments)],
+def call(*arguments, cwd: Path, ranks: int = 0, **changes: str) -> subprocess.CompletedProcess:
+    """Run `cvt-hpc` to its end; ranks 0: without a launcher."""
+    process = subprocess.Popen(
+        [*(mpirun(ranks) if ranks else []), sys.executable, "-m", "cvt_hpc", *map(str, arguments)],
         cwd=cwd,
         env=environment(**changes),
         text=True,
@@ -51,20 +47,15 @@ def start(*arguments, cwd: Path, ranks: int = 0, **changes: str) -> subprocess.P
         stderr=subprocess.PIPE,
         start_new_session=True,
     )
-
-
-def call(*arguments, cwd: Path, ranks: int = 0, **changes: str) -> subprocess.CompletedProcess:
-    """Run `cvt-hpc` to its end."""
-    process = start(*arguments, cwd=cwd, ranks=ranks, **changes)
     try:
         out, err = process.communicate(timeout=PATIENCE)
     except subprocess.TimeoutExpired:
-        kill(process)
+        _kill(process)
         pytest.fail(f"{arguments} hangs; its stderr: {process.communicate()[1]}")
     return subprocess.CompletedProcess(process.args, process.returncode, out, err)
 
 
-def kill(process: subprocess.Popen) -> None:
+def _kill(process: subprocess.Popen) -> None:
     """Kill -9 a launcher and all that it has started, wherever it has put them."""
     root = psutil.Process(process.pid)
     family = [*root.children(recursive=True), root]
@@ -74,14 +65,3 @@ def kill(process: subprocess.Popen) -> None:
         except psutil.NoSuchProcess:
             continue
     psutil.wait_procs(family, timeout=PATIENCE)
-
-
-def wait_for_records(out: Path, count: int, process: subprocess.Popen) -> None:
-    """Return when so many runs are on record."""
-    deadline = time.monotonic() + PATIENCE
-    while records(out) < count:
-        if process.poll() is not None:
-            pytest.fail(f"ended with {process.returncode}: {process.communicate()[1]}")
-        if time.monotonic() > deadline:
-            pytest.fail(f"waited in vain for {count} records")
-        time.sleep(0.02)

@@ -1,12 +1,9 @@
-"""From a job file to its map, with the real mechanics and the real command line, on one rank and on two."""
+"""From a job file to its map, with the real mechanics and the real command line."""
 
 import json
 import os
-import platform
-import random
 import subprocess
 import sys
-import time
 from contextlib import chdir, redirect_stdout
 from io import StringIO
 
@@ -15,14 +12,14 @@ import pytest
 import xarray as xr
 from PIL import Image
 
-from cvt_hpc import load_job, open_results, run
+from cvt_hpc import open_results
 from cvt_hpc.analysis.cells import STYLES
 from cvt_hpc.analysis.classes import OccurrenceClass, occurrence_classes
 from cvt_hpc.cli import main
 from cvt_hpc.variables import Status, Vibrates
 from support.cf import cf_findings
-from support.recorded import assert_same_numbers, frames_written, records
-from support.sweeps import call, environment, kill, start, wait_for_records
+from support.recorded import assert_same_numbers
+from support.sweeps import call, environment
 
 JOB = """
 name = "small"
@@ -52,22 +49,6 @@ HISTORY = """
 history = [{ sheave_stiffness = 1.0, load = "120 N m" }]
 """
 
-# Runs with different meshes cannot be done as one batch: records come one after another.
-MESHES = """
-name = "meshes"
-model = "elastic_belt"
-
-[axes]
-stations = { from = 48, to = 68, step = 4 }
-load = ["0 N m", "60 N m"]
-
-[scene]
-rise_time = "10 ms"
-
-[run]
-duration = "0.1 s"
-"""
-
 
 @pytest.fixture
 def folder(tmp_path, monkeypatch):
@@ -91,16 +72,6 @@ def serial(tmp_path_factory):
         "next: cvt-hpc map out/small; cvt-hpc report out/small",
     ]
     return folder / "out" / "small"
-
-
-@pytest.fixture(scope="module")
-def meshes(tmp_path_factory):
-    """The dataset of an undisturbed serial run over several meshes."""
-    folder = tmp_path_factory.mktemp("meshes")
-    (folder / "meshes.toml").write_text(MESHES)
-    report = run(load_job(folder / "meshes.toml"), folder / "out", progress=False)
-    assert report.exit_status == 0
-    return load_results(report.out)
 
 
 def load_results(out):
@@ -139,29 +110,6 @@ def test_costs_are_estimated_by_what_is_on_record(serial, monkeypatch, capsys):
     assert estimate["small"].startswith(f"estimated cost: {took:.3g} core-seconds per run")
     assert estimate["small"].endswith("(by what 6 runs on record took)")
     assert "record" not in estimate["other"]
-
-
-@pytest.mark.slow
-def test_kill_9_at_any_moment_and_resume(meshes, tmp_path):
-    ranks = 2  # tests/study/test_resume.py kills serial sweeps
-    (tmp_path / "meshes.toml").write_text(MESHES)
-    out = tmp_path / "out" / "meshes"
-    sweep = start("run", "meshes.toml", cwd=tmp_path, ranks=ranks)
-    wait_for_records(out, random.randint(1, 3), sweep)
-    time.sleep(random.uniform(0.0, 0.1))
-    kill(sweep)
-    sweep.communicate()
-    before = records(out)
-    assert 0 < before < meshes["status"].size
-    assert not (out / "results.nc").exists()
-    resumed = call("run", "meshes.toml", cwd=tmp_path, ranks=ranks)
-    assert resumed.returncode == 0, resumed.stderr
-    assert list((out / "records").glob("rank-0001-*.log"))
-    assert_same_numbers(load_results(out), meshes)
-    # the dataset names both starts, and nothing was done twice
-    started = f"python -m cvt_hpc run meshes.toml (on {platform.node()}, {ranks} rank(s))"
-    assert load_results(out).attrs["history"].count(started) == 2
-    assert frames_written(out) == meshes["status"].size
 
 
 @pytest.mark.slow

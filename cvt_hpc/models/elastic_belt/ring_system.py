@@ -22,6 +22,7 @@ from cvt_hpc.models.elastic_belt.rings import (
     with_layers,
     without_saddle_friction,
 )
+from cvt_hpc.solvers.arrays import copy
 from cvt_hpc.steppers.system import System
 
 
@@ -78,7 +79,7 @@ def unpack(flat: FlatRings, t: float, y: np.ndarray) -> None:
     """Write y into `flat.state`, and the part of `one_system` into `flat.one`."""
     belt, fields, one = flat.flat.belt, flat.state.fields, flat.one
     cells, n = belt.cell.size, flat.rings.length.size
-    one[:] = y[: one.size]
+    copy(y, one)
     for k in range(2 * n):
         for j in range(cells):
             fields[FIRST_LAYER + k, j] = y[one.size + k * cells + j] + (belt.belt_speed if k < n else 0.0)
@@ -91,8 +92,9 @@ def unpack(flat: FlatRings, t: float, y: np.ndarray) -> None:
             for j in range(cells):
                 one[place * cells + j] = fields[row, j] - flat.flat.origin[place * cells + j]
     one_system.unpack(flat.flat, t, one)
-    fields[:FIRST_LAYER] = flat.flat.state.fields
-    flat.state.scalars[:] = flat.flat.state.scalars
+    for row in range(FIRST_LAYER):
+        copy(flat.flat.state.fields[row], fields[row])
+    copy(flat.flat.state.scalars, flat.state.scalars)
 
 
 @kernel

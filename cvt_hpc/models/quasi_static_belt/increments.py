@@ -9,6 +9,7 @@ from cvt_hpc.models.elastic_belt.rhs import speed_share_at
 from cvt_hpc.models.quasi_static_belt import fields as q
 from cvt_hpc.models.quasi_static_belt.coupled import solve_chain, solve_dense
 from cvt_hpc.models.quasi_static_belt.split_belt import Motion, SplitBelt, Work
+from cvt_hpc.solvers.arrays import copy
 
 
 @kernel
@@ -46,7 +47,7 @@ def solve_increments(model: SplitBelt, moved: Motion, work: Work) -> None:
     solve_dense(matrix, whole, work.found)
     columns, vector = work.layers.columns, work.vector
     vector[:] = 0.0
-    vector[:size] = work.found[:size]
+    copy(work.found, vector[:size])
     np.dot(shapes, vector, work.rate[f.U])
     if model.steady_flow:
         for j in range(n):
@@ -59,9 +60,10 @@ def solve_increments(model: SplitBelt, moved: Motion, work: Work) -> None:
     closing = work.closing
     closing[:] = 0.0
     closing[q.RIGHT] = 1.0
-    closing[q.BY_COORDINATE : q.BY_COORDINATE + size] = -work.found[:size]
+    for k in range(size):
+        closing[q.BY_COORDINATE + k] = -work.found[k]
     flat = columns.reshape(-1, columns.shape[2])
-    flat[:, q.RIGHT] = np.dot(flat, closing)
+    copy(np.dot(flat, closing), flat[:, q.RIGHT])
 
 
 @kernel

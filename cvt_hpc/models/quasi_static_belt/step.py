@@ -146,7 +146,8 @@ def _advance(model: SplitBelt, moved: Motion, work: Work) -> None:
         found = free_rates(belt, state, pull)
         scalars[f.DRIVEN_SPEED] += step * found[0]
         scalars[f.DRIVEN_POSITION] += step * found[1]
-        scalars[f.FIRST_STATE :] += step * found[2:]
+        for k in range(f.FIRST_STATE, scalars.size):
+            scalars[k] += step * found[2 + k - f.FIRST_STATE]
     else:
         thrust = driven_thrust(belt, moved.force) - belt.thrust
         load = belt.ratio * rhs.load_at(belt, scalars[f.TIME])

@@ -15,6 +15,7 @@ from cvt_hpc.models.elastic_belt import fields as f
 from cvt_hpc.models.elastic_belt import one_system as one
 from cvt_hpc.physics import compliance
 from cvt_hpc.physics.sheaves import flexibility
+from cvt_hpc.solvers.arrays import copy
 
 REACH = 2  # stations to either side that a rate knows of
 STRIDE = 2 * REACH + 1
@@ -53,11 +54,12 @@ def local_slopes(flat: one.FlatBelt, increments: np.ndarray, near: np.ndarray, t
         for group in range(STRIDE + (longer > 0)):
             chosen = np.flatnonzero(groups == group)
             for sign, out in ((1.0, ahead), (-1.0, behind)):
-                fields[:] = origin
+                for row in range(fields.shape[0]):
+                    copy(origin[row], fields[row])
                 for j in chosen:
                     moved[j] = unmoved[j] + sign * increments[i]
                 _evaluate(flat, out)
-                moved[:] = unmoved
+                copy(unmoved, moved)
             for j in chosen:
                 for d in range(STRIDE):
                     k = (j + d - REACH) % n
@@ -75,16 +77,19 @@ def slopes_with_scalar(flat: one.FlatBelt, place: int, size: float, slopes: np.n
     for sign, out in ((1.0, ahead), (-1.0, behind)):
         scalars[place] = unmoved + sign * INCREMENT * size
         _evaluate(flat, out)
-    slopes[:] = (ahead - behind) / (2.0 * INCREMENT * size)
+    for o in range(slopes.shape[0]):
+        for j in range(slopes.shape[1]):
+            slopes[o, j] = (ahead[o, j] - behind[o, j]) / (2.0 * INCREMENT * size)
     scalars[place] = unmoved
 
 
 @kernel
 def _evaluate(flat: one.FlatBelt, out: np.ndarray) -> None:
     one.rates_under_forces(flat)
-    out[:MOMENT], out[MOMENT] = flat.rate, flat.moments
-    if flat.loose.size == 0:
-        out[MOMENT] *= flat.belt.on_driven
+    for row in range(MOMENT):
+        copy(flat.rate[row], out[row])
+    for j in range(flat.moments.size):
+        out[MOMENT, j] = flat.moments[j] * (flat.belt.on_driven[j] if flat.loose.size == 0 else 1.0)
 
 
 @kernel
@@ -104,7 +109,9 @@ def pulley_slopes(flat: one.FlatBelt, pull: np.ndarray, sizes: np.ndarray) -> np
                 moved[k] += sign * increment
             else:
                 scalars[place] = unmoved + sign * increment
-            found[:, k] += sign * one.free_rates(flat.belt, flat.state, moved) / (2.0 * increment)
+            rates = one.free_rates(flat.belt, flat.state, moved)
+            for o in range(rates.size):
+                found[o, k] += sign * rates[o] / (2.0 * increment)
             scalars[place] = unmoved
     return found
 
