@@ -38,6 +38,8 @@ Kernels read `state[j, f.TENSION]`; the arrays are those of `belt`, a row an ele
 CHANGE_Y, CHANGE_Z, CHANGE_W, CHANGE_V = range(CHANGE, CHANGE + 4)
 STATE_FIELDS = CHANGE + 4
 
+POINTS = 1  # of a flank
+
 # Entries of the state of the pulleys
 DRIVING_SPEED, DRIVEN_SPEED, DRIVING_RADIUS, DRIVEN_RADIUS = range(4)
 
