@@ -13,7 +13,7 @@ from cvt_hpc.variables import Status
 from support.lone import Transient
 from support.marched import CHEAP, job
 
-SAMPLES = 15
+SAMPLES = 30
 
 
 @cache
