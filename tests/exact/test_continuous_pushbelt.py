@@ -1,5 +1,6 @@
 """The pushbelt of which a continuous belt is the continuum: what gives way, gives way alike."""
 
+import runpy
 import tomllib
 from pathlib import Path
 
@@ -10,12 +11,13 @@ from cvt_hpc.experiments.chart import load
 from cvt_hpc.job import known_keys, load_job
 from cvt_hpc.models.elastic_belt import PARAMETERS
 from cvt_hpc.models.pushbelt import inert
-from cvt_hpc.models.pushbelt.continuous import ABSENT, FOLLOWS, ONLY
+from cvt_hpc.models.pushbelt.continuous import FOLLOWS, ONLY
 from cvt_hpc.models.pushbelt.parameters import flank_compliance
 from cvt_hpc.physics.sheaves import flexibility, sheaves
 from support.wraps import places
 
 JOBS = Path(__file__).parents[2] / "jobs"
+TERMS = runpy.run_path(str(JOBS.parent / "docs" / "terms_page.py"))["terms"]()
 ANGLE, RADII = np.radians(11.0), {"driving": 0.03, "driven": 0.075}
 BELT = {
     "element_stiffness": 4e7, "element_damping": 20.0, "flank_stiffness": 2e10, "element_factor": 1.5,
@@ -85,7 +87,12 @@ def test_every_parameter_of_the_continuous_belt_has_its_place():
     # the pushbelt refuses a table of friction, and pistons, without which there is no pressure
     tables = {key for key in own if key.startswith("table_") or key.endswith("_pressure")}
     led = {need for needs, _ in FOLLOWS.values() for need in needs} - shared
-    assert shared | tables | led | {*ABSENT} | {*ONLY} | {*PARAMETERS["mesh"], "stiffness_of"} == own
+    # terms of the continuum alone; a key that switches one has the others of its table with it
+    terms = {key for term in TERMS for key in term["keys"]} & own
+    terms |= {key for table in ("bending", "deflection", "rings") for key in PARAMETERS[table]}
+    of_a_run = {*PARAMETERS["mesh"], *PARAMETERS["numerics"], *PARAMETERS["record"]}
+    start = {"disturbance", "seed", "start_damping"}
+    assert shared | tables | led | terms | {*ONLY} | of_a_run | start | {"stiffness_of"} == own
     assert FOLLOWS.keys() <= {*known_keys("pushbelt")}
 
 

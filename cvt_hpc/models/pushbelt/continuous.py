@@ -18,9 +18,10 @@ friction of the belt, the transverse damping, wedge angle and inertia, the law o
 - elements tilt against the rings by the same spring and damper. Of a continuum whose elements do not tilt, by
   the pushbelt's default ones.
 
-Assumptions: the keys in ABSENT are left out: damping of the rings, bending (0.5 N m^2
-adds EI q^2 = 0.9 kN to the 5.7 kN that a strand of 148 mm has in its second mode at 120 N m), and the rings'
-length, since the pushbelt's rings fit the path at a strain of 1e-4; `README.md` has the effect of that.
+Assumptions: terms of the continuum alone (`docs/guide/terms.md`) are left out: damping of the rings, bending
+(0.5 N m^2 adds EI q^2 = 0.9 kN to the 5.7 kN that a strand of 148 mm has in its second mode at 120 N m), and
+the rings' length, since the pushbelt's rings fit the path at a strain of 1e-4; `README.md` has the effect of
+that.
 Elements have an inertia against tilting and a second contact of which the continuum knows nothing: the
 pushbelt's own defaults. The push adds P to its stiffness against tilting, k_a, and a moment P kappa t / 2, t
 being an element's thickness: (k_a + P) theta = -d (f_t - P_s) - P kappa t / 2 in a steady state, of which the
@@ -32,10 +33,7 @@ from typing import Any, NamedTuple
 
 import numpy as np
 
-from cvt_hpc.models.elastic_belt.bending_settings import BENDING
-from cvt_hpc.models.elastic_belt.deflection_settings import DEFLECTION
 from cvt_hpc.models.elastic_belt.pulley_settings import PULLEY_DEFAULTS
-from cvt_hpc.models.elastic_belt.ring_settings import RINGS
 from cvt_hpc.physics.sheaves import axial_element_stiffness
 from cvt_hpc.variator.scene import TILT
 
@@ -52,21 +50,6 @@ ONLY = {
     "column_bending": "off",
     **PULLEY_DEFAULTS,
 }
-# Of the continuum alone
-ABSENT = (
-    "reference_tension",
-    "bending_stiffness",
-    "ring_damping",
-    "disturbance",
-    "start_damping",
-    "most_step_ripple",
-    "seed",
-    "modal_peaks",
-    "profile_duration",
-    *(key for key in DEFLECTION if key != "sheave_deformation"),
-    *(key for key in BENDING if key not in ONLY),
-    *(key for key in RINGS if key not in ONLY),
-)
 
 
 class Follows(NamedTuple):
