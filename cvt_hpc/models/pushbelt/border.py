@@ -208,7 +208,7 @@ def book(belt, state, work, dt):
         flank += 2.0 * (belt.cosine * grip_m * radial + grip_t * sliding)
         opening = opening_of(belt, state, work, j, driven)
         change = dt * belt.sine * radial + belt.cosine * opening
-        change += elements[j, f.SPREAD] - elements[j, f.LAST_SPREAD]
+        change += elements[j, f.SPREAD] - step[j, f.LAST_SPREAD]
         gap = -iterate[j, f.DEPTH_REACHED]
         sheaves += 2.0 * taken(gap, change, belt.flank_stiffness, elements[j, f.FLANK])
 

@@ -32,9 +32,8 @@ Kernels read `state[j, f.TENSION]`; the arrays are those of `belt`, a row an ele
     V_FILTERED,  # sliding speed at which the friction law of the flanks is read [m/s]
     DRIVEN,  # 1 where the nearer pulley is the driven one, else 0
     SPREAD,  # deflection of a sheave beyond its bedding, along the flank's normal [m]
-    LAST_SPREAD,  # of the step before [m]
     CHANGE,  # 4: of the speeds in the last step, from which the next one starts
-) = range(29)
+) = range(28)
 CHANGE_Y, CHANGE_Z, CHANGE_W, CHANGE_V = range(CHANGE, CHANGE + 4)
 STATE_FIELDS = CHANGE + 4
 
@@ -134,8 +133,9 @@ CONTACTS = ("edge", "head", "flank", "ring", "nose")
     NOSE_MEAN,
     NOSE_LEVER_I,
     NOSE_LEVER_J,
+    LAST_SPREAD,  # SPREAD of the step before [m]
     DIAGONAL,  # 4 x 4 blocks of the linear laws, by columns: of an element, and of it with the next one
-) = range(44)
+) = range(45)
 LINK = DIAGONAL + 16
 STEP_FIELDS = LINK + 16
 

@@ -77,6 +77,9 @@ def _prepare(belt, state, work, dt):
     linear_blocks(belt, work.step, dt)
     for j in range(work.step.rows):
         set_shapes(belt, work.step[j, f.R_Y], work.step[j, f.R_Z], work.shapes, j)
+        if belt.local_compliance == 0.0:
+            state.elements[j, f.SPREAD] = 0.0
+        work.step[j, f.LAST_SPREAD] = state.elements[j, f.SPREAD]
 
 
 @kernel
@@ -160,7 +163,6 @@ def _accept(belt, state, work, inputs, dt):
         slip_m, slip_t = elements[j, f.FLANK_SLIP_M], elements[j, f.FLANK_SLIP_T]
         filtered = filtered_slip(belt, slip_m, slip_t, elements[j, f.FLANK], elements[j, f.V_FILTERED], dt)
         elements[j, f.V_FILTERED] = filtered
-        elements[j, f.LAST_SPREAD] = elements[j, f.SPREAD]
     for k in range(3):
         scratch[0, k] = around(scratch[0, k])
     driving_thrust, driven_thrust = scratch.data[0, 0, 0], scratch.data[0, 1, 0]

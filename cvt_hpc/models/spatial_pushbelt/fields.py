@@ -30,6 +30,7 @@ AXIAL = 2  # coordinate of a vector out of the plane
 LEFT_LOW, LEFT_HIGH, RIGHT_LOW, RIGHT_HIGH = range(4)
 EDGE_LEFT, EDGE_RIGHT, HEAD_LEFT, HEAD_RIGHT = range(4)
 POINTS = 4
+LEFT, RIGHT = range(2)  # sides
 
 # Fields of the state of an element. Speeds are those at the middle of the last step.
 POSITION = 0  # 3: middle of the saddle line, which is the ring line and the assumed centre of gravity [m]
@@ -58,8 +59,7 @@ RING_FRICTION = 59  # friction force of the element against that [N]
 RING_DUAL = 60
 DRIVEN = 61  # 1 where the nearer pulley is the driven one, else 0
 SPREAD = 62  # 2: deflection of the left and the right sheave beyond its bedding, along the flank's normal [m]
-LAST_SPREAD = 64  # 2: of the step before [m]
-CHANGE = 66  # 8: of the speeds in the last step, from which the next one starts
+CHANGE = 64  # 8: of the speeds in the last step, from which the next one starts
 STATE_FIELDS = CHANGE + SIZE
 
 # Entries of the state of the pulleys beside those of `pushbelt.belt`: positions of the mid planes between
@@ -133,7 +133,8 @@ DIAGONAL = 152  # blocks of the linear laws: of an element,
 LINK = DIAGONAL + SIZE**2  # and of it with the next one
 PUSH_MEAN = LINK + SIZE**2  # 4
 PIN_MEAN = PUSH_MEAN + POINTS
-STEP_FIELDS = PIN_MEAN + 1
+LAST_SPREAD = PIN_MEAN + 1  # 2: SPREAD of the step before [m]
+STEP_FIELDS = LAST_SPREAD + 2
 
 # Fields of Workspace.iterate
 ITERATE_TENSION = 0

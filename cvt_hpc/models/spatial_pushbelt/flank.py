@@ -110,6 +110,10 @@ def predict_flanks(belt, state, pulleys, step, dt):
         centre, axis = driven * belt.centre_distance, pulley_axis(belt, driven)
         groove = of_pulley(pulleys[planar.DRIVING_RADIUS], pulleys[planar.DRIVEN_RADIUS], driven)
         middle = of_pulley(pulleys[f.DRIVING_MIDDLE], pulleys[f.DRIVEN_MIDDLE], driven)
+        for side in (f.LEFT, f.RIGHT):
+            if belt.local_compliance == 0.0:
+                state[j, f.SPREAD + side] = 0.0
+            step[j, f.LAST_SPREAD + side] = state[j, f.SPREAD + side]
         r, o = vec.at(state, j, f.POSITION), vec.at(state, j, f.OUTWARD)
         a = vec.cross(o, vec.at(state, j, f.HEADING))
         half = vec.moved(r, 0.5 * dt, vec.at(state, j, f.SPEED))
@@ -162,7 +166,8 @@ def bend_sheaves(belt, state, increments, openings, shapes, step, iterate, bent,
             iterate[j, f.FLANK_REACHED + p] = -fma(dt, rate, step[j, f.FLANK_GAP + p] + opening)
     bend = belt.local_compliance, 0.5 * belt.flank_stiffness, belt.local_decay
     depths = iterate.data[:, f.FLANK_REACHED : f.FLANK_REACHED + f.POINTS]
-    on_driven, left, right = state.data[:, f.DRIVEN], state.data[:, f.SPREAD], state.data[:, f.SPREAD + 1]
+    on_driven = state.data[:, f.DRIVEN]
+    left, right = state.data[:, f.SPREAD + f.LEFT], state.data[:, f.SPREAD + f.RIGHT]
     spread_bending(on_driven, depths[:, : f.RIGHT_LOW], left, bent, *bend)
     spread_bending(on_driven, depths[:, f.RIGHT_LOW :], right, bent, *bend)
 
@@ -432,7 +437,7 @@ def book_flanks(belt, state, work, dt):
             rubbed += elements[j, f.FLANK_FRICTION_M + p] * vec.dot(m, q)
             rubbed += elements[j, f.FLANK_FRICTION_T + p] * (around_it - radius * rotation)
             change = dt * vec.dot(n, q) + belt.cosine * opening
-            change += elements[j, f.SPREAD + p // 2] - elements[j, f.LAST_SPREAD + p // 2]
+            change += elements[j, f.SPREAD + p // 2] - step[j, f.LAST_SPREAD + p // 2]
             # the mean gap, of which the axial part that is reached is ahead
             gap = iterate[j, f.FLANK_REACHED + p] + dt * side * belt.cosine * vec.dot(axis, q)
             sheaves += taken(gap, change, 0.5 * belt.flank_stiffness, elements[j, f.FLANK + p])

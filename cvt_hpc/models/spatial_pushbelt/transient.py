@@ -293,8 +293,6 @@ def _accept_elements(belt, state, work, dt):
             filtered = elements[j, f.V_FILTERED + p]
             filtered = filtered_slip(belt, along, around_it, elements[j, f.FLANK + p], filtered, dt)
             elements[j, f.V_FILTERED + p] = filtered
-        for side in range(2):
-            elements[j, f.LAST_SPREAD + side] = elements[j, f.SPREAD + side]
 
 
 @kernel
