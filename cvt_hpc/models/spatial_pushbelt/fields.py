@@ -30,7 +30,7 @@ AXIAL = 2  # coordinate of a vector out of the plane
 LEFT_LOW, LEFT_HIGH, RIGHT_LOW, RIGHT_HIGH = range(4)
 EDGE_LEFT, EDGE_RIGHT, HEAD_LEFT, HEAD_RIGHT = range(4)
 POINTS = 4
-LEFT, RIGHT = range(2)  # sides
+ON_LEFT, ON_RIGHT = range(2)
 
 # Fields of the state of an element. Speeds are those at the middle of the last step.
 POSITION = 0  # 3: middle of the saddle line, which is the ring line and the assumed centre of gravity [m]

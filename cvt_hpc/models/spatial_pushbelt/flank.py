@@ -110,10 +110,10 @@ def predict_flanks(belt, state, pulleys, step, dt):
         centre, axis = driven * belt.centre_distance, pulley_axis(belt, driven)
         groove = of_pulley(pulleys[planar.DRIVING_RADIUS], pulleys[planar.DRIVEN_RADIUS], driven)
         middle = of_pulley(pulleys[f.DRIVING_MIDDLE], pulleys[f.DRIVEN_MIDDLE], driven)
-        for side in (f.LEFT, f.RIGHT):
+        for sheave in (f.ON_LEFT, f.ON_RIGHT):
             if belt.local_compliance == 0.0:
-                state[j, f.SPREAD + side] = 0.0
-            step[j, f.LAST_SPREAD + side] = state[j, f.SPREAD + side]
+                state[j, f.SPREAD + sheave] = 0.0
+            step[j, f.LAST_SPREAD + sheave] = state[j, f.SPREAD + sheave]
         r, o = vec.at(state, j, f.POSITION), vec.at(state, j, f.OUTWARD)
         a = vec.cross(o, vec.at(state, j, f.HEADING))
         half = vec.moved(r, 0.5 * dt, vec.at(state, j, f.SPEED))
@@ -167,7 +167,7 @@ def bend_sheaves(belt, state, increments, openings, shapes, step, iterate, bent,
     bend = belt.local_compliance, 0.5 * belt.flank_stiffness, belt.local_decay
     depths = iterate.data[:, f.FLANK_REACHED : f.FLANK_REACHED + f.POINTS]
     on_driven = state.data[:, f.DRIVEN]
-    left, right = state.data[:, f.SPREAD + f.LEFT], state.data[:, f.SPREAD + f.RIGHT]
+    left, right = state.data[:, f.SPREAD + f.ON_LEFT], state.data[:, f.SPREAD + f.ON_RIGHT]
     spread_bending(on_driven, depths[:, : f.RIGHT_LOW], left, bent, *bend)
     spread_bending(on_driven, depths[:, f.RIGHT_LOW :], right, bent, *bend)
 
