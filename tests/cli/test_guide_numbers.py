@@ -32,7 +32,10 @@ QUOTED = [
     (CHOOSE, r"`linear_stability`.* onset (\S+) N m", "ladder", of_rung("onset", "linear_stability"), "error_median", 1.0),
     (CHOOSE, r"`linear_stability`.* (\S+) N m \(95 %", "ladder", of_rung("onset", "linear_stability"), "error_95", 1.0),
     (CHOOSE, r"`auto`.* wrong in (\S+) %", "ladder", of_rung("occurrence", "auto"), "wrong_share", 0.01),
-    (CHOOSE, r"`elastic_belt` \| \d.* wrong in (\S+) %", "ladder", of_rung("occurrence", "elastic_belt"), "wrong_share", 0.01),
+    (CHOOSE, r"`elastic_belt` \| \d.* wrong in (\S+) of 15", "ladder_pushbelt", of_rung("occurrence", "elastic_belt"), "wrong_share", 1 / 15),
+    (CHOOSE, r"`elastic_belt` \| \d.* amplitude (\S+) % \(median", "ladder_pushbelt", of_rung("amplitude", "elastic_belt"), "error_median", 0.01),
+    (CHOOSE, r"`elastic_belt` \| \d.* (\S+) % \(95 %", "ladder_pushbelt", of_rung("amplitude", "elastic_belt"), "error_95", 0.01),
+    (CHOOSE, r"`elastic_belt` \| \d.* frequency (\S+) %", "ladder_pushbelt", of_rung("frequency", "elastic_belt"), "error_median", 0.01),
     (CHOOSE, r"`quasi_static_belt`.* frequency (\S+) %", "ladder_quasi_static", of_rung("frequency", "quasi_static_belt"), "error_median", 0.01),
     (CHOOSE, r"`quasi_static_belt`.* amplitude (\S+) %", "ladder_quasi_static", of_rung("amplitude", "quasi_static_belt"), "error_median", 0.01),
     (CHOOSE, r"`pushbelt` \| (\S+) s", "chart_pushbelt", PUSHBELT, "core_s_per_s", 1.0),
@@ -43,8 +46,9 @@ QUOTED = [
     (CHOOSE, r"`spatial_pushbelt`.* axial force (\S+) %", "chart_spatial_pushbelt", SPATIAL, "net_axial_force_error", 0.01),
     (CHOOSE, r"`spatial_pushbelt`.* push force (\S+) %", "chart_spatial_pushbelt", SPATIAL, "push_force_error", 0.01),
     (CHOOSE, r"`spatial_pushbelt` \| \d.* losses (\S+) %", "chart_spatial_pushbelt", SPATIAL, "friction_loss_error", 0.01),
-    (CHARTS, r"within (\S+) % of this reference", "ladder_pushbelt", of_rung("forces", "elastic_belt"), "error_95", 0.01),
-    (CHARTS, r"within (\S+) % \(median\)", "ladder_pushbelt", of_rung("frequency", "elastic_belt"), "error_median", 0.01),
+    (CHARTS, r"within (\S+) % of this reference", "ladder_pushbelt", of_rung("forces", "elastic_belt"), "error_median", 0.01),
+    (CHARTS, r"amplitudes within (\S+) %", "ladder_pushbelt", of_rung("amplitude", "elastic_belt"), "error_median", 0.01),
+    (CHARTS, r"frequencies within (\S+) % \(medians\)", "ladder_pushbelt", of_rung("frequency", "elastic_belt"), "error_median", 0.01),
 ]  # fmt: skip
 
 
