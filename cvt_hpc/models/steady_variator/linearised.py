@@ -86,7 +86,7 @@ def slopes_with_scalar(flat: one.FlatBelt, place: int, size: float, slopes: np.n
 @kernel
 def _evaluate(flat: one.FlatBelt, out: np.ndarray) -> None:
     one.rates_under_forces(flat)
-    for row in range(MOMENT):
+    for row in range(out.shape[0] - 1):
         copy(flat.rate[row], out[row])
     for j in range(flat.moments.size):
         out[MOMENT, j] = flat.moments[j] * (flat.belt.on_driven[j] if flat.loose.size == 0 else 1.0)
