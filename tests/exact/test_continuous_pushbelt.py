@@ -23,7 +23,7 @@ BELT = {
     "element_stiffness": 4e7, "element_damping": 20.0, "flank_stiffness": 2e10, "element_factor": 1.5,
     "local_stiffness": 4e9, "sheave_stiffness": 1.5, "half_wedge_angle": ANGLE, "tilt_stiffness": 2e5,
     "tilt_factor": 1.5, "ratio": 2.5, "driven_radius": RADII["driven"], "sheave_lag": 2e-3, "lag_stiffness": 2e8,
-    "tilt_spring": np.inf,
+    "tilt_spring": np.inf, "tilt_damper": 1.0,
 }  # fmt: skip
 
 

@@ -29,6 +29,7 @@ continuum has k_a theta = -d (f_t - P_s).
 """
 
 from collections.abc import Callable, Mapping
+from functools import partial
 from typing import Any, NamedTuple
 
 import numpy as np
@@ -76,6 +77,10 @@ def _modes(p: Mapping[str, Any], radius: float) -> tuple[float, float, float]:
     return RIGID, tilt, tilt
 
 
+def _tilt(key: str, p: Mapping[str, Any]) -> float:
+    return float(p[key] if np.isfinite(p["tilt_spring"]) else TILT[key].default)
+
+
 FOLLOWS = {
     # the driving sheave is held, as ONLY has it: the continuum has an idle thrust by this name
     "driving_thrust": Follows(("driving_axial",), lambda p: 0.0),
@@ -95,10 +100,8 @@ FOLLOWS = {
     "driven_modal_stiffness": Follows(
         ("tilt_stiffness", "tilt_factor", "driven_radius"), lambda p: _modes(p, p["driven_radius"])
     ),
-    "tilt_spring": Follows(
-        ("tilt_spring",),
-        lambda p: p["tilt_spring"] if np.isfinite(p["tilt_spring"]) else TILT["tilt_spring"].default,
-    ),
+    "tilt_spring": Follows(("tilt_spring",), partial(_tilt, "tilt_spring")),
+    "tilt_damper": Follows(("tilt_spring", "tilt_damper"), partial(_tilt, "tilt_damper")),
     "sheave_rate": Follows(
         ("sheave_lag", "lag_stiffness", "half_wedge_angle"),
         lambda p: float(0.5 / np.tan(p["half_wedge_angle"]) / (p["sheave_lag"] * p["lag_stiffness"])),
