@@ -56,7 +56,7 @@ def test_sheaves_and_elements_open_alike_under_the_same_force(pulley, stiffness)
     modal = stiffness * np.array(found[f"{pulley}_modal_stiffness"])
     openings = (shapes @ (wrap.weight * force)) / modal  # of one flank
     # along its normal: of element and local bending
-    overlap = force / np.cos(ANGLE) * flank_compliance(found | {"half_wedge_angle": ANGLE})
+    overlap = force / np.cos(ANGLE) * flank_compliance(given | found)
     pushbelt = 2.0 * (overlap / np.cos(ANGLE) + openings @ shapes)
     # ends, where local bending reaches beyond the force, apart; it has ten stations, and the first mode opens
     # by 1e-3 of the others
