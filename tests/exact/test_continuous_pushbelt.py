@@ -23,7 +23,7 @@ BELT = {
     "element_stiffness": 4e7, "element_damping": 20.0, "flank_stiffness": 2e10, "element_factor": 1.5,
     "local_stiffness": 4e9, "sheave_stiffness": 1.5, "half_wedge_angle": ANGLE, "tilt_stiffness": 2e5,
     "tilt_factor": 1.5, "ratio": 2.5, "driven_radius": RADII["driven"], "sheave_lag": 2e-3, "lag_stiffness": 2e8,
-    "tilt_spring": np.inf,
+    "tilt_spring": np.inf, "tilt_damper": 1.0,
 }  # fmt: skip
 
 
@@ -56,7 +56,7 @@ def test_sheaves_and_elements_open_alike_under_the_same_force(pulley, stiffness)
     modal = stiffness * np.array(found[f"{pulley}_modal_stiffness"])
     openings = (shapes @ (wrap.weight * force)) / modal  # of one flank
     # along its normal: of element and local bending
-    overlap = force / np.cos(ANGLE) * flank_compliance(found | {"half_wedge_angle": ANGLE})
+    overlap = force / np.cos(ANGLE) * flank_compliance(given | found)
     pushbelt = 2.0 * (overlap / np.cos(ANGLE) + openings @ shapes)
     # ends, where local bending reaches beyond the force, apart; it has ten stations, and the first mode opens
     # by 1e-3 of the others

@@ -9,6 +9,7 @@ from cvt_hpc.models.elastic_belt.bending_settings import bending_inert
 from cvt_hpc.models.elastic_belt.deflection_settings import CONE, MODE_FILES, MODE_KEYS, RITZ, TABLE_KEYS
 from cvt_hpc.models.elastic_belt.pulley_checks import pulley_inert
 from cvt_hpc.models.elastic_belt.ring_settings import ring_inert
+from cvt_hpc.models.elastic_belt.tilt_settings import tilt_inert
 from cvt_hpc.simulation import record_variables
 from support.marched import fresh_record, job
 
@@ -33,11 +34,12 @@ OTHER = {
     "local_stiffness": 5e9,
     "local_length": 0.02,
 }
-# of pulleys, rings and discs as they are in every scene here
+# of pulleys, rings, discs and elements as they are in every scene here
 AT_REST = (
     pulley_inert({})
     | ring_inert({})
     | bending_inert({})
+    | tilt_inert({})
     | dict.fromkeys([*CONE, *TABLE_KEYS, *RITZ, *MODE_KEYS, *MODE_FILES], "sheave_deformation bending")
 )
 CASES = [

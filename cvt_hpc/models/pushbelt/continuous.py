@@ -10,8 +10,8 @@ friction of the belt, the transverse damping, wedge angle and inertia, the law o
 - a flank alone has half the axial compliance of a station's element, 1 / c_e of both flanks. Its own
   stiffness c is normal force over normal overlap, of which the axial one is c cos^2 d0:
   1 / (c cos^2 d0) = 1 / (2 c_e);
-- local bending has the stiffness k sheave_stiffness, and spreads alike. The pushbelt's own `sheave_stiffness`
-  scales its modes of opening, so a value other than 1 requires `stiffness_of` "sheave";
+- local bending has the same keys. `sheave_stiffness` scales the pushbelt's modes of opening as well, so a
+  value other than 1 requires `stiffness_of` "sheave";
 - tilt opens a pulley by r^2 / c_tilt cos(phi) times the sum of F cos(phi), and likewise with sin, while modes
   open each flank by 1 / S: S = 2 c_tilt / r^2 of cos and sin. Nothing opens all around alike;
 - the thrust moves the driven sheave by 1 / (T_1 k) in opening, which is 2 tan d0 of radius: `sheave_rate`;
@@ -29,6 +29,7 @@ continuum has k_a theta = -d (f_t - P_s).
 """
 
 from collections.abc import Callable, Mapping
+from functools import partial
 from typing import Any, NamedTuple
 
 import numpy as np
@@ -76,6 +77,10 @@ def _modes(p: Mapping[str, Any], radius: float) -> tuple[float, float, float]:
     return RIGID, tilt, tilt
 
 
+def _tilt(key: str, p: Mapping[str, Any]) -> float:
+    return float(p[key] if np.isfinite(p["tilt_spring"]) else TILT[key].default)
+
+
 FOLLOWS = {
     # the driving sheave is held, as ONLY has it: the continuum has an idle thrust by this name
     "driving_thrust": Follows(("driving_axial",), lambda p: 0.0),
@@ -85,9 +90,6 @@ FOLLOWS = {
         lambda p: max(p["element_damping"], RESOLVED * p["element_stiffness"]),
     ),
     "flank_stiffness": Follows(("flank_stiffness", "element_factor", "half_wedge_angle"), _flank_stiffness),
-    "local_stiffness": Follows(
-        ("sheave_stiffness", "local_stiffness"), lambda p: p["sheave_stiffness"] * p["local_stiffness"]
-    ),
     "driving_modal_stiffness": Follows(
         ("tilt_stiffness", "tilt_factor", "ratio", "driven_radius"),
         lambda p: _modes(p, p["driven_radius"] / p["ratio"]),
@@ -95,10 +97,8 @@ FOLLOWS = {
     "driven_modal_stiffness": Follows(
         ("tilt_stiffness", "tilt_factor", "driven_radius"), lambda p: _modes(p, p["driven_radius"])
     ),
-    "tilt_spring": Follows(
-        ("tilt_spring",),
-        lambda p: p["tilt_spring"] if np.isfinite(p["tilt_spring"]) else TILT["tilt_spring"].default,
-    ),
+    "tilt_spring": Follows(("tilt_spring",), partial(_tilt, "tilt_spring")),
+    "tilt_damper": Follows(("tilt_spring", "tilt_damper"), partial(_tilt, "tilt_damper")),
     "sheave_rate": Follows(
         ("sheave_lag", "lag_stiffness", "half_wedge_angle"),
         lambda p: float(0.5 / np.tan(p["half_wedge_angle"]) / (p["sheave_lag"] * p["lag_stiffness"])),

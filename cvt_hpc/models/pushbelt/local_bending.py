@@ -14,8 +14,10 @@ place i along the belt on one pulley
 r = exp(-pitch / l). Sheaves of both pulleys are apart: half way along a strand nothing is handed on. The
 matrix is an M-matrix, so that the set of pressing points settles by full steps.
 
-Newton's method of a step takes the slope of the bedding alone: within a step the inertia of elements is far
-stiffer, so that each iteration leaves some tenth of the spread's error.
+Newton's method of a step takes the slope of the bedding alone. In the plane the inertia of elements is far
+stiffer within a step, so that each iteration leaves some tenth of the spread's error. Along the axis of the
+spatial pushbelt, where flanks are steep and act at the step's end, it is not: steps take more than twice as
+many iterations (10 in place of 4 of 216 elements, 10 us, at Lebrecht's point).
 """
 
 from numba.extending import register_jitable

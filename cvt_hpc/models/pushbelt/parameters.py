@@ -22,6 +22,7 @@ FEWEST_ELEMENTS = 100
 BELOW_PASSAGE = 0.9  # of half that frequency: belts run up to 4 % slower than by the nominal radius
 NOT_HERE = ("disturbance", "seed")
 MODES = ("driving_modal_stiffness", "driven_modal_stiffness")
+SCALED = (*MODES, "local_stiffness", "local_length")  # without effect between rigid sheaves
 NO_TABLE = ("table_file", "table_force", "table_speed", "table_mu")
 
 
@@ -146,7 +147,7 @@ PARAMETERS: dict[str, dict[str, Parameter]] = {
             positive(
                 1.0,
                 "",
-                "stiffness of the sheaves, disc and collar: factor on all modes of opening; inf: rigid",
+                "stiffness of the sheaves: factor on all modes of opening and on local_stiffness; inf: rigid",
             ),
             allow_infinite=True,
         ),
@@ -296,7 +297,8 @@ def local_compliance(parameters: Parameters) -> float:
     Both sheaves open by n cos(d0) / k, and each gives way along its normal by half of that times cos(d0).
     """
     p = parameters
-    return float(0.5 * np.cos(p["half_wedge_angle"]) ** 2 / p["local_stiffness"])
+    stiffness = p["sheave_stiffness"] * p["local_stiffness"]
+    return float(0.5 * np.cos(p["half_wedge_angle"]) ** 2 / stiffness)
 
 
 def flank_compliance(parameters: Parameters) -> float:
@@ -376,7 +378,7 @@ def inert(parameters: Parameters) -> dict[str, str]:
         (p["ring_friction"] == 0.0, "ring_friction_speed", "ring_friction 0"),
         (p["friction_gradient"] == 0.0, "friction_memory", "friction_gradient 0"),
         (np.isinf(p["local_stiffness"]), "local_length", "local_stiffness inf"),
-        *((np.isinf(p["sheave_stiffness"]), key, "sheave_stiffness inf") for key in MODES),
+        *((np.isinf(p["sheave_stiffness"]), key, "sheave_stiffness inf") for key in SCALED),
         *(
             (np.isinf(p["nose_clearance"]), f"nose_{key}", "nose_clearance inf")
             for key in ("height", "stiffness")
