@@ -4,7 +4,8 @@ The deflection y of a sheave under the forces F of flanks follows y - l^2 y'' = 
 which the shorter of two lengths is left out): each force deflects its surroundings by exp(-|s| / l). Forces
 that are alike all along deflect as by a bedding, b F. The laws of a step have this bedding in series with
 the element, as the stiffness k of a flank, b k < 1. The rest of y is the spread, z = y - b F, by which the
-flank is less deep in the sheave: F = sum k_p max(0, depth_p - z) over the points p of a flank.
+flank is less deep in the sheave: F = sum k_p max(0, depth_p - z) over the points p of a flank. Of two points
+each has an equal share of k, bedding included: one of them alone gives way by 2 / k under a force alike.
 
 With K = sum k_p and D = sum k_p depth_p over the points that press, F = (D - K y) / (1 - b K), and with its
 place i along the belt on one pulley

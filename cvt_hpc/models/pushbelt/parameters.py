@@ -163,7 +163,7 @@ PARAMETERS: dict[str, dict[str, Parameter]] = {
         "flank_stiffness": positive(
             3.27e10,
             "N/m^2",
-            "axial stiffness of the elements, per length",
+            "stiffness of an element at each flank, along its normal, per length",
             sensible=(1000000.0, 100000000000000.0),
         ),
         "local_stiffness": replace(
