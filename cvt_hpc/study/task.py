@@ -70,7 +70,7 @@ class Result(NamedTuple):
 
 
 class _Outside(BaseException):
-    """An error while runs join, as its cause; no `except Exception` takes it for that of a run."""
+    """An error while runs join or ask whether to go on; no `except Exception` takes it for that of a run."""
 
 
 class _Trouble(NamedTuple):
@@ -246,7 +246,10 @@ class _Watch:
         if self._started is None:
             self._start()
             self._started = time.monotonic()
-        reason = self._interrupt()
+        try:
+            reason = self._interrupt()
+        except Exception as error:  # such as of a rank that is lost
+            raise _Outside from error
         if reason is None and self.elapsed() > self.limit:
             self.is_over = True
             reason = "run limit"

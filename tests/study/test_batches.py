@@ -13,12 +13,14 @@ from hypothesis import strategies as st
 from cvt_hpc.files import StorageError
 from cvt_hpc.study import open_results, run
 from cvt_hpc.study.batches import batch_cost, share_out
+from cvt_hpc.study.description import describe
 from cvt_hpc.study.forecast.cost_model import CostModel
 from cvt_hpc.study.ranks.launch import RankDied
 from cvt_hpc.study.ranks.progress import Counter
 from cvt_hpc.study.record.log import RECORD, RecordLog
 from cvt_hpc.study.status import find_records
 from cvt_hpc.study.sweep import Claims
+from cvt_hpc.study.task import Task
 from cvt_hpc.variables import Status
 from support.recorded import assert_same_numbers
 from support.study_double import Axis, Job, Simulator
@@ -371,6 +373,18 @@ def test_an_error_of_a_claim_is_no_failure_of_the_runs_at_work(tmp_path, monkeyp
     with pytest.raises(StorageError, match="the disk is full"):
         sweep(tmp_path, 4, simulator=lambda lanes: Joining(lanes=lanes))
     assert find_records(tmp_path, Job((Axis("load", tuple(range(RUNS))),))).recorded.sum() == 0
+
+
+def test_an_error_of_the_question_whether_to_go_on_is_no_failure_of_a_run():
+    """Such as that of a rank which is lost."""
+
+    def lost():
+        raise OSError("a rank is lost")
+
+    job, simulator = Job((Axis("load", (0, 1)), Axis("pause", (0.01,)))), Simulator()
+    task = Task(job, describe(job, simulator), simulator)
+    with pytest.raises(OSError, match="a rank is lost"):
+        list(task.do((0, 1), lost, lambda runs: None))
 
 
 def test_a_batch_of_more_turns_is_predicted_to_take_longer():

@@ -171,7 +171,7 @@ PARAMETERS: dict[str, dict[str, Parameter]] = {
                 np.inf,
                 "N/m^2",
                 "stiffness of both sheaves against local bending, per length; inf: none",
-                sensible=(100000.0, 100000000000000.0),
+                sensible=(1e5, np.inf),
             ),
             allow_infinite=True,
         ),
