@@ -199,7 +199,7 @@ def test_records_tell_unless_pilots_are_asked_for(tmp_path):
     assert find_out(job, simulator, groups, tmp_path / "none", 0).fit.batches == 0
     run(job, tmp_path, simulator=simulator, progress=False)
     known = find_out(job, simulator, groups, tmp_path, 0)
-    assert known.basis == "batches on record (5)"  # the first of a log has loaded kernels
+    assert known.basis == "batches on record (6)"  # the first one from when its kernels are loaded
     assert known.fit.likely() > 2 * 0.01
     assert find_out(job, simulator, groups, tmp_path, 1).basis.startswith("1 pilot")
 
