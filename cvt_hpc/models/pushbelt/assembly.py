@@ -76,12 +76,9 @@ def flank_depths(belt, state, increments, openings, shapes, step, iterate, bent,
             deep = deep - belt.cosine * of_pulley(driving_one, driven_one, driven) * shapes[j, k]
         iterate[j, f.DEPTH_REACHED] = deep
     if belt.local_compliance > 0.0:
-        depths, spread = (
-            iterate.data[:, f.DEPTH_REACHED : f.DEPTH_REACHED + f.POINTS],
-            state.data[:, f.SPREAD],
-        )
+        depths = iterate.data[:, f.DEPTH_REACHED : f.DEPTH_REACHED + f.POINTS]
         bend = belt.local_compliance, belt.flank_stiffness, belt.local_decay
-        spread_bending(state.data[:, f.DRIVEN], depths, spread, bent, *bend)
+        spread_bending(state.data[:, f.DRIVEN], depths, state.data[:, f.SPREAD], bent, *bend)
         for j in range(step.rows):
             iterate[j, f.DEPTH_REACHED] -= state[j, f.SPREAD]
 

@@ -21,11 +21,12 @@ spatial pushbelt, where flanks are steep and act at the step's end, it is not: s
 many iterations (10 in place of 4 of 216 elements, 10 us, at Lebrecht's point).
 """
 
+import numpy as np
 from numba.extending import register_jitable
 
 from cvt_hpc.kernels import kernel
 
-MOST_SETS = 50  # of pressing points that are tried; random depths take at most a dozen
+MOST_SETS = 50  # of pressing points that are tried; 400 random scenes of 32 to 216 elements take at most 5
 
 
 @register_jitable
@@ -97,4 +98,5 @@ def spread_bending(driven, depths, spread, work, compliance, stiffness, decay):
             work[k, 0], work[k, 1] = _pressing(depths, j, lane, spread[j, lane], stiffness)
             settled = settled and work[k, 0] == held and work[k, 1] == pressed
         if settled:
-            break
+            return
+    spread[0, 0] = np.nan  # which ends the march as not finite
