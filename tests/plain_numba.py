@@ -2,15 +2,16 @@
 
     .venv/bin/python tests/plain_numba.py
 
-Each run is made by two processes, with an empty cache each. In one `kernel` and `merged_kernel` are
-`numba.njit(cache=True)`, and nothing of `cvt_hpc.kernels` is imported.
+Each run is made by two processes. One takes the machine code that is kept, as every command does. In the other
+`kernel` and `merged_kernel` are `numba.njit(cache=True)` with an empty cache, and nothing of `cvt_hpc.kernels`
+is imported.
 """
 
 import os
 import subprocess
 import sys
 import tempfile
-from functools import partial
+from concurrent.futures import ThreadPoolExecutor
 from pathlib import Path
 from types import ModuleType
 
@@ -45,18 +46,18 @@ def take_plain_numba():
 def simulate(how, run, folder):
     """The history of a run, of a process that compiles in one of two ways."""
     job, at, values = RUNS[run]
-    history = Path(folder) / f"{how}.nc"
-    arguments = [str(JOBS / job), "--at", at, "--out", str(history)]
+    folder = Path(folder) / how / job
+    folder.mkdir(parents=True)
+    arguments = [str(JOBS / job), "--at", at, "--out", str(folder / "history.nc")]
     for value in values:
         arguments += ["--set", value]
-    with tempfile.TemporaryDirectory() as cache:
-        subprocess.run(
-            [sys.executable, __file__, how, "simulate", *arguments],
-            env=os.environ | {"NUMBA_CACHE_DIR": cache},
-            stdout=subprocess.DEVNULL,
-            check=True,
-        )
-    with xr.open_dataset(history) as found:
+    subprocess.run(
+        [sys.executable, __file__, how, "simulate", *arguments],
+        env=os.environ | ({"NUMBA_CACHE_DIR": str(folder)} if how == "plain" else {}),
+        stdout=subprocess.DEVNULL,
+        check=True,
+    )
+    with xr.open_dataset(folder / "history.nc") as found:
         return found.load()
 
 
@@ -76,15 +77,16 @@ def same(one, other):
 
 def main():
     status = 0
-    for run in RUNS:
-        with tempfile.TemporaryDirectory() as folder:
-            ours, plain = map(partial(simulate, run=run, folder=folder), ("ours", "plain"))
-        found = differences(ours, plain)
-        print(
-            f"{run}: {len(ours.variables)} variables",
-            f"differ in {', '.join(found)}" if found else "are the same",
-        )
-        status = status or bool(found)
+    with tempfile.TemporaryDirectory() as folder, ThreadPoolExecutor() as pool:
+        made = {run: [pool.submit(simulate, how, run, folder) for how in ("plain", "ours")] for run in RUNS}
+        for run, both in made.items():
+            plain, ours = (history.result() for history in both)
+            found = differences(ours, plain)
+            print(
+                f"{run}: {len(ours.variables)} variables",
+                f"differ in {', '.join(found)}" if found else "are the same",
+            )
+            status = status or bool(found)
     return int(status)
 
 

@@ -14,6 +14,15 @@ from numba.extending import lower_builtin
 from cvt_hpc.lanes.kinds import ALIGNMENT, LaneArrayKind, Lanes, Mask, converted, vector_type
 
 
+class _OfLanes(AbstractTemplate):
+    """Types of an operation of lanes.
+
+    They are asked before those that the compiler has for every target, some dozens, which refuse lanes.
+    """
+
+    metadata = {"target": "cpu"}
+
+
 def _common(a, b):
     """The lanes' type of an operation, or None."""
     if isinstance(a, Lanes) and isinstance(b, Lanes):
@@ -26,7 +35,7 @@ def _common(a, b):
 
 def _define_arithmetic(op, instruction: str) -> None:
     @infer_global(op)
-    class Arithmetic(AbstractTemplate):
+    class Arithmetic(_OfLanes):
         def generic(self, arguments, keywords):
             if len(arguments) == 2 and (kind := _common(*arguments)):
                 return signature(kind, *arguments)
@@ -42,7 +51,7 @@ def _define_arithmetic(op, instruction: str) -> None:
 
 def _define_comparison(op, symbol: str) -> None:
     @infer_global(op)
-    class Comparison(AbstractTemplate):
+    class Comparison(_OfLanes):
         def generic(self, arguments, keywords):
             if len(arguments) == 2 and (kind := _common(*arguments)):
                 return signature(Mask(kind.count, kind.linked), *arguments)
@@ -58,7 +67,7 @@ def _define_comparison(op, symbol: str) -> None:
 
 def _define_logic(op, instruction: str) -> None:
     @infer_global(op)
-    class Logic(AbstractTemplate):
+    class Logic(_OfLanes):
         def generic(self, arguments, keywords):
             if len(arguments) == 2 and isinstance(arguments[0], Mask) and arguments[0] == arguments[1]:
                 return signature(arguments[0], *arguments)
@@ -90,7 +99,7 @@ for _op, _instruction in (
 
 
 @infer_global(operator.neg)
-class _Negation(AbstractTemplate):
+class _Negation(_OfLanes):
     def generic(self, arguments, keywords):
         if isinstance(arguments[0], Lanes):
             return signature(arguments[0], *arguments)
@@ -102,7 +111,7 @@ def _negate(context, builder, sig, arguments):
 
 
 @infer_global(operator.invert)
-class _Inversion(AbstractTemplate):
+class _Inversion(_OfLanes):
     def generic(self, arguments, keywords):
         if isinstance(arguments[0], Mask):
             return signature(arguments[0], *arguments)
@@ -114,7 +123,7 @@ def _invert(context, builder, sig, arguments):
 
 
 @infer_global(operator.getitem)
-class _Load(AbstractTemplate):
+class _Load(_OfLanes):
     def generic(self, arguments, keywords):
         array, index = arguments
         if isinstance(array, LaneArrayKind):
@@ -123,7 +132,7 @@ class _Load(AbstractTemplate):
 
 
 @infer_global(operator.setitem)
-class _Store(AbstractTemplate):
+class _Store(_OfLanes):
     def generic(self, arguments, keywords):
         array, _, value = arguments
         if isinstance(array, LaneArrayKind) and isinstance(value, Lanes | types.Number):
