@@ -139,19 +139,12 @@ class _Store(_OfLanes):
             return signature(types.none, array, types.UniTuple(types.intp, 2), value)
 
 
-def _values(context, builder, kind, array):
-    """The array within a LaneArray."""
-    box = cgutils.create_struct_proxy(kind)(context, builder, value=array)
-    return cgutils.create_struct_proxy(kind.array)(context, builder, value=box.data)
-
-
 def place(context, builder, kind, array, row, field):
     """Pointer to the lanes at a place."""
-    values = _values(context, builder, kind, array)
-    fields = cgutils.unpack_tuple(builder, values.shape)[1]
-    flat = builder.add(builder.mul(row, fields), field)
+    lanes = cgutils.create_struct_proxy(kind)(context, builder, value=array)
+    flat = builder.add(builder.mul(row, lanes.fields), field)
     flat = builder.mul(flat, ir.Constant(flat.type, kind.count))
-    return builder.bitcast(builder.gep(values.data, [flat]), vector_type(kind.element).as_pointer())
+    return builder.bitcast(builder.gep(lanes.first, [flat]), vector_type(kind.element).as_pointer())
 
 
 def _alignment(kind: LaneArrayKind) -> int:
@@ -160,11 +153,9 @@ def _alignment(kind: LaneArrayKind) -> int:
 
 def rows_of(context, builder, kind, array):
     """Number of rows of a LaneArray or a plain array."""
-    plain = isinstance(kind, types.Array)
-    values = (
-        context.make_array(kind)(context, builder, array) if plain else _values(context, builder, kind, array)
-    )
-    return cgutils.unpack_tuple(builder, values.shape)[0]
+    if isinstance(kind, types.Array):
+        return cgutils.unpack_tuple(builder, context.make_array(kind)(context, builder, array).shape)[0]
+    return cgutils.create_struct_proxy(kind)(context, builder, value=array).rows
 
 
 def load(context, builder, kind, array, row, field):

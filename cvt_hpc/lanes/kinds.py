@@ -6,6 +6,7 @@ import numpy as np
 from llvmlite import ir
 from numba import extending, types
 from numba.core import cgutils
+from numba.core.typing.templates import AttributeTemplate, infer_getattr
 from numpy.typing import DTypeLike
 
 ALIGNMENT = 64  # bytes: the widest register, so that no access crosses a line of the cache
@@ -94,8 +95,11 @@ class _MaskModel(extending.models.PrimitiveModel):
 
 @extending.register_model(LaneArrayKind)
 class _LaneArrayModel(extending.models.StructModel):
+    """Where the values are, and how many: a third of an array's numbers, which calls hand over one by one."""
+
     def __init__(self, manager, kind):
-        super().__init__(manager, kind, [("data", kind.array)])
+        parts = [("first", types.CPointer(kind.dtype)), ("rows", types.intp), ("fields", types.intp)]
+        super().__init__(manager, kind, parts)
 
 
 @extending.typeof_impl.register(LaneArray)
@@ -104,7 +108,35 @@ def _type_of_lane_array(value, context):
     return LaneArrayKind(dtype, value.data.shape[2], value.linked)
 
 
-extending.make_attribute_wrapper(LaneArrayKind, "data", "data")
+extending.make_attribute_wrapper(LaneArrayKind, "rows", "rows")
+
+
+@infer_getattr
+class _Attributes(AttributeTemplate):
+    key = LaneArrayKind
+
+    def resolve_data(self, kind):
+        return kind.array
+
+
+@extending.lower_getattr(LaneArrayKind, "data")
+def _as_array(context, builder, kind, value):
+    """The values as an array, which owns nothing: the LaneArray outlasts it."""
+    lanes = cgutils.create_struct_proxy(kind)(context, builder, value=value)
+    array = context.make_array(kind.array)(context, builder)
+    count, itemsize = (
+        context.get_constant(types.intp, number) for number in (kind.count, kind.dtype.bitwidth // 8)
+    )
+    row = builder.mul(itemsize, count)
+    context.populate_array(
+        array,
+        data=lanes.first,
+        shape=[lanes.rows, lanes.fields, count],
+        strides=[builder.mul(row, lanes.fields), row, itemsize],
+        itemsize=itemsize,
+        meminfo=None,
+    )
+    return array._getvalue()
 
 
 @extending.unbox(LaneArrayKind)
@@ -112,9 +144,11 @@ def _unbox_lane_array(kind, value, context):
     data = context.pyapi.object_getattr_string(value, "data")
     native = context.unbox(kind.array, data)
     context.pyapi.decref(data)
-    box = cgutils.create_struct_proxy(kind)(context.context, context.builder)
-    box.data = native.value
-    return extending.NativeValue(box._getvalue(), is_error=native.is_error)
+    array = context.context.make_array(kind.array)(context.context, context.builder, native.value)
+    lanes = cgutils.create_struct_proxy(kind)(context.context, context.builder)
+    lanes.first = array.data
+    lanes.rows, lanes.fields, _ = cgutils.unpack_tuple(context.builder, array.shape)
+    return extending.NativeValue(lanes._getvalue(), is_error=native.is_error)
 
 
 def converted(context, builder, value, kind, wanted: Lanes):

@@ -9,7 +9,7 @@ such as a pulley's speed, stands in all lanes alike; a sum over rows becomes the
 
 from llvmlite import ir
 from numba import types
-from numba.extending import intrinsic, overload, overload_attribute, register_jitable
+from numba.extending import intrinsic, overload, register_jitable
 
 from cvt_hpc.lanes.arithmetic import load, place, rows_of
 from cvt_hpc.lanes.functions import anywhere, fma
@@ -45,11 +45,6 @@ def _merge_parts(linked, array, fields):
                 whole[j, field, 0] = parts[j % rows, field, j // rows]
 
     return copy
-
-
-@overload_attribute(LaneArrayKind, "rows")
-def _rows(array):
-    return lambda array: array.data.shape[0]
 
 
 def _turned(builder, kind, value, distance: int):
