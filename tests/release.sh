@@ -53,13 +53,11 @@ for file in "$scratch/cvt_hpc-$version.tar.gz" "$scratch"/cvt_hpc-"$version"-*.w
     rm -rf "$scratch/try" && "$python" -m venv "$scratch/try"
     "$scratch/try/bin/pip" install --quiet --disable-pip-version-check "$file" -c tests/constraints.txt
     (
-        cd "$scratch/try"
-        . bin/activate
-        unset PYTHONPATH
-        [ "$(cvt-hpc --version | head -1 | grep -o "[0-9.]*" | head -1)" = "$version" ] || fail "$file: another version"
-        cvt-hpc examples quickstart > /dev/null
-        cvt-hpc run quickstart.toml --set "load=100 N m" --set "friction_gradient=-0.8 s/m" --out out/tried > /dev/null
-        cvt-hpc map out/tried > /dev/null
+        cd "$scratch/try" && . bin/activate && unset PYTHONPATH &&
+            [ "$(cvt-hpc --version)" = "cvt_hpc $version" ] &&
+            cvt-hpc examples quickstart > /dev/null &&
+            cvt-hpc run jobs/quickstart.toml --set "load=100 N m" --set "friction_gradient=-0.8 s/m" > /dev/null &&
+            cvt-hpc map out/quickstart > /dev/null
     ) || fail "$file: does not run in a fresh environment"
     echo "$(basename "$file"): installed and run in a fresh environment"
 done
