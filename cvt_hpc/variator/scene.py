@@ -161,6 +161,16 @@ TRANSVERSE_DAMPING = not_negative(
     500.0, "N s/m^2", "viscous damping of the transverse motion", sensible=(0.1, 1000000.0)
 )
 
+RINGS: dict[str, Parameter] = {
+    "bending_stiffness": not_negative(
+        0.5, "N m^2", "EI of the belt against leaving its path's curvature", sensible=(0.0001, 1000.0)
+    ),
+    "reference_tension": not_negative(
+        5.3e3, "N", "ring tension at which the rings fit the reference path", sensible=(10.0, 1000000.0)
+    ),
+    "ring_damping": not_negative(4.0, "N s", "longitudinal damping of the rings", sensible=(0.001, 100000.0)),
+}
+
 # Of an element on its rings, whose saddle is ring_offset above the pitch line
 TILT: dict[str, Parameter] = {
     "tilt_spring": not_negative(

@@ -75,8 +75,8 @@ def evaluated(belt, state, work, dt):
 
 def test_rates_of_gaps_strains_angles_and_depths():
     # what forces take as rates along a direction, against differences of gaps at q + X dt with dt = 1
-    belt, state, work, rng = shaken(1, angle_damping=0.0)
-    belt = belt._replace(thickness=belt.thickness + 1e-3)  # nearly all are pressed
+    belt, state, work, rng = shaken(1, angle_damping=0.0, ring_damping=0.0)
+    belt = belt._replace(thickness=belt.thickness + 1e-3, driven_rate=0.0)  # nearly all are pressed
     f, x = fields(state.elements), rng.normal(0.0, 1.0, (64, 4)) * [1.0, 1.0, 100.0, 1.0]
     f[:, U] = 0.0
     # the direction of the tension is its rate at rest: at strains of zero
@@ -91,12 +91,14 @@ def test_rates_of_gaps_strains_angles_and_depths():
         write(state.elements, g)
         _prepare(belt, state, work, 1.0)
         measured[sign] = fields(work.step)
+        evaluated(belt, state, work, 1.0)
         _accept(belt, state, work, np.zeros(pushbelt_fields.INPUTS), 1.0)
         _prepare(belt, state, work, 1.0)
         moved[sign] = fields(work.step)
     difference = (measured[1.0] - measured[-1.0]) / (2.0 * small)
-    # springs of tilt and flanks act at mean positions, of which a quarter are those that are reached
+    # rings, springs of tilt and flanks act at mean positions, of which a quarter are those that are reached
     means = [pushbelt_fields.START_MOMENT_I, pushbelt_fields.START_MOMENT_J, pushbelt_fields.DEPTH]
+    means.append(pushbelt_fields.START_TENSION)
     difference[:, means] = 0.25 * (moved[1.0] - moved[-1.0])[:, means] / (2.0 * small)
     # contacts by the mean gap, and by its rate at the end of the step times three quarters of it
     gaps = [pushbelt_fields.EDGE_MEAN, pushbelt_fields.HEAD_MEAN, pushbelt_fields.NOSE_MEAN]
@@ -114,7 +116,7 @@ def test_rates_of_gaps_strains_angles_and_depths():
         forces[share] = fields(work.iterate), fields(state.elements)
     iterate, elements = ((forces[small][k] - forces[0.0][k]) / small for k in (0, 1))
     pairs = {
-        pushbelt_fields.PREDICTED_TENSION: iterate[:, pushbelt_fields.ITERATE_TENSION],
+        pushbelt_fields.START_TENSION: iterate[:, pushbelt_fields.ITERATE_TENSION],
         pushbelt_fields.EDGE_GAP: -elements[:, pushbelt_fields.EDGE] / belt.contact_stiffness,
         pushbelt_fields.HEAD_GAP: -elements[:, pushbelt_fields.HEAD] / belt.contact_stiffness,
         pushbelt_fields.NOSE_OFFSET: elements[:, pushbelt_fields.NOSE] / belt.nose_stiffness,
@@ -215,7 +217,7 @@ def test_free_spinning_ring():
     # T = m' v^2, of a polygon of masses m: T = m R omega^2 / (2 sin(pi / n))
     radius, omega = 0.1082, 250.0
     belt, state = start(given())
-    belt = belt._replace(thickness=1e-3, centre_distance=10.0, transverse_damping=0.0)
+    belt = belt._replace(thickness=1e-3, centre_distance=10.0, transverse_damping=0.0, ring_time=STEP)
     state.pulleys[[pushbelt_fields.DRIVING_RADIUS, pushbelt_fields.DRIVEN_RADIUS]] = 0.01
     angle = 2.0 * np.pi * np.arange(NODES) / NODES
     o, x = np.stack([np.cos(angle), np.sin(angle)], 1), np.stack([-np.sin(angle), np.cos(angle)], 1)
@@ -435,6 +437,7 @@ def test_power_balance_over_a_revolution(run):
             pushbelt_fields.DAMPING_LOSS,
             pushbelt_fields.BELT_LOSS,
             pushbelt_fields.ELEMENT_LOSS,
+            pushbelt_fields.STRETCH_LOSS,
         ]
     ]
     damped = rates[list(pushbelt_fields.DAMPED.values())]
@@ -446,7 +449,7 @@ def test_power_balance_over_a_revolution(run):
     )
     # what Newton's method leaves; elastic sheaves lean along the arc, which has no part in the forces
     assert taken - losses.sum() - damped.sum() == pytest.approx(0.0, abs=2e-3 * losses.sum())
-    assert (losses > 1.0).all()
+    assert (losses[:-1] > 1.0).all() and 0.0 < losses[-1] < 1.0
     # contacts have dampers of 13 us, more than the step needs; flanks: as elements enter faster than they leave,
     # -0.3 W at 10 us
     named = dict(zip(pushbelt_fields.DAMPED, damped, strict=True))
@@ -591,7 +594,7 @@ def test_a_step_loses_what_its_contacts_take(run):
     points = [pitch_points(belt, f, driven) for f in three]
     speeds = np.array(turning)[:, [pushbelt_fields.DRIVING_SPEED, pushbelt_fields.DRIVEN_SPEED]][:, driven]
     distance = np.linalg.norm(points, axis=2)
-    angle = np.array([np.arctan2(*p.T[::-1]) for p in points])
+    angle = np.unwrap([np.arctan2(*p.T[::-1]) for p in points], axis=0)
     radial = np.diff(distance, axis=0) / STEP
     mid = np.linalg.norm([0.5 * (points[k] + points[k + 1]) for k in (0, 1)], axis=2)
     tangential = mid * (np.diff(angle, axis=0) / STEP - speeds)
@@ -921,7 +924,7 @@ def rate_and_turn(x):
 
 def test_free_vibration_of_tilt_keeps_its_energy():
     """Elements rock on a ring at rest; the frequency errs by (w dt)^2 / 12."""
-    belt, state = start(given(angle_damping=0.0))
+    belt, state = start(given(angle_damping=0.0, ring_damping=0.0))
     belt = belt._replace(mass=1e9, ring_mass=1e9, thickness=1e-3, ring_stiffness=1e-9, transverse_damping=0.0)
     belt = belt._replace(centre_distance=10.0)  # away from the sheaves
     angle = 2.0 * np.pi * np.arange(NODES) / NODES
@@ -938,6 +941,68 @@ def test_free_vibration_of_tilt_keeps_its_energy():
     growth, found_turn = rate_and_turn(np.array(found))
     assert growth == pytest.approx(0.0, abs=0.1)  # -770 by the angle at the end of the step
     assert found_turn == pytest.approx(turn * (1.0 - turn**2 / 12.0), rel=1e-4)
+
+
+@pytest.mark.parametrize("time", [0.0, 1e-6])
+def test_a_ring_that_breathes_loses_what_its_damper_takes(time):
+    """Far from the pulleys: m w'' = -2 sin(pi / n) EA (w + tau w') / R; the frequency errs by (w dt)^2 / 12."""
+    belt, state, work = on_a_pulley(given(angle_stiffness=0.0, angle_damping=0.0), 0.0, 0.0)
+    belt = belt._replace(ring_stiffness=6e6, ring_time=time, flank_stiffness=0.0)
+    f, speed = fields(state.elements), 1e-3
+    outward = np.stack([f[:, pushbelt_fields.HEADING_Z], -f[:, pushbelt_fields.HEADING_Y]], 1)
+    f[:, [pushbelt_fields.U_Y, pushbelt_fields.U_Z]] = speed * outward
+    write(state.elements, f)
+    found = []
+    for _ in range(200):
+        assert advance(belt, b.NEWTON, state, work, constant(0.0, 0.0), 1, STEP) == pushbelt_fields.CONVERGED
+        f = fields(state.elements)
+        found.append(np.hypot(f[0, pushbelt_fields.Y], f[0, pushbelt_fields.Z]))
+    mass = belt.mass + belt.ring_mass
+    turn = STEP * np.sqrt(2.0 * np.sin(np.pi / NODES) * belt.ring_stiffness / (0.1 * mass))
+    growth, found_turn = rate_and_turn(np.array(found))
+    # 0.1: the damper acts at the end of the step
+    assert growth == pytest.approx(-0.5 * time * (turn / STEP) ** 2, rel=0.1, abs=0.5)
+    assert found_turn == pytest.approx(turn * (1.0 - turn**2 / 12.0), rel=2e-3)
+    taken = 0.5 * NODES * mass * speed**2 * (1.0 - np.exp(2.0 * growth * 200 * STEP))
+    assert state.totals[pushbelt_fields.STRETCH_LOSS] == pytest.approx(taken, rel=0.1, abs=1e-9)
+
+
+def test_a_ring_on_a_soft_bed_vibrates_by_its_bending_as_well():
+    """In its fourth mode, all around one pulley without friction: w^2 rises by EI k^4 / m, and energy is kept.
+
+    Rings flow along the elements by w' / n, so that their tension stays even. Elements do not turn.
+    """
+    soft = {"flank_stiffness": 1e5, "kinetic_friction": 0.0, "ring_friction": 0.0}
+    soft |= {"angle_stiffness": 0.0, "angle_damping": 0.0}
+    found, mode, pressed, speed, stiffness = [], 4, 1.0, 1e-3, 0.5
+    pitch, angle = 0.2 * np.sin(np.pi / NODES), 2.0 * np.pi * mode * np.arange(NODES) / NODES
+    for bending in (0.0, stiffness):
+        belt, state, work = on_a_pulley(given(**soft, bending_stiffness=bending), 0.0, pressed)
+        belt = belt._replace(
+            ring_stiffness=6e6, centre_distance=1e-9, driven_rate=0.0, inertia=1e3, pitch=pitch
+        )
+        state.pulleys[pushbelt_fields.DRIVEN_RADIUS] = state.pulleys[pushbelt_fields.DRIVING_RADIUS]
+        f = fields(state.elements)
+        f[:, pushbelt_fields.LENGTH] /= (
+            1.0 + pressed * belt.sine / np.sin(np.pi / NODES) / belt.ring_stiffness
+        )
+        outward = np.stack([f[:, pushbelt_fields.HEADING_Z], -f[:, pushbelt_fields.HEADING_Y]], 1)
+        f[:, [pushbelt_fields.U_Y, pushbelt_fields.U_Z]] = speed * np.cos(angle)[:, None] * outward
+        f[:, pushbelt_fields.V] = -speed / mode * np.sin(angle)
+        write(state.elements, f)
+        moved = []
+        for _ in range(1000):
+            assert advance(belt, b.NEWTON, state, work, constant(0.0, 0.0), 1, STEP) == 0
+            f = fields(state.elements)
+            moved.append(np.hypot(f[:, pushbelt_fields.Y], f[:, pushbelt_fields.Z]) @ np.cos(angle))
+        growth, turn = rate_and_turn(np.array(moved))
+        assert growth == pytest.approx(0.0, abs=0.05)
+        found.append((2.0 * np.sin(0.5 * turn) / STEP) ** 2)
+    wave = 2.0 * np.sin(np.pi * mode / NODES) / pitch
+    expected = stiffness * pitch * wave**4 / (belt.mass + belt.ring_mass * (1.0 + 1.0 / mode**2))
+    assert expected > found[0]
+    # segments lean against the path by w' cos(pi / n): 1e-3
+    assert found[1] - found[0] == pytest.approx(expected, rel=2e-3)
 
 
 def test_free_vibration_on_flanks_that_stay_shut_keeps_its_energy():

@@ -33,6 +33,8 @@ GIVEN = {
     "nose_stiffness": 1e8,
     "ring_mass": 0.165,
     "ring_stiffness": 6e6,
+    "ring_damping": 4.0,
+    "bending_stiffness": 0.0,
     "ring_strain": 1e-4,
     "ring_bending": EI,
     "ring_shear": 2.4e6,

@@ -74,6 +74,7 @@ def test_tensions_of_both_packages_change_by_their_directions():
     right, left = np.linalg.norm(np.roll(place, -1, axis=1) - place, axis=2)
     # the direction of a tension is its rate at a strain of zero
     f[:, spatial_fields.LENGTH], f[:, spatial_fields.HALF_LENGTH] = 0.5 * (right + left), 0.5 * (right - left)
+    belt = belt._replace(ring_time=3.0)  # by which a tension at the start of a step changes with the speeds
     x = rng.normal(0.0, 1.0, (NODES, 9)) * [1, 1, 1, 100, 100, 100, 1, 0, 1]
     small, measured = 3e-9, {}
     for sign in (-1.0, 0.0, 1.0):
@@ -89,27 +90,32 @@ def test_tensions_of_both_packages_change_by_their_directions():
     of_both, apart = stretches(step, x)
     own, cross = step[:, spatial_fields.TENSION_SLOPE], step[:, spatial_fields.CROSS_SLOPE]
     assert np.abs(cross).max() > 1e-4 * own.max()
+    damper = 3.0 / 3.25
     for field, expected in (
-        (spatial_fields.PREDICTED_TENSION, -own * of_both - cross * apart),
-        (spatial_fields.PREDICTED_DIFFERENCE, -own * apart - cross * of_both),
+        (spatial_fields.START_TENSION, -damper * (own * of_both + cross * apart)),
+        (spatial_fields.START_DIFFERENCE, -damper * (own * apart + cross * of_both)),
     ):
         found = (measured[1.0][:, field] - measured[-1.0][:, field]) / (2.0 * small)
         # 2e-7: differences of lengths of 6 mm by 3e-9 m
         assert found == pytest.approx(expected, abs=2e-7 * np.abs(expected).max())
-    # slips: v + w and v - w less the speeds of both lines along themselves
-    for field, direction, number in (
-        (spatial_fields.START_SLIP, spatial_fields.SLIP_BY, V),
-        (spatial_fields.START_HALF_SLIP, spatial_fields.HALF_SLIP_BY, W),
-    ):
-        found = (measured[1.0][:, field] - measured[-1.0][:, field]) / (2.0 * small)
-        expected = along(step, direction, x, number)
-        assert found == pytest.approx(expected, abs=1e-9 * np.abs(expected).max())
+    f[:, spatial_fields.SPEED : spatial_fields.SPEED + 8] = f[:, spatial_fields.HALF_SPEED] = 0.0
+    f[:, spatial_fields.LENGTH], f[:, spatial_fields.HALF_LENGTH] = right, 0.1 * right
+    state.elements.data[:] = in_lanes(f).data
+    TWO.prepare(belt, state, work, 1.0)
+    step, half = of_lanes(work.step), 0.5 * belt.ring_stiffness
+    one, two = half * (1.0 / 1.1 - 1.0), half * (left / (0.9 * right) - 1.0)
+    assert step[:, spatial_fields.START_TENSION] == pytest.approx(one + two)
+    assert step[:, spatial_fields.START_DIFFERENCE] == pytest.approx(one - two)
 
 
 def test_both_packages_slip_along_their_own_lines():
     belt, state, work, _ = shaken(2)
+    f = of_lanes(state.elements).copy()
+    f[:, spatial_fields.CHANGE : spatial_fields.CHANGE + 9] = 0.0
+    state.elements.data[:] = in_lanes(f).data
     TWO.prepare(belt, state, work, STEP)
-    f, step = of_lanes(state.elements), of_lanes(work.step)
+    TWO.evaluate(belt, state, work, LOAD, STEP)
+    found = of_lanes(state.elements)
     slips = []
     for side, line, t in zip((1.0, -1.0), *chains.lines(belt, f), strict=True):
         moving = f[:, spatial_fields.SPEED : spatial_fields.SPEED + 3] + np.cross(
@@ -117,10 +123,11 @@ def test_both_packages_slip_along_their_own_lines():
         )
         slips.append(f[:, spatial_fields.V] + side * f[:, spatial_fields.HALF_SPEED] - np.sum(t * moving, 1))
     scale = np.abs(slips).max()
-    assert step[:, spatial_fields.START_SLIP] == pytest.approx(0.5 * (slips[0] + slips[1]), abs=1e-12 * scale)
-    assert step[:, spatial_fields.START_HALF_SLIP] == pytest.approx(
-        0.5 * (slips[0] - slips[1]), abs=1e-12 * scale
-    )
+    for field, slip in (
+        (spatial_fields.RING_SLIP, 0.5 * (slips[0] + slips[1])),
+        (spatial_fields.HALF_SLIP, 0.5 * (slips[0] - slips[1])),
+    ):
+        assert found[:, field] == pytest.approx(slip, abs=1e-12 * scale)
 
 
 def evaluated(belt, state, work):
@@ -154,9 +161,9 @@ def test_the_linear_system_is_the_slope_of_the_residuals():
     of_both, apart = stretches(step, change)
     own, cross = step[:, spatial_fields.TENSION_SLOPE], step[:, spatial_fields.CROSS_SLOPE]
     for predicted, at, expected in (
-        (spatial_fields.PREDICTED_TENSION, spatial_fields.ITERATE_TENSION, own * of_both + cross * apart),
+        (spatial_fields.START_TENSION, spatial_fields.ITERATE_TENSION, own * of_both + cross * apart),
         (
-            spatial_fields.PREDICTED_DIFFERENCE,
+            spatial_fields.START_DIFFERENCE,
             spatial_fields.ITERATE_DIFFERENCE,
             own * apart + cross * of_both,
         ),
@@ -254,9 +261,11 @@ def test_packages_that_run_apart_are_braked_by_what_is_booked_as_loss():
     assert at_rings_now - at_rings == pytest.approx(lost_now - lost, rel=1e-2)
 
 
-def test_what_a_step_damps_of_waves_in_the_packages_is_booked():
+@pytest.mark.parametrize("time", [0.0, 1e-6])
+def test_waves_in_the_packages_lose_what_their_damper_takes(time):
     nodes = 216
     constants, _, fields = chains.free_ring(nodes, 0.1082, 250.0)
+    constants = constants._replace(ring_time=time)
     state = with_two_flows(constants, chains.state(fields))
     f = of_lanes(state.elements).copy()
     f[:, spatial_fields.HALF_SPEED] = 5.0 * np.cos(6.0 * np.pi * np.arange(nodes) / nodes)
@@ -265,9 +274,10 @@ def test_what_a_step_damps_of_waves_in_the_packages_is_booked():
     work, rest = b.workspace(constants, nodes, 2), np.zeros((2, spatial_fields.INPUTS))
     assert advance_two(constants, b.NEWTON_OF_TWO_FLOWS, state, work, rest, 60, 1e-6) == 0
     after, _, _ = chains.energy_and_momentum(constants, of_lanes(state.elements))
-    assert before - after > 0.2  # of 1 J: waves of 22 kHz
-    # the formula is that of waves slow against the step: (2 pi f dt)^2 is 2 %
-    assert state.totals[pushbelt_fields.RING_DAMPED] == pytest.approx(before - after, rel=0.04)
+    assert (before - after > 0.2) == (time > 0.0)  # of 1 J: waves of 22 kHz
+    # (2 pi f dt)^2 is 2 %, and energy that is not lost is read half a step late: 5 % of 1 J
+    loss = state.totals[pushbelt_fields.STRETCH_LOSS]
+    assert loss == pytest.approx(before - after, **({"rel": 0.04} if time else {"abs": 0.1}))
 
 
 def test_one_flow_is_two_flows_of_equal_packages_in_the_plane():

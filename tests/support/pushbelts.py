@@ -16,6 +16,8 @@ ASSUMED = {
     "ring_mass": 0.165,  # [kg]
     "ring_stiffness": 6.0e6,  # EA [N]
     "ring_strain": 1e-4,  # at the start
+    "ring_damping": 4.0,  # [N s]
+    "bending_stiffness": 0.0,  # [N m^2]
     "half_wedge_angle": np.radians(11.0),  # [rad]
     "flank_stiffness": 5e7,  # [N/m]
     "local_compliance": 0.0,

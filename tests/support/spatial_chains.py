@@ -43,6 +43,8 @@ def belt(**given):
         "ring_mass": 0.165 / 432,
         "ring_rotary_inertia": 0.165 / 432 * 9.75e-3**2 / 12.0,
         "ring_stiffness": 6.0e6,
+        "ring_time": 4.0 / 6.0e6,
+        "bending_stiffness": 0.0,
         "ring_bending": 47.6,
         "ring_shear": 2.4e6,
         "flank_stiffness": 5e7,
@@ -113,6 +115,7 @@ def free_ring(nodes, radius, spin, lateral=0.0):
         mass=2 * 1.858e-3,
         ring_mass=0.165 / nodes,
         ring_rotary_inertia=0.165 / nodes * 9.75e-3**2 / 12.0,
+        ring_time=1e-5,  # it settles on the circle of its steps, half a step from where it starts
     )
     tension = (constants.mass + constants.ring_mass) * spin**2 * radius / (2.0 * np.sin(np.pi / nodes))
     fields = spinning_ring(nodes, radius, spin)

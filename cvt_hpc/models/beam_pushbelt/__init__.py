@@ -30,6 +30,8 @@ _IDLE = (
     "local_stiffness",
     "local_length",
     "ring_friction_speed",
+    "ring_damping",
+    "bending_stiffness",
     "friction_speed",
     *pushbelt.MODES,
 )

@@ -16,6 +16,7 @@ BEAM_COST, ELEMENT_COST, RUB_COST, SAMPLE_COST = 3e-6, 6e-7, 2e-7, 3e-4
 _OTHERWISE = {
     "iterations": "sweeps over all contacts in a step, mean",
     "element_loss": "0: contacts between elements have no dampers",
+    "stretch_loss": "0: the ring has no damper",
     "numerical_damping": "0: power that time steps damp is not separated, but left in power_residual",
 }
 VARIABLES = tuple(replace(v, comment=_OTHERWISE.get(v.name, v.comment)) for v in pushbelt.VARIABLES)

@@ -40,15 +40,11 @@ PARAMETERS: dict[str, dict[str, Parameter]] = {
         "ring_stiffness": positive(
             7.7e6, "N", "longitudinal stiffness EA of all rings", sensible=(10000.0, 10000000000.0)
         ),
-        "bending_stiffness": not_negative(
-            0.5, "N m^2", "EI of the belt against leaving its path's curvature", sensible=(0.0001, 1000.0)
-        ),
+        "bending_stiffness": scene.RINGS["bending_stiffness"],
         "play": Parameter(
             0.3e-3, "m", "sum of the gaps between elements on the reference path", sensible=(1e-07, 0.05)
         ),
-        "reference_tension": not_negative(
-            5.3e3, "N", "ring tension at which the rings fit the reference path", sensible=(10.0, 1000000.0)
-        ),
+        "reference_tension": scene.RINGS["reference_tension"],
         "ring_offset": Parameter(
             1e-3, "m", "radial offset of the rings' neutral line from the pitch line", sensible=(1e-06, 0.05)
         ),
@@ -61,9 +57,7 @@ PARAMETERS: dict[str, dict[str, Parameter]] = {
         "element_damping": not_negative(
             20.0, "N s", "longitudinal damping of the pressed elements", sensible=(0.001, 100000.0)
         ),
-        "ring_damping": not_negative(
-            4.0, "N s", "longitudinal damping of the rings", sensible=(0.001, 100000.0)
-        ),
+        "ring_damping": scene.RINGS["ring_damping"],
         "longitudinal_mass": positive(
             1.0, "", "factor on the layers' inertia along the path; other than 1 it is another belt"
         ),

@@ -33,7 +33,7 @@ def pair_forces(belt, state, step, iterate, dt):
 
         stretch = step[j, f.TENSION_I_Y] * iy + step[j, f.TENSION_I_Z] * iz + iv
         stretch -= step[j, f.TENSION_J_Y] * jy + step[j, f.TENSION_J_Z] * jz + jv
-        iterate[j, f.ITERATE_TENSION] = step[j, f.PREDICTED_TENSION] - step[j, f.TENSION_SLOPE] * stretch
+        iterate[j, f.ITERATE_TENSION] = step[j, f.START_TENSION] - step[j, f.TENSION_SLOPE] * stretch
 
         turn = step[j, f.TURN_Y] * (jy - iy) + step[j, f.TURN_Z] * (jz - iz)
         iterate[j, f.MOMENT_I] = step[j, f.START_MOMENT_I] + steep * step[j, f.ANGLE_I] * (iw - turn)
@@ -163,8 +163,8 @@ def residuals(belt, state, increments, openings, shapes, load, step, iterate, sc
         across = belt.ring_mass * (t_z * dy - t_y * dz)
         n_y, n_z = step[j, f.NORMAL_Y], step[j, f.NORMAL_Z]
         drag = belt.transverse_damping * (n_y * (state[j, f.U_Y] + dy) + n_z * (state[j, f.U_Z] + dz))
-        f_y = -per_dt * (belt.mass * dy + across * t_z) - drag * n_y
-        f_z = -per_dt * (belt.mass * dz - across * t_y) - drag * n_z
+        f_y = -per_dt * (belt.mass * dy + across * t_z) - drag * n_y + step[j, f.BENT_Y]
+        f_z = -per_dt * (belt.mass * dz - across * t_y) - drag * n_z + step[j, f.BENT_Z]
         f_w, f_v = -per_dt * belt.inertia * dw, -per_dt * belt.ring_mass * dv
 
         tension = iterate[j, f.ITERATE_TENSION]

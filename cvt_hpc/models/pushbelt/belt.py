@@ -13,6 +13,7 @@ import numpy as np
 
 from cvt_hpc.lanes import LaneArray
 from cvt_hpc.models.pushbelt import fields as f
+from cvt_hpc.models.pushbelt.ring_bending import COLUMNS
 from cvt_hpc.physics.friction_laws import Law
 from cvt_hpc.physics.geometry import Variator, driven_radius, variator
 from cvt_hpc.solvers.linked_blocks import empty_scratch, empty_system
@@ -37,6 +38,10 @@ class Belt(NamedTuple):
         [kg], [kg m^2], and mass of the ring for each element [kg].
     ring_stiffness : float
         EA of both ring packages [N].
+    bending_stiffness, pitch : float
+        EI of theirs in the plane [N m^2], distance of neighbours [m].
+    ring_time : float
+        Their damping along the belt over that stiffness [s].
     flank_stiffness : float
         Normal force at each flank by its penetration, element and local bending of the sheave in series,
         where neighbours have the same force [N/m].
@@ -81,6 +86,9 @@ class Belt(NamedTuple):
     inertia: float
     ring_mass: float
     ring_stiffness: float
+    bending_stiffness: float
+    pitch: float
+    ring_time: float
     flank_stiffness: float
     local_compliance: float
     local_decay: float
@@ -190,8 +198,8 @@ class Workspace(NamedTuple):
         `BeltState.increments` at its start.
     kept : (2, STATE_FIELDS) array
         States of two elements before the last correction.
-    bent : (elements, 4) array
-        Of `local_bending`.
+    bent : (elements, COLUMNS) array
+        Of `ring_bending` and `local_bending`.
     """
 
     step: LaneArray
@@ -226,8 +234,10 @@ def shared_constants(given: Mapping[str, Any], chord: float, names: Sequence[str
         "sine": float(np.sin(angle)),
         "cosine": float(np.cos(angle)),
         "thickness": float(chord - g["play"] / g["elements"]),
+        "pitch": float(chord),
         "mass": float(g["element_mass"]),
         "ring_mass": float(g["ring_mass"] / g["elements"]),
+        "ring_time": float(g["ring_damping"] / g["ring_stiffness"]),
         "transverse_damping": float(g["transverse_damping"] * chord),
         "flank_law": int(Law[g["friction_law"].upper()]),
         "flank_kinetic": float(g["kinetic_friction"]),
@@ -387,5 +397,5 @@ def empty_workspace(
         inputs=np.zeros(inputs),
         increments=np.zeros(columns - 1),
         kept=np.zeros((2, state)),
-        bent=np.zeros((nodes, 4)),
+        bent=np.zeros((nodes, COLUMNS)),
     )

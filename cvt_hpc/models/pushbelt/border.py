@@ -10,13 +10,10 @@ M (X - X_old) / dt = f times the mean speed (X + X_old) / 2, which belongs to q_
 forces do, is the change of kinetic energy without remainder. So a force takes its magnitude times the mean
 rate along its direction: that is the loss of friction and dampers.
 
-Tension T has its magnitude from the end of the step. It takes -T r for the change r of the length within a
-step at the mean rate, and stores the potentials half a step later and earlier, which add up. The difference
-is k r^2, as of a damper k dt. The step damps by that, and it is neither physics nor an error in the balance
-of power.
-
-Springs of tilt and flanks have their magnitude from the middle of the step: there the difference is 0 but
-for flanks that close or open. So have contacts between elements, whose dampers take all of the difference.
+Springs of rings, tilt and flanks have their magnitude from the middle of the step: what they take from the
+motion they store, but for flanks that close or open. So have contacts between elements, whose dampers take
+all of the difference. What is not a damper's is the step's, neither physics nor an error in the balance of
+power.
 """
 
 import numpy as np
@@ -25,7 +22,7 @@ from numba.extending import register_jitable
 from cvt_hpc.kernels import kernel
 from cvt_hpc.lanes import ahead, around, like, maximum
 from cvt_hpc.models.pushbelt import fields as f
-from cvt_hpc.models.pushbelt.chain import LEAST_CONTACT_TIME, contact_shares
+from cvt_hpc.models.pushbelt.chain import LEAST_CONTACT_TIME, contact_shares, ring_share
 from cvt_hpc.physics.contact_laws import taken
 
 
@@ -156,6 +153,7 @@ def book(belt, state, work, dt):
     driven_speed = state.pulleys[f.DRIVEN_SPEED] + 0.5 * state.increments[0]
     ahead_share, _, _ = contact_shares(belt, dt)
     half_ahead = 0.5 / ahead_share
+    damper = belt.ring_time / ring_share(belt, dt)
     flank = ring = tilt = drag = between = sheaves = stretching = like(0.0, elements[0, f.U_Y])
     for j in range(step.rows):
         dy, dz = elements[j, f.CHANGE_Y], elements[j, f.CHANGE_Z]
@@ -173,7 +171,8 @@ def book(belt, state, work, dt):
 
         stretch = step[j, f.TENSION_I_Y] * y + step[j, f.TENSION_I_Z] * z + v
         stretch -= step[j, f.TENSION_J_Y] * next_y + step[j, f.TENSION_J_Z] * next_z + next_v
-        stretching += step[j, f.TENSION_SLOPE] * stretch * stretch
+        more = 0.5 * (step[j, f.START_TENSION] - iterate[j, f.ITERATE_TENSION])
+        stretching += damper * stretch * (step[j, f.TENSION_SLOPE] * stretch + more)
 
         turn = step[j, f.TURN_Y] * (next_y - y) + step[j, f.TURN_Z] * (next_z - z)
         more = 0.5 * (step[j, f.TURN_Y] * (next_dy - dy) + step[j, f.TURN_Z] * (next_dz - dz))
@@ -223,4 +222,4 @@ def book(belt, state, work, dt):
     add_to_totals(state, scratch, f.BELT_LOSS, dt * drag)
     book_contacts(belt, state, scratch, between, dt)
     add_to_totals(state, scratch, f.FLANK_DAMPED, sheaves)
-    add_to_totals(state, scratch, f.RING_DAMPED, dt * stretching)
+    add_to_totals(state, scratch, f.STRETCH_LOSS, dt * stretching)

@@ -1,9 +1,9 @@
 """Geometry of the chain of elements in lanes: predicted gaps and strains, and the directions of all forces.
 
 Index i is an element and j the next one. x is the running direction of an element and o = (x_z, -x_y) its
-outward normal; both turn as x' = -o, o' = x. Directions are those at q_k. The magnitude of tension is that
-at q* = q_k + dt X_k, of tilt and flanks those at q_k, and of contacts between elements those of q_{k-1}, q_k
-and q*. From there on they are linear in the change of the speeds X.
+outward normal; both turn as x' = -o, o' = x. Directions are those at q_k. Magnitudes of tension, tilt and
+flanks are those at q_k, and of contacts between elements those of q_{k-1}, q_k and q* = q_k + dt X_k. From
+there on they are linear in the change of the speeds X.
 
 Slip speeds at the flanks take the radial direction and the lever of the contact point at mid step, and speeds
 across the path that direction. At either end of a step the direction would add v phi' dt / 2 of false radial
@@ -34,6 +34,21 @@ def contact_shares(belt, dt):
     """
     share = max(belt.contact_time / dt, LEAST_CONTACT_TIME)
     return BETA + share, 1.0 - 2.0 * BETA - share, BETA
+
+
+@register_jitable
+def ring_share(belt, dt):
+    """Increase of the ring's strain by its rate in a step, by which tension rises [s]."""
+    return BETA * dt + belt.ring_time
+
+
+@register_jitable
+def turned_length(belt, length, spin, dt):
+    """What a segment that turns adds to its mean length, and by the rate of it to its tension [m].
+
+    Rates along the directions at q_k leave out that the length grows by spin^2 dt / 2 within half a step.
+    """
+    return length * dt * (BETA * dt + 0.5 * belt.ring_time) * spin * spin
 
 
 @register_jitable
@@ -104,7 +119,6 @@ def predict(belt, state, pulleys, step, dt):
         per_size = 1.0 / sqrt(t_y * t_y + t_z * t_z)
         t_y, t_z = t_y * per_size, t_z * per_size
         step[j, f.T_Y], step[j, f.T_Z] = t_y, t_z
-        step[j, f.START_SLIP] = state[j, f.V] - t_y * u_y - t_z * u_z
 
         driven = y > 0.5 * belt.centre_distance
         centre = select(driven, like(belt.centre_distance, y), 0.0)
@@ -147,19 +161,16 @@ def link(belt, state, step, dt):
         zj = (ahead(step, j, f.PREDICTED_HEADING_Y), ahead(step, j, f.PREDICTED_HEADING_Z))
 
         e_y, e_z = rj[0] - ri[0], rj[1] - ri[1]
-        per_length = 1.0 / sqrt(e_y * e_y + e_z * e_z)
+        length = sqrt(e_y * e_y + e_z * e_z)
+        per_length = 1.0 / length
         e_y, e_z = e_y * per_length, e_z * per_length
         step[j, f.TENSION_I_Y], step[j, f.TENSION_I_Z] = e_y - step[j, f.T_Y], e_z - step[j, f.T_Z]
         step[j, f.TENSION_J_Y] = e_y - ahead(step, j, f.T_Y)
         step[j, f.TENSION_J_Z] = e_z - ahead(step, j, f.T_Z)
-        f_y, f_z = sj[0] - si[0], sj[1] - si[1]
-        length = sqrt(f_y * f_y + f_z * f_z)
-        per_unstretched = 1.0 / (
-            state[j, f.LENGTH] + dt * (step[j, f.START_SLIP] - ahead(step, j, f.START_SLIP))
-        )
-        step[j, f.PREDICTED_TENSION] = belt.ring_stiffness * (length * per_unstretched - 1.0)
-        step[j, f.TENSION_SLOPE] = dt * belt.ring_stiffness * per_unstretched
-
+        shortened = step[j, f.TENSION_I_Y] * state[j, f.U_Y] + step[j, f.TENSION_I_Z] * state[j, f.U_Z]
+        shortened -= step[j, f.TENSION_J_Y] * ahead(state, j, f.U_Y)
+        shortened -= step[j, f.TENSION_J_Z] * ahead(state, j, f.U_Z)
+        shortened += state[j, f.V] - ahead(state, j, f.V)
         turn_y, turn_z = -e_z * per_length, e_y * per_length
         angle_i, angle_j = e_y * xi[0] + e_z * xi[1], e_y * xj[0] + e_z * xj[1]
         step[j, f.TURN_Y] = turn_y
@@ -169,6 +180,12 @@ def link(belt, state, step, dt):
         turn = turn_y * (ahead(state, j, f.U_Y) - state[j, f.U_Y]) + turn_z * (
             ahead(state, j, f.U_Z) - state[j, f.U_Z]
         )
+
+        per_unstretched = 1.0 / state[j, f.LENGTH]
+        length += turned_length(belt, length, turn, dt) - belt.ring_time * shortened
+        step[j, f.START_TENSION] = belt.ring_stiffness * (length * per_unstretched - 1.0)
+        step[j, f.TENSION_SLOPE] = ring_share(belt, dt) * belt.ring_stiffness * per_unstretched
+
         rate_i, rate_j = angle_i * (state[j, f.OMEGA] - turn), angle_j * (ahead(state, j, f.OMEGA) - turn)
         damping = 0.5 * belt.angle_damping
         step[j, f.START_MOMENT_I] = stiffness * (e_y * xi[1] - e_z * xi[0]) + damping * rate_i

@@ -10,6 +10,7 @@ friction of the belt, the transverse damping, wedge angle and inertia, the law o
 - a flank alone has half the axial compliance of a station's element, 1 / c_e of both flanks. Its own
   stiffness c is normal force over normal overlap, of which the axial one is c cos^2 d0:
   1 / (c cos^2 d0) = 1 / (2 c_e);
+- rings bend, are as long and are damped by the same keys;
 - local bending has the same keys. `sheave_stiffness` scales the pushbelt's modes of opening as well, so a
   value other than 1 requires `stiffness_of` "sheave";
 - tilt opens a pulley by r^2 / c_tilt cos(phi) times the sum of F cos(phi), and likewise with sin, while modes
@@ -18,10 +19,7 @@ friction of the belt, the transverse damping, wedge angle and inertia, the law o
 - elements tilt against the rings by the same spring and damper. Of a continuum whose elements do not tilt, by
   the pushbelt's default ones.
 
-Assumptions: terms of the continuum alone (`docs/guide/terms.md`) are left out: damping of the rings, bending
-(0.5 N m^2 adds EI q^2 = 0.9 kN to the 5.7 kN that a strand of 148 mm has in its second mode at 120 N m), and
-the rings' length, since the pushbelt's rings fit the path at a strain of 1e-4; `README.md` has the effect of
-that.
+Assumptions: terms of the continuum alone (`docs/guide/terms.md`) are left out.
 Elements have an inertia against tilting and a second contact of which the continuum knows nothing: the
 pushbelt's own defaults. The push adds P to its stiffness against tilting, k_a, and a moment P kappa t / 2, t
 being an element's thickness: (k_a + P) theta = -d (f_t - P_s) - P kappa t / 2 in a steady state, of which the

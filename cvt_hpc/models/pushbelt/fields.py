@@ -32,8 +32,9 @@ Kernels read `state[j, f.TENSION]`; the arrays are those of `belt`, a row an ele
     V_FILTERED,  # sliding speed at which the friction law of the flanks is read [m/s]
     DRIVEN,  # 1 where the nearer pulley is the driven one, else 0
     SPREAD,  # deflection of a sheave beyond its bedding, along the flank's normal [m]
+    BENDING,  # energy of the ring's bending up to the next element [J]
     CHANGE,  # 4: of the speeds in the last step, from which the next one starts
-) = range(28)
+) = range(29)
 CHANGE_Y, CHANGE_Z, CHANGE_W, CHANGE_V = range(CHANGE, CHANGE + 4)
 STATE_FIELDS = CHANGE + 4
 
@@ -57,9 +58,9 @@ INPUTS = IN_DRIVING_SHIFT + 1
     DAMPING_LOSS,  # of the rotation of elements against the ring [J]
     BELT_LOSS,  # of the transverse damping [J]
     ELEMENT_LOSS,  # of the dampers of contacts and noses between elements [J]
+    STRETCH_LOSS,  # of the rings' damper along the belt [J]
     ELEMENT_DAMPED,  # by the step itself, at contacts and noses between elements (`border`) [J]
     FLANK_DAMPED,  # at flanks [J]
-    RING_DAMPED,  # by the stretching of the ring [J]
     POWER_RESIDUAL,  # of the equations of motion as they were solved [J]
 ) = range(13)
 TOTALS = 13
@@ -73,11 +74,11 @@ POWERS = (
     "tilt_loss",
     "belt_loss",
     "element_loss",
+    "stretch_loss",
 )
 DAMPED = {  # numerical damping of the step, by the springs and contacts where it occurs
     "elements": ELEMENT_DAMPED,
     "flanks": FLANK_DAMPED,
-    "ring": RING_DAMPED,
 }
 
 # Entries of the counters
@@ -96,15 +97,16 @@ CONTACTS = ("edge", "head", "flank", "ring", "nose")
     PREDICTED_HEADING_Z,
     T_Y,  # direction of the ring at an element
     T_Z,
-    START_SLIP,  # of the ring at the old speeds
     TENSION_I_Y,  # direction of the tension at this element and at the next one
     TENSION_I_Z,
     TENSION_J_Y,
     TENSION_J_Z,
-    PREDICTED_TENSION,
+    START_TENSION,  # at q_k and the old speeds
     TENSION_SLOPE,
     TURN_Y,  # rate of the angle of a segment by the speed difference of its ends
     TURN_Z,
+    BENT_Y,  # force of the ring's bending on an element
+    BENT_Z,
     ANGLE_I,  # rate of the sine of the angle between element and segment by the difference of their rates
     ANGLE_J,
     START_MOMENT_I,  # of the angle to the segment ahead, at q_k and the old speeds
@@ -135,7 +137,7 @@ CONTACTS = ("edge", "head", "flank", "ring", "nose")
     NOSE_LEVER_J,
     LAST_SPREAD,  # SPREAD of the step before [m]
     DIAGONAL,  # 4 x 4 blocks of the linear laws, by columns: of an element, and of it with the next one
-) = range(45)
+) = range(46)
 LINK = DIAGONAL + 16
 STEP_FIELDS = LINK + 16
 

@@ -23,6 +23,7 @@ BELOW_PASSAGE = 0.9  # of half that frequency: belts run up to 4 % slower than b
 NOT_HERE = ("disturbance", "seed")
 MODES = ("driving_modal_stiffness", "driven_modal_stiffness")
 SCALED = (*MODES, "local_stiffness", "local_length")  # without effect between rigid sheaves
+RINGS = {"bending_stiffness": 0.0, "reference_tension": 600.0}  # defaults other than the elastic belt's
 NO_TABLE = ("table_file", "table_force", "table_speed", "table_mu")
 
 
@@ -135,6 +136,7 @@ PARAMETERS: dict[str, dict[str, Parameter]] = {
         "ring_stiffness": positive(
             6e6, "N", "longitudinal stiffness EA of all rings", sensible=(10000.0, 10000000000.0)
         ),
+        **{key: replace(entry, default=RINGS.get(key, entry.default)) for key, entry in scene.RINGS.items()},
         "ring_friction": not_negative(0.06, "", "friction coefficient between rings and elements"),
         "ring_friction_speed": positive(
             5e-4, "m/s", "regularisation speed of that friction", sensible=(1e-06, 5.0)
@@ -353,10 +355,11 @@ def most_tension(parameters: Parameters) -> float:
 def string_limit(parameters: Parameters) -> float:
     """Longest step with which the strands' transverse motion, which is explicit, is stable [s].
 
-    It is pitch / sqrt(T / m) of a string in steps of symplectic Euler, T being `most_tension`.
+    It is pitch / sqrt(T / m) of a string in steps of symplectic Euler, T being `most_tension`; bending of the
+    rings takes a quarter of its square (`ring_bending`).
     """
     p = parameters
-    mass = p["element_mass"] + p["ring_mass"]
+    mass = (p["element_mass"] + p["ring_mass"]) * (0.75 if p["bending_stiffness"] > 0.0 else 1.0)
     return float(path_length(p) / p["elements"] * np.sqrt(mass / most_tension(p)))
 
 

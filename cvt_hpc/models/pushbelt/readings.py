@@ -251,6 +251,7 @@ class Reading:
         elastic += 2.0 * (e[:, fields.FLANK] ** 2).sum() / belt.flank_stiffness
         elastic += 2.0 * (e[:, fields.FLANK] * e[:, fields.SPREAD]).sum()
         elastic += 2.0 * (belt.modal_stiffness * openings**2).sum()
+        elastic += 2.0 * e[:, fields.BENDING].sum()
         for end in (e, ahead):  # half of the angle's stiffness at each end of a segment
             cosine = (segment * end[:, [fields.HEADING_Y, fields.HEADING_Z]]).sum(axis=1)
             elastic += belt.angle_stiffness * (1.0 - cosine).sum()

@@ -67,6 +67,7 @@ VARIABLES = (
     *shared("driven_speed_ripple", "driving_power", "load_power", "thrust_power"),
     *shared("storing_power", "ring_loss", "belt_loss", "tilt_loss"),
     power("element_loss", "mean power of the dampers of contacts between elements, most of it of impacts"),
+    power("stretch_loss", "mean power of the rings' damping along the belt"),
     *shared("loss"),
     power(
         "numerical_damping",

@@ -339,7 +339,7 @@ class ElementRun(SampledRun):
         """Mean powers over the judged part, named as in the record [W]."""
         found = {name: self.mean_rate(f.WORK_IN + k) for k, name in enumerate(f.POWERS)}
         loss = found["flank_loss"] + found["ring_loss"] + found["belt_loss"]
-        loss += found["tilt_loss"] + found["element_loss"]
+        loss += found["tilt_loss"] + found["element_loss"] + found["stretch_loss"]
         damped = np.array([self.mean_rate(total) for total in f.DAMPED.values()])
         storing = self.mean_rate(f.TOTALS)
         return found | {"loss": loss, "storing_power": storing, "numerical_damping": damped}
@@ -409,7 +409,7 @@ def given(parameters: Mapping[str, Any]) -> dict[str, Any]:
         "element_mass": p["element_mass"] * pitch,
         "pitch_depth": p["ring_offset"],
         "ring_mass": p["ring_mass"] * length,
-        "ring_strain": 1e-4,
+        "ring_strain": p["reference_tension"] / p["ring_stiffness"],
         "flank_stiffness": pitch / flank_compliance(p),
         "local_compliance": local_compliance(p) / pitch,
         "local_decay": np.exp(-pitch / p["local_length"]),

@@ -2,10 +2,9 @@
 
 Steps of the planar pushbelt in time.
 
-From q_k and X_{k-1/2} a step finds X_{k+1/2}. All directions are those at q_k. The magnitude of tension is
-that at q_{k+1} = q_k + dt X_{k+1/2}: implicit Euler along its direction, symplectic Euler for slow motion.
-Springs of tilt, flanks and contacts between elements act at mean positions, which damps nothing
-(`chain.BETA`); these contacts have dampers of their own.
+From q_k and X_{k-1/2} a step finds X_{k+1/2}. All directions are those at q_k. Rings, springs of tilt, flanks
+and contacts between elements act at mean positions, which damps nothing (`chain.BETA`); rings and these
+contacts have dampers of their own.
 
 The nose of each element in the hole of the next one, in lanes: it holds neighbours side by side.
 
@@ -31,6 +30,7 @@ from cvt_hpc.models.pushbelt.border import accept_border, book, close_border, mo
 from cvt_hpc.models.pushbelt.chain import before_step, contact_shares, linear_blocks, link, predict, turned
 from cvt_hpc.models.pushbelt.friction import filtered_slip
 from cvt_hpc.models.pushbelt.readings import SCALARS, Reading
+from cvt_hpc.models.pushbelt.ring_bending import set_bending
 from cvt_hpc.models.pushbelt.run import COURSES, ElementRun, given
 from cvt_hpc.models.pushbelt.stepping import Equations, advance_by
 from cvt_hpc.parameters import Parameters
@@ -70,16 +70,18 @@ forget = run.forget
 @kernel
 def _prepare(belt, state, work, dt):
     """Values that all iterates of a step have in common: geometry, directions, linear laws."""
-    predict(belt, state.elements, state.pulleys, work.step, dt)
-    link(belt, state.elements, work.step, dt)
+    elements, step = state.elements, work.step
+    predict(belt, elements, state.pulleys, step, dt)
+    link(belt, elements, step, dt)
     if belt.nose_clearance < np.inf:
-        predict_noses(belt, state.elements, work.step, dt)
-    linear_blocks(belt, work.step, dt)
-    for j in range(work.step.rows):
-        set_shapes(belt, work.step[j, f.R_Y], work.step[j, f.R_Z], work.shapes, j)
+        predict_noses(belt, elements, step, dt)
+    linear_blocks(belt, step, dt)
+    set_bending(belt, state, work, f.Y, f.BENDING, f.BENT_Y, dt)
+    for j in range(step.rows):
+        set_shapes(belt, step[j, f.R_Y], step[j, f.R_Z], work.shapes, j)
         if belt.local_compliance == 0.0:
-            state.elements[j, f.SPREAD] = 0.0
-        work.step[j, f.LAST_SPREAD] = state.elements[j, f.SPREAD]
+            elements[j, f.SPREAD] = 0.0
+        step[j, f.LAST_SPREAD] = elements[j, f.SPREAD]
 
 
 @kernel
@@ -141,6 +143,7 @@ def _accept(belt, state, work, inputs, dt):
         ahead_of_it, tension = iterate[j, f.ITERATE_TENSION], behind(iterate, j, f.ITERATE_TENSION)
         pull = ahead_of_it * (t_z * step[j, f.TENSION_I_Y] - t_y * step[j, f.TENSION_I_Z])
         pull -= tension * (t_z * behind(step, j, f.TENSION_J_Y) - t_y * behind(step, j, f.TENSION_J_Z))
+        pull += t_z * step[j, f.BENT_Y] - t_y * step[j, f.BENT_Z]
         across = per_dt * (t_z * elements[j, f.CHANGE_Y] - t_y * elements[j, f.CHANGE_Z])
         elements[j, f.SADDLE] = absolute(belt.ring_mass * across - pull)
         elements[j, f.TENSION] = ahead_of_it

@@ -53,8 +53,8 @@ class Belt(NamedTuple):
         Of the flanks' contact points above and below the pitch line [m].
     thickness : float
         [m]
-    pitch : float
-        Distance of neighbours [m].
+    bending_stiffness, pitch : float
+        EI of the rings in the plane [N m^2], distance of neighbours [m].
     pitch_depth, head_height : float
         Of the pitch line below the saddles, which is that of the rocking edge, and of the head's contacts
         above them [m].
@@ -70,8 +70,8 @@ class Belt(NamedTuple):
         About the element's x, o and a [kg m^2].
     ring_mass, ring_rotary_inertia : float
         Of both packages for each element [kg], and against a change of slope [kg m^2].
-    ring_stiffness, ring_bending, ring_shear : float
-        EA [N], lateral EI [N m^2] and lateral k G A [N] of both packages.
+    ring_stiffness, ring_time, ring_bending, ring_shear : float
+        EA [N], damping along the belt over it [s], lateral EI [N m^2] and lateral k G A [N] of both packages.
     flank_stiffness : float
         Normal force at each flank by its penetration, shared by its two points, with local bending in
         series as in the plane [N/m].
@@ -115,6 +115,7 @@ class Belt(NamedTuple):
     half_width: float
     flank_reach: float
     thickness: float
+    bending_stiffness: float
     pitch: float
     pitch_depth: float
     head_height: float
@@ -131,6 +132,7 @@ class Belt(NamedTuple):
     ring_mass: float
     ring_rotary_inertia: float
     ring_stiffness: float
+    ring_time: float
     ring_bending: float
     ring_shear: float
     flank_stiffness: float
@@ -221,7 +223,6 @@ def belt_of(given: Mapping[str, Any], chord: float) -> Belt:
         axes=turned / np.linalg.norm(turned, axis=1)[:, None],
         loose_side=np.array([float(SIDES[side]) for side in g["loose_sides"]]),
         half_width=float(0.5 * width),
-        pitch=float(chord),
         edge_width=float(g["edge_half_width"]),
         head_width=float(g["head_half_width"]),
         package_distance=float(g["package_arm"]),

@@ -1,7 +1,7 @@
 """The free chain in lanes: positions at q*, inertia, tension in two lines, pitch and yaw of elements.
 
-Index i is an element and j the next one. Directions are those at q_k. Magnitudes of tension are those at q* =
-q_k + dt X_k, of pitch and yaw those at q_k, from where on they are linear in the change of the speeds X.
+Index i is an element and j the next one. Directions are those at q_k, and so are magnitudes of tension, pitch
+and yaw, from where on they are linear in the change of the speeds X.
 
 The packages lie on the lines r + b a and r - b a, b being `package_distance`. t is the direction of either
 at an element, from the one behind to the one ahead, e that up to the next element. One material flows
@@ -17,9 +17,9 @@ import numpy as np
 from numba.extending import register_jitable
 
 from cvt_hpc.kernels import kernel
-from cvt_hpc.lanes import ahead, behind, fma, like, select
+from cvt_hpc.lanes import ahead, behind, fma, like, select, sqrt
 from cvt_hpc.models.pushbelt import fields as planar
-from cvt_hpc.models.pushbelt.chain import angle_slope
+from cvt_hpc.models.pushbelt.chain import angle_slope, ring_share, turned_length
 from cvt_hpc.models.pushbelt.friction import ring_friction
 from cvt_hpc.models.spatial_pushbelt import fields as f
 from cvt_hpc.models.spatial_pushbelt import vectors as vec
@@ -35,6 +35,24 @@ def motion(state, j, share):
 def motion_ahead(state, j, share):
     """Those of the next one."""
     return vec.both_moved(vec.screw_ahead(state, j, f.SPEED), share, vec.screw_ahead(state, j, f.CHANGE))
+
+
+@register_jitable
+def shortening(state, step, j, share):
+    """Rate at which the ring up to the next element is shortened [m/s], of speeds as of `motion`."""
+    u, w = motion_ahead(state, j, share)
+    v = state[j, f.V] + share * state[j, f.CHANGE + f.ROW_V]
+    next_v = ahead(state, j, f.V) + share * ahead(state, j, f.CHANGE + f.ROW_V)
+    here = vec.both_dot(vec.screw(step, j, f.TENSION_I), motion(state, j, share)) + v
+    t, lever = vec.screw(step, j, f.TENSION_J)
+    return here - vec.dot(t, u) - vec.dot(lever, w) - next_v
+
+
+@register_jitable
+def spin_of(e, per_length, du):
+    """Angular velocity of a segment along e whose ends move apart by du [rad/s]."""
+    across = vec.moved(du, -vec.dot(e, du), e)
+    return per_length * sqrt(vec.dot(across, across))
 
 
 @register_jitable
@@ -94,7 +112,6 @@ def predict(belt, state, pulleys, step, dt):
         right, left = (right, vec.cross(vec.times(b, a), right)), (left, vec.cross(vec.times(-b, a), left))
         line = vec.both_times(0.5, vec.both_plus(right, left))
         vec.store_screw(step, j, f.RING_LINE, line)
-        step[j, f.START_SLIP] = state[j, f.V] - vec.dot(line[0], u) - vec.dot(line[1], omega)
 
         # ring mass goes with the element only across its lines
         none = like(0.0, r[0])
@@ -141,23 +158,12 @@ def link(belt, state, step, dt):
     for j in range(state.rows):
         oi, oj = vec.at(state, j, f.OUTWARD), vec.ahead(state, j, f.OUTWARD)
         ai, aj, chord, lines = lines_to_next(state, j, f.POSITION, f.HEADING, f.OUTWARD, b)
-        right, left, _, _ = lines
+        right, left, right_size, left_size = lines
         e = vec.times(0.5, vec.plus(right, left))
         roll = vec.times(0.5 * b, vec.minus(right, left))
         own, next_one = vec.screw(step, j, f.RING_LINE), vec.screw_ahead(step, j, f.RING_LINE)
         vec.store_screw(step, j, f.TENSION_I, vec.both_minus((e, vec.cross(ai, roll)), own))
         vec.store_screw(step, j, f.TENSION_J, vec.both_minus((e, vec.cross(aj, roll)), next_one))
-
-        _, _, _, lines = lines_to_next(
-            step, j, f.PREDICTED_POSITION, f.PREDICTED_HEADING, f.PREDICTED_OUTWARD, b
-        )
-        _, _, right_size, left_size = lines
-        per_unstretched = 1.0 / (
-            state[j, f.LENGTH] + dt * (step[j, f.START_SLIP] - ahead(step, j, f.START_SLIP))
-        )
-        mean = 0.5 * (right_size + left_size)
-        step[j, f.PREDICTED_TENSION] = belt.ring_stiffness * (mean * per_unstretched - 1.0)
-        step[j, f.TENSION_SLOPE] = dt * belt.ring_stiffness * per_unstretched
 
         # sine e . o of the angle between the chord and an element
         e, size = vec.unit(chord)
@@ -170,6 +176,13 @@ def link(belt, state, step, dt):
         vec.store(step, j, f.TURN_I, turn_i)
         vec.store(step, j, f.TURN_J, turn_j)
         du = vec.minus(vec.ahead(state, j, f.SPEED), vec.at(state, j, f.SPEED))
+
+        per_unstretched = 1.0 / state[j, f.LENGTH]
+        length = 0.5 * (right_size + left_size) + turned_length(belt, size, spin_of(e, per_length, du), dt)
+        length -= belt.ring_time * shortening(state, step, j, 0.0)
+        step[j, f.START_TENSION] = belt.ring_stiffness * (length * per_unstretched - 1.0)
+        step[j, f.TENSION_SLOPE] = ring_share(belt, dt) * belt.ring_stiffness * per_unstretched
+
         rate_i = vec.dot(chord_i, du) + vec.dot(turn_i, vec.at(state, j, f.OMEGA))
         rate_j = vec.dot(chord_j, du) + vec.dot(turn_j, vec.ahead(state, j, f.OMEGA))
         step[j, f.START_MOMENT_I] = stiffness * vec.dot(e, oi) + damping * rate_i
@@ -186,7 +199,7 @@ def chain_forces(belt, state, step, iterate, dt):
         ti, tj = vec.screw(step, j, f.TENSION_I), vec.screw(step, j, f.TENSION_J)
         stretch = vec.both_dot(ti, own) + state[j, f.CHANGE + f.ROW_V]
         stretch -= vec.both_dot(tj, next_one) + ahead(state, j, f.CHANGE + f.ROW_V)
-        tension = fma(-step[j, f.TENSION_SLOPE], stretch, step[j, f.PREDICTED_TENSION])
+        tension = fma(-step[j, f.TENSION_SLOPE], stretch, step[j, f.START_TENSION])
         iterate[j, f.ITERATE_TENSION] = tension
 
         du = vec.minus(uj, ui)
@@ -204,20 +217,10 @@ def chain_forces(belt, state, step, iterate, dt):
 
 
 @register_jitable
-def mean_stretch(state, step, j):
-    """Mean rate within a step at which the ring between an element and the next one is shortened [m/s]."""
-    u, w = motion_ahead(state, j, 0.5)
-    v = state[j, f.V] + 0.5 * state[j, f.CHANGE + f.ROW_V]
-    next_v = ahead(state, j, f.V) + 0.5 * ahead(state, j, f.CHANGE + f.ROW_V)
-    here = vec.both_dot(vec.screw(step, j, f.TENSION_I), motion(state, j, 0.5)) + v
-    t, lever = vec.screw(step, j, f.TENSION_J)
-    return here - vec.dot(t, u) - vec.dot(lever, w) - next_v
-
-
-@register_jitable
 def pull_across(step, iterate, j, o):
-    """Force of the ring's tension on an element along o [N]."""
-    pull = iterate[j, f.ITERATE_TENSION] * vec.dot(vec.at(step, j, f.TENSION_I), o)
+    """Force of the ring's tension and of its bending in the plane on an element along o [N]."""
+    pull = step[j, f.BENT] * o[0] + step[j, f.BENT + 1] * o[1]
+    pull += iterate[j, f.ITERATE_TENSION] * vec.dot(vec.at(step, j, f.TENSION_I), o)
     return pull - behind(iterate, j, f.ITERATE_TENSION) * vec.dot(vec.behind(step, j, f.TENSION_J), o)
 
 

@@ -24,13 +24,13 @@ from cvt_hpc.kernels import kernel
 from cvt_hpc.lanes import fma, like, sqrt
 from cvt_hpc.models.pushbelt import fields as planar
 from cvt_hpc.models.pushbelt.border import add_to_totals, book_contacts, of_pulley, opening_of
-from cvt_hpc.models.pushbelt.chain import BETA, contact_shares
+from cvt_hpc.models.pushbelt.chain import BETA, contact_shares, ring_share
 from cvt_hpc.models.pushbelt.friction import flank_friction
 from cvt_hpc.models.pushbelt.local_bending import spread_bending
 from cvt_hpc.models.spatial_pushbelt import fields as f
 from cvt_hpc.models.spatial_pushbelt import flank
 from cvt_hpc.models.spatial_pushbelt import vectors as vec
-from cvt_hpc.models.spatial_pushbelt.chain import mean_stretch, motion, motion_ahead, ring_slip
+from cvt_hpc.models.spatial_pushbelt.chain import motion, motion_ahead, ring_slip, shortening
 from cvt_hpc.physics.contact_laws import pressed, taken
 
 
@@ -365,12 +365,14 @@ def book_pairs(belt, state, work, dt):
     contact = 0.5 * belt.contact_stiffness
     ahead_share, _, _ = contact_shares(belt, dt)
     half_ahead = 0.5 / ahead_share
+    damper = belt.ring_time / ring_share(belt, dt)
     ring = tilt = drag = between = stretching = like(0.0, elements[0, f.FLANK])
     for j in range(step.rows):
         (du, dw), (ju, jw) = vec.screw(elements, j, f.CHANGE), vec.screw_ahead(elements, j, f.CHANGE)
         (u, w), (next_u, next_w) = motion(elements, j, 0.5), motion_ahead(elements, j, 0.5)
-        stretch = mean_stretch(elements, step, j)
-        stretching += step[j, f.TENSION_SLOPE] * stretch * stretch
+        stretch = shortening(elements, step, j, 0.5)
+        more = 0.5 * (step[j, f.START_TENSION] - iterate[j, f.ITERATE_TENSION])
+        stretching += damper * stretch * (step[j, f.TENSION_SLOPE] * stretch + more)
 
         apart, more = vec.minus(next_u, u), vec.minus(ju, du)
         chord_i, chord_j = vec.at(step, j, f.CHORD_I), vec.at(step, j, f.CHORD_J)
@@ -410,7 +412,7 @@ def book_pairs(belt, state, work, dt):
     add_to_totals(state, scratch, planar.DAMPING_LOSS, dt * tilt)
     add_to_totals(state, scratch, planar.BELT_LOSS, dt * drag)
     book_contacts(belt, state, scratch, between, dt)
-    add_to_totals(state, scratch, planar.RING_DAMPED, dt * stretching)
+    add_to_totals(state, scratch, planar.STRETCH_LOSS, dt * stretching)
 
 
 @kernel

@@ -246,6 +246,7 @@ class Reading:
             kinetic += 0.5 * belt.ring_mass * ((w**2).sum() - (_dot(t, w) ** 2).sum())
 
         elastic = (e[:, fields.TENSION] ** 2 * e[:, fields.LENGTH]).sum() / belt.ring_stiffness
+        elastic += 2.0 * e[:, fields.BENDING].sum()
         if self._has_two_flows():
             tension, difference = e[:, fields.TENSION], e[:, fields.TENSION_DIFFERENCE]
             mixed = difference * (difference * e[:, fields.LENGTH] + 2.0 * tension * e[:, fields.HALF_LENGTH])

@@ -2,10 +2,10 @@
 
 Steps of the spatial pushbelt in time.
 
-From q_k and X_{k-1/2} a step finds X_{k+1/2}. All directions are those at q_k. The magnitudes of tension and
-of flanks along the axis are those at q_{k+1} = q_k + dt X_{k+1/2}: implicit Euler along these directions,
-symplectic Euler for what is slow. Springs of pitch and yaw, flanks in the plane, lateral bending of the
-rings and contacts between elements act at mean positions, which damps nothing (`pushbelt.chain.BETA`); these
+From q_k and X_{k-1/2} a step finds X_{k+1/2}. All directions are those at q_k. The magnitude of flanks along
+the axis is that at q_{k+1} = q_k + dt X_{k+1/2}: implicit Euler along these directions, symplectic Euler for
+what is slow. Tension and lateral bending of the rings, springs of pitch and yaw, flanks in the plane and
+contacts between elements act at mean positions, which damps nothing (`pushbelt.chain.BETA`); rings and these
 contacts have dampers of their own.
 """
 
@@ -23,6 +23,7 @@ from cvt_hpc.models.pushbelt import run
 from cvt_hpc.models.pushbelt.belt import of_lanes
 from cvt_hpc.models.pushbelt.border import accept_border, close_border, of_pulley, set_shapes
 from cvt_hpc.models.pushbelt.friction import filtered_slip
+from cvt_hpc.models.pushbelt.ring_bending import set_bending
 from cvt_hpc.models.pushbelt.run import COURSES, ElementRun
 from cvt_hpc.models.pushbelt.stepping import Equations, advance_by
 from cvt_hpc.models.spatial_pushbelt import assembly, flank, readings, two_flows
@@ -149,6 +150,7 @@ def _place(belt, state, work, dt):
     if belt.pin_clearance < np.inf:
         predict_pins(belt, elements, step, dt)
     flank.predict_flanks(belt, elements, state.pulleys, step, dt)
+    set_bending(belt, state, work, f.POSITION, f.BENDING, f.BENT, dt)
     _open_sheaves(belt, elements, state.leans, step, work.shapes)
 
 
@@ -369,7 +371,7 @@ def _accept(belt, state, work, inputs, dt):
 @kernel
 def _accept_two_flows(belt, state, work, inputs, dt):
     """The same with two flows."""
-    two_flows.book_difference(state, work, dt)
+    two_flows.book_difference(belt, state, work, dt)
     two_flows.accept_difference(belt, state, work, dt)
     _accept(belt, state, work, inputs, dt)
 

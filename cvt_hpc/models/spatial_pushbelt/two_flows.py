@@ -14,6 +14,7 @@ from cvt_hpc.kernels import kernel
 from cvt_hpc.lanes import absolute, ahead, around, behind, fma, like
 from cvt_hpc.models.pushbelt import fields as planar
 from cvt_hpc.models.pushbelt.border import add_to_totals
+from cvt_hpc.models.pushbelt.chain import ring_share, turned_length
 from cvt_hpc.models.pushbelt.friction import ring_friction
 from cvt_hpc.models.spatial_pushbelt import chain
 from cvt_hpc.models.spatial_pushbelt import fields as f
@@ -27,11 +28,20 @@ def _along(direction, state, j, share):
     return vec.both_dot(direction, chain.motion(state, j, share)) + w
 
 
+@register_jitable
+def _drawn_apart(state, step, j, share):
+    """Half of the rate at which the right package is shortened to the next element, less the left one's."""
+    w = fma(share, ahead(state, j, f.CHANGE_OF_HALF), ahead(state, j, f.HALF_SPEED))
+    there = vec.both_dot(vec.screw(step, j, f.DIFFERENCE_J), chain.motion_ahead(state, j, share)) + w
+    return _along(vec.screw(step, j, f.DIFFERENCE_I), state, j, share) - there
+
+
 @kernel
 def predict_flows(belt, state, step, dt):
     """What two flows need in a step beside what one needs; sets tension and its slope anew."""
     b = belt.package_distance
     half_stiffness = 0.5 * belt.ring_stiffness
+    steep = ring_share(belt, dt) * half_stiffness
     for j in range(state.rows):
         right, left = chain.lines_at(belt, state, j)
         a = vec.cross(vec.at(state, j, f.OUTWARD), vec.at(state, j, f.HEADING))
@@ -39,29 +49,28 @@ def predict_flows(belt, state, step, dt):
         half = vec.times(-0.5, vec.minus(right, left)), vec.times(-b, vec.cross(a, line[0]))
         vec.store_screw(step, j, f.SLIP_BY, vec.both_times(-1.0, line))
         vec.store_screw(step, j, f.HALF_SLIP_BY, half)
-        step[j, f.START_HALF_SLIP] = _along(half, state, j, 0.0)
     for j in range(state.rows):
-        ai, aj, _, lines = chain.lines_to_next(state, j, f.POSITION, f.HEADING, f.OUTWARD, b)
-        right, left, _, _ = lines
+        ai, aj, chord, lines = chain.lines_to_next(state, j, f.POSITION, f.HEADING, f.OUTWARD, b)
+        right, left, right_size, left_size = lines
         half, mean = vec.times(0.5, vec.minus(right, left)), vec.times(0.5 * b, vec.plus(right, left))
         own, next_one = vec.screw(step, j, f.HALF_SLIP_BY), vec.screw_ahead(step, j, f.HALF_SLIP_BY)
         vec.store_screw(step, j, f.DIFFERENCE_I, vec.both_plus((half, vec.cross(ai, mean)), own))
         vec.store_screw(step, j, f.DIFFERENCE_J, vec.both_plus((half, vec.cross(aj, mean)), next_one))
 
-        _, _, _, lines = chain.lines_to_next(
-            step, j, f.PREDICTED_POSITION, f.PREDICTED_HEADING, f.PREDICTED_OUTWARD, b
-        )
-        _, _, right_size, left_size = lines
-        length = state[j, f.LENGTH] + dt * (step[j, f.START_SLIP] - ahead(step, j, f.START_SLIP))
-        other = state[j, f.HALF_LENGTH] + dt * (
-            step[j, f.START_HALF_SLIP] - ahead(step, j, f.START_HALF_SLIP)
-        )
+        length, other = state[j, f.LENGTH], state[j, f.HALF_LENGTH]
         per_right, per_left = 1.0 / (length + other), 1.0 / (length - other)
-        one, two = right_size * per_right - 1.0, left_size * per_left - 1.0
-        step[j, f.PREDICTED_TENSION] = half_stiffness * (one + two)
-        step[j, f.PREDICTED_DIFFERENCE] = half_stiffness * (one - two)
-        step[j, f.TENSION_SLOPE] = dt * half_stiffness * (per_right + per_left)
-        step[j, f.CROSS_SLOPE] = dt * half_stiffness * (per_right - per_left)
+        e, size = vec.unit(chord)
+        spin = chain.spin_of(
+            e, 1.0 / size, vec.minus(vec.ahead(state, j, f.SPEED), vec.at(state, j, f.SPEED))
+        )
+        turned = turned_length(belt, size, spin, dt)
+        of_both, apart = chain.shortening(state, step, j, 0.0), _drawn_apart(state, step, j, 0.0)
+        one = (right_size + turned - belt.ring_time * (of_both + apart)) * per_right - 1.0
+        two = (left_size + turned - belt.ring_time * (of_both - apart)) * per_left - 1.0
+        step[j, f.START_TENSION] = half_stiffness * (one + two)
+        step[j, f.START_DIFFERENCE] = half_stiffness * (one - two)
+        step[j, f.TENSION_SLOPE] = steep * (per_right + per_left)
+        step[j, f.CROSS_SLOPE] = steep * (per_right - per_left)
     for j in range(state.rows):
         vec.store_screw(step, j, f.TENSION_BEHIND, vec.screw_behind(step, j, f.TENSION_J))
         vec.store_screw(step, j, f.DIFFERENCE_BEHIND, vec.screw_behind(step, j, f.DIFFERENCE_J))
@@ -77,8 +86,8 @@ def difference_forces(state, step, iterate):
         stretch = stretch - (
             vec.both_dot(there, vec.screw_ahead(state, j, f.CHANGE)) + ahead(state, j, f.CHANGE_OF_HALF)
         )
-        of_both = (step[j, f.PREDICTED_TENSION] - iterate[j, f.ITERATE_TENSION]) / slope
-        difference = fma(-slope, stretch, fma(-cross_slope, of_both, step[j, f.PREDICTED_DIFFERENCE]))
+        of_both = (step[j, f.START_TENSION] - iterate[j, f.ITERATE_TENSION]) / slope
+        difference = fma(-slope, stretch, fma(-cross_slope, of_both, step[j, f.START_DIFFERENCE]))
         more = -cross_slope * stretch
         iterate[j, f.ITERATE_DIFFERENCE] = difference
         iterate[j, f.ITERATE_TENSION] += more
@@ -194,21 +203,20 @@ def narrow_solutions(blocks, narrow):
 
 
 @kernel
-def book_difference(state, work, dt):
+def book_difference(belt, state, work, dt):
     """Add to the totals what the difference of the flows takes in a solved step, before it is accepted."""
-    elements, step, scratch = state.elements, work.step, work.scratch
+    elements, step, iterate, scratch = state.elements, work.step, work.iterate, work.scratch
+    damper = belt.ring_time / ring_share(belt, dt)
     ring = stretching = like(0.0, elements[0, f.HALF_SPEED])
     for j in range(step.rows):
-        here, there = vec.screw(step, j, f.DIFFERENCE_I), vec.screw(step, j, f.DIFFERENCE_J)
         half_slip = _along(vec.screw(step, j, f.HALF_SLIP_BY), elements, j, 0.5)
         ring += elements[j, f.FRICTION_DIFFERENCE] * half_slip
-        w = ahead(elements, j, f.HALF_SPEED) + 0.5 * ahead(elements, j, f.CHANGE_OF_HALF)
-        next_one = vec.both_dot(there, chain.motion_ahead(elements, j, 0.5)) + w
-        stretch = _along(here, elements, j, 0.5) - next_one
-        of_both = chain.mean_stretch(elements, step, j)
-        stretching += stretch * (step[j, f.TENSION_SLOPE] * stretch + 2.0 * step[j, f.CROSS_SLOPE] * of_both)
+        of_both, apart = chain.shortening(elements, step, j, 0.5), _drawn_apart(elements, step, j, 0.5)
+        more = 0.5 * (step[j, f.START_DIFFERENCE] - iterate[j, f.ITERATE_DIFFERENCE])
+        more = more + 2.0 * step[j, f.CROSS_SLOPE] * of_both
+        stretching += damper * apart * (step[j, f.TENSION_SLOPE] * apart + more)
     add_to_totals(state, scratch, planar.RING_LOSS, dt * ring)
-    add_to_totals(state, scratch, planar.RING_DAMPED, dt * stretching)
+    add_to_totals(state, scratch, planar.STRETCH_LOSS, dt * stretching)
 
 
 @kernel
@@ -227,7 +235,8 @@ def accept_difference(belt, state, work, dt):
         for side in (1.0, -1.0):
             ahead_of_it = vec.moved(vec.at(step, j, f.TENSION_I), side, vec.at(step, j, f.DIFFERENCE_I))
             behind_it = vec.moved(vec.behind(step, j, f.TENSION_J), side, vec.behind(step, j, f.DIFFERENCE_J))
-            pull = 0.5 * (tension + side * difference) * vec.dot(ahead_of_it, outward)
+            pull = 0.5 * (step[j, f.BENT] * outward[0] + step[j, f.BENT + 1] * outward[1])
+            pull += 0.5 * (tension + side * difference) * vec.dot(ahead_of_it, outward)
             pull -= 0.5 * (tension_behind + side * difference_behind) * vec.dot(behind_it, outward)
             rising = vec.dot(
                 outward, vec.plus(u, vec.times(side * belt.package_distance, vec.cross(omega, a)))
