@@ -20,7 +20,7 @@ MEASURED = {
     "frequency": (("frequency_t1 [Hz]", "frequency_t2 [Hz]"), ".0f", "Hz"),
     "amplitude": (("amplitude_t1 [um]", "amplitude_t2 [um]"), ".1f", "um"),
 }
-HEAD = ("term", "equation", "key", "default", "models", "switched", *MEASURED)
+HEAD = ("term", "equation", "key", "default", "models", "switched", *MEASURED, "pushbelt")
 
 
 def on_page_markdown(markdown: str, page: Any, **_: Any) -> str:
@@ -63,7 +63,7 @@ def table() -> str:
         own = measured.get(term.get("switch"), {})
         changes = [_change(name, measured["none"], own) for name in MEASURED]
         first = (term["name"], term["equation"])
-        last = (term.get("told", ""), *changes)
+        last = (term.get("told", ""), *changes, term.get("pushbelt", ""))
         for key in term["keys"]:
             for default, models in defaults(key).items():
                 lines.append((*first, f"`{key}`", default, ", ".join(models), *last))

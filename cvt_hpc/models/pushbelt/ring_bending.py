@@ -141,4 +141,6 @@ def set_bending(belt, state, work, place, energy, force, dt):
         bend_rings(belt, state.pulleys, places, forces, elements.data[:, energy], work.bent, dt)
         return
     for j in range(step.rows):
-        step[j, force] = step[j, force + 1] = elements[j, energy] = 0.0
+        elements[j, energy] = 0.0
+        for axis in range(2):
+            step[j, force + axis] = 0.0

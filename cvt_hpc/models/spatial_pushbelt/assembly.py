@@ -167,8 +167,8 @@ def residuals(belt, state, increments, openings, shapes, load, step, iterate, sc
         )
         n_y, n_z = step[j, f.NORMAL_Y], step[j, f.NORMAL_Z]
         drag = belt.transverse_damping * fma(n_y, u[0], n_z * u[1])
-        f_y = force[0] - drag * n_y + step[j, f.BENT]
-        f_z = force[1] - drag * n_z + step[j, f.BENT + 1]
+        f_y = force[0] - drag * n_y + step[j, f.BENT_Y]
+        f_z = force[1] - drag * n_z + step[j, f.BENT_Z]
         force = f_y, f_z, force[2] - belt.lateral_damping * u[2]
         y = vec.at(step, j, f.YAW)
         moment = step[j, f.PREDICTED_YAW] + yawing * (vec.dot(y, change[1]) - dp)

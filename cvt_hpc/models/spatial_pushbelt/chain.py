@@ -219,7 +219,7 @@ def chain_forces(belt, state, step, iterate, dt):
 @register_jitable
 def pull_across(step, iterate, j, o):
     """Force of the ring's tension and of its bending in the plane on an element along o [N]."""
-    pull = step[j, f.BENT] * o[0] + step[j, f.BENT + 1] * o[1]
+    pull = step[j, f.BENT_Y] * o[0] + step[j, f.BENT_Z] * o[1]
     pull += iterate[j, f.ITERATE_TENSION] * vec.dot(vec.at(step, j, f.TENSION_I), o)
     return pull - behind(iterate, j, f.ITERATE_TENSION) * vec.dot(vec.behind(step, j, f.TENSION_J), o)
 

@@ -150,7 +150,7 @@ def _place(belt, state, work, dt):
     if belt.pin_clearance < np.inf:
         predict_pins(belt, elements, step, dt)
     flank.predict_flanks(belt, elements, state.pulleys, step, dt)
-    set_bending(belt, state, work, f.POSITION, f.BENDING, f.BENT, dt)
+    set_bending(belt, state, work, f.POSITION, f.BENDING, f.BENT_Y, dt)
     _open_sheaves(belt, elements, state.leans, step, work.shapes)
 
 

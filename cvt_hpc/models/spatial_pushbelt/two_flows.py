@@ -235,7 +235,7 @@ def accept_difference(belt, state, work, dt):
         for side in (1.0, -1.0):
             ahead_of_it = vec.moved(vec.at(step, j, f.TENSION_I), side, vec.at(step, j, f.DIFFERENCE_I))
             behind_it = vec.moved(vec.behind(step, j, f.TENSION_J), side, vec.behind(step, j, f.DIFFERENCE_J))
-            pull = 0.5 * (step[j, f.BENT] * outward[0] + step[j, f.BENT + 1] * outward[1])
+            pull = 0.5 * (step[j, f.BENT_Y] * outward[0] + step[j, f.BENT_Z] * outward[1])
             pull += 0.5 * (tension + side * difference) * vec.dot(ahead_of_it, outward)
             pull -= 0.5 * (tension_behind + side * difference_behind) * vec.dot(behind_it, outward)
             rising = vec.dot(
