@@ -4,9 +4,10 @@ import numpy as np
 import pytest
 
 from cvt_hpc.models.pushbelt.belt import in_lanes, of_lanes
+from cvt_hpc.models.pushbelt.ring_bending import bend_rings
 from cvt_hpc.models.spatial_pushbelt import fields
 from cvt_hpc.models.spatial_pushbelt.assembly import bending_forces, predict_bending
-from cvt_hpc.models.spatial_pushbelt.transient import _assemble, _prepare
+from cvt_hpc.models.spatial_pushbelt.transient import _assemble, _evaluate, _prepare
 from support import spatial_chains as chains
 
 STEP = 1e-5
@@ -146,6 +147,25 @@ def test_rates_of_lateral_strains_yaw_and_ring_slip():
     _, t = chains.lines(belt, f)
     rates = 0.5 * np.sum(t * (places[0] - places[1]), axis=(0, 2)) / (2.0 * small)
     assert np.sum(along * x[:, :6], 1) == pytest.approx(rates, abs=2e-7 * np.abs(rates).max())
+
+
+def test_rings_bend_in_the_plane_as_those_of_the_planar_belt():
+    belt, state, work, _ = chains.shaken(6)
+    belt, found = belt._replace(flank_kinetic=0.0, ring_friction=0.0), []
+    for stiffness in (0.0, 0.5):
+        belt = belt._replace(bending_stiffness=stiffness)
+        _prepare(belt, state, work, STEP)
+        _evaluate(belt, state, work, 0.0, STEP)
+        found.append(of_lanes(work.iterate)[:, fields.RESIDUAL : fields.RESIDUAL + 8].copy())
+    places = in_lanes(of_lanes(state.elements)[:, :2])
+    forces, energy = np.zeros_like(places.data), np.zeros_like(places.data[:, 0])
+    bend_rings(belt, state.pulleys, places.data, forces, energy, work.bent, STEP)
+    places.data[:] = forces
+    assert np.abs(forces).max() > 1.0 and energy.sum() > 0.0
+    more = found[1] - found[0]
+    assert more[:, :2] == pytest.approx(of_lanes(places), abs=1e-9 * np.abs(found[0]).max())
+    assert np.abs(more[:, 2:]).max() < 1e-9 * np.abs(found[0]).max()
+    assert of_lanes(state.elements)[:, fields.BENDING].sum() == pytest.approx(energy.sum())
 
 
 INTERNAL = {
