@@ -131,7 +131,7 @@ class Walk:
         if isinstance(value, np.generic):
             return kind.__name__, str(value.dtype), value.tobytes()
         if kind is CodeType:
-            return _code(value)
+            return code_digest(value)
         if kind is ModuleType:
             return _checked_name(value, value.__name__, "")
         if isinstance(value, enum.Enum):
@@ -180,7 +180,7 @@ class Walk:
         return found
 
     def _parts(self, function: FunctionType) -> Iterator[Any]:
-        yield function.__module__, function.__qualname__, _code(function.__code__)
+        yield function.__module__, function.__qualname__, code_digest(function.__code__)
         yield self.value(function.__defaults__), self.value(function.__kwdefaults__)
         for cell in function.__closure__ or ():
             try:
@@ -215,9 +215,10 @@ def digest(description: Any) -> str:
 
 
 @cache
-def _code(code: CodeType) -> str:
+def code_digest(code: CodeType) -> str:
+    """Return a digest of bytecode with its constants and names, without the numbers of its lines."""
     constants = [
-        _code(constant) if isinstance(constant, CodeType) else _constant(constant)
+        code_digest(constant) if isinstance(constant, CodeType) else _constant(constant)
         for constant in code.co_consts
     ]
     # the compiler takes CO_OPTIMIZED from a kernel that is called while a profiler or a tracer is at work
@@ -301,13 +302,13 @@ def _loosely(value: Any) -> Any:
     value = getattr(value, "__func__", None) or getattr(value, "fget", None) or value
     if isinstance(value, FunctionType):
         cells = [_alone(cell.cell_contents) for cell in value.__closure__ or ()]
-        return value.__qualname__, _code(value.__code__), cells
+        return value.__qualname__, code_digest(value.__code__), cells
     return _alone(value)
 
 
 def _alone(value: Any) -> Any:
     if isinstance(value, FunctionType):
-        return _code(value.__code__)
+        return code_digest(value.__code__)
     try:
         return Walk().value(value)
     except UnknownValueError:

@@ -3,7 +3,6 @@
 # Needs the environment of jobs/quickstart.sh; out/clamping_* and out/spatial_push_force_* keep what is done.
 set -euo pipefail
 cd "$(dirname "${BASH_SOURCE[0]}")/.."
-job=spatial_beside_planar
 labels=sheaves,model,loose_sheaves,flank_reach
 columns=(axial_force mean_ring_tension mean_push_force flank_loss ring_loss loss power_residual)
 source jobs/parts.sh

@@ -1,15 +1,15 @@
 """What the spatial pushbelt costs: core-seconds per simulated second by elements, step and sheaves.
 
-    python tests/benchmarks/spatial_pushbelt.py [--turns 3] [--flows 2]
+    python tests/benchmarks/spatial_pushbelt.py TABLE.csv [--turns 3]
 
-With --flows 2 the packages have a flow each. The scene is that of `tests/support/spatial_belts.py` with pins: ratio 1.35, 100 pi rad/s, 20 kN, 60 N m,
+The packages have one flow, then a flow each. The scene is that of `tests/support/spatial_belts.py` with pins: ratio 1.35, 100 pi rad/s, 20 kN, 60 N m,
 Coulomb friction at flanks and rings, and an offset of 0.5 mm. Each row is the least of a few turns of 2 ms, 45 ms
 after the start; beside it iterations a step, steps that were not solved, and what the balance of power leaves open
-over the turns. Prints a table, and the time of the first call, in which kernels are compiled if they are not yet.
-Takes two minutes; the machine ought to be idle.
+over the turns. Takes two minutes; the machine ought to be idle.
 """
 
 import argparse
+import csv
 import sys
 import time
 from pathlib import Path
@@ -24,6 +24,7 @@ from cvt_hpc.models.pushbelt.stepping import advance_by
 from cvt_hpc.models.spatial_pushbelt import belt as b
 from cvt_hpc.models.spatial_pushbelt.belt import with_two_flows
 from cvt_hpc.models.spatial_pushbelt.transient import EQUATIONS
+from cvt_hpc.provenance import origin_lines
 from support.pushbelts import THRUST
 from support.spatial_belts import LOAD, inputs, scene, stored
 
@@ -34,6 +35,11 @@ ROWS = (
     (432, FIVE, 1e-5, 200.0),
     (216, (), 1e-5, 70.0),
     (104, (), 1e-5, None),
+)
+
+HEAD = (
+    *("ring_flows", "elements", "modes", "step [us]", "core_s_per_s", "mark", "iterations", "unsolved"),
+    *("open_power [W]", "memory [MB]"),
 )
 
 
@@ -64,26 +70,33 @@ def measured(state, belt, work, step, turns, flows):
 
 
 def main() -> None:
-    """Measure and print."""
+    """Measure, and write the table."""
     parser = argparse.ArgumentParser()
+    parser.add_argument("table", type=Path)
     parser.add_argument("--turns", type=int, default=3)
-    parser.add_argument("--flows", type=int, default=1, choices=(1, 2))
     arguments = parser.parse_args()
-    turns, flows = arguments.turns, arguments.flows
-    start = time.process_time()
-    scene(nodes=104)
-    print(f"first run, with compiling where needed: {time.process_time() - start:.0f} s")
-    print("elements  modes  step [us]  core-s per s  mark  iterations  unsolved  open [W]  memory [MB]")
-    for nodes, modal, step, mark in ROWS:
-        belt, state, work = scene(nodes=nodes, modal=modal, pin_clearance=1e-4)
-        if flows == 2:
-            state, work = with_two_flows(belt, state), b.workspace(belt, nodes, flows)
-        cost, iterations, unsolved, left = measured(state, belt, work, step, turns, flows)
-        memory = sum({id(array): size(array) for array in (*state, *work)}.values()) / 1e6
-        print(
-            f"{nodes:8d} {belt.modal_stiffness.shape[1]:6d} {1e6 * step:10.0f} {cost:13.0f}"
-            f" {mark or '-':>5} {iterations:11.2f} {unsolved:9d} {left:9.2f} {memory:12.1f}"
-        )
+    with arguments.table.open("w", newline="") as file:
+        file.writelines(origin_lines())
+        writer = csv.writer(file, lineterminator="\n")
+        writer.writerow(HEAD)
+        for flows in (1, 2):
+            scene(nodes=104)  # its machine code is there before time is taken
+            for nodes, modal, step, mark in ROWS:
+                belt, state, work = scene(nodes=nodes, modal=modal, pin_clearance=1e-4)
+                if flows == 2:
+                    state, work = with_two_flows(belt, state), b.workspace(belt, nodes, flows)
+                cost, iterations, unsolved, left = measured(state, belt, work, step, arguments.turns, flows)
+                memory = sum({id(array): size(array) for array in (*state, *work)}.values()) / 1e6
+                numbers = [
+                    f"{cost:.0f}",
+                    mark or "",
+                    f"{iterations:.2f}",
+                    unsolved,
+                    f"{left:.2f}",
+                    f"{memory:.1f}",
+                ]
+                writer.writerow([flows, nodes, belt.modal_stiffness.shape[1], f"{1e6 * step:g}", *numbers])
+                file.flush()
 
 
 if __name__ == "__main__":
