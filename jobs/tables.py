@@ -279,7 +279,9 @@ def meaning(content, suffix):
             bodies += [node.body for node in body if isinstance(node, within)]
         return code_digest(compile(tree, "", "exec", dont_inherit=True))
     if suffix == ".toml":
-        return tomllib.loads(content.decode()) | {"description": ""}
+        document = tomllib.loads(content.decode())
+        document.pop("description", None)
+        return repr(document)  # the order of axes counts
     if suffix == ".sh":
         return [line.strip() for line in content.decode().splitlines() if line.strip()[:1] not in ("", "#")]
     return content
@@ -322,7 +324,7 @@ def make(names, stale):
             why = made(table, Path(folder))
             print(f"{table.name}: {why or 'made'}", flush=True)
             failed += [table.name] if why else []
-    print(f"{len(wanted) - len(failed)} tables made", *(["; not", ", ".join(failed)] if failed else []))
+    print(f"{len(wanted) - len(failed)} made" + f", not {', '.join(failed)}" * bool(failed))
     return int(bool(failed))
 
 
@@ -340,7 +342,7 @@ def made(table, work):
     told = {"stdout": subprocess.PIPE, "stderr": subprocess.STDOUT, "text": True}
     done = subprocess.run(shell, cwd=work / "tree", env=environment, **told)
     if done.returncode:
-        return f"exit status {done.returncode}: {done.stdout.strip().rpartition(chr(10))[2]}"
+        return f"exit status {done.returncode}: {''.join(done.stdout.strip().splitlines()[-1:])}"
     lines = target.read_text(encoding="utf-8").splitlines() if target.is_file() else []
     cells = list(csv.reader(below_origin(lines)))
     if len(cells) < 2 or any(len(row) != len(cells[0]) for row in cells):
@@ -378,7 +380,10 @@ def check(turn, seconds):
     for cost, table, study, place in [*cheap, *dear[first:], *dear[:first]]:
         if time.process_time() - begun + cost > seconds:
             continue
-        told = [*differences(table.rows[place], recomputed(*study, place, len(table.rows)))]
+        try:
+            told = [*differences(table.rows[place], recomputed(*study, place, len(table.rows)))]
+        except InputError as error:  # the job has changed
+            told = [str(error)]
         expected = OLDER in table.told
         status |= bool(told) and not expected
         print(
