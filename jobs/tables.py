@@ -17,6 +17,7 @@ import ast
 import csv
 import datetime
 import hashlib
+import math
 import os
 import re
 import resource
@@ -30,6 +31,7 @@ from dataclasses import dataclass, replace
 from functools import cache, cached_property
 from itertools import pairwise
 from pathlib import Path
+from statistics import median
 
 from cvt_hpc import load_job, open_results, run
 from cvt_hpc.errors import InputError, mismatch, unknown
@@ -54,8 +56,8 @@ COMPUTING |= {"simulation", "experiments", "recording.py", "linear_algebra.py"}
 
 # How far a row may be from the stored one. Other lanes and other processors round otherwise. So runs that
 # vibrate part within milliseconds, and what is recorded of them differs as between two random starts.
-QUIET, VIBRATING = 0.01, {"amplitude": 0.25, "lateral": 0.25}  # relative
-OTHERS = 0.05  # relative, what else is recorded of a run that vibrates
+QUIET, MOVING = 0.01, 0.05  # of the largest value of the column, in runs that do not vibrate and that do
+OF_VIBRATION = {"amplitude": 0.25, "lateral": 0.25, "frequency": 0.05}  # relative, in runs that vibrate
 STILL = 0.5  # [um]: amplitude of a quiet run, a tenth of what vibrates
 FREE = ("core_seconds", "power_residual", "step_ripple", "refinements", "time_step", "unsolved_share")
 NOISE = ("frequency", "mode", "lateral")  # of a quiet run
@@ -82,13 +84,15 @@ class Table:
         return self.told[MADE_BY]
 
     @property
+    def seconds(self):
+        """Core-seconds of each run that is done, where they are told."""
+        done = [row for row in self.rows if row.get("status") != "not_run"]
+        return [float(row["core_seconds"]) for row in done if "core_seconds" in row]
+
+    @property
     def cost(self):
         """Core-seconds of making it, else of its runs; infinite where neither is told."""
-        if COST in self.told:
-            return float(self.told[COST].split()[0])
-        return sum(
-            float(row.get("core_seconds", "inf")) for row in self.rows if row.get("status") != "not_run"
-        )
+        return float(self.told[COST].split()[0]) if COST in self.told else sum(self.seconds or [math.inf])
 
     @property
     def revisions(self):
@@ -372,7 +376,7 @@ def check(turn, seconds):
     for table in tables():
         done = [place for place, row in enumerate(table.rows) if row.get("status") == "done"]
         if done and (study := study_of(table.made_by)):
-            studies.append((table.cost / len(done), table, study, done[turn * STRIDE % len(done)]))
+            studies.append((median(table.seconds), table, study, done[turn * STRIDE % len(done)]))
     cheap = [entry for entry in studies if entry[0] <= ALWAYS]
     dear = [entry for entry in studies if entry[0] > ALWAYS]
     first, begun, status = turn % max(len(dear), 1), time.process_time(), 0
@@ -381,7 +385,7 @@ def check(turn, seconds):
         if time.process_time() - begun + cost > seconds:
             continue
         try:
-            told = [*differences(table.rows[place], recomputed(*study, place, len(table.rows)))]
+            told = [*differences(table.rows, place, recomputed(*study, place, len(table.rows)))]
         except InputError as error:  # the job has changed
             told = [str(error)]
         expected = OLDER in table.told
@@ -420,30 +424,28 @@ def recomputed(file, settings, quantities, place, size):
     return row
 
 
-def differences(stored, found):
-    """Yield in words what differs between the cells of two rows by more than rounding explains."""
+def differences(stored, place, found):
+    """Yield in words what differs between a row of a table and other cells by more than rounding explains."""
     for column in ("status", "vibrates"):
-        if stored[column] != found[column]:
-            yield f"{column} {found[column]}, stored {stored[column]}"
+        if stored[place][column] != found[column]:
+            yield f"{column} {found[column]}, stored {stored[place][column]}"
             return
-    moves = stored["vibrates"] == "yes"
-    for column, text in stored.items():
-        if column.startswith(FREE) or (column.startswith(NOISE) and not moves):
+    moves = found["vibrates"] == "yes"
+    for column, text in stored[place].items():
+        if column.startswith(FREE) or (column.startswith(NOISE) and not moves) or text == found.get(column):
             continue
-        if text != found.get(column) and not is_near(column, text, found.get(column, ""), moves):
+        try:
+            one, other = float(text), float(found[column])
+            largest = max(abs(float(row[column])) for row in stored if row[column] not in ("", "nan"))
+        except (KeyError, ValueError):
+            one, other, largest = 0.0, 1.0, 0.0
+        most = largest * (MOVING if moves else QUIET)
+        if moves and (word := column.partition("_")[0]) in OF_VIBRATION:
+            most = max(abs(one), abs(other)) * OF_VIBRATION[word]
+        elif column.startswith("amplitude"):
+            most = STILL
+        if not abs(one - other) <= most:
             yield f"{column} {found.get(column)}, stored {text}"
-
-
-def is_near(column, stored, found, moves):
-    """Whether two cells differ by no more than rounding explains."""
-    try:
-        a, b = float(stored), float(found)
-    except ValueError:
-        return False
-    if column.startswith("amplitude") and not moves:
-        return abs(a - b) <= STILL
-    relative = VIBRATING.get(column.partition("_")[0], OTHERS) if moves else QUIET
-    return abs(a - b) <= relative * max(abs(a), abs(b))
 
 
 def main(arguments=None):
