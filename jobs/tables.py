@@ -390,10 +390,8 @@ def check(turn, seconds):
             told = [str(error)]
         expected = OLDER in table.told
         status |= bool(told) and not expected
-        print(
-            f"{table.name}, row {place + 1}: {'; '.join(told) or 'the same'}",
-            "(older)" if told and expected else "",
-        )
+        words = f"{'; '.join(told)}{' (older)' * expected}" if told else "the same"
+        print(f"{table.name}, row {place + 1}: {words}", flush=True)
     print(f"{time.process_time() - begun:.0f} core-s")
     return int(status)
 
@@ -418,7 +416,7 @@ def recomputed(file, settings, quantities, place, size):
     axes = tuple(replace(axis, values=(point[axis.name],)) for axis in job.axes)
     alone = replace(job, axes=axes, design=job.design | {"runs": 1} if job.is_sampled else {}, histories=())
     with tempfile.TemporaryDirectory() as folder:
-        run(alone, folder, progress=False, raises=False)
+        run(alone, folder, progress=False)
         with open_results(folder) as results:
             (row,) = csv.DictReader(rows(results.load(), quantities))
     return row
@@ -461,7 +459,7 @@ def main(arguments=None):
     day = datetime.date.today().toordinal()
     checking.add_argument("--turn", type=int, default=day, help="which rows (default: by the day)")
     checking.add_argument(
-        "--seconds", type=float, default=60.0, help="processor time for all of them (default: 60)"
+        "--seconds", type=float, default=40.0, help="processor time for all of them (default: 40)"
     )
     asked = parser.parse_args(arguments)
     try:

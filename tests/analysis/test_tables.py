@@ -233,7 +233,7 @@ def test_a_stored_row_is_computed_again_and_named_where_it_differs(program, caps
     assert status == 0 and told.count("strand, row 9: the same") == 1
     table.rows[8]["net_force_t1 [N]"] = "1"
     status, told = check(program, capsys, monkeypatch, [table, dear])
-    assert status == 1 and re.search(r"row 9: net_force_t1 \[N\] \S+, stored 1 \n", told)
+    assert status == 1 and re.search(r"row 9: net_force_t1 \[N\] \S+, stored 1\n", told)
     table.told["older than the code"] = "another formula"
     status, told = check(program, capsys, monkeypatch, [table, dear])
     assert status == 0 and told.count("(older)") == 1
