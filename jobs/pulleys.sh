@@ -12,7 +12,7 @@ source jobs/parts.sh
 shaft=(--set 'shaft_lengths=["30 mm", "50 mm", "60 mm", "50 mm", "30 mm"]'
   --set 'shaft_diameters=["30 mm", "40 mm", "45 mm", "40 mm", "30 mm"]'
   --set 'bearing_positions=["15 mm", "205 mm"]' --set 'seat_positions=["85 mm", "135 mm"]')
-collar=(--set 'tilt_stiffness=4.275e5 N m/rad')
+collar=(--set 'tilt_stiffness=3.94e5 N m/rad')
 short=(--set 'step=2 us') # short lags of the tilt need it, the shortest 1 us
 
 # a motor that holds its speed within 3 % at 50 N m
