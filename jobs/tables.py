@@ -388,7 +388,7 @@ def check(turn, seconds):
             told = [*differences(table.rows, place, recomputed(*study, place, len(table.rows)))]
         except InputError as error:  # the job has changed
             told = [str(error)]
-        expected = OLDER in table.told
+        expected = OLDER in table.told or table.is_stale
         status |= bool(told) and not expected
         words = f"{'; '.join(told)}{' (older)' * expected}" if told else "the same"
         print(f"{table.name}, row {place + 1}: {words}", flush=True)

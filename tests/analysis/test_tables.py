@@ -232,6 +232,10 @@ def test_a_stored_row_is_computed_again_and_named_where_it_differs(program, caps
     status, told = check(program, capsys, monkeypatch, [table, dear])
     assert status == 0 and told.count("strand, row 9: the same") == 1
     table.rows[8]["net_force_t1 [N]"] = "1"
+    monkeypatch.setattr(program.Table, "is_stale", True)
+    status, told = check(program, capsys, monkeypatch, [table, dear])
+    assert status == 0 and told.count("(older)") == 1
+    monkeypatch.setattr(program.Table, "is_stale", False)
     status, told = check(program, capsys, monkeypatch, [table, dear])
     assert status == 1 and re.search(r"row 9: net_force_t1 \[N\] \S+, stored 1\n", told)
     table.told["older than the code"] = "another formula"
@@ -242,6 +246,7 @@ def test_a_stored_row_is_computed_again_and_named_where_it_differs(program, caps
 def test_a_job_of_another_size_than_its_table_is_named(program, capsys, monkeypatch):
     (table,) = program.tables(["strand"])
     table.rows.pop()
+    monkeypatch.setattr(program.Table, "is_stale", False)
     status, told = check(program, capsys, monkeypatch, [table])
     assert (
         status == 1
