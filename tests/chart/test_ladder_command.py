@@ -85,7 +85,7 @@ def test_a_dearer_model_stands_beside_the_rungs_if_it_is_asked_for(job, capsys):
     beside = rungs[-3].job
     assert beside.stepper == "split" and beside.parameters["stations"] == 48 and beside.size == 2
     assert main(["ladder", str(job), "--set", "ladder.beside=quasi_static"]) == 2
-    told = 'beside: expected one of none, quasi_static_belt, found "quasi_static"; did you mean quasi_static_belt?'
+    told = 'beside: expected one of none, quasi_static_belt, spatial_pushbelt, found "quasi_static"; did you mean quasi_static_belt?'
     assert told in capsys.readouterr().err
 
 

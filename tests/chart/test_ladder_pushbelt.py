@@ -53,6 +53,18 @@ def test_the_reference_is_the_same_scene_on_a_refined_pushbelt():
     assert bending / bending[0] == pytest.approx([1.0, 0.5, 0.0])
 
 
+def test_the_spatial_pushbelt_beside_it_is_that_belt_with_both_sheaves_alike():
+    asked = load(JOBS / "ladder_spatial.toml")
+    assert [rung.name for rung in asked.rungs[-3:]] == ["spatial_pushbelt", "pushbelt", "reference"]
+    spatial, planar = (rung.job for rung in asked.rungs[-3:-1])
+    assert asked.rungs[-3].answers == QUESTIONS and spatial.axes == planar.axes
+    for index in range(planar.size):
+        here, there = spatial.point(index), planar.point(index)
+        assert {key: here[key] for key in there} == there
+        assert here["misalignment"] == 0.0
+        assert here["driving_loose_side"] == here["driven_loose_side"] == "both"
+
+
 def test_keys_without_effect_in_the_continuous_belt_are_not_handed_over():
     """Its driving thrust, which a held sheave does not feel, would let that of the pushbelt go."""
     job = build_job(DOCUMENT, "x.toml")
@@ -136,6 +148,10 @@ def test_its_cost_is_told_before_it_is_asked_for(job, capsys):
         (
             "[ladder]\nset = { elements = 104 }",
             '[ladder] set: expected reference = "pushbelt", for which it is',
+        ),
+        (
+            "[ladder]\nbeside = 'spatial_pushbelt'",
+            '[ladder] beside: expected none, or reference = "pushbelt", found',
         ),
         ("[ladder]\nreference = 'pushbelt'\nset = 3", "[ladder] set: expected a table, found 3"),
     ],

@@ -9,7 +9,7 @@ from cvt_hpc.cli import main
 from cvt_hpc.errors import InputError
 from cvt_hpc.job import build_job
 from cvt_hpc.models.pushbelt import fields as f
-from cvt_hpc.models.pushbelt.parameters import most_tension, path_length, string_limit
+from cvt_hpc.models.pushbelt.parameters import flank_compliance, most_tension, path_length, string_limit
 from cvt_hpc.models.spatial_pushbelt import fields
 from cvt_hpc.models.spatial_pushbelt.parameters import roll_limit
 from cvt_hpc.models.spatial_pushbelt.readings import ANGLES, SHEAVES
@@ -20,7 +20,7 @@ from cvt_hpc.simulation import run_point, simulate
 from cvt_hpc.study import open_results, run
 from cvt_hpc.variables import Status, Vibrates
 from cvt_hpc.variator.history import regions
-from support.spatial_belts import COARSE, job
+from support.spatial_belts import COARSE, TORQUE, job
 
 OFFSET = 5e-4  # [m]
 
@@ -72,6 +72,43 @@ def test_power_and_axial_forces_are_balanced_with_falling_friction_between_elast
     # 2 %: by samples; by every step they agree to 0.03 % (`exact/test_spatial_revolution.py`)
     assert driving > 80.0 and driving == pytest.approx(-driven, rel=0.02)
     assert abs(found["power_residual"]) < 3e-3
+
+
+BENDING = {
+    "local_stiffness": 4e9,
+    "flank_stiffness": 6e10,
+    "sheave_stiffness": 1.0,
+    "nose_clearance": np.inf,
+    "step": 2e-5,
+    "sampling_rate": 12.5e3,
+    "band_high": 800.0,
+}
+
+
+def test_local_bending_gives_an_aligned_belt_the_forces_slip_and_losses_of_the_planar_one():
+    """With the points of a flank at one height and sheaves that move alike it is that belt."""
+    document, values = {"name": "planar", "model": "pushbelt"}, COARSE | BENDING | {"load": TORQUE}
+    asked = build_job(document, "planar", values | {"longest_duration": 0.04})
+    planar = run_point(asked, asked.point(0), lambda: None)
+    flank = {"flank_reach": 1e-9, "disturbance": 0.0}
+    loose = {"driving_loose_side": "both", "driven_loose_side": "both"}
+    spatial = record(**BENDING, **flank, **loose)
+    assert planar["status"] == spatial["status"] == Status.DONE
+    for name in (
+        "axial_force",
+        "mean_ring_tension",
+        "mean_push_force",
+        "flank_loss",
+        "ring_loss",
+        "slip_loss",
+    ):
+        close = 0.01 * np.abs(planar[name]).max()
+        assert spatial[name] == pytest.approx(planar[name], abs=close), name
+    # bending has an effect, by which none of both is left out
+    bedding = {"local_stiffness": np.inf, "flank_stiffness": 1.0 / flank_compliance(asked.point(0))}
+    without = record(**BENDING | bedding, **flank, **loose)
+    assert np.abs(without["axial_force"] - planar["axial_force"]).max() > 300.0
+    assert spatial["iterations"] < 1.3 * without["iterations"]
 
 
 def test_the_loose_sheave_has_the_thrust(misaligned):

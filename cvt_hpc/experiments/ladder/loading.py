@@ -2,7 +2,7 @@
 
 `ladder` gives the models with which the job can be done, from the cheapest up. Beside them stands a model
 that takes longer than the elastic belt and answers the same questions, if a job requests it. The reference
-may be the pushbelt of rigid elements. The expected cost follows from the models' cost models.
+may be the pushbelt of rigid elements, beside which the spatial one may stand. The expected cost follows from the models' cost models.
 """
 
 from collections.abc import Iterator, Mapping
@@ -52,7 +52,10 @@ _LOWER: dict[str, tuple[str, dict[str, Any], tuple[str, ...]]] = {
     "auto": ("auto", {"question": "occurrence"}, ("occurrence", "onset")),
 }
 NONE = "none"
-BESIDE = ("quasi_static_belt",)
+SPATIAL = "spatial_pushbelt"
+BESIDE = ("quasi_static_belt", SPATIAL)
+# Both sheaves of a pulley move alike, as those of the planar pushbelt do
+_AS_PLANAR = {"driving_loose_side": "both", "driven_loose_side": "both"}
 
 
 def ladder(
@@ -67,7 +70,7 @@ def ladder(
     pushbelt : mapping, optional
         Further keys of the pushbelt, as `pushbelt_jobs` takes them: the reference is a pushbelt then.
     beside : str
-        A requested entry of BESIDE, or NONE.
+        A requested entry of BESIDE, or NONE. SPATIAL is the pushbelt below the reference, out of its plane.
 
     Returns
     -------
@@ -84,7 +87,7 @@ def ladder(
     """
     _check(job)
     rungs, refusals = [], {}
-    models = _LOWER if beside == NONE else _LOWER | {beside: (beside, {}, QUESTIONS)}
+    models = _LOWER if beside in (NONE, SPATIAL) else _LOWER | {beside: (beside, {}, QUESTIONS)}
     for name, (model, table, answers) in models.items():
         try:
             rungs.append(Sweep(name, answers, handed(job, model, table)))
@@ -95,6 +98,11 @@ def ladder(
         reference = rebuild_job(_refined(job), job.source, job.units)
     else:
         coarser, reference = pushbelt_jobs(job, pushbelt)
+        if beside == SPATIAL:
+            whole = replace(coarser, given=frozenset(coarser.parameters))
+            document = handed_to(whole, SPATIAL, "a model of its ladder")
+            out_of_plane = rebuild_job(document, job.source, job.units, _AS_PLANAR)
+            rungs.append(Sweep(SPATIAL, QUESTIONS, out_of_plane))
         rungs.append(Sweep(PUSHBELT, QUESTIONS, coarser))
     return (*rungs, Sweep(REFERENCE, (), reference)), refusals
 
@@ -252,6 +260,8 @@ def load(path: str | Path, overrides: Assignments = ()) -> Ladder:
     settings = read_set(table, where)
     if settings and reference != PUSHBELT:
         raise mismatch(f"{where} set", f'reference = "{PUSHBELT}", for which it is', show(reference))
+    if beside == SPATIAL and reference != PUSHBELT:
+        raise mismatch(f"{where} beside", f'{NONE}, or reference = "{PUSHBELT}"', show(beside))
     job = build_job(document, source, replaced, "--set")
     return Ladder(job, *ladder(job, settings if reference == PUSHBELT else None, beside))
 

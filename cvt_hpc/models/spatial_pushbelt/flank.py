@@ -26,7 +26,7 @@ from cvt_hpc.models.pushbelt import fields as planar
 from cvt_hpc.models.pushbelt.border import add_to_totals, book_contacts, of_pulley, opening_of
 from cvt_hpc.models.pushbelt.chain import BETA, contact_shares, ring_share
 from cvt_hpc.models.pushbelt.friction import flank_friction
-from cvt_hpc.models.pushbelt.local_bending import spread_bending
+from cvt_hpc.models.pushbelt.local_bending import axial_excess, spread_bending
 from cvt_hpc.models.spatial_pushbelt import fields as f
 from cvt_hpc.models.spatial_pushbelt import flank
 from cvt_hpc.models.spatial_pushbelt import vectors as vec
@@ -279,6 +279,13 @@ def _add_columns(blocks, j, k, left, right):
 
 
 @register_jitable
+def _excess_of_side(belt, iterate, j, p):
+    """Slope along the axis of the two points from p on, beyond that of the bedding [N/m]."""
+    pressing = iterate[j, f.YIELD + p] + iterate[j, f.YIELD + p + 1]
+    return belt.cosine * belt.cosine * axial_excess(belt.local_compliance, pressing)
+
+
+@register_jitable
 def _with_force(total, lever, g):
     """A force and a moment, and another force at a lever."""
     return vec.plus(total[0], g), vec.plus_cross(total[1], lever, g)
@@ -339,6 +346,10 @@ def add_flank_blocks(belt, state, shapes, step, iterate, blocks, dt):
         _add_columns(blocks, j, 0, left, right)
         _add_columns(blocks, j, 1, left, right)
         _add_columns(blocks, j, 2, left, right)
+        if belt.local_compliance > 0.0:
+            excess = _excess_of_side(belt, iterate, j, f.LEFT_LOW)
+            excess = excess + _excess_of_side(belt, iterate, j, f.RIGHT_LOW)
+            blocks[j, f.UU + f.AXIAL + f.SIZE * f.AXIAL] += dt * excess
         by_border, rows, own = _border_of_side(belt, step, iterate, j, f.LEFT_LOW, left, driven, dt)
         more, more_rows, more_own = _border_of_side(belt, step, iterate, j, f.RIGHT_LOW, right, driven, dt)
         drive, give = vec.both_plus(by_border[0], more[0]), vec.both_plus(by_border[1], more[1])
