@@ -2,7 +2,8 @@
 
 `ladder` gives the models with which the job can be done, from the cheapest up. Beside them stands a model
 that takes longer than the elastic belt and answers the same questions, if a job requests it. The reference
-may be the pushbelt of rigid elements, beside which the spatial one may stand. The expected cost follows from the models' cost models.
+may be the pushbelt of rigid elements, beside which the spatial one may stand. The expected cost follows from
+the models' cost models.
 """
 
 from collections.abc import Iterator, Mapping
