@@ -9,7 +9,7 @@ from cvt_hpc.cli import main
 from cvt_hpc.errors import InputError
 from cvt_hpc.job import build_job
 from cvt_hpc.models.pushbelt import fields as f
-from cvt_hpc.models.pushbelt.parameters import flank_compliance, most_tension, path_length, string_limit
+from cvt_hpc.models.pushbelt.parameters import most_tension, path_length, string_limit
 from cvt_hpc.models.spatial_pushbelt import fields
 from cvt_hpc.models.spatial_pushbelt.parameters import roll_limit
 from cvt_hpc.models.spatial_pushbelt.readings import ANGLES, SHEAVES
@@ -86,14 +86,14 @@ BENDING = {
 
 
 def test_local_bending_gives_an_aligned_belt_the_forces_slip_and_losses_of_the_planar_one():
-    """With the points of a flank at one height and sheaves that move alike it is that belt."""
-    document, values = {"name": "planar", "model": "pushbelt"}, COARSE | BENDING | {"load": TORQUE}
-    asked = build_job(document, "planar", values | {"longest_duration": 0.04})
+    """With the points of a flank at one height and sheaves that move alike it is that belt, in as many iterations."""
+    values = COARSE | BENDING | {"load": TORQUE, "longest_duration": 0.04}
+    asked = build_job({"name": "planar", "model": "pushbelt"}, "planar", values)
     planar = run_point(asked, asked.point(0), lambda: None)
-    flank = {"flank_reach": 1e-9, "disturbance": 0.0}
     loose = {"driving_loose_side": "both", "driven_loose_side": "both"}
-    spatial = record(**BENDING, **flank, **loose)
-    assert planar["status"] == spatial["status"] == Status.DONE
+    found = record(**BENDING, **loose, flank_reach="1e-9 m", disturbance=0.0)
+    assert planar["status"] == found["status"] == Status.DONE
+    # 0.4 % at most; as a bedding alone it is 1 % off in axial forces, 2 % in the others, and 8 % in slip
     for name in (
         "axial_force",
         "mean_ring_tension",
@@ -102,13 +102,9 @@ def test_local_bending_gives_an_aligned_belt_the_forces_slip_and_losses_of_the_p
         "ring_loss",
         "slip_loss",
     ):
-        close = 0.01 * np.abs(planar[name]).max()
-        assert spatial[name] == pytest.approx(planar[name], abs=close), name
-    # bending has an effect, by which none of both is left out
-    bedding = {"local_stiffness": np.inf, "flank_stiffness": 1.0 / flank_compliance(asked.point(0))}
-    without = record(**BENDING | bedding, **flank, **loose)
-    assert np.abs(without["axial_force"] - planar["axial_force"]).max() > 300.0
-    assert spatial["iterations"] < 1.3 * without["iterations"]
+        close = 0.006 * np.abs(planar[name]).max()
+        assert found[name] == pytest.approx(planar[name], abs=close), name
+    assert found["iterations"] < 1.1 * planar["iterations"]
 
 
 def test_the_loose_sheave_has_the_thrust(misaligned):

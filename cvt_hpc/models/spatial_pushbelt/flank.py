@@ -279,9 +279,9 @@ def _add_columns(blocks, j, k, left, right):
 
 
 @register_jitable
-def _excess_of_side(belt, iterate, j, p):
-    """Slope along the axis of the two points from p on, beyond that of the bedding [N/m]."""
-    pressing = iterate[j, f.YIELD + p] + iterate[j, f.YIELD + p + 1]
+def _excess_of_side(belt, iterate, j, low, high):
+    """Slope along the axis of the two points of a side, beyond that of the bedding [N/m]."""
+    pressing = iterate[j, f.YIELD + low] + iterate[j, f.YIELD + high]
     return belt.cosine * belt.cosine * axial_excess(belt.local_compliance, pressing)
 
 
@@ -347,8 +347,8 @@ def add_flank_blocks(belt, state, shapes, step, iterate, blocks, dt):
         _add_columns(blocks, j, 1, left, right)
         _add_columns(blocks, j, 2, left, right)
         if belt.local_compliance > 0.0:
-            excess = _excess_of_side(belt, iterate, j, f.LEFT_LOW)
-            excess = excess + _excess_of_side(belt, iterate, j, f.RIGHT_LOW)
+            excess = _excess_of_side(belt, iterate, j, f.LEFT_LOW, f.LEFT_HIGH)
+            excess = excess + _excess_of_side(belt, iterate, j, f.RIGHT_LOW, f.RIGHT_HIGH)
             blocks[j, f.UU + f.AXIAL + f.SIZE * f.AXIAL] += dt * excess
         by_border, rows, own = _border_of_side(belt, step, iterate, j, f.LEFT_LOW, left, driven, dt)
         more, more_rows, more_own = _border_of_side(belt, step, iterate, j, f.RIGHT_LOW, right, driven, dt)
