@@ -1,5 +1,6 @@
 #!/usr/bin/env bash
-# Cells of `cvt-hpc ladder jobs/ladder_pushbelt.toml --out DIR`, belt beside pushbelts: pushbelt_beside_belt.sh DIR TABLE.csv.
+# Cells of `cvt-hpc ladder jobs/ladder_pushbelt.toml --out DIR`, belt beside pushbelts:
+# pushbelt_beside_belt.sh DIR TABLE.csv.
 # Needs the environment of jobs/quickstart.sh.
 set -euo pipefail
 cd "$(dirname "${BASH_SOURCE[0]}")/.."

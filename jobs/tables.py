@@ -159,11 +159,16 @@ def rests_on(made_by):
     found, left, package = set(), named(made_by, ROOT), ROOT / "cvt_hpc"
     for command in re.findall(r"cvt-hpc (\w+)", made_by):
         left |= modules(EXPERIMENTS[command].module) if command in EXPERIMENTS else set()
+        found |= modules("cvt_hpc.analysis.statements") if command == "figure" else set()
     while left:
         found.add(path := left.pop())
         left |= needs(path) - found
     return {
-        path for path in found if package not in path.parents or path.parts[len(package.parts)] in COMPUTING
+        path
+        for path in found
+        if package not in path.parents
+        or path.parts[len(package.parts)] in COMPUTING
+        or path.parts[len(package.parts) + 1 :][:1] == ("statements",)
     }
 
 
@@ -399,7 +404,7 @@ def check(turn, seconds):
 def study_of(made_by):
     """Return job file, settings and variables of a table with a row for each run of a study, else None."""
     words = shlex.split(made_by)
-    if words[:2] != ["cvt-hpc", "run"] or (at := words.index("&&")) + 5 > len(words):
+    if words[:2] != ["cvt-hpc", "run"] or "&&" not in words or (at := words.index("&&")) + 5 > len(words):
         return None
     if words[at + 1 : at + 5] != ["python", "jobs/tabulate.py", "$OUT", "$TABLE"]:
         return None

@@ -1,6 +1,6 @@
 """Runs the tests with several versions of Python and of the packages, and prints what passed where.
 
-    python3 tests/matrix.py [PYTEST ARGUMENT ...]      # without arguments: -n 3 -m "not slow"
+    python3 tests/matrix.py [PYTEST ARGUMENT ...]      # without arguments: -q -n 3 --dist loadfile -m "not slow"
 
 Every Python from 3.11 to 3.14 that is on the PATH is taken with the lowest versions of all ranges in
 pyproject.toml, with those of tests/constraints.txt, and with the newest that the ranges allow. Each pair has an

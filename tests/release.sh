@@ -1,6 +1,7 @@
 #!/usr/bin/env bash
-# Makes a release: `bash tests/release.sh 0.2.0` sets the version, dates the change log, builds wheel and sdist, installs
-# each in a fresh environment, runs a small study with it, and commits and tags what has passed. Nothing is pushed.
+# Makes a release: `bash tests/release.sh 0.2.0` sets the version, dates the change log, builds wheel and sdist,
+# installs each in a fresh environment, runs a small study with it, and commits and tags what has passed. It pushes
+# nothing.
 set -euo pipefail
 cd "$(dirname "${BASH_SOURCE[0]}")/.."
 . jobs/environment.sh
@@ -40,7 +41,7 @@ for name, pattern, text in (
         sys.exit(f"{name}: expected a version before {version}, found {found[1]}")
     path.write_text(before[: found.start()] + text + before[found.end() :], encoding="utf-8")
 EOF
-git -C "$tree" commit --quiet --all --message "Version $version"
+git -C "$tree" commit --quiet --no-verify --all --message "Version $version"
 
 # Build without isolation, in an environment of its own with the pinned setuptools
 "$python" -m venv "$scratch/build"

@@ -151,7 +151,7 @@ def test_its_cost_is_told_before_it_is_asked_for(job, capsys):
         ),
         (
             "[ladder]\nbeside = 'spatial_pushbelt'",
-            '[ladder] beside: expected none, or reference = "pushbelt", found',
+            '[ladder] beside: expected reference = "pushbelt", for which it is, found',
         ),
         ("[ladder]\nreference = 'pushbelt'\nset = 3", "[ladder] set: expected a table, found 3"),
     ],

@@ -76,8 +76,8 @@ def ladder(
     Returns
     -------
     rungs : tuple of Sweep
-        From the cheapest up, then the requested model beside them, the job itself, a pushbelt if requested,
-        the reference last. The reference is the model before it, refined.
+        From the cheapest up, then a requested continuous model, the job itself, a requested spatial pushbelt,
+        the pushbelt of the reference, the reference last. The reference is the model before it, refined.
     refusals : dict
         The reason, by the name of the model.
 
@@ -262,7 +262,7 @@ def load(path: str | Path, overrides: Assignments = ()) -> Ladder:
     if settings and reference != PUSHBELT:
         raise mismatch(f"{where} set", f'reference = "{PUSHBELT}", for which it is', show(reference))
     if beside == SPATIAL and reference != PUSHBELT:
-        raise mismatch(f"{where} beside", f'{NONE}, or reference = "{PUSHBELT}"', show(beside))
+        raise mismatch(f"{where} beside", f'reference = "{PUSHBELT}", for which it is', show(beside))
     job = build_job(document, source, replaced, "--set")
     return Ladder(job, *ladder(job, settings if reference == PUSHBELT else None, beside))
 

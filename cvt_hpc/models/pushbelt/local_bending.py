@@ -23,8 +23,8 @@ the spatial pushbelt, where flanks are steep and act at the step's end, it is no
 
 for waves of phase q from element to element, rises from K of the longest ones to K / (1 - b K), which is that
 of the element alone. `axial_excess` makes the slope the mean of both, by which an iteration leaves b K /
-(2 - b K) of the error at most, whatever inertia and rings resist. A tridiagonal slope nearest to S, and any
-other factor from 2.6 to 4.7, take as many iterations (216 and 432 elements, 10 and 20 us).
+(2 - b K) of the error at most, whatever inertia and rings resist. A tridiagonal slope nearest to S
+takes as many iterations (216 and 432 elements, 10 and 20 us).
 """
 
 import numpy as np
@@ -76,7 +76,7 @@ def spread_bending(driven, depths, spread, work, compliance, stiffness, decay):
         Depth of each point of a flank in the sheave without local bending [m].
     spread : (rows, lanes) array
         The spread of the iterate before, which is set [m].
-    work : (elements, 4) array
+    work : (elements, 4 or more) array
         Work space.
     compliance, stiffness, decay : float
         b [m/N] and k_p [N/m] of an element, and r [1].

@@ -16,6 +16,8 @@ are smoothed first, by (1 + b D^2)^-1 with D the second difference and b = EI dt
 has a frequency above 1 / dt from bending, and the energy is that of the smoothed angles times the angles:
 symmetric, and conserved as well. Of a wave that has the frequency w from bending, it leaves out (w dt)^2.
 The inverse is the real part of A z^|n|, of the root z of 1 + b D^2 that decays.
+
+A path that moves with its sheaves does work on the bent belt, which the balance of power leaves open.
 """
 
 import numpy as np
