@@ -33,6 +33,7 @@ ELSEWHERE = {
     "python -m pytest": "runs tests that all runs of the tests have",
     "python -m mkdocs": "tests/cli/test_guide.py builds the guide",
     "python tests/benchmarks": "compares models, for minutes of a core",
+    "python jobs/tables.py": "tests/analysis/test_tables.py",
     "sbatch": "tests/slurm submits the batch files to a Slurm of its own",
     "scancel": "tests/slurm stops jobs so",
     "apptainer": "no container is built in a test; tests/slurm/test_launch_script.py starts the ranks through a stand-in",
@@ -131,7 +132,7 @@ class Reader:
             _parser().parse_args(words[1:])
             status = self._main(_smaller(words[1:], self.page))
             assert status in ((0, 1) if words[1] == "doctor" else (0,))  # 1: of this machine, not of the page
-        elif words[0] == "python" and words[1].startswith("jobs/"):
+        elif words[0] == "python" and words[1].startswith("jobs/") and " ".join(words[:2]) not in ELSEWHERE:
             sys.argv = words[1:]
             runpy.run_path(words[1], run_name="__main__")
         else:
