@@ -159,17 +159,13 @@ def rests_on(made_by):
     found, left, package = set(), named(made_by, ROOT), ROOT / "cvt_hpc"
     for command in re.findall(r"cvt-hpc (\w+)", made_by):
         left |= modules(EXPERIMENTS[command].module) if command in EXPERIMENTS else set()
-        found |= modules("cvt_hpc.analysis.statements") if command == "figure" else set()
     while left:
         found.add(path := left.pop())
         left |= needs(path) - found
-    return {
-        path
-        for path in found
-        if package not in path.parents
-        or path.parts[len(package.parts)] in COMPUTING
-        or path.parts[len(package.parts) + 1 :][:1] == ("statements",)
+    computing = {
+        path for path in found if package not in path.parents or path.parts[len(package.parts)] in COMPUTING
     }
+    return computing | (modules("cvt_hpc.analysis.statements") if "cvt-hpc figure" in made_by else set())
 
 
 @cache
