@@ -6,7 +6,7 @@ from hypothesis import given, settings
 from hypothesis import strategies as st
 
 from cvt_hpc.models.pushbelt.belt import in_lanes, of_lanes
-from cvt_hpc.models.pushbelt.local_bending import spread_bending
+from cvt_hpc.models.pushbelt.local_bending import axial_excess, spread_bending
 from support.complementarity import solve_lcp
 
 STIFFNESS = 1e8  # [N/m] of an element's flank, bending in series
@@ -72,3 +72,23 @@ def test_a_force_deflects_its_surroundings_by_an_exponential_and_alike_forces_as
     assert z[:128] == pytest.approx(expected, abs=1e-6 * compliance * force)
     assert z[128:] == pytest.approx(0.0, abs=1e-30)
     assert spread(np.full((nodes, 1), 1e-5), driven, compliance, decay) == pytest.approx(0.0, abs=1e-18)
+
+
+@pytest.mark.parametrize("share", [0.1, 0.5, 0.9])
+def test_the_slope_along_the_axis_is_half_way_between_those_of_the_longest_and_the_shortest_waves(share):
+    nodes, decay, compliance = 256, 0.97, share / STIFFNESS
+    driven = (np.arange(nodes) >= 128).astype(float)
+    taken, slopes = STIFFNESS + axial_excess(compliance, STIFFNESS), []
+    for wave in (np.ones(nodes), (-1.0) ** np.arange(nodes)):
+        depths = 1e-5 + 1e-6 * wave
+        force = STIFFNESS * (depths - spread(depths[:, None], driven, compliance, decay))
+        slopes.append((force[64] - STIFFNESS * 1e-5) / (1e-6 * wave[64]))
+    # S of the wave from element to element, 4 a = 4313, is a little below K / (1 - b K);
+    # the ends of the arc are felt by up to 1e-4
+    short = 4.0 * decay / (1.0 - decay) ** 2
+    assert slopes == pytest.approx(
+        [STIFFNESS, STIFFNESS * (1.0 + short) / (1.0 + (1.0 - share) * short)], rel=3e-4
+    )
+    # the part of an error that an iteration leaves, alike and of either sign
+    left = share / (2.0 - share)
+    assert 1.0 - np.array(slopes) / taken == pytest.approx([left, -left], abs=5e-3)
