@@ -38,11 +38,11 @@ if TYPE_CHECKING:
 import csv
 
 from cvt_hpc.analysis.conversion import documented_units
-from cvt_hpc.files import naming_refusals, read_regular
 from cvt_hpc.job.units import to_si
 from cvt_hpc.models import MODELS
 from cvt_hpc.models.contract import load_model
-from cvt_hpc.netcdf import flag_attributes
+from cvt_hpc.storage.files import naming_refusals, read_regular
+from cvt_hpc.storage.netcdf import flag_attributes
 from cvt_hpc.tables import below_origin
 from cvt_hpc.variables import Status, Vibrates
 

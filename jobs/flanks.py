@@ -8,7 +8,7 @@ import xarray as xr
 
 from cvt_hpc.analysis.profiles import AROUND, alone, ends_of_arcs, from_end
 from cvt_hpc.analysis.telling_apart import history_files, on_axes
-from cvt_hpc.provenance import origin_lines
+from cvt_hpc.storage.provenance import origin_lines
 
 HEAD = "run,end,flank alone,alone [mm],its largest sliding along the belt [m/s],and along the meridian [m/s]"
 

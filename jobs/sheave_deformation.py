@@ -12,7 +12,7 @@ import numpy as np
 
 from cvt_hpc import simulate
 from cvt_hpc.job import load_job
-from cvt_hpc.provenance import origin_lines
+from cvt_hpc.storage.provenance import origin_lines
 
 JOBS = Path(__file__).parent
 NO_MODES = {"driving_modes_file": "", "driven_modes_file": ""}

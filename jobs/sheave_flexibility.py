@@ -46,11 +46,11 @@ from skfem import (
 from skfem.helpers import grad
 
 from cvt_hpc.errors import InputError, mismatch
-from cvt_hpc.files import written_aside
 from cvt_hpc.job.units import to_si
-from cvt_hpc.netcdf import attributes, write_netcdf
 from cvt_hpc.physics.geometry import cut_path, variator
-from cvt_hpc.provenance import history_line
+from cvt_hpc.storage.files import written_aside
+from cvt_hpc.storage.netcdf import attributes, write_netcdf
+from cvt_hpc.storage.provenance import history_line
 
 DISCS = 2  # of a groove, alike
 QUADRATURE = 6

@@ -36,11 +36,11 @@ from statistics import median
 from cvt_hpc import load_job, open_results, run
 from cvt_hpc.errors import InputError, mismatch, unknown
 from cvt_hpc.experiment_kinds import EXPERIMENTS
-from cvt_hpc.files import written_aside
-from cvt_hpc.kernel_identity import code_digest
+from cvt_hpc.kernels.identity import code_digest
 from cvt_hpc.models import MODELS
 from cvt_hpc.models.contract import load_model
 from cvt_hpc.steppers import STEPPERS
+from cvt_hpc.storage.files import written_aside
 from cvt_hpc.tables import below_origin, columns
 
 ROOT = Path(__file__).resolve().parents[1]
@@ -165,7 +165,7 @@ def rests_on(made_by):
     computing = {
         path for path in found if package not in path.parents or path.parts[len(package.parts)] in COMPUTING
     }
-    return computing | (modules("cvt_hpc.analysis.statements") if "cvt-hpc figure" in made_by else set())
+    return computing | (modules("cvt_hpc.papers") if "cvt-hpc figure" in made_by else set())
 
 
 @cache

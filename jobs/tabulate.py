@@ -7,7 +7,7 @@ import numpy as np
 
 from cvt_hpc import open_results
 from cvt_hpc.errors import InputError, unknown
-from cvt_hpc.provenance import origin_lines
+from cvt_hpc.storage.provenance import origin_lines
 
 OF_A_BELT = ("amplitude", "frequency", "mode", "power_residual")
 # unit, factor and digits of quantities that are not written in SI units, to six digits

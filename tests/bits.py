@@ -213,7 +213,7 @@ def do_study(name: str, document: dict, folder: Path) -> None:
     """Run a study in a folder, and keep the history of its first run where the model has any."""
     from cvt_hpc import build_job, run, simulate
     from cvt_hpc.models.contract import load_model
-    from cvt_hpc.netcdf import write_history
+    from cvt_hpc.storage.netcdf import write_history
 
     model = name.split()[0]
     job = build_job({"name": "bits", "model": model, **document})

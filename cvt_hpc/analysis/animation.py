@@ -19,8 +19,8 @@ from scipy.interpolate import CubicSpline
 from cvt_hpc.analysis.figures import STYLE, as_written
 from cvt_hpc.analysis.on_variator import Drive, draw_pulleys, run_geometry
 from cvt_hpc.errors import mismatch, one_line
-from cvt_hpc.files import written_aside
 from cvt_hpc.physics.belt_path import points_at
+from cvt_hpc.storage.files import written_aside
 
 FORMATS = (".gif", ".mp4")
 PERIODS, FRAMES = 2, 24  # of the vibration, and pictures of each

@@ -5,7 +5,7 @@ import xarray as xr
 from numpy.typing import NDArray
 
 from cvt_hpc.errors import few_of, mismatch
-from cvt_hpc.netcdf import flag_attributes
+from cvt_hpc.storage.netcdf import flag_attributes
 from cvt_hpc.vibration.classes import OccurrenceClass, StartClass, classify_runs
 
 WITHOUT_RESULT = {  # in words, beside curves and spectra

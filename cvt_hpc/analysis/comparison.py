@@ -18,10 +18,10 @@ from numpy.typing import NDArray
 from cvt_hpc.analysis.alignment import COMPARED, align, axes_of, job_of
 from cvt_hpc.analysis.arrangement import labelled
 from cvt_hpc.analysis.classes import at_strongest_strand, occurrence_classes
-from cvt_hpc.files import write_rows
 from cvt_hpc.job.values import heading, shown, shown_number
 from cvt_hpc.models import MODELS
 from cvt_hpc.models.contract import load_model
+from cvt_hpc.storage.files import write_rows
 from cvt_hpc.study import open_results
 from cvt_hpc.study.job_difference import differences, short_pair
 from cvt_hpc.study.repeats import AUDIT, WAYS, interval

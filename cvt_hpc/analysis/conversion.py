@@ -8,12 +8,12 @@ import numpy as np
 import xarray as xr
 from xarray.indexes import PandasMultiIndex
 
-from cvt_hpc.dataset_form import check_form
 from cvt_hpc.errors import mismatch, show, unknown
 from cvt_hpc.job.units import factor_to, is_unit
 from cvt_hpc.job.values import JOB_UNITS
 from cvt_hpc.models import MODELS
 from cvt_hpc.models.contract import load_model
+from cvt_hpc.storage.dataset_form import check_form
 from cvt_hpc.variables import Status, Vibrates
 from cvt_hpc.vibration.classes import OccurrenceClass
 

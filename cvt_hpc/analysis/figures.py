@@ -40,8 +40,8 @@ from numpy.typing import NDArray
 from PIL import Image
 
 from cvt_hpc.errors import mismatch, one_line
-from cvt_hpc.files import written_aside
 from cvt_hpc.job.values import JOB_UNITS, shown_number, shown_unit
+from cvt_hpc.storage.files import written_aside
 
 # Okabe and Ito's colours, told apart by those who do not see all; with the lines enough for 21 methods.
 COLOURS = ("#0072b2", "#d55e00", "#009e73", "#cc79a7", "#e69f00", "#56b4e9", "#333333")

@@ -21,7 +21,7 @@ from cvt_hpc.analysis.figures import WIDTH, check_known, styled
 from cvt_hpc.analysis.profiles import ARC, regions
 from cvt_hpc.analysis.telling_apart import entitle_runs
 from cvt_hpc.errors import mismatch
-from cvt_hpc.netcdf import attributes
+from cvt_hpc.storage.netcdf import attributes
 
 PREFIX = "momentary_"
 SPEED = PREFIX + "element_speed"

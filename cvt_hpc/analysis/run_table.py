@@ -10,8 +10,8 @@ from pandas import DataFrame
 from cvt_hpc.analysis.arrangement import labelled
 from cvt_hpc.analysis.classes import check_results, map_classes
 from cvt_hpc.errors import mismatch
-from cvt_hpc.files import written_aside
 from cvt_hpc.job.values import heading, shown_number
+from cvt_hpc.storage.files import written_aside
 
 FORMATS = (".csv", ".xlsx")
 MOST_ROWS = (1 << 20) - 1  # of a sheet, below its head

@@ -11,7 +11,7 @@ from cvt_hpc.analysis.arrangement import infinity_in_words
 from cvt_hpc.analysis.figures import check_known, entitle
 from cvt_hpc.analysis.histories import place_of, values_of
 from cvt_hpc.errors import InputError, mismatch, one_line
-from cvt_hpc.files import kind_of
+from cvt_hpc.storage.files import kind_of
 
 
 def named(histories: Sequence[xr.Dataset], sources: Sequence[str] = ()) -> list[str]:
@@ -89,7 +89,7 @@ def history_files(paths: Sequence[Path]) -> list[Path]:
     InputError
         A file is no history, or a folder has none.
     """
-    from cvt_hpc.netcdf import is_history
+    from cvt_hpc.storage.netcdf import is_history
 
     found: list[Path] = []
     for path in paths:

@@ -19,7 +19,7 @@ from cvt_hpc.cli import checking, experiments, plots, results, single_run, start
 from cvt_hpc.cli.parts import DONE, INTERRUPTED, complain, end_all, speaks
 from cvt_hpc.errors import BAD_INPUT, CRASHED, InputError, JobWarning, did_you_mean, mismatch, one_line, show
 from cvt_hpc.experiment_kinds import EXPERIMENTS
-from cvt_hpc.files import open_missing_streams
+from cvt_hpc.storage.files import open_missing_streams
 
 __all__ = ["main"]
 

@@ -8,8 +8,8 @@ from typing import Any
 
 from cvt_hpc.cli import parts
 from cvt_hpc.errors import InputError
-from cvt_hpc.files import StorageError
 from cvt_hpc.picture_kinds import END, HISTORIES, KINDS, RESULTS, Kind
+from cvt_hpc.storage.files import StorageError
 
 
 def add(commands: Any) -> None:
@@ -64,8 +64,8 @@ def _draw(arguments: argparse.Namespace) -> int:
     def write(history: Any, out: Path, source: str, of_several: str) -> list[str]:
         written = [f"picture: {_write(name, [history], out, None, [source], options)}"]
         if data:
-            from cvt_hpc.netcdf import write_history
             from cvt_hpc.picture_kinds import function_of
+            from cvt_hpc.storage.netcdf import write_history
 
             shown = function_of(kind.data)(history, source=source, **options)
             written.append(f"data: {write_history(shown, data.with_stem(data.stem + of_several))}")
@@ -160,7 +160,7 @@ def _each(
 def _opened(files: Sequence[Path]) -> Iterator[list[Any]]:
     """Histories of runs, open within."""
     from cvt_hpc.analysis.conversion import standard
-    from cvt_hpc.netcdf import open_netcdf
+    from cvt_hpc.storage.netcdf import open_netcdf
 
     with ExitStack() as stack:
         opened = [stack.enter_context(open_netcdf(file, follow=True)) for file in files]

@@ -122,7 +122,7 @@ def _map(arguments: argparse.Namespace) -> int:
 
 
 def _figure(arguments: argparse.Namespace) -> int:
-    from cvt_hpc.analysis.statements.figures import figure_of, finding_lines
+    from cvt_hpc.papers.figures import figure_of, finding_lines
 
     picture, table, findings = figure_of(arguments.path)
     parts.say(*finding_lines(findings), f"picture: {picture}", f"table: {table}")

@@ -29,9 +29,9 @@ def _simulate(arguments: argparse.Namespace) -> int:
     job.point_at(at, "--at")
     parts.check_output(arguments.out, (".nc",))
     parts.check_output(arguments.plot, parts.PICTURES)
-    from cvt_hpc.netcdf import is_history, write_history
     from cvt_hpc.printing import MOST_OUTCOMES, outcome_lines, point_lines, units_of
     from cvt_hpc.simulation import alone
+    from cvt_hpc.storage.netcdf import is_history, write_history
     from cvt_hpc.variables import Status
 
     if arguments.out is not None and arguments.out.exists() and not is_history(arguments.out):

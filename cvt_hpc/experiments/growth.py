@@ -14,15 +14,15 @@ import xarray as xr
 from cvt_hpc.errors import InputError, mismatch
 from cvt_hpc.experiments.outcome import Outcome, Tell
 from cvt_hpc.experiments.sweeps import Sweep, handed, load_sweep, maker_of, run_sweeps, sweep_lines
-from cvt_hpc.files import write_rows
 from cvt_hpc.job import Job, rebuild_job
 from cvt_hpc.job.assignments import Assignments
 from cvt_hpc.job.loading import load_job
 from cvt_hpc.job.values import heading, in_words, read_value, shown_number
 from cvt_hpc.models import MODELS
 from cvt_hpc.models.contract import load_model
-from cvt_hpc.netcdf import attributes, global_attributes, open_netcdf, store
-from cvt_hpc.provenance import origin_lines
+from cvt_hpc.storage.files import write_rows
+from cvt_hpc.storage.netcdf import attributes, global_attributes, open_netcdf, store
+from cvt_hpc.storage.provenance import origin_lines
 from cvt_hpc.study import process_rank
 from cvt_hpc.study.status import STALLED
 from cvt_hpc.tables import columns, number, short

@@ -5,8 +5,8 @@ from collections.abc import Callable, Iterator
 from pathlib import Path
 from typing import Any
 
-from cvt_hpc.archives import Archives
-from cvt_hpc.output_folder import Content, OutputFolder
+from cvt_hpc.storage.archives import Archives
+from cvt_hpc.storage.output_folder import Content, OutputFolder
 from cvt_hpc.study.job_difference import another_job
 
 _LIMIT = 1 << 26  # [bytes] of a part; a branch of 20 loads has some 10 kB

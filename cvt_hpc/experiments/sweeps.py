@@ -14,13 +14,13 @@ import numpy as np
 import xarray as xr
 
 from cvt_hpc.experiments.outcome import Tell
-from cvt_hpc.files import refuse_link
 from cvt_hpc.job import Job, known_keys, rebuild_job
 from cvt_hpc.job.definition import handed_to
 from cvt_hpc.job.summary import core_time_in_words
 from cvt_hpc.linear_algebra import one_thread
 from cvt_hpc.printing import trouble_lines
 from cvt_hpc.simulation import run_costs, simulate
+from cvt_hpc.storage.files import refuse_link
 from cvt_hpc.study import check_start, open_results, run
 from cvt_hpc.study.ranks.launch import detect_launch
 from cvt_hpc.study.ranks.progress import show_duration

@@ -14,9 +14,9 @@ from pathlib import Path
 from typing import Any, NamedTuple
 
 from cvt_hpc.errors import InputError, JobWarning, did_you_mean, few_of, mismatch, show
-from cvt_hpc.files import read_regular
 from cvt_hpc.job.units import factor_to, to_si
 from cvt_hpc.parameters import Column, FromFile, RowError
+from cvt_hpc.storage.files import read_regular
 
 MOST_BYTES = 2**20
 _SEPARATORS = {",": "commas", ";": "semicolons", "\t": "tabs"}

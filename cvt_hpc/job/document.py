@@ -10,10 +10,10 @@ from pathlib import Path
 from typing import Any
 
 from cvt_hpc.errors import InputError, check_keys, did_you_mean, mismatch, show, unknown
-from cvt_hpc.files import read_regular
 from cvt_hpc.job.definition import HEADER
 from cvt_hpc.job.values import expectation, read_value, warn_of_bare_numbers
 from cvt_hpc.parameters import Parameter
+from cvt_hpc.storage.files import read_regular
 
 MOST_BYTES = 2**26
 _POSITION = re.compile(r"(?P<what>.*?) \(at (?:line (?P<line>\d+), column (?P<column>\d+)|end of document)\)")

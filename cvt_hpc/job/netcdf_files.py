@@ -1,6 +1,6 @@
 """netCDF files that give parameters of a job: variables with units, one error for all faults.
 
-A file may come from somebody else: `cvt_hpc/foreign_files.py` says what is not read.
+A file may come from somebody else: `cvt_hpc/storage/foreign_files.py` says what is not read.
 """
 
 from __future__ import annotations
@@ -63,7 +63,7 @@ def _columns(file: FromFile, content: bytes, place: str) -> dict[str, Column]:
     import netCDF4
 
     if _HDF5 in content:  # netCDF looks for it behind a block of the user's, too
-        from cvt_hpc.foreign_files import check_hdf5
+        from cvt_hpc.storage.foreign_files import check_hdf5
 
         check_hdf5(io.BytesIO(content), len(content), place)
     try:

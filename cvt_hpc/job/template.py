@@ -14,7 +14,6 @@ from pathlib import Path, PurePosixPath
 
 import cvt_hpc
 from cvt_hpc.errors import mismatch, unknown
-from cvt_hpc.files import written_aside
 from cvt_hpc.job.loading import read_name
 from cvt_hpc.job.schema import Schema, load_schema
 from cvt_hpc.job.units import to_si
@@ -22,6 +21,7 @@ from cvt_hpc.job.values import angle_in_words, in_words, kind_of
 from cvt_hpc.models import MODELS
 from cvt_hpc.models.contract import load_model
 from cvt_hpc.parameters import Parameter
+from cvt_hpc.storage.files import written_aside
 from cvt_hpc.tables import columns
 
 _SHARE = "share/cvt_hpc/"  # where an installed package has them

@@ -12,10 +12,10 @@ from typing import Any
 
 import numpy as np
 
-from cvt_hpc.dataset_form import LARGEST
 from cvt_hpc.errors import InputError, UnitWarning, did_you_mean, mismatch, show
 from cvt_hpc.job.units import UnitError, factor_to, from_si, to_si, unit_in
 from cvt_hpc.parameters import Parameter
+from cvt_hpc.storage.dataset_form import LARGEST
 
 # Units in which people give a quantity, by the SI unit in which a bare number is read
 _CUSTOMARY = {

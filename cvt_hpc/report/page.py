@@ -28,15 +28,15 @@ from cvt_hpc.analysis.maps import AXIS, has_starts, map_figure
 from cvt_hpc.analysis.scatter import is_sampled
 from cvt_hpc.analysis.value_maps import value_map_figure
 from cvt_hpc.errors import InputError, escaped, mismatch, one_line
-from cvt_hpc.files import written_aside
 from cvt_hpc.job import Job, stored_job
 from cvt_hpc.job.summary import core_time_in_words, rules_in_words, value_in_words
 from cvt_hpc.job.values import shown
 from cvt_hpc.models.contract import load_model
-from cvt_hpc.netcdf import CONTENT, HISTORY
 from cvt_hpc.report import findings
 from cvt_hpc.report.findings import quantities
 from cvt_hpc.report.interactive import KEPT, as_script, map_data
+from cvt_hpc.storage.files import written_aside
+from cvt_hpc.storage.netcdf import CONTENT, HISTORY
 from cvt_hpc.variables import Status
 from cvt_hpc.vibration.classes import OccurrenceClass, levels, onsets
 

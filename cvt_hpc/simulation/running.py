@@ -17,9 +17,9 @@ from cvt_hpc.job.assignments import Assignments, read_assignments, warn_of_bare_
 from cvt_hpc.job.summary import warn_of_notices
 from cvt_hpc.job.values import POINT_UNITS
 from cvt_hpc.models.contract import Model, load_model
-from cvt_hpc.netcdf import attributes, global_attributes, variable_attributes
 from cvt_hpc.simulation.marching import Interrupted, More, march_runs, no_more
 from cvt_hpc.simulation.record import record_coordinates, record_of_solution, record_variables, recorded_model
+from cvt_hpc.storage.netcdf import attributes, global_attributes, variable_attributes
 from cvt_hpc.variables import Outcome
 
 if TYPE_CHECKING:

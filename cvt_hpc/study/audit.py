@@ -8,11 +8,11 @@ from typing import NamedTuple
 import numpy as np
 
 from cvt_hpc.errors import mismatch
-from cvt_hpc.files import write_rows
 from cvt_hpc.job import Job
 from cvt_hpc.job.definition import handed_to
 from cvt_hpc.job.values import heading, shown_number
 from cvt_hpc.models.auto.rules import Rung
+from cvt_hpc.storage.files import write_rows
 from cvt_hpc.study.description import Study, describe
 from cvt_hpc.study.folder import StudyFolder
 from cvt_hpc.study.record.index import Records

@@ -16,7 +16,7 @@ from cvt_hpc.errors import InputError
 from cvt_hpc.job import Axis, Job
 from cvt_hpc.job.definition import Derived
 from cvt_hpc.job.values import JOB_UNITS, shown
-from cvt_hpc.netcdf import attributes
+from cvt_hpc.storage.netcdf import attributes
 from cvt_hpc.study.simulator import Simulator
 from cvt_hpc.variables import Status, Variable
 

@@ -8,8 +8,8 @@ from collections.abc import Iterator
 from pathlib import Path
 from typing import NamedTuple
 
-from cvt_hpc.files import try_to_write
-from cvt_hpc.provenance import versions
+from cvt_hpc.storage.files import try_to_write
+from cvt_hpc.storage.provenance import versions
 from cvt_hpc.study.forecast.resources import size_in_words
 
 LEAST_DISK = 1e9  # [byte]: records and results.nc of a million runs take about as much
@@ -64,7 +64,7 @@ def _usable_cores() -> int:
 
 
 def _cache() -> Finding:
-    from cvt_hpc.kernel_store import folder as cache_folder
+    from cvt_hpc.kernels.store import folder as cache_folder
 
     if (place := cache_folder()) is None:
         advice = "set NUMBA_CACHE_DIR to a folder of your own, or each start compiles again"

@@ -17,10 +17,10 @@ from typing import TYPE_CHECKING, Any, NamedTuple
 import numpy as np
 
 from cvt_hpc.errors import InputError, few_of, mismatch, nearest
-from cvt_hpc.files import kind_of, make_own_folder, naming_refusals, sync_folder
-from cvt_hpc.locks import BusyError, is_locked, locked
-from cvt_hpc.netcdf import store_history
-from cvt_hpc.output_folder import DamagedJobError, Kind, OutputFolder
+from cvt_hpc.storage.files import kind_of, make_own_folder, naming_refusals, sync_folder
+from cvt_hpc.storage.locks import BusyError, is_locked, locked
+from cvt_hpc.storage.netcdf import store_history
+from cvt_hpc.storage.output_folder import DamagedJobError, Kind, OutputFolder
 from cvt_hpc.study.description import Study
 from cvt_hpc.study.job_difference import have_one_layout, places_in, refuse_other
 from cvt_hpc.study.record.index import Places, Records, open_log, read_records

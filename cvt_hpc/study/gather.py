@@ -19,10 +19,10 @@ from typing import TYPE_CHECKING, Any
 import numpy as np
 
 from cvt_hpc.errors import InputError, mismatch
-from cvt_hpc.files import discard, kind_of, naming_refusals, written_aside
-from cvt_hpc.locks import locked
-from cvt_hpc.netcdf import global_attributes, open_netcdf, refuse_beside_sweep, variable_attributes
-from cvt_hpc.provenance import history_line
+from cvt_hpc.storage.files import discard, kind_of, naming_refusals, written_aside
+from cvt_hpc.storage.locks import locked
+from cvt_hpc.storage.netcdf import global_attributes, open_netcdf, refuse_beside_sweep, variable_attributes
+from cvt_hpc.storage.provenance import history_line
 from cvt_hpc.study.description import Dimension, Study
 from cvt_hpc.study.folder import StudyFolder, study_instead
 from cvt_hpc.study.job_difference import difference_in_words, places_in
@@ -132,7 +132,7 @@ def _read_held(path: Path) -> tuple[dict[str, Any], np.ndarray]:
     """Return the resolved job of a dataset, and how each of its runs has ended; or nothing."""
     import h5py
 
-    from cvt_hpc.foreign_files import DAMAGE, check_hdf5
+    from cvt_hpc.storage.foreign_files import DAMAGE, check_hdf5
 
     nothing: tuple[dict[str, Any], np.ndarray] = {}, np.zeros(0, np.int8)
     if kind_of(path) != "a file":

@@ -32,9 +32,9 @@ from typing import Any, NamedTuple
 import numpy as np
 from numpy.typing import NDArray
 
-from cvt_hpc.files import discard
 from cvt_hpc.job import Job
-from cvt_hpc.provenance import new_session
+from cvt_hpc.storage.files import discard
+from cvt_hpc.storage.provenance import new_session
 from cvt_hpc.study.batches import Assignment, share_out
 from cvt_hpc.study.description import Study
 from cvt_hpc.study.folder import Part, StudyFolder, leave_out_missing

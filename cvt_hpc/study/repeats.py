@@ -21,12 +21,12 @@ from numpy.typing import NDArray
 from scipy.special import betaincinv
 
 from cvt_hpc.errors import mismatch, show
-from cvt_hpc.files import refuse_link
 from cvt_hpc.job import Job, rebuild_job
 from cvt_hpc.job.definition import handed_to
 from cvt_hpc.job.rules import overridden
 from cvt_hpc.models.auto.rules import COARSENESS, Rung
 from cvt_hpc.models.contract import load_model
+from cvt_hpc.storage.files import refuse_link
 from cvt_hpc.study.description import Study, describe
 from cvt_hpc.study.folder import StudyFolder
 from cvt_hpc.study.record.index import Records

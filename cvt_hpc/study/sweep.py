@@ -16,12 +16,12 @@ from typing import Any
 import numpy as np
 
 from cvt_hpc.errors import mismatch
-from cvt_hpc.files import StorageError, open_missing_streams
 from cvt_hpc.job import Job
 from cvt_hpc.linear_algebra import one_thread
-from cvt_hpc.locks import BusyError
-from cvt_hpc.netcdf import library_for_sweep
-from cvt_hpc.provenance import program_identity
+from cvt_hpc.storage.files import StorageError, open_missing_streams
+from cvt_hpc.storage.locks import BusyError
+from cvt_hpc.storage.netcdf import library_for_sweep
+from cvt_hpc.storage.provenance import program_identity
 from cvt_hpc.study.batches import Assignment, Batch
 from cvt_hpc.study.description import Study, describe
 from cvt_hpc.study.folder import Part, StudyFolder, keep_histories, leave_out_missing, read_part

@@ -12,8 +12,8 @@ from typing import TYPE_CHECKING, Any
 
 import numpy as np
 
-from cvt_hpc.netcdf import attributes
 from cvt_hpc.physics.geometry import Variator
+from cvt_hpc.storage.netcdf import attributes
 
 if TYPE_CHECKING:
     import xarray as xr

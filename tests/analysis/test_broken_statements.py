@@ -5,8 +5,8 @@ import json
 import numpy as np
 import pytest
 
-from cvt_hpc.analysis.statements.figures import FIGURES
-from cvt_hpc.analysis.statements.verdicts import Kept, Verdict, judged
+from cvt_hpc.papers.figures import FIGURES
+from cvt_hpc.papers.verdicts import Kept, Verdict, judged
 from cvt_hpc.variables import Vibrates
 from support import stated
 

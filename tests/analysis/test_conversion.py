@@ -15,9 +15,9 @@ from cvt_hpc.cli import main
 from cvt_hpc.errors import InputError
 from cvt_hpc.models import MODELS
 from cvt_hpc.models.contract import load_model
-from cvt_hpc.netcdf import write_netcdf
 from cvt_hpc.picture_kinds import KINDS, RESULTS
 from cvt_hpc.simulation.record import COMMON
+from cvt_hpc.storage.netcdf import write_netcdf
 from support.foreign import REGISTRY, WAYS, drawn, in_other_units, numbers, other_unit
 from support.stored import NAMES, content, stored
 

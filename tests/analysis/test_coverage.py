@@ -6,12 +6,12 @@ import tomllib
 
 import pytest
 
-from cvt_hpc.analysis.statements.figures import FIGURES
 from cvt_hpc.cli import _parser
 from cvt_hpc.errors import InputError
 from cvt_hpc.job.schema import load_schema
 from cvt_hpc.models import MODELS
 from cvt_hpc.models.contract import load_model
+from cvt_hpc.papers.figures import FIGURES
 from support.pages import ROOT, shell_calls
 
 JOBS = ROOT / "jobs"

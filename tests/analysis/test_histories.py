@@ -15,8 +15,8 @@ from cvt_hpc.analysis.histories import draw_history, history_figure, phase_figur
 from cvt_hpc.analysis.history_panels import read_strands
 from cvt_hpc.errors import InputError
 from cvt_hpc.job import load_job
-from cvt_hpc.netcdf import is_history, write_history
 from cvt_hpc.printing import point_lines
+from cvt_hpc.storage.netcdf import is_history, write_history
 from cvt_hpc.variables import Status, shortened
 from support.runs import PROBES, RATE, run
 from support.stored import stored

@@ -12,8 +12,8 @@ import xarray as xr
 import cvt_hpc.accessor  # noqa: F401
 from cvt_hpc.cli import main
 from cvt_hpc.errors import InputError
-from cvt_hpc.foreign_files import EXPANSION
-from cvt_hpc.netcdf import is_history, open_netcdf, write_history, write_netcdf
+from cvt_hpc.storage.foreign_files import EXPANSION
+from cvt_hpc.storage.netcdf import is_history, open_netcdf, write_history, write_netcdf
 from cvt_hpc.study import open_results
 from support.hostile_datasets import FORMS, HOSTILE, SECRET, raw
 from support.studies import study
@@ -185,8 +185,8 @@ def test_all_that_opens_a_dataset_does_so_by_one_function():
     }
     found["accessor.py"] = []  # in its docstring, as the user does
     assert {source for source, names in found.items() if names} == {
-        "foreign_files.py",
-        "netcdf.py",
+        "storage/foreign_files.py",
+        "storage/netcdf.py",
         "job/netcdf_files.py",  # of bytes that were read, and checked
         "study/gather.py",  # written by the process itself, or checked
     }

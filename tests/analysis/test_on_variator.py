@@ -11,9 +11,9 @@ from cvt_hpc.analysis.on_variator import LARGEST, energy_figure, region_powers, 
 from cvt_hpc.cli import main
 from cvt_hpc.errors import InputError
 from cvt_hpc.models.belt_drive.layout import layout
-from cvt_hpc.netcdf import write_history
 from cvt_hpc.physics.belt_path import points_at
 from cvt_hpc.physics.geometry import variator
+from cvt_hpc.storage.netcdf import write_history
 from cvt_hpc.variator.variables import Means
 
 POINT = {"ratio": 1.0, "driven_radius": 0.05, "centre_distance": 0.155}

@@ -4,7 +4,7 @@ import numpy as np
 import pytest
 
 from cvt_hpc.analysis.paper_pictures import spectrum_figure
-from cvt_hpc.analysis.statements.figures import FIGURES
+from cvt_hpc.papers.figures import FIGURES
 from support import stated
 
 

@@ -8,9 +8,9 @@ import xarray as xr
 
 from cvt_hpc.analysis.paper_pictures import strand_bars_figure
 from cvt_hpc.analysis.profiles import profile_figure
-from cvt_hpc.analysis.statements import bullinger_along
-from cvt_hpc.analysis.statements.verdicts import Kept, Verdict, judged
 from cvt_hpc.errors import InputError
+from cvt_hpc.papers import bullinger_along
+from cvt_hpc.papers.verdicts import Kept, Verdict, judged
 
 NAMES = np.repeat(["driving arc", "t1", "driven arc", "t2"], [10, 3, 10, 3])
 AXES = json.dumps({"name": "two", "model": "pushbelt", "axes": {"load": [8, 16]}})

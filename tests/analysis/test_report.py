@@ -17,9 +17,9 @@ from cvt_hpc.analysis.classes import map_classes, occurrence_classes
 from cvt_hpc.analysis.hysteresis_bands import lowest_onsets
 from cvt_hpc.errors import InputError
 from cvt_hpc.job import build_job
-from cvt_hpc.netcdf import HISTORY
 from cvt_hpc.report import write_report
 from cvt_hpc.report.interactive import as_script, map_data
+from cvt_hpc.storage.netcdf import HISTORY
 from cvt_hpc.variables import Status, Vibrates
 from support.studies import ramps, sampled, study, traced
 

@@ -7,10 +7,10 @@ import pytest
 import xarray as xr
 
 from cvt_hpc.analysis.followed_drawing import sliding_spectrum
-from cvt_hpc.analysis.statements.bullinger_ratios import _thirds
-from cvt_hpc.analysis.statements.figures import ARROWS, FIGURES, _Arc
-from cvt_hpc.analysis.statements.verdicts import Measured, Statement, Verdict, judged, on_strand, over_arc
 from cvt_hpc.errors import InputError
+from cvt_hpc.papers.bullinger_ratios import _thirds
+from cvt_hpc.papers.figures import ARROWS, FIGURES, _Arc
+from cvt_hpc.papers.verdicts import Measured, Statement, Verdict, judged, on_strand, over_arc
 
 ROOT = Path(__file__).parents[2]
 

@@ -18,7 +18,7 @@ import xarray as xr
 from cvt_hpc.job import Job, build_job, load_job
 from cvt_hpc.job.definition import handed_to
 from cvt_hpc.models.auto.rules import Rung
-from cvt_hpc.provenance import origin_lines
+from cvt_hpc.storage.provenance import origin_lines
 from cvt_hpc.study import open_results, run
 from cvt_hpc.vibration.classes import OccurrenceClass, classify_runs
 

@@ -18,9 +18,9 @@ import numpy as np
 
 from cvt_hpc.kernels import kernel
 from cvt_hpc.lanes import LaneArray, fma
-from cvt_hpc.provenance import origin_lines
 from cvt_hpc.solvers import cyclic_blocks, linked_blocks
 from cvt_hpc.solvers.cyclic_blocks import DIAGONAL, LOWER, UPPER, block_size
+from cvt_hpc.storage.provenance import origin_lines
 
 NODES, PARTS = 432, 8
 CASES = ((4, 1), (4, 4), (4, 12), (8, 1), (8, 8), (8, 12), (9, 8), (10, 8))  # size, right-hand sides

@@ -31,7 +31,7 @@ from cvt_hpc.models.linear_stability.modes import loosened, modes
 from cvt_hpc.models.pushbelt.run import ElementRun
 from cvt_hpc.models.steady_variator.record import quantities
 from cvt_hpc.models.steady_variator.walking import NoSteadyState, SteadyBelt
-from cvt_hpc.provenance import origin_lines
+from cvt_hpc.storage.provenance import origin_lines
 from cvt_hpc.variator import PULLEYS, STRANDS
 from cvt_hpc.vibration.damped_modes import LEAST_SAMPLES, damped_modes, thinned
 

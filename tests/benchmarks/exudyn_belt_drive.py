@@ -41,7 +41,7 @@ from cvt_hpc.models.belt_drive.theory import answers, expected_loss, kick, stran
 from cvt_hpc.models.belt_drive.transient import Transient
 from cvt_hpc.multibody.ancf_beam import SHAPES, WEIGHTS, at_places
 from cvt_hpc.physics.nearest_on_path import along
-from cvt_hpc.provenance import origin_lines
+from cvt_hpc.storage.provenance import origin_lines
 
 HERE = Path(__file__).parent
 LOAD, DURATION, INTERVAL, IMPULSE = 8.0, 0.65, 1e-3, 0.01

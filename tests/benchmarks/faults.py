@@ -26,7 +26,7 @@ TESTS = Path(__file__).parents[1]
 sys.path.insert(0, str(TESTS))
 
 from cvt_hpc import load_job, open_results, run  # noqa: E402
-from cvt_hpc.provenance import origin_lines  # noqa: E402
+from cvt_hpc.storage.provenance import origin_lines  # noqa: E402
 from cvt_hpc.study.folder import StudyFolder  # noqa: E402
 from cvt_hpc.study.record.index import read_records  # noqa: E402
 from support.cluster import JOB, TWO_NODES, Cluster, missing, wait_until  # noqa: E402

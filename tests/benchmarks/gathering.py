@@ -24,7 +24,7 @@ import numpy as np
 
 from cvt_hpc import simulation
 from cvt_hpc.job import build_job
-from cvt_hpc.provenance import new_session, origin_lines
+from cvt_hpc.storage.provenance import new_session, origin_lines
 from cvt_hpc.study import gather, open_results, read_status
 from cvt_hpc.study.description import Dimension, Study, describe
 from cvt_hpc.study.folder import StudyFolder

@@ -18,8 +18,7 @@ from pathlib import Path
 import numba
 import numpy as np
 
-from cvt_hpc import kernel_store
-from cvt_hpc.kernels import kernel
+from cvt_hpc.kernels import kernel, store
 
 
 def kernels():
@@ -119,7 +118,7 @@ def damaged_runs(count, seed=0):
     chance, found = random.Random(seed), Counter()
     with tempfile.TemporaryDirectory() as folder:
         right, _ = in_a_process(folder)
-        place = Path(folder) / kernel_store._FOLDER
+        place = Path(folder) / store._FOLDER
         for _ in range(count):
             entries = sorted(path for path in place.iterdir() if path.name != "claims")
             way = damage(entries, chance)

@@ -28,7 +28,7 @@ from peer_tasks import read_witness
 
 HERE = Path(__file__).parent
 sys.path.insert(0, str(HERE.parent))
-from cvt_hpc.provenance import origin_lines  # noqa: E402
+from cvt_hpc.storage.provenance import origin_lines  # noqa: E402
 from support.study_processes import clean_environment, find_mpirun  # noqa: E402
 
 PEERS = ("cvt_hpc", "mpi4py.futures", "libEnsemble", "dask.distributed")

@@ -19,7 +19,7 @@ from pathlib import Path
 import numpy as np
 
 sys.path.insert(0, str(Path(__file__).parents[1]))
-from cvt_hpc.provenance import origin_lines  # noqa: E402
+from cvt_hpc.storage.provenance import origin_lines  # noqa: E402
 from support.studies import study  # noqa: E402
 
 REPEATS = 3

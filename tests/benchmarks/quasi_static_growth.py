@@ -24,7 +24,7 @@ from cvt_hpc.models.quasi_static_belt.split_belt import lag_drag, layer_shares
 from cvt_hpc.models.steady_variator.equations import LATE
 from cvt_hpc.models.steady_variator.linearised import Linearisation
 from cvt_hpc.models.steady_variator.walking import NoSteadyState, SteadyBelt
-from cvt_hpc.provenance import origin_lines
+from cvt_hpc.storage.provenance import origin_lines
 
 DEFAULTS = {key: p.default for table in PARAMETERS.values() for key, p in table.items()} | {"duration": 0.4}
 FITTED = Path(__file__).parents[2] / "jobs" / "lebrecht_fitted.toml"

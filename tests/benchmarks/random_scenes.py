@@ -21,8 +21,8 @@ from scipy.stats import qmc
 
 from cvt_hpc.job import Job, build_job
 from cvt_hpc.models.elastic_belt.step_choice import REFERENCE_ERROR
-from cvt_hpc.provenance import origin_lines
 from cvt_hpc.simulation import run_points
+from cvt_hpc.storage.provenance import origin_lines
 from cvt_hpc.tables import below_origin
 from cvt_hpc.vibration.classes import OccurrenceClass, classify_runs
 

@@ -24,7 +24,7 @@ from cvt_hpc.models.pushbelt.stepping import advance_by
 from cvt_hpc.models.spatial_pushbelt import belt as b
 from cvt_hpc.models.spatial_pushbelt.belt import with_two_flows
 from cvt_hpc.models.spatial_pushbelt.transient import EQUATIONS
-from cvt_hpc.provenance import origin_lines
+from cvt_hpc.storage.provenance import origin_lines
 from support.pushbelts import THRUST
 from support.spatial_belts import LOAD, inputs, scene, stored
 

@@ -12,7 +12,7 @@ import sys
 import numpy as np
 from scipy.stats import qmc
 
-from cvt_hpc.provenance import origin_lines
+from cvt_hpc.storage.provenance import origin_lines
 from cvt_hpc.variables import Status, Vibrates
 from support.rungs import rung_record
 

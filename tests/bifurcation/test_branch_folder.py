@@ -11,8 +11,8 @@ import xarray as xr
 from cvt_hpc.cli import main
 from cvt_hpc.experiments.branch import diagram
 from cvt_hpc.experiments.branch.attractors import Attractor, Followed, Stability, states_of
-from cvt_hpc.locks import locked
 from cvt_hpc.models.linear_stability.branch import Branch
+from cvt_hpc.storage.locks import locked
 from cvt_hpc.vibration.classes import OccurrenceClass
 
 JOB = """

@@ -19,8 +19,8 @@ from threadpoolctl import threadpool_info, threadpool_limits
 from cvt_hpc.errors import InputError
 from cvt_hpc.experiments.chart import load, make
 from cvt_hpc.experiments.chart.making import ChartFolder, _tell_compiling
-from cvt_hpc.output_folder import checksum
-from cvt_hpc.provenance import git_revision, machine
+from cvt_hpc.storage.output_folder import checksum
+from cvt_hpc.storage.provenance import git_revision, machine
 from cvt_hpc.tables import below_origin
 from support.bells import Transient
 from support.cf import cf_findings
@@ -271,7 +271,7 @@ def test_points_by_other_versions_or_machines_are_named(
 ):
     job = write_chart()
     with monkeypatch.context() as earlier:
-        earlier.setattr(f"cvt_hpc.archives.{name}", lambda: value)
+        earlier.setattr(f"cvt_hpc.storage.archives.{name}", lambda: value)
         made(job)
     assert not caplog.records
     (tmp_path / "out/bells/points/ringing-soft-3.npz").unlink()

@@ -98,8 +98,8 @@ def mechanics(monkeypatch):
     monkeypatch.setitem(sys.modules, "cvt_hpc.simulation", double)
     monkeypatch.setitem(sys.modules, "cvt_hpc.analysis.histories", histories)
     kept = lambda dataset, path: calls["written"].append((dataset, path)) or path  # noqa: E731
-    monkeypatch.setattr("cvt_hpc.netcdf.write_history", kept)
-    monkeypatch.setattr("cvt_hpc.netcdf.is_history", lambda path: path.name == "history.nc")
+    monkeypatch.setattr("cvt_hpc.storage.netcdf.write_history", kept)
+    monkeypatch.setattr("cvt_hpc.storage.netcdf.is_history", lambda path: path.name == "history.nc")
     return calls
 
 

@@ -9,7 +9,7 @@ from matplotlib.text import Text
 
 from cvt_hpc.analysis.figures import LONG, NARROW
 from cvt_hpc.cli import main
-from cvt_hpc.netcdf import write_history
+from cvt_hpc.storage.netcdf import write_history
 from support import pictured
 from support.eyes import EYES, lightness, seen
 

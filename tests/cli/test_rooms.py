@@ -33,8 +33,8 @@ def statements(block):
 
 
 def by_module(path):
-    """Names of `cvt_hpc.files` that a file uses by that module's name."""
-    return {f"cvt_hpc.files.{name}" for name in re.findall(r"\bfiles\.(\w+)", path.read_text())}
+    """Names of `cvt_hpc.storage.files` that a file uses by that module's name."""
+    return {f"cvt_hpc.storage.files.{name}" for name in re.findall(r"\bfiles\.(\w+)", path.read_text())}
 
 
 @cache
@@ -84,16 +84,15 @@ def test_imports_run_downwards():
     [
         ({"mpi4py"}, {"study"}),
         (
-            {"cvt_hpc.files.written_aside", "cvt_hpc.files.write_rows"},
+            {"cvt_hpc.storage.files.written_aside", "cvt_hpc.storage.files.write_rows"},
             {
                 "job",
                 "study",
                 "analysis",
                 "experiments",
                 "report",
-                "archives",
-                "output_folder",
-                "netcdf",
+                "papers",
+                "storage",
             },
         ),
     ],

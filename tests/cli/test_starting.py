@@ -169,7 +169,7 @@ def test_the_wheel_brings_its_revision_and_the_same_examples(tmp_path):
     (package,) = (tmp_path / "own").glob("lib*/python*/site-packages")
     program = (
         "import json, cvt_hpc; from cvt_hpc.job.template import example_files;"
-        "from cvt_hpc.provenance import git_revision;"
+        "from cvt_hpc.storage.provenance import git_revision;"
         "files = {name: str(path) for name, path in example_files().items()};"
         "print(json.dumps([cvt_hpc.__file__, git_revision(), files]))"
     )

@@ -7,7 +7,7 @@ from pathlib import Path
 
 import cvt_hpc
 from cvt_hpc import build_job, run, simulate
-from cvt_hpc.netcdf import write_history
+from cvt_hpc.storage.netcdf import write_history
 
 FOLDER = Path(__file__).parent / cvt_hpc.__version__
 SHORT = {"duration": "0.1 s", "longest_duration": "0.1 s"}

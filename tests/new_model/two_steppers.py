@@ -7,12 +7,12 @@ from matplotlib.figure import Figure
 from cvt_hpc.analysis.figures import WIDTH, draw
 from cvt_hpc.experiments.outcome import Outcome
 from cvt_hpc.experiments.sweeps import Sweep, load_sweep, run_sweeps, sweep_lines
-from cvt_hpc.files import write_rows
 from cvt_hpc.job import Job, build_job, rebuild_job
 from cvt_hpc.job.document import read_document, read_table
-from cvt_hpc.netcdf import global_attributes
 from cvt_hpc.parameters import Parameter
-from cvt_hpc.provenance import origin_lines
+from cvt_hpc.storage.files import write_rows
+from cvt_hpc.storage.netcdf import global_attributes
+from cvt_hpc.storage.provenance import origin_lines
 from cvt_hpc.study import process_rank
 from cvt_hpc.study.status import STALLED
 from cvt_hpc.tables import columns

@@ -27,22 +27,21 @@ from numba.core.dispatcher import Dispatcher
 from numba.extending import overload, register_jitable
 
 import cvt_hpc
-from cvt_hpc import kernel_identity, kernel_store, kernels
-from cvt_hpc.kernel_identity import UnknownValueError, Walk
-from cvt_hpc.kernels import kernel, merged_kernel
+from cvt_hpc.kernels import called_alike, compiling, identity, kernel, merged_kernel, store
+from cvt_hpc.kernels.identity import UnknownValueError, Walk
 from cvt_hpc.lanes import LaneArray, minimum
 
-PACKAGE = Path(kernels.__file__).parent
+PACKAGE = Path(cvt_hpc.__file__).parent
 
 
 @pytest.fixture
 def chosen(monkeypatch, tmp_path):
     """A folder that the user has chosen; what has been told before is told again."""
     for told in (
-        kernel_store.not_kept,
-        kernel_store.tell_damaged,
-        kernel_store._remove_forgotten,
-        kernels._tell_unknown,
+        store.not_kept,
+        store.tell_damaged,
+        store._remove_forgotten,
+        compiling._tell_unknown,
     ):
         told.cache_clear()
     monkeypatch.setattr(numba.config, "CACHE_DIR", str(tmp_path / "mine"))
@@ -185,17 +184,17 @@ def test_every_kernel_of_the_package_can_be_told_apart():
 
 
 def test_what_has_taught_the_compiler_counts_and_what_it_has_loaded_itself_does_not(monkeypatch):
-    before = kernel_identity.extensions()
+    before = identity.extensions()
     numba.njit(lambda x: np.sort(x))(np.ones(2))
-    assert kernel_identity.extensions() == before
+    assert identity.extensions() == before
     arithmetic = sys.modules["cvt_hpc.lanes.arithmetic"]
     monkeypatch.setattr(arithmetic, "_common", made("def f(a, b): return None"))
     arithmetic._common.__module__ = arithmetic.__name__
-    assert kernel_identity.extensions() != before
+    assert identity.extensions() != before
     monkeypatch.undo()
-    assert kernel_identity.extensions() == before
+    assert identity.extensions() == before
     overload(len)(made("def f(x): return None"))
-    assert kernel_identity.extensions() != before
+    assert identity.extensions() != before
 
 
 @kernel
@@ -215,7 +214,7 @@ def test_kernels_with_functions_of_the_compilers_library_are_kept(chosen, caplog
     assert again(2).sum() == 4.0 and hits(again) == 1
     assert len(entries(chosen)) == 1 and caplog.messages == []
     of_user = "_ZN5numba2np3sumB4v100typeC29CPUDispatcher"
-    assert [kernels._is_foreign(name) for name in ("_ZN5numba2np3sumE", of_user, "_ZN8__main__1fE", "sin")] == [
+    assert [compiling._is_foreign(name) for name in ("_ZN5numba2np3sumE", of_user, "_ZN8__main__1fE", "sin")] == [
         False, True, True, False,
     ]  # fmt: skip
 
@@ -224,22 +223,26 @@ def test_the_compiler_and_its_switches_count(chosen, monkeypatch):
     compiled = kernel(plus_one)
 
     def name():
-        with kernels._work("plus_one") as work:
-            return kernels._name_of_entry(compiled, (numba.float64,), work)
+        with compiling._work("plus_one") as work:
+            return compiling._name_of_entry(compiled, (numba.float64,), work)
 
     found = [name()]
     for switch, value in (("BOUNDSCHECK", 1), ("OPT", 0), ("LOOP_VECTORIZE", 0), ("DEBUGINFO_DEFAULT", 1)):
         with monkeypatch.context() as changed:
             changed.setattr(numba.config, switch, value)
             found.append(name())
-    for owner, attribute in ((numba, "__version__"), (np, "__version__"), (kernels.llvmlite, "__version__")):
+    for owner, attribute in (
+        (numba, "__version__"),
+        (np, "__version__"),
+        (compiling.llvmlite, "__version__"),
+    ):
         with monkeypatch.context() as changed:
             changed.setattr(owner, attribute, "another")
             found.append(name())
     for values in ({"_tm_features": "none"}, {"_get_host_cpu_name": lambda: "another"}):
         with monkeypatch.context() as changed:
             for attribute, value in values.items():
-                changed.setattr(kernels._context().codegen(), attribute, value)
+                changed.setattr(compiling._context().codegen(), attribute, value)
             found.append(name())
     assert len(set(found)) == len(found)
     monkeypatch.setattr(numba.config, "NUMBA_NUM_THREADS", 77)
@@ -452,16 +455,16 @@ def test_other_processes_take_in_a_kernel_that_they_find(printed):
 SLOW = """
 import logging, sys
 from numba.extending import overload
-from cvt_hpc import kernels, kernel_store
+from cvt_hpc.kernels import compiling, kernel, store
 logging.basicConfig(level=logging.INFO, stream=sys.stdout, format="%(message)s")
-kernels._LONG = kernel_store._LONG = 0.0
+compiling._LONG = store._LONG = 0.0
 def plus(x): pass
 @overload(plus)
 def typed(x):
     print("typing", flush=True)
     input()
     return lambda x: x + 1.0
-@kernels.kernel
+@kernel
 def slow(x): return plus(x)
 print(slow(1.0), sum(slow.stats.cache_hits.values()))
 """
@@ -573,7 +576,7 @@ def give_away(entry):
 
 
 def from_another_version(entry):
-    kernel_store.write(entry.name, b"what no pickle begins with")
+    store.write(entry.name, b"what no pickle begins with")
 
 
 DAMAGES = (
@@ -631,7 +634,7 @@ def test_a_new_entry_takes_the_place_of_those_that_nobody_uses(chosen):
     forgotten = aged(chosen / "older", 31.0), chosen / "forgotten"
     forgotten[1].touch()
     aged(forgotten[1], 31.0)
-    kernel_store._remove_forgotten.cache_clear()
+    store._remove_forgotten.cache_clear()
     aged(used, 31.0)
     kernel(plus_one)(1.0)  # reading renews it
     assert time.time() - used.stat().st_mtime < 86400.0
@@ -658,13 +661,13 @@ def test_code_lies_in_the_folder_that_the_user_has_chosen(tmp_path):
 def package(tmp_path, monkeypatch):
     """A folder in the place of the package, and no choice of the user."""
     monkeypatch.setattr(numba.config, "CACHE_DIR", "")
-    monkeypatch.setattr(kernel_store, "_PACKAGE", tmp_path / "cvt_hpc")
+    monkeypatch.setattr(store, "_PACKAGE", tmp_path / "cvt_hpc")
     (tmp_path / "cvt_hpc").mkdir()
     return tmp_path / "cvt_hpc"
 
 
 def test_without_a_choice_it_is_the_package(package):
-    assert kernel_store.folder() == package / "__pycache__" / "cvt_hpc-kernels"
+    assert store.folder() == package / "__pycache__" / "cvt_hpc-kernels"
 
 
 @pytest.mark.parametrize("why", ["no permission", "somebody else's", "open to others"])
@@ -679,10 +682,10 @@ def test_a_package_that_is_not_the_users_own_leaves_his_cache(package, monkeypat
     else:
         package.chmod(0o777)
     monkeypatch.setenv("XDG_CACHE_HOME", str(tmp_path / "cache"))
-    assert kernel_store.folder() == tmp_path / "cache" / "cvt_hpc-kernels"
+    assert store.folder() == tmp_path / "cache" / "cvt_hpc-kernels"
     monkeypatch.delenv("XDG_CACHE_HOME")
     monkeypatch.setenv("HOME", str(tmp_path / "home"))
-    assert kernel_store.folder() == tmp_path / "home" / ".cache" / "cvt_hpc-kernels"
+    assert store.folder() == tmp_path / "home" / ".cache" / "cvt_hpc-kernels"
 
 
 def with_mode(mode, level=0):
@@ -736,18 +739,18 @@ def test_a_folder_that_is_not_safe_is_not_used(
     base = tmp_path / "a" / "b" / "c"
     base.mkdir(parents=True)
     monkeypatch.setattr(numba.config, "CACHE_DIR", str(base))
-    monkeypatch.setattr(kernel_store, "_is_alone", lambda gid: False)
+    monkeypatch.setattr(store, "_is_alone", lambda gid: False)
     folder = base / "cvt_hpc-kernels"
     folder.mkdir(mode=0o700)
     if found_before:  # it is looked at each time
-        assert kernel_store.folder() == folder
-        kernel_store.write("entry", b"content")
+        assert store.folder() == folder
+        store.write("entry", b"content")
         if spoil is file_instead:
             shutil.rmtree(folder)
             folder.mkdir()
     spoil(folder)
-    assert kernel_store.read("entry", "it") is None
-    kernel_store.write("another", b"content")
+    assert store.read("entry", "it") is None
+    store.write("another", b"content")
     (line,) = caplog.messages
     assert says.replace("FOLDER", str(folder)) in line
     assert "machine code is not kept" in line and "NUMBA_CACHE_DIR" in line
@@ -757,10 +760,10 @@ def test_a_folder_that_is_not_safe_is_not_used(
 def test_the_temporary_folder_of_all_is_safe_and_so_is_a_group_of_one(chosen, monkeypatch):
     chosen.parent.mkdir()
     chosen.parent.chmod(0o1777)
-    assert kernel_store.folder() == chosen
-    monkeypatch.setattr(kernel_store, "_is_alone", lambda gid: True)
+    assert store.folder() == chosen
+    monkeypatch.setattr(store, "_is_alone", lambda gid: True)
     chosen.parent.chmod(0o775)
-    assert kernel_store.folder() == chosen
+    assert store.folder() == chosen
 
 
 # Calls from Python and from kernels
@@ -832,7 +835,7 @@ def test_calls_after_the_first_go_to_the_machine_code_for_its_types(chosen):
             called.append(x)
             return compiled(x)
 
-    call = kernels.called_alike(Counted())
+    call = called_alike(Counted())
     assert [call(x) for x in (1.5, 2.5, 3.5)] == [2.5, 3.5, 4.5]
     assert called == [1.5]
 
@@ -885,9 +888,9 @@ def test_types_are_those_that_the_compiler_finds():
         *(Pair(one, (FIELD, one)) for one in ARRAYS),
     ]
     for value in values * 2:  # then those found before
-        assert kernels.typeof(value) == numba.typeof(value)
+        assert compiling.typeof(value) == numba.typeof(value)
     with pytest.raises(ValueError, match="Cannot determine Numba type"):
-        kernels.typeof((1.0, object()))
+        compiling.typeof((1.0, object()))
 
 
 def test_a_kernel_that_was_called_under_a_profiler_is_the_same():

@@ -10,7 +10,7 @@ import pytest
 from hypothesis import given
 from hypothesis import strategies as st
 
-from cvt_hpc.files import StorageError
+from cvt_hpc.storage.files import StorageError
 from cvt_hpc.study import open_results, run
 from cvt_hpc.study.batches import batch_cost, share_out
 from cvt_hpc.study.description import describe

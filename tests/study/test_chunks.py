@@ -13,7 +13,7 @@ import pytest
 from hypothesis import given
 from hypothesis import strategies as st
 
-from cvt_hpc.files import StorageError
+from cvt_hpc.storage.files import StorageError
 from cvt_hpc.study import gather, open_results, run
 from cvt_hpc.study.description import describe
 from cvt_hpc.study.folder import StudyFolder

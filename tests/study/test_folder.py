@@ -6,7 +6,7 @@ import os
 import pytest
 
 from cvt_hpc.errors import InputError
-from cvt_hpc.locks import is_locked, locked
+from cvt_hpc.storage.locks import is_locked, locked
 from cvt_hpc.study import gather, open_results, read_status, run
 from support.study_double import Axis, Job, Simulator
 from support.study_processes import wait_until

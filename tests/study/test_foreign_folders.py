@@ -14,9 +14,9 @@ import xarray as xr
 from cvt_hpc.cli import main
 from cvt_hpc.errors import InputError
 from cvt_hpc.experiments.sweeps import run_sweeps
-from cvt_hpc.locks import BusyError, locked
-from cvt_hpc.netcdf import write_history
-from cvt_hpc.output_folder import checksum
+from cvt_hpc.storage.locks import BusyError, locked
+from cvt_hpc.storage.netcdf import write_history
+from cvt_hpc.storage.output_folder import checksum
 from cvt_hpc.study import gather, open_results, read_status, run
 from cvt_hpc.study.folder import StudyFolder
 from cvt_hpc.study.repeats import Repeat
@@ -161,7 +161,7 @@ class TestLinks:
         assert not (out / "results.nc").is_symlink() and not (out / "job.json").is_symlink()
 
     def test_half_written_files(self, out, mine, monkeypatch):
-        monkeypatch.setattr("cvt_hpc.files.secrets.token_hex", lambda length: "guessed")
+        monkeypatch.setattr("cvt_hpc.storage.files.secrets.token_hex", lambda length: "guessed")
         (out / ".results.nc.guessed.part").symlink_to(mine / "precious")
         monkeypatch.setattr(StudyFolder, "leftovers", lambda folder: [])
         with pytest.raises(InputError, match="found: File exists"):
@@ -169,9 +169,9 @@ class TestLinks:
 
     def test_names_of_half_written_files_are_not_the_same_twice(self, tmp_path, monkeypatch):
         names = []
-        monkeypatch.setattr("cvt_hpc.files.os.replace", lambda aside, path: names.append(aside.name))
+        monkeypatch.setattr("cvt_hpc.storage.files.os.replace", lambda aside, path: names.append(aside.name))
         for _ in range(2):
-            monkeypatch.setattr("cvt_hpc.netcdf.write_netcdf", lambda dataset, path: None)
+            monkeypatch.setattr("cvt_hpc.storage.netcdf.write_netcdf", lambda dataset, path: None)
             write_history(xr.Dataset(), tmp_path / "h.nc")
         assert len(set(names)) == 2
 
@@ -212,7 +212,7 @@ class TestHeldGatherLock:
 
     def test_who_waits_says_for_whom_and_gives_up(self, out, monkeypatch, caplog):
         monkeypatch.setattr(GATHERING, "PATIENCE", 0.5)
-        monkeypatch.setattr("cvt_hpc.locks._SILENCE", 0.1)
+        monkeypatch.setattr("cvt_hpc.storage.locks._SILENCE", 0.1)
         with locked(out / "gather.lock"), pytest.raises(BusyError, match=f"found process {os.getpid()} on"):
             gather(out)
         assert f"gather.lock: waits for process {os.getpid()} on" in caplog.text

@@ -13,8 +13,8 @@ import pytest
 
 import cvt_hpc
 from cvt_hpc.errors import InputError
-from cvt_hpc.netcdf import variable_attributes
-from cvt_hpc.output_folder import CHECKSUM, checksum
+from cvt_hpc.storage.netcdf import variable_attributes
+from cvt_hpc.storage.output_folder import CHECKSUM, checksum
 from cvt_hpc.study import gather, open_results, run
 from cvt_hpc.study.description import Study, describe
 from cvt_hpc.variables import Status, Vibrates

@@ -10,7 +10,7 @@ import xarray as xr
 
 from cvt_hpc import build_job
 from cvt_hpc.errors import InputError
-from cvt_hpc.locks import locked
+from cvt_hpc.storage.locks import locked
 from cvt_hpc.study import gather, open_results, read_status, run
 from cvt_hpc.study.folder import StudyFolder
 from cvt_hpc.study.job_difference import places_in

@@ -10,7 +10,7 @@ import numpy as np
 import pytest
 
 from cvt_hpc.errors import InputError
-from cvt_hpc.locks import locked
+from cvt_hpc.storage.locks import locked
 from cvt_hpc.study import gather, open_results, read_status, run
 from cvt_hpc.study.folder import Part, StudyFolder, read_part
 from support.recorded import assert_same_numbers, records

@@ -13,8 +13,8 @@ import time
 import numpy as np
 import pytest
 
-from cvt_hpc.locks import locked
-from cvt_hpc.provenance import new_session
+from cvt_hpc.storage.locks import locked
+from cvt_hpc.storage.provenance import new_session
 from cvt_hpc.study import read_status, run
 from cvt_hpc.study.folder import StudyFolder
 from cvt_hpc.study.ranks.progress import Counter, Progress, Steps, show_duration

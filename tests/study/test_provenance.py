@@ -9,8 +9,9 @@ from pathlib import Path
 
 import pytest
 
-from cvt_hpc import provenance, read_table
-from cvt_hpc.provenance import machine, merge_versions, origin_lines, revision_of
+from cvt_hpc import read_table
+from cvt_hpc.storage import provenance
+from cvt_hpc.storage.provenance import machine, merge_versions, origin_lines, revision_of
 from support.studies import study
 
 ROOT = Path(__file__).parents[2]
@@ -50,6 +51,7 @@ def test_no_revision_without_git(monkeypatch):
 @pytest.mark.parametrize(("written", "told"), [("abc\n", "abc"), ("$Format:%H$\n", ""), (None, "")])
 def test_the_revision_of_what_is_installed_is_the_one_that_was_written(written, told, tmp_path, monkeypatch):
     monkeypatch.setattr(provenance, "__file__", str(tmp_path / "provenance.py"))
+    monkeypatch.setattr(provenance, "_PACKAGE", tmp_path)
     if written:
         (tmp_path / "revision.txt").write_text(written)
     assert provenance.git_revision.__wrapped__() == told

@@ -5,7 +5,7 @@ import os
 import numpy as np
 import pytest
 
-from cvt_hpc.files import StorageError
+from cvt_hpc.storage.files import StorageError
 from cvt_hpc.study.description import describe
 from cvt_hpc.study.record import log
 from cvt_hpc.study.record.index import read_records

@@ -5,7 +5,7 @@ import pwd
 
 import pytest
 
-from cvt_hpc.files import StorageError, naming_refusals, written_aside
+from cvt_hpc.storage.files import StorageError, naming_refusals, written_aside
 
 FULL = OSError(errno.ENOSPC, "No space left on device")
 # As h5py and the netCDF library tell it.
@@ -48,7 +48,7 @@ def test_who_can_grant_a_right_is_told(tmp_path):
 
 
 def test_the_system_is_asked_where_a_library_does_not_say(tmp_path, monkeypatch):
-    monkeypatch.setattr("cvt_hpc.files.os.fsync", lambda _: refuse(FULL))
+    monkeypatch.setattr("cvt_hpc.storage.files.os.fsync", lambda _: refuse(FULL))
     with pytest.raises(StorageError, match="expected to be able to write, found: No space left on device$"):
         with written_aside(tmp_path / "x.nc"):
             refuse(MUTE)

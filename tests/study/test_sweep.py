@@ -125,7 +125,7 @@ def test_other_versions_are_pointed_out(tmp_path, monkeypatch, caplog):
     sweep(Job(), tmp_path, time_limit=0.0)
     sweep(Job(), tmp_path)
     assert "other versions" not in caplog.text
-    monkeypatch.setattr("cvt_hpc.provenance.versions", lambda: {"numpy": "99"})
+    monkeypatch.setattr("cvt_hpc.storage.provenance.versions", lambda: {"numpy": "99"})
     sweep(Job(), tmp_path)
     assert "other versions" in caplog.text
 

@@ -15,7 +15,7 @@ from collections.abc import Callable, Iterator
 from pathlib import Path
 from random import Random
 
-from cvt_hpc.locks import locked
+from cvt_hpc.storage.locks import locked
 
 Damage = Callable[[Path, Path, Random], contextlib.AbstractContextManager[bool]]
 HELD = 1.0  # [s]

@@ -19,7 +19,14 @@ from support.study_processes import HERE, Sweep, clean_environment, find_mpirun
 BOUND = 60.0  # [s] until a start counts as hanging; a sweep takes half a second and mpirun some more
 _GRACE = 15.0  # [s] until what outlives its launcher counts as left behind
 
-_MODULES = ["support.fault_child", "cvt_hpc.study.sweep", "cvt_hpc.netcdf", "netCDF4", "h5py", "dask.array"]
+_MODULES = [
+    "support.fault_child",
+    "cvt_hpc.study.sweep",
+    "cvt_hpc.storage.netcdf",
+    "netCDF4",
+    "h5py",
+    "dask.array",
+]
 _MODULES += ["cvt_hpc.simulation", "cvt_hpc.models.oscillator.record", "cvt_hpc.models.oscillator.transient"]
 _context = multiprocessing.get_context("forkserver")
 

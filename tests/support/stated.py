@@ -5,9 +5,9 @@ import json
 import numpy as np
 import xarray as xr
 
-from cvt_hpc.analysis.statements.bullinger_ratios import ALONE, AT_REST, LOADED, REVERSED
-from cvt_hpc.analysis.statements.verdicts import Kept
 from cvt_hpc.job import build_job
+from cvt_hpc.papers.bullinger_ratios import ALONE, AT_REST, LOADED, REVERSED
+from cvt_hpc.papers.verdicts import Kept
 from cvt_hpc.variables import Status, Vibrates
 
 ARC, STRAND = 40, 8

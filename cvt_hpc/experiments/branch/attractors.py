@@ -14,7 +14,6 @@ from typing import Any, NamedTuple
 
 import numpy as np
 
-from cvt_hpc.archives import Arrays
 from cvt_hpc.experiments.branch.job import Asked
 from cvt_hpc.job import Job
 from cvt_hpc.models.contract import load_model
@@ -25,6 +24,7 @@ from cvt_hpc.models.linear_stability.modes import Mode
 from cvt_hpc.models.steady_variator.record import quantities
 from cvt_hpc.simulation.marching import march
 from cvt_hpc.simulation.record import in_lanes, record_of, recorded_model
+from cvt_hpc.storage.archives import Arrays
 from cvt_hpc.vibration.classes import OccurrenceClass, classify_runs
 from cvt_hpc.vibration.criticality import Criticality
 

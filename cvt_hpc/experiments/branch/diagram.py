@@ -15,9 +15,7 @@ from typing import Any
 import numpy as np
 import xarray as xr
 
-from cvt_hpc import netcdf
 from cvt_hpc.analysis.figures import draw
-from cvt_hpc.archives import Arrays
 from cvt_hpc.experiments.branch.attractors import (
     OF_MODES,
     STRAND,
@@ -45,7 +43,9 @@ from cvt_hpc.models.linear_stability.branch import Branch, Onset, branch, onsets
 from cvt_hpc.models.linear_stability.modes import LOW
 from cvt_hpc.models.steady_variator.record import VARIABLES, coordinates
 from cvt_hpc.models.steady_variator.walking import NoSteadyState, SteadyBelt
-from cvt_hpc.output_folder import Kind as FolderKind
+from cvt_hpc.storage import netcdf
+from cvt_hpc.storage.archives import Arrays
+from cvt_hpc.storage.output_folder import Kind as FolderKind
 from cvt_hpc.study.description import axis_dimension, derived_coordinate
 from cvt_hpc.study.ranks.progress import Steps
 from cvt_hpc.study.status import DONE, SOME_FAILED

@@ -22,8 +22,8 @@ from cvt_hpc.job.rules import varied_by
 from cvt_hpc.job.summary import core_time_in_words, values_in_words
 from cvt_hpc.job.values import JOB_UNITS
 from cvt_hpc.models.contract import load_model
-from cvt_hpc.netcdf import attributes
 from cvt_hpc.parameters import Parameter, positive
+from cvt_hpc.storage.netcdf import attributes
 from cvt_hpc.tables import columns
 
 STEADY, TRANSIENT = "linear_stability", "elastic_belt"

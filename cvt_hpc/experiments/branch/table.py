@@ -8,12 +8,12 @@ from functools import partial
 
 import numpy as np
 
-from cvt_hpc.archives import Arrays
 from cvt_hpc.errors import few_of
 from cvt_hpc.experiments.branch.attractors import FROM, Attractor, Followed
 from cvt_hpc.experiments.branch.job import Asked, Diagram, load_attributes
 from cvt_hpc.job.values import number_within, shown_number, shown_unit
 from cvt_hpc.models.linear_stability.branch import CLOSE, Onset
+from cvt_hpc.storage.archives import Arrays
 from cvt_hpc.variator.band import steady_band
 from cvt_hpc.vibration.classes import OccurrenceClass
 from cvt_hpc.vibration.criticality import Criticality, Kind, criticality

@@ -24,7 +24,6 @@ import numpy as np
 import xarray as xr
 
 from cvt_hpc.analysis.figures import draw
-from cvt_hpc.archives import Arrays
 from cvt_hpc.experiments.chart.comparing import Comparison, Result, compare
 from cvt_hpc.experiments.chart.measuring import Measurement, check_prospects, measure, predicted_cost
 from cvt_hpc.experiments.chart.plan import Chart, Point, Role
@@ -32,11 +31,12 @@ from cvt_hpc.experiments.chart.quantities import KINDS
 from cvt_hpc.experiments.chart.scene_drawing import budget_figure, scene_figure
 from cvt_hpc.experiments.outcome import Outcome, Tell
 from cvt_hpc.experiments.parts import PartsFolder
-from cvt_hpc.files import write_rows
 from cvt_hpc.linear_algebra import one_thread
-from cvt_hpc.netcdf import VOLATILE, attributes, global_attributes, store
-from cvt_hpc.output_folder import Kind
-from cvt_hpc.provenance import origin_lines
+from cvt_hpc.storage.archives import Arrays
+from cvt_hpc.storage.files import write_rows
+from cvt_hpc.storage.netcdf import VOLATILE, attributes, global_attributes, store
+from cvt_hpc.storage.output_folder import Kind
+from cvt_hpc.storage.provenance import origin_lines
 from cvt_hpc.study.ranks.progress import Steps
 from cvt_hpc.tables import columns, number, short
 

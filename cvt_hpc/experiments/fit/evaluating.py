@@ -11,8 +11,8 @@ from numpy.typing import NDArray
 
 from cvt_hpc.errors import InputError
 from cvt_hpc.experiments.fit.job import Case, Course, Fit, score, total
-from cvt_hpc.files import refuse_link
 from cvt_hpc.job import Job, rebuild_job
+from cvt_hpc.storage.files import refuse_link
 from cvt_hpc.study import open_results, run
 from cvt_hpc.variables import Status
 from cvt_hpc.vibration.classes import OccurrenceClass, classify_runs

@@ -16,13 +16,13 @@ from cvt_hpc.experiments.fit.evaluating import Evaluation, Stopped
 from cvt_hpc.experiments.fit.job import REPRODUCED, Course, Fit, areas, verdict
 from cvt_hpc.experiments.fit.search import Around, Confirmed, Found, confirm, look_around, reach, search
 from cvt_hpc.experiments.outcome import Outcome, Tell
-from cvt_hpc.files import write_rows
 from cvt_hpc.job.definition import digest
 from cvt_hpc.job.summary import core_time_in_words
 from cvt_hpc.job.units import from_si
-from cvt_hpc.netcdf import global_attributes
-from cvt_hpc.provenance import origin_lines
 from cvt_hpc.simulation import estimate_cost
+from cvt_hpc.storage.files import write_rows
+from cvt_hpc.storage.netcdf import global_attributes
+from cvt_hpc.storage.provenance import origin_lines
 from cvt_hpc.study import process_rank
 from cvt_hpc.tables import columns
 from cvt_hpc.vibration.classes import OccurrenceClass

@@ -22,11 +22,11 @@ from cvt_hpc.experiments.ladder.comparing import Finding, compare
 from cvt_hpc.experiments.ladder.loading import QUESTIONS, REFERENCE, Ladder
 from cvt_hpc.experiments.outcome import Outcome, Tell
 from cvt_hpc.experiments.sweeps import Sweep, load_sweep, maker_of, run_sweeps
-from cvt_hpc.files import write_rows
 from cvt_hpc.job import Job
 from cvt_hpc.job.values import JOB_UNITS
-from cvt_hpc.netcdf import attributes, global_attributes, store
-from cvt_hpc.provenance import machine, origin_lines
+from cvt_hpc.storage.files import write_rows
+from cvt_hpc.storage.netcdf import attributes, global_attributes, store
+from cvt_hpc.storage.provenance import machine, origin_lines
 from cvt_hpc.study import process_rank
 from cvt_hpc.study.status import STALLED
 from cvt_hpc.tables import columns, number, short

@@ -13,7 +13,7 @@ from typing import TYPE_CHECKING, Any
 import numpy as np
 
 from cvt_hpc.models.oscillator.motion import steady_sliding
-from cvt_hpc.netcdf import attributes
+from cvt_hpc.storage.netcdf import attributes
 from cvt_hpc.variables import Coordinate, Variable
 from cvt_hpc.vibration import assessment
 

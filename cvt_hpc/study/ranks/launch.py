@@ -19,7 +19,7 @@ from pathlib import Path
 from typing import TYPE_CHECKING, Any, Literal, NoReturn, TypeAlias, TypeVar
 
 from cvt_hpc.errors import BAD_INPUT, CRASHED, InputError, mismatch
-from cvt_hpc.files import append_text
+from cvt_hpc.storage.files import append_text
 from cvt_hpc.study.job_difference import differences, short_pair
 from cvt_hpc.study.ranks.starting import await_all, bounded_start
 

@@ -13,7 +13,7 @@ from typing import Any, NamedTuple
 import numpy as np
 from numpy.typing import NDArray
 
-from cvt_hpc.files import StorageError, naming_refusals, open_regular
+from cvt_hpc.storage.files import StorageError, naming_refusals, open_regular
 from cvt_hpc.study.batches import Batch
 from cvt_hpc.study.description import Study
 from cvt_hpc.study.record import log

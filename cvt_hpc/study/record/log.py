@@ -24,7 +24,7 @@ from typing import Any, NamedTuple, Self
 
 import numpy as np
 
-from cvt_hpc.files import storage_error, sync_folder
+from cvt_hpc.storage.files import storage_error, sync_folder
 
 MAGIC = b"\x89CVTREC\n"
 FORMAT_VERSION = 2

@@ -15,9 +15,9 @@ from contextlib import AbstractContextManager, contextmanager, nullcontext
 from pathlib import Path
 from typing import Any, ClassVar, Generic, NamedTuple, TypeVar
 
-from cvt_hpc import files
 from cvt_hpc.errors import InputError
-from cvt_hpc.locks import is_locked, locked
+from cvt_hpc.storage import files
+from cvt_hpc.storage.locks import is_locked, locked
 
 CHECKSUM = "checksum"  # key of the job file
 _LIMIT = 1 << 29  # [bytes] of a job file; 10^6 samples of ten parameters are 400 MB

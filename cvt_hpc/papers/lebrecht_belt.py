@@ -12,7 +12,7 @@ from matplotlib.figure import Figure
 
 from cvt_hpc.analysis.followed_drawing import sliding_spectrum, swinging_figure
 from cvt_hpc.analysis.ramps import NOISE, envelope, read_ramp
-from cvt_hpc.analysis.statements.verdicts import Kept, Measured, Statement
+from cvt_hpc.papers.verdicts import Kept, Measured, Statement
 from cvt_hpc.variables import Status, Vibrates
 from cvt_hpc.vibration.settings import PARAMETERS
 

@@ -2,7 +2,7 @@
 
 import numpy as np
 
-from cvt_hpc.analysis.statements.verdicts import Kept, Measured, Statement, listed, over_arc
+from cvt_hpc.papers.verdicts import Kept, Measured, Statement, listed, over_arc
 
 APPROXIMATE = 2.0  # [%]: what is stated as equal
 APART = 1.0  # [N]: push force below which elements count as apart

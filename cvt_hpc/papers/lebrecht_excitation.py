@@ -8,7 +8,7 @@ import xarray as xr
 
 from cvt_hpc.analysis.followed_drawing import mean_there, one_passage
 from cvt_hpc.analysis.paper_pictures import curves_of, powers_of, regularised
-from cvt_hpc.analysis.statements.verdicts import Kept, Measured, Statement, listed, over_arc
+from cvt_hpc.papers.verdicts import Kept, Measured, Statement, listed, over_arc
 from cvt_hpc.variables import Vibrates
 
 SWING = 0.02  # of the radial speed: how far it swings at least where it is jagged

@@ -11,7 +11,7 @@ from contextlib import contextmanager, suppress
 from pathlib import Path
 
 from cvt_hpc.errors import InputError
-from cvt_hpc.files import naming_refusals, open_regular
+from cvt_hpc.storage.files import naming_refusals, open_regular
 
 # A start waits this long [s]: `is_locked` takes the lock for an instant to see whether a run is at work.
 _PATIENCE = 1.0

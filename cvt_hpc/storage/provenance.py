@@ -20,7 +20,8 @@ import cvt_hpc
 
 NOT_RECORDED = "not recorded"
 _TURNS = 2_000_000  # of a loop that marks the speed of a machine
-_PACKAGES = ("numpy", "numba", "scipy", "xarray", "netCDF4", "mpi4py")
+_PACKAGE = Path(__file__).parent.parent
+_LIBRARIES = ("numpy", "numba", "scipy", "xarray", "netCDF4", "mpi4py")
 
 
 def new_session(ranks: int) -> dict[str, Any]:
@@ -63,10 +64,9 @@ def versions() -> dict[str, str]:
 @cache
 def program_identity() -> dict[str, Any]:
     """Return what decides whether two processes run the same program: versions, and a digest of sources."""
-    package = Path(__file__).parent
     digest = hashlib.sha256()
-    for source in sorted(package.rglob("*.py")):
-        digest.update(f"{source.relative_to(package)}\n".encode())
+    for source in sorted(_PACKAGE.rglob("*.py")):
+        digest.update(f"{source.relative_to(_PACKAGE)}\n".encode())
         digest.update(source.read_bytes())
     return {**versions(), "sources": digest.hexdigest()}
 
@@ -75,7 +75,7 @@ def program_identity() -> dict[str, Any]:
 def _installed() -> dict[str, str]:
     """Versions of packages; to read them takes some 10 ms."""
     found = {}
-    for package in _PACKAGES:
+    for package in _LIBRARIES:
         with suppress(metadata.PackageNotFoundError):
             found[package] = metadata.version(package)
     return found
@@ -158,11 +158,10 @@ def git_revision() -> str:
 
     A build writes revision.txt, and so does `git archive`; in a checkout it has a place for it alone.
     """
-    here = Path(__file__)
-    if found := revision_of(here):
+    if found := revision_of(Path(__file__)):
         return found
     with suppress(OSError):
-        written = here.with_name("revision.txt").read_text(encoding="utf-8").strip()
+        written = (_PACKAGE / "revision.txt").read_text(encoding="utf-8").strip()
         return "" if written.startswith("$") else written
     return ""
 

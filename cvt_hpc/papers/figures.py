@@ -24,18 +24,18 @@ from cvt_hpc.analysis.paper_pictures import (
 )
 from cvt_hpc.analysis.profiles import inside, profile_figure
 from cvt_hpc.analysis.ramps import course_figure, ramp_figure
-from cvt_hpc.analysis.statements import (
+from cvt_hpc.analysis.telling_apart import entitle_runs, on_axes
+from cvt_hpc.analysis.waterfall import waterfall_figure
+from cvt_hpc.errors import unknown
+from cvt_hpc.papers import (
     bullinger_along,
     bullinger_ratios,
     lebrecht_belt,
     lebrecht_excitation,
 )
-from cvt_hpc.analysis.statements.verdicts import Finding, Kept, Statement, judged, opened
-from cvt_hpc.analysis.telling_apart import entitle_runs, on_axes
-from cvt_hpc.analysis.waterfall import waterfall_figure
-from cvt_hpc.errors import unknown
-from cvt_hpc.files import write_rows
-from cvt_hpc.provenance import origin_lines
+from cvt_hpc.papers.verdicts import Finding, Kept, Statement, judged, opened
+from cvt_hpc.storage.files import write_rows
+from cvt_hpc.storage.provenance import origin_lines
 
 INWARDS, OUTWARDS = "#0072b2", "#d55e00"
 PARTS = {"radial_sliding": "#0072b2", "tangential_sliding": "#009e73"}

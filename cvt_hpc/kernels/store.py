@@ -31,7 +31,7 @@ from typing import Any
 
 import numba
 
-_PACKAGE = Path(__file__).parent
+_PACKAGE = Path(__file__).parent.parent
 _FOLDER = "cvt_hpc-kernels"
 _MONTH = 30 * 86400.0  # [s]: longer than any job lasts, so that none loses the code it has begun with
 _LONG = 3.0  # [s]: faster compiling is not logged

@@ -16,8 +16,8 @@ from typing import Any, TypeVar
 
 import numpy as np
 
-from cvt_hpc.files import StorageError, kind_of, read_regular, written_aside
-from cvt_hpc.provenance import git_revision, machine, versions
+from cvt_hpc.storage.files import StorageError, kind_of, read_regular, written_aside
+from cvt_hpc.storage.provenance import git_revision, machine, versions
 
 _SUFFIX = ".npz"
 # the exception from an archive depends on the damaged byte

@@ -14,11 +14,11 @@ from typing import TYPE_CHECKING, Any, Protocol
 
 import numpy as np
 
-from cvt_hpc.dataset_form import check_form
 from cvt_hpc.errors import InputError, mismatch
-from cvt_hpc.files import kind_of, naming_refusals, open_regular, written_aside
-from cvt_hpc.locks import refuse_locked
-from cvt_hpc.provenance import command, git_revision, history_line, merge_versions, versions
+from cvt_hpc.storage.dataset_form import check_form
+from cvt_hpc.storage.files import kind_of, naming_refusals, open_regular, written_aside
+from cvt_hpc.storage.locks import refuse_locked
+from cvt_hpc.storage.provenance import command, git_revision, history_line, merge_versions, versions
 
 if TYPE_CHECKING:
     import xarray as xr
@@ -227,7 +227,7 @@ def is_history(path: Path) -> bool:
     """Whether a file that the user names, or the target of a link, is a history that this program wrote."""
     if kind_of(path, follow=True) != "a file":  # a pipe would be waited for
         return False
-    from cvt_hpc.foreign_files import global_text
+    from cvt_hpc.storage.foreign_files import global_text
 
     return global_text(path, CONTENT) == HISTORY
 
@@ -260,7 +260,7 @@ def open_netcdf(path: Path, *, follow: bool = False, **options: Any) -> xr.Datas
     """
     import xarray as xr
 
-    from cvt_hpc.foreign_files import DAMAGE, check_hdf5
+    from cvt_hpc.storage.foreign_files import DAMAGE, check_hdf5
 
     place = str(path)
     with naming_refusals(path, "a netCDF dataset"):

@@ -3,7 +3,7 @@
 import numpy as np
 import xarray as xr
 
-from cvt_hpc.analysis.statements.verdicts import Kept, Measured, Statement, listed, on_strand, over_arc
+from cvt_hpc.papers.verdicts import Kept, Measured, Statement, listed, on_strand, over_arc
 
 LOW_RATIOS, ALL_RATIOS = (0.26, 0.51), (0.26, 0.51, 0.77)  # torque ratios
 ALIKE = 0.2  # of two forces that are said to be in equilibrium

@@ -1,7 +1,7 @@
 """Compilation of the kernels, whose machine code is kept on the disk, since compiling takes minutes.
 
-An entry of `kernel_store` is found by all that decides it: the kernel and all that it calls, as in memory
-(`kernel_identity`), the types of its arguments, the compiler with its switches, and the processor. Where this
+An entry of `store` is found by all that decides it: the kernel and all that it calls, as in memory
+(`identity`), the types of its arguments, the compiler with its switches, and the processor. Where this
 cannot be told a kernel is compiled and not kept.
 
 A kernel that only other kernels call gets no entry from Python, which for tuples of arrays takes long to
@@ -48,8 +48,8 @@ from numba.core.target_extension import CPU, dispatcher_registry, jit_registry
 from numba.core.targetconfig import ConfigStack
 from numba.core.typing import signature
 
-from cvt_hpc import kernel_store
-from cvt_hpc.kernel_identity import UnknownValueError, Walk, code_of_classes, digest, extensions
+from cvt_hpc.kernels import store
+from cvt_hpc.kernels.identity import UnknownValueError, Walk, code_of_classes, digest, extensions
 from cvt_hpc.lanes.kinds import LaneArrayKind
 
 _LONG = 3.0  # [s]: faster compiling is not logged
@@ -59,7 +59,7 @@ _LONG = 3.0  # [s]: faster compiling is not logged
 # whether their code is compiled or found in the folder.
 _OPTIONS = {"nopython": True, "error_model": "numpy", "no_cfunc_wrapper": True}
 
-_logger = logging.getLogger(__name__)
+_logger = logging.getLogger("cvt_hpc.kernels")
 
 
 def kernel(function: Callable[..., Any]) -> Any:
@@ -140,7 +140,7 @@ class _Kernel(CPUDispatcher):
             with _work(self.__name__) as work, ExitStack() as claims:  # until the code is kept
                 name = _name_of_entry(self, kinds, work)
                 if (found := _found(name, self, kinds, work.walk)) is None and name:
-                    claims.enter_context(kernel_store.claimed(name, self.__name__))
+                    claims.enter_context(store.claimed(name, self.__name__))
                     found = _found(name, self, kinds, work.walk)
                 if found is not None:
                     self._cache_hits[sig] += 1
@@ -393,7 +393,7 @@ class _Unpickler(pickle.Unpickler):
 
 def _found(name: str, compiled: _Kernel, kinds: tuple, walk: Walk) -> CompileResult | None:
     """Return the machine code of an entry; None where there is none that can be used."""
-    content = kernel_store.read(name, compiled.__name__) if name else None
+    content = store.read(name, compiled.__name__) if name else None
     if content is None:
         return None
     try:
@@ -405,7 +405,7 @@ def _found(name: str, compiled: _Kernel, kinds: tuple, walk: Walk) -> CompileRes
             *(False, (), "", reload, environments),
         )
     except Exception as error:  # whatever it is: it can be compiled again
-        return kernel_store.tell_damaged(compiled.__name__, str(error))
+        return store.tell_damaged(compiled.__name__, str(error))
 
 
 def _is_foreign(name: str) -> bool:
@@ -433,7 +433,7 @@ def _keep(name: str, found: CompileResult, walk: Walk) -> None:
         try:
             content = library, described, environment, sig.return_type, reload, environments
             _Pickler(file, walk).dump(content)
-            return kernel_store.write(name, file.getvalue())
+            return store.write(name, file.getvalue())
         except Exception as error:  # of a type that only this process knows
             why = str(error)
         finally:

@@ -15,7 +15,7 @@ import xarray as xr
 
 from cvt_hpc.analysis.profiles import inside
 from cvt_hpc.errors import InputError
-from cvt_hpc.netcdf import open_netcdf
+from cvt_hpc.storage.netcdf import open_netcdf
 from cvt_hpc.variables import Status
 
 
