@@ -124,6 +124,22 @@ def means(
     return Variable(name, units, comment, dims=(dim,), of=lambda m: m.each(template, labels), **others)
 
 
+def shift_speed(radii: Callable[[Any], Sequence[np.ndarray]]) -> Variable:
+    """Rate of the speed ratio, declared: radii(measured) are those of both pulleys over the judged part [m]."""
+
+    def rate(measured: Any) -> float:
+        driving, driven = radii(measured)
+        time = np.arange(len(driving)) / measured.parameters["sampling_rate"]
+        return float(np.polyfit(time, driven / driving, 1)[0])
+
+    return Variable(
+        "shift_speed",
+        "s-1",
+        "mean rate of the ratio of the driven to the driving radius, as the sheaves' positions give both",
+        of=rate,
+    )
+
+
 each_pulley, each_strand = partial(means, "pulley", PULLEYS), partial(means, "strand", STRANDS)
 _SHARED = (
     Variable(

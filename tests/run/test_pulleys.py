@@ -50,6 +50,19 @@ def test_the_balance_closes(name):
     assert abs(balance(scene(name))["power_residual"]) < (2.5e-3 if name == "thrust" else 1e-3)
 
 
+def test_the_ratio_shifts_at_the_rate_of_both_sheaves():
+    run = scene("thrust")
+    found, p = balance(run), run.parameters
+    # T k z' = F - Q - c z of each sheave, and a belt that sinks by z / (2 tan delta)
+    slope = 2.0 * np.tan(p["half_wedge_angle"])
+    forces = found["piston_force"] - [p["driving_thrust"], p["thrust"]]
+    sinks = forces / (p["sheave_lag"] * p["lag_stiffness"] * slope)
+    positions = np.array([mean(run, f"{pulley}_position") for pulley in ("driving", "driven")])
+    driving, driven = [run.path.driving_radius, run.path.driven_radius] - positions / slope
+    rate = driven / driving * (sinks[0] / driving - sinks[1] / driven)
+    assert found["shift_speed"] == pytest.approx(rate, rel=0.01)
+
+
 @pytest.mark.parametrize(
     ("name", "term", "size"),
     [

@@ -118,6 +118,11 @@ def test_a_force_sets_the_driving_sheave():
     # sheaves creep on, at their rate by what the forces differ
     assert found["axial_force"] == pytest.approx([18e3, 20e3], rel=0.02)
     assert found["status"] == Status.DONE
+    # dr/dt = rate (Q - F) of each pulley, and i = r_driven / r_driving
+    p = job(load=60.0).point(0)
+    driving, driven = (np.array([18e3, 20e3]) - found["axial_force"]) * p["sheave_rate"]
+    expected = 1.35 * (driven / p["driven_radius"] - driving / (p["driven_radius"] / 1.35))
+    assert found["shift_speed"] == pytest.approx(expected, rel=0.05)
 
 
 def test_a_longer_run_goes_on_from_a_shorter_one_bit_by_bit():

@@ -16,7 +16,15 @@ from cvt_hpc.variables import Coordinate, Variable, together
 from cvt_hpc.variator import PULLEYS, judging
 from cvt_hpc.variator.band import band
 from cvt_hpc.variator.slip import AGAINST_SLIP
-from cvt_hpc.variator.variables import COORDINATES, Measured, each_pulley, frequency_bins, power, shared
+from cvt_hpc.variator.variables import (
+    COORDINATES,
+    Measured,
+    each_pulley,
+    frequency_bins,
+    power,
+    shared,
+    shift_speed,
+)
 from cvt_hpc.vibration import peaks, ramp
 from cvt_hpc.vibration.signals import band_amplitude
 
@@ -51,6 +59,16 @@ def piston_force(measured: Measured) -> np.ndarray:
     )
     oil = np.array([oil_factor(p[f"{pulley}_piston"], p["oil_density"]) for pulley in PULLEYS])
     return measured.each("axial_force {}") - forces - rates * shifts - oil * turning
+
+
+def radii(measured: Measured) -> list[np.ndarray]:
+    """Radii of both pulleys by their positions over the judged part [m]."""
+    nominal = measured.path.driving_radius, measured.path.driven_radius
+    slope = 2.0 * np.tan(measured.parameters["half_wedge_angle"])
+    return [
+        radius - measured.part(f"{pulley}_position") / slope
+        for radius, pulley in zip(nominal, PULLEYS, strict=True)
+    ]
 
 
 def fluctuations(measured: Measured) -> tuple[Any, ...]:
@@ -119,7 +137,9 @@ VARIABLES = (
         of=lambda m: m.each("tilt {}") / [m.path.driving_radius, m.path.driven_radius],
     ),
     each_pulley("open_share", "1", "mean, out of contact", words="open share of the wrap", early=True),
-    *shared("flank_loss", "thrust_ratio", "speed_loss", "driven_speed_ripple", "driving_power", "load_power"),
+    *shared("flank_loss", "thrust_ratio", "speed_loss"),
+    shift_speed(radii),
+    *shared("driven_speed_ripple", "driving_power", "load_power"),
     *shared("thrust_power", "storing_power", "ring_loss", "belt_loss", "layer_loss"),
     power("lag_loss", "mean power of the driven sheave's lag"),
     *shared("seating_loss", "tilt_loss", "loss", "efficiency", "power_residual"),

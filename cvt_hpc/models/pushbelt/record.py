@@ -13,7 +13,15 @@ from cvt_hpc.variables import Coordinate, Variable
 from cvt_hpc.variator import PULLEYS, STRANDS, judging
 from cvt_hpc.variator.history import REGIONS, dataset, regions
 from cvt_hpc.variator.slip import AGAINST_SLIP
-from cvt_hpc.variator.variables import COORDINATES, Measured, each_pulley, frequency_bins, power, shared
+from cvt_hpc.variator.variables import (
+    COORDINATES,
+    Measured,
+    each_pulley,
+    frequency_bins,
+    power,
+    shared,
+    shift_speed,
+)
 from cvt_hpc.vibration import ramp
 
 if TYPE_CHECKING:
@@ -64,6 +72,7 @@ VARIABLES = (
         "mean radius of the flanks' contact points, weighted by contact force",
         early=True,
     ),
+    shift_speed(lambda m: [m.part(f"{pulley}_radius") for pulley in PULLEYS]),
     *shared("driven_speed_ripple", "driving_power", "load_power", "thrust_power"),
     *shared("storing_power", "ring_loss", "belt_loss", "tilt_loss"),
     power("element_loss", "mean power of the dampers of contacts between elements, most of it of impacts"),
