@@ -21,10 +21,10 @@ from cvt_hpc.storage.provenance import origin_lines
 JOB = Path(__file__).with_suffix(".toml")
 FORCES = 0.8, 0.9, 1.1, 1.25  # on the driving sheave, of that which holds the ratio
 MIDDLE = {"ratio": [1.0], "driving_speed": ["2000 rpm"]}
-CELLS = (  # of the job; there, between rigid sheaves; there, with other loads
-    {},
-    MIDDLE | {"sheave_stiffness": [np.inf]},
-    MIDDLE | {"thrust": ["20 kN"], "load_share": [0.0, 0.6, 0.9]},
+CELLS = (  # of the job: at one load; in the middle, between rigid sheaves; there, at the other loads
+    {"load_share": [0.3], "sheave_stiffness": [1.0]},
+    MIDDLE | {"load_share": [0.3], "sheave_stiffness": [np.inf]},
+    MIDDLE | {"thrust": ["20 kN"], "load_share": [0.0, 0.6, 0.9], "sheave_stiffness": [1.0]},
 )
 HEAD = (
     "model", "ratio", "driving_speed [rpm]", "thrust [kN]", "load_share", "sheave_stiffness", "thrust_ratio",
@@ -60,7 +60,7 @@ def rows() -> Iterator[tuple[str, ...]]:
 
 if __name__ == "__main__":
     with open(sys.argv[1], "w", newline="", encoding="utf-8") as file:
-        file.writelines(origin_lines({"job": str(JOB)}))
+        file.writelines(origin_lines())
         table = csv.writer(file, lineterminator="\n")
         table.writerow(HEAD)
         for row in rows():

@@ -125,7 +125,7 @@ def means(
 
 
 def shift_speed(radii: Callable[[Any], Sequence[np.ndarray]]) -> Variable:
-    """Rate of the speed ratio, declared: radii(measured) are those of both pulleys over the judged part [m]."""
+    """Rate of the speed ratio, declared: radii(measured) are both pulleys' over the judged part [m]."""
 
     def rate(measured: Any) -> float:
         driving, driven = radii(measured)
