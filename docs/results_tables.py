@@ -75,12 +75,17 @@ def table(
 
 
 def window(place: pd.Series, vibrates: pd.Series) -> str:
-    """Return the ranges of a place, such as the load, where runs vibrate; with "?" where undecided."""
-    marks, found = {"yes": "", "undecided": "?"}, []
-    for verdict, members in groupby(sorted(zip(place, vibrates, strict=True)), key=lambda run: run[1]):
-        ends = sorted({at for at, _ in members})
-        if verdict in marks:
-            found.append(" to ".join(f"{at:g}" for at in {ends[0]: 0, ends[-1]: 0}) + marks[verdict])
+    """Return the ranges of a place, such as the load, where runs vibrate; "?" behind those left undecided.
+
+    Runs that were left out are taken to be as their neighbours.
+    """
+    done = sorted((at, verdict) for at, verdict in zip(place, vibrates, strict=True) if not pd.isna(verdict))
+    found = []
+    for verdict, members in groupby(done, key=lambda run: run[1]):
+        ends = [f"{at:g}" for at, _ in members]
+        if verdict != "no":
+            mark = {"yes": "", "undecided": "?"}.get(verdict, f" {verdict}")
+            found.append(" to ".join(dict.fromkeys([ends[0], ends[-1]])) + mark)
     return ", ".join(found) or "none"
 
 

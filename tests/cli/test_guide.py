@@ -130,7 +130,9 @@ part,load [N m],vibrates,amplitude_t1 [um],amplitude_t2 [um],frequency_t1 [Hz],f
 shaft,30,undecided,1,0.5,300,400
 shaft,10,yes,2,34.56,500,512.6
 shaft,20,yes,1200.4,3,507,600
+shaft,15,,,,,
 none,10,no,,,,
+none,20,irregular,,,,
 """
 MARKER = """before
 <!-- table
@@ -150,7 +152,7 @@ def test_a_marker_becomes_a_table_of_results(tmp_path, monkeypatch):
     (tmp_path / "small.csv").write_text(STORED)
     *_, shaft, none, _, origin, after = hook(MARKER).splitlines()
     assert shaft == "| shaft | 10 to 20, 30? | 1200 at 507 to 513 |"
-    assert none == "| none | none | - |"
+    assert none == "| none | 20 irregular | - |"
     assert origin == (
         "*`jobs/results/small.csv`, revision 123456789, 2026-01-31; **older than the code**: another law*"
     )
