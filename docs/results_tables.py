@@ -48,7 +48,7 @@ def table(
     rows : str
         Query for the rows that count, by default all.
     by : dict
-        Heads and stored columns: there is a line for each set of their values, by default for each row.
+        Heads and expressions: there is a line for each set of their values, by default for each row.
     across : str
         Stored column: `columns` are repeated for each of its values, which are filled into heads with braces.
 
@@ -66,7 +66,9 @@ def table(
     values = kept[across].unique() if across else [None]
     heads = [*keys, *(head.format(_told(value)) for value in values for head in columns)]
     cells = [heads, ["---"] * len(heads)]
-    for key, group in kept.groupby(list(keys.values()) if by else kept.index, sort=False, dropna=False):
+    for key, group in kept.groupby(
+        [kept.eval(key) for key in keys.values()] if by else kept.index, sort=False, dropna=False
+    ):
         parts = [group[group[across] == value] if across else group for value in values]
         line = [_cell(part, content) for part in parts for content in columns.values()]
         cells.append([*(_told(value) for value in key if by), *line] if by else line)
