@@ -62,16 +62,14 @@ def table(
     kept = stored.query(rows) if rows else stored
     if kept.empty:
         raise ValueError(f"{of}: expected rows where {rows}, found none")
-    keys = by or {}
+    keys = [kept.eval(expression) for expression in (by or {}).values()]
     values = kept[across].unique() if across else [None]
-    heads = [*keys, *(head.format(_told(value)) for value in values for head in columns)]
+    heads = [*(by or ()), *(head.format(_told(value)) for value in values for head in columns)]
     cells = [heads, ["---"] * len(heads)]
-    for key, group in kept.groupby(
-        [kept.eval(key) for key in keys.values()] if by else kept.index, sort=False, dropna=False
-    ):
+    for key, group in kept.groupby(keys or kept.index, sort=False, dropna=False):
         parts = [group[group[across] == value] if across else group for value in values]
-        line = [_cell(part, content) for part in parts for content in columns.values()]
-        cells.append([*(_told(value) for value in key if by), *line] if by else line)
+        line = [_told(value) for value in key] if by else []
+        cells.append([*line, *(_cell(part, content) for part in parts for content in columns.values())])
     body = "\n".join(f"| {' | '.join(line)} |" for line in cells)
     return f"**{caption}**\n\n{body}\n\n*{_origin(of, lines)}*"
 
@@ -129,7 +127,10 @@ def _told(value: Any) -> str:
 def _origin(of: str, lines: list[str]) -> str:
     told = [line[2:].partition(": ")[::2] for line in lines if line.startswith("# ")]
     first = dict(reversed(told))
-    revision = re.search("[0-9a-f]{40}", first["revision"])
+    revision = re.search("[0-9a-f]{9}", first["revision"])
+    dirty = ", with changes" if "-dirty" in first["revision"] else ""
     older = "; ".join(why for name, why in told if name == "older than the code")
-    made = f"`jobs/results/{of}.csv`, revision {revision[0][:9] if revision else 'unknown'}, {first['date']}"
+    made = (
+        f"`jobs/results/{of}.csv`, revision {revision[0] if revision else 'unknown'}{dirty}, {first['date']}"
+    )
     return f"{made}; **older than the code**: {older}" if older else made
