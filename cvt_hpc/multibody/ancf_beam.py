@@ -18,7 +18,7 @@ by lines; alpha's integral is that of these points. All other integrals are exac
 
 A cubic that bends unevenly cannot keep e even: e waves along an element that is as long as a bend. A strain
 of less degree (Gerstmayr and Irschik 2008) smooths the forces, but not the speeds along the belt, on which
-friction acts; the README of the belt drive describes the consequences.
+friction acts; `docs/guide/results_drive.md` describes the consequences.
 """
 
 from typing import NamedTuple

@@ -1,4 +1,4 @@
-"""Growth and frequency of the leading mode, linear against transient: the table of linear_stability/README.md.
+"""Growth and frequency of the leading mode, linear against transient: see docs/guide/results_stability.md.
 
 python tests/benchmarks/growth.py 60 90 110 125 140
 python tests/benchmarks/growth.py 60 80 --set friction_memory=1e-4 --size 1e-9

@@ -4,7 +4,7 @@
     quasi_static_growth.py range > jobs/results/quasi_static_growth_range.csv  # some, over loads, of three sets
 
 The sets are the defaults, and the sets A and B of `jobs/lebrecht_fitted.toml`. The elastic belt's Jacobian about its steady state, with coordinates across the belt and motion along it replaced as
-`cvt_hpc/models/quasi_static_belt/README.md` says. One line for each: memory, split, motion along the path, whose rates
+`docs/guide/results_stability.md` says. One line for each: memory, split, motion along the path, whose rates
 slide, limits, then the fastest growth of all and that between 250 and 900 Hz.
 """
 

@@ -4,6 +4,7 @@ Their blocks of code are done by `test_guide_blocks.py`.
 """
 
 import re
+import runpy
 import subprocess
 import sys
 from html import escape
@@ -108,6 +109,11 @@ def test_the_guide_is_built_and_names_all_its_pages(tmp_path):
     assert (tmp_path / "site" / "pictures" / "lebrecht_2004.png").exists() and "pictures/lebrecht" in site[
         "tutorial"
     ]
+    results = [page for page in (ROOT / "docs" / "guide").glob("*.md") if "<!-- table" in page.read_text()]
+    assert results
+    for page in results:
+        assert site[page.stem].count("jobs/results/") >= page.read_text().count("<!-- table")
+        assert "<!-- table" not in site[page.stem]
     meant = (tmp_path / "site" / "variables.html").read_text()
     for model in map(load_model, MODELS):
         for variable in model.variables if model.is_recorded else ():
@@ -115,6 +121,47 @@ def test_the_guide_is_built_and_names_all_its_pages(tmp_path):
                 f"<td><code>{variable.name}</code></td>" in meant
                 and escape(variable.comment, quote=False) in meant
             )
+
+
+STORED = """# revision: stored by 1234567890123456789012345678901234567890 (1 of 2 lines)
+# date: 2026-01-31
+# older than the code: another law
+part,load [N m],vibrates,amplitude_t1 [um],amplitude_t2 [um],frequency_t1 [Hz],frequency_t2 [Hz]
+shaft,30,undecided,1,0.5,300,400
+shaft,10,yes,2,34.56,500,512.6
+shaft,20,yes,1200.4,3,507,600
+shaft,15,,,,,
+none,10,no,,,,
+none,20,irregular,,,,
+"""
+MARKER = """before
+<!-- table
+of = "small"
+caption = "Small"
+by = {"what" = "part"}
+[columns]
+"window" = "window(load, vibrates)"
+"largest" = ["amplitude.max(), frequency[vibrates == 'yes']", "{} at {}"]
+-->
+after"""
+
+
+def test_a_marker_becomes_a_table_of_results(tmp_path, monkeypatch):
+    hook = runpy.run_path(str(ROOT / "docs" / "results_tables.py"))["on_page_markdown"]
+    monkeypatch.setitem(hook.__globals__, "RESULTS", tmp_path)
+    (tmp_path / "small.csv").write_text(STORED)
+    *_, shaft, none, _, origin, after = hook(MARKER).splitlines()
+    assert shaft == "| shaft | 10 to 20, 30? | 1200 at 507 to 513 |"
+    assert none == "| none | 20 irregular | - |"
+    assert origin == (
+        "*`jobs/results/small.csv`, revision 123456789, 2026-01-31; **older than the code**: another law*"
+    )
+    columns = hook(
+        MARKER.replace('by = {"what" = "part"}', 'across = "load"\nrows = "load > 10"')
+    ).splitlines()
+    assert "| 1 at - |  |" in columns[5] and after == "after"
+    with pytest.raises(ValueError, match="expected rows where load > 99"):
+        hook(MARKER.replace("[columns]", 'rows = "load > 99"\n[columns]'))
 
 
 def test_a_command_that_is_none_is_seen():

@@ -79,8 +79,6 @@ BEFORE = {
         cvt-hpc run jobs/quickstart.toml --set name=fine
     """,
     "docs/guide/sweeps.md": "cvt-hpc init JOB",
-    "cvt_hpc/models/linear_stability/README.md": "cvt-hpc init JOB --model linear_stability",
-    "cvt_hpc/models/steady_variator/README.md": "cvt-hpc init JOB --model steady_variator",
 }
 
 

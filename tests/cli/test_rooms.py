@@ -107,7 +107,7 @@ def test_models_are_loaded_by_their_contract_but_where_their_readme_says():
     told = re.search(r"imported outside this folder only in(.*?):", text, re.DOTALL)[1]
     named = {
         (at, model)
-        for at, models in re.findall(r"`(\w+)` \((.*?)\)", told)
+        for at, models in re.findall(r"`(\w+)`\s\((.*?)\)", told)
         for model in re.findall(r"\w+", models)
     }
     assert named == {

@@ -12,6 +12,7 @@ PAGES = [*GUIDE, *BESIDE_CODE]
 # Held to length of lines and words.
 IN_PLAIN_WORDS = [*PAGES, ROOT / "docs" / "CHANGELOG.md", ROOT / "docs" / "coverage.md"]
 _FENCE = re.compile(r"^```([^\n]*)\n(.*?)^```$", re.MULTILINE | re.DOTALL)
+_MARKER = re.compile(r"<!--.*?-->", re.DOTALL)
 
 
 class Block(NamedTuple):
@@ -34,8 +35,11 @@ def blocks(page: Path) -> list[Block]:
 
 
 def prose(page: Path) -> str:
-    """Text of a page, with an empty line in the place of each line of a block."""
-    return _FENCE.sub(lambda block: "\n" * block[0].count("\n"), page.read_text())
+    """Text of a page, with an empty line in the place of each line of a block, or of a marker of a table."""
+    text = page.read_text()
+    for pattern in (_FENCE, _MARKER):
+        text = pattern.sub(lambda block: "\n" * block[0].count("\n"), text)
+    return text
 
 
 def shell_calls(text: str) -> list[list[str]]:

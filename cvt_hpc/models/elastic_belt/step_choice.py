@@ -3,7 +3,7 @@
 **Accuracy.** The step is of first order: its effect on a vibration's amplitude is in proportion to its
 length over the period. REFERENCE_STEP changes it by REFERENCE_ERROR at the working point of the chart, whose
 vibrations are below REFERENCE_BAND. Elsewhere that is no bound: of 81 random scenes that vibrate it changes
-half by more than 1.2 %, a tenth by more than 9 % (`README.md`).
+half by more than 1.2 %, a tenth by more than 9 % (`docs/guide/validation.md`).
 
 **Stability.** Transverse motion is explicit but for bending (`imex_bending`): beyond 2 / w the shortest waves
 grow, w being their angular frequency under tension and contact (`transverse_limit`). The step chosen stays at

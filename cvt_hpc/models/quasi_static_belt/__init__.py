@@ -1,7 +1,7 @@
 """The elastic belt with all motion faster than a limit frequency lagging behind its forces.
 
-Another model than `elastic_belt`, made of its parts: `README.md` states the common and the dropped parts, and
-why the equations as printed do not vibrate. Importing this package is cheap.
+Another model than `elastic_belt`, made of its parts: `docs/guide/theory_belt.md` states the common and the
+dropped parts, and why the equations as printed do not vibrate. Importing this package is cheap.
 """
 
 from cvt_hpc.models import elastic_belt
