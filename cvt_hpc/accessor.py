@@ -194,6 +194,34 @@ class Results:
         onset = boundary.where(boundary["rising"] == 1.0).min("boundary", keep_attrs=True)
         return onset.rename("onset").assign_attrs(long_name=f"onset of vibration in {along}")
 
+    def probability(self) -> xr.Dataset:
+        """Return the probabilities of vibration, slip and failure over the samples of uncertain parameters.
+
+        Returns
+        -------
+        Dataset
+            Over the other axes `vibration_probability`, `slip_probability`, `failure_probability`, each with
+            the ends `_low` and `_high` of its 95 % interval, quantiles of amplitude and frequency of the
+            samples that vibrate, and how many samples ended and are undecided.
+        """
+        from cvt_hpc.analysis.probability import probabilities
+
+        return probabilities(self._dataset)
+
+    def onset_quantiles(self, along: str = "load") -> xr.DataArray:
+        """Return the onset that 5, 50 and 95 % of the samples of uncertain parameters do not exceed.
+
+        Returns
+        -------
+        DataArray
+            Over `quantile` and the other axes [unit of the axis]: -inf where vibration is there at the lowest
+            value already, inf where there is none.
+        """
+        from cvt_hpc.analysis.probability import onset_quantiles
+
+        self.probability()  # which refuses results without samples
+        return onset_quantiles(self._dataset, along)
+
     def boundary(self, along: str = "load") -> xr.DataArray:
         """Return all boundaries between quiet and vibrating along an axis.
 

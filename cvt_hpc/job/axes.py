@@ -13,6 +13,7 @@ from cvt_hpc.job.values import as_list, kind_of, read_value
 from cvt_hpc.parameters import Parameter
 
 LARGEST_AXIS = 100_000
+SAMPLE = "sample"  # axis along which uncertain parameters take their values
 _RANGE_KEYS = ("from", "to", "count", "step", "spacing")
 _SPACINGS = ("linear", "log")
 _STEP_TOLERANCE = Decimal("1e-9")
