@@ -109,7 +109,7 @@ def probabilities(dataset: xr.Dataset, source: str = "results") -> xr.Dataset:
     kept = {name: axis for name, axis in dataset.coords.items() if SAMPLE not in axis.dims}
     cells, most = count.size, int(count.max())
     widest = float((found[f"{PROBABILITY}_high"] - found[f"{PROBABILITY}_low"]).max())
-    counted = f"{cells} cells of {most} samples; 95 % intervals up to {widest:.2g} wide"
+    counted = f"{cells} cell{'s' * (cells != 1)} of {most} samples; 95 % intervals up to {widest:.2g} wide"
     return found.assign_coords(kept).assign_attrs(counted=counted)
 
 

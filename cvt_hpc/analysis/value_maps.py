@@ -190,13 +190,15 @@ def _panels(arrangement: layout.Arrangement, quantities: Sequence[str]) -> list[
     """Panels of all quantities, by the axis of panels and by labels of further dimensions."""
     dataset = arrangement.dataset
     kinds, found = occurrence_classes(dataset), []
+    # between texts there is nothing that a line could cross
+    are_numbers = all(dataset[name].dtype.kind in "iuf" for name in (arrangement.x, arrangement.y) if name)
     for name in quantities:
         array = dataset[name]
         factor, unit = figures.value_unit(array)
         over = [arrangement.panel] if arrangement.panel else []
         labelled = [str(dim) for dim in array.dims if dim not in (arrangement.x, arrangement.y, *over)]
         alike = factor * np.asarray(array.attrs.get("valid_range", array.values))
-        isolines = tuple(factor * np.asarray(array.attrs.get(ISOLINES, ()), float))
+        isolines = tuple(factor * np.asarray(array.attrs.get(ISOLINES, ()) if are_numbers else (), float))
         for labels in layout.places(array, labelled):
             told = [str(array[dim].values[k]) for dim, k in labels.items()]
             for at in layout.places(dataset, over):

@@ -151,7 +151,8 @@ def rebuild_job(
     tables = _read_tables(document, schema, source)
     changed = assignments.take_own(pairs, "design")
     uncertain = {**document.get(TABLE, {}), **assignments.take_own(pairs, TABLE)}
-    schema = with_samples(schema) if uncertain else schema
+    is_uncertain = TABLE in document or bool(uncertain)
+    schema = with_samples(schema) if is_uncertain else schema
     others = {key: value for key, value in pairs.items() if key not in HEADER}
     put_axes, others = assignments.split_axes(others, schema, source, label)
     replaced = assignments.read_assignments(others, schema, source, label)
@@ -160,10 +161,11 @@ def rebuild_job(
     put |= {given for key in replaced if (file := schema.parameters[key].file) for given in file.gives}
     gone = {*put, *overridden(put, schema)}
     scatters: list[Rule] = []
-    if uncertain:
+    if is_uncertain:
         scatters, samples, fixed = read_uncertain(uncertain, gone, schema, source)
         if not scatters:  # the job of the values that overrides give
             certain = {name: table for name, table in document.items() if name != TABLE}
+            certain |= {"design": {**document.get("design", {}), **changed}}
             return rebuild_job(certain, source, None if is_users else units, pairs, label)
         tables |= fixed
         document = _with_samples(document, samples, {*fixed, *gone}, design, source)

@@ -16,7 +16,7 @@ from cvt_hpc.job.values import kind_of, read_value
 from cvt_hpc.parameters import Parameter, positive
 
 _LEAST_SHARE = 1e-6  # of a distribution within its limits
-_SYMMETRIC = 1e-9
+_TOLERANCE = 1e-9  # of a matrix: how symmetric it is, and how positive its eigenvalues are
 _SAMPLES = Parameter(256, "", "samples of each cell", minimum=2, maximum=MOST)
 _SEED = Parameter(1, "", "of the samples", minimum=0)
 _COEFFICIENTS = Parameter((), "", "matrix of correlation")
@@ -151,11 +151,11 @@ def _read_correlation(
     if len(matrix) != size or not all(isinstance(row, tuple) and len(row) == size for row in matrix):
         raise mismatch(f"{where}.matrix", shape, f"{len(matrix)} rows" if matrix else "nothing")
     values = np.array(matrix)
-    if not (values.ndim == 2 and np.abs(values - values.T).max() <= _SYMMETRIC):
+    if not (values.ndim == 2 and np.abs(values - values.T).max() <= _TOLERANCE):
         raise mismatch(f"{where}.matrix", "a symmetric matrix", "one that is not")
     if not np.array_equal(np.diag(values), np.ones(size)):
         raise mismatch(f"{where}.matrix", "1 on the diagonal", "other numbers")
-    if (least := float(np.linalg.eigvalsh(values).min())) < _SYMMETRIC:
+    if (least := float(np.linalg.eigvalsh(values).min())) < _TOLERANCE:
         raise mismatch(f"{where}.matrix", "a positive definite matrix", f"an eigenvalue of {least:.3g}")
     kept = [place for place, key in enumerate(correlated) if key not in gone]
     if len(kept) < 2:

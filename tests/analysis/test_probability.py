@@ -71,33 +71,31 @@ def test_what_is_not_decided_counts_on_neither_side_and_widens_the_interval():
     assert np.isnan(found["amplitude_quantiles"].values[:, 1:]).all()
 
 
-def onset_job(seed, loads, samples):
+def onset_job(seed, loads, samples, **further):
     """The oscillator with a normal damping over its normal load."""
+    friction = {"friction_law": "stribeck", "kinetic_friction": 2.0, "stribeck_velocity": 0.1}
     return build_job(
         {
             "name": "onset",
             "model": "oscillator",
             "axes": {"normal_load": list(loads)},
-            "friction": {
-                "friction_law": "stribeck",
-                "kinetic_friction": 2.0,
-                "friction_gradient": -40.0,
-                "stribeck_velocity": 0.1,
-            },
+            "friction": friction | ({} if further else {"friction_gradient": -40.0}),
             "uncertain": {
                 "samples": samples,
                 "seed": seed,
                 "damping": {"distribution": "normal", "mean": 5.9, "standard_deviation": 0.6},
+                **further,
             },
         }
     )
 
 
-# at 0.2 m/s friction falls by 40 s/m exp(-2) of the normal load: steady sliding is unstable where that is more than
-# the damping
+# at 0.2 m/s friction falls by exp(-2) of its steepest fall; steady sliding is unstable where the damping is less than
+# that times the normal load
 SLOPE = 40.0 * np.exp(-2.0)
 LOADS = np.array([0.95, 1.1, 1.2])
-TRUE = norm.cdf((SLOPE * LOADS - 5.9) / 0.6)
+GRADIENT = {"distribution": "normal", "mean": -40.0, "standard_deviation": 3.0}
+CORRELATION = {"parameters": ["damping", "friction_gradient"], "matrix": [[1.0, 0.5], [0.5, 1.0]]}
 
 
 def stability(job):
@@ -108,13 +106,23 @@ def stability(job):
 
 
 def test_the_interval_holds_the_probability_of_the_closed_form():
+    further = {"friction_gradient": GRADIENT, "correlation": CORRELATION}
+    # damping and weighted gradient, both normal, add to less than nothing
+    weight = LOADS * np.exp(-2.0)
+    spread = np.sqrt(0.6**2 + (3.0 * weight) ** 2 + 2 * 0.5 * 0.6 * 3.0 * weight)
+    true = norm.cdf((40.0 * weight - 5.9) / spread)
     held = np.zeros(LOADS.size)
     for seed in range(100):
-        found = probabilities(stability(onset_job(seed, LOADS, samples=32)))
-        assert found["vibration_probability"].values == pytest.approx(TRUE, abs=1.01 / 32)  # one in each 32nd
+        found = probabilities(stability(onset_job(seed, LOADS, 16, **further)))
         low, high = (found[f"vibration_probability_{end}"].values for end in ("low", "high"))
-        held += (low <= TRUE) & (TRUE <= high)
+        held += (low <= true) & (true <= high)
     assert (held >= 90).all()
+
+
+def test_one_uncertain_parameter_has_a_sample_in_each_part_of_its_distribution():
+    found = probabilities(stability(onset_job(1, LOADS, samples=64)))
+    true = norm.cdf((SLOPE * LOADS - 5.9) / 0.6)
+    assert found["vibration_probability"].values == pytest.approx(true, abs=1 / 64)
 
 
 def test_quantiles_of_the_onset_are_those_of_the_closed_form():

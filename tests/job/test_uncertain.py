@@ -93,6 +93,9 @@ class TestSamples:
         assert toy(table, "thrust=19 kN").shape == (2, 8)
         assert toy(table, "thrust=19 kN", "element_mass=1").shape == (2,)
         assert toy(table, "uncertain.samples=16").shape == (2, 16)
+        axes = {"load": {"from": 0, "to": 80, "count": 17}}
+        traced = toy({"samples": 8, "thrust": NORMAL}, "thrust=2e4", "design.kind=trace", axes=axes)
+        assert (traced.shape, traced.design["kind"]) == ((17,), "trace")
         assert job.point_at({"sample": 3})["element_mass"] == job.point(3)["element_mass"]
 
     def test_formulas_follow_uncertain_parameters(self):
@@ -129,6 +132,7 @@ def correlated(matrix, parameters=("thrust", "element_mass")):
     ("table", "text"),
     [
         ({"thrust": NORMAL}, "samples: expected the number of samples, found nothing"),
+        ({}, ": expected a parameter with a distribution, or several, found none"),
         ({"samples": 8}, ": expected a parameter with a distribution, or several, found none"),
         ({"samples": 10**8, "thrust": NORMAL}, "samples: expected >= 2 and <= 65536, found 100000000"),
         ({"samples": 100, "thrust": NORMAL}, "the nearest: 64 and 128), found 100"),
