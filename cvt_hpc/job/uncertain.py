@@ -116,7 +116,7 @@ class Uncertain:
     Attributes
     ----------
     distributions : tuple of Distribution
-        In the order of the dimensions of the Sobol sequence.
+        By name, in the order of the dimensions of the Sobol sequence.
     seed : int
         Of its scrambling.
     correlated : tuple of str

@@ -66,7 +66,8 @@ def read_uncertain(
         raise mismatch(where, "a parameter with a distribution, or several", "none")
     seed = read_value(_SEED, table.get("seed", _SEED.default), f"{where} seed")
     correlated, matrix = _read_correlation(table.get("correlation"), found, gone, schema, where)
-    left = tuple(one for key, one in found.items() if key not in gone)
+    # by name, so that the samples of a job do not depend on its layout
+    left = tuple(one for key, one in sorted(found.items()) if key not in gone)
     uncertain = Uncertain(left, seed, correlated, matrix)
     rules = []
     for place, one in enumerate(left):

@@ -83,6 +83,17 @@ class TestSamples:
         assert [again.point(k) for k in range(16)] == [job.point(k) for k in range(16)]
         assert toy({"samples": 8, "seed": 3, "thrust": CUT}).fingerprint() != job.fingerprint()
 
+    def test_samples_do_not_depend_on_the_layout_of_the_table(self):
+        jobs = [
+            toy({"samples": 4, **tables})
+            for tables in (
+                {"thrust": NORMAL, "element_mass": LOG_NORMAL},
+                {"belt": {"element_mass": LOG_NORMAL}, "thrust": NORMAL},
+            )
+        ]
+        assert jobs[0].fingerprint() == jobs[1].fingerprint()
+        assert [jobs[0].point(k) for k in range(8)] == [jobs[1].point(k) for k in range(8)]
+
     def test_overrides_take_a_sample_or_a_value(self):
         table = {"samples": 8, "thrust": NORMAL, "element_mass": LOG_NORMAL}
         job = toy(table)
