@@ -222,6 +222,25 @@ class Results:
         self.probability()  # which refuses results without samples
         return onset_quantiles(self._dataset, along)
 
+    def sobol_indices(self, of: str = "vibration") -> xr.Dataset:
+        """Return which uncertain parameter a result owes its variance to; of a job with `indices = true`.
+
+        Parameters
+        ----------
+        of : str
+            "vibration", "slip", "failure", or a numeric variable.
+
+        Returns
+        -------
+        Dataset
+            Over `parameter` and the other axes `first_order` and `total_order`, each with the ends `_low` and
+            `_high` of its 95 % bounds by bootstrap; nan where the result does not vary, or is not known of
+            all swapped runs of 90 % of the samples.
+        """
+        from cvt_hpc.analysis.probability import indices_of
+
+        return indices_of(self._dataset, of)
+
     def boundary(self, along: str = "load") -> xr.DataArray:
         """Return all boundaries between quiet and vibrating along an axis.
 

@@ -218,7 +218,7 @@ def values_of(attributes: Mapping[str, Any]) -> dict[str, str]:
     job, point = json.loads(attributes["job"]), json.loads(attributes["point"])
     try:
         schema = load_schema(job["model"], job["stepper"], "history")
-        schema = with_samples(schema) if TABLE in job else schema
+        schema = with_samples(schema, job[TABLE]) if TABLE in job else schema
         tables = {key: value for section in schema.sections for key, value in job.get(section, {}).items()}
         # numerics that depart from the job, such as the step, are those that the program has chosen
         chosen = {*job["axes"], *schema.sections.get("numerics", {})}

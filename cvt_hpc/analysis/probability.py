@@ -18,8 +18,9 @@ import xarray as xr
 from numpy.typing import NDArray
 
 from cvt_hpc.analysis.classes import OccurrenceClass, at_strongest_strand, check_results, map_classes
-from cvt_hpc.errors import mismatch
-from cvt_hpc.job.axes import SAMPLE
+from cvt_hpc.analysis.sobol import sobol_indices
+from cvt_hpc.errors import mismatch, unknown
+from cvt_hpc.job.axes import ALL, NONE, SAMPLE, SWAPPED
 from cvt_hpc.study.repeats import interval
 from cvt_hpc.variables import Status, Vibrates
 from cvt_hpc.vibration.classes import levels, onsets
@@ -40,7 +41,8 @@ _VERDICTS = (OccurrenceClass.QUIET, OccurrenceClass.VIBRATING, OccurrenceClass.S
 
 def has_samples(dataset: xr.Dataset, fixed: Collection[str] = ()) -> bool:
     """Whether results have samples of uncertain parameters, and none of them is fixed."""
-    return SAMPLE in dataset["status"].dims and SAMPLE not in fixed and dataset["status"].ndim > 1
+    dims = {*dataset["status"].dims}
+    return SAMPLE in dims - {*fixed} and bool(dims - {SAMPLE, SWAPPED})
 
 
 def over_samples(dataset: xr.Dataset, fixed: Collection[str] = ()) -> xr.Dataset:
@@ -65,7 +67,7 @@ def probabilities(dataset: xr.Dataset, source: str = "results") -> xr.Dataset:
         the ends of its 95 % interval, `_low` and `_high`; `samples`, how many have ended, and
         `undecided_samples`, how many of them count neither as vibration nor against it. Over `quantile`, too,
         `amplitude_quantiles` [m] and `frequency_quantiles` [Hz] of the samples that vibrate, at the strongest
-        strand.
+        strand. With runs for Sobol indices those of vibration over `parameter`, as of `indices_of`.
 
     Raises
     ------
@@ -76,6 +78,7 @@ def probabilities(dataset: xr.Dataset, source: str = "results") -> xr.Dataset:
     if SAMPLE not in dataset["status"].dims:
         dims = ", ".join(map(str, dataset["status"].dims)) or "a single run"
         raise mismatch(source, f"results with the axis {SAMPLE}, of a job with [uncertain]", dims)
+    whole, dataset = dataset, independent(dataset)
     classes = map_classes(dataset).compute().drop_attrs(deep=False)
     ended = classes != OccurrenceClass.NOT_RUN
     count = ended.sum(SAMPLE)
@@ -103,6 +106,8 @@ def probabilities(dataset: xr.Dataset, source: str = "results") -> xr.Dataset:
             values = at_strongest_strand(dataset, name).compute().where(vibrates)
             told = {"units": unit, "long_name": name, "comment": "quantiles of the samples that vibrate"}
             found[f"{name}_quantiles"] = _quantiles(values).assign_attrs(told)
+    if SWAPPED in whole["status"].dims:
+        found = found.merge(indices_of(whole, "vibration"))
     # a cell of many runs has no verdict of its own
     found["status"] = xr.where(count > 0, int(Status.DONE), int(Status.NOT_RUN)).astype(np.int8)
     found["vibrates"] = xr.full_like(found["status"], int(Vibrates.UNDECIDED))
@@ -111,6 +116,49 @@ def probabilities(dataset: xr.Dataset, source: str = "results") -> xr.Dataset:
     widest = float((found[f"{PROBABILITY}_high"] - found[f"{PROBABILITY}_low"]).max())
     counted = f"{cells} cell{'s' * (cells != 1)} of {most} samples; 95 % intervals up to {widest:.2g} wide"
     return found.assign_coords(kept).assign_attrs(counted=counted)
+
+
+def independent(dataset: xr.Dataset) -> xr.Dataset:
+    """Return results of independent samples along `sample`: of runs for Sobol indices both sets."""
+    if SWAPPED not in dataset["status"].dims:
+        return dataset
+    names = ("status", "vibrates", "inferred_class", "amplitude", "frequency")
+    kept = dataset[[name for name in names if name in dataset]]
+    both = [kept.sel({SWAPPED: which}, drop=True) for which in (NONE, ALL)]
+    return xr.concat(both, SAMPLE, coords="minimal", compat="override", data_vars="minimal")
+
+
+def indices_of(dataset: xr.Dataset, of: str, source: str = "results") -> xr.Dataset:
+    """Return Sobol indices of a result to each uncertain parameter, in each cell; as of `sobol_indices`.
+
+    Parameters
+    ----------
+    dataset : Dataset
+        Results of a job with `indices = true` in [uncertain].
+    of : str
+        "vibration", "slip" or "failure": whether a run has it; or a numeric variable, of those with more
+        dimensions at the strongest strand.
+    source : str
+        Where the results are from, for the errors.
+
+    Raises
+    ------
+    InputError
+        If the results have no such runs, or no such variable.
+    """
+    check_results(dataset, source)
+    if not {SAMPLE, SWAPPED} <= {*dataset["status"].dims}:
+        raise mismatch(source, "results of a job with `indices = true` in [uncertain]", "others")
+    if of in _EVENTS:
+        kind, may_hide = _EVENTS[of]
+        classes = map_classes(dataset)
+        decided = classes.isin(_VERDICTS) if may_hide else classes != OccurrenceClass.NOT_RUN
+        return sobol_indices((classes == kind).astype(float).where(decided))
+    known = [str(name) for name, array in dataset.data_vars.items() if array.dtype.kind in "iuf"]
+    if of not in known:
+        raise unknown(source, "variable", of, [*_EVENTS, *known])
+    beyond = {*dataset[of].dims} - {*dataset["status"].dims}
+    return sobol_indices(at_strongest_strand(dataset, of) if beyond else dataset[of])
 
 
 def _quantiles(values: xr.DataArray) -> xr.DataArray:
@@ -141,7 +189,7 @@ def onset_quantiles(dataset: xr.Dataset, along: str) -> xr.DataArray:
         quiet and a vibrating neighbour. -inf: vibrates at the lowest value already; inf: at no value. Samples
         of which no run is known to be quiet or to vibrate do not count.
     """
-    classes = map_classes(dataset).compute().sortby(along).transpose(..., along)
+    classes = map_classes(independent(dataset)).compute().sortby(along).transpose(..., along)
     places = np.asarray(classes[along].values, float)
     lowest = classes.isel({along: 0}, drop=True).astype(float)
     flat = [_onset(places, levels(row)) for row in classes.values.reshape(-1, places.size)]

@@ -6,9 +6,10 @@ from collections.abc import Iterable, Mapping, Sequence
 from typing import Any
 
 from cvt_hpc.errors import InputError, mismatch
-from cvt_hpc.job.axes import SAMPLE, Axis, thinned
+from cvt_hpc.job.axes import NONE, SAMPLE, SWAPPED, Axis, thinned
 from cvt_hpc.job.rules import Rule, follow, needed_rules, places, varied_by
 from cvt_hpc.job.schema import Schema
+from cvt_hpc.job.uncertain import Scatter
 
 MOST_CHECKED_POINTS, MOST_CHECKED_VALUES = 20_000, 5_000  # of runs, and of parameters that follow from others
 
@@ -57,7 +58,7 @@ def check_grid(
     """
     check_point(schema, parameters, source)
     sizes = {axis.name: len(axis.values) for axis in axes}
-    scattered = [rule.key for rule in rules if rule.needs == (SAMPLE,)]
+    scattered = [rule.key for rule in rules if isinstance(rule.source, Scatter)]
     idle = dict.fromkeys([*given, *scattered, *(name for name, size in sizes.items() if size > 1)], "")
     for values in _samples_to_check(axes) if sampled else _points_to_check(axes, rules):
         varied = dict(zip(sizes, values, strict=True))
@@ -196,8 +197,8 @@ def _extreme_samples(axis: Axis, rules: Sequence[Rule]) -> tuple:
     """Return the samples in which an uncertain parameter has its least or its largest value."""
     found = set()
     for rule in rules:
-        if rule.needs == (SAMPLE,):
-            values = [rule.value({SAMPLE: sample}) for sample in axis.values]
+        if isinstance(rule.source, Scatter):
+            values = [rule.value({SAMPLE: sample, SWAPPED: NONE}) for sample in axis.values]
             found |= {axis.values[values.index(end)] for end in (min(values), max(values))}
     return tuple(sorted(found))
 

@@ -13,7 +13,7 @@ from typing import Any, Self
 
 from cvt_hpc.errors import mismatch
 from cvt_hpc.job.assignments import Assignments, read_assignments, split_assignments
-from cvt_hpc.job.axes import SAMPLE, Axis, thinned
+from cvt_hpc.job.axes import SAMPLE, SWAPPED, Axis, thinned
 from cvt_hpc.job.crosscheck import check_point, complete_point
 from cvt_hpc.job.design import Design
 from cvt_hpc.job.formula import Formula
@@ -126,11 +126,10 @@ class Job:
 
     @property
     def schema(self) -> Schema:
-        """Declarations of the model and the stepper; with uncertain parameters that of `sample`."""
+        """Declarations of the model and the stepper, and of the axes of uncertain parameters."""
         schema = replace(load_schema(self.model, self.stepper, self.source), units=self.units)
-        return (
-            with_samples(schema) if any(isinstance(rule.source, Scatter) for rule in self.rules) else schema
-        )
+        table = self._stated_rules().get(TABLE)
+        return with_samples(schema, table) if table else schema
 
     @cached_property
     def derived(self) -> tuple[Derived, ...]:
@@ -329,7 +328,7 @@ def handed_to(job: Job, model: str, why: str) -> dict[str, Any]:
         it does not know.
     """
     document, known = job.resolved(), load_schema(model, None, job.source).section_of
-    varied = [("axes", axis.name) for axis in job.axes if axis.name != SAMPLE]
+    varied = [("axes", axis.name) for axis in job.axes if axis.name not in (SAMPLE, SWAPPED)]
     for table, name in varied + [(TABLE, rule.key) for rule in job.rules if isinstance(rule.source, Scatter)]:
         if name not in known:
             where = f"{job.source}: [{table}] {name}"

@@ -152,7 +152,7 @@ def rebuild_job(
     changed = assignments.take_own(pairs, "design")
     uncertain = {**document.get(TABLE, {}), **assignments.take_own(pairs, TABLE)}
     is_uncertain = TABLE in document or bool(uncertain)
-    schema = with_samples(schema) if is_uncertain else schema
+    schema = with_samples(schema, uncertain) if is_uncertain else schema
     others = {key: value for key, value in pairs.items() if key not in HEADER}
     put_axes, others = assignments.split_axes(others, schema, source, label)
     replaced = assignments.read_assignments(others, schema, source, label)
@@ -162,13 +162,13 @@ def rebuild_job(
     gone = {*put, *overridden(put, schema)}
     scatters: list[Rule] = []
     if is_uncertain:
-        scatters, samples, fixed = read_uncertain(uncertain, gone, schema, source)
+        scatters, further, fixed = read_uncertain(uncertain, gone, schema, source)
         if not scatters:  # the job of the values that overrides give
             certain = {name: table for name, table in document.items() if name != TABLE}
             certain |= {"design": {**document.get("design", {}), **changed}}
             return rebuild_job(certain, source, None if is_users else units, pairs, label)
         tables |= fixed
-        document = _with_samples(document, samples, {*fixed, *gone}, design, source)
+        document = _with_samples(document, further, {*fixed, *gone}, design, source)
     given = {key: value for key, value in tables.items() if key not in gone} | replaced
     files = {key: name for key, name in given.items() if name and schema.parameters[key].file}
     given = _with_files(given, schema, source)
@@ -243,18 +243,22 @@ def _with_files(given: Mapping[str, Any], schema: Schema, source: str) -> dict[s
 
 
 def _with_samples(
-    document: Mapping[str, Any], samples: int | None, given: Collection[str], design: Design, source: str
+    document: Mapping[str, Any],
+    further: Mapping[str, list],
+    given: Collection[str],
+    design: Design,
+    source: str,
 ) -> dict[str, Any]:
-    """Return a document with the axis of the samples, the last one, unless it is given otherwise."""
+    """Return a document with the axes of the samples, the last ones, unless they are given otherwise."""
     where, axes = f"{source}: [{TABLE}]", document.get("axes", {})
     if "runs" in design:
         expected = "a grid or a trace, each cell of which has its samples"
         raise mismatch(where, expected, f"a design of kind {show(design['kind'])}")
-    if samples is None and SAMPLE not in {*axes, *given}:
+    if SAMPLE not in {*further, *axes, *given}:
         raise mismatch(f"{where} samples", "the number of samples", "nothing")
-    if samples is not None and SAMPLE in axes:
-        raise mismatch(f"{where} samples", f"either samples or an axis {SAMPLE}", "both")
-    return {**document, "axes": {**axes, SAMPLE: list(range(samples))} if samples else axes}
+    if twice := [name for name in further if name in axes]:
+        raise mismatch(f"{where} samples", f"either samples or an axis {twice[0]}", "both")
+    return {**document, "axes": {**axes, **further}}
 
 
 def _read_axes_and_rules(

@@ -8,6 +8,9 @@ common: two cells differ by their place on the grid, and not by the luck of the 
 Correlated parameters have the copula of a normal distribution: the matrix is that of their normal scores,
 which for normal parameters is the correlation of their values. Limits cut a distribution off, and what is
 left keeps its shape. Mean and standard deviation are those without the limits.
+
+For Sobol indices each sample is drawn twice, A and B, and a further axis `swapped` names the parameters that
+are those of B: none, all, or one of them (Saltelli et al. 2010).
 """
 
 import math
@@ -19,7 +22,7 @@ from typing import Any, NamedTuple
 import numpy as np
 from numpy.typing import NDArray
 
-from cvt_hpc.job.axes import SAMPLE
+from cvt_hpc.job.axes import ALL, NONE, SAMPLE, SWAPPED
 from cvt_hpc.job.schema import Schema
 from cvt_hpc.job.values import in_words
 from cvt_hpc.parameters import Parameter
@@ -123,17 +126,21 @@ class Uncertain:
         Parameters that are correlated.
     matrix : tuple of tuple of float
         The correlation of their normal scores.
+    indices : bool
+        Whether a second set of samples is drawn.
     """
 
     distributions: tuple[Distribution, ...]
     seed: int
     correlated: tuple[str, ...] = ()
     matrix: tuple[tuple[float, ...], ...] = ()
+    indices: bool = False
 
-    def value(self, place: int, sample: int) -> float:
-        """Return the value [SI] of the distribution at a place for a sample."""
+    def value(self, place: int, sample: int, swapped: str = NONE) -> float:
+        """Return the value [SI] of the distribution at a place for a sample, by what is swapped."""
         block, row = divmod(sample, BLOCK)
-        return float(_block(self, block)[row, place])
+        is_second = swapped in (ALL, self.distributions[place].key)
+        return float(_block(self, block)[row, place + is_second * len(self.distributions)])
 
     def document(self) -> dict[str, Any]:
         """Return the table of a job file, without the number of samples, in JSON types."""
@@ -142,7 +149,7 @@ class Uncertain:
         if self.correlated:
             matrix = [list(row) for row in self.matrix]
             told["correlation"] = {"parameters": list(self.correlated), "matrix": matrix}
-        return told
+        return told | ({"indices": True} if self.indices else {})
 
 
 @dataclass(frozen=True)
@@ -152,20 +159,27 @@ class Scatter:
     uncertain: Uncertain
     place: int
     text: str = field(compare=False)
-    names = (SAMPLE,)
+
+    @property
+    def names(self) -> tuple[str, ...]:
+        """The axes along which it varies."""
+        return (SAMPLE, SWAPPED) if self.uncertain.indices else (SAMPLE,)
 
     def value(self, parameters: Mapping[str, Any]) -> float:
         """Return the value [SI] of the sample."""
-        return self.uncertain.value(self.place, parameters[SAMPLE])
+        return self.uncertain.value(self.place, *(parameters[name] for name in self.names))
 
 
 @lru_cache(maxsize=2 * MOST // BLOCK)
 def _block(uncertain: Uncertain, number: int) -> NDArray[np.float64]:
-    """Return the values of the samples from BLOCK * number on, shape (BLOCK, distribution) [SI]."""
+    """Return the values of the samples from BLOCK * number on, shape (BLOCK, distribution) [SI].
+
+    For Sobol indices those of the second set stand behind, for each distribution.
+    """
     from scipy.special import ndtr, ndtri
     from scipy.stats import qmc
 
-    found = uncertain.distributions
+    found = uncertain.distributions * (2 if uncertain.indices else 1)
     engine = qmc.Sobol(len(found), seed=np.random.default_rng(uncertain.seed))
     if number:  # the engine cannot go on by none
         engine.fast_forward(BLOCK * number)
@@ -179,6 +193,11 @@ def _block(uncertain: Uncertain, number: int) -> NDArray[np.float64]:
     return np.stack([one.quantiles(shares[:, k]) for k, one in enumerate(found)], axis=1)
 
 
-def with_samples(schema: Schema) -> Schema:
-    """Return the schema of a job with uncertain parameters, which knows the number of a sample."""
-    return replace(schema, sections=schema.sections | {TABLE: {SAMPLE: _SAMPLE}})
+def with_samples(schema: Schema, table: Mapping[str, Any]) -> Schema:
+    """Return the schema of a job with a table [uncertain], which knows the number of a sample."""
+    known = {SAMPLE: _SAMPLE}
+    if table.get("indices"):
+        keys = (name.rpartition(".")[2] for name, _ in schema.flatten(table))
+        choices = (NONE, ALL, *(key for key in keys if key in schema.parameters))
+        known[SWAPPED] = Parameter(NONE, "", "which are those of the second set of samples", choices=choices)
+    return replace(schema, sections=schema.sections | {TABLE: known})

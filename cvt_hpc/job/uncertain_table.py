@@ -8,7 +8,7 @@ from typing import Any
 import numpy as np
 
 from cvt_hpc.errors import InputError, mismatch, show, unknown
-from cvt_hpc.job.axes import SAMPLE, Axis
+from cvt_hpc.job.axes import ALL, NONE, SAMPLE, SWAPPED, Axis
 from cvt_hpc.job.rules import Rule
 from cvt_hpc.job.schema import Schema
 from cvt_hpc.job.uncertain import KINDS, MOST, TABLE, Distribution, Scatter, Uncertain
@@ -20,18 +20,19 @@ _TOLERANCE = 1e-9  # of a matrix: how symmetric it is, and how positive its eige
 _SAMPLES = Parameter(256, "", "samples of each cell", minimum=2, maximum=MOST)
 _SEED = Parameter(1, "", "of the samples", minimum=0)
 _COEFFICIENTS = Parameter((), "", "matrix of correlation")
-_OWN = ("samples", "seed", "correlation", SAMPLE)
+_INDICES = Parameter(False, "", "whether runs for Sobol indices are done, too")
+_OWN = ("samples", "seed", "correlation", "indices", SAMPLE, SWAPPED)
 
 
 def read_uncertain(
     table: Mapping[str, Any], gone: Collection[str], schema: Schema, source: str
-) -> tuple[list[Rule], int | None, dict[str, int]]:
+) -> tuple[list[Rule], dict[str, list], dict[str, Any]]:
     """Check a job file's table [uncertain].
 
     Parameters
     ----------
     table : mapping
-        `samples`, `seed`, `correlation`, and a distribution by parameter.
+        `samples`, `seed`, `correlation`, `indices`, and a distribution by parameter.
     gone : collection of str
         Parameters that overrides have given a value of their own.
     schema : Schema
@@ -43,10 +44,10 @@ def read_uncertain(
     -------
     rules : list of Rule
         The values of each uncertain parameter by the number of the sample; none if overrides left none.
-    samples : int or None
-        Their number, where the table gives it.
+    axes : dict
+        The values on the axes that the table adds to the job.
     fixed : dict
-        The number of the sample, where the table fixes it.
+        The number of the sample, or what is swapped, where the table fixes it.
 
     Raises
     ------
@@ -68,7 +69,10 @@ def read_uncertain(
     correlated, matrix = _read_correlation(table.get("correlation"), found, gone, schema, where)
     # by name, so that the samples of a job do not depend on its layout
     left = tuple(one for key, one in sorted(found.items()) if key not in gone)
-    uncertain = Uncertain(left, seed, correlated, matrix)
+    indices = read_value(_INDICES, table.get("indices", False), f"{where} indices")
+    if indices and correlated:
+        raise mismatch(f"{where} indices", "independent parameters, for Sobol indices", "a correlation")
+    uncertain = Uncertain(left, seed, correlated, matrix, indices)
     rules = []
     for place, one in enumerate(left):
         parameter = replace(schema.parameters[one.key], sensible=None)
@@ -77,11 +81,8 @@ def read_uncertain(
             others = ", ".join(key for key in correlated if key != one.key)
             text += f"; correlated with {others}"
         rules.append(Rule(one.key, Scatter(uncertain, place, text), f"{where} {one.key}", parameter))
-    fixed = (
-        {SAMPLE: read_value(schema.parameters[SAMPLE], table[SAMPLE], f"{where} {SAMPLE}")}
-        if SAMPLE in table
-        else {}
-    )
+    own = {key: parameter for key, parameter in schema.sections[TABLE].items() if key in table}
+    fixed = {key: read_value(one, table[key], f"{where} {key}") for key, one in own.items()}
     samples = read_value(_SAMPLES, table["samples"], f"{where} samples") if "samples" in table else None
     if samples is not None and samples & (samples - 1):
         lower = 2 ** (samples.bit_length() - 1)
@@ -89,7 +90,10 @@ def read_uncertain(
             f"a power of 2, which covers the distributions evenly (the nearest: {lower} and {2 * lower})"
         )
         raise mismatch(f"{where} samples", expected, str(samples))
-    return rules, samples, fixed
+    axes: dict[str, list] = {} if samples is None else {SAMPLE: list(range(samples))}
+    if indices and samples is not None:
+        axes[SWAPPED] = [NONE, ALL, *(one.key for one in left)]
+    return rules, axes, fixed
 
 
 def _read_distribution(key: str, parameter: Parameter, raw: Any, where: str) -> Distribution:
@@ -173,18 +177,20 @@ def check_samples(rules: Collection[Rule], axes: Collection[Axis]) -> None:
         With the first parameter of which a sample is not legal.
     """
     samples = next((axis.values for axis in axes if axis.name == SAMPLE), ())
+    places = [{SAMPLE: sample, SWAPPED: which} for sample in samples for which in (NONE, ALL)]
     for rule in rules:
         if not isinstance(rule.source, Scatter):
             continue
         refused: dict[float, InputError] = {}
+        drawn = places if rule.source.uncertain.indices else places[::2]
         count = 0
-        for sample in samples:
+        for place in drawn:
             try:
-                rule.value({SAMPLE: sample})
+                rule.value(place)
             except InputError as error:
                 count += 1
-                refused[rule.source.value({SAMPLE: sample})] = error
+                refused[rule.source.value(place)] = error
         if refused:
-            share = f"in {100 * count / len(samples):.2g} % of the {len(samples)} samples"
+            share = f"in {100 * count / len(drawn):.2g} % of the {len(drawn)} samples"
             then = "limits `from` and `to` cut a distribution off"
             raise InputError(f"{refused[max(refused, key=abs)]} {share}; {then}")

@@ -136,7 +136,7 @@ def probability_sentences(
     uncertain = (
         f"{in_words(axis)} ({axis.attrs['derived']})"
         for axis in dataset.coords.values()
-        if axis.dims == (SAMPLE,) and "derived" in axis.attrs
+        if SAMPLE in axis.dims and "derived" in axis.attrs
     )
     yield f"Uncertain: {'; '.join(uncertain)}."
     yield (
@@ -155,11 +155,30 @@ def probability_sentences(
     if quiet := len(lines) - len(moving):
         along = f" in {quiet} of {len(lines)} lines along {in_words(told[x])}" if others else ""
         yield f"No sample is known to vibrate{along}."
+    if "total_order" in told:
+        yield from _owed(told)
     slip = told["slip_probability"]
     if (slip > 0.0).any():
         largest = int(np.nanargmax(slip.values))
         at = _place(told, list(map(str, slip.dims)), largest)
         yield f"The belt slips with a probability of up to {_percent(slip.values.flat[largest])} %, at {at}."
+
+
+def _owed(told: xr.Dataset) -> Iterator[str]:
+    """State the Sobol indices in the cell where it is least certain whether it vibrates."""
+    shares = told[PROBABILITY]
+    cell = int(np.nanargmin(np.abs(shares.values - 0.5)))
+    dims = list(map(str, shares.dims))
+    here = told.isel(dict(zip(dims, map(int, np.unravel_index(cell, shares.shape)), strict=True)))
+    orders = (f"total_order{end}" for end in ("", "_low", "_high"))
+    named = zip(here["parameter"].values, *(here[order].values for order in orders), strict=True)
+    known = sorted(((one, *ends) for one, *ends in named if np.isfinite(ends[0])), key=lambda row: -row[1])
+    if known:
+        listed = ", ".join(
+            f"{name} {value:.2f} ({low:.2f} to {high:.2f})" for name, value, low, high in known
+        )
+        where = f"where vibration is least certain, at {_place(told, dims, cell)}"
+        yield f"Total Sobol indices {where}: {listed}."
 
 
 def _how_sure(line: xr.Dataset, x: str, place: str) -> str:

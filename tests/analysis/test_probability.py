@@ -5,12 +5,14 @@ import pytest
 import xarray as xr
 from matplotlib.text import Text
 from scipy.stats import binomtest, norm
+from scipy.stats import sobol_indices as scipy_indices
 
 import cvt_hpc.accessor  # noqa: F401
 from cvt_hpc.analysis.classes import OccurrenceClass
 from cvt_hpc.analysis.maps import map_figure
 from cvt_hpc.analysis.probability import onset_quantiles, probabilities
 from cvt_hpc.analysis.probability_drawing import onset_bands_figure
+from cvt_hpc.analysis.sobol import sobol_indices
 from cvt_hpc.analysis.value_maps import value_map_figure
 from cvt_hpc.errors import InputError
 from cvt_hpc.job import build_job
@@ -105,6 +107,7 @@ def stability(job):
     return study(np.where(growth > 0.0, V, Q).reshape(job.shape), normal_load=job.axes[0].values)
 
 
+@pytest.mark.slow
 def test_the_interval_holds_the_probability_of_the_closed_form():
     further = {"friction_gradient": GRADIENT, "correlation": CORRELATION}
     # damping and weighted gradient, both normal, add to less than nothing
@@ -123,6 +126,55 @@ def test_one_uncertain_parameter_has_a_sample_in_each_part_of_its_distribution()
     found = probabilities(stability(onset_job(1, LOADS, samples=64)))
     true = norm.cdf((SLOPE * LOADS - 5.9) / 0.6)
     assert found["vibration_probability"].values == pytest.approx(true, abs=1 / 64)
+
+
+@pytest.mark.slow
+def test_sobol_indices_are_those_of_the_ishigami_function():
+    size = 8192
+    flat = {"distribution": "uniform", "from": -np.pi, "to": np.pi}
+    keys = ("preload", "initial_displacement", "initial_speed")
+    table = {"samples": size, "seed": 2, "indices": True, **dict.fromkeys(keys, flat)}
+    job = build_job({"name": "x", "model": "oscillator", "uncertain": table})
+    places = [{"sample": k, "swapped": which} for k in range(size) for which in job.axes[1].values]
+    rules = {rule.key: rule for rule in job.rules}
+    x, y, z = np.array([[rules[key].source.value(place) for place in places] for key in sorted(keys)])
+    values = (np.sin(x) + 7.0 * np.sin(y) ** 2 + 0.1 * z**4 * np.sin(x)).reshape(size, 5)
+    axes = {"sample": np.arange(size), "swapped": [*job.axes[1].values]}
+    found = sobol_indices(xr.DataArray(values, axes, ["sample", "swapped"]))
+    assert found["parameter"].values.tolist() == sorted(keys)
+    assert found["first_order"].values == pytest.approx([0.3139, 0.4424, 0.0], abs=0.01)
+    assert found["total_order"].values == pytest.approx([0.5576, 0.4424, 0.2437], abs=0.01)
+    scores = values.T
+    given = {"f_A": scores[:1], "f_B": scores[1:2], "f_AB": scores[2:, None]}
+    other = scipy_indices(func=given, n=size)
+    assert found["first_order"].values == pytest.approx(other.first_order.ravel(), abs=1e-12)
+    assert found["total_order"].values == pytest.approx(other.total_order.ravel(), abs=1e-12)
+    for order in ("first_order", "total_order"):
+        low, high = found[f"{order}_low"], found[f"{order}_high"]
+        assert ((low <= found[order]) & (found[order] <= high)).all()
+        assert (high - low).max() < 0.1
+
+
+def test_probabilities_rest_on_both_sets_of_samples_and_not_on_those_between(tmp_path):
+    # the first set vibrates, and of the second what has its damping; the mass is of no effect
+    classes = np.array([[V] * 8, [V] * 4 + [Q] * 4, [V] * 4 + [Q] * 4, [V] * 8])
+    dataset = xr.concat([study(row[np.newaxis], load=[1.0]) for row in classes], "swapped")
+    dataset = dataset.assign_coords(swapped=["none", "all", "damping", "mass"])
+    found = dataset.cvt.probability()
+    assert found["samples"].item() == 16
+    assert found["vibration_probability"].item() == 12 / 16
+    assert found["total_order"].values[0] == pytest.approx([4 / 8 / 2 / (12 / 16 * 4 / 16), 0.0])
+    # one of eight samples without a verdict is too many
+    unknown = dataset.copy(deep=True)
+    unknown["vibrates"][3, 0, 0] = Vibrates.UNDECIDED
+    assert np.isnan(unknown.cvt.sobol_indices()["total_order"]).all()
+    assert dataset.cvt.sobol_indices("amplitude")["total_order"].shape == (1, 2)
+    with pytest.raises(InputError, match="unknown variable; did you mean amplitude"):
+        dataset.cvt.sobol_indices("amplitud")
+    with pytest.raises(InputError, match="expected results of a job with `indices = true`"):
+        dataset.isel(swapped=0).cvt.sobol_indices()
+    text = write_report(dataset, tmp_path / "report.html").read_text().replace("\u00a0", " ")
+    assert "Total Sobol indices where vibration is least certain, at load 1 N m: damping 1.33 (" in text
 
 
 def test_quantiles_of_the_onset_are_those_of_the_closed_form():

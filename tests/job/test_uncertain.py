@@ -94,6 +94,25 @@ class TestSamples:
         assert jobs[0].fingerprint() == jobs[1].fingerprint()
         assert [jobs[0].point(k) for k in range(8)] == [jobs[1].point(k) for k in range(8)]
 
+    def test_for_sobol_indices_each_parameter_is_swapped_alone(self):
+        table = {"samples": 8, "indices": True, "thrust": NORMAL, "element_mass": LOG_NORMAL}
+        job = toy(table)
+        assert [axis.name for axis in job.axes] == ["load", "sample", "swapped"]
+        assert job.axes[-1].values == ("none", "all", "element_mass", "thrust")
+        found = [
+            [job.complete({"sample": 3, "swapped": which})[key] for key in ("element_mass", "thrust")]
+            for which in job.axes[-1].values
+        ]
+        a, b = found[:2]
+        assert a[0] != b[0] and a[1] != b[1]
+        assert found[2:] == [[b[0], a[1]], [a[0], b[1]]]
+        again = build_job(json.loads(json.dumps(job.resolved())), "again")
+        assert again.fingerprint() == job.fingerprint() and again.point(21) == job.point(21)
+        assert toy(table, "thrust=1e4").axes[-1].values == ("none", "all", "element_mass")
+        assert toy(table, "swapped=all").point(3)["thrust"] == b[1]
+        with pytest.raises(InputError, match=r"indices: expected independent parameters"):
+            toy(correlated([[1.0, 0.5], [0.5, 1.0]]) | {"indices": True})
+
     def test_overrides_take_a_sample_or_a_value(self):
         table = {"samples": 8, "thrust": NORMAL, "element_mass": LOG_NORMAL}
         job = toy(table)
