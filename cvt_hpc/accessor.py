@@ -195,47 +195,27 @@ class Results:
         return onset.rename("onset").assign_attrs(long_name=f"onset of vibration in {along}")
 
     def probability(self) -> xr.Dataset:
-        """Return the probabilities of vibration, slip and failure over the samples of uncertain parameters.
+        """Return probabilities with 95 % intervals, and quantiles, over samples of uncertain parameters.
 
-        Returns
-        -------
-        Dataset
-            Over the other axes `vibration_probability`, `slip_probability`, `failure_probability`, each with
-            the ends `_low` and `_high` of its 95 % interval, quantiles of amplitude and frequency of the
-            samples that vibrate, and how many samples ended and are undecided.
+        See `cvt_hpc.analysis.probability.probabilities`.
         """
         from cvt_hpc.analysis.probability import probabilities
 
         return probabilities(self._dataset)
 
     def onset_quantiles(self, along: str = "load") -> xr.DataArray:
-        """Return the onset that 5, 50 and 95 % of the samples of uncertain parameters do not exceed.
+        """Return the onset [unit of the axis] that 5, 50 and 95 % of the samples do not exceed.
 
-        Returns
-        -------
-        DataArray
-            Over `quantile` and the other axes [unit of the axis]: -inf where vibration is there at the lowest
-            value already, inf where there is none.
+        It is -inf where vibration is there at the lowest value already, inf where there is none.
         """
         from cvt_hpc.analysis.probability import onset_quantiles
 
-        self.probability()  # which refuses results without samples
         return onset_quantiles(self._dataset, along)
 
     def sobol_indices(self, of: str = "vibration") -> xr.Dataset:
-        """Return which uncertain parameter a result owes its variance to; of a job with `indices = true`.
+        """Return to which uncertain parameters the variance of a result is due; a job needs `indices = true`.
 
-        Parameters
-        ----------
-        of : str
-            "vibration", "slip", "failure", or a numeric variable.
-
-        Returns
-        -------
-        Dataset
-            Over `parameter` and the other axes `first_order` and `total_order`, each with the ends `_low` and
-            `_high` of its 95 % bounds by bootstrap; nan where the result does not vary, or is not known of
-            all swapped runs of 90 % of the samples.
+        See `cvt_hpc.analysis.probability.indices_of`.
         """
         from cvt_hpc.analysis.probability import indices_of
 

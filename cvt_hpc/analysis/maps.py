@@ -72,7 +72,7 @@ def map_figure(
         `run`: each run is a mark, there is a panel for each pair of axes, and `at` has to be empty. Results
         that hold `eigenfrequency` but no `amplitude` are drawn as lines over the axis that else runs along x.
         Of a study with the axis `disturbance` the runs from the smallest and the largest value make one cell.
-        Of one with samples of uncertain parameters the probability of vibration is drawn.
+        Of samples of uncertain parameters the probability of vibration is drawn.
     sides : Sides
         Which axis runs along x, along y and over the panels; of a grid.
     vmax : float

@@ -74,10 +74,7 @@ def probabilities(dataset: xr.Dataset, source: str = "results") -> xr.Dataset:
     InputError
         If the results have no samples.
     """
-    check_results(dataset, source)
-    if SAMPLE not in dataset["status"].dims:
-        dims = ", ".join(map(str, dataset["status"].dims)) or "a single run"
-        raise mismatch(source, f"results with the axis {SAMPLE}, of a job with [uncertain]", dims)
+    _check_samples(dataset, source)
     whole, dataset = dataset, independent(dataset)
     classes = map_classes(dataset).compute().drop_attrs(deep=False)
     ended = classes != OccurrenceClass.NOT_RUN
@@ -116,6 +113,13 @@ def probabilities(dataset: xr.Dataset, source: str = "results") -> xr.Dataset:
     widest = float((found[f"{PROBABILITY}_high"] - found[f"{PROBABILITY}_low"]).max())
     counted = f"{cells} cell{'s' * (cells != 1)} of {most} samples; 95 % intervals up to {widest:.2g} wide"
     return found.assign_coords(kept).assign_attrs(counted=counted)
+
+
+def _check_samples(dataset: xr.Dataset, source: str) -> None:
+    check_results(dataset, source)
+    if SAMPLE not in dataset["status"].dims:
+        dims = ", ".join(map(str, dataset["status"].dims)) or "a single run"
+        raise mismatch(source, f"results with the axis {SAMPLE}, of a job with [uncertain]", dims)
 
 
 def independent(dataset: xr.Dataset) -> xr.Dataset:
@@ -172,7 +176,7 @@ def _quantiles(values: xr.DataArray) -> xr.DataArray:
     return xr.DataArray(found, {**coordinates, "quantile": [*QUANTILES]}, ["quantile", *rest])
 
 
-def onset_quantiles(dataset: xr.Dataset, along: str) -> xr.DataArray:
+def onset_quantiles(dataset: xr.Dataset, along: str, source: str = "results") -> xr.DataArray:
     """Return quantiles of the onset of vibration along an axis, over the samples.
 
     Parameters
@@ -181,6 +185,8 @@ def onset_quantiles(dataset: xr.Dataset, along: str) -> xr.DataArray:
         Results with the axis `sample`.
     along : str
         A numeric axis.
+    source : str
+        Where they are from, for the errors.
 
     Returns
     -------
@@ -188,7 +194,17 @@ def onset_quantiles(dataset: xr.Dataset, along: str) -> xr.DataArray:
         Over `quantile` and the other axes [unit of the axis], each known within half a step: midway between a
         quiet and a vibrating neighbour. -inf: vibrates at the lowest value already; inf: at no value. Samples
         of which no run is known to be quiet or to vibrate do not count.
+
+    Raises
+    ------
+    InputError
+        If the results have no samples, or no such axis.
     """
+    _check_samples(dataset, source)
+    axes = [str(dim) for dim in dataset["status"].dims if dim not in (SAMPLE, SWAPPED)]
+    numeric = [name for name in axes if dataset[name].dtype.kind in "iuf"]
+    if along not in numeric:
+        raise mismatch(f"{source}: along", f"one of the axes {', '.join(numeric) or '(none)'}", along)
     classes = map_classes(independent(dataset)).compute().sortby(along).transpose(..., along)
     places = np.asarray(classes[along].values, float)
     lowest = classes.isel({along: 0}, drop=True).astype(float)

@@ -238,6 +238,8 @@ def test_over_one_axis_the_interval_is_a_band_and_onsets_have_one_over_another(t
         onset_bands_figure(two_axes.isel(thrust=0))
     with pytest.raises(InputError, match="expected results with the axis sample"):
         two_axes.isel(sample=0).cvt.probability()
+    with pytest.raises(InputError, match="along: expected one of the axes thrust, load, found sample"):
+        two_axes.cvt.onset_quantiles("sample")
 
 
 def test_the_report_says_how_sure_the_map_is(two_axes, tmp_path):
