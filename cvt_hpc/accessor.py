@@ -194,6 +194,33 @@ class Results:
         onset = boundary.where(boundary["rising"] == 1.0).min("boundary", keep_attrs=True)
         return onset.rename("onset").assign_attrs(long_name=f"onset of vibration in {along}")
 
+    def probability(self) -> xr.Dataset:
+        """Return probabilities with 95 % intervals, and quantiles, over samples of uncertain parameters.
+
+        See `cvt_hpc.analysis.probability.probabilities`.
+        """
+        from cvt_hpc.analysis.probability import probabilities
+
+        return probabilities(self._dataset)
+
+    def onset_quantiles(self, along: str = "load") -> xr.DataArray:
+        """Return the onset [unit of the axis] that 5, 50 and 95 % of the samples do not exceed.
+
+        It is -inf where vibration is there at the lowest value already, inf where there is none.
+        """
+        from cvt_hpc.analysis.probability import onset_quantiles
+
+        return onset_quantiles(self._dataset, along)
+
+    def sobol_indices(self, of: str = "vibration") -> xr.Dataset:
+        """Return to which uncertain parameters the variance of a result is due; a job needs `indices = true`.
+
+        See `cvt_hpc.analysis.probability.indices_of`.
+        """
+        from cvt_hpc.analysis.probability import indices_of
+
+        return indices_of(self._dataset, of)
+
     def boundary(self, along: str = "load") -> xr.DataArray:
         """Return all boundaries between quiet and vibrating along an axis.
 

@@ -119,6 +119,20 @@ KINDS = {
         "where vibration begins and ends along ramps up and down, and the bands between them",
         sides=("y", "panel"),
     ),
+    "onset_bands": Kind(
+        RESULTS,
+        "probability_drawing.onset_bands_figure",
+        "onset of vibration over an axis, with its scatter over the samples of uncertain parameters",
+        (
+            Option(
+                "along",
+                "axis along which vibration sets in (default: the load, or the last one)",
+                "--along",
+                {"metavar": "AXIS"},
+            ),
+        ),
+        sides=("x", "panel"),
+    ),
     "curve": Kind(
         RESULTS,
         "curves.curves_figure",

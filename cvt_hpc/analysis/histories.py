@@ -16,6 +16,7 @@ from cvt_hpc.analysis.conversion import standard
 from cvt_hpc.analysis.figures import LONG, WIDTH, balanced, draw, entitle, headline, styled
 from cvt_hpc.errors import mismatch
 from cvt_hpc.job.schema import load_schema
+from cvt_hpc.job.uncertain import TABLE, with_samples
 from cvt_hpc.job.values import JOB_UNITS, POINT_UNITS, shown
 from cvt_hpc.variables import Status, Vibrates, flag_in_words, shortened
 from cvt_hpc.vibration import settings as vibration_settings
@@ -217,6 +218,7 @@ def values_of(attributes: Mapping[str, Any]) -> dict[str, str]:
     job, point = json.loads(attributes["job"]), json.loads(attributes["point"])
     try:
         schema = load_schema(job["model"], job["stepper"], "history")
+        schema = with_samples(schema, job[TABLE]) if TABLE in job else schema
         tables = {key: value for section in schema.sections for key, value in job.get(section, {}).items()}
         # numerics that depart from the job, such as the step, are those that the program has chosen
         chosen = {*job["axes"], *schema.sections.get("numerics", {})}

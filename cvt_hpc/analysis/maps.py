@@ -34,6 +34,8 @@ from cvt_hpc.analysis.classes import (
 from cvt_hpc.analysis.conversion import standard
 from cvt_hpc.analysis.eigenfrequencies import eigenfrequency_figure
 from cvt_hpc.analysis.hysteresis_bands import ALONG, draw_onsets
+from cvt_hpc.analysis.probability import PROBABILITY, has_samples
+from cvt_hpc.analysis.probability_drawing import probability_figure
 from cvt_hpc.analysis.scatter import is_sampled, scatter_figure
 from cvt_hpc.errors import mismatch
 from cvt_hpc.variables import Vibrates, shortened
@@ -70,6 +72,7 @@ def map_figure(
         `run`: each run is a mark, there is a panel for each pair of axes, and `at` has to be empty. Results
         that hold `eigenfrequency` but no `amplitude` are drawn as lines over the axis that else runs along x.
         Of a study with the axis `disturbance` the runs from the smallest and the largest value make one cell.
+        Of samples of uncertain parameters the probability of vibration is drawn.
     sides : Sides
         Which axis runs along x, along y and over the panels; of a grid.
     vmax : float
@@ -84,6 +87,8 @@ def map_figure(
                 f"{source}: x, y, panel", "results over a grid", "samples, in a panel for each pair"
             )
         return scatter_figure(dataset, at or {}, source, vmax)
+    if has_samples(dataset, at or {}) or PROBABILITY in dataset:
+        return probability_figure(dataset, at, source, sides)
     if "eigenfrequency" in dataset and "amplitude" not in dataset:
         return eigenfrequency_figure(dataset, at or {}, source, sides)
     if has_starts(dataset, at or {}):

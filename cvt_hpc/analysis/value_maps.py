@@ -1,5 +1,6 @@
 """Maps of quantities over a study's grid, such as efficiency and thrust over ratio and torque ratio."""
 
+import warnings
 from collections.abc import Sequence
 from textwrap import fill
 from typing import Any, NamedTuple
@@ -9,13 +10,16 @@ import xarray as xr
 from matplotlib.axes import Axes
 from matplotlib.colors import Normalize
 from matplotlib.figure import Figure
+from matplotlib.lines import Line2D
 from matplotlib.patches import Patch, PathPatch
+from matplotlib.patheffects import Normal, withStroke
 from numpy.typing import NDArray
 
 from cvt_hpc.analysis import arrangement as layout
 from cvt_hpc.analysis import cells, figures
 from cvt_hpc.analysis.classes import WITHOUT_RESULT, check_results, count_classes, occurrence_classes
 from cvt_hpc.analysis.curves import check_quantities
+from cvt_hpc.analysis.probability import ISOLINES, over_samples
 from cvt_hpc.analysis.scatter import is_sampled
 from cvt_hpc.errors import mismatch, one_line
 from cvt_hpc.vibration.classes import OccurrenceClass
@@ -28,6 +32,7 @@ BESIDE, LETTERS = 3, 14.0  # panels side by side at most; letters of a title to 
 ROW, FRAME = 0.25, 0.9  # [inch], of a row of cells, and of title and labels
 HIGHEST, LEAST = 3.6, 0.8  # [inch], of a panel's cells
 AROUND = 1.5  # [inch]: labels beside a panel's cells
+ISOLINE_INK = "#b3003b"  # over the colours of a map, light and dark
 NEGATIVE, INK = "---", "#5a5a5a"  # lines over cells below zero that hold no numbers
 HATCH = cells.STYLES[OccurrenceClass.SLIPPING].hatch
 EQUAL = 1e-6  # of a quantity: what differs less is the same
@@ -46,7 +51,9 @@ class Panel(NamedTuple):
     values, kinds : (row, column) array
         In the unit, and how the runs ended.
     alike : array
-        Values of all panels that share the scale of colours, in the unit.
+        Values of all panels that share the scale of colours, in the unit; or the range that it is to have.
+    isolines : tuple of float
+        Values of lines, in the unit.
     """
 
     title: str
@@ -55,6 +62,7 @@ class Panel(NamedTuple):
     values: NDArray[np.float64]
     kinds: NDArray[np.int8]
     alike: NDArray[np.float64]
+    isolines: tuple[float, ...] = ()
 
 
 @figures.styled
@@ -73,7 +81,7 @@ def value_map_figure(
     dataset, at, source
         As of all pictures of results (`figures.py`). x, y and the axis of panels are those of `map_figure`;
         where there would be more than MOST_PANELS panels and nobody chose it, that axis is fixed at its first
-        value.
+        value. Results with samples of uncertain parameters are drawn as their `probabilities`.
     quantities : sequence of str
         Numeric variables of the results.
     sides : Sides
@@ -90,6 +98,7 @@ def value_map_figure(
     check_results(dataset, source)
     if is_sampled(dataset):
         raise mismatch(source, "results over a grid", "samples")
+    dataset = over_samples(dataset, at or {})
     check_quantities(dataset, quantities, source, of_one_unit=False)
     if vmax is not None and len(quantities) > 1:
         raise mismatch(f"{source}: vmax", "one quantity", ", ".join(quantities))
@@ -118,7 +127,8 @@ def value_map_figure(
         axes.set_xlabel(x.label)
     job = one_line(dataset.attrs.get("job_name", ""))
     kinds = occurrence_classes(shown)
-    lines = [f"{job}: {_counted(kinds)}".removeprefix(": "), ", ".join(arrangement.notes)]
+    counted = dataset.attrs.get("counted") or _counted(kinds)
+    lines = [f"{job}: {counted}".removeprefix(": "), ", ".join(arrangement.notes)]
     figures.entitle(figure, lines, int(72 * size[0] / figures.WIDTH))
     marked: dict[cells.CellClass, cells.ClassStyle] = {
         kind: cells.STYLES[kind] for kind in OTHERS if (kinds == kind).any()
@@ -128,8 +138,18 @@ def value_map_figure(
         for axes in all_axes.flat
         if any(patch.get_hatch() == NEGATIVE for patch in axes.patches)
     ][:1]
-    if marked or negative:
-        cells.class_legend(figure, marked, len(marked) + len(negative), further=negative)
+    isolines = sorted({panel.isolines for panel in panels if min(panel.values.shape) > 1} - {()})
+    lines_of = [
+        Line2D([], [], color=ISOLINE_INK, ls=style, lw=1.6, label=label)
+        for values in isolines[:1]
+        for style, label in (
+            ("-", f"{values[len(values) // 2]:g}"),
+            ("--", f"{values[0]:g} and {values[-1]:g}"),
+        )
+    ]
+    further = negative + lines_of
+    if marked or further:
+        cells.class_legend(figure, marked, len(marked) + len(further), further=further)
     return figure
 
 
@@ -170,12 +190,15 @@ def _panels(arrangement: layout.Arrangement, quantities: Sequence[str]) -> list[
     """Panels of all quantities, by the axis of panels and by labels of further dimensions."""
     dataset = arrangement.dataset
     kinds, found = occurrence_classes(dataset), []
+    # between texts there is nothing that a line could cross
+    are_numbers = all(dataset[name].dtype.kind in "iuf" for name in (arrangement.x, arrangement.y) if name)
     for name in quantities:
         array = dataset[name]
         factor, unit = figures.value_unit(array)
         over = [arrangement.panel] if arrangement.panel else []
         labelled = [str(dim) for dim in array.dims if dim not in (arrangement.x, arrangement.y, *over)]
-        alike = factor * array.values
+        alike = factor * np.asarray(array.attrs.get("valid_range", array.values))
+        isolines = tuple(factor * np.asarray(array.attrs.get(ISOLINES, ()) if are_numbers else (), float))
         for labels in layout.places(array, labelled):
             told = [str(array[dim].values[k]) for dim, k in labels.items()]
             for at in layout.places(dataset, over):
@@ -191,6 +214,7 @@ def _panels(arrangement: layout.Arrangement, quantities: Sequence[str]) -> list[
                         factor * _of_grid(array.isel(labels | at), arrangement),
                         _of_grid(kinds.isel(at), arrangement).astype(np.int8),
                         alike,
+                        isolines,
                     )
                 )
     return found
@@ -224,16 +248,31 @@ def _draw_panel(
             place, value = (x.centres[column], y.centres[row]), values[row, column]
             fill_colour = np.asarray(scale.colours(scale.norm(value)))
             digits = ".0f" if 1e3 <= abs(value) < 1e5 else ".3g" if abs(value) >= 0.1 else ".2g"
-            is_dotted = kinds[row, column] == OccurrenceClass.SLIPPING
-            cells.write_value(axes, place, f"{value:{digits}}", fill_colour, size=7.5, outlined=is_dotted)
+            is_lined = kinds[row, column] == OccurrenceClass.SLIPPING or bool(panel.isolines)
+            digits = ".2g" if panel.isolines else digits
+            cells.write_value(axes, place, f"{value:{digits}}", fill_colour, size=7.5, outlined=is_lined)
     elif both:  # in grey the colours of both signs are alike
         _hatch(axes, x, y, is_known & (values < 0.0), NEGATIVE, INK)
     cells.draw_marks(axes, x, y, kinds, np.isin(kinds, OTHERS) & ~is_known, 3.5)
     _hatch(axes, x, y, is_known & (kinds == OccurrenceClass.SLIPPING), HATCH, "#ffffff")
+    if panel.isolines and min(values.shape) > 1:
+        _draw_isolines(axes, x, y, np.where(is_known, values, np.nan), panel.isolines)
     x.lay_out(axes.xaxis)
     y.lay_out(axes.yaxis)
     if is_known.any():
         cells.colour_bar(figure, scale, values, ax=axes, pad=0.02)
+
+
+def _draw_isolines(
+    axes: Axes, x: layout.Ruler, y: layout.Ruler, values: NDArray[np.float64], isolines: Sequence[float]
+) -> None:
+    """Draw lines of equal values between the grid points, dashed but for the middle one."""
+    styles = ["--" if value != isolines[len(isolines) // 2] else "-" for value in isolines]
+    look: dict[str, Any] = {"colors": ISOLINE_INK, "linewidths": 1.6, "linestyles": styles, "zorder": 2.4}
+    with warnings.catch_warnings():
+        warnings.filterwarnings("ignore", "No contour levels")
+        lines = axes.contour(x.centres, y.centres, values, isolines, **look)
+    lines.set_path_effects([withStroke(linewidth=3.0, foreground="white"), Normal()])
 
 
 def _hatch(

@@ -15,6 +15,7 @@ import xarray as xr
 
 from cvt_hpc.experiments.outcome import Tell
 from cvt_hpc.job import Job, known_keys, rebuild_job
+from cvt_hpc.job.axes import SAMPLE, SWAPPED
 from cvt_hpc.job.definition import handed_to
 from cvt_hpc.job.summary import core_time_in_words
 from cvt_hpc.linear_algebra import one_thread
@@ -54,7 +55,7 @@ def handed(job: Job, model: str, table: Mapping[str, Any]) -> Job:
     InputError
         If the model cannot take them.
     """
-    known = known_keys(model)
+    known = {*known_keys(model), SAMPLE, SWAPPED}
     fewer = replace(job, axes=tuple(axis for axis in job.axes if axis.name in known))
     document = handed_to(fewer, model, "a model of its ladder")
     if table:

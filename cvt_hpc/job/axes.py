@@ -13,6 +13,9 @@ from cvt_hpc.job.values import as_list, kind_of, read_value
 from cvt_hpc.parameters import Parameter
 
 LARGEST_AXIS = 100_000
+SAMPLE = "sample"  # axis along which uncertain parameters take their values
+SWAPPED = "swapped"  # axis of those that take them from a second set of samples, for Sobol indices
+NONE, ALL = "none", "all"  # on it, beside the names of uncertain parameters
 _RANGE_KEYS = ("from", "to", "count", "step", "spacing")
 _SPACINGS = ("linear", "log")
 _STEP_TOLERANCE = Decimal("1e-9")

@@ -6,9 +6,10 @@ from collections.abc import Iterable, Mapping, Sequence
 from typing import Any
 
 from cvt_hpc.errors import InputError, mismatch
-from cvt_hpc.job.axes import Axis, thinned
+from cvt_hpc.job.axes import NONE, SAMPLE, SWAPPED, Axis, thinned
 from cvt_hpc.job.rules import Rule, follow, needed_rules, places, varied_by
 from cvt_hpc.job.schema import Schema
+from cvt_hpc.job.uncertain import Scatter
 
 MOST_CHECKED_POINTS, MOST_CHECKED_VALUES = 20_000, 5_000  # of runs, and of parameters that follow from others
 
@@ -25,8 +26,8 @@ def check_grid(
 ) -> dict[str, str]:
     """Check the base scene and every run, and that axes are of effect; of a huge study, some runs.
 
-    Of a grid these are the extremes of its axes; of samples those with an extreme value, and others from all
-    over them.
+    Of a grid these are the extremes of its axes, and of its uncertain parameters; of samples those with an
+    extreme value, and others from all over them.
 
     Parameters
     ----------
@@ -57,8 +58,9 @@ def check_grid(
     """
     check_point(schema, parameters, source)
     sizes = {axis.name: len(axis.values) for axis in axes}
-    idle = dict.fromkeys([*given, *(name for name, size in sizes.items() if size > 1)], "")
-    for values in _samples_to_check(axes) if sampled else _points_to_check(axes):
+    scattered = [rule.key for rule in rules if isinstance(rule.source, Scatter)]
+    idle = dict.fromkeys([*given, *scattered, *(name for name, size in sizes.items() if size > 1)], "")
+    for values in _samples_to_check(axes) if sampled else _points_to_check(axes, rules):
         varied = dict(zip(sizes, values, strict=True))
         point = follow(rules, {**parameters, **varied})
         check_point(schema, point, source, varied)
@@ -67,6 +69,9 @@ def check_grid(
     for name in filter(idle.__contains__, sizes):
         expected = f"one value, since it has no effect with {idle[name]}"
         raise mismatch(f"{source}: [axes] {name}", expected, f"{sizes[name]} values")
+    for name in filter(idle.__contains__, scattered):
+        expected = f"a parameter of effect, which it has not with {idle[name]}"
+        raise mismatch(f"{source}: [uncertain] {name}", expected, "a distribution")
     return idle
 
 
@@ -179,10 +184,23 @@ def _inert(schema: Schema, rules: Sequence[Rule], point: dict[str, Any]) -> dict
     return inert
 
 
-def _points_to_check(axes: tuple[Axis, ...]) -> Iterable[tuple]:
+def _points_to_check(axes: tuple[Axis, ...], rules: Sequence[Rule]) -> Iterable[tuple]:
     size = math.prod(len(axis.values) for axis in axes)
-    thin = size > MOST_CHECKED_POINTS
-    return itertools.product(*(_extremes(axis.values) if thin else axis.values for axis in axes))
+    if size <= MOST_CHECKED_POINTS:
+        return itertools.product(*(axis.values for axis in axes))
+    return itertools.product(
+        *(_extreme_samples(axis, rules) if axis.name == SAMPLE else _extremes(axis.values) for axis in axes)
+    )
+
+
+def _extreme_samples(axis: Axis, rules: Sequence[Rule]) -> tuple:
+    """Return the samples in which an uncertain parameter has its least or its largest value."""
+    found = set()
+    for rule in rules:
+        if isinstance(rule.source, Scatter):
+            values = [rule.value({SAMPLE: sample, SWAPPED: NONE}) for sample in axis.values]
+            found |= {axis.values[values.index(end)] for end in (min(values), max(values))}
+    return tuple(sorted(found))
 
 
 def _samples_to_check(axes: tuple[Axis, ...]) -> Iterable[tuple]:

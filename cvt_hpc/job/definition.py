@@ -13,12 +13,13 @@ from typing import Any, Self
 
 from cvt_hpc.errors import mismatch
 from cvt_hpc.job.assignments import Assignments, read_assignments, split_assignments
-from cvt_hpc.job.axes import Axis, thinned
+from cvt_hpc.job.axes import SAMPLE, SWAPPED, Axis, thinned
 from cvt_hpc.job.crosscheck import check_point, complete_point
 from cvt_hpc.job.design import Design
 from cvt_hpc.job.formula import Formula
 from cvt_hpc.job.rules import Link, Rule, follow, needed_rules, ordered_rules, overridden, places, varied_by
 from cvt_hpc.job.schema import Schema, load_schema
+from cvt_hpc.job.uncertain import TABLE, Scatter, with_samples
 from cvt_hpc.job.units import unit_in
 from cvt_hpc.models.contract import load_model
 
@@ -125,8 +126,10 @@ class Job:
 
     @property
     def schema(self) -> Schema:
-        """Declarations of the model and the stepper."""
-        return replace(load_schema(self.model, self.stepper, self.source), units=self.units)
+        """Declarations of the model and the stepper, and of the axes of uncertain parameters."""
+        schema = replace(load_schema(self.model, self.stepper, self.source), units=self.units)
+        table = self._stated_rules().get(TABLE)
+        return with_samples(schema, table) if table else schema
 
     @cached_property
     def derived(self) -> tuple[Derived, ...]:
@@ -241,11 +244,11 @@ class Job:
             As a job file is laid out, in JSON types; SI units, and the text "inf" for infinity.
         """
         elsewhere = {axis.name for axis in self.axes} | {rule.key for rule in self.rules}
+        tables, stated = self.tables(self.parameters, elsewhere), self._stated_rules()
         return {
             **{key: getattr(self, key) for key in HEADER},
-            **self.tables(self.parameters, elsewhere),
+            **{key: {**tables.get(key, {}), **stated.get(key, {})} for key in (tables | stated)},
             **({"design": self.design} if self.design else {}),
-            **self._stated_rules(),
             "axes": {axis.name: [_to_json(value) for value in axis.values] for axis in self.axes},
         }
 
@@ -257,13 +260,16 @@ class Job:
         }
 
     def _stated_rules(self) -> dict[str, Any]:
-        """Return the tables [derived] and [linked], where there are any, in JSON types."""
+        """Return the tables [derived], [linked] and [uncertain], where there are any, in JSON types."""
         derived = {rule.key: rule.words for rule in self.rules if isinstance(rule.source, Formula)}
         linked: dict[str, dict[str, Any]] = {}
         for rule in self.rules:
             if isinstance(link := rule.source, Link):
                 linked.setdefault(link.axis, {})[rule.key] = [_to_json(value) for value in link.values]
-        return {name: table for name, table in (("derived", derived), ("linked", linked)) if table}
+        scatters = (rule.source for rule in self.rules if isinstance(rule.source, Scatter))
+        uncertain = next((scatter.uncertain.document() for scatter in scatters), {})
+        tables = {"derived": derived, "linked": linked, TABLE: uncertain}
+        return {name: table for name, table in tables.items() if table}
 
     def fingerprint(self) -> str:
         """Return the SHA-256 [hex] of entries that determine numbers; name and description do not count."""
@@ -318,15 +324,17 @@ def handed_to(job: Job, model: str, why: str) -> dict[str, Any]:
     Raises
     ------
     InputError
-        If the other model does not know an axis. A formula may still name keys that it does not know.
+        If the other model does not know an axis or an uncertain parameter. A formula may still name keys that
+        it does not know.
     """
     document, known = job.resolved(), load_schema(model, None, job.source).section_of
-    for axis in job.axes:
-        if axis.name not in known:
-            where = f"{job.source}: [axes] {axis.name}"
+    varied = [("axes", axis.name) for axis in job.axes if axis.name not in (SAMPLE, SWAPPED)]
+    for table, name in varied + [(TABLE, rule.key) for rule in job.rules if isinstance(rule.source, Scatter)]:
+        if name not in known:
+            where = f"{job.source}: [{table}] {name}"
             raise mismatch(where, f"a key of {model}, since {why}", "one without effect there")
     tables: dict[str, dict[str, Any]] = {}
-    for section in job.schema.sections:
+    for section in filter(TABLE.__ne__, job.schema.sections):
         for key, value in document[section].items():
             if key in job.given and key in known:
                 tables.setdefault(known[key], {})[key] = value  # it may belong in another table there
@@ -337,7 +345,7 @@ def handed_to(job: Job, model: str, why: str) -> dict[str, Any]:
     }
     text = f"{job.description}{'; ' if job.description else ''}{model}: {why}"
     head = {"name": job.name, "model": model, "description": text}
-    rest = {key: document[key] for key in ("axes", "design") if key in document}
+    rest = {key: document[key] for key in ("axes", "design", TABLE) if key in document}
     tables |= {"derived": derived, "linked": {axis: table for axis, table in linked.items() if table}}
     tables = {name: table for name, table in tables.items() if table}
     return head | tables | rest

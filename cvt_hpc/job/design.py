@@ -12,7 +12,15 @@ from typing import Any
 import numpy as np
 
 from cvt_hpc.errors import mismatch, show, unknown
-from cvt_hpc.job.axes import LARGEST_AXIS, Axis, read_bounds, read_spacing, read_values, without_rounding
+from cvt_hpc.job.axes import (
+    LARGEST_AXIS,
+    SAMPLE,
+    Axis,
+    read_bounds,
+    read_spacing,
+    read_values,
+    without_rounding,
+)
 from cvt_hpc.job.schema import Schema
 from cvt_hpc.job.values import kind_of, read_value
 from cvt_hpc.parameters import Parameter
@@ -90,7 +98,7 @@ def resolve_spacing(design: Design, axes: tuple[Axis, ...], source: str) -> Desi
     """Return the design of a trace with its first spacing on each axis along which it traces.
 
     A table names these axes. A number stands for all numeric axes of more than twice as many values: shorter
-    ones, on which neighbours are far apart, are run in full.
+    ones, on which neighbours are far apart, are run in full. Of samples each one has a trace of its own.
 
     Raises
     ------
@@ -99,7 +107,7 @@ def resolve_spacing(design: Design, axes: tuple[Axis, ...], source: str) -> Desi
         long enough.
     """
     where = f"{source}: [design] first_spacing"
-    found = design["first_spacing"]
+    found, axes = design["first_spacing"], tuple(axis for axis in axes if axis.name != SAMPLE)
     if isinstance(found, Mapping):
         spacings = {name: read_value(_SPACING, raw, f"{where}.{name}") for name, raw in found.items()}
     else:

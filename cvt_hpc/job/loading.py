@@ -10,7 +10,7 @@ from cvt_hpc.errors import InputError, did_you_mean, mismatch, show
 from cvt_hpc.experiment_kinds import with_table
 from cvt_hpc.job import assignments
 from cvt_hpc.job.assignments import Assignments, AxisEntry, plain
-from cvt_hpc.job.axes import Axis, read_axis
+from cvt_hpc.job.axes import SAMPLE, Axis, read_axis
 from cvt_hpc.job.crosscheck import check_grid, check_rules
 from cvt_hpc.job.csv_files import read_csv
 from cvt_hpc.job.definition import HEADER, Job, answering_model, handed_to
@@ -29,6 +29,8 @@ from cvt_hpc.job.rules import (
 )
 from cvt_hpc.job.schema import Schema, load_schema
 from cvt_hpc.job.summary import tell_of_no_effect, warn_of_notices
+from cvt_hpc.job.uncertain import TABLE, with_samples
+from cvt_hpc.job.uncertain_table import check_samples, read_uncertain
 from cvt_hpc.job.units import unit_in
 from cvt_hpc.job.values import expectation, kind_of, read_value, warn_of_bare_numbers
 from cvt_hpc.models.contract import load_model
@@ -148,6 +150,9 @@ def rebuild_job(
     schema = replace(schema, units=units)
     tables = _read_tables(document, schema, source)
     changed = assignments.take_own(pairs, "design")
+    uncertain = {**document.get(TABLE, {}), **assignments.take_own(pairs, TABLE)}
+    is_uncertain = TABLE in document or bool(uncertain)
+    schema = with_samples(schema, uncertain) if is_uncertain else schema
     others = {key: value for key, value in pairs.items() if key not in HEADER}
     put_axes, others = assignments.split_axes(others, schema, source, label)
     replaced = assignments.read_assignments(others, schema, source, label)
@@ -155,10 +160,20 @@ def rebuild_job(
     put = {*replaced, *put_axes}
     put |= {given for key in replaced if (file := schema.parameters[key].file) for given in file.gives}
     gone = {*put, *overridden(put, schema)}
+    scatters: list[Rule] = []
+    if is_uncertain:
+        scatters, further, fixed = read_uncertain(uncertain, gone, schema, source)
+        if not scatters:  # the job of the values that overrides give
+            certain = {name: table for name, table in document.items() if name != TABLE}
+            certain |= {"design": {**document.get("design", {}), **changed}}
+            return rebuild_job(certain, source, None if is_users else units, pairs, label)
+        tables |= fixed
+        document = _with_samples(document, further, {*fixed, *gone}, design, source)
     given = {key: value for key, value in tables.items() if key not in gone} | replaced
     files = {key: name for key, name in given.items() if name and schema.parameters[key].file}
     given = _with_files(given, schema, source)
-    axes, rules = _read_axes_and_rules(document, design, gone, put_axes, given, schema, source)
+    axes, rules = _read_axes_and_rules(document, scatters, design, gone, put_axes, given, schema, source)
+    check_samples(rules, axes)
     for key, entry in written.items():
         warn_of_bare_numbers(schema.parameters[key], *entry)
     if "first_spacing" in design:
@@ -201,7 +216,7 @@ def _written(
     If there are several, the one that takes precedence. Nothing is checked.
     """
     links = [(f"[linked.{axis}]", table) for axis, table in document.get("linked", {}).items()]
-    tables = [(f"[{name}]", document.get(name, {})) for name in schema.sections]
+    tables = [(f"[{name}]", document.get(name, {})) for name in (*schema.sections, TABLE)]
     found = {}
     for place, table in [*tables, *links, ("[axes]", document.get("axes", {})), (label, pairs)]:
         for name, raw in schema.flatten(table) if isinstance(table, Mapping) else ():
@@ -227,8 +242,28 @@ def _with_files(given: Mapping[str, Any], schema: Schema, source: str) -> dict[s
     return found
 
 
+def _with_samples(
+    document: Mapping[str, Any],
+    further: Mapping[str, list],
+    given: Collection[str],
+    design: Design,
+    source: str,
+) -> dict[str, Any]:
+    """Return a document with the axes of the samples, the last ones, unless they are given otherwise."""
+    where, axes = f"{source}: [{TABLE}]", document.get("axes", {})
+    if "runs" in design:
+        expected = "a grid or a trace, each cell of which has its samples"
+        raise mismatch(where, expected, f"a design of kind {show(design['kind'])}")
+    if SAMPLE not in {*further, *axes, *given}:
+        raise mismatch(f"{where} samples", "the number of samples", "nothing")
+    if twice := [name for name in further if name in axes]:
+        raise mismatch(f"{where} samples", f"either samples or an axis {twice[0]}", "both")
+    return {**document, "axes": {**axes, **further}}
+
+
 def _read_axes_and_rules(
     document: Mapping[str, Any],
+    scatters: Sequence[Rule],
     design: Design,
     gone: Collection[str],
     put: Mapping[str, AxisEntry],
@@ -236,7 +271,7 @@ def _read_axes_and_rules(
     schema: Schema,
     source: str,
 ) -> tuple[tuple[Axis, ...], list[Rule]]:
-    """Return the axes and the rules in their order.
+    """Return the axes and the rules in their order, `scatters` among them.
 
     Those that overrides have put out of force are `gone`, and the axes that overrides `put` are in their
     place, or come last.
@@ -248,6 +283,7 @@ def _read_axes_and_rules(
     axes = sampled_axes(kept, design, source) if sampled else _read_grid(kept)
     # a link has a value for each of the file's axis, and keeps the values that are left of it
     stated = _read_rules(document, () if sampled else _read_grid(of_file), design, schema, source)
+    stated += scatters
     stated = relinked([rule for rule in stated if rule.key not in gone], axes)
     return axes, ordered_rules(stated, {*given, *(axis.name for axis in axes)}, schema, source)
 
@@ -287,7 +323,7 @@ def _read_description(head: Mapping[str, Any], source: str) -> str:
 
 
 def _check_top_level(document: Mapping[str, Any], schema: Schema, source: str) -> None:
-    tables = [*_sections(document, schema), "axes", "design", "derived", "linked"]
+    tables = [*_sections(document, schema), "axes", "design", "derived", "linked", TABLE]
     for key, value in document.items():
         if key in HEADER:
             continue

@@ -1,9 +1,9 @@
 """Rules by which the value of one parameter follows from others, point by point.
 
-The tables [derived] and [linked.AXIS] of a job and substitutes give the rules. [derived] has formulas,
-[linked.AXIS] the parameters that follow an axis value by value. Substitutes are the model's: `belt_length`
-gives `driven_radius`, and `step_error` gives `step` where the job gives neither. Each rule comes after the
-rules that give its sources.
+The tables [derived], [linked.AXIS] and [uncertain] of a job and substitutes give the rules. [derived] has
+formulas, [linked.AXIS] the parameters that follow an axis value by value, [uncertain] those that follow the
+number of a sample. Substitutes are the model's: `belt_length` gives `driven_radius`, and `step_error` gives
+`step` where the job gives neither. Each rule comes after the rules that give its sources.
 """
 
 from collections.abc import Callable, Collection, Iterable, Iterator, Mapping
@@ -16,6 +16,7 @@ from cvt_hpc.errors import few_of, mismatch, show, unknown
 from cvt_hpc.job.axes import Axis, read_values
 from cvt_hpc.job.formula import Formula, read_formula
 from cvt_hpc.job.schema import Schema
+from cvt_hpc.job.uncertain import Scatter
 from cvt_hpc.job.values import in_words, kind_of, read_value
 from cvt_hpc.parameters import Parameter, Substitute
 
@@ -79,8 +80,8 @@ class Rule:
     ----------
     key : str
         The parameter.
-    source : Formula, Link or Substituted
-        The formula, function or list that gives its value.
+    source : Formula, Link, Scatter or Substituted
+        The formula, list, distribution or function that gives its value.
     where : str
         File and key, for errors.
     parameter : Parameter
@@ -88,7 +89,7 @@ class Rule:
     """
 
     key: str
-    source: Formula | Link | Substituted
+    source: Formula | Link | Scatter | Substituted
     where: str = field(compare=False)
     parameter: Parameter = field(compare=False, repr=False)
 
@@ -127,7 +128,7 @@ class Rule:
         try:
             return self.source.value(parameters)
         except ValueError as error:
-            if isinstance(self.source, Formula):
+            if not isinstance(self.source, (Link, Substituted)):
                 raise mismatch(self.where, "a finite value", f"{show(self.words)} ({error})") from None
             blamed, unit, wanted = self.source.names[0], self.source.unit, self.source.wanted
             raise mismatch(self.where, str(error), in_words(parameters[blamed], unit, wanted)) from None

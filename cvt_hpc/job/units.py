@@ -102,7 +102,7 @@ def is_unit(text: str) -> bool:
 
 
 def unit_in(raw: Any) -> str:
-    """Return the unit that a value of a job file is written with, of a list or a range the first one.
+    """Return the unit that a value of a job is written with, of a list, range or distribution the first one.
 
     Returns
     -------
@@ -113,7 +113,7 @@ def unit_in(raw: Any) -> str:
         match = _QUANTITY.fullmatch(raw)
         return match["unit"] if match else ""
     if isinstance(raw, Mapping):
-        raw = [raw.get(key) for key in ("from", "to", "step")]
+        raw = [raw.get(key) for key in ("from", "to", "step", "mode", "mean")]
     return next(filter(None, map(unit_in, raw)), "") if isinstance(raw, (list, tuple)) else ""
 
 

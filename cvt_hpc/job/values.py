@@ -265,9 +265,9 @@ def warn_of_bare_numbers(parameter: Parameter, raw: Any, where: str) -> None:
 
 
 def _items(raw: Any) -> Iterator[Any]:
-    """Yield the values of a list, an array or a range, at any depth."""
+    """Yield the values of a list, an array, a range or a distribution, at any depth."""
     if isinstance(raw, Mapping):
-        raw = [raw.get("from"), raw.get("to")]
+        raw = [raw.get(key) for key in ("from", "to", "mode", "mean")]
     if isinstance(raw, np.ndarray):
         raw = raw.tolist()
     if isinstance(raw, (list, tuple)):

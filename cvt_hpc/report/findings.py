@@ -15,7 +15,9 @@ from numpy.typing import NDArray
 from cvt_hpc.analysis.arrangement import infinity_in_words, value_text
 from cvt_hpc.analysis.classes import at_strongest_strand, count_classes, map_classes, occurrence_classes
 from cvt_hpc.analysis.figures import coordinate_unit, in_words, number, value_unit
+from cvt_hpc.analysis.probability import CONTOURS, PROBABILITY, QUANTILES
 from cvt_hpc.analysis.scatter import is_sampled
+from cvt_hpc.job.axes import SAMPLE
 from cvt_hpc.variables import Status
 from cvt_hpc.vibration.classes import DECIDED, OccurrenceClass, levels, onsets
 
@@ -114,6 +116,98 @@ def window_sentences(dataset: xr.Dataset, x: str, others: Sequence[str]) -> Iter
     if open_ones := len(rest) - quiet:
         start = f"In {open_ones} {along} no" if along else "No"
         yield f"{start} run is known to vibrate, but not all are known to be quiet."
+
+
+def probability_sentences(
+    dataset: xr.Dataset, told: xr.Dataset, x: str, others: Sequence[str]
+) -> Iterator[str]:
+    """Yield how sure the vibration of a study with uncertain parameters is, line by line along x.
+
+    Parameters
+    ----------
+    dataset, told : Dataset
+        The results, and their `probabilities`.
+    x : str
+        Axis along which lines run.
+    others : sequence of str
+        All other axes but that of the samples.
+    """
+    yield f"{told.attrs['counted']}.".replace(";", ", with", 1)
+    uncertain = (
+        f"{in_words(axis)} ({axis.attrs['derived']})"
+        for axis in dataset.coords.values()
+        if SAMPLE in axis.dims and "derived" in axis.attrs
+    )
+    yield f"Uncertain: {'; '.join(uncertain)}."
+    yield (
+        "The intervals are those of independent samples. Sobol points cover the distributions more evenly, "
+        "so that the intervals are rather too wide, which is not certain. All cells have the same samples: "
+        "their errors are alike. Runs without a verdict count on neither side, and widen the intervals."
+    )
+    told = told.sortby([name for name in (x, *others) if _is_number(told[name])])
+    stacked = told.stack(line=others) if others else told.expand_dims("line")
+    lines = [stacked.isel(line=k) for k in range(stacked.sizes["line"])]
+    moving = [k for k, line in enumerate(lines) if (line[PROBABILITY] > 0.0).any()]
+    for k in moving[:MOST_LINES]:
+        yield _how_sure(lines[k], x, _place(told, others, k))
+    if (more := len(moving) - MOST_LINES) > 0:
+        yield f"In {counted(more, 'more line')} along {in_words(told[x])} samples vibrate."
+    if quiet := len(lines) - len(moving):
+        along = f" in {quiet} of {len(lines)} lines along {in_words(told[x])}" if others else ""
+        yield f"No sample is known to vibrate{along}."
+    if "total_order" in told:
+        yield from _owed(told)
+    slip = told["slip_probability"]
+    if (slip > 0.0).any():
+        largest = int(np.nanargmax(slip.values))
+        at = _place(told, list(map(str, slip.dims)), largest)
+        yield f"The belt slips with a probability of up to {_percent(slip.values.flat[largest])} %, at {at}."
+
+
+def _owed(told: xr.Dataset) -> Iterator[str]:
+    """State the Sobol indices in the cell where it is least certain whether it vibrates."""
+    shares = told[PROBABILITY]
+    cell = int(np.nanargmin(np.abs(shares.values - 0.5)))
+    dims = list(map(str, shares.dims))
+    here = told.isel(dict(zip(dims, map(int, np.unravel_index(cell, shares.shape)), strict=True)))
+    orders = (f"total_order{end}" for end in ("", "_low", "_high"))
+    named = zip(here["parameter"].values, *(here[order].values for order in orders), strict=True)
+    known = sorted(((one, *ends) for one, *ends in named if np.isfinite(ends[0])), key=lambda row: -row[1])
+    if known:
+        listed = ", ".join(
+            f"{name} {value:.2f} ({low:.2f} to {high:.2f})" for name, value, low, high in known
+        )
+        where = f"where vibration is least certain, at {_place(told, dims, cell)}"
+        yield f"Total Sobol indices {where}: {listed}."
+
+
+def _how_sure(line: xr.Dataset, x: str, place: str) -> str:
+    """State where the probability along a line crosses the contours, and where it is largest."""
+    shares = line[PROBABILITY].values
+    crossed = []
+    for share in CONTOURS if _is_number(line[x]) else ():
+        rising = [one.load for one in onsets(line[x].values.astype(float), shares - share) if one.rising]
+        if rising:
+            factor, unit = coordinate_unit(line[x].attrs)
+            crossed.append(f"{_percent(share)} % at {factor * min(rising):.4g} {unit}".rstrip())
+    largest = int(np.nanargmax(shares))
+    low, high = (float(line[f"{PROBABILITY}_{end}"].values[largest]) for end in ("low", "high"))
+    text = f"At {place} the" if place else "The"
+    text += " probability of vibration "
+    text += f"passes {', '.join(crossed)} of {in_words(line[x])}, and " if crossed else ""
+    most = f"{_percent(shares[largest])} % ({_percent(low)} to {_percent(high)} %)"
+    text += f"is largest at {value_text(line[x], largest)}: {most}"
+    if "amplitude_quantiles" in line:
+        quantiles = line["amplitude_quantiles"].transpose("quantile", ...).values[:, largest]
+        factor, unit = length_unit(quantiles)
+        first, _, last = QUANTILES
+        text += f", with amplitudes of {factor * quantiles[0]:.3g} to {factor * quantiles[-1]:.3g} {unit} "
+        text += f"({first} to {last} of the samples that vibrate)"
+    return text + "."
+
+
+def _percent(share: float) -> str:
+    return f"{100.0 * share:.3g}"
 
 
 def _place(dataset: xr.Dataset, names: Sequence[str], index: int) -> str:

@@ -16,6 +16,7 @@ from cvt_hpc.analysis.classes import OccurrenceClass, map_classes, occurrence_cl
 from cvt_hpc.analysis.figures import axis_label, coordinate_unit, in_words
 from cvt_hpc.analysis.hysteresis_bands import ALONG, INK, lowest_onsets, of_each_start
 from cvt_hpc.analysis.maps import AXIS, has_starts, join_starts
+from cvt_hpc.analysis.probability import PROBABILITY
 from cvt_hpc.analysis.scatter import is_sampled, sample_axes
 from cvt_hpc.errors import escaped
 from cvt_hpc.report.findings import AMPLITUDE, Quantity, is_judged, quantities
@@ -82,6 +83,8 @@ def map_data(dataset: xr.Dataset, source: str = "results") -> dict[str, Any]:
         "others": _colours(cells.FREQUENCY_COLOURS),
         "quantities": [_quantity(one) for one in quantities(dataset)],
     }
+    # a cell of many samples has no class
+    data["ofSamples"] = PROBABILITY in dataset and bool(data["quantities"])
     # where nothing is judged, a quantity comes first
     return data | {"first": -1 if is_judged(dataset) or not data["quantities"] else 0}
 

@@ -50,7 +50,7 @@ function take(side, axis) { // an axis that is on another side changes places wi
 
 function refresh() {
   controls.replaceChildren();
-  const shown = [[OCCURRENCE, "occurrence"]];
+  const shown = data.ofSamples ? [] : [[OCCURRENCE, "occurrence"]];
   if (starts) shown.push([STARTS, "occurrence from the smallest and the largest disturbance"]);
   choice("show", [...shown, ...data.quantities.map((one, k) => [k, named(one)])], chosen.show, k => { chosen.show = k; });
   const names = data.axes.map((axis, k) => [k, axis.name]);
@@ -70,7 +70,7 @@ function refresh() {
 function told(index, at, kinds) {
   const lines = at.filter(([axis]) => axis >= 0).map(([axis, k]) => `${data.axes[axis].name}: ${data.axes[axis].texts[k]}`);
   const kind = kinds[index];
-  lines.push(data.kinds[kind].label + (inferred && inferred[index] ? " (inferred)" : ""));
+  if (!data.ofSamples) lines.push(data.kinds[kind].label + (inferred && inferred[index] ? " (inferred)" : ""));
   if (chosen.show >= 0) {
     const one = data.quantities[chosen.show], value = one.values[index];
     if (Number.isFinite(value)) lines.push(`${one.name}: ${digits(value)} ${one.unit}`);

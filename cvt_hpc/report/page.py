@@ -25,10 +25,13 @@ from cvt_hpc.analysis.comparison import sample_sentences
 from cvt_hpc.analysis.figures import RESOLUTION, coordinate_unit, in_words, number, with_units
 from cvt_hpc.analysis.hysteresis_bands import hysteresis_figure
 from cvt_hpc.analysis.maps import AXIS, has_starts, map_figure
+from cvt_hpc.analysis.probability import PROBABILITY, has_samples, over_samples
+from cvt_hpc.analysis.probability_drawing import onset_bands_figure
 from cvt_hpc.analysis.scatter import is_sampled
 from cvt_hpc.analysis.value_maps import value_map_figure
 from cvt_hpc.errors import InputError, escaped, mismatch, one_line
 from cvt_hpc.job import Job, stored_job
+from cvt_hpc.job.axes import SAMPLE
 from cvt_hpc.job.summary import core_time_in_words, rules_in_words, value_in_words
 from cvt_hpc.job.values import shown
 from cvt_hpc.models.contract import load_model
@@ -119,7 +122,8 @@ def _content(dataset: xr.Dataset, source: str, folder: Path | None) -> dict[str,
     joined = [str(name) for name in dataset["status"].dims if name not in own]
     if joined:  # the attributes are those of one of several studies
         job = None
-    arrangement = _arrangement(dataset, source)
+    cells = over_samples(dataset)
+    arrangement = _arrangement(cells, source)
     found = findings.failures(dataset)
     parameters = _parameters(job) if job else {}
     sentences: list[str] = []
@@ -127,12 +131,15 @@ def _content(dataset: xr.Dataset, source: str, folder: Path | None) -> dict[str,
     judged, x = findings.is_judged(dataset), None
     if arrangement:
         axes = [name for name in (arrangement.panel, arrangement.y) if name]
-        beyond = [name for name in map(str, dataset["status"].dims) if name not in (arrangement.x, *axes)]
+        beyond = [name for name in map(str, cells["status"].dims) if name not in (arrangement.x, *axes)]
         x = arrangement.x if dataset[arrangement.x].dtype.kind in "iuf" else None
-        if judged:
+        if PROBABILITY in cells:
+            others = [*beyond, *axes]
+            sentences = list(findings.probability_sentences(dataset, cells, arrangement.x, others))
+        elif judged:
             sentences = list(findings.window_sentences(dataset, arrangement.x, [*beyond, *axes]))
             sentences += filter(None, [findings.slip_sentence(dataset, arrangement.x)])
-    if not judged:
+    if not judged and not sentences:
         sentences = list(findings.range_sentences(dataset))
     combinations = int(np.prod([dataset.sizes[name] for name in beyond]))
     return {
@@ -145,9 +152,11 @@ def _content(dataset: xr.Dataset, source: str, folder: Path | None) -> dict[str,
         "sentences": list(map(_with_code, sentences)),
         "windows": any("vibration from" in line or "vibration up to" in line for line in sentences),
         "next_steps": list(map(_with_code, next_steps(dataset, job, x))),
-        "has_lines": "eigenfrequency" in dataset and "amplitude" not in dataset,
-        "map": _map(dataset, source),
-        "pictures": _pictures(dataset, arrangement, beyond, source),
+        # drawn beside the map of the browser, which has no such lines
+        "has_lines": ("eigenfrequency" in dataset and "amplitude" not in dataset) or PROBABILITY in cells,
+        "map": _map(cells, source),
+        "pictures": _pictures(cells, arrangement, beyond, source),
+        "onset": _encoded(lambda: onset_bands_figure(dataset, source=source)) if PROBABILITY in cells else "",
         "hysteresis": _encoded(lambda: hysteresis_figure(dataset, source=source)) if arrangement else "",
         "not_drawn": max(0, combinations - MOST_MAPS),
         "beyond": " and ".join(beyond),
@@ -226,7 +235,8 @@ def _picture(dataset: xr.Dataset, at: Mapping[str, Any], source: str) -> str:
 
     It shows quantities where nothing was judged.
     """
-    shown = () if findings.is_judged(dataset) else dict.fromkeys(one.key for one in quantities(dataset))
+    has_verdicts = findings.is_judged(dataset) or PROBABILITY in dataset
+    shown = () if has_verdicts else dict.fromkeys(one.key for one in quantities(dataset))
     drawn = [key for key in shown if dataset[key].dtype.kind in "iuf"][:MOST_VALUE_MAPS]
     if drawn:
         return _encoded(lambda: value_map_figure(dataset, drawn, at, source))
@@ -344,7 +354,10 @@ def next_steps(dataset: xr.Dataset, job: Job | None, x: str | None) -> Iterator[
     if has_transient and undecided:
         runs = "The undecided run was" if undecided == 1 else f"The {undecided} undecided runs were"
         yield f"{runs} too short to tell: a larger `longest_duration` in [run] may decide more."
-    if x is not None and x in classes.dims and dataset[x].dtype.kind in "iuf":
+    if has_samples(dataset):
+        more = 2 * dataset.sizes[SAMPLE]
+        yield f"`cvt-hpc run JOB --set uncertain.samples={more}` narrows the intervals by new samples alone."
+    elif x is not None and x in classes.dims and dataset[x].dtype.kind in "iuf":
         yield from _along(dataset[x], classes)
     vibrating = (classes == OccurrenceClass.VIBRATING) & (dataset["status"] == Status.DONE)
     if has_transient and vibrating.any() and "run" not in classes.dims:

@@ -153,12 +153,16 @@ def built(job: Job, document: dict[str, Any]) -> Job:
     return rebuild_job(document, job.source, job.units)
 
 
-def interval(count: int, runs: int) -> tuple[float, float]:
-    """Return the ends of the interval that holds a rate with CONFIDENCE (Clopper and Pearson 1934)."""
+def interval(count: Any, runs: Any) -> tuple[Any, Any]:
+    """Return the ends of the interval that holds a rate with CONFIDENCE (Clopper and Pearson 1934).
+
+    Numbers of runs, and of those with the property, may be arrays of one shape, and so are the ends then.
+    """
     outside = 0.5 * (1.0 - CONFIDENCE)
-    low = betaincinv(count, runs - count + 1, outside) if count > 0 else 0.0
-    high = betaincinv(count + 1, runs - count, 1.0 - outside) if count < runs else 1.0
-    return float(low), float(high)
+    count, runs = np.asarray(count, float), np.asarray(runs, float)
+    low = np.where(count > 0, betaincinv(np.maximum(count, 1), runs - count + 1, outside), 0.0)
+    high = np.where(count < runs, betaincinv(count + 1, np.maximum(runs - count, 1), 1.0 - outside), 1.0)
+    return low[()], high[()]
 
 
 def step_check(job: Job, out: Path, fraction: float, way: str = "half") -> Repeat:

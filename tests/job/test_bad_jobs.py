@@ -67,7 +67,7 @@ def complaint(path="x.toml"):
         ),
         ("[scene]\nload_history = 1", "[scene] load_history: expected one of constant, ramp, found 1"),
         ("[blet]", "[blet]: unknown table; did you mean belt?"),
-        ("[zzz]", "[zzz]: unknown table; known: scene, belt, mesh, numerics, run, axes, design, derived, linked"),
+        ("[zzz]", "[zzz]: unknown table; known: scene, belt, mesh, numerics, run, axes, design, derived, linked, uncertain"),
         ("[[belt]]", "belt: expected a table [belt], found a list"),
         ("[axes]\nlaod = [1]", "[axes] laod: unknown key; did you mean load in [scene]?"),
         ("[axes]\nzzz.load = [1]", "[axes] zzz: unknown key; known: ratio, driving_speed, thrust, load, load_history, "

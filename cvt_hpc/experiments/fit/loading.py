@@ -61,9 +61,9 @@ def load(path: str | Path, overrides: Assignments = ()) -> Fit:
     own = read_table(NUMBERS, table, where, _TABLES)
     _check_own(own, where)
     axes = document.pop("axes", {})
-    if "design" in document or "linked" in document:
-        key = "design" if "design" in document else "linked"
-        raise mismatch(f"{source}: [{key}]", "none: a fit draws its candidates itself", "one")
+    for key in ("design", "linked", "uncertain"):
+        if key in document:
+            raise mismatch(f"{source}: [{key}]", "none: a fit draws its candidates itself", "one")
     job = build_job(document, source, replaced, "--set")
     if job.axes:
         raise mismatch(f"{source}: --set {job.axes[0].name}", "one value", "an axis")

@@ -16,8 +16,9 @@ from typing import Any, NamedTuple
 import numpy as np
 from numpy.typing import NDArray
 from scipy.optimize import differential_evolution
-from scipy.stats import qmc, sobol_indices
+from scipy.stats import qmc
 
+from cvt_hpc.analysis.sobol import orders_with_bounds
 from cvt_hpc.experiments.fit.evaluating import Evaluation, Findings
 from cvt_hpc.experiments.fit.job import Course, Fit
 from cvt_hpc.vibration.classes import OccurrenceClass
@@ -26,8 +27,6 @@ _DIGITS = 9  # of a share: a rounding of the optimiser is no other candidate
 Evaluate = Callable[[str, NDArray[np.float64]], Findings]
 
 _START = "start "
-
-_RESAMPLES = 200  # of the bootstrap
 
 
 class Found(NamedTuple):
@@ -311,20 +310,6 @@ def sensitivities(fit: Fit, evaluation: Evaluation, study: str, scene: NDArray[n
 
 def _indices(fit: Fit, name: str, scores: NDArray[np.float64], rng: np.random.Generator) -> Iterator[Index]:
     """Yield the indices of one score, shape (2 + free, samples): of both sets of samples, and crossed."""
-    names = [one.name for one in fit.free]
-    if np.ptp(scores[:2]) == 0.0:
-        yield from (Index(name, parameter, *[np.nan] * 6) for parameter in names)
-        return
-    drawn = rng.integers(fit.samples, size=(_RESAMPLES, fit.samples))
-    resampled = [_orders(part) for part in (scores[:, rows] for rows in drawn) if np.ptp(part[:2]) > 0.0]
-    low, high = np.quantile(resampled, [0.025, 0.975], axis=0)
-    for k, parameter in enumerate(names):
-        both = zip(_orders(scores)[:, k], low[:, k], high[:, k], strict=True)
-        yield Index(name, parameter, *(float(value) for order in both for value in order))
-
-
-def _orders(scores: NDArray[np.float64]) -> NDArray[np.float64]:
-    """Return indices of first and of total order, shape (2, free)."""
-    given = {"f_A": scores[:1], "f_B": scores[1:2], "f_AB": scores[2:, None]}
-    found = sobol_indices(func=given, n=scores.shape[1])
-    return np.array([np.ravel(found.first_order), np.ravel(found.total_order)])
+    found = orders_with_bounds(scores, rng)
+    for k, one in enumerate(fit.free):
+        yield Index(name, one.name, *map(float, found[:, :, k].T.ravel()))

@@ -1,0 +1,203 @@
+"""Uncertain parameters of a job: distributions, from which every cell of the grid draws the same samples.
+
+The axis `sample` counts the points of a scrambled Sobol sequence (Owen 1998; scipy.stats.qmc), a dimension of
+it for each uncertain parameter. The values of a parameter follow from distributions, seed and the number of
+the sample alone. So a study grows by further samples and keeps the earlier ones, and all cells have them in
+common: two cells differ by their place on the grid, and not by the luck of the draw.
+
+Correlated parameters have the copula of a normal distribution: the matrix is that of their normal scores,
+which for normal parameters is the correlation of their values. Limits cut a distribution off, and what is
+left keeps its shape. Mean and standard deviation are those without the limits.
+
+For Sobol indices each sample is drawn twice, A and B, and a further axis `swapped` names the parameters that
+are those of B: none, all, or one of them (Saltelli et al. 2010).
+"""
+
+import math
+from collections.abc import Mapping
+from dataclasses import dataclass, field, replace
+from functools import lru_cache
+from typing import Any, NamedTuple
+
+import numpy as np
+from numpy.typing import NDArray
+
+from cvt_hpc.job.axes import ALL, NONE, SAMPLE, SWAPPED
+from cvt_hpc.job.schema import Schema
+from cvt_hpc.job.values import in_words
+from cvt_hpc.parameters import Parameter
+
+TABLE = "uncertain"
+BLOCK = 256  # samples evaluated together: always as many, so that a value has the same bits in every study
+MOST = 2**16
+_RESOLUTION = 2.0**-30  # of the points in the unit cube
+
+# By kind the numbers that a distribution needs, and those that it may have
+KINDS: dict[str, tuple[tuple[str, ...], tuple[str, ...]]] = {
+    "uniform": (("from", "to"), ()),
+    "triangular": (("from", "mode", "to"), ()),
+    "normal": (("mean", "standard_deviation"), ("from", "to")),
+    "log_normal": (("mean", "standard_deviation"), ("from", "to")),
+}
+_SAMPLE = Parameter(0, "", "number of the Sobol point, common to all cells", minimum=0, maximum=MOST - 1)
+
+
+class Distribution(NamedTuple):
+    """Distribution of a parameter.
+
+    Attributes
+    ----------
+    key : str
+        The parameter.
+    kind : str
+        "uniform", "triangular", "normal" or "log_normal".
+    numbers : tuple of (str, float)
+        What the kind needs, and limits `from` and `to`, in SI units of the parameter.
+    """
+
+    key: str
+    kind: str
+    numbers: tuple[tuple[str, float], ...]
+
+    def quantiles(self, shares: NDArray[np.float64]) -> NDArray[np.float64]:
+        """Return the values [SI] below which shares of the distribution lie, of the shape of these."""
+        from scipy.special import ndtri
+
+        has = dict(self.numbers)
+        low, high = has.get("from", -math.inf), has.get("to", math.inf)
+        if self.kind == "uniform":
+            return low + (high - low) * shares
+        if self.kind == "triangular":
+            left = (has["mode"] - low) / (high - low)
+            rising = low + (high - low) * np.sqrt(left * shares)
+            falling = high - (high - low) * np.sqrt((1.0 - left) * (1.0 - shares))
+            return np.where(shares < left, rising, falling)
+        below, within = self._share_within(low, high)
+        centre, spread, to_value, _ = self._normal()
+        # the limits hold whatever rounding does
+        return np.clip(to_value(centre + spread * ndtri(below + within * shares)), low, high)
+
+    def share_within(self) -> float:
+        """Return the share of the distribution that its limits leave, 1 of kinds that end at them."""
+        if self.kind in ("uniform", "triangular"):
+            return 1.0
+        has = dict(self.numbers)
+        return self._share_within(has.get("from", -math.inf), has.get("to", math.inf))[1]
+
+    def _share_within(self, low: float, high: float) -> tuple[float, float]:
+        """Return the share below both limits and that between them."""
+        from scipy.special import ndtr
+
+        centre, spread, _, of_value = self._normal()
+        below, up_to = (float(ndtr((of_value(limit) - centre) / spread)) for limit in (low, high))
+        return below, up_to - below
+
+    def _normal(self) -> tuple[float, float, Any, Any]:
+        """Mean and standard deviation of the normal number behind it, and functions to a value and back."""
+        has = dict(self.numbers)
+        mean, deviation = has["mean"], has["standard_deviation"]
+        if self.kind == "normal":
+            return mean, deviation, np.asarray, float
+        variance = math.log1p((deviation / mean) ** 2)
+        return (
+            math.log(mean) - 0.5 * variance,
+            math.sqrt(variance),
+            np.exp,
+            lambda value: math.log(value) if value > 0.0 else -math.inf,
+        )
+
+    def in_words(self, unit: str, wanted: str) -> str:
+        """State the distribution for people, in a unit that is wanted."""
+        told = (f"{key.replace('_', ' ')} {in_words(value, unit, wanted)}" for key, value in self.numbers)
+        return f"{self.kind.replace('_', '-')}, {', '.join(told)}"
+
+
+@dataclass(frozen=True)
+class Uncertain:
+    """The uncertain parameters of a job.
+
+    Attributes
+    ----------
+    distributions : tuple of Distribution
+        By name, in the order of the dimensions of the Sobol sequence.
+    seed : int
+        Of its scrambling.
+    correlated : tuple of str
+        Parameters that are correlated.
+    matrix : tuple of tuple of float
+        The correlation of their normal scores.
+    indices : bool
+        Whether a second set of samples is drawn.
+    """
+
+    distributions: tuple[Distribution, ...]
+    seed: int
+    correlated: tuple[str, ...] = ()
+    matrix: tuple[tuple[float, ...], ...] = ()
+    indices: bool = False
+
+    def value(self, place: int, sample: int, swapped: str = NONE) -> float:
+        """Return the value [SI] of the distribution at a place for a sample, by what is swapped."""
+        block, row = divmod(sample, BLOCK)
+        is_second = swapped in (ALL, self.distributions[place].key)
+        return float(_block(self, block)[row, place + is_second * len(self.distributions)])
+
+    def document(self) -> dict[str, Any]:
+        """Return the table of a job file, without the number of samples, in JSON types."""
+        told: dict[str, Any] = {"seed": self.seed}
+        told |= {one.key: {"distribution": one.kind, **dict(one.numbers)} for one in self.distributions}
+        if self.correlated:
+            matrix = [list(row) for row in self.matrix]
+            told["correlation"] = {"parameters": list(self.correlated), "matrix": matrix}
+        return told | ({"indices": True} if self.indices else {})
+
+
+@dataclass(frozen=True)
+class Scatter:
+    """Values that one uncertain parameter takes by the number of the sample; the source of a `Rule`."""
+
+    uncertain: Uncertain
+    place: int
+    text: str = field(compare=False)
+
+    @property
+    def names(self) -> tuple[str, ...]:
+        """The axes along which it varies."""
+        return (SAMPLE, SWAPPED) if self.uncertain.indices else (SAMPLE,)
+
+    def value(self, parameters: Mapping[str, Any]) -> float:
+        """Return the value [SI] of the sample."""
+        return self.uncertain.value(self.place, *(parameters[name] for name in self.names))
+
+
+@lru_cache(maxsize=2 * MOST // BLOCK)
+def _block(uncertain: Uncertain, number: int) -> NDArray[np.float64]:
+    """Return the values of the samples from BLOCK * number on, shape (BLOCK, distribution) [SI].
+
+    For Sobol indices those of the second set stand behind, for each distribution.
+    """
+    from scipy.special import ndtr, ndtri
+    from scipy.stats import qmc
+
+    found = uncertain.distributions * (2 if uncertain.indices else 1)
+    engine = qmc.Sobol(len(found), seed=np.random.default_rng(uncertain.seed))
+    if number:  # the engine cannot go on by none
+        engine.fast_forward(BLOCK * number)
+    # in the middle of the cells of the sequence's resolution, so never at 0, where quantiles are infinite
+    shares = engine.random(BLOCK) + 0.5 * _RESOLUTION
+    if uncertain.correlated:
+        columns = [[one.key for one in found].index(key) for key in uncertain.correlated]
+        scores, factor = ndtri(shares[:, columns]), np.linalg.cholesky(np.array(uncertain.matrix))
+        for row, column in enumerate(columns):  # sums in a fixed order, which a matrix product has not
+            shares[:, column] = ndtr(sum(factor[row, k] * scores[:, k] for k in range(row + 1)))
+    return np.stack([one.quantiles(shares[:, k]) for k, one in enumerate(found)], axis=1)
+
+
+def with_samples(schema: Schema, table: Mapping[str, Any]) -> Schema:
+    """Return the schema of a job with a table [uncertain], which knows the number of a sample."""
+    known = {SAMPLE: _SAMPLE}
+    if table.get("indices"):
+        keys = (name.rpartition(".")[2] for name, _ in schema.flatten(table))
+        choices = (NONE, ALL, *(key for key in keys if key in schema.parameters))
+        known[SWAPPED] = Parameter(NONE, "", "which are those of the second set of samples", choices=choices)
+    return replace(schema, sections=schema.sections | {TABLE: known})

@@ -1,0 +1,196 @@
+"""The table [uncertain] of a job file: its distributions and their correlation, each checked in turn."""
+
+import math
+from collections.abc import Collection, Mapping
+from dataclasses import replace
+from typing import Any
+
+import numpy as np
+
+from cvt_hpc.errors import InputError, mismatch, show, unknown
+from cvt_hpc.job.axes import ALL, NONE, SAMPLE, SWAPPED, Axis
+from cvt_hpc.job.rules import Rule
+from cvt_hpc.job.schema import Schema
+from cvt_hpc.job.uncertain import KINDS, MOST, TABLE, Distribution, Scatter, Uncertain
+from cvt_hpc.job.values import kind_of, read_value
+from cvt_hpc.parameters import Parameter, positive
+
+_LEAST_SHARE = 1e-6  # of a distribution within its limits
+_TOLERANCE = 1e-9  # of a matrix: how symmetric it is, and how positive its eigenvalues are
+_SAMPLES = Parameter(256, "", "samples of each cell", minimum=2, maximum=MOST)
+_SEED = Parameter(1, "", "of the samples", minimum=0)
+_COEFFICIENTS = Parameter((), "", "matrix of correlation")
+_INDICES = Parameter(False, "", "whether runs for Sobol indices are done, too")
+_OWN = ("samples", "seed", "correlation", "indices", SAMPLE, SWAPPED)
+
+
+def read_uncertain(
+    table: Mapping[str, Any], gone: Collection[str], schema: Schema, source: str
+) -> tuple[list[Rule], dict[str, list], dict[str, Any]]:
+    """Check a job file's table [uncertain].
+
+    Parameters
+    ----------
+    table : mapping
+        `samples`, `seed`, `correlation`, `indices`, and a distribution by parameter.
+    gone : collection of str
+        Parameters that overrides have given a value of their own.
+    schema : Schema
+        Of the job, with samples.
+    source : str
+        The job file, for the error.
+
+    Returns
+    -------
+    rules : list of Rule
+        The values of each uncertain parameter by the number of the sample; none if overrides left none.
+    axes : dict
+        The values on the axes that the table adds to the job.
+    fixed : dict
+        The number of the sample, or what is swapped, where the table fixes it.
+
+    Raises
+    ------
+    InputError
+        If anything is wrong with the table.
+    """
+    where = f"{source}: [{TABLE}]"
+    found: dict[str, Distribution] = {}
+    for name, raw in schema.flatten(table):
+        if name in _OWN:
+            continue
+        key = schema.find(name, f"{where} {name}")
+        if key in found:
+            raise mismatch(f"{where} {name}", "one distribution of a parameter", f"a second one of {key}")
+        found[key] = _read_distribution(key, schema.parameters[key], raw, f"{where} {name}")
+    if not found:
+        raise mismatch(where, "a parameter with a distribution, or several", "none")
+    seed = read_value(_SEED, table.get("seed", _SEED.default), f"{where} seed")
+    correlated, matrix = _read_correlation(table.get("correlation"), found, gone, schema, where)
+    # by name, so that the samples of a job do not depend on its layout
+    left = tuple(one for key, one in sorted(found.items()) if key not in gone)
+    indices = read_value(_INDICES, table.get("indices", False), f"{where} indices")
+    if indices and correlated:
+        raise mismatch(f"{where} indices", "independent parameters, for Sobol indices", "a correlation")
+    uncertain = Uncertain(left, seed, correlated, matrix, indices)
+    rules = []
+    for place, one in enumerate(left):
+        parameter = replace(schema.parameters[one.key], sensible=None)
+        text = one.in_words(parameter.unit, schema.units.get(one.key, ""))
+        if one.key in correlated:
+            others = ", ".join(key for key in correlated if key != one.key)
+            text += f"; correlated with {others}"
+        rules.append(Rule(one.key, Scatter(uncertain, place, text), f"{where} {one.key}", parameter))
+    own = {key: parameter for key, parameter in schema.sections[TABLE].items() if key in table}
+    fixed = {key: read_value(one, table[key], f"{where} {key}") for key, one in own.items()}
+    samples = read_value(_SAMPLES, table["samples"], f"{where} samples") if "samples" in table else None
+    if samples is not None and samples & (samples - 1):
+        lower = 2 ** (samples.bit_length() - 1)
+        expected = (
+            f"a power of 2, which covers the distributions evenly (the nearest: {lower} and {2 * lower})"
+        )
+        raise mismatch(f"{where} samples", expected, str(samples))
+    axes: dict[str, list] = {} if samples is None else {SAMPLE: list(range(samples))}
+    if indices and samples is not None:
+        axes[SWAPPED] = [NONE, ALL, *(one.key for one in left)]
+    return rules, axes, fixed
+
+
+def _read_distribution(key: str, parameter: Parameter, raw: Any, where: str) -> Distribution:
+    if kind_of(parameter) is not float or key == SAMPLE:
+        raise mismatch(where, "a parameter with continuous values, to give it a distribution", "another one")
+    if not isinstance(raw, Mapping):
+        raise mismatch(where, 'a distribution, such as { distribution = "uniform", from =, to = }', show(raw))
+    kinds = Parameter("normal", "", "", choices=tuple(KINDS))
+    kind = read_value(kinds, raw.get("distribution"), f"{where}.distribution")
+    needed, optional = KINDS[kind]
+    for name in raw:
+        if name not in ("distribution", *needed, *optional):
+            known = ("distribution", *needed, *optional)
+            raise unknown(f"{where}.{name}", f"key of a {kind} distribution", name, known)
+    numbers = []
+    for name in (*needed, *optional):
+        if name not in raw and name in needed:
+            raise mismatch(f"{where}.{name}", f"a number, which a {kind} distribution needs", "nothing")
+        if name in raw:
+            is_positive = name == "standard_deviation" or (kind == "log_normal" and name == "mean")
+            free = positive(1.0, parameter.unit, "") if is_positive else Parameter(0.0, parameter.unit, "")
+            numbers.append((name, read_value(free, raw[name], f"{where}.{name}")))
+    distribution, has = Distribution(key, kind, tuple(numbers)), dict(numbers)
+    if not has.get("from", -math.inf) < has.get("to", math.inf):
+        raise mismatch(where, "from below to", f"{has['from']:g} and {has['to']:g}")
+    if "mode" in has and not has["from"] <= has["mode"] <= has["to"]:
+        raise mismatch(f"{where}.mode", "a value from `from` to `to`", f"{has['mode']:g}")
+    if (share := distribution.share_within()) < _LEAST_SHARE:
+        raise mismatch(
+            where, "limits between which values are likely", f"a share of {share:.1g} between them"
+        )
+    return distribution
+
+
+def _read_correlation(
+    raw: Any, found: Mapping[str, Distribution], gone: Collection[str], schema: Schema, where: str
+) -> tuple[tuple[str, ...], tuple[tuple[float, ...], ...]]:
+    """Return the correlated parameters that overrides have left, and their matrix."""
+    where = f"{where} correlation"
+    if raw is None:
+        return (), ()
+    keys = ("parameters", "matrix")
+    if not isinstance(raw, Mapping):
+        raise mismatch(where, "a table with parameters and matrix", show(raw))
+    for name in raw:
+        if name not in keys:
+            raise unknown(f"{where}.{name}", "key of a correlation", name, keys)
+    names = raw.get("parameters")
+    if not isinstance(names, (list, tuple)) or not all(isinstance(name, str) for name in names):
+        raise mismatch(f"{where}.parameters", "a list of uncertain parameters", show(names))
+    correlated = tuple(schema.find(name, f"{where}.parameters") for name in names)
+    for key in correlated:
+        if key not in found:
+            raise unknown(f"{where}.parameters {key}", "uncertain parameter", key, found)
+    size = len(correlated)
+    if size < 2 or len({*correlated}) < size:
+        raise mismatch(f"{where}.parameters", "two or more, each once", ", ".join(correlated) or "none")
+    matrix = read_value(_COEFFICIENTS, raw.get("matrix", ()), f"{where}.matrix")
+    shape = f"{size} rows of {size} numbers, one for each parameter"
+    if len(matrix) != size or not all(isinstance(row, tuple) and len(row) == size for row in matrix):
+        raise mismatch(f"{where}.matrix", shape, f"{len(matrix)} rows" if matrix else "nothing")
+    values = np.array(matrix)
+    if not (values.ndim == 2 and np.abs(values - values.T).max() <= _TOLERANCE):
+        raise mismatch(f"{where}.matrix", "a symmetric matrix", "one that is not")
+    if not np.array_equal(np.diag(values), np.ones(size)):
+        raise mismatch(f"{where}.matrix", "1 on the diagonal", "other numbers")
+    if (least := float(np.linalg.eigvalsh(values).min())) < _TOLERANCE:
+        raise mismatch(f"{where}.matrix", "a positive definite matrix", f"an eigenvalue of {least:.3g}")
+    kept = [place for place, key in enumerate(correlated) if key not in gone]
+    if len(kept) < 2:
+        return (), ()
+    return tuple(correlated[k] for k in kept), tuple(tuple(matrix[j][k] for k in kept) for j in kept)
+
+
+def check_samples(rules: Collection[Rule], axes: Collection[Axis]) -> None:
+    """Refuse distributions that give impossible values, with the share of the samples.
+
+    Raises
+    ------
+    InputError
+        With the first parameter of which a sample is not legal.
+    """
+    samples = next((axis.values for axis in axes if axis.name == SAMPLE), ())
+    places = [{SAMPLE: sample, SWAPPED: which} for sample in samples for which in (NONE, ALL)]
+    for rule in rules:
+        if not isinstance(rule.source, Scatter):
+            continue
+        refused: dict[float, InputError] = {}
+        drawn = places if rule.source.uncertain.indices else places[::2]
+        count = 0
+        for place in drawn:
+            try:
+                rule.value(place)
+            except InputError as error:
+                count += 1
+                refused[rule.source.value(place)] = error
+        if refused:
+            share = f"in {100 * count / len(drawn):.2g} % of the {len(drawn)} samples"
+            then = "limits `from` and `to` cut a distribution off"
+            raise InputError(f"{refused[max(refused, key=abs)]} {share}; {then}")

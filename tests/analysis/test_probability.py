@@ -1,0 +1,253 @@
+"""Probabilities over the samples of uncertain parameters: counts, intervals, onsets, pictures and sentences."""
+
+import numpy as np
+import pytest
+import xarray as xr
+from matplotlib.text import Text
+from scipy.stats import binomtest, norm
+from scipy.stats import sobol_indices as scipy_indices
+
+import cvt_hpc.accessor  # noqa: F401
+from cvt_hpc.analysis.classes import OccurrenceClass
+from cvt_hpc.analysis.maps import map_figure
+from cvt_hpc.analysis.probability import onset_quantiles, probabilities
+from cvt_hpc.analysis.probability_drawing import onset_bands_figure
+from cvt_hpc.analysis.sobol import sobol_indices
+from cvt_hpc.analysis.value_maps import value_map_figure
+from cvt_hpc.errors import InputError
+from cvt_hpc.job import build_job
+from cvt_hpc.models.oscillator.motion import oscillator, steady_sliding
+from cvt_hpc.report import write_report
+from cvt_hpc.variables import Status, Vibrates
+from support.studies import flags
+
+Q, V, U, F, N, S, IRR = OccurrenceClass
+VERDICTS = {Q: Vibrates.NO, V: Vibrates.YES, S: Vibrates.SLIPS, IRR: Vibrates.IRREGULAR}
+NAMES = {F: Status.FAILED_NUMERICS, N: Status.NOT_RUN}
+
+
+def study(classes, **axes):
+    """Results of these classes over axes and, last, the samples."""
+    classes, dims = np.asarray(classes), (*axes, "sample")
+    kinds = [OccurrenceClass(kind) for kind in classes.ravel()]
+    status = np.reshape([NAMES.get(kind, Status.DONE) for kind in kinds], classes.shape)
+    vibrates = np.reshape([VERDICTS.get(kind, Vibrates.UNDECIDED) for kind in kinds], classes.shape)
+    amplitude = np.where(classes == V, 1e-6 * (1.0 + np.arange(classes.shape[-1])), np.nan)
+    damping = xr.DataArray(np.arange(classes.shape[-1]) / 10.0, dims="sample")
+    return xr.Dataset(
+        {
+            "status": flags(status, dims, Status, "status"),
+            "vibrates": flags(vibrates, dims, Vibrates, "vibrates"),
+            "amplitude": (dims, amplitude, {"units": "m"}),
+        },
+        {
+            **{
+                name: (name, list(values), {"units": "N m" if name == "load" else "N"})
+                for name, values in axes.items()
+            },
+            "sample": np.arange(classes.shape[-1]),
+            "damping": damping.assign_attrs(units="N s m-1", derived="normal, mean 0.5 N s/m"),
+        },
+        {"job_name": "made"},
+    )
+
+
+def test_what_is_not_decided_counts_on_neither_side_and_widens_the_interval():
+    runs = [V] * 6 + [Q] * 5 + [S] * 2 + [U] * 3 + [IRR, F, N]
+    found = study([runs, [Q] * 19, [U] * 19, [N] * 19], load=[1.0, 2.0, 3.0, 4.0]).cvt.probability()
+    assert found["samples"].values.tolist() == [18, 19, 19, 0]
+    assert found["undecided_samples"].values.tolist() == [5, 0, 19, 0]
+    one = found.isel(load=0)
+    assert one["vibration_probability"] == pytest.approx(6 / 13)
+    assert one["slip_probability"] == pytest.approx(2 / 13)
+    assert one["failure_probability"] == pytest.approx(1 / 18)
+    for event, count, hidden in (("vibration", 6, 5), ("slip", 2, 5), ("failure", 1, 0)):
+        low = binomtest(count, 18).proportion_ci(method="exact").low
+        high = binomtest(count + hidden, 18).proportion_ci(method="exact").high
+        assert one[f"{event}_probability_low"] == pytest.approx(low)
+        assert one[f"{event}_probability_high"] == pytest.approx(high)
+    assert found["vibration_probability"].values[1:] == pytest.approx([0.0, np.nan, np.nan], nan_ok=True)
+    assert found["vibration_probability_high"].values[1:] == pytest.approx([1 - 0.025 ** (1 / 19), 1.0, 1.0])
+    # of the samples that vibrate: 1 to 6 um
+    assert one["amplitude_quantiles"].values == pytest.approx([1e-6, 3e-6, 6e-6])
+    assert np.isnan(found["amplitude_quantiles"].values[:, 1:]).all()
+
+
+def onset_job(seed, loads, samples, **further):
+    """The oscillator with a normal damping over its normal load."""
+    friction = {"friction_law": "stribeck", "kinetic_friction": 2.0, "stribeck_velocity": 0.1}
+    return build_job(
+        {
+            "name": "onset",
+            "model": "oscillator",
+            "axes": {"normal_load": list(loads)},
+            "friction": friction | ({} if further else {"friction_gradient": -40.0}),
+            "uncertain": {
+                "samples": samples,
+                "seed": seed,
+                "damping": {"distribution": "normal", "mean": 5.9, "standard_deviation": 0.6},
+                **further,
+            },
+        }
+    )
+
+
+# at 0.2 m/s friction falls by exp(-2) of its steepest fall; steady sliding is unstable where the damping is less than
+# that times the normal load
+SLOPE = 40.0 * np.exp(-2.0)
+LOADS = np.array([0.95, 1.1, 1.2])
+GRADIENT = {"distribution": "normal", "mean": -40.0, "standard_deviation": 3.0}
+CORRELATION = {"parameters": ["damping", "friction_gradient"], "matrix": [[1.0, 0.5], [0.5, 1.0]]}
+
+
+def stability(job):
+    """Results of the job's cells by the stability of steady sliding, as the model has it."""
+    points = (job.point(index) for index in range(job.size))
+    growth = np.array([steady_sliding(oscillator(point)).eigenvalue.real for point in points])
+    return study(np.where(growth > 0.0, V, Q).reshape(job.shape), normal_load=job.axes[0].values)
+
+
+@pytest.mark.slow
+def test_the_interval_holds_the_probability_of_the_closed_form():
+    further = {"friction_gradient": GRADIENT, "correlation": CORRELATION}
+    # damping and weighted gradient, both normal, add to less than nothing
+    weight = LOADS * np.exp(-2.0)
+    spread = np.sqrt(0.6**2 + (3.0 * weight) ** 2 + 2 * 0.5 * 0.6 * 3.0 * weight)
+    true = norm.cdf((40.0 * weight - 5.9) / spread)
+    held = np.zeros(LOADS.size)
+    for seed in range(100):
+        found = probabilities(stability(onset_job(seed, LOADS, 16, **further)))
+        low, high = (found[f"vibration_probability_{end}"].values for end in ("low", "high"))
+        held += (low <= true) & (true <= high)
+    assert (held >= 90).all()
+
+
+def test_one_uncertain_parameter_has_a_sample_in_each_part_of_its_distribution():
+    found = probabilities(stability(onset_job(1, LOADS, samples=64)))
+    true = norm.cdf((SLOPE * LOADS - 5.9) / 0.6)
+    assert found["vibration_probability"].values == pytest.approx(true, abs=1 / 64)
+
+
+@pytest.mark.slow
+def test_sobol_indices_are_those_of_the_ishigami_function():
+    size = 8192
+    flat = {"distribution": "uniform", "from": -np.pi, "to": np.pi}
+    keys = ("preload", "initial_displacement", "initial_speed")
+    table = {"samples": size, "seed": 2, "indices": True, **dict.fromkeys(keys, flat)}
+    job = build_job({"name": "x", "model": "oscillator", "uncertain": table})
+    places = [{"sample": k, "swapped": which} for k in range(size) for which in job.axes[1].values]
+    rules = {rule.key: rule for rule in job.rules}
+    x, y, z = np.array([[rules[key].source.value(place) for place in places] for key in sorted(keys)])
+    values = (np.sin(x) + 7.0 * np.sin(y) ** 2 + 0.1 * z**4 * np.sin(x)).reshape(size, 5)
+    axes = {"sample": np.arange(size), "swapped": [*job.axes[1].values]}
+    found = sobol_indices(xr.DataArray(values, axes, ["sample", "swapped"]))
+    assert found["parameter"].values.tolist() == sorted(keys)
+    assert found["first_order"].values == pytest.approx([0.3139, 0.4424, 0.0], abs=0.01)
+    assert found["total_order"].values == pytest.approx([0.5576, 0.4424, 0.2437], abs=0.01)
+    scores = values.T
+    given = {"f_A": scores[:1], "f_B": scores[1:2], "f_AB": scores[2:, None]}
+    other = scipy_indices(func=given, n=size)
+    assert found["first_order"].values == pytest.approx(other.first_order.ravel(), abs=1e-12)
+    assert found["total_order"].values == pytest.approx(other.total_order.ravel(), abs=1e-12)
+    for order in ("first_order", "total_order"):
+        low, high = found[f"{order}_low"], found[f"{order}_high"]
+        assert ((low <= found[order]) & (found[order] <= high)).all()
+        assert (high - low).max() < 0.1
+
+
+def test_probabilities_rest_on_both_sets_of_samples_and_not_on_those_between(tmp_path):
+    # the first set vibrates, and of the second what has its damping; the mass is of no effect
+    classes = np.array([[V] * 8, [V] * 4 + [Q] * 4, [V] * 4 + [Q] * 4, [V] * 8])
+    dataset = xr.concat([study(row[np.newaxis], load=[1.0]) for row in classes], "swapped")
+    dataset = dataset.assign_coords(swapped=["none", "all", "damping", "mass"])
+    found = dataset.cvt.probability()
+    assert found["samples"].item() == 16
+    assert found["vibration_probability"].item() == 12 / 16
+    assert found["total_order"].values[0] == pytest.approx([4 / 8 / 2 / (12 / 16 * 4 / 16), 0.0])
+    # one of eight samples without a verdict is too many
+    unknown = dataset.copy(deep=True)
+    unknown["vibrates"][3, 0, 0] = Vibrates.UNDECIDED
+    assert np.isnan(unknown.cvt.sobol_indices()["total_order"]).all()
+    assert dataset.cvt.sobol_indices("amplitude")["total_order"].shape == (1, 2)
+    with pytest.raises(InputError, match="unknown variable; did you mean amplitude"):
+        dataset.cvt.sobol_indices("amplitud")
+    with pytest.raises(InputError, match="expected results of a job with `indices = true`"):
+        dataset.isel(swapped=0).cvt.sobol_indices()
+    text = write_report(dataset, tmp_path / "report.html").read_text().replace("\u00a0", " ")
+    assert "Total Sobol indices where vibration is least certain, at load 1 N m: damping 1.33 (" in text
+
+
+def test_quantiles_of_the_onset_are_those_of_the_closed_form():
+    loads = np.arange(0.92, 1.4, 0.02)
+    found = onset_quantiles(stability(onset_job(1, loads, samples=128)), "normal_load")
+    exact = (5.9 + 0.6 * norm.ppf([0.05, 0.5, 0.95])) / SLOPE
+    assert exact[0] < 0.92 and found[0] == -np.inf
+    # half a step of the grid, and a 128th of the distribution
+    assert found.values[1:] == pytest.approx(exact[1:], abs=0.01 + 0.6 / SLOPE / 128 / norm.pdf(1.645))
+
+
+def test_an_onset_beyond_the_axis_is_infinite_and_one_without_verdicts_does_not_count():
+    runs = [[V, V], [Q, Q], [Q, V], [U, U], [U, V]]
+    dataset = study(np.transpose(runs), load=[1.0, 2.0])
+    found = dataset.cvt.onset_quantiles()
+    assert found.values.tolist() == [-np.inf, -np.inf, np.inf]  # of -inf, inf, 1.5, none, -inf
+    assert found["quantile"].values.tolist() == ["5 %", "50 %", "95 %"]
+
+
+@pytest.fixture
+def two_axes():
+    """Probabilities that rise along the load and with the thrust."""
+    order = np.add.outer(np.arange(4), np.arange(8))[..., np.newaxis] - np.arange(8) / 2
+    classes = np.where(order > 5, V, Q)
+    classes[0, 0, 0], classes[3, 7, :2] = U, S
+    return study(classes, thrust=[1e3, 2e3, 3e3, 4e3], load=np.arange(8) * 10.0)
+
+
+def words(figure):
+    return " ".join(text.get_text() for text in figure.findobj(Text))
+
+
+def test_a_map_has_contours_and_says_how_wide_intervals_are(two_axes):
+    figure = map_figure(two_axes)
+    told = words(figure)
+    assert "made: 32 cells of 8 samples; 95 % intervals up to" in told
+    assert "probability of vibration" in told
+    assert [text.get_text() for text in figure.legends[0].get_texts()] == ["0.5", "0.1 and 0.9"]
+    # the middle line lies where as many samples vibrate as do not
+    lines = next(one for one in figure.axes[0].collections if hasattr(one, "levels"))
+    assert list(lines.levels) == [0.1, 0.5, 0.9]
+    place = min(lines.allsegs[1][0], key=lambda point: abs(point[1] - 2.0))
+    shares = probabilities(two_axes)["vibration_probability"].sel(thrust=2e3)
+    assert np.interp(place[0], shares["load"], shares) == pytest.approx(0.5)
+    assert "slip" in words(value_map_figure(two_axes, ["slip_probability"]))
+    assert "Vibration occurrence" in words(map_figure(two_axes, {"sample": 0}))
+    assert "probability" in words(map_figure(two_axes.cvt.probability()))
+
+
+def test_over_one_axis_the_interval_is_a_band_and_onsets_have_one_over_another(two_axes):
+    figure = map_figure(two_axes.sel(thrust=2e3))
+    assert [text.get_text() for text in figure.legends[0].get_texts()] == ["95 % interval", "of the samples"]
+    (band,) = figure.axes[0].collections
+    high = probabilities(two_axes)["vibration_probability_high"].sel(thrust=2e3)
+    assert band.get_paths()[0].vertices[:, 1].max() == pytest.approx(high.max().item())
+    figure = onset_bands_figure(two_axes)
+    quantiles = onset_quantiles(two_axes, "load")
+    median = figure.axes[0].lines[0].get_ydata()
+    assert median == pytest.approx(np.where(np.isinf(quantiles[1]), np.nan, quantiles[1]), nan_ok=True)
+    with pytest.raises(InputError, match="expected results over samples and two further axes, of them load"):
+        onset_bands_figure(two_axes.isel(thrust=0))
+    with pytest.raises(InputError, match="expected results with the axis sample"):
+        two_axes.isel(sample=0).cvt.probability()
+    with pytest.raises(InputError, match="along: expected one of the axes thrust, load, found sample"):
+        two_axes.cvt.onset_quantiles("sample")
+
+
+def test_the_report_says_how_sure_the_map_is(two_axes, tmp_path):
+    text = write_report(two_axes, tmp_path / "report.html").read_text().replace("\u00a0", " ")
+    assert "32 cells of 8 samples, with 95 % intervals up to" in text
+    assert "Uncertain: damping (normal, mean 0.5 N s/m)." in text
+    assert "At thrust 2 kN the probability of vibration passes 10 % at" in text
+    assert "The belt slips with a probability of up to 25 %, at thrust 4 kN and load 70 N m." in text
+    assert "--set uncertain.samples=16</code> narrows the intervals" in text
+    assert "along sample" not in text
+    assert text.count('alt="onset of vibration"') == 1

@@ -1,0 +1,80 @@
+"""A sweep with uncertain parameters: killed, grown and shared by ranks it has the numbers of an undisturbed one."""
+
+import subprocess
+import sys
+import time
+import tomllib
+from pathlib import Path
+
+import numpy as np
+import pytest
+
+from cvt_hpc import open_results
+from cvt_hpc.cli import main
+from cvt_hpc.job import build_job
+from cvt_hpc.study import run
+from support.cf import cf_findings
+from support.recorded import assert_same_numbers, frames_written, records
+from support.sweeps import PATIENCE, call, environment
+
+JOB = Path(__file__).parents[2] / "jobs" / "uncertain_criterion.toml"
+FEW = ("--set", "friction_gradient=-0.5", "--set", "radial_speed=[0.05, 0.07, 0.09, 0.12, 0.15, 0.2]")
+RUNS = 6 * 32
+
+
+def load_results(out):
+    with open_results(out) as dataset:
+        return dataset.load()
+
+
+@pytest.mark.slow
+def test_a_sweep_that_is_killed_and_grows_has_the_numbers_of_an_undisturbed_one(
+    tmp_path, monkeypatch, capsys
+):
+    monkeypatch.chdir(tmp_path)
+    command = [sys.executable, "-m", "cvt_hpc", "run", str(JOB), *FEW, "--out", "killed"]
+    sweep = subprocess.Popen(command, env=environment(), stdout=subprocess.PIPE, stderr=subprocess.PIPE)
+    until = time.monotonic() + PATIENCE
+    while not records(tmp_path / "killed") and sweep.poll() is None and time.monotonic() < until:
+        time.sleep(0.005)
+    sweep.kill()
+    sweep.communicate()
+    before = records(tmp_path / "killed")
+    assert 0 < before < RUNS
+    assert main(["run", str(JOB), *FEW, "--out", "killed"]) == 0
+    assert frames_written(tmp_path / "killed") == RUNS  # none was repeated
+    half = load_results(tmp_path / "killed")
+
+    larger = (*FEW, "--set", "uncertain.samples=64")
+    grown = call("run", JOB, *larger, "--out", "killed", cwd=tmp_path, ranks=2)
+    assert grown.returncode == 0, grown.stderr
+    assert "the study grows from 192 to 384 runs" in grown.stderr
+    assert main(["run", str(JOB), *larger, "--out", "whole"]) == 0
+    found, whole = load_results(tmp_path / "killed"), load_results(tmp_path / "whole")
+    assert_same_numbers(found, whole)
+    assert_same_numbers(found.isel(sample=slice(32)), half)
+    assert cf_findings(tmp_path / "whole" / "results.nc") == []
+
+    assert main(["map", "whole"]) == 0
+    assert main(["map", "whole", "--show", "slip_probability"]) == 0
+    assert main(["report", "whole"]) == 0
+    capsys.readouterr()
+    assert main(["plot", "onset_bands", "whole"]) == 2
+    assert "expected results over samples and two further axes" in capsys.readouterr().err
+
+
+def test_each_run_has_the_values_that_the_dataset_states(tmp_path):
+    document = tomllib.loads((JOB.parent / "bistable_oscillator.toml").read_text())
+    document["axes"] = {"normal_load": [0.5, 1.0, 1.5]}
+    del document["oscillator"]["damping"], document["scene"]["normal_load"]
+    document["uncertain"] = {
+        "samples": 8,
+        "damping": {"distribution": "normal", "mean": "5.9 N s/m", "standard_deviation": "0.6 N s/m"},
+    }
+    job = build_job(document, "x.toml", {"belt_speed": 0.2, "duration": 2.0, "step": 2e-4})
+    results = load_results(run(job, tmp_path, progress=False).results.parent)
+    assert results["damping"].dims == ("sample",)
+    assert results["damping"].attrs["derived"] == "normal, mean 5.9 N s/m, standard deviation 0.6 N s/m"
+    # m s^2 + (c + N mu') s + k = 0 with mu' = -40 s/m exp(-v / 0.1 m/s)
+    growth = (40.0 * np.exp(-2.0) * results["normal_load"] - results["damping"]) / (2 * 0.538)
+    assert results["linear_growth_rate"].values == pytest.approx(growth.values, rel=1e-9)
