@@ -8,11 +8,15 @@ import numpy as np
 import pytest
 
 from cvt_hpc.experiments.chart import load
+from cvt_hpc.experiments.ladder.loading import pushbelt_jobs
 from cvt_hpc.job import known_keys, load_job
+from cvt_hpc.models.contract import load_model
 from cvt_hpc.models.elastic_belt import PARAMETERS
 from cvt_hpc.models.pushbelt import inert
 from cvt_hpc.models.pushbelt.continuous import FOLLOWS, ONLY
 from cvt_hpc.models.pushbelt.parameters import flank_compliance
+from cvt_hpc.models.steady_variator.record import solve
+from cvt_hpc.physics.geometry import variator
 from cvt_hpc.physics.sheaves import flexibility, sheaves
 from support.wraps import places
 
@@ -141,3 +145,32 @@ def test_the_chart_has_sheaves_that_open_nearly_alike():
     bending = np.exp(-radius * apart / length) / (2.0 * length * local)
     continuum = radius**2 / tilt * np.cos(apart) + bending
     assert np.linalg.norm(continuum - modes) < 0.105 * np.linalg.norm(modes)
+
+
+@pytest.mark.parametrize(("ratio", "load"), [(2.52, 140.0), (1.35, 250.0), (0.52, 300.0)])
+def test_rings_rub_on_the_whole_wrap_of_the_smaller_pulley(ratio, load):
+    """Eytelwein there: T - m v^2 grows as exp(mu s / R). On the larger pulley rings all but stick.
+
+    In the pushbelt they miss the way on which elements, here 6.3 mm long, take up the turning of the arc.
+    """
+    few = {"stations": 64, "band_high": 400.0, "rise_time": 0.02, "duration": 0.05, "longest_duration": 0.05}
+    changes = {"ratio": ratio, "load": [load], "friction_gradient": 0.0, "ring_damping": 4.0}
+    asked = load_job(JOBS / "both_belts.toml", changes | few)
+    point = asked.point(0)
+    path = variator(ratio, point["driven_radius"], point["centre_distance"])
+    radius, wrap = min((path.driving_radius, path.driving_wrap), (path.driven_radius, path.driven_wrap))
+    centrifugal = point["ring_mass"] * (point["driving_speed"] * path.driving_radius) ** 2
+
+    def rubbed(tensions):
+        """Angle [rad] on which they rub, by the tensions of t1 and t2 [N]."""
+        t1, t2 = np.asarray(tensions) - centrifugal
+        return np.sign(ratio - 1.0) * np.log(t2 / t1) / point["ring_friction"]
+
+    assert rubbed(solve(point).values["mean_ring_tension"]) == pytest.approx(wrap, rel=1e-3)
+
+    marched = pushbelt_jobs(asked, {"elements": 104})[0]
+    run = load_model(marched.model).batch([marched.point(0)], marched.stepper).runs[0]
+    assert run.advance(run.samples) is None
+    late = slice(run.samples - round(5e-3 / run.interval), run.samples)
+    missed = wrap - rubbed([run.channel(f"ring_tension {strand}")[late].mean() for strand in ("t1", "t2")])
+    assert 0.0 < missed * radius < 4.5 * path.path_length / 104
