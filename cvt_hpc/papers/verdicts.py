@@ -74,6 +74,12 @@ def on_strand(history: xr.Dataset, name: str, strand: str) -> np.ndarray:
     return np.interp(even, position, history[name].values[here])
 
 
+def courses(kept: Kept, axis: str, *names: str) -> dict[str, np.ndarray]:
+    """Results (n, ...) along an axis, in ascending order, by name; of all pulleys together."""
+    found = ((name, kept.results[name].transpose(axis, ...).sortby(axis)) for name in names)
+    return {name: (of.sum("pulley") if "pulley" in of.dims else of).values for name, of in found}
+
+
 @contextmanager
 def opened(folder: Path) -> Iterator[Kept]:
     """The study in an output folder, open within."""
@@ -105,7 +111,7 @@ class Verdict(Enum):
 class Measured(NamedTuple):
     """Whether each part of a statement holds, and the numbers by which that is told."""
 
-    holds: Sequence[Any]
+    holds: Iterable[Any]
     numbers: str
 
 
