@@ -129,8 +129,8 @@ def _edges_on_arcs(kept: Kept) -> Measured:
             for name in ("head_push", "push_force")
         )
         shares.append(heads / push)
-    return Measured(np.less(shares, NOTICED),
-                    f"heads carry {listed(np.multiply(100, shares), '.2g')} % at 60, 0 N m")  # fmt: skip
+    said = listed(np.multiply(100, shares), ".2g")
+    return Measured(np.less(shares, NOTICED), f"heads carry {said} % on the arcs at 60, 0 N m")
 
 
 def _heads_on_strands(kept: Kept) -> Measured:
@@ -138,8 +138,8 @@ def _heads_on_strands(kept: Kept) -> Measured:
         on_strand(history, "head_push", strand).mean() / on_strand(history, "push_force", strand).mean()
         for history, strand in _divided(kept)
     ]
-    return Measured(np.greater(shares, NOTICED),
-                    f"{listed(np.multiply(100, shares))} % of t1 at 60 N m, of t2 at 0 N m")  # fmt: skip
+    said = listed(np.multiply(100, shares), ".2g")
+    return Measured(np.greater(shares, NOTICED), f"heads carry {said} % in t1 at 60, in t2 at 0 N m")
 
 
 def _sum_is_constant(kept: Kept) -> Measured:

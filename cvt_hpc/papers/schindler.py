@@ -6,7 +6,7 @@ from cvt_hpc.papers.verdicts import Kept, Measured, Statement, courses, listed
 
 ALIKE = 0.02  # of two forces that balance each other
 # panels of the picture: first a quantity by marks, then theory beside it by lines
-SHOWN = (("net_axial_force", "beam_axial_force", "string_axial_force"), ("arc_one_sidedness",), ("loss",),
+SHOWN = (("net_axial_force", "beam_axial_force", "string_axial_force"), ("final_misalignment",), ("loss",),
          ("largest_roll",), ("largest_yaw",))  # fmt: skip
 
 

@@ -6,6 +6,7 @@ import numpy as np
 import xarray as xr
 
 from cvt_hpc.job import build_job
+from cvt_hpc.papers import schindler
 from cvt_hpc.papers.bullinger_ratios import ALONE, AT_REST, LOADED, REVERSED
 from cvt_hpc.papers.verdicts import Kept
 from cvt_hpc.variables import Status, Vibrates
@@ -41,6 +42,7 @@ def results(axes, **values):
         name: (value if isinstance(value, tuple) else (list(axes), value)) for name, value in values.items()
     }
     arrays["status"] = list(axes), np.full(shape, Status.DONE, np.int8)
+    arrays.setdefault("vibrates", (list(axes), np.full(shape, Vibrates.NO, np.int8)))
     return xr.Dataset(arrays, {**axes, "strand": STRANDS})
 
 
@@ -318,6 +320,7 @@ def spatial_push_force():
             other: {},
         }
         runs.append(belt({"misalignment": 0.0, "load": load}, **along))
+        runs[-1]["push_force"].attrs["units"] = "N"
     return Kept(None, runs)
 
 
@@ -333,7 +336,7 @@ def clamping():
         efficiency=1.0 - whole / 2e4,
         **losses,
     )
-    return Kept(found, [])
+    return Kept(found.assign_coords(pulley=["driving", "driven"]), [])
 
 
 def belt_drive():
@@ -360,7 +363,7 @@ def belt_drive_tension():
         "friction_force": -10.0 * peaks * tension,
     }
     axes = {"load": [2.0, 16.0], "bending_stiffness": [0.0026, 0.026], "contact_stiffness": [3e8, 1.2e9]}
-    rise = np.multiply.outer(np.multiply.outer([0.1, 1.0], [3.0, 12.0]), [1.0, 1.0])
+    rise = np.multiply.outer(np.multiply.outer([0.1, 1.0], [3.0, 250.0]), [1.0, 1.0])
     pair = 310.0 + rise[..., None] + np.array([-160.0, 160.0])
     found = results(axes, strand_tension=((*axes, "strand"), pair))
     points = ({"bending_stiffness": stiffness, "tension": 310.0} for stiffness in axes["bending_stiffness"])
@@ -398,9 +401,11 @@ def serpentine():
 def misalignment():
     axes = {"misalignment": np.array([0.0, 5e-4, 1e-3]), "load": np.array([0.0, 60.0])}
     size = np.add.outer(40.0 + 3e5 * axes["misalignment"], 0.1 * axes["load"])
+    force = size[..., None] * np.array([1.0, -1.0])
     found = results(
         axes,
-        net_axial_force=((*axes, "pulley"), size[..., None] * np.array([1.0, -1.0])),
+        **{name: ((*axes, "pulley"), force) for name in schindler.SHOWN[0]},
+        final_misalignment=1e-6 * size,
         largest_roll=1e-5 * size,
         largest_yaw=2e-5 * size,
         loss=300.0 + size,
