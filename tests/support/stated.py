@@ -326,7 +326,12 @@ def spatial_push_force():
 
 def clamping():
     thrust = np.array([11e3, 20e3, 34e3])
-    losses = {"ring_loss": 5e-3 * thrust, "tilt_loss": 5e-4 * thrust, "belt_loss": 5e-5 * thrust}
+    losses = {
+        "ring_loss": 5e-3 * thrust,
+        "tilt_loss": 5e-4 * thrust,
+        "element_loss": 2e-4 * thrust,
+        "belt_loss": 5e-5 * thrust,
+    }
     flanks = 1e-2 * np.outer(thrust, [1.5, 1.0])
     whole = flanks.sum(axis=1) + sum(losses.values())
     found = results(
