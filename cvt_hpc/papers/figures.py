@@ -272,7 +272,8 @@ FIGURES |= {
 FIGURES |= {
     job: PaperFigure(source, compose, statements)
     for job, source, compose, statements in (
-        ("push_force", "Geier et al. 2007, fig. 4", _along("push_force"), geier.FIGURE_4),
+        ("push_force", "Geier et al. 2007, fig. 4",
+         _along("push_force", columns="load_share"), geier.FIGURE_4),
         ("spatial_push_force", "Geier et al. 2007, fig. 5", geier.push_parts_figure, geier.FIGURE_5),
         ("clamping", "Geier et al. 2007, figs 6, 7", _over(*geier.LOSSES), geier.FIGURES_6_7),
         ("belt_drive", "Cepon and Boltezar 2011, figs 7, 8",

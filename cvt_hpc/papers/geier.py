@@ -11,7 +11,7 @@ from cvt_hpc.papers.verdicts import Kept, Measured, Statement, courses, listed, 
 
 LOW, NEAR, HIGH = (0.0, 0.15), (0.3,), (0.6, 0.95)  # torque ratios before, at and behind the transition
 APART = 10.0  # [N]: push force below which elements count as apart
-CLOSE = 0.1  # of the push at the largest torque: below it a state counts as close to the transition
+CLOSE = 0.1  # of the largest push: below it one counts as small, and a state as close to the transition
 CONSTANT = 0.01  # of a force that is said to be constant
 ALIKE = 0.05  # of two forces that are said to compensate each other
 EXIT = 0.95  # share of a wrap behind which its exit lies
@@ -36,7 +36,7 @@ def _largest_at_driven_exit(kept: Kept) -> Measured:
     holds, said = [], []
     for push in _arcs(kept, "driven"):
         place = np.argmax(push) / (push.size - 1)
-        holds += [push[0] < APART, place > EXIT]
+        holds += [push[0] < CLOSE * push.max(), place > EXIT]
         said.append(f"{push.max():.0f} N at {100 * place:.0f} % of the wrap, {push[-1]:.0f} N at its end")
     return Measured(holds, f"largest at r 0, 0.15: {', '.join(said)}")
 
@@ -75,8 +75,8 @@ def _reversed(kept: Kept) -> Measured:
 def _constant_along_strands(kept: Kept) -> Measured:
     cases = {0.0: "t2"} | dict.fromkeys(HIGH, "t1")
     spreads = [_spread(kept.history(load_share=r), "push_force", strand) for r, strand in cases.items()]
-    return Measured(np.less(spreads, CONSTANT),
-                    f"{listed(100 * np.array(spreads), '.2g')} % in t2 at r 0, in t1 beyond")  # fmt: skip
+    said = listed(np.multiply(100, spreads), ".2g")
+    return Measured(np.less(spreads, CONSTANT), f"within {said} % in t2 at r 0, in t1 at r 0.6, 0.95")
 
 
 def _spread(history: xr.Dataset, name: str, strand: str) -> float:

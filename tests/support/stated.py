@@ -305,7 +305,8 @@ def push_force():
                 t2={"push_force": second, "ring_tension": 2000.0 + second},
             )
         )
-    return Kept(None, runs)
+    job = build_job({"name": "made_up", "model": "pushbelt", "axes": {"load_share": [0.0, 0.15]}}).resolved()
+    return Kept(None, [history.assign_attrs(job=json.dumps(job)) for history in runs])
 
 
 def spatial_push_force():
