@@ -163,8 +163,14 @@ LOSSES = ("flank_loss", "ring_loss", "tilt_loss", "element_loss", "belt_loss")
 OVERALL = 0.01  # of all losses: by how much those of the contacts may miss them
 
 
+def _losses(kept: Kept, *names: str) -> dict[str, np.ndarray]:
+    """Losses [W] or efficiency by rising clamping force, of both pulleys together."""
+    found = courses(kept, "thrust", *names)
+    return {name: (of.sum("pulley") if "pulley" in of.dims else of).values for name, of in found.items()}
+
+
 def _losses_by_contact(kept: Kept) -> Measured:
-    parts = courses(kept, "thrust", *LOSSES, "loss")
+    parts = _losses(kept, *LOSSES, "loss")
     whole = parts.pop("loss")
     said = (f"{name} {listed(100 * (part / whole)[[0, -1]])}" for name, part in parts.items())
     return Measured([np.abs(sum(parts.values()) / whole - 1.0).max() < OVERALL],
@@ -172,13 +178,13 @@ def _losses_by_contact(kept: Kept) -> Measured:
 
 
 def _falls_with_clamping(kept: Kept, *names: str) -> Measured:
-    found = courses(kept, "thrust", *names)
+    found = _losses(kept, *names)
     said = (f"{name} {of[-1]:.3g} to {of[0]:.3g}" for name, of in found.items())
     return Measured([np.all(np.diff(of) > 0.0) for of in found.values()], f"[W] {', '.join(said)}")
 
 
 def _gains_efficiency(kept: Kept) -> Measured:
-    efficiency = courses(kept, "thrust", "efficiency")["efficiency"]
+    efficiency = _losses(kept, "efficiency")["efficiency"]
     return Measured([np.all(np.diff(efficiency) < 0.0)], f"efficiency {listed(100 * efficiency[::-1])} %")
 
 

@@ -11,7 +11,7 @@ SHOWN = (("net_axial_force", "beam_axial_force", "string_axial_force"), ("final_
 
 
 def _axial_forces(kept: Kept) -> Measured:
-    force = kept.results["net_axial_force"].transpose("misalignment", "load", "pulley").sortby("misalignment")
+    force = courses(kept, "misalignment", "net_axial_force")["net_axial_force"]
     driving, off = force.sel(pulley="driving").values, np.abs(force.sum("pulley").values)
     return Measured(
         [(driving[-1] > 2.0 * driving[0]).all(), off.max() < ALIKE * driving.max()],
@@ -21,7 +21,7 @@ def _axial_forces(kept: Kept) -> Measured:
 
 
 def _grow(kept: Kept, unit: str, factor: float, *names: str) -> Measured:
-    found = courses(kept, "misalignment", *names)
+    found = {name: of.values for name, of in courses(kept, "misalignment", *names).items()}
     said = (f"{name} {listed(factor * of[0])} to {listed(factor * of[-1])}" for name, of in found.items())
     return Measured(
         [np.all(of[-1] > of[0]) for of in found.values()], f"[{unit}] by loads, {'; '.join(said)}"

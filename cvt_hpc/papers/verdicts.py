@@ -74,10 +74,11 @@ def on_strand(history: xr.Dataset, name: str, strand: str) -> np.ndarray:
     return np.interp(even, position, history[name].values[here])
 
 
-def courses(kept: Kept, axis: str, *names: str) -> dict[str, np.ndarray]:
-    """Results (n, ...) along an axis, in ascending order, by name; of all pulleys together."""
-    found = ((name, kept.results[name].transpose(axis, ...).sortby(axis)) for name in names)
-    return {name: (of.sum("pulley") if "pulley" in of.dims else of).values for name, of in found}
+def courses(kept: Kept, axis: str, *names: str) -> dict[str, xr.DataArray]:
+    """Results by name along an axis, which comes first and ascends; InputError where a run is not done."""
+    if (kept.results["status"] != Status.DONE).any():
+        raise InputError(f"expected runs that are done at each {axis}, found others")
+    return {name: kept.results[name].transpose(axis, ...).sortby(axis) for name in names}
 
 
 @contextmanager

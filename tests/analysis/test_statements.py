@@ -11,6 +11,8 @@ from cvt_hpc.errors import InputError
 from cvt_hpc.papers.bullinger_ratios import _thirds
 from cvt_hpc.papers.figures import ARROWS, FIGURES, _Arc
 from cvt_hpc.papers.verdicts import Measured, Statement, Verdict, judged, on_strand, over_arc
+from cvt_hpc.variables import Status
+from support import stated
 
 ROOT = Path(__file__).parents[2]
 
@@ -33,6 +35,13 @@ def test_a_run_that_failed_measures_nothing():
         raise InputError("expected a run that is done")
 
     assert judged(Statement("it does", measure), None).verdict is Verdict.UNKNOWN
+
+
+@pytest.mark.parametrize("name", ["clamping", "misalignment"])
+def test_a_study_with_open_runs_measures_no_course(name):
+    kept = getattr(stated, name)()
+    kept.results["status"][-1] = Status.NOT_RUN
+    assert {judged(of, kept).verdict for of in FIGURES[name].statements} == {Verdict.UNKNOWN}
 
 
 def test_each_figure_has_a_job_and_a_table():
