@@ -25,7 +25,7 @@ PAPERS = {
 HEAD = """# Five papers, statement by statement
 
 What five papers state, the command, key or test that shows it here, what it gives, and whether that is what
-they state: first all of each paper, then each figure of the first two.
+they state: first all of each paper, then each figure whose statements are kept as a table.
 
 - Lebrecht, Pfeiffer, Ulbrich 2004 (04CVT-32): vibration of the pushbelt
 - Bullinger, Funk, Pfeiffer 2005: forces in the pushbelt as a continuum
@@ -36,11 +36,11 @@ they state: first all of each paper, then each figure of the first two.
 Made by `python jobs/paper_coverage.py docs/coverage.md` from `docs/coverage.toml` and from the tables in
 `jobs/results`. A row is measured where columns of these tables, or statements of a figure, decide at least
 a part of it. It is reproduced where all parts hold, partly where some do. Numbers are "older" where their
-table is older than the code, by its first lines. "Figure `NAME`" is `cvt-hpc run jobs/figures/NAME.toml &&
-cvt-hpc figure out/NAME`, which leaves `figure.png` and `statements.csv`. The papers' pictures have no data
-here: "reproduced" means every number and shape that the text states. What they do not give is assumed, as
-each job says. Jobs of figures have values of their own: no set of them meets all that Lebrecht et al.
-state.
+table is older than the code, by its first lines. "Figure `NAME`" is `cvt-hpc run JOB && cvt-hpc figure
+out/NAME`, where JOB is `jobs/figures/NAME.toml` or `jobs/NAME.toml`; it leaves `figure.png` and
+`statements.csv`. The papers' pictures have no data here: "reproduced" means every number and shape that the
+text states. What they do not give is assumed, as each job says. Jobs of figures have values of their own:
+no set of them meets all that Lebrecht et al. state.
 """
 REPRODUCED, PARTLY, NOT = "reproduced", "partly", "not"
 OLDER = " (older)"

@@ -424,4 +424,5 @@ def _add_legend(figure: Figure, axes: Axes, theory: Sequence[str]) -> None:
     handles, labels = axes.get_legend_handles_labels()
     handles += [Line2D([], [], ls=":", lw=1.6, color=INK) for _ in theory]
     if len(labels := [*labels, *theory]) > 1:
-        figure.legend(handles, labels, loc="outside lower center", frameon=False, ncols=min(len(labels), 3))
+        place = {"loc": "outside lower center", "frameon": False}
+        figure.legend(handles, labels, ncols=figures.legend_columns(labels), **place)

@@ -13,7 +13,7 @@ import xarray as xr
 from matplotlib.axes import Axes
 from matplotlib.figure import Figure
 
-from cvt_hpc.analysis.curves import curve_figure
+from cvt_hpc.analysis.curves import curve_figure, curve_panels_figure
 from cvt_hpc.analysis.figures import WIDTH, draw, styled
 from cvt_hpc.analysis.followed_drawing import element_figure
 from cvt_hpc.analysis.paper_pictures import (
@@ -22,7 +22,7 @@ from cvt_hpc.analysis.paper_pictures import (
     spectrum_figure,
     strand_bars_figure,
 )
-from cvt_hpc.analysis.profiles import inside, profile_figure
+from cvt_hpc.analysis.profiles import inside, profile_figure, wrap_figure
 from cvt_hpc.analysis.ramps import course_figure, ramp_figure
 from cvt_hpc.analysis.telling_apart import entitle_runs, on_axes
 from cvt_hpc.analysis.waterfall import waterfall_figure
@@ -30,8 +30,11 @@ from cvt_hpc.errors import unknown
 from cvt_hpc.papers import (
     bullinger_along,
     bullinger_ratios,
+    cepon,
+    geier,
     lebrecht_belt,
     lebrecht_excitation,
+    schindler,
 )
 from cvt_hpc.papers.verdicts import Finding, Kept, Statement, judged, opened
 from cvt_hpc.storage.files import write_rows
@@ -225,6 +228,11 @@ def _along(
     return lambda kept: profile_figure(kept.histories, quantities, region, columns)
 
 
+def _over(*quantities: str) -> Callable[[Kept], Figure]:
+    """Quantities over the axis of the study."""
+    return lambda kept: curve_figure(kept.results, quantities)
+
+
 FIGURES = {
     f"bullinger_{number}": PaperFigure(f"Bullinger et al. 2005, fig. {int(number)}", compose, statements)
     for number, compose, statements in (
@@ -244,7 +252,7 @@ FIGURES |= {
         ("3.1", lambda kept: course_figure(kept.histories[0], "driving_moment"), lebrecht_belt.FIGURE_3_1),
         ("3.2", lambda kept: waterfall_figure(kept.results), lebrecht_belt.FIGURE_3_2),
         ("3.6", lambda kept: strand_bars_figure(kept.results), lebrecht_belt.FIGURE_3_6),
-        ("3.7", lambda kept: curve_figure(kept.results, ["eigenfrequency"]), lebrecht_belt.FIGURE_3_7),
+        ("3.7", _over("eigenfrequency"), lebrecht_belt.FIGURE_3_7),
         ("3.9", lambda kept: ramp_figure(kept.histories), lebrecht_belt.FIGURE_3_9),
         ("3.10", lebrecht_belt.swings_figure, lebrecht_belt.FIGURE_3_10),
         ("3.11", lambda kept: spectrum_figure(kept.run()), lebrecht_belt.FIGURE_3_11),
@@ -260,6 +268,26 @@ FIGURES |= {
         ("4.4", lambda kept: blocks_figure(kept.histories), lebrecht_excitation.FIGURE_4_4),
     )
 }
+# several figures of these papers are of one job, by whose name they are found
+FIGURES |= {
+    job: PaperFigure(source, compose, statements)
+    for job, source, compose, statements in (
+        ("push_force", "Geier et al. 2007, fig. 4",
+         _along("push_force", columns="load_share"), geier.FIGURE_4),
+        ("spatial_push_force", "Geier et al. 2007, fig. 5", geier.push_parts_figure, geier.FIGURE_5),
+        ("clamping", "Geier et al. 2007, figs 6, 7", _over(*geier.LOSSES), geier.FIGURES_6_7),
+        ("belt_drive", "Cepon and Boltezar 2011, figs 7, 8",
+         _over("speed_loss", "expected_speed_loss", "creep_speed_loss"), cepon.FIGURES_7_8),
+        ("belt_drive_tension", "Cepon and Boltezar 2011, figs 9, 10",
+         lambda kept: wrap_figure(kept.histories), cepon.FIGURES_9_10),
+        ("belt_drive_spectra", "Cepon and Boltezar 2011, figs 11, 12",
+         lambda kept: waterfall_figure(kept.results), cepon.FIGURES_11_12),
+        ("serpentine", "Cepon and Boltezar 2011, figs 14 to 16",
+         lambda kept: cepon.drive_figure(kept.histories[0]), cepon.FIGURES_14_16),
+        ("misalignment", "Schindler et al. 2008, without a figure",
+         lambda kept: curve_panels_figure(kept.results, schindler.SHOWN, "load"), schindler.MISALIGNMENT),
+    )
+}  # fmt: skip
 
 
 def figure_of(folder: Path) -> tuple[Path, Path, list[Finding]]:

@@ -74,6 +74,13 @@ def on_strand(history: xr.Dataset, name: str, strand: str) -> np.ndarray:
     return np.interp(even, position, history[name].values[here])
 
 
+def courses(kept: Kept, axis: str, *names: str) -> dict[str, xr.DataArray]:
+    """Results by name along an axis, which comes first and ascends; InputError where a run is not done."""
+    if (kept.results["status"] != Status.DONE).any():
+        raise InputError(f"expected runs that are done at each {axis}, found others")
+    return {name: kept.results[name].transpose(axis, ...).sortby(axis) for name in names}
+
+
 @contextmanager
 def opened(folder: Path) -> Iterator[Kept]:
     """The study in an output folder, open within."""
@@ -105,7 +112,7 @@ class Verdict(Enum):
 class Measured(NamedTuple):
     """Whether each part of a statement holds, and the numbers by which that is told."""
 
-    holds: Sequence[Any]
+    holds: Iterable[Any]
     numbers: str
 
 

@@ -61,6 +61,16 @@ def tilted(name):
     return change
 
 
+def as_tension(name):
+    """A force that follows the tension, without peaks."""
+    return lambda history: history.assign({name: 20.0 * history["tension"]})
+
+
+def one_sided(name):
+    """Forces that point the same way at both pulleys."""
+    return lambda dataset: dataset.assign({name: abs(dataset[name])})
+
+
 def added(name, value):
     def change(dataset):
         dataset[name] = dataset[name] + value
@@ -213,6 +223,37 @@ BREAKS = {
     ),
     "lebrecht_4_4": (
         histories(scaled("radial_sliding", -1.0)), runs_swapped, runs_swapped,
+    ),
+    "push_force": (
+        histories(added("push_force", 100.0)), histories(backwards("push_force")),
+        histories(backwards("push_force")), histories(scaled("ring_tension", -1.0)), runs_swapped, runs_swapped,
+        histories(tilted("push_force")),
+    ),
+    "spatial_push_force": (
+        histories(added("head_force_left", 100.0)), histories(scaled("head_force_left", 0.0)),
+        histories(tilted("push_force")),
+    ),
+    "clamping": (
+        results(scaled("loss", 2.0)), results(along_swapped("thrust", "flank_loss")),
+        results(along_swapped("thrust", "ring_loss")), results(along_swapped("thrust", "efficiency")),
+    ),
+    "belt_drive": (results(scaled("speed_loss", 0.5)), results(scaled("vibrates", 0))),
+    "belt_drive_tension": (
+        histories(as_tension("normal_force")), histories(as_tension("friction_force")),
+        results(along_swapped("bending_stiffness", "strand_tension")),
+    ),
+    "belt_drive_spectra": (
+        results(strands_swapped("spectrum", "eigenfrequency")), results(level("spectrum")),
+        results(strands_swapped("spectrum", "eigenfrequency")),
+        results(along_swapped("frequency_bin", "spectrum")),
+    ),
+    "serpentine": (
+        histories(with_point(ripple_frequency=80.0)), histories(scaled("tension_P3-P4", 10.0)),
+        histories(scaled("arm_T2", 0.0)), histories(scaled("speed_P5", 0.9)),
+    ),
+    "misalignment": (
+        results(one_sided("net_axial_force")), results(along_swapped("misalignment", "largest_roll")),
+        results(along_swapped("misalignment", "loss")),
     ),
 }  # fmt: skip
 

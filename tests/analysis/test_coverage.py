@@ -44,7 +44,7 @@ WORDS = {
         if model.is_recorded
         for variable in model.variables
     ),
-    *("ring_slip", "head_force_left", "head_force_right"),  # of histories
+    "ring_slip",  # of histories
 }
 
 

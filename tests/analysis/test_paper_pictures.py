@@ -75,3 +75,34 @@ def test_a_spectrum_has_a_line_for_each_strand_and_names_modes():
     assert [line.get_ydata().max() for line in axes.lines] == pytest.approx([10.0, 10.0])
     assert [text.get_text() for text in axes.texts] == ["mode 2", "mode 3"] * 2
     assert labels_of(figure) == ["strand t1", "strand t2", "500 to 700 Hz"]
+
+
+def test_push_is_divided_between_rocking_edges_and_heads():
+    whole, edges, heads = (
+        [line.get_ydata() for line in axes.lines[:2]] for axes in drawn("spatial_push_force").axes
+    )
+    assert np.add(edges, np.multiply(1e-3, heads)) == pytest.approx(np.array(whole))  # kN and N
+    assert np.max(heads) == 60.0
+
+
+def test_a_serpentine_drive_has_its_spans_an_arm_and_all_speeds_over_time():
+    spans, arm, speeds = drawn("serpentine").axes
+    assert [len(axes.lines) for axes in (spans, arm, speeds)] == [2, 1, 2]
+    assert arm.get_ylabel() == "arm [°]" and arm.lines[0].get_ydata().max() == pytest.approx(1.3, rel=1e-3)
+
+
+def test_losses_of_contacts_stand_over_the_clamping_force():
+    (axes,) = drawn("clamping").axes
+    labels = [line.get_label() for line in axes.lines]
+    assert labels == [
+        *("flank loss driving", "flank loss driven"),
+        *(f"{of} loss" for of in ("ring", "tilt", "element", "belt")),
+    ]
+    assert axes.lines[2].get_ydata() == pytest.approx([55.0, 100.0, 170.0])
+
+
+@pytest.mark.parametrize(
+    "name", ["push_force", "belt_drive", "belt_drive_tension", "belt_drive_spectra", "misalignment"]
+)
+def test_figures_by_other_pictures_are_drawn(name):
+    assert all(axes.lines or axes.collections for axes in drawn(name).axes if axes.get_visible())

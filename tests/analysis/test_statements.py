@@ -11,6 +11,8 @@ from cvt_hpc.errors import InputError
 from cvt_hpc.papers.bullinger_ratios import _thirds
 from cvt_hpc.papers.figures import ARROWS, FIGURES, _Arc
 from cvt_hpc.papers.verdicts import Measured, Statement, Verdict, judged, on_strand, over_arc
+from cvt_hpc.variables import Status
+from support import stated
 
 ROOT = Path(__file__).parents[2]
 
@@ -35,9 +37,19 @@ def test_a_run_that_failed_measures_nothing():
     assert judged(Statement("it does", measure), None).verdict is Verdict.UNKNOWN
 
 
+@pytest.mark.parametrize("name", ["clamping", "misalignment"])
+def test_a_study_with_open_runs_measures_no_course(name):
+    kept = getattr(stated, name)()
+    kept.results["status"][-1] = Status.NOT_RUN
+    assert {judged(of, kept).verdict for of in FIGURES[name].statements} == {Verdict.UNKNOWN}
+
+
 def test_each_figure_has_a_job_and_a_table():
-    for folder, suffix in (("figures", "toml"), ("results/figures", "csv")):
-        assert {path.stem for path in (ROOT / "jobs" / folder).glob(f"*.{suffix}")} == set(FIGURES)
+    jobs, own, tables = (
+        {path.stem for path in (ROOT / "jobs").glob(names)}
+        for names in ("*.toml", "figures/*.toml", "results/figures/*.csv")
+    )
+    assert own <= set(FIGURES) <= own | jobs and tables == set(FIGURES)
 
 
 def graded(count=60):

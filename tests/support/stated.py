@@ -6,6 +6,7 @@ import numpy as np
 import xarray as xr
 
 from cvt_hpc.job import build_job
+from cvt_hpc.papers import schindler
 from cvt_hpc.papers.bullinger_ratios import ALONE, AT_REST, LOADED, REVERSED
 from cvt_hpc.papers.verdicts import Kept
 from cvt_hpc.variables import Status, Vibrates
@@ -41,6 +42,7 @@ def results(axes, **values):
         name: (value if isinstance(value, tuple) else (list(axes), value)) for name, value in values.items()
     }
     arrays["status"] = list(axes), np.full(shape, Status.DONE, np.int8)
+    arrays.setdefault("vibrates", (list(axes), np.full(shape, Vibrates.NO, np.int8)))
     return xr.Dataset(arrays, {**axes, "strand": STRANDS})
 
 
@@ -286,3 +288,132 @@ def lebrecht_4_4():
             history[name] = (), power
         runs.append(history)
     return Kept(results({"friction_gradient": [-0.7, 0.0]}), runs)
+
+
+def push_force():
+    """A belt whose push changes from t2 to t1 as the torque rises, and is largest at the exit of an arc."""
+    runs = []
+    for share, first, second in (
+        (0.0, 0.0, 400.0), (0.15, 0.0, 60.0), (0.3, 30.0, 0.0), (0.6, 800.0, 0.0), (0.95, 1500.0, 0.0)
+    ):  # fmt: skip
+        runs.append(
+            belt(
+                {"load_share": share},
+                driving={"push_force": np.interp(SHARE, [0.0, 1.0], [second, first])},
+                t1={"push_force": first, "ring_tension": 2000.0 + first},
+                driven={"push_force": np.interp(SHARE, [0.0, 1.0], [first, second])},
+                t2={"push_force": second, "ring_tension": 2000.0 + second},
+            )
+        )
+    job = build_job({"name": "made_up", "model": "pushbelt", "axes": {"load_share": [0.0, 0.15]}}).resolved()
+    return Kept(None, [history.assign_attrs(job=json.dumps(job)) for history in runs])
+
+
+def spatial_push_force():
+    """Aligned belts that press at the rocking edges on arcs, and partly by their left heads on a strand."""
+    runs = []
+    for load, strand, other in ((60.0, "t1", "t2"), (0.0, "t2", "t1")):
+        heads = {"head_force_left": np.linspace(20.0, 60.0, STRAND), "head_force_right": 0.0}
+        along = {
+            "driving": {"push_force": 600.0 * SHARE},
+            strand: {"push_force": 600.0, **heads},
+            "driven": {"push_force": 600.0 * SHARE[::-1]},
+            other: {},
+        }
+        runs.append(belt({"misalignment": 0.0, "load": load}, **along))
+        runs[-1]["push_force"].attrs["units"] = "N"
+    return Kept(None, runs)
+
+
+def clamping():
+    thrust = np.array([11e3, 20e3, 34e3])
+    losses = {
+        "ring_loss": 5e-3 * thrust,
+        "tilt_loss": 5e-4 * thrust,
+        "element_loss": 2e-4 * thrust,
+        "belt_loss": 5e-5 * thrust,
+    }
+    flanks = 1e-2 * np.outer(thrust, [1.5, 1.0])
+    whole = flanks.sum(axis=1) + sum(losses.values())
+    found = results(
+        {"thrust": thrust},
+        flank_loss=(("thrust", "pulley"), flanks),
+        loss=whole,
+        efficiency=1.0 - whole / 2e4,
+        **losses,
+    )
+    return Kept(found.assign_coords(pulley=["driving", "driven"]), [])
+
+
+def belt_drive():
+    load = np.array([0.0, 8.0, 16.0, 22.0])
+    creep = np.tile(1.3e-4 * load, (2, 1))
+    verdicts = np.where(load == 22.0, Vibrates.SLIPS, Vibrates.NO) * np.ones((2, 1), np.int8)
+    found = results(
+        {"driving_speed": [22.6, 62.8], "load": load},
+        speed_loss=1.1 * creep,
+        expected_speed_loss=1.07 * creep,
+        creep_speed_loss=creep,
+        vibrates=verdicts,
+    )
+    return Kept(found, [])
+
+
+def belt_drive_tension():
+    """Forces over a driven pulley that follow the tension, with a peak at both ends; bending tightens the belt."""
+    tension = np.interp(SHARE, [0.0, 0.3, 1.0], [160.0, 160.0, 480.0])
+    peaks = np.where(np.abs(SHARE - 0.5) > 0.42, 2.0, 1.0)
+    forces = {
+        "tension": tension,
+        "normal_force": 20.0 * peaks * tension,
+        "friction_force": -10.0 * peaks * tension,
+    }
+    axes = {"load": [2.0, 16.0], "bending_stiffness": [0.0026, 0.026], "contact_stiffness": [3e8, 1.2e9]}
+    rise = np.multiply.outer(np.multiply.outer([0.1, 1.0], [3.0, 250.0]), [1.0, 1.0])
+    pair = 310.0 + rise[..., None] + np.array([-160.0, 160.0])
+    found = results(axes, strand_tension=((*axes, "strand"), pair))
+    points = ({"bending_stiffness": stiffness, "tension": 310.0} for stiffness in axes["bending_stiffness"])
+    return Kept(found, [belt(point, driven=forces) for point in points])
+
+
+def belt_drive_spectra():
+    """Spectra with the lines of three modes, whose frequencies fall in t1 and rise in t2."""
+    load, bins, waves = np.array([0.0, 10.0, 20.0]), np.arange(0.0, 400.0, 2.5), np.array([1, 2, 3])
+    first = np.stack([72.0 - load, 72.0 + load], 1)
+    frequency = first[..., None] * waves
+    lines = np.exp(-(((bins - frequency[..., None]) / 3.0) ** 2)) / waves[:, None]
+    found = results(
+        {"load": load},
+        eigenfrequency=(("load", "strand", "half_waves"), frequency),
+        spectrum=(("load", "strand", "frequency_bin"), 1e-7 + 1e-5 * lines.sum(axis=2)),
+    )
+    return Kept(found.assign_coords(half_waves=waves, frequency_bin=bins), [])
+
+
+def serpentine():
+    time = 5e-4 * np.arange(1, 2001)
+    ripple = np.sin(2.0 * np.pi * 40.0 * time)
+    courses = {
+        "tension_P3-P4": 700.0 + 30.0 * ripple,
+        "tension_P5-P1": 1400.0 + 200.0 * ripple,
+        "arm_T2": np.radians(1.0 + 0.3 * ripple),
+        "speed_P1": 60.0 + 10.0 * ripple,
+        "speed_P5": 59.8 + 10.0 * ripple,
+    }
+    history = xr.Dataset({name: ("time", course) for name, course in courses.items()}, {"time": time})
+    return Kept(None, [history.assign_attrs(point=json.dumps({"ripple_frequency": 40.0}))])
+
+
+def misalignment():
+    axes = {"misalignment": np.array([0.0, 5e-4, 1e-3]), "load": np.array([0.0, 60.0])}
+    size = np.add.outer(40.0 + 3e5 * axes["misalignment"], 0.1 * axes["load"])
+    force = size[..., None] * np.array([1.0, -1.0])
+    found = results(
+        axes,
+        **{name: ((*axes, "pulley"), force) for name in schindler.SHOWN[0]},
+        final_misalignment=1e-6 * size,
+        largest_roll=1e-5 * size,
+        largest_yaw=2e-5 * size,
+        loss=300.0 + size,
+    )
+    return Kept(found.assign_coords(pulley=["driving", "driven"]), [])
