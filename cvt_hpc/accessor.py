@@ -206,7 +206,7 @@ class Results:
     def onset_quantiles(self, along: str = "load") -> xr.DataArray:
         """Return the onset [unit of the axis] that 5, 50 and 95 % of the samples do not exceed.
 
-        It is -inf where vibration is there at the lowest value already, inf where there is none.
+        It is -inf where the lowest value with a verdict vibrates already, inf where none does.
         """
         from cvt_hpc.analysis.probability import onset_quantiles
 

@@ -16,7 +16,7 @@ from cvt_hpc.analysis.hysteresis_bands import ALONG
 from cvt_hpc.analysis.probability import CONTOURS, PROBABILITY, QUANTILES, onset_quantiles, over_samples
 from cvt_hpc.analysis.value_maps import value_map_figure
 from cvt_hpc.errors import mismatch
-from cvt_hpc.job.axes import SAMPLE
+from cvt_hpc.job.axes import SAMPLE, SWAPPED
 
 LINE, BAND = figures.COLOURS[0], "#9ecae1"
 LEAST, HEIGHT, FRAME = 1.3, 2.8, 1.3  # [inch]: a panel at least and else, and title and legend
@@ -45,7 +45,7 @@ def probability_figure(
     sides : Sides
         Which axis runs along x, along y, and over the panels.
     """
-    told = over_samples(dataset)
+    told = over_samples(dataset, at or {})
     name = PROBABILITY if np.isfinite(told[PROBABILITY]).any() else "failure_probability"
     arrangement = layout.arrange(told, at or {}, source, sides)
     if arrangement.y:
@@ -88,7 +88,7 @@ def onset_bands_figure(
         As of all pictures; the results have no samples, or no axis beside `along`.
     """
     check_results(dataset, source)
-    told = over_samples(dataset)
+    told = over_samples(dataset, at or {})
     numeric = [name for name in map(str, told["status"].dims) if told[name].dtype.kind in "iuf"]
     known = [name for name in (*ALONG, *reversed(numeric)) if name in numeric and name not in (at or {})]
     along = along or next(iter(known), "")
@@ -114,7 +114,7 @@ def onset_bands_figure(
     labels = "median", f"{first} to {last} of the samples"
     then = "fix an axis, as by `--at AXIS=VALUE`"
     figure, all_axes = _draw_bands(panels, layout.ruler(shown[arrangement.x]), label, labels, source, then)
-    samples = f"{dataset.sizes[SAMPLE]} samples; the band ends where the axis does"
+    samples = f"{dataset.sizes[SAMPLE] * (1 + (SWAPPED in dataset.dims))} samples; the band ends where the axis does"
     head = figures.headline("Onset of vibration", dataset.attrs)
     _entitle(figure, all_axes[0], [head, samples, *arrangement.notes])
     return figure

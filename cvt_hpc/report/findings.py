@@ -167,6 +167,8 @@ def probability_sentences(
 def _owed(told: xr.Dataset) -> Iterator[str]:
     """State the Sobol indices in the cell where it is least certain whether it vibrates."""
     shares = told[PROBABILITY]
+    if not shares.notnull().any():
+        return
     cell = int(np.nanargmin(np.abs(shares.values - 0.5)))
     dims = list(map(str, shares.dims))
     here = told.isel(dict(zip(dims, map(int, np.unravel_index(cell, shares.shape)), strict=True)))

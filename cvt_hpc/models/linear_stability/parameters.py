@@ -6,7 +6,7 @@ from cvt_hpc.models import steady_variator
 from cvt_hpc.models.steady_variator.parameters import OF_LAGS
 from cvt_hpc.parameters import Parameter, not_negative, positive
 
-LEAST_MEMORY = 1e-4  # [s]: compared with transients down to this, see README.md
+LEAST_MEMORY = 1e-4  # [s]: shorter ones are outside the band that is searched (README.md)
 
 PARAMETERS: dict[str, dict[str, Parameter]] = steady_variator.PARAMETERS | {
     "judgement": {
