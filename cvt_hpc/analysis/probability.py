@@ -40,7 +40,7 @@ _VERDICTS = (OccurrenceClass.QUIET, OccurrenceClass.VIBRATING, OccurrenceClass.S
 
 
 def has_samples(dataset: xr.Dataset, fixed: Collection[str] = ()) -> bool:
-    """Whether results have samples of uncertain parameters, and neither a sample nor what is swapped is fixed."""
+    """Whether results have samples of uncertain parameters, and none of their axes is fixed."""
     dims = {*dataset["status"].dims}
     return SAMPLE in dims and not {SAMPLE, SWAPPED} & {*fixed} and bool(dims - {SAMPLE, SWAPPED})
 
@@ -191,10 +191,10 @@ def onset_quantiles(dataset: xr.Dataset, along: str, source: str = "results") ->
     Returns
     -------
     DataArray
-        Over `quantile` and the other axes [unit of the axis]: midway between the quiet and the vibrating value
-        around it, so within half a step where no run between them is undecided. -inf: vibrates at the lowest
-        value of which a verdict is known; inf: at no value. Samples of which no run is known to be quiet or
-        to vibrate do not count.
+        Over `quantile` and the other axes [unit of the axis]: midway between the quiet and the vibrating
+        value around it, so within half a step where no run between them is undecided. -inf: vibrates at the
+        lowest value of which a verdict is known; inf: at no value. Samples of which no run is known to be
+        quiet or to vibrate do not count.
 
     Raises
     ------

@@ -114,7 +114,8 @@ def onset_bands_figure(
     labels = "median", f"{first} to {last} of the samples"
     then = "fix an axis, as by `--at AXIS=VALUE`"
     figure, all_axes = _draw_bands(panels, layout.ruler(shown[arrangement.x]), label, labels, source, then)
-    samples = f"{dataset.sizes[SAMPLE] * (1 + (SWAPPED in dataset.dims))} samples; the band ends where the axis does"
+    size = dataset.sizes[SAMPLE] * (2 if SWAPPED in dataset.dims else 1)
+    samples = f"{size} samples; the band ends where the axis does"
     head = figures.headline("Onset of vibration", dataset.attrs)
     _entitle(figure, all_axes[0], [head, samples, *arrangement.notes])
     return figure

@@ -101,9 +101,9 @@ class StartClass(IntEnum):
 def classify_starts(small: NDArray, large: NDArray) -> NDArray[np.int8]:
     """Class of each cell by its runs from two starts.
 
-    Where a run failed the cell failed, whatever the other run gives, so that no failure is hidden. Else a cell
-    that vibrates from the small start vibrates; a cell is quiet only if it is so from both. Of a cell that is
-    quiet from the small start the other run decides, and where one run is undecided the cell is.
+    Where a run failed the cell failed, whatever the other run gives, so that no failure is hidden. Else a
+    cell that vibrates from the small start vibrates; a cell is quiet only if it is so from both. Of a cell
+    that is quiet from the small start the other run decides, and where one run is undecided the cell is.
     A cell that slips or moves irregularly from the small start is of that class.
 
     Parameters
