@@ -38,7 +38,8 @@ def measured(job: Job) -> tuple[float, float, float, float]:
     held = simulate(job)
     force, free = float(held["axial_force"][0]), BELTS[job.model]
     runs = [held, *(simulate(job, free | {"driving_thrust": share * force}) for share in FORCES)]
-    logarithms = np.log([1.0, *FORCES])
+    # of the belt's own forces: without those of the dampers behind the sheaves
+    logarithms = np.log([float(run["thrust_ratio"] / held["thrust_ratio"]) for run in runs])
     rates = np.array([float(run["shift_speed"]) for run in runs])
     slope = (logarithms @ rates) / (logarithms @ logarithms)
     off = np.abs(rates - slope * logarithms).max() / np.abs(rates).max()
