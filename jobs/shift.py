@@ -52,9 +52,10 @@ def rows() -> Iterator[tuple[str, ...]]:
     for chosen in CELLS:
         axes = load_job(JOB, chosen).axes
         for place in product(*(axis.values for axis in axes)):
-            cell = load_job(JOB, dict(zip([axis.name for axis in axes], map(float, place), strict=True)))
-            p = cell.parameters
-            where = p["ratio"], p["driving_speed"] * 30.0 / np.pi, p["thrust"] * 1e-3, place[3], place[4]
+            at = dict(zip([axis.name for axis in axes], map(float, place), strict=True))
+            cell = load_job(JOB, at)
+            speed, thrust = at["driving_speed"] * 30.0 / np.pi, at["thrust"] * 1e-3
+            where = at["ratio"], speed, thrust, at["load_share"], at["sheave_stiffness"]
             for belt in (cell, pushbelt_jobs(cell, {})[0]):
                 yield belt.model, *(f"{value:.4g}" for value in (*where, *measured(belt)))
 

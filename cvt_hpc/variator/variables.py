@@ -129,8 +129,10 @@ def shift_speed(radii: Callable[[Any], Sequence[np.ndarray]]) -> Variable:
 
     def rate(measured: Any) -> float:
         driving, driven = radii(measured)
-        time = np.arange(len(driving)) / measured.parameters["sampling_rate"]
-        return float(np.polyfit(time, driven / driving, 1)[0])
+        # the slope of a line of least squares; sums have the same bits on any number of threads
+        time = np.arange(len(driving)) - 0.5 * (len(driving) - 1)
+        per_sample = (time * (driven / driving)).sum() / (time * time).sum()
+        return float(per_sample * measured.parameters["sampling_rate"])
 
     return Variable(
         "shift_speed",
