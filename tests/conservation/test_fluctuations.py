@@ -239,7 +239,9 @@ def test_growth_is_what_is_fed_over_twice_the_energy(load):
 def _dampers_take(runs, belt, states):
     """Power of the layers' dampers in the fluctuation [W]: of no steps, and so of the samples."""
     v0, v1 = (np.array([state.fields[row] for state in states]) for row in (f.V_ELEMENT, f.V_RING))
-    opening, stretching = (np.roll(v, -1, axis=1) - v for v in (v0, v1))
+    u = np.array([state.fields[f.U] for state in states])
+    lifted = 0.5 * belt.curvature * belt.cell * (u + np.roll(u, -1, axis=1))
+    opening, stretching = (np.roll(v, -1, axis=1) - v + lifted for v in (v0, v1))
     elements = -covariance(runs.profiles()["push_damping"].T, opening).sum()
     return elements + belt.ring_damping * (stretching.var(axis=0) / belt.cell).sum()
 

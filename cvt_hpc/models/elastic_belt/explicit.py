@@ -84,7 +84,7 @@ def _accelerate(belt: LaneBelt, state: LaneState, stations: LaneArray, step: flo
     masses = c[0, lf.ELEMENT_MASS], ring_mass
     rise, zero = acceleration * step, like(0.0, sine)
     taken = moment = net_left = ring_left = stress_left_0 = stress_left_1 = zero
-    gap_left_0 = gap_left_1 = zero
+    gap_left_0 = gap_left_1 = bent_left = zero
     for k in range(-1, n):
         # the last cell first, which is behind row 0
         j = k if k >= 0 else n - 1
@@ -95,9 +95,12 @@ def _accelerate(belt: LaneBelt, state: LaneState, stations: LaneArray, step: flo
         net_right = push + (ring_right - centrifugal)
         gap_0 = (ahead(fields, j, f.V_ELEMENT) - v0) * per_cell
         gap_1 = (ahead(fields, j, f.V_RING) - v1) * per_cell
+        kappa = belt.curvature[j]
+        lifting = (0.5 * kappa) * (fields[j, f.U] + ahead(fields, j, f.U))
         # elements that are apart have no damper, and it never makes them pull
-        damped_0 = select(push < 0.0, minimum(element_damping * gap_0, -push), 0.0)
-        damped_1 = ring_damping * gap_1
+        damped_0 = select(push < 0.0, minimum(element_damping * (gap_0 + lifting), -push), 0.0)
+        damped_1 = ring_damping * (gap_1 + lifting)
+        bent = (0.5 * kappa * belt.cell[j]) * (damped_0 + damped_1)
         stress_0, stress_1 = push + damped_0, ring_right + damped_1
         if k >= 0:
             stations[j, DAMPED_0], stations[j, DAMPED_1] = damped_0, damped_1
@@ -107,6 +110,7 @@ def _accelerate(belt: LaneBelt, state: LaneState, stations: LaneArray, step: flo
             across = forces.lane_transverse(belt, fields, j, net_left, net_right, bending, 0.0)
             across = fma(-gyroscopic, (ahead(fields, j, f.U) - behind(fields, j, f.U)) * span, across)
             across = fma(-acceleration * mass, slope, across)
+            across = fma(-per_dual, bent_left + bent, across)
             if belt.has_column:
                 across += column_across(belt, state, j)
             if belt.is_curved:
@@ -152,11 +156,12 @@ def _accelerate(belt: LaneBelt, state: LaneState, stations: LaneArray, step: flo
                 dv_1 = fma(-turning, (belt_speed + v1) / longer, dv_1)
             stations[j, DV_0], stations[j, DV_1] = dv_0 - rise, dv_1 - rise
         net_left, ring_left, stress_left_0, stress_left_1 = net_right, ring_right, stress_0, stress_1
-        gap_left_0, gap_left_1 = gap_0, gap_1
+        gap_left_0, gap_left_1, bent_left = gap_0, gap_1, bent
         if k < 0:
             net_left, ring_left = from_behind(net_left), from_behind(ring_left)
             stress_left_0, stress_left_1 = from_behind(stress_left_0), from_behind(stress_left_1)
             gap_left_0, gap_left_1 = from_behind(gap_left_0), from_behind(gap_left_1)
+            bent_left = from_behind(bent_left)
     return around(taken), around(moment)
 
 
@@ -175,15 +180,17 @@ def _advance_layers(belt: LaneBelt, state: LaneState, stations: LaneArray, step:
         v_b = fields[0, v_row] + dv_b
         flux_b = fma(-belt_speed, behind(stations, 0, eps_row), v_b) * behind(stations, 0, short_row)
         dv_b, v_b, flux_b = from_ahead(dv_b), from_ahead(v_b), from_ahead(flux_b)
+        u_b = from_ahead(fma(0.5, stations[0, DU], fields[0, f.U]))
         for j in range(n - 1, -1, -1):
-            dv = stations[j, dv_row]
+            dv, u = stations[j, dv_row], fma(0.5, stations[j, DU], fields[j, f.U])
             v = fields[j, v_row] + dv
             flux = fma(-belt_speed, behind(stations, j, eps_row), v) * behind(stations, j, short_row)
-            # a damper's force at the start of the step times the mean closing speed
-            work_done = fma(stations[j, damped_row], fma(-0.5, dv_b - dv, v_b - v), work_done)
+            # a damper's force at the start of the step times the mean speed at which its cell lengthens
+            longer = fma(0.5 * belt.curvature[j] * belt.cell[j], u + u_b, fma(-0.5, dv_b - dv, v_b - v))
+            work_done = fma(stations[j, damped_row], longer, work_done)
             fields[j, n_row] = fma(step * belt.per_cell[j], flux - flux_b, fields[j, n_row])
             fields[j, v_row] = v
-            dv_b, v_b, flux_b = dv, v, flux
+            dv_b, v_b, flux_b, u_b = dv, v, flux, u
     scalars[0, lf.LAYER_WORK] = scalars[0, lf.LAYER_WORK] + around(work_done) * step
 
 

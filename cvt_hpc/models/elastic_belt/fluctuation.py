@@ -124,14 +124,15 @@ def fluctuation(means: dict[str, np.ndarray], grid: Mesh, parameters: Mapping[st
     own = own + m["element_power"] - m["element_force"] * m["element_speed"]
     opening, stretching = _step(m["element_speed"]), _step(m["ring_speed"])
     mean_stresses = m["push_force"] * opening - m["ring_tension"] * stretching - _lifting(m, grid, p)
-    mean_rings = p["ring_damping"] * (stretching**2 / grid.cell).sum()
+    lifted = _lifted(m, grid)
+    mean_rings = p["ring_damping"] * ((stretching + lifted) ** 2 / grid.cell).sum()
     powers = (
         dual * flanks,
         dual * belt,
         m["saddle_friction"] * m["saddle_speed"] - m["saddle_power"],
         dual * (own - flanks - belt),
         m["stress_power"] - mean_stresses,
-        mean_rings - m["push_damping"] @ opening,
+        mean_rings - m["push_damping"] @ (opening + lifted),
     )
     return Fluctuation(*(steadiness(p) * power for power in powers))
 
@@ -141,13 +142,18 @@ def steadiness(parameters: Mapping[str, Any]) -> float:
     return np.nan if ramped(parameters) else 1.0
 
 
+def _lifted(m: dict[str, np.ndarray], grid: Mesh) -> np.ndarray:
+    """Speed at which the cells of the arcs lengthen by their mean transverse motion [m/s], (N,)."""
+    u = m["transverse_speed"]
+    return grid.cell * grid.curvature * (u + 0.5 * _step(u))
+
+
 def _lifting(m: dict[str, np.ndarray], grid: Mesh, p: Mapping[str, Any]) -> np.ndarray:
     """Power of the cells' mean stresses in the mean transverse motion [W], (N,)."""
     speed = p["driving_speed"] * grid.path.driving_radius
     net = m["ring_tension"] - m["push_force"] - (p["element_mass"] + p["ring_mass"]) * speed**2
-    u = m["transverse_speed"]
-    turning = _step(m["mean_displacement"]) * _step(u) / grid.cell
-    return net * (grid.cell * grid.curvature * (u + 0.5 * _step(u)) + turning)
+    turning = _step(m["mean_displacement"]) * _step(m["transverse_speed"]) / grid.cell
+    return net * (_lifted(m, grid) + turning)
 
 
 def at_stations(values: np.ndarray) -> np.ndarray:

@@ -13,7 +13,7 @@ from cvt_hpc.models.elastic_belt.belt import Belt, State, belt_constants, initia
 from cvt_hpc.models.elastic_belt.column import pressed_strains
 from cvt_hpc.models.elastic_belt.lane_belt import put_lane
 from cvt_hpc.models.elastic_belt.recorded_run import OneLaneRun
-from cvt_hpc.models.elastic_belt.rhs import strains
+from cvt_hpc.models.elastic_belt.rhs import lengthening, strains
 from cvt_hpc.models.elastic_belt.ring_settings import layer_count
 from cvt_hpc.models.elastic_belt.rings import FIRST_LAYER, ring_constants
 from cvt_hpc.models.elastic_belt.sampling import Outcome
@@ -173,12 +173,12 @@ def damper_power(belt: Belt, state: State) -> float:
         v = state.fields[f.V_ELEMENT + layer]
         damper = belt.ring_damping if layer else belt.element_damping
         for c in range(n):
-            closing = v[c + 1 if c < n - 1 else 0] - v[c]
-            damped = damper * closing / belt.cell[c]
+            rate = lengthening(belt, v, state.fields[f.U], c)
+            damped = damper * rate
             if layer == 0:
                 # elements that are apart have none, and it never makes them pull
                 damped = min(damped, -belt.element_stiffness * pressed[c]) if pressed[c] < 0.0 else 0.0
-            power += damped * closing
+            power += damped * rate * belt.cell[c]
     for k in range(FIRST_LAYER, (FIRST_LAYER + state.fields.shape[0]) // 2):
         # beside the transport by the layers' mean speed
         share = 2.0 / (state.fields.shape[0] - FIRST_LAYER)

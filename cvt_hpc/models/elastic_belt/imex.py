@@ -22,7 +22,7 @@ from cvt_hpc.models.elastic_belt import fields as f
 from cvt_hpc.models.elastic_belt import lane_fields as lf
 from cvt_hpc.models.elastic_belt import lane_forces as forces
 from cvt_hpc.models.elastic_belt.imex_bending import move_across, move_with_layers
-from cvt_hpc.models.elastic_belt.imex_stations import assemble
+from cvt_hpc.models.elastic_belt.imex_stations import assemble, damp_across
 from cvt_hpc.models.elastic_belt.imex_system import TURNS_BACK, eliminate, substitute
 from cvt_hpc.models.elastic_belt.lane_belt import LaneBelt, LaneState, Work
 from cvt_hpc.models.elastic_belt.lane_column import foresee_column, lane_column
@@ -57,6 +57,7 @@ def step_imex(belt: LaneBelt, state: LaneState, work: Work, step: float) -> None
     if belt.tilts:
         carry_tilt(belt, state, step)
         lane_tilt(belt, state, stations, step)
+    damp_across(belt, state, work)
     assemble(belt, state, work, step, False)
     coupled = move_across(belt, state, work, step)
     if belt.has_column:
@@ -106,16 +107,13 @@ def advance_belt(belt: LaneBelt, state: LaneState, work: Work, step: float):
     per_cosine = 1.0 / c[0, lf.COSINE]
     speed_share = forces.lane_speed_share(belt, state.time[0], c[0, lf.BELT_SPEED])
     belt_speed, offset = speed_share * c[0, lf.BELT_SPEED], c[0, lf.RING_OFFSET]
-    stiffness, damper_0, damper_1 = (
-        c[0, lf.ELEMENT_STIFFNESS],
-        c[0, lf.ELEMENT_DAMPING],
-        c[0, lf.RING_DAMPING],
-    )
     driven_speed, radius, driving_radius = (
         state.scalars[0, lf.SPEED],
         c[0, lf.DRIVEN_RADIUS],
         c[0, lf.DRIVING_RADIUS],
     )
+    stiffness, damper_0 = c[0, lf.ELEMENT_STIFFNESS], c[0, lf.ELEMENT_DAMPING]
+    damper_1 = c[0, lf.RING_DAMPING]
     pulleys = forces.lane_pulleys(belt, speed_share, state.scalars)
     zero, moment, taken = like(0.0, offset), like(0.0, driven_speed), like(0.0, driven_speed)
     last_filtered = behind(fields, 0, f.V_FILTERED)
@@ -127,23 +125,23 @@ def advance_belt(belt: LaneBelt, state: LaneState, work: Work, step: float):
     w_b = fma(step, fields[0, f.U] + stations[0, lf.PUSH], fields[0, f.W])
     v0_b, dv0_b, flux0_b = from_ahead(v0_b), from_ahead(dv0_b), from_ahead(first_0)
     v1_b, dv1_b, flux1_b = from_ahead(v1_b), from_ahead(dv1_b), from_ahead(first_1)
-    w_b = from_ahead(w_b)
+    w_b, du_b = from_ahead(w_b), from_ahead(stations[0, lf.PUSH])
+    u_b = from_ahead(fields[0, f.U]) + du_b
     work_done = zero
     for j in range(n - 1, -1, -1):
         per_cell = belt.per_cell[j]
-        v0, dv0, eps = (
-            fields[j, f.V_ELEMENT],
-            stations[j, lf.DV_0],
-            forces.pressed_strain(belt, state, stations, j),
-        )
+        v0, dv0 = fields[j, f.V_ELEMENT], stations[j, lf.DV_0]
         v1, dv1 = fields[j, f.V_RING], stations[j, lf.DV_1]
         new_0, new_1 = v0 + dv0, v1 + dv1
         flux_0, flux_1 = first_0, first_1
         if j > 0:
             flux_0 = fma(-belt_speed, stations[j - 1, lf.EPS_0], new_0) * stations[j - 1, lf.SHORT_0]
             flux_1 = fma(-belt_speed, stations[j - 1, lf.EPS_1], new_1) * stations[j - 1, lf.SHORT_1]
+        du, w, eps = stations[j, lf.PUSH], fields[j, f.W], forces.pressed_strain(belt, state, stations, j)
+        u = fields[j, f.U] + du
+        lifts = (0.5 * belt.curvature[j] * belt.cell[j]) * (u + u_b)
         closing, change = v0_b - v0, dv0_b - dv0
-        viscous = damper_0 * per_cell * closing
+        viscous = damper_0 * per_cell * (closing + lifts)
         damped = fma(damper_0 * per_cell, change, viscous)
         # the remaining push beyond the length at rest stores nothing: all of it is damping
         damped = select(eps > 0.0, minimum(fma(stiffness, eps, damped), 0.0), damped)
@@ -151,16 +149,16 @@ def advance_belt(belt: LaneBelt, state: LaneState, work: Work, step: float):
         damped = select(stations[j, lf.LINK_0] > 0.0, damped, 0.0)
         work_done = fma(damped, fma(0.5, change, closing), work_done)
         closing, change = v1_b - v1, dv1_b - dv1
-        damped = damper_1 * per_cell * (closing + change)
+        damped = damper_1 * per_cell * (closing + change + lifts)
         work_done = fma(damped, fma(0.5, change, closing), work_done)
+        work_done = fma(stations[j, lf.BENT], fma(-0.5, du + du_b, u + u_b), work_done)
         more_0 = fma(step * per_cell, flux_0 - flux0_b, fields[j, f.N_ELEMENT])
         more_1 = fma(step * per_cell, flux_1 - flux1_b, fields[j, f.N_RING])
         fields[j, f.V_ELEMENT], fields[j, f.V_RING] = new_0, new_1
         fields[j, f.N_ELEMENT], fields[j, f.N_RING] = more_0, more_1
         v0_b, dv0_b, flux0_b, v1_b, dv1_b, flux1_b = v0, dv0, flux_0, v1, dv1, flux_1
 
-        touches, du, w = belt.touches[j], stations[j, lf.PUSH], fields[j, f.W]
-        u = fields[j, f.U] + du
+        touches = belt.touches[j]
         if anywhere(touches > 0.0):
             is_driven = belt.on_driven[j] > 0.5
             if belt.is_free or anywhere(is_driven):
@@ -184,6 +182,6 @@ def advance_belt(belt: LaneBelt, state: LaneState, work: Work, step: float):
         w = fma(step, u, w)
         fields[j, f.U], fields[j, f.W] = u, w
         forces.cell_strains(belt, stations, j, w, w_b, more_0, more_1, offset)
-        w_b = w
+        w_b, u_b, du_b = w, u, du
     state.scalars[0, lf.LAYER_WORK] = state.scalars[0, lf.LAYER_WORK] + around(like(work_done, moment)) * step
     return around(taken), around(moment)

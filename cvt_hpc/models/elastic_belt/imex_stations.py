@@ -33,6 +33,34 @@ def implicit_shares(one, other, inertia):
 
 
 @kernel
+def damp_across(belt: LaneBelt, state: LaneState, work: Work) -> None:
+    """What the layers' dampers take across the belt from the stations at both ends of each cell, into BENT.
+
+    By the speeds that the step begins with. Of a cell's lengthening v_0,s + kappa u, in which the dampers
+    along the belt are implicit, a step of both leaves with a = 4 c dt / (m_0 h^2) and b = c dt kappa^2 / m
+    the share (1 - b) / (1 + a): it is stable up to b = 2 + a.
+    """
+    fields, stations, c = state.fields, work.stations, belt.constants
+    stiffness, damper_0 = c[0, lf.ELEMENT_STIFFNESS], c[0, lf.ELEMENT_DAMPING]
+    damper_1 = c[0, lf.RING_DAMPING]
+    zero = like(0.0, stiffness)
+    for j in range(fields.rows):
+        half, bent = 0.5 * belt.curvature[j] * belt.cell[j], zero
+        if anywhere(half > 0.0):
+            lifts = half * (fields[j, f.U] + ahead(fields, j, f.U))
+            opening = ahead(fields, j, f.V_ELEMENT) - fields[j, f.V_ELEMENT] + lifts
+            stretching = ahead(fields, j, f.V_RING) - fields[j, f.V_RING] + lifts
+            # It never makes elements pull; those that are apart have none, but for what remains of a push
+            # beyond the length at rest.
+            pull = stiffness * forces.pressed_strain(belt, state, stations, j)
+            viscous = damper_0 * belt.per_cell[j] * opening
+            beyond = select(stations[j, lf.LINK_0] > 0.0, minimum(pull + viscous, 0.0), zero)
+            damped = select(pull < 0.0, minimum(viscous, -pull), beyond)
+            bent = half * fma(damper_1 * belt.per_cell[j], stretching, damped)
+        stations[j, lf.BENT] = bent
+
+
+@kernel
 def assemble(belt: LaneBelt, state: LaneState, work: Work, step: float, again: bool) -> None:
     """Forces and slopes at the stations, but for the stresses T and P: the system's blocks and right side.
 
@@ -71,6 +99,7 @@ def assemble(belt: LaneBelt, state: LaneState, work: Work, step: float, again: b
         transverse = forces.lane_transverse(belt, fields, j, net_left, net_right, bending, DAMPED * step)
         transverse = fma(-gyroscopic, (ahead(fields, j, f.U) - behind(fields, j, f.U)) * span, transverse)
         transverse = fma(-acceleration * mass, slope, transverse)
+        transverse = fma(-belt.per_dual[j], behind(stations, j, lf.BENT) + stations[j, lf.BENT], transverse)
         if belt.has_column:
             transverse += column_across(belt, state, j)
         if belt.is_curved:

@@ -39,9 +39,9 @@ def element_stress(stiffness, grip, eps, closing, ahead, per_length, last, meet)
     stiffness, grip
         EA [N], damping over the cell's length [N s/m].
     eps, closing
-        Strain and difference of the speeds at both ends [m/s].
+        Strain and speed at which the cell lengthens [m/s].
     ahead, per_length
-        Strain at the end of the step with these speeds, and its slope with the difference [s/m].
+        Strain at the end of the step with these speeds, and its slope with their difference [s/m].
     last
         Slope of -P in the step before [N s/m]: 0 where the elements were apart.
     meet
@@ -84,10 +84,8 @@ def eliminate(belt: LaneBelt, state: LaneState, work: Work, step: float, again: 
         outflow = fma(-(belt_speed + v0), entering, closing_0)
         kappa = belt.curvature[j]
         if anywhere(kappa > 0.0):
-            lifts = (
-                fields[j, f.U] + stations[j, lf.PUSH] + ahead(fields, j, f.U) + ahead(stations, j, lf.PUSH)
-            )
-            outflow = fma(0.5 * kappa * belt.cell[j], lifts, outflow)
+            lifts = lifting(fields, stations, j, 0.5 * kappa * belt.cell[j])
+            outflow, closing_0, closing_1 = outflow + lifts, closing_0 + lifts, closing_1 + lifts
         per_length = (step * per_cell) * stations[j, lf.PER_CONTENT_0]
         at_end = fma(per_length, outflow, eps)
         if belt.has_column:
@@ -152,6 +150,16 @@ def eliminate(belt: LaneBelt, state: LaneState, work: Work, step: float, again: 
         faded,
     )
     stations[last, lf.DV_0], stations[last, lf.DV_1] = x0, x1
+
+
+@merged_kernel
+def lifting(fields: LaneArray, stations: LaneArray, j: int, half):
+    """Speed at which cell j of an arc lengthens by moving outwards [m/s], `half` being kappa h / 2.
+
+    At the end of the step, without the part of its increments due to the layers' speeds.
+    """
+    here, beyond = fields[j, f.U] + stations[j, lf.PUSH], ahead(fields, j, f.U) + ahead(stations, j, lf.PUSH)
+    return half * (here + beyond)
 
 
 @kernel

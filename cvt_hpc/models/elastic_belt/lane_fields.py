@@ -58,7 +58,9 @@ I_00, I_01, I_11, DV_0, DV_1, G_00, G_01, G_10, G_11, LINK_0, LINK_1 = range(33,
 # of `imex_bending`: line force across the belt, its slopes with the increments of u and of v_element; factors
 # and work space
 ACROSS, MASS_ACROSS, CROSS, A_00, A_01, A_11, B_00, B_01, B_10, B_11, X_0, X_1 = range(44, 56)
-FIELDS_OF_WORK = 56
+# of the layers' dampers in the cells of arcs, kappa h / 2 times their force [N]
+BENT = 56
+FIELDS_OF_WORK = 57
 
 # Constants of each lane; from FIRST_OFFSET on the layers' offsets, then by arc and surface the factors of the
 # layer above it and of the one below.

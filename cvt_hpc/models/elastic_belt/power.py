@@ -114,14 +114,15 @@ def audit(
             elastic = (fields[j, f.N_ELEMENT] + 1.0) * state.column[j, lf.COLUMN_ENERGY]
         tension, push = ring_stiffness * stretched, -element_stiffness * pressed
         opening = fields[b, f.V_ELEMENT] - fields[j, f.V_ELEMENT]
-        lifting = 0.5 * right * belt.curvature[j] * (u + fields[b, f.U])
+        curved = 0.5 * belt.curvature[j] * (u + fields[b, f.U])
+        lifting = right * curved
         lifting += (fields[b, f.W] - w) * (fields[b, f.U] - u) * belt.per_cell[j]
         working = push * opening - tension * (fields[b, f.V_RING] - fields[j, f.V_RING])
         working -= (tension - push - centrifugal) * lifting
         if belt.has_column:
             working -= state.column[j, lf.COLUMN_MOMENT] * dual * curving(belt, fields, j, f.U)
         damped = -element_stiffness * forces.pressed_strain(belt, state, stations, j)
-        damped -= element_damping * belt.per_cell[j] * opening
+        damped -= element_damping * fma(belt.per_cell[j], opening, curved)
         if summed:
             moments.add_stresses(profiles, j, working, tension, push, maximum(damped, zero) - push)
         stored += (0.5 * right) * (elastic + rings * ring_stiffness * stretched * stretched)

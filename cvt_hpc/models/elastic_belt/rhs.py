@@ -12,6 +12,7 @@ outward):
     memory         v_f,t + v v_f,s = (|v| - v_f) / tau_f in contact, v_f = |v| where that begins
     tilt           d_a (th_t + v_0 th_s) = -k_a th - d_1 q, where elements tilt (`element_tilt.py`)
     pulleys        J omega_dn' = -sum f_t (r + w) - i M,   T_1 k z_dn' = sum f_ax - F_dn   (and `pulleys.py`)
+    dampers        T_d,i = c_i (v_i,s + kappa w_t): +T_d,i,s along the belt, -kappa T_d,i across it
 
 with q the friction of the rings on the elements' saddle, p_r, f_t the flanks' forces, |v| their sliding
 speed and M the load; v = r_dr omega_dr is the speed of the pitch line at the driving pulley's present speed,
@@ -26,7 +27,13 @@ angle theta = atan(x / (R + w)) to the path's normal. So with u = w_t + v_0 w_s
     on the belt    along: p_r sin theta + f_t cos theta,   across: p_r cos theta - f_t sin theta
     on the pulley  rho f_t
 
-and the equations above are those of theta = 0. Stresses of T and P enter cells, everything else stations; the
+and the equations above are those of theta = 0. Material that flows along the path lengthens, by the equations
+of stretch and content, at the rate
+
+    D ln(1 + eps_i) / Dt = (v_i,s + kappa w_t) / (1 + kappa (w + d_i)),
+
+on which a layer's damper acts (the divisor is left out): elements that move outwards on an arc and spread as
+they do strain nothing. Stresses of T and P enter cells, everything else stations; the
 content is upwinded, since centred fluxes leave a free checkerboard mode where P = 0.
 """
 
@@ -167,8 +174,15 @@ def ring_drag(
 
 
 @merged_kernel
+def lengthening(belt: Belt, v: np.ndarray, u: np.ndarray, c: int) -> float:
+    """Rate v_s + kappa w_t at which the material of cell c lengthens [1/s], v (N,) being its layer's speed."""
+    b = c + 1 if c < v.size - 1 else 0
+    return (v[b] - v[c]) / belt.cell[c] + 0.5 * belt.curvature[c] * (u[c] + u[b])
+
+
+@merged_kernel
 def damped_push(belt: Belt, eps: float, opening: float) -> float:
-    """Push force with its damper [N], never a pull, of a cell that is strained and opens by v_0,s [1/s]."""
+    """Push force with its damper [N], never a pull, of a cell that is strained and lengthens [1/s]."""
     if eps >= 0.0 and belt.bridging_stiffness == np.inf:
         return 0.0
     stiffness = belt.element_stiffness if eps < 0.0 else belt.bridging_stiffness
@@ -216,11 +230,16 @@ def accelerations(
         push_right = max(-belt.element_stiffness * pressed[j], 0.0)
         net_left, net_right = ring_left - push_left - centrifugal, ring_right - push_right - centrifugal
         slope = (w[b] - w[a]) / (left + right)
+        # stress of the layers with their dampers; elements never pull
+        stress_left = ring_left + belt.ring_damping * lengthening(belt, v1, u, a)
+        stress_right = ring_right + belt.ring_damping * lengthening(belt, v1, u, j)
+        push_left = damped_push(belt, pressed[a], lengthening(belt, v0, u, a))
+        push_right = damped_push(belt, pressed[j], lengthening(belt, v0, u, j))
 
         transverse = (net_right * (w[b] - w[j]) / right - net_left * (w[j] - w[a]) / left) / dual
-        transverse -= (
-            0.5 * (net_right * right * belt.curvature[j] + net_left * left * belt.curvature[a]) / dual
-        )
+        bent_left = (stress_left - push_left - centrifugal) * left * belt.curvature[a]
+        bent_right = (stress_right - push_right - centrifugal) * right * belt.curvature[j]
+        transverse -= 0.5 * (bent_right + bent_left) / dual
         transverse -= 2.0 * belt.mass * belt_speed * (u[b] - u[a]) / (left + right)
         transverse -= belt.mass * acceleration * slope
         for k in range(5):
@@ -236,12 +255,7 @@ def accelerations(
         v_radial = u[j] + v0[j] * slope
         outward = -damping * v_radial
 
-        # stress of the layers with their dampers; elements never pull
-        stress_left = ring_left + belt.ring_damping * (v1[j] - v1[a]) / left
-        stress_right = ring_right + belt.ring_damping * (v1[b] - v1[j]) / right
         along_ring = (stress_right - stress_left) / dual
-        push_left = damped_push(belt, pressed[a], (v0[j] - v0[a]) / left)
-        push_right = damped_push(belt, pressed[j], (v0[b] - v0[j]) / right)
         along_element = -(push_right - push_left) / dual
 
         moments[j] = 0.0

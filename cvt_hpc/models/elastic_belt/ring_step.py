@@ -34,7 +34,7 @@ from cvt_hpc.models.elastic_belt import lane_rings
 from cvt_hpc.models.elastic_belt.belt import Belt
 from cvt_hpc.models.elastic_belt.imex import MOST_PASSES, advance_belt, forget
 from cvt_hpc.models.elastic_belt.imex_bending import move_across, move_with_layers
-from cvt_hpc.models.elastic_belt.imex_stations import assemble
+from cvt_hpc.models.elastic_belt.imex_stations import assemble, damp_across
 from cvt_hpc.models.elastic_belt.imex_system import TURNS_BACK, eliminate, substitute
 from cvt_hpc.models.elastic_belt.lane_belt import LaneBelt, LaneState, Work, work_space
 from cvt_hpc.models.elastic_belt.lane_rings import LaneRings
@@ -59,7 +59,7 @@ class RingWork(NamedTuple):
 
     Attributes
     ----------
-    stations : (N, 56) LaneArray
+    stations : (N, 57) LaneArray
         As of `Work`.
     layers : (N, 5 n + 4) LaneArray
         See above.
@@ -134,6 +134,7 @@ def step_rings(belt: LaneBelt, state: LaneState, work: RingWork, step: float) ->
     """
     one = Work(work.stations)
     forces.lane_sliding(belt, state, work.stations)
+    damp_across(belt, state, one)
     assemble(belt, state, one, step, False)
     coupled = move_across(belt, state, one, step)
     couple_layers(belt, work.rings, state, work, step)

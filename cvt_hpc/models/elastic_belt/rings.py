@@ -25,6 +25,7 @@ from cvt_hpc.kernels import kernel
 from cvt_hpc.models.elastic_belt import fields as f
 from cvt_hpc.models.elastic_belt.belt import Belt, State
 from cvt_hpc.models.elastic_belt.lane_forces import LEAST_SHARE_OF_WIDTH
+from cvt_hpc.models.elastic_belt.rhs import lengthening
 from cvt_hpc.models.elastic_belt.ring_settings import RING_DEFAULTS, layer_count
 from cvt_hpc.physics.layers import ring_friction, stack_forces
 
@@ -192,14 +193,14 @@ def layer_rates(
     """
     n, cells = rings.length.size, belt.cell.size
     normal, sliding = np.empty(n + 1), np.empty(n + 1)
-    v = state.fields[FIRST_LAYER : FIRST_LAYER + n]
+    u, v = state.fields[f.U], state.fields[FIRST_LAYER : FIRST_LAYER + n]
     for j in range(cells):
         a, b = j - 1 if j > 0 else cells - 1, j + 1 if j < cells - 1 else 0
         kappa = belt.arc_curvature[j]
         weighted = 0.5 * (belt.cell[a] * belt.curvature[a] + belt.cell[j] * belt.curvature[j]) / belt.dual[j]
         for k in range(n):
-            left = rings.stiffness * eps[k, a] + rings.damping * (v[k, j] - v[k, a]) / belt.cell[a]
-            right = rings.stiffness * eps[k, j] + rings.damping * (v[k, b] - v[k, j]) / belt.cell[j]
+            left = rings.stiffness * eps[k, a] + rings.damping * lengthening(belt, v[k], u, a)
+            right = rings.stiffness * eps[k, j] + rings.damping * lengthening(belt, v[k], u, j)
             rate[k, j] = (right - left) / belt.dual[j]
         rate[2 * n, j] = 0.0
         if belt.arc_curvature[j] > 0.0:

@@ -19,28 +19,27 @@ REACH = {
     f.U: {
         f.W: (-2, 2),
         f.U: (-1, 1),
-        f.V_ELEMENT: (0, 0),
+        f.V_ELEMENT: (-1, 1),
+        f.V_RING: (-1, 1),
         f.V_FILTERED: (0, 0),
         f.N_ELEMENT: (-1, 0),
         f.N_RING: (-1, 0),
     },
     f.V_ELEMENT: {
         f.W: (-1, 1),
-        f.U: (0, 0),
+        f.U: (-1, 1),
         f.V_ELEMENT: (-1, 1),
         f.V_RING: (0, 0),
         f.V_FILTERED: (0, 0),
         f.N_ELEMENT: (-1, 0),
         f.N_RING: (-1, 0),
     },
-    f.V_RING: {f.W: (-1, 1), f.V_ELEMENT: (0, 0), f.V_RING: (-1, 1), f.N_RING: (-1, 0)},
+    f.V_RING: {f.W: (-1, 1), f.U: (-1, 1), f.V_ELEMENT: (0, 0), f.V_RING: (-1, 1), f.N_RING: (-1, 0)},
     f.N_ELEMENT: {f.W: (-1, 2), f.V_ELEMENT: (0, 1), f.N_ELEMENT: (-1, 1)},
     f.N_RING: {f.W: (-1, 2), f.V_RING: (0, 1), f.N_RING: (-1, 1)},
 }
-# With a column that bears a moment, which knows strains and turning of the cells around, and by the path's
-# curvature, which turns motion along the belt into motion across it, and back
+# With a column that bears a moment, which knows strains and turning of the cells around
 OF_COLUMN = {f.U: {f.N_ELEMENT: (-2, 1)}, f.V_ELEMENT: {f.W: (-2, 2)}}
-OF_CURVATURE = {f.U: {f.V_RING: (0, 0)}, f.V_RING: {f.U: (0, 0)}}
 # With elements that tilt by the rings' friction, which acts on both layers
 OF_TILT = {
     f.V_ELEMENT: {f.ELEMENT_TILT: (0, 0)},
@@ -67,8 +66,7 @@ def pattern(flat: FlatBelt) -> csc_array:
             known = (rows >= 0) & (columns >= 0)
             found[rows[known], columns[known]] = True
 
-    more = [OF_COLUMN] * belt.has_column + [OF_CURVATURE] * (belt.curvature_terms > 0)
-    for reach in (REACH, *more, *[OF_TILT] * belt.tilts):
+    for reach in (REACH, *[OF_COLUMN] * belt.has_column, *[OF_TILT] * belt.tilts):
         for row, reaches in reach.items():
             for unknown, (behind, ahead) in reaches.items():
                 mark(row, unknown, np.arange(n), range(behind, ahead + 1))

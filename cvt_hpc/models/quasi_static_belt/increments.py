@@ -89,7 +89,7 @@ def _fill_chain(model: SplitBelt, work: Work) -> None:
         # a cell that moves outwards is stretched, and pulls at the stations at both its ends
         b, half = j + 1 if j < n - 1 else 0, 0.5 * belt.curvature[j] * belt.cell[j]
         for layer in range(2):
-            pull = half * stations[q.RING_HOOP if layer == q.RING else q.ELEMENT_HOOP, j]
+            pull = half * work.layers.links[layer, j]
             here, ahead = columns[j, layer], columns[b, layer]
             for k in range(size):
                 stretched = pull * (shapes[j, k] + shapes[b, k])
@@ -102,7 +102,7 @@ def _reduce(model: SplitBelt, work: Work) -> None:
     """Add the forces at the stations and their slopes to the dense system, with the layers' remainder."""
     belt, shapes, size = model.belt, model.shapes, model.shapes.shape[1]
     stations, columns = work.stations, work.layers.columns
-    n, matrix = belt.cell.size, work.matrix
+    n, matrix, links = belt.cell.size, work.matrix, work.layers.links
     whole = size + 2 if model.steady_flow else size
     row = work.row
     for j in range(n):
@@ -120,7 +120,7 @@ def _reduce(model: SplitBelt, work: Work) -> None:
                 if belt.curvature[c] == 0.0:
                     continue
                 b, half = c + 1 if c < n - 1 else 0, 0.5 * belt.curvature[c] * belt.cell[c]
-                pull_0, pull_1 = half * stations[q.ELEMENT_HOOP, c], half * stations[q.RING_HOOP, c]
+                pull_0, pull_1 = half * links[q.ELEMENT, c], half * links[q.RING, c]
                 stiff = half * (pull_0 + pull_1)
                 e0, e1 = columns[b, q.ELEMENT], columns[c, q.ELEMENT]
                 e2, e3 = columns[b, q.RING], columns[c, q.RING]

@@ -21,14 +21,13 @@ from cvt_hpc.physics.friction import friction_coefficient, saturation
 def put_forces(model: SplitBelt, moved: Motion, work: Work) -> None:
     """Forces at the stations [N] without those of the layers' stresses."""
     belt, stations, fields = model.belt, work.stations, moved.state.fields
-    n, v0, v1 = belt.cell.size, fields[f.V_ELEMENT], fields[f.V_RING]
+    n, u, v0, v1 = belt.cell.size, fields[f.U], fields[f.V_ELEMENT], fields[f.V_RING]
     for j in range(n):
-        a, b = j - 1 if j > 0 else n - 1, j + 1 if j < n - 1 else 0
-        push_left = rhs.damped_push(belt, moved.eps[q.ELEMENT, a], (v0[j] - v0[a]) / belt.cell[a])
-        push_right = rhs.damped_push(belt, moved.eps[q.ELEMENT, j], (v0[b] - v0[j]) / belt.cell[j])
+        a, dual = j - 1 if j > 0 else n - 1, belt.dual[j]
+        push_left = rhs.damped_push(belt, moved.eps[q.ELEMENT, a], rhs.lengthening(belt, v0, u, a))
+        push_right = rhs.damped_push(belt, moved.eps[q.ELEMENT, j], rhs.lengthening(belt, v0, u, j))
         pull = belt.ring_stiffness * (moved.eps[q.RING, j] - moved.eps[q.RING, a])
-        pull += belt.ring_damping * ((v1[b] - v1[j]) / belt.cell[j] - (v1[j] - v1[a]) / belt.cell[a])
-        dual = belt.dual[j]
+        pull += belt.ring_damping * (rhs.lengthening(belt, v1, u, j) - rhs.lengthening(belt, v1, u, a))
         stations[q.ACROSS, j] = dual * belt.mass * work.rate[f.U, j]
         stations[q.ALONG, j] = dual * belt.element_mass * work.rate[f.V_ELEMENT, j] + (push_right - push_left)
         stations[q.ALONG_RING, j] = dual * belt.ring_mass[j] * work.rate[f.V_RING, j] - pull
@@ -110,7 +109,7 @@ def put_slopes(model: SplitBelt, moved: Motion, work: Work) -> None:
             belt.element_stiffness,
             grip,
             eps[q.ELEMENT, j],
-            closing,
+            closing + lifted,
             ahead,
             per_length,
             links[q.ELEMENT, j],
@@ -118,14 +117,10 @@ def put_slopes(model: SplitBelt, moved: Motion, work: Work) -> None:
         )
         stations[q.ELEMENT_STRAIN_AHEAD, j] = ahead
         stations[q.ELEMENT_STRESS, j] = stress
-        pressed = links[q.ELEMENT, j] > 0.0
-        stations[q.ELEMENT_HOOP, j] = belt.element_stiffness * per_length if pressed else 0.0
         # beyond its part in the explicit force across the belt
-        hoop = belt.element_stiffness * (ahead if pressed else 0.0)
-        stations[q.HOOP_STRESS, j] = hoop - belt.element_stiffness * min(eps[q.ELEMENT, j], 0.0)
+        push = rhs.damped_push(belt, eps[q.ELEMENT, j], (closing + lifted) / length)
+        stations[q.HOOP_STRESS, j] = stress + push
         grip = belt.ring_damping / length
-        stations[q.RING_STRESS, j] = belt.ring_stiffness * eps[q.RING, j] + grip * (v1[b] - v1[j])
-        stations[q.RING_HOOP, j] = (
-            CENTRED * belt.ring_stiffness * step / (length * fields[f.N_ELEMENT + q.RING, j])
-        )
-        links[q.RING, j] = stations[q.RING_HOOP, j] + grip
+        stations[q.RING_STRESS, j] = belt.ring_stiffness * eps[q.RING, j] + grip * (v1[b] - v1[j] + lifted)
+        per_content = step / (length * fields[f.N_ELEMENT + q.RING, j])
+        links[q.RING, j] = CENTRED * belt.ring_stiffness * per_content + grip

@@ -90,23 +90,26 @@ def _advance(model: SplitBelt, moved: Motion, work: Work) -> None:
     np.dot(model.inertia, moved.p, work.row)
     for i in range(slow, count):
         work_done += moved.p[i] * work.row[i]
-    if not model.steady_flow:
-        for j in range(n):
-            b = j + 1 if j < n - 1 else 0
-            closing = fields[f.V_ELEMENT, b] - fields[f.V_ELEMENT, j]
-            change = columns[b, q.ELEMENT, q.RIGHT] - columns[j, q.ELEMENT, q.RIGHT]
-            grip, eps = belt.element_damping / belt.cell[j], moved.eps[q.ELEMENT, j]
-            damped = 0.0
-            if work.layers.links[q.ELEMENT, j] > 0.0:
-                damped = grip * (closing + change)
-                if eps > 0.0:
-                    damped = min(belt.element_stiffness * eps + damped, 0.0)
-                if grip * closing > -belt.element_stiffness * eps:
-                    damped = -belt.element_stiffness * min(eps, 0.0)
-            work_done += damped * (closing + 0.5 * change)
-            closing = fields[f.V_RING, b] - fields[f.V_RING, j]
-            change = columns[b, q.RING, q.RIGHT] - columns[j, q.RING, q.RIGHT]
-            work_done += belt.ring_damping / belt.cell[j] * (closing + change) * (closing + 0.5 * change)
+    implicit = 0.0 if model.steady_flow else 1.0  # share of the change of speeds that the dampers feel
+    for j in range(n):
+        b, half = j + 1 if j < n - 1 else 0, 0.5 * belt.curvature[j] * belt.cell[j]
+        lifted = half * (fields[f.U, j] + fields[f.U, b])
+        lifts = half * (work.rate[f.U, j] + work.rate[f.U, b])
+        closing = fields[f.V_ELEMENT, b] - fields[f.V_ELEMENT, j] + lifted
+        change = columns[b, q.ELEMENT, q.RIGHT] - columns[j, q.ELEMENT, q.RIGHT] + lifts
+        grip, eps = belt.element_damping / belt.cell[j], moved.eps[q.ELEMENT, j]
+        damped = 0.0
+        if work.layers.links[q.ELEMENT, j] > 0.0:
+            damped = grip * (closing + implicit * change)
+            if eps > 0.0:
+                damped = implicit * min(belt.element_stiffness * eps + damped, 0.0)
+            if grip * closing > -belt.element_stiffness * eps:
+                damped = -belt.element_stiffness * min(eps, 0.0)
+        work_done += damped * (closing + 0.5 * change)
+        closing = fields[f.V_RING, b] - fields[f.V_RING, j] + lifted
+        change = columns[b, q.RING, q.RIGHT] - columns[j, q.RING, q.RIGHT] + lifts
+        damped = belt.ring_damping / belt.cell[j] * (closing + implicit * change)
+        work_done += damped * (closing + 0.5 * change)
     for j in range(n):
         fields[f.V_ELEMENT, j] += columns[j, q.ELEMENT, q.RIGHT]
         fields[f.V_RING, j] += columns[j, q.RING, q.RIGHT]
