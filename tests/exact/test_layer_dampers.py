@@ -23,7 +23,9 @@ def pressed_state(belt, seed=0):
     middle = angle + np.pi * belt.cell / belt.cell.sum()
 
     def wave(at, size):
-        return size * sum(random.normal() * np.cos(k * at + random.uniform(0.0, 2.0 * np.pi)) for k in (1, 2, 3))
+        return size * sum(
+            random.normal() * np.cos(k * at + random.uniform(0.0, 2.0 * np.pi)) for k in (1, 2, 3)
+        )
 
     state = State(np.zeros((7, n)), np.zeros(f.SCALARS))
     state.scalars[f.TIME] = 1.0
@@ -47,7 +49,9 @@ def rates_of(belt, state):
 
 def of_dampers(state, stations, dampers):
     """Accelerations that dampers (elements', rings') add to those of the belt without any."""
-    ones = [belt_of(stations, element_damping=one, ring_damping=other) for one, other in ((0.0, 0.0), dampers)]
+    ones = [
+        belt_of(stations, element_damping=one, ring_damping=other) for one, other in ((0.0, 0.0), dampers)
+    ]
     without, found = (rates_of(belt, state)[0] for belt in ones)
     return ones[1], found - without
 
@@ -86,8 +90,15 @@ def test_elements_that_spread_as_they_move_outwards_are_not_braked():
     for row in (f.V_ELEMENT, f.V_RING):
         v = state.fields[row]
         for c in range(stations - 1):
-            v[c + 1] = v[c] - lengthening(belt, state.fields[row], state.fields[f.U], c) * belt.cell[c] + v[c + 1] - v[c]
-    strained = np.abs([lengthening(belt, state.fields[f.V_ELEMENT], state.fields[f.U], c) for c in range(stations - 1)])
+            v[c + 1] = (
+                v[c]
+                - lengthening(belt, state.fields[row], state.fields[f.U], c) * belt.cell[c]
+                + v[c + 1]
+                - v[c]
+            )
+    strained = np.abs(
+        [lengthening(belt, state.fields[f.V_ELEMENT], state.fields[f.U], c) for c in range(stations - 1)]
+    )
     assert strained.max() < 1e-9
     _, added = of_dampers(state, stations, (2000.0, 400.0))
     inner = slice(2, stations - 2)  # but where the closed belt cannot spread

@@ -175,7 +175,7 @@ def ring_drag(
 
 @merged_kernel
 def lengthening(belt: Belt, v: np.ndarray, u: np.ndarray, c: int) -> float:
-    """Rate v_s + kappa w_t at which the material of cell c lengthens [1/s], v (N,) being its layer's speed."""
+    """Rate v_s + kappa w_t at which the material of cell c lengthens [1/s], by its layer's speed v (N,)."""
     b = c + 1 if c < v.size - 1 else 0
     return (v[b] - v[c]) / belt.cell[c] + 0.5 * belt.curvature[c] * (u[c] + u[b])
 
