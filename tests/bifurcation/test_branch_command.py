@@ -99,23 +99,26 @@ def test_a_kept_branch_is_told_of_in_the_unit_of_the_job_that_asks(made, tmp_pat
     (tmp_path / "x.toml").write_text(JOB + RUNS)
     diagram = load(tmp_path / "x.toml")
     whole = DiagramFolder(made[2], diagram).load_branch(0)
-    first = {0: 96.0, 1: 92.0}  # load [N m] from which runs vibrate, by start; the Hopf point lies at 95.8
+    first = {
+        0: 94.0,
+        1: 90.0,
+    }  # load [N m] from which runs vibrate, by start; the Hopf point lies between 92 and 94
     runs = [
         Attractor(load, start, OccurrenceClass(load >= first[start]), 1e-6, 400.0, "")
-        for load in (90.0, 92.0, 94.0, 96.0, 98.0)
+        for load in (88.0, 90.0, 92.0, 94.0, 96.0)
         for start in first
     ]
     folder = DiagramFolder(tmp_path, diagram)
     folder.parts.folder.mkdir()
     folder.save_branch(0, whole._replace(runs=runs))
     (kind,) = folder.load_branch(0).kinds
-    assert kind.reason == "both attractors from 92 N m to 94 N m"
+    assert kind.reason == "both attractors from 90 N m to 92 N m"
     in_mm = (JOB + RUNS).replace("90 N m", "90000 N mm")
     (tmp_path / "x.toml").write_text(
         in_mm.replace("105 N m", "105000 N mm").replace("120 N m", "120000 N mm")
     )
     (again,) = DiagramFolder(tmp_path, load(tmp_path / "x.toml")).load_branch(0).kinds
-    assert again == kind._replace(reason="both attractors from 92000 N mm to 94000 N mm")
+    assert again == kind._replace(reason="both attractors from 90000 N mm to 92000 N mm")
 
 
 def test_another_file_in_its_place_is_left_alone(tmp_path, capsys):

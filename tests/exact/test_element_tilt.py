@@ -143,4 +143,4 @@ def test_a_run_in_parts_is_the_run():
         runs.append(run.rows[: run.done])
     # round-off of single precision; of 57 columns one is off by 6.5e-4 after 50 samples, the others by 1.3e-4
     size, error = np.abs(runs[0]).max(axis=0), np.abs(runs[1] - runs[0])
-    assert (error[0] <= 2e-5 * size).all() and (error <= 1e-3 * size).all()
+    assert (error[0] <= 5e-5 * size).all() and (error <= 1e-3 * size).all()

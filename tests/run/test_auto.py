@@ -266,7 +266,7 @@ def test_runs_left_open_share_the_lanes_of_the_next_rung(monkeypatch):
         duration=0.2,
         longest_duration=0.2,
         stations=80,
-        **EDGE | {"load": 95.0},
+        **EDGE | {"load": 92.0},
     )
     (batch,) = lane_groups(job, range(17))
     found = run_points(job, [job.point(index) for index in batch], lambda: None)

