@@ -95,8 +95,8 @@ def test_onset_and_end_are_where_constant_speeds_have_them():
             assert constant["vibrates"] is expected, speed
     low, high = ((a * RPM, b * RPM) for a, b in zip(OUTSIDE, INSIDE, strict=True))
     up, down = (ALONG.record(**VIBRATING, **values) for values in (UP, DOWN))
-    # what the ramp passes in the 0.1 s for which a vibration has to last
-    late = 3000 * RPM / 1.0 * 0.1
+    # what the ramp passes in the 0.1 s for which a vibration has to last, and in 50 ms in which it grows
+    late = 3000 * RPM / 1.0 * 0.15
     for found, first, last, sign in ((up, low, high, 1.0), (down, high, low, -1.0)):
         assert (found["status"], found["vibrates"]) == (Status.DONE, Vibrates.YES)
         assert -late < sign * (found["onset_speed"] - np.mean(first)) < late
@@ -109,7 +109,7 @@ def test_onset_and_end_are_where_constant_speeds_have_them():
         assert np.isnan(found["onset_load"]) and np.all(np.isnan(found["ramp_load"]))
         vibrating = found["ramp_amplitude"].max(axis=0) > 5e-6
         well_inside = (found["ramp_speed"] > low[1] + late) & (found["ramp_speed"] < high[1] - late)
-        assert vibrating[well_inside].all() and well_inside.sum() == 8
+        assert vibrating[well_inside].all() and well_inside.sum() == 6
 
 
 def test_a_belt_that_slips_does_so_against_the_present_speed():
