@@ -46,6 +46,17 @@ def test_the_limit_is_that_of_the_shortest_wave(case):
     assert quiet < 2e-4
 
 
+@pytest.mark.parametrize("damper", ["element_damping", "ring_damping"])
+def test_the_dampers_of_the_layers_limit_it(damper):
+    """Explicit across the belt: arcs of elastic sheaves that breathe; at the default step they leave the path."""
+    values = {damper: 10e3, "stations": 96, "load": 60.0}
+    step = limit(values)
+    assert step == pytest.approx(2.0 * limit(values | {damper: 20e3}), rel=1e-2)
+    assert outcome(0.75 * step, values)[0] is None
+    status, reason = outcome(4.6e-6, values)[0]
+    assert status == Status.FAILED_NUMERICS and reason
+
+
 @pytest.mark.parametrize("bending", [0.05, 20.0])
 def test_bending_limits_no_step(bending):
     """At the step that a scene has anyway, ten and more times as long as explicit bending bears."""

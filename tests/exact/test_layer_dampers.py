@@ -9,11 +9,11 @@ from cvt_hpc.models.elastic_belt.general_run import damper_power
 from cvt_hpc.models.elastic_belt.rhs import accelerations, content_rates, lengthening, strains
 from support.settled import DEFAULTS
 
-MESH = {"end_refinement": 1.0, "curvature_terms": "none"}
+EVEN = {"end_refinement": 1.0}
 
 
 def belt_of(stations, **values):
-    return belt_constants(DEFAULTS | MESH | {"stations": stations} | values)
+    return belt_constants(DEFAULTS | EVEN | {"stations": stations} | values)
 
 
 def pressed_state(belt, seed=0):
@@ -47,10 +47,11 @@ def rates_of(belt, state):
     return rate, eps
 
 
-def of_dampers(state, stations, dampers):
-    """Accelerations that dampers (elements', rings') add to those of the belt without any."""
+def of_dampers(state, stations, dampers, **values):
+    """The belt, and accelerations that dampers (elements', rings') add to those of the belt without any."""
     ones = [
-        belt_of(stations, element_damping=one, ring_damping=other) for one, other in ((0.0, 0.0), dampers)
+        belt_of(stations, element_damping=one, ring_damping=other, **values)
+        for one, other in ((0.0, 0.0), dampers)
     ]
     without, found = (rates_of(belt, state)[0] for belt in ones)
     return ones[1], found - without
@@ -90,12 +91,7 @@ def test_elements_that_spread_as_they_move_outwards_are_not_braked():
     for row in (f.V_ELEMENT, f.V_RING):
         v = state.fields[row]
         for c in range(stations - 1):
-            v[c + 1] = (
-                v[c]
-                - lengthening(belt, state.fields[row], state.fields[f.U], c) * belt.cell[c]
-                + v[c + 1]
-                - v[c]
-            )
+            v[c + 1] -= lengthening(belt, v, state.fields[f.U], c) * belt.cell[c]
     strained = np.abs(
         [lengthening(belt, state.fields[f.V_ELEMENT], state.fields[f.U], c) for c in range(stations - 1)]
     )
@@ -107,11 +103,19 @@ def test_elements_that_spread_as_they_move_outwards_are_not_braked():
     assert np.abs(added[f.V_ELEMENT, inner]).max() < 1e-9 * scale
 
 
+SCENES = {
+    "low": {},
+    "medium, graded mesh": {"ratio": 1.0, "driven_radius": 0.053, "end_refinement": 4.0},
+    "overdrive": {"ratio": 0.5, "driven_radius": 0.035},
+}
+
+
+@pytest.mark.parametrize("scene", SCENES)
 @pytest.mark.parametrize("dampers", [(20.0, 0.0), (0.0, 4.0), (60.0, 30.0)])
-def test_forces_take_what_the_dampers_lose(dampers):
+def test_forces_take_what_the_dampers_lose(dampers, scene):
     stations = 120
-    state = pressed_state(belt_of(stations))
-    belt, added = of_dampers(state, stations, dampers)
+    state = pressed_state(belt_of(stations, **SCENES[scene]), list(SCENES).index(scene))
+    belt, added = of_dampers(state, stations, dampers, **SCENES[scene])
     u, v0, v1 = (state.fields[row] for row in (f.U, f.V_ELEMENT, f.V_RING))
     taken = -(belt.dual * (belt.mass * added[f.U] * u + belt.element_mass * added[f.V_ELEMENT] * v0)).sum()
     taken -= (belt.dual * belt.ring_mass * added[f.V_RING] * v1).sum()

@@ -6,8 +6,8 @@ vibrations are below REFERENCE_BAND. Elsewhere that is no bound: of 81 random sc
 half by more than 1.2 %, a tenth by more than 9 % (`docs/guide/validation.md`).
 
 **Stability.** Transverse motion is explicit but for bending (`imex_bending`): beyond 2 / w the shortest waves
-grow, w being their angular frequency under tension and contact (`transverse_limit`). The step chosen stays at
-SAFE_SHARE of that.
+grow, w being their angular frequency under tension and contact, and beyond 2 m / (c kappa^2) what the layers'
+dampers c brake (`transverse_limit`). The step chosen stays at SAFE_SHARE of that.
 """
 
 from collections.abc import Mapping
@@ -35,6 +35,8 @@ NEEDS = (
     "driving_speed",
     "element_mass",
     "ring_mass",
+    "element_damping",
+    "ring_damping",
     "flank_stiffness",
     "element_factor",
     "half_wedge_angle",
@@ -47,6 +49,7 @@ def transverse_limit(parameters: Mapping[str, Any]) -> float:
     The fastest waves are two of the shortest cells long, in the grooves:
     w^2 = (4 F / h^2 + 4 c_e tan^2 delta) / m.
     Bending, which is implicit, has no part in it. What the belt carries goes on by a cell in a step at most.
+    Arcs that move outwards without a motion along the belt are braked by (c_0 + c_1) kappa^2 / m.
 
     Parameters
     ----------
@@ -60,7 +63,9 @@ def transverse_limit(parameters: Mapping[str, Any]) -> float:
     force = 2.0 * slope * p["thrust"] / path.driven_wrap
     stiffness = 4.0 * force / cell**2 + 4.0 * slope**2 * axial_element_stiffness(p)
     waves = 2.0 / np.sqrt(stiffness / (p["element_mass"] + p["ring_mass"]))
-    return float(min(waves, cell / (p["driving_speed"] * path.driving_radius)))
+    braked = (p["element_damping"] + p["ring_damping"]) / min(path.driving_radius, path.driven_radius) ** 2
+    dampers = 2.0 * (p["element_mass"] + p["ring_mass"]) / max(braked, SHORTEST)
+    return float(min(waves, dampers, cell / (p["driving_speed"] * path.driving_radius)))
 
 
 def chosen_step(parameters: Mapping[str, Any]) -> float:
