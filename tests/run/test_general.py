@@ -17,9 +17,9 @@ SAMPLES = 30
 
 
 @cache
-def plain(step):
+def plain(step, **values):
     """By the belt's own explicit step."""
-    asked = job("explicit", **CHEAP, load=60.0, step=step)
+    asked = job("explicit", **CHEAP | values, load=60.0, step=step)
     run = Transient(asked.point(0), "explicit")
     assert run.advance(SAMPLES) is None
     return run
@@ -34,7 +34,8 @@ def general(stepper, **values):
     ("stepper", "values"),
     [
         ("symplectic_euler", {"step": 1e-7}),
-        ("scipy_bdf", {"tolerance": 1e-4}),
+        # with that damper pushes jump, and no step is short enough for it
+        ("scipy_bdf", {"tolerance": 1e-4, "element_damping": 0.0}),
     ],
 )
 def test_runs_are_those_of_the_explicit_step(stepper, values):
@@ -42,7 +43,8 @@ def test_runs_are_those_of_the_explicit_step(stepper, values):
     assert run.advance(SAMPLES) is None
     assert run.done == SAMPLES and run.time == pytest.approx(SAMPLES * run.interval)
     # the explicit run's own error is what halving its step changes, twice over at the longer one
-    coarse, fine = plain(2e-7), plain(1e-7)
+    alike = {key: value for key, value in values.items() if key == "element_damping"}
+    coarse, fine = plain(2e-7, **alike), plain(1e-7, **alike)
     error = 2.0 * np.abs(coarse.displacement - fine.displacement).max()
     assert np.abs(run.displacement - fine.displacement).max() < 2.0 * error
     for name in ("ring_tension t1", "push_force t2", "axial_force driven", "driven_speed"):
