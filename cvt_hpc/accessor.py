@@ -203,23 +203,24 @@ class Results:
 
         return probabilities(self._dataset)
 
-    def onset_quantiles(self, along: str = "load") -> xr.DataArray:
-        """Return the onset [unit of the axis] that 5, 50 and 95 % of the samples do not exceed.
+    def onset_scatter(self, along: str = "load") -> xr.Dataset:
+        """Return quantiles of the onset, and what half the scatter of each parameter makes of them.
 
-        It is -inf where the lowest value with a verdict vibrates already, inf where none does.
+        See `cvt_hpc.analysis.sensitivity.onset_scatter`.
         """
-        from cvt_hpc.analysis.probability import onset_quantiles
+        from cvt_hpc.analysis.sensitivity import onset_scatter
 
-        return onset_quantiles(self._dataset, along)
+        return onset_scatter(self._dataset, along)
 
-    def sobol_indices(self, of: str = "vibration") -> xr.Dataset:
+    def indices(self, of: str = "vibration", along: str = "") -> xr.Dataset:
         """Return to which uncertain parameters the variance of a result is due; a job needs `indices = true`.
 
-        See `cvt_hpc.analysis.probability.indices_of`.
+        Each cell has its own; with `along` a row of cells, as `indices("vibration", "load")`, or the onset
+        along it: `indices("onset", "load")`. See `cvt_hpc.analysis.sensitivity.indices_of`.
         """
-        from cvt_hpc.analysis.probability import indices_of
+        from cvt_hpc.analysis.sensitivity import indices_of
 
-        return indices_of(self._dataset, of)
+        return indices_of(self._dataset, of, along)
 
     def boundary(self, along: str = "load") -> xr.DataArray:
         """Return all boundaries between quiet and vibrating along an axis.

@@ -15,28 +15,16 @@ from collections.abc import Collection
 
 import numpy as np
 import xarray as xr
-from numpy.typing import NDArray
 
-from cvt_hpc.analysis.classes import OccurrenceClass, at_strongest_strand, check_results, map_classes
-from cvt_hpc.analysis.sobol import sobol_indices
-from cvt_hpc.errors import mismatch, unknown
-from cvt_hpc.job.axes import ALL, NONE, SAMPLE, SWAPPED
+from cvt_hpc.analysis.classes import OccurrenceClass, at_strongest_strand, map_classes
+from cvt_hpc.analysis.sensitivity import EVENTS, QUANTILES, VERDICTS, check_samples, independent, indices_of
+from cvt_hpc.job.axes import SAMPLE, SWAPPED
 from cvt_hpc.study.repeats import interval
 from cvt_hpc.variables import Status, Vibrates
-from cvt_hpc.vibration.classes import levels, onsets
 
-QUANTILES = {"5 %": 0.05, "50 %": 0.5, "95 %": 0.95}
 CONTOURS = (0.1, 0.5, 0.9)
 ISOLINES = "isolines"  # attribute of a variable: values of lines on its map
 PROBABILITY = "vibration_probability"
-
-# By name the class, and whether a run that failed, or without a verdict, may have it
-_EVENTS = {
-    "vibration": (OccurrenceClass.VIBRATING, True),
-    "slip": (OccurrenceClass.SLIPPING, True),
-    "failure": (OccurrenceClass.FAILED, False),
-}
-_VERDICTS = (OccurrenceClass.QUIET, OccurrenceClass.VIBRATING, OccurrenceClass.SLIPPING)
 
 
 def has_samples(dataset: xr.Dataset, fixed: Collection[str] = ()) -> bool:
@@ -74,15 +62,15 @@ def probabilities(dataset: xr.Dataset, source: str = "results") -> xr.Dataset:
     InputError
         If the results have no samples.
     """
-    _check_samples(dataset, source)
+    check_samples(dataset, source)
     whole, dataset = dataset, independent(dataset)
     classes = map_classes(dataset).compute().drop_attrs(deep=False)
     ended = classes != OccurrenceClass.NOT_RUN
     count = ended.sum(SAMPLE)
     found = xr.Dataset(attrs=dataset.attrs)
-    for event, (kind, may_hide) in _EVENTS.items():
+    for event, (kind, may_hide) in EVENTS.items():
         yes = classes == kind
-        hidden = (ended & ~classes.isin(_VERDICTS)).sum(SAMPLE) if may_hide else xr.zeros_like(count)
+        hidden = (ended & ~classes.isin(VERDICTS)).sum(SAMPLE) if may_hide else xr.zeros_like(count)
         name = f"{event}_probability"
         found[name] = (yes.sum(SAMPLE) / (count - hidden).where(count > hidden)).assign_attrs(
             units="1", long_name=f"probability of {event}", valid_range=[0.0, 1.0], isolines=list(CONTOURS)
@@ -115,56 +103,6 @@ def probabilities(dataset: xr.Dataset, source: str = "results") -> xr.Dataset:
     return found.assign_coords(kept).assign_attrs(counted=counted)
 
 
-def _check_samples(dataset: xr.Dataset, source: str) -> None:
-    check_results(dataset, source)
-    if SAMPLE not in dataset["status"].dims:
-        dims = ", ".join(map(str, dataset["status"].dims)) or "a single run"
-        raise mismatch(source, f"results with the axis {SAMPLE}, of a job with [uncertain]", dims)
-
-
-def independent(dataset: xr.Dataset) -> xr.Dataset:
-    """Return results of independent samples along `sample`: of runs for Sobol indices both sets."""
-    if SWAPPED not in dataset["status"].dims:
-        return dataset
-    names = ("status", "vibrates", "inferred_class", "amplitude", "frequency")
-    kept = dataset[[name for name in names if name in dataset]]
-    both = [kept.sel({SWAPPED: which}, drop=True) for which in (NONE, ALL)]
-    return xr.concat(both, SAMPLE, coords="minimal", compat="override", data_vars="minimal")
-
-
-def indices_of(dataset: xr.Dataset, of: str, source: str = "results") -> xr.Dataset:
-    """Return Sobol indices of a result to each uncertain parameter, in each cell; as of `sobol_indices`.
-
-    Parameters
-    ----------
-    dataset : Dataset
-        Results of a job with `indices = true` in [uncertain].
-    of : str
-        "vibration", "slip" or "failure": whether a run has it; or a numeric variable, of those with more
-        dimensions at the strongest strand.
-    source : str
-        Where the results are from, for the errors.
-
-    Raises
-    ------
-    InputError
-        If the results have no such runs, or no such variable.
-    """
-    check_results(dataset, source)
-    if not {SAMPLE, SWAPPED} <= {*dataset["status"].dims}:
-        raise mismatch(source, "results of a job with `indices = true` in [uncertain]", "others")
-    if of in _EVENTS:
-        kind, may_hide = _EVENTS[of]
-        classes = map_classes(dataset)
-        decided = classes.isin(_VERDICTS) if may_hide else classes != OccurrenceClass.NOT_RUN
-        return sobol_indices((classes == kind).astype(float).where(decided))
-    known = [str(name) for name, array in dataset.data_vars.items() if array.dtype.kind in "iuf"]
-    if of not in known:
-        raise unknown(source, "variable", of, [*_EVENTS, *known])
-    beyond = {*dataset[of].dims} - {*dataset["status"].dims}
-    return sobol_indices(at_strongest_strand(dataset, of) if beyond else dataset[of])
-
-
 def _quantiles(values: xr.DataArray) -> xr.DataArray:
     """Quantiles over the samples: the least value that so many do not exceed; nan where none has a value."""
     ordered = np.sort(values.transpose(SAMPLE, ...).values, axis=0)  # nan last
@@ -174,51 +112,3 @@ def _quantiles(values: xr.DataArray) -> xr.DataArray:
     rest = [dim for dim in values.dims if dim != SAMPLE]
     coordinates = {name: axis for name, axis in values.coords.items() if SAMPLE not in axis.dims}
     return xr.DataArray(found, {**coordinates, "quantile": [*QUANTILES]}, ["quantile", *rest])
-
-
-def onset_quantiles(dataset: xr.Dataset, along: str, source: str = "results") -> xr.DataArray:
-    """Return quantiles of the onset of vibration along an axis, over the samples.
-
-    Parameters
-    ----------
-    dataset : Dataset
-        Results with the axis `sample`.
-    along : str
-        A numeric axis.
-    source : str
-        Where they are from, for the errors.
-
-    Returns
-    -------
-    DataArray
-        Over `quantile` and the other axes [unit of the axis]: midway between the quiet and the vibrating
-        value around it, so within half a step where no run between them is undecided. -inf: vibrates at the
-        lowest value of which a verdict is known; inf: at no value. Samples of which no run is known to be
-        quiet or to vibrate do not count.
-
-    Raises
-    ------
-    InputError
-        If the results have no samples, or no such axis.
-    """
-    _check_samples(dataset, source)
-    axes = [str(dim) for dim in dataset["status"].dims if dim not in (SAMPLE, SWAPPED)]
-    numeric = [name for name in axes if dataset[name].dtype.kind in "iuf"]
-    if along not in numeric:
-        raise mismatch(f"{source}: along", f"one of the axes {', '.join(numeric) or '(none)'}", along)
-    classes = map_classes(independent(dataset)).compute().sortby(along).transpose(..., along)
-    places = np.asarray(classes[along].values, float)
-    lowest = classes.isel({along: 0}, drop=True).astype(float)
-    flat = [_onset(places, levels(row)) for row in classes.values.reshape(-1, places.size)]
-    lowest = lowest.copy(data=np.reshape(flat, lowest.shape))
-    told = {key: value for key, value in classes[along].attrs.items() if key in ("units", "job_units")}
-    return _quantiles(lowest).rename("onset").assign_attrs(told, long_name=f"onset of vibration in {along}")
-
-
-def _onset(places: NDArray[np.float64], level: NDArray[np.float64]) -> float:
-    known = level[np.isfinite(level)]
-    if not known.size:
-        return np.nan
-    if known[0] > 0.0:
-        return -np.inf
-    return min((one.load for one in onsets(places, level) if one.rising), default=np.inf)

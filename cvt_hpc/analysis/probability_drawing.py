@@ -13,7 +13,8 @@ from cvt_hpc.analysis import figures
 from cvt_hpc.analysis.classes import check_results
 from cvt_hpc.analysis.curves import set_frame
 from cvt_hpc.analysis.hysteresis_bands import ALONG
-from cvt_hpc.analysis.probability import CONTOURS, PROBABILITY, QUANTILES, onset_quantiles, over_samples
+from cvt_hpc.analysis.probability import CONTOURS, PROBABILITY, over_samples
+from cvt_hpc.analysis.sensitivity import QUANTILES, onset_scatter
 from cvt_hpc.analysis.value_maps import value_map_figure
 from cvt_hpc.errors import mismatch
 from cvt_hpc.job.axes import SAMPLE, SWAPPED
@@ -96,7 +97,7 @@ def onset_bands_figure(
         found = ", ".join(map(str, dataset["status"].dims)) or "a single run"
         expected = f"results over samples and two further axes, of them {along or 'one'} of numbers"
         raise mismatch(source, expected, found)
-    quantiles = onset_quantiles(dataset, along)
+    quantiles = onset_scatter(dataset, along)["onset"]
     axes_left = xr.Dataset({"status": told["status"].isel({along: 0}, drop=True), "onset": quantiles})
     arrangement = layout.arrange(axes_left, at or {}, source, layout.Sides(sides.x, sides.panel))
     arrangement = layout.first_panel(arrangement)

@@ -5,6 +5,9 @@ variance V that a parameter makes alone (first order; Saltelli et al. 2010) and 
 Jansen 1999):
 
     S = mean(f(B) (f(AB) - f(A))) / V,    S_T = mean((f(A) - f(AB))^2) / (2 V)
+
+Of the cells of a row together, numerators and variances are added before they are divided (Gamboa et al.
+2014).
 """
 
 import numpy as np
@@ -13,7 +16,7 @@ from numpy.typing import NDArray
 
 from cvt_hpc.job.axes import ALL, NONE, SAMPLE, SWAPPED
 
-_RESAMPLES = 200  # of the bootstrap
+RESAMPLES = 200  # of the bootstrap
 _LEAST_KNOWN = 0.9  # of the samples: those left out are not like the others
 _ENDS = {"": "index", "_low": "low end of the 95 % bounds", "_high": "high end of the 95 % bounds"}
 
@@ -23,13 +26,14 @@ def orders(scores: NDArray[np.float64]) -> NDArray[np.float64]:
 
     Parameters
     ----------
-    scores : array, shape (2 + parameter, sample)
-        f(A), f(B), and f(AB) of each parameter; not all alike.
+    scores : array, shape (..., 2 + parameter, sample)
+        f(A), f(B), and f(AB) of each parameter; not all alike. nan is left out; further cells are pooled.
     """
-    a, b, crossed = scores[0], scores[1], scores[2:]
-    variance = np.var(scores[:2])
-    first = np.mean((b - np.mean(scores[:2])) * (crossed - a), axis=1)
-    return np.stack([first, 0.5 * np.mean((a - crossed) ** 2, axis=1)]) / variance
+    both, crossed = scores[..., :2, :], scores[..., 2:, :]
+    a, b = both[..., :1, :], both[..., 1:, :]
+    mean = np.nanmean(both, axis=(-2, -1), keepdims=True)
+    shares = np.nanmean([(b - mean) * (crossed - a), 0.5 * (a - crossed) ** 2], axis=-1)
+    return shares.reshape(2, -1, crossed.shape[-2]).sum(axis=1) / np.nanvar(both, axis=(-2, -1)).sum()
 
 
 def orders_with_bounds(scores: NDArray[np.float64], rng: np.random.Generator) -> NDArray[np.float64]:
@@ -37,36 +41,50 @@ def orders_with_bounds(scores: NDArray[np.float64], rng: np.random.Generator) ->
 
     They are nan where the scores, as of `orders`, do not vary.
     """
-    if scores.shape[1] == 0 or np.ptp(scores[:2]) == 0.0:
-        return np.full((3, 2, len(scores) - 2), np.nan)
-    drawn = rng.integers(scores.shape[1], size=(_RESAMPLES, scores.shape[1]))
-    resampled = [orders(part) for part in (scores[:, rows] for rows in drawn) if np.ptp(part[:2]) > 0.0]
+    size = scores.shape[-1]
+    if not _vary(scores):
+        return np.full((3, 2, scores.shape[-2] - 2), np.nan)
+    drawn = rng.integers(size, size=(RESAMPLES, size))
+    resampled = [orders(part) for part in (scores[..., rows] for rows in drawn) if _vary(part)]
     return np.stack([orders(scores), *np.quantile(resampled, [0.025, 0.975], axis=0)])
 
 
-def sobol_indices(values: xr.DataArray) -> xr.Dataset:
-    """Return the indices of a result in each cell.
+def _vary(scores: NDArray[np.float64]) -> bool:
+    """Whether each cell has a known sample, and the samples of any differ."""
+    both = scores[..., :2, :]
+    is_known = np.isfinite(both)
+    least, most = np.where(is_known, both, np.inf), np.where(is_known, both, -np.inf)
+    spans = most.max(axis=(-2, -1), initial=-np.inf) - least.min(axis=(-2, -1), initial=np.inf)
+    return bool(spans.size) and bool(np.isfinite(spans).all()) and bool((spans > 0.0).any())
+
+
+def sobol_indices(values: xr.DataArray, along: str = "") -> xr.Dataset:
+    """Return the indices of a result in each cell, or in each row of cells.
 
     Parameters
     ----------
     values : DataArray
         Over the cells, `sample` and `swapped`. A sample counts if all its values are known.
+    along : str
+        Axis along which rows go, the cells of which are pooled; "": each cell alone.
 
     Returns
     -------
     Dataset
-        Over `parameter` and the cells `first_order` and `total_order`, with the ends of their 95 % bounds,
-        `_low` and `_high`; nan where the result does not vary, or less than 90 % of the samples count.
+        Over `parameter` and the cells or rows `first_order` and `total_order`, with the ends of their 95 %
+        bounds, `_low` and `_high`; nan where the result does not vary, or less than 90 % of the samples
+        count. Of a row the cells count in which so many do.
     """
     parameters = [str(name) for name in values[SWAPPED].values if name not in (NONE, ALL)]
-    ordered = values.sel({SWAPPED: [NONE, ALL, *parameters]}).transpose(..., SWAPPED, SAMPLE)
-    dims, shape = ordered.dims[:-2], ordered.shape[:-2]
+    values = values.rename({along: "row"}).drop_vars("row") if along else values.expand_dims("row")
+    ordered = values.sel({SWAPPED: [NONE, ALL, *parameters]}).transpose(..., "row", SWAPPED, SAMPLE)
+    dims, shape = ordered.dims[:-3], ordered.shape[:-3]
     found = np.empty((*shape, 3, 2, len(parameters)))
-    for cell in np.ndindex(shape):
-        scores = ordered.values[cell].astype(float)
-        is_known = np.isfinite(scores).all(axis=0)
-        known = scores[:, is_known if is_known.mean() >= _LEAST_KNOWN else []]
-        found[cell] = orders_with_bounds(known, np.random.default_rng(0))
+    for place in np.ndindex(shape):
+        scores = ordered.values[place].astype(float)
+        is_known = np.isfinite(scores).all(axis=1, keepdims=True)
+        known = np.where(is_known, scores, np.nan)[is_known.mean(axis=(1, 2)) >= _LEAST_KNOWN]
+        found[place] = orders_with_bounds(known, np.random.default_rng(0))
     dataset = xr.Dataset(coords={"parameter": parameters})
     for k, order in enumerate(("first_order", "total_order")):
         for end, (suffix, words) in enumerate(_ENDS.items()):

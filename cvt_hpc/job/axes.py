@@ -16,6 +16,7 @@ LARGEST_AXIS = 100_000
 SAMPLE = "sample"  # axis along which uncertain parameters take their values
 SWAPPED = "swapped"  # axis of those that take them from a second set of samples, for Sobol indices
 NONE, ALL = "none", "all"  # on it, beside the names of uncertain parameters
+CORRELATED = "correlated"  # the correlated ones among them, together
 _RANGE_KEYS = ("from", "to", "count", "step", "spacing")
 _SPACINGS = ("linear", "log")
 _STEP_TOLERANCE = Decimal("1e-9")

@@ -10,7 +10,7 @@ which for normal parameters is the correlation of their values. Limits cut a dis
 left keeps its shape. Mean and standard deviation are those without the limits.
 
 For Sobol indices each sample is drawn twice, A and B, and a further axis `swapped` names the parameters that
-are those of B: none, all, or one of them (Saltelli et al. 2010).
+are those of B: none, all, or one of them (Saltelli et al. 2010). Correlated ones are swapped together.
 """
 
 import math
@@ -22,7 +22,7 @@ from typing import Any, NamedTuple
 import numpy as np
 from numpy.typing import NDArray
 
-from cvt_hpc.job.axes import ALL, NONE, SAMPLE, SWAPPED
+from cvt_hpc.job.axes import ALL, CORRELATED, NONE, SAMPLE, SWAPPED
 from cvt_hpc.job.schema import Schema
 from cvt_hpc.job.values import in_words
 from cvt_hpc.parameters import Parameter
@@ -76,6 +76,55 @@ class Distribution(NamedTuple):
         centre, spread, to_value, _ = self._normal()
         # the limits hold whatever rounding does
         return np.clip(to_value(centre + spread * ndtri(below + within * shares)), low, high)
+
+    def shares(self, values: NDArray[np.float64]) -> NDArray[np.float64]:
+        """Return the shares of the distribution below values [SI], of the shape of these."""
+        from scipy.special import ndtr
+
+        has = dict(self.numbers)
+        low, high = has.get("from", -math.inf), has.get("to", math.inf)
+        if self.kind == "uniform":
+            found = (values - low) / (high - low)
+        elif self.kind == "triangular":
+            span = high - low
+            rising = (values - low) ** 2 / (span * max(has["mode"] - low, math.ulp(span)))
+            falling = 1.0 - (high - values) ** 2 / (span * max(high - has["mode"], math.ulp(span)))
+            found = np.where(values < has["mode"], rising, falling)
+        else:
+            below, within = self._share_within(low, high)
+            found = (ndtr(self._scores(values)) - below) / within
+        return np.where(values < low, 0.0, np.where(values > high, 1.0, found))
+
+    def log_density(self, values: NDArray[np.float64]) -> NDArray[np.float64]:
+        """Return the logarithm of the density at values [SI], but for a constant; -inf beyond the limits."""
+        has = dict(self.numbers)
+        low, high = has.get("from", -math.inf), has.get("to", math.inf)
+        with np.errstate(divide="ignore", invalid="ignore"):
+            if self.kind == "uniform":
+                found = np.zeros_like(values)
+            elif self.kind == "triangular":
+                rising = (values - low) / (has["mode"] - low)
+                falling = (high - values) / (high - has["mode"])
+                found = np.log(np.where(values < has["mode"], rising, falling))
+            else:
+                found = -0.5 * self._scores(values) ** 2
+                found = found - np.log(values) if self.kind == "log_normal" else found
+        return np.where((values < low) | (values > high), -math.inf, found)
+
+    def halved(self) -> "Distribution":
+        """Return the distribution of half the standard deviation about the same mean; limits stay."""
+        has = dict(self.numbers)
+        if "standard_deviation" in has:
+            has["standard_deviation"] *= 0.5
+        else:
+            mean = sum(has.values()) / len(has)
+            has = {name: mean + 0.5 * (value - mean) for name, value in has.items()}
+        return self._replace(numbers=tuple(has.items()))
+
+    def _scores(self, values: NDArray[np.float64]) -> NDArray[np.float64]:
+        """Return the scores of the normal number behind values."""
+        centre, spread, _, _ = self._normal()
+        return ((np.log(values) if self.kind == "log_normal" else values) - centre) / spread
 
     def share_within(self) -> float:
         """Return the share of the distribution that its limits leave, 1 of kinds that end at them."""
@@ -139,8 +188,14 @@ class Uncertain:
     def value(self, place: int, sample: int, swapped: str = NONE) -> float:
         """Return the value [SI] of the distribution at a place for a sample, by what is swapped."""
         block, row = divmod(sample, BLOCK)
-        is_second = swapped in (ALL, self.distributions[place].key)
+        key = self.distributions[place].key
+        is_second = swapped in (ALL, CORRELATED if key in self.correlated else key)
         return float(_block(self, block)[row, place + is_second * len(self.distributions)])
+
+    def groups(self) -> dict[str, tuple[str, ...]]:
+        """Return groups of parameters, independent of each other: correlated ones together."""
+        alone = {one.key: (one.key,) for one in self.distributions if one.key not in self.correlated}
+        return alone | ({CORRELATED: self.correlated} if self.correlated else {})
 
     def document(self) -> dict[str, Any]:
         """Return the table of a job file, without the number of samples, in JSON types."""
@@ -179,18 +234,32 @@ def _block(uncertain: Uncertain, number: int) -> NDArray[np.float64]:
     from scipy.special import ndtr, ndtri
     from scipy.stats import qmc
 
-    found = uncertain.distributions * (2 if uncertain.indices else 1)
+    sets, size = 2 if uncertain.indices else 1, len(uncertain.distributions)
+    found = uncertain.distributions * sets
     engine = qmc.Sobol(len(found), seed=np.random.default_rng(uncertain.seed))
     if number:  # the engine cannot go on by none
         engine.fast_forward(BLOCK * number)
     # in the middle of the cells of the sequence's resolution, so never at 0, where quantiles are infinite
     shares = engine.random(BLOCK) + 0.5 * _RESOLUTION
-    if uncertain.correlated:
-        columns = [[one.key for one in found].index(key) for key in uncertain.correlated]
+    keys = [one.key for one in uncertain.distributions]
+    for first in range(0, sets * size, size) if uncertain.correlated else ():
+        columns = [first + keys.index(key) for key in uncertain.correlated]
         scores, factor = ndtri(shares[:, columns]), np.linalg.cholesky(np.array(uncertain.matrix))
         for row, column in enumerate(columns):  # sums in a fixed order, which a matrix product has not
             shares[:, column] = ndtr(sum(factor[row, k] * scores[:, k] for k in range(row + 1)))
     return np.stack([one.quantiles(shares[:, k]) for k, one in enumerate(found)], axis=1)
+
+
+def read_document(table: Mapping[str, Any]) -> Uncertain:
+    """Return what a table is of, as `Uncertain.document` gives it."""
+    kinds = {
+        key: dict(one) for key, one in table.items() if isinstance(one, Mapping) and "distribution" in one
+    }
+    drawn = (Distribution(key, one.pop("distribution"), tuple(one.items())) for key, one in kinds.items())
+    correlation = table.get("correlation", {"parameters": (), "matrix": ()})
+    matrix = tuple(map(tuple, correlation["matrix"]))
+    is_second = table.get("indices", False)
+    return Uncertain(tuple(drawn), table["seed"], tuple(correlation["parameters"]), matrix, is_second)
 
 
 def with_samples(schema: Schema, table: Mapping[str, Any]) -> Schema:
@@ -198,6 +267,6 @@ def with_samples(schema: Schema, table: Mapping[str, Any]) -> Schema:
     known = {SAMPLE: _SAMPLE}
     if table.get("indices"):
         keys = (name.rpartition(".")[2] for name, _ in schema.flatten(table))
-        choices = (NONE, ALL, *(key for key in keys if key in schema.parameters))
+        choices = (NONE, ALL, CORRELATED, *(key for key in keys if key in schema.parameters))
         known[SWAPPED] = Parameter(NONE, "", "which are those of the second set of samples", choices=choices)
     return replace(schema, sections=schema.sections | {TABLE: known})

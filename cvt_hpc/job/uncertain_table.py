@@ -70,8 +70,6 @@ def read_uncertain(
     # by name, so that the samples of a job do not depend on its layout
     left = tuple(one for key, one in sorted(found.items()) if key not in gone)
     indices = read_value(_INDICES, table.get("indices", False), f"{where} indices")
-    if indices and correlated:
-        raise mismatch(f"{where} indices", "independent parameters, for Sobol indices", "a correlation")
     uncertain = Uncertain(left, seed, correlated, matrix, indices)
     rules = []
     for place, one in enumerate(left):
@@ -92,7 +90,7 @@ def read_uncertain(
         raise mismatch(f"{where} samples", expected, str(samples))
     axes: dict[str, list] = {} if samples is None else {SAMPLE: list(range(samples))}
     if indices and samples is not None:
-        axes[SWAPPED] = [NONE, ALL, *(one.key for one in left)]
+        axes[SWAPPED] = [NONE, ALL, *uncertain.groups()]
     return rules, axes, fixed
 
 

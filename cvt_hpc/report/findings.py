@@ -15,8 +15,9 @@ from numpy.typing import NDArray
 from cvt_hpc.analysis.arrangement import infinity_in_words, value_text
 from cvt_hpc.analysis.classes import at_strongest_strand, count_classes, map_classes, occurrence_classes
 from cvt_hpc.analysis.figures import coordinate_unit, in_words, number, value_unit
-from cvt_hpc.analysis.probability import CONTOURS, PROBABILITY, QUANTILES
+from cvt_hpc.analysis.probability import CONTOURS, PROBABILITY
 from cvt_hpc.analysis.scatter import is_sampled
+from cvt_hpc.analysis.sensitivity import QUANTILES
 from cvt_hpc.job.axes import SAMPLE
 from cvt_hpc.variables import Status
 from cvt_hpc.vibration.classes import DECIDED, OccurrenceClass, levels, onsets

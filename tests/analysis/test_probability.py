@@ -1,5 +1,7 @@
 """Probabilities over the samples of uncertain parameters: counts, intervals, onsets, pictures and sentences."""
 
+import json
+
 import numpy as np
 import pytest
 import xarray as xr
@@ -10,8 +12,9 @@ from scipy.stats import sobol_indices as scipy_indices
 import cvt_hpc.accessor  # noqa: F401
 from cvt_hpc.analysis.classes import OccurrenceClass
 from cvt_hpc.analysis.maps import map_figure
-from cvt_hpc.analysis.probability import onset_quantiles, probabilities
+from cvt_hpc.analysis.probability import probabilities
 from cvt_hpc.analysis.probability_drawing import onset_bands_figure
+from cvt_hpc.analysis.sensitivity import onset_scatter
 from cvt_hpc.analysis.sobol import sobol_indices
 from cvt_hpc.analysis.value_maps import value_map_figure
 from cvt_hpc.errors import InputError
@@ -170,12 +173,12 @@ def test_probabilities_rest_on_both_sets_of_samples_and_not_on_those_between(tmp
     # one of eight samples without a verdict is too many
     unknown = dataset.copy(deep=True)
     unknown["vibrates"][3, 0, 0] = Vibrates.UNDECIDED
-    assert np.isnan(unknown.cvt.sobol_indices()["total_order"]).all()
-    assert dataset.cvt.sobol_indices("amplitude")["total_order"].shape == (1, 2)
+    assert np.isnan(unknown.cvt.indices()["total_order"]).all()
+    assert dataset.cvt.indices("amplitude")["total_order"].shape == (1, 2)
     with pytest.raises(InputError, match="unknown variable; did you mean amplitude"):
-        dataset.cvt.sobol_indices("amplitud")
+        dataset.cvt.indices("amplitud")
     with pytest.raises(InputError, match="expected results of a job with `indices = true`"):
-        dataset.isel(swapped=0).cvt.sobol_indices()
+        dataset.isel(swapped=0).cvt.indices()
     text = write_report(dataset, tmp_path / "report.html").read_text().replace("\u00a0", " ")
     assert "Total Sobol indices where vibration is least certain, at load 1 N m: damping 1.33 (" in text
     dataset["vibrates"][:] = Vibrates.UNDECIDED
@@ -183,19 +186,100 @@ def test_probabilities_rest_on_both_sets_of_samples_and_not_on_those_between(tmp
     assert "occurrence" in words(map_figure(dataset, {"swapped": "none"}))
 
 
+def linear_onset(samples, along, **uncertain):
+    """Results of which vibration sets in at 1 + 2 damping + preload / 10, by the samples of a job."""
+    table = {"samples": samples, "seed": 3, **uncertain}
+    job = build_job({"name": "x", "model": "oscillator", "uncertain": table})
+    points = [job.point(index) for index in range(job.size)]
+    values = {key: np.reshape([point[key] for point in points], job.shape) for key in ("damping", "preload")}
+    sets_in = 1.0 + 2.0 * values["damping"] + values["preload"] / 10.0
+    classes = np.where(np.greater_equal.outer(along, sets_in), V, Q)
+    parts = [
+        study(part, load=along) for part in np.moveaxis(np.reshape(classes, (len(along), samples, -1)), -1, 0)
+    ]
+    if "indices" not in table:
+        dataset, dims = parts[0], ["sample"]
+    else:
+        dataset = xr.concat(parts, "swapped").assign_coords(swapped=[*job.axes[1].values])
+        dims = ["sample", "swapped"]
+    dataset = dataset.assign_coords({key: (dims, one) for key, one in values.items()})
+    return dataset.assign_attrs(job=json.dumps(job.resolved()))
+
+
+def normal(mean, deviation):
+    return {"distribution": "normal", "mean": mean, "standard_deviation": deviation}
+
+
+STEPS = np.arange(5.0, 26.0)
+WIDE = 2.0 * norm.ppf(0.95)
+
+
 def test_quantiles_of_the_onset_are_those_of_the_closed_form():
     loads = np.arange(0.92, 1.4, 0.02)
-    found = onset_quantiles(stability(onset_job(1, loads, samples=128)), "normal_load")
+    found = onset_scatter(stability(onset_job(1, loads, samples=128)), "normal_load")["onset"]
     exact = (5.9 + 0.6 * norm.ppf([0.05, 0.5, 0.95])) / SLOPE
     assert exact[0] < 0.92 and found[0] == -np.inf
-    # half a step of the grid, and a 128th of the distribution
-    assert found.values[1:] == pytest.approx(exact[1:], abs=0.01 + 0.6 / SLOPE / 128 / norm.pdf(1.645))
+    # a 128th of the distribution, where a step of the grid is 0.02
+    assert found.values[1:] == pytest.approx(exact[1:], abs=0.6 / SLOPE / 128 / norm.pdf(1.645))
+
+
+@pytest.mark.parametrize("correlation", [0.0, 0.6])
+def test_half_the_scatter_of_a_parameter_narrows_the_onset_as_in_the_closed_form(correlation):
+    further = {"damping": normal(5.0, 0.75), "preload": normal(40.0, 20.0)}
+    if correlation:
+        matrix = [[1.0, correlation], [correlation, 1.0]]
+        further["correlation"] = {"parameters": ["damping", "preload"], "matrix": matrix}
+    found = linear_onset(1024, STEPS, **further).cvt.onset_scatter()
+    # the onset has the standard deviations 1.5 and 2 by the two parameters
+    exact = WIDE * np.sqrt(1.5**2 + 2.0**2 + 2 * correlation * 1.5 * 2.0)
+    assert found["band"].item() == pytest.approx(exact, rel=0.02)
+    halved = WIDE * np.sqrt([0.75**2 + 2.0**2, 1.5**2 + 1.0]) if not correlation else [0.5 * exact]
+    assert found["parameter"].values.tolist() == (["correlated"] if correlation else ["damping", "preload"])
+    assert found["halved_band"].values == pytest.approx(halved, rel=0.03)
+    assert ((found["halved_band_low"] < halved) & (halved < found["halved_band_high"])).all()
+    left = (np.sqrt(7.0) / 4.0) ** (2 if correlation else 1)
+    assert found["effective_samples"].values == pytest.approx(1024 * left, rel=0.02)
+    assert found["halved_onset"].values[1] == pytest.approx(15.0, abs=0.1)
+
+
+def test_a_band_that_ends_beyond_the_axis_has_no_width():
+    found = linear_onset(64, np.arange(5.0, 16.0), damping=normal(5.0, 0.75), preload=normal(40.0, 20.0))
+    assert (
+        np.isinf(found.cvt.onset_scatter()["band"])
+        and np.isinf(found.cvt.onset_scatter()["halved_band"]).all()
+    )
+    assert "halved_band" not in found.drop_attrs().cvt.onset_scatter()
+
+
+def test_indices_of_the_onset_are_shares_of_its_variance_and_rows_pool_their_cells():
+    further = {"indices": True, "damping": normal(5.0, 0.75), "preload": normal(40.0, 20.0)}
+    dataset = linear_onset(512, STEPS, **further)
+    found = dataset.cvt.indices("onset", "load")
+    shares = np.array([1.5**2, 2.0**2]) / 6.25
+    # of a sum of independent parameters both orders are alike
+    assert found["first_order"].values == pytest.approx(shares, abs=0.03)
+    assert found["total_order"].values == pytest.approx(shares, abs=0.03)
+    row, cells = dataset.cvt.indices(along="load"), dataset.cvt.indices()
+    both = dataset["vibrates"].sel(swapped=["none", "all"]) == Vibrates.YES
+    variance = both.astype(float).var(["sample", "swapped"])
+    pooled = (cells["total_order"] * variance).sum("load") / variance.sum()
+    # where A and B are alike in a cell it has no index of its own, and counts in the row
+    assert row["total_order"].values == pytest.approx(pooled.values, abs=2e-3)
+    for dataset_ in (found, row):
+        assert (dataset_["total_order_low"] <= dataset_["total_order"]).all()
+    matrix = [[1.0, 0.6], [0.6, 1.0]]
+    further["correlation"] = {"parameters": ["damping", "preload"], "matrix": matrix}
+    found = linear_onset(64, STEPS, **further).cvt.indices("onset", "load")
+    assert found["parameter"].values.tolist() == ["correlated"]
+    assert found["total_order"].values == pytest.approx([1.0], abs=0.15)
+    with pytest.raises(InputError, match="along: expected one of the axes load, found thrust"):
+        dataset.cvt.indices("onset", "thrust")
 
 
 def test_an_onset_beyond_the_axis_is_infinite_and_one_without_verdicts_does_not_count():
     runs = [[V, V], [Q, Q], [Q, V], [U, U], [U, V]]
     dataset = study(np.transpose(runs), load=[1.0, 2.0])
-    found = dataset.cvt.onset_quantiles()
+    found = dataset.cvt.onset_scatter()["onset"]
     assert found.values.tolist() == [-np.inf, -np.inf, np.inf]  # of -inf, inf, 1.5, none, -inf
     assert found["quantile"].values.tolist() == ["5 %", "50 %", "95 %"]
 
@@ -237,7 +321,7 @@ def test_over_one_axis_the_interval_is_a_band_and_onsets_have_one_over_another(t
     high = probabilities(two_axes)["vibration_probability_high"].sel(thrust=2e3)
     assert band.get_paths()[0].vertices[:, 1].max() == pytest.approx(high.max().item())
     figure = onset_bands_figure(two_axes)
-    quantiles = onset_quantiles(two_axes, "load")
+    quantiles = onset_scatter(two_axes, "load")["onset"]
     median = figure.axes[0].lines[0].get_ydata()
     assert median == pytest.approx(np.where(np.isinf(quantiles[1]), np.nan, quantiles[1]), nan_ok=True)
     with pytest.raises(InputError, match="expected results over samples and two further axes, of them load"):
@@ -245,7 +329,7 @@ def test_over_one_axis_the_interval_is_a_band_and_onsets_have_one_over_another(t
     with pytest.raises(InputError, match="expected results with the axis sample"):
         two_axes.isel(sample=0).cvt.probability()
     with pytest.raises(InputError, match="along: expected one of the axes thrust, load, found sample"):
-        two_axes.cvt.onset_quantiles("sample")
+        two_axes.cvt.onset_scatter("sample")
 
 
 def test_the_report_says_how_sure_the_map_is(two_axes, tmp_path):

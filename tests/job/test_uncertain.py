@@ -9,6 +9,7 @@ from scipy import stats
 from cvt_hpc.errors import InputError, UnitWarning
 from cvt_hpc.job import build_job
 from cvt_hpc.job.definition import handed_to
+from cvt_hpc.job.uncertain import read_document
 
 NORMAL = {"distribution": "normal", "mean": "20 kN", "standard_deviation": "1 kN"}
 LOG_NORMAL = {"distribution": "log_normal", "mean": "2 kg/m", "standard_deviation": "0.5 kg/m"}
@@ -49,6 +50,17 @@ class TestSamples:
         values = column(toy({"samples": 1024, key: table}, **thrust), key)
         # one value in each of 1024 equal parts of the distribution: the point of such a sequence
         assert sorted(np.floor(1024 * law.cdf(values)).astype(int)) == list(range(1024))
+        one = read_document(toy({"samples": 2, key: table}, **thrust).rules[-1].source.uncertain.document())
+        drawn = one.distributions[0]
+        assert drawn.shares(values) == pytest.approx(law.cdf(values), abs=1e-9)
+        # weighted, they are those of half the scatter
+        weights = np.exp(drawn.halved().log_density(values) - drawn.log_density(values))
+        means = np.average([values, values**2], axis=1, weights=weights)
+        assert means[0] == pytest.approx(
+            law.mean() if table is not CUT else stats.truncnorm(-2, 3, 2e4, 500).mean(), rel=1e-3
+        )
+        deviation = 0.5 * law.std() if table is not CUT else stats.truncnorm(-2, 3, 2e4, 500).std()
+        assert np.sqrt(means[1] - means[0] ** 2) == pytest.approx(deviation, rel=1e-2)
 
     def test_every_cell_has_the_same_samples_and_the_axes_come_first(self):
         job = toy({"samples": 8, "thrust": NORMAL})
@@ -110,8 +122,16 @@ class TestSamples:
         assert again.fingerprint() == job.fingerprint() and again.point(21) == job.point(21)
         assert toy(table, "thrust=1e4").axes[-1].values == ("none", "all", "element_mass")
         assert toy(table, "swapped=all").point(3)["thrust"] == b[1]
-        with pytest.raises(InputError, match=r"indices: expected independent parameters"):
-            toy(correlated([[1.0, 0.5], [0.5, 1.0]]) | {"indices": True})
+
+    def test_correlated_parameters_are_swapped_together_and_are_correlated_in_both_sets(self):
+        job = toy(correlated([[1.0, 0.9], [0.9, 1.0]]) | {"indices": True, "samples": 512})
+        assert job.axes[-1].values == ("none", "all", "correlated")
+        sets = {}
+        for which in job.axes[-1].values:
+            points = [job.complete({"sample": k, "swapped": which}) for k in range(512)]
+            sets[which] = np.array([[point["thrust"], np.log(point["element_mass"])] for point in points])
+            assert np.corrcoef(sets[which].T)[0, 1] == pytest.approx(0.9, abs=0.02)
+        assert (sets["correlated"] == sets["all"]).all() and (sets["none"] != sets["all"]).all()
 
     def test_overrides_take_a_sample_or_a_value(self):
         table = {"samples": 8, "thrust": NORMAL, "element_mass": LOG_NORMAL}
