@@ -70,7 +70,7 @@ def report_lines(report: RunReport) -> Iterator[str]:
         yield f"of those done {words}"
     if report.unneeded:
         cells = report.total + report.unneeded
-        yield f"{report.unneeded} of {cells} cells of the grid not run: their class is inferred"
+        yield f"{report.unneeded} of {cells} runs of the whole grid not needed"
     yield f"results: {report.results or 'gathered by the part that ends last'}"
 
 
@@ -216,7 +216,7 @@ def status_lines(status: StudyStatus) -> Iterator[str]:
     rows = [("job", f"{status.name} ({state})"), ("runs", f"{status.total}")]
     if status.unneeded:
         cells = status.total + status.unneeded
-        rows.append(("grid", f"{cells} cells, {status.unneeded} not needed so far"))
+        rows.append(("grid", f"{cells} runs, {status.unneeded} not needed so far"))
     words = _special_in_words(status)
     done = f"{status.done} ({status.done / status.total:.1%})"
     rows += [("done", f"{done}, of these {words}" if words else done), ("failed", f"{status.failed}")]
@@ -235,7 +235,7 @@ def forecast_lines(forecasts: Sequence[Forecast], job: Job, basis: str) -> Itera
     from cvt_hpc.study.forecast.resources import slurm_time, suggested_time
     from cvt_hpc.study.ranks.progress import show_duration
 
-    at_most = ", if all cells of the grid are run" if "first_spacing" in job.design else ""
+    at_most = ", if all cells of the grid are run" if job.in_rounds else ""
     yield f"forecast of all {job.size} runs by {basis}{at_most}:"
     rows = [("ranks", "makespan", "95 % of sweeps", "efficiency", "core-hours", "--time")]
     for forecast in forecasts:

@@ -23,8 +23,9 @@ from cvt_hpc.models import MODELS
 from cvt_hpc.models.contract import load_model
 from cvt_hpc.storage.files import write_rows
 from cvt_hpc.study import open_results
+from cvt_hpc.study.intervals import interval
 from cvt_hpc.study.job_difference import differences, short_pair
-from cvt_hpc.study.repeats import AUDIT, WAYS, interval
+from cvt_hpc.study.repeats import AUDIT, WAYS
 from cvt_hpc.tables import number
 from cvt_hpc.variables import Status
 from cvt_hpc.vibration import classes as agreement

@@ -3,12 +3,12 @@
 A run that ended without a verdict, or moves irregularly, counts on neither side: the probability is that of
 the others. Its interval reaches from where no such run had the property to where all of them had it.
 
-The intervals are those of Clopper and Pearson (1934), which hold the probability in 95 of 100 studies or more
-if samples are independent. Points of a scrambled Sobol sequence are not. Each is distributed like a sample,
-so that the probability has no bias. They cover a distribution more evenly: with one uncertain parameter each
-of n equal parts has one of n samples. So the intervals are rather too wide; of several parameters no theorem
-says so for a given n. All cells have the samples in common: their errors are alike, and contours shift as a
-whole.
+The intervals hold the probability in 95 of 100 studies or more if samples are independent, also where an
+adaptive study stops by what it finds (`study/intervals.py`). Points of a scrambled Sobol sequence are not
+independent. Each is distributed like a sample, so that the probability has no bias. They cover a distribution
+more evenly: with one uncertain parameter each of n equal parts has one of n samples. So the intervals are
+rather too wide; of several parameters no theorem says so for a given n. All cells have the samples in common:
+their errors are alike, and contours shift as a whole.
 """
 
 from collections.abc import Collection
@@ -17,9 +17,9 @@ import numpy as np
 import xarray as xr
 
 from cvt_hpc.analysis.classes import OccurrenceClass, at_strongest_strand, map_classes
-from cvt_hpc.analysis.sensitivity import EVENTS, QUANTILES, VERDICTS, check_samples, independent, indices_of
+from cvt_hpc.analysis.sensitivity import EVENTS, QUANTILES, check_samples, independent, indices_of, stated
 from cvt_hpc.job.axes import SAMPLE, SWAPPED
-from cvt_hpc.study.repeats import interval
+from cvt_hpc.study.intervals import VERDICTS, interval, look, looks_of
 from cvt_hpc.variables import Status, Vibrates
 
 CONTOURS = (0.1, 0.5, 0.9)
@@ -65,6 +65,13 @@ def probabilities(dataset: xr.Dataset, source: str = "results") -> xr.Dataset:
     check_samples(dataset, source)
     whole, dataset = dataset, independent(dataset)
     classes = map_classes(dataset).compute().drop_attrs(deep=False)
+    design = stated(dataset, "design")
+    looks = looks_of(design, dataset.sizes[SAMPLE])
+    if len(looks) > 1:  # further samples, of other studies in the folder, are none that a cell has stopped at
+        counted = look(classes.transpose(..., SAMPLE).values, design).counted
+        rest = [dim for dim in classes.dims if dim != SAMPLE]
+        place = xr.DataArray(np.arange(classes.sizes[SAMPLE]), dims=SAMPLE)
+        classes = classes.where(place < xr.DataArray(counted, dims=rest), OccurrenceClass.NOT_RUN)
     ended = classes != OccurrenceClass.NOT_RUN
     count = ended.sum(SAMPLE)
     found = xr.Dataset(attrs=dataset.attrs)
@@ -76,8 +83,8 @@ def probabilities(dataset: xr.Dataset, source: str = "results") -> xr.Dataset:
             units="1", long_name=f"probability of {event}", valid_range=[0.0, 1.0], isolines=list(CONTOURS)
         )
         hits = yes.sum(SAMPLE)
-        low, _ = interval(hits.values, count.values)
-        _, high = interval((hits + hidden).values, count.values)
+        low, _ = interval(hits.values, count.values, len(looks))
+        _, high = interval((hits + hidden).values, count.values, len(looks))
         for end, values in (("low", low), ("high", high)):
             comment = f"{end} end of the 95 % interval of {name}"
             found[f"{name}_{end}"] = count.dims, values, {"units": "1", "comment": comment}
@@ -97,10 +104,11 @@ def probabilities(dataset: xr.Dataset, source: str = "results") -> xr.Dataset:
     found["status"] = xr.where(count > 0, int(Status.DONE), int(Status.NOT_RUN)).astype(np.int8)
     found["vibrates"] = xr.full_like(found["status"], int(Vibrates.UNDECIDED))
     kept = {name: axis for name, axis in dataset.coords.items() if SAMPLE not in axis.dims}
-    cells, most = count.size, int(count.max())
+    cells, least, most = count.size, int(count.min()), int(count.max())
+    each = f"{most} samples" if len(looks) == 1 or least == most else f"{least} to {most} samples"
     widest = float((found[f"{PROBABILITY}_high"] - found[f"{PROBABILITY}_low"]).max())
-    counted = f"{cells} cell{'s' * (cells != 1)} of {most} samples; 95 % intervals up to {widest:.2g} wide"
-    return found.assign_coords(kept).assign_attrs(counted=counted)
+    told_as = f"{cells} cell{'s' * (cells != 1)} of {each}; 95 % intervals up to {widest:.2g} wide"
+    return found.assign_coords(kept).assign_attrs(counted=told_as)
 
 
 def _quantiles(values: xr.DataArray) -> xr.DataArray:

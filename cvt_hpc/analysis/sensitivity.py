@@ -13,7 +13,7 @@ together, since halved alone they would have weights without bound.
 """
 
 import json
-from typing import NamedTuple
+from typing import Any, NamedTuple
 
 import numpy as np
 import xarray as xr
@@ -24,6 +24,7 @@ from cvt_hpc.analysis.sobol import RESAMPLES, sobol_indices
 from cvt_hpc.errors import mismatch, unknown
 from cvt_hpc.job.axes import ALL, NONE, SAMPLE, SWAPPED
 from cvt_hpc.job.uncertain import TABLE, Uncertain, read_document
+from cvt_hpc.study.intervals import VERDICTS
 from cvt_hpc.vibration.classes import levels
 
 QUANTILES = {"5 %": 0.05, "50 %": 0.5, "95 %": 0.95}
@@ -35,7 +36,6 @@ EVENTS = {
     "slip": (OccurrenceClass.SLIPPING, True),
     "failure": (OccurrenceClass.FAILED, False),
 }
-VERDICTS = (OccurrenceClass.QUIET, OccurrenceClass.VIBRATING, OccurrenceClass.SLIPPING)
 
 
 def check_samples(dataset: xr.Dataset, source: str) -> None:
@@ -44,6 +44,11 @@ def check_samples(dataset: xr.Dataset, source: str) -> None:
     if SAMPLE not in dataset["status"].dims:
         dims = ", ".join(map(str, dataset["status"].dims)) or "a single run"
         raise mismatch(source, f"results with the axis {SAMPLE}, of a job with [uncertain]", dims)
+
+
+def stated(dataset: xr.Dataset, table: str) -> dict[str, Any]:
+    """Return a table of the job in the attributes of a dataset; {} where there is none."""
+    return json.loads(dataset.attrs.get("job", "{}")).get(table, {})
 
 
 def independent(dataset: xr.Dataset) -> xr.Dataset:
@@ -246,7 +251,7 @@ def _band(quantiles: NDArray[np.float64]) -> NDArray[np.float64]:
 
 def _weights(dataset: xr.Dataset) -> dict[str, NDArray[np.float64]]:
     """By group of parameters the weights that make its scatter half, shape (samples,); {} without a job."""
-    table = json.loads(dataset.attrs.get("job", "{}")).get(TABLE, {})
+    table = stated(dataset, TABLE)
     uncertain = read_document(table) if table else Uncertain((), 0)
     values = {
         one.key: dataset[one.key].values for one in uncertain.distributions if one.key in dataset.coords

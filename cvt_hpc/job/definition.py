@@ -15,7 +15,7 @@ from cvt_hpc.errors import mismatch
 from cvt_hpc.job.assignments import Assignments, read_assignments, split_assignments
 from cvt_hpc.job.axes import SAMPLE, SWAPPED, Axis, thinned
 from cvt_hpc.job.crosscheck import check_point, complete_point
-from cvt_hpc.job.design import Design
+from cvt_hpc.job.design import Design, is_in_rounds
 from cvt_hpc.job.formula import Formula
 from cvt_hpc.job.rules import Link, Rule, follow, needed_rules, ordered_rules, overridden, places, varied_by
 from cvt_hpc.job.schema import Schema, load_schema
@@ -107,6 +107,11 @@ class Job:
     def is_sampled(self) -> bool:
         """Whether the values of the axes at one place make a run, instead of all their combinations."""
         return "runs" in self.design
+
+    @property
+    def in_rounds(self) -> bool:
+        """Whether the runs depend on the results of earlier ones."""
+        return is_in_rounds(self.design)
 
     @property
     def shape(self) -> tuple[int, ...]:

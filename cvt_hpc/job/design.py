@@ -1,5 +1,7 @@
 """Which points of the space of its axes a study runs: all of a grid, those along boundaries, or samples.
 
+Of a grid with samples of uncertain parameters it runs as many in each cell as a stated interval needs.
+
 Samples of the space that the ranges of axes span are drawn by scipy.stats.qmc. A job also names the runs
 whose whole history a sweep is to keep, as grid points or run indices. They do not determine the numbers: a
 folder takes the job with any of them.
@@ -15,6 +17,7 @@ from cvt_hpc.errors import mismatch, show, unknown
 from cvt_hpc.job.axes import (
     LARGEST_AXIS,
     SAMPLE,
+    SWAPPED,
     Axis,
     read_bounds,
     read_spacing,
@@ -29,11 +32,16 @@ KEY = ("record", "history")
 _FORMS = "a list of runs, each a table {axis = value, ...} with all axes, or a run index"
 
 _KIND = Parameter(
-    "grid", "", "which points are run", choices=("grid", "trace", "sobol", "latin_hypercube", "listed")
+    "grid",
+    "",
+    "which points are run",
+    choices=("grid", "trace", "adaptive", "sobol", "latin_hypercube", "listed"),
 )
+ADAPTIVE = "adaptive"
 LISTED = "listed"  # samples that the job gives itself, drawn elsewhere
 _KEYS = {
     "trace": ("first_spacing",),
+    ADAPTIVE: ("first_samples", "widest_interval"),
     "sobol": ("runs", "seed"),
     "latin_hypercube": ("runs", "seed"),
     LISTED: ("runs",),
@@ -41,10 +49,20 @@ _KEYS = {
 _SPACING = Parameter(
     4, "", "cells between the runs that a trace begins with", minimum=1, maximum=LARGEST_AXIS
 )
+_FIRST = Parameter(32, "", "samples that all cells have", minimum=2, maximum=2**16)
+_WIDEST = Parameter(
+    0.2, "", "95 % interval of the probability, with which a cell is left", minimum=0.001, maximum=1.0
+)
 _RUNS = Parameter(64, "", "samples", minimum=1, maximum=2**24)
 _SEED = Parameter(1, "", "of the samples", minimum=0)
 
 Design = dict[str, Any]  # empty: the full grid
+
+
+def is_in_rounds(design: Mapping[str, Any]) -> bool:
+    """Return whether the runs depend on results of earlier ones: of a trace, and of adaptive samples."""
+    return "first_spacing" in design or "first_samples" in design
+
 
 _SAMPLED = ("from", "to", "spacing")
 
@@ -55,8 +73,8 @@ def read_design(table: Mapping[str, Any], source: str) -> Design:
     Parameters
     ----------
     table : mapping
-        `kind`, and with "trace" `first_spacing`, with "sobol" and "latin_hypercube" `runs` and `seed`, with
-        "listed" `runs`.
+        `kind`, and with "trace" `first_spacing`, with "adaptive" `first_samples` and `widest_interval`, with
+        "sobol" and "latin_hypercube" `runs` and `seed`, with "listed" `runs`.
     source : str
         The job file, for the error.
 
@@ -81,17 +99,37 @@ def read_design(table: Mapping[str, Any], source: str) -> Design:
         return {}
     if kind == "trace":
         return {"kind": kind, "first_spacing": table.get("first_spacing", _SPACING.default)}
+    if kind == ADAPTIVE:
+        first = read_value(_FIRST, table.get("first_samples", _FIRST.default), f"{where} first_samples")
+        widest = read_value(
+            _WIDEST, table.get("widest_interval", _WIDEST.default), f"{where} widest_interval"
+        )
+        check_power_of_2(first, f"{where} first_samples")
+        return {"kind": kind, "first_samples": first, "widest_interval": widest}
     if "runs" not in table:
         raise mismatch(f"{where} runs", "the number of samples", "nothing")
     runs = read_value(_RUNS, table["runs"], f"{where} runs")
-    if kind == "sobol" and runs & (runs - 1):
-        # Only whole powers of two fill the space evenly: that is the point of such a sequence.
-        lower = 2 ** (runs.bit_length() - 1)
-        raise mismatch(f"{where} runs", f"a power of 2 (the nearest: {lower} and {2 * lower})", str(runs))
+    if kind == "sobol":
+        check_power_of_2(runs, f"{where} runs")
     if kind == LISTED:
         return {"kind": kind, "runs": runs}
     seed = read_value(_SEED, table.get("seed", _SEED.default), f"{where} seed")
     return {"kind": kind, "runs": runs, "seed": seed}
+
+
+def check_power_of_2(count: int, where: str) -> None:
+    """Raise InputError unless so many points of a Sobol sequence fill the space evenly."""
+    if count & (count - 1):
+        lower = 2 ** (count.bit_length() - 1)
+        raise mismatch(where, f"a power of 2 (the nearest: {lower} and {2 * lower})", str(count))
+
+
+def check_adaptive(axes: tuple[Axis, ...], source: str) -> None:
+    """Raise InputError unless a job with these axes can choose the number of samples of each cell."""
+    names = [axis.name for axis in axes]
+    if SAMPLE not in names or SWAPPED in names:
+        expected = "samples of [uncertain] without indices, as many of which are run as a cell needs"
+        raise mismatch(f"{source}: [design] kind", expected, f"the axes {', '.join(names) or '(none)'}")
 
 
 def resolve_spacing(design: Design, axes: tuple[Axis, ...], source: str) -> Design:

@@ -14,7 +14,16 @@ from cvt_hpc.job.axes import SAMPLE, Axis, read_axis
 from cvt_hpc.job.crosscheck import check_grid, check_rules
 from cvt_hpc.job.csv_files import read_csv
 from cvt_hpc.job.definition import HEADER, Job, answering_model, handed_to
-from cvt_hpc.job.design import KEY, Design, read_design, read_histories, resolve_spacing, sampled_axes
+from cvt_hpc.job.design import (
+    ADAPTIVE,
+    KEY,
+    Design,
+    check_adaptive,
+    read_design,
+    read_histories,
+    resolve_spacing,
+    sampled_axes,
+)
 from cvt_hpc.job.document import read_document
 from cvt_hpc.job.netcdf_files import SUFFIX, read_netcdf
 from cvt_hpc.job.rules import (
@@ -176,6 +185,8 @@ def rebuild_job(
     check_samples(rules, axes)
     for key, entry in written.items():
         warn_of_bare_numbers(schema.parameters[key], *entry)
+    if design.get("kind") == ADAPTIVE:
+        check_adaptive(axes, source)
     if "first_spacing" in design:
         design = resolve_spacing(design, axes, source)
     scene = _resolve({**{axis.name: axis.values[0] for axis in axes}, **given}, rules, schema, source)

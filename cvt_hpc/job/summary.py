@@ -59,7 +59,7 @@ def summarize(job: Job, core_seconds: float, measured: int = 0) -> str:
         design = [(key, _setting_in_words(value)) for key, value in job.design.items()]
         lines += ["", "[design]", *columns(design)]
     product = f" = {' x '.join(map(str, job.shape))}" if len(job.shape) > 1 else ""
-    at_most = "at most " if "first_spacing" in job.design else ""
+    at_most = "at most " if job.in_rounds else ""
     basis = f" (by what {measured} runs on record took)" if measured else ""
     cost = f"estimated cost: {at_most}{cost_in_words(core_seconds, job.size)}{basis}"
     lines += ["", f"runs: {at_most}{job.size}{product}"]

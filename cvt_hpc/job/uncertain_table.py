@@ -9,6 +9,7 @@ import numpy as np
 
 from cvt_hpc.errors import InputError, mismatch, show, unknown
 from cvt_hpc.job.axes import ALL, NONE, SAMPLE, SWAPPED, Axis
+from cvt_hpc.job.design import check_power_of_2
 from cvt_hpc.job.rules import Rule
 from cvt_hpc.job.schema import Schema
 from cvt_hpc.job.uncertain import KINDS, MOST, TABLE, Distribution, Scatter, Uncertain
@@ -82,12 +83,8 @@ def read_uncertain(
     own = {key: parameter for key, parameter in schema.sections[TABLE].items() if key in table}
     fixed = {key: read_value(one, table[key], f"{where} {key}") for key, one in own.items()}
     samples = read_value(_SAMPLES, table["samples"], f"{where} samples") if "samples" in table else None
-    if samples is not None and samples & (samples - 1):
-        lower = 2 ** (samples.bit_length() - 1)
-        expected = (
-            f"a power of 2, which covers the distributions evenly (the nearest: {lower} and {2 * lower})"
-        )
-        raise mismatch(f"{where} samples", expected, str(samples))
+    if samples is not None:
+        check_power_of_2(samples, f"{where} samples")
     axes: dict[str, list] = {} if samples is None else {SAMPLE: list(range(samples))}
     if indices and samples is not None:
         axes[SWAPPED] = [NONE, ALL, *uncertain.groups()]

@@ -347,7 +347,8 @@ def next_steps(dataset: xr.Dataset, job: Job | None, x: str | None) -> Iterator[
         if count := int(np.count_nonzero(status == kind)):
             runs = f"{count} runs" if count > 1 else "run"
             yield f"`cvt-hpc run JOB --retry {kind.name.lower()}` does the {runs} again, {how}."
-    if "inferred_class" not in dataset and (left := int(np.sum(classes == OccurrenceClass.NOT_RUN))):
+    chooses = "inferred_class" in dataset or (job is not None and job.in_rounds)
+    if not chooses and (left := int(np.sum(classes == OccurrenceClass.NOT_RUN))):
         yield f"`cvt-hpc run JOB` goes on: {left} {'runs are' if left > 1 else 'run is'} left."
     undecided = int(np.sum(occurrence_classes(dataset) == OccurrenceClass.UNDECIDED))
     has_transient = job is not None and load_model(job.model).default_stepper is not None

@@ -15,8 +15,9 @@ from cvt_hpc.models.auto.rules import Rung
 from cvt_hpc.storage.files import write_rows
 from cvt_hpc.study.description import Study, describe
 from cvt_hpc.study.folder import StudyFolder
+from cvt_hpc.study.intervals import interval
 from cvt_hpc.study.record.index import Records
-from cvt_hpc.study.repeats import AUDIT, AUDITED, FULL_MODEL, Repeat, built, interval
+from cvt_hpc.study.repeats import AUDIT, AUDITED, FULL_MODEL, Repeat, built
 from cvt_hpc.study.simulator import default_simulator
 from cvt_hpc.study.status import expected_cost
 from cvt_hpc.variables import Status

@@ -15,6 +15,7 @@ import numpy as np
 from cvt_hpc.errors import InputError
 from cvt_hpc.job import Axis, Job
 from cvt_hpc.job.definition import Derived
+from cvt_hpc.job.design import is_in_rounds
 from cvt_hpc.job.values import JOB_UNITS, shown
 from cvt_hpc.storage.netcdf import attributes
 from cvt_hpc.study.simulator import Simulator
@@ -179,8 +180,13 @@ class Study:
 
     @property
     def is_traced(self) -> bool:
-        """Whether the runs depend on the results of earlier ones."""
+        """Whether boundaries are traced."""
         return "first_spacing" in self.design
+
+    @property
+    def in_rounds(self) -> bool:
+        """Whether the runs depend on the results of earlier ones."""
+        return is_in_rounds(self.design)
 
     @property
     def dims(self) -> tuple[str, ...]:

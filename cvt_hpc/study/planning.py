@@ -33,12 +33,14 @@ import numpy as np
 from numpy.typing import NDArray
 
 from cvt_hpc.job import Job
+from cvt_hpc.job.axes import SAMPLE
 from cvt_hpc.storage.files import discard
 from cvt_hpc.storage.provenance import new_session
 from cvt_hpc.study.batches import Assignment, share_out
 from cvt_hpc.study.description import Study
 from cvt_hpc.study.folder import Part, StudyFolder, leave_out_missing
 from cvt_hpc.study.forecast.cost_model import Fit
+from cvt_hpc.study.intervals import look
 from cvt_hpc.study.ranks.progress import Counter, Progress
 from cvt_hpc.study.ranks.stopping import TimeLimit
 from cvt_hpc.study.record.index import Records
@@ -303,6 +305,8 @@ def later_attempts(records: Records) -> dict[int, int]:
 def needed_runs(study: Study, records: Records) -> NDArray[np.bool_]:
     """Return the runs that a study needs by the records, shape (runs,): of a grid or of samples all.
 
+    Of an adaptive one the samples that each cell wants.
+
     Parameters
     ----------
     study : Study
@@ -310,9 +314,14 @@ def needed_runs(study: Study, records: Records) -> NDArray[np.bool_]:
     records : Records
         The runs on record; these runs count as needed. Those needed now are among those needed later on.
     """
-    if not study.is_traced:
+    if not study.in_rounds:
         return np.ones(study.size, bool)
     classes = run_classes(study, records)
+    if not study.is_traced:
+        of_samples = study.dims.index(SAMPLE)
+        wanted = look(np.moveaxis(classes, of_samples, -1), study.design).wanted
+        chosen = np.arange(study.shape[of_samples]) < wanted[..., np.newaxis]
+        return np.moveaxis(chosen, -1, of_samples).ravel() | records.recorded
     needed = np.zeros(study.shape, bool)
     for box in leaf_boxes(classes, first_intervals(study)):
         needed[np.ix_(*box)] = True

@@ -18,7 +18,6 @@ from typing import Any
 
 import numpy as np
 from numpy.typing import NDArray
-from scipy.special import betaincinv
 
 from cvt_hpc.errors import mismatch, show
 from cvt_hpc.job import Job, rebuild_job
@@ -36,7 +35,6 @@ from cvt_hpc.study.sweep import check_start, run
 from cvt_hpc.study.task import STEP, stepper_in_words
 from cvt_hpc.variables import Status
 
-CONFIDENCE = 0.95
 AUDIT = "audit"  # folder of the runs of an audit, in that of the study
 AUDITED, FULL_MODEL = "auto", "elastic_belt"  # what answers some runs cheaply, and what does all in full
 
@@ -147,22 +145,10 @@ def check_fraction(flag: str, fraction: float, part: str | None = None) -> None:
 
 
 def built(job: Job, document: dict[str, Any]) -> Job:
-    """Return the job of a document of the same runs; of the whole grid where the first one traces it."""
-    if "first_spacing" in job.design:
+    """Return the job of a document of the same runs; of the whole grid where the first one chooses some."""
+    if job.in_rounds:
         document = {key: table for key, table in document.items() if key != "design"}
     return rebuild_job(document, job.source, job.units)
-
-
-def interval(count: Any, runs: Any) -> tuple[Any, Any]:
-    """Return the ends of the interval that holds a rate with CONFIDENCE (Clopper and Pearson 1934).
-
-    Numbers of runs, and of those with the property, may be arrays of one shape, and so are the ends then.
-    """
-    outside = 0.5 * (1.0 - CONFIDENCE)
-    count, runs = np.asarray(count, float), np.asarray(runs, float)
-    low = np.where(count > 0, betaincinv(np.maximum(count, 1), runs - count + 1, outside), 0.0)
-    high = np.where(count < runs, betaincinv(count + 1, np.maximum(runs - count, 1), 1.0 - outside), 1.0)
-    return low[()], high[()]
 
 
 def step_check(job: Job, out: Path, fraction: float, way: str = "half") -> Repeat:

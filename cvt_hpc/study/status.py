@@ -45,7 +45,7 @@ class StudyStatus:
     warnings : tuple of str
         One line for each record file that is not sound.
     unneeded : int
-        Number of cells of the grid that a trace does not run, as far as is known.
+        Number of runs of the grid that a trace or an adaptive study does not need, as far as is known.
     undecided, slipping, irregular : int
         Number of runs with results that were too short to be decided, under more load than friction carries,
         and of irregular motion.
@@ -237,7 +237,7 @@ class RunReport:
     gained : int
         Number of runs recorded since this start.
     unneeded : int
-        Number of cells of the grid that a trace does not run.
+        Number of runs of the grid that a trace or an adaptive study does not need.
     undecided, slipping, irregular : int
         Number of runs with results that were too short to be decided, under more load than friction carries,
         and of irregular motion.
@@ -306,7 +306,7 @@ def build_report(
         remaining=int((asked & ~records.recorded).sum()),
         stopped=stopped,
         gained=gained,
-        unneeded=int((~asked).sum()) if study.is_traced else 0,
+        unneeded=int((~asked).sum()) if study.in_rounds else 0,
         **count_special(records, asked),
     )
 

@@ -183,7 +183,7 @@ def run(
                         trouble = _compute(task, folder, plan, team.rank, counter, stop)
                         team.wait_for_all(stop.look)
                         stopped = _settle(team, trouble, stop.reason)
-                        if stopped or not study.is_traced:
+                        if stopped or not study.in_rounds:
                             break
                         more = partial(next_round, folder, task, plan, team.size, counter, display)
                         plan = team.on_root(more)
@@ -221,8 +221,8 @@ def _accept(job: Job, part: str | None, fresh: bool, simulator: Simulator) -> tu
     if share is not None and fresh:
         raise mismatch("fresh", "a run of the whole study", f"part {share}, and the others would lose theirs")
     study = describe(job, simulator)
-    if share is not None and study.is_traced:
-        raise mismatch("part", "a whole study, since a trace goes by the runs of all parts", f"part {share}")
+    if share is not None and study.in_rounds:
+        raise mismatch("part", "a whole study, since it chooses by the runs of all parts", f"part {share}")
     return study, share
 
 

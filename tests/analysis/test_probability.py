@@ -19,8 +19,10 @@ from cvt_hpc.analysis.sobol import sobol_indices
 from cvt_hpc.analysis.value_maps import value_map_figure
 from cvt_hpc.errors import InputError
 from cvt_hpc.job import build_job
+from cvt_hpc.job.uncertain import Distribution, Uncertain
 from cvt_hpc.models.oscillator.motion import oscillator, steady_sliding
 from cvt_hpc.report import write_report
+from cvt_hpc.study.intervals import interval, look, looks_of
 from cvt_hpc.variables import Status, Vibrates
 from support.studies import flags
 
@@ -126,6 +128,51 @@ def test_the_interval_holds_the_probability_of_the_closed_form():
     assert (held == 100).all()
     independent = np.sqrt(true * (1.0 - true) / 16.0)
     assert (np.sqrt(np.mean(np.square(errors), axis=0)) < 0.5 * independent).all()
+
+
+@pytest.mark.parametrize("of_sobol", [True, False])
+def test_intervals_hold_also_where_cells_stop_by_what_they_find(of_sobol):
+    design = {"first_samples": 16, "widest_interval": 0.3}
+    true, repeats = np.array([0.02, 0.1, 0.3, 0.5]), 300
+    held, first = np.zeros(true.size), np.zeros(true.size)
+    for seed in range(repeats):
+        if of_sobol:  # the sum of two of them
+            normals = [
+                Distribution(key, "normal", (("mean", 0.0), ("standard_deviation", 1.0))) for key in "ab"
+            ]
+            drawn = Uncertain(tuple(normals), seed)
+            scores = np.array([[drawn.value(place, k) for k in range(256)] for place in (0, 1)]).sum(axis=0)
+            vibrates = np.less.outer(norm.ppf(true), scores / np.sqrt(2.0))
+        else:
+            vibrates = np.random.default_rng(seed).random((true.size, 256)) < true[:, np.newaxis]
+        classes = np.where(vibrates, V, Q).astype(np.int8)
+        counted, wanted = look(classes, design)
+        assert (counted == wanted).all()
+        hits = np.array([row[:size].sum() for row, size in zip(vibrates, counted, strict=True)])
+        low, high = interval(hits, counted, looks=5)
+        assert ((high - low <= 0.3) | (counted == 256)).all()
+        right = 1.0 - true if of_sobol else true
+        held += (low <= right) & (right <= high)
+        first += counted
+    assert (held >= 0.95 * repeats).all()
+    assert (np.diff(first) > 0.0).all()  # the less certain a cell is, the more samples it has
+
+
+def test_a_cell_wants_no_further_sample_before_the_last_look_has_ended_nor_in_vain():
+    design = {"first_samples": 4, "widest_interval": 0.4}
+    assert looks_of(design, 16) == [4, 8, 16] and looks_of({}, 16) == [16]
+    mixed = [V, Q, V, Q, Q, V, V, Q]
+    rows = [[*mixed[:3], *[N] * 13], [*mixed[:4], *[N] * 12], [*mixed, *[N] * 8], [*mixed, *mixed], [U] * 16]
+    found = look(np.array(rows, np.int8), design)
+    assert found.counted.tolist() == [0, 4, 8, 16, 8]
+    assert found.wanted.tolist() == [4, 8, 16, 16, 8]  # of the last one no sample ends with a verdict
+    dataset = study(rows, load=np.arange(5.0)).assign_attrs(job=json.dumps({"design": design}))
+    told = dataset.cvt.probability()
+    assert told["samples"].values.tolist() == [0, 4, 8, 16, 8]
+    low, high = interval(8, 16, looks=3)
+    assert told["vibration_probability_low"][3] == low < interval(8, 16)[0]
+    assert told["vibration_probability_high"][3] == high
+    assert "5 cells of 0 to 16 samples" in told.attrs["counted"]
 
 
 def test_one_uncertain_parameter_has_a_sample_in_each_part_of_its_distribution():

@@ -155,7 +155,7 @@ def test_a_design_is_told(write_job):
 @pytest.mark.parametrize(
     ("old", "new", "message"),
     [
-        ('"sobol"', '"sobl"', '[design] kind: expected one of grid, trace, sobol, latin_hypercube, listed, found "sobl"; did you mean sobol?'),
+        ('"sobol"', '"sobl"', '[design] kind: expected one of grid, trace, adaptive, sobol, latin_hypercube, listed, found "sobl"; did you mean sobol?'),
         ("runs = 32", "runs = 100", "[design] runs: expected a power of 2 (the nearest: 64 and 128), found 100"),
         ("runs = 32", "", "[design] runs: expected the number of samples, found nothing"),
         ("runs = 32", "run = 32", '[design] run: unknown key of a design of kind "sobol"; did you mean runs?'),

@@ -157,6 +157,22 @@ class TestSamples:
         job = toy({"samples": 64, "thrust": NORMAL}, axes=load, design={"kind": "trace"})
         assert job.design["first_spacing"] == {"load": 4}
 
+    def test_adaptive_samples_need_samples_and_no_indices(self):
+        table = {"samples": 64, "thrust": NORMAL}
+        job = toy(table, design={"kind": "adaptive", "first_samples": 16})
+        assert job.design == {"kind": "adaptive", "first_samples": 16, "widest_interval": 0.2}
+        again = build_job(json.loads(json.dumps(job.resolved())), "again")
+        assert (again.fingerprint(), again.in_rounds) == (job.fingerprint(), True)
+        for overrides in (["uncertain.indices=true"], ["sample=3"], ["thrust=2e4"]):
+            with pytest.raises(
+                InputError, match=r"\[design\] kind: expected samples of \[uncertain\] without"
+            ):
+                toy(table, "design.kind=adaptive", *overrides)
+        with pytest.raises(
+            InputError, match=r"first_samples: expected a power of 2 \(the nearest: 32 and 64\)"
+        ):
+            toy(table, design={"kind": "adaptive", "first_samples": 40})
+
     def test_a_bare_number_that_is_far_from_usual_draws_a_warning(self):
         with pytest.warns(UnitWarning, match=r"\[uncertain\] driving_speed: 3000 is read as 3000 rad/s"):
             toy(

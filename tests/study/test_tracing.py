@@ -314,7 +314,7 @@ def test_a_run_that_is_done_again_may_change_its_class(tmp_path):
 
 
 def test_a_trace_is_not_done_in_parts(tmp_path):
-    with pytest.raises(InputError, match="part: expected a whole study, since a trace goes by"):
+    with pytest.raises(InputError, match="part: expected a whole study, since it chooses by"):
         run(JOB, tmp_path / "out", simulator=Simulator(), part="1/2")
     assert not (tmp_path / "out").exists()
 

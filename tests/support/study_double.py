@@ -22,6 +22,7 @@ from typing import TYPE_CHECKING, Any
 import numpy as np
 
 from cvt_hpc.errors import InputError
+from cvt_hpc.job.design import is_in_rounds
 from cvt_hpc.variables import Coordinate, Status, Variable, Vibrates
 
 if TYPE_CHECKING:
@@ -67,6 +68,10 @@ class Job:
     @property
     def size(self) -> int:
         return math.prod(self.shape)
+
+    @property
+    def in_rounds(self) -> bool:
+        return is_in_rounds(self.design)
 
     def point(self, index: int) -> dict[str, Any]:
         place = np.unravel_index(index, self.shape) if self.shape else ()

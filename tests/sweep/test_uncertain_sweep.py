@@ -1,5 +1,6 @@
 """A sweep with uncertain parameters: killed, grown and shared by ranks it has the numbers of an undisturbed one."""
 
+import shutil
 import subprocess
 import sys
 import time
@@ -11,8 +12,10 @@ import pytest
 
 from cvt_hpc import open_results
 from cvt_hpc.cli import main
-from cvt_hpc.job import build_job
+from cvt_hpc.errors import InputError
+from cvt_hpc.job import build_job, load_job
 from cvt_hpc.study import run
+from cvt_hpc.variables import Status
 from support.cf import cf_findings
 from support.recorded import assert_same_numbers, frames_written, records
 from support.sweeps import PATIENCE, call, environment
@@ -78,3 +81,39 @@ def test_each_run_has_the_values_that_the_dataset_states(tmp_path):
     # m s^2 + (c + N mu') s + k = 0 with mu' = -40 s/m exp(-v / 0.1 m/s)
     growth = (40.0 * np.exp(-2.0) * results["normal_load"] - results["damping"]) / (2 * 0.538)
     assert results["linear_growth_rate"].values == pytest.approx(growth.values, rel=1e-9)
+
+
+ADAPTIVE = (
+    "uncertain.samples=128",
+    "design.kind=adaptive",
+    "design.first_samples=16",
+    "design.widest_interval=0.3",
+)
+
+
+def test_samples_go_to_cells_that_are_not_yet_known_and_a_cut_record_goes_on_to_the_same(tmp_path):
+    job = load_job(
+        JOB,
+        {"friction_gradient": -0.5, "radial_speed": [0.05, 0.09, 0.12, 0.2]}
+        | dict(entry.split("=") for entry in ADAPTIVE),
+    )
+    report = run(job, tmp_path / "whole", progress=False)
+    whole = load_results(tmp_path / "whole")
+    told = whole.cvt.probability()
+    width = told["vibration_probability_high"] - told["vibration_probability_low"]
+    samples = told["samples"].values.ravel()
+    assert samples.min() == 16 and samples.max() > 32
+    assert ((width.values.ravel() <= 0.3) | (samples == 128)).all()
+    assert report.total == samples.sum() == (whole["status"] == Status.DONE).sum()
+    assert report.unneeded == 4 * 128 - samples.sum()
+
+    log = min((tmp_path / "whole" / "records").glob("*.log"))
+    (tmp_path / "cut" / "records").mkdir(parents=True)
+    shutil.copy(tmp_path / "whole" / "job.json", tmp_path / "cut")
+    whole_log = log.read_bytes()
+    (tmp_path / "cut" / "records" / log.name).write_bytes(whole_log[: len(whole_log) // 2])
+    run(job, tmp_path / "cut", progress=False)
+    assert_same_numbers(load_results(tmp_path / "cut"), whole)
+    assert frames_written(tmp_path / "cut") - samples.sum() in (0, 1)  # that which the cut has torn
+    with pytest.raises(InputError, match="expected a whole study, since it chooses by the runs of all parts"):
+        run(job, tmp_path / "part", part="1/2", progress=False)

@@ -104,7 +104,7 @@ def refuse_too_large(job: Job, simulator: Simulator, out: Path) -> Needs:
     if needed.profiles > memory:
         found = f"{size_in_words(memory)} in this machine"
         raise mismatch(where, f"{size_in_words(needed.profiles)} of memory for profiles over time", found)
-    if "first_spacing" not in job.design:
+    if not job.in_rounds:
         free = _free(out) + _held(out)
         profiles = needed.profiles * len(job.histories)
         if (disk := needed.disk.records + needed.disk.results + profiles) > free:
