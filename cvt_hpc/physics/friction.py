@@ -296,8 +296,14 @@ def friction_coefficient(law: FrictionLaw, speed: float, force: float) -> tuple[
 def friction_coefficients(law: FrictionLaw, speeds: np.ndarray, forces: np.ndarray) -> np.ndarray:
     """Coefficients of friction (n,) [1] at sliding speeds (n,) [m/s] under normal line forces (n,) [N/m]."""
     found = np.empty_like(speeds)
-    for k in range(speeds.size):
-        found[k] = friction_coefficient(law, speeds[k], forces[k])[0]
+    if law.kind == Law.TABLE:
+        table = law.table_force, law.table_speed, law.table_mu
+        for k in range(speeds.size):
+            found[k] = table_coefficient(table, speeds[k], forces[k])[0]
+    else:  # apart, so that the compiler fills registers
+        numbers = law_numbers(law.kinetic, law.gradient, law.speed)
+        for k in range(speeds.size):
+            found[k] = formula_coefficient(law.kind, numbers, speeds[k])[0]
     return found
 
 

@@ -56,6 +56,7 @@ EARLY_SHARE = 0.58  # of the first transient where runs may end at a quarter of 
 LEFT_SHARE = 1.0  # extra cost of refined and prolonged runs in a map, as measured by lebrecht_2004.toml
 _MOST_ESTIMATED = 2_000  # runs whose costs are averaged
 BATCH_SECONDS = 30.0  # of computing in a batch, as predicted: so much a process that dies may lose
+SOLVED_TOGETHER, SOLVED_SECONDS = 64, 0.1  # runs without a march in a batch, and the time [s] of all
 Item = TypeVar("Item")
 
 MOST_TURNS = 16  # groups of lanes in a batch: with more, those of the runs left would be hardly fuller
@@ -135,7 +136,7 @@ def record_of(
         and the record's status is not_run, where it does not answer.
     """
     started = time.process_time()
-    record, failure = _blank(job), run.failure
+    record, failure = blank_record(job), run.failure
     has_result = failure is None or failure[0] is Status.DONE
     if has_result and (values := (judge or load_model(job.model).judge)(run)) is not None:
         record |= values
@@ -143,7 +144,10 @@ def record_of(
             failure = run.numerical_doubt(record)
     if failure is not None and failure[0] is not Status.DONE:
         status, why = failure
-        record = _blank(job) | {"status": status, "reason": shortened(f"at {run.time * 1e3:.4g} ms: {why}")}
+        record = blank_record(job) | {
+            "status": status,
+            "reason": shortened(f"at {run.time * 1e3:.4g} ms: {why}"),
+        }
     return record | {
         "core_seconds": marched + time.process_time() - started,
         "simulated_seconds": run.time,
@@ -163,27 +167,10 @@ def record_without_run(job: Job, values: dict[str, Any]) -> dict[str, Any]:
     values : dict
         The known values.
     """
-    return _blank(job) | values | {"core_seconds": 0.0, "simulated_seconds": 0.0}
+    return blank_record(job) | values | {"core_seconds": 0.0, "simulated_seconds": 0.0}
 
 
-def record_of_solution(job: Job, solution: Any, solving: float) -> dict[str, Any]:
-    """The record of the result of a model without a transient.
-
-    Parameters
-    ----------
-    job : Job
-        For its model.
-    solution : object
-        As the model's `solve` returns it.
-    solving : float
-        Processor time that it has taken [s].
-    """
-    started = time.process_time()
-    record = _blank(job) | load_model(job.model).judge(solution)
-    return record | {"core_seconds": solving + time.process_time() - started}
-
-
-def _blank(job: Job) -> dict[str, Any]:
+def blank_record(job: Job) -> dict[str, Any]:
     """An empty record."""
     sizes = {name: len(c.values) for name, c in record_coordinates(job).items()}
     return {
@@ -355,6 +342,8 @@ def _batch_size(job: Job, parameters: dict[str, Any]) -> int:
     """Most runs of a batch: several times the lanes, unless a process that dies would lose too much."""
     model = load_model(job.model)
     most = model.lanes(parameters, job.stepper)
+    if job.stepper is None:  # they take their turns, and have the cost of a batch in common
+        return int(np.clip(SOLVED_SECONDS / model.cost(parameters, None), 1, SOLVED_TOGETHER))
     if most == 1:
         return 1
     return most * int(np.clip(BATCH_SECONDS / model.cost(parameters, job.stepper), 1, MOST_TURNS))

@@ -18,7 +18,7 @@ from cvt_hpc.job.summary import warn_of_notices
 from cvt_hpc.job.values import POINT_UNITS
 from cvt_hpc.models.contract import Model, load_model
 from cvt_hpc.simulation.marching import Interrupted, More, march_runs, no_more
-from cvt_hpc.simulation.record import record_coordinates, record_of_solution, record_variables, recorded_model
+from cvt_hpc.simulation.record import blank_record, record_coordinates, record_variables, recorded_model
 from cvt_hpc.storage.netcdf import attributes, global_attributes, variable_attributes
 from cvt_hpc.variables import Outcome
 
@@ -95,19 +95,21 @@ def do(
     """Do a batch of runs as `run_points`; beside each record the input of `histories`, if kept."""
     model = recorded_model(job)
     if job.stepper is None:
-        return [_solve(job, model, point, interrupt) for point in points]
+        blank = blank_record(job)
+        return [_solve(blank, model, point, interrupt) for point in points]
     return march_runs(job, points, interrupt, kept, more)
 
 
 def _solve(
-    job: Job, model: Model, point: dict[str, Any], interrupt: Callable[[], str | None]
+    blank: dict[str, Any], model: Model, point: dict[str, Any], interrupt: Callable[[], str | None]
 ) -> tuple[Any, dict[str, Any]]:
     """A run of a model without a transient: its record follows from the parameters at once."""
     if stop := interrupt():
         raise Interrupted(stop)
     started = time.process_time()
     solution = model.solve(point)
-    return solution, record_of_solution(job, solution, time.process_time() - started)
+    record = blank | model.judge(solution)
+    return solution, record | {"core_seconds": time.process_time() - started}
 
 
 def simulate(job: Job, at: Assignments | None = None) -> xr.Dataset:

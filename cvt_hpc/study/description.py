@@ -226,6 +226,16 @@ class Study:
             f"{name} = {shown(value, attributes[name])}" for name, value in self.place(index).items()
         )
 
+    @cached_property
+    def _blank_row(self) -> np.ndarray:
+        return self.blank_rows()
+
+    @cached_property
+    def _fields(self) -> dict[str, tuple[tuple[int, ...], int]]:
+        """Shape of each quantity of a record, and of a text its bytes, else 0."""
+        fields = {name: self.record_dtype[name] for name in self.record_names}
+        return {name: (one.shape, one.itemsize * (one.kind == "S")) for name, one in fields.items()}
+
     def blank_rows(self, shape: int | tuple[int, ...] = ()) -> np.ndarray:
         """Return empty records of runs."""
         rows = np.zeros(shape, self.record_dtype)
@@ -242,14 +252,14 @@ class Study:
             If a quantity is missing, unknown, or has another shape than declared, or the run says that it was
             not run.
         """
-        row = self.blank_rows()
-        if values.keys() != set(self.record_names):
+        row, fields = self._blank_row.copy(), self._fields
+        if values.keys() != fields.keys():
             raise ValueError(f"a record needs {sorted(self.record_names)}, found {sorted(values)}")
         for name, value in values.items():
-            field = row.dtype[name]
-            if np.shape(value) != field.shape:
-                raise ValueError(f"{name}: expected shape {field.shape}, found {np.shape(value)}")
-            row[name] = fit_text(value, field.itemsize) if field.kind == "S" else value
+            shape, letters = fields[name]
+            if np.shape(value) != shape:
+                raise ValueError(f"{name}: expected shape {shape}, found {np.shape(value)}")
+            row[name] = fit_text(value, letters) if letters else value
         if row["status"] == Status.NOT_RUN:
             raise ValueError("a run that ended has the status not_run")
         return row

@@ -73,9 +73,7 @@ def test_the_command_line(tmp_path, capsys, monkeypatch):
         'name = "x"\nmodel = "criterion"\n[axes]\ntangential_speed = [0, 0.1]\nradial_speed = [0.05, 0.1]\n'
     )
     assert main(["check", "x.toml", "--ranks", "2", "--pilots", "2"]) == 0
-    assert (
-        "forecast of all 4 runs by 2 pilot batches of 100% of the simulated time" in capsys.readouterr().out
-    )
+    assert "forecast of all 4 runs by 1 pilot batch of 100% of the simulated time" in capsys.readouterr().out
     assert main(["run", "x.toml"]) == 0
     assert main(["map", "out/x"]) == 0
     assert (tmp_path / "out/x/map.png").stat().st_size > 0

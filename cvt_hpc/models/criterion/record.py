@@ -13,6 +13,9 @@ from cvt_hpc.physics import friction as laws
 from cvt_hpc.variables import Coordinate, Status, Variable, Vibrates
 
 PHASES = 512  # of a cycle: errors of its square at a corner of the law, of 1/512 at a jump (v_reg -> 0)
+_HARMONICS = np.arange(PHASES // 2 + 1)
+_SWING = -np.cos(2.0 * np.pi * _HARMONICS / PHASES)  # of half a cycle, from one turning point to the other
+_LEAST_SPEED = 1e-300  # [m/s]
 
 # Speed of the vibration over that of sliding: above 1 radial sliding turns about, and at 2 friction takes
 # energy whatever the law, since each speed that feeds then has its opposite
@@ -134,25 +137,32 @@ def energy_per_cycle(f: Flank, amplitudes: np.ndarray) -> np.ndarray:
         Energy per length of belt [J/m]; positive: fed.
     """
     w = f.angular_frequency
-    swing = np.multiply.outer(w * amplitudes, np.sin(2.0 * np.pi * np.arange(PHASES) / PHASES))
-    tangential = np.sqrt(f.speed**2 - f.radial_speed**2)
-    force = f.damping[0] * swing + 2.0 * f.contact_force * _radial_friction(
-        f, f.radial_speed + swing, tangential
-    )
-    return -2.0 * np.pi / w * np.mean(force * swing, axis=-1)
+    swing = np.multiply.outer(w * amplitudes, _SWING)
+    radial = f.radial_speed + swing
+    tangential = f.speed**2 - f.radial_speed**2
+    speed = np.sqrt(radial * radial + tangential)
+    mu = _friction(f, speed)
+    left = np.exp(speed * (-2.0 / f.width))
+    # radial share of sliding times tanh(speed / width); at rest there is none
+    share = radial * ((1.0 - left) / ((1.0 + left) * np.maximum(speed, _LEAST_SPEED)))
+    friction = 2.0 * f.contact_force * np.einsum("ak,ak,ak->a", mu, share, swing) / PHASES
+    return -2.0 * np.pi / w * (0.5 * f.damping[0] * (w * amplitudes) ** 2 + friction)
 
 
-def _radial_friction(f: Flank, radial: np.ndarray, tangential: float) -> np.ndarray:
-    """Coefficient of friction times the radial share of sliding, over a periodic course of radial speeds."""
-    speed = np.hypot(radial, tangential)
-    harmonics = np.arange(PHASES // 2 + 1)
-    filtered = np.fft.rfft(speed) / (1.0 + 1j * harmonics * f.angular_frequency * f.memory)
+def _friction(f: Flank, speed: np.ndarray) -> np.ndarray:
+    """Coefficients of friction at the phases of _SWING, of which both ways through its middle are added up.
+
+    Sliding speeds (n, PHASES // 2 + 1) are alike on both ways; what friction remembers of them is not.
+    """
+    around = np.concatenate([speed, speed[:, -2:0:-1]], axis=1)
+    memory = 1.0 / (1.0 + 1j * _HARMONICS * (f.angular_frequency * f.memory))
     # where sliding comes to rest, the cut-off harmonics of a speed that is 0 there may leave less
-    remembered = np.maximum(np.fft.irfft(filtered, PHASES), 0.0)
-    forces = np.full(speed.size, f.normal_force)
-    mu = laws.friction_coefficients(f.law, remembered.ravel(), forces).reshape(speed.shape)
-    direction = np.divide(radial, speed, out=np.zeros_like(speed), where=speed > 0.0)
-    return mu * np.tanh(speed / f.width) * direction
+    remembered = np.maximum(np.fft.irfft(np.fft.rfft(around) * memory, PHASES), 0.0)
+    forces = np.full(remembered.size, f.normal_force)
+    mu = laws.friction_coefficients(f.law, remembered.ravel(), forces).reshape(remembered.shape)
+    both = mu[:, : PHASES // 2 + 1]
+    both[:, 1:-1] += mu[:, : PHASES // 2 : -1]
+    return both
 
 
 class Solution(NamedTuple):
@@ -207,7 +217,7 @@ def judge(solution: Solution) -> dict[str, Any]:
         "status": Status.DONE,
         "vibrates": vibrates,
         "reason": reason,
-        "amplitude": _limit_amplitude(f, is_fed),
+        "amplitude": _limit_amplitude(f, solution.energy, is_fed),
         "frequency": w / (2.0 * np.pi),
         "growth_rate": -damping / (2.0 * f.mass),
         "damping": damping,
@@ -238,13 +248,19 @@ def _verdict(balance: float, margin: float, fed: np.ndarray) -> tuple[Vibrates, 
     return Vibrates.NO, f"{words}, and no larger vibration is fed"
 
 
-def _limit_amplitude(f: Flank, is_fed: np.ndarray) -> float:
+def _limit_amplitude(f: Flank, energy: np.ndarray, is_fed: np.ndarray) -> float:
     """Largest amplitude [m] beyond which motions are no longer fed; nan where there is none."""
     ends = np.flatnonzero(is_fed[:-1] & ~is_fed[1:])
     if not ends.size:
         return np.nan
-    low, high = RELATIVE_AMPLITUDES[ends[-1] : ends[-1] + 2] * f.speed / f.angular_frequency
-    return brentq(lambda x: energy_per_cycle(f, np.array([x]))[0], low, high, xtol=1e-12 * high, rtol=1e-9)
+    around = slice(ends[-1], ends[-1] + 2)
+    low, high = (RELATIVE_AMPLITUDES[around] * f.speed / f.angular_frequency).tolist()
+    known = dict(zip((low, high), energy[around].tolist(), strict=True))
+
+    def gained(amplitude: float) -> float:
+        return known[amplitude] if amplitude in known else energy_per_cycle(f, np.array([amplitude]))[0]
+
+    return brentq(gained, low, high, xtol=1e-12 * high, rtol=1e-9)
 
 
 def _critical_gradient(f: Flank) -> float:
