@@ -90,6 +90,13 @@ def _region(text: str) -> Option:
     return Option("region", text, "--region", {"choices": ("driving", "driven")}, True)
 
 
+ALONG = Option(
+    "along",
+    "axis along which vibration sets in (default: the load, or the last one)",
+    "--along",
+    {"metavar": "AXIS"},
+)
+
 KINDS = {
     "waterfall": Kind(
         RESULTS,
@@ -123,15 +130,14 @@ KINDS = {
         RESULTS,
         "probability_drawing.onset_bands_figure",
         "onset of vibration over an axis, with its scatter over the samples of uncertain parameters",
-        (
-            Option(
-                "along",
-                "axis along which vibration sets in (default: the load, or the last one)",
-                "--along",
-                {"metavar": "AXIS"},
-            ),
-        ),
+        (ALONG,),
         sides=("x", "panel"),
+    ),
+    "sensitivity": Kind(
+        RESULTS,
+        "probability_drawing.sensitivity_figure",
+        "which uncertain parameters the onset of vibration depends on, and what half their scatter changes",
+        (ALONG,),
     ),
     "curve": Kind(
         RESULTS,

@@ -90,7 +90,7 @@ def arrange(dataset: xr.Dataset, at: Mapping[str, Any], source: str, sides: Side
     for name, value in at.items():
         if name not in axes:
             raise unknown(f"{source}: at {name}", "axis of the results", name, axes)
-        index = _index_of(dataset[name], value, f"{source}: at {name}")
+        index = index_of(dataset[name], value, f"{source}: at {name}")
         notes.append(f"{in_words(dataset[name])} = {value_text(dataset[name], index)}")
         dataset = dataset.isel({name: index})
     free = [name for name in axes if name not in at]
@@ -213,7 +213,7 @@ def _take(names: list[str], preferred: str, avoid: str = "") -> str | None:
     return name
 
 
-def _index_of(coordinate: xr.DataArray, value: Any, where: str) -> int:
+def index_of(coordinate: xr.DataArray, value: Any, where: str) -> int:
     """Index of a value on an axis."""
     values, wanted = coordinate.values, np.nan
     if values.dtype.kind in "iuf":

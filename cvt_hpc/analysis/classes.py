@@ -13,6 +13,7 @@ WITHOUT_RESULT = {  # in words, beside curves and spectra
     OccurrenceClass.FAILED: "failed",
     OccurrenceClass.NOT_RUN: "not run",
 }
+ALONG = ("load", "load_share", "driving_speed")  # axes along which a vibration is said to set in
 _MOST_NAMED = 6  # variables
 
 

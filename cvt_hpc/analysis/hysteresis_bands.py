@@ -21,7 +21,6 @@ from cvt_hpc.variables import Status, Vibrates
 from cvt_hpc.vibration.classes import StartClass, levels, onsets
 from cvt_hpc.vibration.ramped import QUANTITIES
 
-ALONG = ("load", "load_share", "driving_speed")  # axes along which a vibration is said to set in
 INK = "#00695c"  # beside orange, grey and purple cells, and as dark as these are light
 BAND = OF_STARTS[StartClass.LARGE_START_ONLY]
 UP, DOWN = "up", "down"

@@ -24,6 +24,7 @@ from cvt_hpc.analysis import arrangement as layout
 from cvt_hpc.analysis import cells, figures
 from cvt_hpc.analysis.arrangement import arrange, value_text
 from cvt_hpc.analysis.classes import (
+    ALONG,
     OccurrenceClass,
     at_strongest_strand,
     check_results,
@@ -33,7 +34,7 @@ from cvt_hpc.analysis.classes import (
 )
 from cvt_hpc.analysis.conversion import standard
 from cvt_hpc.analysis.eigenfrequencies import eigenfrequency_figure
-from cvt_hpc.analysis.hysteresis_bands import ALONG, draw_onsets
+from cvt_hpc.analysis.hysteresis_bands import draw_onsets
 from cvt_hpc.analysis.probability import PROBABILITY, has_samples
 from cvt_hpc.analysis.probability_drawing import probability_figure
 from cvt_hpc.analysis.scatter import is_sampled, scatter_figure

@@ -1,4 +1,4 @@
-"""Pictures over samples of uncertain parameters: probability over an axis or two, and bands of the onset."""
+"""Pictures over samples of uncertain parameters: probability, bands of the onset, and what it depends on."""
 
 from collections.abc import Sequence
 from typing import Any, NamedTuple
@@ -12,14 +12,23 @@ from cvt_hpc.analysis import arrangement as layout
 from cvt_hpc.analysis import figures
 from cvt_hpc.analysis.classes import check_results
 from cvt_hpc.analysis.curves import set_frame
-from cvt_hpc.analysis.hysteresis_bands import ALONG
 from cvt_hpc.analysis.probability import CONTOURS, PROBABILITY, over_samples
-from cvt_hpc.analysis.sensitivity import QUANTILES, onset_scatter
+from cvt_hpc.analysis.sensitivity import (
+    ONSET,
+    QUANTILES,
+    QUARTERS,
+    indices_of,
+    onset_axis,
+    onset_scatter,
+    widest_row,
+)
 from cvt_hpc.analysis.value_maps import value_map_figure
-from cvt_hpc.errors import mismatch
+from cvt_hpc.errors import mismatch, unknown
 from cvt_hpc.job.axes import SAMPLE, SWAPPED
 
 LINE, BAND = figures.COLOURS[0], "#9ecae1"
+DEEP = figures.COLOURS[1]
+_BOUNDS = ("", "_low", "_high")  # a value and the ends of its 95 % bounds
 LEAST, HEIGHT, FRAME = 1.3, 2.8, 1.3  # [inch]: a panel at least and else, and title and legend
 
 
@@ -90,9 +99,8 @@ def onset_bands_figure(
     """
     check_results(dataset, source)
     told = over_samples(dataset, at or {})
-    numeric = [name for name in map(str, told["status"].dims) if told[name].dtype.kind in "iuf"]
-    known = [name for name in (*ALONG, *reversed(numeric)) if name in numeric and name not in (at or {})]
-    along = along or next(iter(known), "")
+    along = along or onset_axis(told, at or {})
+    known = [name for name in map(str, told["status"].dims) if name not in (at or {})]
     if "counted" not in told.attrs or along not in known or told["status"].ndim < 2:
         found = ", ".join(map(str, dataset["status"].dims)) or "a single run"
         expected = f"results over samples and two further axes, of them {along or 'one'} of numbers"
@@ -120,6 +128,98 @@ def onset_bands_figure(
     head = figures.headline("Onset of vibration", dataset.attrs)
     _entitle(figure, all_axes[0], [head, samples, *arrangement.notes])
     return figure
+
+
+@figures.styled
+def sensitivity_figure(
+    dataset: xr.Dataset, at: layout.At = None, source: str = "results", along: str = ""
+) -> Figure:
+    """Draw which uncertain parameters the onset of vibration depends on, a bar for each.
+
+    Side by side: its median in the lowest and the highest quarter of the samples, by the parameter; its
+    scatter as it is, and with half that of the parameter; Sobol indices, where the job has the runs.
+
+    Parameters
+    ----------
+    dataset, at, source
+        As of all pictures of results (`figures.py`), with the axis `sample`. Further axes are fixed where the
+        scatter of the onset is widest.
+    along : str
+        Axis along which vibration sets in; by default the load or the axis in its place, else the last one.
+
+    Raises
+    ------
+    InputError
+        As of all pictures; the results have no samples, or no job with their distributions.
+    """
+    check_results(dataset, source)
+    dims = list(map(str, dataset["status"].dims))
+    for name, value in (at or {}).items():
+        where = f"{source}: at {name}"
+        if name not in dims:
+            raise unknown(where, "axis of the results", name, dims)
+        dataset = dataset.isel({name: [layout.index_of(dataset[name], value, where)]})
+    along = along or onset_axis(dataset, at or {})
+    found = onset_scatter(dataset, along, source)
+    if "band" not in found:
+        raise mismatch(source, "results with the job that states the distributions", "others")
+    row = widest_row(found)
+    rows = (
+        f"{figures.in_words(found[name])} = {layout.value_text(found[name], k)}" for name, k in row.items()
+    )
+    head = figures.headline(f"What the onset in {figures.in_words(dataset[along])} depends on", dataset.attrs)
+    lines = [head, ", ".join(rows).replace("_", " ")]
+    here = found.isel(row)
+    swing = np.abs(here["quarter_onset"].diff("quarter").values[0])
+    here = here.isel(parameter=np.argsort(np.where(np.isfinite(swing), swing, -1.0)))
+    factor, unit = figures.coordinate_unit(here[ONSET].attrs)
+    ends = _ends(dataset[along].values[np.isfinite(dataset[along].values)])
+    middle = factor * np.clip(here[ONSET].values[1], *ends)
+    medians = factor * np.clip(here["quarter_onset"].fillna(middle / factor).values, *ends)
+    places, names = np.arange(float(here.sizes["parameter"])), here["parameter"].values
+    heads = [f"median onset [{unit}]", f"5 to 95 % [{unit}]"]
+    heads += ["Sobol index"] * (SWAPPED in dims)
+    figure = Figure((figures.WIDTH, FRAME + 0.45 * places.size + 0.3), layout="constrained")
+    all_axes = figure.subplots(1, len(heads), sharey=True)
+    for median, colour, quarter in zip(medians, (LINE, DEEP), QUARTERS, strict=True):
+        label = f"{quarter} of the parameter"
+        all_axes[0].barh(places, median - middle, left=middle, color=colour, label=label)
+    halved = factor * np.stack([here[f"halved_band{end}"].values for end in _BOUNDS])
+    _draw_bars(all_axes[1], places, halved, "half its scatter", BAND)
+    all_axes[1].axvline(factor * here["band"].item(), color="k", ls="--", lw=1.0, label="scatter as it is")
+    if SWAPPED in dims:
+        shares = indices_of(dataset, ONSET, along, source).isel(row).sel(parameter=names)
+        for key, shift, colour in (("first_order", 0.18, "#756bb1"), ("total_order", -0.18, "#bcbddc")):
+            values = np.stack([shares[f"{key}{end}"].values for end in _BOUNDS])
+            _draw_bars(all_axes[2], places + shift, values, key.replace("_", " "), colour, 0.34)
+    all_axes[0].set_yticks(places, [str(name).replace("_", " ") for name in names])
+    legend: dict[str, Any] = {}
+    for axes, head in zip(all_axes, heads, strict=True):
+        axes.set_xlabel(head)
+        axes.grid(axis="x", lw=0.4, alpha=0.5)
+        handles, labels = axes.get_legend_handles_labels()
+        legend |= dict(zip(labels, handles, strict=True))
+    set_frame(figure, legend, lines)
+    return figure
+
+
+def _draw_bars(
+    axes: Any,
+    places: NDArray[np.float64],
+    values: NDArray[np.float64],
+    label: str,
+    colour: str,
+    height: float = 0.8,
+) -> None:
+    """Draw bars of values and their bounds, shape (3, places); none where one is not known or infinite."""
+    known = np.isfinite(values[0])
+    with np.errstate(invalid="ignore"):
+        errors = np.abs(values[1:] - values[0])
+    errors = np.where(np.isfinite(errors) & known, errors, 0.0)
+    bars = {"xerr": errors, "error_kw": {"lw": 1.0, "capsize": 2.5}}
+    axes.barh(places, np.where(known, values[0], 0.0), height, color=colour, label=label, **bars)
+    for place in places[np.isinf(values[0])]:
+        axes.text(0.0, place, " beyond the axis", va="center", fontsize="small")
 
 
 def _ends(values: NDArray[np.float64]) -> tuple[float, float]:

@@ -13,13 +13,14 @@ together, since halved alone they would have weights without bound.
 """
 
 import json
+from collections.abc import Collection
 from typing import Any, NamedTuple
 
 import numpy as np
 import xarray as xr
 from numpy.typing import NDArray
 
-from cvt_hpc.analysis.classes import OccurrenceClass, at_strongest_strand, check_results, map_classes
+from cvt_hpc.analysis.classes import ALONG, OccurrenceClass, at_strongest_strand, check_results, map_classes
 from cvt_hpc.analysis.sobol import RESAMPLES, sobol_indices
 from cvt_hpc.errors import mismatch, unknown
 from cvt_hpc.job.axes import ALL, NONE, SAMPLE, SWAPPED
@@ -29,6 +30,7 @@ from cvt_hpc.vibration.classes import levels
 
 QUANTILES = {"5 %": 0.05, "50 %": 0.5, "95 %": 0.95}
 ONSET = "onset"
+QUARTERS = ("lowest quarter", "highest quarter")  # of the samples, by a parameter
 
 # By name the class, and whether a run that failed, or without a verdict, may have it
 EVENTS = {
@@ -174,6 +176,21 @@ def _quantiles(below: NDArray[np.float64], knots: NDArray[np.float64], samples: 
     return np.stack(found)
 
 
+def onset_axis(dataset: xr.Dataset, fixed: Collection[str] = ()) -> str:
+    """Return the axis along which vibration is said to set in; "" where there is none of numbers."""
+    numeric = [name for name in map(str, dataset["status"].dims) if dataset[name].dtype.kind in "iuf"]
+    free = [name for name in numeric if name not in {SAMPLE, *fixed}]
+    return next((name for name in (*ALONG, *reversed(free)) if name in free), "")
+
+
+def widest_row(found: xr.Dataset) -> dict[str, int]:
+    """Return the place on each further axis where the band of an `onset_scatter` is widest, and finite."""
+    band = found["band"].fillna(-np.inf)
+    band = band.where(band < np.inf, -np.inf)
+    places = np.unravel_index(int(band.values.argmax()), band.shape)
+    return dict(zip(map(str, band.dims), map(int, places), strict=True))
+
+
 def onset_scatter(dataset: xr.Dataset, along: str, source: str = "results") -> xr.Dataset:
     """Return quantiles of the onset of vibration, and what half the scatter of each parameter makes of them.
 
@@ -195,7 +212,8 @@ def onset_scatter(dataset: xr.Dataset, along: str, source: str = "results") -> x
         `parameter`, too, each an uncertain one or those that are correlated: `halved_onset`, the quantiles
         with half its scatter; `band` and `halved_band`, from 5 to 95 %, with the ends of 95 % bounds by
         bootstrap, `_low` and `_high`, inf where the band reaches beyond the axis; `effective_samples` of
-        independent ones that the weights leave [1].
+        independent ones that the weights leave [1]. Over `quarter`, too, `quarter_onset`: the median of the
+        onset where the parameter is in the lowest or the highest quarter of its samples.
 
     Raises
     ------
@@ -207,7 +225,7 @@ def onset_scatter(dataset: xr.Dataset, along: str, source: str = "results") -> x
     samples = independent(dataset)
     found = _brackets(samples, along)
     attributes = samples[along].attrs
-    told = {key: attributes[key] for key in ("units", "job_units") if key in attributes}
+    units = {key: attributes[key] for key in ("units", "job_units") if key in attributes}
     order = found.like.dims.index(SAMPLE)
     below = np.moveaxis(_shares(found), order, -2)
     rest = [dim for dim in found.like.dims if dim != SAMPLE]
@@ -218,19 +236,21 @@ def onset_scatter(dataset: xr.Dataset, along: str, source: str = "results") -> x
     quantiles = _quantiles(_weighted(below, rows), found.knots, size)  # quantile, ..., parameter
     result = xr.Dataset(coords={**axes, "quantile": [*QUANTILES], "parameter": [*weights]})
     words = {"long_name": f"onset of vibration in {along}"}
-    result["onset"] = ("quantile", *rest), quantiles[..., 0], told | words
+    result["onset"] = ("quantile", *rest), quantiles[..., 0], units | words
     if not weights:
         return result.drop_vars("parameter")
-    result["halved_onset"] = ("quantile", *rest, "parameter"), quantiles[..., 1:], told | words
+    result["halved_onset"] = ("quantile", *rest, "parameter"), quantiles[..., 1:], units | words
     drawn = np.random.default_rng(0).multinomial(size, np.full(size, 1.0 / size), RESAMPLES)
     again = [_band(_quantiles(_weighted(below, rows * counts), found.knots, size)) for counts in drawn]
     ends = np.quantile(again, [0.025, 0.975], axis=0, method="closest_observation")
     for suffix, band in zip(("", "_low", "_high"), (_band(quantiles), *ends), strict=True):
-        told["comment"] = (
-            f"width of the onset's distribution from 5 to 95 %{': end of 95 % bounds' * bool(suffix)}"
-        )
-        result[f"band{suffix}"] = rest, band[..., 0], dict(told)
-        result[f"halved_band{suffix}"] = (*rest, "parameter"), band[..., 1:], dict(told)
+        comment = f"from 5 to 95 % of the onset{': end of 95 % bounds' * bool(suffix)}"
+        result[f"band{suffix}"] = rest, band[..., 0], units | {"comment": comment}
+        result[f"halved_band{suffix}"] = (*rest, "parameter"), band[..., 1:], units | {"comment": comment}
+    quarters = np.stack([_in_quarters(samples, name) for name in weights], axis=1)
+    medians = [_quantiles(_weighted(below, part), found.knots, size)[1] for part in quarters]
+    result["quarter_onset"] = ("quarter", *rest, "parameter"), np.stack(medians), units | words
+    result = result.assign_coords(quarter=[*QUARTERS])
     effective = rows[1:].sum(axis=1) ** 2 / np.square(rows[1:]).sum(axis=1)
     result["effective_samples"] = "parameter", effective, {"units": "1"}
     return result
@@ -258,6 +278,15 @@ def _weights(dataset: xr.Dataset) -> dict[str, NDArray[np.float64]]:
     }
     groups = uncertain.groups()
     return {name: _halving(uncertain, keys, values) for name, keys in groups.items() if {*keys} <= {*values}}
+
+
+def _in_quarters(dataset: xr.Dataset, name: str) -> NDArray[np.float64]:
+    """Whether a parameter of a sample is in each of QUARTERS, shape (2, samples); nan of correlated ones."""
+    if name not in dataset.coords:
+        return np.full((2, dataset.sizes[SAMPLE]), np.nan)
+    values = dataset[name].values
+    low, high = np.quantile(values, [0.25, 0.75])
+    return np.stack([values <= low, values >= high]).astype(float)
 
 
 def _halving(uncertain: Uncertain, keys: tuple[str, ...], values: dict[str, NDArray]) -> NDArray[np.float64]:

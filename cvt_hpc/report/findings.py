@@ -17,8 +17,8 @@ from cvt_hpc.analysis.classes import at_strongest_strand, count_classes, map_cla
 from cvt_hpc.analysis.figures import coordinate_unit, in_words, number, value_unit
 from cvt_hpc.analysis.probability import CONTOURS, PROBABILITY
 from cvt_hpc.analysis.scatter import is_sampled
-from cvt_hpc.analysis.sensitivity import QUANTILES
-from cvt_hpc.job.axes import SAMPLE
+from cvt_hpc.analysis.sensitivity import QUANTILES, onset_axis, onset_scatter, widest_row
+from cvt_hpc.job.axes import CORRELATED, SAMPLE
 from cvt_hpc.variables import Status
 from cvt_hpc.vibration.classes import DECIDED, OccurrenceClass, levels, onsets
 
@@ -158,6 +158,8 @@ def probability_sentences(
         yield f"No sample is known to vibrate{along}."
     if "total_order" in told:
         yield from _owed(told)
+    if along := onset_axis(told):
+        yield from _onset_owed(dataset, along)
     slip = told["slip_probability"]
     if (slip > 0.0).any():
         largest = int(np.nanargmax(slip.values))
@@ -182,6 +184,33 @@ def _owed(told: xr.Dataset) -> Iterator[str]:
         )
         where = f"where vibration is least certain, at {_place(told, dims, cell)}"
         yield f"Total Sobol indices {where}: {listed}."
+
+
+def _onset_owed(dataset: xr.Dataset, along: str) -> Iterator[str]:
+    """State what half the scatter of each parameter would make of the onset's, where that is widest."""
+    found = onset_scatter(dataset, along)
+    if "band" not in found:
+        return
+    row = widest_row(found)
+    here, shape = found.isel(row), found["band"].shape
+    place = _place(found, [*row], int(np.ravel_multi_index([*row.values()], shape))) if row else ""
+    factor, unit = coordinate_unit(found["onset"].attrs)
+    band = factor * here["band"].item()
+    if not np.isfinite(band):
+        return
+    first, _, last = QUANTILES
+    start = f"The onset in {in_words(dataset[along])} scatters{f' most at {place}' * bool(place)}"
+    yield f"{start}: {first} to {last} of the samples within {band:.3g} {unit}."
+    for name in here["parameter"].values:
+        one = here.sel(parameter=name)
+        width, low, high = (factor * one[f"halved_band{end}"].item() for end in ("", "_low", "_high"))
+        if np.isfinite(width):
+            bounds = f"{low:.3g} to {high:.3g}" if np.isfinite(high) else f"{low:.3g} or more"
+            words = str(name).replace("_", " ")
+            yield (
+                f"Halve the scatter of {words}{' parameters' * (name == CORRELATED)}, and this band "
+                f"{'shrinks' if width < band else 'grows'} from {band:.3g} to {width:.3g} {unit} ({bounds})."
+            )
 
 
 def _how_sure(line: xr.Dataset, x: str, place: str) -> str:

@@ -12,9 +12,9 @@ from numpy.typing import NDArray
 
 from cvt_hpc.analysis import cells
 from cvt_hpc.analysis.arrangement import arrange, ruler, value_text
-from cvt_hpc.analysis.classes import OccurrenceClass, map_classes, occurrence_classes
+from cvt_hpc.analysis.classes import ALONG, OccurrenceClass, map_classes, occurrence_classes
 from cvt_hpc.analysis.figures import axis_label, coordinate_unit, in_words
-from cvt_hpc.analysis.hysteresis_bands import ALONG, INK, lowest_onsets, of_each_start
+from cvt_hpc.analysis.hysteresis_bands import INK, lowest_onsets, of_each_start
 from cvt_hpc.analysis.maps import AXIS, has_starts, join_starts
 from cvt_hpc.analysis.probability import PROBABILITY
 from cvt_hpc.analysis.scatter import is_sampled, sample_axes

@@ -6,6 +6,7 @@
 import base64
 import json
 from collections.abc import Callable, Iterator, Mapping
+from functools import partial
 from importlib import resources
 from io import BytesIO
 from itertools import islice, product
@@ -26,7 +27,7 @@ from cvt_hpc.analysis.figures import RESOLUTION, coordinate_unit, in_words, numb
 from cvt_hpc.analysis.hysteresis_bands import hysteresis_figure
 from cvt_hpc.analysis.maps import AXIS, has_starts, map_figure
 from cvt_hpc.analysis.probability import PROBABILITY, has_samples, over_samples
-from cvt_hpc.analysis.probability_drawing import onset_bands_figure
+from cvt_hpc.analysis.probability_drawing import onset_bands_figure, sensitivity_figure
 from cvt_hpc.analysis.scatter import is_sampled
 from cvt_hpc.analysis.value_maps import value_map_figure
 from cvt_hpc.errors import InputError, escaped, mismatch, one_line
@@ -156,7 +157,10 @@ def _content(dataset: xr.Dataset, source: str, folder: Path | None) -> dict[str,
         "has_lines": ("eigenfrequency" in dataset and "amplitude" not in dataset) or PROBABILITY in cells,
         "map": _map(cells, source),
         "pictures": _pictures(cells, arrangement, beyond, source),
-        "onset": _encoded(lambda: onset_bands_figure(dataset, source=source)) if PROBABILITY in cells else "",
+        **{
+            name: _encoded(partial(draw, dataset, source=source)) if PROBABILITY in cells else ""
+            for name, draw in (("onset", onset_bands_figure), ("sensitivity", sensitivity_figure))
+        },
         "hysteresis": _encoded(lambda: hysteresis_figure(dataset, source=source)) if arrangement else "",
         "not_drawn": max(0, combinations - MOST_MAPS),
         "beyond": " and ".join(beyond),

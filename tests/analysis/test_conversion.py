@@ -91,7 +91,7 @@ def test_each_kind_draws_lazy_quantities_in_other_units_as_numbers_in_si(kind):
         if is_of_a_run(name) == (KINDS[kind].subject == RESULTS):
             continue
         dataset = with_derived_axes(stored(name))
-        if kind == "onset_bands":  # of studies whose cells have samples
+        if kind in ("onset_bands", "sensitivity"):  # of studies whose cells have samples
             dataset = dataset.expand_dims(sample=np.arange(3))
         try:
             numbers_drawn, texts = drawn(getattr(dataset.cvt, kind)(*words))

@@ -13,7 +13,7 @@ import cvt_hpc.accessor  # noqa: F401
 from cvt_hpc.analysis.classes import OccurrenceClass
 from cvt_hpc.analysis.maps import map_figure
 from cvt_hpc.analysis.probability import probabilities
-from cvt_hpc.analysis.probability_drawing import onset_bands_figure
+from cvt_hpc.analysis.probability_drawing import onset_bands_figure, sensitivity_figure
 from cvt_hpc.analysis.sensitivity import onset_scatter
 from cvt_hpc.analysis.sobol import sobol_indices
 from cvt_hpc.analysis.value_maps import value_map_figure
@@ -388,3 +388,31 @@ def test_the_report_says_how_sure_the_map_is(two_axes, tmp_path):
     assert "--set uncertain.samples=16</code> narrows the intervals" in text
     assert "along sample" not in text
     assert text.count('alt="onset of vibration"') == 1
+
+
+@pytest.mark.parametrize("indices", [False, True])
+def test_what_the_onset_depends_on_is_drawn_and_told(indices, tmp_path):
+    further = {"damping": normal(5.0, 0.75), "preload": normal(40.0, 20.0)}
+    dataset = linear_onset(64, STEPS, **further, **({"indices": True} if indices else {}))
+    dataset = dataset.assign_attrs(job_name="made")
+    found, figure = dataset.cvt.onset_scatter(), sensitivity_figure(dataset)
+    told = words(figure)
+    assert "What the onset in load depends on: made" in told
+    assert ("Sobol index" in told, len(figure.axes)) == (indices, 2 + indices)
+    # the longer bar above: preload moves the onset by twice its standard deviation more than damping does
+    assert [text.get_text() for text in figure.axes[0].get_yticklabels()] == ["damping", "preload"]
+    low, high = found["quarter_onset"].sel(parameter="preload").values
+    assert (low, high) == pytest.approx(15.0 + 2.0 * norm.ppf([0.125, 0.875]), abs=0.6)
+    ends = [bar.get_x() + bar.get_width() for bar in figure.axes[0].patches]
+    assert ends == pytest.approx(found["quarter_onset"].values.ravel())
+    widths = [bar.get_width() for bar in figure.axes[1].patches]
+    assert widths == pytest.approx(found["halved_band"].values)
+    assert figure.axes[1].lines[-1].get_xdata()[0] == pytest.approx(found["band"].item())
+    text = write_report(dataset, tmp_path / "report.html").read_text().replace("\u00a0", " ")
+    assert f"Halve the scatter of preload, and this band shrinks from {found['band'].item():.3g} to" in text
+    assert text.count('alt="what the onset depends on"') == 1
+    assert "beyond the axis" in words(sensitivity_figure(dataset.sel(load=slice(5.0, 15.0))))
+    with pytest.raises(InputError, match="expected results with the job that states the distributions"):
+        sensitivity_figure(dataset.drop_attrs())
+    with pytest.raises(InputError, match="at thrust: unknown axis of the results"):
+        sensitivity_figure(dataset, {"thrust": 1.0})
