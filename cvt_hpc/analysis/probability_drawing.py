@@ -186,7 +186,8 @@ def sensitivity_figure(
         all_axes[0].barh(places, median - middle, left=middle, color=colour, label=label)
     halved = factor * np.stack([here[f"halved_band{end}"].values for end in _BOUNDS])
     _draw_bars(all_axes[1], places, halved, "half its scatter", BAND)
-    all_axes[1].axvline(factor * here["band"].item(), color="k", ls="--", lw=1.0, label="scatter as it is")
+    if np.isfinite(band := factor * here["band"].item()):
+        all_axes[1].axvline(band, color="k", ls="--", lw=1.0, label="scatter as it is")
     if SWAPPED in dims:
         shares = indices_of(dataset, ONSET, along, source).isel(row).sel(parameter=names)
         for key, shift, colour in (("first_order", 0.18, "#756bb1"), ("total_order", -0.18, "#bcbddc")):

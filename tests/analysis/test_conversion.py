@@ -1,5 +1,6 @@
 """Datasets in other units, quantified, lazy or changed by xarray are drawn and reported as those of this program."""
 
+import json
 import re
 
 import dask
@@ -92,7 +93,9 @@ def test_each_kind_draws_lazy_quantities_in_other_units_as_numbers_in_si(kind):
             continue
         dataset = with_derived_axes(stored(name))
         if kind in ("onset_bands", "sensitivity"):  # of studies whose cells have samples
-            dataset = dataset.expand_dims(sample=np.arange(3))
+            dataset = dataset.expand_dims(sample=np.arange(3)).assign_coords(play=("sample", [1.0, 2.0, 3.0]))
+            law = {"distribution": "normal", "mean": 2.0, "standard_deviation": 1.0}
+            dataset.attrs["job"] = json.dumps({"uncertain": {"seed": 1, "play": law}})
         try:
             numbers_drawn, texts = drawn(getattr(dataset.cvt, kind)(*words))
         except InputError:
