@@ -22,13 +22,7 @@ KICK = "kick", 0.02  # [m/s]
 MOST_TURN = np.pi / 3.0  # [rad] of a beam along an arc
 
 # what the model of rigid sheaves, bare strands and set-valued friction does without, and what that is there
-_WITHOUT = {
-    "coarse": True,
-    "nose_clearance": np.inf,
-    "transverse_damping": 0.0,
-    "sheave_stiffness": np.inf,
-    "gravity": 0.0,
-}
+_WITHOUT = {"coarse": True, "nose_clearance": np.inf, "transverse_damping": 0.0, "sheave_stiffness": np.inf}
 _IDLE = (
     "nose_height",
     "nose_stiffness",
@@ -39,6 +33,7 @@ _IDLE = (
     "ring_damping",
     "bending_stiffness",
     "friction_speed",
+    "gravity",
     *pushbelt.MODES,
 )
 _WITHOUT |= {
