@@ -178,7 +178,7 @@ def residuals(belt, state, increments, openings, shapes, load, step, iterate, sc
         g = vec.moved(g, -moment, y)
         h = iterate[j, f.RESIDUAL + f.ROW_V] + iterate[j, f.PAIR_I + f.ROW_V]
         h = h + behind(iterate, j, f.PAIR_J + f.ROW_V)
-        h = h - ring * (dv + fall * step[j, f.RING_LINE + 1])
+        h = h - ring * (dv + fall * vec.at(step, j, f.RING_LINE)[1])
         s = iterate[j, f.PAIR_I + f.ROW_P] + behind(iterate, j, f.PAIR_J + f.ROW_P) - rotary * dp + moment
         vec.store_screw(iterate, j, f.RESIDUAL, (force, g))
         iterate[j, f.RESIDUAL + f.ROW_V], iterate[j, f.RESIDUAL + f.ROW_P] = h, s

@@ -436,7 +436,7 @@ def book_weight(belt, state, work, dt):
         v = elements[j, f.V] + 0.5 * elements[j, f.CHANGE + f.ROW_V]
         mass, coupling = vec.symmetric(step, j, f.INERTIA), vec.matrix(step, j, f.INERTIA_UW)
         falling -= vec.of_symmetric(mass, u)[1] + vec.of_matrix(coupling, w)[1]
-        falling -= belt.ring_mass / dt * step[j, f.RING_LINE + 1] * v
+        falling -= belt.ring_mass / dt * vec.at(step, j, f.RING_LINE)[1] * v
     # inertia is that of a step, divided by it
     add_to_totals(state, work.scratch, planar.GRAVITY_WORK, dt * dt * belt.gravity * falling)
 
