@@ -253,6 +253,23 @@ def test_free_spinning_ring():
     ) == pytest.approx((belt.mass + belt.ring_mass) * NODES * radius**2 * omega, rel=1e-6)
 
 
+def test_a_belt_at_rest_falls_freely():
+    # elements apart and rings without tension, by g t (t + dt) / 2 after t, with the speed g t
+    belt, state = start(given(ring_strain=0.0, angle_stiffness=0.0, gravity=9.81))
+    belt = belt._replace(thickness=1e-3, transverse_damping=0.0)
+    state.pulleys[:] = 0.0, 0.0, 1e-4, 1e-4
+    f = fields(state.elements)
+    f[:, U] = 0.0
+    write(state.elements, f)
+    inputs, time = np.zeros((2, pushbelt_fields.INPUTS)), 300 * STEP
+    assert advance(belt, b.NEWTON, state, workspace(belt, NODES), inputs, 300, STEP) == 0
+    g, fallen, speed = fields(state.elements), 0.5 * 9.81 * time * (time + STEP), 9.81 * time
+    assert f[:, pushbelt_fields.Z] - g[:, pushbelt_fields.Z] == pytest.approx(fallen, rel=1e-9)
+    assert np.abs(g[:, pushbelt_fields.TENSION]).max() < 1e-5
+    kinetic = 0.5 * NODES * (belt.mass + belt.ring_mass) * speed**2
+    assert state.totals[pushbelt_fields.GRAVITY_WORK] == pytest.approx(kinetic, rel=1e-9)
+
+
 def test_a_strand_decays_by_the_transverse_damping():
     # damping in proportion to mass: each mode decays by exp(-d_b t / (2 m')), its energy goes into BELT_LOSS
     speed, pitch = 0.1, 0.6612 / NODES  # [m/s], [m]
@@ -293,6 +310,37 @@ def test_a_strand_decays_by_the_transverse_damping():
     assert rates[1] - rates[0] == pytest.approx(expected, rel=5e-3)
     # 3 %: that friction's share, and motion along the belt
     assert lost == [0.0, pytest.approx(0.5 * mass * speed**2 * (shape**2).sum(), rel=0.03)]
+
+
+def test_a_strand_at_rest_sags_under_its_weight():
+    # between pulleys of one size m' g l^2 / (8 T) in the middle; elements apart, damped nearly critically
+    heights, tensions, left_open, done = [], [], [], []
+    for gravity in (100.0, -100.0, 0.0):
+        belt, state = start(given(ratio=1.0, ring_strain=5e-4, transverse_damping=3000.0, gravity=gravity))
+        belt = belt._replace(thickness=belt.thickness - 1e-3, driven_rate=0.0)
+        state.pulleys[:2] = 0.0
+        f, totals = fields(state.elements), state.totals
+        f[:, U] = 0.0
+        write(state.elements, f)
+        inputs, begun = np.zeros((2, pushbelt_fields.INPUTS)), stored(belt, state)
+        assert advance(belt, b.NEWTON, state, workspace(belt, NODES), inputs, 4000, STEP) == 0
+        f = fields(state.elements)
+        f = f[np.argsort(f[:, pushbelt_fields.Y])]
+        strands = [f[side * f[:, pushbelt_fields.Z] > 0.0] for side in (1.0, -1.0)]
+        heights.append(
+            [np.interp(0.0775, *of[:, [pushbelt_fields.Y, pushbelt_fields.Z]].T) for of in strands]
+        )
+        tensions.append(f[:, pushbelt_fields.TENSION].mean())
+        lost = totals[pushbelt_fields.FLANK_LOSS : pushbelt_fields.FLANK_DAMPED + 1].sum()
+        done.append(totals[pushbelt_fields.GRAVITY_WORK])
+        left_open.append(stored(belt, state) - begun + lost - done[-1])
+    down, up, _ = heights
+    expected = (belt.mass + belt.ring_mass) / belt.pitch * 100.0 * 0.155**2 / (8.0 * np.mean(tensions[:2]))
+    # strands end between elements of 6.4 mm
+    assert 0.5 * np.subtract(up, down) == pytest.approx([expected] * 2, rel=0.02)
+    # weight's work is stored or lost; the start from rest leaves as much open as without weight
+    assert min(done[:2]) > 5e-3 and done[2] == 0.0
+    assert left_open == pytest.approx([left_open[2]] * 3, abs=0.02 * done[0])
 
 
 def on_a_pulley(values, speed, pressed):

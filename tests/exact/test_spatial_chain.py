@@ -77,6 +77,19 @@ def test_a_ring_that_moves_out_of_its_plane_keeps_its_energy_and_momentum():
     assert energy_now == pytest.approx(energy, rel=4e-6)
 
 
+def test_a_ring_at_rest_falls_freely():
+    # by g t (t + dt) / 2 after t, with the speed g t
+    constants, _, fields = chains.free_ring(NODES, RADIUS, 0.0)
+    constants, state, time = constants._replace(gravity=9.81), chains.state(fields), 300 * STEP
+    inputs = np.zeros((2, spatial_fields.INPUTS))
+    assert advance(constants, b.NEWTON, state, b.workspace(constants, NODES), inputs, 300, STEP) == 0
+    found, kinetic = of_lanes(state.elements), 0.5 * (9.81 * time) ** 2
+    kinetic *= NODES * (constants.mass + constants.ring_mass)
+    assert fields[:, 1] - found[:, 1] == pytest.approx(0.5 * 9.81 * time * (time + STEP), rel=1e-9)
+    assert np.abs(found[:, spatial_fields.TENSION]).max() < 1e-5
+    assert state.totals[pushbelt_fields.GRAVITY_WORK] == pytest.approx(kinetic, rel=1e-9)
+
+
 def test_free_elements_turn_as_rigid_bodies():
     # nothing acts on them, so that R J R' omega of each stays; speeds are half a step early, of first order
     nodes = 16

@@ -2,17 +2,19 @@
 
 import csv
 from dataclasses import replace
+from pathlib import Path
 
 import numpy as np
 import pytest
 
 from cvt_hpc.cli import main
 from cvt_hpc.errors import InputError
-from cvt_hpc.experiments.fit.evaluating import Evaluation
+from cvt_hpc.experiments.fit.evaluating import Evaluation, study_of
 from cvt_hpc.experiments.fit.job import share_of
 from cvt_hpc.experiments.fit.loading import load
 from cvt_hpc.experiments.fit.making import conflict_table
 from cvt_hpc.experiments.fit.search import Found, sensitivities
+from cvt_hpc.physics.out_of_plane import axial_offset
 from cvt_hpc.study import run
 from cvt_hpc.tables import below_origin
 from cvt_hpc.vibration.classes import OccurrenceClass
@@ -78,6 +80,8 @@ case = "steeper"
 measure = "larger"
 than = "as_built"
 """
+
+ALIGNMENT = Path(__file__).parents[2] / "jobs" / "fit_alignment.toml"
 
 
 @pytest.fixture
@@ -240,10 +244,26 @@ def test_check_tells_targets_and_cost(job, capsys):
     assert "[fit]: expected a job of runs, found one for `cvt-hpc fit`" in capsys.readouterr().err
 
 
+def test_a_free_parameter_may_give_another_one_at_each_value_along():
+    fit = load(ALIGNMENT)
+    job, legal = study_of(fit, "x", fit.scenes(np.array([[0.0], [1.0]])), {}, fit.values, fit.cases)
+    points = [job.point(k) for k in range(job.size)]
+    assert legal.all() and {point["ratio"] for point in points} == set(fit.values)
+    offsets = [axial_offset(point, point["aligned_ratio"]) for point in points]
+    assert [point["misalignment"] for point in points] == offsets and len(set(offsets)) == 4
+
+
+def test_a_start_gives_what_the_job_does_not(tmp_path):
+    text = ALIGNMENT.read_text().replace("[{ aligned_ratio = 1 }]", "[{}]")
+    (tmp_path / "x.toml").write_text(text)
+    with pytest.raises(InputError, match="aligned_ratio: expected a value, as the job has none"):
+        load(tmp_path / "x.toml")
+
+
 @pytest.mark.parametrize(
     ("old", "new", "message"),
     [
-        ('measure = "areas"', 'measure = "area"', 'measure: expected one of vibrating, quiet, within, areas, onset, larger, found "area"; did you mean areas?'),
+        ('measure = "areas"', 'measure = "area"', 'measure: expected one of vibrating, quiet, within, least, areas, onset, larger, found "area"; did you mean areas?'),
         ('measure = "areas"', "", "targets, item 4 measure: expected one of"),
         ('case = "rigid"\n', 'case = "rigit"\n', 'item 5 case: expected one of as_built, rigid, steeper, constant, found "rigit"; did you mean rigid?'),
         ('than = "as_built"', 'than = "steeper"', 'item 7 than: expected another case than its own, found "steeper"'),

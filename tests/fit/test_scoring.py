@@ -82,6 +82,16 @@ def test_quiet_runs_have_no_say_in_a_quantity():
     assert scored("within", mixed, **keys) == pytest.approx(0.75)
 
 
+def test_the_least_value_is_that_of_the_worst_run_whether_it_vibrates_or_not():
+    keys = {"quantity": "frequency", "fading": 100.0}
+    assert scored("least", course("qVq", np.array([10.0, -300.0, 50.0])), **keys) == 0.25
+    assert scored("least", course("qVq", np.array([10.0, -300.0, 50.0])), 25.0, **keys) == pytest.approx(
+        2 / 3
+    )
+    assert scored("least", course("q", 0.0), **keys) == 1.0
+    assert scored("least", course("qx", np.array([10.0, np.nan])), **keys) == 0.0  # failed is failed
+
+
 @pytest.mark.parametrize(
     ("letters", "found"),
     [

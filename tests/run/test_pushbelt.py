@@ -62,7 +62,8 @@ def test_forces_of_both_strands_give_the_torque(records):
 
 
 def test_power_balance_closes_with_falling_friction_and_damping():
-    found = record(load=60.0, friction_gradient=-0.4, transverse_damping=1e6)
+    # the weight of ten times gravity works with 0.7 W, 4e-5 of the driving power
+    found = record(load=60.0, friction_gradient=-0.4, transverse_damping=1e6, gravity=-100.0)
     assert found["status"] == Status.DONE and found["unsolved_share"] == 0.0
     drive, damped = found["driving_power"], found["numerical_damping"]
     # what the belt's damping and impacts of elements take are a dozen times and more of what is left open

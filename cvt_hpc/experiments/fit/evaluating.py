@@ -181,6 +181,10 @@ def study_of(
         axes[key] = column
     axes[fit.along] = np.broadcast_to(values, shape)
     document, known = fit.job.resolved(), (fit.job.source, fit.job.units, dict(settings), "[fit]")
+    # of a parameter that follows from an axis the scene has no value of its own
+    follow = {gives.key for key in base if (gives := fit.job.schema.parameters[key].gives)}
+    for table in fit.job.schema.sections:
+        document[table] = {key: value for key, value in document[table].items() if key not in follow}
     scene = rebuild_job(document, *known)
     legal = np.empty(shape, dtype=bool)
     for place in np.ndindex(shape):

@@ -103,11 +103,12 @@ class Target:
     low, high : float
         Ends of the swept parameter [SI]: the runs between them count.
     quantity : str
-        Recorded quantity for `within`; "" for the other measures.
+        Recorded quantity for `within` and `least`; "" for the other measures.
     bounds : tuple of float
         Of the quantity, or of the onset [SI]; () where nothing is bounded.
     fading : float
-        Distance [SI] from the bounds at which nothing is left of the score.
+        Distance [SI] from the bounds at which nothing is left of the score; for `least` from 0, at which
+        half of it is.
     count : int
         Of separate areas.
     than : str
@@ -181,6 +182,12 @@ def _within(target: Target, asked: Course, other: Course) -> float:
     return float(_near(asked.quantities[target.quantity][asked.vibrates], target).mean())
 
 
+def _least(target: Target, asked: Course, other: Course) -> float:
+    """Score the largest size of the quantity: 1 for none, a half at `fading`; 0 where a run has no value."""
+    largest = float(np.abs(asked.quantities[target.quantity]).max())
+    return target.fading / (target.fading + largest) if np.isfinite(largest) else 0.0
+
+
 def _areas(target: Target, asked: Course, other: Course) -> float:
     """Score the number of separate areas; each that is missing or too many costs its share."""
     return max(0.0, 1.0 - abs(len(areas(asked)) - target.count) / target.count)
@@ -211,6 +218,7 @@ MEASURES: Mapping[str, Callable[[Target, Course, Course], float]] = {
     "vibrating": _vibrating,
     "quiet": _quiet,
     "within": _within,
+    "least": _least,
     "areas": _areas,
     "onset": _onset,
     "larger": _larger,

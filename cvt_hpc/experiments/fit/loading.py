@@ -190,13 +190,15 @@ def _read_starts(raw: Any, free: tuple[Free, ...], job: Job, where: str) -> NDAr
             if key not in names:
                 raise unknown(f"{place} {key}", "free parameter", key, names)
         for column, one in enumerate(free):
-            value = job.parameters[one.name]
+            spot = f"{place} {one.name}"
             if one.name in table:
-                value = read_value(job.schema.parameters[one.name], table[one.name], f"{place} {one.name}")
+                value = read_value(job.schema.parameters[one.name], table[one.name], spot)
+            elif (value := job.parameters.get(one.name)) is None:
+                raise mismatch(spot, "a value, as the job has none", "nothing")
             shares[row, column] = share = share_of(one, value)
             if not -1e-9 <= share <= 1.0 + 1e-9:
                 words = [job.schema.in_words(one.name, end) for end in (one.low, one.high, value)]
-                raise mismatch(f"{place} {one.name}", f"a value from {words[0]} to {words[1]}", words[2])
+                raise mismatch(spot, f"a value from {words[0]} to {words[1]}", words[2])
     return np.clip(shares, 0.0, 1.0)
 
 
@@ -261,11 +263,13 @@ def _read_target(table: Any, job: Job, along: str, cases: Collection[str], where
         "weight": positive(1.0, "", "in the mean of all targets"),
     }
     own: dict[str, Parameter] = {}
-    if kind == "within":
+    if kind in ("within", "least"):
         name = table.get("quantity")
         if not isinstance(name, str):
             raise mismatch(f"{where} quantity", "a recorded quantity", show(name))
         own = {"quantity": Parameter("", "", ""), **_bounds(_unit_of(name, job, f"{where} quantity"))}
+        if kind == "least":
+            del own["bounds"]
     elif kind == "onset":
         own = _bounds(unit)
     elif kind == "areas":

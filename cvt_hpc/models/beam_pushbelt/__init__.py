@@ -33,6 +33,7 @@ _IDLE = (
     "ring_damping",
     "bending_stiffness",
     "friction_speed",
+    "gravity",
     *pushbelt.MODES,
 )
 _WITHOUT |= {

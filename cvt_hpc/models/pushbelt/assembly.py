@@ -146,13 +146,15 @@ def element_forces(belt, state, pulleys, increments, step, iterate, dt):
 def residuals(belt, state, increments, openings, shapes, load, step, iterate, scratch, border, dt):
     """Residuals of all equations: of elements in `iterate`, of the border in the last column of `border`.
 
+    Weight has no term of its own: masses resist the change of their speeds beyond that of free fall.
+
     Returns
     -------
     float
         Power residual of the belt [W].
     """
     modes = belt.modal_stiffness.shape[1]
-    per_dt = 1.0 / dt
+    per_dt, fall = 1.0 / dt, dt * belt.gravity
     power = torque = like(0.0, state[0, f.FLANK])
     for k in range(2 * modes):
         scratch[0, k] = 0.0
@@ -160,12 +162,13 @@ def residuals(belt, state, increments, openings, shapes, load, step, iterate, sc
         t_y, t_z = step[j, f.T_Y], step[j, f.T_Z]
         dy, dz = state[j, f.CHANGE_Y], state[j, f.CHANGE_Z]
         dw, dv = state[j, f.CHANGE_W], state[j, f.CHANGE_V]
-        across = belt.ring_mass * (t_z * dy - t_y * dz)
+        dz_beyond = dz + fall
+        across = belt.ring_mass * (t_z * dy - t_y * dz_beyond)
         n_y, n_z = step[j, f.NORMAL_Y], step[j, f.NORMAL_Z]
         drag = belt.transverse_damping * (n_y * (state[j, f.U_Y] + dy) + n_z * (state[j, f.U_Z] + dz))
         f_y = -per_dt * (belt.mass * dy + across * t_z) - drag * n_y + step[j, f.BENT_Y]
-        f_z = -per_dt * (belt.mass * dz - across * t_y) - drag * n_z + step[j, f.BENT_Z]
-        f_w, f_v = -per_dt * belt.inertia * dw, -per_dt * belt.ring_mass * dv
+        f_z = -per_dt * (belt.mass * dz_beyond - across * t_y) - drag * n_z + step[j, f.BENT_Z]
+        f_w, f_v = -per_dt * belt.inertia * dw, -per_dt * belt.ring_mass * (dv + fall * t_z)
 
         tension = iterate[j, f.ITERATE_TENSION]
         f_y += tension * step[j, f.TENSION_I_Y]

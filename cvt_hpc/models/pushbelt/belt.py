@@ -74,6 +74,8 @@ class Belt(NamedTuple):
     modal_stiffness : (2, modes) array
         S_k of the opening of each pulley's sheaves as sum a_k psi_k(phi), psi 1, cos, sin, cos 2, ... [N/m];
         none: rigid sheaves.
+    gravity : float
+        Acceleration of gravity, against z [m/s^2].
     """
 
     centre_distance: float
@@ -112,6 +114,7 @@ class Belt(NamedTuple):
     driving_rate: float
     driven_rate: float
     modal_stiffness: np.ndarray
+    gravity: float = 0.0
 
 
 class Newton(NamedTuple):

@@ -146,6 +146,19 @@ def move_sheaves(belt, state, inputs, driving_thrust, driven_thrust, dt):
 
 
 @kernel
+def book_weight(belt, state, work, dt):
+    """Add the work of the weight to the totals."""
+    elements, step = state.elements, work.step
+    falling = like(0.0, elements[0, f.U_Y])
+    for j in range(step.rows):
+        y = elements[j, f.U_Y] + 0.5 * elements[j, f.CHANGE_Y]
+        z = elements[j, f.U_Z] + 0.5 * elements[j, f.CHANGE_Z]
+        slip = elements[j, f.V] + 0.5 * elements[j, f.CHANGE_V] - step[j, f.T_Y] * y - step[j, f.T_Z] * z
+        falling -= belt.mass * z + belt.ring_mass * (z + step[j, f.T_Z] * slip)
+    add_to_totals(state, work.scratch, f.GRAVITY_WORK, dt * belt.gravity * falling)
+
+
+@kernel
 def book(belt, state, work, dt):
     """Add to the totals the work of a solved step, before it is accepted."""
     elements, step, iterate, scratch = state.elements, work.step, work.iterate, work.scratch

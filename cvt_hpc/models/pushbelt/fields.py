@@ -62,8 +62,9 @@ INPUTS = IN_DRIVING_SHIFT + 1
     ELEMENT_DAMPED,  # by the step itself, at contacts and noses between elements (`border`) [J]
     FLANK_DAMPED,  # at flanks [J]
     POWER_RESIDUAL,  # of the equations of motion as they were solved [J]
-) = range(13)
-TOTALS = 13
+    GRAVITY_WORK,  # of the weight of elements and rings [J]
+) = range(14)
+TOTALS = 14
 # Mean rates of totals from WORK_IN on, by their names in the record
 POWERS = (
     "driving_power",

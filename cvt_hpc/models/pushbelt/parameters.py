@@ -70,6 +70,14 @@ PARAMETERS: dict[str, dict[str, Parameter]] = {
             "largest speed outwards that is given to each strand when the judged part begins",
             sensible=(1e-6, 10.0),
         ),
+        "gravity": Parameter(
+            0.0,
+            "m/s^2",
+            "acceleration of gravity in the plane of the belt, across the line of both shafts, from t2 to t1",
+            minimum=-100.0,
+            maximum=100.0,
+            sensible=(0.1, 100.0),
+        ),
     },
     "profiles": PROFILES,
     "belt": {

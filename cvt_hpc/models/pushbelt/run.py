@@ -341,7 +341,7 @@ class ElementRun(SampledRun):
         loss = found["flank_loss"] + found["ring_loss"] + found["belt_loss"]
         loss += found["tilt_loss"] + found["element_loss"] + found["stretch_loss"]
         damped = np.array([self.mean_rate(total) for total in f.DAMPED.values()])
-        storing = self.mean_rate(f.TOTALS)
+        storing = self.mean_rate(f.TOTALS) - self.mean_rate(f.GRAVITY_WORK)
         return found | {"loss": loss, "storing_power": storing, "numerical_damping": damped}
 
     @property

@@ -26,7 +26,14 @@ from cvt_hpc.models.marched import batches_of_one
 from cvt_hpc.models.pushbelt import assembly, run
 from cvt_hpc.models.pushbelt import fields as f
 from cvt_hpc.models.pushbelt.belt import NEWTON, of_lanes, start, workspace
-from cvt_hpc.models.pushbelt.border import accept_border, book, close_border, move_sheaves, set_shapes
+from cvt_hpc.models.pushbelt.border import (
+    accept_border,
+    book,
+    book_weight,
+    close_border,
+    move_sheaves,
+    set_shapes,
+)
 from cvt_hpc.models.pushbelt.chain import before_step, contact_shares, linear_blocks, link, predict, turned
 from cvt_hpc.models.pushbelt.friction import filtered_slip
 from cvt_hpc.models.pushbelt.readings import SCALARS, Reading
@@ -135,16 +142,18 @@ def _accept(belt, state, work, inputs, dt):
     elements, step, iterate, scratch = state.elements, work.step, work.iterate, work.scratch
     totals, pulleys = state.totals, state.pulleys
     book(belt, state, work, dt)
+    if belt.gravity != 0.0:
+        book_weight(belt, state, work, dt)
     for k in range(3):
         scratch[0, k] = 0.0
-    per_dt = 1.0 / dt
+    per_dt, fall = 1.0 / dt, dt * belt.gravity
     for j in range(step.rows):
         t_y, t_z = step[j, f.T_Y], step[j, f.T_Z]
         ahead_of_it, tension = iterate[j, f.ITERATE_TENSION], behind(iterate, j, f.ITERATE_TENSION)
         pull = ahead_of_it * (t_z * step[j, f.TENSION_I_Y] - t_y * step[j, f.TENSION_I_Z])
         pull -= tension * (t_z * behind(step, j, f.TENSION_J_Y) - t_y * behind(step, j, f.TENSION_J_Z))
         pull += t_z * step[j, f.BENT_Y] - t_y * step[j, f.BENT_Z]
-        across = per_dt * (t_z * elements[j, f.CHANGE_Y] - t_y * elements[j, f.CHANGE_Z])
+        across = per_dt * (t_z * elements[j, f.CHANGE_Y] - t_y * (elements[j, f.CHANGE_Z] + fall))
         elements[j, f.SADDLE] = absolute(belt.ring_mass * across - pull)
         elements[j, f.TENSION] = ahead_of_it
         elements[j, f.LENGTH] += dt * (elements[j, f.RING_SLIP] - ahead(elements, j, f.RING_SLIP))

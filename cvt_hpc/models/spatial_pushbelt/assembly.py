@@ -142,7 +142,7 @@ def side_torque(state, step, j, p):
 def residuals(belt, state, increments, openings, shapes, load, step, iterate, scratch, border, dt):
     """Residuals of all equations: of elements in `iterate`, of the border in the last column of `border`.
 
-    Forces of flanks and saddles stand in the residuals already.
+    Forces of flanks and saddles stand in the residuals already. Weight acts as in the plane.
 
     Returns
     -------
@@ -150,34 +150,35 @@ def residuals(belt, state, increments, openings, shapes, load, step, iterate, sc
         Power residual of the belt [W].
     """
     modes = belt.modal_stiffness.shape[1]
+    fall = dt * belt.gravity
     ring, rotary = belt.ring_mass / dt, belt.ring_rotary_inertia / dt
     yawing = BETA * dt * belt.yaw_stiffness + belt.yaw_damping
     power = torque = like(0.0, state[0, f.FLANK])
     for k in range(2 * modes):
         scratch[0, k] = 0.0
     for j in range(step.rows):
-        change = vec.screw(state, j, f.CHANGE)
+        du, dw = vec.screw(state, j, f.CHANGE)
+        du = du[0], du[1] + fall, du[2]
         dv, dp = state[j, f.CHANGE + f.ROW_V], state[j, f.CHANGE + f.ROW_P]
         u, omega = motion(state, j, 1.0)
         mass, coupling = vec.symmetric(step, j, f.INERTIA), vec.matrix(step, j, f.INERTIA_UW)
         force, g = vec.both_plus(vec.screw(iterate, j, f.RESIDUAL), vec.screw(iterate, j, f.PAIR_I))
         force, g = vec.both_plus((force, g), vec.screw_behind(iterate, j, f.PAIR_J))
-        force = vec.minus(
-            force, vec.plus(vec.of_symmetric(mass, change[0]), vec.of_matrix(coupling, change[1]))
-        )
+        force = vec.minus(force, vec.plus(vec.of_symmetric(mass, du), vec.of_matrix(coupling, dw)))
         n_y, n_z = step[j, f.NORMAL_Y], step[j, f.NORMAL_Z]
         drag = belt.transverse_damping * fma(n_y, u[0], n_z * u[1])
         f_y = force[0] - drag * n_y + step[j, f.BENT_Y]
         f_z = force[1] - drag * n_z + step[j, f.BENT_Z]
         force = f_y, f_z, force[2] - belt.lateral_damping * u[2]
         y = vec.at(step, j, f.YAW)
-        moment = step[j, f.PREDICTED_YAW] + yawing * (vec.dot(y, change[1]) - dp)
-        swing = vec.of_symmetric(vec.symmetric(step, j, f.INERTIA_WW), change[1])
+        moment = step[j, f.PREDICTED_YAW] + yawing * (vec.dot(y, dw) - dp)
+        swing = vec.of_symmetric(vec.symmetric(step, j, f.INERTIA_WW), dw)
         g = vec.plus(g, vec.at(step, j, f.GYROSCOPIC))
-        g = vec.minus(g, vec.plus(vec.of_transposed(coupling, change[0]), swing))
+        g = vec.minus(g, vec.plus(vec.of_transposed(coupling, du), swing))
         g = vec.moved(g, -moment, y)
         h = iterate[j, f.RESIDUAL + f.ROW_V] + iterate[j, f.PAIR_I + f.ROW_V]
-        h = h + behind(iterate, j, f.PAIR_J + f.ROW_V) - ring * dv
+        h = h + behind(iterate, j, f.PAIR_J + f.ROW_V)
+        h = h - ring * (dv + fall * vec.at(step, j, f.RING_LINE)[1])
         s = iterate[j, f.PAIR_I + f.ROW_P] + behind(iterate, j, f.PAIR_J + f.ROW_P) - rotary * dp + moment
         vec.store_screw(iterate, j, f.RESIDUAL, (force, g))
         iterate[j, f.RESIDUAL + f.ROW_V], iterate[j, f.RESIDUAL + f.ROW_P] = h, s

@@ -105,6 +105,8 @@ class Belt(NamedTuple):
         [N/m]; none: rigid sheaves.
     lean_lag : float
         Time constant with which the difference of a pulley's two sheaves follows their load [s].
+    gravity : float
+        Acceleration of gravity, against z [m/s^2].
     """
 
     centre_distance: float
@@ -159,6 +161,7 @@ class Belt(NamedTuple):
     driven_rate: float
     modal_stiffness: np.ndarray
     lean_lag: float
+    gravity: float = 0.0
 
 
 # How a step is solved: velocity, angular velocity in the plane and out of it, V, rate of the slope

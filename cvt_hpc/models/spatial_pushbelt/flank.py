@@ -427,6 +427,21 @@ def book_pairs(belt, state, work, dt):
 
 
 @kernel
+def book_weight(belt, state, work, dt):
+    """Add the work of the weight to the totals."""
+    elements, step = state.elements, work.step
+    falling = like(0.0, elements[0, f.FLANK])
+    for j in range(step.rows):
+        u, w = motion(elements, j, 0.5)
+        v = elements[j, f.V] + 0.5 * elements[j, f.CHANGE + f.ROW_V]
+        mass, coupling = vec.symmetric(step, j, f.INERTIA), vec.matrix(step, j, f.INERTIA_UW)
+        falling -= vec.of_symmetric(mass, u)[1] + vec.of_matrix(coupling, w)[1]
+        falling -= belt.ring_mass / dt * vec.at(step, j, f.RING_LINE)[1] * v
+    # inertia is that of a step, divided by it
+    add_to_totals(state, work.scratch, planar.GRAVITY_WORK, dt * dt * belt.gravity * falling)
+
+
+@kernel
 def book_flanks(belt, state, work, dt):
     """Add to the totals what a solved step takes at the flanks, before it is accepted."""
     elements, step, iterate, scratch = state.elements, work.step, work.iterate, work.scratch

@@ -33,7 +33,7 @@ from cvt_hpc.models.spatial_pushbelt.assembly import bending_forces, predict_ben
 from cvt_hpc.models.spatial_pushbelt.belt import NEWTON, NEWTON_OF_TWO_FLOWS, start, with_two_flows, workspace
 from cvt_hpc.models.spatial_pushbelt.chain import chain_forces, link, predict, pull_across, saddle_forces
 from cvt_hpc.models.spatial_pushbelt.faces import face_forces, pin_forces, predict_faces, predict_pins
-from cvt_hpc.models.spatial_pushbelt.flank import book_flanks, book_pairs
+from cvt_hpc.models.spatial_pushbelt.flank import book_flanks, book_pairs, book_weight
 from cvt_hpc.models.spatial_pushbelt.parameters import LOOSE_SIDES, package_arm
 from cvt_hpc.parameters import Parameters
 from cvt_hpc.variator import LARGEST_DISPLACEMENT, STRANDS
@@ -272,12 +272,13 @@ def _changes(kept, k):
 def _accept_elements(belt, state, work, dt):
     """Take the elements to the end of the step."""
     elements, step, iterate = state.elements, work.step, work.iterate
-    per_dt = 1.0 / dt
+    per_dt, fall = 1.0 / dt, dt * belt.gravity
     for j in range(step.rows):
         x, o = vec.at(elements, j, f.HEADING), vec.at(elements, j, f.OUTWARD)
         outward = vec.cross(vec.at(step, j, f.RING_LINE), vec.cross(o, x))
         pull = pull_across(step, iterate, j, outward)
-        across = per_dt * vec.dot(outward, vec.at(elements, j, f.CHANGE))
+        d_y, d_z, d_x = vec.at(elements, j, f.CHANGE)
+        across = per_dt * vec.dot(outward, (d_y, d_z + fall, d_x))
         elements[j, f.SADDLE] = absolute(belt.ring_mass * across - pull)
         elements[j, f.TENSION] = iterate[j, f.ITERATE_TENSION]
         elements[j, f.LENGTH] += dt * (elements[j, f.RING_SLIP] - ahead(elements, j, f.RING_SLIP))
@@ -335,6 +336,8 @@ def _accept(belt, state, work, inputs, dt):
     """Take the state to the end of the step, and add up what it has done."""
     totals, pulleys, loads = state.totals, state.pulleys, state.loads
     book_pairs(belt, state, work, dt)
+    if belt.gravity != 0.0:
+        book_weight(belt, state, work, dt)
     book_flanks(belt, state, work, dt)
     _accept_elements(belt, state, work, dt)
     _add_loads(belt, state, work)

@@ -223,12 +223,13 @@ def book_difference(belt, state, work, dt):
 def accept_difference(belt, state, work, dt):
     """Take the difference of the flows to the end of the step, before the elements are taken there."""
     elements, step, iterate = state.elements, work.step, work.iterate
-    half_mass = 0.5 * belt.ring_mass / dt
+    half_mass, fall = 0.5 * belt.ring_mass / dt, dt * belt.gravity
     for j in range(step.rows):
         o = vec.at(elements, j, f.OUTWARD)
         a = vec.cross(o, vec.at(elements, j, f.HEADING))
         outward = vec.cross(vec.at(step, j, f.RING_LINE), a)
         u, omega = vec.screw(elements, j, f.CHANGE)
+        u = u[0], u[1] + fall, u[2]
         tension, difference = iterate[j, f.ITERATE_TENSION], iterate[j, f.ITERATE_DIFFERENCE]
         tension_behind = behind(iterate, j, f.ITERATE_TENSION)
         difference_behind = behind(iterate, j, f.ITERATE_DIFFERENCE)
