@@ -5,10 +5,10 @@ the others. Its interval reaches from where no such run had the property to wher
 
 The intervals hold the probability in 95 of 100 studies or more if samples are independent, also where an
 adaptive study stops by what it finds (`study/intervals.py`). Points of a scrambled Sobol sequence are not
-independent. Each is distributed like a sample, so that the probability has no bias. They cover a distribution
-more evenly: with one uncertain parameter each of n equal parts has one of n samples. So the intervals are
-rather too wide; of several parameters no theorem says so for a given n. All cells have the samples in common:
-their errors are alike, and contours shift as a whole.
+independent. Each is distributed like a sample, so that the probability has no bias, but in an adaptive study
+that has stopped. They cover a distribution more evenly: with one uncertain parameter each of n equal parts
+has one of n samples. So the intervals are rather too wide; of several parameters no theorem says so for a
+given n. All cells have the samples in common: their errors are alike, and contours shift as a whole.
 """
 
 from collections.abc import Collection

@@ -7,9 +7,11 @@ than a step nobody knows more than the step.
 
 What half the scatter of a parameter would do is told by the samples at hand: they are weighted by the density
 of the narrower distribution over that from which they were drawn. This importance sampling needs no further
-run and supposes nothing of how the onset depends on the parameter. The weights are bounded; of a normal
-parameter they leave 66 % of the samples in effect, of a uniform one 50 %. Correlated parameters are halved
-together, since halved alone they would have weights without bound.
+run and supposes nothing of how the onset depends on the parameter. The weights of a normal parameter leave
+66 % of the samples in effect, those of a uniform one 50 %. Limits stay, so that the scatter of a parameter
+that is cut off tightly shrinks by less than half. Correlated parameters are halved together, since halved
+alone they would have weights without bound. The bounds are by bootstrap, and too narrow below some 256
+samples: with 32 independent ones they hold in 67 to 83 of 100 studies.
 """
 
 import json
