@@ -21,7 +21,20 @@ from cvt_hpc.vibration.classes import OccurrenceClass
 UNITS = (
     *("1", "m", "s", "N", "N m", "W", "Hz", "rad", "rad s-1", "m s-1", "N m-1", "W m-1", "s m-1", "kg", "Pa"),
     *("s-1", "J", "J m-1", "N s", "N m s", "N s m-2", "kg/m", "kg/m^3", "kg m^2", "N m^2", "m/N", "N s/m"),
-    *("N m/rad", "N m s/rad", "m/(N s)", "1/s", "N s/m^2", "N/m", "N/m^2", "N/s", "m/s", "rad/s", "s/m"),
+    *(
+        "N m/rad",
+        "N m s/rad",
+        "m/(N s)",
+        "1/s",
+        "N s/m^2",
+        "N/m",
+        "N/m^2",
+        "N/s",
+        "m/s",
+        "m/s^2",
+        "rad/s",
+        "s/m",
+    ),
 )
 BLANKS = {  # what flags mean where they are missing
     "status": Status.NOT_RUN,
