@@ -158,11 +158,16 @@ def _shares(found: _Brackets) -> NDArray[np.float64]:
     return np.where(np.isinf(low), (low < 0.0).astype(float), np.where(np.isnan(low), np.nan, within))
 
 
-def _quantiles(below: NDArray[np.float64], knots: NDArray[np.float64], samples: int) -> NDArray[np.float64]:
-    """Quantiles of a distribution that samples tell at knots, the last axis; -inf and inf beyond them."""
+def _quantiles(
+    below: NDArray[np.float64], knots: NDArray[np.float64], samples: NDArray
+) -> NDArray[np.float64]:
+    """Quantiles of a distribution that samples tell at knots, the last axis; -inf and inf beyond them.
+
+    The number of samples, for all but that axis, is of those that count.
+    """
     from scipy.special import ndtri
 
-    least = 0.25 / samples  # a share of none, or of all, is known no better
+    least = 0.25 / np.maximum(samples, 1)[..., np.newaxis]  # a share of none, or of all, is known no better
     scores, found = ndtri(np.clip(below, least, 1.0 - least)), []
     for share in QUANTILES.values():
         place = (below < share).sum(axis=-1)
@@ -233,9 +238,10 @@ def onset_scatter(dataset: xr.Dataset, along: str, source: str = "results") -> x
     rest = [dim for dim in found.like.dims if dim != SAMPLE]
     axes = {name: axis for name, axis in found.like.coords.items() if SAMPLE not in axis.dims}
     weights = _weights(samples)
-    size = below.shape[-2]
+    size, counts = below.shape[-2], np.isfinite(below[..., 0])
+    counted = counts.sum(axis=-1)[..., np.newaxis]  # of each row, for all weights
     rows = np.stack([np.ones(size), *weights.values()])
-    quantiles = _quantiles(_weighted(below, rows), found.knots, size)  # quantile, ..., parameter
+    quantiles = _quantiles(_weighted(below, rows), found.knots, counted)  # quantile, ..., parameter
     result = xr.Dataset(coords={**axes, "quantile": [*QUANTILES], "parameter": [*weights]})
     words = {"long_name": f"onset of vibration in {along}"}
     result["onset"] = ("quantile", *rest), quantiles[..., 0], units | words
@@ -243,18 +249,19 @@ def onset_scatter(dataset: xr.Dataset, along: str, source: str = "results") -> x
         return result.drop_vars("parameter")
     result["halved_onset"] = ("quantile", *rest, "parameter"), quantiles[..., 1:], units | words
     drawn = np.random.default_rng(0).multinomial(size, np.full(size, 1.0 / size), RESAMPLES)
-    again = [_band(_quantiles(_weighted(below, rows * counts), found.knots, size)) for counts in drawn]
+    again = [_band(_quantiles(_weighted(below, rows * often), found.knots, counted)) for often in drawn]
     ends = np.quantile(again, [0.025, 0.975], axis=0, method="closest_observation")
     for suffix, band in zip(("", "_low", "_high"), (_band(quantiles), *ends), strict=True):
         comment = f"from 5 to 95 % of the onset{': end of 95 % bounds' * bool(suffix)}"
         result[f"band{suffix}"] = rest, band[..., 0], units | {"comment": comment}
         result[f"halved_band{suffix}"] = (*rest, "parameter"), band[..., 1:], units | {"comment": comment}
     quarters = np.stack([_in_quarters(samples, name) for name in weights], axis=1)
-    medians = [_quantiles(_weighted(below, part), found.knots, size)[1] for part in quarters]
+    medians = [_quantiles(_weighted(below, part), found.knots, counted)[1] for part in quarters]
     result["quarter_onset"] = ("quarter", *rest, "parameter"), np.stack(medians), units | words
     result = result.assign_coords(quarter=[*QUARTERS])
-    effective = rows[1:].sum(axis=1) ** 2 / np.square(rows[1:]).sum(axis=1)
-    result["effective_samples"] = "parameter", effective, {"units": "1"}
+    with np.errstate(invalid="ignore"):
+        effective = (counts @ rows[1:].T) ** 2 / (counts @ np.square(rows[1:]).T)
+    result["effective_samples"] = (*rest, "parameter"), effective, {"units": "1"}
     return result
 
 

@@ -289,6 +289,16 @@ def test_half_the_scatter_of_a_parameter_narrows_the_onset_as_in_the_closed_form
     assert found["halved_onset"].values[1] == pytest.approx(15.0, abs=0.1)
 
 
+def test_samples_that_are_not_run_make_no_band_surer():
+    whole = linear_onset(256, STEPS, damping=normal(5.0, 0.75), preload=normal(40.0, 20.0))
+    part = whole.isel(sample=slice(32))
+    few = whole.assign(status=whole["status"].where(whole["sample"] < 32, int(Status.NOT_RUN)))
+    found, expected = few.cvt.onset_scatter(), part.cvt.onset_scatter()
+    for name in ("onset", "band", "halved_band", "effective_samples"):
+        assert found[name].values == pytest.approx(expected[name].values), name
+    assert found["effective_samples"].max() < 32
+
+
 def test_a_band_that_ends_beyond_the_axis_has_no_width():
     found = linear_onset(64, np.arange(5.0, 16.0), damping=normal(5.0, 0.75), preload=normal(40.0, 20.0))
     assert (

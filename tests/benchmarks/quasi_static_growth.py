@@ -4,8 +4,9 @@
     quasi_static_growth.py range > jobs/results/quasi_static_growth_range.csv  # some, over loads, of both sets
 
 The sets are the defaults, and that of `jobs/lebrecht_fitted.toml`. The elastic belt's Jacobian about its steady
-state, with coordinates across the belt and motion along it replaced as `docs/guide/results_stability.md` says. One line for each: memory, split, motion along the path, whose rates
-slide, limits, then the fastest growth of all and that between 250 and 900 Hz.
+state, with coordinates across the belt and motion along it replaced as `docs/guide/results_stability.md` says. One
+line for each: memory, split, motion along the path, whose rates slide, limits, then the fastest growth of all and that
+between 250 and 900 Hz.
 """
 
 import sys

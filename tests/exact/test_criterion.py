@@ -6,7 +6,7 @@ from scipy.integrate import quad, solve_ivp
 from scipy.optimize import brentq
 
 from cvt_hpc.errors import InputError
-from cvt_hpc.models.criterion.record import RELATIVE_AMPLITUDES, energy_per_cycle, flank
+from cvt_hpc.models.criterion.record import RELATIVE_AMPLITUDES, _limit_amplitude, energy_per_cycle, flank
 from cvt_hpc.variables import Status, Vibrates
 from support.rungs import rung_job, rung_record
 
@@ -207,6 +207,17 @@ def test_a_small_limit_cycle_is_found():
     speed = 2.0 * np.sqrt(0.2**2 - 0.19999**2)
     record = found(p, radial_speed=0.19999, transverse_damping=0.0, undecided_margin=0.0)
     assert record["amplitude"] * 2 * np.pi * record["frequency"] == pytest.approx(speed, rel=1e-4)
+
+
+def test_a_limit_within_rounding_is_where_energy_is_counted_as_none():
+    cubic = {"friction_law": "cubic", "friction_gradient": -0.1, "stribeck_velocity": 0.21}
+    f = sliding(PAPER | cubic, radial_speed=0.2, transverse_damping=50.0)
+    energy = energy_per_cycle(f, RELATIVE_AMPLITUDES * f.speed / f.angular_frequency)
+    is_fed = energy > 0.0
+    beyond = np.flatnonzero(is_fed)[-1] + 1
+    energy[beyond] = 1e-300
+    found = _limit_amplitude(f, energy, is_fed) * f.angular_frequency
+    assert found == pytest.approx(RELATIVE_AMPLITUDES[beyond] * f.speed)
 
 
 def test_energy_over_amplitude_of_a_hyperbolic_law():

@@ -257,6 +257,9 @@ def _limit_amplitude(f: Flank, energy: np.ndarray, is_fed: np.ndarray) -> float:
     low, high = (RELATIVE_AMPLITUDES[around] * f.speed / f.angular_frequency).tolist()
     known = dict(zip((low, high), energy[around].tolist(), strict=True))
 
+    if known[high] >= 0.0:  # by less than rounding
+        return high
+
     def gained(amplitude: float) -> float:
         return known[amplitude] if amplitude in known else energy_per_cycle(f, np.array([amplitude]))[0]
 
