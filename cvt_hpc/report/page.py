@@ -41,6 +41,7 @@ from cvt_hpc.report.findings import quantities
 from cvt_hpc.report.interactive import KEPT, as_script, map_data
 from cvt_hpc.storage.files import written_aside
 from cvt_hpc.storage.netcdf import CONTENT, HISTORY
+from cvt_hpc.study.intervals import look
 from cvt_hpc.variables import Status
 from cvt_hpc.vibration.classes import OccurrenceClass, levels, onsets
 
@@ -351,8 +352,12 @@ def next_steps(dataset: xr.Dataset, job: Job | None, x: str | None) -> Iterator[
         if count := int(np.count_nonzero(status == kind)):
             runs = f"{count} runs" if count > 1 else "run"
             yield f"`cvt-hpc run JOB --retry {kind.name.lower()}` does the {runs} again, {how}."
-    chooses = "inferred_class" in dataset or (job is not None and job.in_rounds)
-    if not chooses and (left := int(np.sum(classes == OccurrenceClass.NOT_RUN))):
+    missing = (classes == OccurrenceClass.NOT_RUN).values
+    if "first_samples" in (design := job.design if job is not None else {}):  # those that its cells want
+        of_samples = classes.transpose(..., SAMPLE).values
+        wanted = look(of_samples, design).wanted[..., np.newaxis]
+        missing = (of_samples == OccurrenceClass.NOT_RUN) & (np.arange(dataset.sizes[SAMPLE]) < wanted)
+    if "inferred_class" not in dataset and (left := int(missing.sum())):
         yield f"`cvt-hpc run JOB` goes on: {left} {'runs are' if left > 1 else 'run is'} left."
     undecided = int(np.sum(occurrence_classes(dataset) == OccurrenceClass.UNDECIDED))
     has_transient = job is not None and load_model(job.model).default_stepper is not None

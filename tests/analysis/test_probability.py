@@ -22,6 +22,7 @@ from cvt_hpc.job import build_job
 from cvt_hpc.job.uncertain import Distribution, Uncertain
 from cvt_hpc.models.oscillator.motion import oscillator, steady_sliding
 from cvt_hpc.report import write_report
+from cvt_hpc.report.page import next_steps
 from cvt_hpc.study.intervals import interval, look, looks_of
 from cvt_hpc.variables import Status, Vibrates
 from support.studies import flags
@@ -297,6 +298,19 @@ def test_samples_that_are_not_run_make_no_band_surer():
     for name in ("onset", "band", "halved_band", "effective_samples"):
         assert found[name].values == pytest.approx(expected[name].values), name
     assert found["effective_samples"].max() < 32
+
+
+def test_of_an_adaptive_study_the_report_tells_the_runs_that_its_cells_want():
+    design = {"kind": "adaptive", "first_samples": 32, "widest_interval": 0.2}
+    uncertain = {"samples": 128, "damping": normal(5.0, 0.75)}
+    job = build_job({"name": "x", "model": "oscillator", "uncertain": uncertain, "design": design})
+    # the first has 30 of its 32, the second 48 of 64 since it is not known well enough, the third more than it wants
+    cells = [[Q] * 30 + [N] * 98, [Q, V] * 24 + [N] * 80, [Q] * 64 + [N] * 64]
+    found = study(cells, load=[1.0, 2.0, 3.0])
+    assert look(np.array(cells, np.int8), design).wanted.tolist() == [32, 64, 32]
+    steps = list(next_steps(found, job, None))
+    assert "`cvt-hpc run JOB` goes on: 18 runs are left." in steps
+    assert "goes on" not in " ".join(next_steps(found.isel(load=[2]), job, None))
 
 
 def test_a_band_that_ends_beyond_the_axis_has_no_width():
