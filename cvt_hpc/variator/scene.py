@@ -187,6 +187,12 @@ TILT: dict[str, Parameter] = {
     ),
 }
 
+TILT_LAG: dict[str, Parameter] = {
+    "tilt_lag": not_negative(
+        0.0, "s", "time constant T1 of the movable sheaves' tilt; 0: it follows at once", (1e-6, 1.0)
+    ),
+}
+
 HALF_WEDGE_ANGLE = Parameter(
     np.deg2rad(11.0),
     "rad",

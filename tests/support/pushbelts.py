@@ -42,6 +42,7 @@ ASSUMED = {
     "driving_rate": 0.0,  # [m/(s N)]: position prescribed
     "driven_rate": 5e-6,  # [m/(s N)]
     "modal_stiffness": ((), ()),  # [N/m]
+    "tilt_lag": 0.0,  # [s]
     "driving_speed": 100.0 * np.pi,  # [rad/s]
 }
 NODES = 104  # of 8 lanes; polygon effects in the power balance are below half a percent

@@ -70,6 +70,7 @@ def belt(**given):
         "driving_rate": 0.0,
         "driven_rate": 0.0,
         "modal_stiffness": np.zeros((2, 0)),
+        "modal_damping": np.zeros((2, 0)),
         "lean_lag": 1e-3,
     }
     return b.Belt(**constants | given)

@@ -34,6 +34,7 @@ _IDLE = (
     "bending_stiffness",
     "friction_speed",
     "gravity",
+    "tilt_lag",
     *pushbelt.MODES,
 )
 _WITHOUT |= {
@@ -49,6 +50,7 @@ _CHANGED: dict[str, Parameter] = {
 PARAMETERS: dict[str, dict[str, Parameter]] = {
     name: {key: _CHANGED.get(key, entry) for key, entry in table.items() if key not in _WITHOUT}
     for name, table in pushbelt.PARAMETERS.items()
+    if not table.keys() <= _WITHOUT.keys()
 }
 PARAMETERS["belt"] |= {
     "ring_beams": Parameter(40, "", "beams of the ring", minimum=4, maximum=512),

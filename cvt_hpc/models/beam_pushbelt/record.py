@@ -17,6 +17,7 @@ _OTHERWISE = {
     "iterations": "sweeps over all contacts in a step, mean",
     "element_loss": "0: contacts between elements have no dampers",
     "stretch_loss": "0: the ring has no damper",
+    "lag_loss": "0: the sheaves are rigid",
     "numerical_damping": "0: power that time steps damp is not separated, but left in power_residual",
 }
 VARIABLES = tuple(replace(v, comment=_OTHERWISE.get(v.name, v.comment)) for v in pushbelt.VARIABLES)

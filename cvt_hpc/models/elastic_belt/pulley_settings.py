@@ -10,6 +10,7 @@ import numpy as np
 
 from cvt_hpc.parameters import Parameter, Substitute, not_negative, positive
 from cvt_hpc.physics.shaft import Bearing, Seats, beam_flexibility, free_opening, shaft_compliance
+from cvt_hpc.variator.scene import TILT_LAG
 
 FORCES, LENGTHS = (1.0, 2e6), (1e-4, 2.0)
 
@@ -126,9 +127,7 @@ PULLEYS: dict[str, Parameter] = {
     "most_thrust": positive(100e3, "N", "largest thrust that a controller sets", sensible=FORCES),
     **_of_each(_axial),
     "oil_density": positive(850.0, "kg/m^3", "density of the oil behind the pistons", sensible=(100.0, 1e4)),
-    "tilt_lag": not_negative(
-        0.0, "s", "time constant T1 of the movable sheaves' tilt; 0: it follows at once", (1e-6, 1.0)
-    ),
+    **TILT_LAG,
     "collar_clearance": not_negative(
         0.0, "rad", "angle by which the collar of a movable sheave tilts before it bears", (1e-7, 0.1)
     ),

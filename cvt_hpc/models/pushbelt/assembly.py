@@ -143,7 +143,7 @@ def element_forces(belt, state, pulleys, increments, step, iterate, dt):
 
 
 @kernel
-def residuals(belt, state, increments, openings, shapes, load, step, iterate, scratch, border, dt):
+def residuals(belt, state, changes, openings, shapes, load, step, iterate, scratch, border, dt):
     """Residuals of all equations: of elements in `iterate`, of the border in the last column of `border`.
 
     Weight has no term of its own: masses resist the change of their speeds beyond that of free fall.
@@ -216,7 +216,7 @@ def residuals(belt, state, increments, openings, shapes, load, step, iterate, sc
             axial = belt.cosine * state[j, f.FLANK] * shapes[j, k]
             scratch[0, modes + k] += state[j, f.DRIVEN] * axial
             scratch[0, k] += (1.0 - state[j, f.DRIVEN]) * axial
-    return border_residuals(belt, increments, openings, load, torque, power, scratch, border, dt)
+    return border_residuals(belt, changes, openings, load, torque, power, scratch, border, dt)
 
 
 @register_jitable

@@ -74,6 +74,8 @@ class Belt(NamedTuple):
     modal_stiffness : (2, modes) array
         S_k of the opening of each pulley's sheaves as sum a_k psi_k(phi), psi 1, cos, sin, cos 2, ... [N/m];
         none: rigid sheaves.
+    modal_damping : (2, modes) array
+        Of the same openings, where their tilt lags (`border`) [N s/m].
     gravity : float
         Acceleration of gravity, against z [m/s^2].
     """
@@ -114,6 +116,7 @@ class Belt(NamedTuple):
     driving_rate: float
     driven_rate: float
     modal_stiffness: np.ndarray
+    modal_damping: np.ndarray
     gravity: float = 0.0
 
 
@@ -142,6 +145,7 @@ class Newton(NamedTuple):
     most_failures: int = 20
 
 
+TILT_MODES = slice(1, 3)  # cos and sin
 NEWTON = Newton(tolerance=1e-3, power_tolerance=1.0, weights=(1.0, 1.0, 2e-3, 1.0))
 
 
@@ -233,6 +237,9 @@ def path_of(given: Mapping[str, Any]) -> Variator:
 def shared_constants(given: Mapping[str, Any], chord: float, names: Sequence[str]) -> dict[str, Any]:
     """Constants that a belt has in its plane and out of it, and what is given of `names`; as `belt_of`."""
     g, angle = given, given["half_wedge_angle"]
+    modal_stiffness = np.array(g["modal_stiffness"], dtype=np.float64).reshape(2, -1)
+    modal_damping = np.zeros_like(modal_stiffness)
+    modal_damping[:, TILT_MODES] = g["tilt_lag"] * modal_stiffness[:, TILT_MODES]
     found = {
         "sine": float(np.sin(angle)),
         "cosine": float(np.cos(angle)),
@@ -246,7 +253,8 @@ def shared_constants(given: Mapping[str, Any], chord: float, names: Sequence[str
         "flank_kinetic": float(g["kinetic_friction"]),
         "flank_gradient": float(g["friction_gradient"]),
         "flank_speed": float(g["stribeck_velocity"]),
-        "modal_stiffness": np.array(g["modal_stiffness"], dtype=np.float64).reshape(2, -1),
+        "modal_stiffness": modal_stiffness,
+        "modal_damping": modal_damping,
     }
     return {name: float(g[name]) for name in names if name in g and name not in found} | found
 

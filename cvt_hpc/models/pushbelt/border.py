@@ -1,8 +1,10 @@
 """The border of a belt's equations: unknowns that all elements share, of driven pulley and sheaves.
 
 Sheaves of a pulley open by sum a_k psi_k(phi), psi 1, cos, sin, cos 2, sin 2, ..., each mode with a stiffness
-of its own. Unknowns are the changes of the driven pulley's speed, and of a_k of the driving and of the driven
-sheaves.
+of its own, and where their tilt lags (cos, sin) with a damper beside it: S_k (a_k + T_1 a_k') = s_k, the sum of
+psi_k times the axial force (Bullinger et al. 2005, eq. 9). Its rate is that of the parabola through the last three
+openings, of second order and stable for any lag. Unknowns are the changes of the driven pulley's speed, and of a_k
+of the driving and of the driven sheaves.
 
 Power that the laws of a step take from the motion, in lanes: losses, and numerical damping.
 
@@ -61,12 +63,20 @@ def book_contacts(belt, state, scratch, between, dt):
     add_to_totals(state, scratch, f.ELEMENT_DAMPED, (1.0 - own) * between)
 
 
+@register_jitable
+def lag_rate(increments, earlier, unknown, dt):
+    """Rate of an opening at the end of a step [m/s], by its changes in this step and in the one before."""
+    return (1.5 * increments[unknown] - 0.5 * earlier[unknown]) / dt
+
+
 @kernel
-def border_residuals(belt, increments, openings, load, torque, power, scratch, border, dt):
+def border_residuals(belt, changes, openings, load, torque, power, scratch, border, dt):
     """Set the last column of `border`; return the power residual of the belt [W].
 
     Parameters
     ----------
+    changes : pair of (1 + 2 modes,) arrays
+        Of the unknowns in this step, and in the one before.
     torque, power : lanes
         Of the elements on the driven pulley [N m], and the power that the residuals of the elements leave
         open [W].
@@ -74,11 +84,14 @@ def border_residuals(belt, increments, openings, load, torque, power, scratch, b
         Its row holds the axial forces of the elements by the modes of both pulleys [N].
     """
     modes, last = belt.modal_stiffness.shape[1], border.shape[0]
+    increments, earlier = changes
     for k in range(2 * modes):
         scratch[0, k] = around(scratch[0, k])
         pulley, mode = k // modes, k % modes
         opening = openings[pulley, mode] + increments[1 + k]
-        border[1 + k, last] = scratch.data[0, k, 0] - belt.modal_stiffness[pulley, mode] * opening
+        held = belt.modal_stiffness[pulley, mode] * opening
+        held += belt.modal_damping[pulley, mode] * lag_rate(increments, earlier, 1 + k, dt)
+        border[1 + k, last] = scratch.data[0, k, 0] - held
     scratch[0, 0], scratch[0, 1] = around(torque), around(power)
     border[0, last] = scratch.data[0, 0, 0] - load - belt.driven_inertia * increments[0] / dt
     return scratch.data[0, 1, 0]
@@ -104,7 +117,8 @@ def close_border(belt, sums, border, dt):
         if row == 0:
             border[row, row] += belt.driven_inertia / dt
         else:
-            border[row, row] += belt.modal_stiffness[(row - 1) // modes, (row - 1) % modes]
+            pulley, mode = (row - 1) // modes, (row - 1) % modes
+            border[row, row] += belt.modal_stiffness[pulley, mode] + 1.5 * belt.modal_damping[pulley, mode] / dt
 
 
 @register_jitable
@@ -120,10 +134,12 @@ def opening_of(belt, state, work, j, driven):
 
 
 @kernel
-def accept_border(belt, state, inputs, dt):
+def accept_border(belt, state, work, inputs, dt):
     """Take driven pulley, sheaves and time to the end of the step."""
     modes = belt.modal_stiffness.shape[1]
     for k in range(2 * modes):
+        rate = lag_rate(state.increments, work.increments, 1 + k, dt)
+        state.totals[f.LAG_LOSS] += dt * belt.modal_damping[k // modes, k % modes] * rate * rate
         state.openings[k // modes, k % modes] += state.increments[1 + k]
     state.pulleys[f.DRIVEN_SPEED] += state.increments[0]
     state.totals[f.TIME] += dt

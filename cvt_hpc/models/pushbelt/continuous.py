@@ -13,6 +13,7 @@ friction of the belt, the transverse damping, wedge angle and inertia, the law o
 - rings bend, are as long and are damped by the same keys;
 - local bending has the same keys. `sheave_stiffness` scales the pushbelt's modes of opening as well, so a
   value other than 1 requires `stiffness_of` "sheave";
+- the sheaves' tilt lags by the same key, and by it alone;
 - tilt opens a pulley by r^2 / c_tilt cos(phi) times the sum of F cos(phi), and likewise with sin, while modes
   open each flank by 1 / S: S = 2 c_tilt / r^2 of cos and sin. Nothing opens all around alike;
 - the thrust moves the driven sheave by 1 / (T_1 k) in opening, which is 2 tan d0 of radius: `sheave_rate`;
@@ -47,7 +48,7 @@ ONLY = {
     "ring_layers": 1,
     "curvature_terms": "none",
     "column_bending": "off",
-    **PULLEY_DEFAULTS,
+    **{key: value for key, value in PULLEY_DEFAULTS.items() if key != "tilt_lag"},
 }
 
 

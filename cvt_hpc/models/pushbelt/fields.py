@@ -59,12 +59,13 @@ INPUTS = IN_DRIVING_SHIFT + 1
     BELT_LOSS,  # of the transverse damping [J]
     ELEMENT_LOSS,  # of the dampers of contacts and noses between elements [J]
     STRETCH_LOSS,  # of the rings' damper along the belt [J]
+    LAG_LOSS,  # of the lag of the sheaves' tilt [J]
     ELEMENT_DAMPED,  # by the step itself, at contacts and noses between elements (`border`) [J]
     FLANK_DAMPED,  # at flanks [J]
     POWER_RESIDUAL,  # of the equations of motion as they were solved [J]
     GRAVITY_WORK,  # of the weight of elements and rings [J]
-) = range(14)
-TOTALS = 14
+) = range(15)
+TOTALS = 15
 # Mean rates of totals from WORK_IN on, by their names in the record
 POWERS = (
     "driving_power",
@@ -76,6 +77,7 @@ POWERS = (
     "belt_loss",
     "element_loss",
     "stretch_loss",
+    "lag_loss",
 )
 DAMPED = {  # numerical damping of the step, by the springs and contacts where it occurs
     "elements": ELEMENT_DAMPED,

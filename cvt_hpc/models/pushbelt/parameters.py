@@ -209,6 +209,7 @@ PARAMETERS: dict[str, dict[str, Parameter]] = {
             0.02, "kg m^2", "moment of inertia of the driven pulley", sensible=(1e-05, 100.0)
         ),
     },
+    "pulleys": scene.TILT_LAG,
     "friction": {
         **{key: entry for key, entry in scene.FRICTION.items() if key not in NO_TABLE},
         "friction_law": replace(
@@ -389,7 +390,8 @@ def inert(parameters: Parameters) -> dict[str, str]:
         (p["ring_friction"] == 0.0, "ring_friction_speed", "ring_friction 0"),
         (p["friction_gradient"] == 0.0, "friction_memory", "friction_gradient 0"),
         (np.isinf(p["local_stiffness"]), "local_length", "local_stiffness inf"),
-        *((np.isinf(p["sheave_stiffness"]), key, "sheave_stiffness inf") for key in SCALED),
+        *((np.isinf(p["sheave_stiffness"]), key, "sheave_stiffness inf") for key in (*SCALED, "tilt_lag")),
+        (len(p[MODES[0]]) == 1, "tilt_lag", "one mode of opening"),
         *(
             (np.isinf(p["nose_clearance"]), f"nose_{key}", "nose_clearance inf")
             for key in ("height", "stiffness")

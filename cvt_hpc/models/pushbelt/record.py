@@ -77,6 +77,7 @@ VARIABLES = (
     *shared("storing_power", "ring_loss", "belt_loss", "tilt_loss"),
     power("element_loss", "mean power of the dampers of contacts between elements, most of it of impacts"),
     power("stretch_loss", "mean power of the rings' damping along the belt"),
+    power("lag_loss", "mean power of the lag of the sheaves' tilt"),
     *shared("loss"),
     power(
         "numerical_damping",

@@ -339,7 +339,7 @@ class ElementRun(SampledRun):
         """Mean powers over the judged part, named as in the record [W]."""
         found = {name: self.mean_rate(f.WORK_IN + k) for k, name in enumerate(f.POWERS)}
         loss = found["flank_loss"] + found["ring_loss"] + found["belt_loss"]
-        loss += found["tilt_loss"] + found["element_loss"] + found["stretch_loss"]
+        loss += found["tilt_loss"] + found["element_loss"] + found["stretch_loss"] + found["lag_loss"]
         damped = np.array([self.mean_rate(total) for total in f.DAMPED.values()])
         storing = self.mean_rate(f.TOTALS) - self.mean_rate(f.GRAVITY_WORK)
         return found | {"loss": loss, "storing_power": storing, "numerical_damping": damped}

@@ -101,8 +101,9 @@ def _evaluate(belt, state, work, load, dt):
         nose_forces(belt, elements, step, iterate, dt)
     assembly.flank_depths(belt, elements, increments, openings, shapes, step, iterate, work.bent, dt)
     assembly.element_forces(belt, elements, pulleys, increments, step, iterate, dt)
+    changes = increments, work.increments
     return assembly.residuals(
-        belt, elements, increments, openings, shapes, load, step, iterate, scratch, work.border, dt
+        belt, elements, changes, openings, shapes, load, step, iterate, scratch, work.border, dt
     )
 
 
@@ -180,7 +181,7 @@ def _accept(belt, state, work, inputs, dt):
     driving_thrust, driven_thrust = scratch.data[0, 0, 0], scratch.data[0, 1, 0]
     move_sheaves(belt, state, inputs, driving_thrust, driven_thrust, dt)
     totals[f.WORK_IN] += dt * scratch.data[0, 2, 0] * pulleys[f.DRIVING_SPEED]
-    accept_border(belt, state, inputs, dt)
+    accept_border(belt, state, work, inputs, dt)
 
 
 EQUATIONS = Equations(_prepare, _evaluate, _assemble, _close, _accept, _changes, f.CHANGE)

@@ -139,7 +139,7 @@ def side_torque(state, step, j, p):
 
 
 @kernel
-def residuals(belt, state, increments, openings, shapes, load, step, iterate, scratch, border, dt):
+def residuals(belt, state, changes, openings, shapes, load, step, iterate, scratch, border, dt):
     """Residuals of all equations: of elements in `iterate`, of the border in the last column of `border`.
 
     Forces of flanks and saddles stand in the residuals already. Weight acts as in the plane.
@@ -194,7 +194,7 @@ def residuals(belt, state, increments, openings, shapes, load, step, iterate, sc
             for k in range(modes):
                 scratch[0, modes + k] += driven * axial * shapes[j, k]
                 scratch[0, k] += (1.0 - driven) * axial * shapes[j, k]
-    return border_residuals(belt, increments, openings, load, torque, power, scratch, border, dt)
+    return border_residuals(belt, changes, openings, load, torque, power, scratch, border, dt)
 
 
 @kernel

@@ -103,6 +103,8 @@ class Belt(NamedTuple):
     modal_stiffness : (2, modes) array
         S_k of the opening of each sheave of a pulley as sum a_k psi_k(phi), psi 1, cos, sin, cos 2, ...
         [N/m]; none: rigid sheaves.
+    modal_damping : (2, modes) array
+        Of the same openings, where their tilt lags [N s/m].
     lean_lag : float
         Time constant with which the difference of a pulley's two sheaves follows their load [s].
     gravity : float
@@ -160,6 +162,7 @@ class Belt(NamedTuple):
     driving_rate: float
     driven_rate: float
     modal_stiffness: np.ndarray
+    modal_damping: np.ndarray
     lean_lag: float
     gravity: float = 0.0
 

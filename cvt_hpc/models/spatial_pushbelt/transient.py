@@ -186,10 +186,10 @@ def _press(belt, state, work, dt):
 @kernel
 def _sum_up(belt, state, work, load, dt):
     """The residuals that forces leave, but for those of a second flow; return the power residual [W]."""
-    elements, increments, openings = state.elements, state.increments, state.openings
+    elements, changes, openings = state.elements, (state.increments, work.increments), state.openings
     step, iterate, scratch, border = work.step, work.iterate, work.scratch, work.border
     return assembly.residuals(
-        belt, elements, increments, openings, work.shapes, load, step, iterate, scratch, border, dt
+        belt, elements, changes, openings, work.shapes, load, step, iterate, scratch, border, dt
     )
 
 
@@ -349,7 +349,7 @@ def _accept(belt, state, work, inputs, dt):
         state.leans[pulley, mode] += follow * (target - state.leans[pulley, mode])
 
     totals[planar.WORK_IN] -= dt * loads[f.DRIVING_TORQUE] * pulleys[planar.DRIVING_SPEED]
-    accept_border(belt, state, inputs, dt)
+    accept_border(belt, state, work, inputs, dt)
     tangent = belt.sine / belt.cosine
     for pulley in range(2):
         left, right = loads[2 * pulley], loads[2 * pulley + 1]
