@@ -112,10 +112,11 @@ def assert_the_same_belt(pushbelt, continuous, but=()):
             assert pushbelt[key] == wanted, key
 
 
-def test_the_job_of_vibration_has_the_belt_of_lebrecht_2004():
+def test_the_job_of_vibration_has_the_belt_of_the_fitted_map():
     pushbelt = load_job(JOBS / "pushbelt_vibration.toml")
     axes = {axis.name: list(axis.values) for axis in pushbelt.axes}
-    continuous = load_job(JOBS / "lebrecht_2004.toml", axes | {"sheave_stiffness": 1.0})
+    axes |= {"sheave_stiffness": [1.0], "tilt_factor": [1.0]}
+    continuous = load_job(JOBS / "lebrecht_fitted.toml", axes)
     for index in (0, pushbelt.size - 1):
         assert_the_same_belt(pushbelt.point(index), continuous.point(index))
 

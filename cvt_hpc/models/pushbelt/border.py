@@ -1,10 +1,10 @@
 """The border of a belt's equations: unknowns that all elements share, of driven pulley and sheaves.
 
 Sheaves of a pulley open by sum a_k psi_k(phi), psi 1, cos, sin, cos 2, sin 2, ..., each mode with a stiffness
-of its own, and where their tilt lags (cos, sin) with a damper beside it: S_k (a_k + T_1 a_k') = s_k, the sum of
-psi_k times the axial force (Bullinger et al. 2005, eq. 9). Its rate is that of the parabola through the last three
-openings, of second order and stable for any lag. Unknowns are the changes of the driven pulley's speed, and of a_k
-of the driving and of the driven sheaves.
+of its own. Tilts (cos, sin) may lag, S_k (a_k + T_1 a_k') = s_k, the sum of psi_k times axial forces (Bullinger
+et al. 2005, eq. 9), with the rate of the parabola through the last three openings: of second order, and stable
+for any lag. Unknowns are the changes of the driven pulley's speed, and of a_k of the driving and of the driven
+sheaves.
 
 Power that the laws of a step take from the motion, in lanes: losses, and numerical damping.
 
@@ -118,7 +118,9 @@ def close_border(belt, sums, border, dt):
             border[row, row] += belt.driven_inertia / dt
         else:
             pulley, mode = (row - 1) // modes, (row - 1) % modes
-            border[row, row] += belt.modal_stiffness[pulley, mode] + 1.5 * belt.modal_damping[pulley, mode] / dt
+            border[row, row] += (
+                belt.modal_stiffness[pulley, mode] + 1.5 * belt.modal_damping[pulley, mode] / dt
+            )
 
 
 @register_jitable
