@@ -32,6 +32,7 @@ _SUBJECTS = {
     "JOB": "job file (TOML)",
     "DIR": "output folder of a run",
     "RESULTS": "output folder of a run, or a dataset (.nc)",
+    "CSV": "measured points: columns speed and mu, and, if there are any, force and specimen",
     "HISTORIES": "dataset of one run (.nc), or the folder of a study: all runs whose histories it keeps",
 }
 

@@ -1,4 +1,4 @@
-"""`init`, `models`, `variables`, `examples`, `doctor`, `completion`: what somebody needs who begins."""
+"""`init`, `models`, `variables`, `examples`, `friction`, `doctor`, `completion`: for somebody who begins."""
 
 import argparse
 from pathlib import Path
@@ -28,6 +28,12 @@ def add(commands: Any) -> None:
     examples.add_argument("names", nargs="*", metavar="NAME", help=text)
     text = "folder below which the copies go (default: this one)"
     examples.add_argument("--out", type=Path, default=Path(), metavar="DIR", help=text)
+    text = (
+        "fit the laws of friction to measured coefficients; write the best as a part of a job, and a picture"
+    )
+    friction = parts.add_command(commands, "friction", _friction, text, "CSV")
+    text = "the part of a job (default: friction.toml in this folder; the picture beside it)"
+    friction.add_argument("--out", type=Path, default=Path("friction.toml"), metavar="TOML", help=text)
     text = "look at MPI, cores, cache, disk and Slurm of this machine, and say what to do"
     parts.add_command(commands, "doctor", _doctor, text)
     text = "print what completes commands and options in a shell"
@@ -75,6 +81,15 @@ def _examples(arguments: argparse.Namespace) -> int:
         parts.say(*(f"example: {path}" for path in copy_examples(arguments.names, arguments.out)))
     else:
         parts.say(*example_lines(), "", "copies: cvt-hpc examples NAME")
+    return parts.DONE
+
+
+def _friction(arguments: argparse.Namespace) -> int:
+    from cvt_hpc.experiments.measured_friction import write_fit
+
+    parts.check_output(arguments.out, (".toml",))
+    lines, files = write_fit(arguments.path, arguments.out)
+    parts.say(*lines, *(f"{what}: {path}" for what, path in files))
     return parts.DONE
 
 

@@ -16,7 +16,7 @@ import numpy as np
 from cvt_hpc.parameters import Column, FromFile, Parameter, Parameters, RowError
 
 KEYS = ("table_force", "table_speed", "table_mu")
-_OTHER_NAMES = {
+OTHER_NAMES = {
     "cof": "mu",
     "coefficient_of_friction": "mu",
     "friction_coefficient": "mu",
@@ -169,7 +169,7 @@ def friction_file(force_unit: str) -> Parameter:
         columns["element_pitch"] = ("m",)
     told = f"{', '.join(KEYS)}; columns {', '.join(columns)}"
     text = f"CSV or netCDF file of a friction table, in the place of {told}"
-    file = FromFile(columns, ("speed", "mu"), KEYS, partial(_arranged, force_unit), _OTHER_NAMES)
+    file = FromFile(columns, ("speed", "mu"), KEYS, partial(_arranged, force_unit), OTHER_NAMES)
     return Parameter("", "", text, file=file)
 
 

@@ -3,7 +3,7 @@
 Sheaves of a pulley open by sum a_k psi_k(phi), psi 1, cos, sin, cos 2, sin 2, ..., each mode with its own
 stiffness. Tilts (cos, sin) may lag: S_k (a_k + T_1 a_k') = s_k, the sum of psi_k times the axial forces
 (Bullinger et al. 2005, eq. 9), with the rate of the parabola through the last three openings, of second order
-and stable for any lag. Unknowns are the changes of the driven pulley's speed, and of a_k of the driving and of
+and stable for any lag. Unknowns are the changes of the driven pulley's speed, and of a_k of the driving and
 the driven sheaves.
 
 Power that the laws of a step take from the motion, in lanes: losses, and numerical damping.
