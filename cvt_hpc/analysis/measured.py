@@ -26,17 +26,14 @@ import xarray as xr
 from numpy.typing import NDArray
 
 from cvt_hpc.analysis import arrangement as layout
-from cvt_hpc.analysis.alignment import job_of
+from cvt_hpc.analysis.alignment import job_held
 from cvt_hpc.analysis.classes import ALONG
 from cvt_hpc.analysis.figures import coordinate_unit
 from cvt_hpc.analysis.scatter import is_sampled
 from cvt_hpc.errors import JobWarning, did_you_mean, few_of, mismatch, nearest, show
 from cvt_hpc.job.csv_files import MOST_BYTES, content_of, read_csv
 from cvt_hpc.job.values import si_unit
-from cvt_hpc.models import MODELS
-from cvt_hpc.models.contract import load_model
 from cvt_hpc.parameters import Column, FromFile, RowError
-from cvt_hpc.study.job_difference import flatten
 
 WINDOW, ONSET, PEAK = "window", "onset", "peak"
 FREQUENCY = "frequency"
@@ -169,7 +166,9 @@ def read_measured(path: str | Path, dataset: xr.Dataset, source: str = "results"
     if is_sampled(dataset):
         raise mismatch(source, "results over a grid, beside which measurements are drawn", "samples")
     dims = map(str, dataset["status"].dims if "status" in dataset else ())
-    axes = {name: dataset[name] for name in dims if dataset[name].dtype.kind in "iuf"}
+    axes = {
+        name: dataset[name] for name in dims if name in dataset.coords and dataset[name].dtype.kind in "iuf"
+    }
     constants = {key: value for key, value in _constants(dataset).items() if key not in axes}
     units = {name: si_unit(axis.attrs) for name, axis in axes.items()}
     kind, along, file = _declaration(Path(path), units, {key: unit for key, (_, unit) in constants.items()})
@@ -192,11 +191,11 @@ def read_measured(path: str | Path, dataset: xr.Dataset, source: str = "results"
 
 def _constants(dataset: xr.Dataset) -> dict[str, Quantity]:
     """Return by name what a study, or a run, holds at one value."""
-    job = job_of(dataset)
-    told = {key.rpartition(".")[2]: value for key, value in flatten(job).items()}
-    told |= json.loads(dataset.attrs.get("point", "{}"))
-    tables = load_model(job["model"]).parameters.values() if job.get("model") in MODELS else ()
-    units = {key: parameter.unit for table in tables for key, parameter in table.items()}
+    told: dict[str, Any] = {}
+    units: dict[str, str] = {}
+    if job := job_held(dataset):
+        told |= {**job.parameters, **json.loads(dataset.attrs.get("point", "{}"))}
+        units |= {key: parameter.unit for key, parameter in job.schema.parameters.items()}
     for name in ALONG:  # courses of a run
         if name in dataset and dataset[name].dims == ("time",):
             units[name] = si_unit(dataset[name].attrs)

@@ -4,7 +4,6 @@
 """
 
 import base64
-import json
 from collections.abc import Callable, Iterator, Mapping
 from functools import partial
 from importlib import resources
@@ -20,6 +19,7 @@ import xarray as xr
 from markupsafe import Markup
 from matplotlib.figure import Figure
 
+from cvt_hpc.analysis.alignment import job_held
 from cvt_hpc.analysis.arrangement import Arrangement, Sides, arrange, known_values, value_text
 from cvt_hpc.analysis.classes import at_strongest_strand, check_results, map_classes, occurrence_classes
 from cvt_hpc.analysis.comparison import sample_sentences
@@ -32,7 +32,7 @@ from cvt_hpc.analysis.probability_drawing import onset_bands_figure, sensitivity
 from cvt_hpc.analysis.scatter import is_sampled
 from cvt_hpc.analysis.value_maps import value_map_figure
 from cvt_hpc.errors import InputError, escaped, mismatch, one_line
-from cvt_hpc.job import Job, stored_job
+from cvt_hpc.job import Job
 from cvt_hpc.job.axes import SAMPLE
 from cvt_hpc.job.summary import core_time_in_words, rules_in_words, value_in_words
 from cvt_hpc.job.values import shown
@@ -130,7 +130,7 @@ def _content(
     dataset: xr.Dataset, source: str, folder: Path | None, measured: str | Path | None
 ) -> dict[str, Any]:
     attributes = {str(key): str(value) for key, value in dataset.attrs.items()}
-    job = _job(attributes, source)
+    job = job_held(dataset, source)
     own = ["run", *(axis.name for axis in job.axes)] if job else dataset["status"].dims
     joined = [str(name) for name in dataset["status"].dims if name not in own]
     if joined:  # the attributes are those of one of several studies
@@ -190,14 +190,6 @@ def _content(
         "derived": rules_in_words(job, job.schema) if job else [],
         "provenance": _provenance(attributes),
     }
-
-
-def _job(attributes: Mapping[str, str], source: str) -> Job | None:
-    """The job of a dataset; None where this version of the program cannot read it any more."""
-    try:
-        return stored_job(json.loads(attributes["job"]), source)
-    except (InputError, KeyError, ValueError, RecursionError):
-        return None
 
 
 def _arrangement(dataset: xr.Dataset, source: str) -> Arrangement | None:
