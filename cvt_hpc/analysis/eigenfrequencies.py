@@ -2,6 +2,7 @@
 
 import json
 from collections.abc import Mapping
+from pathlib import Path
 from typing import Any
 
 import numpy as np
@@ -9,7 +10,7 @@ import xarray as xr
 from matplotlib.axes import Axes
 from matplotlib.figure import Figure
 
-from cvt_hpc.analysis.arrangement import Sides, along_x, arrange, ruler
+from cvt_hpc.analysis.arrangement import CHOSEN, Sides, along_x, arrange, ruler
 from cvt_hpc.analysis.figures import WIDTH, axis_label, entitle, headline
 from cvt_hpc.analysis.measured import FREQUENCY, Side, side_of
 from cvt_hpc.analysis.measured_drawing import Overlay, put_legend
@@ -61,7 +62,11 @@ def along_axis(shown: xr.Dataset, x: str) -> xr.DataArray | None:
 
 
 def eigenfrequency_figure(
-    dataset: xr.Dataset, at: Mapping[str, Any], source: str, sides: Sides, over: Overlay
+    dataset: xr.Dataset,
+    at: Mapping[str, Any],
+    source: str,
+    sides: Sides = CHOSEN,
+    measured: str | Path | None = None,
 ) -> Figure:
     """Compose the picture: a panel for each strand, a line for each number of half waves.
 
@@ -75,14 +80,15 @@ def eigenfrequency_figure(
         Where the results are from, for the errors.
     sides : Sides
         Which axis runs along x.
-    over : Overlay
-        What was measured.
+    measured : str or Path
+        Measured file that is drawn over it (`measured.py`).
 
     Returns
     -------
     Figure
         Where a strand holds no shape its lines have gaps.
     """
+    over = Overlay(measured, dataset, source)
     arrangement = arrange(dataset, at, source, sides)
     shown, notes = along_x(arrangement)
     along = ruler(shown[arrangement.x])

@@ -98,7 +98,7 @@ def map_figure(
     if has_samples(dataset, at or {}) or PROBABILITY in dataset:
         return probability_figure(dataset, at, source, sides, measured)
     if "eigenfrequency" in dataset and "amplitude" not in dataset:
-        return eigenfrequency_figure(dataset, at or {}, source, sides, over)
+        return eigenfrequency_figure(dataset, at or {}, source, sides, measured)
     if has_starts(dataset, at or {}):
         dataset = join_starts(dataset)
     return _grid_figure(layout.arrange(dataset, at or {}, source, sides), vmax, source, over)
