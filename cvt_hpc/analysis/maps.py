@@ -213,7 +213,7 @@ def _grid_figure(arrangement: layout.Arrangement, vmax: float | None, source: st
         further.append(Line2D([], [], **cells.LEADING.marks(4.0), label="harmonics lead"))
     figures.entitle(figure, [*_title(sheet), over.note])
     figure.supylabel(sheet.y.label, fontsize=10)
-    styles, columns = cells.STYLES, cells.LEGEND_COLUMNS
+    styles, columns = cells.STYLES, cells.LEGEND_COLUMNS - bool(over.handles)  # whose names are longer
     if "starts" in arrangement.dataset.attrs:
         styles, columns = cells.STYLES | cells.OF_STARTS, 3  # as wide as the page with the longest label
     shown = {kind: style for kind, style in styles.items() if np.any(sheet.classes == kind)}

@@ -278,7 +278,9 @@ def _row(
     """Return a row at its place in a study; None where it has none."""
     first = {WINDOW: f"{along}_from", ONSET: f"onset_{along}", PEAK: along}[kind]
     span = told[first], told.get(f"{along}_to", told[first])
-    if along in sides and sides[along].span(*span) is None:
+    swept = told.get(f"measured_{along}_from", -math.inf), told.get(f"measured_{along}_to", math.inf)
+    reach = (span, swept) if math.isfinite(swept[0]) else (span,)
+    if along in sides and all(sides[along].span(*one) is None for one in reach):
         return None
     points = {name: told[name] for name in sides if name in told and name != along}
     if kind != WINDOW and along in sides:
@@ -298,6 +300,6 @@ def _row(
         at.pop(along, math.nan),
         (frequencies[0], frequencies[-1]) if frequencies else None,
         told.get("amplitude", math.nan),
-        (told.get(f"measured_{along}_from", -math.inf), told.get(f"measured_{along}_to", math.inf)),
+        swept,
         told.get("direction", 1.0) > 0.0,
     )
