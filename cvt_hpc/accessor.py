@@ -116,8 +116,7 @@ class Results:
 
         quantities = [show] if isinstance(show, str) else list(show)
         datasets = [self._given, *_several(beside)]
-        sides = Sides(x, y, panel)
-        return maps_figure(datasets, quantities, at, sides=sides, vmax=vmax, measured=measured)
+        return maps_figure(datasets, quantities, at, (), Sides(x, y, panel), vmax, measured)
 
     def animation(self) -> Animation:
         """Draw the belt in the last periods of a run, magnified, as a moving picture; of a history.
@@ -129,19 +128,13 @@ class Results:
         return animation(self._history("animation"))
 
     def report(self, out: str | Path = "report.html", measured: str | Path | None = None) -> Path:
-        """Write a page about the study: what was found, a map with values, failed runs, cost, assumptions.
-
-        With a `measured` file the map has it, and a sentence says how far they agree.
-        """
+        """Write a page: findings, a map with values, failed runs, cost; with a measured file the score."""
         from cvt_hpc.report import write_report
 
         return write_report(self._dataset, Path(out), measured=measured)
 
     def score(self, measured: str | Path) -> Score:
-        """Return how far the study agrees with the CSV file of a test rig; of a grid.
-
-        See `cvt_hpc.analysis.measured_score.score`.
-        """
+        """Return how far the study agrees with a measured file; see `cvt_hpc.analysis.measured_score`."""
         from cvt_hpc.analysis.measured_score import score
 
         return score(self._dataset, measured)

@@ -253,22 +253,22 @@ def _declaration(path: Path, axes: dict[str, str], constants: dict[str, str]) ->
 
 def _checked(along: str, columns: Mapping[str, Column]) -> dict[str, Any]:
     """Return the columns of a measured file; RowError or ValueError for what has no meaning."""
+    values = {name: np.array(column.values) for name, column in columns.items()}
+    faults: list[tuple[tuple[str, ...], str, NDArray[np.bool_]]]
+    faults = [((name,), f"{name} > 0", values[name] <= 0.0) for name in _POSITIVE if name in values]
+    if "direction" in values:
+        is_none = np.abs(values["direction"]) != 1.0
+        faults.append((("direction",), "direction 1 (rising) or -1 (falling)", is_none))
     for name in (along, f"measured_{along}", FREQUENCY):
-        pair = [f"{name}_{end}" for end in ("from", "to")]
-        there = [one for one in pair if one in columns]
-        if len(there) == 1:
+        pair = f"{name}_from", f"{name}_to"
+        if len(there := [one for one in pair if one in values]) == 1:
             raise ValueError(f"expected columns {' and '.join(pair)}, found {there[0]} alone")
         if there:
-            for k, (low, high) in enumerate(zip(*(columns[one].values for one in pair), strict=True)):
-                if low > high:
-                    raise RowError(k, f"{pair[0]} of at most {pair[1]}", f"{low:g} and {high:g}")
-    for name in (one for one in _POSITIVE if one in columns):
-        for k, value in enumerate(columns[name].values):
-            if value <= 0.0:
-                raise RowError(k, f"{name} > 0", f"{value:g}")
-    for k, value in enumerate(columns["direction"].values if "direction" in columns else ()):
-        if abs(value) != 1.0:
-            raise RowError(k, "direction 1 (rising) or -1 (falling)", f"{value:g}")
+            faults.append((pair, f"{pair[0]} of at most {pair[1]}", values[pair[0]] > values[pair[1]]))
+    for names, expected, wrong in faults:
+        if wrong.any():
+            k = int(np.argmax(wrong))
+            raise RowError(k, expected, " and ".join(f"{values[name][k]:g}" for name in names))
     return dict(columns)
 
 
