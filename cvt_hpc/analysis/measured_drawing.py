@@ -84,22 +84,18 @@ class Overlay:
         shown : Dataset
             What it shows: coordinates without a dimension say at which values.
         """
-        if self._measured.rows:
-            fixed = fixed_values(shown)
-            for row in self._measured.rows:
-                if all(self._holds(row, name, value) for name, value in fixed.items()):
-                    self._draw_row(axes, row, (x, y))
+        fixed = fixed_values(shown) if self._measured.rows else {}
+        for row in self._measured.rows:
+            if all(self._holds(row, name, value) for name, value in fixed.items()):
+                self._draw_row(axes, row, (x, y))
 
     def _holds(self, row: Row, name: str, value: float) -> bool:
         """Whether a row tells of this value of an axis."""
         if name != self._measured.along:
             return row.at.get(name, value) == value
-        if np.isfinite(row.cell):
-            return row.cell == value
-        is_point = self._measured.kind != WINDOW
-        return row.span[0] <= value <= row.span[1] or (
-            is_point and math.isclose(value, row.span[0], rel_tol=ALIKE)
-        )
+        if self._measured.kind == WINDOW:
+            return row.span[0] <= value <= row.span[1]
+        return math.isclose(value, row.span[0], rel_tol=ALIKE) if math.isnan(row.cell) else row.cell == value
 
     def _extent(self, row: Row, side: Side) -> Extent | None:
         """Where a row lies on a side; None beyond its ends."""

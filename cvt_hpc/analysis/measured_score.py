@@ -27,7 +27,6 @@ from cvt_hpc.vibration.classes import Onset, levels, onsets, paired_errors
 
 MOST_LINES = 10  # that are printed
 _READ = ("status", "vibrates", "occurrence_class", "inferred_class", "amplitude", "frequency")
-_UNITS = {"frequency": "Hz", "amplitude": "1"}
 
 Array = NDArray[np.float64]
 
@@ -198,13 +197,13 @@ def score_sentences(found: Score) -> Iterator[str]:
         yield "Peaks tell of no silence: there are no false alarms nor correct silences."
     if kind == WINDOW and not np.isfinite([row.swept for row in rows]).any():
         yield f"The file states no measured range: all values of {along.replace('_', ' ')} count as measured."
-    for what, unit in (_UNITS | {"onset": found.unit}).items():
-        if values := getattr(total, what):
+    for what, values, unit in (("frequency", total.frequency, "Hz"), ("onset", total.onset, found.unit)):
+        if values:
             middle, most = number(float(np.median(values)), 3), number(max(values), 3)
-            if what == "amplitude":
-                yield f"Computed amplitude of hits: {middle} times the measured one (median)."
-            else:
-                yield f"Error of the {what}: {middle} {unit} (median), {most} {unit} (largest)."
+            yield f"Error of the {what}: {middle} {unit} (median), {most} {unit} (largest)."
+    if total.amplitude:
+        ratio = number(float(np.median(total.amplitude)), 3)
+        yield f"Amplitude of hits: computed {ratio} times the measured one (median)."
 
 
 def _disagreement(one: tuple[list[str], Line]) -> int:

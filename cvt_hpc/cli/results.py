@@ -9,6 +9,7 @@ from pathlib import Path
 from typing import TYPE_CHECKING, Any
 
 from cvt_hpc.cli import parts
+from cvt_hpc.errors import InputError
 from cvt_hpc.picture_kinds import MEASURED
 
 if TYPE_CHECKING:
@@ -173,9 +174,14 @@ def _compare_measured(arguments: argparse.Namespace, source: str, path: str) -> 
     folder = arguments.out or parts.folder_of(arguments.path)
     with parts.opened_results(arguments.path) as dataset:
         found = score(dataset, path, source)
-        picture = draw(lambda: map_figure(dataset, source=source, measured=path), folder / "compare.png")
-    table = write_score(found, folder / "compare.csv")
-    parts.say(*score_lines(found, source, path), f"picture: {picture}", f"table: {table}")
+        written = f"table: {write_score(found, folder / 'compare.csv')}"
+        parts.say(*score_lines(found, source, path), written)
+        try:
+            figure = map_figure(dataset, source=source, measured=path)
+        except InputError as error:  # more panels than a page holds
+            parts.complain(f"no picture: {error}")
+        else:
+            parts.say(f"picture: {draw(lambda: figure, folder / 'compare.png')}")
     return CONTRADICTING if found.contradicts else parts.DONE
 
 

@@ -4,6 +4,7 @@ import csv
 import json
 import re
 import warnings
+from pathlib import Path
 
 import dask
 import numpy as np
@@ -250,7 +251,7 @@ def test_compare_leaves_a_table_and_a_picture(write, tmp_path, capsys):
     assert main(call) == 1
     out = capsys.readouterr().out.splitlines()
     assert out[0] == f"computed: {tmp_path}; measured: {tmp_path / 'rig.csv'}"
-    assert out[-2:] == [f"picture: {tmp_path}/found/compare.png", f"table: {tmp_path}/found/compare.csv"]
+    assert out[-2:] == [f"table: {tmp_path}/found/compare.csv", f"picture: {tmp_path}/found/compare.png"]
     rows = list(csv.DictReader((tmp_path / "found/compare.csv").open()))
     assert [(row["sheave_stiffness"], row["hits"], row["false_alarms"]) for row in rows] == [
         ("1", "1", "0"),
@@ -258,8 +259,11 @@ def test_compare_leaves_a_table_and_a_picture(write, tmp_path, capsys):
     ]
     assert rows[0]["onset_error_largest [N m]"] == "0"
     assert (tmp_path / "found/compare.png").read_bytes().startswith(b"\x89PNG")
-    results([[Q, V, Q]]).to_netcdf(tmp_path / "results.nc")
-    assert main(call) == 0
+    whole = results([[Q, V, Q]] * 200)
+    many = xr.concat([whole, whole], xr.DataArray([-1.0, -2.0], dims="friction_gradient"), data_vars="all")
+    many.to_netcdf(tmp_path / "results.nc")
+    assert main(call) == 0  # the score needs no page that holds 200 panels
+    assert "no picture: " in capsys.readouterr().err
 
 
 def test_the_page_says_the_score_and_shows_the_map(write, tmp_path, monkeypatch):
@@ -356,3 +360,23 @@ def test_maps_of_values_of_probabilities_and_of_eigenfrequencies_have_it(write):
     samples = study().isel(sheave_stiffness=0).expand_dims(sample=4).copy()
     for part in (samples, samples.isel(friction_gradient=0)):
         assert ink_of(part.cvt.map(measured=write(WINDOWS, "60,90")))
+
+
+@pytest.mark.parametrize(("window", "is_drawn"), [("60,150", True), ("120,150", False)])
+def test_over_time_a_window_is_drawn_where_it_holds_the_load_of_the_run(window, is_drawn, write):
+    run = pictured.history(load=100.0)
+    assert bool(ink_of(run.cvt.spectrogram(measured=write(WINDOWS, window)))) == is_drawn
+
+
+def test_a_spreadsheet_of_windows_letters_is_read(tmp_path):
+    path = tmp_path / "rig.csv"
+    path.write_bytes("Rig A\nLoad from [N·m];Load to [N·m];amplitude [µm]\n15,5;25,5;1,5\n".encode("utf-16"))
+    with pytest.warns(JobWarning, match="UTF-16 letters, .* decimal commas"):
+        (row,) = read_measured(path, results([[Q, V, Q]])).rows
+    assert (row.span, row.amplitude) == ((15.5, 25.5), 1.5e-6)
+
+
+def test_the_noise_that_a_paper_states_is_a_measured_file():
+    path = Path(__file__).parents[2] / "jobs" / "lebrecht_measured.csv"
+    (row,) = read_measured(path, study()).rows
+    assert row[:5] == ({}, (130.0, 200.0), pytest.approx(np.nan, nan_ok=True), (500.0, 700.0), 2e-5)
