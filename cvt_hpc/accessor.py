@@ -35,6 +35,7 @@ if TYPE_CHECKING:
     from pandas import DataFrame
 
     from cvt_hpc.analysis.animation import Animation
+    from cvt_hpc.analysis.measured_score import Score
 import csv
 
 from cvt_hpc.analysis.conversion import documented_units
@@ -91,6 +92,7 @@ class Results:
         panel: str | None = None,
         vmax: float | None = None,
         beside: xr.Dataset | Sequence[xr.Dataset] = (),
+        measured: str | Path | None = None,
         **at: Any,
     ) -> Figure:
         """Draw where vibration occurs, or quantities over two axes.
@@ -105,6 +107,8 @@ class Results:
             Where the colours end [SI unit of what is shown].
         beside : Dataset or sequence of Dataset
             Further studies over the same axes: a panel for each, on one scale of colours.
+        measured : str or Path
+            CSV file of a test rig, drawn over the map; see `cvt_hpc.analysis.measured`.
         **at
             Axes to fix.
         """
@@ -112,7 +116,7 @@ class Results:
 
         quantities = [show] if isinstance(show, str) else list(show)
         datasets = [self._given, *_several(beside)]
-        return maps_figure(datasets, quantities, at, sides=Sides(x, y, panel), vmax=vmax)
+        return maps_figure(datasets, quantities, at, (), Sides(x, y, panel), vmax, measured)
 
     def animation(self) -> Animation:
         """Draw the belt in the last periods of a run, magnified, as a moving picture; of a history.
@@ -123,11 +127,17 @@ class Results:
 
         return animation(self._history("animation"))
 
-    def report(self, out: str | Path = "report.html") -> Path:
-        """Write a page about the study: what was found, a map with values, failed runs, cost, assumptions."""
+    def report(self, out: str | Path = "report.html", measured: str | Path | None = None) -> Path:
+        """Write a page: findings, a map with values, failed runs, cost; with a measured file the score."""
         from cvt_hpc.report import write_report
 
-        return write_report(self._dataset, Path(out))
+        return write_report(self._dataset, Path(out), measured=measured)
+
+    def score(self, measured: str | Path) -> Score:
+        """Return how far the study agrees with a measured file; see `cvt_hpc.analysis.measured_score`."""
+        from cvt_hpc.analysis.measured_score import score
+
+        return score(self._dataset, measured)
 
     def table(self) -> DataFrame:
         """Return a data frame with a row for each run.

@@ -90,6 +90,12 @@ def _region(text: str) -> Option:
     return Option("region", text, "--region", {"choices": ("driving", "driven")}, True)
 
 
+MEASURED = Option(
+    "measured",
+    "CSV file of a test rig, drawn over it: noise windows, onset loads, or peaks over load",
+    "--measured",
+    {"metavar": "CSV"},
+)
 ALONG = Option(
     "along",
     "axis along which vibration sets in (default: the load, or the last one)",
@@ -102,7 +108,7 @@ KINDS = {
         RESULTS,
         "waterfall.waterfall_figure",
         "spectra of the strands over an axis, with eigenfrequencies where they are known",
-        (_end("runs"),),
+        (_end("runs"), MEASURED),
         sides=("x", "panel"),
     ),
     "campbell": Kind(
@@ -117,6 +123,7 @@ KINDS = {
                 {"nargs": "+", "type": float, "metavar": "ORDER"},
             ),
             _end("runs"),
+            MEASURED,
         ),
         sides=("panel",),
     ),
@@ -124,6 +131,7 @@ KINDS = {
         RESULTS,
         "hysteresis_bands.hysteresis_figure",
         "where vibration begins and ends along ramps up and down, and the bands between them",
+        (MEASURED,),
         sides=("y", "panel"),
     ),
     "onset_bands": Kind(
@@ -191,13 +199,14 @@ KINDS = {
                 True,
             ),
             _end("moments"),
+            MEASURED,
         ),
     ),
     "spectrogram": Kind(
         HISTORIES,
         "ramps.spectrogram_figure",
         "spectra of the strands side by side along a ramp or over time, with eigenfrequencies",
-        (_end("moments"),),
+        (_end("moments"), MEASURED),
     ),
     "element": Kind(
         HISTORY,

@@ -11,6 +11,7 @@ from cvt_hpc.analysis.arrangement import known_values
 from cvt_hpc.analysis.classes import check_results
 from cvt_hpc.analysis.scatter import is_sampled
 from cvt_hpc.errors import InputError, did_you_mean, mismatch
+from cvt_hpc.job import Job, stored_job
 from cvt_hpc.job.values import shown
 from cvt_hpc.study.job_difference import flatten
 
@@ -81,6 +82,14 @@ def axes_of(dataset: xr.Dataset) -> list[str]:
 def job_of(dataset: xr.Dataset) -> dict[str, Any]:
     """The resolved job that a dataset keeps in its attributes; empty where it keeps none."""
     return json.loads(dataset.attrs.get("job", "{}"))
+
+
+def job_held(dataset: xr.Dataset, source: str = "results") -> Job | None:
+    """The job of a dataset; None where this version of the program cannot read it any more."""
+    try:
+        return stored_job(job_of(dataset), source)
+    except (InputError, ValueError, RecursionError):
+        return None
 
 
 def _reduced(

@@ -2,6 +2,7 @@
 
 import json
 from collections.abc import Mapping
+from pathlib import Path
 from typing import Any
 
 import numpy as np
@@ -11,6 +12,8 @@ from matplotlib.figure import Figure
 
 from cvt_hpc.analysis.arrangement import CHOSEN, Sides, along_x, arrange, ruler
 from cvt_hpc.analysis.figures import WIDTH, axis_label, entitle, headline
+from cvt_hpc.analysis.measured import FREQUENCY, Side, side_of
+from cvt_hpc.analysis.measured_drawing import Overlay, put_legend
 from cvt_hpc.variator import STRANDS
 from cvt_hpc.variator.band import MODES, strand_frequencies
 
@@ -59,7 +62,11 @@ def along_axis(shown: xr.Dataset, x: str) -> xr.DataArray | None:
 
 
 def eigenfrequency_figure(
-    dataset: xr.Dataset, at: Mapping[str, Any], source: str, sides: Sides = CHOSEN
+    dataset: xr.Dataset,
+    at: Mapping[str, Any],
+    source: str,
+    sides: Sides = CHOSEN,
+    measured: str | Path | None = None,
 ) -> Figure:
     """Compose the picture: a panel for each strand, a line for each number of half waves.
 
@@ -73,16 +80,19 @@ def eigenfrequency_figure(
         Where the results are from, for the errors.
     sides : Sides
         Which axis runs along x.
+    measured : str or Path
+        Measured file that is drawn over it (`measured.py`).
 
     Returns
     -------
     Figure
         Where a strand holds no shape its lines have gaps.
     """
+    over = Overlay(measured, dataset, source)
     arrangement = arrange(dataset, at, source, sides)
     shown, notes = along_x(arrangement)
     along = ruler(shown[arrangement.x])
-    figure = Figure((WIDTH, HEIGHT), layout="constrained")
+    figure = Figure((WIDTH, HEIGHT + over.height), layout="constrained")
     strands = shown["strand"].values
     panels = figure.subplots(1, strands.size, sharex=True, sharey=True, squeeze=False)[0]
     for axes, strand in zip(panels, strands, strict=True):
@@ -93,8 +103,12 @@ def eigenfrequency_figure(
         along.lay_out(axes.xaxis)
     panels[0].set_ylabel(axis_label(dataset["eigenfrequency"], "Hz"))
     panels[0].set_ylim(bottom=0.0)
+    frequencies = Side(FREQUENCY, np.array(panels[0].get_ylim()))
+    for axes in panels:
+        over.draw(axes, side_of(shown, arrangement.x), frequencies, shown)
+    put_legend(figure, over)
     first = headline("Eigenfrequencies", dataset.attrs)
-    entitle(figure, [first, *notes, "beside the lines: half waves along the strand"])
+    entitle(figure, [first, *notes, "beside the lines: half waves along the strand", over.note])
     return figure
 
 

@@ -1,5 +1,6 @@
 """Onset and end of vibration over a map: lines, and bands where ramps up and down differ."""
 
+from pathlib import Path
 from typing import Any
 
 import numpy as np
@@ -16,6 +17,8 @@ from cvt_hpc.analysis import arrangement as layout
 from cvt_hpc.analysis import figures
 from cvt_hpc.analysis.cells import OF_STARTS, STYLES
 from cvt_hpc.analysis.classes import OccurrenceClass, check_results
+from cvt_hpc.analysis.measured import Side, side_of
+from cvt_hpc.analysis.measured_drawing import Overlay
 from cvt_hpc.errors import mismatch
 from cvt_hpc.variables import Status, Vibrates
 from cvt_hpc.vibration.classes import StartClass, levels, onsets
@@ -186,16 +189,22 @@ def draw_bands(axes: Axes, y: layout.Ruler, ranges: NDArray[np.float64]) -> list
 
 @figures.styled
 def hysteresis_figure(
-    dataset: xr.Dataset, at: layout.At = None, source: str = "results", sides: layout.Sides = layout.CHOSEN
+    dataset: xr.Dataset,
+    at: layout.At = None,
+    source: str = "results",
+    sides: layout.Sides = layout.CHOSEN,
+    measured: str | Path | None = None,
 ) -> Figure:
     """Draw between which loads or speeds runs vibrate along ramps up and down, and where the two differ.
 
     Arguments and errors as of `vibration_ranges`, and `at` as of all pictures of results (`figures.py`): the
     first axis that is left, or that of `sides`, runs along y, the next one, or that of `sides`, over the
-    panels.
+    panels. A `measured` file is drawn over them (`measured.py`).
     """
     ranges = vibration_ranges(dataset, source)
     axes_left = ranges.isel(ramp=0, limit=0, drop=True)
+    ramped = axes_left.to_dataset(name="status").assign_coords({ranges.name: ((), np.nan, ranges.attrs)})
+    over = Overlay(measured, ramped.assign_attrs(dataset.attrs), source)
     layout.check_sides(sides, list(map(str, axes_left.dims)), at or {}, source)
     notes: tuple[str, ...] = ()
     y_name = panel = None
@@ -241,12 +250,18 @@ def hysteresis_figure(
             axes.set_title(
                 f"{figures.in_words(ranges[panel])}: {layout.value_text(ranges[panel], k)}", loc="left", pad=3
             )
+    x, places = Side(str(ranges.name), np.array(panels[0, 0].get_xlim()), factor), ranges.coords.to_dataset()
+    for k, axes in enumerate(panels.flat[:count]):
+        over.draw(axes, x, side_of(places, y_name), places.isel({panel: k} if panel else {}))
+    legend |= {handle.get_label(): handle for handle in over.handles}
     for axes in panels.flat[:count][-grid.columns :]:
         axes.set_xlabel(figures.axis_label(ranges, unit))
         axes.tick_params(labelbottom=True)
     if count > 1:
         figure.supylabel(y.label, fontsize=figures.STYLE["axes.labelsize"])
-    figures.entitle(figure, [figures.headline("Vibration along ramps up and down", dataset.attrs), *notes])
+    figures.entitle(
+        figure, [figures.headline("Vibration along ramps up and down", dataset.attrs), *notes, over.note]
+    )
     place = {"loc": "outside lower center", "frameon": False, "ncols": figures.legend_columns(list(legend))}
     figure.legend(legend.values(), legend.keys(), **place)
     return figure

@@ -9,8 +9,9 @@ harmonic of it have a diamond for a dot. Into irregular cells their amplitude is
 Where runs begin with a small and with a large disturbance, one map shows where the start decides.
 """
 
-from collections.abc import Mapping
+from collections.abc import Iterator, Mapping
 from dataclasses import dataclass, replace
+from pathlib import Path
 from typing import Any
 
 import numpy as np
@@ -35,6 +36,8 @@ from cvt_hpc.analysis.classes import (
 from cvt_hpc.analysis.conversion import standard
 from cvt_hpc.analysis.eigenfrequencies import eigenfrequency_figure
 from cvt_hpc.analysis.hysteresis_bands import draw_onsets
+from cvt_hpc.analysis.measured import side_of
+from cvt_hpc.analysis.measured_drawing import Overlay
 from cvt_hpc.analysis.probability import PROBABILITY, has_samples
 from cvt_hpc.analysis.probability_drawing import probability_figure
 from cvt_hpc.analysis.scatter import is_sampled, scatter_figure
@@ -61,6 +64,7 @@ def map_figure(
     source: str = "results",
     sides: layout.Sides = layout.CHOSEN,
     vmax: float | None = None,
+    measured: str | Path | None = None,
 ) -> Figure:
     """Draw where vibration occurs.
 
@@ -79,9 +83,12 @@ def map_figure(
     vmax : float
         Amplitude at which the colours end [m]; by default that of 98 % of the vibrating cells, where few lie
         far above it.
+    measured : str or Path
+        Measured file that is drawn over the map (`measured.py`); of a grid.
     """
     dataset = standard(dataset, source)
     check_results(dataset, source)
+    over = Overlay(measured, dataset, source)
     if is_sampled(dataset):
         if sides != layout.CHOSEN:
             raise mismatch(
@@ -89,12 +96,12 @@ def map_figure(
             )
         return scatter_figure(dataset, at or {}, source, vmax)
     if has_samples(dataset, at or {}) or PROBABILITY in dataset:
-        return probability_figure(dataset, at, source, sides)
+        return probability_figure(dataset, at, source, sides, measured)
     if "eigenfrequency" in dataset and "amplitude" not in dataset:
-        return eigenfrequency_figure(dataset, at or {}, source, sides)
+        return eigenfrequency_figure(dataset, at or {}, source, sides, measured)
     if has_starts(dataset, at or {}):
         dataset = join_starts(dataset)
-    return _grid_figure(layout.arrange(dataset, at or {}, source, sides), vmax, source)
+    return _grid_figure(layout.arrange(dataset, at or {}, source, sides), vmax, source, over)
 
 
 @dataclass(frozen=True)
@@ -173,7 +180,7 @@ class Sheet:
         return width >= 22 and height >= 22  # [point]
 
 
-def _grid_figure(arrangement: layout.Arrangement, vmax: float | None, source: str) -> Figure:
+def _grid_figure(arrangement: layout.Arrangement, vmax: float | None, source: str, over: Overlay) -> Figure:
     """Compose the map of a study over a grid; to be called within STYLE."""
     sheet = sheet_of(arrangement, source)
     figure = Figure((figures.WIDTH, sheet.height + FRAME), layout="constrained")
@@ -197,11 +204,16 @@ def _grid_figure(arrangement: layout.Arrangement, vmax: float | None, source: st
         frequency = cells.Scale(cells.FREQUENCY_COLOURS, norm, sheet.frequency_label)
         draw_block(figure, axes[sheet.rows :], sheet, sheet.frequency, frequency)
     further = _draw_onsets(axes, sheet)
+    x, y = (side_of(arrangement.dataset, name) for name in (arrangement.x, arrangement.y))
+    for panel, ax in _panels_of(axes, sheet):
+        at = {arrangement.panel: panel} if arrangement.panel else {}
+        over.draw(ax, x, y, arrangement.dataset.coords.to_dataset().isel(at))
+    further += over.handles
     if sheet.leads.any() and min(sheet.smallest_cell) >= SMALLEST_APART:
         further.append(Line2D([], [], **cells.LEADING.marks(4.0), label="harmonics lead"))
-    figures.entitle(figure, _title(sheet))
+    figures.entitle(figure, [*_title(sheet), over.note])
     figure.supylabel(sheet.y.label, fontsize=10)
-    styles, columns = cells.STYLES, cells.LEGEND_COLUMNS
+    styles, columns = cells.STYLES, cells.LEGEND_COLUMNS - bool(over.handles)  # whose names are longer
     if "starts" in arrangement.dataset.attrs:
         styles, columns = cells.STYLES | cells.OF_STARTS, 3  # as wide as the page with the longest label
     shown = {kind: style for kind, style in styles.items() if np.any(sheet.classes == kind)}
@@ -231,12 +243,17 @@ def _draw_onsets(axes: NDArray[Any], sheet: Sheet) -> list[Any]:
     handles: dict[str, Any] = {}
     if along is None or arrangement.y is None:
         return []  # of a single row the cells show it
-    for k, ax in enumerate(axes.flat):
-        panel = k % (sheet.rows * sheet.columns)
-        if panel < sheet.panels:
-            for handle in draw_onsets(ax, sheet.x, sheet.y, sheet.classes[panel], along == arrangement.y):
-                handles.setdefault(handle.get_label(), handle)
+    for panel, ax in _panels_of(axes, sheet):
+        for handle in draw_onsets(ax, sheet.x, sheet.y, sheet.classes[panel], along == arrangement.y):
+            handles.setdefault(handle.get_label(), handle)
     return list(handles.values())
+
+
+def _panels_of(axes: NDArray[Any], sheet: Sheet) -> Iterator[tuple[int, Axes]]:
+    """Yield the panels that hold cells, of all blocks, with their numbers within these."""
+    for k, ax in enumerate(axes.flat):
+        if (panel := k % (sheet.rows * sheet.columns)) < sheet.panels:
+            yield panel, ax
 
 
 def sheet_of(arrangement: layout.Arrangement, source: str = "results", frame: float = FRAME) -> Sheet:

@@ -1,6 +1,7 @@
 """Pictures over samples of uncertain parameters: probability, bands of the onset, and what it depends on."""
 
 from collections.abc import Sequence
+from pathlib import Path
 from typing import Any, NamedTuple
 
 import numpy as np
@@ -12,6 +13,8 @@ from cvt_hpc.analysis import arrangement as layout
 from cvt_hpc.analysis import figures
 from cvt_hpc.analysis.classes import check_results
 from cvt_hpc.analysis.curves import set_frame
+from cvt_hpc.analysis.measured import Side, side_of
+from cvt_hpc.analysis.measured_drawing import Overlay
 from cvt_hpc.analysis.probability import CONTOURS, PROBABILITY, over_samples
 from cvt_hpc.analysis.sensitivity import (
     ONSET,
@@ -43,7 +46,11 @@ class _Panel(NamedTuple):
 
 @figures.styled
 def probability_figure(
-    dataset: xr.Dataset, at: layout.At = None, source: str = "results", sides: layout.Sides = layout.CHOSEN
+    dataset: xr.Dataset,
+    at: layout.At = None,
+    source: str = "results",
+    sides: layout.Sides = layout.CHOSEN,
+    measured: str | Path | None = None,
 ) -> Figure:
     """Draw the probability of vibration: over two axes with contours, over one with its 95 % interval.
 
@@ -54,22 +61,27 @@ def probability_figure(
         no verdict on vibration is known, the probability of failure is drawn.
     sides : Sides
         Which axis runs along x, along y, and over the panels.
+    measured : str or Path
+        Measured file that is drawn over it (`measured.py`).
     """
     told = over_samples(dataset, at or {})
     name = PROBABILITY if np.isfinite(told[PROBABILITY]).any() else "failure_probability"
     arrangement = layout.arrange(told, at or {}, source, sides)
     if arrangement.y:
-        return value_map_figure(told, [name], at, source, sides)
+        return value_map_figure(told, [name], at, source, sides, measured=measured)
+    over = Overlay(measured, told, source)
     shown = arrangement.dataset
     panel = _Panel("", *(shown[one].values for one in (f"{name}_low", name, f"{name}_high")))
     labels = "of the samples", "95 % interval"
     x = layout.ruler(shown[arrangement.x])
     figure, (axes,) = _draw_bands([panel], x, figures.in_words(shown[name]), labels, source, "")
     axes.set_ylim(-0.03, 1.03)
+    over.draw(axes, side_of(shown, arrangement.x), Side("", np.array(axes.get_ylim())), shown)
     for share in CONTOURS:
         axes.axhline(share, color="#777777", ls="--" if share != CONTOURS[1] else "-", lw=0.8, zorder=0.5)
     head = f"P{figures.in_words(shown[name])[1:]}"
-    _entitle(figure, axes, [figures.headline(head, dataset.attrs), told.attrs["counted"], *arrangement.notes])
+    lines = [figures.headline(head, dataset.attrs), told.attrs["counted"], *arrangement.notes, over.note]
+    _entitle(figure, axes, lines, over.handles)
     return figure
 
 
@@ -255,6 +267,7 @@ def _draw_bands(
     return figure, all_axes[: len(panels)]
 
 
-def _entitle(figure: Figure, axes: Any, lines: Sequence[str]) -> None:
+def _entitle(figure: Figure, axes: Any, lines: Sequence[str], further: Sequence[Any] = ()) -> None:
     handles, labels = axes.get_legend_handles_labels()
-    set_frame(figure, dict(zip(labels, handles, strict=True)), lines)
+    legend = dict(zip(labels, handles, strict=True)) | {handle.get_label(): handle for handle in further}
+    set_frame(figure, legend, lines)

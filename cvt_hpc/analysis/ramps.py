@@ -2,6 +2,7 @@
 
 import json
 from collections.abc import Sequence
+from pathlib import Path
 from textwrap import fill
 from typing import NamedTuple
 
@@ -10,6 +11,8 @@ import xarray as xr
 from matplotlib.figure import Figure
 
 from cvt_hpc.analysis import cells, figures
+from cvt_hpc.analysis.measured import FREQUENCY, Side
+from cvt_hpc.analysis.measured_drawing import Overlay, put_legend
 from cvt_hpc.analysis.telling_apart import entitle_runs, named, on_axes
 from cvt_hpc.analysis.waterfall import (
     COLOURS,
@@ -31,6 +34,8 @@ LEAST, ROW = 1.1, 1.5  # [inch]: a row of panels of a ramp, at least and else
 LEAST_HEIGHT, HEIGHT = 1.5, 2.2  # [inch]: the same of spectrograms
 LETTERS = 14  # of a label beside a row
 THEN = "name fewer histories"  # of more than a page holds
+COURSES = ("load", "driving_speed")  # of which a run ramps one at most
+FREQUENCIES = Side(FREQUENCY, np.array([0.0, HIGHEST]))
 LINE_POINTS = 21  # of lines over a spectrogram
 
 
@@ -61,6 +66,7 @@ def ramp_figure(
     of: str = "t1",
     sources: Sequence[str] = (),
     vmax: float | None = None,
+    measured: str | Path | None = None,
 ) -> Figure:
     """Draw motion and spectrogram of runs along their ramps, below each other.
 
@@ -74,6 +80,8 @@ def ramp_figure(
         Where the runs are from, for errors, and for titles where their axes do not tell them apart.
     vmax : float, optional
         Amplitude at which the colours end [SI].
+    measured : str or Path, optional
+        Measured file that is drawn over them (`measured.py`).
 
     Raises
     ------
@@ -83,8 +91,10 @@ def ramp_figure(
     names = named(histories, sources)
     ramps = [read_ramp(history, of, name) for history, name in zip(histories, names, strict=True)]
     _, labels = on_axes(histories, names)
-    grid = figures.on_a_page(len(ramps), (1,), (LEAST, ROW), 1.1, names[0], THEN)
-    figure = Figure((figures.NARROW, grid.height * len(ramps) + 1.1), layout="constrained")
+    overlays = [Overlay(measured, history, name) for history, name in zip(histories, names, strict=True)]
+    frame = 1.1 + overlays[0].height
+    grid = figures.on_a_page(len(ramps), (1,), (LEAST, ROW), frame, names[0], THEN)
+    figure = Figure((figures.NARROW, grid.height * len(ramps) + frame), layout="constrained")
     panels = figure.subplots(len(ramps), 2, sharex=True, sharey="col", squeeze=False)
     spectra = [spectrogram(ramp) for ramp in ramps]
     scale = 1e6 if of in STRANDS else 1.0
@@ -111,13 +121,23 @@ def ramp_figure(
     bar = cells.Scale(COLOURS, norm, f"amplitude [{unit}]")
     drawn = np.concatenate([amplitude.ravel() for *_, amplitude in spectra])
     cells.colour_bar(figure, bar, drawn, ax=list(panels[:, 1]), aspect=15 * len(ramps), pad=0.02)
-    entitle_runs(figure, histories, f"Along the ramp, {name}", "dashed: 500 and 700 Hz", width=80)
+    for history, ramp, row, over in zip(histories, ramps, panels, overlays, strict=True):
+        motion = Side("", np.array(row[0].get_ylim()))
+        for axes, y in zip(row, (motion, FREQUENCIES), strict=True):
+            over.draw(axes, _side_of(history, ramp), y, _held(history))
+    put_legend(figure, *overlays)
+    entitle_runs(
+        figure, histories, f"Along the ramp, {name}", "dashed: 500 and 700 Hz", overlays[0].note, width=80
+    )
     return figure
 
 
 @figures.styled
 def spectrogram_figure(
-    histories: Sequence[xr.Dataset], sources: Sequence[str] = (), vmax: float | None = None
+    histories: Sequence[xr.Dataset],
+    sources: Sequence[str] = (),
+    vmax: float | None = None,
+    measured: str | Path | None = None,
 ) -> Figure:
     """Draw spectrograms of the strands side by side, over the ramp of a run or else over time.
 
@@ -132,6 +152,8 @@ def spectrogram_figure(
         Where the runs are from, for errors, and for titles where their axes do not tell them apart.
     vmax : float, optional
         Amplitude at which the colours end [m].
+    measured : str or Path, optional
+        Measured file that is drawn over them (`measured.py`).
 
     Raises
     ------
@@ -156,21 +178,24 @@ def spectrogram_figure(
     spectra = [[spectrogram(ramp) for ramp in row] for row in ramps]
     drawn = [amplitude.T for row in spectra for *_, amplitude in row]
     norm = spectra_norm(drawn, None if vmax is None else 1e6 * vmax)
-    grid = figures.on_a_page(len(ramps), (1, 2), (LEAST_HEIGHT, HEIGHT), 1.4, names[0], THEN)
+    overlays = [Overlay(measured, history, name) for history, name in zip(histories, names, strict=True)]
+    frame = 1.4 + overlays[0].height
+    grid = figures.on_a_page(len(ramps), (1, 2), (LEAST_HEIGHT, HEIGHT), frame, names[0], THEN)
     count, beside = -(-len(ramps) // grid.columns), grid.columns * len(strands)
-    figure = Figure((figures.WIDTH, grid.height * count + 1.4), layout="constrained")
+    figure = Figure((figures.WIDTH, grid.height * count + frame), layout="constrained")
     panels = figure.subplots(count, beside, sharey=True, squeeze=False)
     size, told, each = (0.8 * figures.WIDTH / beside, grid.height - 0.7), set(), iter(panels.flat)
     pads = np.full(panels.shape, 0.0)
     for axes in panels.flat[len(ramps) * len(strands) :]:
         axes.set_axis_off()
-    for history, row, of_row, label in zip(histories, ramps, spectra, labels, strict=True):
+    for history, row, of_row, label, over in zip(histories, ramps, spectra, labels, overlays, strict=True):
         turns, known = _lines_along(history, row[0])
         for strand, ramp, (values, frequency, amplitude) in zip(strands, row, of_row, strict=True):
             axes, lines = next(each), []
             shown = np.maximum(amplitude, norm.vmin).T
             axes.pcolormesh(values, frequency, shown, norm=norm, cmap=COLOURS, rasterized=True)
             axes.set(xlim=np.sort(values[[0, -1]]), ylim=(0.0, HIGHEST))
+            over.draw(axes, _side_of(history, ramp), FREQUENCIES, _held(history))
             if known is not None:
                 places, waves = known
                 of_strand = waves[STRANDS.index(strand)]
@@ -191,7 +216,8 @@ def spectrogram_figure(
     scale = cells.Scale(COLOURS, norm, "amplitude [µm]")
     values = np.concatenate([each.ravel() for each in drawn])
     cells.colour_bar(figure, scale, values, ax=panels, aspect=20 * count, pad=0.02)
-    entitle_runs(figure, histories, "Spectrogram", *sorted(told), width=72)
+    put_legend(figure, *overlays)
+    entitle_runs(figure, histories, "Spectrogram", *sorted(told), overlays[0].note, width=72)
     return figure
 
 
@@ -310,8 +336,21 @@ def read_ramp(history: xr.Dataset, of: str, source: str = "history", *, is_ramp:
 
 def _changing(history: xr.Dataset) -> str | None:
     """The quantity that a run ramps."""
-    courses = [name for name in ("load", "driving_speed") if name in history]
+    courses = [name for name in COURSES if name in history]
     return next((name for name in courses if _is_ramp(history[name].values)), None)
+
+
+def _side_of(history: xr.Dataset, ramp: Ramp) -> Side:
+    """What runs along x, in display units."""
+    changing = _changing(history)
+    factor = figures.coordinate_unit(history[changing].attrs)[0] if changing else 1.0
+    return Side(changing or "time", np.sort(ramp.values[[0, -1]]), factor)
+
+
+def _held(history: xr.Dataset) -> xr.Dataset:
+    """Load and speed of a run, as coordinates, where they do not change."""
+    names = [name for name in COURSES if name in history and name != _changing(history)]
+    return xr.Dataset(coords={name: float(history[name].values[-1]) for name in names})
 
 
 def _is_ramp(values: np.ndarray) -> bool:

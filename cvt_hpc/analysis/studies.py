@@ -1,6 +1,7 @@
 """Several studies as one dataset with the axis `study`, for pictures on one scale of colours."""
 
 from collections.abc import Collection, Sequence
+from pathlib import Path
 
 import numpy as np
 import xarray as xr
@@ -79,6 +80,7 @@ def maps_figure(
     sources: Sequence[str] = (),
     sides: Sides = CHOSEN,
     vmax: float | None = None,
+    measured: str | Path | None = None,
 ) -> Figure:
     """Draw where vibration occurs, or quantities, of one study or of several on one scale of colours.
 
@@ -88,7 +90,7 @@ def maps_figure(
         Results of studies over the same axes.
     quantities : sequence of str
         Variables to be drawn instead of occurrence.
-    at, sides, vmax
+    at, sides, vmax, measured
         As `map_figure` takes them; `study` is one of the axes where there are several datasets.
     sources : sequence of str
         Where the datasets are from, for the errors; these also name studies of jobs of one name.
@@ -107,8 +109,8 @@ def maps_figure(
     if len(datasets) > 1:
         dataset, sides = side_by_side(datasets, named, quantities, sides)
     if quantities:
-        return value_map_figure(dataset, quantities, at, source, sides, vmax)
-    return map_figure(dataset, at, source, sides, vmax)
+        return value_map_figure(dataset, quantities, at, source, sides, vmax, measured)
+    return map_figure(dataset, at, source, sides, vmax, measured)
 
 
 def _with_values_of(first: xr.Dataset, dataset: xr.Dataset) -> xr.Dataset:

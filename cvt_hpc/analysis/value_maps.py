@@ -2,6 +2,7 @@
 
 import warnings
 from collections.abc import Sequence
+from pathlib import Path
 from textwrap import fill
 from typing import Any, NamedTuple
 
@@ -19,6 +20,8 @@ from cvt_hpc.analysis import arrangement as layout
 from cvt_hpc.analysis import cells, figures
 from cvt_hpc.analysis.classes import WITHOUT_RESULT, check_results, count_classes, occurrence_classes
 from cvt_hpc.analysis.curves import check_quantities
+from cvt_hpc.analysis.measured import side_of
+from cvt_hpc.analysis.measured_drawing import Overlay
 from cvt_hpc.analysis.probability import ISOLINES, over_samples
 from cvt_hpc.analysis.scatter import is_sampled
 from cvt_hpc.errors import mismatch, one_line
@@ -54,6 +57,8 @@ class Panel(NamedTuple):
         Values of all panels that share the scale of colours, in the unit; or the range that it is to have.
     isolines : tuple of float
         Values of lines, in the unit.
+    at : dict
+        Index along the axis of panels.
     """
 
     title: str
@@ -62,7 +67,8 @@ class Panel(NamedTuple):
     values: NDArray[np.float64]
     kinds: NDArray[np.int8]
     alike: NDArray[np.float64]
-    isolines: tuple[float, ...] = ()
+    isolines: tuple[float, ...]
+    at: dict[str, int]
 
 
 @figures.styled
@@ -73,6 +79,7 @@ def value_map_figure(
     source: str = "results",
     sides: layout.Sides = layout.CHOSEN,
     vmax: float | None = None,
+    measured: str | Path | None = None,
 ) -> Figure:
     """Draw quantities over two axes of a study: panels for each, its further dimensions and a third axis.
 
@@ -88,6 +95,8 @@ def value_map_figure(
         Which axis runs along x, along y, and over the panels.
     vmax : float
         Value at which the colours end, in the unit of the quantity [SI].
+    measured : str or Path
+        Measured file that is drawn over the map (`measured.py`).
 
     Raises
     ------
@@ -99,6 +108,7 @@ def value_map_figure(
     if is_sampled(dataset):
         raise mismatch(source, "results over a grid", "samples")
     dataset = over_samples(dataset, at or {})
+    over = Overlay(measured, dataset, source)
     check_quantities(dataset, quantities, source, of_one_unit=False)
     if vmax is not None and len(quantities) > 1:
         raise mismatch(f"{source}: vmax", "one quantity", ", ".join(quantities))
@@ -113,11 +123,13 @@ def value_map_figure(
         layout.ruler(shown[arrangement.y]) if arrangement.y else layout.ONE_ROW,
     )
     size, (columns, height) = _on_paper(len(panels), y.centres.size, source, arrangement)
+    sides_of_panel = side_of(shown, arrangement.x), side_of(shown, arrangement.y)
     figure = Figure(size, layout="constrained")
     all_axes = figure.subplots(-(-len(panels) // columns), columns, squeeze=False)
     room = 72 * np.array([size[0] / columns - AROUND, height - FRAME])  # [point]
     for axes, panel in zip(all_axes.flat, panels, strict=False):
         _draw_panel(figure, axes, (x, y), panel, vmax, room)
+        over.draw(axes, *sides_of_panel, shown.coords.to_dataset().isel(panel.at))
         axes.set_title(fill(panel.title, int(LETTERS * size[0] / columns)), loc="left", pad=3)
     for axes in list(all_axes.flat)[len(panels) :]:
         axes.set_axis_off()
@@ -128,7 +140,7 @@ def value_map_figure(
     job = one_line(dataset.attrs.get("job_name", ""))
     kinds = occurrence_classes(shown)
     counted = dataset.attrs.get("counted") or _counted(kinds)
-    lines = [f"{job}: {counted}".removeprefix(": "), ", ".join(arrangement.notes)]
+    lines = [f"{job}: {counted}".removeprefix(": "), ", ".join(arrangement.notes), over.note]
     figures.entitle(figure, lines, int(72 * size[0] / figures.WIDTH))
     marked: dict[cells.CellClass, cells.ClassStyle] = {
         kind: cells.STYLES[kind] for kind in OTHERS if (kinds == kind).any()
@@ -147,7 +159,7 @@ def value_map_figure(
             ("--", f"{values[0]:g} and {values[-1]:g}"),
         )
     ]
-    further = negative + lines_of
+    further = negative + lines_of + over.handles
     if marked or further:
         cells.class_legend(figure, marked, len(marked) + len(further), further=further)
     return figure
@@ -215,6 +227,7 @@ def _panels(arrangement: layout.Arrangement, quantities: Sequence[str]) -> list[
                         _of_grid(kinds.isel(at), arrangement).astype(np.int8),
                         alike,
                         isolines,
+                        at,
                     )
                 )
     return found

@@ -5,6 +5,7 @@ Names of lines stand in the margins where the lines leave the panel, clear of ri
 
 from collections.abc import Sequence
 from dataclasses import replace
+from pathlib import Path
 from typing import Any, NamedTuple
 
 import numpy as np
@@ -20,6 +21,8 @@ from cvt_hpc.analysis import cells
 from cvt_hpc.analysis.classes import WITHOUT_RESULT, check_results, occurrence_classes
 from cvt_hpc.analysis.eigenfrequencies import along_axis
 from cvt_hpc.analysis.figures import WIDTH, check_known, entitle, headline, in_words, on_a_page, styled
+from cvt_hpc.analysis.measured import FREQUENCY, Side, side_of
+from cvt_hpc.analysis.measured_drawing import Overlay, put_legend
 from cvt_hpc.errors import few_of, mismatch
 
 NAME_HEIGHT, LETTER, TITLE = (
@@ -129,6 +132,7 @@ def campbell_figure(
     orders: Sequence[float] = ORDERS,
     sides: layout.Sides = layout.CHOSEN,
     vmax: float | None = None,
+    measured: str | Path | None = None,
 ) -> Figure:
     """Draw a Campbell diagram: `waterfall_figure` over the driving speed, with orders of that speed."""
     check_results(dataset, source)
@@ -136,9 +140,8 @@ def campbell_figure(
         found = ", ".join(map(str, dataset["status"].dims)) or "a single run"
         then = "`cvt-hpc plot waterfall` draws spectra over any axis"
         raise mismatch(source, "results over the axis driving_speed", found, then)
-    return waterfall_figure(
-        dataset, at, source, layout.Sides("driving_speed", panel=sides.panel), orders, vmax
-    )
+    sides = layout.Sides("driving_speed", panel=sides.panel)
+    return waterfall_figure(dataset, at, source, sides, orders, vmax, measured)
 
 
 @styled
@@ -149,6 +152,7 @@ def waterfall_figure(
     sides: layout.Sides = layout.CHOSEN,
     orders: Sequence[float] = (),
     vmax: float | None = None,
+    measured: str | Path | None = None,
 ) -> Figure:
     """Draw spectra of all strands over an axis, with the eigenfrequencies where they are known.
 
@@ -158,13 +162,15 @@ def waterfall_figure(
     driving speed `orders` are drawn, multiples of the turns of the driving pulley. Of the axes that are not
     fixed the one that runs along x in a map, or that of `sides`, does so here; that of `sides.panel` has a
     row of panels for each value, and the rest are fixed at their first value. `vmax` is the amplitude at
-    which the colours end [m], else chosen as `spectra_norm` says.
+    which the colours end [m], else chosen as `spectra_norm` says. A `measured` file is drawn over the spectra
+    (`measured.py`).
     """
     check_results(dataset, source)
     if "spectrum" not in dataset or "frequency_bin" not in dataset["spectrum"].dims:
         found = few_of(list(map(str, dataset.data_vars)), 6)
         then = "runs of a belt that marches in time record it, up to band_high in [vibration]"
         raise mismatch(source, "results with the variable spectrum", found, then)
+    overlay = Overlay(measured, dataset, source)
     arrangement = layout.arrange(dataset, at or {}, source, sides)
     check_known(arrangement.dataset, ["spectrum"], source)
     rows, notes = _rows(arrangement, sides.panel)
@@ -175,14 +181,14 @@ def waterfall_figure(
     known = [along_axis(shown, arrangement.x) for _, shown in rows]
     strands = [str(name) for name in dataset["strand"].values]
     then = f"fix an axis, as by `--at {sides.panel}=VALUE`, or choose another one by `--panel AXIS`"
-    grid = on_a_page(len(rows), (1, 2), (LEAST, HEIGHT), FRAME, source, then)
+    grid = on_a_page(len(rows), (1, 2), (LEAST, HEIGHT), FRAME + overlay.height, source, then)
     count = -(-len(rows) // grid.columns)
-    figure = Figure((WIDTH, count * grid.height + FRAME), layout="constrained")
+    figure = Figure((WIDTH, count * grid.height + FRAME + overlay.height), layout="constrained")
     panels = figure.subplots(count, grid.columns * len(strands), sharex=True, sharey=True, squeeze=False)
     size = 0.8 * WIDTH / panels.shape[1], grid.height - 0.3
     for ax in panels.flat[len(rows) * len(strands) :]:
         ax.set_axis_off()
-    each, pad = iter(panels.flat), 0.0
+    each, pad, along = iter(panels.flat), 0.0, side_of(arrangement.dataset, arrangement.x)
     for (title, shown), of_row, modes in zip(rows, amplitude, known, strict=True):
         for strand, values in zip(strands, of_row, strict=True):
             axes, lines = next(each), []
@@ -195,6 +201,7 @@ def waterfall_figure(
                 lines += draw_eigenfrequencies(axes, x.centres, of_strand, modes["half_waves"].values)
             if arrangement.x == "driving_speed":
                 lines += draw_orders(axes, x.centres, shown["driving_speed"].values / (2.0 * np.pi), orders)
+            overlay.draw(axes, along, Side(FREQUENCY, y.edges[[0, -1]]), shown)
             pad = max(pad, name_lines(axes, lines, size))
             words = ", ".join(filter(None, (f"strand {strand}", title)))
             axes.set_title(words, loc="left", pad=pad)
@@ -213,7 +220,8 @@ def waterfall_figure(
     if any(modes is not None for modes in known):
         told.append("dashed: eigenfrequencies, with their half waves along the strand")
     told += _without_spectrum(rows, amplitude)
-    entitle(figure, [headline(subject, dataset.attrs), ", ".join(notes), *told])
+    entitle(figure, [headline(subject, dataset.attrs), ", ".join(notes), *told, overlay.note])
+    put_legend(figure, overlay)
     return figure
 
 

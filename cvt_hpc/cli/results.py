@@ -9,11 +9,14 @@ from pathlib import Path
 from typing import TYPE_CHECKING, Any
 
 from cvt_hpc.cli import parts
+from cvt_hpc.errors import InputError
+from cvt_hpc.picture_kinds import MEASURED
 
 if TYPE_CHECKING:
     from cvt_hpc.analysis.comparison import Comparison
 
-CONTRADICTING = 1  # exit status of `compare`: by one method some cells are quiet that vibrate by the other
+# Exit status of `compare`: some cells are quiet by one method, or as measured, that vibrate by the other
+CONTRADICTING = 1
 
 
 def add(commands: Any) -> None:
@@ -35,6 +38,7 @@ def add(commands: Any) -> None:
     picture.add_argument("--out", type=Path, metavar="PNG", help=text)
     parts.add_assignments(picture, "--at", "fix an axis at a value")
     parts.add_sides(picture)
+    _add_measured(picture)
     text = "value at which the colours end, such as '20 um' (default: that of 98 %% of the cells)"
     picture.add_argument("--vmax", metavar="VALUE", help=text)
     text = "draw an axis log or linear (default: log where its values are spread so); may be repeated"
@@ -44,11 +48,18 @@ def add(commands: Any) -> None:
     text = "write a page about a study: what was found, a map with values, failed runs, cost, assumptions"
     page = parts.add_command(commands, "report", _report, text, "RESULTS")
     page.add_argument("--out", type=Path, metavar="HTML", help="default: report.html beside the dataset")
-    text = "compare two methods or two designs, cell by cell; exit status 1: two methods contradict somewhere"
-    compare = parts.add_command(commands, "compare", _compare, text, "RESULTS")
-    compare.add_argument("other", type=Path, metavar="RESULTS", help="the one to compare with it")
-    folder = "folder of compare.csv and compare.png (default: that of the second study)"
+    _add_measured(page)
+    text = "compare two methods or two designs, or a study with measurements, cell by cell"
+    end = "; exit status 1: two methods, or computed and measured, contradict somewhere."
+    compare = parts.add_command(commands, "compare", _compare, text, "RESULTS", end)
+    text = "the study to compare with it, or the CSV file of a test rig: hits, misses, false alarms, silences"
+    compare.add_argument("other", type=Path, metavar="RESULTS|CSV", help=text)
+    folder = "folder of compare.csv and compare.png (default: that of the second study, or the only one)"
     compare.add_argument("--out", type=Path, metavar="DIR", help=folder)
+
+
+def _add_measured(command: argparse.ArgumentParser) -> None:
+    command.add_argument("--measured", metavar="CSV", help=MEASURED.text)
 
 
 def _status(arguments: argparse.Namespace) -> int:
@@ -106,15 +117,15 @@ def _map(arguments: argparse.Namespace) -> int:
         files = [file for path in paths for file in parts.files_of(path)]
         words = (kind, *arguments.show, *arguments.at)
         out = arguments.out or parts.picture_beside(arguments.path, files, *words)
-        vmax, shown = None, arguments.show[0] if arguments.show else "amplitude"
+        measured, vmax, shown = arguments.measured, None, arguments.show[0] if arguments.show else "amplitude"
         if shown in dataset:  # what draws it refuses a quantity that is not known
             vmax = parts.colour_end(arguments.vmax, str(dataset[shown].attrs.get("units", "")))
         if arguments.show:
             shown = arguments.show
-            draw(lambda: value_map_figure(dataset, shown, at, source, sides, vmax), out)
+            draw(lambda: value_map_figure(dataset, shown, at, source, sides, vmax, measured), out)
             parts.say(f"map: {out}")
             return parts.DONE
-        draw(lambda: map_figure(dataset, at, source, sides, vmax), out)
+        draw(lambda: map_figure(dataset, at, source, sides, vmax, measured), out)
         if has_starts(dataset, at) and not arguments.others:
             parts.say(start_line(dataset, at, source))
         parts.say(f"map: {out}")
@@ -135,7 +146,8 @@ def _report(arguments: argparse.Namespace) -> int:
     out = arguments.out or parts.folder_of(arguments.path) / "report.html"
     parts.check_output(out, (".html",))
     with parts.opened_results(arguments.path) as dataset:
-        written = write_report(dataset, out, str(arguments.path), parts.folder_of(arguments.path))
+        source, folder = str(arguments.path), parts.folder_of(arguments.path)
+        written = write_report(dataset, out, source, folder, arguments.measured)
         parts.say(f"report: {written}")
     return parts.DONE
 
@@ -145,11 +157,32 @@ def _compare(arguments: argparse.Namespace) -> int:
     from cvt_hpc.printing import comparison_lines
 
     sources = str(arguments.path), str(arguments.other)
+    if arguments.other.suffix.lower() == ".csv":
+        return _compare_measured(arguments, *sources)
     with parts.opened_results(arguments.path) as a, parts.opened_results(arguments.other) as b:
         found = compare(a, b, sources)
     written = leave_comparison(found, arguments.out or parts.folder_of(arguments.other), sources)
     parts.say(*comparison_lines(found, sources), *written)
     return CONTRADICTING if found.contradicts.any() and not found.are_designs else parts.DONE
+
+
+def _compare_measured(arguments: argparse.Namespace, source: str, path: str) -> int:
+    from cvt_hpc.analysis.figures import draw
+    from cvt_hpc.analysis.maps import map_figure
+    from cvt_hpc.analysis.measured_score import score, score_lines, write_score
+
+    folder = arguments.out or parts.folder_of(arguments.path)
+    with parts.opened_results(arguments.path) as dataset:
+        found = score(dataset, path, source)
+        written = f"table: {write_score(found, folder / 'compare.csv')}"
+        parts.say(*score_lines(found, source, path), written)
+        try:
+            figure = map_figure(dataset, source=source, measured=path)
+        except InputError as error:  # more panels than a page holds
+            parts.complain(f"no picture: {error}")
+        else:
+            parts.say(f"picture: {draw(lambda: figure, folder / 'compare.png')}")
+    return CONTRADICTING if found.contradicts else parts.DONE
 
 
 def leave_comparison(found: Comparison, folder: Path, sources: tuple[str, str]) -> list[str]:

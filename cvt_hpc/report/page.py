@@ -4,7 +4,6 @@
 """
 
 import base64
-import json
 from collections.abc import Callable, Iterator, Mapping
 from functools import partial
 from importlib import resources
@@ -20,18 +19,20 @@ import xarray as xr
 from markupsafe import Markup
 from matplotlib.figure import Figure
 
+from cvt_hpc.analysis.alignment import job_held
 from cvt_hpc.analysis.arrangement import Arrangement, Sides, arrange, known_values, value_text
 from cvt_hpc.analysis.classes import at_strongest_strand, check_results, map_classes, occurrence_classes
 from cvt_hpc.analysis.comparison import sample_sentences
 from cvt_hpc.analysis.figures import RESOLUTION, coordinate_unit, in_words, number, with_units
 from cvt_hpc.analysis.hysteresis_bands import hysteresis_figure
 from cvt_hpc.analysis.maps import AXIS, has_starts, map_figure
+from cvt_hpc.analysis.measured_score import score, score_sentences
 from cvt_hpc.analysis.probability import PROBABILITY, has_samples, over_samples
 from cvt_hpc.analysis.probability_drawing import onset_bands_figure, sensitivity_figure
 from cvt_hpc.analysis.scatter import is_sampled
 from cvt_hpc.analysis.value_maps import value_map_figure
 from cvt_hpc.errors import InputError, escaped, mismatch, one_line
-from cvt_hpc.job import Job, stored_job
+from cvt_hpc.job import Job
 from cvt_hpc.job.axes import SAMPLE
 from cvt_hpc.job.summary import core_time_in_words, rules_in_words, value_in_words
 from cvt_hpc.job.values import shown
@@ -76,7 +77,13 @@ class Row(NamedTuple):
     changed: bool
 
 
-def write_report(dataset: xr.Dataset, out: Path, source: str = "results", folder: Path | None = None) -> Path:
+def write_report(
+    dataset: xr.Dataset,
+    out: Path,
+    source: str = "results",
+    folder: Path | None = None,
+    measured: str | Path | None = None,
+) -> Path:
     """Write the page.
 
     Parameters
@@ -89,6 +96,8 @@ def write_report(dataset: xr.Dataset, out: Path, source: str = "results", folder
         Where the results are from, for the errors.
     folder : Path, optional
         Folder of the study: runs that `--check-step` and `--audit` have left in it are compared with its own.
+    measured : str or Path, optional
+        Measured file, drawn over the maps of a grid; a sentence says how far they agree.
 
     Returns
     -------
@@ -99,14 +108,14 @@ def write_report(dataset: xr.Dataset, out: Path, source: str = "results", folder
     Raises
     ------
     InputError
-        If the dataset holds no results of a study, or the system refuses.
+        If the dataset holds no results of a study, or the system refuses; as of `score`.
     """
     check_results(dataset, source)
     if (content := str(dataset.attrs.get(CONTENT, ""))) == HISTORY:
         raise mismatch(source, "results of a study", f"the {content}; `cvt-hpc plot` draws it")
     loader = jinja2.PackageLoader("cvt_hpc.report", ".")
     templates = jinja2.Environment(loader=loader, autoescape=True, finalize=_as_it_stands)
-    page = templates.get_template("page.html").render(_content(dataset, source, folder))
+    page = templates.get_template("page.html").render(_content(dataset, source, folder, measured))
     with written_aside(Path(out), parents=True) as aside:
         aside.write_text(page, encoding="utf-8")
     return Path(out)
@@ -117,9 +126,11 @@ def _as_it_stands(value: Any) -> Any:
     return escaped(value, KEPT) if isinstance(value, str) and not isinstance(value, Markup) else value
 
 
-def _content(dataset: xr.Dataset, source: str, folder: Path | None) -> dict[str, Any]:
+def _content(
+    dataset: xr.Dataset, source: str, folder: Path | None, measured: str | Path | None
+) -> dict[str, Any]:
     attributes = {str(key): str(value) for key, value in dataset.attrs.items()}
-    job = _job(attributes, source)
+    job = job_held(dataset, source)
     own = ["run", *(axis.name for axis in job.axes)] if job else dataset["status"].dims
     joined = [str(name) for name in dataset["status"].dims if name not in own]
     if joined:  # the attributes are those of one of several studies
@@ -143,6 +154,8 @@ def _content(dataset: xr.Dataset, source: str, folder: Path | None) -> dict[str,
             sentences += filter(None, [findings.slip_sentence(dataset, arrangement.x)])
     if not judged and not sentences:
         sentences = list(findings.range_sentences(dataset))
+    if measured is not None:
+        sentences += score_sentences(score(dataset, measured, source))
     combinations = int(np.prod([dataset.sizes[name] for name in beyond]))
     return {
         "name": one_line(attributes.get("job_name", source)),
@@ -155,9 +168,11 @@ def _content(dataset: xr.Dataset, source: str, folder: Path | None) -> dict[str,
         "windows": any("vibration from" in line or "vibration up to" in line for line in sentences),
         "next_steps": list(map(_with_code, next_steps(dataset, job, x))),
         # drawn beside the map of the browser, which has no such lines
-        "has_lines": ("eigenfrequency" in dataset and "amplitude" not in dataset) or PROBABILITY in cells,
+        "has_lines": ("eigenfrequency" in dataset and "amplitude" not in dataset)
+        or PROBABILITY in cells
+        or measured is not None,
         "map": _map(cells, source),
-        "pictures": _pictures(cells, arrangement, beyond, source),
+        "pictures": _pictures(cells, arrangement, beyond, source, measured),
         **{
             name: _encoded(partial(draw, dataset, source=source)) if PROBABILITY in cells else ""
             for name, draw in (("onset", onset_bands_figure), ("sensitivity", sensitivity_figure))
@@ -177,14 +192,6 @@ def _content(dataset: xr.Dataset, source: str, folder: Path | None) -> dict[str,
     }
 
 
-def _job(attributes: Mapping[str, str], source: str) -> Job | None:
-    """The job of a dataset; None where this version of the program cannot read it any more."""
-    try:
-        return stored_job(json.loads(attributes["job"]), source)
-    except (InputError, KeyError, ValueError, RecursionError):
-        return None
-
-
 def _arrangement(dataset: xr.Dataset, source: str) -> Arrangement | None:
     """Arrangement of a map of the study; None of samples and of single runs."""
     if is_sampled(dataset) or not dataset["status"].dims:
@@ -193,22 +200,27 @@ def _arrangement(dataset: xr.Dataset, source: str) -> Arrangement | None:
 
 
 def _pictures(
-    dataset: xr.Dataset, arrangement: Arrangement | None, beyond: list[str], source: str
+    dataset: xr.Dataset,
+    arrangement: Arrangement | None,
+    beyond: list[str],
+    source: str,
+    measured: str | Path | None,
 ) -> list[Picture]:
     """One printed map, or one for each of the first combinations of the axes beyond x, y and panels."""
     if arrangement is None or not beyond:
-        pictures = [Picture("", "", _picture(dataset, {}, source))]
+        pictures = [Picture("", "", _picture(dataset, {}, source, measured))]
     else:
         pictures = []
         if beyond == [AXIS] and has_starts(dataset, {}):
             heading = "Smallest and largest disturbance in one"
-            pictures.append(Picture(heading, "", _picture(dataset, {}, source)))
+            pictures.append(Picture(heading, "", _picture(dataset, {}, source, measured)))
         sides = Sides(arrangement.x, arrangement.y, arrangement.panel)
         for place in islice(product(*(dataset[name].values.tolist() for name in beyond)), MOST_MAPS):
             at = dict(zip(beyond, place, strict=True))
             part = arrange(dataset, at, source, sides)
             found = findings.summary(part.dataset)
-            pictures.append(Picture("; ".join(part.notes), found, _picture(dataset, at, source)))
+            picture = _picture(dataset, at, source, measured)
+            pictures.append(Picture("; ".join(part.notes), found, picture))
     return [one for one in pictures if one.picture]
 
 
@@ -235,7 +247,7 @@ def _axes(dataset: xr.Dataset, job: Job | None) -> list[tuple[str, str, str]]:
     return rows
 
 
-def _picture(dataset: xr.Dataset, at: Mapping[str, Any], source: str) -> str:
+def _picture(dataset: xr.Dataset, at: Mapping[str, Any], source: str, measured: str | Path | None) -> str:
     """The printed map as a PNG in base64; "" where there is nothing to draw.
 
     It shows quantities where nothing was judged.
@@ -244,8 +256,8 @@ def _picture(dataset: xr.Dataset, at: Mapping[str, Any], source: str) -> str:
     shown = () if has_verdicts else dict.fromkeys(one.key for one in quantities(dataset))
     drawn = [key for key in shown if dataset[key].dtype.kind in "iuf"][:MOST_VALUE_MAPS]
     if drawn:
-        return _encoded(lambda: value_map_figure(dataset, drawn, at, source))
-    return _encoded(lambda: map_figure(dataset, at, source))
+        return _encoded(lambda: value_map_figure(dataset, drawn, at, source, measured=measured))
+    return _encoded(lambda: map_figure(dataset, at, source, measured=measured))
 
 
 def _encoded(compose: Callable[[], Figure]) -> str:

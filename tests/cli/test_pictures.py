@@ -27,10 +27,12 @@ MARGIN = 0.01  # [inch]
 IN_GREY, IN_COLOUR = 15.0, 10.0  # differences that an eye sees without looking twice
 KINDS = {
     "map": "map R",
+    "map with measurements": "map R --at ratio=1 --measured M",
     "maps": "map R R2",
     "map of values": "map R --show efficiency --show amplitude --panel ratio",
     "waterfall": "plot waterfall R",
     "waterfall of panels": "plot waterfall R --x driving_speed --panel ratio --vmax 5um",
+    "waterfall with measurements": "plot waterfall R --panel ratio --measured M",
     "campbell": "plot campbell R",
     "campbell of panels": "plot campbell R --panel ratio --orders 1 2 3 8 16 24 --vmax 5um",
     "hysteresis": "plot hysteresis S",
@@ -41,6 +43,7 @@ KINDS = {
     "profile": "plot profile H H2",
     "profile of a wrap": "plot profile H H2 --of sliding --region driven --columns load",
     "ramp": "plot ramp L --vmax 5um",
+    "ramp with measurements": "plot ramp L --measured M",
     "spectrograms": "plot spectrogram H L V --vmax 5um",
     "element of an arc": "plot element H --region driven",
     "history": "plot history H",
@@ -60,6 +63,9 @@ def stored(tmp_path_factory):
     pictured.results().to_netcdf(files["R"])
     pictured.results().assign_attrs(job_name="other pictures").to_netcdf(files["R2"])
     pictured.ramps().to_netcdf(files["S"])
+    files["M"] = folder / "a_long_name_of_a_file_of_the_rig_and_its_day.csv"
+    heads = (f"{name}_{end}" for name in ("load", "measured_load") for end in ("from [N m]", "to [N m]"))
+    files["M"].write_text(f"{','.join(heads)}\n60,150,20,180\n")
     histories = {"H": {}, "H2": {"load": 80.0}, "L": {"ramped": "load"}, "V": {"ramped": "driving_speed"}}
     for letter, options in histories.items():
         files[letter] = write_history(pictured.history(**options), folder / f"run_{letter}.nc")
