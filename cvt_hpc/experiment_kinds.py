@@ -79,6 +79,17 @@ EXPERIMENTS = {
         "earlier studies of the folder",
         "{}; fit.KEY replaces a number of [fit]",
     ),
+    "calibrate": Experiment(
+        "cvt_hpc.experiments.calibrate",
+        "weigh the samples of a job's uncertain parameters by measured noise",
+        "earlier runs",
+        has_table=False,
+        options={
+            "measured": "file with measured noise: windows, onsets or peaks, as `map --measured` takes it",
+            "doubt": "share of cells that model or rig may judge otherwise (default: 0.05)",
+            "scatter": "standard error of frequencies (default: 20 Hz)",
+        },
+    ),
 }
 
 

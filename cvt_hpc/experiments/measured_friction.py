@@ -27,6 +27,7 @@ from scipy.optimize import least_squares
 
 from cvt_hpc.analysis.figures import WIDTH, draw, line_style
 from cvt_hpc.errors import mismatch
+from cvt_hpc.experiments.uncertain_lines import Scattered, given, uncertain_lines
 from cvt_hpc.job.csv_files import read_csv
 from cvt_hpc.parameters import Column, FromFile, RowError
 from cvt_hpc.physics.friction import friction_coefficients, friction_law
@@ -129,8 +130,8 @@ def read_measured(path: str | Path) -> Measured:
     return found
 
 
-def _measured(given: Mapping[str, Column]) -> dict[str, Any]:
-    arrays = {name: np.array(column.values) for name, column in given.items()}
+def _measured(table: Mapping[str, Column]) -> dict[str, Any]:
+    arrays = {name: np.array(column.values) for name, column in table.items()}
     for row, (speed, mu) in enumerate(zip(arrays["speed"], arrays["mu"], strict=True)):
         if speed < 0.0:
             raise RowError(row, "a speed of 0 or more (a magnitude)", f"{speed:g} m/s")
@@ -138,7 +139,7 @@ def _measured(given: Mapping[str, Column]) -> dict[str, Any]:
             raise RowError(row, "a coefficient of friction > 0", f"{mu:g}")
     count = len(arrays["speed"])
     force = arrays.get("force", np.full(count, np.nan))
-    unit = given["force"].unit if "force" in given else ""
+    unit = table["force"].unit if "force" in table else ""
     specimen = arrays.get("specimen", np.zeros(count))
     if len(np.unique(arrays["speed"])) < LEAST_SPECIMENS:
         raise ValueError(f"expected {LEAST_SPECIMENS} different speeds or more, found fewer")
@@ -156,7 +157,8 @@ def _values(keys: Sequence[str], x: Array) -> dict[str, float]:
 def _curve(law: Law, keys: Sequence[str], x: Array, speeds: Array) -> Array:
     """Coefficients of a law (n,) at speeds (n,) [m/s]."""
     has = {"friction_gradient": 0.0, "stribeck_velocity": 1.0} | _values(keys, x)
-    made = friction_law(law.name.lower(), *(has[key] for key in _PARAMETERS))
+    kinetic, gradient, scale = (has[key] for key in _PARAMETERS)
+    made = friction_law(law.name.lower(), kinetic, gradient, scale)
     found: Array = friction_coefficients(made, speeds, np.zeros_like(speeds))
     return found
 
@@ -231,12 +233,13 @@ def fit_law(law: Law, measured: Measured) -> Fitted | None:
         return None
     share = _independent(residuals, speed)
     variance = square / max(n - k / share, 1.0)
-    covariance = variance * np.linalg.inv(slopes.T @ slopes) / share
+    covariance: Any = variance * np.linalg.inv(slopes.T @ slopes) / share
     specimens = np.unique(measured.specimen)
     if len(specimens) >= LEAST_SPECIMENS:
         parts = [measured.specimen == one for one in specimens]
         found = np.array([_least(law, keys, speed[part], mu[part]) for part in parts])
-        x, covariance = found.mean(0), np.atleast_2d(np.cov(found, rowvar=False))
+        x = found.mean(0)
+        covariance = np.cov(found, rowvar=False).reshape(len(keys), -1).astype(np.float64)
     count = len(specimens) if len(specimens) >= LEAST_SPECIMENS else 0
     return Fitted(law, keys, x, covariance, float(np.sqrt(square / n)), share, np.inf, count)
 
@@ -284,51 +287,22 @@ def by_force(fitted: Fitted, measured: Measured) -> tuple[float, float] | None:
 
 def job_lines(fitted: Fitted) -> list[str]:
     """Tables [friction] and [uncertain] of a job, with the law and its uncertainty."""
-    values, deviations = fitted.values(), fitted.deviations()
+    values = fitted.values()
     lines = ["[friction]", f'friction_law = "{fitted.law.name.lower()}"']
     lines += ["# for the law without its uncertainty, leave the other tables out"]
-    lines += [f"# {key} = {_given(key, value)}" for key, value in values.items()]
+    lines += [f"# {key} = {given(value, _PARAMETERS[key])}" for key, value in values.items()]
     if fitted.law is Law.COULOMB:
         lines.append("friction_gradient = 0")
-    what = (
-        f"scatter of {fitted.of_specimens} specimens"
-        if fitted.of_specimens
-        else "uncertainty of the mean law"
-    )
-    lines += ["", f"[uncertain] # {what}", "samples = 64"]
-    for key, value in values.items():
-        kind, mean, spread, limit = "normal", value, deviations[key], ""
-        if _is_log(key):  # moments of a speed whose logarithm is normal
-            place = fitted.keys.index(key)
-            variance = float(fitted.covariance[place, place])
-            kind, mean = "log_normal", value * float(np.exp(0.5 * variance))
-            spread = mean * float(np.sqrt(np.expm1(variance)))
-        elif key == "friction_gradient":
-            limit = f", to = {_given(key, 0.0)}"
-        else:
-            limit = f", from = {_given(key, 0.1 * value)}"
-        numbers = f"mean = {_given(key, mean)}, standard_deviation = {_given(key, spread)}{limit}"
-        lines.append(f'{key} = {{ distribution = "{kind}", {numbers} }}')
-    if len(values) > 1:
-        deviation = np.sqrt(np.diag(fitted.covariance))
-        matrix = fitted.covariance / np.outer(deviation, deviation)
-        rows = ["[" + ", ".join(f"{one:.4f}" for one in row) + "]" for row in _positive(matrix)]
-        names = ", ".join(f'"{key}"' for key in values)
-        lines += ["", "[uncertain.correlation]", f"parameters = [{names}]", f"matrix = [{', '.join(rows)}]"]
-    return lines
-
-
-def _positive(matrix: Array) -> Array:
-    """The matrix with correlations reduced until four digits keep it positive definite."""
-    least = float(np.linalg.eigvalsh(matrix).min())
-    share = max(0.0, (1e-3 - least) / (1.0 - least))
-    found: Array = (1.0 - share) * matrix + share * np.eye(len(matrix))
-    return found
-
-
-def _given(key: str, value: float) -> str:
-    unit = _PARAMETERS[key]
-    return f'"{value:.6g} {unit}"' if unit else f"{value:.6g}"
+    least = 0.1 * values["kinetic_friction"]
+    limits = {"kinetic_friction": (least, np.inf), "friction_gradient": (-np.inf, 0.0)}
+    parameters = [
+        Scattered(key, unit, _is_log(key), *limits.get(key, ()))
+        for key, unit in _PARAMETERS.items()
+        if key in fitted.keys
+    ]
+    count = fitted.of_specimens
+    what = f"scatter of {count} specimens" if count else "uncertainty of the mean law"
+    return [*lines, "", *uncertain_lines(parameters, fitted.estimate, fitted.covariance, what)]
 
 
 def law_lines(laws: Sequence[Fitted], measured: Measured) -> list[str]:
