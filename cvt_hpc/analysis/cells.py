@@ -10,7 +10,7 @@ from matplotlib.axes import Axes
 from matplotlib.cm import ScalarMappable
 from matplotlib.collections import LineCollection
 from matplotlib.colorbar import Colorbar
-from matplotlib.colors import Colormap, ListedColormap, Normalize, to_hex, to_rgba
+from matplotlib.colors import Colormap, ListedColormap, LogNorm, Normalize, to_hex, to_rgba
 from matplotlib.figure import Figure, FigureBase
 from matplotlib.image import PcolorImage
 from matplotlib.legend_handler import HandlerTuple
@@ -22,9 +22,16 @@ from numpy.typing import NDArray
 
 from cvt_hpc.analysis.arrangement import Ruler
 from cvt_hpc.analysis.classes import OccurrenceClass
+from cvt_hpc.errors import mismatch, show
 from cvt_hpc.vibration.classes import PairClass, StartClass
 
 Array = NDArray[np.float64]
+# [um] All maps have one scale of amplitudes, so that they compare: from less than the threshold of vibration to
+# the largest of pushbelts; equal ratios, as in dB, are equally far apart.
+AMPLITUDES = 2.0, 200.0
+AMPLITUDE_TICKS = 2, 5, 10, 20, 50, 100, 200
+FIT = "fit"  # instead of a value: colours end where the amplitudes of a map do
+End = float | str | None
 # share of values on a scale, where the others reach so far beyond; of so many
 MOST, FAR, MANY = 0.98, 1.5, 20
 MOST_BORDERS = 20_000  # sides between cells of different class: more would hide the cells
@@ -123,12 +130,25 @@ def norm_over(values: Array, lowest: float | None = None, highest: float | None 
     return Normalize(low, high) if high > low else Normalize(low - 0.5, high + 0.5)
 
 
+def amplitude_norm(values: Array, vmax: End = None) -> Normalize:
+    """Scale of amplitudes [um]: logarithmic over AMPLITUDES; or linear from zero to `vmax` [m], or to FIT."""
+    if vmax is None:
+        return LogNorm(*AMPLITUDES)
+    if isinstance(vmax, str) and vmax != FIT:
+        raise mismatch("vmax", f'a number or "{FIT}"', show(vmax))
+    return norm_over(values, 0.0, None if isinstance(vmax, str) else 1e6 * vmax)
+
+
 def colour_bar(figure: Figure, scale: Scale, values: Array, **options: Any) -> Colorbar:
     """Draw the colour bar of a scale; it has a point where values lie beyond its end."""
     above, below = np.nanmax(values) > scale.norm.vmax, np.nanmin(values) < scale.norm.vmin
     extend = {(True, True): "both", (True, False): "max", (False, True): "min"}.get((above, below), "neither")
     mappable = ScalarMappable(scale.norm, scale.colours)
-    return figure.colorbar(mappable, extend=extend, label=scale.label, **options)
+    bar = figure.colorbar(mappable, extend=extend, label=scale.label, **options)
+    if isinstance(scale.norm, LogNorm):
+        bar.set_ticks(AMPLITUDE_TICKS, labels=list(map(str, AMPLITUDE_TICKS)))
+        bar.minorticks_off()
+    return bar
 
 
 def draw_cells(

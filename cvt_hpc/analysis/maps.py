@@ -60,7 +60,7 @@ def map_figure(
     at: layout.At = None,
     source: str = "results",
     sides: layout.Sides = layout.CHOSEN,
-    vmax: float | None = None,
+    vmax: cells.End = None,
 ) -> Figure:
     """Draw where vibration occurs.
 
@@ -76,9 +76,9 @@ def map_figure(
         Of samples of uncertain parameters the probability of vibration is drawn.
     sides : Sides
         Which axis runs along x, along y and over the panels; of a grid.
-    vmax : float
-        Amplitude at which the colours end [m]; by default that of 98 % of the vibrating cells, where few lie
-        far above it.
+    vmax : float or "fit"
+        Amplitude at which linear colours end [m], or that of the map, of 98 % of the vibrating cells where few
+        lie far above; by default they are logarithmic, and those of all maps.
     """
     dataset = standard(dataset, source)
     check_results(dataset, source)
@@ -173,13 +173,13 @@ class Sheet:
         return width >= 22 and height >= 22  # [point]
 
 
-def _grid_figure(arrangement: layout.Arrangement, vmax: float | None, source: str) -> Figure:
+def _grid_figure(arrangement: layout.Arrangement, vmax: cells.End, source: str) -> Figure:
     """Compose the map of a study over a grid; to be called within STYLE."""
     sheet = sheet_of(arrangement, source)
     figure = Figure((figures.WIDTH, sheet.height + FRAME), layout="constrained")
     # not shared: matplotlib would go through all panels for each
     axes = figure.subplots(sheet.blocks * sheet.rows, sheet.columns, squeeze=False)
-    norm = cells.norm_over(sheet.amplitude, 0.0, None if vmax is None else 1e6 * vmax)
+    norm = cells.amplitude_norm(sheet.amplitude, vmax)
     amplitude = cells.Scale(cells.AMPLITUDE_COLOURS, norm, "amplitude [µm]")
     draw_block(figure, axes[: sheet.rows], sheet, sheet.amplitude, amplitude)
     texts = [(OccurrenceClass.IRREGULAR, sheet.irregular)] if sheet.has_room else []

@@ -35,7 +35,8 @@ def add(commands: Any) -> None:
     picture.add_argument("--out", type=Path, metavar="PNG", help=text)
     parts.add_assignments(picture, "--at", "fix an axis at a value")
     parts.add_sides(picture)
-    text = "value at which the colours end, such as '20 um' (default: that of 98 %% of the cells)"
+    text = "value at which the colours end, such as '20 um', or fit: that of 98 %% of the cells (default: "
+    text += "fit, but of occurrence 2 to 200 um on a logarithmic scale, as in all maps)"
     picture.add_argument("--vmax", metavar="VALUE", help=text)
     text = "draw an axis log or linear (default: log where its values are spread so); may be repeated"
     picture.add_argument("--spacing", action="append", default=[], metavar="AXIS=SPACING", help=text)
@@ -44,6 +45,8 @@ def add(commands: Any) -> None:
     text = "write a page about a study: what was found, a map with values, failed runs, cost, assumptions"
     page = parts.add_command(commands, "report", _report, text, "RESULTS")
     page.add_argument("--out", type=Path, metavar="HTML", help="default: report.html beside the dataset")
+    text = "write it again every so often, such as 30s, from the records of a running sweep, until that ends"
+    page.add_argument("--every", metavar="TIME", help=text)
     text = "compare two methods or two designs, cell by cell; exit status 1: two methods contradict somewhere"
     compare = parts.add_command(commands, "compare", _compare, text, "RESULTS")
     compare.add_argument("other", type=Path, metavar="RESULTS", help="the one to compare with it")
@@ -52,12 +55,14 @@ def add(commands: Any) -> None:
 
 
 def _status(arguments: argparse.Namespace) -> int:
-    from cvt_hpc.printing import status_lines
+    from cvt_hpc.printing import status_rows
     from cvt_hpc.study import read_status
+    from cvt_hpc.tables import columns
 
     status = read_status(arguments.path)
     parts.complain(*status.warnings)
-    parts.say(*([json.dumps(asdict(status))] if arguments.json else status_lines(status)))
+    in_words = columns(status_rows(status), indent="")
+    parts.say(*([json.dumps(asdict(status))] if arguments.json else in_words))
     return parts.DONE
 
 
@@ -108,7 +113,8 @@ def _map(arguments: argparse.Namespace) -> int:
         out = arguments.out or parts.picture_beside(arguments.path, files, *words)
         vmax, shown = None, arguments.show[0] if arguments.show else "amplitude"
         if shown in dataset:  # what draws it refuses a quantity that is not known
-            vmax = parts.colour_end(arguments.vmax, str(dataset[shown].attrs.get("units", "")))
+            unit = str(dataset[shown].attrs.get("units", ""))
+            vmax = parts.colour_end(arguments.vmax, unit, fits=bool(arguments.show))
         if arguments.show:
             shown = arguments.show
             draw(lambda: value_map_figure(dataset, shown, at, source, sides, vmax), out)
@@ -134,6 +140,14 @@ def _report(arguments: argparse.Namespace) -> int:
 
     out = arguments.out or parts.folder_of(arguments.path) / "report.html"
     parts.check_output(out, (".html",))
+    if arguments.every:
+        from cvt_hpc.job.units import read_duration
+        from cvt_hpc.printing import status_rows
+        from cvt_hpc.report.following import follow_report
+
+        every = read_duration(arguments.every, "--every")
+        parts.say(f"report: {follow_report(arguments.path, out, every, status_rows)}")
+        return parts.DONE
     with parts.opened_results(arguments.path) as dataset:
         written = write_report(dataset, out, str(arguments.path), parts.folder_of(arguments.path))
         parts.say(f"report: {written}")

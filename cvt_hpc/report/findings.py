@@ -30,7 +30,7 @@ OF_COMPUTATION = (  # come behind what is about the belt
     *("core_seconds", "simulated_seconds", "time_step", "refinements", "steps", "contact_solves"),
 )
 
-MOST_LINES = 12  # lines of the map that are told apart
+MOST_LINES = 8  # lines of the map that are told apart, on the first page
 MOST_RANGES = 6  # quantities
 NARROW = 1.05  # largest over least frequency of a line that are told apart
 STATUS = {int(status): status.name.lower() for status in Status}

@@ -5,7 +5,7 @@
 
 import base64
 import json
-from collections.abc import Callable, Iterator, Mapping
+from collections.abc import Callable, Iterator, Mapping, Sequence
 from functools import partial
 from importlib import resources
 from io import BytesIO
@@ -43,7 +43,7 @@ from cvt_hpc.storage.files import written_aside
 from cvt_hpc.storage.netcdf import CONTENT, HISTORY
 from cvt_hpc.study.intervals import look
 from cvt_hpc.variables import Status
-from cvt_hpc.vibration.classes import OccurrenceClass, levels, onsets
+from cvt_hpc.vibration.classes import DECIDED, OccurrenceClass, levels, onsets
 
 COARSE = 0.02  # of an axis: a step beyond is worth a smaller one
 _RETRIES = {
@@ -52,6 +52,7 @@ _RETRIES = {
     Status.TIMED_OUT: "with a longer `--run-limit`",
 }
 
+MOST_CHANGED = 8  # parameters named on the first page
 MOST_FAILURES = 30  # kinds of failure in the table
 MOST_MAPS = 12  # of combinations of the axes that no map has room for
 MOST_VALUE_MAPS = 2  # quantities in a picture, of a study that judges no vibration
@@ -67,6 +68,18 @@ class Picture(NamedTuple):
     picture: str
 
 
+class Progress(NamedTuple):
+    """How far a study is: names and values in words, share of the runs on record, when the page was made.
+
+    `every` [s] is after what time a browser reads the page again; None once it is the last one.
+    """
+
+    rows: Sequence[tuple[str, str]]
+    share: float
+    made: str
+    every: float | None
+
+
 class Row(NamedTuple):
     """A parameter of the job: value in words, what it is, and whether it is other than the default."""
 
@@ -76,7 +89,13 @@ class Row(NamedTuple):
     changed: bool
 
 
-def write_report(dataset: xr.Dataset, out: Path, source: str = "results", folder: Path | None = None) -> Path:
+def write_report(
+    dataset: xr.Dataset,
+    out: Path,
+    source: str = "results",
+    folder: Path | None = None,
+    progress: Progress | None = None,
+) -> Path:
     """Write the page.
 
     Parameters
@@ -89,6 +108,8 @@ def write_report(dataset: xr.Dataset, out: Path, source: str = "results", folder
         Where the results are from, for the errors.
     folder : Path, optional
         Folder of the study: runs that `--check-step` and `--audit` have left in it are compared with its own.
+    progress : Progress, optional
+        Heads the page. Of one that a browser reads again the map is the printed one.
 
     Returns
     -------
@@ -106,7 +127,7 @@ def write_report(dataset: xr.Dataset, out: Path, source: str = "results", folder
         raise mismatch(source, "results of a study", f"the {content}; `cvt-hpc plot` draws it")
     loader = jinja2.PackageLoader("cvt_hpc.report", ".")
     templates = jinja2.Environment(loader=loader, autoescape=True, finalize=_as_it_stands)
-    page = templates.get_template("page.html").render(_content(dataset, source, folder))
+    page = templates.get_template("page.html").render(_content(dataset, source, folder, progress))
     with written_aside(Path(out), parents=True) as aside:
         aside.write_text(page, encoding="utf-8")
     return Path(out)
@@ -117,9 +138,11 @@ def _as_it_stands(value: Any) -> Any:
     return escaped(value, KEPT) if isinstance(value, str) and not isinstance(value, Markup) else value
 
 
-def _content(dataset: xr.Dataset, source: str, folder: Path | None) -> dict[str, Any]:
+def _content(
+    dataset: xr.Dataset, source: str, folder: Path | None, progress: Progress | None
+) -> dict[str, Any]:
     attributes = {str(key): str(value) for key, value in dataset.attrs.items()}
-    job = _job(attributes, source)
+    name, job = one_line(attributes.get("job_name", source)), _job(attributes, source)
     own = ["run", *(axis.name for axis in job.axes)] if job else dataset["status"].dims
     joined = [str(name) for name in dataset["status"].dims if name not in own]
     if joined:  # the attributes are those of one of several studies
@@ -128,6 +151,7 @@ def _content(dataset: xr.Dataset, source: str, folder: Path | None) -> dict[str,
     arrangement = _arrangement(cells, source)
     found = findings.failures(dataset)
     parameters = _parameters(job) if job else {}
+    changed = [row for rows in parameters.values() for row in rows if row.changed]
     sentences: list[str] = []
     beyond: list[str] = []
     judged, x = findings.is_judged(dataset), None
@@ -143,20 +167,23 @@ def _content(dataset: xr.Dataset, source: str, folder: Path | None) -> dict[str,
             sentences += filter(None, [findings.slip_sentence(dataset, arrangement.x)])
     if not judged and not sentences:
         sentences = list(findings.range_sentences(dataset))
+    basis = [*map(_with_code, _basis(dataset, job, changed)), *_samples(dataset, folder, source)]
+    is_renewed = progress is not None and progress.every is not None
     combinations = int(np.prod([dataset.sizes[name] for name in beyond]))
     return {
-        "name": one_line(attributes.get("job_name", source)),
-        "description": attributes.get("title", ""),
+        "name": name,
+        "description": title if (title := attributes.get("title", "")) != name else "",
         "model": f"{job.model}: {load_model(job.model).title}" if job else "",
         "axes": _axes(dataset, job),
         "joined": " and ".join(joined),
         "summary": findings.summary(dataset),
         "sentences": list(map(_with_code, sentences)),
         "windows": any("vibration from" in line or "vibration up to" in line for line in sentences),
-        "next_steps": list(map(_with_code, next_steps(dataset, job, x))),
+        "progress": progress,
+        "next_steps": [] if is_renewed else list(map(_with_code, next_steps(dataset, job, x))),
         # drawn beside the map of the browser, which has no such lines
         "has_lines": ("eigenfrequency" in dataset and "amplitude" not in dataset) or PROBABILITY in cells,
-        "map": _map(cells, source),
+        "map": None if is_renewed else _map(cells, source),
         "pictures": _pictures(cells, arrangement, beyond, source),
         **{
             name: _encoded(partial(draw, dataset, source=source)) if PROBABILITY in cells else ""
@@ -169,9 +196,9 @@ def _content(dataset: xr.Dataset, source: str, folder: Path | None) -> dict[str,
         "failed": findings.counted(sum(one.runs for one in found), "run"),
         "cost": _cost(dataset),
         "quality": _quality(dataset),
-        "samples": _samples(dataset, folder, source),
+        "basis": [] if is_renewed else basis,
         "parameters": parameters,
-        "changed": [row for rows in parameters.values() for row in rows if row.changed],
+        "changed": changed,
         "derived": rules_in_words(job, job.schema) if job else [],
         "provenance": _provenance(attributes),
     }
@@ -276,6 +303,26 @@ def _map(dataset: xr.Dataset, source: str) -> dict[str, str] | None:
 
     program = resources.files("cvt_hpc.report").joinpath("map.js").read_text(encoding="utf-8")
     return {"library": get_plotlyjs(), "numbers": as_script(map_data(dataset, source)), "program": program}
+
+
+def _basis(dataset: xr.Dataset, job: Job | None, changed: Sequence[Row]) -> Iterator[str]:
+    """State what the findings rest on: verdict, parameters, runs without a verdict, program."""
+    if job is not None:
+        if "amplitude_threshold" in job.parameters:
+            least = job.parameters["amplitude_threshold"]
+            factor, unit = findings.length_unit(least)
+            threshold = f"{factor * least:.3g} {unit} or more (`amplitude_threshold`)"
+            yield f"A run vibrates where the amplitude of a strand is {threshold}."
+        told = [f"{row.key.replace('_', ' ')} {row.value}" for row in changed[:MOST_CHANGED]]
+        told += [f"{more} more"] if (more := len(changed) - MOST_CHANGED) > 0 else []
+        start = f"Other than the defaults: {', '.join(told)}. All else" if told else "All that is fixed"
+        yield f"{start} is at its default, which is an assumption where no paper gives it."
+    classes = map_classes(dataset).values
+    without = [(kind, int(np.sum(classes == kind))) for kind in OccurrenceClass if kind not in DECIDED]
+    if counts := ", ".join(f"{count} {kind.label}" for kind, count in without if count):
+        yield f"Runs that are neither quiet nor vibrating: {counts}."
+    if "source" in dataset.attrs:
+        yield f"Computed by {dataset.attrs['source']}."
 
 
 def _cost(dataset: xr.Dataset) -> str:

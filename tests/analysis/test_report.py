@@ -118,6 +118,18 @@ def page_of(results, tmp_path):
         return words_of(write_report(results, tmp_path / "report.html"))
 
 
+def test_the_page_begins_with_what_one_hands_on(page):
+    words = words_of(page)
+    headings = ["Study", "Findings", "What it rests on", "Map", "Next steps", "Failed runs", "Parameters"]
+    found = re.findall(r"<h2>(.*?)</h2>", page.read_text())
+    assert [one for one in found if one in headings] == headings
+    first = page.read_text().partition("Next steps")[0]
+    assert first.count('<div class="front">') == 1 and first.rstrip().endswith("</div>\n\n<h2>")
+    assert "A run vibrates where the amplitude of a strand is 5 µm or more ( amplitude_threshold )." in words
+    assert "All that is fixed is at its default, which is an assumption" in words
+    assert re.search(r"Runs that are neither quiet nor vibrating: \d+ undecided, \d failed", words)
+
+
 def test_what_turns_the_direction_of_a_text_is_seen(tmp_path):
     turning = "".join(map(chr, [0x061C, 0x200E, 0x200F, *range(0x202A, 0x202F), *range(0x2066, 0x206A)]))
     results = study(**SMALL)
@@ -455,3 +467,7 @@ def test_it_prints_on_paper(page):
     assert "Point at a run" not in words  # the printed map stands in the place of that to point at
     assert sum(len(one.images) for one in pages) == 1
     assert "[belt] ring_mass" in words  # the defaults, which are folded on the screen
+    handed_on = [" ".join(one.extract_text().split()) for one in pages[:2]]
+    assert "Findings" in handed_on[0] and "What it rests on" in handed_on[0]
+    assert "Map" in handed_on[1] and len(pages[1].images) == 1
+    assert "Next steps" not in " ".join(handed_on)

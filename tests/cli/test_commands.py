@@ -44,6 +44,10 @@ def test_run_status_gather_and_map_of_one_study(write_job, call, tmp_path):
         ["map: out/x/map_sheave_stiffness=3.png"],
         [],
     )
+    assert call("report", "out/x", "--every", "1s") == (0, ["report: out/x/report.html"], [])
+    assert "(finished" in (tmp_path / "out/x/report.html").read_text()
+    status, _, told = call("report", "out/x", "--every", "soon")
+    assert status == 2 and told[0].startswith("cvt-hpc: --every: expected")
     assert call("map", "out/x/results.nc", "--out", "y.png") == (0, ["map: y.png"], [])
     assert call("map", "out/x", "out/x/results.nc") == (0, ["map: out/x/maps.png"], [])
     status, _, told = call("map", "out/x", "--show", "vibrate", "--vmax", "20 um")
