@@ -102,7 +102,7 @@ class Results:
         x, y, panel : str
             Axes that run along x, along y and over the panels.
         vmax : float or "fit"
-            Where the colours end [SI unit of what is shown]; of amplitudes by default where those of all maps do.
+            Where the colours end [SI unit of what is shown]; of occurrence by default as in all maps.
         beside : Dataset or sequence of Dataset
             Further studies over the same axes: a panel for each, on one scale of colours.
         **at

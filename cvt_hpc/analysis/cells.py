@@ -26,8 +26,8 @@ from cvt_hpc.errors import mismatch, show
 from cvt_hpc.vibration.classes import PairClass, StartClass
 
 Array = NDArray[np.float64]
-# [um] All maps have one scale of amplitudes, so that they compare: from less than the threshold of vibration to
-# the largest of pushbelts; equal ratios, as in dB, are equally far apart.
+# [um] All maps have one scale of amplitudes, so that they compare: from less than the threshold of vibration
+# to the largest of pushbelts; equal ratios, as in dB, are equally far apart.
 AMPLITUDES = 2.0, 200.0
 AMPLITUDE_TICKS = 2, 5, 10, 20, 50, 100, 200
 FIT = "fit"  # instead of a value: colours end where the amplitudes of a map do

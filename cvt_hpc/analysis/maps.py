@@ -77,8 +77,8 @@ def map_figure(
     sides : Sides
         Which axis runs along x, along y and over the panels; of a grid.
     vmax : float or "fit"
-        Amplitude at which linear colours end [m], or that of the map, of 98 % of the vibrating cells where few
-        lie far above; by default they are logarithmic, and those of all maps.
+        Amplitude at which linear colours end [m], or that of this map, of 98 % of the vibrating cells where
+        few lie far above; by default they are logarithmic, and those of all maps.
     """
     dataset = standard(dataset, source)
     check_results(dataset, source)

@@ -68,7 +68,7 @@ def sides_of(arguments: argparse.Namespace) -> Sides:
 
 
 def colour_end(text: str | None, unit: str, *, fits: bool = True) -> Any:
-    """Return the value at which colours end [SI], of a quantity of this SI unit; `fits`: they fit by default."""
+    """Return where colours end [SI], of a quantity of this SI unit; `fits`: they fit by default."""
     from cvt_hpc.analysis.cells import FIT
     from cvt_hpc.job.units import unit_in
     from cvt_hpc.job.values import read_value

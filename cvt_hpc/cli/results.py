@@ -111,12 +111,13 @@ def _map(arguments: argparse.Namespace) -> int:
         files = [file for path in paths for file in parts.files_of(path)]
         words = (kind, *arguments.show, *arguments.at)
         out = arguments.out or parts.picture_beside(arguments.path, files, *words)
-        vmax, shown = None, arguments.show[0] if arguments.show else "amplitude"
-        if shown in dataset:  # what draws it refuses a quantity that is not known
-            unit = str(dataset[shown].attrs.get("units", ""))
+        vmax, coloured = None, arguments.show[0] if arguments.show else "amplitude"
+        if coloured in dataset:  # what draws it refuses a quantity that is not known
+            unit = str(dataset[coloured].attrs.get("units", ""))
             vmax = parts.colour_end(arguments.vmax, unit, fits=bool(arguments.show))
-        if arguments.show:
-            shown = arguments.show
+        from cvt_hpc.report.findings import shown_quantities
+
+        if shown := arguments.show or shown_quantities(dataset):
             draw(lambda: value_map_figure(dataset, shown, at, source, sides, vmax), out)
             parts.say(f"map: {out}")
             return parts.DONE

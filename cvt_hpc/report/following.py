@@ -1,4 +1,4 @@
-"""The page of a study while a sweep is at work in its folder: written again and again, from the records alone."""
+"""The page of a study while a sweep is at work in its folder: written again and again, from the records."""
 
 import time
 from collections.abc import Callable, Sequence

@@ -37,7 +37,6 @@ from cvt_hpc.job.summary import core_time_in_words, rules_in_words, value_in_wor
 from cvt_hpc.job.values import shown
 from cvt_hpc.models.contract import load_model
 from cvt_hpc.report import findings
-from cvt_hpc.report.findings import quantities
 from cvt_hpc.report.interactive import KEPT, as_script, map_data
 from cvt_hpc.storage.files import written_aside
 from cvt_hpc.storage.netcdf import CONTENT, HISTORY
@@ -55,7 +54,6 @@ _RETRIES = {
 MOST_CHANGED = 8  # parameters named on the first page
 MOST_FAILURES = 30  # kinds of failure in the table
 MOST_MAPS = 12  # of combinations of the axes that no map has room for
-MOST_VALUE_MAPS = 2  # quantities in a picture, of a study that judges no vibration
 # What tells how well a run was computed, where its model records it
 _QUALITY = ("power_residual", "step_ripple", "refinements", "time_step", "simulated_seconds", "core_seconds")
 
@@ -267,10 +265,7 @@ def _picture(dataset: xr.Dataset, at: Mapping[str, Any], source: str) -> str:
 
     It shows quantities where nothing was judged.
     """
-    has_verdicts = findings.is_judged(dataset) or PROBABILITY in dataset
-    shown = () if has_verdicts else dict.fromkeys(one.key for one in quantities(dataset))
-    drawn = [key for key in shown if dataset[key].dtype.kind in "iuf"][:MOST_VALUE_MAPS]
-    if drawn:
+    if drawn := findings.shown_quantities(dataset):
         return _encoded(lambda: value_map_figure(dataset, drawn, at, source))
     return _encoded(lambda: map_figure(dataset, at, source))
 

@@ -204,7 +204,7 @@ def write_results(folder: StudyFolder, study: Study, records: Records) -> Path:
 
 @contextmanager
 def recorded_results(records: Records) -> Iterator[xr.Dataset]:
-    """The dataset of records that were read, without spectra, open within; nothing in their folder changes."""
+    """The dataset of records that were read, without spectra, open within; their folder stays as it is."""
     study = records.study
     kept = [one for one in study.variables if math.prod(study.record_dtype[one.name].shape) <= LONGEST]
     with TemporaryDirectory(prefix="cvt-hpc-") as aside:

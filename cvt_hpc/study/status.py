@@ -92,7 +92,7 @@ def read_status(out: str | Path) -> StudyStatus:
 
 
 def status_of(folder: StudyFolder, records: Records, running: bool) -> StudyStatus:
-    """Return how far a study is by its records; `running`: whether a sweep was at work before they were read."""
+    """Return how far a study is by its records; `running`: a sweep was at work before they were read."""
     study = records.study
     recorded = int(records.recorded.sum())
     done = int((records.status == Status.DONE).sum())
