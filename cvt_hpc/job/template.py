@@ -121,7 +121,7 @@ def job_template(name: str, model: str, source: str) -> str:
     lines += [
         "",
         "[axes]  # what the study varies: any key with a number or a choice",
-        "# as a list of values, or as a range: { from = 1, to = 9, count = 5 }, or with step = 2 for count = 5",
+        "# as a list of values, or as a range: { from = 1, to = 9, count = 5 }, or step = 2 for count",
         *axes,
     ]
     for section, table in schema.sections.items():

@@ -6,6 +6,7 @@
 import base64
 import json
 from collections.abc import Callable, Iterator, Mapping, Sequence
+from dataclasses import replace
 from functools import partial
 from importlib import resources
 from io import BytesIO
@@ -34,7 +35,8 @@ from cvt_hpc.errors import InputError, escaped, mismatch, one_line
 from cvt_hpc.job import Job, stored_job
 from cvt_hpc.job.axes import SAMPLE
 from cvt_hpc.job.summary import core_time_in_words, rules_in_words, value_in_words
-from cvt_hpc.job.values import shown
+from cvt_hpc.job.units import factor_to
+from cvt_hpc.job.values import JOB_UNITS, shown
 from cvt_hpc.models.contract import load_model
 from cvt_hpc.report import findings
 from cvt_hpc.report.interactive import KEPT, as_script, map_data
@@ -205,8 +207,12 @@ def _content(
 def _job(attributes: Mapping[str, str], source: str) -> Job | None:
     """The job of a dataset; None where this version of the program cannot read it any more."""
     try:
-        return stored_job(json.loads(attributes["job"]), source)
-    except (InputError, KeyError, ValueError, RecursionError):
+        job = stored_job(json.loads(attributes["job"]), source)
+        units = json.loads(attributes.get(JOB_UNITS, "{}"))
+        known = job.schema.parameters
+        legal = {k: u for k, u in units.items() if k in known and factor_to(str(u), known[k].unit)}
+        return replace(job, units=legal)
+    except (AttributeError, InputError, KeyError, TypeError, ValueError, RecursionError):
         return None
 
 

@@ -14,7 +14,7 @@ from cvt_hpc.study.folder import StudyFolder
 from cvt_hpc.study.gather import recorded_results
 from support.study_double import Job, Simulator
 
-JOB = Job(parameters={"raise_at": 3})
+JOB = Job(parameters={"raise_at": 3}, units={"load": "kN m"})
 
 
 def do(out, part=None):
@@ -113,3 +113,4 @@ def test_its_dataset_has_no_spectra(monkeypatch, tmp_path):
     with recorded_results(folder.read_records(folder.load())) as dataset:
         assert "spectrum" not in dataset and dataset["amplitude"].notnull().any()
         assert dataset.attrs["job_name"] == "double"
+        assert dataset.attrs["job_units"] == '{"load": "kN m"}'

@@ -130,6 +130,23 @@ def test_the_page_begins_with_what_one_hands_on(page):
     assert re.search(r"Runs that are neither quiet nor vibrating: \d+ undecided, \d failed", words)
 
 
+@pytest.mark.parametrize(
+    ("units", "told"),
+    [
+        ({"driving_speed": "rpm"}, "driving speed 2500 rpm, thrust 40000 N."),
+        ({"driving_speed": "rpm", "thrust": "kN"}, "driving speed 2500 rpm, thrust 40 kN."),
+        ({"driving_speed": "kg", "thrust": 5}, "driving speed 261.7993878 rad/s (2500 rpm), thrust 40000 N."),
+    ],
+)
+def test_parameters_have_the_units_of_the_job(units, told, tmp_path):
+    results = study(gradients=(-2.4,), stiffnesses=(1.0,))
+    axes = {name: results[name].values.tolist() for name in results["status"].dims}
+    scene = {"driving_speed": "2500 rpm", "thrust": "40 kN"}
+    job = build_job({"name": "a", "model": "elastic_belt", "axes": axes, "scene": scene})
+    results.attrs |= {"job": json.dumps(job.resolved()), "job_units": json.dumps(units)}
+    assert f"Other than the defaults: {told}" in words_of(write_report(results, tmp_path / "report.html"))
+
+
 def test_what_turns_the_direction_of_a_text_is_seen(tmp_path):
     turning = "".join(map(chr, [0x061C, 0x200E, 0x200F, *range(0x202A, 0x202F), *range(0x2066, 0x206A)]))
     results = study(**SMALL)
