@@ -32,7 +32,7 @@ _QUOTED = re.compile(r"\"([\w./-]+)\\?\"")  # in notebooks the marks are escaped
 _FIRST_AXES = {"load_share": (0.2, 0.4, 0.6), "friction_gradient": None}
 _SHARES = (0.5, 1.0, 1.5)  # of the default, else
 # Both as a map, where that takes no longer than this [core-s]
-_LOADS, _LONGEST_MAP = "load_share = { from = 0.1, to = 0.9, count = 9 }", 40.0
+_LOADS, _LONGEST_MAP = "load_share = { from = 0.1, to = 0.9, count = 9 }", 5.0
 _LONGEST = 120  # letters of a line
 # Units in which engineers give a size, by SI unit: each from a magnitude [SI] on, the largest first
 CUSTOMARY = {

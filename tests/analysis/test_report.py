@@ -15,9 +15,11 @@ import xarray as xr
 
 from cvt_hpc.analysis.classes import map_classes, occurrence_classes
 from cvt_hpc.analysis.hysteresis_bands import lowest_onsets
+from cvt_hpc.cli import main
 from cvt_hpc.errors import InputError
 from cvt_hpc.job import build_job
 from cvt_hpc.report import write_report
+from cvt_hpc.report.findings import shown_quantities
 from cvt_hpc.report.interactive import as_script, map_data
 from cvt_hpc.storage.netcdf import HISTORY
 from cvt_hpc.variables import Status, Vibrates
@@ -347,6 +349,15 @@ def unjudged():
     results["status"][:], results["vibrates"][:] = Status.DONE, Vibrates.UNDECIDED
     results["limit_torque"] = results["status"].dims, np.arange(40.0).reshape(2, 2, 10), {"units": "N m"}
     return results
+
+
+def test_a_map_shows_quantities_where_no_run_is_judged(tmp_path, monkeypatch):
+    unjudged().to_netcdf(tmp_path / "results.nc")
+    drawn = []
+    monkeypatch.setattr("cvt_hpc.analysis.value_maps.value_map_figure", lambda *given: drawn.append(given[1]))
+    monkeypatch.setattr("cvt_hpc.analysis.figures.draw", lambda compose, out: compose())
+    assert main(["map", str(tmp_path / "results.nc")]) == 0
+    assert drawn == [["limit_torque"]] and shown_quantities(study(**SMALL)) == []
 
 
 def test_a_study_that_judges_no_vibration_tells_and_shows_its_quantities(tmp_path):

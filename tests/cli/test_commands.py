@@ -461,6 +461,7 @@ def test_an_interrupt_ends_with_130(write_job, call, monkeypatch):
 def test_the_end_of_the_colours_is_given_with_its_unit():
     assert colour_end("20 um", "m") == 20e-6
     assert colour_end("0.4", "1") == 0.4
-    assert colour_end(None, "m") is None
+    assert colour_end(None, "m") is None and colour_end("fit", "m") is None
+    assert colour_end("fit", "m", fits=False) == "fit" and colour_end(None, "m", fits=False) is None
     with pytest.raises(InputError, match="--vmax: expected a value with its unit, of m, found 20"):
         colour_end("20", "m")
