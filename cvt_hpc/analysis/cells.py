@@ -104,11 +104,12 @@ FREQUENCY_COLOURS = colours_of("viridis_r", 0.30, 1.0)
 
 @dataclass(frozen=True)
 class Scale:
-    """Quantity that colours the vibrating cells, with its colour scale."""
+    """Quantity that colours the vibrating cells, with its colour scale; ticks where they are given."""
 
     colours: Colormap
     norm: Normalize
     label: str
+    ticks: Sequence[int] = ()
 
 
 def norm_over(values: Array, lowest: float | None = None, highest: float | None = None) -> Normalize:
@@ -130,13 +131,14 @@ def norm_over(values: Array, lowest: float | None = None, highest: float | None 
     return Normalize(low, high) if high > low else Normalize(low - 0.5, high + 0.5)
 
 
-def amplitude_norm(values: Array, vmax: End = None) -> Normalize:
+def amplitude_scale(values: Array, vmax: End = None) -> Scale:
     """Scale of amplitudes [um]: logarithmic over AMPLITUDES; or linear from zero to `vmax` [m], or to FIT."""
-    if vmax is None:
-        return LogNorm(*AMPLITUDES)
     if isinstance(vmax, str) and vmax != FIT:
         raise mismatch("vmax", f'a number or "{FIT}"', show(vmax))
-    return norm_over(values, 0.0, None if isinstance(vmax, str) else 1e6 * vmax)
+    if vmax is None:
+        return Scale(AMPLITUDE_COLOURS, LogNorm(*AMPLITUDES), "amplitude [µm]", AMPLITUDE_TICKS)
+    norm = norm_over(values, 0.0, None if isinstance(vmax, str) else 1e6 * vmax)
+    return Scale(AMPLITUDE_COLOURS, norm, "amplitude [µm]")
 
 
 def colour_bar(figure: Figure, scale: Scale, values: Array, **options: Any) -> Colorbar:
@@ -145,8 +147,8 @@ def colour_bar(figure: Figure, scale: Scale, values: Array, **options: Any) -> C
     extend = {(True, True): "both", (True, False): "max", (False, True): "min"}.get((above, below), "neither")
     mappable = ScalarMappable(scale.norm, scale.colours)
     bar = figure.colorbar(mappable, extend=extend, label=scale.label, **options)
-    if isinstance(scale.norm, LogNorm):
-        bar.set_ticks(AMPLITUDE_TICKS, labels=list(map(str, AMPLITUDE_TICKS)))
+    if scale.ticks:
+        bar.set_ticks(scale.ticks, labels=list(map(str, scale.ticks)))
         bar.minorticks_off()
     return bar
 

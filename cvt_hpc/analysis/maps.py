@@ -179,8 +179,7 @@ def _grid_figure(arrangement: layout.Arrangement, vmax: cells.End, source: str) 
     figure = Figure((figures.WIDTH, sheet.height + FRAME), layout="constrained")
     # not shared: matplotlib would go through all panels for each
     axes = figure.subplots(sheet.blocks * sheet.rows, sheet.columns, squeeze=False)
-    norm = cells.amplitude_norm(sheet.amplitude, vmax)
-    amplitude = cells.Scale(cells.AMPLITUDE_COLOURS, norm, "amplitude [µm]")
+    amplitude = cells.amplitude_scale(sheet.amplitude, vmax)
     draw_block(figure, axes[: sheet.rows], sheet, sheet.amplitude, amplitude)
     texts = [(OccurrenceClass.IRREGULAR, sheet.irregular)] if sheet.has_room else []
     texts += [(OccurrenceClass.VIBRATING, sheet.frequency)] if sheet.writes_frequency else []

@@ -56,8 +56,7 @@ def scatter_figure(dataset: xr.Dataset, at: Mapping[str, Any], source: str, vmax
     amplitude = np.where(
         classes == OccurrenceClass.VIBRATING, at_strongest_strand(dataset, "amplitude") * 1e6, np.nan
     )
-    norm = cells.amplitude_norm(amplitude, vmax)
-    scale = cells.Scale(cells.AMPLITUDE_COLOURS, norm, "amplitude [µm]")
+    scale = cells.amplitude_scale(amplitude, vmax)
     panels = draw_samples(figure, dataset, classes, amplitude, scale)
     if np.isfinite(amplitude).any():
         cells.colour_bar(figure, scale, amplitude, ax=panels, pad=0.02)
