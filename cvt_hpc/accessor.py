@@ -90,7 +90,7 @@ class Results:
         x: str | None = None,
         y: str | None = None,
         panel: str | None = None,
-        vmax: float | None = None,
+        vmax: float | str | None = None,
         beside: xr.Dataset | Sequence[xr.Dataset] = (),
         measured: str | Path | None = None,
         **at: Any,
@@ -103,8 +103,8 @@ class Results:
             Variables, such as "efficiency", instead of occurrence.
         x, y, panel : str
             Axes that run along x, along y and over the panels.
-        vmax : float
-            Where the colours end [SI unit of what is shown].
+        vmax : float or "fit"
+            Where the colours end [SI unit of what is shown]; of occurrence by default as in all maps.
         beside : Dataset or sequence of Dataset
             Further studies over the same axes: a panel for each, on one scale of colours.
         measured : str or Path

@@ -205,8 +205,8 @@ def trouble_lines(report: RunReport) -> Iterator[str]:
             yield f"stopped early ({report.stopped}) before any run had ended; give it more time"
 
 
-def status_lines(status: StudyStatus) -> Iterator[str]:
-    """Yield the lines that say how far a study is."""
+def status_rows(status: StudyStatus) -> list[tuple[str, str]]:
+    """Return how far a study is, names and values."""
     from cvt_hpc.study.ranks.progress import show_duration
 
     state = "running" if status.running else "not running"
@@ -227,7 +227,7 @@ def status_lines(status: StudyStatus) -> Iterator[str]:
         rows.append(("to go", show_duration(status.time_to_go)))
     if status.left and not status.running:
         rows.append(("next", "the same `cvt-hpc run` goes on with what is left"))
-    yield from columns(rows, indent="")
+    return rows
 
 
 def forecast_lines(forecasts: Sequence[Forecast], job: Job, basis: str) -> Iterator[str]:

@@ -2,6 +2,7 @@
 
 import json
 from collections.abc import Collection, Hashable, Iterable
+from dataclasses import replace
 from typing import Any, NamedTuple
 
 import numpy as np
@@ -12,7 +13,8 @@ from cvt_hpc.analysis.classes import check_results
 from cvt_hpc.analysis.scatter import is_sampled
 from cvt_hpc.errors import InputError, did_you_mean, mismatch
 from cvt_hpc.job import Job, stored_job
-from cvt_hpc.job.values import shown
+from cvt_hpc.job.units import factor_to
+from cvt_hpc.job.values import JOB_UNITS, shown
 from cvt_hpc.study.job_difference import flatten
 
 COMPARED = ("status", "vibrates", "amplitude", "frequency")  # beside what a model adds
@@ -85,10 +87,14 @@ def job_of(dataset: xr.Dataset) -> dict[str, Any]:
 
 
 def job_held(dataset: xr.Dataset, source: str = "results") -> Job | None:
-    """The job of a dataset; None where this version of the program cannot read it any more."""
+    """The job of a dataset, with its units; None where this version cannot read it any more."""
     try:
-        return stored_job(job_of(dataset), source)
-    except (InputError, ValueError, RecursionError):
+        job = stored_job(job_of(dataset), source)
+        units = json.loads(dataset.attrs.get(JOB_UNITS, "{}"))
+        known = job.schema.parameters
+        legal = {k: u for k, u in units.items() if k in known and factor_to(str(u), known[k].unit)}
+        return replace(job, units=legal)
+    except (AttributeError, InputError, TypeError, ValueError, RecursionError):
         return None
 
 

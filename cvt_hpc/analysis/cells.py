@@ -10,7 +10,7 @@ from matplotlib.axes import Axes
 from matplotlib.cm import ScalarMappable
 from matplotlib.collections import LineCollection
 from matplotlib.colorbar import Colorbar
-from matplotlib.colors import Colormap, ListedColormap, Normalize, to_hex, to_rgba
+from matplotlib.colors import Colormap, ListedColormap, LogNorm, Normalize, to_hex, to_rgba
 from matplotlib.figure import Figure, FigureBase
 from matplotlib.image import PcolorImage
 from matplotlib.legend_handler import HandlerTuple
@@ -22,9 +22,16 @@ from numpy.typing import NDArray
 
 from cvt_hpc.analysis.arrangement import Ruler
 from cvt_hpc.analysis.classes import OccurrenceClass
+from cvt_hpc.errors import mismatch, show
 from cvt_hpc.vibration.classes import PairClass, StartClass
 
 Array = NDArray[np.float64]
+# [um] All maps have one scale of amplitudes, so that they compare: from less than the threshold of vibration
+# to the largest of pushbelts; equal ratios, as in dB, are equally far apart.
+AMPLITUDES = 2.0, 200.0
+AMPLITUDE_TICKS = 2, 5, 10, 20, 50, 100, 200
+FIT = "fit"  # instead of a value: colours end where the amplitudes of a map do
+End = float | str | None
 # share of values on a scale, where the others reach so far beyond; of so many
 MOST, FAR, MANY = 0.98, 1.5, 20
 MOST_BORDERS = 20_000  # sides between cells of different class: more would hide the cells
@@ -97,11 +104,12 @@ FREQUENCY_COLOURS = colours_of("viridis_r", 0.30, 1.0)
 
 @dataclass(frozen=True)
 class Scale:
-    """Quantity that colours the vibrating cells, with its colour scale."""
+    """Quantity that colours the vibrating cells, with its colour scale; ticks where they are given."""
 
     colours: Colormap
     norm: Normalize
     label: str
+    ticks: Sequence[int] = ()
 
 
 def norm_over(values: Array, lowest: float | None = None, highest: float | None = None) -> Normalize:
@@ -123,12 +131,26 @@ def norm_over(values: Array, lowest: float | None = None, highest: float | None 
     return Normalize(low, high) if high > low else Normalize(low - 0.5, high + 0.5)
 
 
+def amplitude_scale(values: Array, vmax: End = None) -> Scale:
+    """Scale of amplitudes [um]: logarithmic over AMPLITUDES; or linear from zero to `vmax` [m], or to FIT."""
+    if isinstance(vmax, str) and vmax != FIT:
+        raise mismatch("vmax", f'a number or "{FIT}"', show(vmax))
+    if vmax is None:
+        return Scale(AMPLITUDE_COLOURS, LogNorm(*AMPLITUDES), "amplitude [µm]", AMPLITUDE_TICKS)
+    norm = norm_over(values, 0.0, None if isinstance(vmax, str) else 1e6 * vmax)
+    return Scale(AMPLITUDE_COLOURS, norm, "amplitude [µm]")
+
+
 def colour_bar(figure: Figure, scale: Scale, values: Array, **options: Any) -> Colorbar:
     """Draw the colour bar of a scale; it has a point where values lie beyond its end."""
     above, below = np.nanmax(values) > scale.norm.vmax, np.nanmin(values) < scale.norm.vmin
     extend = {(True, True): "both", (True, False): "max", (False, True): "min"}.get((above, below), "neither")
     mappable = ScalarMappable(scale.norm, scale.colours)
-    return figure.colorbar(mappable, extend=extend, label=scale.label, **options)
+    bar = figure.colorbar(mappable, extend=extend, label=scale.label, **options)
+    if scale.ticks:
+        bar.set_ticks(scale.ticks, labels=list(map(str, scale.ticks)))
+        bar.minorticks_off()
+    return bar
 
 
 def draw_cells(

@@ -63,7 +63,7 @@ def map_figure(
     at: layout.At = None,
     source: str = "results",
     sides: layout.Sides = layout.CHOSEN,
-    vmax: float | None = None,
+    vmax: cells.End = None,
     measured: str | Path | None = None,
 ) -> Figure:
     """Draw where vibration occurs.
@@ -80,9 +80,9 @@ def map_figure(
         Of samples of uncertain parameters the probability of vibration is drawn.
     sides : Sides
         Which axis runs along x, along y and over the panels; of a grid.
-    vmax : float
-        Amplitude at which the colours end [m]; by default that of 98 % of the vibrating cells, where few lie
-        far above it.
+    vmax : float or "fit"
+        Amplitude at which linear colours end [m], or that of this map, of 98 % of the vibrating cells where
+        few lie far above; by default they are logarithmic, and those of all maps.
     measured : str or Path
         Measured file that is drawn over the map (`measured.py`); of a grid.
     """
@@ -180,14 +180,13 @@ class Sheet:
         return width >= 22 and height >= 22  # [point]
 
 
-def _grid_figure(arrangement: layout.Arrangement, vmax: float | None, source: str, over: Overlay) -> Figure:
+def _grid_figure(arrangement: layout.Arrangement, vmax: cells.End, source: str, over: Overlay) -> Figure:
     """Compose the map of a study over a grid; to be called within STYLE."""
     sheet = sheet_of(arrangement, source)
     figure = Figure((figures.WIDTH, sheet.height + FRAME), layout="constrained")
     # not shared: matplotlib would go through all panels for each
     axes = figure.subplots(sheet.blocks * sheet.rows, sheet.columns, squeeze=False)
-    norm = cells.norm_over(sheet.amplitude, 0.0, None if vmax is None else 1e6 * vmax)
-    amplitude = cells.Scale(cells.AMPLITUDE_COLOURS, norm, "amplitude [µm]")
+    amplitude = cells.amplitude_scale(sheet.amplitude, vmax)
     draw_block(figure, axes[: sheet.rows], sheet, sheet.amplitude, amplitude)
     texts = [(OccurrenceClass.IRREGULAR, sheet.irregular)] if sheet.has_room else []
     texts += [(OccurrenceClass.VIBRATING, sheet.frequency)] if sheet.writes_frequency else []

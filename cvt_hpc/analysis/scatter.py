@@ -29,9 +29,7 @@ def is_sampled(dataset: xr.Dataset) -> bool:
     return dataset["status"].dims == ("run",)
 
 
-def scatter_figure(
-    dataset: xr.Dataset, at: Mapping[str, Any], source: str, vmax: float | None = None
-) -> Figure:
+def scatter_figure(dataset: xr.Dataset, at: Mapping[str, Any], source: str, vmax: cells.End = None) -> Figure:
     """Compose the map of a sampled study.
 
     Parameters
@@ -43,8 +41,8 @@ def scatter_figure(
         Has to be empty: no two samples lie at one value of an axis.
     source : str
         Where the results are from, for the error.
-    vmax : float
-        Amplitude at which the colours end [m].
+    vmax : float or "fit"
+        As of `map_figure`.
 
     Raises
     ------
@@ -58,8 +56,7 @@ def scatter_figure(
     amplitude = np.where(
         classes == OccurrenceClass.VIBRATING, at_strongest_strand(dataset, "amplitude") * 1e6, np.nan
     )
-    norm = cells.norm_over(amplitude, 0.0, None if vmax is None else 1e6 * vmax)
-    scale = cells.Scale(cells.AMPLITUDE_COLOURS, norm, "amplitude [µm]")
+    scale = cells.amplitude_scale(amplitude, vmax)
     panels = draw_samples(figure, dataset, classes, amplitude, scale)
     if np.isfinite(amplitude).any():
         cells.colour_bar(figure, scale, amplitude, ax=panels, pad=0.02)

@@ -79,7 +79,7 @@ def maps_figure(
     at: At = None,
     sources: Sequence[str] = (),
     sides: Sides = CHOSEN,
-    vmax: float | None = None,
+    vmax: float | str | None = None,
     measured: str | Path | None = None,
 ) -> Figure:
     """Draw where vibration occurs, or quantities, of one study or of several on one scale of colours.
@@ -109,7 +109,8 @@ def maps_figure(
     if len(datasets) > 1:
         dataset, sides = side_by_side(datasets, named, quantities, sides)
     if quantities:
-        return value_map_figure(dataset, quantities, at, source, sides, vmax, measured)
+        end = None if isinstance(vmax, str) else vmax  # their colours fit by default
+        return value_map_figure(dataset, quantities, at, source, sides, end, measured)
     return map_figure(dataset, at, source, sides, vmax, measured)
 
 

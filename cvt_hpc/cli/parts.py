@@ -68,14 +68,15 @@ def sides_of(arguments: argparse.Namespace) -> Sides:
     return Sides(*(getattr(arguments, side, None) for side in Sides._fields))
 
 
-def colour_end(text: str | None, unit: str) -> float | None:
-    """Return the value at which colours end [SI], of a quantity of this SI unit."""
+def colour_end(text: str | None, unit: str, *, fits: bool = True) -> Any:
+    """Return where colours end [SI], of a quantity of this SI unit; `fits`: they fit by default."""
+    from cvt_hpc.analysis.cells import FIT
     from cvt_hpc.job.units import unit_in
     from cvt_hpc.job.values import read_value
     from cvt_hpc.parameters import positive
 
-    if text is None:
-        return None
+    if text is None or text == FIT:
+        return None if fits else text
     unit = unit.removeprefix("1")
     if unit and not unit_in(text):  # 20 would be 20 m
         raise mismatch("--vmax", f"a value with its unit, of {unit}", text)

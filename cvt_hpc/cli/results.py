@@ -39,7 +39,8 @@ def add(commands: Any) -> None:
     parts.add_assignments(picture, "--at", "fix an axis at a value")
     parts.add_sides(picture)
     _add_measured(picture)
-    text = "value at which the colours end, such as '20 um' (default: that of 98 %% of the cells)"
+    text = "value at which the colours end, such as '20 um', or fit: that of 98 %% of the cells (default: "
+    text += "fit, but of occurrence 2 to 200 um on a logarithmic scale, as in all maps)"
     picture.add_argument("--vmax", metavar="VALUE", help=text)
     text = "draw an axis log or linear (default: log where its values are spread so); may be repeated"
     picture.add_argument("--spacing", action="append", default=[], metavar="AXIS=SPACING", help=text)
@@ -48,6 +49,8 @@ def add(commands: Any) -> None:
     text = "write a page about a study: what was found, a map with values, failed runs, cost, assumptions"
     page = parts.add_command(commands, "report", _report, text, "RESULTS")
     page.add_argument("--out", type=Path, metavar="HTML", help="default: report.html beside the dataset")
+    text = "write it again every so often, such as 30s, from the records of a running sweep, until that ends"
+    page.add_argument("--every", metavar="TIME", help=text)
     _add_measured(page)
     text = "compare two methods or two designs, or a study with measurements, cell by cell"
     end = "; exit status 1: two methods, or computed and measured, contradict somewhere."
@@ -63,12 +66,14 @@ def _add_measured(command: argparse.ArgumentParser) -> None:
 
 
 def _status(arguments: argparse.Namespace) -> int:
-    from cvt_hpc.printing import status_lines
+    from cvt_hpc.printing import status_rows
     from cvt_hpc.study import read_status
+    from cvt_hpc.tables import columns
 
     status = read_status(arguments.path)
     parts.complain(*status.warnings)
-    parts.say(*([json.dumps(asdict(status))] if arguments.json else status_lines(status)))
+    in_words = columns(status_rows(status), indent="")
+    parts.say(*([json.dumps(asdict(status))] if arguments.json else in_words))
     return parts.DONE
 
 
@@ -117,11 +122,14 @@ def _map(arguments: argparse.Namespace) -> int:
         files = [file for path in paths for file in parts.files_of(path)]
         words = (kind, *arguments.show, *arguments.at)
         out = arguments.out or parts.picture_beside(arguments.path, files, *words)
-        measured, vmax, shown = arguments.measured, None, arguments.show[0] if arguments.show else "amplitude"
-        if shown in dataset:  # what draws it refuses a quantity that is not known
-            vmax = parts.colour_end(arguments.vmax, str(dataset[shown].attrs.get("units", "")))
-        if arguments.show:
-            shown = arguments.show
+        measured, vmax = arguments.measured, None
+        coloured = arguments.show[0] if arguments.show else "amplitude"
+        if coloured in dataset:  # what draws it refuses a quantity that is not known
+            unit = str(dataset[coloured].attrs.get("units", ""))
+            vmax = parts.colour_end(arguments.vmax, unit, fits=bool(arguments.show))
+        from cvt_hpc.report.findings import shown_quantities
+
+        if shown := arguments.show or shown_quantities(dataset):
             draw(lambda: value_map_figure(dataset, shown, at, source, sides, vmax, measured), out)
             parts.say(f"map: {out}")
             return parts.DONE
@@ -145,6 +153,14 @@ def _report(arguments: argparse.Namespace) -> int:
 
     out = arguments.out or parts.folder_of(arguments.path) / "report.html"
     parts.check_output(out, (".html",))
+    if arguments.every:
+        from cvt_hpc.job.units import read_duration
+        from cvt_hpc.printing import status_rows
+        from cvt_hpc.report.following import follow_report
+
+        every = read_duration(arguments.every, "--every")
+        parts.say(f"report: {follow_report(arguments.path, out, every, status_rows)}")
+        return parts.DONE
     with parts.opened_results(arguments.path) as dataset:
         source, folder = str(arguments.path), parts.folder_of(arguments.path)
         written = write_report(dataset, out, source, folder, arguments.measured)

@@ -9,7 +9,7 @@ from typing import Any
 import numpy as np
 
 from cvt_hpc.errors import InputError, did_you_mean, mismatch, show, unknown
-from cvt_hpc.job.values import as_list, kind_of, read_value
+from cvt_hpc.job.values import as_list, kind_of, read_value, separated
 from cvt_hpc.parameters import Parameter
 
 LARGEST_AXIS = 100_000
@@ -141,7 +141,7 @@ def read_values(parameter: Parameter, raw: Any, where: str) -> tuple:
     elif isinstance(raw, (list, tuple)):
         values = raw
     else:
-        raise mismatch(where, _FORMS, show(raw))
+        raise mismatch(where, _FORMS, show(raw) + separated(raw))
     if not values:
         raise mismatch(where, "at least one value", show(raw))
     if len(values) > LARGEST_AXIS:

@@ -14,7 +14,7 @@ from pathlib import Path, PurePosixPath
 
 import cvt_hpc
 from cvt_hpc.errors import mismatch, unknown
-from cvt_hpc.job.loading import read_name
+from cvt_hpc.job.loading import build_job, read_name
 from cvt_hpc.job.schema import Schema, load_schema
 from cvt_hpc.job.units import to_si
 from cvt_hpc.job.values import angle_in_words, in_words, kind_of
@@ -31,6 +31,8 @@ _QUOTED = re.compile(r"\"([\w./-]+)\\?\"")  # in notebooks the marks are escaped
 # carries, its gradient
 _FIRST_AXES = {"load_share": (0.2, 0.4, 0.6), "friction_gradient": None}
 _SHARES = (0.5, 1.0, 1.5)  # of the default, else
+# Both as a map, where that takes no longer than this [core-s]
+_LOADS, _LONGEST_MAP = "load_share = { from = 0.1, to = 0.9, count = 9 }", 5.0
 _LONGEST = 120  # letters of a line
 # Units in which engineers give a size, by SI unit: each from a magnitude [SI] on, the largest first
 CUSTOMARY = {
@@ -75,7 +77,8 @@ def key_lines(model: str) -> list[str]:
 def job_template(name: str, model: str, source: str) -> str:
     """Return a job file of a model in which each key stands commented out, with its default and meaning.
 
-    As it stands it is a small study along one axis, with all else at its default.
+    As it stands it is a small study along one axis, or along two if its runs are cheap; all else is at its
+    default.
 
     Parameters
     ----------
@@ -96,7 +99,13 @@ def job_template(name: str, model: str, source: str) -> str:
     loaded = load_model(model)
     if not loaded.is_recorded:
         raise mismatch(f"{source}: model", "a model whose runs are recorded", f"{model}, for charts alone")
-    axis = _axis(schema)
+    axes = [_axis(schema, [key for key in _FIRST_AXES if key in schema.parameters])]
+    known = schema.parameters
+    if _FIRST_AXES.keys() <= known.keys() and _may_be_varied(known["friction_gradient"]):
+        grid = [_LOADS, _axis(schema, ["friction_gradient"])]
+        job = build_job({"name": name, "model": model, "axes": tomllib.loads("\n".join(grid))})
+        cost = loaded.cost(job.point(0), job.stepper) / loaded.lanes(job.parameters, job.stepper)
+        axes = grid if cost * job.size <= _LONGEST_MAP else axes
     lines = [
         *_commented(f"A study with the model {model}: {loaded.title}"),
         "# Each key stands here with its default: take away the # to change it. Defaults that no paper gives",
@@ -112,7 +121,8 @@ def job_template(name: str, model: str, source: str) -> str:
     lines += [
         "",
         "[axes]  # what the study varies: any key with a number or a choice",
-        axis,
+        "# as a list of values, or as a range: { from = 1, to = 9, count = 5 }, or step = 2 for count",
+        *axes,
     ]
     for section, table in schema.sections.items():
         lines += ["", f"[{section}]"]
@@ -190,10 +200,9 @@ def _list_as_toml(values: tuple) -> str:
     return f"[{', '.join(items)}]"
 
 
-def _axis(schema: Schema) -> str:
+def _axis(schema: Schema, preferred: Sequence[str]) -> str:
     """Return a line with the axis of a first study: given values of a key, or some about its default."""
     known = schema.parameters
-    preferred = [key for key in _FIRST_AXES if key in known]
     key = next(key for key in (*preferred, *known) if _FIRST_AXES.get(key) or _may_be_varied(known[key]))
     unit = known[key].unit
     values = _FIRST_AXES.get(key) or [share * known[key].default for share in _SHARES]

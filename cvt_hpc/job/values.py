@@ -6,6 +6,7 @@ metres. Values of axes are shown in the unit in which the job gives them, by the
 
 import math
 import numbers
+import re
 import warnings
 from collections.abc import Iterator, Mapping
 from typing import Any
@@ -35,6 +36,7 @@ _CUSTOMARY = {
     "s": ("ms", "us"),
 }
 
+_SEPARATED = re.compile(r"\s*\[?\s*[-+]?\d[\d.]*[^,;\d]*[,;]\s*[-+]?\d")
 JOB_UNITS = "job_units"  # attribute of a coordinate, beside `units`
 POINT_UNITS = "point_units"  # attribute of a history: by key, beside the values `point`
 
@@ -146,7 +148,7 @@ def _read_number(parameter: Parameter, raw: Any, where: str) -> float:
     try:
         value = to_si(raw, parameter.unit) if isinstance(raw, str) else float(raw)
     except UnitError as error:
-        reason = f" ({error})" if str(error) else ""
+        reason = f" ({error})" if str(error) else separated(raw)
         raise mismatch(where, _number_in_words(parameter), show(raw) + reason) from None
     except OverflowError:
         value = math.inf
@@ -156,6 +158,13 @@ def _read_number(parameter: Parameter, raw: Any, where: str) -> float:
         raise mismatch(where, _with_unit(f"a value of at most {LARGEST:g}", parameter), show(raw))
     _check_bounds(parameter, value, raw, where)
     return value + 0.0  # -0.0 and 0.0 are one value, and shall be one job
+
+
+def separated(raw: Any) -> str:
+    """Return advice on a text with numbers between commas or semicolons, such as "2,4"; "" of all else."""
+    if not isinstance(raw, str) or not _SEPARATED.match(raw):
+        return ""
+    return "; decimals have a point, as 2.4, thousands have no mark, and several values are a list, as [2, 4]"
 
 
 def _check_bounds(parameter: Parameter, value: float, raw: Any, where: str) -> None:
@@ -197,7 +206,7 @@ def _read_table(parameter: Parameter, raw: Any, where: str) -> tuple:
     if isinstance(raw, np.ndarray):
         raw = as_list(raw, where, (1, 2))
     if not isinstance(raw, (list, tuple)):
-        raise mismatch(where, expectation(parameter), show(raw))
+        raise mismatch(where, expectation(parameter), show(raw) + separated(raw))
     rows = []
     for i, item in enumerate(raw, 1):
         read = _read_table if isinstance(item, (list, tuple)) else _read_number

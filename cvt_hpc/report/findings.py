@@ -30,7 +30,8 @@ OF_COMPUTATION = (  # come behind what is about the belt
     *("core_seconds", "simulated_seconds", "time_step", "refinements", "steps", "contact_solves"),
 )
 
-MOST_LINES = 12  # lines of the map that are told apart
+MOST_LINES = 8  # lines of the map that are told apart, on the first page
+MOST_VALUE_MAPS = 2  # quantities in a picture, of a study that judges no vibration
 MOST_RANGES = 6  # quantities
 NARROW = 1.05  # largest over least frequency of a line that are told apart
 STATUS = {int(status): status.name.lower() for status in Status}
@@ -388,6 +389,14 @@ def quantities(dataset: xr.Dataset) -> list[Quantity]:
         if len(found) == room:
             break
     return found
+
+
+def shown_quantities(dataset: xr.Dataset) -> list[str]:
+    """Return the quantities that a map shows where no run was judged; none elsewhere."""
+    if is_judged(dataset) or PROBABILITY in dataset or is_sampled(dataset):
+        return []
+    names = dict.fromkeys(one.key for one in quantities(dataset))
+    return [name for name in names if dataset[name].dtype.kind in "iuf"][:MOST_VALUE_MAPS]
 
 
 def length_unit(lengths: NDArray[np.float64]) -> tuple[float, str]:

@@ -80,6 +80,7 @@ def map_data(dataset: xr.Dataset, source: str = "results") -> dict[str, Any]:
         "inferredVibration": cells.INFERRED_VIBRATION,
         "vibrating": int(OccurrenceClass.VIBRATING),
         "colours": _colours(cells.AMPLITUDE_COLOURS),
+        "amplitudes": cells.AMPLITUDE_TICKS,  # [um]
         "others": _colours(cells.FREQUENCY_COLOURS),
         "quantities": [_quantity(one) for one in quantities(dataset)],
     }
@@ -178,8 +179,7 @@ def _colours(colours: Any) -> list[list[Any]]:
 
 
 def _quantity(quantity: Quantity) -> dict[str, Any]:
-    is_amplitude = quantity.key == AMPLITUDE
-    norm = cells.norm_over(quantity.values, 0.0 if is_amplitude else None)
+    norm = cells.norm_over(quantity.values, 0.0 if quantity.key == AMPLITUDE else None)
     return {
         "key": quantity.key,
         "name": quantity.name,

@@ -16,6 +16,9 @@ const amplitude = data.quantities.find(one => one.key === "amplitude");
 const frequency = data.quantities.find(one => one.key === "frequency");
 const escaped = text => String(text).replace(/&/g, "&amp;").replace(/</g, "&lt;").replace(/>/g, "&gt;");
 const digits = value => String(Number(value.toPrecision(4))).replace("-", "−");
+const micro = amplitude && amplitude.unit === "mm" ? 1e-3 : 1; // [um] in its unit
+const level = value => Math.log10(Math.max(value, Number.MIN_VALUE) / micro); // on the scale of amplitudes of all maps
+const ends = [data.amplitudes[0], data.amplitudes.at(-1)].map(Math.log10);
 const named = one => one.unit ? `${one.name} [${one.unit}]` : one.name;
 const sizes = data.axes.map(axis => axis.texts.length);
 const strides = sizes.map((_, k) => data.sampled ? 1 : sizes.slice(k + 1).reduce((a, b) => a * b, 1));
@@ -83,7 +86,8 @@ function told(index, at, kinds) {
 function coloured(index, kinds) { // the number that colours a run; null where its class does
   const one = chosen.show >= 0 ? data.quantities[chosen.show] : amplitude;
   if (!one || !Number.isFinite(one.values[index])) return null;
-  return chosen.show >= 0 || (kinds[index] === data.vibrating && !(inferred && inferred[index])) ? one.values[index] : null;
+  if (chosen.show >= 0) return one.values[index];
+  return kinds[index] === data.vibrating && !(inferred && inferred[index]) ? level(one.values[index]) : null;
 }
 
 function fill(index, kinds) {
@@ -177,6 +181,14 @@ function side(axis, title) {
   return {...fixed, range: [edges[0], edges.at(-1)]};
 }
 
+function amplitudeTicks() { // beyond its ends a scale has the colours there, and says so
+  const levels = [...amplitude.values].filter((_, k) => classes[k] === data.vibrating).map(level);
+  const texts = data.amplitudes.map(one => digits(one * micro));
+  if (levels.some(one => one < ends[0])) texts[0] = `≤ ${texts[0]}`;
+  if (levels.some(one => one > ends[1])) texts.push(`≥ ${texts.pop()}`);
+  return {tickvals: data.amplitudes.map(Math.log10), ticktext: texts};
+}
+
 function draw() {
   const kinds = chosen.show === STARTS ? starts : classes;
   const width = place.clientWidth, panels = chosen.panel >= 0 ? sizes[chosen.panel] : 1;
@@ -212,8 +224,8 @@ function draw() {
   const below = scaled ? 130 : 60;
   Object.assign(layout, {height: inside + above + below, margin: {l: 70, r: 20, t: above, b: below}});
   if (scaled)
-    layout.coloraxis = {colorscale: chosen.show >= 0 ? data.others : data.colours, cmin: scale.least, cmax: scale.most,
-      colorbar: {orientation: "h", y: -70 / inside, yanchor: "top", thickness: 12, len: 0.9, title: {text: escaped(named(scale)), side: "bottom"}}};
+    layout.coloraxis = {...(chosen.show >= 0 ? {colorscale: data.others, cmin: scale.least, cmax: scale.most} : {colorscale: data.colours, cmin: ends[0], cmax: ends[1]}),
+      colorbar: {...(chosen.show >= 0 ? {} : amplitudeTicks()), orientation: "h", y: -70 / inside, yanchor: "top", thickness: 12, len: 0.9, title: {text: escaped(named(scale)), side: "bottom"}}};
   Plotly.react(place, traces, layout, {responsive: true, displaylogo: false, modeBarButtonsToRemove: ["select2d", "lasso2d"],
     "showSendToCloud": false}); // the library's default is a button that uploads the map
   const present = new Set(curve ? [] : kinds), legend = document.getElementById("map-legend");

@@ -4,7 +4,7 @@
 """
 
 import base64
-from collections.abc import Callable, Iterator, Mapping
+from collections.abc import Callable, Iterator, Mapping, Sequence
 from functools import partial
 from importlib import resources
 from io import BytesIO
@@ -38,13 +38,12 @@ from cvt_hpc.job.summary import core_time_in_words, rules_in_words, value_in_wor
 from cvt_hpc.job.values import shown
 from cvt_hpc.models.contract import load_model
 from cvt_hpc.report import findings
-from cvt_hpc.report.findings import quantities
 from cvt_hpc.report.interactive import KEPT, as_script, map_data
 from cvt_hpc.storage.files import written_aside
 from cvt_hpc.storage.netcdf import CONTENT, HISTORY
 from cvt_hpc.study.intervals import look
 from cvt_hpc.variables import Status
-from cvt_hpc.vibration.classes import OccurrenceClass, levels, onsets
+from cvt_hpc.vibration.classes import DECIDED, OccurrenceClass, levels, onsets
 
 COARSE = 0.02  # of an axis: a step beyond is worth a smaller one
 _RETRIES = {
@@ -53,9 +52,9 @@ _RETRIES = {
     Status.TIMED_OUT: "with a longer `--run-limit`",
 }
 
+MOST_CHANGED = 8  # parameters named on the first page
 MOST_FAILURES = 30  # kinds of failure in the table
 MOST_MAPS = 12  # of combinations of the axes that no map has room for
-MOST_VALUE_MAPS = 2  # quantities in a picture, of a study that judges no vibration
 # What tells how well a run was computed, where its model records it
 _QUALITY = ("power_residual", "step_ripple", "refinements", "time_step", "simulated_seconds", "core_seconds")
 
@@ -66,6 +65,18 @@ class Picture(NamedTuple):
     heading: str
     summary: str
     picture: str
+
+
+class Progress(NamedTuple):
+    """How far a study is: names and values in words, share of the runs on record, when the page was made.
+
+    `every` [s] is after what time a browser reads the page again; None once it is the last one.
+    """
+
+    rows: Sequence[tuple[str, str]]
+    share: float
+    made: str
+    every: float | None
 
 
 class Row(NamedTuple):
@@ -83,6 +94,7 @@ def write_report(
     source: str = "results",
     folder: Path | None = None,
     measured: str | Path | None = None,
+    progress: Progress | None = None,
 ) -> Path:
     """Write the page.
 
@@ -98,6 +110,8 @@ def write_report(
         Folder of the study: runs that `--check-step` and `--audit` have left in it are compared with its own.
     measured : str or Path, optional
         Measured file, drawn over the maps of a grid; a sentence says how far they agree.
+    progress : Progress, optional
+        Heads the page. Of one that a browser reads again the map is the printed one.
 
     Returns
     -------
@@ -115,7 +129,7 @@ def write_report(
         raise mismatch(source, "results of a study", f"the {content}; `cvt-hpc plot` draws it")
     loader = jinja2.PackageLoader("cvt_hpc.report", ".")
     templates = jinja2.Environment(loader=loader, autoescape=True, finalize=_as_it_stands)
-    page = templates.get_template("page.html").render(_content(dataset, source, folder, measured))
+    page = templates.get_template("page.html").render(_content(dataset, source, folder, measured, progress))
     with written_aside(Path(out), parents=True) as aside:
         aside.write_text(page, encoding="utf-8")
     return Path(out)
@@ -127,10 +141,14 @@ def _as_it_stands(value: Any) -> Any:
 
 
 def _content(
-    dataset: xr.Dataset, source: str, folder: Path | None, measured: str | Path | None
+    dataset: xr.Dataset,
+    source: str,
+    folder: Path | None,
+    measured: str | Path | None,
+    progress: Progress | None,
 ) -> dict[str, Any]:
     attributes = {str(key): str(value) for key, value in dataset.attrs.items()}
-    job = job_held(dataset, source)
+    name, job = one_line(attributes.get("job_name", source)), job_held(dataset, source)
     own = ["run", *(axis.name for axis in job.axes)] if job else dataset["status"].dims
     joined = [str(name) for name in dataset["status"].dims if name not in own]
     if joined:  # the attributes are those of one of several studies
@@ -139,6 +157,7 @@ def _content(
     arrangement = _arrangement(cells, source)
     found = findings.failures(dataset)
     parameters = _parameters(job) if job else {}
+    changed = [row for rows in parameters.values() for row in rows if row.changed]
     sentences: list[str] = []
     beyond: list[str] = []
     judged, x = findings.is_judged(dataset), None
@@ -156,22 +175,25 @@ def _content(
         sentences = list(findings.range_sentences(dataset))
     if measured is not None:
         sentences += score_sentences(score(dataset, measured, source))
+    basis = [*map(_with_code, _basis(dataset, job, changed)), *_samples(dataset, folder, source)]
+    is_renewed = progress is not None and progress.every is not None
     combinations = int(np.prod([dataset.sizes[name] for name in beyond]))
     return {
-        "name": one_line(attributes.get("job_name", source)),
-        "description": attributes.get("title", ""),
+        "name": name,
+        "description": title if (title := attributes.get("title", "")) != name else "",
         "model": f"{job.model}: {load_model(job.model).title}" if job else "",
         "axes": _axes(dataset, job),
         "joined": " and ".join(joined),
         "summary": findings.summary(dataset),
         "sentences": list(map(_with_code, sentences)),
         "windows": any("vibration from" in line or "vibration up to" in line for line in sentences),
-        "next_steps": list(map(_with_code, next_steps(dataset, job, x))),
+        "progress": progress,
+        "next_steps": [] if is_renewed else list(map(_with_code, next_steps(dataset, job, x))),
         # drawn beside the map of the browser, which has no such lines
         "has_lines": ("eigenfrequency" in dataset and "amplitude" not in dataset)
         or PROBABILITY in cells
         or measured is not None,
-        "map": _map(cells, source),
+        "map": None if is_renewed else _map(cells, source),
         "pictures": _pictures(cells, arrangement, beyond, source, measured),
         **{
             name: _encoded(partial(draw, dataset, source=source)) if PROBABILITY in cells else ""
@@ -184,9 +206,9 @@ def _content(
         "failed": findings.counted(sum(one.runs for one in found), "run"),
         "cost": _cost(dataset),
         "quality": _quality(dataset),
-        "samples": _samples(dataset, folder, source),
+        "basis": [] if is_renewed else basis,
         "parameters": parameters,
-        "changed": [row for rows in parameters.values() for row in rows if row.changed],
+        "changed": changed,
         "derived": rules_in_words(job, job.schema) if job else [],
         "provenance": _provenance(attributes),
     }
@@ -252,10 +274,7 @@ def _picture(dataset: xr.Dataset, at: Mapping[str, Any], source: str, measured: 
 
     It shows quantities where nothing was judged.
     """
-    has_verdicts = findings.is_judged(dataset) or PROBABILITY in dataset
-    shown = () if has_verdicts else dict.fromkeys(one.key for one in quantities(dataset))
-    drawn = [key for key in shown if dataset[key].dtype.kind in "iuf"][:MOST_VALUE_MAPS]
-    if drawn:
+    if drawn := findings.shown_quantities(dataset):
         return _encoded(lambda: value_map_figure(dataset, drawn, at, source, measured=measured))
     return _encoded(lambda: map_figure(dataset, at, source, measured=measured))
 
@@ -288,6 +307,26 @@ def _map(dataset: xr.Dataset, source: str) -> dict[str, str] | None:
 
     program = resources.files("cvt_hpc.report").joinpath("map.js").read_text(encoding="utf-8")
     return {"library": get_plotlyjs(), "numbers": as_script(map_data(dataset, source)), "program": program}
+
+
+def _basis(dataset: xr.Dataset, job: Job | None, changed: Sequence[Row]) -> Iterator[str]:
+    """State what the findings rest on: verdict, parameters, runs without a verdict, program."""
+    if job is not None:
+        if "amplitude_threshold" in job.parameters:
+            least = job.parameters["amplitude_threshold"]
+            factor, unit = findings.length_unit(least)
+            threshold = f"{factor * least:.3g} {unit} or more (`amplitude_threshold`)"
+            yield f"A run vibrates where the amplitude of a strand is {threshold}."
+        told = [f"{row.key.replace('_', ' ')} {row.value}" for row in changed[:MOST_CHANGED]]
+        told += [f"{more} more"] if (more := len(changed) - MOST_CHANGED) > 0 else []
+        start = f"Other than the defaults: {', '.join(told)}. All else" if told else "All that is fixed"
+        yield f"{start} is at its default, which is an assumption where no paper gives it."
+    classes = map_classes(dataset).values
+    without = [(kind, int(np.sum(classes == kind))) for kind in OccurrenceClass if kind not in DECIDED]
+    if counts := ", ".join(f"{count} {kind.label}" for kind, count in without if count):
+        yield f"Runs that are neither quiet nor vibrating: {counts}."
+    if "source" in dataset.attrs:
+        yield f"Computed by {dataset.attrs['source']}."
 
 
 def _cost(dataset: xr.Dataset) -> str:

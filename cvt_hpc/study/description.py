@@ -5,7 +5,7 @@ The coordinates of its dataset are axes, parameters that follow from them, and e
 
 import math
 from collections.abc import Collection, Iterable, Mapping, Sequence
-from dataclasses import asdict, dataclass
+from dataclasses import asdict, dataclass, field
 from enum import IntEnum
 from functools import cached_property
 from typing import Any, Self
@@ -157,6 +157,8 @@ class Study:
         Dimensions of the variables beside the grid.
     derived : tuple of DerivedCoordinate
         Parameters that follow from the axes, except those with more than `MOST_DERIVED` values.
+    units : dict
+        Units in which the job gives values, by key.
     """
 
     name: str
@@ -167,6 +169,7 @@ class Study:
     variables: tuple[Variable, ...]
     coordinates: tuple[Dimension, ...]
     derived: tuple[DerivedCoordinate, ...] = ()
+    units: Mapping[str, str] = field(default_factory=dict)
 
     @property
     def design(self) -> dict[str, Any]:
@@ -282,6 +285,7 @@ class Study:
             "variables": [_variable_to_json(variable) for variable in self.variables],
             "coordinates": [dimension.to_json() for dimension in self.coordinates],
             "derived": [coordinate.to_json() for coordinate in self.derived],
+            "units": dict(self.units),
         }
 
     @classmethod
@@ -296,6 +300,7 @@ class Study:
             tuple(_variable_from_json(variable) for variable in entry["variables"]),
             tuple(Dimension.from_json(dimension) for dimension in entry["coordinates"]),
             tuple(DerivedCoordinate.from_json(derived) for derived in entry.get("derived", ())),
+            entry.get("units", {}),
         )
 
 
@@ -307,7 +312,7 @@ def describe(job: Job, simulator: Simulator) -> Study:
     few = (one for one in job.derived if runs_along(job, one.axes) <= MOST_DERIVED)
     derived = tuple(derived_coordinate(one, job) for one in few)
     head = job.name, job.description, job.fingerprint(), job.resolved()
-    return Study(*head, axes, variables, coordinates, derived)
+    return Study(*head, axes, variables, coordinates, derived, job.units)
 
 
 def runs_along(job: Job, names: Collection[str]) -> int:

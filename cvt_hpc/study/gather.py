@@ -10,15 +10,19 @@ from __future__ import annotations
 import itertools
 import json
 import logging
+import math
 import zlib
-from collections.abc import Callable, Iterator
+from collections.abc import Callable, Iterable, Iterator, Sequence
 from concurrent.futures import ThreadPoolExecutor
+from contextlib import contextmanager
 from pathlib import Path
+from tempfile import TemporaryDirectory
 from typing import TYPE_CHECKING, Any
 
 import numpy as np
 
 from cvt_hpc.errors import InputError, mismatch
+from cvt_hpc.job.values import JOB_UNITS
 from cvt_hpc.storage.files import discard, kind_of, naming_refusals, written_aside
 from cvt_hpc.storage.locks import locked
 from cvt_hpc.storage.netcdf import global_attributes, open_netcdf, refuse_beside_sweep, variable_attributes
@@ -46,6 +50,7 @@ _INFERRED = Variable(
     dtype="i1",
     flags=OccurrenceClass,
 )
+LONGEST = 64  # numbers of a run in a variable that is no spectrum
 PATIENCE = 600.0  # [s]; 10^6 runs are gathered within a minute
 _logger = logging.getLogger(__name__)
 
@@ -193,13 +198,26 @@ def write_results(folder: StudyFolder, study: Study, records: Records) -> Path:
         If the system refuses; the dataset that was there is then untouched.
     """
     with written_aside(folder.results, advice=KEPT) as aside:
-        _declare(aside, study, records)
+        _declare(aside, study, records, study.variables)
         fill(aside, study, records)
     return folder.results
 
 
-def _declare(path: Path, study: Study, records: Records) -> None:
-    """Write a file with the coordinates and one variable per quantity over the runs, `status` first.
+@contextmanager
+def recorded_results(records: Records) -> Iterator[xr.Dataset]:
+    """The dataset of records that were read, without spectra, open within; their folder stays as it is."""
+    study = records.study
+    kept = [one for one in study.variables if math.prod(study.record_dtype[one.name].shape) <= LONGEST]
+    with TemporaryDirectory(prefix="cvt-hpc-") as aside:
+        path = Path(aside) / "results.nc"
+        _declare(path, study, records, kept)
+        fill(path, study, records, [one.name for one in kept])
+        with open_netcdf(path) as dataset:
+            yield dataset
+
+
+def _declare(path: Path, study: Study, records: Records, variables: Sequence[Variable]) -> None:
+    """Write a file with the coordinates and some variables over the runs.
 
     Not through xarray: its first dataset loads dask, scipy and pint, a second at the end of each sweep.
     """
@@ -216,7 +234,7 @@ def _declare(path: Path, study: Study, records: Records) -> None:
             _write_coordinate(file, extra, (extra.name,))
         for derived in study.derived:
             _write_coordinate(file, derived, derived.dims)
-        for variable in study.variables:
+        for variable in variables:
             _create(file, study, variable, chunk_shape(study, variable.name))
         if study.is_traced:
             _create(file, study, _INFERRED, study.shape)[:] = inferred_classes(study, records)
@@ -284,6 +302,7 @@ def _global_attributes(study: Study, records: Records) -> dict[str, str]:
     return {
         **global_attributes(study, study.job, f"model {model}", makers=sessions, earlier=earlier),
         "job_fingerprint": study.fingerprint,
+        JOB_UNITS: json.dumps(dict(study.units)),
     }
 
 
@@ -308,8 +327,8 @@ def contiguous_part(shape: tuple[int, ...], most: int) -> tuple[int, ...]:
     return tuple(reversed(part))
 
 
-def fill(path: Path, study: Study, records: Records) -> None:
-    """Write the values of all quantities into a file that declares them.
+def fill(path: Path, study: Study, records: Records, names: Iterable[str] | None = None) -> None:
+    """Write the values of quantities into a file that declares them.
 
     Parameters
     ----------
@@ -319,6 +338,8 @@ def fill(path: Path, study: Study, records: Records) -> None:
         The quantities.
     records : Records
         Their values.
+    names : iterable of str, optional
+        Some of the quantities; all by default.
     """
     import h5py
 
@@ -326,7 +347,7 @@ def fill(path: Path, study: Study, records: Records) -> None:
     with h5py.File(path, "r+") as file, ThreadPoolExecutor() as pool:
         for block in _parts(study.shape, contiguous_part(study.shape, block_length(study))):
             rows = records.read(runs[block])
-            for name in study.record_names:
+            for name in study.record_names if names is None else names:
                 _fill_block(file[name], block, rows[name], pool)
 
 

@@ -88,7 +88,12 @@ def read_status(out: str | Path) -> StudyStatus:
     folder = StudyFolder(out)
     study = folder.load()
     running = folder.is_in_use()
-    records = folder.read_records(study)
+    return status_of(folder, folder.read_records(study), running)
+
+
+def status_of(folder: StudyFolder, records: Records, running: bool) -> StudyStatus:
+    """Return how far a study is by its records; `running`: a sweep was at work before they were read."""
+    study = records.study
     recorded = int(records.recorded.sum())
     done = int((records.status == Status.DONE).sum())
     needed = needed_runs(study, records)

@@ -12,6 +12,7 @@ import numpy as np
 import pytest
 import xarray as xr
 from matplotlib.backends.backend_agg import FigureCanvasAgg
+from matplotlib.colors import to_hex
 from PIL import Image
 
 import cvt_hpc
@@ -86,7 +87,7 @@ def test_cells_show_their_class_at_their_place():
     small = lightness(pixel(picture, soft, 65, -0.8))
     assert quiet > 220
     assert large < small < 170
-    assert large < 40
+    assert large < small - 40
     white = pixel(picture, rigid, 205, -0.8)
     assert white.tolist() == [255, 255, 255]  # not run
 
@@ -205,8 +206,25 @@ def test_only_vibrating_runs_set_the_scale():
     largest = 1e6 * float(dataset["amplitude"].where(dataset["vibrates"] == Vibrates.YES).max())
     other = dataset["vibrates"] != Vibrates.YES
     dataset["amplitude"] = dataset["amplitude"].where(~other, 1.0)
-    (bar,) = [axes for axes in figure_of(dataset).axes if axes.get_label() == "<colorbar>"]
+    (bar,) = [axes for axes in map_figure(dataset, vmax="fit").axes if axes.get_label() == "<colorbar>"]
     assert bar.get_ylim() == pytest.approx((0, largest))
+
+
+def test_maps_have_one_scale_of_amplitudes_and_mark_what_lies_beyond():
+    dataset, colours = study(stiffnesses=(1.0,), gradients=(-2.4,)), []
+    for factor, extend in ((1.0, "neither"), (20.0, "max"), (0.2, "min")):
+        larger = dataset.assign(amplitude=factor * dataset["amplitude"])
+        figure = map_figure(larger)
+        (bar,) = [axes for axes in figure.axes if axes.get_label() == "<colorbar>"]
+        assert bar.get_ylim() == pytest.approx((2.0, 200.0)) and bar.get_yscale() == "log"
+        labels = [label.get_text() for label in bar.get_yticklabels()]
+        assert labels == ["2", "5", "10", "20", "50", "100", "200"] and bar._colorbar.extend == extend
+        colours.append(fills_of(panels_of(figure)[0]))
+    beyond = map_figure(dataset.assign(amplitude=300.0 * dataset["amplitude"]))
+    assert to_hex(AMPLITUDE_COLOURS(1.0)) in fills_of(panels_of(beyond)[0])
+    assert colours[0] != colours[1]
+    with pytest.raises(InputError, match='vmax: expected a number or "fit", found "most"'):
+        map_figure(dataset, vmax="most")
 
 
 def test_what_is_fixed_stands_in_the_title():

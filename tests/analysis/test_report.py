@@ -15,9 +15,11 @@ import xarray as xr
 
 from cvt_hpc.analysis.classes import map_classes, occurrence_classes
 from cvt_hpc.analysis.hysteresis_bands import lowest_onsets
+from cvt_hpc.cli import main
 from cvt_hpc.errors import InputError
 from cvt_hpc.job import build_job
 from cvt_hpc.report import write_report
+from cvt_hpc.report.findings import shown_quantities
 from cvt_hpc.report.interactive import as_script, map_data
 from cvt_hpc.storage.netcdf import HISTORY
 from cvt_hpc.variables import Status, Vibrates
@@ -116,6 +118,35 @@ def page_of(results, tmp_path):
     with pytest.MonkeyPatch.context() as patch:
         patch.setattr("cvt_hpc.report.page._encoded", lambda compose: "AA==")
         return words_of(write_report(results, tmp_path / "report.html"))
+
+
+def test_the_page_begins_with_what_one_hands_on(page):
+    words = words_of(page)
+    headings = ["Study", "Findings", "What it rests on", "Map", "Next steps", "Failed runs", "Parameters"]
+    found = re.findall(r"<h2>(.*?)</h2>", page.read_text())
+    assert [one for one in found if one in headings] == headings
+    first = page.read_text().partition("Next steps")[0]
+    assert first.count('<div class="front">') == 1 and first.rstrip().endswith("</div>\n\n<h2>")
+    assert "A run vibrates where the amplitude of a strand is 5 µm or more ( amplitude_threshold )." in words
+    assert "All that is fixed is at its default, which is an assumption" in words
+    assert re.search(r"Runs that are neither quiet nor vibrating: \d+ undecided, \d failed", words)
+
+
+@pytest.mark.parametrize(
+    ("units", "told"),
+    [
+        ({"driving_speed": "rpm"}, "driving speed 2500 rpm, thrust 40000 N."),
+        ({"driving_speed": "rpm", "thrust": "kN"}, "driving speed 2500 rpm, thrust 40 kN."),
+        ({"driving_speed": "kg", "thrust": 5}, "driving speed 261.7993878 rad/s (2500 rpm), thrust 40000 N."),
+    ],
+)
+def test_parameters_have_the_units_of_the_job(units, told, tmp_path):
+    results = study(gradients=(-2.4,), stiffnesses=(1.0,))
+    axes = {name: results[name].values.tolist() for name in results["status"].dims}
+    scene = {"driving_speed": "2500 rpm", "thrust": "40 kN"}
+    job = build_job({"name": "a", "model": "elastic_belt", "axes": axes, "scene": scene})
+    results.attrs |= {"job": json.dumps(job.resolved()), "job_units": json.dumps(units)}
+    assert f"Other than the defaults: {told}" in words_of(write_report(results, tmp_path / "report.html"))
 
 
 def test_what_turns_the_direction_of_a_text_is_seen(tmp_path):
@@ -320,6 +351,15 @@ def unjudged():
     return results
 
 
+def test_a_map_shows_quantities_where_no_run_is_judged(tmp_path, monkeypatch):
+    unjudged().to_netcdf(tmp_path / "results.nc")
+    drawn = []
+    monkeypatch.setattr("cvt_hpc.analysis.value_maps.value_map_figure", lambda *given: drawn.append(given[1]))
+    monkeypatch.setattr("cvt_hpc.analysis.figures.draw", lambda compose, out: compose())
+    assert main(["map", str(tmp_path / "results.nc")]) == 0
+    assert drawn == [["limit_torque"]] and shown_quantities(study(**SMALL)) == []
+
+
 def test_a_study_that_judges_no_vibration_tells_and_shows_its_quantities(tmp_path):
     words = page_of(unjudged(), tmp_path)
     assert "40 runs: 40 undecided. No run is known to be quiet or to vibrate." in words
@@ -455,3 +495,7 @@ def test_it_prints_on_paper(page):
     assert "Point at a run" not in words  # the printed map stands in the place of that to point at
     assert sum(len(one.images) for one in pages) == 1
     assert "[belt] ring_mass" in words  # the defaults, which are folded on the screen
+    handed_on = [" ".join(one.extract_text().split()) for one in pages[:2]]
+    assert "Findings" in handed_on[0] and "What it rests on" in handed_on[0]
+    assert "Map" in handed_on[1] and len(pages[1].images) == 1
+    assert "Next steps" not in " ".join(handed_on)

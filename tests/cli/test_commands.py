@@ -44,6 +44,10 @@ def test_run_status_gather_and_map_of_one_study(write_job, call, tmp_path):
         ["map: out/x/map_sheave_stiffness=3.png"],
         [],
     )
+    assert call("report", "out/x", "--every", "1s") == (0, ["report: out/x/report.html"], [])
+    assert "(finished" in (tmp_path / "out/x/report.html").read_text()
+    status, _, told = call("report", "out/x", "--every", "soon")
+    assert status == 2 and told[0].startswith("cvt-hpc: --every: expected")
     assert call("map", "out/x/results.nc", "--out", "y.png") == (0, ["map: y.png"], [])
     assert call("map", "out/x", "out/x/results.nc") == (0, ["map: out/x/maps.png"], [])
     status, _, told = call("map", "out/x", "--show", "vibrate", "--vmax", "20 um")
@@ -457,6 +461,7 @@ def test_an_interrupt_ends_with_130(write_job, call, monkeypatch):
 def test_the_end_of_the_colours_is_given_with_its_unit():
     assert colour_end("20 um", "m") == 20e-6
     assert colour_end("0.4", "1") == 0.4
-    assert colour_end(None, "m") is None
+    assert colour_end(None, "m") is None and colour_end("fit", "m") is None
+    assert colour_end("fit", "m", fits=False) == "fit" and colour_end(None, "m", fits=False) is None
     with pytest.raises(InputError, match="--vmax: expected a value with its unit, of m, found 20"):
         colour_end("20", "m")

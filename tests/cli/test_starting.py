@@ -26,7 +26,9 @@ RECORDED = [name for name in MODELS if load_model(name).is_recorded]
 def test_a_template_is_a_job_and_so_is_all_that_is_commented_out_in_it(model):
     text = job_template("first", model, "init")
     job = build_job(tomllib.loads(text))
-    assert (job.name, job.model, len(job)) == ("first", model, 3)
+    mapped = model in ("auto", "elastic_belt")
+    assert (job.name, job.model, len(job)) == ("first", model, 27 if mapped else 3)
+    assert ("count = 5" in text) and job.shape == ((9, 3) if mapped else (3,))
     # every key with its default, but what stands in the place of another one, and the load beside its share
     uncommented = re.sub(r"(?m)^# (?!load =)(\w+ = )(?!.*\.\.\.)", r"\1", text)
     assert uncommented.count("\n#") < text.count("\n#")

@@ -1,5 +1,6 @@
 """The page of terms: its keys are those of models, its effects those of stored tables."""
 
+import re
 import runpy
 from pathlib import Path
 
@@ -7,8 +8,10 @@ import pytest
 
 from cvt_hpc.job import known_keys
 from cvt_hpc.models import MODELS
+from cvt_hpc.vibration.classes import OccurrenceClass
 
-PAGE = runpy.run_path(str(Path(__file__).parents[2] / "docs" / "terms_page.py"))
+ROOT = Path(__file__).parents[2]
+PAGE = runpy.run_path(str(ROOT / "docs" / "terms_page.py"))
 TERMS = PAGE["terms"]()
 
 
@@ -34,3 +37,41 @@ def test_what_is_switched_has_been_measured():
     (tilt,) = [row for row in rows if row[0] == "| tilt of the elements"]
     assert tilt[4] == "auto, elastic_belt, linear_stability, slip_limit, steady_variator"
     assert float(tilt[6].split()[0]) == round(measured["none"]["frequency"])
+
+
+# Programs, file formats, signals and words in place of others, which are no terms of the field
+NO_TERMS = set("EXUDYN CSV TOML UTF HDF5 README EPYC UDUNITS MPICH A4 TERM HUP USR1 USR2 XCPU".split())
+NO_TERMS |= set("NAME SITE KIND WHAT AXIS VALUE TA P1".split())
+# Terms of the field in a report; each stands in its texts
+IN_A_REPORT = [
+    *("amplitude", "disturbance", "hysteresis", "inferred", "load", "onset", "threshold"),
+    *("ratio", "sample", "Sobol index", "strand t1, t2", "window"),
+]
+
+
+def glossary_words():
+    rows = re.findall(r"(?m)^\| `?(.*?)`? \| ", (ROOT / "docs" / "guide" / "glossary.md").read_text())
+    return rows[1:]
+
+
+def prose_of(path):
+    """Text of a page of the guide, or of a page's template, without code and formulas."""
+    code = r"```.*?```|`[^`]*`|\$[^$\n]*\$|<style>.*?</style>|\{[%{#].*?[%}#]\}|<[^>]+>|\]\([^)]*\)"
+    return re.sub(code, "", path.read_text(), flags=re.DOTALL)
+
+
+def test_the_glossary_has_the_classes_and_the_abbreviations():
+    words = glossary_words()
+    assert words == sorted(words, key=lambda word: word.split(",")[0].lower())
+    assert {kind.label for kind in OccurrenceClass} | {"inferred"} <= {*words}
+    pages = [*(ROOT / "docs" / "guide").glob("*.md"), ROOT / "cvt_hpc" / "report" / "page.html"]
+    told = {word for page in pages for word in re.findall(r"\b[A-Z][A-Z0-9]*[A-Z0-9]\b", prose_of(page))}
+    known = set(re.findall(r"\w+", (ROOT / "docs" / "guide" / "glossary.md").read_text()))
+    assert sorted(told - known - NO_TERMS) == []
+    assert NO_TERMS <= told
+
+
+def test_the_glossary_has_the_terms_of_a_report():
+    texts = "".join(path.read_text() for path in (ROOT / "cvt_hpc" / "report").glob("*.*"))
+    for term in IN_A_REPORT:
+        assert term in glossary_words() and re.split(r"[ ,]", term)[0] in texts, term

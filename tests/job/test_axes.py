@@ -72,6 +72,13 @@ def test_minus_zero_is_zero():
             ": expected a list [v1, v2, ...] or a range {from=, to=, count=} or {from=, to=, step=}, found 5",
         ),
         (
+            "40, 60",
+            LOAD,
+            ": expected a list [v1, v2, ...] or a range {from=, to=, count=} or {from=, to=, step=}, found "
+            '"40, 60"; decimals have a point, as 2.4, thousands have no mark, and several values are a list, '
+            "as [2, 4]",
+        ),
+        (
             [1, 2, "1 N m"],
             LOAD,
             ': expected distinct values, found "1 N m" as value 1 and value 3',

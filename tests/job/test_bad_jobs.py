@@ -10,6 +10,9 @@ from cvt_hpc.models import MODELS
 
 HEAD = 'name = "x"\nmodel = "toy"\n'
 THRUST = '[scene]\nthrust = "20 kN"\n'
+SEPARATED = (
+    "; decimals have a point, as 2.4, thousands have no mark, and several values are a list, as [2, 4]"
+)
 IN_N = 'expected a value in N (such as "1 N" or a bare number in N), found'
 IN_KG_PER_M = 'expected a value in kg/m (such as "1 kg/m" or a bare number in kg/m), found'
 OTHER_ENCODING = "x.toml: expected a text in UTF-8, found another encoding or binary data; save it in UTF-8"
@@ -32,6 +35,8 @@ def complaint(path="x.toml"):
         ("[mesh]\nzzz = 1", "[mesh] zzz: unknown key; known: stations, refined"),
         ('[scene]\nthrust = "50 kg"', f'[scene] thrust: {IN_N} "50 kg"'),
         ('[scene]\nthrust = "50 kX"', f'[scene] thrust: {IN_N} "50 kX" (kX is no known unit)'),
+        ('[scene]\nthrust = "2,4 kN"', f'[scene] thrust: {IN_N} "2,4 kN"{SEPARATED}'),
+        ('[scene]\nthrust = "1; 2"', f'[scene] thrust: {IN_N} "1; 2"{SEPARATED}'),
         ('[scene]\nthrust = "much"', f'[scene] thrust: {IN_N} "much"'),
         ("[scene]\nthrust = true", f"[scene] thrust: {IN_N} true"),
         ("[scene]\nthrust = 2020-01-01", f"[scene] thrust: {IN_N} 2020-01-01"),
@@ -54,6 +59,7 @@ def complaint(path="x.toml"):
         ("[belt]\nsheave_stiffness = '1 N'", '[belt] sheave_stiffness: expected a number, found "1 N"'),
         ("[belt]\nlabel = 5", "[belt] label: expected a text, found 5"),
         ("[belt]\ntable = 5", "[belt] table: expected a list of numbers in N/m, found 5"),
+        ('[belt]\ntable = "2,4"', f'[belt] table: expected a list of numbers in N/m, found "2,4"{SEPARATED}'),
         (
             "[belt]\ntable = [[1, 2], [3, 'x']]",
             '[belt] table, item 2, item 2: expected a value in N/m (such as "1 N/m" or a bare number in N/m), found "x"',
