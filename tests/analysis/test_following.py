@@ -85,7 +85,7 @@ def test_ctrl_c_leaves_a_last_page(second, monkeypatch, tmp_path):
 
     if second:  # pressed again while that page is written
         pages = iter([lambda *_: None, press])
-        monkeypatch.setattr(following, "write_report", lambda *given: next(pages)(*given))
+        monkeypatch.setattr(following, "write_report", lambda *given, **options: next(pages)(*given))
         monkeypatch.setattr(StudyFolder, "is_in_use", lambda folder: True)
         monkeypatch.setattr(following.time, "sleep", press)
         with pytest.raises(KeyboardInterrupt):
