@@ -26,6 +26,7 @@ FORMATS = (".wav", ".csv", ".uff")
 AUDIO_RATE, FULL_SCALE = 48000, 32767  # [Hz], and the largest number of 16 bits
 PEAK = 10.0 ** (-3.0 / 20.0)  # of full scale: -3 dBFS
 LEAST_SOUND = 5.0  # [s]: a loop is repeated until it lasts so long
+ROUNDING = 1e-13  # of a signal, which moves no more than that by rounding alone
 FADE = 0.01  # [s]: over this time, in whole periods, the end of a loop goes over into its beginning
 KINDS = {"m": 8, "N": 13}  # specific data types of UFF58: displacement, excitation force; else unknown
 
@@ -157,6 +158,8 @@ def _write_sound(history: xr.Dataset, signal: Signal, out: Path, source: str, ve
             moved * (0.5 - 0.5 * np.cos(np.pi * np.minimum(ends, ends[::-1]))), moved.size / signal.rate, 0
         )
         times, what = 1, f"the whole ramp, {loop.length:.6g} s"
+    if np.ptp(loop.values) <= ROUNDING * np.abs(signal.values).max():
+        raise mismatch(f"{source}: {signal.name}", "a signal that changes", "a constant one")
     # periodic, so that transforms give the derivative and samples at another rate without effects of ends
     values, unit = loop.values, signal.unit
     if velocity:
@@ -164,8 +167,6 @@ def _write_sound(history: xr.Dataset, signal: Signal, out: Path, source: str, ve
         values, unit = np.fft.irfft(rates * np.fft.rfft(values), values.size), "m s-1"
     values = resample(values, round(loop.length * AUDIO_RATE))
     highest = float(np.abs(values).max())
-    if not highest > 0.0:
-        raise mismatch(f"{source}: {signal.name}", "a signal that changes", "a constant one")
     samples = np.round(values * (PEAK * FULL_SCALE / highest)).astype(np.int16)
     with written_aside(out, parents=True) as aside:
         wavfile.write(aside, AUDIO_RATE, np.tile(samples, times))
