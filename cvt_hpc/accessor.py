@@ -127,6 +127,15 @@ class Results:
 
         return animation(self._history("animation"))
 
+    def export(self, out: str | Path, *of: str, velocity: bool = False) -> list[str]:
+        """Write signals of a run as WAV, CSV or UFF58, and return lines about it; of a history.
+
+        See `cvt_hpc.analysis.export.export`.
+        """
+        from cvt_hpc.analysis.export import export
+
+        return export(self._history("export"), of, Path(out), velocity=velocity)
+
     def report(self, out: str | Path = "report.html", measured: str | Path | None = None) -> Path:
         """Write a page: findings, a map with values, failed runs, cost; with a measured file the score."""
         from cvt_hpc.report import write_report

@@ -96,12 +96,29 @@ MEASURED = Option(
     "--measured",
     {"metavar": "CSV"},
 )
+_FLAG = {"action": "store_true"}
+
 ALONG = Option(
     "along",
     "axis along which vibration sets in (default: the load, or the last one)",
     "--along",
     {"metavar": "AXIS"},
 )
+
+ORDERS = Option(
+    "orders",
+    "orders: 8 of the driving pulley, driven:2, elements:1 (default: 1 2 4 8 16 driven:1 elements:1)",
+    "--orders",
+    {"nargs": "+", "metavar": "ORDER"},
+)
+BANDWIDTH = Option(
+    "bandwidth",
+    "band of an order, in orders (default: 1)",
+    "--bandwidth",
+    {"type": float, "metavar": "ORDERS"},
+)
+VELOCITY = Option("velocity", "of velocities in the place of displacements", "--velocity", _FLAG)
+LEVEL = Option("level", "RMS levels in dB in the place of amplitudes", "--level", _FLAG)
 
 KINDS = {
     "waterfall": Kind(
@@ -207,6 +224,47 @@ KINDS = {
         "ramps.spectrogram_figure",
         "spectra of the strands side by side along a ramp or over time, with eigenfrequencies",
         (_end("moments"), MEASURED),
+    ),
+    "orders": Kind(
+        HISTORIES,
+        "orders.orders_figure",
+        "orders of the pulleys' turns and of passing elements along a ramp of speed, or over time",
+        (
+            Option(
+                "of",
+                "t1, t2, a probe, variable over time or shaft force (default: t1)",
+                "--of",
+                {"default": "t1", "metavar": "WHAT"},
+                True,
+                True,
+            ),
+            ORDERS,
+            BANDWIDTH,
+            VELOCITY,
+            LEVEL,
+        ),
+    ),
+    "order_cuts": Kind(
+        RESULTS,
+        "orders.order_cuts_figure",
+        "orders of the pulleys' turns and of passing elements over the driving speeds of a study",
+        (ORDERS, BANDWIDTH, VELOCITY, LEVEL),
+    ),
+    "third_octaves": Kind(
+        HISTORIES,
+        "levels.third_octaves_figure",
+        "RMS levels of the judged part in third octaves, in dB re 1 um, 1 mm/s or the unit",
+        (
+            Option(
+                "quantities",
+                "t1, t2, a probe, variable over time or shaft force; may be repeated (default: t1 and t2)",
+                "--of",
+                {"action": "append", "default": [], "metavar": "WHAT"},
+                True,
+                True,
+            ),
+            VELOCITY,
+        ),
     ),
     "element": Kind(
         HISTORY,

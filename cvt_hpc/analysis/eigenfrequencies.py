@@ -40,13 +40,7 @@ def along_axis(shown: xr.Dataset, x: str) -> xr.DataArray | None:
         return shown["eigenfrequency"].transpose("strand", "half_waves", x)
     if not {"mean_ring_tension", "mean_push_force"} <= {*map(str, shown.data_vars)}:
         return None
-    try:
-        job = json.loads(shown.attrs.get("job", "{}"))
-    except ValueError:
-        return None
-    tables = (table for table in job.values() if isinstance(table, dict))
-    fixed = {key: value for table in tables for key, value in table.items()}
-    fixed |= {str(key): value.values.item() for key, value in shown.coords.items() if value.ndim == 0}
+    fixed = parameters_of(shown)
     force = (shown["mean_ring_tension"] - shown["mean_push_force"]).transpose(x, "strand")
     if force.sizes["strand"] != len(STRANDS):
         return None
@@ -59,6 +53,17 @@ def along_axis(shown: xr.Dataset, x: str) -> xr.DataArray | None:
         return None
     coordinates = {x: shown[x], "strand": shown["strand"], "half_waves": np.arange(1, MODES + 1)}
     return xr.DataArray(found, coordinates, (x, "strand", "half_waves")).transpose("strand", "half_waves", x)
+
+
+def parameters_of(shown: xr.Dataset) -> dict[str, Any]:
+    """Parameters by name [SI] that all runs of results have, by their job and fixed axes."""
+    try:
+        job = json.loads(shown.attrs.get("job", "{}"))
+    except ValueError:
+        return {}
+    tables = (table for table in job.values() if isinstance(table, dict))
+    fixed = {key: value for table in tables for key, value in table.items()}
+    return fixed | {str(key): value.values.item() for key, value in shown.coords.items() if value.ndim == 0}
 
 
 def eigenfrequency_figure(

@@ -100,10 +100,10 @@ _SMALL = {"m": (1e-4, (1e6, "µm")), "rad": (0.1, (1e3, "mrad")), "N": (500.0, (
 def display_unit(unit: str) -> tuple[float, str]:
     """Factor and unit in which a quantity with this SI unit is shown: ("N") -> (1e-3, "kN")."""
     known = _DISPLAY_UNITS.get(unit.replace("rad/s", "rad s-1"))
-    return known if known is not None else (1.0, _as_fraction(unit))
+    return known if known is not None else (1.0, as_fraction(unit))
 
 
-def _as_fraction(unit: str) -> str:
+def as_fraction(unit: str) -> str:
     """A product of powers as a fraction: "N s m-2" as "N s/m²"; what is none, or has no power, as it is."""
     factors = [_POWER.fullmatch(factor) for factor in unit.split()]
     if None in factors or "-" not in unit:

@@ -58,7 +58,7 @@ def history_figure(dataset: xr.Dataset, source: str = "history") -> Figure:
         There is nothing to draw.
     """
     dataset = standard(dataset, source)
-    settings, band = _vibration_settings(dataset)
+    settings, band = settings_of(dataset)
     judged = settings["judged_fraction"] if _is_judged(dataset) else 0.0
     strands = panels.read_strands(dataset, judged, band)
     with_spectrum = [strand for strand in strands if strand.has_spectrum]
@@ -119,7 +119,7 @@ def phase_figure(dataset: xr.Dataset, source: str = "history") -> Figure:
     InputError
         No motion of strands was recorded, or too little of it.
     """
-    settings, band = _vibration_settings(dataset)
+    settings, band = settings_of(dataset)
     judged = settings["judged_fraction"] if _is_judged(dataset) else 0.5
     strands = [one for one in panels.read_strands(dataset, judged, band) if one.has_spectrum]
     if not strands:
@@ -174,7 +174,7 @@ def _is_known(dataset: xr.Dataset, name: str) -> bool:
     return name in dataset and bool(np.isfinite(dataset[name]).any())
 
 
-def _vibration_settings(dataset: xr.Dataset) -> tuple[dict[str, float], tuple[float, float]]:
+def settings_of(dataset: xr.Dataset) -> tuple[dict[str, float], tuple[float, float]]:
     """Table [vibration] of the run's job, with what the run had of its own, else defaults; and its band."""
     declared = vibration_settings.PARAMETERS["vibration"]
     defaults = {key: parameter.default for key, parameter in declared.items()}

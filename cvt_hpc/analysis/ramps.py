@@ -164,7 +164,7 @@ def spectrogram_figure(
     for history, name in zip(histories, names, strict=True):
         if "displacement" not in history or "probe" not in history["displacement"].dims:
             raise mismatch(name, "the history of a run with the displacement of strands", "none")
-        if float(np.ptp(history["time"].values)) < _start_up(history) + 2.0 * WINDOW:
+        if float(np.ptp(history["time"].values)) < start_up(history) + 2.0 * WINDOW:
             raise mismatch(name, f"a run of {2.0 * WINDOW:g} s or more after its start-up", "a shorter one")
     probes = (str(probe) for history in histories for probe in history["probe"].values)
     strands = [name for name in dict.fromkeys(probe.split()[0] for probe in probes) if name in STRANDS]
@@ -228,7 +228,7 @@ def _lines_along(history: xr.Dataset, ramp: Ramp) -> tuple[_Lines | None, _Lines
     """Turns (n,) [Hz] along a ramp of speed, and eigenfrequencies (strand, half waves, n) [Hz], at places."""
     half = int(0.5 * WINDOW * ramp.rate)  # the panel reaches from the middle of the first window on
     at = np.linspace(half, ramp.values.size - 1 - half, LINE_POINTS).astype(int)
-    changing = _changing(history)
+    changing = changing_of(history)
     point = json.loads(history.attrs.get("point", "{}"))
     courses = {}
     if changing is not None:
@@ -262,7 +262,7 @@ def course_figure(history: xr.Dataset, of: str) -> Figure:
     upper, lower = figure.subplots(2, 1, sharex=True)
     upper.plot(time, values, color="#0072b2", lw=0.3, rasterized=True)
     upper.set_ylabel(f"{name} [{unit}]")
-    begun = float(time[np.searchsorted(time, _start_up(history))])
+    begun = float(time[np.searchsorted(time, start_up(history))])
     beside = lower.twinx()
     panels = ((lower, of, NOISE, "#0072b2", "-", unit), (beside, "t1", BAND, "#d55e00", "--", "µm"))
     for axes, what, band, colour, line, scale in panels:
@@ -303,13 +303,10 @@ def read_ramp(history: xr.Dataset, of: str, source: str = "history", *, is_ramp:
 
     Unless it has to be a ramp, a run at constant load and speed has its time [s] in the place of that.
     """
-    changing = _changing(history)
-    if changing is None and is_ramp:
+    if changing_of(history) is None and is_ramp:
         raise mismatch(source, "a run along a ramp of load or speed", "constant ones")
-    time = history["time"].values
-    course = history["time"] if changing is None else history[changing]
-    first = int(np.searchsorted(time, _start_up(history)))
-    factor, unit = figures.coordinate_unit(course.attrs) if changing else (1.0, "s")
+    time, (course, label) = history["time"].values, course_of(history)
+    first = int(np.searchsorted(time, start_up(history)))
     rate = 1.0 / (time[1] - time[0])
     if time.size - first < WINDOW * rate:
         raise mismatch(source, f"a run of {WINDOW:g} s or more after its start-up", "a shorter one")
@@ -327,14 +324,22 @@ def read_ramp(history: xr.Dataset, of: str, source: str = "history", *, is_ramp:
     else:
         raise mismatch(source, "t1, t2 or a variable over time", of)
     return Ramp(
-        factor * course.values[first:],
-        f"{figures.in_words(course)} [{unit}]",
+        course[first:],
+        label,
         _without_drift(motion, rate),
         rate,
     )
 
 
-def _changing(history: xr.Dataset) -> str | None:
+def course_of(history: xr.Dataset) -> tuple[np.ndarray, str]:
+    """What a run ramps over its time, in display units, with its name and unit; else the time [s]."""
+    changing = changing_of(history)
+    course = history[changing or "time"]
+    factor, unit = figures.coordinate_unit(course.attrs) if changing else (1.0, "s")
+    return factor * course.values, f"{figures.in_words(course)} [{unit}]"
+
+
+def changing_of(history: xr.Dataset) -> str | None:
     """The quantity that a run ramps."""
     courses = [name for name in COURSES if name in history]
     return next((name for name in courses if _is_ramp(history[name].values)), None)
@@ -342,14 +347,14 @@ def _changing(history: xr.Dataset) -> str | None:
 
 def _side_of(history: xr.Dataset, ramp: Ramp) -> Side:
     """What runs along x, in display units."""
-    changing = _changing(history)
+    changing = changing_of(history)
     factor = figures.coordinate_unit(history[changing].attrs)[0] if changing else 1.0
     return Side(changing or "time", np.sort(ramp.values[[0, -1]]), factor)
 
 
 def _held(history: xr.Dataset) -> xr.Dataset:
     """Load and speed of a run, as coordinates, where they do not change."""
-    names = [name for name in COURSES if name in history and name != _changing(history)]
+    names = [name for name in COURSES if name in history and name != changing_of(history)]
     return xr.Dataset(coords={name: float(history[name].values[-1]) for name in names})
 
 
@@ -359,7 +364,7 @@ def _is_ramp(values: np.ndarray) -> bool:
     return bool(np.ptp(half) > 1e-6 * np.abs(half).max())
 
 
-def _start_up(history: xr.Dataset) -> float:
+def start_up(history: xr.Dataset) -> float:
     """When the ramp begins [s]."""
     return float(json.loads(history.attrs.get("point", "{}")).get("rise_time", 0.0))
 

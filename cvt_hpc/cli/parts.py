@@ -7,7 +7,7 @@ import os
 import re
 import sys
 from collections.abc import Callable, Iterator, Sequence
-from contextlib import contextmanager
+from contextlib import ExitStack, contextmanager
 from pathlib import Path
 from typing import TYPE_CHECKING, Any, TypeVar
 
@@ -33,6 +33,7 @@ _SUBJECTS = {
     "DIR": "output folder of a run",
     "RESULTS": "output folder of a run, or a dataset (.nc)",
     "CSV": "measured points: columns speed and mu, and, if there are any, force and specimen",
+    "HISTORY": "dataset of one run (.nc)",
     "HISTORIES": "dataset of one run (.nc), or the folder of a study: all runs whose histories it keeps",
 }
 
@@ -107,6 +108,17 @@ def opened_results(path: Path) -> Iterator[xr.Dataset]:
 
     with open_results(path) as opened:
         yield standard(opened, str(path))
+
+
+@contextmanager
+def opened_histories(files: Sequence[Path]) -> Iterator[list[xr.Dataset]]:
+    """Histories of runs in the form in which this program writes them, open within."""
+    from cvt_hpc.analysis.conversion import standard
+    from cvt_hpc.storage.netcdf import open_netcdf
+
+    with ExitStack() as stack:
+        opened = [stack.enter_context(open_netcdf(file, follow=True)) for file in files]
+        yield [standard(history, str(file)) for history, file in zip(opened, files, strict=True)]
 
 
 def fixed_axes(arguments: argparse.Namespace, dataset: xr.Dataset, source: str) -> dict[str, Any]:

@@ -1,8 +1,7 @@
 """`plot`: pictures of results beside the map, each by its kind; `picture_kinds.py` declares them."""
 
 import argparse
-from collections.abc import Callable, Iterator, Sequence
-from contextlib import ExitStack, contextmanager
+from collections.abc import Callable, Sequence
 from pathlib import Path
 from typing import Any
 
@@ -90,7 +89,7 @@ def _draw_together(arguments: argparse.Namespace, words: Sequence[str], options:
     files = history_files([arguments.path, *arguments.others])
     names = [file.stem for file in files]
     out = arguments.out or parts.picture_beside(arguments.path, files, *words)
-    with _opened(files) as histories:
+    with parts.opened_histories(files) as histories:
         parts.say(f"picture: {_write(arguments.kind, histories, out, None, names, options)}")
 
 
@@ -144,7 +143,7 @@ def _each(
         out = arguments.out
         out = beside(file) if out is None else out.with_stem(out.stem + of_several)
         try:
-            with _opened([file]) as (history,):
+            with parts.opened_histories([file]) as (history,):
                 parts.say(*write(history, out, str(file), of_several))
         except StorageError:
             raise
@@ -154,14 +153,3 @@ def _each(
             parts.complain(str(error))
             status = parts.SOME_FAILED
     return status
-
-
-@contextmanager
-def _opened(files: Sequence[Path]) -> Iterator[list[Any]]:
-    """Histories of runs, open within."""
-    from cvt_hpc.analysis.conversion import standard
-    from cvt_hpc.storage.netcdf import open_netcdf
-
-    with ExitStack() as stack:
-        opened = [stack.enter_context(open_netcdf(file, follow=True)) for file in files]
-        yield [standard(history, str(file)) for history, file in zip(opened, files, strict=True)]

@@ -1,4 +1,4 @@
-"""`simulate`: one run with its history."""
+"""`simulate` and `export`: one run with its history, and its signals for ears and other programs."""
 
 import argparse
 from pathlib import Path
@@ -18,6 +18,15 @@ def add(commands: Any) -> None:
     parts.add_assignments(simulate, "--set", parts.REPLACE)
     at = "where to run; an axis that is not named takes the value of its table, or else its first one"
     parts.add_assignments(simulate, "--at", at)
+    text = "signals of a run over time: WAV to listen to, CSV and UFF58 as input of a model of the casing"
+    end = ". No casing, and no sound that it radiates, is modelled."
+    export = parts.add_command(commands, "export", _export, text, "HISTORY", end)
+    text = "t1, t2, a probe, variable over time or shaft force; may be repeated (default: WAV t1, else all)"
+    export.add_argument("--of", action="append", default=[], metavar="WHAT", help=text)
+    text = "FILE.wav, a loop of the judged part, or a whole ramp; FILE.csv; or FILE.uff"
+    export.add_argument("--out", type=Path, metavar="FILE", required=True, help=text)
+    text = "as WAV: the velocity of a displacement"
+    export.add_argument("--velocity", action="store_true", help=text)
 
 
 def _simulate(arguments: argparse.Namespace) -> int:
@@ -55,4 +64,18 @@ def _simulate(arguments: argparse.Namespace) -> int:
     if status != Status.DONE:
         parts.complain(f"the run failed: {status.name.lower()}: {run.record['reason']}")
         return parts.SOME_FAILED
+    return parts.DONE
+
+
+def _export(arguments: argparse.Namespace) -> int:
+    from cvt_hpc.analysis.export import FORMATS, export
+    from cvt_hpc.analysis.telling_apart import history_files
+
+    parts.check_output(arguments.out, FORMATS)
+    files = history_files([arguments.path])
+    if len(files) > 1:
+        raise mismatch(str(arguments.path), "the history of one run", f"a folder of {len(files)}")
+    with parts.opened_histories(files) as (history,):
+        lines = export(history, arguments.of, arguments.out, str(files[0]), velocity=arguments.velocity)
+    parts.say(*lines)
     return parts.DONE

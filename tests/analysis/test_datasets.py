@@ -20,7 +20,7 @@ VERSIONS = sorted(path for path in (Path(__file__).parents[1] / "datasets").iter
 OF_RUNS = ("waterfall", "curve", "strands")
 FOUND = {  # classes of the cells, and what can be drawn beside the map
     "grid": ("2 quiet, 2 vibrating, 2 undecided", OF_RUNS),
-    "speeds": ("1 quiet, 2 vibrating", (*OF_RUNS, "campbell")),
+    "speeds": ("1 quiet, 2 vibrating", (*OF_RUNS, "campbell", "order_cuts")),
     "traced": ("7 quiet, 9 vibrating, 2 undecided", OF_RUNS),
     "samples": ("6 quiet, 2 vibrating", OF_RUNS),
     "starts": ("1 quiet, 4 vibrating, 1 undecided", OF_RUNS),
@@ -30,9 +30,9 @@ FOUND = {  # classes of the cells, and what can be drawn beside the map
     "strand": ("6 undecided", ("curve",)),
 }
 DRAWN = {
-    "elastic_belt": ("wrap", "profile", "element", "history", "phase", "energy", "variator"),
+    "elastic_belt": ("wrap", "profile", "element", "history", "phase", "energy", "variator", "third_octaves"),
     "elastic_belt_ramp": ("ramp", "spectrogram", "wrap", "profile", "history", "phase", "energy", "variator"),
-    "pushbelt": ("profile", "history", "phase", "variator"),
+    "pushbelt": ("profile", "history", "phase", "variator", "third_octaves"),
     "spatial_pushbelt": ("profile", "history", "phase", "variator", "flanks"),
     "belt_drive": ("wrap", "profile", "history", "phase"),
 }

@@ -34,8 +34,6 @@ ELSEWHERE = {
     "python -m mkdocs": "tests/cli/test_guide.py builds the guide",
     "python tests/benchmarks": "compares models, for minutes of a core",
     "python jobs/tables.py": "tests/analysis/test_tables.py",
-    "cvt-hpc friction": "takes the file of a rig; tests/fit/test_measured_friction.py",
-    "cvt-hpc calibrate": "takes the file of a rig; tests/fit/test_calibrate.py",
     "sbatch": "tests/slurm submits the batch files to a Slurm of its own",
     "scancel": "tests/slurm stops jobs so",
     "apptainer": "no container is built in a test; tests/slurm/test_launch_script.py starts the ranks through a stand-in",
