@@ -7,6 +7,7 @@ import numpy as np
 import pytest
 import xarray as xr
 
+import cvt_hpc.simulation.record  # noqa: F401  # the double below is no package to look for it in
 from cvt_hpc.cli import main
 from cvt_hpc.variables import Status, Variable, Vibrates
 from support.outcomes import outcomes_of
@@ -93,7 +94,7 @@ def mechanics(monkeypatch):
     )
     histories = ModuleType("cvt_hpc.analysis.histories")
     calls = {"written": [], "drawn": []}
-    histories.place_of = histories.values_of = lambda attributes: []
+    histories.place_of = histories.values_of = histories.settings_of = lambda attributes: []
     histories.draw_history = lambda dataset, path: calls["drawn"].append((dataset, path)) or path
     monkeypatch.setitem(sys.modules, "cvt_hpc.simulation", double)
     monkeypatch.setitem(sys.modules, "cvt_hpc.analysis.histories", histories)
