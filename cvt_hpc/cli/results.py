@@ -123,13 +123,14 @@ def _map(arguments: argparse.Namespace) -> int:
         words = (kind, *arguments.show, *arguments.at)
         out = arguments.out or parts.picture_beside(arguments.path, files, *words)
         measured, vmax = arguments.measured, None
-        coloured = arguments.show[0] if arguments.show else "amplitude"
-        if coloured in dataset:  # what draws it refuses a quantity that is not known
-            unit = str(dataset[coloured].attrs.get("units", ""))
-            vmax = parts.colour_end(arguments.vmax, unit, fits=bool(arguments.show))
         from cvt_hpc.report.findings import shown_quantities
 
-        if shown := arguments.show or shown_quantities(dataset):
+        shown = arguments.show or shown_quantities(dataset)
+        coloured = shown[0] if shown else "amplitude"
+        if coloured in dataset:  # what draws it refuses a quantity that is not known
+            unit = str(dataset[coloured].attrs.get("units", ""))
+            vmax = parts.colour_end(arguments.vmax, unit, fits=bool(shown))
+        if shown:
             draw(lambda: value_map_figure(dataset, shown, at, source, sides, vmax, measured), out)
             parts.say(f"map: {out}")
             return parts.DONE
@@ -153,6 +154,10 @@ def _report(arguments: argparse.Namespace) -> int:
 
     out = arguments.out or parts.folder_of(arguments.path) / "report.html"
     parts.check_output(out, (".html",))
+    if arguments.every and arguments.measured:
+        from cvt_hpc.errors import mismatch
+
+        raise mismatch("--every", "no --measured beside it: a running sweep is drawn alone", "both")
     if arguments.every:
         from cvt_hpc.job.units import read_duration
         from cvt_hpc.printing import status_rows

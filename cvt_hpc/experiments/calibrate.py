@@ -3,18 +3,22 @@
 The job's samples are the candidates, drawn from the distributions that [uncertain] states beforehand. Each
 is weighed by how well its runs agree with a measured file, by
 
-    ln L = -n ln((1 - p) / p) - mean((df / s_f)^2) / 2 - (mean ln q / ln 2)^2 / 2 - sum((do / s_o)^2) / 2,
+    ln L = -n c - m ln(2 (1 - p)) - min(h c, h'),    c = ln((1 - p) / p),
+    h' = mean((df / s_f)^2) / 2 + (mean ln q / ln 2)^2 / 2,    of onsets  -sum((do / s_o)^2) / 2,
 
-n counting misses and false alarms, and p being the share of cells that may be judged otherwise by model or
-rig (`doubt`); df and q are errors of the frequencies and ratios of the amplitudes of hits, s_f is `scatter`;
-do are errors of onsets, whose places are known to half a step s_o of the axis. Errors of frequency and
-amplitude are alike in neighbouring cells: they count as one measurement each, amplitudes within a factor of
-two, as a rig measures at another place.
+n counting misses and false alarms, m cells without a verdict, which are as likely as not, h hits, and p being
+the share of cells that may be judged otherwise by model or rig (`doubt`); df and q are errors of the
+frequencies and ratios of the amplitudes of hits, s_f is `scatter`; do are errors of onsets, whose places are
+known to half a step s_o of the axis. Errors of frequency and amplitude are alike in neighbouring cells: they
+count as one measurement each, amplitudes within a factor of two, as a rig measures at another place, and cost
+no more together than misses in place of all hits.
 
 Weights are samples of the posterior distribution. A measurement of noise or silence at a further cell tells
 most where its outcome is most open, by the mutual information between outcome and sample.
 """
 
+import json
+import warnings
 from collections.abc import Iterator
 from functools import partial
 from pathlib import Path
@@ -28,16 +32,16 @@ from numpy.typing import NDArray
 from cvt_hpc.analysis.arrangement import value_text
 from cvt_hpc.analysis.classes import OccurrenceClass, map_classes
 from cvt_hpc.analysis.figures import WIDTH, axis_label, coordinate_unit, draw
-from cvt_hpc.analysis.measured import ONSET, Measured
+from cvt_hpc.analysis.measured import ONSET, Measured, read_measured
 from cvt_hpc.analysis.measured_score import Line, Score, score
 from cvt_hpc.analysis.sensitivity import independent
-from cvt_hpc.errors import mismatch
+from cvt_hpc.errors import JobWarning, mismatch
 from cvt_hpc.experiments.outcome import Outcome, Tell
 from cvt_hpc.experiments.sweeps import Sweep, load_sweep, run_sweeps, sweep_lines
-from cvt_hpc.experiments.uncertain_lines import Scattered, uncertain_lines
+from cvt_hpc.experiments.uncertain_lines import Scattered, given, uncertain_lines
 from cvt_hpc.job import Job
 from cvt_hpc.job.assignments import Assignments
-from cvt_hpc.job.axes import SAMPLE
+from cvt_hpc.job.axes import SAMPLE, SWAPPED
 from cvt_hpc.job.loading import load_job
 from cvt_hpc.job.uncertain import Distribution, Scatter
 from cvt_hpc.job.values import heading, read_value
@@ -52,6 +56,8 @@ STUDY = "samples"
 FEWEST = 8.0  # effective samples, below which the posterior is not told
 BAND = (0.025, 0.5, 0.975)  # quantiles
 ALIKE = 0.5  # rank correlation from which on two parameters are not told apart
+TOLD = 0.9  # of the band before: a parameter whose band is hardly narrower keeps its distribution
+LEAST_BIT = 0.01  # that a further measurement has to tell
 _FACTOR = np.log(2.0)  # of amplitudes
 _LARGEST_FILE = 2**20
 _DOUBT = Parameter(0.05, "", "", minimum=0.0, maximum=0.5, exclusive=True)
@@ -112,6 +118,20 @@ class Posterior(NamedTuple):
     weights: Array
 
     @property
+    def best(self) -> Line:
+        """Agreement of the likeliest sample."""
+        return self.lines[int(np.argmax(self.log_likelihood))]
+
+    def fault(self, doubt: float) -> str:
+        """Why the weights state nothing of the parameters; "" where they do."""
+        noise = (self.best.hits + self.best.misses) * np.log((1.0 - doubt) / doubt)
+        if -self.log_likelihood.max() > 0.5 * max(noise, 1.0):
+            return "no sample agrees with the file: state other distributions, or more doubt"
+        if self.effective < FEWEST:
+            return f"fewer than {FEWEST:.0f} effective samples, too few to state the parameters: take more"
+        return ""
+
+    @property
     def effective(self) -> float:
         """Effective number of samples."""
         return float(1.0 / (self.weights**2).sum())
@@ -167,7 +187,9 @@ def load(
     job = load_job(path, overrides)
     if SAMPLE not in {axis.name for axis in job.axes} or not _distributions(job):
         raise mismatch(f"{job.source}: [uncertain]", "samples of uncertain parameters", "none")
-    if len(job.axes) < 2:
+    if job.design.get("kind") == "adaptive":
+        raise mismatch(f"{job.source}: [design]", "as many samples in each cell", "adaptive")
+    if not {axis.name for axis in job.axes} - {SAMPLE, SWAPPED}:
         raise mismatch(
             f"{job.source}: [axes]", "an axis along which noise was measured, such as load", "none"
         )
@@ -181,7 +203,21 @@ def load(
         name: default.default if told is None else read_value(default, told, f"--{name}")
         for name, told, default in (("doubt", doubt, _DOUBT), ("scatter", scatter, _SCATTER))
     }
+    with warnings.catch_warnings():
+        warnings.simplefilter("ignore", JobWarning)  # comes once the runs are there
+        along = read_measured(measured, _without_runs(job), job.source).along
+    if along not in {axis.name for axis in job.axes}:
+        raise mismatch(f"{job.source}: [axes]", f"the axis {along}, as in {measured}", "none of this name")
     return Calibration(job, Path(measured), **shares, rungs=(Sweep(STUDY, (), job),))
+
+
+def _without_runs(job: Job) -> xr.Dataset:
+    """Results of a job before its first run: axes alone, for what a measured file is checked by."""
+    known = job.schema.parameters
+    units = {axis.name: known[axis.name].unit if axis.name in known else "" for axis in job.axes}
+    axes = {axis.name: (axis.name, np.array(axis.values), {"units": units[axis.name]}) for axis in job.axes}
+    status = [axis.name for axis in job.axes], np.zeros(job.shape, np.int8)
+    return xr.Dataset({"status": status}, axes, {"job": json.dumps(job.resolved())})
 
 
 def _distributions(job: Job) -> tuple[Distribution, ...]:
@@ -208,11 +244,13 @@ def make(asked: Calibration, out: Path, *, fresh: bool, tell: Tell) -> Outcome:
     if status >= STALLED or process_rank() != 0:
         return Outcome(status=status)
     found = weigh(asked, load_sweep(STUDY, out))
-    files = [("table", _write_table(asked, found, out / "calibrated.csv"))]
-    if found.effective >= FEWEST:
+    files = [("table", _write_table(found, out / "calibrated.csv"))]
+    for name in ("calibrated.toml", "calibrated.png"):
+        (out / name).unlink(missing_ok=True)
+    if not (fault := found.fault(asked.doubt)):
         files.append(("job", _write_part(asked, found, out / "calibrated.toml")))
-        files.append(("picture", draw(partial(_figure, asked, found), out / "calibrated.png")))
-    return Outcome(tuple(_lines(asked, found)), tuple(files), max(status, int(found.effective < FEWEST)))
+        files.append(("picture", draw(partial(_figure, found), out / "calibrated.png")))
+    return Outcome(tuple(_lines(asked, found)), tuple(files), max(status, int(bool(fault))))
 
 
 def weigh(asked: Calibration, dataset: xr.Dataset) -> Posterior:
@@ -224,10 +262,15 @@ def weigh(asked: Calibration, dataset: xr.Dataset) -> Posterior:
         If the file does not fit the study.
     """
     dataset = independent(dataset).load()
+    # both sets of samples, where there are runs for Sobol indices
+    dataset = dataset.assign_coords({SAMPLE: np.arange(dataset.sizes[SAMPLE])})
     agreement = score(dataset, asked.measured, STUDY)
     lines = _by_sample(agreement, dataset)
+    if not sum(agreement.total[:4]):
+        raise mismatch(f"{asked.measured}", "cells in its range of which a run is decided", "none")
     along = dataset[agreement.measured.along]
-    step = coordinate_unit(along.attrs)[0] * float(np.median(np.abs(np.diff(along.values))))
+    places = np.unique(along.values[np.isfinite(along.values)])
+    step = coordinate_unit(along.attrs)[0] * float(np.median(np.diff(places))) if len(places) > 1 else np.inf
     values = np.array([_log_likelihood(one, agreement, asked, 0.5 * step) for one in lines])
     weights = np.exp(values - values.max())
     distributions = _distributions(asked.job)
@@ -247,12 +290,14 @@ def _by_sample(agreement: Score, dataset: xr.Dataset) -> list[Line]:
 
 
 def _log_likelihood(line: Line, agreement: Score, asked: Calibration, half_step: float) -> float:
-    wrong = line.misses + line.false_alarms
-    found = -wrong * np.log((1.0 - asked.doubt) / asked.doubt)
+    each = np.log((1.0 - asked.doubt) / asked.doubt)
+    found = -(line.misses + line.false_alarms) * each - line.neither * np.log(2.0 * (1.0 - asked.doubt))
+    of_hits = 0.0
     if line.frequency:
-        found -= 0.5 * float(np.mean((np.array(line.frequency) / asked.scatter) ** 2))
+        of_hits += 0.5 * float(np.mean((np.array(line.frequency) / asked.scatter) ** 2))
     if line.amplitude:
-        found -= 0.5 * (float(np.mean(np.log(line.amplitude))) / _FACTOR) ** 2
+        of_hits += 0.5 * (float(np.mean(np.log(line.amplitude))) / _FACTOR) ** 2
+    found -= min(of_hits, line.hits * each)
     if agreement.measured.kind == ONSET:
         found -= 0.5 * float(np.sum((np.array(line.onset) / half_step) ** 2))
     return float(found)
@@ -279,17 +324,14 @@ def information(asked: Calibration, found: Posterior) -> xr.DataArray:
 
 def _lines(asked: Calibration, found: Posterior) -> Iterator[str]:
     """Yield the lines that state the result."""
-    best = found.lines[int(np.argmax(found.log_likelihood))]
+    best = found.best
     yield (
         f"{found.values.shape[1]} samples weighed by {found.measured.name}, {found.effective:.0f} effective; "
         f"best: {best.hits} hits, {best.silences} silences, {best.misses} misses, "
         f"{best.false_alarms} false alarms"
     )
-    if found.effective < FEWEST:
-        yield (
-            f"fewer than {FEWEST:.0f} effective samples agree, too few to state the parameters: "
-            "state more samples, other distributions, or more doubt"
-        )
+    if fault := found.fault(asked.doubt):
+        yield fault
         return
     rows = [
         ["parameter", "unit", "before: 2.5 %", "50 %", "97.5 %", "after: 2.5 %", "50 %", "97.5 %", "width"]
@@ -306,7 +348,11 @@ def _lines(asked: Calibration, found: Posterior) -> Iterator[str]:
         if abs(correlation[i, j]) >= ALIKE:
             yield f"not told apart: {names[i]} and {names[j]}, rank correlation {correlation[i, j]:.2f}"
     bits = information(asked, found).transpose(*_grid(found))
-    k = np.unravel_index(int(np.nanargmax(bits.values)), bits.shape)
+    bits = bits.where(~_measured_cells(found).transpose(*_grid(found)), -np.inf).fillna(-np.inf)
+    k = np.unravel_index(int(np.argmax(bits.values)), bits.shape)
+    if bits.values[k] < LEAST_BIT:
+        yield "no cell beyond the measured range would tell more"
+        return
     axes = [found.dataset[name] for name in _grid(found)]
     told = (f"{axis.name} {value_text(axis, int(n))}" for axis, n in zip(axes, k, strict=True))
     chance = float(found.probability().transpose(*_grid(found)).values[k])
@@ -314,11 +360,24 @@ def _lines(asked: Calibration, found: Posterior) -> Iterator[str]:
     yield f"measure next: {', '.join(told)}, {odds}"
 
 
+def _measured_cells(found: Posterior) -> xr.DataArray:
+    """Whether a cell of the grid lies in the measured range, or has an onset or a peak."""
+    grid = found.dataset["status"].isel({SAMPLE: 0}, drop=True)
+    known, loads = xr.zeros_like(grid, bool), found.dataset[found.measured.along]
+    for row in found.measured.rows:
+        span = row.swept if np.isfinite(row.swept).all() else row.span
+        inside = (loads >= span[0]) & (loads <= span[1]) | (loads == row.cell)
+        for name, value in row.at.items():
+            inside = inside & (found.dataset[name] == value)
+        known = known | inside
+    return known
+
+
 def _grid(found: Posterior) -> list[str]:
     return [str(name) for name in found.dataset["status"].dims if name != SAMPLE]
 
 
-def _write_table(asked: Calibration, found: Posterior, path: Path) -> Path:
+def _write_table(found: Posterior, path: Path) -> Path:
     keys = [one.key for one in found.distributions]
     head = [SAMPLE, *(heading(key, found.dataset[key].attrs) for key in keys)]
     head += ["hits", "misses", "false_alarms", "correct_silences", "neither", "log_likelihood", "weight"]
@@ -338,20 +397,31 @@ def _write_table(asked: Calibration, found: Posterior, path: Path) -> Path:
 
 def _write_part(asked: Calibration, found: Posterior, path: Path) -> Path:
     """Write the table [uncertain] of a job that goes on from here."""
-    parameters = []
-    for one in found.distributions:
+    parameters, told, kept = [], [], []
+    before, after = found.bands()
+    for k, one in enumerate(found.distributions):
         has, unit = dict(one.numbers), asked.job.schema.parameters[one.key].unit
+        width, moved = np.ptp(before[k]), abs(after[k, 1] - before[k, 1])
+        if np.ptp(after[k]) >= TOLD * width and moved <= (1.0 - TOLD) * width:
+            numbers = ", ".join(f"{name} = {given(value, unit)}" for name, value in one.numbers)
+            told_before = f'{{ distribution = "{one.kind}", {numbers} }}'
+            kept.append(f"{one.key} = {told_before} # as before: the file hardly tells of it")
+            continue
         limits = has.get("from", -np.inf), has.get("to", np.inf)
         parameters.append(Scattered(one.key, unit, one.kind == "log_normal", *limits))
-    logs = np.array([np.log(v) if p.is_log else v for p, v in zip(parameters, found.values, strict=True)])
-    covariance = np.atleast_2d(np.cov(logs, aweights=found.weights, ddof=0))
-    lines = uncertain_lines(parameters, logs @ found.weights, covariance, f"by {found.measured.name}")
+        told.append(np.log(found.values[k]) if one.kind == "log_normal" else found.values[k])
+    logs = np.array(told).reshape(len(told), -1)
+    spread = np.cov(logs, aweights=found.weights, ddof=0) if told else np.empty(0)
+    covariance = spread.reshape(len(told), -1)
+    mean = logs @ found.weights if told else np.empty(0)
+    lines = uncertain_lines(parameters, mean, covariance, f"by {found.measured.name}")
+    lines[2:2] = kept
     with written_aside(path) as aside:
         aside.write_text("\n".join(lines) + "\n", encoding="utf-8")
     return path
 
 
-def _figure(asked: Calibration, found: Posterior) -> Figure:
+def _figure(found: Posterior) -> Figure:
     """Each parameter before and after, and the probability of vibration along the measured axis."""
     count = len(found.distributions)
     rows = -(-count // 3)
@@ -386,13 +456,16 @@ def _draw_probability(axes: Any, found: Posterior) -> None:
             label = ("before" if one is even else "after") if k == 0 else None
             axes.plot(places, line, marker=".", lw=1.4, label=label, **style)
     ends = np.array([places.min(), places.max()])
-    for k, row in enumerate(found.measured.rows):
-        low, high = np.clip([factor * value for value in row.span], *ends)
-        label = "measured" if k == 0 else None
-        if low < high:
-            axes.axvspan(low, high, color="#e69f00", alpha=0.25, lw=0, label=label)
-        else:
-            axes.axvline(low, color="#e69f00", lw=1.6, ls="-.", label=label)
+    named: str | None = "measured"
+    for row in found.measured.rows:
+        low, high = (factor * value for value in row.span)
+        if low < high and low < ends[1] and high > ends[0]:
+            axes.axvspan(*np.clip([low, high], *ends), color="#e69f00", alpha=0.25, lw=0, label=named)
+        elif np.isfinite(row.cell) and ends[0] <= low <= ends[1]:
+            axes.axvline(low, color="#e69f00", lw=1.6, ls="-.", label=named)
+        else:  # a row of silence, or beyond the axis
+            continue
+        named = None
     axes.set(
         xlabel=axis_label(found.dataset[along], unit), ylabel="probability of vibration", ylim=(-0.03, 1.03)
     )

@@ -185,13 +185,15 @@ def _least(law: Law, keys: Sequence[str], speed: Array, mu: Array) -> Array:
         "friction_gradient": (-1e4, 0.0),
         "stribeck_velocity": (low, high),
     }
-    scales = np.linspace(low, high, _SCALES + 2)[1:-1] if "stribeck_velocity" in keys else [0.0]
+    scales = (
+        np.linspace(low, high, _SCALES + 2)[1:-1] if "stribeck_velocity" in keys else [np.log(speed.max())]
+    )
     best = None
     for scale in scales:
         drop = max(float(np.ptp(mu)), 1e-6 * level)
         first = {
             "kinetic_friction": level if law is Law.HYPERBOLIC else max(float(mu.min()), 1e-5),
-            "friction_gradient": -drop / float(np.exp(scale) if scale else speed.max()),
+            "friction_gradient": -drop / float(np.exp(scale)),
             "stribeck_velocity": scale,
         }
         found = least_squares(
@@ -234,14 +236,22 @@ def fit_law(law: Law, measured: Measured) -> Fitted | None:
     share = _independent(residuals, speed)
     variance = square / max(n - k / share, 1.0)
     covariance: Any = variance * np.linalg.inv(slopes.T @ slopes) / share
-    specimens = np.unique(measured.specimen)
-    if len(specimens) >= LEAST_SPECIMENS:
-        parts = [measured.specimen == one for one in specimens]
-        found = np.array([_least(law, keys, speed[part], mu[part]) for part in parts])
-        x = found.mean(0)
-        covariance = np.cov(found, rowvar=False).reshape(len(keys), -1).astype(np.float64)
-    count = len(specimens) if len(specimens) >= LEAST_SPECIMENS else 0
+    count, parts = 0, (measured.specimen == one for one in np.unique(measured.specimen))
+    own = [
+        one for one in (_of_specimen(law, keys, speed[part], mu[part]) for part in parts) if one is not None
+    ]
+    if len(own) >= LEAST_SPECIMENS and (np.ptp(own, axis=0) > 0.0).all():
+        count, x = len(own), np.mean(own, axis=0)
+        covariance = np.cov(own, rowvar=False).reshape(k, -1).astype(np.float64)
     return Fitted(law, keys, x, covariance, float(np.sqrt(square / n)), share, np.inf, count)
+
+
+def _of_specimen(law: Law, keys: Sequence[str], speed: Array, mu: Array) -> Array | None:
+    """The x of a specimen alone; None where its points do not determine it."""
+    if len(np.unique(speed)) <= len(keys):
+        return None
+    x = _least(law, keys, speed, mu)
+    return x if _determined(_slopes(law, keys, x, speed)) else None
 
 
 def _determined(slopes: Array) -> bool:
@@ -277,22 +287,33 @@ def by_force(fitted: Fitted, measured: Measured) -> tuple[float, float] | None:
     if not np.isfinite(measured.force).all() or np.ptp(measured.force) == 0.0:
         return None
     residuals = measured.mu - _curve(fitted.law, fitted.keys, fitted.estimate, measured.speed)
-    share = (measured.force - measured.force.min()) / np.ptp(measured.force) - 0.5
-    ways = np.stack([np.ones_like(share), share], 1)
-    x, *_ = np.linalg.lstsq(ways, residuals, rcond=None)
-    left = residuals - ways @ x
-    variance = (left**2).sum() / max(len(left) - 2, 1) * np.linalg.inv(ways.T @ ways)[1, 1]
-    return float(x[1] / measured.mu.mean()), float(np.sqrt(variance) / measured.mu.mean())
+    share = (measured.force - measured.force.min()) / np.ptp(measured.force)
+    for one in np.unique(measured.specimen):  # what specimens have of their own is no effect of their forces
+        part = measured.specimen == one
+        share[part], residuals[part] = (
+            share[part] - share[part].mean(),
+            residuals[part] - residuals[part].mean(),
+        )
+    square = float((share**2).sum())
+    if square < 1e-9:
+        return None
+    slope = float((share * residuals).sum()) / square
+    left = residuals - slope * share
+    variance = float((left**2).sum()) / max(len(left) - 2, 1) / square / _independent(left, measured.speed)
+    return slope / float(measured.mu.mean()), float(np.sqrt(variance)) / float(measured.mu.mean())
 
 
 def job_lines(fitted: Fitted) -> list[str]:
     """Tables [friction] and [uncertain] of a job, with the law and its uncertainty."""
     values = fitted.values()
     lines = ["[friction]", f'friction_law = "{fitted.law.name.lower()}"']
-    lines += ["# for the law without its uncertainty, leave the other tables out"]
-    lines += [f"# {key} = {given(value, _PARAMETERS[key])}" for key, value in values.items()]
     if fitted.law is Law.COULOMB:
         lines.append("friction_gradient = 0")
+    certain = [f"{key} = {given(value, _PARAMETERS[key])}" for key, value in values.items()]
+    if not (np.diag(fitted.covariance) > 0.0).all():  # points without any scatter
+        return [*lines, *certain]
+    lines += ["# for the law without its uncertainty, leave the other tables out"]
+    lines += [f"# {line}" for line in certain]
     least = 0.1 * values["kinetic_friction"]
     limits = {"kinetic_friction": (least, np.inf), "friction_gradient": (-np.inf, 0.0)}
     parameters = [
@@ -329,6 +350,8 @@ def law_lines(laws: Sequence[Fitted], measured: Measured) -> list[str]:
         else f"are those of the mean law; the scatter of variators takes {LEAST_SPECIMENS} specimens or more"
     )
     lines.append(f"standard deviations {whose}")
+    if best.of_specimens and (out := specimens - best.of_specimens):
+        lines.append(f"left out of the scatter: {out}, whose points do not determine the law")
     if (change := by_force(best, measured)) is not None:
         share, error = change
         lines.append(

@@ -7,6 +7,7 @@ import pytest
 import xarray as xr
 
 from cvt_hpc.cli import main
+from cvt_hpc.errors import InputError
 from cvt_hpc.experiments.calibrate import FEWEST, Posterior, information, load, weigh
 from cvt_hpc.job import load_job
 
@@ -179,7 +180,7 @@ def test_a_study_is_run_and_calibrated_by_one_command(tmp_path, capsys, monkeypa
     monkeypatch.chdir(tmp_path)
     (tmp_path / "y.toml").write_text(CRITERION)
     head = "radial_speed_from [mm/s],radial_speed_to [mm/s],measured_radial_speed_from [mm/s],"
-    (tmp_path / "rig.csv").write_text(f"{head}measured_radial_speed_to [mm/s]\n70,260,10,250\n")
+    (tmp_path / "rig.csv").write_text(f"{head}measured_radial_speed_to [mm/s]\n70,170,10,170\n")
     command = ["calibrate", "y.toml", "--measured", "rig.csv"]
     assert main(command) == 0
     out = capsys.readouterr().out
@@ -195,7 +196,7 @@ def test_a_study_is_run_and_calibrated_by_one_command(tmp_path, capsys, monkeypa
     job, weights = load_job(tmp_path / "z.toml"), np.array([float(row["weight"]) for row in rows])
     speed = np.array([float(row["stribeck_velocity [mm/s]"]) for row in rows]) @ weights
     drawn = np.unique([1e3 * job.point(k)["stribeck_velocity"] for k in range(job.size)])
-    assert drawn.mean() == pytest.approx(speed, rel=0.03)
+    assert drawn.mean() == pytest.approx(speed, rel=0.05)
     # nothing is run twice
     before = {path: path.stat().st_mtime_ns for path in (folder / "samples" / "records").rglob("*")}
     assert main(command) == 0
@@ -206,7 +207,36 @@ def test_too_few_samples_that_agree_are_no_result(study, tmp_path):
     _, dataset = study
     rig = "load_from [N m],load_to [N m],measured_load_from [N m],measured_load_to [N m],frequency_from [Hz],frequency_to [Hz]\n95,185,20,200,900,900\n"
     asked = asked_by(study, tmp_path, rig, scatter=1.0)
-    assert weigh(asked, dataset).effective < FEWEST
+    assert weigh(asked, dataset).fault(asked.doubt).startswith("no sample agrees")
+    few = dataset.isel(sample=slice(0, 6))
+    asked = asked_by(study, tmp_path, "onset_load [N m]\n87\n")
+    assert "effective samples, too few" in weigh(asked, few).fault(asked.doubt)
+
+
+def test_samples_without_verdicts_are_no_candidates(study, tmp_path):
+    """A run that failed agrees with nothing, and a study of such runs is one error."""
+    _, dataset = study
+    rng = np.random.default_rng(2)
+    asked = asked_by(study, tmp_path, measured_windows(np.array([0.5, 0.5, 0.5]), rng))
+    failed = dataset.copy(deep=True)
+    failed["status"][::2] = 2
+    weights = weigh(asked, failed).weights
+    assert weights[::2].max() < 1e-2 * weights.max()
+    failed["status"][:] = 2
+    with pytest.raises(InputError, match="cells in its range of which a run is decided"):
+        weigh(asked, failed)
+
+
+def test_both_sets_of_samples_for_sobol_indices_are_candidates(study, tmp_path):
+    _, dataset = study
+    halves = [dataset.isel(sample=slice(0, 128)), dataset.isel(sample=slice(128, 256))]
+    halves = [half.assign_coords(sample=np.arange(128)) for half in halves]
+    whole = xr.concat(halves, xr.DataArray(["none", "all"], dims="swapped", name="swapped"))
+    asked = asked_by(study, tmp_path, "onset_load [N m]\n87\n")
+    found, alone = weigh(asked, whole), weigh(asked, dataset)
+    assert found.values.shape == alone.values.shape
+    assert found.log_likelihood == pytest.approx(alone.log_likelihood)
+    assert found.values == pytest.approx(alone.values)
 
 
 @pytest.mark.parametrize(
@@ -220,6 +250,14 @@ def test_too_few_samples_that_agree_are_no_result(study, tmp_path):
         ),
         (JOB, {"measured": "none.csv"}, "none.csv"),
         (JOB, {"measured": "rig.csv", "doubt": "0.7"}, "--doubt"),
+        (
+            JOB.replace(
+                'load = { from = "20 N m", to = "200 N m", step = "10 N m" }', 'thrust = ["40 kN", "50 kN"]'
+            ),
+            {"measured": "rig.csv"},
+            "expected the axis load",
+        ),
+        (JOB + '[design]\nkind = "adaptive"\n', {"measured": "rig.csv"}, "as many samples in each cell"),
         (JOB, {"measured": "rig.csv", "scatter": "3 um"}, "--scatter"),
     ],
 )

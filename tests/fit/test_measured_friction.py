@@ -82,6 +82,36 @@ def test_scatter_is_that_of_the_specimens_and_not_of_their_number():
     assert found.values()["friction_gradient"] == pytest.approx(np.mean(own), rel=1e-4)
 
 
+def test_specimens_whose_points_do_not_determine_the_law_are_left_out():
+    rng = np.random.default_rng(6)
+    mu = np.concatenate([of_law(Law.STRIBECK) + SPREAD * rng.normal(size=10) for _ in range(5)] + [[0.13]])
+    speeds = np.concatenate([np.tile(SPEEDS, 5), [0.0]])
+    found = fit_law(Law.STRIBECK, points(mu, speeds, np.append(np.repeat(np.arange(5), 10), 9)))
+    assert found.of_specimens == 5
+    alone = points(mu[:50], speeds[:50], np.arange(50))  # a row for each: none is determined
+    assert fit_law(Law.STRIBECK, alone).of_specimens == 0
+    same = points(np.tile(of_law(Law.STRIBECK), 5), np.tile(SPEEDS, 5), np.repeat(np.arange(5), 10))
+    assert fit_law(Law.STRIBECK, same).of_specimens == 0
+
+
+def test_a_trace_does_not_depend_on_the_force_because_its_noise_is_slow():
+    rng, told = np.random.default_rng(8), 0
+    speeds = np.linspace(0.001, 0.4, 400)
+    for _ in range(20):
+        noise = rng.normal(size=400)
+        for k in range(1, 400):
+            noise[k] = 0.9 * noise[k - 1] + np.sqrt(0.19) * noise[k]
+        trace = points(
+            of_law(Law.STRIBECK, speeds) + SPREAD * noise, speeds, force=np.repeat([50.0, 100.0], 200)
+        )
+        share, error = by_force(fit_law(Law.STRIBECK, trace), trace)
+        told += abs(share) > 2.0 * error
+    assert told <= 4
+    mu, specimen = np.tile(of_law(Law.STRIBECK), 2), np.repeat([1.0, 2.0], 10)
+    apart = points(mu * np.repeat([1.0, 1.1], 10), np.tile(SPEEDS, 2), specimen, 50.0 * specimen)
+    assert by_force(fit_law(Law.STRIBECK, apart), apart) is None  # of specimens, or of their forces
+
+
 def test_a_coefficient_that_depends_on_the_force_is_told():
     force = np.repeat([50.0, 100.0, 200.0], 10)
     mu, speeds = np.tile(of_law(Law.STRIBECK), 3), np.tile(SPEEDS, 3)
