@@ -15,7 +15,7 @@ from cvt_hpc.analysis.histories import settings_of
 from cvt_hpc.analysis.levels import check_velocity, shown_in
 from cvt_hpc.analysis.ramps import changing_of, start_up
 from cvt_hpc.analysis.time_signals import Signal, known_signals, read_signal
-from cvt_hpc.errors import mismatch
+from cvt_hpc.errors import InputError, mismatch
 from cvt_hpc.storage.files import write_rows, written_aside
 from cvt_hpc.storage.provenance import origin_lines
 from cvt_hpc.vibration.peaks import fundamental
@@ -90,18 +90,31 @@ def export(
         return _write_sound(history, signal, out, source, velocity)
     if velocity:
         raise mismatch(str(out), "velocities as .wav alone", suffix)
-    signals = [read_signal(history, name, source) for name in of or known_signals(history)]
+    signals: list[Signal] = []
+    left_out = []
+    for name in of or known_signals(history):
+        try:
+            signal = read_signal(history, name, source)
+            if signals and not np.array_equal(signal.times, signals[0].times):
+                expected = f"samples at the times of {signals[0].name}"
+                raise mismatch(f"{source}: {signal.name}", expected, "others")
+        except InputError:
+            if of:
+                raise
+            left_out.append(name)  # of all that there are, such as a course that the model does not compute
+        else:
+            signals.append(signal)
+    if not signals:
+        raise mismatch(source, "signals over time", "none that is a number throughout")
     times = signals[0].times
-    for signal in signals:
-        if not np.array_equal(signal.times, times):
-            raise mismatch(f"{source}: {signal.name}", f"samples at the times of {signals[0].name}", "others")
     if suffix == ".csv":
         head = ["time [s]", *(f"{signal.name} [{signal.unit}]" for signal in signals)]
         rows = np.stack([times, *(signal.values for signal in signals)], 1)
         write_rows(out, head, rows.tolist(), origin_lines(history.attrs))
     else:
         _write_uff(signals, out)
-    return [f"signals: {out}: {len(signals)} of {times.size} samples, {signals[0].rate:g} Hz"]
+    lines = [f"left out, as not all of their samples are there: {', '.join(left_out)}"] if left_out else []
+    return [*lines, f"signals: {out}: {len(signals)} of {times.size} samples, {signals[0].rate:g} Hz"]
 
 
 def loop_of(signal: Signal, band: tuple[float, float]) -> Loop:
@@ -178,7 +191,9 @@ def _write_sound(history: xr.Dataset, signal: Signal, out: Path, source: str, ve
         "not modelled: the casing, and the sound that it radiates",
     ]
     with written_aside(out.with_suffix(".txt")) as aside:
-        aside.write_text("".join([*origin_lines(history.attrs), *(f"{line}\n" for line in lines)]))
+        aside.write_text(
+            "".join([*origin_lines(history.attrs), *(f"{line}\n" for line in lines)]), encoding="utf-8"
+        )
     return lines
 
 

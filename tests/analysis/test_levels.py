@@ -277,6 +277,12 @@ def test_tables_and_uff_files_are_read_again_by_their_libraries(tmp_path, monkey
         np.testing.assert_allclose(found["x"], signal.times, rtol=1e-5)
     export(run, [], tmp_path / "all.csv")
     assert len(pd.read_csv(tmp_path / "all.csv", comment="#").columns) == 1 + 2 + 2 + 4 + 4
+    # a course that ends in nothing is left out of all, and refused by its name
+    broken = run.copy(deep=True)
+    broken["load"][-5:] = np.nan
+    lines = export(broken, [], tmp_path / "rest.csv")
+    assert "left out" in lines[0] and "load" in lines[0]
+    assert "load" not in "".join(pd.read_csv(tmp_path / "rest.csv", comment="#").columns)
     monkeypatch.setitem(sys.modules, "pyuff", None)
     with pytest.raises(InputError, match=r'the library pyuff, found none; `pip install "cvt_hpc\[uff\]"`'):
         export(run, names, tmp_path / "y.uff")
