@@ -206,7 +206,7 @@ def _grid_figure(arrangement: layout.Arrangement, vmax: cells.End, source: str, 
     x, y = (side_of(arrangement.dataset, name) for name in (arrangement.x, arrangement.y))
     for panel, ax in _panels_of(axes, sheet):
         at = {arrangement.panel: panel} if arrangement.panel else {}
-        over.draw(ax, x, y, arrangement.dataset.coords.to_dataset().isel(at))
+        over.draw(ax, x, y, arrangement.dataset.coords.to_dataset().isel(at, missing_dims="ignore"))
     further += over.handles
     if sheet.leads.any() and min(sheet.smallest_cell) >= SMALLEST_APART:
         further.append(Line2D([], [], **cells.LEADING.marks(4.0), label="harmonics lead"))

@@ -62,6 +62,7 @@ GIVEN = {
     "driving_rate": 0.0,
     "driven_rate": 5e-6,
     "modal_stiffness": ((), ()),
+    "tilt_lag": 0.0,
     "lean_lag": 1e-4,
     "loose_sides": ("right", "left"),
     "misalignment": 0.0,

@@ -160,7 +160,7 @@ def test_overrides_reach_the_head_and_the_last_of_two_counts(write_job):
             '--set load: expected a value in N m (such as "1 N m" or a bare number in N m), found "3 kg"',
         ),
         (["table=3"], '--set table: expected a list of numbers in N/m, found "3"'),
-        (["load=[1, 2"], '--set load: expected a value in N m (such as "1 N m" or a bare number in N m), found "[1, 2"'),
+        (["load=[1, 2"], '--set load: expected a value in N m (such as "1 N m" or a bare number in N m), found "[1, 2"; decimals have a point, as 2.4, thousands have no mark, and several values are a list, as [2, 4]'),
         (["load=[1, 1]"], "--set load: expected distinct values, found 1 as value 1 and value 2"),
         (["load={from=1, too=2, step=1}"], "--set load.too: unknown key; did you mean to?"),
         ({"load": np.ones((2, 2))}, "override load: expected a 1-D array of numbers, found an array of shape (2, 2) of float64"),

@@ -141,7 +141,8 @@ def accept_border(belt, state, work, inputs, dt):
     modes = belt.modal_stiffness.shape[1]
     for k in range(2 * modes):
         rate = lag_rate(state.increments, work.increments, 1 + k, dt)
-        state.totals[f.LAG_LOSS] += dt * belt.modal_damping[k // modes, k % modes] * rate * rate
+        # of both sheaves of a pulley
+        state.totals[f.LAG_LOSS] += 2.0 * dt * belt.modal_damping[k // modes, k % modes] * rate * rate
         state.openings[k // modes, k % modes] += state.increments[1 + k]
     state.pulleys[f.DRIVEN_SPEED] += state.increments[0]
     state.totals[f.TIME] += dt
