@@ -56,6 +56,11 @@ class Line(NamedTuple):
     amplitude: tuple[float, ...] = ()
 
 
+def joined(lines: Sequence[Line]) -> Line:
+    """Agreement along several lines together."""
+    return Line(*(sum(parts[1:], parts[0]) for parts in zip(*lines, strict=True)))
+
+
 class Score(NamedTuple):
     """Agreement of a study with a measured file.
 
@@ -78,9 +83,7 @@ class Score(NamedTuple):
     @property
     def total(self) -> Line:
         """Agreement along all lines."""
-        return Line(
-            *(sum(parts[1:], parts[0]) for parts in zip(*(line for _, line in self.lines), strict=True))
-        )
+        return joined([line for _, line in self.lines])
 
     @property
     def contradicts(self) -> bool:

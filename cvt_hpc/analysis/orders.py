@@ -89,9 +89,12 @@ def read_orders(given: Iterable[float | str], bandwidth: float) -> list[Order]:
     InputError
         A text is none of these, the bandwidth is not above zero, or an order is below it.
     """
-    if not bandwidth > 0.0:
+    if not 0.0 < bandwidth < math.inf:
         raise mismatch("bandwidth", "a bandwidth in orders, above 0", f"{bandwidth:g}")
     given, found = list(given), []
+    if not given and bandwidth > max(ORDERS):
+        expected = f"at most {max(ORDERS):g}, the largest of the default orders, or orders beside it"
+        raise mismatch("bandwidth", expected, f"{bandwidth:g}")
     for text in map(str, given or DEFAULT):
         of, _, number = text.rpartition(":")
         try:
@@ -293,9 +296,11 @@ def _turning_over(shown: xr.Dataset) -> dict[str, Turning]:
     """What orders are multiples of, over the driving speeds of a study."""
     rate = shown["driving_speed"].values / (2.0 * np.pi)
     known, ratio = {"driving": Turning(rate)}, parameters_of(shown).get("ratio")
-    if ratio:
+    if "ratio" in shown.coords:  # which may follow the speed
+        ratio = shown["ratio"].values
+    if ratio is not None:
         lost = shown["speed_loss"].values if "speed_loss" in shown else 0.0
-        known["driven"] = Turning(rate / float(ratio) * (1.0 - lost))
+        known["driven"] = Turning(rate / ratio * (1.0 - lost))
     if "passing_frequency" in shown:
         known["elements"] = Turning(rate, shown["passing_frequency"].values / rate, PASSING_SLIP)
     return known

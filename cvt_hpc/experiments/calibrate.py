@@ -33,7 +33,7 @@ from cvt_hpc.analysis.arrangement import value_text
 from cvt_hpc.analysis.classes import OccurrenceClass, map_classes
 from cvt_hpc.analysis.figures import WIDTH, axis_label, coordinate_unit, draw
 from cvt_hpc.analysis.measured import ONSET, Measured, read_measured
-from cvt_hpc.analysis.measured_score import Line, Score, score
+from cvt_hpc.analysis.measured_score import Line, Score, joined, score
 from cvt_hpc.analysis.sensitivity import independent
 from cvt_hpc.errors import JobWarning, mismatch
 from cvt_hpc.experiments.outcome import Outcome, Tell
@@ -286,7 +286,7 @@ def _by_sample(agreement: Score, dataset: xr.Dataset) -> list[Line]:
     found: dict[str, list[Line]] = {value_text(dataset[SAMPLE], k): [] for k in range(dataset.sizes[SAMPLE])}
     for values, line in agreement.lines:
         found[values[place]].append(line)
-    return [Line(*(sum(parts[1:], parts[0]) for parts in zip(*own, strict=True))) for own in found.values()]
+    return [joined(own) for own in found.values()]
 
 
 def _log_likelihood(line: Line, agreement: Score, asked: Calibration, half_step: float) -> float:

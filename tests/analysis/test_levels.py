@@ -73,6 +73,9 @@ def test_orders_of_both_pulleys_and_of_elements_are_told_apart():
     run = history(2.0, (200.0, 400.0), motion=motion)
     run["driven_speed"] = run["driving_speed"] / 2.0
     run["passing_frequency"] = 60.0 * float(run["driving_speed"][20000:].mean()) / TURN  # slip: 60.3
+    for bandwidth, said in ((np.inf, "above 0, found inf"), (1e4, "the largest of the default orders")):
+        with pytest.raises(InputError, match=said):
+            orders_figure([run], bandwidth=bandwidth)
     with pytest.raises(InputError, match="expected orders of the bandwidth, 1, or more.*found driven:0.5"):
         orders_figure([run], orders=["driven:0.5"])
     figure = orders_figure([run], orders=["4", "driven:5.2", "elements:1"], bandwidth=1.0)
