@@ -1,9 +1,9 @@
 """A sweep with uncertain parameters: killed, grown and shared by ranks it has the numbers of an undisturbed one."""
 
 import shutil
+import signal
 import subprocess
 import sys
-import time
 import tomllib
 from pathlib import Path
 
@@ -23,6 +23,20 @@ from support.sweeps import PATIENCE, call, environment
 JOB = Path(__file__).parents[2] / "jobs" / "uncertain_criterion.toml"
 FEW = ("--set", "friction_gradient=-0.5", "--set", "radial_speed=[0.05, 0.07, 0.09, 0.12, 0.15, 0.2]")
 RUNS = 6 * 32
+# The command line, killed as it begins to write its third batch of records.
+KILLED = """
+import os, signal, sys
+from cvt_hpc.cli import main
+from cvt_hpc.study.record.log import RecordLog
+write, batches = RecordLog.append, []
+def append(self, records):
+    batches.append(len(records))
+    if len(batches) == 3:
+        os.kill(os.getpid(), signal.SIGKILL)
+    write(self, records)
+RecordLog.append = append
+main(sys.argv[1:])
+"""
 
 
 def load_results(out):
@@ -35,13 +49,13 @@ def test_a_sweep_that_is_killed_and_grows_has_the_numbers_of_an_undisturbed_one(
     tmp_path, monkeypatch, capsys
 ):
     monkeypatch.chdir(tmp_path)
-    command = [sys.executable, "-m", "cvt_hpc", "run", str(JOB), *FEW, "--out", "killed"]
-    sweep = subprocess.Popen(command, env=environment(), stdout=subprocess.PIPE, stderr=subprocess.PIPE)
-    until = time.monotonic() + PATIENCE
-    while not records(tmp_path / "killed") and sweep.poll() is None and time.monotonic() < until:
-        time.sleep(0.005)
-    sweep.kill()
-    sweep.communicate()
+    sweep = subprocess.run(
+        [sys.executable, "-c", KILLED, "run", str(JOB), *FEW, "--out", "killed"],
+        env=environment(),
+        capture_output=True,
+        timeout=PATIENCE,
+    )
+    assert sweep.returncode == -signal.SIGKILL, sweep.stderr
     before = records(tmp_path / "killed")
     assert 0 < before < RUNS
     assert main(["run", str(JOB), *FEW, "--out", "killed"]) == 0
