@@ -78,22 +78,6 @@ class FromFile:
 
 
 @dataclass(frozen=True)
-class Notice:
-    """A message about a parameter whose values have two possible meanings, if no key selects one.
-
-    Attributes
-    ----------
-    settled_by : str
-        The key that selects the meaning. A job that sets it, to any value, gets no message.
-    text : str
-        Message for values other than the default; it follows the file and the parameter's name.
-    """
-
-    settled_by: str
-    text: str
-
-
-@dataclass(frozen=True)
 class Parameter:
     """One quantity that a job file may set.
 
@@ -124,8 +108,6 @@ class Parameter:
     file : FromFile or None
         For a text that is the path of a file: the parameters that the file gives. Runs do not know such a
         parameter.
-    notice : Notice or None
-        Message for values other than the default.
     """
 
     default: Any
@@ -139,7 +121,6 @@ class Parameter:
     gives: Substitute | None = None
     sensible: tuple[float, float] | None = None
     file: FromFile | None = None
-    notice: Notice | None = None
 
 
 def positive(

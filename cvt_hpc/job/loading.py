@@ -37,7 +37,7 @@ from cvt_hpc.job.rules import (
     relinked,
 )
 from cvt_hpc.job.schema import Schema, load_schema
-from cvt_hpc.job.summary import tell_of_no_effect, warn_of_notices
+from cvt_hpc.job.summary import tell_of_no_effect
 from cvt_hpc.job.uncertain import TABLE, with_samples
 from cvt_hpc.job.uncertain_table import check_samples, read_uncertain
 from cvt_hpc.job.units import unit_in
@@ -101,9 +101,7 @@ def build_job(
     InputError
         If anything is wrong with the document or an override.
     """
-    job = rebuild_job(document, source, None, overrides, label)
-    warn_of_notices(job)
-    return job
+    return rebuild_job(document, source, None, overrides, label)
 
 
 def stored_job(document: Mapping[str, Any], source: str) -> Job:

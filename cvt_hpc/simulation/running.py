@@ -14,7 +14,6 @@ import numpy as np
 
 from cvt_hpc.job import Job
 from cvt_hpc.job.assignments import Assignments, read_assignments, warn_of_bare_assignments
-from cvt_hpc.job.summary import warn_of_notices
 from cvt_hpc.job.values import POINT_UNITS
 from cvt_hpc.models.contract import Model, load_model
 from cvt_hpc.simulation.marching import Interrupted, More, march_runs, no_more
@@ -184,7 +183,6 @@ def alone(job: Job, at: Assignments | None = None) -> Alone:
     at = read_assignments(given, schema, job.source, "at")
     warn_of_bare_assignments(given, schema, job.source, "at")
     point = job.point_at(at)
-    warn_of_notices(job, {key: (value,) for key, value in at.items()})
     if "lanes" in point and "lanes" not in {*at, *job.given, *(axis.name for axis in job.axes)}:
         point["lanes"] = "stations"
     ((run, record),) = do(job, [point], lambda: None, kept=(0,))

@@ -1,7 +1,8 @@
 """Parameters of a variator in every model of it: the scene, the friction of the flanks, damping.
 
 Only ratio, driving_speed and thrust of the defaults are from a paper (Lebrecht et al. 2004, sec. 3.1); sizes
-are those of a common passenger-car belt; every other default is an assumption, plausible and not measured.
+are those of a common passenger-car belt; seven were fitted to what that paper states of the noise, as
+jobs/lebrecht_2004.toml says; every other default is an assumption, plausible and not measured.
 
 Profiles over time are lists of a job that give multiples of one of its values, linear between their times.
 """
@@ -144,10 +145,10 @@ FRICTION: dict[str, Parameter] = {
     "kinetic_friction": positive(0.1, "", "the level that does not change with the gradient"),
     "stribeck_velocity": positive(0.05, "m/s", "speed scale of the fall", sensible=(0.0001, 10.0)),
     "friction_speed": positive(
-        0.03, "m/s", "regularisation speed of the flanks' friction", sensible=(1e-06, 5.0)
+        0.017, "m/s", "regularisation speed of the flanks' friction", sensible=(1e-06, 5.0)
     ),
     "friction_memory": not_negative(
-        0.3e-3, "s", "time constant of the filtered sliding speed; 0: no memory", sensible=(1e-07, 0.1)
+        0.18e-3, "s", "time constant of the filtered sliding speed; 0: no memory", sensible=(1e-07, 0.1)
     ),
     "table_file": friction_file("N/m"),
     "table_force": Parameter(
@@ -158,7 +159,7 @@ FRICTION: dict[str, Parameter] = {
 }
 
 TRANSVERSE_DAMPING = not_negative(
-    500.0, "N s/m^2", "viscous damping of the transverse motion", sensible=(0.1, 1000000.0)
+    1000.0, "N s/m^2", "viscous damping of the transverse motion", sensible=(0.1, 1000000.0)
 )
 
 RINGS: dict[str, Parameter] = {
@@ -189,7 +190,7 @@ TILT: dict[str, Parameter] = {
 
 TILT_LAG: dict[str, Parameter] = {
     "tilt_lag": not_negative(
-        0.0, "s", "time constant T1 of the movable sheaves' tilt; 0: it follows at once", (1e-6, 1.0)
+        0.6e-3, "s", "time constant T1 of the movable sheaves' tilt; 0: it follows at once", (1e-6, 1.0)
     ),
 }
 

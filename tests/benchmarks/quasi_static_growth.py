@@ -3,7 +3,7 @@
     quasi_static_growth.py > jobs/results/quasi_static_growth.csv              # all cases, defaults at 120 N m
     quasi_static_growth.py range > jobs/results/quasi_static_growth_range.csv  # some, over loads, of both sets
 
-The sets are the defaults, and that of `jobs/lebrecht_fitted.toml`. The elastic belt's Jacobian about its steady
+The sets are the defaults, and that of `jobs/lebrecht_2004.toml`. The elastic belt's Jacobian about its steady
 state, with coordinates across the belt and motion along it replaced as `docs/guide/results_stability.md` says. One
 line for each: memory, split, motion along the path, whose rates slide, limits, then the fastest growth of all and that
 between 250 and 900 Hz.
@@ -28,7 +28,7 @@ from cvt_hpc.models.steady_variator.walking import NoSteadyState, SteadyBelt
 from cvt_hpc.storage.provenance import origin_lines
 
 DEFAULTS = {key: p.default for table in PARAMETERS.values() for key, p in table.items()} | {"duration": 0.4}
-FITTED = Path(__file__).parents[2] / "jobs" / "lebrecht_fitted.toml"
+FITTED = Path(__file__).parents[2] / "jobs" / "lebrecht_2004.toml"
 LOADS = 80.0, 100.0, 120.0, 160.0, 200.0  # [N m]
 OVER_LOADS = (  # as `cases` has them
     ("stations", "inertia", 1, 1e3, 1e3),

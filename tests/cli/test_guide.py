@@ -106,7 +106,7 @@ def test_the_guide_is_built_and_names_all_its_pages(tmp_path):
     loaded = re.compile(r'(?:src|<link[^>]*href)="(?:https?:)?//')
     assert not [name for name, text in site.items() if loaded.search(text)]
     assert site["theory_belt"].count("<svg") > 100 and "arithmatex" not in "".join(site.values())
-    assert (tmp_path / "site" / "pictures" / "lebrecht_fitted.png").exists() and "pictures/lebrecht" in site[
+    assert (tmp_path / "site" / "pictures" / "lebrecht_2004.png").exists() and "pictures/lebrecht" in site[
         "tutorial"
     ]
     results = [page for page in (ROOT / "docs" / "guide").glob("*.md") if "<!-- table" in page.read_text()]

@@ -116,7 +116,7 @@ def test_the_job_of_vibration_has_the_belt_of_the_fitted_map():
     pushbelt = load_job(JOBS / "pushbelt_vibration.toml")
     axes = {axis.name: list(axis.values) for axis in pushbelt.axes}
     axes |= {"sheave_stiffness": [1.0], "tilt_factor": [1.0]}
-    continuous = load_job(JOBS / "lebrecht_fitted.toml", axes)
+    continuous = load_job(JOBS / "lebrecht_2004.toml", axes)
     for index in (0, pushbelt.size - 1):
         assert_the_same_belt(pushbelt.point(index), continuous.point(index))
 

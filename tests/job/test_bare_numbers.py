@@ -1,4 +1,4 @@
-"""Numbers far from usual without a unit, and scaled sheaves, draw a warning, in Python and in the commands."""
+"""Numbers far from usual without a unit draw a warning, in Python and in the commands."""
 
 import tomllib
 import warnings
@@ -7,7 +7,7 @@ from pathlib import Path
 import numpy as np
 import pytest
 
-from cvt_hpc import models, simulate
+from cvt_hpc import models
 from cvt_hpc.cli import main
 from cvt_hpc.errors import JobWarning, NoEffectWarning, UnitWarning
 from cvt_hpc.experiments.branch import load as load_diagram
@@ -17,7 +17,6 @@ from cvt_hpc.experiments.ladder import load as load_ladder
 from cvt_hpc.job import build_job, load_job, rebuild_job
 from cvt_hpc.job.values import warn_of_bare_numbers
 from cvt_hpc.parameters import Parameter
-from cvt_hpc.simulation import running
 
 SPEED = Parameter(300.0, "rad/s", "", sensible=(1.0, 800.0))
 LENGTH = Parameter(0.1, "m", "", sensible=(1e-3, 1.0), allow_infinite=True)
@@ -88,55 +87,6 @@ def test_every_place_of_a_job_is_looked_at_and_what_counts_most_is_told(write_jo
     ]
     # a number that is an SI value of another job is what it is
     assert warned(rebuild_job, document, "x", {}) == []
-
-
-@pytest.mark.parametrize("model", ["elastic_belt", "linear_stability"])
-def test_scaled_sheaves_are_told_unless_the_job_names_what_is_scaled(model, tmp_path, monkeypatch, capsys):
-    monkeypatch.chdir(tmp_path)
-    Path("x.toml").write_text(f'name = "x"\nmodel = "{model}"\n[axes]\nload = ["40 N m"]\n')
-    told = 'x.toml: [sheaves] sheave_stiffness scales the discs alone; stiffness_of = "sheave" keeps the earlier '
-    told += 'meaning, disc and tilt; stiffness_of = "disc" silences this line'
-    for value in ("1.5", "inf", "[1, 1.5]"):
-        assert warned(load_job, "x.toml", [f"sheave_stiffness={value}"]) == [told]
-        for named in ("disc", "sheave"):
-            assert warned(load_job, "x.toml", [f"sheave_stiffness={value}", f"stiffness_of={named}"]) == []
-    assert warned(load_job, "x.toml") == warned(load_job, "x.toml", ["sheave_stiffness=[1]"]) == []
-    main(["check", "x.toml", "--set", "sheave_stiffness=1.5"])
-    shown = [one for one in capsys.readouterr().err.splitlines() if "warning" in one]
-    assert shown == [f"cvt-hpc: warning: {told}"]
-
-
-def test_notices_speak_of_a_single_run_and_of_the_ranges_of_a_fit(tmp_path, monkeypatch):
-    monkeypatch.chdir(tmp_path)
-
-    def told(source):
-        return [
-            f'{source}: [sheaves] sheave_stiffness scales the discs alone; stiffness_of = "sheave" keeps the earlier '
-            'meaning, disc and tilt; stiffness_of = "disc" silences this line'
-        ]
-
-    monkeypatch.setattr(running, "_history", lambda *_: None)
-    monkeypatch.setattr(running, "do", lambda *_, **__: [(None, {})])
-    document = {"name": "x", "model": "elastic_belt"}
-    plain = build_job(document)
-    assert warned(simulate, plain, {"sheave_stiffness": 1.5}) == told("build_job")
-    assert warned(simulate, plain, {"sheave_stiffness": 1.5, "stiffness_of": "disc"}) == []
-    assert warned(simulate, plain, {"sheave_stiffness": 1.0}) == warned(simulate, plain) == []
-    with warnings.catch_warnings():
-        warnings.simplefilter("ignore")
-        scaled = build_job(document | {"sheaves": {"sheave_stiffness": 2.0}})
-    assert warned(simulate, scaled, {"sheave_stiffness": 1.5}) == []  # it has been told
-
-    fit = Path("fit.toml")
-    text = 'name = "x"\nmodel = "elastic_belt"\n[axes]\nFREE\n[fit]\nalong = { load = [50, 60] }\n[fit.cases]\na = {CASE}\n'
-    text += '[[fit.targets]]\nname = "t"\nmeasure = "vibrating"\nfrom = 50\nto = 60\nstatement = "s"\n'
-    of_range = "sheave_stiffness = { from = 1, to = 2 }", ""
-    of_case = "kinetic_friction = { from = 0.08, to = 0.1 }", " set = { sheave_stiffness = 1.5 } "
-    silent = of_case[0], " factor = { sheave_stiffness = 1 } "
-    for (free, case), expected in ((of_range, told("fit.toml")), (of_case, told("fit.toml")), (silent, [])):
-        fit.write_text(text.replace("FREE", free).replace("CASE", case))
-        assert warned(load_fit, fit) == expected
-        assert warned(load_fit, fit, ["stiffness_of=disc"]) == []
 
 
 def test_commands_say_it_once_on_stderr(write_job, capsys):

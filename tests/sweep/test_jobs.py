@@ -8,7 +8,7 @@ import pytest
 from cvt_hpc import simulation
 from cvt_hpc.cli import main
 from cvt_hpc.experiment_kinds import with_table
-from cvt_hpc.job import load_job
+from cvt_hpc.job import build_job, load_job
 from cvt_hpc.study.description import describe
 
 FOLDER = Path(__file__).parents[2] / "jobs"
@@ -38,3 +38,14 @@ def test_a_job_is_fit_to_be_run(path, capsys):
     study = describe(job, simulation)
     assert study.size == job.size
     assert study.description
+
+
+def test_the_scene_of_reference_is_that_of_the_defaults():
+    job, plain = load_job(FOLDER / "lebrecht_2004.toml"), build_job({"name": "x", "model": "elastic_belt"})
+    own = {
+        "load",
+        "friction_gradient",
+        "duration",
+        "shortest_duration",
+    }  # axes at their first values, and the run
+    assert {key for key, value in job.parameters.items() if value != plain.parameters[key]} == own

@@ -19,7 +19,6 @@ from cvt_hpc.job.assignments import Assignments, split_assignments, take_own
 from cvt_hpc.job.axes import read_values
 from cvt_hpc.job.design import read_range
 from cvt_hpc.job.document import read_document, read_set, read_table, read_tables
-from cvt_hpc.job.summary import warn_of_notices
 from cvt_hpc.job.units import unit_in
 from cvt_hpc.job.values import expectation, kind_of, read_value, warn_of_bare_numbers
 from cvt_hpc.parameters import Parameter, positive
@@ -86,21 +85,9 @@ def load(path: str | Path, overrides: Assignments = ()) -> Fit:
         counted=_read_counted(table.get("counted", {}), job, where),
         **own,
     )
-    warn_of_notices(job, _looked_at(fit))
     if axes := fit.coarse_job().axes:
         raise mismatch(f"{where} coarse {axes[0].name}", "one value", "an axis")
     return fit
-
-
-def _looked_at(fit: Fit) -> dict[str, list[float]]:
-    """Return ends of all ranges, the swept values and those of the cases [SI], by parameter."""
-    found: dict[str, list[float]] = {one.name: [one.low, one.high] for one in fit.free}
-    found[fit.along] = list(fit.values)
-    for case in fit.cases.values():
-        scaled = {key: factor * fit.job.parameters[key] for key, factor in case.factor.items()}
-        for key, value in (*case.set.items(), *scaled.items()):
-            found.setdefault(key, []).append(value)
-    return found
 
 
 def _check_own(own: Mapping[str, Any], where: str) -> None:

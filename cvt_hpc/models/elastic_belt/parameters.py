@@ -1,7 +1,8 @@
 """Parameters of the elastic belt that a job may set, with units, bounds and defaults.
 
 Only ratio, driving_speed and thrust of the defaults are from a paper (Lebrecht et al. 2004, sec. 3.1); sizes
-are those of a common passenger-car belt; every other default is an assumption, plausible and not measured.
+are those of a common passenger-car belt; seven were fitted to what that paper states of the noise, as
+jobs/lebrecht_2004.toml says; every other default is an assumption, plausible and not measured.
 """
 
 from typing import Any
@@ -14,7 +15,7 @@ from cvt_hpc.models.elastic_belt.bending_settings import BENDING, bending_inert,
 from cvt_hpc.models.elastic_belt.pulley_checks import pulley_inert, pulley_problems, shaft_problems
 from cvt_hpc.models.elastic_belt.pulley_settings import DRIVEN_INERTIA, DRIVEN_SHAFT, PULLEYS, SHAFT
 from cvt_hpc.models.elastic_belt.tilt_settings import TILT, tilt_inert, tilt_problems
-from cvt_hpc.parameters import Notice, Parameter, not_negative, positive
+from cvt_hpc.parameters import Parameter, not_negative, positive
 from cvt_hpc.physics.friction_laws import friction_inert, friction_problems
 from cvt_hpc.physics.geometry import variator, variator_problems
 from cvt_hpc.physics.sheaves import STIFFNESS_OF, stiffness_factors
@@ -68,11 +69,6 @@ PARAMETERS: dict[str, dict[str, Parameter]] = {
             "",
             "stiffness of the sheaves' discs, multiple of the reference; inf: rigid; see stiffness_of",
             allow_infinite=True,
-            notice=Notice(
-                "stiffness_of",
-                'scales the discs alone; stiffness_of = "sheave" keeps the earlier meaning, disc and tilt; '
-                'stiffness_of = "disc" silences this line',
-            ),
         ),
         "stiffness_of": Parameter(
             "disc",
@@ -82,7 +78,7 @@ PARAMETERS: dict[str, dict[str, Parameter]] = {
             choices=STIFFNESS_OF,
         ),
         "tilt_stiffness": positive(
-            3e5,
+            6.3e5,
             "N m/rad",
             "reference stiffness against tilting, shaft bending included",
             sensible=(100.0, 1000000000.0),
@@ -95,12 +91,12 @@ PARAMETERS: dict[str, dict[str, Parameter]] = {
             allow_infinite=True,
         ),
         "local_stiffness": positive(
-            4e9,
+            7.1e9,
             "N/m^2",
             "reference stiffness against local bending, per length",
             sensible=(100000.0, 100000000000000.0),
         ),
-        "local_length": positive(0.012, "m", "decay length of local bending", sensible=(0.0001, 0.3)),
+        "local_length": positive(0.013, "m", "decay length of local bending", sensible=(0.0001, 0.3)),
         "flank_stiffness": positive(
             3e10,
             "N/m^2",

@@ -185,7 +185,7 @@ PARAMETERS: dict[str, dict[str, Parameter]] = {
             ),
             allow_infinite=True,
         ),
-        "local_length": positive(0.012, "m", "decay length of local bending", sensible=(0.0001, 0.3)),
+        "local_length": positive(0.013, "m", "decay length of local bending", sensible=(0.0001, 0.3)),
         "half_wedge_angle": scene.HALF_WEDGE_ANGLE,
         "inner_radius": not_negative(
             0.0, "m", "pitch radius at the inner end of the sheaves of both pulleys", sensible=(1e-3, 0.5)
