@@ -83,8 +83,8 @@ def test_a_table_rests_on_job_data_and_all_modules_that_compute_it(program):
     (of_steppers,) = program.tables(["chart_oscillator"])
     assert ROOT / "cvt_hpc/steppers/moreau.py" in program.rests_on(of_steppers.made_by)
     assert ROOT / "cvt_hpc/experiments/chart/measuring.py" in program.rests_on(of_steppers.made_by)
-    (of_script,) = program.tables(["belt_terms"])
-    assert ROOT / "jobs/belt_terms.toml" in program.rests_on(of_script.made_by)
+    (of_script,) = program.tables(["terms"])
+    assert ROOT / "jobs/terms.toml" in program.rests_on(of_script.made_by)
 
 
 @pytest.mark.parametrize(
