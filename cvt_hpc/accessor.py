@@ -14,7 +14,7 @@ program, whoever opened it:
 
 from __future__ import annotations
 
-from collections.abc import Sequence
+from collections.abc import Mapping, Sequence
 from inspect import Parameter, Signature
 from pathlib import Path
 from typing import TYPE_CHECKING, Any
@@ -340,7 +340,7 @@ def read_table(path: str | Path) -> xr.Dataset:
     path : str or Path
         A CSV file as `jobs/tabulate.py` writes it: lines with "#" of its origin, then a head of axes [SI],
         `status`, `vibrates`, and quantities with the unit and a column for each strand or pulley. The axes
-        make a full grid.
+        make a full grid; what is linked to one of them is a coordinate along it.
 
     Returns
     -------
@@ -360,6 +360,8 @@ def read_table(path: str | Path) -> xr.Dataset:
         raise mismatch(str(path), "a table of a study, with a column status and full rows", ", ".join(head))
     columns = dict(zip(head, zip(*body, strict=True), strict=True))
     axes = {name: _numbers(columns[name]) for name in head[: head.index("status")]}
+    linked = _linked(axes)
+    followers = {name: axes.pop(name) for name in linked}
     coordinates = {name: np.unique(values) for name, values in axes.items()}
     shape = tuple(map(len, coordinates.values()))
     places = tuple(np.searchsorted(coordinates[name], values) for name, values in axes.items())
@@ -374,6 +376,9 @@ def read_table(path: str | Path) -> xr.Dataset:
     dataset = xr.Dataset(
         coords={name: (name, v, {"units": _unit_of(name)}) for name, v in coordinates.items()}
     )
+    for name, leader in linked.items():
+        first = np.unique(axes[leader], return_index=True)[1]
+        dataset.coords[name] = (leader, followers[name][first], {"units": _unit_of(name)})
     for name, flags in (("status", Status), ("vibrates", Vibrates)):
         known = {flag.name.lower(): flag for flag in flags}
         values = [known.get(word, Vibrates.UNDECIDED) for word in columns[name]]
@@ -381,6 +386,20 @@ def read_table(path: str | Path) -> xr.Dataset:
     for column in head[head.index("vibrates") + 1 :]:
         _add(dataset, column, tuple(axes), columns[column], grid)
     return dataset.assign_attrs(job_name=Path(path).stem)
+
+
+def _linked(columns: Mapping[str, np.ndarray]) -> dict[str, str]:
+    """Return the axis that decides the values of each column that varies with one axis alone."""
+    found: dict[str, str] = {}
+    counts = {name: np.unique(values).size for name, values in columns.items()}
+    for name, values in reversed(columns.items()):  # axes come first
+        for leader in columns:
+            pairs = set(zip(columns[leader], values, strict=True))
+            is_decided = leader != name and leader not in found and len(pairs) == counts[leader]
+            if is_decided and counts[name] > 1:
+                found[name] = leader
+                break
+    return found
 
 
 def _add(dataset: xr.Dataset, column: str, dims: tuple[str, ...], texts: Sequence[str], grid: Any) -> None:

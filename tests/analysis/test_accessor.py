@@ -139,10 +139,15 @@ def test_a_table_is_read_as_the_dataset_that_it_was_made_of(tmp_path):
     rows = runpy.run_path(str(Path(__file__).parents[2] / "jobs" / "tabulate.py"))["rows"]
     made = study()
     made["core_seconds"] = made["status"].astype(float)
+    made.coords["thrust"] = "load", 10.0 * made["load"].values  # linked, as is a coordinate of fewer values
+    made.coords["tilt_factor"] = "load", np.where(made["load"] < made["load"][-1], 1.0, np.inf)
     path = tmp_path / "table.csv"
     path.write_text("\n".join(rows(made, ("amplitude", "frequency"))))
     found = cvt_hpc.read_table(path)
     assert found["load"].attrs["units"] == "N m" and found.amplitude.attrs["units"] == "m"
+    for name in ("thrust", "tilt_factor"):
+        np.testing.assert_array_equal(found[name], made[name])
+        assert found[name].dims == ("load",)
     np.testing.assert_array_equal(found.status, made.status)
     done = made.status == Status.DONE
     np.testing.assert_array_equal(found.vibrates.where(done), made.vibrates.where(done))

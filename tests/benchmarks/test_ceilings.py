@@ -13,10 +13,10 @@ def test_operations_are_counted_once():
 def test_a_step_needs_what_the_docs_say():
     needs = count(STEP, "single")
     flops = needs["sums and products"] + 2 * needs["fused"] + needs["quotients and roots"]
-    # 103 kflop, 641 for each station, implicit bending included; a front that moves by a cell or two changes little
-    assert flops / STATIONS == pytest.approx(641, rel=0.05)
+    # 107 kflop, 669 for each station, implicit bending included; a front that moves by a cell or two changes little
+    assert flops / STATIONS == pytest.approx(669, rel=0.05)
     assert needs["quotients and roots"] / STATIONS == pytest.approx(11.5, rel=0.1)
-    assert (needs["array read"] + needs["array written"]) / STATIONS == pytest.approx(202, rel=0.05)
+    assert (needs["array read"] + needs["array written"]) / STATIONS == pytest.approx(212, rel=0.05)
 
 
 def test_precision_changes_the_length_of_the_exponential_series_alone():

@@ -14,6 +14,7 @@ from cvt_hpc.job import build_job
 from cvt_hpc.models.steady_variator.walking import SteadyBelt
 from cvt_hpc.vibration.classes import OccurrenceClass
 from support.cf import cf_findings
+from support.rungs import scene_tables
 
 JOB = """
 name = "x"
@@ -23,7 +24,7 @@ load = ["90 N m", "105 N m", "120 N m"]
 [mesh]
 stations = 96
 end_refinement = 1
-"""
+""" + scene_tables("linear_stability")
 RUNS = """
 [branch]
 resolution = "5 N m"

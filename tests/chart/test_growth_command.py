@@ -16,6 +16,7 @@ from cvt_hpc.models.linear_stability.record import solve
 from cvt_hpc.study import run
 from cvt_hpc.tables import below_origin
 from support.cf import cf_findings
+from support.rungs import scene_tables
 
 OSCILLATOR = """name = "mass"
 model = "oscillator"
@@ -47,7 +48,7 @@ rise_time = "40 ms"
 stations = 112
 [run]
 duration = "0.08 s"
-"""
+""" + scene_tables("elastic_belt")
 
 
 @pytest.fixture

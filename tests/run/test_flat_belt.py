@@ -8,11 +8,10 @@ import pytest
 from cvt_hpc.models.elastic_belt import fields as f
 from cvt_hpc.models.elastic_belt.belt import State, belt_constants, initial_state
 from cvt_hpc.models.elastic_belt.one_system import flat_belt, pack, rates, system, unpack
-from cvt_hpc.models.elastic_belt.parameters import PARAMETERS
 from support.fast_runs import FastRuns, march
+from support.scene import VALUES
 
-DEFAULTS = {key: parameter.default for section in PARAMETERS.values() for key, parameter in section.items()}
-DEFAULTS |= {"duration": 0.1, "load": 100.0, "load_history": "ramp", "stations": 96}
+VALUES |= {"duration": 0.1, "load": 100.0, "load_history": "ramp", "stations": 96}
 FREE = {
     "driving_inertia": 0.05,
     "driving_axial": "thrust",
@@ -33,7 +32,7 @@ CASES = {
 @cache
 def rough_belt(case):
     """A belt in motion, roughened so that gaps open, elements press and flanks slip every way."""
-    parameters = DEFAULTS | CASES[case]
+    parameters = VALUES | CASES[case]
     belt = belt_constants(parameters)
     run, random = FastRuns([belt], [initial_state(parameters, belt)]), np.random.default_rng(5)
     run.advance(5000, 4e-6)

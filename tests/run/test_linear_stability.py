@@ -10,7 +10,6 @@ from cvt_hpc.errors import InputError
 from cvt_hpc.kernels import called_alike
 from cvt_hpc.models.elastic_belt.belt import mesh
 from cvt_hpc.models.elastic_belt.one_system import rates, system
-from cvt_hpc.models.elastic_belt.parameters import PARAMETERS
 from cvt_hpc.models.linear_stability.branch import branch, onsets
 from cvt_hpc.models.linear_stability.modes import DECAY, HIGH, LOW, loosened, modes
 from cvt_hpc.models.linear_stability.spectrum import eigenpairs
@@ -22,10 +21,10 @@ from cvt_hpc.vibration.settings import BELOW_MODES
 from support.cf import cf_findings
 from support.growing import at_rest, measured
 from support.rungs import rung_job, rung_record
+from support.scene import VALUES
 
-DEFAULTS = {key: parameter.default for section in PARAMETERS.values() for key, parameter in section.items()}
 LOADS = (95.0, 125.0)
-COARSE = DEFAULTS | {"stations": 96}
+COARSE = VALUES | {"stations": 96}
 
 
 @cache

@@ -1,19 +1,38 @@
 """Records of the rungs of the ladder for tests, through the job and the simulation as any user has them."""
 
-from collections.abc import Mapping
+from collections.abc import Collection, Mapping
 from numbers import Real
 from typing import Any
 
 from cvt_hpc.job import Job, build_job
 from cvt_hpc.job.schema import load_schema
 from cvt_hpc.simulation import run_point
+from support.scene import OF_BELTS, SCENE
 
 
 def rung_job(model: str, axes: dict | None = None, stepper: str | None = None, **values) -> Job:
-    """A job of a model with defaults but for `values` and those of the axes [SI]."""
+    """A job of a model on the scene of the tests but for `values` and those of the axes [SI]."""
     head = {"name": "test", "model": model} | ({"stepper": stepper} if stepper else {})
+    values = scene_of(model, {*values, *(axes or {})}) | values
     axes = with_units(model, stepper, axes or {})
     return build_job(head | {"axes": axes}, "test.toml", with_units(model, stepper, values))
+
+
+def scene_of(model: str, given: Collection[str] = ()) -> dict[str, float]:
+    """Values [SI] of the scene of the tests that a model has, but for given keys."""
+    has = load_schema(model, None, "test.toml").parameters
+    scene = SCENE if "tilt_stiffness" in has else OF_BELTS if "tilt_lag" in has else {}
+    return {key: value for key, value in scene.items() if key in has and key not in given}
+
+
+def scene_tables(model: str) -> str:
+    """That scene as the tables of a job file."""
+    schema = load_schema(model, None, "test.toml")
+    tables: dict[str, list[str]] = {}
+    for key, value in scene_of(model).items():
+        written = f'{key} = "{value!r} {schema.parameters[key].unit}"\n'
+        tables.setdefault(schema.section_of[key], []).append(written)
+    return "".join(f"[{table}]\n{''.join(lines)}" for table, lines in tables.items())
 
 
 def with_units(model: str, stepper: str | None, values: Mapping[str, Any]) -> dict[str, Any]:

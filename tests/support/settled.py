@@ -4,13 +4,12 @@ import numpy as np
 
 from cvt_hpc.models.elastic_belt import fields as f
 from cvt_hpc.models.elastic_belt.belt import Belt, Mesh, State, belt_constants, initial_state, mesh
-from cvt_hpc.models.elastic_belt.parameters import PARAMETERS
 from cvt_hpc.models.elastic_belt.rhs import contact_forces, fresh_contacts, strains
 from cvt_hpc.models.elastic_belt.sampling import Outcome
 from support.fast_runs import FastRuns
+from support.scene import VALUES
 
-DEFAULTS = {key: parameter.default for section in PARAMETERS.values() for key, parameter in section.items()}
-DEFAULTS["duration"] = 0.1
+DEFAULTS = VALUES | {"duration": 0.1}
 T1, T2 = 1, 3  # regions of the path
 # shorter than the default: flanks without friction leave the belt hardly damped, and 5 us is too long for it
 STEP = 3e-6

@@ -8,10 +8,9 @@ import numpy as np
 
 from cvt_hpc.models.elastic_belt import fields as f
 from cvt_hpc.models.elastic_belt.belt import Belt, State, belt_constants
-from cvt_hpc.models.elastic_belt.parameters import PARAMETERS
+from support.scene import VALUES
 
-DEFAULTS = {key: parameter.default for section in PARAMETERS.values() for key, parameter in section.items()}
-MASS = DEFAULTS["element_mass"] + DEFAULTS["ring_mass"]
+MASS = VALUES["element_mass"] + VALUES["ring_mass"]
 RADIUS = 0.024
 LENGTH = 2.0 * np.pi * RADIUS  # half the path [m]: 0.151, as long as a strand
 TENSION = 5000.0  # net tension F = T - P [N]
@@ -23,7 +22,7 @@ def straight_belt(
 ) -> Belt:
     """A straight belt of 2 LENGTH, `cells` cells (an even number) in each half."""
     belt = belt_constants(
-        DEFAULTS
+        VALUES
         | {
             "duration": 1.0,
             "ratio": 1.0,

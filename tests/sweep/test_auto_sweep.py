@@ -7,6 +7,7 @@ from cvt_hpc.cli import main
 from cvt_hpc.study import open_results
 from cvt_hpc.variables import Status
 from support.cf import cf_findings
+from support.rungs import scene_tables
 from support.sweeps import call
 
 JOB = """name = "a"
@@ -23,7 +24,7 @@ stations = 96
 duration = "0.3 s"
 [numerics]
 step = "7.6 us"
-"""
+""" + scene_tables("auto")
 
 
 CHECKED = ("--audit", "0.7", "--check-step", "0.9")

@@ -19,6 +19,7 @@ from cvt_hpc.cli import main
 from cvt_hpc.variables import Status, Vibrates
 from support.cf import cf_findings
 from support.recorded import assert_same_numbers
+from support.rungs import scene_tables
 from support.sweeps import call, environment
 
 JOB = """
@@ -33,15 +34,12 @@ load = ["0 N m", "60 N m", "120 N m", "450 N m"] # the last one is more than fri
 [scene]
 rise_time = "20 ms"
 
-[sheaves]
-stiffness_of = "disc"
-
 [mesh]
 stations = 48
 
 [run]
 duration = "0.08 s"
-"""
+""" + scene_tables("elastic_belt")
 
 
 HISTORY = """
