@@ -18,6 +18,6 @@ part long_rings --set 'reference_tension=770 N'
 part layers --set 'element_damping=2 N s' --set 'ring_damping=0.4 N s'
 part path --set curvature_terms=path
 part rigid_discs --set sheave_stiffness=inf
-part memory --set 'friction_memory=0.2 ms'
-part tilt_lag --set 'tilt_lag=0.1 ms'
+part memory --set 'friction_memory=0.1 ms'
+part tilt_lag --set 'tilt_lag=0 s'
 joined
