@@ -18,7 +18,7 @@ from support.fast_runs import FastRuns
 from support.fast_runs import march as march_steps
 from support.scene import VALUES
 
-VALUES |= {"duration": 0.1, "load": 100.0}
+GIVEN = VALUES | {"duration": 0.1, "load": 100.0}
 WINDOW = 2e-4  # [s]
 STARTS = (0, 1, 2, 3, 4)
 CASES = {"memory": {}, "no memory": {"friction_memory": 0.0}}
@@ -35,10 +35,10 @@ def march(stepper, belt, state, step, duration):
 @cache
 def moving_belt(case, number=0):
     """A belt at 100 N m after 40 ms and `number` ms: falling friction, push in t1, elements apart in t2."""
-    belt = belt_constants(VALUES | SCENES[case])
+    belt = belt_constants(GIVEN | SCENES[case])
     if number > 0:
         return belt, march("imex", belt, moving_belt(case, number - 1)[1], STEP, 1e-3)
-    return belt, march("imex", belt, initial_state(VALUES | SCENES[case], belt), STEP, 0.04)
+    return belt, march("imex", belt, initial_state(GIVEN | SCENES[case], belt), STEP, 0.04)
 
 
 @cache
@@ -91,7 +91,7 @@ def test_both_steps_have_the_same_rates(case, law):
     # One tiny step from a rough state, in which gaps open and close, elements press and slip every way: both
     # take the same forces then. A step of 0.01 ns times the stiffest rate, 10^7 / s, is 1e-4; round-off of 10
     # m/s in it is 1e-4 m/s^2.
-    belt = belt_constants(VALUES | CASES[case] | LAWS[law])
+    belt = belt_constants(GIVEN | CASES[case] | LAWS[law])
     state, random, step = moving_belt("memory")[1].copy(), np.random.default_rng(3), 1e-11
     for row, size in ((f.W, 1e-6), (f.U, 0.05), (f.V_ELEMENT, 0.05), (f.V_RING, 0.05), (f.N_ELEMENT, 1e-7)):
         state.fields[row] += size * random.normal(size=belt.cell.size)
@@ -166,8 +166,8 @@ def test_table_of_the_linear_law_is_the_linear_law(stepper):
     }
     finals = []
     for friction in (law, table):
-        belt = belt_constants(VALUES | friction)
-        state = initial_state(VALUES | friction, belt)
+        belt = belt_constants(GIVEN | friction)
+        state = initial_state(GIVEN | friction, belt)
         finals.append(march(stepper, belt, state, 4e-8, 1e-4))
     line, looked_up = finals
     assert np.abs(line.fields[f.U]).max() > 1e-3

@@ -11,7 +11,7 @@ from cvt_hpc.models.elastic_belt.one_system import flat_belt, pack, rates, syste
 from support.fast_runs import FastRuns, march
 from support.scene import VALUES
 
-VALUES |= {"duration": 0.1, "load": 100.0, "load_history": "ramp", "stations": 96}
+GIVEN = VALUES | {"duration": 0.1, "load": 100.0, "load_history": "ramp", "stations": 96}
 FREE = {
     "driving_inertia": 0.05,
     "driving_axial": "thrust",
@@ -32,7 +32,7 @@ CASES = {
 @cache
 def rough_belt(case):
     """A belt in motion, roughened so that gaps open, elements press and flanks slip every way."""
-    parameters = VALUES | CASES[case]
+    parameters = GIVEN | CASES[case]
     belt = belt_constants(parameters)
     run, random = FastRuns([belt], [initial_state(parameters, belt)]), np.random.default_rng(5)
     run.advance(5000, 4e-6)

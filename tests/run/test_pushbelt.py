@@ -56,8 +56,8 @@ def test_forces_of_both_strands_give_the_torque(records):
     torque = found["driving_power"] / (100.0 * np.pi)
     ring = radius + 1.5e-3
     least, most = ((t2 - t1) * ring + (p1 - p2) * height for height in (radius, ring + 4e-3))
-    # 1e-4: heads do not touch, so that the torque is the least but for what the middles of strands leave out
-    assert (1.0 - 1e-4) * least < torque < most
+    # 2.5e-4: heads do not touch, so that the torque is the least but for what damping of the strands takes away
+    assert (1.0 - 2.5e-4) * least < torque < most
     assert torque == pytest.approx(60.0, rel=0.05)  # the driven pulley still swings, by 2.7 N m
 
 

@@ -22,13 +22,13 @@ from support.fast_runs import FastRuns
 from support.rungs import rung_record
 from support.scene import VALUES
 
-VALUES |= {"duration": 0.1, "stations": 48}
+GIVEN = VALUES | {"duration": 0.1, "stations": 48}
 LOADS = (60.0, 80.0, 100.0, 120.0)
 
 
 @cache
 def steady(**values):
-    found = tuple(SteadyBelt(VALUES | values).along(LOADS))
+    found = tuple(SteadyBelt(GIVEN | values).along(LOADS))
     assert len(found) == len(LOADS)
     return found
 
@@ -49,7 +49,7 @@ def rates_of(found, belt):
     ],
 )
 def test_nothing_changes_in_it(values):
-    first = initial_state(VALUES | values, belt_constants(VALUES | values))
+    first = initial_state(GIVEN | values, belt_constants(GIVEN | values))
     for found in steady(**values):
         belt = found.belt._replace(bridging_stiffness=found.belt.element_stiffness)
         # Newton's last step is 1e-7 of the sizes, so strains are left by 1e-10, and the elements' stiffness 4e7 N
@@ -74,11 +74,11 @@ def test_a_transient_stays_there():
 
 def test_pulleys_are_in_balance():
     # moment about the driven shaft: strands pull where their lines pass it, the rings d_1 further out
-    grid = mesh(VALUES)
+    grid = mesh(GIVEN)
     for found in steady():
         belt, around = found.belt, distributions(found)
         numbers = quantities(found, grid)
-        assert numbers["axial_force"][1] == pytest.approx(VALUES["thrust"], rel=1e-9)
+        assert numbers["axial_force"][1] == pytest.approx(GIVEN["thrust"], rel=1e-9)
         moment = 0.0
         for region, sign in ((1, -1.0), (3, 1.0)):
             stations = grid.starts[region] + np.arange(grid.counts[region] // 4, 3 * grid.counts[region] // 4)
@@ -93,7 +93,7 @@ def test_pulleys_are_in_balance():
 
 
 def test_load_moves_the_push_into_t1_and_slows_the_driven_pulley():
-    numbers = [quantities(found, mesh(VALUES)) for found in steady()]
+    numbers = [quantities(found, mesh(GIVEN)) for found in steady()]
     push = np.array([one["mean_push_force"] for one in numbers])
     loss = [one["speed_loss"] for one in numbers]
     assert np.all(np.diff(push[:, 0]) > 0.0) and np.all(push[:, 1] < 1.0)
@@ -102,13 +102,13 @@ def test_load_moves_the_push_into_t1_and_slows_the_driven_pulley():
 
 def test_the_way_does_not_matter():
     # 80 N m along the load, and from a first state of its own: both within Newton's tolerance, 1e-7 of the sizes
-    alone = SteadyBelt(VALUES).at(80.0)
-    sizes = Equations(VALUES | {"load_start": 0.0}, alone.belt).sizes
+    alone = SteadyBelt(GIVEN).at(80.0)
+    sizes = Equations(GIVEN | {"load_start": 0.0}, alone.belt).sizes
     assert np.abs((alone.unknowns - steady()[1].unknowns) / sizes).max() < 1e-7
 
 
 def test_jacobian():
-    parameters = VALUES | {"load_start": 0.0}
+    parameters = GIVEN | {"load_start": 0.0}
     equations = Equations(parameters, belt_constants(parameters))
     x = steady()[0].unknowns.copy()
     assert equations.residual(x) is not None
@@ -121,7 +121,7 @@ def test_jacobian():
 
 
 def test_newton_gives_up_where_it_is_lost():
-    parameters = VALUES | {"load_start": 0.0}
+    parameters = GIVEN | {"load_start": 0.0}
     belt = belt_constants(parameters)
     equations = Equations(parameters, belt)
     assert newton(equations, equations.unknowns(initial_state(parameters, belt)), 1e-7) is None
@@ -130,17 +130,17 @@ def test_newton_gives_up_where_it_is_lost():
 def test_friction_carries_what_bullinger_says():
     # transmittable torque 2 mu / cos(d0) Q r of the driving pulley (Bullinger et al. 2005, eq. 2), if all sliding is along
     # the belt and far beyond the regularisation speed
-    parameters = VALUES | {"friction_gradient": 0.0, "sheave_stiffness": np.inf, "stiffness_of": "sheave"}
+    parameters = GIVEN | {"friction_gradient": 0.0, "sheave_stiffness": np.inf, "stiffness_of": "sheave"}
     belt = SteadyBelt(parameters)
     last = belt.carried(belt.at(200.0))
     axial = quantities(last, mesh(parameters))["axial_force"][0]
-    most = 2.0 * VALUES["kinetic_friction"] / np.cos(VALUES["half_wedge_angle"])
+    most = 2.0 * GIVEN["kinetic_friction"] / np.cos(GIVEN["half_wedge_angle"])
     assert 0.9 < last.load / (most * axial * last.belt.driving_radius) < 1.0
 
 
 def test_a_load_beyond_what_friction_carries():
     with pytest.raises(NoSteadyState, match="400 N m"):
-        SteadyBelt(VALUES).at(400.0)
+        SteadyBelt(GIVEN).at(400.0)
     record = rung_record("steady_variator", load=400.0, stations=48)
     assert (record["status"], record["vibrates"]) == (Status.DONE, Vibrates.SLIPS)
     assert "slips through under 400 N m: from" in record["reason"]
@@ -149,7 +149,7 @@ def test_a_load_beyond_what_friction_carries():
 def test_a_load_that_does_not_settle_is_reached_from_each_of_the_loads_beside_it(monkeypatch):
     """And a march that runs away from a load that brakes has not slipped through: it diverges."""
     monkeypatch.setattr(first_states, "settled", lambda *_: Outcome.RAN_AWAY)
-    parameters = VALUES | {"load_start": 0.0}
+    parameters = GIVEN | {"load_start": 0.0}
     first = FirstStates(parameters, Continuation(parameters))
     with pytest.raises(NoSteadyState, match="does not settle under 60 N m"):
         first._settled(60.0)
@@ -174,7 +174,7 @@ def test_a_load_that_does_not_settle_is_reached_from_each_of_the_loads_beside_it
 
 
 def test_wider_friction_is_tried_where_a_march_by_its_own_does_not_settle(monkeypatch):
-    first, tried = FirstStates(VALUES, Continuation(VALUES)), []
+    first, tried = FirstStates(GIVEN, Continuation(GIVEN)), []
 
     def settle(load, wide):
         tried.append(wide)
@@ -190,11 +190,11 @@ def test_wider_friction_is_tried_where_a_march_by_its_own_does_not_settle(monkey
 
 def test_a_load_that_takes_faster_sliding_than_the_belt_runs_is_refused():
     """tanh(v / v_reg) of the torque that twice the thrust carries at friction's highest level."""
-    belt = belt_constants(VALUES | {"load": 0.0, "load_start": 0.0, "driving_speed": 0.01})
-    most = 4.0 * VALUES["thrust"] * belt.driving_radius / np.cos(VALUES["half_wedge_angle"])
-    most *= VALUES["kinetic_friction"] - VALUES["friction_gradient"] * VALUES["stribeck_velocity"]
+    belt = belt_constants(GIVEN | {"load": 0.0, "load_start": 0.0, "driving_speed": 0.01})
+    most = 4.0 * GIVEN["thrust"] * belt.driving_radius / np.cos(GIVEN["half_wedge_angle"])
+    most *= GIVEN["kinetic_friction"] - GIVEN["friction_gradient"] * GIVEN["stribeck_velocity"]
     v = least_sliding(belt, 60.0)
-    assert most * np.tanh(v / VALUES["friction_speed"]) == pytest.approx(60.0, rel=1e-9)
+    assert most * np.tanh(v / GIVEN["friction_speed"]) == pytest.approx(60.0, rel=1e-9)
     assert least_sliding(belt, -60.0) == v and least_sliding(belt, 1.01 * most) == 0.0
     record = rung_record("steady_variator", load=60.0, driving_speed=0.01, stations=48)
     assert (
@@ -205,7 +205,7 @@ def test_a_load_that_takes_faster_sliding_than_the_belt_runs_is_refused():
 
 def test_record_is_that_of_the_state():
     record = rung_record("steady_variator", load=60.0, stations=48)
-    numbers = quantities(steady()[0], mesh(VALUES))
+    numbers = quantities(steady()[0], mesh(GIVEN))
     assert record["status"] == Status.DONE
     assert record["mean_push_force"] == pytest.approx(numbers["mean_push_force"], rel=1e-6)
     assert record["thrust_ratio"] == pytest.approx(numbers["thrust_ratio"], rel=1e-9)

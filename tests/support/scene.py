@@ -4,6 +4,8 @@ Between them the belt vibrates from 90 N m on, cells at edges of windows are che
 closed forms hold. Tests do not depend on the defaults, which are fitted.
 """
 
+from collections.abc import Mapping
+from types import MappingProxyType
 from typing import Any
 
 from cvt_hpc.models.elastic_belt.parameters import PARAMETERS
@@ -18,6 +20,6 @@ SCENE = OF_BELTS | {
 }
 
 # All parameters of the elastic belt
-VALUES: dict[str, Any] = {
-    key: parameter.default for section in PARAMETERS.values() for key, parameter in section.items()
-} | SCENE
+VALUES: Mapping[str, Any] = MappingProxyType(
+    {key: parameter.default for section in PARAMETERS.values() for key, parameter in section.items()} | SCENE
+)
