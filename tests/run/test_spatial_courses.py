@@ -74,7 +74,8 @@ def test_speed_rises_along_a_ramp():
 
 def test_axial_forces_are_balanced_between_pulleys_out_of_parallel():
     tilt, skew = 4e-3, -2e-3
-    run, point, record = finished(axis_tilt=tilt, axis_skew=skew, duration=0.06)
+    # little damping: strands that still move sideways take a part of the balance, 1.6 % at half as long again
+    run, point, record = finished(axis_tilt=tilt, axis_skew=skew, duration=0.06, transverse_damping=500.0)
     driving, driven = record["net_axial_force"]
     assert driving > 80.0
     # Along the driven axis lies a part of what the strands pull that pulley with, towards the other one

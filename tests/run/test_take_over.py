@@ -39,7 +39,7 @@ def test_a_run_taken_over_is_the_run_that_was_not_broken_off(stepper):
     expected, found = whole.runs[0].displacement, run.displacement
     assert np.array_equal(found[:BEFORE], expected[:BEFORE])
     moved = np.abs(expected[BEFORE:] - expected[BEFORE - 1]).max()
-    assert moved > 5e-5
+    assert moved > 4e-5
     # lanes keep speeds as deviations, so that handing the state over rounds it;
     # the general form moves the sheave by forces of the end of a step, not of its start; imex has an error of its own
     allowed = {"explicit": 1e-6, "symplectic_euler": 1e-3, "imex": 0.01}[stepper]
