@@ -14,6 +14,7 @@ from cvt_hpc.errors import InputError
 from cvt_hpc.models.auto import record
 from cvt_hpc.study.audit import FULL_MODEL
 from cvt_hpc.variables import Status, Vibrates
+from support.rungs import scene_tables
 
 # the middle of a window of the reference map and cells outside
 JOB = """name = "audited"
@@ -29,7 +30,7 @@ stations = 96
 duration = "0.3 s"
 [numerics]
 step = "7.6 us"
-"""
+""" + scene_tables("auto")
 
 
 @pytest.fixture
