@@ -391,7 +391,7 @@ def test_what_ends_a_run_is_recorded_and_the_sweep_goes_on(tmp_path):
         ("belt.elements=60", "[belt] elements: expected 100 or more, or coarse = true, found 60"),
         ("numerics.step=1 ms", "[numerics] step: expected at most 0.000122 s, pitch over the speed of transverse"),
         ("numerics.step=0.121 ms", "[numerics] step: expected at most 0.000121 s, pitch over the speed of torsional"),
-        ("friction.friction_gradient=-80 s/m", "[numerics] step: expected at most 3.96e-06 s, beyond which friction that falls so steeply has several"),
+        ("friction.friction_gradient=-80 s/m", "[numerics] step: expected at most 3.07e-06 s, beyond which friction that falls so steeply has several"),
         ("friction.stribeck_velocity=0 m/s", "[friction] stribeck_velocity: expected > 0 m/s, found"),
         ("friction.kinetic_friction=-0.1", "[friction] kinetic_friction: expected > 0, found -0.1"),
         ("sheaves.flank_stiffness=-1 N/m^2", "[sheaves] flank_stiffness: expected > 0 N/m^2, found"),
