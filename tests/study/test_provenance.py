@@ -69,7 +69,8 @@ def test_command_has_no_folder_of_the_program(monkeypatch):
 
 def test_a_stored_table_is_read_as_a_dataset():
     dataset = read_table(ROOT / "jobs/results/lebrecht_2004.csv")
-    assert dataset["status"].shape == (5, 4, 19)
+    assert dataset["status"].shape == (7, 4, 19)
+    assert dataset["tilt_factor"].dims == ("sheave_stiffness",)  # linked to it
     assert dataset["amplitude"].attrs["units"] == "m" and dataset["core_seconds"].attrs["units"] == "s"
     assert dataset.cvt.strongest("amplitude").max() > 1e-5
 

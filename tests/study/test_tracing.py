@@ -28,6 +28,7 @@ FLAGS = {
     VIBRATING: (Status.DONE, Vibrates.YES),
     UNDECIDED: (Status.DONE, Vibrates.UNDECIDED),
     IRREGULAR: (Status.DONE, Vibrates.IRREGULAR),
+    SLIPPING: (Status.DONE, Vibrates.SLIPS),
     FAILED: (Status.FAILED_NUMERICS, Vibrates.UNDECIDED),
 }
 
@@ -168,7 +169,8 @@ def test_the_published_map_is_traced_with_half_of_its_runs():
     with (HERE.parents[1] / "jobs" / "results" / "lebrecht_2004.csv").open() as table:
         rows = list(csv.DictReader(below_origin(table)))
     verdicts = {"no": QUIET, "yes": VIBRATING, "undecided": UNDECIDED, "irregular": IRREGULAR, "": FAILED}
-    truth = np.array([verdicts[row["vibrates"]] for row in rows], np.int8).reshape(5, 4, 19)
+    verdicts["slips"] = SLIPPING
+    truth = np.array([verdicts[row["vibrates"]] for row in rows], np.int8).reshape(7, 4, 19)
     for spacing in (4, 6, 9):
         done, inferred = traced(truth, [None, None, spacing])
         assert done.mean() < 0.5
