@@ -1,4 +1,7 @@
-"""Write the dataset of a study as a small table: tabulate.py OUT/STUDY TABLE.csv [QUANTITY ...]."""
+"""Write the dataset of a study as a small table: tabulate.py OUT/STUDY TABLE.csv [QUANTITY ...].
+
+A row has a run, or, where parameters are uncertain, all samples of a cell: what is said of them together.
+"""
 
 import sys
 from itertools import product
@@ -8,7 +11,9 @@ import numpy as np
 from cvt_hpc import open_results
 from cvt_hpc.errors import InputError, unknown
 from cvt_hpc.storage.provenance import origin_lines
+from cvt_hpc.variables import Status, Vibrates
 
+FLAGS = {"status": Status, "vibrates": Vibrates}
 OF_A_BELT = ("amplitude", "frequency", "mode", "power_residual")
 # unit, factor and digits of quantities that are not written in SI units, to six digits
 LAYOUTS = {
@@ -22,14 +27,15 @@ LAYOUTS = {
 
 def rows(results, quantities=OF_A_BELT):
     """Yield the lines, one per run: axes, status, verdict, and the quantities, per strand and the like."""
+    cost = ["core_seconds"] if "core_seconds" in results else []
     dims = results["status"].dims
     axes = [str(name) for name, values in results.coords.items() if set(values.dims) <= set(dims)]
     for name in quantities:
         if name not in results.data_vars:
             raise unknown(name, "variable", name, map(str, results.data_vars))
     columns = [column for name in quantities for column in _columns(results[name], dims)]
-    yield ",".join([*axes, "status", "vibrates", *(head for head, *_ in columns), "core_seconds"])
-    words = {name: results[name].attrs["flag_meanings"].split() for name in ("status", "vibrates")}
+    yield ",".join([*axes, "status", "vibrates", *(head for head, *_ in columns), *cost])
+    words = {name: [flag.name.lower() for flag in kind] for name, kind in FLAGS.items()}
     for place in np.ndindex(results["status"].shape):
         run = results.isel(dict(zip(dims, place, strict=True)))
         done = words["status"][int(run["status"])] == "done"
@@ -39,7 +45,7 @@ def rows(results, quantities=OF_A_BELT):
             words["vibrates"][int(run["vibrates"])] if done else "",
         ]
         cells += [layout(run[name].isel(at).item()) if done else "" for _, name, at, layout in columns]
-        yield ",".join([*cells, f"{float(run['core_seconds']):.2f}"])
+        yield ",".join([*cells, *(f"{float(run[name]):.2f}" for name in cost)])
 
 
 def _columns(array, dims):
@@ -66,7 +72,8 @@ if __name__ == "__main__":
     folder, table, *asked = sys.argv[1:]
     try:
         with open_results(folder) as results:
-            body = [f"{row}\n" for row in rows(results.load(), asked or OF_A_BELT)]
+            of_cells = results.load().cvt.probability() if "sample" in results.dims else results.load()
+            body = [f"{row}\n" for row in rows(of_cells, asked or OF_A_BELT)]
             lines = [*origin_lines(results.attrs), *body]
     except InputError as error:
         sys.exit(f"tabulate.py: {error}")
