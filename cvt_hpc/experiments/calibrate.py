@@ -8,8 +8,8 @@ is weighed by how well its runs agree with a measured file, by
 
 n counting misses and false alarms, m cells without a verdict, which are as likely as not, h hits, and p being
 the share of cells that may be judged otherwise by model or rig (`doubt`); df and q are errors of the
-frequencies and ratios of the amplitudes of hits, s_f is `scatter`; do are errors of onsets, whose places are
-known to half a step s_o of the axis. Errors of frequency and amplitude are alike in neighbouring cells: they
+frequencies and ratios of the amplitudes of hits, s_f is `scatter`; do are errors of onsets, s_o their
+standard errors (`measured_score`). Errors of frequency and amplitude are alike in neighbouring cells: they
 count as one measurement each, amplitudes within a factor of two, as a rig measures at another place, and cost
 no more together than misses in place of all hits.
 
@@ -268,10 +268,7 @@ def weigh(asked: Calibration, dataset: xr.Dataset) -> Posterior:
     lines = _by_sample(agreement, dataset)
     if not sum(agreement.total[:4]):
         raise mismatch(f"{asked.measured}", "cells in its range of which a run is decided", "none")
-    along = dataset[agreement.measured.along]
-    places = np.unique(along.values[np.isfinite(along.values)])
-    step = coordinate_unit(along.attrs)[0] * float(np.median(np.diff(places))) if len(places) > 1 else np.inf
-    values = np.array([_log_likelihood(one, agreement, asked, 0.5 * step) for one in lines])
+    values = np.array([_log_likelihood(one, agreement.measured.kind, asked) for one in lines])
     weights = np.exp(values - values.max())
     distributions = _distributions(asked.job)
     parameters = np.array([dataset[one.key].values for one in distributions], float)
@@ -289,7 +286,7 @@ def _by_sample(agreement: Score, dataset: xr.Dataset) -> list[Line]:
     return [joined(own) for own in found.values()]
 
 
-def _log_likelihood(line: Line, agreement: Score, asked: Calibration, half_step: float) -> float:
+def _log_likelihood(line: Line, kind: str, asked: Calibration) -> float:
     each = np.log((1.0 - asked.doubt) / asked.doubt)
     found = -(line.misses + line.false_alarms) * each - line.neither * np.log(2.0 * (1.0 - asked.doubt))
     of_hits = 0.0
@@ -298,8 +295,8 @@ def _log_likelihood(line: Line, agreement: Score, asked: Calibration, half_step:
     if line.amplitude:
         of_hits += 0.5 * (float(np.mean(np.log(line.amplitude))) / _FACTOR) ** 2
     found -= min(of_hits, line.hits * each)
-    if agreement.measured.kind == ONSET:
-        found -= 0.5 * float(np.sum((np.array(line.onset) / half_step) ** 2))
+    if kind == ONSET:
+        found -= 0.5 * float(np.sum((np.array(line.onset) / np.array(line.standard)) ** 2))
     return float(found)
 
 
