@@ -38,6 +38,7 @@ from cvt_hpc.analysis.classes import ALONG
 from cvt_hpc.analysis.figures import coordinate_unit, legend_columns
 from cvt_hpc.analysis.scatter import is_sampled
 from cvt_hpc.errors import JobWarning, did_you_mean, few_of, mismatch, nearest, show
+from cvt_hpc.job import Job
 from cvt_hpc.job.csv_files import MOST_BYTES, content_of, read_csv
 from cvt_hpc.job.values import shown, si_unit
 from cvt_hpc.parameters import Column, FromFile, RowError
@@ -205,11 +206,13 @@ def read_columns(
     return read_csv(FromFile(columns, required, (), arrange, other_names or {}), str(path), "", place)
 
 
-def read_measured(path: str | Path, dataset: xr.Dataset, source: str = "results") -> Measured:
+def read_measured(
+    path: str | Path, dataset: xr.Dataset, source: str = "results", job: Job | None = None
+) -> Measured:
     """Read a measured file beside the results of a study over a grid, or beside the history of a run.
 
-    Rows at values that these do not have are left out. Of this, and of a window that holds no value of its
-    axis that was run, a warning tells.
+    The job is that in the attributes of the dataset, unless it is at hand. Rows at values that these do not
+    have are left out. Of this, and of a window that holds no value of its axis that was run, a warning tells.
 
     Raises
     ------
@@ -220,7 +223,9 @@ def read_measured(path: str | Path, dataset: xr.Dataset, source: str = "results"
         raise mismatch(source, "results over a grid, beside which measurements are drawn", "samples")
     dims = map(str, dataset["status"].dims if "status" in dataset else ())
     axes = [name for name in dims if name in dataset.coords and dataset[name].dtype.kind in "iuf"]
-    constants = {key: value for key, value in _constants(dataset).items() if key not in axes}
+    constants = {
+        key: value for key, value in _constants(dataset, job or job_held(dataset)).items() if key not in axes
+    }
     units = {name: si_unit(dataset[name].attrs) for name in axes}
     units |= {key: unit for key, (_, unit) in constants.items()}
     kind, along, columns = _declaration(Path(path), units, axes)
@@ -248,11 +253,11 @@ def read_measured(path: str | Path, dataset: xr.Dataset, source: str = "results"
     return Measured(Path(path).name, kind, along, rows)
 
 
-def _constants(dataset: xr.Dataset) -> dict[str, tuple[float, str]]:
+def _constants(dataset: xr.Dataset, job: Job | None) -> dict[str, tuple[float, str]]:
     """Return by name what a study, or a run, holds at one value [SI], and its unit."""
     told: dict[str, Any] = {}
     units: dict[str, str] = {}
-    if job := job_held(dataset):
+    if job:
         told |= {**job.parameters, **json.loads(dataset.attrs.get("point", "{}"))}
         units |= {key: parameter.unit for key, parameter in job.schema.parameters.items()}
     for name in ALONG:  # courses of a run
@@ -360,8 +365,8 @@ class Overlay:
 
     Parameters
     ----------
-    path : str, Path or None
-        The measured file; without one nothing is drawn.
+    path : str, Path, Measured or None
+        The measured file, or what was read of it; without one nothing is drawn.
     dataset, source
         As `read_measured` takes them, whole.
 
@@ -373,9 +378,13 @@ class Overlay:
         Line of the title, which names the file.
     """
 
-    def __init__(self, path: str | Path | None, dataset: xr.Dataset, source: str = "results") -> None:
-        none = Measured("", "", "", ())
-        self._measured = none if path is None else read_measured(path, dataset, source)
+    def __init__(
+        self, path: str | Path | Measured | None, dataset: xr.Dataset, source: str = "results"
+    ) -> None:
+        if path is None or isinstance(path, Measured):
+            self._measured = path or Measured("", "", "", ())
+        else:
+            self._measured = read_measured(path, dataset, source)
         self._entries: dict[str, Any] = {}
         self.height = 0.0 if path is None else LEGEND
         self.note = "" if path is None else f"measured: {shortened(self._measured.name, LONGEST_NAME)}"

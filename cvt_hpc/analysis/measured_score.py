@@ -35,6 +35,7 @@ COUNTS = ("hits", "misses", "false_alarms", "correct_silences", "neither")
 _READ = ("status", "vibrates", "occurrence_class", "inferred_class", "amplitude", "frequency")
 
 Array = NDArray[np.float64]
+Cells = NDArray[np.bool_]
 
 
 class Line(NamedTuple):
@@ -119,27 +120,29 @@ def score(dataset: xr.Dataset, path: str | Path, source: str = "results") -> Sco
     names = [str(name) for name in dataset["status"].dims if name != along]
     factor, unit = coordinate_unit(dataset[along].attrs)
     loads, lines = dataset[along].values.astype(float), []
+    cells = [(row, row.covers(loads), within(loads, row.swept) & np.isnan(row.cell)) for row in measured.rows]
     for index in np.ndindex(classes.shape[:-1]):
         at = {name: dataset[name].values[k] for name, k in zip(names, index, strict=True)}
-        rows = [row for row in measured.rows if all(at[name] == value for name, value in row.at.items())]
-        if rows:
+        told = [one for one in cells if all(at[name] == value for name, value in one[0].at.items())]
+        if told:
             level = levels(classes[index])
-            line = _of_onsets(measured.kind, rows, loads, level, factor)
+            line = _of_onsets(measured.kind, [row for row, *_ in told], loads, level, factor)
             if measured.kind != ONSET:
-                of_cells = _of_cells(rows, loads, level, frequency[index], amplitude[index])
+                of_cells = _of_cells(told, level, frequency[index], amplitude[index])
                 line = of_cells._replace(onset=line.onset, standard=line.standard)
             lines.append(([value_text(dataset[name], k) for name, k in zip(names, index, strict=True)], line))
     return Score(measured, unit, names, lines)
 
 
-def _of_cells(rows: Sequence[Row], loads: Array, level: Array, frequency: Array, amplitude: Array) -> Line:
-    """Agreement of the cells of a line (n,) with windows or peaks."""
-    noise, known = np.zeros((2, loads.size), bool)
-    errors, ratios = np.full((2, loads.size), np.inf)
-    for row in rows:
-        inside = row.covers(loads)
+def _of_cells(
+    rows: Sequence[tuple[Row, Cells, Cells]], level: Array, frequency: Array, amplitude: Array
+) -> Line:
+    """Agreement of a line (n,) with windows or peaks, each with its cells of noise, and of its range."""
+    noise, known = np.zeros((2, level.size), bool)
+    errors, ratios = np.full((2, level.size), np.inf)
+    for row, inside, swept in rows:
         noise |= inside
-        known |= inside | (within(loads, row.swept) & np.isnan(row.cell))  # of a window
+        known |= inside | swept
         if row.frequency:
             beyond = np.maximum(np.maximum(row.frequency[0] - frequency, frequency - row.frequency[1]), 0.0)
             errors[inside] = np.fmin(errors, beyond)[inside]
