@@ -32,14 +32,9 @@ NOT_MODELLED = "not modelled: the casing, and the sound that it radiates"
 
 
 class Loop(NamedTuple):
-    """What can be played again and again.
+    """What can be played again and again: (n,) values, of which the first follows the last, in a length [s].
 
-    Attributes
-    ----------
-    values : (n,) array
-        In the signal's unit; the first sample follows the last one.
-    length, periods : float, int
-        [s], and periods within it; 0 of a signal that has none.
+    `periods` are those within it; 0 of a signal that has none.
     """
 
     values: Array
@@ -54,16 +49,14 @@ def export(
 
     Parameters
     ----------
-    history : Dataset
-        As `simulate` returns it.
+    history, source
+        As of `read_signal`.
     of : sequence of str
         Signals, as of `read_signal`. By default t1 as WAV, all of them otherwise.
     out : Path
         FILE.wav: one signal, its judged part as a loop of whole periods, or all of a ramp, at AUDIO_RATE with
         its peak at -3 dBFS; FILE.txt beside it has the scale. FILE.csv: a column for each. FILE.uff: a
         data set 58 for each, in SI units.
-    source : str
-        Where the history is from, for the errors.
     velocity : bool
         As WAV the velocity of a displacement.
 

@@ -78,14 +78,10 @@ class Side(NamedTuple):
     ----------
     name : str
         The axis or quantity along it.
-    edges : array, shape (cell + 1,)
-        Borders of its cells, in the units that are drawn; of a side without cells its ends.
-    factor : float
-        From SI to these units.
-    values : array, shape (cell,)
-        Values of the cells [SI]; empty of a side without cells.
-    sign : float
-        Sign of all values of a logarithmic side; 0 of a linear one.
+    edges, factor : (cell + 1,) array, float
+        Borders of its cells, or its ends, in the units that are drawn; from SI to these.
+    values, sign : (cell,) array, float
+        Values of the cells [SI], if it has any; sign of those of a logarithmic side, 0 of a linear one.
     """
 
     name: str
@@ -112,27 +108,21 @@ class Side(NamedTuple):
 
 
 class Row(NamedTuple):
-    """A row of a measured file.
+    """A row of a measured file, in SI units.
 
     Attributes
     ----------
     at : dict
-        By axis of the study the value of the cell in which the measured one lies [SI].
-    span : (float, float)
-        Between which values of the axis `along` noise was measured [SI]: the same twice of onset and peak,
-        not numbers where the row states silence alone.
+        By axis of the study the value of the cell in which the measured one lies.
+    span, swept : (float, float)
+        Between which values of the axis `along` noise was measured, the same twice of onset and peak, nan
+        where the row states silence alone; and the measured range, infinite where it is not stated.
     cell : float
-        Value of the cell of an onset or a peak [SI]; not a number of a window, or of a run.
-    frequency : (float, float) or None
-        Between which frequencies [Hz].
-    amplitude : float
-        [m]; not a number where it was not measured.
-    swept : (float, float)
-        Measured range of the axis [SI], infinite where it is not stated.
-    rising : bool
-        Whether the axis rose as noise set in.
-    deviation : float
-        Standard deviation of the ends of the span [SI], as far as it is stated.
+        Value of the cell of an onset or a peak; nan of a window, or of a run.
+    frequency, amplitude : (float, float) or None, float
+        Between which frequencies, and how large; None and nan where that was not measured.
+    rising, deviation : bool, float
+        Whether the axis rose as noise set in; standard deviation of the ends of the span.
     """
 
     at: dict[str, float]
@@ -368,14 +358,12 @@ class Overlay:
     path : str, Path, Measured or None
         The measured file, or what was read of it; without one nothing is drawn.
     dataset, source
-        As `read_measured` takes them, whole.
+        As of `read_measured`.
 
     Attributes
     ----------
-    height : float
-        Height that a legend of its own takes [inch].
-    note : str
-        Line of the title, which names the file.
+    height, note : float, str
+        Height that a legend of its own takes [inch]; line of the title, which names the file.
     """
 
     def __init__(
@@ -419,7 +407,8 @@ class Overlay:
                 box.append(side.edges[cell : cell + 2])
             else:
                 box.append(side.edges[[0, -1]])
-        return [one for one in box if one is not None] if all(one is not None for one in box) else []
+        found = [one for one in box if one is not None]
+        return found if len(found) == len(box) else []
 
     def _draw_row(self, axes: Axes, row: Row, sides: tuple[Side, Side]) -> None:
         _, kind, along, _ = self._measured

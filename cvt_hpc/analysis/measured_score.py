@@ -45,12 +45,10 @@ class Line(NamedTuple):
     ----------
     hits, misses, false_alarms, silences, neither : int
         Cells of the measured range, `neither` those not known to vibrate or to be quiet; or onsets.
-    frequency : tuple of float
-        Distances of the frequencies of hits from the measured ones, or from their band [Hz].
+    frequency, amplitude : tuple of float
+        Of hits: distances from measured frequencies, or their band [Hz], and ratios to measured amplitudes.
     onset, standard : tuple of float
         Distances of paired onsets and their standard errors, in the unit in which the axis is shown.
-    amplitude : tuple of float
-        Amplitudes of hits over the measured ones [1].
     """
 
     hits: int = 0
@@ -74,13 +72,10 @@ class Score(NamedTuple):
 
     Attributes
     ----------
-    measured : Measured
-    unit : str
-        In which the axis of the windows, onsets or peaks is shown.
-    names : list of str
-        The other axes of the study.
-    lines : list of (list of str, Line)
-        Values on these axes in words, and the agreement, of each line of which anything was measured.
+    measured, unit : Measured, str
+        The file, and the unit in which its axis is shown.
+    names, lines : list of str, list of (list of str, Line)
+        The other axes; their values in words, and the agreement, of each line where anything was measured.
     """
 
     measured: Measured

@@ -132,20 +132,17 @@ def orders_figure(
 
     Parameters
     ----------
-    histories : sequence of Dataset
-        As `simulate` returns them.
+    histories, sources : sequences of Dataset and str
+        As `simulate` returns them; for errors, and for titles where their axes do not tell them apart.
     of : str
         Signal, as of `read_signal`.
-    sources : sequence of str, optional
-        Where the runs are from, for errors, and for titles where their axes do not tell them apart.
     orders : sequence of float or str, optional
         As of `read_orders`; by default those of DEFAULT that the run tells.
     bandwidth : float
         In orders, in which power is summed; windows have LINES / bandwidth turns.
-    velocity : bool
-        Of a displacement: its velocity, 2 pi f times the amplitude at the frequency f of the order.
-    level : bool
-        Levels of the rms [dB] in the place of amplitudes.
+    velocity, level : bool
+        Of a displacement its velocity, 2 pi f times the amplitude at the frequency f of the order; levels of
+        the rms [dB] in the place of amplitudes.
 
     Raises
     ------

@@ -101,13 +101,11 @@ def read_signal(history: xr.Dataset, of: str, source: str = "history", *, veloci
 
     Parameters
     ----------
-    history : Dataset
-        As `simulate` returns it.
+    history, source : Dataset, str
+        As `simulate` returns it, and where it is from, for the errors.
     of : str
         A probe, as "t1 1/2"; a strand, for the probe of it that moves most in the judged part; a variable
         over time; or one of SHAFT_FORCES [N]: y from the driving to the driven shaft, z across, t2's side.
-    source : str
-        Where the history is from, for the errors.
     velocity : bool
         Whether it has to be a displacement, as its velocity is wanted.
 
@@ -248,12 +246,10 @@ def third_octaves_figure(
 
     Parameters
     ----------
-    histories : sequence of Dataset
-        As `simulate` returns them.
+    histories, sources : sequences of Dataset and str
+        As `simulate` returns them, and where they are from, for errors and for the legend.
     quantities : sequence of str
         Signals, as of `read_signal`.
-    sources : sequence of str, optional
-        Where the runs are from, for errors and for the legend.
     velocity : bool
         Of displacements: levels of their velocities.
 

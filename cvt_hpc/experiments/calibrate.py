@@ -173,10 +173,8 @@ def load(
 
     Parameters
     ----------
-    path, overrides
-        As `load_job` takes them.
-    measured : str
-        A file as `analysis.measured.read_measured` takes it.
+    path, overrides, measured
+        As `load_job` and `analysis.measured.read_measured` take them.
     doubt, scatter : str, optional
         Share of cells that may be judged otherwise; standard error of frequencies with its unit.
 
@@ -232,10 +230,7 @@ def plan_lines(asked: Calibration, out: Path) -> Iterator[str]:
 def make(asked: Calibration, out: Path, *, fresh: bool, tell: Tell) -> Outcome:
     """Do the runs, weigh the samples, and write tables and picture; see `experiment_kinds`.
 
-    Raises
-    ------
-    InputError
-        If a folder holds another job, the measured file does not fit, or the system refuses a file.
+    InputError if a folder holds another job, the measured file does not fit, or the system refuses a file.
     """
     status = run_sweeps(asked.rungs, {}, out, fresh=fresh, tell=tell)
     if status >= STALLED or process_rank() != 0:

@@ -67,14 +67,10 @@ class Fitted(NamedTuple):
 
     Attributes
     ----------
-    law : Law
-        Which one.
-    estimate, covariance : (k,) and (k, k) arrays
-        Of x [SI]; the logarithm of a speed.
-    rms : float
-        Root mean square of the residuals of the best fit to all points [1].
-    independent : float
-        n_e / n of these.
+    law, estimate, covariance : Law, (k,) and (k, k) arrays
+        Which one, and of x [SI], which has the logarithm of a speed.
+    rms, independent : float
+        Root mean square of the residuals of the best fit to all points [1], and n_e / n of these.
     of_specimens : int
         Specimens whose scatter the covariance is; 0: it is the uncertainty of the mean law.
     criterion : float
@@ -202,6 +198,7 @@ def fit_law(law: Law, points: Points) -> Fitted | None:
     variance = square / max(n - k / share, 1.0)
     covariance: Any = variance * np.linalg.inv(slopes.T @ slopes) / share
     parts = [points.specimen == one for one in np.unique(points.specimen)]
+    parts = parts if len(parts) >= LEAST_SPECIMENS else []
     own = [one for part in parts if (one := _least(law, speed[part], mu[part])) is not None]
     is_scatter = len(own) >= LEAST_SPECIMENS and bool((np.ptp(own, axis=0) > 0.0).all())
     if is_scatter:
