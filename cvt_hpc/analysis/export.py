@@ -134,7 +134,7 @@ def loop_of(signal: Signal, band: tuple[float, float]) -> Loop:
 def _write_sound(history: xr.Dataset, signal: Signal, out: Path, source: str, velocity: bool) -> list[str]:
     """Write a WAV of 16 bits, and a text beside it with the lines that are returned."""
     from scipy.io import wavfile
-    from scipy.signal import resample
+    from scipy.signal import resample, windows
 
     text = out.with_suffix(".txt")
     _check_own(text)
@@ -146,8 +146,7 @@ def _write_sound(history: xr.Dataset, signal: Signal, out: Path, source: str, ve
         what += f", {loop.periods} periods each" if loop.periods else ""
     else:
         moved = signal._replace(judged=int(np.searchsorted(signal.times, start_up(history)))).vibration
-        ends = np.minimum(np.arange(moved.size) / (FADE * signal.rate), 1.0)
-        faded = moved * (0.5 - 0.5 * np.cos(np.pi * np.minimum(ends, ends[::-1])))
+        faded = moved * windows.tukey(moved.size, 2.0 * FADE * signal.rate / (moved.size - 1))
         loop = Loop(faded, moved.size / signal.rate, 0)
         times, what = 1, f"the whole ramp, {loop.length:.6g} s"
     if np.ptp(loop.values) <= ROUNDING * np.abs(signal.values).max():

@@ -5,7 +5,7 @@ An order is a multiple of the turns of the driving pulley, of the driven one, or
 
 import math
 from collections.abc import Iterable, Mapping, Sequence
-from typing import Any, NamedTuple
+from typing import Any
 
 import numpy as np
 import xarray as xr
@@ -28,6 +28,7 @@ Array = NDArray[np.float64]
 # Turns of a pulley (n,) [Hz], how many orders of them one order is, a number or (n,), and by which share this
 # may be off
 Turning = tuple[Array, Any, float]
+Order = tuple[float, str]  # the multiple, and of what: "driving" or "driven" pulley, passing "elements"
 
 BANDWIDTH = 1.0  # orders, in which power is summed
 LINES = 8  # of a window in this bandwidth: a sine in the middle is 4 lines off the edges
@@ -39,20 +40,10 @@ UNKNOWN = {
 }
 
 
-class Order(NamedTuple):
-    """A multiple of the turns `of` the "driving" or "driven" pulley, or of passing "elements"."""
-
-    number: float
-    of: str
-
-    @property
-    def words(self) -> str:
-        """For a legend."""
-        return f"{self.number:g}× {self.of}".removesuffix(" driving")
-
-
-def read_orders(given: Iterable[float | str], bandwidth: float) -> list[Order]:
+def read_orders(given: Iterable[float | str], bandwidth: float) -> dict[str, Order]:
     """Read orders such as 8 or "8", of the driving pulley, "driven:2" and "elements:1"; none: the default.
+
+    They are returned by their names for a legend.
 
     Raises
     ------
@@ -61,19 +52,19 @@ def read_orders(given: Iterable[float | str], bandwidth: float) -> list[Order]:
     """
     if not 0.0 < bandwidth < math.inf:
         raise mismatch("bandwidth", "a bandwidth in orders, above 0", f"{bandwidth:g}")
-    given, found = list(given), []
+    given, found = list(given), {}
     if not given and bandwidth > max(ORDERS):
         expected = f"at most {max(ORDERS):g}, the largest of the default orders, or orders beside it"
         raise mismatch("bandwidth", expected, f"{bandwidth:g}")
     for text in map(str, given or DEFAULT):
         of, _, number = text.rpartition(":")
         try:
-            order = Order(float(number), of or "driving")
+            order = float(number), of or "driving"
         except ValueError:
-            order = Order(math.nan, of)
-        least = 1.0 if order.of == "elements" else bandwidth
-        if order.of in ("driving", *UNKNOWN) and least <= order.number < math.inf:
-            found.append(order)
+            order = math.nan, of
+        least = 1.0 if of == "elements" else bandwidth
+        if order[1] in ("driving", *UNKNOWN) and least <= order[0] < math.inf:
+            found[f"{order[0]:g}× {order[1]}".removesuffix(" driving")] = order
         elif given:
             expected = f"orders of the bandwidth, {bandwidth:g}, or more, as 8, driven:2 or elements:1"
             raise mismatch("orders", expected, text)
@@ -160,9 +151,9 @@ def orders_figure(
         known, (course, x_label) = _turning_along(history, source), course_of(history)
         first, lines = int(np.searchsorted(signal.times, start_up(history))), {}
         times, values = signal.times[first:], signal.values[first:]
-        for order in _told(wanted, known, bool(orders), source, notes):
+        for words, order in _told(wanted, known, bool(orders), source, notes).items():
             low, high = _band(order, known, bandwidth)
-            rate = np.interp(times, history["time"].values, known[order.of][0])
+            rate = np.interp(times, history["time"].values, known[order[1]][0])
             turned = np.append(0.0, np.cumsum(0.5 * (rate[1:] + rate[:-1])) / signal.rate)
             if not turned[-1] >= length:
                 expected = f"{length:g} turns or more after the start-up"
@@ -174,7 +165,7 @@ def orders_figure(
             middles, amplitude = track(values, turned, (low, high), length)
             amplitude[high * rate[middles] > 0.5 * signal.rate] = np.nan
             at = np.interp(times[middles], history["time"].values, course)
-            lines[order.words] = at, amplitude, 0.5 * (low + high) * rate[middles]
+            lines[words] = at, amplitude, 0.5 * (low + high) * rate[middles]
         _draw(axes, lines, signal.unit, velocity, level, notes)
         axes.set(xlabel=x_label)
         axes.set_title(", ".join(label.values()), loc="left")
@@ -213,11 +204,11 @@ def order_cuts_figure(
     figure, panels = time_signals.in_a_column(len(strands), source, "", sharex=True, sharey=True)
     for axes, strand in zip(panels, strands, strict=True):
         spectra, lines = shown["spectrum"].sel(strand=strand).transpose("driving_speed", ...).values, {}
-        for order in _told(wanted, known, bool(orders), source, notes):
-            (low, high), rate = _band(order, known, bandwidth), known[order.of][0]
+        for words, order in _told(wanted, known, bool(orders), source, notes).items():
+            (low, high), rate = _band(order, known, bandwidth), known[order[1]][0]
             bands = np.broadcast_arrays(low * rate, high * rate)
             amplitude = [_largest(bins, *of_run) for of_run in zip(spectra, *bands, strict=True)]
-            lines[order.words] = x.centres, np.array(amplitude), 0.5 * (low + high) * rate
+            lines[words] = x.centres, np.array(amplitude), 0.5 * (low + high) * rate
         _draw(axes, lines, str(dataset["spectrum"].attrs.get("units", "m")), velocity, level, notes)
         axes.set_title(f"strand {strand}", loc="left")
     panels[-1].set_xlabel(x.label)
@@ -234,9 +225,9 @@ def _in_words(bandwidth: float) -> str:
 
 def _band(order: Order, known: Mapping[str, Turning], bandwidth: float) -> tuple[Any, Any]:
     """Lowest and highest multiple of the turns of a pulley in the band of an order."""
-    _, each, slip = known[order.of]
-    half = np.maximum(0.5 * bandwidth, slip * order.number * each)
-    return order.number * each - half, order.number * each + half
+    _, each, slip = known[order[1]]
+    half = np.maximum(0.5 * bandwidth, slip * order[0] * each)
+    return order[0] * each - half, order[0] * each + half
 
 
 def _largest(bins: Array, spectrum: Array, low: float, high: float) -> float:
@@ -276,14 +267,14 @@ def _turning_over(shown: xr.Dataset) -> dict[str, Turning]:
 
 
 def _told(
-    wanted: Sequence[Order], known: Mapping[str, Turning], must: bool, source: str, notes: dict[str, str]
-) -> list[Order]:
+    wanted: dict[str, Order], known: Mapping[str, Turning], must: bool, source: str, notes: dict[str, str]
+) -> dict[str, Order]:
     """Orders that are known; why others are not goes to the notes, or is an error where they `must` be."""
-    for of in dict.fromkeys(order.of for order in wanted if order.of not in known):
+    for of in dict.fromkeys(of for _, of in wanted.values() if of not in known):
         if must:
             raise mismatch(f"{source}: orders of {of}", "what they are multiples of", f"none: {UNKNOWN[of]}")
         notes[of] = f"no orders of {of}: {UNKNOWN[of]}"
-    return [order for order in wanted if order.of in known]
+    return {words: order for words, order in wanted.items() if order[1] in known}
 
 
 def _draw(
