@@ -386,7 +386,7 @@ def _figure(found: Posterior) -> Figure:
         factor, unit = coordinate_unit(found.dataset[one.key].attrs)
         bins = np.linspace(factor * values.min(), factor * values.max(), 13)
         axes.hist(factor * values, bins, density=True, color="0.8", label="before")
-        after = {"color": COLOURS[0], "lw": 1.6, "histtype": "step", "label": "after"}
+        after = {"color": COLOURS[1], "lw": 1.6, "histtype": "step", "label": "after"}
         axes.hist(factor * values, bins, weights=found.weights, density=True, **after)
         axes.set(xlabel=axis_label(found.dataset[one.key], unit), yticks=[])
     for axes in panels.flat[count:]:
@@ -398,24 +398,21 @@ def _figure(found: Posterior) -> Figure:
 
 
 def _draw_probability(axes: Axes, found: Posterior) -> None:
-    along = found.dataset[found.measured.along]
-    factor, unit = coordinate_unit(along.attrs)
-    even = np.full_like(found.weights, 1.0 / found.weights.size)
-    for one, told, look in (
-        (found._replace(weights=even), "before", {"color": "0.5", "ls": "--"}),
-        (found, "after", {"color": COLOURS[0]}),
-    ):
-        shown = one.probability().transpose(found.measured.along, ...)
-        lines = axes.plot(
-            factor * along.values, shown.values.reshape(along.size, -1), marker=".", lw=1.4, **look
-        )
+    name = found.measured.along
+    dataset, even = found.dataset.sortby(name), np.full_like(found.weights, 1.0 / found.weights.size)
+    factor, unit = coordinate_unit(dataset[name].attrs)
+    looks = {"before": (even, "0.5", "--"), "after": (found.weights, COLOURS[1], "-")}
+    for told, (weights, colour, style) in looks.items():
+        one = found._replace(dataset=dataset, weights=weights)
+        shown = one.probability().transpose(name, ...)
+        values = shown.values.reshape(shown.sizes[name], -1)
+        lines = axes.plot(factor * dataset[name].values, values, marker=".", lw=1.4, color=colour, ls=style)
         lines[0].set_label(told)
-    axes.set(xlabel=axis_label(along, unit), ylabel="probability of vibration", ylim=(-0.03, 1.03))
-    over = Overlay(found.measured, found.dataset)
-    over.draw(
-        axes, side_of(found.dataset, found.measured.along), Side("", np.array(axes.get_ylim())), xr.Dataset()
-    )
+    axes.set(xlabel=axis_label(dataset[name], unit), ylabel="probability of vibration", ylim=(-0.03, 1.03))
+    over, height = Overlay(found.measured, dataset), Side("", np.array(axes.get_ylim()))
+    over.draw(axes, side_of(dataset, name), height, xr.Dataset())
     others = [str(name) for name in shown.dims[1:]]
     title = f"a line for each {', '.join(others).replace('_', ' ')}" if others else None
     handles = [line for line in axes.get_lines() if not line.get_label().startswith("_")]
-    axes.legend(handles=[*handles, *over.handles], frameon=False, fontsize=8, title=title, title_fontsize=8)
+    beside = {"loc": "center left", "bbox_to_anchor": (1.0, 0.5), "title": title, "title_fontsize": 8}
+    axes.legend(handles=[*handles, *over.handles], frameon=False, fontsize=8, **beside)
