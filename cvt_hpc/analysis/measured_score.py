@@ -116,8 +116,10 @@ def score(dataset: xr.Dataset, path: str | Path, source: str = "results") -> Sco
     factor, unit = coordinate_unit(dataset[along].attrs)
     loads, lines = dataset[along].values.astype(float), []
     cells = [(row, row.covers(loads), within(loads, row.swept) & np.isnan(row.cell)) for row in measured.rows]
+    axes = {name: dataset[name].values for name in names}
+    texts = [[value_text(dataset[name], k) for k in range(dataset.sizes[name])] for name in names]
     for index in np.ndindex(classes.shape[:-1]):
-        at = {name: dataset[name].values[k] for name, k in zip(names, index, strict=True)}
+        at = {name: axes[name][k] for name, k in zip(names, index, strict=True)}
         told = [one for one in cells if all(at[name] == value for name, value in one[0].at.items())]
         if told:
             level = levels(classes[index])
@@ -125,7 +127,7 @@ def score(dataset: xr.Dataset, path: str | Path, source: str = "results") -> Sco
             if measured.kind != ONSET:
                 of_cells = _of_cells(told, level, frequency[index], amplitude[index])
                 line = of_cells._replace(onset=line.onset, standard=line.standard)
-            lines.append(([value_text(dataset[name], k) for name, k in zip(names, index, strict=True)], line))
+            lines.append(([text[k] for text, k in zip(texts, index, strict=True)], line))
     return Score(measured, unit, names, lines)
 
 
@@ -165,9 +167,9 @@ def _of_onsets(kind: str, rows: Sequence[Row], loads: Array, level: Array, facto
     if kind == ONSET:
         true = [(row.span[0], row.deviation, row.rising) for row in rows]
     ways = {WINDOW: {True, False}, ONSET: {row.rising for row in rows}, PEAK: set()}[kind]
-    decided, errors, alone = loads[np.isfinite(level)], [], 0
+    decided, computed, errors, alone = loads[np.isfinite(level)], onsets(loads, level), [], 0
     for rising in ways:
-        places = np.array([one.load for one in onsets(loads, level) if one.rising == rising])
+        places = np.array([one.load for one in computed if one.rising == rising])
         others = np.array([one[:2] for one in true if one[2] == rising]).reshape(-1, 2)
         above = np.searchsorted(decided, places)
         distance = np.abs(np.subtract.outer(places, others[:, 0]))

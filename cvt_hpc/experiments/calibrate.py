@@ -254,7 +254,7 @@ def weigh(asked: Calibration, dataset: xr.Dataset) -> Posterior:
     if not sum(agreement.total[:4]):
         raise mismatch(f"{asked.measured}", "cells in its range of which a run is decided", "none")
     place = agreement.names.index(SAMPLE)
-    own: list[list[Line]] = [[] for _ in dataset[SAMPLE]]
+    own: list[list[Line]] = [[] for _ in range(dataset.sizes[SAMPLE])]
     for at, line in agreement.lines:
         own[int(at[place])].append(line)
     lines = [joined(one) for one in own]

@@ -85,6 +85,7 @@ def measured_windows(hidden, rng):
     return "\n".join([f"{WINDOW},{FREQUENCIES}", *rows, f"20,20,{end}", ""])
 
 
+@pytest.mark.slow
 def test_hidden_variators_lie_in_bands_and_in_what_is_written_as_often_as_these_say(study, tmp_path):
     """Of two parameters on which the noise depends, by central shares of the distribution for a next job."""
     rng, inside, widths, shares = np.random.default_rng(3), [], [], []
