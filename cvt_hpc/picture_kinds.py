@@ -252,7 +252,7 @@ KINDS = {
     ),
     "third_octaves": Kind(
         HISTORIES,
-        "levels.third_octaves_figure",
+        "time_signals.third_octaves_figure",
         "RMS levels of the judged part in third octaves, in dB re 1 um, 1 mm/s or the unit",
         (
             Option(

@@ -12,8 +12,7 @@ from matplotlib.figure import Figure
 
 from cvt_hpc.analysis.arrangement import CHOSEN, Sides, along_x, arrange, ruler
 from cvt_hpc.analysis.figures import WIDTH, axis_label, entitle, headline
-from cvt_hpc.analysis.measured import FREQUENCY, Side, side_of
-from cvt_hpc.analysis.measured_drawing import Overlay, put_legend
+from cvt_hpc.analysis.measured import FREQUENCY, Overlay, Side, put_legend, side_of
 from cvt_hpc.variator import STRANDS
 from cvt_hpc.variator.band import MODES, strand_frequencies
 

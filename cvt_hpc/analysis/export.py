@@ -12,11 +12,10 @@ import xarray as xr
 from numpy.typing import NDArray
 
 from cvt_hpc.analysis.histories import settings_of
-from cvt_hpc.analysis.levels import check_velocity, shown_in
 from cvt_hpc.analysis.ramps import changing_of, start_up
-from cvt_hpc.analysis.time_signals import Signal, known_signals, read_signal
+from cvt_hpc.analysis.time_signals import Signal, known_signals, read_signal, shown_in
 from cvt_hpc.errors import InputError, mismatch
-from cvt_hpc.storage.files import write_rows, written_aside
+from cvt_hpc.storage.files import naming_refusals, read_regular, write_rows, written_aside
 from cvt_hpc.storage.provenance import origin_lines
 from cvt_hpc.vibration.peaks import fundamental
 
@@ -29,19 +28,13 @@ LEAST_SOUND = 5.0  # [s]: a loop is repeated until it lasts so long
 ROUNDING = 1e-13  # of a signal, which moves no more than that by rounding alone
 FADE = 0.01  # [s]: over this time, in whole periods, the end of a loop goes over into its beginning
 KINDS = {"m": 8, "N": 13}  # specific data types of UFF58: displacement, excitation force; else unknown
+NOT_MODELLED = "not modelled: the casing, and the sound that it radiates"
 
 
 class Loop(NamedTuple):
-    """What can be played again and again.
+    """What can be played again and again: (n,) values, of which the first follows the last, in a length [s].
 
-    Attributes
-    ----------
-    values : (n,) array
-        In the signal's unit; the first sample follows the last one.
-    length : float
-        [s]
-    periods : int
-        Within it; 0 of a signal that has none.
+    `periods` are those within it; 0 of a signal that has none.
     """
 
     values: Array
@@ -50,27 +43,20 @@ class Loop(NamedTuple):
 
 
 def export(
-    history: xr.Dataset,
-    of: Sequence[str],
-    out: Path,
-    source: str = "history",
-    *,
-    velocity: bool = False,
+    history: xr.Dataset, of: Sequence[str], out: Path, source: str = "history", *, velocity: bool = False
 ) -> list[str]:
     """Write signals of a run in the format that the suffix names; return lines about what was written.
 
     Parameters
     ----------
-    history : Dataset
-        As `simulate` returns it.
+    history, source
+        As of `read_signal`.
     of : sequence of str
         Signals, as of `read_signal`. By default t1 as WAV, all of them otherwise.
     out : Path
         FILE.wav: one signal, its judged part as a loop of whole periods, or all of a ramp, at AUDIO_RATE with
         its peak at -3 dBFS; FILE.txt beside it has the scale. FILE.csv: a column for each. FILE.uff: a
         data set 58 for each, in SI units.
-    source : str
-        Where the history is from, for the errors.
     velocity : bool
         As WAV the velocity of a displacement.
 
@@ -78,7 +64,7 @@ def export(
     ------
     InputError
         As of `read_signal`; another suffix; more than one signal as WAV; signals at unlike times; `pyuff` is
-        missing; or the system refuses.
+        missing; FILE.txt is of somebody else; or the system refuses.
     """
     out, suffix = Path(out), Path(out).suffix.lower()
     if suffix not in FORMATS:
@@ -86,7 +72,7 @@ def export(
     if suffix == ".wav":
         if len(of) > 1:
             raise mismatch(str(out), "one signal, which a sound has", str(len(of)))
-        signal = read_signal(history, (*of, "t1")[0], source)
+        signal = read_signal(history, (*of, "t1")[0], source, velocity=velocity)
         return _write_sound(history, signal, out, source, velocity)
     if velocity:
         raise mismatch(str(out), "velocities as .wav alone", suffix)
@@ -121,13 +107,11 @@ def loop_of(signal: Signal, band: tuple[float, float]) -> Loop:
     """Make a loop of the end of a run: whole periods of the fundamental that `band` [Hz] holds.
 
     In its last periods it goes over, by a raised cosine, into what came before its beginning, so that value
-    and slope are continuous at the seam whatever else the signal has. The periods before are needed for it.
-
-    Raises
-    ------
-    InputError
-        The judged part is shorter than that.
+    and slope are continuous at the seam whatever else the signal has. The periods before are needed for it;
+    InputError if the judged part is shorter than that.
     """
+    from scipy.interpolate import CubicSpline
+
     part, rate = signal.vibration, signal.rate
     frequency, _ = fundamental(part, rate, band)
     has_period = bool(np.isfinite(frequency))
@@ -135,11 +119,8 @@ def loop_of(signal: Signal, band: tuple[float, float]) -> Loop:
     fade = int(np.ceil(FADE * frequency))
     periods = int((part.size - 1) / rate * frequency) - fade
     if periods < fade:
-        raise mismatch(
-            signal.name, f"a judged part of {2.0 * fade / frequency:.3g} s or more", "a shorter one"
-        )
-    from scipy.interpolate import CubicSpline
-
+        expected = f"a judged part of {2.0 * fade / frequency:.3g} s or more"
+        raise mismatch(signal.name, expected, "a shorter one")
     length, over = periods / frequency, fade / frequency
     course = CubicSpline(np.arange(part.size) / rate, part)
     begin = (part.size - 1) / rate - length
@@ -153,23 +134,20 @@ def loop_of(signal: Signal, band: tuple[float, float]) -> Loop:
 def _write_sound(history: xr.Dataset, signal: Signal, out: Path, source: str, velocity: bool) -> list[str]:
     """Write a WAV of 16 bits, and a text beside it with the lines that are returned."""
     from scipy.io import wavfile
-    from scipy.signal import resample
+    from scipy.signal import resample, windows
 
-    if velocity:
-        check_velocity(signal, source)
+    text = out.with_suffix(".txt")
+    _check_own(text)
     if changing_of(history) is None:
         low, high = settings_of(history)[1]
         loop = loop_of(signal, (low, min(high, 0.5 * signal.rate)))
         times = int(np.ceil(LEAST_SOUND / loop.length))
-        what = f"{times} times {loop.length:.6g} s" + (
-            f", {loop.periods} periods each" if loop.periods else ""
-        )
+        what = f"{times} times {loop.length:.6g} s"
+        what += f", {loop.periods} periods each" if loop.periods else ""
     else:
         moved = signal._replace(judged=int(np.searchsorted(signal.times, start_up(history)))).vibration
-        ends = np.minimum(np.arange(moved.size) / (FADE * signal.rate), 1.0)
-        loop = Loop(
-            moved * (0.5 - 0.5 * np.cos(np.pi * np.minimum(ends, ends[::-1]))), moved.size / signal.rate, 0
-        )
+        faded = moved * windows.tukey(moved.size, 2.0 * FADE * signal.rate / (moved.size - 1))
+        loop = Loop(faded, moved.size / signal.rate, 0)
         times, what = 1, f"the whole ramp, {loop.length:.6g} s"
     if np.ptp(loop.values) <= ROUNDING * np.abs(signal.values).max():
         raise mismatch(f"{source}: {signal.name}", "a signal that changes", "a constant one")
@@ -188,13 +166,21 @@ def _write_sound(history: xr.Dataset, signal: Signal, out: Path, source: str, ve
     lines = [
         f"sound: {out}: {'velocity of ' * velocity}{signal.words}, {what}, {AUDIO_RATE} Hz",
         f"full scale: {full:.6g} {name}; peak {PEAK * full:.6g} {name}, at -3 dBFS",
-        "not modelled: the casing, and the sound that it radiates",
+        NOT_MODELLED,
     ]
-    with written_aside(out.with_suffix(".txt")) as aside:
-        aside.write_text(
-            "".join([*origin_lines(history.attrs), *(f"{line}\n" for line in lines)]), encoding="utf-8"
-        )
-    return lines
+    with written_aside(text) as aside:
+        written = "".join([*origin_lines(history.attrs), *(f"{line}\n" for line in lines)])
+        aside.write_text(written, encoding="utf-8")
+    return [*lines, f"text: {text}"]
+
+
+def _check_own(text: Path) -> None:
+    """Raise InputError if another file stands where the text of a sound goes."""
+    expected = "a new file, or the text of a sound written by cvt_hpc"
+    if text.exists():
+        with naming_refusals(text, expected):
+            if NOT_MODELLED.encode() not in read_regular(text, 1 << 20):
+                raise mismatch(str(text), expected, "another file")
 
 
 def _write_uff(signals: Sequence[Signal], out: Path) -> None:
@@ -204,33 +190,15 @@ def _write_uff(signals: Sequence[Signal], out: Path) -> None:
     except ImportError:
         then = '`pip install "cvt_hpc[uff]"`, or write a .csv'
         raise mismatch(str(out), "the library pyuff", "none", then) from None
-    units = pyuff.prepare_164(
-        units_code=1, units_description="SI: Meter (newton)", temp_mode=1, length=1.0, force=1.0, temp=1.0,
-        temp_offset=273.15,
-    )  # fmt: skip
-    sets = [units]
+    sets = [
+        {"type": 164, "units_code": 1, "units_description": "SI: Meter (newton)", "temp_mode": 1}
+        | {"length": 1.0, "force": 1.0, "temp": 1.0, "temp_offset": 273.15}
+    ]
     for node, signal in enumerate(signals, 1):
-        sets.append(
-            pyuff.prepare_58(
-                binary=0,
-                id1=signal.name,
-                func_type=1,
-                rsp_node=node,
-                rsp_dir=0,
-                ref_node=0,
-                ref_dir=0,
-                abscissa_spacing=1,
-                abscissa_min=signal.times[0],
-                abscissa_inc=1.0 / signal.rate,
-                abscissa_spec_data_type=17,
-                abscissa_axis_units_lab="s",
-                ordinate_spec_data_type=KINDS.get(signal.unit, 0),
-                ordinate_axis_units_lab=signal.unit,
-                orddenom_spec_data_type=0,
-                z_axis_spec_data_type=0,
-                data=signal.values,
-                x=signal.times,
-            )
-        )
+        kind = {"ordinate_spec_data_type": KINDS.get(signal.unit, 0), "ordinate_axis_units_lab": signal.unit}
+        time = {"abscissa_spacing": 1, "abscissa_spec_data_type": 17, "abscissa_axis_units_lab": "s"}
+        at = {"rsp_node": node, "rsp_dir": 0, "ref_node": 0, "ref_dir": 0, "orddenom_spec_data_type": 0}
+        of = {"id1": signal.name, "func_type": 1, "x": signal.times, "data": signal.values}
+        sets.append({"type": 58} | of | at | time | kind)
     with written_aside(out, parents=True) as aside:
         pyuff.UFF(str(aside)).write_sets(sets, "overwrite")

@@ -17,8 +17,7 @@ from cvt_hpc.analysis import arrangement as layout
 from cvt_hpc.analysis import figures
 from cvt_hpc.analysis.cells import OF_STARTS, STYLES
 from cvt_hpc.analysis.classes import OccurrenceClass, check_results
-from cvt_hpc.analysis.measured import Side, side_of
-from cvt_hpc.analysis.measured_drawing import Overlay
+from cvt_hpc.analysis.measured import Overlay, Side, side_of
 from cvt_hpc.errors import mismatch
 from cvt_hpc.variables import Status, Vibrates
 from cvt_hpc.vibration.classes import StartClass, levels, onsets

@@ -36,8 +36,7 @@ from cvt_hpc.analysis.classes import (
 from cvt_hpc.analysis.conversion import standard
 from cvt_hpc.analysis.eigenfrequencies import eigenfrequency_figure
 from cvt_hpc.analysis.hysteresis_bands import draw_onsets
-from cvt_hpc.analysis.measured import side_of
-from cvt_hpc.analysis.measured_drawing import Overlay
+from cvt_hpc.analysis.measured import Overlay, side_of
 from cvt_hpc.analysis.probability import PROBABILITY, has_samples
 from cvt_hpc.analysis.probability_drawing import probability_figure
 from cvt_hpc.analysis.scatter import is_sampled, scatter_figure

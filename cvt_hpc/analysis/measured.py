@@ -1,51 +1,74 @@
-"""Measurements of a test rig, placed among the cells of a study or on the course of a run.
+"""Measurements of a test rig, placed among the cells of a study or on the course of a run, and drawn there.
 
 A measured file is a CSV file as `read_csv` takes it, of one of three kinds, told by its columns:
 
-    window    AXIS_from, AXIS_to; optional measured_AXIS_from, measured_AXIS_to, frequency_from, frequency_to,
-              amplitude: noise between two values of an axis such as load, silence elsewhere in the measured
-              range; a row of one value twice states silence alone
-    onset     onset_AXIS; optional direction (1: AXIS rises, as without this column; -1: it falls) and the
-              measured range: where noise sets in
+    window    AXIS_from, AXIS_to; optional frequency_from, frequency_to, amplitude: noise between two values
+              of an axis such as load, silence elsewhere in the measured range; a row of one value twice
+              states silence alone
+    onset     onset_AXIS; optional direction (1: AXIS rises, as without this column; -1: it falls): where
+              noise sets in
     peak      AXIS, frequency; optional amplitude: a line of a measured spectrum
 
-Further columns have the name of an axis or a parameter, and say at which value of it a row was measured.
+Windows and onsets may have a measured range, measured_AXIS_from and measured_AXIS_to, and AXIS_deviation, the
+standard deviation of their places. Further columns have the name of an axis or a parameter, and say at which
+value of it a row was measured.
 """
 
 import json
 import math
 import re
 import warnings
-from collections.abc import Mapping
+from collections.abc import Callable, Iterable, Iterator, Mapping, Sequence
 from functools import partial
 from pathlib import Path
 from typing import Any, NamedTuple
 
 import numpy as np
 import xarray as xr
+from matplotlib.axes import Axes
+from matplotlib.figure import Figure
+from matplotlib.lines import Line2D
+from matplotlib.patches import Rectangle
+from matplotlib.patheffects import Normal, withStroke
 from numpy.typing import NDArray
 
 from cvt_hpc.analysis import arrangement as layout
 from cvt_hpc.analysis.alignment import job_held
 from cvt_hpc.analysis.classes import ALONG
-from cvt_hpc.analysis.figures import coordinate_unit
+from cvt_hpc.analysis.figures import coordinate_unit, legend_columns
 from cvt_hpc.analysis.scatter import is_sampled
 from cvt_hpc.errors import JobWarning, did_you_mean, few_of, mismatch, nearest, show
+from cvt_hpc.job import Job
 from cvt_hpc.job.csv_files import MOST_BYTES, content_of, read_csv
-from cvt_hpc.job.values import si_unit
+from cvt_hpc.job.values import shown, si_unit
 from cvt_hpc.parameters import Column, FromFile, RowError
+from cvt_hpc.variables import shortened
 
-WINDOW, ONSET, PEAK = "window", "onset", "peak"
-FREQUENCY = "frequency"
+WINDOW, ONSET, PEAK, FREQUENCY = "window", "onset", "peak", "frequency"
+_BAND, _SWEPT = ("frequency_from", "frequency_to"), ("measured_{}_from", "measured_{}_to")
+# By kind the columns that it needs, and those that it may have; {} stands for the axis
+_KINDS = {
+    WINDOW: (("{}_from", "{}_to"), (*_SWEPT, *_BAND, "amplitude", "{}_deviation")),
+    ONSET: (("onset_{}",), (*_SWEPT, "direction", "{}_deviation")),
+    PEAK: (("{}", FREQUENCY), ("amplitude",)),
+}
+_UNITS = dict.fromkeys((*_BAND, FREQUENCY), "Hz") | {"amplitude": "m", "direction": ""}  # else the axis' own
 ALIKE = 0.01  # of a parameter that does not vary: so far the measured value may be off
 _PLACE = "measured file"
 _MOST_NAMED = 8
 _LEAST = 1e-300  # stands for zero on a logarithmic side
-_BAND = (f"{FREQUENCY}_from", f"{FREQUENCY}_to")
-_POSITIVE = (*_BAND, FREQUENCY, "amplitude")
 
+INK = "#0033dd"  # of nothing that is computed; in grey, dark within a white outline
+DASHES, DOTS = (0, (6, 1.5, 1.5, 1.5)), (0, (1, 1.5))
+LONGEST_NAME = 60  # letters of the file's name in a title
+LEGEND = 0.4  # [inch]: height of a legend of its own
+_ABOVE = {"zorder": 2.6, "path_effects": [withStroke(linewidth=4.2, foreground="white"), Normal()]}
+_LOOK: dict[str, Any] = {"color": INK, "lw": 2.0, "ms": 7.0}
+_MARKS = {"x": {True: ">", False: "<"}, "y": {True: "^", False: "v"}}  # of an onset, as the axis goes
+
+Array = NDArray[np.float64]
 Span = tuple[float, float]
-Quantity = tuple[float, str]  # value that does not vary [SI], and its unit
+Fault = tuple[Sequence[str], str, NDArray[np.bool_]]  # columns, what is expected of rows, which ones differ
 
 
 class Side(NamedTuple):
@@ -55,31 +78,27 @@ class Side(NamedTuple):
     ----------
     name : str
         The axis or quantity along it.
-    edges : array, shape (cell + 1,)
-        Borders of its cells, in the units that are drawn; of a side without cells its ends.
-    factor : float
-        From SI to these units.
-    values : array, shape (cell,)
-        Values of the cells [SI]; empty of a side without cells.
-    sign : float
-        Sign of all values of a logarithmic side; 0 of a linear one.
+    edges, factor : (cell + 1,) array, float
+        Borders of its cells, or its ends, in the units that are drawn; from SI to these.
+    values, sign : (cell,) array, float
+        Values of the cells [SI], if it has any; sign of those of a logarithmic side, 0 of a linear one.
     """
 
     name: str
-    edges: NDArray[np.float64]
+    edges: Array
     factor: float = 1.0
-    values: NDArray[np.float64] = np.empty(0)
+    values: Array = np.empty(0)
     sign: float = 0.0
 
     def place(self, value: float) -> float:
         """Return the place of a value [SI]."""
-        shown = self.factor * value
-        return self.sign * math.log10(max(self.sign * shown, _LEAST)) if self.sign else shown
+        place = self.factor * value
+        return self.sign * math.log10(max(self.sign * place, _LEAST)) if self.sign else place
 
-    def span(self, low: float, high: float) -> NDArray[np.float64] | None:
+    def span(self, low: float, high: float) -> Array | None:
         """Return the places of two values [SI], within the ends; None where both lie beyond one end."""
         places, ends = np.array([self.place(low), self.place(high)]), self.edges[[0, -1]]
-        return None if places[1] < ends[0] or places[0] > ends[1] else np.clip(places, *ends)
+        return np.clip(places, *ends) if places[1] >= ends[0] and places[0] <= ends[1] else None
 
     def cell(self, value: float) -> int | None:
         """Return the cell in which a value [SI] lies, None where there is none."""
@@ -89,24 +108,21 @@ class Side(NamedTuple):
 
 
 class Row(NamedTuple):
-    """A row of a measured file.
+    """A row of a measured file, in SI units.
 
     Attributes
     ----------
     at : dict
-        By axis of the study the value of the cell in which the measured one lies [SI].
-    span : (float, float)
-        Between which values of the axis `along` noise was measured [SI]; the same twice of onset and peak.
+        By axis of the study the value of the cell in which the measured one lies.
+    span, swept : (float, float)
+        Between which values of the axis `along` noise was measured, the same twice of onset and peak, nan
+        where the row states silence alone; and the measured range, infinite where it is not stated.
     cell : float
-        Value of the cell of an onset or a peak [SI]; not a number of a window.
-    frequency : (float, float) or None
-        Between which frequencies [Hz].
-    amplitude : float
-        [m]; not a number where it was not measured.
-    swept : (float, float)
-        Measured range of the axis [SI], infinite where it is not stated.
-    rising : bool
-        Whether the axis rose as noise set in.
+        Value of the cell of an onset or a peak; nan of a window, or of a run.
+    frequency, amplitude : (float, float) or None, float
+        Between which frequencies, and how large; None and nan where that was not measured.
+    rising, deviation : bool, float
+        Whether the axis rose as noise set in; standard deviation of the ends of the span.
     """
 
     at: dict[str, float]
@@ -116,6 +132,14 @@ class Row(NamedTuple):
     amplitude: float
     swept: Span
     rising: bool
+    deviation: float
+
+    def covers(self, values: Array) -> NDArray[np.bool_]:
+        """Whether the row tells of noise at values of its axis [SI], of the shape of these."""
+        if self.span[0] < self.span[1]:
+            return within(values, self.span)
+        is_run = math.isnan(self.cell)
+        return np.isclose(values, self.span[0], ALIKE, 0.0) if is_run else values == self.cell
 
 
 class Measured(NamedTuple):
@@ -125,6 +149,12 @@ class Measured(NamedTuple):
     kind: str
     along: str
     rows: tuple[Row, ...]
+
+
+def within(values: Array, span: Span) -> NDArray[np.bool_]:
+    """Whether values lie between two others, or on them within rounding."""
+    on_ends = np.isclose(np.asarray(values)[..., None], span, 1e-9, 0.0).any(axis=-1)
+    return ((span[0] <= values) & (values <= span[1])) | on_ends
 
 
 def side_of(dataset: xr.Dataset, name: str | None) -> Side:
@@ -141,22 +171,38 @@ def side_of(dataset: xr.Dataset, name: str | None) -> Side:
     return Side(name, ruler.edges, factor, values.astype(float), sign)
 
 
-def read_measured(path: str | Path, dataset: xr.Dataset, source: str = "results") -> Measured:
-    """Read a measured file beside what was computed.
+def read_columns(
+    path: str | Path,
+    place: str,
+    columns: Mapping[str, tuple[str, ...]],
+    required: tuple[str, ...],
+    faults: Callable[[dict[str, Array]], Iterable[Fault]],
+    other_names: Mapping[str, str] | None = None,
+) -> dict[str, Array]:
+    """Read the columns (row,) of a CSV file of measurements, in SI units.
 
-    Parameters
-    ----------
-    path : str or Path
-        The file.
-    dataset : Dataset
-        Results of a study over a grid, or the history of a run.
-    source : str
-        Where it is from, for the errors.
+    `columns`, `required` and `other_names` are as of `FromFile`. InputError, as of `read_csv`, names `place`
+    and path, and the line of the first of the `faults`, of which a ValueError stands for the whole file.
+    """
 
-    Returns
-    -------
-    Measured
-        Rows at values that the study does not have are left out, with a warning.
+    def arrange(found: Mapping[str, Column]) -> dict[str, Array]:
+        values = {name: np.array(column.values) for name, column in found.items()}
+        for names, expected, wrong in faults(values):
+            if wrong.any():
+                k = int(np.argmax(wrong))
+                raise RowError(k, expected, " and ".join(f"{values[name][k]:g}" for name in names))
+        return values
+
+    return read_csv(FromFile(columns, required, (), arrange, other_names or {}), str(path), "", place)
+
+
+def read_measured(
+    path: str | Path, dataset: xr.Dataset, source: str = "results", job: Job | None = None
+) -> Measured:
+    """Read a measured file beside the results of a study over a grid, or beside the history of a run.
+
+    The job is that in the attributes of the dataset, unless it is at hand. Rows at values that these do not
+    have are left out. Of this, and of a window that holds no value of its axis that was run, a warning tells.
 
     Raises
     ------
@@ -166,68 +212,74 @@ def read_measured(path: str | Path, dataset: xr.Dataset, source: str = "results"
     if is_sampled(dataset):
         raise mismatch(source, "results over a grid, beside which measurements are drawn", "samples")
     dims = map(str, dataset["status"].dims if "status" in dataset else ())
-    axes = {
-        name: dataset[name] for name in dims if name in dataset.coords and dataset[name].dtype.kind in "iuf"
+    axes = [name for name in dims if name in dataset.coords and dataset[name].dtype.kind in "iuf"]
+    constants = {
+        key: value for key, value in _constants(dataset, job or job_held(dataset)).items() if key not in axes
     }
-    constants = {key: value for key, value in _constants(dataset).items() if key not in axes}
-    units = {name: si_unit(axis.attrs) for name, axis in axes.items()}
-    kind, along, file = _declaration(Path(path), units, {key: unit for key, (_, unit) in constants.items()})
-    columns: dict[str, Column] = read_csv(file, str(path), "", _PLACE)
+    units = {name: si_unit(dataset[name].attrs) for name in axes}
+    units |= {key: unit for key, (_, unit) in constants.items()}
+    kind, along, columns = _declaration(Path(path), units, axes)
+    required = tuple(name.format(along) for name in _KINDS[kind][0])
+    legal = {name: (unit,) for name, unit in columns.items()}
+    table = read_columns(path, _PLACE, legal, required, partial(_faults, along))
     sides = {name: side_of(dataset.coords.to_dataset().sortby(name), name) for name in axes}
-    table = {name: column.values for name, column in columns.items()}
-    count = len(next(iter(table.values())))
-    told = [{name: values[k] for name, values in table.items()} for k in range(count)]
+    told = [dict(zip(table, row, strict=True)) for row in zip(*table.values(), strict=True)]
     placed = [_row(one, kind, along, sides, constants) for one in told]
     rows = tuple(row for row in placed if row is not None)
-    if len(rows) < count:
+    if len(rows) < len(told):
         first = told[placed.index(None)]
-        at = ", ".join(f"{name} {value:g} {columns[name].unit}".rstrip() for name, value in first.items())
-        text = f"{len(rows)} of {count}; the first that it has not: {at}"
+        at = ", ".join(f"{name} {value:g} {columns[name]}".rstrip() for name, value in first.items())
+        text = f"{len(rows)} of {len(told)}; the first that it has not: {at}"
         if axes and not rows:
             raise mismatch(f"{_PLACE}: {path}", f"rows at values that {source} has", text)
         warnings.warn(f"{_PLACE}: {path}: rows at values that {source} has: {text}", JobWarning, stacklevel=2)
+    if kind == WINDOW and (side := sides.get(along)):
+        for number, row in enumerate(placed, 1):
+            if row and side.span(*row.span) is not None and not row.covers(side.values).any():
+                low, high = (shown(one, dataset[along].attrs) for one in row.span)
+                text = f"row {number}: no {along} from {low} to {high} was run in {source}, but"
+                text = f"{_PLACE}: {path}: {text} {layout.known_values(dataset[along])}"
+                warnings.warn(text, JobWarning, stacklevel=2)
     return Measured(Path(path).name, kind, along, rows)
 
 
-def _constants(dataset: xr.Dataset) -> dict[str, Quantity]:
-    """Return by name what a study, or a run, holds at one value."""
+def _constants(dataset: xr.Dataset, job: Job | None) -> dict[str, tuple[float, str]]:
+    """Return by name what a study, or a run, holds at one value [SI], and its unit."""
     told: dict[str, Any] = {}
     units: dict[str, str] = {}
-    if job := job_held(dataset):
+    if job:
         told |= {**job.parameters, **json.loads(dataset.attrs.get("point", "{}"))}
         units |= {key: parameter.unit for key, parameter in job.schema.parameters.items()}
     for name in ALONG:  # courses of a run
         if name in dataset and dataset[name].dims == ("time",):
             units[name] = si_unit(dataset[name].attrs)
             told.setdefault(name, float(dataset[name].values[-1]))
-    found = {key: (told[key], unit) for key, unit in units.items() if isinstance(told.get(key), (int, float))}
-    return found | {
-        name: (value, si_unit(dataset[name].attrs)) for name, value in fixed_values(dataset).items()
-    }
+    fixed = _fixed(dataset)
+    told, units = told | fixed, units | {name: si_unit(dataset[name].attrs) for name in fixed}
+    return {key: (told[key], unit) for key, unit in units.items() if isinstance(told.get(key), (int, float))}
 
 
-def fixed_values(dataset: xr.Dataset) -> dict[str, float]:
+def _fixed(dataset: xr.Dataset) -> dict[str, float]:
     """Return the numbers at which axes of results are fixed [SI]."""
     scalars = {str(name): values for name, values in dataset.coords.items() if not values.ndim}
     return {name: float(values) for name, values in scalars.items() if values.dtype.kind in "iuf"}
 
 
-def _declaration(path: Path, axes: dict[str, str], constants: dict[str, str]) -> tuple[str, str, FromFile]:
-    """Return kind and axis of a measured file by the words in it, and the columns that it may have.
+def _declaration(path: Path, units: dict[str, str], axes: list[str]) -> tuple[str, str, dict[str, str]]:
+    """Return kind and axis of a measured file by the words in it, and units of columns that it may have.
 
-    `axes` and `constants` are SI units by name.
+    `units` are those of axes and constants [SI].
     """
     text = content_of(path, MOST_BYTES, f"{_PLACE}: {path}", "a CSV file", ".csv").replace(b"\0", b"")
     lines = [line for line in text.decode("latin-1").splitlines() if not line.lstrip().startswith("#")]
     cells = [re.split(r"[\[(]", cell)[0].strip(' "') for cell in re.split(r"[,;\t\n]", "\n".join(lines))]
     words = list(dict.fromkeys(re.sub(r"[\s_]+", "_", cell.casefold()) for cell in cells))
-    units = axes | constants
     names = sorted(units, key=lambda name: (name not in axes, name not in ALONG))
     heads = {
-        head: (kind, name)
-        for kind, ends in ((WINDOW, ("{}_from", "{}_to")), (ONSET, ("onset_{}",)))
+        head.format(name): (kind, name)
+        for kind in (WINDOW, ONSET)
         for name in names
-        for head in (end.format(name) for end in ends)
+        for head in _KINDS[kind][0]
     }
     known = [heads[word] for word in words if word in heads]
     known += [(PEAK, name) for name in names if {name, FREQUENCY} <= {*words}]
@@ -238,47 +290,39 @@ def _declaration(path: Path, axes: dict[str, str], constants: dict[str, str]) ->
         found = few_of(list(map(show, words)), _MOST_NAMED) + next(filter(None, near), "")
         raise mismatch(f"{_PLACE}: {path}", expected, found)
     kind, along = known[0]
-    unit, swept = (units[along],), [f"measured_{along}_from", f"measured_{along}_to"]
-    required, optional = {
-        WINDOW: ((f"{along}_from", f"{along}_to"), [*swept, *_BAND, "amplitude"]),
-        ONSET: ((f"onset_{along}",), [*swept, "direction"]),
-        PEAK: ((along, FREQUENCY), ["amplitude"]),
-    }[kind]
-    of_units = {"amplitude": ("m",), "direction": ("",)} | dict.fromkeys((*_BAND, FREQUENCY), ("Hz",))
-    columns = {name: of_units.get(name, unit) for name in (*required, *optional)}
-    meant = {nearest(word, constants) for word in words}
-    columns |= {name: (units[name],) for name in names if name != along and (name in axes or name in meant)}
-    return kind, along, FromFile(columns, required, (), partial(_checked, along))
+    columns = [name.format(along) for part in _KINDS[kind] for name in part]
+    meant = {nearest(word, units) for word in words}
+    columns += [name for name in names if name != along and (name in axes or name in meant)]
+    return kind, along, {name: _UNITS.get(name, units.get(name, units[along])) for name in columns}
 
 
-def _checked(along: str, columns: Mapping[str, Column]) -> dict[str, Any]:
-    """Return the columns of a measured file; RowError or ValueError for what has no meaning."""
-    values = {name: np.array(column.values) for name, column in columns.items()}
-    faults: list[tuple[tuple[str, ...], str, NDArray[np.bool_]]]
-    faults = [((name,), f"{name} > 0", values[name] <= 0.0) for name in _POSITIVE if name in values]
+def _faults(along: str, values: dict[str, Array]) -> Iterator[Fault]:
+    """Yield what has no meaning in a measured file; ValueError of a column without its partner."""
+    for name in (*_BAND, FREQUENCY, "amplitude", f"{along}_deviation"):
+        if name in values:
+            yield (name,), f"{name} > 0", values[name] <= 0.0
     if "direction" in values:
-        is_none = np.abs(values["direction"]) != 1.0
-        faults.append((("direction",), "direction 1 (rising) or -1 (falling)", is_none))
+        expected = "direction 1 (rising) or -1 (falling)"
+        yield ("direction",), expected, np.abs(values["direction"]) != 1.0
     for name in (along, f"measured_{along}", FREQUENCY):
         pair = f"{name}_from", f"{name}_to"
         if len(there := [one for one in pair if one in values]) == 1:
             raise ValueError(f"expected columns {' and '.join(pair)}, found {there[0]} alone")
         if there:
-            faults.append((pair, f"{pair[0]} of at most {pair[1]}", values[pair[0]] > values[pair[1]]))
-    for names, expected, wrong in faults:
-        if wrong.any():
-            k = int(np.argmax(wrong))
-            raise RowError(k, expected, " and ".join(f"{values[name][k]:g}" for name in names))
-    return dict(columns)
+            yield pair, f"{pair[0]} of at most {pair[1]}", values[pair[0]] > values[pair[1]]
 
 
 def _row(
-    told: dict[str, float], kind: str, along: str, sides: dict[str, Side], constants: dict[str, Quantity]
+    told: dict[str, float],
+    kind: str,
+    along: str,
+    sides: dict[str, Side],
+    constants: dict[str, tuple[float, str]],
 ) -> Row | None:
     """Return a row at its place in a study; None where it has none."""
-    first = {WINDOW: f"{along}_from", ONSET: f"onset_{along}", PEAK: along}[kind]
-    span = told[first], told.get(f"{along}_to", told[first])
-    swept = told.get(f"measured_{along}_from", -math.inf), told.get(f"measured_{along}_to", math.inf)
+    ends = [told[name.format(along)] for name in _KINDS[kind][0] if name != FREQUENCY]
+    span = ends[0], ends[-1]
+    swept = told.get(_SWEPT[0].format(along), -math.inf), told.get(_SWEPT[1].format(along), math.inf)
     reach = (span, swept) if math.isfinite(swept[0]) else (span,)
     if along in sides and all(sides[along].span(*one) is None for one in reach):
         return None
@@ -296,10 +340,113 @@ def _row(
     frequencies = [told[name] for name in (*_BAND, FREQUENCY) if name in told]
     return Row(
         at,
-        span,
+        span if kind != WINDOW or span[0] < span[1] else (math.nan, math.nan),
         at.pop(along, math.nan),
         (frequencies[0], frequencies[-1]) if frequencies else None,
         told.get("amplitude", math.nan),
         swept,
         told.get("direction", 1.0) > 0.0,
+        told.get(f"{along}_deviation", 0.0),
     )
+
+
+class Overlay:
+    """What was measured, drawn over panels one by one, and its entries of the legend.
+
+    Parameters
+    ----------
+    path : str, Path, Measured or None
+        The measured file, or what was read of it; without one nothing is drawn.
+    dataset, source
+        As of `read_measured`.
+
+    Attributes
+    ----------
+    height, note : float, str
+        Height that a legend of its own takes [inch]; line of the title, which names the file.
+    """
+
+    def __init__(
+        self, path: str | Path | Measured | None, dataset: xr.Dataset, source: str = "results"
+    ) -> None:
+        if path is None or isinstance(path, Measured):
+            self._measured = path or Measured("", "", "", ())
+        else:
+            self._measured = read_measured(path, dataset, source)
+        self._entries: dict[str, Any] = {}
+        self.height = 0.0 if path is None else LEGEND
+        self.note = "" if path is None else f"measured: {shortened(self._measured.name, LONGEST_NAME)}"
+
+    @property
+    def handles(self) -> list[Any]:
+        """Entries of the legend, of what was drawn."""
+        return list(self._entries.values())
+
+    def draw(self, axes: Axes, x: Side, y: Side, shown: xr.Dataset) -> None:
+        """Draw what was measured over a panel whose limits are set.
+
+        `x` and `y` are its sides; coordinates of `shown` without a dimension say at which values.
+        """
+        along, fixed = self._measured.along, _fixed(shown)
+        at = fixed.pop(along, None)
+        for row in self._measured.rows:
+            if all(row.at.get(name, value) == value for name, value in fixed.items()):
+                if at is None or row.covers(np.array(at)):
+                    self._draw_row(axes, row, (x, y))
+
+    def _box(self, row: Row, sides: tuple[Side, Side]) -> list[Array]:
+        """Places of the ends of a row on both sides; empty where it lies beyond an end."""
+        box: list[Array | None] = []
+        for side in sides:
+            if side.name == self._measured.along:
+                box.append(side.span(*row.span))
+            elif side.name == FREQUENCY and row.frequency:
+                box.append(side.span(*row.frequency))
+            elif side.name in row.at:
+                cell = int(np.argmax(side.values == row.at[side.name]))
+                box.append(side.edges[cell : cell + 2])
+            else:
+                box.append(side.edges[[0, -1]])
+        found = [one for one in box if one is not None]
+        return found if len(found) == len(box) else []
+
+    def _draw_row(self, axes: Axes, row: Row, sides: tuple[Side, Side]) -> None:
+        _, kind, along, _ = self._measured
+        on = next((which for which, side in zip("xy", sides, strict=True) if side.name == along), "")
+        if kind == WINDOW and on and np.isfinite(row.swept).all():
+            swept = row._replace(span=row.swept, frequency=None)
+            self._outline(axes, self._box(swept, sides), "measured range", DOTS)
+        box = self._box(row, sides)
+        if kind == WINDOW:
+            self._outline(axes, box, "measured noise", DASHES)
+        elif kind == PEAK and box:  # at the lower end of a side that tells nothing of it
+            whole = [np.array_equal(one, side.edges[[0, -1]]) for one, side in zip(box, sides, strict=True)]
+            x, y = (
+                one[:1] if rest else one.mean(keepdims=True) for one, rest in zip(box, whole, strict=True)
+            )
+            self._line(axes, x, y, "measured peak", marker="P", ls="")
+        elif kind == ONSET and on and box:
+            x, y = (np.array([low, 0.5 * (low + high), high]) for low, high in box)
+            label = f"measured onset, {'rising' if row.rising else 'falling'}"
+            self._line(axes, x, y, label, marker=_MARKS[on][row.rising], ls=DASHES)
+
+    def _line(self, axes: Axes, x: Array, y: Array, label: str, **look: Any) -> None:
+        """Draw a line with a mark in its middle, or the mark alone, without a change of the limits."""
+        how = {"markevery": [x.size // 2], "clip_on": x.size > 1, **_ABOVE}
+        axes.add_artist(Line2D(x, y, **_LOOK, **look, **how))
+        self._entries.setdefault(label, Line2D([], [], **_LOOK, **look, label=label))
+
+    def _outline(self, axes: Axes, box: list[Array], label: str, style: Any) -> None:
+        if box:
+            (left, right), (low, high) = box
+            look = {"fill": False, "ec": INK, "lw": 2.0, "ls": style}
+            axes.add_artist(Rectangle((left, low), right - left, high - low, **look, **_ABOVE))
+            self._entries.setdefault(label, Rectangle((0.0, 0.0), 1.0, 1.0, **look, label=label))
+
+
+def put_legend(figure: Figure, *overlays: Overlay) -> None:
+    """Put a legend of what was measured below a picture that has none of its own."""
+    entries = {handle.get_label(): handle for over in overlays for handle in over.handles}
+    if entries:
+        place = {"ncols": legend_columns(list(entries)), "loc": "outside lower center", "frameon": False}
+        figure.legend(handles=list(entries.values()), **place)

@@ -2,9 +2,13 @@
 
 Cells of the measured range count where a run is known to vibrate or to be quiet. Within a window noise was
 measured, elsewhere in the range silence. Peaks tell of the cells in which they lie alone, and of no silence.
-Onsets tell of no cell: they are paired with the computed ones of the same direction at the least distance in
-all; one without a partner is a miss or a false alarm. The ends of windows within the range are paired alike,
-and give the error of the onset alone.
+Onsets tell of no cell: they are paired with the computed ones of the same direction, as many as there can be
+and at the least distance in all; one without a partner is a miss or a false alarm. The ends of windows within
+the range are paired alike, and give the error of the onset alone.
+
+The distance of a pair has the standard error hypot(h, s): h is half the distance of the two cells between
+which the computed onset lies, s the deviation that the file states. Farther than FARTHEST of these apart, two
+onsets are no pair.
 """
 
 import math
@@ -19,16 +23,19 @@ from numpy.typing import NDArray
 from cvt_hpc.analysis.arrangement import value_text
 from cvt_hpc.analysis.classes import at_strongest_strand, check_results, map_classes
 from cvt_hpc.analysis.figures import coordinate_unit
-from cvt_hpc.analysis.measured import ONSET, PEAK, WINDOW, Measured, Row, Span, read_measured
+from cvt_hpc.analysis.measured import ONSET, PEAK, WINDOW, Measured, Row, Span, read_measured, within
 from cvt_hpc.errors import mismatch
 from cvt_hpc.storage.files import write_rows
 from cvt_hpc.tables import columns, number
-from cvt_hpc.vibration.classes import Onset, levels, onsets, paired_errors
+from cvt_hpc.vibration.classes import levels, onsets
 
+FARTHEST = 3.0  # standard errors
 MOST_LINES = 10  # that are printed
+COUNTS = ("hits", "misses", "false_alarms", "correct_silences", "neither")
 _READ = ("status", "vibrates", "occurrence_class", "inferred_class", "amplitude", "frequency")
 
 Array = NDArray[np.float64]
+Cells = NDArray[np.bool_]
 
 
 class Line(NamedTuple):
@@ -38,12 +45,10 @@ class Line(NamedTuple):
     ----------
     hits, misses, false_alarms, silences, neither : int
         Cells of the measured range, `neither` those not known to vibrate or to be quiet; or onsets.
-    frequency : tuple of float
-        Distances of the frequencies of hits from the measured ones, or from their band [Hz].
-    onset : tuple of float
-        Distances of paired onsets, in the unit in which the axis is shown.
-    amplitude : tuple of float
-        Amplitudes of hits over the measured ones [1].
+    frequency, amplitude : tuple of float
+        Of hits: distances from measured frequencies, or their band [Hz], and ratios to measured amplitudes.
+    onset, standard : tuple of float
+        Distances of paired onsets and their standard errors, in the unit in which the axis is shown.
     """
 
     hits: int = 0
@@ -53,6 +58,7 @@ class Line(NamedTuple):
     neither: int = 0
     frequency: tuple[float, ...] = ()
     onset: tuple[float, ...] = ()
+    standard: tuple[float, ...] = ()
     amplitude: tuple[float, ...] = ()
 
 
@@ -66,13 +72,10 @@ class Score(NamedTuple):
 
     Attributes
     ----------
-    measured : Measured
-    unit : str
-        In which the axis of the windows, onsets or peaks is shown.
-    names : list of str
-        The other axes of the study.
-    lines : list of (list of str, Line)
-        Values on these axes in words, and the agreement, of each line of which anything was measured.
+    measured, unit : Measured, str
+        The file, and the unit in which its axis is shown.
+    names, lines : list of str, list of (list of str, Line)
+        The other axes; their values in words, and the agreement, of each line where anything was measured.
     """
 
     measured: Measured
@@ -92,16 +95,7 @@ class Score(NamedTuple):
 
 
 def score(dataset: xr.Dataset, path: str | Path, source: str = "results") -> Score:
-    """Compare a study with a measured file.
-
-    Parameters
-    ----------
-    dataset : Dataset
-        Results of a study over a grid. A row counts along each line that it does not exclude.
-    path : str or Path
-        The file, as `read_measured` takes it.
-    source : str
-        Where the results are from, for the errors.
+    """Compare a study over a grid with a measured file; a row counts along each line that it admits.
 
     Raises
     ------
@@ -115,71 +109,83 @@ def score(dataset: xr.Dataset, path: str | Path, source: str = "results") -> Sco
         found = ", ".join(map(str, dataset["status"].dims)) or "a single run"
         raise mismatch(source, f"results over the axis {along}, as in {measured.name}", found)
     dataset = dataset[[name for name in _READ if name in dataset]].sortby(along).transpose(..., along)
-    arrays = (
-        map_classes(dataset),
-        *(at_strongest_strand(dataset, name) for name in ("frequency", "amplitude")),
-    )
+    strongest = (at_strongest_strand(dataset, name) for name in ("frequency", "amplitude"))
+    arrays = map_classes(dataset), *strongest
     classes, frequency, amplitude = (array.transpose(..., along).values for array in arrays)
     names = [str(name) for name in dataset["status"].dims if name != along]
     factor, unit = coordinate_unit(dataset[along].attrs)
-    lines = []
+    loads, lines = dataset[along].values.astype(float), []
+    cells = [(row, row.covers(loads), within(loads, row.swept) & np.isnan(row.cell)) for row in measured.rows]
+    axes = {name: dataset[name].values for name in names}
+    texts = [[value_text(dataset[name], k) for k in range(dataset.sizes[name])] for name in names]
     for index in np.ndindex(classes.shape[:-1]):
-        at = {name: dataset[name].values[k] for name, k in zip(names, index, strict=True)}
-        rows = [row for row in measured.rows if all(at[name] == value for name, value in row.at.items())]
-        if rows:
-            loads, level = dataset[along].values.astype(float), levels(classes[index])
-            errors, missed, additional = _onset_errors(measured.kind, rows, loads, level)
-            line = Line(len(errors), missed, additional)
+        at = {name: axes[name][k] for name, k in zip(names, index, strict=True)}
+        told = [one for one in cells if all(at[name] == value for name, value in one[0].at.items())]
+        if told:
+            level = levels(classes[index])
+            line = _of_onsets(measured.kind, [row for row, *_ in told], loads, level, factor)
             if measured.kind != ONSET:
-                line = _of_cells(rows, loads, level, frequency[index], amplitude[index])
-            place = [value_text(dataset[name], k) for name, k in zip(names, index, strict=True)]
-            lines.append((place, line._replace(onset=tuple(factor * error for error in errors))))
+                of_cells = _of_cells(told, level, frequency[index], amplitude[index])
+                line = of_cells._replace(onset=line.onset, standard=line.standard)
+            lines.append(([text[k] for text, k in zip(texts, index, strict=True)], line))
     return Score(measured, unit, names, lines)
 
 
-def _of_cells(rows: Sequence[Row], loads: Array, level: Array, frequency: Array, amplitude: Array) -> Line:
-    """Agreement of the cells of a line (n,) with windows or peaks."""
-    noise, known = np.zeros((2, loads.size), bool)
-    errors, ratios = np.full((2, loads.size), np.inf)
-    for row in rows:
-        inside = loads == row.cell
-        if np.isnan(row.cell):  # a window
-            inside = _within(loads, row.span) & (row.span[0] < row.span[1])
-            known |= _within(loads, row.swept)
+def _of_cells(
+    rows: Sequence[tuple[Row, Cells, Cells]], level: Array, frequency: Array, amplitude: Array
+) -> Line:
+    """Agreement of a line (n,) with windows or peaks, each with its cells of noise, and of its range."""
+    noise, known = np.zeros((2, level.size), bool)
+    errors, ratios = np.full((2, level.size), np.inf)
+    for row, inside, swept in rows:
         noise |= inside
+        known |= inside | swept
         if row.frequency:
             beyond = np.maximum(np.maximum(row.frequency[0] - frequency, frequency - row.frequency[1]), 0.0)
             errors[inside] = np.fmin(errors, beyond)[inside]
         ratios[inside] = amplitude[inside] / row.amplitude
-    known |= noise
     vibrates, quiet = known & (level > 0.0), known & (level < 0.0)
     counts = noise & vibrates, noise & quiet, vibrates & ~noise, quiet & ~noise, known & np.isnan(level)
     told = [tuple(values[counts[0] & np.isfinite(values)].tolist()) for values in (errors, ratios)]
-    return Line(*(int(one.sum()) for one in counts), told[0], (), told[1])  # type: ignore[call-arg, arg-type]
+    return Line._make([*(int(one.sum()) for one in counts), told[0], (), (), told[1]])
 
 
-def _within(loads: Array, span: Span) -> NDArray[np.bool_]:
-    """Whether values lie between two others, or on them within rounding."""
-    on_ends = np.isclose(loads[:, None], span, 1e-9, 0.0).any(axis=1)
-    return ((span[0] <= loads) & (loads <= span[1])) | on_ends
+def _of_onsets(kind: str, rows: Sequence[Row], loads: Array, level: Array, factor: float) -> Line:
+    """Agreement of the onsets along a line (n,), or of the ends of windows; `factor` is from SI."""
+    from scipy.optimize import linear_sum_assignment  # long to load
 
-
-def _onset_errors(kind: str, rows: Sequence[Row], loads: Array, level: Array) -> tuple[list[float], int, int]:
-    """Errors of onsets along a line (n,) [SI], and how many are missed and additional."""
     loads, level = loads[np.isfinite(loads)], level[np.isfinite(loads)]
     low = max(loads[0], min(row.swept[0] for row in rows))
     high = min(loads[-1], max(row.swept[1] for row in rows))
-    true = [Onset(row.span[0], row.rising) for row in rows if kind == ONSET]
-    if kind == WINDOW:
-        joined: list[Span] = []
-        for start, end in sorted(row.span for row in rows if row.span[0] < row.span[1]):
-            if joined and start <= joined[-1][1]:
-                start, end = joined[-1][0], max(end, joined.pop()[1])
-            joined.append((start, end))
-        ends = [Onset(end, k == 0) for span in joined for k, end in enumerate(span)]
-        true = [one for one in ends if low < one.load < high]
-    ways = {row.rising for row in rows} if kind == ONSET else {True, False} if kind == WINDOW else set()
-    return paired_errors([one for one in onsets(loads, level) if one.rising in ways], true, (low, high))
+    ends: list[Span] = []  # of windows, each with its deviation
+    for row in sorted((row for row in rows if row.span[0] < row.span[1]), key=lambda row: row.span):
+        start, end = ((load, row.deviation) for load in row.span)
+        if ends and start[0] <= ends[-1][0]:  # windows that touch are one
+            end, start = max(end, ends.pop()), ends.pop()
+        ends += [start, end]
+    true = [(*one, k % 2 == 0) for k, one in enumerate(ends) if low < one[0] < high]
+    if kind == ONSET:
+        true = [(row.span[0], row.deviation, row.rising) for row in rows]
+    ways = {WINDOW: {True, False}, ONSET: {row.rising for row in rows}, PEAK: set()}[kind]
+    decided, computed, errors, alone = loads[np.isfinite(level)], onsets(loads, level), [], 0
+    for rising in ways:
+        places = np.array([one.load for one in computed if one.rising == rising])
+        others = np.array([one[:2] for one in true if one[2] == rising]).reshape(-1, 2)
+        above = np.searchsorted(decided, places)
+        distance = np.abs(np.subtract.outer(places, others[:, 0]))
+        standard = np.hypot.outer(0.5 * (decided[above] - decided[above - 1]), others[:, 1])
+        near = distance <= FARTHEST * standard
+        pairs = linear_sum_assignment(np.where(near, distance, distance.size * distance.max(initial=0.0)))
+        errors += [(factor * distance[k], factor * standard[k]) for k in zip(*pairs, strict=True) if near[k]]
+        left = np.delete(places, pairs[0][near[pairs]])
+        alone += int(((low < left) & (left < high)).sum())
+    onset, known = zip(*errors, strict=True) if errors else ((), ())
+    return Line(len(errors), len(true) - len(errors), alone, onset=tuple(onset), standard=tuple(known))
+
+
+def _told(values: Sequence[float]) -> tuple[float, float]:
+    """Median and largest of errors; not numbers of none."""
+    return (float(np.median(values)), max(values)) if values else (math.nan, math.nan)
 
 
 def score_sentences(found: Score) -> Iterator[str]:
@@ -202,33 +208,24 @@ def score_sentences(found: Score) -> Iterator[str]:
         yield f"The file states no measured range: all values of {along.replace('_', ' ')} count as measured."
     for what, values, unit in (("frequency", total.frequency, "Hz"), ("onset", total.onset, found.unit)):
         if values:
-            middle, most = number(float(np.median(values)), 3), number(max(values), 3)
-            yield f"Error of the {what}: {middle} {unit} (median), {most} {unit} (largest)."
+            middle, most = (f"{number(one, 3)} {unit}" for one in _told(values))
+            yield f"Error of the {what}: {middle} (median), {most} (largest)."
     if total.amplitude:
-        ratio = number(float(np.median(total.amplitude)), 3)
+        ratio = number(_told(total.amplitude)[0], 3)
         yield f"Amplitude of hits: computed {ratio} times the measured one (median)."
 
 
-def _disagreement(one: tuple[list[str], Line]) -> int:
-    line = one[1]
-    return line.misses + line.false_alarms - line.hits - line.silences
+def _rows(found: Score) -> list[list[str]]:
+    """Rows of the agreement along each line, those first that agree most."""
 
+    def disagreement(one: tuple[list[str], Line]) -> int:
+        return one[1].misses + one[1].false_alarms - one[1].hits - one[1].silences
 
-def score_table(found: Score) -> tuple[list[str], list[list[str]]]:
-    """Return head and rows of the agreement along each line, those first that agree most."""
-    head = [*found.names, "hits", "misses", "false_alarms", "correct_silences", "neither"]
-    units = {"frequency_error": "Hz", "onset_error": found.unit}
-    head += [f"{what}_{how} [{unit}]" for what, unit in units.items() for how in ("median", "largest")]
-    rows = []
-    for place, line in sorted(found.lines, key=_disagreement):
-        errors = [
-            how(values) if values else math.nan
-            for values in (line.frequency, line.onset)
-            for how in (np.median, max)
-        ]
-        ratio = float(np.median(line.amplitude)) if line.amplitude else math.nan
-        rows.append([*place, *map(str, line[:5]), *(number(float(one), 4) for one in (*errors, ratio))])
-    return [*head, "amplitude_ratio_median"], rows
+    return [
+        [*place, *map(str, line[:5])]
+        + [number(one, 4) for one in (*_told(line.frequency), *_told(line.onset), _told(line.amplitude)[0])]
+        for place, line in sorted(found.lines, key=disagreement)
+    ]
 
 
 def score_lines(found: Score, source: str, path: str) -> Iterator[str]:
@@ -237,12 +234,13 @@ def score_lines(found: Score, source: str, path: str) -> Iterator[str]:
     yield from score_sentences(found)
     head = ["hits", "misses", "false alarms", "silences", "neither", "frequency [Hz]", "largest"]
     head = [*found.names, *head, f"onset [{found.unit}]", "largest", "amplitude"]
-    _, rows = score_table(found)
-    yield from columns([head, *rows[:MOST_LINES]])
-    if len(rows) > MOST_LINES:
-        yield f"  {len(rows) - MOST_LINES} lines that agree less, in the table"
+    yield from columns([head, *_rows(found)[:MOST_LINES]])
+    if len(found.lines) > MOST_LINES:
+        yield f"  {len(found.lines) - MOST_LINES} lines that agree less, in the table"
 
 
 def write_score(found: Score, table: Path) -> Path:
     """Write the agreement along each line as a CSV table, and return its path."""
-    return write_rows(table, *score_table(found))
+    units = {"frequency_error": "Hz", "onset_error": found.unit}
+    errors = [f"{what}_{how} [{unit}]" for what, unit in units.items() for how in ("median", "largest")]
+    return write_rows(table, [*found.names, *COUNTS, *errors, "amplitude_ratio_median"], _rows(found))

@@ -5,7 +5,7 @@ An order is a multiple of the turns of the driving pulley, of the driven one, or
 
 import math
 from collections.abc import Iterable, Mapping, Sequence
-from typing import Any, NamedTuple
+from typing import Any
 
 import numpy as np
 import xarray as xr
@@ -14,22 +14,25 @@ from matplotlib.figure import Figure
 from numpy.typing import NDArray
 
 from cvt_hpc.analysis import arrangement as layout
-from cvt_hpc.analysis import figures, levels
+from cvt_hpc.analysis import figures, time_signals
 from cvt_hpc.analysis.classes import check_results
 from cvt_hpc.analysis.eigenfrequencies import parameters_of
 from cvt_hpc.analysis.ramps import THEN, course_of, start_up
 from cvt_hpc.analysis.telling_apart import entitle_runs, named, on_axes
-from cvt_hpc.analysis.time_signals import read_signal
 from cvt_hpc.analysis.waterfall import ORDERS
 from cvt_hpc.errors import few_of, mismatch
+from cvt_hpc.vibration.settings import SHORTEST_SEGMENT
 from cvt_hpc.vibration.signals import DRIFT_DEGREE
 
 Array = NDArray[np.float64]
+# Turns of a pulley (n,) [Hz], how many orders of them one order is, a number or (n,), and by which share this
+# may be off
+Turning = tuple[Array, Any, float]
+Order = tuple[float, str]  # the multiple, and of what: "driving" or "driven" pulley, passing "elements"
 
 BANDWIDTH = 1.0  # orders, in which power is summed
 LINES = 8  # of a window in this bandwidth: a sine in the middle is 4 lines off the edges
 PASSING_SLIP = 0.01  # of the order of passing elements: half its band at least, since slip shifts it
-LEAST, ROW = 1.5, 2.6  # [inch]: a panel, at least and else
 DEFAULT = (*ORDERS, "driven:1", "elements:1")
 UNKNOWN = {
     "driven": "neither the ratio nor the speed of the driven pulley is recorded",
@@ -37,52 +40,10 @@ UNKNOWN = {
 }
 
 
-class Turning(NamedTuple):
-    """What orders are multiples of.
-
-    Attributes
-    ----------
-    rate : (n,) array
-        Turns of a pulley per second [Hz].
-    each : float or (n,) array
-        How many of its orders one order has; 1 where that pulley is meant.
-    slip : float
-        Share by which this may be off.
-    """
-
-    rate: Array
-    each: Any = 1.0
-    slip: float = 0.0
-
-    def band(self, number: float, bandwidth: float) -> tuple[Any, Any]:
-        """Lowest and highest multiple of `rate` in the band of an order."""
-        middle = number * self.each
-        half = np.maximum(0.5 * bandwidth, self.slip * middle)
-        return middle - half, middle + half
-
-
-class Order(NamedTuple):
-    """A multiple of the turns of a pulley, or of the elements that pass.
-
-    Attributes
-    ----------
-    number : float
-        The multiple.
-    of : str
-        "driving", "driven" or "elements".
-    """
-
-    number: float
-    of: str
-
-    @property
-    def words(self) -> str:
-        """For a legend."""
-        return f"{self.number:g}× {self.of}".removesuffix(" driving")
-
-
-def read_orders(given: Iterable[float | str], bandwidth: float) -> list[Order]:
+def read_orders(given: Iterable[float | str], bandwidth: float) -> dict[str, Order]:
     """Read orders such as 8 or "8", of the driving pulley, "driven:2" and "elements:1"; none: the default.
+
+    They are returned by their names for a legend.
 
     Raises
     ------
@@ -91,19 +52,19 @@ def read_orders(given: Iterable[float | str], bandwidth: float) -> list[Order]:
     """
     if not 0.0 < bandwidth < math.inf:
         raise mismatch("bandwidth", "a bandwidth in orders, above 0", f"{bandwidth:g}")
-    given, found = list(given), []
+    given, found = list(given), {}
     if not given and bandwidth > max(ORDERS):
         expected = f"at most {max(ORDERS):g}, the largest of the default orders, or orders beside it"
         raise mismatch("bandwidth", expected, f"{bandwidth:g}")
     for text in map(str, given or DEFAULT):
         of, _, number = text.rpartition(":")
         try:
-            order = Order(float(number), of or "driving")
+            order = float(number), of or "driving"
         except ValueError:
-            order = Order(math.nan, of)
-        least = 1.0 if order.of == "elements" else bandwidth
-        if order.of in ("driving", *UNKNOWN) and least <= order.number < math.inf:
-            found.append(order)
+            order = math.nan, of
+        least = 1.0 if of == "elements" else bandwidth
+        if order[1] in ("driving", *UNKNOWN) and least <= order[0] < math.inf:
+            found[f"{order[0]:g}× {order[1]}".removesuffix(" driving")] = order
         elif given:
             expected = f"orders of the bandwidth, {bandwidth:g}, or more, as 8, driven:2 or elements:1"
             raise mismatch("orders", expected, text)
@@ -113,7 +74,7 @@ def read_orders(given: Iterable[float | str], bandwidth: float) -> list[Order]:
 def track(
     values: Array, turned: Array, band: tuple[float, float], length: float
 ) -> tuple[NDArray[Any], Array]:
-    """Amplitude of what a signal has in a band of orders, in windows of equally many turns.
+    """Amplitude of what a signal (n,) has in a band of orders, in windows of equally many turns.
 
     The signal is multiplied by a Hann window over the angle, freed of a cubic drift, and transformed over the
     angle, not over time, so that a changing speed smears no order; the power of all lines in the band is
@@ -123,18 +84,14 @@ def track(
     ----------
     values, turned : (n,) arrays
         Signal, and turns that the shaft has made [1], ascending.
-    band : (float, float)
-        Orders.
-    length : float
-        Of a window [turns].
+    band, length
+        Lowest and highest order; turns of a window.
 
     Returns
     -------
-    middles : (window,) int array
-        Samples in the middle of each window.
-    amplitude : (window,) array
-        sqrt(2) times the Hann-weighted rms, in the signal's unit. The error for a steady sine that keeps 4
-        lines, 4/length, from the edges is below 0.1 %.
+    middles, amplitude : (window,) arrays
+        Samples in the middle of each window, and sqrt(2) times the Hann-weighted rms, in the signal's unit.
+        The error for a steady sine that keeps 4 lines, 4/length, from the edges is below 0.1 %.
     """
     lines = np.arange(math.ceil(band[0] * length - 1e-9), math.floor(band[1] * length + 1e-9) + 1) / length
     starts = np.arange(turned[0], turned[-1] - length + 1e-9, 0.5 * length)
@@ -166,51 +123,49 @@ def orders_figure(
 
     Parameters
     ----------
-    histories : sequence of Dataset
-        As `simulate` returns them.
+    histories, sources : sequences of Dataset and str
+        As `simulate` returns them; for errors, and for titles where their axes do not tell them apart.
     of : str
         Signal, as of `read_signal`.
-    sources : sequence of str, optional
-        Where the runs are from, for errors, and for titles where their axes do not tell them apart.
     orders : sequence of float or str, optional
         As of `read_orders`; by default those of DEFAULT that the run tells.
     bandwidth : float
         In orders, in which power is summed; windows have LINES / bandwidth turns.
-    velocity : bool
-        Of a displacement: its velocity, 2 pi f times the amplitude at the frequency f of the order.
-    level : bool
-        Levels of the rms [dB] in the place of amplitudes.
+    velocity, level : bool
+        Of a displacement its velocity, 2 pi f times the amplitude at the frequency f of the order; levels of
+        the rms [dB] in the place of amplitudes.
 
     Raises
     ------
     InputError
-        As of `read_signal` and `read_orders`; a run does not tell an order that is wanted, or is too short.
+        As of `read_signal` and `read_orders`; a run does not tell an order that is wanted, or is too short;
+        or windows have less than SHORTEST_SEGMENT samples.
     """
     names, wanted = named(histories, sources), read_orders(orders, bandwidth)
-    grid = figures.on_a_page(len(histories), (1,), (LEAST, ROW), 1.5, names[0], THEN)
+    figure, panels = time_signals.in_a_column(len(histories), names[0], THEN)
     _, labels = on_axes(histories, names)
-    figure = Figure((figures.WIDTH, grid.height * len(histories) + 1.5), layout="constrained")
-    panels = figure.subplots(len(histories), 1, squeeze=False)[:, 0]
     length, name = LINES / bandwidth, ""
     notes: dict[str, str] = {}
     for axes, history, source, label in zip(panels, histories, names, labels, strict=True):
-        signal = read_signal(history, of, source)
-        if velocity:
-            levels.check_velocity(signal, source)
+        signal = time_signals.read_signal(history, of, source, velocity=velocity)
         known, (course, x_label) = _turning_along(history, source), course_of(history)
         first, lines = int(np.searchsorted(signal.times, start_up(history))), {}
         times, values = signal.times[first:], signal.values[first:]
-        for order in _told(wanted, known, bool(orders), source, notes):
-            rate, band = np.interp(times, history["time"].values, known[order.of].rate), known[order.of].band
+        for words, order in _told(wanted, known, bool(orders), source, notes).items():
+            low, high = _band(order, known, bandwidth)
+            rate = np.interp(times, history["time"].values, known[order[1]][0])
             turned = np.append(0.0, np.cumsum(0.5 * (rate[1:] + rate[:-1])) / signal.rate)
             if not turned[-1] >= length:
                 expected = f"{length:g} turns or more after the start-up"
                 raise mismatch(source, expected, f"{turned[-1]:.3g}", "a larger --bandwidth needs fewer")
-            low, high = band(order.number, bandwidth)
+            most = LINES * signal.rate / (SHORTEST_SEGMENT * rate.max())
+            if bandwidth > most:
+                expected = f"at most {most:.3g} orders, whose windows have {SHORTEST_SEGMENT} samples"
+                raise mismatch(f"{source}: bandwidth", expected, f"{bandwidth:g}")
             middles, amplitude = track(values, turned, (low, high), length)
             amplitude[high * rate[middles] > 0.5 * signal.rate] = np.nan
             at = np.interp(times[middles], history["time"].values, course)
-            lines[order.words] = at, amplitude, 0.5 * (low + high) * rate[middles]
+            lines[words] = at, amplitude, 0.5 * (low + high) * rate[middles]
         _draw(axes, lines, signal.unit, velocity, level, notes)
         axes.set(xlabel=x_label)
         axes.set_title(", ".join(label.values()), loc="left")
@@ -245,16 +200,15 @@ def order_cuts_figure(
     wanted, known = read_orders(orders, bandwidth), _turning_over(shown)
     notes: dict[str, str] = {}
     x, bins = layout.ruler(shown["driving_speed"]), shown["frequency_bin"].values
-    figure = Figure((figures.WIDTH, ROW * shown.sizes["strand"] + 1.5), layout="constrained")
-    panels = figure.subplots(shown.sizes["strand"], 1, sharex=True, sharey=True, squeeze=False)[:, 0]
-    for axes, strand in zip(panels, shown["strand"].values, strict=True):
+    strands = shown["strand"].values
+    figure, panels = time_signals.in_a_column(len(strands), source, "", sharex=True, sharey=True)
+    for axes, strand in zip(panels, strands, strict=True):
         spectra, lines = shown["spectrum"].sel(strand=strand).transpose("driving_speed", ...).values, {}
-        for order in _told(wanted, known, bool(orders), source, notes):
-            low, high = known[order.of].band(order.number, bandwidth)
-            rate = known[order.of].rate
+        for words, order in _told(wanted, known, bool(orders), source, notes).items():
+            (low, high), rate = _band(order, known, bandwidth), known[order[1]][0]
             bands = np.broadcast_arrays(low * rate, high * rate)
             amplitude = [_largest(bins, *of_run) for of_run in zip(spectra, *bands, strict=True)]
-            lines[order.words] = x.centres, np.array(amplitude), 0.5 * (low + high) * rate
+            lines[words] = x.centres, np.array(amplitude), 0.5 * (low + high) * rate
         _draw(axes, lines, str(dataset["spectrum"].attrs.get("units", "m")), velocity, level, notes)
         axes.set_title(f"strand {strand}", loc="left")
     panels[-1].set_xlabel(x.label)
@@ -267,6 +221,13 @@ def order_cuts_figure(
 
 def _in_words(bandwidth: float) -> str:
     return f"{bandwidth:g} order{'s' * (bandwidth != 1.0)}"
+
+
+def _band(order: Order, known: Mapping[str, Turning], bandwidth: float) -> tuple[Any, Any]:
+    """Lowest and highest multiple of the turns of a pulley in the band of an order."""
+    _, each, slip = known[order[1]]
+    half = np.maximum(0.5 * bandwidth, slip * order[0] * each)
+    return order[0] * each - half, order[0] * each + half
 
 
 def _largest(bins: Array, spectrum: Array, low: float, high: float) -> float:
@@ -282,43 +243,38 @@ def _turning_along(history: xr.Dataset, source: str) -> dict[str, Turning]:
     """What orders are multiples of, over the time of a run."""
     figures.check_known(history, ["driving_speed"], source)
     rate = history["driving_speed"].values / (2.0 * np.pi)
-    known = {"driving": Turning(rate)}
+    known: dict[str, Turning] = {"driving": (rate, 1.0, 0.0)}
     if "driven_speed" in history and (history["driven_speed"].values >= 0.0).all():
-        known["driven"] = Turning(history["driven_speed"].values / (2.0 * np.pi))
+        known["driven"] = history["driven_speed"].values / (2.0 * np.pi), 1.0, 0.0
     passing = float(history.get("passing_frequency", math.nan))
     if np.isfinite(passing):  # a mean of the judged part
-        judged = read_signal(history, "driving_speed").judged
-        known["elements"] = Turning(rate, passing / float(rate[judged:].mean()), PASSING_SLIP)
+        judged = time_signals.read_signal(history, "driving_speed").judged
+        known["elements"] = rate, passing / float(rate[judged:].mean()), PASSING_SLIP
     return known
 
 
 def _turning_over(shown: xr.Dataset) -> dict[str, Turning]:
-    """What orders are multiples of, over the driving speeds of a study."""
+    """What orders are multiples of, over the driving speeds of a study, which the ratio may follow."""
     rate = shown["driving_speed"].values / (2.0 * np.pi)
-    known, ratio = {"driving": Turning(rate)}, parameters_of(shown).get("ratio")
-    if "ratio" in shown.coords:  # which may follow the speed
-        ratio = shown["ratio"].values
+    known: dict[str, Turning] = {"driving": (rate, 1.0, 0.0)}
+    ratio = shown.coords.get("ratio", parameters_of(shown).get("ratio"))
     if ratio is not None:
         lost = shown["speed_loss"].values if "speed_loss" in shown else 0.0
-        known["driven"] = Turning(rate / ratio * (1.0 - lost))
+        known["driven"] = rate / np.asarray(ratio) * (1.0 - lost), 1.0, 0.0
     if "passing_frequency" in shown:
-        known["elements"] = Turning(rate, shown["passing_frequency"].values / rate, PASSING_SLIP)
+        known["elements"] = rate, shown["passing_frequency"].values / rate, PASSING_SLIP
     return known
 
 
 def _told(
-    wanted: Sequence[Order],
-    known: Mapping[str, Turning],
-    must: bool,
-    source: str,
-    notes: dict[str, str],
-) -> list[Order]:
+    wanted: dict[str, Order], known: Mapping[str, Turning], must: bool, source: str, notes: dict[str, str]
+) -> dict[str, Order]:
     """Orders that are known; why others are not goes to the notes, or is an error where they `must` be."""
-    for of in dict.fromkeys(order.of for order in wanted if order.of not in known):
+    for of in dict.fromkeys(of for _, of in wanted.values() if of not in known):
         if must:
             raise mismatch(f"{source}: orders of {of}", "what they are multiples of", f"none: {UNKNOWN[of]}")
         notes[of] = f"no orders of {of}: {UNKNOWN[of]}"
-    return [order for order in wanted if order.of in known]
+    return {words: order for words, order in wanted.items() if order[1] in known}
 
 
 def _draw(
@@ -331,18 +287,17 @@ def _draw(
 ) -> None:
     """Lines by their names: places, amplitudes [SI], and frequencies [Hz] for velocities."""
     unit = "m s-1" if velocity else unit
-    reference, shown = levels.shown_in(unit)
+    reference, shown = time_signals.shown_in(unit)
     for k, (words, (x, amplitude, frequency)) in enumerate(lines.items()):
         if not np.isfinite(amplitude).any():
             notes[words] = f"{words}: beyond the frequencies that are recorded"
             continue
         values = amplitude * (2.0 * np.pi * frequency if velocity else 1.0)
-        values = levels.level(values / np.sqrt(2.0), unit) if as_level else values / reference
+        values = time_signals.level(values / np.sqrt(2.0), unit) if as_level else values / reference
         axes.plot(x, np.where(np.isfinite(values), values, np.nan), label=words, **figures.line_style(k))
     if as_level:
-        axes.set_ylabel(levels.level_label(unit))
+        axes.set_ylabel(time_signals.level_label(unit))
     else:
         axes.set(ylabel=f"amplitude [{shown}]", yscale="log")
-    levels.cut_off(axes)
-    axes.grid(lw=0.4, alpha=0.5)
+    time_signals.cut_off(axes)
     axes.legend(loc="center left", bbox_to_anchor=(1.0, 0.5), frameon=False)

@@ -13,8 +13,7 @@ from cvt_hpc.analysis import arrangement as layout
 from cvt_hpc.analysis import figures
 from cvt_hpc.analysis.classes import check_results
 from cvt_hpc.analysis.curves import set_frame
-from cvt_hpc.analysis.measured import Side, side_of
-from cvt_hpc.analysis.measured_drawing import Overlay
+from cvt_hpc.analysis.measured import Overlay, Side, side_of
 from cvt_hpc.analysis.probability import CONTOURS, PROBABILITY, over_samples
 from cvt_hpc.analysis.sensitivity import (
     ONSET,

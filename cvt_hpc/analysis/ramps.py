@@ -11,8 +11,7 @@ import xarray as xr
 from matplotlib.figure import Figure
 
 from cvt_hpc.analysis import cells, figures
-from cvt_hpc.analysis.measured import FREQUENCY, Side
-from cvt_hpc.analysis.measured_drawing import Overlay, put_legend
+from cvt_hpc.analysis.measured import FREQUENCY, Overlay, Side, put_legend
 from cvt_hpc.analysis.telling_apart import entitle_runs, named, on_axes
 from cvt_hpc.analysis.waterfall import (
     COLOURS,

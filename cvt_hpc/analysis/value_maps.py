@@ -20,8 +20,7 @@ from cvt_hpc.analysis import arrangement as layout
 from cvt_hpc.analysis import cells, figures
 from cvt_hpc.analysis.classes import WITHOUT_RESULT, check_results, count_classes, occurrence_classes
 from cvt_hpc.analysis.curves import check_quantities
-from cvt_hpc.analysis.measured import side_of
-from cvt_hpc.analysis.measured_drawing import Overlay
+from cvt_hpc.analysis.measured import Overlay, side_of
 from cvt_hpc.analysis.probability import ISOLINES, over_samples
 from cvt_hpc.analysis.scatter import is_sampled
 from cvt_hpc.errors import mismatch, one_line

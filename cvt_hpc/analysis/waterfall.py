@@ -21,8 +21,7 @@ from cvt_hpc.analysis import cells
 from cvt_hpc.analysis.classes import WITHOUT_RESULT, check_results, occurrence_classes
 from cvt_hpc.analysis.eigenfrequencies import along_axis
 from cvt_hpc.analysis.figures import WIDTH, check_known, entitle, headline, in_words, on_a_page, styled
-from cvt_hpc.analysis.measured import FREQUENCY, Side, side_of
-from cvt_hpc.analysis.measured_drawing import Overlay, put_legend
+from cvt_hpc.analysis.measured import FREQUENCY, Overlay, Side, put_legend, side_of
 from cvt_hpc.errors import few_of, mismatch
 
 NAME_HEIGHT, LETTER, TITLE = (

@@ -8,8 +8,8 @@ is weighed by how well its runs agree with a measured file, by
 
 n counting misses and false alarms, m cells without a verdict, which are as likely as not, h hits, and p being
 the share of cells that may be judged otherwise by model or rig (`doubt`); df and q are errors of the
-frequencies and ratios of the amplitudes of hits, s_f is `scatter`; do are errors of onsets, whose places are
-known to half a step s_o of the axis. Errors of frequency and amplitude are alike in neighbouring cells: they
+frequencies and ratios of the amplitudes of hits, s_f is `scatter`; do are errors of onsets, s_o their
+standard errors (`measured_score`). Errors of frequency and amplitude are alike in neighbouring cells: they
 count as one measurement each, amplitudes within a factor of two, as a rig measures at another place, and cost
 no more together than misses in place of all hits.
 
@@ -17,7 +17,6 @@ Weights are samples of the posterior distribution. A measurement of noise or sil
 most where its outcome is most open, by the mutual information between outcome and sample.
 """
 
-import json
 import warnings
 from collections.abc import Iterator
 from functools import partial
@@ -26,19 +25,20 @@ from typing import Any, NamedTuple
 
 import numpy as np
 import xarray as xr
+from matplotlib.axes import Axes
 from matplotlib.figure import Figure
 from numpy.typing import NDArray
 
 from cvt_hpc.analysis.arrangement import value_text
 from cvt_hpc.analysis.classes import OccurrenceClass, map_classes
-from cvt_hpc.analysis.figures import WIDTH, axis_label, coordinate_unit, draw
-from cvt_hpc.analysis.measured import ONSET, Measured, read_measured
-from cvt_hpc.analysis.measured_score import Line, Score, joined, score
+from cvt_hpc.analysis.figures import COLOURS, WIDTH, axis_label, coordinate_unit, draw
+from cvt_hpc.analysis.measured import ONSET, Measured, Overlay, Side, read_measured, side_of, within
+from cvt_hpc.analysis.measured_score import COUNTS, Line, joined, score
 from cvt_hpc.analysis.sensitivity import independent
 from cvt_hpc.errors import JobWarning, mismatch
 from cvt_hpc.experiments.outcome import Outcome, Tell
 from cvt_hpc.experiments.sweeps import Sweep, load_sweep, run_sweeps, sweep_lines
-from cvt_hpc.experiments.uncertain_lines import Scattered, given, uncertain_lines
+from cvt_hpc.experiments.uncertain_lines import nearest_distribution, shares_of, uncertain_lines
 from cvt_hpc.job import Job
 from cvt_hpc.job.assignments import Assignments
 from cvt_hpc.job.axes import SAMPLE, SWAPPED
@@ -46,7 +46,7 @@ from cvt_hpc.job.loading import load_job
 from cvt_hpc.job.uncertain import Distribution, Scatter
 from cvt_hpc.job.values import heading, read_value
 from cvt_hpc.parameters import Parameter, positive
-from cvt_hpc.storage.files import read_regular, storage_error, write_rows, written_aside
+from cvt_hpc.storage.files import write_rows, written_aside
 from cvt_hpc.storage.provenance import origin_lines
 from cvt_hpc.study import process_rank
 from cvt_hpc.study.status import STALLED
@@ -54,14 +54,15 @@ from cvt_hpc.tables import columns, number, short
 
 STUDY = "samples"
 FEWEST = 8.0  # effective samples, below which the posterior is not told
-BAND = (0.025, 0.5, 0.975)  # quantiles
+BAND = np.array([0.025, 0.5, 0.975])  # quantiles
 ALIKE = 0.5  # rank correlation from which on two parameters are not told apart
 TOLD = 0.9  # of the band before: a parameter whose band is hardly narrower keeps its distribution
 LEAST_BIT = 0.01  # that a further measurement has to tell
 _FACTOR = np.log(2.0)  # of amplitudes
-_LARGEST_FILE = 2**20
-_DOUBT = Parameter(0.05, "", "", minimum=0.0, maximum=0.5, exclusive=True)
-_SCATTER = positive(20.0, "Hz", "")
+_OPTIONS = {
+    "doubt": Parameter(0.05, "", "", minimum=0.0, maximum=0.5, exclusive=True),
+    "scatter": positive(20.0, "Hz", ""),
+}
 
 Array = NDArray[np.float64]
 
@@ -71,23 +72,19 @@ class Calibration(NamedTuple):
 
     Attributes
     ----------
-    job : Job
-        With uncertain parameters.
+    job, rungs : Job, tuple of Sweep
+        With uncertain parameters, and the one study of its samples.
     measured : Path
         The measured file.
-    doubt : float
-        Share of cells that may be judged otherwise [1].
-    scatter : float
-        Standard error of frequencies [Hz].
-    rungs : tuple of Sweep
-        The one study of the samples.
+    doubt, scatter : float
+        Share of cells that may be judged otherwise [1], standard error of frequencies [Hz].
     """
 
     job: Job
+    rungs: tuple[Sweep, ...]
     measured: Path
     doubt: float
     scatter: float
-    rungs: tuple[Sweep, ...]
 
 
 class Posterior(NamedTuple):
@@ -95,18 +92,16 @@ class Posterior(NamedTuple):
 
     Attributes
     ----------
-    dataset : Dataset
-        Results of the study, over `sample`.
-    measured : Measured
-        What was measured.
-    distributions : tuple of Distribution
-        The uncertain parameters beforehand.
-    values : (parameter, sample) array
-        Their values [SI].
+    dataset, measured : Dataset, Measured
+        Results of the study, over `sample` and its grid, and what was measured.
+    distributions, values : tuple of Distribution, (parameter, sample) array
+        The uncertain parameters beforehand, and their values [SI].
     lines : list of Line
         Agreement of each sample.
     log_likelihood, weights : (sample,) arrays
         ln L, and the weights, whose sum is 1.
+    after : tuple of Distribution
+        Those that are nearest to the weighed samples.
     """
 
     dataset: xr.Dataset
@@ -116,11 +111,17 @@ class Posterior(NamedTuple):
     lines: list[Line]
     log_likelihood: Array
     weights: Array
+    after: tuple[Distribution, ...] = ()
 
     @property
     def best(self) -> Line:
         """Agreement of the likeliest sample."""
         return self.lines[int(np.argmax(self.log_likelihood))]
+
+    @property
+    def effective(self) -> float:
+        """Effective number of samples."""
+        return float(1.0 / (self.weights**2).sum())
 
     def fault(self, doubt: float) -> str:
         """Why the weights state nothing of the parameters; "" where they do."""
@@ -131,34 +132,34 @@ class Posterior(NamedTuple):
             return f"fewer than {FEWEST:.0f} effective samples, too few to state the parameters: take more"
         return ""
 
-    @property
-    def effective(self) -> float:
-        """Effective number of samples."""
-        return float(1.0 / (self.weights**2).sum())
+    def bands(self) -> list[tuple[Array, Array]]:
+        """Quantiles BAND of each parameter before and after the measurement [SI]."""
+        pairs = zip(self.distributions, self.after, strict=True)
+        return [(one.quantiles(BAND), other.quantiles(BAND)) for one, other in pairs]
 
-    def bands(self) -> tuple[Array, Array]:
-        """Quantiles BAND of each parameter before and after the measurement, (parameter, 3) each [SI]."""
-        even = np.full_like(self.weights, 1.0 / self.weights.size)
-        before, after = (np.array([_quantiles(row, w) for row in self.values]) for w in (even, self.weights))
-        return before, after
+    def narrowed(self) -> dict[str, Distribution]:
+        """By its key the distribution after the measurement of each parameter of which the file tells."""
+        found = {}
+        for one, (before, after) in zip(self.after, self.bands(), strict=True):
+            width = np.ptp(before)
+            if np.ptp(after) < TOLD * width or abs(after[1] - before[1]) > (1.0 - TOLD) * width:
+                found[one.key] = one
+        return found
 
     def correlation(self) -> Array:
-        """Rank correlations of the parameters after the measurement, (parameter, parameter)."""
-        ranks = self.values.argsort(axis=1).argsort(axis=1).astype(float)
-        spread = np.cov(ranks, aweights=self.weights, ddof=0).reshape(len(ranks), -1)
+        """Rank correlations of the parameters, (parameter, parameter)."""
+        shares = np.array([shares_of(values, self.weights) for values in self.values])
+        spread = np.cov(shares, aweights=self.weights, ddof=0).reshape(len(shares), -1)
         size = np.sqrt(np.diag(spread))
         found: Array = spread / np.outer(size, size)
         return found
 
     def probability(self) -> xr.DataArray:
-        """Probability of vibration of each cell after the measurement, over the axes of the grid [1]."""
-        classes = map_classes(self.dataset).compute()
-        weights = xr.DataArray(self.weights, dims=SAMPLE)
-        yes, no = (
-            (weights * (classes == kind)).sum(SAMPLE)
-            for kind in (OccurrenceClass.VIBRATING, OccurrenceClass.QUIET)
-        )
-        return (yes / (yes + no).where(yes + no > 0.0)).assign_attrs(units="1", long_name="probability")
+        """Probability of vibration of each cell, over the axes of the grid [1]."""
+        classes, weights = map_classes(self.dataset), xr.DataArray(self.weights, dims=SAMPLE)
+        kinds = OccurrenceClass.VIBRATING, OccurrenceClass.QUIET
+        yes, no = ((weights * (classes == kind)).sum(SAMPLE) for kind in kinds)
+        return yes / (yes + no).where(yes + no > 0.0)
 
 
 def load(
@@ -172,10 +173,8 @@ def load(
 
     Parameters
     ----------
-    path, overrides
-        As `load_job` takes them.
-    measured : str
-        A file as `analysis.measured.read_measured` takes it.
+    path, overrides, measured
+        As `load_job` and `analysis.measured.read_measured` take them.
     doubt, scatter : str, optional
         Share of cells that may be judged otherwise; standard error of frequencies with its unit.
 
@@ -185,30 +184,26 @@ def load(
         If the job is not legal or has no samples, or there is no measured file.
     """
     job = load_job(path, overrides)
-    if SAMPLE not in {axis.name for axis in job.axes} or not _distributions(job):
+    names = {axis.name for axis in job.axes}
+    if SAMPLE not in names or not _distributions(job):
         raise mismatch(f"{job.source}: [uncertain]", "samples of uncertain parameters", "none")
     if job.design.get("kind") == "adaptive":
         raise mismatch(f"{job.source}: [design]", "as many samples in each cell", "adaptive")
-    if not {axis.name for axis in job.axes} - {SAMPLE, SWAPPED}:
-        raise mismatch(
-            f"{job.source}: [axes]", "an axis along which noise was measured, such as load", "none"
-        )
+    where = f"{job.source}: [axes]"
+    if not names - {SAMPLE, SWAPPED}:
+        raise mismatch(where, "an axis along which noise was measured, such as load", "none")
     if measured is None:
         raise mismatch("--measured", "a file with measured noise", "nothing")
-    try:
-        read_regular(Path(measured), _LARGEST_FILE)
-    except (OSError, ValueError) as error:
-        raise storage_error(Path(measured), error) from None
-    shares = {
+    options = {
         name: default.default if told is None else read_value(default, told, f"--{name}")
-        for name, told, default in (("doubt", doubt, _DOUBT), ("scatter", scatter, _SCATTER))
+        for (name, default), told in zip(_OPTIONS.items(), (doubt, scatter), strict=True)
     }
     with warnings.catch_warnings():
         warnings.simplefilter("ignore", JobWarning)  # comes once the runs are there
-        along = read_measured(measured, _without_runs(job), job.source).along
-    if along not in {axis.name for axis in job.axes}:
-        raise mismatch(f"{job.source}: [axes]", f"the axis {along}, as in {measured}", "none of this name")
-    return Calibration(job, Path(measured), **shares, rungs=(Sweep(STUDY, (), job),))
+        along = read_measured(measured, _without_runs(job), job.source, job).along
+    if along not in names:
+        raise mismatch(where, f"the axis {along}, as in {measured}", "none of this name")
+    return Calibration(job, (Sweep(STUDY, (), job),), Path(measured), **options)
 
 
 def _without_runs(job: Job) -> xr.Dataset:
@@ -217,7 +212,7 @@ def _without_runs(job: Job) -> xr.Dataset:
     units = {axis.name: known[axis.name].unit if axis.name in known else "" for axis in job.axes}
     axes = {axis.name: (axis.name, np.array(axis.values), {"units": units[axis.name]}) for axis in job.axes}
     status = [axis.name for axis in job.axes], np.zeros(job.shape, np.int8)
-    return xr.Dataset({"status": status}, axes, {"job": json.dumps(job.resolved())})
+    return xr.Dataset({"status": status}, axes)
 
 
 def _distributions(job: Job) -> tuple[Distribution, ...]:
@@ -235,10 +230,7 @@ def plan_lines(asked: Calibration, out: Path) -> Iterator[str]:
 def make(asked: Calibration, out: Path, *, fresh: bool, tell: Tell) -> Outcome:
     """Do the runs, weigh the samples, and write tables and picture; see `experiment_kinds`.
 
-    Raises
-    ------
-    InputError
-        If a folder holds another job, the measured file does not fit, or the system refuses a file.
+    InputError if a folder holds another job, the measured file does not fit, or the system refuses a file.
     """
     status = run_sweeps(asked.rungs, {}, out, fresh=fresh, tell=tell)
     if status >= STALLED or process_rank() != 0:
@@ -254,42 +246,29 @@ def make(asked: Calibration, out: Path, *, fresh: bool, tell: Tell) -> Outcome:
 
 
 def weigh(asked: Calibration, dataset: xr.Dataset) -> Posterior:
-    """Weigh the samples of a study by a measured file.
-
-    Raises
-    ------
-    InputError
-        If the file does not fit the study.
-    """
-    dataset = independent(dataset).load()
+    """Weigh the samples of a study by a measured file; InputError if the file does not fit the study."""
+    dataset = independent(dataset).load().transpose(SAMPLE, ...)
     # both sets of samples, where there are runs for Sobol indices
     dataset = dataset.assign_coords({SAMPLE: np.arange(dataset.sizes[SAMPLE])})
     agreement = score(dataset, asked.measured, STUDY)
-    lines = _by_sample(agreement, dataset)
     if not sum(agreement.total[:4]):
         raise mismatch(f"{asked.measured}", "cells in its range of which a run is decided", "none")
-    along = dataset[agreement.measured.along]
-    places = np.unique(along.values[np.isfinite(along.values)])
-    step = coordinate_unit(along.attrs)[0] * float(np.median(np.diff(places))) if len(places) > 1 else np.inf
-    values = np.array([_log_likelihood(one, agreement, asked, 0.5 * step) for one in lines])
-    weights = np.exp(values - values.max())
-    distributions = _distributions(asked.job)
-    parameters = np.array([dataset[one.key].values for one in distributions], float)
-    return Posterior(
-        dataset, agreement.measured, distributions, parameters, lines, values, weights / weights.sum()
-    )
-
-
-def _by_sample(agreement: Score, dataset: xr.Dataset) -> list[Line]:
-    """Agreement of each sample, along all its lines."""
     place = agreement.names.index(SAMPLE)
-    found: dict[str, list[Line]] = {value_text(dataset[SAMPLE], k): [] for k in range(dataset.sizes[SAMPLE])}
-    for values, line in agreement.lines:
-        found[values[place]].append(line)
-    return [joined(own) for own in found.values()]
+    own: list[list[Line]] = [[] for _ in range(dataset.sizes[SAMPLE])]
+    for at, line in agreement.lines:
+        own[int(at[place])].append(line)
+    lines = [joined(one) for one in own]
+    likelihood = np.array([_log_likelihood(one, agreement.measured.kind, asked) for one in lines])
+    weights = np.exp(likelihood - likelihood.max())
+    distributions = _distributions(asked.job)
+    values = np.array([dataset[one.key].values for one in distributions], float)
+    weights /= weights.sum()
+    pairs = zip(distributions, values, strict=True)
+    after = tuple(nearest_distribution(one, own, weights) for one, own in pairs)
+    return Posterior(dataset, agreement.measured, distributions, values, lines, likelihood, weights, after)
 
 
-def _log_likelihood(line: Line, agreement: Score, asked: Calibration, half_step: float) -> float:
+def _log_likelihood(line: Line, kind: str, asked: Calibration) -> float:
     each = np.log((1.0 - asked.doubt) / asked.doubt)
     found = -(line.misses + line.false_alarms) * each - line.neither * np.log(2.0 * (1.0 - asked.doubt))
     of_hits = 0.0
@@ -298,17 +277,9 @@ def _log_likelihood(line: Line, agreement: Score, asked: Calibration, half_step:
     if line.amplitude:
         of_hits += 0.5 * (float(np.mean(np.log(line.amplitude))) / _FACTOR) ** 2
     found -= min(of_hits, line.hits * each)
-    if agreement.measured.kind == ONSET:
-        found -= 0.5 * float(np.sum((np.array(line.onset) / half_step) ** 2))
+    if kind == ONSET:
+        found -= 0.5 * float(np.sum((np.array(line.onset) / np.array(line.standard)) ** 2))
     return float(found)
-
-
-def _quantiles(values: Array, weights: Array) -> Array:
-    """Quantiles BAND of weighed samples (n,)."""
-    order = np.argsort(values)
-    shares = np.cumsum(weights[order]) - 0.5 * weights[order]
-    found: Array = np.interp(BAND, shares, values[order])
-    return found
 
 
 def information(asked: Calibration, found: Posterior) -> xr.DataArray:
@@ -333,11 +304,9 @@ def _lines(asked: Calibration, found: Posterior) -> Iterator[str]:
     if fault := found.fault(asked.doubt):
         yield fault
         return
-    rows = [
-        ["parameter", "unit", "before: 2.5 %", "50 %", "97.5 %", "after: 2.5 %", "50 %", "97.5 %", "width"]
-    ]
-    before, after = found.bands()
-    for one, low, high in zip(found.distributions, before, after, strict=True):
+    head = ["before: 2.5 %", "50 %", "97.5 %", "after: 2.5 %", "50 %", "97.5 %", "width"]
+    rows = [["parameter", "unit", *head]]
+    for one, (low, high) in zip(found.distributions, found.bands(), strict=True):
         factor, unit = coordinate_unit(found.dataset[one.key].attrs)
         numbers = [short(factor * value) for value in (*low, *high)]
         rows.append([one.key, unit or "1", *numbers, f"{np.ptp(high) / np.ptp(low):.2f}"])
@@ -347,75 +316,60 @@ def _lines(asked: Calibration, found: Posterior) -> Iterator[str]:
     for i, j in zip(*np.triu_indices(len(names), 1), strict=True):
         if abs(correlation[i, j]) >= ALIKE:
             yield f"not told apart: {names[i]} and {names[j]}, rank correlation {correlation[i, j]:.2f}"
-    bits = information(asked, found).transpose(*_grid(found))
-    bits = bits.where(~_measured_cells(found).transpose(*_grid(found)), -np.inf).fillna(-np.inf)
-    k = np.unravel_index(int(np.argmax(bits.values)), bits.shape)
-    if bits.values[k] < LEAST_BIT:
+    bits = information(asked, found).where(~_measured_cells(found), -np.inf).fillna(-np.inf)
+    at = {name: int(k) for name, k in bits.argmax(...).items()}
+    if (most := float(bits.isel(at))) < LEAST_BIT:
         yield "no cell beyond the measured range would tell more"
         return
-    axes = [found.dataset[name] for name in _grid(found)]
-    told = (f"{axis.name} {value_text(axis, int(n))}" for axis, n in zip(axes, k, strict=True))
-    chance = float(found.probability().transpose(*_grid(found)).values[k])
-    odds = f"which vibrates with a probability of {chance:.2f}: {bits.values[k]:.2f} bit"
-    yield f"measure next: {', '.join(told)}, {odds}"
+    told = ", ".join(f"{name} {value_text(found.dataset[name], k)}" for name, k in at.items())
+    chance = float(found.probability().isel(at))
+    yield f"measure next: {told}, which vibrates with a probability of {chance:.2f}: {most:.2f} bit"
 
 
 def _measured_cells(found: Posterior) -> xr.DataArray:
     """Whether a cell of the grid lies in the measured range, or has an onset or a peak."""
-    grid = found.dataset["status"].isel({SAMPLE: 0}, drop=True)
-    known, loads = xr.zeros_like(grid, bool), found.dataset[found.measured.along]
+    known = xr.zeros_like(found.dataset["status"].isel({SAMPLE: 0}, drop=True), bool)
+    loads = found.dataset[found.measured.along]
     for row in found.measured.rows:
-        span = row.swept if np.isfinite(row.swept).all() else row.span
-        inside = (loads >= span[0]) & (loads <= span[1]) | (loads == row.cell)
+        inside = row.covers(loads.values)
+        if np.isfinite(row.swept).all():
+            inside = inside | within(loads.values, row.swept)
+        cells = loads.copy(data=inside)
         for name, value in row.at.items():
-            inside = inside & (found.dataset[name] == value)
-        known = known | inside
+            cells = cells & (found.dataset[name] == value)
+        known = known | cells
     return known
 
 
-def _grid(found: Posterior) -> list[str]:
-    return [str(name) for name in found.dataset["status"].dims if name != SAMPLE]
-
-
 def _write_table(found: Posterior, path: Path) -> Path:
-    keys = [one.key for one in found.distributions]
-    head = [SAMPLE, *(heading(key, found.dataset[key].attrs) for key in keys)]
-    head += ["hits", "misses", "false_alarms", "correct_silences", "neither", "log_likelihood", "weight"]
-    factors = [coordinate_unit(found.dataset[key].attrs)[0] for key in keys]
+    axes = [found.dataset[one.key] for one in found.distributions]
+    head = [
+        SAMPLE,
+        *(heading(str(axis.name), axis.attrs) for axis in axes),
+        *COUNTS,
+        "log_likelihood",
+        "weight",
+    ]
+    values = [coordinate_unit(axis.attrs)[0] * own for axis, own in zip(axes, found.values, strict=True)]
     rows = (
-        [
-            str(k),
-            *(number(factor * value) for factor, value in zip(factors, found.values[:, k], strict=True)),
-            *map(str, line[:5]),
-            number(found.log_likelihood[k], 6),
-            number(found.weights[k], 6),
-        ]
-        for k, line in enumerate(found.lines)
+        [str(k), *map(number, own), *map(str, line[:5]), number(likelihood, 6), number(weight, 6)]
+        for k, (*own, line, likelihood, weight) in enumerate(
+            zip(*values, found.lines, found.log_likelihood, found.weights, strict=True)
+        )
     )
     return write_rows(path, head, rows, origin_lines(found.dataset.attrs))
 
 
 def _write_part(asked: Calibration, found: Posterior, path: Path) -> Path:
     """Write the table [uncertain] of a job that goes on from here."""
-    parameters, told, kept = [], [], []
-    before, after = found.bands()
-    for k, one in enumerate(found.distributions):
-        has, unit = dict(one.numbers), asked.job.schema.parameters[one.key].unit
-        width, moved = np.ptp(before[k]), abs(after[k, 1] - before[k, 1])
-        if np.ptp(after[k]) >= TOLD * width and moved <= (1.0 - TOLD) * width:
-            numbers = ", ".join(f"{name} = {given(value, unit)}" for name, value in one.numbers)
-            told_before = f'{{ distribution = "{one.kind}", {numbers} }}'
-            kept.append(f"{one.key} = {told_before} # as before: the file hardly tells of it")
-            continue
-        limits = has.get("from", -np.inf), has.get("to", np.inf)
-        parameters.append(Scattered(one.key, unit, one.kind == "log_normal", *limits))
-        told.append(np.log(found.values[k]) if one.kind == "log_normal" else found.values[k])
-    logs = np.array(told).reshape(len(told), -1)
-    spread = np.cov(logs, aweights=found.weights, ddof=0) if told else np.empty(0)
-    covariance = spread.reshape(len(told), -1)
-    mean = logs @ found.weights if told else np.empty(0)
-    lines = uncertain_lines(parameters, mean, covariance, f"by {found.measured.name}")
-    lines[2:2] = kept
+    narrowed, keys = found.narrowed(), [one.key for one in found.distributions]
+    told = [keys.index(key) for key in narrowed]
+    comments = {key: "as before: the file hardly tells of it" for key in keys if key not in narrowed}
+    # correlation of normal scores by that of ranks
+    correlation = 2.0 * np.sin(np.pi / 6.0 * found.correlation()[np.ix_(told, told)])
+    units = {key: asked.job.schema.parameters[key].unit for key in keys}
+    distributions = [narrowed.get(one.key, one) for one in found.distributions]
+    lines = uncertain_lines(f"by {found.measured.name}", distributions, units, correlation, comments)
     with written_aside(path) as aside:
         aside.write_text("\n".join(lines) + "\n", encoding="utf-8")
     return path
@@ -429,15 +383,13 @@ def _figure(found: Posterior) -> Figure:
     upper, lower = figure.subfigures(2, 1, height_ratios=(2.3 * rows, 2.6))
     panels = upper.subplots(rows, min(count, 3), squeeze=False)
     for axes, one, values in zip(panels.flat, found.distributions, found.values, strict=False):
-        array = found.dataset[one.key]
-        factor, unit = coordinate_unit(array.attrs)
+        factor, unit = coordinate_unit(found.dataset[one.key].attrs)
         bins = np.linspace(factor * values.min(), factor * values.max(), 13)
         axes.hist(factor * values, bins, density=True, color="0.8", label="before")
-        after = {"color": "#0072b2", "lw": 1.6, "histtype": "step", "label": "after"}
+        after = {"color": COLOURS[1], "lw": 1.6, "histtype": "step", "label": "after"}
         axes.hist(factor * values, bins, weights=found.weights, density=True, **after)
-        axes.set_xlabel(axis_label(array, unit))
-        axes.set_yticks([])
-    for axes in list(panels.flat)[count:]:
+        axes.set(xlabel=axis_label(found.dataset[one.key], unit), yticks=[])
+    for axes in panels.flat[count:]:
         axes.set_axis_off()
     panels[0, 0].set_ylabel("density")
     panels[0, 0].legend(frameon=False, fontsize=8)
@@ -445,30 +397,22 @@ def _figure(found: Posterior) -> Figure:
     return figure
 
 
-def _draw_probability(axes: Any, found: Posterior) -> None:
-    along = found.measured.along
-    factor, unit = coordinate_unit(found.dataset[along].attrs)
-    places = factor * found.dataset[along].values
-    even = found._replace(weights=np.full_like(found.weights, 1.0 / found.weights.size))
-    for one, style in ((even, {"color": "0.5", "ls": "--"}), (found, {"color": "#0072b2"})):
-        shown = one.probability().transpose(..., along)
-        for k, line in enumerate(shown.values.reshape(-1, shown.sizes[along])):
-            label = ("before" if one is even else "after") if k == 0 else None
-            axes.plot(places, line, marker=".", lw=1.4, label=label, **style)
-    ends = np.array([places.min(), places.max()])
-    named: str | None = "measured"
-    for row in found.measured.rows:
-        low, high = (factor * value for value in row.span)
-        if low < high and low < ends[1] and high > ends[0]:
-            axes.axvspan(*np.clip([low, high], *ends), color="#e69f00", alpha=0.25, lw=0, label=named)
-        elif np.isfinite(row.cell) and ends[0] <= low <= ends[1]:
-            axes.axvline(low, color="#e69f00", lw=1.6, ls="-.", label=named)
-        else:  # a row of silence, or beyond the axis
-            continue
-        named = None
-    axes.set(
-        xlabel=axis_label(found.dataset[along], unit), ylabel="probability of vibration", ylim=(-0.03, 1.03)
-    )
-    others = ", ".join(name.replace("_", " ") for name in _grid(found) if name != along)
-    title = f"a line for each {others}" if others else None
-    axes.legend(frameon=False, fontsize=8, title=title, title_fontsize=8)
+def _draw_probability(axes: Axes, found: Posterior) -> None:
+    name = found.measured.along
+    dataset, even = found.dataset.sortby(name), np.full_like(found.weights, 1.0 / found.weights.size)
+    factor, unit = coordinate_unit(dataset[name].attrs)
+    looks = {"before": (even, "0.5", "--"), "after": (found.weights, COLOURS[1], "-")}
+    for told, (weights, colour, style) in looks.items():
+        one = found._replace(dataset=dataset, weights=weights)
+        shown = one.probability().transpose(name, ...)
+        values = shown.values.reshape(shown.sizes[name], -1)
+        lines = axes.plot(factor * dataset[name].values, values, marker=".", lw=1.4, color=colour, ls=style)
+        lines[0].set_label(told)
+    axes.set(xlabel=axis_label(dataset[name], unit), ylabel="probability of vibration", ylim=(-0.03, 1.03))
+    over, height = Overlay(found.measured, dataset), Side("", np.array(axes.get_ylim()))
+    over.draw(axes, side_of(dataset, name), height, xr.Dataset())
+    others = [str(name) for name in shown.dims[1:]]
+    title = f"a line for each {', '.join(others).replace('_', ' ')}" if others else None
+    handles = [line for line in axes.get_lines() if not line.get_label().startswith("_")]
+    beside = {"loc": "center left", "bbox_to_anchor": (1.0, 0.5), "title": title, "title_fontsize": 8}
+    axes.legend(handles=[*handles, *over.handles], frameon=False, fontsize=8, **beside)

@@ -15,7 +15,7 @@ Laws are compared by Akaike's criterion for small samples (Hurvich and Tsai 1989
 normal force; whether the coefficient does is found from the residuals.
 """
 
-from collections.abc import Mapping, Sequence
+from collections.abc import Iterator, Sequence
 from functools import partial
 from pathlib import Path
 from typing import Any, NamedTuple
@@ -23,13 +23,13 @@ from typing import Any, NamedTuple
 import numpy as np
 from matplotlib.figure import Figure
 from numpy.typing import NDArray
-from scipy.optimize import least_squares
+from scipy.optimize import approx_fprime, least_squares
 
 from cvt_hpc.analysis.figures import WIDTH, draw, line_style
+from cvt_hpc.analysis.measured import Fault, read_columns
 from cvt_hpc.errors import mismatch
-from cvt_hpc.experiments.uncertain_lines import Scattered, given, uncertain_lines
-from cvt_hpc.job.csv_files import read_csv
-from cvt_hpc.parameters import Column, FromFile, RowError
+from cvt_hpc.experiments.uncertain_lines import given, uncertain_lines
+from cvt_hpc.job.uncertain import Distribution
 from cvt_hpc.physics.friction import friction_coefficients, friction_law
 from cvt_hpc.physics.friction_laws import OTHER_NAMES, Law
 from cvt_hpc.storage.files import written_aside
@@ -40,28 +40,26 @@ _COLUMNS = {"force": ("N/m", "N", "Pa"), "speed": ("m/s",), "mu": ("",), "specim
 _SCALES = 7  # speed scales at which the search begins
 _LARGEST = 1e8  # condition of J, by columns of one size, up to which the points determine a law
 _CERTAIN = 1.96  # standard errors
-_PARAMETERS = {"kinetic_friction": "", "friction_gradient": "s/m", "stribeck_velocity": "m/s"}
+_UNITS = {"kinetic_friction": "", "friction_gradient": "s/m", "stribeck_velocity": "m/s"}
+_SCALE = "stribeck_velocity"  # in x by its logarithm
 
 Array = NDArray[np.float64]
 
 
-class Measured(NamedTuple):
-    """Measured coefficients of friction, (n,) each.
+class Points(NamedTuple):
+    """Measured coefficients of friction: arrays (n,).
 
     Attributes
     ----------
-    speed, mu, force, specimen : (n,) arrays
-        Sliding speed [m/s], coefficient [1], normal force [`force_unit`] and number of the specimen; the last
+    speed, mu, force, specimen : arrays
+        Sliding speed [m/s], coefficient [1], normal force in any unit and number of the specimen; the last
         two are nan and 0 where the file has no such column.
-    force_unit : str
-        SI unit of the forces.
     """
 
     speed: Array
     mu: Array
     force: Array
     specimen: Array
-    force_unit: str
 
 
 class Fitted(NamedTuple):
@@ -69,142 +67,115 @@ class Fitted(NamedTuple):
 
     Attributes
     ----------
-    law : Law
-        Which one.
-    keys : tuple of str
-        The parameters that it reads, in the order of x.
-    estimate, covariance : (k,) and (k, k) arrays
-        Of x [SI]; the logarithm of a speed.
-    rms : float
-        Root mean square of the residuals of the best fit to all points [1].
-    independent : float
-        n_e / n of these.
+    law, estimate, covariance : Law, (k,) and (k, k) arrays
+        Which one, and of x [SI], which has the logarithm of a speed.
+    rms, independent : float
+        Root mean square of the residuals of the best fit to all points [1], and n_e / n of these.
+    of_specimens : int
+        Specimens whose scatter the covariance is; 0: it is the uncertainty of the mean law.
     criterion : float
         Akaike's criterion for small samples, n_e being that of the law whose residuals are correlated least:
         the law of the least criterion is the best.
-    of_specimens : int
-        Specimens whose scatter the covariance is; 0: it is the uncertainty of the mean law.
     """
 
     law: Law
-    keys: tuple[str, ...]
     estimate: Array
     covariance: Array
     rms: float
     independent: float
-    criterion: float
     of_specimens: int
+    criterion: float = np.inf
 
+    @property
     def values(self) -> dict[str, float]:
         """Values of the law's parameters by key [SI]."""
-        return _values(self.keys, self.estimate)
+        return _values(self.law, self.estimate)
 
+    @property
     def deviations(self) -> dict[str, float]:
         """Standard deviations of these [SI]; of a speed by its logarithm, to first order."""
-        found = dict(zip(self.keys, np.sqrt(np.diag(self.covariance)).tolist(), strict=True))
-        return {key: one * (self.values()[key] if _is_log(key) else 1.0) for key, one in found.items()}
+        sizes = np.sqrt(np.diag(self.covariance)).tolist()
+        found = dict(zip(keys_of(self.law), sizes, strict=True))
+        return {key: one * (self.values[key] if key == _SCALE else 1.0) for key, one in found.items()}
 
     def band(self, speeds: Array) -> tuple[Array, Array]:
         """Coefficients at speeds (n,) [m/s] and their standard deviation, to first order."""
-        slopes = _slopes(self.law, self.keys, self.estimate, speeds)
+        slopes = _slopes(self.law, self.estimate, speeds)
         deviation = np.sqrt(np.einsum("ij,jk,ik->i", slopes, self.covariance, slopes))
-        return _curve(self.law, self.keys, self.estimate, speeds), deviation
+        return _curve(self.law, self.estimate, speeds), deviation
 
 
-def read_measured(path: str | Path) -> Measured:
+def keys_of(law: Law) -> tuple[str, ...]:
+    """Parameters of a law that are fitted, in the order of x."""
+    return law.reads[:1] if law is Law.COULOMB else law.reads
+
+
+def read_points(path: str | Path) -> Points:
     """Read measured coefficients of friction from a CSV file.
 
-    Parameters
-    ----------
-    path : path-like
-        Columns `speed` [m/s] and `mu`; `force` [N, N/m or Pa] and `specimen`, a number, may be there, too.
-        Rows may be repeated.
-
-    Raises
-    ------
-    InputError
-        If the file cannot be read, or a row is not legal.
+    Its columns are `speed` and `mu`; `force` [N, N/m or Pa] and `specimen`, a number, may be there, too. Rows
+    may be repeated. InputError if the file cannot be read, or a row is not legal.
     """
-    file = FromFile(_COLUMNS, ("speed", "mu"), (), _measured, OTHER_NAMES)
-    found: Measured = read_csv(file, str(path), "", "cvt-hpc friction")["measured"]
-    return found
+    needed = ("speed", "mu")
+    found = read_columns(path, "cvt-hpc friction", _COLUMNS, needed, _faults, OTHER_NAMES)
+    speed, mu = (found[name] for name in needed)
+    force, specimen = (
+        found.get(name, np.full(speed.size, none)) for name, none in (("force", np.nan), ("specimen", 0.0))
+    )
+    return Points(speed, mu, force, specimen)
 
 
-def _measured(table: Mapping[str, Column]) -> dict[str, Any]:
-    arrays = {name: np.array(column.values) for name, column in table.items()}
-    for row, (speed, mu) in enumerate(zip(arrays["speed"], arrays["mu"], strict=True)):
-        if speed < 0.0:
-            raise RowError(row, "a speed of 0 or more (a magnitude)", f"{speed:g} m/s")
-        if mu <= 0.0:
-            raise RowError(row, "a coefficient of friction > 0", f"{mu:g}")
-    count = len(arrays["speed"])
-    force = arrays.get("force", np.full(count, np.nan))
-    unit = table["force"].unit if "force" in table else ""
-    specimen = arrays.get("specimen", np.zeros(count))
-    if len(np.unique(arrays["speed"])) < LEAST_SPECIMENS:
+def _faults(values: dict[str, Array]) -> Iterator[Fault]:
+    yield ("speed",), "a speed of 0 or more (a magnitude)", values["speed"] < 0.0
+    yield ("mu",), "a coefficient of friction > 0", values["mu"] <= 0.0
+    if len(np.unique(values["speed"])) < LEAST_SPECIMENS:
         raise ValueError(f"expected {LEAST_SPECIMENS} different speeds or more, found fewer")
-    return {"measured": Measured(arrays["speed"], arrays["mu"], force, specimen, unit)}
 
 
-def _is_log(key: str) -> bool:
-    return key == "stribeck_velocity"
+def _values(law: Law, x: Array) -> dict[str, float]:
+    told = dict(zip(keys_of(law), x.tolist(), strict=True))
+    return told | ({_SCALE: float(np.exp(told[_SCALE]))} if _SCALE in told else {})
 
 
-def _values(keys: Sequence[str], x: Array) -> dict[str, float]:
-    return {key: float(np.exp(one) if _is_log(key) else one) for key, one in zip(keys, x, strict=True)}
-
-
-def _curve(law: Law, keys: Sequence[str], x: Array, speeds: Array) -> Array:
+def _curve(law: Law, x: Array, speeds: Array) -> Array:
     """Coefficients of a law (n,) at speeds (n,) [m/s]."""
-    has = {"friction_gradient": 0.0, "stribeck_velocity": 1.0} | _values(keys, x)
-    kinetic, gradient, scale = (has[key] for key in _PARAMETERS)
+    has = dict(zip(_UNITS, (0.0, 0.0, 1.0), strict=True)) | _values(law, x)
+    kinetic, gradient, scale = has.values()
     made = friction_law(law.name.lower(), kinetic, gradient, scale)
     found: Array = friction_coefficients(made, speeds, np.zeros_like(speeds))
     return found
 
 
-def _slopes(law: Law, keys: Sequence[str], x: Array, speeds: Array) -> Array:
+def _slopes(law: Law, x: Array, speeds: Array) -> Array:
     """Slopes of the coefficients by x, (n, k)."""
     steps = np.maximum(1e-6 * np.abs(x), 1e-9)
-    ways = np.diag(steps)
-    return np.stack(
-        [
-            (_curve(law, keys, x + way, speeds) - _curve(law, keys, x - way, speeds)) / (2.0 * step)
-            for way, step in zip(ways, steps, strict=True)
-        ],
-        axis=1,
-    )
+    slopes: Array = approx_fprime(x, lambda at: _curve(law, at, speeds), steps)
+    return slopes.reshape(speeds.size, x.size)
 
 
-def _least(law: Law, keys: Sequence[str], speed: Array, mu: Array) -> Array:
-    """The x of least squares, from several speed scales; the fall is never negative."""
-    moving, level = speed[speed > 0.0], float(mu.mean())
+def _least(law: Law, speed: Array, mu: Array) -> Array | None:
+    """The x of least squares, from several speed scales; None where the points do not determine it.
+
+    The fall is never negative.
+    """
+    keys, moving, level = keys_of(law), speed[speed > 0.0], float(mu.mean())
+    if len(np.unique(speed)) <= len(keys):
+        return None
     low, high = np.log(moving.min() / 3.0), np.log(3.0 * moving.max())
-    box = {
-        "kinetic_friction": (1e-6, 10.0),
-        "friction_gradient": (-1e4, 0.0),
-        "stribeck_velocity": (low, high),
-    }
-    scales = (
-        np.linspace(low, high, _SCALES + 2)[1:-1] if "stribeck_velocity" in keys else [np.log(speed.max())]
-    )
-    best = None
+    box = dict(zip(_UNITS, ((1e-6, 10.0), (-1e4, 0.0), (low, high)), strict=True))
+    scales = np.linspace(low, high, _SCALES + 2)[1:-1] if _SCALE in keys else [np.log(speed.max())]
+    drop, fits = max(float(np.ptp(mu)), 1e-6 * level), []
     for scale in scales:
-        drop = max(float(np.ptp(mu)), 1e-6 * level)
-        first = {
-            "kinetic_friction": level if law is Law.HYPERBOLIC else max(float(mu.min()), 1e-5),
-            "friction_gradient": -drop / float(np.exp(scale)),
-            "stribeck_velocity": scale,
-        }
-        found = least_squares(
-            lambda x: _curve(law, keys, x, speed) - mu,
-            [first[key] for key in keys],
-            bounds=tuple(zip(*(box[key] for key in keys), strict=True)),
-            x_scale=[1.0 if _is_log(key) else max(abs(first[key]), 1e-9) for key in keys],
-        )
-        best = found if best is None or found.cost < best.cost else best
-    assert best is not None
-    return np.asarray(best.x)
+        first = level if law is Law.HYPERBOLIC else max(float(mu.min()), 1e-5)
+        start = np.array([first, -drop / np.exp(scale), scale])[: len(keys)]
+        sizes = np.maximum(np.abs([*start[:2], 1.0][: len(keys)]), 1e-9)
+        bounds = tuple(zip(*(box[key] for key in keys), strict=True))
+        fits.append(least_squares(lambda x: _curve(law, x, speed) - mu, start, bounds=bounds, x_scale=sizes))
+    x = np.asarray(min(fits, key=lambda fit: fit.cost).x)
+    slopes = _slopes(law, x, speed)
+    size = np.linalg.norm(slopes, axis=0)
+    is_determined = (size > 0.0).all() and np.linalg.cond(slopes / size) < _LARGEST
+    return x if is_determined else None
 
 
 def _independent(residuals: Array, speed: Array) -> float:
@@ -216,200 +187,144 @@ def _independent(residuals: Array, speed: Array) -> float:
     return (1.0 - r) / (1.0 + r)
 
 
-def fit_law(law: Law, measured: Measured) -> Fitted | None:
-    """Fit a law to measured coefficients.
-
-    Returns
-    -------
-    Fitted or None
-        None where the points do not determine the law's parameters, such as a speed scale without a fall.
-    """
-    read = law.reads[:1] if law is Law.COULOMB else law.reads
-    keys = tuple(key for key in _PARAMETERS if key in read)
-    speed, mu, k = measured.speed, measured.mu, len(keys)
-    x = _least(law, keys, speed, mu)
-    residuals = _curve(law, keys, x, speed) - mu
-    n, square = len(mu), float((residuals**2).sum())
-    slopes = _slopes(law, keys, x, speed)
-    if n <= k + 2 or not _determined(slopes):
+def fit_law(law: Law, points: Points) -> Fitted | None:
+    """Fit a law; None where the points do not determine it, such as a speed scale without a fall."""
+    speed, mu, k = points.speed, points.mu, len(keys_of(law))
+    n, x = len(mu), _least(law, speed, mu)
+    if n <= k + 2 or x is None:
         return None
-    share = _independent(residuals, speed)
+    residuals, slopes = _curve(law, x, speed) - mu, _slopes(law, x, speed)
+    square, share = float((residuals**2).sum()), _independent(residuals, speed)
     variance = square / max(n - k / share, 1.0)
     covariance: Any = variance * np.linalg.inv(slopes.T @ slopes) / share
-    count, parts = 0, (measured.specimen == one for one in np.unique(measured.specimen))
-    own = [
-        one for one in (_of_specimen(law, keys, speed[part], mu[part]) for part in parts) if one is not None
-    ]
-    if len(own) >= LEAST_SPECIMENS and (np.ptp(own, axis=0) > 0.0).all():
-        count, x = len(own), np.mean(own, axis=0)
-        covariance = np.cov(own, rowvar=False).reshape(k, -1).astype(np.float64)
-    return Fitted(law, keys, x, covariance, float(np.sqrt(square / n)), share, np.inf, count)
+    parts = [points.specimen == one for one in np.unique(points.specimen)]
+    parts = parts if len(parts) >= LEAST_SPECIMENS else []
+    own = [one for part in parts if (one := _least(law, speed[part], mu[part])) is not None]
+    is_scatter = len(own) >= LEAST_SPECIMENS and bool((np.ptp(own, axis=0) > 0.0).all())
+    if is_scatter:
+        x, covariance = np.mean(own, axis=0), np.cov(own, rowvar=False).reshape(k, -1).astype(float)
+    return Fitted(law, x, covariance, float(np.sqrt(square / n)), share, len(own) * is_scatter)
 
 
-def _of_specimen(law: Law, keys: Sequence[str], speed: Array, mu: Array) -> Array | None:
-    """The x of a specimen alone; None where its points do not determine it."""
-    if len(np.unique(speed)) <= len(keys):
-        return None
-    x = _least(law, keys, speed, mu)
-    return x if _determined(_slopes(law, keys, x, speed)) else None
-
-
-def _determined(slopes: Array) -> bool:
-    size = np.linalg.norm(slopes, axis=0)
-    return bool((size > 0.0).all() and np.linalg.cond(slopes / size) < _LARGEST)
-
-
-def fit_laws(measured: Measured) -> list[Fitted]:
-    """Fit every law that has a formula; the best comes first.
-
-    Raises
-    ------
-    InputError
-        If the points determine none.
-    """
-    found = [fit_law(law, measured) for law in Law if law is not Law.TABLE]
-    sound = [one for one in found if one]
-    if not sound:
-        raise mismatch("cvt-hpc friction", "more points than a law has parameters", str(len(measured.mu)))
-    points = len(measured.mu) * max(one.independent for one in sound)
+def fit_laws(points: Points) -> list[Fitted]:
+    """Fit every law that has a formula; the best comes first. InputError if the points determine none."""
+    found = [one for law in Law if law is not Law.TABLE if (one := fit_law(law, points))]
+    if not found:
+        raise mismatch("cvt-hpc friction", "more points than a law has parameters", str(len(points.mu)))
+    count = len(points.mu) * max(one.independent for one in found)
 
     def criterion(one: Fitted) -> float:
-        k = len(one.keys) + 1  # the variance, too
-        spare = max(points - k - 1.0, 0.5)
-        return points * np.log(max(one.rms**2, 1e-30)) + 2.0 * k * points / spare
+        k = len(one.estimate) + 1  # the variance, too
+        spare = max(count - k - 1.0, 0.5)
+        return float(count * np.log(max(one.rms**2, 1e-30)) + 2.0 * k * count / spare)
 
-    judged = (one._replace(criterion=float(criterion(one))) for one in sound)
+    judged = (one._replace(criterion=criterion(one)) for one in found)
     return sorted(judged, key=lambda one: one.criterion)
 
 
-def by_force(fitted: Fitted, measured: Measured) -> tuple[float, float] | None:
+def by_force(fitted: Fitted, points: Points) -> tuple[float, float] | None:
     """Change of the coefficient from the least to the largest force over its mean, and its error."""
-    if not np.isfinite(measured.force).all() or np.ptp(measured.force) == 0.0:
+    if not np.isfinite(points.force).all() or np.ptp(points.force) == 0.0:
         return None
-    residuals = measured.mu - _curve(fitted.law, fitted.keys, fitted.estimate, measured.speed)
-    share = (measured.force - measured.force.min()) / np.ptp(measured.force)
-    for one in np.unique(measured.specimen):  # what specimens have of their own is no effect of their forces
-        part = measured.specimen == one
-        share[part], residuals[part] = (
-            share[part] - share[part].mean(),
-            residuals[part] - residuals[part].mean(),
-        )
+    residuals = points.mu - _curve(fitted.law, fitted.estimate, points.speed)
+    share = (points.force - points.force.min()) / np.ptp(points.force)
+    for one in np.unique(points.specimen):  # what specimens have of their own is no effect of their forces
+        for values in (share, residuals):
+            values[points.specimen == one] -= values[points.specimen == one].mean()
     square = float((share**2).sum())
     if square < 1e-9:
         return None
     slope = float((share * residuals).sum()) / square
     left = residuals - slope * share
-    variance = float((left**2).sum()) / max(len(left) - 2, 1) / square / _independent(left, measured.speed)
-    return slope / float(measured.mu.mean()), float(np.sqrt(variance)) / float(measured.mu.mean())
+    variance = float((left**2).sum()) / max(len(left) - 2, 1) / square / _independent(left, points.speed)
+    return slope / float(points.mu.mean()), float(np.sqrt(variance)) / float(points.mu.mean())
 
 
 def job_lines(fitted: Fitted) -> list[str]:
     """Tables [friction] and [uncertain] of a job, with the law and its uncertainty."""
-    values = fitted.values()
+    values, deviations = fitted.values, np.sqrt(np.diag(fitted.covariance))
     lines = ["[friction]", f'friction_law = "{fitted.law.name.lower()}"']
     if fitted.law is Law.COULOMB:
         lines.append("friction_gradient = 0")
-    certain = [f"{key} = {given(value, _PARAMETERS[key])}" for key, value in values.items()]
-    if not (np.diag(fitted.covariance) > 0.0).all():  # points without any scatter
+    certain = [f"{key} = {given(value, _UNITS[key])}" for key, value in values.items()]
+    if not (deviations > 0.0).all():  # points without any scatter
         return [*lines, *certain]
     lines += ["# for the law without its uncertainty, leave the other tables out"]
     lines += [f"# {line}" for line in certain]
-    least = 0.1 * values["kinetic_friction"]
-    limits = {"kinetic_friction": (least, np.inf), "friction_gradient": (-np.inf, 0.0)}
-    parameters = [
-        Scattered(key, unit, _is_log(key), *limits.get(key, ()))
-        for key, unit in _PARAMETERS.items()
-        if key in fitted.keys
-    ]
+    limits = {
+        "kinetic_friction": (("from", 0.1 * values["kinetic_friction"]),),
+        "friction_gradient": (("to", 0.0),),
+    }
+    distributions = []
+    for (key, mean), deviation in zip(values.items(), deviations.tolist(), strict=True):
+        if key == _SCALE:  # moments of a value whose logarithm is normal
+            mean *= float(np.exp(0.5 * deviation**2))
+            deviation = mean * float(np.sqrt(np.expm1(deviation**2)))
+        kind = "log_normal" if key == _SCALE else "normal"
+        numbers = (("mean", mean), ("standard_deviation", deviation), *limits.get(key, ()))
+        distributions.append(Distribution(key, kind, numbers))
     count = fitted.of_specimens
     what = f"scatter of {count} specimens" if count else "uncertainty of the mean law"
-    return [*lines, "", *uncertain_lines(parameters, fitted.estimate, fitted.covariance, what)]
+    correlation = fitted.covariance / np.outer(deviations, deviations)
+    return [*lines, "", *uncertain_lines(what, distributions, _UNITS, correlation)]
 
 
-def law_lines(laws: Sequence[Fitted], measured: Measured) -> list[str]:
-    """Lines that state what was measured and every fit; the best law stands first."""
-    rows = [("law", *(f"{key} [{unit or 1}]" for key, unit in _PARAMETERS.items()), "rms [1]", "criterion")]
-    for one in laws:
-        values, deviations = one.values(), one.deviations()
-        cells = [
-            f"{short(values[key])} +- {deviations[key]:.2g}" if key in values else "" for key in _PARAMETERS
-        ]
-        rows.append(
-            (one.law.name.lower(), *cells, f"{one.rms:.2g}", f"{one.criterion - laws[0].criterion:.1f}")
-        )
-    speeds, specimens = measured.speed, len(np.unique(measured.specimen))
-    lines = [
+def law_lines(laws: Sequence[Fitted], points: Points) -> Iterator[str]:
+    """Yield lines that state what was measured and every fit; the best law stands first."""
+    best, speeds, specimens = laws[0], points.speed, len(np.unique(points.specimen))
+    yield (
         f"{len(speeds)} points from {1e3 * speeds.min():g} to {1e3 * speeds.max():g} mm/s, "
-        f"{specimens} specimen{'s' * (specimens > 1)}",
-        *columns(rows, indent=""),
-    ]
-    best = laws[0]
-    whose = (
-        f"are the scatter of {best.of_specimens} specimens"
-        if best.of_specimens
-        else f"are those of the mean law; the scatter of variators takes {LEAST_SPECIMENS} specimens or more"
+        f"{specimens} specimen{'s' * (specimens > 1)}"
     )
-    lines.append(f"standard deviations {whose}")
+    rows = [["law", *(f"{key} [{unit or 1}]" for key, unit in _UNITS.items()), "rms [1]", "criterion"]]
+    for one in laws:
+        values, deviations = one.values, one.deviations
+        cells = [f"{short(values[key])} +- {deviations[key]:.2g}" if key in values else "" for key in _UNITS]
+        rows.append([one.law.name.lower(), *cells, f"{one.rms:.2g}", f"{one.criterion - best.criterion:.1f}"])
+    yield from columns(rows, indent="")
+    if best.of_specimens:
+        yield f"standard deviations are the scatter of {best.of_specimens} specimens"
+    else:
+        whose = f"the scatter of variators takes {LEAST_SPECIMENS} specimens or more"
+        yield f"standard deviations are those of the mean law; {whose}"
     if best.of_specimens and (out := specimens - best.of_specimens):
-        lines.append(f"left out of the scatter: {out}, whose points do not determine the law")
-    if (change := by_force(best, measured)) is not None:
-        share, error = change
-        lines.append(
-            f"from the least to the largest force the coefficient changes by {100 * share:+.1f} % "
-            f"+- {100 * error:.1f} %"
-            + ("" if abs(share) <= _CERTAIN * error else ": no law has that, but friction_law table")
-        )
-    return lines
+        yield f"left out of the scatter: {out}, whose points do not determine the law"
+    if (change := by_force(best, points)) is not None:
+        share, error = (100.0 * one for one in change)
+        told = "" if abs(share) <= _CERTAIN * error else ": no law has that, but friction_law table"
+        changes = f"changes by {share:+.1f} % +- {error:.1f} %{told}"
+        yield f"from the least to the largest force the coefficient {changes}"
 
 
 def write_fit(path: Path, out: Path) -> tuple[list[str], list[tuple[str, Path]]]:
-    """Fit all laws to a file; write a fragment of a job with the best, and a picture.
+    """Fit all laws to a file; write a fragment of a job with the best to `out`, and a picture beside it.
 
-    Parameters
-    ----------
-    path : Path
-        The measured file.
-    out : Path
-        The fragment, .toml; the picture stands beside it, .png.
-
-    Returns
-    -------
-    lines, files
-        What was found, and what was written.
-
-    Raises
-    ------
-    InputError
-        If the file is not legal, or the system refuses to write.
+    Returns what was found, as lines, and what was written. InputError if the file is not legal, or the system
+    refuses to write.
     """
-    measured = read_measured(path)
-    laws = fit_laws(measured)
+    points = read_points(path)
+    laws = fit_laws(points)
     text = [f"# Friction fitted to {path.name} by cvt-hpc friction", *job_lines(laws[0])]
     with written_aside(out, parents=True) as aside:
         aside.write_text("\n".join(text) + "\n", encoding="utf-8")
-    picture = draw(partial(_figure, laws, measured), out.with_suffix(".png"))
-    return law_lines(laws, measured), [("job", out), ("picture", picture)]
+    picture = draw(partial(_figure, laws, points), out.with_suffix(".png"))
+    return list(law_lines(laws, points)), [("job", out), ("picture", picture)]
 
 
-def _figure(laws: Sequence[Fitted], measured: Measured) -> Figure:
+def _figure(laws: Sequence[Fitted], points: Points) -> Figure:
     """Points, all laws, and of the best one the band of two standard deviations."""
     figure = Figure((WIDTH, 4.2), layout="constrained")
-    axes = figure.subplots()
-    grid = np.linspace(0.0, 1.05 * measured.speed.max(), 300)
-    axes.plot(1e3 * measured.speed, measured.mu, ".", color="0.45", markersize=4, label="measured")
+    axes, best = figure.subplots(), laws[0]
+    grid = np.linspace(0.0, 1.05 * points.speed.max(), 300)
+    shown = 1e3 * grid
+    axes.plot(1e3 * points.speed, points.mu, ".", color="0.45", markersize=4, label="measured")
     for k, one in enumerate(laws):
-        curve, deviation = one.band(grid)
-        name = one.law.name.lower() + (" (best)" if k == 0 else "")
-        axes.plot(
-            1e3 * grid, curve, label=name, **line_style(k) | {"marker": "", "lw": 1.8 if k == 0 else 1.1}
-        )
-        if k == 0:
-            whose = f"{one.of_specimens} specimens" if one.of_specimens else "the mean law"
-            low, high = curve - 2.0 * deviation, curve + 2.0 * deviation
-            axes.fill_between(
-                1e3 * grid, low, high, alpha=0.25, lw=0, label=f"2 standard deviations of {whose}"
-            )
-    axes.set(xlabel="sliding speed [mm/s]", ylabel="coefficient of friction [1]")
-    axes.set_xlim(0.0, 1e3 * grid[-1])
+        look = line_style(k) | {"marker": "", "lw": 1.1 if k else 1.8}
+        axes.plot(shown, one.band(grid)[0], label=one.law.name.lower() + " (best)" * (k == 0), **look)
+    curve, deviation = best.band(grid)
+    whose = f"{best.of_specimens} specimens" if best.of_specimens else "the mean law"
+    label = f"2 standard deviations of {whose}"
+    axes.fill_between(shown, curve - 2.0 * deviation, curve + 2.0 * deviation, alpha=0.25, lw=0, label=label)
+    axes.set(xlabel="sliding speed [mm/s]", ylabel="coefficient of friction [1]", xlim=shown[[0, -1]])
     figure.legend(loc="outside lower center", ncols=3, frameon=False)
     return figure

@@ -1,53 +1,15 @@
-"""The table [uncertain] of a job, from the mean and the covariance of its parameters."""
+"""The table [uncertain] of a job, and the distribution that is nearest to weighed samples."""
 
-from collections.abc import Sequence
-from typing import NamedTuple
+from collections.abc import Mapping, Sequence
 
 import numpy as np
 from numpy.typing import NDArray
 
+from cvt_hpc.job.uncertain import Distribution
+
 Array = NDArray[np.float64]
 SAMPLES = 64
-
-
-class Scattered(NamedTuple):
-    """A parameter that scatters: key, SI unit, whether its logarithm is normal, limits [SI]."""
-
-    key: str
-    unit: str
-    is_log: bool = False
-    low: float = -np.inf
-    high: float = np.inf
-
-
-def uncertain_lines(parameters: Sequence[Scattered], mean: Array, covariance: Array, what: str) -> list[str]:
-    """Lines of the table.
-
-    Parameters
-    ----------
-    parameters : sequence of Scattered
-        The parameters.
-    mean, covariance : (k,) and (k, k) arrays
-        Of their values [SI], or of the logarithms of these.
-    what : str
-        What scatters, for a comment.
-    """
-    deviation = np.sqrt(np.diag(covariance))
-    lines = [f"[uncertain] # {what}", f"samples = {SAMPLES}"]
-    for one, centre, spread in zip(parameters, mean.tolist(), deviation.tolist(), strict=True):
-        kind, of_value, limits = "normal", centre, ""
-        if one.is_log:  # moments of a value whose logarithm is normal
-            kind, of_value = "log_normal", float(np.exp(centre + 0.5 * spread * spread))
-            spread = of_value * float(np.sqrt(np.expm1(spread * spread)))
-        for name, limit in (("from", one.low), ("to", one.high)):
-            limits += f", {name} = {given(limit, one.unit)}" if np.isfinite(limit) else ""
-        numbers = f"mean = {given(of_value, one.unit)}, standard_deviation = {given(spread, one.unit)}"
-        lines.append(f'{one.key} = {{ distribution = "{kind}", {numbers}{limits} }}')
-    if len(parameters) > 1:
-        rows = ["[" + ", ".join(f"{one:.4f}" for one in row) + "]" for row in _correlation(covariance)]
-        names = ", ".join(f'"{one.key}"' for one in parameters)
-        lines += ["", "[uncertain.correlation]", f"parameters = [{names}]", f"matrix = [{', '.join(rows)}]"]
-    return lines
+_BOUNDS = [-2.0, -1.0], [2.0, 2.0]  # of place in standard deviations, and of the logarithm of the width
 
 
 def given(value: float, unit: str) -> str:
@@ -55,11 +17,72 @@ def given(value: float, unit: str) -> str:
     return f'"{value:.6g} {unit}"' if unit else f"{value:.6g}"
 
 
-def _correlation(covariance: Array) -> Array:
-    """Correlations, reduced until four digits keep their matrix positive definite."""
-    deviation = np.sqrt(np.diag(covariance))
-    matrix = covariance / np.outer(deviation, deviation)
-    least = float(np.linalg.eigvalsh(matrix).min())
-    share = max(0.0, (1e-3 - least) / (1.0 - least))
-    found: Array = (1.0 - share) * matrix + share * np.eye(len(matrix))
-    return found
+def uncertain_lines(
+    what: str,
+    distributions: Sequence[Distribution],
+    units: Mapping[str, str],
+    correlation: Array,
+    comments: Mapping[str, str] | None = None,
+) -> list[str]:
+    """Lines of the table: `what` scatters, for a comment, SI units and further comments by parameter.
+
+    `correlation` is that of the normal scores of the parameters without a comment, which are independent of
+    the others.
+    """
+    lines, told = [f"[uncertain] # {what}", f"samples = {SAMPLES}"], dict(comments or {})
+    for one in distributions:
+        numbers = ", ".join(f"{name} = {given(value, units[one.key])}" for name, value in one.numbers)
+        line = f'{one.key} = {{ distribution = "{one.kind}", {numbers} }}'
+        lines.append(f"{line} # {told[one.key]}" if one.key in told else line)
+    names = [f'"{one.key}"' for one in distributions if one.key not in told]
+    if len(names) > 1:
+        # reduced until four digits keep the matrix positive definite
+        least = float(np.linalg.eigvalsh(correlation).min())
+        share = max(0.0, (1e-3 - least) / (1.0 - least))
+        matrix = (1.0 - share) * correlation + share * np.eye(len(names))
+        rows = ["[" + ", ".join(f"{one:.4f}" for one in row) + "]" for row in matrix]
+        head = f"parameters = [{', '.join(names)}]"
+        lines += ["", "[uncertain.correlation]", head, f"matrix = [{', '.join(rows)}]"]
+    return lines
+
+
+def shares_of(values: Array, weights: Array) -> Array:
+    """Share of weighed samples (n,) below each, half of its own weight included."""
+    order, shares = np.argsort(values), np.empty_like(values)
+    shares[order] = np.cumsum(weights[order]) - 0.5 * weights[order]
+    return shares
+
+
+def nearest_distribution(prior: Distribution, values: Array, weights: Array) -> Distribution:
+    """Return the distribution that is nearest to weighed samples (n,) of a prior one.
+
+    It is uniform, or normal, or log-normal where the prior is, and stays within the limits of that. Its
+    numbers make the mean square of the difference of both cumulative distributions least (Cramer-von Mises),
+    and of both kinds the one is taken of which that is less. Below the k-th of m independent samples lies on
+    average the share k / (m + 1); m is the effective number of the weighed ones.
+    """
+    from scipy.optimize import least_squares
+
+    has, count = dict(prior.numbers), 1.0 / (weights**2).sum()
+    shares = (count * shares_of(values, weights) + 0.5) / (count + 1.0)
+    limits = tuple((name, has[name]) for name in ("from", "to") if name in has)
+    mean = float(weights @ values)
+    spread = float(np.sqrt(weights @ (values - mean) ** 2))
+
+    def made(kind: str, place: float, width: float) -> Distribution:
+        middle, deviation = mean + place * spread, spread * float(np.exp(width))
+        if kind == "uniform":
+            ends = middle + np.sqrt(3.0) * deviation * np.array([-1.0, 1.0])
+            low, high = np.clip(ends, has.get("from", -np.inf), has.get("to", np.inf)).tolist()
+            return Distribution(prior.key, kind, (("from", low), ("to", high)))
+        if kind == "log_normal":
+            middle = mean * float(np.exp(place * spread / mean))
+        return Distribution(prior.key, kind, (("mean", middle), ("standard_deviation", deviation), *limits))
+
+    def off(at: Array, kind: str) -> Array:
+        return np.sqrt(weights) * (made(kind, *at.tolist()).shares(values) - shares)
+
+    kinds = "uniform", "log_normal" if prior.kind == "log_normal" else "normal"
+    fits = {kind: least_squares(off, [0.0, 0.0], bounds=_BOUNDS, args=(kind,)) for kind in kinds}
+    kind = min(fits, key=lambda one: fits[one].cost)
+    return made(kind, *fits[kind].x.tolist())

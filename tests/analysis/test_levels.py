@@ -13,9 +13,17 @@ from scipy.io import wavfile
 
 import cvt_hpc.accessor  # noqa: F401  # gives datasets their `cvt`
 from cvt_hpc.analysis.export import AUDIO_RATE, FULL_SCALE, PEAK, export, loop_of
-from cvt_hpc.analysis.levels import centre, level, nominal, third_octaves, third_octaves_figure
 from cvt_hpc.analysis.orders import order_cuts_figure, orders_figure, track
-from cvt_hpc.analysis.time_signals import SHAFT_FORCES, Signal, read_signal
+from cvt_hpc.analysis.time_signals import (
+    SHAFT_FORCES,
+    Signal,
+    centre,
+    level,
+    nominal,
+    read_signal,
+    third_octaves,
+    third_octaves_figure,
+)
 from cvt_hpc.cli import main
 from cvt_hpc.errors import InputError
 from cvt_hpc.physics.geometry import variator
@@ -78,6 +86,10 @@ def test_orders_of_both_pulleys_and_of_elements_are_told_apart():
             orders_figure([run], bandwidth=bandwidth)
     with pytest.raises(InputError, match="expected orders of the bandwidth, 1, or more.*found driven:0.5"):
         orders_figure([run], orders=["driven:0.5"])
+    with pytest.raises(
+        InputError, match="x.nc: bandwidth: expected at most 78.5 orders, whose windows have 32"
+    ):
+        orders_figure([run], orders=[10000], bandwidth=1e4, sources=["x.nc"])
     figure = orders_figure([run], orders=["4", "driven:5.2", "elements:1"], bandwidth=1.0)
     for words, expected in {"4×": 2.0, "5.2× driven": 3.0, "1× elements": 4.0}.items():
         speed, amplitude = lines_of(figure)[words]
@@ -122,6 +134,31 @@ def test_cuts_of_spectra_are_the_largest_lines_about_the_orders():
     speeds = results["driving_speed"].values
     expected = 20.0 * np.log10(1e-3 * found["8×"][1] * 8.0 * speeds / np.sqrt(2.0))
     np.testing.assert_allclose(lines_of(shown)["8×"][1], expected)
+
+
+def test_orders_of_the_driven_pulley_follow_a_ratio_that_follows_the_speed():
+    """A line at 40 Hz times the place on the axis is another order of the driven pulley at each speed."""
+    results = pictured.results().isel(ratio=0, drop=True)
+    speeds, bins = results["driving_speed"].values, results["frequency_bin"].values
+    ratio = np.linspace(0.5, 2.5, speeds.size)
+    lines = 5.0 * speeds / (TURN * ratio)  # 5 turns of the driven pulley
+    spectrum = 2e-6 * np.exp(-(((bins - lines[:, None]) / 15.0) ** 2)) + 1e-12
+    shape = results["spectrum"].transpose("driving_speed", "frequency_bin", ...)
+    filled = np.broadcast_to(spectrum[..., None, None], shape.shape)
+    results["spectrum"] = shape.dims, filled, {"units": "m"}
+    results = results.assign_coords(ratio=("driving_speed", ratio))
+    found = lines_of(order_cuts_figure(results, {"load": 20.0}, orders=["driven:5", 5], bandwidth=0.5))
+    np.testing.assert_allclose(found["5× driven"][1], 2.0, rtol=0.15)
+    assert found["5×"][1].min() < 0.1
+    # the same of a run that shifts: 3 turns of the driven pulley while the ratio doubles
+    run = history(2.0)
+    ratio = np.linspace(1.0, 2.0, run.sizes["time"])
+    run["driven_speed"] = run["driving_speed"] / ratio
+    turned = np.cumsum(run["driven_speed"].values) / RATE
+    run["displacement"][:] = 1e-6 * np.sin(3.0 * turned)[:, None]
+    found = lines_of(orders_figure([run], orders=["driven:3", 3]))
+    np.testing.assert_allclose(found["3× driven"][1], 1.0, rtol=5e-3)
+    assert found["3×"][1][-1] < 0.1
 
 
 def test_bands_are_those_of_the_standard():
@@ -245,7 +282,11 @@ def test_a_sound_has_its_peak_at_3_db_below_full_scale_and_its_frequency(tmp_pat
     full, peak = (float(number) for number in re.findall(r"[\d.]+(?= µm)", lines[1]))
     assert (peak, full) == (pytest.approx(4.0, rel=0.01), pytest.approx(peak / PEAK, rel=1e-4))
     told = (tmp_path / "x.txt").read_text()
-    assert all(line in told for line in lines) and "# job: run" in told and "not modelled: the casing" in told
+    assert (
+        all(line in told for line in lines[:-1])
+        and "# job: run" in told
+        and "not modelled: the casing" in told
+    )
     lines_in = np.abs(np.fft.rfft(samples))
     assert np.argmax(lines_in) * rate / samples.size == pytest.approx(13.0 * 300.0 / TURN, rel=1e-3)
     # repeated, it goes on over each seam
@@ -296,16 +337,21 @@ def test_the_command_exports_and_refuses_in_a_line(tmp_path, monkeypatch, capsys
     monkeypatch.chdir(tmp_path)
     write_history(history(), tmp_path / "run.nc")
     assert main(["export", "run.nc", "--of", "t1 1/2", "--out", "x.wav"]) == 0
-    assert capsys.readouterr().out.splitlines()[0].startswith("sound: x.wav: t1 1/2, ")
+    lines = capsys.readouterr().out.splitlines()
+    assert lines[0].startswith("sound: x.wav: t1 1/2, ") and lines[-1] == "text: x.txt"
+    assert main(["export", "run.nc", "--of", "t2", "--out", "x.wav"]) == 0  # its own text is replaced
+    (tmp_path / "notes.txt").write_text("what I heard\n")
     for words, refusal in (
         (["--of", "t1", "--of", "t2", "--out", "x.wav"], "expected one signal, which a sound has, found 2"),
         (["--velocity", "--out", "x.csv"], "expected velocities as .wav alone"),
         (["--out", "x.mp3"], "expected a file name in .wav, .csv, .uff"),
         (["--of", "lood", "--out", "x.csv"], "run.nc: unknown signal; did you mean load?"),
         (["--of", "load", "--out", "y.wav"], "load: expected a signal that changes, found a constant one"),
+        (["--out", "notes.wav"], "notes.txt: expected a new file, or the text of a sound written by cvt_hpc"),
     ):
         assert main(["export", "run.nc", *words]) == 2
         assert refusal in capsys.readouterr().err
+    assert (tmp_path / "notes.txt").read_text() == "what I heard\n" and not (tmp_path / "notes.wav").exists()
     with pytest.raises(SystemExit):
         main(["export", "--help"])
     assert "No casing, and no sound that it radiates, is modelled." in " ".join(

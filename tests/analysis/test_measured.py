@@ -16,8 +16,7 @@ from matplotlib.colors import to_hex
 
 import cvt_hpc.accessor  # noqa: F401 (dataset.cvt)
 from cvt_hpc.analysis.arrangement import ruler
-from cvt_hpc.analysis.measured import read_measured, side_of
-from cvt_hpc.analysis.measured_drawing import INK
+from cvt_hpc.analysis.measured import INK, read_measured, side_of
 from cvt_hpc.analysis.measured_score import score, score_sentences
 from cvt_hpc.cli import main
 from cvt_hpc.errors import InputError, JobWarning
@@ -380,3 +379,36 @@ def test_the_noise_that_a_paper_states_is_a_measured_file():
     path = Path(__file__).parents[2] / "jobs" / "lebrecht_measured.csv"
     (row,) = read_measured(path, study()).rows
     assert row[:5] == ({}, (130.0, 200.0), pytest.approx(np.nan, nan_ok=True), (500.0, 700.0), 2e-5)
+
+
+def test_onsets_far_apart_are_no_pair(write):
+    """Beyond three standard errors: half a step of 5 N m, and the deviation that the file states."""
+    dataset = results([[Q, Q, V, V, V, V, V, V, V]])  # sets in at 25 N m
+    for place, deviation, expected in (
+        (39, 0.1, (1, 0, 0)),
+        (41, 0.1, (0, 1, 1)),
+        (64, 12, (1, 0, 0)),
+        (65, 12, (0, 1, 1)),
+    ):
+        path = write("onset_load [N m],load_deviation [kN mm]", f"{place},{deviation}")
+        total = score(dataset, path).total
+        assert total[:3] == expected
+        assert total.standard == pytest.approx((np.hypot(5.0, deviation),) * expected[0])
+    # cells without a verdict between the two that are known make the onset less certain
+    total = score(results([[Q, Q, U, U, V, V, V]]), write("onset_load [N m]", "70")).total
+    assert total.standard == pytest.approx((15.0,)) and total[:3] == (1, 0, 0)
+    # as many pairs as there can be: each takes the partner that leaves one to the other
+    dataset = results([[Q, V, V, Q, V, V, V]])  # at 15 and 45
+    assert score(dataset, write("onset_load [N m]", "30", "44")).total[:3] == (2, 0, 0)
+
+
+def test_a_window_between_two_cells_is_said_in_a_line(write, tmp_path, capsys):
+    path = write(WINDOWS, "15,25", "32,38")
+    results([[Q, V, V, V]]).to_netcdf(tmp_path / "results.nc")
+    assert main(["compare", str(tmp_path), str(path)]) == 1
+    (line,) = [one for one in capsys.readouterr().err.splitlines() if "row" in one][:1]
+    expected = "rig.csv: row 2: no load from 32 N m to 38 N m was run in "
+    assert expected in line and line.endswith("but 10, 20, 30, 40 [N m]")
+    with warnings.catch_warnings():
+        warnings.simplefilter("error", JobWarning)
+        score(results([[Q, V, V, V]]), write(WINDOWS + RANGE, "30,30,10,40", "90,95,10,40", "15,40,10,40"))

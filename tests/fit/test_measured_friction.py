@@ -9,12 +9,13 @@ from scipy.stats import t
 from cvt_hpc.cli import main
 from cvt_hpc.errors import InputError, JobWarning
 from cvt_hpc.experiments.measured_friction import (
-    Measured,
+    Points,
     by_force,
     fit_law,
     fit_laws,
     job_lines,
-    read_measured,
+    keys_of,
+    read_points,
 )
 from cvt_hpc.job import load_job
 from cvt_hpc.physics.friction import friction_coefficients, friction_law
@@ -35,7 +36,7 @@ def of_law(law, speeds=SPEEDS, **changes):
 
 def points(mu, speeds=SPEEDS, specimen=None, force=None):
     nothing = np.full(mu.shape, np.nan) if force is None else force
-    return Measured(speeds, mu, nothing, np.zeros(mu.shape) if specimen is None else specimen, "N")
+    return Points(speeds, mu, nothing, np.zeros(mu.shape) if specimen is None else specimen)
 
 
 @pytest.mark.parametrize("law", LAWS, ids=lambda law: law.name.lower())
@@ -43,7 +44,7 @@ def test_points_of_a_law_give_it_back_and_no_other_is_better(law):
     found = fit_laws(points(of_law(law)))
     assert found[0].law is law or (law is Law.COULOMB and found[0].rms < 1e-9)
     own = next(one for one in found if one.law is law)
-    for key, value in own.values().items():
+    for key, value in own.values.items():
         assert value == pytest.approx(TRUE[key], rel=1e-5)
 
 
@@ -76,10 +77,10 @@ def test_scatter_is_that_of_the_specimens_and_not_of_their_number():
     mu = np.concatenate([of_law(Law.STRIBECK, friction_gradient=one) for one in own])
     found = fit_law(Law.STRIBECK, points(mu, np.tile(SPEEDS, count), np.repeat(np.arange(count), 10)))
     assert found.of_specimens == count
-    deviation = found.deviations()
+    deviation = found.deviations
     assert deviation["friction_gradient"] == pytest.approx(np.std(own, ddof=1), rel=1e-3)
     assert deviation["kinetic_friction"] < 1e-6
-    assert found.values()["friction_gradient"] == pytest.approx(np.mean(own), rel=1e-4)
+    assert found.values["friction_gradient"] == pytest.approx(np.mean(own), rel=1e-4)
 
 
 def test_specimens_whose_points_do_not_determine_the_law_are_left_out():
@@ -142,11 +143,11 @@ def test_a_job_takes_the_part_that_is_written(law, tmp_path):
     path.write_text('name = "x"\nmodel = "elastic_belt"\n\n' + "\n".join(job_lines(found)) + "\n")
     job = load_job(path)
     assert job.size == 64 and job.point(0)["friction_law"] == law.name.lower()
-    drawn = {key: np.array([job.point(k)[key] for k in range(64)]) for key in found.keys}
+    drawn = {key: np.array([job.point(k)[key] for k in range(64)]) for key in keys_of(law)}
     for key, values in drawn.items():
-        assert values.mean() == pytest.approx(found.values()[key], rel=0.02)
-        assert values.std() == pytest.approx(found.deviations()[key], rel=0.15)
-    if len(found.keys) > 1:
+        assert values.mean() == pytest.approx(found.values[key], rel=0.02)
+        assert values.std() == pytest.approx(found.deviations[key], rel=0.15)
+    if len(keys_of(law)) > 1:
         scores = np.array([np.log(v) if key == "stribeck_velocity" else v for key, v in drawn.items()])
         deviation = np.sqrt(np.diag(found.covariance))
         wanted = found.covariance / np.outer(deviation, deviation)
@@ -182,4 +183,4 @@ def test_what_is_no_measurement_of_friction_is_one_error(text, said, tmp_path):
     (tmp_path / "x.csv").write_text(text)
     with warnings.catch_warnings(), pytest.raises(InputError, match=said):
         warnings.simplefilter("ignore", JobWarning)
-        read_measured(tmp_path / "x.csv")
+        read_points(tmp_path / "x.csv")
