@@ -138,12 +138,14 @@ def _of_cells(
     noise, known = np.zeros((2, level.size), bool)
     errors, ratios = np.full((2, level.size), np.inf)
     for row, inside, swept in rows:
+        nearest = inside & np.isinf(ratios)  # the row whose frequency is nearest gives the amplitude, too
         noise |= inside
         known |= inside | swept
         if row.frequency:
             beyond = np.maximum(np.maximum(row.frequency[0] - frequency, frequency - row.frequency[1]), 0.0)
-            errors[inside] = np.fmin(errors, beyond)[inside]
-        ratios[inside] = amplitude[inside] / row.amplitude
+            nearest = inside & ~(beyond >= errors)
+            errors[nearest] = beyond[nearest]
+        ratios[nearest] = amplitude[nearest] / row.amplitude
     vibrates, quiet = known & (level > 0.0), known & (level < 0.0)
     counts = noise & vibrates, noise & quiet, vibrates & ~noise, quiet & ~noise, known & np.isnan(level)
     told = [tuple(values[counts[0] & np.isfinite(values)].tolist()) for values in (errors, ratios)]
@@ -178,7 +180,8 @@ def _of_onsets(kind: str, rows: Sequence[Row], loads: Array, level: Array, facto
         pairs = linear_sum_assignment(np.where(near, distance, distance.size * distance.max(initial=0.0)))
         errors += [(factor * distance[k], factor * standard[k]) for k in zip(*pairs, strict=True) if near[k]]
         left = np.delete(places, pairs[0][near[pairs]])
-        alone += int(((low < left) & (left < high)).sum())
+        swept = [row.swept for row in rows if kind != ONSET or row.rising == rising]
+        alone += sum(any(max(low, a) < one < min(high, b) for a, b in swept) for one in left.tolist())
     onset, known = zip(*errors, strict=True) if errors else ((), ())
     return Line(len(errors), len(true) - len(errors), alone, onset=tuple(onset), standard=tuple(known))
 

@@ -151,7 +151,7 @@ def orders_figure(
         known, (course, x_label) = _turning_along(history, source), course_of(history)
         first, lines = int(np.searchsorted(signal.times, start_up(history))), {}
         times, values = signal.times[first:], signal.values[first:]
-        for words, order in _told(wanted, known, bool(orders), source, notes).items():
+        for words, order in _known_orders(wanted, known, bool(orders), source, notes).items():
             low, high = _band(order, known, bandwidth)
             rate = np.interp(times, history["time"].values, known[order[1]][0])
             turned = np.append(0.0, np.cumsum(0.5 * (rate[1:] + rate[:-1])) / signal.rate)
@@ -204,7 +204,7 @@ def order_cuts_figure(
     figure, panels = time_signals.in_a_column(len(strands), source, "", sharex=True, sharey=True)
     for axes, strand in zip(panels, strands, strict=True):
         spectra, lines = shown["spectrum"].sel(strand=strand).transpose("driving_speed", ...).values, {}
-        for words, order in _told(wanted, known, bool(orders), source, notes).items():
+        for words, order in _known_orders(wanted, known, bool(orders), source, notes).items():
             (low, high), rate = _band(order, known, bandwidth), known[order[1]][0]
             bands = np.broadcast_arrays(low * rate, high * rate)
             amplitude = [_largest(bins, *of_run) for of_run in zip(spectra, *bands, strict=True)]
@@ -224,14 +224,17 @@ def _in_words(bandwidth: float) -> str:
 
 
 def _band(order: Order, known: Mapping[str, Turning], bandwidth: float) -> tuple[Any, Any]:
-    """Lowest and highest multiple of the turns of a pulley in the band of an order."""
+    """Lowest and highest multiple of the turns of the driving or driven pulley in the band of an order."""
     _, each, slip = known[order[1]]
     half = np.maximum(0.5 * bandwidth, slip * order[0] * each)
     return order[0] * each - half, order[0] * each + half
 
 
 def _largest(bins: Array, spectrum: Array, low: float, high: float) -> float:
-    """Largest line between two frequencies [Hz], or that of the bin in their middle; nan beyond the bins."""
+    """Largest line of a spectrum (n,) between two frequencies, or that of the bin in their middle.
+
+    `bins` (n,), `low` and `high` [Hz]; nan beyond the bins.
+    """
     if not high <= bins[-1]:
         return math.nan
     inside = (bins >= low) & (bins <= high)
@@ -266,7 +269,7 @@ def _turning_over(shown: xr.Dataset) -> dict[str, Turning]:
     return known
 
 
-def _told(
+def _known_orders(
     wanted: dict[str, Order], known: Mapping[str, Turning], must: bool, source: str, notes: dict[str, str]
 ) -> dict[str, Order]:
     """Orders that are known; why others are not goes to the notes, or is an error where they `must` be."""
@@ -285,7 +288,7 @@ def _draw(
     as_level: bool,
     notes: dict[str, str],
 ) -> None:
-    """Lines by their names: places, amplitudes [SI], and frequencies [Hz] for velocities."""
+    """Draw lines by their names: places, amplitudes [SI] and frequencies [Hz], (n,) each."""
     unit = "m s-1" if velocity else unit
     reference, shown = time_signals.shown_in(unit)
     for k, (words, (x, amplitude, frequency)) in enumerate(lines.items()):

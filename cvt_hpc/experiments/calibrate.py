@@ -4,8 +4,9 @@ The job's samples are the candidates, drawn from the distributions that [uncerta
 is weighed by how well its runs agree with a measured file, by
 
     ln L = -n c - m ln(2 (1 - p)) - min(h c, h'),    c = ln((1 - p) / p),
-    h' = mean((df / s_f)^2) / 2 + (mean ln q / ln 2)^2 / 2,    of onsets  -sum((do / s_o)^2) / 2,
+    h' = mean((df / s_f)^2) / 2 + (mean ln q / ln 2)^2 / 2,
 
+and, of a file of onsets, -sum((do / s_o)^2) / 2 in addition;
 n counting misses and false alarms, m cells without a verdict, which are as likely as not, h hits, and p being
 the share of cells that may be judged otherwise by model or rig (`doubt`); df and q are errors of the
 frequencies and ratios of the amplitudes of hits, s_f is `scatter`; do are errors of onsets, s_o their
@@ -32,7 +33,7 @@ from numpy.typing import NDArray
 from cvt_hpc.analysis.arrangement import value_text
 from cvt_hpc.analysis.classes import OccurrenceClass, map_classes
 from cvt_hpc.analysis.figures import COLOURS, WIDTH, axis_label, coordinate_unit, draw
-from cvt_hpc.analysis.measured import ONSET, Measured, Overlay, Side, read_measured, side_of, within
+from cvt_hpc.analysis.measured import ONSET, WINDOW, Measured, Overlay, Side, read_measured, side_of, within
 from cvt_hpc.analysis.measured_score import COUNTS, Line, joined, score
 from cvt_hpc.analysis.sensitivity import independent
 from cvt_hpc.errors import JobWarning, mismatch
@@ -101,7 +102,7 @@ class Posterior(NamedTuple):
     log_likelihood, weights : (sample,) arrays
         ln L, and the weights, whose sum is 1.
     after : tuple of Distribution
-        Those that are nearest to the weighed samples.
+        Those that are nearest to the weighed samples; of too few of them, those beforehand.
     """
 
     dataset: xr.Dataset
@@ -254,21 +255,26 @@ def weigh(asked: Calibration, dataset: xr.Dataset) -> Posterior:
     if not sum(agreement.total[:4]):
         raise mismatch(f"{asked.measured}", "cells in its range of which a run is decided", "none")
     place = agreement.names.index(SAMPLE)
-    own: list[list[Line]] = [[] for _ in range(dataset.sizes[SAMPLE])]
+    of_samples: list[list[Line]] = [[] for _ in range(dataset.sizes[SAMPLE])]
     for at, line in agreement.lines:
-        own[int(at[place])].append(line)
-    lines = [joined(one) for one in own]
+        of_samples[int(at[place])].append(line)
+    lines = [joined(one) for one in of_samples]
     likelihood = np.array([_log_likelihood(one, agreement.measured.kind, asked) for one in lines])
     weights = np.exp(likelihood - likelihood.max())
     distributions = _distributions(asked.job)
     values = np.array([dataset[one.key].values for one in distributions], float)
     weights /= weights.sum()
+    found = Posterior(
+        dataset, agreement.measured, distributions, values, lines, likelihood, weights, distributions
+    )
+    if found.effective < FEWEST:
+        return found
     pairs = zip(distributions, values, strict=True)
-    after = tuple(nearest_distribution(one, own, weights) for one, own in pairs)
-    return Posterior(dataset, agreement.measured, distributions, values, lines, likelihood, weights, after)
+    return found._replace(after=tuple(nearest_distribution(prior, drawn, weights) for prior, drawn in pairs))
 
 
 def _log_likelihood(line: Line, kind: str, asked: Calibration) -> float:
+    """Return ln L of a sample by its counts and errors; `kind` is that of the measured file."""
     each = np.log((1.0 - asked.doubt) / asked.doubt)
     found = -(line.misses + line.false_alarms) * each - line.neither * np.log(2.0 * (1.0 - asked.doubt))
     of_hits = 0.0
@@ -332,7 +338,7 @@ def _measured_cells(found: Posterior) -> xr.DataArray:
     loads = found.dataset[found.measured.along]
     for row in found.measured.rows:
         inside = row.covers(loads.values)
-        if np.isfinite(row.swept).all():
+        if found.measured.kind == WINDOW or np.isfinite(row.swept).all():  # windows without a range: of all
             inside = inside | within(loads.values, row.swept)
         cells = loads.copy(data=inside)
         for name, value in row.at.items():
@@ -363,10 +369,9 @@ def _write_table(found: Posterior, path: Path) -> Path:
 def _write_part(asked: Calibration, found: Posterior, path: Path) -> Path:
     """Write the table [uncertain] of a job that goes on from here."""
     narrowed, keys = found.narrowed(), [one.key for one in found.distributions]
-    told = [keys.index(key) for key in narrowed]
     comments = {key: "as before: the file hardly tells of it" for key in keys if key not in narrowed}
     # correlation of normal scores by that of ranks
-    correlation = 2.0 * np.sin(np.pi / 6.0 * found.correlation()[np.ix_(told, told)])
+    correlation = 2.0 * np.sin(np.pi / 6.0 * found.correlation())
     units = {key: asked.job.schema.parameters[key].unit for key in keys}
     distributions = [narrowed.get(one.key, one) for one in found.distributions]
     lines = uncertain_lines(f"by {found.measured.name}", distributions, units, correlation, comments)

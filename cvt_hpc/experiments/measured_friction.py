@@ -35,11 +35,11 @@ from cvt_hpc.physics.friction_laws import OTHER_NAMES, Law
 from cvt_hpc.storage.files import written_aside
 from cvt_hpc.tables import columns, short
 
-LEAST_SPECIMENS = 4  # one more than a law has parameters
+LEAST_SPECIMENS = LEAST_SPEEDS = 4  # one more than a law has parameters
 _COLUMNS = {"force": ("N/m", "N", "Pa"), "speed": ("m/s",), "mu": ("",), "specimen": ("",)}
 _SCALES = 7  # speed scales at which the search begins
-_LARGEST = 1e8  # condition of J, by columns of one size, up to which the points determine a law
-_CERTAIN = 1.96  # standard errors
+LARGEST_CONDITION = 1e8  # condition of J, by columns of one size, up to which the points determine a law
+TWO_SIDED_95 = 1.96  # standard errors
 _UNITS = {"kinetic_friction": "", "friction_gradient": "s/m", "stribeck_velocity": "m/s"}
 _SCALE = "stribeck_velocity"  # in x by its logarithm
 
@@ -128,8 +128,8 @@ def read_points(path: str | Path) -> Points:
 def _faults(values: dict[str, Array]) -> Iterator[Fault]:
     yield ("speed",), "a speed of 0 or more (a magnitude)", values["speed"] < 0.0
     yield ("mu",), "a coefficient of friction > 0", values["mu"] <= 0.0
-    if len(np.unique(values["speed"])) < LEAST_SPECIMENS:
-        raise ValueError(f"expected {LEAST_SPECIMENS} different speeds or more, found fewer")
+    if len(np.unique(values["speed"])) < LEAST_SPEEDS:
+        raise ValueError(f"expected {LEAST_SPEEDS} different speeds or more, found fewer")
 
 
 def _values(law: Law, x: Array) -> dict[str, float]:
@@ -156,7 +156,7 @@ def _slopes(law: Law, x: Array, speeds: Array) -> Array:
 def _least(law: Law, speed: Array, mu: Array) -> Array | None:
     """The x of least squares, from several speed scales; None where the points do not determine it.
 
-    The fall is never negative.
+    `speed` (n,) [m/s], `mu` (n,). The fall is never negative.
     """
     keys, moving, level = keys_of(law), speed[speed > 0.0], float(mu.mean())
     if len(np.unique(speed)) <= len(keys):
@@ -174,12 +174,12 @@ def _least(law: Law, speed: Array, mu: Array) -> Array | None:
     x = np.asarray(min(fits, key=lambda fit: fit.cost).x)
     slopes = _slopes(law, x, speed)
     size = np.linalg.norm(slopes, axis=0)
-    is_determined = (size > 0.0).all() and np.linalg.cond(slopes / size) < _LARGEST
+    is_determined = (size > 0.0).all() and np.linalg.cond(slopes / size) < LARGEST_CONDITION
     return x if is_determined else None
 
 
 def _independent(residuals: Array, speed: Array) -> float:
-    """n_e / n, by the correlation of neighbouring residuals in the order of the speeds, at most 1."""
+    """n_e / n, at most 1, by the correlation of neighbouring residuals (n,) in the order of speeds (n,)."""
     ordered = residuals[np.argsort(speed, kind="stable")]
     total = float((ordered**2).sum())
     r = float((ordered[1:] * ordered[:-1]).sum()) / total if total > 0.0 else 0.0
@@ -291,7 +291,7 @@ def law_lines(laws: Sequence[Fitted], points: Points) -> Iterator[str]:
         yield f"left out of the scatter: {out}, whose points do not determine the law"
     if (change := by_force(best, points)) is not None:
         share, error = (100.0 * one for one in change)
-        told = "" if abs(share) <= _CERTAIN * error else ": no law has that, but friction_law table"
+        told = "" if abs(share) <= TWO_SIDED_95 * error else ": no law has that, but friction_law table"
         changes = f"changes by {share:+.1f} % +- {error:.1f} %{told}"
         yield f"from the least to the largest force the coefficient {changes}"
 

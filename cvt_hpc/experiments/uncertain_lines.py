@@ -26,15 +26,14 @@ def uncertain_lines(
 ) -> list[str]:
     """Lines of the table: `what` scatters, for a comment, SI units and further comments by parameter.
 
-    `correlation` is that of the normal scores of the parameters without a comment, which are independent of
-    the others.
+    `correlation`, (parameter, parameter), is that of their normal scores.
     """
     lines, told = [f"[uncertain] # {what}", f"samples = {SAMPLES}"], dict(comments or {})
     for one in distributions:
         numbers = ", ".join(f"{name} = {given(value, units[one.key])}" for name, value in one.numbers)
         line = f'{one.key} = {{ distribution = "{one.kind}", {numbers} }}'
         lines.append(f"{line} # {told[one.key]}" if one.key in told else line)
-    names = [f'"{one.key}"' for one in distributions if one.key not in told]
+    names = [f'"{one.key}"' for one in distributions]
     if len(names) > 1:
         # reduced until four digits keep the matrix positive definite
         least = float(np.linalg.eigvalsh(correlation).min())

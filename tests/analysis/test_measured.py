@@ -127,6 +127,12 @@ def test_onsets_are_paired_by_their_direction(write):
     # beyond the measured range nothing is a false alarm
     total = score(dataset, write(f"onset_load [N m]{RANGE}", "20,10,40")).total
     assert total[:3] == (1, 0, 0)
+    # nor between two ranges, nor in one of the other direction
+    longer = results([[Q, Q, V, V, Q, V, Q, Q, Q, Q, Q, V]])  # rising at 25, 55 and 115
+    total = score(longer, write(f"onset_load [N m]{RANGE}", "20,10,30", "112,100,120")).total
+    assert total[:3] == (2, 0, 0)
+    total = score(dataset, write(f"onset_load [N m],direction{RANGE}", "20,1,10,60", "66,-1,60,70")).total
+    assert total[:3] == (2, 0, 1)
 
 
 def test_peaks_tell_of_their_cells_alone(write):
@@ -138,6 +144,10 @@ def test_peaks_tell_of_their_cells_alone(write):
     assert found.total[:5] == (2, 1, 0, 0, 1)
     assert found.total.frequency == pytest.approx((20.0, 5.0))
     assert found.total.amplitude == pytest.approx((0.5, 1.0))
+    # of two peaks in a cell the one of the nearest frequency gives both
+    for rows in (("22,505,0.1", "21,480,0.02"), ("21,480,0.02", "22,505,0.1")):
+        total = score(dataset, write("load [N m],frequency [Hz],amplitude [mm]", *rows)).total
+        assert (*total.frequency, *total.amplitude) == pytest.approx((5.0, 0.1))
 
 
 CLASSES = st.lists(st.sampled_from([Q, V, U, F, S]), min_size=3, max_size=9)

@@ -223,6 +223,7 @@ def test_too_few_samples_that_agree_are_no_result(study, tmp_path):
     few = dataset.isel(sample=slice(0, 6))
     asked = asked_by(study, tmp_path, ONSET)
     assert "effective samples, too few" in weigh(asked, few).fault(asked.doubt)
+    assert weigh(asked, dataset.isel(sample=[0])).fault(asked.doubt)
 
 
 def test_samples_without_verdicts_are_no_candidates(study, tmp_path):
