@@ -1,7 +1,7 @@
 """The variator of the tests: softer collars than those of the defaults, so that much happens at moderate loads.
 
-Between them the belt vibrates from 90 N m on, cells at edges of windows are cheap to find, and nothing lags, so that
-closed forms hold. Tests do not depend on the defaults, which are fitted.
+Between them the belt vibrates from 110 N m on at -0.8 s/m and from 90 N m on where friction falls more steeply, and
+nothing lags, so that closed forms hold. Tests that use it do not depend on the defaults, which are fitted.
 """
 
 from collections.abc import Mapping
