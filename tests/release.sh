@@ -57,7 +57,7 @@ for file in "$scratch/cvt_hpc-$version.tar.gz" "$scratch"/cvt_hpc-"$version"-*.w
         cd "$scratch/try" && . bin/activate && unset PYTHONPATH &&
             [ "$(cvt-hpc --version)" = "cvt_hpc $version" ] &&
             cvt-hpc examples quickstart > /dev/null &&
-            cvt-hpc run jobs/quickstart.toml --set "load=100 N m" --set "friction_gradient=-0.8 s/m" > /dev/null &&
+            cvt-hpc run jobs/quickstart.toml --set "load=160 N m" --set "friction_gradient=-0.8 s/m" > /dev/null &&
             cvt-hpc map out/quickstart > /dev/null
     ) || fail "$file: does not run in a fresh environment"
     echo "$(basename "$file"): installed and run in a fresh environment"

@@ -113,7 +113,7 @@ def assert_the_same_belt(pushbelt, continuous, but=()):
             assert pushbelt[key] == wanted, key
 
 
-def test_the_job_of_vibration_has_the_belt_of_the_fitted_map():
+def test_the_job_of_vibration_has_the_belt_of_the_published_map():
     pushbelt = load_job(JOBS / "pushbelt_vibration.toml")
     axes = {axis.name: list(axis.values) for axis in pushbelt.axes}
     axes |= {"sheave_stiffness": [1.0], "tilt_factor": [1.0]}

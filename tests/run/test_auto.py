@@ -24,7 +24,7 @@ from cvt_hpc.vibration.assessment import Occurrence
 from support.outcomes import outcomes_of
 from support.rungs import rung_job
 
-# cells of the reference map by what is known of them: the middle of a window, outside of all, the edge of one
+# cells of the scene of the tests by what is known of them: the middle of a window, outside of all, the edge of one
 VIBRATING = {"load": 120.0, "friction_gradient": -1.0}
 QUIET = {"load": 60.0, "friction_gradient": -0.4}
 EDGE = {"load": 90.0, "friction_gradient": -0.8}

@@ -16,7 +16,7 @@ from cvt_hpc.study.audit import FULL_MODEL
 from cvt_hpc.variables import Status, Vibrates
 from support.rungs import scene_tables
 
-# the middle of a window of the reference map and cells outside
+# the middle of a window of the map of the scene of the tests and cells outside
 JOB = """name = "audited"
 model = "auto"
 [axes]

@@ -171,6 +171,7 @@ def test_the_published_map_is_traced_with_half_of_its_runs():
     verdicts = {"no": QUIET, "yes": VIBRATING, "undecided": UNDECIDED, "irregular": IRREGULAR, "": FAILED}
     verdicts["slips"] = SLIPPING
     truth = np.array([verdicts[row["vibrates"]] for row in rows], np.int8).reshape(7, 4, 19)
+    truth[..., -2:] = QUIET  # as if all windows ended at 180 N m, so that some lie between runs
     for spacing in (4, 6, 9):
         done, inferred = traced(truth, [None, None, spacing])
         assert done.mean() < 0.5
@@ -181,7 +182,7 @@ def test_the_published_map_is_traced_with_half_of_its_runs():
             beside = run[run < load].max(), run[run > load].min()
             assert (truth[row, panel, beside] == QUIET).all() and inferred[row, panel, load] == QUIET
         windows = (missed & (truth == VIBRATING)).any(axis=2).sum()
-        assert windows <= (4 if spacing == 9 else 0)
+        assert (windows > 0) == (spacing == 9)  # which is wider than some of the windows
 
 
 def test_nothing_is_inferred_along_an_axis_that_is_not_traced():

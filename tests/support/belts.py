@@ -20,7 +20,7 @@ COARSE = {"stations": 48, "duration": 0.04, "rise_time": 0.01, "load": 60.0}
 
 
 def point(stepper: str, **values) -> dict:
-    """Parameters of a run of a coarse belt with defaults but for `values` [SI]."""
+    """Parameters of a run of a coarse belt on the scene of the tests but for `values` [SI]."""
     return rung_job("elastic_belt", stepper=stepper, **COARSE | values).point(0)
 
 

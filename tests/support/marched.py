@@ -18,7 +18,7 @@ CHEAP = {"stations": 48, "duration": 0.04, "rise_time": 0.01}
 
 
 def job(stepper: str = "imex", axes: dict | None = None, **values) -> Job:
-    """A job of the elastic belt with defaults but for `values` [SI]: in double precision, one transient a run.
+    """A job of the elastic belt on the scene of the tests but for `values` [SI]: in double precision, one transient a run.
 
     So that tolerances tell what the method leaves, not what rounding does, and that runs show what a step does.
     """

@@ -16,7 +16,7 @@ STEP = 3e-6
 
 
 def start(**parameters) -> tuple[Belt, State]:
-    """Constants and state of a run with defaults but for `parameters`."""
+    """Constants and state of a run on the scene of the tests but for `parameters`."""
     belt = belt_constants(DEFAULTS | parameters)
     return belt, initial_state(DEFAULTS | parameters, belt)
 
