@@ -14,7 +14,7 @@ program, whoever opened it:
 
 from __future__ import annotations
 
-from collections.abc import Mapping, Sequence
+from collections.abc import Sequence
 from inspect import Parameter, Signature
 from pathlib import Path
 from typing import TYPE_CHECKING, Any
@@ -388,7 +388,7 @@ def read_table(path: str | Path) -> xr.Dataset:
     return dataset.assign_attrs(job_name=Path(path).stem)
 
 
-def _linked(columns: Mapping[str, np.ndarray]) -> dict[str, str]:
+def _linked(columns: dict[str, np.ndarray]) -> dict[str, str]:
     """Return the axis that decides the values of each column that varies with one axis alone."""
     found: dict[str, str] = {}
     counts = {name: np.unique(values).size for name, values in columns.items()}

@@ -6,6 +6,7 @@ import pytest
 from cvt_hpc.job import build_job
 from cvt_hpc.models.elastic_belt.transient import batch
 from cvt_hpc.models.quasi_static_belt.transient import batch as quasi_static_batch
+from support.rungs import scene_of
 
 COARSE = {"stations": 48, "duration": 0.04, "rise_time": 4e-3, "load": 60.0}
 BEFORE, TOGETHER = 100, 20  # samples; the disturbance comes at 80
@@ -16,7 +17,7 @@ def runs(stepper, model="elastic_belt", make=batch, count=1, **values):
     document = {"name": "test", "model": model, "stepper": stepper}
     options = {"step": STEPS[stepper]} if stepper in STEPS else {}
     options |= {"precision": "double"} if stepper == "imex" else {}
-    point = build_job(document, "test.toml", COARSE | options | values).point(0)
+    point = build_job(document, "test.toml", scene_of(model) | COARSE | options | values).point(0)
     return make([point | {"disturbance": 1e-6 * (1 + k)} for k in range(count)], stepper)
 
 
@@ -39,7 +40,7 @@ def test_a_run_taken_over_is_the_run_that_was_not_broken_off(stepper):
     expected, found = whole.runs[0].displacement, run.displacement
     assert np.array_equal(found[:BEFORE], expected[:BEFORE])
     moved = np.abs(expected[BEFORE:] - expected[BEFORE - 1]).max()
-    assert moved > 4e-5
+    assert moved > 5e-5
     # lanes keep speeds as deviations, so that handing the state over rounds it;
     # the general form moves the sheave by forces of the end of a step, not of its start; imex has an error of its own
     allowed = {"explicit": 1e-6, "symplectic_euler": 1e-3, "imex": 0.01}[stepper]
