@@ -376,7 +376,7 @@ def check(turn, seconds):
     studies = []
     for table in tables():
         done = [place for place, row in enumerate(table.rows) if row.get("status") == "done"]
-        if done and (study := study_of(table.made_by)):
+        if done and table.seconds and (study := study_of(table.made_by)):  # not of cells of many runs
             studies.append((median(table.seconds), table, study, done[turn * STRIDE % len(done)]))
     cheap = [entry for entry in studies if entry[0] <= ALWAYS]
     dear = [entry for entry in studies if entry[0] > ALWAYS]

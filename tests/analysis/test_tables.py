@@ -262,3 +262,8 @@ def test_a_row_of_samples_is_the_sample_of_its_place(program):
     for place in (0, 200):
         stored = {axis.name: table.rows[place][axis.name] for axis in job.axes}
         assert {axis.name: f"{job.point(place)[axis.name]:g}" for axis in job.axes} == stored
+
+
+def test_a_check_without_time_goes_through_all_tables_and_computes_none(program, capsys):
+    assert program.check(turn=1, seconds=-1.0) == 0
+    assert len(capsys.readouterr().out.splitlines()) == 2
