@@ -138,7 +138,7 @@ def _of_cells(
     noise, known = np.zeros((2, level.size), bool)
     errors, ratios = np.full((2, level.size), np.inf)
     for row, inside, swept in rows:
-        nearest = inside & np.isinf(ratios)  # the row whose frequency is nearest gives the amplitude, too
+        nearest = inside & ~np.isfinite(ratios)  # the row whose frequency is nearest gives the amplitude, too
         noise |= inside
         known |= inside | swept
         if row.frequency:

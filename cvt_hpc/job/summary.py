@@ -1,7 +1,4 @@
-"""A job in words, for `cvt-hpc check`.
-
-Messages tell of values whose meaning another key decides, if nothing names that key, or that it disables.
-"""
+"""A job in words, for `cvt-hpc check`; messages tell of values that another key makes void."""
 
 import math
 import warnings

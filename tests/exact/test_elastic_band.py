@@ -11,11 +11,11 @@ import pytest
 
 from cvt_hpc.models.elastic_belt import fields as f
 from cvt_hpc.models.elastic_belt.belt import mesh
-from cvt_hpc.models.elastic_belt.parameters import PARAMETERS
 from cvt_hpc.models.steady_variator.forces import distributions
 from cvt_hpc.models.steady_variator.record import quantities
 from cvt_hpc.models.steady_variator.walking import SteadyBelt
 from support.elastic_band import elastic_band
+from support.scene import VALUES
 
 RADII = 30.687090662822e-3, 76.717726657055e-3
 RINGS = 18 * 0.185e-3 * 9.75e-3  # section [m^2]
@@ -61,8 +61,7 @@ def test_more_than_friction_carries_has_no_equilibrium():
 
 def band_parameters(stations):
     """Of the belt with elements that never press and hold on to the rings, on rigid sheaves without creep."""
-    defaults = {key: parameter.default for table in PARAMETERS.values() for key, parameter in table.items()}
-    return defaults | {
+    return VALUES | {
         "stations": stations,
         "end_refinement": 1.0,  # the order in the mesh is judged, and slopes along the arcs by even cells
         "ratio": RADII[1] / RADII[0],

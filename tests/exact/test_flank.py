@@ -7,9 +7,9 @@ from hypothesis import strategies as st
 
 from cvt_hpc.models.elastic_belt import fields as f
 from cvt_hpc.models.elastic_belt.belt import State, belt_constants
-from cvt_hpc.models.elastic_belt.parameters import PARAMETERS
 from cvt_hpc.models.elastic_belt.rhs import contact_forces, fresh_contacts
 from cvt_hpc.physics.flank import flank_forces, flank_sliding
+from support.scene import VALUES
 
 speeds = st.floats(-1.0, 1.0)
 coefficients = st.floats(0.01, 0.3)
@@ -54,10 +54,7 @@ def test_no_sliding_no_friction():
 def test_overlap_in_rigid_grooves():
     # Bullinger et al. 2005, eq. 33: the gap is z + 2 w tan(d0), z driven by the driven sheave, prescribed at
     # the driver; rigid sheaves leave the elements' c_e alone
-    parameters = {
-        key: parameter.default for section in PARAMETERS.values() for key, parameter in section.items()
-    }
-    parameters |= {
+    parameters = VALUES | {
         "duration": 1.0,
         "sheave_stiffness": np.inf,
         "stiffness_of": "sheave",
