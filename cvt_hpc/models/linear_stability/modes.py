@@ -20,7 +20,7 @@ from cvt_hpc.models.elastic_belt.one_system import flat_belt, pack, rates
 from cvt_hpc.models.elastic_belt.rhs import strains
 from cvt_hpc.models.linear_stability.spectrum import eigenpairs
 from cvt_hpc.models.steady_variator.equations import LATE
-from cvt_hpc.models.steady_variator.linearised import Linearisation
+from cvt_hpc.models.steady_variator.linearised import Linearisation, corners
 from cvt_hpc.models.steady_variator.walking import Steady
 
 LOW, HIGH = 100.0, 1500.0  # [Hz]: the band of strands
@@ -83,12 +83,12 @@ def modes(
     y = pack(flat, steady.state)
     if not rates(flat, 0.0, y, np.empty_like(y)):
         raise ValueError("the contact of this state has no solution")
-    linearise = Linearisation(flat)
-    whole = linearise(flat)
+    linearise, pressed = Linearisation(flat), corners(belt, flat.state) > 0.0
+    whole = linearise(flat, pressed)
     # the same without flanks and saddles: the difference is the effect of their friction and contact
     nowhere = np.zeros_like(belt.touches)
     without = belt._replace(touches=nowhere, arc_curvature=nowhere)
-    free = linearise(flat._replace(belt=without))
+    free = linearise(flat._replace(belt=without), pressed)
     values, vectors = eigenpairs(whole, 2.0 * np.pi * band[0], 2.0 * np.pi * band[1], decay, GROWTH)
     n = belt.cell.size
     velocities = slice(n, 4 * n)

@@ -38,7 +38,7 @@ from cvt_hpc.models.elastic_belt.one_system import (
 from cvt_hpc.models.elastic_belt.one_system import SIZES as SIZES_OF_ROWS
 from cvt_hpc.models.elastic_belt.pulleys import moving_states
 from cvt_hpc.models.elastic_belt.rhs import strains
-from cvt_hpc.models.steady_variator.linearised import Linearisation
+from cvt_hpc.models.steady_variator.linearised import Linearisation, corners
 
 LATE = 1e9  # [s]: load and damping are those after any start-up
 # sizes that count alike in each unknown of the default scene: w, eps_0, eps_1, v_f; Q_0, Q_1, driven speed,
@@ -130,9 +130,20 @@ class Equations:
             left[MOMENT] = x[SPEED] - self._held_speed
         return left
 
-    def jacobian(self, x: np.ndarray) -> csc_array:
-        """Slopes of the residual, (n, n), about the unknowns of its last call."""
-        slopes = self._linearise(self._flat)
+    def corners(self, x: np.ndarray) -> np.ndarray:
+        """Distances (2, N) of the cells from the corners of their push, as of `linearised.corners`."""
+        unpack(self._flat, 0.0, self._flat_unknowns(x))
+        return corners(self.belt, self._flat.state)
+
+    def jacobian(self, x: np.ndarray, sided: bool = True, pressed: np.ndarray | None = None) -> csc_array:
+        """Slopes of the residual, (n, n), about the unknowns of its last call.
+
+        On one side of each corner, by the cells (2, N) that are taken as pressed (by default those that are),
+        or else mean ones across those that are very near.
+        """
+        if sided and pressed is None:
+            pressed = self.corners(x) > 0.0
+        slopes = self._linearise(self._flat, pressed)
         chain = self._chain(x)
         n = self.belt.cell.size
         contents = csr_array(np.kron(np.eye(2), self.belt.cell)) @ chain[4 * n : 6 * n]

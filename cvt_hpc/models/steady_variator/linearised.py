@@ -5,6 +5,10 @@ deformation ties to every displacement of a wrap, and the pulleys. So the forces
 their own: stations five apart can then be moved together, and some ninety evaluations give all slopes. With
 the set of closed stations the forces follow from the gaps by a linear system, df = -C^-1 dg. Pulleys know the
 belt by eight numbers (`pulled_by`) alone, so their rows are the slopes with these times those of them.
+
+A push that is nearly zero has a corner nearby, at which elements part. A difference quotient across it would
+be a mean of both slopes, by which Newton's iteration moves between two sets of pressed elements for ever. So
+slopes are taken on the state's own side of each corner, beyond the reach of the increments.
 """
 
 import numpy as np
@@ -13,6 +17,7 @@ from scipy.sparse import csc_array, csr_array
 from cvt_hpc.kernels import kernel
 from cvt_hpc.models.elastic_belt import fields as f
 from cvt_hpc.models.elastic_belt import one_system as one
+from cvt_hpc.models.elastic_belt.belt import Belt, State
 from cvt_hpc.physics import compliance
 from cvt_hpc.physics.sheaves import flexibility
 from cvt_hpc.solvers.arrays import copy
@@ -24,6 +29,7 @@ SIZE_OF_FORCE = 1e5  # [N/m]
 # Relative to the sizes, for central differences: the third derivative's part is 1e-12 of a slope, round-off
 # 1e-10 of the steepest slopes.
 INCREMENT = 1e-6
+BEYOND = 1.5  # of the farthest that one increment moves a push
 SIZES_OF_PULL = np.array([100.0, 100.0, *[1e4] * 6])  # of `pulled_by` [N m], [N]
 
 
@@ -116,6 +122,27 @@ def pulley_slopes(flat: one.FlatBelt, pull: np.ndarray, sizes: np.ndarray) -> np
     return found
 
 
+def corners(belt: Belt, state: State) -> np.ndarray:
+    """Distances (2, N) of the cells from two corners of their push [1].
+
+    The first is the strain by which elements push on each other, dampers included; the second that without
+    them, which holds the strands and arcs. Elements are pressed where they are positive.
+    """
+    _, eps, damped = _strained(belt, state)
+    u, v = state.fields[[f.U, f.V_ELEMENT]]
+    opening = (np.roll(v, -1) - v) / belt.cell + 0.5 * belt.curvature * (u + np.roll(u, -1))
+    return np.array([-eps - damped * opening, -eps])
+
+
+def _strained(belt: Belt, state: State) -> tuple[np.ndarray, np.ndarray, np.ndarray]:
+    """Lengths of the cells [1], strains of elements [1], dampers over stiffness [s], each (N,)."""
+    w, content = state.fields[[f.W, f.N_ELEMENT]]
+    length = 1.0 + 0.5 * belt.curvature * (w + np.roll(w, -1))
+    eps = length / content - 1.0
+    stiffness = np.where(eps < 0.0, belt.element_stiffness, belt.bridging_stiffness)
+    return length, eps, belt.element_damping / stiffness
+
+
 class Linearisation:
     """Jacobians of the rates of belts that differ in neither mesh nor sheaves.
 
@@ -153,10 +180,19 @@ class Linearisation:
         self._flexibility = [flexibility(belt.driving), flexibility(belt.driven)]
         self._near, self._turning = np.zeros(o.shape), np.zeros((fields + 1, n))
 
-    def __call__(self, flat: one.FlatBelt) -> csc_array:
-        """Jacobian of `flat.rates`, (n, n), about the state of its last call."""
+    def __call__(self, flat: one.FlatBelt, pressed: np.ndarray | None = None) -> csc_array:
+        """Jacobian of `flat.rates`, (n, n), about the state of its last call.
+
+        With slopes on one side of each corner, by the cells (2, N) that are taken as pressed; without these,
+        with mean slopes across those within reach of the increments.
+        """
         belt, count, n = flat.belt, self._count, flat.belt.cell.size
+        contents = flat.state.fields[f.N_ELEMENT]
+        own = contents.copy()
+        if pressed is not None:
+            contents[:] = self._off_corners(belt, flat.state, pressed)
         local_slopes(flat, self._increments, self._near, self._turning)
+        contents[:] = own
         if self._loose.size:
             return self._of_free_pulleys(flat)
         self._near[MOMENT] /= belt.driven_inertia
@@ -178,6 +214,21 @@ class Linearisation:
         there = values != 0.0
         slopes = csc_array((values[there], (rows[there], columns[there])), shape=(count, count + forces))
         return slopes[:, :count] + slopes[:, count:] @ self._forces(flat)
+
+    def _off_corners(self, belt: Belt, state: State, pressed: np.ndarray) -> np.ndarray:
+        """Contents (N,) of the elements' cells, which no increment brings across a corner [1]."""
+        length, eps, damped = _strained(belt, state)
+        distances = corners(belt, state)
+        of_path = 0.5 * np.abs(belt.curvature)
+        moves = np.array([of_path, of_path * damped, damped / belt.cell, np.ones(eps.size)])
+        steps = self._increments[[f.W, f.U, f.V_ELEMENT, f.N_ELEMENT]]
+        reach = BEYOND * np.max(moves * steps[:, np.newaxis], axis=0)
+        sides = np.where(pressed, 1.0, -1.0)
+        moved = np.zeros(eps.size)
+        for side, distance in zip(sides[::-1], distances[::-1], strict=True):  # the push counts more
+            moved += side * np.maximum(reach - side * (distance + moved), 0.0)
+        eps -= moved
+        return length / (1.0 + eps)
 
     def _of_free_pulleys(self, flat: one.FlatBelt) -> csc_array:
         """Jacobian where pulleys have states of their own."""

@@ -16,18 +16,18 @@ FAR = 1e4  # of the unknowns' sizes: a step beyond, such as 1 m of w, does not c
 
 
 class Solvable(Protocol):
-    """Equations as Newton's iteration takes them: `Equations` under a load, `Braked` at a speed."""
+    """Equations as Newton's iteration takes them: `Equations` under a load, `Released` on its way."""
 
     sizes: np.ndarray
 
     def residual(self, x: np.ndarray) -> np.ndarray | None:
         """Residual of the equations; None where they have no value."""
 
-    def jacobian(self, x: np.ndarray) -> csc_array:
-        """Slopes of the residual, about the unknowns of its last call."""
+    def jacobian(self, x: np.ndarray, sided: bool) -> csc_array:
+        """Slopes of the residual about the unknowns of its last call, as of `Equations`."""
 
 
-def newton(equations: Solvable, x: np.ndarray, tolerance: float, most: int = FULL_STEPS) -> np.ndarray | None:
+def newton(equations: Solvable, x: np.ndarray, tolerance: float, sided: bool = True) -> np.ndarray | None:
     """Solve the steady equations.
 
     Parameters
@@ -38,8 +38,9 @@ def newton(equations: Solvable, x: np.ndarray, tolerance: float, most: int = FUL
         Where to begin; left as it is.
     tolerance : float
         Root mean square of the next step, over the unknowns' sizes.
-    most : int
-        Of steps.
+    sided : bool
+        With slopes on the near side of each corner: ends after a few steps from a solution nearby. Otherwise
+        with mean slopes across those that are very near, which is better from far away.
 
     Returns
     -------
@@ -47,10 +48,10 @@ def newton(equations: Solvable, x: np.ndarray, tolerance: float, most: int = FUL
         The solution; None where the iteration does not end.
     """
     residual = equations.residual(x)
-    for _ in range(most):
+    for _ in range(FULL_STEPS):
         if residual is None or not np.all(np.isfinite(residual)):
             return None
-        matrix = equations.jacobian(x)
+        matrix = equations.jacobian(x, sided)
         if not np.all(np.isfinite(matrix.data)):
             return None
         try:
@@ -58,16 +59,16 @@ def newton(equations: Solvable, x: np.ndarray, tolerance: float, most: int = FUL
         except RuntimeError:  # exactly singular
             return None
         step = -factors.solve(residual)
-        if not _size(equations, step) < FAR:
+        if not mean_size(equations, step) < FAR:
             return None
         x = x + step
         residual = equations.residual(x)
         # by the same factors, the next step
-        if residual is not None and _size(equations, factors.solve(residual)) < tolerance:
+        if residual is not None and mean_size(equations, factors.solve(residual)) < tolerance:
             return x
     return None
 
 
-def _size(equations: Solvable, step: np.ndarray) -> float:
+def mean_size(equations: Solvable, step: np.ndarray) -> float:
     """Root mean square of a step over the unknowns' sizes."""
     return float(np.sqrt(np.mean((step / equations.sizes) ** 2)))

@@ -106,6 +106,6 @@ class Released:
             return None
         return left - (1.0 - self.share) * self._start
 
-    def jacobian(self, x: np.ndarray) -> csc_array:
+    def jacobian(self, x: np.ndarray, sided: bool) -> csc_array:
         """As of `Equations`."""
-        return self._equations.jacobian(x)
+        return self._equations.jacobian(x, sided)

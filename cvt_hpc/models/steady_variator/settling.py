@@ -74,7 +74,7 @@ def settled(parameters: Mapping[str, Any], equations: Equations, tolerance: floa
         contact_forces(belt, state, fresh_contacts(belt), force)
         # as far out as flanks of the belt's own stiffness carry the same force
         state.fields[f.W] += np.maximum(force, 0.0) * pressed_in
-        found = newton(equations, equations.unknowns(state), tolerance)
+        found = newton(equations, equations.unknowns(state), tolerance, sided=False)
         if found is not None:
             return found
     return Outcome.OK

@@ -13,9 +13,9 @@ from cvt_hpc.models.elastic_belt.belt import Belt, State, belt_constants
 from cvt_hpc.models.elastic_belt.rhs import contact_forces, fresh_contacts
 from cvt_hpc.models.elastic_belt.state_march import sampled
 from cvt_hpc.models.elastic_belt.validity import reach_doubt
-from cvt_hpc.models.steady_variator.braked import Braked
 from cvt_hpc.models.steady_variator.continuation import AT_HOME, Continuation, NoSteadyState, PathEnds
-from cvt_hpc.models.steady_variator.equations import SPEED, Equations
+from cvt_hpc.models.steady_variator.curve import Curve
+from cvt_hpc.models.steady_variator.equations import Equations
 from cvt_hpc.models.steady_variator.first_states import FirstStates, SlipsThrough
 from cvt_hpc.models.steady_variator.newton import newton
 from cvt_hpc.models.steady_variator.parameters import OF_THE_COURSE
@@ -24,8 +24,6 @@ from cvt_hpc.variator import GROSS_SLIP, PULLEYS
 
 __all__ = ["NoSteadyState", "SlipsThrough", "Steady", "SteadyBelt"]
 
-# how closely a load is met along the driven speed [N m], in the default scene; tries
-NEAR_LOAD, HALVINGS = 1e-6, 40
 FALLEN = 0.9  # of the largest load: a load that has fallen so far rises no more
 SLIDING = 0.5  # slip of a pulley beyond which no state under a load is looked for
 
@@ -168,7 +166,7 @@ class SteadyBelt:
         """As `braked`, of the free pulleys or of the held ones."""
         self._course.own()
         equations.under(load=0.0, load_start=0.0)
-        for found, load in Braked(equations).along(x, sign, AT_HOME):
+        for found, load in Curve(equations, AT_HOME).along(x, sign):
             yield self._state_of(equations, found, load)
             equations.under(load=0.0, load_start=0.0)
 
@@ -202,12 +200,12 @@ class SteadyBelt:
 
     def _at_slip(self, below: Steady, beyond: Steady) -> Steady:
         """State at which a pulley just does not slip grossly, between two states."""
-        self._own.under(load=0.0, load_start=0.0)
         slips = [state.largest_slip for state in (below, beyond)]
         share = (GROSS_SLIP - slips[0]) / (slips[1] - slips[0])
-        x = below.unknowns + share * (beyond.unknowns - below.unknowns)
-        found = Braked(self._own).at(x[SPEED], x, AT_HOME)
-        return below if found is None else self._state_of(self._own, *found)
+        load = below.load + share * (beyond.load - below.load)
+        self._own.under(load=load, load_start=load)
+        x = newton(self._own, below.unknowns + share * (beyond.unknowns - below.unknowns), AT_HOME)
+        return below if x is None else self._state_of(self._own, x, load)
 
     def _found(self, x: np.ndarray, load: float) -> Steady:
         return self._state_of(self._equations, x, load)
@@ -231,23 +229,11 @@ class SteadyBelt:
         raise NoSteadyState(f"no steady state found at {load:g} N m", reach)
 
     def _between(self, low: Steady, high: Steady, load: float) -> np.ndarray:
-        """Unknowns under a load between two states, by regula falsi (Illinois) over the driven speed."""
-        braked, ends = Braked(self._equations), [low.unknowns, high.unknowns]
-        left = [low.load - load, high.load - load]
-        self._course.load(0.0)
-        near_load = NEAR_LOAD * low.belt.measures.force * low.belt.measures.length
-        for _ in range(HALVINGS):
-            x = ends[0] + left[0] / (left[0] - left[1]) * (ends[1] - ends[0])
-            found = braked.at(x[SPEED], x, AT_HOME)
-            if found is None:
-                break
-            x, off = found[0], found[1] - load
-            if abs(off) < near_load:
-                self._course.load(load)
-                return found[0] if (own := newton(self._equations, x, AT_HOME)) is None else own
-            side = 0 if off * left[0] > 0.0 else 1
-            ends[side], left[side] = x, off
-            left[1 - side] *= 0.5
+        """Unknowns under a load between two states that are next to each other on their curve."""
+        x = low.unknowns + (load - low.load) / (high.load - low.load) * (high.unknowns - low.unknowns)
+        self._course.load(load)
+        if (found := newton(self._equations, x, AT_HOME)) is not None:
+            return found
         raise NoSteadyState(
             f"no steady state found at {load:g} N m: they jump from {low.load:.4g} to {high.load:.4g} N m"
         )
