@@ -32,7 +32,7 @@ def general(stepper: str, **values) -> GeneralTransient:
 @cache
 def settled(**values) -> tuple[System, np.ndarray]:
     """A belt under its load, and its unknowns 1 ms after the start-up, by short explicit steps."""
-    run = Transient(point("explicit", **{"step": 5e-8, "lanes": "stations"} | values), "explicit")
+    run = Transient(point("explicit", **{"step": 5e-8} | values), "explicit")
     end = round((run.parameters["rise_time"] + 1e-3) / run.interval)
     while run.done < end:
         assert run.advance(end - run.done) is None
