@@ -403,6 +403,13 @@ def test_over_one_axis_the_interval_is_a_band_and_onsets_have_one_over_another(t
         two_axes.cvt.onset_scatter("sample")
 
 
+@pytest.fixture
+def undrawn(monkeypatch):
+    """Pages have places for their pictures alone."""
+    monkeypatch.setattr("cvt_hpc.report.page._encoded", lambda compose: "AA==")
+
+
+@pytest.mark.usefixtures("undrawn")
 def test_the_report_says_how_sure_the_map_is(two_axes, tmp_path):
     text = write_report(two_axes, tmp_path / "report.html").read_text().replace("\u00a0", " ")
     assert "32 cells of 8 samples, with 95 % intervals up to" in text
@@ -414,6 +421,7 @@ def test_the_report_says_how_sure_the_map_is(two_axes, tmp_path):
     assert text.count('alt="onset of vibration"') == 1
 
 
+@pytest.mark.usefixtures("undrawn")
 @pytest.mark.parametrize("indices", [False, True])
 def test_what_the_onset_depends_on_is_drawn_and_told(indices, tmp_path):
     further = {"damping": normal(5.0, 0.75), "preload": normal(40.0, 20.0)}

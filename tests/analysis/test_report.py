@@ -113,11 +113,16 @@ def test_the_page_says_what_was_found_in_sentences(page):
     )
 
 
-def page_of(results, tmp_path):
-    """The words of a page, whose pictures are not drawn."""
+def written(results, path, *options):
+    """A page whose pictures are not drawn."""
     with pytest.MonkeyPatch.context() as patch:
         patch.setattr("cvt_hpc.report.page._encoded", lambda compose: "AA==")
-        return words_of(write_report(results, tmp_path / "report.html"))
+        return write_report(results, path, *options)
+
+
+def page_of(results, tmp_path):
+    """The words of such a page."""
+    return words_of(written(results, tmp_path / "report.html"))
 
 
 def test_the_page_begins_with_what_one_hands_on(page):
@@ -146,7 +151,7 @@ def test_parameters_have_the_units_of_the_job(units, told, tmp_path):
     scene = {"driving_speed": "2500 rpm", "thrust": "40 kN"}
     job = build_job({"name": "a", "model": "elastic_belt", "axes": axes, "scene": scene})
     results.attrs |= {"job": json.dumps(job.resolved()), "job_units": json.dumps(units)}
-    assert f"Other than the defaults: {told}" in words_of(write_report(results, tmp_path / "report.html"))
+    assert f"Other than the defaults: {told}" in page_of(results, tmp_path)
 
 
 def test_what_turns_the_direction_of_a_text_is_seen(tmp_path):
@@ -157,7 +162,7 @@ def test_what_turns_the_direction_of_a_text_is_seen(tmp_path):
     results["load"].attrs["long_name"] = f"e {turning}"
     results["loss"] = results["load"] * (results["status"] == Status.DONE)
     results["loss"].attrs = {"units": "W", "long_name": "f \u202e"}
-    text = write_report(results, tmp_path / "report.html").read_text()
+    text = written(results, tmp_path / "report.html").read_text()
     data = re.search(r'id="map-data">(.*?)</script>', text, flags=re.S)[1]
     for shown in (text, json.dumps(json.loads(data), ensure_ascii=False)):
         assert not set(turning) & set(shown)
@@ -317,14 +322,14 @@ def test_runs_that_were_done_again_tell_of_the_quality(tmp_path):
     again["vibrates"][0, 0, 6] = Vibrates.NO
     (tmp_path / "check_step").mkdir()
     again.to_netcdf(tmp_path / "check_step" / "results.nc")
-    words = words_of(write_report(results, tmp_path / "report.html", "x", tmp_path))
+    words = words_of(written(results, tmp_path / "report.html", "x", tmp_path))
     assert "3 runs were done again at half the step, in check_step : 1 of 3 contradict" in words
     assert "those done again deviate by 25.00% (median)" in words
     assert "done again" not in page_of(results, tmp_path)
     other = again.assign_coords(load=again["load"] + 1.0)
     (tmp_path / "check_step" / "results.nc").unlink()
     other.to_netcdf(tmp_path / "check_step" / "results.nc")
-    words = words_of(write_report(results, tmp_path / "report.html", "x", tmp_path))
+    words = words_of(written(results, tmp_path / "report.html", "x", tmp_path))
     assert "Runs were done again, but cannot be compared: " in words
 
 

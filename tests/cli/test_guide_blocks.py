@@ -9,6 +9,7 @@ import runpy
 import shutil
 import sys
 import tomllib
+from functools import cache
 from pathlib import Path
 from typing import ClassVar
 
@@ -64,6 +65,8 @@ SMALL_OF = {
     "linear_stability": {"stations": 64},
 }
 PILOT = SMALL | {"stations": 64}  # of `check --pilots`
+CALIBRATED = "friction_gradient=[-1.1]"  # s/m, of what its page measures
+PARSER = _parser()
 PYTHON_RUN = 'duration = "0.1 s"\nlongest_duration = "0.1 s"'
 # What a page takes for granted: work of its reader, or of another page.
 BEFORE = {
@@ -127,7 +130,7 @@ class Reader:
         if words[:2] == ["mpirun", "-n"]:  # tests/sweep has the same under mpirun
             words = words[3:]
         if words[0] == "cvt-hpc":
-            _parser().parse_args(words[1:])
+            PARSER.parse_args(words[1:])
             status = self._main(_smaller(words[1:], self.page))
             assert status in ((0, 1) if words[1] == "doctor" else (0,))  # 1: of this machine, not of the page
         elif words[0] == "python" and words[1].startswith("jobs/") and " ".join(words[:2]) not in ELSEWHERE:
@@ -175,18 +178,25 @@ def _smaller(words, page):
     command = words[0]
     if "--pilots" in words:
         return [*words, *(word for key, value in PILOT.items() for word in ("--set", f"{key}={value}"))]
-    if command not in {"run", "simulate", *CHECKED_ONLY} or words[1].startswith("jobs/figures/"):
+    if command == "calibrate":
+        return [*words, "--set", CALIBRATED]
+    if command not in {"check", "run", "simulate", *CHECKED_ONLY} or words[1].startswith("jobs/figures/"):
         return words  # figures take half a second each
     given = [words[i + 1] for i, word in enumerate(words) if word == "--set"]
     settings = [word for text in given for word in ("--set", text)]
     if command in CHECKED_ONLY:
         return ["check", words[1], "--for", command, *settings]
-    job = build_job(read_document(Path(words[1])), words[1], given)
+    if "--for" in words:
+        return words
+    job = _job(Path(words[1]).read_text(), words[1], tuple(given))
+    mentioned = {text.partition("=")[0] for text in given}
+    if command == "check":
+        return [*words, *_ends(job, mentioned)]
     code = "\n".join(block.text for block in blocks(page))
     is_read = "--out" in words if command == "simulate" else re.search(rf"out/{job.name}(?!\w)", code)
     # a course of time cannot be cut short
     if not is_read or job.model in CHECKED_MODELS or job.parameters.get("profile_time"):
-        return ["check", words[1], *settings]
+        return ["check", words[1], *settings, *_ends(job, mentioned)]
     changed = SMALL | SMALL_OF.get(job.model, {}) | SMALL_OF.get(job.stepper, {}) | SMALL_OF.get(job.name, {})
     changed = {key: value for key, value in changed.items() if key in job.parameters}
     longest = max(job.axes, key=lambda axis: len(axis.values), default=None)
@@ -207,9 +217,26 @@ def _smaller(words, page):
         changed[axis.name] = list(kept)
     if "runs" in job.design:
         changed["design.runs"] = 2
-    mentioned = {text.partition("=")[0] for text in given}
+    return [*words, *_settings(changed, mentioned)]
+
+
+def _ends(job, mentioned):
+    """Options by which a grid has the ends of its axes alone; `test_jobs.py` checks the whole grid of each job."""
+    if job.design.keys() & {"runs", "first_spacing"}:
+        return []
+    return _settings({axis.name: [axis.values[0], axis.values[-1]] for axis in job.axes}, mentioned)
+
+
+def _settings(changed, mentioned):
+    """Options that change keys which are not mentioned."""
     more = [f"{key}={value!r}" for key, value in changed.items() if key not in mentioned]
-    return [*words, *(word for text in more for word in ("--set", text))]
+    return [word for text in more for word in ("--set", text)]
+
+
+@cache
+def _job(_, name, given):
+    """The job of a file with this text, by which it is found again."""
+    return build_job(read_document(Path(name)), name, given)
 
 
 def _named(key, job, stem):

@@ -21,7 +21,9 @@ def test_quickstart_leaves_results_and_a_map(tmp_path):
         (tmp_path / name).parent.mkdir(exist_ok=True)
         shutil.copy(ROOT / name, tmp_path / name)
     job = (ROOT / "jobs" / "quickstart.toml").read_text()
-    shorter = job.replace('duration = "0.3 s"', 'duration = "0.08 s"\nlongest_duration = "0.08 s"')
+    shorter = job.replace(
+        'duration = "0.3 s"', 'duration = "0.08 s"\nlongest_duration = "0.08 s"\n[mesh]\nstations = 64'
+    )
     assert shorter != job
     (tmp_path / "jobs" / "quickstart.toml").write_text(shorter)
     # what the script would install: its stamp says that nothing has changed since

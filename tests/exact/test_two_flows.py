@@ -1,6 +1,6 @@
 """Two flows of ring material, one for each package: directions, linear system, a free ring, balances, and one flow."""
 
-from functools import cache, partial
+from functools import partial
 
 import numpy as np
 import pytest
@@ -15,26 +15,17 @@ from cvt_hpc.models.spatial_pushbelt.transient import EQUATIONS, advance
 from cvt_hpc.solvers.linked_blocks import field_of_right
 from support import spatial_chains as chains
 from support.pushbelts import THRUST
-from support.spatial_belts import LOAD, NODES, STEP, inputs, scene, stored
+from support.spatial_belts import LOAD, NODES, STEP, inputs, kept_scene, scene, stored
 
 TWO = EQUATIONS[2]
 advance_two = partial(advance_by, TWO)
 V, W = spatial_fields.ROW_V, spatial_fields.ROW_HALF  # numbers of these unknowns
 
 
-loaded = cache(scene)
-
-
-def of_two(belt, state):
-    """A state of its own with two flows."""
-    state = with_two_flows(belt, state)
-    return state._replace(**{name: getattr(state, name).copy() for name in state._fields[1:]})
-
-
 def shaken(seed):
     """A loaded belt out of order, with flows that slip and are strained differently."""
-    belt, state, _ = loaded(pin_clearance=2e-5, ring_friction_speed=0.02)
-    state = of_two(belt, state)
+    belt, state, _ = kept_scene(pin_clearance=2e-5, ring_friction_speed=0.02)
+    state = with_two_flows(belt, state)
     rng = np.random.default_rng(seed)
     f = of_lanes(state.elements).copy()
     f[:, :3] += rng.normal(0.0, 2e-5, (NODES, 3))
@@ -284,7 +275,7 @@ def test_one_flow_is_two_flows_of_equal_packages_in_the_plane():
     """A belt that stays in its plane has equal packages: both march alike, up to the order of sums."""
     found = []
     for flows, march, newton in ((1, advance, b.NEWTON), (2, advance_two, b.NEWTON_OF_TWO_FLOWS)):
-        belt, state, _ = scene(offset=0.0)
+        belt, state, _ = kept_scene(offset=0.0)
         state = with_two_flows(belt, state) if flows == 2 else state
         hold = inputs((THRUST, THRUST), (LOAD, LOAD))
         assert march(belt, newton, state, b.workspace(belt, NODES, flows), hold, 100, STEP) == 0

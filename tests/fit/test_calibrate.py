@@ -89,7 +89,7 @@ def measured_windows(hidden, rng):
 def test_hidden_variators_lie_in_bands_and_in_what_is_written_as_often_as_these_say(study, tmp_path):
     """Of two parameters on which the noise depends, by central shares of the distribution for a next job."""
     rng, inside, widths, shares = np.random.default_rng(3), [], [], []
-    for _ in range(48):
+    for _ in range(32):
         hidden = rng.random(3)
         found = weigh(asked_by(study, tmp_path, measured_windows(hidden, rng), scatter=10.0), study[1])
         assert [one.key for one in found.distributions] == [*KEYS]

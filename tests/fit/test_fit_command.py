@@ -81,6 +81,10 @@ measure = "larger"
 than = "as_built"
 """
 
+# Where it does not matter what the search finds
+BRIEFLY = [
+    word for key in ("generations=1", "screened=8", "population=5") for word in ("--set", f"fit.{key}")
+]
 ALIGNMENT = Path(__file__).parents[2] / "jobs" / "fit_alignment.toml"
 
 
@@ -185,7 +189,7 @@ def test_runs_that_the_model_refuses_do_not_count(job, window, tmp_path):
 
 
 def test_starts_are_looked_around_as_the_best_set_is(job, tmp_path, capsys):
-    assert main(["fit", "x.toml", "--set", "fit.around=starts", "--set", "fit.generations=1"]) == 0
+    assert main(["fit", "x.toml", "--set", "fit.around=starts", *BRIEFLY]) == 0
     for name in ("distances", "sensitivities"):
         _, rows = read(tmp_path / "out" / "x" / f"{name}.csv")
         sets = list(dict.fromkeys(row["around"] for row in rows))
@@ -199,7 +203,7 @@ def test_starts_are_looked_around_as_the_best_set_is(job, tmp_path, capsys):
 
 
 def test_a_fit_that_was_stopped_goes_on(job, window, monkeypatch, capsys, tmp_path):
-    small = ["fit", "x.toml", "--set", "fit.generations=1", "--set", "fit.samples=0"]
+    small = ["fit", "x.toml", *BRIEFLY, "--set", "fit.samples=0"]
     assert main([*small, "--out", "whole"]) == 0
     whole, runs = capsys.readouterr().out, len(window)
     reports = iter([False, True])

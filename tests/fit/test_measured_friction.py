@@ -50,15 +50,15 @@ def test_points_of_a_law_give_it_back_and_no_other_is_better(law):
 
 def test_scatter_about_a_constant_is_rarely_taken_for_a_fall():
     rng = np.random.default_rng(4)
-    best = [fit_laws(points(0.1 + SPREAD * rng.normal(size=10)))[0].law for _ in range(20)]
-    assert best.count(Law.COULOMB) >= 16
+    best = [fit_laws(points(0.1 + SPREAD * rng.normal(size=10)))[0].law for _ in range(10)]
+    assert best.count(Law.COULOMB) >= 8
 
 
 @pytest.mark.parametrize("correlation", [0.0, 0.8])
 def test_intervals_hold_the_truth_as_often_as_they_promise(correlation):
     """Noise of independent points, and of a trace whose samples follow each other closely."""
     rng, inside = np.random.default_rng(5), []
-    speeds = np.linspace(0.001, 0.4, 40 if correlation == 0.0 else 300)
+    speeds = np.linspace(0.001, 0.4, 40 if correlation == 0.0 else 150)
     for _ in range(60):
         noise = rng.normal(size=len(speeds))
         for k in range(1, len(speeds)):
@@ -72,7 +72,7 @@ def test_intervals_hold_the_truth_as_often_as_they_promise(correlation):
 
 
 def test_scatter_is_that_of_the_specimens_and_not_of_their_number():
-    rng, count = np.random.default_rng(7), 60
+    rng, count = np.random.default_rng(7), 24
     own = [TRUE["friction_gradient"] * (1.0 + 0.1 * rng.normal()) for _ in range(count)]
     mu = np.concatenate([of_law(Law.STRIBECK, friction_gradient=one) for one in own])
     found = fit_law(Law.STRIBECK, points(mu, np.tile(SPEEDS, count), np.repeat(np.arange(count), 10)))

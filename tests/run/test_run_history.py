@@ -12,7 +12,7 @@ from cvt_hpc.models.elastic_belt.belt import REGIONS, belt_constants, mesh
 from cvt_hpc.models.elastic_belt.sampling import probes
 from cvt_hpc.simulation import record_coordinates, record_variables
 from cvt_hpc.variables import Status, Vibrates
-from support.marched import CHEAP, fresh_record, job
+from support.marched import CHEAP, alone, fresh_record, job
 
 LOADED = CHEAP | {"load": 120.0}
 JUDGED = slice(400, None)  # of 800 samples
@@ -20,7 +20,7 @@ JUDGED = slice(400, None)  # of 800 samples
 
 @pytest.fixture(scope="module")
 def history():
-    return simulate(job(**LOADED), {"lanes": "runs"})
+    return simulate(alone(**LOADED))
 
 
 @pytest.fixture(scope="module")

@@ -14,6 +14,7 @@ from cvt_hpc.vibration.ramp import RampOccurrence
 NOT_COMPUTED = object()
 FURTHER = {
     "belt_drive": {"amplitude_threshold": 0.01},  # coarse elements shake the strands
+    **dict.fromkeys(("steady_variator", "linear_stability"), {"stations": 48}),
     "slip_limit": {"stations": 48},
 }
 RECORDED = [

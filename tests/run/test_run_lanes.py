@@ -25,7 +25,8 @@ WIDTHS = {"double": 8, "single": 16}
 METHODS = {
     "double": {"stepper": "imex", "precision": "double"},
     "single": {"stepper": "imex", "precision": "single"},
-    "explicit": {"stepper": "explicit", "precision": "double", "step": 2e-7, "stations": 24},
+    "explicit": {"stepper": "explicit", "precision": "double", "step": 2e-7, "stations": 24}
+    | {"duration": 0.022, "rise_time": 8e-3, "band_low": 500.0},
 }
 SHORT = CHEAP | {"stations": 40}
 # Of all that may differ between the lanes of a batch, and of all endings.

@@ -19,12 +19,13 @@ from support.marched import Together, balance, finished, job, mean
 
 COARSE = {"stations": 64, "duration": 0.08}
 CONSTANT = {"friction_law": "coulomb", "friction_gradient": 0.0}
+ALONE = {"lanes": "stations"}  # where no other run has the law, the mesh and the time
 # parameters and what the balance may leave open, as a share of the power
 SCENES = {
     "vibrating": ({"load": 120.0}, 5e-4),
-    "vibrating, no memory": ({"load": 120.0, "friction_memory": 0.0}, 5e-4),
+    "vibrating, no memory": (ALONE | {"load": 120.0, "friction_memory": 0.0}, 5e-4),
     "quiet": ({"load": 60.0}, 5e-4),
-    "constant friction": ({"load": 120.0} | CONSTANT, 5e-4),
+    "constant friction": (ALONE | {"load": 120.0} | CONSTANT, 5e-4),
     "braking": ({"load": -60.0}, 5e-4),
     "rigid": ({"load": 120.0, "sheave_stiffness": np.inf, "stiffness_of": "sheave"}, 1e-3),  # 20 W of 38 kW
     "no load": ({"load": 0.0}, 5e-3),
@@ -42,11 +43,11 @@ DEFAULT_MESH = {
         {"load": 40.0, "sheave_stiffness": np.inf, "stiffness_of": "sheave"} | CONSTANT,
         5e-4,
     ),
-    "no load": (NO_LOAD, 2e-3),
+    "no load": (ALONE | NO_LOAD, 2e-3),
     # of a step that begins at every sample in the same phase: dampers that were sampled too were 80 W off here, 4 %
-    "no load, in phase": (NO_LOAD | {"step": 2.5e-6}, 2e-3),
+    "no load, in phase": (ALONE | NO_LOAD | {"step": 2.5e-6}, 2e-3),
 }
-SEATED = {"load": 120.0, "stations": 320, "duration": 0.08} | CONSTANT
+SEATED = ALONE | {"load": 120.0, "stations": 320, "duration": 0.08} | CONSTANT
 HALF_STEP = {"step": 0.5 * job().parameters["step"]}
 HALVED = ["vibrating", "quiet", "rigid", "no load"]
 RUNS = Together(

@@ -23,6 +23,7 @@ from cvt_hpc.variator.history import regions
 from support.spatial_belts import COARSE, TORQUE, job
 
 OFFSET = 5e-4  # [m]
+BRIEF = {"duration": 0.016, "rise_time": 0.004, "band_low": 700.0}
 
 
 def record(**values):
@@ -148,8 +149,7 @@ def test_profiles_and_histories_agree_with_the_record(misaligned):
 
 
 def test_two_flows_show_what_one_leaves_out_in_record_and_history():
-    values = {"misalignment": OFFSET, "duration": 0.016, "rise_time": 0.004, "band_low": 700.0}
-    one, two = (simulate(job(**values, ring_flows=flows)) for flows in (1, 2))
+    one, two = (simulate(job(misalignment=OFFSET, **BRIEF, ring_flows=flows)) for flows in (1, 2))
     assert one["sheave_force"].shape == (4,) and one["contact_force_left"].dims == ("position",)
     assert float(one["axial_offset"][-1]) == pytest.approx(OFFSET, rel=0.2)
     assert two["unsolved_share"] == 0.0 and abs(two["power_residual"]) < 1e-3
@@ -162,13 +162,7 @@ def test_two_flows_show_what_one_leaves_out_in_record_and_history():
 
 
 def test_an_aligned_belt_stays_in_its_plane_and_a_seed_leads_it_out():
-    values = {
-        "duration": 0.016,
-        "rise_time": 0.004,
-        "band_low": 700.0,
-        "driving_loose_side": "both",
-        "driven_loose_side": "both",
-    }
+    values = BRIEF | {"driving_loose_side": "both", "driven_loose_side": "both"}
     still = Transient(job(disturbance=0.0, **values).point(0), "newton")
     still.advance(still.samples // 2)
     lateral = still.displacement[:, len(still.probes) // 2 :]
@@ -255,7 +249,7 @@ def test_a_ramp_that_slips_through_tells_of_both_planes_before():
 
 
 def test_a_run_along_a_ramp_has_the_amplitudes_of_both_planes():
-    found = record(misalignment=OFFSET, **RAMP)
+    found = record(misalignment=OFFSET, **RAMP, **BRIEF)
     assert found["status"] == Status.DONE
     for plane in ("", "lateral_"):
         along, most = found[f"{plane}ramp_amplitude"], found[f"{plane}amplitude"]
@@ -338,8 +332,7 @@ def test_what_ends_a_run_is_recorded_and_the_sweep_goes_on(tmp_path):
     }
     loose = {"driving_thrust": 20e3, "sheave_rate": 5e-5, "flank_reach": 1e-3}
     faces = {"inner_radius": 0.045, "outer_radius": 0.065}
-    short = {"duration": 0.016, "longest_duration": 0.016, "rise_time": 0.004, "band_low": 700.0}
-    short |= {"most_refinements": 0, "most_iterations": 20}
+    short = BRIEF | {"longest_duration": 0.016, "most_refinements": 0, "most_iterations": 20}
     report = run(build_job(document, "ends.toml", COARSE | loose | faces | short), tmp_path, progress=False)
     assert report.done == 2 and len(report.failed) == 3
     with open_results(report.results) as results:

@@ -56,6 +56,14 @@ def whole(tmp_path_factory):
     return printed.getvalue(), folder / "out"
 
 
+@pytest.fixture
+def studied(job, whole):
+    """The folder of that study beside the job, without its audit."""
+    out = job.parent / "out"
+    shutil.copytree(whole[1], out, ignore=shutil.ignore_patterns("audit"))
+    return out
+
+
 def test_rungs_that_are_right_are_found_right(whole):
     printed, out = whole
     assert "audit: 4 of 4 runs that cheaper models decided done again in full" in printed
@@ -98,7 +106,7 @@ def test_forces_are_compared(whole):
     assert f"mean forces within {np.quantile(off, 0.95):.2%} in 95 % of the runs" in printed
 
 
-def test_the_smallest_sample_has_a_run(job, capsys):
+def test_the_smallest_sample_has_a_run(job, studied, capsys):
     status, printed, _ = audited(job, capsys, "1e-9")
     assert status == 0
     assert "audit: 1 of 4 runs that cheaper models decided done again in full" in printed
@@ -115,14 +123,12 @@ def test_a_fresh_study_has_a_fresh_audit(job, whole, capsys):
     assert "expected the folder of this job" in capsys.readouterr().err
 
 
-def test_what_fails_in_full_is_no_error_of_the_rung(job, capsys):
-    out = job.parent / "out"
-    assert main(["run", str(job), "--out", str(out)]) == 0
+def test_what_fails_in_full_is_no_error_of_the_rung(job, studied, capsys):
     status, printed, _ = audited(job, capsys, "1", "--run-limit", "1us")
     assert status == 1
     assert "coarse: 0 of 0 runs of another class (95 % interval 0.00% to 100.00%)" in printed
     assert "; 4 more failed in full" in printed
-    rows = list(csv.DictReader((out / "audit" / "audit.csv").open()))
+    rows = list(csv.DictReader((studied / "audit" / "audit.csv").open()))
     assert [row["class in full"] for row in rows] == ["failed"] * 4
     status, printed, _ = audited(job, capsys, "1", "--retry", "timed_out")
     assert status == 0
@@ -156,7 +162,7 @@ def test_audits_end_with_the_time(job, capsys, monkeypatch):
 
 
 def test_a_larger_share_goes_on_with_the_same_sample(job, capsys):
-    passive = ("--set", "friction_gradient=0", "--set", "run.duration=0.1")
+    passive = ("--set", "friction_gradient=0", "--set", "run.duration=0.1", "--set", "stations=48")
     job.write_text(JOB.replace("[60, 120]", "{ from = 1, to = 40, step = 1 }"))
     _, first, out = audited(job, capsys, "0.2", *passive)
     records = sum(path.stat().st_size for path in (out / "audit" / "records").iterdir())

@@ -1,4 +1,4 @@
-"""A run of the elastic belt by one of its own steps, alone in a batch."""
+"""A run of the elastic belt by one of its own steps, alone in a batch, whose lanes its stations fill."""
 
 from collections.abc import Mapping
 from typing import Any
@@ -11,7 +11,7 @@ class Transient(LaneRun):
     """One run by "imex" or "explicit", with the parameters given [SI]."""
 
     def __init__(self, parameters: Mapping[str, Any], stepper: str) -> None:
-        super().__init__(Batch([parameters], stepper), 0)
+        super().__init__(Batch([{**parameters, "lanes": "stations"}], stepper), 0)
 
     def advance(self, samples: int) -> tuple[Status, str] | None:
         """March on by so many samples at most; the failure, where the run cannot continue."""

@@ -1,10 +1,12 @@
 """A spatial pushbelt under its thrust and load, beside the common planar one."""
 
+from functools import cache
+
 import numpy as np
 
 from cvt_hpc.job import build_job
 from cvt_hpc.models.pushbelt import fields as pushbelt_fields
-from cvt_hpc.models.pushbelt.belt import of_lanes, start
+from cvt_hpc.models.pushbelt.belt import in_lanes, of_lanes, start
 from cvt_hpc.models.spatial_pushbelt import belt as b
 from cvt_hpc.models.spatial_pushbelt import fields as spatial_fields
 from cvt_hpc.models.spatial_pushbelt.transient import advance
@@ -38,6 +40,19 @@ def inputs(thrusts, loads, fields=spatial_fields.INPUTS, drift=0.0):
     found[:, pushbelt_fields.IN_DRIVEN_THRUST], found[:, pushbelt_fields.IN_LOAD] = thrusts, loads
     found[:, spatial_fields.IN_DRIVEN_DRIFT :] = drift
     return found
+
+
+@cache
+def _scene(**values):
+    return scene(**values)
+
+
+def kept_scene(**values):
+    """As `scene`, which marches once for the same values; state and work space are the caller's own."""
+    belt, state, _ = _scene(**values)
+    own = {name: getattr(state, name).copy() for name in state._fields[1:]}
+    state = state._replace(elements=in_lanes(of_lanes(state.elements)), **own)
+    return belt, state, b.workspace(belt, len(of_lanes(state.elements)))
 
 
 def scene(offset=OFFSET, modal=(), nodes=NODES, **constants):

@@ -10,16 +10,18 @@ from cvt_hpc.variables import Status
 JOB = """name = "b"
 model = "elastic_belt"
 [axes]
-load = [60, 120]
+load = [120]
 [scene]
 thrust = "50 kN"
-rise_time = "10 ms"
+rise_time = "8 ms"
 [friction]
 friction_gradient = -1.0
 [mesh]
-stations = 32
+stations = 24
 [run]
-duration = "40 ms"
+duration = "22 ms"
+[vibration]
+band_low = "500 Hz"
 """
 EXPLICITLY = ("--check-step", "1", "--check-step-by", "explicit")
 
@@ -30,11 +32,11 @@ def test_a_study_is_checked_by_the_explicit_step_and_compared_with_it(tmp_path, 
     (tmp_path / "b.toml").write_text(JOB)
     assert main(["run", "b.toml", *EXPLICITLY]) == 0
     printed = capsys.readouterr().out
-    assert "step check: 2 of 2 runs that took steps done again by the explicit step" in printed
-    assert "  0 of 2 contradict" in printed
+    assert "step check: 1 of 1 runs that took steps done again by the explicit step" in printed
+    assert "  0 of 1 contradict" in printed
     with open_results("out/b/check_explicit") as dataset:
         assert np.allclose(dataset["time_step"], 4e-8, rtol=1e-9)
-        assert dataset["status"].values.tolist() == [Status.DONE] * 2
+        assert dataset["status"].values.tolist() == [Status.DONE]
     assert main(["compare", "out/b", "out/b/check_explicit"]) == 0
     assert 'differs: stepper: "imex" in A, "explicit" in B' in capsys.readouterr().out
     assert main(["run", "b.toml", "--set", "stepper=explicit", *EXPLICITLY]) == 2
