@@ -11,6 +11,7 @@ from cvt_hpc.models.elastic_belt.one_system import flat_belt, pack, rates
 from cvt_hpc.models.elastic_belt.sampling import Outcome
 from cvt_hpc.models.steady_variator import first_states
 from cvt_hpc.models.steady_variator.continuation import OWN, Continuation
+from cvt_hpc.models.steady_variator.curve import Curve
 from cvt_hpc.models.steady_variator.equations import Equations
 from cvt_hpc.models.steady_variator.first_states import FirstStates, least_sliding
 from cvt_hpc.models.steady_variator.forces import distributions
@@ -118,6 +119,46 @@ def test_jacobian():
     random[48 : 2 * 48] = 0.0
     change = equations.residual(x + random) - equations.residual(x - random)
     assert matrix @ (2.0 * random) == pytest.approx(change, rel=1e-4, abs=3e-6 * np.abs(change).max())
+
+
+@pytest.mark.parametrize("distance", [3e-11, -3e-11], ids=["pressed", "apart"])
+def test_slopes_beside_a_corner_are_those_of_its_own_side(distance):
+    # a difference quotient of 1e-9 would be the mean of both sides: with it, Newton's iteration goes to and fro
+    parameters = GIVEN | {"load_start": 0.0, "tilt_lag": 0.0}
+    equations = Equations(parameters, belt_constants(parameters))
+    x = steady()[0].unknowns.copy()
+    cell = int(np.argmax(equations.corners(x)[0]))
+    strain = 48 + cell
+    for _ in range(5):  # the damper's part follows the strain, too
+        x[strain] += equations.corners(x)[0, cell] - distance
+    assert equations.corners(x)[0, cell] == pytest.approx(distance, rel=1e-3)
+    away = np.zeros(x.size)
+    away[strain] = -np.sign(distance) * 1e-8
+    before = equations.residual(x)
+    assert before is not None
+    slopes, mean = (equations.jacobian(x, sided=sided) @ away for sided in (True, False))
+    change = equations.residual(x + away) - before
+    assert slopes == pytest.approx(change, rel=1e-3, abs=1e-4 * np.abs(change).max())
+    assert np.abs(mean - change).max() > 0.1 * np.abs(change).max()
+
+
+def test_states_follow_their_curve_from_corner_to_corner_where_the_load_turns_back():
+    # from 20 to 60 N m the play passes from the driven wrap through a strand to the driving wrap, cell by cell
+    parameters = GIVEN | {"load_start": 0.0, "tilt_lag": 0.0, "tilt_stiffness": 6.3e5, "stations": 40}
+    first = SteadyBelt(parameters).at(20.0)
+    equations = Equations(parameters, first.belt)
+    loads, pressed = [first.load], equations.corners(first.unknowns) > 0.0
+    for x, load in Curve(equations, 1e-7).along(first.unknowns, -1.0):
+        equations.under(load=load, load_start=load)
+        # strains are left by 1e-10 or so, which the elements' stiffness makes some m/s^2 of
+        assert np.abs(equations.residual(x)).max() < 10.0
+        before, pressed = pressed, equations.corners(x) > 0.0
+        assert np.sum(pressed[0] != before[0]) <= 1
+        loads.append(load)
+        if load > 60.0:
+            break
+    assert loads[-1] > 60.0 and np.diff(loads).min() < 0.0 and np.diff(loads).max() < 10.0
+    assert SteadyBelt(parameters).at(60.0).load == 60.0
 
 
 def test_newton_gives_up_where_it_is_lost():

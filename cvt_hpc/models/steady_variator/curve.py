@@ -23,7 +23,8 @@ from cvt_hpc.models.steady_variator.newton import mean_size
 # Steps, as the root mean square of the unknowns over their sizes: first, longest, and shortest that is tried
 FIRST, LONGEST, SHORTEST = 1e-3, 0.1, 1e-12
 PROBE = 1e-4  # at the most, of the step over which a corner's distance is linear
-CORRECTIONS, EASY = 8, 3  # at most, by one factorisation; with so few the next step is twice as long
+CORRECTIONS, FACTORISATIONS = 4, 3  # at most: by one factorisation, and of these in a step
+EASY = 3  # with so few corrections the next step is twice as long
 MOST = 1500  # steps of a curve
 NEAR = 1e-9  # strain: so near to a corner the next piece begins
 
@@ -65,7 +66,7 @@ class Curve:
             taken = distance if meets else step
             # beyond a corner the strain of its cell may change a thousand times as fast: it leads there
             across = tangent if passed < 0 else self._strain_of(passed)
-            found = self._corrected(x, tangent, taken, slopes, across)
+            found = self._corrected(x, tangent, taken, slopes, across, pressed)
             if found is not None:
                 reached, corrections = found
                 there = self._corners(reached)
@@ -161,20 +162,33 @@ class Curve:
         return corner, float(distances[corner])
 
     def _corrected(
-        self, x: np.ndarray, tangent: np.ndarray, step: float, slopes: csr_array, across: np.ndarray
+        self,
+        x: np.ndarray,
+        tangent: np.ndarray,
+        step: float,
+        slopes: csr_array,
+        across: np.ndarray,
+        pressed: np.ndarray,
     ) -> tuple[np.ndarray, int] | None:
-        """State in a plane, across a direction, at a step along the tangent; corrections to it."""
-        try:
-            factors = splu(self._bordered(slopes, across))
-        except RuntimeError:  # exactly singular
-            return None
-        found = x + step * tangent * self._equations.sizes
-        for correction in range(CORRECTIONS):
-            residual = self._residual(found)
-            if residual is None:
+        """State in a plane, across a direction, at a step along the tangent; corrections to it.
+
+        First by the slopes at x, then by their own, as where flanks meet or part on the way.
+        """
+        found, done = x + step * tangent * self._equations.sizes, 0
+        for _ in range(FACTORISATIONS):
+            try:
+                factors = splu(self._bordered(slopes, across))
+            except RuntimeError:  # exactly singular
                 return None
-            change = -factors.solve(np.append(residual, 0.0))
-            found = found + change
-            if mean_size(self._equations, change) < self._tolerance:
-                return (found, correction + 1) if self._residual(found) is not None else None
+            for done in range(done + 1, done + 1 + CORRECTIONS):
+                residual = self._residual(found)
+                if residual is None:
+                    return None
+                change = -factors.solve(np.append(residual, 0.0))
+                found = found + change
+                if mean_size(self._equations, change) < self._tolerance:
+                    return None if self._residual(found) is None else (found, done)
+            if self._residual(found) is None:
+                return None
+            slopes = self._slopes(found, pressed)
         return None
