@@ -71,12 +71,12 @@ def test_a_thrust_for_no_load_and_a_torque_ratio_of_one_are_refused():
         rung_job("steady_variator", load_share=1.0)
 
 
-def test_where_neither_strand_pushes_held_speeds_have_states():
+def test_where_neither_strand_pushes_the_curve_has_states():
     # default belt: below 38 N m t2 pushes, above 40 N m t1; between, the play moves at nearly one load
     point = rung_job("steady_variator", stations=STATIONS, load=60.0).point(0)
     belt = SteadyBelt(point)
     loads, pushes = [], []
-    for state in belt.braked(belt.at(60.0), 1.0):
+    for state in belt.along_curve(belt.at(60.0), 1.0):
         numbers = quantities(state, mesh(point))
         assert state.load == pytest.approx(
             numbers["load_power"] / point["ratio"] / state.state.scalars[1], 1e-9

@@ -174,19 +174,20 @@ class Curve:
 
         First by the slopes at x, then by their own, as where flanks meet or part on the way.
         """
-        found, done = x + step * tangent * self._equations.sizes, 0
-        for _ in range(FACTORISATIONS):
+        found = x + step * tangent * self._equations.sizes
+        for factorisation in range(FACTORISATIONS):
             try:
                 factors = splu(self._bordered(slopes, across))
             except RuntimeError:  # exactly singular
                 return None
-            for done in range(done + 1, done + 1 + CORRECTIONS):
+            for correction in range(CORRECTIONS):
                 residual = self._residual(found)
                 if residual is None:
                     return None
                 change = -factors.solve(np.append(residual, 0.0))
                 found = found + change
                 if mean_size(self._equations, change) < self._tolerance:
+                    done = factorisation * CORRECTIONS + correction + 1
                     return None if self._residual(found) is None else (found, done)
             if self._residual(found) is None:
                 return None

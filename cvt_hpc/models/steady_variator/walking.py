@@ -1,7 +1,7 @@
-"""Steady states of a belt: a first one by the transient, further ones along the load or the driven speed.
+"""Steady states of a belt: a first one by the transient, further ones along the load or along their curve.
 
 Corners of the push force are sharp: each state begins at the one before, and a step that fails is made again
-in quarters. Near the limit of friction the load does not separate states, and the driven speed does.
+in quarters. Where the load does not separate states, the arc of their curve does (`curve.py`).
 """
 
 from collections.abc import Iterator, Mapping, Sequence
@@ -154,16 +154,16 @@ class SteadyBelt:
             near = self.at(load, near)
             yield near
 
-    def braked(self, near: Steady, sign: float) -> Iterator[Steady]:
-        """States from one on as the driven pulley is held at lower (sign -1) or higher (1) speeds.
+    def along_curve(self, near: Steady, sign: float) -> Iterator[Steady]:
+        """States along their curve; the driven pulley turns slower (sign -1) or faster (1) at first.
 
         As far as they are found; in the direction in which the load's size grows they continue past the
         largest torque that friction carries.
         """
-        return self._braked(self._own, near.unknowns, sign)
+        return self._along_curve(self._own, near.unknowns, sign)
 
-    def _braked(self, equations: Equations, x: np.ndarray, sign: float) -> Iterator[Steady]:
-        """As `braked`, of the free pulleys or of the held ones."""
+    def _along_curve(self, equations: Equations, x: np.ndarray, sign: float) -> Iterator[Steady]:
+        """As `along_curve`, of the free pulleys or of the held ones."""
         self._course.own()
         equations.under(load=0.0, load_start=0.0)
         for found, load in Curve(equations, AT_HOME).along(x, sign):
@@ -185,7 +185,7 @@ class SteadyBelt:
         """
         direction = -1.0 if near.load < 0.0 else 1.0
         most = last = near
-        for state in self.braked(near, -direction):
+        for state in self.along_curve(near, -direction):
             if state.largest_slip > GROSS_SLIP:
                 state = self._at_slip(last, state)
                 return state if direction * state.load > direction * most.load else most
@@ -218,7 +218,7 @@ class SteadyBelt:
             x, reached = ended.x, start + ended.share * (load - start)
         before = self._found(x, reached)
         farthest, sign = reached, 1.0 if load < reached else -1.0  # a larger load slows the driven pulley
-        for state in self._braked(self._equations, before.unknowns, sign):
+        for state in self._along_curve(self._equations, before.unknowns, sign):
             if (before.load - load) * (state.load - load) <= 0.0:
                 return self._between(before, state, load)
             before = state
