@@ -224,10 +224,11 @@ POINTS = [{"seed": seed} | ({"load": 450.0} if seed == 6 else {}) for seed in ra
 
 
 @pytest.mark.slow
-def test_neighbours_that_are_refined_or_prolonged_change_nothing(script):
+@pytest.mark.parametrize("precision", ["double", "single"])
+def test_neighbours_that_are_refined_or_prolonged_change_nothing(script, precision):
     script[0].update(UNTIL)
     script[1].update(FAILS)
-    points = [point(precision="single", **values) for values in POINTS]
+    points = [point(precision=precision, **values) for values in POINTS]
     together = run_points(asked(), points, never)
     for values, record in zip(points, together, strict=True):
         assert_same_bits(record, run_point(asked(), values, never))

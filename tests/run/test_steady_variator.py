@@ -15,7 +15,7 @@ from cvt_hpc.models.steady_variator.curve import Curve
 from cvt_hpc.models.steady_variator.equations import Equations
 from cvt_hpc.models.steady_variator.first_states import FirstStates, least_sliding
 from cvt_hpc.models.steady_variator.forces import distributions
-from cvt_hpc.models.steady_variator.newton import newton
+from cvt_hpc.models.steady_variator.newton import mean_size, newton
 from cvt_hpc.models.steady_variator.record import Found, judge, quantities
 from cvt_hpc.models.steady_variator.walking import NoSteadyState, SlipsThrough, SteadyBelt
 from cvt_hpc.variables import Status, Vibrates
@@ -158,7 +158,24 @@ def test_states_follow_their_curve_from_corner_to_corner_where_the_load_turns_ba
         if load > 60.0:
             break
     assert loads[-1] > 60.0 and np.diff(loads).min() < 0.0 and np.diff(loads).max() < 10.0
-    assert SteadyBelt(parameters).at(60.0).load == 60.0
+    # under a load between two of them there is a state between them, also where they turn back
+    found = SteadyBelt(parameters).at(60.0, first).unknowns
+    equations.under(load=60.0, load_start=60.0)
+    assert np.abs(equations.residual(found)).max() < 1.0
+    assert mean_size(equations, found - x) < 1.0
+
+
+def test_single_cells_that_open_are_not_taken_for_the_limit_of_friction():
+    # -5 s/m: the load falls to three quarters at 180 N m, while slip stays at half a per cent, and rises again
+    parameters = GIVEN | {
+        "load_start": 0.0,
+        "friction_gradient": -5.0,
+        "tilt_stiffness": 6.3e5,
+        "stations": 40,
+    }
+    belt = SteadyBelt(parameters)
+    limit = belt.carried(belt.at(60.0))
+    assert limit.largest_slip > 0.01 and limit.load > 250.0
 
 
 def test_newton_gives_up_where_it_is_lost():

@@ -5,7 +5,7 @@ import numpy as np
 from cvt_hpc.models.elastic_belt.one_system import FlatBelt, flat_belt, pack, rates, unpack
 from cvt_hpc.models.linear_stability.branch import Point
 from cvt_hpc.models.steady_variator.equations import LATE
-from cvt_hpc.models.steady_variator.linearised import Linearisation
+from cvt_hpc.models.steady_variator.linearised import Linearisation, corners
 from cvt_hpc.models.steady_variator.walking import Steady
 from support.fast_runs import FastRuns
 
@@ -15,7 +15,7 @@ def at_rest(steady: Steady) -> tuple[FlatBelt, np.ndarray, np.ndarray]:
     flat = flat_belt(steady.belt._replace(bridging_stiffness=steady.belt.element_stiffness), LATE)
     y = pack(flat, steady.state)
     assert rates(flat, 0.0, y, np.empty_like(y))
-    return flat, y, Linearisation(flat)(flat).toarray()
+    return flat, y, Linearisation(flat)(flat, corners(flat.belt, flat.state) > 0.0).toarray()
 
 
 def measured(point: Point, size: float = 1e-10, step: float = 1e-6, duration: float = 4.8e-3):

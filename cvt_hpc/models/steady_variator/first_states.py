@@ -165,7 +165,7 @@ class FirstStates:
         course.friction(0.0, self._wide)
         course.bridge(0.0)
         x = course.equations.unknowns(initial_state(self._parameters, course.whole))
-        if (found := newton(course.equations, x, ON_THE_WAY)) is None:
+        if (found := newton(course.equations, x, ON_THE_WAY, sided=False)) is None:
             raise NoSteadyState("no steady state found without load and with widened friction")
         return self._narrowed(found, 0.0, self._wide)
 

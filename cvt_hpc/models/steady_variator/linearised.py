@@ -126,7 +126,8 @@ def corners(belt: Belt, state: State) -> np.ndarray:
     """Distances (2, N) of the cells from two corners of their push [1].
 
     The first is the strain by which elements push on each other, dampers included; the second that without
-    them, which holds the strands and arcs. Elements are pressed where they are positive.
+    them, which holds the strands and arcs. Elements are pressed where they are positive. Where elements rock
+    on their edges (`column_bending`) both are those of the pitch line, not of the edge.
     """
     _, eps, damped = _strained(belt, state)
     u, v = state.fields[[f.U, f.V_ELEMENT]]
@@ -183,8 +184,13 @@ class Linearisation:
     def __call__(self, flat: one.FlatBelt, pressed: np.ndarray | None = None) -> csc_array:
         """Jacobian of `flat.rates`, (n, n), about the state of its last call.
 
-        With slopes on one side of each corner, by the cells (2, N) that are taken as pressed; without these,
-        with mean slopes across those within reach of the increments.
+        Parameters
+        ----------
+        flat : FlatBelt
+            With that state.
+        pressed : (2, N) array of bool, optional
+            On which side of its `corners` each cell is taken to be; without it slopes are means across those
+            within reach of the increments.
         """
         belt, count, n = flat.belt, self._count, flat.belt.cell.size
         contents = flat.state.fields[f.N_ELEMENT]
@@ -220,12 +226,13 @@ class Linearisation:
         length, eps, damped = _strained(belt, state)
         distances = corners(belt, state)
         of_path = 0.5 * np.abs(belt.curvature)
-        moves = np.array([of_path, of_path * damped, damped / belt.cell, np.ones(eps.size)])
-        steps = self._increments[[f.W, f.U, f.V_ELEMENT, f.N_ELEMENT]]
-        reach = BEYOND * np.max(moves * steps[:, np.newaxis], axis=0)
+        w, u, v, content = self._increments[[f.W, f.U, f.V_ELEMENT, f.N_ELEMENT]]
+        strained = BEYOND * np.maximum(of_path * w, content)
+        reached = np.maximum(strained, BEYOND * damped * np.maximum(of_path * u, v / belt.cell))
         sides = np.where(pressed, 1.0, -1.0)
         moved = np.zeros(eps.size)
-        for side, distance in zip(sides[::-1], distances[::-1], strict=True):  # the push counts more
+        # the corner with its damper counts more, so it is the last
+        for side, distance, reach in zip(sides[::-1], distances[::-1], (strained, reached), strict=True):
             moved += side * np.maximum(reach - side * (distance + moved), 0.0)
         eps -= moved
         return length / (1.0 + eps)

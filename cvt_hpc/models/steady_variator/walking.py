@@ -17,14 +17,16 @@ from cvt_hpc.models.steady_variator.continuation import AT_HOME, Continuation, N
 from cvt_hpc.models.steady_variator.curve import Curve
 from cvt_hpc.models.steady_variator.equations import Equations
 from cvt_hpc.models.steady_variator.first_states import FirstStates, SlipsThrough
-from cvt_hpc.models.steady_variator.newton import newton
+from cvt_hpc.models.steady_variator.newton import mean_size, newton
 from cvt_hpc.models.steady_variator.parameters import OF_THE_COURSE
 from cvt_hpc.models.steady_variator.released import Released, freed, held, nearest
 from cvt_hpc.variator import GROSS_SLIP, PULLEYS
 
 __all__ = ["NoSteadyState", "SlipsThrough", "Steady", "SteadyBelt"]
 
-FALLEN = 0.9  # of the largest load: a load that has fallen so far rises no more
+# A load rises no more that has fallen to this share of the largest, while slip has grown by a share of gross
+# slip: single cells that open turn the curve back without slip.
+FALLEN, GROWN = 0.9, 0.2
 SLIDING = 0.5  # slip of a pulley beyond which no state under a load is looked for
 
 
@@ -158,7 +160,7 @@ class SteadyBelt:
         """States along their curve; the driven pulley turns slower (sign -1) or faster (1) at first.
 
         As far as they are found; in the direction in which the load's size grows they continue past the
-        largest torque that friction carries.
+        largest torque that friction carries. Not of a driven pulley whose speed is given.
         """
         return self._along_curve(self._own, near.unknowns, sign)
 
@@ -168,6 +170,7 @@ class SteadyBelt:
         equations.under(load=0.0, load_start=0.0)
         for found, load in Curve(equations, AT_HOME).along(x, sign):
             yield self._state_of(equations, found, load)
+            self._course.own()
             equations.under(load=0.0, load_start=0.0)
 
     def carried(self, near: Steady) -> Steady:
@@ -192,7 +195,9 @@ class SteadyBelt:
             last = state
             if direction * state.load > direction * most.load:
                 most = state
-            elif direction * state.load < FALLEN * direction * most.load:
+            elif direction * state.load < FALLEN * direction * most.load and (
+                state.largest_slip > most.largest_slip + GROWN * GROSS_SLIP
+            ):
                 return most
         raise NoSteadyState(
             f"no largest load found: from {near.load:.4g} N m states reach to {last.load:.4g} N m"
@@ -220,7 +225,8 @@ class SteadyBelt:
         farthest, sign = reached, 1.0 if load < reached else -1.0  # a larger load slows the driven pulley
         for state in self._along_curve(self._equations, before.unknowns, sign):
             if (before.load - load) * (state.load - load) <= 0.0:
-                return self._between(before, state, load)
+                if (found := self._between(before, state, load)) is not None:
+                    return found
             before = state
             farthest = min(farthest, state.load) if load < reached else max(farthest, state.load)
             if state.largest_slip > SLIDING:
@@ -228,15 +234,15 @@ class SteadyBelt:
         reach = f"from {start:.4g} N m they reach to {farthest:.4g} N m"
         raise NoSteadyState(f"no steady state found at {load:g} N m", reach)
 
-    def _between(self, low: Steady, high: Steady, load: float) -> np.ndarray:
-        """Unknowns under a load between two states that are next to each other on their curve."""
-        x = low.unknowns + (load - low.load) / (high.load - low.load) * (high.unknowns - low.unknowns)
+    def _between(self, low: Steady, high: Steady, load: float) -> np.ndarray | None:
+        """Unknowns under a load between two neighbours on the curve of states, if found there."""
+        way = high.unknowns - low.unknowns
+        x = low.unknowns + (load - low.load) / (high.load - low.load) * way
         self._course.load(load)
-        if (found := newton(self._equations, x, AT_HOME)) is not None:
-            return found
-        raise NoSteadyState(
-            f"no steady state found at {load:g} N m: they jump from {low.load:.4g} to {high.load:.4g} N m"
-        )
+        found = newton(self._equations, x, AT_HOME)
+        if found is None or mean_size(self._equations, found - x) > mean_size(self._equations, way):
+            return None
+        return found
 
     def _walk(self, x: np.ndarray, start: float, end: float) -> np.ndarray:
         """Unknowns under another load."""
