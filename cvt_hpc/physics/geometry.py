@@ -2,7 +2,6 @@
 
 import math
 from dataclasses import dataclass
-from functools import lru_cache
 from typing import Any
 
 import numpy as np
@@ -131,7 +130,6 @@ def driven_radius(ratio: float, belt_length: float, centre_distance: float) -> f
 REFINED_WAY = 0.05
 
 
-@lru_cache(maxsize=1024)  # the runs of a grid have few paths
 def cut_path(path: Variator, cells: int, refinement: float = 1.0) -> tuple[np.ndarray, ...]:
     """Cut each region of a path into cells that are the shorter the nearer they are to its ends.
 
@@ -151,7 +149,7 @@ def cut_path(path: Variator, cells: int, refinement: float = 1.0) -> tuple[np.nd
     Returns
     -------
     tuple of four arrays
-        Lengths of the cells [m], by region; read-only.
+        Lengths of the cells [m], by region.
     """
     centre_distance = math.hypot(path.strand_length, path.driven_radius - path.driving_radius)
     way = REFINED_WAY * centre_distance
@@ -169,7 +167,6 @@ def cut_path(path: Variator, cells: int, refinement: float = 1.0) -> tuple[np.nd
     for length, whole, count in zip(path.lengths, wholes, counts, strict=True):
         fine = np.linspace(0.0, length, 100 * count + 1)
         found.append(np.diff(np.interp(np.linspace(0.0, whole, count + 1), upto(fine, length), fine)))
-        found[-1].setflags(write=False)
     return tuple(found)
 
 
