@@ -61,9 +61,8 @@ TILT = {"tilt_spring": 3267.0}
 def test_jacobian_is_that_of_central_differences_one_by_one(values):
     parameters = COARSE | values
     flat, y, _ = at_rest(SteadyBelt(parameters).at(80.0))
-    matrix = Linearisation(flat)(
-        flat
-    ).toarray()  # with means across corners that are very near, as differences have
+    # with means across corners that are very near, as differences have
+    matrix = Linearisation(flat)(flat).toarray()
     sizes, step = system(flat).scale, 1e-6
     dense, compiled = np.empty((y.size, y.size)), called_alike(rates)
     for j in range(y.size):

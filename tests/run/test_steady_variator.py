@@ -18,6 +18,7 @@ from cvt_hpc.models.steady_variator.forces import distributions
 from cvt_hpc.models.steady_variator.newton import mean_size, newton
 from cvt_hpc.models.steady_variator.record import Found, judge, quantities
 from cvt_hpc.models.steady_variator.walking import NoSteadyState, SlipsThrough, SteadyBelt
+from cvt_hpc.physics.capacity import carried_torque
 from cvt_hpc.variables import Status, Vibrates
 from support.fast_runs import FastRuns
 from support.rungs import rung_record
@@ -229,6 +230,14 @@ def test_a_load_that_does_not_settle_is_reached_from_each_of_the_loads_beside_it
 
     monkeypatch.setattr(first, "_settle", settle)
     assert first.under(60.0, rise) == 0.0 and len(set(begun)) == 3
+
+    def refused(x, start, load):
+        begun.append(start)
+        raise NoSteadyState(f"not from {start:g}")
+
+    with pytest.raises(NoSteadyState, match="not from"):
+        first.under(60.0, refused)
+    assert begun[-1] == pytest.approx(0.1 * carried_torque(GIVEN))
 
 
 def test_wider_friction_is_tried_where_a_march_by_its_own_does_not_settle(monkeypatch):

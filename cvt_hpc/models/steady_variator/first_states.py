@@ -38,6 +38,7 @@ SLOWEST_MARCH = 50.0  # [rad/s]: a slower belt takes too long to settle, and a f
 # iteration comes through on a fine mesh follows no rule: at 240 stations and 100 N m from the last one, not
 # from the first four.
 LESS, BESIDE = 0.8 ** np.arange(1, 8), (0.1, -0.1, 0.2, -0.2, 0.15, -0.15)
+SMALL = 0.1  # of the load that friction carries: a belt settles under it, and others are reached from there
 MOST_FORCE = 2.0  # of the thrust: axial forces on either pulley are below
 
 
@@ -89,7 +90,9 @@ class FirstStates:
         except SlipsThrough as error:
             missed, others = error, [share * load for share in LESS]
         except NoSteadyState as error:
-            missed, others = error, [load + part * carried_torque(self._parameters) for part in BESIDE]
+            most = carried_torque(self._parameters)
+            missed, others = error, [load + part * most for part in BESIDE]
+            others.append(math.copysign(SMALL * most, load))
             with suppress(NoSteadyState):
                 x = self._unmarched()
                 return rise(x, 0.0, load) if load != 0.0 else x

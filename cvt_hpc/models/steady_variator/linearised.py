@@ -18,6 +18,7 @@ from cvt_hpc.kernels import kernel
 from cvt_hpc.models.elastic_belt import fields as f
 from cvt_hpc.models.elastic_belt import one_system as one
 from cvt_hpc.models.elastic_belt.belt import Belt, State
+from cvt_hpc.models.elastic_belt.rhs import strains
 from cvt_hpc.physics import compliance
 from cvt_hpc.physics.sheaves import flexibility
 from cvt_hpc.solvers.arrays import copy
@@ -137,11 +138,11 @@ def corners(belt: Belt, state: State) -> np.ndarray:
 
 def _strained(belt: Belt, state: State) -> tuple[np.ndarray, np.ndarray, np.ndarray]:
     """Lengths of the cells [1], strains of elements [1], dampers over stiffness [s], each (N,)."""
-    w, content = state.fields[[f.W, f.N_ELEMENT]]
-    length = 1.0 + 0.5 * belt.curvature * (w + np.roll(w, -1))
-    eps = length / content - 1.0
+    both = np.empty((2, belt.cell.size))
+    strains(belt, state.fields, both)
+    eps = both[0]
     stiffness = np.where(eps < 0.0, belt.element_stiffness, belt.bridging_stiffness)
-    return length, eps, belt.element_damping / stiffness
+    return (1.0 + eps) * state.fields[f.N_ELEMENT], eps, belt.element_damping / stiffness
 
 
 class Linearisation:
