@@ -4,21 +4,20 @@ Arrays and quantities of other libraries become what a job file has; none of the
 """
 
 import tomllib
-from collections.abc import Mapping, Sequence
+from collections.abc import Iterator, Mapping, Sequence
 from typing import Any
 
 import numpy as np
 
 from cvt_hpc.errors import check_keys, mismatch, show, unknown
 from cvt_hpc.job.axes import is_axis
-from cvt_hpc.job.schema import Schema
+from cvt_hpc.job.schema import Entry, Schema
 from cvt_hpc.job.values import kind_of, read_value, warn_of_bare_numbers
 from cvt_hpc.parameters import Parameter
 
 _PLAIN = {bool, int, float, str}
 
 Assignments = Mapping[str, Any] | Sequence[str]
-AxisEntry = tuple[Parameter, Any, str]  # declaration of an axis, its list or range, and file and key
 
 
 def split_assignments(assignments: Assignments, source: str, label: str) -> dict[str, Any]:
@@ -65,58 +64,40 @@ def read_assignments(assignments: Assignments, schema: Schema, source: str, labe
     InputError
         If a key is unknown or a value not legal.
     """
-    values = {}
-    for name, raw in split_assignments(assignments, source, label).items():
-        where = f"{source}: {label} {name}"
-        key = schema.find(name, where)
-        parameter = schema.parameters[key]
-        values[key] = read_value(parameter, _plain(parameter, raw), where)
-    return values
+    return {key: read_value(*entry) for key, entry in _entries(assignments, schema, source, label)}
 
 
 def warn_of_bare_assignments(assignments: Assignments, schema: Schema, source: str, label: str) -> None:
     """Warn of numbers without a unit that are far from usual, in the result of `read_assignments`."""
-    for name, raw in split_assignments(assignments, source, label).items():
-        where = f"{source}: {label} {name}"
-        parameter = schema.parameters[schema.find(name, where)]
-        warn_of_bare_numbers(parameter, _plain(parameter, raw), where)
+    for _, entry in _entries(assignments, schema, source, label):
+        warn_of_bare_numbers(*entry)
 
 
-def split_axes(
-    assignments: Mapping[str, Any], schema: Schema, source: str, label: str
-) -> tuple[dict[str, AxisEntry], dict[str, Any]]:
-    """Return the assignments that are axes, and the others by the names that the user wrote.
+def read_axes_and_values(
+    assignments: Assignments, schema: Schema, source: str, label: str
+) -> tuple[dict[str, Entry], dict[str, Any]]:
+    """Return the assignments that are axes, and the values [SI] of the others; as of `read_assignments`.
 
     An axis is a list or a range, as a table [axes] has it, of a parameter with a single value.
-
-    Parameters
-    ----------
-    assignments, schema, source, label
-        As of `read_assignments`.
-
-    Returns
-    -------
-    axes : dict
-        By key the declaration of the parameter, the list or the range, and the place for errors.
-    others : dict
-        Raw value by name.
-
-    Raises
-    ------
-    InputError
-        If a key is unknown.
     """
-    axes, others = {}, {}
-    for name, raw in assignments.items():
-        where = f"{source}: {label} {name}"
-        key = schema.find(name, where)
-        parameter = schema.parameters[key]
-        plain = _plain(parameter, raw)
-        if kind_of(parameter) is not tuple and is_axis(plain):
-            axes[key] = (parameter, plain, where)
+    axes, values = {}, {}
+    for key, entry in _entries(assignments, schema, source, label):
+        parameter, raw, _ = entry
+        if kind_of(parameter) is not tuple and is_axis(raw):
+            axes[key] = entry
         else:
-            others[name] = raw
-    return axes, others
+            values[key] = read_value(*entry)
+    return axes, values
+
+
+def _entries(
+    assignments: Assignments, schema: Schema, source: str, label: str
+) -> Iterator[tuple[str, Entry]]:
+    """Yield the key and the entry of each assignment, in which texts of lists and tables are such."""
+    pairs = split_assignments(assignments, source, label)
+    for key, (parameter, raw, where) in schema.entries(pairs.items(), f"{source}: {label}"):
+        is_free_text = kind_of(parameter) is str and not parameter.choices
+        yield key, (parameter, raw if is_free_text else structured(raw), where)
 
 
 def read_coordinates(
@@ -162,10 +143,6 @@ def structured(raw: Any) -> Any:
         return tomllib.loads(f"value = {raw}")["value"]
     except (ValueError, RecursionError):
         return raw
-
-
-def _plain(parameter: Parameter, raw: Any) -> Any:
-    return raw if kind_of(parameter) is str and parameter.choices == () else structured(raw)
 
 
 def plain(value: Any) -> Any:

@@ -8,8 +8,8 @@ from typing import Any
 
 import numpy as np
 
-from cvt_hpc.errors import InputError, did_you_mean, mismatch, show, unknown
-from cvt_hpc.job.values import as_list, kind_of, read_value, separated
+from cvt_hpc.errors import InputError, mismatch, show
+from cvt_hpc.job.values import as_list, kind_of, read_value, refuse_unknown, separated
 from cvt_hpc.parameters import Parameter
 
 LARGEST_AXIS = 100_000
@@ -18,7 +18,7 @@ SWAPPED = "swapped"  # axis of those that take them from a second set of samples
 NONE, ALL = "none", "all"  # on it, beside the names of uncertain parameters
 CORRELATED = "correlated"  # the correlated ones among them, together
 _RANGE_KEYS = ("from", "to", "count", "step", "spacing")
-_SPACINGS = ("linear", "log")
+_SPACING = Parameter("linear", "", "of the values of a range", choices=("linear", "log"))
 _STEP_TOLERANCE = Decimal("1e-9")
 _ROUNDING = 4  # units in the last place, after some additions
 _COUNT = Parameter(2, "", "values of a range", minimum=2, maximum=LARGEST_AXIS)
@@ -153,17 +153,13 @@ def _check_distinct(read: tuple, raw: Any, where: str) -> None:
     values = read if isinstance(raw, dict) else raw
     first: dict[Any, int] = {}
     for i, value in enumerate(read):
-        if value in first:
-            raise mismatch(
-                where, "distinct values", f"{show(values[i])} as value {first[value] + 1} and value {i + 1}"
-            )
-        first[value] = i
+        if (before := first.setdefault(value, i)) < i:
+            found = f"{show(values[i])} as value {before + 1} and value {i + 1}"
+            raise mismatch(where, "distinct values", found)
 
 
 def _read_range(parameter: Parameter, raw: dict[str, Any], where: str) -> tuple[float, ...]:
-    for key in raw:
-        if key not in _RANGE_KEYS:
-            raise unknown(f"{where}.{key}", "key", key, _RANGE_KEYS)
+    refuse_unknown(raw, _RANGE_KEYS, f"{where}.")
     if kind_of(parameter) not in (int, float):
         raise mismatch(where, "a list of values, because the parameter is not a number", "a range")
     start, stop = read_bounds(parameter, raw, where)
@@ -176,9 +172,9 @@ def _read_range(parameter: Parameter, raw: dict[str, Any], where: str) -> tuple[
 
 def read_bounds(parameter: Parameter, raw: dict[str, Any], where: str) -> tuple[float, float]:
     """Return `from` and `to` [parameter.unit] of a range; an infinite one is refused."""
-    for key in ("from", "to"):
+    for key, which in (("from", "first"), ("to", "last")):
         if key not in raw:
-            raise mismatch(f"{where}.{key}", f"the {'first' if key == 'from' else 'last'} value", "nothing")
+            raise mismatch(f"{where}.{key}", f"the {which} value", "nothing")
     finite = replace(parameter, allow_infinite=False)
     start, stop = (read_value(finite, raw[key], f"{where}.{key}") for key in ("from", "to"))
     return start, stop
@@ -186,10 +182,7 @@ def read_bounds(parameter: Parameter, raw: dict[str, Any], where: str) -> tuple[
 
 def read_spacing(raw: dict[str, Any], start: float, stop: float, where: str) -> str:
     """Return the spacing of a range from `start` to `stop`: "linear", or "log" if that can be."""
-    spacing = raw.get("spacing", "linear")
-    if spacing not in _SPACINGS:
-        found = show(spacing) + did_you_mean(str(spacing), _SPACINGS)
-        raise mismatch(f"{where}.spacing", f"one of {', '.join(_SPACINGS)}", found)
+    spacing = read_value(_SPACING, raw.get("spacing", "linear"), f"{where}.spacing")
     if start == stop:
         raise mismatch(where, "a range with from and to apart", f"{start:g} for both")
     if spacing == "log" and (start <= 0 or stop <= 0):
@@ -215,8 +208,10 @@ def _counted(start: float, stop: float, raw: dict[str, Any], where: str) -> tupl
     first, last = _decimal(start), _decimal(stop)
     shares = [Decimal(i) / (count - 1) for i in range(1, count - 1)]
     if spacing == "linear":
-        return (start, *(float(first + (last - first) * share) for share in shares), stop)
-    return (start, *(float(first * (last / first) ** share) for share in shares), stop)
+        between = (first + (last - first) * share for share in shares)
+    else:
+        between = (first * (last / first) ** share for share in shares)
+    return (start, *map(float, between), stop)
 
 
 def _stepped(start: float, stop: float, step: float, where: str) -> tuple[float, ...]:
@@ -224,11 +219,8 @@ def _stepped(start: float, stop: float, step: float, where: str) -> tuple[float,
     steps = (last - first) / stride
     count = round(steps)
     if count < 1 or abs(steps - count) > _STEP_TOLERANCE:
-        raise mismatch(
-            f"{where}.step",
-            f"a step that leads from {start:g} to {stop:g} in whole steps",
-            f"{step:g}, which takes {steps:.6g} steps",
-        )
+        expected = f"a step that leads from {start:g} to {stop:g} in whole steps"
+        raise mismatch(f"{where}.step", expected, f"{step:g}, which takes {steps:.6g} steps")
     if count >= LARGEST_AXIS:
         raise mismatch(where, f"at most {LARGEST_AXIS} values", f"about {steps:.0e}")
     return (start, *(float(first + i * stride) for i in range(1, count)), stop)

@@ -1,8 +1,8 @@
 """Conditions that must hold between parameters, checked for every run before any computing."""
 
-import itertools
 import math
 from collections.abc import Iterable, Mapping, Sequence
+from dataclasses import replace
 from typing import Any
 
 from cvt_hpc.errors import InputError, mismatch
@@ -60,8 +60,7 @@ def check_grid(
     sizes = {axis.name: len(axis.values) for axis in axes}
     scattered = [rule.key for rule in rules if isinstance(rule.source, Scatter)]
     idle = dict.fromkeys([*given, *scattered, *(name for name, size in sizes.items() if size > 1)], "")
-    for values in _samples_to_check(axes) if sampled else _points_to_check(axes, rules):
-        varied = dict(zip(sizes, values, strict=True))
+    for varied in _samples_to_check(axes) if sampled else _points_to_check(axes, rules):
         point = follow(rules, {**parameters, **varied})
         check_point(schema, point, source, varied)
         inert = _inert(schema, rules, point) if idle else {}
@@ -184,13 +183,16 @@ def _inert(schema: Schema, rules: Sequence[Rule], point: dict[str, Any]) -> dict
     return inert
 
 
-def _points_to_check(axes: tuple[Axis, ...], rules: Sequence[Rule]) -> Iterable[tuple]:
-    size = math.prod(len(axis.values) for axis in axes)
-    if size <= MOST_CHECKED_POINTS:
-        return itertools.product(*(axis.values for axis in axes))
-    return itertools.product(
-        *(_extreme_samples(axis, rules) if axis.name == SAMPLE else _extremes(axis.values) for axis in axes)
-    )
+def _points_to_check(axes: tuple[Axis, ...], rules: Sequence[Rule]) -> Iterable[dict[str, Any]]:
+    if math.prod(len(axis.values) for axis in axes) > MOST_CHECKED_POINTS:
+        axes = tuple(replace(axis, values=_extremes(axis, rules)) for axis in axes)
+    return places(axes, {axis.name for axis in axes})
+
+
+def _extremes(axis: Axis, rules: Sequence[Rule]) -> tuple:
+    if axis.name == SAMPLE:
+        return _extreme_samples(axis, rules)
+    return axis.values if isinstance(axis.values[0], str) else (min(axis.values), max(axis.values))
 
 
 def _extreme_samples(axis: Axis, rules: Sequence[Rule]) -> tuple:
@@ -203,14 +205,10 @@ def _extreme_samples(axis: Axis, rules: Sequence[Rule]) -> tuple:
     return tuple(sorted(found))
 
 
-def _samples_to_check(axes: tuple[Axis, ...]) -> Iterable[tuple]:
-    few = thinned(axes, MOST_CHECKED_VALUES, sampled=True)
-    if len(axes[0].values) <= MOST_CHECKED_POINTS:
-        few = axes
-    samples = zip(*(axis.values for axis in few), strict=True)
+def _samples_to_check(axes: tuple[Axis, ...]) -> Iterable[dict[str, Any]]:
+    is_huge = len(axes[0].values) > MOST_CHECKED_POINTS
+    some = thinned(axes, MOST_CHECKED_VALUES, sampled=True) if is_huge else axes
+    yield from places(some, {axis.name for axis in axes}, sampled=True)
     ends = {axis.values.index(end) for axis in axes for end in (min(axis.values), max(axis.values))}
-    return itertools.chain(samples, (tuple(axis.values[place] for axis in axes) for place in sorted(ends)))
-
-
-def _extremes(values: tuple) -> tuple:
-    return values if isinstance(values[0], str) else (min(values), max(values))
+    for place in sorted(ends):
+        yield {axis.name: axis.values[place] for axis in axes}

@@ -15,7 +15,7 @@ from cvt_hpc.errors import mismatch
 from cvt_hpc.job.assignments import Assignments, read_assignments, split_assignments
 from cvt_hpc.job.axes import SAMPLE, SWAPPED, Axis, thinned
 from cvt_hpc.job.crosscheck import check_point, complete_point
-from cvt_hpc.job.design import Design, is_in_rounds
+from cvt_hpc.job.design import Design, Runs
 from cvt_hpc.job.formula import Formula
 from cvt_hpc.job.rules import Link, Rule, follow, needed_rules, ordered_rules, overridden, places, varied_by
 from cvt_hpc.job.schema import Schema, load_schema
@@ -62,7 +62,7 @@ class Derived:
 
 
 @dataclass(frozen=True)
-class Job:
+class Job(Runs):
     """A validated job: every default resolved, every value in SI units.
 
     Attributes
@@ -102,28 +102,6 @@ class Job:
     histories: tuple[int, ...] = field(default=(), compare=False)
     rules: tuple[Rule, ...] = ()
     units: Mapping[str, str] = field(default_factory=dict, compare=False)
-
-    @property
-    def is_sampled(self) -> bool:
-        """Whether the values of the axes at one place make a run, instead of all their combinations."""
-        return "runs" in self.design
-
-    @property
-    def in_rounds(self) -> bool:
-        """Whether the runs depend on the results of earlier ones."""
-        return is_in_rounds(self.design)
-
-    @property
-    def shape(self) -> tuple[int, ...]:
-        """Number of values on each axis, () for a single run; the number of runs of a sampled job."""
-        if self.is_sampled:
-            return (self.design["runs"],)
-        return tuple(len(axis.values) for axis in self.axes)
-
-    @property
-    def size(self) -> int:
-        """Number of runs; of a trace, of all runs that it chooses from."""
-        return math.prod(self.shape)
 
     def __len__(self) -> int:
         """Number of runs."""
@@ -183,10 +161,10 @@ class Job:
 
     def with_units_of(self, at: Assignments, label: str = "at") -> Self:
         """Return this job with the units of `at`, as of `point_at`, for its parameters without a unit."""
-        written = split_assignments(at, self.source, label)
-        found = {self.schema.find(name, f"{self.source}: {label} {name}"): unit_in(raw)
-                 for name, raw in written.items()}  # fmt: skip
-        return replace(self, units={key: unit for key, unit in found.items() if unit} | {**self.units})
+        written = split_assignments(at, self.source, label).items()
+        entries = self.schema.entries(written, f"{self.source}: {label}")
+        found = {key: unit for key, (_, raw, _) in entries if (unit := unit_in(raw))}
+        return replace(self, units=found | {**self.units})
 
     def point_at(self, at: Assignments, label: str = "at") -> dict[str, Any]:
         """Return the parameters of a run at chosen values, whether they lie on the axes or not.

@@ -24,28 +24,13 @@ from cvt_hpc.job.axes import (
     read_values,
     without_rounding,
 )
-from cvt_hpc.job.schema import Schema
-from cvt_hpc.job.values import kind_of, read_value
+from cvt_hpc.job.schema import Entry, Schema
+from cvt_hpc.job.values import kind_of, read_or_default, read_value, refuse_unknown
 from cvt_hpc.parameters import Parameter
 
 KEY = ("record", "history")
 _FORMS = "a list of runs, each a table {axis = value, ...} with all axes, or a run index"
 
-_KIND = Parameter(
-    "grid",
-    "",
-    "which points are run",
-    choices=("grid", "trace", "adaptive", "sobol", "latin_hypercube", "listed"),
-)
-ADAPTIVE = "adaptive"
-LISTED = "listed"  # samples that the job gives itself, drawn elsewhere
-_KEYS = {
-    "trace": ("first_spacing",),
-    ADAPTIVE: ("first_samples", "widest_interval"),
-    "sobol": ("runs", "seed"),
-    "latin_hypercube": ("runs", "seed"),
-    LISTED: ("runs",),
-}
 _SPACING = Parameter(
     4, "", "cells between the runs that a trace begins with", minimum=1, maximum=LARGEST_AXIS
 )
@@ -54,7 +39,18 @@ _WIDEST = Parameter(
     0.2, "", "95 % interval of the probability, with which a cell is left", minimum=0.001, maximum=1.0
 )
 _RUNS = Parameter(64, "", "samples", minimum=1, maximum=2**24)
-_SEED = Parameter(1, "", "of the samples", minimum=0)
+SEED = Parameter(1, "", "of the samples", minimum=0)
+ADAPTIVE = "adaptive"
+LISTED = "listed"  # samples that the job gives itself, drawn elsewhere
+_KEYS: dict[str, dict[str, Parameter]] = {  # beside `kind`
+    "grid": {},
+    "trace": {"first_spacing": _SPACING},
+    ADAPTIVE: {"first_samples": _FIRST, "widest_interval": _WIDEST},
+    "sobol": {"runs": _RUNS, "seed": SEED},
+    "latin_hypercube": {"runs": _RUNS, "seed": SEED},
+    LISTED: {"runs": _RUNS},
+}
+_KIND = Parameter("grid", "", "which points are run", choices=tuple(_KEYS))
 
 Design = dict[str, Any]  # empty: the full grid
 
@@ -62,6 +58,38 @@ Design = dict[str, Any]  # empty: the full grid
 def is_in_rounds(design: Mapping[str, Any]) -> bool:
     """Return whether the runs depend on results of earlier ones: of a trace, and of adaptive samples."""
     return "first_spacing" in design or "first_samples" in design
+
+
+class Runs:
+    """The runs that axes and a design make: the common part of a job and of a study that is read again."""
+
+    axes: tuple  # the varied values: a grid, whose last axis is the fastest, or those of all samples
+    design: Design
+
+    @property
+    def is_sampled(self) -> bool:
+        """Whether the values of the axes at one place make a run, instead of all their combinations."""
+        return "runs" in self.design
+
+    @property
+    def is_traced(self) -> bool:
+        """Whether boundaries are traced."""
+        return "first_spacing" in self.design
+
+    @property
+    def in_rounds(self) -> bool:
+        """Whether the runs depend on the results of earlier ones."""
+        return is_in_rounds(self.design)
+
+    @property
+    def shape(self) -> tuple[int, ...]:
+        """Number of values on each axis, () for a single run; the number of runs where these are samples."""
+        return (self.design["runs"],) if self.is_sampled else tuple(len(axis.values) for axis in self.axes)
+
+    @property
+    def size(self) -> int:
+        """Number of runs; of a trace, of all runs that it chooses from."""
+        return math.prod(self.shape)
 
 
 _SAMPLED = ("from", "to", "spacing")
@@ -91,30 +119,18 @@ def read_design(table: Mapping[str, Any], source: str) -> Design:
     """
     where = f"{source}: [design]"
     kind = read_value(_KIND, table.get("kind", _KIND.default), f"{where} kind")
-    known = ("kind", *_KEYS.get(kind, ()))
-    for key in table:
-        if key not in known:
-            raise unknown(f"{where} {key}", f"key of a design of kind {show(kind)}", key, known)
+    refuse_unknown(table, ("kind", *_KEYS[kind]), f"{where} ", f"key of a design of kind {show(kind)}")
     if kind == "grid":
         return {}
     if kind == "trace":
         return {"kind": kind, "first_spacing": table.get("first_spacing", _SPACING.default)}
-    if kind == ADAPTIVE:
-        first = read_value(_FIRST, table.get("first_samples", _FIRST.default), f"{where} first_samples")
-        widest = read_value(
-            _WIDEST, table.get("widest_interval", _WIDEST.default), f"{where} widest_interval"
-        )
-        check_power_of_2(first, f"{where} first_samples")
-        return {"kind": kind, "first_samples": first, "widest_interval": widest}
-    if "runs" not in table:
+    if "runs" in _KEYS[kind] and "runs" not in table:
         raise mismatch(f"{where} runs", "the number of samples", "nothing")
-    runs = read_value(_RUNS, table["runs"], f"{where} runs")
-    if kind == "sobol":
-        check_power_of_2(runs, f"{where} runs")
-    if kind == LISTED:
-        return {"kind": kind, "runs": runs}
-    seed = read_value(_SEED, table.get("seed", _SEED.default), f"{where} seed")
-    return {"kind": kind, "runs": runs, "seed": seed}
+    found = read_or_default(_KEYS[kind], table, where)
+    if kind in (ADAPTIVE, "sobol"):
+        counted = "first_samples" if kind == ADAPTIVE else "runs"
+        check_power_of_2(found[counted], f"{where} {counted}")
+    return {"kind": kind, **found}
 
 
 def check_power_of_2(count: int, where: str) -> None:
@@ -171,9 +187,7 @@ def _is_numeric(axis: Axis) -> bool:
     return not isinstance(axis.values[0], (str, bool))
 
 
-def sampled_axes(
-    found: Mapping[str, tuple[Parameter, Any, str]], design: Design, source: str
-) -> tuple[Axis, ...]:
+def sampled_axes(found: Mapping[str, Entry], design: Design, source: str) -> tuple[Axis, ...]:
     """Return the axes of a sampled study, each with the value of every sample.
 
     Parameters
@@ -215,8 +229,9 @@ def sampled_axes(
 
 def _read_listed(name: str, runs: int, parameter: Parameter, raw: Any, where: str) -> Axis:
     """Return an axis with the value of each sample, as it stands in the job; values may come again."""
-    if not isinstance(raw, (list, tuple, np.ndarray)) or len(raw) != runs:
-        found = f"{len(raw)} values" if isinstance(raw, (list, tuple, np.ndarray)) else show(raw)
+    is_list = isinstance(raw, (list, tuple, np.ndarray))
+    if not is_list or len(raw) != runs:
+        found = f"{len(raw)} values" if is_list else show(raw)
         raise mismatch(where, f"a list of {runs} values, one for each of the runs of [design]", found)
     return Axis(name, read_values(parameter, raw, where), parameter.unit, parameter.description)
 
@@ -225,9 +240,7 @@ def read_range(parameter: Parameter, raw: Any, where: str) -> tuple[float, float
     """Return the ends of a range and the spacing of the values drawn from it."""
     if not isinstance(raw, dict):
         raise mismatch(where, "a range {from=, to=}, to draw samples from", show(raw))
-    for key in raw:
-        if key not in _SAMPLED:
-            raise unknown(f"{where}.{key}", "key of a range to draw samples from", key, _SAMPLED)
+    refuse_unknown(raw, _SAMPLED, f"{where}.", "key of a range to draw samples from")
     start, stop = read_bounds(parameter, raw, where)
     return start, stop, read_spacing(raw, start, stop, where)
 
@@ -279,11 +292,10 @@ def read_histories(
     where = f"{source}: [record] history"
     if not isinstance(raw, (list, tuple)):
         raise mismatch(where, _FORMS, show(raw))
+    entries = {f"{where}, run {i}": entry for i, entry in enumerate(raw, 1)}
     if samples is not None:
-        return tuple(
-            sorted({_numbered(entry, samples, f"{where}, run {i}") for i, entry in enumerate(raw, 1)})
-        )
-    found = {_index(entry, schema, axes, replaced, f"{where}, run {i}") for i, entry in enumerate(raw, 1)}
+        return tuple(sorted({_numbered(entry, samples, place) for place, entry in entries.items()}))
+    found = {_index(entry, schema, axes, replaced, place) for place, entry in entries.items()}
     return tuple(sorted(index for index in found if index is not None))
 
 
@@ -305,9 +317,8 @@ def _index(
             return None
         if axis.name not in values:
             raise mismatch(where, "a value for each axis", f"none for {axis.name}")
-        index = index * len(axis.values) + _place(
-            axis, values.pop(axis.name), schema, f"{where}, {axis.name}"
-        )
+        place = _place(axis, values.pop(axis.name), schema, f"{where}, {axis.name}")
+        index = index * len(axis.values) + place
     for key in values.keys() - replaced.keys():
         raise mismatch(where, f"axes of this job ({', '.join(axis.name for axis in axes)})", key)
     return index if all(without_rounding(replaced[key]) == value for key, value in values.items()) else None

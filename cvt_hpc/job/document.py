@@ -9,9 +9,9 @@ from collections.abc import Mapping
 from pathlib import Path
 from typing import Any
 
-from cvt_hpc.errors import InputError, check_keys, did_you_mean, mismatch, show, unknown
+from cvt_hpc.errors import InputError, check_keys, did_you_mean, mismatch, show
 from cvt_hpc.job.definition import HEADER
-from cvt_hpc.job.values import expectation, read_value, warn_of_bare_numbers
+from cvt_hpc.job.values import expectation, read_value, refuse_unknown, warn_of_bare_numbers
 from cvt_hpc.parameters import Parameter
 from cvt_hpc.storage.files import read_regular
 
@@ -83,9 +83,7 @@ def read_table(
     """
     if not isinstance(raw, Mapping):
         raise mismatch(where, "a table", show(raw))
-    for key in raw:
-        if key not in declared and key not in tables:
-            raise unknown(f"{where} {key}", "key", key, [*declared, *tables])
+    refuse_unknown(raw, (*declared, *tables), f"{where} ")
     values = {}
     for key, parameter in declared.items():
         if key in raw:

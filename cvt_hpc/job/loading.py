@@ -9,7 +9,7 @@ from typing import Any
 from cvt_hpc.errors import InputError, did_you_mean, mismatch, show
 from cvt_hpc.experiment_kinds import with_table
 from cvt_hpc.job import assignments
-from cvt_hpc.job.assignments import Assignments, AxisEntry, plain
+from cvt_hpc.job.assignments import Assignments, plain
 from cvt_hpc.job.axes import SAMPLE, Axis, read_axis
 from cvt_hpc.job.crosscheck import check_grid, check_rules
 from cvt_hpc.job.csv_files import read_csv
@@ -36,7 +36,7 @@ from cvt_hpc.job.rules import (
     read_linked,
     relinked,
 )
-from cvt_hpc.job.schema import Schema, load_schema
+from cvt_hpc.job.schema import Entry, Schema, load_schema
 from cvt_hpc.job.summary import tell_of_no_effect
 from cvt_hpc.job.uncertain import TABLE, with_samples
 from cvt_hpc.job.uncertain_table import check_samples, read_uncertain
@@ -161,8 +161,7 @@ def rebuild_job(
     is_uncertain = TABLE in document or bool(uncertain)
     schema = with_samples(schema, uncertain) if is_uncertain else schema
     others = {key: value for key, value in pairs.items() if key not in HEADER}
-    put_axes, others = assignments.split_axes(others, schema, source, label)
-    replaced = assignments.read_assignments(others, schema, source, label)
+    put_axes, replaced = assignments.read_axes_and_values(others, schema, source, label)
     design = read_design({**document.get("design", {}), **changed}, source)
     put = {*replaced, *put_axes}
     put |= {given for key in replaced if (file := schema.parameters[key].file) for given in file.gives}
@@ -275,7 +274,7 @@ def _read_axes_and_rules(
     scatters: Sequence[Rule],
     design: Design,
     gone: Collection[str],
-    put: Mapping[str, AxisEntry],
+    put: Mapping[str, Entry],
     given: Collection[str],
     schema: Schema,
     source: str,
@@ -364,28 +363,24 @@ def _sections(document: Mapping[str, Any], schema: Schema) -> list[str]:
 def _read_tables(document: Mapping[str, Any], schema: Schema, source: str) -> dict[str, Any]:
     values = {}
     for section in _sections(document, schema):
-        for name, raw in document.get(section, {}).items():
-            if (section, name) == KEY:
-                continue
-            where = f"{source}: [{section}] {name}"
-            key = schema.find(name, where, section)
-            values[key] = read_value(schema.parameters[key], raw, where)
+        table = document.get(section, {})
+        pairs = ((name, raw) for name, raw in table.items() if (section, name) != KEY)
+        for key, entry in schema.entries(pairs, f"{source}: [{section}]", section):
+            values[key] = read_value(*entry)
     return values
 
 
-def _find_axes(table: Mapping[str, Any], schema: Schema, source: str) -> dict[str, AxisEntry]:
+def _find_axes(table: Mapping[str, Any], schema: Schema, source: str) -> dict[str, Entry]:
     """Return the entry of each key in the file's table [axes]."""
-    found: dict[str, AxisEntry] = {}
-    for name, raw in schema.flatten(table):
-        where = f"{source}: [axes] {name}"
-        key = schema.find(name, where)
+    found: dict[str, Entry] = {}
+    for key, entry in schema.entries(schema.flatten(table), f"{source}: [axes]"):
         if key in found:
-            raise mismatch(where, "one axis for a parameter", f"a second one for {key}")
-        found[key] = (schema.parameters[key], raw, where)
+            raise mismatch(entry[2], "one axis for a parameter", f"a second one for {key}")
+        found[key] = entry
     return found
 
 
-def _read_grid(entries: Mapping[str, AxisEntry]) -> tuple[Axis, ...]:
+def _read_grid(entries: Mapping[str, Entry]) -> tuple[Axis, ...]:
     return tuple(read_axis(key, *entry) for key, entry in entries.items())
 
 

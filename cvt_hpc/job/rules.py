@@ -208,10 +208,7 @@ def read_derived(table: Mapping[str, Any], schema: Schema, source: str) -> list[
         If a key is unknown, no number, or has no legal formula.
     """
     rules = []
-    for name, raw in schema.flatten(table):
-        where = f"{source}: [derived] {name}"
-        key = schema.find(name, where)
-        parameter = schema.parameters[key]
+    for key, (parameter, raw, where) in schema.entries(schema.flatten(table), f"{source}: [derived]"):
         if kind_of(parameter) not in (int, float):
             raise mismatch(where, "a parameter that is a number", key)
         formula = read_formula(raw, schema.parameters, where)
@@ -247,18 +244,14 @@ def read_linked(tables: Mapping[str, Any], axes: Iterable[Axis], schema: Schema,
             raise mismatch(f"{source}: [linked] {axis_name}", f"a table [linked.{axis_name}]", show(table))
         if axis_name not in known:
             raise unknown(where, "axis", axis_name, known)
-        rules += [_read_link(name, raw, known[axis_name], schema, where) for name, raw in table.items()]
+        at, axis, wanted = known[axis_name].values, known[axis_name], schema.units.get(axis_name, "")
+        for key, entry in schema.entries(table.items(), where):
+            values = read_values(*entry)
+            if len(values) != len(at):
+                raise mismatch(entry[2], f"{len(at)} values, one for each of {axis_name}", f"{len(values)}")
+            link = Link(axis_name, at, values, axis.unit, wanted)
+            rules.append(Rule(key, link, entry[2], entry[0]))
     return rules
-
-
-def _read_link(name: str, raw: Any, axis: Axis, schema: Schema, where: str) -> Rule:
-    where = f"{where} {name}"
-    key = schema.find(name, where)
-    values = read_values(schema.parameters[key], raw, where)
-    if len(values) != len(axis.values):
-        raise mismatch(where, f"{len(axis.values)} values, one for each of {axis.name}", f"{len(values)}")
-    link = Link(axis.name, axis.values, values, axis.unit, schema.units.get(axis.name, ""))
-    return Rule(key, link, where, schema.parameters[key])
 
 
 def relinked(rules: Iterable[Rule], axes: Iterable[Axis]) -> list[Rule]:

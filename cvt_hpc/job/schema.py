@@ -1,6 +1,6 @@
 """The parameters that a job may set: tables of its model and its stepper, and tables of all transients."""
 
-from collections.abc import Callable, Iterator, Mapping, Sequence
+from collections.abc import Callable, Iterable, Iterator, Mapping, Sequence
 from dataclasses import dataclass, field, replace
 from functools import cached_property, partial
 from importlib import import_module
@@ -15,15 +15,12 @@ from cvt_hpc.parameters import Parameter
 from cvt_hpc.steppers import STEPPERS
 from cvt_hpc.vibration import settings as vibration_settings
 
-SHARED = (
-    recording,
-    vibration_settings,
-)  # tables of every job with a transient, for each model and stepper
+SHARED = recording, vibration_settings  # with tables of every job with a transient
 
+Entry = tuple[Parameter, Any, str]  # declaration of a key, what stands there, and file and key
 Problem = tuple[str, str, str]
 Check = Callable[[dict[str, Any]], list[Problem]]
 Inert = Callable[[dict[str, Any]], dict[str, str]]
-
 
 RETIRED = {"contact_sweeps": "contact is solved exactly; delete the line"}  # keys of earlier versions
 
@@ -116,6 +113,14 @@ class Schema:
                 yield from ((f"{name}.{key}", value) for key, value in raw.items())
             else:
                 yield name, raw
+
+    def entries(
+        self, pairs: Iterable[tuple[str, Any]], where: str, section: str | None = None
+    ) -> Iterator[tuple[str, Entry]]:
+        """Yield the key of each pair of a name and a value, and its entry; further arguments as of `find`."""
+        for name, raw in pairs:
+            key = self.find(name, f"{where} {name}", section)
+            yield key, (self.parameters[key], raw, f"{where} {name}")
 
     def nearest(self, name: str, section: str | None = None) -> str:
         """Return "; did you mean KEY?" for the nearest key, with its table where that is another one."""

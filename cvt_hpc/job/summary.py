@@ -40,8 +40,9 @@ def summarize(job: Job, core_seconds: float, measured: int = 0) -> str:
     """
     stepper = "no transient" if job.stepper is None else f"stepper {job.stepper}"
     lines = [f"job {job.name} ({one_line(job.source)}): model {job.model}, {stepper}"]
-    lines += job.description.splitlines()[:_MOST_DESCRIBED]
-    lines += ["", *_choices(job)]
+    lines += [*job.description.splitlines()[:_MOST_DESCRIBED], "", f"models: {', '.join(MODELS)}"]
+    if steppers := load_model(job.model).steppers:
+        lines.append(f"steppers of {job.model}: {', '.join(steppers)}")
     schema = job.schema
     for section, rows in _tables(job, schema).items():
         lines += ["", f"[{section}]", *columns(rows)]
@@ -60,16 +61,9 @@ def summarize(job: Job, core_seconds: float, measured: int = 0) -> str:
     basis = f" (by what {measured} runs on record took)" if measured else ""
     cost = f"estimated cost: {at_most}{cost_in_words(core_seconds, job.size)}{basis}"
     lines += ["", f"runs: {at_most}{job.size}{product}"]
-    lines += [f"histories kept: of runs {', '.join(map(str, job.histories))}"] if job.histories else []
-    lines += [cost]
-    return "\n".join(lines)
-
-
-def _choices(job: Job) -> list[str]:
-    """Return the other choices of model and stepper."""
-    steppers = load_model(job.model).steppers
-    words = [f"models: {', '.join(MODELS)}"]
-    return words + ([f"steppers of {job.model}: {', '.join(steppers)}"] if steppers else [])
+    if job.histories:
+        lines.append(f"histories kept: of runs {', '.join(map(str, job.histories))}")
+    return "\n".join([*lines, cost])
 
 
 def _tables(job: Job, schema: Schema) -> dict[str, list[tuple[str, ...]]]:
@@ -198,13 +192,9 @@ def tell_of_no_effect(
         if isinstance(value, tuple):
             found, nothing = (files[shown], '""') if shown in files else (value, "[]")
             where = f"{source}: [{schema.section_of[key]}] {shown}"
-            expected, then = (
-                f"nothing, as it has no effect with {setting}",
-                f"delete it, or set {shown} = {nothing}",
-            )
-            raise mismatch(where, expected, show(found), then)
+            expected, then = f"nothing, as it has no effect with {setting}", f"delete it, or set {shown} = "
+            raise mismatch(where, expected, show(found), then + nothing)
         told.append(f"{key} (with {setting})")
     if told:
-        warnings.warn(
-            f"{source}: without effect on all runs: {', '.join(told)}", NoEffectWarning, stacklevel=4
-        )
+        text = f"{source}: without effect on all runs: {', '.join(told)}"
+        warnings.warn(text, NoEffectWarning, stacklevel=4)

@@ -65,9 +65,8 @@ def key_lines(model: str) -> list[str]:
     schema = load_schema(model, None, "models")
     loaded = load_model(model)
     lines = [f"{model}: {loaded.title}"]
-    lines += (
-        [f"steppers: {', '.join(loaded.steppers)} (default: {schema.stepper})"] if loaded.steppers else []
-    )
+    if loaded.steppers:
+        lines.append(f"steppers: {', '.join(loaded.steppers)} (default: {schema.stepper})")
     for section, table in schema.sections.items():
         rows = [(key, _default_in_words(parameter), _meaning(parameter)) for key, parameter in table.items()]
         lines += ["", f"[{section}]", *columns(rows)]
@@ -175,13 +174,9 @@ def _as_toml(parameter: Parameter) -> str:
     value, unit = parameter.default, parameter.unit
     if value is None:
         return f'"... {unit}"' if unit else "..."
-    if isinstance(value, bool):
-        return str(value).lower()
-    if isinstance(value, str):
-        return f'"{value}"'
-    if isinstance(value, tuple):
-        return _list_as_toml(value)
-    if isinstance(value, int) or not unit or not math.isfinite(value):
+    if not isinstance(value, float):
+        return json.dumps(value)  # of these TOML has the same form
+    if not unit or not math.isfinite(value):
         return repr(value)
     texts = (_in_customary(value, unit), in_words(value, unit), f"{value!r} {unit}")
     return next(f'"{text}"' for text in texts if text and to_si(text, unit) == value)
@@ -195,22 +190,15 @@ def _in_customary(value: float, unit: str) -> str:
     return in_words(value, unit, wanted)
 
 
-def _list_as_toml(values: tuple) -> str:
-    items = (_list_as_toml(item) if isinstance(item, tuple) else repr(item) for item in values)
-    return f"[{', '.join(items)}]"
-
-
 def _axis(schema: Schema, preferred: Sequence[str]) -> str:
     """Return a line with the axis of a first study: given values of a key, or some about its default."""
     known = schema.parameters
     key = next(key for key in (*preferred, *known) if _FIRST_AXES.get(key) or _may_be_varied(known[key]))
     unit = known[key].unit
     values = _FIRST_AXES.get(key) or [share * known[key].default for share in _SHARES]
-    texts = [
-        f'"{_in_customary(value, unit) or in_words(value, unit)}"' if unit else in_words(value, unit)
-        for value in values
-    ]
-    return f"{key} = [{', '.join(texts)}]"
+    texts = (_in_customary(value, unit) or in_words(value, unit) for value in values)
+    items = (f'"{text}"' if unit else text for text in texts)
+    return f"{key} = [{', '.join(items)}]"
 
 
 def _may_be_varied(parameter: Parameter) -> bool:
@@ -240,12 +228,9 @@ def example_files() -> dict[str, Path]:
         paths = {path for pattern in patterns for path in root.glob(pattern) if path.is_file()}
         files = {path.relative_to(root).as_posix(): path for path in paths}
     else:
-        installed = {file.as_posix().partition(_SHARE)[2]: file for file in metadata.files("cvt_hpc") or ()}
-        files = {
-            name: Path(str(file.locate()))
-            for name, file in installed.items()
-            if name and file.suffix != ".pyc"
-        }
+        installed = [file for file in metadata.files("cvt_hpc") or () if file.suffix != ".pyc"]
+        named = {file.as_posix().partition(_SHARE)[2]: Path(str(file.locate())) for file in installed}
+        files = {name: path for name, path in named.items() if name}
     if not files:
         raise mismatch("examples", f"those of a wheel, or of a checkout in {root}", "none")
     return dict(sorted(files.items()))

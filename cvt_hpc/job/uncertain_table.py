@@ -3,23 +3,24 @@
 import math
 from collections.abc import Collection, Mapping
 from dataclasses import replace
+from operator import itemgetter
 from typing import Any
 
 import numpy as np
 
 from cvt_hpc.errors import InputError, mismatch, show, unknown
 from cvt_hpc.job.axes import ALL, NONE, SAMPLE, SWAPPED, Axis
-from cvt_hpc.job.design import check_power_of_2
+from cvt_hpc.job.design import SEED, check_power_of_2
 from cvt_hpc.job.rules import Rule
 from cvt_hpc.job.schema import Schema
 from cvt_hpc.job.uncertain import KINDS, MOST, TABLE, Distribution, Scatter, Uncertain
-from cvt_hpc.job.values import kind_of, read_value
+from cvt_hpc.job.values import kind_of, read_or_default, read_value, refuse_unknown
 from cvt_hpc.parameters import Parameter, positive
 
 _LEAST_SHARE = 1e-6  # of a distribution within its limits
 _TOLERANCE = 1e-9  # of a matrix: how symmetric it is, and how positive its eigenvalues are
 _SAMPLES = Parameter(256, "", "samples of each cell", minimum=2, maximum=MOST)
-_SEED = Parameter(1, "", "of the samples", minimum=0)
+
 _COEFFICIENTS = Parameter((), "", "matrix of correlation")
 _INDICES = Parameter(False, "", "whether runs for Sobol indices are done, too")
 _OWN = ("samples", "seed", "correlation", "indices", SAMPLE, SWAPPED)
@@ -57,21 +58,18 @@ def read_uncertain(
     """
     where = f"{source}: [{TABLE}]"
     found: dict[str, Distribution] = {}
-    for name, raw in schema.flatten(table):
-        if name in _OWN:
-            continue
-        key = schema.find(name, f"{where} {name}")
+    pairs = ((name, raw) for name, raw in schema.flatten(table) if name not in _OWN)
+    for key, entry in schema.entries(pairs, where):
         if key in found:
-            raise mismatch(f"{where} {name}", "one distribution of a parameter", f"a second one of {key}")
-        found[key] = _read_distribution(key, schema.parameters[key], raw, f"{where} {name}")
+            raise mismatch(entry[2], "one distribution of a parameter", f"a second one of {key}")
+        found[key] = _read_distribution(key, *entry)
     if not found:
         raise mismatch(where, "a parameter with a distribution, or several", "none")
-    seed = read_value(_SEED, table.get("seed", _SEED.default), f"{where} seed")
+    settings = read_or_default({"seed": SEED, "indices": _INDICES}, table, where)
     correlated, matrix = _read_correlation(table.get("correlation"), found, gone, schema, where)
     # by name, so that the samples of a job do not depend on its layout
     left = tuple(one for key, one in sorted(found.items()) if key not in gone)
-    indices = read_value(_INDICES, table.get("indices", False), f"{where} indices")
-    uncertain = Uncertain(left, seed, correlated, matrix, indices)
+    uncertain = Uncertain(left, settings["seed"], correlated, matrix, settings["indices"])
     rules = []
     for place, one in enumerate(left):
         parameter = replace(schema.parameters[one.key], sensible=None)
@@ -81,14 +79,14 @@ def read_uncertain(
             text += f"; correlated with {others}"
         rules.append(Rule(one.key, Scatter(uncertain, place, text), f"{where} {one.key}", parameter))
     own = {key: parameter for key, parameter in schema.sections[TABLE].items() if key in table}
-    fixed = {key: read_value(one, table[key], f"{where} {key}") for key, one in own.items()}
-    samples = read_value(_SAMPLES, table["samples"], f"{where} samples") if "samples" in table else None
-    if samples is not None:
+    axes: dict[str, list] = {}
+    if "samples" in table:
+        samples = read_value(_SAMPLES, table["samples"], f"{where} samples")
         check_power_of_2(samples, f"{where} samples")
-    axes: dict[str, list] = {} if samples is None else {SAMPLE: list(range(samples))}
-    if indices and samples is not None:
-        axes[SWAPPED] = [NONE, ALL, *uncertain.groups()]
-    return rules, axes, fixed
+        axes[SAMPLE] = list(range(samples))
+        if uncertain.indices:
+            axes[SWAPPED] = [NONE, ALL, *uncertain.groups()]
+    return rules, axes, read_or_default(own, table, where)
 
 
 def _read_distribution(key: str, parameter: Parameter, raw: Any, where: str) -> Distribution:
@@ -99,10 +97,8 @@ def _read_distribution(key: str, parameter: Parameter, raw: Any, where: str) -> 
     kinds = Parameter("normal", "", "", choices=tuple(KINDS))
     kind = read_value(kinds, raw.get("distribution"), f"{where}.distribution")
     needed, optional = KINDS[kind]
-    for name in raw:
-        if name not in ("distribution", *needed, *optional):
-            known = ("distribution", *needed, *optional)
-            raise unknown(f"{where}.{name}", f"key of a {kind} distribution", name, known)
+    known = ("distribution", *needed, *optional)
+    refuse_unknown(raw, known, f"{where}.", f"key of a {kind} distribution")
     numbers = []
     for name in (*needed, *optional):
         if name not in raw and name in needed:
@@ -117,9 +113,8 @@ def _read_distribution(key: str, parameter: Parameter, raw: Any, where: str) -> 
     if "mode" in has and not has["from"] <= has["mode"] <= has["to"]:
         raise mismatch(f"{where}.mode", "a value from `from` to `to`", f"{has['mode']:g}")
     if (share := distribution.share_within()) < _LEAST_SHARE:
-        raise mismatch(
-            where, "limits between which values are likely", f"a share of {share:.1g} between them"
-        )
+        found = f"a share of {share:.1g} between them"
+        raise mismatch(where, "limits between which values are likely", found)
     return distribution
 
 
@@ -130,12 +125,9 @@ def _read_correlation(
     where = f"{where} correlation"
     if raw is None:
         return (), ()
-    keys = ("parameters", "matrix")
     if not isinstance(raw, Mapping):
         raise mismatch(where, "a table with parameters and matrix", show(raw))
-    for name in raw:
-        if name not in keys:
-            raise unknown(f"{where}.{name}", "key of a correlation", name, keys)
+    refuse_unknown(raw, ("parameters", "matrix"), f"{where}.", "key of a correlation")
     names = raw.get("parameters")
     if not isinstance(names, (list, tuple)) or not all(isinstance(name, str) for name in names):
         raise mismatch(f"{where}.parameters", "a list of uncertain parameters", show(names))
@@ -176,16 +168,14 @@ def check_samples(rules: Collection[Rule], axes: Collection[Axis]) -> None:
     for rule in rules:
         if not isinstance(rule.source, Scatter):
             continue
-        refused: dict[float, InputError] = {}
+        refused: list[tuple[float, InputError]] = []
         drawn = places if rule.source.uncertain.indices else places[::2]
-        count = 0
         for place in drawn:
             try:
                 rule.value(place)
             except InputError as error:
-                count += 1
-                refused[rule.source.value(place)] = error
+                refused.append((abs(rule.source.value(place)), error))
         if refused:
-            share = f"in {100 * count / len(drawn):.2g} % of the {len(drawn)} samples"
-            then = "limits `from` and `to` cut a distribution off"
-            raise InputError(f"{refused[max(refused, key=abs)]} {share}; {then}")
+            _, worst = max(refused, key=itemgetter(0))
+            share = f"in {100 * len(refused) / len(drawn):.2g} % of the {len(drawn)} samples"
+            raise InputError(f"{worst} {share}; limits `from` and `to` cut a distribution off")

@@ -8,12 +8,12 @@ import math
 import numbers
 import re
 import warnings
-from collections.abc import Iterator, Mapping
+from collections.abc import Collection, Iterable, Iterator, Mapping
 from typing import Any
 
 import numpy as np
 
-from cvt_hpc.errors import InputError, UnitWarning, did_you_mean, mismatch, show
+from cvt_hpc.errors import UnitWarning, did_you_mean, mismatch, show, unknown
 from cvt_hpc.job.units import UnitError, factor_to, from_si, to_si, unit_in
 from cvt_hpc.parameters import Parameter
 from cvt_hpc.storage.dataset_form import LARGEST
@@ -63,19 +63,31 @@ def read_value(parameter: Parameter, raw: Any, where: str) -> Any:
     InputError
         If the value does not fit the declaration of the parameter.
     """
-    kind = kind_of(parameter)
-    if kind is tuple:
-        return _read_table(parameter, raw, where)
-    if kind is str:
-        return _read_text(parameter, raw, where)
-    if kind is bool:
-        return _read_flag(parameter, raw, where)
-    value = _read_number(parameter, raw, where)
-    if kind is int:
-        if not value.is_integer():
-            raise mismatch(where, "a whole number", show(raw))
-        return int(value)
-    return value
+    readers = {
+        tuple: _read_table,
+        str: _read_text,
+        bool: _read_flag,
+        int: _read_whole_number,
+        float: _read_number,
+    }
+    return readers[kind_of(parameter)](parameter, raw, where)
+
+
+def read_or_default(
+    declared: Mapping[str, Parameter], table: Mapping[str, Any], where: str
+) -> dict[str, Any]:
+    """Return the values of a table by declared key, defaults included; as of `read_value`."""
+    return {
+        key: read_value(parameter, table.get(key, parameter.default), f"{where} {key}")
+        for key, parameter in declared.items()
+    }
+
+
+def refuse_unknown(table: Iterable[str], known: Collection[str], place: str, what: str = "key") -> None:
+    """Raise InputError with the first key of a table that is not known; `place` stands before it."""
+    for key in table:
+        if key not in known:
+            raise unknown(f"{place}{key}", what, key, known)
 
 
 def as_list(array: np.ndarray, where: str, dimensions: tuple[int, ...]) -> list:
@@ -183,15 +195,18 @@ def _check_bounds(parameter: Parameter, value: float, raw: Any, where: str) -> N
     raise mismatch(where, f"{' and '.join(bounds)} {unit}".rstrip(), show(raw) + hint)
 
 
-def _read_text(parameter: Parameter, raw: Any, where: str) -> str:
-    if not isinstance(raw, str):
-        raise mismatch(where, expectation(parameter), show(raw))
-    if parameter.choices and raw not in parameter.choices:
-        raise InputError(
-            f"{where}: expected {expectation(parameter)}, found {show(raw)}"
-            f"{did_you_mean(raw, parameter.choices)}"
-        )
-    return raw
+def _read_whole_number(parameter: Parameter, raw: object, where: str) -> int:
+    value = _read_number(parameter, raw, where)
+    if not value.is_integer():
+        raise mismatch(where, "a whole number", show(raw))
+    return int(value)
+
+
+def _read_text(parameter: Parameter, raw: object, where: str) -> str:
+    if isinstance(raw, str) and (raw in parameter.choices or not parameter.choices):
+        return raw
+    near = did_you_mean(raw, parameter.choices) if isinstance(raw, str) else ""
+    raise mismatch(where, expectation(parameter), show(raw) + near)
 
 
 def _read_flag(parameter: Parameter, raw: Any, where: str) -> bool:
@@ -265,11 +280,9 @@ def warn_of_bare_numbers(parameter: Parameter, raw: Any, where: str) -> None:
         if value and math.isfinite(value) and not low <= abs(value) <= high:
             unit = parameter.unit
             other = meant(item, parameter)
-            text = (
-                f"{where}: {item} is read as {item} {unit}, far from the usual {low:g} to {high:g} {unit}; "
-            )
-            text += f"write {other} if that is meant, or " if other else "if that is meant write "
-            warnings.warn(f'{text}"{item} {unit}"', UnitWarning, stacklevel=2)
+            read = f"{item} is read as {item} {unit}, far from the usual {low:g} to {high:g} {unit}"
+            then = f"write {other} if that is meant, or" if other else "if that is meant write"
+            warnings.warn(f'{where}: {read}; {then} "{item} {unit}"', UnitWarning, stacklevel=2)
             return
 
 

@@ -15,7 +15,7 @@ import numpy as np
 from cvt_hpc.errors import InputError
 from cvt_hpc.job import Axis, Job
 from cvt_hpc.job.definition import Derived
-from cvt_hpc.job.design import is_in_rounds
+from cvt_hpc.job.design import Design, Runs
 from cvt_hpc.job.values import JOB_UNITS, shown
 from cvt_hpc.storage.netcdf import attributes
 from cvt_hpc.study.simulator import Simulator
@@ -139,7 +139,7 @@ def _values_and_units(varied: Axis | Derived) -> tuple[tuple, str]:
 
 
 @dataclass(frozen=True)
-class Study:
+class Study(Runs):
     """A job together with the layout of its records.
 
     Attributes
@@ -172,39 +172,14 @@ class Study:
     units: Mapping[str, str] = field(default_factory=dict)
 
     @property
-    def design(self) -> dict[str, Any]:
+    def design(self) -> Design:  # type: ignore[override]  # it stands in the job
         """The job's table [design]; empty for the full grid."""
         return self.job.get("design", {})
-
-    @property
-    def is_sampled(self) -> bool:
-        """Whether the values of the axes at one place make a run, instead of all their combinations."""
-        return "runs" in self.design
-
-    @property
-    def is_traced(self) -> bool:
-        """Whether boundaries are traced."""
-        return "first_spacing" in self.design
-
-    @property
-    def in_rounds(self) -> bool:
-        """Whether the runs depend on the results of earlier ones."""
-        return is_in_rounds(self.design)
 
     @property
     def dims(self) -> tuple[str, ...]:
         """Names of the dimensions along which the runs lie: the axes, or `run` for samples."""
         return ("run",) if self.is_sampled else tuple(axis.name for axis in self.axes)
-
-    @property
-    def shape(self) -> tuple[int, ...]:
-        """Number of runs along each dimension."""
-        return (self.design["runs"],) if self.is_sampled else tuple(len(axis.values) for axis in self.axes)
-
-    @property
-    def size(self) -> int:
-        """Number of runs; of a trace, of all runs that it chooses from."""
-        return math.prod(self.shape)
 
     @cached_property
     def record_dtype(self) -> np.dtype:
