@@ -31,16 +31,12 @@ def check_grid(
 
     Parameters
     ----------
-    schema : Schema
-        With the checks.
+    schema, source
+        The checks, and the job file, for the error.
     parameters : dict
         The base scene [SI].
-    axes : tuple of Axis
-        The grid.
-    source : str
-        The job file, for the error.
-    rules : sequence of Rule
-        How parameters follow from others.
+    axes, rules
+        The grid, and how parameters follow from others.
     sampled : bool
         Whether the values of the axes at one place make a run, instead of all their combinations.
     given : iterable of str
@@ -81,12 +77,8 @@ def check_point(
 
     Parameters
     ----------
-    schema : Schema
-        With the checks.
-    parameters : dict
-        Value [SI] by key.
-    source : str
-        The job file, for the error.
+    schema, parameters, source
+        As of `check_grid`.
     varied : mapping, optional
         The values that set the run apart, to be named in the error.
 

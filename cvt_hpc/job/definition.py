@@ -28,28 +28,14 @@ HEADER = ("name", "model", "stepper", "description")
 
 @dataclass(frozen=True)
 class Derived:
-    """A parameter whose value is derived from axes.
+    """A parameter whose value is derived from axes."""
 
-    Attributes
-    ----------
-    name : str
-        Of the parameter.
-    axes : tuple of str
-        Those along which it varies, in the job's order.
-    unit, description : str
-        Of the parameter.
-    words : str
-        The rule: a formula, or the parameter that it is linked to or given by.
-    evaluate : callable
-        Returns `values`.
-    """
-
-    name: str
-    axes: tuple[str, ...]
-    unit: str
+    name: str  # of the parameter
+    axes: tuple[str, ...]  # those along which it varies, in the job's order
+    unit: str  # of the parameter, as its description
     description: str
-    words: str
-    evaluate: Callable[[], tuple] = field(compare=False, repr=False)
+    words: str  # the rule: a formula, or the parameter that it is linked to or given by
+    evaluate: Callable[[], tuple] = field(compare=False, repr=False)  # returns `values`
 
     @cached_property
     def values(self) -> tuple:

@@ -98,14 +98,6 @@ _SAMPLED = ("from", "to", "spacing")
 def read_design(table: Mapping[str, Any], source: str) -> Design:
     """Check a job file's table [design].
 
-    Parameters
-    ----------
-    table : mapping
-        `kind`, and with "trace" `first_spacing`, with "adaptive" `first_samples` and `widest_interval`, with
-        "sobol" and "latin_hypercube" `runs` and `seed`, with "listed" `runs`.
-    source : str
-        The job file, for the error.
-
     Returns
     -------
     dict
@@ -193,9 +185,9 @@ def sampled_axes(found: Mapping[str, Entry], design: Design, source: str) -> tup
     Parameters
     ----------
     found : mapping
-        By name the declaration of the parameter, and the entry in the job file, a table with from, to and
-        optionally spacing; and file and key, for the error. In the place of all ranges may stand the lists of
-        drawn values, as the resolved job in a dataset gives them; with the kind "listed" they have to.
+        By name the entry in the job file, a table with from, to and optionally spacing. In the place of all
+        ranges may stand the lists of drawn values, as the resolved job in a dataset gives them; with the kind
+        "listed" they have to.
     design : dict
         Kind, `runs` and `seed`.
     source : str
@@ -266,21 +258,15 @@ def read_histories(
     source: str,
     samples: int | None = None,
 ) -> tuple[int, ...]:
-    """Return the indices of the runs, in order.
+    """Return the indices of the runs that a list of a job names, in order.
 
     Parameters
     ----------
-    raw : Any
-        The list as TOML gives it.
-    schema : Schema
-        Of the job.
-    axes : tuple of Axis
-        Its grid.
+    raw, schema, axes, source
+        The list as TOML gives it, and the job: what it declares, its grid, and its file for the errors.
     replaced : mapping
         By key the replacement of an axis or a value by overrides: a value, or None for an axis of
         their own. A run that they have taken off the grid is left out.
-    source : str
-        The job file, for the errors.
     samples : int, optional
         Their number, if the runs are samples and no grid: these have an index alone.
 

@@ -37,21 +37,11 @@ _WITH_UNIT = re.compile(r"(?<![\w.])[\d.]+\s*[A-Za-zµ%°]")
 
 @dataclass(frozen=True)
 class Formula:
-    """A formula that has been read.
+    """A formula that has been read."""
 
-    Attributes
-    ----------
-    text : str
-        As it stands in the job file.
-    names : tuple of str
-        The parameters in it.
-    tree : ast.expr
-        As Python's parser reads it.
-    """
-
-    text: str
-    names: tuple[str, ...] = field(compare=False)
-    tree: ast.expr = field(compare=False, repr=False)
+    text: str  # as it stands in the job file
+    names: tuple[str, ...] = field(compare=False)  # the parameters in it
+    tree: ast.expr = field(compare=False, repr=False)  # as Python's parser reads it
 
     def value(self, parameters: Mapping[str, Any]) -> float:
         """Return the value [SI] for flat parameters [SI].

@@ -48,7 +48,7 @@ _NAME = re.compile(r"[A-Za-z0-9][A-Za-z0-9._-]{0,99}")
 
 
 def load_job(path: str | Path, overrides: Assignments = ()) -> Job:
-    """Read and validate a job file.
+    """Read and validate a job file, and return it with every default resolved.
 
     Parameters
     ----------
@@ -57,11 +57,6 @@ def load_job(path: str | Path, overrides: Assignments = ()) -> Job:
     overrides : mapping, or sequence of "KEY=VALUE"
         Values that replace those of the file. One value for an axis replaces the axis by that value; a list
         or a range, as a table [axes] has it, makes an axis or replaces one.
-
-    Returns
-    -------
-    Job
-        With every default resolved.
 
     Raises
     ------
@@ -77,7 +72,7 @@ def build_job(
     overrides: Assignments = (),
     label: str | None = None,
 ) -> Job:
-    """Validate a job that is given as a dict.
+    """Validate a job that is given as a dict; result, overrides and errors as of `load_job`.
 
     Parameters
     ----------
@@ -86,32 +81,14 @@ def build_job(
         pint, and a table of coefficients a 2-D one; units of pint, and attributes `units`, count.
     source : str
         Where it is from, for the errors: for a job of a file its path.
-    overrides : mapping, or sequence of "KEY=VALUE"
-        See `load_job`.
     label : str, optional
         Name of the overrides in an error; by default after their origin.
-
-    Returns
-    -------
-    Job
-        With every default resolved.
-
-    Raises
-    ------
-    InputError
-        If anything is wrong with the document or an override.
     """
     return rebuild_job(document, source, None, overrides, label)
 
 
 def stored_job(document: Mapping[str, Any], source: str) -> Job:
-    """Return the job that a dataset holds, without the keys that this version does not have.
-
-    Raises
-    ------
-    InputError
-        If anything else is wrong with the document.
-    """
+    """Return the job that a dataset holds, without keys of other versions; errors as of `build_job`."""
     schema = load_schema(document.get("model"), document.get("stepper"), source)
     known = {
         name: {key: value for key, value in table.items() if key in schema.parameters}
@@ -133,33 +110,29 @@ def rebuild_job(
     Parameters
     ----------
     document, source, overrides, label
-        As of `build_job`.
+        As of `build_job`, errors too.
     units : mapping or None
         Units for people: those of the other job. None: the document is a user's own, as of `build_job`.
-
-    Raises
-    ------
-    InputError
-        If anything is wrong with the document or an override.
     """
     document = plain(document)
     label = label or ("override" if isinstance(overrides, Mapping) else "--set")
     pairs = assignments.split_assignments(overrides, source, label)
     head = {**document, **{key: value for key, value in pairs.items() if key in HEADER}}
-    name, description = read_name(head, source), _read_description(head, source)
+    name, description = read_name(head, source), head.get("description", "")
+    if not isinstance(description, str):
+        raise mismatch(f"{source}: description", "a text", show(description))
     schema = load_schema(head.get("model"), head.get("stepper"), source)
     _check_top_level(document, schema, source)
     is_users = units is None
     written = _written(document, pairs, schema, source, label) if is_users else {}
-    found = {key: unit_in(raw) for key, (raw, _) in written.items()}
     if units is None:
-        units = {key: unit for key, unit in found.items() if unit}
+        units = {key: unit for key, (_, raw, _) in written.items() if (unit := unit_in(raw))}
     schema = replace(schema, units=units)
     tables = _read_tables(document, schema, source)
     changed = assignments.take_own(pairs, "design")
     uncertain = {**document.get(TABLE, {}), **assignments.take_own(pairs, TABLE)}
-    is_uncertain = TABLE in document or bool(uncertain)
-    schema = with_samples(schema, uncertain) if is_uncertain else schema
+    if is_uncertain := TABLE in document or bool(uncertain):
+        schema = with_samples(schema, uncertain)
     others = {key: value for key, value in pairs.items() if key not in HEADER}
     put_axes, replaced = assignments.read_axes_and_values(others, schema, source, label)
     design = read_design({**document.get("design", {}), **changed}, source)
@@ -180,8 +153,8 @@ def rebuild_job(
     given = _with_files(given, schema, source)
     axes, rules = _read_axes_and_rules(document, scatters, design, gone, put_axes, given, schema, source)
     check_samples(rules, axes)
-    for key, entry in written.items():
-        warn_of_bare_numbers(schema.parameters[key], *entry)
+    for entry in written.values():
+        warn_of_bare_numbers(*entry)
     if design.get("kind") == ADAPTIVE:
         check_adaptive(axes, source)
     if "first_spacing" in design:
@@ -191,46 +164,38 @@ def rebuild_job(
     check_rules(schema, scene, axes, rules, sampled=sampled)
     scene = follow(rules, scene)
     parameters = {key: scene[key] for key in schema.parameters if key in scene}
-    settled = _settled(rules, axes)
+    swept = {axis.name for axis in axes}
+    # keys linked to a former axis that an override set: each has one given value
+    settled = {rule.key for rule in rules if isinstance(rule.source, Link) and rule.source.axis not in swept}
     own = [*given, *sorted(settled)]
     checked = own if is_users else ()
     without = check_grid(schema, parameters, axes, source, rules=rules, sampled=sampled, given=checked)
     tell_of_no_effect(schema, parameters, files, without, source)
     histories = document.get(KEY[0], {}).get(KEY[1], [])
     replacing = {key: replaced.get(key) for key in gone}
-    job = Job(
-        name,
-        schema.model,
-        schema.stepper,
-        description,
-        source,
-        parameters,
-        axes,
-        frozenset(own),
-        design,
-        read_histories(histories, schema, axes, replacing, source, design.get("runs")),
-        tuple(rule for rule in rules if rule.key not in settled),
-        schema.units,
-    )
+    kept = read_histories(histories, schema, axes, replacing, source, design.get("runs"))
+    stated = tuple(rule for rule in rules if rule.key not in settled)
+    runs = parameters, axes, frozenset(own), design, kept, stated, schema.units
+    job = Job(name, schema.model, schema.stepper, description, source, *runs)
     answering = answering_model(job)
     return job if answering is None else rebuild_job(handed_to(job, *answering), source, job.units)
 
 
 def _written(
     document: Mapping[str, Any], pairs: Mapping[str, Any], schema: Schema, source: str, label: str
-) -> dict[str, tuple[Any, str]]:
-    """Return the entry of each parameter in the tables, the axes or the overrides, and its place.
+) -> dict[str, Entry]:
+    """Return the entry of each number in the tables, the axes or the overrides, unchecked.
 
-    If there are several, the one that takes precedence. Nothing is checked.
+    If there are several, the one that takes precedence.
     """
     links = [(f"[linked.{axis}]", table) for axis, table in document.get("linked", {}).items()]
     tables = [(f"[{name}]", document.get(name, {})) for name in (*schema.sections, TABLE)]
     found = {}
     for place, table in [*tables, *links, ("[axes]", document.get("axes", {})), (label, pairs)]:
         for name, raw in schema.flatten(table) if isinstance(table, Mapping) else ():
-            key = name.rpartition(".")[2]
-            if key in schema.parameters and kind_of(schema.parameters[key]) in (float, tuple):
-                found[key] = assignments.structured(raw), f"{source}: {place} {name}"
+            parameter = schema.parameters.get(key := name.rpartition(".")[2])
+            if parameter is not None and kind_of(parameter) in (float, tuple):
+                found[key] = parameter, assignments.structured(raw), f"{source}: {place} {name}"
     return found
 
 
@@ -281,37 +246,22 @@ def _read_axes_and_rules(
 ) -> tuple[tuple[Axis, ...], list[Rule]]:
     """Return the axes and the rules in their order, `scatters` among them.
 
-    Those that overrides have put out of force are `gone`, and the axes that overrides `put` are in their
-    place, or come last.
+    Those that overrides have put out of force are `gone`; the axes that they `put` come in their place.
     """
     of_file = _find_axes(document.get("axes", {}), schema, source)
     kept = {key: entry for key, entry in of_file.items() if key not in gone or key in put}
     kept |= put
     sampled = "runs" in design
     axes = sampled_axes(kept, design, source) if sampled else _read_grid(kept)
-    # a link has a value for each of the file's axis, and keeps the values that are left of it
-    stated = _read_rules(document, () if sampled else _read_grid(of_file), design, schema, source)
-    stated += scatters
-    stated = relinked([rule for rule in stated if rule.key not in gone], axes)
-    return axes, ordered_rules(stated, {*given, *(axis.name for axis in axes)}, schema, source)
-
-
-def _read_rules(
-    document: Mapping[str, Any], axes: tuple[Axis, ...], design: Design, schema: Schema, source: str
-) -> list[Rule]:
-    """Return the rules that the tables [derived] and [linked.AXIS] state."""
     linked = document.get("linked", {})
-    if linked and "runs" in design:
+    if linked and sampled:
         expected = "a grid, since samples have no values to be linked to; a formula in [derived] follows them"
         raise mismatch(f"{source}: [linked]", expected, f"a design of kind {show(design['kind'])}")
-    derived = read_derived(document.get("derived", {}), schema, source)
-    return derived + read_linked(linked, axes, schema, source)
-
-
-def _settled(rules: Sequence[Rule], axes: tuple[Axis, ...]) -> set[str]:
-    """Return the keys linked to a former axis that an override set; each then has one given value."""
-    swept = {axis.name for axis in axes}
-    return {rule.key for rule in rules if isinstance(rule.source, Link) and rule.source.axis not in swept}
+    stated = read_derived(document.get("derived", {}), schema, source)
+    # a link has a value for each of the file's axis, and keeps the values that are left of it
+    stated += [] if sampled else read_linked(linked, _read_grid(of_file), schema, source)
+    stated = relinked([rule for rule in [*stated, *scatters] if rule.key not in gone], axes)
+    return axes, ordered_rules(stated, {*given, *(axis.name for axis in axes)}, schema, source)
 
 
 def read_name(head: Mapping[str, Any], source: str) -> str:
@@ -321,13 +271,6 @@ def read_name(head: Mapping[str, Any], source: str) -> str:
         expected = "a word of letters, digits, '.', '_' and '-' (it names the output folder)"
         raise mismatch(f"{source}: name", expected, show(name))
     return name
-
-
-def _read_description(head: Mapping[str, Any], source: str) -> str:
-    description = head.get("description", "")
-    if not isinstance(description, str):
-        raise mismatch(f"{source}: description", "a text", show(description))
-    return description
 
 
 def _check_top_level(document: Mapping[str, Any], schema: Schema, source: str) -> None:
@@ -343,10 +286,8 @@ def _check_top_level(document: Mapping[str, Any], schema: Schema, source: str) -
         elif isinstance(value, Mapping):
             hint = did_you_mean(key, tables) or f"; known: {', '.join(tables)}"
             raise InputError(f"{source}: [{key}]: unknown table{hint}")
-        elif key in schema.parameters:
-            raise InputError(
-                f"{source}: {key}: belongs in [{schema.section_of[key]}], found above all tables"
-            )
+        elif home := schema.section_of.get(key):
+            raise InputError(f"{source}: {key}: belongs in [{home}], found above all tables")
         else:
             hint = did_you_mean(key, HEADER) or schema.nearest(key) or f"; known: {', '.join(HEADER)}"
             raise InputError(f"{source}: {key}: unknown key{hint}")

@@ -74,24 +74,12 @@ class Substituted:
 
 @dataclass(frozen=True)
 class Rule:
-    """Rule by which the value of one parameter follows from others.
+    """Rule by which the value of one parameter follows from others."""
 
-    Attributes
-    ----------
-    key : str
-        The parameter.
-    source : Formula, Link, Scatter or Substituted
-        The formula, list, distribution or function that gives its value.
-    where : str
-        File and key, for errors.
-    parameter : Parameter
-        Declaration of the key.
-    """
-
-    key: str
-    source: Formula | Link | Scatter | Substituted
-    where: str = field(compare=False)
-    parameter: Parameter = field(compare=False, repr=False)
+    key: str  # of the parameter
+    source: Formula | Link | Scatter | Substituted  # what gives its value
+    where: str = field(compare=False)  # file and key, for errors
+    parameter: Parameter = field(compare=False, repr=False)  # declaration of the key
 
     @property
     def needs(self) -> tuple[str, ...]:
@@ -218,18 +206,7 @@ def read_derived(table: Mapping[str, Any], schema: Schema, source: str) -> list[
 
 
 def read_linked(tables: Mapping[str, Any], axes: Iterable[Axis], schema: Schema, source: str) -> list[Rule]:
-    """Return the rules of a job file's tables [linked.AXIS].
-
-    Parameters
-    ----------
-    tables : mapping
-        By the name of an axis a table of keys, each with as many values as the axis has.
-    axes : iterable of Axis
-        The grid, as the file gives it.
-    schema : Schema
-        Parameters that may be linked.
-    source : str
-        The job file, for the error.
+    """Return the rules of a job file's tables [linked.AXIS], where `axes` are the grid as the file gives it.
 
     Raises
     ------
@@ -284,14 +261,10 @@ def ordered_rules(rules: Iterable[Rule], given: Collection[str], schema: Schema,
 
     Parameters
     ----------
-    rules : iterable of Rule
-        Of the tables [derived] and [linked].
+    rules, schema, source
+        Those of its tables, what it declares, and its file, for the error.
     given : collection of str
         The keys that have a value of their own, or several on an axis; defaults excluded.
-    schema : Schema
-        Of the job.
-    source : str
-        The job file, for the error.
 
     Raises
     ------

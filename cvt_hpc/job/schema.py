@@ -27,29 +27,17 @@ RETIRED = {"contact_sweeps": "contact is solved exactly; delete the line"}  # ke
 
 @dataclass(frozen=True)
 class Schema:
-    """The parameters of a job with a certain model and stepper.
+    """The parameters of a job with a certain model and stepper."""
 
-    Attributes
-    ----------
-    model : str
-        Its name.
-    stepper : str or None
-        Its name; None for a model without a transient.
-    sections : dict
-        Section -> key -> Parameter; keys are unique over all sections.
-    checks : tuple of callable
-        The checks that lie between parameters, the model's first: flat values -> list of problems.
-    inert : callable
-        Flat values -> the keys without effect on such a run, each with the setting that makes it so.
-    units : dict
-        By key the unit in which the job gives a parameter, where it names one; values are shown in it.
-    """
-
-    model: str
-    stepper: str | None
+    model: str  # its name
+    stepper: str | None  # its name; None for a model without a transient
+    # section -> key -> Parameter; keys are unique over all sections
     sections: dict[str, dict[str, Parameter]]
+    # the checks that lie between parameters, the model's first: flat values -> list of problems
     checks: tuple[Check, ...]
+    # flat values -> the keys without effect on such a run, each with the setting that makes it so
     inert: Inert
+    # by key the unit in which the job gives a parameter, where it names one; values are shown in it
     units: Mapping[str, str] = field(default_factory=dict)
 
     def in_words(self, key: str, value: Any) -> str:

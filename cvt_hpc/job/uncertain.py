@@ -43,20 +43,11 @@ _SAMPLE = Parameter(0, "", "number of the Sobol point, common to all cells", min
 
 
 class Distribution(NamedTuple):
-    """Distribution of a parameter.
+    """Distribution of a parameter."""
 
-    Attributes
-    ----------
-    key : str
-        The parameter.
-    kind : str
-        "uniform", "triangular", "normal" or "log_normal".
-    numbers : tuple of (str, float)
-        What the kind needs, and limits `from` and `to`, in SI units of the parameter.
-    """
-
-    key: str
-    kind: str
+    key: str  # the parameter
+    kind: str  # "uniform", "triangular", "normal" or "log_normal"
+    # what the kind needs, and limits `from` and `to`, in SI units of the parameter
     numbers: tuple[tuple[str, float], ...]
 
     def quantiles(self, shares: NDArray[np.float64]) -> NDArray[np.float64]:
@@ -163,27 +154,13 @@ class Distribution(NamedTuple):
 
 @dataclass(frozen=True)
 class Uncertain:
-    """The uncertain parameters of a job.
+    """The uncertain parameters of a job."""
 
-    Attributes
-    ----------
-    distributions : tuple of Distribution
-        By name, in the order of the dimensions of the Sobol sequence.
-    seed : int
-        Of its scrambling.
-    correlated : tuple of str
-        Parameters that are correlated.
-    matrix : tuple of tuple of float
-        The correlation of their normal scores.
-    indices : bool
-        Whether a second set of samples is drawn.
-    """
-
-    distributions: tuple[Distribution, ...]
-    seed: int
-    correlated: tuple[str, ...] = ()
-    matrix: tuple[tuple[float, ...], ...] = ()
-    indices: bool = False
+    distributions: tuple[Distribution, ...]  # by name, in the order of the dimensions of the Sobol sequence
+    seed: int  # of its scrambling
+    correlated: tuple[str, ...] = ()  # parameters that are correlated
+    matrix: tuple[tuple[float, ...], ...] = ()  # the correlation of their normal scores
+    indices: bool = False  # whether a second set of samples is drawn
 
     def value(self, place: int, sample: int, swapped: str = NONE) -> float:
         """Return the value [SI] of the distribution at a place for a sample, by what is swapped."""

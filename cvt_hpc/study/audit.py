@@ -30,52 +30,25 @@ FORCES = (("mean_ring_tension", "mean_push_force"), ("axial_force",))  # each gr
 
 
 class RungAudit(NamedTuple):
-    """Result of the audit of one model of the ladder.
+    """Result of the audit of one model of the ladder."""
 
-    Attributes
-    ----------
-    rung : Rung
-        The model that had answered.
-    runs : int
-        Runs done again, to their end.
-    failed : int
-        Further runs, which failed in full or took too long.
-    differing : int
-        Number of `runs` with another class by the model.
-    contrary : int
-        Of these, the number with quiet by one and vibrating by the other.
-    interval : (float, float)
-        The share of differing runs lies within it, see `interval`.
-    force_deviation : float
-        Deviation that the mean forces of strands and of sheaves, over the largest of either, keep in 95 % of
-        the runs; not a number where the model gives no forces.
-    """
-
-    rung: Rung
-    runs: int
-    failed: int
-    differing: int
-    contrary: int
-    interval: tuple[float, float]
+    rung: Rung  # the model that had answered
+    runs: int  # runs done again, to their end
+    failed: int  # further runs, which failed in full or took too long
+    differing: int  # number of `runs` with another class by the model
+    contrary: int  # of these, the number with quiet by one and vibrating by the other
+    interval: tuple[float, float]  # the share of differing runs lies within it, see `interval`
+    # deviation that the mean forces of strands and of sheaves, over the largest of either, keep in 95 % of
+    # the runs; not a number where the model gives no forces
     force_deviation: float
 
 
 class AuditReport(NamedTuple):
-    """Result of an audit.
+    """Result of an audit."""
 
-    Attributes
-    ----------
-    answered : int
-        Runs that the cheaper models have answered, of which a sample was repeated.
-    rungs : tuple of RungAudit
-        By model.
-    table : Path
-        All runs that differ or failed, one by one.
-    """
-
-    answered: int
-    rungs: tuple[RungAudit, ...]
-    table: Path
+    answered: int  # runs that the cheaper models have answered, of which a sample was repeated
+    rungs: tuple[RungAudit, ...]  # by model
+    table: Path  # all runs that differ or failed, one by one
 
 
 def audit_of(job: Job, out: Path, fraction: float) -> Repeat:

@@ -27,21 +27,12 @@ SHARE = 0.5  # of the work that is left, which one more batch for each rank may 
 
 
 class Assignment(NamedTuple):
-    """The result of one claim.
+    """The result of one claim."""
 
-    Attributes
-    ----------
-    runs : tuple of int
-        Run indices.
-    alone : bool
-        Whether they are done one by one, because processes have died at them, and not together.
-    joins : bool
-        Whether runs may be done with those of other batches.
-    """
-
-    runs: Batch
+    runs: Batch  # run indices
+    # whether they are done one by one, because processes have died at them, and not together
     alone: bool = False
-    joins: bool = False
+    joins: bool = False  # whether runs may be done with those of other batches
 
     def parts(self) -> list[Assignment]:
         """Return the runs of each batch."""

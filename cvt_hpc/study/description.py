@@ -26,33 +26,15 @@ MOST_DERIVED = 200_000  # values of a parameter that follows from axes: these ta
 
 @dataclass(frozen=True)
 class Dimension:
-    """A dimension of the dataset with its coordinate: an axis of the job, or an extra one of the record.
+    """A dimension of the dataset with its coordinate: an axis of the job, or an extra one of the record."""
 
-    Attributes
-    ----------
-    name : str
-        Name of the dimension and of its coordinate.
-    values : tuple
-        Coordinate values in SI units, or texts.
-    units : str
-        CF unit; "" for texts.
-    long_name : str
-        CF long_name.
-    spacing : str
-        "log" for samples that are spread evenly by their logarithm.
-    comment : str
-        CF comment.
-    job_units : str
-        Unit in which the job gives the values; "" where it has none.
-    """
-
-    name: str
-    values: tuple
-    units: str
-    long_name: str
-    spacing: str = "linear"
-    comment: str = ""
-    job_units: str = ""
+    name: str  # name of the dimension and of its coordinate
+    values: tuple  # coordinate values in SI units, or texts
+    units: str  # CF unit; "" for texts
+    long_name: str  # CF long_name
+    spacing: str = "linear"  # "log" for samples that are spread evenly by their logarithm
+    comment: str = ""  # CF comment
+    job_units: str = ""  # unit in which the job gives the values; "" where it has none
 
     @property
     def attributes(self) -> dict[str, Any]:
@@ -87,20 +69,11 @@ class Dimension:
 class DerivedCoordinate(Dimension):
     """A parameter that follows from axes: a coordinate of the runs which is no dimension.
 
-    Attributes
-    ----------
-    name, units, long_name
-        As of a dimension.
-    values : tuple
-        In C order over `dims`.
-    dims : tuple of str
-        Names of the axes along which it varies, or `run`.
-    follows : str
-        How it follows, for people.
+    Its values are in C order over `dims`.
     """
 
-    dims: tuple[str, ...] = ()
-    follows: str = ""
+    dims: tuple[str, ...] = ()  # names of the axes along which it varies, or `run`
+    follows: str = ""  # how it follows, for people
 
     @property
     def attributes(self) -> dict[str, Any]:
@@ -140,36 +113,20 @@ def _values_and_units(varied: Axis | Derived) -> tuple[tuple, str]:
 
 @dataclass(frozen=True)
 class Study(Runs):
-    """A job together with the layout of its records.
+    """A job together with the layout of its records."""
 
-    Attributes
-    ----------
-    name, description, fingerprint : str
-        Of the job.
-    job : dict
-        The whole resolved job, as JSON types.
-    axes : tuple of Dimension
-        The varied values: a grid, through which run indices count in C order, or the values of all samples.
-        Empty for a single run.
-    variables : tuple of Variable
-        The quantities of a record, `status` first.
-    coordinates : tuple of Dimension
-        Dimensions of the variables beside the grid.
-    derived : tuple of DerivedCoordinate
-        Parameters that follow from the axes, except those with more than `MOST_DERIVED` values.
-    units : dict
-        Units in which the job gives values, by key.
-    """
-
-    name: str
+    name: str  # of the job, as the next two
     description: str
     fingerprint: str
-    job: dict[str, Any]
+    job: dict[str, Any]  # the whole resolved job, as JSON types
+    # the varied values: a grid, through which run indices count in C order, or the values of all samples.
+    # Empty for a single run.
     axes: tuple[Dimension, ...]
-    variables: tuple[Variable, ...]
-    coordinates: tuple[Dimension, ...]
+    variables: tuple[Variable, ...]  # the quantities of a record, `status` first
+    coordinates: tuple[Dimension, ...]  # dimensions of the variables beside the grid
+    # parameters that follow from the axes, except those with more than `MOST_DERIVED` values
     derived: tuple[DerivedCoordinate, ...] = ()
-    units: Mapping[str, str] = field(default_factory=dict)
+    units: Mapping[str, str] = field(default_factory=dict)  # units in which the job gives values, by key
 
     @property
     def design(self) -> Design:  # type: ignore[override]  # it stands in the job

@@ -23,22 +23,12 @@ _COUNT_RANKS = (
 
 
 class Finding(NamedTuple):
-    """One thing that was looked at.
+    """One thing that was looked at."""
 
-    Attributes
-    ----------
-    fine : bool
-        Whether sweeps work with it.
-    what, found : str
-        The object of the check, and its finding.
-    advice : str
-        The next action, or the consequence; "" where there is none.
-    """
-
-    fine: bool
-    what: str
-    found: str
-    advice: str = ""
+    fine: bool  # whether sweeps work with it
+    what: str  # the object of the check
+    found: str  # its finding
+    advice: str = ""  # the next action, or the consequence; "" where there is none
 
 
 def examine(folder: Path) -> Iterator[Finding]:

@@ -42,18 +42,10 @@ _logger = logging.getLogger(__name__)
 
 
 class Part(NamedTuple):
-    """One of several parts of a study; every run belongs to exactly one of them.
+    """One of several parts of a study; every run belongs to exactly one of them."""
 
-    Attributes
-    ----------
-    number : int
-        Which one, from 1.
-    parts : int
-        How many there are.
-    """
-
-    number: int
-    parts: int
+    number: int  # which one, from 1
+    parts: int  # how many there are
 
     def __str__(self) -> str:
         return f"{self.number}/{self.parts}"

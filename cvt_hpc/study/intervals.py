@@ -42,17 +42,10 @@ def looks_of(design: Mapping[str, Any], samples: int) -> list[int]:
 
 
 class Looked(NamedTuple):
-    """How far the cells of an adaptive study are, arrays over the cells.
+    """How far the cells of an adaptive study are, arrays over the cells."""
 
-    Attributes
-    ----------
-    counted : array of int
-        Samples at the last look, all of which have ended; 0 before the first.
-    wanted : array of int
-        Samples at the next look, or at the last one where the probability is known as well as was asked.
-    """
-
-    counted: NDArray[np.int64]
+    counted: NDArray[np.int64]  # samples at the last look, all of which have ended; 0 before the first
+    # samples at the next look, or at the last one where the probability is known as well as was asked
     wanted: NDArray[np.int64]
 
 

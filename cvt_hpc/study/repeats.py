@@ -53,42 +53,21 @@ def _of_the_job(records: Records, runs: NDArray[np.intp]) -> Mapping[int, float]
 
 @dataclass(frozen=True)
 class Repeat:
-    """A sample of the runs of a study, and another way to do them.
+    """A sample of the runs of a study, and another way to do them."""
 
-    Attributes
-    ----------
-    label : str
-        Its name in messages.
-    way : str
-        How the runs are done again, in words.
-    first : Job
-        The runs as they were done.
-    out : Path
-        Their folder; all of them are done before the sample is drawn.
-    folder : str
-        Where the repeated runs are kept, in that folder.
-    job : Job
-        The same runs as they are done again.
-    fraction : float
-        Share of the eligible runs that is done again; one run at least, if any is eligible.
-    eligible : callable
-        Returns by the records of the first study the runs that may be drawn, shape (runs,).
-    core_seconds : callable
-        Returns the expected cost of a repeated run [core-seconds], mean over the job.
-    steps : callable
-        Returns by these records and the indices of drawn runs the time step [s] of runs that are not to
-        take that of `job`, by index.
-    """
-
-    label: str
-    way: str
-    first: Job
-    out: Path
-    folder: str
-    job: Job
-    fraction: float
+    label: str  # its name in messages
+    way: str  # how the runs are done again, in words
+    first: Job  # the runs as they were done
+    out: Path  # their folder; all of them are done before the sample is drawn
+    folder: str  # where the repeated runs are kept, in that folder
+    job: Job  # the same runs as they are done again
+    fraction: float  # share of the eligible runs that is done again; one run at least, if any is eligible
+    # returns by the records of the first study the runs that may be drawn, shape (runs,)
     eligible: Callable[[Records], NDArray[np.bool_]]
+    # returns the expected cost of a repeated run [core-seconds], mean over the job
     core_seconds: Callable[[], float]
+    # returns by these records and the indices of drawn runs the time step [s] of runs that are not to take
+    # that of `job`, by index
     steps: Callable[[Records, NDArray[np.intp]], Mapping[int, float]] = _of_the_job
 
     @property

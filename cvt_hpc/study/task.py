@@ -42,20 +42,11 @@ _logger = logging.getLogger(__name__)
 
 
 class Result(NamedTuple):
-    """Result of runs that were done together.
+    """Result of runs that were done together."""
 
-    Attributes
-    ----------
-    records : list of (int, numpy.ndarray)
-        Run index and record of each.
-    seconds : float
-        Time [s] that they took together; 0 where it is not known.
-    histories : list of (int, xarray.Dataset)
-        Run index and history of each run whose history is kept.
-    """
-
-    records: list[Record]
-    seconds: float = 0.0
+    records: list[Record]  # run index and record of each
+    seconds: float = 0.0  # time [s] that they took together; 0 where it is not known
+    # run index and history of each run whose history is kept
     histories: Sequence[tuple[int, xr.Dataset]] = ()
 
     @property
@@ -83,33 +74,18 @@ class _Trouble(NamedTuple):
 
 @dataclass(frozen=True)
 class Task:
-    """The runs of a job and the simulator that does them.
+    """The runs of a job and the simulator that does them."""
 
-    Attributes
-    ----------
-    job : Job
-        The job to run.
-    study : Study
-        The layout of its records.
-    simulator : Simulator
-        Does the runs.
-    run_limit : float
-        Time [s] that a run may take; infinite for no limit.
-    chosen : callable, optional
-        Returns on rank 0 the requested runs, shape (runs,); by default those of the job's design.
-    asked_steps : callable, optional
-        Returns on rank 0 the time step [s] of runs that do not take the job's step, by run index.
-    steps : mapping
-        Time step [s] of the runs that do not take the job's step, by run index: requested, or shortened by a
-        retry.
-    """
-
-    job: Job
-    study: Study
-    simulator: Simulator
-    run_limit: float = math.inf
+    job: Job  # the job to run
+    study: Study  # the layout of its records
+    simulator: Simulator  # does the runs
+    run_limit: float = math.inf  # time [s] that a run may take; infinite for no limit
+    # returns on rank 0 the requested runs, shape (runs,); by default those of the job's design
     chosen: Callable[[], np.ndarray] | None = None
+    # returns on rank 0 the time step [s] of runs that do not take the job's step, by run index
     asked_steps: Callable[[], Mapping[int, float]] | None = None
+    # time step [s] of the runs that do not take the job's step, by run index: requested, or shortened by a
+    # retry
     steps: Mapping[int, float] = field(default_factory=dict)
 
     @property

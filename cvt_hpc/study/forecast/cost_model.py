@@ -39,21 +39,11 @@ CURVE = tuple(np.unique(np.logspace(0, 4, 25).round().astype(int)).tolist())  # 
 
 
 class Fit(NamedTuple):
-    """The logarithm of the machine's factor, as far as it is known.
+    """The logarithm of the machine's factor, as far as it is known."""
 
-    Attributes
-    ----------
-    batches : int
-        How many it is fitted to.
-    mean : float
-        Mean of the logarithm of (time taken [s] / cost).
-    squares : float
-        Sum of the squared deviations from it.
-    """
-
-    batches: int = 0
-    mean: float = 0.0
-    squares: float = 0.0
+    batches: int = 0  # how many it is fitted to
+    mean: float = 0.0  # mean of the logarithm of (time taken [s] / cost)
+    squares: float = 0.0  # sum of the squared deviations from it
 
     def with_ratio(self, ratio: float) -> Fit:
         """Return the fit to one more batch (Welford 1962)."""
@@ -152,21 +142,11 @@ def fit_recorded(
 
 
 class ClaimTimes(NamedTuple):
-    """Duration of a claim.
+    """Duration of a claim."""
 
-    Attributes
-    ----------
-    service : float
-        Time [s] for which the counter serves one claim and no other.
-    latency : float
-        Time [s] on the way there and back, its median.
-    scatter : float
-        Standard deviation of the logarithm of the latency.
-    """
-
-    service: float
-    latency: float
-    scatter: float
+    service: float  # time [s] for which the counter serves one claim and no other
+    latency: float  # time [s] on the way there and back, its median
+    scatter: float  # standard deviation of the logarithm of the latency
 
     def draw_latencies(self, generator: np.random.Generator, count: int) -> np.ndarray:
         """Return latencies [s] of some claims, shape (count,)."""
@@ -179,27 +159,16 @@ NETWORK = ClaimTimes(2e-6, 65e-6, math.log(11e-3 / 65e-6) / 3.7)
 
 
 class Forecast(NamedTuple):
-    """Expected time of a sweep.
+    """Expected time of a sweep."""
 
-    Attributes
-    ----------
-    ranks : int
-        Number of processes that compute.
-    batches : int
-        Number of batches that the runs make on them.
-    makespan : (float, float, float)
-        Time [s] from the first claim to the end of the last batch: median, and between which 95 % lie.
-    bound : float
-        Median of the time [s] that no schedule of these batches can undercut: all work over all ranks, or the
-        longest batch.
-    efficiency : (float, float, float)
-        Time of one rank, which does full batches, over the makespan times the ranks: median, and 95 %.
-    """
-
-    ranks: int
-    batches: int
+    ranks: int  # number of processes that compute
+    batches: int  # number of batches that the runs make on them
+    # time [s] from the first claim to the end of the last batch: median, and between which 95 % lie
     makespan: tuple[float, float, float]
+    # median of the time [s] that no schedule of these batches can undercut: all work over all ranks, or the
+    # longest batch
     bound: float
+    # time of one rank, which does full batches, over the makespan times the ranks: median, and 95 %
     efficiency: tuple[float, float, float]
 
     @property

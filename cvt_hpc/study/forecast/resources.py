@@ -45,20 +45,11 @@ class Disk(NamedTuple):
 
 
 class Needs(NamedTuple):
-    """Needs of a sweep.
+    """Needs of a sweep."""
 
-    Attributes
-    ----------
-    memory : int
-        Of rank 0, for the plan [byte].
-    disk : Disk
-        Space on the disk.
-    profiles : int
-        Memory of a rank, and disk at most, for a kept history's values along the belt at each sample [byte].
-    """
-
-    memory: int
-    disk: Disk
+    memory: int  # of rank 0, for the plan [byte]
+    disk: Disk  # space on the disk
+    # memory of a rank, and disk at most, for a kept history's values along the belt at each sample [byte]
     profiles: int = 0
 
 
@@ -217,20 +208,11 @@ def slurm_time(seconds: float) -> str:
 
 
 class Knowledge(NamedTuple):
-    """The times of a job's batches, as far as they are known.
+    """The times of a job's batches, as far as they are known."""
 
-    Attributes
-    ----------
-    fit : Fit
-        Time [s] of a batch over its predicted cost.
-    basis : str
-        Where it is from, in words.
-    history_bytes : float
-        Size of the history of a run in memory [byte]; NaN where it is not known.
-    """
-
-    fit: Fit
-    basis: str
+    fit: Fit  # time [s] of a batch over its predicted cost
+    basis: str  # where it is from, in words
+    # size of the history of a run in memory [byte]; NaN where it is not known
     history_bytes: float = math.nan
 
 

@@ -47,21 +47,11 @@ _PASSING_ON = 0.5  # [s]; mpirun, after an abort, drops output that it has not y
 
 @dataclass(frozen=True)
 class Launch:
-    """The start of this process according to the environment.
+    """The start of this process according to the environment."""
 
-    Attributes
-    ----------
-    size : int
-        Number of processes started together.
-    rank : int
-        Number of this process among them.
-    variable : str
-        The environment variable that shows it; "" if there is none.
-    """
-
-    size: int = 1
-    rank: int = 0
-    variable: str = ""
+    size: int = 1  # number of processes started together
+    rank: int = 0  # number of this process among them
+    variable: str = ""  # the environment variable that shows it; "" if there is none
 
 
 def detect_launch(environment: Mapping[str, str] = os.environ) -> Launch:
