@@ -52,42 +52,25 @@ class AuditReport(NamedTuple):
 
 
 def audit_of(job: Job, out: Path, fraction: float) -> Repeat:
-    """Return the audit of a study: a sample of the runs that cheaper models have answered, in full.
-
-    Parameters
-    ----------
-    job : Job
-        Of model auto.
-    out : Path
-        Its folder.
-    fraction : float
-        Share of the runs that is done again.
+    """Return the audit of a study in a folder: a share of the runs of cheaper models, done again in full.
 
     Raises
     ------
     InputError
-        If the job has no ladder.
+        If the job is not of model auto, which has a ladder.
     """
     if job.model != AUDITED:
-        raise mismatch(
-            "--audit", f"a job of model {AUDITED}, whose cheaper models can err", f"model {job.model}"
-        )
+        expected = f"a job of model {AUDITED}, whose cheaper models can err"
+        raise mismatch("--audit", expected, f"model {job.model}")
     full = built(job, handed_to(job, FULL_MODEL, "done in full, to audit the cheaper models"))
-
-    def cost() -> float:
-        return expected_cost(full, out / AUDIT)[0]
-
-    return Repeat("audit", "in full", job, out, AUDIT, full, fraction, _answered, core_seconds=cost)
+    place = out / AUDIT
+    return Repeat(
+        "audit", "in full", job, out, AUDIT, full, fraction, _answered, lambda: expected_cost(full, place)[0]
+    )
 
 
 def report_audit(audit: Repeat) -> AuditReport:
-    """Compare the runs of an audit with the answers of the cheaper models, and write the table; on one rank.
-
-    Parameters
-    ----------
-    audit : Repeat
-        As returned by `audit_of`, with all runs done.
-    """
+    """Compare the runs of an audit, all done, with the cheaper models, and write the table; on one rank."""
     low = audit.records
     full = StudyFolder(audit.place).read_records(describe(audit.job, default_simulator()))
     audited = np.flatnonzero(audit.sample & full.recorded)

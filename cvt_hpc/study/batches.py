@@ -69,12 +69,10 @@ def share_out(groups: Sequence[Batch], costs: np.ndarray, ranks: int, turns: Tur
     ----------
     groups : sequence of tuple of int
         Run indices that can be done together, in batches as large as may be.
-    costs : numpy.ndarray, shape (runs,)
-        Predicted duration of each run of the study, in any unit.
+    costs, turns
+        As of `batch_cost`.
     ranks : int
         Number of processes that compute.
-    turns : callable
-        How many times so many runs fill the lanes.
 
     Returns
     -------

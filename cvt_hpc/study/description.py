@@ -12,7 +12,7 @@ from typing import Any, Self
 
 import numpy as np
 
-from cvt_hpc.errors import InputError
+from cvt_hpc.errors import mismatch
 from cvt_hpc.job import Axis, Job
 from cvt_hpc.job.definition import Derived
 from cvt_hpc.job.design import Design, Runs
@@ -21,6 +21,7 @@ from cvt_hpc.storage.netcdf import attributes
 from cvt_hpc.study.simulator import Simulator
 from cvt_hpc.variables import Status, Variable
 
+_HEAD = ("name", "description", "fingerprint", "job")  # the first attributes of a study, kept as they are
 MOST_DERIVED = 200_000  # values of a parameter that follows from axes: these take some seconds
 
 
@@ -83,32 +84,26 @@ class DerivedCoordinate(Dimension):
 
 def axis_dimension(axis: Axis, job: Job) -> Dimension:
     """Return the dimension of an axis of a job."""
-    values, units = _values_and_units(axis)
-    return Dimension(axis.name, values, units, spacing=axis.spacing, **_named(axis, job))
+    return Dimension(**_common(axis, job), spacing=axis.spacing)
 
 
 def derived_coordinate(derived: Derived, job: Job) -> DerivedCoordinate:
     """Return the coordinate of a parameter that follows from axes; of samples it lies along `run`."""
     dims = ("run",) if "runs" in job.design else derived.axes
-    values, units = _values_and_units(derived)
-    named = _named(derived, job)
-    return DerivedCoordinate(derived.name, values, units, **named, dims=dims, follows=derived.words)
+    return DerivedCoordinate(**_common(derived, job), dims=dims, follows=derived.words)
 
 
-def _named(varied: Axis | Derived, job: Job) -> dict[str, str]:
-    """Return the label of a coordinate for people."""
-    named = {"long_name": _in_words(varied.name), "comment": varied.description}
-    return named | {"job_units": job.units.get(varied.name, "")}
-
-
-def _in_words(name: str) -> str:
-    return name.replace("_", " ")
-
-
-def _values_and_units(varied: Axis | Derived) -> tuple[tuple, str]:
-    """Return the values and their CF unit."""
+def _common(varied: Axis | Derived, job: Job) -> dict[str, Any]:
+    """Return the attributes of a coordinate that each has."""
     values = tuple(np.asarray(varied.values).tolist())
-    return values, "" if isinstance(values[0], str) else varied.unit or "1"
+    return {
+        "name": varied.name,
+        "values": values,
+        "units": "" if isinstance(values[0], str) else varied.unit or "1",
+        "long_name": varied.name.replace("_", " "),
+        "comment": varied.description,
+        "job_units": job.units.get(varied.name, ""),
+    }
 
 
 @dataclass(frozen=True)
@@ -209,10 +204,7 @@ class Study(Runs):
     def to_json(self) -> dict[str, Any]:
         """Return the study as JSON types."""
         return {
-            "name": self.name,
-            "description": self.description,
-            "fingerprint": self.fingerprint,
-            "job": self.job,
+            **{key: getattr(self, key) for key in _HEAD},
             "axes": [axis.to_json() for axis in self.axes],
             "variables": [_variable_to_json(variable) for variable in self.variables],
             "coordinates": [dimension.to_json() for dimension in self.coordinates],
@@ -224,15 +216,12 @@ class Study(Runs):
     def from_json(cls, entry: Mapping[str, Any]) -> Self:
         """Return the study that `to_json` wrote."""
         return cls(
-            entry["name"],
-            entry["description"],
-            entry["fingerprint"],
-            entry["job"],
-            tuple(Dimension.from_json(axis) for axis in entry["axes"]),
-            tuple(_variable_from_json(variable) for variable in entry["variables"]),
-            tuple(Dimension.from_json(dimension) for dimension in entry["coordinates"]),
-            tuple(DerivedCoordinate.from_json(derived) for derived in entry.get("derived", ())),
-            entry.get("units", {}),
+            **{key: entry[key] for key in _HEAD},
+            axes=tuple(map(Dimension.from_json, entry["axes"])),
+            variables=tuple(map(_variable_from_json, entry["variables"])),
+            coordinates=tuple(map(Dimension.from_json, entry["coordinates"])),
+            derived=tuple(map(DerivedCoordinate.from_json, entry.get("derived", ()))),
+            units=entry.get("units", {}),
         )
 
 
@@ -282,14 +271,11 @@ def check_names(job: Job, simulator: Simulator) -> None:
     """
     taken = {variable.name for variable in simulator.record_variables(job)}
     taken |= set(simulator.record_coordinates(job))
-    for table, name in [("axes", axis.name) for axis in job.axes] + [
-        ("derived", d.name) for d in job.derived
-    ]:
+    varied = [("axes", axis.name) for axis in job.axes] + [("derived", one.name) for one in job.derived]
+    for table, name in varied:
         if name in taken:
-            raise InputError(
-                f"{job.source}: [{table}] {name}: expected a parameter that is not also the name of a "
-                f"recorded quantity, found {name}"
-            )
+            expected = "a parameter that is not also the name of a recorded quantity"
+            raise mismatch(f"{job.source}: [{table}] {name}", expected, name)
 
 
 def fit_text(text: str, size: int) -> bytes:

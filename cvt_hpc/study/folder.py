@@ -60,18 +60,7 @@ class Part(NamedTuple):
 
 
 def read_part(text: str) -> Part:
-    """Return the part that is written as "K/N".
-
-    Parameters
-    ----------
-    text : str
-        Such as "3/16".
-
-    Raises
-    ------
-    InputError
-        If it is none.
-    """
+    """Return the part that is written as "K/N", such as "3/16"; InputError if the text is none."""
     numbers = re.fullmatch(r"([1-9]\d*)/([1-9]\d*)", text, re.ASCII)
     if numbers is None or int(numbers[1]) > int(numbers[2]):
         raise mismatch("part", "K/N with K from 1 to N, such as 3/16", f'"{text}"')
@@ -121,10 +110,18 @@ class StudyFolder(OutputFolder[Study]):
         records.warnings[:0] = flaws
         return records
 
-    def make_histories(self) -> None:
-        """Make the folder of histories; StorageError if something else is there, or the system refuses."""
-        with naming_refusals(self.histories, "a folder that histories can be written to"):
-            make_own_folder(self.histories)
+    def keep_histories(self, histories: Iterable[tuple[int, xr.Dataset]]) -> None:
+        """Write histories, by run index; before the records, so that a run on record has its history.
+
+        Raises
+        ------
+        StorageError
+            If something else stands in the place of their folder, or the system refuses.
+        """
+        for index, history in histories:
+            with naming_refusals(self.histories, "a folder that histories can be written to"):
+                make_own_folder(self.histories)
+            store_history(history, self.history(index))
 
     def load(self) -> Study:
         """Return the study that the folder holds.
@@ -326,19 +323,6 @@ def _numbers(study: Study) -> str:
     del entry["units"]
     job = {key: value for key, value in entry["job"].items() if key not in ("name", "description")}
     return json.dumps({**entry, "job": job, "name": "", "description": ""})
-
-
-def keep_histories(folder: StudyFolder, histories: Iterable[tuple[int, xr.Dataset]]) -> None:
-    """Write histories, by run index; before the records, so that a run on record has its history.
-
-    Raises
-    ------
-    StorageError
-        If the system refuses.
-    """
-    for index, history in histories:
-        folder.make_histories()
-        store_history(history, folder.history(index))
 
 
 def leave_out_missing(job: Job, folder: StudyFolder, records: Records) -> None:

@@ -12,7 +12,7 @@ import json
 import logging
 import math
 import zlib
-from collections.abc import Callable, Iterable, Iterator, Sequence
+from collections.abc import Callable, Iterator, Sequence
 from concurrent.futures import ThreadPoolExecutor
 from contextlib import contextmanager
 from pathlib import Path
@@ -60,17 +60,9 @@ class LossError(InputError):
 
 
 def gather(out: str | Path) -> Path:
-    """Write the dataset of all runs recorded so far; works while a run is at work.
+    """Write the dataset of all runs recorded so far in the output folder of a run, and return its path.
 
-    Parameters
-    ----------
-    out : str or Path
-        The output folder of a run.
-
-    Returns
-    -------
-    Path
-        Of the dataset, `results.nc` in the folder.
+    Works while a run is at work.
 
     Raises
     ------
@@ -105,14 +97,16 @@ def gather_records(
     LossError
         If runs of the dataset that is there are not on record.
     StorageError
-        If the system refuses.
+        If the system refuses; the dataset that was there is then untouched.
     """
     with locked(folder.gather_lock, patience=PATIENCE, interrupt=interrupt):
         for leftover in folder.leftovers():
             discard(leftover)
         records = folder.read_records(study)
         _refuse_loss(folder.results, study, records)
-        write_results(folder, study, records)
+        with written_aside(folder.results, advice=KEPT) as aside:
+            _declare(aside, records, study.variables)
+            fill(aside, records, study.variables)
     return records
 
 
@@ -178,29 +172,13 @@ def open_results(path: str | Path) -> xr.Dataset:
             if not found.exists() or kind_of(folder.job_file) is not None:
                 folder.load()
             if not found.exists():
-                raise InputError(
-                    f"{found}: expected a dataset, found nothing; `cvt-hpc gather {path}` writes it"
-                )
+                raise mismatch(str(found), "a dataset", "nothing", f"`cvt-hpc gather {path}` writes it")
         if not found.exists():
             raise mismatch(str(found), "a netCDF dataset", "nothing", study_instead(found))
         if found.suffix == ".toml":
             expected = "the output folder of a run, or a dataset"
             raise mismatch(str(found), expected, "a job file", study_instead(found))
     return open_netcdf(found, follow=not is_folder, chunks={})
-
-
-def write_results(folder: StudyFolder, study: Study, records: Records) -> Path:
-    """Write the dataset of records that were read: aside, to the disk, and in its place in one step.
-
-    Raises
-    ------
-    StorageError
-        If the system refuses; the dataset that was there is then untouched.
-    """
-    with written_aside(folder.results, advice=KEPT) as aside:
-        _declare(aside, study, records, study.variables)
-        fill(aside, study, records)
-    return folder.results
 
 
 @contextmanager
@@ -210,21 +188,22 @@ def recorded_results(records: Records) -> Iterator[xr.Dataset]:
     kept = [one for one in study.variables if math.prod(study.record_dtype[one.name].shape) <= LONGEST]
     with TemporaryDirectory(prefix="cvt-hpc-") as aside:
         path = Path(aside) / "results.nc"
-        _declare(path, study, records, kept)
-        fill(path, study, records, [one.name for one in kept])
+        _declare(path, records, kept)
+        fill(path, records, kept)
         with open_netcdf(path) as dataset:
             yield dataset
 
 
-def _declare(path: Path, study: Study, records: Records, variables: Sequence[Variable]) -> None:
+def _declare(path: Path, records: Records, variables: Sequence[Variable]) -> None:
     """Write a file with the coordinates and some variables over the runs.
 
     Not through xarray: its first dataset loads dask, scipy and pint, a second at the end of each sweep.
     """
     import netCDF4
 
+    study = records.study
     with netCDF4.Dataset(path, "w") as file:
-        file.setncatts(_global_attributes(study, records))
+        file.setncatts(_global_attributes(records))
         for name, length in zip(study.dims, study.shape, strict=True):
             file.createDimension(name, length)
         for axis in study.axes:
@@ -293,14 +272,14 @@ def _create(file: netCDF4.Dataset, study: Study, variable: Variable, chunk: tupl
     return stored
 
 
-def _global_attributes(study: Study, records: Records) -> dict[str, str]:
-    sessions = records.sessions
-    earlier = [
-        history_line(f"{s['command']} (on {s['host']}, {s['ranks']} rank(s))", s["started"]) for s in sessions
+def _global_attributes(records: Records) -> dict[str, str]:
+    study, made = records.study, records.sessions
+    lines = [
+        history_line(f"{s['command']} (on {s['host']}, {s['ranks']} rank(s))", s["started"]) for s in made
     ]
     model = study.job.get("model", "")
     return {
-        **global_attributes(study, study.job, f"model {model}", makers=sessions, earlier=earlier),
+        **global_attributes(study, study.job, f"model {model}", makers=made, earlier=lines),
         "job_fingerprint": study.fingerprint,
         JOB_UNITS: json.dumps(dict(study.units)),
     }
@@ -327,28 +306,17 @@ def contiguous_part(shape: tuple[int, ...], most: int) -> tuple[int, ...]:
     return tuple(reversed(part))
 
 
-def fill(path: Path, study: Study, records: Records, names: Iterable[str] | None = None) -> None:
-    """Write the values of quantities into a file that declares them.
-
-    Parameters
-    ----------
-    path : Path
-        A netCDF-4 file with the quantities as `chunk_shape` has them, shuffled and deflated.
-    study : Study
-        The quantities.
-    records : Records
-        Their values.
-    names : iterable of str, optional
-        Some of the quantities; all by default.
-    """
+def fill(path: Path, records: Records, variables: Sequence[Variable]) -> None:
+    """Write the values of some variables over the runs into a file that declares them."""
     import h5py
 
+    study = records.study
     runs = np.arange(study.size).reshape(study.shape)
     with h5py.File(path, "r+") as file, ThreadPoolExecutor() as pool:
         for block in _parts(study.shape, contiguous_part(study.shape, block_length(study))):
             rows = records.read(runs[block])
-            for name in study.record_names if names is None else names:
-                _fill_block(file[name], block, rows[name], pool)
+            for variable in variables:
+                _fill_block(file[variable.name], block, rows[variable.name], pool)
 
 
 def _fill_block(

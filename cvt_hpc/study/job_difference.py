@@ -13,7 +13,7 @@ from typing import Any
 import numpy as np
 from numpy.typing import NDArray
 
-from cvt_hpc.errors import InputError, few_of
+from cvt_hpc.errors import InputError, few_of, mismatch
 from cvt_hpc.study.description import Study
 
 _LONGEST = 40  # letters of a value
@@ -23,11 +23,9 @@ _FREE = ("name", "description", "axes", "linked", "design")  # compared by the r
 
 def another_job(path: Path, found: dict[str, Any], asked: dict[str, Any], name: str = "") -> InputError:
     """Return the error that a folder holds the results of another resolved job."""
-    difference = f"{name}{difference_in_words(found, asked)}"
-    return InputError(
-        f"{path}: expected the folder of this job, found that of another ({difference}); choose another name "
-        "or --out, or --fresh to throw its results away"
-    )
+    another = f"that of another ({name}{difference_in_words(found, asked)})"
+    then = "choose another name or --out, or --fresh to throw its results away"
+    return mismatch(str(path), "the folder of this job", another, then)
 
 
 def difference_in_words(found: Mapping[str, Any], asked: Mapping[str, Any]) -> str:
@@ -41,19 +39,15 @@ def _pair_in_words(there: Any, here: Any) -> str:
     """Return in words how two values differ: of lists the values that only one of them has."""
     if not isinstance(there, list) or not isinstance(here, list) or len(f"{there}{here}") <= _LONGEST:
         return "is {} there, {} here".format(*short_pair(there, here))
-    gone, more = (
-        [value for value in one if value not in other] for one, other in ((there, here), (here, there))
-    )
     parts = [
-        f"has {len(values)} value{'s' * (len(values) > 1)} {where} ({_few(values)})"
-        for values, where in ((gone, "there that it lacks here"), (more, "here that it lacks there"))
-        if values
+        f"has {len(alone)} value{'s' * (len(alone) > 1)} {where} ({few_of(alone, 4)})"
+        for one, other, where in (
+            (there, here, "there that it lacks here"),
+            (here, there, "here that it lacks there"),
+        )
+        if (alone := [short(value) for value in one if value not in other])
     ]
     return " and ".join(parts) or "has its values in another order"
-
-
-def _few(values: list) -> str:
-    return few_of([short(value) for value in values], 4)
 
 
 def differences(one: Mapping[str, Any], other: Mapping[str, Any]) -> dict[str, tuple[Any, Any]]:
@@ -91,10 +85,8 @@ def refuse_other(path: Path, found: Study, asked: Study) -> None:
     if found.fingerprint != asked.fingerprint and places_in(found.job, asked.job) is None:
         raise another_job(path, found.job, asked.job, f"job {found.name}: ")
     if not have_one_layout(found, asked):
-        raise InputError(
-            f"{path}: expected records with the quantities of this version, found others; choose "
-            "another --out, or --fresh to throw them away"
-        )
+        then = "choose another --out, or --fresh to throw them away"
+        raise mismatch(str(path), "records with the quantities of this version", "others", then)
 
 
 def have_one_layout(one: Study, other: Study) -> bool:
@@ -105,20 +97,11 @@ def have_one_layout(one: Study, other: Study) -> bool:
 
 
 def places_in(found: Mapping[str, Any], asked: Mapping[str, Any]) -> NDArray[np.int64] | None:
-    """Return which run of one job each run of another is.
+    """Return the index in one job of each run of another, shape (runs of `found`,); None if any is not there.
 
-    A run is the same if all its parameters are: values of axes and linked parameters are compared exactly, in
-    SI units. A constant may have become an axis, on which its value then has to be.
-
-    Parameters
-    ----------
-    found, asked : mapping
-        Resolved jobs, as of `Job.resolved`.
-
-    Returns
-    -------
-    numpy.ndarray of int, shape (runs of `found`,), or None
-        The indices of these runs in `asked`; None unless all of them are there.
+    The jobs are resolved, as of `Job.resolved`. A run is the same if all its parameters are: values of axes
+    and linked parameters are compared exactly, in SI units. A constant may have become an axis, on which its
+    value then has to be.
     """
     try:
         return _find_places(found, asked)

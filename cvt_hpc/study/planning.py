@@ -75,6 +75,11 @@ class Plan(NamedTuple):
     session: dict[str, Any]
     limit: TimeLimit
 
+    @property
+    def order(self) -> list[int]:
+        """The runs in the order in which they are begun."""
+        return [index for assignment in self.assignments for index in assignment.runs]
+
 
 def prepare(
     folder: StudyFolder,
@@ -142,17 +147,14 @@ def next_round(
         If a run of that round is not on record: requesting it once more would never end.
     """
     records = folder.read_records(task.study)
-    lost = [
-        index for assignment in plan.assignments for index in assignment.runs if not records.recorded[index]
-    ]
-    if lost:
+    if lost := [index for index in plan.order if not records.recorded[index]]:
         raise RuntimeError(f"a round of the trace has ended without records of its runs {lost}")
-    asked, costs = asked_runs(task, records), plan.costs
+    asked = asked_runs(task, records)
     assignments = plan_runs(task.job, task.simulator, records, asked, ranks, plan.steps)
+    plan = plan._replace(assignments=assignments, fit=task.fit(records, plan.costs).inherited())
     counter.rewind()
-    display.expect(costs[[index for assignment in assignments for index in assignment.runs]])
-    fit = task.fit(records, costs)
-    return plan._replace(assignments=assignments, fit=fit.inherited())
+    display.expect(plan.costs[plan.order])
+    return plan
 
 
 def _other_versions(records: Records, session: dict[str, Any]) -> list[str]:
@@ -178,16 +180,12 @@ def plan_runs(
 
     Parameters
     ----------
-    job : Job
-        The job that is run.
-    simulator : Simulator
-        Does the runs.
+    job, simulator, ranks
+        The job that is run, what does the runs, and the number of processes that compute.
     records : Records
         The runs on record; no run in it is to be given up.
     asked : numpy.ndarray of bool, shape (runs,)
         Which runs are to be on record in the end.
-    ranks : int
-        Number of processes that compute.
     steps : mapping, optional
         Time steps [s] of the runs that do not take that of the job, by run index: only runs of one step can
         advance together.
@@ -215,14 +213,7 @@ def plan_runs(
 def predicted_costs(job: Job, simulator: Simulator, steps: Mapping[int, float]) -> np.ndarray:
     """Return the predicted duration of each run, in any unit.
 
-    Parameters
-    ----------
-    job : Job
-        The job that is run.
-    simulator : Simulator
-        Does the runs.
-    steps : mapping
-        Time steps [s] of the runs that do not take that of the job, by run index: as much longer they take.
+    The runs that do not take the time step of the job but that of `steps` [s] take as much longer.
     """
     costs = np.array(simulator.run_costs(job), float)
     for index, step in steps.items():
@@ -250,22 +241,12 @@ def given_up(records: Records, asked: np.ndarray) -> dict[int, str]:
 
 
 def runs_to_repeat(records: Records, asked: np.ndarray, statuses: Collection[Status]) -> np.ndarray:
-    """Return the indices of recorded runs that a retry begins again.
+    """Return the indices of recorded runs, of those `asked`, that a retry of some statuses begins again.
 
     None while runs are left of a sweep in which an earlier retry began: the same command, given again
     after an early end, continues instead of beginning anew.
-
-    Parameters
-    ----------
-    records : Records
-        The runs on record.
-    asked : numpy.ndarray of bool, shape (runs,)
-        Which runs are in question.
-    statuses : collection of Status
-        How the runs ended that are to be done again.
     """
-    goes_on = (records.attempts[asked] > 1).any() and not records.recorded[asked].all()
-    if goes_on:
+    if (records.attempts[asked] > 1).any() and not records.recorded[asked].all():
         return np.zeros(0, np.int64)
     return np.flatnonzero(asked & records.recorded & np.isin(records.status, list(statuses)))
 
@@ -305,14 +286,8 @@ def later_attempts(records: Records) -> dict[int, int]:
 def needed_runs(study: Study, records: Records) -> NDArray[np.bool_]:
     """Return the runs that a study needs by the records, shape (runs,): of a grid or of samples all.
 
-    Of an adaptive one the samples that each cell wants.
-
-    Parameters
-    ----------
-    study : Study
-        With its design.
-    records : Records
-        The runs on record; these runs count as needed. Those needed now are among those needed later on.
+    Of an adaptive one the samples that each cell wants. Runs on record count as needed; those needed now are
+    among those needed later on.
     """
     if not study.in_rounds:
         return np.ones(study.size, bool)

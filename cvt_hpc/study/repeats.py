@@ -131,18 +131,7 @@ def built(job: Job, document: dict[str, Any]) -> Job:
 
 
 def step_check(job: Job, out: Path, fraction: float, way: str = "half") -> Repeat:
-    """Return the check of a study's time step.
-
-    Parameters
-    ----------
-    job : Job
-        The job, with a stepper of a fixed step.
-    out : Path
-        Its folder.
-    fraction : float
-        Share of the runs that is done again.
-    way : str
-        One of WAYS.
+    """Return the check of a study's time step: a share of the runs in a folder, done again by one of WAYS.
 
     Raises
     ------
@@ -151,14 +140,14 @@ def step_check(job: Job, out: Path, fraction: float, way: str = "half") -> Repea
     """
     _check(job, way)
     words, folder = WAYS[way]
-    if way == EXPLICIT:
-        other = built(job, _explicit(job))
-        own: dict[str, Any] = {"core_seconds": lambda: expected_cost(other, out / folder)[0]}
-    else:
-        # each run has a step of its own to be halved
-        other = built(job, _halved(job))
-        own = {"core_seconds": lambda: 2.0 * expected_cost(job, out)[0], "steps": halved_steps}
-    return Repeat("step check", words, job, out, folder, other, fraction, _eligible, **own)
+    other = built(job, _explicit(job) if way == EXPLICIT else _halved(job))
+
+    def cost() -> float:
+        return expected_cost(other, out / folder)[0] if way == EXPLICIT else 2.0 * expected_cost(job, out)[0]
+
+    # at half the step each run has a step of its own to be halved
+    steps = _of_the_job if way == EXPLICIT else halved_steps
+    return Repeat("step check", words, job, out, folder, other, fraction, _eligible, cost, steps)
 
 
 def halved_steps(records: Records, runs: NDArray[np.intp]) -> Mapping[int, float]:
@@ -175,8 +164,7 @@ def halved_steps(records: Records, runs: NDArray[np.intp]) -> Mapping[int, float
 def _check(job: Job, way: str) -> None:
     if STEP not in job.parameters:
         raise mismatch(FLAG, "a job whose stepper has a fixed step", stepper_in_words(job))
-    varied = [axis.name for axis in job.axes if job.schema.section_of[axis.name] == _section(job)]
-    if varied:
+    if varied := [axis.name for axis in job.axes if job.schema.section_of[axis.name] == _section(job)]:
         raise mismatch(FLAG, f"a job with one value of {varied[0]}", "an axis")
     if way == EXPLICIT and job.stepper == EXPLICIT:
         raise mismatch(f"{FLAG}-by {EXPLICIT}", "a job of another stepper", f"stepper {job.stepper}")

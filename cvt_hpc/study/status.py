@@ -121,29 +121,16 @@ def status_of(folder: StudyFolder, records: Records, running: bool) -> StudyStat
 def expected_cost(job: Job, out: Path) -> tuple[float, int]:
     """Return the core-seconds of a run, mean over the job, and the number of records used for it.
 
-    Parameters
-    ----------
-    job : Job
-        A validated job.
-    out : Path
-        The output folder, whose records of this job give the speed of the machine.
+    Records of this job in the output folder give the speed of the machine.
     """
     from cvt_hpc.simulation import estimate_cost
 
-    factor, runs = read_machine_factor(out, job)
+    factor, runs = _machine_factor(out, job)
     return factor * estimate_cost(job), runs
 
 
-def read_machine_factor(out: Path, job: Job) -> tuple[float, int]:
-    """Return processor time over predicted cost of the recorded runs of a job, and their number.
-
-    Parameters
-    ----------
-    out : Path
-        The output folder; without records of this job in it the factor is 1, by 0 runs.
-    job : Job
-        A validated job.
-    """
+def _machine_factor(out: Path, job: Job) -> tuple[float, int]:
+    """Return processor time over predicted cost of recorded runs of a job, and their number; or 1 by none."""
     records = find_records(out, job)
     if records is None or "core_seconds" not in records.study.record_names:
         return 1.0, 0
@@ -190,10 +177,11 @@ def _predicted_costs(study: Study, folder: StudyFolder) -> np.ndarray:
     """Return the predicted duration of each run, in some unit; all alike where there is no such model."""
     try:
         job = rebuild_job(study.job, str(folder.job_file), {})
-        costs = default_simulator().run_costs(job) if job.shape == study.shape else np.ones(study.size)
-    except InputError:
-        costs = np.ones(study.size)
-    return costs
+        if job.shape == study.shape:
+            return default_simulator().run_costs(job)
+    except InputError:  # of another version
+        pass
+    return np.ones(study.size)
 
 
 @dataclass(frozen=True)
@@ -289,16 +277,16 @@ def build_report(
     stopped: str | None,
 ) -> RunReport:
     """Return the report of a sweep of the runs marked in `asked`, shape (runs,)."""
-    status = records.status
-    without_results = np.flatnonzero(asked & records.recorded & (status != Status.DONE))
-    reasons = records.read(without_results, "reason")
+    status, recorded = records.status, asked & records.recorded
+    without_results = np.flatnonzero(recorded & (status != Status.DONE)).tolist()
+    reasons = records.read(np.array(without_results, int), "reason")
     failed = tuple(
         FailedRun(
-            index=int(index),
-            at=study.place(int(index)),
-            place=study.place_in_words(int(index)),
-            status=Status(status[index]).name.lower(),
-            reason=reason.decode(errors="replace"),
+            index,
+            study.place(index),
+            study.place_in_words(index),
+            Status(status[index]).name.lower(),
+            reason.decode(errors="replace"),
         )
         for index, reason in zip(without_results, reasons, strict=True)
     )
@@ -306,7 +294,7 @@ def build_report(
         out=folder.path,
         results=folder.results if gathered else None,
         total=int(asked.sum()),
-        done=int((asked & records.recorded & (status == Status.DONE)).sum()),
+        done=int((recorded & (status == Status.DONE)).sum()),
         failed=failed,
         remaining=int((asked & ~records.recorded).sum()),
         stopped=stopped,
@@ -321,9 +309,6 @@ def count_special(records: Records, asked: np.ndarray | None = None) -> dict[str
     is_done = records.status == Status.DONE
     done = np.flatnonzero(is_done if asked is None else is_done & asked)
     verdicts = records.read(done, "vibrates")
-    kinds = {
-        "undecided": Vibrates.UNDECIDED,
-        "slipping": Vibrates.SLIPS,
-        "irregular": Vibrates.IRREGULAR,
-    }
-    return {name: int((verdicts == verdict).sum()) for name, verdict in kinds.items()}
+    kinds = (Vibrates.UNDECIDED, Vibrates.SLIPS, Vibrates.IRREGULAR)
+    counts = (int((verdicts == verdict).sum()) for verdict in kinds)
+    return dict(zip(("undecided", "slipping", "irregular"), counts, strict=True))

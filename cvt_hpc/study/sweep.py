@@ -24,7 +24,7 @@ from cvt_hpc.storage.netcdf import library_for_sweep
 from cvt_hpc.storage.provenance import program_identity
 from cvt_hpc.study.batches import Assignment, Batch
 from cvt_hpc.study.description import Study, describe
-from cvt_hpc.study.folder import Part, StudyFolder, keep_histories, leave_out_missing, read_part
+from cvt_hpc.study.folder import Part, StudyFolder, leave_out_missing, read_part
 from cvt_hpc.study.forecast.cost_model import CostModel
 from cvt_hpc.study.forecast.resources import refuse_too_large
 from cvt_hpc.study.gather import LossError, gather_records
@@ -171,11 +171,8 @@ def run(
         with ExitStack() as held:
             plan = team.on_root(find_plan)
             with open_counter(team) as counter:
-                order = [index for assignment in plan.assignments for index in assignment.runs]
-                visible = progress and team.rank == 0
-                display = Progress(
-                    counter, plan.total, plan.recorded, plan.failed, visible, plan.costs[order]
-                )
+                visible, costs = progress and team.rank == 0, plan.costs[plan.order]
+                display = Progress(counter, plan.total, plan.recorded, plan.failed, visible, costs)
                 stop = stopping.Stop(counter, signals, plan.limit, display.show)
                 stopped = None
                 with closing(display):
@@ -265,7 +262,7 @@ def _compute(
             for runs, alone, joins in claims:
                 begin = partial(log.begin, alone=alone)
                 for result in task.do(runs, stop.interrupt, begin, join if joins else None):
-                    keep_histories(folder, result.histories)
+                    folder.keep_histories(result.histories)
                     log.append(result.records)
                     counter.report(len(result.records) - counted, result.failed)
                     counted = 0

@@ -183,7 +183,9 @@ class Task:
             return Result([]), _Trouble(Status.FAILED_ERROR, words, f"raised {words}")
 
     def _points(self, runs: Sequence[int]) -> list[dict[str, Any]]:
-        return [point_at_step(self.job, index, self.steps) for index in runs]
+        """Return the parameters of runs, each at its own time step where it has one."""
+        own = ({STEP: self.steps[index]} if index in self.steps else {} for index in runs)
+        return [self.job.point(index) | step for index, step in zip(runs, own, strict=True)]
 
     def _failure(self, index: int, trouble: _Trouble) -> Result:
         return Result([(index, self.study.pack_failure(trouble.reason, trouble.status))])
@@ -197,18 +199,10 @@ class Task:
 
 
 class _Watch:
-    """Decides during a run whether to continue: by the given question and by the run's own limit.
+    """Decides during a run whether to continue: by the given question and by the run's own limit [s].
 
     The clock starts with the first question: kernels, which a run may have to wait for, are compiled by then.
-
-    Parameters
-    ----------
-    interrupt : callable
-        Called first.
-    limit : float
-        Time [s] that the run may take.
-    start : callable
-        Called when the clock starts.
+    `start` is called at that time.
     """
 
     def __init__(self, interrupt: Interrupt, limit: float, start: Callable[[], None]) -> None:
@@ -248,14 +242,7 @@ def asked_step(job: Job, index: int) -> float:
 def refined_steps(job: Job, records: Records, others: Mapping[int, float]) -> dict[int, float]:
     """Return the time steps [s] of the runs that do not take that of their job, by run index.
 
-    Parameters
-    ----------
-    job : Job
-        The job that is run.
-    records : Records
-        With the factors by which retries shorten steps.
-    others : mapping
-        Time steps by run index, for runs that do not take the job's step, on record or not.
+    Those are `others`, on record or not, and the runs whose step a retry shortens by the factor on record.
     """
     steps = dict(others)
     for index in np.flatnonzero(records.refinements != 1.0).tolist():
@@ -264,28 +251,11 @@ def refined_steps(job: Job, records: Records, others: Mapping[int, float]) -> di
     return steps
 
 
-def point_at_step(job: Job, index: int, steps: Mapping[int, float]) -> dict[str, Any]:
-    """Return the parameters of a run, at its time step of `steps` where that has one."""
-    point = job.point(index)
-    return {**point, STEP: steps[index]} if index in steps else point
-
-
 def untried_factor(job: Job, records: Records, again: NDArray[np.int64], retry: Collection[Status]) -> float:
     """Return the factor by which a retry shortens time steps where none is given: half of the shortest tried.
 
     The same run at the same step would only fail again. Where not failed numerics alone are done again, or
-    the job has no fixed step, it is 1.
-
-    Parameters
-    ----------
-    job : Job
-        The job that is run.
-    records : Records
-        With the factors of earlier retries.
-    again : array of int
-        Indices of the runs that are done again.
-    retry : collection of Status
-        How these ended.
+    the job has no fixed step, it is 1. `again` are the indices of the runs, which have ended as `retry` says.
     """
     if set(retry) != {Status.FAILED_NUMERICS} or STEP not in job.parameters or not again.size:
         return 1.0
@@ -294,16 +264,9 @@ def untried_factor(job: Job, records: Records, again: NDArray[np.int64], retry: 
 
 
 def check_refinement(job: Job, refine: float, retry: Collection[Status]) -> None:
-    """Raise InputError unless failed runs of a job can be done again at a step shorter by a factor.
+    """Raise InputError unless runs that ended as `retry` says can be done again at a step over a factor.
 
-    Parameters
-    ----------
-    job : Job
-        A validated job.
-    refine : float
-        The factor.
-    retry : collection of Status
-        How the runs ended that are done again: a shorter step is a cure for failed numerics alone.
+    A shorter step is a cure for failed numerics alone.
     """
     if not 1.0 <= refine <= MOST_REFINED:
         raise mismatch("--refine", f"a factor of 1 or more, at most {MOST_REFINED:g}", show(refine))

@@ -88,12 +88,10 @@ class CostModel:
 
     Parameters
     ----------
-    costs : numpy.ndarray, shape (runs,)
-        Predicted duration of each run of the study, in any unit.
+    costs, turns
+        As of `batch_cost`.
     fit : Fit, optional
         The fit that is known beforehand.
-    turns : callable
-        How many times so many runs fill the lanes.
     """
 
     def __init__(self, costs: np.ndarray, fit: Fit | None = None, turns: Turns = one_turn) -> None:
@@ -125,14 +123,12 @@ def fit_recorded(
 
     Parameters
     ----------
-    costs : numpy.ndarray, shape (runs,)
-        Predicted duration of each run of the study, in any unit.
+    costs, turns
+        As of `batch_cost`.
     timings : iterable of (batch, seconds)
         How long batches have taken [s].
     done : numpy.ndarray of bool, shape (runs,)
         Runs with results. A batch without any ended before its time, and is left out.
-    turns : callable
-        How many times so many runs fill the lanes.
     """
     model = CostModel(costs, turns=turns)
     for batch, seconds in timings:
@@ -190,20 +186,14 @@ def forecast(
 
     Parameters
     ----------
-    groups : sequence of tuple of int
-        Run indices that can be done together, in batches as large as may be.
-    costs : numpy.ndarray, shape (runs,)
-        Predicted duration of each run of the study, in any unit.
+    groups, costs, ranks, turns
+        As of `share_out`.
     fit : Fit
         Time [s] of a batch over its predicted cost.
-    ranks : int
-        Number of processes that compute.
     claims : ClaimTimes
         Time that a claim takes.
     seed : int
         Of the random numbers.
-    turns : callable
-        How many times so many runs fill the lanes.
     """
     planned = np.array([batch_cost(batch, costs, turns) for batch in share_out(groups, costs, ranks, turns)])
     # Cost of empty lanes, which keep all ranks at work.
@@ -230,17 +220,14 @@ def simulate_schedule(
     ----------
     seconds : numpy.ndarray, shape (batches,)
         How long each batch takes [s], in the order in which they are claimed.
-    ranks : int
-        Number of processes that compute.
-    claims : ClaimTimes
-        Time that a claim takes.
+    ranks, claims
+        As of `forecast`.
     generator : numpy.random.Generator
         Of the latencies.
     """
     latencies = claims.draw_latencies(generator, ranks + len(seconds))
-    arrivals = np.sort(
-        latencies[:ranks]
-    ).tolist()  # next claim of each rank at the counter; sorted, it is a heap
+    # next claim of each rank at the counter; sorted, it is a heap
+    arrivals = np.sort(latencies[:ranks]).tolist()
     free = end = 0.0
     for duration, latency in zip(seconds.tolist(), latencies[ranks:].tolist(), strict=True):
         free = max(free, arrivals[0]) + claims.service

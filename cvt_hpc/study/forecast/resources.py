@@ -20,7 +20,7 @@ from cvt_hpc.study.description import Study, describe, record_layout, record_typ
 from cvt_hpc.study.forecast.cost_model import CostModel, Fit, Forecast, forecast
 from cvt_hpc.study.planning import predicted_costs
 from cvt_hpc.study.ranks.stopping import gathering_margin
-from cvt_hpc.study.record.log import HEAD, PLACE, RecordFormat
+from cvt_hpc.study.record.log import HEAD, PLACE
 from cvt_hpc.study.simulator import Simulator, default_simulator
 from cvt_hpc.study.status import find_records
 from cvt_hpc.study.task import Task, refined_steps
@@ -57,29 +57,22 @@ def needs(job: Job, simulator: Simulator) -> Needs:
     """Return the needs of a sweep of all runs of a job, without the marks of its batches."""
     variables, coordinates = record_layout(job, simulator)
     record = record_type(variables, coordinates).itemsize
-    size = job.size
     named = len(variables) + len(coordinates) + len(job.axes) + len(job.rules)
-    disk = Disk((HEAD.size + PLACE.size + record) * size, most_of_results(size * record, named), math.nan)
-    disk = disk if job.histories else disk._replace(histories=0.0)
-    return Needs(MEMORY_PER_RUN * size, disk, simulator.profile_bytes(job))
+    disk = _disk(job.size, record, named, math.nan if job.histories else 0.0)
+    return Needs(MEMORY_PER_RUN * job.size, disk, simulator.profile_bytes(job))
 
 
-def most_of_results(values: int, named: int) -> int:
-    """Return the most that results.nc takes [byte], by its values [byte] and number of quantities."""
-    return values + NAMES_AND_CHUNKS * named
+def _disk(runs: int, record: int, named: int, histories: float) -> Disk:
+    """Return the space that runs take without the marks of their batches, by the bytes of a record.
+
+    The dataset is compressed. It takes no more than its records, and something for each quantity `named`.
+    """
+    framed = HEAD.size + PLACE.size + record
+    return Disk(framed * runs, record * runs + NAMES_AND_CHUNKS * named, histories)
 
 
 def refuse_too_large(job: Job, simulator: Simulator, out: Path) -> Needs:
-    """Return the needs of a sweep of all runs of a job.
-
-    Parameters
-    ----------
-    job : Job
-        A validated job.
-    simulator : Simulator
-        Does the runs.
-    out : Path
-        The output folder; its present content need not be written any more.
+    """Return the needs of a sweep of all runs of a job; what is in its folder need not be written again.
 
     Raises
     ------
@@ -89,12 +82,10 @@ def refuse_too_large(job: Job, simulator: Simulator, out: Path) -> Needs:
     """
     needed, where = needs(job, simulator), f"{job.source}: {job.size} runs"
     memory = os.sysconf("SC_PAGE_SIZE") * os.sysconf("SC_PHYS_PAGES")
-    if needed.memory > memory:
-        found = f"{size_in_words(memory)} in this machine"
-        raise mismatch(where, f"{size_in_words(needed.memory)} of memory for their plan", found)
-    if needed.profiles > memory:
-        found = f"{size_in_words(memory)} in this machine"
-        raise mismatch(where, f"{size_in_words(needed.profiles)} of memory for profiles over time", found)
+    for size, what in ((needed.memory, "their plan"), (needed.profiles, "profiles over time")):
+        if size > memory:
+            expected = f"{size_in_words(size)} of memory for {what}"
+            raise mismatch(where, expected, f"{size_in_words(memory)} in this machine")
     if not job.in_rounds:
         free = _free(out) + _held(out)
         profiles = needed.profiles * len(job.histories)
@@ -138,16 +129,7 @@ class Expectation(NamedTuple):
 def expect(job: Job, out: Path, ranks: Sequence[int], pilots: int = 0) -> Expectation:
     """Return the time and space of a sweep of all runs of a job on each of some numbers of ranks.
 
-    Parameters
-    ----------
-    job : Job
-        A validated job.
-    out : Path
-        The output folder, whose records give the time of batches if no pilots are requested.
-    ranks : sequence of int
-        Numbers of processes that compute.
-    pilots : int
-        Number of batches to be done for this.
+    Records in the output folder give the time of batches, or as many pilots, done for this, as are requested.
     """
     simulator = default_simulator()
     study, costs = describe(job, simulator), simulator.run_costs(job)
@@ -161,42 +143,18 @@ def expect(job: Job, out: Path, ranks: Sequence[int], pilots: int = 0) -> Expect
 
 
 def suggested_time(forecast: Forecast, runs: int) -> float:
-    """Return the time limit [s] to request from Slurm: enough for 39 sweeps in 40, start and end included.
-
-    Parameters
-    ----------
-    forecast : Forecast
-        Of the sweep.
-    runs : int
-        Number of runs of the study.
-    """
+    """Return the time limit [s] to request from Slurm: enough for 39 sweeps in 40, start and end included."""
     needed = _START_UP + forecast.makespan[2] + gathering_margin(runs)
     return _STEP * math.ceil(needed / _STEP)
 
 
 def disk_space(study: Study, batches: int, histories: int, history_bytes: float) -> Disk:
-    """Return the space that a study takes: the dataset, which is compressed, for no more than its records.
-
-    Parameters
-    ----------
-    study : Study
-        With the layout of its records.
-    batches : int
-        Number of batches that its runs make.
-    histories : int
-        Number of histories that are kept.
-    history_bytes : float
-        Size of one of them [byte].
-    """
-    layout = RecordFormat(study.fingerprint, study.record_dtype)
+    """Return the space that a study takes in some batches, and with kept histories of a size [byte] each."""
     marks = batches * HEAD.size + study.size * PLACE.size
-    values = study.size * study.record_dtype.itemsize
     named = len((*study.variables, *study.coordinates, *study.axes, *study.derived))
-    return Disk(
-        study.size * layout.record_size + marks,
-        most_of_results(values, named),
-        histories * history_bytes if histories else 0.0,
-    )
+    kept = histories * history_bytes if histories else 0.0
+    disk = _disk(study.size, study.record_dtype.itemsize, named, kept)
+    return disk._replace(records=disk.records + marks)
 
 
 def slurm_time(seconds: float) -> str:
@@ -217,32 +175,20 @@ class Knowledge(NamedTuple):
 
 
 def find_out(job: Job, simulator: Simulator, groups: Sequence[Batch], out: Path, pilots: int) -> Knowledge:
-    """Return the known times of a job's batches.
+    """Return the known times of a job's batches, of which `groups` are full ones.
 
-    Parameters
-    ----------
-    job : Job
-        A validated job.
-    simulator : Simulator
-        Does the runs, and predicts their cost in core-seconds.
-    groups : sequence of tuple of int
-        All runs, in full batches.
-    out : Path
-        The output folder, whose records are used if no pilots are requested.
-    pilots : int
-        Number of batches to be done for this, shortened and without a trace in the folder.
+    By records in the output folder, or by so many `pilots`: batches, shortened and without a trace in the
+    folder.
     """
     if pilots:
         found = run_pilots(job, simulator, groups, pilots)
         if found.fit.batches:
             return found
-    else:
-        records = find_records(out, job)
-        if records is not None:
-            costs = predicted_costs(job, simulator, refined_steps(job, records, {}))
-            fit = Task(job, records.study, simulator).fit(records, costs)
-            if fit.batches:
-                return Knowledge(fit, f"batches on record ({fit.batches})")
+    elif (records := find_records(out, job)) is not None:
+        costs = predicted_costs(job, simulator, refined_steps(job, records, {}))
+        fit = Task(job, records.study, simulator).fit(records, costs)
+        if fit.batches:
+            return Knowledge(fit, f"batches on record ({fit.batches})")
     # The cost of a run is its share of a full batch.
     lanes = max(len(group) / simulator.turns(job, len(group)) for group in groups)
     failed = "; no pilot batch came to its end" if pilots else ""
@@ -261,10 +207,9 @@ def run_pilots(job: Job, simulator: Simulator, groups: Sequence[Batch], count: i
     fixed = {axis.name for axis in job.axes} | {rule.key for rule in job.rules}
     if share < 1.0 and "duration" in job.parameters and "duration" not in fixed:
         duration = share * job.parameters["duration"]
-        bare = {"duration": duration, "longest_duration": duration, "most_refinements": 0}
-        bare["shortest_duration"] = 0.0
-        known = {key: value for key, value in bare.items() if key in job.parameters}
-        short = replace(job, parameters={**job.parameters, **known})
+        bare = {"duration": duration, "longest_duration": duration, "shortest_duration": 0.0}
+        bare |= {"most_refinements": 0}
+        short = replace(job, parameters={key: bare.get(key, old) for key, old in job.parameters.items()})
     else:
         share = 1.0
     turns = partial(simulator.turns, job)
@@ -284,6 +229,5 @@ def run_pilots(job: Job, simulator: Simulator, groups: Sequence[Batch], count: i
             for _, history in result.histories:
                 history_bytes = history.nbytes / share
     noun = "pilot batch" if model.fit.batches == 1 else "pilot batches"
-    return Knowledge(
-        model.fit, f"{model.fit.batches} {noun} of {share:.0%} of the simulated time", history_bytes
-    )
+    basis = f"{model.fit.batches} {noun} of {share:.0%} of the simulated time"
+    return Knowledge(model.fit, basis, history_bytes)

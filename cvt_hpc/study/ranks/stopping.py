@@ -47,23 +47,14 @@ class TimeLimit(NamedTuple):
 
 
 def find_time_limit(asked: float | None, runs: int, environment: Mapping[str, str] = os.environ) -> TimeLimit:
-    """Return how much time is left.
+    """Return how much time is left, with some to gather so many runs of the study before the end.
 
-    Parameters
-    ----------
-    asked : float or None
-        Time [s] that the user has given; without it that of the Slurm job counts, if there is one.
-    runs : int
-        Number of runs of the study, which have to be gathered before the end.
-    environment : mapping
-        Of this process.
+    It is the time [s] that the user has asked for; without it that of the Slurm job counts, if there is one.
     """
     if asked is not None:
         return TimeLimit(asked - _GATHERING * runs)
-    left = _left_to_slurm_job(environment)
-    return (
-        TimeLimit(left - gathering_margin(runs), "end of the Slurm job") if left < math.inf else TimeLimit()
-    )
+    left = _left_to_slurm_job(environment) - gathering_margin(runs)
+    return TimeLimit(left, "end of the Slurm job") if left < math.inf else TimeLimit()
 
 
 def gathering_margin(runs: int) -> float:
@@ -83,12 +74,7 @@ class _TimeUp(BaseException):
 def planning_within(seconds: float, runs: int) -> Iterator[None]:
     """End a `with` block when its time is up: a plan of very many runs can take longer than their limit.
 
-    Parameters
-    ----------
-    seconds : float
-        Time [s] that is left; infinite for no limit. Some seconds are always left.
-    runs : int
-        Number of runs, for the error.
+    The time that is left [s] is infinite for no limit. Some seconds are always left.
 
     Raises
     ------
@@ -153,16 +139,10 @@ def _in_seconds(left: re.Match[str]) -> float:
 
 
 class SignalWatch:
-    """A context in which the signals to stop are noted instead of ending the process.
-
-    Attributes
-    ----------
-    noted : str or None
-        Name of the first signal that came.
-    """
+    """A context in which the signals to stop are noted instead of ending the process."""
 
     def __init__(self) -> None:
-        self.noted: str | None = None
+        self.noted: str | None = None  # name of the first signal that came
         self._noted_at = 0.0
         self._previous: dict[int, Any] = {}
 
@@ -186,23 +166,14 @@ class SignalWatch:
 
 
 def raise_again(name: str, status: int, everywhere: bool) -> NoReturn:
-    """Raise what a signal means to a script, once its sweep has been stopped.
-
-    Parameters
-    ----------
-    name : str
-        Of the signal.
-    status : int
-        Exit status of a script that leaves it uncaught.
-    everywhere : bool
-        Whether all ranks do so.
+    """Raise what a signal means to a script, once its sweep has been stopped: on all ranks if `everywhere`.
 
     Raises
     ------
     KeyboardInterrupt
         After SIGINT.
     SystemExit
-        After other signals.
+        After other signals, with the exit status of a script that leaves it uncaught.
     """
     error = KeyboardInterrupt(name) if name == signal.SIGINT.name else SystemExit(status)
     vars(error)["everywhere"] = everywhere
