@@ -5,7 +5,7 @@ from __future__ import annotations
 import argparse
 from importlib import import_module
 from pathlib import Path
-from typing import TYPE_CHECKING, Any
+from typing import TYPE_CHECKING
 
 from cvt_hpc.cli import parts
 from cvt_hpc.errors import mismatch
@@ -17,7 +17,7 @@ if TYPE_CHECKING:
 RUN = "run"
 
 
-def add(commands: Any) -> None:
+def add(commands: parts.Commands) -> None:
     """Declare the command."""
     text = "validate a job, show its defaults and estimate its cost"
     check = parts.add_command(commands, "check", _check, text, "JOB")

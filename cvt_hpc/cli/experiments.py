@@ -3,13 +3,12 @@
 import argparse
 from functools import partial
 from importlib import import_module
-from typing import Any
 
 from cvt_hpc.cli import parts
 from cvt_hpc.experiment_kinds import EXPERIMENTS
 
 
-def add(commands: Any) -> None:
+def add(commands: parts.Commands) -> None:
     """Declare the commands."""
     for name, experiment in EXPERIMENTS.items():
         command = parts.add_command(commands, name, _do, experiment.text, "JOB")

@@ -9,7 +9,7 @@ import sys
 from collections.abc import Callable, Iterator, Sequence
 from contextlib import ExitStack, contextmanager
 from pathlib import Path
-from typing import TYPE_CHECKING, Any, TypeVar
+from typing import TYPE_CHECKING, Any, TypeAlias, TypeVar
 
 from cvt_hpc.errors import mismatch, one_line
 
@@ -18,8 +18,11 @@ if TYPE_CHECKING:
 
     from cvt_hpc.analysis.arrangement import Sides
     from cvt_hpc.job import Job
+    from cvt_hpc.job.values import Point
 
 Result = TypeVar("Result")
+Command = Callable[[argparse.Namespace], int]  # does one, and returns the exit status
+Commands: TypeAlias = "argparse._SubParsersAction[argparse.ArgumentParser]"
 
 DONE, SOME_FAILED, INTERRUPTED = 0, 1, 130
 PICTURES = (".png", ".svg", ".pdf")
@@ -39,7 +42,7 @@ _SUBJECTS = {
 
 
 def add_command(
-    commands: Any, name: str, call: Callable[[Any], int], text: str, subject: str = "", end: str = "."
+    commands: Commands, name: str, call: Command, text: str, subject: str = "", end: str = "."
 ) -> argparse.ArgumentParser:
     """Return a new command; `subject`, what it is about, is one of the keys of _SUBJECTS, if there is any."""
     command = commands.add_parser(name, help=text, description=f"{text[0].upper()}{text[1:]}{end}")
@@ -121,7 +124,7 @@ def opened_histories(files: Sequence[Path]) -> Iterator[list[xr.Dataset]]:
         yield [standard(history, str(file)) for history, file in zip(opened, files, strict=True)]
 
 
-def fixed_axes(arguments: argparse.Namespace, dataset: xr.Dataset, source: str) -> dict[str, Any]:
+def fixed_axes(arguments: argparse.Namespace, dataset: xr.Dataset, source: str) -> Point:
     """Return the values [SI] at which --at fixes axes of results."""
     from cvt_hpc.job.assignments import read_coordinates
 

@@ -1,17 +1,26 @@
 """`plot`: pictures of results beside the map, each by its kind; `picture_kinds.py` declares them."""
 
+from __future__ import annotations
+
 import argparse
 from collections.abc import Callable, Sequence
 from pathlib import Path
-from typing import Any
+from typing import TYPE_CHECKING, Any
 
 from cvt_hpc.cli import parts
 from cvt_hpc.errors import InputError
 from cvt_hpc.picture_kinds import END, HISTORIES, KINDS, RESULTS, Kind
 from cvt_hpc.storage.files import StorageError
 
+if TYPE_CHECKING:
+    import xarray as xr
 
-def add(commands: Any) -> None:
+    from cvt_hpc.job.values import Point
+
+Options = dict[str, Any]  # of a picture, as they are given
+
+
+def add(commands: parts.Commands) -> None:
     """Declare the command."""
     plot = commands.add_parser("plot", help="draw spectra, curves or forces", description="Draw results.")
     kinds = plot.add_subparsers(metavar="KIND", required=True)
@@ -23,7 +32,7 @@ def add(commands: Any) -> None:
     animation.add_argument("--out", type=Path, metavar="GIF", help=text)
 
 
-def _add_kind(kinds: Any, name: str, kind: Kind) -> None:
+def _add_kind(kinds: parts.Commands, name: str, kind: Kind) -> None:
     command = parts.add_command(
         kinds, name, _draw, kind.text, RESULTS if kind.subject == RESULTS else HISTORIES
     )
@@ -60,7 +69,7 @@ def _draw(arguments: argparse.Namespace) -> int:
     def beside(file: Path) -> Path:
         return parts.picture_beside(arguments.path, [file], *words)
 
-    def write(history: Any, out: Path, source: str, of_several: str) -> list[str]:
+    def write(history: xr.Dataset, out: Path, source: str, of_several: str) -> list[str]:
         written = [f"picture: {_write(name, [history], out, None, [source], options)}"]
         if data:
             from cvt_hpc.picture_kinds import function_of
@@ -73,7 +82,7 @@ def _draw(arguments: argparse.Namespace) -> int:
     return _each(arguments, beside, write)
 
 
-def _draw_results(arguments: argparse.Namespace, words: Sequence[str], options: dict[str, Any]) -> None:
+def _draw_results(arguments: argparse.Namespace, words: Sequence[str], options: Options) -> None:
     source = str(arguments.path)
     out = arguments.out or parts.picture_beside(
         arguments.path, parts.files_of(arguments.path), *words, *arguments.at
@@ -83,7 +92,7 @@ def _draw_results(arguments: argparse.Namespace, words: Sequence[str], options: 
         parts.say(f"picture: {_write(arguments.kind, [dataset], out, at, [source], options)}")
 
 
-def _draw_together(arguments: argparse.Namespace, words: Sequence[str], options: dict[str, Any]) -> None:
+def _draw_together(arguments: argparse.Namespace, words: Sequence[str], options: Options) -> None:
     from cvt_hpc.analysis.telling_apart import history_files
 
     files = history_files([arguments.path, *arguments.others])
@@ -94,7 +103,7 @@ def _draw_together(arguments: argparse.Namespace, words: Sequence[str], options:
 
 
 def _write(
-    name: str, datasets: Sequence[Any], out: Path, at: Any, sources: Sequence[str], options: dict[str, Any]
+    name: str, datasets: list[xr.Dataset], out: Path, at: Point | None, sources: list[str], options: Options
 ) -> Path:
     from cvt_hpc.analysis.figures import draw
     from cvt_hpc.picture_kinds import compose
@@ -109,7 +118,7 @@ def _write(
 def _animation(arguments: argparse.Namespace) -> int:
     from cvt_hpc.analysis.animation import check_animation, draw_animation
 
-    def write(history: Any, out: Path, source: str, _: str) -> list[str]:
+    def write(history: xr.Dataset, out: Path, source: str, _: str) -> list[str]:
         return [f"animation: {draw_animation(history, out, source)}"]
 
     check_animation(arguments.out or Path("belt.gif"))
@@ -123,7 +132,7 @@ def _animation(arguments: argparse.Namespace) -> int:
 def _each(
     arguments: argparse.Namespace,
     beside: Callable[[Path], Path],
-    write: Callable[[Any, Path, str, str], list[str]],
+    write: Callable[[xr.Dataset, Path, str, str], list[str]],
 ) -> int:
     """Write a picture of each history that is given, one by one; of several the others of one that has none.
 

@@ -6,7 +6,7 @@ import argparse
 import json
 from dataclasses import asdict
 from pathlib import Path
-from typing import TYPE_CHECKING, Any
+from typing import TYPE_CHECKING
 
 from cvt_hpc.cli import parts
 from cvt_hpc.errors import InputError
@@ -19,7 +19,7 @@ if TYPE_CHECKING:
 CONTRADICTING = 1
 
 
-def add(commands: Any) -> None:
+def add(commands: parts.Commands) -> None:
     """Declare the commands."""
     status = parts.add_command(commands, "status", _status, "how far a study is", "DIR")
     status.add_argument("--json", action="store_true", help="for programs: one line of JSON, times in s")

@@ -2,13 +2,12 @@
 
 import argparse
 from pathlib import Path
-from typing import Any
 
 from cvt_hpc.cli import parts
 from cvt_hpc.errors import mismatch
 
 
-def add(commands: Any) -> None:
+def add(commands: parts.Commands) -> None:
     """Declare the command."""
     simulate = parts.add_command(commands, "simulate", _simulate, "one run with its full history", "JOB")
     simulate.add_argument("--out", type=Path, metavar="FILE.nc", help="dataset of the history")

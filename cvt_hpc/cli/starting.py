@@ -2,14 +2,13 @@
 
 import argparse
 from pathlib import Path
-from typing import Any
 
 from cvt_hpc.cli import parts
 
 SHELLS = ("bash", "zsh", "tcsh")
 
 
-def add(commands: Any) -> None:
+def add(commands: parts.Commands) -> None:
     """Declare the commands."""
     text = "write NAME.toml, a job in which each key of a model stands with its default and meaning"
     init = parts.add_command(commands, "init", _init, text)

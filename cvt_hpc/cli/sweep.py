@@ -21,7 +21,7 @@ if TYPE_CHECKING:
 RETRIED = ("timed_out", "failed_error", "failed_numerics")
 
 
-def add(commands: Any) -> None:
+def add(commands: parts.Commands) -> None:
     """Declare the command."""
     run = parts.add_command(
         commands, "run", _run, "do all runs of a job, or those that an earlier start has left", "JOB"

@@ -12,7 +12,7 @@ import numpy as np
 from cvt_hpc.errors import check_keys, mismatch, show, unknown
 from cvt_hpc.job.axes import is_axis
 from cvt_hpc.job.schema import Entry, Schema
-from cvt_hpc.job.values import kind_of, read_value, warn_of_bare_numbers
+from cvt_hpc.job.values import Point, kind_of, read_value, warn_of_bare_numbers
 from cvt_hpc.parameters import Parameter
 
 _PLAIN = {bool, int, float, str}
@@ -47,7 +47,7 @@ def split_assignments(assignments: Assignments, source: str, label: str) -> dict
     return pairs
 
 
-def read_assignments(assignments: Assignments, schema: Schema, source: str, label: str) -> dict[str, Any]:
+def read_assignments(assignments: Assignments, schema: Schema, source: str, label: str) -> Point:
     """Return the values [SI] by key.
 
     Parameters
@@ -75,7 +75,7 @@ def warn_of_bare_assignments(assignments: Assignments, schema: Schema, source: s
 
 def read_axes_and_values(
     assignments: Assignments, schema: Schema, source: str, label: str
-) -> tuple[dict[str, Entry], dict[str, Any]]:
+) -> tuple[dict[str, Entry], Point]:
     """Return the assignments that are axes, and the values [SI] of the others; as of `read_assignments`.
 
     An axis is a list or a range, as a table [axes] has it, of a parameter with a single value.
@@ -102,7 +102,7 @@ def _entries(
 
 def read_coordinates(
     assignments: Sequence[str], units: Mapping[str, str | None], source: str, label: str
-) -> dict[str, Any]:
+) -> Point:
     """Return the values of coordinates of a dataset by name: numbers in its units, texts where it has none.
 
     Parameters
@@ -135,7 +135,7 @@ def take_own(assignments: dict[str, Any], table: str) -> dict[str, Any]:
     return {key.removeprefix(f"{table}."): structured(assignments.pop(key)) for key in own}
 
 
-def structured(raw: Any) -> Any:
+def structured(raw: object) -> Any:
     """Return the list or the table that a text of the command line holds, or the value as it is."""
     if not isinstance(raw, str) or not raw.startswith(("[", "{")):
         return raw

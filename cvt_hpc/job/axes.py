@@ -9,7 +9,7 @@ from typing import Any
 import numpy as np
 
 from cvt_hpc.errors import InputError, mismatch, show
-from cvt_hpc.job.values import as_list, kind_of, read_value, refuse_unknown, separated
+from cvt_hpc.job.values import Table, as_list, kind_of, read_value, refuse_unknown, separated
 from cvt_hpc.parameters import Parameter
 
 LARGEST_AXIS = 100_000
@@ -85,7 +85,7 @@ def _spread(axis: Axis, most: float) -> Axis:
     return replace(axis, values=tuple(axis.values[k * (size - 1) // (count - 1)] for k in range(count)))
 
 
-def read_axis(name: str, parameter: Parameter, raw: Any, where: str) -> Axis:
+def read_axis(name: str, parameter: Parameter, raw: object, where: str) -> Axis:
     """Check an axis as it stands in a job file, and return it with its values.
 
     Parameters
@@ -94,7 +94,7 @@ def read_axis(name: str, parameter: Parameter, raw: Any, where: str) -> Axis:
         Name of the parameter.
     parameter : Parameter
         Declaration of the axis.
-    raw : Any
+    raw : object
         A list of values, a 1-D array of numbers, or a table with from, to and either count (and spacing) or
         step.
     where : str
@@ -123,19 +123,19 @@ def without_rounding(value: Any) -> Any:
     return short if abs(short - value) <= _ROUNDING * math.ulp(value) else value
 
 
-def is_axis(raw: Any) -> bool:
+def is_axis(raw: object) -> bool:
     """Whether a value has the form of an axis: a list, an array or a range."""
     return isinstance(raw, (list, tuple, dict, np.ndarray))
 
 
-def read_values(parameter: Parameter, raw: Any, where: str) -> tuple:
+def read_values(parameter: Parameter, raw: object, where: str) -> tuple:
     """Return the values [parameter.unit] of a list or a range; arguments and errors as of `read_axis`."""
     if kind_of(parameter) is tuple:
         raise mismatch(where, "a parameter with a single value", "one that takes a list")
     if parameter.file is not None:
         raise mismatch(where, "one file for all runs", "an axis of files")
     if isinstance(raw, dict):
-        values: Sequence[Any] = _read_range(parameter, raw, where)
+        values: Sequence[object] = _read_range(parameter, raw, where)
     elif isinstance(raw, np.ndarray):
         values = as_list(raw, where, (1,))
     elif isinstance(raw, (list, tuple)):
@@ -151,14 +151,14 @@ def read_values(parameter: Parameter, raw: Any, where: str) -> tuple:
 
 def _check_distinct(read: tuple, raw: Any, where: str) -> None:
     values = read if isinstance(raw, dict) else raw
-    first: dict[Any, int] = {}
+    first: dict[object, int] = {}
     for i, value in enumerate(read):
         if (before := first.setdefault(value, i)) < i:
             found = f"{show(values[i])} as value {before + 1} and value {i + 1}"
             raise mismatch(where, "distinct values", found)
 
 
-def _read_range(parameter: Parameter, raw: dict[str, Any], where: str) -> tuple[float, ...]:
+def _read_range(parameter: Parameter, raw: Table, where: str) -> tuple[float, ...]:
     refuse_unknown(raw, _RANGE_KEYS, f"{where}.")
     if kind_of(parameter) not in (int, float):
         raise mismatch(where, "a list of values, because the parameter is not a number", "a range")
@@ -170,7 +170,7 @@ def _read_range(parameter: Parameter, raw: dict[str, Any], where: str) -> tuple[
     return _counted(start, stop, raw, where)
 
 
-def read_bounds(parameter: Parameter, raw: dict[str, Any], where: str) -> tuple[float, float]:
+def read_bounds(parameter: Parameter, raw: Table, where: str) -> tuple[float, float]:
     """Return `from` and `to` [parameter.unit] of a range; an infinite one is refused."""
     for key, which in (("from", "first"), ("to", "last")):
         if key not in raw:
@@ -180,7 +180,7 @@ def read_bounds(parameter: Parameter, raw: dict[str, Any], where: str) -> tuple[
     return start, stop
 
 
-def read_spacing(raw: dict[str, Any], start: float, stop: float, where: str) -> str:
+def read_spacing(raw: Table, start: float, stop: float, where: str) -> str:
     """Return the spacing of a range from `start` to `stop`: "linear", or "log" if that can be."""
     spacing = read_value(_SPACING, raw.get("spacing", "linear"), f"{where}.spacing")
     if start == stop:
@@ -190,7 +190,7 @@ def read_spacing(raw: dict[str, Any], start: float, stop: float, where: str) -> 
     return spacing
 
 
-def _read_step(parameter: Parameter, raw: dict[str, Any], where: str) -> float:
+def _read_step(parameter: Parameter, raw: Table, where: str) -> float:
     if "spacing" in raw:
         raise InputError(f"{where}.spacing: expected to stand with count, found with step")
     # A step has the parameter's unit, but not its bounds.
@@ -201,7 +201,7 @@ def _read_step(parameter: Parameter, raw: dict[str, Any], where: str) -> float:
     return step
 
 
-def _counted(start: float, stop: float, raw: dict[str, Any], where: str) -> tuple[float, ...]:
+def _counted(start: float, stop: float, raw: Table, where: str) -> tuple[float, ...]:
     """Return `count` values; in decimal, so that a third step of 0.1 is 0.3 and can be selected as 0.3."""
     count = read_value(_COUNT, raw["count"], f"{where}.count")
     spacing = read_spacing(raw, start, stop, where)

@@ -1,22 +1,23 @@
 """Conditions that must hold between parameters, checked for every run before any computing."""
 
 import math
-from collections.abc import Iterable, Mapping, Sequence
+from collections.abc import Iterable, Sequence
 from dataclasses import replace
-from typing import Any
 
 from cvt_hpc.errors import InputError, mismatch
 from cvt_hpc.job.axes import NONE, SAMPLE, SWAPPED, Axis, thinned
 from cvt_hpc.job.rules import Rule, follow, needed_rules, places, varied_by
 from cvt_hpc.job.schema import Schema
 from cvt_hpc.job.uncertain import Scatter
+from cvt_hpc.job.values import Point
+from cvt_hpc.parameters import Parameters
 
 MOST_CHECKED_POINTS, MOST_CHECKED_VALUES = 20_000, 5_000  # of runs, and of parameters that follow from others
 
 
 def check_grid(
     schema: Schema,
-    parameters: dict[str, Any],
+    parameters: Point,
     axes: tuple[Axis, ...],
     source: str,
     *,
@@ -70,9 +71,7 @@ def check_grid(
     return idle
 
 
-def check_point(
-    schema: Schema, parameters: dict[str, Any], source: str, varied: Mapping[str, Any] | None = None
-) -> None:
+def check_point(schema: Schema, parameters: Point, source: str, varied: Parameters | None = None) -> None:
     """Check the parameters of one run.
 
     Parameters
@@ -97,8 +96,8 @@ def check_point(
 
 
 def complete_point(
-    schema: Schema, rules: Iterable[Rule], parameters: Mapping[str, Any], varied: Mapping[str, Any]
-) -> dict[str, Any]:
+    schema: Schema, rules: Iterable[Rule], parameters: Parameters, varied: Parameters
+) -> Point:
     """Return the parameters [SI] of a run with those derived from them.
 
     Raises
@@ -112,14 +111,14 @@ def complete_point(
         raise InputError(f"{error}{_place(schema, varied)}") from None
 
 
-def _place(schema: Schema, varied: Mapping[str, Any]) -> str:
+def _place(schema: Schema, varied: Parameters) -> str:
     words = (f"{key} = {schema.in_words(key, value)}" for key, value in varied.items())
     return f" (at {', '.join(words)})" if varied else ""
 
 
 def check_rules(
     schema: Schema,
-    parameters: Mapping[str, Any],
+    parameters: Parameters,
     axes: tuple[Axis, ...],
     rules: Sequence[Rule],
     *,
@@ -145,7 +144,7 @@ def check_rules(
 
 def without_effect(
     schema: Schema,
-    parameters: Mapping[str, Any],
+    parameters: Parameters,
     axes: tuple[Axis, ...],
     rules: Sequence[Rule],
     *,
@@ -162,7 +161,7 @@ def without_effect(
     return found or {}
 
 
-def _inert(schema: Schema, rules: Sequence[Rule], point: dict[str, Any]) -> dict[str, str]:
+def _inert(schema: Schema, rules: Sequence[Rule], point: Point) -> dict[str, str]:
     """Return the parameters without effect: sources of derived ones have an effect as far as these have."""
     inert = dict(schema.inert(point))
     for rule in reversed(rules):
@@ -175,7 +174,7 @@ def _inert(schema: Schema, rules: Sequence[Rule], point: dict[str, Any]) -> dict
     return inert
 
 
-def _points_to_check(axes: tuple[Axis, ...], rules: Sequence[Rule]) -> Iterable[dict[str, Any]]:
+def _points_to_check(axes: tuple[Axis, ...], rules: Sequence[Rule]) -> Iterable[Point]:
     if math.prod(len(axis.values) for axis in axes) > MOST_CHECKED_POINTS:
         axes = tuple(replace(axis, values=_extremes(axis, rules)) for axis in axes)
     return places(axes, {axis.name for axis in axes})
@@ -197,7 +196,7 @@ def _extreme_samples(axis: Axis, rules: Sequence[Rule]) -> tuple:
     return tuple(sorted(found))
 
 
-def _samples_to_check(axes: tuple[Axis, ...]) -> Iterable[dict[str, Any]]:
+def _samples_to_check(axes: tuple[Axis, ...]) -> Iterable[Point]:
     is_huge = len(axes[0].values) > MOST_CHECKED_POINTS
     some = thinned(axes, MOST_CHECKED_VALUES, sampled=True) if is_huge else axes
     yield from places(some, {axis.name for axis in axes}, sampled=True)

@@ -11,10 +11,11 @@ import re
 import warnings
 from collections.abc import Sequence
 from pathlib import Path
-from typing import Any, NamedTuple
+from typing import NamedTuple
 
 from cvt_hpc.errors import InputError, JobWarning, did_you_mean, few_of, mismatch, show
 from cvt_hpc.job.units import factor_to, to_si
+from cvt_hpc.job.values import Point
 from cvt_hpc.parameters import Column, FromFile, RowError
 from cvt_hpc.storage.files import read_regular
 
@@ -40,7 +41,7 @@ class _Column(NamedTuple):
     si: str
 
 
-def read_csv(file: FromFile, name: str, source: str, where: str) -> dict[str, Any]:
+def read_csv(file: FromFile, name: str, source: str, where: str) -> Point:
     """Return the raw values of the parameters that a file gives, by key.
 
     One line has the names of the columns, each with its unit in brackets, such as "speed [mm/s]", or with the

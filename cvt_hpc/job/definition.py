@@ -21,7 +21,9 @@ from cvt_hpc.job.rules import Link, Rule, follow, needed_rules, ordered_rules, o
 from cvt_hpc.job.schema import Schema, load_schema
 from cvt_hpc.job.uncertain import TABLE, Scatter, with_samples
 from cvt_hpc.job.units import unit_in
+from cvt_hpc.job.values import Document, Point, Table
 from cvt_hpc.models.contract import load_model
+from cvt_hpc.parameters import Parameters
 
 HEADER = ("name", "model", "stepper", "description")
 
@@ -81,7 +83,7 @@ class Job(Runs):
     stepper: str | None
     description: str
     source: str
-    parameters: dict[str, Any]
+    parameters: Point
     axes: tuple[Axis, ...]
     given: frozenset[str] = field(default=frozenset(), compare=False)
     design: Design = field(default_factory=dict)
@@ -123,11 +125,11 @@ class Job(Runs):
         design = self.design | ({"runs": len(axes[0].values)} if self.is_sampled else {})
         return replace(self, axes=axes, design=design, histories=())
 
-    def complete(self, values: Mapping[str, Any]) -> dict[str, Any]:
+    def complete(self, values: Parameters) -> Point:
         """Return the base scene with values [SI] of axes, and with the values derived from them."""
         return follow(self.rules, {**self.parameters, **values})
 
-    def point(self, index: int) -> dict[str, Any]:
+    def point(self, index: int) -> Point:
         """Return the parameters of run `index`, counted in C order over the grid, or over the samples.
 
         Raises
@@ -152,7 +154,7 @@ class Job(Runs):
         found = {key: unit for key, (_, raw, _) in entries if (unit := unit_in(raw))}
         return replace(self, units=found | {**self.units})
 
-    def point_at(self, at: Assignments, label: str = "at") -> dict[str, Any]:
+    def point_at(self, at: Assignments, label: str = "at") -> Point:
         """Return the parameters of a run at chosen values, whether they lie on the axes or not.
 
         Parameters
@@ -180,7 +182,7 @@ class Job(Runs):
         check_point(schema, point, self.source, varied=values)
         return point
 
-    def _derive_anew(self, values: Mapping[str, Any], schema: Schema) -> dict[str, Any]:
+    def _derive_anew(self, values: Parameters, schema: Schema) -> Point:
         """Return the base scene with other values, and with the values that are then derived.
 
         The values may be those of a whole run, with a parameter and its source, if these agree.
@@ -195,7 +197,7 @@ class Job(Runs):
                 raise mismatch(where, f"either {by} or {key}", "both, which do not agree")
         return point
 
-    def _with_rules(self, values: Mapping[str, Any], schema: Schema) -> dict[str, Any]:
+    def _with_rules(self, values: Parameters, schema: Schema) -> Point:
         gone = {*values, *overridden(values, schema)}
         stated = [rule for rule in self.rules if not rule.is_substituted and rule.key not in gone]
         follows = {rule.key for rule in self.rules}
@@ -204,7 +206,7 @@ class Job(Runs):
         rules = ordered_rules(stated, given, schema, self.source)
         return complete_point(schema, rules, scene, values)
 
-    def resolved(self) -> dict[str, Any]:
+    def resolved(self) -> Document:
         """Return all entries that determine the numbers, as a document that `build_job` takes.
 
         Returns
@@ -221,17 +223,17 @@ class Job(Runs):
             "axes": {axis.name: [_to_json(value) for value in axis.values] for axis in self.axes},
         }
 
-    def tables(self, point: Mapping[str, Any], left_out: Collection[str] = ()) -> dict[str, dict[str, Any]]:
+    def tables(self, point: Parameters, left_out: Collection[str] = ()) -> dict[str, Document]:
         """Return flat parameters [SI] as the tables of a job file, in JSON types."""
         return {
             section: {key: _to_json(point[key]) for key in table if key in point and key not in left_out}
             for section, table in self.schema.sections.items()
         }
 
-    def _stated_rules(self) -> dict[str, Any]:
+    def _stated_rules(self) -> Document:
         """Return the tables [derived], [linked] and [uncertain], where there are any, in JSON types."""
         derived = {rule.key: rule.words for rule in self.rules if isinstance(rule.source, Formula)}
-        linked: dict[str, dict[str, Any]] = {}
+        linked: dict[str, Document] = {}
         for rule in self.rules:
             if isinstance(link := rule.source, Link):
                 linked.setdefault(link.axis, {})[rule.key] = [_to_json(value) for value in link.values]
@@ -245,7 +247,7 @@ class Job(Runs):
         return fingerprint_of(self.resolved())
 
 
-def fingerprint_of(resolved: Mapping[str, Any]) -> str:
+def fingerprint_of(resolved: Table) -> str:
     """Return the fingerprint of a job by the result of `Job.resolved`."""
     document = {key: value for key, value in resolved.items() if key not in ("name", "description")}
     # the order of the axes counts, that of tables does not
@@ -253,7 +255,7 @@ def fingerprint_of(resolved: Mapping[str, Any]) -> str:
     return digest(document)
 
 
-def digest(document: Any) -> str:
+def digest(document: object) -> str:
     """Return the SHA-256 [hex] of a document of JSON types, whatever the order of its keys."""
     return hashlib.sha256(json.dumps(document, sort_keys=True).encode()).hexdigest()
 
@@ -278,7 +280,7 @@ def answering_model(job: Job) -> tuple[str, str] | None:
     return answered_by.get(job.parameters.get("question", ""))
 
 
-def handed_to(job: Job, model: str, why: str) -> dict[str, Any]:
+def handed_to(job: Job, model: str, why: str) -> Document:
     """Return a document of the same runs for another model, with the keys that it knows.
 
     Parameters
@@ -302,7 +304,7 @@ def handed_to(job: Job, model: str, why: str) -> dict[str, Any]:
         if name not in known:
             where = f"{job.source}: [{table}] {name}"
             raise mismatch(where, f"a key of {model}, since {why}", "one without effect there")
-    tables: dict[str, dict[str, Any]] = {}
+    tables: dict[str, Document] = {}
     for section in filter(TABLE.__ne__, job.schema.sections):
         for key, value in document[section].items():
             if key in job.given and key in known:

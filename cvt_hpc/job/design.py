@@ -25,8 +25,8 @@ from cvt_hpc.job.axes import (
     without_rounding,
 )
 from cvt_hpc.job.schema import Entry, Schema
-from cvt_hpc.job.values import kind_of, read_or_default, read_value, refuse_unknown
-from cvt_hpc.parameters import Parameter
+from cvt_hpc.job.values import Table, kind_of, read_or_default, read_value, refuse_unknown
+from cvt_hpc.parameters import Parameter, Parameters
 
 KEY = ("record", "history")
 _FORMS = "a list of runs, each a table {axis = value, ...} with all axes, or a run index"
@@ -55,7 +55,7 @@ _KIND = Parameter("grid", "", "which points are run", choices=tuple(_KEYS))
 Design = dict[str, Any]  # empty: the full grid
 
 
-def is_in_rounds(design: Mapping[str, Any]) -> bool:
+def is_in_rounds(design: Table) -> bool:
     """Return whether the runs depend on results of earlier ones: of a trace, and of adaptive samples."""
     return "first_spacing" in design or "first_samples" in design
 
@@ -95,7 +95,7 @@ class Runs:
 _SAMPLED = ("from", "to", "spacing")
 
 
-def read_design(table: Mapping[str, Any], source: str) -> Design:
+def read_design(table: Table, source: str) -> Design:
     """Check a job file's table [design].
 
     Returns
@@ -219,16 +219,15 @@ def sampled_axes(found: Mapping[str, Entry], design: Design, source: str) -> tup
     )
 
 
-def _read_listed(name: str, runs: int, parameter: Parameter, raw: Any, where: str) -> Axis:
+def _read_listed(name: str, runs: int, parameter: Parameter, raw: object, where: str) -> Axis:
     """Return an axis with the value of each sample, as it stands in the job; values may come again."""
-    is_list = isinstance(raw, (list, tuple, np.ndarray))
-    if not is_list or len(raw) != runs:
-        found = f"{len(raw)} values" if is_list else show(raw)
+    found = f"{len(raw)} values" if isinstance(raw, (list, tuple, np.ndarray)) else show(raw)
+    if found != f"{runs} values":
         raise mismatch(where, f"a list of {runs} values, one for each of the runs of [design]", found)
     return Axis(name, read_values(parameter, raw, where), parameter.unit, parameter.description)
 
 
-def read_range(parameter: Parameter, raw: Any, where: str) -> tuple[float, float, str]:
+def read_range(parameter: Parameter, raw: object, where: str) -> tuple[float, float, str]:
     """Return the ends of a range and the spacing of the values drawn from it."""
     if not isinstance(raw, dict):
         raise mismatch(where, "a range {from=, to=}, to draw samples from", show(raw))
@@ -251,10 +250,10 @@ def between(start: float, stop: float, spacing: str, share: np.ndarray) -> np.nd
 
 
 def read_histories(
-    raw: Any,
+    raw: object,
     schema: Schema,
     axes: tuple[Axis, ...],
-    replaced: Mapping[str, Any],
+    replaced: Parameters,
     source: str,
     samples: int | None = None,
 ) -> tuple[int, ...]:
@@ -286,7 +285,7 @@ def read_histories(
 
 
 def _index(
-    entry: Any, schema: Schema, axes: tuple[Axis, ...], replaced: Mapping[str, Any], where: str
+    entry: object, schema: Schema, axes: tuple[Axis, ...], replaced: Parameters, where: str
 ) -> int | None:
     size = math.prod(len(axis.values) for axis in axes)
     if isinstance(entry, int) and not isinstance(entry, bool):
@@ -310,7 +309,7 @@ def _index(
     return index if all(without_rounding(replaced[key]) == value for key, value in values.items()) else None
 
 
-def _numbered(entry: Any, size: int, where: str) -> int:
+def _numbered(entry: object, size: int, where: str) -> int:
     if isinstance(entry, bool) or not isinstance(entry, int) or not 0 <= entry < size:
         raise mismatch(where, f"an index from 0 to {size - 1}", show(entry))
     return entry

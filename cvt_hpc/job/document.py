@@ -11,7 +11,15 @@ from typing import Any
 
 from cvt_hpc.errors import InputError, check_keys, did_you_mean, mismatch, show
 from cvt_hpc.job.definition import HEADER
-from cvt_hpc.job.values import expectation, read_value, refuse_unknown, warn_of_bare_numbers
+from cvt_hpc.job.values import (
+    Document,
+    Point,
+    Table,
+    expectation,
+    read_value,
+    refuse_unknown,
+    warn_of_bare_numbers,
+)
 from cvt_hpc.parameters import Parameter
 from cvt_hpc.storage.files import read_regular
 
@@ -19,7 +27,7 @@ MOST_BYTES = 2**26
 _POSITION = re.compile(r"(?P<what>.*?) \(at (?:line (?P<line>\d+), column (?P<column>\d+)|end of document)\)")
 
 
-def read_document(path: Path) -> dict[str, Any]:
+def read_document(path: Path) -> Document:
     """Return the contents of a TOML file.
 
     Raises
@@ -45,7 +53,7 @@ def read_document(path: Path) -> dict[str, Any]:
     return document
 
 
-def _parse(text: str, source: str) -> dict[str, Any]:
+def _parse(text: str, source: str) -> Document:
     try:
         return tomllib.loads(text)
     except RecursionError:
@@ -61,15 +69,15 @@ def _parse(text: str, source: str) -> dict[str, Any]:
 
 
 def read_table(
-    declared: Mapping[str, Parameter], raw: Any, where: str, tables: tuple[str, ...] = ()
-) -> dict[str, Any]:
+    declared: Mapping[str, Parameter], raw: object, where: str, tables: tuple[str, ...] = ()
+) -> Point:
     """Return the values of a table by key, defaults included.
 
     Parameters
     ----------
     declared : mapping
         Declared keys of the table.
-    raw : Any
+    raw : object
         Content of the file.
     where : str
         File and table, for the errors.
@@ -96,7 +104,7 @@ def read_table(
     return values
 
 
-def read_tables(raw: Any, where: str, what: str) -> Mapping[str, Any]:
+def read_tables(raw: object, where: str, what: str) -> Table:
     """Return a table of tables.
 
     Raises
@@ -110,7 +118,7 @@ def read_tables(raw: Any, where: str, what: str) -> Mapping[str, Any]:
     return raw
 
 
-def read_set(raw: Mapping[str, Any], where: str) -> dict[str, Any]:
+def read_set(raw: Mapping[str, Any], where: str) -> Point:
     """Return the values that the table `set` of a table gives to parameters.
 
     Raises

@@ -10,11 +10,10 @@ import operator
 import re
 from collections.abc import Callable, Iterator, Mapping
 from dataclasses import dataclass, field
-from typing import Any
 
 from cvt_hpc.errors import InputError, mismatch, show, unknown
 from cvt_hpc.job.values import kind_of
-from cvt_hpc.parameters import Parameter
+from cvt_hpc.parameters import Parameter, Parameters
 
 LONGEST, DEEPEST = 400, 40  # characters, and operations within each other
 CONSTANTS = {"pi": math.pi}
@@ -43,7 +42,7 @@ class Formula:
     names: tuple[str, ...] = field(compare=False)  # the parameters in it
     tree: ast.expr = field(compare=False, repr=False)  # as Python's parser reads it
 
-    def value(self, parameters: Mapping[str, Any]) -> float:
+    def value(self, parameters: Parameters) -> float:
         """Return the value [SI] for flat parameters [SI].
 
         Raises
@@ -57,12 +56,12 @@ class Formula:
             raise ValueError(str(error)) from error
 
 
-def read_formula(raw: Any, parameters: Mapping[str, Parameter], where: str) -> Formula:
+def read_formula(raw: object, parameters: Mapping[str, Parameter], where: str) -> Formula:
     """Return the formula that stands in a job file.
 
     Parameters
     ----------
-    raw : Any
+    raw : object
         As TOML gives it.
     parameters : mapping
         Parameters that names may stand for; parameters that are no numbers are refused.
@@ -153,7 +152,7 @@ def _is_number(parameter: Parameter) -> bool:
     return kind_of(parameter) in (int, float)
 
 
-def _evaluate(node: ast.AST, parameters: Mapping[str, Any]) -> float:
+def _evaluate(node: ast.AST, parameters: Parameters) -> float:
     match node:
         case ast.Constant(value=int() | float() as value):
             return float(value)

@@ -4,7 +4,6 @@ import re
 from collections.abc import Collection, Mapping, Sequence
 from dataclasses import replace
 from pathlib import Path
-from typing import Any
 
 from cvt_hpc.errors import InputError, did_you_mean, mismatch, show
 from cvt_hpc.experiment_kinds import with_table
@@ -41,8 +40,9 @@ from cvt_hpc.job.summary import tell_of_no_effect
 from cvt_hpc.job.uncertain import TABLE, with_samples
 from cvt_hpc.job.uncertain_table import check_samples, read_uncertain
 from cvt_hpc.job.units import unit_in
-from cvt_hpc.job.values import expectation, kind_of, read_value, warn_of_bare_numbers
+from cvt_hpc.job.values import Document, Point, Table, expectation, kind_of, read_value, warn_of_bare_numbers
 from cvt_hpc.models.contract import load_model
+from cvt_hpc.parameters import Parameters
 
 _NAME = re.compile(r"[A-Za-z0-9][A-Za-z0-9._-]{0,99}")
 
@@ -67,7 +67,7 @@ def load_job(path: str | Path, overrides: Assignments = ()) -> Job:
 
 
 def build_job(
-    document: Mapping[str, Any],
+    document: Table,
     source: str = "build_job",
     overrides: Assignments = (),
     label: str | None = None,
@@ -87,7 +87,7 @@ def build_job(
     return rebuild_job(document, source, None, overrides, label)
 
 
-def stored_job(document: Mapping[str, Any], source: str) -> Job:
+def stored_job(document: Table, source: str) -> Job:
     """Return the job that a dataset holds, without keys of other versions; errors as of `build_job`."""
     schema = load_schema(document.get("model"), document.get("stepper"), source)
     known = {
@@ -99,7 +99,7 @@ def stored_job(document: Mapping[str, Any], source: str) -> Job:
 
 
 def rebuild_job(
-    document: Mapping[str, Any],
+    document: Table,
     source: str,
     units: Mapping[str, str] | None,
     overrides: Assignments = (),
@@ -181,9 +181,7 @@ def rebuild_job(
     return job if answering is None else rebuild_job(handed_to(job, *answering), source, job.units)
 
 
-def _written(
-    document: Mapping[str, Any], pairs: Mapping[str, Any], schema: Schema, source: str, label: str
-) -> dict[str, Entry]:
+def _written(document: Table, pairs: Table, schema: Schema, source: str, label: str) -> dict[str, Entry]:
     """Return the entry of each number in the tables, the axes or the overrides, unchecked.
 
     If there are several, the one that takes precedence.
@@ -199,7 +197,7 @@ def _written(
     return found
 
 
-def _with_files(given: Mapping[str, Any], schema: Schema, source: str) -> dict[str, Any]:
+def _with_files(given: Parameters, schema: Schema, source: str) -> Point:
     """Return given values, with the content of files instead of their names."""
     found = dict(given)
     for key in given:
@@ -216,12 +214,12 @@ def _with_files(given: Mapping[str, Any], schema: Schema, source: str) -> dict[s
 
 
 def _with_samples(
-    document: Mapping[str, Any],
+    document: Table,
     further: Mapping[str, list],
     given: Collection[str],
     design: Design,
     source: str,
-) -> dict[str, Any]:
+) -> Document:
     """Return a document with the axes of the samples, the last ones, unless they are given otherwise."""
     where, axes = f"{source}: [{TABLE}]", document.get("axes", {})
     if "runs" in design:
@@ -235,7 +233,7 @@ def _with_samples(
 
 
 def _read_axes_and_rules(
-    document: Mapping[str, Any],
+    document: Table,
     scatters: Sequence[Rule],
     design: Design,
     gone: Collection[str],
@@ -264,7 +262,7 @@ def _read_axes_and_rules(
     return axes, ordered_rules(stated, {*given, *(axis.name for axis in axes)}, schema, source)
 
 
-def read_name(head: Mapping[str, Any], source: str) -> str:
+def read_name(head: Table, source: str) -> str:
     """Return the name of a job, which is also that of its output folder; InputError where it is no word."""
     name = head.get("name")
     if not isinstance(name, str) or not _NAME.fullmatch(name):
@@ -273,7 +271,7 @@ def read_name(head: Mapping[str, Any], source: str) -> str:
     return name
 
 
-def _check_top_level(document: Mapping[str, Any], schema: Schema, source: str) -> None:
+def _check_top_level(document: Table, schema: Schema, source: str) -> None:
     tables = [*_sections(document, schema), "axes", "design", "derived", "linked", TABLE]
     for key, value in document.items():
         if key in HEADER:
@@ -293,7 +291,7 @@ def _check_top_level(document: Mapping[str, Any], schema: Schema, source: str) -
             raise InputError(f"{source}: {key}: unknown key{hint}")
 
 
-def _sections(document: Mapping[str, Any], schema: Schema) -> list[str]:
+def _sections(document: Table, schema: Schema) -> list[str]:
     """Return the tables of parameters; without a transient that of kept histories may join them."""
     sections = list(schema.sections)
     if KEY[0] in document and KEY[0] not in sections and load_model(schema.model).has_histories:
@@ -301,7 +299,7 @@ def _sections(document: Mapping[str, Any], schema: Schema) -> list[str]:
     return sections
 
 
-def _read_tables(document: Mapping[str, Any], schema: Schema, source: str) -> dict[str, Any]:
+def _read_tables(document: Table, schema: Schema, source: str) -> Document:
     values = {}
     for section in _sections(document, schema):
         table = document.get(section, {})
@@ -311,7 +309,7 @@ def _read_tables(document: Mapping[str, Any], schema: Schema, source: str) -> di
     return values
 
 
-def _find_axes(table: Mapping[str, Any], schema: Schema, source: str) -> dict[str, Entry]:
+def _find_axes(table: Table, schema: Schema, source: str) -> dict[str, Entry]:
     """Return the entry of each key in the file's table [axes]."""
     found: dict[str, Entry] = {}
     for key, entry in schema.entries(schema.flatten(table), f"{source}: [axes]"):
@@ -325,7 +323,7 @@ def _read_grid(entries: Mapping[str, Entry]) -> tuple[Axis, ...]:
     return tuple(read_axis(key, *entry) for key, entry in entries.items())
 
 
-def _resolve(values: Mapping[str, Any], rules: Sequence[Rule], schema: Schema, source: str) -> dict[str, Any]:
+def _resolve(values: Parameters, rules: Sequence[Rule], schema: Schema, source: str) -> Document:
     """Return the value of every key that has one and does not follow from others."""
     follows = {rule.key for rule in rules}
     giving = {rule.needs[0] for rule in rules if rule.is_substituted}

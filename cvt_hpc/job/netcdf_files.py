@@ -9,13 +9,14 @@ import io
 import math
 import warnings
 from pathlib import Path
-from typing import TYPE_CHECKING, Any
+from typing import TYPE_CHECKING
 
 import numpy as np
 
 from cvt_hpc.errors import InputError, did_you_mean, mismatch, show
 from cvt_hpc.job.csv_files import content_of, told
 from cvt_hpc.job.units import factor_to
+from cvt_hpc.job.values import Point
 from cvt_hpc.parameters import Column, FromFile, RowError
 
 if TYPE_CHECKING:
@@ -27,7 +28,7 @@ SUFFIX = ".nc"
 _HDF5 = b"\x89HDF\r\n\x1a\n"
 
 
-def read_netcdf(file: FromFile, name: str, source: str, where: str) -> dict[str, Any]:
+def read_netcdf(file: FromFile, name: str, source: str, where: str) -> Point:
     """Return the raw values of the parameters that a file gives, by key.
 
     Each column of `file` is a variable with an attribute `units`. A variable over several dimensions takes
@@ -136,7 +137,7 @@ def _values(file: FromFile, name: str, variable: netCDF4.Variable, place: str) -
     return unit, values
 
 
-def _unit(file: FromFile, name: str, given: Any, place: str) -> tuple[str, float]:
+def _unit(file: FromFile, name: str, given: object, place: str) -> tuple[str, float]:
     text = str(given)
     for si in file.columns[name]:
         bare = text.strip() in ("", "1")

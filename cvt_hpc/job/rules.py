@@ -17,8 +17,8 @@ from cvt_hpc.job.axes import Axis, read_values
 from cvt_hpc.job.formula import Formula, read_formula
 from cvt_hpc.job.schema import Schema
 from cvt_hpc.job.uncertain import Scatter
-from cvt_hpc.job.values import in_words, kind_of, read_value
-from cvt_hpc.parameters import Parameter, Substitute
+from cvt_hpc.job.values import Point, Table, in_words, kind_of, read_value
+from cvt_hpc.parameters import Parameter, Parameters, Substitute
 
 _MOST_NAMED = 8
 
@@ -43,7 +43,7 @@ class Link:
         """State how the values follow, for people."""
         return f"linked to {self.axis}"
 
-    def value(self, parameters: Mapping[str, Any]) -> Any:
+    def value(self, parameters: Parameters) -> Any:
         """Return the value that belongs to the axis' value; ValueError if that one is not on the axis."""
         place = parameters[self.axis]
         if place not in self.at:
@@ -67,7 +67,7 @@ class Substituted:
         """State how the value follows, for people."""
         return f"by {self.by}"
 
-    def value(self, parameters: Mapping[str, Any]) -> float:
+    def value(self, parameters: Parameters) -> float:
         """Return the value [SI]."""
         return self.substitute.value(parameters)
 
@@ -96,13 +96,13 @@ class Rule:
         """Whether it is the model's, and stands in no table of the job."""
         return isinstance(self.source, Substituted)
 
-    def read(self, parameters: Mapping[str, Any]) -> set[str]:
+    def read(self, parameters: Parameters) -> set[str]:
         """Return the parameters that its value follows from at flat parameters [SI], where it has one."""
         noted = Noted(parameters)
         self.source.value(noted)
         return noted.read
 
-    def value(self, parameters: Mapping[str, Any]) -> Any:
+    def value(self, parameters: Parameters) -> Any:
         """Return the value [SI] at flat parameters [SI].
 
         Raises
@@ -112,7 +112,7 @@ class Rule:
         """
         return read_value(self.parameter, self._raw(parameters), self.where)
 
-    def _raw(self, parameters: Mapping[str, Any]) -> Any:
+    def _raw(self, parameters: Parameters) -> Any:
         try:
             return self.source.value(parameters)
         except ValueError as error:
@@ -125,9 +125,7 @@ class Rule:
 class Noted(Mapping[str, Any]):
     """Flat parameters that note which of them were read, and evaluate those of `later` at that time."""
 
-    def __init__(
-        self, known: Mapping[str, Any], later: Mapping[str, Callable[[], Any]] | None = None
-    ) -> None:
+    def __init__(self, known: Parameters, later: Mapping[str, Callable[[], Any]] | None = None) -> None:
         self._known, self._later = dict(known), later or {}
         self.read: set[str] = set()
 
@@ -144,7 +142,7 @@ class Noted(Mapping[str, Any]):
         return len({**self._known, **self._later})
 
 
-def follow(rules: Iterable[Rule], parameters: Mapping[str, Any]) -> dict[str, Any]:
+def follow(rules: Iterable[Rule], parameters: Parameters) -> Point:
     """Return flat parameters [SI] with those derived from them.
 
     Raises
@@ -167,9 +165,7 @@ def varied_by(rules: Iterable[Rule], axes: Collection[str]) -> dict[str, tuple[s
     return found
 
 
-def places(
-    axes: Iterable[Axis], names: Collection[str], *, sampled: bool = False
-) -> Iterator[dict[str, Any]]:
+def places(axes: Iterable[Axis], names: Collection[str], *, sampled: bool = False) -> Iterator[Point]:
     """Yield the values on some axes, by name: their combinations in C order, or the values of each sample."""
     along = {axis.name: axis.values for axis in axes if axis.name in names}
     for values in zip(*along.values(), strict=True) if sampled else product(*along.values()):
@@ -187,7 +183,7 @@ def needed_rules(rules: Iterable[Rule], key: str) -> list[Rule]:
     return kept
 
 
-def read_derived(table: Mapping[str, Any], schema: Schema, source: str) -> list[Rule]:
+def read_derived(table: Table, schema: Schema, source: str) -> list[Rule]:
     """Return the rules of a job file's table [derived].
 
     Raises
@@ -205,7 +201,7 @@ def read_derived(table: Mapping[str, Any], schema: Schema, source: str) -> list[
     return rules
 
 
-def read_linked(tables: Mapping[str, Any], axes: Iterable[Axis], schema: Schema, source: str) -> list[Rule]:
+def read_linked(tables: Table, axes: Iterable[Axis], schema: Schema, source: str) -> list[Rule]:
     """Return the rules of a job file's tables [linked.AXIS], where `axes` are the grid as the file gives it.
 
     Raises

@@ -8,7 +8,7 @@ from typing import Any
 
 from cvt_hpc import recording
 from cvt_hpc.errors import InputError, did_you_mean, mismatch, nearest, show
-from cvt_hpc.job.values import in_words
+from cvt_hpc.job.values import Point, Table, in_words
 from cvt_hpc.models import MODELS
 from cvt_hpc.models.contract import Model, load_model
 from cvt_hpc.parameters import Parameter
@@ -19,8 +19,8 @@ SHARED = recording, vibration_settings  # with tables of every job with a transi
 
 Entry = tuple[Parameter, Any, str]  # declaration of a key, what stands there, and file and key
 Problem = tuple[str, str, str]
-Check = Callable[[dict[str, Any]], list[Problem]]
-Inert = Callable[[dict[str, Any]], dict[str, str]]
+Check = Callable[[Point], list[Problem]]
+Inert = Callable[[Point], dict[str, str]]
 
 RETIRED = {"contact_sweeps": "contact is solved exactly; delete the line"}  # keys of earlier versions
 
@@ -40,7 +40,7 @@ class Schema:
     # by key the unit in which the job gives a parameter, where it names one; values are shown in it
     units: Mapping[str, str] = field(default_factory=dict)
 
-    def in_words(self, key: str, value: Any) -> str:
+    def in_words(self, key: str, value: object) -> str:
         """Return a value [SI] of a parameter for people to read, in the unit of the job."""
         return in_words(value, self.parameters[key].unit, self.units.get(key, ""))
 
@@ -58,7 +58,7 @@ class Schema:
         """Parameter by key."""
         return {key: parameter for table in self.sections.values() for key, parameter in table.items()}
 
-    def problems(self, parameters: dict[str, Any]) -> Iterator[Problem]:
+    def problems(self, parameters: Point) -> Iterator[Problem]:
         """Yield the conflicts between the values [SI] of a run, as (key, expected, found).
 
         The checks run one after the other, so that a caller that stops at the first problem spares a
@@ -94,7 +94,7 @@ class Schema:
             raise InputError(f"{where}: belongs in [{home}], found in [{section}]")
         raise self._unknown_key(name, where, section)
 
-    def flatten(self, table: Mapping[str, Any]) -> Iterator[tuple[str, Any]]:
+    def flatten(self, table: Table) -> Iterator[tuple[str, Any]]:
         """Yield name and value; TOML reads a line `scene.load = ...` as a table "scene" with a key "load"."""
         for name, raw in table.items():
             if name in self.sections and isinstance(raw, Mapping):
@@ -176,11 +176,11 @@ def known_keys(model: str, stepper: str | None = None) -> tuple[str, ...]:
     return tuple(load_schema(model, stepper, "known_keys").parameters)
 
 
-def _all_inert(found: Sequence[Inert], parameters: dict[str, Any]) -> dict[str, str]:
+def _all_inert(found: Sequence[Inert], parameters: Point) -> dict[str, str]:
     return {key: setting for inert in found for key, setting in inert(parameters).items()}
 
 
-def _stepper(model: Model, stepper: Any, source: str) -> str:
+def _stepper(model: Model, stepper: object, source: str) -> str:
     """The module that declares a stepper which the model takes."""
     where = f"{source}: stepper"
     if isinstance(stepper, str) and stepper in model.steppers:
@@ -191,16 +191,16 @@ def _stepper(model: Model, stepper: Any, source: str) -> str:
     for name, _, other in sorted(places, key=lambda found: not found[1].startswith(f"{MODELS[found[2]]}.")):
         if name not in STEPPERS:
             owners.setdefault(name, other)
-    _known(stepper, STEPPERS | owners, "stepper", source, told=model.steppers)
+    name = _known(stepper, STEPPERS | owners, "stepper", source, told=model.steppers)
     if not model.steppers:
-        raise mismatch(where, f"none, since {model.name} has no transient", show(stepper))
-    reason = model.refused.get(stepper) or f"it is {owners[stepper]}'s own step"
+        raise mismatch(where, f"none, since {model.name} has no transient", show(name))
+    reason = model.refused.get(name) or f"it is {owners[name]}'s own step"
     expected = f"one that {model.name} takes ({', '.join(model.steppers)})"
-    raise mismatch(where, expected, f"{show(stepper)}: {reason}")
+    raise mismatch(where, expected, f"{show(name)}: {reason}")
 
 
 def _known(
-    name: Any, registry: Mapping[str, Any], what: str, source: str, told: Mapping[str, Any] | None = None
+    name: object, registry: Mapping[str, Any], what: str, source: str, told: Mapping[str, Any] | None = None
 ) -> str:
     """Return a name of the registry; the error names those `told`, by default all."""
     if not isinstance(name, str) or name not in registry:

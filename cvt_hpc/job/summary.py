@@ -13,6 +13,7 @@ from cvt_hpc.job.schema import Schema
 from cvt_hpc.job.values import angle_in_words, in_words
 from cvt_hpc.models import MODELS
 from cvt_hpc.models.contract import load_model
+from cvt_hpc.parameters import Parameters
 from cvt_hpc.tables import columns
 
 _FEW = 8
@@ -137,7 +138,7 @@ def _range_in_words(axis: Axis | Derived, schema: Schema) -> str:
     return f"{low.removesuffix(unit).rstrip()} to {high}"
 
 
-def _setting_in_words(value: Any) -> str:
+def _setting_in_words(value: object) -> str:
     if not isinstance(value, dict):
         return in_words(value, "")
     return ", ".join(f"{count} along {name}" for name, count in value.items())
@@ -158,7 +159,7 @@ def core_time_in_words(core_seconds: float) -> str:
 
 def tell_of_no_effect(
     schema: Schema,
-    values: Mapping[str, Any],
+    values: Parameters,
     files: Mapping[str, str],
     without: Mapping[str, str],
     source: str,

@@ -24,8 +24,8 @@ from numpy.typing import NDArray
 
 from cvt_hpc.job.axes import ALL, CORRELATED, NONE, SAMPLE, SWAPPED
 from cvt_hpc.job.schema import Schema
-from cvt_hpc.job.values import in_words
-from cvt_hpc.parameters import Parameter
+from cvt_hpc.job.values import Document, Table, in_words
+from cvt_hpc.parameters import Parameter, Parameters
 
 TABLE = "uncertain"
 BLOCK = 256  # samples evaluated together: always as many, so that a value has the same bits in every study
@@ -174,9 +174,9 @@ class Uncertain:
         alone = {one.key: (one.key,) for one in self.distributions if one.key not in self.correlated}
         return alone | ({CORRELATED: self.correlated} if self.correlated else {})
 
-    def document(self) -> dict[str, Any]:
+    def document(self) -> Document:
         """Return the table of a job file, without the number of samples, in JSON types."""
-        told: dict[str, Any] = {"seed": self.seed}
+        told: Document = {"seed": self.seed}
         told |= {one.key: {"distribution": one.kind, **dict(one.numbers)} for one in self.distributions}
         if self.correlated:
             matrix = [list(row) for row in self.matrix]
@@ -197,7 +197,7 @@ class Scatter:
         """The axes along which it varies."""
         return (SAMPLE, SWAPPED) if self.uncertain.indices else (SAMPLE,)
 
-    def value(self, parameters: Mapping[str, Any]) -> float:
+    def value(self, parameters: Parameters) -> float:
         """Return the value [SI] of the sample."""
         return self.uncertain.value(self.place, *(parameters[name] for name in self.names))
 
@@ -227,7 +227,7 @@ def _block(uncertain: Uncertain, number: int) -> NDArray[np.float64]:
     return np.stack([one.quantiles(shares[:, k]) for k, one in enumerate(found)], axis=1)
 
 
-def read_document(table: Mapping[str, Any]) -> Uncertain:
+def read_document(table: Table) -> Uncertain:
     """Return what a table is of, as `Uncertain.document` gives it."""
     kinds = {
         key: dict(one) for key, one in table.items() if isinstance(one, Mapping) and "distribution" in one
@@ -239,7 +239,7 @@ def read_document(table: Mapping[str, Any]) -> Uncertain:
     return Uncertain(tuple(drawn), table["seed"], tuple(correlation["parameters"]), matrix, is_second)
 
 
-def with_samples(schema: Schema, table: Mapping[str, Any]) -> Schema:
+def with_samples(schema: Schema, table: Table) -> Schema:
     """Return the schema of a job with a table [uncertain], which knows the number of a sample."""
     known = {SAMPLE: _SAMPLE}
     if table.get("indices"):

@@ -14,7 +14,7 @@ from cvt_hpc.job.design import SEED, check_power_of_2
 from cvt_hpc.job.rules import Rule
 from cvt_hpc.job.schema import Schema
 from cvt_hpc.job.uncertain import KINDS, MOST, TABLE, Distribution, Scatter, Uncertain
-from cvt_hpc.job.values import kind_of, read_or_default, read_value, refuse_unknown
+from cvt_hpc.job.values import Table, kind_of, read_or_default, read_value, refuse_unknown
 from cvt_hpc.parameters import Parameter, positive
 
 _LEAST_SHARE = 1e-6  # of a distribution within its limits
@@ -27,7 +27,7 @@ _OWN = ("samples", "seed", "correlation", "indices", SAMPLE, SWAPPED)
 
 
 def read_uncertain(
-    table: Mapping[str, Any], gone: Collection[str], schema: Schema, source: str
+    table: Table, gone: Collection[str], schema: Schema, source: str
 ) -> tuple[list[Rule], dict[str, list], dict[str, Any]]:
     """Check a job file's table [uncertain].
 
@@ -89,7 +89,7 @@ def read_uncertain(
     return rules, axes, read_or_default(own, table, where)
 
 
-def _read_distribution(key: str, parameter: Parameter, raw: Any, where: str) -> Distribution:
+def _read_distribution(key: str, parameter: Parameter, raw: object, where: str) -> Distribution:
     if kind_of(parameter) is not float or key == SAMPLE:
         raise mismatch(where, "a parameter with continuous values, to give it a distribution", "another one")
     if not isinstance(raw, Mapping):
@@ -119,7 +119,7 @@ def _read_distribution(key: str, parameter: Parameter, raw: Any, where: str) -> 
 
 
 def _read_correlation(
-    raw: Any, found: Mapping[str, Distribution], gone: Collection[str], schema: Schema, where: str
+    raw: object, found: Mapping[str, Distribution], gone: Collection[str], schema: Schema, where: str
 ) -> tuple[tuple[str, ...], tuple[tuple[float, ...], ...]]:
     """Return the correlated parameters that overrides have left, and their matrix."""
     where = f"{where} correlation"

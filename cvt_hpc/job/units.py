@@ -101,7 +101,7 @@ def is_unit(text: str) -> bool:
         return False
 
 
-def unit_in(raw: Any) -> str:
+def unit_in(raw: object) -> str:
     """Return the unit that a value of a job is written with, of a list, range or distribution the first one.
 
     Returns

@@ -37,18 +37,22 @@ _CUSTOMARY = {
 }
 
 _SEPARATED = re.compile(r"\s*\[?\s*[-+]?\d[\d.]*[^,;\d]*[,;]\s*[-+]?\d")
+Table = Mapping[str, Any]  # of a job file, as TOML gives it
+Document = dict[str, Any]  # a whole one, or what a job is resolved to
+Point = dict[str, Any]  # the parameters of a run, flat [SI]
+
 JOB_UNITS = "job_units"  # attribute of a coordinate, beside `units`
 POINT_UNITS = "point_units"  # attribute of a history: by key, beside the values `point`
 
 
-def read_value(parameter: Parameter, raw: Any, where: str) -> Any:
+def read_value(parameter: Parameter, raw: object, where: str) -> Any:
     """Check a value as it stands in a job file, and return it in SI units and in the parameter's type.
 
     Parameters
     ----------
     parameter : Parameter
         Declaration of the key.
-    raw : Any
+    raw : object
         The value found: a number, a text with or without a unit, a bool, or a (nested) list.
     where : str
         File and key, for the error.
@@ -73,9 +77,7 @@ def read_value(parameter: Parameter, raw: Any, where: str) -> Any:
     return readers[kind_of(parameter)](parameter, raw, where)
 
 
-def read_or_default(
-    declared: Mapping[str, Parameter], table: Mapping[str, Any], where: str
-) -> dict[str, Any]:
+def read_or_default(declared: Mapping[str, Parameter], table: Table, where: str) -> Point:
     """Return the values of a table by declared key, defaults included; as of `read_value`."""
     return {
         key: read_value(parameter, table.get(key, parameter.default), f"{where} {key}")
@@ -133,7 +135,7 @@ def expectation(parameter: Parameter) -> str:
     return _number_in_words(parameter)
 
 
-def in_words(value: Any, unit: str, wanted: str = "") -> str:
+def in_words(value: object, unit: str, wanted: str = "") -> str:
     """Return a value [unit] for people to read, e.g. "50000 N"; in another unit where one is wanted."""
     if wanted:
         value, unit = _converted(value, unit, wanted), wanted
@@ -152,7 +154,7 @@ def _converted(value: Any, unit: str, wanted: str) -> Any:
     return from_si(value, unit, wanted) if isinstance(value, float) else value
 
 
-def _read_number(parameter: Parameter, raw: Any, where: str) -> float:
+def _read_number(parameter: Parameter, raw: object, where: str) -> float:
     if isinstance(raw, bool) or not isinstance(raw, (numbers.Real, str)):
         listed = isinstance(raw, (list, tuple, np.ndarray))
         hint = "; what a study varies stands in [axes]" if listed else ""
@@ -172,14 +174,14 @@ def _read_number(parameter: Parameter, raw: Any, where: str) -> float:
     return value + 0.0  # -0.0 and 0.0 are one value, and shall be one job
 
 
-def separated(raw: Any) -> str:
+def separated(raw: object) -> str:
     """Return advice on a text with numbers between commas or semicolons, such as "2,4"; "" of all else."""
     if not isinstance(raw, str) or not _SEPARATED.match(raw):
         return ""
     return "; decimals have a point, as 2.4, thousands have no mark, and several values are a list, as [2, 4]"
 
 
-def _check_bounds(parameter: Parameter, value: float, raw: Any, where: str) -> None:
+def _check_bounds(parameter: Parameter, value: float, raw: object, where: str) -> None:
     low, high = parameter.minimum, parameter.maximum
     inside = low < value < high if parameter.exclusive else low <= value <= high
     # The bounds of an unbounded side are infinite, and an infinite value that is allowed lies on them.
@@ -209,7 +211,7 @@ def _read_text(parameter: Parameter, raw: object, where: str) -> str:
     raise mismatch(where, expectation(parameter), show(raw) + near)
 
 
-def _read_flag(parameter: Parameter, raw: Any, where: str) -> bool:
+def _read_flag(parameter: Parameter, raw: object, where: str) -> bool:
     if raw in ("true", "false"):
         return raw == "true"
     if not isinstance(raw, bool):
@@ -217,7 +219,7 @@ def _read_flag(parameter: Parameter, raw: Any, where: str) -> bool:
     return raw
 
 
-def _read_table(parameter: Parameter, raw: Any, where: str) -> tuple:
+def _read_table(parameter: Parameter, raw: object, where: str) -> tuple:
     if isinstance(raw, np.ndarray):
         raw = as_list(raw, where, (1, 2))
     if not isinstance(raw, (list, tuple)):
@@ -240,13 +242,13 @@ def _with_unit(text: str, parameter: Parameter) -> str:
     return f"{text} in {parameter.unit}" if parameter.unit else text
 
 
-def angle_in_words(value: Any, unit: str) -> str:
+def angle_in_words(value: float, unit: str) -> str:
     """Return an angle or a speed of rotation [SI] as people give it, such as "11 deg"; "" of all else."""
     wanted = {"rad": "deg", "rad/s": "rpm"}.get(unit, "")
     return f"{from_si(value, unit, wanted):.6g} {wanted}" if wanted and value else ""
 
 
-def meant(raw: Any, parameter: Parameter) -> str:
+def meant(raw: object, parameter: Parameter) -> str:
     """Return a number without a unit in the customary units in which it is sensible, such as '"11 deg"'.
 
     Several are joined by "or"; "" where there is none, or the number has a unit.
@@ -258,7 +260,7 @@ def meant(raw: Any, parameter: Parameter) -> str:
     return " or ".join(f'"{text}"' for text in texts if low <= abs(to_si(text, parameter.unit)) <= high)
 
 
-def warn_of_bare_numbers(parameter: Parameter, raw: Any, where: str) -> None:
+def warn_of_bare_numbers(parameter: Parameter, raw: object, where: str) -> None:
     """Warn of the first number without a unit that is outside the sensible range of a parameter.
 
     Zero and infinity mean the same in any unit.
@@ -267,7 +269,7 @@ def warn_of_bare_numbers(parameter: Parameter, raw: Any, where: str) -> None:
     ----------
     parameter : Parameter
         Declaration of the key.
-    raw : Any
+    raw : object
         The value, list, array or range found.
     where : str
         File and key.
@@ -286,7 +288,7 @@ def warn_of_bare_numbers(parameter: Parameter, raw: Any, where: str) -> None:
             return
 
 
-def _items(raw: Any) -> Iterator[Any]:
+def _items(raw: object) -> Iterator[object]:
     """Yield the values of a list, an array, a range or a distribution, at any depth."""
     if isinstance(raw, Mapping):
         raw = [raw.get(key) for key in ("from", "to", "mode", "mean")]
@@ -299,7 +301,7 @@ def _items(raw: Any) -> Iterator[Any]:
         yield raw
 
 
-def _bare(raw: Any) -> float | None:
+def _bare(raw: object) -> float | None:
     """Return the value of a number without a unit, None for all else."""
     if isinstance(raw, bool) or not isinstance(raw, (numbers.Real, str)) or unit_in(raw):
         return None
@@ -309,42 +311,42 @@ def _bare(raw: Any) -> float | None:
         return None
 
 
-def si_unit(attributes: Mapping[str, Any]) -> str:
+def si_unit(attributes: Mapping[str, object]) -> str:
     """Return the SI unit of a coordinate with these attributes; "" for texts and plain numbers."""
     unit = str(attributes.get("units", ""))
     return "" if unit == "1" else unit
 
 
-def shown_unit(attributes: Mapping[str, Any]) -> str:
+def shown_unit(attributes: Mapping[str, object]) -> str:
     """Return the unit in which a coordinate is shown: that of the job, else the SI unit."""
     unit, wanted = si_unit(attributes), str(attributes.get(JOB_UNITS, ""))
     # a dataset may be that of anybody
     return wanted if wanted and (factor_to(unit, wanted) or 0.0) > 0.0 else unit
 
 
-def shown_number(value: Any, attributes: Mapping[str, Any]) -> Any:
+def shown_number(value: Any, attributes: Mapping[str, object]) -> Any:
     """Return a value [SI] of a coordinate in its `shown_unit`; a text as it is."""
     return from_si(value, si_unit(attributes), shown_unit(attributes)) if isinstance(value, float) else value
 
 
-def shown(value: Any, attributes: Mapping[str, Any]) -> str:
+def shown(value: object, attributes: Mapping[str, object]) -> str:
     """Return a value [SI] of a coordinate with its `shown_unit`, such as "3000 rpm"."""
     return in_words(value, si_unit(attributes), shown_unit(attributes))
 
 
-def number_within(value: float, closest: float, attributes: Mapping[str, Any]) -> str:
+def number_within(value: float, closest: float, attributes: Mapping[str, object]) -> str:
     """Return `shown_number` of a value [SI] with as many decimals as show differences of `closest` [SI]."""
     decimals = -math.floor(math.log10(shown_number(closest, attributes)) + 1e-9)
     return f"{shown_number(value, attributes):.{max(decimals, 0)}f}"
 
 
-def shown_as_read(value: float, attributes: Mapping[str, Any]) -> str:
+def shown_as_read(value: float, attributes: Mapping[str, object]) -> str:
     """Return the same for an error, with the value [SI], which may have been meant in another unit."""
     in_si = in_words(value, si_unit(attributes))
     return in_si if (text := shown(value, attributes)) == in_si else f"{text} ({in_si})"
 
 
-def heading(name: str, attributes: Mapping[str, Any]) -> str:
+def heading(name: str, attributes: Mapping[str, object]) -> str:
     """Return the head of a table's column of `shown_number`, such as "driving_speed [rpm]"."""
     unit = shown_unit(attributes)
     return f"{name} [{unit}]" if unit else name

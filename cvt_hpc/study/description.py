@@ -16,7 +16,7 @@ from cvt_hpc.errors import mismatch
 from cvt_hpc.job import Axis, Job
 from cvt_hpc.job.definition import Derived
 from cvt_hpc.job.design import Design, Runs
-from cvt_hpc.job.values import JOB_UNITS, shown
+from cvt_hpc.job.values import JOB_UNITS, Document, Point, Table, shown
 from cvt_hpc.storage.netcdf import attributes
 from cvt_hpc.study.simulator import Simulator
 from cvt_hpc.variables import Status, Variable
@@ -38,7 +38,7 @@ class Dimension:
     job_units: str = ""  # unit in which the job gives the values; "" where it has none
 
     @property
-    def attributes(self) -> dict[str, Any]:
+    def attributes(self) -> dict[str, str]:
         """Attributes of its coordinate in a dataset."""
         spacing = {"spacing": self.spacing} if self.spacing == "log" else {}
         job_units = {JOB_UNITS: self.job_units} if self.job_units else {}
@@ -49,13 +49,13 @@ class Dimension:
         """Whether the values are texts."""
         return isinstance(self.values[0], str)
 
-    def to_json(self) -> dict[str, Any]:
+    def to_json(self) -> Document:
         """Return the dimension as JSON types; infinities, which JSON lacks, as texts."""
         values = [v if isinstance(v, str) or math.isfinite(v) else str(v) for v in self.values]
         return {**asdict(self), "values": values, "texts": self.holds_texts}
 
     @classmethod
-    def from_json(cls, entry: Mapping[str, Any]) -> Self:
+    def from_json(cls, entry: Table) -> Self:
         """Return the dimension that `to_json` wrote."""
         entry = dict(entry)
         if not entry.pop("texts"):
@@ -77,7 +77,7 @@ class DerivedCoordinate(Dimension):
     follows: str = ""  # how it follows, for people
 
     @property
-    def attributes(self) -> dict[str, Any]:
+    def attributes(self) -> dict[str, str]:
         """Attributes of its coordinate in a dataset: with the formula by which it follows."""
         return super().attributes | {"derived": self.follows}
 
@@ -113,7 +113,7 @@ class Study(Runs):
     name: str  # of the job, as the next two
     description: str
     fingerprint: str
-    job: dict[str, Any]  # the whole resolved job, as JSON types
+    job: Document  # the whole resolved job, as JSON types
     # the varied values: a grid, through which run indices count in C order, or the values of all samples.
     # Empty for a single run.
     axes: tuple[Dimension, ...]
@@ -143,7 +143,7 @@ class Study(Runs):
         """Quantities of a record, by their names in `record_dtype`."""
         return self.record_dtype.names or ()
 
-    def place(self, index: int) -> dict[str, Any]:
+    def place(self, index: int) -> Point:
         """Return the axes' values of run `index`, by axis name."""
         position: Sequence[Any] = np.unravel_index(index, self.shape) if self.axes else ()
         position = [index] * len(self.axes) if self.is_sampled else position
@@ -201,7 +201,7 @@ class Study(Runs):
         row["reason"] = fit_text(reason, row.dtype["reason"].itemsize)
         return row
 
-    def to_json(self) -> dict[str, Any]:
+    def to_json(self) -> Document:
         """Return the study as JSON types."""
         return {
             **{key: getattr(self, key) for key in _HEAD},
@@ -213,7 +213,7 @@ class Study(Runs):
         }
 
     @classmethod
-    def from_json(cls, entry: Mapping[str, Any]) -> Self:
+    def from_json(cls, entry: Table) -> Self:
         """Return the study that `to_json` wrote."""
         return cls(
             **{key: entry[key] for key in _HEAD},
@@ -283,7 +283,7 @@ def fit_text(text: str, size: int) -> bytes:
     return " ".join(text.split()).encode()[:size].decode(errors="ignore").encode()
 
 
-def _variable_to_json(variable: Variable) -> dict[str, Any]:
+def _variable_to_json(variable: Variable) -> Document:
     flags = variable.flags
     meanings = flags and {"name": flags.__name__, "members": {m.name: int(m) for m in flags}}
     entry = {**asdict(variable), "dims": list(variable.dims), "flags": meanings}
@@ -292,7 +292,7 @@ def _variable_to_json(variable: Variable) -> dict[str, Any]:
     return {**entry, "long_name": variable.long_name}
 
 
-def _variable_from_json(entry: Mapping[str, Any]) -> Variable:
+def _variable_from_json(entry: Table) -> Variable:
     meanings = entry["flags"]
     flags = meanings and IntEnum(meanings["name"], meanings["members"])
     entry = {**entry, "dims": tuple(entry["dims"]), "flags": flags}

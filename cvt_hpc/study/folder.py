@@ -12,11 +12,12 @@ import re
 from collections.abc import Callable, Iterable, Iterator
 from contextlib import AbstractContextManager, contextmanager, suppress
 from pathlib import Path
-from typing import TYPE_CHECKING, Any, NamedTuple
+from typing import TYPE_CHECKING, NamedTuple
 
 import numpy as np
 
 from cvt_hpc.errors import InputError, few_of, mismatch, nearest
+from cvt_hpc.job.values import Document
 from cvt_hpc.storage.files import kind_of, make_own_folder, naming_refusals, sync_folder
 from cvt_hpc.storage.locks import BusyError, is_locked, locked
 from cvt_hpc.storage.netcdf import store_history
@@ -171,11 +172,11 @@ class StudyFolder(OutputFolder[Study]):
         """Return the same of histories; only a process that works alone can separate unfinished ones."""
         return [*self._inside(self.histories, ".run-*.nc.*.part")]
 
-    def document(self, content: Study) -> dict[str, Any]:
+    def document(self, content: Study) -> Document:
         """Return the content of a study's job.json."""
         return content.to_json()
 
-    def accept(self, entry: dict[str, Any]) -> Study:
+    def accept(self, entry: Document) -> Study:
         """Return the study of a sound job.json."""
         study = Study.from_json(entry)
         if study.size > _MOST_RUNS or study.record_dtype.itemsize > _LARGEST_RECORD:

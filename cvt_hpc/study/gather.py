@@ -22,7 +22,7 @@ from typing import TYPE_CHECKING, Any
 import numpy as np
 
 from cvt_hpc.errors import InputError, mismatch
-from cvt_hpc.job.values import JOB_UNITS
+from cvt_hpc.job.values import JOB_UNITS, Document
 from cvt_hpc.storage.files import discard, kind_of, naming_refusals, written_aside
 from cvt_hpc.storage.locks import locked
 from cvt_hpc.storage.netcdf import global_attributes, open_netcdf, refuse_beside_sweep, variable_attributes
@@ -127,13 +127,13 @@ def _refuse_loss(path: Path, study: Study, records: Records) -> None:
         )
 
 
-def _read_held(path: Path) -> tuple[dict[str, Any], np.ndarray]:
+def _read_held(path: Path) -> tuple[Document, np.ndarray]:
     """Return the resolved job of a dataset, and how each of its runs has ended; or nothing."""
     import h5py
 
     from cvt_hpc.storage.foreign_files import DAMAGE, check_hdf5
 
-    nothing: tuple[dict[str, Any], np.ndarray] = {}, np.zeros(0, np.int8)
+    nothing: tuple[Document, np.ndarray] = {}, np.zeros(0, np.int8)
     if kind_of(path) != "a file":
         return nothing
     try:

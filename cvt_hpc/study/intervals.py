@@ -8,12 +8,12 @@ that all K hold together in 95 of 100 studies or more, wherever a cell stops (Bo
 A further run can only ask for more samples: what is run does not depend on order, ranks or interruptions.
 """
 
-from collections.abc import Mapping
 from typing import Any, NamedTuple
 
 import numpy as np
 from numpy.typing import NDArray
 
+from cvt_hpc.job.values import Table
 from cvt_hpc.vibration.classes import OccurrenceClass
 
 CONFIDENCE = 0.95
@@ -35,7 +35,7 @@ def interval(count: Any, runs: Any, looks: int = 1) -> tuple[Any, Any]:
     return low[()], high[()]
 
 
-def looks_of(design: Mapping[str, Any], samples: int) -> list[int]:
+def looks_of(design: Table, samples: int) -> list[int]:
     """Return the numbers of samples at which a study looks: of one that is not adaptive at all of them."""
     first = min(design.get("first_samples", samples), samples)
     return [first << k for k in range((samples // first).bit_length())]
@@ -49,7 +49,7 @@ class Looked(NamedTuple):
     wanted: NDArray[np.int64]
 
 
-def look(classes: NDArray[np.int8], design: Mapping[str, Any]) -> Looked:
+def look(classes: NDArray[np.int8], design: Table) -> Looked:
     """Return how many samples count in each cell, and how many it wants.
 
     Parameters

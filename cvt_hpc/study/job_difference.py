@@ -14,6 +14,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from cvt_hpc.errors import InputError, few_of, mismatch
+from cvt_hpc.job.values import Table
 from cvt_hpc.study.description import Study
 
 _LONGEST = 40  # letters of a value
@@ -21,21 +22,21 @@ _LONGEST = 40  # letters of a value
 _FREE = ("name", "description", "axes", "linked", "design")  # compared by the runs that they make
 
 
-def another_job(path: Path, found: dict[str, Any], asked: dict[str, Any], name: str = "") -> InputError:
+def another_job(path: Path, found: Table, asked: Table, name: str = "") -> InputError:
     """Return the error that a folder holds the results of another resolved job."""
     another = f"that of another ({name}{difference_in_words(found, asked)})"
     then = "choose another name or --out, or --fresh to throw its results away"
     return mismatch(str(path), "the folder of this job", another, then)
 
 
-def difference_in_words(found: Mapping[str, Any], asked: Mapping[str, Any]) -> str:
+def difference_in_words(found: Table, asked: Table) -> str:
     """Return the first few entries in which two resolved jobs differ, as "key is 1 there, 2 here"."""
     pairs = differences(found, asked).items()
     entries = [f"{key} {_pair_in_words(there, here)}" for key, (there, here) in pairs]
     return "; ".join(entries[:3]) + ("; ..." if len(entries) > 3 else "")
 
 
-def _pair_in_words(there: Any, here: Any) -> str:
+def _pair_in_words(there: object, here: object) -> str:
     """Return in words how two values differ: of lists the values that only one of them has."""
     if not isinstance(there, list) or not isinstance(here, list) or len(f"{there}{here}") <= _LONGEST:
         return "is {} there, {} here".format(*short_pair(there, here))
@@ -50,14 +51,14 @@ def _pair_in_words(there: Any, here: Any) -> str:
     return " and ".join(parts) or "has its values in another order"
 
 
-def differences(one: Mapping[str, Any], other: Mapping[str, Any]) -> dict[str, tuple[Any, Any]]:
+def differences(one: Table, other: Table) -> dict[str, tuple[Any, Any]]:
     """Return the values, None where there is none, of each key "section.key" in which documents differ."""
     here, there = flatten(one), flatten(other)
     pairs = {key: (here.get(key), there.get(key)) for key in {**here, **there}}
     return {key: pair for key, pair in pairs.items() if pair[0] != pair[1]}
 
 
-def flatten(entry: Any, prefix: str = "") -> dict[str, Any]:
+def flatten(entry: object, prefix: str = "") -> dict[str, Any]:
     """Return the values of nested tables by "section.key"."""
     if not isinstance(entry, Mapping):
         return {prefix: entry}
@@ -65,13 +66,13 @@ def flatten(entry: Any, prefix: str = "") -> dict[str, Any]:
     return {key: value for part in parts for key, value in part.items()}
 
 
-def short(value: Any) -> str:
+def short(value: object) -> str:
     """Return a value of a resolved job in 40 letters at most."""
     text = "not set" if value is None else json.dumps(value)
     return text if len(text) <= _LONGEST else text[: _LONGEST - 3] + "..."
 
 
-def short_pair(one: Any, other: Any) -> list[str]:
+def short_pair(one: object, other: object) -> list[str]:
     """Return two values of a resolved job that differ, each as short, from where they differ if need be."""
     if (first := short(one)) != (second := short(other)):
         return [first, second]
@@ -96,7 +97,7 @@ def have_one_layout(one: Study, other: Study) -> bool:
     return quantities == others and places == elsewhere
 
 
-def places_in(found: Mapping[str, Any], asked: Mapping[str, Any]) -> NDArray[np.int64] | None:
+def places_in(found: Table, asked: Table) -> NDArray[np.int64] | None:
     """Return the index in one job of each run of another, shape (runs of `found`,); None if any is not there.
 
     The jobs are resolved, as of `Job.resolved`. A run is the same if all its parameters are: values of axes
@@ -109,7 +110,7 @@ def places_in(found: Mapping[str, Any], asked: Mapping[str, Any]) -> NDArray[np.
         return None
 
 
-def _find_places(found: Mapping[str, Any], asked: Mapping[str, Any]) -> NDArray[np.int64] | None:
+def _find_places(found: Table, asked: Table) -> NDArray[np.int64] | None:
     constants = {}  # that have become axes
     for key, (there, here) in differences(found, asked).items():
         name = key.rpartition(".")[2]
@@ -131,8 +132,8 @@ def _find_places(found: Mapping[str, Any], asked: Mapping[str, Any]) -> NDArray[
 def _in_grid(
     columns: Mapping[str, list],
     wanted: Mapping[str, list],
-    links: Mapping[str, Any],
-    others: Mapping[str, Any],
+    links: Table,
+    others: Table,
 ) -> NDArray[np.int64] | None:
     """Return the indices, in C order, of a grid in another one: by axes, and by what is linked to them."""
     strides: dict[str, int] = {}
@@ -154,7 +155,7 @@ def _in_grid(
 
 
 def _among_samples(
-    columns: Mapping[str, list], constants: Mapping[str, Any], wanted: Mapping[str, list]
+    columns: Mapping[str, list], constants: Table, wanted: Mapping[str, list]
 ) -> NDArray[np.int64] | None:
     """Return the indices of samples among others; equal ones, which a list may have, in their order."""
     left: dict[tuple, list[int]] = {}

@@ -27,7 +27,7 @@ from collections.abc import Collection, Iterable, Iterator, Mapping
 from contextlib import ExitStack
 from functools import partial
 from itertools import pairwise, product
-from typing import Any, NamedTuple
+from typing import NamedTuple
 
 import numpy as np
 from numpy.typing import NDArray
@@ -44,7 +44,7 @@ from cvt_hpc.study.intervals import look
 from cvt_hpc.study.ranks.progress import Counter, Progress
 from cvt_hpc.study.ranks.stopping import TimeLimit
 from cvt_hpc.study.record.index import Records
-from cvt_hpc.study.record.log import RecordFormat, RecordLog
+from cvt_hpc.study.record.log import RecordFormat, RecordLog, Session
 from cvt_hpc.study.simulator import Simulator
 from cvt_hpc.study.task import Task, asked_step, refined_steps, untried_factor
 from cvt_hpc.variables import Status
@@ -72,7 +72,7 @@ class Plan(NamedTuple):
     total: int
     recorded: int
     failed: int
-    session: dict[str, Any]
+    session: Session
     limit: TimeLimit
 
     @property
@@ -157,7 +157,7 @@ def next_round(
     return plan
 
 
-def _other_versions(records: Records, session: dict[str, Any]) -> list[str]:
+def _other_versions(records: Records, session: Session) -> list[str]:
     """Return a warning if the records were made by other code than that which is going on now."""
     keys = ("versions", "git_revision")
     if all(earlier[key] == session[key] for earlier in records.sessions for key in keys):
@@ -257,7 +257,7 @@ def enter_attempts(
     records: Records,
     asked: np.ndarray,
     retry: Collection[Status],
-    session: dict[str, Any],
+    session: Session,
     refine: float = 1.0,
 ) -> Records:
     """Record which runs are given up and which begin again, and return the records as they are then.

@@ -23,6 +23,7 @@ from cvt_hpc.errors import mismatch, show
 from cvt_hpc.job import Job, rebuild_job
 from cvt_hpc.job.definition import handed_to
 from cvt_hpc.job.rules import overridden
+from cvt_hpc.job.values import Document
 from cvt_hpc.models.auto.rules import COARSENESS, Rung
 from cvt_hpc.models.contract import load_model
 from cvt_hpc.storage.files import refuse_link
@@ -123,7 +124,7 @@ def check_fraction(flag: str, fraction: float, part: str | None = None) -> None:
         raise mismatch(flag, "a run of the whole study, once its parts have ended", f"part {part}")
 
 
-def built(job: Job, document: dict[str, Any]) -> Job:
+def built(job: Job, document: Document) -> Job:
     """Return the job of a document of the same runs; of the whole grid where the first one chooses some."""
     if job.in_rounds:
         document = {key: table for key, table in document.items() if key != "design"}
@@ -174,13 +175,13 @@ def _section(job: Job) -> str:
     return job.schema.section_of[STEP]
 
 
-def _halved(job: Job) -> dict[str, Any]:
+def _halved(job: Job) -> Document:
     document = _without(job.resolved(), _section(job), (STEP, *overridden((STEP,), job.schema)))
     document[_section(job)][STEP] = 0.5 * job.parameters[STEP]
     return document
 
 
-def _explicit(job: Job) -> dict[str, Any]:
+def _explicit(job: Job) -> Document:
     """The same runs by the explicit step with its own defaults, in full if the model is auto."""
     model = FULL_MODEL if job.model == AUDITED else job.model
     document = handed_to(job, model, "by the explicit step, to check the step")
@@ -189,7 +190,7 @@ def _explicit(job: Job) -> dict[str, Any]:
     return _without(document, _section(job), own) | {"stepper": EXPLICIT}
 
 
-def _without(document: dict[str, Any], section: str, keys: Iterable[str]) -> dict[str, Any]:
+def _without(document: Document, section: str, keys: Iterable[str]) -> Document:
     """The document without some keys, whether its tables, its formulas or its links give them."""
     tables = (document.get(section, {}), document.get("derived", {}), *document.get("linked", {}).values())
     for table in tables:

@@ -8,6 +8,7 @@ from typing import TYPE_CHECKING, Any, Protocol
 
 import numpy as np
 
+from cvt_hpc.job.values import Point
 from cvt_hpc.study.batches import Batch
 from cvt_hpc.variables import Coordinate, Variable
 
@@ -52,9 +53,9 @@ class Simulator(Protocol):
     def run_points(
         self,
         job: Job,
-        points: Sequence[dict[str, Any]],
+        points: Sequence[Point],
         interrupt: Callable[[], str | None],
-        more: Callable[[], Sequence[dict[str, Any]]],
+        more: Callable[[], Sequence[Point]],
     ) -> Sequence[Mapping[str, Any]]:
         """Do the runs of a batch, and return their records in the order of the points.
 
@@ -66,7 +67,7 @@ class Simulator(Protocol):
     def run_points_keeping(
         self,
         job: Job,
-        points: Sequence[dict[str, Any]],
+        points: Sequence[Point],
         interrupt: Callable[[], str | None],
         kept: Collection[int],
     ) -> tuple[Sequence[Mapping[str, Any]], dict[int, xr.Dataset]]:

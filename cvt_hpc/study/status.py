@@ -7,12 +7,12 @@ import time
 from dataclasses import dataclass
 from itertools import pairwise
 from pathlib import Path
-from typing import Any
 
 import numpy as np
 
 from cvt_hpc.errors import InputError
 from cvt_hpc.job import Job, rebuild_job
+from cvt_hpc.job.values import Point
 from cvt_hpc.study.description import Study
 from cvt_hpc.study.folder import StudyFolder
 from cvt_hpc.study.planning import needed_runs
@@ -203,7 +203,7 @@ class FailedRun:
     """
 
     index: int
-    at: dict[str, Any]
+    at: Point
     place: str
     status: str
     reason: str

@@ -11,12 +11,12 @@ from contextlib import ExitStack, closing
 from dataclasses import replace
 from functools import partial
 from pathlib import Path
-from typing import Any
 
 import numpy as np
 
 from cvt_hpc.errors import mismatch
 from cvt_hpc.job import Job
+from cvt_hpc.job.values import Document
 from cvt_hpc.linear_algebra import one_thread
 from cvt_hpc.storage.files import StorageError, open_missing_streams
 from cvt_hpc.storage.locks import BusyError
@@ -148,7 +148,7 @@ def run(
             check_refinement(job, refine, retry)
         return _accept(job, part, fresh, simulator)
 
-    def plan_of(accepted: tuple[Study, Part | None]) -> dict[str, Any]:
+    def plan_of(accepted: tuple[Study, Part | None]) -> Document:
         study, _ = accepted
         layout = str(study.record_dtype)
         return {"job": study.job, "records": layout, "options": options, "program": program_identity()}

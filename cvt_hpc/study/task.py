@@ -18,6 +18,7 @@ from numpy.typing import NDArray
 
 from cvt_hpc.errors import mismatch, show
 from cvt_hpc.job import Job
+from cvt_hpc.job.values import Point
 from cvt_hpc.study.batches import Batch, Turns
 from cvt_hpc.study.description import Study
 from cvt_hpc.study.forecast.cost_model import Fit, fit_recorded
@@ -150,7 +151,7 @@ class Task:
         limit = self.run_limit * self.turns(len(runs))
         watch = _Watch(interrupt, limit, begin_all if marches else lambda: None)
 
-        def more() -> Sequence[dict[str, Any]]:
+        def more() -> Sequence[Point]:
             further: Batch = ()
             try:
                 if join is not None:
@@ -182,7 +183,7 @@ class Task:
             words = _in_words(error)
             return Result([]), _Trouble(Status.FAILED_ERROR, words, f"raised {words}")
 
-    def _points(self, runs: Sequence[int]) -> list[dict[str, Any]]:
+    def _points(self, runs: Sequence[int]) -> list[Point]:
         """Return the parameters of runs, each at its own time step where it has one."""
         own = ({STEP: self.steps[index]} if index in self.steps else {} for index in runs)
         return [self.job.point(index) | step for index, step in zip(runs, own, strict=True)]

@@ -16,9 +16,11 @@ from collections.abc import Callable, Iterator, Mapping
 from contextlib import contextmanager, nullcontext, suppress
 from dataclasses import dataclass
 from pathlib import Path
+from types import TracebackType
 from typing import TYPE_CHECKING, Any, Literal, NoReturn, TypeAlias, TypeVar
 
 from cvt_hpc.errors import BAD_INPUT, CRASHED, InputError, mismatch
+from cvt_hpc.job.values import Document
 from cvt_hpc.storage.files import append_text
 from cvt_hpc.study.job_difference import differences, short_pair
 from cvt_hpc.study.ranks.starting import await_all, bounded_start
@@ -148,7 +150,7 @@ class Team:
             raise error or InputError(text)
         return result
 
-    def agreed(self, work: Callable[[], Result], plan: Callable[[Result], dict[str, Any]]) -> Result:
+    def agreed(self, work: Callable[[], Result], plan: Callable[[Result], Document]) -> Result:
         """Return the result of `work`, once all ranks have done theirs, with the plan of rank 0.
 
         Parameters
@@ -191,7 +193,7 @@ class Team:
         shared.everywhere = True
         raise shared from None
 
-    def collect(self, value: Any) -> list[Any]:
+    def collect(self, value: Result) -> list[Result]:
         """Return the values of all ranks, on all ranks."""
         if self.communicator is None:
             return [value]
@@ -329,7 +331,7 @@ def _connect(launch: Launch) -> MPI.Intracomm:
 def _abort_on_uncaught(world: MPI.Intracomm, crash_log: Path | None) -> None:
     """See to it that an error after or between sweeps ends all ranks, not one for which the others wait."""
 
-    def hook(kind: type[BaseException], value: BaseException, trace: Any) -> None:
+    def hook(kind: type[BaseException], value: BaseException, trace: TracebackType | None) -> None:
         if not getattr(value, "everywhere", False):
             if isinstance(value, InputError):
                 end_all(BAD_INPUT, str(value))

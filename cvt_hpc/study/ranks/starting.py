@@ -15,7 +15,7 @@ import time
 from collections.abc import Iterator, Mapping
 from contextlib import contextmanager
 from pathlib import Path
-from typing import TYPE_CHECKING, Any
+from typing import TYPE_CHECKING
 
 from cvt_hpc.errors import mismatch
 
@@ -38,7 +38,7 @@ _PATIENCE = 300.0  # [s]
 _SPREAD = 0.1  # of that time, over which ranks end: the launcher ends the others when the first one does
 _POLL = 1e-3  # [s]
 
-_requests: dict[int, Any] = {}  # of barriers that not all ranks have reached in time, by communicator
+_requests: dict[int, MPI.Request] = {}  # of barriers that not all ranks have reached in time, by communicator
 
 
 def patience(environment: Mapping[str, str] = os.environ) -> float:
@@ -79,10 +79,9 @@ def bounded_start(rank: int, size: int) -> Iterator[None]:
 @contextmanager
 def _default_actions() -> Iterator[None]:
     """Let signals with handlers in Python end the process at once."""
-    handled: dict[int, Any] = {}
-    if threading.current_thread() is threading.main_thread():
-        handled = {number: signal.getsignal(number) for number in SIGNALS}
-        handled = {number: handler for number, handler in handled.items() if callable(handler)}
+    is_main = threading.current_thread() is threading.main_thread()
+    numbers = SIGNALS if is_main else ()
+    handled = {number: handler for number in numbers if callable(handler := signal.getsignal(number))}
     for number in handled:
         signal.signal(number, signal.SIG_DFL)
     try:

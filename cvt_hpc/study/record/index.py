@@ -8,7 +8,7 @@ from collections.abc import Iterable, Iterator, Mapping, Sequence
 from dataclasses import dataclass, field
 from io import FileIO
 from pathlib import Path
-from typing import Any, NamedTuple
+from typing import NamedTuple
 
 import numpy as np
 from numpy.typing import NDArray
@@ -72,7 +72,7 @@ class Records:
     died_alone: np.ndarray
     refinements: np.ndarray
     timings: list[Timing] = field(default_factory=list)
-    sessions: list[dict[str, Any]] = field(default_factory=list)
+    sessions: list[log.Session] = field(default_factory=list)
     warnings: list[str] = field(default_factory=list)
 
     @property
@@ -314,7 +314,7 @@ class _Reader:
         self._deaths: set[_Death] = set()
         self._refinements: dict[log.Place, float] = {}
         self._timings: list[Timing] = []
-        self._sessions: dict[str, dict[str, Any]] = {}
+        self._sessions: dict[str, log.Session] = {}
 
     def read(self, number: int, file: FileIO) -> None:
         """Read a log; damaged parts go to the warnings.

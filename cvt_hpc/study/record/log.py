@@ -49,6 +49,7 @@ KEPT = "The runs recorded so far are kept, and the same command goes on from the
 SYNC_INTERVAL = 5.0  # [s]; a dead process loses nothing, a power failure at most this much
 _CLOSED = -1  # no descriptor of a file
 
+Session = dict[str, Any]  # description of a start of the sweep, see `provenance.new_session`
 Record = tuple[int, np.ndarray]  # run index, and the record of that run, shape ()
 
 
@@ -153,7 +154,7 @@ class RecordFormat:
         if damaged is not None:
             yield damaged, size, None
 
-    def preamble(self, session: dict[str, Any], rank: int) -> bytes:
+    def preamble(self, session: Session, rank: int) -> bytes:
         """Return the bytes with which a log begins."""
         header = {"fingerprint": self.fingerprint, "dtype": self.descr, "rank": rank, "session": session}
         text = json.dumps(header).encode()
@@ -179,7 +180,7 @@ class RecordFormat:
         return is_mark and 0 < length <= MARK_LIMIT and length % PLACE.size == 0
 
 
-def read_preamble(data: bytes, layout: RecordFormat) -> tuple[dict[str, Any] | None, int]:
+def read_preamble(data: bytes, layout: RecordFormat) -> tuple[Session | None, int]:
     """Return a log's session, None if its header is damaged, and where its frames begin.
 
     Raises
@@ -231,7 +232,7 @@ class RecordLog:
         self,
         folder: Path,
         layout: RecordFormat,
-        session: dict[str, Any],
+        session: Session,
         rank: int,
         attempts: Mapping[int, int] | None = None,
     ) -> None:
