@@ -4,12 +4,13 @@ from __future__ import annotations
 
 import argparse
 import json
+from contextlib import ExitStack
 from dataclasses import asdict
 from pathlib import Path
 from typing import TYPE_CHECKING
 
 from cvt_hpc.cli import parts
-from cvt_hpc.errors import InputError
+from cvt_hpc.errors import InputError, mismatch
 from cvt_hpc.picture_kinds import MEASURED
 
 if TYPE_CHECKING:
@@ -98,8 +99,7 @@ def _table(arguments: argparse.Namespace) -> int:
 
 
 def _map(arguments: argparse.Namespace) -> int:
-    from contextlib import ExitStack
-
+    from cvt_hpc.analysis.arrangement import with_spacings
     from cvt_hpc.job.assignments import split_assignments
 
     paths = [arguments.path, *arguments.others]
@@ -111,20 +111,17 @@ def _map(arguments: argparse.Namespace) -> int:
             from cvt_hpc.analysis.studies import side_by_side
 
             dataset, sides = side_by_side(datasets, list(map(str, paths)), arguments.show, sides)
-        from cvt_hpc.analysis.arrangement import with_spacings
-
         dataset = with_spacings(dataset, split_assignments(arguments.spacing, source, "--spacing"), source)
         at = parts.fixed_axes(arguments, dataset, source)
         from cvt_hpc.analysis.figures import draw
         from cvt_hpc.analysis.maps import has_starts, map_figure, start_line
         from cvt_hpc.analysis.value_maps import value_map_figure
+        from cvt_hpc.report.findings import shown_quantities
 
         files = [file for path in paths for file in parts.files_of(path)]
         words = (kind, *arguments.show, *arguments.at)
         out = arguments.out or parts.picture_beside(arguments.path, files, *words)
         measured, vmax = arguments.measured, None
-        from cvt_hpc.report.findings import shown_quantities
-
         shown = arguments.show or shown_quantities(dataset)
         coloured = shown[0] if shown else "amplitude"
         if coloured in dataset:  # what draws it refuses a quantity that is not known
@@ -132,11 +129,10 @@ def _map(arguments: argparse.Namespace) -> int:
             vmax = parts.colour_end(arguments.vmax, unit, fits=bool(shown))
         if shown:
             draw(lambda: value_map_figure(dataset, shown, at, source, sides, vmax, measured), out)
-            parts.say(f"map: {out}")
-            return parts.DONE
-        draw(lambda: map_figure(dataset, at, source, sides, vmax, measured), out)
-        if has_starts(dataset, at) and not arguments.others:
-            parts.say(start_line(dataset, at, source))
+        else:
+            draw(lambda: map_figure(dataset, at, source, sides, vmax, measured), out)
+            if has_starts(dataset, at) and not arguments.others:
+                parts.say(start_line(dataset, at, source))
         parts.say(f"map: {out}")
     return parts.DONE
 
@@ -155,8 +151,6 @@ def _report(arguments: argparse.Namespace) -> int:
     out = arguments.out or parts.folder_of(arguments.path) / "report.html"
     parts.check_output(out, (".html",))
     if arguments.every and arguments.measured:
-        from cvt_hpc.errors import mismatch
-
         raise mismatch("--every", "no --measured beside it: a running sweep is drawn alone", "both")
     if arguments.every:
         from cvt_hpc.job.units import read_duration

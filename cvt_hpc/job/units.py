@@ -6,14 +6,19 @@ are in rpm, degrees or per cent.
 `read_duration` reads time spans of the command line: "2h30m", "90 min", "1 d 12 h", or a number of seconds.
 """
 
+from __future__ import annotations
+
 import math
 import re
 from collections.abc import Mapping
 from decimal import Decimal
 from functools import lru_cache
-from typing import Any
+from typing import TYPE_CHECKING
 
 from cvt_hpc.errors import mismatch, show
+
+if TYPE_CHECKING:
+    import pint
 
 _QUANTITY = re.compile(
     r"\s*(?P<number>[+-]?(?:(?:\d+\.?\d*|\.\d+)(?:[eE][+-]?\d+)?|(?:inf|nan)(?![A-Za-z])))\s*(?P<unit>.*?)\s*"
@@ -147,7 +152,7 @@ def _conversion(given: str, unit: str) -> tuple[Decimal, Decimal]:
     return one - zero, zero
 
 
-def _parse_unit(text: str) -> Any:
+def _parse_unit(text: str) -> pint.Unit:
     """Return pint's unit for a text; only names go to pint, whose own parser evaluates any expression."""
     tokens = _tokens(text.translate(_TYPOGRAPHY))
     unit = _product(tokens)
@@ -168,7 +173,7 @@ def _tokens(text: str) -> list[re.Match]:
     return [token for token in reversed(tokens) if not token[0].isspace()]
 
 
-def _product(tokens: list[re.Match]) -> Any:
+def _product(tokens: list[re.Match]) -> pint.Unit:
     """Consume factors joined by "*", "/" or a space, up to the end or a closing bracket."""
     unit = _registry().Unit("")
     power = 1
@@ -180,7 +185,7 @@ def _product(tokens: list[re.Match]) -> Any:
     return unit
 
 
-def _factor(tokens: list[re.Match]) -> Any:
+def _factor(tokens: list[re.Match]) -> pint.Unit:
     token = tokens.pop() if tokens else None
     if token is None or token[0] in "*/)":
         raise UnitError
@@ -195,7 +200,7 @@ def _factor(tokens: list[re.Match]) -> Any:
     return _named_unit(token["name"]) ** int(token["power"] or 1)
 
 
-def _named_unit(name: str) -> Any:
+def _named_unit(name: str) -> pint.Unit:
     import pint
 
     try:
@@ -204,13 +209,13 @@ def _named_unit(name: str) -> Any:
         raise UnitError(f"{name} is no known unit") from None
 
 
-def _angle_power(unit: Any) -> float:
+def _angle_power(unit: pint.Unit) -> float:
     roots = _registry().get_root_units(unit)[1]
     return dict(roots._units).get("radian", 0)
 
 
 @lru_cache(maxsize=1)
-def _registry() -> Any:
+def _registry() -> pint.UnitRegistry:
     import pint
 
     registry = pint.UnitRegistry(non_int_type=Decimal, on_redefinition="ignore")

@@ -81,7 +81,7 @@ def share_out(groups: Sequence[Batch], costs: np.ndarray, ranks: int, turns: Tur
     """
     groups = list(_guided(groups, costs, ranks, turns))
     most = _largest_batch(groups, ranks)
-    batches = [batch for group in groups for batch in _cut(group, most)]
+    batches = [batch for group in groups for batch in in_parts(group, -(-len(group) // most))]
     return sorted(batches, key=lambda batch: (-batch_cost(batch, costs, turns), -len(batch), batch))
 
 
@@ -108,11 +108,6 @@ def _largest_batch(groups: Sequence[Batch], ranks: int) -> int:
     return next(
         most for most in range(1, largest + 1) if sum(-(-len(group) // most) for group in groups) <= ranks
     )
-
-
-def _cut(group: Batch, most: int) -> Iterator[Batch]:
-    """Yield the parts of a group, of nearly equal size and at most `most` runs."""
-    return in_parts(group, -(-len(group) // most))
 
 
 def in_parts(group: Batch, parts: int) -> Iterator[Batch]:

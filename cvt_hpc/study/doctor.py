@@ -6,6 +6,7 @@ import subprocess
 import sys
 from collections.abc import Iterator
 from pathlib import Path
+from subprocess import PIPE, STDOUT
 from typing import NamedTuple
 
 from cvt_hpc.storage.files import try_to_write
@@ -43,14 +44,10 @@ def examine(folder: Path) -> Iterator[Finding]:
 
 
 def _cores() -> Finding:
-    usable, present = _usable_cores(), os.cpu_count() or 1
+    usable, present = len(os.sched_getaffinity(0)), os.cpu_count() or 1
     memory = os.sysconf("SC_PAGE_SIZE") * os.sysconf("SC_PHYS_PAGES")
     found = f"{usable} of {present} cores may be used, {size_in_words(memory)} of memory"
     return Finding(True, "machine", found)
-
-
-def _usable_cores() -> int:
-    return len(os.sched_getaffinity(0))
 
 
 def _cache() -> Finding:
@@ -87,12 +84,12 @@ def _mpi(installed: bool) -> Finding:
     command = [launcher, "-n", str(_RANKS), sys.executable, "-c", _COUNT_RANKS]
     _, lines = _said(command)
     if len(lines) == 1 and lines[0].startswith(f"{_RANKS} "):
-        fills = f"mpirun -n {usable} fills this machine" if (usable := _usable_cores()) > 1 else ""
+        usable = len(os.sched_getaffinity(0))
+        fills = f"mpirun -n {usable} fills this machine" if usable > 1 else ""
         return Finding(True, "MPI", f"{_RANKS} ranks by {launcher} ({lines[0].split()[1]})", fills)
     advice = f"`{launcher}` does not fit the MPI library of mpi4py; {serial}"
-    return Finding(
-        False, "MPI", f"{_RANKS} ranks did not find each other: {lines[-1:] or 'no answer'}", advice
-    )
+    found = f"{_RANKS} ranks did not find each other: {lines[-1:] or 'no answer'}"
+    return Finding(False, "MPI", found, advice)
 
 
 def _slurm() -> Finding:
@@ -110,14 +107,7 @@ def _slurm() -> Finding:
 def _said(command: list[str]) -> tuple[int | None, list[str]]:
     """Exit status of a program and the lines that it prints, errors included; None where it does not end."""
     try:
-        done = subprocess.run(
-            command,
-            stdout=subprocess.PIPE,
-            stderr=subprocess.STDOUT,
-            text=True,
-            timeout=PATIENCE,
-            check=False,
-        )
+        done = subprocess.run(command, stdout=PIPE, stderr=STDOUT, text=True, timeout=PATIENCE, check=False)
     except (OSError, subprocess.SubprocessError):
         return None, []
     return done.returncode, [line.strip() for line in done.stdout.splitlines() if line.strip()]

@@ -91,18 +91,9 @@ class Records:
         return self.entries["status"]
 
     def read(self, runs: np.ndarray | int, name: str | None = None) -> np.ndarray:
-        """Return the records of some runs, or one of their quantities; blank where a run has none.
+        """Return the records of some runs, or one of their quantities, shape (*runs.shape, *quantity's).
 
-        Parameters
-        ----------
-        runs : numpy.ndarray of int
-            Run indices.
-        name : str, optional
-            The quantity; all by default.
-
-        Returns
-        -------
-        numpy.ndarray, shape (*runs.shape, *quantity's)
+        They are blank where a run has none.
 
         Raises
         ------
@@ -143,10 +134,8 @@ def choose(study: Study, logs: Sequence[Path], found: np.ndarray, marked: np.nda
 
     Parameters
     ----------
-    study : Study
-        The study that the records belong to.
-    logs : sequence of Path
-        The files, by name.
+    study, logs
+        The study that the records belong to, and the files, by name.
     found : numpy.ndarray of ENTRY
         All valid records.
     marked : numpy.ndarray of int, shape (runs,)
@@ -211,17 +200,9 @@ class _Death(NamedTuple):
 def read_records(folder: Path, study: Study, earlier: Mapping[str, Places] | None = None) -> Records:
     """Return which records all logs of a folder hold.
 
-    Of several records of one run that of the latest attempt counts, and of these the earliest written.
-
-    Parameters
-    ----------
-    folder : Path
-        The study's folder of records; may be missing.
-    study : Study
-        The study that the records have to belong to.
-    earlier : mapping, optional
-        Studies from which this one has grown, whose records count as well: by fingerprint, which of its runs
-        each of theirs is.
+    Of several records of one run that of the latest attempt counts, and of these the earliest written. The
+    folder may be missing. Records of studies from which this one has grown count as well: `earlier` has, by
+    fingerprint, which of its runs each of theirs is.
     """
     logs = _files(folder)
     reader = _Reader(study, earlier or {})
@@ -243,28 +224,14 @@ def _files(folder: Path) -> list[Path]:
 
 
 class _Trace:
-    """Follows from mark to mark the runs that a process was doing.
-
-    Parameters
-    ----------
-    refine : float
-        The factor by which the retries that the process begins shorten time steps.
-
-    Attributes
-    ----------
-    followed : int
-        Number of frames.
-    timings : list of Timing
-        Of the batches that were done as a whole; of the first one only if it was marked again once its
-        kernels had been loaded.
-    refinements : dict
-        That factor, by run index and attempt.
-    """
+    """Follows from mark to mark the runs that a process was doing; its retries shorten steps by a factor."""
 
     def __init__(self, refine: float) -> None:
-        self.followed = 0
+        self.followed = 0  # frames
+        # of the batches that were done as a whole; of the first one only if it was marked again once its
+        # kernels had been loaded
         self.timings: list[Timing] = []
-        self.refinements: dict[log.Place, float] = {}
+        self.refinements: dict[log.Place, float] = {}  # that factor
         self._refine = refine
         self._mark: log.Frame | None = None
         self._began, self._loads = 0.0, True

@@ -90,17 +90,7 @@ class RecordFormat:
         return HEAD.size + PLACE.size + self.dtype.itemsize
 
     def record(self, place: Place, written: float, row: np.ndarray) -> bytes:
-        """Return one framed record.
-
-        Parameters
-        ----------
-        place : tuple of int
-            Run index and attempt.
-        written : float
-            Time of writing [s] since the epoch.
-        row : numpy.ndarray, shape ()
-            The record, of the format's dtype.
-        """
+        """Return one framed record, shape (), of the format's dtype, with its time of writing [s]."""
         return self._frame(RECORD, written, PLACE.pack(*place) + row.tobytes())
 
     def mark(self, kind: bytes, places: Sequence[Place], written: float) -> bytes:
@@ -216,14 +206,10 @@ class RecordLog:
 
     Parameters
     ----------
-    folder : Path
-        The study's folder of records.
-    layout : RecordFormat
-        How records are framed.
-    session : dict
-        Description of this start of the sweep, see `provenance.new_session`.
-    rank : int
-        Of this process.
+    folder, layout
+        The study's folder of records, and how these are framed.
+    session, rank
+        The start of the sweep, and the rank of this process in it.
     attempts : mapping, optional
         Which attempt of a run this is, by run index; the first one where it is not named.
     """
@@ -249,14 +235,7 @@ class RecordLog:
         self._open_mark: int | None = None  # where the mark of the batch at work begins [byte]
 
     def begin(self, batch: Sequence[int], *, alone: bool = False) -> None:
-        """Write that this process is at work at some runs, and at no others.
-
-        Parameters
-        ----------
-        batch : sequence of int
-            Run indices.
-        alone : bool
-            Whether the run is done alone because its process has died before.
+        """Write that this process is at work at some runs, alone where one has died of it, and at no others.
 
         Raises
         ------
