@@ -93,19 +93,22 @@ def read_csv(file: FromFile, name: str, source: str, where: str) -> Point:
         c.name: Column(c.si, tuple(_number(cells[c.place], c, f"{place}: line {n}") for n, cells in rows))
         for c in columns
     }
-    try:
-        raw = file.arrange(found)
-    except RowError as error:
-        raise mismatch(f"{place}: line {rows[error.row][0]}", error.expected, error.found) from None
-    except ValueError as error:
-        raise InputError(f"{place}: {error}") from None
+    raw = arranged(file, found, place, [f"line {n}" for n, _ in rows])
     if any(how):
-        values = ", ".join(
-            f"{key} {column.values[0]:g} {column.unit}".rstrip() for key, column in found.items()
-        )
-        told = f"{place}: read with {', '.join(filter(None, how))}; line {rows[0][0]} is {values}"
+        first = (f"{key} {column.values[0]:g} {column.unit}".rstrip() for key, column in found.items())
+        told = f"{place}: read with {', '.join(filter(None, how))}; line {rows[0][0]} is {', '.join(first)}"
         warnings.warn(told, JobWarning, stacklevel=2)
     return raw
+
+
+def arranged(file: FromFile, columns: dict[str, Column], place: str, rows: Sequence[str]) -> Point:
+    """Return the raw values that columns of a file give; an error names one of its rows, or all of it."""
+    try:
+        return file.arrange(columns)
+    except RowError as error:
+        raise mismatch(f"{place}: {rows[error.row]}", error.expected, error.found) from None
+    except ValueError as error:
+        raise InputError(f"{place}: {error}") from None
 
 
 def content_of(path: Path, limit: int, place: str, what: str, suffix: str) -> bytes:

@@ -106,11 +106,12 @@ class Job(Runs):
     def derived(self) -> tuple[Derived, ...]:
         """The parameters that follow from axes, with their values over these."""
         varied = varied_by(self.rules, [axis.name for axis in self.axes])
-        return tuple(self._derived(rule, varied[rule.key]) for rule in self.rules if varied[rule.key])
-
-    def _derived(self, rule: Rule, along: tuple[str, ...]) -> Derived:
-        parameter, evaluate = rule.parameter, partial(self._values_of, rule.key, along)
-        return Derived(rule.key, along, parameter.unit, parameter.description, rule.words, evaluate)
+        found = []
+        for rule in self.rules:
+            if along := varied[rule.key]:
+                words = rule.parameter.unit, rule.parameter.description, rule.words
+                found.append(Derived(rule.key, along, *words, partial(self._values_of, rule.key, along)))
+        return tuple(found)
 
     def _values_of(self, key: str, along: tuple[str, ...]) -> tuple:
         schema, needed = self.schema, needed_rules(self.rules, key)
@@ -139,13 +140,7 @@ class Job(Runs):
         """
         if not 0 <= index < self.size:
             raise IndexError(f"run {index} of {self.size}")
-        if self.is_sampled:
-            return self.complete({axis.name: axis.values[index] for axis in self.axes})
-        values = {}
-        for axis in reversed(self.axes):
-            index, place = divmod(index, len(axis.values))
-            values[axis.name] = axis.values[place]
-        return self.complete(values)
+        return self.complete(self.place(index))
 
     def with_units_of(self, at: Assignments, label: str = "at") -> Self:
         """Return this job with the units of `at`, as of `point_at`, for its parameters without a unit."""

@@ -25,7 +25,7 @@ from cvt_hpc.job.axes import (
     without_rounding,
 )
 from cvt_hpc.job.schema import Entry, Schema
-from cvt_hpc.job.values import Table, kind_of, read_or_default, read_value, refuse_unknown
+from cvt_hpc.job.values import Point, Table, kind_of, read_or_default, read_value, refuse_unknown
 from cvt_hpc.parameters import Parameter, Parameters
 
 KEY = ("record", "history")
@@ -90,6 +90,13 @@ class Runs:
     def size(self) -> int:
         """Number of runs; of a trace, of all runs that it chooses from."""
         return math.prod(self.shape)
+
+    def place(self, index: int) -> Point:
+        """Return the axes' values of run `index`, by axis name, counted in C order or over the samples."""
+        if self.is_sampled:
+            return {axis.name: axis.values[index] for axis in self.axes}
+        places = np.unravel_index(index, self.shape) if self.axes else ()
+        return {axis.name: axis.values[i] for axis, i in zip(self.axes, places, strict=True)}
 
 
 _SAMPLED = ("from", "to", "spacing")

@@ -8,6 +8,7 @@ import ast
 import math
 import operator
 import re
+import sys
 from collections.abc import Callable, Iterator, Mapping
 from dataclasses import dataclass, field
 
@@ -101,7 +102,8 @@ class _Reading:
             raise mismatch(self.where, expected, "a deeper one")
         match node:
             case ast.Constant(value=int() | float() as value) if not isinstance(value, bool):
-                self._check_number(value)
+                if not abs(value) <= sys.float_info.max:  # compared exactly: a whole number may be larger
+                    raise mismatch(self.where, "finite numbers in a formula", "one that is too large")
             case ast.Name(id=name):
                 yield from self._parameter(name)
             case ast.UnaryOp(op=op, operand=operand) if type(op) in _OPERATORS:
@@ -115,14 +117,6 @@ class _Reading:
                     yield from self.names(argument, depth - 1)
             case _:
                 raise self._refused(node)
-
-    def _check_number(self, value: float) -> None:
-        try:
-            finite = math.isfinite(value)
-        except OverflowError:  # a whole number beyond all floats
-            finite = False
-        if not finite:
-            raise mismatch(self.where, "finite numbers in a formula", "one that is too large")
 
     def _parameter(self, name: str) -> Iterator[str]:
         if name in CONSTANTS:

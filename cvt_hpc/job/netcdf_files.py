@@ -13,11 +13,11 @@ from typing import TYPE_CHECKING
 
 import numpy as np
 
-from cvt_hpc.errors import InputError, did_you_mean, mismatch, show
-from cvt_hpc.job.csv_files import content_of, told
+from cvt_hpc.errors import did_you_mean, mismatch, show
+from cvt_hpc.job.csv_files import arranged, content_of, told
 from cvt_hpc.job.units import factor_to
 from cvt_hpc.job.values import Point
-from cvt_hpc.parameters import Column, FromFile, RowError
+from cvt_hpc.parameters import Column, FromFile
 
 if TYPE_CHECKING:
     import netCDF4
@@ -49,15 +49,9 @@ def read_netcdf(file: FromFile, name: str, source: str, where: str) -> Point:
     path = Path(source).parent / name
     place = f"{where}: {path}"
     content = content_of(path, MOST_BYTES, place, "a netCDF file", SUFFIX)
-    try:
-        columns = _columns(file, content, place)
-        return file.arrange(columns)
-    except RowError as error:
-        raise mismatch(f"{place}: entry {error.row + 1}", error.expected, error.found) from None
-    except InputError:
-        raise
-    except ValueError as error:
-        raise InputError(f"{place}: {error}") from None
+    columns = _columns(file, content, place)
+    rows = max(len(column.values) for column in columns.values())
+    return arranged(file, columns, place, [f"entry {row}" for row in range(1, rows + 1)])
 
 
 def _columns(file: FromFile, content: bytes, place: str) -> dict[str, Column]:
@@ -93,14 +87,11 @@ def _in_rows(file: FromFile, variables: dict[str, netCDF4.Variable], place: str)
             if dimension not in grid:
                 raise mismatch(f"{place}, {name}", f"over {' x '.join(grid)}", f"over {' x '.join(own)}")
             sizes[dimension] = size
-    shape = tuple(sizes[dimension] for dimension in grid)
+    places = dict(zip(grid, np.indices([sizes[dimension] for dimension in grid]), strict=True))
     columns = {}
     for name, (unit, values) in found.items():
-        own = dimensions[name]
-        order = [dimension for dimension in grid if dimension in own]
-        turned = values.transpose([own.index(dimension) for dimension in order])
-        spread = turned.reshape([sizes[dimension] if dimension in own else 1 for dimension in grid])
-        columns[name] = Column(unit, tuple(np.broadcast_to(spread, shape).ravel().tolist()))
+        spread = values[tuple(places[dimension] for dimension in dimensions[name])]
+        columns[name] = Column(unit, tuple(spread.ravel().tolist()))
     return columns
 
 

@@ -273,9 +273,11 @@ def ordered_rules(rules: Iterable[Rule], given: Collection[str], schema: Schema,
             raise mismatch(rule.where, "one source of its values", f"a second one of {rule.key}")
         found[rule.key] = rule
     found |= _substituted({*given, *found}, schema, source)
-    giving = {rule.needs[0] for rule in found.values() if rule.is_substituted}
+    known = {*given, *found, *(rule.needs[0] for rule in found.values() if rule.is_substituted)}
     for rule in found.values():
-        _check_known(rule, {*given, *found, *giving}, schema)
+        for need in rule.needs:
+            if need not in known and schema.parameters[need].gives is not None:
+                raise mismatch(rule.where, "parameters that the job gives", f"{need}, which it does not")
     # in the order of declaration where they are free of each other: a job's rules do not depend on its layout
     needs = {key: found[key].needs for key in schema.parameters if key in found}
     try:
@@ -303,9 +305,3 @@ def _substituted(known: set[str], schema: Schema, source: str) -> dict[str, Rule
             gives = Substituted(key, names, parameter.unit, substitute, schema.units.get(key, ""))
             rules[target] = Rule(target, gives, where, schema.parameters[target])
     return rules
-
-
-def _check_known(rule: Rule, known: set[str], schema: Schema) -> None:
-    for need in rule.needs:
-        if need not in known and schema.parameters[need].gives is not None:
-            raise mismatch(rule.where, "parameters that the job gives", f"{need}, which it does not")

@@ -11,6 +11,7 @@ import tomllib
 from collections.abc import Iterator, Mapping, Sequence
 from importlib import metadata
 from pathlib import Path, PurePosixPath
+from textwrap import TextWrapper
 
 import cvt_hpc
 from cvt_hpc.errors import mismatch, unknown
@@ -161,12 +162,8 @@ def _default_in_words(parameter: Parameter) -> str:
 
 def _commented(text: str) -> list[str]:
     """Return a text as lines of a comment, broken between words."""
-    lines = ["#"]
-    for word in text.split():
-        if len(lines[-1]) + 1 + len(word) > _LONGEST:
-            lines.append("#")
-        lines[-1] += f" {word}"
-    return lines
+    wrapper = TextWrapper(_LONGEST, "# ", "# ", break_long_words=False, break_on_hyphens=False)
+    return wrapper.wrap(text)
 
 
 def _as_toml(parameter: Parameter) -> str:

@@ -4,7 +4,7 @@ The coordinates of its dataset are axes, parameters that follow from them, and e
 """
 
 import math
-from collections.abc import Collection, Iterable, Mapping, Sequence
+from collections.abc import Collection, Iterable, Mapping
 from dataclasses import asdict, dataclass, field
 from enum import IntEnum
 from functools import cached_property
@@ -16,7 +16,7 @@ from cvt_hpc.errors import mismatch
 from cvt_hpc.job import Axis, Job
 from cvt_hpc.job.definition import Derived
 from cvt_hpc.job.design import Design, Runs
-from cvt_hpc.job.values import JOB_UNITS, Document, Point, Table, shown
+from cvt_hpc.job.values import JOB_UNITS, Document, Table, shown
 from cvt_hpc.storage.netcdf import attributes
 from cvt_hpc.study.simulator import Simulator
 from cvt_hpc.variables import Status, Variable
@@ -142,12 +142,6 @@ class Study(Runs):
     def record_names(self) -> tuple[str, ...]:
         """Quantities of a record, by their names in `record_dtype`."""
         return self.record_dtype.names or ()
-
-    def place(self, index: int) -> Point:
-        """Return the axes' values of run `index`, by axis name."""
-        position: Sequence[Any] = np.unravel_index(index, self.shape) if self.axes else ()
-        position = [index] * len(self.axes) if self.is_sampled else position
-        return {axis.name: axis.values[i] for axis, i in zip(self.axes, position, strict=True)}
 
     def place_in_words(self, index: int) -> str:
         """Return the axes' values of run `index` for people; "" without axes."""

@@ -8,7 +8,7 @@ import math
 import time
 from collections.abc import Callable, Collection, Iterator, Mapping, Sequence
 from contextlib import ExitStack, closing
-from dataclasses import replace
+from dataclasses import dataclass, replace
 from functools import partial
 from pathlib import Path
 
@@ -337,39 +337,26 @@ def open_counter(team: Team) -> Counter:
     return SharedCounter(team.communicator)
 
 
+@dataclass
 class Claims:
-    """The work of this rank: iterating yields one batch at a time.
+    """The work of this rank: iterating yields one batch at a time."""
 
-    Parameters
-    ----------
-    plan : sequence of Assignment
-        All batches to be done, in the order in which they start; the same on all ranks.
-    counter : Counter
-        Where positions in `plan` are claimed.
-    may_claim : callable
-        Called before each batch; if it returns False, there are no more.
-    fits : callable
-        Whether there is time for a batch. A batch that does not fit is passed over, and no rank does it in
-        this session; shorter ones stand later in the plan.
-    """
+    plan: Sequence[Assignment]  # all batches to be done, in the order in which they start, alike on all ranks
+    counter: Counter  # where positions in `plan` are claimed
+    may_claim: Callable[[], bool]  # called before each batch; if it returns False, there are no more
+    # Whether there is time for a batch. One that does not fit is passed over, and no rank does it in this
+    # session; shorter ones stand later in the plan.
+    fits: Callable[[Batch], bool]
 
-    def __init__(
-        self,
-        plan: Sequence[Assignment],
-        counter: Counter,
-        may_claim: Callable[[], bool],
-        fits: Callable[[Batch], bool],
-    ) -> None:
-        self._plan, self._counter = plan, counter
-        self._may_claim, self._fits = may_claim, fits
+    def __post_init__(self) -> None:
         self._held: Assignment | None = None  # claimed, and not begun
 
     def __iter__(self) -> Iterator[Assignment]:
-        while self._may_claim() and (claimed := self._claim()) is not None:
+        while self.may_claim() and (claimed := self._claim()) is not None:
             for place, part in enumerate(claimed.parts()):
-                if place > 0 and not self._may_claim():
+                if place > 0 and not self.may_claim():
                     return
-                if self._fits(part.runs):
+                if self.fits(part.runs):
                     yield part
 
     def joining(self, may_join: Callable[[Batch], bool]) -> Batch:
@@ -384,5 +371,5 @@ class Claims:
         held, self._held = self._held, None
         if held is not None:
             return held
-        position = self._counter.claim()
-        return self._plan[position] if position < len(self._plan) else None
+        position = self.counter.claim()
+        return self.plan[position] if position < len(self.plan) else None

@@ -8,6 +8,7 @@ import sys
 import time
 from collections.abc import Callable, Sequence
 from contextlib import ExitStack, suppress
+from dataclasses import InitVar, dataclass
 from typing import NamedTuple, Self
 
 import numpy as np
@@ -67,61 +68,40 @@ class Counter:
         return
 
 
+@dataclass
 class Progress:
-    """Shows on stderr how many runs all ranks have finished.
+    """Shows on stderr how many runs all ranks have finished."""
 
-    Parameters
-    ----------
-    counter : Counter
-        The counter to which the ranks report.
-    total : int
-        Number of runs of the study.
-    recorded, failed : int
-        Number of runs that earlier sessions have recorded, and of the failed ones among them.
-    visible : bool
-        Whether anything is shown at all.
-    costs : numpy.ndarray
-        Predicted durations of the runs to be done, in any unit and in the order in which they are started.
-    unit : str
-        Name of the things that are counted.
-    """
+    counter: Counter  # to which the ranks report
+    total: int  # number of runs of the study
+    recorded: int  # number of runs that earlier sessions have recorded
+    failed: int  # number of failed ones among them
+    visible: bool  # whether anything is shown at all
+    # predicted durations of the runs to be done, in any unit and in the order in which they are started
+    costs: InitVar[np.ndarray]
+    unit: str = "run"  # name of the things that are counted
 
-    def __init__(
-        self,
-        counter: Counter,
-        total: int,
-        recorded: int,
-        failed: int,
-        visible: bool,
-        costs: np.ndarray,
-        unit: str = "run",
-    ) -> None:
-        self._counter = counter
-        self._total = total
-        self._recorded = recorded
-        self._failed = failed
+    def __post_init__(self, costs: np.ndarray) -> None:
         self._started = self._shown = time.monotonic()
-        self._visible = visible
         self._work = np.cumsum(costs)
-        self._unit = unit
         self._bar = None
         self._lines_above = ExitStack()  # where log messages go while the bar is shown
-        if visible and sys.stderr.isatty():
+        if self.visible and sys.stderr.isatty():
             from tqdm import tqdm
             from tqdm.contrib.logging import logging_redirect_tqdm
 
-            options = {"unit": unit, "dynamic_ncols": True, "bar_format": _BAR}
-            self._bar = tqdm(total=total, initial=recorded, **options)
+            options = {"unit": self.unit, "dynamic_ncols": True, "bar_format": _BAR}
+            self._bar = tqdm(total=self.total, initial=self.recorded, **options)
             self._lines_above.enter_context(logging_redirect_tqdm())
 
     def expect(self, costs: np.ndarray) -> None:
         """Add runs behind the runs that are to be done; `costs` as before."""
-        self._total += costs.size
+        self.total += costs.size
         self._work = np.append(self._work, self._work[-1] + np.cumsum(costs))
 
     def show(self) -> None:
         """Show the state of things, if the last time is long enough ago."""
-        if not self._visible:
+        if not self.visible:
             return
         now = time.monotonic()
         elapsed = now - self._started
@@ -141,7 +121,7 @@ class Progress:
 
     def to_go(self) -> str:
         """Return the time for the remaining runs, as ", 0:01:00 to go"; "" before anything has ended."""
-        done, elapsed = self._counter.tally().finished, time.monotonic() - self._started
+        done, elapsed = self.counter.tally().finished, time.monotonic() - self._started
         if not done or elapsed <= 0.0:
             return ""
         # by their number alone, too long a time would be left
@@ -150,7 +130,7 @@ class Progress:
 
     def close(self) -> None:
         """Show the state at the end."""
-        if not self._visible:
+        if not self.visible:
             return
         with self._lines_above, suppress(OSError):
             self._show(time.monotonic() - self._started)
@@ -158,18 +138,18 @@ class Progress:
                 self._bar.close()
 
     def _show(self, elapsed: float) -> None:
-        tally = self._counter.tally()
-        finished, failed = self._recorded + tally.finished, self._failed + tally.failed
+        tally = self.counter.tally()
+        finished, failed = self.recorded + tally.finished, self.failed + tally.failed
         if self._bar is not None:
-            self._bar.total = self._total
+            self._bar.total = self.total
             self._bar.set_postfix_str(f"{failed} failed{self.to_go()}", refresh=False)
             self._bar.update(finished - self._bar.n)
             self._bar.refresh()
             return
-        share = finished / self._total if self._total else 1.0
-        line = f"{finished}/{self._total} {self._unit}s ({share:.1%}), {failed} failed"
+        share = finished / self.total if self.total else 1.0
+        line = f"{finished}/{self.total} {self.unit}s ({share:.1%}), {failed} failed"
         if tally.finished and elapsed > 0:
-            line += f", {tally.finished / elapsed:.3g} {self._unit}s/s{self.to_go()}"
+            line += f", {tally.finished / elapsed:.3g} {self.unit}s/s{self.to_go()}"
         print(line, file=sys.stderr, flush=True)
 
 

@@ -16,6 +16,7 @@ import threading
 import time
 from collections.abc import Callable, Iterator, Mapping
 from contextlib import contextmanager
+from dataclasses import dataclass
 from types import FrameType
 from typing import Any, NamedTuple, NoReturn, Self, TypeVar
 
@@ -180,41 +181,30 @@ def raise_again(name: str, status: int, everywhere: bool) -> NoReturn:
     raise error
 
 
+@dataclass
 class Stop:
     """Whether this rank continues.
 
-    Parameters
-    ----------
-    counter : Counter
-        The counter through which ranks communicate.
-    signals : SignalWatch
-        The signals that this process was sent.
-    limit : TimeLimit
-        Time from here on. No batch begins that is not expected to end in it, and batches at
-        work when it is over are broken off.
-    meanwhile : callable
-        Called about twice a second while a run computes: shows the progress.
+    No batch begins that is not expected to end within the limit, and those at work at its end are broken off.
     """
 
-    def __init__(
-        self, counter: Counter, signals: SignalWatch, limit: TimeLimit, meanwhile: Callable[[], None]
-    ) -> None:
-        self._counter = counter
-        self._signals = signals
-        self._limit = limit
-        self._meanwhile = meanwhile
+    counter: Counter  # through which ranks communicate
+    signals: SignalWatch  # the signals that this process was sent
+    limit: TimeLimit  # time from here on
+    meanwhile: Callable[[], None]  # called about twice a second while a run computes: shows the progress
+
+    def __post_init__(self) -> None:
         self._looked = time.monotonic()
-        self._deadline = self._looked + limit.seconds
+        self._deadline = self._looked + self.limit.seconds
         self._late = ""
-        self._told = False
-        self._heard = False
+        self._told = self._heard = False
         self._death: RankDied | None = None
 
     @property
     def reason(self) -> str | None:
         """Why this rank starts no more runs, or not all; None if it continues."""
-        if self._signals.noted:
-            return self._signals.noted
+        if self.signals.noted:
+            return self.signals.noted
         if self._heard:
             return ELSEWHERE
         return self._late or None
@@ -243,7 +233,7 @@ class Stop:
         late = seconds > left
         if late and not self._late:
             self._late = (
-                f"{self._limit.name}: {show_duration(max(left, 0.0))} were left, a batch may take "
+                f"{self.limit.name}: {show_duration(max(left, 0.0))} were left, a batch may take "
                 f"{show_duration(seconds)}"
             )
         return not late
@@ -253,8 +243,8 @@ class Stop:
         self.look()
         over = time.monotonic() >= self._deadline
         if over:
-            self._late = self._late or self._limit.name
-        return self.reason if self._signals.noted or self._heard or over else None
+            self._late = self._late or self.limit.name
+        return self.reason if self.signals.noted or self._heard or over else None
 
     def look(self) -> None:
         """Check the other ranks now and then, and tell them if this one is to stop."""
@@ -262,9 +252,9 @@ class Stop:
         try:
             if now - self._looked > _LOOK_INTERVAL:
                 self._looked = now
-                self._meanwhile()
-                self._heard = self._counter.is_interrupted()
-            if self._signals.noted:
+                self.meanwhile()
+                self._heard = self.counter.is_interrupted()
+            if self.signals.noted:
                 self.tell_all()
         except RankDied as death:  # no reason to stop the present run
             self._death = death
@@ -274,7 +264,7 @@ class Stop:
         # Not from the signal handler: that may strike within another call of MPI.
         if not self._told:
             self._told = True
-            self._counter.interrupt_all()
+            self.counter.interrupt_all()
 
 
 def outlive(team: Team, work: Callable[[Team], Result]) -> Result:
