@@ -55,7 +55,7 @@ def main(arguments: list[str] | None = None) -> int:
         _check_readable(words)
         parsed = _parser().parse_args(words)
         with _compiling_told(), _job_warnings_told():
-            status = parsed.command(parsed)
+            status = parsed.command(parsed) or DONE
         sys.stdout.flush()
         return status
     except InputError as error:

@@ -31,7 +31,7 @@ def add(commands: parts.Commands) -> None:
     parts.add_assignments(check, "--set", parts.REPLACE)
 
 
-def _check(arguments: argparse.Namespace) -> int:
+def _check(arguments: argparse.Namespace) -> None:
     from cvt_hpc.job import load_job
     from cvt_hpc.job.document import read_document
 
@@ -39,15 +39,14 @@ def _check(arguments: argparse.Namespace) -> int:
     command = arguments.command_for or next((name for name in with_table() if name in tables), RUN)
     if command != RUN:
         if arguments.ranks or arguments.pilots or arguments.plot:
-            raise mismatch(
-                "--ranks, --pilots, --plot", "a job of `cvt-hpc run`", f"one of `cvt-hpc {command}`"
-            )
+            found = f"one of `cvt-hpc {command}`"
+            raise mismatch("--ranks, --pilots, --plot", "a job of `cvt-hpc run`", found)
         experiment = import_module(EXPERIMENTS[command].module)
         asked = experiment.load(arguments.path, arguments.set)
         lines = list(experiment.plan_lines(asked, parts.output_folder(None, asked.job)))
         if parts.speaks():
             print(*lines, sep="\n")
-        return parts.DONE
+        return
     _check_ranks(arguments.ranks)
     if arguments.pilots < 0:
         raise mismatch("--pilots", "a number of batches", str(arguments.pilots))
@@ -71,7 +70,6 @@ def _check(arguments: argparse.Namespace) -> int:
 
             title = f"{job.name}: {job.size} runs"
             parts.say(f"picture: {draw_efficiency(curve, title, expected.basis, arguments.plot)}")
-    return parts.DONE
 
 
 def show_job(job: Job, out: Path | None) -> None:

@@ -21,7 +21,7 @@ if TYPE_CHECKING:
     from cvt_hpc.job.values import Point
 
 Result = TypeVar("Result")
-Command = Callable[[argparse.Namespace], int]  # does one, and returns the exit status
+Command = Callable[[argparse.Namespace], int | None]  # does one, and returns the exit status, if not 0
 Commands: TypeAlias = "argparse._SubParsersAction[argparse.ArgumentParser]"
 
 DONE, SOME_FAILED, INTERRUPTED = 0, 1, 130

@@ -66,7 +66,7 @@ def _add_measured(command: argparse.ArgumentParser) -> None:
     command.add_argument("--measured", metavar="CSV", help=MEASURED.text)
 
 
-def _status(arguments: argparse.Namespace) -> int:
+def _status(arguments: argparse.Namespace) -> None:
     from cvt_hpc.printing import status_rows
     from cvt_hpc.study import read_status
     from cvt_hpc.tables import columns
@@ -75,17 +75,15 @@ def _status(arguments: argparse.Namespace) -> int:
     parts.complain(*status.warnings)
     in_words = columns(status_rows(status), indent="")
     parts.say(*([json.dumps(asdict(status))] if arguments.json else in_words))
-    return parts.DONE
 
 
-def _gather(arguments: argparse.Namespace) -> int:
+def _gather(arguments: argparse.Namespace) -> None:
     from cvt_hpc.study import gather
 
     parts.say(f"results: {gather(arguments.path)}")
-    return parts.DONE
 
 
-def _table(arguments: argparse.Namespace) -> int:
+def _table(arguments: argparse.Namespace) -> None:
     from cvt_hpc.analysis.conversion import plain
     from cvt_hpc.analysis.run_table import FORMATS, run_table, write_table
     from cvt_hpc.study import open_results
@@ -95,10 +93,9 @@ def _table(arguments: argparse.Namespace) -> int:
     with open_results(arguments.path) as dataset:
         frame = run_table(plain(dataset, str(arguments.path)), str(arguments.path))
     parts.say(f"table: {write_table(frame, out)}")
-    return parts.DONE
 
 
-def _map(arguments: argparse.Namespace) -> int:
+def _map(arguments: argparse.Namespace) -> None:
     from cvt_hpc.analysis.arrangement import with_spacings
     from cvt_hpc.job.assignments import split_assignments
 
@@ -134,18 +131,16 @@ def _map(arguments: argparse.Namespace) -> int:
             if has_starts(dataset, at) and not arguments.others:
                 parts.say(start_line(dataset, at, source))
         parts.say(f"map: {out}")
-    return parts.DONE
 
 
-def _figure(arguments: argparse.Namespace) -> int:
+def _figure(arguments: argparse.Namespace) -> None:
     from cvt_hpc.papers.figures import figure_of, finding_lines
 
     picture, table, findings = figure_of(arguments.path)
     parts.say(*finding_lines(findings), f"picture: {picture}", f"table: {table}")
-    return parts.DONE
 
 
-def _report(arguments: argparse.Namespace) -> int:
+def _report(arguments: argparse.Namespace) -> None:
     from cvt_hpc.report import write_report
 
     out = arguments.out or parts.folder_of(arguments.path) / "report.html"
@@ -159,12 +154,11 @@ def _report(arguments: argparse.Namespace) -> int:
 
         every = read_duration(arguments.every, "--every")
         parts.say(f"report: {follow_report(arguments.path, out, every, status_rows)}")
-        return parts.DONE
+        return
     with parts.opened_results(arguments.path) as dataset:
         source, folder = str(arguments.path), parts.folder_of(arguments.path)
         written = write_report(dataset, out, source, folder, arguments.measured)
         parts.say(f"report: {written}")
-    return parts.DONE
 
 
 def _compare(arguments: argparse.Namespace) -> int:

@@ -66,7 +66,7 @@ def _simulate(arguments: argparse.Namespace) -> int:
     return parts.DONE
 
 
-def _export(arguments: argparse.Namespace) -> int:
+def _export(arguments: argparse.Namespace) -> None:
     from cvt_hpc.analysis.export import FORMATS, export
     from cvt_hpc.analysis.telling_apart import history_files
 
@@ -77,4 +77,3 @@ def _export(arguments: argparse.Namespace) -> int:
     with parts.opened_histories(files) as (history,):
         lines = export(history, arguments.of, arguments.out, str(files[0]), velocity=arguments.velocity)
     parts.say(*lines)
-    return parts.DONE

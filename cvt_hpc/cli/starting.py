@@ -41,27 +41,25 @@ def add(commands: parts.Commands) -> None:
     completion.add_argument("shell", choices=SHELLS)
 
 
-def _init(arguments: argparse.Namespace) -> int:
+def _init(arguments: argparse.Namespace) -> None:
     from cvt_hpc.job.template import write_template
 
     path = write_template(arguments.name, arguments.model)
     parts.say(
         f"job: {path}", f"next: cvt-hpc check {path}; cvt-hpc run {path}; cvt-hpc map out/{arguments.name}"
     )
-    return parts.DONE
 
 
-def _models(arguments: argparse.Namespace) -> int:
+def _models(arguments: argparse.Namespace) -> None:
     from cvt_hpc.job.template import key_lines, model_lines
 
     if arguments.model:
         parts.say(*key_lines(arguments.model))
     else:
         parts.say(*model_lines(), "", "keys: cvt-hpc models MODEL; a job: cvt-hpc init NAME --model MODEL")
-    return parts.DONE
 
 
-def _variables(arguments: argparse.Namespace) -> int:
+def _variables(arguments: argparse.Namespace) -> None:
     from cvt_hpc.simulation import declared_record
     from cvt_hpc.tables import columns
 
@@ -70,26 +68,23 @@ def _variables(arguments: argparse.Namespace) -> int:
     along = [(name, coordinate.units, coordinate.meaning) for name, coordinate in coordinates.items()]
     parts.say(*columns([("variable", "along", "unit", "meaning"), *rows], indent=""), "")
     parts.say(*columns([("dimension", "unit", "meaning"), *along], indent=""))
-    return parts.DONE
 
 
-def _examples(arguments: argparse.Namespace) -> int:
+def _examples(arguments: argparse.Namespace) -> None:
     from cvt_hpc.job.template import copy_examples, example_lines
 
     if arguments.names:
         parts.say(*(f"example: {path}" for path in copy_examples(arguments.names, arguments.out)))
     else:
         parts.say(*example_lines(), "", "copies: cvt-hpc examples NAME")
-    return parts.DONE
 
 
-def _friction(arguments: argparse.Namespace) -> int:
+def _friction(arguments: argparse.Namespace) -> None:
     from cvt_hpc.experiments.measured_friction import write_fit
 
     parts.check_output(arguments.out, (".toml",))
     lines, files = write_fit(arguments.path, arguments.out)
     parts.say(*lines, *(f"{what}: {path}" for what, path in files))
-    return parts.DONE
 
 
 def _doctor(arguments: argparse.Namespace) -> int:
@@ -104,8 +99,7 @@ def _doctor(arguments: argparse.Namespace) -> int:
     return status
 
 
-def _completion(arguments: argparse.Namespace) -> int:
+def _completion(arguments: argparse.Namespace) -> None:
     import shtab
 
     print(shtab.complete(arguments.parser, arguments.shell))
-    return parts.DONE

@@ -110,16 +110,14 @@ class Rule:
         InputError
             If there is none, or it is not legal.
         """
-        return read_value(self.parameter, self._raw(parameters), self.where)
-
-    def _raw(self, parameters: Parameters) -> Any:
         try:
-            return self.source.value(parameters)
+            raw = self.source.value(parameters)
         except ValueError as error:
             if not isinstance(self.source, (Link, Substituted)):
                 raise mismatch(self.where, "a finite value", f"{show(self.words)} ({error})") from None
             blamed, unit, wanted = self.source.names[0], self.source.unit, self.source.wanted
             raise mismatch(self.where, str(error), in_words(parameters[blamed], unit, wanted)) from None
+        return read_value(self.parameter, raw, self.where)
 
 
 class Noted(Mapping[str, Any]):

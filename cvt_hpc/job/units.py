@@ -242,13 +242,11 @@ def read_duration(text: str, where: str) -> float:
         If the text is not a time span, or none above 0.
     """
     parts = _PART.findall(text)
-    lonely = len(parts) == 1
-    if not parts or _PART.sub("", text) or any(not unit and not lonely for _, unit in parts):
-        raise mismatch(where, _EXPECTED, show(text))
+    is_sum = not _PART.sub("", text) and (len(parts) == 1 or all(unit for _, unit in parts))
     try:
         seconds = sum(to_si(f"{number} {'min' if unit == 'm' else unit}", "s") for number, unit in parts)
     except UnitError:
-        raise mismatch(where, _EXPECTED, show(text)) from None
-    if seconds <= 0:
+        is_sum = False
+    if not is_sum or seconds <= 0:
         raise mismatch(where, _EXPECTED, show(text))
     return seconds

@@ -30,8 +30,6 @@ from cvt_hpc.variables import Status
 if TYPE_CHECKING:
     import xarray as xr
 
-    from cvt_hpc.job import Job
-
 STEP = "step"  # the key of the time step, of steppers that have a fixed one
 MOST_REFINED = 1000.0
 

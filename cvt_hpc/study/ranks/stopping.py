@@ -18,10 +18,10 @@ from collections.abc import Callable, Iterator, Mapping
 from contextlib import contextmanager
 from dataclasses import dataclass
 from types import FrameType
-from typing import Any, NamedTuple, NoReturn, Self, TypeVar
+from typing import Any, NamedTuple, NoReturn, Self
 
 from cvt_hpc.errors import mismatch
-from cvt_hpc.study.ranks.launch import RankDied, Team, is_tolerated
+from cvt_hpc.study.ranks.launch import RankDied, Result, Team, is_tolerated
 from cvt_hpc.study.ranks.progress import Counter, show_duration
 from cvt_hpc.study.ranks.starting import SIGNALS
 
@@ -31,7 +31,6 @@ _GATHERING = 2e-4  # [s] a run
 _SHORTEST_PLANNING = 10.0  # [s]: a plan takes so long on a busy machine, whatever its size
 _TIME_LEFT = re.compile(r"(?:(\d+)-)?(?:(\d+):)?(?:(\d+):)?(\d+)")
 
-Result = TypeVar("Result")
 _logger = logging.getLogger(__name__)
 
 _LOOK_INTERVAL = 0.5  # [s] between checks of the other ranks
