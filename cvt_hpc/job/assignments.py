@@ -81,7 +81,7 @@ def read_axes_and_values(
     An axis is a list or a range, as a table [axes] has it, of a parameter with a single value.
     """
     axes, values = {}, {}
-    for key, entry in _entries(assignments, schema, source, label):
+    for key, entry in [*_entries(assignments, schema, source, label)]:  # unknown keys are the first errors
         parameter, raw, _ = entry
         if kind_of(parameter) is not tuple and is_axis(raw):
             axes[key] = entry
