@@ -48,16 +48,7 @@ def split_assignments(assignments: Assignments, source: str, label: str) -> dict
 
 
 def read_assignments(assignments: Assignments, schema: Schema, source: str, label: str) -> Point:
-    """Return the values [SI] by key.
-
-    Parameters
-    ----------
-    assignments : mapping, or sequence of "KEY=VALUE"
-        Numbers [SI] or texts with units; a key may be written section.key.
-    schema : Schema
-        The declared parameters.
-    source, label : str
-        The job file, and the name of the assignments in an error, e.g. "--set".
+    """Return the values [SI] by key of assignments as of `split_assignments`; a key may be section.key.
 
     Raises
     ------
@@ -105,14 +96,8 @@ def read_coordinates(
 ) -> Point:
     """Return the values of coordinates of a dataset by name: numbers in its units, texts where it has none.
 
-    Parameters
-    ----------
-    assignments : sequence of "KEY=VALUE"
-        Numbers, or texts with units.
-    units : mapping
-        CF unit of each coordinate; None for one of texts.
-    source, label : str
-        The dataset, and the name of the assignments in an error.
+    The assignments are numbers, or texts with units; `units` has the CF unit of each coordinate, None for one
+    of texts.
 
     Raises
     ------

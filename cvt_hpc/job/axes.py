@@ -86,19 +86,15 @@ def _spread(axis: Axis, most: float) -> Axis:
 
 
 def read_axis(name: str, parameter: Parameter, raw: object, where: str) -> Axis:
-    """Check an axis as it stands in a job file, and return it with its values.
+    """Check the axis of a parameter as it stands in a job file, and return it with its values.
 
     Parameters
     ----------
-    name : str
-        Name of the parameter.
-    parameter : Parameter
-        Declaration of the axis.
+    name, parameter, where
+        The key and its declaration, and file and key for the error.
     raw : object
         A list of values, a 1-D array of numbers, or a table with from, to and either count (and spacing) or
         step.
-    where : str
-        File and key, for the error.
 
     Returns
     -------

@@ -278,14 +278,7 @@ def answering_model(job: Job) -> tuple[str, str] | None:
 def handed_to(job: Job, model: str, why: str) -> Document:
     """Return a document of the same runs for another model, with the keys that it knows.
 
-    Parameters
-    ----------
-    job : Job
-        A validated job.
-    model : str
-        The other model.
-    why : str
-        The purpose, for the description and the error.
+    The purpose `why` stands in the description and the error.
 
     Raises
     ------

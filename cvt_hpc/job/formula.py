@@ -58,21 +58,12 @@ class Formula:
 
 
 def read_formula(raw: object, parameters: Mapping[str, Parameter], where: str) -> Formula:
-    """Return the formula that stands in a job file.
-
-    Parameters
-    ----------
-    raw : object
-        As TOML gives it.
-    parameters : mapping
-        Parameters that names may stand for; parameters that are no numbers are refused.
-    where : str
-        File and key, for the error.
+    """Return the formula that stands in a job file, and whose names may stand for parameters.
 
     Raises
     ------
     InputError
-        If it is no formula, or a name is unknown.
+        If it is no formula, or a name is unknown or that of a parameter that is no number.
     """
     if not isinstance(raw, str):
         raise mismatch(where, _EXPECTED, show(raw))

@@ -70,14 +70,7 @@ class Schema:
     def find(self, name: str, where: str, section: str | None = None) -> str:
         """Return the key that a name means: a bare key, or "section.key".
 
-        Parameters
-        ----------
-        name : str
-            As the user wrote it.
-        where : str
-            File and key, for the error.
-        section : str, optional
-            The table in which the name stands, and has to belong.
+        If it stands in the table of a `section`, it has to belong there.
 
         Raises
         ------
@@ -131,21 +124,8 @@ class Schema:
 def load_schema(model: str | None, stepper: str | None, source: str) -> Schema:
     """Return the parameters that a job of a model and a stepper may set.
 
-    Parameters
-    ----------
-    model : str
-        A name in `cvt_hpc.models.MODELS`.
-    stepper : str or None
-        A stepper that the model takes; None for the model's default, which is none for a model without a
-        transient.
-    source : str
-        The file, for the error.
-
-    Returns
-    -------
-    Schema
-        Of both, and of the tables that all transients share; of these a model may declare keys with its own
-        defaults.
+    Those of both, and of the tables that all transients share; of these a model may declare keys with its own
+    defaults. No stepper stands for the model's default, which is none for a model without a transient.
 
     Raises
     ------

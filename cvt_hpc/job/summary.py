@@ -23,21 +23,9 @@ _MOST_ASKED = 500  # runs, for parameters without effect
 
 
 def summarize(job: Job, core_seconds: float, measured: int = 0) -> str:
-    """Return the content of a job: every parameter with its origin, the axes, and the cost.
+    """Return the content of a job in lines: every parameter with its origin, the axes, and the cost.
 
-    Parameters
-    ----------
-    job : Job
-        A validated job.
-    core_seconds : float
-        Estimated cost of one run [s].
-    measured : int
-        Number of recorded runs that the estimate rests on.
-
-    Returns
-    -------
-    str
-        Lines of at most one parameter each.
+    The cost of a run [core-seconds] is estimated by as many recorded ones as are `measured`.
     """
     stepper = "no transient" if job.stepper is None else f"stepper {job.stepper}"
     lines = [f"job {job.name} ({one_line(job.source)}): model {job.model}, {stepper}"]
@@ -168,16 +156,12 @@ def tell_of_no_effect(
 
     Parameters
     ----------
-    schema : Schema
+    schema, values, source
         Of the job.
-    values : mapping
-        Value [SI] by key.
     files : mapping
         By key the name of each file that the job gives.
     without : mapping
         Given keys without effect, each with the setting that makes it so.
-    source : str
-        The job file.
 
     Raises
     ------

@@ -78,16 +78,7 @@ def job_template(name: str, model: str, source: str) -> str:
     """Return a job file of a model in which each key stands commented out, with its default and meaning.
 
     As it stands it is a small study along one axis, or along two if its runs are cheap; all else is at its
-    default.
-
-    Parameters
-    ----------
-    name : str
-        Of the job and its output folder.
-    model : str
-        A model whose runs are recorded.
-    source : str
-        The command that needs it, for the error.
+    default. `name` is also that of its output folder, `source` the command that needs it, for the error.
 
     Raises
     ------
@@ -240,19 +231,10 @@ def example_lines() -> Iterator[str]:
 
 
 def copy_examples(names: Sequence[str], out: Path) -> list[Path]:
-    """Copy examples, with the files that they read, to their places below a folder.
+    """Copy examples, with the files that they read, to their places below a folder, and return the copies.
 
-    Parameters
-    ----------
-    names : sequence of str
-        Each a name as of `example_files`, a folder, or the last part of either, with or without its suffix.
-    out : Path
-        The folder; it is made if needed.
-
-    Returns
-    -------
-    list of Path
-        The copies.
+    Each is named as of `example_files`, or by a folder, or by the last part of either, with or without its
+    suffix. The folder is made if needed.
 
     Raises
     ------

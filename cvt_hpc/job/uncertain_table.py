@@ -33,14 +33,11 @@ def read_uncertain(
 
     Parameters
     ----------
-    table : mapping
-        `samples`, `seed`, `correlation`, `indices`, and a distribution by parameter.
+    table, schema, source
+        `samples`, `seed`, `correlation`, `indices`, and a distribution by parameter; the job's declarations,
+        with samples; and its file, for the error.
     gone : collection of str
         Parameters that overrides have given a value of their own.
-    schema : Schema
-        Of the job, with samples.
-    source : str
-        The job file, for the error.
 
     Returns
     -------

@@ -93,21 +93,12 @@ def refuse_unknown(table: Iterable[str], known: Collection[str], place: str, wha
 
 
 def as_list(array: np.ndarray, where: str, dimensions: tuple[int, ...]) -> list:
-    """Return an array of numbers as a (nested) list.
-
-    Parameters
-    ----------
-    array : array
-        Of floats or integers of any width.
-    where : str
-        File and key, for the error.
-    dimensions : tuple of int
-        Numbers of dimensions that are legal.
+    """Return an array of floats or integers of any width as a (nested) list.
 
     Raises
     ------
     InputError
-        If it is none of numbers, or has another number of dimensions.
+        If it is none of numbers, or has another number of dimensions than is legal.
     """
     if array.ndim not in dimensions or array.dtype.kind not in "iuf":
         shapes = " or ".join(f"{ndim}-D" for ndim in dimensions)
@@ -263,16 +254,7 @@ def meant(raw: object, parameter: Parameter) -> str:
 def warn_of_bare_numbers(parameter: Parameter, raw: object, where: str) -> None:
     """Warn of the first number without a unit that is outside the sensible range of a parameter.
 
-    Zero and infinity mean the same in any unit.
-
-    Parameters
-    ----------
-    parameter : Parameter
-        Declaration of the key.
-    raw : object
-        The value, list, array or range found.
-    where : str
-        File and key.
+    Zero and infinity mean the same in any unit. Arguments are those of `read_value`, or a list or range.
     """
     if parameter.sensible is None:
         return
