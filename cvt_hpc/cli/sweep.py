@@ -18,6 +18,7 @@ if TYPE_CHECKING:
     from cvt_hpc.study import RunReport
     from cvt_hpc.study.repeats import Repeat
 
+Options = dict[str, Any]  # of a sweep
 RETRIED = ("timed_out", "failed_error", "failed_numerics")
 
 
@@ -93,7 +94,7 @@ def _run(arguments: argparse.Namespace) -> int:
 
 def _load(
     arguments: argparse.Namespace,
-) -> tuple[Job, dict[str, Any], list[tuple[Repeat, Callable[[Repeat], None]]]]:
+) -> tuple[Job, Options, list[tuple[Repeat, Callable[[Repeat], None]]]]:
     """Return the job, the options of its sweep, and the samples that are to be done again."""
     from cvt_hpc.job import load_job
     from cvt_hpc.job.units import read_duration
@@ -141,9 +142,7 @@ def _repeats(job: Job, arguments: argparse.Namespace) -> list[tuple[Repeat, Call
     return repeats
 
 
-def _repeat(
-    repeat: Repeat, show: Callable[[Repeat], None], options: dict[str, Any], started: float
-) -> RunReport:
+def _repeat(repeat: Repeat, show: Callable[[Repeat], None], options: Options, started: float) -> RunReport:
     """Do the runs of a sample again in the time that is left, and print what was found."""
     from cvt_hpc.printing import trouble_lines
 

@@ -12,15 +12,15 @@ import numpy as np
 from cvt_hpc.errors import check_keys, mismatch, show, unknown
 from cvt_hpc.job.axes import is_axis
 from cvt_hpc.job.schema import Entry, Schema
-from cvt_hpc.job.values import Point, kind_of, read_value, warn_of_bare_numbers
+from cvt_hpc.job.values import Document, Point, Table, kind_of, read_value, warn_of_bare_numbers
 from cvt_hpc.parameters import Parameter
 
 _PLAIN = {bool, int, float, str}
 
-Assignments = Mapping[str, Any] | Sequence[str]
+Assignments = Table | Sequence[str]
 
 
-def split_assignments(assignments: Assignments, source: str, label: str) -> dict[str, Any]:
+def split_assignments(assignments: Assignments, source: str, label: str) -> Document:
     """Return the values by the names that the user wrote; of a name set twice the last value counts.
 
     Parameters
@@ -104,7 +104,7 @@ def read_coordinates(
     InputError
         If a coordinate is unknown or a value is not in its unit.
     """
-    values: dict[str, Any] = split_assignments(assignments, source, label)
+    values = split_assignments(assignments, source, label)
     for name, text in values.items():
         if name not in units:
             raise unknown(f"{source}: {label} {name}", "axis", name, units)
@@ -114,7 +114,7 @@ def read_coordinates(
     return values
 
 
-def take_own(assignments: dict[str, Any], table: str) -> dict[str, Any]:
+def take_own(assignments: Document, table: str) -> Document:
     """Take the values of a command's own table, TABLE.KEY, off the assignments, and return them by KEY."""
     own = [key for key in assignments if key.startswith(f"{table}.")]
     return {key.removeprefix(f"{table}."): structured(assignments.pop(key)) for key in own}

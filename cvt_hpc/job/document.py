@@ -7,7 +7,6 @@ import re
 import tomllib
 from collections.abc import Mapping
 from pathlib import Path
-from typing import Any
 
 from cvt_hpc.errors import InputError, check_keys, did_you_mean, mismatch, show
 from cvt_hpc.job.definition import HEADER
@@ -118,7 +117,7 @@ def read_tables(raw: object, where: str, what: str) -> Table:
     return raw
 
 
-def read_set(raw: Mapping[str, Any], where: str) -> Point:
+def read_set(raw: Table, where: str) -> Point:
     """Return the values that the table `set` of a table gives to parameters.
 
     Raises

@@ -1,6 +1,6 @@
 """The parameters that a job may set: tables of its model and its stepper, and tables of all transients."""
 
-from collections.abc import Callable, Iterable, Iterator, Mapping, Sequence
+from collections.abc import Callable, Collection, Iterable, Iterator, Mapping, Sequence
 from dataclasses import dataclass, field, replace
 from functools import cached_property, partial
 from importlib import import_module
@@ -180,7 +180,7 @@ def _stepper(model: Model, stepper: object, source: str) -> str:
 
 
 def _known(
-    name: object, registry: Mapping[str, Any], what: str, source: str, told: Mapping[str, Any] | None = None
+    name: object, registry: Collection[str], what: str, source: str, told: Collection[str] | None = None
 ) -> str:
     """Return a name of the registry; the error names those `told`, by default all."""
     if not isinstance(name, str) or name not in registry:

@@ -4,7 +4,6 @@ import math
 from collections.abc import Collection, Mapping
 from dataclasses import replace
 from operator import itemgetter
-from typing import Any
 
 import numpy as np
 
@@ -14,7 +13,7 @@ from cvt_hpc.job.design import SEED, check_power_of_2
 from cvt_hpc.job.rules import Rule
 from cvt_hpc.job.schema import Schema
 from cvt_hpc.job.uncertain import KINDS, MOST, TABLE, Distribution, Scatter, Uncertain
-from cvt_hpc.job.values import Table, kind_of, read_or_default, read_value, refuse_unknown
+from cvt_hpc.job.values import Point, Table, kind_of, read_or_default, read_value, refuse_unknown
 from cvt_hpc.parameters import Parameter, positive
 
 _LEAST_SHARE = 1e-6  # of a distribution within its limits
@@ -28,7 +27,7 @@ _OWN = ("samples", "seed", "correlation", "indices", SAMPLE, SWAPPED)
 
 def read_uncertain(
     table: Table, gone: Collection[str], schema: Schema, source: str
-) -> tuple[list[Rule], dict[str, list], dict[str, Any]]:
+) -> tuple[list[Rule], dict[str, list], Point]:
     """Check a job file's table [uncertain].
 
     Parameters

@@ -38,7 +38,7 @@ _CUSTOMARY = {
 
 _SEPARATED = re.compile(r"\s*\[?\s*[-+]?\d[\d.]*[^,;\d]*[,;]\s*[-+]?\d")
 Table = Mapping[str, Any]  # of a job file, as TOML gives it
-Document = dict[str, Any]  # a whole one, or what a job is resolved to
+Document = dict[str, Any]  # a whole job, or a table of it, as TOML or JSON gives it
 Point = dict[str, Any]  # the parameters of a run, flat [SI]
 
 JOB_UNITS = "job_units"  # attribute of a coordinate, beside `units`

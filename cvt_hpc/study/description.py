@@ -18,7 +18,7 @@ from cvt_hpc.job.definition import Derived
 from cvt_hpc.job.design import Design, Runs
 from cvt_hpc.job.values import JOB_UNITS, Document, Table, shown
 from cvt_hpc.storage.netcdf import attributes
-from cvt_hpc.study.simulator import Simulator
+from cvt_hpc.study.simulator import RecordValues, Simulator
 from cvt_hpc.variables import Status, Variable
 
 _HEAD = ("name", "description", "fingerprint", "job")  # the first attributes of a study, kept as they are
@@ -167,7 +167,7 @@ class Study(Runs):
             rows[variable.name] = variable.blank
         return rows
 
-    def pack(self, values: Mapping[str, Any]) -> np.ndarray:
+    def pack(self, values: RecordValues) -> np.ndarray:
         """Return the record, shape (), of a run's result.
 
         Raises

@@ -8,7 +8,6 @@ import json
 import os.path
 from collections.abc import Mapping
 from pathlib import Path
-from typing import Any
 
 import numpy as np
 from numpy.typing import NDArray
@@ -51,14 +50,14 @@ def _pair_in_words(there: object, here: object) -> str:
     return " and ".join(parts) or "has its values in another order"
 
 
-def differences(one: Table, other: Table) -> dict[str, tuple[Any, Any]]:
+def differences(one: Table, other: Table) -> dict[str, tuple[object, object]]:
     """Return the values, None where there is none, of each key "section.key" in which documents differ."""
     here, there = flatten(one), flatten(other)
     pairs = {key: (here.get(key), there.get(key)) for key in {**here, **there}}
     return {key: pair for key, pair in pairs.items() if pair[0] != pair[1]}
 
 
-def flatten(entry: object, prefix: str = "") -> dict[str, Any]:
+def flatten(entry: object, prefix: str = "") -> dict[str, object]:
     """Return the values of nested tables by "section.key"."""
     if not isinstance(entry, Mapping):
         return {prefix: entry}

@@ -18,6 +18,9 @@ if TYPE_CHECKING:
     from cvt_hpc.job import Job
 
 
+RecordValues = Mapping[str, Any]  # those of a run, by the names of its quantities
+
+
 class Simulator(Protocol):
     """The functions that a sweep needs; the module `cvt_hpc.simulation` satisfies it."""
 
@@ -56,7 +59,7 @@ class Simulator(Protocol):
         points: Sequence[Point],
         interrupt: Callable[[], str | None],
         more: Callable[[], Sequence[Point]],
-    ) -> Sequence[Mapping[str, Any]]:
+    ) -> Sequence[RecordValues]:
         """Do the runs of a batch, and return their records in the order of the points.
 
         No number of a record depends on the other runs of its batch. When `interrupt()` returns a text, all
@@ -70,7 +73,7 @@ class Simulator(Protocol):
         points: Sequence[Point],
         interrupt: Callable[[], str | None],
         kept: Collection[int],
-    ) -> tuple[Sequence[Mapping[str, Any]], dict[int, xr.Dataset]]:
+    ) -> tuple[Sequence[RecordValues], dict[int, xr.Dataset]]:
         """Do as `run_points`, and return the histories of the runs at the places `kept` as well."""
 
 

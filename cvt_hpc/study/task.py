@@ -11,7 +11,7 @@ import time
 from collections.abc import Callable, Collection, Iterator, Mapping, Sequence
 from dataclasses import dataclass, field
 from functools import partial
-from typing import TYPE_CHECKING, Any, NamedTuple
+from typing import TYPE_CHECKING, NamedTuple
 
 import numpy as np
 from numpy.typing import NDArray
@@ -24,7 +24,7 @@ from cvt_hpc.study.description import Study
 from cvt_hpc.study.forecast.cost_model import Fit, fit_recorded
 from cvt_hpc.study.record.index import Records
 from cvt_hpc.study.record.log import Record
-from cvt_hpc.study.simulator import Simulator
+from cvt_hpc.study.simulator import RecordValues, Simulator
 from cvt_hpc.variables import Status
 
 if TYPE_CHECKING:
@@ -189,7 +189,7 @@ class Task:
     def _failure(self, index: int, trouble: _Trouble) -> Result:
         return Result([(index, self.study.pack_failure(trouble.reason, trouble.status))])
 
-    def _pack(self, values: Mapping[str, Any]) -> np.ndarray:
+    def _pack(self, values: RecordValues) -> np.ndarray:
         """Return the record of a run's result; that of a failure if the result is no record."""
         try:
             return self.study.pack(values)
