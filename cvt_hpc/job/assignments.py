@@ -73,8 +73,7 @@ def read_axes_and_values(
     """
     axes, values = {}, {}
     for key, entry in [*_entries(assignments, schema, source, label)]:  # unknown keys are the first errors
-        parameter, raw, _ = entry
-        if kind_of(parameter) is not tuple and is_axis(raw):
+        if kind_of(entry.parameter) is not tuple and is_axis(entry.raw):
             axes[key] = entry
         else:
             values[key] = read_value(*entry)
@@ -86,9 +85,9 @@ def _entries(
 ) -> Iterator[tuple[str, Entry]]:
     """Yield the key and the entry of each assignment, in which texts of lists and tables are such."""
     pairs = split_assignments(assignments, source, label)
-    for key, (parameter, raw, where) in schema.entries(pairs.items(), f"{source}: {label}"):
-        is_free_text = kind_of(parameter) is str and not parameter.choices
-        yield key, (parameter, raw if is_free_text else structured(raw), where)
+    for key, entry in schema.entries(pairs.items(), f"{source}: {label}"):
+        is_free_text = kind_of(entry.parameter) is str and not entry.parameter.choices
+        yield key, entry if is_free_text else entry._replace(raw=structured(entry.raw))
 
 
 def read_coordinates(

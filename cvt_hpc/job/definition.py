@@ -146,7 +146,7 @@ class Job(Runs):
         """Return this job with the units of `at`, as of `point_at`, for its parameters without a unit."""
         written = split_assignments(at, self.source, label).items()
         entries = self.schema.entries(written, f"{self.source}: {label}")
-        found = {key: unit for key, (_, raw, _) in entries if (unit := unit_in(raw))}
+        found = {key: unit for key, entry in entries if (unit := unit_in(entry.raw))}
         return replace(self, units=found | {**self.units})
 
     def point_at(self, at: Assignments, label: str = "at") -> Point:

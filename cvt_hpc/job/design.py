@@ -311,8 +311,9 @@ def _index(
             raise mismatch(where, "a value for each axis", f"none for {axis.name}")
         place = _place(axis, values.pop(axis.name), schema, f"{where}, {axis.name}")
         index = index * len(axis.values) + place
-    for key in values.keys() - replaced.keys():
-        raise mismatch(where, f"axes of this job ({', '.join(axis.name for axis in axes)})", key)
+    for key in values:
+        if key not in replaced:
+            raise mismatch(where, f"axes of this job ({', '.join(axis.name for axis in axes)})", key)
     return index if all(without_rounding(replaced[key]) == value for key, value in values.items()) else None
 
 

@@ -58,7 +58,7 @@ class Formula:
 
 
 def read_formula(raw: object, parameters: Mapping[str, Parameter], where: str) -> Formula:
-    """Return the formula that stands in a job file, and whose names may stand for parameters.
+    """Return the formula that stands in a job file; its names may stand for parameters that are numbers.
 
     Raises
     ------

@@ -126,7 +126,7 @@ def rebuild_job(
     is_users = units is None
     written = _written(document, pairs, schema, source, label) if is_users else {}
     if units is None:
-        units = {key: unit for key, (_, raw, _) in written.items() if (unit := unit_in(raw))}
+        units = {key: unit for key, entry in written.items() if (unit := unit_in(entry.raw))}
     schema = replace(schema, units=units)
     tables = _read_tables(document, schema, source)
     changed = assignments.take_own(pairs, "design")
@@ -193,7 +193,7 @@ def _written(document: Table, pairs: Table, schema: Schema, source: str, label: 
         for name, raw in schema.flatten(table) if isinstance(table, Mapping) else ():
             parameter = schema.parameters.get(key := name.rpartition(".")[2])
             if parameter is not None and kind_of(parameter) in (float, tuple):
-                found[key] = parameter, assignments.structured(raw), f"{source}: {place} {name}"
+                found[key] = Entry(parameter, assignments.structured(raw), f"{source}: {place} {name}")
     return found
 
 
@@ -314,7 +314,7 @@ def _find_axes(table: Table, schema: Schema, source: str) -> dict[str, Entry]:
     found: dict[str, Entry] = {}
     for key, entry in schema.entries(schema.flatten(table), f"{source}: [axes]"):
         if key in found:
-            raise mismatch(entry[2], "one axis for a parameter", f"a second one for {key}")
+            raise mismatch(entry.where, "one axis for a parameter", f"a second one for {key}")
         found[key] = entry
     return found
 

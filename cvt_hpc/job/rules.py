@@ -219,9 +219,10 @@ def read_linked(tables: Table, axes: Iterable[Axis], schema: Schema, source: str
         for key, entry in schema.entries(table.items(), where):
             values = read_values(*entry)
             if len(values) != len(at):
-                raise mismatch(entry[2], f"{len(at)} values, one for each of {axis_name}", f"{len(values)}")
+                expected = f"{len(at)} values, one for each of {axis_name}"
+                raise mismatch(entry.where, expected, str(len(values)))
             link = Link(axis_name, at, values, axis.unit, wanted)
-            rules.append(Rule(key, link, entry[2], entry[0]))
+            rules.append(Rule(key, link, entry.where, entry.parameter))
     return rules
 
 

@@ -4,7 +4,7 @@ from collections.abc import Callable, Collection, Iterable, Iterator, Mapping, S
 from dataclasses import dataclass, field, replace
 from functools import cached_property, partial
 from importlib import import_module
-from typing import Any
+from typing import Any, NamedTuple
 
 from cvt_hpc import recording
 from cvt_hpc.errors import InputError, did_you_mean, mismatch, nearest, show
@@ -17,12 +17,19 @@ from cvt_hpc.vibration import settings as vibration_settings
 
 SHARED = recording, vibration_settings  # with tables of every job with a transient
 
-Entry = tuple[Parameter, Any, str]  # declaration of a key, what stands there, and file and key
 Problem = tuple[str, str, str]
 Check = Callable[[Point], list[Problem]]
 Inert = Callable[[Point], dict[str, str]]
 
 RETIRED = {"contact_sweeps": "contact is solved exactly; delete the line"}  # keys of earlier versions
+
+
+class Entry(NamedTuple):
+    """What stands at a key."""
+
+    parameter: Parameter  # declaration of the key
+    raw: Any
+    where: str  # file and key
 
 
 @dataclass(frozen=True)
@@ -101,7 +108,7 @@ class Schema:
         """Yield the key of each pair of a name and a value, and its entry; further arguments as of `find`."""
         for name, raw in pairs:
             key = self.find(name, f"{where} {name}", section)
-            yield key, (self.parameters[key], raw, f"{where} {name}")
+            yield key, Entry(self.parameters[key], raw, f"{where} {name}")
 
     def nearest(self, name: str, section: str | None = None) -> str:
         """Return "; did you mean KEY?" for the nearest key, with its table where that is another one."""

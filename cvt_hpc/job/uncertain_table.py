@@ -57,7 +57,7 @@ def read_uncertain(
     pairs = ((name, raw) for name, raw in schema.flatten(table) if name not in _OWN)
     for key, entry in schema.entries(pairs, where):
         if key in found:
-            raise mismatch(entry[2], "one distribution of a parameter", f"a second one of {key}")
+            raise mismatch(entry.where, "one distribution of a parameter", f"a second one of {key}")
         found[key] = _read_distribution(key, *entry)
     if not found:
         raise mismatch(where, "a parameter with a distribution, or several", "none")

@@ -254,7 +254,7 @@ def meant(raw: object, parameter: Parameter) -> str:
 def warn_of_bare_numbers(parameter: Parameter, raw: object, where: str) -> None:
     """Warn of the first number without a unit that is outside the sensible range of a parameter.
 
-    Zero and infinity mean the same in any unit. Arguments are those of `read_value`, or a list or range.
+    Zero and infinity mean the same in any unit. Arguments as of `read_value`; it may be a list or a range.
     """
     if parameter.sensible is None:
         return

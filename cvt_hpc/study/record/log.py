@@ -235,7 +235,7 @@ class RecordLog:
         self._open_mark: int | None = None  # where the mark of the batch at work begins [byte]
 
     def begin(self, batch: Sequence[int], *, alone: bool = False) -> None:
-        """Write that this process is at work at some runs, alone where one has died of it, and at no others.
+        """Write that this process is at work at some runs, and no others; `alone` where one has died at it.
 
         Raises
         ------
