@@ -34,6 +34,20 @@ _FIRST_AXES = {"load_share": (0.2, 0.4, 0.6), "friction_gradient": None}
 _SHARES = (0.5, 1.0, 1.5)  # of the default, else
 # Both as a map, where that takes no longer than this [core-s]
 _LOADS, _LONGEST_MAP = "load_share = { from = 0.1, to = 0.9, count = 9 }", 5.0
+# Values of a first study where defaults, of a scene without dimensions, show nothing; in braces: its axes
+# The mass vibrates, at 500 Hz, where damping is less than the normal load times the fall of friction.
+_FIRST_STUDIES = {
+    "oscillator": {
+        "friction_gradient": '{ from = "-1 s/m", to = "-0.1 s/m", count = 10 }',
+        "damping": '{ from = "0 N s/m", to = "90 N s/m", count = 10 }',
+        "belt_speed": '"50 mm/s"',
+        "normal_load": '"300 N"',
+        "start": '"sliding"',
+        "initial_displacement": '"10 um"',
+        "stiffness": '"10 kN/mm"',
+        "friction_law": '"stribeck"',
+    }
+}
 _LONGEST = 120  # letters of a line
 # Units in which engineers give a size, by SI unit: each from a magnitude [SI] on, the largest first
 CUSTOMARY = {
@@ -78,7 +92,8 @@ def job_template(name: str, model: str, source: str) -> str:
     """Return a job file of a model in which each key stands commented out, with its default and meaning.
 
     As it stands it is a small study along one axis, or along two if its runs are cheap; all else is at its
-    default. `name` is also that of its output folder, `source` the command that needs it, for the error.
+    default, but for models whose defaults show nothing. `name` is also that of its output folder, `source`
+    the command that needs it, for the error.
 
     Raises
     ------
@@ -97,6 +112,8 @@ def job_template(name: str, model: str, source: str) -> str:
         job = build_job({"name": name, "model": model, "axes": tomllib.loads("\n".join(grid))})
         cost = loaded.cost(job.point(0), job.stepper) / loaded.lanes(job.parameters, job.stepper)
         axes = grid if cost * job.size <= _LONGEST_MAP else axes
+    first = _FIRST_STUDIES.get(model, {})
+    axes = [f"{key} = {value}" for key, value in first.items() if value[0] == "{"] or axes
     lines = [
         *_commented(f"A study with the model {model}: {loaded.title}"),
         "# Each key stands here with its default: take away the # to change it. Defaults that no paper gives",
@@ -118,7 +135,13 @@ def job_template(name: str, model: str, source: str) -> str:
     for section, table in schema.sections.items():
         lines += ["", f"[{section}]"]
         for key, parameter in table.items():
-            lines += [*_commented(_meaning(parameter)), f"# {key} = {_as_toml(parameter)}"]
+            default, value = _as_toml(parameter), first.get(key, "{")
+            line = (
+                f"# {key} = {default}"
+                if value[0] == "{"
+                else f"{key} = {value}  # assumed, in place of {default}"
+            )
+            lines += [*_commented(_meaning(parameter)), line]
     return "\n".join(lines) + "\n"
 
 

@@ -9,9 +9,11 @@ import sys
 import tomllib
 from pathlib import Path
 
+import numpy as np
 import pytest
 
 import cvt_hpc
+from cvt_hpc import open_results, run
 from cvt_hpc.errors import InputError
 from cvt_hpc.job import build_job
 from cvt_hpc.job.template import example_files, job_template
@@ -26,9 +28,9 @@ RECORDED = [name for name in MODELS if load_model(name).is_recorded]
 def test_a_template_is_a_job_and_so_is_all_that_is_commented_out_in_it(model):
     text = job_template("first", model, "init")
     job = build_job(tomllib.loads(text))
-    mapped = model in ("auto", "elastic_belt")
-    assert (job.name, job.model, len(job)) == ("first", model, 27 if mapped else 3)
-    assert ("count = 5" in text) and job.shape == ((9, 3) if mapped else (3,))
+    shape = {"auto": (9, 3), "elastic_belt": (9, 3), "oscillator": (10, 10)}.get(model, (3,))
+    assert (job.name, job.model, job.shape) == ("first", model, shape)
+    assert "count = 5" in text
     # every key with its default, but what stands in the place of another one, and the load beside its share
     uncommented = re.sub(r"(?m)^# (?!load =)(\w+ = )(?!.*\.\.\.)", r"\1", text)
     assert uncommented.count("\n#") < text.count("\n#")
@@ -40,6 +42,19 @@ def test_a_template_is_a_job_and_so_is_all_that_is_commented_out_in_it(model):
     follow = {parameter.gives.key for parameter in job.schema.parameters.values() if parameter.gives}
     assert max(map(len, text.splitlines())) <= 120
     assert set(job.parameters) - in_the_place_of_others - follow - {"load"} <= filled.given
+
+
+def test_the_template_of_the_oscillator_shows_the_border_of_damping(tmp_path):
+    job = build_job(tomllib.loads(job_template("first", "oscillator", "init")) | {"name": "first"})
+    p = job.parameters
+    fall = np.exp(
+        -p["belt_speed"] / p["stribeck_velocity"]
+    )  # of the law's slope, from v = 0 to the belt's speed
+    drives = -p["normal_load"] * fall * np.array(job.axes[0].values)[:, None]
+    margin = drives / np.maximum(np.array(job.axes[1].values), 1e-9)
+    run(job, out=tmp_path)
+    found = open_results(tmp_path)["vibrates"]
+    assert np.all(found.values[margin > 1.3]) and not np.any(found.values[margin < 0.9])
 
 
 def test_a_template_has_the_units_of_engineers():
