@@ -76,20 +76,16 @@ def curve_figure(
         axes.grid(linewidth=0.4, alpha=0.5)
     label = common_words(dataset, quantities)
     all_axes[0].set_ylabel(f"{label} [{unit}]" if unit else label)
-    legend: dict[str, Any] = {}
-    for axes in all_axes:
-        handles, labels = axes.get_legend_handles_labels()
-        legend |= dict(zip(labels, handles, strict=True))
-    set_frame(figure, legend, [figures.headline(f"{label[0].upper()}{label[1:]}", dataset.attrs), *notes])
+    lines = [figures.headline(f"{label[0].upper()}{label[1:]}", dataset.attrs), *notes]
+    set_frame(figure, figures.entries_of(all_axes), lines)
     return figure
 
 
 def set_frame(figure: Figure, legend: Mapping[str, Any], lines: Sequence[str]) -> None:
     """Title and legend of a figure of curves, which grows by the legend; `legend` has handles by label."""
-    columns = figures.legend_columns(list(legend))
-    figure.set_figheight(figure.get_figheight() + 0.2 * (len(legend) // columns))
-    place = {"loc": "outside lower center", "frameon": False, "ncols": columns}
-    figure.legend(legend.values(), legend.keys(), **place)
+    rows = len(legend) // figures.legend_columns(list(legend))
+    figure.set_figheight(figure.get_figheight() + 0.2 * rows)
+    figures.legend_below(figure, legend)
     figures.entitle(figure, lines)
 
 
@@ -252,15 +248,15 @@ def curve_panels_figure(
     rows = -(-len(panels) // columns)
     width = figures.WIDTH * (1.0 + 0.25 * (columns - 1) / (COLUMNS - 1))
     figure = Figure((width, PANEL_HEIGHT * rows + FRAME), layout="constrained")
-    all_axes = figure.subplots(rows, columns, sharex=True, squeeze=False).ravel()
-    for unused in all_axes[len(panels) :]:
+    all_axes = figure.subplots(rows, columns, sharex=True, squeeze=False)
+    for unused in all_axes.flat[len(panels) :]:
         unused.set_visible(False)
     x = layout.ruler(shown[arrangement.x])
     legend: dict[str, Any] = {
         title: Line2D([], [], color=colour, marker=mark, ms=5, lw=0.7)
         for (title, _), colour, mark in zip(each, figures.COLOURS, curves.MARKS, strict=False)
     }
-    for axes, (group, place) in zip(all_axes, panels, strict=False):
+    for axes, (group, place) in zip(all_axes.flat, panels, strict=False):
         factor, unit = curves.scale(shown, group)
         labels = [curves.place_in_words(shown[dim], k) for dim, k in place.items()]
         title = " ".join([curves.common_words(shown, group), *labels])
@@ -271,14 +267,11 @@ def curve_panels_figure(
             curves.mark_above(axes, x.centres, occurrence_classes(results).values)
         for name, style in zip(group[1:], curves.BESIDE, strict=False):
             legend[figures.in_words(shown[name])] = Line2D([], [], color=INK, ls=style, lw=1.2)
-        handles, told = axes.get_legend_handles_labels()
-        legend |= dict(zip(told, handles, strict=True))
+        legend |= figures.entries_of([axes])
         axes.set_xlim(curves.with_margins(x))
         x.lay_out(axes.xaxis)
         axes.grid(linewidth=0.4, alpha=0.5)
-    for axes in all_axes[len(panels) - columns : len(panels)]:
-        axes.set_xlabel(x.label)
-        axes.tick_params(labelbottom=True)
+    figures.label_x(all_axes, len(panels), x.label)
     title = f"Over {figures.in_words(shown[arrangement.x])}, by {figures.in_words(shown[lines])}"
     curves.set_frame(figure, legend, [figures.headline(title, dataset.attrs), *notes])
     return figure

@@ -5,12 +5,22 @@ Pictures of results take
     dataset    Dataset: results of a study over the axes of its job, as `open_results` returns them
     at         mapping, optional: axes to fix, name -> value, as a number [SI] or a text
     source     str, optional: where the results are from, for the errors
+    sides      Sides, optional: which axis runs along x, along y and over the panels
+    vmax       float, optional: value at which the colours end [SI]
+    measured   str or Path, optional: measured file that is drawn over the picture (`measured.py`)
 
-and pictures of runs a `history` or `histories`, as `simulate` returns them, with their `sources`. A function
-`..._figure` composes a matplotlib Figure, unknown to pyplot, and writes nothing; `figure.savefig(path)` does,
-and `draw` writes it as `save_figure` does. `picture_kinds.py` lists those drawn by a kind. InputError is
-raised where a dataset holds no results, a single run or not what is to be drawn, or where `at` names no axis
-or no value on it; what else a picture refuses its docstring says.
+and pictures of runs
+
+    history    Dataset: one run as `simulate` returns it, or `histories`, a sequence of them
+    source     str, or `sources`, a sequence, optional: where they are from, for errors, and for titles and
+               legends where the axes of the runs do not tell them apart
+    vmax, measured as above.
+
+A function `..._figure` composes a matplotlib Figure, unknown to pyplot, and writes nothing;
+`figure.savefig(path)` does, and `draw` writes it as `save_figure` does. `picture_kinds.py` lists those drawn
+by a kind. InputError is raised where a dataset holds no results, a single run or not what is to be drawn,
+where `at` names no axis or no value on it, or where a page has no room for all panels; what else a picture
+refuses its docstring says.
 
 Ticks at the values of an axis are numbers as short as they may be, and only those for which there is room.
 
@@ -34,6 +44,7 @@ from matplotlib.axes import Axes
 from matplotlib.axis import Axis, XAxis
 from matplotlib.backends.backend_agg import FigureCanvasAgg
 from matplotlib.figure import Figure
+from matplotlib.patheffects import AbstractPathEffect, Normal, withStroke
 from matplotlib.text import Text
 from matplotlib.ticker import FuncFormatter, Locator, LogFormatter, NullFormatter
 from numpy.typing import NDArray
@@ -153,9 +164,10 @@ def check_known(dataset: xr.Dataset, names: Iterable[str], source: str) -> None:
         raise mismatch(source, f"known values of {' or '.join(names)}", "none")
 
 
-def headline(subject: str, attributes: Mapping[str, Any]) -> str:
-    """First line above a picture of a dataset with these attributes: its subject, and the job."""
-    return f"{subject}: {one_line(attributes.get('job_name', ''))}".removesuffix(": ")
+def headline(subject: str, *attributes: Mapping[str, Any]) -> str:
+    """First line above a picture of datasets with these attributes: its subject, and their jobs."""
+    jobs = dict.fromkeys(one_line(one.get("job_name", "")) for one in attributes)
+    return f"{subject}: {', '.join(filter(None, jobs))}".removesuffix(": ")
 
 
 def draw(compose: Callable[[], Figure], out: Path) -> Path:
@@ -262,6 +274,60 @@ def on_a_page(
         return grid
     most = max(columns) * int((LONG - frame) / min(heights))
     raise mismatch(source, f"at most {most} panels, which one page holds", str(count), then)
+
+
+def panels_on_a_page(
+    count: int,
+    columns: Sequence[int],
+    heights: tuple[float, float],
+    frame: float,
+    source: str,
+    then: str,
+    each: int = 1,
+    width: float = WIDTH,
+    **sharing: Any,
+) -> tuple[Figure, NDArray[Any], float]:
+    """Figure with panels laid out as by `on_a_page`, of which nothing is drawn beyond those that are used.
+
+    Instead of one panel there may be `each`, side by side. Returned are the figure, all panels by row and
+    column, and the height of a row [inch].
+    """
+    grid = on_a_page(count, columns, heights, frame, source, then)
+    rows = -(-count // grid.columns)
+    figure = Figure((width, rows * grid.height + frame), layout="constrained")
+    panels = figure.subplots(rows, grid.columns * each, squeeze=False, **sharing)
+    for axes in panels.flat[count * each :]:
+        axes.set_axis_off()
+    return figure, panels, grid.height
+
+
+def label_x(panels: NDArray[Any], count: int, label: str) -> None:
+    """Name what runs along x below the last panels of the columns, of which `count` are used."""
+    for axes in panels.flat[:count][-panels.shape[1] :]:
+        axes.set_xlabel(label)
+        axes.tick_params(labelbottom=True)
+
+
+def entries_of(panels: Iterable[Axes]) -> dict[str, Any]:
+    """Entries for a legend of several panels: handles by label."""
+    entries: dict[str, Any] = {}
+    for axes in panels:
+        handles, labels = axes.get_legend_handles_labels()
+        entries |= dict(zip(labels, handles, strict=True))
+    return entries
+
+
+def legend_below(figure: Figure, entries: Mapping[str, Any], columns: int | None = None) -> None:
+    """Put a legend of handles by label below the panels, if there are any, in as many columns as fit."""
+    if entries:
+        place = {"loc": "outside lower center", "frameon": False}
+        ncols = columns or legend_columns(list(entries))
+        figure.legend(entries.values(), entries.keys(), **place, ncols=ncols)
+
+
+def outlined(width: float, colour: Any = "white") -> list[AbstractPathEffect]:
+    """Outline of a line or a text, which keeps it apart from what it is drawn over."""
+    return [withStroke(linewidth=width, foreground=colour), Normal()]
 
 
 def with_units(line: str) -> str:

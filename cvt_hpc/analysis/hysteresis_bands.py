@@ -10,7 +10,6 @@ from matplotlib.collections import LineCollection, PolyCollection
 from matplotlib.figure import Figure
 from matplotlib.lines import Line2D
 from matplotlib.patches import Patch
-from matplotlib.patheffects import Normal, withStroke
 from numpy.typing import NDArray
 
 from cvt_hpc.analysis import arrangement as layout
@@ -28,7 +27,7 @@ BAND = OF_STARTS[StartClass.LARGE_START_ONLY]
 UP, DOWN = "up", "down"
 LINES = {UP: ("-", ">"), DOWN: ("--", "<")}
 LEAST, FRAME = 0.9, 1.8  # [inch]: a panel at least, and title, labels and legend
-OUTLINE = [withStroke(linewidth=4.0, foreground="white"), Normal()]
+OUTLINE = figures.outlined(4.0)
 
 
 def onset_line(along: layout.Ruler, across: layout.Ruler, classes: NDArray[np.int8]) -> NDArray[np.float64]:
@@ -220,12 +219,8 @@ def hysteresis_figure(
     y = layout.ruler(ranges[y_name]) if y_name else layout.ONE_ROW
     wanted = float(np.clip(0.35 * y.centres.size, 0.6, 2.2)) + 0.35
     then = f"fix an axis, as by `--at {panel}=VALUE`, or choose another one by `--panel AXIS`"
-    grid = figures.on_a_page(count, (1, 2), (LEAST, wanted), FRAME, source, then)
-    rows = -(-count // grid.columns)
-    figure = Figure((figures.WIDTH, rows * grid.height + FRAME), layout="constrained")
-    panels = figure.subplots(rows, grid.columns, sharex=True, squeeze=False)
-    for axes in panels.flat[count:]:
-        axes.set_axis_off()
+    page = count, (1, 2), (LEAST, wanted), FRAME, source, then
+    figure, panels, _ = figures.panels_on_a_page(*page, sharex=True)
     legend: dict[str, Any] = {}
     both = STYLES[OccurrenceClass.VIBRATING].fill
     for k, axes in enumerate(panels.flat[:count]):
@@ -252,15 +247,10 @@ def hysteresis_figure(
     x, places = Side(str(ranges.name), np.array(panels[0, 0].get_xlim()), factor), ranges.coords.to_dataset()
     for k, axes in enumerate(panels.flat[:count]):
         over.draw(axes, x, side_of(places, y_name), places.isel({panel: k} if panel else {}))
-    legend |= {handle.get_label(): handle for handle in over.handles}
-    for axes in panels.flat[:count][-grid.columns :]:
-        axes.set_xlabel(figures.axis_label(ranges, unit))
-        axes.tick_params(labelbottom=True)
+    figures.label_x(panels, count, figures.axis_label(ranges, unit))
     if count > 1:
         figure.supylabel(y.label, fontsize=figures.STYLE["axes.labelsize"])
-    figures.entitle(
-        figure, [figures.headline("Vibration along ramps up and down", dataset.attrs), *notes, over.note]
-    )
-    place = {"loc": "outside lower center", "frameon": False, "ncols": figures.legend_columns(list(legend))}
-    figure.legend(legend.values(), legend.keys(), **place)
+    head = figures.headline("Vibration along ramps up and down", dataset.attrs)
+    figures.entitle(figure, [head, *notes, over.note])
+    figures.legend_below(figure, legend | over.entries)
     return figure

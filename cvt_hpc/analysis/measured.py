@@ -29,13 +29,12 @@ from matplotlib.axes import Axes
 from matplotlib.figure import Figure
 from matplotlib.lines import Line2D
 from matplotlib.patches import Rectangle
-from matplotlib.patheffects import Normal, withStroke
 from numpy.typing import NDArray
 
 from cvt_hpc.analysis import arrangement as layout
 from cvt_hpc.analysis.alignment import job_held
 from cvt_hpc.analysis.classes import ALONG
-from cvt_hpc.analysis.figures import coordinate_unit, legend_columns
+from cvt_hpc.analysis.figures import coordinate_unit, legend_below, outlined
 from cvt_hpc.analysis.scatter import is_sampled
 from cvt_hpc.errors import JobWarning, did_you_mean, few_of, mismatch, nearest, show
 from cvt_hpc.job import Job
@@ -62,7 +61,7 @@ INK = "#0033dd"  # of nothing that is computed; in grey, dark within a white out
 DASHES, DOTS = (0, (6, 1.5, 1.5, 1.5)), (0, (1, 1.5))
 LONGEST_NAME = 60  # letters of the file's name in a title
 LEGEND = 0.4  # [inch]: height of a legend of its own
-_ABOVE = {"zorder": 2.6, "path_effects": [withStroke(linewidth=4.2, foreground="white"), Normal()]}
+_ABOVE = {"zorder": 2.6, "path_effects": outlined(4.2)}
 _LOOK: dict[str, Any] = {"color": INK, "lw": 2.0, "ms": 7.0}
 _MARKS = {"x": {True: ">", False: "<"}, "y": {True: "^", False: "v"}}  # of an onset, as the axis goes
 
@@ -362,6 +361,8 @@ class Overlay:
 
     Attributes
     ----------
+    entries : dict
+        Handles of what was drawn, by their labels in a legend.
     height, note : float, str
         Height that a legend of its own takes [inch]; line of the title, which names the file.
     """
@@ -373,14 +374,14 @@ class Overlay:
             self._measured = path or Measured("", "", "", ())
         else:
             self._measured = read_measured(path, dataset, source)
-        self._entries: dict[str, Any] = {}
+        self.entries: dict[str, Any] = {}
         self.height = 0.0 if path is None else LEGEND
         self.note = "" if path is None else f"measured: {shortened(self._measured.name, LONGEST_NAME)}"
 
     @property
     def handles(self) -> list[Any]:
-        """Entries of the legend, of what was drawn."""
-        return list(self._entries.values())
+        """Handles of the entries."""
+        return list(self.entries.values())
 
     def draw(self, axes: Axes, x: Side, y: Side, shown: xr.Dataset) -> None:
         """Draw what was measured over a panel whose limits are set.
@@ -434,19 +435,16 @@ class Overlay:
         """Draw a line with a mark in its middle, or the mark alone, without a change of the limits."""
         how = {"markevery": [x.size // 2], "clip_on": x.size > 1, **_ABOVE}
         axes.add_artist(Line2D(x, y, **_LOOK, **look, **how))
-        self._entries.setdefault(label, Line2D([], [], **_LOOK, **look, label=label))
+        self.entries.setdefault(label, Line2D([], [], **_LOOK, **look, label=label))
 
     def _outline(self, axes: Axes, box: list[Array], label: str, style: Any) -> None:
         if box:
             (left, right), (low, high) = box
             look = {"fill": False, "ec": INK, "lw": 2.0, "ls": style}
             axes.add_artist(Rectangle((left, low), right - left, high - low, **look, **_ABOVE))
-            self._entries.setdefault(label, Rectangle((0.0, 0.0), 1.0, 1.0, **look, label=label))
+            self.entries.setdefault(label, Rectangle((0.0, 0.0), 1.0, 1.0, **look, label=label))
 
 
 def put_legend(figure: Figure, *overlays: Overlay) -> None:
     """Put a legend of what was measured below a picture that has none of its own."""
-    entries = {handle.get_label(): handle for over in overlays for handle in over.handles}
-    if entries:
-        place = {"ncols": legend_columns(list(entries)), "loc": "outside lower center", "frameon": False}
-        figure.legend(handles=list(entries.values()), **place)
+    legend_below(figure, {label: handle for over in overlays for label, handle in over.entries.items()})

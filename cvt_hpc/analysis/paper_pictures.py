@@ -181,7 +181,7 @@ def spectrum_figure(run: xr.Dataset) -> Figure:
     axes.set(xlabel="frequency [Hz]", ylabel="amplitude [µm]", xlim=(0.0, lines[-1]))
     axes.set_ylim(bottom=0.0)
     axes.grid(lw=0.4, alpha=0.5)
-    figure.legend(loc="outside lower center", frameon=False, ncols=3)
+    figures.legend_below(figure, figures.entries_of([axes]), 3)
     figures.entitle(figure, [figures.headline("Spectra of the strands", run.attrs)], 76)
     return figure
 
@@ -218,8 +218,7 @@ def strand_bars_figure(
         figures.put_ticks(axes.xaxis, np.arange(float(len(ticks))), ticks)
         axes.set_xlabel(x.label)
     row[0].set_ylabel("push force | ring tension [kN]")
-    handles, labels = row[0].get_legend_handles_labels()
-    figure.legend(handles, labels, loc="outside lower center", frameon=False, ncols=4)
+    figures.legend_below(figure, figures.entries_of(row[:1]), 4)
     figures.entitle(figure, [figures.headline("Forces in the strands", dataset.attrs), *notes], 76)
     return figure
 
@@ -280,7 +279,7 @@ def friction_figure(dataset: xr.Dataset) -> Figure:
     axes = figure.subplots()
     for k, (gradient, curve) in enumerate(curves_of(dataset, along).items()):
         colour = figures.COLOURS[k % len(figures.COLOURS)]
-        label = f"{gradient:g} s/m".replace("-", "−")
+        label = f"{figures.number(gradient, 'g')} s/m"
         axes.plot(
             1e3 * along, curve, color=colour, ls=figures.LINES[k % len(figures.LINES)], lw=1.4, label=label
         )
@@ -293,7 +292,7 @@ def friction_figure(dataset: xr.Dataset) -> Figure:
     axes.set(xlabel="sliding speed [mm/s]", ylabel="coefficient of friction", xlim=(0.0, 1e3 * along[-1]))
     axes.set_ylim(bottom=0.0)
     axes.grid(lw=0.4, alpha=0.5)
-    figure.legend(loc="outside lower center", frameon=False, ncols=3)
+    figures.legend_below(figure, figures.entries_of([axes]), 3)
     marks = "marks: by the energy criterion, of radial sliding at that speed"
     figures.entitle(figure, [figures.headline("Curves of friction", dataset.attrs), marks], 76)
     return figure

@@ -2,10 +2,11 @@
 
 from collections.abc import Sequence
 from pathlib import Path
-from typing import Any, NamedTuple
+from typing import NamedTuple
 
 import numpy as np
 import xarray as xr
+from matplotlib.axes import Axes
 from matplotlib.figure import Figure
 from numpy.typing import NDArray
 
@@ -73,14 +74,14 @@ def probability_figure(
     panel = _Panel("", *(shown[one].values for one in (f"{name}_low", name, f"{name}_high")))
     labels = "of the samples", "95 % interval"
     x = layout.ruler(shown[arrangement.x])
-    figure, (axes,) = _draw_bands([panel], x, figures.in_words(shown[name]), labels, source, "")
+    figure, axes = _draw_bands([panel], x, figures.in_words(shown[name]), labels, source, "")
     axes.set_ylim(-0.03, 1.03)
     over.draw(axes, side_of(shown, arrangement.x), Side("", np.array(axes.get_ylim())), shown)
     for share in CONTOURS:
         axes.axhline(share, color="#777777", ls="--" if share != CONTOURS[1] else "-", lw=0.8, zorder=0.5)
     head = f"P{figures.in_words(shown[name])[1:]}"
     lines = [figures.headline(head, dataset.attrs), told.attrs["counted"], *arrangement.notes, over.note]
-    _entitle(figure, axes, lines, over.handles)
+    set_frame(figure, figures.entries_of([axes]) | over.entries, lines)
     return figure
 
 
@@ -130,14 +131,14 @@ def onset_bands_figure(
         low, _, high = np.clip(values, *_ends(factor * told[along].values))
         panels.append(_Panel(title, low, np.where(np.isinf(values[1]), np.nan, values[1]), high))
     label = f"onset in {figures.axis_label(told[along], unit)}"
-    first, _, last = QUANTILES
-    labels = "median", f"{first} to {last} of the samples"
+    least, _, most = QUANTILES
+    labels = "median", f"{least} to {most} of the samples"
     then = "fix an axis, as by `--at AXIS=VALUE`"
-    figure, all_axes = _draw_bands(panels, layout.ruler(shown[arrangement.x]), label, labels, source, then)
+    figure, first = _draw_bands(panels, layout.ruler(shown[arrangement.x]), label, labels, source, then)
     size = dataset.sizes[SAMPLE] * (2 if SWAPPED in dataset.dims else 1)
     samples = f"{size} samples; the band ends where the axis does"
     head = figures.headline("Onset of vibration", dataset.attrs)
-    _entitle(figure, all_axes[0], [head, samples, *arrangement.notes])
+    set_frame(figure, figures.entries_of([first]), [head, samples, *arrangement.notes])
     return figure
 
 
@@ -205,18 +206,15 @@ def sensitivity_figure(
             values = np.stack([shares[f"{key}{end}"].values for end in _BOUNDS])
             _draw_bars(all_axes[2], places + shift, values, key.replace("_", " "), colour, 0.34)
     all_axes[0].set_yticks(places, [str(name).replace("_", " ") for name in names])
-    legend: dict[str, Any] = {}
     for axes, head in zip(all_axes, heads, strict=True):
         axes.set_xlabel(head)
         axes.grid(axis="x", lw=0.4, alpha=0.5)
-        handles, labels = axes.get_legend_handles_labels()
-        legend |= dict(zip(labels, handles, strict=True))
-    set_frame(figure, legend, lines)
+    set_frame(figure, figures.entries_of(all_axes), lines)
     return figure
 
 
 def _draw_bars(
-    axes: Any,
+    axes: Axes,
     places: NDArray[np.float64],
     values: NDArray[np.float64],
     label: str,
@@ -245,28 +243,16 @@ def _draw_bands(
     labels: tuple[str, str],
     source: str,
     then: str,
-) -> tuple[Figure, list[Any]]:
-    """Draw a line and a band in each panel, and return the figure and its panels."""
-    grid = figures.on_a_page(len(panels), (1, 2), (LEAST, HEIGHT), FRAME, source, then)
-    rows = -(-len(panels) // grid.columns)
-    figure = Figure((figures.WIDTH, rows * grid.height + FRAME), layout="constrained")
-    all_axes = list(figure.subplots(rows, grid.columns, sharex=True, sharey=True, squeeze=False).flat)
-    for axes in all_axes[len(panels) :]:
-        axes.set_axis_off()
-    for axes, panel in zip(all_axes, panels, strict=False):
+) -> tuple[Figure, Axes]:
+    """Draw a line and a band in each panel, and return the figure and its first panel."""
+    page = len(panels), (1, 2), (LEAST, HEIGHT), FRAME, source, then
+    figure, all_axes, _ = figures.panels_on_a_page(*page, sharex=True, sharey=True)
+    for axes, panel in zip(all_axes.flat, panels, strict=False):
         axes.fill_between(x.centres, panel.low, panel.high, color=BAND, lw=0, label=labels[1])
         axes.plot(x.centres, panel.middle, color=LINE, marker="o", ms=3.5, lw=1.5, label=labels[0])
         axes.set_title(panel.title, loc="left", pad=3)
         x.lay_out(axes.xaxis)
         axes.grid(lw=0.4, alpha=0.5)
-    for axes in all_axes[: len(panels)][-grid.columns :]:
-        axes.set_xlabel(x.label)
-        axes.tick_params(labelbottom=True)
+    figures.label_x(all_axes, len(panels), x.label)
     figure.supylabel(label, fontsize=figures.STYLE["axes.labelsize"])
-    return figure, all_axes[: len(panels)]
-
-
-def _entitle(figure: Figure, axes: Any, lines: Sequence[str], further: Sequence[Any] = ()) -> None:
-    handles, labels = axes.get_legend_handles_labels()
-    legend = dict(zip(labels, handles, strict=True)) | {handle.get_label(): handle for handle in further}
-    set_frame(figure, legend, lines)
+    return figure, all_axes[0, 0]

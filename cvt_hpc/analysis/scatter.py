@@ -13,9 +13,8 @@ from matplotlib.markers import MarkerStyle
 from matplotlib.ticker import FuncFormatter, LogLocator, NullFormatter
 from numpy.typing import NDArray
 
-from cvt_hpc.analysis import cells
+from cvt_hpc.analysis import cells, figures
 from cvt_hpc.analysis.classes import OccurrenceClass, at_strongest_strand, count_classes, occurrence_classes
-from cvt_hpc.analysis.figures import WIDTH, axis_label, coordinate_unit, entitle, headline
 from cvt_hpc.errors import mismatch
 
 MOST_AXES = 4  # six pairs; the first axes of the job
@@ -51,7 +50,7 @@ def scatter_figure(dataset: xr.Dataset, at: Mapping[str, Any], source: str, vmax
     """
     if at:
         raise mismatch(f"{source}: at {next(iter(at))}", "results over a grid", "samples, all apart")
-    figure = Figure((WIDTH, scatter_height(dataset)), layout="constrained")
+    figure = Figure((figures.WIDTH, scatter_height(dataset)), layout="constrained")
     classes = occurrence_classes(dataset).values
     amplitude = np.where(
         classes == OccurrenceClass.VIBRATING, at_strongest_strand(dataset, "amplitude") * 1e6, np.nan
@@ -61,19 +60,14 @@ def scatter_figure(dataset: xr.Dataset, at: Mapping[str, Any], source: str, vmax
     if np.isfinite(amplitude).any():
         cells.colour_bar(figure, scale, amplitude, ax=panels, pad=0.02)
     title = [
-        headline("Vibration occurrence", dataset.attrs),
+        figures.headline("Vibration occurrence", dataset.attrs),
         f"{classes.size} samples: {count_classes(classes)}",
     ]
     names = sample_axes(dataset)
     if len(names) > MOST_AXES:
         title.append(f"the first {MOST_AXES} of {len(names)} axes")
-    entitle(figure, title)
-    figure.legend(
-        *panels[0, 0].get_legend_handles_labels(),
-        loc="outside lower center",
-        ncols=cells.LEGEND_COLUMNS,
-        frameon=False,
-    )
+    figures.entitle(figure, title)
+    figures.legend_below(figure, figures.entries_of(panels[0, :1]), cells.LEGEND_COLUMNS)
     return figure
 
 
@@ -179,5 +173,5 @@ def _tick_logarithmic(axis: XAxis | YAxis) -> None:
 
 def _along(coordinate: xr.DataArray) -> tuple[NDArray[np.float64], str]:
     """Values of an axis in display units, and its label."""
-    factor, unit = coordinate_unit(coordinate.attrs)
-    return coordinate.values * factor, axis_label(coordinate, unit)
+    factor, unit = figures.coordinate_unit(coordinate.attrs)
+    return coordinate.values * factor, figures.axis_label(coordinate, unit)

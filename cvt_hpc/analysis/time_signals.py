@@ -295,13 +295,10 @@ def _draw_bands(axes: Axes, bands: Bands, k: int, told: str) -> None:
 
 def in_a_column(count: int, source: str, then: str, **sharing: Any) -> tuple[Figure, NDArray[Any]]:
     """Figure with panels below each other; InputError, with what to do `then`, if no page holds them."""
-    frame = 1.5
-    grid = figures.on_a_page(count, (1,), HEIGHTS, frame, source, then)
-    figure = Figure((figures.WIDTH, grid.height * count + frame), layout="constrained")
-    panels = figure.subplots(count, 1, squeeze=False, **sharing)[:, 0]
-    for axes in panels:
+    figure, panels, _ = figures.panels_on_a_page(count, (1,), HEIGHTS, 1.5, source, then, **sharing)
+    for axes in panels.flat:
         axes.grid(lw=0.4, alpha=0.5)
-    return figure, panels
+    return figure, panels[:, 0]
 
 
 def cut_off(axes: Axes) -> None:

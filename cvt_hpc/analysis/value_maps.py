@@ -13,7 +13,6 @@ from matplotlib.colors import Normalize
 from matplotlib.figure import Figure
 from matplotlib.lines import Line2D
 from matplotlib.patches import Patch, PathPatch
-from matplotlib.patheffects import Normal, withStroke
 from numpy.typing import NDArray
 
 from cvt_hpc.analysis import arrangement as layout
@@ -130,15 +129,14 @@ def value_map_figure(
         _draw_panel(figure, axes, (x, y), panel, vmax, room)
         over.draw(axes, *sides_of_panel, shown.coords.to_dataset().isel(panel.at))
         axes.set_title(fill(panel.title, int(LETTERS * size[0] / columns)), loc="left", pad=3)
-    for axes in list(all_axes.flat)[len(panels) :]:
+    for axes in all_axes.flat[len(panels) :]:
         axes.set_axis_off()
     for axes in all_axes[:, 0]:
         axes.set_ylabel(y.label)
-    for axes in list(all_axes.flat)[: len(panels)][-columns:]:
-        axes.set_xlabel(x.label)
-    job = one_line(dataset.attrs.get("job_name", ""))
+    figures.label_x(all_axes, len(panels), x.label)
     kinds = occurrence_classes(shown)
     counted = dataset.attrs.get("counted") or _counted(kinds)
+    job = one_line(dataset.attrs.get("job_name", ""))
     lines = [f"{job}: {counted}".removeprefix(": "), ", ".join(arrangement.notes), over.note]
     figures.entitle(figure, lines, int(72 * size[0] / figures.WIDTH))
     marked: dict[cells.CellClass, cells.ClassStyle] = {
@@ -284,7 +282,7 @@ def _draw_isolines(
     with warnings.catch_warnings():
         warnings.filterwarnings("ignore", "No contour levels")
         lines = axes.contour(x.centres, y.centres, values, isolines, **look)
-    lines.set_path_effects([withStroke(linewidth=3.0, foreground="white"), Normal()])
+    lines.set_path_effects(figures.outlined(3.0))
 
 
 def _hatch(
