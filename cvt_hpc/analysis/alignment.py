@@ -23,21 +23,14 @@ COMPARED = ("status", "vibrates", "amplitude", "frequency")  # beside what a mod
 class Aligned(NamedTuple):
     """The common runs of two studies.
 
-    Attributes
-    ----------
-    a, b : Dataset
-        Those of COMPARED and of the names asked for that each study has, in memory, over the same runs in
-        the same order.
-    left_out : (int, int)
-        Number of runs of A and of B that the other study does not have.
-    notes : tuple of str
-        Which axis of one study was reduced to the value of the other one, in words.
+    A and B have those of COMPARED and of the names asked for that each study has, in memory, over the same
+    runs in the same order.
     """
 
     a: xr.Dataset
     b: xr.Dataset
-    left_out: tuple[int, int]
-    notes: tuple[str, ...]
+    left_out: tuple[int, int]  # number of runs of A and of B that the other study does not have
+    notes: tuple[str, ...]  # which axis of one study was reduced to the value of the other one, in words
 
 
 def align(a: xr.Dataset, b: xr.Dataset, sources: tuple[str, str], names: Collection[str] = ()) -> Aligned:

@@ -156,22 +156,11 @@ def colour_bar(figure: Figure, scale: Scale, values: Array, **options: Any) -> C
 def draw_cells(
     axes: Axes, x: Ruler, y: Ruler, classes: NDArray[np.int8], inferred: Mask, values: Array, scale: Scale
 ) -> None:
-    """Draw the cells of one panel, and borders between the classes.
+    """Draw the cells (row, column) of one panel, and borders between the classes.
 
-    Parameters
-    ----------
-    axes : Axes
-        Where to draw.
-    x, y : Ruler
-        Places of the columns and rows.
-    classes : array, shape (row, column)
-        `OccurrenceClass` of each run, or `StartClass` or `PairClass` of each cell.
-    inferred : array of bool, shape (row, column)
-        Whether a cell's class is not that of a run.
-    values : array, shape (row, column)
-        What colours the vibrating cells; where it is nan they keep the colour of their class.
-    scale : Scale
-        How it colours them.
+    `classes` are the `OccurrenceClass` of each run, or `StartClass` or `PairClass` of each cell; where they
+    are `inferred` they are not those of a run. `values` colour the vibrating cells by the scale; where they
+    are nan these keep the colour of their class.
     """
     fills = np.zeros((*classes.shape, 4))
     hatched = {}

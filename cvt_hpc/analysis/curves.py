@@ -39,20 +39,10 @@ def curve_figure(
 ) -> Figure:
     """Draw quantities over an axis.
 
-    Parameters
-    ----------
-    dataset, at, source
-        As of all pictures of results (`figures.py`). The axis that runs along x in a map does so here;
-        there is a panel for each value of the one that runs along y.
-    quantities : sequence of str
-        Numeric variables of one unit. The first is drawn by marks, the others by lines beside it; one with
-        further dimensions, such as `strand`, gives a curve for each of their labels.
-
-    Raises
-    ------
-    InputError
-        As of all pictures; there is no such quantity, quantities differ in unit, or there would be more than
-        MOST_PANELS panels.
+    Arguments as of all pictures of results (`figures.py`). The axis that runs along x in a map does so here;
+    there is a panel for each value of the one that runs along y, MOST_PANELS at most. Quantities are numeric
+    variables of one unit. The first is drawn by marks, the others by lines beside it; one with further
+    dimensions, such as `strand`, gives a curve for each of their labels.
     """
     check_results(dataset, source)
     check_quantities(dataset, quantities, source)
@@ -216,23 +206,11 @@ def curve_panels_figure(
 ) -> Figure:
     """Draw quantities over an axis, by another axis.
 
-    Parameters
-    ----------
-    dataset, at, source
-        As of all pictures of results (`figures.py`). Of the axes that `lines` leaves, the one that runs along
-        x in a map does so here.
-    groups : sequence of sequences of str
-        Numeric variables: those of a group are of one unit and share a panel, the first drawn by marks, the
-        others by lines beside it. Of quantities with further dimensions, such as `pulley`, there is a panel
-        for each of their labels.
-    lines : str
-        The axis that has a colour for each of its values.
-
-    Raises
-    ------
-    InputError
-        As of all pictures; there is no such quantity or axis, quantities of a group differ in unit or
-        dimensions, or there would be more curves than colours, or more than MOST_QUANTITIES panels.
+    Arguments as of all pictures of results (`figures.py`). The axis `lines` has a colour for each of its
+    values; of the axes that it leaves, the one that runs along x in a map does so here. Variables of a group
+    are numeric, of one unit and of the same dimensions, and share a panel, the first drawn by marks, the
+    others by lines beside it. Of quantities with further dimensions, such as `pulley`, there is a panel for
+    each of their labels, MOST_QUANTITIES at most.
     """
     check_results(dataset, source)
     for group in groups:

@@ -31,19 +31,10 @@ OUTLINE = figures.outlined(4.0)
 
 
 def onset_line(along: layout.Ruler, across: layout.Ruler, classes: NDArray[np.int8]) -> NDArray[np.float64]:
-    """The lowest onset of each row, as a line from border to border of the rows.
+    """The lowest onset of each row, as a line from border to border of the rows: places (point, 2) on both.
 
-    Parameters
-    ----------
-    along, across : Ruler
-        Places of the columns, along which vibration sets in, and of the rows.
-    classes : array, shape (row, column)
-        `OccurrenceClass` or `StartClass` of the cells.
-
-    Returns
-    -------
-    array, shape (point, 2)
-        Places along and across; nan in rows without an onset.
+    Vibration sets in along the columns; classes (row, column) are `OccurrenceClass` or `StartClass` of the
+    cells. nan stands in rows without an onset.
     """
     borders = np.stack([across.edges[:-1], across.edges[1:]], 1)
     lowest = lowest_onsets(along.centres, classes)
@@ -59,11 +50,7 @@ def lowest_onsets(places: NDArray[np.float64], classes: NDArray[np.int8]) -> NDA
 def of_each_start(classes: NDArray[np.int8]) -> list[tuple[str, str, NDArray[np.int8]]]:
     """Name and style of the onset lines of a map, and the classes that each of them separates.
 
-    Parameters
-    ----------
-    classes : array
-        `OccurrenceClass` or `StartClass` of the cells: those that vibrate from a large start only have two
-        lines.
+    A map with cells that vibrate from a large start only has two lines.
     """
     only = classes == StartClass.LARGE_START_ONLY
     small = np.where(only, OccurrenceClass.QUIET, classes)
@@ -78,14 +65,7 @@ def draw_onsets(
 ) -> list[Line2D]:
     """Draw the onset line of a panel, and that of the large starts beside it; return handles of a legend.
 
-    Parameters
-    ----------
-    axes : Axes
-        Where to draw.
-    x, y, classes
-        As of `cells.draw_cells`.
-    along_y : bool
-        Whether vibration sets in along y.
+    Arguments as of `cells.draw_cells`, and whether vibration sets in along y.
     """
     handles = []
     for label, style, kinds in of_each_start(classes):
@@ -102,11 +82,10 @@ def vibration_ranges(dataset: xr.Dataset, source: str = "results") -> xr.DataArr
 
     Parameters
     ----------
-    dataset : Dataset
-        Results of ramps of load or speed, up and down along one axis of the study, such as `load_start`:
-        `onset_load`, `end_load` and `ramp_load` [N m], or the same of the speed [rad/s].
-    source : str
-        Where the results are from, for the errors.
+    dataset, source
+        As of all pictures of results (`figures.py`): results of ramps of load or speed, up and down along one
+        axis of the study, such as `load_start`, else InputError: `onset_load`, `end_load` and `ramp_load`
+        [N m], or the same of the speed [rad/s].
 
     Returns
     -------
@@ -114,11 +93,6 @@ def vibration_ranges(dataset: xr.Dataset, source: str = "results") -> xr.DataArr
         Over the other axes, `ramp` ("up", "down") and `limit` ("lower", "upper"), in the unit of what is
         ramped; nan where a run does not vibrate. A vibration from a ramp's start on, or to its end, reaches
         to the middle of the ramp's first or last part.
-
-    Raises
-    ------
-    InputError
-        The dataset holds no results of ramps in both directions.
     """
     check_results(dataset, source)
     expected = "results of ramps of load or speed, up and down along one axis such as load_start"
@@ -144,9 +118,8 @@ def vibration_ranges(dataset: xr.Dataset, source: str = "results") -> xr.DataArr
     found = []
     for (lower, upper), sign in zip(limits.values(), (1, -1), strict=True):
         here = vibrates & (sign * rise > 0.0)
-        found.append(
-            xr.concat([lower.where(here).min(turning[0]), upper.where(here).max(turning[0])], "limit")
-        )
+        ends = lower.where(here).min(turning[0]), upper.where(here).max(turning[0])
+        found.append(xr.concat(ends, "limit"))
     ranges = xr.concat(found, "ramp").assign_coords(ramp=[UP, DOWN], limit=["lower", "upper"])
     units = {"units": QUANTITIES[name].cf_units, "long_name": name}
     return ranges.rename("driving_speed" if name == "speed" else name).assign_attrs(units)
@@ -155,14 +128,7 @@ def vibration_ranges(dataset: xr.Dataset, source: str = "results") -> xr.DataArr
 def draw_bands(axes: Axes, y: layout.Ruler, ranges: NDArray[np.float64]) -> list[Any]:
     """Draw the limits of vibration along both ramps and hatch what lies between; return handles of a legend.
 
-    Parameters
-    ----------
-    axes : Axes
-        Where to draw.
-    y : Ruler
-        Places of the rows.
-    ranges : array, shape (ramp, limit, row)
-        Places along x, as `vibration_ranges` has them.
+    `ranges` (ramp, limit, row) are places along x, as `vibration_ranges` has them.
     """
     bands = []
     borders = np.stack([y.edges[:-1], y.edges[1:]], 1)
@@ -195,9 +161,8 @@ def hysteresis_figure(
 ) -> Figure:
     """Draw between which loads or speeds runs vibrate along ramps up and down, and where the two differ.
 
-    Arguments and errors as of `vibration_ranges`, and `at` as of all pictures of results (`figures.py`): the
-    first axis that is left, or that of `sides`, runs along y, the next one, or that of `sides`, over the
-    panels. A `measured` file is drawn over them (`measured.py`).
+    Arguments as of all pictures of results (`figures.py`), with what `vibration_ranges` takes: the first axis
+    that is left, or that of `sides`, runs along y, the next one, or that of `sides`, over the panels.
     """
     ranges = vibration_ranges(dataset, source)
     axes_left = ranges.isel(ramp=0, limit=0, drop=True)

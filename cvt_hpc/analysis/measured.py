@@ -71,23 +71,13 @@ Fault = tuple[Sequence[str], str, NDArray[np.bool_]]  # columns, what is expecte
 
 
 class Side(NamedTuple):
-    """A side of a panel, on which values have their places.
+    """A side of a panel, on which values have their places."""
 
-    Attributes
-    ----------
-    name : str
-        The axis or quantity along it.
-    edges, factor : (cell + 1,) array, float
-        Borders of its cells, or its ends, in the units that are drawn; from SI to these.
-    values, sign : (cell,) array, float
-        Values of the cells [SI], if it has any; sign of those of a logarithmic side, 0 of a linear one.
-    """
-
-    name: str
-    edges: Array
-    factor: float = 1.0
-    values: Array = np.empty(0)
-    sign: float = 0.0
+    name: str  # the axis or quantity along it
+    edges: Array  # (cell + 1,) borders of its cells, or its ends, in the units that are drawn
+    factor: float = 1.0  # from SI to these
+    values: Array = np.empty(0)  # (cell,) of the cells [SI], if it has any
+    sign: float = 0.0  # of values of a logarithmic side, 0 of a linear one
 
     def place(self, value: float) -> float:
         """Return the place of a value [SI]."""
@@ -109,29 +99,18 @@ class Side(NamedTuple):
 class Row(NamedTuple):
     """A row of a measured file, in SI units.
 
-    Attributes
-    ----------
-    at : dict
-        By axis of the study the value of the cell in which the measured one lies.
-    span, swept : (float, float)
-        Between which values of the axis `along` noise was measured, the same twice of onset and peak, nan
-        where the row states silence alone; and the measured range, infinite where it is not stated.
-    cell : float
-        Value of the cell of an onset or a peak; nan of a window, or of a run.
-    frequency, amplitude : (float, float) or None, float
-        Between which frequencies, and how large; None and nan where that was not measured.
-    rising, deviation : bool, float
-        Whether the axis rose as noise set in; standard deviation of the ends of the span.
+    The span is between which values of the axis `along` noise was measured: the same twice of onset and peak,
+    nan where the row states silence alone.
     """
 
-    at: dict[str, float]
+    at: dict[str, float]  # by axis of the study the value of the cell in which the measured one lies
     span: Span
-    cell: float
-    frequency: Span | None
-    amplitude: float
-    swept: Span
-    rising: bool
-    deviation: float
+    cell: float  # value of the cell of an onset or a peak; nan of a window, or of a run
+    frequency: Span | None  # None where it was not measured
+    amplitude: float  # nan likewise
+    swept: Span  # the measured range, infinite where it is not stated
+    rising: bool  # whether the axis rose as noise set in
+    deviation: float  # standard, of the ends of the span
 
     def covers(self, values: Array) -> NDArray[np.bool_]:
         """Whether the row tells of noise at values of its axis [SI], of the shape of these."""
@@ -202,11 +181,8 @@ def read_measured(
 
     The job is that in the attributes of the dataset, unless it is at hand. Rows at values that these do not
     have are left out. Of this, and of a window that holds no value of its axis that was run, a warning tells.
-
-    Raises
-    ------
-    InputError
-        As of `read_csv`; the columns are those of no kind; all rows are left out; or results are samples.
+    InputError as of `read_csv`; if the columns are those of no kind; all rows are left out; or results are
+    samples.
     """
     if is_sampled(dataset):
         raise mismatch(source, "results over a grid, beside which measurements are drawn", "samples")
@@ -350,14 +326,7 @@ def _row(
 
 
 class Overlay:
-    """What was measured, drawn over panels one by one, and its entries of the legend.
-
-    Parameters
-    ----------
-    path : str, Path, Measured or None
-        The measured file, or what was read of it; without one nothing is drawn.
-    dataset, source
-        As of `read_measured`.
+    """What was measured, drawn over panels one by one: a file, or what `read_measured` has read; or nothing.
 
     Attributes
     ----------

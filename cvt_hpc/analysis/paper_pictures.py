@@ -50,27 +50,13 @@ TAKEN = ("belt", "ring", "layer", "lag")
 
 
 class Powers(NamedTuple):
-    """Powers of a run that the block diagram shows [W].
+    """Powers of a run that the block diagram shows [W]."""
 
-    Attributes
-    ----------
-    spiral : float
-        Which friction takes from the mean radial motion through the arcs, into the sheaves and out again.
-    outlet : float
-        Which friction feeds into the vibration in the last quarter of the driven arc; negative: takes.
-    elsewhere : float
-        The same in all other parts of both arcs.
-    stresses : float
-        Which push and tension feed into the vibration, where gaps open and close.
-    taken : float
-        Which dampers of belt, layers and sheave and friction of the rings take from the vibration.
-    """
-
-    spiral: float
-    outlet: float
-    elsewhere: float
-    stresses: float
-    taken: float
+    spiral: float  # taken by friction from the mean radial motion through the arcs, into the sheaves and out
+    outlet: float  # fed by friction into the vibration in the last quarter of the driven arc; negative: taken
+    elsewhere: float  # the same in all other parts of both arcs
+    stresses: float  # fed by push and tension into the vibration, where gaps open and close
+    taken: float  # from the vibration by dampers of belt, layers and sheave and friction of the rings
 
 
 def powers_of(history: xr.Dataset) -> Powers:
@@ -87,13 +73,7 @@ def powers_of(history: xr.Dataset) -> Powers:
 
 @figures.styled
 def blocks_figure(histories: Sequence[xr.Dataset]) -> Figure:
-    """Draw a block diagram of each run below each other.
-
-    Parameters
-    ----------
-    histories : sequence of Dataset
-        Of the elastic belt, with what feeds the fluctuations.
-    """
+    """Draw block diagrams of runs of the elastic belt, with what feeds the fluctuations, below each other."""
     _, labels = on_axes(histories)
     figure = Figure((figures.WIDTH * 1.2, ROW * len(histories) + 0.7), layout="constrained")
     rows = figure.subplots(len(histories), 1, squeeze=False)[:, 0]
@@ -109,9 +89,8 @@ def _draw_blocks(axes: Axes, history: xr.Dataset) -> None:
     found = powers_of(history)
     amplitude = history["amplitude"].values
     sizes = zip(history["strand"].values, 1e6 * amplitude, strict=True)
-    strands = ", ".join(f"{strand} {size:.2g} µm" for strand, size in sizes)
-    if amplitude.max() < SILENT:
-        strands = "silent"
+    moving = ", ".join(f"{strand} {size:.2g} µm" for strand, size in sizes)
+    strands = moving if amplitude.max() >= SILENT else "silent"
     blocks = (
         (0.0, "source of energy", f"spiral motion of the belt:\nfriction takes {found.spiral:.0f} W"),
         (1.0, "switch", "curve of friction: less\nalong the motion"),
@@ -155,11 +134,8 @@ def _arrow(
 def spectrum_figure(run: xr.Dataset) -> Figure:
     """Draw the amplitude of each strand over frequency, with the mode of its peaks.
 
-    Parameters
-    ----------
-    run : Dataset
-        Results of one run: `spectrum` [m] over `strand` and `frequency_bin` [Hz]; `peak_frequency` [Hz],
-        `peak_amplitude` [m] and `peak_mode` over `strand` and `peak` (`[record] modal_peaks`).
+    The run has `spectrum` [m] over `strand` and `frequency_bin` [Hz]; `peak_frequency` [Hz], `peak_amplitude`
+    [m] and `peak_mode` over `strand` and `peak` (`[record] modal_peaks`).
     """
     figure = Figure((figures.WIDTH, 3.6), layout="constrained")
     axes = figure.subplots()
@@ -241,14 +217,9 @@ def _draw_bars(axes: Axes, shown: xr.Dataset) -> None:
 
 
 def curves_of(dataset: xr.Dataset, speeds: np.ndarray) -> dict[float, np.ndarray]:
-    """Coefficients of friction, regularised, at sliding speeds by the gradient [s/m] of each law of a study.
+    """Coefficients of friction, regularised, at speeds (n,) [m/s] by the gradient [s/m] of each law.
 
-    Parameters
-    ----------
-    dataset : Dataset
-        Results of a study of the energy criterion over `friction_gradient` and `radial_speed`.
-    speeds : (n,) array
-        [m/s]
+    The study is one of the energy criterion over `friction_gradient` and `radial_speed`.
     """
     job: Any = stored_job(json.loads(dataset.attrs["job"]), "dataset")
     found = {}
@@ -266,13 +237,7 @@ def regularised(point: Mapping[str, Any], speeds: np.ndarray) -> np.ndarray:
 
 @figures.styled
 def friction_figure(dataset: xr.Dataset) -> Figure:
-    """Draw the curves of a study, with marks where the criterion says that radial motion is fed.
-
-    Parameters
-    ----------
-    dataset : Dataset
-        As `curves_of` takes it.
-    """
+    """Draw the `curves_of` a study, with marks where the criterion says that radial motion is fed."""
     sliding = dataset["radial_speed"].values
     along = np.linspace(0.0, sliding.max(), POINTS)
     figure = Figure((figures.WIDTH, 3.8), layout="constrained")
