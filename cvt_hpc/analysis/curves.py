@@ -13,7 +13,7 @@ from matplotlib.figure import Figure
 from matplotlib.lines import Line2D
 
 from cvt_hpc.analysis import arrangement as layout
-from cvt_hpc.analysis import curves, figures
+from cvt_hpc.analysis import figures
 from cvt_hpc.analysis.cells import STYLES
 from cvt_hpc.analysis.classes import WITHOUT_RESULT, check_results, occurrence_classes
 from cvt_hpc.errors import mismatch, unknown
@@ -192,7 +192,7 @@ def curves_figure(
 ) -> Figure:
     """Draw as `curve_figure`, or with `lines` as `curve_panels_figure`, A+B in one panel."""
     if lines is None:
-        return curves.curve_figure(dataset, quantities, at, source)
+        return curve_figure(dataset, quantities, at, source)
     return curve_panels_figure(dataset, [name.split("+") for name in quantities], lines, at, source)
 
 
@@ -214,9 +214,9 @@ def curve_panels_figure(
     """
     check_results(dataset, source)
     for group in groups:
-        curves.check_quantities(dataset, group, source)
+        check_quantities(dataset, group, source)
     arrangement = layout.arrange(dataset, at or {}, source, layout.Sides(y=lines))
-    each, notes = curves.panels_of(arrangement, source, len(figures.COLOURS))
+    each, notes = panels_of(arrangement, source, len(figures.COLOURS))
     shown, along = arrangement.dataset, {arrangement.x, lines, arrangement.panel}
     panels = [(group, place) for group in groups for place in _places(shown, group, along, source)]
     if len(panels) > MOST_QUANTITIES:
@@ -232,26 +232,26 @@ def curve_panels_figure(
     x = layout.ruler(shown[arrangement.x])
     legend: dict[str, Any] = {
         title: Line2D([], [], color=colour, marker=mark, ms=5, lw=0.7)
-        for (title, _), colour, mark in zip(each, figures.COLOURS, curves.MARKS, strict=False)
+        for (title, _), colour, mark in zip(each, figures.COLOURS, MARKS, strict=False)
     }
     for axes, (group, place) in zip(all_axes.flat, panels, strict=False):
-        factor, unit = curves.scale(shown, group)
-        labels = [curves.place_in_words(shown[dim], k) for dim, k in place.items()]
-        title = " ".join([curves.common_words(shown, group), *labels])
+        factor, unit = scale(shown, group)
+        labels = [place_in_words(shown[dim], k) for dim, k in place.items()]
+        title = " ".join([common_words(shown, group), *labels])
         axes.set_title(f"{title} [{unit}]" if unit else title, loc="left", pad=6)
         for k, (_, results) in enumerate(each):
             values = [factor * results[name].isel(place).values for name in group]
             _draw(axes, x.centres, values, results["status"].values == Status.DONE, k)
-            curves.mark_above(axes, x.centres, occurrence_classes(results).values)
-        for name, style in zip(group[1:], curves.BESIDE, strict=False):
+            mark_above(axes, x.centres, occurrence_classes(results).values)
+        for name, style in zip(group[1:], BESIDE, strict=False):
             legend[figures.in_words(shown[name])] = Line2D([], [], color=INK, ls=style, lw=1.2)
         legend |= figures.entries_of([axes])
-        axes.set_xlim(curves.with_margins(x))
+        axes.set_xlim(with_margins(x))
         x.lay_out(axes.xaxis)
         axes.grid(linewidth=0.4, alpha=0.5)
     figures.label_x(all_axes, len(panels), x.label)
     title = f"Over {figures.in_words(shown[arrangement.x])}, by {figures.in_words(shown[lines])}"
-    curves.set_frame(figure, legend, [figures.headline(title, dataset.attrs), *notes])
+    set_frame(figure, legend, [figures.headline(title, dataset.attrs), *notes])
     return figure
 
 
@@ -269,8 +269,8 @@ def _places(
 
 def _draw(axes: Axes, x: np.ndarray, values: Sequence[np.ndarray], is_done: np.ndarray, k: int) -> None:
     """The k-th curve of a panel: marks of the first quantity, lines of the others, in one colour."""
-    colour, mark = figures.COLOURS[k], curves.MARKS[k % len(curves.MARKS)]
+    colour, mark = figures.COLOURS[k], MARKS[k % len(MARKS)]
     first, *others = (np.where(is_done, value, np.nan) for value in values)
     axes.plot(x, first, color=colour, marker=mark, ms=4, lw=0.7, zorder=2.5)
-    for value, style in zip(others, curves.BESIDE, strict=False):
+    for value, style in zip(others, BESIDE, strict=False):
         axes.plot(x, value, color=colour, ls=style, lw=1.2, zorder=1.5)

@@ -54,15 +54,8 @@ def probability_figure(
 ) -> Figure:
     """Draw the probability of vibration: over two axes with contours, over one with its 95 % interval.
 
-    Parameters
-    ----------
-    dataset, at, source
-        As of all pictures of results (`figures.py`), with the axis `sample`; or their `probabilities`. Where
-        no verdict on vibration is known, the probability of failure is drawn.
-    sides : Sides
-        Which axis runs along x, along y, and over the panels.
-    measured : str or Path
-        Measured file that is drawn over it (`measured.py`).
+    Arguments as of all pictures of results (`figures.py`), with the axis `sample`; or their `probabilities`.
+    Where no verdict on vibration is known, the probability of failure is drawn.
     """
     told = over_samples(dataset, at or {})
     name = PROBABILITY if np.isfinite(told[PROBABILITY]).any() else "failure_probability"
@@ -95,19 +88,8 @@ def onset_bands_figure(
 ) -> Figure:
     """Draw the onset of vibration along an axis over another one: its median and 5 to 95 % of the samples.
 
-    Parameters
-    ----------
-    dataset, at, source
-        As of all pictures of results (`figures.py`), with the axis `sample`.
-    sides : Sides
-        Which axis runs along x, and over the panels.
-    along : str
-        Axis along which vibration sets in; by default the load or the axis in its place, else the last one.
-
-    Raises
-    ------
-    InputError
-        As of all pictures; the results have no samples, or no axis beside `along`.
+    Arguments as of all pictures of results (`figures.py`), with the axis `sample` and another one beside that
+    along which vibration sets in: by default the load or the axis in its place, else the last one.
     """
     check_results(dataset, source)
     told = over_samples(dataset, at or {})
@@ -151,18 +133,9 @@ def sensitivity_figure(
     Side by side: its median in the lowest and the highest quarter of the samples, by the parameter; its
     scatter as it is, and with half that of the parameter; Sobol indices, where the job has the runs.
 
-    Parameters
-    ----------
-    dataset, at, source
-        As of all pictures of results (`figures.py`), with the axis `sample`. Further axes are fixed where the
-        scatter of the onset is widest.
-    along : str
-        Axis along which vibration sets in; by default the load or the axis in its place, else the last one.
-
-    Raises
-    ------
-    InputError
-        As of all pictures; the results have no samples, or no job with their distributions.
+    Arguments as of all pictures of results (`figures.py`), with the axis `sample` and the job that states the
+    distributions. Further axes are fixed where the scatter of the onset is widest. Vibration sets in `along`
+    an axis, by default the load or the axis in its place, else the last one.
     """
     check_results(dataset, source)
     dims = list(map(str, dataset["status"].dims))
@@ -176,11 +149,10 @@ def sensitivity_figure(
     if "band" not in found:
         raise mismatch(source, "results with the job that states the distributions", "others")
     row = widest_row(found)
-    rows = (
-        f"{figures.in_words(found[name])} = {layout.value_text(found[name], k)}" for name, k in row.items()
-    )
+    axes_of_row = [(found[name], k) for name, k in row.items()]
+    place = ", ".join(f"{figures.in_words(axis)} = {layout.value_text(axis, k)}" for axis, k in axes_of_row)
     head = figures.headline(f"What the onset in {figures.in_words(dataset[along])} depends on", dataset.attrs)
-    lines = [head, ", ".join(rows).replace("_", " ")]
+    lines = [head, place.replace("_", " ")]
     here = found.isel(row)
     swing = np.abs(here["quarter_onset"].diff("quarter").values[0])
     here = here.isel(parameter=np.argsort(np.where(np.isfinite(swing), swing, -1.0)))

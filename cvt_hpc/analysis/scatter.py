@@ -29,24 +29,9 @@ def is_sampled(dataset: xr.Dataset) -> bool:
 
 
 def scatter_figure(dataset: xr.Dataset, at: Mapping[str, Any], source: str, vmax: cells.End = None) -> Figure:
-    """Compose the map of a sampled study.
+    """Compose the map of a sampled study; arguments as of `map_figure`.
 
-    Parameters
-    ----------
-    dataset : Dataset
-        `status` and `vibrates` along `run`, with the values of the axes as coordinates along it; `amplitude`
-        [m], where known.
-    at : mapping
-        Has to be empty: no two samples lie at one value of an axis.
-    source : str
-        Where the results are from, for the error.
-    vmax : float or "fit"
-        As of `map_figure`.
-
-    Raises
-    ------
-    InputError
-        If `at` is not empty.
+    The axes are coordinates along `run`, and `at` has to be empty: no two samples lie at one value of one.
     """
     if at:
         raise mismatch(f"{source}: at {next(iter(at))}", "results over a grid", "samples, all apart")
@@ -87,20 +72,8 @@ def draw_samples(
 ) -> NDArray[Any]:
     """Draw the runs of a sampled study by class, in a panel for each pair of axes, and return the panels.
 
-    Parameters
-    ----------
-    figure : FigureBase
-        Where to draw.
-    dataset : Dataset
-        With the values of the axes along `run`.
-    classes : array, shape (run,)
-        Keys of `cells.ALL_STYLES`.
-    amplitude : array, shape (run,)
-        What colours the vibrating runs; not a number leaves the colour of the class.
-    scale : Scale
-        How it colours them.
-    beside : int
-        Panels side by side at most.
+    Classes (run,) are keys of `cells.ALL_STYLES`. The amplitude (run,) colours the vibrating runs by the
+    scale; not a number leaves the colour of the class. `beside` panels stand side by side at most.
     """
     pairs = _pairs(dataset)
     columns = min(len(pairs), beside)
