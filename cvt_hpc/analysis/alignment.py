@@ -34,22 +34,11 @@ class Aligned(NamedTuple):
 
 
 def align(a: xr.Dataset, b: xr.Dataset, sources: tuple[str, str], names: Collection[str] = ()) -> Aligned:
-    """Return the common runs of two studies.
+    """Return the common runs of two studies, both over a grid or both of samples.
 
-    Parameters
-    ----------
-    a, b : Dataset
-        Results of either study, both over a grid or both of samples.
-    sources : (str, str)
-        Where they are from, for the errors.
-    names : collection of str
-        Variables to be kept beside COMPARED.
-
-    Raises
-    ------
-    InputError
-        If a dataset holds no results, one is of samples and the other over a grid, an axis of one is neither
-        an axis nor a parameter of the other, or they have no run in common.
+    `names` are of variables to be kept beside COMPARED. InputError, which names a source, if a dataset holds
+    no results, one is of samples and the other over a grid, an axis of one is neither an axis nor a parameter
+    of the other, or they have no run in common.
     """
     for dataset, source in zip((a, b), sources, strict=True):
         check_results(dataset, source)
@@ -128,9 +117,8 @@ def _at_common_samples(
     a: xr.Dataset, b: xr.Dataset, sources: tuple[str, str]
 ) -> tuple[xr.Dataset, xr.Dataset]:
     names = axes_of(a)
-    in_a, in_b = _common_places(
-        *(list(zip(*(_keys(dataset[name]) for name in names), strict=True)) for dataset in (a, b))
-    )
+    keys = (zip(*(_keys(dataset[name]) for name in names), strict=True) for dataset in (a, b))
+    in_a, in_b = _common_places(*keys)
     if not in_a:
         raise mismatch(sources[1], f"samples at places of those of {sources[0]}", "none")
     return a.isel(run=in_a), b.isel(run=in_b)

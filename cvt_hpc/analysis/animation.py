@@ -63,10 +63,7 @@ class Animation:
     def save(self, out: str | Path) -> Path:
         """Write it, with a name in .gif, or in .mp4 where there is ffmpeg; its folder is made if needed.
 
-        Raises
-        ------
-        InputError
-            The suffix names no moving picture, there is no ffmpeg for .mp4, or the system refuses.
+        InputError if the suffix names no moving picture, there is no ffmpeg for .mp4, or the system refuses.
         """
         out = Path(out)
         check_animation(out)
@@ -156,9 +153,8 @@ def _geometry(history: xr.Dataset, source: str) -> Drive:
     """Pulleys and path of the belt of a run whose motion can be drawn."""
     found = run_geometry(history)
     if found is None or not {"displacement", "probe_position"} <= {*map(str, history.variables)}:
-        raise mismatch(
-            source, "the history of a run of a variator or belt drive, with displacement at probes", "another"
-        )
+        expected = "the history of a run of a variator or belt drive, with displacement at probes"
+        raise mismatch(source, expected, "another")
     if history.sizes["time"] < LEAST_SAMPLES or not np.isfinite(history["displacement"]).all():
         expected = f"finite displacements at {LEAST_SAMPLES} times at least"
         raise mismatch(source, expected, f"{history.sizes['time']} times, or others")

@@ -14,7 +14,7 @@ from matplotlib.axis import Axis
 from numpy.typing import NDArray
 
 from cvt_hpc.analysis.figures import axis_label, coordinate_unit, in_words, number, put_ticks, short_numbers
-from cvt_hpc.errors import InputError, few_of, mismatch, show, unknown
+from cvt_hpc.errors import few_of, mismatch, show, unknown
 from cvt_hpc.job.values import shown_as_read, shown_number, shown_unit
 
 EVEN, EQUAL = 1.5, 1.01  # of steps: largest over smallest, below which they are taken for even
@@ -65,14 +65,12 @@ def arrange(dataset: xr.Dataset, at: Mapping[str, Any], source: str, sides: Side
         if name not in axes:
             raise unknown(f"{source}: at {name}", "axis of the results", name, axes)
         index = index_of(dataset[name], value, f"{source}: at {name}")
-        notes.append(f"{in_words(dataset[name])} = {value_text(dataset[name], index)}")
+        notes.append(place_text(dataset[name], index, " = "))
         dataset = dataset.isel({name: index})
     free = [name for name in axes if name not in at]
     if not free:
-        raise InputError(
-            f"{source}: expected results over one axis or more to be drawn, found a single run; "
-            "`cvt-hpc simulate` draws one"
-        )
+        then = "`cvt-hpc simulate` draws one"
+        raise mismatch(source, "results over one axis or more to be drawn", "a single run", then)
     numeric = [name for name in free if dataset[name].dtype.kind in "iuf"]
     rest = [name for name in free if name not in sides]
     x = sides.x or _take_along_x(rest, numeric, source)
@@ -130,7 +128,7 @@ def first_panel(arrangement: Arrangement) -> Arrangement:
 def _at_first(dataset: xr.Dataset, name: str, notes: list[str]) -> xr.Dataset:
     """Results at the first value of an axis, which is added to the notes."""
     axis = dataset[name]
-    notes.append(f"{in_words(axis)} = {value_text(axis, 0)} (first of {axis.size})")
+    notes.append(f"{place_text(axis, 0, ' = ')} (first of {axis.size})")
     return dataset.isel({name: 0})
 
 
@@ -210,6 +208,11 @@ def value_text(coordinate: xr.DataArray, index: int) -> str:
         return infinity_in_words(str(coordinate.name))
     factor, unit = coordinate_unit(coordinate.attrs)
     return f"{number(value * factor)} {unit}".strip()
+
+
+def place_text(coordinate: xr.DataArray, index: int, between: str = " ") -> str:
+    """A place on an axis for people: its name and the value there, such as "load 120 N m"."""
+    return f"{in_words(coordinate)}{between}{value_text(coordinate, index)}"
 
 
 def infinity_in_words(name: str) -> str:

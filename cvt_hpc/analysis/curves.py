@@ -4,6 +4,7 @@
 """
 
 from collections.abc import Iterator, Mapping, Sequence
+from itertools import chain
 from typing import Any
 
 import numpy as np
@@ -53,12 +54,8 @@ def curve_figure(
     x = layout.ruler(arrangement.dataset[arrangement.x])
     factor, unit = scale(arrangement.dataset, quantities)
     for axes, (title, shown) in zip(all_axes, panels, strict=True):
-        curves = [
-            curve
-            for name in quantities
-            for curve in _curves(shown[name], factor, arrangement.x, len(quantities) > 1)
-        ]
-        _draw_curves(axes, x.centres, curves, shown["status"].values == Status.DONE)
+        each = (_curves(shown[name], factor, arrangement.x, len(quantities) > 1) for name in quantities)
+        _draw_curves(axes, x.centres, list(chain(*each)), shown["status"].values == Status.DONE)
         mark_above(axes, x.centres, occurrence_classes(shown).values)
         axes.set_title(title, loc="left", pad=6)
         axes.set(xlabel=x.label, xlim=with_margins(x))
@@ -105,8 +102,7 @@ def panels_of(
     if y.size > most:
         expected = f"at most {most} values, or one that --at fixes"
         raise mismatch(f"{source}: {arrangement.y}", expected, f"{y.size}")
-    titles = [f"{figures.in_words(y)} {layout.value_text(y, k)}" for k in range(y.size)]
-    return [(title, dataset.isel({arrangement.y: k})) for k, title in enumerate(titles)], notes
+    return [(layout.place_text(y, k), dataset.isel({arrangement.y: k})) for k in range(y.size)], notes
 
 
 def _curves(
@@ -158,9 +154,8 @@ def _draw_curves(
             axes.plot(x, known, ls="", marker=mark, fillstyle=fill, ms=5, color=colour, label=label)
             marks += 1
         else:
-            axes.plot(
-                x, values, ls=BESIDE[(k - marks) % len(BESIDE)], lw=1.4, color=colour, label=label, zorder=1.5
-            )
+            style = {"ls": BESIDE[(k - marks) % len(BESIDE)], "lw": 1.4, "zorder": 1.5}
+            axes.plot(x, values, color=colour, label=label, **style)
 
 
 def mark_above(axes: Axes, x: np.ndarray, classes: np.ndarray) -> None:

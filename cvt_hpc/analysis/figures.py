@@ -239,18 +239,10 @@ class Grid(NamedTuple):
 
 
 def fitting(count: int, columns: Sequence[int], heights: tuple[float, float], page: float) -> Grid | None:
-    """Lay panels out within a height, or return None where they would be too low to be read.
+    """Lay panels out within the height of a page [inch], or return None where they are too low to be read.
 
-    Parameters
-    ----------
-    count : int
-        Number of panels.
-    columns : sequence of int
-        How many may stand side by side, the best one first. Rows are lowered before the next one is taken.
-    heights : (float, float)
-        Of a panel with its title [inch]: the least that is readable, and the one that is wanted.
-    page : float
-        Height that all rows may have [inch].
+    `columns` say how many may stand side by side, the best one first: rows are lowered before the next one is
+    taken. `heights` are of a panel with its title [inch]: the least that is readable, and the wanted one.
     """
     least, wanted = heights
     for side_by_side in columns:
@@ -265,10 +257,7 @@ def on_a_page(
 ) -> Grid:
     """Lay panels out as `fitting` does, on a page of which title, labels and legend take `frame` [inch].
 
-    Raises
-    ------
-    InputError
-        If the panels do not fit; it names the source, and says what to do `then`.
+    If they do not fit, InputError names the source, and says what to do `then`.
     """
     if (grid := fitting(count, columns, heights, LONG - frame)) is not None:
         return grid
@@ -360,24 +349,10 @@ def legend_columns(labels: Sequence[str]) -> int:
 
 
 def save_figure(figure: Figure, out: Path) -> Path:
-    """Write a picture in the format that the suffix names.
+    """Write a picture in the format that the suffix names, and return its path.
 
-    Parameters
-    ----------
-    figure : Figure
-        What to write.
-    out : Path
-        The picture; its folder is made if needed.
-
-    Returns
-    -------
-    Path
-        `out`.
-
-    Raises
-    ------
-    InputError
-        The suffix is none of .png, .svg, .pdf, or the system refuses; what stood at `out` is then untouched.
+    Its folder is made if needed. InputError if the suffix is none of .png, .svg, .pdf, or the system refuses;
+    what stood there is then untouched.
     """
     out = Path(out)
     check_format(out)
@@ -466,13 +441,9 @@ def put_ticks(axis: Axis, places: NDArray[np.float64], labels: Sequence[str]) ->
 
 def line_style(k: int) -> dict[str, Any]:
     """Line and marker of the k-th method."""
-    return {
-        "color": COLOURS[k % len(COLOURS)],
-        "ls": LINES[k // len(COLOURS) % len(LINES)],
-        "marker": MARKERS[k % len(MARKERS)],
-        "lw": 1.3,
-        "ms": 4.5,
-    }
+    line = LINES[k // len(COLOURS) % len(LINES)]
+    style = {"color": COLOURS[k % len(COLOURS)], "ls": line, "marker": MARKERS[k % len(MARKERS)]}
+    return style | {"lw": 1.3, "ms": 4.5}
 
 
 def set_error_axis(axes: Axes, values: Sequence[float]) -> float:

@@ -99,9 +99,8 @@ def vibration_ranges(dataset: xr.Dataset, source: str = "results") -> xr.DataArr
     known = (name for name in QUANTITIES if f"onset_{name}" in dataset and f"ramp_{name}" in dataset)
     name = next((name for name in known if np.isfinite(dataset[f"ramp_{name}"]).any()), None)
     if name is None:
-        raise mismatch(
-            source, expected, "no onset along a ramp", "`cvt-hpc examples speed_ramp` copies a job of ramps"
-        )
+        then = "`cvt-hpc examples speed_ramp` copies a job of ramps"
+        raise mismatch(source, expected, "no onset along a ramp", then)
     course = dataset[f"ramp_{name}"]
     rise = course.diff("ramp_share").mean("ramp_share")
     dims = [str(dim) for dim in dataset["status"].dims]
@@ -206,9 +205,7 @@ def hysteresis_figure(
         y.lay_out(axes.yaxis)
         axes.grid(axis="x", lw=0.4, alpha=0.5)
         if panel:
-            axes.set_title(
-                f"{figures.in_words(ranges[panel])}: {layout.value_text(ranges[panel], k)}", loc="left", pad=3
-            )
+            axes.set_title(layout.place_text(ranges[panel], k, ": "), loc="left", pad=3)
     x, places = Side(str(ranges.name), np.array(panels[0, 0].get_xlim()), factor), ranges.coords.to_dataset()
     for k, axes in enumerate(panels.flat[:count]):
         over.draw(axes, x, side_of(places, y_name), places.isel({panel: k} if panel else {}))

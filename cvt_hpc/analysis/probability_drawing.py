@@ -108,7 +108,7 @@ def onset_bands_figure(
     panels = []
     for place in range(shown.sizes[over]) if over else (0,):
         part = shown["onset"].isel({over: place}) if over else shown["onset"]
-        title = f"{figures.in_words(shown[over])}: {layout.value_text(shown[over], place)}" if over else ""
+        title = layout.place_text(shown[over], place, ": ") if over else ""
         values = factor * part.transpose("quantile", ...).values
         low, _, high = np.clip(values, *_ends(factor * told[along].values))
         panels.append(_Panel(title, low, np.where(np.isinf(values[1]), np.nan, values[1]), high))
@@ -149,8 +149,7 @@ def sensitivity_figure(
     if "band" not in found:
         raise mismatch(source, "results with the job that states the distributions", "others")
     row = widest_row(found)
-    axes_of_row = [(found[name], k) for name, k in row.items()]
-    place = ", ".join(f"{figures.in_words(axis)} = {layout.value_text(axis, k)}" for axis, k in axes_of_row)
+    place = ", ".join(layout.place_text(found[name], k, " = ") for name, k in row.items())
     head = figures.headline(f"What the onset in {figures.in_words(dataset[along])} depends on", dataset.attrs)
     lines = [head, place.replace("_", " ")]
     here = found.isel(row)

@@ -10,7 +10,7 @@ import numpy as np
 import xarray as xr
 from matplotlib.figure import Figure
 
-from cvt_hpc.analysis import cells, figures, waterfall
+from cvt_hpc.analysis import figures, waterfall
 from cvt_hpc.analysis.measured import FREQUENCY, Overlay, Side, put_legend
 from cvt_hpc.analysis.telling_apart import entitle_runs, named, on_axes
 from cvt_hpc.errors import mismatch
@@ -62,13 +62,11 @@ def ramp_figure(
     spectra = [spectrogram(ramp) for ramp in ramps]
     scale = 1e6 if of in STRANDS else 1.0
     end = None if vmax is None else scale * vmax
-    norm = waterfall.spectra_norm([amplitude.T for *_, amplitude in spectra], end)
-    for (left, right), ramp, (values, frequency, amplitude), label in zip(
-        panels, ramps, spectra, labels, strict=True
-    ):
+    norm = waterfall.spectra_norm([amplitude for *_, amplitude in spectra], end)
+    for (left, right), ramp, spectrum, label in zip(panels, ramps, spectra, labels, strict=True):
         left.plot(ramp.values, ramp.motion, color="#0072b2", linewidth=0.3, rasterized=True)
         left.grid(linewidth=0.4, alpha=0.5)
-        waterfall.draw_spectra(right, values, frequency, amplitude.T, norm)
+        waterfall.draw_spectra(right, *spectrum, norm)
         for edge in (500.0, 700.0):
             right.axhline(edge, color="#123a6b", linewidth=0.8, linestyle=(0, (4, 4)))
         left.set_title(", ".join(label.values()), loc="left", pad=3)
@@ -80,17 +78,15 @@ def ramp_figure(
         left.set_ylabel(fill(f"{name} [{unit}]", LETTERS))
     for axes in panels[-1]:
         axes.set_xlabel(ramps[0].label)
-    bar = cells.Scale(waterfall.COLOURS, norm, f"amplitude [{unit}]")
-    drawn = np.concatenate([amplitude.ravel() for *_, amplitude in spectra])
-    cells.colour_bar(figure, bar, drawn, ax=list(panels[:, 1]), aspect=15 * len(ramps), pad=0.02)
+    amplitudes = [amplitude for *_, amplitude in spectra]
+    waterfall.spectra_bar(figure, norm, amplitudes, panels[:, 1], 15 * len(ramps), unit)
     for history, ramp, row, over in zip(histories, ramps, panels, overlays, strict=True):
         motion = Side("", np.array(row[0].get_ylim()))
         for axes, y in zip(row, (motion, FREQUENCIES), strict=True):
             over.draw(axes, _side_of(history, ramp), y, _held(history))
     put_legend(figure, *overlays)
-    entitle_runs(
-        figure, histories, f"Along the ramp, {name}", "dashed: 500 and 700 Hz", overlays[0].note, width=80
-    )
+    further = "dashed: 500 and 700 Hz", overlays[0].note
+    entitle_runs(figure, histories, f"Along the ramp, {name}", *further, width=80)
     return figure
 
 
@@ -124,7 +120,7 @@ def spectrogram_figure(
         for history, name in zip(histories, names, strict=True)
     ]
     spectra = [[spectrogram(ramp) for ramp in row] for row in ramps]
-    drawn = [amplitude.T for row in spectra for *_, amplitude in row]
+    drawn = [amplitude for row in spectra for *_, amplitude in row]
     norm = waterfall.spectra_norm(drawn, None if vmax is None else 1e6 * vmax)
     overlays = [Overlay(measured, history, name) for history, name in zip(histories, names, strict=True)]
     frame = 1.4 + overlays[0].height
@@ -135,10 +131,10 @@ def spectrogram_figure(
     pads = np.zeros(panels.shape)
     for history, row, of_row, label, over in zip(histories, ramps, spectra, labels, overlays, strict=True):
         turns, known = _lines_along(history, row[0])
-        for strand, ramp, (values, frequency, amplitude) in zip(strands, row, of_row, strict=True):
+        for strand, ramp, spectrum in zip(strands, row, of_row, strict=True):
             axes, lines = next(each), []
-            waterfall.draw_spectra(axes, values, frequency, amplitude.T, norm)
-            axes.set(xlim=np.sort(values[[0, -1]]), ylim=(0.0, HIGHEST))
+            waterfall.draw_spectra(axes, *spectrum, norm)
+            axes.set(xlim=np.sort(spectrum[0][[0, -1]]), ylim=(0.0, HIGHEST))
             over.draw(axes, _side_of(history, ramp), FREQUENCIES, _held(history))
             if known is not None:
                 places, waves = known
@@ -158,9 +154,7 @@ def spectrogram_figure(
         panels[0, 0].set_ylabel("frequency [Hz]")
     else:
         figure.supylabel("frequency [Hz]", fontsize=figures.STYLE["axes.labelsize"])
-    scale = cells.Scale(waterfall.COLOURS, norm, "amplitude [µm]")
-    values = np.concatenate([each.ravel() for each in drawn])
-    cells.colour_bar(figure, scale, values, ax=panels, aspect=20 * count, pad=0.02)
+    waterfall.spectra_bar(figure, norm, drawn, panels, 20 * count)
     put_legend(figure, *overlays)
     entitle_runs(figure, histories, "Spectrogram", *sorted(told), overlays[0].note, width=72)
     return figure
@@ -221,18 +215,15 @@ def course_figure(history: xr.Dataset, of: str) -> Figure:
     )
     scale.set_xlabel(loads.label)
     lower.set(xlabel="time [s]", xlim=(begun, time[-1]))
-    upper.set_ylim(*_limits(values[time >= begun]))
+    along = values[time >= begun]
+    margin = 0.05 * float(np.ptp(along))
+    upper.set_ylim(along.min() - margin, along.max() + margin)
     for axes in (upper, lower):
         axes.grid(lw=0.4, alpha=0.5)
     moment, strand = (f"{low:g} to {high:g} Hz" for low, high in (NOISE, BAND))
     bands = f"amplitudes: the moment's at {moment}, the strand's at {strand}"
     entitle_runs(figure, [history], f"{name[0].upper()}{name[1:]} over time", bands)
     return figure
-
-
-def _limits(values: np.ndarray) -> tuple[float, float]:
-    margin = 0.05 * float(np.ptp(values))
-    return float(values.min()) - margin, float(values.max()) + margin
 
 
 def read_ramp(history: xr.Dataset, of: str, source: str = "history", *, is_ramp: bool = True) -> Ramp:
@@ -309,7 +300,7 @@ def _without_drift(motion: np.ndarray, rate: float) -> np.ndarray:
 
 
 def spectrogram(ramp: Ramp) -> tuple[np.ndarray, np.ndarray, np.ndarray]:
-    """Values of the ramp (window,), frequencies (line,) [Hz], amplitudes (window, line) by Hann windows."""
+    """Values of the ramp (window,), frequencies (line,) [Hz], amplitudes (line, window) by Hann windows."""
     width = int(round(WINDOW * ramp.rate))
     cut = np.lib.stride_tricks.sliding_window_view(ramp.motion, width)[:: width // 4]
     window = np.hanning(width)
@@ -317,7 +308,7 @@ def spectrogram(ramp: Ramp) -> tuple[np.ndarray, np.ndarray, np.ndarray]:
     inside = lines <= HIGHEST
     amplitude = 2.0 * np.abs(np.fft.rfft(cut * window, 2 * width)) / window.sum()
     middles = ramp.values[width // 2 :: width // 4][: len(cut)]
-    return middles, lines[inside], amplitude[:, inside]
+    return middles, lines[inside], amplitude[:, inside].T
 
 
 def envelope(ramp: Ramp, band: tuple[float, float] = BAND) -> tuple[np.ndarray, np.ndarray]:

@@ -79,12 +79,7 @@ def indices_of(dataset: xr.Dataset, of: str, along: str = "", source: str = "res
     along : str
         Axis along which vibration sets in; else the cells along it count together.
     source : str
-        Where the results are from, for the errors.
-
-    Raises
-    ------
-    InputError
-        If the results have no such runs, no such variable, or no such axis.
+        Named by InputError, if the results have no such runs, no such variable, or no such axis.
     """
     check_results(dataset, source)
     if not {SAMPLE, SWAPPED} <= {*dataset["status"].dims}:
@@ -108,23 +103,15 @@ def indices_of(dataset: xr.Dataset, of: str, along: str = "", source: str = "res
 
 
 class _Brackets(NamedTuple):
-    """Between which values of an axis vibration sets in.
+    """Between which values of an axis vibration sets in, of each sample of each row.
 
-    Attributes
-    ----------
-    low, high : array
-        Of each sample of each row; both -inf where the lowest value vibrates, inf where none does, nan where
-        the sample does not count.
-    like : DataArray
-        With the coordinates of rows and samples.
-    knots : array
-        The finite values of the axis, rising.
+    Both are -inf where the lowest value vibrates, inf where none does, nan where the sample does not count.
     """
 
     low: NDArray[np.float64]
     high: NDArray[np.float64]
-    like: xr.DataArray
-    knots: NDArray[np.float64]
+    like: xr.DataArray  # with the coordinates of rows and samples
+    knots: NDArray[np.float64]  # the finite values of the axis, rising
 
 
 def _check_axis(dataset: xr.Dataset, along: str, source: str) -> None:
@@ -201,14 +188,7 @@ def widest_row(found: xr.Dataset) -> dict[str, int]:
 def onset_scatter(dataset: xr.Dataset, along: str, source: str = "results") -> xr.Dataset:
     """Return quantiles of the onset of vibration, and what half the scatter of each parameter makes of them.
 
-    Parameters
-    ----------
-    dataset : Dataset
-        Results with the axis `sample`.
-    along : str
-        A numeric axis.
-    source : str
-        Where they are from, for the errors.
+    InputError, which names the source, if the results have no axis `sample`, or `along` is none of numbers.
 
     Returns
     -------
@@ -221,11 +201,6 @@ def onset_scatter(dataset: xr.Dataset, along: str, source: str = "results") -> x
         bootstrap, `_low` and `_high`, inf where the band reaches beyond the axis; `effective_samples` of
         independent ones that the weights leave [1]. Over `quarter`, too, `quarter_onset`: the median of the
         onset where the parameter is in the lowest or the highest quarter of its samples.
-
-    Raises
-    ------
-    InputError
-        If the results have no samples, or no such axis.
     """
     check_samples(dataset, source)
     _check_axis(dataset, along, source)

@@ -76,10 +76,7 @@ def check_holds(histories: Sequence[xr.Dataset], names: Sequence[str], wanted: d
 def history_files(paths: Sequence[Path]) -> list[Path]:
     """Files of histories; of a folder all that it keeps, those of a study in its folder `histories`.
 
-    Raises
-    ------
-    InputError
-        A file is no history, or a folder has none.
+    InputError if a file is no history, or a folder has none.
     """
     from cvt_hpc.storage.netcdf import is_history
 

@@ -166,32 +166,21 @@ def _panels(arrangement: layout.Arrangement, quantities: Sequence[str]) -> list[
     kinds, found = occurrence_classes(dataset), []
     # between texts there is nothing that a line could cross
     are_numbers = all(dataset[name].dtype.kind in "iuf" for name in (arrangement.x, arrangement.y) if name)
+    over = [arrangement.panel] if arrangement.panel else []
     for name in quantities:
         array = dataset[name]
         factor, unit = figures.value_unit(array)
-        over = [arrangement.panel] if arrangement.panel else []
         labelled = [str(dim) for dim in array.dims if dim not in (arrangement.x, arrangement.y, *over)]
         alike = factor * np.asarray(array.attrs.get("valid_range", array.values))
         isolines = tuple(factor * np.asarray(array.attrs.get(ISOLINES, ()) if are_numbers else (), float))
         for labels in layout.places(array, labelled):
             told = [str(array[dim].values[k]) for dim, k in labels.items()]
             for at in layout.places(dataset, over):
-                here = [
-                    f"{figures.in_words(dataset[dim])} {layout.value_text(dataset[dim], k)}"
-                    for dim, k in at.items()
-                ]
-                found.append(
-                    Panel(
-                        ", ".join([figures.axis_label(array, unit), *told, *here]),
-                        unit,
-                        factor,
-                        factor * _of_grid(array.isel(labels | at), arrangement),
-                        _of_grid(kinds.isel(at), arrangement).astype(np.int8),
-                        alike,
-                        isolines,
-                        at,
-                    )
-                )
+                here = [layout.place_text(dataset[dim], k) for dim, k in at.items()]
+                title = ", ".join([figures.axis_label(array, unit), *told, *here])
+                values = factor * _of_grid(array.isel(labels | at), arrangement)
+                ended = _of_grid(kinds.isel(at), arrangement).astype(np.int8)
+                found.append(Panel(title, unit, factor, values, ended, alike, isolines, at))
     return found
 
 

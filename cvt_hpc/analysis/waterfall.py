@@ -177,8 +177,7 @@ def waterfall_figure(
     figures.label_x(panels, len(rows) * len(strands), x.label)
     for axes in panels[:, 0]:
         axes.set_ylabel("frequency [Hz]")
-    scale = cells.Scale(COLOURS, norm, "amplitude [µm]")
-    cells.colour_bar(figure, scale, np.stack(amplitude), ax=panels, aspect=20 * len(panels), pad=0.02)
+    spectra_bar(figure, norm, amplitude, panels, 20 * len(panels))
     subject = "Campbell diagram" if orders else "Spectra of the strands"
     told = []
     if arrangement.x == "driving_speed" and orders:
@@ -202,7 +201,7 @@ def _rows(
     for k in range(axis.size):
         one = replace(arrangement, dataset=arrangement.dataset.isel({panel: k}), panel=None)
         shown, notes = layout.along_x(one)
-        rows.append((f"{figures.in_words(axis)} {layout.value_text(axis, k)}", shown))
+        rows.append((layout.place_text(axis, k), shown))
     return rows, notes
 
 
@@ -243,6 +242,20 @@ def draw_spectra(
     """Draw amplitudes (line, run) in colours, at places or between borders along both sides."""
     cut = np.ma.masked_invalid(np.maximum(amplitude, norm.vmin))  # zero has no logarithm
     axes.pcolormesh(x, y, cut, norm=norm, cmap=COLOURS, rasterized=True)
+
+
+def spectra_bar(
+    figure: Figure,
+    norm: LogNorm,
+    spectra: Sequence[NDArray[np.float64]],
+    panels: NDArray[Any],
+    aspect: int,
+    unit: str = "µm",
+) -> None:
+    """Draw the colour bar of spectra beside their panels."""
+    values = np.concatenate([each.ravel() for each in spectra])
+    scale = cells.Scale(COLOURS, norm, f"amplitude [{unit}]")
+    cells.colour_bar(figure, scale, values, ax=list(panels.flat), aspect=aspect, pad=0.02)
 
 
 def draw_orders(
