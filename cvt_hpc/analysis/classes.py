@@ -32,6 +32,11 @@ def check_results(dataset: xr.Dataset, source: str) -> None:
         raise mismatch(source, "results of a study of one run at least", "none")
 
 
+def axes_in_words(dataset: xr.Dataset) -> str:
+    """Names of the axes of results."""
+    return ", ".join(map(str, dataset["status"].dims)) or "a single run"
+
+
 def occurrence_classes(dataset: xr.Dataset) -> xr.DataArray:
     """Class of each run, values of `OccurrenceClass` over the dimensions of `status`.
 

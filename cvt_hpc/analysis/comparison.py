@@ -172,9 +172,8 @@ def compare(a: xr.Dataset, b: xr.Dataset, sources: tuple[str, str] = ("A", "B"))
     aligned = align(a, b, sources, _compared(a, b))
     thresholds = _threshold(a), _threshold(b)
     known = [_known(dataset) for dataset in (aligned.a, aligned.b)]
-    near = agreement.is_near(
-        *(found["amplitude"] / least for found, least in zip(known, thresholds, strict=True))
-    )
+    sizes = (found["amplitude"] / least for found, least in zip(known, thresholds, strict=True))
+    near = agreement.is_near(*sizes)
     frame = aligned.a["status"]
     values = {f"{name}_{study}": array for study, found in zip("ab", known, strict=True)
               for name, array in found.items()}  # fmt: skip
@@ -319,6 +318,5 @@ def sample_sentences(dataset: xr.Dataset, folder: Path, source: str) -> Iterator
         repeated = int(np.sum(found.cells["class_b"] != agreement.OccurrenceClass.NOT_RUN))
         runs = "1 run was" if repeated == 1 else f"{repeated} runs were"
         yield f"{runs} done again {way}, in `{name}`: {contradictions(found, way)}."
-        yield from (
-            f"{line[:1].upper()}{line[1:]}." for line in deviations(found, "those done again deviate")
-        )
+        for line in deviations(found, "those done again deviate"):
+            yield f"{line[:1].upper()}{line[1:]}."

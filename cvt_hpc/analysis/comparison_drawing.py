@@ -73,7 +73,7 @@ def _draw_map(figure: SubFigure, arrangement: Arrangement) -> None:
         sheet = sheet_of(arrangement, frame=FRAME)
         axes = figure.subplots(sheet.rows, sheet.columns, sharex=True, sharey=True, squeeze=False)
         draw_block(figure, axes, sheet, np.full(sheet.classes.shape, np.nan), _NO_SCALE)
-        figure.supylabel(sheet.y.label, fontsize=10)
+        figure.supylabel(sheet.y.label)
 
 
 def _title(found: Comparison, shown: NDArray[np.int8], sources: tuple[str, str]) -> list[str]:

@@ -86,6 +86,7 @@ STYLE = {
     "axes.titlesize": 10,
     "axes.linewidth": 0.8,
     "figure.titlesize": 11,
+    "figure.labelsize": 10,
     "xtick.labelsize": 9,
     "ytick.labelsize": 9,
     "legend.fontsize": 9,

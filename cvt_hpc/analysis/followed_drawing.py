@@ -61,8 +61,8 @@ def element_figure(
         for name in ("driving", "driven"):
             for span in passages(followed, name):
                 axes.axvspan(time[span][0], time[span][-1], color=ARC, lw=0, zorder=0)
-                place = {"transform": axes.get_xaxis_transform(), "ha": "center", "fontsize": 9}
-                axes.text(time[span].mean(), 1.01, name, **place)
+                above = axes.get_xaxis_transform()
+                axes.text(time[span].mean(), 1.01, name, transform=above, ha="center", fontsize=9)
     axes.axhline(0.0, color="#333333", linewidth=0.7, zorder=1)
     axes.grid(linewidth=0.4, alpha=0.5)
     begin = f"time since the element entered the {region} arc [ms]" if region else "time [ms]"
@@ -165,24 +165,24 @@ def follow_element(history: xr.Dataset, start: float, source: str = "history") -
     if SPEED not in history or history.sizes["profile_time"] < 2:
         raise mismatch(source, "a history with profiles over time ([record] profile_duration)", "none")
     time = history["profile_time"].values
-    travelled = path_of(time, around(history), history[SPEED].values.astype(float), start)
-    length = around(history)[-1]
-    position = np.mod(travelled, length)
-    names = [str(name) for name in history.data_vars if str(name).startswith(PREFIX)]
-    variables = {
-        name.removeprefix(PREFIX): ("time", _met(history, name, position), history[name].attrs)
-        for name in names
+    places = around(history)
+    travelled = path_of(time, places, history[SPEED].values.astype(float), start)
+    position = np.mod(travelled, places[-1])
+    quantities = {
+        str(name).removeprefix(PREFIX): ("time", _met(places, array.values, position), array.attrs)
+        for name, array in history.data_vars.items()
+        if str(name).startswith(PREFIX)
     }
     spans = regions(history)
     starts = np.array([first for first, _, _ in spans])
     here = np.array([name for _, _, name in spans], object)[np.searchsorted(starts, position, "right") - 1]
     words = "position", "m", "path coordinate, from the inlet of the driving arc"
-    places = {
+    way = {
         "travelled": ("time", travelled, attributes("travelled", "m", "path coordinate, counted on")),
         "position": ("time", position, attributes(*words)),
         "region": ("time", here, attributes("region", comment="of the path")),
     }
-    return xr.Dataset(variables | places, {"time": ("time", time, attributes("time", "s"))}, history.attrs)
+    return xr.Dataset(quantities | way, {"time": ("time", time, attributes("time", "s"))}, history.attrs)
 
 
 def around(history: xr.Dataset) -> np.ndarray:
@@ -216,9 +216,8 @@ def path_of(time: np.ndarray, places: np.ndarray, speed: np.ndarray, start: floa
     return found
 
 
-def _met(history: xr.Dataset, name: str, position: np.ndarray) -> np.ndarray:
-    """A quantity at the place of an element at each time (time,), linear between stations."""
-    places, values = around(history), history[name].values
+def _met(places: np.ndarray, values: np.ndarray, position: np.ndarray) -> np.ndarray:
+    """A quantity (time, station) at the place of an element at each time (time,), linear between stations."""
     left = np.clip(np.searchsorted(places, position, "right") - 1, 0, values.shape[1] - 1)
     share = (position - places[left]) / (places[left + 1] - places[left])
     rows = np.arange(position.size)

@@ -211,7 +211,7 @@ def hysteresis_figure(
         over.draw(axes, x, side_of(places, y_name), places.isel({panel: k} if panel else {}))
     figures.label_x(panels, count, figures.axis_label(ranges, unit))
     if count > 1:
-        figure.supylabel(y.label, fontsize=figures.STYLE["axes.labelsize"])
+        figure.supylabel(y.label)
     head = figures.headline("Vibration along ramps up and down", dataset.attrs)
     figures.entitle(figure, [head, *notes, over.note])
     figures.legend_below(figure, legend | over.entries)

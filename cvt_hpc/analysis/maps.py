@@ -200,7 +200,7 @@ def _grid_figure(arrangement: layout.Arrangement, vmax: cells.End, source: str, 
     if sheet.leads.any() and min(sheet.smallest_cell) >= SMALLEST_APART:
         further.append(Line2D([], [], **cells.LEADING.marks(4.0), label="harmonics lead"))
     figures.entitle(figure, [*_title(sheet), over.note])
-    figure.supylabel(sheet.y.label, fontsize=10)
+    figure.supylabel(sheet.y.label)
     styles, columns = cells.STYLES, cells.LEGEND_COLUMNS - bool(over.handles)  # whose names are longer
     if "starts" in arrangement.dataset.attrs:
         styles, columns = cells.STYLES | cells.OF_STARTS, 3  # as wide as the page with the longest label

@@ -188,9 +188,8 @@ def read_measured(
         raise mismatch(source, "results over a grid, beside which measurements are drawn", "samples")
     dims = map(str, dataset["status"].dims if "status" in dataset else ())
     axes = [name for name in dims if name in dataset.coords and dataset[name].dtype.kind in "iuf"]
-    constants = {
-        key: value for key, value in _constants(dataset, job or job_held(dataset)).items() if key not in axes
-    }
+    constants = _constants(dataset, job or job_held(dataset))
+    constants = {key: value for key, value in constants.items() if key not in axes}
     units = {name: si_unit(dataset[name].attrs) for name in axes}
     units |= {key: unit for key, (_, unit) in constants.items()}
     kind, along, columns = _declaration(Path(path), units, axes)

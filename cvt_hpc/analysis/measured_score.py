@@ -21,7 +21,7 @@ import xarray as xr
 from numpy.typing import NDArray
 
 from cvt_hpc.analysis.arrangement import value_text
-from cvt_hpc.analysis.classes import at_strongest_strand, check_results, map_classes
+from cvt_hpc.analysis.classes import at_strongest_strand, axes_in_words, check_results, map_classes
 from cvt_hpc.analysis.figures import coordinate_unit
 from cvt_hpc.analysis.measured import ONSET, PEAK, WINDOW, Measured, Row, Span, read_measured, within
 from cvt_hpc.errors import mismatch
@@ -85,8 +85,8 @@ def score(dataset: xr.Dataset, path: str | Path, source: str = "results") -> Sco
     measured = read_measured(path, dataset, source)
     along = measured.along
     if along not in dataset["status"].dims:
-        found = ", ".join(map(str, dataset["status"].dims)) or "a single run"
-        raise mismatch(source, f"results over the axis {along}, as in {measured.name}", found)
+        expected = f"results over the axis {along}, as in {measured.name}"
+        raise mismatch(source, expected, axes_in_words(dataset))
     dataset = dataset[[name for name in _READ if name in dataset]].sortby(along).transpose(..., along)
     strongest = (at_strongest_strand(dataset, name) for name in ("frequency", "amplitude"))
     arrays = map_classes(dataset), *strongest

@@ -203,12 +203,8 @@ def whole_powers(history: xr.Dataset) -> dict[str, float]:
     With what `region_powers` sums up it is 0. "left open" is what the numerics, and a vibration that still
     grows or decays, leave over. Empty where a term is not known.
     """
-    taken = {
-        "layer_taken": "layer\ndampers",
-        "lag_taken": "sheave\nlag",
-        "carried_power": "mean\nmotion",
-        "fluctuation_remainder": "left\nopen",
-    }
+    taken = {"layer_taken": "layer\ndampers", "lag_taken": "sheave\nlag"}
+    taken |= {"carried_power": "mean\nmotion", "fluctuation_remainder": "left\nopen"}
     found = {words: -float(history.get(name, np.nan)) for name, words in taken.items()}
     return found if np.isfinite(list(found.values())).all() else {}
 

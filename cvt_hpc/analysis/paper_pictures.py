@@ -8,6 +8,7 @@
 
 import json
 from collections.abc import Mapping, Sequence
+from itertools import cycle
 from typing import Any, NamedTuple
 
 import numpy as np
@@ -112,12 +113,8 @@ def _draw_blocks(axes: Axes, history: xr.Dataset) -> None:
     _arrow(axes, (2.36, -0.04), (1.36, -0.04), "#333333", "arc3,rad=-0.25")
     axes.text(1.86, -0.35, "its state sets the switch", ha="center", va="top", fontsize=8.5)
     _arrow(axes, (2.76, 0.31), (2.96, 0.31), TAKING)
-    rest = (
-        ("other flanks", found.elsewhere),
-        ("push, tension", found.stresses),
-        ("dampers, rings", -found.taken),
-    )
-    losses = "\n".join(f"{name} {figures.number(power, SIGNED)} W" for name, power in rest)
+    rest = {"other flanks": found.elsewhere, "push, tension": found.stresses, "dampers, rings": -found.taken}
+    losses = "\n".join(f"{name} {figures.number(power, SIGNED)} W" for name, power in rest.items())
     axes.text(2.99, 0.31, losses, va="center", fontsize=8.5)
     axes.set(xlim=(-0.05, 3.65), ylim=(-0.5, 0.85))
     axes.set_axis_off()
@@ -205,9 +202,8 @@ def _draw_bars(axes: Axes, shown: xr.Dataset) -> None:
     done = shown["status"].values == Status.DONE
     for k, strand in enumerate(str(name) for name in shown["strand"].values):
         left = places + (k - 0.5) * (BAR + 0.04)
-        tension, push = (
-            1e-3 * np.where(done, shown[name].sel(strand=strand).values, np.nan) for name in NEEDED
-        )
+        of = shown.sel(strand=strand)
+        tension, push = (1e-3 * np.where(done, of[name].values, np.nan) for name in NEEDED)
         label = {"label": f"tension {strand}"}
         axes.bar(left, tension, BAR, color=SHADES[strand], edgecolor="#333333", lw=0.6, **label)
         hatch = {"hatch": "" if k else "///", "label": f"push {strand}"}
@@ -242,12 +238,10 @@ def friction_figure(dataset: xr.Dataset) -> Figure:
     along = np.linspace(0.0, sliding.max(), POINTS)
     figure = Figure((figures.WIDTH, 3.8), layout="constrained")
     axes = figure.subplots()
-    for k, (gradient, curve) in enumerate(curves_of(dataset, along).items()):
-        colour = figures.COLOURS[k % len(figures.COLOURS)]
+    looks = zip(cycle(figures.COLOURS), cycle(figures.LINES), strict=False)
+    for (gradient, curve), (colour, line) in zip(curves_of(dataset, along).items(), looks, strict=False):
         label = f"{figures.number(gradient, 'g')} s/m"
-        axes.plot(
-            1e3 * along, curve, color=colour, ls=figures.LINES[k % len(figures.LINES)], lw=1.4, label=label
-        )
+        axes.plot(1e3 * along, curve, color=colour, ls=line, lw=1.4, label=label)
         verdicts = dataset["vibrates"].sel(friction_gradient=gradient).values
         for verdict, (style, _) in MARKS.items():
             at = sliding[verdicts == verdict]

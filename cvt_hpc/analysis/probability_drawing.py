@@ -12,7 +12,7 @@ from numpy.typing import NDArray
 
 from cvt_hpc.analysis import arrangement as layout
 from cvt_hpc.analysis import figures
-from cvt_hpc.analysis.classes import check_results
+from cvt_hpc.analysis.classes import axes_in_words, check_results
 from cvt_hpc.analysis.curves import set_frame
 from cvt_hpc.analysis.measured import Overlay, Side, side_of
 from cvt_hpc.analysis.probability import CONTOURS, PROBABILITY, over_samples
@@ -96,9 +96,8 @@ def onset_bands_figure(
     along = along or onset_axis(told, at or {})
     known = [name for name in map(str, told["status"].dims) if name not in (at or {})]
     if "counted" not in told.attrs or along not in known or told["status"].ndim < 2:
-        found = ", ".join(map(str, dataset["status"].dims)) or "a single run"
         expected = f"results over samples and two further axes, of them {along or 'one'} of numbers"
-        raise mismatch(source, expected, found)
+        raise mismatch(source, expected, axes_in_words(dataset))
     quantiles = onset_scatter(dataset, along)["onset"]
     axes_left = xr.Dataset({"status": told["status"].isel({along: 0}, drop=True), "onset": quantiles})
     arrangement = layout.arrange(axes_left, at or {}, source, layout.Sides(sides.x, sides.panel))
@@ -225,5 +224,5 @@ def _draw_bands(
         x.lay_out(axes.xaxis)
         axes.grid(lw=0.4, alpha=0.5)
     figures.label_x(all_axes, len(panels), x.label)
-    figure.supylabel(label, fontsize=figures.STYLE["axes.labelsize"])
+    figure.supylabel(label)
     return figure, all_axes[0, 0]

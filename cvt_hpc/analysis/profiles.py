@@ -348,7 +348,7 @@ def wrap_figure(histories: Sequence[xr.Dataset], sources: Sequence[str] = ()) ->
         line_of_axes[0].set_ylabel(label)
     for axes, pulley in zip(grid[0], pulleys, strict=True):
         axes.set_title(f"{pulley.removesuffix(' arc')} pulley", loc="left", pad=3)
-    panels.supxlabel("wrap angle from inlet [°]", fontsize=figures.STYLE["axes.labelsize"])
+    panels.supxlabel("wrap angle from inlet [°]")
     entries = figures.entries_of(grid[-1:, 0])
     if "sliding_tension" in histories[0]:
         entries[THEORY] = Line2D([], [], ls=":", lw=1.6, color=INK)

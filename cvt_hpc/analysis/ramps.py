@@ -153,7 +153,7 @@ def spectrogram_figure(
     if count == 1:
         panels[0, 0].set_ylabel("frequency [Hz]")
     else:
-        figure.supylabel("frequency [Hz]", fontsize=figures.STYLE["axes.labelsize"])
+        figure.supylabel("frequency [Hz]")
     waterfall.spectra_bar(figure, norm, drawn, panels, 20 * count)
     put_legend(figure, *overlays)
     entitle_runs(figure, histories, "Spectrogram", *sorted(told), overlays[0].note, width=72)

@@ -37,17 +37,14 @@ def scatter_figure(dataset: xr.Dataset, at: Mapping[str, Any], source: str, vmax
         raise mismatch(f"{source}: at {next(iter(at))}", "results over a grid", "samples, all apart")
     figure = Figure((figures.WIDTH, scatter_height(dataset)), layout="constrained")
     classes = occurrence_classes(dataset).values
-    amplitude = np.where(
-        classes == OccurrenceClass.VIBRATING, at_strongest_strand(dataset, "amplitude") * 1e6, np.nan
-    )
+    vibrates = classes == OccurrenceClass.VIBRATING
+    amplitude = np.where(vibrates, at_strongest_strand(dataset, "amplitude") * 1e6, np.nan)
     scale = cells.amplitude_scale(amplitude, vmax)
     panels = draw_samples(figure, dataset, classes, amplitude, scale)
     if np.isfinite(amplitude).any():
         cells.colour_bar(figure, scale, amplitude, ax=panels, pad=0.02)
-    title = [
-        figures.headline("Vibration occurrence", dataset.attrs),
-        f"{classes.size} samples: {count_classes(classes)}",
-    ]
+    head = figures.headline("Vibration occurrence", dataset.attrs)
+    title = [head, f"{classes.size} samples: {count_classes(classes)}"]
     names = sample_axes(dataset)
     if len(names) > MOST_AXES:
         title.append(f"the first {MOST_AXES} of {len(names)} axes")

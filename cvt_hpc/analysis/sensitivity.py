@@ -22,13 +22,13 @@ import numpy as np
 import xarray as xr
 from numpy.typing import NDArray
 
-from cvt_hpc.analysis.classes import ALONG, OccurrenceClass, at_strongest_strand, check_results, map_classes
+from cvt_hpc.analysis.classes import ALONG, at_strongest_strand, axes_in_words, check_results, map_classes
 from cvt_hpc.analysis.sobol import RESAMPLES, sobol_indices
 from cvt_hpc.errors import mismatch, unknown
 from cvt_hpc.job.axes import ALL, NONE, SAMPLE, SWAPPED
 from cvt_hpc.job.uncertain import TABLE, Uncertain, read_document
 from cvt_hpc.study.intervals import VERDICTS
-from cvt_hpc.vibration.classes import levels
+from cvt_hpc.vibration.classes import OccurrenceClass, levels
 
 QUANTILES = {"5 %": 0.05, "50 %": 0.5, "95 %": 0.95}
 ONSET = "onset"
@@ -46,8 +46,8 @@ def check_samples(dataset: xr.Dataset, source: str) -> None:
     """Raise InputError unless a dataset holds results with samples of uncertain parameters."""
     check_results(dataset, source)
     if SAMPLE not in dataset["status"].dims:
-        dims = ", ".join(map(str, dataset["status"].dims)) or "a single run"
-        raise mismatch(source, f"results with the axis {SAMPLE}, of a job with [uncertain]", dims)
+        expected = f"results with the axis {SAMPLE}, of a job with [uncertain]"
+        raise mismatch(source, expected, axes_in_words(dataset))
 
 
 def stated(dataset: xr.Dataset, table: str) -> dict[str, Any]:

@@ -18,7 +18,7 @@ from numpy.typing import NDArray
 
 from cvt_hpc.analysis import arrangement as layout
 from cvt_hpc.analysis import cells, figures
-from cvt_hpc.analysis.classes import WITHOUT_RESULT, check_results, occurrence_classes
+from cvt_hpc.analysis.classes import WITHOUT_RESULT, axes_in_words, check_results, occurrence_classes
 from cvt_hpc.analysis.eigenfrequencies import along_axis
 from cvt_hpc.analysis.measured import FREQUENCY, Overlay, Side, put_legend, side_of
 from cvt_hpc.errors import few_of, mismatch
@@ -111,9 +111,8 @@ def campbell_figure(
     """Draw a Campbell diagram: `waterfall_figure` over the driving speed, with orders of that speed."""
     check_results(dataset, source)
     if "driving_speed" not in dataset["status"].dims:
-        found = ", ".join(map(str, dataset["status"].dims)) or "a single run"
         then = "`cvt-hpc plot waterfall` draws spectra over any axis"
-        raise mismatch(source, "results over the axis driving_speed", found, then)
+        raise mismatch(source, "results over the axis driving_speed", axes_in_words(dataset), then)
     sides = layout.Sides("driving_speed", panel=sides.panel)
     return waterfall_figure(dataset, at, source, sides, orders, vmax, measured)
 
@@ -209,11 +208,8 @@ def _without_spectrum(
     rows: Sequence[tuple[str, xr.Dataset]], amplitude: Sequence[NDArray[np.float64]]
 ) -> list[str]:
     """State what became of the runs without a spectrum; an empty line where all have one."""
-    kinds = [
-        occurrence_classes(shown).values[np.isnan(values).any(axis=(0, 1))]
-        for (_, shown), values in zip(rows, amplitude, strict=True)
-    ]
-    unknown = np.concatenate(kinds)
+    of_rows = zip((occurrence_classes(shown).values for _, shown in rows), amplitude, strict=True)
+    unknown = np.concatenate([kinds[np.isnan(values).any(axis=(0, 1))] for kinds, values in of_rows])
     words = [text for kind, text in WITHOUT_RESULT.items() if (unknown == kind).any()]
     return ["grey: no spectrum" + (f" ({', '.join(words)})" if words else "")] if unknown.size else []
 
@@ -272,11 +268,8 @@ def draw_eigenfrequencies(
     axes: Axes, x: NDArray[np.float64], lines: NDArray[np.float64], numbers: NDArray[np.int64]
 ) -> list[Named]:
     """Draw dashes (half waves, n) at places (n,), which let ridges show; return them with their numbers."""
-    found = [
-        Named(str(number), LINE, x, line)
-        for number, line in zip(numbers, lines, strict=True)
-        if np.any(line < axes.get_ylim()[1])
-    ]
+    each = (Named(str(number), LINE, x, line) for number, line in zip(numbers, lines, strict=True))
+    found = [line for line in each if np.any(line.y < axes.get_ylim()[1])]
     for line in found:
         axes.plot(x, line.y, color=LINE, ls=(0, (3, 5)), lw=1.1, path_effects=OUTLINE)
     return found
