@@ -32,7 +32,7 @@ class Arrangement:
 
     dataset: xr.Dataset  # sorted along x, y and panels; the dimensions of `status` are among these
     x: str  # dimension along x
-    y: str | None  # likewise, if the study has that many
+    y: str | None  # along y, if the study has that many
     panel: str | None  # over the panels, likewise
     notes: tuple[str, ...]  # what is fixed, in words
 

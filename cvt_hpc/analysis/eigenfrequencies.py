@@ -35,10 +35,8 @@ def along_axis(shown: xr.Dataset, x: str) -> xr.DataArray | None:
     if force.sizes["strand"] != len(STRANDS):
         return None
     along = {str(key): values.values for key, values in shown.coords.items() if values.dims == (x,)}
-    found = [
-        strand_frequencies(fixed | {key: values[k] for key, values in along.items()}, tuple(pair))
-        for k, pair in enumerate(force.values)
-    ]
+    points = (fixed | {key: values[k] for key, values in along.items()} for k in range(len(force)))
+    found = [strand_frequencies(at, tuple(pair)) for at, pair in zip(points, force.values, strict=True)]
     if not np.isfinite(found).any():
         return None
     coordinates = {x: shown[x], "strand": shown["strand"], "half_waves": np.arange(1, MODES + 1)}

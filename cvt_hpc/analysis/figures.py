@@ -273,6 +273,7 @@ def panels_on_a_page(
     frame: float,
     source: str,
     then: str,
+    *,
     each: int = 1,
     width: float = WIDTH,
     **sharing: Any,

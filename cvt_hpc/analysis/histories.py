@@ -52,9 +52,8 @@ def history_figure(dataset: xr.Dataset, source: str = "history") -> Figure:
         for strand in strands
     ]
     units = {name: {JOB_UNITS: unit} for name, unit in _job_units(dataset.attrs).items()}
-    courses = [
-        dataset[name].assign_attrs(units.get(name, {})) for name in panels.COURSES if _changes(dataset, name)
-    ]
+    changing = [name for name in panels.COURSES if _changes(dataset, name)]
+    courses = [dataset[name].assign_attrs(units.get(name, {})) for name in changing]
     if courses:
         places = zip((LEFT, RIGHT), courses, strict=False)
         rows.append((1.2, [(place, panels.draw_course, course) for place, course in places]))

@@ -110,15 +110,12 @@ def vibration_ranges(dataset: xr.Dataset, source: str = "results") -> xr.DataArr
     vibrates = (dataset["status"] == Status.DONE) & (dataset["vibrates"] == Vibrates.YES)
     onset, end = dataset[f"onset_{name}"], dataset[f"end_{name}"]
     lowest, highest = course.min("ramp_share"), course.max("ramp_share")
-    limits = {
-        UP: (onset.fillna(lowest), end.fillna(highest)),
-        DOWN: (end.fillna(lowest), onset.fillna(highest)),
-    }
     found = []
-    for (lower, upper), sign in zip(limits.values(), (1, -1), strict=True):
-        here = vibrates & (sign * rise > 0.0)
-        ends = lower.where(here).min(turning[0]), upper.where(here).max(turning[0])
-        found.append(xr.concat(ends, "limit"))
+    for is_rising, first, last in ((rise > 0.0, onset, end), (rise < 0.0, end, onset)):
+        lower, upper = (
+            one.where(vibrates & is_rising) for one in (first.fillna(lowest), last.fillna(highest))
+        )
+        found.append(xr.concat((lower.min(turning[0]), upper.max(turning[0])), "limit"))
     ranges = xr.concat(found, "ramp").assign_coords(ramp=[UP, DOWN], limit=["lower", "upper"])
     units = {"units": QUANTITIES[name].cf_units, "long_name": name}
     return ranges.rename("driving_speed" if name == "speed" else name).assign_attrs(units)

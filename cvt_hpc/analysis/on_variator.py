@@ -175,8 +175,8 @@ def energy_figure(history: xr.Dataset, source: str = "history") -> Figure:
     heights = [BALANCE, 0.7 + 0.18 * balance.bars] if balance else []
     heights += [2.1] * (has_feeds + has_loss)
     if not heights:
-        powers_known = "driving_power, flank_feed or part_flank_loss, known at constant load and speed"
-        raise mismatch(source, f"a history with {powers_known}", "none that is known")
+        needed = "driving_power, flank_feed or part_flank_loss, known at constant load and speed"
+        raise mismatch(source, f"a history with {needed}", "none that is known")
     figure = Figure((figures.WIDTH, sum(heights) + 0.9), layout="constrained")
     panels = list(figure.subplots(len(heights), 1, squeeze=False, height_ratios=heights)[:, 0])
     if balance is not None:

@@ -84,9 +84,10 @@ def profile_figure(
     groups = _groups(labels, columns, MOST_COLUMNS * (2 if len(quantities) == 1 else 1))
     beside = min(len(groups), MOST_COLUMNS)
     rows = max(len(quantities), -(-len(groups) // beside))
-    width, share = figures.NARROW if beside > 1 else figures.WIDTH, "all" if len(quantities) == 1 else "row"
-    page = rows, (1,), (LEAST, HEIGHT), FRAME, names[0], "name fewer quantities by `--of`", beside, width
-    figure, panels, _ = figures.panels_on_a_page(*page, sharex="col", sharey=share)
+    page = rows, (1,), (LEAST, HEIGHT), FRAME, names[0], "name fewer quantities by `--of`"
+    width = figures.NARROW if beside > 1 else figures.WIDTH
+    share = "all" if len(quantities) == 1 else "row"
+    figure, panels, _ = figures.panels_on_a_page(*page, each=beside, width=width, sharex="col", sharey=share)
     # one quantity has its panels row by row
     stacks = panels.reshape(-1, 1) if len(quantities) == 1 else panels.T
     for unused in stacks[len(groups) :].flat:

@@ -57,8 +57,9 @@ def ramp_figure(
     _, labels = on_axes(histories, names)
     overlays = [Overlay(measured, history, name) for history, name in zip(histories, names, strict=True)]
     frame = 1.1 + overlays[0].height
-    page = len(ramps), (1,), (LEAST, ROW), frame, names[0], THEN, 2, figures.NARROW
-    figure, panels, _ = figures.panels_on_a_page(*page, sharex=True, sharey="col")
+    page = len(ramps), (1,), (LEAST, ROW), frame, names[0], THEN
+    width = figures.NARROW
+    figure, panels, _ = figures.panels_on_a_page(*page, each=2, width=width, sharex=True, sharey="col")
     spectra = [spectrogram(ramp) for ramp in ramps]
     scale = 1e6 if of in STRANDS else 1.0
     end = None if vmax is None else scale * vmax
@@ -124,8 +125,8 @@ def spectrogram_figure(
     norm = waterfall.spectra_norm(drawn, None if vmax is None else 1e6 * vmax)
     overlays = [Overlay(measured, history, name) for history, name in zip(histories, names, strict=True)]
     frame = 1.4 + overlays[0].height
-    page = len(ramps), (1, 2), (LEAST_HEIGHT, HEIGHT), frame, names[0], THEN, len(strands)
-    figure, panels, height = figures.panels_on_a_page(*page, sharey=True)
+    page = len(ramps), (1, 2), (LEAST_HEIGHT, HEIGHT), frame, names[0], THEN
+    figure, panels, height = figures.panels_on_a_page(*page, each=len(strands), sharey=True)
     count, beside = panels.shape
     size, told, each = (0.8 * figures.WIDTH / beside, height - 0.7), set(), iter(panels.flat)
     pads = np.zeros(panels.shape)
@@ -175,11 +176,8 @@ def _lines_along(history: xr.Dataset, ramp: Ramp) -> tuple[_Lines | None, _Lines
     turns = None
     if changing == "driving_speed":
         turns = ramp.values[at], courses["driving_speed"] / (2.0 * np.pi)
-    found = [
-        strand_frequencies(point | {key: float(values[k]) for key, values in courses.items()})
-        for k in range(LINE_POINTS)
-    ]
-    known = np.stack(found, -1)
+    points = (point | {key: float(values[k]) for key, values in courses.items()} for k in range(LINE_POINTS))
+    known = np.stack([strand_frequencies(at) for at in points], -1)
     return turns, (ramp.values[at], known) if np.isfinite(known).any() else None
 
 

@@ -23,6 +23,8 @@ from cvt_hpc.analysis.eigenfrequencies import along_axis
 from cvt_hpc.analysis.measured import FREQUENCY, Overlay, Side, put_legend, side_of
 from cvt_hpc.errors import few_of, mismatch
 
+Array = NDArray[np.float64]
+
 NAME_HEIGHT, LETTER = 9.5, 5.6  # [point]: of a name, and width of one of its letters
 TITLE = 3.0  # [point]: distance of a title
 OUTLINE = figures.outlined(2.2)
@@ -42,8 +44,8 @@ class Named(NamedTuple):
 
     name: str
     colour: str
-    x: NDArray[np.float64]
-    y: NDArray[np.float64]
+    x: Array
+    y: Array
 
 
 def name_lines(axes: Axes, lines: Sequence[Named], size: tuple[float, float]) -> float:
@@ -81,9 +83,7 @@ def name_lines(axes: Axes, lines: Sequence[Named], size: tuple[float, float]) ->
     return TITLE + NAME_HEIGHT if above else TITLE
 
 
-def _apart(
-    placed: Sequence[tuple[float, Named]], gap: float, limits: tuple[float, float]
-) -> NDArray[np.float64]:
+def _apart(placed: Sequence[tuple[float, Named]], gap: float, limits: tuple[float, float]) -> Array:
     """Places in ascending order, moved until they lie a gap apart, and within limits as far as they can."""
     at = np.sort([place for place, _ in placed])
     steps = gap * np.arange(at.size)
@@ -153,8 +153,8 @@ def waterfall_figure(
     known = [along_axis(shown, arrangement.x) for _, shown in rows]
     strands = [str(name) for name in dataset["strand"].values]
     then = f"fix an axis, as by `--at {sides.panel}=VALUE`, or choose another one by `--panel AXIS`"
-    page = len(rows), (1, 2), (LEAST, HEIGHT), FRAME + overlay.height, source, then, len(strands)
-    figure, panels, height = figures.panels_on_a_page(*page, sharex=True, sharey=True)
+    page = len(rows), (1, 2), (LEAST, HEIGHT), FRAME + overlay.height, source, then
+    figure, panels, height = figures.panels_on_a_page(*page, each=len(strands), sharex=True, sharey=True)
     size = 0.8 * figures.WIDTH / panels.shape[1], height - 0.3
     each, pad, along = iter(panels.flat), 0.0, side_of(arrangement.dataset, arrangement.x)
     for (title, shown), of_row, modes in zip(rows, amplitude, known, strict=True):
@@ -204,9 +204,7 @@ def _rows(
     return rows, notes
 
 
-def _without_spectrum(
-    rows: Sequence[tuple[str, xr.Dataset]], amplitude: Sequence[NDArray[np.float64]]
-) -> list[str]:
+def _without_spectrum(rows: Sequence[tuple[str, xr.Dataset]], amplitude: Sequence[Array]) -> list[str]:
     """State what became of the runs without a spectrum; an empty line where all have one."""
     of_rows = zip((occurrence_classes(shown).values for _, shown in rows), amplitude, strict=True)
     unknown = np.concatenate([kinds[np.isnan(values).any(axis=(0, 1))] for kinds, values in of_rows])
@@ -214,7 +212,7 @@ def _without_spectrum(
     return ["grey: no spectrum" + (f" ({', '.join(words)})" if words else "")] if unknown.size else []
 
 
-def spectra_norm(spectra: Sequence[NDArray[np.float64]], highest: float | None = None) -> LogNorm:
+def spectra_norm(spectra: Sequence[Array], highest: float | None = None) -> LogNorm:
     """Logarithmic scale of amplitudes, which neither one run nor one harmonic flattens.
 
     It ends at `highest`, or as `cells.norm_over` ends over the largest amplitude of each run, and begins
@@ -228,13 +226,7 @@ def spectra_norm(spectra: Sequence[NDArray[np.float64]], highest: float | None =
     return LogNorm(float(np.clip(low, DEEPEST * top, SHALLOWEST * top)), top)
 
 
-def draw_spectra(
-    axes: Axes,
-    x: NDArray[np.float64],
-    y: NDArray[np.float64],
-    amplitude: NDArray[np.float64],
-    norm: LogNorm,
-) -> None:
+def draw_spectra(axes: Axes, x: Array, y: Array, amplitude: Array, norm: LogNorm) -> None:
     """Draw amplitudes (line, run) in colours, at places or between borders along both sides."""
     cut = np.ma.masked_invalid(np.maximum(amplitude, norm.vmin))  # zero has no logarithm
     axes.pcolormesh(x, y, cut, norm=norm, cmap=COLOURS, rasterized=True)
@@ -243,7 +235,7 @@ def draw_spectra(
 def spectra_bar(
     figure: Figure,
     norm: LogNorm,
-    spectra: Sequence[NDArray[np.float64]],
+    spectra: Sequence[Array],
     panels: NDArray[Any],
     aspect: int,
     unit: str = "µm",
@@ -254,9 +246,7 @@ def spectra_bar(
     cells.colour_bar(figure, scale, values, ax=list(panels.flat), aspect=aspect, pad=0.02)
 
 
-def draw_orders(
-    axes: Axes, x: NDArray[np.float64], turns: NDArray[np.float64], orders: Sequence[float]
-) -> list[Named]:
+def draw_orders(axes: Axes, x: Array, turns: Array, orders: Sequence[float]) -> list[Named]:
     """Draw multiples of the turns (n,) [Hz] at places (n,) as dots, and return them with their orders."""
     lines = [Named(f"{order:g}×", ORDER, x, order * turns) for order in orders]
     for line in lines:
@@ -264,9 +254,7 @@ def draw_orders(
     return lines
 
 
-def draw_eigenfrequencies(
-    axes: Axes, x: NDArray[np.float64], lines: NDArray[np.float64], numbers: NDArray[np.int64]
-) -> list[Named]:
+def draw_eigenfrequencies(axes: Axes, x: Array, lines: Array, numbers: NDArray[np.int64]) -> list[Named]:
     """Draw dashes (half waves, n) at places (n,), which let ridges show; return them with their numbers."""
     each = (Named(str(number), LINE, x, line) for number, line in zip(numbers, lines, strict=True))
     found = [line for line in each if np.any(line.y < axes.get_ylim()[1])]
