@@ -23,40 +23,22 @@ COMPARED = ("status", "vibrates", "amplitude", "frequency")  # beside what a mod
 class Aligned(NamedTuple):
     """The common runs of two studies.
 
-    Attributes
-    ----------
-    a, b : Dataset
-        Those of COMPARED and of the names asked for that each study has, in memory, over the same runs in
-        the same order.
-    left_out : (int, int)
-        Number of runs of A and of B that the other study does not have.
-    notes : tuple of str
-        Which axis of one study was reduced to the value of the other one, in words.
+    A and B have those of COMPARED and of the names asked for that each study has, in memory, over the same
+    runs in the same order.
     """
 
     a: xr.Dataset
     b: xr.Dataset
-    left_out: tuple[int, int]
-    notes: tuple[str, ...]
+    left_out: tuple[int, int]  # number of runs of A and of B that the other study does not have
+    notes: tuple[str, ...]  # which axis of one study was reduced to the value of the other one, in words
 
 
 def align(a: xr.Dataset, b: xr.Dataset, sources: tuple[str, str], names: Collection[str] = ()) -> Aligned:
-    """Return the common runs of two studies.
+    """Return the common runs of two studies, both over a grid or both of samples.
 
-    Parameters
-    ----------
-    a, b : Dataset
-        Results of either study, both over a grid or both of samples.
-    sources : (str, str)
-        Where they are from, for the errors.
-    names : collection of str
-        Variables to be kept beside COMPARED.
-
-    Raises
-    ------
-    InputError
-        If a dataset holds no results, one is of samples and the other over a grid, an axis of one is neither
-        an axis nor a parameter of the other, or they have no run in common.
+    `names` are of variables to be kept beside COMPARED. InputError, which names a source, if a dataset holds
+    no results, one is of samples and the other over a grid, an axis of one is neither an axis nor a parameter
+    of the other, or they have no run in common.
     """
     for dataset, source in zip((a, b), sources, strict=True):
         check_results(dataset, source)
@@ -135,9 +117,8 @@ def _at_common_samples(
     a: xr.Dataset, b: xr.Dataset, sources: tuple[str, str]
 ) -> tuple[xr.Dataset, xr.Dataset]:
     names = axes_of(a)
-    in_a, in_b = _common_places(
-        *(list(zip(*(_keys(dataset[name]) for name in names), strict=True)) for dataset in (a, b))
-    )
+    keys = (zip(*(_keys(dataset[name]) for name in names), strict=True) for dataset in (a, b))
+    in_a, in_b = _common_places(*keys)
     if not in_a:
         raise mismatch(sources[1], f"samples at places of those of {sources[0]}", "none")
     return a.isel(run=in_a), b.isel(run=in_b)

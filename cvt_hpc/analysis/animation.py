@@ -54,29 +54,16 @@ def encoder() -> str | None:
 
 @dataclass(frozen=True)
 class Animation:
-    """A moving picture: notebooks show it, and `save` writes it.
+    """A moving picture: notebooks show it, and `save` writes it."""
 
-    Attributes
-    ----------
-    figure : Figure
-        With the first picture.
-    draw : callable
-        Puts the picture of a number into the figure, and returns what has changed.
-    frames : int
-        Number of pictures.
-    """
-
-    figure: Figure
-    draw: Callable[[int], tuple]
-    frames: int
+    figure: Figure  # with the first picture
+    draw: Callable[[int], tuple]  # puts the picture of a number into it, and returns what has changed
+    frames: int  # number of pictures
 
     def save(self, out: str | Path) -> Path:
         """Write it, with a name in .gif, or in .mp4 where there is ffmpeg; its folder is made if needed.
 
-        Raises
-        ------
-        InputError
-            The suffix names no moving picture, there is no ffmpeg for .mp4, or the system refuses.
+        InputError if the suffix names no moving picture, there is no ffmpeg for .mp4, or the system refuses.
         """
         out = Path(out)
         check_animation(out)
@@ -107,18 +94,8 @@ def draw_animation(history: xr.Dataset, out: Path, source: str = "history") -> P
 def animation(history: xr.Dataset, source: str = "history") -> Animation:
     """Compose a moving picture of the belt in the last periods of a run, magnified.
 
-    Parameters
-    ----------
-    history : Dataset
-        Of a run of a variator or of a belt drive, as `simulate` returns it: `displacement` [m] over `time`
-        and `probe`, with `probe_position` [m].
-    source : str
-        Where the history is from, for the errors.
-
-    Raises
-    ------
-    InputError
-        The history is none of a variator or belt drive.
+    Arguments as of all pictures of runs (`figures.py`); the run is that of a variator or of a belt drive,
+    with `displacement` [m] over `time` and `probe`, and `probe_position` [m].
     """
     drive = _geometry(history, source)
     # probes of the motion out of the plane lie behind those in it, at the same places
@@ -142,10 +119,8 @@ def animation(history: xr.Dataset, source: str = "history") -> Animation:
         axes.set_xlim(1e3 * rest[:, 0].min() - margin, 1e3 * rest[:, 0].max() + margin)
         axes.set_ylim(1e3 * rest[:, 1].min() - margin, 1e3 * rest[:, 1].max() + margin)
         name = one_line(str(history.attrs.get("job_name", "")))
-        told = (
-            f"{name}: {1.0 / period:.0f} Hz, at most {1e6 * size:.3g} µm, drawn {factor:.0f} times as large"
-        )
-        axes.set_title(told.removeprefix(": "), fontsize=10)
+        size_told = f"at most {1e6 * size:.3g} µm, drawn {factor:.0f} times as large"
+        axes.set_title(f"{name}: {1.0 / period:.0f} Hz, {size_told}".removeprefix(": "), fontsize=10)
         if size:
             _draw_scale(axes, size, factor)
         clock = axes.text(0.99, 0.02, "", transform=axes.transAxes, ha="right", fontsize=9)
@@ -178,9 +153,8 @@ def _geometry(history: xr.Dataset, source: str) -> Drive:
     """Pulleys and path of the belt of a run whose motion can be drawn."""
     found = run_geometry(history)
     if found is None or not {"displacement", "probe_position"} <= {*map(str, history.variables)}:
-        raise mismatch(
-            source, "the history of a run of a variator or belt drive, with displacement at probes", "another"
-        )
+        expected = "the history of a run of a variator or belt drive, with displacement at probes"
+        raise mismatch(source, expected, "another")
     if history.sizes["time"] < LEAST_SAMPLES or not np.isfinite(history["displacement"]).all():
         expected = f"finite displacements at {LEAST_SAMPLES} times at least"
         raise mismatch(source, expected, f"{history.sizes['time']} times, or others")
@@ -202,12 +176,9 @@ def _recorded_frequency(history: xr.Dataset) -> float:
     """Return the frequency [Hz] that the run's record has of the strongest strand; 0 where it has none."""
     if "frequency" not in history or "amplitude" not in history:
         return 0.0
-    found = [
-        (float(amplitude), float(frequency))
-        for amplitude, frequency in zip(history["amplitude"].values, history["frequency"].values, strict=True)
-        if np.isfinite(amplitude) and 0.0 < frequency < np.inf
-    ]
-    return max(found, default=(0.0, 0.0))[1]
+    pairs = zip(history["amplitude"].values, history["frequency"].values, strict=True)
+    found = [pair for pair in pairs if np.isfinite(pair[0]) and 0.0 < pair[1] < np.inf]
+    return float(max(found, default=(0.0, 0.0))[1])
 
 
 def _main_frequency(time: NDArray[np.float64], judged: NDArray[np.float64]) -> float:

@@ -4,7 +4,7 @@ A `Ruler` spreads the values of an axis, evenly or by their logarithms, and has 
 """
 
 from collections.abc import Iterator, Mapping, Sequence
-from dataclasses import dataclass, field, replace
+from dataclasses import dataclass, replace
 from itertools import product
 from typing import Any, NamedTuple
 
@@ -14,7 +14,7 @@ from matplotlib.axis import Axis
 from numpy.typing import NDArray
 
 from cvt_hpc.analysis.figures import axis_label, coordinate_unit, in_words, number, put_ticks, short_numbers
-from cvt_hpc.errors import InputError, few_of, mismatch, show, unknown
+from cvt_hpc.errors import few_of, mismatch, show, unknown
 from cvt_hpc.job.values import shown_as_read, shown_number, shown_unit
 
 EVEN, EQUAL = 1.5, 1.01  # of steps: largest over smallest, below which they are taken for even
@@ -28,25 +28,13 @@ FEW_DECADES = 2.5  # on which 1, 2 and 5 have labels, not powers of ten alone
 
 @dataclass(frozen=True)
 class Arrangement:
-    """A study's dataset, reduced to what one picture shows.
+    """A study's dataset, reduced to what one picture shows."""
 
-    Attributes
-    ----------
-    dataset : Dataset
-        Sorted along x, y and panels; the dimensions of `status` are among these.
-    x : str
-        Dimension along x.
-    y, panel : str or None
-        Dimension along y and over the panels, if the study has that many.
-    notes : tuple of str
-        What is fixed, in words.
-    """
-
-    dataset: xr.Dataset
-    x: str
-    y: str | None
-    panel: str | None
-    notes: tuple[str, ...]
+    dataset: xr.Dataset  # sorted along x, y and panels; the dimensions of `status` are among these
+    x: str  # dimension along x
+    y: str | None  # along y, if the study has that many
+    panel: str | None  # over the panels, likewise
+    notes: tuple[str, ...]  # what is fixed, in words
 
 
 class Sides(NamedTuple):
@@ -67,22 +55,8 @@ def arrange(dataset: xr.Dataset, at: Mapping[str, Any], source: str, sides: Side
     `friction_gradient` along y, `sheave_stiffness` over the panels, else the first axes that are left.
     Further axes are fixed at their first value.
 
-    Parameters
-    ----------
-    dataset : Dataset
-        Results of a study.
-    at : mapping
-        Axes to fix: name -> value on the axis, as a number [SI] or a text.
-    source : str
-        Where the results are from, for the errors.
-    sides : Sides
-        Which axis is to run where.
-
-    Raises
-    ------
-    InputError
-        `at` names no axis, or no value on it; `sides` name no axis, a fixed one, or one twice; or no axis is
-        left to draw.
+    Arguments as of all pictures of results (`figures.py`). InputError if `at` names no axis, or no value on
+    it; `sides` name no axis, a fixed one, or one twice; or no axis is left to draw.
     """
     axes = list(map(str, dataset["status"].dims))
     check_sides(sides, axes, at, source)
@@ -91,14 +65,12 @@ def arrange(dataset: xr.Dataset, at: Mapping[str, Any], source: str, sides: Side
         if name not in axes:
             raise unknown(f"{source}: at {name}", "axis of the results", name, axes)
         index = index_of(dataset[name], value, f"{source}: at {name}")
-        notes.append(f"{in_words(dataset[name])} = {value_text(dataset[name], index)}")
+        notes.append(place_text(dataset[name], index, " = "))
         dataset = dataset.isel({name: index})
     free = [name for name in axes if name not in at]
     if not free:
-        raise InputError(
-            f"{source}: expected results over one axis or more to be drawn, found a single run; "
-            "`cvt-hpc simulate` draws one"
-        )
+        then = "`cvt-hpc simulate` draws one"
+        raise mismatch(source, "results over one axis or more to be drawn", "a single run", then)
     numeric = [name for name in free if dataset[name].dtype.kind in "iuf"]
     rest = [name for name in free if name not in sides]
     x = sides.x or _take_along_x(rest, numeric, source)
@@ -156,7 +128,7 @@ def first_panel(arrangement: Arrangement) -> Arrangement:
 def _at_first(dataset: xr.Dataset, name: str, notes: list[str]) -> xr.Dataset:
     """Results at the first value of an axis, which is added to the notes."""
     axis = dataset[name]
-    notes.append(f"{in_words(axis)} = {value_text(axis, 0)} (first of {axis.size})")
+    notes.append(f"{place_text(axis, 0, ' = ')} (first of {axis.size})")
     return dataset.isel({name: 0})
 
 
@@ -173,21 +145,10 @@ def labelled(array: xr.DataArray, dims: Sequence[Any]) -> Iterator[tuple[list[st
 
 
 def with_spacings(dataset: xr.Dataset, spacings: Mapping[str, str], source: str) -> xr.Dataset:
-    """Results whose axes are drawn logarithmic or linear as told, whatever their values.
+    """Results over a grid whose axes are drawn logarithmic or linear as told, whatever their values.
 
-    Parameters
-    ----------
-    dataset : Dataset
-        Results of a study over a grid.
-    spacings : mapping
-        "log" or "linear" by axis.
-    source : str
-        Where the results are from, for the errors.
-
-    Raises
-    ------
-    InputError
-        There is no such axis or spacing, or an axis cannot be logarithmic.
+    `spacings` are "log" or "linear" by axis. InputError, which names the source, if there is no such axis or
+    spacing, or an axis cannot be logarithmic.
     """
     axes = list(map(str, dataset["status"].dims))
     for name, spacing in spacings.items():
@@ -249,38 +210,28 @@ def value_text(coordinate: xr.DataArray, index: int) -> str:
     return f"{number(value * factor)} {unit}".strip()
 
 
+def place_text(coordinate: xr.DataArray, index: int, between: str = " ") -> str:
+    """A place on an axis for people: its name and the value there, such as "load 120 N m"."""
+    return f"{in_words(coordinate)}{between}{value_text(coordinate, index)}"
+
+
 def infinity_in_words(name: str) -> str:
     """An infinite value on the axis of that name."""
     return "rigid" if name.endswith("stiffness") else "∞"
 
 
-@dataclass(frozen=True)
-class Ruler:
-    """Positions of an axis's values along a side of the map.
+class Ruler(NamedTuple):
+    """Positions of an axis's values along a side of the map, in display units.
 
-    Attributes
-    ----------
-    centres : array, shape (value,)
-        Positions of the grid points, in display units; their logarithms to base 10 on a logarithmic axis, of
-        negative values with the sign turned.
-    edges : array, shape (value + 1,)
-        Borders of their cells, halfway between.
-    ticks : array or None
-        Where ticks have to be; None leaves it to the plotting library.
-    tick_labels : tuple of str
-        Their texts.
-    label : str
-        Name and unit.
-    minor : array
-        Where short ticks without labels are, on a logarithmic axis.
+    On a logarithmic axis they are logarithms to base 10, of negative values with the sign turned.
     """
 
-    centres: NDArray[np.float64]
-    edges: NDArray[np.float64]
-    ticks: NDArray[np.float64] | None
-    tick_labels: tuple[str, ...]
-    label: str
-    minor: NDArray[np.float64] = field(default_factory=lambda: np.empty(0))
+    centres: NDArray[np.float64]  # (value,) of the grid points
+    edges: NDArray[np.float64]  # (value + 1,) of the borders of their cells, halfway between
+    ticks: NDArray[np.float64] | None  # where these have to be; None leaves it to the plotting library
+    tick_labels: tuple[str, ...]  # their texts
+    label: str  # name and unit
+    minor: NDArray[np.float64] = np.empty(0)  # where short ticks without labels are, on a logarithmic axis
 
     def lay_out(self, axis: Axis) -> None:
         """Put the ticks on a side of a panel."""
@@ -296,12 +247,8 @@ ONE_ROW = Ruler(np.zeros(1), np.array([-0.5, 0.5]), np.empty(0), (), "")
 def ruler(coordinate: xr.DataArray) -> Ruler:
     """Lay out an axis: numbers at their true place, an infinite one behind them, texts side by side.
 
-    The axis is logarithmic where its finite values are spread so; negative ones are mirrored.
-
-    Parameters
-    ----------
-    coordinate : DataArray, shape (value,)
-        Sorted if numeric; `units` is its SI unit; `spacing`, "log" or "linear", decides where it is given.
+    The axis (value,), sorted if numeric, is logarithmic where its finite values are spread so, or where its
+    `spacing`, "log" or "linear", says so; negative ones are mirrored.
     """
     name = str(coordinate.name)
     factor, unit = coordinate_unit(coordinate.attrs)

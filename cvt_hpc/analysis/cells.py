@@ -17,9 +17,9 @@ from matplotlib.legend_handler import HandlerTuple
 from matplotlib.lines import Line2D
 from matplotlib.patches import Patch, PathPatch
 from matplotlib.path import Path
-from matplotlib.patheffects import Normal, withStroke
 from numpy.typing import NDArray
 
+from cvt_hpc.analysis import figures
 from cvt_hpc.analysis.arrangement import Ruler
 from cvt_hpc.analysis.classes import OccurrenceClass
 from cvt_hpc.errors import mismatch, show
@@ -156,22 +156,11 @@ def colour_bar(figure: Figure, scale: Scale, values: Array, **options: Any) -> C
 def draw_cells(
     axes: Axes, x: Ruler, y: Ruler, classes: NDArray[np.int8], inferred: Mask, values: Array, scale: Scale
 ) -> None:
-    """Draw the cells of one panel, and borders between the classes.
+    """Draw the cells (row, column) of one panel, and borders between the classes.
 
-    Parameters
-    ----------
-    axes : Axes
-        Where to draw.
-    x, y : Ruler
-        Places of the columns and rows.
-    classes : array, shape (row, column)
-        `OccurrenceClass` of each run, or `StartClass` or `PairClass` of each cell.
-    inferred : array of bool, shape (row, column)
-        Whether a cell's class is not that of a run.
-    values : array, shape (row, column)
-        What colours the vibrating cells; where it is nan they keep the colour of their class.
-    scale : Scale
-        How it colours them.
+    `classes` are the `OccurrenceClass` of each run, or `StartClass` or `PairClass` of each cell; where they
+    are `inferred` they are not those of a run. `values` colour the vibrating cells by the scale; where they
+    are nan these keep the colour of their class.
     """
     fills = np.zeros((*classes.shape, 4))
     hatched = {}
@@ -226,7 +215,7 @@ def write_value(
 
     An outline in that colour keeps it apart from hatching.
     """
-    effects = [withStroke(linewidth=2.5, foreground=to_hex(fill)), Normal()] if outlined else None
+    effects = figures.outlined(2.5, to_hex(fill)) if outlined else None
     ink = "#ffffff" if fill[:3] @ (0.299, 0.587, 0.114) < 0.45 else "#000000"  # by the lightness of the fill
     look = {"ha": "center", "va": "bottom" if above else "center", "fontsize": size, "color": ink}
     axes.annotate(text, place, (0, above), textcoords="offset points", path_effects=effects, **look)
@@ -241,24 +230,20 @@ def class_legend(
     further: Sequence[Any] = (),
 ) -> None:
     """Legend of some classes below the panels: fill, hatching, mark; of inferred cells; and of lines."""
-    handles: list[Any] = []
-    labels: list[str] = []
+    entries: dict[str, Any] = {}
     for kind, style in styles.items():
         outline = style.ink if style.hatch else "#606060"
         cell = Patch(facecolor=style.fill, edgecolor=outline, hatch=style.hatch, linewidth=0.8)
-        handles.append((cell, Line2D([], [], **style.marks(4.0))))
-        labels.append(kind.label)
+        entries[kind.label] = cell, Line2D([], [], **style.marks(4.0))
     if with_inferred:
         for label, fill in (("inferred", "none"), ("inferred, vibrating", INFERRED_VIBRATION)):
-            handles.append(Patch(**{**LINES, "facecolor": fill, "linewidth": 0.8}))
-            labels.append(label)
-    handles += further
-    labels += [handle.get_label() for handle in further]
+            entries[label] = Patch(**{**LINES, "facecolor": fill, "linewidth": 0.8})
+    entries |= {handle.get_label(): handle for handle in further}
     figure.legend(
-        handles,
-        labels,
+        entries.values(),
+        entries.keys(),
         loc="outside lower center",
-        ncols=-(-len(labels) // -(-len(labels) // columns)),  # rows of like length
+        ncols=-(-len(entries) // -(-len(entries) // columns)),  # rows of like length
         frameon=False,
         handler_map={tuple: HandlerTuple(ndivide=1, pad=0)},
         handlelength=2.2,

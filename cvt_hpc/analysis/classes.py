@@ -26,27 +26,22 @@ def check_results(dataset: xr.Dataset, source: str) -> None:
         if dataset[name].dtype.kind not in "biuf":
             raise mismatch(f"{source}: {name}", "flags as numbers", "others")
     if beyond := set(dataset["vibrates"].dims) - set(dataset["status"].dims):
-        raise mismatch(
-            f"{source}: vibrates", "the dimensions of status", f"{min(map(str, beyond))} beside them"
-        )
+        found = f"{min(map(str, beyond))} beside them"
+        raise mismatch(f"{source}: vibrates", "the dimensions of status", found)
     if not dataset["status"].size:
         raise mismatch(source, "results of a study of one run at least", "none")
 
 
+def axes_in_words(dataset: xr.Dataset) -> str:
+    """Names of the axes of results."""
+    return ", ".join(map(str, dataset["status"].dims)) or "a single run"
+
+
 def occurrence_classes(dataset: xr.Dataset) -> xr.DataArray:
-    """Class of each run.
+    """Class of each run, values of `OccurrenceClass` over the dimensions of `status`.
 
-    Parameters
-    ----------
-    dataset : Dataset
-        With the flag variables `status` and `vibrates`, same dimensions; with `occurrence_class` where it
-        is of several runs for a cell.
-
-    Returns
-    -------
-    DataArray of int8
-        Values of `OccurrenceClass`, or as they are given; dimensions of `status`. Of a chunked dataset
-        nothing is computed yet.
+    They follow from the flags `status` and `vibrates`, or are given as `occurrence_class`, of several runs
+    for a cell. Of a chunked dataset nothing is computed yet.
     """
     if "occurrence_class" in dataset:
         return dataset["occurrence_class"]
@@ -57,13 +52,7 @@ def occurrence_classes(dataset: xr.Dataset) -> xr.DataArray:
 
 
 def map_classes(dataset: xr.Dataset) -> xr.DataArray:
-    """Class of each cell of a map: that of its run, or in a trace what was inferred where there was none.
-
-    Parameters
-    ----------
-    dataset : Dataset
-        As `occurrence_classes` takes it, with `inferred_class` if it is of a trace.
-    """
+    """Class of each cell of a map: that of its run, or the `inferred_class` of a trace where none was run."""
     classes = occurrence_classes(dataset)
     if "inferred_class" not in dataset:
         return classes
@@ -77,20 +66,10 @@ def count_classes(classes: NDArray[np.int8]) -> str:
 
 
 def at_strongest_strand(dataset: xr.Dataset, name: str) -> xr.DataArray:
-    """A variable at the strand with the largest amplitude.
+    """A variable at the strand with the largest amplitude, over the dimensions of `status`.
 
-    Parameters
-    ----------
-    dataset : Dataset
-        With `status`, `amplitude` and the variable; these may have a dimension (`strand`) beyond those of
-        `status`.
-    name : str
-        "amplitude", "frequency" or another variable with the dimensions of `amplitude`.
-
-    Returns
-    -------
-    DataArray
-        Dimensions of `status`; nan where the dataset has no such variable. Lazy as of `occurrence_classes`.
+    It has the dimensions of `amplitude`, which may be more (`strand`); nan where the dataset has no such
+    variable. Of a chunked dataset nothing is computed yet.
     """
     status = dataset["status"]
     if name not in dataset or "amplitude" not in dataset:

@@ -31,13 +31,8 @@ from cvt_hpc.variables import Status
 from cvt_hpc.vibration import classes as agreement
 
 _HEAD = (
-    "class_a",
-    "class_b",
-    "pair",
-    "amplitude_a [um]",
-    "amplitude_b [um]",
-    "frequency_a [Hz]",
-    "frequency_b [Hz]",
+    *("class_a", "class_b", "pair"),
+    *("amplitude_a [um]", "amplitude_b [um]", "frequency_a [Hz]", "frequency_b [Hz]"),
 )
 # Tables and keys that say how a scene is computed or disturbed, not what it is
 _METHOD = (
@@ -50,87 +45,48 @@ _SAMPLES = (*WAYS.values(), ("in full", AUDIT))  # words of a way, and the folde
 
 
 class Deviation(NamedTuple):
-    """Deviation of B from A, relative to A; not a number where nothing is known.
-
-    Attributes
-    ----------
-    median, high, largest : float
-        Median, what 95 % of the cells keep, and the largest [1].
-    """
+    """Deviation of B from A, relative to A [1]; not a number where nothing is known."""
 
     median: float
-    high: float
+    high: float  # what 95 % of the cells keep
     largest: float
 
 
 class Cell(NamedTuple):
-    """A cell of a comparison.
+    """A cell of a comparison; pairs of values are of A and of B."""
 
-    Attributes
-    ----------
-    at : dict
-        Values of the axes by name [SI].
-    place : str
-        The same for people, in the units of the job.
-    classes : (OccurrenceClass, OccurrenceClass)
-        In A and in B.
-    pair : int
-        The class that both have, or a `PairClass`.
-    amplitude, frequency : (float, float)
-        In A and in B [m, Hz].
-    quantities : dict
-        Further values in A and in B by name [SI].
-    """
-
-    at: dict[str, Any]
-    place: str
+    at: dict[str, Any]  # values of the axes by name [SI]
+    place: str  # the same for people, in the units of the job
     classes: tuple[agreement.OccurrenceClass, agreement.OccurrenceClass]
-    pair: int
-    amplitude: tuple[float, float]
-    frequency: tuple[float, float]
-    quantities: dict[str, tuple[float, float]]
+    pair: int  # the class that both have, or a `PairClass`
+    amplitude: tuple[float, float]  # [m]
+    frequency: tuple[float, float]  # [Hz]
+    quantities: dict[str, tuple[float, float]]  # further values by name [SI]
 
     @property
     def pair_label(self) -> str:
         """Name for people of `pair`."""
-        return (
-            agreement.OccurrenceClass(self.pair) if self.pair >= 0 else agreement.PairClass(self.pair)
-        ).label
+        return (agreement.OccurrenceClass if self.pair >= 0 else agreement.PairClass)(self.pair).label
 
 
 @dataclass(frozen=True)
 class Comparison:
     """Two studies, A and B, over their common cells.
 
-    Attributes
-    ----------
-    cells : Dataset
-        Over the axes of A: `class_a`, `class_b`, values of `OccurrenceClass`; `occurrence_class`, as
-        `classify_pairs` has it; `amplitude_a`, `amplitude_b` [m] and `frequency_a`,
-        `frequency_b` [Hz] at the strand with the largest amplitude, not a number where unknown; and
-        `QUANTITY_a`, `QUANTITY_b` of `quantities`.
-    thresholds : (float, float)
-        Amplitude from which a strand of A and of B vibrates [m]; not a number where a job has none.
-    left_out : (int, int)
-        Number of runs of A and of B that are not among the cells.
-    notes : tuple of str
-        Which axes were reduced, in words.
-    differences : tuple of str
-        In what the jobs and the versions of the program differ, in words.
-    quantities : dict
-        Units of what the model has compared beside amplitude and frequency, by name: of a variable along
-        strands or pulleys that with the label of the place, such as "strand_tension_t1".
-    are_designs : bool
-        Whether A and B are different scenes, of which one may be better, and not one scene computed twice.
+    The cells have over the axes of A: `class_a`, `class_b`, values of `OccurrenceClass`; `occurrence_class`,
+    as `classify_pairs` has it; `amplitude_a`, `amplitude_b` [m] and `frequency_a`, `frequency_b` [Hz] at the
+    strand with the largest amplitude, not a number where unknown; and `QUANTITY_a`, `QUANTITY_b` of the
+    quantities: what the model has compared besides, of a variable along strands or pulleys with the label of
+    the place, such as "strand_tension_t1".
     """
 
     cells: xr.Dataset
-    thresholds: tuple[float, float]
-    left_out: tuple[int, int]
-    notes: tuple[str, ...]
-    differences: tuple[str, ...]
-    quantities: dict[str, str]
-    are_designs: bool = False
+    thresholds: tuple[float, float]  # amplitude from which a strand vibrates [m]; nan where a job has none
+    left_out: tuple[int, int]  # number of runs of A and of B that are not among the cells
+    notes: tuple[str, ...]  # which axes were reduced, in words
+    differences: tuple[str, ...]  # in what the jobs and the versions of the program differ, in words
+    quantities: dict[str, str]  # units by name
+    are_designs: bool = False  # whether A and B are different scenes, and not one scene computed twice
 
     @property
     def better(self) -> NDArray[np.bool_]:
@@ -212,24 +168,12 @@ class Comparison:
 
 
 def compare(a: xr.Dataset, b: xr.Dataset, sources: tuple[str, str] = ("A", "B")) -> Comparison:
-    """Compare two studies over their common cells.
-
-    Parameters
-    ----------
-    a, b, sources
-        As `align` takes them.
-
-    Raises
-    ------
-    InputError
-        As of `align`.
-    """
+    """Compare two studies over their common cells; arguments and errors as of `align`."""
     aligned = align(a, b, sources, _compared(a, b))
     thresholds = _threshold(a), _threshold(b)
     known = [_known(dataset) for dataset in (aligned.a, aligned.b)]
-    near = agreement.is_near(
-        *(found["amplitude"] / least for found, least in zip(known, thresholds, strict=True))
-    )
+    sizes = (found["amplitude"] / least for found, least in zip(known, thresholds, strict=True))
+    near = agreement.is_near(*sizes)
     frame = aligned.a["status"]
     values = {f"{name}_{study}": array for study, found in zip("ab", known, strict=True)
               for name, array in found.items()}  # fmt: skip
@@ -328,24 +272,13 @@ def _document(dataset: xr.Dataset) -> dict[str, Any]:
 
 
 def contradictions(found: Comparison, way: str) -> str:
-    """Return how many runs of a sample contradict those of the study.
-
-    Parameters
-    ----------
-    found : Comparison
-        Of the study with the runs that were done again.
-    way : str
-        How they were done again, in words.
-    """
+    """Return how many runs that were done again, in a way in words, contradict those of the study."""
     runs, contradicting = int(found.answered.sum()), int(found.contradicts.sum())
     low, high = interval(contradicting, runs)
     share = f"{contradicting / runs:.2%}, " if runs else ""
     others = int((found.answered & (found.pairs == agreement.PairClass.OTHERWISE)).sum())
-    failed = sum(
-        count
-        for kinds, count in found.counts().items()
-        if kinds[1] == agreement.OccurrenceClass.FAILED != kinds[0]
-    )
+    fails = [found.cells[name].values == agreement.OccurrenceClass.FAILED for name in ("class_a", "class_b")]
+    failed = int((fails[1] & ~fails[0]).sum())
     return (
         f"{contradicting} of {runs} contradict (quiet against vibrating; {share}95 % interval {low:.2%} to "
         f"{high:.2%}), {int(found.contradicts_beyond.sum())} of them beyond the threshold; "
@@ -375,19 +308,7 @@ def deviations(found: Comparison, who: str = "B deviates") -> Iterator[str]:
 def sample_sentences(dataset: xr.Dataset, folder: Path, source: str) -> Iterator[str]:
     """Yield what the samples in the folder of a study tell: checks of the time step, and the audit.
 
-    Parameters
-    ----------
-    dataset : Dataset
-        Results of the study.
-    folder : Path
-        Its folder, in which `--check-step` and `--audit` leave their runs.
-    source : str
-        Where the results are from, for errors.
-
-    Raises
-    ------
-    InputError
-        If a sample cannot be read, or has nothing in common with the study.
+    InputError, which names the source, if one cannot be read, or has nothing in common with the study.
     """
     for way, name in _SAMPLES:
         if not (folder / name / "results.nc").is_file():
@@ -397,6 +318,5 @@ def sample_sentences(dataset: xr.Dataset, folder: Path, source: str) -> Iterator
         repeated = int(np.sum(found.cells["class_b"] != agreement.OccurrenceClass.NOT_RUN))
         runs = "1 run was" if repeated == 1 else f"{repeated} runs were"
         yield f"{runs} done again {way}, in `{name}`: {contradictions(found, way)}."
-        yield from (
-            f"{line[:1].upper()}{line[1:]}." for line in deviations(found, "those done again deviate")
-        )
+        for line in deviations(found, "those done again deviate"):
+            yield f"{line[:1].upper()}{line[1:]}."

@@ -23,21 +23,9 @@ _NO_SCALE = cells.Scale(cells.AMPLITUDE_COLOURS, cells.norm_over(np.empty(0)), "
 
 
 def draw_comparison(found: Comparison, out: Path, sources: tuple[str, str]) -> Path:
-    """Draw where two studies agree and where they contradict each other.
+    """Draw where two studies agree and where they contradict each other; written as by `save_figure`.
 
-    Parameters
-    ----------
-    found : Comparison
-        What is drawn; of a single run there is no map.
-    out : Path
-        As for `save_figure`, with what it returns.
-    sources : (str, str)
-        What A and B are, for the title.
-
-    Raises
-    ------
-    InputError
-        As of `save_figure`.
+    `sources` say for the title what A and B are. Of a single run there is no map.
     """
     return draw(lambda: _figure(found, sources), out)
 
@@ -85,7 +73,7 @@ def _draw_map(figure: SubFigure, arrangement: Arrangement) -> None:
         sheet = sheet_of(arrangement, frame=FRAME)
         axes = figure.subplots(sheet.rows, sheet.columns, sharex=True, sharey=True, squeeze=False)
         draw_block(figure, axes, sheet, np.full(sheet.classes.shape, np.nan), _NO_SCALE)
-        figure.supylabel(sheet.y.label, fontsize=10)
+        figure.supylabel(sheet.y.label)
 
 
 def _title(found: Comparison, shown: NDArray[np.int8], sources: tuple[str, str]) -> list[str]:

@@ -21,20 +21,8 @@ from cvt_hpc.vibration.classes import OccurrenceClass
 UNITS = (
     *("1", "m", "s", "N", "N m", "W", "Hz", "rad", "rad s-1", "m s-1", "N m-1", "W m-1", "s m-1", "kg", "Pa"),
     *("s-1", "J", "J m-1", "N s", "N m s", "N s m-2", "kg/m", "kg/m^3", "kg m^2", "N m^2", "m/N", "N s/m"),
-    *(
-        "N m/rad",
-        "N m s/rad",
-        "m/(N s)",
-        "1/s",
-        "N s/m^2",
-        "N/m",
-        "N/m^2",
-        "N/s",
-        "m/s",
-        "m/s^2",
-        "rad/s",
-        "s/m",
-    ),
+    *("N m/rad", "N m s/rad", "m/(N s)", "1/s", "N s/m^2", "N/m", "N/m^2", "N/s", "m/s", "m/s^2", "rad/s"),
+    "s/m",
 )
 BLANKS = {  # what flags mean where they are missing
     "status": Status.NOT_RUN,
@@ -45,24 +33,10 @@ BLANKS = {  # what flags mean where they are missing
 
 
 def in_units(dataset: xr.Dataset, units: Mapping[str, str]) -> xr.Dataset:
-    """Convert variables and coordinates.
+    """Convert values and the attribute `units` of variables and coordinates; nothing is computed of chunks.
 
-    Parameters
-    ----------
-    dataset : Dataset
-        Of this program: with the attribute `units` where there is one.
-    units : mapping
-        By the name of a variable or coordinate a unit of its dimension, as pint reads it.
-
-    Returns
-    -------
-    Dataset
-        Values and the attribute `units` are converted. Of a chunked dataset nothing is computed yet.
-
-    Raises
-    ------
-    InputError
-        There is no such variable, it has no unit, or the unit is of another dimension.
+    `units` are by the name of a variable or coordinate one of its dimension, as pint reads it. InputError if
+    there is no such variable, it has no unit, or the unit is of another dimension.
     """
     converted = {}
     for name, unit in units.items():
@@ -83,18 +57,8 @@ def standard(dataset: xr.Dataset, source: str = "results") -> xr.Dataset:
 
     Pictures, sentences and tables are made of this form: as of `plain`, with numbers in SI units. Numbers
     without a unit have the one that their model documents. Of a chunked dataset nothing is computed yet.
-
-    Parameters
-    ----------
-    dataset : Dataset
-        Results of a study or the history of a run.
-    source : str
-        Where it is from, for the errors.
-
-    Raises
-    ------
-    InputError
-        A unit cannot be read, or is of another dimension than the documented one; or as of `plain`.
+    InputError, which names the source, if a unit cannot be read, or is of another dimension than the
+    documented one; or as of `plain`.
     """
     dataset = plain(dataset, source)
     converted = {
@@ -109,14 +73,9 @@ def plain(dataset: xr.Dataset, source: str = "results") -> xr.Dataset:
     """Return a dataset as numbers, flags and texts, in the units that it has.
 
     Quantities of pint and durations become numbers; characters become texts; flags are whole numbers where
-    `where`, `concat` or `merge` have left nan; stacked axes become those of samples. Arguments as of
-    `standard`.
-
-    Raises
-    ------
-    InputError
-        The dataset is not as `check_form` has it, or flags are no whole numbers, which is raised when they
-        are computed.
+    `where`, `concat` or `merge` have left nan; stacked axes become those of samples. InputError, which names
+    the source, if the dataset is not as `check_form` has it, or flags are no whole numbers, which is raised
+    when they are computed.
     """
     for name in [key for key in dataset.dims if isinstance(dataset.xindexes.get(key), PandasMultiIndex)]:
         dataset = dataset.reset_index(name).rename_dims({name: "run"} if name != "run" else {})

@@ -4,6 +4,7 @@
 """
 
 from collections.abc import Iterator, Mapping, Sequence
+from itertools import chain
 from typing import Any
 
 import numpy as np
@@ -13,7 +14,7 @@ from matplotlib.figure import Figure
 from matplotlib.lines import Line2D
 
 from cvt_hpc.analysis import arrangement as layout
-from cvt_hpc.analysis import curves, figures
+from cvt_hpc.analysis import figures
 from cvt_hpc.analysis.cells import STYLES
 from cvt_hpc.analysis.classes import WITHOUT_RESULT, check_results, occurrence_classes
 from cvt_hpc.errors import mismatch, unknown
@@ -39,20 +40,10 @@ def curve_figure(
 ) -> Figure:
     """Draw quantities over an axis.
 
-    Parameters
-    ----------
-    dataset, at, source
-        As of all pictures of results (`figures.py`). The axis that runs along x in a map does so here;
-        there is a panel for each value of the one that runs along y.
-    quantities : sequence of str
-        Numeric variables of one unit. The first is drawn by marks, the others by lines beside it; one with
-        further dimensions, such as `strand`, gives a curve for each of their labels.
-
-    Raises
-    ------
-    InputError
-        As of all pictures; there is no such quantity, quantities differ in unit, or there would be more than
-        MOST_PANELS panels.
+    Arguments as of all pictures of results (`figures.py`). The axis that runs along x in a map does so here;
+    there is a panel for each value of the one that runs along y, MOST_PANELS at most. Quantities are numeric
+    variables of one unit. The first is drawn by marks, the others by lines beside it; one with further
+    dimensions, such as `strand`, gives a curve for each of their labels.
     """
     check_results(dataset, source)
     check_quantities(dataset, quantities, source)
@@ -63,12 +54,8 @@ def curve_figure(
     x = layout.ruler(arrangement.dataset[arrangement.x])
     factor, unit = scale(arrangement.dataset, quantities)
     for axes, (title, shown) in zip(all_axes, panels, strict=True):
-        curves = [
-            curve
-            for name in quantities
-            for curve in _curves(shown[name], factor, arrangement.x, len(quantities) > 1)
-        ]
-        _draw_curves(axes, x.centres, curves, shown["status"].values == Status.DONE)
+        each = (_curves(shown[name], factor, arrangement.x, len(quantities) > 1) for name in quantities)
+        _draw_curves(axes, x.centres, list(chain(*each)), shown["status"].values == Status.DONE)
         mark_above(axes, x.centres, occurrence_classes(shown).values)
         axes.set_title(title, loc="left", pad=6)
         axes.set(xlabel=x.label, xlim=with_margins(x))
@@ -76,20 +63,16 @@ def curve_figure(
         axes.grid(linewidth=0.4, alpha=0.5)
     label = common_words(dataset, quantities)
     all_axes[0].set_ylabel(f"{label} [{unit}]" if unit else label)
-    legend: dict[str, Any] = {}
-    for axes in all_axes:
-        handles, labels = axes.get_legend_handles_labels()
-        legend |= dict(zip(labels, handles, strict=True))
-    set_frame(figure, legend, [figures.headline(f"{label[0].upper()}{label[1:]}", dataset.attrs), *notes])
+    lines = [figures.headline(f"{label[0].upper()}{label[1:]}", dataset.attrs), *notes]
+    set_frame(figure, figures.entries_of(all_axes), lines)
     return figure
 
 
 def set_frame(figure: Figure, legend: Mapping[str, Any], lines: Sequence[str]) -> None:
     """Title and legend of a figure of curves, which grows by the legend; `legend` has handles by label."""
-    columns = figures.legend_columns(list(legend))
-    figure.set_figheight(figure.get_figheight() + 0.2 * (len(legend) // columns))
-    place = {"loc": "outside lower center", "frameon": False, "ncols": columns}
-    figure.legend(legend.values(), legend.keys(), **place)
+    rows = len(legend) // figures.legend_columns(list(legend))
+    figure.set_figheight(figure.get_figheight() + 0.2 * rows)
+    figures.legend_below(figure, legend)
     figures.entitle(figure, lines)
 
 
@@ -119,8 +102,7 @@ def panels_of(
     if y.size > most:
         expected = f"at most {most} values, or one that --at fixes"
         raise mismatch(f"{source}: {arrangement.y}", expected, f"{y.size}")
-    titles = [f"{figures.in_words(y)} {layout.value_text(y, k)}" for k in range(y.size)]
-    return [(title, dataset.isel({arrangement.y: k})) for k, title in enumerate(titles)], notes
+    return [(layout.place_text(y, k), dataset.isel({arrangement.y: k})) for k in range(y.size)], notes
 
 
 def _curves(
@@ -172,9 +154,8 @@ def _draw_curves(
             axes.plot(x, known, ls="", marker=mark, fillstyle=fill, ms=5, color=colour, label=label)
             marks += 1
         else:
-            axes.plot(
-                x, values, ls=BESIDE[(k - marks) % len(BESIDE)], lw=1.4, color=colour, label=label, zorder=1.5
-            )
+            style = {"ls": BESIDE[(k - marks) % len(BESIDE)], "lw": 1.4, "zorder": 1.5}
+            axes.plot(x, values, color=colour, label=label, **style)
 
 
 def mark_above(axes: Axes, x: np.ndarray, classes: np.ndarray) -> None:
@@ -206,7 +187,7 @@ def curves_figure(
 ) -> Figure:
     """Draw as `curve_figure`, or with `lines` as `curve_panels_figure`, A+B in one panel."""
     if lines is None:
-        return curves.curve_figure(dataset, quantities, at, source)
+        return curve_figure(dataset, quantities, at, source)
     return curve_panels_figure(dataset, [name.split("+") for name in quantities], lines, at, source)
 
 
@@ -220,29 +201,17 @@ def curve_panels_figure(
 ) -> Figure:
     """Draw quantities over an axis, by another axis.
 
-    Parameters
-    ----------
-    dataset, at, source
-        As of all pictures of results (`figures.py`). Of the axes that `lines` leaves, the one that runs along
-        x in a map does so here.
-    groups : sequence of sequences of str
-        Numeric variables: those of a group are of one unit and share a panel, the first drawn by marks, the
-        others by lines beside it. Of quantities with further dimensions, such as `pulley`, there is a panel
-        for each of their labels.
-    lines : str
-        The axis that has a colour for each of its values.
-
-    Raises
-    ------
-    InputError
-        As of all pictures; there is no such quantity or axis, quantities of a group differ in unit or
-        dimensions, or there would be more curves than colours, or more than MOST_QUANTITIES panels.
+    Arguments as of all pictures of results (`figures.py`). The axis `lines` has a colour for each of its
+    values; of the axes that it leaves, the one that runs along x in a map does so here. Variables of a group
+    are numeric, of one unit and of the same dimensions, and share a panel, the first drawn by marks, the
+    others by lines beside it. Of quantities with further dimensions, such as `pulley`, there is a panel for
+    each of their labels, MOST_QUANTITIES at most.
     """
     check_results(dataset, source)
     for group in groups:
-        curves.check_quantities(dataset, group, source)
+        check_quantities(dataset, group, source)
     arrangement = layout.arrange(dataset, at or {}, source, layout.Sides(y=lines))
-    each, notes = curves.panels_of(arrangement, source, len(figures.COLOURS))
+    each, notes = panels_of(arrangement, source, len(figures.COLOURS))
     shown, along = arrangement.dataset, {arrangement.x, lines, arrangement.panel}
     panels = [(group, place) for group in groups for place in _places(shown, group, along, source)]
     if len(panels) > MOST_QUANTITIES:
@@ -252,35 +221,32 @@ def curve_panels_figure(
     rows = -(-len(panels) // columns)
     width = figures.WIDTH * (1.0 + 0.25 * (columns - 1) / (COLUMNS - 1))
     figure = Figure((width, PANEL_HEIGHT * rows + FRAME), layout="constrained")
-    all_axes = figure.subplots(rows, columns, sharex=True, squeeze=False).ravel()
-    for unused in all_axes[len(panels) :]:
+    all_axes = figure.subplots(rows, columns, sharex=True, squeeze=False)
+    for unused in all_axes.flat[len(panels) :]:
         unused.set_visible(False)
     x = layout.ruler(shown[arrangement.x])
     legend: dict[str, Any] = {
         title: Line2D([], [], color=colour, marker=mark, ms=5, lw=0.7)
-        for (title, _), colour, mark in zip(each, figures.COLOURS, curves.MARKS, strict=False)
+        for (title, _), colour, mark in zip(each, figures.COLOURS, MARKS, strict=False)
     }
-    for axes, (group, place) in zip(all_axes, panels, strict=False):
-        factor, unit = curves.scale(shown, group)
-        labels = [curves.place_in_words(shown[dim], k) for dim, k in place.items()]
-        title = " ".join([curves.common_words(shown, group), *labels])
+    for axes, (group, place) in zip(all_axes.flat, panels, strict=False):
+        factor, unit = scale(shown, group)
+        labels = [place_in_words(shown[dim], k) for dim, k in place.items()]
+        title = " ".join([common_words(shown, group), *labels])
         axes.set_title(f"{title} [{unit}]" if unit else title, loc="left", pad=6)
         for k, (_, results) in enumerate(each):
             values = [factor * results[name].isel(place).values for name in group]
             _draw(axes, x.centres, values, results["status"].values == Status.DONE, k)
-            curves.mark_above(axes, x.centres, occurrence_classes(results).values)
-        for name, style in zip(group[1:], curves.BESIDE, strict=False):
+            mark_above(axes, x.centres, occurrence_classes(results).values)
+        for name, style in zip(group[1:], BESIDE, strict=False):
             legend[figures.in_words(shown[name])] = Line2D([], [], color=INK, ls=style, lw=1.2)
-        handles, told = axes.get_legend_handles_labels()
-        legend |= dict(zip(told, handles, strict=True))
-        axes.set_xlim(curves.with_margins(x))
+        legend |= figures.entries_of([axes])
+        axes.set_xlim(with_margins(x))
         x.lay_out(axes.xaxis)
         axes.grid(linewidth=0.4, alpha=0.5)
-    for axes in all_axes[len(panels) - columns : len(panels)]:
-        axes.set_xlabel(x.label)
-        axes.tick_params(labelbottom=True)
+    figures.label_x(all_axes, len(panels), x.label)
     title = f"Over {figures.in_words(shown[arrangement.x])}, by {figures.in_words(shown[lines])}"
-    curves.set_frame(figure, legend, [figures.headline(title, dataset.attrs), *notes])
+    set_frame(figure, legend, [figures.headline(title, dataset.attrs), *notes])
     return figure
 
 
@@ -298,8 +264,8 @@ def _places(
 
 def _draw(axes: Axes, x: np.ndarray, values: Sequence[np.ndarray], is_done: np.ndarray, k: int) -> None:
     """The k-th curve of a panel: marks of the first quantity, lines of the others, in one colour."""
-    colour, mark = figures.COLOURS[k], curves.MARKS[k % len(curves.MARKS)]
+    colour, mark = figures.COLOURS[k], MARKS[k % len(MARKS)]
     first, *others = (np.where(is_done, value, np.nan) for value in values)
     axes.plot(x, first, color=colour, marker=mark, ms=4, lw=0.7, zorder=2.5)
-    for value, style in zip(others, curves.BESIDE, strict=False):
+    for value, style in zip(others, BESIDE, strict=False):
         axes.plot(x, value, color=colour, ls=style, lw=1.2, zorder=1.5)

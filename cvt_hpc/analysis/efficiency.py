@@ -19,24 +19,16 @@ _COLOUR = "#0072b2"
 
 
 def draw_efficiency(forecasts: Sequence[Forecast], title: str, basis: str, out: Path) -> Path:
-    """Draw what a sweep is expected to take on several numbers of ranks.
-
-    Parameters
-    ----------
-    forecasts : sequence of Forecast
-        One for each number of ranks, in ascending order.
-    title : str
-        What is run.
-    basis : str
-        What the times of batches are known by.
-    out : Path
-        As for `save_figure`, with what it returns and raises.
-    """
+    """Write the figure of `efficiency_figure` as `save_figure` does."""
     return draw(lambda: efficiency_figure(forecasts, title, basis), out)
 
 
 def efficiency_figure(forecasts: Sequence[Forecast], title: str, basis: str) -> Figure:
-    """Compose the picture of `draw_efficiency`; to be called within STYLE."""
+    """Draw what a sweep is expected to take on several numbers of ranks; to be called within STYLE.
+
+    There is a forecast for each number of ranks, in ascending order. `title` says what is run, `basis` what
+    the times of batches are known by.
+    """
     ranks = [forecast.ranks for forecast in forecasts]
     figure = Figure((WIDTH, 5.0), layout="constrained")
     figure.suptitle(f"{title}\nforecast by {basis}")

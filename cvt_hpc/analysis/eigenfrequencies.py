@@ -21,19 +21,10 @@ HEIGHT = 3.6  # [inch]
 
 
 def along_axis(shown: xr.Dataset, x: str) -> xr.DataArray | None:
-    """Eigenfrequencies over an axis: those of the results, or of their strands' mean forces.
+    """Eigenfrequencies over `strand`, `half_waves` and x [Hz]; None where nothing is known of them.
 
-    Parameters
-    ----------
-    shown : Dataset
-        Results over `x` alone: `eigenfrequency` [Hz], or `mean_ring_tension` and `mean_push_force` [N].
-    x : str
-        The axis.
-
-    Returns
-    -------
-    DataArray or None
-        Over `strand`, `half_waves` and x [Hz]; None where nothing is known of them.
+    They are those of the results over x alone, or of the mean forces of their strands: `eigenfrequency` [Hz],
+    or `mean_ring_tension` and `mean_push_force` [N].
     """
     if "eigenfrequency" in shown:
         return shown["eigenfrequency"].transpose("strand", "half_waves", x)
@@ -44,10 +35,8 @@ def along_axis(shown: xr.Dataset, x: str) -> xr.DataArray | None:
     if force.sizes["strand"] != len(STRANDS):
         return None
     along = {str(key): values.values for key, values in shown.coords.items() if values.dims == (x,)}
-    found = [
-        strand_frequencies(fixed | {key: values[k] for key, values in along.items()}, tuple(pair))
-        for k, pair in enumerate(force.values)
-    ]
+    points = (fixed | {key: values[k] for key, values in along.items()} for k in range(len(force)))
+    found = [strand_frequencies(at, tuple(pair)) for at, pair in zip(points, force.values, strict=True)]
     if not np.isfinite(found).any():
         return None
     coordinates = {x: shown[x], "strand": shown["strand"], "half_waves": np.arange(1, MODES + 1)}
@@ -74,23 +63,9 @@ def eigenfrequency_figure(
 ) -> Figure:
     """Compose the picture: a panel for each strand, a line for each number of half waves.
 
-    Parameters
-    ----------
-    dataset : Dataset
-        Results of a study with `eigenfrequency` [Hz] over its axes, `strand` and `half_waves`.
-    at : mapping
-        Axes to fix: name -> value, as a number [SI] or a text; further ones are fixed at their first value.
-    source : str
-        Where the results are from, for the errors.
-    sides : Sides
-        Which axis runs along x.
-    measured : str or Path
-        Measured file that is drawn over it (`measured.py`).
-
-    Returns
-    -------
-    Figure
-        Where a strand holds no shape its lines have gaps.
+    Arguments as of all pictures of results (`figures.py`), with `eigenfrequency` [Hz] over the axes, `strand`
+    and `half_waves`. Axes beyond x are fixed at their first value. Where a strand holds no shape its lines
+    have gaps.
     """
     over = Overlay(measured, dataset, source)
     arrangement = arrange(dataset, at, source, sides)

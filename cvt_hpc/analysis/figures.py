@@ -5,12 +5,22 @@ Pictures of results take
     dataset    Dataset: results of a study over the axes of its job, as `open_results` returns them
     at         mapping, optional: axes to fix, name -> value, as a number [SI] or a text
     source     str, optional: where the results are from, for the errors
+    sides      Sides, optional: which axis runs along x, along y and over the panels
+    vmax       float, optional: value at which the colours end [SI]
+    measured   str or Path, optional: measured file that is drawn over the picture (`measured.py`)
 
-and pictures of runs a `history` or `histories`, as `simulate` returns them, with their `sources`. A function
-`..._figure` composes a matplotlib Figure, unknown to pyplot, and writes nothing; `figure.savefig(path)` does,
-and `draw` writes it as `save_figure` does. `picture_kinds.py` lists those drawn by a kind. InputError is
-raised where a dataset holds no results, a single run or not what is to be drawn, or where `at` names no axis
-or no value on it; what else a picture refuses its docstring says.
+and pictures of runs
+
+    history    Dataset: one run as `simulate` returns it, or `histories`, a sequence of them
+    source     str, or `sources`, a sequence, optional: where they are from, for errors, and for titles and
+               legends where the axes of the runs do not tell them apart
+    vmax, measured as above.
+
+A function `..._figure` composes a matplotlib Figure, unknown to pyplot, and writes nothing;
+`figure.savefig(path)` does, and `draw` writes it as `save_figure` does. `picture_kinds.py` lists those drawn
+by a kind. InputError is raised where a dataset holds no results, a single run or not what is to be drawn,
+where `at` names no axis or no value on it, or where a page has no room for all panels; what else a picture
+refuses its docstring says.
 
 Ticks at the values of an axis are numbers as short as they may be, and only those for which there is room.
 
@@ -34,6 +44,7 @@ from matplotlib.axes import Axes
 from matplotlib.axis import Axis, XAxis
 from matplotlib.backends.backend_agg import FigureCanvasAgg
 from matplotlib.figure import Figure
+from matplotlib.patheffects import AbstractPathEffect, Normal, withStroke
 from matplotlib.text import Text
 from matplotlib.ticker import FuncFormatter, Locator, LogFormatter, NullFormatter
 from numpy.typing import NDArray
@@ -75,6 +86,7 @@ STYLE = {
     "axes.titlesize": 10,
     "axes.linewidth": 0.8,
     "figure.titlesize": 11,
+    "figure.labelsize": 10,
     "xtick.labelsize": 9,
     "ytick.labelsize": 9,
     "legend.fontsize": 9,
@@ -153,9 +165,10 @@ def check_known(dataset: xr.Dataset, names: Iterable[str], source: str) -> None:
         raise mismatch(source, f"known values of {' or '.join(names)}", "none")
 
 
-def headline(subject: str, attributes: Mapping[str, Any]) -> str:
-    """First line above a picture of a dataset with these attributes: its subject, and the job."""
-    return f"{subject}: {one_line(attributes.get('job_name', ''))}".removesuffix(": ")
+def headline(subject: str, *attributes: Mapping[str, Any]) -> str:
+    """First line above a picture of datasets with these attributes: its subject, and their jobs."""
+    jobs = dict.fromkeys(one_line(one.get("job_name", "")) for one in attributes)
+    return f"{subject}: {', '.join(filter(None, jobs))}".removesuffix(": ")
 
 
 def draw(compose: Callable[[], Figure], out: Path) -> Path:
@@ -227,18 +240,10 @@ class Grid(NamedTuple):
 
 
 def fitting(count: int, columns: Sequence[int], heights: tuple[float, float], page: float) -> Grid | None:
-    """Lay panels out within a height, or return None where they would be too low to be read.
+    """Lay panels out within the height of a page [inch], or return None where they are too low to be read.
 
-    Parameters
-    ----------
-    count : int
-        Number of panels.
-    columns : sequence of int
-        How many may stand side by side, the best one first. Rows are lowered before the next one is taken.
-    heights : (float, float)
-        Of a panel with its title [inch]: the least that is readable, and the one that is wanted.
-    page : float
-        Height that all rows may have [inch].
+    `columns` say how many may stand side by side, the best one first: rows are lowered before the next one is
+    taken. `heights` are of a panel with its title [inch]: the least that is readable, and the wanted one.
     """
     least, wanted = heights
     for side_by_side in columns:
@@ -253,15 +258,67 @@ def on_a_page(
 ) -> Grid:
     """Lay panels out as `fitting` does, on a page of which title, labels and legend take `frame` [inch].
 
-    Raises
-    ------
-    InputError
-        If the panels do not fit; it names the source, and says what to do `then`.
+    If they do not fit, InputError names the source, and says what to do `then`.
     """
     if (grid := fitting(count, columns, heights, LONG - frame)) is not None:
         return grid
     most = max(columns) * int((LONG - frame) / min(heights))
     raise mismatch(source, f"at most {most} panels, which one page holds", str(count), then)
+
+
+def panels_on_a_page(
+    count: int,
+    columns: Sequence[int],
+    heights: tuple[float, float],
+    frame: float,
+    source: str,
+    then: str,
+    *,
+    each: int = 1,
+    width: float = WIDTH,
+    **sharing: Any,
+) -> tuple[Figure, NDArray[Any], float]:
+    """Figure with panels laid out as by `on_a_page`, of which nothing is drawn beyond those that are used.
+
+    Instead of one panel there may be `each`, side by side. Returned are the figure, all panels by row and
+    column, and the height of a row [inch].
+    """
+    grid = on_a_page(count, columns, heights, frame, source, then)
+    rows = -(-count // grid.columns)
+    figure = Figure((width, rows * grid.height + frame), layout="constrained")
+    panels = figure.subplots(rows, grid.columns * each, squeeze=False, **sharing)
+    for axes in panels.flat[count * each :]:
+        axes.set_axis_off()
+    return figure, panels, grid.height
+
+
+def label_x(panels: NDArray[Any], count: int, label: str) -> None:
+    """Name what runs along x below the last panels of the columns, of which `count` are used."""
+    for axes in panels.flat[:count][-panels.shape[1] :]:
+        axes.set_xlabel(label)
+        axes.tick_params(labelbottom=True)
+
+
+def entries_of(panels: Iterable[Axes]) -> dict[str, Any]:
+    """Entries for a legend of several panels: handles by label."""
+    entries: dict[str, Any] = {}
+    for axes in panels:
+        handles, labels = axes.get_legend_handles_labels()
+        entries |= dict(zip(labels, handles, strict=True))
+    return entries
+
+
+def legend_below(figure: Figure, entries: Mapping[str, Any], columns: int | None = None) -> None:
+    """Put a legend of handles by label below the panels, if there are any, in as many columns as fit."""
+    if entries:
+        place = {"loc": "outside lower center", "frameon": False}
+        ncols = columns or legend_columns(list(entries))
+        figure.legend(entries.values(), entries.keys(), **place, ncols=ncols)
+
+
+def outlined(width: float, colour: Any = "white") -> list[AbstractPathEffect]:
+    """Outline of a line or a text, which keeps it apart from what it is drawn over."""
+    return [withStroke(linewidth=width, foreground=colour), Normal()]
 
 
 def with_units(line: str) -> str:
@@ -294,24 +351,10 @@ def legend_columns(labels: Sequence[str]) -> int:
 
 
 def save_figure(figure: Figure, out: Path) -> Path:
-    """Write a picture in the format that the suffix names.
+    """Write a picture in the format that the suffix names, and return its path.
 
-    Parameters
-    ----------
-    figure : Figure
-        What to write.
-    out : Path
-        The picture; its folder is made if needed.
-
-    Returns
-    -------
-    Path
-        `out`.
-
-    Raises
-    ------
-    InputError
-        The suffix is none of .png, .svg, .pdf, or the system refuses; what stood at `out` is then untouched.
+    Its folder is made if needed. InputError if the suffix is none of .png, .svg, .pdf, or the system refuses;
+    what stood there is then untouched.
     """
     out = Path(out)
     check_format(out)
@@ -400,13 +443,9 @@ def put_ticks(axis: Axis, places: NDArray[np.float64], labels: Sequence[str]) ->
 
 def line_style(k: int) -> dict[str, Any]:
     """Line and marker of the k-th method."""
-    return {
-        "color": COLOURS[k % len(COLOURS)],
-        "ls": LINES[k // len(COLOURS) % len(LINES)],
-        "marker": MARKERS[k % len(MARKERS)],
-        "lw": 1.3,
-        "ms": 4.5,
-    }
+    line = LINES[k // len(COLOURS) % len(LINES)]
+    style = {"color": COLOURS[k % len(COLOURS)], "ls": line, "marker": MARKERS[k % len(MARKERS)]}
+    return style | {"lw": 1.3, "ms": 4.5}
 
 
 def set_error_axis(axes: Axes, values: Sequence[float]) -> float:

@@ -17,7 +17,7 @@ import numpy as np
 import xarray as xr
 from matplotlib.figure import Figure
 
-from cvt_hpc.analysis.figures import WIDTH, check_known, styled
+from cvt_hpc.analysis import figures
 from cvt_hpc.analysis.profiles import ARC, regions
 from cvt_hpc.analysis.telling_apart import entitle_runs
 from cvt_hpc.errors import mismatch
@@ -32,7 +32,7 @@ HIGHEST = 1500.0  # [Hz]
 LABELS = {"radial_sliding": "radial", "tangential_sliding": "tangential", "sliding_speed": "resulting"}
 
 
-@styled
+@figures.styled
 def element_figure(
     history: xr.Dataset,
     region: str | None = None,
@@ -41,27 +41,14 @@ def element_figure(
 ) -> Figure:
     """Draw the sliding of an element on the sheaves over time.
 
-    Parameters
-    ----------
-    history : Dataset
-        As `follow_element` takes it.
-    region : str, optional
-        "driving" or "driven": one passage through that arc, with the means at the same places; else as far as
-        the profiles reach.
-    source : str, optional
-        Where the history is from, for the errors.
-    parts : sequence of str
-        What is drawn, of `LABELS`.
-
-    Raises
-    ------
-    InputError
-        There are no profiles over time, or too few for a whole passage.
+    Arguments as of all pictures of runs (`figures.py`), with what `follow_element` takes. `region` is
+    "driving" or "driven": one passage through that arc, with the means at the same places; else the element
+    is followed as far as the profiles reach. What is drawn are `parts` of `LABELS`.
     """
     followed = followed_of(history, region, source)
-    check_known(followed, parts, source)
+    figures.check_known(followed, parts, source)
     time = 1e3 * (followed["time"].values - (followed["time"].values[0] if region else 0.0))
-    figure = Figure((WIDTH, 3.6), layout="constrained")
+    figure = Figure((figures.WIDTH, 3.6), layout="constrained")
     axes = figure.subplots()
     for name in parts:
         style = {"color": COLOURS[name], "ls": LINES[name], "lw": 1.1, "label": LABELS[name]}
@@ -74,31 +61,26 @@ def element_figure(
         for name in ("driving", "driven"):
             for span in passages(followed, name):
                 axes.axvspan(time[span][0], time[span][-1], color=ARC, lw=0, zorder=0)
-                place = {"transform": axes.get_xaxis_transform(), "ha": "center", "fontsize": 9}
-                axes.text(time[span].mean(), 1.01, name, **place)
+                above = axes.get_xaxis_transform()
+                axes.text(time[span].mean(), 1.01, name, transform=above, ha="center", fontsize=9)
     axes.axhline(0.0, color="#333333", linewidth=0.7, zorder=1)
     axes.grid(linewidth=0.4, alpha=0.5)
     begin = f"time since the element entered the {region} arc [ms]" if region else "time [ms]"
     axes.set(xlabel=begin, ylabel="sliding on the sheaves [mm/s]", xlim=time[[0, -1]])
-    figure.legend(loc="outside lower center", frameon=False, ncols=4)
+    figures.legend_below(figure, figures.entries_of([axes]), 4)
     entitle_runs(figure, [history], "One element along its path")
     return figure
 
 
-@styled
+@figures.styled
 def swinging_figure(history: xr.Dataset, marks: Mapping[str, Sequence[float]]) -> Figure:
     """Draw the sliding speed of an element through the driven arc over time, and the spectrum of its swings.
 
-    Parameters
-    ----------
-    history : Dataset
-        As `follow_element` takes it.
-    marks : mapping
-        Frequencies [Hz] that are marked in the spectrum, by the strand whose peaks they are.
+    `marks` are frequencies [Hz] that are marked in the spectrum, by the strand whose peaks they are.
     """
     passed = one_passage(history, "driven")
     time = 1e3 * (passed["time"].values - passed["time"].values[0])
-    figure = Figure((WIDTH * 1.2, 3.6), layout="constrained")
+    figure = Figure((figures.WIDTH * 1.2, 3.6), layout="constrained")
     left, right = figure.subplots(1, 2)
     style = {"color": COLOURS["sliding_speed"], "lw": 1.1}
     left.plot(time, 1e3 * passed["sliding_speed"].values, label="of an element", **style)
@@ -168,45 +150,39 @@ def follow_element(history: xr.Dataset, start: float, source: str = "history") -
 
     Parameters
     ----------
-    history : Dataset
-        As `simulate` returns it, with profiles over `profile_time` (`[record] profile_duration`).
+    history, source
+        As of all pictures of runs (`figures.py`); InputError unless there are profiles over `profile_time`
+        (`[record] profile_duration`).
     start : float
         Path coordinate [m].
-    source : str, optional
-        Where the history is from, for the error.
 
     Returns
     -------
     Dataset
         Over `time`: `travelled` [m], `position` on the path [m], `region`, and every quantity that the
         history has over `profile_time`; nan where it has none.
-
-    Raises
-    ------
-    InputError
-        The history has no profiles over time.
     """
     if SPEED not in history or history.sizes["profile_time"] < 2:
         raise mismatch(source, "a history with profiles over time ([record] profile_duration)", "none")
     time = history["profile_time"].values
-    travelled = path_of(time, around(history), history[SPEED].values.astype(float), start)
-    length = around(history)[-1]
-    position = np.mod(travelled, length)
-    names = [str(name) for name in history.data_vars if str(name).startswith(PREFIX)]
-    variables = {
-        name.removeprefix(PREFIX): ("time", _met(history, name, position), history[name].attrs)
-        for name in names
+    places = around(history)
+    travelled = path_of(time, places, history[SPEED].values.astype(float), start)
+    position = np.mod(travelled, places[-1])
+    quantities = {
+        str(name).removeprefix(PREFIX): ("time", _met(places, array.values, position), array.attrs)
+        for name, array in history.data_vars.items()
+        if str(name).startswith(PREFIX)
     }
     spans = regions(history)
     starts = np.array([first for first, _, _ in spans])
     here = np.array([name for _, _, name in spans], object)[np.searchsorted(starts, position, "right") - 1]
     words = "position", "m", "path coordinate, from the inlet of the driving arc"
-    places = {
+    way = {
         "travelled": ("time", travelled, attributes("travelled", "m", "path coordinate, counted on")),
         "position": ("time", position, attributes(*words)),
         "region": ("time", here, attributes("region", comment="of the path")),
     }
-    return xr.Dataset(variables | places, {"time": ("time", time, attributes("time", "s"))}, history.attrs)
+    return xr.Dataset(quantities | way, {"time": ("time", time, attributes("time", "s"))}, history.attrs)
 
 
 def around(history: xr.Dataset) -> np.ndarray:
@@ -224,18 +200,10 @@ def lengths_of(history: xr.Dataset) -> np.ndarray:
 
 
 def path_of(time: np.ndarray, places: np.ndarray, speed: np.ndarray, start: float) -> np.ndarray:
-    """Path coordinate of an element at each time [m], counted on round by round.
+    """Path coordinate of an element at each time (T,) [s], counted on round by round from its start [m].
 
-    Parameters
-    ----------
-    time : (T,) array
-        [s]
-    places : (N + 1,) array
-        Path coordinates, the path's length the last one [m].
-    speed : (T, N) array
-        ds/dt at the places but for the last, which is the first one again [m/s].
-    start : float
-        At the first time [m].
+    `places` (N + 1,) are path coordinates, the path's length the last one [m]; `speed` (T, N) is ds/dt there
+    but for the last, which is the first one again [m/s].
     """
     closed = np.concatenate([speed, speed[:, :1]], axis=1)
     found = np.empty(time.size)
@@ -248,9 +216,8 @@ def path_of(time: np.ndarray, places: np.ndarray, speed: np.ndarray, start: floa
     return found
 
 
-def _met(history: xr.Dataset, name: str, position: np.ndarray) -> np.ndarray:
-    """A quantity at the place of an element at each time (time,), linear between stations."""
-    places, values = around(history), history[name].values
+def _met(places: np.ndarray, values: np.ndarray, position: np.ndarray) -> np.ndarray:
+    """A quantity (time, station) at the place of an element at each time (time,), linear between stations."""
     left = np.clip(np.searchsorted(places, position, "right") - 1, 0, values.shape[1] - 1)
     share = (position - places[left]) / (places[left + 1] - places[left])
     rows = np.arange(position.size)

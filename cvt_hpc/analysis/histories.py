@@ -38,24 +38,9 @@ def draw_history(dataset: xr.Dataset, out: Path) -> Path:
 def history_figure(dataset: xr.Dataset, source: str = "history") -> Figure:
     """Draw the history of one run; nothing is written, and what the dataset does not hold is left out.
 
-    Parameters
-    ----------
-    dataset : Dataset
-        As `simulate` returns it: `displacement` (time, probe) [m], `load` (time) [N m], `ring_tension` and
-        `push_force` (position) [N], `contact_force` and what feeds the fluctuations (position) [N/m, W/m],
-        `region` (position), and the run's verdict.
-    source : str
-        Where the history is from, for the errors.
-
-    Returns
-    -------
-    matplotlib.figure.Figure
-        Unknown to pyplot; `figure.savefig(path)` writes it.
-
-    Raises
-    ------
-    InputError
-        There is nothing to draw.
+    Arguments as of all pictures of runs (`figures.py`), with `displacement` (time, probe) [m], `load` (time)
+    [N m], `ring_tension` and `push_force` (position) [N], `contact_force` and what feeds the fluctuations
+    (position) [N/m, W/m], `region` (position), and the run's verdict.
     """
     dataset = standard(dataset, source)
     settings, band = settings_of(dataset)
@@ -66,23 +51,22 @@ def history_figure(dataset: xr.Dataset, source: str = "history") -> Figure:
         (1.6, [(LEFT, panels.draw_displacement, strand), (RIGHT, panels.draw_close_up, strand)])
         for strand in strands
     ]
-    courses = [name for name in panels.COURSES if _changes(dataset, name)]
+    units = {name: {JOB_UNITS: unit} for name, unit in _job_units(dataset.attrs).items()}
+    changing = [name for name in panels.COURSES if _changes(dataset, name)]
+    courses = [dataset[name].assign_attrs(units.get(name, {})) for name in changing]
     if courses:
         places = zip((LEFT, RIGHT), courses, strict=False)
-        units = {name: {JOB_UNITS: unit} for name, unit in _job_units(dataset.attrs).items()}
-        rows.append(
-            (1.2, [(place, panels.draw_course, dataset[name].assign_attrs(units.get(name, {})))
-                   for place, name in places])
-        )  # fmt: skip
+        rows.append((1.2, [(place, panels.draw_course, course) for place, course in places]))
     rows += [(1.6, [(WHOLE, panels.draw_group, group)]) for group in panels.groups(dataset)]
     if with_spectrum:
         rows.append((2.1, [(WHOLE, panels.draw_spectra, with_spectrum)]))
-    if _is_known(dataset, "ring_tension") or _is_known(dataset, "push_force"):
-        rows.append((2.0, [(WHOLE, panels.draw_forces, dataset)]))
-    if _is_known(dataset, "contact_force"):
-        rows.append((1.5, [(WHOLE, panels.draw_contact, dataset)]))
-    if _is_known(dataset, "flank_feed"):
-        rows.append((1.7, [(WHOLE, panels.draw_feed, dataset)]))
+    for height, names, draw_panel in (
+        (2.0, ("ring_tension", "push_force"), panels.draw_forces),
+        (1.5, ("contact_force",), panels.draw_contact),
+        (1.7, ("flank_feed",), panels.draw_feed),
+    ):
+        if any(_is_known(dataset, name) for name in names):
+            rows.append((height, [(WHOLE, draw_panel, dataset)]))
     if not rows:
         raise mismatch(source, "displacement, load or forces of a run", "none of them")
     title = _title(dataset)
@@ -107,17 +91,7 @@ def phase_figure(dataset: xr.Dataset, source: str = "history") -> Figure:
     The whole judged part is drawn thin, or the last half where none was judged, and its last SHOWN_PERIODS
     periods bold.
 
-    Parameters
-    ----------
-    dataset : Dataset
-        As of `history_figure`, with `displacement` (time, probe) [m].
-    source : str
-        Where the history is from, for the errors.
-
-    Raises
-    ------
-    InputError
-        No motion of strands was recorded, or too little of it.
+    Arguments as of all pictures of runs (`figures.py`), with `displacement` (time, probe) [m].
     """
     settings, band = settings_of(dataset)
     judged = settings["judged_fraction"] if _is_judged(dataset) else 0.5
@@ -181,10 +155,8 @@ def settings_of(dataset: xr.Dataset) -> tuple[dict[str, float], tuple[float, flo
     own = {key: dataset.attrs[key] for key in defaults if key in dataset.attrs}
     settings = defaults | json.loads(dataset.attrs.get("job", "{}")).get("vibration", {}) | own
     low, high = vibration_settings.band(settings)
-    return settings, (
-        float(dataset["lower_band_edge"]) if _is_known(dataset, "lower_band_edge") else low,
-        high,
-    )
+    low = float(dataset["lower_band_edge"]) if _is_known(dataset, "lower_band_edge") else low
+    return settings, (low, high)
 
 
 def _title(dataset: xr.Dataset) -> str:

@@ -10,7 +10,7 @@ import xarray as xr
 from matplotlib.axes import Axes
 from numpy.typing import NDArray
 
-from cvt_hpc.analysis.figures import axis_label, coordinate_unit, in_words
+from cvt_hpc.analysis.figures import axis_label, coordinate_unit, in_words, number
 from cvt_hpc.vibration.settings import SHORTEST_SEGMENT
 from cvt_hpc.vibration.signals import amplitude_spectrum, band_amplitude, dominant_frequency
 
@@ -40,33 +40,15 @@ _HEADROOM = 1.6  # for a legend of one line
 
 @dataclass(frozen=True)
 class Strand:
-    """Records of the probes on one strand.
+    """Records of the probes on one strand."""
 
-    Attributes
-    ----------
-    name : str
-        "t1" or "t2".
-    probes : tuple of str
-        Their labels.
-    time : array, shape (time,)
-        [s].
-    displacement : array, shape (time, probe)
-        [um], mean removed.
-    first_judged : int
-        Index of the first sample of the part that is judged; the number of samples where nothing is.
-    band : (float, float)
-        Where vibrations are looked for [Hz].
-    colour : str
-        Of the strand's lines.
-    """
-
-    name: str
-    probes: tuple[str, ...]
-    time: Array
-    displacement: Array
-    first_judged: int
-    band: tuple[float, float]
-    colour: str
+    name: str  # "t1" or "t2"
+    probes: tuple[str, ...]  # their labels
+    time: Array  # (time,) [s]
+    displacement: Array  # (time, probe) [um], mean removed
+    first_judged: int  # sample of the part that is judged; the number of samples where nothing is
+    band: tuple[float, float]  # where vibrations are looked for [Hz]
+    colour: str  # of the strand's lines
 
     @property
     def rate(self) -> float:
@@ -97,17 +79,12 @@ def read_strands(dataset: xr.Dataset, judged_fraction: float, band: tuple[float,
     Parameters
     ----------
     dataset : Dataset
-        With `displacement` (time, probe) [m]; a probe's label begins with its strand, as "t1 1/2". Probes on
-        arcs, "driving arc 1/2", are left out.
+        With `displacement` (time, probe) [m], if anything was recorded; a probe's label begins with its
+        strand, as "t1 1/2". Probes on arcs, "driving arc 1/2", are left out.
     judged_fraction : float
         Last part of the time that is judged; 0 of a run that was not judged.
     band : (float, float)
         Where vibrations are looked for [Hz].
-
-    Returns
-    -------
-    list of Strand
-        In the order of the probes; empty if nothing was recorded.
     """
     if "displacement" not in dataset:
         return []
@@ -143,9 +120,9 @@ def draw_displacement(axes: Axes, strand: Strand) -> None:
     lowest, highest = seated.min() - margin, seated.max() + margin
     axes.set(xlim=(time[0], time[-1]), ylim=(lowest, highest))
     if moved.min() < lowest or moved.max() > highest:
-        text = f"start cut off: {moved.min():.0f} to {moved.max():.0f} µm"
+        text = f"start cut off: {number(moved.min(), '.0f')} to {number(moved.max(), '.0f')} µm"
         place = {"xycoords": "axes fraction", "va": "top", "fontsize": 7, "bbox": _PAPER}
-        axes.annotate(text.replace("-", "−"), (0.01, 0.97), **place)
+        axes.annotate(text, (0.01, 0.97), **place)
     axes.set(xlabel="time [ms]", ylabel=f"{strand.name} [µm]")
     axes.set_title(title, loc="left", pad=3)
 
@@ -159,19 +136,9 @@ def draw_close_up(axes: Axes, strand: Strand) -> None:
         place = label.removeprefix(strand.name).strip() or label
         axes.plot(time, values, ls=LINES[i % len(LINES)], color=strand.colour, linewidth=1.2, label=place)
     axes.set(xlim=(time[0], time[-1]), xlabel="time [ms]")
-    axes.legend(
-        title="probes from the inlet",
-        alignment="left",
-        title_fontsize=7,
-        loc="lower left",
-        bbox_to_anchor=(-0.05, 0.97),
-        ncols=3,
-        frameon=False,
-        handlelength=2.2,
-        handletextpad=0.2,
-        columnspacing=0.4,
-        fontsize=7,
-    )
+    at: dict[str, Any] = {"loc": "lower left", "bbox_to_anchor": (-0.05, 0.97), "alignment": "left"}
+    narrow = {"handlelength": 2.2, "handletextpad": 0.2, "columnspacing": 0.4, "fontsize": 7}
+    axes.legend(title="probes from the inlet", title_fontsize=7, ncols=3, frameon=False, **at, **narrow)
 
 
 def draw_spectra(axes: Axes, strands: list[Strand]) -> None:

@@ -10,7 +10,6 @@ from matplotlib.collections import LineCollection, PolyCollection
 from matplotlib.figure import Figure
 from matplotlib.lines import Line2D
 from matplotlib.patches import Patch
-from matplotlib.patheffects import Normal, withStroke
 from numpy.typing import NDArray
 
 from cvt_hpc.analysis import arrangement as layout
@@ -28,23 +27,14 @@ BAND = OF_STARTS[StartClass.LARGE_START_ONLY]
 UP, DOWN = "up", "down"
 LINES = {UP: ("-", ">"), DOWN: ("--", "<")}
 LEAST, FRAME = 0.9, 1.8  # [inch]: a panel at least, and title, labels and legend
-OUTLINE = [withStroke(linewidth=4.0, foreground="white"), Normal()]
+OUTLINE = figures.outlined(4.0)
 
 
 def onset_line(along: layout.Ruler, across: layout.Ruler, classes: NDArray[np.int8]) -> NDArray[np.float64]:
-    """The lowest onset of each row, as a line from border to border of the rows.
+    """The lowest onset of each row, as a line from border to border of the rows: places (point, 2) on both.
 
-    Parameters
-    ----------
-    along, across : Ruler
-        Places of the columns, along which vibration sets in, and of the rows.
-    classes : array, shape (row, column)
-        `OccurrenceClass` or `StartClass` of the cells.
-
-    Returns
-    -------
-    array, shape (point, 2)
-        Places along and across; nan in rows without an onset.
+    Vibration sets in along the columns; classes (row, column) are `OccurrenceClass` or `StartClass` of the
+    cells. nan stands in rows without an onset.
     """
     borders = np.stack([across.edges[:-1], across.edges[1:]], 1)
     lowest = lowest_onsets(along.centres, classes)
@@ -60,11 +50,7 @@ def lowest_onsets(places: NDArray[np.float64], classes: NDArray[np.int8]) -> NDA
 def of_each_start(classes: NDArray[np.int8]) -> list[tuple[str, str, NDArray[np.int8]]]:
     """Name and style of the onset lines of a map, and the classes that each of them separates.
 
-    Parameters
-    ----------
-    classes : array
-        `OccurrenceClass` or `StartClass` of the cells: those that vibrate from a large start only have two
-        lines.
+    A map with cells that vibrate from a large start only has two lines.
     """
     only = classes == StartClass.LARGE_START_ONLY
     small = np.where(only, OccurrenceClass.QUIET, classes)
@@ -79,14 +65,7 @@ def draw_onsets(
 ) -> list[Line2D]:
     """Draw the onset line of a panel, and that of the large starts beside it; return handles of a legend.
 
-    Parameters
-    ----------
-    axes : Axes
-        Where to draw.
-    x, y, classes
-        As of `cells.draw_cells`.
-    along_y : bool
-        Whether vibration sets in along y.
+    Arguments as of `cells.draw_cells`, and whether vibration sets in along y.
     """
     handles = []
     for label, style, kinds in of_each_start(classes):
@@ -103,11 +82,10 @@ def vibration_ranges(dataset: xr.Dataset, source: str = "results") -> xr.DataArr
 
     Parameters
     ----------
-    dataset : Dataset
-        Results of ramps of load or speed, up and down along one axis of the study, such as `load_start`:
-        `onset_load`, `end_load` and `ramp_load` [N m], or the same of the speed [rad/s].
-    source : str
-        Where the results are from, for the errors.
+    dataset, source
+        As of all pictures of results (`figures.py`): results of ramps of load or speed, up and down along one
+        axis of the study, such as `load_start`, else InputError: `onset_load`, `end_load` and `ramp_load`
+        [N m], or the same of the speed [rad/s].
 
     Returns
     -------
@@ -115,20 +93,14 @@ def vibration_ranges(dataset: xr.Dataset, source: str = "results") -> xr.DataArr
         Over the other axes, `ramp` ("up", "down") and `limit` ("lower", "upper"), in the unit of what is
         ramped; nan where a run does not vibrate. A vibration from a ramp's start on, or to its end, reaches
         to the middle of the ramp's first or last part.
-
-    Raises
-    ------
-    InputError
-        The dataset holds no results of ramps in both directions.
     """
     check_results(dataset, source)
     expected = "results of ramps of load or speed, up and down along one axis such as load_start"
     known = (name for name in QUANTITIES if f"onset_{name}" in dataset and f"ramp_{name}" in dataset)
     name = next((name for name in known if np.isfinite(dataset[f"ramp_{name}"]).any()), None)
     if name is None:
-        raise mismatch(
-            source, expected, "no onset along a ramp", "`cvt-hpc examples speed_ramp` copies a job of ramps"
-        )
+        then = "`cvt-hpc examples speed_ramp` copies a job of ramps"
+        raise mismatch(source, expected, "no onset along a ramp", then)
     course = dataset[f"ramp_{name}"]
     rise = course.diff("ramp_share").mean("ramp_share")
     dims = [str(dim) for dim in dataset["status"].dims]
@@ -138,16 +110,12 @@ def vibration_ranges(dataset: xr.Dataset, source: str = "results") -> xr.DataArr
     vibrates = (dataset["status"] == Status.DONE) & (dataset["vibrates"] == Vibrates.YES)
     onset, end = dataset[f"onset_{name}"], dataset[f"end_{name}"]
     lowest, highest = course.min("ramp_share"), course.max("ramp_share")
-    limits = {
-        UP: (onset.fillna(lowest), end.fillna(highest)),
-        DOWN: (end.fillna(lowest), onset.fillna(highest)),
-    }
     found = []
-    for (lower, upper), sign in zip(limits.values(), (1, -1), strict=True):
-        here = vibrates & (sign * rise > 0.0)
-        found.append(
-            xr.concat([lower.where(here).min(turning[0]), upper.where(here).max(turning[0])], "limit")
+    for is_rising, first, last in ((rise > 0.0, onset, end), (rise < 0.0, end, onset)):
+        lower, upper = (
+            one.where(vibrates & is_rising) for one in (first.fillna(lowest), last.fillna(highest))
         )
+        found.append(xr.concat((lower.min(turning[0]), upper.max(turning[0])), "limit"))
     ranges = xr.concat(found, "ramp").assign_coords(ramp=[UP, DOWN], limit=["lower", "upper"])
     units = {"units": QUANTITIES[name].cf_units, "long_name": name}
     return ranges.rename("driving_speed" if name == "speed" else name).assign_attrs(units)
@@ -156,14 +124,7 @@ def vibration_ranges(dataset: xr.Dataset, source: str = "results") -> xr.DataArr
 def draw_bands(axes: Axes, y: layout.Ruler, ranges: NDArray[np.float64]) -> list[Any]:
     """Draw the limits of vibration along both ramps and hatch what lies between; return handles of a legend.
 
-    Parameters
-    ----------
-    axes : Axes
-        Where to draw.
-    y : Ruler
-        Places of the rows.
-    ranges : array, shape (ramp, limit, row)
-        Places along x, as `vibration_ranges` has them.
+    `ranges` (ramp, limit, row) are places along x, as `vibration_ranges` has them.
     """
     bands = []
     borders = np.stack([y.edges[:-1], y.edges[1:]], 1)
@@ -196,9 +157,8 @@ def hysteresis_figure(
 ) -> Figure:
     """Draw between which loads or speeds runs vibrate along ramps up and down, and where the two differ.
 
-    Arguments and errors as of `vibration_ranges`, and `at` as of all pictures of results (`figures.py`): the
-    first axis that is left, or that of `sides`, runs along y, the next one, or that of `sides`, over the
-    panels. A `measured` file is drawn over them (`measured.py`).
+    Arguments as of all pictures of results (`figures.py`), with what `vibration_ranges` takes: the first axis
+    that is left, or that of `sides`, runs along y, the next one, or that of `sides`, over the panels.
     """
     ranges = vibration_ranges(dataset, source)
     axes_left = ranges.isel(ramp=0, limit=0, drop=True)
@@ -220,12 +180,8 @@ def hysteresis_figure(
     y = layout.ruler(ranges[y_name]) if y_name else layout.ONE_ROW
     wanted = float(np.clip(0.35 * y.centres.size, 0.6, 2.2)) + 0.35
     then = f"fix an axis, as by `--at {panel}=VALUE`, or choose another one by `--panel AXIS`"
-    grid = figures.on_a_page(count, (1, 2), (LEAST, wanted), FRAME, source, then)
-    rows = -(-count // grid.columns)
-    figure = Figure((figures.WIDTH, rows * grid.height + FRAME), layout="constrained")
-    panels = figure.subplots(rows, grid.columns, sharex=True, squeeze=False)
-    for axes in panels.flat[count:]:
-        axes.set_axis_off()
+    page = count, (1, 2), (LEAST, wanted), FRAME, source, then
+    figure, panels, _ = figures.panels_on_a_page(*page, sharex=True)
     legend: dict[str, Any] = {}
     both = STYLES[OccurrenceClass.VIBRATING].fill
     for k, axes in enumerate(panels.flat[:count]):
@@ -246,21 +202,14 @@ def hysteresis_figure(
         y.lay_out(axes.yaxis)
         axes.grid(axis="x", lw=0.4, alpha=0.5)
         if panel:
-            axes.set_title(
-                f"{figures.in_words(ranges[panel])}: {layout.value_text(ranges[panel], k)}", loc="left", pad=3
-            )
+            axes.set_title(layout.place_text(ranges[panel], k, ": "), loc="left", pad=3)
     x, places = Side(str(ranges.name), np.array(panels[0, 0].get_xlim()), factor), ranges.coords.to_dataset()
     for k, axes in enumerate(panels.flat[:count]):
         over.draw(axes, x, side_of(places, y_name), places.isel({panel: k} if panel else {}))
-    legend |= {handle.get_label(): handle for handle in over.handles}
-    for axes in panels.flat[:count][-grid.columns :]:
-        axes.set_xlabel(figures.axis_label(ranges, unit))
-        axes.tick_params(labelbottom=True)
+    figures.label_x(panels, count, figures.axis_label(ranges, unit))
     if count > 1:
-        figure.supylabel(y.label, fontsize=figures.STYLE["axes.labelsize"])
-    figures.entitle(
-        figure, [figures.headline("Vibration along ramps up and down", dataset.attrs), *notes, over.note]
-    )
-    place = {"loc": "outside lower center", "frameon": False, "ncols": figures.legend_columns(list(legend))}
-    figure.legend(legend.values(), legend.keys(), **place)
+        figure.supylabel(y.label)
+    head = figures.headline("Vibration along ramps up and down", dataset.attrs)
+    figures.entitle(figure, [head, *notes, over.note])
+    figures.legend_below(figure, legend | over.entries)
     return figure

@@ -67,32 +67,24 @@ def map_figure(
 ) -> Figure:
     """Draw where vibration occurs.
 
-    Parameters
-    ----------
-    dataset, at, source
-        As of all pictures of results (`figures.py`): `status` and `vibrates` over the job's axes;
-        `amplitude` [m], `frequency` and `strongest_frequency` [Hz], per strand, where known;
-        `inferred_class` of a trace. The stronger strand is shown. Of a study of samples the axes lie along
-        `run`: each run is a mark, there is a panel for each pair of axes, and `at` has to be empty. Results
-        that hold `eigenfrequency` but no `amplitude` are drawn as lines over the axis that else runs along x.
-        Of a study with the axis `disturbance` the runs from the smallest and the largest value make one cell.
-        Of samples of uncertain parameters the probability of vibration is drawn.
-    sides : Sides
-        Which axis runs along x, along y and over the panels; of a grid.
-    vmax : float or "fit"
-        Amplitude at which linear colours end [m], or that of this map, of 98 % of the vibrating cells where
-        few lie far above; by default they are logarithmic, and those of all maps.
-    measured : str or Path
-        Measured file that is drawn over the map (`measured.py`); of a grid.
+    Arguments as of all pictures of results (`figures.py`): `status` and `vibrates` over the job's axes;
+    `amplitude` [m], `frequency` and `strongest_frequency` [Hz], per strand, where known; `inferred_class` of
+    a trace. The stronger strand is shown. Of a study of samples the axes lie along `run`: each run is a mark,
+    there is a panel for each pair of axes, and neither `at`, `sides` nor `measured` can be given. Results
+    that hold `eigenfrequency` but no `amplitude` are drawn as lines over the axis that else runs along x. Of
+    a study with the axis `disturbance` the runs from the smallest and the largest value make one cell. Of
+    samples of uncertain parameters the probability of vibration is drawn.
+
+    `vmax` is the amplitude at which linear colours end [m], or "fit", that of this map, of 98 % of the
+    vibrating cells where few lie far above; by default they are logarithmic, and those of all maps.
     """
     dataset = standard(dataset, source)
     check_results(dataset, source)
     over = Overlay(measured, dataset, source)
     if is_sampled(dataset):
         if sides != layout.CHOSEN:
-            raise mismatch(
-                f"{source}: x, y, panel", "results over a grid", "samples, in a panel for each pair"
-            )
+            found = "samples, in a panel for each pair"
+            raise mismatch(f"{source}: x, y, panel", "results over a grid", found)
         return scatter_figure(dataset, at or {}, source, vmax)
     if has_samples(dataset, at or {}) or PROBABILITY in dataset:
         return probability_figure(dataset, at, source, sides, measured)
@@ -167,10 +159,8 @@ class Sheet:
         """Width and height of the smallest cell [point]."""
         width = (figures.WIDTH - 1.9) / self.columns  # ticks, labels and the colour bar take the rest
         height = self.panel_height - TITLE_HEIGHT
-        return (
-            72 * width * np.diff(self.x.edges).min() / np.ptp(self.x.edges),
-            72 * height * np.diff(self.y.edges).min() / np.ptp(self.y.edges),
-        )
+        x, y = (np.diff(side.edges).min() / np.ptp(side.edges) for side in (self.x, self.y))
+        return 72 * width * x, 72 * height * y
 
     @property
     def has_room(self) -> bool:
@@ -210,7 +200,7 @@ def _grid_figure(arrangement: layout.Arrangement, vmax: cells.End, source: str, 
     if sheet.leads.any() and min(sheet.smallest_cell) >= SMALLEST_APART:
         further.append(Line2D([], [], **cells.LEADING.marks(4.0), label="harmonics lead"))
     figures.entitle(figure, [*_title(sheet), over.note])
-    figure.supylabel(sheet.y.label, fontsize=10)
+    figure.supylabel(sheet.y.label)
     styles, columns = cells.STYLES, cells.LEGEND_COLUMNS - bool(over.handles)  # whose names are longer
     if "starts" in arrangement.dataset.attrs:
         styles, columns = cells.STYLES | cells.OF_STARTS, 3  # as wide as the page with the longest label
@@ -301,11 +291,8 @@ def _laid_out(sheet: Sheet, source: str, frame: float) -> Sheet:
     then = f"fix an axis, as by `--at {name}=VALUE`, or choose another one by `--panel AXIS`"
     counts = range(1, min(MOST_COLUMNS, sheet.panels) + 1)
     sizes = LEAST, sheet.wanted_height
-    grid = (
-        figures.fitting(sheet.panels, counts, sizes, 0.5 * (figures.LONG - frame))
-        if sheet.has_frequency
-        else None
-    )
+    half = 0.5 * (figures.LONG - frame)
+    grid = figures.fitting(sheet.panels, counts, sizes, half) if sheet.has_frequency else None
     if grid is None:
         sheet = replace(sheet, frequency=np.full_like(sheet.frequency, np.nan))
         grid = figures.on_a_page(sheet.panels, counts, sizes, frame, source, then)
@@ -359,11 +346,8 @@ def _title(sheet: Sheet) -> list[str]:
     """Title: quantity, job, number of runs of each class, and what is fixed."""
     runs, inferred = sheet.classes[~sheet.inferred], sheet.classes[sheet.inferred]
     attributes = sheet.arrangement.dataset.attrs
-    lines = [
-        figures.headline("Vibration occurrence", attributes),
-        f"{runs.size} {'cells' if 'starts' in attributes else 'runs'}: ",
-    ]
-    lines[1] += count_classes(runs)
+    counted = f"{runs.size} {'cells' if 'starts' in attributes else 'runs'}: {count_classes(runs)}"
+    lines = [figures.headline("Vibration occurrence", attributes), counted]
     if "starts" in attributes:
         lines.append(f"each from a small and a large start: disturbance {attributes['starts']}")
     if inferred.size:
@@ -385,18 +369,10 @@ def has_starts(dataset: xr.Dataset, at: Mapping[str, Any]) -> bool:
 
 
 def join_starts(dataset: xr.Dataset) -> xr.Dataset:
-    """Results over the other axes: the runs from the smallest disturbance, and the classes of both.
+    """Results over the axes beside `disturbance` [m]: the runs from the smallest, and the classes of both.
 
-    Parameters
-    ----------
-    dataset : Dataset
-        Results of a study with the axis `disturbance` [m].
-
-    Returns
-    -------
-    Dataset
-        With `occurrence_class`, values of `StartClass`, `inferred_class` where the study is a trace, and
-        both disturbances in words in the attribute `starts`.
+    They have `occurrence_class`, values of `StartClass`, `inferred_class` where the study is a trace, and
+    both disturbances in words in the attribute `starts`.
     """
     ordered = dataset.sortby(AXIS)
     small, large = (ordered.isel({AXIS: place}, drop=True) for place in (0, -1))

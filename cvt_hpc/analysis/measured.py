@@ -29,13 +29,12 @@ from matplotlib.axes import Axes
 from matplotlib.figure import Figure
 from matplotlib.lines import Line2D
 from matplotlib.patches import Rectangle
-from matplotlib.patheffects import Normal, withStroke
 from numpy.typing import NDArray
 
 from cvt_hpc.analysis import arrangement as layout
 from cvt_hpc.analysis.alignment import job_held
 from cvt_hpc.analysis.classes import ALONG
-from cvt_hpc.analysis.figures import coordinate_unit, legend_columns
+from cvt_hpc.analysis.figures import coordinate_unit, legend_below, outlined
 from cvt_hpc.analysis.scatter import is_sampled
 from cvt_hpc.errors import JobWarning, did_you_mean, few_of, mismatch, nearest, show
 from cvt_hpc.job import Job
@@ -62,7 +61,7 @@ INK = "#0033dd"  # of nothing that is computed; in grey, dark within a white out
 DASHES, DOTS = (0, (6, 1.5, 1.5, 1.5)), (0, (1, 1.5))
 LONGEST_NAME = 60  # letters of the file's name in a title
 LEGEND = 0.4  # [inch]: height of a legend of its own
-_ABOVE = {"zorder": 2.6, "path_effects": [withStroke(linewidth=4.2, foreground="white"), Normal()]}
+_ABOVE = {"zorder": 2.6, "path_effects": outlined(4.2)}
 _LOOK: dict[str, Any] = {"color": INK, "lw": 2.0, "ms": 7.0}
 _MARKS = {"x": {True: ">", False: "<"}, "y": {True: "^", False: "v"}}  # of an onset, as the axis goes
 
@@ -72,23 +71,13 @@ Fault = tuple[Sequence[str], str, NDArray[np.bool_]]  # columns, what is expecte
 
 
 class Side(NamedTuple):
-    """A side of a panel, on which values have their places.
+    """A side of a panel, on which values have their places."""
 
-    Attributes
-    ----------
-    name : str
-        The axis or quantity along it.
-    edges, factor : (cell + 1,) array, float
-        Borders of its cells, or its ends, in the units that are drawn; from SI to these.
-    values, sign : (cell,) array, float
-        Values of the cells [SI], if it has any; sign of those of a logarithmic side, 0 of a linear one.
-    """
-
-    name: str
-    edges: Array
-    factor: float = 1.0
-    values: Array = np.empty(0)
-    sign: float = 0.0
+    name: str  # the axis or quantity along it
+    edges: Array  # (cell + 1,) borders of its cells, or its ends, in the units that are drawn
+    factor: float = 1.0  # from SI to these
+    values: Array = np.empty(0)  # (cell,) of the cells [SI], if it has any
+    sign: float = 0.0  # of values of a logarithmic side, 0 of a linear one
 
     def place(self, value: float) -> float:
         """Return the place of a value [SI]."""
@@ -110,29 +99,18 @@ class Side(NamedTuple):
 class Row(NamedTuple):
     """A row of a measured file, in SI units.
 
-    Attributes
-    ----------
-    at : dict
-        By axis of the study the value of the cell in which the measured one lies.
-    span, swept : (float, float)
-        Between which values of the axis `along` noise was measured, the same twice of onset and peak, nan
-        where the row states silence alone; and the measured range, infinite where it is not stated.
-    cell : float
-        Value of the cell of an onset or a peak; nan of a window, or of a run.
-    frequency, amplitude : (float, float) or None, float
-        Between which frequencies, and how large; None and nan where that was not measured.
-    rising, deviation : bool, float
-        Whether the axis rose as noise set in; standard deviation of the ends of the span.
+    The span is between which values of the axis `along` noise was measured: the same twice of onset and peak,
+    nan where the row states silence alone.
     """
 
-    at: dict[str, float]
+    at: dict[str, float]  # by axis of the study the value of the cell in which the measured one lies
     span: Span
-    cell: float
-    frequency: Span | None
-    amplitude: float
-    swept: Span
-    rising: bool
-    deviation: float
+    cell: float  # value of the cell of an onset or a peak; nan of a window, or of a run
+    frequency: Span | None  # None where it was not measured
+    amplitude: float  # nan likewise
+    swept: Span  # the measured range, infinite where it is not stated
+    rising: bool  # whether the axis rose as noise set in
+    deviation: float  # standard, of the ends of the span
 
     def covers(self, values: Array) -> NDArray[np.bool_]:
         """Whether the row tells of noise at values of its axis [SI], of the shape of these."""
@@ -203,19 +181,15 @@ def read_measured(
 
     The job is that in the attributes of the dataset, unless it is at hand. Rows at values that these do not
     have are left out. Of this, and of a window that holds no value of its axis that was run, a warning tells.
-
-    Raises
-    ------
-    InputError
-        As of `read_csv`; the columns are those of no kind; all rows are left out; or results are samples.
+    InputError as of `read_csv`; if the columns are those of no kind; all rows are left out; or results are
+    samples.
     """
     if is_sampled(dataset):
         raise mismatch(source, "results over a grid, beside which measurements are drawn", "samples")
     dims = map(str, dataset["status"].dims if "status" in dataset else ())
     axes = [name for name in dims if name in dataset.coords and dataset[name].dtype.kind in "iuf"]
-    constants = {
-        key: value for key, value in _constants(dataset, job or job_held(dataset)).items() if key not in axes
-    }
+    constants = _constants(dataset, job or job_held(dataset))
+    constants = {key: value for key, value in constants.items() if key not in axes}
     units = {name: si_unit(dataset[name].attrs) for name in axes}
     units |= {key: unit for key, (_, unit) in constants.items()}
     kind, along, columns = _declaration(Path(path), units, axes)
@@ -351,17 +325,12 @@ def _row(
 
 
 class Overlay:
-    """What was measured, drawn over panels one by one, and its entries of the legend.
-
-    Parameters
-    ----------
-    path : str, Path, Measured or None
-        The measured file, or what was read of it; without one nothing is drawn.
-    dataset, source
-        As of `read_measured`.
+    """What was measured, drawn over panels one by one: a file, or what `read_measured` has read; or nothing.
 
     Attributes
     ----------
+    entries : dict
+        Handles of what was drawn, by their labels in a legend.
     height, note : float, str
         Height that a legend of its own takes [inch]; line of the title, which names the file.
     """
@@ -373,14 +342,14 @@ class Overlay:
             self._measured = path or Measured("", "", "", ())
         else:
             self._measured = read_measured(path, dataset, source)
-        self._entries: dict[str, Any] = {}
+        self.entries: dict[str, Any] = {}
         self.height = 0.0 if path is None else LEGEND
         self.note = "" if path is None else f"measured: {shortened(self._measured.name, LONGEST_NAME)}"
 
     @property
     def handles(self) -> list[Any]:
-        """Entries of the legend, of what was drawn."""
-        return list(self._entries.values())
+        """Handles of the entries."""
+        return list(self.entries.values())
 
     def draw(self, axes: Axes, x: Side, y: Side, shown: xr.Dataset) -> None:
         """Draw what was measured over a panel whose limits are set.
@@ -434,19 +403,16 @@ class Overlay:
         """Draw a line with a mark in its middle, or the mark alone, without a change of the limits."""
         how = {"markevery": [x.size // 2], "clip_on": x.size > 1, **_ABOVE}
         axes.add_artist(Line2D(x, y, **_LOOK, **look, **how))
-        self._entries.setdefault(label, Line2D([], [], **_LOOK, **look, label=label))
+        self.entries.setdefault(label, Line2D([], [], **_LOOK, **look, label=label))
 
     def _outline(self, axes: Axes, box: list[Array], label: str, style: Any) -> None:
         if box:
             (left, right), (low, high) = box
             look = {"fill": False, "ec": INK, "lw": 2.0, "ls": style}
             axes.add_artist(Rectangle((left, low), right - left, high - low, **look, **_ABOVE))
-            self._entries.setdefault(label, Rectangle((0.0, 0.0), 1.0, 1.0, **look, label=label))
+            self.entries.setdefault(label, Rectangle((0.0, 0.0), 1.0, 1.0, **look, label=label))
 
 
 def put_legend(figure: Figure, *overlays: Overlay) -> None:
     """Put a legend of what was measured below a picture that has none of its own."""
-    entries = {handle.get_label(): handle for over in overlays for handle in over.handles}
-    if entries:
-        place = {"ncols": legend_columns(list(entries)), "loc": "outside lower center", "frameon": False}
-        figure.legend(handles=list(entries.values()), **place)
+    legend_below(figure, {label: handle for over in overlays for label, handle in over.entries.items()})

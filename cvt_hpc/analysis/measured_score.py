@@ -21,7 +21,7 @@ import xarray as xr
 from numpy.typing import NDArray
 
 from cvt_hpc.analysis.arrangement import value_text
-from cvt_hpc.analysis.classes import at_strongest_strand, check_results, map_classes
+from cvt_hpc.analysis.classes import at_strongest_strand, axes_in_words, check_results, map_classes
 from cvt_hpc.analysis.figures import coordinate_unit
 from cvt_hpc.analysis.measured import ONSET, PEAK, WINDOW, Measured, Row, Span, read_measured, within
 from cvt_hpc.errors import mismatch
@@ -39,27 +39,17 @@ Cells = NDArray[np.bool_]
 
 
 class Line(NamedTuple):
-    """Agreement along one line of a study, or along all.
-
-    Attributes
-    ----------
-    hits, misses, false_alarms, silences, neither : int
-        Cells of the measured range, `neither` those not known to vibrate or to be quiet; or onsets.
-    frequency, amplitude : tuple of float
-        Of hits: distances from measured frequencies, or their band [Hz], and ratios to measured amplitudes.
-    onset, standard : tuple of float
-        Distances of paired onsets and their standard errors, in the unit in which the axis is shown.
-    """
+    """Agreement along one line of a study, or along all: cells of the measured range, or onsets."""
 
     hits: int = 0
     misses: int = 0
     false_alarms: int = 0
     silences: int = 0
-    neither: int = 0
-    frequency: tuple[float, ...] = ()
-    onset: tuple[float, ...] = ()
-    standard: tuple[float, ...] = ()
-    amplitude: tuple[float, ...] = ()
+    neither: int = 0  # cells that are not known to vibrate or to be quiet
+    frequency: tuple[float, ...] = ()  # distances of hits from measured frequencies, or their band [Hz]
+    onset: tuple[float, ...] = ()  # distances of paired onsets, in the unit in which the axis is shown
+    standard: tuple[float, ...] = ()  # their standard errors
+    amplitude: tuple[float, ...] = ()  # ratios of hits to measured amplitudes
 
 
 def joined(lines: Sequence[Line]) -> Line:
@@ -68,20 +58,12 @@ def joined(lines: Sequence[Line]) -> Line:
 
 
 class Score(NamedTuple):
-    """Agreement of a study with a measured file.
-
-    Attributes
-    ----------
-    measured, unit : Measured, str
-        The file, and the unit in which its axis is shown.
-    names, lines : list of str, list of (list of str, Line)
-        The other axes; their values in words, and the agreement, of each line where anything was measured.
-    """
+    """Agreement of a study with a measured file."""
 
     measured: Measured
-    unit: str
-    names: list[str]
-    lines: list[tuple[list[str], Line]]
+    unit: str  # in which the axis of the file is shown
+    names: list[str]  # of the other axes
+    lines: list[tuple[list[str], Line]]  # their values in words, and the agreement, of each that was measured
 
     @property
     def total(self) -> Line:
@@ -97,17 +79,14 @@ class Score(NamedTuple):
 def score(dataset: xr.Dataset, path: str | Path, source: str = "results") -> Score:
     """Compare a study over a grid with a measured file; a row counts along each line that it admits.
 
-    Raises
-    ------
-    InputError
-        As of `read_measured`; or the axis of the file is no axis of the study.
+    InputError as of `read_measured`; or if the axis of the file is no axis of the study.
     """
     check_results(dataset, source)
     measured = read_measured(path, dataset, source)
     along = measured.along
     if along not in dataset["status"].dims:
-        found = ", ".join(map(str, dataset["status"].dims)) or "a single run"
-        raise mismatch(source, f"results over the axis {along}, as in {measured.name}", found)
+        expected = f"results over the axis {along}, as in {measured.name}"
+        raise mismatch(source, expected, axes_in_words(dataset))
     dataset = dataset[[name for name in _READ if name in dataset]].sortby(along).transpose(..., along)
     strongest = (at_strongest_strand(dataset, name) for name in ("frequency", "amplitude"))
     arrays = map_classes(dataset), *strongest

@@ -15,13 +15,13 @@ from matplotlib.colors import Normalize, TwoSlopeNorm
 from matplotlib.figure import Figure
 from matplotlib.patches import Circle
 
+from cvt_hpc.analysis import figures
 from cvt_hpc.analysis.cells import colours_of
-from cvt_hpc.analysis.figures import WIDTH, axis_label, check_known, in_words, number, on_a_page, styled
 from cvt_hpc.analysis.followed_drawing import lengths_of
 from cvt_hpc.analysis.history_panels import FEEDS
-from cvt_hpc.analysis.profiles import regions, shown_unit
+from cvt_hpc.analysis.profiles import check_along_belt, regions, shown_unit
 from cvt_hpc.analysis.telling_apart import entitle_runs
-from cvt_hpc.errors import mismatch, unknown
+from cvt_hpc.errors import mismatch
 from cvt_hpc.models.belt_drive.layout import layout
 from cvt_hpc.physics.belt_path import BeltPath, belt_path, points_at
 from cvt_hpc.variator import PULLEYS, STRANDS
@@ -43,19 +43,11 @@ WATTS = 0.02  # of the largest bar: what is smaller has no number
 
 
 class Drive(NamedTuple):
-    """The pulleys of a run and its belt, as they are drawn.
+    """The pulleys of a run and its belt, as they are drawn."""
 
-    Attributes
-    ----------
-    path : BeltPath
-        Of the belt; tensioners stand as at rest.
-    pulleys, strands : tuple of str
-        Names; a strand is behind its pulley.
-    """
-
-    path: BeltPath
-    pulleys: tuple[str, ...]
-    strands: tuple[str, ...]
+    path: BeltPath  # tensioners stand as at rest
+    pulleys: tuple[str, ...]  # names
+    strands: tuple[str, ...]  # likewise; a strand is behind its pulley
 
     @property
     def size(self) -> float:
@@ -103,43 +95,23 @@ def _named_at(drive: Drive) -> list[float]:
     return [float(path.ends[2 * k] + share * path.spans[k]) for k, share in enumerate(shares)]
 
 
-@styled
+@figures.styled
 def variator_figure(history: xr.Dataset, quantities: Sequence[str] = (), source: str = "history") -> Figure:
     """Draw quantities along the belt on the variator: the belt by colour, and bars outwards from it.
 
-    Parameters
-    ----------
-    history : Dataset
-        Of a run of a variator or of a belt drive, as `simulate` returns it.
-    quantities : sequence of str
-        Variables over `position` [m], such as forces, sliding and power; each has a panel. Negative values
-        point inwards. By default the push force, or the tension of a belt without one.
-    source : str
-        Where the history is from, for the errors.
-
-    Raises
-    ------
-    InputError
-        The history is none of a variator or belt drive, or has no such quantity along the belt.
+    Arguments as of all pictures of runs (`figures.py`); the run is that of a variator or of a belt drive.
+    `quantities` are variables over `position` [m], such as forces, sliding and power; each has a panel.
+    Negative values point inwards. By default the push force, or the tension of a belt without one.
     """
     found = run_geometry(history)
     if found is None or "position" not in history.coords:
         raise mismatch(source, "the history of a run of a variator or belt drive, over position", "another")
-    known = [str(key) for key, array in history.data_vars.items() if array.dims == ("position",)]
-    quantities = quantities or [next((name for name in DEFAULT if name in known), DEFAULT[0])]
-    for name in quantities:
-        if name not in known:
-            raise unknown(f"{source}: {name}", "quantity along the belt", name, known)
-        check_known(history, [name], source)
-    then = "name fewer quantities"
-    grid = on_a_page(len(quantities), (1, 2), (LEAST, HEIGHT), FRAME, source, then)
-    rows = -(-len(quantities) // grid.columns)
-    figure = Figure((WIDTH, grid.height * rows + FRAME), layout="constrained")
-    panels = figure.subplots(rows, grid.columns, squeeze=False)
+    quantities = quantities or [next((name for name in DEFAULT if name in history), DEFAULT[0])]
+    check_along_belt(history, quantities, source)
+    page = len(quantities), (1, 2), (LEAST, HEIGHT), FRAME, source, "name fewer quantities"
+    figure, panels, _ = figures.panels_on_a_page(*page)
     for axes, name in zip(panels.flat, quantities, strict=False):
         _draw_belt(figure, axes, history[name], found)
-    for axes in panels.flat[len(quantities) :]:
-        axes.set_axis_off()
     entitle_runs(figure, [history], "On the pulleys", width=72)
     return figure
 
@@ -172,22 +144,14 @@ def _draw_belt(figure: Figure, axes: Axes, array: xr.DataArray, drive: Drive) ->
     margin = 1.15e3 * LARGEST * drive.size
     for column, set_limits in enumerate((axes.set_xlim, axes.set_ylim)):
         set_limits(points[:, column].min() - margin, points[:, column].max() + margin)
-    figure.colorbar(drawn, ax=axes, label=axis_label(array, unit), pad=0.02)
+    figure.colorbar(drawn, ax=axes, label=figures.axis_label(array, unit), pad=0.02)
 
 
 def region_powers(history: xr.Dataset) -> xr.DataArray:
-    """Return the power fed into the fluctuations by cause and region of the belt.
+    """Return the power fed into the fluctuations over `cause` and `region` of the belt [W]; negative: taken.
 
-    Parameters
-    ----------
-    history : Dataset
-        With some of `flank_feed`, `stress_feed`, `damping_feed` [W/m] over `position`, with `region`.
-
-    Returns
-    -------
-    DataArray
-        Over `cause` and `region` [W], sums over the stations; negative: taken. Causes without a finite value
-        are left out.
+    It is the sum over the stations of `flank_feed`, `stress_feed` and `damping_feed` [W/m], of which those
+    without a finite value are left out.
     """
     lengths, region = lengths_of(history), history["region"].values.astype(str)
     names = [name for _, _, name in regions(history)]
@@ -197,22 +161,12 @@ def region_powers(history: xr.Dataset) -> xr.DataArray:
     return xr.DataArray(shape, {"cause": causes, "region": names}, ("cause", "region"), attrs={"units": "W"})
 
 
-@styled
+@figures.styled
 def energy_figure(history: xr.Dataset, source: str = "history") -> Figure:
     """Draw what the pulleys put in and take out, what is lost, and what feeds the vibration [W].
 
-    Parameters
-    ----------
-    history : Dataset
-        As `simulate` returns it, with what `balance_of` takes, `part_flank_loss` [W] over `pulley` and
-        `arc_part`, or what `region_powers` takes.
-    source : str
-        Where the history is from, for the errors.
-
-    Raises
-    ------
-    InputError
-        The history has none of them.
+    Arguments as of all pictures of runs (`figures.py`), with what `balance_of` takes, `part_flank_loss` [W]
+    over `pulley` and `arc_part`, or what `region_powers` takes.
     """
     powers = region_powers(history) if {"position", "region"} <= {*map(str, history.coords)} else None
     has_feeds = powers is not None and powers.sizes["cause"] > 0
@@ -221,11 +175,9 @@ def energy_figure(history: xr.Dataset, source: str = "history") -> Figure:
     heights = [BALANCE, 0.7 + 0.18 * balance.bars] if balance else []
     heights += [2.1] * (has_feeds + has_loss)
     if not heights:
-        expected = (
-            "a history with driving_power, flank_feed or part_flank_loss, known at constant load and speed"
-        )
-        raise mismatch(source, expected, "none that is known")
-    figure = Figure((WIDTH, sum(heights) + 0.9), layout="constrained")
+        needed = "driving_power, flank_feed or part_flank_loss, known at constant load and speed"
+        raise mismatch(source, f"a history with {needed}", "none that is known")
+    figure = Figure((figures.WIDTH, sum(heights) + 0.9), layout="constrained")
     panels = list(figure.subplots(len(heights), 1, squeeze=False, height_ratios=heights)[:, 0])
     if balance is not None:
         draw_balance(panels.pop(0), panels.pop(0), balance)
@@ -251,12 +203,8 @@ def whole_powers(history: xr.Dataset) -> dict[str, float]:
     With what `region_powers` sums up it is 0. "left open" is what the numerics, and a vibration that still
     grows or decays, leave over. Empty where a term is not known.
     """
-    taken = {
-        "layer_taken": "layer\ndampers",
-        "lag_taken": "sheave\nlag",
-        "carried_power": "mean\nmotion",
-        "fluctuation_remainder": "left\nopen",
-    }
+    taken = {"layer_taken": "layer\ndampers", "lag_taken": "sheave\nlag"}
+    taken |= {"carried_power": "mean\nmotion", "fluctuation_remainder": "left\nopen"}
     found = {words: -float(history.get(name, np.nan)) for name, words in taken.items()}
     return found if np.isfinite(list(found.values())).all() else {}
 
@@ -277,7 +225,7 @@ def _draw_feeds(axes: Axes, powers: xr.DataArray, whole: dict[str, float]) -> No
         least = WATTS * largest if at[0] < regions - 0.5 else 0.0
         style = {"color": colour, "edgecolor": "#ffffff", "hatch": HATCHES[k % len(HATCHES)], "lw": 0.6}
         bars = axes.bar(at, values, 0.9 * width, label=label, **style)
-        texts = [f"{p:+.2g}".replace("-", "−") if abs(p) > least else "" for p in values]
+        texts = [figures.number(p, "+.2g") if abs(p) > least else "" for p in values]
         axes.bar_label(bars, texts, fontsize=8, padding=1)
     axes.axhline(0.0, color=INK, lw=0.8)
     told = "0 W with what is left open" if whole else "not all terms known"
@@ -291,20 +239,13 @@ def _draw_feeds(axes: Axes, powers: xr.DataArray, whole: dict[str, float]) -> No
 class Balance(NamedTuple):
     """Mean powers of a run [W], of which `put_in` less all others is nothing.
 
-    Attributes
-    ----------
-    put_in, taken_out : float
-        By the driving pulley, and by the load of the driven ones; negative where power flows backwards.
-    losses : dict
-        By their names in words.
-    rest : dict
-        What is neither: work on moving sheaves, stored energy, damping of the time step, and "left open",
-        what the balance of the record does not close.
+    The rest is neither lost nor taken out: work on moving sheaves, stored energy, damping of the time step,
+    and "left open", what the balance of the record does not close.
     """
 
-    put_in: float
-    taken_out: float
-    losses: dict[str, float]
+    put_in: float  # by the driving pulley, negative where power flows backwards
+    taken_out: float  # by the load of the driven ones, likewise
+    losses: dict[str, float]  # by their names in words
     rest: dict[str, float]
 
     @property
@@ -316,11 +257,8 @@ class Balance(NamedTuple):
 def balance_of(history: xr.Dataset) -> Balance | None:
     """Return the balance of a run by its record; None where it has none that is known.
 
-    Parameters
-    ----------
-    history : Dataset
-        With `driving_power`, `load_power` and `loss` [W], losses by cause named `..._loss` [W], and
-        `thrust_power`, `storing_power`, `numerical_damping` [W] where the model has them.
+    The record has `driving_power`, `load_power` and `loss` [W], losses by cause named `..._loss` [W], and
+    `thrust_power`, `storing_power`, `numerical_damping` [W] where the model has them.
     """
     known = [_power(history, name) for name in ("driving_power", "load_power", "loss")]
     if None in known:
@@ -335,7 +273,7 @@ def balance_of(history: xr.Dataset) -> Balance | None:
     for name in causes:
         for place in np.atleast_1d(history.get("pulley", "")) if history[name].dims else [""]:
             part = history[name].sel(pulley=place) if place else history[name]
-            losses[f"{in_words(history[name])}, {place}".removesuffix(", ")] = float(part)
+            losses[f"{figures.in_words(history[name])}, {place}".removesuffix(", ")] = float(part)
     others = loss - sum(losses.values())
     if abs(others) > 1e-9 * abs(loss):
         losses["other losses"] = others
@@ -369,7 +307,7 @@ def draw_balance(whole: Axes, parts: Axes, balance: Balance) -> None:
 
 def _draw_bars(axes: Axes, powers: dict[str, float], colours: Sequence[str], unit: str) -> None:
     """A bar for each power, below each other; its number stands with its name, where no bar reaches."""
-    names = [f"{name}  {number(power, '.4g')}" for name, power in powers.items()]
+    names = [f"{name}  {figures.number(power, '.4g')}" for name, power in powers.items()]
     axes.barh(names, list(powers.values()), 0.7, color=colours, edgecolor=INK, lw=0.6)
     axes.axvline(0.0, color=INK, lw=0.8)
     axes.invert_yaxis()

@@ -43,12 +43,8 @@ UNKNOWN = {
 def read_orders(given: Iterable[float | str], bandwidth: float) -> dict[str, Order]:
     """Read orders such as 8 or "8", of the driving pulley, "driven:2" and "elements:1"; none: the default.
 
-    They are returned by their names for a legend.
-
-    Raises
-    ------
-    InputError
-        A text is none of these, the bandwidth is not above zero, or an order is below it.
+    They are returned by their names for a legend. InputError if a text is none of these, the bandwidth is not
+    above zero, or an order is below it.
     """
     if not 0.0 < bandwidth < math.inf:
         raise mismatch("bandwidth", "a bandwidth in orders, above 0", f"{bandwidth:g}")
@@ -123,8 +119,8 @@ def orders_figure(
 
     Parameters
     ----------
-    histories, sources : sequences of Dataset and str
-        As `simulate` returns them; for errors, and for titles where their axes do not tell them apart.
+    histories, sources
+        As of all pictures of runs (`figures.py`); windows have SHORTEST_SEGMENT samples or more.
     of : str
         Signal, as of `read_signal`.
     orders : sequence of float or str, optional
@@ -134,12 +130,6 @@ def orders_figure(
     velocity, level : bool
         Of a displacement its velocity, 2 pi f times the amplitude at the frequency f of the order; levels of
         the rms [dB] in the place of amplitudes.
-
-    Raises
-    ------
-    InputError
-        As of `read_signal` and `read_orders`; a run does not tell an order that is wanted, or is too short;
-        or windows have less than SHORTEST_SEGMENT samples.
     """
     names, wanted = named(histories, sources), read_orders(orders, bandwidth)
     figure, panels = time_signals.in_a_column(len(histories), names[0], THEN)

@@ -8,6 +8,7 @@
 
 import json
 from collections.abc import Mapping, Sequence
+from itertools import cycle
 from typing import Any, NamedTuple
 
 import numpy as np
@@ -50,27 +51,13 @@ TAKEN = ("belt", "ring", "layer", "lag")
 
 
 class Powers(NamedTuple):
-    """Powers of a run that the block diagram shows [W].
+    """Powers of a run that the block diagram shows [W]."""
 
-    Attributes
-    ----------
-    spiral : float
-        Which friction takes from the mean radial motion through the arcs, into the sheaves and out again.
-    outlet : float
-        Which friction feeds into the vibration in the last quarter of the driven arc; negative: takes.
-    elsewhere : float
-        The same in all other parts of both arcs.
-    stresses : float
-        Which push and tension feed into the vibration, where gaps open and close.
-    taken : float
-        Which dampers of belt, layers and sheave and friction of the rings take from the vibration.
-    """
-
-    spiral: float
-    outlet: float
-    elsewhere: float
-    stresses: float
-    taken: float
+    spiral: float  # taken by friction from the mean radial motion through the arcs, into the sheaves and out
+    outlet: float  # fed by friction into the vibration in the last quarter of the driven arc; negative: taken
+    elsewhere: float  # the same in all other parts of both arcs
+    stresses: float  # fed by push and tension into the vibration, where gaps open and close
+    taken: float  # from the vibration by dampers of belt, layers and sheave and friction of the rings
 
 
 def powers_of(history: xr.Dataset) -> Powers:
@@ -87,13 +74,7 @@ def powers_of(history: xr.Dataset) -> Powers:
 
 @figures.styled
 def blocks_figure(histories: Sequence[xr.Dataset]) -> Figure:
-    """Draw a block diagram of each run below each other.
-
-    Parameters
-    ----------
-    histories : sequence of Dataset
-        Of the elastic belt, with what feeds the fluctuations.
-    """
+    """Draw block diagrams of runs of the elastic belt, with what feeds the fluctuations, below each other."""
     _, labels = on_axes(histories)
     figure = Figure((figures.WIDTH * 1.2, ROW * len(histories) + 0.7), layout="constrained")
     rows = figure.subplots(len(histories), 1, squeeze=False)[:, 0]
@@ -109,9 +90,8 @@ def _draw_blocks(axes: Axes, history: xr.Dataset) -> None:
     found = powers_of(history)
     amplitude = history["amplitude"].values
     sizes = zip(history["strand"].values, 1e6 * amplitude, strict=True)
-    strands = ", ".join(f"{strand} {size:.2g} µm" for strand, size in sizes)
-    if amplitude.max() < SILENT:
-        strands = "silent"
+    moving = ", ".join(f"{strand} {size:.2g} µm" for strand, size in sizes)
+    strands = moving if amplitude.max() >= SILENT else "silent"
     blocks = (
         (0.0, "source of energy", f"spiral motion of the belt:\nfriction takes {found.spiral:.0f} W"),
         (1.0, "switch", "curve of friction: less\nalong the motion"),
@@ -133,12 +113,8 @@ def _draw_blocks(axes: Axes, history: xr.Dataset) -> None:
     _arrow(axes, (2.36, -0.04), (1.36, -0.04), "#333333", "arc3,rad=-0.25")
     axes.text(1.86, -0.35, "its state sets the switch", ha="center", va="top", fontsize=8.5)
     _arrow(axes, (2.76, 0.31), (2.96, 0.31), TAKING)
-    rest = (
-        ("other flanks", found.elsewhere),
-        ("push, tension", found.stresses),
-        ("dampers, rings", -found.taken),
-    )
-    losses = "\n".join(f"{name} {figures.number(power, SIGNED)} W" for name, power in rest)
+    rest = {"other flanks": found.elsewhere, "push, tension": found.stresses, "dampers, rings": -found.taken}
+    losses = "\n".join(f"{name} {figures.number(power, SIGNED)} W" for name, power in rest.items())
     axes.text(2.99, 0.31, losses, va="center", fontsize=8.5)
     axes.set(xlim=(-0.05, 3.65), ylim=(-0.5, 0.85))
     axes.set_axis_off()
@@ -155,11 +131,8 @@ def _arrow(
 def spectrum_figure(run: xr.Dataset) -> Figure:
     """Draw the amplitude of each strand over frequency, with the mode of its peaks.
 
-    Parameters
-    ----------
-    run : Dataset
-        Results of one run: `spectrum` [m] over `strand` and `frequency_bin` [Hz]; `peak_frequency` [Hz],
-        `peak_amplitude` [m] and `peak_mode` over `strand` and `peak` (`[record] modal_peaks`).
+    The run has `spectrum` [m] over `strand` and `frequency_bin` [Hz]; `peak_frequency` [Hz], `peak_amplitude`
+    [m] and `peak_mode` over `strand` and `peak` (`[record] modal_peaks`).
     """
     figure = Figure((figures.WIDTH, 3.6), layout="constrained")
     axes = figure.subplots()
@@ -181,7 +154,7 @@ def spectrum_figure(run: xr.Dataset) -> Figure:
     axes.set(xlabel="frequency [Hz]", ylabel="amplitude [µm]", xlim=(0.0, lines[-1]))
     axes.set_ylim(bottom=0.0)
     axes.grid(lw=0.4, alpha=0.5)
-    figure.legend(loc="outside lower center", frameon=False, ncols=3)
+    figures.legend_below(figure, figures.entries_of([axes]), 3)
     figures.entitle(figure, [figures.headline("Spectra of the strands", run.attrs)], 76)
     return figure
 
@@ -218,8 +191,7 @@ def strand_bars_figure(
         figures.put_ticks(axes.xaxis, np.arange(float(len(ticks))), ticks)
         axes.set_xlabel(x.label)
     row[0].set_ylabel("push force | ring tension [kN]")
-    handles, labels = row[0].get_legend_handles_labels()
-    figure.legend(handles, labels, loc="outside lower center", frameon=False, ncols=4)
+    figures.legend_below(figure, figures.entries_of(row[:1]), 4)
     figures.entitle(figure, [figures.headline("Forces in the strands", dataset.attrs), *notes], 76)
     return figure
 
@@ -230,9 +202,8 @@ def _draw_bars(axes: Axes, shown: xr.Dataset) -> None:
     done = shown["status"].values == Status.DONE
     for k, strand in enumerate(str(name) for name in shown["strand"].values):
         left = places + (k - 0.5) * (BAR + 0.04)
-        tension, push = (
-            1e-3 * np.where(done, shown[name].sel(strand=strand).values, np.nan) for name in NEEDED
-        )
+        of = shown.sel(strand=strand)
+        tension, push = (1e-3 * np.where(done, of[name].values, np.nan) for name in NEEDED)
         label = {"label": f"tension {strand}"}
         axes.bar(left, tension, BAR, color=SHADES[strand], edgecolor="#333333", lw=0.6, **label)
         hatch = {"hatch": "" if k else "///", "label": f"push {strand}"}
@@ -242,14 +213,9 @@ def _draw_bars(axes: Axes, shown: xr.Dataset) -> None:
 
 
 def curves_of(dataset: xr.Dataset, speeds: np.ndarray) -> dict[float, np.ndarray]:
-    """Coefficients of friction, regularised, at sliding speeds by the gradient [s/m] of each law of a study.
+    """Coefficients of friction, regularised, at speeds (n,) [m/s] by the gradient [s/m] of each law.
 
-    Parameters
-    ----------
-    dataset : Dataset
-        Results of a study of the energy criterion over `friction_gradient` and `radial_speed`.
-    speeds : (n,) array
-        [m/s]
+    The study is one of the energy criterion over `friction_gradient` and `radial_speed`.
     """
     job: Any = stored_job(json.loads(dataset.attrs["job"]), "dataset")
     found = {}
@@ -267,23 +233,15 @@ def regularised(point: Mapping[str, Any], speeds: np.ndarray) -> np.ndarray:
 
 @figures.styled
 def friction_figure(dataset: xr.Dataset) -> Figure:
-    """Draw the curves of a study, with marks where the criterion says that radial motion is fed.
-
-    Parameters
-    ----------
-    dataset : Dataset
-        As `curves_of` takes it.
-    """
+    """Draw the `curves_of` a study, with marks where the criterion says that radial motion is fed."""
     sliding = dataset["radial_speed"].values
     along = np.linspace(0.0, sliding.max(), POINTS)
     figure = Figure((figures.WIDTH, 3.8), layout="constrained")
     axes = figure.subplots()
-    for k, (gradient, curve) in enumerate(curves_of(dataset, along).items()):
-        colour = figures.COLOURS[k % len(figures.COLOURS)]
-        label = f"{gradient:g} s/m".replace("-", "−")
-        axes.plot(
-            1e3 * along, curve, color=colour, ls=figures.LINES[k % len(figures.LINES)], lw=1.4, label=label
-        )
+    looks = zip(cycle(figures.COLOURS), cycle(figures.LINES), strict=False)
+    for (gradient, curve), (colour, line) in zip(curves_of(dataset, along).items(), looks, strict=False):
+        label = f"{figures.number(gradient, 'g')} s/m"
+        axes.plot(1e3 * along, curve, color=colour, ls=line, lw=1.4, label=label)
         verdicts = dataset["vibrates"].sel(friction_gradient=gradient).values
         for verdict, (style, _) in MARKS.items():
             at = sliding[verdicts == verdict]
@@ -293,7 +251,7 @@ def friction_figure(dataset: xr.Dataset) -> Figure:
     axes.set(xlabel="sliding speed [mm/s]", ylabel="coefficient of friction", xlim=(0.0, 1e3 * along[-1]))
     axes.set_ylim(bottom=0.0)
     axes.grid(lw=0.4, alpha=0.5)
-    figure.legend(loc="outside lower center", frameon=False, ncols=3)
+    figures.legend_below(figure, figures.entries_of([axes]), 3)
     marks = "marks: by the energy criterion, of radial sliding at that speed"
     figures.entitle(figure, [figures.headline("Curves of friction", dataset.attrs), marks], 76)
     return figure

@@ -43,10 +43,8 @@ def probabilities(dataset: xr.Dataset, source: str = "results") -> xr.Dataset:
 
     Parameters
     ----------
-    dataset : Dataset
-        Results of a study with the axis `sample`.
-    source : str
-        Where they are from, for the errors.
+    dataset, source
+        Results of a study with the axis `sample`, else InputError, which names the source.
 
     Returns
     -------
@@ -56,11 +54,6 @@ def probabilities(dataset: xr.Dataset, source: str = "results") -> xr.Dataset:
         `undecided_samples`, how many of them count neither as vibration nor against it. Over `quantile`, too,
         `amplitude_quantiles` [m] and `frequency_quantiles` [Hz] of the samples that vibrate, at the strongest
         strand. With runs for Sobol indices those of vibration over `parameter`, as of `indices_of`.
-
-    Raises
-    ------
-    InputError
-        If the results have no samples.
     """
     check_samples(dataset, source)
     whole, dataset = dataset, independent(dataset)

@@ -2,16 +2,17 @@
 
 from collections.abc import Sequence
 from pathlib import Path
-from typing import Any, NamedTuple
+from typing import NamedTuple
 
 import numpy as np
 import xarray as xr
+from matplotlib.axes import Axes
 from matplotlib.figure import Figure
 from numpy.typing import NDArray
 
 from cvt_hpc.analysis import arrangement as layout
 from cvt_hpc.analysis import figures
-from cvt_hpc.analysis.classes import check_results
+from cvt_hpc.analysis.classes import axes_in_words, check_results
 from cvt_hpc.analysis.curves import set_frame
 from cvt_hpc.analysis.measured import Overlay, Side, side_of
 from cvt_hpc.analysis.probability import CONTOURS, PROBABILITY, over_samples
@@ -53,15 +54,8 @@ def probability_figure(
 ) -> Figure:
     """Draw the probability of vibration: over two axes with contours, over one with its 95 % interval.
 
-    Parameters
-    ----------
-    dataset, at, source
-        As of all pictures of results (`figures.py`), with the axis `sample`; or their `probabilities`. Where
-        no verdict on vibration is known, the probability of failure is drawn.
-    sides : Sides
-        Which axis runs along x, along y, and over the panels.
-    measured : str or Path
-        Measured file that is drawn over it (`measured.py`).
+    Arguments as of all pictures of results (`figures.py`), with the axis `sample`; or their `probabilities`.
+    Where no verdict on vibration is known, the probability of failure is drawn.
     """
     told = over_samples(dataset, at or {})
     name = PROBABILITY if np.isfinite(told[PROBABILITY]).any() else "failure_probability"
@@ -73,14 +67,14 @@ def probability_figure(
     panel = _Panel("", *(shown[one].values for one in (f"{name}_low", name, f"{name}_high")))
     labels = "of the samples", "95 % interval"
     x = layout.ruler(shown[arrangement.x])
-    figure, (axes,) = _draw_bands([panel], x, figures.in_words(shown[name]), labels, source, "")
+    figure, axes = _draw_bands([panel], x, figures.in_words(shown[name]), labels, source, "")
     axes.set_ylim(-0.03, 1.03)
     over.draw(axes, side_of(shown, arrangement.x), Side("", np.array(axes.get_ylim())), shown)
     for share in CONTOURS:
         axes.axhline(share, color="#777777", ls="--" if share != CONTOURS[1] else "-", lw=0.8, zorder=0.5)
     head = f"P{figures.in_words(shown[name])[1:]}"
     lines = [figures.headline(head, dataset.attrs), told.attrs["counted"], *arrangement.notes, over.note]
-    _entitle(figure, axes, lines, over.handles)
+    set_frame(figure, figures.entries_of([axes]) | over.entries, lines)
     return figure
 
 
@@ -94,28 +88,16 @@ def onset_bands_figure(
 ) -> Figure:
     """Draw the onset of vibration along an axis over another one: its median and 5 to 95 % of the samples.
 
-    Parameters
-    ----------
-    dataset, at, source
-        As of all pictures of results (`figures.py`), with the axis `sample`.
-    sides : Sides
-        Which axis runs along x, and over the panels.
-    along : str
-        Axis along which vibration sets in; by default the load or the axis in its place, else the last one.
-
-    Raises
-    ------
-    InputError
-        As of all pictures; the results have no samples, or no axis beside `along`.
+    Arguments as of all pictures of results (`figures.py`), with the axis `sample` and another one beside that
+    along which vibration sets in: by default the load or the axis in its place, else the last one.
     """
     check_results(dataset, source)
     told = over_samples(dataset, at or {})
     along = along or onset_axis(told, at or {})
     known = [name for name in map(str, told["status"].dims) if name not in (at or {})]
     if "counted" not in told.attrs or along not in known or told["status"].ndim < 2:
-        found = ", ".join(map(str, dataset["status"].dims)) or "a single run"
         expected = f"results over samples and two further axes, of them {along or 'one'} of numbers"
-        raise mismatch(source, expected, found)
+        raise mismatch(source, expected, axes_in_words(dataset))
     quantiles = onset_scatter(dataset, along)["onset"]
     axes_left = xr.Dataset({"status": told["status"].isel({along: 0}, drop=True), "onset": quantiles})
     arrangement = layout.arrange(axes_left, at or {}, source, layout.Sides(sides.x, sides.panel))
@@ -125,19 +107,19 @@ def onset_bands_figure(
     panels = []
     for place in range(shown.sizes[over]) if over else (0,):
         part = shown["onset"].isel({over: place}) if over else shown["onset"]
-        title = f"{figures.in_words(shown[over])}: {layout.value_text(shown[over], place)}" if over else ""
+        title = layout.place_text(shown[over], place, ": ") if over else ""
         values = factor * part.transpose("quantile", ...).values
         low, _, high = np.clip(values, *_ends(factor * told[along].values))
         panels.append(_Panel(title, low, np.where(np.isinf(values[1]), np.nan, values[1]), high))
     label = f"onset in {figures.axis_label(told[along], unit)}"
-    first, _, last = QUANTILES
-    labels = "median", f"{first} to {last} of the samples"
+    least, _, most = QUANTILES
+    labels = "median", f"{least} to {most} of the samples"
     then = "fix an axis, as by `--at AXIS=VALUE`"
-    figure, all_axes = _draw_bands(panels, layout.ruler(shown[arrangement.x]), label, labels, source, then)
+    figure, first = _draw_bands(panels, layout.ruler(shown[arrangement.x]), label, labels, source, then)
     size = dataset.sizes[SAMPLE] * (2 if SWAPPED in dataset.dims else 1)
     samples = f"{size} samples; the band ends where the axis does"
     head = figures.headline("Onset of vibration", dataset.attrs)
-    _entitle(figure, all_axes[0], [head, samples, *arrangement.notes])
+    set_frame(figure, figures.entries_of([first]), [head, samples, *arrangement.notes])
     return figure
 
 
@@ -150,18 +132,9 @@ def sensitivity_figure(
     Side by side: its median in the lowest and the highest quarter of the samples, by the parameter; its
     scatter as it is, and with half that of the parameter; Sobol indices, where the job has the runs.
 
-    Parameters
-    ----------
-    dataset, at, source
-        As of all pictures of results (`figures.py`), with the axis `sample`. Further axes are fixed where the
-        scatter of the onset is widest.
-    along : str
-        Axis along which vibration sets in; by default the load or the axis in its place, else the last one.
-
-    Raises
-    ------
-    InputError
-        As of all pictures; the results have no samples, or no job with their distributions.
+    Arguments as of all pictures of results (`figures.py`), with the axis `sample` and the job that states the
+    distributions. Further axes are fixed where the scatter of the onset is widest. Vibration sets in `along`
+    an axis, by default the load or the axis in its place, else the last one.
     """
     check_results(dataset, source)
     dims = list(map(str, dataset["status"].dims))
@@ -175,11 +148,9 @@ def sensitivity_figure(
     if "band" not in found:
         raise mismatch(source, "results with the job that states the distributions", "others")
     row = widest_row(found)
-    rows = (
-        f"{figures.in_words(found[name])} = {layout.value_text(found[name], k)}" for name, k in row.items()
-    )
+    place = ", ".join(layout.place_text(found[name], k, " = ") for name, k in row.items())
     head = figures.headline(f"What the onset in {figures.in_words(dataset[along])} depends on", dataset.attrs)
-    lines = [head, ", ".join(rows).replace("_", " ")]
+    lines = [head, place.replace("_", " ")]
     here = found.isel(row)
     swing = np.abs(here["quarter_onset"].diff("quarter").values[0])
     here = here.isel(parameter=np.argsort(np.where(np.isfinite(swing), swing, -1.0)))
@@ -205,18 +176,15 @@ def sensitivity_figure(
             values = np.stack([shares[f"{key}{end}"].values for end in _BOUNDS])
             _draw_bars(all_axes[2], places + shift, values, key.replace("_", " "), colour, 0.34)
     all_axes[0].set_yticks(places, [str(name).replace("_", " ") for name in names])
-    legend: dict[str, Any] = {}
     for axes, head in zip(all_axes, heads, strict=True):
         axes.set_xlabel(head)
         axes.grid(axis="x", lw=0.4, alpha=0.5)
-        handles, labels = axes.get_legend_handles_labels()
-        legend |= dict(zip(labels, handles, strict=True))
-    set_frame(figure, legend, lines)
+    set_frame(figure, figures.entries_of(all_axes), lines)
     return figure
 
 
 def _draw_bars(
-    axes: Any,
+    axes: Axes,
     places: NDArray[np.float64],
     values: NDArray[np.float64],
     label: str,
@@ -245,28 +213,16 @@ def _draw_bands(
     labels: tuple[str, str],
     source: str,
     then: str,
-) -> tuple[Figure, list[Any]]:
-    """Draw a line and a band in each panel, and return the figure and its panels."""
-    grid = figures.on_a_page(len(panels), (1, 2), (LEAST, HEIGHT), FRAME, source, then)
-    rows = -(-len(panels) // grid.columns)
-    figure = Figure((figures.WIDTH, rows * grid.height + FRAME), layout="constrained")
-    all_axes = list(figure.subplots(rows, grid.columns, sharex=True, sharey=True, squeeze=False).flat)
-    for axes in all_axes[len(panels) :]:
-        axes.set_axis_off()
-    for axes, panel in zip(all_axes, panels, strict=False):
+) -> tuple[Figure, Axes]:
+    """Draw a line and a band in each panel, and return the figure and its first panel."""
+    page = len(panels), (1, 2), (LEAST, HEIGHT), FRAME, source, then
+    figure, all_axes, _ = figures.panels_on_a_page(*page, sharex=True, sharey=True)
+    for axes, panel in zip(all_axes.flat, panels, strict=False):
         axes.fill_between(x.centres, panel.low, panel.high, color=BAND, lw=0, label=labels[1])
         axes.plot(x.centres, panel.middle, color=LINE, marker="o", ms=3.5, lw=1.5, label=labels[0])
         axes.set_title(panel.title, loc="left", pad=3)
         x.lay_out(axes.xaxis)
         axes.grid(lw=0.4, alpha=0.5)
-    for axes in all_axes[: len(panels)][-grid.columns :]:
-        axes.set_xlabel(x.label)
-        axes.tick_params(labelbottom=True)
-    figure.supylabel(label, fontsize=figures.STYLE["axes.labelsize"])
-    return figure, all_axes[: len(panels)]
-
-
-def _entitle(figure: Figure, axes: Any, lines: Sequence[str], further: Sequence[Any] = ()) -> None:
-    handles, labels = axes.get_legend_handles_labels()
-    legend = dict(zip(labels, handles, strict=True)) | {handle.get_label(): handle for handle in further}
-    set_frame(figure, legend, lines)
+    figures.label_x(all_axes, len(panels), x.label)
+    figure.supylabel(label)
+    return figure, all_axes[0, 0]

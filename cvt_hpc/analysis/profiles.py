@@ -5,7 +5,7 @@ forces between belt and pulleys over the wrap, as figs 9 and 10 of Cepon and Bol
 """
 
 from collections.abc import Sequence
-from itertools import pairwise
+from itertools import cycle, pairwise
 from typing import Any, NamedTuple
 
 import numpy as np
@@ -15,9 +15,9 @@ from matplotlib.figure import Figure
 from matplotlib.lines import Line2D
 
 from cvt_hpc.analysis import figures
-from cvt_hpc.analysis.figures import COLOURS, NARROW, STYLE, WIDTH, check_known, in_words, styled
-from cvt_hpc.analysis.telling_apart import check_holds, entitle_jobs, entitle_runs, named, on_axes, told_apart
+from cvt_hpc.analysis.telling_apart import check_holds, entitle_runs, named, on_axes, told_apart
 from cvt_hpc.errors import InputError, mismatch, unknown
+from cvt_hpc.variator import PULLEYS
 
 # Drawn where nothing else is asked for: of each group the first that all runs have.
 DEFAULT = (("push_force", "tension"), ("friction_force", "tangential_friction"), ("ring_friction",))
@@ -36,8 +36,8 @@ TOUCHES = 0.05  # of the largest force: a flank that has less carries nothing
 
 # rows: variable, label with unit, factor, and what stands beside it
 ROWS = (
-    ("normal_force", "normal [N/mm]", 1e-3, None),
-    ("friction_force", "friction [N/mm]", 1e-3, None),
+    ("normal_force", "normal [N/mm]", 1e-3, ""),
+    ("friction_force", "friction [N/mm]", 1e-3, ""),
     ("tension", "tension [N]", 1.0, "sliding_tension"),
 )
 RUN_LINES = ("-", "--", "-.")  # dotted is theory
@@ -60,8 +60,8 @@ def profile_figure(
 
     Parameters
     ----------
-    histories : sequence of Dataset
-        As `simulate` returns them: quantities over `position`, with `region`.
+    histories, sources
+        As of all pictures of runs (`figures.py`): quantities over `position`, with `region`.
     quantities : sequence of str
         Variables over `position`; none: push force or tension, and friction.
     region : str, optional
@@ -69,8 +69,6 @@ def profile_figure(
     columns : str, optional
         An axis of the runs' job that has a column of panels for each value, or a panel where there is one
         quantity; else all are drawn together.
-    sources : sequence of str, optional
-        Where the runs are from, for errors, and for the legend where their axes do not tell them apart.
 
     Raises
     ------
@@ -86,42 +84,32 @@ def profile_figure(
     groups = _groups(labels, columns, MOST_COLUMNS * (2 if len(quantities) == 1 else 1))
     beside = min(len(groups), MOST_COLUMNS)
     rows = max(len(quantities), -(-len(groups) // beside))
-    height = figures.on_a_page(
-        rows, (1,), (LEAST, HEIGHT), FRAME, names[0], "name fewer quantities by `--of`"
-    ).height
-    figure = Figure(
-        (figures.NARROW if beside > 1 else figures.WIDTH, height * rows + FRAME), layout="constrained"
-    )
+    page = rows, (1,), (LEAST, HEIGHT), FRAME, names[0], "name fewer quantities by `--of`"
+    width = figures.NARROW if beside > 1 else figures.WIDTH
     share = "all" if len(quantities) == 1 else "row"
-    panels = figure.subplots(rows, beside, sharex="col", sharey=share, squeeze=False)
+    figure, panels, _ = figures.panels_on_a_page(*page, each=beside, width=width, sharex="col", sharey=share)
     # one quantity has its panels row by row
     stacks = panels.reshape(-1, 1) if len(quantities) == 1 else panels.T
     for unused in stacks[len(groups) :].flat:
         unused.set_visible(False)
     for column, (title, members) in zip(stacks, groups.items(), strict=False):
         for axes, name in zip(column, quantities, strict=True):
-            for k, run in enumerate(members):
+            factor, _ = shown_unit(histories[0][name])
+            for run, colour, line in zip(members, cycle(figures.COLOURS), cycle(LINES), strict=False):
                 told = ", ".join(text for key, text in labels[run].items() if key != columns)
-                style = {"color": COLOURS[k % len(COLOURS)], "ls": LINES[k % len(LINES)], "lw": 1.3}
-                factor, _ = shown_unit(histories[0][name])
-                _draw(axes, histories[run], name, factor, region, label=told or None, **style)
+                style = {"color": colour, "ls": line, "lw": 1.3, "label": told or None}
+                _draw(axes, histories[run], name, factor, region, **style)
             _finish(axes, histories[members[0]], name, region)
         if region is None:
             _name_regions(column[0], histories[members[0]])
         column[0].set_title(title, loc="left", pad=16 if region is None else 4)
-    for axes in stacks[: len(groups), -1][-beside:]:
-        axes.set_xlabel("position along the path [mm]" if region is None else "wrap angle [°]")
-        axes.tick_params(labelbottom=True)
+    lowest = stacks[: len(groups), -1][np.newaxis, -beside:]
+    figures.label_x(lowest, beside, "wrap angle [°]" if region else "position along the path [mm]")
     for row, name in zip(panels, np.resize(quantities, rows), strict=True):
         _, unit = shown_unit(histories[0][name])
         row[0].set_ylabel(f"{figures.in_words(histories[0][name])}\n[{unit}]")
-    handles, told = max(
-        (axes.get_legend_handles_labels() for axes in stacks[: len(groups), 0]), key=lambda pair: len(pair[1])
-    )
-    if told:
-        figure.legend(
-            handles, told, loc="outside lower center", frameon=False, ncols=figures.legend_columns(told)
-        )
+    legends = (figures.entries_of([axes]) for axes in stacks[: len(groups), 0])
+    figures.legend_below(figure, max(legends, key=len))
     where = f" of the {region} pulley" if region else ""
     entitle_runs(figure, histories, f"Along the belt{where}")
     return figure
@@ -136,14 +124,19 @@ def _check(
     histories: Sequence[xr.Dataset], names: Sequence[str], quantities: Sequence[str], region: str | None
 ) -> None:
     for dataset, name in zip(histories, names, strict=True):
-        known = [str(key) for key, array in dataset.data_vars.items() if array.dims == ("position",)]
-        for quantity in quantities:
-            if quantity not in known:
-                raise unknown(f"{name}: {quantity}", "quantity along the belt", quantity, known)
-            figures.check_known(dataset, [quantity], name)
+        check_along_belt(dataset, quantities, name)
         if region is not None and not inside(dataset, region).any():
             found = ", ".join(dict.fromkeys(dataset["region"].values.astype(str)))
             raise mismatch(f"{name}: --region", "a pulley of the belt's path", f"{region}; it has {found}")
+
+
+def check_along_belt(history: xr.Dataset, quantities: Sequence[str], source: str) -> None:
+    """Raise InputError unless a history has these quantities over `position`, with known values."""
+    known = [str(key) for key, array in history.data_vars.items() if array.dims == ("position",)]
+    for name in quantities:
+        if name not in known:
+            raise unknown(f"{source}: {name}", "quantity along the belt", name, known)
+        figures.check_known(history, [name], source)
 
 
 def _groups(labels: Sequence[dict[str, str]], columns: str | None, most: int) -> dict[str, list[int]]:
@@ -198,10 +191,19 @@ def _finish(axes: Axes, dataset: xr.Dataset, name: str, region: str | None) -> N
     axes.grid(linewidth=0.4, alpha=0.5)
     axes.axhline(_REFERENCES.get(name, 0.0), color="#333333", linewidth=0.7, zorder=1)
     if region is None:
-        for start, stop, label in regions(dataset):
-            if label.split()[0] in ("driving", "driven"):
-                axes.axvspan(1e3 * start, 1e3 * stop, color=ARC, linewidth=0, zorder=0)
+        _shade_arcs(axes, dataset)
         axes.set_xlim(0.0, 1e3 * dataset["position"].values[-1])
+
+
+def _shade_arcs(axes: Axes, dataset: xr.Dataset) -> None:
+    for start, stop, _ in arcs(dataset):
+        axes.axvspan(1e3 * start, 1e3 * stop, color=ARC, linewidth=0, zorder=0)
+
+
+def arcs(dataset: xr.Dataset) -> list[tuple[float, float, str]]:
+    """First and last path coordinate of each arc [m], with the name of its pulley."""
+    known = [(start, stop, name.split()[0]) for start, stop, name in regions(dataset)]
+    return [arc for arc in known if arc[2] in PULLEYS]
 
 
 def regions(dataset: xr.Dataset) -> list[tuple[float, float, str]]:
@@ -219,31 +221,19 @@ def _name_regions(axes: Axes, dataset: xr.Dataset) -> None:
 
 
 class End(NamedTuple):
-    """An end of an arc.
+    """An end of an arc."""
 
-    Attributes
-    ----------
-    name : str
-        Such as "driving inlet".
-    position : float
-        Path coordinate [m].
-    inwards : float
-        1 where the arc follows, -1 where it ends.
-    """
-
-    name: str
-    position: float
-    inwards: float
+    name: str  # such as "driving inlet"
+    position: float  # path coordinate [m]
+    inwards: float  # 1 where the arc follows, -1 where it ends
 
 
 def ends_of_arcs(history: xr.Dataset) -> list[End]:
     """Inlet and outlet of both arcs, in the order of the path; places are those between two of `position`."""
     half = float(history["position"].values[0])
-    arcs = [(a, b, name.split()[0]) for a, b, name in regions(history)]
-    arcs = [arc for arc in arcs if arc[2] in ("driving", "driven")]
     return [
         End(f"{pulley} {end}", at - half, way)
-        for a, b, pulley in arcs
+        for a, b, pulley in arcs(history)
         for end, at, way in (("inlet", a, 1.0), ("outlet", b, -1.0))
     ]
 
@@ -253,11 +243,8 @@ def alone(history: xr.Dataset, end: End) -> tuple[str, float]:
 
     A flank carries where its normal force is more than TOUCHES of the largest force of both.
 
-    Returns
-    -------
-    (str, float)
-        Side, and the distance between the outermost places at which the flanks carry; 0 where both begin at
-        the same place.
+    Returned are its side, and the distance between the outermost places at which the flanks carry; 0 where
+    both begin at the same place.
     """
     far = end.inwards * from_end(history, end)
     forces = [history[f"contact_force_{side}"].values for side in SIDES]
@@ -267,34 +254,24 @@ def alone(history: xr.Dataset, end: End) -> tuple[str, float]:
     return SIDES[int(np.argmin(begins))], abs(begins[0] - begins[1])
 
 
-@styled
+@figures.styled
 def flanks_figure(history: xr.Dataset, source: str = "history") -> Figure:
     """Draw normal force and sliding of both flanks: along the belt, and where elements enter and leave arcs.
 
-    Parameters
-    ----------
-    history : Dataset
-        Of a run of a spatial pushbelt, as `simulate` returns it: QUANTITIES of SIDES over `position` [m].
-    source : str
-        Where the history is from, for the errors.
-
-    Raises
-    ------
-    InputError
-        The history has no flanks of two sides.
+    Arguments as of all pictures of runs (`figures.py`); the run is that of a spatial pushbelt, with
+    QUANTITIES of SIDES over `position` [m].
     """
     needed = [f"{name}_{side}" for name in QUANTITIES for side in SIDES]
     check_holds([history], [source], dict.fromkeys(needed, "of a spatial pushbelt"))
     ends = ends_of_arcs(history)
-    figure = Figure((NARROW, 1.75 * (1 + len(QUANTITIES)) + 1.0), layout="constrained")
+    figure = Figure((figures.NARROW, 1.75 * (1 + len(QUANTITIES)) + 1.0), layout="constrained")
     grid = figure.add_gridspec(1 + len(QUANTITIES), len(ends))
     whole = figure.add_subplot(grid[0, :])
     position = 1e3 * history["position"].values
     _draw_flanks(whole, history, "contact_force", position)
     for start, stop, name in regions(history):
         whole.text(500.0 * (start + stop), 1.02, name, transform=whole.get_xaxis_transform(), ha="center")
-        if name.split()[0] in ("driving", "driven"):
-            whole.axvspan(1e3 * start, 1e3 * stop, color=ARC, lw=0, zorder=0)
+    _shade_arcs(whole, history)
     whole.set(xlim=(0.0, position[-1]), xlabel="position along the path [mm]")
     for row, name in enumerate(QUANTITIES, 1):
         first = None
@@ -313,8 +290,7 @@ def flanks_figure(history: xr.Dataset, source: str = "history") -> Figure:
                 side, length = alone(history, end)
                 told = f"{side} alone: {1e3 * length:.2g} mm" if length else "both alike"
                 axes.set_title(f"{end.name}\n{told}", loc="left", pad=4)
-    handles, told = whole.get_legend_handles_labels()
-    figure.legend(handles, told, loc="outside lower center", frameon=False, ncols=2)
+    figures.legend_below(figure, figures.entries_of([whole]), 2)
     entitle_runs(figure, [history], "Left and right flank", width=80)
     return figure
 
@@ -333,33 +309,18 @@ def _draw_flanks(axes: Axes, history: xr.Dataset, name: str, over: np.ndarray, n
         array = history[f"{name}_{side}"]
         axes.plot(over, factor * array.values, label=f"{side} flank", lw=1.2, **LOOKS[side])  # type: ignore[arg-type]  # of a line
     if named:
-        axes.set_ylabel(f"{in_words(array).removesuffix(' right')}\n[{unit}]")
+        axes.set_ylabel(f"{figures.in_words(array).removesuffix(' right')}\n[{unit}]")
     axes.axhline(0.0, color="#333333", lw=0.7, zorder=1)
     axes.grid(lw=0.4, alpha=0.5)
 
 
-@styled
+@figures.styled
 def wrap_figure(histories: Sequence[xr.Dataset], sources: Sequence[str] = ()) -> Figure:
     """Draw the mean forces of one or several runs over the wrap of each pulley.
 
-    Parameters
-    ----------
-    histories : sequence of Dataset
-        As `simulate` returns them: `normal_force` and `friction_force` [N/m] and `tension` [N] over
-        `position`, with `wrap_angle` [rad], nan far from arcs, and `region`; `sliding_tension` [N] is drawn
-        beside the tension. Of more than MOST_PANELS pulleys those without torque are left out.
-    sources : sequence of str, optional
-        Where they are from, for the errors, and for the legend where the runs' points are alike.
-
-    Returns
-    -------
-    matplotlib.figure.Figure
-        Unknown to pyplot; `figure.savefig(path)` writes it.
-
-    Raises
-    ------
-    InputError
-        There is no history, or one without these forces.
+    Arguments as of all pictures of runs (`figures.py`), with `normal_force` and `friction_force` [N/m] and
+    `tension` [N] over `position`, with `wrap_angle` [rad], nan far from arcs, and `region`; `sliding_tension`
+    [N] is drawn beside the tension. Of more than MOST_PANELS pulleys those without torque are left out.
     """
     if not histories:
         raise InputError("wrap: expected one history or more, found none")
@@ -368,48 +329,50 @@ def wrap_figure(histories: Sequence[xr.Dataset], sources: Sequence[str] = ()) ->
         missing = [key for key in ("normal_force", "friction_force", "wrap_angle") if key not in dataset]
         if missing:
             raise mismatch(name, "the history of a run with normal_force and wrap_angle", f"no {missing[0]}")
-        check_known(dataset, ["normal_force"], name)
+        figures.check_known(dataset, ["normal_force"], name)
     pulleys, without_torque = _pulleys(histories)
     common, labels = told_apart(histories, names)
+    runs = list(zip(histories, labels, cycle(figures.COLOURS), cycle(RUN_LINES), strict=False))
     rows = [row for row in ROWS if row[0] in histories[0]]
-    figure = Figure((WIDTH, 1.6 * len(rows) + 1.1), layout="constrained")
+    figure = Figure((figures.WIDTH, 1.6 * len(rows) + 1.1), layout="constrained")
     panels = figure.subfigures()  # the label common to them keeps clear of the figure's legend
     grid = panels.subplots(len(rows), len(pulleys), sharex="col", sharey="row", squeeze=False)
     for (name, label, factor, beside), line_of_axes in zip(rows, grid, strict=True):
         for axes, pulley in zip(line_of_axes, pulleys, strict=True):
-            for k, (dataset, of_run) in enumerate(zip(histories, labels, strict=True)):
-                style = {"ls": RUN_LINES[k % len(RUN_LINES)], "lw": 1.3, "color": COLOURS[k % len(COLOURS)]}
-                _draw_force(axes, dataset, pulley, name, factor, label=of_run, **style)
-            for k, dataset in enumerate(histories):
-                if beside is not None and beside in dataset:
-                    colour = COLOURS[k % len(COLOURS)] if len(histories) > 1 else INK
-                    _draw_force(axes, dataset, pulley, beside, factor, ls=":", lw=1.6, color=colour, zorder=3)
+            for dataset, told, colour, line in runs:
+                _draw_force(axes, dataset, pulley, name, factor, label=told, ls=line, lw=1.3, color=colour)
+            for dataset, _, colour, _ in runs:
+                if beside in dataset:
+                    look = {"ls": ":", "lw": 1.6, "color": colour if len(runs) > 1 else INK, "zorder": 3}
+                    _draw_force(axes, dataset, pulley, beside, factor, **look)
             axes.grid(linewidth=0.4, alpha=0.5)
         line_of_axes[0].set_ylabel(label)
     for axes, pulley in zip(grid[0], pulleys, strict=True):
         axes.set_title(f"{pulley.removesuffix(' arc')} pulley", loc="left", pad=3)
-    panels.supxlabel("wrap angle from inlet [°]", fontsize=STYLE["axes.labelsize"])
-    _add_legend(figure, grid[-1, 0], [THEORY] if "sliding_tension" in histories[0] else [])
+    panels.supxlabel("wrap angle from inlet [°]")
+    entries = figures.entries_of(grid[-1:, 0])
+    if "sliding_tension" in histories[0]:
+        entries[THEORY] = Line2D([], [], ls=":", lw=1.6, color=INK)
+    figures.legend_below(figure, entries if len(entries) > 1 else {})
     further = [f"without torque, not drawn: {', '.join(without_torque)}"] if without_torque else []
-    entitle_jobs(figure, histories, ["Forces over the wrap", common, *further])
+    head = figures.headline("Forces over the wrap", *(dataset.attrs for dataset in histories))
+    figures.entitle(figure, [head, common, *further], 76)
     return figure
 
 
 def _pulleys(histories: Sequence[xr.Dataset]) -> tuple[list[str], list[str]]:
     """Pulleys that have panels, and those that have none because no run has torque there."""
-    region, angle = _regions(histories[0]), histories[0]["wrap_angle"].values
+    along = [history["region"].values.astype(str) for history in histories]
+    region, angle = along[0], histories[0]["wrap_angle"].values
     # the first station of a strand may be the end of the arc before it
     pulleys = [name for name in dict.fromkeys(region) if np.isfinite(angle[region == name]).all()]
     if len(pulleys) <= MOST_PANELS:
         return pulleys, []
-    pulls = [[np.nansum(h["friction_force"].values[_regions(h) == p]) for p in pulleys] for h in histories]
+    forces = [history["friction_force"].values for history in histories]
+    pulls = [[np.nansum(f[r == p]) for p in pulleys] for f, r in zip(forces, along, strict=True)]
     largest = np.abs(pulls).max(axis=0)
     carries = dict(zip(pulleys, largest >= LEAST_PULL * largest.max(), strict=True))
     return [p for p in pulleys if carries[p]], [p for p in pulleys if not carries[p]]
-
-
-def _regions(dataset: xr.Dataset) -> np.ndarray:
-    return dataset["region"].values.astype(str)
 
 
 def _draw_force(axes: Axes, dataset: xr.Dataset, pulley: str, name: str, factor: float, **style: Any) -> None:
@@ -418,11 +381,3 @@ def _draw_force(axes: Axes, dataset: xr.Dataset, pulley: str, name: str, factor:
     angle = np.degrees(dataset["wrap_angle"].values[here])
     marker = "." if angle.size < FEW else ""
     axes.plot(angle, factor * dataset[name].values[here], marker=marker, ms=5, **style)
-
-
-def _add_legend(figure: Figure, axes: Axes, theory: Sequence[str]) -> None:
-    handles, labels = axes.get_legend_handles_labels()
-    handles += [Line2D([], [], ls=":", lw=1.6, color=INK) for _ in theory]
-    if len(labels := [*labels, *theory]) > 1:
-        place = {"loc": "outside lower center", "frameon": False}
-        figure.legend(handles, labels, ncols=figures.legend_columns(labels), **place)

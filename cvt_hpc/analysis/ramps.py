@@ -10,17 +10,9 @@ import numpy as np
 import xarray as xr
 from matplotlib.figure import Figure
 
-from cvt_hpc.analysis import cells, figures
+from cvt_hpc.analysis import figures, waterfall
 from cvt_hpc.analysis.measured import FREQUENCY, Overlay, Side, put_legend
 from cvt_hpc.analysis.telling_apart import entitle_runs, named, on_axes
-from cvt_hpc.analysis.waterfall import (
-    COLOURS,
-    ORDERS,
-    draw_eigenfrequencies,
-    draw_orders,
-    name_lines,
-    spectra_norm,
-)
 from cvt_hpc.errors import mismatch
 from cvt_hpc.variator import STRANDS
 from cvt_hpc.variator.band import strand_frequencies
@@ -39,24 +31,12 @@ LINE_POINTS = 21  # of lines over a spectrogram
 
 
 class Ramp(NamedTuple):
-    """Course of a run along its ramp.
+    """Course of a run along its ramp."""
 
-    Attributes
-    ----------
-    values : (time,) array
-        Of what the ramp changes, in display units.
-    label : str
-        Its name with the unit.
-    motion : (time,) array
-        [um, N m], mean removed.
-    rate : float
-        Of samples [Hz].
-    """
-
-    values: np.ndarray
-    label: str
-    motion: np.ndarray
-    rate: float
+    values: np.ndarray  # (time,) of what the ramp changes, in display units
+    label: str  # its name with the unit
+    motion: np.ndarray  # (time,) [um, N m], mean removed
+    rate: float  # of samples [Hz]
 
 
 @figures.styled
@@ -69,43 +49,25 @@ def ramp_figure(
 ) -> Figure:
     """Draw motion and spectrogram of runs along their ramps, below each other.
 
-    Parameters
-    ----------
-    histories : sequence of Dataset
-        As `simulate` returns them, of runs along a ramp of load or speed.
-    of : str
-        "t1" or "t2": the probe of that strand that moves most; or a variable over `time`.
-    sources : sequence of str, optional
-        Where the runs are from, for errors, and for titles where their axes do not tell them apart.
-    vmax : float, optional
-        Amplitude at which the colours end [SI].
-    measured : str or Path, optional
-        Measured file that is drawn over them (`measured.py`).
-
-    Raises
-    ------
-    InputError
-        A history has no ramp, no such strand or variable; or there are more than a page holds.
+    Arguments as of all pictures of runs (`figures.py`), each along a ramp of load or speed. `of` is "t1" or
+    "t2": the probe of that strand that moves most; or a variable over `time`.
     """
     names = named(histories, sources)
     ramps = [read_ramp(history, of, name) for history, name in zip(histories, names, strict=True)]
     _, labels = on_axes(histories, names)
     overlays = [Overlay(measured, history, name) for history, name in zip(histories, names, strict=True)]
     frame = 1.1 + overlays[0].height
-    grid = figures.on_a_page(len(ramps), (1,), (LEAST, ROW), frame, names[0], THEN)
-    figure = Figure((figures.NARROW, grid.height * len(ramps) + frame), layout="constrained")
-    panels = figure.subplots(len(ramps), 2, sharex=True, sharey="col", squeeze=False)
+    page = len(ramps), (1,), (LEAST, ROW), frame, names[0], THEN
+    width = figures.NARROW
+    figure, panels, _ = figures.panels_on_a_page(*page, each=2, width=width, sharex=True, sharey="col")
     spectra = [spectrogram(ramp) for ramp in ramps]
     scale = 1e6 if of in STRANDS else 1.0
-    norm = spectra_norm([amplitude.T for *_, amplitude in spectra], None if vmax is None else scale * vmax)
-    for (left, right), ramp, (values, frequency, amplitude), label in zip(
-        panels, ramps, spectra, labels, strict=True
-    ):
+    end = None if vmax is None else scale * vmax
+    norm = waterfall.spectra_norm([amplitude for *_, amplitude in spectra], end)
+    for (left, right), ramp, spectrum, label in zip(panels, ramps, spectra, labels, strict=True):
         left.plot(ramp.values, ramp.motion, color="#0072b2", linewidth=0.3, rasterized=True)
         left.grid(linewidth=0.4, alpha=0.5)
-        right.pcolormesh(
-            values, frequency, np.maximum(amplitude, norm.vmin).T, norm=norm, cmap=COLOURS, rasterized=True
-        )
+        waterfall.draw_spectra(right, *spectrum, norm)
         for edge in (500.0, 700.0):
             right.axhline(edge, color="#123a6b", linewidth=0.8, linestyle=(0, (4, 4)))
         left.set_title(", ".join(label.values()), loc="left", pad=3)
@@ -117,17 +79,15 @@ def ramp_figure(
         left.set_ylabel(fill(f"{name} [{unit}]", LETTERS))
     for axes in panels[-1]:
         axes.set_xlabel(ramps[0].label)
-    bar = cells.Scale(COLOURS, norm, f"amplitude [{unit}]")
-    drawn = np.concatenate([amplitude.ravel() for *_, amplitude in spectra])
-    cells.colour_bar(figure, bar, drawn, ax=list(panels[:, 1]), aspect=15 * len(ramps), pad=0.02)
+    amplitudes = [amplitude for *_, amplitude in spectra]
+    waterfall.spectra_bar(figure, norm, amplitudes, panels[:, 1], 15 * len(ramps), unit)
     for history, ramp, row, over in zip(histories, ramps, panels, overlays, strict=True):
         motion = Side("", np.array(row[0].get_ylim()))
         for axes, y in zip(row, (motion, FREQUENCIES), strict=True):
             over.draw(axes, _side_of(history, ramp), y, _held(history))
     put_legend(figure, *overlays)
-    entitle_runs(
-        figure, histories, f"Along the ramp, {name}", "dashed: 500 and 700 Hz", overlays[0].note, width=80
-    )
+    further = "dashed: 500 and 700 Hz", overlays[0].note
+    entitle_runs(figure, histories, f"Along the ramp, {name}", *further, width=80)
     return figure
 
 
@@ -143,21 +103,7 @@ def spectrogram_figure(
     Eigenfrequencies by belt formulas are drawn where the run's parameters tell them, and orders of the
     driving pulley along a ramp of speed.
 
-    Parameters
-    ----------
-    histories : sequence of Dataset
-        As `simulate` returns them: `displacement` [m] over `time` [s] and `probe`; each has a row.
-    sources : sequence of str, optional
-        Where the runs are from, for errors, and for titles where their axes do not tell them apart.
-    vmax : float, optional
-        Amplitude at which the colours end [m].
-    measured : str or Path, optional
-        Measured file that is drawn over them (`measured.py`).
-
-    Raises
-    ------
-    InputError
-        A history has no motion of strands, or is too short; or there are more than a page holds.
+    Arguments as of all pictures of runs (`figures.py`), with `displacement` [m] over `time` [s] and `probe`.
     """
     names = named(histories, sources)
     for history, name in zip(histories, names, strict=True):
@@ -175,35 +121,32 @@ def spectrogram_figure(
         for history, name in zip(histories, names, strict=True)
     ]
     spectra = [[spectrogram(ramp) for ramp in row] for row in ramps]
-    drawn = [amplitude.T for row in spectra for *_, amplitude in row]
-    norm = spectra_norm(drawn, None if vmax is None else 1e6 * vmax)
+    drawn = [amplitude for row in spectra for *_, amplitude in row]
+    norm = waterfall.spectra_norm(drawn, None if vmax is None else 1e6 * vmax)
     overlays = [Overlay(measured, history, name) for history, name in zip(histories, names, strict=True)]
     frame = 1.4 + overlays[0].height
-    grid = figures.on_a_page(len(ramps), (1, 2), (LEAST_HEIGHT, HEIGHT), frame, names[0], THEN)
-    count, beside = -(-len(ramps) // grid.columns), grid.columns * len(strands)
-    figure = Figure((figures.WIDTH, grid.height * count + frame), layout="constrained")
-    panels = figure.subplots(count, beside, sharey=True, squeeze=False)
-    size, told, each = (0.8 * figures.WIDTH / beside, grid.height - 0.7), set(), iter(panels.flat)
-    pads = np.full(panels.shape, 0.0)
-    for axes in panels.flat[len(ramps) * len(strands) :]:
-        axes.set_axis_off()
+    page = len(ramps), (1, 2), (LEAST_HEIGHT, HEIGHT), frame, names[0], THEN
+    figure, panels, height = figures.panels_on_a_page(*page, each=len(strands), sharey=True)
+    count, beside = panels.shape
+    size, told, each = (0.8 * figures.WIDTH / beside, height - 0.7), set(), iter(panels.flat)
+    pads = np.zeros(panels.shape)
     for history, row, of_row, label, over in zip(histories, ramps, spectra, labels, overlays, strict=True):
         turns, known = _lines_along(history, row[0])
-        for strand, ramp, (values, frequency, amplitude) in zip(strands, row, of_row, strict=True):
+        for strand, ramp, spectrum in zip(strands, row, of_row, strict=True):
             axes, lines = next(each), []
-            shown = np.maximum(amplitude, norm.vmin).T
-            axes.pcolormesh(values, frequency, shown, norm=norm, cmap=COLOURS, rasterized=True)
-            axes.set(xlim=np.sort(values[[0, -1]]), ylim=(0.0, HIGHEST))
+            waterfall.draw_spectra(axes, *spectrum, norm)
+            axes.set(xlim=np.sort(spectrum[0][[0, -1]]), ylim=(0.0, HIGHEST))
             over.draw(axes, _side_of(history, ramp), FREQUENCIES, _held(history))
             if known is not None:
                 places, waves = known
                 of_strand = waves[STRANDS.index(strand)]
-                lines += draw_eigenfrequencies(axes, places, of_strand, np.arange(1, len(of_strand) + 1))
+                numbers = np.arange(1, len(of_strand) + 1)
+                lines += waterfall.draw_eigenfrequencies(axes, places, of_strand, numbers)
                 told.add("dashed: eigenfrequencies by belt formulas, with their half waves")
             if turns is not None:
-                lines += draw_orders(axes, *turns, ORDERS)
+                lines += waterfall.draw_orders(axes, *turns, waterfall.ORDERS)
                 told.add("dotted: orders of the driving pulley's turns")
-            pads[panels == axes] = name_lines(axes, lines, size)
+            pads[panels == axes] = waterfall.name_lines(axes, lines, size)
             axes.set_title(fill(", ".join([f"strand {strand}", *label.values()]), 72 // beside), loc="left")
             axes.set_xlabel(ramp.label)
     for axes, pad in zip(panels.flat, np.repeat(pads.max(axis=1), beside), strict=True):
@@ -211,10 +154,8 @@ def spectrogram_figure(
     if count == 1:
         panels[0, 0].set_ylabel("frequency [Hz]")
     else:
-        figure.supylabel("frequency [Hz]", fontsize=figures.STYLE["axes.labelsize"])
-    scale = cells.Scale(COLOURS, norm, "amplitude [µm]")
-    values = np.concatenate([each.ravel() for each in drawn])
-    cells.colour_bar(figure, scale, values, ax=panels, aspect=20 * count, pad=0.02)
+        figure.supylabel("frequency [Hz]")
+    waterfall.spectra_bar(figure, norm, drawn, panels, 20 * count)
     put_legend(figure, *overlays)
     entitle_runs(figure, histories, "Spectrogram", *sorted(told), overlays[0].note, width=72)
     return figure
@@ -235,25 +176,14 @@ def _lines_along(history: xr.Dataset, ramp: Ramp) -> tuple[_Lines | None, _Lines
     turns = None
     if changing == "driving_speed":
         turns = ramp.values[at], courses["driving_speed"] / (2.0 * np.pi)
-    found = [
-        strand_frequencies(point | {key: float(values[k]) for key, values in courses.items()})
-        for k in range(LINE_POINTS)
-    ]
-    known = np.stack(found, -1)
+    points = (point | {key: float(values[k]) for key, values in courses.items()} for k in range(LINE_POINTS))
+    known = np.stack([strand_frequencies(at) for at in points], -1)
     return turns, (ramp.values[at], known) if np.isfinite(known).any() else None
 
 
 @figures.styled
 def course_figure(history: xr.Dataset, of: str) -> Figure:
-    """Draw a quantity over the time of a ramp, and below how far it swings, beside strand t1.
-
-    Parameters
-    ----------
-    history : Dataset
-        As of `ramp_figure`.
-    of : str
-        A variable over `time`.
-    """
+    """Draw a variable over the time of a ramp, and below how far it swings, beside strand t1."""
     unit = str(history[of].attrs.get("units", ""))
     name = figures.in_words(history[of])
     time, values = history["time"].values, history[of].values
@@ -283,18 +213,15 @@ def course_figure(history: xr.Dataset, of: str) -> Figure:
     )
     scale.set_xlabel(loads.label)
     lower.set(xlabel="time [s]", xlim=(begun, time[-1]))
-    upper.set_ylim(*_limits(values[time >= begun]))
+    along = values[time >= begun]
+    margin = 0.05 * float(np.ptp(along))
+    upper.set_ylim(along.min() - margin, along.max() + margin)
     for axes in (upper, lower):
         axes.grid(lw=0.4, alpha=0.5)
     moment, strand = (f"{low:g} to {high:g} Hz" for low, high in (NOISE, BAND))
     bands = f"amplitudes: the moment's at {moment}, the strand's at {strand}"
     entitle_runs(figure, [history], f"{name[0].upper()}{name[1:]} over time", bands)
     return figure
-
-
-def _limits(values: np.ndarray) -> tuple[float, float]:
-    margin = 0.05 * float(np.ptp(values))
-    return float(values.min()) - margin, float(values.max()) + margin
 
 
 def read_ramp(history: xr.Dataset, of: str, source: str = "history", *, is_ramp: bool = True) -> Ramp:
@@ -322,12 +249,7 @@ def read_ramp(history: xr.Dataset, of: str, source: str = "history", *, is_ramp:
         motion = history[of].values[first:]
     else:
         raise mismatch(source, "t1, t2 or a variable over time", of)
-    return Ramp(
-        course[first:],
-        label,
-        _without_drift(motion, rate),
-        rate,
-    )
+    return Ramp(course[first:], label, _without_drift(motion, rate), rate)
 
 
 def course_of(history: xr.Dataset) -> tuple[np.ndarray, str]:
@@ -376,7 +298,7 @@ def _without_drift(motion: np.ndarray, rate: float) -> np.ndarray:
 
 
 def spectrogram(ramp: Ramp) -> tuple[np.ndarray, np.ndarray, np.ndarray]:
-    """Values of the ramp (window,), frequencies (line,) [Hz], amplitudes (window, line) by Hann windows."""
+    """Values of the ramp (window,), frequencies (line,) [Hz], amplitudes (line, window) by Hann windows."""
     width = int(round(WINDOW * ramp.rate))
     cut = np.lib.stride_tricks.sliding_window_view(ramp.motion, width)[:: width // 4]
     window = np.hanning(width)
@@ -384,7 +306,7 @@ def spectrogram(ramp: Ramp) -> tuple[np.ndarray, np.ndarray, np.ndarray]:
     inside = lines <= HIGHEST
     amplitude = 2.0 * np.abs(np.fft.rfft(cut * window, 2 * width)) / window.sum()
     middles = ramp.values[width // 2 :: width // 4][: len(cut)]
-    return middles, lines[inside], amplitude[:, inside]
+    return middles, lines[inside], amplitude[:, inside].T
 
 
 def envelope(ramp: Ramp, band: tuple[float, float] = BAND) -> tuple[np.ndarray, np.ndarray]:

@@ -19,29 +19,12 @@ _DIGITS = 14  # of what was converted: 3000 rpm from 314.1592653589793 rad/s
 
 
 def run_table(dataset: xr.Dataset, source: str = "results") -> DataFrame:
-    """Return results with a row for each run, or each cell of the grid.
+    """Return results with a row for each run, or each cell of the grid; InputError of what is none.
 
-    Parameters
-    ----------
-    dataset : Dataset
-        Results of a study, in memory or in chunks.
-    source : str
-        Where they are from, for the errors.
-
-    Returns
-    -------
-    DataFrame
-        Columns are the axes and what follows from them in the units of the job; `status` and `class`; then
-        all results in the units of the dataset, with a column for each strand, pulley or other named place,
-        such as `amplitude_t1 [m]`. Flags are words. Spectra and other series are left out.
-
-    Raises
-    ------
-    InputError
-        The dataset holds no results of a study.
+    Columns are the axes and what follows from them in the units of the job; `status` and `class`; then all
+    results in the units of the dataset, with a column for each strand, pulley or other named place, such as
+    `amplitude_t1 [m]`. Flags are words. Spectra and other series are left out.
     """
-    from pandas import DataFrame
-
     check_results(dataset, source)
     dims = dataset["status"].dims
     axes = [name for name, values in dataset.coords.items() if set(values.dims) <= set(dims)]
@@ -65,10 +48,8 @@ def run_table(dataset: xr.Dataset, source: str = "results") -> DataFrame:
 def write_table(frame: DataFrame, out: Path) -> Path:
     """Write a table as CSV, or as a sheet for Excel and the like, by its suffix, and return its path.
 
-    Raises
-    ------
-    InputError
-        The suffix is none of FORMATS; of a sheet, the library is missing or there are more than MOST_ROWS.
+    InputError if it is none of FORMATS; of a sheet, if the library is missing or there are more than
+    MOST_ROWS.
     """
     if out.suffix.lower() not in FORMATS:
         raise mismatch(str(out), f"a table: {', '.join(FORMATS)}", out.suffix or "no suffix")
@@ -82,9 +63,8 @@ def write_table(frame: DataFrame, out: Path) -> Path:
         then = '`pip install "cvt_hpc[xlsx]"`, or write a .csv, which spreadsheets read too'
         raise mismatch(str(out), "the library XlsxWriter", "none", then) from None
     if len(frame) > MOST_ROWS:
-        raise mismatch(
-            str(out), f"at most {MOST_ROWS} runs, which a sheet holds", f"{len(frame)}", "write .csv"
-        )
+        expected = f"at most {MOST_ROWS} runs, which a sheet holds"
+        raise mismatch(str(out), expected, str(len(frame)), "write .csv")
     # texts stay texts, whoever has written them: no formulas and no links
     options = {"constant_memory": True, "strings_to_formulas": False, "strings_to_urls": False}
     cells = frame.astype(object).where(frame.notna(), None).replace([np.inf, -np.inf], ["inf", "-inf"])

@@ -13,9 +13,8 @@ from matplotlib.markers import MarkerStyle
 from matplotlib.ticker import FuncFormatter, LogLocator, NullFormatter
 from numpy.typing import NDArray
 
-from cvt_hpc.analysis import cells
+from cvt_hpc.analysis import cells, figures
 from cvt_hpc.analysis.classes import OccurrenceClass, at_strongest_strand, count_classes, occurrence_classes
-from cvt_hpc.analysis.figures import WIDTH, axis_label, coordinate_unit, entitle, headline
 from cvt_hpc.errors import mismatch
 
 MOST_AXES = 4  # six pairs; the first axes of the job
@@ -30,50 +29,27 @@ def is_sampled(dataset: xr.Dataset) -> bool:
 
 
 def scatter_figure(dataset: xr.Dataset, at: Mapping[str, Any], source: str, vmax: cells.End = None) -> Figure:
-    """Compose the map of a sampled study.
+    """Compose the map of a sampled study; arguments as of `map_figure`.
 
-    Parameters
-    ----------
-    dataset : Dataset
-        `status` and `vibrates` along `run`, with the values of the axes as coordinates along it; `amplitude`
-        [m], where known.
-    at : mapping
-        Has to be empty: no two samples lie at one value of an axis.
-    source : str
-        Where the results are from, for the error.
-    vmax : float or "fit"
-        As of `map_figure`.
-
-    Raises
-    ------
-    InputError
-        If `at` is not empty.
+    The axes are coordinates along `run`, and `at` has to be empty: no two samples lie at one value of one.
     """
     if at:
         raise mismatch(f"{source}: at {next(iter(at))}", "results over a grid", "samples, all apart")
-    figure = Figure((WIDTH, scatter_height(dataset)), layout="constrained")
+    figure = Figure((figures.WIDTH, scatter_height(dataset)), layout="constrained")
     classes = occurrence_classes(dataset).values
-    amplitude = np.where(
-        classes == OccurrenceClass.VIBRATING, at_strongest_strand(dataset, "amplitude") * 1e6, np.nan
-    )
+    vibrates = classes == OccurrenceClass.VIBRATING
+    amplitude = np.where(vibrates, at_strongest_strand(dataset, "amplitude") * 1e6, np.nan)
     scale = cells.amplitude_scale(amplitude, vmax)
     panels = draw_samples(figure, dataset, classes, amplitude, scale)
     if np.isfinite(amplitude).any():
         cells.colour_bar(figure, scale, amplitude, ax=panels, pad=0.02)
-    title = [
-        headline("Vibration occurrence", dataset.attrs),
-        f"{classes.size} samples: {count_classes(classes)}",
-    ]
+    head = figures.headline("Vibration occurrence", dataset.attrs)
+    title = [head, f"{classes.size} samples: {count_classes(classes)}"]
     names = sample_axes(dataset)
     if len(names) > MOST_AXES:
         title.append(f"the first {MOST_AXES} of {len(names)} axes")
-    entitle(figure, title)
-    figure.legend(
-        *panels[0, 0].get_legend_handles_labels(),
-        loc="outside lower center",
-        ncols=cells.LEGEND_COLUMNS,
-        frameon=False,
-    )
+    figures.entitle(figure, title)
+    figures.legend_below(figure, figures.entries_of(panels[0, :1]), cells.LEGEND_COLUMNS)
     return figure
 
 
@@ -93,20 +69,8 @@ def draw_samples(
 ) -> NDArray[Any]:
     """Draw the runs of a sampled study by class, in a panel for each pair of axes, and return the panels.
 
-    Parameters
-    ----------
-    figure : FigureBase
-        Where to draw.
-    dataset : Dataset
-        With the values of the axes along `run`.
-    classes : array, shape (run,)
-        Keys of `cells.ALL_STYLES`.
-    amplitude : array, shape (run,)
-        What colours the vibrating runs; not a number leaves the colour of the class.
-    scale : Scale
-        How it colours them.
-    beside : int
-        Panels side by side at most.
+    Classes (run,) are keys of `cells.ALL_STYLES`. The amplitude (run,) colours the vibrating runs by the
+    scale; not a number leaves the colour of the class. `beside` panels stand side by side at most.
     """
     pairs = _pairs(dataset)
     columns = min(len(pairs), beside)
@@ -179,5 +143,5 @@ def _tick_logarithmic(axis: XAxis | YAxis) -> None:
 
 def _along(coordinate: xr.DataArray) -> tuple[NDArray[np.float64], str]:
     """Values of an axis in display units, and its label."""
-    factor, unit = coordinate_unit(coordinate.attrs)
-    return coordinate.values * factor, axis_label(coordinate, unit)
+    factor, unit = figures.coordinate_unit(coordinate.attrs)
+    return coordinate.values * factor, figures.axis_label(coordinate, unit)

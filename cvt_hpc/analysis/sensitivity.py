@@ -22,13 +22,13 @@ import numpy as np
 import xarray as xr
 from numpy.typing import NDArray
 
-from cvt_hpc.analysis.classes import ALONG, OccurrenceClass, at_strongest_strand, check_results, map_classes
+from cvt_hpc.analysis.classes import ALONG, at_strongest_strand, axes_in_words, check_results, map_classes
 from cvt_hpc.analysis.sobol import RESAMPLES, sobol_indices
 from cvt_hpc.errors import mismatch, unknown
 from cvt_hpc.job.axes import ALL, NONE, SAMPLE, SWAPPED
 from cvt_hpc.job.uncertain import TABLE, Uncertain, read_document
 from cvt_hpc.study.intervals import VERDICTS
-from cvt_hpc.vibration.classes import levels
+from cvt_hpc.vibration.classes import OccurrenceClass, levels
 
 QUANTILES = {"5 %": 0.05, "50 %": 0.5, "95 %": 0.95}
 ONSET = "onset"
@@ -46,8 +46,8 @@ def check_samples(dataset: xr.Dataset, source: str) -> None:
     """Raise InputError unless a dataset holds results with samples of uncertain parameters."""
     check_results(dataset, source)
     if SAMPLE not in dataset["status"].dims:
-        dims = ", ".join(map(str, dataset["status"].dims)) or "a single run"
-        raise mismatch(source, f"results with the axis {SAMPLE}, of a job with [uncertain]", dims)
+        expected = f"results with the axis {SAMPLE}, of a job with [uncertain]"
+        raise mismatch(source, expected, axes_in_words(dataset))
 
 
 def stated(dataset: xr.Dataset, table: str) -> dict[str, Any]:
@@ -79,12 +79,7 @@ def indices_of(dataset: xr.Dataset, of: str, along: str = "", source: str = "res
     along : str
         Axis along which vibration sets in; else the cells along it count together.
     source : str
-        Where the results are from, for the errors.
-
-    Raises
-    ------
-    InputError
-        If the results have no such runs, no such variable, or no such axis.
+        Named by InputError, if the results have no such runs, no such variable, or no such axis.
     """
     check_results(dataset, source)
     if not {SAMPLE, SWAPPED} <= {*dataset["status"].dims}:
@@ -108,23 +103,15 @@ def indices_of(dataset: xr.Dataset, of: str, along: str = "", source: str = "res
 
 
 class _Brackets(NamedTuple):
-    """Between which values of an axis vibration sets in.
+    """Between which values of an axis vibration sets in, of each sample of each row.
 
-    Attributes
-    ----------
-    low, high : array
-        Of each sample of each row; both -inf where the lowest value vibrates, inf where none does, nan where
-        the sample does not count.
-    like : DataArray
-        With the coordinates of rows and samples.
-    knots : array
-        The finite values of the axis, rising.
+    Both are -inf where the lowest value vibrates, inf where none does, nan where the sample does not count.
     """
 
     low: NDArray[np.float64]
     high: NDArray[np.float64]
-    like: xr.DataArray
-    knots: NDArray[np.float64]
+    like: xr.DataArray  # with the coordinates of rows and samples
+    knots: NDArray[np.float64]  # the finite values of the axis, rising
 
 
 def _check_axis(dataset: xr.Dataset, along: str, source: str) -> None:
@@ -201,14 +188,7 @@ def widest_row(found: xr.Dataset) -> dict[str, int]:
 def onset_scatter(dataset: xr.Dataset, along: str, source: str = "results") -> xr.Dataset:
     """Return quantiles of the onset of vibration, and what half the scatter of each parameter makes of them.
 
-    Parameters
-    ----------
-    dataset : Dataset
-        Results with the axis `sample`.
-    along : str
-        A numeric axis.
-    source : str
-        Where they are from, for the errors.
+    InputError, which names the source, if the results have no axis `sample`, or `along` is none of numbers.
 
     Returns
     -------
@@ -221,11 +201,6 @@ def onset_scatter(dataset: xr.Dataset, along: str, source: str = "results") -> x
         bootstrap, `_low` and `_high`, inf where the band reaches beyond the axis; `effective_samples` of
         independent ones that the weights leave [1]. Over `quarter`, too, `quarter_onset`: the median of the
         onset where the parameter is in the lowest or the highest quarter of its samples.
-
-    Raises
-    ------
-    InputError
-        If the results have no samples, or no such axis.
     """
     check_samples(dataset, source)
     _check_axis(dataset, along, source)

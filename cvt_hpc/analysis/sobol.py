@@ -24,10 +24,8 @@ _ENDS = {"": "index", "_low": "low end of the 95 % bounds", "_high": "high end o
 def orders(scores: NDArray[np.float64]) -> NDArray[np.float64]:
     """Return indices of first and of total order, shape (2, parameter).
 
-    Parameters
-    ----------
-    scores : array, shape (..., 2 + parameter, sample)
-        f(A), f(B), and f(AB) of each parameter; not all alike. nan is left out; further cells are pooled.
+    Scores (..., 2 + parameter, sample) are f(A), f(B), and f(AB) of each parameter; not all alike. nan is
+    left out; further cells are pooled.
     """
     both, crossed = scores[..., :2, :], scores[..., 2:, :]
     a, b = both[..., :1, :], both[..., 1:, :]

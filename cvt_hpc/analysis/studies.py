@@ -23,27 +23,12 @@ _ALIKE = 1e-9  # relative: by so much values of an axis differ that are the same
 def join_studies(
     datasets: Sequence[xr.Dataset], sources: Sequence[str], names: Collection[str] = ()
 ) -> xr.Dataset:
-    """Join studies over the same axes.
+    """Join studies over grids of the same axes, with `study` as the first one.
 
-    Parameters
-    ----------
-    datasets : sequence of Dataset
-        Results of studies over grids. Their values on the axes may differ: what a study does not have was
-        not run.
-    sources : sequence of str
-        Where they are from, for the errors; these also name studies of jobs of one name.
-    names : collection of str
-        Variables to be kept beside verdict, amplitude and frequency.
-
-    Returns
-    -------
-    Dataset
-        With `study` as first axis.
-
-    Raises
-    ------
-    InputError
-        If one of them holds no results, or samples, or is over other axes than the first.
+    Their values on the axes may differ: what a study does not have was not run. `sources` say for the errors
+    where they are from; these also name studies of jobs of one name. `names` are of variables to be kept
+    beside verdict, amplitude and frequency. InputError if one of them holds no results, or samples, or is
+    over other axes than the first.
     """
     for dataset, source in zip(datasets, sources, strict=True):
         check_results(dataset, source)
@@ -84,21 +69,8 @@ def maps_figure(
 ) -> Figure:
     """Draw where vibration occurs, or quantities, of one study or of several on one scale of colours.
 
-    Parameters
-    ----------
-    datasets : sequence of Dataset
-        Results of studies over the same axes.
-    quantities : sequence of str
-        Variables to be drawn instead of occurrence.
-    at, sides, vmax, measured
-        As `map_figure` takes them; `study` is one of the axes where there are several datasets.
-    sources : sequence of str
-        Where the datasets are from, for the errors; these also name studies of jobs of one name.
-
-    Raises
-    ------
-    InputError
-        As of `join_studies` and of all pictures.
+    Arguments as of `map_figure`; where there are several datasets, `study` is one of the axes, as of
+    `join_studies`. `quantities` are variables to be drawn instead of occurrence.
     """
     from cvt_hpc.analysis.maps import map_figure
     from cvt_hpc.analysis.value_maps import value_map_figure

@@ -8,9 +8,9 @@ import xarray as xr
 from matplotlib.figure import Figure
 
 from cvt_hpc.analysis.arrangement import infinity_in_words
-from cvt_hpc.analysis.figures import check_known, entitle
+from cvt_hpc.analysis.figures import check_known, entitle, headline
 from cvt_hpc.analysis.histories import place_of, values_of
-from cvt_hpc.errors import InputError, mismatch, one_line
+from cvt_hpc.errors import InputError, mismatch
 from cvt_hpc.storage.files import kind_of
 
 
@@ -60,16 +60,8 @@ def entitle_runs(
 ) -> None:
     """Title of a picture of runs: subject with the names of jobs, what they have in common, further lines."""
     common, _ = on_axes(histories)
-    entitle_jobs(figure, histories, [subject, ", ".join(common), *further], width)
-
-
-def entitle_jobs(
-    figure: Figure, histories: Sequence[xr.Dataset], lines: Sequence[str], width: int = 76
-) -> None:
-    """Title of a picture of runs: the first line with the names of their jobs, and further lines."""
-    jobs = dict.fromkeys(one_line(dataset.attrs.get("job_name", "")) for dataset in histories)
-    first = f"{lines[0]}: {', '.join(filter(None, jobs))}".removesuffix(": ")
-    entitle(figure, [first, *lines[1:]], width)
+    head = headline(subject, *(dataset.attrs for dataset in histories))
+    entitle(figure, [head, ", ".join(common), *further], width)
 
 
 def check_holds(histories: Sequence[xr.Dataset], names: Sequence[str], wanted: dict[str, str]) -> None:
@@ -84,10 +76,7 @@ def check_holds(histories: Sequence[xr.Dataset], names: Sequence[str], wanted: d
 def history_files(paths: Sequence[Path]) -> list[Path]:
     """Files of histories; of a folder all that it keeps, those of a study in its folder `histories`.
 
-    Raises
-    ------
-    InputError
-        A file is no history, or a folder has none.
+    InputError if a file is no history, or a folder has none.
     """
     from cvt_hpc.storage.netcdf import is_history
 

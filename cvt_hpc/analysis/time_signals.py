@@ -45,23 +45,13 @@ HEIGHTS = 1.5, 2.5  # [inch]: a panel, at least and else
 
 
 class Signal(NamedTuple):
-    """A quantity over time.
+    """A quantity over time."""
 
-    Attributes
-    ----------
-    name, unit : str
-        Such as "displacement t1 1/2" and "m".
-    times, values : (n,) arrays
-        Evenly spaced [s], and in the unit.
-    judged : int
-        First sample of the part that is judged.
-    """
-
-    name: str
-    unit: str
-    times: Array
-    values: Array
-    judged: int
+    name: str  # such as "displacement t1 1/2"
+    unit: str  # such as "m"
+    times: Array  # (n,) [s], evenly spaced
+    values: Array  # (n,) in the unit
+    judged: int  # first sample of the part that is judged
 
     @property
     def rate(self) -> float:
@@ -101,18 +91,13 @@ def read_signal(history: xr.Dataset, of: str, source: str = "history", *, veloci
 
     Parameters
     ----------
-    history, source : Dataset, str
-        As `simulate` returns it, and where it is from, for the errors.
+    history, source
+        As of all pictures of runs (`figures.py`); InputError unless it has the signal, and enough of it.
     of : str
         A probe, as "t1 1/2"; a strand, for the probe of it that moves most in the judged part; a variable
         over time; or one of SHAFT_FORCES [N]: y from the driving to the driven shaft, z across, t2's side.
     velocity : bool
         Whether it has to be a displacement, as its velocity is wanted.
-
-    Raises
-    ------
-    InputError
-        The history has no such signal, or too little of it.
     """
     probes = _probes(history)
     if of in STRANDS and (places := [name for name in probes if name.split()[0] == of]):
@@ -244,19 +229,8 @@ def third_octaves_figure(
 ) -> Figure:
     """Draw third-octave levels of the judged part: a panel for each signal, a line for each run.
 
-    Parameters
-    ----------
-    histories, sources : sequences of Dataset and str
-        As `simulate` returns them, and where they are from, for errors and for the legend.
-    quantities : sequence of str
-        Signals, as of `read_signal`.
-    velocity : bool
-        Of displacements: levels of their velocities.
-
-    Raises
-    ------
-    InputError
-        As of `read_signal`; a judged part is too short; or there are more panels than a page holds.
+    Arguments as of all pictures of runs (`figures.py`). `quantities` are signals as of `read_signal`; of
+    displacements `velocity` gives levels of their velocities.
     """
     names = named(histories, sources)
     figure, panels = in_a_column(len(quantities), names[0], "name fewer quantities")
@@ -295,13 +269,10 @@ def _draw_bands(axes: Axes, bands: Bands, k: int, told: str) -> None:
 
 def in_a_column(count: int, source: str, then: str, **sharing: Any) -> tuple[Figure, NDArray[Any]]:
     """Figure with panels below each other; InputError, with what to do `then`, if no page holds them."""
-    frame = 1.5
-    grid = figures.on_a_page(count, (1,), HEIGHTS, frame, source, then)
-    figure = Figure((figures.WIDTH, grid.height * count + frame), layout="constrained")
-    panels = figure.subplots(count, 1, squeeze=False, **sharing)[:, 0]
-    for axes in panels:
+    figure, panels, _ = figures.panels_on_a_page(count, (1,), HEIGHTS, 1.5, source, then, **sharing)
+    for axes in panels.flat:
         axes.grid(lw=0.4, alpha=0.5)
-    return figure, panels
+    return figure, panels[:, 0]
 
 
 def cut_off(axes: Axes) -> None:

@@ -13,7 +13,6 @@ from matplotlib.colors import Normalize
 from matplotlib.figure import Figure
 from matplotlib.lines import Line2D
 from matplotlib.patches import Patch, PathPatch
-from matplotlib.patheffects import Normal, withStroke
 from numpy.typing import NDArray
 
 from cvt_hpc.analysis import arrangement as layout
@@ -43,31 +42,16 @@ OTHERS = tuple(WITHOUT_RESULT)  # which runs are marked
 
 
 class Panel(NamedTuple):
-    """A quantity over a grid.
-
-    Attributes
-    ----------
-    title, unit : str
-    factor : float
-        From SI to the unit.
-    values, kinds : (row, column) array
-        In the unit, and how the runs ended.
-    alike : array
-        Values of all panels that share the scale of colours, in the unit; or the range that it is to have.
-    isolines : tuple of float
-        Values of lines, in the unit.
-    at : dict
-        Index along the axis of panels.
-    """
+    """A quantity over a grid (row, column)."""
 
     title: str
     unit: str
-    factor: float
-    values: NDArray[np.float64]
-    kinds: NDArray[np.int8]
-    alike: NDArray[np.float64]
-    isolines: tuple[float, ...]
-    at: dict[str, int]
+    factor: float  # from SI to the unit
+    values: NDArray[np.float64]  # in the unit
+    kinds: NDArray[np.int8]  # how the runs ended
+    alike: NDArray[np.float64]  # values of all panels that share the scale of colours, or its range
+    isolines: tuple[float, ...]  # values of lines, in the unit
+    at: dict[str, int]  # index along the axis of panels
 
 
 @figures.styled
@@ -82,26 +66,10 @@ def value_map_figure(
 ) -> Figure:
     """Draw quantities over two axes of a study: panels for each, its further dimensions and a third axis.
 
-    Parameters
-    ----------
-    dataset, at, source
-        As of all pictures of results (`figures.py`). x, y and the axis of panels are those of `map_figure`;
-        where there would be more than MOST_PANELS panels and nobody chose it, that axis is fixed at its first
-        value. Results with samples of uncertain parameters are drawn as their `probabilities`.
-    quantities : sequence of str
-        Numeric variables of the results.
-    sides : Sides
-        Which axis runs along x, along y, and over the panels.
-    vmax : float
-        Value at which the colours end, in the unit of the quantity [SI].
-    measured : str or Path
-        Measured file that is drawn over the map (`measured.py`).
-
-    Raises
-    ------
-    InputError
-        As of all pictures; there is no such quantity; there would be more panels than a page holds; or one
-        end of the colours is given for several quantities.
+    Arguments as of all pictures of results (`figures.py`); `vmax` is of a single quantity. x, y and the axis
+    of panels are those of `map_figure`; where there would be more than MOST_PANELS panels and nobody chose
+    it, that axis is fixed at its first value. Quantities are numeric variables. Results with samples of
+    uncertain parameters are drawn as their `probabilities`.
     """
     check_results(dataset, source)
     if is_sampled(dataset):
@@ -117,10 +85,8 @@ def value_map_figure(
         arrangement = layout.first_panel(arrangement)
         panels = _panels(arrangement, quantities)
     shown = arrangement.dataset
-    x, y = (
-        layout.ruler(shown[arrangement.x]),
-        layout.ruler(shown[arrangement.y]) if arrangement.y else layout.ONE_ROW,
-    )
+    x = layout.ruler(shown[arrangement.x])
+    y = layout.ruler(shown[arrangement.y]) if arrangement.y else layout.ONE_ROW
     size, (columns, height) = _on_paper(len(panels), y.centres.size, source, arrangement)
     sides_of_panel = side_of(shown, arrangement.x), side_of(shown, arrangement.y)
     figure = Figure(size, layout="constrained")
@@ -130,15 +96,14 @@ def value_map_figure(
         _draw_panel(figure, axes, (x, y), panel, vmax, room)
         over.draw(axes, *sides_of_panel, shown.coords.to_dataset().isel(panel.at))
         axes.set_title(fill(panel.title, int(LETTERS * size[0] / columns)), loc="left", pad=3)
-    for axes in list(all_axes.flat)[len(panels) :]:
+    for axes in all_axes.flat[len(panels) :]:
         axes.set_axis_off()
     for axes in all_axes[:, 0]:
         axes.set_ylabel(y.label)
-    for axes in list(all_axes.flat)[: len(panels)][-columns:]:
-        axes.set_xlabel(x.label)
-    job = one_line(dataset.attrs.get("job_name", ""))
+    figures.label_x(all_axes, len(panels), x.label)
     kinds = occurrence_classes(shown)
     counted = dataset.attrs.get("counted") or _counted(kinds)
+    job = one_line(dataset.attrs.get("job_name", ""))
     lines = [f"{job}: {counted}".removeprefix(": "), ", ".join(arrangement.notes), over.note]
     figures.entitle(figure, lines, int(72 * size[0] / figures.WIDTH))
     marked: dict[cells.CellClass, cells.ClassStyle] = {
@@ -149,15 +114,13 @@ def value_map_figure(
         for axes in all_axes.flat
         if any(patch.get_hatch() == NEGATIVE for patch in axes.patches)
     ][:1]
-    isolines = sorted({panel.isolines for panel in panels if min(panel.values.shape) > 1} - {()})
-    lines_of = [
-        Line2D([], [], color=ISOLINE_INK, ls=style, lw=1.6, label=label)
-        for values in isolines[:1]
-        for style, label in (
-            ("-", f"{values[len(values) // 2]:g}"),
-            ("--", f"{values[0]:g} and {values[-1]:g}"),
-        )
-    ]
+    isolines = {panel.isolines for panel in panels if min(panel.values.shape) > 1} - {()}
+    values = min(isolines, default=())
+    names = (
+        {"-": f"{values[len(values) // 2]:g}", "--": f"{values[0]:g} and {values[-1]:g}"} if values else {}
+    )
+    look = {"color": ISOLINE_INK, "lw": 1.6}
+    lines_of = [Line2D([], [], ls=style, label=name, **look) for style, name in names.items()]
     further = negative + lines_of + over.handles
     if marked or further:
         cells.class_legend(figure, marked, len(marked) + len(further), further=further)
@@ -203,32 +166,21 @@ def _panels(arrangement: layout.Arrangement, quantities: Sequence[str]) -> list[
     kinds, found = occurrence_classes(dataset), []
     # between texts there is nothing that a line could cross
     are_numbers = all(dataset[name].dtype.kind in "iuf" for name in (arrangement.x, arrangement.y) if name)
+    over = [arrangement.panel] if arrangement.panel else []
     for name in quantities:
         array = dataset[name]
         factor, unit = figures.value_unit(array)
-        over = [arrangement.panel] if arrangement.panel else []
         labelled = [str(dim) for dim in array.dims if dim not in (arrangement.x, arrangement.y, *over)]
         alike = factor * np.asarray(array.attrs.get("valid_range", array.values))
         isolines = tuple(factor * np.asarray(array.attrs.get(ISOLINES, ()) if are_numbers else (), float))
         for labels in layout.places(array, labelled):
             told = [str(array[dim].values[k]) for dim, k in labels.items()]
             for at in layout.places(dataset, over):
-                here = [
-                    f"{figures.in_words(dataset[dim])} {layout.value_text(dataset[dim], k)}"
-                    for dim, k in at.items()
-                ]
-                found.append(
-                    Panel(
-                        ", ".join([figures.axis_label(array, unit), *told, *here]),
-                        unit,
-                        factor,
-                        factor * _of_grid(array.isel(labels | at), arrangement),
-                        _of_grid(kinds.isel(at), arrangement).astype(np.int8),
-                        alike,
-                        isolines,
-                        at,
-                    )
-                )
+                here = [layout.place_text(dataset[dim], k) for dim, k in at.items()]
+                title = ", ".join([figures.axis_label(array, unit), *told, *here])
+                values = factor * _of_grid(array.isel(labels | at), arrangement)
+                ended = _of_grid(kinds.isel(at), arrangement).astype(np.int8)
+                found.append(Panel(title, unit, factor, values, ended, alike, isolines, at))
     return found
 
 
@@ -284,7 +236,7 @@ def _draw_isolines(
     with warnings.catch_warnings():
         warnings.filterwarnings("ignore", "No contour levels")
         lines = axes.contour(x.centres, y.centres, values, isolines, **look)
-    lines.set_path_effects([withStroke(linewidth=3.0, foreground="white"), Normal()])
+    lines.set_path_effects(figures.outlined(3.0))
 
 
 def _hatch(

@@ -5,6 +5,7 @@ Names of lines stand in the margins where the lines leave the panel, clear of ri
 
 from collections.abc import Sequence
 from dataclasses import replace
+from operator import itemgetter
 from pathlib import Path
 from typing import Any, NamedTuple
 
@@ -13,23 +14,20 @@ import xarray as xr
 from matplotlib.axes import Axes
 from matplotlib.colors import ListedColormap, LogNorm
 from matplotlib.figure import Figure
-from matplotlib.patheffects import Normal, withStroke
 from numpy.typing import NDArray
 
 from cvt_hpc.analysis import arrangement as layout
-from cvt_hpc.analysis import cells
-from cvt_hpc.analysis.classes import WITHOUT_RESULT, check_results, occurrence_classes
+from cvt_hpc.analysis import cells, figures
+from cvt_hpc.analysis.classes import WITHOUT_RESULT, axes_in_words, check_results, occurrence_classes
 from cvt_hpc.analysis.eigenfrequencies import along_axis
-from cvt_hpc.analysis.figures import WIDTH, check_known, entitle, headline, in_words, on_a_page, styled
 from cvt_hpc.analysis.measured import FREQUENCY, Overlay, Side, put_legend, side_of
 from cvt_hpc.errors import few_of, mismatch
 
-NAME_HEIGHT, LETTER, TITLE = (
-    9.5,
-    5.6,
-    3.0,
-)  # [point]: height of a name, width of a letter, distance of a title
-OUTLINE = [withStroke(linewidth=2.2, foreground="white"), Normal()]
+Array = NDArray[np.float64]
+
+NAME_HEIGHT, LETTER = 9.5, 5.6  # [point]: of a name, and width of one of its letters
+TITLE = 3.0  # [point]: distance of a title
+OUTLINE = figures.outlined(2.2)
 
 LEAST, HEIGHT, FRAME = 1.3, 2.8, 1.2  # [inch]: a row of panels, and title and labels
 # white ground, on which weak ridges are seen
@@ -42,37 +40,19 @@ ORDERS = (1.0, 2.0, 4.0, 8.0, 16.0)  # of the driving pulley, in a Campbell diag
 
 
 class Named(NamedTuple):
-    """A line with its name.
-
-    Attributes
-    ----------
-    name, colour : str
-    x, y : array, shape (point,)
-        In data coordinates; nan where it is not known.
-    """
+    """A line with its name, over points (n,) in data coordinates; nan where it is not known."""
 
     name: str
     colour: str
-    x: NDArray[np.float64]
-    y: NDArray[np.float64]
+    x: Array
+    y: Array
 
 
 def name_lines(axes: Axes, lines: Sequence[Named], size: tuple[float, float]) -> float:
-    """Write the names of lines beside a panel whose limits are set; return how high its title has to stand.
+    """Write the names of lines beside a panel whose limits are set; return the distance of its title [point].
 
-    Parameters
-    ----------
-    axes : Axes
-        The panel; its lower limit along y is below all lines.
-    lines : sequence of Named
-        What leaves the panel at its upper side is named there, other lines where they end.
-    size : (float, float)
-        About the width and height of the panel [inch].
-
-    Returns
-    -------
-    float
-        Distance of the title [point].
+    What leaves the panel at its upper side is named there, other lines where they end; none lies below its
+    lower limit. `size` is about the width and height of the panel [inch].
     """
     right: list[tuple[float, Named]] = []
     above: list[tuple[float, Named]] = []
@@ -95,20 +75,15 @@ def name_lines(axes: Axes, lines: Sequence[Named], size: tuple[float, float]) ->
     letters = max((len(line.name) for _, line in above), default=1)
     gaps = NAME_HEIGHT / (72.0 * size[1]) * top, (LETTER * letters + 3.0) / (72.0 * size[0]) * (end - left)
     places = _apart(right, gaps[0], (0.0, top - 0.5 * gaps[0]))
-    for (_, line), place in zip(sorted(right, key=_place), places, strict=True):
+    for (_, line), place in zip(sorted(right, key=itemgetter(0)), places, strict=True):
         _write(axes, line, (1.0, place), axes.get_yaxis_transform(), (3, 0), ha="left", va="center")
-    for (_, line), place in zip(sorted(above, key=_place), _apart(above, gaps[1], (left, end)), strict=True):
+    places = _apart(above, gaps[1], (left, end))
+    for (_, line), place in zip(sorted(above, key=itemgetter(0)), places, strict=True):
         _write(axes, line, (place, 1.0), axes.get_xaxis_transform(), (0, 1), ha="center", va="bottom")
     return TITLE + NAME_HEIGHT if above else TITLE
 
 
-def _place(placed: tuple[float, Named]) -> float:
-    return placed[0]
-
-
-def _apart(
-    placed: Sequence[tuple[float, Named]], gap: float, limits: tuple[float, float]
-) -> NDArray[np.float64]:
+def _apart(placed: Sequence[tuple[float, Named]], gap: float, limits: tuple[float, float]) -> Array:
     """Places in ascending order, moved until they lie a gap apart, and within limits as far as they can."""
     at = np.sort([place for place, _ in placed])
     steps = gap * np.arange(at.size)
@@ -136,14 +111,13 @@ def campbell_figure(
     """Draw a Campbell diagram: `waterfall_figure` over the driving speed, with orders of that speed."""
     check_results(dataset, source)
     if "driving_speed" not in dataset["status"].dims:
-        found = ", ".join(map(str, dataset["status"].dims)) or "a single run"
         then = "`cvt-hpc plot waterfall` draws spectra over any axis"
-        raise mismatch(source, "results over the axis driving_speed", found, then)
+        raise mismatch(source, "results over the axis driving_speed", axes_in_words(dataset), then)
     sides = layout.Sides("driving_speed", panel=sides.panel)
     return waterfall_figure(dataset, at, source, sides, orders, vmax, measured)
 
 
-@styled
+@figures.styled
 def waterfall_figure(
     dataset: xr.Dataset,
     at: layout.At = None,
@@ -159,10 +133,9 @@ def waterfall_figure(
     the job's axes, `strand` and `frequency_bin` [Hz]. `eigenfrequency` [Hz] over the axes, `strand` and
     `half_waves` is drawn as lines; where it is missing it follows from the strands' mean forces. Over the
     driving speed `orders` are drawn, multiples of the turns of the driving pulley. Of the axes that are not
-    fixed the one that runs along x in a map, or that of `sides`, does so here; that of `sides.panel` has a
-    row of panels for each value, and the rest are fixed at their first value. `vmax` is the amplitude at
-    which the colours end [m], else chosen as `spectra_norm` says. A `measured` file is drawn over the spectra
-    (`measured.py`).
+    fixed the one that runs along x in a map does so here; that of `sides.panel` has a row of panels for each
+    value, and the rest are fixed at their first value. The colours end as `spectra_norm` says, unless at
+    `vmax`.
     """
     check_results(dataset, source)
     if "spectrum" not in dataset or "frequency_bin" not in dataset["spectrum"].dims:
@@ -171,7 +144,7 @@ def waterfall_figure(
         raise mismatch(source, "results with the variable spectrum", found, then)
     overlay = Overlay(measured, dataset, source)
     arrangement = layout.arrange(dataset, at or {}, source, sides)
-    check_known(arrangement.dataset, ["spectrum"], source)
+    figures.check_known(arrangement.dataset, ["spectrum"], source)
     rows, notes = _rows(arrangement, sides.panel)
     x, y = layout.ruler(arrangement.dataset[arrangement.x]), layout.ruler(dataset["frequency_bin"])
     over = ("strand", "frequency_bin", arrangement.x)
@@ -180,20 +153,15 @@ def waterfall_figure(
     known = [along_axis(shown, arrangement.x) for _, shown in rows]
     strands = [str(name) for name in dataset["strand"].values]
     then = f"fix an axis, as by `--at {sides.panel}=VALUE`, or choose another one by `--panel AXIS`"
-    grid = on_a_page(len(rows), (1, 2), (LEAST, HEIGHT), FRAME + overlay.height, source, then)
-    count = -(-len(rows) // grid.columns)
-    figure = Figure((WIDTH, count * grid.height + FRAME + overlay.height), layout="constrained")
-    panels = figure.subplots(count, grid.columns * len(strands), sharex=True, sharey=True, squeeze=False)
-    size = 0.8 * WIDTH / panels.shape[1], grid.height - 0.3
-    for ax in panels.flat[len(rows) * len(strands) :]:
-        ax.set_axis_off()
+    page = len(rows), (1, 2), (LEAST, HEIGHT), FRAME + overlay.height, source, then
+    figure, panels, height = figures.panels_on_a_page(*page, each=len(strands), sharex=True, sharey=True)
+    size = 0.8 * figures.WIDTH / panels.shape[1], height - 0.3
     each, pad, along = iter(panels.flat), 0.0, side_of(arrangement.dataset, arrangement.x)
     for (title, shown), of_row, modes in zip(rows, amplitude, known, strict=True):
         for strand, values in zip(strands, of_row, strict=True):
             axes, lines = next(each), []
             axes.set_facecolor(UNKNOWN)
-            cut = np.ma.masked_invalid(np.maximum(values, norm.vmin))  # zero has no logarithm
-            axes.pcolormesh(x.edges, y.edges, cut, norm=norm, cmap=COLOURS, rasterized=True)
+            draw_spectra(axes, x.edges, y.edges, values, norm)
             axes.set(xlim=x.edges[[0, -1]], ylim=(0.0, y.edges[-1]))
             if modes is not None:
                 of_strand = modes.sel(strand=strand).values
@@ -205,13 +173,10 @@ def waterfall_figure(
             words = ", ".join(filter(None, (f"strand {strand}", title)))
             axes.set_title(words, loc="left", pad=pad)
             x.lay_out(axes.xaxis)
-    for axes in panels.flat[: len(rows) * len(strands)][-panels.shape[1] :]:
-        axes.set_xlabel(x.label)
-        axes.tick_params(labelbottom=True)
+    figures.label_x(panels, len(rows) * len(strands), x.label)
     for axes in panels[:, 0]:
         axes.set_ylabel("frequency [Hz]")
-    scale = cells.Scale(COLOURS, norm, "amplitude [µm]")
-    cells.colour_bar(figure, scale, np.stack(amplitude), ax=panels, aspect=20 * count, pad=0.02)
+    spectra_bar(figure, norm, amplitude, panels, 20 * len(panels))
     subject = "Campbell diagram" if orders else "Spectra of the strands"
     told = []
     if arrangement.x == "driving_speed" and orders:
@@ -219,7 +184,7 @@ def waterfall_figure(
     if any(modes is not None for modes in known):
         told.append("dashed: eigenfrequencies, with their half waves along the strand")
     told += _without_spectrum(rows, amplitude)
-    entitle(figure, [headline(subject, dataset.attrs), ", ".join(notes), *told, overlay.note])
+    figures.entitle(figure, [figures.headline(subject, dataset.attrs), ", ".join(notes), *told, overlay.note])
     put_legend(figure, overlay)
     return figure
 
@@ -235,35 +200,24 @@ def _rows(
     for k in range(axis.size):
         one = replace(arrangement, dataset=arrangement.dataset.isel({panel: k}), panel=None)
         shown, notes = layout.along_x(one)
-        rows.append((f"{in_words(axis)} {layout.value_text(axis, k)}", shown))
+        rows.append((layout.place_text(axis, k), shown))
     return rows, notes
 
 
-def _without_spectrum(
-    rows: Sequence[tuple[str, xr.Dataset]], amplitude: Sequence[NDArray[np.float64]]
-) -> list[str]:
+def _without_spectrum(rows: Sequence[tuple[str, xr.Dataset]], amplitude: Sequence[Array]) -> list[str]:
     """State what became of the runs without a spectrum; an empty line where all have one."""
-    kinds = [
-        occurrence_classes(shown).values[np.isnan(values).any(axis=(0, 1))]
-        for (_, shown), values in zip(rows, amplitude, strict=True)
-    ]
-    unknown = np.concatenate(kinds)
+    of_rows = zip((occurrence_classes(shown).values for _, shown in rows), amplitude, strict=True)
+    unknown = np.concatenate([kinds[np.isnan(values).any(axis=(0, 1))] for kinds, values in of_rows])
     words = [text for kind, text in WITHOUT_RESULT.items() if (unknown == kind).any()]
     return ["grey: no spectrum" + (f" ({', '.join(words)})" if words else "")] if unknown.size else []
 
 
-def spectra_norm(spectra: Sequence[NDArray[np.float64]], highest: float | None = None) -> LogNorm:
+def spectra_norm(spectra: Sequence[Array], highest: float | None = None) -> LogNorm:
     """Logarithmic scale of amplitudes, which neither one run nor one harmonic flattens.
 
     It ends at `highest`, or as `cells.norm_over` ends over the largest amplitude of each run, and begins
-    where LIGHT of all amplitudes lie below, within two to four decades from its end.
-
-    Parameters
-    ----------
-    spectra : sequence of array, shape (line, run)
-        Amplitudes, nan where a run has no spectrum.
-    highest : float
-        In their unit.
+    where LIGHT of all amplitudes (line, run) lie below, within two to four decades from its end. nan stands
+    where a run has no spectrum.
     """
     strongest = np.concatenate([np.nan_to_num(each, nan=-1.0).max(axis=0) for each in spectra])
     top = float(cells.norm_over(strongest[strongest > 0.0], 0.0, highest).vmax or 1.0)
@@ -272,9 +226,27 @@ def spectra_norm(spectra: Sequence[NDArray[np.float64]], highest: float | None =
     return LogNorm(float(np.clip(low, DEEPEST * top, SHALLOWEST * top)), top)
 
 
-def draw_orders(
-    axes: Axes, x: NDArray[np.float64], turns: NDArray[np.float64], orders: Sequence[float]
-) -> list[Named]:
+def draw_spectra(axes: Axes, x: Array, y: Array, amplitude: Array, norm: LogNorm) -> None:
+    """Draw amplitudes (line, run) in colours, at places or between borders along both sides."""
+    cut = np.ma.masked_invalid(np.maximum(amplitude, norm.vmin))  # zero has no logarithm
+    axes.pcolormesh(x, y, cut, norm=norm, cmap=COLOURS, rasterized=True)
+
+
+def spectra_bar(
+    figure: Figure,
+    norm: LogNorm,
+    spectra: Sequence[Array],
+    panels: NDArray[Any],
+    aspect: int,
+    unit: str = "µm",
+) -> None:
+    """Draw the colour bar of spectra beside their panels."""
+    values = np.concatenate([each.ravel() for each in spectra])
+    scale = cells.Scale(COLOURS, norm, f"amplitude [{unit}]")
+    cells.colour_bar(figure, scale, values, ax=list(panels.flat), aspect=aspect, pad=0.02)
+
+
+def draw_orders(axes: Axes, x: Array, turns: Array, orders: Sequence[float]) -> list[Named]:
     """Draw multiples of the turns (n,) [Hz] at places (n,) as dots, and return them with their orders."""
     lines = [Named(f"{order:g}×", ORDER, x, order * turns) for order in orders]
     for line in lines:
@@ -282,15 +254,10 @@ def draw_orders(
     return lines
 
 
-def draw_eigenfrequencies(
-    axes: Axes, x: NDArray[np.float64], lines: NDArray[np.float64], numbers: NDArray[np.int64]
-) -> list[Named]:
+def draw_eigenfrequencies(axes: Axes, x: Array, lines: Array, numbers: NDArray[np.int64]) -> list[Named]:
     """Draw dashes (half waves, n) at places (n,), which let ridges show; return them with their numbers."""
-    found = [
-        Named(str(number), LINE, x, line)
-        for number, line in zip(numbers, lines, strict=True)
-        if np.any(line < axes.get_ylim()[1])
-    ]
+    each = (Named(str(number), LINE, x, line) for number, line in zip(numbers, lines, strict=True))
+    found = [line for line in each if np.any(line.y < axes.get_ylim()[1])]
     for line in found:
         axes.plot(x, line.y, color=LINE, ls=(0, (3, 5)), lw=1.1, path_effects=OUTLINE)
     return found

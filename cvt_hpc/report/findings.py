@@ -3,6 +3,7 @@
 Quantities that a page shows are numbers, one for each run, that vary over the study.
 """
 
+import re
 from collections import Counter
 from collections.abc import Iterator, Sequence
 from itertools import islice
@@ -12,7 +13,7 @@ import numpy as np
 import xarray as xr
 from numpy.typing import NDArray
 
-from cvt_hpc.analysis.arrangement import infinity_in_words, value_text
+from cvt_hpc.analysis.arrangement import infinity_in_words, place_text, value_text
 from cvt_hpc.analysis.classes import at_strongest_strand, count_classes, map_classes, occurrence_classes
 from cvt_hpc.analysis.figures import coordinate_unit, in_words, number, value_unit
 from cvt_hpc.analysis.probability import CONTOURS, PROBABILITY
@@ -81,7 +82,7 @@ def slip_sentence(dataset: xr.Dataset, x: str) -> str:
         return ""
     other = [dim for dim in slipping.dims if dim != x]
     lowest = int(np.argmax(slipping.any(other).values))
-    least = f", the first at {in_words(dataset[x])} {value_text(dataset[x], lowest)}"
+    least = f", the first at {place_text(dataset[x], lowest)}"
     return f"The belt slips or lifts off in {counted(count, 'run')}{least if _is_number(dataset[x]) else ''}."
 
 
@@ -101,9 +102,8 @@ def window_sentences(dataset: xr.Dataset, x: str, others: Sequence[str]) -> Iter
     if not decided.any():
         return
     dataset = dataset.sortby([name for name in (x, *others) if _is_number(dataset[name])])
-    stacked = dataset.stack(line=others) if others else dataset.expand_dims("line")
-    lines = [stacked.isel(line=k) for k in range(stacked.sizes["line"])]
-    told = [_line(line, x, _place(dataset, others, k)) for k, line in enumerate(lines)]
+    places, lines = _lines(dataset, others)
+    told = [_line(line, x, place) for line, place in zip(lines, places, strict=True)]
     vibrating = [text for text in told if text]
     shown = np.unique(np.linspace(0, len(vibrating) - 1, min(len(vibrating), MOST_LINES)).round().astype(int))
     yield from (vibrating[k] for k in shown)
@@ -120,19 +120,19 @@ def window_sentences(dataset: xr.Dataset, x: str, others: Sequence[str]) -> Iter
         yield f"{start} run is known to vibrate, but not all are known to be quiet."
 
 
+def _lines(dataset: xr.Dataset, others: Sequence[str]) -> tuple[list[str], list[xr.Dataset]]:
+    """Places of the lines of a study along an axis, and these lines, by the values of all others."""
+    stacked = dataset.stack(line=others) if others else dataset.expand_dims("line")
+    numbers = range(stacked.sizes["line"])
+    return [_place(dataset, others, k) for k in numbers], [stacked.isel(line=k) for k in numbers]
+
+
 def probability_sentences(
     dataset: xr.Dataset, told: xr.Dataset, x: str, others: Sequence[str]
 ) -> Iterator[str]:
     """Yield how sure the vibration of a study with uncertain parameters is, line by line along x.
 
-    Parameters
-    ----------
-    dataset, told : Dataset
-        The results, and their `probabilities`.
-    x : str
-        Axis along which lines run.
-    others : sequence of str
-        All other axes but that of the samples.
+    `told` are the `probabilities` of the results, `others` all other axes but that of the samples.
     """
     yield f"{told.attrs['counted']}.".replace(";", ", with", 1)
     uncertain = (
@@ -147,11 +147,10 @@ def probability_sentences(
         "their errors are alike. Runs without a verdict count on neither side, and widen the intervals."
     )
     told = told.sortby([name for name in (x, *others) if _is_number(told[name])])
-    stacked = told.stack(line=others) if others else told.expand_dims("line")
-    lines = [stacked.isel(line=k) for k in range(stacked.sizes["line"])]
+    places, lines = _lines(told, others)
     moving = [k for k, line in enumerate(lines) if (line[PROBABILITY] > 0.0).any()]
     for k in moving[:MOST_LINES]:
-        yield _how_sure(lines[k], x, _place(told, others, k))
+        yield _how_sure(lines[k], x, places[k])
     if (more := len(moving) - MOST_LINES) > 0:
         yield f"In {counted(more, 'more line')} along {in_words(told[x])} samples vibrate."
     if quiet := len(lines) - len(moving):
@@ -180,11 +179,9 @@ def _owed(told: xr.Dataset) -> Iterator[str]:
     named = zip(here["parameter"].values, *(here[order].values for order in orders), strict=True)
     known = sorted(((one, *ends) for one, *ends in named if np.isfinite(ends[0])), key=lambda row: -row[1])
     if known:
-        listed = ", ".join(
-            f"{name} {value:.2f} ({low:.2f} to {high:.2f})" for name, value, low, high in known
-        )
+        listed = (f"{name} {value:.2f} ({low:.2f} to {high:.2f})" for name, value, low, high in known)
         where = f"where vibration is least certain, at {_place(told, dims, cell)}"
-        yield f"Total Sobol indices {where}: {listed}."
+        yield f"Total Sobol indices {where}: {', '.join(listed)}."
 
 
 def _onset_owed(dataset: xr.Dataset, along: str) -> Iterator[str]:
@@ -245,10 +242,7 @@ def _percent(share: float) -> str:
 
 def _place(dataset: xr.Dataset, names: Sequence[str], index: int) -> str:
     places = np.unravel_index(index, [dataset.sizes[name] for name in names]) if names else ()
-    at = [
-        f"{in_words(dataset[name])} {value_text(dataset[name], int(place))}"
-        for name, place in zip(names, places, strict=True)
-    ]
+    at = [place_text(dataset[name], int(k)) for name, k in zip(names, places, strict=True)]
     return " and ".join(filter(None, (", ".join(at[:-1]), *at[-1:])))
 
 
@@ -329,7 +323,7 @@ def failures(dataset: xr.Dataset) -> list[Failure]:
     alike: dict[tuple[str, str], tuple[str, int]] = {}
     numbers: Counter[tuple[str, str]] = Counter()
     for index, reason in zip(failed, map(str, reasons), strict=True):
-        kind = STATUS.get(int(status[index]), "failed"), _without_numbers(reason)
+        kind = STATUS.get(int(status[index]), "failed"), re.sub(r"\d", "", reason)
         alike.setdefault(kind, (reason, int(index)))
         numbers[kind] += 1
     found = []
@@ -340,33 +334,17 @@ def failures(dataset: xr.Dataset) -> list[Failure]:
     return found
 
 
-def _without_numbers(reason: str) -> str:
-    return "".join(letter for letter in reason if not letter.isdigit())
-
-
 def _is_number(axis: xr.DataArray) -> bool:
     return axis.dtype.kind in "iuf"
 
 
 class Quantity(NamedTuple):
-    """A number of each run.
+    """A number of each run."""
 
-    Attributes
-    ----------
-    key : str
-        The variable of the dataset.
-    name : str
-        In words.
-    unit : str
-        For people.
-    values : array
-        In that unit, over the dimensions of `status`; nan where it is not known.
-    """
-
-    key: str
-    name: str
-    unit: str
-    values: NDArray[np.float64]
+    key: str  # the variable of the dataset
+    name: str  # in words
+    unit: str  # for people
+    values: NDArray[np.float64]  # in that unit, over the dimensions of `status`; nan where it is not known
 
     @property
     def label(self) -> str:
@@ -419,10 +397,9 @@ def _candidates(dataset: xr.Dataset) -> Iterator[tuple[str, xr.DataArray]]:
             yield name, array
             continue
         for place in range(array.sizes[extra]):
-            is_text = dataset[extra].dtype.kind not in "iuf"
-            label = (
-                str(dataset[extra].values[place]) if is_text else f"{in_words(dataset[extra])} {place + 1}"
-            )
+            label = f"{in_words(dataset[extra])} {place + 1}"
+            if not _is_number(dataset[extra]):
+                label = str(dataset[extra].values[place])
             part = array.isel({extra: place}, drop=True)
             # the name of a variable may be long; what stands there is never taken for a sentence
             yield name, part.rename(f"{in_words(array)}, {label}").assign_attrs(long_name="")

@@ -18,28 +18,9 @@ def follow_report(
 ) -> Path:
     """Write the page of a study every so often [s] until no sweep is at work, or until Ctrl-C.
 
-    The last page is as `write_report` makes it. A second Ctrl-C leaves the one before it.
-
-    Parameters
-    ----------
-    path : Path
-        The output folder of a run.
-    out : Path
-        The page.
-    every : float
-        Time between two pages [s]; longer where a page takes long.
-    rows : callable
-        Tells the status of the study, by names and values.
-
-    Returns
-    -------
-    Path
-        `out`.
-
-    Raises
-    ------
-    InputError
-        If the folder is not that of a run, or the system refuses.
+    The time between two pages is longer where a page takes long. The last page is as `write_report` makes it;
+    a second Ctrl-C leaves the one before it. `rows` tells the status of the study, by names and values.
+    InputError if `path` is not the folder of a run, or the system refuses.
     """
     folder, is_left = StudyFolder(path), False
     while True:

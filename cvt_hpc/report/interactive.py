@@ -35,20 +35,10 @@ _SYMBOLS = {  # marks of the plotting library on cells of a class, and for legen
 
 
 def map_data(dataset: xr.Dataset, source: str = "results") -> dict[str, Any]:
-    """Gather what the map shows.
+    """Gather what the map shows of a study over a grid or of samples, of one run at least along one axis.
 
-    Parameters
-    ----------
-    dataset : Dataset
-        Results of a study over a grid or of samples, of one run at least along one axis.
-    source : str
-        Where the results are from, for errors.
-
-    Returns
-    -------
-    dict
-        Of JSON types; numbers of cells as base64 of bytes, or of floats of 4 bytes, the last axis running
-        fastest.
+    Returned are JSON types; numbers of cells are base64 of bytes, or of floats of 4 bytes, the last axis
+    running fastest.
     """
     sampled = is_sampled(dataset)
     sides: dict[str, str | None]
@@ -122,11 +112,9 @@ def _grid_axis(axis: xr.DataArray) -> dict[str, Any]:
 def _sampled_axis(axis: xr.DataArray) -> dict[str, Any]:
     factor, unit = coordinate_unit(axis.attrs)
     is_number = axis.dtype.kind in "iuf"
-    values = (
-        [factor * value if np.isfinite(value) else None for value in axis.values.tolist()]
-        if is_number
-        else list(map(str, axis.values))
-    )
+    values: list[Any] = list(map(str, axis.values))
+    if is_number:
+        values = [factor * value if np.isfinite(value) else None for value in axis.values.tolist()]
     return {
         "name": in_words(axis),
         "label": axis_label(axis, unit if is_number else ""),

@@ -96,33 +96,23 @@ def write_report(
     measured: str | Path | None = None,
     progress: Progress | None = None,
 ) -> Path:
-    """Write the page.
+    """Write the page, and return its path.
+
+    It needs no network: the plotting library, which draws the map with the values of its cells, is in it, and
+    pictures of the maps for paper and for browsers without scripts.
 
     Parameters
     ----------
-    dataset : Dataset
-        Results of a study, as `open_results` returns them, of any model and earlier version.
+    dataset, source
+        Results of a study, of any model and earlier version, else InputError, which names the source.
     out : Path
         The page; its folder is made if needed.
-    source : str
-        Where the results are from, for the errors.
     folder : Path, optional
         Folder of the study: runs that `--check-step` and `--audit` have left in it are compared with its own.
     measured : str or Path, optional
         Measured file, drawn over the maps of a grid; a sentence says how far they agree.
     progress : Progress, optional
         Heads the page. Of one that a browser reads again the map is the printed one.
-
-    Returns
-    -------
-    Path
-        `out`. The page needs no network: the plotting library, which draws the map with the values of its
-        cells, is in it, and pictures of the maps for paper and for browsers without scripts.
-
-    Raises
-    ------
-    InputError
-        If the dataset holds no results of a study, or the system refuses; as of `score`.
     """
     check_results(dataset, source)
     if (content := str(dataset.attrs.get(CONTENT, ""))) == HISTORY:
@@ -293,10 +283,8 @@ def _encoded(compose: Callable[[], Figure]) -> str:
 def _with_code(text: str) -> Markup:
     """A text as HTML: what stands between backticks as code, numbers never parted from their units."""
     text = with_units(_as_it_stands(text)).replace("N m", "N\u00a0m")
-    parts = [
-        Markup("<code>{}</code>" if k % 2 else "{}").format(part) for k, part in enumerate(text.split("`"))
-    ]
-    return Markup("").join(parts)
+    parts = enumerate(text.split("`"))
+    return Markup("").join(Markup("<code>{}</code>" if k % 2 else "{}").format(part) for k, part in parts)
 
 
 def _map(dataset: xr.Dataset, source: str) -> dict[str, str] | None:
@@ -336,10 +324,8 @@ def _cost(dataset: xr.Dataset) -> str:
     known = seconds[np.isfinite(seconds)]
     if not known.size:
         return ""
-    return (
-        f"{core_time_in_words(known.sum())} in all; a run took {np.median(known):.3g} s of a core (median), "
-        f"{known.max():.3g} s at most."
-    )
+    told = f"{np.median(known):.3g} s of a core (median), {known.max():.3g} s at most"
+    return f"{core_time_in_words(known.sum())} in all; a run took {told}."
 
 
 def _quality(dataset: xr.Dataset) -> list[tuple[str, str, str, str, str]]:
@@ -387,16 +373,10 @@ def _provenance(attributes: Mapping[str, str]) -> list[tuple[str, str]]:
 
 
 def next_steps(dataset: xr.Dataset, job: Job | None, x: str | None) -> Iterator[str]:
-    """Yield what to do next, one sentence each, code between backticks.
+    """Yield what to do next with a study, one sentence each, code between backticks.
 
-    Parameters
-    ----------
-    dataset : Dataset
-        Results of a study.
-    job : Job or None
-        Its job, where this version reads it.
-    x : str or None
-        The numeric axis along which windows are told; None of samples.
+    The job is None where this version does not read it, and the numeric axis x, along which windows are told,
+    of samples.
     """
     status, classes = dataset["status"].values, map_classes(dataset)
     for kind, how in _RETRIES.items():
