@@ -49,6 +49,9 @@ QUOTED = [
     (CHARTS, r"within (\S+) % of this reference", "ladder_pushbelt", of_rung("forces", "elastic_belt"), "error_median", 0.01),
     (CHARTS, r"amplitudes within (\S+) %", "ladder_pushbelt", of_rung("amplitude", "elastic_belt"), "error_median", 0.01),
     (CHARTS, r"frequencies within (\S+) % \(medians\)", "ladder_pushbelt", of_rung("frequency", "elastic_belt"), "error_median", 0.01),
+    (VALIDATION, r"`elastic_belt` \| `pushbelt`.* amplitude (\S+) % \(median", "ladder_pushbelt", of_rung("amplitude", "elastic_belt"), "error_median", 0.01),
+    (VALIDATION, r"`elastic_belt` \| `pushbelt`.* frequency (\S+) %", "ladder_pushbelt", of_rung("frequency", "elastic_belt"), "error_median", 0.01),
+    (VALIDATION, r"`elastic_belt` \| `pushbelt`.* forces (\S+) %", "ladder_pushbelt", of_rung("forces", "elastic_belt"), "error_median", 0.01),
 ]  # fmt: skip
 
 
