@@ -202,7 +202,8 @@ def trouble_lines(report: RunReport) -> Iterator[str]:
         if report.gained:
             yield f"stopped early ({report.stopped}); the same command goes on from here"
         else:
-            yield f"stopped early ({report.stopped}) before any run had ended; give it more time"
+            more = "; give it more time" * (report.stopped == "time limit")
+            yield f"stopped early ({report.stopped}) before any run had ended{more}"
 
 
 def status_rows(status: StudyStatus) -> list[tuple[str, str]]:

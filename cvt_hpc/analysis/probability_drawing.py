@@ -21,6 +21,7 @@ from cvt_hpc.analysis.sensitivity import (
     QUANTILES,
     QUARTERS,
     indices_of,
+    members,
     onset_axis,
     onset_scatter,
     widest_row,
@@ -96,7 +97,8 @@ def onset_bands_figure(
     along = along or onset_axis(told, at or {})
     known = [name for name in map(str, told["status"].dims) if name not in (at or {})]
     if "counted" not in told.attrs or along not in known or told["status"].ndim < 2:
-        expected = f"results over samples and two further axes, of them {along or 'one'} of numbers"
+        which = f"{along} with numbers" if along else "one of numbers"
+        expected = f"results over samples, {which}, and a further axis, such as friction_gradient"
         raise mismatch(source, expected, axes_in_words(dataset))
     quantiles = onset_scatter(dataset, along)["onset"]
     axes_left = xr.Dataset({"status": told["status"].isel({along: 0}, drop=True), "onset": quantiles})
@@ -148,6 +150,8 @@ def sensitivity_figure(
     if "band" not in found:
         raise mismatch(source, "results with the job that states the distributions", "others")
     row = widest_row(found)
+    if not np.any(np.isfinite(found["onset"])):
+        raise mismatch(source, f"vibration that sets in along {along}", "none in any sample")
     place = ", ".join(layout.place_text(found[name], k, " = ") for name, k in row.items())
     head = figures.headline(f"What the onset in {figures.in_words(dataset[along])} depends on", dataset.attrs)
     lines = [head, place.replace("_", " ")]
@@ -175,7 +179,7 @@ def sensitivity_figure(
         for key, shift, colour in (("first_order", 0.18, "#756bb1"), ("total_order", -0.18, "#bcbddc")):
             values = np.stack([shares[f"{key}{end}"].values for end in _BOUNDS])
             _draw_bars(all_axes[2], places + shift, values, key.replace("_", " "), colour, 0.34)
-    all_axes[0].set_yticks(places, [str(name).replace("_", " ") for name in names])
+    all_axes[0].set_yticks(places, [",\n".join(members(dataset, str(name))) for name in names])
     for axes, head in zip(all_axes, heads, strict=True):
         axes.set_xlabel(head)
         axes.grid(axis="x", lw=0.4, alpha=0.5)

@@ -264,6 +264,13 @@ def _weights(dataset: xr.Dataset) -> dict[str, NDArray[np.float64]]:
     return {name: _halving(uncertain, keys, values) for name, keys in groups.items() if {*keys} <= {*values}}
 
 
+def members(dataset: xr.Dataset, group: str) -> list[str]:
+    """Return the names of a group of an `onset_scatter`: of one parameter or of the correlated ones."""
+    table = stated(dataset, TABLE)
+    keys = read_document(table).groups()[group] if table else (group,)
+    return [key.replace("_", " ") for key in keys]
+
+
 def _in_quarters(dataset: xr.Dataset, name: str) -> NDArray[np.float64]:
     """Whether a parameter of a sample is in each of QUARTERS, shape (2, samples); nan of correlated ones."""
     if name not in dataset.coords:

@@ -120,8 +120,8 @@ def take_own(assignments: Document, table: str) -> Document:
 
 
 def structured(raw: object) -> Any:
-    """Return the list or the table that a text of the command line holds, or the value as it is."""
-    if not isinstance(raw, str) or not raw.startswith(("[", "{")):
+    """Return the list, table or quoted text that a text of the command line holds, or the value as it is."""
+    if not isinstance(raw, str) or not raw.startswith(("[", "{", '"')):
         return raw
     try:
         return tomllib.loads(f"value = {raw}")["value"]

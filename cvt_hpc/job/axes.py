@@ -213,6 +213,9 @@ def _counted(start: float, stop: float, raw: Table, where: str) -> tuple[float, 
 def _stepped(start: float, stop: float, step: float, where: str) -> tuple[float, ...]:
     first, last, stride = _decimal(start), _decimal(stop), _decimal(step)
     steps = (last - first) / stride
+    if steps < 0:
+        sign = "above" if last > first else "below"
+        raise mismatch(f"{where}.step", f"a step {sign} 0, from {start:g} to {stop:g}", f"{step:g}")
     count = round(steps)
     if count < 1 or abs(steps - count) > _STEP_TOLERANCE:
         expected = f"a step that leads from {start:g} to {stop:g} in whole steps"

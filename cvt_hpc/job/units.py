@@ -40,6 +40,7 @@ _PLAIN = {
     ("deg", "rad"): lambda number: number * _PI / 180,
     ("%", ""): lambda number: number.scaleb(-2),
 }
+_MEANT = {("U/min", "rad/s"): "rpm", ("kg", "N"): "kgf"}  # by what is written of what is wanted
 
 _PART = re.compile(r"\s*(\d+\.?\d*|\.\d+)\s*([A-Za-z]*)\s*")
 _EXPECTED = 'a time above 0, such as "2h30m", "90 min" or a bare number in s'
@@ -136,6 +137,8 @@ def _convert(number: Decimal, given: str, unit: str) -> Decimal:
 @lru_cache
 def _conversion(given: str, unit: str) -> tuple[Decimal, Decimal]:
     """Factor between two units, and what a zero of the first one is in the second one."""
+    if meant := _MEANT.get((given, unit)):
+        raise UnitError(f"write {meant}")
     source, target = _parse_unit(given), _parse_unit(unit)
     if source.dimensionality != target.dimensionality:
         raise UnitError

@@ -18,8 +18,8 @@ from cvt_hpc.analysis.classes import at_strongest_strand, count_classes, map_cla
 from cvt_hpc.analysis.figures import coordinate_unit, in_words, number, value_unit
 from cvt_hpc.analysis.probability import CONTOURS, PROBABILITY
 from cvt_hpc.analysis.scatter import is_sampled
-from cvt_hpc.analysis.sensitivity import QUANTILES, onset_axis, onset_scatter, widest_row
-from cvt_hpc.job.axes import CORRELATED, SAMPLE
+from cvt_hpc.analysis.sensitivity import QUANTILES, members, onset_axis, onset_scatter, widest_row
+from cvt_hpc.job.axes import SAMPLE
 from cvt_hpc.variables import Status
 from cvt_hpc.vibration.classes import DECIDED, OccurrenceClass, levels, onsets
 
@@ -204,9 +204,9 @@ def _onset_owed(dataset: xr.Dataset, along: str) -> Iterator[str]:
         width, low, high = (factor * one[f"halved_band{end}"].item() for end in ("", "_low", "_high"))
         if np.isfinite(width):
             bounds = f"{low:.3g} to {high:.3g}" if np.isfinite(high) else f"{low:.3g} or more"
-            words = str(name).replace("_", " ")
+            words = " with ".join(members(dataset, str(name)))
             yield (
-                f"Halve the scatter of {words}{' parameters' * (name == CORRELATED)}, and this band "
+                f"Halve the scatter of {words}, and this band "
                 f"{'shrinks' if width < band else 'grows'} from {band:.3g} to {width:.3g} {unit} ({bounds})."
             )
 

@@ -290,6 +290,16 @@ def test_half_the_scatter_of_a_parameter_narrows_the_onset_as_in_the_closed_form
     assert found["halved_onset"].values[1] == pytest.approx(15.0, abs=0.1)
 
 
+def test_the_picture_names_correlated_parameters_and_none_is_drawn_where_nothing_vibrates():
+    further = {"damping": normal(5.0, 0.75), "preload": normal(40.0, 20.0)}
+    further["correlation"] = {"parameters": ["damping", "preload"], "matrix": [[1.0, 0.6], [0.6, 1.0]]}
+    dataset = linear_onset(32, STEPS, **further)
+    assert "damping,\npreload" in words(sensitivity_figure(dataset))
+    quiet = dataset.assign(vibrates=xr.full_like(dataset["vibrates"], int(Vibrates.NO)))
+    with pytest.raises(InputError, match="expected vibration that sets in along load, found none in any"):
+        sensitivity_figure(quiet)
+
+
 def test_samples_that_are_not_run_make_no_band_surer():
     whole = linear_onset(256, STEPS, damping=normal(5.0, 0.75), preload=normal(40.0, 20.0))
     part = whole.isel(sample=slice(32))
@@ -395,7 +405,7 @@ def test_over_one_axis_the_interval_is_a_band_and_onsets_have_one_over_another(t
     quantiles = onset_scatter(two_axes, "load")["onset"]
     median = figure.axes[0].lines[0].get_ydata()
     assert median == pytest.approx(np.where(np.isinf(quantiles[1]), np.nan, quantiles[1]), nan_ok=True)
-    with pytest.raises(InputError, match="expected results over samples and two further axes, of them load"):
+    with pytest.raises(InputError, match="over samples, load with numbers, and a further axis, such as"):
         onset_bands_figure(two_axes.isel(thrust=0))
     with pytest.raises(InputError, match="expected results with the axis sample"):
         two_axes.isel(sample=0).cvt.probability()

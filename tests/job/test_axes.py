@@ -130,7 +130,7 @@ def test_minus_zero_is_zero():
         (
             {"from": 0, "to": 1, "step": -0.5},
             LOAD,
-            ".step: expected a step that leads from 0 to 1 in whole steps, found -0.5, which takes -2 steps",
+            ".step: expected a step above 0, from 0 to 1, found -0.5",
         ),
         ({"from": 0, "to": 1, "step": 0}, LOAD, ".step: expected a step other than 0, found 0"),
         ({"from": 0, "to": 1, "step": 1e-9}, LOAD, ": expected at most 100000 values, found about 1e+9"),

@@ -289,7 +289,7 @@ def test_a_rule_of_a_whole_number_has_to_give_one(write_job):
         ("[linked.ratio]", "[linked.element_mass]", "[linked.element_mass]: unknown axis; known: ratio, sheave_stiffness"),
         ("[linked.ratio]\nthrust", "[linked]\nthrust", "[linked] thrust: expected a table [linked.thrust], found a list"),
         (', "20 kN"]', "]", "[linked.ratio] thrust: expected 3 values, one for each of ratio, found 2"),
-        ('"10 kN"', '"10 kg"', '[linked.ratio] thrust, value 2: expected a value in N (such as "1 N" or a bare number in N), found "10 kg"'),
+        ('"10 kN"', '"10 kg"', '[linked.ratio] thrust, value 2: expected a value in N (such as "1 N" or a bare number in N), found "10 kg" (write kgf)'),
         ("thrust = [", "load = [", None),
         ("thrust = [", "thurst = [", "[linked.ratio] thurst: unknown key; did you mean thrust in [scene]?"),
         ("[derived]", "[derive]", "[derive]: unknown table; did you mean derived?"),

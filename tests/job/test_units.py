@@ -54,8 +54,10 @@ def test_texts_with_units_become_si_numbers(text, unit, value):
 @pytest.mark.parametrize(
     ("text", "unit", "reason"),
     [
-        ("50 kg", "N", ""),
-        ("nan kg", "N", ""),
+        ("50 kg", "N", "write kgf"),
+        ("nan kg", "N", "write kgf"),
+        ("50 kg", "s", ""),
+        ("3000 U/min", "rad/s", "write rpm"),
         ("50 kX", "N", "kX is no known unit"),
         ("50 KN", "N", "KN is no known unit"),
         ("0NAN", "N", "NAN is no known unit"),

@@ -77,7 +77,7 @@ def test_a_sweep_that_is_killed_and_grows_has_the_numbers_of_an_undisturbed_one(
     assert main(["report", "whole"]) == 0
     capsys.readouterr()
     assert main(["plot", "onset_bands", "whole"]) == 2
-    assert "expected results over samples and two further axes" in capsys.readouterr().err
+    assert "results over samples, radial_speed with numbers, and a further axis" in capsys.readouterr().err
 
 
 def test_each_run_has_the_values_that_the_dataset_states(tmp_path):
