@@ -66,33 +66,16 @@ class Asked:
 
 @dataclass(frozen=True)
 class Diagram:
-    """The content of a job.
+    """The content of a job."""
 
-    Attributes
-    ----------
-    job : Job
-        Of linear stability, with the load among its axes.
-    axes : tuple of Axis
-        Those other than the load.
-    loads : tuple of float
-        Ascending [N m].
-    branches : tuple of Asked
-        One for each combination of the other axes' values, the last axis fastest.
-    disturbance : tuple of float
-        Of the runs from near the steady state and from the large start [m]; () for no runs.
-    resolution : float
-        Spacing of the runs where vibration begins or ends [N m].
-    settings : dict
-        Further keys of the runs, as the job gives them.
-    """
-
-    job: Job
-    axes: tuple[Axis, ...]
-    loads: tuple[float, ...]
-    branches: tuple[Asked, ...]
+    job: Job  # of linear stability, with the load among its axes
+    axes: tuple[Axis, ...]  # those other than the load
+    loads: tuple[float, ...]  # ascending [N m]
+    branches: tuple[Asked, ...]  # one for each combination of the other axes' values, the last axis fastest
+    # of the runs from near the steady state and from the large start [m]; () for no runs
     disturbance: tuple[float, ...]
-    resolution: float
-    settings: dict[str, Any]
+    resolution: float  # spacing of the runs where vibration begins or ends [N m]
+    settings: dict[str, Any]  # further keys of the runs, as the job gives them
 
     def resolved(self) -> dict[str, Any]:
         """Return all entries that determine the numbers, as a job file is laid out, in JSON types."""

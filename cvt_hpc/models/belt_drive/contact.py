@@ -45,17 +45,11 @@ class Contact(NamedTuple):
 
 
 class Touch(NamedTuple):
-    """State of the contacts of P pulleys and k elements, and their forces.
+    """State of the contacts of P pulleys and k elements, and their forces."""
 
-    Attributes
-    ----------
-    memory : Memory
-        Of friction.
-    normal, tangential : (P, k, C) arrays
-        Forces on the belt in the last stage, outwards and counter-clockwise [N].
-    """
-
-    memory: Memory
+    memory: Memory  # of friction
+    # normal, tangential, shape (P, k, C): forces on the belt in the last stage, outwards and
+    # counter-clockwise [N]
     normal: np.ndarray
     tangential: np.ndarray
 

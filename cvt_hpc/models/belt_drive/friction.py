@@ -119,18 +119,13 @@ def empty_memory(pulleys: int, elements: int, points: int) -> Memory:
 
 
 class Rub(NamedTuple):
-    """Friction of a contact per length, against its slip, and its slopes.
+    """Friction of a contact per length, against its slip, and its slopes."""
 
-    Attributes
-    ----------
-    force, settled : float
-        By this iterate, and the value expected of the solution, which turns with the contact [N/m].
-    by_slip, by_pressure : float
-        [N s/m^2], [1].
-    """
-
+    # force, settled: by this iterate, and the value expected of the solution, which turns with the contact
+    # [N/m]
     force: float
     settled: float
+    # by_slip, by_pressure: [N s/m^2], [1]
     by_slip: float
     by_pressure: float
 
