@@ -86,8 +86,8 @@ class Posterior(NamedTuple):
     # dataset, measured: results of the study, over `sample` and its grid, and what was measured
     dataset: xr.Dataset
     measured: Measured
-    # distributions, values, shape (parameter, sample): the uncertain parameters beforehand, and their values
-    # [SI]
+    # distributions, values: the uncertain parameters beforehand, and their values [SI], shape (parameter,
+    # sample)
     distributions: tuple[Distribution, ...]
     values: Array
     lines: list[Line]  # agreement of each sample

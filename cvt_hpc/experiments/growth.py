@@ -156,8 +156,6 @@ def find_growth(asked: Growth, out: Path) -> list[Found]:
 
     Parameters
     ----------
-    asked : Growth
-        The job.
     out : Path
         The folder with its studies, whose runs have been done.
 

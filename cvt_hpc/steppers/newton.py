@@ -92,8 +92,6 @@ def renew(
 
     Parameters
     ----------
-    system : System
-        The equations.
     frozen : Frozen
         Result; its `rates` are those of y.
     t, y
@@ -166,8 +164,6 @@ def solve_stage(
 
     Parameters
     ----------
-    system : System
-        The equations.
     frozen : Frozen
         The last matrix; renewed where it does not serve.
     t : float

@@ -114,10 +114,8 @@ def fundamental(signal: ArrayLike, rate: float, band: tuple[float, float]) -> tu
     ----------
     signal : array, shape (time,)
         Samples, in any unit.
-    rate : float
-        Sampling rate [Hz].
-    band : (float, float)
-        Lowest and highest frequency [Hz].
+    rate, band
+        As of `modal_peaks`.
 
     Returns
     -------

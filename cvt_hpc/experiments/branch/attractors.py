@@ -222,8 +222,6 @@ def states_of(found: Branch, grid: Mesh, loads: Sequence[float]) -> Arrays:
 
     Parameters
     ----------
-    found : Branch
-        The branch.
     grid : Mesh
         Of its belt.
     loads : sequence of float

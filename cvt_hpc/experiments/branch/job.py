@@ -186,15 +186,7 @@ class Cost(NamedTuple):
 
 
 def predicted_cost(diagram: Diagram, asked: Asked) -> Cost:
-    """Return the cost of a branch where vibration begins once and ends once.
-
-    Parameters
-    ----------
-    diagram : Diagram
-        The requested diagram.
-    asked : Asked
-        One of its branches.
-    """
+    """Return the cost of a branch where vibration begins once and ends once."""
     first = float(load_model(diagram.job.model).cost(asked.parameters, None))
     steady = first * (1.0 + FURTHER * len(diagram.loads))
     if not diagram.disturbance:

@@ -70,8 +70,6 @@ def compare(chart: Chart, measurements: Mapping[str, Measurement]) -> tuple[Comp
 
     Parameters
     ----------
-    chart : Chart
-        The requested chart.
     measurements : mapping
         By the name of the point.
     """
@@ -140,8 +138,6 @@ def error(quantity: Quantity, measurement: Measurement, reference: Measurement) 
 
     Parameters
     ----------
-    quantity : Quantity
-        Which one, with its scale.
     measurement, reference : Measurement
         The measurement to judge, and its reference.
 

@@ -134,10 +134,6 @@ def measure(point: Point, scene: Scene, repeats: int, time_limit: float) -> Meas
 
     Parameters
     ----------
-    point : Point
-        The job to run.
-    scene : Scene
-        The scene with the judged quantities.
     repeats : int
         How often a quick run is timed.
     time_limit : float
@@ -246,13 +242,6 @@ def predicted_cost(chart: Chart, point: Point) -> float:
 
     Little is known of methods that choose their step. Not known (nan) of a model without records; an exact
     solution takes next to nothing.
-
-    Parameters
-    ----------
-    chart : Chart
-        The chart.
-    point : Point
-        One of its points.
     """
     if point.series == "exact":
         return 0.0

@@ -187,10 +187,6 @@ def observe(history: History, quantities: Sequence[Quantity], whole: bool) -> di
 
     Parameters
     ----------
-    history : History
-        The recorded values of the run.
-    quantities : sequence of Quantity
-        The requested quantities.
     whole : bool
         Whether the run went to its end; of a shorter one only the trajectory counts.
     """

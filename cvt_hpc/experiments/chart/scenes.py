@@ -129,8 +129,6 @@ def read_stage(name: str, raw: Any, document: dict[str, Any], replaced: dict[str
         The job file without the chart.
     replaced : dict
         Values from the command line, which take precedence over those of the scene.
-    source : str
-        The job file, for the errors.
 
     Raises
     ------

@@ -48,8 +48,6 @@ def search(fit: Fit, evaluate: Evaluate, tell: Callable[[str], None] = lambda li
 
     Parameters
     ----------
-    fit : Fit
-        The requested fit.
     evaluate : callable
         Given the name of a study and the scenes of its candidates, shape (candidates, free) [SI].
     tell : callable
@@ -132,10 +130,6 @@ def confirm(fit: Fit, evaluation: Evaluation, found: Found) -> list[Confirmed]:
 
     Parameters
     ----------
-    fit : Fit
-        The requested fit.
-    evaluation : Evaluation
-        Does the runs.
     found : Found
         The candidates of the search, the starts before all others.
     """
@@ -210,10 +204,6 @@ def look_around(fit: Fit, evaluation: Evaluation, confirmed: Sequence[Confirmed]
 
     Parameters
     ----------
-    fit : Fit
-        The requested fit.
-    evaluation : Evaluation
-        Does the runs.
     confirmed : sequence of Confirmed
         The best one first; the starts are among them.
     """

@@ -61,7 +61,7 @@ class State(NamedTuple):
     chain: Chain  # of the belt's n = k nodes
     wheels: rotating.Wheels  # of the pulleys
     touch: Touch  # of the contacts
-    # counters, totals, shape (5 + P,): work done [J]
+    # counters, totals, shapes (3,), of int, and (5 + P,): work done [J]
     counters: np.ndarray
     totals: np.ndarray
 

@@ -106,7 +106,8 @@ class Wheels(NamedTuple):
     centre: np.ndarray
     centre_speed: np.ndarray
     lever: np.ndarray
-    # rows, corner, shape (n, P - 1 + A, 4): border of the equations: the pulleys but the first, then the arms
+    # rows, corner, shapes (n, P - 1 + A, 4) and (1, P - 1 + A): border of the equations: the pulleys but the
+    # first, then the arms
     rows: np.ndarray
     corner: LaneArray
     power: np.ndarray  # shape (5 + P,): of the last stage, in the order of the totals [W]

@@ -183,8 +183,6 @@ def read(
 
     Parameters
     ----------
-    way : Way
-        The reference path.
     beam, chain : AncfBeam, Chain
         The belt, and its motion.
     contact, touch : Contact, Touch

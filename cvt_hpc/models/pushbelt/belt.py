@@ -253,8 +253,8 @@ class PitchLine(NamedTuple):
     """Where the rocking edges of a belt lie at the start, and how fast it runs."""
 
     path: Variator  # [m]
-    # places, points, along, curvature, shape (n,): of the elements, with equal chords: path coordinate [m],
-    # position [m], running direction and curvature of the path [1/m]
+    # places, points, along, curvature, shapes (n,), (n, 2), (n, 2), (n,): of the elements, with equal chords:
+    # path coordinate [m], position [m], running direction and curvature of the path [1/m]
     places: np.ndarray
     points: np.ndarray
     along: np.ndarray

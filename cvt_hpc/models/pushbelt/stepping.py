@@ -144,8 +144,6 @@ def advance_by(equations, belt, newton, state, work, inputs, steps, dt):
         How steps are solved.
     state : BeltState
         The state at the start; at the end, of its last step.
-    work : Workspace
-        Work space.
     inputs : (2, INPUTS) array
         Inputs of the model at the start and at the end (`belt.IN_SPEED` and so on): between, they change
         linearly.
