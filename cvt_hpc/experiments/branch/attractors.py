@@ -55,18 +55,11 @@ class Attractor(NamedTuple):
 
 
 class Start(NamedTuple):
-    """A start of runs.
+    """A start of runs."""
 
-    Attributes
-    ----------
-    settings : mapping
-        Keys of the job with values [SI].
-    state : callable or None
-        The belt's state at a value of the parameter, or None where there is none: that run is left out.
-        Without such a function runs begin as any other.
-    """
-
-    settings: Mapping[str, Any]
+    settings: Mapping[str, Any]  # keys of the job with values [SI]
+    # the belt's state at a value of the parameter, or None where there is none: that run is left out. Without
+    # such a function runs begin as any other.
     state: Callable[[float], State | None] | None = None
 
 

@@ -47,21 +47,11 @@ ENDS = 2  # places along the load where vibration begins or ends, with closer ru
 
 @dataclass(frozen=True)
 class Asked:
-    """One requested branch.
+    """One requested branch."""
 
-    Attributes
-    ----------
-    place : dict
-        Values of the axes other than the load [SI].
-    parameters : dict
-        Resolved parameters of the steady belt [SI].
-    runs : Job
-        Of its transients, without axes.
-    """
-
-    place: dict[str, Any]
-    parameters: dict[str, Any]
-    runs: Job
+    place: dict[str, Any]  # values of the axes other than the load [SI]
+    parameters: dict[str, Any]  # resolved parameters of the steady belt [SI]
+    runs: Job  # of its transients, without axes
 
 
 @dataclass(frozen=True)

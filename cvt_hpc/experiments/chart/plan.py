@@ -44,31 +44,18 @@ class Lead:
 
 @dataclass(frozen=True)
 class Scene:
-    """One problem on which methods compete.
+    """One problem on which methods compete."""
 
-    Attributes
-    ----------
-    name, title : str
-        For files and for people.
-    quantities : tuple of Quantity
-        The judged quantities, in the order of the panels.
-    starts : int
-        Number of runs, from as many random starts.
-    exact : bool
-        Whether the reference is the model's exact solution.
-    time_limit : float
-        Core-seconds [s] after which a run is given up, where the chart allows more.
-    lead : Lead or None
-        The lead-in run that brings all runs, the reference's too, to a state from which they start; only
-        trajectories are judged then.
-    """
-
+    # name, title: for files and for people
     name: str
     title: str
-    quantities: tuple[Quantity, ...]
-    starts: int
-    exact: bool
+    quantities: tuple[Quantity, ...]  # the judged quantities, in the order of the panels
+    starts: int  # number of runs, from as many random starts
+    exact: bool  # whether the reference is the model's exact solution
+    # core-seconds [s] after which a run is given up, where the chart allows more
     time_limit: float = math.inf
+    # the lead-in run that brings all runs, the reference's too, to a state from which they start; only
+    # trajectories are judged then
     lead: Lead | None = None
 
 

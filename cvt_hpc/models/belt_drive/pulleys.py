@@ -35,33 +35,20 @@ class Struts(NamedTuple):
 
 
 class Arms(NamedTuple):
-    """Constants of A arms; (A,) arrays but for the pivots.
+    """Constants of A arms; (A,) arrays but for the pivots."""
 
-    Attributes
-    ----------
-    pivot : (A, 2) array
-        [m]
-    inertia : array
-        Of the arm with the mass of its pulley, about the pivot [kg m^2].
-    moment, stiffness, damping : arrays
-        Of the spring or the strut as drawn [N m], of spring and dashpot at the pivot [N m/rad], [N m s/rad].
-    lowest, highest : arrays
-        Ends of the travel [rad].
-    stop : float
-        Stiffness beyond them [N m/rad].
-    struts : Struts
-        Between arms and ground.
-    """
-
-    pivot: np.ndarray
-    inertia: np.ndarray
+    pivot: np.ndarray  # shape (A, 2): [m]
+    inertia: np.ndarray  # of the arm with the mass of its pulley, about the pivot [kg m^2]
+    # moment, stiffness, damping: of the spring or the strut as drawn [N m], of spring and dashpot at the
+    # pivot [N m/rad], [N m s/rad]
     moment: np.ndarray
     stiffness: np.ndarray
     damping: np.ndarray
+    # lowest, highest: ends of the travel [rad]
     lowest: np.ndarray
     highest: np.ndarray
-    stop: float
-    struts: Struts
+    stop: float  # stiffness beyond them [N m/rad]
+    struts: Struts  # between arms and ground
 
 
 class Pulleys(NamedTuple):

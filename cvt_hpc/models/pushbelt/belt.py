@@ -84,28 +84,17 @@ class Belt(NamedTuple):
 
 
 class Newton(NamedTuple):
-    """How a step is solved.
+    """How a step is solved."""
 
-    Attributes
-    ----------
-    tolerance : float
-        Largest correction of a speed [m/s].
-    power_tolerance : float
-        Largest power residual of the whole belt [W].
-    weights : tuple of float
-        Weights of the corrections of an element's speeds: lengths of angular velocities [m], else 1.
-    most_iterations, first_half_step : int
-        Iterations a step, and the first one whose correction is halved where corrections do not fall.
-    most_failures : int
-        Failed steps in a row with which a run ends.
-    """
-
-    tolerance: float
-    power_tolerance: float
+    tolerance: float  # largest correction of a speed [m/s]
+    power_tolerance: float  # largest power residual of the whole belt [W]
+    # weights of the corrections of an element's speeds: lengths of angular velocities [m], else 1
     weights: tuple[float, ...]
+    # most_iterations, first_half_step: iterations a step, and the first one whose correction is halved where
+    # corrections do not fall
     most_iterations: int = 40
     first_half_step: int = 10
-    most_failures: int = 20
+    most_failures: int = 20  # failed steps in a row with which a run ends
 
 
 TILT_MODES = slice(1, 3)  # cos and sin
