@@ -21,57 +21,25 @@ END = "vmax"  # where colours end: a number [SI], by the command line with its u
 
 
 class Option(NamedTuple):
-    """A choice that a kind offers.
+    """A choice that a kind offers."""
 
-    Attributes
-    ----------
-    key : str
-        Argument of the figure's function.
-    text : str
-        What it chooses.
-    flag : str
-        Of the command line; "" where its words stand behind the dataset.
-    settings : mapping
-        Of the command line: how `argparse` reads it.
-    is_named : bool
-        Whether the picture's file has it in its name.
-    is_word : bool
-        Whether the accessor takes it without its key, as its first arguments.
-    """
-
-    key: str
-    text: str
-    flag: str
-    settings: Mapping[str, Any]
-    is_named: bool = False
-    is_word: bool = False
+    key: str  # argument of the figure's function
+    text: str  # what it chooses
+    flag: str  # of the command line; "" where its words stand behind the dataset
+    settings: Mapping[str, Any]  # of the command line: how `argparse` reads it
+    is_named: bool = False  # whether the picture's file has it in its name
+    is_word: bool = False  # whether the accessor takes it without its key, as its first arguments
 
 
 class Kind(NamedTuple):
-    """A kind of pictures.
+    """A kind of pictures."""
 
-    Attributes
-    ----------
-    subject : str
-        RESULTS, HISTORY or HISTORIES.
-    figure : str
-        Module of `analysis/`, and its function that composes the figure.
-    text : str
-        What it shows.
-    options : tuple of Option
-        Beside those of all kinds of the subject.
-    sides : tuple of str
-        Of `x`, `y`, `panel`: sides on which an axis can be put.
-    data : str
-        As `figure`: a function that gives a dataset of what is drawn, where there is one.
-    """
-
-    subject: str
-    figure: str
-    text: str
-    options: tuple[Option, ...] = ()
-    sides: tuple[str, ...] = ()
-    data: str = ""
+    subject: str  # RESULTS, HISTORY or HISTORIES
+    figure: str  # module of `analysis/`, and its function that composes the figure
+    text: str  # what it shows
+    options: tuple[Option, ...] = ()  # beside those of all kinds of the subject
+    sides: tuple[str, ...] = ()  # of `x`, `y`, `panel`: sides on which an axis can be put
+    data: str = ""  # as `figure`: a function that gives a dataset of what is drawn, where there is one
 
 
 def _several(text: str) -> Option:

@@ -69,49 +69,32 @@ Array = NDArray[np.float64]
 
 
 class Calibration(NamedTuple):
-    """What is asked.
+    """What is asked."""
 
-    Attributes
-    ----------
-    job, rungs : Job, tuple of Sweep
-        With uncertain parameters, and the one study of its samples.
-    measured : Path
-        The measured file.
-    doubt, scatter : float
-        Share of cells that may be judged otherwise [1], standard error of frequencies [Hz].
-    """
-
+    # job, rungs: with uncertain parameters, and the one study of its samples
     job: Job
     rungs: tuple[Sweep, ...]
-    measured: Path
+    measured: Path  # the measured file
+    # doubt, scatter: share of cells that may be judged otherwise [1], standard error of frequencies [Hz]
     doubt: float
     scatter: float
 
 
 class Posterior(NamedTuple):
-    """Samples, weighed by a measurement.
+    """Samples, weighed by a measurement."""
 
-    Attributes
-    ----------
-    dataset, measured : Dataset, Measured
-        Results of the study, over `sample` and its grid, and what was measured.
-    distributions, values : tuple of Distribution, (parameter, sample) array
-        The uncertain parameters beforehand, and their values [SI].
-    lines : list of Line
-        Agreement of each sample.
-    log_likelihood, weights : (sample,) arrays
-        ln L, and the weights, whose sum is 1.
-    after : tuple of Distribution
-        Those that are nearest to the weighed samples; of too few of them, those beforehand.
-    """
-
+    # dataset, measured: results of the study, over `sample` and its grid, and what was measured
     dataset: xr.Dataset
     measured: Measured
+    # distributions, values: the uncertain parameters beforehand, and their values [SI], shape (parameter,
+    # sample)
     distributions: tuple[Distribution, ...]
     values: Array
-    lines: list[Line]
+    lines: list[Line]  # agreement of each sample
+    # log_likelihood, weights, shape (sample,): ln L, and the weights, whose sum is 1
     log_likelihood: Array
     weights: Array
+    # those that are nearest to the weighed samples; of too few of them, those beforehand
     after: tuple[Distribution, ...] = ()
 
     @property

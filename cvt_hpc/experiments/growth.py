@@ -51,24 +51,12 @@ _OF_CELLS = {
 
 
 class Growth(NamedTuple):
-    """A job whose modes are asked for.
+    """A job whose modes are asked for."""
 
-    Attributes
-    ----------
-    job : Job
-        As it was given.
-    kick : float
-        Largest value of the model's parameter of a kick [SI].
-    rungs : tuple of Sweep
-        The twin runs; the eigenvalues, where there are any.
-    refusals : dict
-        Why there are none, by the name of the model.
-    """
-
-    job: Job
-    kick: float
-    rungs: tuple[Sweep, ...]
-    refusals: dict[str, str]
+    job: Job  # as it was given
+    kick: float  # largest value of the model's parameter of a kick [SI]
+    rungs: tuple[Sweep, ...]  # the twin runs; the eigenvalues, where there are any
+    refusals: dict[str, str]  # why there are none, by the name of the model
 
 
 def load(path: str | Path, overrides: Assignments = (), kick: str | None = None) -> Growth:
@@ -156,8 +144,6 @@ def find_growth(asked: Growth, out: Path) -> list[Found]:
 
     Parameters
     ----------
-    asked : Growth
-        The job.
     out : Path
         The folder with its studies, whose runs have been done.
 

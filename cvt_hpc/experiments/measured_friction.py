@@ -47,15 +47,10 @@ Array = NDArray[np.float64]
 
 
 class Points(NamedTuple):
-    """Measured coefficients of friction: arrays (n,).
+    """Measured coefficients of friction: arrays (n,)."""
 
-    Attributes
-    ----------
-    speed, mu, force, specimen : arrays
-        Sliding speed [m/s], coefficient [1], normal force in any unit and number of the specimen; the last
-        two are nan and 0 where the file has no such column.
-    """
-
+    # speed, mu, force, specimen: sliding speed [m/s], coefficient [1], normal force in any unit and number of
+    # the specimen; the last two are nan and 0 where the file has no such column
     speed: Array
     mu: Array
     force: Array

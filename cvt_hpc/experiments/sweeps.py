@@ -75,8 +75,6 @@ def sweep_lines(sweeps: Sequence[Sweep], refusals: Mapping[str, str], out: Path)
 
     Parameters
     ----------
-    sweeps : sequence of Sweep
-        The sweeps.
     refusals : mapping
         Reasons by the name of a model that is left out.
     out : Path

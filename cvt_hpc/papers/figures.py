@@ -204,21 +204,11 @@ def spiral_figure(history: xr.Dataset, pulley: str) -> Figure:
 
 
 class PaperFigure(NamedTuple):
-    """A figure of a paper.
+    """A figure of a paper."""
 
-    Attributes
-    ----------
-    source : str
-        Paper and number.
-    compose : callable
-        Draws it of a study.
-    statements : sequence of Statement
-        What the paper says of it.
-    """
-
-    source: str
-    compose: Callable[[Kept], Figure]
-    statements: Sequence[Statement]
+    source: str  # paper and number
+    compose: Callable[[Kept], Figure]  # draws it of a study
+    statements: Sequence[Statement]  # what the paper says of it
 
 
 def _along(

@@ -117,21 +117,11 @@ class Measured(NamedTuple):
 
 
 class Statement(NamedTuple):
-    """Statement of a paper on a figure.
+    """Statement of a paper on a figure."""
 
-    Attributes
-    ----------
-    text : str
-        In the paper's words, shortened.
-    measure : callable
-        Of the study.
-    why : str
-        What is known of the reason where it does not hold.
-    """
-
-    text: str
-    measure: Callable[[Kept], Measured]
-    why: str = ""
+    text: str  # in the paper's words, shortened
+    measure: Callable[[Kept], Measured]  # of the study
+    why: str = ""  # what is known of the reason where it does not hold
 
 
 class Finding(NamedTuple):

@@ -222,8 +222,6 @@ def march_runs(
 
     Parameters
     ----------
-    job : Job
-        For its model and stepper.
     points : sequence of dict
         Flat parameters of the runs [SI].
     interrupt : callable

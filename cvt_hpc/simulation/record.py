@@ -73,11 +73,6 @@ def record_variables(job: Job) -> tuple[Variable, ...]:
     """Quantities of a run's record, `status` first.
 
     Those along a dimension that the job's record does not have are left out.
-
-    Parameters
-    ----------
-    job : Job
-        A validated job.
     """
     march = () if job.stepper is None else _MARCH
     model, dims = recorded_model(job), record_coordinates(job).keys()
@@ -87,13 +82,6 @@ def record_variables(job: Job) -> tuple[Variable, ...]:
 
 def declared_record(model: str, source: str) -> tuple[list[Variable], dict[str, Coordinate]]:
     """Return all quantities that a model declares of a run, with default settings or others, and dimensions.
-
-    Parameters
-    ----------
-    model : str
-        A model whose runs are recorded.
-    source : str
-        Who asks, for the error.
 
     Raises
     ------
@@ -108,13 +96,7 @@ def declared_record(model: str, source: str) -> tuple[list[Variable], dict[str, 
 
 
 def record_coordinates(job: Job) -> dict[str, Coordinate]:
-    """Dimensions of a run's record beside the grid's.
-
-    Parameters
-    ----------
-    job : Job
-        A validated job.
-    """
+    """Dimensions of a run's record beside the grid's."""
     return recorded_model(job).coordinates(job.parameters)
 
 
@@ -125,8 +107,6 @@ def record_of(
 
     Parameters
     ----------
-    job : Job
-        For its model.
     run : object
         A run as the model's batch has them.
     marched : float
@@ -158,15 +138,7 @@ def record_of(
 
 
 def record_without_run(job: Job, values: dict[str, Any]) -> dict[str, Any]:
-    """The record of a run that needed no transient.
-
-    Parameters
-    ----------
-    job : Job
-        For its model.
-    values : dict
-        The known values.
-    """
+    """The record of a run that needed no transient."""
     return blank_record(job) | values | {"core_seconds": 0.0, "simulated_seconds": 0.0}
 
 
@@ -183,11 +155,6 @@ def blank_record(job: Job) -> dict[str, Any]:
 
 def run_costs(job: Job) -> np.ndarray:
     """Core-seconds of each run: within a factor of two on processors of the last years.
-
-    Parameters
-    ----------
-    job : Job
-        A validated job.
 
     Returns
     -------
@@ -226,11 +193,6 @@ def estimate_cost(job: Job) -> float:
     """Core-seconds of a run, mean over the job; of a huge one, over runs from all over it.
 
     Not known (nan) of a model that no study runs.
-
-    Parameters
-    ----------
-    job : Job
-        A validated job.
     """
     if not load_model(job.model).is_recorded:
         return float("nan")
@@ -327,8 +289,6 @@ def may_join(job: Job, runs: Sequence[int], others: Sequence[int]) -> bool:
 
     Parameters
     ----------
-    job : Job
-        A validated job.
     runs, others : sequence of int
         Run indices, of one batch each.
     """
@@ -350,15 +310,7 @@ def _batch_size(job: Job, parameters: dict[str, Any]) -> int:
 
 
 def turns(job: Job, runs: int) -> int:
-    """Number of groups of lanes that a batch does one after the other, including runs that are left apart.
-
-    Parameters
-    ----------
-    job : Job
-        A validated job.
-    runs : int
-        Runs of the batch.
-    """
+    """Number of groups of lanes that a batch does one after the other, including runs that are left apart."""
     return -(-runs // load_model(job.model).lanes(job.parameters, job.stepper))
 
 

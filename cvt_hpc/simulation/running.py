@@ -32,8 +32,6 @@ def run_point(job: Job, point: dict[str, Any], interrupt: Callable[[], str | Non
 
     Parameters
     ----------
-    job : Job
-        For its model and stepper.
     point : dict
         Flat parameters of the run [SI].
     interrupt : callable
@@ -62,8 +60,6 @@ def run_points(
 
     Parameters
     ----------
-    job : Job
-        For its model and stepper.
     points : sequence of dict
         Flat parameters of the runs [SI], as `lane_groups` puts them together.
     interrupt : callable

@@ -36,25 +36,16 @@ MOST_PASSES = 200
 
 
 class Frozen(NamedTuple):
-    """A Jacobian, the inverse that was made of it, and work space.
+    """A Jacobian, the inverse that was made of it, and work space."""
 
-    Attributes
-    ----------
-    jacobian, inverse : (n, n) arrays
-        J, and (I - shift J)^-1.
-    memory : (2,) array
-        Shift of that inverse [s], 0 where there is none yet; 1 where friction leaves one solution, -1 where
-        several.
-    reach : float
-        Shift with which growth is judged, in those of the inverse [1].
-    rates, changed, trial, correction, next_correction : (n,) arrays
-        Work space.
-    """
-
+    # jacobian, inverse, shape (n, n): J, and (I - shift J)^-1
     jacobian: np.ndarray
     inverse: np.ndarray
+    # shape (2,): shift of that inverse [s], 0 where there is none yet; 1 where friction leaves one solution,
+    # -1 where several
     memory: np.ndarray
-    reach: float
+    reach: float  # shift with which growth is judged, in those of the inverse [1]
+    # rates, changed, trial, correction, next_correction, shape (n,): work space
     rates: np.ndarray
     changed: np.ndarray
     trial: np.ndarray
@@ -101,8 +92,6 @@ def renew(
 
     Parameters
     ----------
-    system : System
-        The equations.
     frozen : Frozen
         Result; its `rates` are those of y.
     t, y
@@ -175,8 +164,6 @@ def solve_stage(
 
     Parameters
     ----------
-    system : System
-        The equations.
     frozen : Frozen
         The last matrix; renewed where it does not serve.
     t : float

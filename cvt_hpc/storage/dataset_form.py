@@ -44,8 +44,6 @@ def check_form(dataset: xr.Dataset, source: str) -> None:
     ----------
     dataset : Dataset
         Results, a history or anything else. Of values only coordinates are looked at.
-    source : str
-        Where it is from, for the error.
     """
     for key in TEXTS:
         _check_text(dataset.attrs, key, source)

@@ -94,8 +94,6 @@ def open_regular(path: Path, flags: int = os.O_RDONLY, *, follow: bool = False) 
 
     Parameters
     ----------
-    path : Path
-        The file.
     flags : int
         As of `os.open`.
     follow : bool

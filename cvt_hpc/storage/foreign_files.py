@@ -40,8 +40,6 @@ def check_hdf5(source: Path | BinaryIO, size: int, place: str) -> None:
 
     Parameters
     ----------
-    source : Path or binary file
-        The file.
     size : int
         Its size [bytes]. All its values together may take `EXPANSION` times as much memory, or `SMALL`.
     place : str

@@ -156,8 +156,6 @@ def write_netcdf(dataset: xr.Dataset, path: Path) -> None:
     ----------
     dataset : Dataset
         Numbers and texts.
-    path : Path
-        The file.
     """
     encoding = {
         name: _encoding(variable, name in dataset.coords) for name, variable in dataset.variables.items()

@@ -42,25 +42,14 @@ class DamagedJobError(InputError):
 
 
 class Kind(NamedTuple):
-    """The properties of one kind of output folder.
+    """The properties of one kind of output folder."""
 
-    Attributes
-    ----------
-    what : str
-        Its content, in words for people.
-    job_file, lock_file : str
-        Names of these files.
-    format : str
-        First entry of the job file.
-    folders : tuple of str
-        Names of the folders in it.
-    """
-
-    what: str
+    what: str  # its content, in words for people
+    # job_file, lock_file: names of these files
     job_file: str
     lock_file: str
-    format: str
-    folders: tuple[str, ...] = ()
+    format: str  # first entry of the job file
+    folders: tuple[str, ...] = ()  # names of the folders in it
 
 
 class OutputFolder(ABC, Generic[Content]):

@@ -305,45 +305,29 @@ def _gain(levels: NDArray[np.float64]) -> tuple[float, float]:
 
 @dataclass(frozen=True)
 class Occurrence:
-    """Whether and how a run vibrates.
+    """Whether and how a run vibrates."""
 
-    Attributes
-    ----------
-    vibrates : Vibrates
-        The verdict.
-    reason : str
-        Reason in one line, ASCII, at most 240 characters.
-    strands : tuple of str
-        Labels of the strands, the order of the arrays below.
-    amplitude : array, shape (strand,)
-        Band-limited peak amplitude over the judged part [m], at the strongest probe.
-    frequency, strongest_frequency : array, shape (strand,)
-        Fundamental of the periodic part at that probe, as of `peaks.fundamental`, and its strongest line in
-        the band [Hz]; nan without a peak in the band.
-    lower_band_edge : float
-        Lowest frequency of the band [Hz].
-    growth_rate, growth_error : array, shape (strand,)
-        Growth rate over the judged part and its standard error [1/s]; nan where nothing moves.
-    amplitude_scatter : array, shape (strand,)
-        Standard deviation of the amplitudes in successive windows over their mean; nan where nothing moves.
-    strongest_probe : array of int, shape (strand,)
-        Column of the displacement with the largest amplitude.
-    margin : float
-        Distance of the deciding quantity, as a rule the amplitudes, from the threshold [e-folds]; 0 where
-        nothing is decided.
-    """
-
-    vibrates: Vibrates
-    reason: str
-    strands: tuple[str, ...]
+    vibrates: Vibrates  # the verdict
+    reason: str  # reason in one line, ASCII, at most 240 characters
+    strands: tuple[str, ...]  # labels of the strands, the order of the arrays below
+    # shape (strand,): band-limited peak amplitude over the judged part [m], at the strongest probe
     amplitude: NDArray[np.float64]
+    # frequency, strongest_frequency, shape (strand,): fundamental of the periodic part at that probe, as of
+    # `peaks.fundamental`, and its strongest line in the band [Hz]; nan without a peak in the band
     frequency: NDArray[np.float64]
     strongest_frequency: NDArray[np.float64]
-    lower_band_edge: float
+    lower_band_edge: float  # lowest frequency of the band [Hz]
+    # growth_rate, growth_error, shape (strand,): growth rate over the judged part and its standard error
+    # [1/s]; nan where nothing moves
     growth_rate: NDArray[np.float64]
     growth_error: NDArray[np.float64]
+    # shape (strand,): standard deviation of the amplitudes in successive windows over their mean; nan where
+    # nothing moves
     amplitude_scatter: NDArray[np.float64]
+    # shape (strand,): column of the displacement with the largest amplitude
     strongest_probe: NDArray[np.int64]
+    # distance of the deciding quantity, as a rule the amplitudes, from the threshold [e-folds]; 0 where
+    # nothing is decided
     margin: float
 
     def record(self) -> dict[str, Any]:

@@ -31,26 +31,16 @@ class Kind(IntEnum):
 
 
 class Criticality(NamedTuple):
-    """The verdict on a Hopf point by runs.
+    """The verdict on a Hopf point by runs."""
 
-    Attributes
-    ----------
-    kind : Kind
-        The verdict.
-    width : float
-        From the Hopf point, into the stable side, to where the vibration ends from the large start, in the
-        parameter's unit: of the hysteresis, or its upper bound by the runs' spacing; nan if undecided.
-    error : float
-        Half of the spacing of the runs at that end, and the Hopf point's own error; inf where runs from the
-        large start vibrate as far as there are any.
-    reason : str
-        One line.
-    """
-
-    kind: Kind
+    kind: Kind  # the verdict
+    # from the Hopf point, into the stable side, to where the vibration ends from the large start, in the
+    # parameter's unit: of the hysteresis, or its upper bound by the runs' spacing; nan if undecided
     width: float
+    # half of the spacing of the runs at that end, and the Hopf point's own error; inf where runs from the
+    # large start vibrate as far as there are any
     error: float
-    reason: str
+    reason: str  # one line
 
 
 def criticality(

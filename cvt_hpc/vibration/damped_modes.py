@@ -27,21 +27,11 @@ LEAST_FACTOR = 1e-6  # factor from sample to sample; what decays faster than tha
 
 
 class Modes(NamedTuple):
-    """Modes of a free motion, the strongest first.
+    """Modes of a free motion, the strongest first."""
 
-    Attributes
-    ----------
-    growth : (m,) array
-        Growth rates; negative: decay [1/s].
-    frequency : (m,) array
-        [Hz]; 0 of a motion that does not oscillate.
-    share : (m,) array
-        Energy of the mode in the record, over the sum of all [1].
-    """
-
-    growth: Array
-    frequency: Array
-    share: Array
+    growth: Array  # shape (m,): growth rates; negative: decay [1/s]
+    frequency: Array  # shape (m,): [Hz]; 0 of a motion that does not oscillate
+    share: Array  # shape (m,): energy of the mode in the record, over the sum of all [1]
 
 
 def thinned(signal: Array, rate: float, highest: float) -> tuple[Array, float]:

@@ -43,19 +43,12 @@ VARIABLES = (
 
 
 class Peaks(NamedTuple):
-    """Largest peaks of each strand, largest first, (strand, COUNT) each; nan and mode 0 for want of more.
+    """Largest peaks of each strand, largest first, (strand, COUNT) each; nan and mode 0 for want of more."""
 
-    Attributes
-    ----------
-    frequency, amplitude : arrays
-        [Hz], and of the mode that is largest there, in the signal's unit.
-    mode : int array
-        Its half waves.
-    """
-
+    # frequency, amplitude: [Hz], and of the mode that is largest there, in the signal's unit
     frequency: Array
     amplitude: Array
-    mode: np.ndarray
+    mode: np.ndarray  # its half waves
 
     @property
     def frequency_ratio(self) -> Array:
@@ -114,10 +107,8 @@ def fundamental(signal: ArrayLike, rate: float, band: tuple[float, float]) -> tu
     ----------
     signal : array, shape (time,)
         Samples, in any unit.
-    rate : float
-        Sampling rate [Hz].
-    band : (float, float)
-        Lowest and highest frequency [Hz].
+    rate, band
+        As of `modal_peaks`.
 
     Returns
     -------

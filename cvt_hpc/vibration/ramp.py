@@ -62,26 +62,15 @@ def coordinate() -> Coordinate:
 
 @dataclass(frozen=True)
 class RampOccurrence(Occurrence):
-    """Occurrence along a ramp: amplitude and frequencies are those of the window that moves most.
+    """Occurrence along a ramp: amplitude and frequencies are those of the window that moves most."""
 
-    Attributes
-    ----------
-    quantity : str
-        The ramped one of QUANTITIES: a load [N m] or a speed [rad/s].
-    onset, end : float
-        Its values between which the run vibrates; nan where it does not, and where vibration is there from
-        the ramp's start, or lasts to its end.
-    ramp_mean : array, shape (BINS,)
-        Its mean in equal parts of the ramp; nan where no window lies.
-    ramp_amplitude : array, shape (strand, BINS)
-        Mean amplitude in them [m].
-    """
-
-    quantity: str
+    quantity: str  # the ramped one of QUANTITIES: a load [N m] or a speed [rad/s]
+    # onset, end: its values between which the run vibrates; nan where it does not, and where vibration is
+    # there from the ramp's start, or lasts to its end
     onset: float
     end: float
-    ramp_mean: Array
-    ramp_amplitude: Array
+    ramp_mean: Array  # shape (BINS,): its mean in equal parts of the ramp; nan where no window lies
+    ramp_amplitude: Array  # shape (strand, BINS): mean amplitude in them [m]
 
     def record(self) -> dict[str, Any]:
         """Return the entries of a record: as of `Occurrence`, and VARIABLES of its quantity."""

@@ -123,10 +123,8 @@ def amplitude_spectrum(signal: ArrayLike, rate: float, bins: ArrayLike) -> Array
 
     Parameters
     ----------
-    signal : array, shape (time, ...)
-        Samples, in any unit.
-    rate : float
-        Sampling rate [Hz].
+    signal, rate
+        As of `band_amplitude`.
     bins : array, shape (bin,)
         Centres of the bins [Hz], ascending, two or more; a bin reaches halfway to its neighbours.
 

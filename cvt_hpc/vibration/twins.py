@@ -31,31 +31,21 @@ APART = 0.1  # of a frequency: its largest error
 
 
 class Found(NamedTuple):
-    """Modes of a state, the strongest first, and how far to trust them.
+    """Modes of a state, the strongest first, and how far to trust them."""
 
-    Attributes
-    ----------
-    modes : Modes
-        Medians over the decompositions; the share is that of the part in which the mode is strongest.
-    growth_error, frequency_error : (m,) arrays
-        Largest deviation of a decomposition from these [1/s], [Hz].
-    window : float
-        Length of the linear record [s].
-    difference, floor, unrest : float
-        Rms over it and all sensors, in the signal's unit: of the difference by the whole kick, of what
-        chatter and nonlinear terms leave in it, and of the motion without a kick, apart from its drift.
-    reason : str
-        Why there are no modes, or "".
-    """
-
+    # medians over the decompositions; the share is that of the part in which the mode is strongest
     modes: Modes
+    # growth_error, frequency_error, shape (m,): largest deviation of a decomposition from these [1/s], [Hz]
     growth_error: Array
     frequency_error: Array
-    window: float
+    window: float  # length of the linear record [s]
+    # difference, floor, unrest: rms over it and all sensors, in the signal's unit: of the difference by the
+    # whole kick, of what chatter and nonlinear terms leave in it, and of the motion without a kick, apart
+    # from its drift
     difference: float
     floor: float
     unrest: float
-    reason: str
+    reason: str  # why there are no modes, or ""
 
 
 def nothing(reason: str, window: float = 0.0, *sizes: float) -> Found:

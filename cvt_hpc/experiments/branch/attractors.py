@@ -42,46 +42,24 @@ OF_MODES: dict[str, tuple[Callable[[Mode], float], str, str, str]] = {
 
 
 class Attractor(NamedTuple):
-    """Result of a run.
+    """Result of a run."""
 
-    Attributes
-    ----------
-    value : float
-        Of the parameter [SI].
-    start : int
-        Place among the starts.
-    occurrence : OccurrenceClass
-        Its class.
-    amplitude : float
-        Of the strand that moves most, or of the mass, in the band and over the judged part [m]; nan where
-        the run failed.
-    frequency : float
-        Of the same [Hz].
-    reason : str
-        Why the run failed, or was found to vibrate or not.
-    """
-
-    value: float
-    start: int
-    occurrence: OccurrenceClass
+    value: float  # of the parameter [SI]
+    start: int  # place among the starts
+    occurrence: OccurrenceClass  # its class
+    # of the strand that moves most, or of the mass, in the band and over the judged part [m]; nan where the
+    # run failed
     amplitude: float
-    frequency: float
-    reason: str
+    frequency: float  # of the same [Hz]
+    reason: str  # why the run failed, or was found to vibrate or not
 
 
 class Start(NamedTuple):
-    """A start of runs.
+    """A start of runs."""
 
-    Attributes
-    ----------
-    settings : mapping
-        Keys of the job with values [SI].
-    state : callable or None
-        The belt's state at a value of the parameter, or None where there is none: that run is left out.
-        Without such a function runs begin as any other.
-    """
-
-    settings: Mapping[str, Any]
+    settings: Mapping[str, Any]  # keys of the job with values [SI]
+    # the belt's state at a value of the parameter, or None where there is none: that run is left out. Without
+    # such a function runs begin as any other.
     state: Callable[[float], State | None] | None = None
 
 
@@ -215,30 +193,16 @@ class Stability(IntEnum):
 
 
 class Followed(NamedTuple):
-    """One branch with all its results.
+    """One branch with all its results."""
 
-    Attributes
-    ----------
-    asked : Asked
-        The requested branch.
-    states : dict of array
-        As of `states_of`.
-    onsets : list of Onset
-        Its Hopf points, in the order of their loads.
-    hidden : list of (float, float)
-        Loads between which stability changes without a Hopf point that could be found [N m].
-    runs : list of Attractor
-        From near the steady state (start 0) and from the large start (1); empty if none were requested.
-    kinds : list of Criticality
-        One for each of `onsets`.
-    """
-
-    asked: Asked
-    states: Arrays
-    onsets: list[Onset]
+    asked: Asked  # the requested branch
+    states: Arrays  # as of `states_of`
+    onsets: list[Onset]  # its Hopf points, in the order of their loads
+    # loads between which stability changes without a Hopf point that could be found [N m]
     hidden: list[tuple[float, float]]
+    # from near the steady state (start 0) and from the large start (1); empty if none were requested
     runs: list[Attractor]
-    kinds: list[Criticality]
+    kinds: list[Criticality]  # one for each of `onsets`
 
     @property
     def missed(self) -> np.ndarray:
@@ -251,8 +215,6 @@ def states_of(found: Branch, grid: Mesh, loads: Sequence[float]) -> Arrays:
 
     Parameters
     ----------
-    found : Branch
-        The branch.
     grid : Mesh
         Of its belt.
     loads : sequence of float

@@ -185,8 +185,6 @@ def diagram_dataset(
 
     Parameters
     ----------
-    diagram : Diagram
-        The requested diagram.
     followed : mapping
         Branches by their place in `diagram.branches`: all, or the finished ones.
     makers : sequence of mapping

@@ -47,52 +47,25 @@ ENDS = 2  # places along the load where vibration begins or ends, with closer ru
 
 @dataclass(frozen=True)
 class Asked:
-    """One requested branch.
+    """One requested branch."""
 
-    Attributes
-    ----------
-    place : dict
-        Values of the axes other than the load [SI].
-    parameters : dict
-        Resolved parameters of the steady belt [SI].
-    runs : Job
-        Of its transients, without axes.
-    """
-
-    place: dict[str, Any]
-    parameters: dict[str, Any]
-    runs: Job
+    place: dict[str, Any]  # values of the axes other than the load [SI]
+    parameters: dict[str, Any]  # resolved parameters of the steady belt [SI]
+    runs: Job  # of its transients, without axes
 
 
 @dataclass(frozen=True)
 class Diagram:
-    """The content of a job.
+    """The content of a job."""
 
-    Attributes
-    ----------
-    job : Job
-        Of linear stability, with the load among its axes.
-    axes : tuple of Axis
-        Those other than the load.
-    loads : tuple of float
-        Ascending [N m].
-    branches : tuple of Asked
-        One for each combination of the other axes' values, the last axis fastest.
-    disturbance : tuple of float
-        Of the runs from near the steady state and from the large start [m]; () for no runs.
-    resolution : float
-        Spacing of the runs where vibration begins or ends [N m].
-    settings : dict
-        Further keys of the runs, as the job gives them.
-    """
-
-    job: Job
-    axes: tuple[Axis, ...]
-    loads: tuple[float, ...]
-    branches: tuple[Asked, ...]
+    job: Job  # of linear stability, with the load among its axes
+    axes: tuple[Axis, ...]  # those other than the load
+    loads: tuple[float, ...]  # ascending [N m]
+    branches: tuple[Asked, ...]  # one for each combination of the other axes' values, the last axis fastest
+    # of the runs from near the steady state and from the large start [m]; () for no runs
     disturbance: tuple[float, ...]
-    resolution: float
-    settings: dict[str, Any]
+    resolution: float  # spacing of the runs where vibration begins or ends [N m]
+    settings: dict[str, Any]  # further keys of the runs, as the job gives them
 
     def resolved(self) -> dict[str, Any]:
         """Return all entries that determine the numbers, as a job file is laid out, in JSON types."""
@@ -203,15 +176,7 @@ class Cost(NamedTuple):
 
 
 def predicted_cost(diagram: Diagram, asked: Asked) -> Cost:
-    """Return the cost of a branch where vibration begins once and ends once.
-
-    Parameters
-    ----------
-    diagram : Diagram
-        The requested diagram.
-    asked : Asked
-        One of its branches.
-    """
+    """Return the cost of a branch where vibration begins once and ends once."""
     first = float(load_model(diagram.job.model).cost(asked.parameters, None))
     steady = first * (1.0 + FURTHER * len(diagram.loads))
     if not diagram.disturbance:

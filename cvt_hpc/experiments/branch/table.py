@@ -166,8 +166,6 @@ def judged(
 
     Parameters
     ----------
-    onset : Onset
-        The Hopf point.
     hopf, hidden
         All of the branch, and where stability changes unseen, as `onsets` returns them.
     runs : list of Attractor

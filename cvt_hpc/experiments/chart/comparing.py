@@ -46,34 +46,18 @@ class Result:
 
 @dataclass(frozen=True)
 class Comparison:
-    """All results of a scene.
+    """All results of a scene."""
 
-    Attributes
-    ----------
-    scene : Scene
-        Which one.
-    reference : Result
-        Its errors are its own.
-    methods, choices : tuple of Result
-        Against the reference, and against the base of the error budget.
-    series : tuple of str
-        All methods of the chart by name, so that each has the same colour in all pictures.
-    base : str
-        The point that choices are compared with; "" where there are none.
-    shown : tuple of str
-        Quantities by which choices are judged.
-    verdict : str
-        The chosen method and the criterion, or the reason why none was chosen.
-    """
-
-    scene: Scene
-    reference: Result
+    scene: Scene  # which one
+    reference: Result  # its errors are its own
+    # methods, choices: against the reference, and against the base of the error budget
     methods: tuple[Result, ...]
     choices: tuple[Result, ...]
+    # all methods of the chart by name, so that each has the same colour in all pictures
     series: tuple[str, ...]
-    base: str
-    shown: tuple[str, ...]
-    verdict: str
+    base: str  # the point that choices are compared with; "" where there are none
+    shown: tuple[str, ...]  # quantities by which choices are judged
+    verdict: str  # the chosen method and the criterion, or the reason why none was chosen
 
     @property
     def results(self) -> tuple[Result, ...]:
@@ -86,8 +70,6 @@ def compare(chart: Chart, measurements: Mapping[str, Measurement]) -> tuple[Comp
 
     Parameters
     ----------
-    chart : Chart
-        The requested chart.
     measurements : mapping
         By the name of the point.
     """
@@ -156,8 +138,6 @@ def error(quantity: Quantity, measurement: Measurement, reference: Measurement) 
 
     Parameters
     ----------
-    quantity : Quantity
-        Which one, with its scale.
     measurement, reference : Measurement
         The measurement to judge, and its reference.
 

@@ -33,24 +33,12 @@ LONG = 2.0  # [s] of processor time: beyond, a run is timed once, because noise 
 
 @dataclass(frozen=True)
 class Marched:
-    """Runs from several starts.
+    """Runs from several starts."""
 
-    Attributes
-    ----------
-    runs : tuple of Transient
-        Of the model, in the order of the points.
-    failures : tuple of (Status, str) or None
-        The failure of each.
-    core_seconds : float
-        Processor time of all of them [s], without compiling.
-    simulated : float
-        Their simulated time together [s].
-    """
-
-    runs: tuple[Run, ...]
-    failures: tuple[Failure | None, ...]
-    core_seconds: float
-    simulated: float
+    runs: tuple[Run, ...]  # of the model, in the order of the points
+    failures: tuple[Failure | None, ...]  # the failure of each
+    core_seconds: float  # processor time of all of them [s], without compiling
+    simulated: float  # their simulated time together [s]
 
     @property
     def cost(self) -> float:
@@ -128,31 +116,17 @@ def _stop_after(seconds: float) -> Callable[[], str | None] | None:
 
 @dataclass(frozen=True)
 class Measurement:
-    """Result of a point.
+    """Result of a point."""
 
-    Attributes
-    ----------
-    reason : str
-        Why it failed; "" where it did not.
-    values : dict
-        By quantity an array with the starts along the first axis; empty where it failed.
-    cost : float
-        Core-seconds for each simulated second of a run, the shortest of all repeats; of a run that failed or
-        was given up until then. Of a point that is not timed by one pass, in as many lanes as it has starts.
-    core_seconds : float
-        Processor time that the first pass took [s].
-    simulated : float
-        Simulated time of all starts [s].
-    counters : dict
-        Work by its name, mean over the starts.
-    """
-
-    reason: str
+    reason: str  # why it failed; "" where it did not
+    # by quantity an array with the starts along the first axis; empty where it failed
     values: dict[str, NDArray[np.float64]] = field(default_factory=dict)
+    # core-seconds for each simulated second of a run, the shortest of all repeats; of a run that failed or
+    # was given up until then. Of a point that is not timed by one pass, in as many lanes as it has starts.
     cost: float = math.nan
-    core_seconds: float = 0.0
-    simulated: float = 0.0
-    counters: dict[str, float] = field(default_factory=dict)
+    core_seconds: float = 0.0  # processor time that the first pass took [s]
+    simulated: float = 0.0  # simulated time of all starts [s]
+    counters: dict[str, float] = field(default_factory=dict)  # work by its name, mean over the starts
 
 
 def measure(point: Point, scene: Scene, repeats: int, time_limit: float) -> Measurement:
@@ -160,10 +134,6 @@ def measure(point: Point, scene: Scene, repeats: int, time_limit: float) -> Meas
 
     Parameters
     ----------
-    point : Point
-        The job to run.
-    scene : Scene
-        The scene with the judged quantities.
     repeats : int
         How often a quick run is timed.
     time_limit : float
@@ -272,13 +242,6 @@ def predicted_cost(chart: Chart, point: Point) -> float:
 
     Little is known of methods that choose their step. Not known (nan) of a model without records; an exact
     solution takes next to nothing.
-
-    Parameters
-    ----------
-    chart : Chart
-        The chart.
-    point : Point
-        One of its points.
     """
     if point.series == "exact":
         return 0.0

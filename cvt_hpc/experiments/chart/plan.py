@@ -23,116 +23,61 @@ class Role(Enum):
 
 @dataclass(frozen=True)
 class Quantity:
-    """A result by which methods are judged.
+    """A result by which methods are judged."""
 
-    Attributes
-    ----------
-    name : str
-        One of `cvt_hpc.experiments.chart.quantities.KINDS`.
-    tolerance : float
-        Largest error that is allowed; inf where there is no limit.
-    scale : float
-        Scale of errors [unit of the quantity]; 0: the size of the reference.
-    since, until : float
-        Part of the run [s] that is looked at, where the quantity has one; inf: to the end.
-    channel : str
-        Recorded channel that shows an onset; "" for other quantities.
-    """
-
-    name: str
-    tolerance: float
-    scale: float
+    name: str  # one of `cvt_hpc.experiments.chart.quantities.KINDS`
+    tolerance: float  # largest error that is allowed; inf where there is no limit
+    scale: float  # scale of errors [unit of the quantity]; 0: the size of the reference
+    # since, until: part of the run [s] that is looked at, where the quantity has one; inf: to the end
     since: float = 0.0
     until: float = math.inf
-    channel: str = ""
+    channel: str = ""  # recorded channel that shows an onset; "" for other quantities
 
 
 @dataclass(frozen=True)
 class Lead:
-    """Run to the state from which the methods of a scene march.
+    """Run to the state from which the methods of a scene march."""
 
-    Attributes
-    ----------
-    job : Job
-        The stepper that leads there, with its settings.
-    until : float
-        When the methods take over [s].
-    """
-
-    job: Job
-    until: float
+    job: Job  # the stepper that leads there, with its settings
+    until: float  # when the methods take over [s]
 
 
 @dataclass(frozen=True)
 class Scene:
-    """One problem on which methods compete.
+    """One problem on which methods compete."""
 
-    Attributes
-    ----------
-    name, title : str
-        For files and for people.
-    quantities : tuple of Quantity
-        The judged quantities, in the order of the panels.
-    starts : int
-        Number of runs, from as many random starts.
-    exact : bool
-        Whether the reference is the model's exact solution.
-    time_limit : float
-        Core-seconds [s] after which a run is given up, where the chart allows more.
-    lead : Lead or None
-        The lead-in run that brings all runs, the reference's too, to a state from which they start; only
-        trajectories are judged then.
-    """
-
+    # name, title: for files and for people
     name: str
     title: str
-    quantities: tuple[Quantity, ...]
-    starts: int
-    exact: bool
+    quantities: tuple[Quantity, ...]  # the judged quantities, in the order of the panels
+    starts: int  # number of runs, from as many random starts
+    exact: bool  # whether the reference is the model's exact solution
+    # core-seconds [s] after which a run is given up, where the chart allows more
     time_limit: float = math.inf
+    # the lead-in run that brings all runs, the reference's too, to a state from which they start; only
+    # trajectories are judged then
     lead: Lead | None = None
 
 
 @dataclass(frozen=True)
 class Point:
-    """One thing to measure: a scene by a method at a step or a tolerance.
+    """One thing to measure: a scene by a method at a step or a tolerance."""
 
-    Attributes
-    ----------
-    name : str
-        Unique in the chart; a file-safe word.
-    scene : str
-        Name of its scene.
-    role : Role
-        Its purpose.
-    series, label : str
-        The method or the choice: its name in the job, and for people.
-    key : str
-        Which parameter of the stepper the points of a series differ in; "" where there is none.
-    job : Job
-        The job that is run; with its own seed for the first start, the next ones for the others.
-    starts : int
-        Number of runs.
-    lanes : int
-        How many of them advance together; timed ones fill all lanes, if need be with further starts that
-        count for the time alone. 0: as many as the model can, where only results count.
-    until : float
-        How far a run is marched [s]; inf: to its end.
-    refines : bool
-        Of a choice: whether it comes nearer to the truth than the base, so that the difference is an error
-        of the base.
-    """
-
-    name: str
-    scene: str
-    role: Role
+    name: str  # unique in the chart; a file-safe word
+    scene: str  # name of its scene
+    role: Role  # its purpose
+    # series, label: the method or the choice: its name in the job, and for people
     series: str
     label: str
-    key: str
-    job: Job
-    starts: int
+    key: str  # which parameter of the stepper the points of a series differ in; "" where there is none
+    job: Job  # the job that is run; with its own seed for the first start, the next ones for the others
+    starts: int  # number of runs
+    # how many of them advance together; timed ones fill all lanes, if need be with further starts that count
+    # for the time alone. 0: as many as the model can, where only results count
     lanes: int = 0
-    until: float = math.inf
+    until: float = math.inf  # how far a run is marched [s]; inf: to its end
+    # of a choice: whether it comes nearer to the truth than the base, so that the difference is an error of
+    # the base
     refines: bool = False
 
     @property
@@ -170,33 +115,15 @@ def start_parameters(job: Job, start: int) -> dict[str, Any]:
 
 @dataclass(frozen=True)
 class Chart:
-    """A validated chart job.
+    """A validated chart job."""
 
-    Attributes
-    ----------
-    job : Job
-        The job of the first point, which has the chart's name and description.
-    source : str
-        The job file.
-    scenes : tuple of Scene
-        The problems.
-    points : tuple of Point
-        All points, references first.
-    repeats : int
-        How often a quick run is timed.
-    time_limit : float
-        Core-seconds [s] after which a run is given up.
-    budgeted : tuple of str
-        Quantities that the error budget shows.
-    """
-
-    job: Job
-    source: str
-    scenes: tuple[Scene, ...]
-    points: tuple[Point, ...]
-    repeats: int
-    time_limit: float
-    budgeted: tuple[str, ...] = ()
+    job: Job  # the job of the first point, which has the chart's name and description
+    source: str  # the job file
+    scenes: tuple[Scene, ...]  # the problems
+    points: tuple[Point, ...]  # all points, references first
+    repeats: int  # how often a quick run is timed
+    time_limit: float  # core-seconds [s] after which a run is given up
+    budgeted: tuple[str, ...] = ()  # quantities that the error budget shows
 
     def scene(self, name: str) -> Scene:
         """Return the scene of a name."""

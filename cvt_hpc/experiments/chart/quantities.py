@@ -27,24 +27,14 @@ Array = NDArray[np.float64]
 
 @dataclass(frozen=True)
 class History:
-    """Recorded values of a run.
+    """Recorded values of a run."""
 
-    Attributes
-    ----------
-    displacement : array, shape (time, probe)
-        Of the probes on strands or masses [m]; the first sample is one interval after the start.
-    strands : tuple of str, length probe
-        The strand, or the mass, to which each probe belongs.
-    channel : callable
-        History of a recorded channel by its name, shape (time,).
-    parameters : mapping
-        Flat parameters of the run [SI].
-    """
-
+    # shape (time, probe): of the probes on strands or masses [m]; the first sample is one interval after the
+    # start
     displacement: Array
-    strands: tuple[str, ...]
-    channel: Callable[[str], Array]
-    parameters: Mapping[str, Any]
+    strands: tuple[str, ...]  # the strand, or the mass, to which each probe belongs
+    channel: Callable[[str], Array]  # history of a recorded channel by its name, shape (time,)
+    parameters: Mapping[str, Any]  # flat parameters of the run [SI]
 
     @property
     def rate(self) -> float:
@@ -70,30 +60,15 @@ class History:
 
 @dataclass(frozen=True)
 class Kind:
-    """A sort of quantity.
+    """A sort of quantity."""
 
-    Attributes
-    ----------
-    unit : str
-        Of its values.
-    title : str
-        The compared quantity, for people; the heading of a panel.
-    takes_part : bool
-        Whether a job may limit it to a part of the run.
-    needs_part : bool
-        Whether it must.
-    values : callable
-        (History, Quantity) -> the run's values, shape (n,) or, for a trajectory, (time, probe).
-    channels : tuple of str
-        Recorded channels that it is made of.
-    """
-
-    unit: str
-    title: str
+    unit: str  # of its values
+    title: str  # the compared quantity, for people; the heading of a panel
+    # (History, Quantity) -> the run's values, shape (n,) or, for a trajectory, (time, probe)
     values: Callable[[History, Quantity], Array]
-    takes_part: bool = False
-    needs_part: bool = False
-    channels: tuple[str, ...] = ()
+    takes_part: bool = False  # whether a job may limit it to a part of the run
+    needs_part: bool = False  # whether it must
+    channels: tuple[str, ...] = ()  # recorded channels that it is made of
 
 
 def _trajectory(history: History, quantity: Quantity) -> Array:
@@ -212,10 +187,6 @@ def observe(history: History, quantities: Sequence[Quantity], whole: bool) -> di
 
     Parameters
     ----------
-    history : History
-        The recorded values of the run.
-    quantities : sequence of Quantity
-        The requested quantities.
     whole : bool
         Whether the run went to its end; of a shorter one only the trajectory counts.
     """

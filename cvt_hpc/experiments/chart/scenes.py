@@ -75,24 +75,12 @@ _WORD = re.compile(r"[A-Za-z0-9][A-Za-z0-9_]{0,59}")
 
 @dataclass(frozen=True)
 class Stage:
-    """A scene with the data from which its runs are built.
+    """A scene with the data from which its runs are built."""
 
-    Attributes
-    ----------
-    scene : Scene
-        As the chart knows it.
-    document : dict
-        Job file without the chart.
-    values : dict
-        Further values of the scene, or of the command line.
-    where : str
-        File and table, for the errors.
-    """
-
-    scene: Scene
-    document: dict[str, Any]
-    values: dict[str, Any]
-    where: str
+    scene: Scene  # as the chart knows it
+    document: dict[str, Any]  # job file without the chart
+    values: dict[str, Any]  # further values of the scene, or of the command line
+    where: str  # file and table, for the errors
 
     @property
     def until(self) -> float:
@@ -141,8 +129,6 @@ def read_stage(name: str, raw: Any, document: dict[str, Any], replaced: dict[str
         The job file without the chart.
     replaced : dict
         Values from the command line, which take precedence over those of the scene.
-    source : str
-        The job file, for the errors.
 
     Raises
     ------

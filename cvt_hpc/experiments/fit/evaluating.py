@@ -38,24 +38,12 @@ class Stopped(Exception):
 
 
 class Findings(NamedTuple):
-    """Results of candidates.
+    """Results of candidates."""
 
-    Attributes
-    ----------
-    scenes : (candidates, free) array
-        Values of the free parameters [SI].
-    scores : (candidates, target) array
-        0 to 1.
-    totals : (candidates,) array
-        Their weighted means.
-    courses : list of dict
-        Of each candidate its runs by case.
-    """
-
-    scenes: NDArray[np.float64]
-    scores: NDArray[np.float64]
-    totals: NDArray[np.float64]
-    courses: list[dict[str, Course]]
+    scenes: NDArray[np.float64]  # shape (candidates, free): values of the free parameters [SI]
+    scores: NDArray[np.float64]  # shape (candidates, target): 0 to 1
+    totals: NDArray[np.float64]  # shape (candidates,): their weighted means
+    courses: list[dict[str, Course]]  # of each candidate its runs by case
 
 
 class Evaluation:

@@ -56,23 +56,12 @@ NUMBERS = {
 
 @dataclass(frozen=True)
 class Course:
-    """The runs of one case of a candidate along the swept parameter.
+    """The runs of one case of a candidate along the swept parameter."""
 
-    Attributes
-    ----------
-    values : (runs,) array
-        Of that parameter, ascending [SI].
-    classes : (runs,) array
-        `OccurrenceClass` of each run.
-    counted : (runs,) array of bool
-        Whether its motion counts.
-    quantities : mapping of (runs,) arrays
-        Recorded values by name [SI], of the strand or pulley that moves most.
-    """
-
-    values: NDArray[np.float64]
-    classes: NDArray[np.int8]
-    counted: NDArray[np.bool_]
+    values: NDArray[np.float64]  # shape (runs,): of that parameter, ascending [SI]
+    classes: NDArray[np.int8]  # shape (runs,): `OccurrenceClass` of each run
+    counted: NDArray[np.bool_]  # shape (runs,): whether its motion counts
+    # shape (runs,): recorded values by name [SI], of the strand or pulley that moves most
     quantities: Mapping[str, NDArray[np.float64]]
 
     @property
@@ -90,48 +79,25 @@ class Course:
 
 @dataclass(frozen=True)
 class Target:
-    """A statement that can be measured.
+    """A statement that can be measured."""
 
-    Attributes
-    ----------
-    name, statement : str
-        One word, and the statement as its source has it.
-    case : str
-        Name of the case.
-    measure : str
-        One of MEASURES.
-    low, high : float
-        Ends of the swept parameter [SI]: the runs between them count.
-    quantity : str
-        Recorded quantity for `within` and `least`; "" for the other measures.
-    bounds : tuple of float
-        Of the quantity, or of the onset [SI]; () where nothing is bounded.
-    fading : float
-        Distance [SI] from the bounds at which nothing is left of the score; for `least` from 0, at which
-        half of it is.
-    count : int
-        Of separate areas.
-    than : str
-        Case that is exceeded.
-    by : float
-        Factor of amplitude that earns the whole score.
-    weight : float
-        In the mean of all targets.
-    """
-
+    # name, statement: one word, and the statement as its source has it
     name: str
     statement: str
-    case: str
-    measure: str
+    case: str  # name of the case
+    measure: str  # one of MEASURES
+    # low, high: ends of the swept parameter [SI]: the runs between them count
     low: float
     high: float
-    quantity: str = ""
-    bounds: tuple[float, ...] = ()
+    quantity: str = ""  # recorded quantity for `within` and `least`; "" for the other measures
+    bounds: tuple[float, ...] = ()  # of the quantity, or of the onset [SI]; () where nothing is bounded
+    # distance [SI] from the bounds at which nothing is left of the score; for `least` from 0, at which half
+    # of it is
     fading: float = 1.0
-    count: int = 1
-    than: str = ""
-    by: float = 1.0
-    weight: float = 1.0
+    count: int = 1  # of separate areas
+    than: str = ""  # case that is exceeded
+    by: float = 1.0  # factor of amplitude that earns the whole score
+    weight: float = 1.0  # in the mean of all targets
 
 
 def score(target: Target, courses: Mapping[str, Course]) -> float:

@@ -30,17 +30,10 @@ _START = "start "
 
 
 class Found(NamedTuple):
-    """All candidates of a search, in the order in which they were requested.
+    """All candidates of a search, in the order in which they were requested."""
 
-    Attributes
-    ----------
-    stages : list of str
-        Name of the study of each.
-    scenes, scores, totals : arrays
-        As of `Findings`.
-    """
-
-    stages: list[str]
+    stages: list[str]  # name of the study of each
+    # scenes, scores, totals: as of `Findings`
     scenes: NDArray[np.float64]
     scores: NDArray[np.float64]
     totals: NDArray[np.float64]
@@ -55,8 +48,6 @@ def search(fit: Fit, evaluate: Evaluate, tell: Callable[[str], None] = lambda li
 
     Parameters
     ----------
-    fit : Fit
-        The requested fit.
     evaluate : callable
         Given the name of a study and the scenes of its candidates, shape (candidates, free) [SI].
     tell : callable
@@ -104,30 +95,14 @@ def search(fit: Fit, evaluate: Evaluate, tell: Callable[[str], None] = lambda li
 
 @dataclass(frozen=True)
 class Confirmed:
-    """A set run in full.
+    """A set run in full."""
 
-    Attributes
-    ----------
-    name : str
-        "start 1" for a start of the job, else the study of the search in which it was found.
-    scene : (free,) array
-        Values of the free parameters [SI].
-    coarse : float
-        Score in the search.
-    scores : (repeats, target) array
-        0 to 1.
-    totals : (repeats,) array
-        Their weighted means.
-    courses : list of dict
-        Of each repeat its runs by case.
-    """
-
-    name: str
-    scene: NDArray[np.float64]
-    coarse: float
-    scores: NDArray[np.float64]
-    totals: NDArray[np.float64]
-    courses: list[dict[str, Course]]
+    name: str  # "start 1" for a start of the job, else the study of the search in which it was found
+    scene: NDArray[np.float64]  # shape (free,): values of the free parameters [SI]
+    coarse: float  # score in the search
+    scores: NDArray[np.float64]  # shape (repeats, target): 0 to 1
+    totals: NDArray[np.float64]  # shape (repeats,): their weighted means
+    courses: list[dict[str, Course]]  # of each repeat its runs by case
 
     @property
     def is_start(self) -> bool:
@@ -155,10 +130,6 @@ def confirm(fit: Fit, evaluation: Evaluation, found: Found) -> list[Confirmed]:
 
     Parameters
     ----------
-    fit : Fit
-        The requested fit.
-    evaluation : Evaluation
-        Does the runs.
     found : Found
         The candidates of the search, the starts before all others.
     """
@@ -190,22 +161,13 @@ def _repeats(fit: Fit) -> Mapping[str, Mapping[str, Any]]:
 
 
 class Moved(NamedTuple):
-    """Result of the first case with one parameter moved by a factor.
+    """Result of the first case with one parameter moved by a factor."""
 
-    Attributes
-    ----------
-    parameter : str
-        Its name.
-    factor, value : float
-        The factor, and the resulting value [SI].
-    course : Course
-        Its runs.
-    """
-
-    parameter: str
+    parameter: str  # its name
+    # factor, value: the factor, and the resulting value [SI]
     factor: float
     value: float
-    course: Course
+    course: Course  # its runs
 
     @property
     def is_out(self) -> bool:
@@ -242,10 +204,6 @@ def look_around(fit: Fit, evaluation: Evaluation, confirmed: Sequence[Confirmed]
 
     Parameters
     ----------
-    fit : Fit
-        The requested fit.
-    evaluation : Evaluation
-        Does the runs.
     confirmed : sequence of Confirmed
         The best one first; the starts are among them.
     """

@@ -24,49 +24,29 @@ Array = NDArray[np.float64]
 
 
 class Score(NamedTuple):
-    """Score of a model's answers to a question.
+    """Score of a model's answers to a question."""
 
-    Attributes
-    ----------
-    cells : int
-        Cells behind the errors; of onsets, pairs of them.
-    median, high : float
-        Median of the errors and the bound that 95 % of them keep: of onsets [N m], of all else relative. Not
-        a number of occurrence, and where there is nothing to compare.
-    wrong : float
-        Of occurrence, the share of cells that are decided here and there, but of another class.
-    undecided : float
-        Share of the reference's cells that the model leaves undecided, fails at or does not answer; of
-        onsets the share that it misses.
-    additional : int
-        Onsets that the reference does not have, though it decides below and above them.
-    """
-
-    cells: int
+    cells: int  # cells behind the errors; of onsets, pairs of them
+    # median, high: median of the errors and the bound that 95 % of them keep: of onsets [N m], of all else
+    # relative. Not a number of occurrence, and where there is nothing to compare.
     median: float = math.nan
     high: float = math.nan
+    # of occurrence, the share of cells that are decided here and there, but of another class
     wrong: float = math.nan
+    # share of the reference's cells that the model leaves undecided, fails at or does not answer; of onsets
+    # the share that it misses
     undecided: float = math.nan
-    additional: int = 0
+    additional: int = 0  # onsets that the reference does not have, though it decides below and above them
 
 
 class Finding(NamedTuple):
-    """A row of the table.
+    """A row of the table."""
 
-    Attributes
-    ----------
-    question, rung : str
-        The question, and the model that answered.
-    score : Score
-        How well; of the reference its estimated error.
-    core_seconds : float
-        Of a run of the model, mean [s].
-    """
-
+    # question, rung: the question, and the model that answered
     question: str
     rung: str
-    score: Score
-    core_seconds: float
+    score: Score  # how well; of the reference its estimated error
+    core_seconds: float  # of a run of the model, mean [s]
 
 
 def compare(rungs: Sequence[Sweep], results: Mapping[str, xr.Dataset]) -> Iterator[Finding]:

@@ -217,21 +217,11 @@ _KEYS = {
 
 
 class Ladder(NamedTuple):
-    """The content of a ladder job.
+    """The content of a ladder job."""
 
-    Attributes
-    ----------
-    job : Job
-        Of the elastic belt.
-    rungs : tuple of Sweep
-        As `ladder` returns them.
-    refusals : dict
-        The reason, by the name of a model that is left out.
-    """
-
-    job: Job
-    rungs: tuple[Sweep, ...]
-    refusals: dict[str, str]
+    job: Job  # of the elastic belt
+    rungs: tuple[Sweep, ...]  # as `ladder` returns them
+    refusals: dict[str, str]  # the reason, by the name of a model that is left out
 
 
 def load(path: str | Path, overrides: Assignments = ()) -> Ladder:

@@ -26,36 +26,21 @@ NEAR = 1.05  # radii of a pulley, beyond which nothing touches it
 
 
 class Contact(NamedTuple):
-    """Constants of the contacts.
+    """Constants of the contacts."""
 
-    Attributes
-    ----------
-    shape : (C, 4) array
-        Shapes at the C points of an element of length 1.
-    stiffness, damping : float
-        Per length [N/m^2], [N s/m^2].
-    friction : Friction
-        How they rub.
-    """
-
-    shape: np.ndarray
+    shape: np.ndarray  # shape (C, 4): shapes at the C points of an element of length 1
+    # stiffness, damping: per length [N/m^2], [N s/m^2]
     stiffness: float
     damping: float
-    friction: Friction
+    friction: Friction  # how they rub
 
 
 class Touch(NamedTuple):
-    """State of the contacts of P pulleys and k elements, and their forces.
+    """State of the contacts of P pulleys and k elements, and their forces."""
 
-    Attributes
-    ----------
-    memory : Memory
-        Of friction.
-    normal, tangential : (P, k, C) arrays
-        Forces on the belt in the last stage, outwards and counter-clockwise [N].
-    """
-
-    memory: Memory
+    memory: Memory  # of friction
+    # normal, tangential, shape (P, k, C): forces on the belt in the last stage, outwards and
+    # counter-clockwise [N]
     normal: np.ndarray
     tangential: np.ndarray
 

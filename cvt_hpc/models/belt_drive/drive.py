@@ -48,41 +48,20 @@ LOWEST = 1.0  # [Hz]: modes below are the belt as it runs around
 
 
 class Drive(NamedTuple):
-    """Constants of a belt of k elements on P pulleys.
+    """Constants of a belt of k elements on P pulleys."""
 
-    Attributes
-    ----------
-    beam : AncfBeam
-        Of the belt.
-    pulleys : Pulleys
-        The pulleys that it runs around.
-    contact : Contact
-        Between both.
-    """
-
-    beam: AncfBeam
-    pulleys: rotating.Pulleys
-    contact: Contact
+    beam: AncfBeam  # of the belt
+    pulleys: rotating.Pulleys  # the pulleys that it runs around
+    contact: Contact  # between both
 
 
 class State(NamedTuple):
-    """Motion of a drive, and the work space of its steps.
+    """Motion of a drive, and the work space of its steps."""
 
-    Attributes
-    ----------
-    chain : Chain
-        Of the belt's n = k nodes.
-    wheels : Wheels
-        Of the pulleys.
-    touch : Touch
-        Of the contacts.
-    counters, totals : (3,) int array, (5 + P,) array
-        Work done [J].
-    """
-
-    chain: Chain
-    wheels: rotating.Wheels
-    touch: Touch
+    chain: Chain  # of the belt's n = k nodes
+    wheels: rotating.Wheels  # of the pulleys
+    touch: Touch  # of the contacts
+    # counters, totals, shapes (3,), of int, and (5 + P,): work done [J]
     counters: np.ndarray
     totals: np.ndarray
 

@@ -53,29 +53,16 @@ class Treatment(IntEnum):
 
 
 class Friction(NamedTuple):
-    """Constants of friction.
+    """Constants of friction."""
 
-    Attributes
-    ----------
-    treatment : int
-        One of `Treatment`.
-    law : FrictionLaw
-        mu over speed and normal force per length.
-    friction_speed : float
-        Of the regularisation [m/s].
-    grip, slack : float
-        Set-valued: force per length by speed of a contact that sticks, at first [N s/m^2]; speed that such a
-        one may keep, or up to which one that slides may go backwards [m/s].
-    shear_stiffness : float
-        Of bristles, force per length by shear [N/m^2].
-    """
-
-    treatment: int
-    law: FrictionLaw
-    friction_speed: float
+    treatment: int  # one of `Treatment`
+    law: FrictionLaw  # mu over speed and normal force per length
+    friction_speed: float  # of the regularisation [m/s]
+    # grip, slack: set-valued: force per length by speed of a contact that sticks, at first [N s/m^2]; speed
+    # that such a one may keep, or up to which one that slides may go backwards [m/s]
     grip: float
     slack: float
-    shear_stiffness: float
+    shear_stiffness: float  # of bristles, force per length by shear [N/m^2]
 
 
 class Memory(NamedTuple):
@@ -119,18 +106,13 @@ def empty_memory(pulleys: int, elements: int, points: int) -> Memory:
 
 
 class Rub(NamedTuple):
-    """Friction of a contact per length, against its slip, and its slopes.
+    """Friction of a contact per length, against its slip, and its slopes."""
 
-    Attributes
-    ----------
-    force, settled : float
-        By this iterate, and the value expected of the solution, which turns with the contact [N/m].
-    by_slip, by_pressure : float
-        [N s/m^2], [1].
-    """
-
+    # force, settled: by this iterate, and the value expected of the solution, which turns with the contact
+    # [N/m]
     force: float
     settled: float
+    # by_slip, by_pressure: [N s/m^2], [1]
     by_slip: float
     by_pressure: float
 

@@ -23,53 +23,32 @@ POWERS = ("driving_power", "load_power", "contact_loss", "belt_loss", "arm_loss"
 
 
 class Struts(NamedTuple):
-    """Springs and dashpots between fixed points and A arms; (A,) arrays but for the points.
+    """Springs and dashpots between fixed points and A arms; (A,) arrays but for the points."""
 
-    Attributes
-    ----------
-    fixed, held : (A, 2) arrays
-        Ends on the ground and, as drawn, on the arms [m].
-    stiffness, damping : arrays
-        [N/m], [N s/m]
-    lever : array
-        Slope of the length by the arm's angle as drawn [m]; 0 where there is no strut.
-    """
-
+    # fixed, held, shape (A, 2): ends on the ground and, as drawn, on the arms [m]
     fixed: np.ndarray
     held: np.ndarray
+    # stiffness, damping: [N/m], [N s/m]
     stiffness: np.ndarray
     damping: np.ndarray
-    lever: np.ndarray
+    lever: np.ndarray  # slope of the length by the arm's angle as drawn [m]; 0 where there is no strut
 
 
 class Arms(NamedTuple):
-    """Constants of A arms; (A,) arrays but for the pivots.
+    """Constants of A arms; (A,) arrays but for the pivots."""
 
-    Attributes
-    ----------
-    pivot : (A, 2) array
-        [m]
-    inertia : array
-        Of the arm with the mass of its pulley, about the pivot [kg m^2].
-    moment, stiffness, damping : arrays
-        Of the spring or the strut as drawn [N m], of spring and dashpot at the pivot [N m/rad], [N m s/rad].
-    lowest, highest : arrays
-        Ends of the travel [rad].
-    stop : float
-        Stiffness beyond them [N m/rad].
-    struts : Struts
-        Between arms and ground.
-    """
-
-    pivot: np.ndarray
-    inertia: np.ndarray
+    pivot: np.ndarray  # shape (A, 2): [m]
+    inertia: np.ndarray  # of the arm with the mass of its pulley, about the pivot [kg m^2]
+    # moment, stiffness, damping: of the spring or the strut as drawn [N m], of spring and dashpot at the
+    # pivot [N m/rad], [N m s/rad]
     moment: np.ndarray
     stiffness: np.ndarray
     damping: np.ndarray
+    # lowest, highest: ends of the travel [rad]
     lowest: np.ndarray
     highest: np.ndarray
-    stop: float
-    struts: Struts
+    stop: float  # stiffness beyond them [N m/rad]
+    struts: Struts  # between arms and ground
 
 
 class Pulleys(NamedTuple):
@@ -95,36 +74,30 @@ class Pulleys(NamedTuple):
 
 
 class Wheels(NamedTuple):
-    """Motion of P pulleys and A arms, and their part in the equations of a stage.
+    """Motion of P pulleys and A arms, and their part in the equations of a stage."""
 
-    Attributes
-    ----------
-    speed, acceleration, stage_speed, start_speed : (1, P + A) arrays
-        Of pulleys, then arms, counter-clockwise [rad/s], [rad/s^2], as those of a chain.
-    angle, turning, stage_angle, start_angle : (1, A) arrays
-        Of the arms from where they are drawn [rad], and its rate [rad/s], as those of a chain.
-    centre, centre_speed, lever : (P, 2) arrays
-        Axes in a stage [m], their speeds [m/s], and slopes by the angle of the arm [m].
-    rows, corner : (n, P - 1 + A, 4) array, (1, P - 1 + A) LaneArray
-        Border of the equations: the pulleys but the first, then the arms.
-    power : (5 + P,) array
-        Of the last stage, in the order of the totals [W].
-    """
-
+    # speed, acceleration, stage_speed, start_speed, shape (1, P + A): of pulleys, then arms,
+    # counter-clockwise [rad/s], [rad/s^2], as those of a chain
     speed: np.ndarray
     acceleration: np.ndarray
     stage_speed: np.ndarray
     start_speed: np.ndarray
+    # angle, turning, stage_angle, start_angle, shape (1, A): of the arms from where they are drawn [rad], and
+    # its rate [rad/s], as those of a chain
     angle: np.ndarray
     turning: np.ndarray
     stage_angle: np.ndarray
     start_angle: np.ndarray
+    # centre, centre_speed, lever, shape (P, 2): axes in a stage [m], their speeds [m/s], and slopes by the
+    # angle of the arm [m]
     centre: np.ndarray
     centre_speed: np.ndarray
     lever: np.ndarray
+    # rows, corner, shapes (n, P - 1 + A, 4) and (1, P - 1 + A): border of the equations: the pulleys but the
+    # first, then the arms
     rows: np.ndarray
     corner: LaneArray
-    power: np.ndarray
+    power: np.ndarray  # shape (5 + P,): of the last stage, in the order of the totals [W]
 
 
 def struts(

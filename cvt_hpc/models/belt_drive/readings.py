@@ -139,40 +139,21 @@ def stored_energy(drive: Drive, state: State) -> float:
 
 
 class Line(NamedTuple):
-    """The belt at the Gauss points of its k elements, (k, POINTS) arrays.
+    """The belt at the Gauss points of its k elements, (k, POINTS) arrays."""
 
-    Attributes
-    ----------
-    position, offset : arrays
-        Path coordinate, and distance from the path to the right of the belt's way [m].
-    tension : array
-        [N]
-    """
-
+    # position, offset: path coordinate, and distance from the path to the right of the belt's way [m]
     position: np.ndarray
     offset: np.ndarray
-    tension: np.ndarray
+    tension: np.ndarray  # [N]
 
 
 class Sample(NamedTuple):
-    """Readings of a belt on P pulleys at p probes.
+    """Readings of a belt on P pulleys at p probes."""
 
-    Attributes
-    ----------
-    displacement : (p,) array
-        To the right of the belt's way [m].
-    tension : (P,) array
-        Mean over the middle half of the spans [N].
-    slip : (P,) array
-        Mean sliding speed, counter-clockwise, weighed by normal forces [m/s].
-    largest : (P,) array
-        Normal force of the contact that is pressed most [N].
-    """
-
-    displacement: np.ndarray
-    tension: np.ndarray
-    slip: np.ndarray
-    largest: np.ndarray
+    displacement: np.ndarray  # shape (p,): to the right of the belt's way [m]
+    tension: np.ndarray  # shape (P,): mean over the middle half of the spans [N]
+    slip: np.ndarray  # shape (P,): mean sliding speed, counter-clockwise, weighed by normal forces [m/s]
+    largest: np.ndarray  # shape (P,): normal force of the contact that is pressed most [N]
 
 
 def empty_line(elements: int) -> Line:
@@ -202,8 +183,6 @@ def read(
 
     Parameters
     ----------
-    way : Way
-        The reference path.
     beam, chain : AncfBeam, Chain
         The belt, and its motion.
     contact, touch : Contact, Touch

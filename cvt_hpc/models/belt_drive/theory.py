@@ -61,10 +61,8 @@ def expected_loss(parameters: Parameters, drawn: Layout, tension: np.ndarray) ->
 
     Parameters
     ----------
-    parameters : mapping
-        Flat parameters of a run [SI].
-    drawn : Layout
-        Its pulleys.
+    parameters, drawn
+        As of `creep_loss`.
     tension : (P,) array
         Of the strands [N].
     """
@@ -165,8 +163,6 @@ def sliding_tension(
     ----------
     parameters : mapping
         Flat parameters of a run [SI].
-    path : BeltPath
-        The reference path.
     tension : (P,) array
         Of the strands [N].
     position : (place,) array
@@ -203,8 +199,6 @@ def strand_frequencies(parameters: Parameters, path: BeltPath, tension: np.ndarr
     ----------
     parameters : mapping
         Flat parameters of a run [SI].
-    path : BeltPath
-        The reference path.
     tension : (P,) array
         Of the strands [N].
 
@@ -234,8 +228,6 @@ def mesh_amplitude(parameters: Parameters, path: BeltPath, tension: np.ndarray) 
     ----------
     parameters : mapping
         Flat parameters of a run [SI].
-    path : BeltPath
-        The reference path.
     tension : (P,) array
         Of the strands [N].
     """
@@ -252,8 +244,6 @@ def kick(path: BeltPath, line_mass: float, impulse: float, q: np.ndarray, v: np.
 
     Parameters
     ----------
-    path : BeltPath
-        The reference path.
     line_mass : float
         [kg/m]
     impulse : float

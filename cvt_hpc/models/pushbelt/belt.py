@@ -21,128 +21,80 @@ from cvt_hpc.variator.history import points_at
 
 
 class Belt(NamedTuple):
-    """Constants of a belt and its pulleys; of an element where not stated otherwise.
+    """Constants of a belt and its pulleys; of an element where not stated otherwise."""
 
-    Attributes
-    ----------
-    centre_distance : float
-        [m]
-    sine, cosine : float
-        Of the half wedge angle.
-    thickness : float
-        [m]
-    pitch_depth, head_height : float
-        Of the rocking edge and the flank's contact point below the saddle, and of the head's contact above
-        it [m].
-    mass, inertia, ring_mass : float
-        [kg], [kg m^2], and mass of the ring for each element [kg].
-    ring_stiffness : float
-        EA of both ring packages [N].
-    bending_stiffness, pitch : float
-        EI of theirs in the plane [N m^2], distance of neighbours [m].
-    ring_time : float
-        Their damping along the belt over that stiffness [s].
-    flank_stiffness : float
-        Normal force at each flank by its penetration, element and local bending of the sheave in series,
-        where neighbours have the same force [N/m].
-    local_compliance, local_decay : float
-        Local bending of a sheave along the normal by that force [m/N], 0: none; its decay from element to
-        element [1] (`local_bending`).
-    contact_stiffness : float
-        Of each of the two contacts between elements [N/m].
-    nose_height, nose_clearance, nose_stiffness : float
-        Of nose and hole above the saddle [m], play to either side [m], infinite without noses, and [N/m].
-    contact_time : float
-        Damping over stiffness of contacts and noses between elements [s].
-    angle_stiffness, angle_damping : float
-        Of an element's rotation against each segment of the ring, half at each end [N m/rad], [N m s/rad].
-    transverse_damping : float
-        Force against the speed across the path [N s/m].
-    flank_law, flank_kinetic, flank_gradient, flank_speed : int, float, float, float
-        Friction law at the flanks (`physics.friction`).
-    friction_memory : float
-        Time constant of the sliding speed at which that law is read [s].
-    ring_friction : float
-        Friction coefficient of the ring on the saddles.
-    friction_speed, ring_friction_speed : float
-        v_reg of both: friction is mu N tanh(|v| / v_reg) [m/s].
-    driven_inertia : float
-        [kg m^2]
-    driving_rate, driven_rate : float
-        Radial speed of the belt by the excess of a loose sheave's thrust over the belt's axial force
-        [m/(s N)]; 0: the sheave is fixed.
-    modal_stiffness : (2, modes) array
-        S_k of the opening of each pulley's sheaves as sum a_k psi_k(phi), psi 1, cos, sin, cos 2, ... [N/m];
-        none: rigid sheaves.
-    modal_damping : (2, modes) array
-        Of the same openings, where their tilt lags (`border`) [N s/m].
-    gravity : float
-        Acceleration of gravity, against z [m/s^2].
-    """
-
-    centre_distance: float
+    centre_distance: float  # [m]
+    # sine, cosine: of the half wedge angle
     sine: float
     cosine: float
-    thickness: float
+    thickness: float  # [m]
+    # pitch_depth, head_height: of the rocking edge and the flank's contact point below the saddle, and of the
+    # head's contact above it [m]
     pitch_depth: float
     head_height: float
+    # mass, inertia, ring_mass: [kg], [kg m^2], and mass of the ring for each element [kg]
     mass: float
     inertia: float
     ring_mass: float
-    ring_stiffness: float
+    ring_stiffness: float  # EA of both ring packages [N]
+    # bending_stiffness, pitch: EI of theirs in the plane [N m^2], distance of neighbours [m]
     bending_stiffness: float
     pitch: float
-    ring_time: float
+    ring_time: float  # their damping along the belt over that stiffness [s]
+    # normal force at each flank by its penetration, element and local bending of the sheave in series, where
+    # neighbours have the same force [N/m]
     flank_stiffness: float
+    # local_compliance, local_decay: local bending of a sheave along the normal by that force [m/N], 0: none;
+    # its decay from element to element [1] (`local_bending`)
     local_compliance: float
     local_decay: float
-    contact_stiffness: float
+    contact_stiffness: float  # of each of the two contacts between elements [N/m]
+    # nose_height, nose_clearance, nose_stiffness: of nose and hole above the saddle [m], play to either side
+    # [m], infinite without noses, and [N/m]
     nose_height: float
     nose_clearance: float
     nose_stiffness: float
-    contact_time: float
+    contact_time: float  # damping over stiffness of contacts and noses between elements [s]
+    # angle_stiffness, angle_damping: of an element's rotation against each segment of the ring, half at each
+    # end [N m/rad], [N m s/rad]
     angle_stiffness: float
     angle_damping: float
-    transverse_damping: float
+    transverse_damping: float  # force against the speed across the path [N s/m]
+    # flank_law, flank_kinetic, flank_gradient, flank_speed: friction law at the flanks (`physics.friction`)
     flank_law: int
     flank_kinetic: float
     flank_gradient: float
     flank_speed: float
-    friction_memory: float
-    ring_friction: float
+    friction_memory: float  # time constant of the sliding speed at which that law is read [s]
+    ring_friction: float  # friction coefficient of the ring on the saddles
+    # friction_speed, ring_friction_speed: v_reg of both: friction is mu N tanh(|v| / v_reg) [m/s]
     friction_speed: float
     ring_friction_speed: float
-    driven_inertia: float
+    driven_inertia: float  # [kg m^2]
+    # driving_rate, driven_rate: radial speed of the belt by the excess of a loose sheave's thrust over the
+    # belt's axial force [m/(s N)]; 0: the sheave is fixed
     driving_rate: float
     driven_rate: float
+    # shape (2, modes): S_k of the opening of each pulley's sheaves as sum a_k psi_k(phi), psi 1, cos, sin,
+    # cos 2, ... [N/m]; none: rigid sheaves
     modal_stiffness: np.ndarray
+    # shape (2, modes): of the same openings, where their tilt lags (`border`) [N s/m]
     modal_damping: np.ndarray
-    gravity: float = 0.0
+    gravity: float = 0.0  # acceleration of gravity, against z [m/s^2]
 
 
 class Newton(NamedTuple):
-    """How a step is solved.
+    """How a step is solved."""
 
-    Attributes
-    ----------
-    tolerance : float
-        Largest correction of a speed [m/s].
-    power_tolerance : float
-        Largest power residual of the whole belt [W].
-    weights : tuple of float
-        Weights of the corrections of an element's speeds: lengths of angular velocities [m], else 1.
-    most_iterations, first_half_step : int
-        Iterations a step, and the first one whose correction is halved where corrections do not fall.
-    most_failures : int
-        Failed steps in a row with which a run ends.
-    """
-
-    tolerance: float
-    power_tolerance: float
+    tolerance: float  # largest correction of a speed [m/s]
+    power_tolerance: float  # largest power residual of the whole belt [W]
+    # weights of the corrections of an element's speeds: lengths of angular velocities [m], else 1
     weights: tuple[float, ...]
+    # most_iterations, first_half_step: iterations a step, and the first one whose correction is halved where
+    # corrections do not fall
     most_iterations: int = 40
     first_half_step: int = 10
-    most_failures: int = 20
+    most_failures: int = 20  # failed steps in a row with which a run ends
 
 
 TILT_MODES = slice(1, 3)  # cos and sin
@@ -287,29 +239,19 @@ def equal_chords(
 
 
 class PitchLine(NamedTuple):
-    """Where the rocking edges of a belt lie at the start, and how fast it runs.
+    """Where the rocking edges of a belt lie at the start, and how fast it runs."""
 
-    Attributes
-    ----------
-    path : Variator
-        [m]
-    places, points, along, curvature : (n,), (n, 2), (n, 2), (n,) array
-        Of the elements, with equal chords: path coordinate [m], position [m], running direction and curvature
-        of the path [1/m].
-    chord, speed : float
-        Distance of neighbours [m], and speed along the path [m/s].
-    pulleys : (4,) array
-        Speeds [rad/s] and radii [m].
-    """
-
-    path: Variator
+    path: Variator  # [m]
+    # places, points, along, curvature, shapes (n,), (n, 2), (n, 2), (n,): of the elements, with equal chords:
+    # path coordinate [m], position [m], running direction and curvature of the path [1/m]
     places: np.ndarray
     points: np.ndarray
     along: np.ndarray
     curvature: np.ndarray
+    # chord, speed: distance of neighbours [m], and speed along the path [m/s]
     chord: float
     speed: float
-    pulleys: np.ndarray
+    pulleys: np.ndarray  # shape (4,): speeds [rad/s] and radii [m]
 
 
 def pitch_line(given: Mapping[str, Any]) -> PitchLine:

@@ -53,18 +53,10 @@ ONLY = {
 
 
 class Follows(NamedTuple):
-    """How a parameter of the pushbelt follows.
+    """How a parameter of the pushbelt follows."""
 
-    Attributes
-    ----------
-    needs : tuple of str
-        Keys of the continuous belt that decide it.
-    value : callable
-        Flat parameters of the continuous belt [SI] -> the value [SI].
-    """
-
-    needs: tuple[str, ...]
-    value: Callable[[Mapping[str, Any]], Any]
+    needs: tuple[str, ...]  # keys of the continuous belt that decide it
+    value: Callable[[Mapping[str, Any]], Any]  # flat parameters of the continuous belt [SI] -> the value [SI]
 
 
 def _flank_stiffness(p: Mapping[str, Any]) -> float:

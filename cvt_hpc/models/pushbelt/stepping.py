@@ -21,34 +21,21 @@ _LARGE = 1e100  # more than any speed or power that means something
 
 
 class Equations(NamedTuple):
-    """A model's equations of a step: kernels, which take `belt, state, work` first and `dt` last.
+    """A model's equations of a step: kernels, which take `belt, state, work` first and `dt` last."""
 
-    Attributes
-    ----------
-    prepare : kernel
-        Values that all iterates of a step have in common: geometry, directions, linear laws.
-    evaluate : kernel
-        Forces of the iterate, and the residuals that they leave, that of the border in its last column. Takes
-        the load [N m] before `dt`, and returns the power residual [W].
-    assemble : kernel
-        The linear system of the elements, with a column for the residual and one for each unknown of the
-        border.
-    close : kernel
-        That of the border, once the elements' is solved (`solvers.linked_blocks`).
-    accept : kernel
-        Advances the state to the end of the step, and adds up the works. Takes the inputs before `dt`.
-    changes : kernel
-        By how much contact forces have changed, in the order of `CONTACTS` (`faults.name_fault`).
-    first_change : int
-        Field of an element at which the changes of its speeds in the step begin, as many as it has unknowns.
-    """
-
+    # values that all iterates of a step have in common: geometry, directions, linear laws
     prepare: Callable[..., None]
+    # forces of the iterate, and the residuals that they leave, that of the border in its last column. Takes
+    # the load [N m] before `dt`, and returns the power residual [W].
     evaluate: Callable[..., float]
+    # the linear system of the elements, with a column for the residual and one for each unknown of the border
     assemble: Callable[..., None]
-    close: Callable[..., None]
+    close: Callable[..., None]  # that of the border, once the elements' is solved (`solvers.linked_blocks`)
+    # advances the state to the end of the step, and adds up the works. Takes the inputs before `dt`.
     accept: Callable[..., None]
+    # by how much contact forces have changed, in the order of `CONTACTS` (`faults.name_fault`)
     changes: Callable[..., tuple[float, ...]]
+    # field of an element at which the changes of its speeds in the step begin, as many as it has unknowns
     first_change: int
 
 
@@ -144,8 +131,6 @@ def advance_by(equations, belt, newton, state, work, inputs, steps, dt):
         How steps are solved.
     state : BeltState
         The state at the start; at the end, of its last step.
-    work : Workspace
-        Work space.
     inputs : (2, INPUTS) array
         Inputs of the model at the start and at the end (`belt.IN_SPEED` and so on): between, they change
         linearly.

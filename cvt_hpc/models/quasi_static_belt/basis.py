@@ -13,23 +13,12 @@ SPLITS = ("free_splines", "held_splines", "modes")
 
 
 class Basis(NamedTuple):
-    """Shapes at the stations.
+    """Shapes at the stations."""
 
-    Attributes
-    ----------
-    dynamic : (N, D) array
-        Shapes that have inertia.
-    lagging : (N, L) array
-        Shapes that follow their forces.
-    stiffness : (N, N) array
-        Of the stations, at rest in closed grooves [N/m].
-    fastest : float
-        Largest angular frequency of the dynamic ones under that stiffness [rad/s]; 0 where there is none.
-    """
-
-    dynamic: np.ndarray
-    lagging: np.ndarray
-    stiffness: np.ndarray
+    dynamic: np.ndarray  # shape (N, D): shapes that have inertia
+    lagging: np.ndarray  # shape (N, L): shapes that follow their forces
+    stiffness: np.ndarray  # shape (N, N): of the stations, at rest in closed grooves [N/m]
+    # largest angular frequency of the dynamic ones under that stiffness [rad/s]; 0 where there is none
     fastest: float
 
 

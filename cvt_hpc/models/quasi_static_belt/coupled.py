@@ -17,23 +17,14 @@ from cvt_hpc.models.quasi_static_belt import fields as f
 
 
 class Chain(NamedTuple):
-    """Work space of the layers' elimination, C = R + 3 columns.
+    """Work space of the layers' elimination, C = R + 3 columns."""
 
-    Attributes
-    ----------
-    diagonal : (N, 3) array
-        Blocks at the stations (00, 01, 11) without the links [N s/m].
-    links : (2, N) array
-        Slopes of the stresses in the cells with the speeds' differences, by layer [N s/m].
-    inverse : (N, 3) array
-        Of the eliminated blocks.
-    columns : (N, 2, C) array
-        By station and layer the right side, c R, and the two that close the ring; then the solution.
-    """
-
-    diagonal: np.ndarray
+    diagonal: np.ndarray  # shape (N, 3): blocks at the stations (00, 01, 11) without the links [N s/m]
+    # shape (2, N): slopes of the stresses in the cells with the speeds' differences, by layer [N s/m]
     links: np.ndarray
-    inverse: np.ndarray
+    inverse: np.ndarray  # shape (N, 3): of the eliminated blocks
+    # shape (N, 2, C): by station and layer the right side, c R, and the two that close the ring; then the
+    # solution
     columns: np.ndarray
 
 

@@ -18,39 +18,20 @@ from cvt_hpc.physics.compliance import Contact
 
 
 class SplitBelt(NamedTuple):
-    """Constants of a run and its step.
+    """Constants of a run and its step."""
 
-    Attributes
-    ----------
-    belt : Belt
-        As of the elastic belt.
-    shapes : (N, D + L) array
-        Dynamic shapes first.
-    dynamic : int
-        Their number D.
-    step : float
-        [s]
-    inertia : (D + L, D + L) array
-        M / dt of the dynamic ones, dt / (1 - exp(-dt / T)) K of the lagging ones [N s/m].
-    gyration : (D + L, D + L) array
-        Half of the gyroscopic matrix per belt speed, antisymmetric [N s^2/m^2].
-    steady_flow : bool
-        Each layer has one speed.
-    drag : (2,) array
-        Of the material against its layer's mean motion, with the steady flow [N s/m^2].
-    share : (2, N) array
-        The layers' mass at the stations over the layer's whole mass [1].
-    """
-
-    belt: Belt
-    shapes: np.ndarray
-    dynamic: int
-    step: float
+    belt: Belt  # as of the elastic belt
+    shapes: np.ndarray  # shape (N, D + L): dynamic shapes first
+    dynamic: int  # their number D
+    step: float  # [s]
+    # shape (D + L, D + L): M / dt of the dynamic ones, dt / (1 - exp(-dt / T)) K of the lagging ones [N s/m]
     inertia: np.ndarray
+    # shape (D + L, D + L): half of the gyroscopic matrix per belt speed, antisymmetric [N s^2/m^2]
     gyration: np.ndarray
-    steady_flow: bool
+    steady_flow: bool  # each layer has one speed
+    # shape (2,): of the material against its layer's mean motion, with the steady flow [N s/m^2]
     drag: np.ndarray
-    share: np.ndarray
+    share: np.ndarray  # shape (2, N): the layers' mass at the stations over the layer's whole mass [1]
 
 
 class Motion(NamedTuple):

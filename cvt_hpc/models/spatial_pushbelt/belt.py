@@ -35,136 +35,91 @@ SEED_MODES = 5  # half waves of a strand that the disturbance at the start is ma
 
 
 class Belt(NamedTuple):
-    """Constants of a belt and its pulleys; of an element where not said otherwise.
+    """Constants of a belt and its pulleys; of an element where not said otherwise."""
 
-    Attributes
-    ----------
-    centre_distance : float
-        [m]
-    axes : (2, 3) array
-        Directions of the driving and the driven axis, unit vectors; without tilt (0, 0, 1).
-    loose_side : (2,) array
-        Of each pulley 1 where the right sheave moves, -1 where the left one does, 0 where both do.
-    sine, cosine : float
-        Of the half wedge angle.
-    half_width : float
-        From the middle to either flank on the pitch line [m].
-    flank_reach : float
-        Of the flanks' contact points above and below the pitch line [m].
-    thickness : float
-        [m]
-    bending_stiffness, pitch : float
-        EI of the rings in the plane [N m^2], distance of neighbours [m].
-    pitch_depth, head_height : float
-        Of the pitch line below the saddles, which is that of the rocking edge, and of the head's contacts
-        above them [m].
-    edge_width, head_width : float
-        From the middle to the contacts at the rocking edge and at the head [m].
-    package_distance : float
-        From the middle to the line of either ring package [m].
-    pin_height, pin_clearance, pin_stiffness : float
-        Of pin and hole above the saddles [m], play to all sides [m], infinite without pins, and [N/m].
-    mass : float
-        [kg]
-    roll_inertia, yaw_inertia, pitch_inertia : float
-        About the element's x, o and a [kg m^2].
-    ring_mass, ring_rotary_inertia : float
-        Of both packages for each element [kg], and against a change of slope [kg m^2].
-    ring_stiffness, ring_time, ring_bending, ring_shear : float
-        EA [N], damping along the belt over it [s], lateral EI [N m^2] and lateral k G A [N] of both packages.
-    flank_stiffness : float
-        Normal force at each flank by its penetration, shared by its two points, with local bending in
-        series as in the plane [N/m].
-    local_compliance, local_decay : float
-        As in the plane [m/N], [1].
-    contact_stiffness : float
-        Of the contacts at an edge and at a head, shared by its two points [N/m].
-    contact_time : float
-        Damping over stiffness of contacts and pins between elements [s].
-    angle_stiffness, angle_damping : float
-        Of an element's pitch against each segment of the ring, half at each end [N m/rad], [N m s/rad].
-    yaw_stiffness, yaw_damping : float
-        Of an element's yaw against the slope of the ring [N m/rad], [N m s/rad].
-    transverse_damping, lateral_damping : float
-        Force against the speed across the path in the plane, and out of it [N s/m].
-    flank_law, flank_kinetic, flank_gradient, flank_speed : int, float, float, float
-        Friction law at the flanks (`physics.friction`).
-    friction_memory : float
-        Time constant of the sliding speed at which that law is read [s].
-    ring_friction : float
-        Friction coefficient of the rings on the saddles.
-    friction_speed, ring_friction_speed : float
-        v_reg of both: friction is mu N tanh(|v| / v_reg) [m/s].
-    driven_inertia : float
-        [kg m^2]
-    driving_rate, driven_rate : float
-        Radial speed of the belt by the excess of a loose sheave's thrust over the belt's axial force on it
-        [m/(s N)]; 0: the sheave is fixed.
-    modal_stiffness : (2, modes) array
-        S_k of the opening of each sheave of a pulley as sum a_k psi_k(phi), psi 1, cos, sin, cos 2, ...
-        [N/m]; none: rigid sheaves.
-    modal_damping : (2, modes) array
-        Of the same openings, where their tilt lags [N s/m].
-    lean_lag : float
-        Time constant with which the difference of a pulley's two sheaves follows their load [s].
-    gravity : float
-        Acceleration of gravity, against z [m/s^2].
-    """
-
-    centre_distance: float
+    centre_distance: float  # [m]
+    # shape (2, 3): directions of the driving and the driven axis, unit vectors; without tilt (0, 0, 1)
     axes: np.ndarray
+    # shape (2,): of each pulley 1 where the right sheave moves, -1 where the left one does, 0 where both do
     loose_side: np.ndarray
+    # sine, cosine: of the half wedge angle
     sine: float
     cosine: float
-    half_width: float
-    flank_reach: float
-    thickness: float
+    half_width: float  # from the middle to either flank on the pitch line [m]
+    flank_reach: float  # of the flanks' contact points above and below the pitch line [m]
+    thickness: float  # [m]
+    # bending_stiffness, pitch: EI of the rings in the plane [N m^2], distance of neighbours [m]
     bending_stiffness: float
     pitch: float
+    # pitch_depth, head_height: of the pitch line below the saddles, which is that of the rocking edge, and of
+    # the head's contacts above them [m]
     pitch_depth: float
     head_height: float
+    # edge_width, head_width: from the middle to the contacts at the rocking edge and at the head [m]
     edge_width: float
     head_width: float
-    package_distance: float
+    package_distance: float  # from the middle to the line of either ring package [m]
+    # pin_height, pin_clearance, pin_stiffness: of pin and hole above the saddles [m], play to all sides [m],
+    # infinite without pins, and [N/m]
     pin_height: float
     pin_clearance: float
     pin_stiffness: float
-    mass: float
+    mass: float  # [kg]
+    # roll_inertia, yaw_inertia, pitch_inertia: about the element's x, o and a [kg m^2]
     roll_inertia: float
     yaw_inertia: float
     pitch_inertia: float
+    # ring_mass, ring_rotary_inertia: of both packages for each element [kg], and against a change of slope
+    # [kg m^2]
     ring_mass: float
     ring_rotary_inertia: float
+    # ring_stiffness, ring_time, ring_bending, ring_shear: EA [N], damping along the belt over it [s], lateral
+    # EI [N m^2] and lateral k G A [N] of both packages
     ring_stiffness: float
     ring_time: float
     ring_bending: float
     ring_shear: float
+    # normal force at each flank by its penetration, shared by its two points, with local bending in series as
+    # in the plane [N/m]
     flank_stiffness: float
+    # local_compliance, local_decay: as in the plane [m/N], [1]
     local_compliance: float
     local_decay: float
-    contact_stiffness: float
-    contact_time: float
+    contact_stiffness: float  # of the contacts at an edge and at a head, shared by its two points [N/m]
+    contact_time: float  # damping over stiffness of contacts and pins between elements [s]
+    # angle_stiffness, angle_damping: of an element's pitch against each segment of the ring, half at each end
+    # [N m/rad], [N m s/rad]
     angle_stiffness: float
     angle_damping: float
+    # yaw_stiffness, yaw_damping: of an element's yaw against the slope of the ring [N m/rad], [N m s/rad]
     yaw_stiffness: float
     yaw_damping: float
+    # transverse_damping, lateral_damping: force against the speed across the path in the plane, and out of it
+    # [N s/m]
     transverse_damping: float
     lateral_damping: float
+    # flank_law, flank_kinetic, flank_gradient, flank_speed: friction law at the flanks (`physics.friction`)
     flank_law: int
     flank_kinetic: float
     flank_gradient: float
     flank_speed: float
-    friction_memory: float
-    ring_friction: float
+    friction_memory: float  # time constant of the sliding speed at which that law is read [s]
+    ring_friction: float  # friction coefficient of the rings on the saddles
+    # friction_speed, ring_friction_speed: v_reg of both: friction is mu N tanh(|v| / v_reg) [m/s]
     friction_speed: float
     ring_friction_speed: float
-    driven_inertia: float
+    driven_inertia: float  # [kg m^2]
+    # driving_rate, driven_rate: radial speed of the belt by the excess of a loose sheave's thrust over the
+    # belt's axial force on it [m/(s N)]; 0: the sheave is fixed
     driving_rate: float
     driven_rate: float
+    # shape (2, modes): S_k of the opening of each sheave of a pulley as sum a_k psi_k(phi), psi 1, cos, sin,
+    # cos 2, ... [N/m]; none: rigid sheaves
     modal_stiffness: np.ndarray
-    modal_damping: np.ndarray
+    modal_damping: np.ndarray  # shape (2, modes): of the same openings, where their tilt lags [N s/m]
+    # time constant with which the difference of a pulley's two sheaves follows their load [s]
     lean_lag: float
-    gravity: float = 0.0
+    gravity: float = 0.0  # acceleration of gravity, against z [m/s^2]
 
 
 # How a step is solved: velocity, angular velocity in the plane and out of it, V, rate of the slope
