@@ -150,12 +150,12 @@ def sensitivity_figure(
     if "band" not in found:
         raise mismatch(source, "results with the job that states the distributions", "others")
     row = widest_row(found)
-    if not np.any(np.isfinite(found["onset"])):
-        raise mismatch(source, f"vibration that sets in along {along}", "none in any sample")
     place = ", ".join(layout.place_text(found[name], k, " = ") for name, k in row.items())
     head = figures.headline(f"What the onset in {figures.in_words(dataset[along])} depends on", dataset.attrs)
     lines = [head, place.replace("_", " ")]
     here = found.isel(row)
+    if not np.any(here["onset"] < np.inf):
+        lines.append("hardly any sample vibrates along the axis: extend it, or take more samples")
     swing = np.abs(here["quarter_onset"].diff("quarter").values[0])
     here = here.isel(parameter=np.argsort(np.where(np.isfinite(swing), swing, -1.0)))
     factor, unit = figures.coordinate_unit(here[ONSET].attrs)

@@ -290,14 +290,14 @@ def test_half_the_scatter_of_a_parameter_narrows_the_onset_as_in_the_closed_form
     assert found["halved_onset"].values[1] == pytest.approx(15.0, abs=0.1)
 
 
-def test_the_picture_names_correlated_parameters_and_none_is_drawn_where_nothing_vibrates():
+def test_the_picture_names_correlated_parameters_and_says_where_nothing_vibrates():
     further = {"damping": normal(5.0, 0.75), "preload": normal(40.0, 20.0)}
     further["correlation"] = {"parameters": ["damping", "preload"], "matrix": [[1.0, 0.6], [0.6, 1.0]]}
     dataset = linear_onset(32, STEPS, **further)
     assert "damping,\npreload" in words(sensitivity_figure(dataset))
     quiet = dataset.assign(vibrates=xr.full_like(dataset["vibrates"], int(Vibrates.NO)))
-    with pytest.raises(InputError, match="expected vibration that sets in along load, found none in any"):
-        sensitivity_figure(quiet)
+    assert "hardly any sample vibrates" in words(sensitivity_figure(quiet))
+    assert "hardly any" not in words(sensitivity_figure(dataset))
 
 
 def test_samples_that_are_not_run_make_no_band_surer():
