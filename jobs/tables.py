@@ -22,6 +22,7 @@ import os
 import re
 import resource
 import shlex
+import shutil
 import subprocess
 import sys
 import tempfile
@@ -321,14 +322,17 @@ def make(names, stale):
             raise mismatch(
                 table.name, "all that it rests on as in HEAD, of which it is made", f"changes of {files}"
             )
-    failed = []
-    with tempfile.TemporaryDirectory() as folder:
-        (tree := Path(folder) / "tree").mkdir()
-        subprocess.run(["tar", "-x", "-C", tree], input=git("archive", "HEAD"), check=True)
-        for table in wanted:
-            why = made(table, Path(folder))
-            print(f"{table.name}: {why or 'made'}", flush=True)
-            failed += [table.name] if why else []
+    failed, folder = [], Path(tempfile.mkdtemp())
+    (tree := folder / "tree").mkdir()
+    subprocess.run(["tar", "-x", "-C", tree], input=git("archive", "HEAD"), check=True)
+    for table in wanted:
+        why = made(table, folder)
+        print(f"{table.name}: {why or 'made'}", flush=True)
+        failed += [table.name] if why else []
+    if failed:
+        print(f"kept, with what its runs have left: {folder}")
+    else:
+        shutil.rmtree(folder)
     print(f"{len(wanted) - len(failed)} made" + f", not {', '.join(failed)}" * bool(failed))
     return int(bool(failed))
 

@@ -133,7 +133,11 @@ def test_a_revision_that_leaves_something_open_is_named(program, store, told, st
     assert states(program)["small"] == (state, stale)
 
 
-def test_tables_are_made_the_cheapest_first_and_one_that_fails_stays_as_it_is(program, store, capsys):
+def test_tables_are_made_the_cheapest_first_and_one_that_fails_stays_as_it_is(
+    program, store, capsys, tmp_path, monkeypatch
+):
+    (kept := tmp_path / "made").mkdir()
+    monkeypatch.setattr("tempfile.tempdir", str(kept))
     results = store / "jobs" / "results"
     broken = (results / "broken.csv").read_text()
     assert program.main(["make", "large", "small", "broken"]) == 1
@@ -142,6 +146,7 @@ def test_tables_are_made_the_cheapest_first_and_one_that_fails_stays_as_it_is(pr
         "broken: exit status 3: no belt",
         "small: made",
         "large: made",
+        f"kept, with what its runs have left: {next(kept.iterdir())}",
         "2 made, not broken",
     ]
     assert (results / "broken.csv").read_text() == broken
@@ -152,7 +157,9 @@ def test_tables_are_made_the_cheapest_first_and_one_that_fails_stays_as_it_is(pr
     assert sorted(path.name for path in results.iterdir()) == ["broken.csv", "large.csv", "small.csv"]
 
 
-def test_all_that_are_stale_are_made_from_what_is_committed(program, store, capsys):
+def test_all_that_are_stale_are_made_from_what_is_committed(program, store, capsys, tmp_path, monkeypatch):
+    (left := tmp_path / "made").mkdir()
+    monkeypatch.setattr("tempfile.tempdir", str(left))
     edit(store / "jobs" / "large.sh", "1,2", "1,3")
     assert program.main(["make", "--stale"]) == 2
     assert re.fullmatch(
@@ -161,12 +168,14 @@ def test_all_that_are_stale_are_made_from_what_is_committed(program, store, caps
     git(store, "commit", "-q", "-a", "-m", "another load")
     program.objects.cache_clear()
     assert program.main(["make", "--stale"]) == 0
-    assert capsys.readouterr().out == "large: made\n1 made\n"
+    assert capsys.readouterr().out == "large: made\n1 made\n" and not [*left.iterdir()]
     assert (store / "jobs" / "results" / "large.csv").read_text().endswith("1,3\n")
 
 
 @pytest.mark.parametrize("lines", [r"load\n1,2\n", r"load\n"])
-def test_a_table_without_whole_rows_replaces_none(program, store, lines, capsys):
+def test_a_table_without_whole_rows_replaces_none(program, store, lines, capsys, tmp_path, monkeypatch):
+    (tmp_path / "made").mkdir()
+    monkeypatch.setattr("tempfile.tempdir", str(tmp_path / "made"))
     kept = (store / "jobs" / "results" / "small.csv").read_text()
     (store / "jobs" / "small.sh").write_text(rf"printf '# command: x\n{lines}' > $1")
     git(store, "commit", "-q", "-a", "-m", "less")
