@@ -19,7 +19,7 @@ from scipy.sparse import csr_array, vstack
 from scipy.sparse.linalg import splu
 
 from cvt_hpc.models.steady_variator.equations import MOMENT, SPEED, Equations
-from cvt_hpc.models.steady_variator.newton import mean_size
+from cvt_hpc.models.steady_variator.newton import FAR, mean_size
 
 # Steps, as the root mean square of the unknowns over their sizes: first, longest, and shortest that is tried
 FIRST, LONGEST, SHORTEST = 1e-3, 0.1, 1e-12
@@ -188,6 +188,8 @@ class Curve:
                 if (residual := self._residual(found)) is None:
                     return None
                 change = -factors.solve(np.append(residual[0], 0.0))
+                if not mean_size(self._equations, change) < FAR:  # SuperLU crashes on slopes out there
+                    return None
                 found = found + change
                 if mean_size(self._equations, change) < self._tolerance:
                     if (last := self._residual(found)) is None:
