@@ -114,6 +114,7 @@ def job_template(name: str, model: str, source: str) -> str:
         axes = grid if cost * job.size <= _LONGEST_MAP else axes
     first = _FIRST_STUDIES.get(model, {})
     axes = [f"{key} = {value}" for key, value in first.items() if value[0] == "{"] or axes
+    changed = {key: value for key, value in first.items() if value[0] != "{"}
     lines = [
         *_commented(f"A study with the model {model}: {loaded.title}"),
         "# Each key stands here with its default: take away the # to change it. Defaults that no paper gives",
@@ -135,12 +136,9 @@ def job_template(name: str, model: str, source: str) -> str:
     for section, table in schema.sections.items():
         lines += ["", f"[{section}]"]
         for key, parameter in table.items():
-            default, value = _as_toml(parameter), first.get(key, "{")
-            line = (
-                f"# {key} = {default}"
-                if value[0] == "{"
-                else f"{key} = {value}  # assumed, in place of {default}"
-            )
+            line = f"# {key} = {_as_toml(parameter)}"
+            if key in changed:
+                line = f"{key} = {changed[key]}  # assumed, in place of {_as_toml(parameter)}"
             lines += [*_commented(_meaning(parameter)), line]
     return "\n".join(lines) + "\n"
 

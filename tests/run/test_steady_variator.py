@@ -143,6 +143,23 @@ def test_slopes_beside_a_corner_are_those_of_its_own_side(distance):
     assert np.abs(mean - change).max() > 0.1 * np.abs(change).max()
 
 
+def test_a_correction_that_leaves_the_range_of_the_unknowns_ends_the_step(monkeypatch):
+    belt = SteadyBelt(GIVEN)
+    start, equations, solves = belt.at(60.0), Equations(GIVEN, belt_constants(GIVEN)), []
+
+    class Diverging:
+        def solve(self, right):
+            solves.append(right.size)
+            return 1e6 * equations.sizes
+
+    curve = Curve(equations, 1e-7)
+    monkeypatch.setattr(curve, "_factors", lambda slopes, along: Diverging())
+    along = np.ones(equations.sizes.size)
+    pressed = equations.corners(start.unknowns).ravel() > 0.0
+    assert curve._corrected(start.unknowns, along, 0.0, None, along, pressed) is None
+    assert len(solves) == 1  # no slopes are taken out there, on which SuperLU crashes
+
+
 def test_states_follow_their_curve_from_corner_to_corner_where_the_load_turns_back():
     # from 20 to 60 N m the play passes from the driven wrap through a strand to the driving wrap, cell by cell
     parameters = GIVEN | {"load_start": 0.0, "tilt_lag": 0.0, "tilt_stiffness": 6.3e5, "stations": 40}
