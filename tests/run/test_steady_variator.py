@@ -154,6 +154,8 @@ def test_a_correction_that_leaves_the_range_of_the_unknowns_ends_the_step(monkey
 
     curve = Curve(equations, 1e-7)
     monkeypatch.setattr(curve, "_factors", lambda slopes, along: Diverging())
+    monkeypatch.setattr(curve, "_residual", lambda x: (np.zeros(x.size - 1), 0.0))
+    monkeypatch.setattr(curve, "_slopes", lambda x, pressed: None)
     along = np.ones(equations.sizes.size)
     pressed = equations.corners(start.unknowns).ravel() > 0.0
     assert curve._corrected(start.unknowns, along, 0.0, None, along, pressed) is None
