@@ -4,7 +4,7 @@ import math
 from typing import Any
 
 from cvt_hpc.parameters import Parameter, Parameters, not_negative
-from cvt_hpc.vibration.ramped import ramped
+from cvt_hpc.vibration.ramped import along_ramp, ramped
 from cvt_hpc.vibration.settings import LEAST_PERIODS, band
 
 LONGEST = 4  # times the duration
@@ -96,8 +96,9 @@ def inert(parameters: Parameters) -> dict[str, str]:
     found = {} if "step" in parameters else {"most_refinements": "a stepper that chooses its step"}
     if 2.0 * parameters["shortest_duration"] > parameters["duration"] * (1.0 + 1e-9):
         found["shortest_duration"] = "a duration below twice of it"
-    names = ("shortest_duration", "longest_duration") if ramped(parameters) else ()
-    return found | dict.fromkeys(names, f"{ramped(parameters)}_history ramp")
+    if setting := along_ramp(parameters):
+        found |= dict.fromkeys(("shortest_duration", "longest_duration"), setting)
+    return found
 
 
 def sample_count(parameters: Parameters) -> int:
@@ -143,6 +144,8 @@ def first_duration(parameters: Parameters) -> float:
     """
     samples, shortest = sample_count(parameters), parameters["shortest_duration"]
     is_whole = shortest == 0.0 or ramped(parameters)
+    for end in parameters.get("profile_time", ())[-1:]:  # what is judged lies behind it
+        shortest = max(shortest, end / (1.0 - parameters["judged_fraction"]))
     halvings = 0 if is_whole else math.floor(math.log2(parameters["duration"] / shortest) + 1e-9)
     if halvings < 1:
         return float(parameters["duration"])

@@ -157,7 +157,7 @@ def _find_names(file: FromFile, lines: Sequence[str]) -> tuple[int, str]:
     for place, line in enumerate(lines):
         for separator in _SEPARATORS:
             try:
-                known = {_key(file, cell) for cell in _cells(line, separator, "")}
+                known = {named_column(file, cell) for cell in _cells(line, separator, "")}
             except InputError:
                 continue
             if known >= set(file.required):
@@ -179,8 +179,8 @@ def _plain(cell: str) -> str:
     return re.sub(r"[\s_]+", "_", _split(cell)[0].casefold())
 
 
-def _key(file: FromFile, cell: str) -> str | None:
-    """Return the column that a cell names, whatever its case."""
+def named_column(file: FromFile, cell: str) -> str | None:
+    """Return the column that a cell, or the name of a signal, names, whatever its case."""
     name = _plain(cell)
     return name if name in file.columns else file.other_names.get(name)
 
@@ -195,13 +195,13 @@ def _columns(file: FromFile, of_names: Row, of_units: Row, place: str) -> list[_
     """Return the columns that have a name."""
     line, names = of_names
     where, legal = f"{place}: line {line}", ", ".join(told(name, file) for name in file.columns)
-    if unknown := [cell for cell in names if cell and _key(file, cell) is None]:
+    if unknown := [cell for cell in names if cell and named_column(file, cell) is None]:
         near = did_you_mean(_split(unknown[0])[0], file.columns)
         found = few_of([show(cell) for cell in unknown], _MOST_NAMED) + near
         raise mismatch(where, f"columns among {legal}", found, "name them so, or delete them")
     columns: list[_Column] = []
     for i, cell in enumerate(names):
-        unit, key = _split(cell)[1], _key(file, cell)
+        unit, key = _split(cell)[1], named_column(file, cell)
         if key is None:
             continue
         if key in [column.name for column in columns]:

@@ -24,7 +24,8 @@ from cvt_hpc.job.design import (
     sampled_axes,
 )
 from cvt_hpc.job.document import read_document
-from cvt_hpc.job.netcdf_files import SUFFIX, read_netcdf
+from cvt_hpc.job.netcdf_files import SUFFIX as NETCDF
+from cvt_hpc.job.netcdf_files import read_netcdf
 from cvt_hpc.job.rules import (
     Link,
     Rule,
@@ -36,6 +37,7 @@ from cvt_hpc.job.rules import (
     relinked,
 )
 from cvt_hpc.job.schema import Entry, Schema, load_schema
+from cvt_hpc.job.signal_files import MAT, MDF, read_signals
 from cvt_hpc.job.summary import tell_of_no_effect
 from cvt_hpc.job.uncertain import TABLE, with_samples
 from cvt_hpc.job.uncertain_table import check_samples, read_uncertain
@@ -44,6 +46,7 @@ from cvt_hpc.job.values import Document, Point, Table, expectation, kind_of, rea
 from cvt_hpc.models.contract import load_model
 from cvt_hpc.parameters import Parameters
 
+_READERS = {NETCDF: read_netcdf, MAT: read_signals, MDF: read_signals}  # by suffix; others are CSV
 _NAME = re.compile(r"[A-Za-z0-9][A-Za-z0-9._-]{0,99}")
 
 
@@ -137,7 +140,8 @@ def rebuild_job(
     put_axes, replaced = assignments.read_axes_and_values(others, schema, source, label)
     design = read_design({**document.get("design", {}), **changed}, source)
     put = {*replaced, *put_axes}
-    put |= {given for key in replaced if (file := schema.parameters[key].file) for given in file.gives}
+    contents = _contents(replaced, schema, source)
+    put |= {key for content in contents.values() for key in content}
     gone = {*put, *overridden(put, schema)}
     scatters: list[Rule] = []
     if is_uncertain:
@@ -150,7 +154,8 @@ def rebuild_job(
         document = _with_samples(document, further, {*fixed, *gone}, design, source)
     given = {key: value for key, value in tables.items() if key not in gone} | replaced
     files = {key: name for key, name in given.items() if name and schema.parameters[key].file}
-    given = _with_files(given, schema, source)
+    contents |= _contents({key: name for key, name in given.items() if key not in contents}, schema, source)
+    given = _with_files(given, contents, schema, source)
     axes, rules = _read_axes_and_rules(document, scatters, design, gone, put_axes, given, schema, source)
     check_samples(rules, axes)
     for entry in written.values():
@@ -197,19 +202,28 @@ def _written(document: Table, pairs: Table, schema: Schema, source: str, label: 
     return found
 
 
-def _with_files(given: Parameters, schema: Schema, source: str) -> Point:
-    """Return given values, with the content of files instead of their names."""
-    found = dict(given)
-    for key in given:
+def _contents(given: Parameters, schema: Schema, source: str) -> dict[str, Point]:
+    """Return by key of each file among given values the values that it gives."""
+    found = {}
+    for key, name in given.items():
         if (file := schema.parameters[key].file) is None:
             continue
-        name, where = found.pop(key), f"{source}: [{schema.section_of[key]}] {key}"
-        for one in file.gives if name else ():
-            if one in given:
-                raise mismatch(where, f"either {key} or {one}", "both")
-        read = read_netcdf if name.endswith(SUFFIX) else read_csv
+        where = f"{source}: [{schema.section_of[key]}] {key}"
+        read = _READERS.get(Path(name).suffix, read_csv)
         raw = read(file, name, source, where) if name else {}
-        found |= {one: read_value(schema.parameters[one], value, where) for one, value in raw.items()}
+        found[key] = {one: read_value(schema.parameters[one], value, where) for one, value in raw.items()}
+    return found
+
+
+def _with_files(given: Parameters, contents: Mapping[str, Point], schema: Schema, source: str) -> Point:
+    """Return given values, with the contents of files instead of their names."""
+    found = {key: value for key, value in given.items() if key not in contents}
+    for key, content in contents.items():
+        for one in content:
+            if one in found:
+                where = f"{source}: [{schema.section_of[key]}] {key}"
+                raise mismatch(where, f"either {key} or {one}", "both")
+        found |= content
     return found
 
 

@@ -79,7 +79,8 @@ def merged_kernel(function: Callable[..., Any]) -> Any:
 def called_alike(compiled: Any) -> Callable[..., Any]:
     """Return a kernel for calls whose arguments have the types of the first call's, as in a loop of samples.
 
-    No later call looks at the types, which takes a millisecond where there are tuples of many arrays.
+    No later call looks at the types, which takes a millisecond where there are tuples of many arrays:
+    arguments of other types would be misread, so each run has such a kernel of its own.
     """
     entry: Callable[..., Any] | None = None
 

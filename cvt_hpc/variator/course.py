@@ -1,9 +1,61 @@
-"""Course of a run's load, speed and start-up damping over time; of plain numbers and of lanes."""
+"""Course of a run's load, speed, thrust and start-up damping over time; of plain numbers and of lanes."""
 
 import numpy as np
 
-from cvt_hpc.kernels import merged_kernel
+from cvt_hpc.kernels import kernel, merged_kernel
 from cvt_hpc.lanes import like
+from cvt_hpc.parameters import Parameters
+from cvt_hpc.variator import profiles
+
+PROFILED = ("load", "driving_speed", "thrust")  # columns of a table of multiples, after that of times
+LOAD, SPEED, THRUST = 1, 2, 3
+
+
+def profile_table(parameters: Parameters) -> np.ndarray:
+    """Times [s] and multiples of a run's profiles, (K, 4); one line without any.
+
+    Parameters
+    ----------
+    parameters : mapping
+        Flat values of the run [SI]; a model without profiles has no key of theirs.
+    """
+    times = parameters.get(profiles.TIME, ()) or (0.0,)
+    columns = [[profiles.multiple(parameters, name, time) for time in times] for name in PROFILED]
+    return np.column_stack([times, *columns]).astype(float)
+
+
+@kernel
+def _before(profile: np.ndarray, time: float) -> int:
+    """Line of a profile from which it is linear to the next; -1 where it is constant."""
+    low, high = 0, profile.shape[0] - 1
+    if time < profile[low, 0] or time >= profile[high, 0]:
+        return -1
+    while high - low > 1:
+        middle = (low + high) // 2
+        if profile[middle, 0] <= time:
+            low = middle
+        else:
+            high = middle
+    return low
+
+
+@kernel
+def multiple_at(profile: np.ndarray, column: int, time: float) -> float:
+    """Multiple at a time [s] by a `profile_table`: linear between its times, constant before and after."""
+    k = _before(profile, time)
+    if k < 0:
+        return profile[0 if time < profile[0, 0] else profile.shape[0] - 1, column]
+    share = (time - profile[k, 0]) / (profile[k + 1, 0] - profile[k, 0])
+    return profile[k, column] + share * (profile[k + 1, column] - profile[k, column])
+
+
+@kernel
+def slope_at(profile: np.ndarray, column: int, time: float) -> float:
+    """Rate of the multiple at a time [1/s], that of what follows where lines meet."""
+    k = _before(profile, time)
+    if k < 0:
+        return 0.0
+    return (profile[k + 1, column] - profile[k, column]) / (profile[k + 1, 0] - profile[k, 0])
 
 
 @merged_kernel

@@ -25,7 +25,7 @@ VIBRATION = tuple(
 LOCKED = 0.1  # of the resolution 1/L: how far a line of judder's may lie from a multiple of its frequency
 REGULAR = 1e-8  # keeps the matrix of multiples regular where the last one lies at half the sampling rate
 COMB = 0.5  # of that line: least height of the multiple before it
-RAMPED_CHANNELS = {"load": "load", "speed": "driving_speed"}  # by the ramped quantity
+RAMPED_CHANNELS = {"load": "load", "speed": "driving_speed"}  # by the ramped quantity, if not the time
 
 
 def assess(
@@ -136,7 +136,10 @@ def _assess_ramp(run: Any, names: Sequence[str]) -> ramp.RampOccurrence | None:
     p, first, quantity = run.parameters, run.risen, ramped(run.parameters)
     columns, strands = _on_strands(run, names)
     rate, moved = p["sampling_rate"], run.displacement[first:, columns]
-    values = run.channel(RAMPED_CHANNELS[quantity])[first:]
+    if quantity == "time":
+        values = (np.arange(first, first + len(moved)) + 1.0) / rate
+    else:
+        values = run.channel(RAMPED_CHANNELS[quantity])[first:]
     found = ramp.assess_ramp(moved, rate, strands, quantity, values, run.samples - first, p)
     return found and replace(found, strongest_probe=columns[found.strongest_probe])
 

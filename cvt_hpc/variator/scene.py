@@ -3,8 +3,6 @@
 Only ratio, driving_speed and thrust of the defaults are from a paper (Lebrecht et al. 2004, sec. 3.1); sizes
 are those of a common passenger-car belt; seven were fitted to what that paper states of the noise, as
 jobs/lebrecht_2004.toml says; every other default is an assumption, plausible and not measured.
-
-Profiles over time are lists of a job that give multiples of one of its values, linear between their times.
 """
 
 from collections import Counter
@@ -203,15 +201,6 @@ HALF_WEDGE_ANGLE = Parameter(
     exclusive=True,
     sensible=(0.02, 0.8),
 )
-
-
-def multiple(parameters: Mapping[str, Any], name: str, time: float) -> float:
-    """Multiple of a value at a time [s], by `profile_time` and the list of its name; 1 without a list.
-
-    Before the first and after the last time it is constant.
-    """
-    values = parameters[f"{name}_profile"]
-    return float(np.interp(time, parameters["profile_time"], values)) if values else 1.0
 
 
 def nested(values: Sequence[Any]) -> bool:

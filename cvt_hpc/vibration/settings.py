@@ -25,7 +25,7 @@ The defaults, and why:
 """
 
 from cvt_hpc.parameters import Parameter, Parameters, not_negative, positive
-from cvt_hpc.vibration.ramped import ramped
+from cvt_hpc.vibration.ramped import along_ramp
 
 PARAMETERS: dict[str, dict[str, Parameter]] = {
     "vibration": {
@@ -150,4 +150,4 @@ def check(parameters: Parameters) -> list[tuple[str, str, str]]:
 
 def inert(parameters: Parameters) -> dict[str, str]:
     """Parameters without effect on a run, each with the setting that makes it so."""
-    return {"decay_tolerance": f"{ramped(parameters)}_history ramp"} if ramped(parameters) else {}
+    return {"decay_tolerance": setting} if (setting := along_ramp(parameters)) else {}

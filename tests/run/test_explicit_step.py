@@ -49,6 +49,12 @@ CASES = {
     "other laws": {"friction_law": "cubic", "friction_memory": 1e-3},
     "ramp": {"load_history": "ramp", "load_start": 60.0, "load": 140.0},
     "ramp of speed": {"speed_history": "ramp", "speed_start": 100.0},
+    "profiles": {
+        "profile_time": (0.01, 0.015, 0.04),
+        "load_profile": (0.5, 1.0, 1.5),
+        "driving_speed_profile": (0.9, 1.0, 1.1),
+        "thrust_profile": (1.2, 1.0, 0.8),
+    },
     "rising": {"rise_time": 0.03},  # the start-up's damping and load, half way
     "rigid": {"sheave_stiffness": np.inf, "stiffness_of": "sheave", "load": -80.0},
     "free pulleys": FREE | {"driving_axial": "thrust"},
@@ -133,7 +139,8 @@ def plain_step(belt, before, step):
     for row in (f.U, f.V_ELEMENT, f.V_RING, *range(f.ELEMENT_TILT, len(fields))):
         fields[row] += step * rate[row]
     load = belt.ratio * load_at(belt, scalars[f.TIME])
-    closing = (driven_thrust(belt, force) - belt.thrust) / belt.axial_damping
+    thrust = belt.thrust * np.interp(scalars[f.TIME], belt.profile[:, 0], belt.profile[:, 3])
+    closing = (driven_thrust(belt, force) - thrust) / belt.axial_damping
     turning = (driven_moment(belt, moments) - load) / belt.driven_inertia
     if belt.pulleys.are_free:
         turning, closing, *others = free_rates(belt, before, pulled_by(belt, force, moments))

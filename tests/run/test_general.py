@@ -50,13 +50,25 @@ def test_runs_are_those_of_the_explicit_step(stepper, values):
     for name in ("ring_tension t1", "push_force t2", "axial_force driven", "driven_speed"):
         error = 2.0 * np.abs(coarse.channel(name) - fine.channel(name)).max()
         size = np.abs(fine.channel(name)).max()
-        assert np.abs(run.channel(name) - fine.channel(name)).max() < 3.0 * error + 1e-4 * size, name
+        assert np.abs(run.channel(name) - fine.channel(name)).max() <= 3.0 * error + 1e-4 * size, name
     assert run.counters()["rates"] > run.steps > 0
     assert run.step == pytest.approx(run.time / run.steps)
 
 
-def test_a_ramp_of_speed_is_that_of_the_explicit_step():
-    values = CHEAP | {"rise_time": 5e-4, "speed_history": "ramp", "speed_start": 305.0, "load": 60.0}
+@pytest.mark.parametrize(
+    "course",
+    [
+        {"speed_history": "ramp", "speed_start": 305.0},
+        {
+            "profile_time": (0.0, 8e-4, 5e-3),
+            "driving_speed_profile": (0.96, 0.98, 0.97),
+            "load_profile": (1.0, 1.2, 1.1),
+            "thrust_profile": (1.0, 1.1, 0.9),
+        },
+    ],
+)
+def test_a_course_is_that_of_the_explicit_step(course):
+    values = CHEAP | {"rise_time": 5e-4, "load": 60.0} | course
     run = GeneralTransient(job("symplectic_euler", **values, step=1e-7).point(0), "symplectic_euler")
     assert run.advance(100) is None
     coarse, fine = (
@@ -68,8 +80,8 @@ def test_a_ramp_of_speed_is_that_of_the_explicit_step():
     for name in ("ring_tension t1", "push_force t2", "axial_force driven", "driven_speed", "driving_speed"):
         error = 2.0 * np.abs(coarse.channel(name) - fine.channel(name)).max()
         size = np.abs(fine.channel(name)).max()
-        assert np.abs(run.channel(name) - fine.channel(name)).max() < 3.0 * error + 1e-4 * size, name
-    assert 305.5 < run.channel("driving_speed")[-1] < 307.0
+        assert np.abs(run.channel(name) - fine.channel(name)).max() <= 3.0 * error + 1e-4 * size, name
+    assert 305.2 < run.channel("driving_speed")[-1] < 307.6
 
 
 def test_the_strands_are_disturbed_once_the_start_up_is_over():

@@ -1,5 +1,6 @@
 """Which machine code is kept, what tells it apart, where it lies; and what is told while it is compiled."""
 
+import ast
 import cProfile
 import enum
 import gc
@@ -838,6 +839,15 @@ def test_calls_after_the_first_go_to_the_machine_code_for_its_types(chosen):
     call = called_alike(Counted())
     assert [call(x) for x in (1.5, 2.5, 3.5)] == [2.5, 3.5, 4.5]
     assert called == [1.5]
+
+
+def test_no_module_has_calls_of_one_type_for_all_runs():
+    # of two runs in a process whose arguments differ in type the second would be misread
+    for path in Path(cvt_hpc.__file__).parent.rglob("*.py"):
+        for statement in ast.parse(path.read_text()).body:
+            if not isinstance(statement, ast.FunctionDef | ast.ClassDef):
+                names = {node.id for node in ast.walk(statement) if isinstance(node, ast.Name)}
+                assert "called_alike" not in names, path
 
 
 def test_garbage_is_collected_again_after_compiling():

@@ -22,10 +22,9 @@ from cvt_hpc.job.schema import load_schema
 from cvt_hpc.job.summary import core_time_in_words
 from cvt_hpc.job.values import in_words
 from cvt_hpc.models.pushbelt.continuous import FOLLOWS, ONLY
-from cvt_hpc.models.pushbelt.profiles import PARAMETERS as PROFILES
 from cvt_hpc.parameters import Parameter
 from cvt_hpc.simulation import run_costs
-from cvt_hpc.vibration.ramped import QUANTITIES
+from cvt_hpc.vibration.ramped import CONSTANT, QUANTITIES
 
 PUSHBELT = "pushbelt"
 # Of the model below the reference: half as many elements as a belt has, at the default step
@@ -119,8 +118,9 @@ def _check(job: Job) -> None:
     if "load" not in axes:
         raise mismatch(f"{where}: [axes]", "load among the axes, for its onsets", ", ".join(axes) or "none")
     for key in (quantity.history for quantity in QUANTITIES.values()):
-        if (course := job.parameters[key]) != "constant":
-            raise mismatch(f"{where}: [scene] {key}", "constant, as the cheaper models have it", course)
+        if (course := job.parameters[key]) not in CONSTANT:
+            place = f"{where}: [{job.schema.section_of[key]}] {key}"
+            raise mismatch(place, "constant values, as the cheaper models have them", show(course))
     stated = [rule.key for rule in job.rules if not rule.is_substituted]
     varied = dict.fromkeys(stated, ("derived", "a formula"))
     varied |= dict.fromkeys(axes, ("axes", "an axis"))
@@ -163,7 +163,8 @@ def pushbelt_jobs(job: Job, settings: Mapping[str, Any]) -> tuple[Job, Job]:
 def _check_settings(job: Job, settings: Mapping[str, Any], where: str) -> None:
     """Refuse keys that the elastic belt knows as well: both would be different belts."""
     schema = load_schema(PUSHBELT, None, job.source)
-    own = {*known_keys(PUSHBELT)} - {*known_keys(job.model, job.stepper), *PROFILES} | {*FOLLOWS, *COARSER}
+    own = {key for key in known_keys(PUSHBELT) if schema.section_of[key] != "profiles"}
+    own = own - {*known_keys(job.model, job.stepper)} | {*FOLLOWS, *COARSER}
     for name in settings:
         if schema.find(name, f"{where} {name}") not in own:
             expected = "a key that the elastic belt does not know, since all else is that belt's"

@@ -52,6 +52,8 @@ def is_passive(parameters: Parameters) -> bool:
     p = parameters
     is_table = p["friction_law"] == "table"
     falls = bool(np.any(np.diff(p["table_mu"]) < 0.0)) if is_table else p["friction_gradient"] != 0.0
+    if p["profile_time"]:
+        return False
     loads = [p["load"]] if p["load_history"] == "constant" else [p["load"], p["load_start"]]
     is_carried = max(map(abs, loads)) <= CARRIED_SHARE * carried_torque(p)
     return bool(p["question"] != "forces" and not falls and is_carried)

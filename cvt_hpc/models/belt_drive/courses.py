@@ -15,7 +15,8 @@ from cvt_hpc.models.belt_drive.layout import PULLEY_LISTS, TENSIONER, TWO, layou
 from cvt_hpc.parameters import Parameter, Parameters, Substitute, not_negative, positive
 from cvt_hpc.physics.belt_path import BeltPath
 from cvt_hpc.variator.course import load_course
-from cvt_hpc.variator.scene import length_problems, multiple, nested_problems
+from cvt_hpc.variator.profiles import multiple
+from cvt_hpc.variator.scene import length_problems, nested_problems
 
 MOST_STRAIN = 0.5  # tension over axial_stiffness
 

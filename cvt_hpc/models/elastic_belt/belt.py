@@ -31,6 +31,7 @@ from cvt_hpc.physics.sheaves import (
     stiffness_factors,
 )
 from cvt_hpc.variator import LARGEST_DISPLACEMENT, PULLEYS
+from cvt_hpc.variator.course import SPEED, THRUST, profile_table
 from cvt_hpc.variator.measures import Measures, measures, rounded
 from cvt_hpc.vibration.ramped import ramped
 
@@ -54,10 +55,10 @@ class Belt(NamedTuple):
     of the scene, `faded` is the coupling that counts for nothing, and a belt that is further than
     `largest_displacement` off its path has left its grooves; `ring_relief` is the tension at which the rings'
     own weight bears them. `belt_speed` is that of the pitch line at `driving_speed`; along a ramp of speed
-    both follow `rhs.speed_share_at`. `element_mass` and `ring_mass` are the inertia along the path, `mass`
-    that across it. Across a gap the elements' damper may push against `bridging_stiffness` times the gap's
-    strain; inf, as in every run: elements that are apart have no damper. `tilts` is whether elements tilt on
-    the rings.
+    both follow `rhs.speed_share_at`; `profile` (K, 4) is `course.profile_table`. `element_mass` and
+    `ring_mass` are the inertia along the path, `mass` that across it. Across a gap the elements' damper may
+    push against `bridging_stiffness` times the gap's strain; inf, as in every run: elements that are apart
+    have no damper. `tilts` is whether elements tilt on the rings.
     """
 
     cell: np.ndarray
@@ -119,6 +120,7 @@ class Belt(NamedTuple):
     load: float
     load_start: float
     speed_start: float
+    profile: np.ndarray
     rise_time: float
     start_damping: float
     largest_displacement: float
@@ -324,7 +326,8 @@ def belt_constants(parameters: Mapping[str, Any]) -> Belt:
         axial_damping=p["sheave_lag"] * p["lag_stiffness"],
         load_start=p["load_start"] if quantity == "load" else p["load"],
         speed_start=p["speed_start"] if quantity == "speed" else p["driving_speed"],
-        ramp_end=p["duration"] if quantity else p["rise_time"],
+        profile=profile_table(p),
+        ramp_end=p["duration"] if quantity in ("load", "speed") else p["rise_time"],
     )
     # all else is a parameter of the run, by the same name
     given = {key: p[key] for key in Belt._fields if key not in computed}
@@ -348,7 +351,7 @@ def initial_state(parameters: Mapping[str, Any], belt: Belt) -> State:
     """
     p, grid = parameters, mesh(parameters)
     tangent = np.tan(p["half_wedge_angle"])
-    pull = 2.0 * tangent * p["thrust"] / grid.path.driven_wrap
+    pull = 2.0 * tangent * p["thrust"] * belt.profile[0, THRUST] / grid.path.driven_wrap
     w = np.zeros(grid.cell.size)
     bent = grid.cell * belt.curvature
     bent = 0.5 * (bent + np.roll(bent, 1))  # angle that each station stands for [rad]
@@ -374,7 +377,7 @@ def initial_state(parameters: Mapping[str, Any], belt: Belt) -> State:
     _fill_strands(w, grid)
 
     mean = [bent[stations] @ w[stations] / bent[stations].sum() for stations in arcs]
-    speed = belt.speed_start * (belt.driving_radius + mean[0])
+    speed = belt.speed_start * belt.profile[0, SPEED] * (belt.driving_radius + mean[0])
     fields = np.zeros((len(f.FIELDS) + belt.tilts, grid.cell.size))
     fields[f.W] = w
     fields[f.V_ELEMENT] = fields[f.V_RING] = speed

@@ -21,6 +21,7 @@ from cvt_hpc.physics.compliance import Contact, lane_contact
 from cvt_hpc.physics.friction import FrictionLaw
 from cvt_hpc.physics.moving_discs import settle
 from cvt_hpc.physics.sheaves import disc_factor
+from cvt_hpc.variator.course import SPEED
 
 LEAST_ROWS = 3  # of a part of a run: bending reaches two stations
 
@@ -54,8 +55,10 @@ class LaneBelt(NamedTuple):
         Course of the load and of the speed [s].
     start_damping, largest_displacement, faded : float
         As in `Belt`.
-    speed_ramps : bool
-        Whether some run's driving speed changes.
+    profile : (K, 4) array
+        As in `Belt`, the same for all runs.
+    speed_changes : bool
+        Whether some run's driving speed does.
     is_free : bool
         Whether the pulleys have the states and laws of `pulleys.py`.
     is_curved, has_column, tilts : bool
@@ -88,7 +91,8 @@ class LaneBelt(NamedTuple):
     largest_displacement: float
     faded: float
     ramp_end: float
-    speed_ramps: bool
+    profile: np.ndarray
+    speed_changes: bool
     is_free: bool
     is_curved: bool
     has_column: bool
@@ -186,7 +190,9 @@ def lane_belt(belts: list[Belt], dtype: DTypeLike) -> LaneBelt:
         largest_displacement=first.largest_displacement,
         faded=first.faded,
         ramp_end=first.ramp_end,
-        speed_ramps=any(belt.speed_start != belt.driving_speed for belt in belts),
+        profile=first.profile,
+        speed_changes=any(belt.speed_start != belt.driving_speed for belt in belts)
+        or bool(np.any(first.profile[:, SPEED] != 1.0)),
         is_free=first.pulleys.are_free,
         is_curved=first.curvature_terms > 0,
         has_column=first.has_column,
@@ -288,7 +294,7 @@ def parted(belt: LaneBelt, parts: int) -> LaneBelt:
     arrays: dict[str, Any] = {
         name: split(_one_lane(array), parts)
         for name, array in belt._asdict().items()
-        if isinstance(array, np.ndarray)
+        if isinstance(array, np.ndarray) and name != "profile"  # which no station has
     }
     rows = belt.cell.size // parts
     places = _places(belt.places[0][0], belt.places[1][0], rows)

@@ -33,7 +33,15 @@ from cvt_hpc.physics.flank import flank_sliding, tangential_sliding
 from cvt_hpc.physics.friction import formula_coefficient, law_numbers, saturation, table_coefficient
 from cvt_hpc.physics.friction_laws import Law
 from cvt_hpc.physics.moving_discs import open_gaps, turn_discs
-from cvt_hpc.variator.course import faded_damping, load_course, speed_course
+from cvt_hpc.variator.course import (
+    LOAD,
+    SPEED,
+    THRUST,
+    faded_damping,
+    load_course,
+    multiple_at,
+    speed_course,
+)
 
 MOST_CONTACT_ROUNDS = 200
 LEAST_FORCE = 1e-12  # [N/m]: for a quotient of forces that may both be 0
@@ -104,17 +112,24 @@ def lane_load(belt: LaneBelt, time: float, pattern):
     c = belt.constants
     start, load = like(c[0, lf.LOAD_START], pattern), like(c[0, lf.LOAD], pattern)
     torque = load_course(time, belt.rise_time, belt.ramp_end, start, load)
-    return torque
+    return torque * multiple_at(belt.profile, LOAD, time)
 
 
 @merged_kernel
 def lane_speed_share(belt: LaneBelt, time: float, pattern):
     """Speed of the driving pulley over `driving_speed`, as `rhs.speed_share_at`, in lanes like `pattern`."""
     share = like(1.0, pattern)
-    if belt.speed_ramps:
+    if belt.speed_changes:
         start = like(belt.constants[0, lf.START_SHARE], pattern)
         share = speed_course(time, belt.rise_time, belt.ramp_end, start)
+        share = share * multiple_at(belt.profile, SPEED, time)
     return share
+
+
+@merged_kernel
+def lane_given_thrust(belt: LaneBelt, time: float, pattern):
+    """Thrust on the driven pulley [N], as `rhs.thrust_at`, in lanes like `pattern`."""
+    return like(belt.constants[0, lf.THRUST], pattern) * multiple_at(belt.profile, THRUST, time)
 
 
 @merged_kernel

@@ -200,7 +200,7 @@ def free_rates(belt: Belt, state: State, pull: np.ndarray) -> np.ndarray:
         (rhs.driving_speed_at(belt, state), scalars[f.DRIVEN_SPEED]),
         scalars[f.DRIVEN_POSITION],
         (pull[0], pull[1], (pull[2], pull[3]), (pull[4], pull[5], pull[6], pull[7])),
-        (rhs.load_at(belt, time), belt.ratio, belt.thrust, belt.axial_damping),
+        (rhs.load_at(belt, time), belt.ratio, rhs.thrust_at(belt, time), belt.axial_damping),
     )
     return np.array(found)
 
@@ -261,8 +261,9 @@ def rates(flat: FlatBelt, t: float, y: np.ndarray, out: np.ndarray) -> bool:
         out[-2], out[-1] = found[0], found[1]
         return True
     moment = driven_moment(belt, flat.moments)
-    out[-2] = (moment - belt.ratio * rhs.load_at(belt, state.scalars[f.TIME])) / belt.driven_inertia
-    out[-1] = (driven_thrust(belt, flat.force) - belt.thrust) / belt.axial_damping
+    time = state.scalars[f.TIME]
+    out[-2] = (moment - belt.ratio * rhs.load_at(belt, time)) / belt.driven_inertia
+    out[-1] = (driven_thrust(belt, flat.force) - rhs.thrust_at(belt, time)) / belt.axial_damping
     return True
 
 

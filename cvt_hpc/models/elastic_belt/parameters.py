@@ -19,7 +19,7 @@ from cvt_hpc.parameters import Parameter, not_negative, positive
 from cvt_hpc.physics.friction_laws import friction_inert, friction_problems
 from cvt_hpc.physics.geometry import variator, variator_problems
 from cvt_hpc.physics.sheaves import STIFFNESS_OF, stiffness_factors
-from cvt_hpc.variator import scene
+from cvt_hpc.variator import profiles, scene
 
 PARAMETERS: dict[str, dict[str, Parameter]] = {
     "scene": scene.SCENE
@@ -32,6 +32,9 @@ PARAMETERS: dict[str, dict[str, Parameter]] = {
             sensible=(1.0, 1e7),
         )
     },
+    "profiles": profiles.declared(
+        ("load", "driving_speed", "thrust"), ("load", "driving_speed", "thrust", "driven_pressure")
+    ),
     "belt": {
         "element_mass": positive(1.0, "kg/m", "mass per length of the elements", sensible=(0.05, 20.0)),
         "ring_mass": positive(0.3, "kg/m", "mass per length of the rings", sensible=(0.01, 10.0)),
@@ -174,7 +177,7 @@ def check(parameters: dict[str, Any]) -> list[tuple[str, str, str]]:
         Empty where all is well.
     """
     p = parameters
-    found = shape_problems(p) + scene.course_problems(p) + friction_problems(p)
+    found = shape_problems(p) + profiles.profile_problems(p) + friction_problems(p)
     return found or pulley_problems(p)
 
 

@@ -193,7 +193,7 @@ def audit(
             moments.add_saddles(profiles, j, drag, saddle)
         opening_0 = opening_driven if on_driven else opening_driving
         stored -= 0.5 * dual * force * fma(wedge, fma(upright, w, belt.rise[j]), opening_0)
-    thrust = c[0, lf.THRUST]
+    thrust = forces.lane_given_thrust(belt, state.time[0], axial)
     axial_speed = (axial - thrust) / c[0, lf.AXIAL_DAMPING]
     rows[k, first + power_terms.DRIVING_POWER] = driving
     rows[k, first + power_terms.LOAD_POWER] = (

@@ -6,7 +6,7 @@ from cvt_hpc.models.elastic_belt import fields as f
 from cvt_hpc.models.elastic_belt import lane_fields as lf
 from cvt_hpc.models.elastic_belt import power_terms
 from cvt_hpc.models.elastic_belt.lane_belt import LaneBelt, LaneState
-from cvt_hpc.models.elastic_belt.lane_forces import lane_load, lane_speed_share
+from cvt_hpc.models.elastic_belt.lane_forces import lane_given_thrust, lane_load, lane_speed_share
 from cvt_hpc.models.elastic_belt.pulleys import beyond_clearance, drive_torque, pulley_rates
 from cvt_hpc.physics import compliance
 from cvt_hpc.physics.compliance import Contact
@@ -69,7 +69,7 @@ def lane_pulley_rates(belt: LaneBelt, state: LaneState, taken, moment):
         (
             load,
             like(c[0, lf.RATIO], speed),
-            like(c[0, lf.THRUST], speed),
+            lane_given_thrust(belt, time, speed),
             like(c[0, lf.AXIAL_DAMPING], speed),
         ),
     )
@@ -96,7 +96,7 @@ def advance_pulleys(belt: LaneBelt, state: LaneState, taken, moment, step: float
         scalars[0, lf.SPEED] = speed + step * (moment - load) / like(c[0, lf.DRIVEN_INERTIA], speed)
         axial = like(lane_thrust(state), speed)
         scalars[0, lf.POSITION] = scalars[0, lf.POSITION] + step * (
-            axial - like(c[0, lf.THRUST], speed)
+            axial - lane_given_thrust(belt, state.time[0], speed)
         ) / like(c[0, lf.AXIAL_DAMPING], speed)
 
 

@@ -26,8 +26,6 @@ from cvt_hpc.recording import sample_count, start_up_samples
 from cvt_hpc.variables import Status
 from cvt_hpc.vibration.ramped import ramped
 
-_sample, _audit_layers = called_alike(sample_state), called_alike(lane_rings.audit_layers)
-
 
 class Recording(NamedTuple):
     """The recorded quantities, with places and times.
@@ -219,7 +217,8 @@ class RecordedRun:
 
     def mean_driving_speed(self, samples: slice) -> float:
         """Mean speed of the driving pulley in some samples [rad/s]."""
-        if ramped(self.parameters) != "speed" and not are_free(self.parameters):
+        is_held = not (self.parameters.get("driving_speed_profile") or are_free(self.parameters))
+        if is_held and ramped(self.parameters) != "speed":
             return self.parameters["driving_speed"]
         return float(self.channel("driving_speed")[samples].mean())
 
@@ -322,6 +321,7 @@ class OneLaneRun(RecordedRun):
         self._lane_belt = lane_belt([belt], np.float64)
         self._state = lane_state([belt], [first], np.float64)
         self._stations = LaneArray(self.mesh.cell.size, lf.FIELDS_OF_FORCES, 1)
+        self._sample, self._audit_layers = called_alike(sample_state), called_alike(lane_rings.audit_layers)
 
     @property
     def layer_sums(self) -> np.ndarray | None:
@@ -346,8 +346,8 @@ class OneLaneRun(RecordedRun):
         layer_sums = self._layer_sums[int(self.done >= self._plan.first_judged)]
         with self._records.profiles_of(self.done) as profiles:
             samples = sampling.Samples(self._plan.sensing, self._rows, profiles, self._records.ended)
-            _sample(self._lane_belt, self._state, self._stations, samples, self.done)
+            self._sample(self._lane_belt, self._state, self._stations, samples, self.done)
             if layer_count(self.parameters) > 1:
                 of_layers = self._lane_belt, self._rings, self._state, self._layers
-                _audit_layers(*of_layers, samples, self.done, layer_sums)
+                self._audit_layers(*of_layers, samples, self.done, layer_sums)
         return Outcome(int(self._records.ended.data[0, sampling.OUTCOME, 0]))

@@ -48,23 +48,41 @@ from cvt_hpc.physics import compliance
 from cvt_hpc.physics.compliance import Contact, plain_contact, solve_wrap
 from cvt_hpc.physics.flank import flank_forces, flank_sliding
 from cvt_hpc.physics.friction import friction_coefficient, saturation
-from cvt_hpc.variator.course import faded_damping, load_course, speed_course
+from cvt_hpc.variator.course import (
+    LOAD,
+    SPEED,
+    THRUST,
+    faded_damping,
+    load_course,
+    multiple_at,
+    slope_at,
+    speed_course,
+)
 
 LEAST_WAY = 0.02  # share of a cell from the place where contact begins to a station, for its memory
 
 
 @merged_kernel
 def load_at(belt: Belt, time: float) -> float:
-    """Torque at the driving pulley [N m]: a smooth rise to load_start, then linear to load."""
+    """Torque at the driving pulley [N m]: a smooth rise to load_start, then linear to load, or a profile."""
     load = load_course(time, belt.rise_time, belt.ramp_end, belt.load_start, belt.load)
-    return load
+    return load * multiple_at(belt.profile, LOAD, time)
+
+
+@merged_kernel
+def thrust_at(belt: Belt, time: float) -> float:
+    """Thrust on the driven pulley [N], by its profile."""
+    return belt.thrust * multiple_at(belt.profile, THRUST, time)
 
 
 @merged_kernel
 def speed_share_at(belt: Belt, time: float) -> float:
-    """Speed of the driving pulley over driving_speed [1]: that of speed_start, from rise_time linear to 1."""
+    """Speed of the driving pulley over driving_speed [1]: that of speed_start, from rise_time linear to 1.
+
+    Or by its profile.
+    """
     share = speed_course(time, belt.rise_time, belt.ramp_end, belt.speed_start / belt.driving_speed)
-    return share
+    return share * multiple_at(belt.profile, SPEED, time)
 
 
 @merged_kernel
@@ -76,11 +94,11 @@ def driving_speed_at(belt: Belt, state: State) -> float:
 
 @merged_kernel
 def belt_acceleration_at(belt: Belt, time: float) -> float:
-    """Rate v' of the belt speed [m/s^2]; 0 but along a ramp of speed."""
-    if time < belt.rise_time or time >= belt.ramp_end:
-        return 0.0
-    start = belt.speed_start / belt.driving_speed
-    return (1.0 - start) * belt.belt_speed / (belt.ramp_end - belt.rise_time)
+    """Rate v' of the belt speed [m/s^2]; 0 but along a ramp or a profile of speed, of which a run has one."""
+    rate = slope_at(belt.profile, SPEED, time)
+    if belt.rise_time <= time < belt.ramp_end:
+        rate += (1.0 - belt.speed_start / belt.driving_speed) / (belt.ramp_end - belt.rise_time)
+    return rate * belt.belt_speed
 
 
 @merged_kernel

@@ -9,12 +9,11 @@ from dataclasses import replace
 
 import numpy as np
 
-from cvt_hpc.models.pushbelt.profiles import PARAMETERS as PROFILES
-from cvt_hpc.models.pushbelt.profiles import extremes, profile_inert, profile_problems, ratios_along
 from cvt_hpc.parameters import Parameter, Parameters, Substitute, not_negative, positive
 from cvt_hpc.physics.friction_laws import FRICTION_LAWS, friction_inert, friction_problems
 from cvt_hpc.physics.geometry import driven_radius, variator, variator_problems
-from cvt_hpc.variator import PULLEYS, scene
+from cvt_hpc.variator import PULLEYS, profiles, scene
+from cvt_hpc.variator.profiles import extremes, profile_problems
 from cvt_hpc.variator.scene import nested
 from cvt_hpc.vibration.ramped import ramped
 
@@ -79,7 +78,10 @@ PARAMETERS: dict[str, dict[str, Parameter]] = {
             sensible=(0.1, 100.0),
         ),
     },
-    "profiles": PROFILES,
+    "profiles": profiles.declared(
+        ("load", "driving_speed", "thrust", "driving_thrust", "ratio"),
+        ("load", "driving_speed", "thrust", "driving_thrust"),
+    ),
     "belt": {
         "elements": Parameter(432, "", "elements of the belt", minimum=32, maximum=4096),
         "coarse": Parameter(
@@ -263,6 +265,12 @@ def check(parameters: Parameters) -> list[tuple[str, str, str]]:
     return problems + friction_problems(p)
 
 
+def ratios_along(parameters: Parameters) -> list[float]:
+    """The ratio first, then the least and greatest along its profile if that has an effect."""
+    ratio, others = parameters["ratio"], extremes(parameters, "ratio")
+    return [ratio, *(other for other in others if other != ratio and parameters["driving_thrust"] == 0.0)]
+
+
 def _problems_at(parameters: Parameters, ratio: float) -> list[tuple[str, str, str]]:
     """Problems at a ratio that the run has, or comes to along its profile."""
     key = "ratio" if ratio == parameters["ratio"] else "ratio_profile"
@@ -397,12 +405,9 @@ def inert(parameters: Parameters) -> dict[str, str]:
             for key in ("height", "stiffness")
         ),
         (p["elements"] >= FEWEST_ELEMENTS, "coarse", f"elements {FEWEST_ELEMENTS} or more"),
+        (p["driving_thrust"] > 0.0, "ratio_profile", "driving_thrust above 0"),
+        (p["driving_thrust"] == 0.0, "driving_thrust_profile", "driving_thrust 0"),
         (True, "arc_probes", "model pushbelt, which is probed on its strands"),
     )
     found = {key: setting for holds, key, setting in cases if holds}
-    return (
-        friction_inert({**p, **dict.fromkeys(NO_TABLE, ())})
-        | scene.course_inert(p)
-        | profile_inert(p)
-        | found
-    )
+    return friction_inert({**p, **dict.fromkeys(NO_TABLE, ())}) | scene.course_inert(p) | found

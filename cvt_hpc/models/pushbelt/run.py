@@ -24,7 +24,7 @@ from cvt_hpc.variables import Status
 from cvt_hpc.variator import LEAST_SPEED, MOST_SPEED, PULLEYS, STRANDS
 from cvt_hpc.variator.course import load_course
 from cvt_hpc.variator.history import points_at, regions
-from cvt_hpc.variator.scene import multiple
+from cvt_hpc.variator.profiles import extremes, multiple
 from cvt_hpc.variator.slip import GAINED, LOST
 from cvt_hpc.vibration.ramped import ramped
 
@@ -394,7 +394,7 @@ class ElementRun(SampledRun):
         passing = speed / self._readings.pitch
         turning = path.driving_radius**-2 + path.driven_radius**-2
         rotation = 0.5 * self._tilting_inertia() * passing * speed**2 * turning
-        thrust = p["thrust"] * multiple(p, "thrust", p["duration"])  # a profile ends before the judged part
+        thrust = extremes(p, "thrust")[1]
         return OF_ROTATION * rotation + OF_THRUST * self.step * thrust * speed
 
 

@@ -22,8 +22,6 @@ from cvt_hpc.variables import Status
 
 BEYOND_LIMIT = 1.25  # of 2 / w of the fastest dynamic shape: contact may be stiffer than at rest
 
-_march = called_alike(march)
-
 
 class SplitRun(OneLaneRun):
     """One run, advanced sample by sample; attributes as of `RecordedRun`.
@@ -58,6 +56,7 @@ class SplitRun(OneLaneRun):
         first = initial_state(p, self.belt)
         self._motion, self._work = motion(self._model, first), work_space(self._model)
         self._make_lane(self.belt, first)
+        self._march = called_alike(march)
         self._noted = np.zeros((3, n))
         self._disturbed = False
 
@@ -124,11 +123,11 @@ class SplitRun(OneLaneRun):
             The failure, where the run cannot continue.
         """
         if samples == 0:
-            _march(self._model, self._motion, self._work, 0, self._noted)
+            self._march(self._model, self._motion, self._work, 0, self._noted)
         for _ in range(min(samples, self.samples - self.done)):
             if self.done == self._plan.kick and not self._disturbed:
                 self._disturb()
-            if not _march(self._model, self._motion, self._work, self._steps, self._noted):
+            if not self._march(self._model, self._motion, self._work, self._steps, self._noted):
                 self.failure = FAILURES[Outcome.NO_CONTACT_SOLUTION]
                 return self.failure
             outcome = self._record()

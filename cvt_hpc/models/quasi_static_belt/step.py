@@ -152,7 +152,7 @@ def _advance(model: SplitBelt, moved: Motion, work: Work) -> None:
         for k in range(f.FIRST_STATE, scalars.size):
             scalars[k] += step * found[2 + k - f.FIRST_STATE]
     else:
-        thrust = driven_thrust(belt, moved.force) - belt.thrust
+        thrust = driven_thrust(belt, moved.force) - rhs.thrust_at(belt, scalars[f.TIME])
         load = belt.ratio * rhs.load_at(belt, scalars[f.TIME])
         scalars[f.DRIVEN_SPEED] += step * (moment - load) / belt.driven_inertia
         scalars[f.DRIVEN_POSITION] += step * thrust / belt.axial_damping

@@ -8,7 +8,7 @@ from cvt_hpc.models.elastic_belt.pulley_checks import steady_pulley_problems
 from cvt_hpc.parameters import Parameter
 from cvt_hpc.physics.friction_laws import friction_problems
 
-OF_THE_COURSE = {
+OF_THE_COURSE: dict[str, Any] = {
     "load_history": "constant",
     "load_start": 0.0,
     "speed_history": "constant",
@@ -17,6 +17,7 @@ OF_THE_COURSE = {
     "start_damping": 1e4,
     "disturbance": 0.0,
     "seed": 1,
+    **{key: parameter.default for key, parameter in elastic_belt.PARAMETERS["profiles"].items()},
 }
 
 # How soon pulleys come to rest, and where a controller begins: without effect on where they rest
@@ -25,7 +26,7 @@ OF_LAGS = ("tilt_lag", "ratio_gain")
 PARAMETERS: dict[str, dict[str, Parameter]] = {
     section: {key: parameter for key, parameter in table.items() if key not in OF_THE_COURSE}
     for section, table in elastic_belt.PARAMETERS.items()
-    if section not in ("rings", "numerics", "record")  # of a transient
+    if section not in ("profiles", "rings", "numerics", "record")  # of a transient
 }
 
 

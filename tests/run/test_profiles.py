@@ -1,0 +1,258 @@
+"""Profiles of load, speed and thrust, given and from measured files, and their verdict over time."""
+
+import numpy as np
+import pytest
+from hypothesis import given
+from hypothesis import strategies as st
+
+from cvt_hpc.errors import InputError, JobWarning
+from cvt_hpc.job import build_job
+from cvt_hpc.variables import Vibrates
+from cvt_hpc.variator.course import multiple_at, profile_table, slope_at
+from support.marched import balance, finished, job, record
+
+COARSE = {"stations": 64, "load": 100.0, "friction_gradient": -0.4}
+SPEED = job().parameters["driving_speed"]
+T = COARSE | {"duration": 0.1}
+
+
+@given(
+    st.lists(st.floats(0.001, 10.0), min_size=1, max_size=9),
+    st.integers(0, 2**31),
+    st.floats(-1.0, 60.0),
+)
+def test_multiples_are_linear_between_their_times_and_constant_outside(steps, seed, time):
+    times = np.cumsum(steps)
+    profile = np.column_stack([times, np.random.default_rng(seed).normal(size=(times.size, 3))])
+    for at in (time, times[0], times[-1]):
+        for column in (1, 2, 3):
+            expected = np.interp(at, times, profile[:, column])
+            assert multiple_at(profile, column, at) == pytest.approx(expected, rel=1e-12, abs=1e-12)
+    step = 1e-7
+    if not np.any(np.abs(times - time) < 2.0 * step):
+        rise = multiple_at(profile, 2, time + step) - multiple_at(profile, 2, time - step)
+        assert slope_at(profile, 2, time) == pytest.approx(0.5 * rise / step, rel=1e-5, abs=1e-6)
+
+
+def test_profiles_of_ones_change_no_bit():
+    ones = {f"{name}_profile": (1.0, 1.0) for name in ("load", "driving_speed", "thrust")}
+    plain = finished(**T)
+    assert finished(**T, profile_time=(0.01, 0.05), **ones).rows.tobytes() == plain.rows.tobytes()
+
+
+@pytest.mark.parametrize(
+    ("ramp", "profile"),
+    [
+        ({"load_history": "ramp", "load_start": 40.0}, {"load_profile": (0.4, 1.0)}),
+        ({"speed_history": "ramp", "speed_start": 0.6 * SPEED}, {"driving_speed_profile": (0.6, 1.0)}),
+    ],
+)
+def test_a_profile_along_the_whole_run_is_a_ramp(ramp, profile):
+    p = job(**T).point(0)
+    given_times = profile | {"profile_time": (p["rise_time"], p["duration"])}
+    expected, found = finished(**T, **ramp), finished(**T, **given_times)
+    size = np.abs(expected.displacement).max()
+    assert np.abs(found.displacement - expected.displacement).max() < 1e-6 * size
+    for name in ("ring_tension t1", "driven_speed", "axial_force driving", "load", "driving_speed"):
+        assert found.channel(name) == pytest.approx(expected.channel(name), rel=1e-6, abs=1e-6), name
+
+
+def test_the_power_balance_closes_and_the_sheave_follows_its_thrust_along_profiles():
+    course = {
+        "profile_time": (0.0, 0.1, 0.14, 0.3),
+        "load_profile": (0.6, 1.0, 0.7, 0.8),
+        "driving_speed_profile": (1.0, 1.05, 0.95, 1.0),
+        "thrust_profile": (1.0, 0.9, 0.9, 1.1),
+    }
+    run = finished(**COARSE | {"stations": 96, "duration": 0.3}, **course)
+    found, p = balance(run), run.parameters
+    assert abs(found["power_residual"]) < 5e-4
+    times = (1.0 + np.arange(run.samples)) * run.interval
+    late = times > 0.05  # the load has risen
+    expected = p["load"] * np.interp(times, course["profile_time"], course["load_profile"])
+    assert run.channel("load")[late] == pytest.approx(expected[late])
+    thrust = p["thrust"] * np.interp(times, course["profile_time"], course["thrust_profile"])
+    force = run.channel("axial_force driven")
+    assert np.abs(force[late] / thrust[late] - 1.0).max() < 0.05  # friction of a sheave that moves
+    turning = run.channel("driving_speed").mean()
+    assert run.mean_driving_speed(slice(None)) == pytest.approx(turning) != p["driving_speed"]
+
+
+def test_a_pressure_moves_the_thrust_beside_a_spring():
+    spring = {"driven_piston": (0.02, 0.09), "driven_pressure": 2e6, "driven_spring_force": 4e3}
+    point = job(**spring, profile_time=(0.0, 0.1), driven_pressure_profile=(1.0, 0.5)).point(0)
+    area = np.pi * (0.09**2 - 0.02**2)
+    thrust = point["thrust"] * profile_table(point)[:, 3]
+    assert thrust == pytest.approx([area * 2e6 + 4e3, area * 1e6 + 4e3])
+
+
+LOADED = {"stations": 96, "step": 7.6e-6, "friction_gradient": -1.0, "load": 120.0, "duration": 0.4}
+RISEN = LOADED | {"profile_time": (0.0, 0.1, 0.2, 0.4), "load_profile": (0.2, 0.2, 1.0, 1.0)}
+
+
+@pytest.mark.slow
+def test_a_course_is_judged_all_along_over_time():
+    found = record(**RISEN)
+    assert found["vibrates"] is Vibrates.YES, found["reason"]
+    assert 0.12 < found["onset_time"] < 0.25 and np.isnan(found["end_time"])
+    assert f"from {found['onset_time']:.4g} s to its end" in found["reason"]
+    times = found["ramp_time"]
+    assert np.all(np.diff(times[np.isfinite(times)]) > 0.0) and np.isnan(found["onset_load"])
+    quiet = record(**RISEN | {"load_profile": (0.2, 0.2, 0.2, 0.2)})
+    assert quiet["vibrates"] is Vibrates.NO and "quiet between" in quiet["reason"]
+
+
+def test_a_course_that_ends_before_the_judged_part_leads_to_a_constant_scene():
+    ended = {"profile_time": (0.0, 0.05), "load_profile": (0.5, 1.0)}
+    found = record(**COARSE | {"duration": 0.2, "shortest_duration": 0.05}, **ended)
+    assert np.isnan(found["onset_time"]) and np.all(np.isnan(found["ramp_time"]))
+    # no part of it is judged that the course still changes
+    assert found["simulated_seconds"] * (1.0 - job().parameters["judged_fraction"]) >= 0.05
+
+
+RIG = """time [s],torque [N m],speed [rpm],clamping force [kN]
+2.0,40,2900,45
+2.05,150,3000,50
+2.2,120,3100,40
+"""
+
+
+def course_job(folder, text, name="rig.csv", model="elastic_belt", **tables):
+    (folder / name).write_text(text)
+    document = {"name": "course", "model": model, "profiles": {"profile_file": name}, **tables}
+    return build_job(document, str(folder / "course.toml"))
+
+
+@pytest.mark.parametrize(
+    "model", ["elastic_belt", "auto", "quasi_static_belt", "pushbelt", "spatial_pushbelt"]
+)
+def test_a_measured_file_gives_profiles_and_what_they_multiply(tmp_path, model):
+    with pytest.warns(JobWarning, match='"torque .N m." as load'):
+        point = course_job(tmp_path, RIG, model=model).point(0)
+    assert point["load"] == 150.0 and point["thrust"] == 50e3
+    assert point["driving_speed"] == pytest.approx(3100 * np.pi / 30)
+    assert point["profile_time"] == pytest.approx((0.0, 0.05, 0.2))
+    assert point["load_profile"] == pytest.approx((40 / 150, 1.0, 0.8))
+    assert point["driving_speed_profile"] == pytest.approx((29 / 31, 30 / 31, 1.0))
+    assert point["thrust_profile"] == pytest.approx((0.9, 1.0, 0.8))
+
+
+def test_an_axis_takes_the_place_of_a_measured_greatest_value(tmp_path):
+    with pytest.warns(JobWarning):
+        studied = course_job(tmp_path, RIG, axes={"load": ["100 N m", "200 N m"]})
+    assert [studied.point(k)["load"] for k in (0, 1)] == [100.0, 200.0]
+    assert studied.point(1)["load_profile"] == pytest.approx((40 / 150, 1.0, 0.8))
+
+
+def test_a_long_file_is_averaged_over_equal_parts(tmp_path):
+    times = np.arange(5000) / 1e4
+    rows = [f"{time:.4f},{100 + 10 * time + (-1) ** k}" for k, time in enumerate(times)]
+    point = course_job(tmp_path, "\n".join(["time [s],load [N m]", *rows]), run={"duration": "0.5 s"}).point(
+        0
+    )
+    at, load = np.array(point["profile_time"]), point["load"] * np.array(point["load_profile"])
+    assert at.size == 1000
+    assert load == pytest.approx(100 + 10 * at, abs=0.25)  # alternating samples cancel but for one in five
+
+
+SAMPLED = "\n".join(["time [s],load [N m]", *(f"{k / 100 + (k > 25)},{80 + k % 3}" for k in range(40))])
+
+
+@pytest.mark.parametrize(
+    ("text", "expected"),
+    [
+        ("time [s]\n0\n1\n", "expected a column beside time, found none"),
+        ("time [s],load [N m]\n0,1\n", "expected two times or more, found 1"),
+        ("time [s],load [N m]\n0,1\n1,2\n0.5,3\n", "line 4: expected a time after 1 s, .* found 0.5 s"),
+        ("time [s],load [N m]\n0,0\n1,0\n", "expected a load other than 0, found 0 all along"),
+        (SAMPLED, "line 28: expected samples every 0.01 s without a gap, as before, found none from 0.25"),
+        ("time [s],load [N m]\n0,1\n9,2\n", "duration: expected 9 s or more, the end of profile_time"),
+        ("time [s],thrust [kN]\n0,50\n0.1,-1\n", "thrust_profile: expected multiples above 0, found -0.02"),
+        ("time [s],load [rpm]\n0,1\n1,2\n", "line 1: expected load .N m., found"),
+        ("time [s],grip [N]\n0,1\n1,2\n", "expected columns among time"),
+        ("time [s],load [N m]\n0,1\n1,\n", "line 3"),
+    ],
+)
+def test_a_file_of_courses_that_cannot_be_driven_is_one_error(tmp_path, text, expected):
+    with pytest.raises(InputError, match=expected) as raised:
+        course_job(tmp_path, text).point(0)
+    assert "\n" not in str(raised.value)
+
+
+def test_a_file_and_what_it_gives_are_not_both_given(tmp_path):
+    with pytest.raises(InputError, match="profile_file: expected either profile_file or load, found both"):
+        course_job(tmp_path, "time [s],load [N m]\n0,1\n0.1,2\n", scene={"load": "50 N m"})
+    # what it does not give is the job's
+    point = course_job(tmp_path, "time [s],thrust [N]\n0,4e4\n0.1,5e4\n", scene={"load": "50 N m"}).point(0)
+    assert point["load"] == 50.0 and point["thrust"] == 5e4
+
+
+SIGNALS = {
+    "Time": ([1.0, 1.2, 1.5], "s"),
+    "Torque": ([40.0, 160.0, 80.0], "N m"),
+    "Speed": ([1500, 3000, 3000], "rpm"),
+}
+
+
+def write_mat(path, signals, **further):
+    from scipy.io import savemat
+
+    told = {f"{name}_unit": unit for name, (_, unit) in signals.items() if unit}
+    savemat(path, {name: np.array(values) for name, (values, _) in signals.items()} | told | further)
+
+
+def write_mdf(path, signals):
+    asammdf = pytest.importorskip("asammdf")
+    times = np.array(signals["Time"][0])
+    with asammdf.MDF(version="4.10") as measured:
+        for name, (values, unit) in signals.items():
+            if name != "Time":
+                measured.append(
+                    asammdf.Signal(np.array(values, float), timestamps=times, name=name, unit=unit),
+                    common_timebase=True,
+                )
+        measured.save(path, overwrite=True)
+
+
+@pytest.mark.parametrize(("write", "suffix"), [(write_mat, ".mat"), (write_mdf, ".mf4")])
+def test_signals_of_measuring_programs_give_profiles(tmp_path, write, suffix):
+    write(tmp_path / f"rig{suffix}", SIGNALS | {"Oil_temperature": ([80.0, 80.0, 80.0], "degC")})
+    document = {"name": "course", "model": "elastic_belt", "profiles": {"profile_file": f"rig{suffix}"}}
+    point = build_job(document | {"run": {"duration": "0.5 s"}}, str(tmp_path / "course.toml")).point(0)
+    assert point["load"] == 160.0 and point["load_profile"] == pytest.approx((0.25, 1.0, 0.5))
+    assert point["driving_speed"] == pytest.approx(100.0 * np.pi)
+    assert point["driving_speed_profile"] == pytest.approx((0.5, 1.0, 1.0))
+    assert point["profile_time"] == pytest.approx((0.0, 0.2, 0.5))
+
+
+@pytest.mark.parametrize(
+    ("changed", "further", "expected"),
+    [
+        ({"Torque": ([40.0, 160.0, 80.0], "")}, {}, "Torque: expected the unit of load .N m., found none"),
+        ({"Torque": ([40.0, np.nan, 80.0], "N m")}, {}, "Torque: expected finite numbers"),
+        ({"Torque": ([40.0, 160.0], "N m")}, {}, "load: expected 3 values, as others have, found 2"),
+        ({"Torque": (["a", "b", "c"], "N m")}, {}, "Torque: expected a row or a column of numbers"),
+        ({"Time": ([1.0, 1.2, 1.1], "s")}, {}, "entry 3: expected a time after 1.2 s"),
+        ({}, {"Load": np.ones(3), "Load_unit": "N m"}, "expected one signal for load"),
+    ],
+)
+def test_a_signal_that_means_nothing_certain_is_one_error(tmp_path, changed, further, expected):
+    write_mat(tmp_path / "rig.mat", SIGNALS | changed, **further)
+    document = {"name": "course", "model": "elastic_belt", "profiles": {"profile_file": "rig.mat"}}
+    with pytest.raises(InputError, match=expected) as raised:
+        build_job(document, str(tmp_path / "course.toml"))
+    assert "\n" not in str(raised.value)
+
+
+@pytest.mark.parametrize(
+    "content", [b"", b"no file of theirs", bytes(2000), b"MATLAB 5.0 MAT-file" + bytes(300)]
+)
+@pytest.mark.parametrize("suffix", [".mat", ".mf4"])
+def test_a_file_of_another_kind_is_one_error(tmp_path, suffix, content):
+    if suffix == ".mf4":
+        pytest.importorskip("asammdf")
+    (tmp_path / f"rig{suffix}").write_bytes(content)
+    document = {"name": "course", "model": "elastic_belt", "profiles": {"profile_file": f"rig{suffix}"}}
+    with pytest.raises(InputError, match="profile_file: .*rig.*expected an?") as raised:
+        build_job(document, str(tmp_path / "course.toml"))
+    assert "\n" not in str(raised.value)
