@@ -59,10 +59,10 @@ def table(
     """
     lines = (RESULTS / f"{of}.csv").read_text(encoding="utf-8").splitlines()
     stored = _read(lines)
-    kept = stored.query(rows) if rows else stored
+    kept = stored.query(rows, engine="python") if rows else stored
     if kept.empty:
         raise ValueError(f"{of}: expected rows where {rows}, found none")
-    keys = [kept.eval(expression) for expression in (by or {}).values()]
+    keys = [kept.eval(expression, engine="python") for expression in (by or {}).values()]
     values = kept[across].unique() if across else [None]
     heads = [*(by or ()), *(head.format(_told(value)) for value in values for head in columns)]
     cells = [heads, ["---"] * len(heads)]

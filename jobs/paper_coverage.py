@@ -86,7 +86,11 @@ def measured(part):
     table = stored(part["table"])
 
     def found(rows):
-        return (table.query(rows) if rows else table).eval(part["value"]).to_numpy(float)
+        return (
+            (table.query(rows, engine="python") if rows else table)
+            .eval(part["value"], engine="python")
+            .to_numpy(float)
+        )
 
     values = found(part.get("rows"))
     if "beside" in part:

@@ -26,6 +26,8 @@ LEAST_HEIGHT, HEIGHT = 1.5, 2.2  # [inch]: the same of spectrograms
 LETTERS = 14  # of a label beside a row
 THEN = "name fewer histories"  # of more than a page holds
 COURSES = ("load", "driving_speed")  # of which a run ramps one at most
+STRAIGHT = 0.02  # of its change: how far a ramp may be off a straight line, since pulleys may be free
+LEAST_CHANGE = 0.01  # of a value: free pulleys swing by less
 FREQUENCIES = Side(FREQUENCY, np.array([0.0, HIGHEST]))
 LINE_POINTS = 21  # of lines over a spectrogram
 
@@ -168,14 +170,14 @@ def _lines_along(history: xr.Dataset, ramp: Ramp) -> tuple[_Lines | None, _Lines
     """Turns (n,) [Hz] along a ramp of speed, and eigenfrequencies (strand, half waves, n) [Hz], at places."""
     half = int(0.5 * WINDOW * ramp.rate)  # the panel reaches from the middle of the first window on
     at = np.linspace(half, ramp.values.size - 1 - half, LINE_POINTS).astype(int)
-    changing = changing_of(history)
     point = json.loads(history.attrs.get("point", "{}"))
     courses = {}
-    if changing is not None:
-        courses[changing] = history[changing].values[-ramp.values.size :][at]
-    turns = None
-    if changing == "driving_speed":
-        turns = ramp.values[at], courses["driving_speed"] / (2.0 * np.pi)
+    if changing_of(history) is not None:
+        named = (name for name in COURSES if name in history)
+        courses = {name: history[name].values[-ramp.values.size :][at] for name in named}
+    turns, speed = None, courses.get("driving_speed")
+    if speed is not None and np.ptp(speed) > LEAST_CHANGE * speed.max():
+        turns = ramp.values[at], speed / (2.0 * np.pi)
     points = (point | {key: float(values[k]) for key, values in courses.items()} for k in range(LINE_POINTS))
     known = np.stack([strand_frequencies(at) for at in points], -1)
     return turns, (ramp.values[at], known) if np.isfinite(known).any() else None
@@ -227,7 +229,7 @@ def course_figure(history: xr.Dataset, of: str) -> Figure:
 def read_ramp(history: xr.Dataset, of: str, source: str = "history", *, is_ramp: bool = True) -> Ramp:
     """Read the course of a run along its ramp, without the start-up before it; arguments as of `ramp_figure`.
 
-    Unless it has to be a ramp, a run at constant load and speed has its time [s] in the place of that.
+    Along another course, and at constant load and speed unless it has to be a ramp, that is the time [s].
     """
     if changing_of(history) is None and is_ramp:
         raise mismatch(source, "a run along a ramp of load or speed", "constant ones")
@@ -254,35 +256,45 @@ def read_ramp(history: xr.Dataset, of: str, source: str = "history", *, is_ramp:
 
 def course_of(history: xr.Dataset) -> tuple[np.ndarray, str]:
     """What a run ramps over its time, in display units, with its name and unit; else the time [s]."""
-    changing = changing_of(history)
-    course = history[changing or "time"]
-    factor, unit = figures.coordinate_unit(course.attrs) if changing else (1.0, "s")
+    changing = changing_of(history) or "time"
+    course = history[changing]
+    factor, unit = (1.0, "s") if changing == "time" else figures.coordinate_unit(course.attrs)
     return factor * course.values, f"{figures.in_words(course)} [{unit}]"
 
 
 def changing_of(history: xr.Dataset) -> str | None:
-    """The quantity that a run ramps."""
-    courses = [name for name in COURSES if name in history]
-    return next((name for name in courses if _is_ramp(history[name].values)), None)
+    """The quantity that a run ramps, "time" of another course of load or speed, None of constant ones."""
+    first = int(np.searchsorted(history["time"].values, start_up(history)))
+    courses = {name: history[name].values[first:] for name in COURSES if name in history}
+    ramped = (name for name, values in courses.items() if _is_ramp(values))
+    other = "time" if any(_change(values) > LEAST_CHANGE for values in courses.values()) else None
+    return next(ramped, other)
 
 
 def _side_of(history: xr.Dataset, ramp: Ramp) -> Side:
     """What runs along x, in display units."""
-    changing = changing_of(history)
-    factor = figures.coordinate_unit(history[changing].attrs)[0] if changing else 1.0
-    return Side(changing or "time", np.sort(ramp.values[[0, -1]]), factor)
+    changing = changing_of(history) or "time"
+    factor = 1.0 if changing == "time" else figures.coordinate_unit(history[changing].attrs)[0]
+    return Side(changing, np.sort(ramp.values[[0, -1]]), factor)
 
 
 def _held(history: xr.Dataset) -> xr.Dataset:
     """Load and speed of a run, as coordinates, where they do not change."""
-    names = [name for name in COURSES if name in history and name != changing_of(history)]
+    changing = changing_of(history)
+    names = [name for name in COURSES if name in history and changing not in (name, "time")]
     return xr.Dataset(coords={name: float(history[name].values[-1]) for name in names})
 
 
 def _is_ramp(values: np.ndarray) -> bool:
-    """Whether a quantity still changes in the last half of a run."""
+    """Whether a quantity changes along a straight line."""
+    line = np.linspace(values[0], values[-1], values.size)
+    return _change(values) > 1e-6 and bool(np.abs(values - line).max() < STRAIGHT * np.ptp(values))
+
+
+def _change(values: np.ndarray) -> float:
+    """Change in the last half of a run, over the largest value there."""
     half = values[values.size // 2 :]
-    return bool(np.ptp(half) > 1e-6 * np.abs(half).max())
+    return float(np.ptp(half) / max(np.abs(half).max(), np.finfo(float).tiny))
 
 
 def start_up(history: xr.Dataset) -> float:

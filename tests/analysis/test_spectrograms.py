@@ -7,7 +7,7 @@ import pytest
 import xarray as xr
 
 from cvt_hpc.analysis.eigenfrequencies import along_axis
-from cvt_hpc.analysis.ramps import WINDOW, spectrogram_figure
+from cvt_hpc.analysis.ramps import WINDOW, changing_of, spectrogram_figure
 from cvt_hpc.analysis.waterfall import campbell_figure
 from cvt_hpc.errors import InputError
 from cvt_hpc.variator.band import strand_frequencies
@@ -54,6 +54,29 @@ def ridge(axes):
     middles = 0.5 * (places[0, 1:, 0] + places[0, :-1, 0])
     lines = 0.5 * (places[1:, 0, 1] + places[:-1, 0, 1])
     return middles, lines[cells.argmax(axis=0)]
+
+
+def test_another_course_than_a_ramp_is_shown_over_time():
+    assert [changing_of(history(ramped)) for ramped in (None, "load", "driving_speed")] == [
+        *(None, "load", "driving_speed")
+    ]
+    along = history("load")
+    time = along["time"].values
+    swinging = along.assign(
+        driving_speed=300.0 * (1.0 + 1e-3 * np.sin(PER_RAD * 50.0 * xr.DataArray(time, dims="time")))
+    )
+    assert changing_of(swinging) == "load"  # of a free pulley
+    course = np.interp(time, [0.1, 0.2, 0.3], [50.0, 150.0, 80.0])
+    bent = history().assign(load=("time", course, {"units": "N m"}))
+    assert changing_of(bent) == "time"
+    panels = spectrogram_figure([bent]).axes
+    assert panels[0].get_xlabel() == "time [s]" and panels[0].get_xlim()[1] == pytest.approx(
+        0.4 - 0.5 * WINDOW, abs=1e-3
+    )
+    # eigenfrequencies follow the load of each time: t1's fall while it rises, as push takes its tension
+    lines = [line for line in panels[0].lines if line.get_linestyle() == "--"]
+    x, first = lines[0].get_data()
+    assert first[np.argmin(np.abs(x - 0.2))] < first[0] - 1.0
 
 
 def test_strands_lie_side_by_side_over_time_or_along_the_ramp():
