@@ -77,6 +77,8 @@ def _is_number(value):
         ({"friction_gradient": 0.0, "load_history": "ramp", "load_start": 152.0}, False),
         (TABLE | {"load": 121.0}, True),  # by its least coefficient, 0.08
         (TABLE | {"load": 122.0}, False),
+        # a course may take the load beyond what its thrust carries
+        ({"friction_gradient": 0.0, "profile_time": (0.1, 0.2), "thrust_profile": (0.1, 1.0)}, False),
     ],
 )
 def test_friction_that_never_falls_needs_no_run(values, passive):
@@ -187,6 +189,7 @@ def test_runs_in_company_are_what_they_are_alone():
     [
         {"load_history": "ramp"},
         {"speed_history": "ramp"},
+        {"profile_time": (0.1, 0.4), "load_profile": (0.5, 1.0)},
         {
             "duration": 0.1
         },  # three tenths of it are over before the load has risen and five periods have passed
