@@ -224,6 +224,8 @@ def _constants(dataset: xr.Dataset, job: Job | None) -> dict[str, tuple[float, s
     if job:
         told |= {**job.parameters, **json.loads(dataset.attrs.get("point", "{}"))}
         units |= {key: parameter.unit for key, parameter in job.schema.parameters.items()}
+    if "time" in dataset.coords:  # of a run, over which its course goes
+        told["time"], units["time"] = float(dataset["time"].values[-1]), "s"
     for name in ALONG:  # courses of a run
         if name in dataset and dataset[name].dims == ("time",):
             units[name] = si_unit(dataset[name].attrs)

@@ -377,6 +377,14 @@ def test_over_time_a_window_is_drawn_where_it_holds_the_load_of_the_run(window, 
     assert bool(ink_of(run.cvt.spectrogram(measured=write(WINDOWS, window)))) == is_drawn
 
 
+def test_noise_measured_over_the_time_of_a_course_is_drawn_at_its_time(write):
+    run = pictured.history(load=100.0)
+    path = write("time_from [ms],time_to [ms],frequency_from [Hz],frequency_to [Hz]", "50,80,500,700")
+    (row,) = read_measured(path, run).rows
+    assert row.span == pytest.approx((0.05, 0.08)) and row.frequency == (500.0, 700.0)
+    assert bool(ink_of(run.cvt.spectrogram(measured=path)))
+
+
 def test_a_spreadsheet_of_windows_letters_is_read(tmp_path):
     path = tmp_path / "rig.csv"
     path.write_bytes("Rig A\nLoad from [N·m];Load to [N·m];amplitude [µm]\n15,5;25,5;1,5\n".encode("utf-16"))
