@@ -115,9 +115,7 @@ def cut_path(path: Variator, cells: int, refinement: float = 1.0) -> tuple[np.nd
 
 
 def variator_problems(parameters: Parameters) -> list[tuple[str, str, str]]:
-    """Problems of a variator's geometry: (key, expected, found); those values [SI] that `variator` takes
-    count.
-    """
+    """Problems of a variator's geometry, (key, expected, found), by the values [SI] of `variator`."""
     p = parameters
     try:
         variator(p["ratio"], p["driven_radius"], p["centre_distance"])
