@@ -52,8 +52,8 @@ def with_judder(run: Any, found: assessment.Occurrence) -> assessment.Occurrence
     judder's frequency, twice it or more, within LOCKED/L, L being the length of the judged part, and rises
     out of the multiple before it by no more than 1/COMB, and where the strands are below the threshold
     without all multiples up to the band's end. A vibration of the belt that is locked to judder rises by
-    three and more. Amplitudes stay as they are; nothing else is decided by them. Probes of what was found of
-    the run are columns of the displacement.
+    three and more. Amplitudes stay as they are; nothing else is decided by them. Probes are columns of the
+    displacement.
     """
     p = run.parameters
     rate, threshold = p["sampling_rate"], p["amplitude_threshold"]
@@ -134,10 +134,7 @@ def slipped_through(run: Any) -> dict[str, Any]:
 
 
 def judge(run: Any, variables: Sequence[Variable], names: Sequence[str] = STRANDS) -> dict[str, Any]:
-    """The record of a run that has reached its end, or slipped through before, its cost apart.
-
-    Of the `variables` of its model.
-    """
+    """The record of a run that has reached its end, or slipped through before, its cost apart."""
     if run.failure is None:
         return finished(run, variables, assess(run, names))
     record = slipped_through(run)

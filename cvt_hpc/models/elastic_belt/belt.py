@@ -133,9 +133,7 @@ class State(NamedTuple):
     """The state: `fields` (7, N) in the order of FIELDS, `scalars` (12,) in the order of SCALARS.
 
     Of elements that tilt `fields` is (8, N), with ELEMENT_TILT; of rings in n layers (7 + 2 n, N), see
-    `rings.py`.
-
-    The work of the layers' dampers [J] until it is read is no state of the belt.
+    `rings.py`. The work of the layers' dampers [J] until it is read is no state of the belt.
     """
 
     fields: np.ndarray
@@ -196,36 +194,16 @@ class Mesh(NamedTuple):
 
 
 class Zone(NamedTuple):
-    """Stations that one groove may hold, m of them, and their place about its axis.
+    """Stations that one groove may hold, m of them, and their place about its axis."""
 
-    Attributes
-    ----------
-    stations : (m,) int array
-        In the direction of travel.
-    angle, beyond, rise : (m,) arrays
-        Angle from the inlet's tangent point [rad], way beyond the tangent points (negative before the inlet,
-        0 on the arc) and distance from the axis beyond the pitch radius [m].
-    """
-
-    stations: np.ndarray
-    angle: np.ndarray
-    beyond: np.ndarray
-    rise: np.ndarray
+    stations: np.ndarray  # (m,) int, in the direction of travel
+    angle: np.ndarray  # from the inlet's tangent point, (m,) [rad]
+    beyond: np.ndarray  # way beyond the tangent points, (m,) [m]: negative before the inlet, 0 on the arc
+    rise: np.ndarray  # distance from the axis beyond the pitch radius, (m,) [m]
 
 
 def mesh(parameters: Mapping[str, Any]) -> Mesh:
-    """Cut the path into `stations` cells, shorter by `end_refinement` at the ends of the arcs (`cut_path`).
-
-    Parameters
-    ----------
-    parameters : dict
-        Resolved parameters of one run.
-
-    Returns
-    -------
-    Mesh
-        With faces on the ends of the arcs.
-    """
+    """Cut the path into `stations` cells, shorter by `end_refinement` at the ends of arcs (`cut_path`)."""
     path = variator(parameters["ratio"], parameters["driven_radius"], parameters["centre_distance"])
     cells = cut_path(path, parameters["stations"], parameters["end_refinement"])
     counts = [part.size for part in cells]
@@ -233,18 +211,7 @@ def mesh(parameters: Mapping[str, Any]) -> Mesh:
 
 
 def belt_constants(parameters: Mapping[str, Any]) -> Belt:
-    """Constants of one run.
-
-    Parameters
-    ----------
-    parameters : dict
-        Resolved parameters of one run, `duration` [s] included.
-
-    Returns
-    -------
-    Belt
-        For the kernels.
-    """
+    """Constants of one run for the kernels, from its resolved parameters, `duration` [s] included."""
     p, grid = BENDING_DEFAULTS | TILT_DEFAULTS | dict(parameters), mesh(parameters)
     path, cell = grid.path, grid.cell
     dual = 0.5 * (cell + np.roll(cell, 1))
@@ -337,17 +304,8 @@ def belt_constants(parameters: Mapping[str, Any]) -> Belt:
 def initial_state(parameters: Mapping[str, Any], belt: Belt) -> State:
     """Start near the steady state without load.
 
-    Parameters
-    ----------
-    parameters : dict
-        Resolved parameters of one run.
-    belt : Belt
-        Its constants.
-
-    Returns
-    -------
-    State
-        Belt seated in both grooves under the tension that the thrust requires; layers at uniform strain.
+    The belt is seated in both grooves under the tension that the thrust requires, the layers at uniform
+    strain.
     """
     p, grid = parameters, mesh(parameters)
     tangent = np.tan(p["half_wedge_angle"])
@@ -400,21 +358,9 @@ def _fill_strands(w: np.ndarray, grid: Mesh) -> None:
 
 
 def random_strands(grid: Mesh, size: float, seed: int) -> np.ndarray:
-    """Random mixture of the first six sine shapes of both strands.
+    """Random mixture of the first six sine shapes of both strands: displacement of the stations (N,) [m].
 
-    Parameters
-    ----------
-    grid : Mesh
-        The belt's mesh.
-    size : float
-        Largest displacement [m].
-    seed : int
-        Of the random numbers; the mixture does not depend on the mesh.
-
-    Returns
-    -------
-    (N,) array
-        Displacement of the stations [m], 0 on the arcs.
+    It is `size` [m] at most, and 0 on the arcs. The mixture of a seed does not depend on the mesh.
     """
     random = np.random.default_rng(seed)
     shape = np.zeros(grid.cell.size)

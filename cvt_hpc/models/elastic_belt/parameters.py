@@ -164,18 +164,7 @@ PARAMETERS: dict[str, dict[str, Parameter]] = {
 
 
 def check(parameters: dict[str, Any]) -> list[tuple[str, str, str]]:
-    """Problems that lie between parameters.
-
-    Parameters
-    ----------
-    parameters : dict
-        Values by name, in SI units.
-
-    Returns
-    -------
-    list of (key, expected, found)
-        Empty where all is well.
-    """
+    """Problems that lie between parameters [SI]: (key, expected, found)."""
     p = parameters
     found = shape_problems(p) + profiles.profile_problems(p) + friction_problems(p)
     return found or pulley_problems(p)
@@ -200,15 +189,7 @@ def shape_problems(parameters: dict[str, Any]) -> list[tuple[str, str, str]]:
 def inert(parameters: dict[str, Any]) -> dict[str, str]:
     """Parameters without effect on a run, so that a study does not vary them for nothing.
 
-    Parameters
-    ----------
-    parameters : dict
-        Values by name, in SI units.
-
-    Returns
-    -------
-    dict
-        By the name of the parameter, the setting that makes it so, e.g. "friction_law table".
+    By the name of the parameter, the setting that makes it so, e.g. "friction_law table".
     """
     p = parameters
     whole, disc = stiffness_factors(p)
