@@ -44,21 +44,7 @@ REACH = 0.1
 class Belt(NamedTuple):
     """Everything the kernels need, in SI units; N stations around the belt.
 
-    Arrays of cells and stations have shape (N,), `per_...` being reciprocals, the span that of two cells;
-    `touches` is 1 where a groove may hold a station, else 0, and `on_driven` 1 from the middle of t1 to that
-    of t2; there the pulley's radial unit vector has the parts `lean` along the path, `lean_rate` less per
-    displacement [1/m], and `upright` across it, and `rise` is the path's distance from the axis beyond the
-    pitch radius (`Mesh.zone`); `driving_stations` and `driven_stations` (m,) are those that each groove may
-    hold; `bending` is (N, 5): force per length on station j from the displacements of stations j-2 .. j+2,
-    `bending_load` that without displacement; `squared_curvature` is kappa^2 at the stations where curvature
-    terms count, else 0, and `curvature_terms` the place among those in CURVATURE_TERMS; `measures` are those
-    of the scene, `faded` is the coupling that counts for nothing, and a belt that is further than
-    `largest_displacement` off its path has left its grooves; `ring_relief` is the tension at which the rings'
-    own weight bears them. `belt_speed` is that of the pitch line at `driving_speed`; along a ramp of speed
-    both follow `rhs.speed_share_at`; `profile` (K, 4) is `course.profile_table`. `element_mass` and
-    `ring_mass` are the inertia along the path, `mass` that across it. Across a gap the elements' damper may
-    push against `bridging_stiffness` times the gap's strain; inf, as in every run: elements that are apart
-    have no damper. `tilts` is whether elements tilt on the rings.
+    Arrays of cells and stations have shape (N,), `per_...` being reciprocals, the span that of two cells.
     """
 
     cell: np.ndarray
@@ -68,34 +54,37 @@ class Belt(NamedTuple):
     per_span: np.ndarray
     curvature: np.ndarray
     arc_curvature: np.ndarray
-    touches: np.ndarray
-    on_driven: np.ndarray
-    rise: np.ndarray
-    lean: np.ndarray
-    lean_rate: np.ndarray
-    upright: np.ndarray
-    driving_stations: np.ndarray
-    driven_stations: np.ndarray
-    bending: np.ndarray
-    bending_load: np.ndarray
-    squared_curvature: np.ndarray
-    curvature_terms: int
-    ring_mass: np.ndarray
-    ring_relief: np.ndarray
+    touches: np.ndarray  # 1 where a groove may hold a station, else 0
+    on_driven: np.ndarray  # 1 from the middle of t1 to that of t2, else 0
+    rise: np.ndarray  # the path's distance from the axis beyond the pitch radius (`Mesh.zone`)
+    lean: np.ndarray  # where a groove may hold it, part of the pulley's radial unit vector along the path
+    lean_rate: np.ndarray  # less of that per displacement [1/m]
+    upright: np.ndarray  # part of that vector across the path
+    driving_stations: np.ndarray  # those that the groove may hold, (m,)
+    driven_stations: np.ndarray  # likewise, (m,)
+    bending: np.ndarray  # force per length on station j from the displacements of j-2 .. j+2, (N, 5)
+    bending_load: np.ndarray  # that without displacement
+    squared_curvature: np.ndarray  # kappa^2 at the stations where curvature terms count, else 0
+    curvature_terms: int  # place among those in CURVATURE_TERMS
+    ring_mass: np.ndarray  # inertia along the path, as `element_mass`
+    ring_relief: np.ndarray  # tension at which the rings' own weight bears them
     element_mass: float
-    mass: float
+    mass: float  # inertia across the path
     bending_stiffness: float
+    # of the pitch line at `driving_speed`; along a ramp of speed both follow `rhs.speed_share_at`
     belt_speed: float
     element_stiffness: float
     ring_stiffness: float
     element_damping: float
+    # times a gap's strain: most push of the elements' damper across the gap; inf, as in every run: elements
+    # that are apart have no damper
     bridging_stiffness: float
     has_column: bool
     column_stiffness: float
     outer_edge: float
     inner_edge: float
     ring_damping: float
-    tilts: bool
+    tilts: bool  # whether elements tilt on the rings
     tilt_spring: float
     tilt_damper: float
     transverse_damping: float
@@ -120,12 +109,12 @@ class Belt(NamedTuple):
     load: float
     load_start: float
     speed_start: float
-    profile: np.ndarray
+    profile: np.ndarray  # `course.profile_table`, (K, 4)
     rise_time: float
     start_damping: float
-    largest_displacement: float
-    faded: float
-    measures: Measures
+    largest_displacement: float  # a belt that is further off its path has left its grooves
+    faded: float  # coupling that counts for nothing
+    measures: Measures  # of the scene
     ramp_end: float
 
 

@@ -1,8 +1,7 @@
 """Parameters of the elastic belt that a job may set, with units, bounds and defaults.
 
-Only ratio, driving_speed and thrust of the defaults are from a paper (Lebrecht et al. 2004, sec. 3.1); sizes
-are those of a common passenger-car belt; seven were fitted to what that paper states of the noise, as
-jobs/lebrecht_2004.toml says; every other default is an assumption, plausible and not measured.
+Of the defaults the same holds as of those in `variator/scene.py`: most are assumptions, plausible and not
+measured.
 """
 
 from typing import Any

@@ -372,9 +372,7 @@ def sliding_speeds(
 ) -> tuple[float, float, float]:
     """Sliding of station j in its groove: radial, tangential [m/s], and the distance from the axis [m].
 
-    With the element's velocities v_0 along the path and u = w_t + v_0 w_s across it
-
-        v_r = u cos(theta) + v_0 sin(theta),    v_t = v_0 cos(theta) - u sin(theta) - omega rho.
+    `v_across` is u = w_t + v_0 w_s, the element's speed across the path [m/s].
     """
     w, v = state.fields[f.W, j], state.fields[f.V_ELEMENT, j]
     lean, upright = leaning(belt, j, w), belt.upright[j]
