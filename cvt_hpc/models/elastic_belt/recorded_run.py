@@ -111,23 +111,25 @@ class Records:
 class RecordedRun:
     """One run, as it is judged and recorded, by its resolved parameters [SI], in a lane of `records`.
 
-    `mesh`, `probes`, `interval`, `samples` and `risen` are those of the plan; the marching class sets `rows`,
-    `done`, `failure` and `time`.
+    `mesh`, `probes`, `interval`, `samples` and `risen` are those of the plan. The marching class sets `time`,
+    simulated [s]; `rows`, the sensors' displacement [m], the strands' modes [m], and CHANNELS, (done, S + C);
+    `done`, the samples recorded so far, up to the one at which the run failed; and `failure`, why the run
+    cannot continue: a failure, or a result, with the status done.
     """
 
     if TYPE_CHECKING:  # set by the marching class
 
         @property
         def rows(self) -> np.ndarray:
-            """The sensors' displacement [m], the strands' modes [m], and CHANNELS, (done, S + C)."""
+            """Sensors, modes and CHANNELS."""
 
         @property
         def done(self) -> int:
-            """Samples recorded so far, up to the one at which the run failed."""
+            """Samples."""
 
         @property
         def failure(self) -> tuple[Status, str] | None:
-            """Why the run cannot continue: a failure, or a result, with the status done."""
+            """Why the run cannot continue."""
 
         @property
         def time(self) -> float:
