@@ -1,7 +1,4 @@
-"""Sums, products, comparisons and logic of lanes.
-
-Places of an array of lanes are read and written here as well.
-"""
+"""Sums, products, comparisons and logic of lanes; reading and writing of places of an array of lanes."""
 
 import operator
 
@@ -15,10 +12,7 @@ from cvt_hpc.lanes.kinds import ALIGNMENT, LaneArrayKind, Lanes, Mask, converted
 
 
 class _OfLanes(AbstractTemplate):
-    """Types of an operation of lanes.
-
-    They are asked before those that the compiler has for every target, some dozens, which refuse lanes.
-    """
+    """Types of an operation of lanes, asked before those of every target, some dozens, which refuse lanes."""
 
     metadata = {"target": "cpu"}
 

@@ -13,7 +13,7 @@ ALIGNMENT = 64  # bytes: the widest register, so that no access crosses a line o
 
 
 class LaneArray:
-    """Array of W-lane numbers.
+    """Array of W-lane numbers: `data` (rows, fields, lanes) in order of memory, zero at first.
 
     Parameters
     ----------
@@ -23,13 +23,6 @@ class LaneArray:
         np.float64 or np.float32.
     linked : bool
         Whether the lanes are parts of one ring, each ahead of the last, and not systems of their own.
-
-    Attributes
-    ----------
-    data : (rows, fields, lanes) array
-        The values, in order of memory; zero at first.
-    linked : bool
-        As given.
     """
 
     def __init__(

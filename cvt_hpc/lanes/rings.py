@@ -164,26 +164,12 @@ def _folding(turns: list):
 
 
 def ring_solution(p, q, r, f0, f1, l00, l01, l10, l11, faded):
-    """Solve for two unknowns x of each part that are coupled to those of the parts behind and ahead.
+    """Solve for two unknowns x0, x1 of each part that are coupled to those of the parts behind and ahead.
 
     A x + L x_behind + (L_ahead)' x_ahead = f, symmetric and positive definite, by cyclic reduction: each
-    stage couples parts twice as far apart, until both neighbours are the part itself. Where
-    lanes are rings of their own it is that from the start.
-
-    Parameters
-    ----------
-    p, q, r
-        A: its first, mixed and second element.
-    f0, f1
-        Right side.
-    l00, l01, l10, l11
-        L.
-    faded
-        Couplings far below that become zero, before they are too small for the processor's normal numbers.
-
-    Returns
-    -------
-    x0, x1
+    stage couples parts twice as far apart, until both neighbours are the part itself. Where lanes are rings
+    of their own it is that from the start. p, q, r are the first, mixed and second element of A; couplings
+    far below `faded` become zero, before they are too small for the processor's normal numbers.
     """
     raise NotImplementedError("for kernels")
 

@@ -36,18 +36,10 @@ PLACES, WEIGHTS = 0.5 + 0.5 * _X, 0.5 * _W
 
 
 def shapes(place: float | np.ndarray) -> tuple[np.ndarray, np.ndarray, np.ndarray]:
-    """Shapes of an element of length 1 and their first two derivatives, (..., 4) each.
+    """Shapes of an element of length 1 and their first two derivatives, (..., 4), at places from 0 to 1.
 
-    Parameters
-    ----------
-    place : float or array
-        From 0 at the first node to 1 at the second.
-
-    Returns
-    -------
-    tuple of arrays
-        Of the first node's position and gradient, and the second's. At length l the shapes of gradients are
-        l times as large, and a derivative is 1 / l times as large.
+    Of the first node's position and gradient, and the second's. At length l the shapes of gradients are l
+    times as large, and a derivative is 1 / l times as large.
     """
     x = np.asarray(place, float)
     value = [1 - 3 * x**2 + 2 * x**3, x - 2 * x**2 + x**3, 3 * x**2 - 2 * x**3, x**3 - x**2]
@@ -60,32 +52,16 @@ SHAPES = np.stack(shapes(PLACES), 1)  # at the Gauss points: (point, derivative,
 
 
 class AncfBeam(NamedTuple):
-    """Constants of a chain of elements.
+    """Constants of a chain of k elements."""
 
-    Attributes
-    ----------
-    lengths : (k,) array
-        Of the elements without load [m].
-    line_mass : float
-        Mass per length without load [kg/m].
-    axial_stiffness, bending_stiffness : float
-        EA [N], EI [N m^2].
-    axial_damping : float
-        cA [N s].
-    mass_damping, bending_damping : float
-        alpha [1/s], beta [s].
-    gravity : (float, float)
-        Acceleration along x and y [m/s^2].
-    """
-
-    lengths: np.ndarray
-    line_mass: float
-    axial_stiffness: float
-    bending_stiffness: float
-    axial_damping: float
-    mass_damping: float
-    bending_damping: float
-    gravity: tuple[float, float]
+    lengths: np.ndarray  # of the elements without load, (k,) [m]
+    line_mass: float  # mass per length without load [kg/m]
+    axial_stiffness: float  # EA [N]
+    bending_stiffness: float  # EI [N m^2]
+    axial_damping: float  # cA [N s]
+    mass_damping: float  # alpha [1/s]
+    bending_damping: float  # beta [s]
+    gravity: tuple[float, float]  # acceleration along x and y [m/s^2]
 
 
 def beam(
@@ -112,44 +88,20 @@ def beam(
 
 
 def random_lengths(total: float, elements: int, scatter: float, seed: int) -> np.ndarray:
-    """Lengths of elements that differ at random (Cepon and Boltezar 2011, eq. 3).
+    """Lengths (elements,) [m] that differ at random, of the sum `total` [m] (Cepon and Boltezar 2011, eq. 3).
 
-    Parameters
-    ----------
-    total : float
-        Their sum [m].
-    elements : int
-        How many.
-    scatter : float
-        Largest share by which one differs from the mean before all are scaled to the sum, below 1.
-    seed : int
-        Of the random numbers.
-
-    Returns
-    -------
-    (elements,) array
-        Lengths [m].
+    `scatter` is the largest share, below 1, by which one differs from the mean before all are scaled to the
+    sum.
     """
     lengths = 1.0 + scatter * np.random.default_rng(seed).uniform(-1.0, 1.0, elements)
     return total * lengths / lengths.sum()
 
 
 def at_places(beam: AncfBeam, nodes: np.ndarray, shape: np.ndarray) -> np.ndarray:
-    """Values at places of each element.
+    """Values at m places of each of k elements, along x and y, (k, m, 2), from those of the nodes (n, 4).
 
-    Parameters
-    ----------
-    beam : AncfBeam
-        k elements.
-    nodes : (n, 4) array
-        Positions of the nodes, or speeds.
-    shape : (m, 4) array
-        Shapes of an element of length 1 at m places; their derivatives give those by the share of a length.
-
-    Returns
-    -------
-    (k, m, 2) array
-        Along x and y.
+    They are positions or speeds. `shape` (m, 4) are the shapes of an element of length 1 at these places;
+    their derivatives give those by the share of a length.
     """
     first = np.arange(beam.lengths.size)
     second, lengths = (first + 1) % len(nodes), beam.lengths[:, None]
@@ -183,7 +135,7 @@ def energies(beam: AncfBeam, q: np.ndarray, u: np.ndarray) -> tuple[float, float
 
 
 def tensions(beam: AncfBeam, q: np.ndarray) -> np.ndarray:
-    """Elastic force along the belt at the Gauss points [N], (k, POINTS), from positions (n, 4) of the nodes.
+    """Elastic force along the belt at the Gauss points, (k, POINTS) [N], from positions (n, 4) of the nodes.
 
     That is EA e |r'|, against the area without load.
     """

@@ -57,31 +57,14 @@ def assemble(
 ) -> float:
     """Set up a correction of speeds, (M / tau + D + tau K) du = F - M (u - start) / tau.
 
-    That is Newton's method for an implicit Euler step tau from `start`, at speeds u and positions q = q_a +
-    tau u. Strains are the mean of those at both ends of a step 2 tau with q in its middle, which makes the
+    That is Newton's method for an implicit Euler step tau [s] from `start`, at speeds u and positions q = q_a
+    + tau u. Strains are the mean of those at both ends of a step 2 tau with q in its middle, which makes the
     midpoint rule conserve energy (Simo and Tarnow 1992) and changes others by their order. K leaves out how
-    alpha's direction turns.
+    alpha's direction turns. Returns the power that damping takes [W].
 
-    Parameters
-    ----------
-    beam : AncfBeam
-        k elements.
-    work : LaneArray
-        `empty_work()`; overwritten.
-    q, u, start : (n, 4) arrays
-        Positions [m, 1], speeds and speeds at the start [m/s, 1/s]; n = k of a closed chain, k + 1 of an open
-        one.
-    tau : float
-        [s]
-    blocks, columns : LaneArrays
-        Of `cyclic_blocks`; overwritten.
-    column : int
-        Which of the right-hand sides it is; the others become 0.
-
-    Returns
-    -------
-    float
-        Power that damping takes [W].
+    Of k elements, positions q [m, 1], speeds u and speeds at the start [m/s, 1/s] are (n, 4): n = k of a
+    closed chain, k + 1 of an open one. `empty_work()`, `blocks` and `columns` of `cyclic_blocks` are
+    overwritten; `column` tells which of the right-hand sides it is, the others become 0.
     """
     k, n = beam.lengths.size, q.shape[0]
     side_by_side = work.data.shape[2]
@@ -308,51 +291,25 @@ def _scatter(found, lane, i, j, blocks, columns, column):
 
 
 class Chain(NamedTuple):
-    """Motion of a chain of n nodes; all but the equations are (n, 4) arrays.
+    """Motion of a chain of n nodes; all but the equations are (n, 4) arrays."""
 
-    Attributes
-    ----------
-    q, v : arrays
-        Positions [m, 1] and speeds [m/s, 1/s] of the nodes.
-    dq, dv : arrays
-        Their rates, as the method of steps knows them.
-    stage_q, stage_v : arrays
-        Those of the last stage.
-    start_q, start_v : arrays
-        Initial values of its implicit Euler step.
-    blocks, columns : LaneArrays
-        Equations of `cyclic_blocks`.
-    work : LaneArray
-        Of `assemble`.
-    """
-
-    q: np.ndarray
-    v: np.ndarray
-    dq: np.ndarray
-    dv: np.ndarray
-    stage_q: np.ndarray
-    stage_v: np.ndarray
-    start_q: np.ndarray
-    start_v: np.ndarray
-    blocks: LaneArray
-    columns: LaneArray
-    work: LaneArray
+    q: np.ndarray  # positions of the nodes [m, 1]
+    v: np.ndarray  # speeds of the nodes [m/s, 1/s]
+    dq: np.ndarray  # rate of q, as the method of steps knows it
+    dv: np.ndarray  # rate of v, likewise
+    stage_q: np.ndarray  # q of the last stage
+    stage_v: np.ndarray  # v of the last stage
+    start_q: np.ndarray  # initial value of its implicit Euler step
+    start_v: np.ndarray  # likewise
+    blocks: LaneArray  # equations of `cyclic_blocks`
+    columns: LaneArray  # their right-hand sides
+    work: LaneArray  # of `assemble`
 
 
 def chain(q: np.ndarray, v: np.ndarray, columns: int = 1) -> Chain:
-    """A chain at positions and speeds (n, 4); its accelerations are 0.
+    """A chain at copies of positions [m, 1] and speeds [m/s, 1/s], (n, 4); its accelerations are 0.
 
-    Parameters
-    ----------
-    q, v : (n, 4) arrays
-        Positions [m, 1] and speeds [m/s, 1/s] of the nodes.
-    columns : int
-        Right-hand sides of its equations.
-
-    Returns
-    -------
-    Chain
-        With copies of both.
+    Its equations have as many right-hand sides as `columns`.
     """
     q, v = np.array(q, float), np.array(v, float)
     dv, stage_q, stage_v, start_q, start_v = np.zeros((5, *q.shape))

@@ -19,26 +19,14 @@ MOST_WRAP = 1.5 * np.pi  # of a belt crossed around more than two: it crosses it
 
 
 class BeltPath(NamedTuple):
-    """A closed path around P circles, in the order in which the belt runs around them.
+    """A closed path around P circles, in the order in which the belt runs around them."""
 
-    Attributes
-    ----------
-    centre : (P, 2) array
-        Of the circles [m].
-    radius, turn : (P,) arrays
-        [m]; 1 where the belt runs counter-clockwise, else -1.
-    angle, wrap : (P,) arrays
-        Running direction where the belt runs on, and angle over which it touches the circle [rad].
-    spans : (P,) array
-        Length of the span that leaves each circle [m].
-    """
-
-    centre: np.ndarray
-    radius: np.ndarray
-    turn: np.ndarray
-    angle: np.ndarray
-    wrap: np.ndarray
-    spans: np.ndarray
+    centre: np.ndarray  # of the circles, (P, 2) [m]
+    radius: np.ndarray  # (P,) [m]
+    turn: np.ndarray  # (P,): 1 where the belt runs counter-clockwise, else -1
+    angle: np.ndarray  # running direction where the belt runs on, (P,) [rad]
+    wrap: np.ndarray  # angle over which it touches the circle, (P,) [rad]
+    spans: np.ndarray  # length of the span that leaves each circle, (P,) [m]
 
     @property
     def arcs(self) -> np.ndarray:
@@ -62,25 +50,11 @@ class BeltPath(NamedTuple):
 
 
 def belt_path(centre: np.ndarray, radius: np.ndarray, turn: np.ndarray) -> BeltPath:
-    """Lay a belt around circles.
+    """Lay a belt around two circles or more.
 
-    Parameters
-    ----------
-    centre : (P, 2) array
-        Of two circles or more [m].
-    radius, turn : (P,) arrays
-        [m]; 1 where the belt runs counter-clockwise, else -1.
-
-    Returns
-    -------
-    BeltPath
-        Of a belt that winds around all together once, or not at all if it crosses itself.
-
-    Raises
-    ------
-    ValueError
-        If circles overlap, or the belt does not close around them or passes through itself; the text says
-        where.
+    Centres (P, 2) and radii (P,) [m], and turns (P,) as of `BeltPath`. The belt winds around all together
+    once, or not at all if it crosses itself. ValueError if circles overlap, or the belt does not close around
+    them or passes through itself; the text says where.
     """
     centre, radius, turn = (np.array(values, float) for values in (centre, radius, turn))
     pulleys = range(len(radius))
@@ -163,19 +137,9 @@ def tangents(centre: np.ndarray, radius: np.ndarray, turn: np.ndarray) -> tuple[
 
 
 def points_at(path: BeltPath, position: np.ndarray) -> tuple[np.ndarray, np.ndarray, np.ndarray]:
-    """Points of a path, angles of the running direction, and curvatures to the left.
+    """Points of a path (n, 2) [m], angles in which it runs (n,) [rad], and curvatures to the left (n,) [1/m].
 
-    Parameters
-    ----------
-    path : BeltPath
-        The path.
-    position : (n,) array
-        Path coordinates [m].
-
-    Returns
-    -------
-    (n, 2), (n,), (n,) arrays
-        [m], [rad], [1/m]
+    `position` holds path coordinates (n,) [m].
     """
     s = np.mod(position, path.path_length)
     where = regions(path, s)

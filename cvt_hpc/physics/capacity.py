@@ -18,14 +18,8 @@ NEEDS = (
 def torque_limit(mu: Any, axial_force: Any, driving_radius: float, half_wedge_angle: float) -> Any:
     """Torque at the driving pulley [N m] at which a pulley slips: Bullinger et al. 2005, eq. 2.
 
-    Parameters
-    ----------
-    mu : float or array
-        Coefficient of friction [1].
-    axial_force : float or array
-        Of the belt on a sheave [N]; the least result over both pulleys counts.
-    driving_radius, half_wedge_angle : float
-        [m], [rad].
+    Of the coefficient of friction `mu` [1], the axial force of the belt on a sheave [N] (numbers or arrays;
+    the least result over both pulleys counts), `driving_radius` [m] and `half_wedge_angle` [rad].
     """
     return 2.0 * mu * axial_force * driving_radius / math.cos(half_wedge_angle)
 
@@ -33,19 +27,9 @@ def torque_limit(mu: Any, axial_force: Any, driving_radius: float, half_wedge_an
 def carried_torque(parameters: Mapping[str, Any]) -> float:
     """Torque at the driving pulley [N m] that friction carries on rigid sheaves.
 
-    By `torque_limit`, with the thrust on the driven pulley, which a job prescribes, and the
-    coefficient of `friction_level`.
-
-    Parameters
-    ----------
-    parameters : mapping
-        Flat values [SI] by the names in NEEDS; a model without a choice of friction laws has the last one and
-        `friction_law` not.
-
-    Raises
-    ------
-    ValueError
-        If the friction table has no coefficients.
+    From flat parameters [SI], those of NEEDS, by `torque_limit`, with the thrust on the driven pulley, which
+    a job prescribes, and the coefficient of `friction_level`. A model without a choice of friction laws has
+    neither `friction_law` nor `table_mu`. ValueError if the friction table has no coefficients.
     """
     p = parameters
     radius = p["driven_radius"] / p["ratio"]

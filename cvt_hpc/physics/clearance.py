@@ -41,17 +41,9 @@ TINY = 1e-30
 
 @kernel
 def principal_axes(one: Any, between: Any, other: Any) -> tuple[Any, Any, Any, Any]:
-    """Eigenvalues of a symmetric matrix, none below 0, and the direction of the larger one.
+    """Direction of the larger eigenvalue of ((one, between), (between, other)), and both, none below 0.
 
-    Parameters
-    ----------
-    one, between, other : number
-        ((one, between), (between, other)).
-
-    Returns
-    -------
-    cosine, sine, larger, lesser
-        Of numbers, or of lanes.
+    Cosine, sine, the larger and the lesser eigenvalue: numbers or lanes.
     """
     half = 0.5 * (one - other)
     apart = sqrt(fma(half, half, between * between))
@@ -71,21 +63,9 @@ def bearing_direction(
 ) -> tuple[Any, Any, Any]:
     """Direction p of the sheave that bears, a unit vector within `error`, or shorter within its clearance.
 
-    Parameters
-    ----------
-    one, other : number
-        s_0 in the principal axes of L [N].
-    larger, lesser : number
-        Eigenvalues of L [N].
-    least : number
-        Load from which on the sheave bears [N].
-    error : number
-        Of |p|.
-
-    Returns
-    -------
-    p_1, p_2, left
-        In these axes; whether |p| is still beyond `error`.
+    From s_0 = (one, other) in the principal axes of L and the eigenvalues `larger` and `lesser` of L [N];
+    from the load `least` on [N] the sheave bears. Returns p_1, p_2 in these axes, and whether |p| is still
+    beyond `error`.
     """
     load = maximum(sqrt(fma(one, one, other * other)) - larger, least)
     for _ in range(MOST_STEPS):

@@ -37,18 +37,8 @@ def factorise_closed(matrix: Any, stations: Any, closed: int, m: int) -> None:
 def solve_closed(matrix: Any, root: np.ndarray, stations: Any, fields: tuple, stiffness: Any) -> None:
     """Force of closed stations, and -c_e times the opening of open ones [N/m], from gaps.
 
-    Parameters
-    ----------
-    matrix : (m, 2 m) LaneArray or array
-        With its factor.
-    root : (m,) array
-        sqrt(h) [m^(1/2)].
-    stations : (m, ...) LaneArray or array
-        Of the contact.
-    fields : (4,) tuple of int
-        Where stations have the closed set, the gap, work space and the result.
-    stiffness : number
-        c_e [N/m^2].
+    Of `matrix` with its factor, `root` sqrt(h) (m,) [m^(1/2)] and `stiffness` c_e [N/m^2]. `fields` tells
+    where `stations` (m, ...) have the closed set, the gap, work space and the result.
     """
     closed, gap, y, push = fields
     m = root.size

@@ -56,56 +56,31 @@ _DIRECTION_ERROR = {np.dtype(np.float64): 1e-13, np.dtype(np.float32): 1e-6}  # 
 class Contact(NamedTuple):
     """The contact of one wrap of m stations, and the data that its solver keeps between calls.
 
-    Attributes
-    ----------
-    weight, cosine, sine, rise, upright : (m,) arrays
-        Length that a station stands for [m]; directions of the tilt; distance of the reference path from the
-        axis beyond the pitch radius [m], and its slope with the belt's displacement.
-    stations : (m, 11) LaneArray or array
-        Gap of the rigid bodies [m] (set by the caller), -c_e times the opening without f / c_e [N/m]; the
-        local kernel's diagonal and the entry beside it, factors, the tilt's response, work space, closed set
-        (1 or 0), and the force that the caller takes from it [N/m].
-    scalars : (1, 19) LaneArray or array
-        Constants of the wrap, the inverse of the tilt's 2x2 system, the round-off of forces [N/m]; linear
-        solves so far, and whether (1) a search for the closed set did not end. Of a collar with clearance:
-        c [m], the load from which on it bears [N], the error of its direction, the principal axis of L and
-        its eigenvalues [N], and the opening c p of the last solution [m].
-    fresh : (1,) bool array
-        False until the factors belong to the closed set.
-    root : (m,) or (0,) array
-        sqrt(h) [m^(1/2)] where the sheaves have a matrix of flexibilities, else empty.
-    matrix : (m, 2 m) or (0, 0) LaneArray or array
-        That matrix and its factor, as in `closed_set`; else empty.
-    discs : MovingDiscs
-        Modes with inertia; without any, as in plain numbers, discs follow at once.
-    has_clearance : bool
-        Whether any lane's collar has.
+    `stations` (m, 11) and `scalars` (1, 19) are LaneArrays or arrays of the fields above. Of stations: gap of
+    the rigid bodies [m] (set by the caller), -c_e times the opening without f / c_e [N/m]; the local kernel's
+    diagonal and the entry beside it, factors, the tilt's response, work space, closed set (1 or 0), and the
+    force that the caller takes from it [N/m]. Of scalars: constants of the wrap, the inverse of the tilt's
+    2x2 system, the round-off of forces [N/m]; linear solves so far, and whether (1) a search for the closed
+    set did not end. Of a collar with clearance: c [m], the load from which on it bears [N], the error of its
+    direction, the principal axis of L and its eigenvalues [N], and the opening c p of the last solution [m].
     """
 
-    weight: np.ndarray
-    cosine: np.ndarray
-    sine: np.ndarray
-    rise: np.ndarray
-    upright: np.ndarray
+    weight: np.ndarray  # length that a station stands for, (m,) [m]
+    cosine: np.ndarray  # of the tilt's directions, (m,)
+    sine: np.ndarray  # (m,)
+    rise: np.ndarray  # distance of the reference path from the axis beyond the pitch radius, (m,) [m]
+    upright: np.ndarray  # its slope with the belt's displacement, (m,)
     stations: Any
     scalars: Any
-    fresh: np.ndarray
-    root: np.ndarray
-    matrix: Any
-    discs: MovingDiscs
-    has_clearance: bool
+    fresh: np.ndarray  # (1,) bool: False until the factors belong to the closed set
+    root: np.ndarray  # sqrt(h) [m^(1/2)], (m,) where the sheaves have a matrix of flexibilities, else empty
+    matrix: Any  # LaneArray or array of that matrix and its factor, (m, 2 m), as in `closed_set`; else empty
+    discs: MovingDiscs  # modes with inertia; without any, as in plain numbers, discs follow at once
+    has_clearance: bool  # whether any lane's collar has
 
 
 def lane_contact(wraps: list[Sheaves], dtype: DTypeLike) -> Contact:
-    """All stations closed, for wraps of the same stations, one for each lane.
-
-    Parameters
-    ----------
-    wraps : list of Sheaves
-        One for each lane.
-    dtype : type
-        np.float64 or np.float32.
-    """
+    """All stations closed, for wraps of the same stations, one for each lane, in np.float64 or np.float32."""
     weight = wraps[0].weight
     stations = LaneArray(weight.size, 11, len(wraps), dtype)
     scalars = LaneArray(1, 19, len(wraps), dtype)
@@ -321,14 +296,10 @@ def _push_by_kernel(contact: Contact) -> None:
 
 @kernel
 def solve_contact(contact: Contact, most_rounds: int) -> None:
-    """Closed sets and pushes from the gaps; forces are the pushes of closed stations, where positive.
+    """Closed sets and pushes from GAP; forces are the pushes of closed stations, where positive.
 
-    Parameters
-    ----------
-    contact : Contact
-        With GAP set; the last closed set is where the search starts.
-    most_rounds : int
-        After that many the lanes whose search has not ended are marked UNSOLVED.
+    The search starts from the last closed set. After `most_rounds` the lanes whose search has not ended are
+    marked UNSOLVED.
     """
     stations, scalars = contact.stations, contact.scalars
     m = contact.weight.size
@@ -362,22 +333,11 @@ def contact_force(stations, j: int):
 
 @kernel
 def solve_wrap(contact: Contact, gap: np.ndarray, force: np.ndarray) -> int:
-    """Axial line forces of one wrap from the gaps of the rigid bodies, in plain numbers.
+    """Axial line forces f >= 0 of one wrap, into `force` (m,) [N/m], from the gaps of the rigid bodies.
 
-    Parameters
-    ----------
-    contact : Contact
-        Of plain arrays; the last closed set is where the search starts.
-    gap : (m,) array
-        G, negative where rigid bodies would overlap [m].
-    force : (m,) array
-        Result f >= 0 [N/m].
-
-    Returns
-    -------
-    int
-        Number of linear solves taken (1 where the set has not changed); 0 if the search did not end, which
-        happens for gaps that are not numbers only.
+    In plain numbers, from G in `gap` (m,) [m], negative where rigid bodies would overlap, and from the last
+    closed set on. Returns the number of linear solves taken (1 where the set has not changed); 0 if the
+    search did not end, which happens for gaps that are not numbers only.
     """
     stations, scalars, m = contact.stations, contact.scalars, gap.size
     for j in range(m):

@@ -15,39 +15,23 @@ ROUND_OFF = 1e-6  # of the largest entry: asymmetry left by tables of six digits
 def cone_flexibilities(
     angle: np.ndarray, distance: np.ndarray, stiffness: float, shift: float = 0.0
 ) -> np.ndarray:
-    """Flexibilities of a cone that tilts as a whole, the "sinus approach" (Bullinger et al. 2005, fig. 10).
+    """Flexibilities w (m, m) [m/N] of a cone that tilts as a whole, of rank two: the "sinus approach".
 
-    The axis of tilting is shifted from the centre towards the contact, here the middle of the arc; the paper
-    does not give the place along the arc where it takes the contact. Tilting about the axis across that opens
-    by r cos(phi) - dr, about the other by r sin(phi), phi from the middle.
-
-    Parameters
-    ----------
-    angle, distance : (m,) arrays
-        Place of the stations about the axis, from the middle of the arc [rad], and r [m].
-    stiffness : float
-        Of the cone against tilting, in series with that of its collar [N m/rad]; inf: rigid.
-    shift : float
-        dr [m].
-
-    Returns
-    -------
-    (m, m) array
-        w [m/N], of rank two.
+    (Bullinger et al. 2005, fig. 10.) The axis of tilting is shifted by `shift` dr [m] from the centre towards
+    the contact, here the middle of the arc; the paper does not give the place along the arc where it takes
+    the contact. Tilting about the axis across that opens by r cos(phi) - dr, about the other by r sin(phi),
+    with the stations' `angle` phi from the middle of the arc (m,) [rad] and `distance` r (m,) [m].
+    `stiffness` is that of the cone against tilting, in series with that of its collar [N m/rad]; inf: rigid.
     """
     levers = np.array([distance * np.cos(angle) - shift, distance * np.sin(angle)])
     return levers.T @ levers / stiffness
 
 
 def table_matrix(angles: Sequence[float], table: Sequence[Sequence[float]]) -> np.ndarray:
-    """Square matrix of a table of flexibilities.
+    """Square matrix (n, n) of a table of flexibilities w [m/N], of n rows of n or of one row of n.
 
-    Parameters
-    ----------
-    angles : sequence of n floats
-        Ascending angles from the inlet [rad], those before it negative; of a single row equidistant, from 0.
-    table : n rows of n floats, or one row of n
-        w [m/N] of each pair of angles, or of a body of revolution over the angle between both.
+    Its n angles [rad] ascend from the inlet, those before it negative. A single row is that of a body of
+    revolution over the angle between two places; its angles are equidistant, from 0.
     """
     values = np.array(table, dtype=float)
     if len(values) > 1:
@@ -59,25 +43,13 @@ def table_matrix(angles: Sequence[float], table: Sequence[Sequence[float]]) -> n
 def interpolated(
     angles: Sequence[float], table: Sequence[Sequence[float]], places: np.ndarray, wrap: float
 ) -> np.ndarray:
-    """Flexibilities of a wrap from a table: forces go to the knots beside them, openings come from there.
+    """Flexibilities w of a wrap (m, m) [m/N] from a table as of `table_matrix`.
 
-    So w stays symmetric and positive semi-definite on any mesh. Where knots are stations it is the table's.
-    Stations beyond the first and the last angle have their flexibilities. A single row that is longer than
-    the wrap reaches as far beyond the inlet as beyond the outlet.
-
-    Parameters
-    ----------
-    angles, table : sequences
-        As of `table_matrix`.
-    places : (m,) array
-        Angles of the stations from the inlet [rad].
-    wrap : float
-        Angle of the wrap [rad].
-
-    Returns
-    -------
-    (m, m) array
-        w [m/N].
+    Forces go to the knots beside them, openings come from there. So w stays symmetric and positive
+    semi-definite on any mesh. Where knots are stations it is the table's. Stations beyond the first and the
+    last angle have their flexibilities. A single row that is longer than the wrap reaches as far beyond the
+    inlet as beyond the outlet. `places` (m,) are the stations' angles from the inlet and `wrap` that of the
+    wrap [rad].
     """
     before = 0.5 * (angles[-1] - wrap) if len(table) == 1 else 0.0
     shares = np.array([np.interp(places + before, angles, unit) for unit in np.eye(len(angles))])
@@ -88,15 +60,7 @@ def interpolated(
 def table_problem(
     angles: Sequence[float], table: Sequence[Sequence[float]], wrap: float
 ) -> tuple[str, str] | None:
-    """Error in a table of flexibilities: expected and found; None if there is none.
-
-    Parameters
-    ----------
-    angles, table : sequences
-        As of `table_matrix`.
-    wrap : float
-        Angle of the wrap [rad], which the table has to cover.
-    """
+    """Error in a table, as of `table_matrix`, for a wrap [rad]: expected and found; None if there is none."""
     n, steps = len(angles), np.diff(angles)
     if n < 2 or {len(row) for row in table} != {n} or len(table) not in (1, n):
         rows = " x ".join(str(size) for size in (len(table), len(table[0]) if table else 0))

@@ -10,19 +10,10 @@ LEAST_SHARE = 3e-8
 
 @merged_kernel
 def flank_sliding(v_radial, v_tangential, per_cosine):
-    """Sliding speed in the plane of the flank and the part of it along the meridian.
+    """Sliding speed |v| in the plane of the flank, and the part of it along the meridian [m/s].
 
-    Parameters
-    ----------
-    v_radial, v_tangential
-        Speed of the element against the sheave, radial and along the belt [m/s].
-    per_cosine
-        1 / cosine of the half wedge angle: the flank is inclined, its meridian speed is v_radial times that.
-
-    Returns
-    -------
-    speed, meridian
-        |v| and v_meridian [m/s].
+    From the speed of the element against the sheave, radial and along the belt [m/s]. The flank is inclined:
+    its meridian speed is v_radial times `per_cosine`, 1 / cosine of the half wedge angle.
     """
     meridian = v_radial * per_cosine
     return sqrt(fma(meridian, meridian, v_tangential * v_tangential)), meridian
@@ -32,14 +23,8 @@ def flank_sliding(v_radial, v_tangential, per_cosine):
 def flank_shares(mu, climb, sine, cosine):
     """Axial and radial force of a flank over its normal force (Bullinger et al. 2005, eqs 37-38).
 
-    Parameters
-    ----------
-    mu
-        Coefficient of friction, with its regularisation [1].
-    climb
-        Share of the meridian in the sliding speed [1].
-    sine, cosine
-        Of the half wedge angle.
+    From the coefficient of friction `mu` [1], with its regularisation, the share `climb` of the meridian in
+    the sliding speed [1], and sine and cosine of the half wedge angle.
     """
     upward = mu * climb
     return fma(upward, sine, cosine), fma(-upward, cosine, sine)
@@ -55,25 +40,11 @@ def flank_forces(
     v_radial: float,
     v_tangential: float,
 ) -> tuple[float, float]:
-    """Line forces of both flanks on the belt (Bullinger et al. 2005, eqs 37-39).
+    """Line forces of both flanks on the belt, outward and along it [N/m] (Bullinger et al. 2005, eqs 37-39).
 
-    Parameters
-    ----------
-    coefficient : float
-        Friction law's value, without regularisation [1].
-    width : float
-        Regularisation speed [m/s].
-    sine, cosine : float
-        Of the half wedge angle.
-    axial : float
-        Axial line force f_ax of one flank, >= 0 [N/m].
-    v_radial, v_tangential : float
-        Speed of the element against the sheave [m/s].
-
-    Returns
-    -------
-    radial, tangential : float
-        Forces of both flanks, outward and along the belt [N/m].
+    From the friction law's `coefficient`, without regularisation [1], the regularisation speed `width` [m/s],
+    sine and cosine of the half wedge angle, the axial line force of one flank `axial` >= 0 [N/m], and the
+    speed of the element against the sheave, radial and along the belt [m/s].
     """
     speed, meridian = flank_sliding(v_radial, v_tangential, 1.0 / cosine)
     speed = maximum(speed, LEAST_SHARE * width)
@@ -88,13 +59,7 @@ def flank_forces(
 def tangential_sliding(v_element, w, turning, surface):
     """Speed of an element against the sheave along the belt [m/s].
 
-    Parameters
-    ----------
-    v_element
-        Element's speed less the belt speed [m/s].
-    w
-        Its displacement [m].
-    turning, surface
-        Pulley's speed [rad/s] and that of its surface at the pitch radius, less the belt speed [m/s].
+    From the element's speed less the belt speed [m/s], its displacement `w` [m], the pulley's speed `turning`
+    [rad/s] and that of its `surface` at the pitch radius, less the belt speed [m/s].
     """
     return v_element - fma(turning, w, surface)

@@ -42,33 +42,15 @@ _ROOT_3 = 1.7320508075688772
 
 
 class FrictionLaw(NamedTuple):
-    """A law with its coefficients, as kernels take it.
+    """A law with its coefficients, as kernels take it."""
 
-    Attributes
-    ----------
-    kind : int
-        One of `Law`.
-    kinetic : float
-        mu_k [1].
-    gradient : float
-        dmu/dv at v -> 0+ [s/m].
-    speed : float
-        v_s [m/s].
-    table_force : (nf,) array
-        Normal line forces of the table, ascending [N/m].
-    table_speed : (nv,) array
-        Speeds of the table, ascending [m/s].
-    table_mu : (nf, nv) array
-        Coefficients [1].
-    """
-
-    kind: int
-    kinetic: float
-    gradient: float
-    speed: float
-    table_force: np.ndarray
-    table_speed: np.ndarray
-    table_mu: np.ndarray
+    kind: int  # one of `Law`
+    kinetic: float  # mu_k [1]
+    gradient: float  # dmu/dv at v -> 0+ [s/m]
+    speed: float  # v_s [m/s]
+    table_force: np.ndarray  # normal line forces of the table, (nf,), ascending [N/m]
+    table_speed: np.ndarray  # speeds of the table, (nv,), ascending [m/s]
+    table_mu: np.ndarray  # coefficients, (nf, nv) [1]
 
 
 def friction_law(
@@ -80,26 +62,9 @@ def friction_law(
     table_speed: np.ndarray | tuple = (),
     table_mu: np.ndarray | tuple = (),
 ) -> FrictionLaw:
-    """Build a law from its name and coefficients.
+    """Build a law from the name of a `Law`, in lower case, and coefficients as of `FrictionLaw`.
 
-    Parameters
-    ----------
-    kind : str
-        Name of a `Law`, in lower case.
-    kinetic, gradient, speed : float
-        mu_k [1], friction gradient [s/m], v_s [m/s].
-    table_force, table_speed, table_mu : array_like, shapes (nf,), (nv,), (nf, nv)
-        The table [N/m], [m/s], [1]; read by the law `table` only.
-
-    Returns
-    -------
-    FrictionLaw
-        Ready for `friction_coefficient`.
-
-    Raises
-    ------
-    ValueError
-        If there is no such law.
+    The table is read by the law `table` only. ValueError if there is no such law.
     """
     if kind not in FRICTION_LAWS:
         raise ValueError(f"friction law: expected one of {', '.join(FRICTION_LAWS)}; found {kind}")
@@ -214,21 +179,10 @@ def law_numbers(kinetic, gradient, scale):
 
 @merged_kernel
 def formula_coefficient(kind: int, numbers, speed):
-    """Coefficient of friction in steady sliding by a law that is a formula, and its slope.
+    """Coefficient of friction in steady sliding by a formula [1], and its slope dmu/dspeed [s/m].
 
-    Parameters
-    ----------
-    kind : int
-        One of `Law`, the same in all lanes; not a number comes of any other.
-    numbers
-        The numbers of the law by `law_numbers`.
-    speed
-        Sliding speed, >= 0 [m/s]; lanes or a plain number.
-
-    Returns
-    -------
-    mu, slope
-        Coefficient [1] and dmu/dspeed [s/m].
+    `kind` is one of `Law`, the same in all lanes; not a number comes of any other. `numbers` are those of
+    `law_numbers`, `speed` is that of sliding, >= 0 [m/s]: lanes or a plain number.
     """
     found = _formula(kind, numbers, speed)
     return found
@@ -266,23 +220,9 @@ def table_coefficient(table: tuple[np.ndarray, np.ndarray, np.ndarray], speed, f
 
 @merged_kernel
 def friction_coefficient(law: FrictionLaw, speed: float, force: float) -> tuple[float, float]:
-    """Coefficient of friction in steady sliding and its slope.
+    """Coefficient of friction in steady sliding [1] and its slope dmu/dspeed [s/m].
 
-    Parameters
-    ----------
-    law : FrictionLaw
-        The law.
-    speed : float
-        Sliding speed, >= 0 [m/s].
-    force : float
-        Normal line force [N/m]; only a table reads it.
-
-    Returns
-    -------
-    mu : float
-        Coefficient [1].
-    slope : float
-        dmu/dspeed [s/m].
+    At a sliding speed >= 0 [m/s], under a normal line force [N/m], which only a table reads.
     """
     if law.kind == Law.TABLE:
         found = table_coefficient((law.table_force, law.table_speed, law.table_mu), speed, force)
@@ -309,19 +249,9 @@ def friction_coefficients(law: FrictionLaw, speeds: np.ndarray, forces: np.ndarr
 
 @merged_kernel
 def saturation(speed, per_width):
-    """Regularisation of Coulomb friction about zero speed: tanh(speed / v_reg) and its slope.
+    """Regularisation of Coulomb friction about zero speed: tanh(speed / v_reg) [1] and its slope [s/m].
 
-    Parameters
-    ----------
-    speed
-        Sliding speed, any sign [m/s]; lanes or a plain number.
-    per_width
-        1 / v_reg, > 0 [s/m].
-
-    Returns
-    -------
-    factor, slope
-        tanh(speed / v_reg) [1] and its derivative [s/m].
+    Of lanes or of plain numbers: sliding speed of any sign [m/s], `per_width` 1 / v_reg > 0 [s/m].
     """
     # tanh by one exponential: a third of the cost of the library's
     left = decay(absolute(speed) * (2.0 * per_width))

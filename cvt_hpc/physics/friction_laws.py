@@ -1,9 +1,8 @@
 """The friction laws: their names, the parameters that each reads, and the checks of these.
 
 A law is declared by an entry in `Law`; its formula, by which this file cannot be read without a compiler,
-goes into `friction`, whose import fails where one is missing.
-
-`friction_file` reads a table of a coefficient for each pair of normal force and sliding speed.
+goes into `friction`, whose import fails where one is missing. `friction_file` reads a table of a coefficient
+for each pair of normal force and sliding speed. Parameters are values by name [SI]; those of the law count.
 """
 
 from collections.abc import Callable, Mapping
@@ -73,20 +72,11 @@ def _of_table(p: Parameters) -> float:
 
 
 class Law(IntEnum):
-    """The laws, as kernels know them, each with its declaration.
+    """The laws, as kernels know them, each with its declaration."""
 
-    Attributes
-    ----------
-    reads : tuple of str
-        The parameters that the law reads.
-    problems : callable
-        Finds its problems in parameters by name.
-    largest : callable
-        Parameters by name -> the largest coefficient [1], which is that of v -> 0+ but for a table.
-    """
-
-    reads: tuple[str, ...]
-    problems: Callable[[Parameters], Problems]
+    reads: tuple[str, ...]  # the parameters that the law reads
+    problems: Callable[[Parameters], Problems]  # finds its problems in parameters
+    # largest coefficient [1] by parameters: that of v -> 0+ but for a table
     largest: Callable[[Parameters], float]
 
     def __new__(
@@ -113,24 +103,12 @@ FRICTION_LAWS = tuple(law.name.lower() for law in Law)  # as a job names them
 
 
 def friction_problems(parameters: Parameters) -> Problems:
-    """Problems of a friction law: (key, expected, found).
-
-    Parameters
-    ----------
-    parameters : mapping
-        Values by name [SI]; those of the law count.
-    """
+    """Problems of a friction law: (key, expected, found)."""
     return _declared(parameters).problems(parameters)
 
 
 def friction_inert(parameters: Parameters) -> dict[str, str]:
-    """Parameters of a friction law without effect, each with the setting that makes it so.
-
-    Parameters
-    ----------
-    parameters : mapping
-        Values by name [SI]; those of the law count.
-    """
+    """Parameters of a friction law without effect, each with the setting that makes it so."""
     reads, setting = _declared(parameters).reads, f"friction_law {parameters['friction_law']}"
     inert = {key: setting for key in _ALL_PARAMETERS if key not in reads}
     if parameters["friction_gradient"] == 0.0:
@@ -139,13 +117,7 @@ def friction_inert(parameters: Parameters) -> dict[str, str]:
 
 
 def largest_friction(parameters: Parameters) -> float:
-    """Largest coefficient of a friction law without problems, at any speed and force [1].
-
-    Parameters
-    ----------
-    parameters : mapping
-        Values by name [SI]; those of the law count.
-    """
+    """Largest coefficient of a friction law without problems, at any speed and force [1]."""
     return _declared(parameters).largest(parameters)
 
 
@@ -156,12 +128,9 @@ def _declared(parameters: Parameters) -> Law:
 def friction_file(force_unit: str) -> Parameter:
     """Return the parameter that names the file of a friction table.
 
-    Parameters
-    ----------
-    force_unit : str
-        Of the normal forces of the table [N/m, or N for a single contact]. Where it is N/m the file may have
-        the normal force of an element [N] instead, together with `element_pitch` [m]: the line force is the
-        former over the latter.
+    `force_unit` is that of the table's normal forces: N/m, or N for a single contact. Where it is N/m the
+    file may have the normal force of an element [N] instead, together with `element_pitch` [m]: the line
+    force is the former over the latter.
     """
     per_length = force_unit == "N/m"
     columns = {"force": ("N/m", "N") if per_length else ("N",), "speed": ("m/s",), "mu": ("",)}

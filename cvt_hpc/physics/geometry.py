@@ -11,23 +11,13 @@ from cvt_hpc.parameters import Parameters
 
 @dataclass(frozen=True)
 class Variator:
-    """The reference path: driving arc, strand t1, driven arc, strand t2, in the belt's direction of travel.
+    """The reference path, as the belt travels: driving arc, strand t1, driven arc, strand t2."""
 
-    Attributes
-    ----------
-    driving_radius, driven_radius : float
-        Pitch radii [m].
-    driving_wrap, driven_wrap : float
-        Wrap angles [rad].
-    strand_length : float
-        Length of each free strand [m].
-    """
-
-    driving_radius: float
-    driven_radius: float
-    driving_wrap: float
-    driven_wrap: float
-    strand_length: float
+    driving_radius: float  # pitch radius [m]
+    driven_radius: float  # pitch radius [m]
+    driving_wrap: float  # wrap angle [rad]
+    driven_wrap: float  # wrap angle [rad]
+    strand_length: float  # of each free strand [m]
 
     @property
     def lengths(self) -> tuple[float, float, float, float]:
@@ -42,26 +32,11 @@ class Variator:
 
 
 def variator(ratio: float, driven_radius: float, centre_distance: float) -> Variator:
-    """Geometry from the speed ratio.
+    """Geometry from the speed ratio i = omega_driving / omega_driven = driven radius / driving radius [1].
 
-    Parameters
-    ----------
-    ratio : float
-        Speed ratio i = omega_driving / omega_driven = driven radius / driving radius [1].
-    driven_radius : float
-        Pitch radius of the belt on the driven pulley [m].
-    centre_distance : float
-        Distance of the shafts [m].
-
-    Returns
-    -------
-    Variator
-        With sin(psi) = (r_dn - r_dr) / a, wraps pi -/+ 2 psi and strands a cos(psi).
-
-    Raises
-    ------
-    ValueError
-        If the pulleys' pitch circles overlap.
+    With the pitch radius of the belt on the driven pulley and the distance a of the shafts [m], sin(psi) =
+    (r_dn - r_dr) / a, wraps are pi -/+ 2 psi and strands a cos(psi). ValueError if the pulleys' pitch circles
+    overlap.
     """
     driving_radius = driven_radius / ratio
     if driving_radius + driven_radius >= centre_distance:
@@ -77,34 +52,16 @@ def variator(ratio: float, driven_radius: float, centre_distance: float) -> Vari
 
 
 def driven_radius(ratio: float, belt_length: float, centre_distance: float) -> float:
-    """Pitch radius on the driven pulley at which a belt of given length closes.
+    """Pitch radius on the driven pulley [m] at which a belt of given length on its pitch line closes.
 
-    The length of the closed path grows with the driving radius r; i is the ratio, a the centre distance:
+    The length of the closed path grows with the driving radius r; i is the ratio, a the centre distance [m]:
 
         L(r) = r (pi - 2 psi) + i r (pi + 2 psi) + 2 a cos(psi),    sin(psi) = (i - 1) r / a,
         dL/dr = (pi - 2 psi) + i (pi + 2 psi) > 0.
 
     L is convex, too. Newton's iteration from the largest radius, at which the pitch circles touch, therefore
     comes down to the root without overshooting it, and ends where rounding lets it descend no further.
-
-    Parameters
-    ----------
-    ratio : float
-        Speed ratio i = driven radius / driving radius [1].
-    belt_length : float
-        Length of the closed pitch line [m].
-    centre_distance : float
-        Distance of the shafts [m].
-
-    Returns
-    -------
-    float
-        [m]
-
-    Raises
-    ------
-    ValueError
-        If no pulleys fit; the text states the possible lengths.
+    ValueError if no pulleys fit; the text states the possible lengths.
     """
 
     def residual_and_slope(radius: float) -> tuple[float, float]:
@@ -131,25 +88,12 @@ REFINED_WAY = 0.05
 
 
 def cut_path(path: Variator, cells: int, refinement: float = 1.0) -> tuple[np.ndarray, ...]:
-    """Cut each region of a path into cells that are the shorter the nearer they are to its ends.
+    """Cut each region of a path into cells, by region their lengths [m]: the shorter the nearer to its ends.
 
     The number of cells per length is 1 + (r - 1) / (1 + (x / l)^2) for each end of the region, x from there,
-    times what gives their number; l = REFINED_WAY of the centre distance. Each region has four cells or more;
-    the driven arc takes what rounding leaves.
-
-    Parameters
-    ----------
-    path : Variator
-        The path.
-    cells : int
-        Their number, all around.
-    refinement : float
-        r: how many times as many cells a length has at the tangent points as far from them; 1: even cells.
-
-    Returns
-    -------
-    tuple of four arrays
-        Lengths of the cells [m], by region.
+    times what gives their number `cells` all around; l = REFINED_WAY of the centre distance. A length has r =
+    `refinement` times as many cells at the tangent points as far from them; 1: even cells. Each region has
+    four cells or more; the driven arc takes what rounding leaves.
     """
     centre_distance = math.hypot(path.strand_length, path.driven_radius - path.driving_radius)
     way = REFINED_WAY * centre_distance
@@ -171,13 +115,7 @@ def cut_path(path: Variator, cells: int, refinement: float = 1.0) -> tuple[np.nd
 
 
 def variator_problems(parameters: Parameters) -> list[tuple[str, str, str]]:
-    """Problems of a variator's geometry, in the form of a model's check: (key, expected, found).
-
-    Parameters
-    ----------
-    parameters : mapping
-        Values by name [SI]; those that `variator` takes count.
-    """
+    """Problems of a variator's geometry, (key, expected, found), by the values [SI] of `variator`."""
     p = parameters
     try:
         variator(p["ratio"], p["driven_radius"], p["centre_distance"])

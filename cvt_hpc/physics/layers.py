@@ -19,14 +19,8 @@ def stack_forces(inward: np.ndarray, normal: np.ndarray) -> None:
 
     Equilibrium of each layer is N_k - N_k+1 = g_k with N >= 0. Below the layer where the sum of g from the
     saddle on is largest all layers press inward, above it outward: N_k is that sum less the sum below surface
-    k, and where every layer presses inward the sum of g from layer k outward.
-
-    Parameters
-    ----------
-    inward : (n,) array
-        g_k of the layers, innermost first [N/m].
-    normal : (n + 1,) array
-        Result: saddle, between layers, ears [N/m].
+    k, and where every layer presses inward the sum of g from layer k outward. `inward` is g_k (n,), innermost
+    first; the result goes into `normal` (n + 1,): saddle, between layers, ears [N/m].
     """
     below = largest = 0.0
     for k in range(inward.size):
@@ -39,27 +33,15 @@ def stack_forces(inward: np.ndarray, normal: np.ndarray) -> None:
 
 @merged_kernel
 def ring_friction(speed, kinetic, falls, static_excess, per_stribeck, per_width, least):
-    """Friction coefficient of the rings by the size of their sliding: its secant and its slope.
+    """Friction coefficient of the rings by the size of their sliding: its secant and its slope [s/m].
 
-    mu = mu_k (1 + (mu_s / mu_k - 1) exp(-|v| / v_st)) tanh(|v| / v_reg)
+        mu = mu_k (1 + (mu_s / mu_k - 1) exp(-|v| / v_st)) tanh(|v| / v_reg)
 
-    Parameters
-    ----------
-    speed
-        Sliding speed, any sign [m/s]; lanes or a plain number, as all parameters that follow but `falls`.
-    kinetic, static_excess
-        mu_k, or that times a normal force, which then is in the results, and mu_s / mu_k - 1.
-    falls : bool
-        Whether mu_s is larger than mu_k anywhere.
-    per_stribeck, per_width
-        1 / v_st, 1 / v_reg [s/m].
-    least
-        Sliding speed below which friction is linear, 1e-3 v_reg and less [m/s].
-
-    Returns
-    -------
-    secant, slope
-        mu / |v|, and the derivative of mu by the tanh alone, which is not negative [s/m].
+    The secant is mu / |v|, the slope the derivative of mu by the tanh alone, which is not negative. All
+    arguments but `falls` are lanes or plain numbers: the sliding speed, of any sign [m/s]; mu_k, or that
+    times a normal force, which then is in the results; whether mu_s is larger than mu_k anywhere; mu_s / mu_k
+    - 1; 1 / v_st and 1 / v_reg [s/m]; the sliding speed below which friction is linear, 1e-3 v_reg and less
+    [m/s].
     """
     size = maximum(absolute(speed), least)
     level = kinetic

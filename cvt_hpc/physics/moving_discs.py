@@ -14,33 +14,18 @@ PLACE, SPEED, AHEAD, GIVES, PER_MASS, DRAG, SQUARE, PLACE_SHARE, SPEED_SHARE, PE
 
 
 class MovingDiscs(NamedTuple):
-    """Modes in lanes.
-
-    Attributes
-    ----------
-    shapes, harmonics, place : arrays
-        As of `Modes`.
-    states : (2 M, 10) LaneArray of doubles
-        PLACE and so on of the cosine and of the sine of each mode.
-    """
+    """Modes in lanes: shapes, harmonics and place as of `Modes`."""
 
     shapes: np.ndarray
     harmonics: np.ndarray
     place: np.ndarray
-    states: Any
+    states: Any  # (2 M, 10) LaneArray of doubles: PLACE and so on of the cosine and of the sine of each mode
 
 
 def lane_discs(wraps: list[Modes], compliances: list[float], dtype: Any) -> MovingDiscs:
     """Modes of several runs with the same modes, one in each lane, at rest without force.
 
-    Parameters
-    ----------
-    wraps : list of Modes
-        One for each lane.
-    compliances : list of float
-        Multiple of the reference compliance of each; 0: rigid.
-    dtype : type
-        Of shapes.
+    The compliance of each is a multiple of the reference compliance; 0: rigid. Shapes are of `dtype`.
     """
     first = wraps[0]
     states = LaneArray(2 * first.place.size, 10, len(wraps))
@@ -105,18 +90,8 @@ def turn_discs(
 ) -> None:
     """Take modes to the state under the last forces, turn it with the disc, and look a step ahead.
 
-    Parameters
-    ----------
-    discs : MovingDiscs
-        States, which advance.
-    weight : (m,) array
-        Length that a station stands for [m].
-    stations, forced
-        Of the contact, and the field of its axial line forces [N/m].
-    turning
-        Speed of the pulley [rad/s].
-    step : float
-        Time step [s].
+    The forces are field `forced` of the contact's stations, axial line forces [N/m], each over the length
+    `weight` (m,) [m]; `turning` is the speed of the pulley [rad/s], `step` the time step [s].
     """
     modes, count, states = discs.place.size, discs.harmonics.size, discs.states
     for h in range(count):

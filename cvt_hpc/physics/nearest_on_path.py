@@ -9,36 +9,20 @@ from cvt_hpc.physics.belt_path import BeltPath, directions, span_starts
 
 
 class Way(NamedTuple):
-    """A path as kernels take it, P circles.
+    """A path as kernels take it, P circles; radius, turn, angle, wrap and spans are those of `BeltPath`."""
 
-    Attributes
-    ----------
-    centre, start : (P, 2) arrays
-        Of the circles, and of the spans that leave them [m].
-    radius, turn, angle, wrap, spans : (P,) arrays
-        As those of `BeltPath`.
-    onto, off : (P, 2) arrays
-        Running directions where the belt runs on, and of the spans.
-    begins : (P, 2) array
-        Path coordinates where arcs and spans begin [m].
-    length : float
-        Of the whole path [m].
-    aside : float
-        What it counts to run across the path [m^2].
-    """
-
-    centre: np.ndarray
-    start: np.ndarray
+    centre: np.ndarray  # of the circles, (P, 2) [m]
+    start: np.ndarray  # of the spans that leave them, (P, 2) [m]
     radius: np.ndarray
     turn: np.ndarray
     angle: np.ndarray
     wrap: np.ndarray
     spans: np.ndarray
-    onto: np.ndarray
-    off: np.ndarray
-    begins: np.ndarray
-    length: float
-    aside: float
+    onto: np.ndarray  # running directions where the belt runs on, (P, 2)
+    off: np.ndarray  # running directions of the spans, (P, 2)
+    begins: np.ndarray  # path coordinates where arcs and spans begin, (P, 2) [m]
+    length: float  # of the whole path [m]
+    aside: float  # what it counts to run across the path [m^2]
 
 
 def way(path: BeltPath) -> Way:
@@ -87,24 +71,11 @@ def nearest(way: Way, x: float, y: float, along_x: float, along_y: float) -> tup
 
 
 def along(path: BeltPath, points: np.ndarray, running: np.ndarray) -> tuple[np.ndarray, np.ndarray]:
-    """Path coordinates of points near a path, and their distances from it.
+    """Path coordinates (n,) [m] of points near a path, below its length, and distances to its right (n,) [m].
 
-    Of two places of the path that are equally near, as where a belt crosses itself, the one counts at which
-    the belt runs in the direction of the point.
-
-    Parameters
-    ----------
-    path : BeltPath
-        The path.
-    points, running : (n, 2) arrays
-        [m]; of any length, in which the belt runs there.
-
-    Returns
-    -------
-    position : (n,) array
-        Less than the path's length [m].
-    offset : (n,) array
-        To the right of the running direction [m].
+    Of two places of the path that are equally near to one of the `points` (n, 2) [m], as where a belt crosses
+    itself, the one counts at which the belt runs in the direction of the point, `running` (n, 2), of any
+    length.
     """
     position, offset = np.empty((2, len(points)))
     _along(way(path), np.array(points, float), np.array(running, float), position, offset)

@@ -21,26 +21,16 @@ SIDES = {"left": -1, "right": 1, "both": 0}
 def axial_offset(parameters: Parameters, aligned_ratio: float) -> float:
     """Axial offset of the driven pulley's mid plane from the driving one's [m], towards the right.
 
-    Of each pulley one sheave alone moves, on the side s_l (1: right), so that its mid plane goes along:
-    C = -s_l tan d0 (R - R_1), R_1 being the radius at which the pulleys are aligned. With the loose sheaves
-    on opposite sides, right at the driving pulley, that is
+    Of each pulley one sheave alone moves, on the side s_l (1: right), so that its mid plane goes along: C =
+    -s_l tan d0 (R - R_1), R_1 being the radius at which the pulleys are aligned. With the loose sheaves on
+    opposite sides, right at the driving pulley, that is
 
         e = tan d0 [(R_dr - R_dr1) + (R_dn - R_dn1)],  about -tan d0 (R_dn - R_dr)^2 / (pi a)
 
-    of a variator aligned at 1, since the belt's length is constant.
-
-    Parameters
-    ----------
-    parameters : mapping
-        `ratio`, `driven_radius`, `centre_distance`, `half_wedge_angle` [SI], and `driving_loose_side` and
-        `driven_loose_side`, of SIDES.
-    aligned_ratio : float
-        The ratio without offset.
-
-    Raises
-    ------
-    ValueError
-        If the belt does not close at that ratio.
+    of a variator aligned at 1, since the belt's length is constant. Of the parameters `ratio`,
+    `driven_radius`, `centre_distance` and `half_wedge_angle` [SI] count, and `driving_loose_side` and
+    `driven_loose_side`, of SIDES; `aligned_ratio` is the ratio without offset. ValueError if the belt does
+    not close at that ratio.
     """
     p = parameters
     path = variator(p["ratio"], p["driven_radius"], p["centre_distance"])
@@ -66,16 +56,8 @@ def clamped_force(
     """Lateral force of a strand whose ends are offset and held without slope [N].
 
     V = (1 + T / kGA) e / l / (1 / kGA + (1 - tanh(u) / u) / T), u^2 = l^2 T / (4 EI (1 + T / kGA)); without
-    shear T e / l / (1 - tanh(u) / u), without tension either 12 EI e / l^3, and of a string T e / l.
-
-    Parameters
-    ----------
-    offset, length : float
-        e and l [m].
-    tension : float
-        Not negative [N].
-    bending_stiffness, shear_stiffness : float
-        EI, above 0 [N m^2]; kGA [N].
+    shear T e / l / (1 - tanh(u) / u), without tension either 12 EI e / l^3, and of a string T e / l. Offset e
+    and length l [m], tension T >= 0 [N], EI > 0 [N m^2], kGA [N].
     """
     stretched = 1.0 + tension / shear_stiffness
     soft = 0.25 * length**2 / (bending_stiffness * stretched)  # u^2 / T
@@ -105,18 +87,10 @@ def pinned_frequencies(
     line_mass: float,
     shear_stiffness: float = math.inf,
 ) -> np.ndarray:
-    """Lateral eigenfrequencies of a strand that ends can turn, (count,) [Hz].
+    """Lateral eigenfrequencies of a strand that ends can turn, from the lowest mode on, (count,) [Hz].
 
     f_n = k / (2 pi) sqrt((T + EI k^2 / (1 + EI k^2 / kGA)) / m'), k = n pi / l; without inertia of rotation.
-
-    Parameters
-    ----------
-    count : int
-        From the lowest mode on.
-    length, tension, bending_stiffness, line_mass : float
-        [m], [N], [N m^2], [kg/m].
-    shear_stiffness : float
-        kGA [N].
+    Length l [m], tension T [N], EI [N m^2], line mass m' [kg/m], kGA [N].
     """
     k = np.arange(1, count + 1) * math.pi / length
     bending = bending_stiffness * k**2
@@ -160,11 +134,7 @@ def clamped_frequency(
 def buckling_push(length: float, tension: float, bending_stiffness: float, clamped: bool = False) -> float:
     """Push force under which a strand buckles sideways: T + EI (pi / l)^2, or T + 4 EI (pi / l)^2 [N].
 
-    Parameters
-    ----------
-    length, tension, bending_stiffness : float
-        [m], of the rings [N], [N m^2].
-    clamped : bool
-        Whether its ends are held without slope; else they can turn.
+    The latter with `clamped` ends, held without slope; else they can turn. Length l [m], tension T of the
+    rings [N], EI [N m^2].
     """
     return tension + (4.0 if clamped else 1.0) * bending_stiffness * (math.pi / length) ** 2

@@ -20,29 +20,15 @@ import numpy as np
 
 
 class Modes(NamedTuple):
-    """Modes of the discs of one wrap that have inertia.
+    """Modes of the discs of one wrap that have inertia: M, of H harmonics, at m stations."""
 
-    Attributes
-    ----------
-    shapes : (2 H, m) array
-        Cosines, then sines, of H harmonics at m stations, with the factor above.
-    harmonics : (H,) array
-        Their n.
-    place : (M,) int array
-        Harmonic of each mode.
-    flexibility, pace : (M,) arrays
-        c [m/N] and omega [rad/s] of discs of the reference stiffness.
-    damping, step : float
-        zeta [1] and the time step [s].
-    """
-
-    shapes: np.ndarray
-    harmonics: np.ndarray
-    place: np.ndarray
-    flexibility: np.ndarray
-    pace: np.ndarray
-    damping: float
-    step: float
+    shapes: np.ndarray  # cosines, then sines, of the harmonics, (2 H, m), with the factor above
+    harmonics: np.ndarray  # their n, (H,)
+    place: np.ndarray  # harmonic of each mode, (M,) int
+    flexibility: np.ndarray  # c of discs of the reference stiffness, (M,) [m/N]
+    pace: np.ndarray  # omega of these discs, (M,) [rad/s]
+    damping: float  # zeta [1]
+    step: float  # time step [s]
 
 
 _NONE = np.empty(0)
@@ -52,12 +38,8 @@ NO_MODES = Modes(np.empty((0, 0)), _NONE, np.empty(0, dtype=np.int64), _NONE, _N
 def shapes(harmonics: np.ndarray, angle: np.ndarray, width: np.ndarray) -> np.ndarray:
     """Cosines, then sines, of harmonics at stations, spread to their neighbours, (2 H, m).
 
-    Parameters
-    ----------
-    harmonics : (H,) array
-        Waves around the disc.
-    angle, width : (m,) arrays
-        Place of the stations about the axis, and the angle that each stands for [rad].
+    `harmonics` (H,) are waves around the disc, `angle` (m,) is the stations' place about the axis and `width`
+    (m,) the angle that each stands for [rad].
     """
     spread = np.sinc(0.5 * harmonics[:, None] * width / np.pi) ** 2
     turned = harmonics[:, None] * angle
@@ -67,14 +49,9 @@ def shapes(harmonics: np.ndarray, angle: np.ndarray, width: np.ndarray) -> np.nd
 def modal_flexibilities(
     harmonic: np.ndarray, flexibility: np.ndarray, angle: np.ndarray, width: np.ndarray
 ) -> np.ndarray:
-    """Flexibilities w_ij [m/N] of modes at rest, (m, m).
+    """Flexibilities w_ij (m, m) [m/N] at rest of modes of harmonics (M,) and c (M,) [m/N], at m stations.
 
-    Parameters
-    ----------
-    harmonic, flexibility : (M,) arrays
-        n and c [m/N].
-    angle, width : (m,) arrays
-        As of `shapes`.
+    Angle and width as of `shapes`.
     """
     forms = shapes(np.asarray(harmonic, float), angle, width)
     return (forms * np.tile(flexibility, 2)[:, None]).T @ forms
@@ -89,14 +66,8 @@ def moving_modes(
 ) -> Modes:
     """Return the modes of a table that have inertia: frequencies up to `limit` [Hz].
 
-    Parameters
-    ----------
-    table : three (K,) arrays
-        Harmonic, flexibility and mass; 0: none.
-    limit, damping, step : float
-        Limit frequency [Hz], zeta [1], time step [s].
-    wrap : pair of (m,) arrays
-        Angle and width of the stations, as of `shapes`.
+    The table holds harmonic, flexibility and mass, each (K,), without inertia where the mass is 0; `damping`
+    is zeta [1], `step` the time step [s], and `wrap` angle and width of the stations as of `shapes`.
     """
     harmonic, flexibility, mass = (np.asarray(values, float) for values in table)
     squares = flexibility * mass * (2.0 * np.pi * limit) ** 2

@@ -25,27 +25,13 @@ from cvt_hpc.physics.geometry import variator
 
 
 class Strand(NamedTuple):
-    """A running strand.
+    """A running strand."""
 
-    Attributes
-    ----------
-    length : float
-        Between its pinned ends [m].
-    line_mass : float
-        Mass per length [kg/m].
-    speed : float
-        At which it runs [m/s].
-    net_force : float
-        Ring tension less push force [N].
-    bending_stiffness : float
-        EI [N m^2].
-    """
-
-    length: float
-    line_mass: float
-    speed: float
-    net_force: float
-    bending_stiffness: float
+    length: float  # between its pinned ends [m]
+    line_mass: float  # mass per length [kg/m]
+    speed: float  # at which it runs [m/s]
+    net_force: float  # ring tension less push force [N]
+    bending_stiffness: float  # EI [N m^2]
 
     @property
     def critical_speed(self) -> float:
@@ -56,22 +42,7 @@ class Strand(NamedTuple):
 
 
 def ritz_matrices(strand: Strand, functions: int) -> tuple[np.ndarray, np.ndarray]:
-    """Matrices of q'' + G q' + K q = 0.
-
-    Parameters
-    ----------
-    strand : Strand
-        The strand.
-    functions : int
-        Number of sines.
-
-    Returns
-    -------
-    gyroscopic : (n, n) array
-        G [1/s], skew.
-    stiffness : (n,) array
-        Diagonal of K [1/s^2].
-    """
+    """Matrices of q'' + G q' + K q = 0 by n sines: G (n, n) [1/s], skew; diagonal of K (n,) [1/s^2]."""
     n = np.arange(1, functions + 1)
     wave = n * np.pi / strand.length
     force = strand.net_force / strand.line_mass - strand.speed**2
@@ -84,22 +55,10 @@ def ritz_matrices(strand: Strand, functions: int) -> tuple[np.ndarray, np.ndarra
 
 
 def eigenfrequencies(strand: Strand, functions: int) -> np.ndarray:
-    """Eigenfrequencies below the critical speed, ascending.
+    """Eigenfrequencies by n sines below the critical speed, ascending, (n,) [Hz]; nan beyond that speed.
 
     With p = sqrt(K) q the equations are z' = A z, z = (p, q'), and A is skew: i A is Hermitian, and its
     eigenvalues come in pairs +-w.
-
-    Parameters
-    ----------
-    strand : Strand
-        The strand.
-    functions : int
-        Number of sines.
-
-    Returns
-    -------
-    (functions,) array
-        [Hz]; nan beyond the critical speed.
     """
     gyroscopic, stiffness = ritz_matrices(strand, functions)
     if stiffness.min() <= 0.0:

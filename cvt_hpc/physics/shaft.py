@@ -39,21 +39,11 @@ import numpy as np
 
 
 class Bearing(NamedTuple):
-    """A support of a shaft.
+    """A support of a shaft."""
 
-    Attributes
-    ----------
-    position : float
-        Along the shaft [m].
-    stiffness : float
-        Radial [N/m]; inf: it does not give.
-    tilt_stiffness : float
-        Against the shaft's slope [N m/rad]; inf with an infinite stiffness: the shaft is clamped.
-    """
-
-    position: float
-    stiffness: float
-    tilt_stiffness: float = 0.0
+    position: float  # along the shaft [m]
+    stiffness: float  # radial [N/m]; inf: it does not give
+    tilt_stiffness: float = 0.0  # against the slope [N m/rad]; inf with infinite stiffness: clamped
 
 
 class Seats(NamedTuple):
@@ -70,28 +60,12 @@ def beam_flexibility(
     bearings: Sequence[Bearing],
     places: Sequence[float],
 ) -> np.ndarray:
-    """Deflection and slope at some places of a shaft under forces and couples there, in one plane.
+    """Deflection and slope at k places of a shaft under forces and couples there, in one plane.
 
-    Parameters
-    ----------
-    lengths, diameters : sequences of float
-        Of its sections, one after the other from position 0 [m].
-    modulus : float
-        Young's modulus [N/m^2].
-    bearings : sequence of Bearing
-        Its supports.
-    places : sequence of float
-        Positions along the shaft [m].
-
-    Returns
-    -------
-    (2 k, 2 k) array
-        Symmetric: rows deflection [m] and slope [rad] of each place, columns force [N] and couple [N m].
-
-    Raises
-    ------
-    ValueError
-        If the bearings do not hold the shaft.
+    The result (2 k, 2 k) is symmetric: rows deflection [m] and slope [rad] of each place, columns force [N]
+    and couple [N m]. The shaft has sections of `lengths` and `diameters` [m], one after the other from
+    position 0, and Young's `modulus` [N/m^2]; `places` are positions along it [m]. ValueError if the bearings
+    do not hold it.
     """
     ends = np.concatenate([[0.0], np.cumsum(lengths)])
     own = [bearing.position for bearing in bearings]
@@ -131,14 +105,9 @@ def _balanced(matrix: np.ndarray) -> np.ndarray:
 
 
 def gap_shares(seats: Seats, radius: float, half_wedge_angle: float) -> np.ndarray:
-    """B of the gap change b . x by the seats' deflections and slopes, (4,) in [1, m, 1, m].
+    """Shares b of the seats' deflections and slopes in the gap change b . x, (4,) in [1, m, 1, m].
 
-    Parameters
-    ----------
-    seats : Seats
-        Of both sheaves; the belt runs midway.
-    radius, half_wedge_angle : float
-        Pitch radius [m], [rad].
+    The belt runs midway between the seats, at the pitch radius [m]; the half wedge angle is in [rad].
     """
     tangent, half = np.tan(half_wedge_angle), 0.5 * abs(seats.movable - seats.fixed)
     lever = radius - tangent * half
@@ -149,12 +118,7 @@ def gap_shares(seats: Seats, radius: float, half_wedge_angle: float) -> np.ndarr
 def shaft_compliance(flexibility: np.ndarray, seats: Seats, radius: float, half_wedge_angle: float) -> float:
     """Compliance b . S b of the groove by a shaft's bending [m/N].
 
-    Parameters
-    ----------
-    flexibility : (4, 4) array
-        S of the seats, fixed and movable, as of `beam_flexibility`.
-    seats, radius, half_wedge_angle
-        As of `gap_shares`.
+    S (4, 4) is that of the seats, fixed and movable, as of `beam_flexibility`; all else as of `gap_shares`.
     """
     shares = gap_shares(seats, radius, half_wedge_angle)
     return float(shares @ flexibility @ shares)

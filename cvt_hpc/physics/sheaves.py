@@ -11,57 +11,27 @@ STIFFNESS_OF = ("disc", "sheave")  # the parts that `sheave_stiffness` scales
 
 
 class Sheaves(NamedTuple):
-    """Constants of one wrap's contact.
+    """Constants of the contact of one wrap of m stations."""
 
-    Attributes
-    ----------
-    weight : (m,) array
-        Length h that each station stands for [m].
-    angle : (m,) array
-        Angle about the pulley's axis from the inlet's tangent point [rad], negative before it.
-    rise, upright : (m,) arrays
-        Distance from the axis beyond the pitch radius, rho - R, of the reference path [m], 0 on the arc, and
-        its slope with the belt's displacement, R / rho.
-    element_stiffness : float
-        c_e [N/m^2].
-    compliance : float
-        a [1] of disc and collar together, 0 where both are rigid.
-    disc_compliance : float
-        b [1] of the disc alone, 0 where it is rigid.
-    diagonal : (m,) array
-        Diagonal of the inverse of the local kernel [N/m].
-    off_diagonal : (m,) array
-        Its entry between a station and the one behind it [N/m]; the first is 0.
-    tilt : (2, m) array
-        U [1]: rho / R times cosine and sine of the angle.
-    tilt_compliance : float
-        r^2 / c_tilt [m/N].
-    flexibilities : (m, m) or (0, 0) array
-        W [m/N] in the place of the local kernel, of discs of the reference stiffness: opening at one station
-        under a force at another; empty: the kernel.
-    modes : Modes
-        Discs whose inertia counts; W has them at rest.
-    clearance : float
-        Opening of the groove [m] by which collar and shaft tilt before they bear.
-    line_forces : float
-        Size of the axial line forces over that of the default scene [1].
-    """
-
-    weight: np.ndarray
+    weight: np.ndarray  # length h that each station stands for, (m,) [m]
+    # about the pulley's axis from the inlet's tangent point, (m,) [rad], negative before it
     angle: np.ndarray
+    # distance from the axis beyond the pitch radius, rho - R, of the reference path, (m,) [m], 0 on the arc
     rise: np.ndarray
-    upright: np.ndarray
-    element_stiffness: float
-    compliance: float
-    disc_compliance: float
-    diagonal: np.ndarray
-    off_diagonal: np.ndarray
-    tilt: np.ndarray
-    tilt_compliance: float
+    upright: np.ndarray  # its slope with the belt's displacement, R / rho, (m,)
+    element_stiffness: float  # c_e [N/m^2]
+    compliance: float  # a [1] of disc and collar together, 0 where both are rigid
+    disc_compliance: float  # b [1] of the disc alone, 0 where it is rigid
+    diagonal: np.ndarray  # diagonal of the inverse of the local kernel, (m,) [N/m]
+    off_diagonal: np.ndarray  # its entry between a station and the one behind it, (m,) [N/m]; the first is 0
+    tilt: np.ndarray  # U, (2, m) [1]: rho / R times cosine and sine of the angle
+    tilt_compliance: float  # r^2 / c_tilt [m/N]
+    # W (m, m) [m/N] in the place of the local kernel, of discs of the reference stiffness: opening at one
+    # station under a force at another; empty: the kernel
     flexibilities: np.ndarray
-    modes: Modes
-    clearance: float = 0.0
-    line_forces: float = 1.0
+    modes: Modes  # discs whose inertia counts; W has them at rest
+    clearance: float = 0.0  # opening of the groove by which collar and shaft tilt before they bear [m]
+    line_forces: float = 1.0  # size of the axial line forces over that of the default scene [1]
 
 
 def sheaves(
@@ -76,34 +46,17 @@ def sheaves(
     element_stiffness: float,
     disc_stiffness: float = 1.0,
 ) -> Sheaves:
-    """Constants of the contact over one wrap.
+    """Constants of the contact over one wrap, for `plain_contact` and `lane_contact`.
 
     The kernel of local bending, exp(-|s - s'| / l) / (2 l k) with s = R times the angle, is that of a Markov
     process: its inverse over any stations is tridiagonal. With e_j = exp(-(s_j - s_j-1) / l) the pair of
-    stations j - 1 and j gives 2 l k / (1 - e_j^2) to both diagonals and -2 l k e_j / (1 - e_j^2) beside
-    them; a station between two others counts 2 l k less.
+    stations j - 1 and j gives 2 l k / (1 - e_j^2) to both diagonals and -2 l k e_j / (1 - e_j^2) beside them;
+    a station between two others counts 2 l k less.
 
-    Parameters
-    ----------
-    weight, angle, rise : (m,) arrays
-        As of `Sheaves`, the angles ascending.
-    radius : float
-        Pitch radius [m].
-    sheave_stiffness : float
-        Multiple of the reference stiffness of disc and collar together; inf is rigid [1].
-    tilt_stiffness : float
-        c_tilt of the reference [N m/rad]; inf is a collar without tilt.
-    local_stiffness, local_length : float
-        k [N/m^2] and l [m] of the local bending kernel of the reference.
-    element_stiffness : float
-        c_e [N/m^2].
-    disc_stiffness : float
-        Multiple of the reference stiffness of the disc alone; inf is rigid [1].
-
-    Returns
-    -------
-    Sheaves
-        For `plain_contact` and `lane_contact`.
+    Arguments as of `Sheaves`, the angles ascending, and: the pitch radius [m]; `sheave_stiffness`, multiple
+    of the reference stiffness of disc and collar together, and `disc_stiffness`, that of the disc alone [1],
+    inf: rigid; c_tilt of the reference [N m/rad], inf: a collar without tilt; k [N/m^2] and l [m] of its
+    kernel.
     """
     scale = 2.0 * local_length * local_stiffness
     decay = np.exp(-np.diff(angle) * radius / local_length)
@@ -129,13 +82,9 @@ def sheaves(
 def stiffness_factors(parameters: Mapping[str, Any]) -> tuple[float, float]:
     """Multiples of the reference stiffness of disc and collar together, and of the disc alone [1].
 
-    Lebrecht et al. 2004 vary "the stiffness parameters of the FE-model" (sec. 3.6), which is that of the
-    discs; the tilt of the shaft-to-collar connection belongs to their rigid bodies (sec. 2.1.1) and stays.
-
-    Parameters
-    ----------
-    parameters : mapping
-        Values by name [SI]; `sheave_stiffness` and `stiffness_of` count.
+    By `sheave_stiffness` and `stiffness_of`. Lebrecht et al. 2004 vary "the stiffness parameters of the
+    FE-model" (sec. 3.6), which is that of the discs; the tilt of the shaft-to-collar connection belongs to
+    their rigid bodies (sec. 2.1.1) and stays.
     """
     factor = parameters["sheave_stiffness"]
     return (1.0, factor) if parameters["stiffness_of"] == "disc" else (factor, 1.0)
@@ -147,17 +96,9 @@ def axial_element_stiffness(parameters: Mapping[str, Any]) -> float:
 
 
 def flexibility(sheave: Sheaves) -> np.ndarray:
-    """Dense matrix C of g = G + C f, for comparison with general solvers.
+    """Dense matrix C (m, m) [m^2/N] of g = G + C f, force per length in, gap out; C diag(1/h) is symmetric.
 
-    Parameters
-    ----------
-    sheave : Sheaves
-        The wrap, m stations.
-
-    Returns
-    -------
-    (m, m) array
-        C [m^2/N], force per length in, gap out; C diag(1/h) is symmetric.
+    For comparison with general solvers.
     """
     m = sheave.weight.size
     return np.eye(m) / sheave.element_stiffness + elastic_matrix(sheave) * sheave.weight

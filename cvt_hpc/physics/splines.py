@@ -11,22 +11,12 @@ import numpy as np
 
 
 class Splines(NamedTuple):
-    """A basis.
+    """A basis of n splines at N stations."""
 
-    Attributes
-    ----------
-    values : (N, n) array
-        Of each spline at the stations [1].
-    centres, spacings : (n,) arrays
-        Where it sits, and a quarter of its width [m].
-    levels : (n,) int array
-        0 the coarse ones.
-    """
-
-    values: np.ndarray
-    centres: np.ndarray
-    spacings: np.ndarray
-    levels: np.ndarray
+    values: np.ndarray  # of each spline at the stations, (N, n) [1]
+    centres: np.ndarray  # where it sits, (n,) [m]
+    spacings: np.ndarray  # a quarter of its width, (n,) [m]
+    levels: np.ndarray  # (n,) int, 0 the coarse ones
 
 
 def cubic_spline(x: np.ndarray) -> np.ndarray:
@@ -40,24 +30,12 @@ def cubic_spline(x: np.ndarray) -> np.ndarray:
 def hierarchical_splines(
     position: np.ndarray, length: float, coarse: int, zones: list[list[tuple[float, float]]]
 ) -> Splines:
-    """Basis at the stations of a closed path.
+    """Basis at the stations of a closed path, level by level.
 
-    Parameters
-    ----------
-    position : (N,) array
-        Path coordinates of the stations [m].
-    length : float
-        Of the closed path [m].
-    coarse : int
-        Number of splines of level 0, at least 4.
-    zones : list of lists of (start, end)
-        For each finer level the intervals of the path that it refines [m]: it takes the splines whose centres
-        lie there. An interval may reach beyond the path's seam.
-
-    Returns
-    -------
-    Splines
-        Level by level.
+    `position` (N,) are their path coordinates and `length` that of the path [m]; `coarse` is the number of
+    splines of level 0, at least 4. Of each finer level `zones` has the intervals (start, end) of the path
+    that it refines [m]: it takes the splines whose centres lie there. An interval may reach beyond the path's
+    seam.
     """
     found, widths, levels = [], [], []
     for level, intervals in enumerate([[(0.0, length)], *zones]):

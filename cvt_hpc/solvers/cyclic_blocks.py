@@ -11,6 +11,8 @@ for definite or block diagonally dominant matrices, and may lose digits on other
 right-hand side for each of its columns, and the Schur complement D - C M^-1 B.
 
 Rows of blocks and rows of right-hand sides lie in lanes, which makes products of blocks vector instructions.
+Blocks are a (n + 1, 5 b) LaneArray, right-hand sides, the `columns`, a (n + 1, b) one, of which the last row
+is for the elimination; kernels take `block_size(b)` beside them as `size`.
 """
 
 import numpy as np
@@ -23,35 +25,16 @@ SMALLEST_PIVOT = 1e-13  # of the largest entry of its column: rounding leaves as
 
 
 def empty_blocks(n: int, b: int) -> LaneArray:
-    """Blocks of a chain, all zero.
+    """Blocks of size b of a chain of n nodes, at least 2, all zero.
 
-    Parameters
-    ----------
-    n, b : int
-        Number of nodes, at least 2, and size of the blocks.
-
-    Returns
-    -------
-    (n + 1, 5 b) LaneArray
-        Entry (j, k) of A_i is `data[i, DIAGONAL * b + j, k]`, likewise LOWER of L_i and UPPER of U_i. The
-        last row is for the elimination, as are SPIKE and FILL; lanes from b on stay zero.
+    Entry (j, k) of A_i is `data[i, DIAGONAL * b + j, k]`, likewise LOWER of L_i and UPPER of U_i. SPIKE and
+    FILL are for the elimination; lanes from b on stay zero.
     """
     return LaneArray(n + 1, 5 * b, _lanes(b))
 
 
 def empty_columns(n: int, b: int, columns: int) -> LaneArray:
-    """Right-hand sides, all zero.
-
-    Parameters
-    ----------
-    n, b, columns : int
-        Number of nodes, size of the blocks, number of right-hand sides.
-
-    Returns
-    -------
-    (n + 1, b) LaneArray
-        Number j of node i in right-hand side c is `data[i, j, c]`. The last row is for the elimination.
-    """
+    """Right-hand sides of such a chain, all zero: number j of node i in column c is `data[i, j, c]`."""
     return LaneArray(n + 1, b, _lanes(columns))
 
 
@@ -74,20 +57,10 @@ def _lanes(count: int) -> int:
 
 @kernel
 def factor(blocks: LaneArray, size: tuple[float, ...]) -> bool:
-    """Factor a matrix in the place of its blocks.
+    """Factor a matrix in the place of its blocks DIAGONAL, LOWER and UPPER; whether this could be done.
 
-    Parameters
-    ----------
-    blocks : (n + 1, 5 b) LaneArray
-        DIAGONAL, LOWER and UPPER of each node; then the input of `solve`.
-    size : tuple
-        `block_size(b)`.
-
-    Returns
-    -------
-    bool
-        Whether it could be done. If not, the matrix is singular up to rounding, needs exchanges between
-        blocks, or has entries that are not finite; the content of `blocks` is then of no use.
+    If not, the matrix is singular up to rounding, needs exchanges between blocks, or has entries that are not
+    finite; the content of `blocks` is then of no use.
     """
     b = len(size)
     spare = blocks.rows - 1
@@ -130,17 +103,7 @@ def factor(blocks: LaneArray, size: tuple[float, ...]) -> bool:
 
 @kernel
 def solve(blocks: LaneArray, columns: LaneArray, size: tuple[float, ...]) -> None:
-    """Solve for all columns.
-
-    Parameters
-    ----------
-    blocks : (n + 1, 5 b) LaneArray
-        After `factor`.
-    columns : (n + 1, b) LaneArray
-        Right-hand sides; then the solutions.
-    size : tuple
-        `block_size(b)`.
-    """
+    """Solve for all columns in their place, with blocks after `factor`."""
     b = len(size)
     last = blocks.rows - 2
     for i in range(last):
@@ -158,25 +121,12 @@ def solve(blocks: LaneArray, columns: LaneArray, size: tuple[float, ...]) -> Non
 def solve_bordered(
     blocks: LaneArray, columns: LaneArray, rows: np.ndarray, corner: LaneArray, size: tuple[float, ...]
 ) -> bool:
-    """Solve for all columns with a border of g unknowns.
+    """Solve for all columns with a border of g unknowns; whether the Schur complement is regular.
 
-    Parameters
-    ----------
-    blocks : (n + 1, 5 b) LaneArray
-        After `factor`, which must have succeeded: without its border the matrix has to be regular.
-    columns : (n + 1, b) LaneArray
-        [B | r], the g columns of the border first; then the solutions x in the place of r.
-    rows : (n, g, b) array
-        C.
-    corner : (1, g) LaneArray
-        [D | s], with as many lanes as `columns`; then the border's unknowns in the place of s.
-    size : tuple
-        `block_size(b)`.
-
-    Returns
-    -------
-    bool
-        Whether the Schur complement is regular. If not, the content of the arrays is of no use.
+    `blocks` come from a `factor` that has succeeded: without its border the matrix has to be regular.
+    `columns` hold [B | r], the g columns of the border first, `rows` (n, g, b) C, and `corner` [D | s] is a
+    (1, g) LaneArray with as many lanes as `columns`. The solutions x are in the place of r then, the border's
+    unknowns in that of s. If the complement is not regular, the content of the arrays is of no use.
     """
     n, g, b = rows.shape
     solve(blocks, columns, size)

@@ -29,10 +29,7 @@ class Scheme(NamedTuple):
 def generalised_alpha(spectral_radius: float) -> Scheme:
     """The scheme of second order that damps vibrations which the step does not resolve.
 
-    Parameters
-    ----------
-    spectral_radius : float
-        Share of such a vibration that a step leaves, 0 to 1; 1 is the implicit midpoint rule.
+    A step leaves the share `spectral_radius` of such a vibration, 0 to 1; 1 is the implicit midpoint rule.
     """
     alpha_m = 0.5 * (3.0 - spectral_radius) / (1.0 + spectral_radius)
     alpha_f = 1.0 / (1.0 + spectral_radius)

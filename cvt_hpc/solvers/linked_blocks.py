@@ -59,20 +59,10 @@ def field_of_right(b: int) -> int:
 
 
 def empty_system(nodes: int, parts: int, b: int, columns: int) -> LaneArray:
-    """The system of a ring, all zero.
+    """The system of a ring, (nodes / parts, b (3 b + columns)), all zero.
 
-    Parameters
-    ----------
-    nodes, parts : int
-        Number of nodes, and in how many parts they are cut; a power of 2 that divides `nodes`.
-    b, columns : int
-        Size of the blocks, and number of right-hand sides.
-
-    Returns
-    -------
-    (nodes / parts, b (3 b + columns)) LaneArray
-        Entry (r, c) of A_i is field r + b c, and that of U_i is b^2 + r + b c; number r of right-hand side c
-        is `field_of_right(b)` + r + b c.
+    The nodes are cut into `parts`, a power of 2 that divides `nodes`. Entry (r, c) of A_i is field r + b c,
+    and that of U_i is b^2 + r + b c; number r of right-hand side c is `field_of_right(b)` + r + b c.
     """
     return LaneArray(nodes // parts, b * (3 * b + columns), parts, linked=parts > 1)
 
@@ -84,23 +74,11 @@ def empty_scratch(parts: int, b: int, columns: int) -> LaneArray:
 
 @kernel
 def solve(blocks: LaneArray, scratch: LaneArray, size: tuple[float, ...]) -> bool:
-    """Solve for all right-hand sides in place.
+    """Solve an `empty_system` with A, U and f, in the place of f; whether this could be done.
 
-    Parameters
-    ----------
-    blocks : (rows, b (3 b + columns)) LaneArray
-        `empty_system`, with A, U and f; then the solutions in the place of f, and A and U are lost.
-    scratch : LaneArray
-        `empty_scratch`.
-    size : tuple
-        `cyclic_blocks.block_size(b)`.
-
-    Returns
-    -------
-    bool
-        Whether all pivots were numbers above `lanes.blocks.SMALLEST_PIVOT` of the diagonal as it was given.
-        If not, the matrix is singular up to rounding or needs exchanges of rows, and what `blocks` hold then
-        is of no use.
+    A and U are lost. All pivots have to be numbers above `lanes.blocks.SMALLEST_PIVOT` of the diagonal as it
+    was given. Else the matrix is singular up to rounding or needs exchanges of rows, and what `blocks` hold
+    then is of no use. `scratch` is of `empty_scratch`, `size` of `cyclic_blocks.block_size(b)`.
     """
     is_regular = _eliminate(blocks, scratch, size)
     is_regular = _solve_separators(blocks, scratch, size) and is_regular
@@ -110,10 +88,9 @@ def solve(blocks: LaneArray, scratch: LaneArray, size: tuple[float, ...]) -> boo
 
 @kernel
 def _eliminate(blocks, scratch, size):
-    """Eliminate the nodes of all parts but the last ones.
+    """Eliminate the nodes of all parts but the last ones, the separators.
 
-    The separators' rows then have the coupling to the separators behind in place of S and that to the ones
-    ahead in place of U.
+    Their rows then have the coupling to the separators behind in place of S and to those ahead in place of U.
     """
     b = len(size)
     u, s, right = b * b, 2 * b * b, 3 * b * b
@@ -230,12 +207,9 @@ def _factor(blocks, j, scratch, size):
 
 @kernel
 def solve_small(system: np.ndarray) -> None:
-    """Solve the equations [A | f] in place, by elimination without pivoting.
+    """Solve [A | f], (size, size + 1), by elimination without pivoting, into the last column.
 
-    Parameters
-    ----------
-    system : (size, size + 1) array
-        A, which has to be nearly symmetric and positive, and f; afterwards the solution is its last column.
+    A has to be nearly symmetric and positive.
     """
     size = system.shape[0]
     for p in range(size):

@@ -21,19 +21,11 @@ LEAST_JERK = 1e-3  # of the driven pulley's speed, amplitude from which it judde
 def strand_frequencies(
     parameters: Mapping[str, Any], forces: tuple[float, float] | None = None
 ) -> np.ndarray:
-    """Eigenfrequencies of both strands as running beams, by the law of the model `strand`.
+    """Eigenfrequencies of both strands as running beams, (strand, MODES) [Hz], by the model `strand`.
 
-    Parameters
-    ----------
-    parameters : mapping
-        Of a run of a variator by name [SI]; without `bending_stiffness` its strands do not resist bending.
-    forces : (float, float), optional
-        Ring tension less push force of t1 and t2 [N]; else by belt formulas from thrust and load.
-
-    Returns
-    -------
-    array, shape (strand, MODES)
-        [Hz]; nan where a strand holds no shape, where the belt slips, or where a parameter is missing.
+    `forces` are ring tension less push force of t1 and t2 [N]; else they follow by belt formulas from thrust
+    and load. Of the parameters [SI] of a run; without `bending_stiffness` its strands do not resist bending.
+    nan where a strand holds no shape, where the belt slips, or where a parameter is missing.
     """
     unknown = np.full((len(STRANDS), MODES), np.nan)
     p = {"strand_forces": "formulas", "bending_stiffness": 0.0, **parameters}
@@ -54,12 +46,7 @@ def steady_band(
 ) -> tuple[float, float]:
     """Lowest and highest frequency of the modes by which a steady state is judged [Hz].
 
-    It is the band of a run that does not judder.
-
-    Parameters
-    ----------
-    parameters, forces
-        As `strand_frequencies` takes them.
+    It is the band of a run that does not judder. Arguments as of `strand_frequencies`.
     """
     lowest = float(strand_frequencies(parameters, forces)[:, 0].min())
     return settings.edge_of_modes(parameters, lowest), parameters["band_high"]
@@ -68,13 +55,9 @@ def steady_band(
 def band(run: Any) -> tuple[float, float]:
     """Lowest and highest frequency by which a run is judged [Hz].
 
-    Where the job gives no `band_low`, `settings.lower_edge` follows from the means of the judged part. A belt
-    without rings and a ramp, along which forces change, have the band of `settings.band`.
-
-    Parameters
-    ----------
-    run : object
-        With `parameters` and, of a belt of rings and elements, all samples recorded.
+    Where the job gives no `band_low`, `settings.lower_edge` follows from the means of the judged part, of a
+    belt of rings and elements with all samples recorded. A belt without rings and a ramp, along which forces
+    change, have the band of `settings.band`.
     """
     p = run.parameters
     if _is_given(p):

@@ -12,12 +12,9 @@ LOAD, SPEED, THRUST = 1, 2, 3
 
 
 def profile_table(parameters: Parameters) -> np.ndarray:
-    """Times [s] and multiples of a run's profiles, (K, 4); one line without any.
+    """Times [s] and multiples of a run's profiles, (K, 4), from its parameters; one line without any.
 
-    Parameters
-    ----------
-    parameters : mapping
-        Flat values of the run [SI]; a model without profiles has no key of theirs.
+    A model without profiles has no key of theirs.
     """
     times = parameters.get(profiles.TIME, ()) or (0.0,)
     columns = [[profiles.multiple(parameters, name, time) for time in times] for name in PROFILED]

@@ -49,6 +49,8 @@ def dataset(
 ) -> xr.Dataset:
     """Histories over `time` and means by `position` of a run, finished or failed.
 
+    `displacement` (time, probe) is in [m]. A blank in the name of a channel is an underscore here.
+
     Parameters
     ----------
     run : object
@@ -57,15 +59,8 @@ def dataset(
         By the name of a channel its long name, unit and comment; OVER_TIME are in any case.
     profiles : mapping
         By name the values of means over the judged part (place,), their long name, unit and comment.
-    position : (place,) array
-        Path coordinates [m].
-    regions : (place,) array of str
-        Of the path.
-
-    Returns
-    -------
-    Dataset
-        With `displacement` (time, probe) [m]. A blank in the name of a channel is an underscore here.
+    position, regions : (place,) arrays
+        Path coordinates [m], and names of the path's regions.
     """
     import xarray as xr
 
@@ -105,21 +100,9 @@ def along_path(
 def points_at(
     path: Variator, centre_distance: float, position: np.ndarray
 ) -> tuple[np.ndarray, np.ndarray, np.ndarray]:
-    """Points of the path, angles of the running direction, and curvatures.
+    """Points of the path (n, 2) [m], angles of the running direction (n,) [rad], and curvatures (n,) [1/m].
 
-    Parameters
-    ----------
-    path : Variator
-        Radii, wraps and strands.
-    centre_distance : float
-        a [m]
-    position : (n,) array
-        Path coordinates [m].
-
-    Returns
-    -------
-    (n, 2), (n,), (n,) arrays
-        [m], [rad], [1/m]
+    At path coordinates `position` (n,) [m]; the centre distance is in [m].
     """
     s = np.mod(position, path.path_length)
     tilt = 0.5 * (path.driven_wrap - np.pi)  # of the strands: the lower one runs downwards for it > 0
@@ -139,24 +122,7 @@ def points_at(
 
 
 def along(path: Variator, centre_distance: float, points: np.ndarray) -> tuple[np.ndarray, np.ndarray]:
-    """Path coordinates of points, and their distances from the path.
-
-    Parameters
-    ----------
-    path : Variator
-        Radii, wraps and strands.
-    centre_distance : float
-        [m]
-    points : (n, 2) array
-        [m]
-
-    Returns
-    -------
-    position : (n,) array
-        Less than the path's length [m].
-    offset : (n,) array
-        Outwards [m].
-    """
+    """Path coordinates (n,) of points (n, 2), below the path's length, and distances outwards (n,) [m]."""
     y, z = points.T
     tilt = 0.5 * (path.driven_wrap - np.pi)
     sine, cosine = np.sin(tilt), np.cos(tilt)

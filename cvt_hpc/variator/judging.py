@@ -1,7 +1,9 @@
 """Verdict and record of a run of a variator, as far as they are the same whichever model marched it.
 
 A run is as `slip` takes it, and has `displacement`, `probes` with labels, `failure` and `time` as well, and
-`risen`, the samples before its load has risen. Of its channels, those of both strands count here, too.
+`risen`, the samples before its load has risen. Of its channels, those of both strands count here, too. All
+samples are recorded, or those until it slipped through; `names` are those of its strands, and `pulleys` those
+whose slip it records.
 """
 
 from collections.abc import Sequence
@@ -31,15 +33,7 @@ RAMPED_CHANNELS = {"load": "load", "speed": "driving_speed"}  # by the ramped qu
 def assess(
     run: Any, names: Sequence[str] = STRANDS, pulleys: Sequence[str] = PULLEYS
 ) -> assessment.Occurrence:
-    """Whether and how a run vibrates that has reached its end; its probes are columns of the displacement.
-
-    Parameters
-    ----------
-    run : object
-        With all samples recorded.
-    names, pulleys : sequences of str
-        Of its strands, and of the pulleys whose slip it records.
-    """
+    """Whether and how a run vibrates that has reached its end; its probes are columns of the displacement."""
     p = run.parameters
     if ramped(p):
         # None is of a run before its end
@@ -58,14 +52,8 @@ def with_judder(run: Any, found: assessment.Occurrence) -> assessment.Occurrence
     judder's frequency, twice it or more, within LOCKED/L, L being the length of the judged part, and rises
     out of the multiple before it by no more than 1/COMB, and where the strands are below the threshold
     without all multiples up to the band's end. A vibration of the belt that is locked to judder rises by
-    three and more. Amplitudes stay as they are; nothing else is decided by them.
-
-    Parameters
-    ----------
-    run : object
-        As `assess` takes it.
-    found : Occurrence
-        Of it, probes being columns of the displacement.
+    three and more. Amplitudes stay as they are; nothing else is decided by them. Probes are columns of the
+    displacement.
     """
     p = run.parameters
     rate, threshold = p["sampling_rate"], p["amplitude_threshold"]
@@ -98,25 +86,13 @@ def with_judder(run: Any, found: assessment.Occurrence) -> assessment.Occurrence
 def multiples(moved: np.ndarray, slow: float, highest: int) -> tuple[np.ndarray, np.ndarray]:
     """The sum of a constant and of sines of all multiples of a frequency that is nearest to motions.
 
+    `moved` (time, strand) holds the motions, `slow` is the frequency in cycles a sample, `highest` the
+    largest multiple, at least 1. Returns complex amplitudes of the constant and of each multiple (1 +
+    highest, strand), and the sum itself (time, strand).
+
     With x_t = sum_k c_k exp(i k w t) over k = -highest .. highest, least squares have the matrix
-    D_(l-k) = sum_t exp(i (l - k) w t), which is Toeplitz: n^2 operations for n unknowns. All sums are
-    chirp transforms.
-
-    Parameters
-    ----------
-    moved : (time, strand) array
-        Motions.
-    slow : float
-        The frequency, in cycles a sample.
-    highest : int
-        The largest multiple, at least 1.
-
-    Returns
-    -------
-    (1 + highest, strand) complex array
-        Amplitude of the constant and of each multiple.
-    (time, strand) array
-        The sum itself.
+    D_(l-k) = sum_t exp(i (l - k) w t), which is Toeplitz: n^2 operations for n unknowns. All sums are chirp
+    transforms.
     """
     from scipy.linalg import solve_toeplitz
     from scipy.signal import czt  # scipy.signal takes long to load
@@ -158,17 +134,7 @@ def slipped_through(run: Any) -> dict[str, Any]:
 
 
 def judge(run: Any, variables: Sequence[Variable], names: Sequence[str] = STRANDS) -> dict[str, Any]:
-    """The record of a run that has reached its end, or slipped through before, its cost apart.
-
-    Parameters
-    ----------
-    run : object
-        With all samples recorded, or those until it slipped through.
-    variables : sequence of Variable
-        Of the model.
-    names : sequence of str
-        Of its strands, as of `assess`.
-    """
+    """The record of a run that has reached its end, or slipped through before, its cost apart."""
     if run.failure is None:
         return finished(run, variables, assess(run, names))
     record = slipped_through(run)

@@ -52,14 +52,9 @@ GAP, REGULAR = (
 
 
 def declared(names: Sequence[str], of_file: Sequence[str]) -> dict[str, Parameter]:
-    """Return the parameters of a model's profiles.
+    """Return the parameters of a model's profiles, of the values `names`.
 
-    Parameters
-    ----------
-    names : sequence of str
-        Values that may have profiles.
-    of_file : sequence of str
-        Columns that a file may have beside `time`: some of the names, and `driven_pressure`.
+    A file may have the columns `of_file` beside `time`: some of the names, and `driven_pressure`.
     """
     columns = {"time": ("s",), **{name: (_UNITS[name],) for name in of_file}}
     gives = (TIME, *of_file, *(f"{name}_profile" for name in of_file))
@@ -144,13 +139,7 @@ def extremes(parameters: Parameters, name: str) -> tuple[float, float]:
 
 
 def profile_problems(parameters: Parameters) -> list[tuple[str, str, str]]:
-    """Return problems of courses in time, in the form of a model's check: (key, expected, found).
-
-    Parameters
-    ----------
-    parameters : mapping
-        Values by name [SI].
-    """
+    """Return problems of courses in time, in the form of a model's check: (key, expected, found)."""
     p, found = parameters, course_problems(parameters)
     profiles = {key: p[key] for key in p if key.endswith("_profile") and p[key]}
     times = p[TIME]

@@ -92,10 +92,7 @@ SCENE: dict[str, Parameter] = {
 def rise_problems(parameters: Mapping[str, Any]) -> list[tuple[str, str, str]]:
     """Problems of a load that rises, in the form of a model's check: (key, expected, found).
 
-    Parameters
-    ----------
-    parameters : mapping
-        Values by name [SI], of which `rise_time`, `duration` and `judged_fraction` count.
+    Of the parameters [SI] `rise_time`, `duration` and `judged_fraction` count.
     """
     p = parameters
     before = (1.0 - p["judged_fraction"]) * p["duration"]
@@ -108,10 +105,7 @@ def rise_problems(parameters: Mapping[str, Any]) -> list[tuple[str, str, str]]:
 def course_problems(parameters: Mapping[str, Any]) -> list[tuple[str, str, str]]:
     """Problems of a run's courses of load and speed, in the form of a model's check: (key, expected, found).
 
-    Parameters
-    ----------
-    parameters : mapping
-        Values by name [SI], of which those of SCENE, `duration` and `judged_fraction` count.
+    Of the parameters [SI] those of SCENE, `duration` and `judged_fraction` count.
     """
     p, problems = parameters, rise_problems(parameters)
     if p["load_history"] == p["speed_history"] == "ramp":

@@ -44,18 +44,9 @@ def largest_torque(
 ) -> float:
     """Largest torque at the driving pulley that friction carries [N m].
 
-    Parameters
-    ----------
-    law : FrictionLaw
-        Of the flanks; read at the sliding speed of gross slip.
-    half_wedge_angle : float
-        [rad]
-    path : Variator
-        Radii of the pulleys, and lengths of the arcs.
-    belt_speed : float
-        [m/s]
-    axial_force : (2,) array
-        Of the belt on a sheave of the driving and of the driven pulley [N].
+    By the law of the flanks at the sliding speed of gross slip, with the half wedge angle [rad], radii and
+    arcs of the path, the belt speed [m/s] and the axial force (2,) of the belt on a sheave of the driving and
+    of the driven pulley [N].
     """
     arcs = np.array([path.lengths[0], path.lengths[2]])
     normal_force = axial_force / (arcs * np.cos(half_wedge_angle))
@@ -64,14 +55,9 @@ def largest_torque(
 
 
 def against_slip(load: float, carried: float) -> tuple[float, float, float]:
-    """Values of AGAINST_SLIP.
+    """Values of AGAINST_SLIP, from torque at the driving pulley and the largest that friction carries [N m].
 
     Without any friction ratio and margin are infinite, or without load either not numbers.
-
-    Parameters
-    ----------
-    load, carried : float
-        Torque at the driving pulley, and the largest torque that friction carries [N m].
     """
     with np.errstate(divide="ignore", invalid="ignore"):
         ratio = float(np.divide(load, carried))

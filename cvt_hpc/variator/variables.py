@@ -20,18 +20,10 @@ COORDINATES = {
 
 
 class Means:
-    """Quantities that follow from mean values of a belt between pulleys.
+    """Quantities that follow from mean values of a belt between pulleys."""
 
-    Attributes
-    ----------
-    mean : callable
-        Mean of a channel, by its name.
-    powers : dict
-        Mean powers by their names in the record [W]; a part of the balance that is not there is 0.
-    """
-
-    mean: Callable[[str], float]
-    powers: Any
+    mean: Callable[[str], float]  # mean of a channel, by its name
+    powers: Any  # mean powers by their names in the record [W]; a part of the balance that is not there is 0
 
     def each(self, name: str, labels: Sequence[str] = PULLEYS) -> np.ndarray:
         """Means of a channel for each pulley, or other label, that fills a gap {} in its name."""
@@ -62,23 +54,14 @@ class Means:
 class Measured(Means):
     """The part of a run by which its record is made, with the attributes of the run and of what is found.
 
-    Attributes
-    ----------
-    run : object
-        With `channel(name)`, `parameters`, `displacement`, `mean_driving_speed(samples)`, and `powers()`,
-        means over the judged part.
-    samples : slice
-        The judged part; of a run that has slipped through, its slide.
-    found : Occurrence or None
-        How it vibrates.
-
-    All other attributes are those of the verdict of a ramp, and of the run. One that a property lacks is
-    sought there as well, so an error may name the run for it.
+    The run has `channel(name)`, `parameters`, `displacement`, `mean_driving_speed(samples)`, and `powers()`,
+    means over the judged part. All other attributes are those of the verdict of a ramp, and of the run. One
+    that a property lacks is sought there as well, so an error may name the run for it.
     """
 
     run: Any
-    samples: slice
-    found: assessment.Occurrence | None
+    samples: slice  # the judged part; of a run that has slipped through, its slide
+    found: assessment.Occurrence | None  # how it vibrates
 
     def __getattr__(self, name: str) -> Any:
         if name in ramp.RampOccurrence.__dataclass_fields__:
@@ -190,13 +173,7 @@ _SHARED = (
 
 
 def frequency_bins(parameters: Parameters) -> Coordinate:
-    """Frequencies of the spectra of a transient [Hz].
-
-    Parameters
-    ----------
-    parameters : mapping
-        Flat parameters of the job or of a run [SI].
-    """
+    """Frequencies of the spectra of a transient [Hz], by flat parameters of the job or of a run [SI]."""
     step = parameters["spectrum_step"]
     return Coordinate(np.arange(0.0, parameters["band_high"] + step / 2, step), "Hz", "frequency")
 

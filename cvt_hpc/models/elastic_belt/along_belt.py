@@ -61,21 +61,10 @@ ELSEWHERE = {**ALONG, "contact_force": ("contact force", "N m-1", "axial line fo
 def along_belt(
     sample: Mapping[str, np.ndarray], grid: Mesh, parameters: Mapping[str, Any]
 ) -> dict[str, np.ndarray]:
-    """Quantities of SLIDING at the stations.
+    """Quantities of SLIDING at the stations, (..., N) by name.
 
-    Parameters
-    ----------
-    sample : mapping
-        Those of NEEDED, (..., N) each: of one instant, or means.
-    grid : Mesh
-        The belt's mesh.
-    parameters : mapping
-        Of the run [SI], of which the half wedge angle counts.
-
-    Returns
-    -------
-    dict
-        By name, (..., N).
+    They follow from those of NEEDED, (..., N) each, of one instant or means, and the run's half wedge angle
+    [SI].
     """
     angle = parameters["half_wedge_angle"]
     on_arc = at_stations(grid.cell * (grid.region % 2 == 0))  # length of a station's part on an arc

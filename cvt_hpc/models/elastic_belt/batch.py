@@ -42,21 +42,12 @@ _march_rings = partial(march, ring_step.begin_rings, ring_step.step_rings, ring_
 
 
 class Paused(NamedTuple):
-    """A run at its end, from which another batch continues; a copy, which keeps no batch alive.
+    """A run at its end, from which another batch continues; a copy, which keeps no batch alive."""
 
-    Attributes
-    ----------
-    time : float
-        Simulated time [s].
-    lane : tuple of (rows, fields) arrays
-        Its lane of all arrays that a batch keeps by lanes, in the order of `lane_arrays`.
-    rows : (done, S + C) array
-        Its history, as `LaneRun.rows`.
-    """
-
-    time: float
+    time: float  # simulated [s]
+    # its lane of all arrays that a batch keeps by lanes, in the order of `lane_arrays`
     lane: tuple[np.ndarray, ...]
-    rows: np.ndarray
+    rows: np.ndarray  # its history, as `LaneRun.rows`
 
 
 def lane_arrays(*parts: Any) -> Iterator[LaneArray]:
@@ -71,26 +62,16 @@ def lane_arrays(*parts: Any) -> Iterator[LaneArray]:
 class Batch:
     """Runs that advance together, sample by sample, each in a lane of its own, or one in linked parts.
 
-    Parameters
-    ----------
-    points : sequence of dict
-        Resolved parameters of the runs [SI], all of one `lane_key`.
-    stepper : str
-        "imex" or "explicit".
-    paused : sequence of Paused, optional
-        Runs from which the runs continue, one for each: shorter runs of the same points by the same stepper
-        and step. Each is then bit by bit the run of its point from the start.
+    Their `points` are resolved parameters [SI], all of one `lane_key`, their stepper "imex" or "explicit".
+    They continue from `paused`, one for each: shorter runs of the same points by the same stepper and step.
+    Each is then bit by bit the run of its point from the start.
 
     Attributes
     ----------
-    points, stepper
-        As given.
     records : Records
         The arrays into which it records.
-    samples : int
-        Samples of a whole run.
-    done : int
-        Samples taken so far.
+    samples, done : int
+        Samples of a whole run, and those taken so far.
     begun : float
         When it took over from another stepper [s]; 0 where it did not.
     interval, step : float
@@ -163,13 +144,7 @@ class Batch:
         return self.done < self.samples and bool((outcomes == Outcome.OK).any())
 
     def advance(self, samples: int) -> None:
-        """March on, at most to the next border of the judged part.
-
-        Parameters
-        ----------
-        samples : int
-            How many samples at most.
-        """
+        """March on by so many samples at most, no further than to the next border of the judged part."""
         first, plan = self.done, self.plan
         if first == plan.kick and not self._disturbed:
             for lane, point in enumerate(self.points):
@@ -199,10 +174,8 @@ class Batch:
     def take_over(self, runs: Sequence[Any]) -> None:
         """Continue runs by another stepper, their history included, except for means that began before.
 
-        Parameters
-        ----------
-        runs : sequence of LaneRun or GeneralTransient
-            One for each run, of the same mesh, sampling and duration, all at the same time.
+        One LaneRun or GeneralTransient for each run, of the same mesh, sampling and duration, all at the same
+        time.
         """
         self._go_on_after([np.broadcast_to(run.rows, (run.done, self.rows.data.shape[1])) for run in runs])
         states = [run.state for run in runs]
@@ -242,22 +215,7 @@ def _parted_work(work: Any, parts: int) -> Any:
 
 
 class LaneRun(RecordedRun):
-    """One run of a batch; attributes as of `RecordedRun`.
-
-    Parameters
-    ----------
-    batch : Batch
-        Which it belongs to.
-    lane : int
-        Its lane there.
-
-    Attributes
-    ----------
-    batch : Batch
-        As given.
-    step : float
-        Time step [s].
-    """
+    """One run of a batch, in a lane of it; attributes as of `RecordedRun`, and the time step `step` [s]."""
 
     def __init__(self, batch: Batch, lane: int) -> None:
         super().__init__(batch.points[lane], batch.records, lane)

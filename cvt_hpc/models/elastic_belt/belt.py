@@ -44,21 +44,7 @@ REACH = 0.1
 class Belt(NamedTuple):
     """Everything the kernels need, in SI units; N stations around the belt.
 
-    Arrays of cells and stations have shape (N,), `per_...` being reciprocals, the span that of two cells;
-    `touches` is 1 where a groove may hold a station, else 0, and `on_driven` 1 from the middle of t1 to that
-    of t2; there the pulley's radial unit vector has the parts `lean` along the path, `lean_rate` less per
-    displacement [1/m], and `upright` across it, and `rise` is the path's distance from the axis beyond the
-    pitch radius (`Mesh.zone`); `driving_stations` and `driven_stations` (m,) are those that each groove may
-    hold; `bending` is (N, 5): force per length on station j from the displacements of stations j-2 .. j+2,
-    `bending_load` that without displacement; `squared_curvature` is kappa^2 at the stations where curvature
-    terms count, else 0, and `curvature_terms` the place among those in CURVATURE_TERMS; `measures` are those
-    of the scene, `faded` is the coupling that counts for nothing, and a belt that is further than
-    `largest_displacement` off its path has left its grooves; `ring_relief` is the tension at which the rings'
-    own weight bears them. `belt_speed` is that of the pitch line at `driving_speed`; along a ramp of speed
-    both follow `rhs.speed_share_at`; `profile` (K, 4) is `course.profile_table`. `element_mass` and
-    `ring_mass` are the inertia along the path, `mass` that across it. Across a gap the elements' damper may
-    push against `bridging_stiffness` times the gap's strain; inf, as in every run: elements that are apart
-    have no damper. `tilts` is whether elements tilt on the rings.
+    Arrays of cells and stations have shape (N,), `per_...` being reciprocals, the span that of two cells.
     """
 
     cell: np.ndarray
@@ -68,34 +54,37 @@ class Belt(NamedTuple):
     per_span: np.ndarray
     curvature: np.ndarray
     arc_curvature: np.ndarray
-    touches: np.ndarray
-    on_driven: np.ndarray
-    rise: np.ndarray
-    lean: np.ndarray
-    lean_rate: np.ndarray
-    upright: np.ndarray
-    driving_stations: np.ndarray
-    driven_stations: np.ndarray
-    bending: np.ndarray
-    bending_load: np.ndarray
-    squared_curvature: np.ndarray
-    curvature_terms: int
-    ring_mass: np.ndarray
-    ring_relief: np.ndarray
+    touches: np.ndarray  # 1 where a groove may hold a station, else 0
+    on_driven: np.ndarray  # 1 from the middle of t1 to that of t2, else 0
+    rise: np.ndarray  # the path's distance from the axis beyond the pitch radius (`Mesh.zone`)
+    lean: np.ndarray  # where a groove may hold it, part of the pulley's radial unit vector along the path
+    lean_rate: np.ndarray  # less of that per displacement [1/m]
+    upright: np.ndarray  # part of that vector across the path
+    driving_stations: np.ndarray  # those that the groove may hold, (m,)
+    driven_stations: np.ndarray  # likewise, (m,)
+    bending: np.ndarray  # force per length on station j from the displacements of j-2 .. j+2, (N, 5)
+    bending_load: np.ndarray  # that without displacement
+    squared_curvature: np.ndarray  # kappa^2 at the stations where curvature terms count, else 0
+    curvature_terms: int  # place among those in CURVATURE_TERMS
+    ring_mass: np.ndarray  # inertia along the path, as `element_mass`
+    ring_relief: np.ndarray  # tension at which the rings' own weight bears them
     element_mass: float
-    mass: float
+    mass: float  # inertia across the path
     bending_stiffness: float
+    # of the pitch line at `driving_speed`; along a ramp of speed both follow `rhs.speed_share_at`
     belt_speed: float
     element_stiffness: float
     ring_stiffness: float
     element_damping: float
+    # times a gap's strain: most push of the elements' damper across the gap; inf, as in every run: elements
+    # that are apart have no damper
     bridging_stiffness: float
     has_column: bool
     column_stiffness: float
     outer_edge: float
     inner_edge: float
     ring_damping: float
-    tilts: bool
+    tilts: bool  # whether elements tilt on the rings
     tilt_spring: float
     tilt_damper: float
     transverse_damping: float
@@ -120,12 +109,12 @@ class Belt(NamedTuple):
     load: float
     load_start: float
     speed_start: float
-    profile: np.ndarray
+    profile: np.ndarray  # `course.profile_table`, (K, 4)
     rise_time: float
     start_damping: float
-    largest_displacement: float
-    faded: float
-    measures: Measures
+    largest_displacement: float  # a belt that is further off its path has left its grooves
+    faded: float  # coupling that counts for nothing
+    measures: Measures  # of the scene
     ramp_end: float
 
 
@@ -133,9 +122,7 @@ class State(NamedTuple):
     """The state: `fields` (7, N) in the order of FIELDS, `scalars` (12,) in the order of SCALARS.
 
     Of elements that tilt `fields` is (8, N), with ELEMENT_TILT; of rings in n layers (7 + 2 n, N), see
-    `rings.py`.
-
-    The work of the layers' dampers [J] until it is read is no state of the belt.
+    `rings.py`. The work of the layers' dampers [J] until it is read is no state of the belt.
     """
 
     fields: np.ndarray
@@ -196,36 +183,16 @@ class Mesh(NamedTuple):
 
 
 class Zone(NamedTuple):
-    """Stations that one groove may hold, m of them, and their place about its axis.
+    """Stations that one groove may hold, m of them, and their place about its axis."""
 
-    Attributes
-    ----------
-    stations : (m,) int array
-        In the direction of travel.
-    angle, beyond, rise : (m,) arrays
-        Angle from the inlet's tangent point [rad], way beyond the tangent points (negative before the inlet,
-        0 on the arc) and distance from the axis beyond the pitch radius [m].
-    """
-
-    stations: np.ndarray
-    angle: np.ndarray
-    beyond: np.ndarray
-    rise: np.ndarray
+    stations: np.ndarray  # (m,) int, in the direction of travel
+    angle: np.ndarray  # from the inlet's tangent point, (m,) [rad]
+    beyond: np.ndarray  # way beyond the tangent points, (m,) [m]: negative before the inlet, 0 on the arc
+    rise: np.ndarray  # distance from the axis beyond the pitch radius, (m,) [m]
 
 
 def mesh(parameters: Mapping[str, Any]) -> Mesh:
-    """Cut the path into `stations` cells, shorter by `end_refinement` at the ends of the arcs (`cut_path`).
-
-    Parameters
-    ----------
-    parameters : dict
-        Resolved parameters of one run.
-
-    Returns
-    -------
-    Mesh
-        With faces on the ends of the arcs.
-    """
+    """Cut the path into `stations` cells, shorter by `end_refinement` at the ends of arcs (`cut_path`)."""
     path = variator(parameters["ratio"], parameters["driven_radius"], parameters["centre_distance"])
     cells = cut_path(path, parameters["stations"], parameters["end_refinement"])
     counts = [part.size for part in cells]
@@ -233,18 +200,7 @@ def mesh(parameters: Mapping[str, Any]) -> Mesh:
 
 
 def belt_constants(parameters: Mapping[str, Any]) -> Belt:
-    """Constants of one run.
-
-    Parameters
-    ----------
-    parameters : dict
-        Resolved parameters of one run, `duration` [s] included.
-
-    Returns
-    -------
-    Belt
-        For the kernels.
-    """
+    """Constants of one run for the kernels, from its resolved parameters, `duration` [s] included."""
     p, grid = BENDING_DEFAULTS | TILT_DEFAULTS | dict(parameters), mesh(parameters)
     path, cell = grid.path, grid.cell
     dual = 0.5 * (cell + np.roll(cell, 1))
@@ -337,17 +293,8 @@ def belt_constants(parameters: Mapping[str, Any]) -> Belt:
 def initial_state(parameters: Mapping[str, Any], belt: Belt) -> State:
     """Start near the steady state without load.
 
-    Parameters
-    ----------
-    parameters : dict
-        Resolved parameters of one run.
-    belt : Belt
-        Its constants.
-
-    Returns
-    -------
-    State
-        Belt seated in both grooves under the tension that the thrust requires; layers at uniform strain.
+    The belt is seated in both grooves under the tension that the thrust requires, the layers at uniform
+    strain.
     """
     p, grid = parameters, mesh(parameters)
     tangent = np.tan(p["half_wedge_angle"])
@@ -400,21 +347,9 @@ def _fill_strands(w: np.ndarray, grid: Mesh) -> None:
 
 
 def random_strands(grid: Mesh, size: float, seed: int) -> np.ndarray:
-    """Random mixture of the first six sine shapes of both strands.
+    """Random mixture of the first six sine shapes of both strands: displacement of the stations (N,) [m].
 
-    Parameters
-    ----------
-    grid : Mesh
-        The belt's mesh.
-    size : float
-        Largest displacement [m].
-    seed : int
-        Of the random numbers; the mixture does not depend on the mesh.
-
-    Returns
-    -------
-    (N,) array
-        Displacement of the stations [m], 0 on the arcs.
+    It is `size` [m] at most, and 0 on the arcs. The mixture of a seed does not depend on the mesh.
     """
     random = np.random.default_rng(seed)
     shape = np.zeros(grid.cell.size)

@@ -49,14 +49,8 @@ def bending_bands(
 ) -> np.ndarray:
     """Force on each station by the displacements of five, (N, 5) [N/m^2]: the gradient of the energy.
 
-    Parameters
-    ----------
-    cell, dual, curvature : (N,) arrays
-        Lengths of cells and of stations [m], curvature of the path in the cells [1/m].
-    stiffness : float
-        EI [N m^2].
-    terms : int
-        NONE, PATH or STRAIGHT.
+    From lengths of cells and of stations [m] and the path's curvature in the cells [1/m], (N,) each, EI [N
+    m^2], and the curvature terms NONE, PATH or STRAIGHT.
     """
     n = cell.size
     second = second_difference(cell, dual)

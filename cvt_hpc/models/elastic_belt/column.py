@@ -35,22 +35,11 @@ from cvt_hpc.models.elastic_belt.belt import Belt
 
 @merged_kernel
 def rocking_column(eps, kappa, stiffness, bending, outer, inner):
-    """Forces of the column under a strain and a curvature.
+    """Forces of the column under a strain of the pitch line eps [1] and a curvature kappa [1/m].
 
-    Parameters
-    ----------
-    eps, kappa
-        Strain of the pitch line [1], curvature [1/m].
-    stiffness, bending
-        EA [N], EI [N m^2].
-    outer, inner
-        k+, k- [m].
-
-    Returns
-    -------
-    strain, give, turn, moment
-        -P / EA; where elements are apart, the positive number that the same formula gives of the strain of
-        the edge that meets first. Its slopes with eps and with kappa [m], and M [N m].
+    With EA [N], EI [N m^2], k+ and k- [m]. Returns -P / EA, or, where elements are apart, the positive number
+    that the same formula gives of the strain of the edge that meets first; its slopes with eps and with kappa
+    [m]; and M [N m].
     """
     edge = select(kappa > 0.0, -inner, outer)
     bent = bending * kappa
@@ -74,18 +63,10 @@ def deviating_curvature(belt: Belt, w: np.ndarray, j: int) -> float:
 def column_forces(
     belt: Belt, fields: np.ndarray, eps: np.ndarray, pressed: np.ndarray, moment: np.ndarray
 ) -> None:
-    """Push and moment of the column around the belt.
+    """Push and moment of the column around the belt, by the elements' strain `eps` in the cells, (N,).
 
-    Parameters
-    ----------
-    belt, fields
-        Constants, fields of the state.
-    eps : (N,) array
-        Strain of the elements in the cells.
-    pressed : (N,) array
-        Result: -P / EA in the cells, mean of both halves; positive where elements are apart.
-    moment : (N,) array
-        Result: M at the stations [N m].
+    Results: into `pressed` -P / EA in the cells, mean of both halves, positive where elements are apart; into
+    `moment` M at the stations [N m].
     """
     n, w = belt.cell.size, fields[f.W]
     moment[:] = 0.0

@@ -125,23 +125,10 @@ def kept_modes(parameters: Mapping[str, Any], pulley: str) -> tuple[np.ndarray, 
 def disc_settings(
     parameters: Mapping[str, Any], pulley: str, wrap: Sheaves, radius: float, turned: float
 ) -> dict[str, Any]:
-    """Data of the discs of one pulley for `Sheaves`, at the reference stiffness, beside local bending.
+    """Data of one pulley's discs for `Sheaves`, at the reference stiffness, beside local bending.
 
-    Parameters
-    ----------
-    parameters : mapping
-        Flat values of the run [SI].
-    pulley : str
-        driving or driven.
-    wrap : Sheaves
-        The wrap with m stations.
-    radius, turned : float
-        Pitch radius [m] and angle of the arc [rad].
-
-    Returns
-    -------
-    dict
-        `flexibilities`, (m, m) [m/N], or (0, 0) for local bending, and `modes` where these have inertia.
+    `flexibilities`, (m, m) [m/N], or (0, 0) for local bending, and `modes` where these have inertia, over the
+    `wrap` of m stations, with the pitch radius [m] and the angle `turned` of the arc [rad].
     """
     p = DEFLECTION_DEFAULTS | dict(parameters)
     if p["sheave_deformation"] == "cone":

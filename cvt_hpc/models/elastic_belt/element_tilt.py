@@ -33,18 +33,9 @@ ROUNDS = 8  # of Newton's method: round-off in double precision, and 2e-9 at the
 def tilted_sliding(free, held, grip, damping, per_width):
     """Sliding speed z of a saddle whose element tilts: damping (z - free) + held + grip tanh(z / v_reg) = 0.
 
-    Parameters
-    ----------
-    free
-        Sliding speed if the element did not turn [m/s].
-    held
-        Force of the spring at the saddle, k_a theta / d [N/m].
-    grip
-        Largest friction [N/m].
-    damping
-        Force at the saddle by its speed, of the damper and in a step of the spring [N s/m^2].
-    per_width
-        1 / v_reg [s/m].
+    `free` is that if the element did not turn [m/s], `held` the force of the spring at the saddle, k_a theta
+    / d, and `grip` the largest friction [N/m], `damping` the force at the saddle by its speed, of the damper
+    and in a step of the spring [N s/m^2], `per_width` 1 / v_reg [s/m].
     """
     pull = fma(damping, free, -held)
     size = absolute(pull)

@@ -37,14 +37,9 @@ FIELDS_OF_WORK = lf.FIELDS_OF_FORCES + 6
 
 @kernel
 def step_explicit(belt: LaneBelt, state: LaneState, work: Work, step: float) -> None:
-    """One step.
+    """Advance the state by a step [s], with the results of `derive` for it in the work space.
 
-    Parameters
-    ----------
-    belt, state, work
-        Constants, state (advanced in place), work space, that holds the results of `derive` for this state.
-    step : float
-        Step [s]; stable below 2 / (largest rate), some 0.2 us with the default belt.
+    It is stable below 2 / (largest rate), some 0.2 us with the default belt.
     """
     stations = work.stations
     forces.lane_sliding(belt, state, stations)
@@ -64,9 +59,9 @@ def step_explicit(belt: LaneBelt, state: LaneState, work: Work, step: float) -> 
 
 @kernel
 def _accelerate(belt: LaneBelt, state: LaneState, stations: LaneArray, step: float):
-    """Increments of the velocities into DU and DV; the flanks' torques.
+    """Increments of the velocities into DU and DV; the flanks' torques on both pulleys [N m].
 
-    The torque taken from the driving pulley, where that is free, and the moment on the driven one [N m].
+    That taken from the driving pulley, where that is free, and the moment on the driven one.
     """
     n, fields, c = state.fields.rows, state.fields, belt.constants
     sine, cosine, offset = c[0, lf.SINE], c[0, lf.COSINE], c[0, lf.RING_OFFSET]

@@ -83,16 +83,10 @@ VARIABLES = (
 
 
 class Fluctuation(NamedTuple):
-    """Mean power that each part of the belt feeds into the fluctuation; negative: takes.
+    """Mean power that each part of the belt feeds into the fluctuation [W], (N,); negative: takes.
 
-    Attributes
-    ----------
-    flanks, belt, rings, carried : (N,) arrays
-        Of the stations [W].
-    stresses : (N,) array
-        Of the cells [W].
-    mean_layers : float
-        Power that the layers' dampers take from the mean motion, which is no fluctuation [W].
+    Of the stations, and `stresses` of the cells; `mean_layers`, a number, is the power that the layers'
+    dampers take from the mean motion, which is no fluctuation.
     """
 
     flanks: np.ndarray
@@ -106,14 +100,7 @@ class Fluctuation(NamedTuple):
 def fluctuation(means: dict[str, np.ndarray], grid: Mesh, parameters: Mapping[str, Any]) -> Fluctuation:
     """Power of the fluctuations around the belt.
 
-    Parameters
-    ----------
-    means : dict
-        MOMENTS over the number of samples, and `mean_displacement` [m], (N,) each.
-    grid : Mesh
-        The belt's mesh.
-    parameters : dict
-        Resolved parameters of the run [SI].
+    `means` are MOMENTS over the number of samples, and `mean_displacement` [m], (N,) each.
     """
     m, p = means, parameters
     dual = at_stations(grid.cell)
@@ -171,11 +158,6 @@ def part_shares(grid: Mesh) -> np.ndarray:
 
     They add up to 1 where a groove may hold a station: its contact reaches over half of both cells beside it,
     and beyond an arc's end it counts to the part there.
-
-    Parameters
-    ----------
-    grid : Mesh
-        The belt's mesh.
     """
     shares = np.zeros((2, ARC_PARTS, grid.cell.size))
     borders = np.linspace(0.0, 1.0, ARC_PARTS + 1)

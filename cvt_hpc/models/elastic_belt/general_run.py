@@ -29,14 +29,9 @@ SAMPLES_TOGETHER = 20  # between two checks of the samples: a run that has left 
 
 
 class GeneralTransient(Marched, OneLaneRun):
-    """One run, advanced sample by sample; attributes as of `RecordedRun`.
+    """One run by any general stepper that the model takes, sample by sample; attributes of `RecordedRun`.
 
-    Parameters
-    ----------
-    parameters : dict
-        Resolved parameters of the run [SI], the stepper's among them.
-    stepper : str
-        Name of a general stepper that the model does not refuse.
+    Its resolved parameters [SI] have those of the stepper.
     """
 
     def __init__(self, parameters: Mapping[str, Any], stepper: str) -> None:
@@ -83,28 +78,14 @@ class GeneralTransient(Marched, OneLaneRun):
     def take_over(self, runs: Sequence[Any]) -> None:
         """Continue a run by another stepper, its history included, except for means that began before.
 
-        Parameters
-        ----------
-        runs : sequence of one LaneRun or GeneralTransient
-            Of the same mesh, sampling and duration.
+        Of `runs`, one LaneRun or GeneralTransient, of the same mesh, sampling and duration.
         """
         (run,) = runs
         self._go_on_from(run)
         self.marching.begin(run.time, self._equations.pack(self._flat, run.state))
 
     def advance(self, samples: int) -> tuple[Status, str] | None:
-        """March on.
-
-        Parameters
-        ----------
-        samples : int
-            How many samples at most; 0 compiles only.
-
-        Returns
-        -------
-        (Status, str) or None
-            The failure, where the run cannot continue.
-        """
+        """March on by so many samples at most, 0 compiles only; the failure, if the run cannot continue."""
         last = min(self.done + samples, self.samples)
         found = self._march(0) if samples == 0 else None
         while found is None and self.done < last:

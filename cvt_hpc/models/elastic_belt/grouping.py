@@ -59,14 +59,8 @@ SHARED = (
 def cost(parameters: Mapping[str, Any], stepper: str, step_cost: Mapping[str, float] = STEP_COST) -> Any:
     """Core-seconds of a batch; of general steppers, some of which choose their step, little is known.
 
-    Parameters
-    ----------
-    parameters : dict
-        Resolved parameters of a run, each a number or an array of them.
-    stepper : str
-        Name of a stepper.
-    step_cost : mapping
-        Core-seconds per station and time step, by stepper.
+    Resolved parameters of a run are numbers or arrays of them; `step_cost` is per station and time step, by
+    stepper.
     """
     p = parameters
     is_alone = np.equal(p.get("lanes", "runs"), "stations")
@@ -77,15 +71,7 @@ def cost(parameters: Mapping[str, Any], stepper: str, step_cost: Mapping[str, fl
 
 
 def lanes(parameters: Mapping[str, Any], stepper: str) -> int:
-    """Most runs that a batch can take.
-
-    Parameters
-    ----------
-    parameters : dict
-        Resolved parameters of a run.
-    stepper : str
-        Name of a stepper; general ones take one.
-    """
+    """Most runs that a batch can take, by parameters of one and the stepper's name; general ones take one."""
     if stepper not in OWN_STEPPERS or parameters["lanes"] == "stations":
         return 1
     return LANES[parameters["precision"]]
@@ -101,13 +87,7 @@ def faded_coupling(parameters: Mapping[str, Any]) -> float:
 
 
 def lane_key(parameters: Mapping[str, Any]) -> tuple:
-    """Values that two runs must have in common to be in one batch.
-
-    Parameters
-    ----------
-    parameters : dict
-        Resolved parameters of a run.
-    """
+    """Values that two runs must have in common to be in one batch."""
     alike = (parameters[key] for key in SHARED if key in parameters)
     common = parameters["friction_memory"] > 0.0, are_free(parameters), faded_coupling(parameters)
     return (*alike, *common, elements_tilt(parameters))

@@ -24,18 +24,10 @@ PREFIX = "momentary_"  # of the names of quantities over time and position
 
 
 def histories(run: RecordedRun) -> xr.Dataset:
-    """Histories over `time` and means by `position` of a run, finished or failed.
+    """Histories over `time` and means by `position` of a run, finished or failed, as far as it has samples.
 
-    Parameters
-    ----------
-    run : RecordedRun
-        With the samples that it has.
-
-    Returns
-    -------
-    Dataset
-        `displacement` (time, probe) [m], scalars over time, and the profiles of the judged part by
-        `position`; with a profile_duration also those of the last samples over `profile_time`.
+    `displacement` (time, probe) [m], scalars over time, and the profiles of the judged part by `position`;
+    with a profile_duration also those of the last samples over `profile_time`.
     """
     over_time = {
         f"{pulley}_position": (f"{pulley} position", "m", f"axial opening of the {pulley} pulley")

@@ -43,15 +43,7 @@ MOST_PASSES = 9
 
 @kernel
 def step_imex(belt: LaneBelt, state: LaneState, work: Work, step: float) -> None:
-    """One step.
-
-    Parameters
-    ----------
-    belt, state, work
-        Constants, state (advanced in place), work space, that holds the results of `derive` for this state.
-    step : float
-        Step [s].
-    """
+    """Advance the state by a step [s], with the results of `derive` for it in the work space."""
     stations = work.stations
     forces.lane_sliding(belt, state, stations)
     if belt.tilts:
@@ -99,9 +91,9 @@ def forget(work: Work) -> None:
 
 @kernel
 def advance_belt(belt: LaneBelt, state: LaneState, work: Work, step: float):
-    """Apply the increments, and find the new strains; the flanks' torques.
+    """Apply the increments, and find the new strains; the flanks' torques on both pulleys [N m].
 
-    The torque taken from the driving pulley, where that is free, and the moment on the driven one [N m].
+    That taken from the driving pulley, where that is free, and the moment on the driven one.
     """
     n, fields, stations, c = state.fields.rows, state.fields, work.stations, belt.constants
     per_cosine = 1.0 / c[0, lf.COSINE]

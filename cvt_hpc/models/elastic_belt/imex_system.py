@@ -34,18 +34,10 @@ TURNS_BACK, MEETS = 1, 2  # why a step has to be done again
 def element_stress(stiffness, grip, eps, closing, ahead, per_length, last, meet):
     """-P in a cell [N] with the speeds that the step begins with, and its slope with their change.
 
-    Parameters
-    ----------
-    stiffness, grip
-        EA [N], damping over the cell's length [N s/m].
-    eps, closing
-        Strain and speed at which the cell lengthens [m/s].
-    ahead, per_length
-        Strain at the end of the step with these speeds, and its slope with their difference [s/m].
-    last
-        Slope of -P in the step before [N s/m]: 0 where the elements were apart.
-    meet
-        1 where the step was found to press elements together that it had taken as apart.
+    From EA [N] and the damping over the cell's length [N s/m]; strain and speed at which the cell lengthens
+    [m/s]; the strain at the end of the step with these speeds, and its slope with their difference [s/m]; the
+    slope of -P in the step before [N s/m], 0 where the elements were apart; `meet`, 1 where the step was
+    found to press elements together that it had taken as apart.
     """
     viscous = grip * closing
     # elements never pull: their damper ends where it would outweigh the push force

@@ -29,40 +29,8 @@ LEAST_ROWS = 3  # of a part of a run: bending reaches two stations
 class LaneBelt(NamedTuple):
     """Constants of W runs on one mesh of N stations; arrays of one number a station are shared.
 
-    Of one run in linked parts (`parted`), arrays of stations are LaneArrays, of one field or of five.
-
-    Attributes
-    ----------
-    cell, dual, per_cell, per_dual, per_span, curvature, arc_curvature, touches, on_driven,
-    rise, lean, lean_rate, upright : (N,) arrays
-        As in `Belt`.
-    ring_curvature : (N,) array
-        Curvature of both neighbouring cells, weighted by length [1/m]: a station's ring mass is
-        ring_mass (1 + ring_offset ring_curvature), and so with its centrifugal relief.
-    bending : (N, 5) array
-        As in `Belt`, for a bending stiffness of 1 N m^2.
-    bending_load, squared_curvature : (N,) arrays
-        As in `Belt`, the load for a bending stiffness of 1 N m^2.
-    constants : (1, 60) LaneArray
-        CONSTANTS.
-    places : two pairs of (m,) int arrays
-        Row and part of the stations that the driving and the driven groove may hold.
-    memory : bool
-        Whether friction has a memory.
-    law : FrictionLaw
-        Its kind, and the table where it is one; coefficients are in `constants`.
-    rise_time, ramp_end : float
-        Course of the load and of the speed [s].
-    start_damping, largest_displacement, faded : float
-        As in `Belt`.
-    profile : (K, 4) array
-        As in `Belt`, the same for all runs.
-    speed_changes : bool
-        Whether some run's driving speed does.
-    is_free : bool
-        Whether the pulleys have the states and laws of `pulleys.py`.
-    is_curved, has_column, tilts : bool
-        Whether curvature terms count, pressed elements bear a bending moment, and elements tilt.
+    What is not described is as in `Belt`; `bending` and `bending_load` are those of a bending stiffness of 1
+    N m^2. Of one run in linked parts (`parted`), arrays of stations are LaneArrays, of one field or of five.
     """
 
     cell: np.ndarray
@@ -78,65 +46,47 @@ class LaneBelt(NamedTuple):
     lean: np.ndarray
     lean_rate: np.ndarray
     upright: np.ndarray
+    # of both neighbouring cells, weighted by length, (N,) [1/m]: a station's ring mass is ring_mass (1 +
+    # ring_offset ring_curvature), and so with its centrifugal relief
     ring_curvature: np.ndarray
     bending: np.ndarray
     bending_load: np.ndarray
     squared_curvature: np.ndarray
-    constants: LaneArray
+    constants: LaneArray  # (1, 60): CONSTANTS
+    # row and part of the stations that the driving and the driven groove may hold, (m,) int each
     places: tuple[tuple[np.ndarray, np.ndarray], tuple[np.ndarray, np.ndarray]]
-    memory: bool
-    law: FrictionLaw
-    rise_time: float
+    memory: bool  # whether friction has one
+    law: FrictionLaw  # its kind, and the table where it is one; coefficients are in `constants`
+    rise_time: float  # end of the load's rise [s]
     start_damping: float
     largest_displacement: float
     faded: float
-    ramp_end: float
-    profile: np.ndarray
-    speed_changes: bool
-    is_free: bool
-    is_curved: bool
-    has_column: bool
-    tilts: bool
+    ramp_end: float  # end of a ramp of load or speed [s]
+    profile: np.ndarray  # (K, 4), the same for all runs
+    speed_changes: bool  # whether some run's driving speed does
+    is_free: bool  # whether the pulleys have the states and laws of `pulleys.py`
+    is_curved: bool  # whether curvature terms count
+    has_column: bool  # whether pressed elements bear a bending moment
+    tilts: bool  # whether elements tilt
 
 
 class LaneState(NamedTuple):
-    """State of W runs.
+    """State of W runs on N stations; what fields, scalars, column and tilt hold is named in `lane_fields`."""
 
-    Attributes
-    ----------
-    fields : (N, 7) LaneArray
-        FIELDS at each station: layers' speeds less the belt speed of `time`; contents less 1 + kappa d_i. Of
-        rings in n layers (N, 7 + 2 n), see `rings.py`.
-    scalars : (1, 12) LaneArray of doubles
-        Scalars of `lane_fields`.
-    time : (1,) array
-        [s]
-    contacts : pair of Contact
-        Driving and driven wrap.
-    column : (N, 11) LaneArray
-        Values of the column by `lane_fields`; without rows where elements bear no moment.
-    tilt : (N, 4) LaneArray
-        Values of the elements' tilt by `lane_fields`; without rows where they do not tilt.
-    """
-
+    # FIELDS at each station, (N, 7), of rings in n layers (N, 7 + 2 n), see `rings.py`: layers' speeds less
+    # the belt speed of `time`; contents less 1 + kappa d_i
     fields: LaneArray
-    scalars: LaneArray
-    time: np.ndarray
-    contacts: tuple[Contact, Contact]
-    column: LaneArray
-    tilt: LaneArray
+    scalars: LaneArray  # (1, 12) doubles
+    time: np.ndarray  # (1,) [s]
+    contacts: tuple[Contact, Contact]  # driving and driven wrap
+    column: LaneArray  # (N, 11), without rows where elements bear no moment
+    tilt: LaneArray  # (N, 4), without rows where elements do not tilt
 
 
 class Work(NamedTuple):
-    """Work space of a step that keeps values of stations alone.
+    """Work space of a step that keeps values of stations alone."""
 
-    Attributes
-    ----------
-    stations : (N, fields) LaneArray
-        Fields that `lane_fields` and the step name.
-    """
-
-    stations: LaneArray
+    stations: LaneArray  # (N, fields), those that `lane_fields` and the step name
 
 
 def work_space(state: LaneState, fields: int) -> Work:
@@ -146,15 +96,7 @@ def work_space(state: LaneState, fields: int) -> Work:
 
 
 def lane_belt(belts: list[Belt], dtype: DTypeLike) -> LaneBelt:
-    """Constants of several runs on the same mesh.
-
-    Parameters
-    ----------
-    belts : list of Belt
-        One for each lane.
-    dtype : type
-        np.float64 or np.float32.
-    """
+    """Constants of several runs on the same mesh, one for each lane, in np.float64 or np.float32."""
     first = belts[0]
     constants = LaneArray(1, len(lf.CONSTANTS), len(belts), dtype)
     for lane, belt in enumerate(belts):
@@ -232,15 +174,7 @@ def _constants_of(belt: Belt) -> list[float]:
 
 
 def lane_state(belts: list[Belt], states: list[State], dtype: type) -> LaneState:
-    """State of several runs on the same mesh, with fresh contacts.
-
-    Parameters
-    ----------
-    belts, states : lists of Belt and State
-        One for each lane, all at the same time.
-    dtype : type
-        np.float64 or np.float32.
-    """
+    """State of several runs on the same mesh, one for each lane, all at one time, with fresh contacts."""
     n, lanes = belts[0].cell.size, len(belts)
     tilts = belts[0].tilts
     fields = LaneArray(n, states[0].fields.shape[0] - tilts, lanes, dtype)
@@ -282,14 +216,9 @@ def parted_state(state: LaneState, parts: int) -> LaneState:
 
 
 def parted(belt: LaneBelt, parts: int) -> LaneBelt:
-    """Constants of one run, its stations in linked parts.
+    """Constants of one run, of one lane, its stations in linked parts.
 
-    Parameters
-    ----------
-    belt : LaneBelt
-        Of one lane.
-    parts : int
-        Their number, a power of 2 that divides that of the stations.
+    Their number is a power of 2 that divides that of the stations.
     """
     arrays: dict[str, Any] = {
         name: split(_one_lane(array), parts)

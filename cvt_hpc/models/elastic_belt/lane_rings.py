@@ -30,36 +30,16 @@ LOSS, SLIDING, TENSION, SPEED_SUM = 0, 1, 3, 5
 
 
 class LaneRings(NamedTuple):
-    """Constants of the layers of W runs.
+    """Constants of n layers of W runs."""
 
-    Attributes
-    ----------
-    constants : (1, 11 + n + 4 (n + 1)) LaneArray
-        See above.
-    number : int
-        n
-    falls : bool
-        Whether static friction is above the kinetic one in any run.
-    middles : (2,) int array
-        Cell in the middle of each strand.
-    """
-
-    constants: LaneArray
-    number: int
-    falls: bool
-    middles: np.ndarray
+    constants: LaneArray  # (1, 11 + n + 4 (n + 1)), see above
+    number: int  # n
+    falls: bool  # whether static friction is above the kinetic one in any run
+    middles: np.ndarray  # cell in the middle of each strand, (2,) int
 
 
 def lane_rings(belts: Sequence[Belt], rings: Sequence[Rings], dtype: DTypeLike) -> LaneRings:
-    """Constants of several runs on the same mesh, with as many layers.
-
-    Parameters
-    ----------
-    belts, rings : sequences of Belt and Rings
-        One for each lane.
-    dtype : type
-        np.float64 or np.float32.
-    """
+    """Constants of several runs on the same mesh, with as many layers, one for each lane."""
     n, first = rings[0].length.size, belts[0]
     constants = LaneArray(1, lf.FIRST_OFFSET + n + 4 * (n + 1), len(rings), dtype)
     for lane, (belt, ring) in enumerate(zip(belts, rings, strict=True)):
@@ -139,16 +119,9 @@ def audit_layers(
 ) -> None:
     """Part of the layers in the audit of a belt whose rings as one do not rub, and in sums over samples.
 
-    Parameters
-    ----------
-    belt, rings, state
-        Constants and state, not in parts.
-    layers : (N, n) LaneArray
-        Work space.
-    samples, k
-        As of `sample`, which comes before.
-    sums : (n + 1, 6) LaneArray of doubles
-        SUMS of this state are added to it where the samples' profiles take any.
+    `belt`, `rings` and `state` are not in parts, `layers` (N, n) is work space, `samples` and `k` are as of
+    `sample`, which comes before. SUMS of this state are added to `sums` (n + 1, 6), of doubles, where the
+    samples' profiles take any.
     """
     rows, profiles, first = samples.rows, samples.profiles, samples.sensing.matrix.shape[0] + len(SCALARS)
     n, fields, c = rings.number, state.fields, rings.constants

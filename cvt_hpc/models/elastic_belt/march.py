@@ -11,15 +11,7 @@ from cvt_hpc.models.elastic_belt.sampling import Samples, sample
 
 
 class Sampled(NamedTuple):
-    """The belt of which samples are taken: the marched one, where that is in linked parts all in one.
-
-    Attributes
-    ----------
-    belt, state
-        Constants and state, not in parts.
-    stations : LaneArray
-        The step's work space.
-    """
+    """The belt of which samples are taken, not in parts, and the step's work space."""
 
     belt: LaneBelt
     state: LaneState
@@ -41,23 +33,11 @@ def march(
     first: int,
     last: int,
 ) -> None:
-    """Fill rows first .. last - 1 with samples, `steps` steps before each.
+    """Fill rows first .. last - 1 with samples, `steps` steps of `step` [s] before each.
 
-    Parameters
-    ----------
-    begin, advance, take : kernels
-        begin(belt, state, work) comes first; advance(belt, state, work, step) takes a step; take, with the
-        arguments of `take_sample`, takes a sample.
-    belt, state, work
-        As these kernels take them.
-    step, steps : float, int
-        Step [s] and their number between samples.
-    sampled : Sampled
-        Of the same run or runs; at the end it has all of the state.
-    samples : Samples
-        The arrays of the samples.
-    first, last : int
-        Which rows of them.
+    The kernels: begin(belt, state, work) comes first; advance(belt, state, work, step) takes a step; take,
+    with the arguments of `take_sample`, takes a sample. `sampled` is of the same run or runs; at the end it
+    has all of the state.
     """
     begin(belt, state, work)
     for k in range(first, last):

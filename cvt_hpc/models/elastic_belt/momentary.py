@@ -37,20 +37,10 @@ def profile_bytes(parameters: Mapping[str, Any]) -> int:
 
 
 class Momentary:
-    """Profiles of the last samples of the runs of a batch.
+    """Profiles of the last samples of the runs of a batch, alike in sampling and duration, of N stations.
 
-    Parameters
-    ----------
-    points : sequence of mapping
-        Parameters of the runs [SI], alike in sampling and duration; those whose profile_duration is 0 keep
-        none.
-    stations : int
-        N
-
-    Attributes
-    ----------
-    first : int
-        Samples before the first one that is kept; all, where none is.
+    Those whose profile_duration is 0 keep none. Before the first one that is kept there are `first` samples;
+    all, where none is.
     """
 
     def __init__(self, points: Sequence[Mapping[str, Any]], stations: int) -> None:

@@ -2,11 +2,10 @@
 
 Unknowns, in this order, for N stations: w, u, v_element, v_ring, n_element, n_ring (N each), the tilt of the
 elements where they tilt (N), the filtered speed of those stations that have a memory, the states of free
-pulleys where they are, the driven pulley's speed and position. Layers' speeds are counted
-from the nominal belt speed, contents from 1 and the pulley's speed from its nominal one, so that tolerances
-relative to an unknown mean its variation. Stations that no groove can hold have no memory, and without
-friction memory none has. Forces,
-contact and laws are those of `rhs`, called and not written again.
+pulleys where they are, the driven pulley's speed and position. Layers' speeds are counted from the nominal
+belt speed, contents from 1 and the pulley's speed from its nominal one, so that tolerances relative to an
+unknown mean its variation. Stations that no groove can hold have no memory, and without friction memory none
+has. Forces, contact and laws are those of `rhs`, called and not written again.
 """
 
 from typing import NamedTuple
@@ -42,52 +41,25 @@ SIZES_OF_STATES = (SIZE_OF_SPEED, *[SIZE_OF_POSITION] * (f.RATIO_SUM - 1), SIZE_
 
 
 class FlatBelt(NamedTuple):
-    """Input of `rates` beside t and y.
-
-    Attributes
-    ----------
-    belt : Belt
-        Constants.
-    state : State
-        Work space: y as fields and scalars, of the last call.
-    contacts : tuple of two Contact
-        Closed sets of the last call, where the next search starts. They change results by round-off alone.
-    remembering : (M,) int array
-        Stations whose filtered speed is an unknown.
-    loose : (K,) int array
-        Those of the state's scalars that are unknowns beside the driven pulley's speed and position.
-    origin : (n,) array
-        Origin from which the unknowns are counted.
-    start : float
-        Simulated time at t = 0 [s].
-    force, eps, rate, moments : (N,), (2, N), (7 or 8, N), (N,) arrays
-        Work space: axial line forces, or pulls, of `contact_forces`, strains, rates, moments on the driven
-        pulley.
-    """
+    """Input of `rates` beside t and y; `state`, and from `force` on all, is work space."""
 
     belt: Belt
-    state: State
+    state: State  # y as fields and scalars, of the last call
+    # closed sets of the last call, where the next search starts; they change results by round-off alone
     contacts: tuple[Contact, Contact]
-    remembering: np.ndarray
+    remembering: np.ndarray  # stations whose filtered speed is an unknown, (M,) int
+    # state's scalars that are unknowns beside the driven pulley's speed and position, (K,) int
     loose: np.ndarray
-    origin: np.ndarray
-    start: float
-    force: np.ndarray
-    eps: np.ndarray
-    rate: np.ndarray
-    moments: np.ndarray
+    origin: np.ndarray  # from which the unknowns are counted, (n,)
+    start: float  # simulated time at t = 0 [s]
+    force: np.ndarray  # axial line forces, or pulls, of `contact_forces`, (N,)
+    eps: np.ndarray  # strains, (2, N)
+    rate: np.ndarray  # rates, (7 or 8, N)
+    moments: np.ndarray  # on the driven pulley, (N,)
 
 
 def flat_belt(belt: Belt, start: float = 0.0) -> FlatBelt:
-    """Constants and work space of a belt's `rates`.
-
-    Parameters
-    ----------
-    belt : Belt
-        Constants of the run.
-    start : float
-        Simulated time at t = 0 [s].
-    """
+    """Constants and work space of a belt's `rates`; `start` is the simulated time at t = 0 [s]."""
     n = belt.cell.size
     remembering = np.flatnonzero((belt.touches > 0.0) & (belt.friction_memory > 0.0))
     origins = {f.V_ELEMENT: belt.belt_speed, f.V_RING: belt.belt_speed, f.N_ELEMENT: 1.0, f.N_RING: 1.0}
@@ -169,10 +141,10 @@ def driven_moment(belt: Belt, moments: np.ndarray) -> float:
 
 @kernel
 def pulled_by(belt: Belt, force: np.ndarray, moments: np.ndarray) -> np.ndarray:
-    """Action of the belt on its pulleys, (8,).
+    """Action of the belt on its pulleys, (8,), driving one first.
 
     The torque that it takes from the driving one, its moment on the driven one [N m], the axial forces, and
-    the tilting forces on the sheaves, driving pulley first [N].
+    the tilting forces on the sheaves [N].
     """
     pull = np.zeros(8)
     pull[1] = driven_moment(belt, moments)
@@ -217,23 +189,9 @@ def rates_under_forces(flat: FlatBelt) -> None:
 
 @kernel
 def rates(flat: FlatBelt, t: float, y: np.ndarray, out: np.ndarray) -> bool:
-    """Right-hand side.
+    """Right-hand side: rates of the unknowns y (n,) at time t [s] into `out` (n,).
 
-    Parameters
-    ----------
-    flat : FlatBelt
-        Constants and work space.
-    t : float
-        Time [s].
-    y : (n,) array
-        Unknowns.
-    out : (n,) array
-        Result: their rates.
-
-    Returns
-    -------
-    bool
-        Whether the contact has a solution; it has one unless y is not a number.
+    Whether the contact has a solution; it has one unless y is not a number.
     """
     belt, state, rate = flat.belt, flat.state, flat.rate
     unpack(flat, t, y)

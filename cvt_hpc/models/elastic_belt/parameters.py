@@ -1,8 +1,7 @@
 """Parameters of the elastic belt that a job may set, with units, bounds and defaults.
 
-Only ratio, driving_speed and thrust of the defaults are from a paper (Lebrecht et al. 2004, sec. 3.1); sizes
-are those of a common passenger-car belt; seven were fitted to what that paper states of the noise, as
-jobs/lebrecht_2004.toml says; every other default is an assumption, plausible and not measured.
+Of the defaults the same holds as of those in `variator/scene.py`: most are assumptions, plausible and not
+measured.
 """
 
 from typing import Any
@@ -164,18 +163,7 @@ PARAMETERS: dict[str, dict[str, Parameter]] = {
 
 
 def check(parameters: dict[str, Any]) -> list[tuple[str, str, str]]:
-    """Problems that lie between parameters.
-
-    Parameters
-    ----------
-    parameters : dict
-        Values by name, in SI units.
-
-    Returns
-    -------
-    list of (key, expected, found)
-        Empty where all is well.
-    """
+    """Problems that lie between parameters [SI]: (key, expected, found)."""
     p = parameters
     found = shape_problems(p) + profiles.profile_problems(p) + friction_problems(p)
     return found or pulley_problems(p)
@@ -200,15 +188,7 @@ def shape_problems(parameters: dict[str, Any]) -> list[tuple[str, str, str]]:
 def inert(parameters: dict[str, Any]) -> dict[str, str]:
     """Parameters without effect on a run, so that a study does not vary them for nothing.
 
-    Parameters
-    ----------
-    parameters : dict
-        Values by name, in SI units.
-
-    Returns
-    -------
-    dict
-        By the name of the parameter, the setting that makes it so, e.g. "friction_law table".
+    By the name of the parameter, the setting that makes it so, e.g. "friction_law table".
     """
     p = parameters
     whole, disc = stiffness_factors(p)

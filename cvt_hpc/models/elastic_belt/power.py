@@ -44,22 +44,11 @@ def audit(
     first: int,
     profiles: LaneArray,
 ) -> None:
-    """Powers [W] and stored energy [J] of a state.
+    """Powers [W] and stored energy [J] of a state, as POWERS into row k of `rows` from field `first` on.
 
-    Parameters
-    ----------
-    belt, state
-        Constants and state; the work of the dampers since the last audit is used up.
-    stations : LaneArray
-        The step's work space, with the forces and strains of this state.
-    axial
-        Axial force of the belt on the driven sheave [N], in lanes.
-    interval : float
-        Time since the last audit [s].
-    rows, k, first
-        Results go into row k from field `first` on, in the order of POWERS.
-    profiles : (N, M) LaneArray of doubles
-        MOMENTS of this state are added to its first fields; one without rows takes none.
+    The work of the dampers since the last audit, `interval` [s] ago, is used up. `stations` have the forces
+    and strains of this state, `axial` is the axial force of the belt on the driven sheave [N]. MOMENTS of
+    this state are added to the first fields of `profiles` (N, M), of doubles; one without rows takes none.
     """
     n, fields, c, scalars = belt.cell.size, state.fields, belt.constants, state.scalars
     speed = scalars[0, lf.SPEED]

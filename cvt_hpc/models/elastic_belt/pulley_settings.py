@@ -198,14 +198,7 @@ def are_free(parameters: Mapping[str, Any]) -> bool:
 def shaft_deflection(parameters: Mapping[str, Any], pulley: str, radius: float) -> tuple[float, float]:
     """Effect of a pulley's shaft on its groove: compliance [m/N], free opening by its bearings [m].
 
-    Parameters
-    ----------
-    parameters : mapping
-        Flat values of the run [SI].
-    pulley : str
-        driving or driven.
-    radius : float
-        Its pitch radius [m].
+    From flat values of the run [SI] and the pitch radius [m] of the driving or the driven pulley.
     """
     p = PULLEY_DEFAULTS | dict(parameters)
     prefix = OWN if pulley == "driven" and p[f"{OWN}shaft_lengths"] else ""

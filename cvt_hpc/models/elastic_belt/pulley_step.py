@@ -140,15 +140,9 @@ def audit_pulleys(
     """Powers and stored energy of free pulleys, in the place of those of pulleys that are not.
 
     A lag's oil takes the work of the axial forces, or moments, beyond the energy in springs. Thrusts work
-    with all pressing forces but the springs.
-
-    Parameters
-    ----------
-    belt, state, rows, k, first
-        As of `power.audit`, whose results stand in the row.
-    driving, driven
-        Power that the belt takes from the driving pulley, and torque that it takes from the driven one times
-        that pulley's speed [W].
+    with all pressing forces but the springs. Results of `power.audit` stand in the row; `driving` and
+    `driven` are the power that the belt takes from the driving pulley, and the torque that it takes from the
+    driven one times that pulley's speed [W].
     """
     c, scalars = belt.constants, state.scalars
     speed = scalars[0, lf.SPEED]

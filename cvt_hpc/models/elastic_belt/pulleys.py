@@ -43,17 +43,10 @@ from cvt_hpc.variator import PULLEYS
 
 
 class Pulleys(NamedTuple):
-    """Constants of both pulleys.
+    """Constants of both pulleys."""
 
-    Attributes
-    ----------
-    laws : (1, 22) array
-        LAWS.
-    are_free : bool
-        Whether any pulley does more than turn by a given speed, or be pressed by a constant thrust.
-    """
-
-    laws: np.ndarray
+    laws: np.ndarray  # LAWS, (1, 22)
+    # whether any pulley does more than turn by a given speed, or be pressed by a constant thrust
     are_free: bool
 
 
@@ -62,14 +55,8 @@ def with_pulleys(
 ) -> tuple[list[Sheaves], Pulleys]:
     """Sheaves as the contact takes them, on their shafts, and the constants of both pulleys.
 
-    Parameters
-    ----------
-    parameters : mapping
-        Flat values of the run [SI].
-    wraps : sequence of Sheaves
-        Of the driving and of the driven pulley, on rigid shafts.
-    radii : (float, float)
-        Their pitch radii [m].
+    From flat values of the run [SI], and of the driving and of the driven pulley the wraps, on rigid shafts,
+    and the pitch radii [m].
     """
     p = PULLEY_DEFAULTS | dict(parameters)
     shafts = [shaft_deflection(p, pulley, radius) for pulley, radius in zip(PULLEYS, radii, strict=True)]
@@ -130,16 +117,9 @@ def moving_states(pulleys: Pulleys) -> np.ndarray:
 
 
 def settled_tilt(pulleys: Pulleys, first: int, tilting: np.ndarray) -> np.ndarray:
-    """Opening q of a groove at rest [m], (2,), where it is a state; else 0.
+    """Opening q of a groove at rest [m], (2,), under s = `tilting` (2,) [N], where it is a state; else 0.
 
-    Parameters
-    ----------
-    pulleys : Pulleys
-        The constants.
-    first : int
-        DRIVING_COS or DRIVEN_COS.
-    tilting : (2,) array
-        s [N].
+    `first` is DRIVING_COS or DRIVEN_COS.
     """
     laws, which = pulleys.laws[0], int(first == f.DRIVEN_COS)
     if laws[f.TILT_RATE] == 0.0:
@@ -161,25 +141,10 @@ def beyond_clearance(one, other, free):
 def thrusts(laws, first: int, states, going: float, turning, position, axial, given):
     """Axial forces on the movable sheaves [N], and how fast the controllers' integrals change [N/s].
 
-    Parameters
-    ----------
-    laws, first
-        Constants, LAWS from field `first` on.
-    states
-        STATES.
-    going : float
-        1 once the controllers go, 0 before.
-    turning, axial
-        Speeds of both pulleys [rad/s], axial forces of the belt on them [N].
-    position
-        Opening of the driven pulley [m].
-    given
-        Load at the driving pulley [N m], speed ratio [1], thrust on the driven pulley [N].
-
-    Returns
-    -------
-    driving, driven, ratio_rate, clamping_rate
-        Forces with springs and oil, and rates.
+    The forces of both pulleys are with springs and oil; the rates are those of ratio and clamping. From
+    `laws`, LAWS from field `first` on, STATES, `going`, 1 once the controllers go and 0 before, speeds of
+    both pulleys [rad/s] and axial forces of the belt on them [N], the opening of the driven pulley [m], and
+    as `given` the load at the driving pulley [N m], speed ratio [1] and thrust on the driven pulley [N].
     """
     torque, ratio, thrust = given
     least, most = like(laws[0, first + f.LEAST_THRUST], thrust), like(laws[0, first + f.MOST_THRUST], thrust)
@@ -235,22 +200,11 @@ def drive_torque(laws, first: int, excess, load):
 
 @merged_kernel
 def pulley_rates(laws, first: int, states, going: float, turning, position, pulled, given):
-    """Rates of all states of both pulleys.
+    """Rates of all states of both pulleys: driven speed [rad/s^2], driven position [m/s], and STATES.
 
-    Parameters
-    ----------
-    laws, first, states, going, turning, position
-        As of `thrusts`.
-    pulled
-        Action of the belt on both pulleys: the torque that it takes from the driving one, that on the driven
-        one [N m], its axial forces (2) and the tilting forces on the sheaves (4) [N].
-    given
-        Load [N m], speed ratio [1], thrust [N], and T_1 k of the driven sheave [N s/m].
-
-    Returns
-    -------
-    driven speed, driven position, and STATES
-        [rad/s^2], [m/s] and so on.
+    Arguments as of `thrusts`; but `pulled` is the action of the belt on both pulleys: the torque that it
+    takes from the driving one, that on the driven one [N m], its axial forces (2) and the tilting forces on
+    the sheaves (4) [N]; and `given` has T_1 k of the driven sheave [N s/m] as well.
     """
     taken, moment, axial, tilting = pulled
     load, ratio, thrust, damping = given

@@ -161,13 +161,7 @@ VARIABLES = (
 
 
 def coordinates(parameters: Mapping[str, Any]) -> dict[str, Coordinate]:
-    """Coordinates of the record's dimensions.
-
-    Parameters
-    ----------
-    parameters : dict
-        Flat parameters of the job.
-    """
+    """Coordinates of the record's dimensions, by flat parameters of the job."""
     of_peaks = {"peak": peaks.coordinate()} if parameters["modal_peaks"] == "on" else {}
     return {
         **COORDINATES,

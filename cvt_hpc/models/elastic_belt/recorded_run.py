@@ -28,46 +28,21 @@ from cvt_hpc.vibration.ramped import ramped
 
 
 class Recording(NamedTuple):
-    """The recorded quantities, with places and times.
-
-    Attributes
-    ----------
-    mesh : Mesh
-        The belt's mesh.
-    probes : tuple of Probe
-        Where displacement is recorded.
-    sensing : Sensors
-        The same for kernels.
-    interval : float
-        Sampling interval [s].
-    samples : int
-        Samples of the whole run.
-    kick : int
-        Samples before the strands are disturbed. The start-up's damping has gone by then: from there on a
-        disturbance grows or decays by the belt's own nature.
-    first_judged : int
-        Samples before the judged part.
-    """
+    """The recorded quantities, with places and times."""
 
     mesh: Mesh
-    probes: tuple[Probe, ...]
-    sensing: Sensors
-    interval: float
-    samples: int
+    probes: tuple[Probe, ...]  # where displacement is recorded
+    sensing: Sensors  # the same for kernels
+    interval: float  # of sampling [s]
+    samples: int  # of the whole run
+    # samples before the strands are disturbed; the start-up's damping has gone by then: from there on a
+    # disturbance grows or decays by the belt's own nature
     kick: int
-    first_judged: int
+    first_judged: int  # samples before the judged part
 
 
 def recording(parameters: Mapping[str, Any], dtype: type) -> Recording:
-    """Plan of a run's recording.
-
-    Parameters
-    ----------
-    parameters : dict
-        Resolved parameters of the run [SI].
-    dtype : type
-        np.float64 or np.float32, that of the lanes.
-    """
+    """Plan of a run's recording, by its resolved parameters [SI] and the lanes' type of numbers."""
     p, grid = parameters, mesh(parameters)
     interval = 1.0 / p["sampling_rate"]
     samples = sample_count(p)
@@ -86,14 +61,8 @@ def recording(parameters: Mapping[str, Any], dtype: type) -> Recording:
 class Records:
     """Arrays that runs which advance together are recorded into, each in a lane.
 
-    Parameters
-    ----------
-    points : sequence of dict
-        Resolved parameters of the runs [SI], alike in mesh, sampling and duration.
-    width : int
-        Lanes, at least one for each run.
-    dtype : type
-        np.float64 or np.float32, that of the lanes.
+    Their `points`, resolved parameters [SI], are alike in mesh, sampling and duration; `width` is the number
+    of lanes, at least one for each run, `dtype` np.float64 or np.float32, that of the lanes.
 
     Attributes
     ----------
@@ -140,31 +109,12 @@ class Records:
 
 
 class RecordedRun:
-    """One run, as it is judged and recorded.
+    """One run, as it is judged and recorded, by its resolved parameters [SI], in a lane of `records`.
 
-    Parameters
-    ----------
-    parameters : dict
-        Resolved parameters of the run [SI].
-    records : Records
-        Of the runs among which it is.
-    lane : int
-        Its lane there.
-
-    Attributes
-    ----------
-    parameters
-        As given.
-    mesh, probes, interval, samples, risen
-        Of the plan.
-    rows : (done, S + C) array
-        The sensors' displacement [m], the strands' modes [m], and CHANNELS; set by the marching class.
-    done : int
-        Samples recorded so far, up to the one at which the run failed; set by the marching class.
-    failure : (Status, str) or None
-        Why the run cannot continue: a failure, or a result, with the status done; set by the marching class.
-    time : float
-        Simulated time [s]; set by the marching class.
+    `mesh`, `probes`, `interval`, `samples` and `risen` are those of the plan. The marching class sets `time`,
+    simulated [s]; `rows`, the sensors' displacement [m], the strands' modes [m], and CHANNELS, (done, S + C);
+    `done`, the samples recorded so far, up to the one at which the run failed; and `failure`, why the run
+    cannot continue: a failure, or a result, with the status done.
     """
 
     if TYPE_CHECKING:  # set by the marching class
@@ -270,17 +220,9 @@ class RecordedRun:
         return np.array(REGIONS)[self.mesh.region]
 
     def numerical_doubt(self, record: dict[str, Any]) -> tuple[Status, str] | None:
-        """Whether a run that reached its end is not to be trusted.
+        """Whether a run that reached its end is not to be trusted; the reason, if so.
 
-        Parameters
-        ----------
-        record : dict
-            With `power_residual`, `step_ripple` and `least_strand_force`.
-
-        Returns
-        -------
-        (Status, str) or None
-            The reason.
+        By `power_residual`, `step_ripple` and `least_strand_force` of its record.
         """
         found = doubt(record, self.parameters, self.mesh)
         grooves = (self.mesh.zone(region).stations for region in (0, 2))
@@ -288,20 +230,14 @@ class RecordedRun:
 
 
 class OneLaneRun(RecordedRun):
-    """A run by a step that knows nothing of lanes: sampled as a single lane, as every other run.
-
-    Attributes are those of `RecordedRun`.
-    """
+    """A run by a step that knows nothing of lanes: sampled as a single lane; attributes of `RecordedRun`."""
 
     done: int
 
     def prolong(self, parameters: Mapping[str, Any]) -> None:
         """Make room for the samples of a longer duration, whose judged part has yet to come.
 
-        Parameters
-        ----------
-        parameters : dict
-            Parameters of the run but for `duration` and `judged_fraction`.
+        The parameters differ from those of the run by `duration` and `judged_fraction` alone.
         """
         RecordedRun.__init__(self, parameters, Records([parameters], 1, np.float64))
         rows = LaneArray(self.samples, self._records.channels, 1)

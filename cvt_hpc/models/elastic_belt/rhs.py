@@ -171,12 +171,8 @@ def ring_drag(
     """Friction of the elements' saddles on the rings at station j of an arc, between cells a and j.
 
     The rings press on the saddles with what their own weight leaves (Bullinger et al. 2005, eq. 48), at
-    `share` of the belt's nominal speed. Where elements tilt, theirs is `tilt` [rad].
-
-    Returns
-    -------
-    drag, sliding_speed : float
-        Line force on the rings [N/m] and the speed of the saddles against them [m/s].
+    `share` of the belt's nominal speed. Where elements tilt, theirs is `tilt` [rad]. Returns the line force
+    on the rings [N/m] and the speed of the saddles against them [m/s].
     """
     sliding_speed = (1.0 + belt.ring_offset * belt.arc_curvature[j]) * v_element - v_ring
     relief = belt.ring_relief[j] * share * share
@@ -211,21 +207,12 @@ def damped_push(belt: Belt, eps: float, opening: float) -> float:
 def accelerations(
     belt: Belt, state: State, force: np.ndarray, eps: np.ndarray, rate: np.ndarray, moments: np.ndarray
 ) -> None:
-    """Accelerations of u, v_element and v_ring.
+    """Accelerations of u, v_element and v_ring, into rows U, V_ELEMENT and V_RING of `rate` (7, N) [m/s^2].
 
-    Parameters
-    ----------
-    belt, state
-        Constants and state.
-    force : (N,) array
-        Axial line forces of the flanks [N/m].
-    eps : (2, N) array
-        Strains of the cells.
-    rate : (7, N) array
-        Rows U, V_ELEMENT and V_RING are set [m/s^2]; of elements that tilt (8, N), with ELEMENT_TILT [rad/s].
-    moments : (N,) array
-        Result: moments of the stations' flanks on the driven pulley, and, of those that the driving one
-        holds, the torque that they take from it [N m].
+    Of elements that tilt it is (8, N), with ELEMENT_TILT [rad/s]. From axial line forces of the flanks
+    `force` (N,) [N/m] and strains of the cells `eps` (2, N). Into `moments` (N,) go the moments of the
+    stations' flanks on the driven pulley, and, of those that the driving one holds, the torque that they take
+    from it [N m].
     """
     n = belt.cell.size
     w, u = state.fields[f.W], state.fields[f.U]
@@ -385,9 +372,7 @@ def sliding_speeds(
 ) -> tuple[float, float, float]:
     """Sliding of station j in its groove: radial, tangential [m/s], and the distance from the axis [m].
 
-    With the element's velocities v_0 along the path and u = w_t + v_0 w_s across it
-
-        v_r = u cos(theta) + v_0 sin(theta),    v_t = v_0 cos(theta) - u sin(theta) - omega rho.
+    `v_across` is u = w_t + v_0 w_s, the element's speed across the path [m/s].
     """
     w, v = state.fields[f.W, j], state.fields[f.V_ELEMENT, j]
     lean, upright = leaning(belt, j, w), belt.upright[j]

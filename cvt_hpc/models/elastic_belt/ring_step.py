@@ -55,30 +55,14 @@ OWN_SUM, ELEMENT_SUM, PER_COMMON_SUM, ON_EARS = FIELDS_OF_STATION = range(4)
 
 
 class RingWork(NamedTuple):
-    """Work space of the step.
+    """Work space of the step with n layers."""
 
-    Attributes
-    ----------
-    stations : (N, 57) LaneArray
-        As of `Work`.
-    layers : (N, 5 n + 4) LaneArray
-        See above.
-    rings : LaneRings
-        Constants of the layers.
-    whole : LaneRings
-        The same for samples, which like the other two are not in parts.
-    audited : (N, n) LaneArray
-        Work space of samples.
-    sums : (n + 1, 6) LaneArray of doubles
-        `lane_rings.SUMS` over the judged part.
-    """
-
-    stations: LaneArray
-    layers: LaneArray
-    rings: LaneRings
-    whole: LaneRings
-    audited: LaneArray
-    sums: LaneArray
+    stations: LaneArray  # (N, 57), as of `Work`
+    layers: LaneArray  # (N, 5 n + 4), see above
+    rings: LaneRings  # constants of the layers
+    whole: LaneRings  # the same for samples, which like the other two are not in parts
+    audited: LaneArray  # of samples, (N, n)
+    sums: LaneArray  # `lane_rings.SUMS` over the judged part, (n + 1, 6) doubles
 
 
 def ring_work(state: LaneState, belts: Sequence[Belt], rings: Sequence[Rings]) -> RingWork:
@@ -122,15 +106,9 @@ def take_sample_of_rings(
 
 @kernel
 def step_rings(belt: LaneBelt, state: LaneState, work: RingWork, step: float) -> None:
-    """One step, of a belt whose rings as one do not rub.
+    """Advance the state of a belt whose rings as one do not rub by a step [s].
 
-    Parameters
-    ----------
-    belt, state, work
-        Constants, state (advanced in place), work space, that holds the results of `derive` for this state,
-        and the layers' strains.
-    step : float
-        Step [s].
+    The work space holds the results of `derive` for this state, and the layers' strains.
     """
     one = Work(work.stations)
     forces.lane_sliding(belt, state, work.stations)

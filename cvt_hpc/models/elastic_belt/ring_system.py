@@ -27,28 +27,14 @@ from cvt_hpc.steppers.system import System
 
 
 class FlatRings(NamedTuple):
-    """Input of `rates` beside t and y.
+    """Input of `rates` beside t and y."""
 
-    Attributes
-    ----------
-    flat : FlatBelt
-        Of the belt whose rings as one do not rub.
-    rings : Rings
-        Constants of the n layers.
-    state : State
-        Work space: the belt with its layers, of the last call.
-    one : (m,) array
-        Work space: the unknowns of `one_system`.
-    eps, rate : (n, N), (2 n + 1, N) arrays
-        Work space of `layer_rates`.
-    """
-
-    flat: FlatBelt
-    rings: Rings
-    state: State
-    one: np.ndarray
-    eps: np.ndarray
-    rate: np.ndarray
+    flat: FlatBelt  # of the belt whose rings as one do not rub
+    rings: Rings  # constants of the n layers
+    state: State  # work space: the belt with its layers, of the last call
+    one: np.ndarray  # work space: the unknowns of `one_system`, (m,)
+    eps: np.ndarray  # work space of `layer_rates`, (n, N)
+    rate: np.ndarray  # likewise, (2 n + 1, N)
 
 
 def flat_rings(belt: Belt, rings: Rings) -> FlatRings:

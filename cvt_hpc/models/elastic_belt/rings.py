@@ -33,48 +33,23 @@ FIRST_LAYER = len(f.FIELDS)  # row of a state with the first layer's speed
 
 
 class Rings(NamedTuple):
-    """Constants of n layers, in SI units; each has an n-th of the rings' mass, stiffness and damping.
+    """Constants of n layers, in SI units; each has an n-th of the rings' mass, stiffness and damping."""
 
-    Attributes
-    ----------
-    mass, relief, stiffness, damping : float
-        Inertia along the path per length [kg/m], tension that the layer's weight bears at the nominal speed
-        [N], EA [N], damping [N s].
-    offset : (n,) array
-        Neutral lines over the pitch line, d_k [m].
-    surface : (n + 1,) array
-        Surfaces over the pitch line: saddle, between layers, ears [m].
-    kinetic : (n + 1,) array
-        Kinetic friction coefficients of the surfaces.
-    static_excess, stribeck_speed, friction_speed : float
-        Static over kinetic friction less 1; speed of that fall, and of the regularisation [m/s].
-    length : (n,) array
-        Length of each layer without tension [m].
-    """
-
-    mass: float
-    relief: float
-    stiffness: float
-    damping: float
-    offset: np.ndarray
-    surface: np.ndarray
-    kinetic: np.ndarray
-    static_excess: float
-    stribeck_speed: float
-    friction_speed: float
-    length: np.ndarray
+    mass: float  # inertia along the path per length [kg/m]
+    relief: float  # tension that the layer's weight bears at the nominal speed [N]
+    stiffness: float  # EA [N]
+    damping: float  # [N s]
+    offset: np.ndarray  # neutral lines over the pitch line, d_k, (n,) [m]
+    surface: np.ndarray  # surfaces over the pitch line: saddle, between layers, ears, (n + 1,) [m]
+    kinetic: np.ndarray  # kinetic friction coefficients of the surfaces, (n + 1,)
+    static_excess: float  # static over kinetic friction less 1
+    stribeck_speed: float  # of that fall [m/s]
+    friction_speed: float  # of the regularisation [m/s]
+    length: np.ndarray  # of each layer without tension, (n,) [m]
 
 
 def ring_constants(parameters: Mapping[str, Any], belt: Belt) -> Rings:
-    """Constants of the layers of one run.
-
-    Parameters
-    ----------
-    parameters : dict
-        Resolved parameters of the run [SI].
-    belt : Belt
-        Its constants.
-    """
+    """Constants of the layers of one run, by its resolved parameters [SI] and the belt's constants."""
     p = RING_DEFAULTS | dict(parameters)
     n, thickness = layer_count(p), p["layer_thickness"]
     offset = p["ring_offset"] + thickness * (np.arange(n) - 0.5 * (n - 1))
@@ -178,18 +153,9 @@ def layer_rates(
 ) -> None:
     """Rates of the layers' speeds and contents, and of the elements' speed by the surfaces' friction.
 
-    Parameters
-    ----------
-    belt, rings
-        Constants.
-    state : State
-        With layers.
-    eps : (n, N) array
-        Their strains.
-    share : float
-        Belt speed over its nominal one.
-    rate : (2 n + 1, N) array
-        Result: of the speeds [m/s^2] and contents [1/s], then the sum to be added for the elements [m/s^2].
+    `state` is with layers, `eps` (n, N) are their strains, `share` is the belt speed over its nominal one.
+    Into `rate` (2 n + 1, N) go the rates of speeds [m/s^2] and contents [1/s], then the sum to be added for
+    the elements [m/s^2].
     """
     n, cells = rings.length.size, belt.cell.size
     normal, sliding = np.empty(n + 1), np.empty(n + 1)

@@ -80,49 +80,27 @@ OUTCOME, ENDED_AT, CONTACT_SOLVES, REPEATED = range(len(ENDED))
 class Sensors(NamedTuple):
     """Where displacement is sensed.
 
-    Attributes
-    ----------
-    matrix : (S, N) array, of the lanes' precision
-        Weights of the stations' displacement: first the probes, then MODES sine amplitudes of each strand,
-        measured from the chord between its ends.
-    begins, ends : (S,) int arrays
-        The stations that count in each of them: the first, and the one behind the last.
-    middles : (2,) int array
-        Cell in the middle of each strand.
-    starts, stops : (2,) int arrays
-        First cell of each strand and the one behind its last.
-    interval : float
-        Sampling interval [s].
+    Of `matrix` first the probes, then MODES sine amplitudes of each strand, measured from the chord between
+    its ends.
     """
 
-    matrix: np.ndarray
-    begins: np.ndarray
-    ends: np.ndarray
-    middles: np.ndarray
-    starts: np.ndarray
-    stops: np.ndarray
-    interval: float
+    matrix: np.ndarray  # weights of the stations' displacement, (S, N), of the lanes' precision
+    begins: np.ndarray  # the first station that counts in each of them, (S,) int
+    ends: np.ndarray  # the one behind the last, (S,) int
+    middles: np.ndarray  # cell in the middle of each strand, (2,) int
+    starts: np.ndarray  # first cell of each strand, (2,) int
+    stops: np.ndarray  # the one behind its last, (2,) int
+    interval: float  # of sampling [s]
 
 
 class Samples(NamedTuple):
-    """The arrays of samples, as kernels take them.
+    """The arrays of samples, as kernels take them."""
 
-    Attributes
-    ----------
-    sensing : Sensors
-        S rows.
-    rows : (samples, S + C) LaneArray of doubles
-        Of a sample a row: the sensors, then CHANNELS.
-    profiles : (N, 23) LaneArray of doubles
-        PROFILES of each sample are added to it; one without rows takes none.
-    ended : (1, 4) LaneArray of doubles
-        ENDED of each lane.
-    """
-
-    sensing: Sensors
-    rows: LaneArray
+    sensing: Sensors  # S rows
+    rows: LaneArray  # of a sample a row, (samples, S + C) doubles: the sensors, then CHANNELS
+    # (N, 23) doubles; PROFILES of each sample are added to it; one without rows takes none
     profiles: LaneArray
-    ended: LaneArray
+    ended: LaneArray  # (1, 4) doubles: ENDED of each lane
 
 
 class Probe(NamedTuple):
@@ -133,15 +111,7 @@ class Probe(NamedTuple):
 
 
 def probes(grid: Mesh, per_strand: int, per_arc: int) -> tuple[Probe, ...]:
-    """Equally spaced probes of all regions, strands first.
-
-    Parameters
-    ----------
-    grid : Mesh
-        The belt's mesh.
-    per_strand, per_arc : int
-        Their number in each region, the region's ends excluded.
-    """
+    """Equally spaced probes of all regions, strands first; so many in each, the region's ends excluded."""
     places = []
     for region in (1, 3, 0, 2):
         count = per_strand if region % 2 else per_arc
@@ -186,19 +156,7 @@ def sensors(grid: Mesh, places: tuple[Probe, ...], interval: float, dtype: type)
 
 @kernel
 def sample(belt: LaneBelt, state: LaneState, stations: LaneArray, samples: Samples, k: int) -> None:
-    """Record a state.
-
-    Parameters
-    ----------
-    belt, state
-        Constants and state.
-    stations : LaneArray
-        The step's work space, with the results of `derive` for this state.
-    samples : Samples
-        Row k is set.
-    k : int
-        Which row.
-    """
+    """Record a state, whose results of `derive` are in `stations`, into row k of `samples`."""
     _watch(belt, state, stations, samples.ended)
     sensing, rows, profiles = samples.sensing, samples.rows, samples.profiles
     fields, c = state.fields, belt.constants

@@ -113,15 +113,7 @@ def groups(pattern: csc_array) -> np.ndarray:
 class SparseJacobian:
     """Jacobian of `flat.rates` by difference quotients, several columns at once.
 
-    Parameters
-    ----------
-    flat : FlatBelt
-        The belt.
-
-    Attributes
-    ----------
-    evaluations : int
-        Of the rates, so far.
+    `evaluations` counts those of the rates so far.
     """
 
     def __init__(self, flat: FlatBelt) -> None:

@@ -19,14 +19,8 @@ from cvt_hpc.models.elastic_belt.sampling import CHANNELS, ENDED, OUTCOME, PROFI
 class StateMarch:
     """Runs on the same mesh, each in a lane of its own, by the kernel that recorded runs take.
 
-    Parameters
-    ----------
-    belts, states : sequences of Belt and State
-        One for each lane; the states stay as they are.
-    dtype : type
-        np.float64 or np.float32.
-    stepper : str
-        "imex" or "explicit".
+    One belt and state for each lane; the states stay as they are. The lanes' dtype is np.float64 or
+    np.float32, the stepper "imex" or "explicit".
     """
 
     def __init__(

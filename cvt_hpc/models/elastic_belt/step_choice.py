@@ -44,17 +44,12 @@ NEEDS = (
 
 
 def transverse_limit(parameters: Mapping[str, Any]) -> float:
-    """Longest stable step of the transverse motion [s].
+    """Longest stable step of the transverse motion [s], by flat values [SI] of a run.
 
     The fastest waves are two of the shortest cells long, in the grooves:
-    w^2 = (4 F / h^2 + 4 c_e tan^2 delta) / m.
+    w^2 = (4 F / h^2 + 4 c_e tan^2 delta) / m, F being the tension that the thrust has the grooves bear.
     Bending, which is implicit, has no part in it. What the belt carries goes on by a cell in a step at most.
     Arcs that move outwards without a motion along the belt are braked by (c_0 + c_1) kappa^2 / m.
-
-    Parameters
-    ----------
-    parameters : mapping
-        Flat values [SI] of a run; F is the tension that the thrust has the grooves bear.
     """
     p = parameters
     path = variator(p["ratio"], p["driven_radius"], p["centre_distance"])

@@ -18,19 +18,9 @@ def batch(
 ) -> Batch | BatchOfOne:
     """Runs that advance together by any stepper that the belt takes.
 
-    Parameters
-    ----------
-    points : sequence of dict
-        Resolved parameters of the runs [SI], all of one `lane_key`; one for steppers without lanes.
-    stepper : str
-        A stepper that the model takes.
-    paused : sequence, optional
-        Results of `paused()` of shorter runs, one for each point, to continue from.
-
-    Returns
-    -------
-    Batch or BatchOfOne
-        They have `runs`, `samples`, `done`, `running`, `interval` and `advance` in common.
+    `points` are resolved parameters of the runs [SI], all of one `lane_key`; one for steppers without lanes.
+    `paused` are results of `paused()` of shorter runs, one for each point, to continue from. Either batch has
+    `runs`, `samples`, `done`, `running`, `interval` and `advance`.
     """
     if stepper in OWN_STEPPERS:
         return Batch(points, stepper, paused)

@@ -40,26 +40,14 @@ FAILURES = {
 
 
 def slack_doubt(bending_stiffness: float, cell: float, least_force: float) -> tuple[Status, str] | None:
-    """Whether a strand was pushed so slack that the growth in it is an effect of the mesh.
+    """Whether a strand was pushed so slack that the growth in it is an effect of the mesh; the reason, if so.
 
     Under F = T - P - m v^2 < 0 waves of wave number k grow, at rest at the rate k sqrt((-F - EI k^2) / m): it
     buckles. So they do in the discretised strand beyond its critical speed sqrt((T - P) / m), whose shortest
     waves feel no gyroscopic force. With bending k = sqrt(-F / (2 EI)) is the fastest; without it the shortest
-    wave is, at a rate that rises with every refinement: the problem is ill posed.
-
-    Parameters
-    ----------
-    bending_stiffness : float
-        EI [N m^2].
-    cell : float
-        Length of a strand's longest cell [m].
-    least_force : float
-        Smallest F in a strand over the run [N].
-
-    Returns
-    -------
-    (Status, str) or None
-        The reason, where the fastest wave has k cell > 1: fewer than some six cells.
+    wave is, at a rate that rises with every refinement: the problem is ill posed. There is doubt where the
+    fastest wave has k cell > 1, fewer than some six cells: by EI [N m^2], the length of a strand's longest
+    `cell` [m] and the smallest F in a strand over the run [N].
     """
     bearable = -2.0 * bending_stiffness / cell**2
     if least_force >= bearable:
@@ -82,19 +70,10 @@ def step_doubt(step: float, limit: float) -> tuple[Status, str] | None:
 
 
 def reach_doubt(force: np.ndarray, grooves: Iterable[np.ndarray]) -> tuple[Status, str] | None:
-    """Whether contact went on to the last stations that a groove may hold, and so might go on beyond them.
+    """Whether contact went on to the last stations that a groove may hold; the reason, if so.
 
-    Parameters
-    ----------
-    force : (N,) array
-        Axial line force of the flanks [N/m], of a state or a mean.
-    grooves : iterable of (m,) int arrays
-        Stations that each groove may hold, in the direction of travel.
-
-    Returns
-    -------
-    (Status, str) or None
-        The reason.
+    It might go on beyond them. By axial line forces of the flanks (N,) [N/m], of a state or a mean, and the
+    stations (m,) that each groove may hold, in the direction of travel.
     """
     if not any((force[stations[[0, -1]]] > 0.0).any() for stations in grooves):
         return None
@@ -103,21 +82,9 @@ def reach_doubt(force: np.ndarray, grooves: Iterable[np.ndarray]) -> tuple[Statu
 
 
 def doubt(record: dict[str, Any], parameters: Mapping[str, Any], grid: Mesh) -> tuple[Status, str] | None:
-    """Whether a run that reached its end is not to be trusted.
+    """Whether a run that reached its end is not to be trusted; the reason, if so.
 
-    Parameters
-    ----------
-    record : dict
-        With `power_residual`, `step_ripple` and `least_strand_force`.
-    parameters : mapping
-        Flat values [SI] of the run.
-    grid : Mesh
-        The belt's mesh.
-
-    Returns
-    -------
-    (Status, str) or None
-        The reason.
+    By `power_residual`, `step_ripple` and `least_strand_force` of its record, and its flat values [SI].
     """
     residual = abs(record["power_residual"])
     if not residual <= power_limit(grid):
