@@ -90,21 +90,21 @@ def do(
     """Do a batch of runs as `run_points`; beside each record the input of `histories`, if kept."""
     model = recorded_model(job)
     if job.stepper is None:
-        blank = blank_record(job)
-        return [_solve(blank, model, point, interrupt) for point in points]
+        return _solve(blank_record(job), model, points, interrupt)
     return march_runs(job, points, interrupt, kept, more)
 
 
 def _solve(
-    blank: dict[str, Any], model: Model, point: dict[str, Any], interrupt: Callable[[], str | None]
-) -> tuple[Any, dict[str, Any]]:
-    """A run of a model without a transient: its record follows from the parameters at once."""
+    blank: dict[str, Any], model: Model, points: Sequence[dict[str, Any]], interrupt: Callable[[], str | None]
+) -> list[tuple[Any, dict[str, Any]]]:
+    """Runs of a model without a transient: their records follow from the parameters at once."""
     if stop := interrupt():
         raise Interrupted(stop)
     started = time.process_time()
-    solution = model.solve(point)
-    record = blank | model.judge(solution)
-    return solution, record | {"core_seconds": time.process_time() - started}
+    solutions = model.solve_together(points)
+    judged = model.judge_together(solutions)
+    cost = {"core_seconds": (time.process_time() - started) / len(points)}
+    return [(one, blank | values | cost) for one, values in zip(solutions, judged, strict=True)]
 
 
 def simulate(job: Job, at: Assignments | None = None) -> xr.Dataset:

@@ -305,9 +305,7 @@ def segment_amplitude(segments: Array, rate: float, band: tuple[float, float]) -
     inside = (frequencies >= band[0]) & (frequencies <= band[1])
     lines = np.abs(np.fft.rfft(vibration)[..., inside]) ** 2
     if lines.ndim > 1 and lines.shape[-2] == 1:
-        lines = np.ascontiguousarray(
-            lines
-        )  # the order in which lines are added up is that of one signal alone
+        lines = np.ascontiguousarray(lines)  # else their order of adding up depends on the other signals
     return np.sqrt(4 * lines.sum(axis=-1) / (window.size * np.sum(window**2)))
 
 

@@ -5,24 +5,28 @@ Whole cycles of the mass, and the energy that goes in and out in one of them.
 
 from __future__ import annotations
 
-from collections.abc import Mapping
+from collections.abc import Mapping, Sequence
 from dataclasses import replace
 from enum import IntEnum
 from typing import TYPE_CHECKING, Any
 
 import numpy as np
 
-from cvt_hpc.models.oscillator.motion import steady_sliding
 from cvt_hpc.storage.netcdf import attributes
 from cvt_hpc.variables import Coordinate, Variable
 from cvt_hpc.vibration import assessment
+from cvt_hpc.vibration.settings import PARAMETERS
 
 if TYPE_CHECKING:
     import xarray as xr
 
     from cvt_hpc.models.oscillator.transient import Transient
 
-STEP_COST = 1e-6  # core-seconds of a step of moreau, and of a sample
+SAMPLE_COST = 1e-7  # core-seconds of a sample, its judgement included
+STEP_COST = {"moreau": 1.5e-8}  # core-seconds of a step in full lanes; of the others 1e-6
+LANES = 64  # runs of a batch by `moreau`: they share what a call takes, and their rows stay in the cache
+LAW = ("friction_law", "table_file", "table_force", "table_speed", "table_mu")
+MARCH = ("duration", "shortest_duration", "sampling_rate", "step")
 
 
 class Sticks(IntEnum):
@@ -71,26 +75,48 @@ def cost(parameters: Mapping[str, Any], stepper: str) -> Any:
     """
     p = parameters
     samples = p["duration"] * p["sampling_rate"]
-    return STEP_COST * (samples + p["duration"] / p.get("step", 1e-6))
+    step_cost = STEP_COST.get(stepper, 1e-6)
+    return lanes(p, stepper) * (SAMPLE_COST * samples + step_cost * p["duration"] / p.get("step", 1e-6))
+
+
+def lanes(parameters: Mapping[str, Any], stepper: str) -> int:
+    """Most runs that advance together."""
+    return LANES if stepper == "moreau" else 1
+
+
+def lane_key(parameters: Mapping[str, Any]) -> tuple:
+    """Values that all runs of one batch have in common."""
+    return tuple(parameters.get(key) for key in (*MARCH, *LAW, *PARAMETERS["vibration"]))
 
 
 def judge(run: Transient) -> dict[str, Any]:
-    """The record of a run that has reached its end, its cost apart.
+    """The record of a run that has reached its end, its cost apart; see `judge_together`."""
+    return judge_together([run])[0]
+
+
+def judge_together(runs: Sequence[Transient]) -> list[dict[str, Any]]:
+    """The records of runs of one batch that have reached their ends, their cost apart.
 
     Parameters
     ----------
-    run : Transient
+    runs : sequence of Transient
         With all samples recorded.
     """
-    p, first = run.parameters, run.first_judged
-    found = assessment.assess(run.displacement, p["sampling_rate"], ("mass",), p)
+    p = runs[0].parameters
+    motions = np.stack([run.displacement for run in runs])
+    judged = assessment.assess_runs(motions, p["sampling_rate"], ("mass",), p)
+    return [_values(run, found) for run, found in zip(runs, judged, strict=True)]
+
+
+def _values(run: Transient, found: assessment.Occurrence) -> dict[str, Any]:
+    """The record of a run, by what is found of its vibration."""
+    p, first, steady = run.parameters, run.first_judged, run.steady
     numbers = {v.name: np.ravel(getattr(found, v.name)).item() for v in assessment.VARIABLES}
     x, is_stuck = run.displacement[first:, 0], run.is_stuck[first:]
     starts = cycle_starts(x, p["negligible_amplitude"])
     cycles = slice(starts[0], starts[-1]) if len(starts) > 1 else slice(None)
-    steady = steady_sliding(run.constants)
     return {
-        **found.record(),
+        **found.verdict(),
         **numbers,
         "sticks": Sticks.YES if is_stuck.any() else Sticks.NO,
         "stuck_share": float(is_stuck[cycles].mean()),
