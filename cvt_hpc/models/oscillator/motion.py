@@ -139,6 +139,28 @@ def regularised_frictions(o: Oscillator, sliding: np.ndarray, load: np.ndarray) 
 
 
 @kernel
+def friction_forces(several: Any, rows: np.ndarray, slowest: np.ndarray, is_set_valued: bool) -> np.ndarray:
+    """Friction forces (run, n) [N] at states (run, n, 2).
+
+    Friction as it is holds the mass where it slides no faster than `slowest` (run,) [m/s].
+    """
+    found = np.empty(rows.shape[:2])
+    for k in range(len(rows)):
+        o = one_of(several, k)
+        for i in range(rows.shape[1]):
+            x, v = rows[k, i, X], rows[k, i, V]
+            sliding, load = o.belt_speed - v, normal_load(o, x)
+            if not is_set_valued:
+                found[k, i] = regularised_friction(o, sliding, load)
+            elif abs(sliding) <= slowest[k]:
+                found[k, i] = o.stiffness * x + o.damping * v - o.preload
+            else:
+                mu = friction_coefficient(o.law, abs(sliding), load)[0]
+                found[k, i] = np.copysign(load * mu, sliding)
+    return found
+
+
+@kernel
 def friction_at_rest(o: Oscillator) -> float:
     """Largest friction force at rest [N]."""
     mu = friction_coefficient(o.law, 0.0, o.normal_load)[0]

@@ -12,6 +12,7 @@ from typing import TYPE_CHECKING, Any
 
 import numpy as np
 
+from cvt_hpc.models.oscillator.motion import Oscillator, V, X, friction_forces, together
 from cvt_hpc.storage.netcdf import attributes
 from cvt_hpc.variables import Coordinate, Variable
 from cvt_hpc.vibration import assessment
@@ -102,31 +103,34 @@ def judge_together(runs: Sequence[Transient]) -> list[dict[str, Any]]:
     runs : sequence of Transient
         With all samples recorded.
     """
-    p = runs[0].parameters
-    motions = np.stack([run.displacement for run in runs])
-    judged = assessment.assess_runs(motions, p["sampling_rate"], ("mass",), p)
-    return [_values(run, found) for run, found in zip(runs, judged, strict=True)]
-
-
-def _values(run: Transient, found: assessment.Occurrence) -> dict[str, Any]:
-    """The record of a run, by what is found of its vibration."""
-    p, first, steady = run.parameters, run.first_judged, run.steady
-    numbers = {v.name: np.ravel(getattr(found, v.name)).item() for v in assessment.VARIABLES}
-    x, is_stuck = run.displacement[first:, 0], run.is_stuck[first:]
-    starts = cycle_starts(x, p["negligible_amplitude"])
-    cycles = slice(starts[0], starts[-1]) if len(starts) > 1 else slice(None)
-    return {
-        **found.verdict(),
-        **numbers,
-        "sticks": Sticks.YES if is_stuck.any() else Sticks.NO,
-        "stuck_share": float(is_stuck[cycles].mean()),
-        "half_stroke": 0.5 * float(np.ptp(x)),
-        "cycles": max(len(starts) - 1, 0),
-        **work_per_cycle(run, first + starts),
-        "steady_displacement": steady.displacement,
-        "linear_growth_rate": steady.eigenvalue.real,
-        "linear_frequency": abs(steady.eigenvalue.imag) / (2.0 * np.pi),
-    }
+    p, interval, first = runs[0].parameters, runs[0].interval, runs[0].first_judged
+    rows = np.stack([run.rows for run in runs])
+    motions = np.ascontiguousarray(rows[:, :, X:V])
+    occurrences = assessment.assess_runs(motions, p["sampling_rate"], ("mass",), p)
+    x, v = motions[:, first:, 0], rows[:, first:, V]
+    several, slowest = together([run.constants for run in runs]), np.array([run.slowest for run in runs])
+    forces = friction_forces(several, rows[:, first:], slowest, runs[0].is_set_valued)
+    sticks = np.abs(several.belt_speed[:, np.newaxis] - v) <= slowest[:, np.newaxis]
+    passages, half_strokes = cycle_starts(x, p["negligible_amplitude"]), 0.5 * np.ptp(x, axis=1)
+    records = []
+    for k, (run, found, starts) in enumerate(zip(runs, occurrences, passages, strict=True)):
+        numbers = {one.name: np.ravel(getattr(found, one.name)).item() for one in assessment.VARIABLES}
+        cycles = slice(starts[0], starts[-1]) if len(starts) > 1 else slice(None)
+        records.append(
+            {
+                **found.verdict(),
+                **numbers,
+                "sticks": Sticks.YES if sticks[k].any() else Sticks.NO,
+                "stuck_share": float(sticks[k, cycles].mean()),
+                "half_stroke": float(half_strokes[k]),
+                "cycles": max(len(starts) - 1, 0),
+                **work_per_cycle(run.constants, v[k], forces[k], starts, interval),
+                "steady_displacement": run.steady.displacement,
+                "linear_growth_rate": run.steady.eigenvalue.real,
+                "linear_frequency": abs(run.steady.eigenvalue.imag) / (2.0 * np.pi),
+            }
+        )
+    return records
 
 
 def histories(run: Transient) -> xr.Dataset:
@@ -158,28 +162,30 @@ def histories(run: Transient) -> xr.Dataset:
     )
 
 
-def cycle_starts(x: np.ndarray, least: float) -> np.ndarray:
-    """Find where a displacement comes up through the middle of its range.
+def cycle_starts(x: np.ndarray, least: float) -> list[np.ndarray]:
+    """Find where displacements come up through the middle of their range.
 
     Parameters
     ----------
-    x : (n,) array
+    x : (run, n) array
         Displacement [m].
     least : float
         Half stroke [m] up to which a motion has no cycles.
 
     Returns
     -------
-    (cycles + 1,) int array
-        The sample before each passage; empty where there are none.
+    list of (cycles + 1,) int arrays
+        Of each run the samples before each passage; empty where there are none.
     """
-    if x.size == 0 or np.ptp(x) <= 2.0 * least:
-        return np.zeros(0, np.int64)
-    away = x - 0.5 * (x.max() + x.min())
-    return np.flatnonzero((away[:-1] < 0.0) & (away[1:] >= 0.0))
+    low, high = x.min(axis=1, keepdims=True), x.max(axis=1, keepdims=True)
+    away = x - 0.5 * (high + low)
+    rises = (away[:, :-1] < 0.0) & (away[:, 1:] >= 0.0) & (high - low > 2.0 * least)
+    return [np.flatnonzero(own) for own in rises]
 
 
-def work_per_cycle(run: Transient, starts: np.ndarray) -> dict[str, float]:
+def work_per_cycle(
+    o: Oscillator, speed: np.ndarray, friction: np.ndarray, starts: np.ndarray, interval: float
+) -> dict[str, float]:
     """Mean work of a cycle, by the trapezoidal rule over the samples.
 
     A jump of friction between two samples leaves an error of the first order in their interval, a sticking
@@ -187,10 +193,14 @@ def work_per_cycle(run: Transient, starts: np.ndarray) -> dict[str, float]:
 
     Parameters
     ----------
-    run : Transient
-        With all samples recorded.
+    o : Oscillator
+        Constants.
+    speed, friction : (n,) arrays
+        Of the mass [m/s], and the force on it [N], at samples.
     starts : (cycles + 1,) int array
         Samples at which cycles start and end.
+    interval : float
+        Sampling interval [s].
 
     Returns
     -------
@@ -201,16 +211,15 @@ def work_per_cycle(run: Transient, starts: np.ndarray) -> dict[str, float]:
     """
     if len(starts) < 2:
         return dict.fromkeys(("friction_work", "damping_loss", "energy_residual"), np.nan)
-    o, cycles = run.constants, slice(starts[0], starts[-1] + 1)
-    v = run.channel("speed")[cycles]
-    power = run.friction()[cycles] * v
-    count = len(starts) - 1
-    work, turned_over, loss = (
-        float(np.trapezoid(rate, dx=run.interval)) for rate in (power, np.abs(power), o.damping * v * v)
-    )
+    cycles = slice(starts[0], starts[-1] + 1)
+    v = speed[cycles]
+    power = friction[cycles] * v
+    rates = np.stack([power, np.abs(power), o.damping * v * v])
+    work, turned_over, loss = np.trapezoid(rates, dx=interval).tolist()
     # cycles start at one displacement: spring and preload have done no work
-    kinetic = 0.5 * o.mass * v**2
-    left = work - loss - (kinetic[-1] - kinetic[0])
+    kinetic = 0.5 * o.mass * v[[0, -1]] ** 2
+    left = work - loss - (kinetic[1] - kinetic[0])
+    count = len(starts) - 1
     return {
         "friction_work": work / count,
         "damping_loss": loss / count,

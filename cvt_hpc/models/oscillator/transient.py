@@ -31,7 +31,7 @@ from cvt_hpc.kernels import kernel
 from cvt_hpc.models.marched import MarchedRun, Probe, batches_of_one
 from cvt_hpc.models.oscillator import motion
 from cvt_hpc.models.oscillator.lanes import ENDED, Lane, Lanes, march
-from cvt_hpc.physics.friction import friction_coefficient, friction_coefficients
+from cvt_hpc.physics.friction import friction_coefficient
 from cvt_hpc.recording import sample_count, steps_per_sample
 from cvt_hpc.steppers.facts import OK, STEPS, Facts, Result
 from cvt_hpc.steppers.marching import Marching
@@ -94,7 +94,7 @@ class Transient(MarchedRun):
         missed = rest_missed(o, self.marching.facts, self.step, self._allowed, seen) or self._silenced
         if missed or not self.is_set_valued:
             return missed or wrongly_held(o, self._peak, seen, self.interval)
-        return wrongly_stuck(o, seen, self.interval, self.step, self._slowest)
+        return wrongly_stuck(o, seen, self.interval, self.step, self.slowest)
 
     @cached_property
     def steady(self) -> motion.SteadySliding:
@@ -114,10 +114,10 @@ class Transient(MarchedRun):
     @property
     def is_stuck(self) -> np.ndarray:
         """Whether the mass sticks, or with smoothed friction creeps, at each sample so far, (done,) bool."""
-        return np.abs(self.constants.belt_speed - self.channel("speed")) <= self._slowest
+        return np.abs(self.constants.belt_speed - self.channel("speed")) <= self.slowest
 
     @property
-    def _slowest(self) -> float:
+    def slowest(self) -> float:
         """Sliding [m/s] up to which the mass sticks or creeps."""
         if self.is_set_valued:
             return REST * float(np.abs(self.channel("speed")).max(initial=self._typical_speed))
@@ -125,13 +125,8 @@ class Transient(MarchedRun):
 
     def friction(self) -> np.ndarray:
         """Friction force on the mass at each sample so far, (done,) [N]."""
-        o, x, v = self.constants, self.displacement[:, 0], self.channel("speed")
-        sliding, load = o.belt_speed - v, motion.normal_load(o, x)
-        if not self.is_set_valued:
-            return motion.regularised_frictions(o, sliding, load)
-        holding = o.stiffness * x + o.damping * v - o.preload
-        level = load * friction_coefficients(o.law, np.abs(sliding), load)
-        return np.where(self.is_stuck, holding, np.copysign(level, sliding))
+        several, rows = motion.together([self.constants]), self.rows[np.newaxis, : self.done]
+        return motion.friction_forces(several, rows, np.array([self.slowest]), self.is_set_valued)[0]
 
     def channel(self, name: str) -> np.ndarray:
         """History of one of CHANNELS, (done,): speed of the mass [m/s]."""
@@ -428,7 +423,8 @@ class LaneRun(Transient):
         self.failure = Status.FAILED_NUMERICS, str(wrong)
 
     @property
-    def _slowest(self) -> float:
+    def slowest(self) -> float:
+        """Sliding [m/s] up to which the mass sticks."""
         return REST * float(self.marching.lanes.fastest[self.marching.place])
 
 
