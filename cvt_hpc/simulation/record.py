@@ -314,7 +314,7 @@ def _batch_size(job: Job, parameters: dict[str, Any]) -> int:
     model = load_model(job.model)
     most = model.lanes(parameters, job.stepper)
     if job.stepper is None:  # they take their turns, and have the cost of a batch in common
-        return int(np.clip(SOLVED_SECONDS / model.cost(parameters, None), 1, SOLVED_TOGETHER))
+        return int(np.clip(most * SOLVED_SECONDS / model.cost(parameters, None), most, SOLVED_TOGETHER))
     if most == 1:
         return 1
     return most * int(np.clip(BATCH_SECONDS / model.cost(parameters, job.stepper), 1, MOST_TURNS))

@@ -3,16 +3,23 @@
 A metre of flank that slides: its radial frequency and damping, and the energy that a cycle gains.
 """
 
-from collections.abc import Mapping
+from __future__ import annotations
+
+from collections.abc import Mapping, Sequence
 from typing import Any, NamedTuple
 
 import numpy as np
-from scipy.optimize import brentq
 
+from cvt_hpc.kernels import kernel
+from cvt_hpc.lanes import LaneArray, maximum
+from cvt_hpc.models.criterion.root import Search, brent
 from cvt_hpc.physics import friction as laws
+from cvt_hpc.physics.friction_laws import TABLE_PARAMETERS, Law
 from cvt_hpc.variables import Coordinate, Status, Variable, Vibrates
 
+LANES = 64  # runs of a batch
 PHASES = 512  # of a cycle: errors of its square at a corner of the law, of 1/512 at a jump (v_reg -> 0)
+WIDTH = 8  # phases side by side in a register
 _HARMONICS = np.arange(PHASES // 2 + 1)
 _SWING = -np.cos(2.0 * np.pi * _HARMONICS / PHASES)  # of half a cycle, from one turning point to the other
 _LEAST_SPEED = 1e-300  # [m/s]
@@ -91,21 +98,34 @@ class Flank(NamedTuple):
 
 def flank(parameters: Mapping[str, Any]) -> Flank:
     """Steady sliding, from flat parameters [SI]."""
-    p = parameters
-    law = laws.given_law(p)
+    return flanks([parameters])[0]
+
+
+def flanks(points: Sequence[Mapping[str, Any]]) -> list[Flank]:
+    """Steady sliding of several runs, whose laws share kind and table."""
+    all_laws = [laws.given_law(p) for p in points]
+    angles = [p["half_wedge_angle"] for p in points]
+    speeds = [float(np.hypot(p["radial_speed"], p["tangential_speed"])) for p in points]
+    forces = [p["contact_force"] / np.cos(angle) for p, angle in zip(points, angles, strict=True)]
+    widths = np.array([p["friction_speed"] for p in points])
+    slopes = _slopes(_together(all_laws), np.array(speeds), np.array(forces), widths).tolist()
+    return [_flank(*each) for each in zip(points, all_laws, speeds, forces, slopes, strict=True)]
+
+
+def _flank(
+    p: Mapping[str, Any], law: laws.FrictionLaw, speed: float, normal_force: float, slopes: list[float]
+) -> Flank:
+    """One of `flanks`, by the numbers of `_slopes`."""
     tangent = np.tan(p["half_wedge_angle"])
     force = p["contact_force"]
-    normal_force = force / np.cos(p["half_wedge_angle"])
-    speed = float(np.hypot(p["radial_speed"], p["tangential_speed"]))
     share = p["radial_speed"] / speed
-    value, fall = laws.friction_coefficient(law, speed, normal_force)
-    factor, rise = laws.saturation(speed, 1.0 / p["friction_speed"])
+    value, fall, factor, rise = slopes
     mu = value * factor
     mass = p["element_mass"] + p["ring_mass"]
     stiffness = p["belt_stiffness"] + 2.0 * p["contact_stiffness"] * tangent * (tangent + mu * share)
     delay = max(stiffness, 0.0) / mass * p["friction_memory"] ** 2
-    slopes = np.array([value * rise, factor * fall / (1.0 + delay)])
-    friction = 2.0 * force * np.append(slopes * share**2, mu / speed * (1.0 - share**2))
+    gradients = value * rise, factor * fall / (1.0 + delay)
+    shares = *(one * share**2 for one in gradients), mu / speed * (1.0 - share**2)
     return Flank(
         law,
         p["friction_speed"],
@@ -116,9 +136,31 @@ def flank(parameters: Mapping[str, Any]) -> Flank:
         speed,
         mass,
         stiffness,
-        np.append(p["transverse_damping"], friction),
-        float(slopes.sum()),
+        np.array([p["transverse_damping"], *(2.0 * force * one for one in shares)]),
+        float(sum(gradients)),
     )
+
+
+def _together(each: Sequence[laws.FrictionLaw]) -> Any:
+    """A FrictionLaw of several, each number an array; they share kind and table."""
+    names = "kinetic", "gradient", "speed"
+    numbers: dict[str, Any] = {name: np.array([getattr(law, name) for law in each]) for name in names}
+    return each[0]._replace(**numbers)
+
+
+@kernel
+def _slopes(law: Any, speeds: np.ndarray, forces: np.ndarray, widths: np.ndarray) -> np.ndarray:
+    """Law and its slope, saturation and its slope, (run, 4), of several laws `_together`."""
+    found = np.empty((speeds.size, 4))
+    table = law.table_force, law.table_speed, law.table_mu
+    for k in range(speeds.size):
+        if law.kind == Law.TABLE:
+            found[k, 0], found[k, 1] = laws.table_coefficient(table, speeds[k], forces[k])
+        else:
+            numbers = laws.law_numbers(law.kinetic[k], law.gradient[k], law.speed[k])
+            found[k, 0], found[k, 1] = laws.formula_coefficient(law.kind, numbers, speeds[k])
+        found[k, 2], found[k, 3] = laws.saturation(speeds[k], 1.0 / widths[k])
+    return found
 
 
 def energy_per_cycle(f: Flank, amplitudes: np.ndarray) -> np.ndarray:
@@ -136,33 +178,82 @@ def energy_per_cycle(f: Flank, amplitudes: np.ndarray) -> np.ndarray:
     (n,) array
         Energy per length of belt [J/m]; positive: fed.
     """
-    w = f.angular_frequency
-    swing = np.multiply.outer(w * amplitudes, _SWING)
-    radial = f.radial_speed + swing
-    tangential = f.speed**2 - f.radial_speed**2
-    speed = np.sqrt(radial * radial + tangential)
-    mu = _friction(f, speed)
-    left = np.exp(speed * (-2.0 / f.width))
-    # radial share of sliding times tanh(speed / width); at rest there is none
-    share = radial * ((1.0 - left) / ((1.0 + left) * np.maximum(speed, _LEAST_SPEED)))
-    friction = 2.0 * f.contact_force * np.einsum("ak,ak,ak->a", mu, share, swing) / PHASES
-    return -2.0 * np.pi / w * (0.5 * f.damping[0] * (w * amplitudes) ** 2 + friction)
+    return Flanks.of([f]).energy_per_cycle(amplitudes)
 
 
-def _friction(f: Flank, speed: np.ndarray) -> np.ndarray:
-    """Coefficients of friction at the phases of _SWING, of which both ways through its middle are added up.
+class Flanks(NamedTuple):
+    """Several flanks, whose laws share kind and table.
 
-    Sliding speeds (n, PHASES // 2 + 1) are alike on both ways; what friction remembers of them is not.
+    Attributes
+    ----------
+    law : FrictionLaw
+        Its numbers are arrays (flank,).
+    numbers : (flank, 8) array
+        Angular frequency [rad/s], radial and whole speed, width [m/s], memory [s], normal and contact
+        force [N/m], and the belt's damping [N s/m^2].
     """
-    around = np.concatenate([speed, speed[:, -2:0:-1]], axis=1)
-    memory = 1.0 / (1.0 + 1j * _HARMONICS * (f.angular_frequency * f.memory))
-    # where sliding comes to rest, the cut-off harmonics of a speed that is 0 there may leave less
-    remembered = np.maximum(np.fft.irfft(np.fft.rfft(around) * memory, PHASES), 0.0)
-    forces = np.full(remembered.size, f.normal_force)
-    mu = laws.friction_coefficients(f.law, remembered.ravel(), forces).reshape(remembered.shape)
-    both = mu[:, : PHASES // 2 + 1]
-    both[:, 1:-1] += mu[:, : PHASES // 2 : -1]
-    return both
+
+    law: Any
+    numbers: np.ndarray
+
+    @classmethod
+    def of(cls, each: Sequence[Flank]) -> Flanks:
+        """Put flanks side by side."""
+        names = (
+            "angular_frequency",
+            "radial_speed",
+            "speed",
+            "width",
+            "memory",
+            "normal_force",
+            "contact_force",
+        )
+        numbers = [[*(getattr(f, name) for name in names), f.damping[0]] for f in each]
+        return cls(_together([f.law for f in each]), np.array(numbers))
+
+    def some(self, places: Sequence[int]) -> Flanks:
+        """Return those at some places."""
+        law, at = self.law, np.array(places)
+        own = law._replace(kinetic=law.kinetic[at], gradient=law.gradient[at], speed=law.speed[at])
+        return Flanks(own, self.numbers[at])
+
+    def energy_per_cycle(self, amplitudes: np.ndarray) -> np.ndarray:
+        """Energies (n,) as of `energy_per_cycle`, at one flank or at a flank each."""
+        w, v_r, v, width, memory, normal_force, contact_force, damping = self.numbers.T
+        swing = np.multiply.outer(w * amplitudes, _SWING)
+        radial = v_r[:, np.newaxis] + swing
+        speed = np.sqrt(radial * radial + (v * v - v_r * v_r)[:, np.newaxis])
+        # sliding speeds are alike on both ways through the middle; what friction remembers of them is not
+        around = np.concatenate([speed, speed[:, -2:0:-1]], axis=1)
+        harmonics = np.fft.rfft(around)
+        harmonics *= 1.0 / (1.0 + 1j * _HARMONICS * (w * memory)[:, np.newaxis])
+        lanes = LaneArray(len(swing), PHASES // WIDTH, WIDTH)
+        mu = np.fft.irfft(harmonics, PHASES, out=lanes.data.reshape(around.shape))
+        _coefficients(self.law, normal_force, lanes)
+        mu[:, 1 : PHASES // 2] += mu[:, : PHASES // 2 : -1]
+        left = np.exp(speed * (-2.0 / width)[:, np.newaxis])
+        # radial share of sliding times tanh(speed / width); at rest there is none
+        share = radial * ((1.0 - left) / ((1.0 + left) * np.maximum(speed, _LEAST_SPEED)))
+        work = np.einsum("ak,ak,ak->a", mu[:, : PHASES // 2 + 1], share, swing)
+        friction = 2.0 * contact_force * work / PHASES
+        return -2.0 * np.pi / w * (0.5 * damping * (w * amplitudes) ** 2 + friction)
+
+
+@kernel
+def _coefficients(law: Any, normal_force: np.ndarray, speeds: LaneArray) -> None:
+    """Write coefficients of friction in the place of remembered speeds, at one flank or at a flank each."""
+    table = law.table_force, law.table_speed, law.table_mu
+    for a in range(speeds.rows):
+        k = a if normal_force.size > 1 else 0
+        numbers = laws.law_numbers(law.kinetic[k], law.gradient[k], law.speed[k])
+        for i in range(PHASES // WIDTH):
+            # where sliding comes to rest, the cut-off harmonics of a speed that is 0 there may leave less
+            speed = maximum(speeds[a, i], 0.0)
+            if law.kind == Law.TABLE:
+                mu = laws.table_coefficient(table, speed, normal_force[k])[0]
+            else:
+                mu = laws.formula_coefficient(law.kind, numbers, speed)[0]
+            speeds[a, i] = mu
 
 
 class Solution(NamedTuple):
@@ -180,34 +271,64 @@ def coordinates(parameters: Mapping[str, Any]) -> dict[str, Coordinate]:
 
 
 def cost(parameters: Mapping[str, Any], stepper: None) -> float:
-    """Core-seconds of a run."""
-    return 1e-3
+    """Core-seconds of a batch."""
+    return 4e-4 * LANES
+
+
+def lanes(parameters: Mapping[str, Any], stepper: None) -> int:
+    """Most runs of a batch: they share what a call takes."""
+    return LANES
+
+
+def lane_key(parameters: Mapping[str, Any]) -> tuple:
+    """Values that all runs of one batch have in common."""
+    return tuple(parameters[key] for key in ("friction_law", *TABLE_PARAMETERS))
 
 
 def solve(parameters: Mapping[str, Any]) -> Solution:
     """Apply the criterion to the parameters of a run [SI]."""
-    f = flank(parameters)
-    energy = np.full(RELATIVE_AMPLITUDES.size, np.nan)
-    if f.stiffness > 0.0:
-        energy = energy_per_cycle(f, RELATIVE_AMPLITUDES * f.speed / f.angular_frequency)
-    return Solution(f, energy, parameters["undecided_margin"])
+    return solve_together([parameters])[0]
+
+
+def solve_together(points: Sequence[Mapping[str, Any]]) -> list[Solution]:
+    """Apply the criterion to runs of one batch."""
+    found = []
+    for f, p in zip(flanks(points), points, strict=True):
+        energy = np.full(RELATIVE_AMPLITUDES.size, np.nan)
+        if f.stiffness > 0.0:
+            # each on its own: these arrays are as large as the cache
+            amplitudes = RELATIVE_AMPLITUDES * f.speed / f.angular_frequency
+            energy = Flanks.of([f]).energy_per_cycle(amplitudes)
+        found.append(Solution(f, energy, p["undecided_margin"]))
+    return found
 
 
 def judge(solution: Solution) -> dict[str, Any]:
-    """The record of a run, its cost apart.
+    """The record of a run, its cost apart; see `judge_together`."""
+    return judge_together([solution])[0]
+
+
+def judge_together(solutions: Sequence[Solution]) -> list[dict[str, Any]]:
+    """The records of runs of one batch, their cost apart.
 
     Parameters
     ----------
-    solution : Solution
-        As `solve` returns it.
+    solutions : sequence of Solution
+        As `solve_together` returns them.
     """
+    is_fed = [solution.energy > _rounding(solution.flank) for solution in solutions]
+    amplitudes = limit_amplitudes(solutions, is_fed)
+    return [_values(*each) for each in zip(solutions, is_fed, amplitudes, strict=True)]
+
+
+def _values(solution: Solution, is_fed: np.ndarray, amplitude: float) -> dict[str, Any]:
+    """The record of a run, by the amplitudes that are fed, and that of its limit cycle [m]."""
     f = solution.flank
     if f.stiffness <= 0.0:
         reason = "nothing brings the belt back: friction outweighs the wedge, and there is no frequency"
         return {"status": Status.DONE, "vibrates": Vibrates.UNDECIDED, "reason": reason}
     fed, taken = -f.damping[f.damping < 0.0].sum(), f.damping[f.damping > 0.0].sum()
     balance = (fed - taken) / (fed + taken) if fed + taken > 0.0 else 0.0
-    is_fed = solution.energy > _rounding(f)
     vibrates, reason = _verdict(balance, solution.margin, RELATIVE_AMPLITUDES[is_fed])
     w, damping = f.angular_frequency, f.damping.sum()
     ratio = damping / (2.0 * f.mass * w)
@@ -217,7 +338,7 @@ def judge(solution: Solution) -> dict[str, Any]:
         "status": Status.DONE,
         "vibrates": vibrates,
         "reason": reason,
-        "amplitude": _limit_amplitude(f, solution.energy, is_fed),
+        "amplitude": amplitude,
         "frequency": w / (2.0 * np.pi),
         "growth_rate": -damping / (2.0 * f.mass),
         "damping": damping,
@@ -232,7 +353,8 @@ def judge(solution: Solution) -> dict[str, Any]:
 def _rounding(f: Flank) -> np.ndarray:
     """Energies [J/m] at RELATIVE_AMPLITUDES that rounding may leave of none."""
     level = 2.0 * f.contact_force * RELATIVE_AMPLITUDES * f.speed + f.damping[0] * f.speed**2
-    return ROUNDING * 2.0 * np.pi / f.angular_frequency * level
+    with np.errstate(divide="ignore"):
+        return ROUNDING * 2.0 * np.pi / f.angular_frequency * level
 
 
 def _verdict(balance: float, margin: float, fed: np.ndarray) -> tuple[Vibrates, str]:
@@ -248,22 +370,42 @@ def _verdict(balance: float, margin: float, fed: np.ndarray) -> tuple[Vibrates, 
     return Vibrates.NO, f"{words}, and no larger vibration is fed"
 
 
-def _limit_amplitude(f: Flank, energy: np.ndarray, is_fed: np.ndarray) -> float:
-    """Largest amplitude [m] beyond which motions are no longer fed; nan where there is none."""
-    ends = np.flatnonzero(is_fed[:-1] & ~is_fed[1:])
+def limit_amplitudes(solutions: Sequence[Solution], is_fed: Sequence[np.ndarray]) -> list[float]:
+    """Largest amplitudes [m] beyond which motions are no longer fed; nan where there is none.
+
+    The searches of all runs go on side by side, with one evaluation of the energies for all that are open.
+    """
+    found, open_ = [np.nan] * len(solutions), {}
+    searches = list(map(_search, solutions, is_fed))
+    flanks = Flanks.of([solution.flank for solution in solutions])
+
+    def go_on(place: int, energy: float | None) -> None:
+        try:
+            open_[place] = searches[place].send(energy)
+        except StopIteration as end:
+            found[place] = end.value
+            open_.pop(place, None)
+
+    for place in range(len(solutions)):
+        go_on(place, None)
+    while places := list(open_):
+        energies = flanks.some(places).energy_per_cycle(np.array([open_[place] for place in places]))
+        for place, energy in zip(places, energies.tolist(), strict=True):
+            go_on(place, energy)
+    return found
+
+
+def _search(solution: Solution, is_fed: np.ndarray) -> Search:
+    """Look for the largest amplitude of one run."""
+    f, ends = solution.flank, np.flatnonzero(is_fed[:-1] & ~is_fed[1:])
     if not ends.size:
         return np.nan
     around = slice(ends[-1], ends[-1] + 2)
     low, high = (RELATIVE_AMPLITUDES[around] * f.speed / f.angular_frequency).tolist()
-    known = dict(zip((low, high), energy[around].tolist(), strict=True))
-
-    if known[high] >= 0.0:  # by less than rounding
+    at_low, at_high = solution.energy[around].tolist()
+    if at_high >= 0.0:  # by less than rounding
         return high
-
-    def gained(amplitude: float) -> float:
-        return known[amplitude] if amplitude in known else energy_per_cycle(f, np.array([amplitude]))[0]
-
-    return brentq(gained, low, high, xtol=1e-12 * high, rtol=1e-9)
+    return (yield from brent(low, high, at_low, at_high, 1e-12 * high, 1e-9))
 
 
 def _critical_gradient(f: Flank) -> float:
