@@ -17,6 +17,10 @@ A model with a transient may answer some runs without all of it. Its `record` th
 the values where no transient is needed, else None; `preliminary(parameters)`, the parameters of a cheaper
 transient that comes first, or None; and `settle(run)`, the values by that transient if it answers, else None.
 
+The `record` of a model whose runs cost little has `judge_together(runs)` and, without a transient,
+`solve_together(points)`, for all runs of a batch at once: of one `lane_key`, `lanes` at most. A run's values
+are those of `judge` and `solve`, to the bit.
+
 If the runs of a `transient` keep a part of their march for later runs of the process, it has `forget()`,
 which drops that part.
 """

@@ -23,9 +23,10 @@ if TYPE_CHECKING:
 
     from cvt_hpc.models.oscillator.transient import Transient
 
-SAMPLE_COST = 1e-7  # core-seconds of a sample, its judgement included
+SAMPLE_COST = 2e-7  # core-seconds of a sample, its judgement included
 STEP_COST = {"moreau": 1.5e-8}  # core-seconds of a step in full lanes; of the others 1e-6
-LANES = 64  # runs of a batch by `moreau`: they share what a call takes, and their rows stay in the cache
+LANES = 64  # runs of a batch by `moreau`: so many share what a call takes
+SAMPLES = 1 << 18  # of all runs of a batch, most: their spectra take 16 MB
 LAW = ("friction_law", "table_file", "table_force", "table_speed", "table_mu")
 MARCH = ("duration", "shortest_duration", "sampling_rate", "step")
 
@@ -75,14 +76,15 @@ def cost(parameters: Mapping[str, Any], stepper: str) -> Any:
         Name of a stepper.
     """
     p = parameters
-    samples = p["duration"] * p["sampling_rate"]
-    step_cost = STEP_COST.get(stepper, 1e-6)
+    samples, step_cost = p["duration"] * p["sampling_rate"], STEP_COST.get(stepper, 1e-6)
     return lanes(p, stepper) * (SAMPLE_COST * samples + step_cost * p["duration"] / p.get("step", 1e-6))
 
 
-def lanes(parameters: Mapping[str, Any], stepper: str) -> int:
-    """Most runs that advance together."""
-    return LANES if stepper == "moreau" else 1
+def lanes(parameters: Mapping[str, Any], stepper: str) -> Any:
+    """Most runs that advance together; of parameters that are arrays, an array."""
+    p = parameters
+    found = np.clip(SAMPLES // (p["duration"] * p["sampling_rate"]), 1, LANES if stepper == "moreau" else 1)
+    return found.astype(int) if found.ndim else int(found)
 
 
 def lane_key(parameters: Mapping[str, Any]) -> tuple:
