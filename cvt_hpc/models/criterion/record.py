@@ -6,6 +6,7 @@ A metre of flank that slides: its radial frequency and damping, and the energy t
 from __future__ import annotations
 
 from collections.abc import Mapping, Sequence
+from operator import attrgetter
 from typing import Any, NamedTuple
 
 import numpy as np
@@ -98,34 +99,21 @@ class Flank(NamedTuple):
 
 def flank(parameters: Mapping[str, Any]) -> Flank:
     """Steady sliding, from flat parameters [SI]."""
-    return flanks([parameters])[0]
-
-
-def flanks(points: Sequence[Mapping[str, Any]]) -> list[Flank]:
-    """Steady sliding of several runs, whose laws share kind and table."""
-    all_laws = [laws.given_law(p) for p in points]
-    angles = [p["half_wedge_angle"] for p in points]
-    speeds = [float(np.hypot(p["radial_speed"], p["tangential_speed"])) for p in points]
-    forces = [p["contact_force"] / np.cos(angle) for p, angle in zip(points, angles, strict=True)]
-    widths = np.array([p["friction_speed"] for p in points])
-    slopes = _slopes(_together(all_laws), np.array(speeds), np.array(forces), widths).tolist()
-    return [_flank(*each) for each in zip(points, all_laws, speeds, forces, slopes, strict=True)]
-
-
-def _flank(
-    p: Mapping[str, Any], law: laws.FrictionLaw, speed: float, normal_force: float, slopes: list[float]
-) -> Flank:
-    """One of `flanks`, by the numbers of `_slopes`."""
+    p = parameters
+    law = laws.given_law(p)
     tangent = np.tan(p["half_wedge_angle"])
     force = p["contact_force"]
+    normal_force = force / np.cos(p["half_wedge_angle"])
+    speed = float(np.hypot(p["radial_speed"], p["tangential_speed"]))
     share = p["radial_speed"] / speed
-    value, fall, factor, rise = slopes
+    value, fall = laws.friction_coefficient(law, speed, normal_force)
+    factor, rise = laws.saturation(speed, 1.0 / p["friction_speed"])
     mu = value * factor
     mass = p["element_mass"] + p["ring_mass"]
     stiffness = p["belt_stiffness"] + 2.0 * p["contact_stiffness"] * tangent * (tangent + mu * share)
     delay = max(stiffness, 0.0) / mass * p["friction_memory"] ** 2
-    gradients = value * rise, factor * fall / (1.0 + delay)
-    shares = *(one * share**2 for one in gradients), mu / speed * (1.0 - share**2)
+    slopes = np.array([value * rise, factor * fall / (1.0 + delay)])
+    friction = 2.0 * force * np.append(slopes * share**2, mu / speed * (1.0 - share**2))
     return Flank(
         law,
         p["friction_speed"],
@@ -136,31 +124,9 @@ def _flank(
         speed,
         mass,
         stiffness,
-        np.array([p["transverse_damping"], *(2.0 * force * one for one in shares)]),
-        float(sum(gradients)),
+        np.append(p["transverse_damping"], friction),
+        float(slopes.sum()),
     )
-
-
-def _together(each: Sequence[laws.FrictionLaw]) -> Any:
-    """A FrictionLaw of several, each number an array; they share kind and table."""
-    names = "kinetic", "gradient", "speed"
-    numbers: dict[str, Any] = {name: np.array([getattr(law, name) for law in each]) for name in names}
-    return each[0]._replace(**numbers)
-
-
-@kernel
-def _slopes(law: Any, speeds: np.ndarray, forces: np.ndarray, widths: np.ndarray) -> np.ndarray:
-    """Law and its slope, saturation and its slope, (run, 4), of several laws `_together`."""
-    found = np.empty((speeds.size, 4))
-    table = law.table_force, law.table_speed, law.table_mu
-    for k in range(speeds.size):
-        if law.kind == Law.TABLE:
-            found[k, 0], found[k, 1] = laws.table_coefficient(table, speeds[k], forces[k])
-        else:
-            numbers = laws.law_numbers(law.kinetic[k], law.gradient[k], law.speed[k])
-            found[k, 0], found[k, 1] = laws.formula_coefficient(law.kind, numbers, speeds[k])
-        found[k, 2], found[k, 3] = laws.saturation(speeds[k], 1.0 / widths[k])
-    return found
 
 
 def energy_per_cycle(f: Flank, amplitudes: np.ndarray) -> np.ndarray:
@@ -181,6 +147,11 @@ def energy_per_cycle(f: Flank, amplitudes: np.ndarray) -> np.ndarray:
     return Flanks.of([f]).energy_per_cycle(amplitudes)
 
 
+_OF_LAW = "kinetic", "gradient", "speed"
+_MOTION = "angular_frequency", "radial_speed", "speed", "width", "memory"
+_NUMBERS = attrgetter(*_MOTION, "normal_force", "contact_force")
+
+
 class Flanks(NamedTuple):
     """Several flanks, whose laws share kind and table.
 
@@ -199,17 +170,9 @@ class Flanks(NamedTuple):
     @classmethod
     def of(cls, each: Sequence[Flank]) -> Flanks:
         """Put flanks side by side."""
-        names = (
-            "angular_frequency",
-            "radial_speed",
-            "speed",
-            "width",
-            "memory",
-            "normal_force",
-            "contact_force",
-        )
-        numbers = [[*(getattr(f, name) for name in names), f.damping[0]] for f in each]
-        return cls(_together([f.law for f in each]), np.array(numbers))
+        numbers = [[*_NUMBERS(f), f.damping[0]] for f in each]
+        law: dict[str, Any] = {key: np.array([getattr(f.law, key) for f in each]) for key in _OF_LAW}
+        return cls(each[0].law._replace(**law), np.array(numbers))
 
     def some(self, places: Sequence[int]) -> Flanks:
         """Return those at some places."""
@@ -293,7 +256,8 @@ def solve(parameters: Mapping[str, Any]) -> Solution:
 def solve_together(points: Sequence[Mapping[str, Any]]) -> list[Solution]:
     """Apply the criterion to runs of one batch."""
     found = []
-    for f, p in zip(flanks(points), points, strict=True):
+    for p in points:
+        f = flank(p)
         energy = np.full(RELATIVE_AMPLITUDES.size, np.nan)
         if f.stiffness > 0.0:
             # each on its own: these arrays are as large as the cache

@@ -91,27 +91,11 @@ def together(each: Sequence[Oscillator]) -> Any:
 def one_of(several: Any, k: int) -> Oscillator:
     """Return the constants of one of the oscillators that are `together`."""
     o, law = several, several.law
-    own = FrictionLaw(
-        law.kind,
-        law.kinetic[k],
-        law.gradient[k],
-        law.speed[k],
-        law.table_force,
-        law.table_speed,
-        law.table_mu,
-    )
-    return Oscillator(
-        o.mass[k],
-        o.stiffness[k],
-        o.damping[k],
-        o.belt_speed[k],
-        o.normal_load[k],
-        o.normal_stiffness[k],
-        o.preload[k],
-        own,
-        o.excess[k],
-        o.width[k],
-    )
+    kinetic, gradient, scale = law.kinetic[k], law.gradient[k], law.speed[k]
+    own = FrictionLaw(law.kind, kinetic, gradient, scale, law.table_force, law.table_speed, law.table_mu)
+    mass, stiffness, damping, speed = o.mass[k], o.stiffness[k], o.damping[k], o.belt_speed[k]
+    load, fall, preload = o.normal_load[k], o.normal_stiffness[k], o.preload[k]
+    return Oscillator(mass, stiffness, damping, speed, load, fall, preload, own, o.excess[k], o.width[k])
 
 
 @kernel
