@@ -281,7 +281,7 @@ def test_its_chatter_is_named():
 def test_runs_in_lanes_are_those_of_the_general_step(law):
     """In batches of any size, marched in pieces of any length, and continued: equal to the bit."""
     rng, ends = np.random.default_rng(21), set()
-    for turn in range(8):
+    for turn in range(24):
         scenes, first = [], random_scene(rng, law)
         for _ in range(rng.integers(1, 6)):
             keys = ("mass", "damping", "initial_speed", "belt_speed", "friction_gradient", "kinetic_friction")
@@ -293,7 +293,8 @@ def test_runs_in_lanes_are_those_of_the_general_step(law):
             scenes = [one | {"step": step, "sampling_rate": 1.0 / step} for one in scenes]
         if turn % 4 == 2:  # the mass lifts off in some swings
             fall = first["stiffness"] / first["kinetic_friction"]
-            scenes = [one | {"normal_stiffness": float(fall * rng.uniform(0.3, 1.0))} for one in scenes]
+            scenes = [one | {"normal_stiffness": float(fall * rng.uniform(0.5, 3.0))} for one in scenes]
+            scenes = scenes[: 1 if turn > 2 else None]  # nobody goes on beside it
         longer = [one | {"duration": 1.5 * first["duration"]} for one in scenes]
         together = batch(scenes, "moreau")
         advance(together, rng)
@@ -309,7 +310,7 @@ def test_runs_in_lanes_are_those_of_the_general_step(law):
 
 def advance(together, rng):
     while together.running:
-        together.advance(int(rng.integers(1, 100)))
+        together.advance(int(rng.integers(1, 30)))
 
 
 def assert_general(runs, scenes, begun=0):

@@ -504,7 +504,7 @@ class Batch:
             piece = self._rows[:, self.done : min(last, self._border)]
             march(self._several, self._lanes, self.interval, self._steps, piece)
             self.done += piece.shape[1]
-            if self.done in (self._border, self.samples):
+            if self.done in (self._border, self.samples) or not self.running:
                 self._look()
             if self.done == last or not self.running:
                 return
