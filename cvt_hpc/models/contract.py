@@ -17,6 +17,10 @@ A model with a transient may answer some runs without all of it. Its `record` th
 the values where no transient is needed, else None; `preliminary(parameters)`, the parameters of a cheaper
 transient that comes first, or None; and `settle(run)`, the values by that transient if it answers, else None.
 
+The `record` of a model whose runs cost little has `judge_together(runs)` and, without a transient,
+`solve_together(points)`, for all runs of a batch at once: of one `lane_key`, `lanes` at most. A run's values
+are those of `judge` and `solve`, to the bit.
+
 If the runs of a `transient` keep a part of their march for later runs of the process, it has `forget()`,
 which drops that part.
 """
@@ -318,9 +322,19 @@ class Model:
         """Values and verdict of a run at its end, or of the result of `solve`."""
         return self._record.judge(run)
 
+    def judge_together(self, runs: Sequence[Any]) -> list[Values]:
+        """Values and verdicts of runs of one batch, each as `judge` gives them to the bit."""
+        if not runs:
+            return []
+        return _member(self._record, "judge_together", lambda runs: list(map(self.judge, runs)))(runs)
+
     def solve(self, parameters: Parameters) -> Any:
         """Result that `judge` and `histories` read, for a model without a transient."""
         return self._record.solve(parameters)
+
+    def solve_together(self, points: Sequence[Parameters]) -> list[Any]:
+        """Results of several runs, each as `solve` gives it to the bit."""
+        return _member(self._record, "solve_together", lambda points: list(map(self.solve, points)))(points)
 
     def profile_bytes(self, parameters: Parameters) -> int:
         """Size of a kept history's values along the belt at each sample [byte]."""

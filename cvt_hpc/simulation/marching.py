@@ -18,7 +18,7 @@ from typing import Any
 from cvt_hpc.job import Job
 from cvt_hpc.models.contract import Batch, load_model
 from cvt_hpc.recording import first_duration, longest_duration, sample_count
-from cvt_hpc.simulation.record import in_lanes, record_of, record_without_run
+from cvt_hpc.simulation.record import blank_record, has_result, in_lanes, record_of, record_without_run
 from cvt_hpc.variables import LONGEST_REASON, Status, Vibrates, shortened
 from cvt_hpc.vibration.assessment import is_certain
 from cvt_hpc.vibration.ramped import ramped
@@ -46,9 +46,13 @@ class OpenRun:
         Flat parameters of the run [SI].
     is_kept : bool
         Whether `run` is to be there in the end.
+    blank : dict
+        An empty record.
 
     Attributes
     ----------
+    is_preliminary : bool
+        Whether the next transient is one that may answer in the place of the full one.
     next : dict
         Flat parameters of the transient that comes next [SI].
     paused : object or None
@@ -59,17 +63,17 @@ class OpenRun:
         The transient that counts, where it is kept and there is one.
     """
 
-    def __init__(self, job: Job, point: dict[str, Any], is_kept: bool = False) -> None:
+    def __init__(self, job: Job, point: dict[str, Any], is_kept: bool, blank: dict[str, Any]) -> None:
         if not is_kept and point.get("profile_duration"):
             point = point | {"profile_duration": 0.0}  # only histories have profiles over time
         self._job, self._point, self._model = job, point, load_model(job.model)
-        self._is_kept = is_kept
+        self._is_kept, self._blank = is_kept, blank
         self.next, self.paused = self._first(point), None
         self.record: dict[str, Any] | None = None
         self.run: Any = None
         self._refinements, self._vibrated = 0, False
         self._spent = dict.fromkeys(_COST, 0)
-        self._is_preliminary = False
+        self.is_preliminary = False
         self._begin_cheaply()
 
     def _begin_cheaply(self) -> None:
@@ -79,9 +83,9 @@ class OpenRun:
             return
         preliminary = self._model.preliminary(self._point)
         if preliminary is not None:
-            self.next, self._is_preliminary = preliminary, True
+            self.next, self.is_preliminary = preliminary, True
 
-    def take(self, run: Any, seconds: float) -> None:
+    def take(self, run: Any, seconds: float, values: dict[str, Any] | None) -> None:
         """Look at a transient that has ended, and decide whether it counts or which one comes next.
 
         Parameters
@@ -90,14 +94,16 @@ class OpenRun:
             As the model's batch has it.
         seconds : float
             Processor time that it has taken [s].
+        values : dict or None
+            As the model judges it; None of a preliminary one, and of one that has failed.
         """
-        judge = self._model.settle if self._is_preliminary else self._model.judge
-        record = record_of(self._job, run, seconds, judge)
+        judge = self._model.settle if self.is_preliminary else lambda run: values
+        record = record_of(self._job, run, seconds, judge, self._blank)
         record |= {name: record[name] + self._spent[name] for name in _COST}
-        if self._is_preliminary and record["status"] != Status.DONE:
-            self._is_preliminary = False
+        if self.is_preliminary and record["status"] != Status.DONE:
+            self.is_preliminary = False
             self._begin(self._first(self._point), record)
-        elif self._is_preliminary:
+        elif self.is_preliminary:
             self._end(run, record)
         elif record["status"] == Status.FAILED_NUMERICS and (finer := self._finer(run)):
             self._refinements += 1
@@ -241,9 +247,10 @@ def march_runs(
     Interrupted
         With the text of `interrupt`.
     """
-    runs = [OpenRun(job, point, place in kept) for place, point in enumerate(points)]
+    blank = blank_record(job)
+    runs = [OpenRun(job, point, place in kept, blank) for place, point in enumerate(points)]
     _march_once(job, runs, interrupt)
-    while joining := [OpenRun(job, point) for point in more()]:
+    while joining := [OpenRun(job, point, False, blank) for point in more()]:
         _march_once(job, joining, interrupt)
         runs += joining
     while any(run.record is None for run in runs):
@@ -262,10 +269,16 @@ def _march_once(job: Job, runs: Sequence[OpenRun], interrupt: Callable[[], str |
 def _march_together(job: Job, group: Sequence[OpenRun], interrupt: Callable[[], str | None]) -> None:
     """March the next transients of a group to their ends."""
     paused = [run.paused for run in group if run.paused is not None]
-    batch = load_model(job.model).batch([run.next for run in group], job.stepper, paused)
+    model = load_model(job.model)
+    batch = model.batch([run.next for run in group], job.stepper, paused)
     batch.advance(0)  # compiles or loads the kernels, which is no cost of these runs
     seconds, stopped = march(batch, stop=interrupt)
     if stopped:
         raise Interrupted(stopped)
-    for run, marched in zip(group, batch.runs, strict=True):
-        run.take(marched, seconds / len(group))
+    started = time.process_time()
+    pairs = list(zip(group, batch.runs, strict=True))
+    whole = [k for k, (run, marched) in enumerate(pairs) if not run.is_preliminary and has_result(marched)]
+    values = dict(zip(whole, model.judge_together([pairs[k][1] for k in whole]), strict=True))
+    seconds += time.process_time() - started
+    for k, (run, marched) in enumerate(pairs):
+        run.take(marched, seconds / len(group), values.get(k))

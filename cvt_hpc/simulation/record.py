@@ -101,7 +101,11 @@ def record_coordinates(job: Job) -> dict[str, Coordinate]:
 
 
 def record_of(
-    job: Job, run: Run, marched: float, judge: Callable[[Any], dict[str, Any] | None] | None = None
+    job: Job,
+    run: Run,
+    marched: float,
+    judge: Callable[[Any], dict[str, Any] | None] | None = None,
+    blank: dict[str, Any] | None = None,
 ) -> dict[str, Any]:
     """The record of a transient that has ended.
 
@@ -114,17 +118,19 @@ def record_of(
     judge : callable, optional
         Gives the values of a run that has reached its end, by default as the model judges its runs; None,
         and the record's status is not_run, where it does not answer.
+    blank : dict, optional
+        An empty record of the job, by default a new one.
     """
     started = time.process_time()
-    record, failure = blank_record(job), run.failure
-    has_result = failure is None or failure[0] is Status.DONE
-    if has_result and (values := (judge or load_model(job.model).judge)(run)) is not None:
+    blank = blank_record(job) if blank is None else blank
+    record, failure = dict(blank), run.failure
+    if has_result(run) and (values := (judge or load_model(job.model).judge)(run)) is not None:
         record |= values
         if failure is None:
             failure = run.numerical_doubt(record)
     if failure is not None and failure[0] is not Status.DONE:
         status, why = failure
-        record = blank_record(job) | {
+        record = blank | {
             "status": status,
             "reason": shortened(f"at {run.time * 1e3:.4g} ms: {why}"),
         }
@@ -135,6 +141,11 @@ def record_of(
         "steps": run.steps,
         "contact_solves": run.contact_solves,
     }
+
+
+def has_result(run: Run) -> bool:
+    """Whether a transient that has ended can be judged."""
+    return run.failure is None or run.failure[0] is Status.DONE
 
 
 def record_without_run(job: Job, values: dict[str, Any]) -> dict[str, Any]:
@@ -303,7 +314,7 @@ def _batch_size(job: Job, parameters: dict[str, Any]) -> int:
     model = load_model(job.model)
     most = model.lanes(parameters, job.stepper)
     if job.stepper is None:  # they take their turns, and have the cost of a batch in common
-        return int(np.clip(SOLVED_SECONDS / model.cost(parameters, None), 1, SOLVED_TOGETHER))
+        return int(np.clip(most * SOLVED_SECONDS / model.cost(parameters, None), most, SOLVED_TOGETHER))
     if most == 1:
         return 1
     return most * int(np.clip(BATCH_SECONDS / model.cost(parameters, job.stepper), 1, MOST_TURNS))

@@ -17,7 +17,13 @@ from cvt_hpc.job.assignments import Assignments, read_assignments, warn_of_bare_
 from cvt_hpc.job.values import POINT_UNITS
 from cvt_hpc.models.contract import Model, load_model
 from cvt_hpc.simulation.marching import Interrupted, More, march_runs, no_more
-from cvt_hpc.simulation.record import blank_record, record_coordinates, record_variables, recorded_model
+from cvt_hpc.simulation.record import (
+    blank_record,
+    in_lanes,
+    record_coordinates,
+    record_variables,
+    recorded_model,
+)
 from cvt_hpc.storage.netcdf import attributes, global_attributes, variable_attributes
 from cvt_hpc.variables import Outcome
 
@@ -90,21 +96,25 @@ def do(
     """Do a batch of runs as `run_points`; beside each record the input of `histories`, if kept."""
     model = recorded_model(job)
     if job.stepper is None:
-        blank = blank_record(job)
-        return [_solve(blank, model, point, interrupt) for point in points]
+        return _solve(job, model, points, interrupt)
     return march_runs(job, points, interrupt, kept, more)
 
 
 def _solve(
-    blank: dict[str, Any], model: Model, point: dict[str, Any], interrupt: Callable[[], str | None]
-) -> tuple[Any, dict[str, Any]]:
-    """A run of a model without a transient: its record follows from the parameters at once."""
-    if stop := interrupt():
-        raise Interrupted(stop)
-    started = time.process_time()
-    solution = model.solve(point)
-    record = blank | model.judge(solution)
-    return solution, record | {"core_seconds": time.process_time() - started}
+    job: Job, model: Model, points: Sequence[dict[str, Any]], interrupt: Callable[[], str | None]
+) -> list[tuple[Any, dict[str, Any]]]:
+    """Runs of a model without a transient: their records follow from the parameters at once."""
+    blank, done = blank_record(job), {}
+    for group in in_lanes(model, None, range(len(points)), points.__getitem__, lambda place: None):
+        if stop := interrupt():
+            raise Interrupted(stop)
+        started = time.process_time()
+        solutions = model.solve_together([points[place] for place in group])
+        judged = model.judge_together(solutions)
+        cost = {"core_seconds": (time.process_time() - started) / len(group)}
+        for place, solution, values in zip(group, solutions, judged, strict=True):
+            done[place] = solution, blank | values | cost
+    return [done[place] for place in range(len(points))]
 
 
 def simulate(job: Job, at: Assignments | None = None) -> xr.Dataset:

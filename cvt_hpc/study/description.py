@@ -181,8 +181,9 @@ class Study(Runs):
             raise ValueError(f"a record needs {sorted(self.record_names)}, found {sorted(values)}")
         for name, value in values.items():
             shape, letters = fields[name]
-            if np.shape(value) != shape:
-                raise ValueError(f"{name}: expected shape {shape}, found {np.shape(value)}")
+            found = () if isinstance(value, float | int | str) else np.shape(value)
+            if found != shape:
+                raise ValueError(f"{name}: expected shape {shape}, found {found}")
             row[name] = fit_text(value, letters) if letters else value
         if row["status"] == Status.NOT_RUN:
             raise ValueError("a run that ended has the status not_run")

@@ -39,7 +39,7 @@ from numpy.typing import ArrayLike, NDArray
 
 from cvt_hpc.variables import Status, Variable, Vibrates, shortened, values
 from cvt_hpc.vibration import signals
-from cvt_hpc.vibration.peaks import fundamental
+from cvt_hpc.vibration.peaks import fundamentals
 from cvt_hpc.vibration.settings import LEAST_PERIODS, fitting_window
 from cvt_hpc.vibration.settings import band as given_band
 
@@ -250,11 +250,11 @@ def is_certain(record: Mapping[str, Any], parameters: Mapping[str, Any], left: f
     return bool(is_settled and lowest >= np.log(CERTAIN_FACTOR))
 
 
-def relative_scatter(windows: ArrayLike) -> NDArray[np.float64]:
-    """Standard deviation of amplitudes (window, ...) over their mean, (...); nan where nothing moves."""
+def relative_scatter(windows: ArrayLike, axis: int = 0) -> NDArray[np.float64]:
+    """Standard deviation of amplitudes over their mean, along an axis; nan where nothing moves."""
     amplitudes = np.asarray(windows, dtype=float)
     with np.errstate(invalid="ignore"):
-        return np.std(amplitudes, axis=0) / np.mean(amplitudes, axis=0)
+        return np.std(amplitudes, axis=axis) / np.mean(amplitudes, axis=axis)
 
 
 def is_irregular(windows: ArrayLike, threshold: float, most_gain: float) -> bool:
@@ -365,43 +365,65 @@ def assess(
     ValueError
         The displacement is not finite, or too short for the band.
     """
-    w = np.asarray(displacement, dtype=float)
-    judged = w[len(w) - round(parameters["judged_fraction"] * len(w)) :]
+    return assess_runs(np.asarray(displacement, dtype=float)[np.newaxis], rate, strands, parameters)[0]
+
+
+def assess_runs(
+    displacements: NDArray[np.float64], rate: float, strands: Sequence[str], parameters: Mapping[str, Any]
+) -> list[Occurrence]:
+    """Judge runs of equal length and settings as `assess` does each; displacements (run, time, probe).
+
+    The numbers of a run do not depend on the others, to the bit.
+    """
+    w = displacements
+    total = w.shape[1]
+    judged = w[:, total - round(parameters["judged_fraction"] * total) :]
     band = given_band(parameters)
-    duration = len(judged) / rate
+    duration = judged.shape[1] / rate
     window = fitting_window(duration, parameters["window_length"])
-    centres, windows = signals.window_amplitudes(judged, rate, band, window)
-    amplitudes = signals.band_amplitude(judged, rate, band)
+    by_time = np.moveaxis(judged, 1, 0)
+    centres, windows = signals.window_amplitudes(by_time, rate, band, window)
+    amplitudes = signals.band_amplitude(by_time, rate, band)
     names = tuple(dict.fromkeys(strands))
     members = [np.flatnonzero(np.asarray(strands) == name) for name in names]
-    strongest = np.array([columns[np.argmax(amplitudes[columns])] for columns in members])
-    strand_windows = np.stack([windows[:, columns].max(axis=1) for columns in members], axis=1)
-    growth = signals.growth_fit(centres, strand_windows)
-    vibrates, reason = classify(
-        strand_windows,
-        growth.rate,
-        growth.standard_error,
-        judged_time=duration,
-        record_time=len(w) / rate,
-        parameters=parameters,
-        strands=names,
-        overall=amplitudes[strongest],
-    )
-    if vibrates is Vibrates.YES and amplitudes[strongest].max() < parameters["amplitude_threshold"]:
-        # a short window sees a little beyond the band: motion there is not in it
-        vibrates, reason = Vibrates.UNDECIDED, "moves at the edge of the band only"
-    frequencies = np.array([fundamental(judged[:, probe], rate, band) for probe in strongest])
-    return Occurrence(
-        vibrates,
-        reason,
-        names,
-        amplitudes[strongest],
-        frequencies[:, 0],
-        frequencies[:, 1],
-        band[0],
-        growth.rate,
-        growth.standard_error,
-        relative_scatter(strand_windows),
-        strongest,
-        margin(strand_windows, vibrates, parameters["amplitude_threshold"]),
-    )
+    strongest = np.stack([columns[np.argmax(amplitudes[:, columns], axis=1)] for columns in members], axis=1)
+    sizes = np.take_along_axis(amplitudes, strongest, axis=1)
+    strand_windows = np.stack([windows[:, :, columns].max(axis=2) for columns in members], axis=2)
+    strand_windows = np.ascontiguousarray(np.moveaxis(strand_windows, 1, 0))
+    growth = signals.growth_fits(centres, strand_windows)
+    scatter = relative_scatter(strand_windows, axis=1)
+    motions = np.take_along_axis(judged, strongest[:, np.newaxis], axis=2)
+    motions = np.moveaxis(motions, 1, 2).reshape(-1, judged.shape[1])
+    frequencies = fundamentals(motions, rate, band).reshape(*strongest.shape, 2)
+    found = []
+    for k, own in enumerate(strand_windows):
+        vibrates, reason = classify(
+            own,
+            growth.rate[k],
+            growth.standard_error[k],
+            judged_time=duration,
+            record_time=total / rate,
+            parameters=parameters,
+            strands=names,
+            overall=sizes[k],
+        )
+        if vibrates is Vibrates.YES and sizes[k].max() < parameters["amplitude_threshold"]:
+            # a short window sees a little beyond the band: motion there is not in it
+            vibrates, reason = Vibrates.UNDECIDED, "moves at the edge of the band only"
+        found.append(
+            Occurrence(
+                vibrates,
+                reason,
+                names,
+                sizes[k],
+                frequencies[k, :, 0],
+                frequencies[k, :, 1],
+                band[0],
+                growth.rate[k],
+                growth.standard_error[k],
+                scatter[k],
+                strongest[k],
+                margin(own, vibrates, parameters["amplitude_threshold"]),
+            )
+        )
+    return found

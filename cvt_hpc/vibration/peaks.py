@@ -6,13 +6,14 @@ of their squares. Peaks nearer to a higher one than the window's main lobe, or l
 that one's own, in the band or beside it.
 """
 
+import math
 from typing import NamedTuple
 
 import numpy as np
 from numpy.typing import ArrayLike
 
 from cvt_hpc.variables import Coordinate, Variable
-from cvt_hpc.vibration.signals import Array, check_band, dominant_frequency, fine_spectrum, time_last
+from cvt_hpc.vibration.signals import Array, check_band, fine_spectrum, strongest_peak, time_last
 
 COUNT = 3  # peaks of a strand that are recorded
 LINES = 12  # largest ones among which harmonics are looked for
@@ -122,23 +123,33 @@ def fundamental(signal: ArrayLike, rate: float, band: tuple[float, float]) -> tu
     ValueError
         As of `signals.band_amplitude`.
     """
-    strongest = float(dominant_frequency(signal, rate, band))
-    if np.isnan(strongest):
-        return strongest, strongest
-    lines, height = fine_spectrum(time_last(signal), rate)
-    noise = np.median(height[(lines >= band[0]) & (lines <= band[1])])
-    least = max(LEAST_LINE * height[round(strongest / lines[1])], ABOVE_NOISE * noise)
-    width = rate / len(np.asarray(signal))
-    found = _highest(lines, height, band, width, LINES, least)
-    peaks = np.array([_vertex(lines, height, line) for line in found])
-    for number in range(MOST_HARMONIC, 1, -1):
+    found = fundamentals(np.asarray(signal, float)[np.newaxis], rate, band)[0]
+    return float(found[0]), float(found[1])
+
+
+def fundamentals(signals: Array, rate: float, band: tuple[float, float]) -> Array:
+    """Return `fundamental` and strongest line [Hz] of each of several signals (n, time), shape (n, 2)."""
+    check_band(band, rate)
+    # each signal a matrix of its own, in one piece: no number depends on the other signals, to the bit
+    lines, heights = fine_spectrum(np.ascontiguousarray(signals)[:, np.newaxis], rate)
+    heights = heights[:, 0]
+    strongest = strongest_peak(lines, heights, band)
+    noise = np.median(heights[:, (lines >= band[0]) & (lines <= band[1])], axis=1)
+    width = rate / signals.shape[1]
+    peaks = np.full((len(signals), LINES), np.nan)
+    for k in np.flatnonzero(~np.isnan(strongest)):
+        least = max(LEAST_LINE * heights[k, round(strongest[k] / lines[1])], ABOVE_NOISE * noise[k])
+        for place, line in enumerate(_highest(lines, heights[k], band, width, LINES, least)):
+            peaks[k, place] = _vertex(lines, heights[k], line)
+    found = np.stack([strongest, strongest], axis=1)
+    for number in range(2, MOST_HARMONIC + 1):  # the larger number counts, where several do
         first = strongest / number
-        orders = np.arange(1, number + 3)
-        has_line = (np.abs(peaks[:, np.newaxis] - orders * first) <= NEAR * width).any(axis=0)
-        in_a_row = has_line[:-2] & has_line[1:-1] & has_line[2:]
-        if first >= band[0] and (has_line[0] or in_a_row[max(number - 3, 0) :].any()):
-            return first, strongest
-    return strongest, strongest
+        harmonics = np.arange(1, number + 3) * first[:, np.newaxis]
+        has_line = (np.abs(peaks[:, :, np.newaxis] - harmonics[:, np.newaxis]) <= NEAR * width).any(axis=1)
+        in_a_row = has_line[:, :-2] & has_line[:, 1:-1] & has_line[:, 2:]
+        is_periodic = has_line[:, 0] | in_a_row[:, max(number - 3, 0) :].any(axis=1)
+        found[:, 0] = np.where((first >= band[0]) & is_periodic, first, found[:, 0])
+    return found
 
 
 def _highest(
@@ -154,23 +165,30 @@ def _highest(
     `width` is the distance of two lines of a transform without padding [Hz]; `count` and `least` are the
     largest number of them, and the least height.
     """
-    is_peak = (height[1:-1] > height[:-2]) & (height[1:-1] >= height[2:])
-    candidates = 1 + np.flatnonzero(is_peak)
-    peaks: list[int] = []
+    inner = height[1:-1]
+    candidates = 1 + np.flatnonzero((inner > height[:-2]) & (inner >= height[2:]) & (inner >= least))
+    order = candidates[np.argsort(height[candidates])[::-1]]
+    peaks: list[tuple[float, float]] = []  # frequency and height; plain numbers: most spectra have few
     chosen: list[int] = []
-    for line in candidates[np.argsort(height[candidates])[::-1]]:
-        if len(chosen) == count or height[line] < least:
+    for line, frequency, size in zip(
+        order.tolist(), lines[order].tolist(), height[order].tolist(), strict=True
+    ):
+        if len(chosen) == count:
             break
-        apart = np.abs(lines[peaks] - lines[line]) / width
-        if (apart < MAIN_LOBE).any():
+        if any(_is_part_of(size, higher, abs(place - frequency) / width) for place, higher in peaks):
             continue
-        # side lobes of Hann's window fall as 1 / (pi x (x^2 - 1)), x in lines
-        if (height[line] < MARGIN * height[peaks] / (np.pi * apart * (apart**2 - 1.0))).any():
-            continue
-        peaks.append(int(line))
-        if band[0] <= lines[line] <= band[1] and not (chosen and height[line] < LEAST * height[chosen[0]]):
-            chosen.append(int(line))
+        peaks.append((frequency, size))
+        if band[0] <= frequency <= band[1] and not (chosen and size < LEAST * height[chosen[0]]):
+            chosen.append(line)
     return chosen
+
+
+def _is_part_of(height: float, higher: float, apart: float) -> bool:
+    """Whether a peak is a flank or a side lobe of a higher one, so many lines apart."""
+    if apart < MAIN_LOBE:
+        return True
+    # side lobes of Hann's window fall as 1 / (pi x (x^2 - 1)), x in lines
+    return height < MARGIN * higher / (math.pi * apart * (apart * apart - 1.0))
 
 
 def _vertex(lines: Array, height: Array, line: int) -> float:

@@ -22,6 +22,7 @@ sine on an edge counts with 0.91 of its amplitude), sines below 3.5/L lose ampli
 and where the amplitude changes within the segment, its middle counts most.
 """
 
+from functools import lru_cache
 from typing import NamedTuple
 
 import numpy as np
@@ -176,7 +177,11 @@ def dominant_frequency(signal: ArrayLike, rate: float, band: tuple[float, float]
         As for `band_amplitude`.
     """
     check_band(band, rate)
-    frequencies, magnitudes = fine_spectrum(time_last(signal), rate)
+    return strongest_peak(*fine_spectrum(time_last(signal), rate), band)
+
+
+def strongest_peak(frequencies: Array, magnitudes: Array, band: tuple[float, float]) -> Array:
+    """Frequency [Hz] of the highest peak in a band of spectra (..., line), shape (...); nan without one."""
     inside = (frequencies[1:-1] >= band[0]) & (frequencies[1:-1] <= band[1])
     left, middle, right = magnitudes[..., :-2], magnitudes[..., 1:-1], magnitudes[..., 2:]
     is_peak = inside & (middle > left) & (middle >= right)
@@ -234,15 +239,25 @@ def growth_fit(times: ArrayLike, amplitudes: ArrayLike) -> Growth:
     """
     t = np.asarray(times, dtype=float)
     a = np.asarray(amplitudes, dtype=float)
+    found = growth_fits(t, a.reshape(1, len(a), -1))
+    return Growth(*(each.reshape(a.shape[1:]) for each in found))
+
+
+def growth_fits(times: Array, amplitudes: Array) -> Growth:
+    """Growth of several runs, as of `growth_fit`; amplitudes (run, window, channel), growth (run, channel).
+
+    The numbers of a run do not depend on the others, to the bit: runs are the outermost of all axes.
+    """
+    t, a = times, np.ascontiguousarray(amplitudes)
     if t.size < WINDOWS_FOR_GROWTH:
-        nothing = np.full(a.shape[1:], np.nan)
+        nothing = np.full((len(a), a.shape[2]), np.nan)
         return Growth(nothing, nothing.copy())
     t = t - t.mean()
     logs = np.log(np.where(a > 0, a, np.nan))
-    logs = logs - logs.mean(axis=0)
-    slope = np.tensordot(t, logs, axes=1) / (t @ t)
-    scatter = logs - np.multiply.outer(t, slope)
-    variance = np.sum(scatter**2, axis=0) / (t.size - 2)
+    logs = logs - logs.mean(axis=1, keepdims=True)
+    slope = (t @ logs) / (t @ t)
+    scatter = logs - t[:, np.newaxis] * slope[:, np.newaxis]
+    variance = np.sum(scatter**2, axis=1) / (t.size - 2)
     return Growth(slope, np.sqrt(variance / (t @ t)))
 
 
@@ -263,9 +278,7 @@ def _windowed(segments: Array) -> tuple[Array, Array]:
     size = segments.shape[-1]
     if size < SHORTEST_SEGMENT:
         raise ValueError(f"expected {SHORTEST_SEGMENT} samples or more; found {size}")
-    window = 0.5 - 0.5 * np.cos(2 * np.pi * (np.arange(size) + 0.5) / size)
-    powers = np.polynomial.legendre.legvander(np.linspace(-1, 1, size), DRIFT_DEGREE)
-    drift, _ = np.linalg.qr(window[:, np.newaxis] * powers)
+    window, drift = _window_and_drift(size)
     # The mean goes first: taken out together with the window it would leave its own rounding behind.
     centred = segments - segments.mean(axis=-1, keepdims=True)
     tapered = window * centred
@@ -275,14 +288,25 @@ def _windowed(segments: Array) -> tuple[Array, Array]:
     return np.where(is_rounding, 0.0, vibration), window
 
 
+@lru_cache(maxsize=64)
+def _window_and_drift(size: int) -> tuple[Array, Array]:
+    """Hann window (size,), and orthonormal shapes of the drift under it (size, DRIFT_DEGREE + 1)."""
+    window = 0.5 - 0.5 * np.cos(2 * np.pi * (np.arange(size) + 0.5) / size)
+    powers = np.polynomial.legendre.legvander(np.linspace(-1, 1, size), DRIFT_DEGREE)
+    drift, _ = np.linalg.qr(window[:, np.newaxis] * powers)
+    return window, drift
+
+
 def segment_amplitude(segments: Array, rate: float, band: tuple[float, float]) -> Array:
     """Amplitude within the band [Hz] of segments (..., time) sampled at `rate` [Hz]; shape (...)."""
     check_band(band, rate)
     vibration, window = _windowed(segments)
     frequencies = np.fft.rfftfreq(window.size, 1 / rate)
     inside = (frequencies >= band[0]) & (frequencies <= band[1])
-    power = np.sum(np.abs(np.fft.rfft(vibration)[..., inside]) ** 2, axis=-1)
-    return np.sqrt(4 * power / (window.size * np.sum(window**2)))
+    lines = np.abs(np.fft.rfft(vibration)[..., inside]) ** 2
+    if lines.ndim > 1 and lines.shape[-2] == 1:
+        lines = np.ascontiguousarray(lines)  # else their order of adding up depends on the other signals
+    return np.sqrt(4 * lines.sum(axis=-1) / (window.size * np.sum(window**2)))
 
 
 def fine_spectrum(segments: Array, rate: float, finest: float = np.inf) -> tuple[Array, Array]:

@@ -10,7 +10,15 @@ import pytest
 
 from cvt_hpc.models.oscillator.exact import exact
 from cvt_hpc.models.oscillator.motion import oscillator
-from cvt_hpc.models.oscillator.transient import HELD, LET_GO, peak, wrongly_held, wrongly_stuck
+from cvt_hpc.models.oscillator.transient import (
+    HELD,
+    LET_GO,
+    Transient,
+    batch,
+    peak,
+    wrongly_held,
+    wrongly_stuck,
+)
 from cvt_hpc.physics.friction_laws import FRICTION_LAWS
 from cvt_hpc.variables import Status
 from support.small_systems import FACTS, begin, bisect, finished, scene
@@ -267,3 +275,53 @@ def test_its_chatter_is_named():
     status, reason = run.advance(run.samples)
     assert status == Status.FAILED_NUMERICS
     assert "from where friction chatters" in reason
+
+
+@pytest.mark.parametrize("law", FRICTION_LAWS)
+def test_runs_in_lanes_are_those_of_the_general_step(law):
+    """In batches of any size, marched in pieces of any length, and continued: equal to the bit."""
+    rng, ends = np.random.default_rng(21), set()
+    for turn in range(24):
+        scenes, first = [], random_scene(rng, law)
+        for _ in range(rng.integers(1, 6)):
+            keys = ("mass", "damping", "initial_speed", "belt_speed", "friction_gradient", "kinetic_friction")
+            changes = {key: float(first[key] * rng.uniform(0.3, 1.0)) for key in keys}
+            start = str(rng.choice(["given", "sliding", "sticking"]))
+            scenes.append(first | changes | {"start": start})
+        if turn % 2:  # a step of a quarter of the first one's period, at which lighter masses swing up
+            step = 0.25 * first["duration"] / 40.0
+            scenes = [one | {"step": step, "sampling_rate": 1.0 / step} for one in scenes]
+        if turn % 4 == 2:  # the mass lifts off in some swings
+            fall = first["stiffness"] / first["kinetic_friction"]
+            scenes = [one | {"normal_stiffness": float(fall * rng.uniform(0.5, 3.0))} for one in scenes]
+            scenes = scenes[: 1 if turn > 2 else None]  # nobody goes on beside it
+        longer = [one | {"duration": 1.5 * first["duration"]} for one in scenes]
+        together = batch(scenes, "moreau")
+        advance(together, rng)
+        assert_general(together.runs, scenes)
+        ends |= {run.failure for run in together.runs}
+        whole = [k for k, run in enumerate(together.runs) if run.failure is None]
+        if whole:
+            go_on = batch([longer[k] for k in whole], "moreau", [together.runs[k].paused() for k in whole])
+            advance(go_on, rng)
+            assert_general(go_on.runs, [longer[k] for k in whole], together.done)
+    assert None in ends and len(ends) > 1
+
+
+def advance(together, rng):
+    while together.running:
+        together.advance(int(rng.integers(1, 30)))
+
+
+def assert_general(runs, scenes, begun=0):
+    """Runs equal those by the general step, which are looked at after the same samples."""
+    for run, one in zip(runs, scenes, strict=True):
+        general, piece = Transient(one, "moreau"), begun or 1
+        while general.failure is None and general.done < general.samples:
+            general.advance(piece)
+            piece = 1 if general.done == begun else 2 * piece
+        assert run.failure == general.failure
+        assert run.displacement.tobytes() == general.displacement.tobytes()
+        assert run.channel("speed").tobytes() == general.channel("speed").tobytes()
+        assert (run.is_stuck == general.is_stuck).all() and run.steady == general.steady
+        assert (run.time, run.step, run.counters()) == (general.time, general.step, general.counters())

@@ -6,7 +6,19 @@ from scipy.integrate import quad, solve_ivp
 from scipy.optimize import brentq
 
 from cvt_hpc.errors import InputError
-from cvt_hpc.models.criterion.record import RELATIVE_AMPLITUDES, _limit_amplitude, energy_per_cycle, flank
+from cvt_hpc.models.criterion.record import (
+    RELATIVE_AMPLITUDES,
+    Solution,
+    energy_per_cycle,
+    flank,
+    judge,
+    judge_together,
+    limit_amplitudes,
+    solve,
+    solve_together,
+)
+from cvt_hpc.models.criterion.root import brent
+from cvt_hpc.physics.friction_laws import FRICTION_LAWS
 from cvt_hpc.variables import Status, Vibrates
 from support.rungs import rung_job, rung_record
 
@@ -216,8 +228,8 @@ def test_a_limit_within_rounding_is_where_energy_is_counted_as_none():
     is_fed = energy > 0.0
     beyond = np.flatnonzero(is_fed)[-1] + 1
     energy[beyond] = 1e-300
-    found = _limit_amplitude(f, energy, is_fed) * f.angular_frequency
-    assert found == pytest.approx(RELATIVE_AMPLITUDES[beyond] * f.speed)
+    (found,) = limit_amplitudes([Solution(f, energy, 0.1)], [is_fed])
+    assert found * f.angular_frequency == pytest.approx(RELATIVE_AMPLITUDES[beyond] * f.speed)
 
 
 def test_energy_over_amplitude_of_a_hyperbolic_law():
@@ -310,3 +322,45 @@ def test_a_motion_that_is_not_harmonic_is_said_to_be_so(gradient, is_rough):
 def test_a_flank_that_rests_is_refused():
     with pytest.raises(InputError, match="radial_speed: expected a flank that slides.*found both speeds 0"):
         rung_job("criterion", radial_speed=0.0)
+
+
+@pytest.mark.parametrize("law", FRICTION_LAWS)
+def test_runs_of_a_batch_are_those_alone(law):
+    """Fed, damped, without a frequency, with limit cycles and without: equal to the bit."""
+    rng, points = np.random.default_rng(8), []
+    table = {"table_force": (1e4, 3e5), "table_speed": (0.0, 0.1, 1.0), "table_mu": ((0.3, 0.1, 0.1),) * 2}
+    base = rung_job("criterion").parameters | {"friction_law": law} | table
+    for _ in range(12):
+        kinetic = rng.uniform(0.05, 0.2)
+        changes = {
+            "kinetic_friction": kinetic,
+            "friction_gradient": 0.0 if law in ("coulomb", "table") else -(10.0 ** rng.uniform(-1.0, 0.5)),
+            "stribeck_velocity": 10.0 ** rng.uniform(-2.0, 0.0),
+            "friction_memory": rng.choice([0.0, 3e-4]),
+            "radial_speed": rng.uniform(-0.05, 0.25),
+            "transverse_damping": 10.0 ** rng.uniform(0.0, 4.0),
+            "belt_stiffness": rng.choice([0.0, 1e6]),
+        }
+        points.append(base | {key: float(value) for key, value in changes.items()})
+    together, alone = judge_together(solve_together(points)), [judge(solve(point)) for point in points]
+    assert law == "coulomb" or len({record["vibrates"] for record in together}) > 1
+    for found, expected in zip(together, alone, strict=True):
+        assert found.keys() == expected.keys()
+        for name, value in found.items():
+            np.testing.assert_array_equal(value, expected[name], name)
+
+
+def test_brents_search_is_that_of_scipy():
+    rng = np.random.default_rng(5)
+    for _ in range(200):
+        shape, root = rng.choice([1.0, 3.0, 9.0]), rng.uniform(0.1, 0.9)
+
+        def energy(x, shape=shape, root=root):
+            return np.sign(root - x) * abs(root - x) ** shape * np.exp(5.0 * x)
+
+        low, high = root - rng.uniform(0.01, 0.1), root + rng.uniform(0.01, 0.1)
+        search, energies = brent(low, high, energy(low), energy(high), 1e-12 * high, 1e-9), [None]
+        with pytest.raises(StopIteration) as end:
+            while True:
+                energies.append(energy(search.send(energies[-1])))
+        assert end.value.value == brentq(energy, low, high, xtol=1e-12 * high, rtol=1e-9)

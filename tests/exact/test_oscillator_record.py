@@ -51,17 +51,12 @@ def test_work_of_growing_cycles_is_that_of_closed_integrals(rate, share):
     t = interval * np.arange(40_001)  # four periods
     size = np.exp(rate * t)
     x, v = size * np.sin(pulse * t), size * (rate * np.sin(pulse * t) + pulse * np.cos(pulse * t))
-    starts = cycle_starts(x - 0.5 * (x.max() + x.min()), 0.0)
+    (starts,) = cycle_starts(x[np.newaxis] - 0.5 * (x.max() + x.min()), 0.0)
     passing = x[starts[0]]
     acceleration = np.gradient(v, interval)
     friction = share * (mass * acceleration + damping * v + 40.0 * (x - passing))
-    run = SimpleNamespace(
-        constants=SimpleNamespace(mass=mass, damping=damping),
-        interval=interval,
-        channel={"speed": v}.__getitem__,
-        friction=lambda: friction,
-    )
-    found = work_per_cycle(run, starts)
+    o = SimpleNamespace(mass=mass, damping=damping)
+    found = work_per_cycle(o, v, friction, starts, interval)
     cycles = slice(starts[0], starts[-1] + 1)
     loss = damping * np.trapezoid(v[cycles] ** 2, dx=interval)
     gained = 0.5 * mass * (v[starts[-1]] ** 2 - v[starts[0]] ** 2)

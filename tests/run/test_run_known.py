@@ -7,7 +7,7 @@ import bits
 from cvt_hpc import build_job
 from cvt_hpc.models import MODELS
 from cvt_hpc.models.contract import load_model
-from cvt_hpc.simulation import record, record_variables, run_point, running
+from cvt_hpc.simulation import marching, record, record_variables, run_point, running
 from cvt_hpc.variables import Status
 from cvt_hpc.vibration.ramp import RampOccurrence
 
@@ -29,7 +29,7 @@ def test_what_is_declared_is_computed_and_nothing_else(model, monkeypatch):
     document = next(job for name, job in bits.STUDIES.items() if name.split()[0] == model)
     job = build_job({"name": "known", "model": model, **document}, "known", FURTHER.get(model, {}))
     declared = {variable.name: variable for variable in record_variables(job)}
-    for module in (record, running):
+    for module in (record, running, marching):
         monkeypatch.setattr(module, "blank_record", lambda job: dict.fromkeys(declared, NOT_COMPUTED))
     found = run_point(job, job.point(0), lambda: None)
     assert found["status"] is Status.DONE, found["reason"]

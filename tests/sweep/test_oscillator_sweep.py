@@ -12,7 +12,7 @@ from cvt_hpc.analysis.figures import draw
 from cvt_hpc.analysis.histories import draw_history
 from cvt_hpc.analysis.maps import map_figure
 from cvt_hpc.job import build_job
-from cvt_hpc.simulation import simulate
+from cvt_hpc.simulation import record_variables, run_point, run_points, simulate
 from cvt_hpc.study import open_results, run
 from cvt_hpc.variables import Status, Vibrates
 from support.cf import cf_findings
@@ -47,6 +47,18 @@ def test_both_starts_are_swept(results):
     assert results["sticks"].attrs["flag_meanings"] == "no yes"
     assert np.all(results["linear_growth_rate"].sel(belt_speed=0.15) > 0.0)
     assert np.all(results["linear_growth_rate"].sel(belt_speed=SPEEDS[1:]) < 0.0)
+
+
+def test_a_record_does_not_depend_on_the_runs_beside_it():
+    """Decided early, at their end and prolonged, in one batch: each as alone, to the bit."""
+    job = few()
+    points = [job.point(index) | {"duration": 2.0, "shortest_duration": 1.0} for index in range(len(job))]
+    together = run_points(job, points, lambda: None)
+    assert len({record["simulated_seconds"] for record in together}) > 1
+    for point, found in zip(points, together, strict=True):
+        alone = run_point(job, point, lambda: None)
+        for name in (variable.name for variable in record_variables(job) if not variable.volatile):
+            assert np.asarray(found[name]).tobytes() == np.asarray(alone[name]).tobytes(), name
 
 
 def test_it_has_a_map(results, tmp_path):

@@ -6,7 +6,7 @@ from hypothesis import given, settings
 from hypothesis import strategies as st
 
 from cvt_hpc.variables import Vibrates
-from cvt_hpc.vibration.assessment import assess, classify, is_certain, margin
+from cvt_hpc.vibration.assessment import assess, assess_runs, classify, is_certain, margin
 from cvt_hpc.vibration.settings import PARAMETERS, check
 from cvt_hpc.vibration.signals import growth_fit
 
@@ -267,3 +267,24 @@ def test_when_more_of_a_run_would_not_change_its_verdict(vibrates, amplitude, ra
 
 def test_a_record_without_growth_is_never_certain():
     assert not is_certain({"vibrates": Vibrates.NO, "amplitude": np.zeros(1)}, CERTAIN, left=0.3)
+
+
+@settings(max_examples=30, deadline=None)
+@given(runs=st.integers(1, 7), strands=st.sampled_from(["a", "ab", "aabbb"]), seed=st.integers(0, 2**32 - 1))
+def test_runs_are_judged_together_as_each_alone(runs, strands, seed):
+    """Tones with harmonics, growth and noise over decades, rest among them: equal to the bit."""
+    rng, time = np.random.default_rng(seed), np.arange(2000) / RATE
+    shape = runs, 1, len(strands)
+    motion = rng.choice([0.0, 1e-9, 1e-6], (runs, 1, 1)) * rng.normal(size=(runs, time.size, len(strands)))
+    for _ in range(3):
+        size = rng.choice([0.0, 1e-8, 5e-6, 1e-4], shape) * np.exp(
+            rng.normal(0.0, 20.0, shape) * time[:, np.newaxis]
+        )
+        wave = np.sin(2.0 * np.pi * rng.uniform(100.0, 1600.0, shape) * time[:, np.newaxis])
+        motion += size * np.maximum(wave, rng.uniform(-1.0, 0.0, shape))
+    together = assess_runs(motion, RATE, tuple(strands), DEFAULTS)
+    assert len(together) == runs
+    for found, alone in zip(together, motion, strict=True):
+        expected = vars(assess(alone, RATE, tuple(strands), DEFAULTS))
+        for name, value in vars(found).items():
+            np.testing.assert_array_equal(value, expected[name], name)

@@ -9,7 +9,9 @@ The constants of an oscillator, as its kernels take them.
 Steady sliding of the mass, and small motions about it.
 """
 
-from collections.abc import Mapping
+from __future__ import annotations
+
+from collections.abc import Mapping, Sequence
 from typing import Any, NamedTuple
 
 import numpy as np
@@ -75,6 +77,27 @@ def oscillator(parameters: Mapping[str, Any]) -> Oscillator:
     return Oscillator(**mechanics, law=given_law(p), excess=float(at_rest), width=float(p["friction_speed"]))
 
 
+def together(each: Sequence[Oscillator]) -> Any:
+    """An Oscillator of several, each number an array (run,); their laws share kind and table."""
+
+    def arrays(parts: Sequence[Any], *keys: str) -> dict[str, Any]:
+        return {key: np.array([getattr(part, key) for part in parts]) for key in keys}
+
+    law = each[0].law._replace(**arrays([o.law for o in each], "kinetic", "gradient", "speed"))
+    return Oscillator(**arrays(each, *_MECHANICS, "excess", "width"), law=law)
+
+
+@kernel
+def one_of(several: Any, k: int) -> Oscillator:
+    """Return the constants of one of the oscillators that are `together`."""
+    o, law = several, several.law
+    kinetic, gradient, scale = law.kinetic[k], law.gradient[k], law.speed[k]
+    own = FrictionLaw(law.kind, kinetic, gradient, scale, law.table_force, law.table_speed, law.table_mu)
+    mass, stiffness, damping, speed = o.mass[k], o.stiffness[k], o.damping[k], o.belt_speed[k]
+    load, fall, preload = o.normal_load[k], o.normal_stiffness[k], o.preload[k]
+    return Oscillator(mass, stiffness, damping, speed, load, fall, preload, own, o.excess[k], o.width[k])
+
+
 @kernel
 def normal_load(o: Oscillator, x: float) -> float:
     """Normal load [N] at a displacement [m]."""
@@ -99,9 +122,33 @@ def regularised_frictions(o: Oscillator, sliding: np.ndarray, load: np.ndarray) 
     return found
 
 
+@kernel
+def friction_forces(several: Any, rows: np.ndarray, slowest: np.ndarray, is_set_valued: bool) -> np.ndarray:
+    """Friction forces (run, n) [N] at states (run, n, 2).
+
+    Friction as it is holds the mass where it slides no faster than `slowest` (run,) [m/s].
+    """
+    found = np.empty(rows.shape[:2])
+    for k in range(len(rows)):
+        o = one_of(several, k)
+        for i in range(rows.shape[1]):
+            x, v = rows[k, i, X], rows[k, i, V]
+            sliding, load = o.belt_speed - v, normal_load(o, x)
+            if not is_set_valued:
+                found[k, i] = regularised_friction(o, sliding, load)
+            elif abs(sliding) <= slowest[k]:
+                found[k, i] = o.stiffness * x + o.damping * v - o.preload
+            else:
+                mu = friction_coefficient(o.law, abs(sliding), load)[0]
+                found[k, i] = np.copysign(load * mu, sliding)
+    return found
+
+
+@kernel
 def friction_at_rest(o: Oscillator) -> float:
     """Largest friction force at rest [N]."""
-    return o.normal_load * (friction_coefficient(o.law, 0.0, o.normal_load)[0] + o.excess)
+    mu = friction_coefficient(o.law, 0.0, o.normal_load)[0]
+    return o.normal_load * (mu + o.excess)
 
 
 def largest_rate(o: Oscillator) -> float:
@@ -151,10 +198,16 @@ def friction_bounds(
 
 def _unknowns(o: Oscillator) -> tuple[np.ndarray, np.ndarray, np.ndarray]:
     """Which unknowns are velocities, their positions, and typical sizes."""
+    return np.array([False, True]), np.array([-1, X]), np.array(typical_sizes(o))
+
+
+@kernel
+def typical_sizes(o: Oscillator) -> tuple[float, float]:
+    """Typical displacement [m] and speed [m/s]."""
     frequency = np.sqrt(o.stiffness / o.mass)
     pull = (friction_at_rest(o) + abs(o.preload)) / o.stiffness
     speed = o.belt_speed if o.belt_speed > 0.0 else frequency * pull
-    return np.array([False, True]), np.array([-1, X]), np.array([pull + speed / frequency, speed])
+    return pull + speed / frequency, speed
 
 
 def system(parameters: Mapping[str, Any]) -> System:
@@ -176,12 +229,12 @@ def set_valued_system(parameters: Mapping[str, Any]) -> SetValuedSystem:
     )
 
 
-def initial_state(parameters: Mapping[str, Any]) -> np.ndarray:
-    """Displacement [m] and speed [m/s] at the start, from flat parameters."""
+def initial_state(parameters: Mapping[str, Any], steady: SteadySliding | None = None) -> np.ndarray:
+    """Displacement [m] and speed [m/s] at the start, from flat parameters, and steady sliding where known."""
     p = parameters
     if p["start"] == "given":
         return np.array([p["initial_displacement"], p["initial_speed"]], dtype=np.float64)
-    displacement = steady_sliding(oscillator(p)).displacement + p["initial_displacement"]
+    displacement = (steady or steady_sliding(oscillator(p))).displacement + p["initial_displacement"]
     return np.array([displacement, p["belt_speed"] if p["start"] == "sticking" else 0.0])
 
 
@@ -202,19 +255,28 @@ class SteadySliding(NamedTuple):
 
 def steady_sliding(o: Oscillator) -> SteadySliding:
     """Steady sliding of an oscillator: x_s = (P + N_0 mu) / (k + n mu)."""
-    load, displacement = o.normal_load, np.nan
+    return sliding_with(*about_sliding(o))
+
+
+def sliding_with(displacement: float, half: float, square: float) -> SteadySliding:
+    """Return steady sliding by the numbers of `about_sliding`."""
+    return SteadySliding(displacement, complex(half + np.sqrt(complex(half) * half - square)))
+
+
+@kernel
+def about_sliding(o: Oscillator) -> tuple[float, float, float]:
+    """x_s [m], and p [1/s], q [1/s^2] of small motions exp(s t) about it: s^2 - 2 p s + q = 0."""
+    load, displacement, mu, slope = o.normal_load, np.nan, 0.0, 0.0
     for _ in range(MOST_ROUNDS):
         mu, slope = friction_coefficient(o.law, o.belt_speed, load)
-        last, displacement = (
-            displacement,
-            (o.preload + o.normal_load * mu) / (o.stiffness + o.normal_stiffness * mu),
-        )
+        last = displacement
+        displacement = (o.preload + o.normal_load * mu) / (o.stiffness + o.normal_stiffness * mu)
         load = normal_load(o, displacement)
         if displacement == last:
             break
-    beside = [load * (1.0 + side) for side in (BESIDE, -BESIDE)]
-    forces = [n * friction_coefficient(o.law, o.belt_speed, n)[0] for n in beside]
-    by_load = (forces[0] - forces[1]) / (beside[0] - beside[1])
-    half = complex(-0.5 * (o.damping + load * slope) / o.mass)
+    more, less = load * (1.0 + BESIDE), load * (1.0 - BESIDE)
+    at_more = friction_coefficient(o.law, o.belt_speed, more)[0]
+    at_less = friction_coefficient(o.law, o.belt_speed, less)[0]
+    by_load = (more * at_more - less * at_less) / (more - less)
     stiffness = o.stiffness + o.normal_stiffness * by_load
-    return SteadySliding(displacement, complex(half + np.sqrt(half * half - stiffness / o.mass)))
+    return displacement, -0.5 * (o.damping + load * slope) / o.mass, stiffness / o.mass

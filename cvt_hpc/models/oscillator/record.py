@@ -5,24 +5,30 @@ Whole cycles of the mass, and the energy that goes in and out in one of them.
 
 from __future__ import annotations
 
-from collections.abc import Mapping
+from collections.abc import Mapping, Sequence
 from dataclasses import replace
 from enum import IntEnum
 from typing import TYPE_CHECKING, Any
 
 import numpy as np
 
-from cvt_hpc.models.oscillator.motion import steady_sliding
+from cvt_hpc.models.oscillator.motion import Oscillator, V, X, friction_forces, together
 from cvt_hpc.storage.netcdf import attributes
 from cvt_hpc.variables import Coordinate, Variable
 from cvt_hpc.vibration import assessment
+from cvt_hpc.vibration.settings import PARAMETERS
 
 if TYPE_CHECKING:
     import xarray as xr
 
     from cvt_hpc.models.oscillator.transient import Transient
 
-STEP_COST = 1e-6  # core-seconds of a step of moreau, and of a sample
+SAMPLE_COST = 2e-7  # core-seconds of a sample, its judgement included
+STEP_COST = {"moreau": 1.5e-8}  # core-seconds of a step in full lanes; of the others 1e-6
+LANES = 64  # runs of a batch by `moreau`: so many share what a call takes
+SAMPLES = 1 << 18  # of all runs of a batch, most: their spectra take 16 MB
+LAW = ("friction_law", "table_file", "table_force", "table_speed", "table_mu")
+MARCH = ("duration", "shortest_duration", "sampling_rate", "step")
 
 
 class Sticks(IntEnum):
@@ -70,37 +76,63 @@ def cost(parameters: Mapping[str, Any], stepper: str) -> Any:
         Name of a stepper.
     """
     p = parameters
-    samples = p["duration"] * p["sampling_rate"]
-    return STEP_COST * (samples + p["duration"] / p.get("step", 1e-6))
+    samples, step_cost = p["duration"] * p["sampling_rate"], STEP_COST.get(stepper, 1e-6)
+    return lanes(p, stepper) * (SAMPLE_COST * samples + step_cost * p["duration"] / p.get("step", 1e-6))
+
+
+def lanes(parameters: Mapping[str, Any], stepper: str) -> Any:
+    """Most runs that advance together; of parameters that are arrays, an array."""
+    p = parameters
+    found = np.clip(SAMPLES // (p["duration"] * p["sampling_rate"]), 1, LANES if stepper == "moreau" else 1)
+    return found.astype(int) if found.ndim else int(found)
+
+
+def lane_key(parameters: Mapping[str, Any]) -> tuple:
+    """Values that all runs of one batch have in common."""
+    return tuple(parameters.get(key) for key in (*MARCH, *LAW, *PARAMETERS["vibration"]))
 
 
 def judge(run: Transient) -> dict[str, Any]:
-    """The record of a run that has reached its end, its cost apart.
+    """The record of a run that has reached its end, its cost apart; see `judge_together`."""
+    return judge_together([run])[0]
+
+
+def judge_together(runs: Sequence[Transient]) -> list[dict[str, Any]]:
+    """The records of runs of one batch that have reached their ends, their cost apart.
 
     Parameters
     ----------
-    run : Transient
+    runs : sequence of Transient
         With all samples recorded.
     """
-    p, first = run.parameters, run.first_judged
-    found = assessment.assess(run.displacement, p["sampling_rate"], ("mass",), p)
-    numbers = {v.name: np.ravel(getattr(found, v.name)).item() for v in assessment.VARIABLES}
-    x, is_stuck = run.displacement[first:, 0], run.is_stuck[first:]
-    starts = cycle_starts(x, p["negligible_amplitude"])
-    cycles = slice(starts[0], starts[-1]) if len(starts) > 1 else slice(None)
-    steady = steady_sliding(run.constants)
-    return {
-        **found.record(),
-        **numbers,
-        "sticks": Sticks.YES if is_stuck.any() else Sticks.NO,
-        "stuck_share": float(is_stuck[cycles].mean()),
-        "half_stroke": 0.5 * float(np.ptp(x)),
-        "cycles": max(len(starts) - 1, 0),
-        **work_per_cycle(run, first + starts),
-        "steady_displacement": steady.displacement,
-        "linear_growth_rate": steady.eigenvalue.real,
-        "linear_frequency": abs(steady.eigenvalue.imag) / (2.0 * np.pi),
-    }
+    p, interval, first = runs[0].parameters, runs[0].interval, runs[0].first_judged
+    rows = np.stack([run.rows for run in runs])
+    motions = np.ascontiguousarray(rows[:, :, X:V])
+    occurrences = assessment.assess_runs(motions, p["sampling_rate"], ("mass",), p)
+    x, v = motions[:, first:, 0], rows[:, first:, V]
+    several, slowest = together([run.constants for run in runs]), np.array([run.slowest for run in runs])
+    forces = friction_forces(several, rows[:, first:], slowest, runs[0].is_set_valued)
+    sticks = np.abs(several.belt_speed[:, np.newaxis] - v) <= slowest[:, np.newaxis]
+    passages, half_strokes = cycle_starts(x, p["negligible_amplitude"]), 0.5 * np.ptp(x, axis=1)
+    records = []
+    for k, (run, found, starts) in enumerate(zip(runs, occurrences, passages, strict=True)):
+        numbers = {one.name: np.ravel(getattr(found, one.name)).item() for one in assessment.VARIABLES}
+        cycles = slice(starts[0], starts[-1]) if len(starts) > 1 else slice(None)
+        records.append(
+            {
+                **found.verdict(),
+                **numbers,
+                "sticks": Sticks.YES if sticks[k].any() else Sticks.NO,
+                "stuck_share": float(sticks[k, cycles].mean()),
+                "half_stroke": float(half_strokes[k]),
+                "cycles": max(len(starts) - 1, 0),
+                **work_per_cycle(run.constants, v[k], forces[k], starts, interval),
+                "steady_displacement": run.steady.displacement,
+                "linear_growth_rate": run.steady.eigenvalue.real,
+                "linear_frequency": abs(run.steady.eigenvalue.imag) / (2.0 * np.pi),
+            }
+        )
+    return records
 
 
 def histories(run: Transient) -> xr.Dataset:
@@ -132,28 +164,30 @@ def histories(run: Transient) -> xr.Dataset:
     )
 
 
-def cycle_starts(x: np.ndarray, least: float) -> np.ndarray:
-    """Find where a displacement comes up through the middle of its range.
+def cycle_starts(x: np.ndarray, least: float) -> list[np.ndarray]:
+    """Find where displacements come up through the middle of their range.
 
     Parameters
     ----------
-    x : (n,) array
+    x : (run, n) array
         Displacement [m].
     least : float
         Half stroke [m] up to which a motion has no cycles.
 
     Returns
     -------
-    (cycles + 1,) int array
-        The sample before each passage; empty where there are none.
+    list of (cycles + 1,) int arrays
+        Of each run the samples before each passage; empty where there are none.
     """
-    if x.size == 0 or np.ptp(x) <= 2.0 * least:
-        return np.zeros(0, np.int64)
-    away = x - 0.5 * (x.max() + x.min())
-    return np.flatnonzero((away[:-1] < 0.0) & (away[1:] >= 0.0))
+    low, high = x.min(axis=1, keepdims=True), x.max(axis=1, keepdims=True)
+    away = x - 0.5 * (high + low)
+    rises = (away[:, :-1] < 0.0) & (away[:, 1:] >= 0.0) & (high - low > 2.0 * least)
+    return [np.flatnonzero(own) for own in rises]
 
 
-def work_per_cycle(run: Transient, starts: np.ndarray) -> dict[str, float]:
+def work_per_cycle(
+    o: Oscillator, speed: np.ndarray, friction: np.ndarray, starts: np.ndarray, interval: float
+) -> dict[str, float]:
     """Mean work of a cycle, by the trapezoidal rule over the samples.
 
     A jump of friction between two samples leaves an error of the first order in their interval, a sticking
@@ -161,10 +195,14 @@ def work_per_cycle(run: Transient, starts: np.ndarray) -> dict[str, float]:
 
     Parameters
     ----------
-    run : Transient
-        With all samples recorded.
+    o : Oscillator
+        Constants.
+    speed, friction : (n,) arrays
+        Of the mass [m/s], and the force on it [N], at samples.
     starts : (cycles + 1,) int array
         Samples at which cycles start and end.
+    interval : float
+        Sampling interval [s].
 
     Returns
     -------
@@ -175,16 +213,15 @@ def work_per_cycle(run: Transient, starts: np.ndarray) -> dict[str, float]:
     """
     if len(starts) < 2:
         return dict.fromkeys(("friction_work", "damping_loss", "energy_residual"), np.nan)
-    o, cycles = run.constants, slice(starts[0], starts[-1] + 1)
-    v = run.channel("speed")[cycles]
-    power = run.friction()[cycles] * v
-    count = len(starts) - 1
-    work, turned_over, loss = (
-        float(np.trapezoid(rate, dx=run.interval)) for rate in (power, np.abs(power), o.damping * v * v)
-    )
+    cycles = slice(starts[0], starts[-1] + 1)
+    v = speed[cycles]
+    power = friction[cycles] * v
+    rates = np.stack([power, np.abs(power), o.damping * v * v])
+    work, turned_over, loss = np.trapezoid(rates, dx=interval).tolist()
     # cycles start at one displacement: spring and preload have done no work
-    kinetic = 0.5 * o.mass * v**2
-    left = work - loss - (kinetic[-1] - kinetic[0])
+    kinetic = 0.5 * o.mass * v[[0, -1]] ** 2
+    left = work - loss - (kinetic[1] - kinetic[0])
+    count = len(starts) - 1
     return {
         "friction_work": work / count,
         "damping_loss": loss / count,
