@@ -11,7 +11,7 @@ from cvt_hpc.models.elastic_belt import fields as f
 from cvt_hpc.models.elastic_belt.belt import belt_constants, initial_state, mesh
 from cvt_hpc.models.elastic_belt.one_system import flat_belt, pack, rates
 from cvt_hpc.models.elastic_belt.sampling import Outcome
-from cvt_hpc.models.steady_variator import first_states
+from cvt_hpc.models.steady_variator import curve, first_states
 from cvt_hpc.models.steady_variator.continuation import OWN, Continuation
 from cvt_hpc.models.steady_variator.curve import Curve, Piece, determinant_sign
 from cvt_hpc.models.steady_variator.equations import Equations
@@ -22,8 +22,9 @@ from cvt_hpc.models.steady_variator.record import Found, judge, quantities
 from cvt_hpc.models.steady_variator.walking import NoSteadyState, SlipsThrough, SteadyBelt
 from cvt_hpc.physics.capacity import carried_torque
 from cvt_hpc.variables import Status, Vibrates
+from cvt_hpc.variator import GROSS_SLIP
 from support.fast_runs import FastRuns
-from support.rungs import rung_record
+from support.rungs import rung_job, rung_record
 from support.scene import VALUES
 
 GIVEN = VALUES | {"duration": 0.1, "stations": 48}
@@ -159,12 +160,12 @@ def test_a_correction_that_leaves_the_range_of_the_unknowns_ends_the_step(monkey
             solves.append(right.size)
             return 1e6 * equations.sizes * (-1.0) ** np.arange(right.size)
 
-    curve = Curve(equations, 1e-7)
-    monkeypatch.setattr(curve, "_residual", lambda x, pressed: (np.zeros(x.size - 1), 0.0))
+    states = Curve(equations, 1e-7)
+    monkeypatch.setattr(states, "_residual", lambda x, pressed: (np.zeros(x.size - 1), 0.0))
     pressed = equations.corners(start.unknowns).ravel() > 0.0
     tangent = np.ones(equations.sizes.size)
     piece = Piece(start.unknowns, pressed, Diverging(), tangent, 1.0)
-    assert curve._corrected(piece, 0.0) is None
+    assert states._corrected(piece, 0.0) is None
     assert len(solves) == 1  # no slopes are taken out there, on which SuperLU crashes
 
 
@@ -231,6 +232,39 @@ def test_single_cells_that_open_are_not_taken_for_the_limit_of_friction():
     belt = SteadyBelt(parameters)
     limit = belt.carried(belt.at(60.0))
     assert limit.largest_slip > 0.01 and limit.load > 250.0
+
+
+def test_largest_load_where_a_strand_is_about_to_let_go():
+    """Its cells' pushes differ by 1e-12 of strain and less, so that several are on their corners at once."""
+    scene = {
+        "belt_length": 0.661195,
+        "centre_distance": 0.155,
+        "ratio": 2.191,
+        "driving_speed": 47.8,
+        "thrust": 58.86e3,
+        "friction_gradient": -0.47,
+        "sheave_stiffness": np.inf,
+        "stiffness_of": "sheave",
+        "tilt_stiffness": 6.3e5,
+        "friction_memory": 0.18e-3,
+        "friction_speed": 0.01,
+        "stations": 64,
+    }
+    point = rung_job("steady_variator", load_share=-0.4695, **scene).point(0)
+    belt = SteadyBelt(point)
+    near = belt.at(point["load"])
+    limit = belt.carried(near)
+    assert limit.load < 1.2 * near.load and 0.01 < limit.largest_slip < GROSS_SLIP
+
+
+def test_largest_load_does_not_depend_on_the_steps(monkeypatch):
+    parameters = GIVEN | {"friction_gradient": 0.0, "stations": 40}
+    belt = SteadyBelt(parameters)
+    near = belt.at(200.0)
+    loads = [belt.carried(near).load]
+    monkeypatch.setattr(curve, "LONGEST", 0.025)
+    loads.append(belt.carried(near).load)
+    assert loads[1] == pytest.approx(loads[0], rel=1e-6)
 
 
 def test_newton_gives_up_where_it_is_lost():

@@ -4,6 +4,7 @@ Corners of the push force are sharp: each state begins at the one before, and a 
 in quarters. Where the load does not separate states, the arc of their curve does (`curve.py`).
 """
 
+import math
 from collections.abc import Callable, Iterator, Mapping, Sequence
 from functools import partial
 from typing import Any, NamedTuple
@@ -29,7 +30,7 @@ __all__ = ["NoSteadyState", "SlipsThrough", "Steady", "SteadyBelt"]
 # slip: single cells that open turn the curve back without slip.
 FALLEN, GROWN = 0.9, 0.2
 SLIDING = 0.5  # slip of a pulley beyond which no state under a load is looked for
-WITHIN = 1e-4  # of a step: how closely its largest load is met, which changes the load by the square
+WITHIN = 1e-3  # of a step: how closely its largest load is met, which changes the load by the square
 
 
 class Steady(NamedTuple):
@@ -89,20 +90,17 @@ class Between(NamedTuple):
 
     def most(self, direction: float) -> Steady:
         """State of the largest load in a direction."""
+        tried = [self.low, self.high]
 
-        def load(share: float) -> float:
-            return direction * self.at(share).load
+        def less(share: float) -> float:
+            try:
+                tried.append(self.at(share))
+            except NoSteadyState:
+                return math.inf
+            return -direction * tried[-1].load
 
-        highest = max(self.low, self.high, key=lambda one: direction * one.load)
-        try:
-            ends = [direction * one.load for one in (self.low, self.high)]
-            bent = sum(ends) - 2.0 * load(0.5)
-            if abs(ends[1] - ends[0]) >= -2.0 * bent:  # their parabola has its vertex elsewhere
-                return highest
-            within = {"bounds": (0.0, 1.0), "method": "bounded", "options": {"xatol": WITHIN}}
-            return self.at(minimize_scalar(lambda share: -load(share), **within).x)
-        except NoSteadyState:
-            return highest
+        minimize_scalar(less, bounds=(0.0, 1.0), method="bounded", options={"xatol": WITHIN})
+        return max(tried, key=lambda one: direction * one.load)
 
 
 class SteadyBelt:
