@@ -40,7 +40,6 @@ MOST = 20  # steps of a curve, over the number of stations: default belt from 20
 SETS = 10  # of pressed cells, tried where a curve begins
 # Of the last correction, by its root mean square (round-off leaves 1e-12), and what it leaves of a strain
 CLOSE, NEAR = 1e-11, 1e-12
-BENT = 1.5  # distance of a state over its part along the tangent
 MOST_TURNS = 2  # of a cell's sides in place
 NONE = -1  # in the place of a corner
 
@@ -185,7 +184,7 @@ class Curve:
         before = self._inside(piece.x, piece.pressed)
         while taken > SHORTEST:
             found = self._corrected(piece, taken, meets)
-            if found is None or self._bends(piece, found.x):
+            if found is None:
                 step = taken = 0.25 * taken
                 meets = NONE
                 continue
@@ -206,11 +205,6 @@ class Curve:
             meets = int(np.argmin(shares))
             taken *= float(shares[meets])
         return None, step, NONE
-
-    def _bends(self, piece: Piece, x: np.ndarray) -> bool:
-        """Whether a state is so far beside the tangent that the curve turns back, or is another one."""
-        away = np.sqrt(np.mean(((x - piece.x) * self._measured / self._equations.sizes) ** 2))
-        return bool(away > BENT * self._way(piece, x) + 10.0 * CLOSE)
 
     def _inside(self, x: np.ndarray, pressed: np.ndarray) -> np.ndarray:
         """Distances (2 N,) that are left to the corners of a set of pressed cells."""
