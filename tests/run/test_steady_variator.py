@@ -4,14 +4,16 @@ from functools import cache
 
 import numpy as np
 import pytest
+from scipy.sparse import csc_array
+from scipy.sparse.linalg import splu
 
 from cvt_hpc.models.elastic_belt import fields as f
 from cvt_hpc.models.elastic_belt.belt import belt_constants, initial_state, mesh
 from cvt_hpc.models.elastic_belt.one_system import flat_belt, pack, rates
 from cvt_hpc.models.elastic_belt.sampling import Outcome
-from cvt_hpc.models.steady_variator import first_states
+from cvt_hpc.models.steady_variator import curve, first_states
 from cvt_hpc.models.steady_variator.continuation import OWN, Continuation
-from cvt_hpc.models.steady_variator.curve import Curve
+from cvt_hpc.models.steady_variator.curve import Curve, Piece, determinant_sign
 from cvt_hpc.models.steady_variator.equations import Equations
 from cvt_hpc.models.steady_variator.first_states import FirstStates, least_sliding
 from cvt_hpc.models.steady_variator.forces import distributions
@@ -20,8 +22,9 @@ from cvt_hpc.models.steady_variator.record import Found, judge, quantities
 from cvt_hpc.models.steady_variator.walking import NoSteadyState, SlipsThrough, SteadyBelt
 from cvt_hpc.physics.capacity import carried_torque
 from cvt_hpc.variables import Status, Vibrates
+from cvt_hpc.variator import GROSS_SLIP
 from support.fast_runs import FastRuns
-from support.rungs import rung_record
+from support.rungs import rung_job, rung_record
 from support.scene import VALUES
 
 GIVEN = VALUES | {"duration": 0.1, "stations": 48}
@@ -122,17 +125,22 @@ def test_jacobian():
     assert matrix @ (2.0 * random) == pytest.approx(change, rel=1e-4, abs=3e-6 * np.abs(change).max())
 
 
+def beside_a_corner(equations, distance):
+    """Unknowns with one strain moved next to the corner of its cell's damped push, and that strain's place."""
+    x = steady()[0].unknowns.copy()
+    cell = int(np.argmax(equations.corners(x)[0]))
+    for _ in range(5):  # the damper's part follows the strain, too
+        x[48 + cell] += equations.corners(x)[0, cell] - distance
+    assert equations.corners(x)[0, cell] == pytest.approx(distance, rel=1e-3)
+    return x, 48 + cell
+
+
 @pytest.mark.parametrize("distance", [3e-11, -3e-11], ids=["pressed", "apart"])
 def test_slopes_beside_a_corner_are_those_of_its_own_side(distance):
     # a difference quotient of 1e-9 would be the mean of both sides: with it, Newton's iteration goes to and fro
     parameters = GIVEN | {"load_start": 0.0, "tilt_lag": 0.0}
     equations = Equations(parameters, belt_constants(parameters))
-    x = steady()[0].unknowns.copy()
-    cell = int(np.argmax(equations.corners(x)[0]))
-    strain = 48 + cell
-    for _ in range(5):  # the damper's part follows the strain, too
-        x[strain] += equations.corners(x)[0, cell] - distance
-    assert equations.corners(x)[0, cell] == pytest.approx(distance, rel=1e-3)
+    x, strain = beside_a_corner(equations, distance)
     away = np.zeros(x.size)
     away[strain] = -np.sign(distance) * 1e-8
     before = equations.residual(x)
@@ -150,16 +158,44 @@ def test_a_correction_that_leaves_the_range_of_the_unknowns_ends_the_step(monkey
     class Diverging:
         def solve(self, right):
             solves.append(right.size)
-            return 1e6 * equations.sizes
+            return 1e6 * equations.sizes * (-1.0) ** np.arange(right.size)
 
-    curve = Curve(equations, 1e-7)
-    monkeypatch.setattr(curve, "_factors", lambda slopes, along: Diverging())
-    monkeypatch.setattr(curve, "_residual", lambda x: (np.zeros(x.size - 1), 0.0))
-    monkeypatch.setattr(curve, "_slopes", lambda x, pressed: None)
-    along = np.ones(equations.sizes.size)
+    states = Curve(equations, 1e-7)
+    monkeypatch.setattr(states, "_residual", lambda x, pressed: (np.zeros(x.size - 1), 0.0))
     pressed = equations.corners(start.unknowns).ravel() > 0.0
-    assert curve._corrected(start.unknowns, along, 0.0, None, along, pressed) is None
+    tangent = np.ones(equations.sizes.size)
+    piece = Piece(start.unknowns, pressed, Diverging(), tangent, 1.0)
+    assert states._corrected(piece, 0.0) is None
     assert len(solves) == 1  # no slopes are taken out there, on which SuperLU crashes
+
+
+@pytest.mark.parametrize("distance", [1e-8, -1e-8], ids=["pressed", "apart"])
+def test_pushes_go_on_beyond_the_corners_of_presumed_cells(distance):
+    parameters = GIVEN | {"load_start": 0.0, "tilt_lag": 0.0}
+    equations = Equations(parameters, belt_constants(parameters))
+    x, strain = beside_a_corner(equations, distance)
+    pressed = equations.corners(x) > 0.0
+    own = equations.residual(x)
+    assert equations.residual(x, pressed) == pytest.approx(own, abs=1e-6 * np.abs(own).max())
+    across = np.zeros(x.size)
+    across[strain] = 2.0 * distance
+    ahead, behind = (equations.residual(x + sign * across, pressed) - own for sign in (1.0, -1.0))
+    assert np.abs(ahead + behind).max() < 1e-3 * np.abs(ahead).max()
+    assert np.abs(equations.residual(x + across) - own + behind).max() > 0.1 * np.abs(ahead).max()
+
+
+def test_slopes_of_corners():
+    parameters = GIVEN | {"load_start": 0.0, "tilt_lag": 0.0}
+    equations = Equations(parameters, belt_constants(parameters))
+    x = steady()[0].unknowns
+    change = 1e-6 * np.random.default_rng(4).normal(size=x.size) * equations.sizes
+    found = equations.corners(x + change) - equations.corners(x - change)
+    assert equations.corner_slopes(x) @ (2.0 * change) == pytest.approx(found.ravel(), rel=1e-6, abs=1e-14)
+
+
+def test_sign_of_a_determinant():
+    for matrix in np.random.default_rng(5).normal(size=(10, 7, 7)):
+        assert determinant_sign(splu(csc_array(matrix))) == np.sign(np.linalg.det(matrix))
 
 
 def test_states_follow_their_curve_from_corner_to_corner_where_the_load_turns_back():
@@ -196,6 +232,39 @@ def test_single_cells_that_open_are_not_taken_for_the_limit_of_friction():
     belt = SteadyBelt(parameters)
     limit = belt.carried(belt.at(60.0))
     assert limit.largest_slip > 0.01 and limit.load > 250.0
+
+
+def test_largest_load_where_a_strand_is_about_to_let_go():
+    """Its cells' pushes differ by 1e-12 of strain and less, so that several are on their corners at once."""
+    scene = {
+        "belt_length": 0.661195,
+        "centre_distance": 0.155,
+        "ratio": 2.191,
+        "driving_speed": 47.8,
+        "thrust": 58.86e3,
+        "friction_gradient": -0.47,
+        "sheave_stiffness": np.inf,
+        "stiffness_of": "sheave",
+        "tilt_stiffness": 6.3e5,
+        "friction_memory": 0.18e-3,
+        "friction_speed": 0.01,
+        "stations": 64,
+    }
+    point = rung_job("steady_variator", load_share=-0.4695, **scene).point(0)
+    belt = SteadyBelt(point)
+    near = belt.at(point["load"])
+    limit = belt.carried(near)
+    assert limit.load < 1.2 * near.load and 0.01 < limit.largest_slip < GROSS_SLIP
+
+
+def test_largest_load_does_not_depend_on_the_steps(monkeypatch):
+    parameters = GIVEN | {"friction_gradient": 0.0, "stations": 40}
+    belt = SteadyBelt(parameters)
+    near = belt.at(200.0)
+    loads = [belt.carried(near).load]
+    monkeypatch.setattr(curve, "LONGEST", 0.025)
+    loads.append(belt.carried(near).load)
+    assert loads[1] == pytest.approx(loads[0], rel=1e-6)
 
 
 def test_newton_gives_up_where_it_is_lost():

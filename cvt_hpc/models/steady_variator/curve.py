@@ -7,15 +7,26 @@ nor the driven speed separates states, but the arc of their curve does.
 
 Between two corners, at which elements of a cell meet or part, the curve is smooth: its tangent is the null
 vector of the Jacobian without the driven pulley's balance of moments, sum of the flanks' moments = i M, which
-gives the load M. At a corner the curve goes on in the direction that brings that cell to its other side
-(continuation of a piecewise smooth curve; Allgower and Georg, Numerical continuation methods, 1990, ch. 15).
+gives the load M. There the equations are those of one set of pressed cells, whose pushes go on beyond their
+corners, so that corrections do not see other corners nearby. A step that would cross one ends on it, and the
+cell changes its side. The curve goes on in the direction in which the slopes above its tangent have a
+determinant of the same sign as before: that holds along a smooth curve, where it turns back, and across
+corners (Allgower and Georg, Numerical continuation methods, 1990, ch. 2 and 15).
+
+A strand lets go in all of its cells at nearly one place: their pushes are alike but for the momentum of the
+elements, some 1e-11 of strain. The order in which they part follows from these, so states are found to
+round-off. Of corners that not even that tells apart the one that is met most steeply counts (ratio test of
+Harris 1973), and its cell changes sides in place. One that does so twice is below round-off, and does not
+count until the next state.
 """
 
-from collections.abc import Iterator
-from typing import Any
+from collections.abc import Callable, Iterator
+from functools import partial
+from typing import Any, NamedTuple
 
 import numpy as np
 from scipy.sparse import csr_array, vstack
+from scipy.sparse.csgraph import connected_components
 from scipy.sparse.linalg import splu
 
 from cvt_hpc.models.steady_variator.equations import MOMENT, SPEED, Equations
@@ -23,11 +34,46 @@ from cvt_hpc.models.steady_variator.newton import FAR, mean_size
 
 # Steps, as the root mean square of the unknowns over their sizes: first, longest, and shortest that is tried
 FIRST, LONGEST, SHORTEST = 1e-3, 0.1, 1e-12
-PROBE = 1e-4  # at the most, of the step over which a corner's distance is linear
-CORRECTIONS, FACTORISATIONS = 4, 3  # at most: by one factorisation, and of these in a step
-EASY = 3  # with so few corrections the next step is twice as long
+CORRECTIONS, FACTORISATIONS = 6, 3  # at most: by one factorisation, and of these in a step
+EASY = 5  # with so few corrections the next step is twice as long
 MOST = 20  # steps of a curve, over the number of stations: default belt from 20 to 160 N m 7, at 80 stations
-NEAR = 1e-9  # strain: so near to a corner the next piece begins
+SETS = 10  # of pressed cells, tried where a curve begins
+# Of the last correction, by its root mean square (round-off leaves 1e-12), and what it leaves of a strain
+CLOSE, NEAR = 1e-11, 1e-12
+MOST_TURNS = 2  # of a cell's sides in place
+NONE = -1  # in the place of a corner
+
+
+class Piece(NamedTuple):
+    """The curve about a state, with a set of pressed cells.
+
+    Attributes
+    ----------
+    x : (n,) array
+        Unknowns of the state.
+    pressed : (2 N,) array of bool
+        The cells that are taken as pressed, on both of their corners.
+    factors : SuperLU
+        Of the residual's slopes with a direction below them.
+    tangent : (n,) array
+        In which the residual does not change; over the unknowns' sizes, of mean square 1.
+    sense : float
+        Sign (1 or -1) of the determinant of these slopes above the tangent.
+    """
+
+    x: np.ndarray
+    pressed: np.ndarray
+    factors: Any
+    tangent: np.ndarray
+    sense: float
+
+
+class Reached(NamedTuple):
+    """A state that was corrected: its unknowns, its load [N m], and after how many corrections."""
+
+    x: np.ndarray
+    load: float
+    corrections: int
 
 
 class Curve:
@@ -38,11 +84,20 @@ class Curve:
     equations : Equations
         Of the belt; its load has no influence.
     tolerance : float
-        Root mean square of the last correction, over the unknowns' sizes.
+        Root mean square of the last correction at most, over the unknowns' sizes.
+
+    Attributes
+    ----------
+    within : callable
+        within(share): state with its load [N m] at a share of the last step, 0 to 1; None if not found.
     """
 
     def __init__(self, equations: Equations, tolerance: float) -> None:
         self._equations, self._tolerance = equations, tolerance
+        # The arc leaves out the memories of friction, which jump where a station opens
+        self._measured = np.ones(equations.sizes.size)
+        self._measured[equations.memories] = 0.0
+        self.within: Callable[[float], tuple[np.ndarray, float] | None] = lambda share: None
 
     def along(self, x: np.ndarray, sign: float) -> Iterator[tuple[np.ndarray, float]]:
         """States with their loads [N m], as far as they are found.
@@ -54,145 +109,204 @@ class Curve:
         sign : float
             The driven speed rises (1) or falls (-1) at first.
         """
-        margin = self._corners(x)
-        pressed = margin > 0.0
         ahead = np.zeros(x.size)
         ahead[SPEED] = sign
-        slopes = self._slopes(x, pressed)
-        tangent = self._tangent(slopes, ahead)
-        step, passed, taken_steps = FIRST, -1, 0
-        while tangent is not None and step >= SHORTEST and taken_steps < MOST * margin.size // 2:
-            corner, distance = self._next_corner(x, tangent, margin, pressed, passed, step)
-            meets = distance < step
-            taken = distance if meets else step
-            # beyond a corner the strain of its cell may change a thousand times as fast: it leads there
-            across = tangent if passed < 0 else self._strain_of(passed)
-            found = self._corrected(x, tangent, taken, slopes, across, pressed)
+        piece, step = self._begun(x, ahead), FIRST
+        count = self._equations.belt.cell.size
+        turns = np.zeros(2 * count, dtype=int)  # of each cell's sides, in place
+        for _ in range(MOST * count):
+            if piece is None:
+                return
+            told = turns < MOST_TURNS
+            corner, distance = self._next_corner(piece, told)
+            found = None
+            if distance > 0.0:
+                found, step, corner = self._stepped(piece, step, corner, distance, told)
+            if found is not None:
+                self.within = partial(self._within, piece, self._way(piece, found.x))
+                turns[:] = 0
+            elif corner == NONE:
+                return
+            else:
+                turns[corner] += 1
+            piece = self._next(piece, piece.x if found is None else found.x, corner)
+            if found is not None:
+                yield found.x, found.load
+
+    def _within(self, piece: Piece, step: float, share: float) -> tuple[np.ndarray, float] | None:
+        """State with its load at a share of a step."""
+        found = self._corrected(piece, share * step)
+        return None if found is None else (found.x, found.load)
+
+    def _begun(self, x: np.ndarray, ahead: np.ndarray) -> Piece | None:
+        """The curve about a state near x, to its own tolerance."""
+        pressed = self._equations.corners(x).ravel() > 0.0
+        for _ in range(SETS):
+            piece = self._piece(x, pressed, ahead)
+            if piece is None or (found := self._corrected(piece, 0.0)) is None:
+                return None
+            wrong = self._inside(found.x, pressed) < -NEAR
+            if not wrong.any():
+                return piece._replace(x=found.x)
+            x, pressed = found.x, pressed ^ wrong
+        return None
+
+    def _next(self, before: Piece, x: np.ndarray, corner: int) -> Piece | None:
+        """The curve about the next state, beyond a corner that it is on."""
+        pressed = before.pressed.copy()
+        if corner != NONE:
+            pressed[corner] = not pressed[corner]
+        piece = self._piece(x, pressed, before.tangent)
+        if piece is None or piece.sense == before.sense:
+            return piece
+        return piece._replace(tangent=-piece.tangent, sense=before.sense)
+
+    def _stepped(
+        self, piece: Piece, step: float, corner: int, distance: float, told: np.ndarray
+    ) -> tuple[Reached | None, float, int]:
+        """The next state, the length of the step from there, and the corner on which it is.
+
+        Without a state: the corner on which the piece is; or NONE, where no step succeeds.
+
+        Parameters
+        ----------
+        piece : Piece
+            Where the step begins.
+        step : float
+            Its length.
+        corner, distance
+            As of `_next_corner`.
+        told : (2 N,) array of bool
+            Corners that count.
+        """
+        meets = corner if distance < step else NONE
+        taken = min(distance, step)
+        before = self._inside(piece.x, piece.pressed)
+        while taken > SHORTEST:
+            found = self._corrected(piece, taken, meets)
             if found is None:
-                step = 0.25 * taken
+                step = taken = 0.25 * taken
+                meets = NONE
                 continue
-            reached, load, corrections = found
-            there = self._corners(reached)
-            crossed = ((there > 0.0) != pressed) & ((margin > 0.0) == pressed) & (np.abs(there) > NEAR)
-            if meets:
-                crossed[corner] = False
-            if crossed.any() and taken > SHORTEST:
-                step = 0.25 * taken
-                continue
-            x, margin, passed = reached, there, -1
-            taken_steps += 1
-            inside = margin[corner] if pressed[corner] else -margin[corner]
-            meets = meets and inside < NEAR  # otherwise the next step meets it
-            if meets:
-                pressed = pressed.copy()
-                pressed[corner] = not pressed[corner]
-                passed = corner
-            elif corrections <= EASY:
-                step = min(2.0 * step, LONGEST)
-            slopes = self._slopes(x, pressed)
-            tangent = self._tangent(slopes, tangent)
-            if meets and tangent is not None:
-                nears = self._rates(x, tangent, margin, PROBE)[corner] > 0.0
-                tangent = tangent if nears == pressed[corner] else -tangent
-            yield x, load
+            inside = self._inside(found.x, piece.pressed)
+            inside[~told] = 0.0
+            if meets != NONE:
+                inside[meets] = 0.0
+            if inside.min() >= -NEAR:
+                easy = found.corrections <= EASY and meets == NONE
+                return found, min(2.0 * step, LONGEST) if easy else step, meets
+            # onto the corner that was crossed first; from one that is as near as round-off nothing leads away
+            crossed = inside < -NEAR
+            there = np.where(crossed & (before <= NEAR), before - inside, 0.0)
+            if there.any():
+                return None, step, int(np.argmax(there))
+            shares = np.full(inside.size, np.inf)
+            shares[crossed] = before[crossed] / (before[crossed] - inside[crossed])
+            meets = int(np.argmin(shares))
+            taken *= float(shares[meets])
+        return None, step, NONE
 
-    def _corners(self, x: np.ndarray) -> np.ndarray:
-        """Distances from all corners, (2 N,)."""
-        return self._equations.corners(x).ravel()
+    def _inside(self, x: np.ndarray, pressed: np.ndarray) -> np.ndarray:
+        """Distances (2 N,) that are left to the corners of a set of pressed cells."""
+        return np.where(pressed, 1.0, -1.0) * self._equations.corners(x).ravel()
 
-    def _residual(self, x: np.ndarray) -> tuple[np.ndarray, float] | None:
+    def _rates(self, piece: Piece) -> np.ndarray:
+        """Change (2 N,) of these distances along the tangent."""
+        slopes = self._equations.corner_slopes(piece.x)
+        return np.where(piece.pressed, 1.0, -1.0) * (slopes @ (piece.tangent * self._equations.sizes))
+
+    def _next_corner(self, piece: Piece, told: np.ndarray) -> tuple[int, float]:
+        """Corner that the tangent meets first, and the step to there; 0 if the piece is on it.
+
+        Of those (2 N,) that count.
+        """
+        inside, nears = self._inside(piece.x, piece.pressed), -self._rates(piece)
+        met = np.flatnonzero(told & (nears > 0.0))
+        if met.size == 0:
+            return NONE, np.inf
+        inside, nears = np.maximum(inside[met], 0.0), nears[met]
+        if (first := np.min((inside + NEAR) / nears)) > LONGEST:
+            return NONE, np.inf
+        together = inside / nears <= first
+        steepest = int(np.argmax(np.where(together, nears, 0.0)))
+        near = inside[steepest] <= NEAR
+        return int(met[steepest]), 0.0 if near else float(inside[steepest] / nears[steepest])
+
+    def _residual(self, x: np.ndarray, pressed: np.ndarray) -> tuple[np.ndarray, float] | None:
         """As of `Equations` (n - 1,), without the balance that gives the load, and the load [N m]."""
-        left = self._equations.residual(x)
+        left = self._equations.residual(x, pressed.reshape(2, -1))
         if left is None or not np.all(np.isfinite(left)):
             return None
         belt = self._equations.belt
         return np.delete(left, MOMENT), float(belt.load + left[MOMENT] * belt.driven_inertia / belt.ratio)
 
-    def _slopes(self, x: np.ndarray, pressed: np.ndarray) -> csr_array | None:
-        """Slopes of the residual (n - 1, n) about x, with a set of pressed cells; None: it has no value."""
-        if self._residual(x) is None:
+    def _piece(self, x: np.ndarray, pressed: np.ndarray, near: np.ndarray) -> Piece | None:
+        """The curve about x, its tangent nearer to another one; None: it has none."""
+        if self._residual(x, pressed) is None:
             return None
         slopes = self._equations.jacobian(x, pressed=pressed.reshape(2, -1)).tocsr()
-        return slopes[np.delete(np.arange(slopes.shape[0]), MOMENT)]
-
-    def _factors(self, slopes: csr_array | None, along: np.ndarray) -> Any:
-        """Factors of slopes, below them a direction over the unknowns' sizes; None: it has none."""
-        if slopes is None:
-            return None
-        matrix = vstack([slopes, csr_array((along / self._equations.sizes)[np.newaxis])], format="csc")
+        slopes = slopes[np.delete(np.arange(slopes.shape[0]), MOMENT)]
+        matrix = vstack([slopes, csr_array(self._across(near)[np.newaxis])], format="csc")
         if not np.all(np.isfinite(matrix.data)):
             return None
         try:
-            return splu(matrix)
+            factors = splu(matrix)
         except RuntimeError:  # exactly singular
-            return None
-
-    def _tangent(self, slopes: csr_array | None, near: np.ndarray) -> np.ndarray | None:
-        """Direction of the curve over the unknowns' sizes, of mean square 1, nearer to another one."""
-        if (factors := self._factors(slopes, near)) is None:
             return None
         last = np.zeros(near.size)
         last[-1] = 1.0
         found = factors.solve(last) / self._equations.sizes
-        return np.asarray(found / np.sqrt(np.mean(found**2)))
+        size = np.sqrt(np.mean((found * self._measured) ** 2))
+        return Piece(x, pressed, factors, found / size, determinant_sign(factors))
 
-    def _strain_of(self, corner: int) -> np.ndarray:
-        """Direction (n,) in which the strain of a corner's cell changes alone."""
-        count = self._equations.belt.cell.size
-        found = np.zeros(self._equations.sizes.size)
-        found[count + corner % count] = 1.0
-        return found
+    def _across(self, tangent: np.ndarray) -> np.ndarray:
+        """Slopes (n,) with the unknowns of the way along a tangent, times their number."""
+        return tangent * self._measured / self._equations.sizes
 
-    def _rates(self, x: np.ndarray, tangent: np.ndarray, margin: np.ndarray, over: float) -> np.ndarray:
-        """Change (2 N,) of the distances from all corners along the curve, over the step."""
-        return (self._corners(x + over * tangent * self._equations.sizes) - margin) / over
+    def _way(self, piece: Piece, x: np.ndarray) -> float:
+        """Step along the tangent to the plane in which a state is."""
+        return float(self._across(piece.tangent) @ (x - piece.x)) / x.size
 
-    def _next_corner(
-        self,
-        x: np.ndarray,
-        tangent: np.ndarray,
-        margin: np.ndarray,
-        pressed: np.ndarray,
-        passed: int,
-        step: float,
-    ) -> tuple[int, float]:
-        """Corner that the tangent meets first, but for the one just passed, and the step to there."""
-        rates = self._rates(x, tangent, margin, min(step, PROBE))
-        nears = np.where(pressed, rates < 0.0, rates > 0.0)
-        distances = np.full(margin.size, np.inf)
-        distances[nears] = np.maximum(-margin[nears] / rates[nears], 0.0)
-        if passed >= 0:
-            distances[passed] = np.inf
-        corner = int(np.argmin(distances))
-        return corner, float(distances[corner])
+    def _corrected(self, piece: Piece, step: float, corner: int = NONE) -> Reached | None:
+        """State from a step along the tangent: on a corner, or else in the plane across the tangent.
 
-    def _corrected(
-        self,
-        x: np.ndarray,
-        tangent: np.ndarray,
-        step: float,
-        slopes: csr_array | None,
-        across: np.ndarray,
-        pressed: np.ndarray,
-    ) -> tuple[np.ndarray, float, int] | None:
-        """State in a plane, across a direction, at a step along the tangent; its load, and the corrections.
-
-        First by the slopes at x, then by their own, as where flanks meet or part on the way.
+        First by the piece's factors, then by new ones, as where flanks meet or part on the way.
         """
-        found = x + step * tangent * self._equations.sizes
+        sizes, row = self._equations.sizes, self._across(piece.tangent)
+        found, size, left = piece.x + step * piece.tangent * sizes, np.inf, 0.0
         for factorisation in range(FACTORISATIONS):
-            factors = self._factors(slopes if factorisation == 0 else self._slopes(found, pressed), across)
-            if factors is None:
-                return None
-            for correction in range(CORRECTIONS):
-                if (residual := self._residual(found)) is None:
+            if factorisation > 0:
+                renewed = self._piece(found, piece.pressed, piece.tangent)
+                if renewed is None:
                     return None
-                change = -factors.solve(np.append(residual[0], 0.0))
-                if not mean_size(self._equations, change) < FAR:  # SuperLU crashes on slopes out there
+                piece = renewed
+            along = piece.tangent * sizes
+            for correction in range(CORRECTIONS):
+                if (residual := self._residual(found, piece.pressed)) is None:
+                    return None
+                change = -piece.factors.solve(np.append(residual[0], 0.0))
+                if corner != NONE:
+                    left = self._equations.corners(found).ravel()[corner]
+                    row = self._equations.corner_slopes(found)[[corner]].toarray()[0]
+                change -= (left + row @ change) / (row @ along) * along
+                before, size = size, mean_size(self._equations, change)
+                if not size < FAR:  # SuperLU crashes on slopes out there
                     return None
                 found = found + change
-                if mean_size(self._equations, change) < self._tolerance:
-                    if (last := self._residual(found)) is None:
+                if size < CLOSE or 0.5 * before < size < self._tolerance:
+                    if (last := self._residual(found, piece.pressed)) is None:
                         return None
-                    return found, last[1], factorisation * CORRECTIONS + correction + 1
+                    return Reached(found, last[1], factorisation * CORRECTIONS + correction + 1)
+                if size > before:
+                    break
         return None
+
+
+def determinant_sign(factors: Any) -> float:
+    """Sign of the determinant of a matrix that SuperLU has factorised."""
+    sign = float(np.prod(np.sign(factors.U.diagonal())))
+    for places in (factors.perm_r, factors.perm_c):
+        n = places.size
+        cycles, _ = connected_components(csr_array((np.ones(n), (np.arange(n), places)), shape=(n, n)))
+        sign *= (-1.0) ** (n - cycles)
+    return sign

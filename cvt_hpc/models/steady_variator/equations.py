@@ -38,7 +38,7 @@ from cvt_hpc.models.elastic_belt.one_system import (
 from cvt_hpc.models.elastic_belt.one_system import SIZES as SIZES_OF_ROWS
 from cvt_hpc.models.elastic_belt.pulleys import moving_states
 from cvt_hpc.models.elastic_belt.rhs import strains
-from cvt_hpc.models.steady_variator.linearised import Linearisation, corners
+from cvt_hpc.models.steady_variator.linearised import Linearisation, corners, rates_beyond_corners
 
 LATE = 1e9  # [s]: load and damping are those after any start-up
 # sizes that count alike in each unknown of the default scene: w, eps_0, eps_1, v_f; Q_0, Q_1, driven speed,
@@ -78,6 +78,7 @@ class Equations:
         self._moving = moving_states(belt.pulleys)
         # tilt and filtered speeds end here, then come the pulleys' states and four scalars
         self._carried = slice(3 * n, 3 * n + self._memories)
+        self.memories = slice(self._carried.start + tilts, self._carried.stop)
         self._states = slice(self._carried.stop, self._carried.stop + self._moving.size)
         counts = (n, n, n, self._memories)
         of_states = sizes_of_states(belt)[self._moving]
@@ -115,10 +116,11 @@ class Equations:
         unpack(self._flat, 0.0, self._flat_unknowns(x))
         return self._flat.state.copy()
 
-    def residual(self, x: np.ndarray) -> np.ndarray | None:
+    def residual(self, x: np.ndarray, pressed: np.ndarray | None = None) -> np.ndarray | None:
         """Residual of the equations, (n,); None where the contact has no solution.
 
-        Rates are in [m/s^2], [rad/s^2] and [m/s], contents in [m].
+        Rates are in [m/s^2], [rad/s^2] and [m/s], contents in [m]. With the cells (2, N) that are taken as
+        pressed, pushes go on beyond their corners as on the side of these, so that the residual is smooth.
         """
         y = self._flat_unknowns(x)
         flat = self._flat
@@ -128,12 +130,31 @@ class Equations:
         left = np.concatenate([self._out[self._rates], contents - self._contents])
         if self._held_speed is not None:
             left[MOMENT] = x[SPEED] - self._held_speed
+        if pressed is not None:
+            n = self.belt.cell.size
+            left[: 2 * n] += np.concatenate(rates_beyond_corners(self.belt, flat.state, pressed))
         return left
 
     def corners(self, x: np.ndarray) -> np.ndarray:
         """Distances (2, N) of the cells from the corners of their push, as of `linearised.corners`."""
         unpack(self._flat, 0.0, self._flat_unknowns(x))
         return corners(self.belt, self._flat.state)
+
+    def corner_slopes(self, x: np.ndarray) -> csr_array:
+        """Slopes (2 N, n) of the distances of `corners` with the unknowns."""
+        n, belt = self.belt.cell.size, self.belt
+        cells, behind, ones = np.arange(n), np.roll(np.arange(n), 1), np.ones(n)
+        strains, flux = x[n : 2 * n], x[-4]
+        # v_j = Q (1 + eps_j-1), so the damper's push is that of the difference of two strains
+        softened = belt.element_damping / (belt.element_stiffness * belt.cell)
+        entries = (
+            (-1.0 - softened * flux, cells, n + cells),
+            (softened * flux, cells, n + behind),
+            (softened * (np.roll(strains, 1) - strains), cells, np.full(n, x.size - 4)),
+            (-ones, n + cells, n + cells),
+        )
+        values, rows, columns = map(np.concatenate, zip(*entries, strict=True))
+        return csr_array((values, (rows, columns)), shape=(2 * n, x.size))
 
     def jacobian(self, x: np.ndarray, sided: bool = True, pressed: np.ndarray | None = None) -> csc_array:
         """Slopes of the residual, (n, n), about the unknowns of its last call.

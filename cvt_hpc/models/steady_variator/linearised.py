@@ -136,6 +136,36 @@ def corners(belt: Belt, state: State) -> np.ndarray:
     return np.array([-eps - damped * opening, -eps])
 
 
+def rates_beyond_corners(belt: Belt, state: State, pressed: np.ndarray) -> tuple[np.ndarray, np.ndarray]:
+    """What the rates of u and of the elements' speed lack where pushes go on beyond their corners.
+
+    With them the rates are those of a belt whose pressed cells pull, and whose other cells do not push, on
+    either side of their corners: smooth there, and the belt's own where each cell is on its side.
+
+    Parameters
+    ----------
+    belt, state
+        Constants and state.
+    pressed : (2, N) array of bool
+        Cells that are taken as pressed, as of `corners`.
+
+    Returns
+    -------
+    across, along : (N,) arrays
+        Of u and v_element [m/s^2]; zeros where elements rock, whose corners these are not.
+    """
+    if belt.has_column:
+        return np.zeros(belt.cell.size), np.zeros(belt.cell.size)
+    distances = corners(belt, state)
+    damped, held = belt.element_stiffness * (np.where(pressed, distances, 0.0) - np.maximum(distances, 0.0))
+    w = state.fields[f.W]
+    turned = held * (np.roll(w, -1) - w) / belt.cell
+    bent = 0.5 * damped * belt.cell * belt.curvature
+    across = bent + np.roll(bent, 1) - (turned - np.roll(turned, 1))
+    along = np.roll(damped, 1) - damped
+    return across / (belt.dual * belt.mass), along / (belt.dual * belt.element_mass)
+
+
 def _strained(belt: Belt, state: State) -> tuple[np.ndarray, np.ndarray, np.ndarray]:
     """Lengths of the cells [1], strains of elements [1], dampers over stiffness [s], each (N,)."""
     both = np.empty((2, belt.cell.size))
@@ -195,11 +225,15 @@ class Linearisation:
         """
         belt, count, n = flat.belt, self._count, flat.belt.cell.size
         contents = flat.state.fields[f.N_ELEMENT]
-        own = contents.copy()
+        own, force = contents.copy(), flat.force.copy()
         if pressed is not None:
             contents[:] = self._off_corners(belt, flat.state, pressed)
+            # stations that all but open or close, whose memory is another one when open
+            away = BEYOND * self._increments[FORCE]
+            nearly = (force != 0.0) & (np.abs(force) < away)
+            flat.force[nearly] = np.copysign(away, force[nearly])
         local_slopes(flat, self._increments, self._near, self._turning)
-        contents[:] = own
+        contents[:], flat.force[:] = own, force
         if self._loose.size:
             return self._of_free_pulleys(flat)
         self._near[MOMENT] /= belt.driven_inertia

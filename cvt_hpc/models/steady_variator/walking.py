@@ -4,10 +4,13 @@ Corners of the push force are sharp: each state begins at the one before, and a 
 in quarters. Where the load does not separate states, the arc of their curve does (`curve.py`).
 """
 
-from collections.abc import Iterator, Mapping, Sequence
+import math
+from collections.abc import Callable, Iterator, Mapping, Sequence
+from functools import partial
 from typing import Any, NamedTuple
 
 import numpy as np
+from scipy.optimize import brentq, minimize_scalar
 
 from cvt_hpc.models.elastic_belt.belt import Belt, State, belt_constants
 from cvt_hpc.models.elastic_belt.rhs import contact_forces, fresh_contacts
@@ -17,7 +20,6 @@ from cvt_hpc.models.steady_variator.continuation import AT_HOME, Continuation, N
 from cvt_hpc.models.steady_variator.curve import Curve
 from cvt_hpc.models.steady_variator.equations import Equations
 from cvt_hpc.models.steady_variator.first_states import FirstStates, SlipsThrough
-from cvt_hpc.models.steady_variator.newton import mean_size, newton
 from cvt_hpc.models.steady_variator.parameters import OF_THE_COURSE
 from cvt_hpc.models.steady_variator.released import Released, freed, held, nearest
 from cvt_hpc.variator import GROSS_SLIP, PULLEYS
@@ -28,6 +30,7 @@ __all__ = ["NoSteadyState", "SlipsThrough", "Steady", "SteadyBelt"]
 # slip: single cells that open turn the curve back without slip.
 FALLEN, GROWN = 0.9, 0.2
 SLIDING = 0.5  # slip of a pulley beyond which no state under a load is looked for
+WITHIN = 1e-3  # of a step: how closely its largest load is met, which changes the load by the square
 
 
 class Steady(NamedTuple):
@@ -55,6 +58,49 @@ class Steady(NamedTuple):
         """Tangential sliding over belt speed, of the pulley that slips more [1]."""
         seen = sampled(self.belt, self.state).channels()
         return max(abs(seen[f"slip {pulley}"]) for pulley in PULLEYS)
+
+
+class Between(NamedTuple):
+    """Two neighbours on the curve of states, and those between them.
+
+    Attributes
+    ----------
+    low, high : Steady
+        The neighbours.
+    at : callable
+        at(share): the state at a share of the step from the one to the other; NoSteadyState where none is
+        found.
+    """
+
+    low: Steady
+    high: Steady
+    at: Callable[[float], Steady]
+
+    def where(self, value: Callable[[Steady], float], wanted: float) -> Steady | None:
+        """State with a value that lies between those of the neighbours; None if not found between them."""
+
+        def beyond(share: float) -> float:
+            state = self.low if share == 0.0 else self.high if share == 1.0 else self.at(share)
+            return value(state) - wanted
+
+        try:
+            return self.at(brentq(beyond, 0.0, 1.0))
+        except NoSteadyState:
+            return None
+
+    def most(self, direction: float) -> Steady:
+        """State of the largest load in a direction."""
+        tried = [self.low, self.high]
+
+        def less(share: float) -> float:
+            try:
+                tried.append(self.at(share))
+            except NoSteadyState:
+                return math.inf
+            return -direction * tried[-1].load
+
+        minimize_scalar(less, bounds=(0.0, 1.0), method="bounded", options={"xatol": WITHIN})
+        return max(tried, key=lambda one: direction * one.load)
 
 
 class SteadyBelt:
@@ -162,16 +208,29 @@ class SteadyBelt:
         As far as they are found; in the direction in which the load's size grows they continue past the
         largest torque that friction carries. Not of a driven pulley whose speed is given.
         """
-        return self._along_curve(self._own, near.unknowns, sign)
+        for step in self._steps(self._own, near, sign):
+            yield step.high
 
-    def _along_curve(self, equations: Equations, x: np.ndarray, sign: float) -> Iterator[Steady]:
-        """As `along_curve`, of the free pulleys or of the held ones."""
-        self._course.own()
-        equations.under(load=0.0, load_start=0.0)
-        for found, load in Curve(equations, AT_HOME).along(x, sign):
-            yield self._state_of(equations, found, load)
+    def _steps(self, equations: Equations, near: Steady, sign: float) -> Iterator[Between]:
+        """As `along_curve`, of the free pulleys or of the held ones, with the states in between."""
+        curve = Curve(equations, AT_HOME)
+
+        def alone() -> None:
             self._course.own()
             equations.under(load=0.0, load_start=0.0)
+
+        def at(within: Callable[[float], tuple[np.ndarray, float] | None], share: float) -> Steady:
+            alone()
+            if (found := within(share)) is None:
+                raise NoSteadyState("no steady state found within a step of their curve")
+            return self._state_of(equations, *found)
+
+        alone()
+        for found, load in curve.along(near.unknowns, sign):
+            state = self._state_of(equations, found, load)
+            yield Between(near, state, partial(at, curve.within))
+            near = state
+            alone()
 
     def carried(self, near: Steady) -> Steady:
         """State at the largest load that friction carries while neither pulley slips grossly.
@@ -187,30 +246,26 @@ class SteadyBelt:
             Where states end before the load falls or a pulley slips grossly.
         """
         direction = -1.0 if near.load < 0.0 else 1.0
-        most = last = near
-        for state in self.along_curve(near, -direction):
-            if state.largest_slip > GROSS_SLIP:
-                state = self._at_slip(last, state)
-                return state if direction * state.load > direction * most.load else most
-            last = state
+        if near.largest_slip > GROSS_SLIP:
+            raise NoSteadyState(f"no largest load found: at {near.load:.4g} N m a pulley slips grossly")
+        most, last, beside = near, near, list[Between]()
+        for step in self._steps(self._own, near, -direction):
+            state = step.high
+            if slips := state.largest_slip > GROSS_SLIP:
+                state = step.where(lambda one: one.largest_slip, GROSS_SLIP) or last
             if direction * state.load > direction * most.load:
-                most = state
-            elif direction * state.load < FALLEN * direction * most.load and (
-                state.largest_slip > most.largest_slip + GROWN * GROSS_SLIP
-            ):
-                return most
+                most, beside = state, [step]
+            elif most is last:
+                beside.append(step)
+            last = state
+            fallen = direction * state.load < FALLEN * direction * most.load
+            if slips or (fallen and state.largest_slip > most.largest_slip + GROWN * GROSS_SLIP):
+                turns = [one.most(direction) for one in beside]
+                sound = [one for one in turns if one.largest_slip <= GROSS_SLIP]
+                return max([most, *sound], key=lambda one: direction * one.load)
         raise NoSteadyState(
             f"no largest load found: from {near.load:.4g} N m states reach to {last.load:.4g} N m"
         )
-
-    def _at_slip(self, below: Steady, beyond: Steady) -> Steady:
-        """State at which a pulley just does not slip grossly, between two states."""
-        slips = [state.largest_slip for state in (below, beyond)]
-        share = (GROSS_SLIP - slips[0]) / (slips[1] - slips[0])
-        load = below.load + share * (beyond.load - below.load)
-        self._own.under(load=load, load_start=load)
-        x = newton(self._own, below.unknowns + share * (beyond.unknowns - below.unknowns), AT_HOME)
-        return below if x is None else self._state_of(self._own, x, load)
 
     def _found(self, x: np.ndarray, load: float) -> Steady:
         return self._state_of(self._equations, x, load)
@@ -221,28 +276,17 @@ class SteadyBelt:
             return self._walk(x, start, load)
         except PathEnds as ended:
             x, reached = ended.x, start + ended.share * (load - start)
-        before = self._found(x, reached)
         farthest, sign = reached, 1.0 if load < reached else -1.0  # a larger load slows the driven pulley
-        for state in self._along_curve(self._equations, before.unknowns, sign):
+        for step in self._steps(self._equations, self._found(x, reached), sign):
+            before, state = step.low, step.high
             if (before.load - load) * (state.load - load) <= 0.0:
-                if (found := self._between(before, state, load)) is not None:
-                    return found
-            before = state
+                if (found := step.where(lambda one: one.load, load)) is not None:
+                    return found.unknowns
             farthest = min(farthest, state.load) if load < reached else max(farthest, state.load)
             if state.largest_slip > SLIDING:
                 break
         reach = f"from {start:.4g} N m they reach to {farthest:.4g} N m"
         raise NoSteadyState(f"no steady state found at {load:g} N m", reach)
-
-    def _between(self, low: Steady, high: Steady, load: float) -> np.ndarray | None:
-        """Unknowns under a load between two neighbours on the curve of states, if found there."""
-        way = high.unknowns - low.unknowns
-        x = low.unknowns + (load - low.load) / (high.load - low.load) * way
-        self._course.load(load)
-        found = newton(self._equations, x, AT_HOME)
-        if found is None or mean_size(self._equations, found - x) > mean_size(self._equations, way):
-            return None
-        return found
 
     def _walk(self, x: np.ndarray, start: float, end: float) -> np.ndarray:
         """Unknowns under another load."""
