@@ -7,6 +7,7 @@ import pytest
 from scipy.sparse import csc_array
 from scipy.sparse.linalg import splu
 
+from cvt_hpc.job import build_job
 from cvt_hpc.models.elastic_belt import fields as f
 from cvt_hpc.models.elastic_belt.belt import belt_constants, initial_state, mesh
 from cvt_hpc.models.elastic_belt.one_system import flat_belt, pack, rates
@@ -18,6 +19,7 @@ from cvt_hpc.models.steady_variator.equations import Equations
 from cvt_hpc.models.steady_variator.first_states import FirstStates, least_sliding
 from cvt_hpc.models.steady_variator.forces import distributions
 from cvt_hpc.models.steady_variator.newton import mean_size, newton
+from cvt_hpc.models.steady_variator.parameters import OF_THE_COURSE
 from cvt_hpc.models.steady_variator.record import Found, judge, quantities
 from cvt_hpc.models.steady_variator.walking import NoSteadyState, SlipsThrough, SteadyBelt
 from cvt_hpc.physics.capacity import carried_torque
@@ -341,6 +343,19 @@ def test_wider_friction_is_tried_where_a_march_by_its_own_does_not_settle(monkey
     assert first.under(60.0, None) == 0.0
     # 0.3 and 10 m/s over 30 and 10 mm/s
     assert tried == [OWN, pytest.approx((10.0, 1000.0))]
+
+
+@pytest.mark.parametrize("speed", [0.01, 0.3])
+def test_a_slow_belt_settles_as_a_faster_one_whose_speeds_are_slowed_down(speed):
+    # the angles by which its elements tilt are no speeds
+    scene = {"driving_speed": speed, "thrust": 2e4, "ratio": 2.16, "driven_radius": 0.0705, "stations": 48}
+    asked = build_job({"name": "slow", "model": "steady_variator"}).parameters | scene
+    given = {**asked, **OF_THE_COURSE, "load": 0.0}
+    first = FirstStates(given, course := Continuation(given))
+    x = first._settle(0.0, OWN)
+    assert np.abs(x[course.equations.memories]).max() < speed and x[-2] == pytest.approx(
+        speed / 2.16, rel=0.02
+    )
 
 
 def test_a_load_that_takes_faster_sliding_than_the_belt_runs_is_refused():

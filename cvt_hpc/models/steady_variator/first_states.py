@@ -155,8 +155,8 @@ class FirstStates:
         if faster > 1.0:
             name = f"belt slowed down at {load:g} N m"
             x = course.follow(lambda share: course.faster(faster, share, wide), x, 1.0, name)
-            n = whole.cell.size
-            x[3 * n : -1] /= faster
+            for speeds in (course.equations.memories, slice(-4, -1)):  # all others are no speeds
+                x[speeds] /= faster
             course.faster(1.0, 1.0, wide)
         return self._narrowed(x, load, wide)
 
