@@ -118,6 +118,10 @@ def test_a_rung_has_the_keys_of_the_job_in_tables_of_its_own(job):
             ["speed_history=ramp"],
             "[scene] speed_history: expected constant, as the cheaper models have it, found ramp",
         ),
+        (
+            ["profile_time=[0.01, 0.02]", "load_profile=[0.5, 1]"],
+            "[profiles] profile_time: expected constant, as the cheaper models have it, found [0.01, 0.02]",
+        ),
     ],
 )
 def test_jobs_without_a_ladder_are_refused(job, options, message, capsys):

@@ -120,7 +120,7 @@ def _check(job: Job) -> None:
     for key in (quantity.history for quantity in QUANTITIES.values()):
         if (course := job.parameters[key]) not in CONSTANT:
             place = f"{where}: [{job.schema.section_of[key]}] {key}"
-            raise mismatch(place, "constant values, as the cheaper models have them", show(course))
+            raise mismatch(place, "constant, as the cheaper models have it", in_words(course, ""))
     stated = [rule.key for rule in job.rules if not rule.is_substituted]
     varied = dict.fromkeys(stated, ("derived", "a formula"))
     varied |= dict.fromkeys(axes, ("axes", "an axis"))
