@@ -16,6 +16,7 @@ from cvt_hpc.analysis.telling_apart import entitle_runs, named, on_axes
 from cvt_hpc.errors import mismatch
 from cvt_hpc.variator import STRANDS
 from cvt_hpc.variator.band import strand_frequencies
+from cvt_hpc.variator.profiles import multiple
 from cvt_hpc.vibration.signals import window_amplitudes
 
 WINDOW = 0.04  # [s]: lines of the spectrogram 50 Hz wide
@@ -175,6 +176,9 @@ def _lines_along(history: xr.Dataset, ramp: Ramp) -> tuple[_Lines | None, _Lines
     if changing_of(history) is not None:
         named = (name for name in COURSES if name in history)
         courses = {name: history[name].values[-ramp.values.size :][at] for name in named}
+        if "thrust" in point:
+            times = history["time"].values[-ramp.values.size :][at]
+            courses["thrust"] = np.array([point["thrust"] * multiple(point, "thrust", t) for t in times])
     turns, speed = None, courses.get("driving_speed")
     if speed is not None and np.ptp(speed) > LEAST_CHANGE * speed.max():
         turns = ramp.values[at], speed / (2.0 * np.pi)

@@ -80,6 +80,9 @@ def load(path: str | Path, overrides: Assignments = (), kick: str | None = None)
         raise mismatch(f"{job.source}: [axes] {key}", "none: growth takes a kick of its own", "an axis")
     if job.design:
         raise mismatch(f"{job.source}: [design]", "none: growth goes over the whole grid", job.design["kind"])
+    if job.parameters.get("profile_time"):
+        expected = "none: growth is that about one steady state"
+        raise mismatch(f"{job.source}: [{job.schema.section_of['profile_time']}]", expected, "profiles")
     if kick is not None:
         size = read_value(job.schema.parameters[key], kick, "--kick")
         if not size > 0.0:

@@ -28,6 +28,7 @@ _AMBIGUOUS = re.compile(r"[+-]?[1-9]\d{0,2}[.,]\d{3}", re.ASCII)  # a fraction, 
 _GROUPED = re.compile(r"[+-]?\d[\d.,' ]*", re.ASCII)
 _LINES = "a line of column names and lines of numbers"
 _MOST_NAMED = 8
+_PER_MINUTE = ("1/min", "u/min", "min-1", "rev/min", "r/min", "rpm", "tr/min")
 
 Row = tuple[int, list[str]]  # number of the line, and its cells up to the last one that is not empty
 
@@ -209,13 +210,19 @@ def _columns(file: FromFile, of_names: Row, of_units: Row, place: str) -> list[_
         below = (of_units[1][i : i + 1] or [""])[0].strip("[]()").strip()
         if unit and below and unit != below:
             raise mismatch(f"{place}: line {of_units[0]}, {key}", f"no other unit than {unit}", show(below))
-        unit = (unit or below).removeprefix("-")
+        unit = unit_of(file, key, (unit or below).removeprefix("-"))
         columns.append(_Column(i, key, unit, _si_unit(file, key, unit, f"{place}: line {of_units[0]}")))
     for name in file.required:
         if name not in [column.name for column in columns]:
             found = ", ".join(column.name for column in columns)
             raise mismatch(where, f"a column {told(name, file)}", f"none among {found}")
     return columns
+
+
+def unit_of(file: FromFile, key: str, unit: str) -> str:
+    """Return the unit of a column as it is written here: turns a minute are rpm where a speed is meant."""
+    is_rotation = "rad/s" in file.columns[key] and re.sub(r"[\s^{}]", "", unit).casefold() in _PER_MINUTE
+    return "rpm" if is_rotation else unit
 
 
 def _si_unit(file: FromFile, name: str, unit: str, place: str) -> str:

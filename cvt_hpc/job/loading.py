@@ -209,7 +209,7 @@ def _contents(given: Parameters, schema: Schema, source: str) -> dict[str, Point
         if (file := schema.parameters[key].file) is None:
             continue
         where = f"{source}: [{schema.section_of[key]}] {key}"
-        read = _READERS.get(Path(name).suffix, read_csv)
+        read = _READERS.get(Path(name).suffix.lower(), read_csv)
         raw = read(file, name, source, where) if name else {}
         found[key] = {one: read_value(schema.parameters[one], value, where) for one, value in raw.items()}
     return found

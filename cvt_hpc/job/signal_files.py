@@ -6,16 +6,18 @@ Of all signals of a file those count that a column's name, or another name of it
 from __future__ import annotations
 
 import io
-from collections.abc import Iterator
+import warnings
+from collections.abc import Iterator, Sequence
 from pathlib import Path
 
 import numpy as np
 
-from cvt_hpc.errors import few_of, mismatch, show
-from cvt_hpc.job.csv_files import arranged, content_of, named_column, told
+from cvt_hpc.errors import JobWarning, few_of, mismatch, show
+from cvt_hpc.job.csv_files import arranged, content_of, named_column, told, unit_of
 from cvt_hpc.job.units import factor_to
 from cvt_hpc.job.values import Point
-from cvt_hpc.parameters import Column, FromFile
+from cvt_hpc.parameters import Column, FromFile, RowError
+from cvt_hpc.variator.profiles import check_times
 
 MOST_BYTES = 2**26
 MOST_VALUES = 2**22  # of a signal
@@ -29,8 +31,9 @@ Signal = tuple[str, np.ndarray, str]  # name, values (n,), unit
 def read_signals(file: FromFile, name: str, source: str, where: str) -> Point:
     """Return the raw values of the parameters that a file gives, by key.
 
-    In a MAT file (version 7 and before) each signal is an array, and a text NAME_unit beside it its unit. In
-    an MDF4 file signals over other times than the first one are linear between theirs.
+    In a MAT file (version 7 and before) each signal is an array, and a text NAME_unit beside it its unit. The
+    signals of an MDF4 file count where all have values, linear between their own times. A warning states how
+    the file was read, and which of its signals do not count.
 
     Parameters
     ----------
@@ -45,17 +48,19 @@ def read_signals(file: FromFile, name: str, source: str, where: str) -> Point:
     """
     path = Path(source).parent / name
     place = f"{where}: {path}"
-    suffix = MAT if name.endswith(MAT) else MDF
+    suffix = path.suffix.lower()
     content = content_of(path, MOST_BYTES, place, f"a {suffix} file", suffix)
     columns: dict[str, Column] = {}
-    others = []
+    others: list[str] = []
+    named: dict[str, str] = {}
     for signal, values, unit in (_of_mat if suffix == MAT else _of_mdf)(file, content, place):
         if (key := named_column(file, signal)) is None:
             others.append(signal)
         elif key in columns:
-            raise mismatch(place, f"one signal for {key}", f"{show(signal)} and another one")
+            raise mismatch(place, f"one signal for {key}", f"{show(named[key])} and {show(signal)}")
         else:
-            columns[key] = _column(file, key, signal, values, unit, place)
+            named[key] = signal
+            columns[key] = _column(file, key, signal, values, unit_of(file, key, unit), place)
     for key in file.required:
         if key not in columns:
             found = f"none among {few_of(others, _MOST_NAMED)}" if others else "no signals"
@@ -64,7 +69,11 @@ def read_signals(file: FromFile, name: str, source: str, where: str) -> Point:
     for key, column in columns.items():
         if len(column.values) != rows:
             raise mismatch(f"{place}: {key}", f"{rows} values, as others have", str(len(column.values)))
-    return arranged(file, columns, place, [f"entry {row}" for row in range(1, rows + 1)])
+    raw = arranged(file, columns, place, [f"entry {row}" for row in range(1, rows + 1)])
+    read = ", ".join(f"{show(signal)} as {key}" for key, signal in named.items())
+    left = f"; not read: {few_of(others, _MOST_NAMED)}" if others else ""
+    warnings.warn(f"{place}: read with {read}{left}", JobWarning, stacklevel=2)
+    return raw
 
 
 def _column(file: FromFile, key: str, signal: str, values: np.ndarray, unit: str, place: str) -> Column:
@@ -105,22 +114,40 @@ def _of_mdf(file: FromFile, content: bytes, place: str) -> Iterator[Signal]:
         raise mismatch(place, "asammdf, which reads MDF4 files", "no such package", then) from None
     try:
         with asammdf.MDF(io.BytesIO(content)) as measured:
-            yield from _over_one_time(file, measured)
+            signals = {
+                (name, number): measured.get(name, group=group, index=index)
+                for name, places in measured.channels_db.items()
+                for number, (group, index) in enumerate(places)
+                if named_column(file, name) not in (None, "time")
+            }
+            found = [
+                (name, np.asarray(one.timestamps, float), np.asarray(one.samples), str(one.unit))
+                for (name, _), one in signals.items()
+            ]
+            others = [name for name in measured.channels_db if named_column(file, name) is None]
     except Exception as error:  # a foreign file may raise anything in that library
         raise mismatch(place, "an MDF4 file", str(error) or type(error).__name__) from None
+    yield from _over_one_time(found, place)
+    for name in others:
+        yield name, np.empty(0), ""
 
 
-def _over_one_time(file: FromFile, measured: object) -> Iterator[Signal]:
-    """Signals of an MDF file over the times of the first one that counts, and their time."""
-    first = None
-    for name, places in measured.channels_db.items():  # type: ignore[attr-defined]
-        key = named_column(file, name)
-        if key is None or key == "time":
-            continue
-        group, index = places[0]
-        signal = measured.get(name, group=group, index=index)  # type: ignore[attr-defined]
-        if first is None:
-            first = np.asarray(signal.timestamps, float)
-            yield "time", first, "s"
-        values = np.interp(first, signal.timestamps, np.asarray(signal.samples, float))
-        yield name, values, str(signal.unit)
+def _over_one_time(found: Sequence[tuple[str, np.ndarray, np.ndarray, str]], place: str) -> Iterator[Signal]:
+    """Time, and signals over it: the times of the signal with most samples, where all have values."""
+    if not found:
+        return
+    for name, times, _, _ in found:
+        try:
+            check_times(times)
+        except RowError as error:
+            raise mismatch(f"{place}: {name}, entry {error.row + 1}", error.expected, error.found) from None
+    first, last = max(times[0] for _, times, _, _ in found), min(times[-1] for _, times, _, _ in found)
+    finest = max((times for _, times, _, _ in found), key=len)
+    shared = finest[(finest >= first) & (finest <= last)]
+    if shared.size < 2:
+        spans = ", ".join(f"{name} {times[0]:g} to {times[-1]:g} s" for name, times, _, _ in found)
+        raise mismatch(place, "signals that were measured at the same time", spans)
+    yield "time", shared, "s"
+    for name, times, values, unit in found:
+        is_numbers = values.dtype.kind in "fiu" and values.ndim == 1
+        yield name, np.interp(shared, times, values) if is_numbers else values, unit

@@ -17,7 +17,9 @@ def profile_table(parameters: Parameters) -> np.ndarray:
     A model without profiles has no key of theirs.
     """
     times = parameters.get(profiles.TIME, ()) or (0.0,)
-    columns = [[profiles.multiple(parameters, name, time) for time in times] for name in PROFILED]
+    columns = [
+        np.broadcast_to(profiles.multiple(parameters, name, np.array(times)), len(times)) for name in PROFILED
+    ]
     return np.column_stack([times, *columns]).astype(float)
 
 

@@ -45,10 +45,8 @@ OTHER_NAMES = {
     "secondary_pressure": "driven_pressure",
 }
 MOST_TIMES = 1000  # of a file: longer ones are averaged over as many equal parts
-GAP, REGULAR = (
-    5.0,
-    20,
-)  # steps of a sampled file: more than so many in one are a gap; rows that show a sampling
+# Of a file that is sampled: more than so many steps in one are a gap; least rows, and share of steps alike
+GAP, LEAST_ROWS, ALIKE = 5.0, 20, 0.9
 
 
 def declared(names: Sequence[str], of_file: Sequence[str]) -> dict[str, Parameter]:
@@ -84,27 +82,33 @@ def _arranged(columns: Mapping[str, Column]) -> dict[str, Any]:
         raise ValueError("expected a column beside time, found none")
     if times.size < 2:
         raise ValueError(f"expected two times or more, found {times.size}")
-    steps = np.diff(times)
-    if (back := np.flatnonzero(steps <= 0.0)).size:
-        row = int(back[0]) + 1
-        raise RowError(row, f"a time after {times[row - 1]:g} s, that of the row before", f"{times[row]:g} s")
-    usual = float(np.median(steps))
-    if times.size > REGULAR and (gaps := np.flatnonzero(steps > GAP * usual)).size:
-        row = int(gaps[0]) + 1
-        expected = f"samples every {usual:.3g} s without a gap, as before"
-        raise RowError(row, expected, f"none from {times[row - 1]:g} to {times[row]:g} s")
+    check_times(times)
     found: dict[str, Any] = {}
     values = {name: np.array(column.values) for name, column in others.items()}
     for name, value in values.items():
         found[name] = most = float(value[np.argmax(np.abs(value))])
-        if most == 0.0:
-            raise ValueError(f"expected a {name} other than 0, found 0 all along")
-        values[name] = value / most
+        if name != "load" and (low := np.flatnonzero(value <= 0.0)).size:
+            raise RowError(int(low[0]), f"a {name} above 0", f"{value[low[0]]:g} {_UNITS[name]}")
+        values[name] = value / most if most else np.ones_like(value)
     times = times - times[0]
     if times.size > MOST_TIMES:
         times, values = _averaged(times, values)
     found[TIME] = times.tolist()
     return found | {f"{name}_profile": value.tolist() for name, value in values.items()}
+
+
+def check_times(times: np.ndarray) -> None:
+    """Raise RowError where times [s] do not ascend, or samples of a regular file are missing."""
+    steps = np.diff(times)
+    if (back := np.flatnonzero(steps <= 0.0)).size:
+        row = int(back[0]) + 1
+        raise RowError(row, f"a time after {times[row - 1]:g} s, that of the row before", f"{times[row]:g} s")
+    usual = float(np.median(steps))
+    is_sampled = times.size > LEAST_ROWS and np.mean(np.abs(steps - usual) < 0.1 * usual) >= ALIKE
+    if is_sampled and (gaps := np.flatnonzero(steps > GAP * usual)).size:
+        row = int(gaps[0]) + 1
+        expected = f"samples every {usual:.3g} s without a gap"
+        raise RowError(row, expected, f"none from {times[row - 1]:g} to {times[row]:g} s")
 
 
 def _averaged(
@@ -121,14 +125,14 @@ def _averaged(
     return means(times), {name: means(value) for name, value in values.items()}
 
 
-def multiple(parameters: Parameters, name: str, time: float) -> float:
-    """Return the multiple of a value at a time [s]; 1 without a profile."""
+def multiple(parameters: Parameters, name: str, time: Any) -> Any:
+    """Return the multiple of a value at a time, or at times [s]; 1 without a profile."""
     p, key = parameters, f"{name}_profile"
     if name == "thrust" and p.get("driven_pressure_profile"):
         # A p + F of the spring: the pressure's part changes
         spring = p["driven_spring_force"] / p["thrust"]
-        return spring + (1.0 - spring) * float(np.interp(time, p[TIME], p["driven_pressure_profile"]))
-    return float(np.interp(time, p[TIME], p[key])) if p.get(key) else 1.0
+        return spring + (1.0 - spring) * np.interp(time, p[TIME], p["driven_pressure_profile"])
+    return np.interp(time, p[TIME], p[key]) if p.get(key) else 1.0
 
 
 def extremes(parameters: Parameters, name: str) -> tuple[float, float]:

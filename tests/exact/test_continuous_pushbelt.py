@@ -90,7 +90,8 @@ def test_every_parameter_of_the_continuous_belt_has_its_place():
     own = {key for table in PARAMETERS.values() for key in table}
     shared = own & {*known_keys("pushbelt")}
     # the pushbelt refuses a table of friction, and pistons, without which there is no pressure
-    tables = {key for key in own if key.startswith("table_") or key.endswith("_pressure")}
+    of_pressure = "_pressure", "_pressure_profile"
+    tables = {key for key in own if key.startswith("table_") or key.endswith(of_pressure)}
     led = {need for needs, _ in FOLLOWS.values() for need in needs} - shared
     # terms of the continuum alone; a key that switches one has the others of its table with it
     terms = {key for term in TERMS for key in term["keys"]} & own

@@ -6,7 +6,9 @@ from hypothesis import given
 from hypothesis import strategies as st
 
 from cvt_hpc.errors import InputError, JobWarning
+from cvt_hpc.experiments import growth
 from cvt_hpc.job import build_job
+from cvt_hpc.models.elastic_belt.grouping import lane_key
 from cvt_hpc.variables import Vibrates
 from cvt_hpc.variator.course import multiple_at, profile_table, slope_at
 from support.marched import balance, finished, job, record
@@ -164,10 +166,9 @@ SAMPLED = "\n".join(["time [s],load [N m]", *(f"{k / 100 + (k > 25)},{80 + k % 3
         ("time [s]\n0\n1\n", "expected a column beside time, found none"),
         ("time [s],load [N m]\n0,1\n", "expected two times or more, found 1"),
         ("time [s],load [N m]\n0,1\n1,2\n0.5,3\n", "line 4: expected a time after 1 s, .* found 0.5 s"),
-        ("time [s],load [N m]\n0,0\n1,0\n", "expected a load other than 0, found 0 all along"),
-        (SAMPLED, "line 28: expected samples every 0.01 s without a gap, as before, found none from 0.25"),
+        (SAMPLED, "line 28: expected samples every 0.01 s without a gap, found none from 0.25"),
         ("time [s],load [N m]\n0,1\n9,2\n", "duration: expected 9 s or more, the end of profile_time"),
-        ("time [s],thrust [kN]\n0,50\n0.1,-1\n", "thrust_profile: expected multiples above 0, found -0.02"),
+        ("time [s],thrust [kN]\n0,50\n0.1,-1\n", "line 3: expected a thrust above 0, found -1000 N"),
         ("time [s],load [rpm]\n0,1\n1,2\n", "line 1: expected load .N m., found"),
         ("time [s],grip [N]\n0,1\n1,2\n", "expected columns among time"),
         ("time [s],load [N m]\n0,1\n1,\n", "line 3"),
@@ -201,16 +202,15 @@ def write_mat(path, signals, **further):
     savemat(path, {name: np.array(values) for name, (values, _) in signals.items()} | told | further)
 
 
-def write_mdf(path, signals):
+def write_mdf(path, signals, times=()):
+    """Signals over the times of "Time", or over `times` of their own by name."""
     asammdf = pytest.importorskip("asammdf")
-    times = np.array(signals["Time"][0])
+    times = dict(times)
     with asammdf.MDF(version="4.10") as measured:
         for name, (values, unit) in signals.items():
             if name != "Time":
-                measured.append(
-                    asammdf.Signal(np.array(values, float), timestamps=times, name=name, unit=unit),
-                    common_timebase=True,
-                )
+                at = np.array(times.get(name, signals["Time"][0]), float)
+                measured.append(asammdf.Signal(np.array(values, float), timestamps=at, name=name, unit=unit))
         measured.save(path, overwrite=True)
 
 
@@ -256,3 +256,83 @@ def test_a_file_of_another_kind_is_one_error(tmp_path, suffix, content):
     with pytest.raises(InputError, match="profile_file: .*rig.*expected an?") as raised:
         build_job(document, str(tmp_path / "course.toml"))
     assert "\n" not in str(raised.value)
+
+
+def mdf_point(folder, signals, times=()):
+    write_mdf(folder / "rig.mf4", signals, times)
+    document = {"name": "course", "model": "elastic_belt", "profiles": {"profile_file": "rig.mf4"}}
+    return build_job(document | {"run": {"duration": "2 s"}}, str(folder / "course.toml")).point(0)
+
+
+def test_signals_over_times_of_their_own_count_where_all_have_values(tmp_path):
+    fine, coarse = np.linspace(1.0, 2.0, 201), np.array([0.5, 1.5, 2.5])
+    torque, speed = 60.0 + 50.0 * np.sin(20.0 * fine), np.array([2000.0, 3000.0, 1000.0])
+    signals = {"Speed": (speed, "1/min"), "Torque": (torque, "N m"), "Time": ([], "s")}
+    with pytest.warns(JobWarning, match='"Speed" as driving_speed, "Torque" as load'):
+        point = mdf_point(tmp_path, signals, {"Speed": coarse, "Torque": fine})
+    assert np.array(point["profile_time"]) == pytest.approx(fine - 1.0)
+    assert point["load"] * np.array(point["load_profile"]) == pytest.approx(torque)
+    found = point["driving_speed"] * np.array(point["driving_speed_profile"]) * 30.0 / np.pi
+    assert found == pytest.approx(np.interp(fine, coarse, speed))
+
+
+TORQUE, SPEED_TURNS = (np.full(50, 60.0), "N m"), (np.full(50, 3000.0), "rpm")
+REGULAR_TIMES = np.arange(50) / 100.0
+
+
+@pytest.mark.parametrize(
+    ("of_speed", "expected"),
+    [
+        (
+            REGULAR_TIMES + 5.0,
+            "expected signals that were measured at the same time, found .*Speed 5 to 5.49 s",
+        ),
+        (
+            REGULAR_TIMES + 0.3 * (REGULAR_TIMES > 0.2),
+            "Speed, entry 22: expected samples every 0.01 s without a gap",
+        ),
+        (np.where(np.arange(50) == 7, 0.0, REGULAR_TIMES), "Speed, entry 8: expected a time after 0.06 s"),
+    ],
+)
+def test_signals_that_do_not_go_together_are_one_error(tmp_path, of_speed, expected):
+    signals = {"Torque": TORQUE, "Speed": SPEED_TURNS, "Time": ([], "s")}
+    with pytest.raises(InputError, match=expected):
+        mdf_point(tmp_path, signals, {"Torque": REGULAR_TIMES, "Speed": of_speed})
+
+
+def test_turns_a_minute_are_read_in_each_of_their_spellings(tmp_path):
+    for unit in ("1/min", "U/min", "min-1", "min^-1", "rev/min", "RPM", "rpm"):
+        text = f"time [s],driving_speed [{unit}]\n0,2900\n0.1,3000\n"
+        assert course_job(tmp_path, text).point(0)["driving_speed"] == pytest.approx(100.0 * np.pi)
+
+
+def test_runs_whose_courses_differ_share_no_lanes():
+    oil = {"driven_piston": (0.02, 0.09), "driven_pressure": 2e6, "profile_time": (0.0, 0.1)}
+    oil |= {"driven_pressure_profile": (1.0, 0.5)}
+    asked = [job(**oil, driven_spring_force=force).point(0) for force in (0.0, 2e4)]
+    assert lane_key(asked[0]) != lane_key(asked[1])
+    loads = [
+        job(load=load, profile_time=(0.0, 0.1), load_profile=(1.0, 0.5)).point(0) for load in (50.0, 60.0)
+    ]
+    assert lane_key(loads[0]) == lane_key(loads[1])
+
+
+def test_a_speed_is_not_prescribed_to_a_pulley_that_has_an_inertia():
+    course = {"profile_time": (0.0, 0.1), "driving_speed_profile": (1.0, 0.9), "driving_inertia": 0.05}
+    with pytest.raises(InputError, match="driving_speed_profile: expected none where .* is not given"):
+        job(**course).point(0)
+
+
+def test_growth_refuses_courses():
+    asked = {"profile_time": [0.0, 0.1], "load_profile": [0.5, 1.0]}
+    with pytest.raises(
+        InputError, match=r"\[profiles\]: expected none: growth is that about one steady state"
+    ):
+        growth.load("jobs/lebrecht_2004.toml", asked)
+
+
+def test_a_course_may_lead_beyond_what_a_belt_carries_but_not_begin_there():
+    course = {"load": 480.0, "profile_time": (0.0, 0.1)}
+    job(**course, load_profile=(0.2, 1.0)).point(0)
+    with pytest.raises(InputError, match="load: expected at most"):
+        job(**course, load_profile=(1.0, 0.2)).point(0)

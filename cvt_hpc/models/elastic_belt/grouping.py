@@ -9,6 +9,7 @@ from cvt_hpc.models.elastic_belt import OWN_STEPPERS
 from cvt_hpc.models.elastic_belt.deflection_settings import MODE_KEYS, RITZ
 from cvt_hpc.models.elastic_belt.pulley_settings import are_free
 from cvt_hpc.models.elastic_belt.tilt_settings import elements_tilt
+from cvt_hpc.variator.course import profile_table
 from cvt_hpc.variator.measures import measures, rounded
 
 # Core-seconds per station and time step of a batch, measured on one core of an EPYC (Zen 5) at 160 stations.
@@ -35,10 +36,6 @@ SHARED = (
     "start_damping",
     "load_history",
     "speed_history",
-    "profile_time",
-    "load_profile",
-    "driving_speed_profile",
-    "thrust_profile",
     "duration",
     "judged_fraction",
     "sampling_rate",
@@ -90,4 +87,5 @@ def lane_key(parameters: Mapping[str, Any]) -> tuple:
     """Values that two runs must have in common to be in one batch."""
     alike = (parameters[key] for key in SHARED if key in parameters)
     common = parameters["friction_memory"] > 0.0, are_free(parameters), faded_coupling(parameters)
-    return (*alike, *common, elements_tilt(parameters))
+    course = profile_table(parameters).tobytes()
+    return (*alike, *common, elements_tilt(parameters), course)

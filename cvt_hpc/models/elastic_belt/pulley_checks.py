@@ -11,6 +11,7 @@ from cvt_hpc.physics.friction_laws import largest_friction
 from cvt_hpc.physics.geometry import variator, variator_problems
 from cvt_hpc.physics.sheaves import axial_element_stiffness, stiffness_factors
 from cvt_hpc.variator import LARGEST_DISPLACEMENT, MOST_SPEED, PULLEYS
+from cvt_hpc.variator.profiles import multiple
 
 Problem = tuple[str, str, str]  # key, expected, found
 
@@ -90,19 +91,20 @@ def overload_problems(parameters: Mapping[str, Any]) -> list[Problem]:
 
     By `capacity.torque_limit` with the largest coefficient of friction, and ABOVE: a bound on the moment of
     each pulley's flanks, whatever the belt does. Near it a belt slips through long since, which is a result.
-    A ramp may end there, and shows where the belt slips; its start may not lie there.
+    A ramp or a profile may lead there, and shows where the belt slips; its start may not lie there.
     """
     p = settings.PULLEY_DEFAULTS | dict(parameters)
     key = "load_start" if p.get("load_history") == "ramp" else "load"
+    load = p[key] * multiple(p, "load", 0.0)
     mu, radius = largest_friction(p), p["driven_radius"] / p["ratio"]
     for pulley, force in _most_axial_force(p).items():
         most = ABOVE * capacity.torque_limit(mu, force, radius, p["half_wedge_angle"])
-        if abs(p[key]) > most:
+        if abs(load) > most:
             expected = (
                 f"at most {most:.4g} N m in size, {ABOVE:g} times what the {pulley} pulley carries under "
                 f"{force * 1e-3:.4g} kN by its largest coefficient of friction, {mu:.3g}"
             )
-            return [(key, expected, f"{p[key]:g} N m")]
+            return [(key, expected, f"{load:g} N m")]
     return []
 
 
@@ -166,6 +168,8 @@ def _drive_problems(p: Mapping[str, Any]) -> list[Problem]:
         return [("driven_inertia", "finite, or a finite driving_inertia: one speed follows", "both inf")]
     if p.get("speed_history") == "ramp" and has_given != [True, False]:
         return [("speed_history", "constant where the driving pulley's speed is not given", "ramp")]
+    if p.get("driving_speed_profile") and has_given != [True, False]:
+        return [("driving_speed_profile", "none where the driving pulley's speed is not given", "one")]
     return []
 
 

@@ -257,7 +257,8 @@ class OneLaneRun(RecordedRun):
         self._lane_belt = lane_belt([belt], np.float64)
         self._state = lane_state([belt], [first], np.float64)
         self._stations = LaneArray(self.mesh.cell.size, lf.FIELDS_OF_FORCES, 1)
-        self._sample, self._audit_layers = called_alike(sample_state), called_alike(lane_rings.audit_layers)
+        self._take_sample = called_alike(sample_state)
+        self._audit_layers = called_alike(lane_rings.audit_layers)
 
     @property
     def layer_sums(self) -> np.ndarray | None:
@@ -282,7 +283,7 @@ class OneLaneRun(RecordedRun):
         layer_sums = self._layer_sums[int(self.done >= self._plan.first_judged)]
         with self._records.profiles_of(self.done) as profiles:
             samples = sampling.Samples(self._plan.sensing, self._rows, profiles, self._records.ended)
-            self._sample(self._lane_belt, self._state, self._stations, samples, self.done)
+            self._take_sample(self._lane_belt, self._state, self._stations, samples, self.done)
             if layer_count(self.parameters) > 1:
                 of_layers = self._lane_belt, self._rings, self._state, self._layers
                 self._audit_layers(*of_layers, samples, self.done, layer_sums)
