@@ -271,7 +271,8 @@ def changing_of(history: xr.Dataset) -> str | None:
     first = int(np.searchsorted(history["time"].values, start_up(history)))
     courses = {name: history[name].values[first:] for name in COURSES if name in history}
     ramped = (name for name, values in courses.items() if _is_ramp(values))
-    other = "time" if any(_change(values) > LEAST_CHANGE for values in courses.values()) else None
+    has_profiles = bool(json.loads(history.attrs.get("point", "{}")).get("profile_time"))
+    other = "time" if has_profiles or any(_change(v) > LEAST_CHANGE for v in courses.values()) else None
     return next(ramped, other)
 
 

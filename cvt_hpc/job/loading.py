@@ -155,7 +155,7 @@ def rebuild_job(
     given = {key: value for key, value in tables.items() if key not in gone} | replaced
     files = {key: name for key, name in given.items() if name and schema.parameters[key].file}
     contents |= _contents({key: name for key, name in given.items() if key not in contents}, schema, source)
-    given = _with_files(given, contents, schema, source)
+    given = _with_files(given, contents, document.get("axes", {}), schema, source)
     axes, rules = _read_axes_and_rules(document, scatters, design, gone, put_axes, given, schema, source)
     check_samples(rules, axes)
     for entry in written.values():
@@ -215,14 +215,20 @@ def _contents(given: Parameters, schema: Schema, source: str) -> dict[str, Point
     return found
 
 
-def _with_files(given: Parameters, contents: Mapping[str, Point], schema: Schema, source: str) -> Point:
-    """Return given values, with the contents of files instead of their names."""
+def _with_files(
+    given: Parameters, contents: Mapping[str, Point], axes: Table, schema: Schema, source: str
+) -> Point:
+    """Return given values, with the contents of files instead of their names; no axis may give the same."""
     found = {key: value for key, value in given.items() if key not in contents}
     for key, content in contents.items():
+        where = f"{source}: [{schema.section_of[key]}] {key}"
         for one in content:
             if one in found:
-                where = f"{source}: [{schema.section_of[key]}] {key}"
                 raise mismatch(where, f"either {key} or {one}", "both")
+        for one in (*found, *axes):
+            declared = schema.parameters.get(one)
+            if declared is not None and declared.gives is not None and declared.gives.key in content:
+                raise mismatch(where, f"either {key}, which gives {declared.gives.key}, or {one}", "both")
         found |= content
     return found
 

@@ -336,3 +336,8 @@ def test_a_course_may_lead_beyond_what_a_belt_carries_but_not_begin_there():
     job(**course, load_profile=(0.2, 1.0)).point(0)
     with pytest.raises(InputError, match="load: expected at most"):
         job(**course, load_profile=(1.0, 0.2)).point(0)
+
+
+def test_a_share_of_the_torque_and_a_measured_torque_are_not_both_given(tmp_path):
+    with pytest.raises(InputError, match="either profile_file, which gives load, or load_share, found both"):
+        course_job(tmp_path, "time [s],load [N m]\n0,1\n0.1,2\n", axes={"load_share": [0.2, 0.4]})
