@@ -25,6 +25,7 @@ MAT, MDF = ".mat", ".mf4"
 UNIT = "_unit"  # of the name of a text beside a signal
 _HDF5 = b"\x89HDF\r\n\x1a\n"
 _MOST_NAMED = 8
+_FORMULAS = (3, 10)  # kinds of conversion in MDF 4, and in versions before
 Signal = tuple[str, np.ndarray, str]  # name, values (n,), unit
 
 
@@ -35,16 +36,7 @@ def read_signals(file: FromFile, name: str, source: str, where: str) -> Point:
     signals of an MDF4 file count where all have values, linear between their own times. A warning states how
     the file was read, and which of its signals do not count.
 
-    Parameters
-    ----------
-    file, name, source, where
-        As of `csv_files.read_csv`.
-
-    Raises
-    ------
-    InputError
-        If the file is missing, a link, no regular file, too large or of another kind, if the library that
-        reads it is missing, or if a signal is not legal.
+    Arguments and errors are as of `csv_files.read_csv`; InputError also where the library is missing.
     """
     path = Path(source).parent / name
     place = f"{where}: {path}"
@@ -114,19 +106,22 @@ def _of_mdf(file: FromFile, content: bytes, place: str) -> Iterator[Signal]:
         raise mismatch(place, "asammdf, which reads MDF4 files", "no such package", then) from None
     try:
         with asammdf.MDF(io.BytesIO(content)) as measured:
-            signals = {
-                (name, number): measured.get(name, group=group, index=index)
-                for name, places in measured.channels_db.items()
-                for number, (group, index) in enumerate(places)
-                if named_column(file, name) not in (None, "time")
-            }
-            found = [
-                (name, np.asarray(one.timestamps, float), np.asarray(one.samples), str(one.unit))
-                for (name, _), one in signals.items()
-            ]
-            others = [name for name in measured.channels_db if named_column(file, name) is None]
+            known = {name: named_column(file, name) for name in measured.channels_db}
+            others = [name for name, key in known.items() if key is None]
+            found, calculated = [], []
+            for name in (name for name, key in known.items() if key not in (None, "time")):
+                for group, index in measured.channels_db[name]:
+                    rule = measured.get_channel_metadata(group=group, index=index).conversion
+                    if rule is not None and rule.conversion_type in _FORMULAS:
+                        calculated.append(name)
+                        continue
+                    one = measured.get(name, group=group, index=index)
+                    times = np.asarray(one.timestamps, float)
+                    found.append((name, times, np.asarray(one.samples), str(one.unit)))
     except Exception as error:  # a foreign file may raise anything in that library
         raise mismatch(place, "an MDF4 file", str(error) or type(error).__name__) from None
+    if calculated:  # a text of the file that would be evaluated
+        raise mismatch(f"{place}: {calculated[0]}", "stored values, or a straight line of them", "a formula")
     yield from _over_one_time(found, place)
     for name in others:
         yield name, np.empty(0), ""

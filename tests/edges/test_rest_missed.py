@@ -10,15 +10,8 @@ import pytest
 
 from cvt_hpc.models.oscillator.exact import exact
 from cvt_hpc.models.oscillator.motion import oscillator
-from cvt_hpc.models.oscillator.transient import (
-    HELD,
-    LET_GO,
-    Transient,
-    batch,
-    peak,
-    wrongly_held,
-    wrongly_stuck,
-)
+from cvt_hpc.models.oscillator.rest import HELD, LET_GO, peak, wrongly_held, wrongly_stuck
+from cvt_hpc.models.oscillator.transient import Transient, batch
 from cvt_hpc.physics.friction_laws import FRICTION_LAWS
 from cvt_hpc.variables import Status
 from support.small_systems import FACTS, begin, bisect, finished, scene

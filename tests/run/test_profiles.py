@@ -300,6 +300,18 @@ def test_signals_that_do_not_go_together_are_one_error(tmp_path, of_speed, expec
         mdf_point(tmp_path, signals, {"Torque": REGULAR_TIMES, "Speed": of_speed})
 
 
+def test_a_formula_of_a_measured_file_is_not_evaluated(tmp_path):
+    asammdf = pytest.importorskip("asammdf")
+    with asammdf.MDF(version="4.10") as measured:
+        formula = {"formula": "X1 * 2"}
+        told = {"timestamps": REGULAR_TIMES, "name": "Torque", "unit": "N m", "conversion": formula}
+        measured.append(asammdf.Signal(np.arange(50), **told))
+        measured.save(tmp_path / "rig.mf4")
+    document = {"name": "course", "model": "elastic_belt", "profiles": {"profile_file": "rig.mf4"}}
+    with pytest.raises(InputError, match="Torque: expected stored values, .* found a formula"):
+        build_job(document, str(tmp_path / "course.toml"))
+
+
 def test_turns_a_minute_are_read_in_each_of_their_spellings(tmp_path):
     for unit in ("1/min", "U/min", "min-1", "min^-1", "rev/min", "RPM", "rpm"):
         text = f"time [s],driving_speed [{unit}]\n0,2900\n0.1,3000\n"

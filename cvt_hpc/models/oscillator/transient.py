@@ -1,29 +1,10 @@
-"""A transient run of the oscillator.
-
-Whether a method silences a vibration that friction drives: small swings about steady sliding.
-
-At the belt's speed v the mass can slide steadily. There a friction that falls by (N mu)' < 0 drives small
-swings at the rate s = -(c + (N mu)') / (2 m). A method whose damping is stronger turns their growth into
-decay, whatever the order, and a run by it is silent where the model vibrates.
-
-Whether a run has the model's friction at rest: limits of step and tolerance, and checks of the samples.
-
-Smoothed friction N mu over the sliding speed s = v_belt - x' rises to a peak and falls beyond. With the pull
-p = k x + c x' - P of the spring, m s' = p - N mu(s): a mass that slides slower than at the peak passes it
-only while the pull exceeds friction there, and has to once it does. With N = N_0 - n x that is p + n
-mu_peak x against N_0 mu_peak. It holds for the model's own motion whatever the stepper; a run that breaks
-it shows a stick-slip that friction does not make.
-
-Friction as it is has no peak and no width: the mass sticks, s = 0, as long as |p| <= N mu at rest, and not
-longer. Moreau's steps compare the two in their middle, so a mass that sticks over an interval is held rightly
-if it is in the middle of the first step and of the last.
-"""
+"""Transient runs of the oscillator, alone by any stepper or together by `moreau`."""
 
 from __future__ import annotations
 
 from collections.abc import Mapping, Sequence
 from functools import cached_property
-from typing import Any, NamedTuple
+from typing import Any
 
 import numpy as np
 
@@ -31,21 +12,19 @@ from cvt_hpc.kernels import kernel
 from cvt_hpc.models.marched import MarchedRun, Probe, batches_of_one
 from cvt_hpc.models.oscillator import motion
 from cvt_hpc.models.oscillator.lanes import ENDED, Lane, Lanes, march
-from cvt_hpc.physics.friction import friction_coefficient
+from cvt_hpc.models.oscillator.rest import (
+    REASONS,
+    REST,
+    peak,
+    rest_missed,
+    stuck_wrongly,
+    wrongly_held,
+    wrongly_stuck,
+)
+from cvt_hpc.models.oscillator.swing import Swing, silenced, swing_of
 from cvt_hpc.recording import sample_count, steps_per_sample
-from cvt_hpc.steppers.facts import OK, STEPS, Facts, Result
-from cvt_hpc.steppers.marching import Marching
-from cvt_hpc.steppers.system import SetValuedSystem, System
+from cvt_hpc.steppers.facts import OK, STEPS, Result
 from cvt_hpc.variables import Status
-
-LET_GO = "the mass was let go while friction at rest still holds it"
-HELD = "the mass was held against a pull beyond friction at rest"
-REASONS = None, LET_GO, HELD
-REST = 1e-9  # of the mass' largest speed: sliding that rounding may leave while friction holds
-# Of the search for the peak, in units of v_reg; it is found within 1e-6
-REACH, POINTS = 2.0 * motion.HUMP, 2401
-
-SMALL = 1e-3  # of the belt's speed: the swing, within which friction is a straight line
 
 CHANNELS = ("speed",)
 
@@ -131,268 +110,6 @@ class Transient(MarchedRun):
     def channel(self, name: str) -> np.ndarray:
         """History of one of CHANNELS, (done,): speed of the mass [m/s]."""
         return self.rows[: self.done, {"speed": motion.V}[name]]
-
-
-def silenced(
-    o: motion.Oscillator,
-    system: System | SetValuedSystem,
-    stepper: str,
-    parameters: Mapping[str, Any],
-    interval: float,
-) -> str | None:
-    """Decide whether a method damps small swings about steady sliding that friction drives.
-
-    Parameters
-    ----------
-    o : Oscillator
-        Constants.
-    system : System or SetValuedSystem
-        Its equations, as the stepper needs them.
-    stepper : str
-        One with a fixed step.
-    parameters : mapping
-        Resolved parameters of the run [SI].
-    interval : float
-        Sampling interval [s].
-
-    Returns
-    -------
-    str or None
-        The reason, where it does.
-    """
-    swing = Swing(*swing_of(o, isinstance(system, SetValuedSystem)))
-    if not swing.is_driven:
-        return None
-    rows = np.empty((swing.samples(interval), 2))
-    if Marching(stepper, parameters, system, swing.start(o.belt_speed), interval).advance(rows) != Result.OK:
-        return None  # the run itself will report it
-    return swing.silenced(rows[0], rows[-1], interval)
-
-
-class Swing(NamedTuple):
-    """Small swings about steady sliding.
-
-    Attributes
-    ----------
-    growth, frequency : float
-        Growth rate [1/s] and frequency [rad/s]; of a belt at rest no numbers.
-    rest : float
-        Displacement in steady sliding [m].
-    """
-
-    growth: float
-    frequency: float
-    rest: float
-
-    @property
-    def is_driven(self) -> bool:
-        """Whether friction drives them."""
-        return 0.0 < self.growth < self.frequency
-
-    def samples(self, interval: float) -> int:
-        """Return how many samples are a period and more."""
-        return int(np.ceil(2.0 * np.pi / self.frequency / interval)) + 1
-
-    def start(self, belt_speed: float) -> np.ndarray:
-        """Return a state from which such a swing begins, displacement [m] and speed [m/s]."""
-        return np.array([self.rest + SMALL * belt_speed / self.frequency, 0.0])
-
-    def silenced(self, first: np.ndarray, last: np.ndarray, interval: float) -> str | None:
-        """Return the reason, where the swing does not grow from the first to the last of its samples."""
-        true = self.growth
-        away, speed = np.array([first, last]).T - [[self.rest], [0.0]]
-        # exp(2 s t) without ripple, for swings that grow at the rate s
-        energy = (speed - true * away) ** 2 + (self.frequency**2 - true**2) * away**2
-        found = 0.5 * np.log(energy[1] / energy[0]) / (interval * (self.samples(interval) - 1))
-        if found > 0.0:
-            return None
-        return f"the step damps, at {-found:.3g} 1/s, a vibration that friction drives at {true:.3g} 1/s"
-
-
-@kernel
-def swing_of(o: motion.Oscillator, is_set_valued: bool) -> tuple[float, float, float]:
-    """Numbers of a `Swing`."""
-    load, v = motion.normal_load(o, motion.about_sliding(o)[0]), o.belt_speed
-    if is_set_valued:
-        slower = friction_coefficient(o.law, v * (1.0 - SMALL), load)[0]
-        mu = friction_coefficient(o.law, v, load)[0]
-        faster = friction_coefficient(o.law, v * (1.0 + SMALL), load)[0]
-    else:
-        slower = motion.regularised_friction(o, v * (1.0 - SMALL), load) / load
-        mu = motion.regularised_friction(o, v, load) / load
-        faster = motion.regularised_friction(o, v * (1.0 + SMALL), load) / load
-    growth = -0.5 * (o.damping + load * (faster - slower) / (2.0 * SMALL * v)) / o.mass
-    stiffness = o.stiffness + o.normal_stiffness * mu
-    return growth, np.sqrt(max(stiffness, 0.0) / o.mass), (o.preload + o.normal_load * mu) / stiffness
-
-
-class Peak(NamedTuple):
-    """Largest friction: where over the sliding speed [m/s], and its coefficient [1]."""
-
-    sliding: float
-    mu: float
-
-
-def rest_missed(
-    o: motion.Oscillator, facts: Facts, step: float, allowed: float, rows: np.ndarray
-) -> str | None:
-    """Decide whether the mass comes within a step of rest, by a step or tolerance too coarse to find it.
-
-    Beyond the limit of the step, friction chatters instead of bringing the mass to rest: the speed jumps
-    over the belt's in every step, by up to step N mu / m. Beyond that of the tolerance, errors of the speed
-    hide the width over which friction changes its sign.
-
-    Parameters
-    ----------
-    o : Oscillator
-        Constants.
-    facts : Facts
-        Of the method.
-    step : float
-        Mean step [s].
-    allowed : float
-        Error of the speed that the tolerance of an adaptive method allows [m/s].
-    rows : (n, 2) array
-        Displacement [m] and speed [m/s] at samples.
-
-    Returns
-    -------
-    str or None
-        The reason, where it does.
-    """
-    longest = facts.rest_limit / motion.largest_rate(o)
-    coarse = allowed / (facts.width_limit * o.width)
-    if (coarse <= 1.0 if facts.adaptive else step <= longest) or not np.any(
-        np.abs(o.belt_speed - rows[:, motion.V]) < step * motion.friction_at_rest(o) / o.mass
-    ):
-        return None
-    if facts.adaptive:
-        return (
-            f"the tolerance is {coarse:.3g} times that with which smoothed friction brings the mass to rest"
-        )
-    chatter = "from where friction chatters instead of letting the mass stick"
-    return f"the step is beyond {longest:.3g} s, {chatter}"
-
-
-def peak(o: motion.Oscillator) -> Peak | None:
-    """Find the peak of smoothed friction; None where there is none or it moves with the load."""
-    if _moves_with_load(o):
-        return None
-    sliding = np.linspace(0.0, REACH * o.width, POINTS)
-    mu = motion.regularised_frictions(o, sliding, np.full(POINTS, o.normal_load)) / o.normal_load
-    top = int(mu.argmax())
-    return Peak(float(sliding[top]), float(mu[top])) if top < POINTS - 1 else None
-
-
-def wrongly_held(o: motion.Oscillator, peak: Peak | None, rows: np.ndarray, interval: float) -> str | None:
-    """Decide whether smoothed friction released the mass where it holds, or held it against a larger pull.
-
-    Parameters
-    ----------
-    o : Oscillator
-        Constants.
-    peak : Peak or None
-        Its largest friction.
-    rows : (n, 2) array
-        Displacement [m] and speed [m/s] at samples that follow each other.
-    interval : float
-        Sampling interval [s].
-
-    Returns
-    -------
-    str or None
-        The reason, where it was.
-    """
-    if peak is None or len(rows) < 2:
-        return None
-    x, sliding = rows[:, motion.X], o.belt_speed - rows[:, motion.V]
-    pull = o.stiffness * x + o.damping * rows[:, motion.V] - o.preload
-    slow = (sliding >= 0.0) & (sliding < peak.sliding) & (pull >= 0.0)
-    pull, holds = pull + o.normal_stiffness * peak.mu * x, o.normal_load * peak.mu
-    # as long as it slides slowly it goes no faster than the belt, and so does the pull
-    rise = max(o.stiffness + o.normal_stiffness * peak.mu, 0.0) * o.belt_speed
-    largest = pull[:-1] + o.damping * sliding[:-1] + rise * interval
-    if np.any(slow[:-1] & (sliding[1:] > peak.sliding) & (largest < holds)):
-        return LET_GO
-    # Pulled by more than the peak for so long, it has gained the difference in speed: over the peak
-    excess = np.maximum(pull[1:] - holds, 0.0)
-    since = np.minimum(excess / rise, interval) if rise > 0.0 else np.full(excess.size, interval)
-    gained = (excess - 0.5 * rise * since) * since / o.mass
-    if np.any(slow[:-1] & slow[1:] & (gained > peak.sliding)):
-        return HELD
-    return None
-
-
-def wrongly_stuck(
-    o: motion.Oscillator, rows: np.ndarray, interval: float, step: float, rounding: float
-) -> str | None:
-    """Decide whether friction as it is released the mass where it holds, or held it against a larger pull.
-
-    Parameters
-    ----------
-    o : Oscillator
-        Constants.
-    rows : (n, 2) array
-        Displacement [m] and speed [m/s] at samples that follow each other.
-    interval, step : float
-        Sampling interval, and the step of Moreau's method, a part of it [s].
-    rounding : float
-        Sliding up to which the mass counts as sticking [m/s].
-
-    Returns
-    -------
-    str or None
-        The reason, where it was.
-    """
-    return REASONS[stuck_wrongly(o, rows, interval, step, rounding)]
-
-
-@kernel
-def stuck_wrongly(
-    o: motion.Oscillator, rows: np.ndarray, interval: float, step: float, rounding: float
-) -> int:
-    """Place in REASONS of what `wrongly_stuck` returns."""
-    any_stuck, farthest = False, 0.0
-    for i in range(len(rows)):
-        farthest = max(farthest, abs(rows[i, motion.X]))
-        any_stuck |= i + 1 < len(rows) and abs(o.belt_speed - rows[i, motion.V]) <= rounding
-    if not any_stuck:
-        return 0
-    way, half = o.belt_speed * interval, 0.5 * o.belt_speed * step
-    # sliding counts as sticking, by which friction differs, and a mass let go, until it is faster
-    slope = friction_coefficient(o.law, 0.0, o.normal_load)[1]
-    unseen = np.sqrt(2.0 * o.mass * o.stiffness * o.belt_speed * rounding)
-    unseen += REST * (o.stiffness * farthest + motion.friction_at_rest(o))
-    unseen += 2.0 * (o.damping + o.normal_load * abs(slope)) * rounding
-    # Carried by the belt through the whole interval it would be held at its end, too. Where a table's
-    # friction moves with the load, it could be let go between.
-    moves = _moves_with_load(o)
-    reason = 0
-    for i in range(len(rows) - 1):
-        if not abs(o.belt_speed - rows[i, motion.V]) <= rounding:
-            continue
-        x, later = rows[i, motion.X], rows[i + 1, motion.X]
-        if abs(o.belt_speed - rows[i + 1, motion.V]) <= rounding:
-            carried = abs(later - x - way) <= REST * (farthest + way)
-            if carried and max(_beyond_rest(o, x + half), _beyond_rest(o, later - half)) > unseen:
-                return 2
-        elif not moves and max(_beyond_rest(o, x), _beyond_rest(o, x + way)) < -unseen:
-            reason = 1
-    return reason
-
-
-@kernel
-def _beyond_rest(o: motion.Oscillator, x: float) -> float:
-    """Pull of the spring less the friction that holds the mass where it sticks [N]."""
-    load = motion.normal_load(o, x)
-    mu = friction_coefficient(o.law, 0.0, load)[0]
-    return abs(o.stiffness * x + o.damping * o.belt_speed - o.preload) - load * (mu + o.excess)
-
-
-@kernel
-def _moves_with_load(o: motion.Oscillator) -> bool:
-    """Whether the coefficient of friction changes with the displacement."""
-    return o.normal_stiffness != 0.0 and o.law.table_force.size > 1
 
 
 class LaneRun(Transient):
