@@ -21,6 +21,7 @@ from cvt_hpc.job.values import JOB_UNITS, POINT_UNITS, shown
 from cvt_hpc.variables import Status, Vibrates, flag_in_words, shortened
 from cvt_hpc.vibration import settings as vibration_settings
 from cvt_hpc.vibration.peaks import fundamental
+from cvt_hpc.vibration.ramped import ramped
 
 LONGEST_REASON = 120  # letters, in the title: one or two strands
 
@@ -44,7 +45,7 @@ def history_figure(dataset: xr.Dataset, source: str = "history") -> Figure:
     """
     dataset = standard(dataset, source)
     settings, band = settings_of(dataset)
-    judged = settings["judged_fraction"] if _is_judged(dataset) else 0.0
+    judged = _judged_share(dataset, settings) if _is_judged(dataset) else 0.0
     strands = panels.read_strands(dataset, judged, band)
     with_spectrum = [strand for strand in strands if strand.has_spectrum]
     rows: list[tuple[float, list[tuple[Any, Callable[..., None], Any]]]] = [
@@ -94,7 +95,7 @@ def phase_figure(dataset: xr.Dataset, source: str = "history") -> Figure:
     Arguments as of all pictures of runs (`figures.py`), with `displacement` (time, probe) [m].
     """
     settings, band = settings_of(dataset)
-    judged = settings["judged_fraction"] if _is_judged(dataset) else 0.5
+    judged = _judged_share(dataset, settings) if _is_judged(dataset) else 0.5
     strands = [one for one in panels.read_strands(dataset, judged, band) if one.has_spectrum]
     if not strands:
         raise mismatch(source, "the history of a run with the motion of strands in its last part", "none")
@@ -134,6 +135,14 @@ def _above(motion: np.ndarray, rate: float, lowest: float) -> tuple[np.ndarray, 
 def _changes(dataset: xr.Dataset, name: str) -> bool:
     """Whether a quantity has a history, and is not the same all along."""
     return name in dataset and "time" in dataset[name].dims and bool(np.ptp(dataset[name].values) > 0)
+
+
+def _judged_share(dataset: xr.Dataset, settings: Mapping[str, float]) -> float:
+    """Share of a run that is judged: of one that changes all along, what follows its start-up."""
+    point = {**settings, **json.loads(dataset.attrs.get("point", "{}"))}
+    if "duration" in point and ramped(point):
+        return 1.0 - float(point.get("rise_time", 0.0)) / float(point["duration"])
+    return settings["judged_fraction"]
 
 
 def _is_judged(dataset: xr.Dataset) -> bool:

@@ -10,6 +10,7 @@ import numpy as np
 import pytest
 import xarray as xr
 
+from cvt_hpc.analysis import histories
 from cvt_hpc.analysis.figures import balanced
 from cvt_hpc.analysis.histories import draw_history, history_figure, phase_figure
 from cvt_hpc.analysis.history_panels import read_strands
@@ -377,3 +378,18 @@ def test_probes_are_grouped_by_strand():
     t1, t2 = read_strands(run(), 0.5, BAND)
     assert t1.probes + t2.probes == PROBES
     assert (t1.rate, t1.strongest, t2.name) == (pytest.approx(RATE), 0, "t2")
+
+
+@pytest.mark.parametrize(
+    ("course", "share"),
+    [
+        ({}, 0.4),
+        ({"load_history": "ramp"}, 0.9),
+        ({"profile_time": [0.0, 0.25]}, 0.9),
+        ({"profile_time": [0.0, 0.15]}, 0.4),  # constant from there on
+    ],
+)
+def test_the_judged_part_of_a_run_that_changes_all_along_follows_its_start_up(course, share):
+    point = {"duration": 0.3, "rise_time": 0.03, "judged_fraction": 0.4} | course
+    run = xr.Dataset(attrs={"point": json.dumps(point)})
+    assert histories._judged_share(run, {"judged_fraction": 0.4}) == pytest.approx(share)
