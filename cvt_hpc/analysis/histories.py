@@ -140,6 +140,7 @@ def _changes(dataset: xr.Dataset, name: str) -> bool:
 def _judged_share(dataset: xr.Dataset, settings: Mapping[str, float]) -> float:
     """Share of a run that is judged: of one that changes all along, what follows its start-up."""
     point = {**settings, **json.loads(dataset.attrs.get("point", "{}"))}
+    point = {key: tuple(value) if isinstance(value, list) else value for key, value in point.items()}
     if "duration" in point and ramped(point):
         return 1.0 - float(point.get("rise_time", 0.0)) / float(point["duration"])
     return settings["judged_fraction"]

@@ -384,6 +384,7 @@ def test_probes_are_grouped_by_strand():
     ("course", "share"),
     [
         ({}, 0.4),
+        ({"profile_time": []}, 0.4),
         ({"load_history": "ramp"}, 0.9),
         ({"profile_time": [0.0, 0.25]}, 0.9),
         ({"profile_time": [0.0, 0.15]}, 0.4),  # constant from there on
