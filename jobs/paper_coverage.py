@@ -35,11 +35,11 @@ they state: first all of each paper, then each figure whose statements are kept 
 
 Made by `python jobs/paper_coverage.py docs/coverage.md` from `docs/coverage.toml` and from the tables in
 `jobs/results`. A row is measured where columns of these tables, or statements of a figure, decide at least
-a part of it. It is reproduced where all parts hold, partly where some do. Numbers are "older" where their
-table is older than the code, by its first lines. "Figure `NAME`" is `cvt-hpc run JOB && cvt-hpc figure
-out/NAME`, where JOB is `jobs/figures/NAME.toml` or `jobs/NAME.toml`; it leaves `figure.png` and
-`statements.csv`. The papers' pictures have no data here: "reproduced" means every number and shape that the
-text states. What they do not give is assumed, as each job says. All figures of Lebrecht et al. are of one
+a part of it, and tested where none do and a test of the suite, which it names, holds what it states. It is
+reproduced where all parts hold, partly where some do. Numbers are "older" where their table is older than
+the code, by its first lines. "Figure `NAME`" is `cvt-hpc run JOB && cvt-hpc figure out/NAME`, where JOB is
+`jobs/figures/NAME.toml` or `jobs/NAME.toml`; it leaves `figure.png` and `statements.csv`. The papers'
+pictures have no data here: "reproduced" means every number and shape that the text states. What they do not give is assumed, as each job says. All figures of Lebrecht et al. are of one
 set, that of `jobs/lebrecht_2004.toml`, seven values of which were fitted to what they state.
 """
 REPRODUCED, PARTLY, NOT = "reproduced", "partly", "not"
@@ -96,7 +96,8 @@ def measured(part):
     if "beside" in part:
         values = values / found(part["beside"])
     if not values.size or not np.isfinite(values).all():
-        raise ValueError(f"{part}: expected rows with numbers, found {values}")
+        numbers = np.isfinite(values).sum()
+        raise ValueError(f"{part}: expected rows with numbers, found {numbers} in {values.size} rows")
     if "course" in part:
         holds = (np.diff(values) * {"rises": 1.0, "falls": -1.0}[part["course"]] > 0.0).all()
         told = values[[0, -1]]
@@ -134,10 +135,18 @@ def settled(row):
     return "; ".join(numbers), verdict, "; ".join(dict.fromkeys(filter(None, why)))
 
 
-def counted(name, verdicts, by_tables):
+def evidence(row):
+    """What decides a row: tables, a test, or who reads it."""
+    if "measured" in row or "measures" in row:
+        return "measured"
+    return "tested" if "`pytest tests/" in row["command"] else "read"
+
+
+def counted(name, verdicts, decided):
     """A line of the table of counts."""
     numbers = [verdicts.count(verdict) for verdict in (REPRODUCED, PARTLY, NOT)]
-    return f"| {' | '.join(map(str, [name, len(verdicts), *numbers, by_tables]))} |"
+    numbers += [decided.count(way) for way in ("measured", "tested", "read")]
+    return f"| {' | '.join(map(str, [name, len(verdicts), *numbers]))} |"
 
 
 def lines():
@@ -145,22 +154,22 @@ def lines():
     with (HERE.parent / "docs" / "coverage.toml").open("rb") as source:
         rows = tomllib.load(source)["row"]
     yield HEAD
-    parts, verdicts, by_tables = {}, {}, {}
+    parts, verdicts, decided = {}, {}, {}
     for row in rows:
         letter = row["id"][0]
         gives, verdict, why = settled(row)
         verdicts.setdefault(letter, []).append(verdict)
-        by_tables[letter] = by_tables.get(letter, 0) + ("measured" in row or "measures" in row)
+        decided.setdefault(letter, []).append(evidence(row))
         reason = f"{verdict}: {why}" if why else verdict
         cells = row["id"], row["at"], row["states"], row["command"], gives, reason
         parts.setdefault(letter, []).append(f"| {' | '.join(cells)} |")
     figures = {path.stem: statements(path.stem) for path in sorted(FIGURES.glob("*.csv"))}
-    yield "| paper | rows | reproduced | partly | not | of them measured |\n|---|---|---|---|---|---|"
+    yield "| paper | rows | reproduced | partly | not | measured | tested | neither |\n" + "|---" * 8 + "|"
     for letter, paper in PAPERS.items():
-        yield counted(paper, verdicts[letter], by_tables[letter])
-    yield counted("all", sum(verdicts.values(), []), sum(by_tables.values()))
+        yield counted(paper, verdicts[letter], decided[letter])
+    yield counted("all", sum(verdicts.values(), []), sum(decided.values(), []))
     each = [entry["verdict"] for entries in figures.values() for entry in entries]
-    yield counted(f"statements of {len(figures)} figures", each, len(each)) + "\n"
+    yield counted(f"statements of {len(figures)} figures", each, ["measured"] * len(each)) + "\n"
     for letter, paper in PAPERS.items():
         yield f"## {paper}\n"
         yield "| | where | states | shown by | gives | verdict |\n|---|---|---|---|---|---|"
