@@ -39,8 +39,9 @@ a part of it, and tested where none do and a test of the suite, which it names, 
 reproduced where all parts hold, partly where some do. Numbers are "older" where their table is older than
 the code, by its first lines. "Figure `NAME`" is `cvt-hpc run JOB && cvt-hpc figure out/NAME`, where JOB is
 `jobs/figures/NAME.toml` or `jobs/NAME.toml`; it leaves `figure.png` and `statements.csv`. The papers'
-pictures have no data here: "reproduced" means every number and shape that the text states. What they do not give is assumed, as each job says. All figures of Lebrecht et al. are of one
-set, that of `jobs/lebrecht_2004.toml`, seven values of which were fitted to what they state.
+pictures have no data here: "reproduced" means every number and shape that the text states. What they do not
+give is assumed, as each job says. All figures of Lebrecht et al. are of one set, that of
+`jobs/lebrecht_2004.toml`, seven values of which were fitted to what they state.
 """
 REPRODUCED, PARTLY, NOT = "reproduced", "partly", "not"
 OLDER = " (older)"
