@@ -357,6 +357,8 @@ def made(table, work):
     if len(cells) < 2 or any(len(row) != len(cells[0]) for row in cells):
         return f"expected a table of whole rows, found {len(cells)} lines"
     *origin, head = lines[: len(lines) - len(cells) + 1]
+    begins = next((k for k, line in enumerate(origin) if line.startswith("# revision: ")), 0)
+    origin = origin[begins:] + origin[:begins]  # what else is told comes behind
     # of the commands of its runs, which name folders of here, the first place has what makes all of it
     ours = [k for k, line in enumerate(origin) if line.startswith("# command: ")]
     origin = [line for k, line in enumerate(origin) if k not in ours[1:]]

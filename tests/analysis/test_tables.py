@@ -40,7 +40,7 @@ def store(program, tmp_path, monkeypatch):
     results = tmp_path / "jobs" / "results"
     results.mkdir(parents=True)
     for name, last in (("small", ""), ("large", ""), ("broken", "echo no belt >&2; exit 3\n")):
-        lines = r"# revision: made\n# command: x\n# command: y\nload,core_seconds\n1,2\n"
+        lines = r"# in words\n# revision: made\n# command: x\n# command: y\nload,core_seconds\n1,2\n"
         (tmp_path / "jobs" / f"{name}.sh").write_text(f"# says\nprintf '{lines}' > $1\n{last}")
     git(tmp_path, "init", "-q")
     git(tmp_path, "add", ".")
@@ -151,8 +151,8 @@ def test_tables_are_made_the_cheapest_first_and_one_that_fails_stays_as_it_is(
     ]
     assert (results / "broken.csv").read_text() == broken
     *origin, head, row = (results / "small.csv").read_text().splitlines()
-    assert origin[:2] == ["# revision: made", "# made by: bash jobs/small.sh $TABLE"]
-    assert re.fullmatch(r"# cost: \d+ core-s, with compiling", origin[2]) and len(origin) == 3
+    assert origin[:3] == ["# revision: made", "# made by: bash jobs/small.sh $TABLE", "# in words"]
+    assert re.fullmatch(r"# cost: \d+ core-s, with compiling", origin[3]) and len(origin) == 4
     assert (head, row) == ("load,core_seconds", "1,2")
     assert sorted(path.name for path in results.iterdir()) == ["broken.csv", "large.csv", "small.csv"]
 
