@@ -83,7 +83,8 @@ def sobol_indices(values: xr.DataArray, along: str = "") -> xr.Dataset:
         is_known = np.isfinite(scores).all(axis=1, keepdims=True)
         known = np.where(is_known, scores, np.nan)[is_known.mean(axis=(1, 2)) >= _LEAST_KNOWN]
         found[place] = orders_with_bounds(known, np.random.default_rng(0))
-    dataset = xr.Dataset(coords={"parameter": parameters})
+    cells = {dim: ordered[dim] for dim in dims if dim in ordered.coords}
+    dataset = xr.Dataset(coords={**cells, "parameter": parameters})
     for k, order in enumerate(("first_order", "total_order")):
         for end, (suffix, words) in enumerate(_ENDS.items()):
             told = {"units": "1", "comment": f"Sobol index of {order.replace('_', ' ')}: {words}"}

@@ -341,6 +341,7 @@ def test_indices_of_the_onset_are_shares_of_its_variance_and_rows_pool_their_cel
     assert found["first_order"].values == pytest.approx(shares, abs=0.03)
     assert found["total_order"].values == pytest.approx(shares, abs=0.03)
     row, cells = dataset.cvt.indices(along="load"), dataset.cvt.indices()
+    assert cells["load"].equals(dataset["load"]) and "load" not in row.coords
     both = dataset["vibrates"].sel(swapped=["none", "all"]) == Vibrates.YES
     variance = both.astype(float).var(["sample", "swapped"])
     pooled = (cells["total_order"] * variance).sum("load") / variance.sum()
