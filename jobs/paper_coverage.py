@@ -36,14 +36,15 @@ they state: first all of each paper, then each figure whose statements are kept 
 Made by `python jobs/paper_coverage.py docs/coverage.md` from `docs/coverage.toml` and from the tables in
 `jobs/results`. A row is measured where columns of these tables, or statements of a figure, decide at least
 a part of it, and tested where none do and a test of the suite, which it names, holds what it states. It is
-reproduced where all parts hold, partly where some do. Numbers are "older" where their table is older than
-the code, by its first lines. "Figure `NAME`" is `cvt-hpc run JOB && cvt-hpc figure out/NAME`, where JOB is
+reproduced where all parts hold, partly where some do, not where the model gives something else, and missing
+where it has no counterpart or the text no number. Numbers are "older" where their table is older than the
+code, by its first lines. "Figure `NAME`" is `cvt-hpc run JOB && cvt-hpc figure out/NAME`, where JOB is
 `jobs/figures/NAME.toml` or `jobs/NAME.toml`; it leaves `figure.png` and `statements.csv`. The papers'
 pictures have no data here: "reproduced" means every number and shape that the text states. What they do not
 give is assumed, as each job says. All figures of Lebrecht et al. are of one set, that of
 `jobs/lebrecht_2004.toml`, seven values of which were fitted to what they state.
 """
-REPRODUCED, PARTLY, NOT = "reproduced", "partly", "not"
+REPRODUCED, PARTLY, NOT, MISSING = "reproduced", "partly", "not", "missing"
 OLDER = " (older)"
 MANY = 6  # numbers, of which the least and the largest are told
 
@@ -115,7 +116,8 @@ def joined(verdicts):
     """The verdict on a row of several statements."""
     if all(verdict == REPRODUCED for verdict in verdicts):
         return REPRODUCED
-    return NOT if all(verdict == NOT for verdict in verdicts) else PARTLY
+    unlike = set(verdicts) - {NOT}
+    return NOT if not unlike else MISSING if unlike == {MISSING} else PARTLY
 
 
 def settled(row):
@@ -145,7 +147,7 @@ def evidence(row):
 
 def counted(name, verdicts, decided):
     """A line of the table of counts."""
-    numbers = [verdicts.count(verdict) for verdict in (REPRODUCED, PARTLY, NOT)]
+    numbers = [verdicts.count(verdict) for verdict in (REPRODUCED, PARTLY, NOT, MISSING)]
     numbers += [decided.count(way) for way in ("measured", "tested", "read")]
     return f"| {' | '.join(map(str, [name, len(verdicts), *numbers]))} |"
 
@@ -165,7 +167,11 @@ def lines():
         cells = row["id"], row["at"], row["states"], row["command"], gives, reason
         parts.setdefault(letter, []).append(f"| {' | '.join(cells)} |")
     figures = {path.stem: statements(path.stem) for path in sorted(FIGURES.glob("*.csv"))}
-    yield "| paper | rows | reproduced | partly | not | measured | tested | neither |\n" + "|---" * 8 + "|"
+    yield (
+        "| paper | rows | reproduced | partly | not | missing | measured | tested | neither |\n"
+        + "|---" * 9
+        + "|"
+    )
     for letter, paper in PAPERS.items():
         yield counted(paper, verdicts[letter], decided[letter])
     yield counted("all", sum(verdicts.values(), []), sum(decided.values(), []))

@@ -141,6 +141,8 @@ def test_parts_and_the_verdict_beside_them_make_that_of_the_row(table):
         ([holds, fails], {}, "partly"),
         ([fails], {}, "not"),
         ([holds], {"verdict": "not"}, "partly"),
+        ([], {"verdict": "missing"}, "missing"),
+        ([holds], {"verdict": "missing"}, "partly"),
     ):
         assert SETTLED({"measures": parts, "why": "so", **beside})[1] == verdict
 
@@ -150,5 +152,5 @@ def test_the_page_is_made_of_the_tables():
     assert "\n".join(PAGE["lines"]()) == page
     for letter, paper in PAGE["PAPERS"].items():
         found = [verdict for row in ROWS if row["id"][0] == letter for _, verdict, _ in [SETTLED(row)]]
-        counts = [found.count(verdict) for verdict in ("reproduced", "partly", "not")]
+        counts = [found.count(verdict) for verdict in ("reproduced", "partly", "not", "missing")]
         assert f"| {paper} | {len(found)} | {' | '.join(map(str, counts))} |" in page
