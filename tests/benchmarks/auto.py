@@ -4,7 +4,7 @@ python tests/benchmarks/auto.py out/against
 python tests/benchmarks/auto.py out/against --table jobs/results/auto.csv
 
 Does jobs/auto.toml four times: in full and by auto, each on the whole grid and along the boundaries alone. Runs of
-which the classes differ are done once more, for four times as long, to see who is right. Takes four minutes of
+which the classes differ are done once more, for four times as long, to see who is right. Takes 15 minutes of
 an idle core, and goes on where it was broken off.
 """
 
