@@ -60,9 +60,7 @@ class Dimension:
         entry = dict(entry)
         if not entry.pop("texts"):
             entry["values"] = [float(v) if isinstance(v, str) else v for v in entry["values"]]
-        fields: dict[str, Any] = {
-            key: tuple(value) if isinstance(value, list) else value for key, value in entry.items()
-        }
+        fields: dict[str, Any] = {key: tuple(v) if isinstance(v, list) else v for key, v in entry.items()}
         return cls(**fields)
 
 
@@ -93,17 +91,12 @@ def derived_coordinate(derived: Derived, job: Job) -> DerivedCoordinate:
     return DerivedCoordinate(**_common(derived, job), dims=dims, follows=derived.words)
 
 
-def _common(varied: Axis | Derived, job: Job) -> dict[str, Any]:
+def _common(varied: Axis | Derived, job: Job) -> Document:
     """Return the attributes of a coordinate that each has."""
     values = tuple(np.asarray(varied.values).tolist())
-    return {
-        "name": varied.name,
-        "values": values,
-        "units": "" if isinstance(values[0], str) else varied.unit or "1",
-        "long_name": varied.name.replace("_", " "),
-        "comment": varied.description,
-        "job_units": job.units.get(varied.name, ""),
-    }
+    units = "" if isinstance(values[0], str) else varied.unit or "1"
+    named = {"name": varied.name, "long_name": varied.name.replace("_", " "), "comment": varied.description}
+    return {**named, "values": values, "units": units, "job_units": job.units.get(varied.name, "")}
 
 
 @dataclass(frozen=True)
@@ -146,9 +139,8 @@ class Study(Runs):
     def place_in_words(self, index: int) -> str:
         """Return the axes' values of run `index` for people; "" without axes."""
         attributes = {axis.name: axis.attributes for axis in self.axes}
-        return ", ".join(
-            f"{name} = {shown(value, attributes[name])}" for name, value in self.place(index).items()
-        )
+        place = self.place(index).items()
+        return ", ".join(f"{name} = {shown(value, attributes[name])}" for name, value in place)
 
     @cached_property
     def _blank_row(self) -> np.ndarray:
