@@ -48,8 +48,7 @@ def read_netcdf(file: FromFile, name: str, source: str, where: str) -> Point:
     """
     path = Path(source).parent / name
     place = f"{where}: {path}"
-    content = content_of(path, MOST_BYTES, place, "a netCDF file", SUFFIX)
-    columns = _columns(file, content, place)
+    columns = _columns(file, content_of(path, MOST_BYTES, place, "a netCDF file", SUFFIX), place)
     rows = max(len(column.values) for column in columns.values())
     return arranged(file, columns, place, [f"entry {row}" for row in range(1, rows + 1)])
 
