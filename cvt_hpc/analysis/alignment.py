@@ -14,7 +14,7 @@ from cvt_hpc.analysis.scatter import is_sampled
 from cvt_hpc.errors import InputError, did_you_mean, mismatch
 from cvt_hpc.job import Job, stored_job
 from cvt_hpc.job.units import factor_to
-from cvt_hpc.job.values import JOB_UNITS, shown
+from cvt_hpc.job.values import JOB_UNITS, Document, shown
 from cvt_hpc.study.job_difference import flatten
 
 COMPARED = ("status", "vibrates", "amplitude", "frequency")  # beside what a model adds
@@ -63,7 +63,7 @@ def axes_of(dataset: xr.Dataset) -> list[str]:
     return list(map(str, dataset["status"].dims))
 
 
-def job_of(dataset: xr.Dataset) -> dict[str, Any]:
+def job_of(dataset: xr.Dataset) -> Document:
     """The resolved job that a dataset keeps in its attributes; empty where it keeps none."""
     return json.loads(dataset.attrs.get("job", "{}"))
 
@@ -116,8 +116,7 @@ def _on_common_grid(a: xr.Dataset, b: xr.Dataset, sources: tuple[str, str]) -> t
 def _at_common_samples(
     a: xr.Dataset, b: xr.Dataset, sources: tuple[str, str]
 ) -> tuple[xr.Dataset, xr.Dataset]:
-    names = axes_of(a)
-    keys = (zip(*(_keys(dataset[name]) for name in names), strict=True) for dataset in (a, b))
+    keys = (zip(*(_keys(dataset[name]) for name in axes_of(a)), strict=True) for dataset in (a, b))
     in_a, in_b = _common_places(*keys)
     if not in_a:
         raise mismatch(sources[1], f"samples at places of those of {sources[0]}", "none")

@@ -231,11 +231,10 @@ class End(NamedTuple):
 def ends_of_arcs(history: xr.Dataset) -> list[End]:
     """Inlet and outlet of both arcs, in the order of the path; places are those between two of `position`."""
     half = float(history["position"].values[0])
-    return [
-        End(f"{pulley} {end}", at - half, way)
-        for a, b, pulley in arcs(history)
-        for end, at, way in (("inlet", a, 1.0), ("outlet", b, -1.0))
-    ]
+    ends = []
+    for a, b, pulley in arcs(history):
+        ends += [End(f"{pulley} inlet", a - half, 1.0), End(f"{pulley} outlet", b - half, -1.0)]
+    return ends
 
 
 def alone(history: xr.Dataset, end: End) -> tuple[str, float]:

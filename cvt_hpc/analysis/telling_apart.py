@@ -13,8 +13,10 @@ from cvt_hpc.analysis.histories import place_of, values_of
 from cvt_hpc.errors import InputError, mismatch
 from cvt_hpc.storage.files import kind_of
 
+Histories = Sequence[xr.Dataset]
 
-def named(histories: Sequence[xr.Dataset], sources: Sequence[str] = ()) -> list[str]:
+
+def named(histories: Histories, sources: Sequence[str] = ()) -> list[str]:
     """Names of runs: where they are from, or else their numbers."""
     return list(sources) or [f"history {k + 1}" for k in range(len(histories))]
 

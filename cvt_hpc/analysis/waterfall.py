@@ -6,7 +6,6 @@ Names of lines stand in the margins where the lines leave the panel, clear of ri
 from collections.abc import Sequence
 from dataclasses import replace
 from operator import itemgetter
-from pathlib import Path
 from typing import Any, NamedTuple
 
 import numpy as np
@@ -20,7 +19,8 @@ from cvt_hpc.analysis import arrangement as layout
 from cvt_hpc.analysis import cells, figures
 from cvt_hpc.analysis.classes import WITHOUT_RESULT, axes_in_words, check_results, occurrence_classes
 from cvt_hpc.analysis.eigenfrequencies import along_axis
-from cvt_hpc.analysis.measured import FREQUENCY, Overlay, Side, put_legend, side_of
+from cvt_hpc.analysis.figures import Panels
+from cvt_hpc.analysis.measured import FREQUENCY, File, Overlay, Side, put_legend, side_of
 from cvt_hpc.errors import few_of, mismatch
 
 Array = NDArray[np.float64]
@@ -88,8 +88,7 @@ def _apart(placed: Sequence[tuple[float, Named]], gap: float, limits: tuple[floa
     at = np.sort([place for place, _ in placed])
     steps = gap * np.arange(at.size)
     at = np.maximum.accumulate(at - steps) + steps
-    highest = limits[1] - steps[::-1]
-    return np.minimum(at, highest)
+    return np.minimum(at, limits[1] - steps[::-1])
 
 
 def _write(
@@ -106,7 +105,7 @@ def campbell_figure(
     orders: Sequence[float] = ORDERS,
     sides: layout.Sides = layout.CHOSEN,
     vmax: float | None = None,
-    measured: str | Path | None = None,
+    measured: File = None,
 ) -> Figure:
     """Draw a Campbell diagram: `waterfall_figure` over the driving speed, with orders of that speed."""
     check_results(dataset, source)
@@ -125,7 +124,7 @@ def waterfall_figure(
     sides: layout.Sides = layout.CHOSEN,
     orders: Sequence[float] = (),
     vmax: float | None = None,
-    measured: str | Path | None = None,
+    measured: File = None,
 ) -> Figure:
     """Draw spectra of all strands over an axis, with the eigenfrequencies where they are known.
 
@@ -170,8 +169,7 @@ def waterfall_figure(
                 lines += draw_orders(axes, x.centres, shown["driving_speed"].values / (2.0 * np.pi), orders)
             overlay.draw(axes, along, Side(FREQUENCY, y.edges[[0, -1]]), shown)
             pad = max(pad, name_lines(axes, lines, size))
-            words = ", ".join(filter(None, (f"strand {strand}", title)))
-            axes.set_title(words, loc="left", pad=pad)
+            axes.set_title(", ".join(filter(None, (f"strand {strand}", title))), loc="left", pad=pad)
             x.lay_out(axes.xaxis)
     figures.label_x(panels, len(rows) * len(strands), x.label)
     for axes in panels[:, 0]:
@@ -233,12 +231,7 @@ def draw_spectra(axes: Axes, x: Array, y: Array, amplitude: Array, norm: LogNorm
 
 
 def spectra_bar(
-    figure: Figure,
-    norm: LogNorm,
-    spectra: Sequence[Array],
-    panels: NDArray[Any],
-    aspect: int,
-    unit: str = "µm",
+    figure: Figure, norm: LogNorm, spectra: Sequence[Array], panels: Panels, aspect: int, unit: str = "µm"
 ) -> None:
     """Draw the colour bar of spectra beside their panels."""
     values = np.concatenate([each.ravel() for each in spectra])
