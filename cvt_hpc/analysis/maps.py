@@ -34,6 +34,7 @@ from cvt_hpc.analysis.classes import (
     occurrence_classes,
 )
 from cvt_hpc.analysis.conversion import standard
+from cvt_hpc.analysis.courses import line_of_study
 from cvt_hpc.analysis.eigenfrequencies import eigenfrequency_figure
 from cvt_hpc.analysis.hysteresis_bands import draw_onsets
 from cvt_hpc.analysis.measured import Overlay, side_of
@@ -352,7 +353,7 @@ def _title(sheet: Sheet) -> list[str]:
         lines.append(f"each from a small and a large start: disturbance {attributes['starts']}")
     if inferred.size:
         lines.append(f"{inferred.size} cells inferred: {count_classes(inferred)}")
-    lines.append(", ".join(sheet.arrangement.notes))
+    lines += [", ".join(sheet.arrangement.notes), line_of_study(sheet.arrangement.dataset)]
     if sheet.arrangement.panel and sheet.columns > NAMED:
         lines.append(f"panels: {figures.in_words(sheet.arrangement.dataset[sheet.arrangement.panel])}")
     if sheet.writes_frequency:

@@ -32,9 +32,9 @@ from matplotlib.patches import Rectangle
 from numpy.typing import NDArray
 
 from cvt_hpc.analysis import arrangement as layout
-from cvt_hpc.analysis.alignment import job_held
 from cvt_hpc.analysis.classes import ALONG
 from cvt_hpc.analysis.figures import coordinate_unit, legend_below, outlined
+from cvt_hpc.analysis.held_job import job_held
 from cvt_hpc.analysis.scatter import is_sampled
 from cvt_hpc.errors import JobWarning, did_you_mean, few_of, mismatch, nearest, show
 from cvt_hpc.job import Job

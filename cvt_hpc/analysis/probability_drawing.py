@@ -13,6 +13,7 @@ from numpy.typing import NDArray
 from cvt_hpc.analysis import arrangement as layout
 from cvt_hpc.analysis import figures
 from cvt_hpc.analysis.classes import axes_in_words, check_results
+from cvt_hpc.analysis.courses import line_of_study
 from cvt_hpc.analysis.curves import set_frame
 from cvt_hpc.analysis.measured import Overlay, Side, side_of
 from cvt_hpc.analysis.probability import CONTOURS, PROBABILITY, over_samples
@@ -74,7 +75,8 @@ def probability_figure(
     for share in CONTOURS:
         axes.axhline(share, color="#777777", ls="--" if share != CONTOURS[1] else "-", lw=0.8, zorder=0.5)
     head = f"P{figures.in_words(shown[name])[1:]}"
-    lines = [figures.headline(head, dataset.attrs), told.attrs["counted"], *arrangement.notes, over.note]
+    fixed = [*arrangement.notes, line_of_study(dataset)]
+    lines = [figures.headline(head, dataset.attrs), told.attrs["counted"], *fixed, over.note]
     set_frame(figure, figures.entries_of([axes]) | over.entries, lines)
     return figure
 

@@ -42,6 +42,7 @@ Document = dict[str, Any]  # a whole job, or a table of it, as TOML or JSON give
 Point = dict[str, Any]  # the parameters of a run, flat [SI]
 
 JOB_UNITS = "job_units"  # attribute of a coordinate, beside `units`
+JOB_FILES = "job_files"  # attribute of results: by key the name of each file that gives parameters
 POINT_UNITS = "point_units"  # attribute of a history: by key, beside the values `point`
 
 

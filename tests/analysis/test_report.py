@@ -15,6 +15,7 @@ import xarray as xr
 
 from cvt_hpc.analysis.classes import map_classes, occurrence_classes
 from cvt_hpc.analysis.hysteresis_bands import lowest_onsets
+from cvt_hpc.analysis.maps import map_figure
 from cvt_hpc.cli import main
 from cvt_hpc.errors import InputError
 from cvt_hpc.job import build_job
@@ -152,6 +153,38 @@ def test_parameters_have_the_units_of_the_job(units, told, tmp_path):
     job = build_job({"name": "a", "model": "elastic_belt", "axes": axes, "scene": scene})
     results.attrs |= {"job": json.dumps(job.resolved()), "job_units": json.dumps(units)}
     assert f"Other than the defaults: {told}" in page_of(results, tmp_path)
+
+
+def driven_by_a_course(tmp_path, until=0.3):
+    """Results of a job whose course is that of a file, and a line of which no value is constant."""
+    (tmp_path / "rig.csv").write_text(
+        f"time [s],driving_speed [rpm],thrust [kN],load [N m]\n0,2400,44,20\n{until},3000,50,80\n"
+    )
+    results = study(gradients=(-2.4,), stiffnesses=(1.0,))
+    axes = {name: results[name].values.tolist() for name in results["status"].dims if name != "load"}
+    document = {"name": "a", "model": "elastic_belt", "axes": axes, "run": {"duration": 0.4}}
+    job = build_job(document | {"profiles": {"profile_file": "rig.csv"}}, str(tmp_path / "rig.toml"))
+    told = {"job": json.dumps(job.resolved()), "job_files": json.dumps(dict(job.files))}
+    return results.isel(load=0).assign_attrs(told)
+
+
+def test_a_course_that_drives_the_runs_is_told_with_its_file_and_ranges(tmp_path):
+    results = driven_by_a_course(tmp_path)
+    words = page_of(results, tmp_path)
+    ranges = "load 20 to 80 N m, speed 2400 to 3000 rpm, thrust 44 to 50 kN"
+    assert f"The course of rig.csv drives each run from 0 to 0.3 s: {ranges}. Verdicts hold over" in words
+    assert "Other than the defaults: duration 0.4 s. All else" in words
+    for row in ("profile_file rig.csv", "driving_speed 2400 to 3000 rpm", "thrust 44 to 50 kN", "load 20 to"):
+        assert row in words
+    title = map_figure(results).get_suptitle().replace("\u00a0", " ")
+    assert f"course of rig.csv: {ranges}" in " ".join(title.split())
+    words = page_of(driven_by_a_course(tmp_path, until=0.1), tmp_path)
+    assert "from 0 to 0.1 s:" in words and "Verdicts hold for the constant values to which it leads." in words
+    results = study(gradients=(-2.4,), stiffnesses=(1.0,)).assign_attrs(results.attrs)
+    told = json.loads(results.attrs["job"])
+    told["axes"] |= {"load": results["load"].values.tolist()}
+    words = page_of(results.assign_attrs(job=json.dumps(told)), tmp_path)
+    assert ": load 0.25 to 1 times its value, speed 2400 to" in words
 
 
 def test_what_turns_the_direction_of_a_text_is_seen(tmp_path):

@@ -130,7 +130,9 @@ def course_job(folder, text, name="rig.csv", model="elastic_belt", **tables):
 )
 def test_a_measured_file_gives_profiles_and_what_they_multiply(tmp_path, model):
     with pytest.warns(JobWarning, match='"torque .N m." as load'):
-        point = course_job(tmp_path, RIG, model=model).point(0)
+        job = course_job(tmp_path, RIG, model=model)
+    assert job.files == {"profile_file": "rig.csv"}
+    point = job.point(0)
     assert point["load"] == 150.0 and point["thrust"] == 50e3
     assert point["driving_speed"] == pytest.approx(3100 * np.pi / 30)
     assert point["profile_time"] == pytest.approx((0.0, 0.05, 0.2))
