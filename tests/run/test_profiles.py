@@ -216,6 +216,21 @@ def write_mdf(path, signals, times=()):
         measured.save(path, overwrite=True)
 
 
+def test_a_long_log_is_read_whatever_its_kind(tmp_path):
+    times = np.arange(80_000) * 1e-3
+    loads = np.round(100.0 + 50.0 * np.sin(times / 9.0), 4)
+    rows = "".join(f"{time:.3f},{load:.4f}\n" for time, load in zip(times, loads, strict=True))
+    duration = {"run": {"duration": 80.0}}
+    found = course_job(tmp_path, f"time [s],load [N m]\n{rows}", **duration).parameters
+    assert (tmp_path / "rig.csv").stat().st_size > 2**20
+    write_mat(tmp_path / "rig.mat", {"time": (times, "s"), "load": (loads, "N m")})
+    document = {"name": "course", "model": "elastic_belt", "profiles": {"profile_file": "rig.mat"}}
+    other = build_job(document | duration, str(tmp_path / "course.toml")).parameters
+    assert found["load"] == other["load"] == loads.max()
+    assert found["load_profile"] == other["load_profile"]
+    assert found["profile_time"] == pytest.approx(other["profile_time"])
+
+
 @pytest.mark.parametrize(("write", "suffix"), [(write_mat, ".mat"), (write_mdf, ".mf4")])
 def test_signals_of_measuring_programs_give_profiles(tmp_path, write, suffix):
     write(tmp_path / f"rig{suffix}", SIGNALS | {"Oil_temperature": ([80.0, 80.0, 80.0], "degC")})
