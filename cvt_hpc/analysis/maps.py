@@ -233,7 +233,8 @@ def _draw_onsets(axes: NDArray[Any], sheet: Sheet) -> list[Any]:
     if along is None or arrangement.y is None:
         return []  # of a single row the cells show it
     for panel, ax in _panels_of(axes, sheet):
-        for handle in draw_onsets(ax, sheet.x, sheet.y, sheet.classes[panel], along == arrangement.y):
+        cells_of, axis = (sheet.x, sheet.y, sheet.classes[panel]), arrangement.dataset[along]
+        for handle in draw_onsets(ax, *cells_of, axis, along == arrangement.y):
             handles.setdefault(handle.get_label(), handle)
     return list(handles.values())
 

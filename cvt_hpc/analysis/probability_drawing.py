@@ -15,6 +15,7 @@ from cvt_hpc.analysis import figures
 from cvt_hpc.analysis.classes import axes_in_words, check_results
 from cvt_hpc.analysis.courses import line_of_study
 from cvt_hpc.analysis.curves import set_frame
+from cvt_hpc.analysis.hysteresis_bands import within
 from cvt_hpc.analysis.measured import Overlay, Side, side_of
 from cvt_hpc.analysis.probability import CONTOURS, PROBABILITY, over_samples
 from cvt_hpc.analysis.sensitivity import (
@@ -121,7 +122,7 @@ def onset_bands_figure(
     then = "fix an axis, as by `--at AXIS=VALUE`"
     figure, first = _draw_bands(panels, layout.ruler(shown[arrangement.x]), label, labels, source, then)
     size = dataset.sizes[SAMPLE] * (2 if SWAPPED in dataset.dims else 1)
-    samples = f"{size} samples; the band ends where the axis does"
+    samples = f"{size} samples, onsets {within(told[along])}; the band ends where the axis does"
     head = figures.headline("Onset of vibration", dataset.attrs)
     set_frame(figure, figures.entries_of([first]), [head, samples, *arrangement.notes])
     return figure

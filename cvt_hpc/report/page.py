@@ -4,6 +4,7 @@
 """
 
 import base64
+import re
 from collections.abc import Callable, Iterator, Mapping, Sequence
 from functools import partial
 from importlib import resources
@@ -25,7 +26,7 @@ from cvt_hpc.analysis.classes import at_strongest_strand, check_results, map_cla
 from cvt_hpc.analysis.comparison import sample_sentences
 from cvt_hpc.analysis.figures import RESOLUTION, coordinate_unit, in_words, number, with_units
 from cvt_hpc.analysis.held_job import job_held
-from cvt_hpc.analysis.hysteresis_bands import hysteresis_figure
+from cvt_hpc.analysis.hysteresis_bands import hysteresis_figure, within
 from cvt_hpc.analysis.maps import AXIS, has_starts, map_figure
 from cvt_hpc.analysis.measured_score import score, score_sentences
 from cvt_hpc.analysis.probability import PROBABILITY, has_samples, over_samples
@@ -46,6 +47,7 @@ from cvt_hpc.study.intervals import look
 from cvt_hpc.variables import Status
 from cvt_hpc.vibration.classes import DECIDED, OccurrenceClass, levels, onsets
 
+_HAS_ENDS = re.compile("vibration (from|up to)")  # a sentence about windows
 COARSE = 0.02  # of an axis: a step beyond is worth a smaller one
 _RETRIES = {
     Status.FAILED_NUMERICS: "with a smaller step",
@@ -178,7 +180,7 @@ def _content(
         "joined": " and ".join(joined),
         "summary": findings.summary(dataset),
         "sentences": list(map(_with_code, sentences)),
-        "windows": any("vibration from" in line or "vibration up to" in line for line in sentences),
+        "ends": within(dataset[x]) if x and any(map(_HAS_ENDS.search, sentences)) else "",
         "progress": progress,
         "next_steps": [] if is_renewed else list(map(_with_code, next_steps(dataset, job, x))),
         # drawn beside the map of the browser, which has no such lines

@@ -107,6 +107,7 @@ def test_the_page_says_what_was_found_in_sentences(page):
         f"{place} there is vibration from 50 N m on, as far as is decided, most at 120 N m: 21.9 µm at 568 Hz"
         in words
     )
+    assert "midway between neighbouring runs of different class: each end is known ± 10 N m." in words
     # between rigid sheaves all is quiet at -2.4 s/m; at -0.8 s/m a run failed and one was not done
     assert "Nothing vibrates in 1 of 4 lines along load." in words
     assert (
@@ -316,13 +317,13 @@ def two_starts():
 def test_the_map_has_the_onset_lines_of_the_printed_one():
     results = study(**SMALL)
     (line,) = map_data(results)["onsets"]
-    assert (line["axis"], line["starts"], line["label"]) == (2, False, "onset of vibration")
+    assert (line["axis"], line["starts"], line["label"]) == (2, False, "onset of vibration ± 10 N m")
     expected = lowest_onsets(results["load"].values, map_classes(results).values.reshape(-1, 10))
     np.testing.assert_allclose(decoded(line["at"], "<f4", 4), expected)
     assert expected[0] == 50.0 and np.isnan(expected[1])  # rigid sheaves are quiet
     each, small, large = map_data(two_starts())["onsets"]
     assert (each["label"], small["label"], large["label"]) == (
-        "onset of vibration", "onset from a small start", "onset from a large start")  # fmt: skip
+        "onset of vibration ± 10 N m", "onset from a small start ± 10 N m", "onset from a large start ± 10 N m")  # fmt: skip
     # over the disturbance, whose values have it in common, the gradient and the stiffness
     np.testing.assert_allclose(decoded(each["at"], "<f4", (2, 4))[:, 0], [90.0, 50.0])
     np.testing.assert_allclose(decoded(small["at"], "<f4", (2, 4))[:, 0], 90.0)
@@ -514,7 +515,7 @@ def test_sides_values_and_quantities_are_chosen_in_the_browser(tmp_path):
     vibrates, quiet = ["solid", 90, 90, 90, 90], ["solid", None, None, None, None]
     assert of_small == [vibrates, vibrates, quiet, quiet] and hidden == []
     assert of_both[:4] == [vibrates, vibrates, ["solid", 50, 50, 40, 40], ["dash", 50, 50, 40, 40]]
-    assert legend.endswith("onset from a small startonset from a large start")
+    assert legend.endswith("onset from a small start ± 10 N monset from a large start ± 10 N m")
     assert (scale, x, y) == ("frequency [Hz]", "friction gradient [s/m]", "load [N m]") and panels == 2
     assert value == "100 µm"
     place = ["sheave stiffness: 1", "load: 20 N m", "friction gradient: −2.4 s/m"]
