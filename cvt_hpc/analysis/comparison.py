@@ -15,9 +15,10 @@ import numpy as np
 import xarray as xr
 from numpy.typing import NDArray
 
-from cvt_hpc.analysis.alignment import COMPARED, align, axes_of, job_of
+from cvt_hpc.analysis.alignment import COMPARED, align, axes_of
 from cvt_hpc.analysis.arrangement import labelled
 from cvt_hpc.analysis.classes import at_strongest_strand, occurrence_classes
+from cvt_hpc.analysis.held_job import job_of
 from cvt_hpc.job.values import Document, Point, heading, shown, shown_number
 from cvt_hpc.models import MODELS
 from cvt_hpc.models.contract import load_model

@@ -17,6 +17,7 @@ from cvt_hpc.analysis import figures
 from cvt_hpc.analysis.arrangement import At, Sides
 from cvt_hpc.analysis.cells import STYLES
 from cvt_hpc.analysis.classes import WITHOUT_RESULT, check_results, occurrence_classes
+from cvt_hpc.analysis.courses import line_of_study
 from cvt_hpc.errors import mismatch, unknown
 from cvt_hpc.variables import Status
 
@@ -64,7 +65,7 @@ def curve_figure(
     label = common_words(dataset, quantities)
     all_axes[0].set_ylabel(f"{label} [{unit}]" if unit else label)
     lines = [figures.headline(f"{label[0].upper()}{label[1:]}", dataset.attrs), *notes]
-    set_frame(figure, figures.entries_of(all_axes), lines)
+    set_frame(figure, figures.entries_of(all_axes), [*lines, line_of_study(dataset)])
     return figure
 
 
@@ -241,7 +242,7 @@ def curve_panels_figure(
         axes.grid(linewidth=0.4, alpha=0.5)
     figures.label_x(all_axes, len(panels), x.label)
     title = f"Over {figures.in_words(shown[arrangement.x])}, by {figures.in_words(shown[lines])}"
-    set_frame(figure, legend, [figures.headline(title, dataset.attrs), *notes])
+    set_frame(figure, legend, [figures.headline(title, dataset.attrs), *notes, line_of_study(dataset)])
     return figure
 
 

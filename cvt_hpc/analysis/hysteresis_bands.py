@@ -47,28 +47,44 @@ def lowest_onsets(places: NDArray[np.float64], classes: NDArray[np.int8]) -> NDA
     return np.array([min(loads, default=np.nan) for loads in rising])
 
 
-def of_each_start(classes: NDArray[np.int8]) -> list[tuple[str, str, NDArray[np.int8]]]:
-    """Name and style of the onset lines of a map, and the classes that each of them separates.
+def within(axis: xr.DataArray) -> str:
+    """How well a border midway between two values of an axis is known: half their distance, as "± 5 N m"."""
+    factor, unit = figures.coordinate_unit(axis.attrs)
+    values = np.sort(factor * axis.values.astype(float))
+    steps = np.diff(values[np.isfinite(values)])
+    if not steps.size or steps.max() > layout.EQUAL * steps.min():
+        return "± half a step"
+    return f"± {figures.number(0.5 * steps.mean(), '.3g')} {unit}".rstrip()
+
+
+def of_each_start(classes: NDArray[np.int8], along: xr.DataArray) -> list[tuple[str, str, NDArray[np.int8]]]:
+    """Name and style of the onset lines of a map along an axis, and the classes that each of them separates.
 
     A map with cells that vibrate from a large start only has two lines.
     """
-    only = classes == StartClass.LARGE_START_ONLY
+    only, known = classes == StartClass.LARGE_START_ONLY, within(along)
     small = np.where(only, OccurrenceClass.QUIET, classes)
     if not only.any():
-        return [("onset of vibration", "-", small)]
+        return [(f"onset of vibration {known}", "-", small)]
     large = np.where(only, OccurrenceClass.VIBRATING, classes)
-    return [("onset from a small start", "-", small), ("onset from a large start", "--", large)]
+    starts = ("small", "-", small), ("large", "--", large)
+    return [(f"onset from a {size} start {known}", line, kinds) for size, line, kinds in starts]
 
 
 def draw_onsets(
-    axes: Axes, x: layout.Ruler, y: layout.Ruler, classes: NDArray[np.int8], along_y: bool
+    axes: Axes,
+    x: layout.Ruler,
+    y: layout.Ruler,
+    classes: NDArray[np.int8],
+    along: xr.DataArray,
+    along_y: bool,
 ) -> list[Line2D]:
     """Draw the onset line of a panel, and that of the large starts beside it; return handles of a legend.
 
-    Arguments as of `cells.draw_cells`, and whether vibration sets in along y.
+    Arguments as of `cells.draw_cells`, the axis along which vibration sets in, and whether that is y.
     """
     handles = []
-    for label, style, kinds in of_each_start(classes):
+    for label, style, kinds in of_each_start(classes, along):
         points = onset_line(y, x, kinds.T)[:, ::-1] if along_y else onset_line(x, y, kinds)
         if np.isfinite(points).all(axis=1).any():
             look = {"color": INK, "ls": style, "lw": 2.2, "label": label}

@@ -33,6 +33,7 @@ from cvt_hpc.analysis.classes import (
     occurrence_classes,
 )
 from cvt_hpc.analysis.conversion import standard
+from cvt_hpc.analysis.courses import line_of_study
 from cvt_hpc.analysis.eigenfrequencies import eigenfrequency_figure
 from cvt_hpc.analysis.hysteresis_bands import draw_onsets
 from cvt_hpc.analysis.measured import File, Overlay, side_of
@@ -231,7 +232,8 @@ def _draw_onsets(axes: figures.Panels, sheet: Sheet) -> list[Artist]:
     if along is None or arrangement.y is None:
         return []  # of a single row the cells show it
     for panel, ax in _panels_of(axes, sheet):
-        for handle in draw_onsets(ax, sheet.x, sheet.y, sheet.classes[panel], along == arrangement.y):
+        cells_of, axis = (sheet.x, sheet.y, sheet.classes[panel]), arrangement.dataset[along]
+        for handle in draw_onsets(ax, *cells_of, axis, along == arrangement.y):
             handles.setdefault(handle.get_label(), handle)
     return list(handles.values())
 
@@ -350,7 +352,7 @@ def _title(sheet: Sheet) -> list[str]:
         lines.append(f"each from a small and a large start: disturbance {attributes['starts']}")
     if inferred.size:
         lines.append(f"{inferred.size} cells inferred: {count_classes(inferred)}")
-    lines.append(", ".join(sheet.arrangement.notes))
+    lines += [", ".join(sheet.arrangement.notes), line_of_study(sheet.arrangement.dataset)]
     if sheet.arrangement.panel and sheet.columns > NAMED:
         lines.append(f"panels: {figures.in_words(sheet.arrangement.dataset[sheet.arrangement.panel])}")
     if sheet.writes_frequency:

@@ -32,13 +32,13 @@ from matplotlib.patches import Rectangle
 from numpy.typing import NDArray
 
 from cvt_hpc.analysis import arrangement as layout
-from cvt_hpc.analysis.alignment import job_held
 from cvt_hpc.analysis.classes import ALONG
 from cvt_hpc.analysis.figures import Handle, coordinate_unit, legend_below, outlined
+from cvt_hpc.analysis.held_job import job_held
 from cvt_hpc.analysis.scatter import is_sampled
 from cvt_hpc.errors import JobWarning, did_you_mean, few_of, mismatch, nearest, show
 from cvt_hpc.job import Job
-from cvt_hpc.job.csv_files import MOST_BYTES, content_of, read_csv
+from cvt_hpc.job.csv_files import content_of, read_csv
 from cvt_hpc.job.values import shown, si_unit
 from cvt_hpc.parameters import Column, FromFile, RowError
 from cvt_hpc.variables import shortened
@@ -55,6 +55,7 @@ _UNITS = dict.fromkeys((*_BAND, FREQUENCY), "Hz") | {"amplitude": "m", "directio
 ALIKE = 0.01  # of a parameter that does not vary: so far the measured value may be off
 _PLACE = "measured file"
 _MOST_NAMED = 8
+_MOST_BYTES = 2**20  # of a table of onsets, windows or peaks
 _LEAST = 1e-300  # stands for zero on a logarithmic side
 
 INK = "#0033dd"  # of nothing that is computed; in grey, dark within a white outline
@@ -248,7 +249,7 @@ def _declaration(path: Path, units: dict[str, str], axes: list[str]) -> tuple[st
 
     `units` are those of axes and constants [SI].
     """
-    text = content_of(path, MOST_BYTES, f"{_PLACE}: {path}", "a CSV file", ".csv").replace(b"\0", b"")
+    text = content_of(path, _MOST_BYTES, f"{_PLACE}: {path}", "a CSV file", ".csv").replace(b"\0", b"")
     lines = [line for line in text.decode("latin-1").splitlines() if not line.lstrip().startswith("#")]
     cells = [re.split(r"[\[(]", cell)[0].strip(' "') for cell in re.split(r"[,;\t\n]", "\n".join(lines))]
     words = list(dict.fromkeys(re.sub(r"[\s_]+", "_", cell.casefold()) for cell in cells))

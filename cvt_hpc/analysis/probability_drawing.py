@@ -13,7 +13,9 @@ from cvt_hpc.analysis import arrangement as layout
 from cvt_hpc.analysis import figures, sensitivity
 from cvt_hpc.analysis.arrangement import CHOSEN, At, Sides
 from cvt_hpc.analysis.classes import axes_in_words, check_results
+from cvt_hpc.analysis.courses import line_of_study
 from cvt_hpc.analysis.curves import set_frame
+from cvt_hpc.analysis.hysteresis_bands import within
 from cvt_hpc.analysis.measured import File, Overlay, Side, side_of
 from cvt_hpc.analysis.probability import CONTOURS, PROBABILITY, over_samples
 from cvt_hpc.analysis.value_maps import value_map_figure
@@ -61,7 +63,8 @@ def probability_figure(
     for share in CONTOURS:
         axes.axhline(share, color="#777777", ls="--" if share != CONTOURS[1] else "-", lw=0.8, zorder=0.5)
     head = f"P{figures.in_words(shown[name])[1:]}"
-    lines = [figures.headline(head, dataset.attrs), told.attrs["counted"], *arrangement.notes, over.note]
+    fixed = [*arrangement.notes, line_of_study(dataset)]
+    lines = [figures.headline(head, dataset.attrs), told.attrs["counted"], *fixed, over.note]
     set_frame(figure, figures.entries_of([axes]) | over.entries, lines)
     return figure
 
@@ -102,7 +105,7 @@ def onset_bands_figure(
     then = "fix an axis, as by `--at AXIS=VALUE`"
     figure, first = _draw_bands(panels, layout.ruler(shown[arrangement.x]), label, labels, source, then)
     size = dataset.sizes[SAMPLE] * (2 if SWAPPED in dataset.dims else 1)
-    samples = f"{size} samples; the band ends where the axis does"
+    samples = f"{size} samples, onsets {within(told[along])}; the band ends where the axis does"
     head = figures.headline("Onset of vibration", dataset.attrs)
     set_frame(figure, figures.entries_of([first]), [head, samples, *arrangement.notes])
     return figure

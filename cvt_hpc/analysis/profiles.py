@@ -15,7 +15,14 @@ from matplotlib.figure import Figure
 from matplotlib.lines import Line2D
 
 from cvt_hpc.analysis import figures
-from cvt_hpc.analysis.telling_apart import check_holds, entitle_runs, named, on_axes, told_apart
+from cvt_hpc.analysis.telling_apart import (
+    check_holds,
+    common_course,
+    entitle_runs,
+    named,
+    on_axes,
+    told_apart,
+)
 from cvt_hpc.errors import InputError, mismatch, unknown
 from cvt_hpc.variator import PULLEYS
 
@@ -355,7 +362,7 @@ def wrap_figure(histories: Sequence[xr.Dataset], sources: Sequence[str] = ()) ->
     figures.legend_below(figure, entries if len(entries) > 1 else {})
     further = [f"without torque, not drawn: {', '.join(without_torque)}"] if without_torque else []
     head = figures.headline("Forces over the wrap", *(dataset.attrs for dataset in histories))
-    figures.entitle(figure, [head, common, *further], 76)
+    figures.entitle(figure, [head, common, common_course(histories), *further], 76)
     return figure
 
 

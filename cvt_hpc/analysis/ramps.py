@@ -140,7 +140,7 @@ def spectrogram_figure(
                 told.add("dashed: eigenfrequencies by belt formulas, with their half waves")
             if turns is not None:
                 lines += waterfall.draw_orders(axes, *turns, waterfall.ORDERS)
-                told.add("dotted: orders of the driving pulley's turns")
+                told.add(waterfall.orders_in_words(waterfall.ORDERS))
             pads[panels == axes] = waterfall.name_lines(axes, lines, size)
             axes.set_title(fill(", ".join([f"strand {strand}", *label.values()]), 72 // beside), loc="left")
             axes.set_xlabel(ramp.label)
@@ -170,7 +170,7 @@ def _lines_along(history: xr.Dataset, ramp: Ramp) -> tuple[_Lines | None, _Lines
         courses = {name: history[name].values[-ramp.values.size :][at] for name in named}
         if "thrust" in point:
             times = history["time"].values[-ramp.values.size :][at]
-            courses["thrust"] = np.array([point["thrust"] * multiple(point, "thrust", t) for t in times])
+            courses["thrust"] = np.broadcast_to(point["thrust"] * multiple(point, "thrust", times), at.shape)
     turns, speed = None, courses.get("driving_speed")
     if speed is not None and np.ptp(speed) > LEAST_CHANGE * speed.max():
         turns = ramp.values[at], speed / (2.0 * np.pi)

@@ -14,6 +14,7 @@ from numpy.typing import NDArray
 from cvt_hpc.analysis import cells, figures
 from cvt_hpc.analysis.arrangement import Fixed
 from cvt_hpc.analysis.classes import OccurrenceClass, at_strongest_strand, count_classes, occurrence_classes
+from cvt_hpc.analysis.courses import line_of_study
 from cvt_hpc.errors import mismatch
 
 MOST_AXES = 4  # six pairs; the first axes of the job
@@ -47,7 +48,7 @@ def scatter_figure(dataset: xr.Dataset, at: Fixed, source: str, vmax: cells.End 
     names = sample_axes(dataset)
     if len(names) > MOST_AXES:
         title.append(f"the first {MOST_AXES} of {len(names)} axes")
-    figures.entitle(figure, title)
+    figures.entitle(figure, [*title, line_of_study(dataset)])
     figures.legend_below(figure, figures.entries_of(panels[0, :1]), cells.LEGEND_COLUMNS)
     return figure
 

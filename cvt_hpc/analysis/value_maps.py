@@ -18,6 +18,7 @@ from cvt_hpc.analysis import arrangement as layout
 from cvt_hpc.analysis import cells, figures
 from cvt_hpc.analysis.arrangement import Ruler
 from cvt_hpc.analysis.classes import WITHOUT_RESULT, check_results, count_classes, occurrence_classes
+from cvt_hpc.analysis.courses import line_of_study
 from cvt_hpc.analysis.curves import check_quantities
 from cvt_hpc.analysis.measured import File, Overlay, side_of
 from cvt_hpc.analysis.probability import ISOLINES, over_samples
@@ -105,8 +106,8 @@ def value_map_figure(
     kinds = occurrence_classes(shown)
     counted = dataset.attrs.get("counted") or _counted(kinds)
     job = one_line(dataset.attrs.get("job_name", ""))
-    lines = [f"{job}: {counted}".removeprefix(": "), ", ".join(arrangement.notes), over.note]
-    figures.entitle(figure, lines, int(72 * size[0] / figures.WIDTH))
+    lines = [f"{job}: {counted}".removeprefix(": "), ", ".join(arrangement.notes), line_of_study(dataset)]
+    figures.entitle(figure, [*lines, over.note], int(72 * size[0] / figures.WIDTH))
     marked: dict[cells.CellClass, cells.ClassStyle] = {
         kind: cells.STYLES[kind] for kind in OTHERS if (kinds == kind).any()
     }

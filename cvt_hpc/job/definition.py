@@ -76,6 +76,8 @@ class Job(Runs):
         Rules for derived parameters, in an order in which each finds its sources.
     units : dict
         By key the unit in which the job gives a parameter, where it names one.
+    files : dict
+        By key the name of each file that gives parameters; `parameters` has what stood in it.
     """
 
     name: str
@@ -90,6 +92,7 @@ class Job(Runs):
     histories: tuple[int, ...] = field(default=(), compare=False)
     rules: tuple[Rule, ...] = ()
     units: Mapping[str, str] = field(default_factory=dict, compare=False)
+    files: Mapping[str, str] = field(default_factory=dict, compare=False)
 
     def __len__(self) -> int:
         """Number of runs."""

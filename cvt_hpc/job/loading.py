@@ -182,10 +182,12 @@ def rebuild_job(
     replacing = {key: replaced.get(key) for key in gone}
     kept = read_histories(histories, schema, axes, replacing, source, design.get("runs"))
     stated = tuple(rule for rule in rules if rule.key not in settled)
-    runs = parameters, axes, frozenset(own), design, kept, stated, schema.units
+    runs = parameters, axes, frozenset(own), design, kept, stated, schema.units, files
     job = Job(name, schema.model, schema.stepper, description, source, *runs)
     answering = answering_model(job)
-    return job if answering is None else rebuild_job(handed_to(job, *answering), source, job.units)
+    if answering is not None:
+        job = replace(rebuild_job(handed_to(job, *answering), source, job.units), files=files)
+    return job
 
 
 def _written(document: Table, pairs: Table, schema: Schema, source: str, label: str) -> dict[str, Entry]:

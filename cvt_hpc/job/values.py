@@ -32,6 +32,7 @@ Units = Mapping[str, str]  # by key, of parameters that the job gives in others 
 Point = dict[str, Any]  # the parameters of a run, flat [SI]
 
 JOB_UNITS = "job_units"  # attribute of a coordinate, beside `units`
+JOB_FILES = "job_files"  # attribute of results: by key the name of each file that gives parameters
 POINT_UNITS = "point_units"  # attribute of a history: by key, beside the values `point`
 
 

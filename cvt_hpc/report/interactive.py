@@ -50,9 +50,9 @@ def map_data(dataset: xr.Dataset, source: str = "results") -> dict[str, object]:
         axes = [_grid_axis(dataset[name]) for name in names]
     classes, runs = map_classes(dataset), occurrence_classes(dataset)
     starts = _from_both_starts(dataset, names)
-    onsets = [] if sampled else list(_onsets(classes.values, names, axes, from_both=False))
+    onsets = [] if sampled else list(_onsets(classes.values, dataset, axes, from_both=False))
     if starts is not None:
-        onsets += _onsets(starts, names, axes, from_both=True)
+        onsets += _onsets(starts, dataset, axes, from_both=True)
     data = {
         "sampled": sampled,
         "axes": axes,
@@ -121,16 +121,17 @@ def _from_both_starts(dataset: xr.Dataset, names: list[str]) -> NDArray[np.int8]
 
 
 def _onsets(
-    classes: NDArray[np.int8], names: list[str], axes: list[dict[str, object]], from_both: bool
+    classes: NDArray[np.int8], dataset: xr.Dataset, axes: list[dict[str, object]], from_both: bool
 ) -> Iterator[dict[str, object]]:
     """Yield the onset lines along each axis on which a vibration may set in.
 
     Of each line the places along its axis, over all other axes.
     """
+    names = list(map(str, dataset["status"].dims))
     for name in (name for name in ALONG if name in names and len(names) > 1):
         axis = names.index(name)
         centres = np.array(axes[axis]["centres"])
-        for label, style, kinds in of_each_start(classes):
+        for label, style, kinds in of_each_start(classes, dataset[name]):
             lowest = lowest_onsets(centres, np.moveaxis(kinds, axis, -1).reshape(-1, centres.size))
             if np.isfinite(lowest).any():
                 line = {"axis": axis, "starts": from_both, "label": label, "dashed": style == "--"}

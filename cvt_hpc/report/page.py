@@ -4,6 +4,7 @@
 """
 
 import base64
+import re
 from collections.abc import Callable, Iterator, Sequence
 from functools import partial
 from importlib import resources
@@ -19,12 +20,13 @@ import xarray as xr
 from markupsafe import Markup
 from matplotlib.figure import Figure
 
-from cvt_hpc.analysis.alignment import job_held
+from cvt_hpc.analysis import courses
 from cvt_hpc.analysis.arrangement import Arrangement, Fixed, Sides, arrange, known_values, value_text
 from cvt_hpc.analysis.classes import at_strongest_strand, check_results, map_classes, occurrence_classes
 from cvt_hpc.analysis.comparison import sample_sentences
 from cvt_hpc.analysis.figures import RESOLUTION, coordinate_unit, in_words, number, with_units
-from cvt_hpc.analysis.hysteresis_bands import hysteresis_figure
+from cvt_hpc.analysis.held_job import job_held
+from cvt_hpc.analysis.hysteresis_bands import hysteresis_figure, within
 from cvt_hpc.analysis.maps import AXIS, has_starts, map_figure
 from cvt_hpc.analysis.measured import File
 from cvt_hpc.analysis.measured_score import score, score_sentences
@@ -46,6 +48,7 @@ from cvt_hpc.study.intervals import look
 from cvt_hpc.variables import Status
 from cvt_hpc.vibration.classes import DECIDED, OccurrenceClass, levels, onsets
 
+_HAS_ENDS = re.compile("vibration (from|up to)")  # a sentence about windows
 COARSE = 0.02  # of an axis: a step beyond is worth a smaller one
 _RETRIES = {
     Status.FAILED_NUMERICS: "with a smaller step",
@@ -164,6 +167,7 @@ def _content(
         sentences = list(findings.range_sentences(dataset))
     if measured is not None:
         sentences += score_sentences(score(dataset, measured, source))
+    sentences = [*filter(None, [findings.course_sentence(job)]), *sentences] if job else sentences
     basis = [*map(_with_code, _basis(dataset, job, changed)), *_samples(dataset, folder, source)]
     is_renewed = progress is not None and progress.every is not None
     combinations = int(np.prod([dataset.sizes[name] for name in beyond]))
@@ -175,7 +179,7 @@ def _content(
         "joined": " and ".join(joined),
         "summary": findings.summary(dataset),
         "sentences": list(map(_with_code, sentences)),
-        "windows": any("vibration from" in line or "vibration up to" in line for line in sentences),
+        "ends": within(dataset[x]) if x and any(map(_HAS_ENDS.search, sentences)) else "",
         "progress": progress,
         "next_steps": [] if is_renewed else list(map(_with_code, next_steps(dataset, job, x))),
         # drawn beside the map of the browser, which has no such lines
@@ -297,8 +301,10 @@ def _basis(dataset: xr.Dataset, job: Job | None, changed: Sequence[Row]) -> Iter
             factor, unit = findings.length_unit(least)
             threshold = f"{factor * least:.3g} {unit} or more (`amplitude_threshold`)"
             yield f"A run vibrates where the amplitude of a strand is {threshold}."
-        told = [f"{row.key.replace('_', ' ')} {row.value}" for row in changed[:MOST_CHANGED]]
-        told += [f"{more} more"] if (more := len(changed) - MOST_CHANGED) > 0 else []
+        driven = {courses.TIME, courses.FILE, *courses.of_job(job)}  # the findings begin with them
+        rows = [row for row in changed if not (row.key in driven or row.key.endswith("_profile"))]
+        told = [f"{row.key.replace('_', ' ')} {row.value}" for row in rows[:MOST_CHANGED]]
+        told += [f"{more} more"] if (more := len(rows) - MOST_CHANGED) > 0 else []
         start = f"Other than the defaults: {', '.join(told)}. All else" if told else "All that is fixed"
         yield f"{start} is at its default, which is an assumption where no paper gives it."
     classes = map_classes(dataset).values
@@ -347,13 +353,23 @@ def _samples(dataset: xr.Dataset, folder: Path | None, source: str) -> list[Mark
 
 
 def _parameters(job: Job) -> dict[str, list[Row]]:
-    """Values of what neither varies nor follows, by table; the defaults are assumptions of the program."""
+    """Values of what neither varies nor follows, by table; the defaults are assumptions of the program.
+
+    Files have their names, and what a course changes its range.
+    """
     schema, elsewhere = job.schema, {axis.name for axis in job.axes} | {rule.key for rule in job.rules}
+    told = {**job.files, **courses.of_job(job)}
     return {
         section: [
-            Row(key, value_in_words(schema, key, value), parameter.description, value != parameter.default)
+            Row(
+                key,
+                told.get(key) or value_in_words(schema, key, value),
+                parameter.description,
+                key in told or value != parameter.default,
+            )
             for key, parameter in table.items()
-            if key not in elsewhere and (value := job.parameters.get(key)) is not None and value != ()
+            if key not in elsewhere
+            and ((value := job.parameters.get(key)) not in (None, ()) or key in job.files)
         ]
         for section, table in schema.sections.items()
     }

@@ -115,6 +115,7 @@ class Study(Runs):
     # parameters that follow from the axes, except those with more than `MOST_DERIVED` values
     derived: tuple[DerivedCoordinate, ...] = ()
     units: Mapping[str, str] = field(default_factory=dict)  # units in which the job gives values, by key
+    files: Mapping[str, str] = field(default_factory=dict)  # names of files that give parameters, by key
 
     @property
     def design(self) -> Design:  # type: ignore[override]  # it stands in the job
@@ -197,6 +198,7 @@ class Study(Runs):
             "coordinates": [dimension.to_json() for dimension in self.coordinates],
             "derived": [coordinate.to_json() for coordinate in self.derived],
             "units": dict(self.units),
+            "files": dict(self.files),
         }
 
     @classmethod
@@ -209,6 +211,7 @@ class Study(Runs):
             coordinates=tuple(map(Dimension.from_json, entry["coordinates"])),
             derived=tuple(map(DerivedCoordinate.from_json, entry.get("derived", ()))),
             units=entry.get("units", {}),
+            files=entry.get("files", {}),
         )
 
 
@@ -220,7 +223,7 @@ def describe(job: Job, simulator: Simulator) -> Study:
     few = (one for one in job.derived if runs_along(job, one.axes) <= MOST_DERIVED)
     derived = tuple(derived_coordinate(one, job) for one in few)
     head = job.name, job.description, job.fingerprint(), job.resolved()
-    return Study(*head, axes, variables, coordinates, derived, job.units)
+    return Study(*head, axes, variables, coordinates, derived, job.units, job.files)
 
 
 def runs_along(job: Job, names: Collection[str]) -> int:

@@ -317,7 +317,7 @@ def _numbers(study: Study) -> str:
     entry = study.to_json()
     for table in (*entry["axes"], *entry["derived"]):
         del table["job_units"]
-    del entry["units"]
+    del entry["units"], entry["files"]
     job = {key: value for key, value in entry["job"].items() if key not in ("name", "description")}
     return json.dumps({**entry, "job": job, "name": "", "description": ""})
 
