@@ -37,6 +37,7 @@ if TYPE_CHECKING:
     from cvt_hpc.analysis.animation import Animation
     from cvt_hpc.analysis.measured_score import Score
 import csv
+from collections.abc import Callable
 
 from cvt_hpc.analysis.conversion import documented_units
 from cvt_hpc.job.units import to_si
@@ -93,7 +94,7 @@ class Results:
         vmax: float | str | None = None,
         beside: xr.Dataset | Sequence[xr.Dataset] = (),
         measured: str | Path | None = None,
-        **at: Any,
+        **at: float | str,
     ) -> Figure:
         """Draw where vibration occurs, or quantities over two axes.
 
@@ -373,9 +374,8 @@ def read_table(path: str | Path) -> xr.Dataset:
         filled[places] = values
         return filled
 
-    dataset = xr.Dataset(
-        coords={name: (name, v, {"units": _unit_of(name)}) for name, v in coordinates.items()}
-    )
+    named = {name: (name, values, {"units": _unit_of(name)}) for name, values in coordinates.items()}
+    dataset = xr.Dataset(coords=named)
     for name, leader in linked.items():
         first = np.unique(axes[leader], return_index=True)[1]
         dataset.coords[name] = (leader, followers[name][first], {"units": _unit_of(name)})
@@ -402,7 +402,9 @@ def _linked(columns: dict[str, np.ndarray]) -> dict[str, str]:
     return found
 
 
-def _add(dataset: xr.Dataset, column: str, dims: tuple[str, ...], texts: Sequence[str], grid: Any) -> None:
+def _add(
+    dataset: xr.Dataset, column: str, dims: tuple[str, ...], texts: Sequence[str], grid: Callable
+) -> None:
     """Add a column of numbers to a dataset, where it belongs to a strand or pulley at its place."""
     name, _, unit = column.removesuffix("]").partition(" [")
     try:

@@ -6,7 +6,7 @@ import math
 import time
 from collections.abc import Iterator, Mapping, Sequence
 from itertools import islice
-from typing import TYPE_CHECKING, Any
+from typing import TYPE_CHECKING
 
 import numpy as np
 from numpy.typing import NDArray
@@ -14,7 +14,7 @@ from numpy.typing import NDArray
 from cvt_hpc.job import Job
 from cvt_hpc.job.summary import cost_in_words
 from cvt_hpc.job.template import CUSTOMARY
-from cvt_hpc.job.values import JOB_UNITS, shown_number
+from cvt_hpc.job.values import JOB_UNITS, Point, shown_number
 from cvt_hpc.tables import columns
 from cvt_hpc.variables import Outcome, Status, flag_in_words
 from cvt_hpc.vibration.classes import NEAR, NEAR_CONTRADICTIONS
@@ -30,13 +30,7 @@ if TYPE_CHECKING:
 MOST_FAILURES_NAMED = 10
 MOST_CONTRADICTIONS_NAMED = 20
 _KNOWN_OF_FAILURES = (
-    "status",
-    "reason",
-    "core_seconds",
-    "simulated_seconds",
-    "time_step",
-    "refinements",
-    "steps",
+    *("status", "reason", "core_seconds", "simulated_seconds", "time_step", "refinements", "steps"),
     "contact_solves",
 )
 _AGAIN = {
@@ -45,17 +39,8 @@ _AGAIN = {
 }
 # of one run, the first lines of all
 _FIRST = (
-    "status",
-    "vibrates",
-    "reason",
-    "amplitude",
-    "frequency",
-    "growth_rate",
-    "thrust_ratio",
-    "slip_margin",
-    "speed_loss",
-    "loss",
-    "efficiency",
+    *("status", "vibrates", "reason", "amplitude", "frequency", "growth_rate", "thrust_ratio"),
+    *("slip_margin", "speed_loss", "loss", "efficiency"),
 )
 MOST_OUTCOMES = len(_FIRST)
 _LEAST, _MOST = (1.0, 0.1), 1e4  # between these numbers are readable, above the first least best
@@ -130,7 +115,11 @@ def comparison_lines(found: Comparison, sources: tuple[str, str]) -> Iterator[st
     yield from found.notes
     yield from (f"differs: {line}" for line in found.differences or ("nothing that the datasets tell",))
     yield f"{found.pairs.size} cells, by class in A (rows) and in B (columns):"
-    yield from _class_table(found)
+    counts = found.counts()
+    first = sorted({kind for (kind, _), count in counts.items() if count})
+    second = sorted({kind for (_, kind), count in counts.items() if count})
+    rows = [[kind.label, *(str(counts[kind, other]) for other in second)] for kind in first]
+    yield from columns([["", *(kind.label for kind in second)], *rows])
     yield from _design_lines(found) if found.are_designs else _contradiction_lines(found)
     yield from deviations(found)
 
@@ -167,14 +156,6 @@ def _cell_lines(found: Comparison, chosen: NDArray[np.bool_]) -> Iterator[str]:
         yield f"  {left} more in the table"
 
 
-def _class_table(found: Comparison) -> Iterator[str]:
-    counts = found.counts()
-    first = sorted({kind for (kind, _), count in counts.items() if count})
-    second = sorted({kind for (_, kind), count in counts.items() if count})
-    rows = [[kind.label, *(str(counts[kind, other]) for other in second)] for kind in first]
-    yield from columns([["", *(kind.label for kind in second)], *rows])
-
-
 def _cell_line(cell: Cell) -> str:
     words = (
         kind.label
@@ -195,9 +176,8 @@ def trouble_lines(report: RunReport) -> Iterator[str]:
     if unnamed > 0:
         yield f"{unnamed} more runs failed; `status` and `reason` in the results tell which"
     failed = {run.status for run in report.failed}
-    yield from (
-        f"the same command with --retry {status} {how}" for status, how in _AGAIN.items() if status in failed
-    )
+    for status in filter(failed.__contains__, _AGAIN):
+        yield f"the same command with --retry {status} {_AGAIN[status]}"
     if report.remaining:
         if report.gained:
             yield f"stopped early ({report.stopped}); the same command goes on from here"
@@ -251,34 +231,28 @@ def needs_line(needed: Needs, histories: int) -> str:
     """Return the line that says what memory and disk a sweep needs."""
     from cvt_hpc.study.forecast.resources import size_in_words
 
-    line = (
-        f"needed: {size_in_words(needed.memory)} of memory for the plan; {disk_line(needed.disk, histories)}"
-    )
+    memory, disk = size_in_words(needed.memory), disk_line(needed.disk, histories)
+    line = f"needed: {memory} of memory for the plan; {disk}"
     if not needed.profiles:
         return line
-    return (
-        f"{line}; each history at most {size_in_words(needed.profiles)} of profiles over time, as much memory"
-    )
+    each = size_in_words(needed.profiles)
+    return f"{line}; each history at most {each} of profiles over time, as much memory"
 
 
 def disk_line(disk: Disk, histories: int) -> str:
     """Return the line that says what space a study takes on the disk."""
     from cvt_hpc.study.forecast.resources import size_in_words
 
-    line = (
-        f"disk: {size_in_words(disk.records)} of records, at most {size_in_words(disk.results)} of results.nc"
-    )
+    records, results = size_in_words(disk.records), size_in_words(disk.results)
+    line = f"disk: {records} of records, at most {results} of results.nc"
     if not histories:
         return line
-    size = (
-        "of unknown size (--ranks with --pilots tells)"
-        if math.isnan(disk.histories)
-        else size_in_words(disk.histories)
-    )
+    is_known = not math.isnan(disk.histories)
+    size = size_in_words(disk.histories) if is_known else "of unknown size (--ranks with --pilots tells)"
     return f"{line}, {histories} histor{'y' if histories == 1 else 'ies'} {size}"
 
 
-def point_lines(job: Job, at: Mapping[str, Any]) -> Iterator[str]:
+def point_lines(job: Job, at: Point) -> Iterator[str]:
     """Yield the line that says where on the axes of its job a run stands."""
     point = job.point_at(at)
     # a load that is given leaves no share of which it would follow
@@ -323,11 +297,8 @@ def outcome_lines(
     most : int, optional
         Number of lines, with what matters first; all by default, and where one line alone would be left out.
     """
-    told = [
-        one
-        for one in outcomes
-        if (set(one.dims) <= _ALWAYS_SHOWN or one.values.size <= _LARGEST_LINE) and _known(one.values).any()
-    ]
+    few = (one for one in outcomes if set(one.dims) <= _ALWAYS_SHOWN or one.values.size <= _LARGEST_LINE)
+    told = [one for one in few if _known(one.values).any()]
     if any(one.name == "status" and one.values != Status.DONE for one in outcomes):
         told = [one for one in told if one.name in _KNOWN_OF_FAILURES]
     told.sort(key=lambda one: _FIRST.index(one.name) if one.name in _FIRST else len(_FIRST))
@@ -351,14 +322,11 @@ def _in_words(outcome: Outcome, units: Mapping[str, Sequence[str]] | None) -> st
     unit = attributes.get("units", "")
     unit = "" if unit == "1" else unit
     told = {"units": unit, JOB_UNITS: _readable_unit(values[known], unit, units)}
-    texts = [
-        f"{shown_number(value, told):.6g}" if isinstance(value, float) else str(value)
-        for value in values[known].ravel().tolist()
-    ]
+    found = (shown_number(value, told) for value in values[known].ravel().tolist())
+    texts = [f"{value:.6g}" if isinstance(value, float) else str(value) for value in found]
     if outcome.dims:
-        texts = [
-            f"{place} {text}" for place, text in zip(np.asarray(outcome.places)[known], texts, strict=True)
-        ]
+        named = zip(np.asarray(outcome.places)[known], texts, strict=True)
+        texts = [f"{place} {text}" for place, text in named]
     return f"{', '.join(texts)} {told[JOB_UNITS] or unit}".rstrip()
 
 

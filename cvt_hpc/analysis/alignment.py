@@ -1,8 +1,6 @@
 """The common runs of two studies: the same axes in the same order, and on each the values that both have."""
 
-import json
 from collections.abc import Collection, Hashable, Iterable
-from dataclasses import replace
 from typing import Any, NamedTuple
 
 import numpy as np
@@ -10,11 +8,10 @@ import xarray as xr
 
 from cvt_hpc.analysis.arrangement import known_values
 from cvt_hpc.analysis.classes import check_results
+from cvt_hpc.analysis.held_job import job_of
 from cvt_hpc.analysis.scatter import is_sampled
 from cvt_hpc.errors import InputError, did_you_mean, mismatch
-from cvt_hpc.job import Job, stored_job
-from cvt_hpc.job.units import factor_to
-from cvt_hpc.job.values import JOB_UNITS, shown
+from cvt_hpc.job.values import shown
 from cvt_hpc.study.job_difference import flatten
 
 COMPARED = ("status", "vibrates", "amplitude", "frequency")  # beside what a model adds
@@ -63,23 +60,6 @@ def axes_of(dataset: xr.Dataset) -> list[str]:
     return list(map(str, dataset["status"].dims))
 
 
-def job_of(dataset: xr.Dataset) -> dict[str, Any]:
-    """The resolved job that a dataset keeps in its attributes; empty where it keeps none."""
-    return json.loads(dataset.attrs.get("job", "{}"))
-
-
-def job_held(dataset: xr.Dataset, source: str = "results") -> Job | None:
-    """The job of a dataset, with its units; None where this version cannot read it any more."""
-    try:
-        job = stored_job(job_of(dataset), source)
-        units = json.loads(dataset.attrs.get(JOB_UNITS, "{}"))
-        known = job.schema.parameters
-        legal = {k: u for k, u in units.items() if k in known and factor_to(str(u), known[k].unit)}
-        return replace(job, units=legal)
-    except (AttributeError, InputError, TypeError, ValueError, RecursionError):
-        return None
-
-
 def _reduced(
     one: xr.Dataset, other: xr.Dataset, labels: str, sources: tuple[str, str], notes: list[str]
 ) -> xr.Dataset:
@@ -116,8 +96,7 @@ def _on_common_grid(a: xr.Dataset, b: xr.Dataset, sources: tuple[str, str]) -> t
 def _at_common_samples(
     a: xr.Dataset, b: xr.Dataset, sources: tuple[str, str]
 ) -> tuple[xr.Dataset, xr.Dataset]:
-    names = axes_of(a)
-    keys = (zip(*(_keys(dataset[name]) for name in names), strict=True) for dataset in (a, b))
+    keys = (zip(*(_keys(dataset[name]) for name in axes_of(a)), strict=True) for dataset in (a, b))
     in_a, in_b = _common_places(*keys)
     if not in_a:
         raise mismatch(sources[1], f"samples at places of those of {sources[0]}", "none")

@@ -3,10 +3,11 @@
 A `Ruler` spreads the values of an axis, evenly or by their logarithms, and has the borders between them.
 """
 
-from collections.abc import Iterator, Mapping, Sequence
+from collections.abc import Hashable, Iterator, Mapping, Sequence
+from contextlib import suppress
 from dataclasses import dataclass, replace
 from itertools import product
-from typing import Any, NamedTuple
+from typing import NamedTuple
 
 import numpy as np
 import xarray as xr
@@ -20,7 +21,8 @@ from cvt_hpc.job.values import shown_as_read, shown_number, shown_unit
 EVEN, EQUAL = 1.5, 1.01  # of steps: largest over smallest, below which they are taken for even
 LEAST_SPAN = 4.0  # last over first value of a logarithmic axis
 
-At = Mapping[str, Any] | None  # axes to fix: value by name, a number [SI] or a text
+Fixed = Mapping[str, float | str]  # axes to fix: value by name, a number [SI] or a text
+At = Fixed | None
 MOST_VALUES_NAMED = 12
 FEW, FEW_ON_DECADES = 12, 6  # values of an axis that have ticks of their own
 FEW_DECADES = 2.5  # on which 1, 2 and 5 have labels, not powers of ten alone
@@ -48,7 +50,7 @@ class Sides(NamedTuple):
 CHOSEN = Sides()
 
 
-def arrange(dataset: xr.Dataset, at: Mapping[str, Any], source: str, sides: Sides = CHOSEN) -> Arrangement:
+def arrange(dataset: xr.Dataset, at: Fixed, source: str, sides: Sides = CHOSEN) -> Arrangement:
     """Choose what a map shows.
 
     Where `sides` leave it open `load` runs along x, or `load_share`, else the last numeric axis;
@@ -85,7 +87,7 @@ def arrange(dataset: xr.Dataset, at: Mapping[str, Any], source: str, sides: Side
     return Arrangement(dataset, x, y, panel, tuple(notes))
 
 
-def check_sides(sides: Sides, axes: list[str], at: Mapping[str, Any], source: str) -> None:
+def check_sides(sides: Sides, axes: list[str], at: Fixed, source: str) -> None:
     """Raise InputError where sides name no axis of the results, one that `at` fixes, or one twice."""
     for side, name in sides._asdict().items():
         if name is None:
@@ -138,7 +140,7 @@ def places(array: xr.DataArray | xr.Dataset, dims: Sequence[str]) -> list[dict[s
     return [dict(zip(dims, place, strict=True)) for place in product(*sizes)]
 
 
-def labelled(array: xr.DataArray, dims: Sequence[Any]) -> Iterator[tuple[list[str], xr.DataArray]]:
+def labelled(array: xr.DataArray, dims: Sequence[Hashable]) -> Iterator[tuple[list[str], xr.DataArray]]:
     """Yield the parts of a variable at all places along its dimensions beyond `dims`, with their labels."""
     for at in places(array, [str(dim) for dim in array.dims if dim not in dims]):
         yield [str(array[dim].values[k]) for dim, k in at.items()], array.isel(at)
@@ -174,14 +176,12 @@ def _take(names: list[str], preferred: str, avoid: str = "") -> str | None:
     return name
 
 
-def index_of(coordinate: xr.DataArray, value: Any, where: str) -> int:
+def index_of(coordinate: xr.DataArray, value: float | str, where: str) -> int:
     """Index of a value on an axis."""
     values, wanted = coordinate.values, np.nan
     if values.dtype.kind in "iuf":
-        try:
+        with suppress(TypeError, ValueError):
             wanted = float(value)
-        except (TypeError, ValueError):
-            pass
         hits = np.flatnonzero((values == wanted) | np.isclose(values, wanted, rtol=1e-9, atol=0))
     else:
         hits = np.flatnonzero(values.astype(str) == str(value))
@@ -263,7 +263,8 @@ def ruler(coordinate: xr.DataArray) -> Ruler:
     if np.all(finite):
         if is_log:
             return _logarithmic_ruler(centres, axis_label(coordinate, unit))
-        return Ruler(centres, edges_of(centres), *_exact_ticks(centres), axis_label(coordinate, unit))
+        ticks, exact = (centres, short_numbers(centres)) if are_few(centres, FEW) else (None, ())
+        return Ruler(centres, edges_of(centres), ticks, exact, axis_label(coordinate, unit))
     known = centres[finite]
     texts = iter(short_numbers(known, is_log=is_log))
     labels = tuple(next(texts) if is_known else infinity_in_words(name) for is_known in finite)
@@ -288,11 +289,6 @@ def _logarithmic_ruler(values: NDArray[np.float64], label: str) -> Ruler:
     ticks = values if are_few(centres, FEW_ON_DECADES) else inside(digits)
     minor = on_decades(inside(np.arange(1.0, 10.0)))
     return Ruler(centres, edges, on_decades(ticks), short_numbers(ticks, is_log=True), label, minor)
-
-
-def _exact_ticks(centres: NDArray[np.float64]) -> tuple[NDArray[np.float64] | None, tuple[str, ...]]:
-    """Ticks at the grid points where these are few and far enough apart to be labelled."""
-    return (centres, short_numbers(centres)) if are_few(centres, FEW) else (None, ())
 
 
 def is_logarithmic(values: NDArray[np.float64]) -> bool:

@@ -6,6 +6,7 @@ from typing import Any
 
 import matplotlib
 import numpy as np
+from matplotlib.artist import Artist
 from matplotlib.axes import Axes
 from matplotlib.cm import ScalarMappable
 from matplotlib.collections import LineCollection
@@ -17,7 +18,7 @@ from matplotlib.legend_handler import HandlerTuple
 from matplotlib.lines import Line2D
 from matplotlib.patches import Patch, PathPatch
 from matplotlib.path import Path
-from numpy.typing import NDArray
+from numpy.typing import ArrayLike, NDArray
 
 from cvt_hpc.analysis import figures
 from cvt_hpc.analysis.arrangement import Ruler
@@ -227,7 +228,7 @@ def class_legend(
     columns: int,
     *,
     with_inferred: bool = False,
-    further: Sequence[Any] = (),
+    further: Sequence[Artist] = (),
 ) -> None:
     """Legend of some classes below the panels: fill, hatching, mark; of inferred cells; and of lines."""
     entries: dict[str, Any] = {}
@@ -239,17 +240,11 @@ def class_legend(
         for label, fill in (("inferred", "none"), ("inferred, vibrating", INFERRED_VIBRATION)):
             entries[label] = Patch(**{**LINES, "facecolor": fill, "linewidth": 0.8})
     entries |= {handle.get_label(): handle for handle in further}
-    figure.legend(
-        entries.values(),
-        entries.keys(),
-        loc="outside lower center",
-        ncols=-(-len(entries) // -(-len(entries) // columns)),  # rows of like length
-        frameon=False,
-        handler_map={tuple: HandlerTuple(ndivide=1, pad=0)},
-        handlelength=2.2,
-        handleheight=1.5,
-        columnspacing=1.3,
-    )
+    rows = -(-len(entries) // columns)
+    place = {"loc": "outside lower center", "ncols": -(-len(entries) // rows)}  # rows of like length
+    look = {"frameon": False, "handlelength": 2.2, "handleheight": 1.5, "columnspacing": 1.3}
+    handlers = {tuple: HandlerTuple(ndivide=1, pad=0)}
+    figure.legend(entries.values(), entries.keys(), handler_map=handlers, **place, **look)
 
 
 def area_of(x: Ruler, y: Ruler, inside: Mask) -> Path:
@@ -281,6 +276,6 @@ def _borders(x: Ruler, y: Ruler, classes: NDArray[np.int8]) -> Array:
     return np.concatenate((upright, level))
 
 
-def _segments(x0: Any, x1: Any, y0: Any, y1: Any) -> Array:
+def _segments(x0: ArrayLike, x1: ArrayLike, y0: ArrayLike, y1: ArrayLike) -> Array:
     """Lines from (x0, y0) to (x1, y1), numbers or arrays, as shape (line, end, coordinate)."""
     return np.moveaxis(np.stack(np.broadcast_arrays(x0, y0, x1, y1)), 0, -1).reshape(-1, 2, 2)

@@ -9,16 +9,17 @@ from collections.abc import Iterator, Mapping
 from dataclasses import dataclass
 from itertools import product
 from pathlib import Path
-from typing import Any, NamedTuple
+from typing import NamedTuple
 
 import numpy as np
 import xarray as xr
 from numpy.typing import NDArray
 
-from cvt_hpc.analysis.alignment import COMPARED, align, axes_of, job_of
+from cvt_hpc.analysis.alignment import COMPARED, align, axes_of
 from cvt_hpc.analysis.arrangement import labelled
 from cvt_hpc.analysis.classes import at_strongest_strand, occurrence_classes
-from cvt_hpc.job.values import heading, shown, shown_number
+from cvt_hpc.analysis.held_job import job_of
+from cvt_hpc.job.values import Document, Point, heading, shown, shown_number
 from cvt_hpc.models import MODELS
 from cvt_hpc.models.contract import load_model
 from cvt_hpc.storage.files import write_rows
@@ -55,7 +56,7 @@ class Deviation(NamedTuple):
 class Cell(NamedTuple):
     """A cell of a comparison; pairs of values are of A and of B."""
 
-    at: dict[str, Any]  # values of the axes by name [SI]
+    at: Point  # values of the axes by name [SI]
     place: str  # the same for people, in the units of the job
     classes: tuple[agreement.OccurrenceClass, agreement.OccurrenceClass]
     pair: int  # the class that both have, or a `PairClass`
@@ -184,9 +185,9 @@ def compare(a: xr.Dataset, b: xr.Dataset, sources: tuple[str, str] = ("A", "B"))
     for study, found in zip("ab", quantities, strict=True):
         values |= {f"{name}_{study}": found[name][0] for name in common}
     cells = xr.Dataset({name: frame.copy(data=array) for name, array in values.items()})
-    found = _differing(a, b)
-    told = aligned.left_out, aligned.notes, tuple(_in_words(found))
-    return Comparison(cells, thresholds, *told, common, any(map(_is_of_scene, found.items())))
+    differing = _differing(a, b)
+    told = aligned.left_out, aligned.notes, tuple(_in_words(differing))
+    return Comparison(cells, thresholds, *told, common, any(map(_is_of_scene, differing.items())))
 
 
 def _compared(*studies: xr.Dataset) -> list[str]:
@@ -239,21 +240,21 @@ def _threshold(dataset: xr.Dataset) -> float:
     return float(job_of(dataset).get("vibration", {}).get("amplitude_threshold", math.nan))
 
 
-def _differing(a: xr.Dataset, b: xr.Dataset) -> dict[str, tuple[Any, Any]]:
+def _differing(a: xr.Dataset, b: xr.Dataset) -> dict[str, tuple[object, object]]:
     """Return by key the values in A and in B that differ beside their axes; None where there is none."""
     swept = {name for dataset in (a, b) for name in axes_of(dataset)}
     found = differences(_document(a), _document(b))
     return {key: pair for key, pair in found.items() if key.rpartition(".")[2] not in swept}
 
 
-def _is_of_scene(difference: tuple[str, tuple[Any, Any]]) -> bool:
+def _is_of_scene(difference: tuple[str, tuple[object, object]]) -> bool:
     """Whether two studies that differ so are of two scenes; what one model alone knows makes none."""
     key, pair = difference
     words = key.split(".")
     return None not in pair and words[0] not in _METHOD and words[-1] not in _METHOD_KEYS
 
 
-def _in_words(found: Mapping[str, tuple[Any, Any]]) -> Iterator[str]:
+def _in_words(found: Mapping[str, tuple[object, object]]) -> Iterator[str]:
     """Yield the differences of two studies in words."""
     for key, (in_a, in_b) in found.items():
         if in_a is not None and in_b is not None:
@@ -264,7 +265,7 @@ def _in_words(found: Mapping[str, tuple[Any, Any]]) -> Iterator[str]:
             yield f"in {label} alone: {', '.join(alone)}"
 
 
-def _document(dataset: xr.Dataset) -> dict[str, Any]:
+def _document(dataset: xr.Dataset) -> Document:
     """Return what determines the numbers of a study, its axes apart: the resolved job and the versions."""
     job = {key: value for key, value in job_of(dataset).items() if key not in ("name", "description", "axes")}
     versions = json.loads(dataset.attrs.get("versions", "{}"))
@@ -299,10 +300,8 @@ def deviations(found: Comparison, who: str = "B deviates") -> Iterator[str]:
         if name in found.quantities:
             unit = found.quantities[name]
             most = f"; at most {found.largest_difference(name):.3g} {'' if unit == '1' else unit}".rstrip()
-        yield (
-            f"{text}: {who} by {deviation.median:.2%} (median), {deviation.high:.2%} (95 %), "
-            f"{deviation.largest:.2%} (largest){most}"
-        )
+        middle, high, largest = (f"{share:.2%}" for share in deviation)
+        yield f"{text}: {who} by {middle} (median), {high} (95 %), {largest} (largest){most}"
 
 
 def sample_sentences(dataset: xr.Dataset, folder: Path, source: str) -> Iterator[str]:

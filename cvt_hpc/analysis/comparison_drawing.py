@@ -40,8 +40,7 @@ def _figure(found: Comparison, sources: tuple[str, str]) -> Figure:
     _draw_map(above, arrangement)
     cells.class_legend(above, kinds, 3)
     _draw_amplitudes(below, found)
-    lines = _title(found, pairs, sources) + list(arrangement.notes)
-    entitle(figure, lines)
+    entitle(figure, _title(found, pairs, sources) + list(arrangement.notes))
     return figure
 
 
@@ -114,9 +113,8 @@ def _draw_amplitudes(figure: SubFigure, found: Comparison) -> None:
 def _draw_guides(axes: Axes, threshold: np.ndarray, low: float, high: float) -> None:
     """Draw equal amplitudes, and the thresholds with what counts as near them."""
     axes.plot([low, high], [low, high], color="#7c8a96", linewidth=0.8, zorder=1)
-    for value, line, span in zip(
-        threshold, (axes.axvline, axes.axhline), (axes.axvspan, axes.axhspan), strict=True
-    ):
+    ways = (axes.axvline, axes.axvspan), (axes.axhline, axes.axhspan)
+    for value, (line, span) in zip(threshold, ways, strict=True):
         if np.isfinite(value):
             line(value, color="#202020", linewidth=0.8, linestyle="--", zorder=1)
             span((1 - NEAR) * value, (1 + NEAR) * value, color="#e9eef2", zorder=0)

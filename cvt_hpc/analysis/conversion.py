@@ -6,6 +6,7 @@ from typing import Any
 
 import numpy as np
 import xarray as xr
+from numpy.typing import DTypeLike
 from xarray.indexes import PandasMultiIndex
 
 from cvt_hpc.errors import mismatch, show, unknown
@@ -108,8 +109,7 @@ def _restored(dataset: xr.Dataset, source: str) -> Iterator[tuple[str, xr.Variab
         if kind in "OSUT" and name not in dataset.xindexes:
             variable = _each(_texts, variable, object)
         elif kind == "m":
-            seconds = variable.astype("m8[ns]").data.astype(float) * 1e-9
-            variable = _changed_to(variable, seconds, units="s")
+            variable = _changed_to(variable, variable.astype("m8[ns]").data.astype(float) * 1e-9, units="s")
         elif kind == "f" and key in BLANKS:
             variable = _each(partial(_flags, blank=BLANKS[key], where=f"{source}: {key}"), variable, np.int8)
         yield key, variable
@@ -134,7 +134,7 @@ def _in_si(variable: xr.Variable, name: str, is_axis: bool, source: str) -> xr.V
 
 
 @np.vectorize(otypes=[object])
-def _texts(value: Any) -> str:
+def _texts(value: object) -> str:
     """A text, of bytes too; empty where there is none."""
     if isinstance(value, bytes):
         return value.decode(errors="replace")
@@ -151,7 +151,7 @@ def _flags(values: np.ndarray, blank: int, where: str) -> np.ndarray:
     return flags
 
 
-def _each(function: Callable[..., Any], variable: xr.Variable, dtype: Any) -> Any:
+def _each(function: Callable, variable: xr.Variable, dtype: DTypeLike) -> xr.Variable:
     """Apply a function of arrays to a variable, lazily where it is chunked."""
     return xr.apply_ufunc(function, variable, dask="parallelized", output_dtypes=[dtype], keep_attrs=True)
 

@@ -5,7 +5,6 @@
 
 from collections.abc import Iterator, Mapping, Sequence
 from itertools import chain
-from typing import Any
 
 import numpy as np
 import xarray as xr
@@ -15,8 +14,10 @@ from matplotlib.lines import Line2D
 
 from cvt_hpc.analysis import arrangement as layout
 from cvt_hpc.analysis import figures
+from cvt_hpc.analysis.arrangement import At, Sides
 from cvt_hpc.analysis.cells import STYLES
 from cvt_hpc.analysis.classes import WITHOUT_RESULT, check_results, occurrence_classes
+from cvt_hpc.analysis.courses import line_of_study
 from cvt_hpc.errors import mismatch, unknown
 from cvt_hpc.variables import Status
 
@@ -36,7 +37,7 @@ MARKS = tuple(mark for mark in figures.MARKERS if mark not in {STYLES[kind].mark
 
 @figures.styled
 def curve_figure(
-    dataset: xr.Dataset, quantities: Sequence[str], at: layout.At = None, source: str = "results"
+    dataset: xr.Dataset, quantities: Sequence[str], at: At = None, source: str = "results"
 ) -> Figure:
     """Draw quantities over an axis.
 
@@ -64,11 +65,11 @@ def curve_figure(
     label = common_words(dataset, quantities)
     all_axes[0].set_ylabel(f"{label} [{unit}]" if unit else label)
     lines = [figures.headline(f"{label[0].upper()}{label[1:]}", dataset.attrs), *notes]
-    set_frame(figure, figures.entries_of(all_axes), lines)
+    set_frame(figure, figures.entries_of(all_axes), [*lines, line_of_study(dataset)])
     return figure
 
 
-def set_frame(figure: Figure, legend: Mapping[str, Any], lines: Sequence[str]) -> None:
+def set_frame(figure: Figure, legend: Mapping[str, figures.Handle], lines: Sequence[str]) -> None:
     """Title and legend of a figure of curves, which grows by the legend; `legend` has handles by label."""
     rows = len(legend) // figures.legend_columns(list(legend))
     figure.set_figheight(figure.get_figheight() + 0.2 * rows)
@@ -181,7 +182,7 @@ def common_words(dataset: xr.Dataset, quantities: Sequence[str]) -> str:
 def curves_figure(
     dataset: xr.Dataset,
     quantities: Sequence[str],
-    at: layout.At = None,
+    at: At = None,
     source: str = "results",
     lines: str | None = None,
 ) -> Figure:
@@ -193,11 +194,7 @@ def curves_figure(
 
 @figures.styled
 def curve_panels_figure(
-    dataset: xr.Dataset,
-    groups: Sequence[Sequence[str]],
-    lines: str,
-    at: layout.At = None,
-    source: str = "results",
+    dataset: xr.Dataset, groups: Sequence[Sequence[str]], lines: str, at: At = None, source: str = "results"
 ) -> Figure:
     """Draw quantities over an axis, by another axis.
 
@@ -210,7 +207,7 @@ def curve_panels_figure(
     check_results(dataset, source)
     for group in groups:
         check_quantities(dataset, group, source)
-    arrangement = layout.arrange(dataset, at or {}, source, layout.Sides(y=lines))
+    arrangement = layout.arrange(dataset, at or {}, source, Sides(y=lines))
     each, notes = panels_of(arrangement, source, len(figures.COLOURS))
     shown, along = arrangement.dataset, {arrangement.x, lines, arrangement.panel}
     panels = [(group, place) for group in groups for place in _places(shown, group, along, source)]
@@ -225,10 +222,9 @@ def curve_panels_figure(
     for unused in all_axes.flat[len(panels) :]:
         unused.set_visible(False)
     x = layout.ruler(shown[arrangement.x])
-    legend: dict[str, Any] = {
-        title: Line2D([], [], color=colour, marker=mark, ms=5, lw=0.7)
-        for (title, _), colour, mark in zip(each, figures.COLOURS, MARKS, strict=False)
-    }
+    legend: dict[str, figures.Handle] = {}
+    for (title, _), colour, mark in zip(each, figures.COLOURS, MARKS, strict=False):
+        legend[title] = Line2D([], [], color=colour, marker=mark, ms=5, lw=0.7)
     for axes, (group, place) in zip(all_axes.flat, panels, strict=False):
         factor, unit = scale(shown, group)
         labels = [place_in_words(shown[dim], k) for dim, k in place.items()]
@@ -246,7 +242,7 @@ def curve_panels_figure(
         axes.grid(linewidth=0.4, alpha=0.5)
     figures.label_x(all_axes, len(panels), x.label)
     title = f"Over {figures.in_words(shown[arrangement.x])}, by {figures.in_words(shown[lines])}"
-    set_frame(figure, legend, [figures.headline(title, dataset.attrs), *notes])
+    set_frame(figure, legend, [figures.headline(title, dataset.attrs), *notes, line_of_study(dataset)])
     return figure
 
 

@@ -1,18 +1,16 @@
 """Eigenfrequencies of the strands over an axis of a study, as fig. 3.7 of Lebrecht et al. 2004."""
 
 import json
-from collections.abc import Mapping
-from pathlib import Path
-from typing import Any
 
 import numpy as np
 import xarray as xr
 from matplotlib.axes import Axes
 from matplotlib.figure import Figure
 
-from cvt_hpc.analysis.arrangement import CHOSEN, Sides, along_x, arrange, ruler
+from cvt_hpc.analysis.arrangement import CHOSEN, Fixed, Sides, along_x, arrange, ruler
 from cvt_hpc.analysis.figures import WIDTH, axis_label, entitle, headline
-from cvt_hpc.analysis.measured import FREQUENCY, Overlay, Side, put_legend, side_of
+from cvt_hpc.analysis.measured import FREQUENCY, File, Overlay, Side, put_legend, side_of
+from cvt_hpc.job.values import Point
 from cvt_hpc.variator import STRANDS
 from cvt_hpc.variator.band import MODES, strand_frequencies
 
@@ -43,7 +41,7 @@ def along_axis(shown: xr.Dataset, x: str) -> xr.DataArray | None:
     return xr.DataArray(found, coordinates, (x, "strand", "half_waves")).transpose("strand", "half_waves", x)
 
 
-def parameters_of(shown: xr.Dataset) -> dict[str, Any]:
+def parameters_of(shown: xr.Dataset) -> Point:
     """Parameters by name [SI] that all runs of results have, by their job and fixed axes."""
     try:
         job = json.loads(shown.attrs.get("job", "{}"))
@@ -55,11 +53,7 @@ def parameters_of(shown: xr.Dataset) -> dict[str, Any]:
 
 
 def eigenfrequency_figure(
-    dataset: xr.Dataset,
-    at: Mapping[str, Any],
-    source: str,
-    sides: Sides = CHOSEN,
-    measured: str | Path | None = None,
+    dataset: xr.Dataset, at: Fixed, source: str, sides: Sides = CHOSEN, measured: File = None
 ) -> Figure:
     """Compose the picture: a panel for each strand, a line for each number of half waves.
 
@@ -91,7 +85,7 @@ def eigenfrequency_figure(
     return figure
 
 
-def _draw_strand(axes: Axes, x: Any, frequency: xr.DataArray) -> None:
+def _draw_strand(axes: Axes, x: np.ndarray, frequency: xr.DataArray) -> None:
     """Lines over x, each with the number of its half waves beside its last point."""
     for number, line in zip(frequency["half_waves"].values, frequency.values.T, strict=True):
         axes.plot(x, line, color=COLOUR, marker=".", markersize=4, linewidth=1.2)

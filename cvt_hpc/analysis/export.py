@@ -190,10 +190,8 @@ def _write_uff(signals: Sequence[Signal], out: Path) -> None:
     except ImportError:
         then = '`pip install "cvt_hpc[uff]"`, or write a .csv'
         raise mismatch(str(out), "the library pyuff", "none", then) from None
-    sets = [
-        {"type": 164, "units_code": 1, "units_description": "SI: Meter (newton)", "temp_mode": 1}
-        | {"length": 1.0, "force": 1.0, "temp": 1.0, "temp_offset": 273.15}
-    ]
+    units = {"type": 164, "units_code": 1, "units_description": "SI: Meter (newton)", "temp_mode": 1}
+    sets = [units | {"length": 1.0, "force": 1.0, "temp": 1.0, "temp_offset": 273.15}]
     for node, signal in enumerate(signals, 1):
         kind = {"ordinate_spec_data_type": KINDS.get(signal.unit, 0), "ordinate_axis_units_lab": signal.unit}
         time = {"abscissa_spacing": 1, "abscissa_spec_data_type": 17, "abscissa_axis_units_lab": "s"}

@@ -33,7 +33,7 @@ from functools import partial, wraps
 from io import BytesIO
 from pathlib import Path
 from textwrap import wrap
-from typing import Any, NamedTuple, ParamSpec
+from typing import Any, NamedTuple, ParamSpec, TypeAlias
 from weakref import WeakSet
 
 import matplotlib
@@ -43,6 +43,7 @@ from matplotlib.artist import Artist
 from matplotlib.axes import Axes
 from matplotlib.axis import Axis, XAxis
 from matplotlib.backends.backend_agg import FigureCanvasAgg
+from matplotlib.container import Container
 from matplotlib.figure import Figure
 from matplotlib.patheffects import AbstractPathEffect, Normal, withStroke
 from matplotlib.text import Text
@@ -68,6 +69,8 @@ LETTER, LINE, GAP = 5.6, 11.0, 5.0  # [point]: width and height of a tick's lett
 TEXTS = 55  # letters of texts side by side along x; more stand upright
 
 P = ParamSpec("P")
+Handle: TypeAlias = "Artist | Container"  # of a legend
+Panels = np.ndarray  # of axes, by row and column
 _AS_WRITTEN: WeakSet[Figure] = WeakSet()
 
 WIDTH = 6.4  # [inch]: letters of 10 points stay readable across a page and on a telephone held sideways
@@ -80,29 +83,16 @@ LEGEND_LETTERS, HANDLE_LETTERS = 84, 8  # across the page, and what a handle wit
 LONGEST_NAME = 27  # letters of a name on an axis
 
 STYLE = {
-    "font.family": "DejaVu Sans",
-    "font.size": 10,
-    "axes.labelsize": 10,
-    "axes.titlesize": 10,
-    "axes.linewidth": 0.8,
-    "figure.titlesize": 11,
-    "figure.labelsize": 10,
-    "xtick.labelsize": 9,
-    "ytick.labelsize": 9,
-    "legend.fontsize": 9,
-    "hatch.linewidth": 0.7,
-    "axes.unicode_minus": True,
+    "font.family": "DejaVu Sans", "font.size": 10, "figure.titlesize": 11, "figure.labelsize": 10,
+    "axes.labelsize": 10, "axes.titlesize": 10, "axes.linewidth": 0.8, "axes.unicode_minus": True,
+    "xtick.labelsize": 9, "ytick.labelsize": 9, "legend.fontsize": 9, "hatch.linewidth": 0.7,
     "svg.hashsalt": "cvt_hpc",
-}
+}  # fmt: skip
 
 _DISPLAY_UNITS = {
-    "m": (1e3, "mm"),
-    "s": (1e3, "ms"),
-    "N": (1e-3, "kN"),
-    "rad s-1": (30 / 3.141592653589793, "rpm"),
-    "rad": (180 / 3.141592653589793, "°"),
-    "1": (1.0, ""),
-}
+    "m": (1e3, "mm"), "s": (1e3, "ms"), "N": (1e-3, "kN"), "1": (1.0, ""),
+    "rad s-1": (30 / 3.141592653589793, "rpm"), "rad": (180 / 3.141592653589793, "°"),
+}  # fmt: skip
 _POWER = re.compile(r"([A-Za-z]+)(-?)(\d?)")
 _RAISED = str.maketrans("23456789", "²³⁴⁵⁶⁷⁸⁹")
 # largest value below which a smaller unit is shown [SI], with its factor
@@ -138,7 +128,7 @@ def value_unit(array: xr.DataArray) -> tuple[float, str]:
     return display_unit(unit)
 
 
-def coordinate_unit(attributes: Mapping[str, Any]) -> tuple[float, str]:
+def coordinate_unit(attributes: Mapping[str, object]) -> tuple[float, str]:
     """Factor and unit in which a coordinate is shown: those of the job where it names one."""
     if JOB_UNITS not in attributes:
         return display_unit(str(attributes.get("units", "")))
@@ -165,7 +155,7 @@ def check_known(dataset: xr.Dataset, names: Iterable[str], source: str) -> None:
         raise mismatch(source, f"known values of {' or '.join(names)}", "none")
 
 
-def headline(subject: str, *attributes: Mapping[str, Any]) -> str:
+def headline(subject: str, *attributes: Mapping[str, str]) -> str:
     """First line above a picture of datasets with these attributes: its subject, and their jobs."""
     jobs = dict.fromkeys(one_line(one.get("job_name", "")) for one in attributes)
     return f"{subject}: {', '.join(filter(None, jobs))}".removesuffix(": ")
@@ -277,7 +267,7 @@ def panels_on_a_page(
     each: int = 1,
     width: float = WIDTH,
     **sharing: Any,
-) -> tuple[Figure, NDArray[Any], float]:
+) -> tuple[Figure, Panels, float]:
     """Figure with panels laid out as by `on_a_page`, of which nothing is drawn beyond those that are used.
 
     Instead of one panel there may be `each`, side by side. Returned are the figure, all panels by row and
@@ -292,23 +282,23 @@ def panels_on_a_page(
     return figure, panels, grid.height
 
 
-def label_x(panels: NDArray[Any], count: int, label: str) -> None:
+def label_x(panels: Panels, count: int, label: str) -> None:
     """Name what runs along x below the last panels of the columns, of which `count` are used."""
     for axes in panels.flat[:count][-panels.shape[1] :]:
         axes.set_xlabel(label)
         axes.tick_params(labelbottom=True)
 
 
-def entries_of(panels: Iterable[Axes]) -> dict[str, Any]:
+def entries_of(panels: Iterable[Axes]) -> dict[str, Handle]:
     """Entries for a legend of several panels: handles by label."""
-    entries: dict[str, Any] = {}
+    entries: dict[str, Handle] = {}
     for axes in panels:
         handles, labels = axes.get_legend_handles_labels()
         entries |= dict(zip(labels, handles, strict=True))
     return entries
 
 
-def legend_below(figure: Figure, entries: Mapping[str, Any], columns: int | None = None) -> None:
+def legend_below(figure: Figure, entries: Mapping[str, Handle], columns: int | None = None) -> None:
     """Put a legend of handles by label below the panels, if there are any, in as many columns as fit."""
     if entries:
         place = {"loc": "outside lower center", "frameon": False}
@@ -316,7 +306,7 @@ def legend_below(figure: Figure, entries: Mapping[str, Any], columns: int | None
         figure.legend(entries.values(), entries.keys(), **place, ncols=ncols)
 
 
-def outlined(width: float, colour: Any = "white") -> list[AbstractPathEffect]:
+def outlined(width: float, colour: str = "white") -> list[AbstractPathEffect]:
     """Outline of a line or a text, which keeps it apart from what it is drawn over."""
     return [withStroke(linewidth=width, foreground=colour), Normal()]
 
@@ -340,8 +330,7 @@ def balanced(line: str, width: int) -> str:
 
 def entitle(figure: Figure, lines: Sequence[str], width: int = 72) -> None:
     """Put lines that are not empty above a picture, each broken as by `balanced`."""
-    text = "\n".join(balanced(line, width) for line in lines if line)
-    figure.suptitle(text.replace("\u00a0", " "))
+    figure.suptitle("\n".join(balanced(line, width) for line in lines if line).replace("\u00a0", " "))
 
 
 def legend_columns(labels: Sequence[str]) -> int:

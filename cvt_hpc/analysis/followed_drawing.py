@@ -34,10 +34,7 @@ LABELS = {"radial_sliding": "radial", "tangential_sliding": "tangential", "slidi
 
 @figures.styled
 def element_figure(
-    history: xr.Dataset,
-    region: str | None = None,
-    source: str = "history",
-    parts: Sequence[str] = tuple(LABELS),
+    history: xr.Dataset, region: str | None = None, source: str = "history", parts: Sequence[str] = (*LABELS,)
 ) -> Figure:
     """Draw the sliding of an element on the sheaves over time.
 
@@ -221,8 +218,7 @@ def _met(places: np.ndarray, values: np.ndarray, position: np.ndarray) -> np.nda
     left = np.clip(np.searchsorted(places, position, "right") - 1, 0, values.shape[1] - 1)
     share = (position - places[left]) / (places[left + 1] - places[left])
     rows = np.arange(position.size)
-    ahead = (left + 1) % values.shape[1]
-    return (1.0 - share) * values[rows, left] + share * values[rows, ahead]
+    return (1.0 - share) * values[rows, left] + share * values[rows, ((left + 1) % values.shape[1])]
 
 
 def passages(followed: xr.Dataset, pulley: str) -> list[slice]:

@@ -11,6 +11,7 @@ from matplotlib.figure import Figure
 from matplotlib.ticker import MaxNLocator
 from scipy.interpolate import CubicSpline
 
+from cvt_hpc.analysis import courses
 from cvt_hpc.analysis import history_panels as panels
 from cvt_hpc.analysis.conversion import standard
 from cvt_hpc.analysis.figures import LONG, WIDTH, balanced, draw, entitle, headline, styled
@@ -52,12 +53,14 @@ def history_figure(dataset: xr.Dataset, source: str = "history") -> Figure:
         (1.6, [(LEFT, panels.draw_displacement, strand), (RIGHT, panels.draw_close_up, strand)])
         for strand in strands
     ]
-    units = {name: {JOB_UNITS: unit} for name, unit in _job_units(dataset.attrs).items()}
-    changing = [name for name in panels.COURSES if _changes(dataset, name)]
-    courses = [dataset[name].assign_attrs(units.get(name, {})) for name in changing]
-    if courses:
-        places = zip((LEFT, RIGHT), courses, strict=False)
-        rows.append((1.2, [(place, panels.draw_course, course) for place, course in places]))
+    changing = [dataset[name] for name in panels.COURSES if _changes(dataset, name)]
+    changing += courses.thrusts(dataset)
+    if changing:
+        units = {name: {JOB_UNITS: unit} for name, unit in _job_units(dataset.attrs).items()}
+        told = [course.assign_attrs(units.get(str(course.name), {})) for course in changing]
+        places = (LEFT, RIGHT) if len(told) < 3 else range(len(told))
+        beside = zip(places, told, strict=False)
+        rows.append((1.2, [(place, panels.draw_course, course) for place, course in beside]))
     rows += [(1.6, [(WHOLE, panels.draw_group, group)]) for group in panels.groups(dataset)]
     if with_spectrum:
         rows.append((2.1, [(WHOLE, panels.draw_spectra, with_spectrum)]))
@@ -114,7 +117,7 @@ def phase_figure(dataset: xr.Dataset, source: str = "history") -> Figure:
         axes.set_title(f"{strand.probes[strand.strongest]}, {frequency:.0f} Hz", loc="left", pad=3)
         axes.set(xlabel="displacement [µm]", ylabel="velocity [mm/s]")
         axes.grid(lw=0.4, alpha=0.5)
-    lines = [headline("Phase portraits", dataset.attrs), ", ".join(place_of(dataset.attrs))]
+    lines = [headline("Phase portraits", dataset.attrs), *_which(dataset.attrs)]
     lines.append(f"motion above {band[0]:.0f} Hz; bold: last {SHOWN_PERIODS} periods, dot: their end")
     entitle(figure, lines, 76)
     return figure
@@ -171,9 +174,7 @@ def settings_of(dataset: xr.Dataset) -> tuple[dict[str, float], tuple[float, flo
 
 def _title(dataset: xr.Dataset) -> str:
     """Which run, and what became of it."""
-    lines = [headline("One run", dataset.attrs)]
-    if place := place_of(dataset.attrs):
-        lines.append(", ".join(place))
+    lines = [headline("One run", dataset.attrs), *_which(dataset.attrs)]
     if "rung" in dataset:
         rung = flag_in_words(dataset["rung"].item(), dataset["rung"].attrs)
         lines.append(f"decided by the {rung} run of model auto, {float(dataset['simulated_seconds']):.3g} s")
@@ -186,6 +187,18 @@ def _title(dataset: xr.Dataset) -> str:
     elif status is not None:
         lines.append(f"{status.name.lower().replace('_', ' ')}" + (f": {reason}" if reason else ""))
     return "\n".join(balanced(line, 76) for line in lines)
+
+
+def _which(attributes: Mapping[str, Any]) -> list[str]:
+    """Place of a run on the axes of its job, and the course that drives it: a line each, if there is any."""
+    return [line for line in (", ".join(place_of(attributes)), course_line(attributes)) if line]
+
+
+def course_line(attributes: Mapping[str, Any]) -> str:
+    """State the course that drives a run, but of what stands in its place."""
+    changed = courses.of_history(attributes)
+    told = values_of(attributes) if changed else {}
+    return courses.line_of({key: text for key, text in changed.items() if key not in told})
 
 
 def place_of(attributes: Mapping[str, Any]) -> list[str]:
@@ -209,7 +222,8 @@ def values_of(attributes: Mapping[str, Any]) -> dict[str, str]:
         keys = [key for key in (*job["axes"], *others) if key in point]
         units = _job_units(attributes)
         told = {key: {"units": schema.parameters[key].unit, JOB_UNITS: units.get(key, "")} for key in keys}
-        return {key: shown(point[key], told[key]) for key in keys}
+        changed = courses.of_history(attributes)
+        return {key: changed.get(key) or shown(point[key], told[key]) for key in keys}
     except (AttributeError, KeyError, TypeError):
         raise mismatch("history: job, point", "a job of this program and a point of it", "others") from None
 

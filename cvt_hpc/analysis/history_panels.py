@@ -21,7 +21,7 @@ CLOSE_UP = 0.01  # [s]: six periods at 600 Hz
 MOST_PEAKS = 3
 COLOURS = ("#d55e00", "#0072b2", "#cc79a7", "#009e73", "#333333")  # Okabe and Ito's, of strands and pulleys
 LINES = ("-", "--", ":", "-.", (0, (5, 1, 1, 1, 1, 1)))  # one for each probe of a strand, by default
-GROUPS = ("tension_", "speed_", "arm_")  # how the names of histories begin that share a panel
+GROUPS = ("tension_", "speed_", "arm_", "axial_force_")  # how the names of histories begin that share a panel
 COURSES = ("driving_speed", "load")  # what a run may change
 FEEDS = {
     "flank_feed": ("friction of the flanks", "#d55e00", "-"),
@@ -222,7 +222,8 @@ def draw_group(axes: Axes, group: list[xr.DataArray]) -> None:
     """Histories of one kind over time: forces of the strands, speeds of the pulleys, angles of the arms."""
     for k, course in enumerate(group):
         factor, unit = coordinate_unit(course.attrs)
-        kind, _, label = str(course.name).partition("_")
+        prefix = next(prefix for prefix in GROUPS if str(course.name).startswith(prefix))
+        kind, label = prefix.strip("_").replace("_", " "), str(course.name).removeprefix(prefix)
         style = {"ls": LINES[k % len(LINES)], "color": COLOURS[k % len(COLOURS)]}
         width = 0.8 + 0.5 * (len(group) - 1 - k)  # of two alike the upper one lets the lower one be seen
         axes.plot(1e3 * course["time"].values, factor * course.values, label=label, linewidth=width, **style)

@@ -1,10 +1,10 @@
 """Onset and end of vibration over a map: lines, and bands where ramps up and down differ."""
 
-from pathlib import Path
 from typing import Any
 
 import numpy as np
 import xarray as xr
+from matplotlib.artist import Artist
 from matplotlib.axes import Axes
 from matplotlib.collections import LineCollection, PolyCollection
 from matplotlib.figure import Figure
@@ -14,9 +14,10 @@ from numpy.typing import NDArray
 
 from cvt_hpc.analysis import arrangement as layout
 from cvt_hpc.analysis import figures
+from cvt_hpc.analysis.arrangement import CHOSEN, At, Sides
 from cvt_hpc.analysis.cells import OF_STARTS, STYLES
 from cvt_hpc.analysis.classes import OccurrenceClass, check_results
-from cvt_hpc.analysis.measured import Overlay, Side, side_of
+from cvt_hpc.analysis.measured import File, Overlay, Side, side_of
 from cvt_hpc.errors import mismatch
 from cvt_hpc.variables import Status, Vibrates
 from cvt_hpc.vibration.classes import StartClass, levels, onsets
@@ -37,8 +38,7 @@ def onset_line(along: layout.Ruler, across: layout.Ruler, classes: NDArray[np.in
     cells. nan stands in rows without an onset.
     """
     borders = np.stack([across.edges[:-1], across.edges[1:]], 1)
-    lowest = lowest_onsets(along.centres, classes)
-    return np.stack([np.repeat(lowest, 2), borders.ravel()], 1)
+    return np.stack([np.repeat(lowest_onsets(along.centres, classes), 2), borders.ravel()], 1)
 
 
 def lowest_onsets(places: NDArray[np.float64], classes: NDArray[np.int8]) -> NDArray[np.float64]:
@@ -47,28 +47,44 @@ def lowest_onsets(places: NDArray[np.float64], classes: NDArray[np.int8]) -> NDA
     return np.array([min(loads, default=np.nan) for loads in rising])
 
 
-def of_each_start(classes: NDArray[np.int8]) -> list[tuple[str, str, NDArray[np.int8]]]:
-    """Name and style of the onset lines of a map, and the classes that each of them separates.
+def within(axis: xr.DataArray) -> str:
+    """How well a border midway between two values of an axis is known: half their distance, as "± 5 N m"."""
+    factor, unit = figures.coordinate_unit(axis.attrs)
+    values = np.sort(factor * axis.values.astype(float))
+    steps = np.diff(values[np.isfinite(values)])
+    if not steps.size or steps.max() > layout.EQUAL * steps.min():
+        return "± half a step"
+    return f"± {figures.number(0.5 * steps.mean(), '.3g')} {unit}".rstrip()
+
+
+def of_each_start(classes: NDArray[np.int8], along: xr.DataArray) -> list[tuple[str, str, NDArray[np.int8]]]:
+    """Name and style of the onset lines of a map along an axis, and the classes that each of them separates.
 
     A map with cells that vibrate from a large start only has two lines.
     """
-    only = classes == StartClass.LARGE_START_ONLY
+    only, known = classes == StartClass.LARGE_START_ONLY, within(along)
     small = np.where(only, OccurrenceClass.QUIET, classes)
     if not only.any():
-        return [("onset of vibration", "-", small)]
+        return [(f"onset of vibration {known}", "-", small)]
     large = np.where(only, OccurrenceClass.VIBRATING, classes)
-    return [("onset from a small start", "-", small), ("onset from a large start", "--", large)]
+    starts = ("small", "-", small), ("large", "--", large)
+    return [(f"onset from a {size} start {known}", line, kinds) for size, line, kinds in starts]
 
 
 def draw_onsets(
-    axes: Axes, x: layout.Ruler, y: layout.Ruler, classes: NDArray[np.int8], along_y: bool
+    axes: Axes,
+    x: layout.Ruler,
+    y: layout.Ruler,
+    classes: NDArray[np.int8],
+    along: xr.DataArray,
+    along_y: bool,
 ) -> list[Line2D]:
     """Draw the onset line of a panel, and that of the large starts beside it; return handles of a legend.
 
-    Arguments as of `cells.draw_cells`, and whether vibration sets in along y.
+    Arguments as of `cells.draw_cells`, the axis along which vibration sets in, and whether that is y.
     """
     handles = []
-    for label, style, kinds in of_each_start(classes):
+    for label, style, kinds in of_each_start(classes, along):
         points = onset_line(y, x, kinds.T)[:, ::-1] if along_y else onset_line(x, y, kinds)
         if np.isfinite(points).all(axis=1).any():
             look = {"color": INK, "ls": style, "lw": 2.2, "label": label}
@@ -112,16 +128,15 @@ def vibration_ranges(dataset: xr.Dataset, source: str = "results") -> xr.DataArr
     lowest, highest = course.min("ramp_share"), course.max("ramp_share")
     found = []
     for is_rising, first, last in ((rise > 0.0, onset, end), (rise < 0.0, end, onset)):
-        lower, upper = (
-            one.where(vibrates & is_rising) for one in (first.fillna(lowest), last.fillna(highest))
-        )
+        ends = (first.fillna(lowest), last.fillna(highest))
+        lower, upper = (one.where(vibrates & is_rising) for one in ends)
         found.append(xr.concat((lower.min(turning[0]), upper.max(turning[0])), "limit"))
     ranges = xr.concat(found, "ramp").assign_coords(ramp=[UP, DOWN], limit=["lower", "upper"])
     units = {"units": QUANTITIES[name].cf_units, "long_name": name}
     return ranges.rename("driving_speed" if name == "speed" else name).assign_attrs(units)
 
 
-def draw_bands(axes: Axes, y: layout.Ruler, ranges: NDArray[np.float64]) -> list[Any]:
+def draw_bands(axes: Axes, y: layout.Ruler, ranges: NDArray[np.float64]) -> list[Artist]:
     """Draw the limits of vibration along both ramps and hatch what lies between; return handles of a legend.
 
     `ranges` (ramp, limit, row) are places along x, as `vibration_ranges` has them.
@@ -132,7 +147,7 @@ def draw_bands(axes: Axes, y: layout.Ruler, ranges: NDArray[np.float64]) -> list
         for (a, b), (low, high) in zip(between, borders, strict=True):
             if np.isfinite([a, b]).all():
                 bands.append([(a, low), (b, low), (b, high), (a, high)])
-    handles: list[Any] = []
+    handles: list[Artist] = []
     look: dict[str, Any] = {"facecolor": "none", "edgecolor": BAND.ink, "hatch": BAND.hatch, "linewidth": 0}
     if bands:
         axes.add_collection(PolyCollection(bands, **look, zorder=2.5))
@@ -149,11 +164,7 @@ def draw_bands(axes: Axes, y: layout.Ruler, ranges: NDArray[np.float64]) -> list
 
 @figures.styled
 def hysteresis_figure(
-    dataset: xr.Dataset,
-    at: layout.At = None,
-    source: str = "results",
-    sides: layout.Sides = layout.CHOSEN,
-    measured: str | Path | None = None,
+    dataset: xr.Dataset, at: At = None, source: str = "results", sides: Sides = CHOSEN, measured: File = None
 ) -> Figure:
     """Draw between which loads or speeds runs vibrate along ramps up and down, and where the two differ.
 
@@ -168,7 +179,7 @@ def hysteresis_figure(
     notes: tuple[str, ...] = ()
     y_name = panel = None
     if axes_left.dims:
-        along = layout.Sides(sides.y, sides.panel)
+        along = Sides(sides.y, sides.panel)
         shown = layout.first_panel(layout.arrange(xr.Dataset({"status": axes_left}), at or {}, source, along))
         names = [name for name in (shown.x, shown.y) if name]
         # what runs along x of a map runs along y here, because x is what is ramped
@@ -182,7 +193,7 @@ def hysteresis_figure(
     then = f"fix an axis, as by `--at {panel}=VALUE`, or choose another one by `--panel AXIS`"
     page = count, (1, 2), (LEAST, wanted), FRAME, source, then
     figure, panels, _ = figures.panels_on_a_page(*page, sharex=True)
-    legend: dict[str, Any] = {}
+    legend: dict[str, figures.Handle] = {}
     both = STYLES[OccurrenceClass.VIBRATING].fill
     for k, axes in enumerate(panels.flat[:count]):
         part = ranges.isel({panel: k}) if panel else ranges

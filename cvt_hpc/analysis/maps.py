@@ -9,13 +9,12 @@ harmonic of it have a diamond for a dot. Into irregular cells their amplitude is
 Where runs begin with a small and with a large disturbance, one map shows where the start decides.
 """
 
-from collections.abc import Iterator, Mapping
+from collections.abc import Iterator
 from dataclasses import dataclass, replace
-from pathlib import Path
-from typing import Any
 
 import numpy as np
 import xarray as xr
+from matplotlib.artist import Artist
 from matplotlib.axes import Axes
 from matplotlib.figure import Figure
 from matplotlib.lines import Line2D
@@ -34,9 +33,10 @@ from cvt_hpc.analysis.classes import (
     occurrence_classes,
 )
 from cvt_hpc.analysis.conversion import standard
+from cvt_hpc.analysis.courses import line_of_study
 from cvt_hpc.analysis.eigenfrequencies import eigenfrequency_figure
 from cvt_hpc.analysis.hysteresis_bands import draw_onsets
-from cvt_hpc.analysis.measured import Overlay, side_of
+from cvt_hpc.analysis.measured import File, Overlay, side_of
 from cvt_hpc.analysis.probability import PROBABILITY, has_samples
 from cvt_hpc.analysis.probability_drawing import probability_figure
 from cvt_hpc.analysis.scatter import is_sampled, scatter_figure
@@ -63,7 +63,7 @@ def map_figure(
     source: str = "results",
     sides: layout.Sides = layout.CHOSEN,
     vmax: cells.End = None,
-    measured: str | Path | None = None,
+    measured: File = None,
 ) -> Figure:
     """Draw where vibration occurs.
 
@@ -224,20 +224,21 @@ def _lay_out(figure: Figure, inner: list[Axes]) -> None:
         ax.set_visible(True)
 
 
-def _draw_onsets(axes: NDArray[Any], sheet: Sheet) -> list[Any]:
+def _draw_onsets(axes: figures.Panels, sheet: Sheet) -> list[Artist]:
     """Lines of onset along the load, or the axis in its place; return handles for the legend."""
     arrangement = sheet.arrangement
     along = next((name for name in ALONG if name in (arrangement.x, arrangement.y)), None)
-    handles: dict[str, Any] = {}
+    handles: dict[str, Artist] = {}
     if along is None or arrangement.y is None:
         return []  # of a single row the cells show it
     for panel, ax in _panels_of(axes, sheet):
-        for handle in draw_onsets(ax, sheet.x, sheet.y, sheet.classes[panel], along == arrangement.y):
+        cells_of, axis = (sheet.x, sheet.y, sheet.classes[panel]), arrangement.dataset[along]
+        for handle in draw_onsets(ax, *cells_of, axis, along == arrangement.y):
             handles.setdefault(handle.get_label(), handle)
     return list(handles.values())
 
 
-def _panels_of(axes: NDArray[Any], sheet: Sheet) -> Iterator[tuple[int, Axes]]:
+def _panels_of(axes: figures.Panels, sheet: Sheet) -> Iterator[tuple[int, Axes]]:
     """Yield the panels that hold cells, of all blocks, with their numbers within these."""
     for k, ax in enumerate(axes.flat):
         if (panel := k % (sheet.rows * sheet.columns)) < sheet.panels:
@@ -252,7 +253,7 @@ def sheet_of(arrangement: layout.Arrangement, source: str = "results", frame: fl
     dataset = arrangement.dataset
     names = [arrangement.panel, arrangement.y, arrangement.x]
 
-    def grid(variable: xr.DataArray) -> NDArray[Any]:
+    def grid(variable: xr.DataArray) -> np.ndarray:
         present = variable.transpose(*filter(None, names))
         return present.values.reshape([dataset.sizes[name] if name else 1 for name in names])
 
@@ -262,9 +263,8 @@ def sheet_of(arrangement: layout.Arrangement, source: str = "results", frame: fl
     if "vibrates" in dataset:
         # of a cell from two starts the amplitude is that from the small one
         irregular &= grid(dataset["vibrates"]) == Vibrates.IRREGULAR
-    amplitude, frequency, strongest = (
-        grid(at_strongest_strand(dataset, name)) for name in ("amplitude", "frequency", "strongest_frequency")
-    )
+    read = ("amplitude", "frequency", "strongest_frequency")
+    amplitude, frequency, strongest = (grid(at_strongest_strand(dataset, name)) for name in read)
     amplitude *= 1e6
     sheet = Sheet(
         arrangement,
@@ -300,7 +300,7 @@ def _laid_out(sheet: Sheet, source: str, frame: float) -> Sheet:
 
 
 def draw_block(
-    figure: Figure, axes: NDArray[Any], sheet: Sheet, values: NDArray[np.float64], scale: cells.Scale
+    figure: Figure, axes: figures.Panels, sheet: Sheet, values: NDArray[np.float64], scale: cells.Scale
 ) -> None:
     """One set of panels, their vibrating cells coloured by `values`, and the colour bar."""
     mark = float(np.clip(0.35 * min(sheet.smallest_cell), 1.5, 5.0))
@@ -352,7 +352,7 @@ def _title(sheet: Sheet) -> list[str]:
         lines.append(f"each from a small and a large start: disturbance {attributes['starts']}")
     if inferred.size:
         lines.append(f"{inferred.size} cells inferred: {count_classes(inferred)}")
-    lines.append(", ".join(sheet.arrangement.notes))
+    lines += [", ".join(sheet.arrangement.notes), line_of_study(sheet.arrangement.dataset)]
     if sheet.arrangement.panel and sheet.columns > NAMED:
         lines.append(f"panels: {figures.in_words(sheet.arrangement.dataset[sheet.arrangement.panel])}")
     if sheet.writes_frequency:
@@ -362,7 +362,7 @@ def _title(sheet: Sheet) -> list[str]:
     return lines
 
 
-def has_starts(dataset: xr.Dataset, at: Mapping[str, Any]) -> bool:
+def has_starts(dataset: xr.Dataset, at: layout.Fixed) -> bool:
     """Whether a map is to join runs from several disturbances: that axis is free, and not alone."""
     dims = dataset["status"].dims
     return AXIS in dims and AXIS not in at and dataset.sizes[AXIS] > 1 and len(set(dims) - set(at)) > 1
@@ -383,7 +383,7 @@ def join_starts(dataset: xr.Dataset) -> xr.Dataset:
     return small.assign(joined).assign_attrs(starts=words)
 
 
-def start_line(dataset: xr.Dataset, at: Mapping[str, Any], source: str) -> str:
+def start_line(dataset: xr.Dataset, at: layout.Fixed, source: str) -> str:
     """State how many cells of a map vibrate from the large start only."""
     drawn = arrange(join_starts(dataset), at, source).dataset
     classes = map_classes(drawn)

@@ -32,13 +32,13 @@ from matplotlib.patches import Rectangle
 from numpy.typing import NDArray
 
 from cvt_hpc.analysis import arrangement as layout
-from cvt_hpc.analysis.alignment import job_held
 from cvt_hpc.analysis.classes import ALONG
-from cvt_hpc.analysis.figures import coordinate_unit, legend_below, outlined
+from cvt_hpc.analysis.figures import Handle, coordinate_unit, legend_below, outlined
+from cvt_hpc.analysis.held_job import job_held
 from cvt_hpc.analysis.scatter import is_sampled
 from cvt_hpc.errors import JobWarning, did_you_mean, few_of, mismatch, nearest, show
 from cvt_hpc.job import Job
-from cvt_hpc.job.csv_files import MOST_BYTES, content_of, read_csv
+from cvt_hpc.job.csv_files import content_of, read_csv
 from cvt_hpc.job.values import shown, si_unit
 from cvt_hpc.parameters import Column, FromFile, RowError
 from cvt_hpc.variables import shortened
@@ -55,6 +55,7 @@ _UNITS = dict.fromkeys((*_BAND, FREQUENCY), "Hz") | {"amplitude": "m", "directio
 ALIKE = 0.01  # of a parameter that does not vary: so far the measured value may be off
 _PLACE = "measured file"
 _MOST_NAMED = 8
+_MOST_BYTES = 2**20  # of a table of onsets, windows or peaks
 _LEAST = 1e-300  # stands for zero on a logarithmic side
 
 INK = "#0033dd"  # of nothing that is computed; in grey, dark within a white outline
@@ -66,7 +67,9 @@ _LOOK: dict[str, Any] = {"color": INK, "lw": 2.0, "ms": 7.0}
 _MARKS = {"x": {True: ">", False: "<"}, "y": {True: "^", False: "v"}}  # of an onset, as the axis goes
 
 Array = NDArray[np.float64]
+File = str | Path | None  # with measured values, if there is one
 Span = tuple[float, float]
+Constants = dict[str, tuple[float, str]]  # by key a value [SI] and its unit
 Fault = tuple[Sequence[str], str, NDArray[np.bool_]]  # columns, what is expected of rows, which ones differ
 
 
@@ -217,7 +220,7 @@ def read_measured(
     return Measured(Path(path).name, kind, along, rows)
 
 
-def _constants(dataset: xr.Dataset, job: Job | None) -> dict[str, tuple[float, str]]:
+def _constants(dataset: xr.Dataset, job: Job | None) -> Constants:
     """Return by name what a study, or a run, holds at one value [SI], and its unit."""
     told: dict[str, Any] = {}
     units: dict[str, str] = {}
@@ -246,17 +249,13 @@ def _declaration(path: Path, units: dict[str, str], axes: list[str]) -> tuple[st
 
     `units` are those of axes and constants [SI].
     """
-    text = content_of(path, MOST_BYTES, f"{_PLACE}: {path}", "a CSV file", ".csv").replace(b"\0", b"")
+    text = content_of(path, _MOST_BYTES, f"{_PLACE}: {path}", "a CSV file", ".csv").replace(b"\0", b"")
     lines = [line for line in text.decode("latin-1").splitlines() if not line.lstrip().startswith("#")]
     cells = [re.split(r"[\[(]", cell)[0].strip(' "') for cell in re.split(r"[,;\t\n]", "\n".join(lines))]
     words = list(dict.fromkeys(re.sub(r"[\s_]+", "_", cell.casefold()) for cell in cells))
     names = sorted(units, key=lambda name: (name not in axes, name not in ALONG))
-    heads = {
-        head.format(name): (kind, name)
-        for kind in (WINDOW, ONSET)
-        for name in names
-        for head in _KINDS[kind][0]
-    }
+    kinds = (WINDOW, ONSET)
+    heads = {head.format(name): (kind, name) for kind in kinds for name in names for head in _KINDS[kind][0]}
     known = [heads[word] for word in words if word in heads]
     known += [(PEAK, name) for name in names if {name, FREQUENCY} <= {*words}]
     if not known:
@@ -278,8 +277,7 @@ def _faults(along: str, values: dict[str, Array]) -> Iterator[Fault]:
         if name in values:
             yield (name,), f"{name} > 0", values[name] <= 0.0
     if "direction" in values:
-        expected = "direction 1 (rising) or -1 (falling)"
-        yield ("direction",), expected, np.abs(values["direction"]) != 1.0
+        yield ("direction",), "direction 1 (rising) or -1 (falling)", np.abs(values["direction"]) != 1.0
     for name in (along, f"measured_{along}", FREQUENCY):
         pair = f"{name}_from", f"{name}_to"
         if len(there := [one for one in pair if one in values]) == 1:
@@ -289,11 +287,7 @@ def _faults(along: str, values: dict[str, Array]) -> Iterator[Fault]:
 
 
 def _row(
-    told: dict[str, float],
-    kind: str,
-    along: str,
-    sides: dict[str, Side],
-    constants: dict[str, tuple[float, str]],
+    told: dict[str, float], kind: str, along: str, sides: dict[str, Side], constants: Constants
 ) -> Row | None:
     """Return a row at its place in a study; None where it has none."""
     ends = [told[name.format(along)] for name in _KINDS[kind][0] if name != FREQUENCY]
@@ -344,12 +338,12 @@ class Overlay:
             self._measured = path or Measured("", "", "", ())
         else:
             self._measured = read_measured(path, dataset, source)
-        self.entries: dict[str, Any] = {}
+        self.entries: dict[str, Handle] = {}
         self.height = 0.0 if path is None else LEGEND
         self.note = "" if path is None else f"measured: {shortened(self._measured.name, LONGEST_NAME)}"
 
     @property
-    def handles(self) -> list[Any]:
+    def handles(self) -> list[Handle]:
         """Handles of the entries."""
         return list(self.entries.values())
 
@@ -392,9 +386,8 @@ class Overlay:
             self._outline(axes, box, "measured noise", DASHES)
         elif kind == PEAK and box:  # at the lower end of a side that tells nothing of it
             whole = [np.array_equal(one, side.edges[[0, -1]]) for one, side in zip(box, sides, strict=True)]
-            x, y = (
-                one[:1] if rest else one.mean(keepdims=True) for one, rest in zip(box, whole, strict=True)
-            )
+            pairs = zip(box, whole, strict=True)
+            x, y = (one[:1] if rest else one.mean(keepdims=True) for one, rest in pairs)
             self._line(axes, x, y, "measured peak", marker="P", ls="")
         elif kind == ONSET and on and box:
             x, y = (np.array([low, 0.5 * (low + high), high]) for low, high in box)

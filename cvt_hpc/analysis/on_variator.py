@@ -264,11 +264,8 @@ def balance_of(history: xr.Dataset) -> Balance | None:
     if None in known:
         return None
     driving, load, loss = map(float, known)  # type: ignore[arg-type]  # none is None
-    causes = [
-        str(name)
-        for name, array in history.data_vars.items()
-        if str(name).endswith("_loss") and array.attrs.get("units") == "W" and set(array.dims) <= {"pulley"}
-    ]
+    powers = {str(k): v for k, v in history.data_vars.items() if v.attrs.get("units") == "W"}
+    causes = [k for k, v in powers.items() if k.endswith("_loss") and set(v.dims) <= {"pulley"}]
     losses: dict[str, float] = {}
     for name in causes:
         for place in np.atleast_1d(history.get("pulley", "")) if history[name].dims else [""]:

@@ -28,6 +28,7 @@ Array = NDArray[np.float64]
 # Turns of a pulley (n,) [Hz], how many orders of them one order is, a number or (n,), and by which share this
 # may be off
 Turning = tuple[Array, Any, float]
+Curves = Mapping[str, tuple[Array, Array, Array]]  # by name places, amplitudes [SI], frequencies [Hz]
 Order = tuple[float, str]  # the multiple, and of what: "driving" or "driven" pulley, passing "elements"
 
 BANDWIDTH = 1.0  # orders, in which power is summed
@@ -69,7 +70,7 @@ def read_orders(given: Iterable[float | str], bandwidth: float) -> dict[str, Ord
 
 def track(
     values: Array, turned: Array, band: tuple[float, float], length: float
-) -> tuple[NDArray[Any], Array]:
+) -> tuple[NDArray[np.intp], Array]:
     """Amplitude of what a signal (n,) has in a band of orders, in windows of equally many turns.
 
     The signal is multiplied by a Hann window over the angle, freed of a cubic drift, and transformed over the
@@ -185,8 +186,7 @@ def order_cuts_figure(
         found = few_of([*map(str, dataset["status"].dims), *map(str, dataset.data_vars)], 6)
         raise mismatch(source, "results over the axis driving_speed with the variable spectrum", found)
     figures.check_known(dataset, ["spectrum"], source)
-    arrangement = layout.arrange(dataset, at or {}, source, layout.Sides("driving_speed"))
-    shown, fixed = layout.along_x(arrangement)
+    shown, fixed = layout.along_x(layout.arrange(dataset, at or {}, source, layout.Sides("driving_speed")))
     wanted, known = read_orders(orders, bandwidth), _turning_over(shown)
     notes: dict[str, str] = {}
     x, bins = layout.ruler(shown["driving_speed"]), shown["frequency_bin"].values
@@ -271,17 +271,12 @@ def _known_orders(
 
 
 def _draw(
-    axes: Axes,
-    lines: Mapping[str, tuple[Array, Array, Array]],
-    unit: str,
-    velocity: bool,
-    as_level: bool,
-    notes: dict[str, str],
+    axes: Axes, curves: Curves, unit: str, velocity: bool, as_level: bool, notes: dict[str, str]
 ) -> None:
     """Draw lines by their names: places, amplitudes [SI] and frequencies [Hz], (n,) each."""
     unit = "m s-1" if velocity else unit
     reference, shown = time_signals.shown_in(unit)
-    for k, (words, (x, amplitude, frequency)) in enumerate(lines.items()):
+    for k, (words, (x, amplitude, frequency)) in enumerate(curves.items()):
         if not np.isfinite(amplitude).any():
             notes[words] = f"{words}: beyond the frequencies that are recorded"
             continue

@@ -7,7 +7,7 @@
 """
 
 import json
-from collections.abc import Mapping, Sequence
+from collections.abc import Sequence
 from itertools import cycle
 from typing import Any, NamedTuple
 
@@ -25,6 +25,7 @@ from cvt_hpc.analysis.followed_drawing import lengths_of
 from cvt_hpc.analysis.telling_apart import entitle_runs, on_axes
 from cvt_hpc.errors import mismatch
 from cvt_hpc.job import stored_job
+from cvt_hpc.job.values import Table
 from cvt_hpc.physics.friction import friction_coefficients, given_law
 from cvt_hpc.variables import Status, Vibrates
 
@@ -98,18 +99,16 @@ def _draw_blocks(axes: Axes, history: xr.Dataset) -> None:
         (2.0, "oscillator", f"elements and belt:\n{strands}"),
     )
     for x, name, text in blocks:
-        axes.add_patch(
-            FancyBboxPatch((x, 0.0), 0.72, 0.62, "round,pad=0.02", facecolor="#f2f2f2", edgecolor="#333333")
-        )
+        look = {"facecolor": "#f2f2f2", "edgecolor": "#333333"}
+        axes.add_patch(FancyBboxPatch((x, 0.0), 0.72, 0.62, "round,pad=0.02", **look))
         axes.text(x + 0.36, 0.52, name, ha="center", va="top", fontweight="bold", fontsize=9)
         axes.text(x + 0.36, 0.24, text, ha="center", va="center", fontsize=8.5)
     _arrow(axes, (0.76, 0.31), (0.96, 0.31), "#333333")
     fed = found.outlet
     ends = ((1.76, 0.42), (1.96, 0.42)) if fed > 0.0 else ((1.96, 0.42), (1.76, 0.42))
     _arrow(axes, *ends, FEEDING if fed > 0.0 else TAKING)
-    axes.text(
-        1.86, 0.7, f"driven outlet {figures.number(fed, SIGNED)} W", ha="center", va="bottom", fontsize=8.5
-    )
+    outlet = f"driven outlet {figures.number(fed, SIGNED)} W"
+    axes.text(1.86, 0.7, outlet, ha="center", va="bottom", fontsize=8.5)
     _arrow(axes, (2.36, -0.04), (1.36, -0.04), "#333333", "arc3,rad=-0.25")
     axes.text(1.86, -0.35, "its state sets the switch", ha="center", va="top", fontsize=8.5)
     _arrow(axes, (2.76, 0.31), (2.96, 0.31), TAKING)
@@ -220,12 +219,11 @@ def curves_of(dataset: xr.Dataset, speeds: np.ndarray) -> dict[float, np.ndarray
     job: Any = stored_job(json.loads(dataset.attrs["job"]), "dataset")
     found = {}
     for gradient in dataset["friction_gradient"].values:
-        point = job.point_at({"friction_gradient": float(gradient)})
-        found[float(gradient)] = regularised(point, speeds)
+        found[float(gradient)] = regularised(job.point_at({"friction_gradient": float(gradient)}), speeds)
     return found
 
 
-def regularised(point: Mapping[str, Any], speeds: np.ndarray) -> np.ndarray:
+def regularised(point: Table, speeds: np.ndarray) -> np.ndarray:
     """Coefficients of friction (n,) of a run's parameters [SI] at sliding speeds (n,) [m/s], unloaded."""
     coefficients = friction_coefficients(given_law(point), speeds, np.zeros(speeds.size))
     return np.asarray(coefficients * np.tanh(speeds / point["friction_speed"]))

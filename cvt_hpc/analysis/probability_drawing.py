@@ -1,7 +1,6 @@
 """Pictures over samples of uncertain parameters: probability, bands of the onset, and what it depends on."""
 
 from collections.abc import Sequence
-from pathlib import Path
 from typing import NamedTuple
 
 import numpy as np
@@ -11,25 +10,19 @@ from matplotlib.figure import Figure
 from numpy.typing import NDArray
 
 from cvt_hpc.analysis import arrangement as layout
-from cvt_hpc.analysis import figures
+from cvt_hpc.analysis import figures, sensitivity
+from cvt_hpc.analysis.arrangement import CHOSEN, At, Sides
 from cvt_hpc.analysis.classes import axes_in_words, check_results
+from cvt_hpc.analysis.courses import line_of_study
 from cvt_hpc.analysis.curves import set_frame
-from cvt_hpc.analysis.measured import Overlay, Side, side_of
+from cvt_hpc.analysis.hysteresis_bands import within
+from cvt_hpc.analysis.measured import File, Overlay, Side, side_of
 from cvt_hpc.analysis.probability import CONTOURS, PROBABILITY, over_samples
-from cvt_hpc.analysis.sensitivity import (
-    ONSET,
-    QUANTILES,
-    QUARTERS,
-    indices_of,
-    members,
-    onset_axis,
-    onset_scatter,
-    widest_row,
-)
 from cvt_hpc.analysis.value_maps import value_map_figure
 from cvt_hpc.errors import mismatch, unknown
 from cvt_hpc.job.axes import SAMPLE, SWAPPED
 
+Array = NDArray[np.float64]
 LINE, BAND = figures.COLOURS[0], "#9ecae1"
 DEEP = figures.COLOURS[1]
 _BOUNDS = ("", "_low", "_high")  # a value and the ends of its 95 % bounds
@@ -40,18 +33,14 @@ class _Panel(NamedTuple):
     """A line and the band around it, arrays over x in units for people."""
 
     title: str
-    low: NDArray[np.float64]
-    middle: NDArray[np.float64]
-    high: NDArray[np.float64]
+    low: Array
+    middle: Array
+    high: Array
 
 
 @figures.styled
 def probability_figure(
-    dataset: xr.Dataset,
-    at: layout.At = None,
-    source: str = "results",
-    sides: layout.Sides = layout.CHOSEN,
-    measured: str | Path | None = None,
+    dataset: xr.Dataset, at: At = None, source: str = "results", sides: Sides = CHOSEN, measured: File = None
 ) -> Figure:
     """Draw the probability of vibration: over two axes with contours, over one with its 95 % interval.
 
@@ -74,18 +63,15 @@ def probability_figure(
     for share in CONTOURS:
         axes.axhline(share, color="#777777", ls="--" if share != CONTOURS[1] else "-", lw=0.8, zorder=0.5)
     head = f"P{figures.in_words(shown[name])[1:]}"
-    lines = [figures.headline(head, dataset.attrs), told.attrs["counted"], *arrangement.notes, over.note]
+    fixed = [*arrangement.notes, line_of_study(dataset)]
+    lines = [figures.headline(head, dataset.attrs), told.attrs["counted"], *fixed, over.note]
     set_frame(figure, figures.entries_of([axes]) | over.entries, lines)
     return figure
 
 
 @figures.styled
 def onset_bands_figure(
-    dataset: xr.Dataset,
-    at: layout.At = None,
-    source: str = "results",
-    sides: layout.Sides = layout.CHOSEN,
-    along: str = "",
+    dataset: xr.Dataset, at: At = None, source: str = "results", sides: Sides = CHOSEN, along: str = ""
 ) -> Figure:
     """Draw the onset of vibration along an axis over another one: its median and 5 to 95 % of the samples.
 
@@ -94,15 +80,15 @@ def onset_bands_figure(
     """
     check_results(dataset, source)
     told = over_samples(dataset, at or {})
-    along = along or onset_axis(told, at or {})
+    along = along or sensitivity.onset_axis(told, at or {})
     known = [name for name in map(str, told["status"].dims) if name not in (at or {})]
     if "counted" not in told.attrs or along not in known or told["status"].ndim < 2:
         which = f"{along} with numbers" if along else "one of numbers"
         expected = f"results over samples, {which}, and a further axis, such as friction_gradient"
         raise mismatch(source, expected, axes_in_words(dataset))
-    quantiles = onset_scatter(dataset, along)["onset"]
+    quantiles = sensitivity.onset_scatter(dataset, along)["onset"]
     axes_left = xr.Dataset({"status": told["status"].isel({along: 0}, drop=True), "onset": quantiles})
-    arrangement = layout.arrange(axes_left, at or {}, source, layout.Sides(sides.x, sides.panel))
+    arrangement = layout.arrange(axes_left, at or {}, source, Sides(sides.x, sides.panel))
     arrangement = layout.first_panel(arrangement)
     shown, over = arrangement.dataset, arrangement.y
     factor, unit = figures.coordinate_unit(quantiles.attrs)
@@ -114,12 +100,12 @@ def onset_bands_figure(
         low, _, high = np.clip(values, *_ends(factor * told[along].values))
         panels.append(_Panel(title, low, np.where(np.isinf(values[1]), np.nan, values[1]), high))
     label = f"onset in {figures.axis_label(told[along], unit)}"
-    least, _, most = QUANTILES
+    least, _, most = sensitivity.QUANTILES
     labels = "median", f"{least} to {most} of the samples"
     then = "fix an axis, as by `--at AXIS=VALUE`"
     figure, first = _draw_bands(panels, layout.ruler(shown[arrangement.x]), label, labels, source, then)
     size = dataset.sizes[SAMPLE] * (2 if SWAPPED in dataset.dims else 1)
-    samples = f"{size} samples; the band ends where the axis does"
+    samples = f"{size} samples, onsets {within(told[along])}; the band ends where the axis does"
     head = figures.headline("Onset of vibration", dataset.attrs)
     set_frame(figure, figures.entries_of([first]), [head, samples, *arrangement.notes])
     return figure
@@ -127,7 +113,7 @@ def onset_bands_figure(
 
 @figures.styled
 def sensitivity_figure(
-    dataset: xr.Dataset, at: layout.At = None, source: str = "results", along: str = ""
+    dataset: xr.Dataset, at: At = None, source: str = "results", along: str = ""
 ) -> Figure:
     """Draw which uncertain parameters the onset of vibration depends on, a bar for each.
 
@@ -145,11 +131,11 @@ def sensitivity_figure(
         if name not in dims:
             raise unknown(where, "axis of the results", name, dims)
         dataset = dataset.isel({name: [layout.index_of(dataset[name], value, where)]})
-    along = along or onset_axis(dataset, at or {})
-    found = onset_scatter(dataset, along, source)
+    along = along or sensitivity.onset_axis(dataset, at or {})
+    found = sensitivity.onset_scatter(dataset, along, source)
     if "band" not in found:
         raise mismatch(source, "results with the job that states the distributions", "others")
-    row = widest_row(found)
+    row = sensitivity.widest_row(found)
     place = ", ".join(layout.place_text(found[name], k, " = ") for name, k in row.items())
     head = figures.headline(f"What the onset in {figures.in_words(dataset[along])} depends on", dataset.attrs)
     lines = [head, place.replace("_", " ")]
@@ -158,16 +144,16 @@ def sensitivity_figure(
         lines.append("hardly any sample vibrates along the axis: extend it, or take more samples")
     swing = np.abs(here["quarter_onset"].diff("quarter").values[0])
     here = here.isel(parameter=np.argsort(np.where(np.isfinite(swing), swing, -1.0)))
-    factor, unit = figures.coordinate_unit(here[ONSET].attrs)
+    factor, unit = figures.coordinate_unit(here[sensitivity.ONSET].attrs)
     ends = _ends(dataset[along].values[np.isfinite(dataset[along].values)])
-    middle = factor * np.clip(here[ONSET].values[1], *ends)
+    middle = factor * np.clip(here[sensitivity.ONSET].values[1], *ends)
     medians = factor * np.clip(here["quarter_onset"].fillna(middle / factor).values, *ends)
     places, names = np.arange(float(here.sizes["parameter"])), here["parameter"].values
     heads = [f"median onset [{unit}]", f"5 to 95 % [{unit}]"]
     heads += ["Sobol index"] * (SWAPPED in dims)
     figure = Figure((figures.WIDTH, FRAME + 0.45 * places.size + 0.3), layout="constrained")
     all_axes = figure.subplots(1, len(heads), sharey=True)
-    for median, colour, quarter in zip(medians, (LINE, DEEP), QUARTERS, strict=True):
+    for median, colour, quarter in zip(medians, (LINE, DEEP), sensitivity.QUARTERS, strict=True):
         label = f"{quarter} of the parameter"
         all_axes[0].barh(places, median - middle, left=middle, color=colour, label=label)
     halved = factor * np.stack([here[f"halved_band{end}"].values for end in _BOUNDS])
@@ -175,11 +161,12 @@ def sensitivity_figure(
     if np.isfinite(band := factor * here["band"].item()):
         all_axes[1].axvline(band, color="k", ls="--", lw=1.0, label="scatter as it is")
     if SWAPPED in dims:
-        shares = indices_of(dataset, ONSET, along, source).isel(row).sel(parameter=names)
+        shares = sensitivity.indices_of(dataset, sensitivity.ONSET, along, source)
+        shares = shares.isel(row).sel(parameter=names)
         for key, shift, colour in (("first_order", 0.18, "#756bb1"), ("total_order", -0.18, "#bcbddc")):
             values = np.stack([shares[f"{key}{end}"].values for end in _BOUNDS])
             _draw_bars(all_axes[2], places + shift, values, key.replace("_", " "), colour, 0.34)
-    all_axes[0].set_yticks(places, [",\n".join(members(dataset, str(name))) for name in names])
+    all_axes[0].set_yticks(places, [",\n".join(sensitivity.members(dataset, str(name))) for name in names])
     for axes, head in zip(all_axes, heads, strict=True):
         axes.set_xlabel(head)
         axes.grid(axis="x", lw=0.4, alpha=0.5)
@@ -188,12 +175,7 @@ def sensitivity_figure(
 
 
 def _draw_bars(
-    axes: Axes,
-    places: NDArray[np.float64],
-    values: NDArray[np.float64],
-    label: str,
-    colour: str,
-    height: float = 0.8,
+    axes: Axes, places: Array, values: Array, label: str, colour: str, height: float = 0.8
 ) -> None:
     """Draw bars of values and their bounds, shape (3, places); none where one is not known or infinite."""
     known = np.isfinite(values[0])
@@ -206,17 +188,12 @@ def _draw_bars(
         axes.text(0.0, place, " beyond the axis", va="center", fontsize="small")
 
 
-def _ends(values: NDArray[np.float64]) -> tuple[float, float]:
+def _ends(values: Array) -> tuple[float, float]:
     return float(values.min()), float(values.max())
 
 
 def _draw_bands(
-    panels: Sequence[_Panel],
-    x: layout.Ruler,
-    label: str,
-    labels: tuple[str, str],
-    source: str,
-    then: str,
+    panels: Sequence[_Panel], x: layout.Ruler, label: str, labels: tuple[str, str], source: str, then: str
 ) -> tuple[Figure, Axes]:
     """Draw a line and a band in each panel, and return the figure and its first panel."""
     page = len(panels), (1, 2), (LEAST, HEIGHT), FRAME, source, then

@@ -15,7 +15,14 @@ from matplotlib.figure import Figure
 from matplotlib.lines import Line2D
 
 from cvt_hpc.analysis import figures
-from cvt_hpc.analysis.telling_apart import check_holds, entitle_runs, named, on_axes, told_apart
+from cvt_hpc.analysis.telling_apart import (
+    check_holds,
+    common_course,
+    entitle_runs,
+    named,
+    on_axes,
+    told_apart,
+)
 from cvt_hpc.errors import InputError, mismatch, unknown
 from cvt_hpc.variator import PULLEYS
 
@@ -231,11 +238,10 @@ class End(NamedTuple):
 def ends_of_arcs(history: xr.Dataset) -> list[End]:
     """Inlet and outlet of both arcs, in the order of the path; places are those between two of `position`."""
     half = float(history["position"].values[0])
-    return [
-        End(f"{pulley} {end}", at - half, way)
-        for a, b, pulley in arcs(history)
-        for end, at, way in (("inlet", a, 1.0), ("outlet", b, -1.0))
-    ]
+    ends = []
+    for a, b, pulley in arcs(history):
+        ends += [End(f"{pulley} inlet", a - half, 1.0), End(f"{pulley} outlet", b - half, -1.0)]
+    return ends
 
 
 def alone(history: xr.Dataset, end: End) -> tuple[str, float]:
@@ -356,7 +362,7 @@ def wrap_figure(histories: Sequence[xr.Dataset], sources: Sequence[str] = ()) ->
     figures.legend_below(figure, entries if len(entries) > 1 else {})
     further = [f"without torque, not drawn: {', '.join(without_torque)}"] if without_torque else []
     head = figures.headline("Forces over the wrap", *(dataset.attrs for dataset in histories))
-    figures.entitle(figure, [head, common, *further], 76)
+    figures.entitle(figure, [head, common, common_course(histories), *further], 76)
     return figure
 
 

@@ -2,7 +2,6 @@
 
 import json
 from collections.abc import Sequence
-from pathlib import Path
 from textwrap import fill
 from typing import NamedTuple
 
@@ -11,8 +10,8 @@ import xarray as xr
 from matplotlib.figure import Figure
 
 from cvt_hpc.analysis import figures, waterfall
-from cvt_hpc.analysis.measured import FREQUENCY, Overlay, Side, put_legend
-from cvt_hpc.analysis.telling_apart import entitle_runs, named, on_axes
+from cvt_hpc.analysis.measured import FREQUENCY, File, Overlay, Side, put_legend
+from cvt_hpc.analysis.telling_apart import Histories, entitle_runs, named, on_axes
 from cvt_hpc.errors import mismatch
 from cvt_hpc.variator import STRANDS
 from cvt_hpc.variator.band import strand_frequencies
@@ -48,7 +47,7 @@ def ramp_figure(
     of: str = "t1",
     sources: Sequence[str] = (),
     vmax: float | None = None,
-    measured: str | Path | None = None,
+    measured: File = None,
 ) -> Figure:
     """Draw motion and spectrogram of runs along their ramps, below each other.
 
@@ -59,8 +58,7 @@ def ramp_figure(
     ramps = [read_ramp(history, of, name) for history, name in zip(histories, names, strict=True)]
     _, labels = on_axes(histories, names)
     overlays = [Overlay(measured, history, name) for history, name in zip(histories, names, strict=True)]
-    frame = 1.1 + overlays[0].height
-    page = len(ramps), (1,), (LEAST, ROW), frame, names[0], THEN
+    page = len(ramps), (1,), (LEAST, ROW), 1.1 + overlays[0].height, names[0], THEN
     width = figures.NARROW
     figure, panels, _ = figures.panels_on_a_page(*page, each=2, width=width, sharex=True, sharey="col")
     spectra = [spectrogram(ramp) for ramp in ramps]
@@ -96,10 +94,7 @@ def ramp_figure(
 
 @figures.styled
 def spectrogram_figure(
-    histories: Sequence[xr.Dataset],
-    sources: Sequence[str] = (),
-    vmax: float | None = None,
-    measured: str | Path | None = None,
+    histories: Histories, sources: Sequence[str] = (), vmax: float | None = None, measured: File = None
 ) -> Figure:
     """Draw spectrograms of the strands side by side, over the ramp of a run or else over time.
 
@@ -119,16 +114,13 @@ def spectrogram_figure(
     if not strands:
         raise mismatch(names[0], "probes on the strands t1 and t2", "none")
     _, labels = on_axes(histories, names)
-    ramps = [
-        [read_ramp(history, strand, name, is_ramp=False) for strand in strands]
-        for history, name in zip(histories, names, strict=True)
-    ]
+    each = list(zip(histories, names, strict=True))
+    ramps = [[read_ramp(run, strand, name, is_ramp=False) for strand in strands] for run, name in each]
     spectra = [[spectrogram(ramp) for ramp in row] for row in ramps]
     drawn = [amplitude for row in spectra for *_, amplitude in row]
     norm = waterfall.spectra_norm(drawn, None if vmax is None else 1e6 * vmax)
     overlays = [Overlay(measured, history, name) for history, name in zip(histories, names, strict=True)]
-    frame = 1.4 + overlays[0].height
-    page = len(ramps), (1, 2), (LEAST_HEIGHT, HEIGHT), frame, names[0], THEN
+    page = len(ramps), (1, 2), (LEAST_HEIGHT, HEIGHT), 1.4 + overlays[0].height, names[0], THEN
     figure, panels, height = figures.panels_on_a_page(*page, each=len(strands), sharey=True)
     count, beside = panels.shape
     size, told, each = (0.8 * figures.WIDTH / beside, height - 0.7), set(), iter(panels.flat)
@@ -148,7 +140,7 @@ def spectrogram_figure(
                 told.add("dashed: eigenfrequencies by belt formulas, with their half waves")
             if turns is not None:
                 lines += waterfall.draw_orders(axes, *turns, waterfall.ORDERS)
-                told.add("dotted: orders of the driving pulley's turns")
+                told.add(waterfall.orders_in_words(waterfall.ORDERS))
             pads[panels == axes] = waterfall.name_lines(axes, lines, size)
             axes.set_title(fill(", ".join([f"strand {strand}", *label.values()]), 72 // beside), loc="left")
             axes.set_xlabel(ramp.label)
@@ -178,7 +170,7 @@ def _lines_along(history: xr.Dataset, ramp: Ramp) -> tuple[_Lines | None, _Lines
         courses = {name: history[name].values[-ramp.values.size :][at] for name in named}
         if "thrust" in point:
             times = history["time"].values[-ramp.values.size :][at]
-            courses["thrust"] = np.array([point["thrust"] * multiple(point, "thrust", t) for t in times])
+            courses["thrust"] = np.broadcast_to(point["thrust"] * multiple(point, "thrust", times), at.shape)
     turns, speed = None, courses.get("driving_speed")
     if speed is not None and np.ptp(speed) > LEAST_CHANGE * speed.max():
         turns = ramp.values[at], speed / (2.0 * np.pi)
@@ -209,15 +201,10 @@ def course_figure(history: xr.Dataset, of: str) -> Figure:
         axes.set_ylim(bottom=0.0)
     loads = read_ramp(history, of)
     # the ramp is linear, so that its values can be read beside the time
-    rate = (loads.values[-1] - loads.values[0]) / (time[-1] - begun)
-    scale = upper.secondary_xaxis(
-        "top",
-        functions=(
-            lambda at: loads.values[0] + rate * (at - begun),
-            lambda load: begun + (load - loads.values[0]) / rate,
-        ),
-    )
-    scale.set_xlabel(loads.label)
+    first, last = loads.values[[0, -1]]
+    rate = (last - first) / (time[-1] - begun)
+    ways = lambda at: first + rate * (at - begun), lambda load: begun + (load - first) / rate
+    upper.secondary_xaxis("top", functions=ways).set_xlabel(loads.label)
     lower.set(xlabel="time [s]", xlim=(begun, time[-1]))
     along = values[time >= begun]
     margin = 0.05 * float(np.ptp(along))
@@ -322,8 +309,7 @@ def spectrogram(ramp: Ramp) -> tuple[np.ndarray, np.ndarray, np.ndarray]:
     lines = np.fft.rfftfreq(2 * width, 1.0 / ramp.rate)
     inside = lines <= HIGHEST
     amplitude = 2.0 * np.abs(np.fft.rfft(cut * window, 2 * width)) / window.sum()
-    middles = ramp.values[width // 2 :: width // 4][: len(cut)]
-    return middles, lines[inside], amplitude[:, inside].T
+    return ramp.values[width // 2 :: width // 4][: len(cut)], lines[inside], amplitude[:, inside].T
 
 
 def envelope(ramp: Ramp, band: tuple[float, float] = BAND) -> tuple[np.ndarray, np.ndarray]:

@@ -1,5 +1,6 @@
 """The results of a study as one table for spreadsheets and data frames: a row for each run."""
 
+from collections.abc import Hashable
 from pathlib import Path
 from typing import Any
 
@@ -75,13 +76,13 @@ def write_table(frame: DataFrame, out: Path) -> Path:
     return out
 
 
-def _is_named(array: xr.DataArray, dims: tuple[Any, ...]) -> bool:
+def _is_named(array: xr.DataArray, dims: tuple[Hashable, ...]) -> bool:
     """Whether a variable has one value for each run, or one for each of named places."""
     extra = [dim for dim in array.dims if dim not in dims]
     return all(dim in array.coords and array[dim].dtype.kind in "OUST" for dim in extra)
 
 
-def _flat(array: xr.DataArray, dims: tuple[Any, ...]) -> np.ndarray:
+def _flat(array: xr.DataArray, dims: tuple[Hashable, ...]) -> np.ndarray:
     return array.transpose(*dims).values.ravel()
 
 
@@ -98,6 +99,4 @@ def _in_words(values: np.ndarray, attributes: dict[str, Any]) -> np.ndarray:
         meanings = dict(zip(attributes["flag_values"], attributes["flag_meanings"].split(), strict=True))
         known, places = np.unique(values, return_inverse=True)
         return np.array([meanings.get(value, "") for value in known], object)[places]
-    if values.dtype.kind == "S":
-        return np.char.decode(values, errors="replace")
-    return values
+    return np.char.decode(values, errors="replace") if values.dtype.kind == "S" else values

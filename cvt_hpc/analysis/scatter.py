@@ -1,8 +1,6 @@
 """Maps of a sampled study: a mark for each run, in a panel for each pair of axes."""
 
-from collections.abc import Mapping
 from itertools import combinations
-from typing import Any
 
 import numpy as np
 import xarray as xr
@@ -14,7 +12,9 @@ from matplotlib.ticker import FuncFormatter, LogLocator, NullFormatter
 from numpy.typing import NDArray
 
 from cvt_hpc.analysis import cells, figures
+from cvt_hpc.analysis.arrangement import Fixed
 from cvt_hpc.analysis.classes import OccurrenceClass, at_strongest_strand, count_classes, occurrence_classes
+from cvt_hpc.analysis.courses import line_of_study
 from cvt_hpc.errors import mismatch
 
 MOST_AXES = 4  # six pairs; the first axes of the job
@@ -28,7 +28,7 @@ def is_sampled(dataset: xr.Dataset) -> bool:
     return dataset["status"].dims == ("run",)
 
 
-def scatter_figure(dataset: xr.Dataset, at: Mapping[str, Any], source: str, vmax: cells.End = None) -> Figure:
+def scatter_figure(dataset: xr.Dataset, at: Fixed, source: str, vmax: cells.End = None) -> Figure:
     """Compose the map of a sampled study; arguments as of `map_figure`.
 
     The axes are coordinates along `run`, and `at` has to be empty: no two samples lie at one value of one.
@@ -48,7 +48,7 @@ def scatter_figure(dataset: xr.Dataset, at: Mapping[str, Any], source: str, vmax
     names = sample_axes(dataset)
     if len(names) > MOST_AXES:
         title.append(f"the first {MOST_AXES} of {len(names)} axes")
-    figures.entitle(figure, title)
+    figures.entitle(figure, [*title, line_of_study(dataset)])
     figures.legend_below(figure, figures.entries_of(panels[0, :1]), cells.LEGEND_COLUMNS)
     return figure
 
@@ -66,7 +66,7 @@ def draw_samples(
     amplitude: NDArray[np.float64],
     scale: cells.Scale,
     beside: int = BESIDE,
-) -> NDArray[Any]:
+) -> figures.Panels:
     """Draw the runs of a sampled study by class, in a panel for each pair of axes, and return the panels.
 
     Classes (run,) are keys of `cells.ALL_STYLES`. The amplitude (run,) colours the vibrating runs by the
@@ -111,15 +111,9 @@ def _draw_runs(
         if not of_kind.any():
             continue
         is_filled = MarkerStyle(style.mark).is_filled()
-        marks = axes.scatter(
-            across[of_kind],
-            up[of_kind],
-            s=(_SIZE * min(style.mark_size, 1.5)) ** 2,
-            marker=style.mark,
-            edgecolors=style.rim if is_filled else None,
-            linewidths=0.6,
-            label=kind.label,
-        )
+        size = (_SIZE * min(style.mark_size, 1.5)) ** 2
+        look = {"marker": style.mark, "edgecolors": style.rim if is_filled else None, "linewidths": 0.6}
+        marks = axes.scatter(across[of_kind], up[of_kind], size, label=kind.label, **look)
         # a mark that stands alone has the colour of the cell in which it would stand on a grid
         alike = is_filled and (kind is OccurrenceClass.VIBRATING or kind in cells.OF_PAIRS)
         marks.set_facecolor(cells.fills_of(kind, amplitude[of_kind], scale) if alike else style.ink)

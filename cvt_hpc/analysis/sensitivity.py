@@ -16,7 +16,7 @@ samples: with 32 independent ones they hold in 67 to 83 of 100 studies.
 
 import json
 from collections.abc import Collection
-from typing import Any, NamedTuple
+from typing import NamedTuple
 
 import numpy as np
 import xarray as xr
@@ -27,6 +27,7 @@ from cvt_hpc.analysis.sobol import RESAMPLES, sobol_indices
 from cvt_hpc.errors import mismatch, unknown
 from cvt_hpc.job.axes import ALL, NONE, SAMPLE, SWAPPED
 from cvt_hpc.job.uncertain import TABLE, Uncertain, read_document
+from cvt_hpc.job.values import Document
 from cvt_hpc.study.intervals import VERDICTS
 from cvt_hpc.vibration.classes import OccurrenceClass, levels
 
@@ -50,7 +51,7 @@ def check_samples(dataset: xr.Dataset, source: str) -> None:
         raise mismatch(source, expected, axes_in_words(dataset))
 
 
-def stated(dataset: xr.Dataset, table: str) -> dict[str, Any]:
+def stated(dataset: xr.Dataset, table: str) -> Document:
     """Return a table of the job in the attributes of a dataset; {} where there is none."""
     return json.loads(dataset.attrs.get("job", "{}")).get(table, {})
 
@@ -159,9 +160,8 @@ def _quantiles(
     for share in QUANTILES.values():
         place = (below < share).sum(axis=-1)
         inner = np.clip(place, 1, knots.size - 1)
-        before, after = (
-            np.take_along_axis(scores, inner[..., np.newaxis] - k, axis=-1)[..., 0] for k in (1, 0)
-        )
+        each = (np.take_along_axis(scores, inner[..., np.newaxis] - k, axis=-1) for k in (1, 0))
+        before, after = (score[..., 0] for score in each)
         with np.errstate(divide="ignore", invalid="ignore"):
             part = np.clip((ndtri(share) - before) / (after - before), 0.0, 1.0)
         value = knots[inner - 1] + part * (knots[inner] - knots[inner - 1])
@@ -208,8 +208,7 @@ def onset_scatter(dataset: xr.Dataset, along: str, source: str = "results") -> x
     found = _brackets(samples, along)
     attributes = samples[along].attrs
     units = {key: attributes[key] for key in ("units", "job_units") if key in attributes}
-    order = found.like.dims.index(SAMPLE)
-    below = np.moveaxis(_shares(found), order, -2)
+    below = np.moveaxis(_shares(found), found.like.dims.index(SAMPLE), -2)
     rest = [dim for dim in found.like.dims if dim != SAMPLE]
     axes = {name: axis for name, axis in found.like.coords.items() if SAMPLE not in axis.dims}
     weights = _weights(samples)
@@ -257,9 +256,8 @@ def _weights(dataset: xr.Dataset) -> dict[str, NDArray[np.float64]]:
     """By group of parameters the weights that make its scatter half, shape (samples,); {} without a job."""
     table = stated(dataset, TABLE)
     uncertain = read_document(table) if table else Uncertain((), 0)
-    values = {
-        one.key: dataset[one.key].values for one in uncertain.distributions if one.key in dataset.coords
-    }
+    keys = (one.key for one in uncertain.distributions if one.key in dataset.coords)
+    values = {key: dataset[key].values for key in keys}
     groups = uncertain.groups()
     return {name: _halving(uncertain, keys, values) for name, keys in groups.items() if {*keys} <= {*values}}
 
@@ -291,8 +289,7 @@ def _halving(uncertain: Uncertain, keys: tuple[str, ...], values: dict[str, NDAr
     if len(keys) > 1:  # of the copula, the same about the narrower distributions
         tie = np.linalg.inv(np.array(uncertain.matrix)) - np.eye(len(keys))
         for sign, ones in ((1.0, drawn), (-1.0, halved)):
-            scores = ndtri(
-                np.clip([one.shares(x) for one, x in zip(ones, known, strict=True)], 1e-300, 1 - 1e-16)
-            )
+            shares = [one.shares(values) for one, values in zip(ones, known, strict=True)]
+            scores = ndtri(np.clip(shares, 1e-300, 1 - 1e-16))
             ratio = ratio + sign * 0.5 * np.einsum("is,ij,js->s", scores, tie, scores)
     return np.exp(ratio - np.max(ratio))

@@ -1,7 +1,6 @@
 """Several studies as one dataset with the axis `study`, for pictures on one scale of colours."""
 
 from collections.abc import Collection, Sequence
-from pathlib import Path
 
 import numpy as np
 import xarray as xr
@@ -11,6 +10,7 @@ from cvt_hpc.analysis.alignment import COMPARED, axes_of
 from cvt_hpc.analysis.arrangement import CHOSEN, At, Sides
 from cvt_hpc.analysis.classes import check_results
 from cvt_hpc.analysis.conversion import standard
+from cvt_hpc.analysis.measured import File
 from cvt_hpc.analysis.scatter import is_sampled
 from cvt_hpc.errors import mismatch, one_line
 from cvt_hpc.variables import Status
@@ -44,9 +44,8 @@ def join_studies(
     joined = xr.concat(parts, AXIS, join="outer", data_vars="all", coords="minimal", compat="override")
     joined = joined.assign_coords({AXIS: (AXIS, labels, {"long_name": AXIS})})
     blank = {"status": Status.NOT_RUN, "inferred_class": OccurrenceClass.NOT_RUN, "vibrates": 0}
-    filled = {
-        name: joined[name].fillna(value).astype(np.int8) for name, value in blank.items() if name in joined
-    }
+    missing = ((name, value) for name, value in blank.items() if name in joined)
+    filled = {name: joined[name].fillna(value).astype(np.int8) for name, value in missing}
     return joined.assign(filled).drop_attrs(deep=False).assign_attrs(job_name=", ".join(labels))
 
 
@@ -65,7 +64,7 @@ def maps_figure(
     sources: Sequence[str] = (),
     sides: Sides = CHOSEN,
     vmax: float | str | None = None,
-    measured: str | Path | None = None,
+    measured: File = None,
 ) -> Figure:
     """Draw where vibration occurs, or quantities, of one study or of several on one scale of colours.
 

@@ -9,12 +9,14 @@ from matplotlib.figure import Figure
 
 from cvt_hpc.analysis.arrangement import infinity_in_words
 from cvt_hpc.analysis.figures import check_known, entitle, headline
-from cvt_hpc.analysis.histories import place_of, values_of
+from cvt_hpc.analysis.histories import course_line, place_of, values_of
 from cvt_hpc.errors import InputError, mismatch
 from cvt_hpc.storage.files import kind_of
 
+Histories = Sequence[xr.Dataset]
 
-def named(histories: Sequence[xr.Dataset], sources: Sequence[str] = ()) -> list[str]:
+
+def named(histories: Histories, sources: Sequence[str] = ()) -> list[str]:
     """Names of runs: where they are from, or else their numbers."""
     return list(sources) or [f"history {k + 1}" for k in range(len(histories))]
 
@@ -61,7 +63,13 @@ def entitle_runs(
     """Title of a picture of runs: subject with the names of jobs, what they have in common, further lines."""
     common, _ = on_axes(histories)
     head = headline(subject, *(dataset.attrs for dataset in histories))
-    entitle(figure, [head, ", ".join(common), *further], width)
+    entitle(figure, [head, ", ".join(common), common_course(histories), *further], width)
+
+
+def common_course(histories: Sequence[xr.Dataset]) -> str:
+    """State the course that drives all runs; "" where there is none, or several."""
+    lines = {course_line(dataset.attrs) for dataset in histories}
+    return lines.pop() if len(lines) == 1 else ""
 
 
 def check_holds(histories: Sequence[xr.Dataset], names: Sequence[str], wanted: dict[str, str]) -> None:

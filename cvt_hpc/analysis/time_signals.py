@@ -267,7 +267,7 @@ def _draw_bands(axes: Axes, bands: Bands, k: int, told: str) -> None:
     axes.stairs(shown, edges, baseline=None, color=style["color"], ls=style["ls"], lw=1.4, label=label)
 
 
-def in_a_column(count: int, source: str, then: str, **sharing: Any) -> tuple[Figure, NDArray[Any]]:
+def in_a_column(count: int, source: str, then: str, **sharing: Any) -> tuple[Figure, figures.Panels]:
     """Figure with panels below each other; InputError, with what to do `then`, if no page holds them."""
     figure, panels, _ = figures.panels_on_a_page(count, (1,), HEIGHTS, 1.5, source, then, **sharing)
     for axes in panels.flat:

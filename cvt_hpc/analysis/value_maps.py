@@ -2,7 +2,6 @@
 
 import warnings
 from collections.abc import Sequence
-from pathlib import Path
 from textwrap import fill
 from typing import Any, NamedTuple
 
@@ -17,14 +16,17 @@ from numpy.typing import NDArray
 
 from cvt_hpc.analysis import arrangement as layout
 from cvt_hpc.analysis import cells, figures
+from cvt_hpc.analysis.arrangement import Ruler
 from cvt_hpc.analysis.classes import WITHOUT_RESULT, check_results, count_classes, occurrence_classes
+from cvt_hpc.analysis.courses import line_of_study
 from cvt_hpc.analysis.curves import check_quantities
-from cvt_hpc.analysis.measured import Overlay, side_of
+from cvt_hpc.analysis.measured import File, Overlay, side_of
 from cvt_hpc.analysis.probability import ISOLINES, over_samples
 from cvt_hpc.analysis.scatter import is_sampled
 from cvt_hpc.errors import mismatch, one_line
 from cvt_hpc.vibration.classes import OccurrenceClass
 
+Array = NDArray[np.float64]
 COLOURS = cells.colours_of("viridis_r", 0.05, 0.85)
 OTHER_SIGN = 0.05  # of the largest size: values of the other sign from here on have colours of their own
 TWO_SIGNS = cells.colours_of("PuOr", 0.08, 0.92)
@@ -47,9 +49,9 @@ class Panel(NamedTuple):
     title: str
     unit: str
     factor: float  # from SI to the unit
-    values: NDArray[np.float64]  # in the unit
+    values: Array  # in the unit
     kinds: NDArray[np.int8]  # how the runs ended
-    alike: NDArray[np.float64]  # values of all panels that share the scale of colours, or its range
+    alike: Array  # values of all panels that share the scale of colours, or its range
     isolines: tuple[float, ...]  # values of lines, in the unit
     at: dict[str, int]  # index along the axis of panels
 
@@ -62,7 +64,7 @@ def value_map_figure(
     source: str = "results",
     sides: layout.Sides = layout.CHOSEN,
     vmax: float | None = None,
-    measured: str | Path | None = None,
+    measured: File = None,
 ) -> Figure:
     """Draw quantities over two axes of a study: panels for each, its further dimensions and a third axis.
 
@@ -104,16 +106,14 @@ def value_map_figure(
     kinds = occurrence_classes(shown)
     counted = dataset.attrs.get("counted") or _counted(kinds)
     job = one_line(dataset.attrs.get("job_name", ""))
-    lines = [f"{job}: {counted}".removeprefix(": "), ", ".join(arrangement.notes), over.note]
-    figures.entitle(figure, lines, int(72 * size[0] / figures.WIDTH))
+    lines = [f"{job}: {counted}".removeprefix(": "), ", ".join(arrangement.notes), line_of_study(dataset)]
+    figures.entitle(figure, [*lines, over.note], int(72 * size[0] / figures.WIDTH))
     marked: dict[cells.CellClass, cells.ClassStyle] = {
         kind: cells.STYLES[kind] for kind in OTHERS if (kinds == kind).any()
     }
-    negative = [
-        Patch(facecolor="none", edgecolor=INK, hatch=NEGATIVE, linewidth=0.8, label="below zero")
-        for axes in all_axes.flat
-        if any(patch.get_hatch() == NEGATIVE for patch in axes.patches)
-    ][:1]
+    below = Patch(facecolor="none", edgecolor=INK, hatch=NEGATIVE, linewidth=0.8, label="below zero")
+    hatches = {patch.get_hatch() for axes in all_axes.flat for patch in axes.patches}
+    negative = [below] if NEGATIVE in hatches else []
     isolines = {panel.isolines for panel in panels if min(panel.values.shape) > 1} - {()}
     values = min(isolines, default=())
     names = (
@@ -154,10 +154,9 @@ def _counted(kinds: xr.DataArray) -> str:
     return f"{kinds.size} runs" + (f", of them {count_classes(others)}" if others.size else "")
 
 
-def _of_grid(array: xr.DataArray, arrangement: layout.Arrangement) -> NDArray[Any]:
+def _of_grid(array: xr.DataArray, arrangement: layout.Arrangement) -> np.ndarray:
     """Values (row, column) of a variable over x, or over y and x."""
-    names = [name for name in (arrangement.y, arrangement.x) if name]
-    return np.atleast_2d(array.transpose(*names).values)
+    return np.atleast_2d(array.transpose(*[name for name in (arrangement.y, arrangement.x) if name]).values)
 
 
 def _panels(arrangement: layout.Arrangement, quantities: Sequence[str]) -> list[Panel]:
@@ -185,12 +184,7 @@ def _panels(arrangement: layout.Arrangement, quantities: Sequence[str]) -> list[
 
 
 def _draw_panel(
-    figure: Figure,
-    axes: Axes,
-    rulers: tuple[layout.Ruler, layout.Ruler],
-    panel: Panel,
-    vmax: float | None,
-    room: NDArray[np.float64],
+    figure: Figure, axes: Axes, rulers: tuple[Ruler, Ruler], panel: Panel, vmax: float | None, room: Array
 ) -> None:
     """Cells coloured by a quantity, with numbers where there is room [point], and marks of other runs."""
     (x, y), kinds, values = rulers, panel.kinds, panel.values
@@ -203,8 +197,7 @@ def _draw_panel(
     is_known = np.isfinite(values) & ~np.isin(kinds, (OccurrenceClass.FAILED, OccurrenceClass.NOT_RUN))
     # what has a value is coloured by it, as vibrating cells of other maps by their amplitude
     drawn = np.where(is_known, OccurrenceClass.VIBRATING, kinds).astype(np.int8)
-    nothing = np.zeros(kinds.shape, bool)
-    cells.draw_cells(axes, x, y, drawn, nothing, values, scale)
+    cells.draw_cells(axes, x, y, drawn, np.zeros(kinds.shape, bool), values, scale)
     cells.draw_grid(axes, x, y)
     width, height = room * [np.diff(one.edges).min() / np.ptp(one.edges) for one in (x, y)]
     if width >= NARROWEST and height >= LOWEST:
@@ -227,9 +220,7 @@ def _draw_panel(
         cells.colour_bar(figure, scale, values, ax=axes, pad=0.02)
 
 
-def _draw_isolines(
-    axes: Axes, x: layout.Ruler, y: layout.Ruler, values: NDArray[np.float64], isolines: Sequence[float]
-) -> None:
+def _draw_isolines(axes: Axes, x: Ruler, y: Ruler, values: Array, isolines: Sequence[float]) -> None:
     """Draw lines of equal values between the grid points, dashed but for the middle one."""
     styles = ["--" if value != isolines[len(isolines) // 2] else "-" for value in isolines]
     look: dict[str, Any] = {"colors": ISOLINE_INK, "linewidths": 1.6, "linestyles": styles, "zorder": 2.4}
@@ -239,16 +230,14 @@ def _draw_isolines(
     lines.set_path_effects(figures.outlined(3.0))
 
 
-def _hatch(
-    axes: Axes, x: layout.Ruler, y: layout.Ruler, inside: NDArray[np.bool_], hatch: str, ink: str
-) -> None:
+def _hatch(axes: Axes, x: Ruler, y: Ruler, inside: NDArray[np.bool_], hatch: str, ink: str) -> None:
     """Hatch some cells over their colours."""
     lines = {"facecolor": "none", "edgecolor": ink, "linewidth": 0, "hatch": hatch, "rasterized": True}
     if inside.any():
         axes.add_patch(PathPatch(cells.area_of(x, y, inside), **lines))
 
 
-def _norm(values: NDArray[np.float64], vmax: float | None) -> Normalize:
+def _norm(values: Array, vmax: float | None) -> Normalize:
     """Scale over the finite values; a quantity that does not vary has one colour."""
     known = values[np.isfinite(values)]
     if vmax is None and known.size and np.ptp(known) < EQUAL * np.abs(known).max():

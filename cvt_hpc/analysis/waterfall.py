@@ -3,10 +3,8 @@
 Names of lines stand in the margins where the lines leave the panel, clear of ridges.
 """
 
-from collections.abc import Sequence
+from collections.abc import Iterator, Sequence
 from dataclasses import replace
-from operator import itemgetter
-from pathlib import Path
 from typing import Any, NamedTuple
 
 import numpy as np
@@ -19,8 +17,10 @@ from numpy.typing import NDArray
 from cvt_hpc.analysis import arrangement as layout
 from cvt_hpc.analysis import cells, figures
 from cvt_hpc.analysis.classes import WITHOUT_RESULT, axes_in_words, check_results, occurrence_classes
+from cvt_hpc.analysis.courses import line_of_study
 from cvt_hpc.analysis.eigenfrequencies import along_axis
-from cvt_hpc.analysis.measured import FREQUENCY, Overlay, Side, put_legend, side_of
+from cvt_hpc.analysis.figures import Panels
+from cvt_hpc.analysis.measured import FREQUENCY, File, Overlay, Side, put_legend, side_of
 from cvt_hpc.errors import few_of, mismatch
 
 Array = NDArray[np.float64]
@@ -52,7 +52,8 @@ def name_lines(axes: Axes, lines: Sequence[Named], size: tuple[float, float]) ->
     """Write the names of lines beside a panel whose limits are set; return the distance of its title [point].
 
     What leaves the panel at its upper side is named there, other lines where they end; none lies below its
-    lower limit. `size` is about the width and height of the panel [inch].
+    lower limit. Where lines are crowded the first of them have names. `size` is about the width and height
+    of the panel [inch].
     """
     right: list[tuple[float, Named]] = []
     above: list[tuple[float, Named]] = []
@@ -74,22 +75,25 @@ def name_lines(axes: Axes, lines: Sequence[Named], size: tuple[float, float]) ->
             _write(axes, line, (x[last], y[last]), "data", (3, 0), ha="left", va="center", bbox=paper)
     letters = max((len(line.name) for _, line in above), default=1)
     gaps = NAME_HEIGHT / (72.0 * size[1]) * top, (LETTER * letters + 3.0) / (72.0 * size[0]) * (end - left)
-    places = _apart(right, gaps[0], (0.0, top - 0.5 * gaps[0]))
-    for (_, line), place in zip(sorted(right, key=itemgetter(0)), places, strict=True):
-        _write(axes, line, (1.0, place), axes.get_yaxis_transform(), (3, 0), ha="left", va="center")
-    places = _apart(above, gaps[1], (left, end))
-    for (_, line), place in zip(sorted(above, key=itemgetter(0)), places, strict=True):
+    right = [(min(place, top - 0.5 * gaps[0]), line) for place, line in right]  # clear of the title
+    off = 3.0  # [point]: names of another colour have a column of their own
+    for colour in dict.fromkeys(line.colour for _, line in right):
+        named = list(_clear([one for one in right if one[1].colour == colour], gaps[0]))
+        for place, line in named:
+            _write(axes, line, (1.0, place), axes.get_yaxis_transform(), (off, 0), ha="left", va="center")
+        off += LETTER * max(len(line.name) for _, line in named) + 2.0
+    for place, line in _clear(above, gaps[1]):
         _write(axes, line, (place, 1.0), axes.get_xaxis_transform(), (0, 1), ha="center", va="bottom")
     return TITLE + NAME_HEIGHT if above else TITLE
 
 
-def _apart(placed: Sequence[tuple[float, Named]], gap: float, limits: tuple[float, float]) -> Array:
-    """Places in ascending order, moved until they lie a gap apart, and within limits as far as they can."""
-    at = np.sort([place for place, _ in placed])
-    steps = gap * np.arange(at.size)
-    at = np.maximum.accumulate(at - steps) + steps
-    highest = limits[1] - steps[::-1]
-    return np.minimum(at, highest)
+def _clear(placed: Sequence[tuple[float, Named]], gap: float) -> Iterator[tuple[float, Named]]:
+    """Yield the places whose names have room beside those before them: a name elsewhere would mislead."""
+    taken: list[float] = []
+    for place, line in placed:
+        if all(abs(place - other) >= gap for other in taken):
+            taken.append(place)
+            yield place, line
 
 
 def _write(
@@ -106,7 +110,7 @@ def campbell_figure(
     orders: Sequence[float] = ORDERS,
     sides: layout.Sides = layout.CHOSEN,
     vmax: float | None = None,
-    measured: str | Path | None = None,
+    measured: File = None,
 ) -> Figure:
     """Draw a Campbell diagram: `waterfall_figure` over the driving speed, with orders of that speed."""
     check_results(dataset, source)
@@ -125,7 +129,7 @@ def waterfall_figure(
     sides: layout.Sides = layout.CHOSEN,
     orders: Sequence[float] = (),
     vmax: float | None = None,
-    measured: str | Path | None = None,
+    measured: File = None,
 ) -> Figure:
     """Draw spectra of all strands over an axis, with the eigenfrequencies where they are known.
 
@@ -170,8 +174,7 @@ def waterfall_figure(
                 lines += draw_orders(axes, x.centres, shown["driving_speed"].values / (2.0 * np.pi), orders)
             overlay.draw(axes, along, Side(FREQUENCY, y.edges[[0, -1]]), shown)
             pad = max(pad, name_lines(axes, lines, size))
-            words = ", ".join(filter(None, (f"strand {strand}", title)))
-            axes.set_title(words, loc="left", pad=pad)
+            axes.set_title(", ".join(filter(None, (f"strand {strand}", title))), loc="left", pad=pad)
             x.lay_out(axes.xaxis)
     figures.label_x(panels, len(rows) * len(strands), x.label)
     for axes in panels[:, 0]:
@@ -180,11 +183,12 @@ def waterfall_figure(
     subject = "Campbell diagram" if orders else "Spectra of the strands"
     told = []
     if arrangement.x == "driving_speed" and orders:
-        told.append("dotted: orders of the driving pulley's turns")
+        told.append(orders_in_words(orders))
     if any(modes is not None for modes in known):
         told.append("dashed: eigenfrequencies, with their half waves along the strand")
     told += _without_spectrum(rows, amplitude)
-    figures.entitle(figure, [figures.headline(subject, dataset.attrs), ", ".join(notes), *told, overlay.note])
+    fixed = [", ".join(notes), line_of_study(dataset)]
+    figures.entitle(figure, [figures.headline(subject, dataset.attrs), *fixed, *told, overlay.note])
     put_legend(figure, overlay)
     return figure
 
@@ -233,12 +237,7 @@ def draw_spectra(axes: Axes, x: Array, y: Array, amplitude: Array, norm: LogNorm
 
 
 def spectra_bar(
-    figure: Figure,
-    norm: LogNorm,
-    spectra: Sequence[Array],
-    panels: NDArray[Any],
-    aspect: int,
-    unit: str = "µm",
+    figure: Figure, norm: LogNorm, spectra: Sequence[Array], panels: Panels, aspect: int, unit: str = "µm"
 ) -> None:
     """Draw the colour bar of spectra beside their panels."""
     values = np.concatenate([each.ravel() for each in spectra])
@@ -252,6 +251,11 @@ def draw_orders(axes: Axes, x: Array, turns: Array, orders: Sequence[float]) -> 
     for line in lines:
         axes.plot(x, line.y, color=ORDER, ls=":", lw=1.2, path_effects=OUTLINE)
     return lines
+
+
+def orders_in_words(orders: Sequence[float]) -> str:
+    """State which orders are drawn: where they are crowded not all have names."""
+    return f"dotted: orders {', '.join(f'{order:g}' for order in orders)} of the driving pulley's turns"
 
 
 def draw_eigenfrequencies(axes: Axes, x: Array, lines: Array, numbers: NDArray[np.int64]) -> list[Named]:

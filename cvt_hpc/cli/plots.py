@@ -33,9 +33,8 @@ def add(commands: parts.Commands) -> None:
 
 
 def _add_kind(kinds: parts.Commands, name: str, kind: Kind) -> None:
-    command = parts.add_command(
-        kinds, name, _draw, kind.text, RESULTS if kind.subject == RESULTS else HISTORIES
-    )
+    subject = RESULTS if kind.subject == RESULTS else HISTORIES
+    command = parts.add_command(kinds, name, _draw, kind.text, subject)
     command.set_defaults(kind=name)
     for option in kind.options:
         place: dict[str, Any] = {"dest": option.key} if option.flag else {}
@@ -84,9 +83,8 @@ def _draw(arguments: argparse.Namespace) -> int:
 
 def _draw_results(arguments: argparse.Namespace, words: Sequence[str], options: Options) -> None:
     source = str(arguments.path)
-    out = arguments.out or parts.picture_beside(
-        arguments.path, parts.files_of(arguments.path), *words, *arguments.at
-    )
+    files = parts.files_of(arguments.path)
+    out = arguments.out or parts.picture_beside(arguments.path, files, *words, *arguments.at)
     with parts.opened_results(arguments.path) as dataset:
         at = parts.fixed_axes(arguments, dataset, source)
         parts.say(f"picture: {_write(arguments.kind, [dataset], out, at, [source], options)}")

@@ -73,8 +73,7 @@ def _status(arguments: argparse.Namespace) -> None:
 
     status = read_status(arguments.path)
     parts.complain(*status.warnings)
-    in_words = columns(status_rows(status), indent="")
-    parts.say(*([json.dumps(asdict(status))] if arguments.json else in_words))
+    parts.say(*([json.dumps(asdict(status))] if arguments.json else columns(status_rows(status), indent="")))
 
 
 def _gather(arguments: argparse.Namespace) -> None:
@@ -157,8 +156,7 @@ def _report(arguments: argparse.Namespace) -> None:
         return
     with parts.opened_results(arguments.path) as dataset:
         source, folder = str(arguments.path), parts.folder_of(arguments.path)
-        written = write_report(dataset, out, source, folder, arguments.measured)
-        parts.say(f"report: {written}")
+        parts.say(f"report: {write_report(dataset, out, source, folder, arguments.measured)}")
 
 
 def _compare(arguments: argparse.Namespace) -> int:
@@ -183,8 +181,7 @@ def _compare_measured(arguments: argparse.Namespace, source: str, path: str) -> 
     folder = arguments.out or parts.folder_of(arguments.path)
     with parts.opened_results(arguments.path) as dataset:
         found = score(dataset, path, source)
-        written = f"table: {write_score(found, folder / 'compare.csv')}"
-        parts.say(*score_lines(found, source, path), written)
+        parts.say(*score_lines(found, source, path), f"table: {write_score(found, folder / 'compare.csv')}")
         try:
             figure = map_figure(dataset, source=source, measured=path)
         except InputError as error:  # more panels than a page holds
@@ -199,7 +196,5 @@ def leave_comparison(found: Comparison, folder: Path, sources: tuple[str, str]) 
     from cvt_hpc.analysis.comparison import write_comparison
     from cvt_hpc.analysis.comparison_drawing import draw_comparison
 
-    return [
-        f"picture: {draw_comparison(found, folder / 'compare.png', sources)}",
-        f"table: {write_comparison(found, folder / 'compare.csv')}",
-    ]
+    picture = draw_comparison(found, folder / "compare.png", sources)
+    return [f"picture: {picture}", f"table: {write_comparison(found, folder / 'compare.csv')}"]

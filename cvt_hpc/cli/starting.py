@@ -45,9 +45,8 @@ def _init(arguments: argparse.Namespace) -> None:
     from cvt_hpc.job.template import write_template
 
     path = write_template(arguments.name, arguments.model)
-    parts.say(
-        f"job: {path}", f"next: cvt-hpc check {path}; cvt-hpc run {path}; cvt-hpc map out/{arguments.name}"
-    )
+    then = f"cvt-hpc check {path}; cvt-hpc run {path}; cvt-hpc map out/{arguments.name}"
+    parts.say(f"job: {path}", f"next: {then}")
 
 
 def _models(arguments: argparse.Namespace) -> None:

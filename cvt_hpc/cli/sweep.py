@@ -24,34 +24,23 @@ RETRIED = ("timed_out", "failed_error", "failed_numerics")
 
 def add(commands: parts.Commands) -> None:
     """Declare the command."""
-    run = parts.add_command(
-        commands, "run", _run, "do all runs of a job, or those that an earlier start has left", "JOB"
-    )
+    text = "do all runs of a job, or those that an earlier start has left"
+    run = parts.add_command(commands, "run", _run, text, "JOB")
     parts.add_folder(run, "earlier results of the folder")
-    run.add_argument(
-        "--part",
-        metavar="K/N",
-        help="only the K-th of N parts of the runs; parts may be at work in one folder at the same time",
-    )
+    part = "only the K-th of N parts of the runs; parts may be at work in one folder at the same time"
+    run.add_argument("--part", metavar="K/N", help=part)
     run.add_argument("--dry-run", action="store_true", help="validate options, job and folder; runs nothing")
     limit = "time in which the sweep ends, such as 2h30m (default: until the end of the Slurm job, if any)"
     run.add_argument("--time-limit", metavar="TIME", help=limit)
     run.add_argument("--run-limit", metavar="TIME", help="time that one run may take (default: any)")
-    run.add_argument(
-        "--retry",
-        action="append",
-        default=[],
-        choices=RETRIED,
-        help="do recorded runs that ended so again, from their start; may be repeated",
-    )
-    run.add_argument(
-        "--refine",
-        type=float,
-        metavar="FACTOR",
-        help="with --retry failed_numerics: begin at the job's time step over this factor, and halve it from "
+    retry = "do recorded runs that ended so again, from their start; may be repeated"
+    run.add_argument("--retry", action="append", default=[], choices=RETRIED, help=retry)
+    refine = (
+        "with --retry failed_numerics: begin at the job's time step over this factor, and halve it from "
         "there as often as most_refinements says (default: the first factor not tried yet, 16 after three "
-        "halvings; 1: the job's own step again)",
+        "halvings; 1: the job's own step again)"
     )
+    run.add_argument("--refine", type=float, metavar="FACTOR", help=refine)
     audit = "repeat this share of the runs that model auto has decided by cheaper models in full, and compare"
     run.add_argument("--audit", type=float, metavar="FRACTION", help=audit)
     check_step = "repeat this share of the runs at half their time step, and compare"
@@ -102,11 +91,8 @@ def _load(
     from cvt_hpc.study.task import check_refinement
     from cvt_hpc.variables import Status
 
-    limits = {
-        name: read_duration(getattr(arguments, name), f"--{name.replace('_', '-')}")
-        for name in ("time_limit", "run_limit")
-        if getattr(arguments, name) is not None
-    }
+    asked = ((name, getattr(arguments, name)) for name in ("time_limit", "run_limit"))
+    limits = {k: read_duration(v, f"--{k.replace('_', '-')}") for k, v in asked if v is not None}
     retry = [Status[name.upper()] for name in arguments.retry]
     job = load_job(arguments.path, arguments.set)
     options = {"fresh": arguments.fresh, "retry": retry, "raises": False, **limits}
@@ -174,5 +160,4 @@ def _show_step_check(check: Repeat) -> None:
     sources = str(check.out), str(check.place)
     with open_results(check.out) as a, open_results(check.place) as b:
         found = compare(a, only(b, check.sample), sources)
-    written = leave_comparison(found, check.place, sources)
-    parts.say(*step_check_lines(check, found), *written)
+    parts.say(*step_check_lines(check, found), *leave_comparison(found, check.place, sources))

@@ -50,7 +50,7 @@ from cvt_hpc.parameters import Parameter, positive
 from cvt_hpc.storage.files import write_rows, written_aside
 from cvt_hpc.storage.provenance import origin_lines
 from cvt_hpc.study import process_rank
-from cvt_hpc.study.status import STALLED
+from cvt_hpc.study.status import STALLED, find_records
 from cvt_hpc.tables import columns, number, short
 
 STUDY = "samples"
@@ -71,9 +71,7 @@ Array = NDArray[np.float64]
 class Calibration(NamedTuple):
     """What is asked."""
 
-    # job, rungs: with uncertain parameters, and the one study of its samples
-    job: Job
-    rungs: tuple[Sweep, ...]
+    job: Job  # with uncertain parameters
     measured: Path  # the measured file
     # doubt, scatter: share of cells that may be judged otherwise [1], standard error of frequencies [Hz]
     doubt: float
@@ -187,7 +185,7 @@ def load(
         along = read_measured(measured, _without_runs(job), job.source, job).along
     if along not in names:
         raise mismatch(where, f"the axis {along}, as in {measured}", "none of this name")
-    return Calibration(job, (Sweep(STUDY, (), job),), Path(measured), **options)
+    return Calibration(job, Path(measured), **options)
 
 
 def _without_runs(job: Job) -> xr.Dataset:
@@ -204,11 +202,19 @@ def _distributions(job: Job) -> tuple[Distribution, ...]:
     return tuple(one.uncertain.distributions[one.place] for one in found)
 
 
+def _study(job: Job, out: Path) -> tuple[Sweep, Path]:
+    """Return the study of the samples, and where its folder lies: that of `cvt-hpc run`, if it is there."""
+    if find_records(out / STUDY, job) is None and find_records(out, job) is not None:
+        return Sweep(out.absolute().name, (), job), out.absolute().parent
+    return Sweep(STUDY, (), job), out
+
+
 def plan_lines(asked: Calibration, out: Path) -> Iterator[str]:
     """Yield the lines that state the runs and their expected cost."""
     names = ", ".join(one.key for one in _distributions(asked.job))
     yield f"calibrate {asked.job.name} ({asked.job.source}) by {asked.measured}: {names}"
-    yield from sweep_lines(asked.rungs, {}, out)
+    study, folder = _study(asked.job, out)
+    yield from sweep_lines([study], {}, folder)
 
 
 def make(asked: Calibration, out: Path, *, fresh: bool, tell: Tell) -> Outcome:
@@ -216,10 +222,11 @@ def make(asked: Calibration, out: Path, *, fresh: bool, tell: Tell) -> Outcome:
 
     InputError if a folder holds another job, the measured file does not fit, or the system refuses a file.
     """
-    status = run_sweeps(asked.rungs, {}, out, fresh=fresh, tell=tell)
+    study, folder = (Sweep(STUDY, (), asked.job), out) if fresh else _study(asked.job, out)
+    status = run_sweeps([study], {}, folder, fresh=fresh, tell=tell)
     if status >= STALLED or process_rank() != 0:
         return Outcome(status=status)
-    found = weigh(asked, load_sweep(STUDY, out))
+    found = weigh(asked, load_sweep(study.name, folder))
     files = [("table", _write_table(found, out / "calibrated.csv"))]
     for name in ("calibrated.toml", "calibrated.png"):
         (out / name).unlink(missing_ok=True)

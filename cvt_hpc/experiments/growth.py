@@ -60,14 +60,9 @@ class Growth(NamedTuple):
 
 
 def load(path: str | Path, overrides: Assignments = (), kick: str | None = None) -> Growth:
-    """Read a job, and return the runs by which its modes are found.
+    """Read a job, with overrides as of `load_job`, and return the runs by which its modes are found.
 
-    Parameters
-    ----------
-    path, overrides
-        As `load_job` takes them.
-    kick : str, optional
-        Size of the kick with its unit; by default the model's own.
+    The kick's size has a unit; by default it is the model's own.
 
     Raises
     ------
@@ -143,12 +138,7 @@ def make(asked: Growth, out: Path, *, fresh: bool, tell: Tell) -> Outcome:
 
 
 def find_growth(asked: Growth, out: Path) -> list[Found]:
-    """Return the modes of each cell of a job, in the order of its runs.
-
-    Parameters
-    ----------
-    out : Path
-        The folder with its studies, whose runs have been done.
+    """Return the modes of each cell of a job, in the order of its runs, from the folder with done studies.
 
     Raises
     ------

@@ -58,27 +58,16 @@ class Points(NamedTuple):
 
 
 class Fitted(NamedTuple):
-    """A law as it was fitted.
-
-    Attributes
-    ----------
-    law, estimate, covariance : Law, (k,) and (k, k) arrays
-        Which one, and of x [SI], which has the logarithm of a speed.
-    rms, independent : float
-        Root mean square of the residuals of the best fit to all points [1], and n_e / n of these.
-    of_specimens : int
-        Specimens whose scatter the covariance is; 0: it is the uncertainty of the mean law.
-    criterion : float
-        Akaike's criterion for small samples, n_e being that of the law whose residuals are correlated least:
-        the law of the least criterion is the best.
-    """
+    """A law as it was fitted."""
 
     law: Law
-    estimate: Array
-    covariance: Array
-    rms: float
-    independent: float
-    of_specimens: int
+    estimate: Array  # of x [SI], which has the logarithm of a speed, (k,)
+    covariance: Array  # (k, k)
+    rms: float  # root mean square of the residuals of the best fit to all points [1]
+    independent: float  # n_e / n of these
+    of_specimens: int  # specimens whose scatter the covariance is; 0: it is the uncertainty of the mean law
+    # Akaike's for small samples, n_e being that of the law whose residuals are correlated least: the law of
+    # the least criterion is the best
     criterion: float = np.inf
 
     @property

@@ -8,18 +8,9 @@ Tell = Callable[..., None]  # takes lines that are to be printed meanwhile
 
 
 class Outcome(NamedTuple):
-    """Result of an experiment.
+    """Result of an experiment."""
 
-    Attributes
-    ----------
-    lines : sequence of str
-        The results in words.
-    files : sequence of (str, Path)
-        What a file is, such as "table", and where; in the order in which the command names them.
-    status : int
-        Exit status of the command.
-    """
-
-    lines: Sequence[str] = ()
+    lines: Sequence[str] = ()  # the results in words
+    # what a file is, such as "table", and where; in the order in which the command names them
     files: Sequence[tuple[str, Path]] = ()
-    status: int = 0
+    status: int = 0  # exit status of the command

@@ -18,19 +18,8 @@ Entry = dict[str, Any]  # of a job file
 class PartsFolder(OutputFolder[Content]):
     """The output folder of an experiment with parts; a study or another experiment may share it.
 
-    Parameters
-    ----------
-    path : Path
-        The folder; it need not exist.
-    asked : Content
-        The content that is to be made in it.
-
-    Attributes
-    ----------
-    parts : Archives
-        Finished parts, in the first of the kind's folders.
-    dataset, table : Path
-        Files of the results, named as the job file is.
+    `parts` are the finished ones, in the first of the kind's folders; `dataset` and `table` are files of the
+    results, named as the job file is.
     """
 
     def __init__(self, path: Path, asked: Content) -> None:

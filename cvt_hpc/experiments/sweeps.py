@@ -30,20 +30,10 @@ from cvt_hpc.tables import columns, short
 
 
 class Sweep(NamedTuple):
-    """A sweep of an experiment.
+    """A sweep of an experiment."""
 
-    Attributes
-    ----------
-    name : str
-        Name of its folder, and in tables.
-    answers : tuple of str
-        Questions that it answers, in words.
-    job : Job
-        Its runs.
-    """
-
-    name: str
-    answers: tuple[str, ...]
+    name: str  # of its folder, and in tables
+    answers: tuple[str, ...]  # questions that it answers, in words
     job: Job
 
 
@@ -73,12 +63,7 @@ def cost_left(sweep: Sweep, out: Path | None) -> tuple[int, float]:
 def sweep_lines(sweeps: Sequence[Sweep], refusals: Mapping[str, str], out: Path) -> Iterator[str]:
     """Yield the lines that state the runs of sweeps, the models left out, and the cost of what is left.
 
-    Parameters
-    ----------
-    refusals : mapping
-        Reasons by the name of a model that is left out.
-    out : Path
-        Folder of their folders.
+    Refusals are reasons by the name of a model; the sweeps' folders lie in `out`.
     """
     rows = [["name", "model", "runs", "left", "core-s left", "answers"]]
     total = 0.0
@@ -106,19 +91,8 @@ def run_sweeps(
 ) -> int:
     """Do the runs of sweeps that are left, one sweep after the other; on all ranks.
 
-    Parameters
-    ----------
-    sweeps, refusals, out
-        As of `sweep_lines`.
-    fresh : bool
-        Throw earlier results away.
-    tell : callable
-        Given a line before each sweep that has runs left, with the time to go, and lines on failed runs.
-
-    Returns
-    -------
-    int
-        The largest exit status of a sweep; later ones do not start after one that stopped early.
+    A line is told before each sweep that has runs left, with the time to go, and lines on failed runs.
+    Returns the largest exit status of a sweep; later ones do not start after one that stopped early.
 
     Raises
     ------

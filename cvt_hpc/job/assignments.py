@@ -119,7 +119,7 @@ def take_own(assignments: Document, table: str) -> Document:
     return {key.removeprefix(f"{table}."): structured(assignments.pop(key)) for key in own}
 
 
-def structured(raw: object) -> Any:
+def structured(raw: object) -> object:
     """Return the list, table or quoted text that a text of the command line holds, or the value as it is."""
     if not isinstance(raw, str) or not raw.startswith(("[", "{", '"')):
         return raw
@@ -151,7 +151,7 @@ def plain(value: Any) -> Any:
     return _with_unit(value.to_numpy(), str(getattr(value, "attrs", {}).get("units", "")))
 
 
-def _with_unit(array: np.ndarray, unit: str) -> Any:
+def _with_unit(array: np.ndarray, unit: str) -> object:
     """Return an array of numbers as it is, or as texts with its unit; of a scalar or of texts its content."""
     if array.dtype.kind not in "iuf":
         return plain(array.tolist())
@@ -160,5 +160,5 @@ def _with_unit(array: np.ndarray, unit: str) -> Any:
     return array if array.ndim else array.item()
 
 
-def _texts(value: Any, unit: str) -> Any:
+def _texts(value: object, unit: str) -> object:
     return [_texts(entry, unit) for entry in value] if isinstance(value, list) else f"{value!r} {unit}"

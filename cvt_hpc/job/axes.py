@@ -50,7 +50,10 @@ class Axis:
     spacing: str = field(default="linear", compare=False)
 
 
-def thinned(axes: tuple[Axis, ...], most: int, *, sampled: bool = False) -> tuple[Axis, ...]:
+Axes = tuple[Axis, ...]
+
+
+def thinned(axes: Axes, most: int, *, sampled: bool = False) -> Axes:
     """Return axes of fewer values, spread over those given, the first and the last among them.
 
     Parameters

@@ -5,7 +5,7 @@ from collections.abc import Iterable, Sequence
 from dataclasses import replace
 
 from cvt_hpc.errors import InputError, mismatch
-from cvt_hpc.job.axes import NONE, SAMPLE, SWAPPED, Axis, thinned
+from cvt_hpc.job.axes import NONE, SAMPLE, SWAPPED, Axes, Axis, thinned
 from cvt_hpc.job.rules import Rule, follow, needed_rules, places, varied_by
 from cvt_hpc.job.schema import Schema
 from cvt_hpc.job.uncertain import Scatter
@@ -18,7 +18,7 @@ MOST_CHECKED_POINTS, MOST_CHECKED_VALUES = 20_000, 5_000  # of runs, and of para
 def check_grid(
     schema: Schema,
     parameters: Point,
-    axes: tuple[Axis, ...],
+    axes: Axes,
     source: str,
     *,
     rules: Sequence[Rule] = (),
@@ -117,12 +117,7 @@ def _place(schema: Schema, varied: Parameters) -> str:
 
 
 def check_rules(
-    schema: Schema,
-    parameters: Parameters,
-    axes: tuple[Axis, ...],
-    rules: Sequence[Rule],
-    *,
-    sampled: bool = False,
+    schema: Schema, parameters: Parameters, axes: Axes, rules: Sequence[Rule], *, sampled: bool = False
 ) -> None:
     """Check parameters that follow from others, along the axes with which they vary.
 
@@ -143,12 +138,7 @@ def check_rules(
 
 
 def without_effect(
-    schema: Schema,
-    parameters: Parameters,
-    axes: tuple[Axis, ...],
-    rules: Sequence[Rule],
-    *,
-    sampled: bool = False,
+    schema: Schema, parameters: Parameters, axes: Axes, rules: Sequence[Rule], *, sampled: bool = False
 ) -> dict[str, str]:
     """Return the parameters without effect on any run, each with the setting that makes it so.
 
@@ -174,7 +164,7 @@ def _inert(schema: Schema, rules: Sequence[Rule], point: Point) -> dict[str, str
     return inert
 
 
-def _points_to_check(axes: tuple[Axis, ...], rules: Sequence[Rule]) -> Iterable[Point]:
+def _points_to_check(axes: Axes, rules: Sequence[Rule]) -> Iterable[Point]:
     if math.prod(len(axis.values) for axis in axes) > MOST_CHECKED_POINTS:
         axes = tuple(replace(axis, values=_extremes(axis, rules)) for axis in axes)
     return places(axes, {axis.name for axis in axes})
@@ -196,7 +186,7 @@ def _extreme_samples(axis: Axis, rules: Sequence[Rule]) -> tuple:
     return tuple(sorted(found))
 
 
-def _samples_to_check(axes: tuple[Axis, ...]) -> Iterable[Point]:
+def _samples_to_check(axes: Axes) -> Iterable[Point]:
     is_huge = len(axes[0].values) > MOST_CHECKED_POINTS
     some = thinned(axes, MOST_CHECKED_VALUES, sampled=True) if is_huge else axes
     yield from places(some, {axis.name for axis in axes}, sampled=True)

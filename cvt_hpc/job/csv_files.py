@@ -9,17 +9,20 @@ import csv
 import math
 import re
 import warnings
-from collections.abc import Sequence
+from array import array
+from collections.abc import Callable, Iterator, Mapping, Sequence
+from itertools import chain, islice
 from pathlib import Path
 from typing import NamedTuple
 
 from cvt_hpc.errors import InputError, JobWarning, did_you_mean, few_of, mismatch, show
-from cvt_hpc.job.units import factor_to, to_si
+from cvt_hpc.job.units import factor_to, from_si
 from cvt_hpc.job.values import Point
 from cvt_hpc.parameters import Column, FromFile, RowError
 from cvt_hpc.storage.files import read_regular
 
-MOST_BYTES = 2**20
+MOST_BYTES = 2**26  # of a file of any kind
+_BLOCK = 2**18  # rows that are taken apart at a time: cells take ten times the memory of their text
 _SEPARATORS = {",": "commas", ";": "semicolons", "\t": "tabs"}
 _BINARY = re.compile(r"[\x00-\x08\x0b\x0e-\x1f\x7f]")
 _HEAD = re.compile(r"(?P<name>[^[(]*)(?:\[(?P<square>[^]]*)\]|\((?P<round>.*)\))?")
@@ -69,45 +72,73 @@ def read_csv(file: FromFile, name: str, source: str, where: str) -> Point:
     path = Path(source).parent / name
     place = f"{where}: {path}"
     text, encoding = _text(path, place)
-    numbered = enumerate(re.split(r"\r\n|\r|\n", text), 1)
-    lines = [(n, line) for n, line in numbered if line.strip() and not line.lstrip().startswith("#")]
+    split = re.split(r"\r\n|\r|\n", text)
+    numbers = array("q", (n for n, line in enumerate(split, 1) if line.strip()[:1] not in ("", "#")))
+    lines = [split[n - 1] for n in numbers]
     if len(lines) < 2:
         raise mismatch(place, _LINES, "fewer lines")
-    above, separator = _find_names(file, [line for _, line in lines])
-    of_names, *rows = [(n, _cells(line, separator, f"{place}: line {n}")) for n, line in lines[above:]]
-    rows = [(n, cells) for n, cells in rows if cells]
-    of_units = rows.pop(0) if rows and _are_units(rows[0][1]) else (of_names[0], [])
+    above, separator = _find_names(file, lines)
+    below = zip(numbers[above:], lines[above:], strict=True)
+    cells_of = ((n, _cells(line, separator, f"{place}: line {n}")) for n, line in below)
+    of_names, rows = next(cells_of), (row for row in cells_of if row[1])
+    first = list(islice(rows, 1))
+    of_units = first.pop() if first and _are_units(first[0][1]) else (of_names[0], [])
     columns = _columns(file, of_names, of_units, place)
-    if not rows:
-        raise mismatch(place, _LINES, "fewer lines")
+    read = _read_rows(of_names, chain(first, rows), columns, separator, place)
     how = [
         encoding,
         f"names in line {of_names[0]}" if above else "",
         f"units in line {of_units[0]}" if of_units[1] else "",
         "" if separator == "," else f"{_SEPARATORS[separator]} between columns",
-        "empty columns" if any(line.rstrip(" ").endswith(separator) for _, line in lines) else "",
-        _left_out(of_names, rows, separator, place),
-        "decimal commas" if _decimal_mark(rows, separator, place) == "," else "",
+        "empty columns" if any(line.rstrip(" ").endswith(separator) for line in lines) else "",
+        read.left_out,
+        "decimal commas" if read.mark == "," else "",
         *(f"{show(told)} as {c.name}" for c in columns if _plain(told := of_names[1][c.place]) != c.name),
     ]
-    found = {
-        c.name: Column(c.si, tuple(_number(cells[c.place], c, f"{place}: line {n}") for n, cells in rows))
-        for c in columns
-    }
-    raw = arranged(file, found, place, [f"line {n}" for n, _ in rows])
+    found = {c.name: Column(c.si, tuple(read.values[c.name])) for c in columns}
+    raw = arranged(file, found, place, lambda row: f"line {read.lines[row]}")
     if any(how):
-        first = (f"{key} {column.values[0]:g} {column.unit}".rstrip() for key, column in found.items())
-        told = f"{place}: read with {', '.join(filter(None, how))}; line {rows[0][0]} is {', '.join(first)}"
+        begun = (f"{key} {column.values[0]:g} {column.unit}".rstrip() for key, column in found.items())
+        start = f"line {read.lines[0]} is {', '.join(begun)}"
+        told = f"{place}: read with {', '.join(filter(None, how))}; {start}"
         warnings.warn(told, JobWarning, stacklevel=2)
     return raw
 
 
-def arranged(file: FromFile, columns: dict[str, Column], place: str, rows: Sequence[str]) -> Point:
+class _Read(NamedTuple):
+    """Numbers of the lines that hold rows, values [SI] by column, and how the rows were read."""
+
+    lines: Sequence[int]
+    values: Mapping[str, Sequence[float]]
+    left_out: str
+    mark: str
+
+
+def _read_rows(
+    of_names: Row, rows: Iterator[Row], columns: Sequence[_Column], separator: str, place: str
+) -> _Read:
+    lines, values = array("q"), {column.name: array("d") for column in columns}
+    marks: dict[str, _Mark] = {}
+    left_out = ""
+    while block := list(islice(rows, _BLOCK)):
+        left_out = _left_out(of_names, block, separator, place, len(lines))
+        _note_marks(block, marks)
+        if len(marks) > 1:
+            _decimal_mark(marks, separator, place)
+        for column in columns:
+            values[column.name].extend(_numbers(block, column, place))
+        lines.extend(n for n, _ in block)
+    if not lines:
+        raise mismatch(place, _LINES, "fewer lines")
+    return _Read(lines, values, left_out, _decimal_mark(marks, separator, place))
+
+
+def arranged(file: FromFile, columns: dict[str, Column], place: str, named: Callable[[int], str]) -> Point:
     """Return the raw values that columns of a file give; an error names one of its rows, or all of it."""
     try:
         return file.arrange(columns)
     except RowError as error:
-        raise mismatch(f"{place}: {rows[error.row]}", error.expected, error.found) from None
+        raise mismatch(f"{place}: {named(error.row)}", error.expected, error.found) from None
     except ValueError as error:
         raise InputError(f"{place}: {error}") from None
 
@@ -240,8 +271,11 @@ def told(name: str, file: FromFile) -> str:
     return " or ".join(f"{name} [{unit}]" if unit else name for unit in file.columns[name])
 
 
-def _left_out(of_names: Row, rows: Sequence[Row], separator: str, place: str) -> str:
-    """Return what is not read beside the columns; InputError if it may be anything of meaning."""
+def _left_out(of_names: Row, rows: Sequence[Row], separator: str, place: str, before: int) -> str:
+    """Return what is not read beside the columns; InputError if it may be anything of meaning.
+
+    There are so many rows before these.
+    """
     line, names = of_names
     for n, cells in rows:
         if len(cells) != len(names):
@@ -252,7 +286,8 @@ def _left_out(of_names: Row, rows: Sequence[Row], separator: str, place: str) ->
     found = ""
     for i in (i for i, name in enumerate(names) if not name):
         below = [cells[i] for _, cells in rows]
-        if i == 0 and any(below == [str(n) for n in range(start, start + len(rows))] for start in (0, 1)):
+        starts = before, before + 1
+        if i == 0 and any(below == [str(n) for n in range(start, start + len(rows))] for start in starts):
             found = "no column for the numbers of the rows"
         elif any(below):
             n, cells = next((n, cells) for n, cells in rows if cells[i])
@@ -261,31 +296,54 @@ def _left_out(of_names: Row, rows: Sequence[Row], separator: str, place: str) ->
     return found
 
 
-def _decimal_mark(rows: Sequence[Row], separator: str, place: str) -> str:
+class _Mark(NamedTuple):
+    """The first number with a decimal mark, and whether a number shows that it is no separator."""
+
+    line: int  # of the first
+    cell: str
+    is_certain: bool
+
+    def __str__(self) -> str:
+        return f"{show(self.cell)} in line {self.line}"
+
+
+def _note_marks(rows: Sequence[Row], marks: dict[str, _Mark]) -> None:
+    """Note the marks within numbers, "." and ",", of which a number has one."""
+    for mark in ".,":
+        having = ((n, cell) for n, cells in rows for cell in cells if mark in cell)
+        for n, cell in having:
+            known = marks.get(mark)
+            if known and known.is_certain:
+                break
+            if _NUMBER.fullmatch(cell):
+                first = known or _Mark(n, cell, False)
+                marks[mark] = first._replace(is_certain=not _AMBIGUOUS.fullmatch(cell))
+
+
+def _decimal_mark(marks: Mapping[str, _Mark], separator: str, place: str) -> str:
     """Return the decimal mark of all numbers; InputError if it is not certain."""
-    certain = "." if separator == "," else ""  # a program that writes decimal commas separates by others
-    seen: dict[str, str] = {}
-    for n, cells in rows:
-        for cell in filter(_NUMBER.fullmatch, cells):
-            for mark in ".,":
-                if mark in cell:
-                    seen.setdefault(mark, f"{show(cell)} in line {n}")
-                    certain += "" if _AMBIGUOUS.fullmatch(cell) else mark
     then = "write numbers with decimal points, without separators of thousands"
-    if len(seen) > 1:
-        raise mismatch(place, "one decimal mark", " and ".join(seen.values()), then)
-    mark = next(iter(seen), ".")
-    if seen and mark not in certain:
+    if len(marks) > 1:
+        raise mismatch(place, "one decimal mark", " and ".join(map(str, sorted(marks.values()))), then)
+    mark, told = next(iter(marks.items()), (".", _Mark(0, "", True)))
+    # a program that writes decimal commas separates by others
+    if not told.is_certain and (mark, separator) != (".", ","):
         expected = "a number that shows whether the mark is decimal or separates thousands"
-        raise mismatch(place, expected, f"only such as {seen[mark]}", then)
+        raise mismatch(place, expected, f"only such as {told}", then)
     return mark
 
 
-def _number(cell: str, column: _Column, place: str) -> float:
-    place = f"{place}, {column.name}"
-    if not _NUMBER.fullmatch(cell):
-        raise mismatch(place, "a number such as 1500 or 0.13", show(cell))
-    value = to_si(f"{float(cell.replace(',', '.'))!r} {column.unit}", column.si)
-    if not math.isfinite(value):
-        raise mismatch(place, "a finite number", show(cell))
-    return value
+def _numbers(rows: Sequence[Row], column: _Column, place: str) -> list[float]:
+    """Return the values [SI] of a column; each cell that occurs is read once."""
+    cells = [cells[column.place] for _, cells in rows]
+    known = {}
+    for cell in dict.fromkeys(cells):
+        expected = "a number such as 1500 or 0.13"
+        if _NUMBER.fullmatch(cell):
+            known[cell] = from_si(float(cell.replace(",", ".")), column.unit or column.si, column.si)
+            if math.isfinite(known[cell]):
+                continue
+            expected = "a finite number"
+        line = rows[cells.index(cell)][0]
+        raise mismatch(f"{place}: line {line}, {column.name}", expected, show(cell))
+    return [known[cell] for cell in cells]

@@ -9,11 +9,11 @@ import math
 from collections.abc import Callable, Collection, Mapping
 from dataclasses import dataclass, field, replace
 from functools import cached_property, partial
-from typing import Any, Self
+from typing import Self
 
 from cvt_hpc.errors import mismatch
 from cvt_hpc.job.assignments import Assignments, read_assignments, split_assignments
-from cvt_hpc.job.axes import SAMPLE, SWAPPED, Axis, thinned
+from cvt_hpc.job.axes import SAMPLE, SWAPPED, Axes, thinned
 from cvt_hpc.job.crosscheck import check_point, complete_point
 from cvt_hpc.job.design import Design, Runs
 from cvt_hpc.job.formula import Formula
@@ -21,7 +21,7 @@ from cvt_hpc.job.rules import Link, Rule, follow, needed_rules, ordered_rules, o
 from cvt_hpc.job.schema import Schema, load_schema
 from cvt_hpc.job.uncertain import TABLE, Scatter, with_samples
 from cvt_hpc.job.units import unit_in
-from cvt_hpc.job.values import Document, Point, Table
+from cvt_hpc.job.values import Document, Point
 from cvt_hpc.models.contract import load_model
 from cvt_hpc.parameters import Parameters
 
@@ -76,6 +76,8 @@ class Job(Runs):
         Rules for derived parameters, in an order in which each finds its sources.
     units : dict
         By key the unit in which the job gives a parameter, where it names one.
+    files : dict
+        By key the name of each file that gives parameters; `parameters` has what stood in it.
     """
 
     name: str
@@ -84,12 +86,13 @@ class Job(Runs):
     description: str
     source: str
     parameters: Point
-    axes: tuple[Axis, ...]
+    axes: Axes
     given: frozenset[str] = field(default=frozenset(), compare=False)
     design: Design = field(default_factory=dict)
     histories: tuple[int, ...] = field(default=(), compare=False)
     rules: tuple[Rule, ...] = ()
     units: Mapping[str, str] = field(default_factory=dict, compare=False)
+    files: Mapping[str, str] = field(default_factory=dict, compare=False)
 
     def __len__(self) -> int:
         """Number of runs."""
@@ -115,10 +118,8 @@ class Job(Runs):
 
     def _values_of(self, key: str, along: tuple[str, ...]) -> tuple:
         schema, needed = self.schema, needed_rules(self.rules, key)
-        return tuple(
-            complete_point(schema, needed, self.parameters, place)[key]
-            for place in places(self.axes, along, sampled=self.is_sampled)
-        )
+        each = places(self.axes, along, sampled=self.is_sampled)
+        return tuple(complete_point(schema, needed, self.parameters, place)[key] for place in each)
 
     def thinned(self, most: int) -> Self:
         """Return this job with runs from all over it, as many as `most` if it has more; for estimates."""
@@ -184,8 +185,7 @@ class Job(Runs):
         """
         gives = {key: schema.parameters[key].gives for key in values}
         told = {by.key: key for key, by in gives.items() if by and by.key in values}
-        stated = {key: value for key, value in values.items() if key not in told}
-        point = self._with_rules(stated, schema)
+        point = self._with_rules({key: value for key, value in values.items() if key not in told}, schema)
         for key, by in told.items():
             if point[key] != values[key]:
                 where = f"{self.source}: [{schema.section_of[by]}] {by}"
@@ -198,8 +198,7 @@ class Job(Runs):
         follows = {rule.key for rule in self.rules}
         scene = {key: value for key, value in self.parameters.items() if key not in gone | follows}
         given = {*scene} & {*self.given, *(axis.name for axis in self.axes)} | {*values}
-        rules = ordered_rules(stated, given, schema, self.source)
-        return complete_point(schema, rules, scene, values)
+        return complete_point(schema, ordered_rules(stated, given, schema, self.source), scene, values)
 
     def resolved(self) -> Document:
         """Return all entries that determine the numbers, as a document that `build_job` takes.
@@ -239,15 +238,9 @@ class Job(Runs):
 
     def fingerprint(self) -> str:
         """Return the SHA-256 [hex] of entries that determine numbers; name and description do not count."""
-        return fingerprint_of(self.resolved())
-
-
-def fingerprint_of(resolved: Table) -> str:
-    """Return the fingerprint of a job by the result of `Job.resolved`."""
-    document = {key: value for key, value in resolved.items() if key not in ("name", "description")}
-    # the order of the axes counts, that of tables does not
-    document["axes"] = list(document["axes"].items())
-    return digest(document)
+        document = {key: one for key, one in self.resolved().items() if key not in ("name", "description")}
+        # the order of the axes counts, that of tables does not
+        return digest(document | {"axes": list(document["axes"].items())})
 
 
 def digest(document: object) -> str:
@@ -255,7 +248,7 @@ def digest(document: object) -> str:
     return hashlib.sha256(json.dumps(document, sort_keys=True).encode()).hexdigest()
 
 
-def _to_json(value: object) -> Any:
+def _to_json(value: object) -> object:
     if isinstance(value, tuple):
         return [_to_json(item) for item in value]
     return str(value) if isinstance(value, float) and math.isinf(value) else value
@@ -298,13 +291,10 @@ def handed_to(job: Job, model: str, why: str) -> Document:
             if key in job.given and key in known:
                 tables.setdefault(known[key], {})[key] = value  # it may belong in another table there
     derived = {key: text for key, text in document.get("derived", {}).items() if key in known}
-    linked = {
-        axis: {key: values for key, values in table.items() if key in known}
-        for axis, table in document.get("linked", {}).items()
-    }
+    links = document.get("linked", {}).items()
+    linked = {axis: {key: values for key, values in table.items() if key in known} for axis, table in links}
     text = f"{job.description}{'; ' if job.description else ''}{model}: {why}"
     head = {"name": job.name, "model": model, "description": text}
     rest = {key: document[key] for key in ("axes", "design", TABLE) if key in document}
     tables |= {"derived": derived, "linked": {axis: table for axis, table in linked.items() if table}}
-    tables = {name: table for name, table in tables.items() if table}
-    return head | tables | rest
+    return head | {name: table for name, table in tables.items() if table} | rest

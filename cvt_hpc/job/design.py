@@ -18,6 +18,7 @@ from cvt_hpc.job.axes import (
     LARGEST_AXIS,
     SAMPLE,
     SWAPPED,
+    Axes,
     Axis,
     read_bounds,
     read_spacing,
@@ -139,7 +140,7 @@ def check_power_of_2(count: int, where: str) -> None:
         raise mismatch(where, f"a power of 2 (the nearest: {lower} and {2 * lower})", str(count))
 
 
-def check_adaptive(axes: tuple[Axis, ...], source: str) -> None:
+def check_adaptive(axes: Axes, source: str) -> None:
     """Raise InputError unless a job with these axes can choose the number of samples of each cell."""
     names = [axis.name for axis in axes]
     if SAMPLE not in names or SWAPPED in names:
@@ -147,7 +148,7 @@ def check_adaptive(axes: tuple[Axis, ...], source: str) -> None:
         raise mismatch(f"{source}: [design] kind", expected, f"the axes {', '.join(names) or '(none)'}")
 
 
-def resolve_spacing(design: Design, axes: tuple[Axis, ...], source: str) -> Design:
+def resolve_spacing(design: Design, axes: Axes, source: str) -> Design:
     """Return the design of a trace with its first spacing on each axis along which it traces.
 
     A table names these axes. A number stands for all numeric axes of more than twice as many values: shorter
@@ -186,7 +187,7 @@ def _is_numeric(axis: Axis) -> bool:
     return not isinstance(axis.values[0], (str, bool))
 
 
-def sampled_axes(found: Mapping[str, Entry], design: Design, source: str) -> tuple[Axis, ...]:
+def sampled_axes(found: Mapping[str, Entry], design: Design, source: str) -> Axes:
     """Return the axes of a sampled study, each with the value of every sample.
 
     Parameters
@@ -257,12 +258,7 @@ def between(start: float, stop: float, spacing: str, share: np.ndarray) -> np.nd
 
 
 def read_histories(
-    raw: object,
-    schema: Schema,
-    axes: tuple[Axis, ...],
-    replaced: Parameters,
-    source: str,
-    samples: int | None = None,
+    raw: object, schema: Schema, axes: Axes, replaced: Parameters, source: str, samples: int | None = None
 ) -> tuple[int, ...]:
     """Return the indices of the runs that a list of a job names, in order.
 
@@ -291,9 +287,7 @@ def read_histories(
     return tuple(sorted(index for index in found if index is not None))
 
 
-def _index(
-    entry: object, schema: Schema, axes: tuple[Axis, ...], replaced: Parameters, where: str
-) -> int | None:
+def _index(entry: object, schema: Schema, axes: Axes, replaced: Parameters, where: str) -> int | None:
     size = math.prod(len(axis.values) for axis in axes)
     if isinstance(entry, int) and not isinstance(entry, bool):
         return _numbered(entry, size, where)
@@ -323,7 +317,7 @@ def _numbered(entry: object, size: int, where: str) -> int:
     return entry
 
 
-def _place(axis: Axis, value: Any, schema: Schema, where: str) -> int:
+def _place(axis: Axis, value: float | str, schema: Schema, where: str) -> int:
     if value in axis.values:
         return axis.values.index(value)
     if isinstance(value, str):

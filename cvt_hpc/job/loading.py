@@ -9,7 +9,7 @@ from cvt_hpc.errors import InputError, did_you_mean, mismatch, show
 from cvt_hpc.experiment_kinds import with_table
 from cvt_hpc.job import assignments
 from cvt_hpc.job.assignments import Assignments, plain
-from cvt_hpc.job.axes import SAMPLE, Axis, read_axis
+from cvt_hpc.job.axes import SAMPLE, Axes, read_axis
 from cvt_hpc.job.crosscheck import check_grid, check_rules
 from cvt_hpc.job.csv_files import read_csv
 from cvt_hpc.job.definition import HEADER, Job, answering_model, handed_to
@@ -42,7 +42,16 @@ from cvt_hpc.job.summary import tell_of_no_effect
 from cvt_hpc.job.uncertain import TABLE, with_samples
 from cvt_hpc.job.uncertain_table import check_samples, read_uncertain
 from cvt_hpc.job.units import unit_in
-from cvt_hpc.job.values import Document, Point, Table, expectation, kind_of, read_value, warn_of_bare_numbers
+from cvt_hpc.job.values import (
+    Document,
+    Point,
+    Table,
+    Units,
+    expectation,
+    kind_of,
+    read_value,
+    warn_of_bare_numbers,
+)
 from cvt_hpc.models.contract import load_model
 from cvt_hpc.parameters import Parameters
 
@@ -70,10 +79,7 @@ def load_job(path: str | Path, overrides: Assignments = ()) -> Job:
 
 
 def build_job(
-    document: Table,
-    source: str = "build_job",
-    overrides: Assignments = (),
-    label: str | None = None,
+    document: Table, source: str = "build_job", overrides: Assignments = (), label: str | None = None
 ) -> Job:
     """Validate a job that is given as a dict; result, overrides and errors as of `load_job`.
 
@@ -102,11 +108,7 @@ def stored_job(document: Table, source: str) -> Job:
 
 
 def rebuild_job(
-    document: Table,
-    source: str,
-    units: Mapping[str, str] | None,
-    overrides: Assignments = (),
-    label: str | None = None,
+    document: Table, source: str, units: Units | None, overrides: Assignments = (), label: str | None = None
 ) -> Job:
     """Return the job of a document whose numbers are SI values of another job, and draw no warning.
 
@@ -180,10 +182,12 @@ def rebuild_job(
     replacing = {key: replaced.get(key) for key in gone}
     kept = read_histories(histories, schema, axes, replacing, source, design.get("runs"))
     stated = tuple(rule for rule in rules if rule.key not in settled)
-    runs = parameters, axes, frozenset(own), design, kept, stated, schema.units
+    runs = parameters, axes, frozenset(own), design, kept, stated, schema.units, files
     job = Job(name, schema.model, schema.stepper, description, source, *runs)
     answering = answering_model(job)
-    return job if answering is None else rebuild_job(handed_to(job, *answering), source, job.units)
+    if answering is not None:
+        job = replace(rebuild_job(handed_to(job, *answering), source, job.units), files=files)
+    return job
 
 
 def _written(document: Table, pairs: Table, schema: Schema, source: str, label: str) -> dict[str, Entry]:
@@ -234,11 +238,7 @@ def _with_files(
 
 
 def _with_samples(
-    document: Table,
-    further: Mapping[str, list],
-    given: Collection[str],
-    design: Design,
-    source: str,
+    document: Table, further: Mapping[str, list], given: Collection[str], design: Design, source: str
 ) -> Document:
     """Return a document with the axes of the samples, the last ones, unless they are given otherwise."""
     where, axes = f"{source}: [{TABLE}]", document.get("axes", {})
@@ -261,7 +261,7 @@ def _read_axes_and_rules(
     given: Collection[str],
     schema: Schema,
     source: str,
-) -> tuple[tuple[Axis, ...], list[Rule]]:
+) -> tuple[Axes, list[Rule]]:
     """Return the axes and the rules in their order, `scatters` among them.
 
     Those that overrides have put out of force are `gone`; the axes that they `put` come in their place.
@@ -322,8 +322,7 @@ def _sections(document: Table, schema: Schema) -> list[str]:
 def _read_tables(document: Table, schema: Schema, source: str) -> Document:
     values = {}
     for section in _sections(document, schema):
-        table = document.get(section, {})
-        pairs = ((name, raw) for name, raw in table.items() if (section, name) != KEY)
+        pairs = ((name, raw) for name, raw in document.get(section, {}).items() if (section, name) != KEY)
         for key, entry in schema.entries(pairs, f"{source}: [{section}]", section):
             values[key] = read_value(*entry)
     return values
@@ -339,7 +338,7 @@ def _find_axes(table: Table, schema: Schema, source: str) -> dict[str, Entry]:
     return found
 
 
-def _read_grid(entries: Mapping[str, Entry]) -> tuple[Axis, ...]:
+def _read_grid(entries: Mapping[str, Entry]) -> Axes:
     return tuple(read_axis(key, *entry) for key, entry in entries.items())
 
 

@@ -14,7 +14,7 @@ from typing import TYPE_CHECKING
 import numpy as np
 
 from cvt_hpc.errors import did_you_mean, mismatch, show
-from cvt_hpc.job.csv_files import arranged, content_of, told
+from cvt_hpc.job.csv_files import MOST_BYTES, arranged, content_of, told
 from cvt_hpc.job.units import factor_to
 from cvt_hpc.job.values import Point
 from cvt_hpc.parameters import Column, FromFile
@@ -22,8 +22,7 @@ from cvt_hpc.parameters import Column, FromFile
 if TYPE_CHECKING:
     import netCDF4
 
-MOST_BYTES = 2**24
-MOST_VALUES = 2**20  # of a variable
+MOST_VALUES = 2**22  # of a variable
 SUFFIX = ".nc"
 _HDF5 = b"\x89HDF\r\n\x1a\n"
 
@@ -48,10 +47,8 @@ def read_netcdf(file: FromFile, name: str, source: str, where: str) -> Point:
     """
     path = Path(source).parent / name
     place = f"{where}: {path}"
-    content = content_of(path, MOST_BYTES, place, "a netCDF file", SUFFIX)
-    columns = _columns(file, content, place)
-    rows = max(len(column.values) for column in columns.values())
-    return arranged(file, columns, place, [f"entry {row}" for row in range(1, rows + 1)])
+    columns = _columns(file, content_of(path, MOST_BYTES, place, "a netCDF file", SUFFIX), place)
+    return arranged(file, columns, place, lambda row: f"entry {row + 1}")
 
 
 def _columns(file: FromFile, content: bytes, place: str) -> dict[str, Column]:

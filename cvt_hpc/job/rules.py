@@ -280,8 +280,7 @@ def ordered_rules(rules: Iterable[Rule], given: Collection[str], schema: Schema,
     # in the order of declaration where they are free of each other: a job's rules do not depend on its layout
     needs = {key: found[key].needs for key in schema.parameters if key in found}
     try:
-        order = TopologicalSorter(needs).static_order()
-        return [found[key] for key in order if key in found]
+        return [found[key] for key in TopologicalSorter(needs).static_order() if key in found]
     except CycleError as error:
         circle = error.args[1]
         rule = next(found[key] for key in circle if not isinstance(found[key].source, Substituted))

@@ -4,7 +4,7 @@ from collections.abc import Callable, Collection, Iterable, Iterator, Mapping, S
 from dataclasses import dataclass, field, replace
 from functools import cached_property, partial
 from importlib import import_module
-from typing import Any, NamedTuple
+from typing import NamedTuple
 
 from cvt_hpc import recording
 from cvt_hpc.errors import InputError, did_you_mean, mismatch, nearest, show
@@ -28,7 +28,7 @@ class Entry(NamedTuple):
     """What stands at a key."""
 
     parameter: Parameter  # declaration of the key
-    raw: Any
+    raw: object
     where: str  # file and key
 
 
@@ -92,9 +92,13 @@ class Schema:
             return name
         if home is not None:
             raise InputError(f"{where}: belongs in [{home}], found in [{section}]")
-        raise self._unknown_key(name, where, section)
+        if name in RETIRED:
+            raise InputError(f"{where}: no key of this version; {RETIRED[name]}")
+        known = self.sections.get(section or "", {}) or self.parameters
+        hint = self.nearest(name, section) or f"; known: {', '.join(known)}"
+        raise InputError(f"{where}: unknown key{hint}")
 
-    def flatten(self, table: Table) -> Iterator[tuple[str, Any]]:
+    def flatten(self, table: Table) -> Iterator[tuple[str, object]]:
         """Yield name and value; TOML reads a line `scene.load = ...` as a table "scene" with a key "load"."""
         for name, raw in table.items():
             if name in self.sections and isinstance(raw, Mapping):
@@ -103,7 +107,7 @@ class Schema:
                 yield name, raw
 
     def entries(
-        self, pairs: Iterable[tuple[str, Any]], where: str, section: str | None = None
+        self, pairs: Iterable[tuple[str, object]], where: str, section: str | None = None
     ) -> Iterator[tuple[str, Entry]]:
         """Yield the key of each pair of a name and a value, and its entry; further arguments as of `find`."""
         for name, raw in pairs:
@@ -117,15 +121,6 @@ class Schema:
             return ""
         home = self.section_of[near]
         return f"; did you mean {near}{'' if home == section else f' in [{home}]'}?"
-
-    def _unknown_key(self, name: str, where: str, section: str | None) -> InputError:
-        if name in RETIRED:
-            return InputError(f"{where}: no key of this version; {RETIRED[name]}")
-        hint = self.nearest(name, section)
-        if not hint:
-            known = self.sections.get(section or "", {}) or self.parameters
-            hint = f"; known: {', '.join(known)}"
-        return InputError(f"{where}: unknown key{hint}")
 
 
 def load_schema(model: str | None, stepper: str | None, source: str) -> Schema:

@@ -13,14 +13,13 @@ from pathlib import Path
 import numpy as np
 
 from cvt_hpc.errors import JobWarning, few_of, mismatch, show
-from cvt_hpc.job.csv_files import arranged, content_of, named_column, told, unit_of
+from cvt_hpc.job.csv_files import MOST_BYTES, arranged, content_of, named_column, told, unit_of
+from cvt_hpc.job.netcdf_files import MOST_VALUES
 from cvt_hpc.job.units import factor_to
 from cvt_hpc.job.values import Point
 from cvt_hpc.parameters import Column, FromFile, RowError
 from cvt_hpc.variator.profiles import check_times
 
-MOST_BYTES = 2**26
-MOST_VALUES = 2**22  # of a signal
 MAT, MDF = ".mat", ".mf4"
 UNIT = "_unit"  # of the name of a text beside a signal
 _HDF5 = b"\x89HDF\r\n\x1a\n"
@@ -61,7 +60,7 @@ def read_signals(file: FromFile, name: str, source: str, where: str) -> Point:
     for key, column in columns.items():
         if len(column.values) != rows:
             raise mismatch(f"{place}: {key}", f"{rows} values, as others have", str(len(column.values)))
-    raw = arranged(file, columns, place, [f"entry {row}" for row in range(1, rows + 1)])
+    raw = arranged(file, columns, place, lambda row: f"entry {row + 1}")
     read = ", ".join(f"{show(signal)} as {key}" for key, signal in named.items())
     left = f"; not read: {few_of(others, _MOST_NAMED)}" if others else ""
     warnings.warn(f"{place}: read with {read}{left}", JobWarning, stacklevel=2)

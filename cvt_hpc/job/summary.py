@@ -56,11 +56,8 @@ def summarize(job: Job, core_seconds: float, measured: int = 0) -> str:
 
 
 def _tables(job: Job, schema: Schema) -> dict[str, list[tuple[str, ...]]]:
-    kinds = {
-        **dict.fromkeys(job.given, "given"),
-        **{axis.name: "axis" for axis in job.axes},
-        **{rule.key: "derived" for rule in job.rules},
-    }
+    kinds = dict.fromkeys((*job.given, *job.files), "given") | {axis.name: "axis" for axis in job.axes}
+    kinds |= {rule.key: "derived" for rule in job.rules}
     axes = job.thinned(_MOST_ASKED).axes
     inert = without_effect(schema, job.parameters, axes, job.rules, sampled=job.is_sampled)
     elsewhere = {"axis": "see [axes]", "derived": "see [derived]"}
@@ -70,6 +67,7 @@ def _tables(job: Job, schema: Schema) -> dict[str, list[tuple[str, ...]]]:
         for key, parameter in table.items():
             kind = kinds.get(key, "default")
             value = value_in_words(schema, key, job.parameters[key]) if key in job.parameters else "none"
+            value = job.files.get(key, value)
             text = parameter.description
             text += f" ({', '.join(parameter.choices)})" if parameter.choices else ""
             text = f"without effect with {inert[key]}: {text}" if key in inert else text
@@ -146,11 +144,7 @@ def core_time_in_words(core_seconds: float) -> str:
 
 
 def tell_of_no_effect(
-    schema: Schema,
-    values: Parameters,
-    files: Mapping[str, str],
-    without: Mapping[str, str],
-    source: str,
+    schema: Schema, values: Parameters, files: Mapping[str, str], without: Mapping[str, str], source: str
 ) -> None:
     """Refuse files and lists without effect on any run, and warn of other values, unless they are defaults.
 

@@ -34,9 +34,9 @@ _FIRST_AXES = {"load_share": (0.2, 0.4, 0.6), "friction_gradient": None}
 _SHARES = (0.5, 1.0, 1.5)  # of the default, else
 # Both as a map, where that takes no longer than this [core-s]
 _LOADS, _LONGEST_MAP = "load_share = { from = 0.1, to = 0.9, count = 9 }", 5.0
-# Values of a first study where defaults, of a scene without dimensions, show nothing; in braces: its axes
-# The mass vibrates, at 500 Hz, where damping is less than the normal load times the fall of friction.
+# Values of a first study where defaults show nothing, in a minute of a core; in braces: its axes
 _FIRST_STUDIES = {
+    # the mass vibrates, at 500 Hz, where damping is less than the normal load times the fall of friction
     "oscillator": {
         "friction_gradient": '{ from = "-1 s/m", to = "-0.1 s/m", count = 10 }',
         "damping": '{ from = "0 N s/m", to = "90 N s/m", count = 10 }',
@@ -46,7 +46,21 @@ _FIRST_STUDIES = {
         "initial_displacement": '"10 um"',
         "stiffness": '"10 kN/mm"',
         "friction_law": '"stribeck"',
-    }
+    },
+    # which load slips by which tension
+    "belt_drive": {
+        "load": '{ from = "5 N m", to = "30 N m", count = 6 }',
+        "tension": '{ from = "200 N", to = "400 N", count = 5 }',
+    },
+    # where falling friction has the strands vibrate: a coarser belt and short runs, which do for that
+    "pushbelt": {
+        "load_share": "{ from = 0.2, to = 0.8, count = 3 }",
+        "friction_gradient": '{ from = "-0.9 s/m", to = "-0.1 s/m", count = 3 }',
+        "rise_time": '"60 ms"',
+        "elements": "216",
+        "duration": '"0.2 s"',
+        "longest_duration": '"0.2 s"',
+    },
 }
 _LONGEST = 120  # letters of a line
 # Units in which engineers give a size, by SI unit: each from a magnitude [SI] on, the largest first

@@ -14,10 +14,10 @@ are those of B: none, all, or one of them (Saltelli et al. 2010). Correlated one
 """
 
 import math
-from collections.abc import Mapping
+from collections.abc import Callable, Mapping
 from dataclasses import dataclass, field, replace
 from functools import lru_cache
-from typing import Any, NamedTuple
+from typing import NamedTuple
 
 import numpy as np
 from numpy.typing import NDArray
@@ -132,19 +132,15 @@ class Distribution(NamedTuple):
         below, up_to = (float(ndtr((of_value(limit) - centre) / spread)) for limit in (low, high))
         return below, up_to - below
 
-    def _normal(self) -> tuple[float, float, Any, Any]:
+    def _normal(self) -> tuple[float, float, Callable, Callable[[float], float]]:
         """Mean and standard deviation of the normal number behind it, and functions to a value and back."""
         has = dict(self.numbers)
         mean, deviation = has["mean"], has["standard_deviation"]
         if self.kind == "normal":
             return mean, deviation, np.asarray, float
         variance = math.log1p((deviation / mean) ** 2)
-        return (
-            math.log(mean) - 0.5 * variance,
-            math.sqrt(variance),
-            np.exp,
-            lambda value: math.log(value) if value > 0.0 else -math.inf,
-        )
+        centre, spread = math.log(mean) - 0.5 * variance, math.sqrt(variance)
+        return centre, spread, np.exp, lambda value: math.log(value) if value > 0.0 else -math.inf
 
     def in_words(self, unit: str, wanted: str) -> str:
         """State the distribution for people, in a unit that is wanted."""
@@ -229,9 +225,8 @@ def _block(uncertain: Uncertain, number: int) -> NDArray[np.float64]:
 
 def read_document(table: Table) -> Uncertain:
     """Return what a table is of, as `Uncertain.document` gives it."""
-    kinds = {
-        key: dict(one) for key, one in table.items() if isinstance(one, Mapping) and "distribution" in one
-    }
+    tables = ((key, dict(one)) for key, one in table.items() if isinstance(one, Mapping))
+    kinds = {key: one for key, one in tables if "distribution" in one}
     drawn = (Distribution(key, one.pop("distribution"), tuple(one.items())) for key, one in kinds.items())
     correlation = table.get("correlation", {"parameters": (), "matrix": ()})
     matrix = tuple(map(tuple, correlation["matrix"]))

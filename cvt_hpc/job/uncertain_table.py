@@ -93,8 +93,7 @@ def _read_distribution(key: str, parameter: Parameter, raw: object, where: str) 
     kinds = Parameter("normal", "", "", choices=tuple(KINDS))
     kind = read_value(kinds, raw.get("distribution"), f"{where}.distribution")
     needed, optional = KINDS[kind]
-    known = ("distribution", *needed, *optional)
-    refuse_unknown(raw, known, f"{where}.", f"key of a {kind} distribution")
+    refuse_unknown(raw, ("distribution", *needed, *optional), f"{where}.", f"key of a {kind} distribution")
     numbers = []
     for name in (*needed, *optional):
         if name not in raw and name in needed:

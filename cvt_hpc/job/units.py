@@ -213,8 +213,7 @@ def _named_unit(name: str) -> pint.Unit:
 
 
 def _angle_power(unit: pint.Unit) -> float:
-    roots = _registry().get_root_units(unit)[1]
-    return dict(roots._units).get("radian", 0)
+    return dict(_registry().get_root_units(unit)[1]._units).get("radian", 0)
 
 
 @lru_cache(maxsize=1)

@@ -20,28 +20,19 @@ from cvt_hpc.storage.dataset_form import LARGEST
 
 # Units in which people give a quantity, by the SI unit in which a bare number is read
 _CUSTOMARY = {
-    "Hz": ("kHz",),
-    "N": ("kN",),
-    "N m": ("kN m",),
-    "N m^2": ("N mm^2",),
-    "N/m": ("N/mm", "kN/m"),
-    "N/m^2": ("N/mm^2",),
-    "kg": ("g",),
-    "kg m^2": ("kg mm^2",),
-    "kg/m": ("g/m",),
-    "m": ("mm", "um"),
-    "m/s": ("mm/s",),
-    "rad": ("deg",),
-    "rad/s": ("rpm",),
-    "s": ("ms", "us"),
-}
+    "Hz": ("kHz",), "N": ("kN",), "N m": ("kN m",), "N m^2": ("N mm^2",), "N/m": ("N/mm", "kN/m"),
+    "N/m^2": ("N/mm^2",), "kg": ("g",), "kg m^2": ("kg mm^2",), "kg/m": ("g/m",), "m": ("mm", "um"),
+    "m/s": ("mm/s",), "rad": ("deg",), "rad/s": ("rpm",), "s": ("ms", "us"),
+}  # fmt: skip
 
 _SEPARATED = re.compile(r"\s*\[?\s*[-+]?\d[\d.]*[^,;\d]*[,;]\s*[-+]?\d")
 Table = Mapping[str, Any]  # of a job file, as TOML gives it
 Document = dict[str, Any]  # a whole job, or a table of it, as TOML or JSON gives it
+Units = Mapping[str, str]  # by key, of parameters that the job gives in others than SI units
 Point = dict[str, Any]  # the parameters of a run, flat [SI]
 
 JOB_UNITS = "job_units"  # attribute of a coordinate, beside `units`
+JOB_FILES = "job_files"  # attribute of results: by key the name of each file that gives parameters
 POINT_UNITS = "point_units"  # attribute of a history: by key, beside the values `point`
 
 
@@ -67,22 +58,14 @@ def read_value(parameter: Parameter, raw: object, where: str) -> Any:
     InputError
         If the value does not fit the declaration of the parameter.
     """
-    readers = {
-        tuple: _read_table,
-        str: _read_text,
-        bool: _read_flag,
-        int: _read_whole_number,
-        float: _read_number,
-    }
+    readers = {tuple: _read_table, str: _read_text, bool: _read_flag, int: _read_whole, float: _read_number}
     return readers[kind_of(parameter)](parameter, raw, where)
 
 
 def read_or_default(declared: Mapping[str, Parameter], table: Table, where: str) -> Point:
     """Return the values of a table by declared key, defaults included; as of `read_value`."""
-    return {
-        key: read_value(parameter, table.get(key, parameter.default), f"{where} {key}")
-        for key, parameter in declared.items()
-    }
+    given = ((key, one, table.get(key, one.default)) for key, one in declared.items())
+    return {key: read_value(one, raw, f"{where} {key}") for key, one, raw in given}
 
 
 def refuse_unknown(table: Iterable[str], known: Collection[str], place: str, what: str = "key") -> None:
@@ -188,7 +171,7 @@ def _check_bounds(parameter: Parameter, value: float, raw: object, where: str) -
     raise mismatch(where, f"{' and '.join(bounds)} {unit}".rstrip(), show(raw) + hint)
 
 
-def _read_whole_number(parameter: Parameter, raw: object, where: str) -> int:
+def _read_whole(parameter: Parameter, raw: object, where: str) -> int:
     value = _read_number(parameter, raw, where)
     if not value.is_integer():
         raise mismatch(where, "a whole number", show(raw))

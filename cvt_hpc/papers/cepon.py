@@ -24,9 +24,8 @@ def _above_creep(kept: Kept) -> Measured:
     for speed, runs in _by_speed(kept).items():
         held = runs.isel(load=(runs["vibrates"] != Vibrates.SLIPS).values)
         creep = held["creep_speed_loss"].values
-        more, by_compliance = (
-            held[name].values / creep - 1.0 for name in ("speed_loss", "expected_speed_loss")
-        )
+        losses = ("speed_loss", "expected_speed_loss")
+        more, by_compliance = (held[name].values / creep - 1.0 for name in losses)
         part = float(np.median(by_compliance / more))
         holds += [(more > 0.0).all(), part > 0.5]
         said.append(f"{speed:g} rad/s: {100 * more.min():.2g} to {100 * more.max():.2g} % above, of which "
@@ -59,9 +58,8 @@ STIFF = 0.026  # [N m^2]: the paper's bending stiffness
 
 def _peaks_at_both_ends(kept: Kept, name: str) -> Measured:
     """Force over tension, since both rise along an arc by friction, without any peak."""
-    force, tension = (
-        over_arc(kept.history(bending_stiffness=STIFF), key, "driven") for key in (name, "tension")
-    )
+    keys = (name, "tension")
+    force, tension = (over_arc(kept.history(bending_stiffness=STIFF), key, "driven") for key in keys)
     size = np.abs(force.values)
     peaks, beside = [], []
     for share in (force.share, 1.0 - force.share):
@@ -70,10 +68,8 @@ def _peaks_at_both_ends(kept: Kept, name: str) -> Measured:
         peaks.append(1e-3 * size[place])
         next_to_it = (share > END) & (share <= 2.0 * END)
         beside.append(1e-3 * float(np.median(scaled[next_to_it])) * tension.values[place])
-    return Measured(
-        [peak > PEAK * other for peak, other in zip(peaks, beside, strict=True)],
-        f"{listed(peaks)} N/mm at entry and exit; tension alone gives {listed(beside, '.2g')} N/mm there",
-    )
+    said = f"{listed(peaks)} N/mm at entry and exit; tension alone gives {listed(beside, '.2g')} N/mm there"
+    return Measured([peak > PEAK * other for peak, other in zip(peaks, beside, strict=True)], said)
 
 
 def _tension_by_bending(kept: Kept) -> Measured:
@@ -105,9 +101,8 @@ def _ridge_moves(kept: Kept, strand: str, way: float, *modes: int) -> Measured:
     bins, holds, said = runs["frequency_bin"].values, [], []
     for mode in modes:
         lines, heights = [], []
-        for expected, spectrum in zip(
-            runs["eigenfrequency"].sel(half_waves=mode).values, runs["spectrum"].values, strict=True
-        ):
+        theory = runs["eigenfrequency"].sel(half_waves=mode).values
+        for expected, spectrum in zip(theory, runs["spectrum"].values, strict=True):
             off = np.abs(bins / expected - 1.0)
             place = int(np.argmax(np.where(off < NEAR, spectrum, 0.0)))
             lines.append(bins[place])
@@ -179,9 +174,8 @@ def _forces_follow_speed(kept: Kept) -> Measured:
 
 def _slack_varies_less(kept: Kept) -> Measured:
     slack, tight = _judged(kept, SLACK).std(), _judged(kept, TIGHT).std()
-    return Measured(
-        [slack < 0.5 * tight], f"{slack:.0f} N in the slack, {tight:.0f} N in the tight span (rms)"
-    )
+    holds = [slack < 0.5 * tight]
+    return Measured(holds, f"{slack:.0f} N in the slack, {tight:.0f} N in the tight span (rms)")
 
 
 def _arm_turns(kept: Kept) -> Measured:

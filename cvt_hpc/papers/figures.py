@@ -4,6 +4,7 @@ Sliding in the plane of an arc, fig. 4 of Bullinger et al. 2005 and 4.1 of Lebre
 here.
 """
 
+from collections import Counter
 from collections.abc import Callable, Iterator, Sequence
 from pathlib import Path
 from typing import Any, NamedTuple
@@ -74,8 +75,7 @@ class _Arc:
     @property
     def arrows(self) -> np.ndarray:
         """Stations at which arrows are drawn, about equally far apart."""
-        places = np.linspace(self.wrap[1], self.wrap[-2], ARROWS)
-        return np.abs(self.wrap[:, None] - places).argmin(axis=0)
+        return np.abs(self.wrap[:, None] - np.linspace(self.wrap[1], self.wrap[-2], ARROWS)).argmin(axis=0)
 
     def draw(self, axes: Axes, offset: np.ndarray | float = 0.0, **style: object) -> np.ndarray:
         """Draw a line around, off the circle by an offset [m], and return its points (2, n) [mm]."""
@@ -309,8 +309,7 @@ def figure_of(folder: Path) -> tuple[Path, Path, list[Finding]]:
         findings = [judged(statement, kept) for statement in figure.statements]
         origin = list(origin_lines(kept.results.attrs))
     rows = [(figure.source, one.text, one.verdict.value, one.numbers, one.why) for one in findings]
-    table = write_rows(folder / "statements.csv", COLUMNS, rows, origin)
-    return picture, table, findings
+    return picture, write_rows(folder / "statements.csv", COLUMNS, rows, origin), findings
 
 
 def finding_lines(findings: Sequence[Finding]) -> Iterator[str]:
@@ -318,8 +317,5 @@ def finding_lines(findings: Sequence[Finding]) -> Iterator[str]:
     for finding in findings:
         yield f"{finding.verdict.value}: {finding.text}"
         yield f"    {finding.numbers}" + (f"; {finding.why}" if finding.why else "")
-    counts = {
-        verdict: sum(f.verdict is verdict for f in findings)
-        for verdict in dict.fromkeys(f.verdict for f in findings)
-    }
-    yield f"{len(findings)} statements: {', '.join(f'{n} {verdict.value}' for verdict, n in counts.items())}"
+    counts = Counter(finding.verdict.value for finding in findings)
+    yield f"{len(findings)} statements: {', '.join(f'{n} {verdict}' for verdict, n in counts.items())}"

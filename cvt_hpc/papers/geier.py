@@ -43,10 +43,8 @@ def _largest_at_driven_exit(kept: Kept) -> Measured:
 
 def _pressed_in_t2(kept: Kept) -> Measured:
     push, ends = _push(kept, "t2", LOW), [arc[-1] for arc in _arcs(kept, "driving")]
-    return Measured(
-        [*(push > APART), *np.less(ends, APART)],
-        f"P in t2 {listed(push)} N at r 0, 0.15; {listed(ends, '.2g')} N at the end of the driving arc",
-    )
+    said = f"P in t2 {listed(push)} N at r 0, 0.15; {listed(ends, '.2g')} N at the end of the driving arc"
+    return Measured([*(push > APART), *np.less(ends, APART)], said)
 
 
 def _compensated_by_rings(kept: Kept) -> Measured:
@@ -60,10 +58,8 @@ def _compensated_by_rings(kept: Kept) -> Measured:
 
 def _close_to_transition(kept: Kept) -> Measured:
     before, near, behind = (_push(kept, "t1", r) - _push(kept, "t2", r) for r in (LOW, NEAR, HIGH))
-    return Measured(
-        [(before < 0.0).all() and (behind > 0.0).all(), abs(near[0]) < CLOSE * behind[-1]],
-        f"P_t1 - P_t2 {listed(before)} N at r 0, 0.15; {near[0]:.3g} N at 0.3; {listed(behind)} N beyond",
-    )
+    said = f"P_t1 - P_t2 {listed(before)} N at r 0, 0.15; {near[0]:.3g} N at 0.3; {listed(behind)} N beyond"
+    return Measured([(before < 0.0).all() and (behind > 0.0).all(), abs(near[0]) < CLOSE * behind[-1]], said)
 
 
 def _reversed(kept: Kept) -> Measured:
@@ -134,10 +130,10 @@ def _edges_on_arcs(kept: Kept) -> Measured:
 
 
 def _heads_on_strands(kept: Kept) -> Measured:
-    shares = [
-        on_strand(history, "head_push", strand).mean() / on_strand(history, "push_force", strand).mean()
-        for history, strand in _divided(kept)
-    ]
+    shares = []
+    for history, strand in _divided(kept):
+        heads, push = (on_strand(history, name, strand).mean() for name in ("head_push", "push_force"))
+        shares.append(heads / push)
     said = listed(np.multiply(100, shares), ".2g")
     return Measured(np.greater(shares, NOTICED), f"heads carry {said} % in t1 at 60, in t2 at 0 N m")
 

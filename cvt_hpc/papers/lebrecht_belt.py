@@ -4,7 +4,7 @@ Figs 3.1, 3.9, 3.13 and 3.14 show ramps. Fig. 3.12 is in `lebrecht_excitation.py
 """
 
 from collections.abc import Sequence
-from itertools import pairwise
+from itertools import pairwise, product
 
 import numpy as np
 import xarray as xr
@@ -93,10 +93,8 @@ def _speed_has_the_peaks(kept: Kept) -> Measured:
     found = float(lines[above][np.argmax(amplitude[above])])
     peaks = [f for strand in ("t1", "t2") for f, _, _ in _peaks(kept, strand)]
     resolved = 2.0 / float(np.ptp(history["profile_time"].values))
-    return Measured(
-        [any(abs(found - f) < resolved for f in peaks)],
-        f"sliding on the driven arc {found:.0f} Hz, strands {', '.join(f'{f:.0f}' for f in peaks)} Hz",
-    )
+    said = f"sliding on the driven arc {found:.0f} Hz, strands {', '.join(f'{f:.0f}' for f in peaks)} Hz"
+    return Measured([any(abs(found - f) < resolved for f in peaks)], said)
 
 
 FIGURE_3_10 = (
@@ -115,8 +113,7 @@ def _noisy(kept: Kept) -> tuple[np.ndarray, np.ndarray]:
     """Loads [N m] at which a study vibrates, and frequencies of the stronger strand there [Hz]."""
     results = kept.results
     vibrates = (results["status"] == Status.DONE) & (results["vibrates"] == Vibrates.YES)
-    stronger = results["amplitude"].fillna(0.0).argmax("strand")
-    frequency = results["frequency"].isel(strand=stronger)
+    frequency = results["frequency"].isel(strand=results["amplitude"].fillna(0.0).argmax("strand"))
     return results["load"].values[vibrates.values], frequency.values[vibrates.values]
 
 
@@ -136,21 +133,13 @@ def _frequencies_over_load(kept: Kept) -> Measured:
 
 def _modes_over_load(kept: Kept) -> Measured:
     loads, _ = _noisy(kept)
-    first, second = (
-        [int(kept.results["peak_mode"].sel(strand=strand, load=load, peak=1)) for load in loads]
-        for strand in ("t1", "t2")
-    )
-    return Measured(
-        [
-            2 in first and np.mean(np.equal(first, 2)) >= 0.5,
-            3 in second and np.mean(np.equal(second, 3)) >= 0.5,
-        ],
-        f"mode of the largest peak over the vibrating loads: t1 {_modes(first)}, t2 {_modes(second)}",
-    )
-
-
-def _modes(found: Sequence[int]) -> str:
-    return ", ".join(str(mode) for mode in found) or "none"
+    modes = kept.results["peak_mode"].sel(peak=1)
+    holds, said = [], []
+    for strand, expected in (("t1", 2), ("t2", 3)):
+        found = [int(modes.sel(strand=strand, load=load)) for load in loads]
+        holds.append(expected in found and np.mean(np.equal(found, expected)) >= 0.5)
+        said.append(f"{strand} {', '.join(map(str, found)) or 'none'}")
+    return Measured(holds, f"mode of the largest peak over the vibrating loads: {', '.join(said)}")
 
 
 FIGURE_3_2 = (
@@ -170,15 +159,12 @@ def _tension_above(kept: Kept) -> Measured:
 
 
 def _push_above(kept: Kept) -> Measured:
-    found = kept.results
+    found, load = kept.results, kept.results["load"].values
     tension = found["mean_ring_tension"]
-    more = (
-        found["mean_push_force"].sel(strand="t1") - (tension.sel(strand="t2") - tension.sel(strand="t1"))
-    ).values
-    load = found["load"].values
-    normal = load >= NORMAL_LOAD
+    needed = tension.sel(strand="t2") - tension.sel(strand="t1")
+    more = (found["mean_push_force"].sel(strand="t1") - needed).values
     first = f"from {load[more > 0.0].min():.0f} N m on" if (more > 0.0).any() else "at no load"
-    return Measured(list(more[normal] > 0.0), f"P_t1 is above T_t2 - T_t1 {first}")
+    return Measured(list(more[load >= NORMAL_LOAD] > 0.0), f"P_t1 is above T_t2 - T_t1 {first}")
 
 
 FIGURE_3_6 = (
@@ -192,13 +178,11 @@ def _eigenfrequencies(kept: Kept, strand: str, waves: int) -> np.ndarray:
 
 
 def _loaded_falls_unloaded_rises(kept: Kept) -> Measured:
-    moves = {
-        (strand, waves): _eigenfrequencies(kept, strand, waves)[[0, -1]]
-        for strand in ("t1", "t2")
-        for waves in (2, 3)
-    }
-    holds = [(b < a) if strand == "t1" else (b > a) for (strand, _), (a, b) in moves.items()]
-    said = [f"{s} {w}. {a:.0f} to {b:.0f} Hz" for (s, w), (a, b) in moves.items()]
+    holds, said = [], []
+    for strand, waves in product(("t1", "t2"), (2, 3)):
+        a, b = _eigenfrequencies(kept, strand, waves)[[0, -1]]
+        holds.append(b < a if strand == "t1" else b > a)
+        said.append(f"{strand} {waves}. {a:.0f} to {b:.0f} Hz")
     return Measured(holds, ", ".join(said))
 
 
@@ -207,11 +191,8 @@ def _second_and_third_in_band(kept: Kept) -> Measured:
     noisy = (load >= 130.0) & (load <= 200.0)
     second, third = _eigenfrequencies(kept, "t1", 2)[noisy], _eigenfrequencies(kept, "t2", 3)[noisy]
     holds = [bool(((f >= BAND[0]) & (f <= BAND[1])).all()) for f in (second, third)]
-    return Measured(
-        holds,
-        f"at 130-200 N m the second of t1 {second.min():.0f}-{second.max():.0f} Hz, "
-        f"the third of t2 {third.min():.0f}-{third.max():.0f} Hz",
-    )
+    low, high = (f"{found.min():.0f}-{found.max():.0f} Hz" for found in (second, third))
+    return Measured(holds, f"at 130-200 N m the second of t1 {low}, the third of t2 {high}")
 
 
 FIGURE_3_7 = (
@@ -284,9 +265,8 @@ def _moment_swings_with_noise(kept: Kept) -> Measured:
     for first, last, _ in load_areas(history):
         noisy |= (loads > first) & (loads < last)
     loud, quiet = float(np.median(moment[noisy])), float(np.median(moment[~noisy]))
-    return Measured(
-        [loud > 2.0 * quiet], f"{loud:.2g} N m at 400-800 Hz where t1 vibrates, {quiet:.2g} N m elsewhere"
-    )
+    holds = [loud > 2.0 * quiet]
+    return Measured(holds, f"{loud:.2g} N m at 400-800 Hz where t1 vibrates, {quiet:.2g} N m elsewhere")
 
 
 def _starts_at_a_load(kept: Kept) -> Measured:

@@ -18,10 +18,8 @@ def _goes_in(kept: Kept) -> Measured:
     arc = over_arc(kept.histories[0], "mean_displacement", "driven")
     depth = 1e3 * (arc.values[0] - arc.values.min())
     place = float(arc.share[np.argmin(arc.values)])
-    return Measured(
-        [depth > 0.0, 0.0 < place < 1.0],
-        f"{depth:.2g} mm into the groove, innermost at {100 * place:.0f} % of the wrap",
-    )
+    holds = [depth > 0.0, 0.0 < place < 1.0]
+    return Measured(holds, f"{depth:.2g} mm into the groove, innermost at {100 * place:.0f} % of the wrap")
 
 
 def _turns_and_goes_out(kept: Kept) -> Measured:
@@ -44,13 +42,10 @@ FIGURE_4_1 = (
 
 
 def _radial_through_zero(kept: Kept) -> Measured:
-    element = one_passage(kept.histories[0], "driven")
-    radial = 1e3 * element["radial_sliding"].values
+    radial = 1e3 * one_passage(kept.histories[0], "driven")["radial_sliding"].values
     n = radial.size // 4
-    return Measured(
-        [radial[1:n].mean() < 0.0 < radial[-n:].mean()],
-        f"{radial[1:n].mean():.3g} mm/s in the first, {radial[-n:].mean():.3g} mm/s in the last quarter",
-    )
+    said = f"{radial[1:n].mean():.3g} mm/s in the first, {radial[-n:].mean():.3g} mm/s in the last quarter"
+    return Measured([radial[1:n].mean() < 0.0 < radial[-n:].mean()], said)
 
 
 def _jagged(kept: Kept) -> Measured:
@@ -59,26 +54,20 @@ def _jagged(kept: Kept) -> Measured:
     off = 1e3 * (element["radial_sliding"].values - mean_there(history, element, "radial_sliding"))[5:-5]
     turns = int((np.diff(np.sign(off)) != 0).sum())
     size = 1e3 * float(np.sqrt(np.mean(element["radial_sliding"].values ** 2)))
-    return Measured(
-        [turns >= 6 and off.std() > SWING * size],
-        f"it swings {off.std():.2g} mm/s (rms) about its mean, with {turns} changes of sign",
-    )
+    said = f"it swings {off.std():.2g} mm/s (rms) about its mean, with {turns} changes of sign"
+    return Measured([turns >= 6 and off.std() > SWING * size], said)
 
 
 def _falls_at_that_speed(kept: Kept) -> Measured:
     """Mark times at which the element slides faster than the top of the curve of friction lies."""
-    history = kept.histories[0]
-    point = json.loads(history.attrs["point"])
-    speeds = np.linspace(0.0, 1.0, 2000)
-    curve = regularised(point, speeds)
+    history, speeds = kept.histories[0], np.linspace(0.0, 1.0, 2000)
+    curve = regularised(json.loads(history.attrs["point"]), speeds)
     top = float(speeds[np.argmax(curve)])
     speed = one_passage(history, "driven")["sliding_speed"].values
     share = float(np.mean(speed > top))
-    return Measured(
-        [share > 0.5],
-        f"{1e3 * np.median(speed):.3g} mm/s (median); the curve falls beyond {1e3 * top:.3g} mm/s, "
-        f"where the element is for {100 * share:.0f} % of its way",
-    )
+    beyond = f"{1e3 * top:.3g} mm/s, where the element is for {100 * share:.0f} % of its way"
+    said = f"{1e3 * np.median(speed):.3g} mm/s (median); the curve falls beyond {beyond}"
+    return Measured([share > 0.5], said)
 
 
 FIGURE_4_2 = (
@@ -93,11 +82,9 @@ def _steeper(kept: Kept) -> Measured:
     curves = curves_of(kept.results, np.linspace(0.05, 0.25, 50))
     ordered = [curves[gradient] for gradient in sorted(curves, reverse=True)]
     falls = [float(curve[0] - curve[-1]) for curve in ordered]
-    return Measured(
-        [a < b for a, b in pairwise(falls)],
-        f"mu falls by {listed(falls, '.2g')} from 50 to 250 mm/s at "
-        f"{listed(sorted(curves, reverse=True), 'g')} s/m",
-    )
+    gradients = listed(sorted(curves, reverse=True), "g")
+    said = f"mu falls by {listed(falls, '.2g')} from 50 to 250 mm/s at {gradients} s/m"
+    return Measured([a < b for a, b in pairwise(falls)], said)
 
 
 def _fed_where_it_falls(kept: Kept) -> Measured:
@@ -106,20 +93,16 @@ def _fed_where_it_falls(kept: Kept) -> Measured:
         fed = kept.results["vibrates"].sel(friction_gradient=gradient).values == Vibrates.YES
         holds.append(fed.any() == (gradient < 0.0))
         speeds = 1e3 * kept.results["radial_speed"].values[fed]
-        said.append(
-            f"{gradient:g} s/m: {f'{speeds.min():.0f}-{speeds.max():.0f} mm/s' if fed.any() else 'nowhere'}"
-        )
+        where = f"{speeds.min():.0f}-{speeds.max():.0f} mm/s" if fed.any() else "nowhere"
+        said.append(f"{gradient:g} s/m: {where}")
     return Measured(holds, "; ".join(said))
 
 
 def _fed_more(kept: Kept) -> Measured:
-    growth = kept.results["growth_rate"].max("radial_speed")
-    ordered = growth.sortby("friction_gradient", ascending=False)
-    return Measured(
-        [a < b for a, b in pairwise(ordered.values)],
-        f"fastest growth {listed(ordered.values)} 1/s at "
-        f"{listed(ordered['friction_gradient'].values, 'g')} s/m",
-    )
+    ordered = kept.results["growth_rate"].max("radial_speed").sortby("friction_gradient", ascending=False)
+    gradients = listed(ordered["friction_gradient"].values, "g")
+    said = f"fastest growth {listed(ordered.values)} 1/s at {gradients} s/m"
+    return Measured([a < b for a, b in pairwise(ordered.values)], said)
 
 
 FIGURE_3_12 = (
@@ -132,18 +115,15 @@ FIGURE_3_12 = (
 
 def _falling_and_constant(kept: Kept) -> tuple[xr.Dataset, xr.Dataset]:
     gradients = kept.results["friction_gradient"].values
-    steepest, flattest = gradients.min(), gradients.max()
-    return kept.history(friction_gradient=steepest), kept.history(friction_gradient=flattest)
+    return kept.history(friction_gradient=gradients.min()), kept.history(friction_gradient=gradients.max())
 
 
 def _spiral_is_a_source(kept: Kept) -> Measured:
     falling, _ = _falling_and_constant(kept)
     found = powers_of(falling)
-    return Measured(
-        [found.spiral > found.taken > 0.0],
-        f"friction takes {found.spiral:.0f} W from the radial motion through the arcs; what damps the "
-        f"vibration takes {found.taken:.2g} W",
-    )
+    fed = f"friction takes {found.spiral:.0f} W from the radial motion through the arcs"
+    damped = f"what damps the vibration takes {found.taken:.2g} W"
+    return Measured([found.spiral > found.taken > 0.0], f"{fed}; {damped}")
 
 
 def _switch_feeds(kept: Kept) -> Measured:
@@ -158,22 +138,16 @@ def _switch_feeds(kept: Kept) -> Measured:
 
 def _oscillates_with_switch(kept: Kept) -> Measured:
     swings = [1e6 * float(history["amplitude"].max()) for history in _falling_and_constant(kept)]
-    return Measured(
-        [swings[0] > 5.0, swings[1] < 1.0],
-        f"{swings[0]:.2g} um, and {swings[1]:.2g} um with constant friction",
-    )
+    holds = [swings[0] > 5.0, swings[1] < 1.0]
+    return Measured(holds, f"{swings[0]:.2g} um, and {swings[1]:.2g} um with constant friction")
 
 
 FIGURE_4_4 = (
-    Statement(
-        "The spiral movement of the belt in the arc of contact is the source of energy", _spiral_is_a_source
-    ),
-    Statement(
-        "The friction curve is the switch that supplies the oscillator with energy",
-        _switch_feeds,
-        "the front of the push moves over cells that open and close, where flanks take what stresses feed",
-    ),
-    Statement(
-        "The oscillator is the belt: without a negative gradient it is silent", _oscillates_with_switch
-    ),
-)
+    Statement("The spiral movement of the belt in the arc of contact is the source of energy",
+              _spiral_is_a_source),
+    Statement("The friction curve is the switch that supplies the oscillator with energy", _switch_feeds,
+              "the front of the push moves over cells that open and close, where flanks take what stresses "
+              "feed"),
+    Statement("The oscillator is the belt: without a negative gradient it is silent",
+              _oscillates_with_switch),
+)  # fmt: skip

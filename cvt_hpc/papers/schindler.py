@@ -13,19 +13,18 @@ SHOWN = (("net_axial_force", "beam_axial_force", "string_axial_force"), ("final_
 def _axial_forces(kept: Kept) -> Measured:
     force = courses(kept, "misalignment", "net_axial_force")["net_axial_force"]
     driving, off = force.sel(pulley="driving").values, np.abs(force.sum("pulley").values)
-    return Measured(
-        [(driving[-1] > 2.0 * driving[0]).all(), off.max() < ALIKE * driving.max()],
-        f"net axial force of the driving pulley by loads, {listed(driving[0])} N to {listed(driving[-1])} N; "
-        f"that of the driven one is opposite within {off.max():.2g} N",
+    holds = [(driving[-1] > 2.0 * driving[0]).all(), off.max() < ALIKE * driving.max()]
+    first = (
+        f"net axial force of the driving pulley by loads, {listed(driving[0])} N to {listed(driving[-1])} N"
     )
+    return Measured(holds, f"{first}; that of the driven one is opposite within {off.max():.2g} N")
 
 
 def _grow(kept: Kept, unit: str, factor: float, *names: str) -> Measured:
     found = {name: of.values for name, of in courses(kept, "misalignment", *names).items()}
     said = (f"{name} {listed(factor * of[0])} to {listed(factor * of[-1])}" for name, of in found.items())
-    return Measured(
-        [np.all(of[-1] > of[0]) for of in found.values()], f"[{unit}] by loads, {'; '.join(said)}"
-    )
+    holds = [np.all(of[-1] > of[0]) for of in found.values()]
+    return Measured(holds, f"[{unit}] by loads, {'; '.join(said)}")
 
 
 MISALIGNMENT = (

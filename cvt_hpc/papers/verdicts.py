@@ -8,7 +8,7 @@ from collections.abc import Callable, Iterable, Iterator, Sequence
 from contextlib import ExitStack, contextmanager
 from enum import Enum
 from pathlib import Path
-from typing import Any, NamedTuple
+from typing import NamedTuple
 
 import numpy as np
 import xarray as xr
@@ -25,16 +25,15 @@ class Kept(NamedTuple):
     results: xr.Dataset
     histories: Sequence[xr.Dataset]
 
-    def run(self, **values: Any) -> xr.Dataset:
+    def run(self, **values: float | str) -> xr.Dataset:
         """Results of the run at values [SI] of axes; InputError where it is not done."""
         found = self.results.sel(values, method="nearest") if values else self.results
         if int(found["status"]) != Status.DONE:
-            raise InputError(
-                f"expected a run that is done at {values}, found {Status(int(found['status'])).name}"
-            )
+            status = Status(int(found["status"])).name
+            raise InputError(f"expected a run that is done at {values}, found {status}")
         return found
 
-    def history(self, **values: Any) -> xr.Dataset:
+    def history(self, **values: float | str) -> xr.Dataset:
         """History of the run at values [SI] of axes."""
         for history in self.histories:
             point = json.loads(history.attrs["point"])
@@ -70,8 +69,7 @@ def on_strand(history: xr.Dataset, name: str, strand: str) -> np.ndarray:
     """A quantity between the ends of a strand, at places equally far apart."""
     here = np.flatnonzero(history["region"].values.astype(str) == strand)[1:-1]
     position = history["position"].values[here]
-    even = np.linspace(position[0], position[-1], here.size)
-    return np.interp(even, position, history[name].values[here])
+    return np.interp(np.linspace(position[0], position[-1], here.size), position, history[name].values[here])
 
 
 def courses(kept: Kept, axis: str, *names: str) -> dict[str, xr.DataArray]:
@@ -88,13 +86,11 @@ def opened(folder: Path) -> Iterator[Kept]:
 
     with ExitStack() as stack:
         results = stack.enter_context(open_results(folder)).load()
-        histories = [
-            stack.enter_context(open_netcdf(path)) for path in sorted((folder / "histories").glob("run-*.nc"))
-        ]
-        yield Kept(results, histories)
+        paths = sorted((folder / "histories").glob("run-*.nc"))
+        yield Kept(results, [stack.enter_context(open_netcdf(path)) for path in paths])
 
 
-def _is_near(found: Any, value: Any) -> bool:
+def _is_near(found: float | str, value: float | str) -> bool:
     if isinstance(value, str):
         return found == value
     return bool(np.isclose(float(found), value, rtol=1e-6, atol=1e-12)) or float(found) == value
@@ -112,7 +108,7 @@ class Verdict(Enum):
 class Measured(NamedTuple):
     """Whether each part of a statement holds, and the numbers by which that is told."""
 
-    holds: Iterable[Any]
+    holds: Iterable[object]
     numbers: str
 
 

@@ -13,15 +13,18 @@ import numpy as np
 import xarray as xr
 from numpy.typing import NDArray
 
+from cvt_hpc.analysis import courses
 from cvt_hpc.analysis.arrangement import infinity_in_words, place_text, value_text
 from cvt_hpc.analysis.classes import at_strongest_strand, count_classes, map_classes, occurrence_classes
 from cvt_hpc.analysis.figures import coordinate_unit, in_words, number, value_unit
 from cvt_hpc.analysis.probability import CONTOURS, PROBABILITY
 from cvt_hpc.analysis.scatter import is_sampled
 from cvt_hpc.analysis.sensitivity import QUANTILES, members, onset_axis, onset_scatter, widest_row
+from cvt_hpc.job import Job
 from cvt_hpc.job.axes import SAMPLE
 from cvt_hpc.variables import Status
 from cvt_hpc.vibration.classes import DECIDED, OccurrenceClass, levels, onsets
+from cvt_hpc.vibration.ramped import ramped
 
 MOST_NUMBERS = 1_000_000  # of all quantities together: some 5 MB of the page
 MOST_PLACES = 4  # of a dimension that the runs have in common, such as both strands: a quantity for each
@@ -51,6 +54,19 @@ def summary(dataset: xr.Dataset) -> str:
     text = f"{counted(known.size, 'run')}: {count_classes(known)}."
     beside = f" {counted(inferred.size, 'cell')} inferred: {count_classes(inferred)}."
     return text + beside if inferred.size else text
+
+
+def course_sentence(job: Job) -> str:
+    """Return what drives the runs over their time, and for which time verdicts hold; "" without a course."""
+    changed, p = courses.of_job(job), job.parameters
+    if not changed:
+        return ""
+    file = f"of `{job.files[courses.FILE]}` " if courses.FILE in job.files else ""
+    held = "Verdicts hold over that time, window by window: `onset_time`, `end_time`."
+    if "judged_fraction" in p and not ramped(p):
+        held = "Verdicts hold for the constant values to which it leads."
+    times = f"{p[courses.TIME][0]:g} to {p[courses.TIME][-1]:g} s"
+    return f"The course {file}drives each run from {times}: {courses.in_words(changed)}. {held}"
 
 
 def is_judged(dataset: xr.Dataset) -> bool:

@@ -3,12 +3,11 @@
 import json
 from base64 import b64encode
 from collections.abc import Iterator
-from typing import Any
 
 import numpy as np
 import xarray as xr
-from matplotlib.colors import to_hex
-from numpy.typing import NDArray
+from matplotlib.colors import Colormap, to_hex
+from numpy.typing import DTypeLike, NDArray
 
 from cvt_hpc.analysis import cells
 from cvt_hpc.analysis.arrangement import arrange, ruler, value_text
@@ -25,16 +24,13 @@ from cvt_hpc.vibration.classes import StartClass
 LARGEST = 3e38  # in 4 bytes
 KEPT = "\n\t\u00a0"  # characters on a page that do not print, and are no harm
 _SYMBOLS = {  # marks of the plotting library on cells of a class, and for legends
-    StartClass.FAILED: ("x", "✖"),
-    StartClass.NOT_RUN: ("line-ew-open", "–"),
-    StartClass.UNDECIDED: ("", "?"),
-    StartClass.IRREGULAR: ("star", "★"),
-    StartClass.SLIPPING: ("triangle-right", "▶"),
-    StartClass.LARGE_START_ONLY: ("diamond", "◆"),
-}
+    StartClass.FAILED: ("x", "✖"), StartClass.NOT_RUN: ("line-ew-open", "–"),
+    StartClass.UNDECIDED: ("", "?"), StartClass.IRREGULAR: ("star", "★"),
+    StartClass.SLIPPING: ("triangle-right", "▶"), StartClass.LARGE_START_ONLY: ("diamond", "◆"),
+}  # fmt: skip
 
 
-def map_data(dataset: xr.Dataset, source: str = "results") -> dict[str, Any]:
+def map_data(dataset: xr.Dataset, source: str = "results") -> dict[str, object]:
     """Gather what the map shows of a study over a grid or of samples, of one run at least along one axis.
 
     Returned are JSON types; numbers of cells are base64 of bytes, or of floats of 4 bytes, the last axis
@@ -54,9 +50,9 @@ def map_data(dataset: xr.Dataset, source: str = "results") -> dict[str, Any]:
         axes = [_grid_axis(dataset[name]) for name in names]
     classes, runs = map_classes(dataset), occurrence_classes(dataset)
     starts = _from_both_starts(dataset, names)
-    onsets = [] if sampled else list(_onsets(classes.values, names, axes, from_both=False))
+    onsets = [] if sampled else list(_onsets(classes.values, dataset, axes, from_both=False))
     if starts is not None:
-        onsets += _onsets(starts, names, axes, from_both=True)
+        onsets += _onsets(starts, dataset, axes, from_both=True)
     data = {
         "sampled": sampled,
         "axes": axes,
@@ -80,13 +76,13 @@ def map_data(dataset: xr.Dataset, source: str = "results") -> dict[str, Any]:
     return data | {"first": -1 if is_judged(dataset) or not data["quantities"] else 0}
 
 
-def as_script(data: dict[str, Any]) -> str:
+def as_script(data: dict[str, object]) -> str:
     """JSON that ends no script and turns no direction, whatever the texts of a dataset are."""
     text = json.dumps(_as_they_stand(data), separators=(",", ":"), allow_nan=False)
     return text.replace("<", "\\u003c").replace(">", "\\u003e").replace("&", "\\u0026")
 
 
-def _as_they_stand(data: Any) -> Any:
+def _as_they_stand(data: object) -> object:
     """JSON types with escapes in all texts, as a page shows them."""
     if isinstance(data, str):
         return escaped(data, KEPT)
@@ -95,88 +91,71 @@ def _as_they_stand(data: Any) -> Any:
     return list(map(_as_they_stand, data)) if isinstance(data, (list, tuple)) else data
 
 
-def _grid_axis(axis: xr.DataArray) -> dict[str, Any]:
+def _grid_axis(axis: xr.DataArray) -> dict[str, object]:
     ruled = ruler(axis)
     ticks = None if ruled.ticks is None else {"at": ruled.ticks.tolist(), "texts": list(ruled.tick_labels)}
-    return {
-        "name": in_words(axis),
-        "label": ruled.label,
-        "texts": [value_text(axis, place) for place in range(axis.size)],
-        "centres": ruled.centres.tolist(),
-        "edges": ruled.edges.tolist(),
-        "ticks": ticks,
-        "minor": ruled.minor.tolist(),
-    }
+    places = {"centres": ruled.centres.tolist(), "edges": ruled.edges.tolist(), "ticks": ticks}
+    return {**_named(axis, ruled.label), **places, "minor": ruled.minor.tolist()}
 
 
-def _sampled_axis(axis: xr.DataArray) -> dict[str, Any]:
+def _named(axis: xr.DataArray, label: str) -> dict[str, object]:
+    texts = [value_text(axis, place) for place in range(axis.size)]
+    return {"name": in_words(axis), "label": label, "texts": texts}
+
+
+def _sampled_axis(axis: xr.DataArray) -> dict[str, object]:
     factor, unit = coordinate_unit(axis.attrs)
     is_number = axis.dtype.kind in "iuf"
-    values: list[Any] = list(map(str, axis.values))
+    values: list[object] = list(map(str, axis.values))
     if is_number:
         values = [factor * value if np.isfinite(value) else None for value in axis.values.tolist()]
-    return {
-        "name": in_words(axis),
-        "label": axis_label(axis, unit if is_number else ""),
-        "texts": [value_text(axis, place) for place in range(axis.size)],
-        "values": values,
-        "log": axis.attrs.get("spacing") == "log",
-    }
+    named = _named(axis, axis_label(axis, unit if is_number else ""))
+    return {**named, "values": values, "log": axis.attrs.get("spacing") == "log"}
 
 
 def _from_both_starts(dataset: xr.Dataset, names: list[str]) -> NDArray[np.int8] | None:
     """Classes from the smallest and the largest disturbance, over the whole grid; None without that axis."""
     if not has_starts(dataset, {}):
         return None
-    joined = map_classes(join_starts(dataset)).expand_dims({AXIS: dataset.sizes[AXIS]})
-    return joined.transpose(*names).values
+    return map_classes(join_starts(dataset)).expand_dims({AXIS: dataset.sizes[AXIS]}).transpose(*names).values
 
 
 def _onsets(
-    classes: NDArray[np.int8], names: list[str], axes: list[dict[str, Any]], from_both: bool
-) -> Iterator[dict[str, Any]]:
+    classes: NDArray[np.int8], dataset: xr.Dataset, axes: list[dict[str, object]], from_both: bool
+) -> Iterator[dict[str, object]]:
     """Yield the onset lines along each axis on which a vibration may set in.
 
     Of each line the places along its axis, over all other axes.
     """
+    names = list(map(str, dataset["status"].dims))
     for name in (name for name in ALONG if name in names and len(names) > 1):
         axis = names.index(name)
         centres = np.array(axes[axis]["centres"])
-        for label, style, kinds in of_each_start(classes):
+        for label, style, kinds in of_each_start(classes, dataset[name]):
             lowest = lowest_onsets(centres, np.moveaxis(kinds, axis, -1).reshape(-1, centres.size))
             if np.isfinite(lowest).any():
                 line = {"axis": axis, "starts": from_both, "label": label, "dashed": style == "--"}
                 yield line | {"at": _bytes(lowest, np.dtype("<f4"))}
 
 
-def _kind(kind: StartClass) -> dict[str, Any]:
+def _kind(kind: StartClass) -> dict[str, object]:
     style = cells.ALL_STYLES[next(one for one in cells.ALL_STYLES if one == kind)]
     symbol, letter = _SYMBOLS.get(kind, ("", ""))
-    return {
-        "label": kind.label,
-        "fill": style.fill,
-        "ink": style.ink,
-        "symbol": symbol,
-        "letter": letter,
-        "moves": kind in (StartClass.VIBRATING, StartClass.IRREGULAR),
-    }
+    moves = kind in (StartClass.VIBRATING, StartClass.IRREGULAR)
+    look = {"fill": style.fill, "ink": style.ink, "symbol": symbol, "letter": letter}
+    return {"label": kind.label, **look, "moves": moves}
 
 
-def _colours(colours: Any) -> list[list[Any]]:
+def _colours(colours: Colormap) -> list[list[float | str]]:
     return [[k / 23, to_hex(colours(k))] for k in range(24)]
 
 
-def _quantity(quantity: Quantity) -> dict[str, Any]:
+def _quantity(quantity: Quantity) -> dict[str, object]:
     norm = cells.norm_over(quantity.values, 0.0 if quantity.key == AMPLITUDE else None)
-    return {
-        "key": quantity.key,
-        "name": quantity.name,
-        "unit": quantity.unit,
-        "least": norm.vmin,
-        "most": norm.vmax,
-        "values": _bytes(np.clip(quantity.values, -LARGEST, LARGEST), np.dtype("<f4")),
-    }
+    named = {"key": quantity.key, "name": quantity.name, "unit": quantity.unit}
+    values = _bytes(np.clip(quantity.values, -LARGEST, LARGEST), np.dtype("<f4"))
+    return {**named, "least": norm.vmin, "most": norm.vmax, "values": values}
 
 
-def _bytes(values: NDArray[Any], kind: Any) -> str:
+def _bytes(values: np.ndarray, kind: DTypeLike) -> str:
     return b64encode(np.ascontiguousarray(values, kind).tobytes()).decode()

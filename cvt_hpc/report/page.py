@@ -4,14 +4,15 @@
 """
 
 import base64
-from collections.abc import Callable, Iterator, Mapping, Sequence
+import re
+from collections.abc import Callable, Iterator, Sequence
 from functools import partial
 from importlib import resources
 from io import BytesIO
 from itertools import islice, product
 from pathlib import Path
 from shlex import quote
-from typing import Any, NamedTuple
+from typing import NamedTuple
 
 import jinja2
 import numpy as np
@@ -19,13 +20,15 @@ import xarray as xr
 from markupsafe import Markup
 from matplotlib.figure import Figure
 
-from cvt_hpc.analysis.alignment import job_held
-from cvt_hpc.analysis.arrangement import Arrangement, Sides, arrange, known_values, value_text
+from cvt_hpc.analysis import courses
+from cvt_hpc.analysis.arrangement import Arrangement, Fixed, Sides, arrange, known_values, value_text
 from cvt_hpc.analysis.classes import at_strongest_strand, check_results, map_classes, occurrence_classes
 from cvt_hpc.analysis.comparison import sample_sentences
 from cvt_hpc.analysis.figures import RESOLUTION, coordinate_unit, in_words, number, with_units
-from cvt_hpc.analysis.hysteresis_bands import hysteresis_figure
+from cvt_hpc.analysis.held_job import job_held
+from cvt_hpc.analysis.hysteresis_bands import hysteresis_figure, within
 from cvt_hpc.analysis.maps import AXIS, has_starts, map_figure
+from cvt_hpc.analysis.measured import File
 from cvt_hpc.analysis.measured_score import score, score_sentences
 from cvt_hpc.analysis.probability import PROBABILITY, has_samples, over_samples
 from cvt_hpc.analysis.probability_drawing import onset_bands_figure, sensitivity_figure
@@ -45,6 +48,7 @@ from cvt_hpc.study.intervals import look
 from cvt_hpc.variables import Status
 from cvt_hpc.vibration.classes import DECIDED, OccurrenceClass, levels, onsets
 
+_HAS_ENDS = re.compile("vibration (from|up to)")  # a sentence about windows
 COARSE = 0.02  # of an axis: a step beyond is worth a smaller one
 _RETRIES = {
     Status.FAILED_NUMERICS: "with a smaller step",
@@ -57,6 +61,9 @@ MOST_FAILURES = 30  # kinds of failure in the table
 MOST_MAPS = 12  # of combinations of the axes that no map has room for
 # What tells how well a run was computed, where its model records it
 _QUALITY = ("power_residual", "step_ripple", "refinements", "time_step", "simulated_seconds", "core_seconds")
+
+
+_ORIGIN = ("source", "command", "host", "versions", "git_revision", "job_fingerprint", "history")
 
 
 class Picture(NamedTuple):
@@ -93,7 +100,7 @@ def write_report(
     out: Path,
     source: str = "results",
     folder: Path | None = None,
-    measured: str | Path | None = None,
+    measured: File = None,
     progress: Progress | None = None,
 ) -> Path:
     """Write the page, and return its path.
@@ -125,18 +132,14 @@ def write_report(
     return Path(out)
 
 
-def _as_it_stands(value: Any) -> Any:
+def _as_it_stands(value: object) -> object:
     """Escape the characters of a text that would turn or hide what is beside them."""
     return escaped(value, KEPT) if isinstance(value, str) and not isinstance(value, Markup) else value
 
 
 def _content(
-    dataset: xr.Dataset,
-    source: str,
-    folder: Path | None,
-    measured: str | Path | None,
-    progress: Progress | None,
-) -> dict[str, Any]:
+    dataset: xr.Dataset, source: str, folder: Path | None, measured: File, progress: Progress | None
+) -> dict[str, object]:
     attributes = {str(key): str(value) for key, value in dataset.attrs.items()}
     name, job = one_line(attributes.get("job_name", source)), job_held(dataset, source)
     own = ["run", *(axis.name for axis in job.axes)] if job else dataset["status"].dims
@@ -156,8 +159,7 @@ def _content(
         beyond = [name for name in map(str, cells["status"].dims) if name not in (arrangement.x, *axes)]
         x = arrangement.x if dataset[arrangement.x].dtype.kind in "iuf" else None
         if PROBABILITY in cells:
-            others = [*beyond, *axes]
-            sentences = list(findings.probability_sentences(dataset, cells, arrangement.x, others))
+            sentences = list(findings.probability_sentences(dataset, cells, arrangement.x, [*beyond, *axes]))
         elif judged:
             sentences = list(findings.window_sentences(dataset, arrangement.x, [*beyond, *axes]))
             sentences += filter(None, [findings.slip_sentence(dataset, arrangement.x)])
@@ -165,6 +167,7 @@ def _content(
         sentences = list(findings.range_sentences(dataset))
     if measured is not None:
         sentences += score_sentences(score(dataset, measured, source))
+    sentences = [*filter(None, [findings.course_sentence(job)]), *sentences] if job else sentences
     basis = [*map(_with_code, _basis(dataset, job, changed)), *_samples(dataset, folder, source)]
     is_renewed = progress is not None and progress.every is not None
     combinations = int(np.prod([dataset.sizes[name] for name in beyond]))
@@ -176,7 +179,7 @@ def _content(
         "joined": " and ".join(joined),
         "summary": findings.summary(dataset),
         "sentences": list(map(_with_code, sentences)),
-        "windows": any("vibration from" in line or "vibration up to" in line for line in sentences),
+        "ends": within(dataset[x]) if x and any(map(_HAS_ENDS.search, sentences)) else "",
         "progress": progress,
         "next_steps": [] if is_renewed else list(map(_with_code, next_steps(dataset, job, x))),
         # drawn beside the map of the browser, which has no such lines
@@ -200,23 +203,17 @@ def _content(
         "parameters": parameters,
         "changed": changed,
         "derived": rules_in_words(job, job.schema) if job else [],
-        "provenance": _provenance(attributes),
+        "provenance": [(key.replace("_", " "), text) for key in _ORIGIN if (text := attributes.get(key))],
     }
 
 
 def _arrangement(dataset: xr.Dataset, source: str) -> Arrangement | None:
     """Arrangement of a map of the study; None of samples and of single runs."""
-    if is_sampled(dataset) or not dataset["status"].dims:
-        return None
-    return arrange(dataset, {}, source)
+    return None if is_sampled(dataset) or not dataset["status"].dims else arrange(dataset, {}, source)
 
 
 def _pictures(
-    dataset: xr.Dataset,
-    arrangement: Arrangement | None,
-    beyond: list[str],
-    source: str,
-    measured: str | Path | None,
+    dataset: xr.Dataset, arrangement: Arrangement | None, beyond: list[str], source: str, measured: File
 ) -> list[Picture]:
     """One printed map, or one for each of the first combinations of the axes beyond x, y and panels."""
     if arrangement is None or not beyond:
@@ -231,8 +228,7 @@ def _pictures(
             at = dict(zip(beyond, place, strict=True))
             part = arrange(dataset, at, source, sides)
             found = findings.summary(part.dataset)
-            picture = _picture(dataset, at, source, measured)
-            pictures.append(Picture("; ".join(part.notes), found, picture))
+            pictures.append(Picture("; ".join(part.notes), found, _picture(dataset, at, source, measured)))
     return [one for one in pictures if one.picture]
 
 
@@ -259,7 +255,7 @@ def _axes(dataset: xr.Dataset, job: Job | None) -> list[tuple[str, str, str]]:
     return rows
 
 
-def _picture(dataset: xr.Dataset, at: Mapping[str, Any], source: str, measured: str | Path | None) -> str:
+def _picture(dataset: xr.Dataset, at: Fixed, source: str, measured: File) -> str:
     """The printed map as a PNG in base64; "" where there is nothing to draw.
 
     It shows quantities where nothing was judged.
@@ -282,7 +278,7 @@ def _encoded(compose: Callable[[], Figure]) -> str:
 
 def _with_code(text: str) -> Markup:
     """A text as HTML: what stands between backticks as code, numbers never parted from their units."""
-    text = with_units(_as_it_stands(text)).replace("N m", "N\u00a0m")
+    text = with_units(escaped(text, KEPT)).replace("N m", "N\u00a0m")
     parts = enumerate(text.split("`"))
     return Markup("").join(Markup("<code>{}</code>" if k % 2 else "{}").format(part) for k, part in parts)
 
@@ -305,8 +301,10 @@ def _basis(dataset: xr.Dataset, job: Job | None, changed: Sequence[Row]) -> Iter
             factor, unit = findings.length_unit(least)
             threshold = f"{factor * least:.3g} {unit} or more (`amplitude_threshold`)"
             yield f"A run vibrates where the amplitude of a strand is {threshold}."
-        told = [f"{row.key.replace('_', ' ')} {row.value}" for row in changed[:MOST_CHANGED]]
-        told += [f"{more} more"] if (more := len(changed) - MOST_CHANGED) > 0 else []
+        driven = {courses.TIME, courses.FILE, *courses.of_job(job)}  # the findings begin with them
+        rows = [row for row in changed if not (row.key in driven or row.key.endswith("_profile"))]
+        told = [f"{row.key.replace('_', ' ')} {row.value}" for row in rows[:MOST_CHANGED]]
+        told += [f"{more} more"] if (more := len(rows) - MOST_CHANGED) > 0 else []
         start = f"Other than the defaults: {', '.join(told)}. All else" if told else "All that is fixed"
         yield f"{start} is at its default, which is an assumption where no paper gives it."
     classes = map_classes(dataset).values
@@ -355,21 +353,26 @@ def _samples(dataset: xr.Dataset, folder: Path | None, source: str) -> list[Mark
 
 
 def _parameters(job: Job) -> dict[str, list[Row]]:
-    """Values of what neither varies nor follows, by table; the defaults are assumptions of the program."""
+    """Values of what neither varies nor follows, by table; the defaults are assumptions of the program.
+
+    Files have their names, and what a course changes its range.
+    """
     schema, elsewhere = job.schema, {axis.name for axis in job.axes} | {rule.key for rule in job.rules}
+    told = {**job.files, **courses.of_job(job)}
     return {
         section: [
-            Row(key, value_in_words(schema, key, value), parameter.description, value != parameter.default)
+            Row(
+                key,
+                told.get(key) or value_in_words(schema, key, value),
+                parameter.description,
+                key in told or value != parameter.default,
+            )
             for key, parameter in table.items()
-            if key not in elsewhere and (value := job.parameters.get(key)) is not None and value != ()
+            if key not in elsewhere
+            and ((value := job.parameters.get(key)) not in (None, ()) or key in job.files)
         ]
         for section, table in schema.sections.items()
     }
-
-
-def _provenance(attributes: Mapping[str, str]) -> list[tuple[str, str]]:
-    names = ("source", "command", "host", "versions", "git_revision", "job_fingerprint", "history")
-    return [(name.replace("_", " "), attributes[name]) for name in names if attributes.get(name)]
 
 
 def next_steps(dataset: xr.Dataset, job: Job | None, x: str | None) -> Iterator[str]:

@@ -38,16 +38,8 @@ def no_more() -> Sequence[dict[str, Any]]:
 class OpenRun:
     """A run from its point to its record.
 
-    Parameters
-    ----------
-    job : Job
-        For its model.
-    point : dict
-        Flat parameters of the run [SI].
-    is_kept : bool
-        Whether `run` is to be there in the end.
-    blank : dict
-        An empty record.
+    `point` are its flat parameters [SI], `blank` is an empty record of the job, and `is_kept` tells whether
+    `run` is to be there in the end.
 
     Attributes
     ----------
@@ -88,14 +80,8 @@ class OpenRun:
     def take(self, run: Any, seconds: float, values: dict[str, Any] | None) -> None:
         """Look at a transient that has ended, and decide whether it counts or which one comes next.
 
-        Parameters
-        ----------
-        run : object
-            As the model's batch has it.
-        seconds : float
-            Processor time that it has taken [s].
-        values : dict or None
-            As the model judges it; None of a preliminary one, and of one that has failed.
+        It has taken so many seconds of processor time. Values are as the model judges it; None of a
+        preliminary one, and of one that has failed.
         """
         judge = self._model.settle if self.is_preliminary else lambda run: values
         record = record_of(self._job, run, seconds, judge, self._blank)
@@ -182,24 +168,11 @@ class Interrupted(Exception):
 def march(
     batch: Batch, until: int | None = None, stop: Callable[[], str | None] | None = None
 ) -> tuple[float, str | None]:
-    """March a batch to its end.
+    """March a batch of any model to its end, or to so many samples.
 
-    Parameters
-    ----------
-    batch : Batch
-        Of any model.
-    until : int, optional
-        Number of samples to march to; by default all.
-    stop : callable, optional
-        Called every few tens of milliseconds; a text ends the march. Without it the batch is marched in one
-        piece, and nothing but the runs is in the time.
-
-    Returns
-    -------
-    seconds : float
-        Processor time [s].
-    stopped : str or None
-        The text of `stop`, where the batch has not come to its end.
+    `stop` is called every few tens of milliseconds; a text ends the march. Without it the batch is marched in
+    one piece, and nothing but the runs is in the time. Returns the processor time [s], and the text of
+    `stop`, where the batch has not come to its end, or None.
     """
     last = batch.samples if until is None else min(until, batch.samples)
     piece = last if stop is None else 1

@@ -107,19 +107,11 @@ def record_of(
     judge: Callable[[Any], dict[str, Any] | None] | None = None,
     blank: dict[str, Any] | None = None,
 ) -> dict[str, Any]:
-    """The record of a transient that has ended.
+    """The record of a transient, a run as the model's batch has them, that has ended.
 
-    Parameters
-    ----------
-    run : object
-        A run as the model's batch has them.
-    marched : float
-        Processor time that it has taken [s].
-    judge : callable, optional
-        Gives the values of a run that has reached its end, by default as the model judges its runs; None,
-        and the record's status is not_run, where it does not answer.
-    blank : dict, optional
-        An empty record of the job, by default a new one.
+    `marched` is the processor time that it has taken [s]. `judge` gives the values of a run that has reached
+    its end, by default as the model judges its runs; None, and the record's status is not_run, where it does
+    not answer. `blank` is an empty record of the job, by default a new one.
     """
     started = time.process_time()
     blank = blank_record(job) if blank is None else blank
@@ -165,13 +157,7 @@ def blank_record(job: Job) -> dict[str, Any]:
 
 
 def run_costs(job: Job) -> np.ndarray:
-    """Core-seconds of each run: within a factor of two on processors of the last years.
-
-    Returns
-    -------
-    (runs,) array
-        In the order of run indices.
-    """
+    """Core-seconds of each run, in the order of indices: within a factor of two on usual processors."""
     values = [np.asarray(axis.values) for axis in job.axes]
     grids = values if job.is_sampled else np.meshgrid(*values, indexing="ij", sparse=True)
     p = Noted(
@@ -213,18 +199,9 @@ def estimate_cost(job: Job) -> float:
 def lane_groups(job: Job, indices: Sequence[int]) -> list[tuple[int, ...]]:
     """Split runs into batches, in which lanes can be filled again with the runs that are left.
 
-    Parameters
-    ----------
-    job : Job
-        A validated job. Its model gives by `lanes` how many runs a stepper takes at once, and by `lane_key`
-        of a run's parameters which ones: runs with equal keys.
-    indices : sequence of int
-        Run indices.
-
-    Returns
-    -------
-    list of tuple of int
-        Each index once, in as few batches as can be, of nearly equal size.
+    The model of the job gives by `lanes` how many runs a stepper takes at once, and by `lane_key` of a run's
+    parameters which ones: runs with equal keys. Each run index comes once, in as few batches as can be, of
+    nearly equal size.
     """
     runs = np.asarray(indices, np.int64)
     kinds = _lane_kinds(job)[runs]
@@ -275,16 +252,8 @@ def in_lanes(
 ) -> Iterator[list[Item]]:
     """Yield groups of runs that can advance together, as many as there are lanes.
 
-    Parameters
-    ----------
-    model, stepper
-        Of the runs.
-    runs : iterable of object
-        Anything that stands for a run.
-    parameters : callable
-        Flat parameters of such a run [SI].
-    apart : callable
-        Further values that the runs of a group have in common.
+    Runs are anything that stands for one; `parameters` gives the flat ones of such a run [SI], and `apart`
+    further values that the runs of a group have in common.
     """
     groups: dict[Any, list[Item]] = {}
     for run in runs:
@@ -296,12 +265,9 @@ def in_lanes(
 
 
 def may_join(job: Job, runs: Sequence[int], others: Sequence[int]) -> bool:
-    """Whether other runs can be done in the batch of some, and fill the lanes with them.
+    """Tell whether other runs can be done in the batch of some, and fill the lanes with them.
 
-    Parameters
-    ----------
-    runs, others : sequence of int
-        Run indices, of one batch each.
+    Both are run indices of one batch.
     """
     model, parameters = load_model(job.model), job.point(runs[0])
     if len(runs) + len(others) > _batch_size(job, parameters):

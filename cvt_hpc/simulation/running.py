@@ -34,19 +34,10 @@ if TYPE_CHECKING:
 
 
 def run_point(job: Job, point: dict[str, Any], interrupt: Callable[[], str | None]) -> dict[str, Any]:
-    """Do one run.
+    """Do the run of a point, its flat parameters [SI].
 
-    Parameters
-    ----------
-    point : dict
-        Flat parameters of the run [SI].
-    interrupt : callable
-        Called every few tens of milliseconds; a text ends the run.
-
-    Returns
-    -------
-    dict
-        Value of each of `record_variables`. A run that fails has its reason, and no numbers but its cost.
+    Returns the value of each of `record_variables`. A run that fails has its reason, and no numbers but its
+    cost. `interrupt` is called every few tens of milliseconds; a text ends the run.
 
     Raises
     ------
@@ -64,19 +55,9 @@ def run_points(
 ) -> list[dict[str, Any]]:
     """Do several runs that advance together, in the lanes of the processor's registers.
 
-    Parameters
-    ----------
-    points : sequence of dict
-        Flat parameters of the runs [SI], as `lane_groups` puts them together.
-    interrupt : callable
-        As `run_point` takes it.
-    more : callable
-        As `march_runs` takes it.
-
-    Returns
-    -------
-    list of dict
-        Records in the order of the points, each bitwise equal to `run_point` of its point alone.
+    Points are flat parameters of the runs [SI], as `lane_groups` puts them together; `interrupt` and `more`
+    are as `march_runs` takes them. Records are in the order of the points, each bitwise equal to `run_point`
+    of its point alone.
 
     Raises
     ------
@@ -145,22 +126,12 @@ def simulate(job: Job, at: Assignments | None = None) -> xr.Dataset:
 
 
 class Alone(NamedTuple):
-    """A single run that has ended.
-
-    Attributes
-    ----------
-    job, point
-        Its job and parameters [SI].
-    run
-        What its histories are made of.
-    record : dict
-        Value of each of `record_variables`.
-    """
+    """A single run that has ended."""
 
     job: Job
-    point: dict[str, Any]
-    run: Any
-    record: dict[str, Any]
+    point: dict[str, Any]  # parameters [SI]
+    run: Any  # what its histories are made of
+    record: dict[str, Any]  # value of each of `record_variables`
 
     def outcomes(self) -> list[Outcome]:
         """Return what its record has without a dimension or along one."""
@@ -200,19 +171,7 @@ def run_points_keeping(
 ) -> tuple[list[dict[str, Any]], dict[int, xr.Dataset]]:
     """Do as `run_points`, and return the histories of the runs at some places of `points` as well.
 
-    Parameters
-    ----------
-    job, points, interrupt
-        As `run_points` takes them.
-    kept : collection of int
-        Places in `points`.
-
-    Returns
-    -------
-    records : list of dict
-        As of `run_points`.
-    histories : dict
-        Datasets as `simulate` returns them, by place.
+    They are datasets as `simulate` returns them, by place.
     """
     done = do(job, points, interrupt, kept)
     histories = {place: _history(job, points[place], *done[place]) for place in kept}

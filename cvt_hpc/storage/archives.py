@@ -11,6 +11,7 @@ import struct
 import zipfile
 import zlib
 from collections.abc import Callable
+from contextlib import suppress
 from pathlib import Path
 from typing import Any, TypeVar
 
@@ -76,11 +77,8 @@ class Archives:
         """Return the jobs that have sound archives."""
         found = set()
         for path in self.written():
-            try:
-                with self._opened(path) as file:
-                    found.add(str(_head(file)["fingerprint"]))
-            except _DAMAGE:
-                continue
+            with suppress(*_DAMAGE), self._opened(path) as file:
+                found.add(str(_head(file)["fingerprint"]))
         return found
 
     def load(self, name: str, unpack: Callable[[Any, Arrays], Part]) -> Part | None:
@@ -115,9 +113,8 @@ class Archives:
                 arrays = {key.removeprefix("values "): file[key] for key in file.files if key != "head"}
             part = unpack(head["plain"], arrays)
         except PermissionError as error:
-            raise StorageError(
-                f"{path}: expected a file that can be read, found: {error.strerror}"
-            ) from error
+            found = f"{path}: expected a file that can be read, found: {error.strerror}"
+            raise StorageError(found) from error
         except _DAMAGE as error:
             _logger.warning("%s: damaged (%s); done again", path, error or "it is empty")
             return None

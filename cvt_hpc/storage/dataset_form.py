@@ -19,17 +19,8 @@ if TYPE_CHECKING:
 
 TABLES = ("job", "versions", "point", "point_units")  # attributes of a dataset that are texts in JSON
 TEXTS = (  # that are texts
-    *TABLES,
-    "title",
-    "source",
-    "history",
-    "command",
-    "host",
-    "job_name",
-    "git_revision",
-    "job_fingerprint",
-    "cvt_hpc_content",
-    "starts",
+    *(*TABLES, "title", "source", "history", "command", "host", "job_name", "git_revision"),
+    *("job_fingerprint", "cvt_hpc_content", "starts"),
 )
 UNITS = ("units", "job_units")  # of a variable
 WORDS = (*UNITS, "long_name", "comment", "flag_meanings", "spacing", "derived")
@@ -59,7 +50,7 @@ def check_form(dataset: xr.Dataset, source: str) -> None:
             _check_coordinate(variable, f"{source}: {name}")
 
 
-def _check_text(attributes: Mapping[Any, Any], key: str, place: str) -> None:
+def _check_text(attributes: Mapping[str, object], key: str, place: str) -> None:
     if key in attributes and not isinstance(attributes[key], str):
         raise mismatch(f"{place}: {key}", "a text", show(attributes[key]))
 
@@ -95,9 +86,8 @@ def _check_variable(variable: xr.Variable, place: str) -> None:
         values = np.atleast_1d(attributes.get("flag_values", ()))
         count = len(attributes["flag_meanings"].split())
         if values.dtype.kind not in "iuf" or values.shape != (count,):
-            raise mismatch(
-                f"{place}: flag_values", f"{count} numbers, as many as flag_meanings", show(values)
-            )
+            expected = f"{count} numbers, as many as flag_meanings"
+            raise mismatch(f"{place}: flag_values", expected, show(values))
 
 
 def _holds_texts(variable: xr.Variable) -> bool:
@@ -112,10 +102,8 @@ def _check_coordinate(variable: xr.Variable, place: str) -> None:
     if variable.ndim != 1 or variable.dtype.kind not in "fOU" or not isinstance(variable.data, np.ndarray):
         return
     if variable.dtype.kind == "f":
-        largest = np.abs(variable.values)
-        if np.any(np.isfinite(largest) & (largest > LARGEST)):
-            raise mismatch(
-                place, f"values of at most {LARGEST:g}", f"{largest[np.isfinite(largest)].max():g}"
-            )
+        largest = np.abs(variable.values[np.isfinite(variable.values)]).max(initial=0.0)
+        if largest > LARGEST:
+            raise mismatch(place, f"values of at most {LARGEST:g}", f"{largest:g}")
     elif not all(map(str.isprintable, map(str, variable.values))):
         raise mismatch(place, "texts of printable characters", "others")

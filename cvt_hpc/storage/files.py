@@ -14,20 +14,14 @@ import stat
 import sys
 from collections.abc import Iterable, Iterator, Sequence
 from pathlib import Path
-from typing import Any
 
 from cvt_hpc.errors import InputError
 
 _NEW = os.O_WRONLY | os.O_CREAT | os.O_EXCL | os.O_NOFOLLOW | os.O_CLOEXEC
 _KINDS = {
-    stat.S_IFLNK: "a link",
-    stat.S_IFDIR: "a folder",
-    stat.S_IFIFO: "a pipe",
-    stat.S_IFSOCK: "a socket",
-    stat.S_IFCHR: "a device",
-    stat.S_IFBLK: "a device",
-    stat.S_IFREG: "a file",
-}
+    stat.S_IFLNK: "a link", stat.S_IFDIR: "a folder", stat.S_IFIFO: "a pipe", stat.S_IFSOCK: "a socket",
+    stat.S_IFCHR: "a device", stat.S_IFBLK: "a device", stat.S_IFREG: "a file",
+}  # fmt: skip
 _FULL = (errno.ENOSPC, errno.EDQUOT)
 _PROBE = bytes(1 << 20)
 
@@ -202,7 +196,7 @@ def written_aside(path: Path, *, parents: bool = False, advice: str = "") -> Ite
 
 
 def write_rows(
-    path: Path, head: Sequence[Any], rows: Iterable[Sequence[Any]], origin: Iterable[str] = ()
+    path: Path, head: Sequence[str], rows: Iterable[Sequence[object]], origin: Iterable[str] = ()
 ) -> Path:
     """Write a table of comma-separated values below lines of its origin, and return its path.
 

@@ -22,14 +22,8 @@ LONGEST_TEXT = 1_000  # [bytes] of an attribute by which this program knows a fi
 MOST_PARTS = 5_000  # variables and attributes; a study has some 600
 MOST_ATTRIBUTES = 200  # of a variable or the file; the library goes through all of them to find one
 DAMAGE = (  # what fails in a file with changed bytes
-    ArithmeticError,
-    AttributeError,
-    LookupError,
-    MemoryError,
-    OSError,
-    RuntimeError,
-    TypeError,
-    ValueError,
+    *(ArithmeticError, AttributeError, LookupError, MemoryError, OSError, RuntimeError),
+    *(TypeError, ValueError),
 )
 
 
@@ -126,10 +120,8 @@ def _attribute(one: h5a.AttrID, stored: Any, size: int, most: int, place: str) -
     if one.name == b"DIMENSION_LIST":  # of the netCDF library's own: what leads to the coordinates
         sound = within == h5t.VLEN and kind.get_super().get_class() == h5t.REFERENCE and count == stored.rank
     elif one.name == b"REFERENCE_LIST":  # and back
-        parts = (
-            [kind.get_member_class(k) for k in range(kind.get_nmembers())] if within == h5t.COMPOUND else []
-        )
-        sound = parts == [h5t.REFERENCE, h5t.INTEGER]
+        members = range(kind.get_nmembers()) if within == h5t.COMPOUND else ()
+        sound = [kind.get_member_class(k) for k in members] == [h5t.REFERENCE, h5t.INTEGER]
     else:
         sound = _width(kind, size) > 0
     if not sound:

@@ -114,12 +114,7 @@ def _program(process: int) -> str:
 
 
 def _take(
-    descriptor: int,
-    path: Path,
-    what: str,
-    kind: int,
-    patience: float,
-    interrupt: Callable[[], str | None],
+    descriptor: int, path: Path, what: str, kind: int, patience: float, interrupt: Callable[[], str | None]
 ) -> bool:
     """Take the lock and record its owner; return whether the file system has locks at all."""
     began = time.monotonic()
@@ -131,24 +126,18 @@ def _take(
         except BlockingIOError:
             waited = time.monotonic() - began
             if waited > patience or (waited > _PATIENCE and interrupt()):
-                found = _holder(descriptor)
-                raise BusyError(
-                    f"{path.parent}: expected {what} that no run is at work in, found {found}"
-                ) from None
+                expected = f"{what} that no run is at work in"
+                raise BusyError(f"{path.parent}: expected {expected}, found {_holder(descriptor)}") from None
             if waited > _SILENCE and not told:
                 told = True
                 _logger.warning("%s: waits for %s, %.0f s at most", path, _holder(descriptor), patience)
             time.sleep(0.02)
         except OSError as error:  # some network file systems have no locks: no reason not to run there
-            _logger.warning(
-                "%s: cannot be locked (%s): see to it that no second run is started there",
-                path,
-                error.strerror,
-            )
+            text = "%s: cannot be locked (%s): see to it that no second run is started there"
+            _logger.warning(text, path, error.strerror)
             return False
-    holder = (
-        f"process {os.getpid()} on {platform.node()}, at work since {time.strftime('%Y-%m-%d %H:%M:%S')}\n"
-    )
+    since = time.strftime("%Y-%m-%d %H:%M:%S")
+    holder = f"process {os.getpid()} on {platform.node()}, at work since {since}\n"
     with naming_refusals(path, "to be able to write"):
         os.ftruncate(descriptor, 0)
         os.pwrite(descriptor, holder.encode(), 0)
@@ -166,8 +155,6 @@ def _holder(descriptor: int) -> str:
 def _is_alive(process: int) -> bool:
     try:
         os.kill(process, 0)
-    except ProcessLookupError:
-        return False
-    except PermissionError:  # somebody else's
-        pass
+    except (ProcessLookupError, PermissionError) as error:  # the latter of somebody else's
+        return isinstance(error, PermissionError)
     return True

@@ -13,6 +13,7 @@ from pathlib import Path
 from typing import TYPE_CHECKING, Any, Protocol
 
 import numpy as np
+from numpy.typing import DTypeLike
 
 from cvt_hpc.errors import InputError, mismatch
 from cvt_hpc.storage.dataset_form import check_form
@@ -27,6 +28,7 @@ if TYPE_CHECKING:
 
 CONTENT = "cvt_hpc_content"  # global attribute by which this program knows its own files
 HISTORY = "history of one run"
+Entry = Mapping[str, Any]  # as JSON has it
 VOLATILE = "depends on the machine and the hour; not reproduced bitwise"
 
 
@@ -75,12 +77,7 @@ class Named(Protocol):
 
 
 def global_attributes(
-    named: Named,
-    job: Mapping[str, Any],
-    subject: str,
-    *,
-    makers: Sequence[Mapping[str, Any]] = (),
-    earlier: Sequence[str] = (),
+    named: Named, job: Entry, subject: str, *, makers: Sequence[Entry] = (), earlier: Sequence[str] = ()
 ) -> dict[str, str]:
     """Return the global attributes that all datasets of this program have.
 
@@ -105,8 +102,7 @@ def global_attributes(
     """
     makers = makers or [{"versions": versions(), "git_revision": git_revision()}]
     found = merge_versions([maker["versions"] for maker in makers])
-    revisions = dict.fromkeys(maker["git_revision"] for maker in makers)
-    revision = ", ".join(filter(None, revisions))
+    revision = ", ".join(filter(None, dict.fromkeys(maker["git_revision"] for maker in makers)))
     program = f"cvt_hpc {found.get('cvt_hpc', 'of unknown version')}"
     here = history_line(f"{command()} (on {platform.node()})")
     return {
@@ -123,24 +119,22 @@ def global_attributes(
     }
 
 
-def attributes(long_name: str, units: str = "", comment: str = "") -> dict[str, Any]:
+def attributes(long_name: str, units: str = "", comment: str = "") -> dict[str, str]:
     """Return the attributes of a variable; without empty ones."""
     named = {"long_name": long_name, "units": units, "comment": comment}
     return {key: text for key, text in named.items() if text}
 
 
-def flag_attributes(kind: type[IntEnum], dtype: Any = np.int8) -> dict[str, Any]:
+def flag_attributes(kind: type[IntEnum], dtype: DTypeLike = np.int8) -> dict[str, str | np.ndarray]:
     """Return the attributes that explain a flag variable of type `dtype`."""
-    return {
-        "flag_values": np.array([int(flag) for flag in kind], dtype),
-        "flag_meanings": " ".join(flag.name.lower() for flag in kind),
-    }
+    meanings = " ".join(flag.name.lower() for flag in kind)
+    return {"flag_values": np.array([int(flag) for flag in kind], dtype), "flag_meanings": meanings}
 
 
-def variable_attributes(variable: Variable) -> dict[str, Any]:
+def variable_attributes(variable: Variable) -> dict[str, str | np.ndarray]:
     """Return the attributes of a quantity of a run's record."""
     comment = "; ".join(filter(None, (variable.comment, VOLATILE if variable.volatile else "")))
-    named = attributes(variable.long_name, variable.units, comment)
+    named: dict[str, str | np.ndarray] = {**attributes(variable.long_name, variable.units, comment)}
     if variable.flags is not None:
         named |= flag_attributes(variable.flags, variable.dtype)
     return named | ({"volatile": "yes"} if variable.volatile else {})
@@ -157,16 +151,14 @@ def write_netcdf(dataset: xr.Dataset, path: Path) -> None:
     dataset : Dataset
         Numbers and texts.
     """
-    encoding = {
-        name: _encoding(variable, name in dataset.coords) for name, variable in dataset.variables.items()
-    }
+    encoding = {name: _encoding(one, name in dataset.coords) for name, one in dataset.variables.items()}
     dataset.to_netcdf(path, engine="netcdf4", format="NETCDF4", encoding=encoding)
 
 
-def _encoding(variable: xr.Variable, is_coordinate: bool) -> dict[str, Any]:
+def _encoding(variable: xr.Variable, is_coordinate: bool) -> dict[str, bool | str | None]:
     """Return how a variable is stored."""
     kind = variable.dtype.kind
-    encoding: dict[str, Any] = {"zlib": True} if variable.ndim else {}
+    encoding: dict[str, bool | str | None] = {"zlib": True} if variable.ndim else {}
     if kind in "OUST":
         encoding["dtype"] = "S1"
     elif kind != "f" or is_coordinate:
@@ -196,9 +188,8 @@ def write_history(dataset: xr.Dataset, path: Path) -> Path:
     """
     path = Path(path)
     if path.exists() and not is_history(path):
-        raise mismatch(
-            str(path), "a new file, or a history written by cvt_hpc", "another file, left as it is"
-        )
+        expected = "a new file, or a history written by cvt_hpc"
+        raise mismatch(str(path), expected, "another file, left as it is")
     store_history(dataset, path)
     return path
 

@@ -15,7 +15,7 @@ from contextlib import AbstractContextManager, contextmanager, nullcontext
 from pathlib import Path
 from typing import Any, ClassVar, Generic, NamedTuple, TypeVar
 
-from cvt_hpc.errors import InputError
+from cvt_hpc.errors import InputError, mismatch
 from cvt_hpc.storage import files
 from cvt_hpc.storage.locks import is_locked, locked
 
@@ -253,9 +253,8 @@ class OutputFolder(ABC, Generic[Content]):
                 return
             self.replace(found, asked)
         elif self.results_tell() is not None:
-            _logger.warning(
-                "%s: damaged or gone; written anew, since the results are of this job", self.job_file
-            )
+            told = "%s: damaged or gone; written anew, since the results are of this job"
+            _logger.warning(told, self.job_file)
         self.write_job(self.job_file, asked)
 
     def write_job(self, path: Path, content: Content) -> None:
@@ -308,7 +307,5 @@ def _make_way(path: Path, kinds: tuple[str, ...], fresh: bool) -> None:
     if found is None or found in kinds:
         return
     if not fresh:
-        raise InputError(
-            f"{path}: expected {kinds[0]}, found {found}; remove it, or --fresh with all results"
-        )
+        raise mismatch(str(path), kinds[0], found, "remove it, or --fresh with all results")
     files.remove_own(path)

@@ -32,15 +32,9 @@ def new_session(ranks: int) -> dict[str, Any]:
     ranks : int
         Number of MPI ranks that compute.
     """
-    return {
-        "id": uuid.uuid4().hex,
-        "started": time.time(),
-        "command": command(),
-        "host": platform.node(),
-        "ranks": ranks,
-        "versions": versions(),
-        "git_revision": git_revision(),
-    }
+    where = {"command": command(), "host": platform.node(), "ranks": ranks}
+    program = {"versions": versions(), "git_revision": git_revision()}
+    return {"id": uuid.uuid4().hex, "started": time.time(), **where, **program}
 
 
 def command() -> str:
@@ -57,12 +51,11 @@ def history_line(what: str, seconds: float | None = None) -> str:
 
 def versions() -> dict[str, str]:
     """Return the versions of Python and of the packages that numbers may depend on."""
-    found = {"cvt_hpc": cvt_hpc.__version__, "python": platform.python_version()}
-    return found | _installed()
+    return {"cvt_hpc": cvt_hpc.__version__, "python": platform.python_version()} | _installed()
 
 
 @cache
-def program_identity() -> dict[str, Any]:
+def program_identity() -> dict[str, str]:
     """Return what decides whether two processes run the same program: versions, and a digest of sources."""
     digest = hashlib.sha256()
     for source in sorted(_PACKAGE.rglob("*.py")):
@@ -81,15 +74,12 @@ def _installed() -> dict[str, str]:
     return found
 
 
-def machine() -> dict[str, Any]:
+def machine() -> dict[str, str | int | None]:
     """Return the hardware on which times depend: the processor and the number of cores, as JSON types."""
     processor = platform.processor()
-    try:
-        with open("/proc/cpuinfo", encoding="utf-8") as file:
-            names = [line.partition(":")[2].strip() for line in file if line.startswith("model name")]
-            processor = names[0] if names else processor
-    except OSError:
-        pass  # not Linux
+    with suppress(OSError), open("/proc/cpuinfo", encoding="utf-8") as file:  # of Linux
+        names = [line.partition(":")[2].strip() for line in file if line.startswith("model name")]
+        processor = names[0] if names else processor
     return {"processor": processor, "architecture": platform.machine(), "cores": os.cpu_count()}
 
 
@@ -102,7 +92,7 @@ def _loop_seconds() -> float:
     return time.process_time() - start
 
 
-def origin_lines(made: Mapping[str, Any] | None = None) -> Iterator[str]:
+def origin_lines(made: Mapping[str, str] | None = None) -> Iterator[str]:
     """Yield the lines with "#" that stand on top of a table and tell where its numbers come from.
 
     `cvt_hpc.tables.below_origin` reads what stands below them.
@@ -130,7 +120,7 @@ def origin_lines(made: Mapping[str, Any] | None = None) -> Iterator[str]:
         yield f"# {name}: {' '.join((text or NOT_RECORDED).split())}\n"  # a command may have several lines
 
 
-def _machine_in_words(made: Mapping[str, Any]) -> str:
+def _machine_in_words(made: Mapping[str, str]) -> str:
     """The machine of a dataset, and its speed if it is this one; "" where it is not known."""
     here = machine()
     found = json.loads(made["machine"]) if "machine" in made else here
@@ -180,9 +170,7 @@ def revision_of(source: Path) -> str:
 def _git(source: Path, *arguments: str) -> str | None:
     """Return the output of git in the folder of `source`, None if it is missing or refuses."""
     try:
-        answer = subprocess.run(
-            ["git", *arguments], cwd=source.parent, capture_output=True, text=True, timeout=10, check=True
-        )
+        command = ["git", "-C", str(source.parent), *arguments]
+        return subprocess.run(command, capture_output=True, text=True, timeout=10, check=True).stdout.strip()
     except (OSError, subprocess.SubprocessError):
         return None
-    return answer.stdout.strip()

@@ -6,13 +6,6 @@ from cvt_hpc.study.status import FailedRun, RunReport, StudyStatus, read_status
 from cvt_hpc.study.sweep import check_start, run
 
 __all__ = [
-    "FailedRun",
-    "RunReport",
-    "StudyStatus",
-    "check_start",
-    "gather",
-    "open_results",
-    "process_rank",
-    "read_status",
-    "run",
-]
+    "FailedRun", "RunReport", "StudyStatus", "check_start", "gather", "open_results", "process_rank",
+    "read_status", "run",
+]  # fmt: skip

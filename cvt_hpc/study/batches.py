@@ -105,9 +105,8 @@ def _largest_batch(groups: Sequence[Batch], ranks: int) -> int:
     largest = max(map(len, groups), default=1)
     if ranks <= len(groups):
         return largest
-    return next(
-        most for most in range(1, largest + 1) if sum(-(-len(group) // most) for group in groups) <= ranks
-    )
+    sizes = range(1, largest + 1)
+    return next(most for most in sizes if sum(-(-len(group) // most) for group in groups) <= ranks)
 
 
 def in_parts(group: Batch, parts: int) -> Iterator[Batch]:

@@ -60,9 +60,7 @@ class Dimension:
         entry = dict(entry)
         if not entry.pop("texts"):
             entry["values"] = [float(v) if isinstance(v, str) else v for v in entry["values"]]
-        fields: dict[str, Any] = {
-            key: tuple(value) if isinstance(value, list) else value for key, value in entry.items()
-        }
+        fields: dict[str, Any] = {key: tuple(v) if isinstance(v, list) else v for key, v in entry.items()}
         return cls(**fields)
 
 
@@ -93,17 +91,12 @@ def derived_coordinate(derived: Derived, job: Job) -> DerivedCoordinate:
     return DerivedCoordinate(**_common(derived, job), dims=dims, follows=derived.words)
 
 
-def _common(varied: Axis | Derived, job: Job) -> dict[str, Any]:
+def _common(varied: Axis | Derived, job: Job) -> Document:
     """Return the attributes of a coordinate that each has."""
     values = tuple(np.asarray(varied.values).tolist())
-    return {
-        "name": varied.name,
-        "values": values,
-        "units": "" if isinstance(values[0], str) else varied.unit or "1",
-        "long_name": varied.name.replace("_", " "),
-        "comment": varied.description,
-        "job_units": job.units.get(varied.name, ""),
-    }
+    units = "" if isinstance(values[0], str) else varied.unit or "1"
+    named = {"name": varied.name, "long_name": varied.name.replace("_", " "), "comment": varied.description}
+    return {**named, "values": values, "units": units, "job_units": job.units.get(varied.name, "")}
 
 
 @dataclass(frozen=True)
@@ -122,6 +115,7 @@ class Study(Runs):
     # parameters that follow from the axes, except those with more than `MOST_DERIVED` values
     derived: tuple[DerivedCoordinate, ...] = ()
     units: Mapping[str, str] = field(default_factory=dict)  # units in which the job gives values, by key
+    files: Mapping[str, str] = field(default_factory=dict)  # names of files that give parameters, by key
 
     @property
     def design(self) -> Design:  # type: ignore[override]  # it stands in the job
@@ -146,9 +140,8 @@ class Study(Runs):
     def place_in_words(self, index: int) -> str:
         """Return the axes' values of run `index` for people; "" without axes."""
         attributes = {axis.name: axis.attributes for axis in self.axes}
-        return ", ".join(
-            f"{name} = {shown(value, attributes[name])}" for name, value in self.place(index).items()
-        )
+        place = self.place(index).items()
+        return ", ".join(f"{name} = {shown(value, attributes[name])}" for name, value in place)
 
     @cached_property
     def _blank_row(self) -> np.ndarray:
@@ -205,6 +198,7 @@ class Study(Runs):
             "coordinates": [dimension.to_json() for dimension in self.coordinates],
             "derived": [coordinate.to_json() for coordinate in self.derived],
             "units": dict(self.units),
+            "files": dict(self.files),
         }
 
     @classmethod
@@ -217,6 +211,7 @@ class Study(Runs):
             coordinates=tuple(map(Dimension.from_json, entry["coordinates"])),
             derived=tuple(map(DerivedCoordinate.from_json, entry.get("derived", ()))),
             units=entry.get("units", {}),
+            files=entry.get("files", {}),
         )
 
 
@@ -228,7 +223,7 @@ def describe(job: Job, simulator: Simulator) -> Study:
     few = (one for one in job.derived if runs_along(job, one.axes) <= MOST_DERIVED)
     derived = tuple(derived_coordinate(one, job) for one in few)
     head = job.name, job.description, job.fingerprint(), job.resolved()
-    return Study(*head, axes, variables, coordinates, derived, job.units)
+    return Study(*head, axes, variables, coordinates, derived, job.units, job.files)
 
 
 def runs_along(job: Job, names: Collection[str]) -> int:

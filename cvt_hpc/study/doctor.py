@@ -81,8 +81,7 @@ def _mpi(installed: bool) -> Finding:
     launcher = str(beside) if beside.exists() else shutil.which("mpirun")
     if launcher is None:
         return Finding(False, "MPI", "mpi4py without an mpirun", "add that of its MPI library to PATH")
-    command = [launcher, "-n", str(_RANKS), sys.executable, "-c", _COUNT_RANKS]
-    _, lines = _said(command)
+    _, lines = _said([launcher, "-n", str(_RANKS), sys.executable, "-c", _COUNT_RANKS])
     if len(lines) == 1 and lines[0].startswith(f"{_RANKS} "):
         usable = len(os.sched_getaffinity(0))
         fills = f"mpirun -n {usable} fills this machine" if usable > 1 else ""

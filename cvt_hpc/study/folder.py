@@ -140,9 +140,8 @@ class StudyFolder(OutputFolder[Study]):
             try:
                 study = self.read_job()
             except DamagedJobError as error:
-                raise InputError(
-                    f"{error}; {anew}" if error.entry or self._has_logs() else str(error)
-                ) from error
+                then = f"; {anew}" if error.entry or self._has_logs() else ""
+                raise InputError(f"{error}{then}") from error
             if study is None:
                 then = anew if self._has_logs() else study_instead(self.path)
                 raise mismatch(str(self.path), "the output folder of a run", "no job.json in it", then)
@@ -162,11 +161,8 @@ class StudyFolder(OutputFolder[Study]):
 
     def leftovers(self) -> list[Path]:
         """Return the half-written files of processes that died while they wrote."""
-        return [
-            *self.path.glob(".results.nc.*.part"),
-            *self.path.glob(f".{_EARLIER}.json.*.part"),
-            *super().leftovers(),
-        ]
+        own = (".results.nc.*.part", f".{_EARLIER}.json.*.part")
+        return [*(path for pattern in own for path in self.path.glob(pattern)), *super().leftovers()]
 
     def half_histories(self) -> list[Path]:
         """Return the same of histories; only a process that works alone can separate unfinished ones."""
@@ -321,7 +317,7 @@ def _numbers(study: Study) -> str:
     entry = study.to_json()
     for table in (*entry["axes"], *entry["derived"]):
         del table["job_units"]
-    del entry["units"]
+    del entry["units"], entry["files"]
     job = {key: value for key, value in entry["job"].items() if key not in ("name", "description")}
     return json.dumps({**entry, "job": job, "name": "", "description": ""})
 

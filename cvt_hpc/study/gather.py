@@ -22,7 +22,7 @@ from typing import TYPE_CHECKING, Any
 import numpy as np
 
 from cvt_hpc.errors import InputError, mismatch
-from cvt_hpc.job.values import JOB_UNITS, Document
+from cvt_hpc.job.values import JOB_FILES, JOB_UNITS, Document
 from cvt_hpc.storage.files import discard, kind_of, naming_refusals, written_aside
 from cvt_hpc.storage.locks import locked
 from cvt_hpc.storage.netcdf import global_attributes, open_netcdf, refuse_beside_sweep, variable_attributes
@@ -43,13 +43,8 @@ if TYPE_CHECKING:
 
 CHUNK = 1 << 17  # [bytes] at most; a map takes some hundred of them, the spectra of one run a single one
 
-_INFERRED = Variable(
-    "inferred_class",
-    "",
-    "class of the run; where status is not_run, the class of the runs around it, which is inferred",
-    dtype="i1",
-    flags=OccurrenceClass,
-)
+_INFERENCE = "class of the run; where status is not_run, the class of the runs around it, which is inferred"
+_INFERRED = Variable("inferred_class", "", _INFERENCE, dtype="i1", flags=OccurrenceClass)
 LONGEST = 64  # numbers of a run in a variable that is no spectrum
 PATIENCE = 600.0  # [s]; 10^6 runs are gathered within a minute
 _logger = logging.getLogger(__name__)
@@ -278,11 +273,9 @@ def _global_attributes(records: Records) -> dict[str, str]:
         history_line(f"{s['command']} (on {s['host']}, {s['ranks']} rank(s))", s["started"]) for s in made
     ]
     model = study.job.get("model", "")
-    return {
-        **global_attributes(study, study.job, f"model {model}", makers=made, earlier=lines),
-        "job_fingerprint": study.fingerprint,
-        JOB_UNITS: json.dumps(dict(study.units)),
-    }
+    found = global_attributes(study, study.job, f"model {model}", makers=made, earlier=lines)
+    found |= {"job_fingerprint": study.fingerprint, JOB_UNITS: json.dumps(dict(study.units))}
+    return found | ({JOB_FILES: json.dumps(dict(study.files))} if study.files else {})
 
 
 def chunk_shape(study: Study, name: str) -> tuple[int, ...]:
@@ -348,8 +341,5 @@ def _pack(values: np.ndarray, shape: tuple[int, ...]) -> bytes:
 
 def _parts(shape: tuple[int, ...], part: tuple[int, ...]) -> Iterator[tuple[slice, ...]]:
     """Yield the parts of a grid, in C order."""
-    cuts = [
-        [slice(first, min(first + step, length)) for first in range(0, length, step)]
-        for length, step in zip(shape, part, strict=True)
-    ]
-    return itertools.product(*cuts)
+    along = ((length, step, range(0, length, step)) for length, step in zip(shape, part, strict=True))
+    return itertools.product(*([slice(a, min(a + step, n)) for a in firsts] for n, step, firsts in along))

@@ -39,14 +39,11 @@ def _pair_in_words(there: object, here: object) -> str:
     """Return in words how two values differ: of lists the values that only one of them has."""
     if not isinstance(there, list) or not isinstance(here, list) or len(f"{there}{here}") <= _LONGEST:
         return "is {} there, {} here".format(*short_pair(there, here))
-    parts = [
-        f"has {len(alone)} value{'s' * (len(alone) > 1)} {where} ({few_of(alone, 4)})"
-        for one, other, where in (
-            (there, here, "there that it lacks here"),
-            (here, there, "here that it lacks there"),
-        )
-        if (alone := [short(value) for value in one if value not in other])
-    ]
+    parts = []
+    for one, other, at, not_at in ((there, here, "there", "here"), (here, there, "here", "there")):
+        if alone := [short(value) for value in one if value not in other]:
+            count = f"{len(alone)} value{'s' * (len(alone) > 1)}"
+            parts.append(f"has {count} {at} that it lacks {not_at} ({few_of(alone, 4)})")
     return " and ".join(parts) or "has its values in another order"
 
 
@@ -129,10 +126,7 @@ def _find_places(found: Table, asked: Table) -> NDArray[np.int64] | None:
 
 
 def _in_grid(
-    columns: Mapping[str, list],
-    wanted: Mapping[str, list],
-    links: Table,
-    others: Table,
+    columns: Mapping[str, list], wanted: Mapping[str, list], links: Table, others: Table
 ) -> NDArray[np.int64] | None:
     """Return the indices, in C order, of a grid in another one: by axes, and by what is linked to them."""
     strides: dict[str, int] = {}

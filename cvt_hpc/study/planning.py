@@ -105,7 +105,7 @@ def prepare(
     asked = asked_runs(task, records, part)
     if refine is None:
         refine = untried_factor(task.job, records, runs_to_repeat(records, asked, retry), retry)
-    records = enter_attempts(folder, study, records, asked, retry, session, refine)
+    records = enter_attempts(folder, records, asked, retry, session, refine)
     leave_out_missing(task.job, folder, records)
     done = records.status == Status.DONE
     recorded = int((records.recorded & asked).sum())
@@ -149,8 +149,7 @@ def next_round(
     records = folder.read_records(task.study)
     if lost := [index for index in plan.order if not records.recorded[index]]:
         raise RuntimeError(f"a round of the trace has ended without records of its runs {lost}")
-    asked = asked_runs(task, records)
-    assignments = plan_runs(task.job, task.simulator, records, asked, ranks, plan.steps)
+    assignments = plan_runs(task.job, task.simulator, records, asked_runs(task, records), ranks, plan.steps)
     plan = plan._replace(assignments=assignments, fit=task.fit(records, plan.costs).inherited())
     counter.rewind()
     display.expect(plan.costs[plan.order])
@@ -233,11 +232,8 @@ def _by_step(runs: list[int], steps: Mapping[int, float]) -> Iterable[list[int]]
 def given_up(records: Records, asked: np.ndarray) -> dict[int, str]:
     """Return the runs, among those marked in `asked`, that are not tried again, with the reason."""
     lost = np.flatnonzero(asked & ~records.recorded & (records.died_alone >= DEATHS_ALONE))
-    return {
-        int(index): f"its process died {records.died[index]} times, the last "
-        f"{records.died_alone[index]} while it did this run alone"
-        for index in lost
-    }
+    told = "its process died {} times, the last {} while it did this run alone"
+    return {k: told.format(records.died[k], records.died_alone[k]) for k in lost.tolist()}
 
 
 def runs_to_repeat(records: Records, asked: np.ndarray, statuses: Collection[Status]) -> np.ndarray:
@@ -253,12 +249,11 @@ def runs_to_repeat(records: Records, asked: np.ndarray, statuses: Collection[Sta
 
 def enter_attempts(
     folder: StudyFolder,
-    study: Study,
     records: Records,
     asked: np.ndarray,
     retry: Collection[Status],
     session: Session,
-    refine: float = 1.0,
+    refine: float,
 ) -> Records:
     """Record which runs are given up and which begin again, and return the records as they are then.
 
@@ -269,6 +264,7 @@ def enter_attempts(
     if not lost and not len(again):
         return records
     records.attempts[again] += 1
+    study = records.study
     layout = RecordFormat(study.fingerprint, study.record_dtype)
     with RecordLog(folder.records, layout, {**session, "refine": refine}, 0, later_attempts(records)) as log:
         if lost:
@@ -320,8 +316,7 @@ def inferred_classes(study: Study, records: Records) -> NDArray[np.int8]:
 
 def run_classes(study: Study, records: Records) -> NDArray[np.int8]:
     """Return the class of each run, shape of the grid; NOT_RUN where there is no record."""
-    vibrates = records.read(np.arange(study.size), "vibrates")
-    return classify_runs(records.status, vibrates).reshape(study.shape)
+    return classify_runs(records.status, records.read(np.arange(study.size), "vibrates")).reshape(study.shape)
 
 
 def first_intervals(study: Study) -> list[list[Interval]]:

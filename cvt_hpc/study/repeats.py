@@ -42,10 +42,7 @@ AUDITED, FULL_MODEL = "auto", "elastic_belt"  # what answers some runs cheaply, 
 FLAG = "--check-step"
 EXPLICIT = "explicit"
 # By name of a way its words, and the folder of its runs
-WAYS = {
-    "half": ("at half the step", "check_step"),
-    EXPLICIT: ("by the explicit step", "check_explicit"),
-}
+WAYS = {"half": ("at half the step", "check_step"), EXPLICIT: ("by the explicit step", "check_explicit")}
 
 
 def _of_the_job(records: Records, runs: NDArray[np.intp]) -> Mapping[int, float]:

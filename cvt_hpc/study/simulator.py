@@ -18,6 +18,7 @@ if TYPE_CHECKING:
     from cvt_hpc.job import Job
 
 
+Interrupt = Callable[[], str | None]  # returns a text where runs have to end
 RecordValues = Mapping[str, Any]  # those of a run, by the names of its quantities
 
 
@@ -54,11 +55,7 @@ class Simulator(Protocol):
         """Have the next batch take its full time, whatever runs before it have left."""
 
     def run_points(
-        self,
-        job: Job,
-        points: Sequence[Point],
-        interrupt: Callable[[], str | None],
-        more: Callable[[], Sequence[Point]],
+        self, job: Job, points: Sequence[Point], interrupt: Interrupt, more: Callable[[], Sequence[Point]]
     ) -> Sequence[RecordValues]:
         """Do the runs of a batch, and return their records in the order of the points.
 
@@ -68,11 +65,7 @@ class Simulator(Protocol):
         """
 
     def run_points_keeping(
-        self,
-        job: Job,
-        points: Sequence[Point],
-        interrupt: Callable[[], str | None],
-        kept: Collection[int],
+        self, job: Job, points: Sequence[Point], interrupt: Interrupt, kept: Collection[int]
     ) -> tuple[Sequence[RecordValues], dict[int, xr.Dataset]]:
         """Do as `run_points`, and return the histories of the runs at the places `kept` as well."""
 

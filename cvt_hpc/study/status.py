@@ -4,6 +4,7 @@ A `RunReport` says how a sweep ended, for people and for the exit status.
 """
 
 import time
+from contextlib import suppress
 from dataclasses import dataclass
 from itertools import pairwise
 from pathlib import Path
@@ -175,12 +176,10 @@ def _time_at_work(records: Records) -> float:
 
 def _predicted_costs(study: Study, folder: StudyFolder) -> np.ndarray:
     """Return the predicted duration of each run, in some unit; all alike where there is no such model."""
-    try:
+    with suppress(InputError):  # of another version
         job = rebuild_job(study.job, str(folder.job_file), {})
         if job.shape == study.shape:
             return default_simulator().run_costs(job)
-    except InputError:  # of another version
-        pass
     return np.ones(study.size)
 
 
@@ -268,34 +267,22 @@ class RunReport:
 
 
 def build_report(
-    folder: StudyFolder,
-    study: Study,
-    records: Records,
-    asked: np.ndarray,
-    gathered: bool,
-    gained: int,
-    stopped: str | None,
+    folder: StudyFolder, records: Records, asked: np.ndarray, gathered: bool, gained: int, stopped: str | None
 ) -> RunReport:
     """Return the report of a sweep of the runs marked in `asked`, shape (runs,)."""
-    status, recorded = records.status, asked & records.recorded
+    study, status, recorded = records.study, records.status, asked & records.recorded
     without_results = np.flatnonzero(recorded & (status != Status.DONE)).tolist()
     reasons = records.read(np.array(without_results, int), "reason")
-    failed = tuple(
-        FailedRun(
-            index,
-            study.place(index),
-            study.place_in_words(index),
-            Status(status[index]).name.lower(),
-            reason.decode(errors="replace"),
-        )
-        for index, reason in zip(without_results, reasons, strict=True)
-    )
+    failed = []
+    for index, reason in zip(without_results, reasons, strict=True):
+        told = Status(status[index]).name.lower(), reason.decode(errors="replace")
+        failed.append(FailedRun(index, study.place(index), study.place_in_words(index), *told))
     return RunReport(
         out=folder.path,
         results=folder.results if gathered else None,
         total=int(asked.sum()),
         done=int((recorded & (status == Status.DONE)).sum()),
-        failed=failed,
+        failed=tuple(failed),
         remaining=int((asked & ~records.recorded).sum()),
         stopped=stopped,
         gained=gained,

@@ -132,14 +132,8 @@ def run(
     started = time.monotonic()
     simulator = simulator or default_simulator()
     folder = _folder(job, out)
-    options = {
-        "out": str(folder.path),
-        "part": part,
-        "fresh": fresh,
-        "run_limit": run_limit,
-        "retry": [int(status) for status in retry],
-        "refine": refine,
-    }
+    options: Document = {"out": str(folder.path), "part": part, "fresh": fresh, "run_limit": run_limit}
+    options |= {"retry": [int(status) for status in retry], "refine": refine}
 
     first = True
 
@@ -165,8 +159,7 @@ def run(
             limit, began = stopping.find_time_limit(asked, study.size), time.monotonic()
             with stopping.planning_within(limit.seconds, study.size):
                 plan = prepare(folder, task, share, fresh and begins, again, team.size, held, refine)
-            left = limit.seconds - (time.monotonic() - began)
-            return plan._replace(limit=limit._replace(seconds=left))
+            return plan._replace(limit=limit._replace(seconds=limit.seconds - (time.monotonic() - began)))
 
         with ExitStack() as held:
             plan = team.on_root(find_plan)
@@ -224,12 +217,7 @@ def _accept(job: Job, part: str | None, fresh: bool, simulator: Simulator) -> tu
 
 
 def _compute(
-    task: Task,
-    folder: StudyFolder,
-    plan: Plan,
-    rank: int,
-    counter: Counter,
-    stop: stopping.Stop,
+    task: Task, folder: StudyFolder, plan: Plan, rank: int, counter: Counter, stop: stopping.Stop
 ) -> str | None:
     """Do and record the runs that this rank claims; return the reason if it could not continue."""
     layout = RecordFormat(task.study.fingerprint, task.study.record_dtype)
@@ -325,7 +313,7 @@ def _conclude(
     leave_out_missing(task.job, folder, records)
     asked = asked_runs(task, records, part)
     gained = int(records.recorded[asked].sum()) - plan.recorded
-    return build_report(folder, task.study, records, asked, gathers, gained, stopped)
+    return build_report(folder, records, asked, gathers, gained, stopped)
 
 
 def open_counter(team: Team) -> Counter:

@@ -24,7 +24,7 @@ from cvt_hpc.study.description import Study
 from cvt_hpc.study.forecast.cost_model import Fit, fit_recorded
 from cvt_hpc.study.record.index import Records
 from cvt_hpc.study.record.log import Record
-from cvt_hpc.study.simulator import RecordValues, Simulator
+from cvt_hpc.study.simulator import Interrupt, RecordValues, Simulator
 from cvt_hpc.variables import Status
 
 if TYPE_CHECKING:
@@ -33,7 +33,6 @@ if TYPE_CHECKING:
 STEP = "step"  # the key of the time step, of steppers that have a fixed one
 MOST_REFINED = 1000.0
 
-Interrupt = Callable[[], str | None]
 Begin = Callable[[Batch], None]
 Join = Callable[[Batch, float], Batch]  # of the runs at work, and their time [s]: those that join, or none
 

@@ -101,8 +101,6 @@ def classify(
         Length of the judged part and of the whole run [s].
     parameters : mapping
         With `amplitude_threshold` [m], `decay_tolerance` and `growth_tolerance` [e-folds].
-    strands : sequence of str, length strand
-        Their names, for the reason.
     overall : array, shape (strand,), optional
         Amplitudes over the whole judged part [m], for the reason; else the root mean square of the windows'.
 
@@ -112,7 +110,7 @@ def classify(
         YES if a strand vibrates, UNDECIDED where a longer run may decide, IRREGULAR where it would not, NO if
         all strands are quiet.
     str
-        The reason, in one line, the strongest strand first.
+        The reason, in one line, the strongest of `strands` first.
 
     Raises
     ------
@@ -147,20 +145,9 @@ def classify(
 def margin(amplitudes: ArrayLike, vibrates: Vibrates, threshold: float) -> float:
     """Distance of the amplitudes that decided from the threshold [e-folds]; 0 where nothing is decided.
 
-    Parameters
-    ----------
-    amplitudes : array, shape (window, strand)
-        As `classify` takes them [m].
-    vibrates : Vibrates
-        Its verdict.
-    threshold : float
-        From which amplitude a strand vibrates [m].
-
-    Returns
-    -------
-    float
-        Of a vibration by how much the smallest window of the strand that keeps highest is above it, of
-        silence by how much the largest of the last half of the windows is below it; infinite at rest.
+    Of a vibration by how much the smallest window of the strand that keeps highest is above it, of silence by
+    how much the largest of the last half of the windows is below it; infinite at rest. Amplitudes, (window,
+    strand), and threshold [m] are those of `classify`, `vibrates` its verdict.
     """
     windows = np.asarray(amplitudes, dtype=float)
     with np.errstate(divide="ignore"):
@@ -217,20 +204,13 @@ def _judge_strand(
 
 
 def is_certain(record: Mapping[str, Any], parameters: Mapping[str, Any], left: float) -> bool:
-    """Whether a run that goes on would not change its verdict, nor its amplitude by more than a tenth.
+    """Tell whether a run that goes on would keep its verdict, and its amplitude within a tenth.
 
-    Its amplitude is CERTAIN_FACTOR times above or below the threshold, and stays so as it grows or decays,
-    by twice the error of its growth rate; of a vibration it changes by less than UNSETTLED. Where the judged
-    part is so short that it cuts the band off above the first modes, a slower motion may be left.
-
-    Parameters
-    ----------
-    record : mapping
-        With `vibrates` and VARIABLES.
-    parameters : mapping
-        Of the run: those of [vibration], `duration` and `judged_fraction`.
-    left : float
-        By how much the run would go on [s].
+    Its amplitude is CERTAIN_FACTOR times above or below the threshold, and stays so as it grows or decays
+    over the time that is left [s], by twice the error of its growth rate; of a vibration it changes by less
+    than UNSETTLED. Where the judged part is so short that it cuts the band off above the first modes, a
+    slower motion may be left. The record has `vibrates` and VARIABLES; of the parameters those of
+    [vibration], `duration` and `judged_fraction` count.
     """
     if record["vibrates"] not in (Vibrates.YES, Vibrates.NO) or "growth_rate" not in record:
         return False
@@ -258,16 +238,10 @@ def relative_scatter(windows: ArrayLike, axis: int = 0) -> NDArray[np.float64]:
 
 
 def is_irregular(windows: ArrayLike, threshold: float, most_gain: float) -> bool:
-    """Whether an amplitude comes and goes about a threshold, and a trend is ruled out.
+    """Tell whether an amplitude comes and goes about a threshold, and a trend is ruled out.
 
-    Parameters
-    ----------
-    windows : array, shape (window,)
-        Amplitudes in successive windows, equally spaced in time.
-    threshold : float
-        From which amplitude a strand vibrates, in the same unit.
-    most_gain : float
-        Growth or decay over the record that has to be ruled out [e-folds].
+    Of amplitudes in successive windows, (window,), equally spaced in time. The growth or decay over the
+    record that has to be ruled out is `most_gain` [e-folds].
     """
     amplitudes = np.asarray(windows, dtype=float)
     crossings = np.count_nonzero(np.diff(amplitudes >= threshold))
@@ -305,7 +279,7 @@ def _gain(levels: NDArray[np.float64]) -> tuple[float, float]:
 
 @dataclass(frozen=True)
 class Occurrence:
-    """Whether and how a run vibrates."""
+    """Verdict on a run: whether and how it vibrates."""
 
     vibrates: Vibrates  # the verdict
     reason: str  # reason in one line, ASCII, at most 240 characters
@@ -351,14 +325,9 @@ def assess(
     rate : float
         Sampling rate [Hz].
     strands : sequence of str, length probe
-        The strand on which each probe lies.
+        The strand on which each probe lies; those of the result are in the order in which they first appear.
     parameters : mapping
         Flat parameters with the keys of `settings.PARAMETERS["vibration"]`.
-
-    Returns
-    -------
-    Occurrence
-        Strands in the order in which they first appear in `strands`.
 
     Raises
     ------

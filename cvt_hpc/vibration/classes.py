@@ -50,20 +50,10 @@ DECIDED = tuple(_OF_VERDICTS.values())
 
 
 def classify_runs(status: NDArray, vibrates: NDArray) -> NDArray[np.int8]:
-    """Class of each run.
+    """Class of each run, one of `OccurrenceClass`, by its `Status` and `Vibrates`.
 
-    Whatever is not known to have ended well is never quiet nor vibrating: a status that this program does
-    not know counts as failed, a missing one as not run, an unknown verdict as undecided.
-
-    Parameters
-    ----------
-    status, vibrates : arrays of one shape
-        Values of `Status` and of `Vibrates`.
-
-    Returns
-    -------
-    array of int8
-        Values of `OccurrenceClass`.
+    Whatever is not known to have ended well is never quiet nor vibrating: a status that this program does not
+    know counts as failed, a missing one as not run, an unknown verdict as undecided.
     """
     classes = np.full(status.shape, OccurrenceClass.FAILED, np.int8)
     done = status == Status.DONE
@@ -99,22 +89,12 @@ class StartClass(IntEnum):
 
 
 def classify_starts(small: NDArray, large: NDArray) -> NDArray[np.int8]:
-    """Class of each cell by its runs from two starts.
+    """Class of each cell, one of `StartClass`, by its runs from a small and from a large disturbance.
 
     Where a run failed the cell failed, whatever the other run gives, so that no failure is hidden. Else a
     cell that vibrates from the small start vibrates; a cell is quiet only if it is so from both. Of a cell
-    that is quiet from the small start the other run decides, and where one run is undecided the cell is.
-    A cell that slips or moves irregularly from the small start is of that class.
-
-    Parameters
-    ----------
-    small, large : arrays of one shape
-        Values of `OccurrenceClass` of the runs from the smaller and from the larger disturbance.
-
-    Returns
-    -------
-    array of int8
-        Values of `StartClass`.
+    that is quiet from the small start the other run decides, and where one run is undecided the cell is. A
+    cell that slips or moves irregularly from the small start is of that class.
     """
     classes = np.where(small == OccurrenceClass.QUIET, large, small).astype(np.int8)
     # vibration or gross slip from the small start needs no second run, a doubtful motion cannot do without
@@ -163,20 +143,10 @@ CONTRADICTIONS = (PairClass.A_ONLY, PairClass.B_ONLY, *NEAR_CONTRADICTIONS)
 
 
 def classify_pairs(a: NDArray, b: NDArray, near: NDArray[np.bool_]) -> NDArray[np.int8]:
-    """Class of each cell by its two runs.
+    """Class of each cell by the `OccurrenceClass` of its two runs.
 
-    Parameters
-    ----------
-    a, b : arrays of one shape
-        Values of `OccurrenceClass` of either run.
-    near : array of bool, same shape
-        Whether the larger amplitude of the two lies near the threshold; see `is_near`.
-
-    Returns
-    -------
-    array of int8
-        The value of `OccurrenceClass` where both agree, and NOT_RUN where either was not run; else one of
-        `PairClass`.
+    It is their class where both agree, and NOT_RUN where either was not run; else one of `PairClass`, by
+    whether the larger amplitude of the two lies near the threshold (`is_near`).
     """
     pairs = np.where(a == b, a, PairClass.OTHERWISE).astype(np.int8)
     pairs[(a == OccurrenceClass.FAILED) != (b == OccurrenceClass.FAILED)] = PairClass.FAILED_IN_ONE
@@ -211,13 +181,9 @@ class Onset(NamedTuple):
 def onsets(loads: Array, level: Array) -> list[Onset]:
     """Find where a level changes its sign along the load, by a straight line between neighbours.
 
-    Parameters
-    ----------
-    loads : (n,) array
-        In any order [N m].
-    level : (n,) array
-        Positive where the belt vibrates, negative where it is quiet, nan where neither is known: such a place
-        is passed over. Of -1 and 1 the straight line makes the load midway between both.
+    Loads [N m] are in any order. The level is positive where the belt vibrates, negative where it is quiet,
+    nan where neither is known: such a place is passed over. Of -1 and 1 the straight line makes the load
+    midway between both.
     """
     order = np.argsort(loads)
     known = order[np.isfinite(level[order])]
@@ -233,19 +199,9 @@ def paired_errors(
 ) -> tuple[list[float], int, int]:
     """Pair the onsets of a line with the true ones of the same direction, at the least distance in all.
 
-    Parameters
-    ----------
-    found, true : sequence of Onset
-        Of one line.
-    known : (float, float)
-        Loads [N m] between which the truth is known: beyond, it is unknown whether there is an onset.
-
-    Returns
-    -------
-    errors : list of float
-        Distances of the pairs [N m].
-    missed, additional : int
-        True ones without a partner, and found ones between the known loads.
+    Returns the distances of the pairs [N m], the number of true ones without a partner, and that of onsets
+    found in addition between the loads [N m] where the truth is known: beyond, it is unknown whether there is
+    one.
     """
     from scipy.optimize import linear_sum_assignment  # long to load, and maps need onsets alone
 

@@ -59,18 +59,14 @@ def criticality(
 
     Parameters
     ----------
-    hopf : float
-        The parameter at the Hopf point.
-    stable_above : bool
-        Whether the steady state is stable above it, or else below.
+    hopf, stable_above : float, bool
+        The parameter at the Hopf point, and whether the steady state is stable above it, or else below.
     values : array, shape (n,)
         Parameter values of the runs, distinct; in the unit of `hopf`, like all others below.
     small, large : arrays, shape (n,)
         `OccurrenceClass` of the runs from near the steady state and from the large start.
-    agreement : float
-        How far from the Hopf point the runs from the small start may turn quiet.
-    bracket : float
-        How far from `hopf` the Hopf point may lie.
+    agreement, bracket : float
+        How far from the Hopf point the runs from the small start may turn quiet, and it may itself lie.
     limits : (float, float)
         Neighbouring Hopf points, beyond which other branches begin or the steady state is not stable.
     in_words : callable

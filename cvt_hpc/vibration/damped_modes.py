@@ -35,21 +35,9 @@ class Modes(NamedTuple):
 
 
 def thinned(signal: Array, rate: float, highest: float) -> tuple[Array, float]:
-    """Histories without what is faster than a frequency, at the lowest rate that resolves it.
+    """Histories without what is faster than `highest` [Hz], at the lowest rate that resolves it [Hz].
 
-    Parameters
-    ----------
-    signal : (time, sensor) array
-        Samples, in any unit.
-    rate : float
-        Sampling rate [Hz].
-    highest : float
-        Highest frequency that counts [Hz].
-
-    Returns
-    -------
-    (t, sensor) array, float
-        The samples that the filter reaches in full, and their rate [Hz].
+    Of a signal (time, sensor) in any unit only the samples that the filter reaches in full are left.
     """
     every = max(int(rate / (SAMPLES_PER_PERIOD * highest) + 1e-9), 1)
     if every == 1:
@@ -64,26 +52,15 @@ def thinned(signal: Array, rate: float, highest: float) -> tuple[Array, float]:
 
 
 def damped_modes(signal: Array, rate: float, orders: Sequence[int]) -> list[Modes]:
-    """Decompose a free motion into damped modes.
+    """Decompose a free motion into damped modes, for each order each pair of exponentials once.
 
-    Parameters
-    ----------
-    signal : (time, sensor) array
-        Samples without what is faster than the modes, in any unit; LEAST_SAMPLES or more.
-    rate : float
-        Sampling rate [Hz].
-    orders : sequence of int
-        Numbers of complex exponentials, two for each mode; what noise leaves of them, weak modes take.
-
-    Returns
-    -------
-    list of Modes
-        For each order, each pair of exponentials once.
+    The signal (time, sensor), in any unit, has nothing that is faster than the modes. Orders are numbers of
+    complex exponentials, two for each mode; what noise leaves of them, weak modes take.
 
     Raises
     ------
     ValueError
-        If there are fewer samples.
+        If there are fewer samples than LEAST_SAMPLES.
     """
     samples = len(signal)
     if samples < LEAST_SAMPLES:

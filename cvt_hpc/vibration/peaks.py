@@ -65,19 +65,8 @@ def coordinate() -> Coordinate:
 def modal_peaks(modes: ArrayLike, rate: float, band: tuple[float, float]) -> Peaks:
     """Find the largest peaks of each strand and the mode of each.
 
-    Parameters
-    ----------
-    modes : array, shape (time, strand, half_waves)
-        Amplitudes of the strands' sine modes, in any unit.
-    rate : float
-        Sampling rate [Hz].
-    band : (float, float)
-        Lowest and highest frequency [Hz].
-
-    Raises
-    ------
-    ValueError
-        As of `signals.band_amplitude`.
+    Of amplitudes of the strands' sine modes (time, strand, half_waves), in any unit, from the lowest to the
+    highest frequency of a band [Hz]. Errors are those of `signals.band_amplitude`.
     """
     check_band(band, rate)
     samples = np.asarray(modes, float)
@@ -97,31 +86,16 @@ def modal_peaks(modes: ArrayLike, rate: float, band: tuple[float, float]) -> Pea
 
 
 def fundamental(signal: ArrayLike, rate: float, band: tuple[float, float]) -> tuple[float, float]:
-    """Fundamental of the periodic part of a signal, and its strongest line in a band.
+    """Fundamental of the periodic part of a signal (time,), and its strongest line in a band [Hz].
 
     The fundamental is the lowest frequency in the band of which the strongest line is a multiple, up to
     MOST_HARMONIC, that has a line of its own, or three of its harmonics in a row, the strongest among them. A
     line is a peak of LEAST_LINE of the strongest or more, and above noise. Two lines alone therefore are no
     harmonics of a common divisor, unless one is a multiple of the other within NEAR/L, L being the length.
 
-    Parameters
-    ----------
-    signal : array, shape (time,)
-        Samples, in any unit.
-    rate, band
-        As of `modal_peaks`.
-
-    Returns
-    -------
-    fundamental, strongest : float
-        [Hz], both nan where the band holds no peak. Without harmonics both are one. The error is that of
-        `signals.dominant_frequency`, of the fundamental divided by the number of its strongest harmonic;
-        0.1/L where another line lies within 4/L.
-
-    Raises
-    ------
-    ValueError
-        As of `signals.band_amplitude`.
+    Both are nan where the band holds no peak, and one without harmonics. The error is that of
+    `signals.dominant_frequency`, of the fundamental divided by the number of its strongest harmonic; 0.1/L
+    where another line lies within 4/L. Errors are those of `signals.band_amplitude`.
     """
     found = fundamentals(np.asarray(signal, float)[np.newaxis], rate, band)[0]
     return float(found[0]), float(found[1])

@@ -86,29 +86,18 @@ def assess_ramp(
     samples: int,
     parameters: Mapping[str, Any],
 ) -> RampOccurrence | None:
-    """Judge a run along a ramp.
+    """Judge a run along a ramp; None where it ended before it could be judged.
 
     Parameters
     ----------
     displacement : array, shape (time, probe)
         Displacement of the probes along the ramp, without the start-up before it [m].
-    rate : float
-        Sampling rate [Hz].
-    strands : sequence of str, length probe
-        The strand on which each probe lies.
-    quantity : str
-        The ramped one of QUANTITIES.
-    values : array, shape (time,)
-        Its values at the same instants.
+    quantity, values : str and array, shape (time,)
+        The ramped one of QUANTITIES, and its values at the same instants.
     samples : int
         Samples of the whole ramp; a run that ended early has fewer.
-    parameters : mapping
-        As `assessment.assess` takes them.
-
-    Returns
-    -------
-    RampOccurrence or None
-        None where the run ended before it could be judged.
+    rate, strands, parameters
+        As of `assessment.assess`.
     """
     w, band = np.asarray(displacement, dtype=float), given_band(parameters)
     length = fitting_window(len(w) / rate, parameters["window_length"])
@@ -150,18 +139,9 @@ def assess_ramp(
 
 
 class Passages:
-    """Stretches in which amplitudes stay above the threshold.
+    """Stretches in which amplitudes, (window, strand) [m], stay above the threshold.
 
-    Parameters
-    ----------
-    levels : array, shape (window, strand)
-        Amplitudes in successive windows [m].
-    values : array, shape (window,)
-        The ramped quantity, in their middles.
-    quantity : Quantity
-        The quantity of the values.
-    parameters : mapping
-        As `assess_ramp` takes them.
+    `values`, (window,), are those of the ramped quantity in the middles of the windows.
     """
 
     def __init__(
@@ -224,7 +204,7 @@ class Passages:
 
 
 def _sustained(above: NDArray[np.bool_]) -> NDArray[np.bool_]:
-    """Which windows belong to SUSTAINED or more in a row that are above."""
+    """Return which windows belong to SUSTAINED or more in a row that are above."""
     kept = np.zeros(len(above), bool)
     borders = np.flatnonzero(np.diff(np.concatenate([[False], above, [False]])))
     for first, last in borders.reshape(-1, 2):

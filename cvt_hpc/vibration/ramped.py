@@ -27,14 +27,10 @@ CONSTANT = ("constant", ())  # of the parameters that have a quantity change
 
 
 def ramped(parameters: Mapping[str, Any]) -> str:
-    """Which of QUANTITIES a run changes all along; "" where its judged part has constant values.
+    """The one of QUANTITIES that a run changes all along; "" where its judged part has constant values.
 
-    Time is that of a run whose profiles go on while it is judged.
-
-    Parameters
-    ----------
-    parameters : mapping
-        Flat parameters of a run; of a model without ramps or profiles, without their keys.
+    Time is that of a run whose profiles go on while it is judged. Models without ramps or profiles lack their
+    keys.
     """
     p = parameters
     for name, quantity in QUANTITIES.items():

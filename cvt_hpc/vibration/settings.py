@@ -87,19 +87,11 @@ def lower_edge(parameters: Parameters, lowest_mode: float, highest_mode: float, 
     """Lowest frequency by which a run is judged [Hz].
 
     It is `band_low` where that is given. Else it is BELOW_MODES of the lower first mode of both strands: they
-    vibrate from 0.8 of that mode of theirs upwards, since the ends of the arcs give. Of a run that judders it
-    is ABOVE_MODES of the higher one instead: jerks of the driven pulley ring the first modes by up to 29 um,
-    and move strands by up to 4 um above. It is at most half of `band_high`, and at least what the judged part
-    and its windows resolve.
-
-    Parameters
-    ----------
-    parameters : mapping
-        As `check` takes them.
-    lowest_mode, highest_mode : float
-        First eigenfrequencies of the strands under the run's own forces [Hz]; nan: not known, LOWEST holds.
-    judders : bool
-        Whether the driven pulley moves in jerks.
+    vibrate from 0.8 of that mode of theirs upwards, since the ends of the arcs give. Of a run that judders,
+    as its driven pulley moves in jerks, it is ABOVE_MODES of the higher one instead: jerks ring the first
+    modes by up to 29 um, and move strands by up to 4 um above. It is at most half of `band_high`, and at
+    least what the judged part and its windows resolve. The modes are the first ones of the strands under the
+    run's own forces [Hz]; nan: not known, LOWEST holds.
     """
     p = parameters
     if p["band_low"] or not lowest_mode > 0.0:
@@ -124,10 +116,7 @@ def edge_of_modes(parameters: Parameters, lowest_mode: float) -> float:
 def check(parameters: Parameters) -> list[tuple[str, str, str]]:
     """Problems between parameters: (key, expected, found), in the form of a model's check.
 
-    Parameters
-    ----------
-    parameters : mapping
-        Flat parameters including [vibration], the `duration` of a run [s] and its `sampling_rate` [Hz].
+    They include [vibration], the `duration` of a run [s] and its `sampling_rate` [Hz].
     """
     (low, high), window = band(parameters), parameters["window_length"]
     problems = []

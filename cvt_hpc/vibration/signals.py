@@ -53,10 +53,8 @@ def band_amplitude(signal: ArrayLike, rate: float, band: tuple[float, float]) ->
     ----------
     signal : array, shape (time, ...)
         Samples, in any unit.
-    rate : float
-        Sampling rate [Hz].
-    band : (float, float)
-        Lowest and highest frequency [Hz].
+    rate, band : float, (float, float)
+        Sampling rate; lowest and highest frequency [Hz].
 
     Returns
     -------
@@ -90,10 +88,8 @@ def window_amplitudes(
 
     Returns
     -------
-    centres : array, shape (window,)
-        Middle of each window [s], counted from the first sample.
-    amplitudes : array, shape (window, ...)
-        As `band_amplitude` of each window.
+    centres, amplitudes : arrays, shape (window,) and (window, ...)
+        Middle of each window [s], counted from the first sample, and `band_amplitude` of each.
 
     Raises
     ------
@@ -156,25 +152,11 @@ def amplitude_spectrum(signal: ArrayLike, rate: float, bins: ArrayLike) -> Array
 
 
 def dominant_frequency(signal: ArrayLike, rate: float, band: tuple[float, float]) -> Array:
-    """Frequency of the highest peak of the amplitude spectrum within a band.
+    """Frequency of the highest peak of the amplitude spectrum within a band [Hz]; nan where it holds no peak.
 
-    The peak is interpolated by a parabola through the logarithms of three zero-padded spectral lines: for
-    a steady sine the error is below 0.001/L, L being the record's length (0.02 Hz for 50 ms).
-
-    Parameters
-    ----------
-    signal, rate, band
-        As for `band_amplitude`.
-
-    Returns
-    -------
-    array, shape (...)
-        Frequency [Hz]; nan where the band holds no peak.
-
-    Raises
-    ------
-    ValueError
-        As for `band_amplitude`.
+    The peak is interpolated by a parabola through the logarithms of three zero-padded spectral lines: for a
+    steady sine the error is below 0.001/L, L being the record's length (0.02 Hz for 50 ms). Arguments and
+    errors are those of `band_amplitude`.
     """
     check_band(band, rate)
     return strongest_peak(*fine_spectrum(time_last(signal), rate), band)
@@ -196,23 +178,13 @@ def strongest_peak(frequencies: Array, magnitudes: Array, band: tuple[float, flo
 def envelope_growth(
     signal: ArrayLike, rate: float, band: tuple[float, float], length: float | None = None
 ) -> Growth:
-    """Exponential growth rate of the band-limited envelope.
+    """Exponential growth rate of the band-limited envelope [1/s], and its error (`growth_fit`).
 
     The envelope is sampled by `window_amplitudes`, so that no value of it comes from beyond the record's
-    ends, and a straight line is fitted to its logarithm. For an exponentially growing or decaying sine
-    that keeps 4/length from the band's edges the error is below 0.1 % of the rate.
-
-    Parameters
-    ----------
-    signal, rate, band
-        As for `band_amplitude`.
-    length : float, optional
-        Length of a window [s]. Default: `fitting_window` for two periods of the band's lowest frequency.
-
-    Returns
-    -------
-    Growth
-        Arrays of shape (...) [1/s], see `growth_fit`.
+    ends, and a straight line is fitted to its logarithm. For an exponentially growing or decaying sine that
+    keeps 4/length from the band's edges the error is below 0.1 % of the rate. The `length` of a window [s] is
+    by default `fitting_window` for two periods of the band's lowest frequency; other arguments are those of
+    `band_amplitude`.
     """
     samples = np.asarray(signal, dtype=float)
     if length is None:
@@ -221,21 +193,11 @@ def envelope_growth(
 
 
 def growth_fit(times: ArrayLike, amplitudes: ArrayLike) -> Growth:
-    """Straight line through the logarithm of amplitudes over time.
+    """Straight line through the logarithm of amplitudes, (window, ...), over time [s], (window,).
 
-    Parameters
-    ----------
-    times : array, shape (window,)
-        Middles of the windows [s].
-    amplitudes : array, shape (window, ...)
-        Amplitudes in the windows, any unit.
-
-    Returns
-    -------
-    Growth
-        Slope and its standard error from the scatter about the line [1/s], shape (...); both nan with
-        fewer than three windows, or where an amplitude is zero or not finite. Slow beats count as
-        scatter, but windows within one beat are alike, and the standard error is then too small.
+    Slope and its standard error from the scatter about the line [1/s], shape (...); both nan with fewer than
+    three windows, or where an amplitude is zero or not finite. Slow beats count as scatter, but windows
+    within one beat are alike, and the standard error is then too small.
     """
     t = np.asarray(times, dtype=float)
     a = np.asarray(amplitudes, dtype=float)

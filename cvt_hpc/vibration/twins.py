@@ -56,18 +56,10 @@ def nothing(reason: str, window: float = 0.0, *sizes: float) -> Found:
 
 
 def found_modes(motions: Array, rate: float, highest: float, *, vibrates: bool) -> Found:
-    """Modes of a state by the motions of three runs.
+    """Modes of a state up to a highest frequency [Hz] by the motions of three runs, (3, time, sensor) [m].
 
-    Parameters
-    ----------
-    motions : (3, time, sensor) array
-        Displacement without a kick, with half of it and with the whole.
-    rate : float
-        Sampling rate [Hz].
-    highest : float
-        Highest frequency of a mode [Hz].
-    vibrates : bool
-        Whether the run without a kick does, rather than to settle.
+    They are those without a kick, with half of it and with the whole. `vibrates`: the run without a kick
+    does, rather than to settle.
     """
     kicked = np.flatnonzero((motions[2] != motions[0]).any(axis=1))
     if not kicked.size:

@@ -15,7 +15,7 @@ from cvt_hpc.analysis.figures import balanced
 from cvt_hpc.analysis.histories import draw_history, history_figure, phase_figure
 from cvt_hpc.analysis.history_panels import read_strands
 from cvt_hpc.errors import InputError
-from cvt_hpc.job import load_job
+from cvt_hpc.job import build_job, load_job
 from cvt_hpc.printing import point_lines
 from cvt_hpc.storage.netcdf import is_history, write_history
 from cvt_hpc.variables import Status, shortened
@@ -210,6 +210,55 @@ sheave_stiffness = [1, inf]
     assert panel(figure, "load [kN m]").lines[0].get_ydata()[[0, -1]] == pytest.approx([0.02, 0.14], rel=1e-3)
     (printed,) = point_lines(job, {**at, "driving_speed": point["driving_speed"]})
     assert printed.endswith(lines[1].replace("\u00a0", " "))
+
+
+COURSE = {
+    "profile_time": [0.0, 0.1, 0.3],
+    "load_profile": [0.25, 1.0, 0.5],
+    "driving_speed_profile": [1.0, 0.5, 0.75],
+    "thrust_profile": [0.8, 0.9, 1.0],
+}
+
+
+def driven(axes, **tables):
+    """The made-up run, with the attributes of one that a course drives; loads in kN m."""
+    scene = {"thrust": "40 kN", "driving_speed": "3000 rpm"} | ({} if axes else {"load": "0.12 kN m"})
+    document = {"name": "ramp", "model": "elastic_belt", "scene": scene, "axes": axes}
+    job = build_job(document | {"profiles": COURSE, "run": {"duration": 0.3}} | tables)
+    told = {key: repr(value) if value == np.inf else value for key, value in job.point(0).items()}
+    units = json.dumps(dict(job.units))
+    attributes = {"job": json.dumps(job.resolved()), "point": json.dumps(told), "point_units": units}
+    return run(duration=0.3).assign_attrs(attributes)
+
+
+def test_the_title_has_the_ranges_of_a_course_and_no_value_as_if_it_were_constant():
+    told = "course: load 0.03 to 0.12 kN m, speed 1500 to 3000 rpm, thrust 32 to 40 kN"
+    for compose in (history_figure, phase_figure):
+        lines = compose(driven({})).get_suptitle().replace("\u00a0", " ")
+        assert told in " ".join(lines.split())
+    varied = driven({"load": ["0.12 kN m", "0.2 kN m"], "seed": [3, 4]})
+    lines = history_figure(varied).get_suptitle().replace("\u00a0", " ").splitlines()
+    assert lines[1] == "load 0.03 to 0.12 kN m, seed 3"
+    assert lines[2] == "course: speed 1500 to 3000 rpm, thrust 32 to 40 kN"
+    pressed = {"driven_piston": (0.02, 0.09), "driven_pressure": "2 MPa", "driven_spring_force": "4 kN"}
+    course = {"profile_time": [0.0, 0.3], "driven_pressure_profile": [1.0, 0.5]}
+    scene = {"driving_speed": "3000 rpm", "load": "0.12 kN m"}
+    title = history_figure(driven({}, scene=scene, pulleys=pressed, profiles=course)).get_suptitle()
+    area = np.pi * (0.09**2 - 0.02**2)
+    thrusts = " to ".join(f"{1e-3 * (area * pressure + 4e3):.4g}" for pressure in (1e6, 2e6))
+    told = f"thrust {thrusts} kN course: driven pressure 1 to 2 MPa"  # the thrust follows
+    assert told in " ".join(title.replace("\u00a0", " ").split())
+
+
+def test_a_thrust_that_a_course_changes_is_drawn_unless_forces_are_recorded():
+    dataset = driven({})
+    axes = panel(history_figure(dataset), "thrust [kN]")
+    assert axes.lines[0].get_ydata()[[0, 2000, -1]] == pytest.approx([32.0, 36.0, 40.0], rel=1e-3)
+    force = ("time", np.full(dataset.sizes["time"], 4e4), {"units": "N"})
+    recorded = history_figure(dataset.assign(axial_force_driving=force, axial_force_driven=force))
+    assert "thrust [kN]" not in labels_of(recorded)
+    lines = panel(recorded, "axial force [kN]").lines
+    assert [line.get_label() for line in lines] == ["driving", "driven"]
 
 
 def test_the_title_has_no_numerics_that_the_program_has_chosen():

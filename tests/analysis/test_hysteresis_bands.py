@@ -6,7 +6,7 @@ import xarray as xr
 
 import cvt_hpc.accessor  # noqa: F401  # gives datasets their verbs
 from cvt_hpc.analysis.arrangement import ruler
-from cvt_hpc.analysis.hysteresis_bands import hysteresis_figure, onset_line, vibration_ranges
+from cvt_hpc.analysis.hysteresis_bands import hysteresis_figure, onset_line, vibration_ranges, within
 from cvt_hpc.analysis.maps import map_figure
 from cvt_hpc.errors import InputError
 from cvt_hpc.variables import Vibrates
@@ -31,7 +31,7 @@ def test_a_map_has_the_onset_that_the_accessor_tells(side):
     sides = {"x": None, "y": None} if side == "x" else {"x": "friction_gradient", "y": "load"}
     figure = results.cvt.map(**sides)
     axes = figure.axes[0]
-    (line,) = [c for c in axes.collections if c.get_label() == "onset of vibration"]
+    (line,) = [c for c in axes.collections if c.get_label() == "onset of vibration ± 10 N m"]
     (points,) = line.get_segments()
     along = points[::2, 0 if side == "x" else 1]
     np.testing.assert_allclose(along, onset.dropna("friction_gradient"))
@@ -41,7 +41,15 @@ def test_a_quiet_map_has_no_line_of_onset():
     results = study(stiffnesses=(1.0,))
     results["vibrates"][:] = Vibrates.NO
     (legend,) = map_figure(results).legends
-    assert "onset of vibration" not in [text.get_text() for text in legend.get_texts()]
+    assert not any("onset" in text.get_text() for text in legend.get_texts())
+
+
+def test_a_border_between_cells_is_known_to_half_their_distance():
+    units = {"units": "rad/s", "job_units": "rpm"}
+    speeds = xr.DataArray(np.array([1000.0, 1500.0, 2000.0]) * np.pi / 30.0, dims="x", attrs=units)
+    assert within(speeds) == "± 250 rpm"
+    assert within(xr.DataArray([1.0, 2.0, np.inf], dims="x", attrs={"units": "1"})) == "± 0.5"
+    assert within(xr.DataArray([1.0, 2.0, 4.0], dims="x", attrs={"units": "N m"})) == "± half a step"
 
 
 def test_ranges_of_vibration_are_those_of_each_ramp():

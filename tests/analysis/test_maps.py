@@ -123,7 +123,7 @@ def test_counts_and_all_classes_are_told():
     assert "120 runs: 53 quiet, 59 vibrating, 3 undecided, 4 failed, 1 not run" in figure.get_suptitle()
     (legend,) = figure.legends
     of_any_map = [kind.label for kind in (QUIET, VIBRATING, UNDECIDED, FAILED, NOT_RUN)]
-    assert [text.get_text() for text in legend.get_texts()] == [*of_any_map, "onset of vibration"]
+    assert [text.get_text() for text in legend.get_texts()] == [*of_any_map, "onset of vibration ± 10 N m"]
     assert panels_of(figure)[-1].get_xlabel() == "load [N m]"
     assert figure.get_supylabel() == "friction gradient [s/m]"
 
@@ -143,7 +143,14 @@ def test_slipping_and_irregular_runs_are_in_the_legend_where_they_occur():
     figure = figure_of(special_runs())
     (legend,) = figure.legends
     words = [text.get_text() for text in legend.get_texts()]
-    assert words == ["quiet", "vibrating", "undecided", "slipping", "irregular", "onset of vibration"]
+    assert words == [
+        "quiet",
+        "vibrating",
+        "undecided",
+        "slipping",
+        "irregular",
+        "onset of vibration ± 10 N m",
+    ]
     assert "6 slipping, 3 irregular" in figure.get_suptitle()
     figure.draw_without_rendering()
     extent = legend.get_window_extent()

@@ -35,7 +35,10 @@ def results():
         "status": (over, np.ones(shape, np.int8)),
         "vibrates": (over, np.zeros(shape, np.int8)),
         "spectrum": ((*over, "strand", "frequency_bin"), spectrum, {"units": "m"}),
-        "eigenfrequency": ((*over, "strand", "half_waves"), 20.0 + 30.0 * draw.random((*shape, 2, 2))),
+        "eigenfrequency": (
+            (*over, "strand", "half_waves"),
+            [20.0, 60.0] + 30.0 * draw.random((*shape, 2, 2)),
+        ),
         "speed_loss": (over, loss, {"units": "1"}),
         "expected_speed_loss": (
             over,

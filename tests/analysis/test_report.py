@@ -15,6 +15,7 @@ import xarray as xr
 
 from cvt_hpc.analysis.classes import map_classes, occurrence_classes
 from cvt_hpc.analysis.hysteresis_bands import lowest_onsets
+from cvt_hpc.analysis.maps import map_figure
 from cvt_hpc.cli import main
 from cvt_hpc.errors import InputError
 from cvt_hpc.job import build_job
@@ -106,6 +107,7 @@ def test_the_page_says_what_was_found_in_sentences(page):
         f"{place} there is vibration from 50 N m on, as far as is decided, most at 120 N m: 21.9 µm at 568 Hz"
         in words
     )
+    assert "midway between neighbouring runs of different class: each end is known ± 10 N m." in words
     # between rigid sheaves all is quiet at -2.4 s/m; at -0.8 s/m a run failed and one was not done
     assert "Nothing vibrates in 1 of 4 lines along load." in words
     assert (
@@ -152,6 +154,38 @@ def test_parameters_have_the_units_of_the_job(units, told, tmp_path):
     job = build_job({"name": "a", "model": "elastic_belt", "axes": axes, "scene": scene})
     results.attrs |= {"job": json.dumps(job.resolved()), "job_units": json.dumps(units)}
     assert f"Other than the defaults: {told}" in page_of(results, tmp_path)
+
+
+def driven_by_a_course(tmp_path, until=0.3):
+    """Results of a job whose course is that of a file, and a line of which no value is constant."""
+    (tmp_path / "rig.csv").write_text(
+        f"time [s],driving_speed [rpm],thrust [kN],load [N m]\n0,2400,44,20\n{until},3000,50,80\n"
+    )
+    results = study(gradients=(-2.4,), stiffnesses=(1.0,))
+    axes = {name: results[name].values.tolist() for name in results["status"].dims if name != "load"}
+    document = {"name": "a", "model": "elastic_belt", "axes": axes, "run": {"duration": 0.4}}
+    job = build_job(document | {"profiles": {"profile_file": "rig.csv"}}, str(tmp_path / "rig.toml"))
+    told = {"job": json.dumps(job.resolved()), "job_files": json.dumps(dict(job.files))}
+    return results.isel(load=0).assign_attrs(told)
+
+
+def test_a_course_that_drives_the_runs_is_told_with_its_file_and_ranges(tmp_path):
+    results = driven_by_a_course(tmp_path)
+    words = page_of(results, tmp_path)
+    ranges = "load 20 to 80 N m, speed 2400 to 3000 rpm, thrust 44 to 50 kN"
+    assert f"The course of rig.csv drives each run from 0 to 0.3 s: {ranges}. Verdicts hold over" in words
+    assert "Other than the defaults: duration 0.4 s. All else" in words
+    for row in ("profile_file rig.csv", "driving_speed 2400 to 3000 rpm", "thrust 44 to 50 kN", "load 20 to"):
+        assert row in words
+    title = map_figure(results).get_suptitle().replace("\u00a0", " ")
+    assert f"course of rig.csv: {ranges}" in " ".join(title.split())
+    words = page_of(driven_by_a_course(tmp_path, until=0.1), tmp_path)
+    assert "from 0 to 0.1 s:" in words and "Verdicts hold for the constant values to which it leads." in words
+    results = study(gradients=(-2.4,), stiffnesses=(1.0,)).assign_attrs(results.attrs)
+    told = json.loads(results.attrs["job"])
+    told["axes"] |= {"load": results["load"].values.tolist()}
+    words = page_of(results.assign_attrs(job=json.dumps(told)), tmp_path)
+    assert ": load 0.25 to 1 times its value, speed 2400 to" in words
 
 
 def test_what_turns_the_direction_of_a_text_is_seen(tmp_path):
@@ -283,13 +317,13 @@ def two_starts():
 def test_the_map_has_the_onset_lines_of_the_printed_one():
     results = study(**SMALL)
     (line,) = map_data(results)["onsets"]
-    assert (line["axis"], line["starts"], line["label"]) == (2, False, "onset of vibration")
+    assert (line["axis"], line["starts"], line["label"]) == (2, False, "onset of vibration ± 10 N m")
     expected = lowest_onsets(results["load"].values, map_classes(results).values.reshape(-1, 10))
     np.testing.assert_allclose(decoded(line["at"], "<f4", 4), expected)
     assert expected[0] == 50.0 and np.isnan(expected[1])  # rigid sheaves are quiet
     each, small, large = map_data(two_starts())["onsets"]
     assert (each["label"], small["label"], large["label"]) == (
-        "onset of vibration", "onset from a small start", "onset from a large start")  # fmt: skip
+        "onset of vibration ± 10 N m", "onset from a small start ± 10 N m", "onset from a large start ± 10 N m")  # fmt: skip
     # over the disturbance, whose values have it in common, the gradient and the stiffness
     np.testing.assert_allclose(decoded(each["at"], "<f4", (2, 4))[:, 0], [90.0, 50.0])
     np.testing.assert_allclose(decoded(small["at"], "<f4", (2, 4))[:, 0], 90.0)
@@ -481,7 +515,7 @@ def test_sides_values_and_quantities_are_chosen_in_the_browser(tmp_path):
     vibrates, quiet = ["solid", 90, 90, 90, 90], ["solid", None, None, None, None]
     assert of_small == [vibrates, vibrates, quiet, quiet] and hidden == []
     assert of_both[:4] == [vibrates, vibrates, ["solid", 50, 50, 40, 40], ["dash", 50, 50, 40, 40]]
-    assert legend.endswith("onset from a small startonset from a large start")
+    assert legend.endswith("onset from a small start ± 10 N monset from a large start ± 10 N m")
     assert (scale, x, y) == ("frequency [Hz]", "friction gradient [s/m]", "load [N m]") and panels == 2
     assert value == "100 µm"
     place = ["sheave stiffness: 1", "load: 20 N m", "friction gradient: −2.4 s/m"]

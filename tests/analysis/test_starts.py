@@ -102,8 +102,8 @@ def test_the_map_has_one_panel_for_both_starts_and_counts_cells():
     (legend,) = figure.legends
     assert [text.get_text() for text in legend.get_texts()][-3:] == [
         "vibrates from a large start only",
-        "onset from a small start",
-        "onset from a large start",
+        "onset from a small start ± 10 N m",
+        "onset from a large start ± 10 N m",
     ]
     assert sum(fills_of(axes)[OF_STARTS[ONLY].fill] for axes in panels) == only
 

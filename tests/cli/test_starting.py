@@ -20,6 +20,7 @@ from cvt_hpc.job.template import example_files, job_template
 from cvt_hpc.models import MODELS
 from cvt_hpc.models.contract import load_model
 from cvt_hpc.study import doctor
+from cvt_hpc.variables import Vibrates
 
 RECORDED = [name for name in MODELS if load_model(name).is_recorded]
 
@@ -28,7 +29,8 @@ RECORDED = [name for name in MODELS if load_model(name).is_recorded]
 def test_a_template_is_a_job_and_so_is_all_that_is_commented_out_in_it(model):
     text = job_template("first", model, "init")
     job = build_job(tomllib.loads(text))
-    shape = {"auto": (9, 3), "elastic_belt": (9, 3), "oscillator": (10, 10)}.get(model, (3,))
+    maps = {"auto": (9, 3), "elastic_belt": (9, 3), "oscillator": (10, 10), "belt_drive": (6, 5)}
+    shape = (maps | {"pushbelt": (3, 3)}).get(model, (3,))
     assert (job.name, job.model, job.shape) == ("first", model, shape)
     assert "count = 5" in text
     # every key with its default, but what stands in the place of another one, and the load beside its share
@@ -55,6 +57,20 @@ def test_the_template_of_the_oscillator_shows_the_border_of_damping(tmp_path):
     run(job, out=tmp_path)
     found = open_results(tmp_path)["vibrates"]
     assert np.all(found.values[margin > 1.3]) and not np.any(found.values[margin < 0.9])
+
+
+@pytest.mark.parametrize(
+    ("model", "corners"),
+    [
+        ("belt_drive", [[Vibrates.NO, Vibrates.NO], [Vibrates.SLIPS, Vibrates.SLIPS]]),
+        pytest.param("pushbelt", [[Vibrates.YES, Vibrates.NO]] * 2, marks=pytest.mark.slow),
+    ],
+)
+def test_the_template_of_a_belt_shows_a_border_within_a_minute(model, corners, tmp_path):
+    job = build_job(tomllib.loads(job_template("first", model, "init")))
+    assert job.shape[0] * job.shape[1] * load_model(model).cost(job.point(0), job.stepper) < 90.0
+    run(job.thinned(4), out=tmp_path)
+    assert open_results(tmp_path)["vibrates"].values.tolist() == corners
 
 
 def test_a_template_has_the_units_of_engineers():

@@ -12,6 +12,8 @@ from cvt_hpc.experiments.calibrate import Posterior, information, load, weigh
 from cvt_hpc.experiments.uncertain_lines import nearest_distribution
 from cvt_hpc.job import load_job
 from cvt_hpc.job.uncertain import Distribution
+from cvt_hpc.study import run
+from cvt_hpc.study.status import find_records
 
 SPEEDS = np.arange(20.0, 205.0, 10.0)  # [mm/s]
 JOB = """
@@ -213,6 +215,26 @@ def test_a_study_is_run_and_calibrated_by_one_command(tmp_path, capsys, monkeypa
     before = {path: path.stat().st_mtime_ns for path in (folder / "samples" / "records").rglob("*")}
     assert main(command) == 0
     assert {path: path.stat().st_mtime_ns for path in (folder / "samples" / "records").rglob("*")} == before
+
+
+def test_runs_that_are_there_are_weighed_and_what_is_left_of_them_is_done(tmp_path, capsys, monkeypatch):
+    monkeypatch.chdir(tmp_path)
+    (tmp_path / "y.toml").write_text(CRITERION)
+    (tmp_path / "rig.csv").write_text(f"{WINDOW}\n70,170,10,170\n")
+    job, out = load_job(tmp_path / "y.toml"), tmp_path / "out" / "y"
+    run(job, out, part="1/2", progress=False)
+    left = job.size - int(find_records(out, job).recorded.sum())
+    command = ["calibrate", "y.toml", "--measured", "rig.csv"]
+    assert main(command) == 0
+    told = capsys.readouterr()
+    assert 0 < left < job.size and f"{left} runs" in told.err and "32 samples weighed by rig.csv" in told.out
+    assert not (out / "samples").exists() and (out / "calibrated.csv").exists()
+    before = {path: path.stat().st_mtime_ns for path in (out / "records").rglob("*")}
+    assert main(command) == 0 and not (out / "samples").exists()
+    assert {path: path.stat().st_mtime_ns for path in (out / "records").rglob("*")} == before
+    # others, and what --fresh repeats, have a folder of their own
+    assert main([*command, "--set", "uncertain.seed=2"]) == 0 and (out / "samples").exists()
+    assert {path: path.stat().st_mtime_ns for path in (out / "records").rglob("*")} == before
 
 
 def test_too_few_samples_that_agree_are_no_result(study, tmp_path):

@@ -130,7 +130,9 @@ def course_job(folder, text, name="rig.csv", model="elastic_belt", **tables):
 )
 def test_a_measured_file_gives_profiles_and_what_they_multiply(tmp_path, model):
     with pytest.warns(JobWarning, match='"torque .N m." as load'):
-        point = course_job(tmp_path, RIG, model=model).point(0)
+        job = course_job(tmp_path, RIG, model=model)
+    assert job.files == {"profile_file": "rig.csv"}
+    point = job.point(0)
     assert point["load"] == 150.0 and point["thrust"] == 50e3
     assert point["driving_speed"] == pytest.approx(3100 * np.pi / 30)
     assert point["profile_time"] == pytest.approx((0.0, 0.05, 0.2))
@@ -212,6 +214,21 @@ def write_mdf(path, signals, times=()):
                 at = np.array(times.get(name, signals["Time"][0]), float)
                 measured.append(asammdf.Signal(np.array(values, float), timestamps=at, name=name, unit=unit))
         measured.save(path, overwrite=True)
+
+
+def test_a_long_log_is_read_whatever_its_kind(tmp_path):
+    times = np.arange(80_000) * 1e-3
+    loads = np.round(100.0 + 50.0 * np.sin(times / 9.0), 4)
+    rows = "".join(f"{time:.3f},{load:.4f}\n" for time, load in zip(times, loads, strict=True))
+    duration = {"run": {"duration": 80.0}}
+    found = course_job(tmp_path, f"time [s],load [N m]\n{rows}", **duration).parameters
+    assert (tmp_path / "rig.csv").stat().st_size > 2**20
+    write_mat(tmp_path / "rig.mat", {"time": (times, "s"), "load": (loads, "N m")})
+    document = {"name": "course", "model": "elastic_belt", "profiles": {"profile_file": "rig.mat"}}
+    other = build_job(document | duration, str(tmp_path / "course.toml")).parameters
+    assert found["load"] == other["load"] == loads.max()
+    assert found["load_profile"] == other["load_profile"]
+    assert found["profile_time"] == pytest.approx(other["profile_time"])
 
 
 @pytest.mark.parametrize(("write", "suffix"), [(write_mat, ".mat"), (write_mdf, ".mf4")])

@@ -57,6 +57,14 @@ def test_axes_are_the_dimensions(dataset):
     assert "units" not in dataset["friction_law"].attrs
 
 
+def test_the_names_of_files_that_gave_parameters_are_kept_and_may_change(tmp_path, dataset):
+    assert "job_files" not in dataset.attrs
+    for name in ("rig.csv", "renamed.csv"):
+        run(Job(files={"profile_file": name}), tmp_path, simulator=Simulator(), progress=False)
+        with open_results(tmp_path) as opened:
+            assert json.loads(opened.attrs["job_files"]) == {"profile_file": name}
+
+
 def test_each_run_stands_at_its_place(dataset):
     for index in range(12):
         point = JOB.point(index)

@@ -60,6 +60,7 @@ class Job:
     rules: tuple = ()
     derived: tuple = ()
     units: dict[str, str] = field(default_factory=dict)
+    files: dict[str, str] = field(default_factory=dict)
 
     @property
     def shape(self) -> tuple[int, ...]:

@@ -73,25 +73,8 @@ def attractors(
 ) -> list[Attractor]:
     """Run from all starts at all values, and more closely where vibration begins or ends.
 
-    Parameters
-    ----------
-    job : Job
-        Of a model with a transient, without axes.
-    parameter : str
-        Key of the job.
-    starts : sequence of Start
-        Where runs begin.
-    values : sequence of float
-        Of the parameter, ascending [SI].
-    bifurcations : collection of float
-        Values beside which there are to be close ones.
-    resolution : float
-        How close.
-
-    Returns
-    -------
-    list of Attractor
-        In the order of values, then of starts.
+    Values of the job's parameter are ascending [SI]; beside bifurcations there are to be ones as close as the
+    resolution. The order is that of values, then of starts. The job's model has a transient, and no axes.
     """
     found = _run_all(job, parameter, starts, values)
     between = close_values(values, found, bifurcations, resolution)
@@ -211,21 +194,11 @@ class Followed(NamedTuple):
 
 
 def states_of(found: Branch, grid: Mesh, loads: Sequence[float]) -> Arrays:
-    """Return steady states and modes of a branch along the load.
+    """Return steady states and modes of a branch along all its loads, ascending [N m].
 
-    Parameters
-    ----------
-    grid : Mesh
-        Of its belt.
-    loads : sequence of float
-        All loads of the branch, ascending [N m].
-
-    Returns
-    -------
-    dict of array
-        `load` and `stability` (load,); by their names quantities of the steady states (load, ...) and values
-        of the modes (load, mode), each mode followed as far as there are states, the most unstable first;
-        nan where there is none.
+    `load` and `stability` (load,); by their names quantities of the steady states (load, ...) and values of
+    the modes (load, mode), each mode followed as far as there are states, the most unstable first; nan where
+    there is none.
     """
     lines = [
         {piece[place].steady.load: mode for place, mode in track.items()}

@@ -181,21 +181,11 @@ class Direction(IntEnum):
 def diagram_dataset(
     diagram: Diagram, followed: Mapping[int, Followed], makers: Sequence[Mapping[str, Any]] = ()
 ) -> xr.Dataset:
-    """Return all branches in one dataset.
+    """Return all branches that are followed in one dataset, by their place in `diagram.branches`.
 
-    Parameters
-    ----------
-    followed : mapping
-        Branches by their place in `diagram.branches`: all, or the finished ones.
-    makers : sequence of mapping
-        Origin of the results, as `global_attributes` takes it.
-
-    Returns
-    -------
-    Dataset
-        Over the axes and `load` the steady states; with `mode` the modes, each followed from one load to
-        the next; along `onset` the Hopf points and along `run` the runs, with the number of their branch in
-        the grid of the axes, counted in C order.
+    Over the axes and `load` the steady states; with `mode` the modes, each followed from one load to the
+    next; along `onset` the Hopf points and along `run` the runs, with the number of their branch in the grid
+    of the axes, counted in C order. `makers` is the origin of the results, as `global_attributes` takes it.
     """
     axes: dict[str, Any] = {
         axis.name: (axis.name, list(axis.values), axis_dimension(axis, diagram.job).attributes)

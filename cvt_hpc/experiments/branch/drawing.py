@@ -59,21 +59,10 @@ def branch_figure(diagram: Diagram, followed: Followed) -> Figure:
 
 
 def stable_parts(loads: np.ndarray, is_stable: bool, onsets: list[Onset]) -> list[tuple[float, float, bool]]:
-    """Return the loads between which steady states are stable, or not.
+    """Return the loads between which steady states are stable, or not: from, to [N m], whether stable.
 
-    Parameters
-    ----------
-    loads : array, shape (n,)
-        Ascending, without a gap between them [N m].
-    is_stable : bool
-        Whether the state under the first one is stable.
-    onsets : list of Onset
-        Hopf points of the branch, except those of states that are unstable anyway.
-
-    Returns
-    -------
-    list of (float, float, bool)
-        From one load to another [N m], and whether states are stable there.
+    Loads are ascending, without a gap between them [N m]; `is_stable` tells whether the state under the first
+    one is. Onsets are Hopf points of the branch, except those of states that are unstable anyway.
     """
     first, last = loads[0], loads[-1]
     turns = [onset for onset in onsets if first < onset.load < last and not onset.others]

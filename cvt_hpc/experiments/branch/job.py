@@ -88,14 +88,9 @@ def load_attributes(job: Job) -> dict[str, Any]:
 
 
 def load(path: str | Path, overrides: Assignments = ()) -> Diagram:
-    """Read and validate a job of bifurcation diagrams.
+    """Read and validate a job of bifurcation diagrams, with overrides as of `load_job`.
 
-    Parameters
-    ----------
-    path : str or Path
-        A TOML file: a job of `linear_stability` with an axis `load`, and with a table [branch] or without.
-    overrides : mapping, or sequence of "KEY=VALUE"
-        As `load_job` takes them.
+    It is a TOML file: a job of `linear_stability` with an axis `load`, and with a table [branch] or without.
 
     Raises
     ------

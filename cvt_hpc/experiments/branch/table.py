@@ -140,14 +140,7 @@ def with_kinds(
 ) -> Followed:
     """Return a branch with the kinds of its Hopf points; reasons give loads in the unit of the job.
 
-    Parameters
-    ----------
-    diagram, asked : Diagram, Asked
-        The diagram, and the branch of it.
-    states : dict of array
-        As of `states_of`.
-    hopf, hidden, runs
-        As `judged` takes them.
+    States are those of `states_of`, the others as `judged` takes them.
     """
     lowest, in_words = partial(lowest_judged, asked), partial(_load_text, diagram)
     kinds = [judged(onset, hopf, hidden, runs, lowest, in_words) for onset in hopf]
@@ -164,16 +157,9 @@ def judged(
 ) -> Criticality:
     """Judge whether a Hopf point is super- or subcritical, if its mode lies in the band of the runs.
 
-    Parameters
-    ----------
-    hopf, hidden
-        All of the branch, and where stability changes unseen, as `onsets` returns them.
-    runs : list of Attractor
-        From near the steady state (start 0) and from the large start (1).
-    lowest : callable
-        Lowest frequency of a mode that runs under a load [N m] are judged by [Hz].
-    in_words : callable
-        Turns a load [N m] into words.
+    `hopf` and `hidden` are all of the branch, and where stability changes unseen, as `onsets` returns them.
+    Runs are from near the steady state (start 0) and from the large start (1). Of a load [N m] `lowest`
+    returns the lowest frequency of a mode that its runs are judged by [Hz], `in_words` the words.
     """
     if not runs:
         return Criticality(Kind.UNDECIDED, np.nan, np.nan, "no runs were asked for")

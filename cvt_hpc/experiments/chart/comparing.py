@@ -17,31 +17,18 @@ _OF_ONE_STRAND = ("frequency", "growth_rate")  # judged on the strand that vibra
 
 @dataclass(frozen=True)
 class Result:
-    """A point with its errors.
-
-    Attributes
-    ----------
-    point : Point
-        The measured point.
-    measurement : Measurement
-        Its result.
-    errors : dict
-        Error by quantity; nan where it was not measured or has no meaning, inf where the run lacks the
-        reference has (a frequency, an onset). That of a reference is its own estimated error.
-    values : dict
-        Pooled value by quantity [SI], that of the stronger strand where there are two; none of a trajectory.
-    below : frozenset of str
-        Quantities whose error is below the reference's own: the true error is only known to be below that.
-    chosen : bool
-        Whether this is the cheapest point of its scene that meets all tolerances.
-    """
+    """A point with its errors."""
 
     point: Point
     measurement: Measurement
+    # by quantity; nan where it was not measured or has no meaning, inf where the run lacks what the reference
+    # has (a frequency, an onset). That of a reference is its own estimated error.
     errors: dict[str, float]
+    # pooled value by quantity [SI], that of the stronger strand where there are two; none of a trajectory
     values: dict[str, float]
+    # quantities whose error is below the reference's own: the true error is only known to be below that
     below: frozenset[str] = frozenset()
-    chosen: bool = False
+    chosen: bool = False  # whether this is the cheapest point of its scene that meets all tolerances
 
 
 @dataclass(frozen=True)
@@ -66,13 +53,7 @@ class Comparison:
 
 
 def compare(chart: Chart, measurements: Mapping[str, Measurement]) -> tuple[Comparison, ...]:
-    """Return the results of all scenes.
-
-    Parameters
-    ----------
-    measurements : mapping
-        By the name of the point.
-    """
+    """Return the results of all scenes, from measurements by the name of the point."""
     return tuple(_compare_scene(chart, scene, measurements) for scene in chart.scenes)
 
 
@@ -136,15 +117,7 @@ def _own_errors(
 def error(quantity: Quantity, measurement: Measurement, reference: Measurement) -> float:
     """Return the error of a quantity, relative to its scale or to the reference.
 
-    Parameters
-    ----------
-    measurement, reference : Measurement
-        The measurement to judge, and its reference.
-
-    Returns
-    -------
-    float
-        nan where either does not have it; inf where the reference has a value and the measurement none.
+    It is nan where either does not have it; inf where the reference has a value and the measurement none.
     """
     name = quantity.name
     if name not in measurement.values or name not in reference.values:
@@ -183,16 +156,9 @@ def pool(name: str, values: Array) -> Array:
 
 
 def choose(scene: Scene, own: Mapping[str, float], results: list[Result]) -> tuple[list[Result], str]:
-    """Mark the cheapest point that meets every tolerance, and describe the choice in words.
+    """Mark the cheapest of the methods' points that meets every tolerance, and describe the choice in words.
 
-    Parameters
-    ----------
-    scene : Scene
-        With the tolerances.
-    own : mapping
-        Error of the reference by quantity: a tolerance below it cannot be judged.
-    results : list of Result
-        The methods' points.
+    `own` is the error of the reference by quantity: a tolerance below it cannot be judged.
     """
     asked = {q.name: q.tolerance for q in scene.quantities if math.isfinite(q.tolerance)}
     if not asked:

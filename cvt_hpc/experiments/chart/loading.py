@@ -32,19 +32,9 @@ _COUNTED = ("elements", "ring_beams")  # a mesh outside of [mesh]
 
 
 def load(path: str | Path, overrides: Assignments = ()) -> Chart:
-    """Read and validate a chart job.
+    """Read and validate a chart job, and build and check every run.
 
-    Parameters
-    ----------
-    path : str or Path
-        A TOML file: a job with a table [chart].
-    overrides : mapping, or sequence of "KEY=VALUE"
-        Values that replace those of the job and of all its scenes.
-
-    Returns
-    -------
-    Chart
-        With every run built and checked.
+    It is a TOML file: a job with a table [chart]. Overrides replace values of the job and of all its scenes.
 
     Raises
     ------

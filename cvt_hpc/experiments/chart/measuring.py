@@ -73,10 +73,8 @@ def march(
 
     Parameters
     ----------
-    job : Job
-        With their model and stepper.
-    points : sequence of dict
-        Flat parameters of each run [SI]; those of a group may differ as the model's batches allow.
+    job, points : Job, sequence of dict
+        With the model and stepper of the runs; flat parameters of each [SI], of one group as batches allow.
     lanes : int
         Runs of a group.
     until : float
@@ -130,15 +128,7 @@ class Measurement:
 
 
 def measure(point: Point, scene: Scene, repeats: int, time_limit: float) -> Measurement:
-    """Measure a point.
-
-    Parameters
-    ----------
-    repeats : int
-        How often a quick run is timed.
-    time_limit : float
-        Core-seconds after which a run is given up [s].
-    """
+    """Measure a point; a quick run is timed `repeats` times, a run beyond the core-seconds given up."""
     if scene.exact and point.series == "exact":
         return _exact(point, scene)
     job, lanes = point.job, _lanes_of(point)

@@ -183,13 +183,7 @@ def strand_of(label: str) -> str | None:
 
 
 def observe(history: History, quantities: Sequence[Quantity], whole: bool) -> dict[str, Array]:
-    """Return the values of a run by quantity.
-
-    Parameters
-    ----------
-    whole : bool
-        Whether the run went to its end; of a shorter one only the trajectory counts.
-    """
+    """Return the values of a run by quantity; of one that is not `whole` only the trajectory counts."""
     asked = [quantity for quantity in quantities if whole or quantity.name == "trajectory"]
     values = {quantity.name: KINDS[quantity.name].values(history, quantity) for quantity in asked}
     # amplitudes determine the judged strand, whether they are requested or not

@@ -119,16 +119,8 @@ class Stage:
 def read_stage(name: str, raw: Any, document: dict[str, Any], replaced: dict[str, Any], source: str) -> Stage:
     """Return a scene as its table in a chart job describes it.
 
-    Parameters
-    ----------
-    name : str
-        Of the scene.
-    raw : Any
-        Its table.
-    document : dict
-        The job file without the chart.
-    replaced : dict
-        Values from the command line, which take precedence over those of the scene.
+    `document` is the job file without the chart; values `replaced` from the command line take precedence over
+    those of the scene.
 
     Raises
     ------

@@ -24,13 +24,7 @@ _NOT_RUN: dict[str, Any] = {"class": OccurrenceClass.NOT_RUN, "counted": False}
 
 
 class Stopped(Exception):
-    """A study of a fit was stopped early; the same command continues it.
-
-    Attributes
-    ----------
-    status : int
-        Exit status.
-    """
+    """A study of a fit was stopped early, with an exit status; the same command continues it."""
 
     def __init__(self, status: int) -> None:
         super().__init__("stopped early")
@@ -47,21 +41,10 @@ class Findings(NamedTuple):
 
 
 class Evaluation:
-    """The studies of a fit, each in a folder of its own below one folder; the same on all ranks.
+    """Studies of a fit, each in a folder of its own below one folder; the same on all ranks.
 
-    Parameters
-    ----------
-    fit : Fit
-        The requested fit.
-    out : Path
-        Their folder.
-    fresh : bool
-        Remove the results of earlier studies in a folder instead of continuing from them.
-
-    Attributes
-    ----------
-    runs, core_seconds : int, float
-        Of all studies so far, those of earlier starts included.
+    A `fresh` one removes the results of earlier studies in a folder instead of continuing from them. `runs`
+    and `core_seconds` are those of all studies so far, those of earlier starts included.
     """
 
     def __init__(self, fit: Fit, out: Path, *, fresh: bool = False) -> None:
@@ -89,7 +72,7 @@ class Evaluation:
         values : (runs,) array
             Of the swept parameter.
         cases : sequence of str
-            The candidates that are run; all by default. With fewer there are courses and no scores.
+            Names of the cases that are run; all by default. With fewer there are courses and no scores.
 
         Raises
         ------
@@ -143,19 +126,9 @@ def study_of(
 ) -> tuple[Job, NDArray[np.bool_]]:
     """Return the study of candidates: for each of them, each case and each value a run, the last one fastest.
 
-    Without the runs that the model refuses, as under more torque than any belt carries: they do not count.
-
-    Parameters
-    ----------
-    fit, name, scenes, settings, values
-        As `Evaluation.evaluate` takes them.
-    cases : mapping
-        The candidates that are run.
-
-    Returns
-    -------
-    Job, (candidates, case, value) array
-        The study, and which runs it has.
+    And which runs it has, (candidates, case, value): none that the model refuses, as under more torque than
+    any belt carries. They do not count. Arguments are those of `Evaluation.evaluate`, but for the cases by
+    name.
     """
     own = {key: fit.job.parameters[key] for case in cases.values() for key in (*case.set, *case.factor)}
     base = {**own, **dict(zip((one.name for one in fit.free), scenes.T, strict=True))}

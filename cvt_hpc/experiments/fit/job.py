@@ -209,43 +209,19 @@ class Case(NamedTuple):
 
 @dataclass(frozen=True)
 class Fit:
-    """The content of a fit job.
+    """The content of a fit job; numbers not described here are as `NUMBERS` declares them."""
 
-    Attributes
-    ----------
-    job : Job
-        The scene of all runs, without axes.
-    free : tuple of Free
-        The requested fit.
-    along : str
-        The swept parameter.
-    values : (runs,) array
-        Its values in full [SI].
-    cases : dict
-        By name, in the job's order; the first one is the belt as it is.
-    targets : tuple of Target
-        The targets to be met.
-    starts : (starts, free) array
-        Shares of the ranges at which the search begins, beside its samples.
-    coarse : dict
-        Settings of the runs of search and sensitivities, as the job has them.
-    repeat : dict
-        A key and its values, for each of which a set is confirmed; empty for once.
-    counted : dict
-        By quantity, the values between which the motion of a run counts [SI].
-    screened, population, generations, seed, every, confirmed, accepted, around, distances, nearby, samples
-        As `NUMBERS` declares them.
-    """
-
-    job: Job
+    job: Job  # the scene of all runs, without axes
     free: tuple[Free, ...]
-    along: str
-    values: NDArray[np.float64]
-    cases: dict[str, Case]
-    targets: tuple[Target, ...]
+    along: str  # the swept parameter
+    values: NDArray[np.float64]  # its values in full [SI], (runs,)
+    cases: dict[str, Case]  # by name, in the job's order; the first one is the belt as it is
+    targets: tuple[Target, ...]  # to be met
+    # (starts, free): shares of the ranges at which the search begins, beside its samples
     starts: NDArray[np.float64]
-    coarse: dict[str, Any]
-    repeat: dict[str, tuple]
+    coarse: dict[str, Any]  # settings of the runs of search and sensitivities, as the job has them
+    repeat: dict[str, tuple]  # a key and its values, for each of which a set is confirmed; empty for once
+    # by quantity, the values between which the motion of a run counts [SI]
     counted: dict[str, tuple[float, float]]
     screened: int
     population: int

@@ -32,12 +32,8 @@ _TABLES = ("along", "starts", "coarse", "repeat", "counted", "cases", "targets")
 def load(path: str | Path, overrides: Assignments = ()) -> Fit:
     """Read and validate a job of a fit.
 
-    Parameters
-    ----------
-    path : str or Path
-        A TOML file: a job whose [axes] are the ranges of the free parameters, with a table [fit].
-    overrides : mapping, or sequence of "KEY=VALUE"
-        As `load_job` takes them; fit.KEY replaces a number, or the list of factors, of the table [fit].
+    It is a TOML file: a job whose [axes] are the ranges of the free parameters, with a table [fit]. Overrides
+    are as of `load_job`; fit.KEY replaces a number, or the list of factors, of the table [fit].
 
     Raises
     ------

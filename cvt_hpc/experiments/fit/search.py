@@ -44,14 +44,9 @@ class Found(NamedTuple):
 
 
 def search(fit: Fit, evaluate: Evaluate, tell: Callable[[str], None] = lambda line: None) -> Found:
-    """Look for the parameters that meet the targets best.
+    """Look for the parameters that meet the targets best, and tell a line after each study.
 
-    Parameters
-    ----------
-    evaluate : callable
-        Given the name of a study and the scenes of its candidates, shape (candidates, free) [SI].
-    tell : callable
-        Given a line after each study.
+    `evaluate` takes the name of a study and the scenes of its candidates, (candidates, free) [SI].
     """
     known: dict[tuple[float, ...], tuple[str, NDArray, NDArray, float]] = {}
 
@@ -128,10 +123,7 @@ class Confirmed:
 def confirm(fit: Fit, evaluation: Evaluation, found: Found) -> list[Confirmed]:
     """Run the best candidates and the job's own starts in full, as often as requested; the best one first.
 
-    Parameters
-    ----------
-    found : Found
-        The candidates of the search, the starts before all others.
+    The candidates of the search have the starts before all others.
     """
     starts = len(fit.starts)
     chosen = list(dict.fromkeys([*range(starts), *found.best(fit.confirmed).tolist()]))
@@ -202,10 +194,7 @@ class Around(NamedTuple):
 def look_around(fit: Fit, evaluation: Evaluation, confirmed: Sequence[Confirmed]) -> list[Around]:
     """Examine the surroundings of the best set and, if requested, of each start of the job; the best first.
 
-    Parameters
-    ----------
-    confirmed : sequence of Confirmed
-        The best one first; the starts are among them.
+    The starts are among the confirmed ones.
     """
     best, *others = confirmed
     chosen = [best, *(one for one in others if fit.around == "starts" and one.is_start)]

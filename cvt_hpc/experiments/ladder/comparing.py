@@ -52,17 +52,10 @@ class Finding(NamedTuple):
 def compare(rungs: Sequence[Sweep], results: Mapping[str, xr.Dataset]) -> Iterator[Finding]:
     """Yield the score of each model for each question that it answers, the reference last.
 
-    The reference's own error is taken as large as the distance of the model before it, which is a
-    refined one. Of the elastic belt it would be 0.8 of that if all errors were of second order in mesh and
-    step, and twice as much if of the first; of the pushbelt a third, and as much. No onset is known more
-    closely than half a step of the load.
-
-    Parameters
-    ----------
-    rungs : sequence of Rung
-        As `ladder` returns them, the reference last.
-    results : mapping
-        Results of each model, by its name.
+    The reference's own error is taken as large as the distance of the model before it, which is a refined
+    one. Of the elastic belt it would be 0.8 of that if all errors were of second order in mesh and step, and
+    twice as much if of the first; of the pushbelt a third, and as much. No onset is known more closely than
+    half a step of the load. Rungs are as `ladder` returns them, results by the model's name.
     """
     reference = results[REFERENCE]
     costs = {name: float(dataset["core_seconds"].mean()) for name, dataset in results.items()}

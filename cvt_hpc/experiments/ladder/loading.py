@@ -61,7 +61,10 @@ _AS_PLANAR = {"driving_loose_side": "both", "driven_loose_side": "both"}
 def ladder(
     job: Job, pushbelt: Mapping[str, Any] | None = None, beside: str = NONE
 ) -> tuple[tuple[Sweep, ...], dict[str, str]]:
-    """Return the models of a job's ladder, and why others refuse it.
+    """Return the models of a job's ladder, and why others refuse it, by the name of the model.
+
+    From the cheapest up, then a requested continuous model, the job itself, a requested spatial pushbelt, the
+    pushbelt of the reference, the reference last. The reference is the model before it, refined.
 
     Parameters
     ----------
@@ -71,14 +74,6 @@ def ladder(
         Further keys of the pushbelt, as `pushbelt_jobs` takes them: the reference is a pushbelt then.
     beside : str
         A requested entry of BESIDE, or NONE. SPATIAL is the pushbelt below the reference, out of its plane.
-
-    Returns
-    -------
-    rungs : tuple of Sweep
-        From the cheapest up, then a requested continuous model, the job itself, a requested spatial pushbelt,
-        the pushbelt of the reference, the reference last. The reference is the model before it, refined.
-    refusals : dict
-        The reason, by the name of the model.
 
     Raises
     ------
@@ -228,13 +223,9 @@ class Ladder(NamedTuple):
 def load(path: str | Path, overrides: Assignments = ()) -> Ladder:
     """Read and validate a job, and return its ladder.
 
-    Parameters
-    ----------
-    path : str or Path
-        A TOML file. Its table [ladder] may have `beside`, one of BESIDE, and `reference`, elastic_belt
-        or pushbelt, for the pushbelt with `set`, a table of its further keys.
-    overrides : mapping, or sequence of "KEY=VALUE"
-        As `load_job` takes them; ladder.KEY replaces a key of the table.
+    The table [ladder] of the TOML file may have `beside`, one of BESIDE, and `reference`, elastic_belt or
+    pushbelt, for the pushbelt with `set`, a table of its further keys. Overrides are as of `load_job`;
+    ladder.KEY replaces a key of the table.
 
     Raises
     ------

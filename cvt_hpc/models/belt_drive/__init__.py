@@ -138,18 +138,7 @@ __all__ = ["COMPARED", "DEFAULT_STEPPER", "KICK", "PARAMETERS", "REFUSED", "STEP
 
 
 def check(parameters: Parameters) -> list[tuple[str, str, str]]:
-    """Problems that lie between parameters.
-
-    Parameters
-    ----------
-    parameters : dict
-        Values by name, in SI units.
-
-    Returns
-    -------
-    list of (key, expected, found)
-        Empty where all is well.
-    """
+    """Problems that lie between parameters [SI]: (key, expected, found) of each."""
     p = parameters
     problems = layout_problems(p) or _beside_lists(p)
     if problems:
@@ -188,13 +177,7 @@ def _beside_lists(p: Parameters) -> list[tuple[str, str, str]]:
 
 
 def inert(parameters: Parameters) -> dict[str, str]:
-    """Parameters without effect on a run, each with the setting that makes it so.
-
-    Parameters
-    ----------
-    parameters : mapping
-        Values by name, in SI units.
-    """
+    """Parameters without effect on a run, each with the setting that makes it so."""
     found = {"arc_probes": "model belt_drive, which is probed on its strands"}
     if parameters["length_scatter"] == 0.0:
         found["seed"] = "length_scatter 0"

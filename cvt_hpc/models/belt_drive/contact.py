@@ -76,27 +76,10 @@ def add_contacts(
     tau: float,
     is_known: bool,
 ) -> bool:
-    """Add the forces of contacts, and their slopes, to the equations of a stage.
+    """Add the forces of contacts, and their slopes, to the equations of a stage of `tau` [s].
 
-    Parameters
-    ----------
-    contact, touch : Contact, Touch
-        The contacts, with their state.
-    lengths : (k,) array
-        Of the elements [m].
-    chain : Chain
-        The belt.
-    pulleys, wheels : Pulleys, Wheels
-        The pulleys that it runs around.
-    tau : float
-        [s]
-    is_known : bool
-        Whether `touch` is of an iterate of this stage.
-
-    Returns
-    -------
-    bool
-        Whether the laws of friction held in that iterate.
+    The belt has elements of `lengths` [m]. `is_known` tells whether `touch`, the state of the contacts, is of
+    an iterate of this stage. Returns whether the laws of friction held in that iterate.
     """
     q, u, n = chain.stage_q, chain.stage_v, chain.q.shape[0]
     blocks, columns, rows, corner = chain.blocks.data, chain.columns.data, wheels.rows, wheels.corner.data[0]

@@ -59,13 +59,7 @@ def load(parameters: Parameters, time: float) -> float:
 
 
 def course_problems(parameters: Parameters) -> list[tuple[str, str, str]]:
-    """Problems of courses, in the form of a model's check: (key, expected, found).
-
-    Parameters
-    ----------
-    parameters : mapping
-        Values by name [SI].
-    """
+    """Problems of courses, in the form of a model's check: (key, expected, found)."""
     p = parameters
     times, profiles = p["profile_time"], [f"{name}_profile" for name in PROFILED if p[f"{name}_profile"]]
     if found := nested_problems(p, ("profile_time", *profiles)):

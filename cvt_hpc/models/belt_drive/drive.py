@@ -69,18 +69,10 @@ class State(NamedTuple):
 def state(
     drive: Drive, q: np.ndarray, v: np.ndarray, speeds: np.ndarray, angles: np.ndarray | None = None
 ) -> State:
-    """Begin a motion.
+    """Begin a motion of a drive.
 
-    Parameters
-    ----------
-    drive : Drive
-        The moving parts.
-    q, v : (n, 4) arrays
-        Positions [m, 1] and speeds [m/s, 1/s] of the belt.
-    speeds : (P,) array
-        Of the pulleys [rad/s].
-    angles : (A,) array, optional
-        Of the arms [rad]; by default as drawn.
+    With positions [m, 1] and speeds [m/s, 1/s] of the belt, (n, 4) each, speeds of the pulleys, (P,) [rad/s],
+    and angles of the arms, (A,) [rad]; by default as drawn.
     """
     count, n = len(speeds), len(q)
     turning = rotating.wheels_at(
@@ -106,30 +98,17 @@ def advance(
     tolerance: float,
     most: int,
 ) -> bool:
-    """Advance by some steps.
+    """Advance by some steps of `dt` [s], by a scheme; return whether the state is of numbers.
 
     Parameters
     ----------
-    drive, state : Drive, State
-        The moving parts, and their motion.
-    scheme : Scheme
-        Of the step.
     inputs : (2, P) array
         At the begin and at the end of all steps, linear between: speed of the first pulley [rad/s], and
         torques that act on the others [N m].
-    dt : float
-        Step [s].
-    steps : int
-        How many.
     tolerance : float
         Largest correction of a speed of the belt with which a stage counts as solved [m/s].
     most : int
         Corrections of a stage; after them it is counted as not solved, and the step is taken.
-
-    Returns
-    -------
-    bool
-        Whether the state is of numbers.
     """
     belt, wheels, tau = state.chain, state.wheels, stage_length(scheme, dt)
     friction, memory = drive.contact.friction, state.touch.memory
@@ -180,20 +159,7 @@ def advance(
 
 
 def drive_frequencies(drive: Drive, state: State, count: int) -> np.ndarray:
-    """Lowest frequencies of a drive about its state.
-
-    Parameters
-    ----------
-    drive, state : Drive, State
-        The moving parts, and their places.
-    count : int
-        How many.
-
-    Returns
-    -------
-    (count,) array
-        Ascending [Hz]; nan where fewer are found.
-    """
+    """Lowest frequencies of a drive about its state, (count,) ascending [Hz]; nan where fewer are found."""
     mass, stiffness = matrices(drive, state)
     # a shift below all: the belt that runs around has 0
     shift = -((2.0 * np.pi * LOWEST) ** 2)

@@ -66,34 +66,20 @@ class Friction(NamedTuple):
 
 
 class Memory(NamedTuple):
-    """State of the friction in the contacts of P pulleys with k elements of C points.
+    """State of the friction in the contacts of P pulleys with k elements of C points."""
 
-    Attributes
-    ----------
-    slip : (P, k, C) array
-        Sliding speed of the last iterate [m/s].
-    dual : (P, k, C) array
-        Regularised: dual of the slip's direction [1]. Set-valued: friction force per length [N/m].
-    side : (P, k, C) int array
-        0 of contacts that stick, 1 or -1 of those that slide.
-    shear, shear_rate, shear_start, shear_stage : (P, k C) arrays
-        Of bristles, after the last step [m], [m/s], at the start of a stage, and in it [m].
-    pivots : (4,) int array
-        Contacts that were WRONG in the last iterate, and those that stuck but were not yet still (LOOSE); the
-        FEWEST wrong ones in an iterate of this stage, and how many iterates are LEFT to have fewer.
-    grip : (1,) array
-        Of this iterate [N s/m^2].
-    """
-
-    slip: np.ndarray
+    slip: np.ndarray  # sliding speed of the last iterate, (P, k, C) [m/s]
+    # (P, k, C). Regularised: dual of the slip's direction [1]. Set-valued: friction force per length [N/m].
     dual: np.ndarray
-    side: np.ndarray
-    shear: np.ndarray
-    shear_rate: np.ndarray
-    shear_start: np.ndarray
-    shear_stage: np.ndarray
+    side: np.ndarray  # 0 of contacts that stick, 1 or -1 of those that slide, (P, k, C)
+    shear: np.ndarray  # of bristles, after the last step, (P, k C) [m]
+    shear_rate: np.ndarray  # after the last step, (P, k C) [m/s]
+    shear_start: np.ndarray  # at the start of a stage, (P, k C) [m]
+    shear_stage: np.ndarray  # in it, (P, k C) [m]
+    # contacts that were WRONG in the last iterate, and those that stuck but were not yet still (LOOSE); the
+    # FEWEST wrong ones in an iterate of this stage, and how many iterates are LEFT to have fewer
     pivots: np.ndarray
-    grip: np.ndarray
+    grip: np.ndarray  # of this iterate, (1,) [N s/m^2]
 
 
 def empty_memory(pulleys: int, elements: int, points: int) -> Memory:
@@ -144,22 +130,10 @@ def rub(
     tau: float,
     is_known: bool,
 ) -> Rub:
-    """Friction of one contact in an iterate of a stage.
+    """Friction of one contact in an iterate of a stage of `tau` [s]: of pulley p, element i and point c.
 
-    Parameters
-    ----------
-    friction, memory : Friction, Memory
-        The treatment, and its state.
-    p, i, c : int
-        Pulley, element and point.
-    slip : float
-        Sliding speed of the belt over the pulley [m/s].
-    pressure : float
-        Normal force per length, above 0 [N/m].
-    tau : float
-        Of the stage [s].
-    is_known : bool
-        Whether `memory` is of an iterate of this stage.
+    The belt slides over the pulley by `slip` [m/s], under a normal force per length above 0 [N/m]. `is_known`
+    tells whether `memory` is of an iterate of this stage.
     """
     if friction.treatment == Treatment.REGULARISED:
         found = _rub_smoothly(friction, memory, p, i, c, slip, pressure, is_known)

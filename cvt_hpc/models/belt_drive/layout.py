@@ -103,26 +103,14 @@ _ARM_LISTS = tuple(
 
 
 class Layout(NamedTuple):
-    """Pulleys as drawn, and the belt's path around them.
+    """Pulleys as drawn, and the belt's path around them."""
 
-    Attributes
-    ----------
-    path : BeltPath
-        The reference path.
-    pulleys, spans : (P,) tuples of str
-        Names; a span is behind its pulley.
-    inertia, load : (P,) arrays
-        [kg m^2]; torque that brakes a pulley over the load.
-    driven : int
-        The pulley that takes most of the load.
-    """
-
-    path: BeltPath
-    pulleys: tuple[str, ...]
-    spans: tuple[str, ...]
-    inertia: np.ndarray
-    load: np.ndarray
-    driven: int
+    path: BeltPath  # the reference path
+    pulleys: tuple[str, ...]  # names, (P,)
+    spans: tuple[str, ...]  # names, (P,); a span is behind its pulley
+    inertia: np.ndarray  # (P,) [kg m^2]
+    load: np.ndarray  # torque that brakes a pulley over the load, (P,)
+    driven: int  # the pulley that takes most of the load
 
     @property
     def ratio(self) -> float:
@@ -131,13 +119,7 @@ class Layout(NamedTuple):
 
 
 def layout(parameters: Mapping[str, Any]) -> Layout:
-    """Layout of a drive.
-
-    Parameters
-    ----------
-    parameters : mapping
-        Values by name [SI], without problems.
-    """
+    """Layout of a drive, from values by name [SI] without problems."""
     p = parameters
     if not p["pulley_x"]:
         centre = np.array([[0.0, 0.0], [p["centre_distance"], 0.0]])
@@ -177,13 +159,7 @@ def pulleys_of(parameters: Mapping[str, Any], drawn: Layout) -> Pulleys:
 
 
 def layout_problems(parameters: Mapping[str, Any]) -> list[Problem]:
-    """Problems of a layout, in the form of a model's check: (key, expected, found).
-
-    Parameters
-    ----------
-    parameters : mapping
-        Values by name [SI].
-    """
+    """Problems of a layout, in the form of a model's check: (key, expected, found)."""
     p = parameters
     found = (
         _list_problems(p, PULLEY_LISTS) if any(p[key] for key in PULLEY_LISTS) else variator_problems(dict(p))

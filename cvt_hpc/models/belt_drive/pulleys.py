@@ -52,25 +52,13 @@ class Arms(NamedTuple):
 
 
 class Pulleys(NamedTuple):
-    """Constants of P pulleys, the first of which has a prescribed speed.
+    """Constants of P pulleys, the first of which has a prescribed speed."""
 
-    Attributes
-    ----------
-    centre : (P, 2) array
-        Axes as drawn [m].
-    radius, inertia : (P,) arrays
-        [m], [kg m^2]; the inertia of the first is not read.
-    arm : (P,) int array
-        Which of the arms carries a pulley, or -1.
-    arms : Arms
-        Of tensioners.
-    """
-
-    centre: np.ndarray
-    radius: np.ndarray
-    inertia: np.ndarray
-    arm: np.ndarray
-    arms: Arms
+    centre: np.ndarray  # axes as drawn, (P, 2) [m]
+    radius: np.ndarray  # (P,) [m]
+    inertia: np.ndarray  # (P,) [kg m^2]; that of the first is not read
+    arm: np.ndarray  # which of the arms carries a pulley, or -1, (P,)
+    arms: Arms  # of tensioners
 
 
 class Wheels(NamedTuple):
@@ -197,16 +185,8 @@ def finish_wheels(pulleys: Pulleys, wheels: Wheels, scheme: Scheme, dt: float) -
 def add_pulleys(pulleys: Pulleys, wheels: Wheels, inputs: np.ndarray, share: float, tau: float) -> None:
     """Put the inertia of pulleys and arms, and the loads on them beside the belt, into the border.
 
-    Parameters
-    ----------
-    pulleys, wheels : Pulleys, Wheels
-        The rotating parts, and their motion.
-    inputs : (2, P) array
-        Speed of the first pulley [rad/s] and torques on the others [N m], at the begin and the end of steps.
-    share : float
-        Where between both.
-    tau : float
-        [s]
+    `inputs`, (2, P), are the speed of the first pulley [rad/s] and torques on the others [N m], at the begin
+    and the end of steps; `share` is the place between both. The stage is of `tau` [s].
     """
     wheels.rows[:] = 0.0
     wheels.corner.data[:] = 0.0

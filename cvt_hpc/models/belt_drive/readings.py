@@ -39,23 +39,8 @@ def scalars_of(drawn: Layout, arms: int) -> tuple[str, ...]:
 class Readings:
     """Places at which displacement and forces of a run are read.
 
-    Parameters
-    ----------
-    parameters : mapping
-        Resolved parameters of the run [SI].
-    drawn : Layout
-        Its pulleys.
-
-    Attributes
-    ----------
-    drawn : Layout
-        With the reference path.
-    belt_speed : float
-        Of the driving pulley's rim at the speed that the job gives [m/s].
-    probes : (P, p) array
-        Path coordinates on the strands [m].
-    places : (PLACES,) array
-        Path coordinates of profiles [m].
+    `belt_speed` is that of the driving pulley's rim at the speed that the job gives [m/s]. Path coordinates
+    [m]: `probes`, (P, p), on the strands, and `places`, (PLACES,), of profiles.
     """
 
     def __init__(self, parameters: Mapping[str, Any], drawn: Layout) -> None:
@@ -90,14 +75,8 @@ class Readings:
 class Reading:
     """Readings of one sample, until the next one.
 
-    Parameters
-    ----------
-    where : Readings
-        Where it is read.
-    drive, state : Drive, State
-        The moving parts, and their motion.
-    sums : (6, PLACES) array, optional
-        To which profiles are added: length, tension and offset by it, forces, and samples at each place.
+    To `sums`, (6, PLACES), profiles are added: length, tension and offset by it, forces, and samples at each
+    place.
 
     Attributes
     ----------
@@ -179,23 +158,11 @@ def read(
     sample: Sample,
     sums: np.ndarray,
 ) -> None:
-    """Read a sample.
+    """Read a sample into `line` and `sample`.
 
-    Parameters
-    ----------
-    beam, chain : AncfBeam, Chain
-        The belt, and its motion.
-    contact, touch : Contact, Touch
-        Its contacts.
-    slopes : (C, 4) array
-        Derivatives of the shapes at the contact points.
-    probes : (p,) array
-        Path coordinates [m].
-    line, sample : Line, Sample
-        The readings.
-    sums : (6, place) array
-        To which profiles are added at equal shares of the path: length, tension and offset by it, normal
-        force and force forwards per length, samples; none at no places.
+    `slopes`, (C, 4), are derivatives of the shapes at the contact points, `probes`, (p,), path coordinates
+    [m]. To `sums`, (6, place), profiles are added at equal shares of the path: length, tension and offset by
+    it, normal force and force forwards per length, samples; none at no places.
     """
     _locate(way, beam, chain.q, line)
     _displace(line, probes, way.length, sample.displacement)

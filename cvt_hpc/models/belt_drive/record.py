@@ -174,13 +174,7 @@ VARIABLES = (
 
 
 def coordinates(parameters: Mapping[str, Any]) -> dict[str, Coordinate]:
-    """Coordinates of the record's dimensions.
-
-    Parameters
-    ----------
-    parameters : dict
-        Flat parameters of the job.
-    """
+    """Coordinates of the record's dimensions, by flat parameters of the job."""
     drawn = layout(parameters)
     driving, driven = drawn.pulleys[0], drawn.pulleys[drawn.driven]
     roles = (
@@ -212,10 +206,7 @@ def cost(parameters: Mapping[str, Any], stepper: str) -> Any:
 def judge(run: Transient) -> dict[str, Any]:
     """The record of a run that has reached its end, or lost its grip before, its cost apart.
 
-    Parameters
-    ----------
-    run : Transient
-        With all samples recorded, or those until it slipped through or the belt left a pulley.
+    All samples are recorded, or those until it slipped through or the belt left a pulley.
     """
     if run.failure is not None:
         early = (variable for variable in VARIABLES if variable.early)
@@ -224,17 +215,9 @@ def judge(run: Transient) -> dict[str, Any]:
 
 
 def histories(run: Transient) -> xr.Dataset:
-    """Histories over `time` and means by `position` of a run, finished or failed.
+    """Histories over `time` and means by `position` of a run, finished or failed, as far as it has samples.
 
-    Parameters
-    ----------
-    run : Transient
-        With the samples that it has.
-
-    Returns
-    -------
-    Dataset
-        `displacement` (time, probe) [m], scalars over time, profiles of the judged part by `position`.
+    `displacement` (time, probe) [m], scalars over time, profiles of the judged part by `position`.
     """
     from cvt_hpc.models.belt_drive.readings import PROFILES
 

@@ -38,21 +38,9 @@ HELD = 1e12  # [kg m^2]: an arm that stays where it is drawn
 def start(
     parameters: Mapping[str, Any], drawn: Layout, tension_of: Callable[[Drive, State], float]
 ) -> tuple[Drive, State, bool]:
-    """Constants and first state of a run.
+    """Constants and first state of a run, whose parts move as if nothing slid; whether equilibria were found.
 
-    Parameters
-    ----------
-    parameters : mapping
-        Flat parameters of a run [SI].
-    drawn : Layout
-        Its pulleys.
-    tension_of : callable
-        Mean tension of all strands [N], from a drive and its state.
-
-    Returns
-    -------
-    (Drive, State, bool)
-        Belt and pulleys, which move as if nothing slid, and whether equilibria were found.
+    Flat parameters are [SI]; `tension_of` a drive and its state is the mean tension of all strands [N].
     """
     p, path = parameters, drawn.path
     of_contacts = contact_compliance(path, p["contact_stiffness"]) / path.path_length
@@ -115,7 +103,7 @@ def _shares(drive: Drive) -> np.ndarray:
 
 
 def _laid(drive: Drive, drawn: Layout) -> State:
-    """At rest along the path, evenly stretched."""
+    """State at rest along the path, evenly stretched."""
     path = drawn.path
     points, angle, _ = points_at(path, _shares(drive) * path.path_length)
     along = path.path_length / drive.beam.lengths.sum() * np.stack([np.cos(angle), np.sin(angle)], 1)

@@ -31,18 +31,8 @@ SHAKEN = 0.02
 def creep_loss(parameters: Parameters, drawn: Layout) -> float:
     """Speed loss by creep alone, by tension at rest and torque at the end (Cepon and Boltezar 2011, eq. 4).
 
-    Parameters
-    ----------
-    parameters : mapping
-        Flat parameters of a run [SI].
-    drawn : Layout
-        Its pulleys.
-
-    Returns
-    -------
-    float
-        1 - (2 T0 R + 2 R EA - M) / (2 T0 R + 2 R EA + M), with the radius of the driving pulley and its
-        torque without losses; nan of more than two pulleys.
+    1 - (2 T0 R + 2 R EA - M) / (2 T0 R + 2 R EA + M), with the radius of the driving pulley and its torque
+    without losses; nan of more than two pulleys.
     """
     p = parameters
     if len(drawn.pulleys) > 2:
@@ -53,18 +43,11 @@ def creep_loss(parameters: Parameters, drawn: Layout) -> float:
 
 
 def expected_loss(parameters: Parameters, drawn: Layout, tension: np.ndarray) -> float:
-    """Speed loss by creep, radial compliance and shear of bristles, from the tensions of a run.
+    """Speed loss by creep, radial compliance and shear of bristles, from the strands' tensions [N].
 
-    The belt sticks where it runs onto a pulley. The rubber under its cord turns with the pulley, so that
-    w (R - depth) / stretch is the same on all, with depth = (T - m v^2) / (R k) and the tension T of the
-    strand that runs on; where bristles shear, with that of `unsheared_tension`.
-
-    Parameters
-    ----------
-    parameters, drawn
-        As of `creep_loss`.
-    tension : (P,) array
-        Of the strands [N].
+    The belt sticks where it runs onto a pulley. The rubber under its cord turns with the pulley, so that w (R
+    - depth) / stretch is the same on all, with depth = (T - m v^2) / (R k) and the tension T of the strand
+    that runs on; where bristles shear, with that of `unsheared_tension`.
     """
     p, radius = parameters, drawn.path.radius
     running_on, inertial = np.roll(tension, 1), centrifugal(p, drawn.path)
@@ -86,7 +69,7 @@ def expected_loss(parameters: Parameters, drawn: Layout, tension: np.ndarray) ->
 def unsheared_tension(
     parameters: Parameters, inlet: float, outlet: float, radius: float, wrap: float
 ) -> float:
-    """Tension at which a belt of the same speed would run onto a pulley without shearing its rubber.
+    """Tension at which a belt of the same speed would run onto a pulley without shearing its rubber: N_c [N].
 
     Of N = T - m v^2 along the arc: dN/ds = q = shear_stiffness z and dz/ds = (N - N_c) C, where N_c is what
     is sought and C = 1 / EA + 1 / (R^2 k) of belt and contacts. From z = 0 at the inlet on
@@ -96,20 +79,8 @@ def unsheared_tension(
     up to where |q| = mu N / R, beyond which the rim slides, as by Euler and Eytelwein (Firbank 1970; the
     contacts' compliance acts as the belt's own).
 
-    Parameters
-    ----------
-    parameters : mapping
-        Flat parameters of a run [SI].
-    inlet, outlet : float
-        T - m v^2 where the belt runs on and off [N].
-    radius, wrap : float
-        Of the pulley and its arc [m], [rad].
-
-    Returns
-    -------
-    float
-        N_c [N]; nan where friction cannot carry the difference, its coefficient is not constant, or a strand
-        does not press the belt on.
+    With N at inlet and outlet [N], radius [m] and angle of the wrap [rad]. It is nan where friction cannot
+    carry the difference, its coefficient is not constant, or a strand does not press the belt on.
     """
     p, mu = parameters, parameters["kinetic_friction"]
     compliance = 1.0 / p["axial_stiffness"] + 1.0 / (radius**2 * p["contact_stiffness"])
@@ -153,26 +124,12 @@ def wrap_angles(path: BeltPath, position: np.ndarray) -> np.ndarray:
 def sliding_tension(
     parameters: Parameters, path: BeltPath, tension: np.ndarray, position: np.ndarray
 ) -> np.ndarray:
-    """Tension over the wraps by Euler and Eytelwein.
+    """Tension over the wraps by Euler and Eytelwein at path coordinates [m], (place,) [N], by the strands'.
 
     Up to where bending lifts the belt off a pulley d ln(T - m v^2) / dphi is the coefficient of friction,
     with the sign that takes T to that of the strand that leaves. Before, where the belt sticks, T is that of
-    the strand that runs on.
-
-    Parameters
-    ----------
-    parameters : mapping
-        Flat parameters of a run [SI].
-    tension : (P,) array
-        Of the strands [N].
-    position : (place,) array
-        Path coordinates [m].
-
-    Returns
-    -------
-    (place,) array
-        [N]; nan on strands, on pulleys that a strand does not press the belt on, and everywhere unless the
-        coefficient of friction is constant.
+    the strand that runs on. It is nan on strands, on pulleys that a strand does not press the belt on, and
+    everywhere unless the coefficient of friction is constant.
     """
     p = parameters
     if not _has_one_coefficient(p):
@@ -195,17 +152,7 @@ def strand_frequencies(parameters: Parameters, path: BeltPath, tension: np.ndarr
     since the pulley holds its place and its slope, which shortens the vibrating part by d. Both together
     change the frequency of n half waves by about 5/3 (n pi d / L)^3 / (n pi).
 
-    Parameters
-    ----------
-    parameters : mapping
-        Flat parameters of a run [SI].
-    tension : (P,) array
-        Of the strands [N].
-
-    Returns
-    -------
-    (P, MODES) array
-        [Hz]; nan where a strand holds no shape.
+    From the strands' tensions, (P,) [N]: (P, MODES) [Hz]; nan where a strand holds no shape.
     """
     p = parameters
     speed = float(p["driving_speed"] * path.radius[0])
@@ -217,19 +164,12 @@ def strand_frequencies(parameters: Parameters, path: BeltPath, tension: np.ndarr
 
 
 def mesh_amplitude(parameters: Parameters, path: BeltPath, tension: np.ndarray) -> float:
-    """Largest amplitude at which the passing elements may shake the strands [m].
+    """Largest amplitude [m] at which the passing elements may shake the strands, from their tensions [N].
 
-    Where the belt runs on or off, its curvature changes from 0 to 1 / R along d = sqrt(EI / N), with
-    N = T - m v^2. The fourth derivative of its shape is 1 / (R d^2) there, and an element of length h misses
-    that shape by up to h^4 / (384 R d^2). As elements pass, this shakes the strands, more at their
-    resonances: SHAKEN is measured.
-
-    Parameters
-    ----------
-    parameters : mapping
-        Flat parameters of a run [SI].
-    tension : (P,) array
-        Of the strands [N].
+    Where the belt runs on or off, its curvature changes from 0 to 1 / R along d = sqrt(EI / N), with N = T -
+    m v^2. The fourth derivative of its shape is 1 / (R d^2) there, and an element of length h misses that
+    shape by up to h^4 / (384 R d^2). As elements pass, this shakes the strands, more at their resonances:
+    SHAKEN is measured.
     """
     p = parameters
     pull = max(float(np.max(tension)) - centrifugal(p, path), 0.0)
@@ -238,18 +178,9 @@ def mesh_amplitude(parameters: Parameters, path: BeltPath, tension: np.ndarray) 
 
 
 def kick(path: BeltPath, line_mass: float, impulse: float, q: np.ndarray, v: np.ndarray) -> None:
-    """Add the speeds of an impulse across each strand, to the right of the belt's way, to those of the nodes.
+    """Add the speeds of an impulse [N s] across each strand, to the right of the belt's way, to the nodes'.
 
     The impulse is spread as 1 + cos, so that elements of a tenth of the strand carry it.
-
-    Parameters
-    ----------
-    line_mass : float
-        [kg/m]
-    impulse : float
-        [N s]
-    q, v : (n, 4) arrays
-        Positions and speeds of the nodes; the speeds are changed.
     """
     position, _ = along(path, q[:, :2], q[:, 2:])
     region = regions(path, position)
@@ -266,21 +197,10 @@ def kick(path: BeltPath, line_mass: float, impulse: float, q: np.ndarray, v: np.
 
 
 def answers(before: np.ndarray, after: np.ndarray, rate: float, expected: np.ndarray) -> np.ndarray:
-    """Frequencies of a strand after a kick, each near an expected one.
+    """Frequencies of a strand after a kick, each near an expected one, (mode,) [Hz].
 
-    Parameters
-    ----------
-    before, after : (time, probe) arrays
-        Displacement of one strand before and after the kick [m].
-    rate : float
-        Sampling rate [Hz].
-    expected : (mode,) array
-        [Hz]
-
-    Returns
-    -------
-    (mode,) array
-        Of the probe that moves most there [Hz]; nan where it moves less than LOUDER times as much as before.
+    By the displacement before and after the kick, (time, probe) [m]: of the probe that moves most there; nan
+    where it moves less than LOUDER times as much as before.
     """
     found = np.full(len(expected), np.nan)
     for k, frequency in enumerate(expected):

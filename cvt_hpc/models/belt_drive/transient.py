@@ -33,21 +33,9 @@ MOST_OPEN = 0.02
 
 
 class Transient(SampledRun):
-    """One run of the belt drive, advanced sample by sample.
+    """One run of the belt drive by the stepper "cyclic_alpha", advanced sample by sample.
 
-    Parameters
-    ----------
-    parameters : mapping
-        Resolved parameters of the run [SI], those of the stepper among them.
-    stepper : str
-        "cyclic_alpha".
-
-    Attributes
-    ----------
-    drawn : Layout
-        Pulleys and reference path.
-    kicked : slice or None
-        Samples from a kick to the end that the run then had.
+    `drawn` are pulleys and reference path, `kicked` the samples from a kick to the end that the run then had.
     """
 
     kicked: slice | None = None
@@ -69,18 +57,7 @@ class Transient(SampledRun):
             self.failure = Status.FAILED_NUMERICS, "the belt finds no equilibrium on its pulleys"
 
     def advance(self, samples: int) -> tuple[Status, str] | None:
-        """March on.
-
-        Parameters
-        ----------
-        samples : int
-            How many samples at most; 0 compiles only.
-
-        Returns
-        -------
-        (Status, str) or None
-            Why the run ends here.
-        """
+        """March on by so many samples at most, 0 compiles only; the reason, if the run ends here."""
         for _ in range(min(samples, self.samples - self.done)):
             if self.done == self.first_judged and self.parameters["kick"] > 0.0 and not self.kicked:
                 chain = self._state.chain
@@ -243,12 +220,9 @@ class Transient(SampledRun):
         return self._readings.places
 
     def numerical_doubt(self, record: dict[str, Any]) -> tuple[Status, str] | None:
-        """Why a run that reached its end is not to be trusted, by its values; None where it is.
+        """Reason why a run that reached its end is not to be trusted, by its values; None where it is.
 
-        Parameters
-        ----------
-        record : dict
-            With `unsolved_share`, `power_residual`, `vibrates`, `amplitude` and `strand_tension`.
+        These are `unsolved_share`, `power_residual`, `vibrates`, `amplitude` and `strand_tension`.
         """
         p = self.parameters
         unsolved, open_power = record["unsolved_share"], record["power_residual"]

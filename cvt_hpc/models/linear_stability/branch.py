@@ -35,18 +35,10 @@ class Point(NamedTuple):
 
 
 class Branch(NamedTuple):
-    """Steady states along the load.
+    """Steady states along the load."""
 
-    Attributes
-    ----------
-    points : list of Point
-        Those that were found, in the order of their loads.
-    missed : dict
-        Why there is none, by load [N m].
-    """
-
-    points: list[Point]
-    missed: dict[float, str]
+    points: list[Point]  # those that were found, in the order of their loads
+    missed: dict[float, str]  # why there is none, by load [N m]
 
     def pieces(self) -> Iterator[list[Point]]:
         """Yield the points between two gaps."""
@@ -58,46 +50,20 @@ class Branch(NamedTuple):
 
 
 class Onset(NamedTuple):
-    """A Hopf point.
+    """A Hopf point."""
 
-    Attributes
-    ----------
-    load : float
-        [N m]
-    frequency : float
-        Of the mode that neither grows nor decays there [Hz].
-    strand, half_waves : int
-        The strand that moves most in that mode, 0 or 1, and half waves along it.
-    rising : bool
-        Whether the mode grows above that load, or else below.
-    others : int
-        Number of other modes that grow there: where there are none, stability is lost or regained.
-    """
-
-    load: float
-    frequency: float
-    strand: int
-    half_waves: int
-    rising: bool
-    others: int
+    load: float  # [N m]
+    frequency: float  # of the mode that neither grows nor decays there [Hz]
+    strand: int  # that which moves most in that mode, 0 or 1
+    half_waves: int  # along that strand
+    rising: bool  # whether the mode grows above that load, or else below
+    others: int  # number of other modes that grow there: where there are none, stability is lost or regained
 
 
 def branch(
     belt: SteadyBelt, grid: Mesh, loads: Sequence[float], band: tuple[float, float] = (LOW, HIGH)
 ) -> Branch:
-    """Steady states with their modes under several loads, each from the one before.
-
-    Parameters
-    ----------
-    belt : SteadyBelt
-        The belt.
-    grid : Mesh
-        Its mesh.
-    loads : sequence of float
-        Ascending [N m].
-    band : (float, float)
-        Frequencies of the modes [Hz].
-    """
+    """Steady states with their modes in a band [Hz] under ascending loads [N m], each from the one before."""
     points: list[Point] = []
     missed: dict[float, str] = {}
     for load in loads:
@@ -113,21 +79,9 @@ def branch(
 def onsets(
     belt: SteadyBelt, grid: Mesh, found: Branch, band: tuple[float, float] = (LOW, HIGH)
 ) -> tuple[list[Onset], list[tuple[float, float]]]:
-    """Hopf points of a branch.
+    """Hopf points of a branch, in the order of their loads.
 
-    Parameters
-    ----------
-    belt, grid, band
-        As `branch` takes them.
-    found : Branch
-        The branch.
-
-    Returns
-    -------
-    onsets : list of Onset
-        In the order of their loads.
-    hidden : list of (float, float)
-        Loads between which stability changes in a gap, or where a state on the way is not found [N m].
+    And the loads [N m] between which stability changes in a gap, or where a state on the way is not found.
     """
     known, hidden = [], []
     for before, after in pairwise(found.points):
@@ -144,17 +98,9 @@ def onsets(
 
 
 def tracks(piece: Sequence[Point]) -> list[dict[int, Mode]]:
-    """Modes of points without a gap between them, each followed along the load.
+    """Modes of points without a gap between them, in the order of their loads, each followed along the load.
 
-    Parameters
-    ----------
-    piece : sequence of Point
-        In the order of their loads.
-
-    Returns
-    -------
-    list of dict
-        Mode by place in `piece`, for each that is followed.
+    Of each that is followed, the mode by place in `piece`.
     """
     followed = [{0: mode} for mode in piece[0].modes]
     for place, (before, after) in enumerate(pairwise(piece), 1):

@@ -30,53 +30,26 @@ APART = 1e-8  # strain of elements that are taken as apart
 
 
 class Mode(NamedTuple):
-    """One mode.
+    """One mode."""
 
-    Attributes
-    ----------
-    growth : float
-        Growth rate; negative: it decays [1/s].
-    frequency : float
-        [Hz]
-    amplitudes : (4,) array
-        Largest displacement of the regions in the order of REGIONS, over the largest of all.
-    strand : int
-        The strand that moves most: 0 is t1, 1 is t2.
-    half_waves : int
-        Half waves of the strongest sine along that strand, measured from the chord between its ends.
-    fed : (N,) array
-        Share of the growth rate that friction of the flanks and saddles at each station feeds [1/s].
-    displacement : (N,) complex array
-        Amplitude of w, the largest 1.
-    vector : (n,) complex array
-        Of all unknowns of `flat`, in the same measure.
-    """
-
-    growth: float
-    frequency: float
+    growth: float  # growth rate; negative: it decays [1/s]
+    frequency: float  # [Hz]
+    # largest displacement of the regions in the order of REGIONS, over the largest of all, (4,)
     amplitudes: np.ndarray
-    strand: int
-    half_waves: int
+    strand: int  # that which moves most: 0 is t1, 1 is t2
+    half_waves: int  # of the strongest sine along that strand, measured from the chord between its ends
+    # share of the growth rate that friction of flanks and saddles at each station feeds, (N,) [1/s]
     fed: np.ndarray
-    displacement: np.ndarray
-    vector: np.ndarray
+    displacement: np.ndarray  # amplitude of w, the largest 1, (N,) complex
+    vector: np.ndarray  # of all unknowns of `flat`, in the same measure, (n,) complex
 
 
 def modes(
     steady: Steady, grid: Mesh, band: tuple[float, float] = (LOW, HIGH), decay: float = DECAY
 ) -> list[Mode]:
-    """Modes of a steady state, the one that grows fastest first.
+    """Modes of a steady state in a band [Hz], the one that grows fastest first.
 
-    Parameters
-    ----------
-    steady : Steady
-        The state; dampers of the elements as in it.
-    grid : Mesh
-        Its mesh.
-    band : (float, float)
-        Frequencies [Hz].
-    decay : float
-        Modes that decay faster are left out [1/s].
+    Dampers of the elements are as in the state. Modes that decay faster than `decay` [1/s] are left out.
     """
     belt = steady.belt._replace(bridging_stiffness=steady.belt.element_stiffness)
     flat = flat_belt(belt, LATE)

@@ -40,30 +40,15 @@ VARIABLES = (
 
 
 class Solution(NamedTuple):
-    """Result of linear stability.
+    """Result of linear stability."""
 
-    Attributes
-    ----------
-    steady : dict or ValueError
-        Numbers of the steady state, or why there is none.
-    modes : list of Mode
-        In the band, the one that grows fastest first.
-    loosened : float
-        Growth rate of the first mode of the state as `loosened` has it [1/s]; nan where that is the same.
-    lower_edge : float
-        Where the band begins [Hz].
-    starts : (4,) int array
-        First station of each region.
-    undecided : float
-        Growth up to which nothing is decided [1/s].
-    """
-
-    steady: dict[str, Any] | ValueError
-    modes: list
+    steady: dict[str, Any] | ValueError  # numbers of the steady state, or why there is none
+    modes: list  # in the band, the one that grows fastest first
+    # growth rate of the first mode of the state as `loosened` has it [1/s]; nan where that is the same
     loosened: float
-    lower_edge: float
-    starts: np.ndarray
-    undecided: float
+    lower_edge: float  # where the band begins [Hz]
+    starts: np.ndarray  # first station of each region, (4,)
+    undecided: float  # growth up to which nothing is decided [1/s]
 
 
 def coordinates(parameters: Mapping[str, Any]) -> dict[str, Coordinate]:

@@ -20,21 +20,8 @@ def eigenpairs(
 ) -> tuple[np.ndarray, np.ndarray]:
     """Eigenvalues in a rectangle, -`decay` to `growth` by `low` to `high`, and their vectors.
 
-    Parameters
-    ----------
-    matrix : (n, n) csc_array
-        Real.
-    low, high : float
-        Band of circular frequencies [rad/s].
-    decay, growth : float
-        Rates beyond which motions are left out [1/s].
-
-    Returns
-    -------
-    values : (m,) complex array
-        In the order of their real parts, the largest first [1/s].
-    vectors : (n, m) complex array
-        Columns of length 1.
+    The real (n, n) matrix has those of rates [1/s] and circular frequencies [rad/s]. Values, (m,), are in the
+    order of their real parts, the largest first; vectors, (n, m), are columns of length 1.
     """
     whole, identity = matrix.astype(complex), eye_array(matrix.shape[0], format="csc")
     start = np.random.default_rng(0).normal(size=matrix.shape[0]) + 0j

@@ -102,18 +102,7 @@ __all__ = ["DEFAULT_STEPPER", "KICK", "PARAMETERS", "STEPPERS", "check", "inert"
 
 
 def check(parameters: Parameters) -> list[tuple[str, str, str]]:
-    """Problems that lie between parameters.
-
-    Parameters
-    ----------
-    parameters : dict
-        Values by name, in SI units.
-
-    Returns
-    -------
-    list of (key, expected, found)
-        Empty where all is well.
-    """
+    """Problems that lie between parameters [SI]: (key, expected, found) of each."""
     p = parameters
     problems = friction_problems(p)
     if p["friction_law"] == "coulomb" and p["static_friction"] < p["kinetic_friction"]:

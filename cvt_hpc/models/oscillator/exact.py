@@ -30,24 +30,12 @@ class Piece(NamedTuple):
 
 
 def exact(parameters: Mapping[str, Any], times: np.ndarray) -> np.ndarray:
-    """Displacement of the mass without numerical error.
-
-    Parameters
-    ----------
-    parameters : mapping
-        Flat parameters [SI].
-    times : (t,) array
-        Instants, ascending [s].
-
-    Returns
-    -------
-    (t, 1) array
-        Displacement [m].
+    """Displacement of the mass without numerical error at ascending instants [s], (t, 1) [m].
 
     Raises
     ------
     InputError
-        If these parameters have no closed form.
+        If these parameters [SI] have no closed form.
     """
     p = parameters
     if p["normal_stiffness"] != 0.0 or p["preload"] != 0.0:
@@ -70,20 +58,7 @@ def exact(parameters: Mapping[str, Any], times: np.ndarray) -> np.ndarray:
 
 
 def phases(parameters: Mapping[str, Any], end: float) -> list[Piece]:
-    """Phases of the motion under Coulomb friction without damping, up to an instant.
-
-    Parameters
-    ----------
-    parameters : mapping
-        Flat parameters [SI].
-    end : float
-        The instant [s].
-
-    Returns
-    -------
-    list of Piece
-        In order of time.
-    """
+    """Phases of the motion under Coulomb friction without damping, up to an instant [s], in order of time."""
     p = parameters
     frequency = np.sqrt(p["stiffness"] / p["mass"])
     slide, stick = (

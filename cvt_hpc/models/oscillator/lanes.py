@@ -23,30 +23,14 @@ ENDED = -1  # outcome of a run that is not to go on, though its steps could be t
 
 
 class Lanes(NamedTuple):
-    """State and work of runs that advance together.
+    """State and work of runs that advance together, (run,) each."""
 
-    Attributes
-    ----------
-    state : (run, 2) array
-        Displacement [m] and speed [m/s].
-    held : (run,) bool array
-        Whether friction was between its bounds in the last step.
-    fastest : (run,) array
-        Largest speed of the samples so far, at least the typical one [m/s].
-    clock : (run,) array
-        Simulated time [s].
-    counts : (run, COUNTERS) array
-        Work.
-    outcome : (run,) array
-        A `Result`, or ENDED; only runs that are OK go on.
-    """
-
-    state: np.ndarray
-    held: np.ndarray
-    fastest: np.ndarray
-    clock: np.ndarray
-    counts: np.ndarray
-    outcome: np.ndarray
+    state: np.ndarray  # displacement [m] and speed [m/s], (run, 2)
+    held: np.ndarray  # whether friction was between its bounds in the last step
+    fastest: np.ndarray  # largest speed of the samples so far, at least the typical one [m/s]
+    clock: np.ndarray  # simulated time [s]
+    counts: np.ndarray  # work, (run, COUNTERS)
+    outcome: np.ndarray  # a `Result`, or ENDED; only runs that are OK go on
 
     @classmethod
     def at(cls, states: np.ndarray) -> Lanes:
@@ -78,20 +62,10 @@ class Lane(Marching):
 
 @kernel
 def march(several: Any, lanes: Lanes, interval: float, steps: int, rows: np.ndarray) -> None:
-    """March on, each run as long as its outcome is OK.
+    """March on in place, each run as long as its outcome is OK.
 
-    Parameters
-    ----------
-    several : Oscillator
-        Of arrays, by `motion.together`.
-    lanes : Lanes
-        Changed in place.
-    interval : float
-        Sampling interval [s].
-    steps : int
-        Steps in it.
-    rows : (run, samples, 2) array
-        Result: the state at the end of each sampling interval.
+    `several` has arrays, by `motion.together`. Results: into `rows`, (run, samples, 2), the state at the end
+    of each sampling interval [s], of so many steps.
     """
     o, law, state, counts = several, several.law, lanes.state, lanes.counts
     clock, outcome, held = lanes.clock, lanes.outcome, lanes.held

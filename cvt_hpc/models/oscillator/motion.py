@@ -39,34 +39,18 @@ BESIDE = 1e-3
 
 
 class Oscillator(NamedTuple):
-    """Constants of the oscillator.
+    """Constants of the oscillator."""
 
-    Attributes
-    ----------
-    mass, stiffness, damping : float
-        [kg], [N/m], [N s/m].
-    belt_speed : float
-        [m/s].
-    normal_load, normal_stiffness, preload : float
-        N_0 [N], n [N/m], P [N].
-    law : FrictionLaw
-        Friction in steady sliding.
-    excess : float
-        Level at rest above that of the law [1].
-    width : float
-        Regularisation speed [m/s].
-    """
-
-    mass: float
-    stiffness: float
-    damping: float
-    belt_speed: float
-    normal_load: float
-    normal_stiffness: float
-    preload: float
-    law: FrictionLaw
-    excess: float
-    width: float
+    mass: float  # [kg]
+    stiffness: float  # [N/m]
+    damping: float  # [N s/m]
+    belt_speed: float  # [m/s]
+    normal_load: float  # N_0 [N]
+    normal_stiffness: float  # n [N/m]
+    preload: float  # P [N]
+    law: FrictionLaw  # friction in steady sliding
+    excess: float  # level at rest above that of the law [1]
+    width: float  # regularisation speed [m/s]
 
 
 def oscillator(parameters: Mapping[str, Any]) -> Oscillator:
@@ -197,7 +181,7 @@ def friction_bounds(
 
 
 def _unknowns(o: Oscillator) -> tuple[np.ndarray, np.ndarray, np.ndarray]:
-    """Which unknowns are velocities, their positions, and typical sizes."""
+    """Return which unknowns are velocities, their positions, and typical sizes."""
     return np.array([False, True]), np.array([-1, X]), np.array(typical_sizes(o))
 
 
@@ -239,17 +223,10 @@ def initial_state(parameters: Mapping[str, Any], steady: SteadySliding | None = 
 
 
 class SteadySliding(NamedTuple):
-    """The mass at rest on the belt that slides under it, friction without regularisation.
+    """The mass at rest on the belt that slides under it, friction without regularisation."""
 
-    Attributes
-    ----------
-    displacement : float
-        x_s [m].
-    eigenvalue : complex
-        Of the small motions about it the one with the larger imaginary, or else real, part [1/s].
-    """
-
-    displacement: float
+    displacement: float  # x_s [m]
+    # of the small motions about it the one with the larger imaginary, or else real, part [1/s]
     eigenvalue: complex
 
 

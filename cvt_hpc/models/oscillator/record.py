@@ -68,12 +68,7 @@ def coordinates(parameters: Mapping[str, Any]) -> dict[str, Coordinate]:
 def cost(parameters: Mapping[str, Any], stepper: str) -> Any:
     """Core-seconds of a run; of methods that choose their step, little is known.
 
-    Parameters
-    ----------
-    parameters : mapping
-        Resolved parameters of a run, each a number or an array of them.
-    stepper : str
-        Name of a stepper.
+    Resolved parameters of a run are numbers or arrays of them.
     """
     p = parameters
     samples, step_cost = p["duration"] * p["sampling_rate"], STEP_COST.get(stepper, 1e-6)
@@ -98,13 +93,7 @@ def judge(run: Transient) -> dict[str, Any]:
 
 
 def judge_together(runs: Sequence[Transient]) -> list[dict[str, Any]]:
-    """The records of runs of one batch that have reached their ends, their cost apart.
-
-    Parameters
-    ----------
-    runs : sequence of Transient
-        With all samples recorded.
-    """
+    """The records of runs of one batch that have reached their ends, with all samples, but for their cost."""
     p, interval, first = runs[0].parameters, runs[0].interval, runs[0].first_judged
     rows = np.stack([run.rows for run in runs])
     motions = np.ascontiguousarray(rows[:, :, X:V])
@@ -136,17 +125,9 @@ def judge_together(runs: Sequence[Transient]) -> list[dict[str, Any]]:
 
 
 def histories(run: Transient) -> xr.Dataset:
-    """Histories over `time` of a run, finished or failed.
+    """Histories over `time` of a run, finished or failed, as far as it has samples.
 
-    Parameters
-    ----------
-    run : Transient
-        With the samples that it has.
-
-    Returns
-    -------
-    Dataset
-        `displacement` (time, probe) [m], `speed` [m/s] and `friction_force` [N] (time).
+    `displacement` (time, probe) [m], `speed` [m/s] and `friction_force` [N] (time).
     """
     import xarray as xr
 
@@ -165,19 +146,10 @@ def histories(run: Transient) -> xr.Dataset:
 
 
 def cycle_starts(x: np.ndarray, least: float) -> list[np.ndarray]:
-    """Find where displacements come up through the middle of their range.
+    """Find where displacements, (run, n) [m], come up through the middle of their range.
 
-    Parameters
-    ----------
-    x : (run, n) array
-        Displacement [m].
-    least : float
-        Half stroke [m] up to which a motion has no cycles.
-
-    Returns
-    -------
-    list of (cycles + 1,) int arrays
-        Of each run the samples before each passage; empty where there are none.
+    Of each run the samples before each passage, (cycles + 1,); empty where there are none, as of a motion
+    with a half stroke up to `least` [m].
     """
     low, high = x.min(axis=1, keepdims=True), x.max(axis=1, keepdims=True)
     away = x - 0.5 * (high + low)
@@ -190,26 +162,14 @@ def work_per_cycle(
 ) -> dict[str, float]:
     """Mean work of a cycle, by the trapezoidal rule over the samples.
 
-    A jump of friction between two samples leaves an error of the first order in their interval, a sticking
-    phase that falls between two is not seen: `energy_residual` shows it.
+    `friction_work` and `damping_loss` [J], and `energy_residual`, what remains of friction's work after the
+    loss and the change of kinetic energy, over the work that friction turns over either way; nan without a
+    cycle.
 
-    Parameters
-    ----------
-    o : Oscillator
-        Constants.
-    speed, friction : (n,) arrays
-        Of the mass [m/s], and the force on it [N], at samples.
-    starts : (cycles + 1,) int array
-        Samples at which cycles start and end.
-    interval : float
-        Sampling interval [s].
-
-    Returns
-    -------
-    dict
-        `friction_work` and `damping_loss` [J], and `energy_residual`, what remains of friction's work after
-        the loss and the change of kinetic energy, over the work that friction turns over either way; nan
-        without a cycle.
+    A jump of friction between two samples leaves an error of the first order in their interval [s], a
+    sticking phase that falls between two is not seen: `energy_residual` shows it. The mass has speeds [m/s]
+    and takes friction forces [N], (n,) each; `starts`, (cycles + 1,), are the samples at which cycles start
+    and end.
     """
     if len(starts) < 2:
         return dict.fromkeys(("friction_work", "damping_loss", "energy_residual"), np.nan)

@@ -40,29 +40,12 @@ class Peak(NamedTuple):
 def rest_missed(
     o: motion.Oscillator, facts: Facts, step: float, allowed: float, rows: np.ndarray
 ) -> str | None:
-    """Decide whether the mass comes within a step of rest, by a step or tolerance too coarse to find it.
+    """Reason why a step or tolerance is too coarse for the mass that comes near rest; None where it is not.
 
-    Beyond the limit of the step, friction chatters instead of bringing the mass to rest: the speed jumps
-    over the belt's in every step, by up to step N mu / m. Beyond that of the tolerance, errors of the speed
-    hide the width over which friction changes its sign.
-
-    Parameters
-    ----------
-    o : Oscillator
-        Constants.
-    facts : Facts
-        Of the method.
-    step : float
-        Mean step [s].
-    allowed : float
-        Error of the speed that the tolerance of an adaptive method allows [m/s].
-    rows : (n, 2) array
-        Displacement [m] and speed [m/s] at samples.
-
-    Returns
-    -------
-    str or None
-        The reason, where it does.
+    The mass comes within a step of rest. Beyond the limit of the mean step [s], friction chatters instead of
+    bringing it to rest: the speed jumps over the belt's in every step, by up to step N mu / m. Beyond that of
+    the tolerance, errors of the speed, which an adaptive method allows up to `allowed` [m/s], hide the width
+    over which friction changes its sign. Rows are displacement [m] and speed [m/s] at samples.
     """
     longest = facts.rest_limit / motion.largest_rate(o)
     coarse = allowed / (facts.width_limit * o.width)
@@ -89,23 +72,10 @@ def peak(o: motion.Oscillator) -> Peak | None:
 
 
 def wrongly_held(o: motion.Oscillator, peak: Peak | None, rows: np.ndarray, interval: float) -> str | None:
-    """Decide whether smoothed friction released the mass where it holds, or held it against a larger pull.
+    """Reason why smoothed friction let the mass go where it holds, or held it against a larger pull; or None.
 
-    Parameters
-    ----------
-    o : Oscillator
-        Constants.
-    peak : Peak or None
-        Its largest friction.
-    rows : (n, 2) array
-        Displacement [m] and speed [m/s] at samples that follow each other.
-    interval : float
-        Sampling interval [s].
-
-    Returns
-    -------
-    str or None
-        The reason, where it was.
+    `peak` is that of the largest friction, if it has one. Rows are displacement [m] and speed [m/s] at
+    samples that follow each other by `interval` [s].
     """
     if peak is None or len(rows) < 2:
         return None
@@ -130,23 +100,10 @@ def wrongly_held(o: motion.Oscillator, peak: Peak | None, rows: np.ndarray, inte
 def wrongly_stuck(
     o: motion.Oscillator, rows: np.ndarray, interval: float, step: float, rounding: float
 ) -> str | None:
-    """Decide whether friction as it is released the mass where it holds, or held it against a larger pull.
+    """Reason why friction as it is let the mass go where it holds, or held it against a larger pull; or None.
 
-    Parameters
-    ----------
-    o : Oscillator
-        Constants.
-    rows : (n, 2) array
-        Displacement [m] and speed [m/s] at samples that follow each other.
-    interval, step : float
-        Sampling interval, and the step of Moreau's method, a part of it [s].
-    rounding : float
-        Sliding up to which the mass counts as sticking [m/s].
-
-    Returns
-    -------
-    str or None
-        The reason, where it was.
+    Rows are those of `wrongly_held`. `step` is that of Moreau's method, a part of the interval [s],
+    `rounding` the sliding up to which the mass counts as sticking [m/s].
     """
     return REASONS[stuck_wrongly(o, rows, interval, step, rounding)]
 

@@ -29,25 +29,10 @@ def silenced(
     parameters: Mapping[str, Any],
     interval: float,
 ) -> str | None:
-    """Decide whether a method damps small swings about steady sliding that friction drives.
+    """Reason why a method damps small swings about steady sliding that friction drives; None if it does not.
 
-    Parameters
-    ----------
-    o : Oscillator
-        Constants.
-    system : System or SetValuedSystem
-        Its equations, as the stepper needs them.
-    stepper : str
-        One with a fixed step.
-    parameters : mapping
-        Resolved parameters of the run [SI].
-    interval : float
-        Sampling interval [s].
-
-    Returns
-    -------
-    str or None
-        The reason, where it does.
+    `system` has the oscillator's equations as the stepper, one with a fixed step, needs them. Parameters of
+    the run are resolved, `interval` is that of its samples [s].
     """
     swing = Swing(*swing_of(o, isinstance(system, SetValuedSystem)))
     if not swing.is_driven:
@@ -59,19 +44,11 @@ def silenced(
 
 
 class Swing(NamedTuple):
-    """Small swings about steady sliding.
+    """Small swings about steady sliding."""
 
-    Attributes
-    ----------
-    growth, frequency : float
-        Growth rate [1/s] and frequency [rad/s]; of a belt at rest no numbers.
-    rest : float
-        Displacement in steady sliding [m].
-    """
-
-    growth: float
-    frequency: float
-    rest: float
+    growth: float  # growth rate [1/s]; of a belt at rest no number
+    frequency: float  # [rad/s]; of a belt at rest no number
+    rest: float  # displacement in steady sliding [m]
 
     @property
     def is_driven(self) -> bool:

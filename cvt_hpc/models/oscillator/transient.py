@@ -30,26 +30,14 @@ CHANNELS = ("speed",)
 
 
 class Transient(MarchedRun):
-    """One run of the oscillator, advanced sample by sample.
+    """One run of the oscillator, from resolved parameters [SI], by a stepper that the model takes.
 
     A run ends as failed where its friction at rest is not that of the model (`rest`): at the first sample
     within a step of rest, should step or tolerance be too coarse to find rest; and wherever the mass was let
     go by less, or held against more, than friction can do. So does a run whose step damps a vibration about
     steady sliding that friction drives (`slide`), at its first sample.
 
-    Parameters
-    ----------
-    parameters : mapping
-        Resolved parameters of the run [SI].
-    stepper : str
-        A stepper that the model takes.
-
-    Attributes
-    ----------
-    constants : Oscillator
-        Of the equations.
-    is_set_valued : bool
-        Whether friction jumps at rest; else the jump is smoothed, and sticking is creep.
+    `is_set_valued` tells whether friction jumps at rest; else the jump is smoothed, and sticking is creep.
     """
 
     def __init__(self, parameters: Mapping[str, Any], stepper: str) -> None:
@@ -146,22 +134,11 @@ class LaneRun(Transient):
 
 
 class Batch:
-    """Runs of the oscillator that advance together, by `moreau`.
+    """Runs of the oscillator, of one `lane_key`, that advance together by `moreau`.
 
-    They are looked at after 1, 3, 7, 15, ... samples of the batch, whatever runs there are and however long
-    these take, and so end with the numbers that they have alone.
-
-    Parameters
-    ----------
-    points : sequence of dict
-        Resolved parameters of the runs [SI], all of one `lane_key`.
-    paused : sequence of LaneRun
-        Shorter runs of the same points, from which they continue.
-
-    Attributes
-    ----------
-    runs, samples, done, interval
-        As in every batch.
+    They continue from `paused`, shorter runs of the same points. They are looked at after 1, 3, 7, 15, ...
+    samples of the batch, whatever runs there are and however long these take, and so end with the numbers
+    that they have alone.
     """
 
     def __init__(self, points: Sequence[Mapping[str, Any]], paused: Sequence[LaneRun] = ()) -> None:
@@ -209,13 +186,7 @@ class Batch:
         return self.done < self.samples and bool((self._lanes.outcome == OK).any())
 
     def advance(self, samples: int) -> None:
-        """March on.
-
-        Parameters
-        ----------
-        samples : int
-            How many samples at most; 0 compiles only.
-        """
+        """March on by so many samples at most; 0 compiles only."""
         last = min(self.done + samples, self.samples)
         while True:
             piece = self._rows[:, self.done : min(last, self._border)]

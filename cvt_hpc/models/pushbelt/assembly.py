@@ -144,14 +144,9 @@ def element_forces(belt, state, pulleys, increments, step, iterate, dt):
 
 @kernel
 def residuals(belt, state, changes, openings, shapes, load, step, iterate, scratch, border, dt):
-    """Residuals of all equations: of elements in `iterate`, of the border in the last column of `border`.
+    """Set residuals: of elements in `iterate`, of the border in its last column; return the power's [W].
 
     Weight has no term of its own: masses resist the change of their speeds beyond that of free fall.
-
-    Returns
-    -------
-    float
-        Power residual of the belt [W].
     """
     modes = belt.modal_stiffness.shape[1]
     per_dt, fall = 1.0 / dt, dt * belt.gravity

@@ -84,7 +84,7 @@ class Belt(NamedTuple):
 
 
 class Newton(NamedTuple):
-    """How a step is solved."""
+    """Settings by which a step is solved."""
 
     tolerance: float  # largest correction of a speed [m/s]
     power_tolerance: float  # largest power residual of the whole belt [W]
@@ -102,81 +102,42 @@ NEWTON = Newton(tolerance=1e-3, power_tolerance=1.0, weights=(1.0, 1.0, 2e-3, 1.
 
 
 class BeltState(NamedTuple):
-    """State of a run, which `step.advance` takes on.
+    """State of a run, which `step.advance` takes on."""
 
-    Attributes
-    ----------
-    elements : (rows, STATE_FIELDS) LaneArray
-        Element p rows + j lies in row j, lane p.
-    pulleys : (4,) array
-        Speeds [rad/s], and radii on which the flanks' contact points run without penetration [m].
-    openings : (2, modes) array
-        a_k of each pulley's sheaves [m].
-    increments : (1 + 2 modes,) array
-        Changes in the last step of the border's unknowns: speed of the driven pulley, openings.
-    totals : (TOTALS,) array
-        Sums since the start.
-    counters : (COUNTERS,) int array
-        Work done, and how the last call ended.
-    """
-
-    elements: LaneArray
+    elements: LaneArray  # (rows, STATE_FIELDS): element p rows + j lies in row j, lane p
+    # (4,): speeds [rad/s], radii on which flanks' contact points run without penetration [m]
     pulleys: np.ndarray
-    openings: np.ndarray
+    openings: np.ndarray  # a_k of each pulley's sheaves, (2, modes) [m]
+    # (1 + 2 modes,): changes in the last step of the border's unknowns: speed of the driven pulley, openings
     increments: np.ndarray
-    totals: np.ndarray
-    counters: np.ndarray
+    totals: np.ndarray  # sums since the start, (TOTALS,)
+    counters: np.ndarray  # work done, and how the last call ended, (COUNTERS,)
 
 
 class Workspace(NamedTuple):
-    """Work space of a step, which is not needed afterwards; of elements with b unknowns.
+    """Work space of a step, which is not needed afterwards; of elements with b unknowns."""
 
-    Attributes
-    ----------
-    step : (rows, STEP_FIELDS) LaneArray
-        Geometry, directions and the linear laws of a step.
-    iterate : (rows, ITERATE_FIELDS) LaneArray
-        Forces, slopes and residuals of an iterate.
-    shapes : (rows, modes) LaneArray
-        psi_k at the elements.
-    blocks : (rows, b (3 b + columns)) LaneArray
-        The system of an iteration (`solvers.linked_blocks`), with a column for the residual and one for each
-        unknown of the border.
-    narrow : LaneArray
-        That of an element's first unknowns, where a model assembles it before the others come in; else
-        `blocks` itself.
-    scratch : (3, b (3 b + columns)) LaneArray
-        Work space of its solution, and sums.
-    border : (columns - 1, columns) array
-        System of the border, its right side last.
-    sums : (1, (columns - 1) columns) LaneArray
-        Its entries in the parts of the ring (`border.close_border`).
-    inputs : (INPUTS,) array
-        Inputs of the step.
-    increments : (1 + 2 modes,) array
-        `BeltState.increments` at its start.
-    kept : (2, STATE_FIELDS) array
-        States of two elements before the last correction.
-    bent : (elements, COLUMNS) array
-        Of `ring_bending` and `local_bending`.
-    """
-
-    step: LaneArray
-    iterate: LaneArray
-    shapes: LaneArray
+    step: LaneArray  # (rows, STEP_FIELDS): geometry, directions and the linear laws of a step
+    iterate: LaneArray  # (rows, ITERATE_FIELDS): forces, slopes and residuals of an iterate
+    shapes: LaneArray  # (rows, modes): psi_k at the elements
+    # (rows, b (3 b + columns)): the system of an iteration (`solvers.linked_blocks`), with a column for the
+    # residual and one for each unknown of the border
     blocks: LaneArray
+    # that of an element's first unknowns, where a model assembles it before the others come in; else `blocks`
+    # itself
     narrow: LaneArray
-    scratch: LaneArray
-    border: np.ndarray
+    scratch: LaneArray  # (3, b (3 b + columns)): work space of its solution, and sums
+    border: np.ndarray  # (columns - 1, columns): system of the border, its right side last
+    # (1, (columns - 1) columns): its entries in the parts of the ring (`border.close_border`)
     sums: LaneArray
-    inputs: np.ndarray
-    increments: np.ndarray
-    kept: np.ndarray
-    bent: np.ndarray
+    inputs: np.ndarray  # (INPUTS,) of the step
+    increments: np.ndarray  # `BeltState.increments` at its start
+    kept: np.ndarray  # (2, STATE_FIELDS): states of two elements before the last correction
+    bent: np.ndarray  # (elements, COLUMNS), of `ring_bending` and `local_bending`
 
 
 def parts_of(nodes: int) -> int:
-    """How many lanes a ring of nodes is cut into: as many of 8, 4 or 2 as leave whole parts; else 1."""
+    """Number of lanes that a ring of nodes is cut into: as many of 8, 4 or 2 as leave whole parts; else 1."""
     return next(parts for parts in (8, 4, 2, 1) if nodes % parts == 0)
 
 
@@ -239,7 +200,7 @@ def equal_chords(
 
 
 class PitchLine(NamedTuple):
-    """Where the rocking edges of a belt lie at the start, and how fast it runs."""
+    """Line of the rocking edges of a belt at the start, and its speed."""
 
     path: Variator  # [m]
     # places, points, along, curvature, shapes (n,), (n, 2), (n, 2), (n,): of the elements, with equal chords:
@@ -269,15 +230,8 @@ def pitch_line(given: Mapping[str, Any]) -> PitchLine:
 def start(given: Mapping[str, Any]) -> tuple[Belt, BeltState]:
     """Constants and a state from which a belt can run in: equal chords along the ideal path, at its speed.
 
-    Parameters
-    ----------
-    given : mapping
-        Values [SI] as `transient.given` names them, those of an element for each of `elements`.
-
-    Returns
-    -------
-    Belt, BeltState
-        The flanks just touch; the ring has the strain `ring_strain`.
+    The flanks just touch; the ring has the strain `ring_strain`. Values [SI] are given as `transient.given`
+    names them, those of an element for each of `elements`.
     """
     g, line = given, pitch_line(given)
     belt, nodes, along, speed = belt_of(g, line.chord), g["elements"], line.along, line.speed

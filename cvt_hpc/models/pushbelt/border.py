@@ -73,15 +73,9 @@ def lag_rate(increments, earlier, unknown, dt):
 def border_residuals(belt, changes, openings, load, torque, power, scratch, border, dt):
     """Set the last column of `border`; return the power residual of the belt [W].
 
-    Parameters
-    ----------
-    changes : pair of (1 + 2 modes,) arrays
-        Of the unknowns in this step, and in the one before.
-    torque, power : lanes
-        Of the elements on the driven pulley [N m], and the power that the residuals of the elements leave
-        open [W].
-    scratch : LaneArray
-        Its row holds the axial forces of the elements by the modes of both pulleys [N].
+    `changes` are two (1 + 2 modes,) arrays of the unknowns, in this step and in the one before; `torque` and
+    `power` in lanes those of the elements on the driven pulley [N m], and what their residuals leave open
+    [W]. A row of `scratch` holds the axial forces of the elements by the modes of both pulleys [N].
     """
     modes, last = belt.modal_stiffness.shape[1], border.shape[0]
     increments, earlier = changes

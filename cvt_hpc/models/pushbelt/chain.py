@@ -44,7 +44,7 @@ def ring_share(belt, dt):
 
 @register_jitable
 def turned_length(belt, length, spin, dt):
-    """What a segment that turns adds to its mean length, and by the rate of it to its tension [m].
+    """Add to a segment's mean length what its turning does, and by the rate of it to its tension [m].
 
     Rates along the directions at q_k leave out that the length grows by spin^2 dt / 2 within half a step.
     """

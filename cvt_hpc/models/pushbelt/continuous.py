@@ -53,7 +53,7 @@ ONLY = {
 
 
 class Follows(NamedTuple):
-    """How a parameter of the pushbelt follows."""
+    """Rule by which a parameter of the pushbelt follows."""
 
     needs: tuple[str, ...]  # keys of the continuous belt that decide it
     value: Callable[[Mapping[str, Any]], Any]  # flat parameters of the continuous belt [SI] -> the value [SI]

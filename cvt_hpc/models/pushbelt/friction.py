@@ -12,21 +12,11 @@ from cvt_hpc.physics.contact_laws import coefficient, dual_of, friction, remembe
 
 @register_jitable(forceinline=True)
 def flank_friction(belt, slip, earlier, dual, filtered, dt):
-    """Friction at a flank, along the meridian of the sheave and in the direction of rotation.
+    """Return the dual of friction at a flank, both forces, and their four slopes [s/m], as lanes.
 
-    Parameters
-    ----------
-    slip, earlier, dual : (lanes, lanes)
-        Sliding velocity [m/s], and velocity and dual of the iterate before.
-    filtered : lanes
-        Sliding speed at which the law was read at the start of the step [m/s].
-
-    Returns
-    -------
-    (lanes, lanes)
-        The dual.
-    tuple of lanes
-        Both forces, and the slopes of the first and of the second by both velocities [s/m].
+    Forces are along the meridian of the sheave and in the direction of rotation, slopes those of the first
+    and of the second by both velocities. From the sliding velocity [m/s], velocity and dual of the iterate
+    before, and the sliding speed at which the law was read at the start of the step [m/s].
     """
     along, around_it = slip
     dual_m, dual_t = dual_of(along, around_it, earlier[0], earlier[1], dual[0], dual[1], belt.friction_speed)

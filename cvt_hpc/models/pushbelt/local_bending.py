@@ -66,20 +66,11 @@ def axial_excess(compliance, pressing):
 
 @kernel
 def spread_bending(driven, depths, spread, work, compliance, stiffness, decay):
-    """Set the spread at all elements by the depths of an iterate.
+    """Set the spread at all elements, (rows, lanes) [m], by the depths of an iterate.
 
-    Parameters
-    ----------
-    driven : (rows, lanes) array
-        1 for elements on the driven pulley, else 0; element p rows + j stands in row j, lane p.
-    depths : (rows, points, lanes) array
-        Depth of each point of a flank in the sheave without local bending [m].
-    spread : (rows, lanes) array
-        The spread of the iterate before, which is set [m].
-    work : (elements, 4 or more) array
-        Work space.
-    compliance, stiffness, decay : float
-        b [m/N] and k_p [N/m] of an element, and r [1].
+    `driven`, (rows, lanes), is 1 for elements on the driven pulley, else 0; `depths`, (rows, points, lanes),
+    are those of each point of a flank in the sheave without local bending [m]; `work` has (elements, 4 or
+    more). Compliance and stiffness of an element are b [m/N] and k_p [N/m], the decay is r [1].
     """
     rows, count, link = driven.shape[0], driven.size, decay / (1.0 - decay) ** 2
     first = _first(driven)

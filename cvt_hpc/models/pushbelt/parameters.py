@@ -234,18 +234,7 @@ PARAMETERS: dict[str, dict[str, Parameter]] = {
 
 
 def check(parameters: Parameters) -> list[tuple[str, str, str]]:
-    """Problems that lie between parameters.
-
-    Parameters
-    ----------
-    parameters : dict
-        Values by name, in SI units.
-
-    Returns
-    -------
-    list of (key, expected, found)
-        Empty where all is well.
-    """
+    """Problems that lie between parameters [SI]: (key, expected, found) of each."""
     p = parameters
     problems = variator_problems(p) or profile_problems(p)
     if problems:
@@ -383,15 +372,7 @@ def string_limit(parameters: Parameters) -> float:
 def inert(parameters: Parameters) -> dict[str, str]:
     """Parameters without effect on a run, so that a study does not vary them for nothing.
 
-    Parameters
-    ----------
-    parameters : dict
-        Values by name, in SI units.
-
-    Returns
-    -------
-    dict
-        By the name of the parameter, the setting that makes it so, e.g. "sheave_stiffness inf".
+    Each has the setting that makes it so, e.g. "sheave_stiffness inf".
     """
     p = parameters
     cases = (

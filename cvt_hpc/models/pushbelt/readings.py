@@ -54,29 +54,20 @@ PROFILES = {
 
 
 class Readings:
-    """Where displacement and forces of a run are read.
+    """Places where displacement and forces of a run are read.
 
-    Parameters
-    ----------
-    parameters : mapping
-        Resolved parameters of the run [SI].
-    belt : NamedTuple
-        Its constants, of whichever equations: the `pitch_depth` counts.
+    Of the constants, of whichever equations, the `pitch_depth` counts.
 
     Attributes
     ----------
-    belt
-        As given.
     path : Variator
         The reference path.
     centre_distance, pitch : float
         [m]
     probes : (2, p) array
         Path coordinates on both strands [m].
-    middles : (2,) array
-        Path coordinates of the middles of the strands [m].
-    places : (place,) array
-        Path coordinates of profiles [m].
+    middles, places : (2,) and (place,) arrays
+        Path coordinates of the middles of the strands, and of profiles [m].
     """
 
     def __init__(self, parameters: Mapping[str, Any], belt: Any) -> None:
@@ -97,19 +88,8 @@ class Readings:
 class OnPath:
     """Elements on the path at one sample, and what is read there of their values.
 
-    Parameters
-    ----------
-    where : Readings
-        Where it is read.
-    saddles : (n, 2) array
-        Their saddle points in the plane, in the order of the belt [m].
-
-    Attributes
-    ----------
-    position : (n,) array
-        Path coordinates [m].
-    offset : (n,) array
-        Outwards of the path [m].
+    From their saddle points, (n, 2) in the order of the belt [m]: path coordinates `position`, and `offset`
+    outwards of the path, (n,) each [m].
     """
 
     def __init__(self, where: Readings, saddles: np.ndarray) -> None:
@@ -137,17 +117,7 @@ class OnPath:
 
 
 class Reading:
-    """What is read at one sample.
-
-    Parameters
-    ----------
-    where : Readings
-        Where it is read.
-    elements : (n, fields) array
-        In the order of the belt.
-    pulleys : (4,) array
-        State of the pulleys.
-    """
+    """Readings of one sample, from the elements' fields in the order of the belt and the pulleys' state."""
 
     def __init__(self, where: Readings, elements: np.ndarray, pulleys: np.ndarray) -> None:
         self._where, self._elements, self._pulleys = where, elements, pulleys

@@ -35,7 +35,7 @@ RIGID_COST, ELASTIC_COST, SAMPLE_COST = 5.2e-7, 9.3e-7, 2e-4
 
 
 def slip_loss(measured: Measured) -> float:
-    """What sliding alone takes from the speed, mean [1]."""
+    """Loss of speed by sliding alone, mean [1]."""
     driving, driven = (measured.part(f"{k}_speed") * measured.part(f"running_radius {k}") for k in PULLEYS)
     return float(np.mean(1.0 - driven / driving))
 
@@ -118,13 +118,7 @@ VARIABLES = (
 
 
 def coordinates(parameters: Mapping[str, Any]) -> dict[str, Coordinate]:
-    """Coordinates of the record's dimensions.
-
-    Parameters
-    ----------
-    parameters : dict
-        Flat parameters of the job.
-    """
+    """Coordinates of the record's dimensions, by flat parameters of the job."""
     return {
         **COORDINATES,
         "ramp_share": ramp.coordinate(),
@@ -144,17 +138,9 @@ judge = partial(judging.judge, variables=VARIABLES)
 
 
 def histories(run: ElementRun) -> xr.Dataset:
-    """Histories over `time` and means by `position` of a run, finished or failed.
+    """Histories over `time` and means by `position` of a run, finished or failed, as far as it has samples.
 
-    Parameters
-    ----------
-    run : ElementRun
-        With the samples that it has.
-
-    Returns
-    -------
-    Dataset
-        `displacement` (time, probe) [m], scalars over time, profiles of the judged part by `position`.
+    `displacement` (time, probe) [m], scalars over time, profiles of the judged part by `position`.
     """
     from cvt_hpc.models.pushbelt.readings import PROFILES
 
@@ -166,7 +152,7 @@ def history(
     profiles: Mapping[str, tuple[str, str, str]],
     over_time: Mapping[str, tuple[str, str, str]],
 ) -> xr.Dataset:
-    """What `histories` returns, with the words of a model's profiles and of its own channels over time."""
+    """Result of `histories`, with the words of a model's profiles and of its own channels over time."""
     touching = "at which the flanks touch the sheaves"
     told = {f"{k}_radius": (f"{k} radius", "m", touching) for k in PULLEYS}
     comment = "mean over the middle half of the strand"

@@ -88,20 +88,10 @@ def _smooth(work, share):
 
 @kernel
 def bend_rings(belt, pulleys, places, forces, energy, work, dt):
-    """Set the forces of the rings' bending on the elements.
+    """Set forces of the rings' bending on the elements, (rows, 2, lanes) [N], and each segment's energy [J].
 
-    Parameters
-    ----------
-    belt, pulleys
-        Constants, of whichever equations; state of the pulleys.
-    places, forces : (rows, 2, lanes) array
-        Saddle points [m] and forces [N] in the plane; element p rows + j stands in row j, lane p.
-    energy : (rows, lanes) array
-        Of each segment [J], which is set as well.
-    work : (elements, COLUMNS) array
-        Work space.
-    dt : float
-        Step [s].
+    `places` are saddle points in the plane, (rows, 2, lanes) [m]; element p rows + j stands in row j, lane p.
+    The step is `dt` [s].
     """
     rows, count, stiffness = places.shape[0], work.shape[0], belt.bending_stiffness / belt.pitch
     for k in range(count):

@@ -32,13 +32,7 @@ MOST_BYTES = 2**24  # of a process: some 80 start-ups of 432 elements and 15 ms 
 
 
 class StartUps:
-    """Start-ups as copies of arrays; the least recently used goes first.
-
-    Parameters
-    ----------
-    most_bytes : int
-        Limit of their total size [byte].
-    """
+    """Start-ups as copies of arrays, of `most_bytes` in all; the least recently used goes first."""
 
     def __init__(self, most_bytes: int = MOST_BYTES) -> None:
         self._most_bytes = most_bytes
@@ -62,12 +56,9 @@ class StartUps:
 
 
 def fingerprint(*values: Any) -> str:
-    """A key of values that differs where any of them does, by a bit of a number or by its type.
+    """Return a key of values that differs where any of them does, by a bit of a number or by its type.
 
-    Parameters
-    ----------
-    *values
-        Numbers, texts, arrays, and sequences, mappings and objects of such.
+    Values are numbers, texts, arrays, and sequences, mappings and objects of such.
     """
     digest = sha256()
 
@@ -107,16 +98,10 @@ forget = _start_ups.forget
 
 
 class ElementRun(SampledRun):
-    """One run of a belt of rigid elements, advanced sample by sample.
+    """One run of a belt of rigid elements by the model's own stepper, advanced sample by sample.
 
-    It begins at the end of its start-up where another run of this process has marched the same one.
-
-    Parameters
-    ----------
-    parameters : mapping
-        Resolved parameters of the run [SI], those of the stepper among them.
-    stepper : str
-        The model's own.
+    It begins at the end of its start-up where another run of this process has marched the same one. Resolved
+    parameters [SI] include those of the stepper.
     """
 
     _contacts: tuple[str, ...] = f.CONTACTS  # by number, as the counters have them
@@ -162,18 +147,7 @@ class ElementRun(SampledRun):
         return self._belt.inertia
 
     def advance(self, samples: int) -> tuple[Status, str] | None:
-        """March on.
-
-        Parameters
-        ----------
-        samples : int
-            How many samples at most; 0 compiles only.
-
-        Returns
-        -------
-        (Status, str) or None
-            Why the run ends here.
-        """
+        """March on by so many samples at most, 0 compiles only; the reason, if the run ends here."""
         if samples == 0:
             self._compile()
         for _ in range(min(samples, self.samples - self.done)):
@@ -300,7 +274,7 @@ class ElementRun(SampledRun):
         return "the state is not a number, or the equations of a step are singular"
 
     def _fault(self) -> str:
-        """Where the last step that was not solved was not."""
+        """Contact at fault in the last step that was not solved."""
         counters = self._state.counters
         contact = self._contacts[counters[f.FAILED_CONTACT]]
         return f"at the {contact} contact of element {counters[f.FAILED_ELEMENT]}"
@@ -314,7 +288,7 @@ class ElementRun(SampledRun):
         return GAINED if driven > MOST_SPEED * driving else None
 
     def _out_of_place(self) -> str | None:
-        """Whether a sheave has run to its stop, if the job gives the reach of the sheaves."""
+        """Reason why a sheave has run to its stop, if the job gives the reach of the sheaves; or None."""
         least, most = self.parameters["inner_radius"], self.parameters["outer_radius"]
         radii = self._state.pulleys[[f.DRIVING_RADIUS, f.DRIVEN_RADIUS]]
         for pulley, radius in zip(PULLEYS, radii, strict=True):
@@ -362,12 +336,9 @@ class ElementRun(SampledRun):
         return self._readings.places
 
     def numerical_doubt(self, record: dict[str, Any]) -> tuple[Status, str] | None:
-        """Why a run that reached its end is not to be trusted, by its values; None where it is.
+        """Reason why a run that reached its end is not to be trusted, by its values; None where it is.
 
-        Parameters
-        ----------
-        record : dict
-            With `power_residual`, `numerical_damping`, `driving_power`, `loss` and `unsolved_share`.
+        These are `power_residual`, `numerical_damping`, `driving_power`, `loss` and `unsolved_share`.
         """
         unsolved, open_power = record["unsolved_share"], abs(record["power_residual"])
         flow, small = max(abs(record["driving_power"]), record["loss"]), OF_LOSS * record["loss"]

@@ -43,10 +43,7 @@ class Equations(NamedTuple):
 def solve_bordered(equations, belt, state, work, size, dt):
     """Solve for the correction: of the border in its last column, of elements without its part in blocks.
 
-    Returns
-    -------
-    bool
-        Whether the elements' system is regular.
+    Returns whether the elements' system is regular.
     """
     is_regular = solve(work.blocks, work.scratch, size)
     equations.close(belt, state, work, dt)
@@ -119,32 +116,12 @@ def _newton(equations, belt, newton, state, work, load, dt):
 
 @kernel
 def advance_by(equations, belt, newton, state, work, inputs, steps, dt):
-    """Advance a belt by a number of steps, in place.
+    """Advance a belt by a number of steps of `dt` [s], in place; return how its last step ended.
 
-    Parameters
-    ----------
-    equations : Equations
-        Of the model.
-    belt : Belt
-        Its constants.
-    newton : Newton
-        How steps are solved.
-    state : BeltState
-        The state at the start; at the end, of its last step.
-    inputs : (2, INPUTS) array
-        Inputs of the model at the start and at the end (`belt.IN_SPEED` and so on): between, they change
-        linearly.
-    steps : int
-        Number of steps.
-    dt : float
-        Step [s].
-
-    Returns
-    -------
-    int
-        CONVERGED; NOT_CONVERGED where `most_failures` steps in a row had not converged; NOT_FINITE, or where
-        the system of an iteration is singular. Of the last step that had not converged the counters name the
-        contact at fault, and its element.
+    The model has `equations`, their steps are solved as `newton` tells. Inputs, (2, INPUTS) at the start and
+    at the end (`belt.IN_SPEED` and so on), change linearly between. Returns CONVERGED; NOT_CONVERGED where
+    `most_failures` steps in a row had not converged; NOT_FINITE, or where the system of an iteration is
+    singular. Of the last step that had not converged the counters name the contact at fault, and its element.
     """
     counters = state.counters
     for k in range(steps):

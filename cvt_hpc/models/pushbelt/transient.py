@@ -117,7 +117,7 @@ def _assemble(belt, state, work, dt):
 
 @kernel
 def _close(belt, state, work, dt):
-    """That of the border."""
+    """Close the system of the border."""
     step, iterate, blocks = work.step, work.iterate, work.blocks
     assembly.border_sums(belt, state.elements, work.shapes, step, iterate, blocks, work.sums, dt)
     close_border(belt, work.sums, work.border, dt)

@@ -23,21 +23,12 @@ class Basis(NamedTuple):
 
 
 def split_basis(belt: Belt, grid: Mesh, split: str, limit: float, spacing: float) -> Basis:
-    """Shapes of a belt, split at a limit frequency [Hz].
+    """Shapes of a belt, split at a limit frequency [Hz], one of SPLITS, with coarse splines of a spacing [m].
 
-    Parameters
-    ----------
-    belt, grid
-        The belt and its mesh.
-    split : str
-        One of SPLITS. `free_splines`: by the frequency of each spline by itself under tension and bending,
-        without grooves: the coarse ones move, the refinements lag (Lebrecht et al. 2004, fig. 2.6).
-        `held_splines`: by that frequency in the groove, if it lies there. `modes`: the eigenmodes of all
-        splines in closed grooves, of which none of the dynamic ones is faster than the limit.
-    limit : float
-        Limit frequency [Hz].
-    spacing : float
-        Of the coarse splines [m].
+    `free_splines`: by the frequency of each spline by itself under tension and bending, without grooves: the
+    coarse ones move, the refinements lag (Lebrecht et al. 2004, fig. 2.6). `held_splines`: by that frequency
+    in the groove, if it lies there. `modes`: the eigenmodes of all splines in closed grooves, of which none
+    of the dynamic ones is faster than the limit.
     """
     mass, held = belt.mass * belt.dual, transverse_stiffness(belt)
     shapes = splines_of_belt(grid, spacing).values

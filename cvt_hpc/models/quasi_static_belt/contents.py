@@ -25,29 +25,12 @@ def settle_contents(
     along: np.ndarray,
     step: float,
 ) -> float:
-    """Contents at the end of a step, and the speeds of a steady flow that go with them.
+    """Set contents at the end of a step [s], and the speeds of a steady flow that go with them.
 
-    Parameters
-    ----------
-    belt : Belt
-        Constants.
-    drag : (2,) array
-        Of the material against its layer [N s/m^2].
-    share : (2, N) array
-        The layers' mass at the stations over the layer's whole mass [1].
-    fields : (7, N) array
-        Of the state: displacements at the end of the step; contents and speeds are set.
-    eps : (2, N) array
-        Strains at its beginning.
-    along : (2, N) array
-        Forces on the layers at the stations [N] but for their stresses.
-    step : float
-        [s]
-
-    Returns
-    -------
-    float
-        Power that the drag takes [W].
+    `drag`, (2,), is that of the material against its layer [N s/m^2], `share`, (2, N), the layers' mass at
+    the stations over the layer's whole mass. Of the state's `fields`, (7, N), displacements are those at the
+    end of the step; contents and speeds are set. `eps` are strains at its beginning, `along` forces on the
+    layers at the stations [N] but for their stresses, (2, N) each. Returns the power that the drag takes [W].
     """
     n, taken = belt.cell.size, 0.0
     lower, middle, upper, change = np.empty(n), np.empty(n), np.empty(n), np.empty(n)

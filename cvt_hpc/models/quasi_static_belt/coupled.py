@@ -114,14 +114,7 @@ def solve_chain(work: Chain) -> None:
 def solve_dense(matrix: np.ndarray, size: int, x: np.ndarray) -> None:
     """Solve by elimination without exchange of rows: the matrix has a positive definite symmetric part.
 
-    Parameters
-    ----------
-    matrix : (>= size, > size) array
-        Its column `size` is the right side; used up.
-    size : int
-        Of the system.
-    x : (>= size,) array
-        Result.
+    Its column `size` is the right side, all of it is used up. The result is set into `x`.
     """
     for k in range(size):
         per_pivot = 1.0 / matrix[k, k]

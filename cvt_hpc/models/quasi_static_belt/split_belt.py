@@ -35,31 +35,15 @@ class SplitBelt(NamedTuple):
 
 
 class Motion(NamedTuple):
-    """State of a run.
+    """State of a run."""
 
-    Attributes
-    ----------
-    state : State
-        As of the elastic belt; its u is the sliding part.
-    q, p : (D + L,) arrays
-        Coordinates [m] and their rates [m/s].
-    contacts : pair of Contact
-        Closed sets.
-    force : (N,) array
-        Axial line forces of `state` [N/m].
-    eps : (2, N) array
-        Strains of `state`.
-    counts : (3,) int array
-        Steps, steps done again, solves of the contact.
-    """
-
-    state: State
-    q: np.ndarray
-    p: np.ndarray
-    contacts: tuple[Contact, Contact]
-    force: np.ndarray
-    eps: np.ndarray
-    counts: np.ndarray
+    state: State  # of the elastic belt; its u is the sliding part
+    q: np.ndarray  # coordinates, (D + L,) [m]
+    p: np.ndarray  # their rates, (D + L,) [m/s]
+    contacts: tuple[Contact, Contact]  # closed sets
+    force: np.ndarray  # axial line forces of `state`, (N,) [N/m]
+    eps: np.ndarray  # strains of `state`, (2, N)
+    counts: np.ndarray  # steps, steps done again, solves of the contact, (3,)
 
 
 class Work(NamedTuple):
@@ -91,19 +75,7 @@ def layer_shares(belt: Belt) -> np.ndarray:
 def split_belt(
     belt: Belt, grid: Mesh, basis: Basis, limit: float, longitudinal: str, step: float
 ) -> SplitBelt:
-    """Constants of a run.
-
-    Parameters
-    ----------
-    belt, grid, basis
-        The belt, its mesh and its shapes.
-    limit : float
-        Limit frequency [Hz].
-    longitudinal : str
-        As the parameter of the job.
-    step : float
-        [s]
-    """
+    """Constants of a run, with a limit frequency [Hz], a step [s] and the job's parameter `longitudinal`."""
     lag = 1.0 / (2.0 * np.pi * limit)
     shapes = np.ascontiguousarray(np.hstack([basis.dynamic, basis.lagging]))
     count, slow = shapes.shape[1], basis.dynamic.shape[1]

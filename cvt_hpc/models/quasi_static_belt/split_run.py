@@ -24,15 +24,7 @@ BEYOND_LIMIT = 1.25  # of 2 / w of the fastest dynamic shape: contact may be sti
 
 
 class SplitRun(OneLaneRun):
-    """One run, advanced sample by sample; attributes as of `RecordedRun`.
-
-    Parameters
-    ----------
-    parameters : dict
-        Resolved parameters of the run [SI].
-    stepper : str
-        "split", which it is.
-    """
+    """One run by the stepper "split", advanced sample by sample; attributes as of `RecordedRun`."""
 
     failure: tuple[Status, str] | None
 
@@ -91,10 +83,7 @@ class SplitRun(OneLaneRun):
     def take_over(self, runs: Sequence[Any]) -> None:
         """Continue a run by another stepper, its history included, except for means that began before.
 
-        Parameters
-        ----------
-        runs : sequence of one run
-            Of the same mesh, sampling and duration.
+        `runs` is one run of the same mesh, sampling and duration.
         """
         (run,) = runs
         self._go_on_from(run)
@@ -110,18 +99,7 @@ class SplitRun(OneLaneRun):
         return found
 
     def advance(self, samples: int) -> tuple[Status, str] | None:
-        """March on.
-
-        Parameters
-        ----------
-        samples : int
-            How many samples at most; 0 compiles only.
-
-        Returns
-        -------
-        (Status, str) or None
-            The failure, where the run cannot continue.
-        """
+        """March on by so many samples at most, 0 compiles only; the failure, if the run cannot continue."""
         if samples == 0:
             self._march(self._model, self._motion, self._work, 0, self._noted)
         for _ in range(min(samples, self.samples - self.done)):

@@ -140,14 +140,9 @@ def side_torque(state, step, j, p):
 
 @kernel
 def residuals(belt, state, changes, openings, shapes, load, step, iterate, scratch, border, dt):
-    """Residuals of all equations: of elements in `iterate`, of the border in the last column of `border`.
+    """Set residuals: of elements in `iterate`, of the border in its last column; return the power's [W].
 
     Forces of flanks and saddles stand in the residuals already. Weight acts as in the plane.
-
-    Returns
-    -------
-    float
-        Power residual of the belt [W].
     """
     modes = belt.modal_stiffness.shape[1]
     fall = dt * belt.gravity

@@ -129,33 +129,21 @@ NEWTON = Newton(tolerance=3e-3, power_tolerance=5.0, weights=(1.0, 1.0, 1.0, 1e-
 class BeltState(NamedTuple):
     """State of a run, which `step.advance` takes on.
 
-    Attributes
-    ----------
-    elements : (rows, STATE_FIELDS) LaneArray
-        Element p rows + j lies in row j, lane p.
-    pulleys : (PULLEY_FIELDS,) array
-        Speeds, radii and positions of mid planes.
-    openings, leans : (2, modes) array
-        Of each pulley: the sheaves open by a_k, and the right one b_k more, the left one b_k less [m].
-    increments : (1 + 2 modes,) array
-        Changes in the last step of the border's unknowns: speed of the driven pulley, openings.
-    loads : (LOADS,) array
-        Axial forces on the four sheaves and torques on the pulleys in the last step; no part of what a run
-        goes on from.
-    totals : (TOTALS,) array
-        What has added up since the start.
-    counters : (COUNTERS,) int array
-        Work done, and how the last call ended.
+    Of each pulley the sheaves open by a_k, `openings`, and the right one b_k more, the left one b_k less,
+    `leans` [m].
     """
 
-    elements: LaneArray
-    pulleys: np.ndarray
-    openings: np.ndarray
-    leans: np.ndarray
+    elements: LaneArray  # (rows, STATE_FIELDS): element p rows + j lies in row j, lane p
+    pulleys: np.ndarray  # (PULLEY_FIELDS,): speeds, radii and positions of mid planes
+    openings: np.ndarray  # (2, modes)
+    leans: np.ndarray  # (2, modes)
+    # (1 + 2 modes,): changes in the last step of the border's unknowns: speed of the driven pulley, openings
     increments: np.ndarray
+    # (LOADS,): axial forces on the four sheaves and torques on the pulleys in the last step; no part of what
+    # a run goes on from
     loads: np.ndarray
-    totals: np.ndarray
-    counters: np.ndarray
+    totals: np.ndarray  # sums since the start, (TOTALS,)
+    counters: np.ndarray  # work done, and how the last call ended, (COUNTERS,)
 
 
 NEWTON_OF_TWO_FLOWS = NEWTON._replace(weights=(*NEWTON.weights, 1.0))
@@ -198,24 +186,11 @@ def belt_of(given: Mapping[str, Any], chord: float) -> Belt:
 
 
 class SideLine:
-    """Where the belt lies out of the plane at the start, along its path.
+    """Line of the belt out of the plane at the start, along its path [m].
 
-    On the arcs in the mid planes of the pulleys, on the strands along cubics with the slopes of the arcs'
-    ends, as a beam without tension lies between them; there with a disturbance, whose slope vanishes at the
-    ends.
-
-    Parameters
-    ----------
-    path : Variator
-        [m]
-    belt : Belt
-        Constants.
-    middles : (float, float)
-        Axial positions of the mid planes [m].
-    disturbance : float
-        Largest displacement of it [m].
-    seed : int
-        By which the amplitudes of its modes are drawn.
+    On the arcs it is in the mid planes of the pulleys, on the strands along cubics with the slopes of the
+    arcs' ends, as a beam without tension lies between them; there with a disturbance of so much at the most
+    [m], whose slope vanishes at the ends. The amplitudes of its modes are drawn by the seed.
     """
 
     def __init__(
@@ -276,16 +251,9 @@ class SideLine:
 def start(given: Mapping[str, Any]) -> tuple[Belt, BeltState]:
     """Constants and a state from which a belt can run in: equal chords along the ideal path, at its speed.
 
-    Parameters
-    ----------
-    given : mapping
-        Values [SI] as `transient.given` names them, those of an element for each of `elements`.
-
-    Returns
-    -------
-    Belt, BeltState
-        The flanks just touch, but for the disturbance; the rings have the strain `ring_strain`. Half of the
-        misalignment is the driving pulley's.
+    The flanks just touch, but for the disturbance; the rings have the strain `ring_strain`. Half of the
+    misalignment is the driving pulley's. Values [SI] are given as `transient.given` names them, those of an
+    element for each of `elements`.
     """
     g, line = given, pitch_line(given)
     belt, nodes, along, speed = belt_of(g, line.chord), g["elements"], line.along, line.speed

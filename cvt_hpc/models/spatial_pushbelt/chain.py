@@ -33,7 +33,7 @@ def motion(state, j, share):
 
 @register_jitable
 def motion_ahead(state, j, share):
-    """Those of the next one."""
+    """Motion of the next element, in the form of `motion`."""
     return vec.both_moved(vec.screw_ahead(state, j, f.SPEED), share, vec.screw_ahead(state, j, f.CHANGE))
 
 
@@ -152,7 +152,7 @@ def predict(belt, state, pulleys, step, dt):
 
 @kernel
 def link(belt, state, step, dt):
-    """What the free chain needs of pairs of neighbours: tension and pitch."""
+    """Tension and pitch of pairs of neighbours, which the free chain needs."""
     b = belt.package_distance
     stiffness, damping = 0.5 * belt.angle_stiffness, 0.5 * belt.angle_damping
     for j in range(state.rows):

@@ -234,7 +234,7 @@ def flank_forces(belt, state, pulleys, increments, openings, shapes, step, itera
 
 @register_jitable
 def _point_slopes(belt, step, iterate, j, p, axes, dt):
-    """How the force of a point falls, and by what: three forces, and their rows by velocity and by turning.
+    """Slopes of the force of a point: three forces, and their rows by velocity and by turning.
 
     The forces are those for each unit of the gap's rate and of both slips; then the lever, and t.
     """
@@ -293,7 +293,7 @@ def _with_force(total, lever, g):
 
 @register_jitable
 def _border_of_side(belt, step, iterate, j, p, points, driven, dt):
-    """What the two points from p on have for the border.
+    """Entries of the two points from p on in the border.
 
     First their forces and moments by the driven pulley's speed and by an opening. Then the decrease of their
     axial force, and of the driven torque, by velocity and by turning. Last that of the torque by the pulley's

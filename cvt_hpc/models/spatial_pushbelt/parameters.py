@@ -184,13 +184,7 @@ def roll_limit(parameters: Parameters) -> float:
 
 
 def check(parameters: Parameters) -> list[tuple[str, str, str]]:
-    """Problems that lie between parameters, in the form of `pushbelt.check`.
-
-    Parameters
-    ----------
-    parameters : dict
-        Values by name, in SI units.
-    """
+    """Problems that lie between parameters [SI], in the form of `pushbelt.check`."""
     p = parameters
     problems = pushbelt.check(p)
     widths = dict.fromkeys(("edge_half_width", "head_half_width", "package_offset"), "element_width")

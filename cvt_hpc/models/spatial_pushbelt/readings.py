@@ -86,32 +86,14 @@ def _unit(a: np.ndarray) -> np.ndarray:
 
 
 def angles(elements: np.ndarray) -> np.ndarray:
-    """Sines of ANGLES: lateral lean, yaw out of the plane and tilt against the rings, (3, n).
-
-    Parameters
-    ----------
-    elements : (n, fields) array
-        In the order of the belt.
-    """
+    """Sines of ANGLES, (3, n): lateral lean, yaw out of the plane and tilt against the rings of elements."""
     position, o = _vectors(elements, fields.POSITION), _vectors(elements, fields.OUTWARD)
     chord = np.roll(position, -1, axis=0) - np.roll(position, 1, axis=0)
     return np.array([o[:, 2], elements[:, fields.HEADING + fields.AXIAL], -_dot(_unit(chord), o)])
 
 
 class Reading:
-    """What is read at one sample.
-
-    Parameters
-    ----------
-    where : Readings
-        Where it is read.
-    elements : (n, fields) array
-        In the order of the belt.
-    pulleys : (PULLEY_FIELDS,) array
-        State of the pulleys.
-    loads : (LOADS,) array
-        Axial forces on the sheaves.
-    """
+    """Readings of one sample: of elements in the order of the belt, of pulleys and of loads (`BeltState`)."""
 
     def __init__(self, where: Readings, elements: np.ndarray, pulleys: np.ndarray, loads: np.ndarray) -> None:
         e = elements
@@ -224,10 +206,7 @@ class Reading:
     def stored_energy(self, openings: np.ndarray, leans: np.ndarray) -> float:
         """Kinetic and elastic energy of belt, driven pulley and sheaves [J].
 
-        Parameters
-        ----------
-        openings, leans : (2, modes) arrays
-            Of the sheaves: of both alike, and of the right one against the left one [m].
+        Of the sheaves by what both alike open, and the right one against the left one, (2, modes) [m].
         """
         e, belt = self._elements, self._where.belt
         x, o = self._x, self._o

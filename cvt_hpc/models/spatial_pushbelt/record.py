@@ -156,13 +156,7 @@ VARIABLES = (
 
 
 def coordinates(parameters: Mapping[str, Any]) -> dict[str, Coordinate]:
-    """Coordinates of the record's dimensions.
-
-    Parameters
-    ----------
-    parameters : dict
-        Flat parameters of the job.
-    """
+    """Coordinates of the record's dimensions, by flat parameters of the job."""
     sheave = Coordinate(np.array(readings.SHEAVES), "", "sheave", "pulley and side")
     return {**pushbelt.coordinates(parameters), "sheave": sheave}
 
@@ -179,17 +173,9 @@ judge = partial(judging.judge, variables=VARIABLES, names=(*STRANDS, *readings.L
 
 
 def histories(run: ElementRun) -> xr.Dataset:
-    """Histories over `time` and means by `position` of a run, finished or failed.
+    """Histories of a run as those of the planar pushbelt, as far as it has samples.
 
-    Parameters
-    ----------
-    run : ElementRun
-        With the samples that it has.
-
-    Returns
-    -------
-    Dataset
-        That of the planar pushbelt; probes of t1_lateral and t2_lateral move out of the plane, to the right.
+    Probes of t1_lateral and t2_lateral move out of the plane, to the right.
     """
     outwards = "of the belt on the sheave, outwards"
     over_time = {f"sheave_force {k}": (f"axial force {k}", "N", outwards) for k in readings.SHEAVES}

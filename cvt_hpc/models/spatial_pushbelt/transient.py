@@ -85,7 +85,7 @@ class Transient(ElementRun):
         return self._belt.pitch_inertia
 
     def _out_of_place(self) -> str | None:
-        """As in the plane; or whether an element is so far out of it that no groove and no ring holds it."""
+        """Reason why a sheave is at its stop, or an element is beyond all grooves; None where all is well."""
         elements = of_lanes(self._state.elements)
         lateral = np.abs(elements[:, f.POSITION + f.AXIAL])
         most = LARGEST_DISPLACEMENT * self.parameters["centre_distance"]
@@ -105,7 +105,7 @@ class Transient(ElementRun):
 
 
 def given(parameters: Parameters) -> dict[str, Any]:
-    """What `start` takes, from flat parameters of a run [SI]."""
+    """Return what `start` takes, from flat parameters of a run [SI]."""
     p, shared = parameters, run.given(parameters)
     pitch = shared["belt_length"] / p["elements"]
     return {
@@ -156,14 +156,14 @@ def _place(belt, state, work, dt):
 
 @kernel
 def _prepare(belt, state, work, dt):
-    """What all iterates of a step have in common."""
+    """Prepare what all iterates of a step have in common."""
     _place(belt, state, work, dt)
     assembly.linear_blocks(belt, work.step, dt)
 
 
 @kernel
 def _prepare_two_flows(belt, state, work, dt):
-    """The same with two flows."""
+    """Prepare what all iterates have in common with two flows."""
     _place(belt, state, work, dt)
     two_flows.predict_flows(belt, state.elements, work.step, dt)
     assembly.linear_blocks(belt, work.step, dt)
@@ -203,7 +203,7 @@ def _evaluate(belt, state, work, load, dt):
 
 @kernel
 def _evaluate_two_flows(belt, state, work, load, dt):
-    """The same with two flows."""
+    """Forces and residuals of the iterate with two flows; return the power residual [W]."""
     elements, step, iterate = state.elements, work.step, work.iterate
     _press(belt, state, work, dt)
     two_flows.difference_forces(elements, step, iterate)
@@ -221,21 +221,21 @@ def _assemble(belt, state, work, dt):
 
 @kernel
 def _assemble_two_flows(belt, state, work, dt):
-    """The same with two flows."""
+    """The linear system of the elements with two flows."""
     _assemble(belt, state, work, dt)
     two_flows.widen(belt, work.step, work.iterate, work.narrow, work.blocks, dt)
 
 
 @kernel
 def _close(belt, state, work, dt):
-    """That of the border."""
+    """Close the system of the border."""
     assembly.border_sums(belt, state.elements, work.shapes, work.iterate, work.narrow, work.sums)
     close_border(belt, work.sums, work.border, dt)
 
 
 @kernel
 def _close_two_flows(belt, state, work, dt):
-    """The same with two flows."""
+    """Close the system of the border with two flows."""
     two_flows.narrow_solutions(work.blocks, work.narrow)
     _close(belt, state, work, dt)
 
@@ -373,7 +373,7 @@ def _accept(belt, state, work, inputs, dt):
 
 @kernel
 def _accept_two_flows(belt, state, work, inputs, dt):
-    """The same with two flows."""
+    """Take the state to the end of the step with two flows."""
     two_flows.book_difference(belt, state, work, dt)
     two_flows.accept_difference(belt, state, work, dt)
     _accept(belt, state, work, inputs, dt)

@@ -38,7 +38,7 @@ def _drawn_apart(state, step, j, share):
 
 @kernel
 def predict_flows(belt, state, step, dt):
-    """What two flows need in a step beside what one needs; sets tension and its slope anew."""
+    """Predict what two flows need in a step beside what one needs; sets tension and its slope anew."""
     b = belt.package_distance
     half_stiffness = 0.5 * belt.ring_stiffness
     steep = ring_share(belt, dt) * half_stiffness
@@ -101,7 +101,7 @@ def difference_forces(state, step, iterate):
 
 @kernel
 def saddle_forces_of_two(belt, state, step, iterate):
-    """As `saddle.saddle_forces`, of either package by its own slip and its own normal force."""
+    """Set forces of `saddle.saddle_forces`, of either package by its own slip and its own normal force."""
     for j in range(step.rows):
         before, half_before = state[j, f.RING_SLIP], state[j, f.HALF_SLIP]
         by_half = vec.screw(step, j, f.HALF_SLIP_BY)

@@ -22,10 +22,7 @@ OWN: Widths = (1.0, 1.0)
 class NoSteadyState(ValueError):
     """No steady state was found; the text states the reason.
 
-    Attributes
-    ----------
-    reach : str
-        How far states under other loads reach; "" where that is not known.
+    `reach` states how far states under other loads reach; it is "" where that is not known.
     """
 
     def __init__(self, text: str, reach: str = "") -> None:
@@ -42,19 +39,9 @@ class PathEnds(NoSteadyState):
 
 
 class Continuation:
-    """Equations of one belt under changing constants.
+    """Equations of one belt, from its resolved parameters [SI], under changing constants.
 
-    Parameters
-    ----------
-    parameters : dict
-        Resolved parameters of the run [SI].
-
-    Attributes
-    ----------
-    equations : Equations
-        Under the present constants.
-    whole : Belt
-        The belt's own constants.
+    `equations` are those under the present constants, `whole` the belt's own constants.
     """
 
     def __init__(self, parameters: Mapping[str, Any]) -> None:
@@ -116,24 +103,11 @@ class Continuation:
         tolerance: float = ON_THE_WAY,
         equations: Solvable | None = None,
     ) -> np.ndarray:
-        """Solution at the end of a path, from that at its beginning.
+        """Return the solution at the end of a path, from `x`, (n,), at its beginning.
 
-        Its steps double where they succeed and are quartered where they fail.
-
-        Parameters
-        ----------
-        change : callable
-            change(share) sets the constants at a share of the path.
-        x : (n,) array
-            Solution at 0.
-        step : float
-            The first step, a share of the path.
-        name : str
-            Of the path, for the error.
-        tolerance : float
-            Of each solution.
-        equations : Solvable, optional
-            The changed parameters; by default the belt's.
+        change(share) sets the constants at a share of the path; by default those of the belt's equations.
+        Steps, the first of `step`, double where they succeed and are quartered where they fail. The error has
+        the path's name.
 
         Raises
         ------

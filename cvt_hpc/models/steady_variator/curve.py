@@ -45,27 +45,14 @@ NONE = -1  # in the place of a corner
 
 
 class Piece(NamedTuple):
-    """The curve about a state, with a set of pressed cells.
+    """The curve about a state, with a set of pressed cells."""
 
-    Attributes
-    ----------
-    x : (n,) array
-        Unknowns of the state.
-    pressed : (2 N,) array of bool
-        The cells that are taken as pressed, on both of their corners.
-    factors : SuperLU
-        Of the residual's slopes with a direction below them.
-    tangent : (n,) array
-        In which the residual does not change; over the unknowns' sizes, of mean square 1.
-    sense : float
-        Sign (1 or -1) of the determinant of these slopes above the tangent.
-    """
-
-    x: np.ndarray
-    pressed: np.ndarray
-    factors: Any
+    x: np.ndarray  # unknowns of the state, (n,)
+    pressed: np.ndarray  # (2 N,) bool: the cells that are taken as pressed, on both of their corners
+    factors: Any  # SuperLU of the residual's slopes with a direction below them
+    # in which the residual does not change, (n,); over the unknowns' sizes, of mean square 1
     tangent: np.ndarray
-    sense: float
+    sense: float  # sign (1 or -1) of the determinant of these slopes above the tangent
 
 
 class Reached(NamedTuple):
@@ -77,19 +64,10 @@ class Reached(NamedTuple):
 
 
 class Curve:
-    """Steady states of one belt.
+    """Steady states of one belt, whose load in `equations` has no influence.
 
-    Parameters
-    ----------
-    equations : Equations
-        Of the belt; its load has no influence.
-    tolerance : float
-        Root mean square of the last correction at most, over the unknowns' sizes.
-
-    Attributes
-    ----------
-    within : callable
-        within(share): state with its load [N m] at a share of the last step, 0 to 1; None if not found.
+    The last correction is of `tolerance` at most, a root mean square over the unknowns' sizes. within(share)
+    is the state with its load [N m] at a share of the last step, 0 to 1; None if not found.
     """
 
     def __init__(self, equations: Equations, tolerance: float) -> None:
@@ -100,14 +78,9 @@ class Curve:
         self.within: Callable[[float], tuple[np.ndarray, float] | None] = lambda share: None
 
     def along(self, x: np.ndarray, sign: float) -> Iterator[tuple[np.ndarray, float]]:
-        """States with their loads [N m], as far as they are found.
+        """Yield states with their loads [N m], as far as they are found, from the unknowns `x` of one.
 
-        Parameters
-        ----------
-        x : (n,) array
-            Unknowns of a state, where the curve begins.
-        sign : float
-            The driven speed rises (1) or falls (-1) at first.
+        The driven speed rises (sign 1) or falls (-1) at first.
         """
         ahead = np.zeros(x.size)
         ahead[SPEED] = sign
@@ -164,20 +137,10 @@ class Curve:
     def _stepped(
         self, piece: Piece, step: float, corner: int, distance: float, told: np.ndarray
     ) -> tuple[Reached | None, float, int]:
-        """The next state, the length of the step from there, and the corner on which it is.
+        """Return the next state, the length of the step from there, and the corner on which it is.
 
-        Without a state: the corner on which the piece is; or NONE, where no step succeeds.
-
-        Parameters
-        ----------
-        piece : Piece
-            Where the step begins.
-        step : float
-            Its length.
-        corner, distance
-            As of `_next_corner`.
-        told : (2 N,) array of bool
-            Corners that count.
+        Without a state: the corner on which the piece is; or NONE, where no step succeeds. `corner` and
+        `distance` are those of `_next_corner`; corners that count are `told`, (2 N,) bool.
         """
         meets = corner if distance < step else NONE
         taken = min(distance, step)
@@ -233,7 +196,7 @@ class Curve:
         return int(met[steepest]), 0.0 if near else float(inside[steepest] / nears[steepest])
 
     def _residual(self, x: np.ndarray, pressed: np.ndarray) -> tuple[np.ndarray, float] | None:
-        """As of `Equations` (n - 1,), without the balance that gives the load, and the load [N m]."""
+        """Return the residual of `Equations` without the balance that gives the load, and the load [N m]."""
         left = self._equations.residual(x, pressed.reshape(2, -1))
         if left is None or not np.all(np.isfinite(left)):
             return None

@@ -50,21 +50,10 @@ MOMENT = -4  # place of the driven pulley's balance of moments in the residual
 
 
 class Equations:
-    """Residual and Jacobian of the steady equations of one belt.
+    """Residual and Jacobian of the steady equations of one belt, from its resolved parameters [SI].
 
-    Parameters
-    ----------
-    parameters : dict
-        Resolved parameters of the run [SI].
-    belt : Belt
-        Its constants.
-
-    Attributes
-    ----------
-    belt : Belt
-        With dampers that act up to where their push has ended.
-    sizes : (n,) array
-        Typical size of each unknown.
+    `belt` has dampers that act up to where their push has ended; `sizes`, (n,), are typical ones of the
+    unknowns.
     """
 
     def __init__(self, parameters: Mapping[str, Any], belt: Belt) -> None:

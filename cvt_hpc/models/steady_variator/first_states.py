@@ -47,15 +47,7 @@ class SlipsThrough(NoSteadyState):
 
 
 class FirstStates:
-    """First states of one belt.
-
-    Parameters
-    ----------
-    parameters : dict
-        Resolved parameters of the run [SI].
-    continuation : Continuation
-        Of that belt.
-    """
+    """First states of one belt, from its resolved parameters [SI] and its continuation."""
 
     def __init__(self, parameters: Mapping[str, Any], continuation: Continuation) -> None:
         self._parameters, self._course = parameters, continuation
@@ -67,14 +59,9 @@ class FirstStates:
         )
 
     def under(self, load: float, rise: Callable[[np.ndarray, float, float], np.ndarray]) -> np.ndarray:
-        """Unknowns under a load [N m].
+        """Return the unknowns under a load at the driving pulley [N m].
 
-        Parameters
-        ----------
-        load : float
-            Torque at the driving pulley.
-        rise : callable
-            rise(x, start, load): unknowns under a load from those under another one.
+        rise(x, start, load) gives the unknowns under a load from those under another one.
 
         Raises
         ------

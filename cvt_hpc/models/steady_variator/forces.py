@@ -27,26 +27,14 @@ LOSSES = ("driving_flank_loss", "driven_flank_loss", "ring_loss", "belt_loss", "
 
 
 class Distributions(NamedTuple):
-    """Around the belt, (N,) each: T and P in the cells, all else at the stations.
+    """Distributions around the belt, (N,) each: T and P in the cells, all else at the stations."""
 
-    Attributes
-    ----------
-    ring_tension, push_force : (N,) arrays
-        [N]; the push force without its damper.
-    contact_force : (N,) array
-        Axial line force of one flank [N/m].
-    element_speed, ring_speed : (N,) arrays
-        Along the path [m/s].
-    displacement : (N,) array
-        Off the reference path, outward [m].
-    """
-
-    ring_tension: np.ndarray
-    push_force: np.ndarray
-    contact_force: np.ndarray
-    element_speed: np.ndarray
-    ring_speed: np.ndarray
-    displacement: np.ndarray
+    ring_tension: np.ndarray  # [N]
+    push_force: np.ndarray  # without its damper [N]
+    contact_force: np.ndarray  # axial line force of one flank [N/m]
+    element_speed: np.ndarray  # along the path [m/s]
+    ring_speed: np.ndarray  # along the path [m/s]
+    displacement: np.ndarray  # off the reference path, outward [m]
 
 
 def driving_speed(steady: Steady) -> float:

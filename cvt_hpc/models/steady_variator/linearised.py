@@ -36,19 +36,12 @@ SIZES_OF_PULL = np.array([100.0, 100.0, *[1e4] * 6])  # of `pulled_by` [N m], [N
 
 @kernel
 def local_slopes(flat: one.FlatBelt, increments: np.ndarray, near: np.ndarray, turning: np.ndarray) -> None:
-    """Slopes of all rates with the axial forces held, about `flat.state` under `flat.force`.
+    """Set slopes of all rates with the axial forces held, about `flat.state` under `flat.force`.
 
-    Parameters
-    ----------
-    flat : FlatBelt
-        The belt and its state, left as they are.
-    increments : (K,) array
-        Of the fields and the axial force: 8, or 9 where elements tilt.
-    near : (K, K, N, 5) array
-        Result: slope of rate o (of the fields; the moment on the driven pulley) at station j + d - 2 with
-        unknown i (the fields; the axial force) at station j, in [o, i, j, d].
-    turning : (K, N) array
-        Result: slopes of rates and moments with the driven pulley's speed.
+    `increments` are those of the K fields and axial force: 8, or 9 where elements tilt. Result in `near`, (K,
+    K, N, 5): slope of rate o (of the fields; the moment on the driven pulley) at station j + d - 2 with
+    unknown i (the fields; the axial force) at station j, in [o, i, j, d]; in `turning`, (K, N): slopes of
+    rates and moments with the driven pulley's speed.
     """
     n, fields, count = flat.belt.cell.size, flat.state.fields, increments.size
     origin, force = fields.copy(), flat.force.copy()
@@ -137,22 +130,11 @@ def corners(belt: Belt, state: State) -> np.ndarray:
 
 
 def rates_beyond_corners(belt: Belt, state: State, pressed: np.ndarray) -> tuple[np.ndarray, np.ndarray]:
-    """What the rates of u and of the elements' speed lack where pushes go on beyond their corners.
+    """Return what the rates of u and v_element lack where pushes go on beyond their corners, (N,) [m/s^2].
 
-    With them the rates are those of a belt whose pressed cells pull, and whose other cells do not push, on
-    either side of their corners: smooth there, and the belt's own where each cell is on its side.
-
-    Parameters
-    ----------
-    belt, state
-        Constants and state.
-    pressed : (2, N) array of bool
-        Cells that are taken as pressed, as of `corners`.
-
-    Returns
-    -------
-    across, along : (N,) arrays
-        Of u and v_element [m/s^2]; zeros where elements rock, whose corners these are not.
+    With them the rates are those of a belt whose pressed cells, (2, N) as of `corners`, pull, and whose other
+    cells do not push, on either side of their corners: smooth there, and the belt's own where each cell is on
+    its side. They are zeros where elements rock, whose corners these are not.
     """
     if belt.has_column:
         return np.zeros(belt.cell.size), np.zeros(belt.cell.size)
@@ -176,13 +158,7 @@ def _strained(belt: Belt, state: State) -> tuple[np.ndarray, np.ndarray, np.ndar
 
 
 class Linearisation:
-    """Jacobians of the rates of belts that differ in neither mesh nor sheaves.
-
-    Parameters
-    ----------
-    flat : FlatBelt
-        One of them.
-    """
+    """Jacobians of the rates of belts that differ in neither mesh nor sheaves; `flat` is one of them."""
 
     def __init__(self, flat: one.FlatBelt) -> None:
         belt = flat.belt
@@ -213,15 +189,10 @@ class Linearisation:
         self._near, self._turning = np.zeros(o.shape), np.zeros((fields + 1, n))
 
     def __call__(self, flat: one.FlatBelt, pressed: np.ndarray | None = None) -> csc_array:
-        """Jacobian of `flat.rates`, (n, n), about the state of its last call.
+        """Return the Jacobian of `flat.rates`, (n, n), about the state of its last call.
 
-        Parameters
-        ----------
-        flat : FlatBelt
-            With that state.
-        pressed : (2, N) array of bool, optional
-            On which side of its `corners` each cell is taken to be; without it slopes are means across those
-            within reach of the increments.
+        `pressed`, (2, N) bool, tells on which side of its `corners` each cell is taken to be; without it
+        slopes are means across those within reach of the increments.
         """
         belt, count, n = flat.belt, self._count, flat.belt.cell.size
         contents = flat.state.fields[f.N_ELEMENT]

@@ -28,24 +28,11 @@ class Solvable(Protocol):
 
 
 def newton(equations: Solvable, x: np.ndarray, tolerance: float, sided: bool = True) -> np.ndarray | None:
-    """Solve the steady equations.
+    """Solve the steady equations from `x`, (n,), which stays as it is; None where the iteration does not end.
 
-    Parameters
-    ----------
-    equations : Solvable
-        With their constants.
-    x : (n,) array
-        Where to begin; left as it is.
-    tolerance : float
-        Root mean square of the next step, over the unknowns' sizes.
-    sided : bool
-        With slopes on the near side of each corner: ends after a few steps from a solution nearby. Otherwise
-        with mean slopes across those that are very near, which is better from far away.
-
-    Returns
-    -------
-    (n,) array or None
-        The solution; None where the iteration does not end.
+    The root mean square of the next step, over the unknowns' sizes, is `tolerance` at most. With slopes on
+    the near side of each corner (`sided`) it ends after a few steps from a solution nearby. Mean slopes
+    across those that are very near are better from far away.
     """
     residual = equations.residual(x)
     for _ in range(FULL_STEPS):

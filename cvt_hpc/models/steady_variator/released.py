@@ -56,15 +56,7 @@ def freed(parameters: Mapping[str, Any]) -> dict[str, Any] | None:
 
 
 def nearest(whole: Belt, free: Belt, state: State) -> State:
-    """State of free pulleys nearest to one of pulleys that are not.
-
-    Parameters
-    ----------
-    whole, free : Belt
-        Constants of the held pulleys and of the free ones.
-    state : State
-        Of the former.
-    """
+    """Return the state of free pulleys nearest to `state`, one of the `whole` belt, whose pulleys are not."""
     found, force = state.copy(), np.zeros(whole.cell.size)
     contact_forces(whole, state, fresh_contacts(whole), force)
     pull, laws = pulled_by(whole, force, np.zeros_like(force)), free.pulleys.laws[0]
@@ -79,19 +71,7 @@ def nearest(whole: Belt, free: Belt, state: State) -> State:
 class Released:
     """The equations of free pulleys on their way from a held state; in the form that `newton` takes.
 
-    Parameters
-    ----------
-    equations : Equations
-        Of the free pulleys.
-    x : (n,) array
-        Their unknowns nearest to the held state.
-
-    Attributes
-    ----------
-    sizes : (n,) array
-        As of `Equations`.
-    share : float
-        Of the way, 0 to 1.
+    `x`, (n,), are the free pulleys' unknowns nearest to the held state; `share` is that of the way, 0 to 1.
     """
 
     def __init__(self, equations: Equations, x: np.ndarray) -> None:
@@ -107,5 +87,5 @@ class Released:
         return left - (1.0 - self.share) * self._start
 
     def jacobian(self, x: np.ndarray, sided: bool) -> csc_array:
-        """As of `Equations`."""
+        """Return the Jacobian, in the form of `Equations`."""
         return self._equations.jacobian(x, sided)

@@ -29,21 +29,10 @@ ROUNDS, ROUNDS_A_LOOK = 6, 0.3  # of the belt: the march ends; between two tries
 
 
 def settled(parameters: Mapping[str, Any], equations: Equations, tolerance: float) -> np.ndarray | Outcome:
-    """Steady unknowns that a transient comes to.
+    """Return the steady unknowns, (n,), that a transient comes to, with mesh and start of the run [SI].
 
-    Parameters
-    ----------
-    parameters : mapping
-        Resolved parameters of the run [SI]: mesh and start.
-    equations : Equations
-        Of the belt that is marched, under its load and with the friction that it has.
-    tolerance : float
-        Of Newton's iteration.
-
-    Returns
-    -------
-    (n,) array or Outcome
-        The unknowns; or how the march ended, OK if it has not settled in time.
+    Otherwise the outcome of the march, OK if it has not settled in time. `equations` are those of the belt
+    under its load and with the friction that it has; `tolerance` is that of Newton's iteration.
     """
     own = axial_element_stiffness(parameters)
     softened = min(own, STIFFEST_FLANKS)

@@ -34,24 +34,12 @@ WITHIN = 1e-3  # of a step: how closely its largest load is met, which changes t
 
 
 class Steady(NamedTuple):
-    """A steady state.
+    """A steady state."""
 
-    Attributes
-    ----------
-    load : float
-        Torque at the driving pulley [N m].
-    belt : Belt
-        Constants, under that load.
-    state : State
-        Of the belt, its time after any start-up.
-    unknowns : (n,) array
-        Of the `Equations`.
-    """
-
-    load: float
-    belt: Belt
-    state: State
-    unknowns: np.ndarray
+    load: float  # torque at the driving pulley [N m]
+    belt: Belt  # constants under that load
+    state: State  # of the belt, its time after any start-up
+    unknowns: np.ndarray  # those of the `Equations`, (n,)
 
     @property
     def largest_slip(self) -> float:
@@ -61,19 +49,11 @@ class Steady(NamedTuple):
 
 
 class Between(NamedTuple):
-    """Two neighbours on the curve of states, and those between them.
-
-    Attributes
-    ----------
-    low, high : Steady
-        The neighbours.
-    at : callable
-        at(share): the state at a share of the step from the one to the other; NoSteadyState where none is
-        found.
-    """
+    """Two neighbours on the curve of states, and those between them."""
 
     low: Steady
     high: Steady
+    # at(share): the state at a share of the step from low to high; NoSteadyState where none is found
     at: Callable[[float], Steady]
 
     def where(self, value: Callable[[Steady], float], wanted: float) -> Steady | None:
@@ -104,13 +84,7 @@ class Between(NamedTuple):
 
 
 class SteadyBelt:
-    """Steady states of one belt along its load.
-
-    Parameters
-    ----------
-    parameters : dict
-        Resolved parameters of the run [SI]; those of its course are not used, the load among them.
-    """
+    """Steady states of one belt along its load; the course in its resolved parameters [SI] does not count."""
 
     def __init__(self, parameters: Mapping[str, Any]) -> None:
         given = {**parameters, **OF_THE_COURSE, "load": 0.0}
@@ -123,15 +97,10 @@ class SteadyBelt:
         self._first = FirstStates(p, self._course)
 
     def at(self, load: float, near: Steady | None = None) -> Steady:
-        """State under a load.
+        """Return the state under a load at the driving pulley [N m].
 
-        Parameters
-        ----------
-        load : float
-            Torque at the driving pulley [N m].
-        near : Steady, optional
-            A state of this belt where the continuation begins; without it, or where that continuation fails,
-            a first state is made.
+        The continuation begins at `near`, a state of this belt; without it, or where that fails, a first
+        state is made.
 
         Raises
         ------
@@ -212,7 +181,7 @@ class SteadyBelt:
             yield step.high
 
     def _steps(self, equations: Equations, near: Steady, sign: float) -> Iterator[Between]:
-        """As `along_curve`, of the free pulleys or of the held ones, with the states in between."""
+        """Yield steps as `along_curve`, of free pulleys or of held ones, with the states in between."""
         curve = Curve(equations, AT_HOME)
 
         def alone() -> None:
@@ -233,12 +202,9 @@ class SteadyBelt:
             alone()
 
     def carried(self, near: Steady) -> Steady:
-        """State at the largest load that friction carries while neither pulley slips grossly.
+        """Return the state at the largest load that friction carries while neither pulley slips grossly.
 
-        Parameters
-        ----------
-        near : Steady
-            Where to begin; its load gives the direction in which power flows.
+        The load of `near`, where it begins, gives the direction in which power flows.
 
         Raises
         ------

@@ -114,10 +114,7 @@ class CostModel:
 
 
 def fit_recorded(
-    costs: np.ndarray,
-    timings: Iterable[tuple[Batch, float]],
-    done: np.ndarray,
-    turns: Turns = one_turn,
+    costs: np.ndarray, timings: Iterable[tuple[Batch, float]], done: np.ndarray, turns: Turns = one_turn
 ) -> Fit:
     """Return the fit to batches on record.
 
@@ -206,9 +203,8 @@ def forecast(
         makespans[repeat] = simulate_schedule(seconds, ranks, claims, generator)
         bounds[repeat] = least_makespan(seconds, ranks)
         efficiencies[repeat] = use_of_lanes * seconds.sum() / (ranks * makespans[repeat])
-    return Forecast(
-        ranks, planned.size, _summary(makespans), float(np.median(bounds)), _summary(efficiencies)
-    )
+    bound = float(np.median(bounds))
+    return Forecast(ranks, planned.size, _summary(makespans), bound, _summary(efficiencies))
 
 
 def simulate_schedule(

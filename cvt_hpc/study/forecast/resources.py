@@ -67,8 +67,7 @@ def _disk(runs: int, record: int, named: int, histories: float) -> Disk:
 
     The dataset is compressed. It takes no more than its records, and something for each quantity `named`.
     """
-    framed = HEAD.size + PLACE.size + record
-    return Disk(framed * runs, record * runs + NAMES_AND_CHUNKS * named, histories)
+    return Disk((HEAD.size + PLACE.size + record) * runs, record * runs + NAMES_AND_CHUNKS * named, histories)
 
 
 def refuse_too_large(job: Job, simulator: Simulator, out: Path) -> Needs:
@@ -144,8 +143,7 @@ def expect(job: Job, out: Path, ranks: Sequence[int], pilots: int = 0) -> Expect
 
 def suggested_time(forecast: Forecast, runs: int) -> float:
     """Return the time limit [s] to request from Slurm: enough for 39 sweeps in 40, start and end included."""
-    needed = _START_UP + forecast.makespan[2] + gathering_margin(runs)
-    return _STEP * math.ceil(needed / _STEP)
+    return _STEP * math.ceil((_START_UP + forecast.makespan[2] + gathering_margin(runs)) / _STEP)
 
 
 def disk_space(study: Study, batches: int, histories: int, history_bytes: float) -> Disk:
@@ -215,8 +213,7 @@ def run_pilots(job: Job, simulator: Simulator, groups: Sequence[Batch], count: i
     turns = partial(simulator.turns, job)
     if share < 1.0:
         groups = [part for group in groups for part in in_parts(group, turns(len(group)))]
-    places = {int((k + 0.5) * len(groups) / count) for k in range(count)}
-    chosen = [groups[place] for place in sorted(places)]
+    chosen = [groups[place] for place in sorted({int((k + 0.5) * len(groups) / count) for k in range(count)})]
     if job.histories:
         short = replace(short, histories=(chosen[0][0],))
     task = Task(short, describe(short, simulator), simulator)

@@ -145,11 +145,7 @@ class _ProgressThread:
 def _require_threads() -> None:
     provided = MPI.Query_thread()
     if provided < MPI.THREAD_MULTIPLE:
-        names = {
-            MPI.THREAD_SINGLE: "SINGLE",
-            MPI.THREAD_FUNNELED: "FUNNELED",
-            MPI.THREAD_SERIALIZED: "SERIALIZED",
-        }
+        names = {getattr(MPI, f"THREAD_{name}"): name for name in ("SINGLE", "FUNNELED", "SERIALIZED")}
         raise InputError(
             f"MPI: expected the thread level MULTIPLE, found {names[provided]}: rank 0 has to serve the "
             "others while it computes. Use an MPI library built with threads, and leave "

@@ -24,14 +24,7 @@ if TYPE_CHECKING:
 
 # Signals sent by a person, by a terminal that closes, by batch systems at the end of a job and as a warning
 # before, and by the system at the end of the processor time.
-SIGNALS = (
-    signal.SIGINT,
-    signal.SIGHUP,
-    signal.SIGTERM,
-    signal.SIGUSR1,
-    signal.SIGUSR2,
-    signal.SIGXCPU,
-)
+SIGNALS = (signal.SIGINT, signal.SIGHUP, signal.SIGTERM, signal.SIGUSR1, signal.SIGUSR2, signal.SIGXCPU)
 _VARIABLE = "CVT_HPC_RANK_WAIT"
 # Some thousand ranks take minutes to import Python modules from a busy network file system.
 _PATIENCE = 300.0  # [s]
@@ -105,10 +98,7 @@ def await_all(communicator: MPI.Intracomm) -> None:
     while not request.Test():
         if time.monotonic() > deadline:
             _requests[key] = request
-            raise mismatch(
-                "run",
-                f"a call on all {communicator.size} ranks within {seconds:.4g} s",
-                f"that rank {communicator.rank} waits for others",
-                f"comm=None runs on one rank alone, {_VARIABLE}=20min waits longer",
-            )
+            expected = f"a call on all {communicator.size} ranks within {seconds:.4g} s"
+            then = f"comm=None runs on one rank alone, {_VARIABLE}=20min waits longer"
+            raise mismatch("run", expected, f"that rank {communicator.rank} waits for others", then)
         time.sleep(_POLL)

@@ -120,12 +120,8 @@ def _left_to_slurm_job(environment: Mapping[str, str]) -> float:
         return math.inf
     left = _TIME_LEFT.fullmatch(found)
     if left is None:
-        _logger.warning(
-            "the end of Slurm job %s is not known (SLURM_JOB_END_TIME is not set, squeue: %s); "
-            "--time-limit tells it",
-            job,
-            found or "no such job",
-        )
+        why = f"SLURM_JOB_END_TIME is not set, squeue: {found or 'no such job'}"
+        _logger.warning("the end of Slurm job %s is not known (%s); --time-limit tells it", job, why)
         return math.inf
     return _in_seconds(left)
 
@@ -231,10 +227,8 @@ class Stop:
         left = self.seconds_left
         late = seconds > left
         if late and not self._late:
-            self._late = (
-                f"{self.limit.name}: {show_duration(max(left, 0.0))} were left, a batch may take "
-                f"{show_duration(seconds)}"
-            )
+            were_left, needed = show_duration(max(left, 0.0)), show_duration(seconds)
+            self._late = f"{self.limit.name}: {were_left} were left, a batch may take {needed}"
         return not late
 
     def interrupt(self) -> str | None:

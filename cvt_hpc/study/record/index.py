@@ -166,10 +166,8 @@ def _contradictions(records: Records, later: np.ndarray) -> list[str]:
         rows = read_rows(records.study, records.logs, part)
         for entry in part[_differ(rows, records.read(part["run"]), records.study)]:
             chosen = records.logs[records.entries["log"][entry["run"]]]
-            lines.append(
-                f"{records.logs[entry['log']]}: run {entry['run']} has other numbers than in {chosen.name}, "
-                "which counts"
-            )
+            where = f"{records.logs[entry['log']]}: run {entry['run']}"
+            lines.append(f"{where} has other numbers than in {chosen.name}, which counts")
     return lines
 
 
@@ -262,10 +260,8 @@ class _Trace:
         """Return a death at each run that the process was at in the end."""
         if self._mark is None:
             return set()
-        return {
-            _Death(index, attempt, self._mark.kind == log.ALONE, self._mark.written)
-            for index, attempt in self._at_work.items()
-        }
+        alone, begun = self._mark.kind == log.ALONE, self._mark.written
+        return {_Death(index, attempt, alone, begun) for index, attempt in self._at_work.items()}
 
 
 class _Reader:

@@ -109,8 +109,7 @@ class RecordFormat:
         if check != self._check(kind, written, payload):
             return None
         listed = PLACE.size if kind == RECORD else len(payload)
-        places = list(PLACE.iter_unpack(payload[:listed]))
-        return Frame(kind, stop - start, written, places, payload[listed:])
+        return Frame(kind, stop - start, written, list(PLACE.iter_unpack(payload[:listed])), payload[listed:])
 
     def frames(self, file: FileIO, start: int, size: int) -> Iterator[tuple[int, int, Frame | None]]:
         """Yield begin, end and content of each frame of a file; None for a stretch that is not valid.
@@ -166,8 +165,7 @@ class RecordFormat:
     def _is_length_of(self, kind: bytes, length: int) -> bool:
         if kind == RECORD:
             return length == PLACE.size + self.dtype.itemsize
-        is_mark = kind in (BEGUN, ALONE, AGAIN)
-        return is_mark and 0 < length <= MARK_LIMIT and length % PLACE.size == 0
+        return kind in (BEGUN, ALONE, AGAIN) and 0 < length <= MARK_LIMIT and length % PLACE.size == 0
 
 
 def read_preamble(data: bytes, layout: RecordFormat) -> tuple[Session | None, int]:
@@ -242,8 +240,7 @@ class RecordLog:
         StorageError
             If the system refuses the write.
         """
-        mark = self._layout.mark(ALONE if alone else BEGUN, self._places(batch), self._now())
-        written = self._append(mark)
+        written = self._append(self._layout.mark(ALONE if alone else BEGUN, self._places(batch), self._now()))
         self._open_mark = written if self._open_mark is None else self._open_mark
 
     def begin_again(self, indices: Iterable[int]) -> None:
