@@ -1,6 +1,7 @@
 """Courses of load, speed and thrust that drive runs: in words, and over the time of a history."""
 
 import json
+import re
 from collections.abc import Collection, Iterator, Mapping
 from typing import Any
 
@@ -16,6 +17,7 @@ from cvt_hpc.parameters import Parameter
 from cvt_hpc.storage.netcdf import attributes
 from cvt_hpc.variator.profiles import FILE, TIME, multiple
 
+_HAS_TIMES = re.compile(rf'"{TIME}":\s*\[[^]]')
 DRIVEN = ("load", "driving_speed", "thrust", "driving_thrust", "driven_pressure", "ratio")
 
 
@@ -82,7 +84,8 @@ def line_of(changed: Mapping[str, str], file: str = "") -> str:
 
 def line_of_study(dataset: xr.Dataset) -> str:
     """Return the `line_of` the results of a study; "" of several that are joined."""
-    job = job_held(dataset)
+    # a job of a hundred thousand samples takes seconds to read
+    job = job_held(dataset) if _HAS_TIMES.search(str(dataset.attrs.get("job", ""))) else None
     if job is None or not {"run", *(axis.name for axis in job.axes)}.issuperset(dataset["status"].dims):
         return ""
     return line_of(of_job(job), job.files.get(FILE, ""))
@@ -90,9 +93,9 @@ def line_of_study(dataset: xr.Dataset) -> str:
 
 def thrusts(history: xr.Dataset) -> Iterator[xr.DataArray]:
     """Yield the thrusts (time,) [N] that the profiles of a run change, where its history has no forces."""
-    point = json.loads(history.attrs.get("point", "{}"))
+    changed, point = of_history(history.attrs), json.loads(history.attrs.get("point", "{}"))
     for key, pulley in (("thrust", "driven"), ("driving_thrust", "driving")):
-        along = multiple(point, key, history["time"].values) if point.get(TIME) else 1.0
-        if np.ndim(along) and f"axial_force_{pulley}" not in history:
+        if " to " in changed.get(key, "") and f"axial_force_{pulley}" not in history:
+            values = point[key] * multiple(point, key, history["time"].values)
             told = attributes(key.replace("_", " "), "N", f"on the {pulley} pulley, as its profile has it")
-            yield xr.DataArray(point[key] * along, {"time": history["time"]}, ("time",), key, told)
+            yield xr.DataArray(values, {"time": history["time"]}, ("time",), key, told)

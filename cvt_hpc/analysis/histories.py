@@ -15,7 +15,7 @@ from cvt_hpc.analysis import courses
 from cvt_hpc.analysis import history_panels as panels
 from cvt_hpc.analysis.conversion import standard
 from cvt_hpc.analysis.figures import LONG, WIDTH, balanced, draw, entitle, headline, styled
-from cvt_hpc.errors import mismatch
+from cvt_hpc.errors import InputError, mismatch
 from cvt_hpc.job.schema import load_schema
 from cvt_hpc.job.uncertain import TABLE, with_samples
 from cvt_hpc.job.values import JOB_UNITS, POINT_UNITS, shown
@@ -45,6 +45,7 @@ def history_figure(dataset: xr.Dataset, source: str = "history") -> Figure:
     (position) [N/m, W/m], `region` (position), and the run's verdict.
     """
     dataset = standard(dataset, source)
+    title = _title(dataset)  # checks the parameters of the run
     settings, band = settings_of(dataset)
     judged = _judged_share(dataset, settings) if _is_judged(dataset) else 0.0
     strands = panels.read_strands(dataset, judged, band)
@@ -73,7 +74,6 @@ def history_figure(dataset: xr.Dataset, source: str = "history") -> Figure:
             rows.append((height, [(WHOLE, draw_panel, dataset)]))
     if not rows:
         raise mismatch(source, "displacement, load or forces of a run", "none of them")
-    title = _title(dataset)
     heights = [height for height, _ in rows]
     height = min(sum(heights) + 0.2 * title.count("\n") + 0.4, LONG)
     figure = Figure((WIDTH, height), layout="constrained")
@@ -224,7 +224,9 @@ def values_of(attributes: Mapping[str, Any]) -> dict[str, str]:
         told = {key: {"units": schema.parameters[key].unit, JOB_UNITS: units.get(key, "")} for key in keys}
         changed = courses.of_history(attributes)
         return {key: changed.get(key) or shown(point[key], told[key]) for key in keys}
-    except (AttributeError, KeyError, TypeError):
+    except InputError:
+        raise
+    except (AttributeError, KeyError, TypeError, ValueError):
         raise mismatch("history: job, point", "a job of this program and a point of it", "others") from None
 
 

@@ -250,6 +250,14 @@ def test_the_title_has_the_ranges_of_a_course_and_no_value_as_if_it_were_constan
     assert told in " ".join(title.replace("\u00a0", " ").split())
 
 
+@pytest.mark.parametrize("broken", [{"load_profile": [1.0]}, {"thrust": "a"}, {"profile_time": 3}])
+def test_a_course_that_is_none_is_one_error(broken):
+    dataset = driven({})
+    point = json.loads(dataset.attrs["point"]) | broken
+    with pytest.raises(InputError, match="history: job, point: expected a job of this program"):
+        history_figure(dataset.assign_attrs(point=json.dumps(point)))
+
+
 def test_a_thrust_that_a_course_changes_is_drawn_unless_forces_are_recorded():
     dataset = driven({})
     axes = panel(history_figure(dataset), "thrust [kN]")
