@@ -1,7 +1,6 @@
 """Write the dataset of a study as a small table: tabulate.py OUT/STUDY TABLE.csv [QUANTITY ...].
 
 A row has a run, or, where parameters are uncertain, all samples of a cell: what is said of them together.
-With --indices QUANTITY it has a parameter in a cell, and the Sobol indices of that quantity to it.
 """
 
 import sys
@@ -73,12 +72,9 @@ if __name__ == "__main__":
     folder, table, *asked = sys.argv[1:]
     try:
         with open_results(folder) as results:
-            if asked[:1] == ["--indices"]:
-                text = results.load().cvt.indices(*asked[1:]).to_dataframe().to_csv(float_format="%.4g")
-            else:
-                of_cells = results.load().cvt.probability() if "sample" in results.dims else results.load()
-                text = "".join(f"{row}\n" for row in rows(of_cells, asked or OF_A_BELT))
-            lines = [*origin_lines(results.attrs), text]
+            of_cells = results.load().cvt.probability() if "sample" in results.dims else results.load()
+            body = [f"{row}\n" for row in rows(of_cells, asked or OF_A_BELT)]
+            lines = [*origin_lines(results.attrs), *body]
     except InputError as error:
         sys.exit(f"tabulate.py: {error}")
     with open(table, "w", encoding="utf-8") as out:
