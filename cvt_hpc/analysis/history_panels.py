@@ -11,6 +11,7 @@ from matplotlib.axes import Axes
 from numpy.typing import NDArray
 
 from cvt_hpc.analysis.figures import axis_label, coordinate_unit, in_words, number
+from cvt_hpc.variator import PULLEYS
 from cvt_hpc.vibration.settings import SHORTEST_SEGMENT
 from cvt_hpc.vibration.signals import amplitude_spectrum, band_amplitude, dominant_frequency
 
@@ -284,7 +285,7 @@ def _lay_out_positions(axes: Axes, dataset: xr.Dataset) -> None:
     borders = [position[0], *middles[region[1:] != region[:-1]], position[-1]]
     for start, stop in pairwise(borders):
         name = region[np.searchsorted(position, (start + stop) / 2)]
-        if "arc" in name:
+        if "arc" in name or name in PULLEYS:  # as pushbelts name them
             axes.axvspan(start, stop, color="#e6e6e6", linewidth=0, zorder=0)
         top = axes.get_xaxis_transform()
         axes.text((start + stop) / 2, 1.03, name, transform=top, ha="center", fontsize=9)

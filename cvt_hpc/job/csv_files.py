@@ -23,6 +23,7 @@ from cvt_hpc.storage.files import read_regular
 
 MOST_BYTES = 2**26  # of a file of any kind
 _BLOCK = 2**18  # rows that are taken apart at a time: cells take ten times the memory of their text
+_MOST_ABOVE = 10_000  # lines among which that of the names is looked for
 _SEPARATORS = {",": "commas", ";": "semicolons", "\t": "tabs"}
 _BINARY = re.compile(r"[\x00-\x08\x0b\x0e-\x1f\x7f]")
 _HEAD = re.compile(r"(?P<name>[^[(]*)(?:\[(?P<square>[^]]*)\]|\((?P<round>.*)\))?")
@@ -186,7 +187,7 @@ def _find_names(file: FromFile, lines: Sequence[str]) -> tuple[int, str]:
     Where there is none, those of the line that names most of them.
     """
     most, best = -1, (0, ",")
-    for place, line in enumerate(lines):
+    for place, line in enumerate(lines[:_MOST_ABOVE]):
         for separator in _SEPARATORS:
             try:
                 known = {named_column(file, cell) for cell in _cells(line, separator, "")}

@@ -126,6 +126,13 @@ def test_forces_lie_over_shaded_arcs(whole):
     assert (tension, push) == pytest.approx((9.1, 5.0), rel=1e-2)
     assert panel(whole, "contact [kN/m]").lines[0].get_ydata().max() == pytest.approx(400, rel=1e-2)
     assert [text.get_text() for text in forces.texts] == ["driving arc", "t1", "driven arc", "t2"]
+    names = [str(name).removesuffix(" arc") for name in run()["region"].values]
+    of_pushbelt = run().assign_coords(region=("position", names))
+    for drawn in (forces, panel(history_figure(of_pushbelt), "force [kN]")):
+        check_arcs(drawn)
+
+
+def check_arcs(forces):
     spans = [(p.get_x(), p.get_x() + p.get_width()) for p in forces.patches]
     # borders between stations, which are 4.1 mm apart
     assert np.array(spans) == pytest.approx(np.array([[0, 100], [248, 504]]), abs=4.1)

@@ -231,6 +231,14 @@ def test_a_long_log_is_read_whatever_its_kind(tmp_path):
     assert found["profile_time"] == pytest.approx(other["profile_time"])
 
 
+def test_names_are_looked_for_above_the_numbers_and_not_all_through_a_long_log(tmp_path):
+    table = "time [s],load [N m]\n0,100\n1,120\n"
+    found = course_job(tmp_path, 99 * "a line above\n" + table, run={"duration": 1.0})
+    assert found.parameters["load"] == 120.0
+    with pytest.raises(InputError, match='line 1: expected columns among .*, found "1.5", "2"'):
+        course_job(tmp_path, 20_000 * "1.5,2\n" + table)
+
+
 @pytest.mark.parametrize(("write", "suffix"), [(write_mat, ".mat"), (write_mdf, ".mf4")])
 def test_signals_of_measuring_programs_give_profiles(tmp_path, write, suffix):
     write(tmp_path / f"rig{suffix}", SIGNALS | {"Oil_temperature": ([80.0, 80.0, 80.0], "degC")})
