@@ -68,6 +68,7 @@ def test_results_open_draw_and_report(datasets, name, tmp_path, monkeypatch):
     monkeypatch.setattr("cvt_hpc.report.page._encoded", lambda compose: "AA==")
     classes, applying = FOUND[name]
     with open_results(datasets / f"{name}.nc") as results:
+        results.load()
         assert count_classes(results.cvt.classes().values) == classes
         results.cvt.map()
         compose_all(results, [kind for kind in KINDS if KINDS[kind].subject == RESULTS], applying)
@@ -85,6 +86,7 @@ def test_onsets_are_found_again(datasets):
 def test_histories_open_and_draw(datasets, name, monkeypatch):
     monkeypatch.setattr(animation, "FRAMES", 1)
     with open_results(datasets / f"history_{name}.nc") as history:
+        history.load()
         assert np.isfinite(history["displacement"]).all()
         compose_all(history, [kind for kind in KINDS if KINDS[kind].subject != RESULTS], DRAWN[name])
         assert history.cvt.animation()._repr_html_().count("image/gif;base64,") == 1

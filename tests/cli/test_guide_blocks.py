@@ -16,7 +16,7 @@ from typing import ClassVar
 import matplotlib.pyplot as plt
 import pytest
 
-from cvt_hpc.analysis import animation
+from cvt_hpc.analysis import animation, figures
 from cvt_hpc.cli import _parser, main
 from cvt_hpc.job import build_job
 from cvt_hpc.job.assignments import read_assignments
@@ -67,7 +67,7 @@ SMALL_OF = {
 PILOT = SMALL | {"stations": 64}  # of `check --pilots`
 CALIBRATED = "friction_gradient=[-1.1]"  # s/m, of what its page measures
 PARSER = _parser()
-PYTHON_RUN = 'duration = "0.1 s"\nlongest_duration = "0.1 s"'
+PYTHON_RUN = 'duration = "40 ms"\nlongest_duration = "40 ms"'
 # What a page takes for granted: work of its reader, or of another page.
 BEFORE = {
     "docs/guide/tutorial.md": "cvt-hpc run jobs/quickstart.toml",
@@ -252,10 +252,12 @@ def folder(tmp_path, monkeypatch):
     shutil.copytree(ROOT / "jobs", tmp_path / "jobs", ignore=shutil.ignore_patterns("results", "notebooks"))
     (tmp_path / "jobs" / "results").mkdir()
     loaded = tmp_path / "jobs" / "lebrecht_2004.toml"  # by blocks of Python, which have no options
-    loaded.write_text(loaded.read_text().replace('duration = "0.4 s"', PYTHON_RUN))
+    shorter = loaded.read_text().replace('duration = "0.4 s"', PYTHON_RUN)
+    loaded.write_text(shorter.replace('rise_time = "30 ms"', 'rise_time = "10 ms"'))
     monkeypatch.chdir(tmp_path)
     monkeypatch.setattr(sys, "argv", sys.argv)
     monkeypatch.setattr(animation, "FRAMES", 1)  # test_animation.py draws all
+    monkeypatch.setattr(figures, "RESOLUTION", 50)  # test_pictures.py looks at them as they are
     return tmp_path
 
 

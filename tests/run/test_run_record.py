@@ -164,8 +164,9 @@ def test_the_same_point_gives_the_same_bits(name):
 
 
 def test_the_explicit_stepper_gives_the_same_run():
-    # without vibration, which would not stay in phase. The fast step is of first order: 0.4 % are seen while the load settles
+    # without vibration, which would not stay in phase. The fast step is of first order: 0.3 % are seen while the load settles
     values = CHEAP | {"stations": 24, "load": 60.0, "friction_gradient": 0.0, "disturbance": 0.0}
+    values |= {"duration": 0.022, "rise_time": 8e-3, "band_low": 500.0}
     fast, plain = record(**values), record(stepper="explicit", **values)
     assert plain["time_step"] == pytest.approx(4e-8)
     for name in ("mean_ring_tension", "axial_force", "driving_power", "thrust_ratio"):

@@ -75,8 +75,9 @@ def test_where_neither_strand_pushes_the_curve_has_states():
     # default belt: below 38 N m t2 pushes, above 40 N m t1; between, the play moves at nearly one load
     point = rung_job("steady_variator", stations=STATIONS, load=60.0).point(0)
     belt = SteadyBelt(point)
+    first = belt.at(60.0)
     loads, pushes = [], []
-    for state in belt.along_curve(belt.at(60.0), 1.0):
+    for state in belt.along_curve(first, 1.0):
         numbers = quantities(state, mesh(point))
         assert state.load == pytest.approx(
             numbers["load_power"] / point["ratio"] / state.state.scalars[1], 1e-9
@@ -90,6 +91,6 @@ def test_where_neither_strand_pushes_the_curve_has_states():
     assert np.count_nonzero(free) > 3
     assert 30.0 < min(np.array(loads)[free]) < max(np.array(loads)[free]) < 45.0
     # a load between is found from either side
-    for start in (60.0, 20.0):
-        found = belt.at(float(np.median(np.array(loads)[free])), belt.at(start))
+    for start in (first, belt.at(20.0)):
+        found = belt.at(float(np.median(np.array(loads)[free])), start)
         assert quantities(found, mesh(point))["mean_push_force"].max() < 1.0

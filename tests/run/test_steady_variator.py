@@ -232,7 +232,7 @@ def test_single_cells_that_open_are_not_taken_for_the_limit_of_friction():
         "stations": 40,
     }
     belt = SteadyBelt(parameters)
-    limit = belt.carried(belt.at(60.0))
+    limit = belt.carried(belt.at(140.0))
     assert limit.largest_slip > 0.01 and limit.load > 250.0
 
 

@@ -189,8 +189,9 @@ def test_check_start_refuses_as_a_run(tmp_path):
         "name": "x",
         "model": "criterion",
         "axes": {
-            "contact_force": {"from": 100, "to": 200, "count": 100_000},
-            "element_mass": {"from": 1, "to": 2, "count": 100_000},
+            "contact_force": {"from": 100, "to": 200, "count": 2000},
+            "element_mass": {"from": 1, "to": 2, "count": 2000},
+            "friction_gradient": {"from": -1, "to": -0.1, "count": 2500},
         },
     }
     with pytest.raises(InputError, match="^x.toml: 10000000000 runs: expected 4 TB of memory"):

@@ -208,7 +208,8 @@ def texts_of(figure, monkeypatch):
         return draw(self, renderer, *args, **options)
 
     monkeypatch.setattr(Text, "draw", record)
-    FigureCanvasAgg(figure).draw()
+    FigureCanvasAgg(figure)
+    figure.draw_without_rendering()  # all that a drawing does, but for the pixels
     return drawn
 
 
