@@ -28,5 +28,5 @@ prepare_environment mpich,test,discs || { wait; exit 1; }
 wait
 # Where nothing may be written beside the sources, each process rewrites all assertions anew, for 8 s of a core.
 unset PYTHONDONTWRITEBYTECODE
-# One worker more than cores: some tests wait, for Slurm or for ranks, while others compute.
-exec .venv/bin/python -m pytest -n 3 --dist loadfile --no-loadscope-reorder "$@"
+# Two workers more than cores: tests wait, for Slurm, for ranks or for machine code that another one compiles.
+exec .venv/bin/python -m pytest -n 4 --dist loadfile --no-loadscope-reorder "$@"
