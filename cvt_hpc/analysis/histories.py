@@ -97,6 +97,7 @@ def phase_figure(dataset: xr.Dataset, source: str = "history") -> Figure:
 
     Arguments as of all pictures of runs (`figures.py`), with `displacement` (time, probe) [m].
     """
+    lines = [headline("Phase portraits", dataset.attrs), *_which(dataset.attrs)]  # checks the parameters
     settings, band = settings_of(dataset)
     judged = _judged_share(dataset, settings) if _is_judged(dataset) else 0.5
     strands = [one for one in panels.read_strands(dataset, judged, band) if one.has_spectrum]
@@ -117,7 +118,6 @@ def phase_figure(dataset: xr.Dataset, source: str = "history") -> Figure:
         axes.set_title(f"{strand.probes[strand.strongest]}, {frequency:.0f} Hz", loc="left", pad=3)
         axes.set(xlabel="displacement [µm]", ylabel="velocity [mm/s]")
         axes.grid(lw=0.4, alpha=0.5)
-    lines = [headline("Phase portraits", dataset.attrs), *_which(dataset.attrs)]
     lines.append(f"motion above {band[0]:.0f} Hz; bold: last {SHOWN_PERIODS} periods, dot: their end")
     entitle(figure, lines, 76)
     return figure

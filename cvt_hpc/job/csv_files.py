@@ -11,7 +11,7 @@ import re
 import warnings
 from array import array
 from collections.abc import Callable, Iterator, Mapping, Sequence
-from itertools import chain, islice
+from itertools import chain, count, islice, repeat
 from pathlib import Path
 from typing import NamedTuple
 
@@ -30,6 +30,7 @@ _HEAD = re.compile(r"(?P<name>[^[(]*)(?:\[(?P<square>[^]]*)\]|\((?P<round>.*)\))
 _NUMBER = re.compile(r"[+-]?(?:\d+[.,]?\d*|[.,]\d+)(?:[eE][+-]?\d+)?", re.ASCII)
 _AMBIGUOUS = re.compile(r"[+-]?[1-9]\d{0,2}[.,]\d{3}", re.ASCII)  # a fraction, or a thousand and more
 _GROUPED = re.compile(r"[+-]?\d[\d.,' ]*", re.ASCII)
+_NUMBERED = "no column for the numbers of the rows"
 _LINES = "a line of column names and lines of numbers"
 _MOST_NAMED = 8
 _PER_MINUTE = ("1/min", "u/min", "min-1", "rev/min", "r/min", "rpm", "tr/min")
@@ -120,9 +121,10 @@ def _read_rows(
 ) -> _Read:
     lines, values = array("q"), {column.name: array("d") for column in columns}
     marks: dict[str, _Mark] = {}
-    left_out = ""
+    left_out = first = ""
     while block := list(islice(rows, _BLOCK)):
-        left_out = _left_out(of_names, block, separator, place, len(lines))
+        first = first or block[0][1][0]
+        left_out = _left_out(of_names, block, separator, place, len(lines), first)
         _note_marks(block, marks)
         if len(marks) > 1:
             _decimal_mark(marks, separator, place)
@@ -135,13 +137,22 @@ def _read_rows(
 
 
 def arranged(file: FromFile, columns: dict[str, Column], place: str, named: Callable[[int], str]) -> Point:
-    """Return the raw values that columns of a file give; an error names one of its rows, or all of it."""
+    """Return the raw values that columns of a file give; an error names one of its rows, or all of it.
+
+    Multiples of a quantity over time are those of its greatest one, also where a long file is averaged: an
+    axis over the quantity gives the greatest value with which a run is driven.
+    """
     try:
-        return file.arrange(columns)
+        raw = file.arrange(columns)
     except RowError as error:
         raise mismatch(f"{place}: {named(error.row)}", error.expected, error.found) from None
     except ValueError as error:
         raise InputError(f"{place}: {error}") from None
+    for key in [key for key in raw if f"{key}_profile" in raw]:
+        multiples = raw[f"{key}_profile"]
+        if (most := max(multiples, key=abs)) not in (0.0, 1.0):
+            raw |= {key: raw[key] * most, f"{key}_profile": [value / most for value in multiples]}
+    return raw
 
 
 def content_of(path: Path, limit: int, place: str, what: str, suffix: str) -> bytes:
@@ -272,10 +283,10 @@ def told(name: str, file: FromFile) -> str:
     return " or ".join(f"{name} [{unit}]" if unit else name for unit in file.columns[name])
 
 
-def _left_out(of_names: Row, rows: Sequence[Row], separator: str, place: str, before: int) -> str:
+def _left_out(of_names: Row, rows: Sequence[Row], separator: str, place: str, before: int, first: str) -> str:
     """Return what is not read beside the columns; InputError if it may be anything of meaning.
 
-    There are so many rows before these.
+    There are so many rows before these; `first` is the first cell of all, where a column may number the rows.
     """
     line, names = of_names
     for n, cells in rows:
@@ -286,14 +297,14 @@ def _left_out(of_names: Row, rows: Sequence[Row], separator: str, place: str, be
             raise mismatch(where, expected, str(len(cells)), then)
     found = ""
     for i in (i for i, name in enumerate(names) if not name):
-        below = [cells[i] for _, cells in rows]
-        starts = before, before + 1
-        if i == 0 and any(below == [str(n) for n in range(start, start + len(rows))] for start in starts):
-            found = "no column for the numbers of the rows"
-        elif any(below):
-            n, cells = next((n, cells) for n, cells in rows if cells[i])
-            where = f"{place}: line {n}, column {i + 1}"
-            raise mismatch(where, f"nothing, as it has no name in line {line}", show(cells[i]))
+        wanted = repeat("")
+        if i == 0 and first in ("0", "1"):
+            wanted, found = map(str, count(int(first) + before)), _NUMBERED
+        for (n, cells), number in zip(rows, wanted, strict=False):
+            if cells[i] != number:
+                where = f"{place}: line {n}, column {i + 1}"
+                expected = "the number of the row" if number else "nothing"
+                raise mismatch(where, f"{expected}, as it has no name in line {line}", show(cells[i]))
     return found
 
 

@@ -306,6 +306,7 @@ def _basis(dataset: xr.Dataset, job: Job | None, changed: Sequence[Row]) -> Iter
         told = [f"{row.key.replace('_', ' ')} {row.value}" for row in rows[:MOST_CHANGED]]
         told += [f"{more} more"] if (more := len(rows) - MOST_CHANGED) > 0 else []
         start = f"Other than the defaults: {', '.join(told)}. All else" if told else "All that is fixed"
+        start += " but the course" if courses.of_job(job) else ""
         yield f"{start} is at its default, which is an assumption where no paper gives it."
     classes = map_classes(dataset).values
     without = [(kind, int(np.sum(classes == kind))) for kind in OccurrenceClass if kind not in DECIDED]

@@ -35,7 +35,7 @@ class Modes(NamedTuple):
 
 
 def thinned(signal: Array, rate: float, highest: float) -> tuple[Array, float]:
-    """Histories without what is faster than `highest` [Hz], at the lowest rate that resolves it [Hz].
+    """Return histories without what is faster than `highest` [Hz], and the lowest rate that resolves it [Hz].
 
     Of a signal (time, sensor) in any unit only the samples that the filter reaches in full are left.
     """
@@ -54,8 +54,8 @@ def thinned(signal: Array, rate: float, highest: float) -> tuple[Array, float]:
 def damped_modes(signal: Array, rate: float, orders: Sequence[int]) -> list[Modes]:
     """Decompose a free motion into damped modes, for each order each pair of exponentials once.
 
-    The signal (time, sensor), in any unit, has nothing that is faster than the modes. Orders are numbers of
-    complex exponentials, two for each mode; what noise leaves of them, weak modes take.
+    The signal (time, sensor), in any unit, sampled at a rate [Hz], has nothing that is faster than the modes.
+    Orders are numbers of complex exponentials, two for each mode; what noise leaves of them, weak modes take.
 
     Raises
     ------

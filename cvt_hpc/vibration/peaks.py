@@ -63,10 +63,10 @@ def coordinate() -> Coordinate:
 
 
 def modal_peaks(modes: ArrayLike, rate: float, band: tuple[float, float]) -> Peaks:
-    """Find the largest peaks of each strand and the mode of each.
+    """Return the largest peaks of each strand and the mode of each, (strand, COUNT).
 
-    Of amplitudes of the strands' sine modes (time, strand, half_waves), in any unit, from the lowest to the
-    highest frequency of a band [Hz]. Errors are those of `signals.band_amplitude`.
+    They are those of amplitudes of the strands' sine modes (time, strand, half_waves), in any unit, from the
+    lowest to the highest frequency of a band [Hz]. Errors are those of `signals.band_amplitude`.
     """
     check_band(band, rate)
     samples = np.asarray(modes, float)
@@ -93,9 +93,9 @@ def fundamental(signal: ArrayLike, rate: float, band: tuple[float, float]) -> tu
     line is a peak of LEAST_LINE of the strongest or more, and above noise. Two lines alone therefore are no
     harmonics of a common divisor, unless one is a multiple of the other within NEAR/L, L being the length.
 
-    Both are nan where the band holds no peak, and one without harmonics. The error is that of
+    Both are nan where the band holds no peak, and one without harmonics. The accuracy is that of
     `signals.dominant_frequency`, of the fundamental divided by the number of its strongest harmonic; 0.1/L
-    where another line lies within 4/L. Errors are those of `signals.band_amplitude`.
+    where another line lies within 4/L. It raises the errors of `signals.band_amplitude`.
     """
     found = fundamentals(np.asarray(signal, float)[np.newaxis], rate, band)[0]
     return float(found[0]), float(found[1])

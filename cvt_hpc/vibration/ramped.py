@@ -29,7 +29,7 @@ CONSTANT = ("constant", ())  # of the parameters that have a quantity change
 def ramped(parameters: Mapping[str, Any]) -> str:
     """The one of QUANTITIES that a run changes all along; "" where its judged part has constant values.
 
-    Time is that of a run whose profiles go on while it is judged. Models without ramps or profiles lack their
+    It is "time" where profiles go on while the run is judged. Models without ramps or profiles lack their
     keys.
     """
     p = parameters

@@ -56,10 +56,10 @@ def nothing(reason: str, window: float = 0.0, *sizes: float) -> Found:
 
 
 def found_modes(motions: Array, rate: float, highest: float, *, vibrates: bool) -> Found:
-    """Modes of a state up to a highest frequency [Hz] by the motions of three runs, (3, time, sensor) [m].
+    """Return the modes of a state up to a highest frequency [Hz], by motions (3, time, sensor) [m].
 
-    They are those without a kick, with half of it and with the whole. `vibrates`: the run without a kick
-    does, rather than to settle.
+    The three runs, sampled at a rate [Hz], have no kick, half of it and the whole. With `vibrates` the run
+    without a kick vibrates, else it settles.
     """
     kicked = np.flatnonzero((motions[2] != motions[0]).any(axis=1))
     if not kicked.size:

@@ -263,6 +263,8 @@ def test_a_course_that_is_none_is_one_error(broken):
     point = json.loads(dataset.attrs["point"]) | broken
     with pytest.raises(InputError, match="history: job, point: expected a job of this program"):
         history_figure(dataset.assign_attrs(point=json.dumps(point)))
+    with pytest.raises(InputError, match="history: job, point: expected a job of this program"):
+        phase_figure(dataset.assign_attrs(point=json.dumps(point)))
 
 
 def test_a_thrust_that_a_course_changes_is_drawn_unless_forces_are_recorded():

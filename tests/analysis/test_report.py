@@ -174,7 +174,7 @@ def test_a_course_that_drives_the_runs_is_told_with_its_file_and_ranges(tmp_path
     words = page_of(results, tmp_path)
     ranges = "load 20 to 80 N m, speed 2400 to 3000 rpm, thrust 44 to 50 kN"
     assert f"The course of rig.csv drives each run from 0 to 0.3 s: {ranges}. Verdicts hold over" in words
-    assert "Other than the defaults: duration 0.4 s. All else" in words
+    assert "Other than the defaults: duration 0.4 s. All else but the course" in words
     for row in ("profile_file rig.csv", "driving_speed 2400 to 3000 rpm", "thrust 44 to 50 kN", "load 20 to"):
         assert row in words
     title = map_figure(results).get_suptitle().replace("\u00a0", " ")

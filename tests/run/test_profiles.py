@@ -155,7 +155,7 @@ def test_a_long_file_is_averaged_over_equal_parts(tmp_path):
         0
     )
     at, load = np.array(point["profile_time"]), point["load"] * np.array(point["load_profile"])
-    assert at.size == 1000
+    assert at.size == 1000 and max(point["load_profile"]) == 1.0  # an axis gives the greatest that is driven
     assert load == pytest.approx(100 + 10 * at, abs=0.25)  # alternating samples cancel but for one in five
 
 
@@ -226,9 +226,22 @@ def test_a_long_log_is_read_whatever_its_kind(tmp_path):
     write_mat(tmp_path / "rig.mat", {"time": (times, "s"), "load": (loads, "N m")})
     document = {"name": "course", "model": "elastic_belt", "profiles": {"profile_file": "rig.mat"}}
     other = build_job(document | duration, str(tmp_path / "course.toml")).parameters
-    assert found["load"] == other["load"] == loads.max()
+    assert found["load"] == other["load"] == pytest.approx(loads.max(), rel=1e-5)
     assert found["load_profile"] == other["load_profile"]
     assert found["profile_time"] == pytest.approx(other["profile_time"])
+
+
+@pytest.mark.parametrize("numbers", ["0123", "1234", "0124", "01", "1235"])
+def test_a_column_that_numbers_the_rows_does_so_in_all_blocks(tmp_path, monkeypatch, numbers):
+    monkeypatch.setattr("cvt_hpc.job.csv_files._BLOCK", 2)
+    rows = "".join(f"{n},{0.1 * k:g},{100 + k}\n" for k, n in enumerate(numbers.ljust(4)))
+    table = f",time [s],load [N m]\n{rows}".replace(" ,", ",")
+    if numbers in ("0123", "1234"):
+        with pytest.warns(JobWarning, match="no column for the numbers of the rows"):
+            assert course_job(tmp_path, table).parameters["load"] == 103.0
+    else:
+        with pytest.raises(InputError, match="line [45], column 1: expected the number of the row"):
+            course_job(tmp_path, table)
 
 
 def test_names_are_looked_for_above_the_numbers_and_not_all_through_a_long_log(tmp_path):

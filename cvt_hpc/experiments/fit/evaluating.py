@@ -124,11 +124,11 @@ def study_of(
     values: NDArray[np.float64],
     cases: Mapping[str, Case],
 ) -> tuple[Job, NDArray[np.bool_]]:
-    """Return the study of candidates: for each of them, each case and each value a run, the last one fastest.
+    """Return the study of candidates, and which runs it has, (candidates, case, value).
 
-    And which runs it has, (candidates, case, value): none that the model refuses, as under more torque than
-    any belt carries. They do not count. Arguments are those of `Evaluation.evaluate`, but for the cases by
-    name.
+    It has a run for each candidate, case and value, the last one fastest, but none that the model refuses, as
+    under more torque than any belt carries; these do not count. Arguments are those of `Evaluation.evaluate`,
+    but for the cases by name.
     """
     own = {key: fit.job.parameters[key] for case in cases.values() for key in (*case.set, *case.factor)}
     base = {**own, **dict(zip((one.name for one in fit.free), scenes.T, strict=True))}

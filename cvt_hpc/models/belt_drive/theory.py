@@ -45,9 +45,9 @@ def creep_loss(parameters: Parameters, drawn: Layout) -> float:
 def expected_loss(parameters: Parameters, drawn: Layout, tension: np.ndarray) -> float:
     """Speed loss by creep, radial compliance and shear of bristles, from the strands' tensions [N].
 
-    The belt sticks where it runs onto a pulley. The rubber under its cord turns with the pulley, so that w (R
-    - depth) / stretch is the same on all, with depth = (T - m v^2) / (R k) and the tension T of the strand
-    that runs on; where bristles shear, with that of `unsheared_tension`.
+    The belt sticks where it runs onto a pulley. The rubber under its cord turns with the pulley, so that
+    w (R - depth) / stretch is the same on all, with depth = (T - m v^2) / (R k) and the tension T of the
+    strand that runs on; where bristles shear, with that of `unsheared_tension`.
     """
     p, radius = parameters, drawn.path.radius
     running_on, inertial = np.roll(tension, 1), centrifugal(p, drawn.path)
@@ -124,12 +124,13 @@ def wrap_angles(path: BeltPath, position: np.ndarray) -> np.ndarray:
 def sliding_tension(
     parameters: Parameters, path: BeltPath, tension: np.ndarray, position: np.ndarray
 ) -> np.ndarray:
-    """Tension over the wraps by Euler and Eytelwein at path coordinates [m], (place,) [N], by the strands'.
+    """Tension (place,) [N] at path coordinates [m] of the wraps by Euler and Eytelwein.
 
-    Up to where bending lifts the belt off a pulley d ln(T - m v^2) / dphi is the coefficient of friction,
-    with the sign that takes T to that of the strand that leaves. Before, where the belt sticks, T is that of
-    the strand that runs on. It is nan on strands, on pulleys that a strand does not press the belt on, and
-    everywhere unless the coefficient of friction is constant.
+    From the tensions of the strands [N]: up to where bending lifts the belt off a pulley
+    d ln(T - m v^2) / dphi is the coefficient of friction, with the sign that takes T to that of the strand
+    that leaves. Before, where the belt sticks, T is that of the strand that runs on. It is nan on strands, on
+    pulleys that a strand does not press the belt on, and everywhere unless the coefficient of friction is
+    constant.
     """
     p = parameters
     if not _has_one_coefficient(p):
@@ -166,10 +167,10 @@ def strand_frequencies(parameters: Parameters, path: BeltPath, tension: np.ndarr
 def mesh_amplitude(parameters: Parameters, path: BeltPath, tension: np.ndarray) -> float:
     """Largest amplitude [m] at which the passing elements may shake the strands, from their tensions [N].
 
-    Where the belt runs on or off, its curvature changes from 0 to 1 / R along d = sqrt(EI / N), with N = T -
-    m v^2. The fourth derivative of its shape is 1 / (R d^2) there, and an element of length h misses that
-    shape by up to h^4 / (384 R d^2). As elements pass, this shakes the strands, more at their resonances:
-    SHAKEN is measured.
+    Where the belt runs on or off, its curvature changes from 0 to 1 / R along d = sqrt(EI / N), with
+    N = T - m v^2. The fourth derivative of its shape is 1 / (R d^2) there, and an element of length h misses
+    that shape by up to h^4 / (384 R d^2). As elements pass, this shakes the strands, more at their
+    resonances: SHAKEN is measured.
     """
     p = parameters
     pull = max(float(np.max(tension)) - centrifugal(p, path), 0.0)
@@ -178,9 +179,10 @@ def mesh_amplitude(parameters: Parameters, path: BeltPath, tension: np.ndarray) 
 
 
 def kick(path: BeltPath, line_mass: float, impulse: float, q: np.ndarray, v: np.ndarray) -> None:
-    """Add the speeds of an impulse [N s] across each strand, to the right of the belt's way, to the nodes'.
+    """Add the speeds of an impulse [N s] across each strand to the nodes' speeds `v`, in place.
 
-    The impulse is spread as 1 + cos, so that elements of a tenth of the strand carry it.
+    The impulse acts to the right of the belt's way on its `line_mass` [kg/m], spread as 1 + cos, so that
+    elements of a tenth of the strand carry it.
     """
     position, _ = along(path, q[:, :2], q[:, 2:])
     region = regions(path, position)
