@@ -203,8 +203,12 @@ def _distributions(job: Job) -> tuple[Distribution, ...]:
 
 
 def _study(job: Job, out: Path) -> tuple[Sweep, Path]:
-    """Return the study of the samples, and where its folder lies: that of `cvt-hpc run`, if it is there."""
-    if find_records(out / STUDY, job) is None and find_records(out, job) is not None:
+    """Return the study of the samples, and where its folder lies: that of `cvt-hpc run` if it has more."""
+    own, of_run = (
+        -1 if (found := find_records(folder, job)) is None else int(found.recorded.sum())
+        for folder in (out / STUDY, out)
+    )
+    if of_run > own:
         return Sweep(out.absolute().name, (), job), out.absolute().parent
     return Sweep(STUDY, (), job), out
 

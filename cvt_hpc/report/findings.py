@@ -131,7 +131,11 @@ def window_sentences(dataset: xr.Dataset, x: str, others: Sequence[str]) -> Iter
     along = f"of {len(lines)} lines along {in_words(dataset[x])}" if len(lines) > 1 else ""
     if quiet:
         yield f"Nothing vibrates in {quiet} {along}." if along else "Nothing vibrates here."
-    if open_ones := len(rest) - quiet:
+    known = [OccurrenceClass.QUIET, OccurrenceClass.SLIPPING]
+    if slipping := sum(bool(map_classes(line).isin(known).all()) for line in rest) - quiet:
+        start = f"In {slipping} {along} no" if along else "No"
+        yield f"{start} run vibrates, but some slip through."
+    if open_ones := len(rest) - quiet - slipping:
         start = f"In {open_ones} {along} no" if along else "No"
         yield f"{start} run is known to vibrate, but not all are known to be quiet."
 

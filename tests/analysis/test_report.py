@@ -96,6 +96,14 @@ def words_of(page):
     return " ".join(re.sub(r"<[^>]+>", " ", text).split())
 
 
+def test_where_runs_are_quiet_or_slip_through_no_doubt_is_told(tmp_path):
+    results = study(gradients=(-0.8,)).isel(sheave_stiffness=[0])
+    results["status"][:] = Status.DONE
+    results["vibrates"][:] = np.where(results["load"] > 150.0, Vibrates.SLIPS, Vibrates.NO)
+    words = page_of(results, tmp_path)
+    assert "No run vibrates, but some slip through." in words and "not all are known" not in words
+
+
 def test_the_page_says_what_was_found_in_sentences(page):
     words = words_of(page)
     assert "occurrence Vibration occurrence over load, friction and stiffness" in words

@@ -1,6 +1,7 @@
 """Uncertain parameters told by measured noise: hidden ones are found, and a study is calibrated by command."""
 
 import csv
+import shutil
 
 import numpy as np
 import pytest
@@ -232,6 +233,11 @@ def test_runs_that_are_there_are_weighed_and_what_is_left_of_them_is_done(tmp_pa
     before = {path: path.stat().st_mtime_ns for path in (out / "records").rglob("*")}
     assert main(command) == 0 and not (out / "samples").exists()
     assert {path: path.stat().st_mtime_ns for path in (out / "records").rglob("*")} == before
+    # nor does a folder of samples that has fewer of them
+    run(job, out / "samples", part="1/8", progress=False)
+    assert main(command) == 0 and int(find_records(out / "samples", job).recorded.sum()) < job.size
+    assert {path: path.stat().st_mtime_ns for path in (out / "records").rglob("*")} == before
+    shutil.rmtree(out / "samples")
     # others, and what --fresh repeats, have a folder of their own
     assert main([*command, "--set", "uncertain.seed=2"]) == 0 and (out / "samples").exists()
     assert {path: path.stat().st_mtime_ns for path in (out / "records").rglob("*")} == before
