@@ -297,7 +297,7 @@ def _left_out(of_names: Row, rows: Sequence[Row], separator: str, place: str, be
             raise mismatch(where, expected, str(len(cells)), then)
     found = ""
     for i in (i for i, name in enumerate(names) if not name):
-        wanted = repeat("")
+        wanted: Iterator[str] = repeat("")
         if i == 0 and first in ("0", "1"):
             wanted, found = map(str, count(int(first) + before)), _NUMBERED
         for (n, cells), number in zip(rows, wanted, strict=False):
