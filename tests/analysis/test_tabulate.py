@@ -6,8 +6,10 @@ from pathlib import Path
 
 import numpy as np
 import pytest
+import xarray as xr
 
 from cvt_hpc.errors import InputError
+from cvt_hpc.variables import Status, Vibrates
 from support.studies import study
 
 ROWS = runpy.run_path(str(Path(__file__).parents[2] / "jobs" / "tabulate.py"))["rows"]
@@ -61,3 +63,16 @@ def test_samples_have_their_place_in_the_table():
     results, rows = table()
     stacked = results.stack(run=("friction_gradient", "sheave_stiffness", "load")).reset_index("run")
     assert list(csv.DictReader(ROWS(stacked.transpose("run", ...)))) == rows
+
+
+def test_lags_of_the_tilt_are_counted_by_ranges():
+    of_lags = runpy.run_path(str(Path(__file__).parents[2] / "jobs" / "tilt_lag.py"))["table"]
+    lags = np.array([0.25, 0.25, 0.4, 0.4, 1.5, 4.0, 4.0])
+    status = np.array([Status.DONE] * 6 + [Status.FAILED_NUMERICS])
+    yes, no, open_one = Vibrates.YES, Vibrates.NO, Vibrates.UNDECIDED
+    verdicts = np.array([yes, no, yes, yes, no, open_one, yes])
+    runs = {"tilt_lag": 1e-3 * lags, "status": status, "vibrates": verdicts}
+    found = of_lags(xr.Dataset({name: ("run", values) for name, values in runs.items()}))
+    assert found["samples"].tolist() == [2, 2, 0, 1, 1]
+    assert found["vibrating"].tolist() == [1, 2, 0, 0, 0]
+    assert found["undecided"].tolist() == [0, 0, 0, 0, 1]
