@@ -49,6 +49,18 @@ def loaded():
     return simulate(job(load=0.45 * SLIP_TORQUE), {})
 
 
+def test_defaults_are_the_ten_values_of_the_paper():
+    # Cepon and Boltezar 2011, table 1: two equal pulleys, and a belt of five ribs
+    given = build_job({"name": "belt_drive", "model": "belt_drive"}, "belt_drive", {}).point(0)
+    ribs = {"axial_stiffness": 30.4e3, "axial_damping": 4.1, "bending_stiffness": 5.2e-3}
+    wanted = {"driven_radius": 0.05, "driven_inertia": 0.013, "centre_distance": 0.45, "line_mass": 0.096}
+    wanted |= {name: 5.0 * value for name, value in ribs.items()}
+    wanted |= {"mass_damping": 2.8, "bending_damping": 1.8e-3}
+    assert {name: given[name] for name in wanted} == pytest.approx(wanted, rel=1e-12)
+    # its tenth value is the length, printed as 1.2 m
+    assert round(layout(given).path.path_length, 1) == 1.2
+
+
 def stretch(tension, stiffness=152e3):
     """Length over that without load, EA (x^2 - 1) x / 2 = T to the second order."""
     return 1.0 + tension / stiffness - 1.5 * (tension / stiffness) ** 2
