@@ -121,7 +121,7 @@ def test_its_cost_is_told_before_it_is_asked_for(job, capsys):
     assert main(["check", str(job)]) == 0  # by its table it is a job for `ladder`
     asked = capsys.readouterr().out.splitlines()
     rows = {line.split()[0]: line.split() for line in asked if line.startswith("  ")}
-    assert rows["pushbelt"][1:4] == rows["reference"][1:4] == ["pushbelt", "15", "15"]
+    assert rows["pushbelt"][1:4] == rows["reference"][1:4] == ["pushbelt", "36", "36"]
     # twice the elements at half the step, samples apart
     assert float(rows["reference"][4]) == pytest.approx(4.0 * float(rows["pushbelt"][4]), rel=0.2)
     assert "ladder.reference" not in asked[-1]
