@@ -51,6 +51,7 @@ _KEYS: dict[str, dict[str, Parameter]] = {  # beside `kind`
     "latin_hypercube": {"runs": _RUNS, "seed": SEED},
     LISTED: {"runs": _RUNS},
 }
+KEYS_OF_A_DESIGN = {"kind"}.union(*_KEYS.values())
 _KIND = Parameter("grid", "", "which points are run", choices=tuple(_KEYS))
 
 Design = dict[str, Any]  # empty: the full grid

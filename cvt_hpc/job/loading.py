@@ -16,6 +16,7 @@ from cvt_hpc.job.definition import HEADER, Job, answering_model, handed_to
 from cvt_hpc.job.design import (
     ADAPTIVE,
     KEY,
+    KEYS_OF_A_DESIGN,
     Design,
     check_adaptive,
     read_design,
@@ -40,7 +41,7 @@ from cvt_hpc.job.schema import Entry, Schema, load_schema
 from cvt_hpc.job.signal_files import MAT, MDF, read_signals
 from cvt_hpc.job.summary import tell_of_no_effect
 from cvt_hpc.job.uncertain import TABLE, with_samples
-from cvt_hpc.job.uncertain_table import check_samples, read_uncertain
+from cvt_hpc.job.uncertain_table import SETTINGS, check_samples, read_uncertain
 from cvt_hpc.job.units import unit_in
 from cvt_hpc.job.values import (
     Document,
@@ -56,6 +57,9 @@ from cvt_hpc.models.contract import load_model
 from cvt_hpc.parameters import Parameters
 
 _READERS = {NETCDF: read_netcdf, MAT: read_signals, MDF: read_signals}  # by suffix; others are CSV
+_TABLE_OF = dict.fromkeys(KEYS_OF_A_DESIGN, "design") | dict.fromkeys(
+    SETTINGS, TABLE
+)  # that --set has to name
 _NAME = re.compile(r"[A-Za-z0-9][A-Za-z0-9._-]{0,99}")
 
 
@@ -139,6 +143,9 @@ def rebuild_job(
     if is_uncertain := TABLE in document or bool(uncertain):
         schema = with_samples(schema, uncertain)
     others = {key: value for key, value in pairs.items() if key not in HEADER}
+    for key in others:
+        if key not in schema.parameters and key in _TABLE_OF:
+            raise InputError(f"{source}: {label} {key}: unknown key; did you mean {_TABLE_OF[key]}.{key}?")
     put_axes, replaced = assignments.read_axes_and_values(others, schema, source, label)
     design = read_design({**document.get("design", {}), **changed}, source)
     put = {*replaced, *put_axes}

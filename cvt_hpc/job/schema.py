@@ -7,7 +7,7 @@ from importlib import import_module
 from typing import NamedTuple
 
 from cvt_hpc import recording
-from cvt_hpc.errors import InputError, did_you_mean, mismatch, nearest, show
+from cvt_hpc.errors import InputError, did_you_mean, few_of, mismatch, nearest, show, unknown
 from cvt_hpc.job.values import Point, Table, in_words
 from cvt_hpc.models import MODELS
 from cvt_hpc.models.contract import Model, load_model
@@ -21,6 +21,7 @@ Problem = tuple[str, str, str]
 Check = Callable[[Point], list[Problem]]
 Inert = Callable[[Point], dict[str, str]]
 
+_MOST_NAMED = 16
 RETIRED = {"contact_sweeps": "contact is solved exactly; delete the line"}  # keys of earlier versions
 
 
@@ -94,9 +95,13 @@ class Schema:
             raise InputError(f"{where}: belongs in [{home}], found in [{section}]")
         if name in RETIRED:
             raise InputError(f"{where}: no key of this version; {RETIRED[name]}")
-        known = self.sections.get(section or "", {}) or self.parameters
-        hint = self.nearest(name, section) or f"; known: {', '.join(known)}"
-        raise InputError(f"{where}: unknown key{hint}")
+        if near := self.nearest(name, section):
+            raise InputError(f"{where}: unknown key{near}")
+        if known := self.sections.get(section or ""):
+            raise unknown(where, "key", name, known)
+        keys = list(self.parameters)
+        then = f"; `cvt-hpc models {self.model}` lists all {len(keys)}" if len(keys) > _MOST_NAMED else ""
+        raise InputError(f"{where}: unknown key; known: {few_of(keys, _MOST_NAMED)}{then}")
 
     def flatten(self, table: Table) -> Iterator[tuple[str, object]]:
         """Yield name and value; TOML reads a line `scene.load = ...` as a table "scene" with a key "load"."""

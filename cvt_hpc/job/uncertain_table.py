@@ -22,7 +22,7 @@ _SAMPLES = Parameter(256, "", "samples of each cell", minimum=2, maximum=MOST)
 
 _COEFFICIENTS = Parameter((), "", "matrix of correlation")
 _INDICES = Parameter(False, "", "whether runs for Sobol indices are done, too")
-_OWN = ("samples", "seed", "correlation", "indices", SAMPLE, SWAPPED)
+SETTINGS = ("samples", "seed", "correlation", "indices")
 
 
 def read_uncertain(
@@ -54,7 +54,7 @@ def read_uncertain(
     """
     where = f"{source}: [{TABLE}]"
     found: dict[str, Distribution] = {}
-    pairs = ((name, raw) for name, raw in schema.flatten(table) if name not in _OWN)
+    pairs = ((name, raw) for name, raw in schema.flatten(table) if name not in (*SETTINGS, SAMPLE, SWAPPED))
     for key, entry in schema.entries(pairs, where):
         if key in found:
             raise mismatch(entry.where, "one distribution of a parameter", f"a second one of {key}")
