@@ -127,7 +127,7 @@ def test_lines_where_there_is_no_terminal(start, tmp_path):
     lines = [line for line in output if "runs" in line]  # MPI libraries have things to say as well
     assert len(lines) == 1  # of one rank, at the end
     assert lines[0].startswith("10/10 runs (100.0%), 1 failed, ")
-    assert "runs/s, 0:00:00 to go" in lines[0]
+    assert lines[0].endswith(" runs/s")  # without a time for nothing
 
 
 def test_progress_counts_all_ranks_and_earlier_sessions(capsys):

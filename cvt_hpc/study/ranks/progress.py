@@ -120,9 +120,13 @@ class Progress:
             tell(line)
 
     def to_go(self) -> str:
-        """Return the time for the remaining runs, as ", 0:01:00 to go"; "" before anything has ended."""
+        """Return the time for the remaining runs, as ", 0:01:00 to go".
+
+        "" before anything has ended, and where none is known to remain: a trace may add runs, and a run that
+        is recorded may be prolonged.
+        """
         done, elapsed = self.counter.tally().finished, time.monotonic() - self._started
-        if not done or elapsed <= 0.0:
+        if not 0 < done < self._work.size or elapsed <= 0.0:
             return ""
         # by their number alone, too long a time would be left
         work = self._work[done - 1]
