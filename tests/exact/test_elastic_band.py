@@ -112,7 +112,7 @@ def errors(stations):
 
 
 def test_the_belt_without_push_is_that_band():
-    (force, thrust, speed), (fine_force, fine_thrust, fine_speed) = errors(96), errors(192)
+    (force, thrust, speed), (fine_force, fine_thrust, fine_speed) = errors(80), errors(160)
     # First order in the mesh: the force that a band brings into an arc acts on half a cell. Of the centrifugal
     # force, 136 N, the belt's strain of 5e-4 is left out: 2e-5 of the band's force.
     assert fine_force < 0.55 * force and fine_force < 1e-3
@@ -122,7 +122,7 @@ def test_the_belt_without_push_is_that_band():
 
 
 def test_the_belt_slips_at_the_exits():
-    grid, steady = band_of_the_belt(192)
+    grid, steady = band_of_the_belt(160)
     exact = band(grid.path.driven_wrap)
     tension = distributions(steady).ring_tension
     pull = (ELEMENT_MASS + RING_MASS) * exact.flow_speed**2
@@ -161,7 +161,7 @@ def most_moment(driven_wrap):
 
 @pytest.mark.slow
 def test_the_most_that_the_band_carries():
-    wrap = band_of_the_belt(96)[0].path.driven_wrap
+    wrap = band_of_the_belt(80)[0].path.driven_wrap
     moment, _ = most_moment(wrap)
     # the closed equilibrium comes there: slip arcs of smaller moments, extrapolated by their curvature
     moments = np.array([255.0, 261.0, 267.0, 273.0])
@@ -170,8 +170,10 @@ def test_the_most_that_the_band_carries():
     assert np.polyval(np.polyfit(moments, arcs, 3), moment) == pytest.approx(2.0 * np.pi - wrap, rel=1e-3)
     most = moment * RADII[0] / RADII[1]
     errors = []
-    for stations in (64, 96):
-        last = SteadyBelt(band_parameters(stations)).carried(band_of_the_belt(stations)[1])
+    for stations in (80, 160):
+        belt = SteadyBelt(band_parameters(stations))
+        # near there, as states along the way cost most
+        last = belt.carried(belt.at(0.95 * most, band_of_the_belt(stations)[1]))
         errors.append(1.0 - last.load / most)
     # regularised friction and the force that is brought in on half a cell: both let it carry less
     assert 0.0 < errors[1] < errors[0] < 0.01

@@ -184,20 +184,6 @@ def test_every_kernel_of_the_package_can_be_told_apart():
         assert not each.targetoptions.get("fastmath") and not each.targetoptions.get("parallel")
 
 
-def test_what_has_taught_the_compiler_counts_and_what_it_has_loaded_itself_does_not(monkeypatch):
-    before = identity.extensions()
-    numba.njit(lambda x: np.sort(x))(np.ones(2))
-    assert identity.extensions() == before
-    arithmetic = sys.modules["cvt_hpc.lanes.arithmetic"]
-    monkeypatch.setattr(arithmetic, "_common", made("def f(a, b): return None"))
-    arithmetic._common.__module__ = arithmetic.__name__
-    assert identity.extensions() != before
-    monkeypatch.undo()
-    assert identity.extensions() == before
-    overload(len)(made("def f(x): return None"))
-    assert identity.extensions() != before
-
-
 @kernel
 def makes_and_raises(n):
     rows = np.empty((n, 2))  # the size may be negative or overflow, of which the compiler's own code tells
@@ -321,6 +307,29 @@ def printed(forking, tmp_path):
         return found
 
     return output
+
+
+TEACHING = """
+from numba.extending import overload
+from cvt_hpc.kernels.identity import extensions
+before = extensions()
+overload(len)(lambda x: None)
+print(extensions() != before)
+"""
+
+
+def test_what_has_taught_the_compiler_counts_and_what_it_has_loaded_itself_does_not(monkeypatch, printed):
+    before = identity.extensions()
+    numba.njit(lambda x: np.sort(x))(np.ones(2))
+    assert identity.extensions() == before
+    arithmetic = sys.modules["cvt_hpc.lanes.arithmetic"]
+    monkeypatch.setattr(arithmetic, "_common", made("def f(a, b): return None"))
+    arithmetic._common.__module__ = arithmetic.__name__
+    assert identity.extensions() != before
+    monkeypatch.undo()
+    assert identity.extensions() == before
+    # elsewhere, as it lasts as long as the process, which would find no machine code any more
+    assert printed(TEACHING) == ["True"]
 
 
 EULER = """

@@ -15,7 +15,8 @@ NOT_COMPUTED = object()
 FURTHER = {
     "belt_drive": {"amplitude_threshold": 0.01},  # coarse elements shake the strands
     **dict.fromkeys(("steady_variator", "linear_stability"), {"stations": 48}),
-    "slip_limit": {"stations": 32},
+    "beam_pushbelt": {"elements": 80},
+    "slip_limit": {"stations": 36},
 }
 RECORDED = [
     pytest.param(name, marks=pytest.mark.slow) if name == "beam_pushbelt" else name

@@ -202,7 +202,7 @@ def test_sign_of_a_determinant():
 
 def test_states_follow_their_curve_from_corner_to_corner_where_the_load_turns_back():
     # from 20 to 60 N m the play passes from the driven wrap through a strand to the driving wrap, cell by cell
-    parameters = GIVEN | {"load_start": 0.0, "tilt_lag": 0.0, "tilt_stiffness": 6.3e5, "stations": 40}
+    parameters = GIVEN | {"load_start": 0.0, "tilt_lag": 0.0, "tilt_stiffness": 6.3e5, "stations": 36}
     first = SteadyBelt(parameters).at(20.0)
     equations = Equations(parameters, first.belt)
     loads, pressed = [first.load], equations.corners(first.unknowns) > 0.0
@@ -232,7 +232,8 @@ def test_single_cells_that_open_are_not_taken_for_the_limit_of_friction():
         "stations": 40,
     }
     belt = SteadyBelt(parameters)
-    limit = belt.carried(belt.at(140.0))
+    # first a load under which the belt settles soon
+    limit = belt.carried(belt.at(140.0, belt.at(100.0)))
     assert limit.largest_slip > 0.01 and limit.load > 250.0
 
 
@@ -262,7 +263,7 @@ def test_largest_load_where_a_strand_is_about_to_let_go():
 def test_largest_load_does_not_depend_on_the_steps(monkeypatch):
     parameters = GIVEN | {"friction_gradient": 0.0, "stations": 40}
     belt = SteadyBelt(parameters)
-    near = belt.at(200.0)
+    near = belt.at(235.0)
     loads = [belt.carried(near).load]
     monkeypatch.setattr(curve, "LONGEST", 0.025)
     loads.append(belt.carried(near).load)
