@@ -32,7 +32,7 @@ QUOTED = [
     (CHOOSE, r"`linear_stability`.* onset (\S+) N m", "ladder", of_rung("onset", "linear_stability"), "error_median", 1.0),
     (CHOOSE, r"`linear_stability`.* (\S+) N m \(95 %", "ladder", of_rung("onset", "linear_stability"), "error_95", 1.0),
     (CHOOSE, r"`auto`.* wrong in (\S+) %", "ladder", of_rung("occurrence", "auto"), "wrong_share", 0.01),
-    (CHOOSE, r"`elastic_belt` \| \d.* wrong in (\S+) of 36", "ladder_pushbelt", of_rung("occurrence", "elastic_belt"), "wrong_share", 1 / 15),
+    (CHOOSE, r"`elastic_belt` \| \d.* wrong in (\S+) of 36", "ladder_pushbelt", of_rung("occurrence", "elastic_belt"), "wrong_share", 1 / 36),
     (CHOOSE, r"`elastic_belt` \| \d.* amplitude (\S+) % \(median", "ladder_pushbelt", of_rung("amplitude", "elastic_belt"), "error_median", 0.01),
     (CHOOSE, r"`elastic_belt` \| \d.* (\S+) % \(95 %", "ladder_pushbelt", of_rung("amplitude", "elastic_belt"), "error_95", 0.01),
     (CHOOSE, r"`elastic_belt` \| \d.* frequency (\S+) %", "ladder_pushbelt", of_rung("frequency", "elastic_belt"), "error_median", 0.01),
