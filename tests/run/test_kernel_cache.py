@@ -35,6 +35,14 @@ from cvt_hpc.lanes import LaneArray, minimum
 PACKAGE = Path(cvt_hpc.__file__).parent
 
 
+@pytest.fixture(autouse=True)
+def untaught():
+    """What teaches the compiler in this process would have all later tests compile their kernels again."""
+    before = identity.extensions()
+    yield
+    assert identity.extensions() == before
+
+
 @pytest.fixture
 def chosen(monkeypatch, tmp_path):
     """A folder that the user has chosen; what has been told before is told again."""
