@@ -106,7 +106,7 @@ def _cell(part: pd.DataFrame, content: str | list[str]) -> str:
     if part.empty:
         return ""
     expression, form = (content, "{}") if isinstance(content, str) else content
-    found = eval(expression, {"window": window}, dict(part.items()))
+    found = eval(expression, {"window": window}, part)  # its columns by their names
     texts = [_range(value) for value in (found if isinstance(found, tuple) else (found,))]
     return NOTHING if set(texts) == {NOTHING} else form.format(*texts)
 

@@ -47,7 +47,7 @@ from matplotlib.container import Container
 from matplotlib.figure import Figure
 from matplotlib.patheffects import AbstractPathEffect, Normal, withStroke
 from matplotlib.text import Text
-from matplotlib.ticker import FuncFormatter, Locator, LogFormatter, NullFormatter
+from matplotlib.ticker import FuncFormatter, Locator, LogFormatter, NullFormatter, ScalarFormatter
 from numpy.typing import NDArray
 from PIL import Image
 
@@ -72,6 +72,7 @@ P = ParamSpec("P")
 Handle: TypeAlias = "Artist | Container"  # of a legend
 Panels = np.ndarray  # of axes, by row and column
 _AS_WRITTEN: WeakSet[Figure] = WeakSet()
+_NUMBERS = (ScalarFormatter, NullFormatter)  # whose labels have no `$`
 
 WIDTH = 6.4  # [inch]: letters of 10 points stay readable across a page and on a telephone held sideways
 NARROW, LONG = 7.1, 10.5  # [inch]: sides of a page of A4 within margins of 15 mm
@@ -199,24 +200,27 @@ def as_written(figure: Figure) -> Figure:
     if figure in _AS_WRITTEN:
         return figure
     _AS_WRITTEN.add(figure)
-    powers = {
-        label
-        for axes in figure.axes
-        for axis in (axes.xaxis, axes.yaxis)
-        if isinstance(axis.get_major_formatter(), LogFormatter)
-        for tick in (*axis.get_major_ticks(), *axis.get_minor_ticks())
-        for label in (tick.label1, tick.label2)
-    }
     for text in _texts_within(figure):
-        if text not in powers:
-            text.set_parse_math(False)
+        text.set_parse_math(False)
     return figure
 
 
 def _texts_within(artist: Artist) -> Iterator[Text]:
-    """All texts of an artist that are drawn: those of hidden axes would be made first, which takes long."""
+    """All texts of an artist that are drawn, but for numbers along axes.
+
+    Those of hidden axes would be made first, and so would be numbers, which takes long.
+    """
     if isinstance(artist, Text):
         yield artist
+    elif isinstance(artist, Axis) and artist.get_visible():
+        yield from (artist.label, artist.offsetText)
+        major, minor = artist.get_major_formatter(), artist.get_minor_formatter()
+        for formatter, ticks in ((major, artist.get_major_ticks), (minor, artist.get_minor_ticks)):
+            if isinstance(major, LogFormatter) or type(formatter) in _NUMBERS:
+                ticks(1)  # in the present style, which others take over from it
+                continue
+            for tick in ticks():
+                yield from _texts_within(tick)
     elif artist.get_visible():
         for child in artist.get_children():
             yield from _texts_within(child)

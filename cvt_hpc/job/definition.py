@@ -98,7 +98,7 @@ class Job(Runs):
         """Number of runs."""
         return self.size
 
-    @property
+    @cached_property
     def schema(self) -> Schema:
         """Declarations of the model and the stepper, and of the axes of uncertain parameters."""
         schema = replace(load_schema(self.model, self.stepper, self.source), units=self.units)
