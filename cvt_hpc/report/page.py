@@ -6,7 +6,7 @@
 import base64
 import re
 from collections.abc import Callable, Iterator, Sequence
-from functools import partial
+from functools import cache, partial
 from importlib import resources
 from io import BytesIO
 from itertools import islice, product
@@ -124,12 +124,18 @@ def write_report(
     check_results(dataset, source)
     if (content := str(dataset.attrs.get(CONTENT, ""))) == HISTORY:
         raise mismatch(source, "results of a study", f"the {content}; `cvt-hpc plot` draws it")
-    loader = jinja2.PackageLoader("cvt_hpc.report", ".")
-    templates = jinja2.Environment(loader=loader, autoescape=True, finalize=_as_it_stands)
-    page = templates.get_template("page.html").render(_content(dataset, source, folder, measured, progress))
+    page = _template().render(_content(dataset, source, folder, measured, progress))
     with written_aside(Path(out), parents=True) as aside:
         aside.write_text(page, encoding="utf-8")
     return Path(out)
+
+
+@cache  # for pages that are written again and again
+def _template() -> jinja2.Template:
+    """The page, to be filled in."""
+    loader = jinja2.PackageLoader("cvt_hpc.report", ".")
+    templates = jinja2.Environment(loader=loader, autoescape=True, finalize=_as_it_stands)
+    return templates.get_template("page.html")
 
 
 def _as_it_stands(value: object) -> object:
