@@ -57,9 +57,7 @@ from cvt_hpc.models.contract import load_model
 from cvt_hpc.parameters import Parameters
 
 _READERS = {NETCDF: read_netcdf, MAT: read_signals, MDF: read_signals}  # by suffix; others are CSV
-_TABLE_OF = dict.fromkeys(KEYS_OF_A_DESIGN, "design") | dict.fromkeys(
-    SETTINGS, TABLE
-)  # that --set has to name
+_TABLES = {"design": KEYS_OF_A_DESIGN, TABLE: SETTINGS}  # whose keys --set has to name with the table
 _NAME = re.compile(r"[A-Za-z0-9][A-Za-z0-9._-]{0,99}")
 
 
@@ -144,8 +142,9 @@ def rebuild_job(
         schema = with_samples(schema, uncertain)
     others = {key: value for key, value in pairs.items() if key not in HEADER}
     for key in others:
-        if key not in schema.parameters and key in _TABLE_OF:
-            raise InputError(f"{source}: {label} {key}: unknown key; did you mean {_TABLE_OF[key]}.{key}?")
+        near = [f"{table}.{key}" for table, keys in _TABLES.items() if key in keys]
+        if near and key not in schema.parameters:
+            raise InputError(f"{source}: {label} {key}: unknown key; did you mean {' or '.join(near)}?")
     put_axes, replaced = assignments.read_axes_and_values(others, schema, source, label)
     design = read_design({**document.get("design", {}), **changed}, source)
     put = {*replaced, *put_axes}

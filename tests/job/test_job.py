@@ -155,6 +155,7 @@ def test_overrides_reach_the_head_and_the_last_of_two_counts(write_job):
         (["=3"], '--set: expected KEY=VALUE, found "=3"'),
         (["laod=3"], "--set laod: unknown key; did you mean load in [scene]?"),
         (["runs=3"], "--set runs: unknown key; did you mean design.runs?"),
+        (["first_samples=8"], "--set first_samples: unknown key; did you mean design.first_samples?"),
         (["indices=true"], "--set indices: unknown key; did you mean uncertain.indices?"),
         (["belt.load=3"], "--set belt.load: belongs in [scene], found in [belt]"),
         (
