@@ -12,7 +12,6 @@ import traceback
 import warnings
 from collections.abc import Iterator, Sequence
 from contextlib import contextmanager
-from functools import cache
 from typing import Any, NoReturn
 
 from cvt_hpc import __version__
@@ -151,7 +150,6 @@ class _Parser(argparse.ArgumentParser):
         raise InputError(f"{message}; see `{self.prog} --help`")
 
 
-@cache  # for callers of several command lines, such as scripts
 def _parser() -> argparse.ArgumentParser:
     parser = _Parser(
         prog="cvt-hpc",

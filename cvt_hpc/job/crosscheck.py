@@ -3,7 +3,6 @@
 import math
 from collections.abc import Iterable, Sequence
 from dataclasses import replace
-from typing import Any
 
 from cvt_hpc.errors import InputError, mismatch
 from cvt_hpc.job.axes import NONE, SAMPLE, SWAPPED, Axes, Axis, thinned
@@ -58,9 +57,8 @@ def check_grid(
     sizes = {axis.name: len(axis.values) for axis in axes}
     scattered = [rule.key for rule in rules if isinstance(rule.source, Scatter)]
     idle = dict.fromkeys([*given, *scattered, *(name for name, size in sizes.items() if size > 1)], "")
-    known: dict[tuple, Any] = {}
     for varied in _samples_to_check(axes) if sampled else _points_to_check(axes, rules):
-        point = follow(rules, {**parameters, **varied}, known)
+        point = follow(rules, {**parameters, **varied})
         check_point(schema, point, source, varied)
         inert = _inert(schema, rules, point) if idle else {}
         idle = {name: inert[name] for name in idle if name in inert}
@@ -147,9 +145,8 @@ def without_effect(
     All runs are checked: of a huge grid the axes should be `thinned`. Arguments as of `check_grid`.
     """
     found: dict[str, str] | None = None
-    known: dict[tuple, Any] = {}
     for varied in places(axes, [axis.name for axis in axes], sampled=sampled and bool(axes)):
-        inert = _inert(schema, rules, follow(rules, {**parameters, **varied}, known))
+        inert = _inert(schema, rules, follow(rules, {**parameters, **varied}))
         found = inert if found is None else {key: found[key] for key in found if key in inert}
     return found or {}
 

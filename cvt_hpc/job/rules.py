@@ -140,15 +140,8 @@ class Noted(Mapping[str, Any]):
         return len({**self._known, **self._later})
 
 
-def follow(
-    rules: Iterable[Rule], parameters: Parameters, known: dict[tuple[Any, ...], Any] | None = None
-) -> Point:
+def follow(rules: Iterable[Rule], parameters: Parameters) -> Point:
     """Return flat parameters [SI] with those derived from them.
-
-    Parameters
-    ----------
-    known : dict, optional
-        Values of substitutes, kept from point to point: most points of a grid have the same ones.
 
     Raises
     ------
@@ -157,13 +150,7 @@ def follow(
     """
     values = dict(parameters)
     for rule in rules:
-        if known is None or not rule.is_substituted:
-            values[rule.key] = rule.value(values)
-            continue
-        needed = rule.key, *map(values.get, rule.needs)
-        if needed not in known:
-            known[needed] = rule.value(values)
-        values[rule.key] = known[needed]
+        values[rule.key] = rule.value(values)
     return values
 
 

@@ -95,6 +95,7 @@ def mechanics(monkeypatch):
     histories = ModuleType("cvt_hpc.analysis.histories")
     calls = {"written": [], "drawn": []}
     histories.place_of = histories.values_of = histories.settings_of = lambda attributes: []
+    histories.course_line = lambda attributes: ""
     histories.draw_history = lambda dataset, path: calls["drawn"].append((dataset, path)) or path
     monkeypatch.setitem(sys.modules, "cvt_hpc.simulation", double)
     monkeypatch.setitem(sys.modules, "cvt_hpc.analysis.histories", histories)

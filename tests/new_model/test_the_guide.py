@@ -13,7 +13,6 @@ import van_der_pol
 from van_der_pol.transient import Transient
 
 import cvt_hpc
-from cvt_hpc import cli
 from cvt_hpc.cli import main
 from cvt_hpc.experiment_kinds import EXPERIMENTS, Experiment
 from cvt_hpc.job import build_job
@@ -99,7 +98,6 @@ def test_an_experiment_has_its_command_its_files_and_its_table(monkeypatch, tmp_
     own = {"EXPERIMENTS": {}, "Experiment": Experiment}
     exec(registered.replace("cvt_hpc.experiments.", ""), own)
     monkeypatch.setitem(EXPERIMENTS, "two_steppers", own["EXPERIMENTS"]["two_steppers"])
-    monkeypatch.setattr(cli, "_parser", cli._parser.__wrapped__)  # one that knows it
     monkeypatch.setitem(MODELS, "van_der_pol", "van_der_pol")
     monkeypatch.chdir(tmp_path)
     Path("x.toml").write_text(

@@ -36,7 +36,7 @@ def test_a_job_is_fit_to_be_run(path, capsys, monkeypatch):
     assert any(line.startswith("estimated cost: ") and "core-" in line for line in printed.out.splitlines())
     # results go where the file's name says
     assert job.name == path.stem
-    # what a value follows from tells all points that have the same one
+    # the rules declare all that their values follow from
     point = job.point(0)
     assert all(rule.read(point) <= {*rule.needs} for rule in job.rules)
     # the sweep takes it, too: its dataset can hold axes and recorded quantities under their names
