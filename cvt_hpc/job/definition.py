@@ -7,9 +7,9 @@ import hashlib
 import json
 import math
 from collections.abc import Callable, Collection, Mapping
-from dataclasses import dataclass, field, replace
+from dataclasses import dataclass, field, fields, replace
 from functools import cached_property, partial
-from typing import Self
+from typing import Any, Self
 
 from cvt_hpc.errors import mismatch
 from cvt_hpc.job.assignments import Assignments, read_assignments, split_assignments
@@ -97,6 +97,10 @@ class Job(Runs):
     def __len__(self) -> int:
         """Number of runs."""
         return self.size
+
+    def __getstate__(self) -> dict[str, Any]:
+        """Return the fields alone: declarations may hold functions that cannot travel to another process."""
+        return {one.name: getattr(self, one.name) for one in fields(self)}
 
     @cached_property
     def schema(self) -> Schema:

@@ -10,6 +10,7 @@ from cvt_hpc.errors import InputError
 from cvt_hpc.job import build_job, crosscheck, load_job
 from cvt_hpc.job.formula import Formula
 from cvt_hpc.job.summary import summarize
+from cvt_hpc.models import MODELS
 
 JOB = """
 [scene]
@@ -38,6 +39,13 @@ def test_a_job_with_what_follows_goes_to_other_processes(write_job):
     job = load_job(write_job(JOB))
     other = pickle.loads(pickle.dumps(job))
     assert other == job and [d.values for d in other.derived] == [d.values for d in job.derived]
+
+
+@pytest.mark.parametrize("model", MODELS)
+def test_a_job_of_each_model_goes_to_other_processes_with_its_declarations_read(model):
+    job = build_job({"name": "x", "model": model})
+    assert job.schema.parameters
+    assert pickle.loads(pickle.dumps(job)) == job
 
 
 def test_each_run_has_what_follows_from_its_values(write_job):
