@@ -9,19 +9,22 @@ elements apart that hardly touch (loosened).
 
 The pushbelt is marched for `SETTLED`. From its rise time on it is calmed: at each sample it loses a part of the speed at
 which the belt's line moves across itself, which in a steady motion is none, so that the state stays what it is. Then it
-is let go three times, with a kick, a speed outwards of both strands, with half of it, and without. Each motion is
-decomposed in several windows that end while it is small. The table has the median of the strongest mode, and half of
-the range between the quartiles.
+is let go, and a vibration that grows does so from the chatter of the elements to its limit cycle. A cubic term limits
+its amplitude a by da/dt = sigma a (1 - a^2 / a_inf^2), so that its energy is E_inf / (1 + c exp(-2 sigma t)). The growth
+rate sigma is that of the course of this form that fits the energy of the probes best, and `misfit` how far the energy is
+from it (rms of the logarithm). The table has the median over several beginnings, and half of the range between the
+quartiles. A pushbelt whose energy does not grow, or by another course, has no growth rate.
 """
 
 import argparse
 import csv
 import sys
 from collections.abc import Iterator
-from itertools import product
-from typing import Any
+from typing import Any, NamedTuple
 
 import numpy as np
+from scipy.optimize import least_squares
+from scipy.signal import butter, hilbert, sosfiltfilt
 
 from cvt_hpc.experiments.ladder.loading import pushbelt_jobs
 from cvt_hpc.job import Job, build_job, load_job
@@ -33,21 +36,24 @@ from cvt_hpc.models.steady_variator.record import quantities
 from cvt_hpc.models.steady_variator.walking import NoSteadyState, SteadyBelt
 from cvt_hpc.storage.provenance import origin_lines
 from cvt_hpc.variator import PULLEYS, STRANDS
-from cvt_hpc.vibration.damped_modes import LEAST_SAMPLES, damped_modes, thinned
 
-SETTLED, RECORD = 0.085, 0.014  # [s]: until the kick, and from it on
+SETTLED, RECORD = 0.085, 0.08  # [s]: until it is let go, and from then on
 CALMED = 0.4  # of a speed across the belt, at each sample
-KICK, SHARES = 0.006, (0.0, 0.5, 1.0)  # [m/s]
-BEGINS, LASTS = (0.5e-3, 1e-3, 2e-3, 3e-3), (7e-3, 9e-3, 11e-3)  # [s]: of windows
-ORDERS = (6, 8, 10)  # of decompositions
-LOWEST = 200.0  # [Hz]: above judder; the highest frequency is band_high
-SMALL = 8e-6  # [m]: rms at the end of a window, less than a limit cycle has
+BEGINS, LEFT_OUT = (
+    (2e-3, 4e-3, 6e-3),
+    4e-3,
+)  # [s]: of the courses that are fitted, and at the end, of the filter
+LOWEST = 350.0  # [Hz]: above judder and the first modes that decay; the highest frequency is band_high
+LEAST_GROWTH = 2.0  # of the logarithm of the energy, from the first to the last value of the course
+MOST_MISFIT = 0.12
 FORCES = {"push_force": STRANDS, "ring_tension": STRANDS, "axial_force": PULLEYS}
 HEAD = (
     "belt",
     "growth [1/s]",
     "scatter [1/s]",
     "frequency [Hz]",
+    "misfit",
+    "limit cycle [m]",
     "loosened growth [1/s]",
     "loosened frequency [Hz]",
 )
@@ -70,40 +76,62 @@ def marched(run: ElementRun, samples: int) -> None:
         raise RuntimeError(failure[1])
 
 
-def twins(run: ElementRun, samples: int) -> np.ndarray:
-    """Displacement (3, time, probe) [m] from the present state on, without a kick, with half of it, and with it."""
-    begun, state, found = run.done, [array.copy() for array in run._reached()], []
-    for share in SHARES:
-        run.done = begun
-        for own, kept in zip(run._reached(), state, strict=True):
-            own[...] = kept
-        run.parameters = {**run.parameters, "kick": share * KICK}
-        if share:
-            run._kick()
-        marched(run, samples)
-        found.append(run.displacement[begun:].copy())
-    return np.array(found)
+class Course(NamedTuple):
+    """The course of a vibration that a cubic term limits, and how far the motion is from it."""
+
+    growth: float  # [1/s]
+    frequency: float  # [Hz], of the part with less than half of the energy at last
+    misfit: float  # rms of the logarithm of the energy
+    limit: float  # amplitude at last [m], rms over the probes
+    grown: float  # of the logarithm of the energy
 
 
-def strongest(motions: np.ndarray, rate: float, highest: float) -> list[float]:
-    """Growth rate, its scatter [1/s], and frequency [Hz] of the strongest mode of small motions; nan: none is."""
-    found = []
-    for motion in motions:
-        seen, thin = thinned(motion - motion.mean(axis=0), rate, highest)
-        for begin, last in product(BEGINS, LASTS):
-            part = seen[round(begin * thin) : round((begin + last) * thin)]
-            part = part - part.mean(axis=0)
-            if len(part) < LEAST_SAMPLES or part[-len(part) // 4 :].std() > SMALL:
-                continue
-            for one in damped_modes(part, thin, ORDERS):
-                inside = (one.frequency > LOWEST) & (one.frequency < highest)
-                if inside.any():
-                    k = np.argmax(np.where(inside, one.share, 0.0))
-                    found.append((one.growth[k], one.frequency[k]))
-    if not found:
-        return [np.nan] * 3
-    low, growth, high = np.quantile([growth for growth, _ in found], [0.25, 0.5, 0.75])
-    return [growth, 0.5 * (high - low), np.median([frequency for _, frequency in found])]
+def course(motion: np.ndarray, rate: float, band: tuple[float, float], begin: float) -> Course:
+    """Return the course that fits a motion (time, probe) [m] at a rate [Hz] best from a time [s] on.
+
+    With the energy E = E_inf / (1 + c exp(-2 sigma t)), log E is linear in t at first, constant at last.
+    """
+    passed = sosfiltfilt(
+        butter(4, band, "bandpass", fs=rate, output="sos"), motion - motion.mean(axis=0), axis=0
+    )
+    analytic = hilbert(passed, axis=0)[round(begin * rate) : -round(LEFT_OUT * rate)]
+    energy = 0.5 * (np.abs(analytic) ** 2).mean(axis=1)
+    measured, time = np.log(energy), np.arange(len(energy)) / rate
+
+    def log_energy(of: np.ndarray) -> np.ndarray:
+        last, begun, growth = of
+        return last - np.logaddexp(0.0, -(begun + 2.0 * growth * time))
+
+    fits = [
+        least_squares(
+            lambda of: log_energy(of) - measured, [measured.max(), -4.0, guess], loss="soft_l1", f_scale=0.3
+        )
+        for guess in (30.0, 100.0, 300.0)
+    ]
+    best = min(fits, key=lambda fit: float(fit.cost))
+    followed = log_energy(best.x)
+    turned = np.angle((analytic[1:] * analytic[:-1].conj()).sum(axis=1))
+    weights = np.where(followed[:-1] < best.x[0] - np.log(2.0), energy[:-1], 0.0)
+    return Course(
+        growth=float(best.x[2]),
+        frequency=float(np.average(turned, weights=weights) * rate / (2.0 * np.pi))
+        if weights.any()
+        else np.nan,
+        misfit=float(np.sqrt(((followed - measured) ** 2).mean())),
+        limit=float(np.exp(0.5 * best.x[0])),
+        grown=float(followed[-1] - followed[0]),
+    )
+
+
+def growth(motion: np.ndarray, rate: float, highest: float) -> list[float]:
+    """Growth rate, its scatter [1/s], frequency [Hz], misfit, and limit cycle [m] of a motion; nan: none grows."""
+    courses = [course(motion, rate, (LOWEST, highest), begin) for begin in BEGINS]
+    fitting = [one for one in courses if one.grown > LEAST_GROWTH and one.misfit < MOST_MISFIT]
+    if not fitting:
+        return [np.nan] * 5
+    low, median, high = np.quantile([one.growth for one in fitting], [0.25, 0.5, 0.75])
+    others = np.median([(one.frequency, one.misfit, one.limit) for one in fitting], axis=0)
+    return [median, 0.5 * (high - low), *others]
 
 
 def of_pushbelt(cell: Job, settings: dict[str, Any]) -> list[float]:
@@ -118,7 +146,9 @@ def of_pushbelt(cell: Job, settings: dict[str, Any]) -> list[float]:
         marched(run, 1)
     late = slice(run.done - round(5e-3 * rate), run.done)
     forces = [run.channel(f"{name} {place}")[late].mean() for name, at in FORCES.items() for place in at]
-    found = strongest(twins(run, round(RECORD * rate)), rate, cell.parameters["band_high"])
+    begun = run.done
+    marched(run, round(RECORD * rate))
+    found = growth(run.displacement[begun : run.done], rate, cell.parameters["band_high"])
     return [*found, np.nan, np.nan, *forces]
 
 
@@ -147,6 +177,8 @@ class ElasticBelts:
             first.growth,
             np.nan,
             first.frequency,
+            np.nan,
+            np.nan,
             apart.growth,
             apart.frequency,
             *np.concatenate(list(named)),
