@@ -9,7 +9,7 @@ import pytest
 
 from cvt_hpc.experiments.chart import load
 from cvt_hpc.experiments.ladder.loading import pushbelt_jobs
-from cvt_hpc.job import known_keys, load_job
+from cvt_hpc.job import build_job, known_keys, load_job
 from cvt_hpc.models.contract import load_model
 from cvt_hpc.models.elastic_belt import PARAMETERS
 from cvt_hpc.models.pushbelt import inert
@@ -160,7 +160,8 @@ def test_rings_rub_on_the_whole_wrap_of_the_smaller_pulley(ratio, load):
     """
     few = {"stations": 64, "band_high": 400.0, "rise_time": 0.02, "duration": 0.05, "longest_duration": 0.05}
     changes = {"ratio": ratio, "load": [load], "friction_gradient": 0.0, "ring_damping": 4.0}
-    asked = load_job(JOBS / "both_belts.toml", SCENE | changes | few)
+    document = tomllib.loads((JOBS / "both_belts.toml").read_text()) | {"axes": {}, "design": {}}
+    asked = build_job(document, overrides=SCENE | changes | few)
     point = asked.point(0)
     path = variator(ratio, point["driven_radius"], point["centre_distance"])
     radius, wrap = min((path.driving_radius, path.driving_wrap), (path.driven_radius, path.driven_wrap))
