@@ -4,10 +4,11 @@
     python jobs/tables.py make NAME ...     # from HEAD alone, cheapest first; --stale: all that are stale
     python jobs/tables.py check             # some rows are computed again
 
-A line `# made by: COMMANDS` on top of a table has the shell commands that write $TABLE, and keep what they
-need in the folder $OUT. A table is older than the code where anything that it rests on has changed since its
-revision: its job, its scripts, its data, and the modules of its models, its steppers and its experiment, with
-all that these import. Of the package, only rooms that compute count. Comments and docstrings do not count.
+A line `# made by: COMMANDS` on top of a table has the shell commands that write $TABLE, and keep what
+they need in the folder $OUT. Pictures that they write as ${TABLE%.csv}.png, or with a word between, lie
+beside it. A table is older than the code where anything that it rests on has changed since its revision:
+its job, its scripts, its data, and the modules of its models, its steppers and its experiment, with all
+that these import. Of the package, only rooms that compute count. Comments and docstrings do not count.
 
 Exit status 1: a table could not be made, or a row differs; 2: bad input.
 """
@@ -30,7 +31,7 @@ import time
 import tomllib
 from dataclasses import dataclass, replace
 from functools import cache, cached_property
-from itertools import pairwise
+from itertools import pairwise, takewhile
 from pathlib import Path
 from statistics import median
 
@@ -341,7 +342,8 @@ def made(table, work):
     """Replace a table by one that is made with the files of a folder; why it cannot be made, or ""."""
     runs = table.made_by.partition("&&")[0]  # tables of the same runs share their folder
     target = work / "table.csv"
-    target.unlink(missing_ok=True)
+    for earlier in work.glob("table*"):
+        earlier.unlink()
     environment = os.environ | {
         "OUT": str(work / hashlib.sha256(runs.encode()).hexdigest()[:16]), "TABLE": str(target),
         "PYTHONPATH": str(work / "tree"), "NUMBA_CACHE_DIR": str(work / "kernels"), "OMP_NUM_THREADS": "1",
@@ -368,6 +370,9 @@ def made(table, work):
         aside.write_text(
             "\n".join([*origin, head, *lines[len(lines) - len(cells) + 1 :], ""]), encoding="utf-8"
         )
+    for picture in work.glob("table*.png"):
+        with written_aside(table.path.with_name(picture.name.replace("table", table.path.stem, 1))) as aside:
+            shutil.copyfile(picture, aside)
     return ""
 
 
@@ -411,7 +416,8 @@ def study_of(made_by):
     if words[at + 1 : at + 5] != ["python", "jobs/tabulate.py", "$OUT", "$TABLE"]:
         return None
     settings = [value for word, value in pairwise(words[:at]) if word == "--set"]
-    return words[2], settings, words[at + 5 :] or OF_A_BELT
+    quantities = [*takewhile(lambda word: word != "&&", words[at + 5 :])]
+    return words[2], settings, quantities or OF_A_BELT
 
 
 def recomputed(file, settings, quantities, place, size):

@@ -157,6 +157,17 @@ def test_tables_are_made_the_cheapest_first_and_one_that_fails_stays_as_it_is(
     assert sorted(path.name for path in results.iterdir()) == ["broken.csv", "large.csv", "small.csv"]
 
 
+def test_pictures_of_a_table_are_made_with_it(program, store, tmp_path, monkeypatch):
+    (kept := tmp_path / "made").mkdir()
+    monkeypatch.setattr("tempfile.tempdir", str(kept))
+    results = store / "jobs" / "results"
+    drawing = "sh $TABLE && printf drawn > ${TABLE%.csv}.png && printf too > ${TABLE%.csv}_along.png"
+    edit(results / "large.csv", "sh $TABLE", drawing)
+    assert program.main(["make", "large", "small"]) == 0
+    found = {path.name: path.read_text() for path in results.glob("*.png")}
+    assert found == {"large.png": "drawn", "large_along.png": "too"}
+
+
 def test_all_that_are_stale_are_made_from_what_is_committed(program, store, capsys, tmp_path, monkeypatch):
     (left := tmp_path / "made").mkdir()
     monkeypatch.setattr("tempfile.tempdir", str(left))
