@@ -6,7 +6,9 @@ import pytest
 from cvt_hpc.models.elastic_belt import fields as f
 from cvt_hpc.models.elastic_belt.belt import State, belt_constants
 from cvt_hpc.models.elastic_belt.general_run import damper_power
-from cvt_hpc.models.elastic_belt.rhs import accelerations, content_rates, lengthening, strains
+from cvt_hpc.models.elastic_belt.one_system import flat_belt
+from cvt_hpc.models.elastic_belt.rhs import content_rates, lengthening
+from support.equations import evaluate
 from support.settled import DEFAULTS
 
 EVEN = {"end_refinement": 1.0}
@@ -41,10 +43,9 @@ def pressed_state(belt, seed=0):
 
 def rates_of(belt, state):
     """Accelerations (7, N) without flank forces, and the strains (2, N)."""
-    eps, rate = np.empty((2, belt.cell.size)), np.zeros((7, belt.cell.size))
-    strains(belt, state.fields, eps)
-    accelerations(belt, state, np.zeros(belt.cell.size), eps, rate, np.empty(belt.cell.size))
-    return rate, eps
+    flat = flat_belt(belt._replace(touches=np.zeros(belt.cell.size)))
+    evaluate(flat, state)
+    return flat.rate, flat.eps
 
 
 def of_dampers(state, stations, dampers, **values):

@@ -7,9 +7,14 @@ import pytest
 
 from cvt_hpc.models.elastic_belt import fields as f
 from cvt_hpc.models.elastic_belt.belt import State, belt_constants, initial_state
-from cvt_hpc.models.elastic_belt.one_system import driven_moment, driven_thrust, free_rates, pulled_by
+from cvt_hpc.models.elastic_belt.one_system import (
+    driven_moment,
+    driven_thrust,
+    flat_belt,
+    free_rates,
+    pulled_by,
+)
 from cvt_hpc.models.elastic_belt.rhs import (
-    accelerations,
     contact_forces,
     content_rates,
     fresh_contacts,
@@ -19,6 +24,7 @@ from cvt_hpc.models.elastic_belt.rhs import (
     strains,
     transported,
 )
+from support.equations import evaluate
 from support.fast_runs import march, march_fast
 from support.marched import job
 
@@ -133,9 +139,10 @@ def plain_step(belt, before, step):
     But for the memory, which goes to rest exactly, and at open stations at once.
     """
     state = before.copy()
-    (fields, scalars), rate, moments = state, np.zeros_like(before.fields), np.zeros(belt.cell.size)
-    force, eps = forces(belt, state)
-    accelerations(belt, state, force, eps, rate, moments)
+    fields, scalars = state
+    flat = flat_belt(belt)
+    evaluate(flat, state)
+    force, eps, rate, moments = flat.force, flat.eps, flat.rate, flat.moments
     for row in (f.U, f.V_ELEMENT, f.V_RING, *range(f.ELEMENT_TILT, len(fields))):
         fields[row] += step * rate[row]
     load = belt.ratio * load_at(belt, scalars[f.TIME])
