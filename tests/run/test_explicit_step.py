@@ -16,7 +16,6 @@ from cvt_hpc.models.elastic_belt.one_system import (
 )
 from cvt_hpc.models.elastic_belt.rhs import (
     contact_forces,
-    content_rates,
     fresh_contacts,
     load_at,
     sliding_speed,
@@ -142,7 +141,7 @@ def plain_step(belt, before, step):
     fields, scalars = state
     flat = flat_belt(belt)
     evaluate(flat, state)
-    force, eps, rate, moments = flat.force, flat.eps, flat.rate, flat.moments
+    force, rate, moments = flat.force, flat.rate, flat.moments
     for row in (f.U, f.V_ELEMENT, f.V_RING, *range(f.ELEMENT_TILT, len(fields))):
         fields[row] += step * rate[row]
     load = belt.ratio * load_at(belt, scalars[f.TIME])
@@ -156,7 +155,7 @@ def plain_step(belt, before, step):
     scalars[f.TIME] += step
     if belt.friction_memory > 0.0:
         fields[f.V_FILTERED] = remembered(belt, before, state, force, step)
-    content_rates(belt, state, eps, rate)
+    evaluate(flat, state)  # what streams does so at the new velocities
     fields[f.W] += step * fields[f.U]
     for row in (f.N_ELEMENT, f.N_RING):
         fields[row] += step * rate[row]
