@@ -11,8 +11,6 @@ from cvt_hpc.models.elastic_belt.one_system import (
     driven_moment,
     driven_thrust,
     flat_belt,
-    free_rates,
-    pulled_by,
 )
 from cvt_hpc.models.elastic_belt.rhs import (
     contact_forces,
@@ -140,7 +138,7 @@ def plain_step(belt, before, step):
     state = before.copy()
     fields, scalars = state
     flat = flat_belt(belt)
-    evaluate(flat, state)
+    packed = evaluate(flat, state)
     force, rate, moments = flat.force, flat.rate, flat.moments
     for row in (f.U, f.V_ELEMENT, f.V_RING, *range(f.ELEMENT_TILT, len(fields))):
         fields[row] += step * rate[row]
@@ -149,8 +147,8 @@ def plain_step(belt, before, step):
     closing = (driven_thrust(belt, force) - thrust) / belt.axial_damping
     turning = (driven_moment(belt, moments) - load) / belt.driven_inertia
     if belt.pulleys.are_free:
-        turning, closing, *others = free_rates(belt, before, pulled_by(belt, force, moments))
-        scalars[f.FIRST_STATE :] += step * np.array(others)
+        turning, closing = packed[-2:]
+        scalars[f.FIRST_STATE :] += step * packed[-2 - f.STATES : -2]
     scalars[f.DRIVEN_SPEED] += step * turning
     scalars[f.TIME] += step
     if belt.friction_memory > 0.0:

@@ -12,10 +12,12 @@ from cvt_hpc.models.elastic_belt.one_system import FlatBelt, pack, rates
 from cvt_hpc.steppers.system import RELATIVE_INCREMENT, System
 
 
-def evaluate(flat: FlatBelt, state: State) -> None:
-    """Put forces, strains, rates and moments of a state into the work space of its belt; that w rises by u is not told."""
+def evaluate(flat: FlatBelt, state: State) -> np.ndarray:
+    """Rates of the unknowns, as they are packed; forces, strains, moments and other rates go into the work space."""
     y = pack(flat, state)
-    assert rates(flat, state.scalars[f.TIME], y, np.empty_like(y))
+    found = np.empty_like(y)
+    assert rates(flat, state.scalars[f.TIME], y, found)
+    return found
 
 
 def slopes(system: System, time: float, y: np.ndarray) -> np.ndarray:
