@@ -9,13 +9,14 @@ import runpy
 import shutil
 import sys
 import tomllib
-from functools import cache
+from functools import cache, partial
 from pathlib import Path
 from typing import ClassVar
 
 import matplotlib.pyplot as plt
 import pytest
 
+import cvt_hpc
 from cvt_hpc.analysis import animation, figures
 from cvt_hpc.cli import _parser, main
 from cvt_hpc.job import build_job
@@ -254,6 +255,7 @@ def folder(tmp_path, monkeypatch):
     loaded = tmp_path / "jobs" / "lebrecht_2004.toml"  # by blocks of Python, which have no options
     shorter = loaded.read_text().replace('duration = "0.4 s"', PYTHON_RUN)
     loaded.write_text(shorter.replace('rise_time = "30 ms"', 'rise_time = "10 ms"'))
+    monkeypatch.setattr(cvt_hpc, "build_job", partial(build_job, overrides=SMALL | {"stations": 64}))
     monkeypatch.chdir(tmp_path)
     monkeypatch.setattr(sys, "argv", sys.argv)
     monkeypatch.setattr(animation, "FRAMES", 1)  # test_animation.py draws all

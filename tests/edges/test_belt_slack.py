@@ -7,9 +7,9 @@ from cvt_hpc.models.elastic_belt import fields as f
 from cvt_hpc.models.elastic_belt.belt import State, belt_constants
 from cvt_hpc.models.elastic_belt.one_system import flat_belt, pack, system
 from cvt_hpc.models.elastic_belt.validity import slack_doubt
-from cvt_hpc.steppers.system import jacobian
 from cvt_hpc.variables import Status
 from support.belts import point
+from support.equations import slopes
 
 RADIUS = 0.024
 CELLS = (12, 24, 48)  # in each half of the path of 0.30 m
@@ -33,11 +33,7 @@ def straight(cells, tension, push, speed=0.0, bending=0.0):
 def fastest_growth(belt, state):
     """Largest real part of an eigenvalue [1/s]."""
     flat = flat_belt(belt)
-    whole, y = system(flat), pack(flat, state)
-    rates, matrix = np.empty(y.size), np.empty((y.size, y.size))
-    assert whole.rates(flat, 1.0, y, rates)
-    assert jacobian(whole, 1.0, y, rates, np.empty(y.size), matrix)
-    return np.linalg.eigvals(matrix).real.max()
+    return np.linalg.eigvals(slopes(system(flat), 1.0, pack(flat, state))).real.max()
 
 
 @pytest.mark.parametrize(

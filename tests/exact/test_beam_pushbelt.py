@@ -21,7 +21,7 @@ def belt_with(**values):
     none = dict.fromkeys(Belt._fields, 0.0)
     common = {"mass": MASS, "inertia": INERTIA, "sine": 0.19, "cosine": np.sqrt(1.0 - 0.19**2)}
     pulleys = {"centre_distance": 10.0, "driven_inertia": 0.02, "nose_clearance": np.inf}
-    modes = {"modal_stiffness": np.zeros((2, 0)), "flank_law": 0}
+    modes = {"modal_stiffness": np.zeros((2, 0)), "modal_damping": np.zeros((2, 0)), "flank_law": 0}
     return Belt(**none | common | pulleys | modes | {"thickness": 0.008, "head_height": 0.004} | values)
 
 

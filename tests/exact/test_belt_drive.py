@@ -142,8 +142,10 @@ def rest():
     assert is_settled
     body = made.beam._replace(axial_damping=0.0, mass_damping=0.0, bending_damping=0.0)
     friction = made.contact.friction._replace(law=FRICTIONLESS)
-    made = made._replace(beam=body, contact=made.contact._replace(friction=friction, damping=0.0))
-    found = state(made, begun.chain.q, np.zeros_like(begun.chain.q), np.zeros(2))
+    # beside them an arm that holds no pulley, as in `drive`: one kernel adds the contacts of both
+    wheels = made.pulleys._replace(arms=ARM)
+    made = Drive(body, wheels, made.contact._replace(friction=friction, damping=0.0))
+    found = state(made, begun.chain.q, np.zeros_like(begun.chain.q), np.zeros(2), ANGLE)
     found.chain.stage_q[:] = found.chain.q
     add(made, found, 1.0)
     return p, where, made, found

@@ -6,7 +6,9 @@ import pytest
 from cvt_hpc.models.elastic_belt import fields as f
 from cvt_hpc.models.elastic_belt.belt import State
 from cvt_hpc.models.elastic_belt.column import column_across, column_forces, rocking_column
-from cvt_hpc.models.elastic_belt.rhs import accelerations, content_rates, strains
+from cvt_hpc.models.elastic_belt.one_system import flat_belt
+from cvt_hpc.models.elastic_belt.rhs import strains
+from support.equations import evaluate
 from support.straight import LENGTH, MASS, moving_straight, straight_belt
 
 EA, EI, OUTER, INNER = 4e7, 2.0, 1.2e-3, 0.4e-3
@@ -114,15 +116,14 @@ def stiffness_of(belt, tension, push):
     """K of u' = K w about the straight belt, on functions odd about both ends of a strand: hinged."""
     n = belt.cell.size
     fields, scalars = moving_straight(belt, tension=tension, push=push)
-    eps, rate, found = np.empty((2, n)), np.empty((7, n)), np.empty((n, n))
+    flat, found = flat_belt(belt), np.empty((n, n))
     for j in range(n):
         sides = []
         for size in (1e-9, -1e-9):
             moved = fields.copy()
             moved[f.W, j] = size
-            strains(belt, moved, eps)
-            accelerations(belt, State(moved, scalars), np.zeros(n), eps, rate, np.empty(n))
-            sides.append(rate[f.U].copy())
+            evaluate(flat, State(moved, scalars))
+            sides.append(flat.rate[f.U].copy())
         found[:, j] = (sides[0] - sides[1]) / 2e-9
     inside = np.arange(1, n // 2)
     return found[np.ix_(inside, inside)] - found[np.ix_(inside, n - inside)]
@@ -203,16 +204,14 @@ def test_energy_is_kept_while_elements_rock():
     # A belt at rest, let go from a bow in which elements rock on both edges; classical Runge-Kutta. The linear stretch
     # leaves out what net forces that change do against slopes squared: it is followed and counted apart.
     belt = pressed_belt(12, element_damping=0.0, element_mass=16.0)  # waves of 1.6 km/s, for longer steps
-    n, state = belt.cell.size, moving_straight(belt, push=150.0)
+    n, state, flat = belt.cell.size, moving_straight(belt, push=150.0), flat_belt(belt)
     fields, place = state.fields, np.arange(belt.cell.size) * belt.cell[0]
     fields[f.W] = 1e-4 * np.sin(2.0 * np.pi * place / LENGTH)
-    eps, step = np.empty((2, n)), 5e-7
+    step = 5e-7
 
     def rates(moved):
-        rate, now = np.zeros_like(moved), State(moved, state.scalars)
-        strains(belt, moved, eps)
-        content_rates(belt, now, eps, rate)
-        accelerations(belt, now, np.zeros(n), eps, rate, np.empty(n))
+        evaluate(flat, State(moved, state.scalars))
+        rate = flat.rate.copy()
         rate[f.W] = moved[f.U]
         return rate
 

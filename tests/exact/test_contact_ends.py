@@ -8,11 +8,13 @@ import pytest
 from cvt_hpc.models.elastic_belt import fields as f
 from cvt_hpc.models.elastic_belt import rhs
 from cvt_hpc.models.elastic_belt.belt import Mesh, State, belt_constants, mesh
+from cvt_hpc.models.elastic_belt.one_system import flat_belt
 from cvt_hpc.models.elastic_belt.validity import reach_doubt
 from cvt_hpc.physics.compliance import plain_contact, solve_wrap
 from cvt_hpc.physics.sheaves import elastic_matrix, sheaves
 from cvt_hpc.variables import Status
 from support.complementarity import solve_lcp
+from support.equations import evaluate
 from support.marched import fresh_record
 from support.settled import DEFAULTS
 
@@ -55,9 +57,8 @@ def at_rest(bending, flanks):
     law = belt.law._replace(kinetic=0.0, gradient=0.0)
     belt = belt._replace(belt_speed=0.0, driving_speed=0.0, law=law)
     n = belt.cell.size
-    state, force, eps = State(np.zeros((7, n)), np.zeros(f.SCALARS)), np.empty(n), np.empty((2, n))
+    state, flat = State(np.zeros((7, n)), np.zeros(f.SCALARS)), flat_belt(belt)
     state.scalars[f.TIME] = 1.0
-    rate, moments, contacts = np.zeros((7, n)), np.empty(n), rhs.fresh_contacts(belt)
 
     def across(w):
         middles = belt.curvature * 0.5 * (w + np.roll(w, -1))
@@ -65,10 +66,8 @@ def at_rest(bending, flanks):
         state.fields[f.N_ELEMENT] = 1.0 + middles
         ring = 1.0 + middles + belt.curvature * belt.ring_offset
         state.fields[f.N_RING] = ring / (1.0 + FORCE / belt.ring_stiffness)
-        assert rhs.contact_forces(belt, state, contacts, force) > 0
-        rhs.strains(belt, state.fields, eps)
-        rhs.accelerations(belt, state, force, eps, rate, moments)
-        return rate[f.U].copy()
+        evaluate(flat, state)
+        return flat.rate[f.U].copy()
 
     w = np.zeros(n) - 1e-4
     for _ in range(30):
@@ -79,7 +78,7 @@ def at_rest(bending, flanks):
         if np.abs(change).max() < 1e-10:
             break
     assert np.abs(across(w)).max() * belt.mass < 1e-3 * FORCE / belt.driving_radius
-    return belt, mesh(values), force
+    return belt, mesh(values), flat.force
 
 
 @pytest.mark.slow

@@ -6,7 +6,8 @@ import pytest
 from cvt_hpc.models.elastic_belt import fields as f
 from cvt_hpc.models.elastic_belt.belt import State
 from cvt_hpc.models.elastic_belt.bending import NONE, PATH, STRAIGHT, bending_bands, bending_load
-from cvt_hpc.models.elastic_belt.rhs import accelerations, content_rates, strains
+from cvt_hpc.models.elastic_belt.one_system import flat_belt
+from support.equations import evaluate
 from support.straight import moving_straight, straight_belt
 
 RADIUS, MASS, EI, CELLS = 0.048, 0.3, 0.5, 48  # of a ring whose length is that of the straight belt
@@ -39,13 +40,11 @@ def frequencies(terms, speed=0.0, foundation=0.0):
     """Circular frequencies of a ring that turns, on springs across it [N/m^2]: eigenvalues, (frequency, shape) each."""
     belt = ring(terms, speed)
     n, start = 2 * CELLS, moving_straight(belt, tension=MASS * speed**2, push=-1e5)
-    eps, eigen = np.empty((2, n)), np.empty((4 * n, 4 * n))
+    flat, eigen = flat_belt(belt), np.empty((4 * n, 4 * n))
 
     def rates(fields):
-        rate, state = np.zeros_like(fields), State(fields, start.scalars)
-        strains(belt, fields, eps)
-        content_rates(belt, state, eps, rate)
-        accelerations(belt, state, np.zeros(n), eps, rate, np.empty(n))
+        evaluate(flat, State(fields, start.scalars))
+        rate = flat.rate.copy()
         rate[f.W] = fields[f.U]
         rate[f.U] -= foundation / MASS * fields[f.W]
         return rate[list(ROWS)].ravel()

@@ -6,7 +6,9 @@ import pytest
 from cvt_hpc.models.elastic_belt import fields as f
 from cvt_hpc.models.elastic_belt.belt import State, belt_constants
 from cvt_hpc.models.elastic_belt.general_run import damper_power
-from cvt_hpc.models.elastic_belt.rhs import accelerations, content_rates, lengthening, strains
+from cvt_hpc.models.elastic_belt.one_system import flat_belt
+from cvt_hpc.models.elastic_belt.rhs import lengthening
+from support.equations import evaluate
 from support.settled import DEFAULTS
 
 EVEN = {"end_refinement": 1.0}
@@ -40,11 +42,10 @@ def pressed_state(belt, seed=0):
 
 
 def rates_of(belt, state):
-    """Accelerations (7, N) without flank forces, and the strains (2, N)."""
-    eps, rate = np.empty((2, belt.cell.size)), np.zeros((7, belt.cell.size))
-    strains(belt, state.fields, eps)
-    accelerations(belt, state, np.zeros(belt.cell.size), eps, rate, np.empty(belt.cell.size))
-    return rate, eps
+    """Rates (7, N) without flank forces, and the strains (2, N)."""
+    flat = flat_belt(belt._replace(touches=np.zeros(belt.cell.size)))
+    evaluate(flat, state)
+    return flat.rate, flat.eps
 
 
 def of_dampers(state, stations, dampers, **values):
@@ -63,10 +64,8 @@ def test_it_is_the_rate_of_the_strain_of_flowing_material():
     for stations in (200, 400, 800):
         belt = belt_of(stations)
         state = pressed_state(belt)
-        n, u = stations, state.fields[f.U]
-        _, eps = rates_of(belt, state)
-        rate = np.zeros((7, n))
-        content_rates(belt, state, eps, rate)
+        u = state.fields[f.U]
+        rate, eps = rates_of(belt, state)
         v = state.fields[f.V_ELEMENT]
         bent = belt.curvature * 0.5 * (state.fields[f.W] + np.roll(state.fields[f.W], -1))
         here = (belt.curvature * 0.5 * (u + np.roll(u, -1))) / (1.0 + bent)
@@ -74,7 +73,7 @@ def test_it_is_the_rate_of_the_strain_of_flowing_material():
         flow = v / (1.0 + bent)
         carried = flow * (eps[0] - np.roll(eps[0], 1)) / (0.5 * (belt.cell + np.roll(belt.cell, 1)))
         found = (here + carried / (1.0 + eps[0])) * (1.0 + bent)
-        expected = np.array([lengthening(belt, v, u, c) for c in range(n)])
+        expected = np.array([lengthening(belt, v, u, c) for c in range(stations)])
         # within the regions: where they join, w and kappa jump from cell to cell
         smooth = belt.curvature == np.roll(belt.curvature, 1)
         worst.append(np.abs(found - expected)[smooth].max() / np.abs(expected).max())

@@ -9,7 +9,8 @@ from scipy.linalg import eigh
 
 from cvt_hpc.models.elastic_belt import fields as f
 from cvt_hpc.models.elastic_belt.belt import State
-from cvt_hpc.models.elastic_belt.rhs import accelerations, strains
+from cvt_hpc.models.elastic_belt.one_system import flat_belt
+from support.equations import evaluate
 from support.straight import LENGTH, MASS, TENSION, WAVE, moving_straight, straight_belt
 
 
@@ -17,14 +18,13 @@ def linearise(belt, **forces):
     """Matrices of u' = K w + G u around the straight belt."""
     n = belt.cell.size
     fields, scalars = moving_straight(belt, **forces)
-    eps, rate, matrices = np.empty((2, n)), np.empty((7, n)), np.empty((2, n, n))
+    flat, matrices = flat_belt(belt), np.empty((2, n, n))
     for matrix, row in zip(matrices, (f.W, f.U), strict=True):
         for j in range(n):
             probed = fields.copy()
             probed[row, j] = 1.0
-            strains(belt, probed, eps)
-            accelerations(belt, State(probed, scalars), np.zeros(n), eps, rate, np.empty(n))
-            matrix[:, j] = rate[f.U]
+            evaluate(flat, State(probed, scalars))
+            matrix[:, j] = flat.rate[f.U]
     return matrices
 
 

@@ -7,11 +7,13 @@ import pytest
 
 from cvt_hpc.models.elastic_belt import fields as f
 from cvt_hpc.models.elastic_belt.belt import State, belt_constants, initial_state
-from cvt_hpc.models.elastic_belt.one_system import driven_moment, driven_thrust, free_rates, pulled_by
+from cvt_hpc.models.elastic_belt.one_system import (
+    driven_moment,
+    driven_thrust,
+    flat_belt,
+)
 from cvt_hpc.models.elastic_belt.rhs import (
-    accelerations,
     contact_forces,
-    content_rates,
     fresh_contacts,
     load_at,
     sliding_speed,
@@ -19,6 +21,7 @@ from cvt_hpc.models.elastic_belt.rhs import (
     strains,
     transported,
 )
+from support.equations import evaluate
 from support.fast_runs import march, march_fast
 from support.marched import job
 
@@ -133,9 +136,10 @@ def plain_step(belt, before, step):
     But for the memory, which goes to rest exactly, and at open stations at once.
     """
     state = before.copy()
-    (fields, scalars), rate, moments = state, np.zeros_like(before.fields), np.zeros(belt.cell.size)
-    force, eps = forces(belt, state)
-    accelerations(belt, state, force, eps, rate, moments)
+    fields, scalars = state
+    flat = flat_belt(belt)
+    packed = evaluate(flat, state)
+    force, rate, moments = flat.force, flat.rate, flat.moments
     for row in (f.U, f.V_ELEMENT, f.V_RING, *range(f.ELEMENT_TILT, len(fields))):
         fields[row] += step * rate[row]
     load = belt.ratio * load_at(belt, scalars[f.TIME])
@@ -143,13 +147,13 @@ def plain_step(belt, before, step):
     closing = (driven_thrust(belt, force) - thrust) / belt.axial_damping
     turning = (driven_moment(belt, moments) - load) / belt.driven_inertia
     if belt.pulleys.are_free:
-        turning, closing, *others = free_rates(belt, before, pulled_by(belt, force, moments))
-        scalars[f.FIRST_STATE :] += step * np.array(others)
+        turning, closing = packed[-2:]
+        scalars[f.FIRST_STATE :] += step * packed[-2 - f.STATES : -2]
     scalars[f.DRIVEN_SPEED] += step * turning
     scalars[f.TIME] += step
     if belt.friction_memory > 0.0:
         fields[f.V_FILTERED] = remembered(belt, before, state, force, step)
-    content_rates(belt, state, eps, rate)
+    evaluate(flat, state)  # what streams does so at the new velocities
     fields[f.W] += step * fields[f.U]
     for row in (f.N_ELEMENT, f.N_RING):
         fields[row] += step * rate[row]
