@@ -17,6 +17,9 @@ from cvt_hpc.parameters import Parameter
 os.environ.setdefault("OMP_NUM_THREADS", "1")
 threadpool_limits(1)
 
+# Until all tests are collected nothing becomes garbage: searches for it would take a third of that time.
+gc.disable()
+
 # No test depends on the clock: a busy machine, or the first loading of pint, takes longer than an example may.
 settings.register_profile(
     "untimed", parent=settings(), deadline=None, suppress_health_check=[HealthCheck.too_slow]
@@ -97,6 +100,7 @@ def pytest_collection_finish():
     """
     gc.collect()
     gc.freeze()
+    gc.enable()
     gc.set_threshold(7000, 10, 10)
 
 
