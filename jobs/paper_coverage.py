@@ -37,14 +37,15 @@ Made by `python jobs/paper_coverage.py docs/coverage.md` from `docs/coverage.tom
 `jobs/results`. A row is measured where columns of these tables, or statements of a figure, decide at least
 a part of it, and tested where none do and a test of the suite, which it names, holds what it states. It is
 reproduced where all parts hold, partly where some do, not where the model gives something else, and missing
-where it has no counterpart or the text no number. Numbers are "older" where their table is older than the
+where it has no counterpart or the text no number; where the statement itself is one of the latter three,
+numbers beside it do not change that. Numbers are "older" where their table is older than the
 code, by its first lines. "Figure `NAME`" is `cvt-hpc run JOB && cvt-hpc figure out/NAME`, where JOB is
 `jobs/figures/NAME.toml` or `jobs/NAME.toml`; it leaves `figure.png` and `statements.csv`. The papers'
 pictures have no data here: "reproduced" means every number and shape that the text states. What they do not
 give is assumed, as each job says. All figures of Lebrecht et al. are of one set, that of
 `jobs/lebrecht_2004.toml`, seven values of which were fitted to what they state.
 """
-REPRODUCED, PARTLY, NOT, MISSING = "reproduced", "partly", "not", "missing"
+REPRODUCED, PARTLY, NOT, MISSING = WORSE = "reproduced", "partly", "not", "missing"
 OLDER = " (older)"
 MANY = 6  # numbers, of which the least and the largest are told
 
@@ -131,7 +132,8 @@ def settled(row):
     for holds, told in map(measured, row.get("measures", [])):
         verdicts.append(REPRODUCED if holds else NOT)
         numbers.append(told)
-    verdict = joined(verdicts + [row[key] for key in ("verdict",) if key in row])
+    own = [row[key] for key in ("verdict",) if key in row]  # which no measure beside it lifts
+    verdict = max([joined(verdicts + own), *own], key=WORSE.index)
     if verdict != REPRODUCED:
         why.append(row.get("why", ""))
     numbers += [row[key] for key in ("gives",) if key in row]

@@ -49,7 +49,7 @@ WORDS = {
 
 
 def is_there(name):
-    """Whether a command, file, test, key, variable, model or job exists under a name."""
+    """Whether a command, file, test, key, variable, model or job exists under a name; not so a folder of tests."""
     words = shell_calls(name)[0]
     if words[0] == "cvt-hpc":
         try:
@@ -60,7 +60,7 @@ def is_there(name):
     places = [word.partition("::") for word in words if "/" in word]
     if places:
         return all(
-            (ROOT / path).exists() and (not test or f"def {test}(" in (ROOT / path).read_text())
+            (ROOT / path).is_file() and (not test or f"def {test}(" in (ROOT / path).read_text())
             for path, _, test in places
         )
     section, key = re.fullmatch(r"(?:\[(\w+)\] ?)?(\w*)(?: = .+)?", name).groups()
@@ -87,7 +87,7 @@ def test_what_a_row_names_is_there(name):
         "[belt] load",
         "[none]",
     ]
-    + ["pytest tests/run/test_pushbelt.py::test_none", "tests/none.py", "none"],
+    + ["pytest tests/run/test_pushbelt.py::test_none", "tests/none.py", "pytest tests/exact", "none"],
 )
 def test_what_is_not_there_is_seen(name):
     assert not is_there(name)
@@ -140,9 +140,11 @@ def test_parts_and_the_verdict_beside_them_make_that_of_the_row(table):
         ([holds], {}, "reproduced"),
         ([holds, fails], {}, "partly"),
         ([fails], {}, "not"),
-        ([holds], {"verdict": "not"}, "partly"),
+        ([fails], {"verdict": "reproduced"}, "partly"),
+        ([holds], {"verdict": "partly"}, "partly"),
+        ([holds], {"verdict": "not"}, "not"),
         ([], {"verdict": "missing"}, "missing"),
-        ([holds], {"verdict": "missing"}, "partly"),
+        ([holds], {"verdict": "missing"}, "missing"),
     ):
         assert SETTLED({"measures": parts, "why": "so", **beside})[1] == verdict
 

@@ -213,6 +213,15 @@ def test_the_linear_system_is_solved_to_rounding():
     assert np.all(abs(terms @ unknowns - right) <= 1e-14 * (abs(terms) @ abs(unknowns)))
 
 
+def test_a_belt_of_432_elements_has_1739_unknowns():
+    # four of each element; the driven pulley's speed and five openings of either pulley's sheaves
+    belt, _ = start(given(nodes=432, modal_stiffness=((6e8,) * 5,) * 2))
+    work = workspace(belt, 432)
+    right_sides = fields(work.blocks)[:, RIGHT:]
+    assert right_sides.shape == (432, 4 * 12)  # the residual, and by each of the other eleven
+    assert 4 * len(right_sides) + len(work.border) == 1739
+
+
 def test_free_spinning_ring():
     # T = m' v^2, of a polygon of masses m: T = m R omega^2 / (2 sin(pi / n))
     radius, omega = 0.1082, 250.0
@@ -630,6 +639,25 @@ def test_contacts_hold_their_laws(run):
         radius = np.average(np.linalg.norm(points, axis=2), axis=0, weights=[1, 2, 1])
         depth = (groove - radius) * belt.sine - opening * belt.cosine
         assert belt.flank_stiffness * np.maximum(depth, 0.0) == near(f[:, pushbelt_fields.FLANK])
+
+
+def test_flanks_slide_by_what_their_points_migrate_on_the_sheave(run):
+    # Geier et al. 2007, sec. 2: a point fixed at the element migrates on the sheave, and the belt runs in a spiral
+    belt, *_, samples, sheaves = run
+    radii = []
+    for f, (pulleys, _) in zip(samples, sheaves, strict=True):
+        driven = f[:, pushbelt_fields.DRIVEN].astype(int)
+        before, now = (pitch_points(belt, g, driven) for g in (moved(f, -1), f))
+        pressed = f[:, pushbelt_fields.FLANK] > 100.0
+        radius = np.linalg.norm(now, axis=1)
+        outwards = (radius - np.linalg.norm(before, axis=1)) / STEP
+        turned = np.angle((now @ [1.0, 1j]) / (before @ [1.0, 1j])) / STEP
+        speeds = pulleys[[pushbelt_fields.DRIVING_SPEED, pushbelt_fields.DRIVEN_SPEED]][driven]
+        slips = f[:, [pushbelt_fields.FLANK_SLIP_M, pushbelt_fields.FLANK_SLIP_T]][pressed]
+        found = np.stack([outwards / belt.cosine, radius * (turned - speeds)], 1)[pressed]
+        assert slips == pytest.approx(found, abs=5e-3 * np.abs(slips).max())
+        radii.append(radius[pressed & (driven == 1)])
+    assert np.ptp(np.concatenate(radii)) > 1e-5
 
 
 def test_a_step_loses_what_its_contacts_take(run):

@@ -162,6 +162,28 @@ def test_a_clamped_element_without_friction():
     assert forces[middle] == pytest.approx(0.5 * belt.flank_stiffness * 1e-5 * belt.sine, rel=2e-2)
 
 
+def test_both_sheaves_of_a_pulley_have_one_angular_velocity():
+    # Schindler et al. 2008, sec. 4.4.1: another speed of a pulley moves its left and right flank points alike
+    planar, planar_state = start(given(NODES))
+    belt, state = chains.beside_planar(planar, planar_state)
+    work, slips = b.workspace(belt, NODES), []
+    _prepare(belt, state, work, STEP)
+    for change in (0.0, 1.0):
+        state.pulleys[pushbelt_fields.DRIVING_SPEED] += change
+        _evaluate(belt, state, work, LOAD, STEP)
+        f = of_lanes(state.elements)
+        slips.append(f[:, spatial_fields.FLANK_SLIP_T : spatial_fields.FLANK_SLIP_T + 4].copy())
+    left_low, left_high, right_low, right_high = (slips[1] - slips[0]).T
+    driving = f[:, spatial_fields.DRIVEN] < 0.5
+    low = np.linalg.norm(f[:, :2] - (belt.pitch_depth + belt.flank_reach) * f[:, 6:8], axis=1)
+    pressed = driving & (np.abs(f[:, 1]) < 0.02) & (f[:, 0] < 0.0)
+    assert left_low[pressed] == pytest.approx(-low[pressed], rel=1e-3)
+    assert (left_high - left_low)[pressed] == pytest.approx(-2.0 * belt.flank_reach, rel=1e-3)
+    assert right_low == pytest.approx(left_low, rel=1e-12)
+    assert right_high == pytest.approx(left_high, rel=1e-12)
+    assert not (slips[1] - slips[0])[~driving].any()
+
+
 def test_stiff_sheaves_are_rigid_ones():
     rigid, stiff = kept_scene(), scene(modal=((1e14, 1e14, 1e14), (1e14, 1e14, 1e14)))
     for k in (spatial_fields.DRIVING_LEFT, spatial_fields.DRIVEN_RIGHT, spatial_fields.DRIVING_TORQUE):
