@@ -112,7 +112,8 @@ def onset_bands_figure(
     ruler = layout.ruler(shown[arrangement.x])
     figure, all_axes = _draw_bands(panels, ruler, label, labels, source, then)
     if measured is not None:  # what was measured may lie far from the bands
-        all_axes[0].set_ylim(*_ends(factor * told[along].values))
+        reached = factor * told[along].values[np.isfinite(told[along].values)]
+        all_axes[0].set_ylim(*_ends(np.array([*all_axes[0].get_ylim(), *reached])))
     x, y = side_of(shown, arrangement.x), Side(along, np.array(all_axes[0].get_ylim()), factor)
     for place, axes in enumerate(all_axes):
         overlay.draw(axes, x, y, shown.isel({over: place} if over else {}))
