@@ -123,7 +123,7 @@ KINDS = {
         RESULTS,
         "probability_drawing.onset_bands_figure",
         "onset of vibration over an axis, with its scatter over the samples of uncertain parameters",
-        (ALONG,),
+        (ALONG, MEASURED),
         sides=("x", "panel"),
     ),
     "sensitivity": Kind(

@@ -9,6 +9,9 @@ the range are paired alike, and give the error of the onset alone.
 The distance of a pair has the standard error hypot(h, s): h is half the distance of the two cells between
 which the computed onset lies, s the deviation that the file states. Farther than FARTHEST of these apart, two
 onsets are no pair.
+
+Of a study with uncertain parameters each sample has lines of its own, and the probability of vibration has
+the Brier score: the mean square of its distance from 1 where noise was measured, from 0 where silence was.
 """
 
 import math
@@ -24,6 +27,7 @@ from cvt_hpc.analysis.arrangement import value_text
 from cvt_hpc.analysis.classes import at_strongest_strand, axes_in_words, check_results, map_classes
 from cvt_hpc.analysis.figures import coordinate_unit
 from cvt_hpc.analysis.measured import ONSET, PEAK, WINDOW, Measured, Row, Span, read_measured, within
+from cvt_hpc.analysis.probability import PROBABILITY, over_samples
 from cvt_hpc.errors import mismatch
 from cvt_hpc.storage.files import write_rows
 from cvt_hpc.tables import columns, number
@@ -64,6 +68,8 @@ class Score(NamedTuple):
     unit: str  # in which the axis of the file is shown
     names: list[str]  # of the other axes
     lines: list[tuple[list[str], Line]]  # their values in words, and the agreement, of each that was measured
+    # probabilities of vibration, (cell,), in cells of measured noise and of silence; none without samples
+    probabilities: tuple[Array, Array]
 
     @property
     def total(self) -> Line:
@@ -107,7 +113,25 @@ def score(dataset: xr.Dataset, path: str | Path, source: str = "results") -> Sco
                 of_cells = _of_cells(told, level, frequency[index], amplitude[index])
                 line = of_cells._replace(onset=line.onset, standard=line.standard)
             lines.append(([text[k] for text, k in zip(texts, index, strict=True)], line))
-    return Score(measured, unit, names, lines)
+    return Score(measured, unit, names, lines, _probabilities(dataset, measured))
+
+
+def _probabilities(dataset: xr.Dataset, measured: Measured) -> tuple[Array, Array]:
+    """Probabilities of vibration in cells of measured noise, and of silence; none without samples."""
+    cells = over_samples(dataset)
+    if PROBABILITY not in cells or measured.kind == ONSET:
+        return np.empty(0), np.empty(0)
+    shares = cells[PROBABILITY].transpose(..., measured.along)
+    values, places = shares.values, shares[measured.along].values.astype(float)
+    noise, known = np.zeros((2, *shares.shape), bool)
+    for row in measured.rows:
+        here = xr.ones_like(shares, bool)
+        for name, value in row.at.items():
+            here &= shares[name] == value
+        noise |= here.values & row.covers(places)
+        known |= here.values & within(places, row.swept) & np.isnan(row.cell)
+    told = [values[one & np.isfinite(values)] for one in (noise, known & ~noise)]
+    return told[0], told[1]
 
 
 def _of_cells(
@@ -192,6 +216,18 @@ def score_sentences(found: Score) -> Iterator[str]:
         if values:
             middle, most = (f"{number(one, 3)} {unit}" for one in _told(values))
             yield f"Error of the {what}: {middle} (median), {most} (largest)."
+    noise, silence = found.probabilities
+    if noise.size + silence.size:
+        told = [
+            f"{number(values.mean(), 2)} in {values.size} cells of measured {what}"
+            for what, values in (("noise", noise), ("silence", silence))
+            if values.size
+        ]
+        brier = number(np.mean(np.concatenate([1.0 - noise, silence]) ** 2), 2)
+        yield (
+            f"Probability of vibration: on average {', '.join(told)}; Brier score {brier} "
+            "(0: certain and right, 1: certain and wrong)."
+        )
     if total.amplitude:
         ratio = number(_told(total.amplitude)[0], 3)
         yield f"Amplitude of hits: computed {ratio} times the measured one (median)."

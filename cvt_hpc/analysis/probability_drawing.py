@@ -57,7 +57,7 @@ def probability_figure(
     panel = _Panel("", *(shown[one].values for one in (f"{name}_low", name, f"{name}_high")))
     labels = "of the samples", "95 % interval"
     x = layout.ruler(shown[arrangement.x])
-    figure, axes = _draw_bands([panel], x, figures.in_words(shown[name]), labels, source, "")
+    figure, (axes,) = _draw_bands([panel], x, figures.in_words(shown[name]), labels, source, "")
     axes.set_ylim(-0.03, 1.03)
     over.draw(axes, side_of(shown, arrangement.x), Side("", np.array(axes.get_ylim())), shown)
     for share in CONTOURS:
@@ -71,7 +71,12 @@ def probability_figure(
 
 @figures.styled
 def onset_bands_figure(
-    dataset: xr.Dataset, at: At = None, source: str = "results", sides: Sides = CHOSEN, along: str = ""
+    dataset: xr.Dataset,
+    at: At = None,
+    source: str = "results",
+    sides: Sides = CHOSEN,
+    along: str = "",
+    measured: File = None,
 ) -> Figure:
     """Draw the onset of vibration along an axis over another one: its median and 5 to 95 % of the samples.
 
@@ -86,6 +91,7 @@ def onset_bands_figure(
         which = f"{along} with numbers" if along else "one of numbers"
         expected = f"results over samples, {which}, and a further axis, such as friction_gradient"
         raise mismatch(source, expected, axes_in_words(dataset))
+    overlay = Overlay(measured, told, source)
     quantiles = sensitivity.onset_scatter(dataset, along)["onset"]
     axes_left = xr.Dataset({"status": told["status"].isel({along: 0}, drop=True), "onset": quantiles})
     arrangement = layout.arrange(axes_left, at or {}, source, Sides(sides.x, sides.panel))
@@ -103,11 +109,19 @@ def onset_bands_figure(
     least, _, most = sensitivity.QUANTILES
     labels = "median", f"{least} to {most} of the samples"
     then = "fix an axis, as by `--at AXIS=VALUE`"
-    figure, first = _draw_bands(panels, layout.ruler(shown[arrangement.x]), label, labels, source, then)
+    ruler = layout.ruler(shown[arrangement.x])
+    figure, all_axes = _draw_bands(panels, ruler, label, labels, source, then)
+    if measured is not None:  # what was measured may lie far from the bands
+        reached = factor * told[along].values[np.isfinite(told[along].values)]
+        all_axes[0].set_ylim(*_ends(np.array([*all_axes[0].get_ylim(), *reached])))
+    x, y = side_of(shown, arrangement.x), Side(along, np.array(all_axes[0].get_ylim()), factor)
+    for place, axes in enumerate(all_axes):
+        overlay.draw(axes, x, y, shown.isel({over: place} if over else {}))
     size = dataset.sizes[SAMPLE] * (2 if SWAPPED in dataset.dims else 1)
     samples = f"{size} samples, onsets {within(told[along])}; the band ends where the axis does"
     head = figures.headline("Onset of vibration", dataset.attrs)
-    set_frame(figure, figures.entries_of([first]), [head, samples, *arrangement.notes])
+    lines = [head, samples, *arrangement.notes, overlay.note]
+    set_frame(figure, figures.entries_of(all_axes[:1]) | overlay.entries, lines)
     return figure
 
 
@@ -194,16 +208,17 @@ def _ends(values: Array) -> tuple[float, float]:
 
 def _draw_bands(
     panels: Sequence[_Panel], x: layout.Ruler, label: str, labels: tuple[str, str], source: str, then: str
-) -> tuple[Figure, Axes]:
-    """Draw a line and a band in each panel, and return the figure and its first panel."""
+) -> tuple[Figure, list[Axes]]:
+    """Draw a line and a band in each panel, and return the figure and its panels."""
     page = len(panels), (1, 2), (LEAST, HEIGHT), FRAME, source, then
-    figure, all_axes, _ = figures.panels_on_a_page(*page, sharex=True, sharey=True)
-    for axes, panel in zip(all_axes.flat, panels, strict=False):
+    figure, grid, _ = figures.panels_on_a_page(*page, sharex=True, sharey=True)
+    all_axes = list(grid.flat[: len(panels)])
+    for axes, panel in zip(all_axes, panels, strict=True):
         axes.fill_between(x.centres, panel.low, panel.high, color=BAND, lw=0, label=labels[1])
         axes.plot(x.centres, panel.middle, color=LINE, marker="o", ms=3.5, lw=1.5, label=labels[0])
         axes.set_title(panel.title, loc="left", pad=3)
         x.lay_out(axes.xaxis)
         axes.grid(lw=0.4, alpha=0.5)
-    figures.label_x(all_axes, len(panels), x.label)
+    figures.label_x(grid, len(panels), x.label)
     figure.supylabel(label)
-    return figure, all_axes[0, 0]
+    return figure, all_axes

@@ -42,6 +42,11 @@ LARGEST_CONDITION = 1e8  # condition of J, by columns of one size, up to which t
 TWO_SIDED_95 = 1.96  # standard errors
 _UNITS = {"kinetic_friction": "", "friction_gradient": "s/m", "stribeck_velocity": "m/s"}
 _SCALE = "stribeck_velocity"  # in x by its logarithm
+_FURTHER = (
+    "# what else is uncertain belongs here, or friction alone scatters; about the defaults of most models:",
+    '# transverse_damping = { distribution = "uniform", from = "600 N s/m^2", to = "1400 N s/m^2" }',
+    '# friction_memory = { distribution = "log_normal", mean = "0.18 ms", standard_deviation = "0.05 ms" }',
+)
 
 Array = NDArray[np.float64]
 
@@ -250,7 +255,8 @@ def job_lines(fitted: Fitted) -> list[str]:
     count = fitted.of_specimens
     what = f"scatter of {count} specimens" if count else "uncertainty of the mean law"
     correlation = fitted.covariance / np.outer(deviations, deviations)
-    return [*lines, "", *uncertain_lines(what, distributions, _UNITS, correlation)]
+    head, samples, *table = uncertain_lines(what, distributions, _UNITS, correlation)
+    return [*lines, "", head, samples, *_FURTHER, *table]
 
 
 def law_lines(laws: Sequence[Fitted], points: Points) -> Iterator[str]:

@@ -62,6 +62,8 @@ _FIRST_STUDIES = {
         "longest_duration": '"0.2 s"',
     },
 }
+# Without unit, and of effect in each model that knows them: friction, and the tilt of the collars
+_FIRST_UNCERTAIN = ("kinetic_friction", "tilt_factor")
 _LONGEST = 120  # letters of a line
 # Units in which engineers give a size, by SI unit: each from a magnitude [SI] on, the largest first
 CUSTOMARY = {
@@ -146,6 +148,15 @@ def job_template(name: str, model: str, source: str) -> str:
         "[axes]  # what the study varies: any key with a number or a choice",
         "# as a list of values, or as a range: { from = 1, to = 9, count = 5 }, or step = 2 for count",
         *axes,
+        "",
+        "# Uncertain parameters: maps have probabilities, `cvt-hpc plot sensitivity` tells which decides.",
+        "# `cvt-hpc friction` and `calibrate` write such a table from measurements. Take away all # below:",
+        "# [uncertain]",
+        "# samples = 64  # of each cell, a power of 2",
+        *(
+            f'# {key} = {{ distribution = "normal", mean = {mean}, standard_deviation = {0.1 * mean:g} }}'
+            for key, mean in ((key, known[key].default) for key in _FIRST_UNCERTAIN if key in known)
+        ),
     ]
     for section, table in schema.sections.items():
         lines += ["", f"[{section}]"]

@@ -196,7 +196,10 @@ def _content(
         "pictures": _pictures(cells, arrangement, beyond, source, measured),
         **{
             name: _encoded(partial(draw, dataset, source=source)) if PROBABILITY in cells else ""
-            for name, draw in (("onset", onset_bands_figure), ("sensitivity", sensitivity_figure))
+            for name, draw in (
+                ("onset", partial(onset_bands_figure, measured=measured)),
+                ("sensitivity", sensitivity_figure),
+            )
         },
         "hysteresis": _encoded(lambda: hysteresis_figure(dataset, source=source)) if arrangement else "",
         "not_drawn": max(0, combinations - MOST_MAPS),

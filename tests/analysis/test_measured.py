@@ -288,6 +288,38 @@ def test_the_page_says_the_score_and_shows_the_map(write, tmp_path, monkeypatch)
     assert ink_of(figures[0]())
 
 
+def test_the_probability_of_samples_has_a_score(write, tmp_path, capsys):
+    # at 10, 20, 30 and 40 N m two, one, none and none of two samples vibrate; at 30 one has no verdict
+    dataset = xr.concat([results([[V, V, U, Q]]), results([[V, Q, Q, Q]])], xr.Variable("sample", [0, 1]))
+    found = score(dataset, path := write(WINDOWS + RANGE, "15,35,15,45"))
+    assert [values.tolist() for values in found.probabilities] == [[0.5, 0.0], [0.0]]
+    dataset.to_netcdf(tmp_path / "results.nc")
+    assert main(["compare", str(tmp_path), str(path)]) == 1
+    told = "on average 0.25 in 2 cells of measured noise, 0 in 1 cells of measured silence; Brier score 0.42"
+    assert f"Probability of vibration: {told} (" in capsys.readouterr().out
+    # a further axis, at one value of which it was measured, and a file without silence
+    # of two rows that the second one alone was measured in
+    rows = [results([[Q, Q, Q, Q], row]) for row in ([V, V, U, Q], [V, Q, Q, Q])]
+    both = xr.concat(rows, xr.Variable("sample", [0, 1])).transpose("load", ...)
+    found = score(both, write(f"{WINDOWS},sheave_stiffness", "15,35,1.5"))
+    assert [values.tolist() for values in found.probabilities] == [[0.5, 0.0], [1.0, 0.0]]
+    assert not any(
+        "Brier" in line for line in score_sentences(score(dataset, write("onset_load [N m]", "15")))
+    )
+    assert not any("Brier" in line for line in score_sentences(score(results([[Q, V]]), path)))
+
+
+def test_a_measured_onset_far_from_the_bands_is_drawn_beside_them(write):
+    dataset = xr.concat([results([[Q, V, V, V, V, V, V, V]] * 2)] * 2, xr.Variable("sample", [0, 1]))
+    figure = dataset.cvt.onset_bands(measured=write("onset_load [N m],sheave_stiffness", "75,1.5"))
+    ((_, line),) = ink_of(figure)
+    assert (line.get_xdata()[1], line.get_ydata()[1]) == (1.5, 75.0)
+    low, high = figure.axes[0].get_ylim()
+    assert (low <= 10.0, high) == (True, 80.0) and "measured: rig.csv" in figure.get_suptitle()
+    alone = dataset.isel(load=[1])  # an axis of one value has no ends
+    assert ink_of(alone.cvt.onset_bands(measured=write("onset_load [N m]", "20")))
+
+
 def ink_of(figure):
     """What is drawn of measurements in each panel."""
     found = [(axes, artist) for axes in figure.axes for artist in axes.get_children()]
@@ -338,13 +370,14 @@ OF_KINDS = [name for name, kind in KINDS.items() if MEASURED in kind.options]
 
 @pytest.mark.parametrize("kind", ["map", *OF_KINDS])
 def test_every_picture_takes_every_file_on_lazy_data(kind, write, tmp_path):
-    assert {"waterfall", "campbell", "ramp", "spectrogram", "hysteresis"} == {*OF_KINDS}
+    assert {"waterfall", "campbell", "ramp", "spectrogram", "hysteresis", "onset_bands"} == {*OF_KINDS}
     subject = KINDS[kind].subject if kind in KINDS else RESULTS
     if subject == HISTORIES:
         write_history(pictured.history(ramped="load"), tmp_path / "run.nc")
         dataset = xr.open_dataset(tmp_path / "run.nc", chunks={})
     else:
         dataset = (pictured.ramps() if kind == "hysteresis" else pictured.results()).chunk()
+        dataset = dataset.expand_dims(sample=4) if kind == "onset_bands" else dataset
     at = {"load": 100.0, "ratio": 1.0} if kind == "campbell" else {}
     for name, lines in FILES.items():
         with dask.config.set(scheduler="synchronous"):

@@ -10,6 +10,7 @@ from scipy.stats import binomtest, norm
 from scipy.stats import sobol_indices as scipy_indices
 
 import cvt_hpc.accessor  # noqa: F401
+from cvt_hpc import open_results, run
 from cvt_hpc.analysis.classes import OccurrenceClass
 from cvt_hpc.analysis.maps import map_figure
 from cvt_hpc.analysis.probability import probabilities
@@ -129,6 +130,28 @@ def test_the_interval_holds_the_probability_of_the_closed_form():
     assert (held == 100).all()
     independent = np.sqrt(true * (1.0 - true) / 16.0)
     assert (np.sqrt(np.mean(np.square(errors), axis=0)) < 0.5 * independent).all()
+
+
+def test_runs_of_the_samples_have_the_verdicts_of_the_closed_form(tmp_path):
+    loads = np.array([250.0, 300.0, 350.0])
+    damping = {"distribution": "normal", "mean": 55.0, "standard_deviation": 6.0}
+    document = {
+        "scene": {"belt_speed": "50 mm/s", "start": "sliding", "initial_displacement": "4 um"},
+        "oscillator": {"stiffness": "10 kN/mm"},
+        "friction": {"friction_law": "stribeck", "friction_gradient": -0.5, "stribeck_velocity": "50 mm/s"},
+        "run": {"duration": "1 s"},
+        "uncertain": {"samples": 16, "damping": damping},
+    }
+    axes = {"normal_load": loads.tolist()}
+    run(build_job({"name": "onset", "model": "oscillator", "axes": axes, **document}), tmp_path)
+    found = open_results(tmp_path)
+    border = 0.5 * np.exp(-1.0) * loads  # of the damping, below which steady sliding is unstable
+    share = found["damping"].values / border[:, None]
+    beside = np.abs(share - 1.0) < 0.01  # the start is small, yet no infinitely small motion
+    assert beside.sum() < 5
+    assert ((found["vibrates"].values == np.where(share < 1.0, Vibrates.YES, Vibrates.NO)) | beside).all()
+    told, true = found.cvt.probability(), norm.cdf((border - 55.0) / 6.0)
+    assert (np.abs(told["vibration_probability"].values - true) < 2.0 / 16).all()
 
 
 @pytest.mark.parametrize("of_sobol", [True, False])

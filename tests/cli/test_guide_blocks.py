@@ -66,7 +66,6 @@ SMALL_OF = {
     "linear_stability": {"stations": 64},
 }
 PILOT = SMALL | {"stations": 64}  # of `check --pilots`
-CALIBRATED = "friction_gradient=[-1.1]"  # s/m, of what its page measures
 PARSER = _parser()
 PYTHON_RUN = 'duration = "40 ms"\nlongest_duration = "40 ms"'
 # What a page takes for granted: work of its reader, or of another page.
@@ -120,7 +119,7 @@ class Reader:
             exec(compile(code, name_of(self.page), "exec"), self.names)
             plt.close("all")
         elif block.kind == "csv":
-            Path("measured.csv").write_text(block.text)
+            _file_of(block.text, "measured.csv").write_text(block.text)
         elif block.kind != DRAWING:
             raise AssertionError(f"nobody does a block of kind {block.kind!r}")
 
@@ -170,8 +169,15 @@ class Reader:
             text = f'name = "fragment"\nmodel = "{self.model}"\n{text}'
         if "ladder" in tables:
             text += "\n[axes]\nload = [60, 120]\n"
-        Path("block.toml").write_text(text)
-        assert main(["check", "block.toml"]) == 0
+        path = _file_of(text, "block.toml")
+        path.write_text(text)
+        assert main(["check", str(path)]) == 0
+
+
+def _file_of(text, default):
+    """File of a block: that which its first line names, if it does."""
+    named = re.match(r"# (\S+\.(?:csv|toml))\n", text)
+    return Path(named[1] if named else default)
 
 
 def _smaller(words, page):
@@ -179,8 +185,6 @@ def _smaller(words, page):
     command = words[0]
     if "--pilots" in words:
         return [*words, *(word for key, value in PILOT.items() for word in ("--set", f"{key}={value}"))]
-    if command == "calibrate":
-        return [*words, "--set", CALIBRATED]
     if command not in {"check", "run", "simulate", *CHECKED_ONLY} or words[1].startswith("jobs/figures/"):
         return words  # figures take half a second each
     given = [words[i + 1] for i, word in enumerate(words) if word == "--set"]
@@ -194,6 +198,8 @@ def _smaller(words, page):
     if command == "check":
         return [*words, *_ends(job, mentioned)]
     code = "\n".join(block.text for block in blocks(page))
+    if not given and f"calibrate {words[1]} " in code:  # weighs the same runs
+        return words
     is_read = "--out" in words if command == "simulate" else re.search(rf"out/{job.name}(?!\w)", code)
     # a course of time cannot be cut short
     if not is_read or job.model in CHECKED_MODELS or job.parameters.get("profile_time"):

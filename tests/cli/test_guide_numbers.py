@@ -8,8 +8,8 @@ import pytest
 from cvt_hpc.tables import below_origin
 from support.pages import ROOT, name_of
 
-CHOOSE, CHARTS, VALIDATION = (
-    ROOT / "docs" / "guide" / f"{name}.md" for name in ("choose", "charts", "validation")
+CHOOSE, CHARTS, SWEEPS, VALIDATION = (
+    ROOT / "docs" / "guide" / f"{name}.md" for name in ("choose", "charts", "sweeps", "validation")
 )
 PUSHBELT = {"scene": "elastic", "method": "216 super elements", "value": "1e-05"}
 SPATIAL = {"scene": "misaligned", "method": "216 super elements", "value": "1e-05"}
@@ -49,6 +49,8 @@ QUOTED = [
     (CHARTS, r"within (\S+) % of this reference", "ladder_pushbelt", of_rung("forces", "elastic_belt"), "error_median", 0.01),
     (CHARTS, r"amplitudes within (\S+) %", "ladder_pushbelt", of_rung("amplitude", "elastic_belt"), "error_median", 0.01),
     (CHARTS, r"frequencies within (\S+) % \(medians\)", "ladder_pushbelt", of_rung("frequency", "elastic_belt"), "error_median", 0.01),
+    (SWEEPS, r"indices take (\S+) core-seconds as a sweep", "uncertain_peer", {"result": "core-seconds"}, "here", 1.0),
+    (SWEEPS, r"as a sweep and (\S+) core-seconds so", "uncertain_peer", {"result": "core-seconds"}, "OpenTURNS", 1.0),
     (VALIDATION, r"`elastic_belt` \| `pushbelt`.* amplitude (\S+) % \(median", "ladder_pushbelt", of_rung("amplitude", "elastic_belt"), "error_median", 0.01),
     (VALIDATION, r"`elastic_belt` \| `pushbelt`.* frequency (\S+) %", "ladder_pushbelt", of_rung("frequency", "elastic_belt"), "error_median", 0.01),
     (VALIDATION, r"`elastic_belt` \| `pushbelt`.* forces (\S+) %", "ladder_pushbelt", of_rung("forces", "elastic_belt"), "error_median", 0.01),
@@ -62,7 +64,8 @@ QUOTED = [
 )
 def test_a_quoted_number_is_that_of_its_table(page, text, table, row, column, unit):
     lines = page.read_text()
-    joined = lines if page != CHARTS else lines.replace("\n", " ")  # sentences run on, rows of a table do not
+    # sentences run on, rows of a table do not
+    joined = lines.replace("\n", " ") if page in (CHARTS, SWEEPS) else lines
     (quoted,) = re.findall(text, joined)
     with (ROOT / "jobs" / "results" / f"{table}.csv").open(newline="") as file:
         (found,) = [entry for entry in csv.DictReader(below_origin(file)) if row.items() <= entry.items()]

@@ -17,14 +17,15 @@ NOTEBOOKS = sorted(FOLDER.glob("*.ipynb"))
 SHORTER = {
     '"run": {"duration": "0.3 s"}': '"run": {"duration": "0.1 s"}, "mesh": {"stations": 64}',
     'load_job("../lebrecht_2004.toml")': 'load_job("../lebrecht_2004.toml", ["duration=0.12", "longest_duration=0.12", "stations=64"])',
+    "np.linspace(0.02, 0.08, 13)": "np.linspace(0.02, 0.08, 5)",
 }
 SOURCES = "".join(cell.source for path in NOTEBOOKS for cell in nbformat.read(path, as_version=4).cells)
 assert all(said in SOURCES for said in SHORTER)
-PICTURE = re.compile(r"\w+\.cvt\.(map|waterfall|history|spectrogram|phase|energy)\(")
+PICTURE = re.compile(r"\w+\.cvt\.(map|waterfall|history|spectrogram|phase|energy|onset_bands|sensitivity)\(")
 
 
 def test_there_are_notebooks():
-    assert len(NOTEBOOKS) == 5
+    assert len(NOTEBOOKS) == 6
 
 
 @pytest.fixture(scope="module")

@@ -33,6 +33,10 @@ def test_a_template_is_a_job_and_so_is_all_that_is_commented_out_in_it(model):
     shape = (maps | {"pushbelt": (3, 3)}).get(model, (3,))
     assert (job.name, job.model, job.shape) == ("first", model, shape)
     assert "count = 5" in text
+    # uncertain parameters, all lines of them or none
+    (table,) = re.findall(r"(?m)^# \[uncertain\]\n(?:# .+\n)+", text)
+    assert build_job(tomllib.loads(text.replace(table, re.sub("(?m)^# ", "", table)))).size == 64 * job.size
+    text = text.replace(table, "")
     # every key with its default, but what stands in the place of another one, and the load beside its share
     uncommented = re.sub(r"(?m)^# (?!load =)(\w+ = )(?!.*\.\.\.)", r"\1", text)
     assert uncommented.count("\n#") < text.count("\n#")

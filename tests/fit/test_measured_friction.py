@@ -1,5 +1,7 @@
 """Laws of friction fitted to measured coefficients: estimates, their uncertainty, what a job takes of them."""
 
+import re
+import tomllib
 import warnings
 
 import numpy as np
@@ -17,7 +19,8 @@ from cvt_hpc.experiments.measured_friction import (
     keys_of,
     read_points,
 )
-from cvt_hpc.job import load_job
+from cvt_hpc.job import build_job, load_job
+from cvt_hpc.job.uncertain import Scatter
 from cvt_hpc.physics.friction import friction_coefficients, friction_law
 from cvt_hpc.physics.friction_laws import Law
 
@@ -165,7 +168,13 @@ def test_a_file_of_a_tribometer_becomes_a_part_of_a_job_and_a_picture(tmp_path, 
     out = capsys.readouterr().out
     assert "10 points from 1 to 400 mm/s, 1 specimen" in out and "those of the mean law" in out
     assert out.index("stribeck ") < out.index("linear ")
-    assert 'friction_law = "stribeck"' in (tmp_path / "friction.toml").read_text()
+    text = (tmp_path / "friction.toml").read_text()
+    assert 'friction_law = "stribeck"' in text
+    # what else may be uncertain stands there as a comment, to be taken away
+    with_others = re.sub(r"(?m)^# (transverse_damping|friction_memory) = ", r"\1 = ", text)
+    job = build_job(tomllib.loads('name = "x"\nmodel = "elastic_belt"\n' + with_others))
+    told = [rule.source.uncertain.groups() for rule in job.rules if isinstance(rule.source, Scatter)]
+    assert [*told[0]] == ["friction_memory", "transverse_damping", "correlated"]
     assert (tmp_path / "friction.png").stat().st_size > 5000
 
 
