@@ -165,7 +165,7 @@ def _content(
         beyond = [name for name in map(str, cells["status"].dims) if name not in (arrangement.x, *axes)]
         x = arrangement.x if dataset[arrangement.x].dtype.kind in "iuf" else None
         if PROBABILITY in cells:
-            sentences = list(findings.probability_sentences(dataset, cells, arrangement.x, [*beyond, *axes]))
+            sentences = list(findings.probability_sentences(dataset, cells, arrangement.x))
         elif judged:
             sentences = list(findings.window_sentences(dataset, arrangement.x, [*beyond, *axes]))
             sentences += filter(None, [findings.slip_sentence(dataset, arrangement.x)])

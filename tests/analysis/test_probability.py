@@ -14,7 +14,7 @@ from cvt_hpc.analysis.classes import OccurrenceClass
 from cvt_hpc.analysis.maps import map_figure
 from cvt_hpc.analysis.probability import probabilities
 from cvt_hpc.analysis.probability_drawing import onset_bands_figure, sensitivity_figure
-from cvt_hpc.analysis.sensitivity import onset_scatter
+from cvt_hpc.analysis.sensitivity import onset_axes, onset_scatter
 from cvt_hpc.analysis.sobol import sobol_indices
 from cvt_hpc.analysis.value_maps import value_map_figure
 from cvt_hpc.errors import InputError
@@ -298,6 +298,61 @@ def test_the_picture_names_correlated_parameters_and_says_where_nothing_vibrates
     quiet = dataset.assign(vibrates=xr.full_like(dataset["vibrates"], int(Vibrates.NO)))
     assert "hardly any sample vibrates" in words(sensitivity_figure(quiet))
     assert "hardly any" not in words(sensitivity_figure(dataset))
+
+
+@pytest.mark.usefixtures("undrawn")
+def test_a_band_of_less_than_two_steps_is_not_said_to_shrink(tmp_path):
+    further = {"damping": normal(5.0, 0.75), "preload": normal(40.0, 20.0)}
+    dataset = linear_onset(64, np.arange(5.0, 26.0, 5.0), **further)
+    found = dataset.cvt.onset_scatter()
+    assert found["step"] == 5.0 and found["band"] < 10.0
+    text = report(dataset, tmp_path)
+    known = "known no better than the step of 5 N m: take a finer axis"
+    assert f"within {found['band'].item():.3g} N m, {known}." in text and "Halve" not in text
+    assert known in words(sensitivity_figure(dataset))
+    assert known not in words(sensitivity_figure(linear_onset(64, STEPS, **further)))
+
+
+@pytest.mark.usefixtures("undrawn")
+def test_the_report_names_the_parameter_that_decides_as_far_as_the_bounds_tell(tmp_path):
+    steps = np.arange(5.0, 26.0, 0.5)
+    decides = "Preload decides; damping hardly matters."
+    further = {"damping": normal(5.0, 0.1), "preload": normal(40.0, 20.0)}
+    text = report(linear_onset(256, steps, **further), tmp_path)
+    assert decides in text and "Halve the scatter of preload, and this band shrinks from" in text
+    told = "Halve the scatter of damping, and it is not certain that this band changes: "
+    assert told in text and "grows" not in text
+    dataset = linear_onset(256, steps, **further, indices=True)
+    text = report(dataset, tmp_path)
+    assert "Total Sobol indices of the onset in load: preload " in text and decides in text
+    # without verdicts in more than a tenth of the samples those of the onset are left
+    few = dataset["sample"] % 8 > 0
+    beside = dataset.assign(vibrates=dataset["vibrates"].where(few, int(Vibrates.UNDECIDED)))
+    text = report(beside, tmp_path)
+    assert "No cell has Sobol indices of vibration: nine of ten samples need verdicts" in text
+    alike = {"damping": normal(5.0, 0.75), "preload": normal(40.0, 15.0)}
+    text = report(linear_onset(64, steps, **alike), tmp_path)
+    assert "more samples would tell whether" in text and "decides" not in text
+
+
+@pytest.mark.usefixtures("undrawn")
+def test_the_onset_lies_along_the_axis_on_which_verdicts_change(tmp_path):
+    within = np.add.outer(np.arange(40), np.zeros((3, 8))) - np.arange(8)
+    runs = np.where((within > 10) & (within < 25), V, Q)
+    dataset = study(runs, radial_speed=np.arange(40.0), contact_force=[1.0, 2.0, 3.0])
+    assert onset_axes(dataset) == ["radial_speed", "contact_force"]
+    assert onset_axes(dataset, ["radial_speed"]) == ["contact_force"]
+    told = words(onset_bands_figure(dataset))
+    assert "onset in radial speed" in told and "along another axis: --along contact_force" in told
+    assert "another axis" not in words(onset_bands_figure(dataset, along="radial_speed"))
+    text = report(dataset, tmp_path)
+    assert text.count("the probability of vibration passes 10 % at") == 3
+    assert "falls below 90 % at 0.0248 kN, 50 % at 0.028 kN, 10 % at 0.0312 kN of radial speed" in text
+
+
+def report(dataset, folder):
+    """The text of its page."""
+    return write_report(dataset, folder / "report.html").read_text().replace("\u00a0", " ")
 
 
 def test_samples_that_are_not_run_make_no_band_surer():
