@@ -44,6 +44,7 @@ OF_COMPUTATION = (  # come behind what is about the belt
 )
 
 MOST_LINES = 8  # lines of the map that are told apart, on the first page
+MOST_SURE = 3  # of uncertain parameters: the onset of all is drawn
 MOST_VALUE_MAPS = 2  # quantities in a picture, of a study that judges no vibration
 MOST_RANGES = 6  # quantities
 NARROW = 1.05  # largest over least frequency of a line that are told apart
@@ -173,16 +174,15 @@ def probability_sentences(dataset: xr.Dataset, told: xr.Dataset, x: str) -> Iter
     )
     yield f"Uncertain: {'; '.join(uncertain)}."
     yield (
-        "The intervals are those of independent samples. Sobol points cover the distributions more evenly, "
-        "so that the intervals are rather too wide, which is not certain. All cells have the same samples: "
-        "their errors are alike. Runs without a verdict count on neither side, and widen the intervals."
+        "The intervals are those of independent samples, rather too wide for Sobol points. All cells have "
+        "the same samples: their errors are alike. Runs without a verdict widen the intervals."
     )
     told = told.sortby([name for name in (x, *others) if _is_number(told[name])])
     places, lines = _lines(told, others)
     moving = [k for k, line in enumerate(lines) if (line[PROBABILITY] > 0.0).any()]
-    for k in moving[:MOST_LINES]:
-        yield _how_sure(lines[k], x, places[k])
-    if (more := len(moving) - MOST_LINES) > 0:
+    ends = np.linspace(0, len(moving) - 1, min(len(moving), MOST_SURE)).round().astype(int)
+    yield from (_how_sure(lines[moving[k]], x, places[moving[k]]) for k in ends)
+    if (more := len(moving) - MOST_SURE) > 0:
         yield f"In {counted(more, 'more line')} along {in_words(told[x])} samples vibrate."
     if quiet := len(lines) - len(moving):
         along = f" in {quiet} of {len(lines)} lines along {in_words(told[x])}" if others else ""

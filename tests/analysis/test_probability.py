@@ -5,6 +5,7 @@ import json
 import numpy as np
 import pytest
 import xarray as xr
+from matplotlib.colors import to_hex
 from matplotlib.text import Text
 from scipy.stats import binomtest, norm
 from scipy.stats import sobol_indices as scipy_indices
@@ -16,12 +17,13 @@ from cvt_hpc.analysis.probability import probabilities
 from cvt_hpc.analysis.probability_drawing import onset_bands_figure, sensitivity_figure
 from cvt_hpc.analysis.sensitivity import onset_axes, onset_scatter
 from cvt_hpc.analysis.sobol import sobol_indices
-from cvt_hpc.analysis.value_maps import value_map_figure
+from cvt_hpc.analysis.value_maps import COLOURS, UNSURE, value_map_figure
 from cvt_hpc.errors import InputError
 from cvt_hpc.job import build_job
 from cvt_hpc.job.uncertain import Distribution, Uncertain
 from cvt_hpc.models.oscillator.motion import oscillator, steady_sliding
 from cvt_hpc.report import write_report
+from cvt_hpc.report.interactive import map_data
 from cvt_hpc.report.page import next_steps
 from cvt_hpc.study.intervals import interval, look, looks_of
 from cvt_hpc.variables import Status, Vibrates
@@ -376,6 +378,13 @@ def test_of_an_adaptive_study_the_report_tells_the_runs_that_its_cells_want():
     steps = list(next_steps(found, job, None))
     assert "`cvt-hpc run JOB` goes on: 18 runs are left." in steps
     assert "goes on" not in " ".join(next_steps(found.isel(load=[2]), job, None))
+    # more samples serve cells that have all of them, and no cell of which too many samples have no verdict
+    cells = [[Q] * 32 + [N] * 96, [U] * 32 + [N] * 96, [Q] * 90 + [U] * 38]
+    told = " ".join(next_steps(study(cells, load=[1.0, 2.0, 3.0]), job, None))
+    assert "In 2 cells more than 20 % of the samples have no verdict: no further samples narrow" in told
+    assert "uncertain.samples" not in told
+    cells[2] = [Q, V] * 64
+    assert "uncertain.samples=256" in " ".join(next_steps(study(cells, load=[1.0, 2.0, 3.0]), job, None))
 
 
 def test_a_band_that_ends_beyond_the_axis_has_no_width():
@@ -439,16 +448,39 @@ def test_a_map_has_contours_and_says_how_wide_intervals_are(two_axes):
     told = words(figure)
     assert "made: 32 cells of 8 samples; 95 % intervals up to" in told
     assert "probability of vibration" in told
-    assert [text.get_text() for text in figure.legends[0].get_texts()] == ["0.5", "0.1 and 0.9"]
+    assert [text.get_text() for text in figure.legends[0].get_texts()] == [
+        "interval wider than 0.5",
+        *(f"probability {share}" for share in (0.1, 0.5, 0.9)),
+    ]
     # the middle line lies where as many samples vibrate as do not
     lines = next(one for one in figure.axes[0].collections if hasattr(one, "levels"))
     assert list(lines.levels) == [0.1, 0.5, 0.9]
+    assert len({str(style) for style in lines.get_linestyle()}) == 3
     place = min(lines.allsegs[1][0], key=lambda point: abs(point[1] - 2.0))
     shares = probabilities(two_axes)["vibration_probability"].sel(thrust=2e3)
     assert np.interp(place[0], shares["load"], shares) == pytest.approx(0.5)
     assert "slip" in words(value_map_figure(two_axes, ["slip_probability"]))
     assert "Vibration occurrence" in words(map_figure(two_axes, {"sample": 0}))
     assert "probability" in words(map_figure(two_axes.cvt.probability()))
+
+
+def test_cells_that_are_hardly_known_are_hatched_and_those_without_a_value_say_why():
+    # of the first cell 7 of 64 samples are quiet, and all others without a verdict
+    rows = np.array([[[Q] * 7 + [U] * 57, [Q] * 64], [[Q, V] * 32, [U] * 64]])
+    dataset = study(rows, thrust=[1.0, 2.0], load=[1.0, 2.0])
+    figure = map_figure(dataset)
+    (hatched,) = [patch for patch in figure.axes[0].patches if patch.get_hatch() == UNSURE]
+    assert hatched.get_path().get_extents().bounds == pytest.approx((0.5, 0.5e-3, 1.0, 1e-3))
+    told = words(figure)
+    assert "interval wider than 0.5" in told and "no sample has a verdict" in told
+    assert UNSURE not in {patch.get_hatch() for patch in map_figure(dataset[{"load": [1]}]).axes[0].patches}
+    classes = np.array([[V] * 8, [V] * 4 + [Q] * 4, [V] * 4 + [Q] * 4, [V] * 8])
+    parts = [study([[row, row], [[Q] * 8] * 2], thrust=[1.0, 2.0], load=[1.0, 2.0]) for row in classes]
+    both = xr.concat(parts, "swapped").assign_coords(swapped=["none", "all", "damping", "friction_memory"])
+    told = words(value_map_figure(both, ["total_order"]))
+    assert "friction memory" in told and "intervals up to" not in told
+    assert "less than 90 % of the samples count, or all are alike" in told
+    assert "no sample vibrates" in words(value_map_figure(both, ["amplitude_quantiles"]))
 
 
 def test_over_one_axis_the_interval_is_a_band_and_onsets_have_one_over_another(two_axes):
@@ -480,11 +512,17 @@ def test_the_report_says_how_sure_the_map_is(two_axes, tmp_path):
     text = write_report(two_axes, tmp_path / "report.html").read_text().replace("\u00a0", " ")
     assert "32 cells of 8 samples, with 95 % intervals up to" in text
     assert "Uncertain: damping (normal, mean 0.5 N s/m)." in text
-    assert "At thrust 2 kN the probability of vibration passes 10 % at" in text
+    assert "At thrust 3 kN the probability of vibration passes 10 % at" in text
+    assert "In 1 more line along load samples vibrate." in text
     assert "The belt slips with a probability of up to 25 %, at thrust 4 kN and load 70 N m." in text
     assert "--set uncertain.samples=16</code> narrows the intervals" in text
     assert "along sample" not in text
     assert text.count('alt="onset of vibration"') == 1
+    # within the two printed pages to hand on
+    assert 'class="whole several"' in text
+    assert text.index('class="front"') < text.index('alt="onset of vibration"') < text.index("<h2>Next steps")
+    colours = map_data(probabilities(two_axes))["others"]
+    assert [colour for _, colour in colours] == [to_hex(COLOURS(k)) for k in range(24)]  # as in print
 
 
 @pytest.mark.usefixtures("undrawn")
