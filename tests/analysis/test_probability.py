@@ -1,6 +1,7 @@
 """Probabilities over the samples of uncertain parameters: counts, intervals, onsets, pictures and sentences."""
 
 import json
+from zipfile import ZipFile
 
 import numpy as np
 import pytest
@@ -15,6 +16,7 @@ from cvt_hpc.analysis.classes import OccurrenceClass
 from cvt_hpc.analysis.maps import map_figure
 from cvt_hpc.analysis.probability import probabilities
 from cvt_hpc.analysis.probability_drawing import onset_bands_figure, sensitivity_figure
+from cvt_hpc.analysis.run_table import tables, write_tables
 from cvt_hpc.analysis.sensitivity import onset_axes, onset_scatter
 from cvt_hpc.analysis.sobol import sobol_indices
 from cvt_hpc.analysis.value_maps import COLOURS, UNSURE, value_map_figure
@@ -499,6 +501,22 @@ def test_over_one_axis_the_interval_is_a_band_and_onsets_have_one_over_another(t
         two_axes.isel(sample=0).cvt.probability()
     with pytest.raises(InputError, match="along: expected one of the axes thrust, load, found sample"):
         two_axes.cvt.onset_scatter("sample")
+
+
+def test_a_table_has_a_row_for_each_cell_beside_that_for_each_run(two_axes, tmp_path):
+    frames = tables(two_axes)
+    assert [len(frame) for frame in frames.values()] == [256, 32]
+    one = frames["cells"].iloc[15]
+    told = probabilities(two_axes).isel(thrust=1, load=7)
+    assert (one["thrust [N]"], one["load [N m]"]) == (2e3, 70.0)
+    assert one["vibration_probability"] == told["vibration_probability"] and "class" not in frames["cells"]
+    assert one["amplitude_quantiles_95 % [m]"] == told["amplitude_quantiles"].values[-1]
+    written = write_tables(frames, tmp_path / "table.csv")
+    assert [path.name for path in written] == ["table.csv", "table_cells.csv"]
+    assert [len(path.read_text().splitlines()) for path in written] == [257, 33]
+    (sheets,) = write_tables(frames, tmp_path / "table.xlsx")
+    assert "xl/worksheets/sheet2.xml" in ZipFile(sheets).namelist()
+    assert [*tables(two_axes.isel(sample=0))] == ["runs"]
 
 
 @pytest.fixture
