@@ -68,7 +68,7 @@ _FLAG = {"action": "store_true"}
 
 ALONG = Option(
     "along",
-    "axis along which vibration sets in (default: the load, or the last one)",
+    "axis along which vibration sets in (default: the load, or where most rows change)",
     "--along",
     {"metavar": "AXIS"},
 )

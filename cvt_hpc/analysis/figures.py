@@ -323,13 +323,17 @@ def with_units(line: str) -> str:
 def balanced(line: str, width: int) -> str:
     """Break a line into no more lines than it takes, of like length, `width` letters at most.
 
-    Numbers stay with their units.
+    Numbers stay with their units, and phrases whole where that takes no further line.
     """
-    line = with_units(line)
+    line, least = with_units(line), 1
+    whole = re.sub("(?<![:;,]) ", "\0", line)
+    longest = max(map(len, whole.split()), default=0)
+    if longest <= width and len(wrap(whole, width)) == len(wrap(line, width)):
+        line, least = whole, longest
     lines = wrap(line, width)
-    while width > 1 and len(narrower := wrap(line, width - 1)) == len(lines):
+    while width > least and len(narrower := wrap(line, width - 1)) == len(lines):
         lines, width = narrower, width - 1
-    return "\n".join(lines)
+    return "\n".join(lines).replace("\0", " ")
 
 
 def entitle(figure: Figure, lines: Sequence[str], width: int = 72) -> None:

@@ -18,6 +18,7 @@ import xarray as xr
 
 from cvt_hpc.analysis.classes import OccurrenceClass, at_strongest_strand, map_classes
 from cvt_hpc.analysis.sensitivity import EVENTS, QUANTILES, check_samples, independent, indices_of, stated
+from cvt_hpc.analysis.sobol import WITHOUT
 from cvt_hpc.job.axes import SAMPLE, SWAPPED
 from cvt_hpc.study.intervals import VERDICTS, interval, look, looks_of
 from cvt_hpc.variables import Status, Vibrates
@@ -75,6 +76,7 @@ def probabilities(dataset: xr.Dataset, source: str = "results") -> xr.Dataset:
         found[name] = (yes.sum(SAMPLE) / (count - hidden).where(count > hidden)).assign_attrs(
             units="1", long_name=f"probability of {event}", valid_range=[0.0, 1.0], isolines=list(CONTOURS)
         )
+        found[name].attrs[WITHOUT] = "no sample has a verdict"
         hits = yes.sum(SAMPLE)
         low, _ = interval(hits.values, count.values, len(looks))
         _, high = interval((hits + hidden).values, count.values, len(looks))
@@ -90,6 +92,7 @@ def probabilities(dataset: xr.Dataset, source: str = "results") -> xr.Dataset:
         if name in dataset:
             values = at_strongest_strand(dataset, name).compute().where(vibrates)
             told = {"units": unit, "long_name": name, "comment": "quantiles of the samples that vibrate"}
+            told[WITHOUT] = "no sample vibrates"
             found[f"{name}_quantiles"] = _quantiles(values).assign_attrs(told)
     if SWAPPED in whole["status"].dims:
         found = found.merge(indices_of(whole, "vibration"))

@@ -1,6 +1,6 @@
 """Pictures over samples of uncertain parameters: probability, bands of the onset, and what it depends on."""
 
-from collections.abc import Sequence
+from collections.abc import Collection, Sequence
 from typing import NamedTuple
 
 import numpy as np
@@ -69,6 +69,13 @@ def probability_figure(
     return figure
 
 
+def _along(dataset: xr.Dataset, along: str, fixed: Collection[str]) -> tuple[str, str]:
+    """Axis along which vibration sets in, by default the likeliest, and a line that names other ones."""
+    likely, *others = sensitivity.onset_axes(dataset, fixed) or [""]
+    chosen = along or not others
+    return along or likely, "" if chosen else f"along another axis: --along {' or '.join(others)}"
+
+
 @figures.styled
 def onset_bands_figure(
     dataset: xr.Dataset,
@@ -81,11 +88,11 @@ def onset_bands_figure(
     """Draw the onset of vibration along an axis over another one: its median and 5 to 95 % of the samples.
 
     Arguments as of all pictures of results (`figures.py`), with the axis `sample` and another one beside that
-    along which vibration sets in: by default the load or the axis in its place, else the last one.
+    along which vibration sets in: by default as of `onset_axes`.
     """
     check_results(dataset, source)
     told = over_samples(dataset, at or {})
-    along = along or sensitivity.onset_axis(told, at or {})
+    along, other = _along(dataset, along, at or {})
     known = [name for name in map(str, told["status"].dims) if name not in (at or {})]
     if "counted" not in told.attrs or along not in known or told["status"].ndim < 2:
         which = f"{along} with numbers" if along else "one of numbers"
@@ -120,7 +127,7 @@ def onset_bands_figure(
     size = dataset.sizes[SAMPLE] * (2 if SWAPPED in dataset.dims else 1)
     samples = f"{size} samples, onsets {within(told[along])}; the band ends where the axis does"
     head = figures.headline("Onset of vibration", dataset.attrs)
-    lines = [head, samples, *arrangement.notes, overlay.note]
+    lines = [head, samples, other, *arrangement.notes, overlay.note]
     set_frame(figure, figures.entries_of(all_axes[:1]) | overlay.entries, lines)
     return figure
 
@@ -136,7 +143,7 @@ def sensitivity_figure(
 
     Arguments as of all pictures of results (`figures.py`), with the axis `sample` and the job that states the
     distributions. Further axes are fixed where the scatter of the onset is widest. Vibration sets in `along`
-    an axis, by default the load or the axis in its place, else the last one.
+    an axis, by default as of `onset_axes`.
     """
     check_results(dataset, source)
     dims = list(map(str, dataset["status"].dims))
@@ -145,14 +152,14 @@ def sensitivity_figure(
         if name not in dims:
             raise unknown(where, "axis of the results", name, dims)
         dataset = dataset.isel({name: [layout.index_of(dataset[name], value, where)]})
-    along = along or sensitivity.onset_axis(dataset, at or {})
+    along, other = _along(dataset, along, at or {})
     found = sensitivity.onset_scatter(dataset, along, source)
     if "band" not in found:
         raise mismatch(source, "results with the job that states the distributions", "others")
     row = sensitivity.widest_row(found)
     place = ", ".join(layout.place_text(found[name], k, " = ") for name, k in row.items())
     head = figures.headline(f"What the onset in {figures.in_words(dataset[along])} depends on", dataset.attrs)
-    lines = [head, place.replace("_", " ")]
+    lines = [head, place.replace("_", " "), other]
     here = found.isel(row)
     if not np.any(here["onset"] < np.inf):
         lines.append("hardly any sample vibrates along the axis: extend it, or take more samples")
@@ -160,6 +167,8 @@ def sensitivity_figure(
     here = here.isel(parameter=np.argsort(np.where(np.isfinite(swing), swing, -1.0)))
     factor, unit = figures.coordinate_unit(here[sensitivity.ONSET].attrs)
     ends = _ends(dataset[along].values[np.isfinite(dataset[along].values)])
+    if here["band"].item() < sensitivity.COARSE * (step := here["step"].item()):
+        lines.append(f"known no better than the step of {factor * step:.3g} {unit}: take a finer axis")
     middle = factor * np.clip(here[sensitivity.ONSET].values[1], *ends)
     medians = factor * np.clip(here["quarter_onset"].fillna(middle / factor).values, *ends)
     places, names = np.arange(float(here.sizes["parameter"])), here["parameter"].values

@@ -1,6 +1,6 @@
-"""The results of a study as one table for spreadsheets and data frames: a row for each run."""
+"""The results of a study as tables for spreadsheets and data frames: a row for each run, or each cell."""
 
-from collections.abc import Hashable
+from collections.abc import Hashable, Mapping
 from pathlib import Path
 from typing import Any
 
@@ -10,6 +10,7 @@ from pandas import DataFrame
 
 from cvt_hpc.analysis.arrangement import labelled
 from cvt_hpc.analysis.classes import check_results, map_classes
+from cvt_hpc.analysis.probability import has_samples, probabilities
 from cvt_hpc.errors import mismatch
 from cvt_hpc.job.values import heading, shown_number
 from cvt_hpc.storage.files import written_aside
@@ -46,34 +47,49 @@ def run_table(dataset: xr.Dataset, source: str = "results") -> DataFrame:
     return DataFrame(columns)
 
 
-def write_table(frame: DataFrame, out: Path) -> Path:
-    """Write a table as CSV, or as a sheet for Excel and the like, by its suffix, and return its path.
+def tables(dataset: xr.Dataset, source: str = "results") -> dict[str, DataFrame]:
+    """Return the `run_table` as "runs"; of uncertain parameters the probabilities as "cells", too."""
+    found = {"runs": run_table(dataset, source)}
+    if has_samples(dataset):
+        # a cell of many runs has no verdict of its own
+        found["cells"] = run_table(probabilities(dataset)).drop(columns=["status", "class", "vibrates"])
+    return found
 
-    InputError if it is none of FORMATS; of a sheet, if the library is missing or there are more than
-    MOST_ROWS.
+
+def write_tables(frames: Mapping[str, DataFrame], out: Path) -> list[Path]:
+    """Write tables as CSV, or as sheets for Excel and the like, by the suffix, and return the paths.
+
+    Of CSV files the first one is `out`, and the names of the others are beside its own. InputError if the
+    suffix is none of FORMATS; of sheets, if the library is missing or there are more than MOST_ROWS.
     """
     if out.suffix.lower() not in FORMATS:
         raise mismatch(str(out), f"a table: {', '.join(FORMATS)}", out.suffix or "no suffix")
     if out.suffix.lower() == ".csv":
-        with written_aside(out, parents=True) as aside:
-            frame.to_csv(aside, index=False, lineterminator="\n")
-        return out
+        first, *others = frames
+        paths = {first: out} | {name: out.with_stem(f"{out.stem}_{name}") for name in others}
+        for name, path in paths.items():
+            with written_aside(path, parents=True) as aside:
+                frames[name].to_csv(aside, index=False, lineterminator="\n")
+        return [*paths.values()]
     try:
         from xlsxwriter import Workbook
     except ImportError:
         then = '`pip install "cvt_hpc[xlsx]"`, or write a .csv, which spreadsheets read too'
         raise mismatch(str(out), "the library XlsxWriter", "none", then) from None
-    if len(frame) > MOST_ROWS:
+    if (rows := max(map(len, frames.values()))) > MOST_ROWS:
         expected = f"at most {MOST_ROWS} runs, which a sheet holds"
-        raise mismatch(str(out), expected, str(len(frame)), "write .csv")
+        raise mismatch(str(out), expected, str(rows), "write .csv")
     # texts stay texts, whoever has written them: no formulas and no links
     options = {"constant_memory": True, "strings_to_formulas": False, "strings_to_urls": False}
-    cells = frame.astype(object).where(frame.notna(), None).replace([np.inf, -np.inf], ["inf", "-inf"])
     with written_aside(out, parents=True) as aside, Workbook(str(aside), options) as book:
-        sheet = book.add_worksheet("runs")
-        for row, values in enumerate([frame.columns, *cells.itertuples(index=False, name=None)]):
-            sheet.write_row(row, 0, values)
-    return out
+        for name, frame in frames.items():
+            sheet = book.add_worksheet(name)
+            cells = (
+                frame.astype(object).where(frame.notna(), None).replace([np.inf, -np.inf], ["inf", "-inf"])
+            )
+            for row, values in enumerate([frame.columns, *cells.itertuples(index=False, name=None)]):
+                sheet.write_row(row, 0, values)
+    return [out]
 
 
 def _is_named(array: xr.DataArray, dims: tuple[Hashable, ...]) -> bool:

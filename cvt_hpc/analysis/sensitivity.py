@@ -33,6 +33,7 @@ from cvt_hpc.vibration.classes import OccurrenceClass, levels
 
 QUANTILES = {"5 %": 0.05, "50 %": 0.5, "95 %": 0.95}
 ONSET = "onset"
+COARSE = 2.0  # steps of the axis: a band below is known no better than they are
 QUARTERS = ("lowest quarter", "highest quarter")  # of the samples, by a parameter
 
 # By name the class, and whether a run that failed, or without a verdict, may have it
@@ -170,11 +171,21 @@ def _quantiles(
     return np.stack(found)
 
 
-def onset_axis(dataset: xr.Dataset, fixed: Collection[str] = ()) -> str:
-    """Return the axis along which vibration is said to set in; "" where there is none of numbers."""
+def onset_axes(dataset: xr.Dataset, fixed: Collection[str] = ()) -> list[str]:
+    """Return the axes of numbers along which vibration may set in, the likeliest first.
+
+    That is the load or what is in its place, else the axis along which the most rows begin or end to vibrate.
+    """
+    vibrates = map_classes(dataset) == OccurrenceClass.VIBRATING
     numeric = [name for name in map(str, dataset["status"].dims) if dataset[name].dtype.kind in "iuf"]
-    free = [name for name in numeric if name not in {SAMPLE, *fixed}]
-    return next((name for name in (*ALONG, *reversed(free)) if name in free), "")
+
+    def likely(name: str) -> tuple[float, ...]:
+        changes = float((vibrates.any(name) & ~vibrates.all(name)).mean())
+        return name in ALONG, changes, dataset.sizes[name]
+
+    return sorted(
+        (name for name in reversed(numeric) if name not in {SAMPLE, *fixed}), key=likely, reverse=True
+    )
 
 
 def widest_row(found: xr.Dataset) -> dict[str, int]:
@@ -199,7 +210,8 @@ def onset_scatter(dataset: xr.Dataset, along: str, source: str = "results") -> x
         `parameter`, too, each an uncertain one or those that are correlated: `halved_onset`, the quantiles
         with half its scatter; `band` and `halved_band`, from 5 to 95 %, with the ends of 95 % bounds by
         bootstrap, `_low` and `_high`, inf where the band reaches beyond the axis; `effective_samples` of
-        independent ones that the weights leave [1]. Over `quarter`, too, `quarter_onset`: the median of the
+        independent ones that the weights leave [1]; `step`, the largest of the axis within the band, below
+        COARSE of which the band is known no better. Over `quarter`, too, `quarter_onset`: the median of the
         onset where the parameter is in the lowest or the highest quarter of its samples.
     """
     check_samples(dataset, source)
@@ -229,6 +241,9 @@ def onset_scatter(dataset: xr.Dataset, along: str, source: str = "results") -> x
         comment = f"from 5 to 95 % of the onset{': end of 95 % bounds' * bool(suffix)}"
         result[f"band{suffix}"] = rest, band[..., 0], units | {"comment": comment}
         result[f"halved_band{suffix}"] = (*rest, "parameter"), band[..., 1:], units | {"comment": comment}
+    inside = (found.knots[1:] > quantiles[0, ..., :1]) & (found.knots[:-1] < quantiles[-1, ..., :1])
+    widest = np.where(inside, np.diff(found.knots), 0.0).max(axis=-1, initial=0.0)
+    result["step"] = rest, widest, units | {"comment": "largest step of the axis within the band"}
     quarters = np.stack([_in_quarters(samples, name) for name in weights], axis=1)
     medians = [_quantiles(_weighted(below, part), found.knots, counted)[1] for part in quarters]
     result["quarter_onset"] = ("quarter", *rest, "parameter"), np.stack(medians), units | words

@@ -17,6 +17,7 @@ from numpy.typing import NDArray
 from cvt_hpc.job.axes import ALL, NONE, SAMPLE, SWAPPED
 
 RESAMPLES = 200  # of the bootstrap
+WITHOUT = "without_value"  # attribute of a variable: what is the case where it is nan
 _LEAST_KNOWN = 0.9  # of the samples: those left out are not like the others
 _ENDS = {"": "index", "_low": "low end of the 95 % bounds", "_high": "high end of the 95 % bounds"}
 
@@ -88,5 +89,8 @@ def sobol_indices(values: xr.DataArray, along: str = "") -> xr.Dataset:
     for k, order in enumerate(("first_order", "total_order")):
         for end, (suffix, words) in enumerate(_ENDS.items()):
             told = {"units": "1", "comment": f"Sobol index of {order.replace('_', ' ')}: {words}"}
+            told[WITHOUT] = f"less than {_LEAST_KNOWN:.0%} of the samples count, or all are alike".replace(
+                "%", " %"
+            )
             dataset[order + suffix] = (*dims, "parameter"), found[..., end, k, :], told
     return dataset

@@ -7,6 +7,7 @@ from typing import Any, NamedTuple
 
 import numpy as np
 import xarray as xr
+from matplotlib.artist import Artist
 from matplotlib.axes import Axes
 from matplotlib.colors import Normalize
 from matplotlib.figure import Figure
@@ -21,8 +22,9 @@ from cvt_hpc.analysis.classes import WITHOUT_RESULT, check_results, count_classe
 from cvt_hpc.analysis.courses import line_of_study
 from cvt_hpc.analysis.curves import check_quantities
 from cvt_hpc.analysis.measured import File, Overlay, side_of
-from cvt_hpc.analysis.probability import ISOLINES, over_samples
+from cvt_hpc.analysis.probability import ISOLINES, PROBABILITY, over_samples
 from cvt_hpc.analysis.scatter import is_sampled
+from cvt_hpc.analysis.sobol import WITHOUT
 from cvt_hpc.errors import mismatch, one_line
 from cvt_hpc.vibration.classes import OccurrenceClass
 
@@ -36,7 +38,13 @@ ROW, FRAME = 0.25, 0.9  # [inch], of a row of cells, and of title and labels
 HIGHEST, LEAST = 3.6, 0.8  # [inch], of a panel's cells
 AROUND = 1.5  # [inch]: labels beside a panel's cells
 ISOLINE_INK = "#b3003b"  # over the colours of a map, light and dark
-NEGATIVE, INK = "---", "#5a5a5a"  # lines over cells below zero that hold no numbers
+ISOLINE_STYLES = ("--", "-", "-.")
+NEGATIVE, UNSURE, INK = (
+    "---",
+    "xx",
+    "#5a5a5a",
+)  # lines over cells below zero without numbers, and those less known
+WIDE = 0.5  # of a probability or an index: with a wider interval next to nothing is known
 HATCH = cells.STYLES[OccurrenceClass.SLIPPING].hatch
 EQUAL = 1e-6  # of a quantity: what differs less is the same
 NARROWEST, LOWEST = 24.0, 11.0  # [point]: cells into which numbers are written
@@ -51,6 +59,7 @@ class Panel(NamedTuple):
     factor: float  # from SI to the unit
     values: Array  # in the unit
     kinds: NDArray[np.int8]  # how the runs ended
+    unsure: NDArray[np.bool_]  # where the interval of a value is WIDE
     alike: Array  # values of all panels that share the scale of colours, or its range
     isolines: tuple[float, ...]  # values of lines, in the unit
     at: dict[str, int]  # index along the axis of panels
@@ -105,25 +114,35 @@ def value_map_figure(
     figures.label_x(all_axes, len(panels), x.label)
     kinds = occurrence_classes(shown)
     counted = dataset.attrs.get("counted") or _counted(kinds)
+    if PROBABILITY not in quantities:  # the width told is that of its intervals
+        counted = counted.partition(";")[0]
     job = one_line(dataset.attrs.get("job_name", ""))
     lines = [f"{job}: {counted}".removeprefix(": "), ", ".join(arrangement.notes), line_of_study(dataset)]
     figures.entitle(figure, [*lines, over.note], int(72 * size[0] / figures.WIDTH))
     marked: dict[cells.CellClass, cells.ClassStyle] = {
         kind: cells.STYLES[kind] for kind in OTHERS if (kinds == kind).any()
     }
-    below = Patch(facecolor="none", edgecolor=INK, hatch=NEGATIVE, linewidth=0.8, label="below zero")
     hatches = {patch.get_hatch() for axes in all_axes.flat for patch in axes.patches}
-    negative = [below] if NEGATIVE in hatches else []
+    without = (dataset[name].attrs.get(WITHOUT) for name in quantities)
+    undecided = cells.STYLES[OccurrenceClass.UNDECIDED]
+    told = {
+        NEGATIVE: ("below zero", "none", INK),
+        UNSURE: (f"interval wider than {WIDE:g}", "none", INK),
+        undecided.hatch: (next(filter(None, without), "undecided"), undecided.fill, undecided.ink),
+    }
+    further: list[Artist] = [
+        Patch(facecolor=fill, edgecolor=ink, hatch=hatch, linewidth=0.8, label=label)
+        for hatch, (label, fill, ink) in told.items()
+        if hatch in hatches
+    ]
     isolines = {panel.isolines for panel in panels if min(panel.values.shape) > 1} - {()}
-    values = min(isolines, default=())
-    names = (
-        {"-": f"{values[len(values) // 2]:g}", "--": f"{values[0]:g} and {values[-1]:g}"} if values else {}
-    )
-    look = {"color": ISOLINE_INK, "lw": 1.6}
-    lines_of = [Line2D([], [], ls=style, label=name, **look) for style, name in names.items()]
-    further = negative + lines_of + over.handles
+    for style, value in zip(ISOLINE_STYLES, min(isolines, default=()), strict=False):
+        look = {"color": ISOLINE_INK, "lw": 1.6, "ls": style}
+        further.append(Line2D([], [], label=f"probability {value:g}", **look))
+    further += over.handles
     if marked or further:
-        cells.class_legend(figure, marked, len(marked) + len(further), further=further)
+        labels = [kind.label for kind in marked] + [str(one.get_label()) for one in further]
+        cells.class_legend(figure, marked, figures.legend_columns(labels), further=further)
     return figure
 
 
@@ -171,15 +190,19 @@ def _panels(arrangement: layout.Arrangement, quantities: Sequence[str]) -> list[
         factor, unit = figures.value_unit(array)
         labelled = [str(dim) for dim in array.dims if dim not in (arrangement.x, arrangement.y, *over)]
         alike = factor * np.asarray(array.attrs.get("valid_range", array.values))
+        wide = xr.zeros_like(array, bool)
+        if f"{name}_low" in dataset:
+            wide = dataset[f"{name}_high"] - dataset[f"{name}_low"] > WIDE
         isolines = tuple(factor * np.asarray(array.attrs.get(ISOLINES, ()) if are_numbers else (), float))
         for labels in layout.places(array, labelled):
-            told = [str(array[dim].values[k]) for dim, k in labels.items()]
+            told = [str(array[dim].values[k]).replace("_", " ") for dim, k in labels.items()]
             for at in layout.places(dataset, over):
                 here = [layout.place_text(dataset[dim], k) for dim, k in at.items()]
                 title = ", ".join([figures.axis_label(array, unit), *told, *here])
                 values = factor * _of_grid(array.isel(labels | at), arrangement)
                 ended = _of_grid(kinds.isel(at), arrangement).astype(np.int8)
-                found.append(Panel(title, unit, factor, values, ended, alike, isolines, at))
+                unsure = _of_grid(wide.isel(labels | at), arrangement)
+                found.append(Panel(title, unit, factor, values, ended, unsure, alike, isolines, at))
     return found
 
 
@@ -205,13 +228,15 @@ def _draw_panel(
             place, value = (x.centres[column], y.centres[row]), values[row, column]
             fill_colour = np.asarray(scale.colours(scale.norm(value)))
             digits = ".0f" if 1e3 <= abs(value) < 1e5 else ".3g" if abs(value) >= 0.1 else ".2g"
-            is_lined = kinds[row, column] == OccurrenceClass.SLIPPING or bool(panel.isolines)
+            is_lined = kinds[row, column] == OccurrenceClass.SLIPPING or panel.unsure[row, column]
+            is_lined |= bool(panel.isolines)
             digits = ".2g" if panel.isolines else digits
             cells.write_value(axes, place, f"{value:{digits}}", fill_colour, size=7.5, outlined=is_lined)
     elif both:  # in grey the colours of both signs are alike
         _hatch(axes, x, y, is_known & (values < 0.0), NEGATIVE, INK)
     cells.draw_marks(axes, x, y, kinds, np.isin(kinds, OTHERS) & ~is_known, 3.5)
     _hatch(axes, x, y, is_known & (kinds == OccurrenceClass.SLIPPING), HATCH, "#ffffff")
+    _hatch(axes, x, y, is_known & panel.unsure, UNSURE, INK)
     if panel.isolines and min(values.shape) > 1:
         _draw_isolines(axes, x, y, np.where(is_known, values, np.nan), panel.isolines)
     x.lay_out(axes.xaxis)
@@ -221,9 +246,9 @@ def _draw_panel(
 
 
 def _draw_isolines(axes: Axes, x: Ruler, y: Ruler, values: Array, isolines: Sequence[float]) -> None:
-    """Draw lines of equal values between the grid points, dashed but for the middle one."""
-    styles = ["--" if value != isolines[len(isolines) // 2] else "-" for value in isolines]
-    look: dict[str, Any] = {"colors": ISOLINE_INK, "linewidths": 1.6, "linestyles": styles, "zorder": 2.4}
+    """Draw lines of equal values between the grid points, each in a style of its own."""
+    look: dict[str, Any] = {"colors": ISOLINE_INK, "linewidths": 1.6, "zorder": 2.4}
+    look["linestyles"] = ISOLINE_STYLES
     with warnings.catch_warnings():
         warnings.filterwarnings("ignore", "No contour levels")
         lines = axes.contour(x.centres, y.centres, values, isolines, **look)

@@ -26,6 +26,7 @@ def add(commands: parts.Commands) -> None:
     status.add_argument("--json", action="store_true", help="for programs: one line of JSON, times in s")
     parts.add_command(commands, "gather", _gather, "write DIR/results.nc again, from the records", "DIR")
     text = "write the results as a table with a row for each run: axes, class, and what each run gave"
+    text += "; of uncertain parameters also the probabilities of each cell"
     table = parts.add_command(commands, "table", _table, text, "RESULTS")
     text = "FILE.csv, or FILE.xlsx for a spreadsheet (default: table.csv beside the dataset)"
     table.add_argument("--out", type=Path, metavar="FILE", help=text)
@@ -84,14 +85,14 @@ def _gather(arguments: argparse.Namespace) -> None:
 
 def _table(arguments: argparse.Namespace) -> None:
     from cvt_hpc.analysis.conversion import plain
-    from cvt_hpc.analysis.run_table import FORMATS, run_table, write_table
+    from cvt_hpc.analysis.run_table import FORMATS, tables, write_tables
     from cvt_hpc.study import open_results
 
     out = arguments.out or parts.folder_of(arguments.path) / "table.csv"
     parts.check_output(out, FORMATS)
     with open_results(arguments.path) as dataset:
-        frame = run_table(plain(dataset, str(arguments.path)), str(arguments.path))
-    parts.say(f"table: {write_table(frame, out)}")
+        frames = tables(plain(dataset, str(arguments.path)), str(arguments.path))
+    parts.say(f"table: {', '.join(map(str, write_tables(frames, out)))}")
 
 
 def _map(arguments: argparse.Namespace) -> None:

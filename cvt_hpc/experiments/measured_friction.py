@@ -309,7 +309,8 @@ def _figure(laws: Sequence[Fitted], points: Points) -> Figure:
     shown = 1e3 * grid
     axes.plot(1e3 * points.speed, points.mu, ".", color="0.45", markersize=4, label="measured")
     for k, one in enumerate(laws):
-        look = line_style(k) | {"marker": "", "lw": 1.1 if k else 1.8}
+        dashes = "-" if k == 0 else (0, (6 - k, 1.5) + (1, 1.5) * (k - 1))  # tells them apart in grey
+        look = line_style(k) | {"marker": "", "lw": 1.3 if k else 1.8, "ls": dashes}
         axes.plot(shown, one.band(grid)[0], label=one.law.name.lower() + " (best)" * (k == 0), **look)
     curve, deviation = best.band(grid)
     whose = f"{best.of_specimens} specimens" if best.of_specimens else "the mean law"

@@ -17,6 +17,7 @@ from cvt_hpc.analysis.hysteresis_bands import INK, lowest_onsets, of_each_start
 from cvt_hpc.analysis.maps import AXIS, has_starts, join_starts
 from cvt_hpc.analysis.probability import PROBABILITY
 from cvt_hpc.analysis.scatter import is_sampled, sample_axes
+from cvt_hpc.analysis.value_maps import COLOURS
 from cvt_hpc.errors import escaped
 from cvt_hpc.report.findings import AMPLITUDE, Quantity, is_judged, quantities
 from cvt_hpc.vibration.classes import StartClass
@@ -67,7 +68,8 @@ def map_data(dataset: xr.Dataset, source: str = "results") -> dict[str, object]:
         "vibrating": int(OccurrenceClass.VIBRATING),
         "colours": _colours(cells.AMPLITUDE_COLOURS),
         "amplitudes": cells.AMPLITUDE_TICKS,  # [um]
-        "others": _colours(cells.FREQUENCY_COLOURS),
+        # as in print
+        "others": _colours(cells.FREQUENCY_COLOURS if is_judged(dataset) else COLOURS),
         "quantities": [_quantity(one) for one in quantities(dataset)],
     }
     # a cell of many samples has no class

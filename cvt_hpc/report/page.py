@@ -33,10 +33,10 @@ from cvt_hpc.analysis.measured_score import score, score_sentences
 from cvt_hpc.analysis.probability import PROBABILITY, has_samples, over_samples
 from cvt_hpc.analysis.probability_drawing import onset_bands_figure, sensitivity_figure
 from cvt_hpc.analysis.scatter import is_sampled
-from cvt_hpc.analysis.value_maps import value_map_figure
+from cvt_hpc.analysis.value_maps import WIDE, value_map_figure
 from cvt_hpc.errors import InputError, escaped, mismatch, one_line
 from cvt_hpc.job import Job
-from cvt_hpc.job.axes import SAMPLE
+from cvt_hpc.job.axes import SAMPLE, SWAPPED
 from cvt_hpc.job.summary import core_time_in_words, rules_in_words, value_in_words
 from cvt_hpc.job.values import shown
 from cvt_hpc.models.contract import load_model
@@ -44,7 +44,7 @@ from cvt_hpc.report import findings
 from cvt_hpc.report.interactive import KEPT, as_script, map_data
 from cvt_hpc.storage.files import written_aside
 from cvt_hpc.storage.netcdf import CONTENT, HISTORY
-from cvt_hpc.study.intervals import look
+from cvt_hpc.study.intervals import VERDICTS, look
 from cvt_hpc.variables import Status
 from cvt_hpc.vibration.classes import DECIDED, OccurrenceClass, levels, onsets
 
@@ -165,7 +165,7 @@ def _content(
         beyond = [name for name in map(str, cells["status"].dims) if name not in (arrangement.x, *axes)]
         x = arrangement.x if dataset[arrangement.x].dtype.kind in "iuf" else None
         if PROBABILITY in cells:
-            sentences = list(findings.probability_sentences(dataset, cells, arrangement.x, [*beyond, *axes]))
+            sentences = list(findings.probability_sentences(dataset, cells, arrangement.x))
         elif judged:
             sentences = list(findings.window_sentences(dataset, arrangement.x, [*beyond, *axes]))
             sentences += filter(None, [findings.slip_sentence(dataset, arrangement.x)])
@@ -247,7 +247,8 @@ def _axes(dataset: xr.Dataset, job: Job | None) -> list[tuple[str, str, str]]:
     names = list(dict.fromkeys([*dataset.coords, *dataset["status"].dims]))
     names = [str(name) for name in names if dims & set(dataset[name].dims)]
     if job is not None:
-        names = [axis.name for axis in job.axes if axis.name in dataset.coords]
+        counted = (SAMPLE, SWAPPED)  # by the findings
+        names = [axis.name for axis in job.axes if axis.name in dataset.coords and axis.name not in counted]
     rows = []
     for name in names:
         axis = dataset[name]
@@ -409,8 +410,17 @@ def next_steps(dataset: xr.Dataset, job: Job | None, x: str | None) -> Iterator[
         runs = "The undecided run was" if undecided == 1 else f"The {undecided} undecided runs were"
         yield f"{runs} too short to tell: a larger `longest_duration` in [run] may decide more."
     if has_samples(dataset):
-        more = 2 * dataset.sizes[SAMPLE]
-        yield f"`cvt-hpc run JOB --set uncertain.samples={more}` narrows the intervals by new samples alone."
+        ended = (classes != OccurrenceClass.NOT_RUN).sum(SAMPLE)
+        open_ = ((classes != OccurrenceClass.NOT_RUN) & ~classes.isin(VERDICTS)).sum(SAMPLE) / ended
+        widest = design.get("widest_interval", WIDE)
+        if count := int((stuck := open_ > widest).sum()):
+            where = "In a cell" if count == 1 else f"In {count} cells"
+            share = f"more than {100 * widest:.3g} % of the samples have no verdict"
+            yield f"{where} {share}: no further samples narrow such intervals."
+        wanting = ended >= dataset.sizes[SAMPLE] if "first_samples" in design else True
+        if (~stuck & wanting).any():
+            command = f"cvt-hpc run JOB --set uncertain.samples={2 * dataset.sizes[SAMPLE]}"
+            yield f"`{command}` narrows the intervals by new samples alone."
     elif x is not None and x in classes.dims and dataset[x].dtype.kind in "iuf":
         yield from _along(dataset[x], classes)
     vibrating = (classes == OccurrenceClass.VIBRATING) & (dataset["status"] == Status.DONE)

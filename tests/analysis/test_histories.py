@@ -316,6 +316,12 @@ def test_lines_of_a_title_are_of_like_length_and_keep_numbers_with_units(width):
     assert any("27.2\u00a0um" in part for part in lines)
 
 
+def test_a_title_breaks_between_phrases_where_that_takes_no_further_line():
+    line = "uncertain_criterion: 91 cells of 32 samples; 95 % intervals up to 0.7 wide"
+    head = balanced(line, 72).replace("\u00a0", " ")
+    assert head == "uncertain_criterion: 91 cells of 32 samples;\n95 % intervals up to 0.7 wide"
+
+
 def boxes(artists):
     return [artist.get_window_extent() for artist in artists]
 

@@ -1,10 +1,12 @@
 """Probabilities over the samples of uncertain parameters: counts, intervals, onsets, pictures and sentences."""
 
 import json
+from zipfile import ZipFile
 
 import numpy as np
 import pytest
 import xarray as xr
+from matplotlib.colors import to_hex
 from matplotlib.text import Text
 from scipy.stats import binomtest, norm
 from scipy.stats import sobol_indices as scipy_indices
@@ -15,14 +17,16 @@ from cvt_hpc.analysis.classes import OccurrenceClass
 from cvt_hpc.analysis.maps import map_figure
 from cvt_hpc.analysis.probability import probabilities
 from cvt_hpc.analysis.probability_drawing import onset_bands_figure, sensitivity_figure
-from cvt_hpc.analysis.sensitivity import onset_scatter
+from cvt_hpc.analysis.run_table import tables, write_tables
+from cvt_hpc.analysis.sensitivity import onset_axes, onset_scatter
 from cvt_hpc.analysis.sobol import sobol_indices
-from cvt_hpc.analysis.value_maps import value_map_figure
+from cvt_hpc.analysis.value_maps import COLOURS, UNSURE, value_map_figure
 from cvt_hpc.errors import InputError
 from cvt_hpc.job import build_job
 from cvt_hpc.job.uncertain import Distribution, Uncertain
 from cvt_hpc.models.oscillator.motion import oscillator, steady_sliding
 from cvt_hpc.report import write_report
+from cvt_hpc.report.interactive import map_data
 from cvt_hpc.report.page import next_steps
 from cvt_hpc.study.intervals import interval, look, looks_of
 from cvt_hpc.variables import Status, Vibrates
@@ -323,6 +327,61 @@ def test_the_picture_names_correlated_parameters_and_says_where_nothing_vibrates
     assert "hardly any" not in words(sensitivity_figure(dataset))
 
 
+@pytest.mark.usefixtures("undrawn")
+def test_a_band_of_less_than_two_steps_is_not_said_to_shrink(tmp_path):
+    further = {"damping": normal(5.0, 0.75), "preload": normal(40.0, 20.0)}
+    dataset = linear_onset(64, np.arange(5.0, 26.0, 5.0), **further)
+    found = dataset.cvt.onset_scatter()
+    assert found["step"] == 5.0 and found["band"] < 10.0
+    text = report(dataset, tmp_path)
+    known = "known no better than the step of 5 N m: take a finer axis"
+    assert f"within {found['band'].item():.3g} N m, {known}." in text and "Halve" not in text
+    assert known in words(sensitivity_figure(dataset))
+    assert known not in words(sensitivity_figure(linear_onset(64, STEPS, **further)))
+
+
+@pytest.mark.usefixtures("undrawn")
+def test_the_report_names_the_parameter_that_decides_as_far_as_the_bounds_tell(tmp_path):
+    steps = np.arange(5.0, 26.0, 0.5)
+    decides = "Preload decides; damping hardly matters."
+    further = {"damping": normal(5.0, 0.1), "preload": normal(40.0, 20.0)}
+    text = report(linear_onset(256, steps, **further), tmp_path)
+    assert decides in text and "Halve the scatter of preload, and this band shrinks from" in text
+    told = "Halve the scatter of damping, and it is not certain that this band changes: "
+    assert told in text and "grows" not in text
+    dataset = linear_onset(256, steps, **further, indices=True)
+    text = report(dataset, tmp_path)
+    assert "Total Sobol indices of the onset in load: preload " in text and decides in text
+    # without verdicts in more than a tenth of the samples those of the onset are left
+    few = dataset["sample"] % 8 > 0
+    beside = dataset.assign(vibrates=dataset["vibrates"].where(few, int(Vibrates.UNDECIDED)))
+    text = report(beside, tmp_path)
+    assert "No cell has Sobol indices of vibration: nine of ten samples need verdicts" in text
+    alike = {"damping": normal(5.0, 0.75), "preload": normal(40.0, 15.0)}
+    text = report(linear_onset(64, steps, **alike), tmp_path)
+    assert "more samples would tell whether" in text and "decides" not in text
+
+
+@pytest.mark.usefixtures("undrawn")
+def test_the_onset_lies_along_the_axis_on_which_verdicts_change(tmp_path):
+    within = np.add.outer(np.arange(40), np.zeros((3, 8))) - np.arange(8)
+    runs = np.where((within > 10) & (within < 25), V, Q)
+    dataset = study(runs, radial_speed=np.arange(40.0), contact_force=[1.0, 2.0, 3.0])
+    assert onset_axes(dataset) == ["radial_speed", "contact_force"]
+    assert onset_axes(dataset, ["radial_speed"]) == ["contact_force"]
+    told = words(onset_bands_figure(dataset))
+    assert "onset in radial speed" in told and "along another axis: --along contact_force" in told
+    assert "another axis" not in words(onset_bands_figure(dataset, along="radial_speed"))
+    text = report(dataset, tmp_path)
+    assert text.count("the probability of vibration passes 10 % at") == 3
+    assert "falls below 90 % at 0.0248 kN, 50 % at 0.028 kN, 10 % at 0.0312 kN of radial speed" in text
+
+
+def report(dataset, folder):
+    """The text of its page."""
+    return write_report(dataset, folder / "report.html").read_text().replace("\u00a0", " ")
+
+
 def test_samples_that_are_not_run_make_no_band_surer():
     whole = linear_onset(256, STEPS, damping=normal(5.0, 0.75), preload=normal(40.0, 20.0))
     part = whole.isel(sample=slice(32))
@@ -344,6 +403,13 @@ def test_of_an_adaptive_study_the_report_tells_the_runs_that_its_cells_want():
     steps = list(next_steps(found, job, None))
     assert "`cvt-hpc run JOB` goes on: 18 runs are left." in steps
     assert "goes on" not in " ".join(next_steps(found.isel(load=[2]), job, None))
+    # more samples serve cells that have all of them, and no cell of which too many samples have no verdict
+    cells = [[Q] * 32 + [N] * 96, [U] * 32 + [N] * 96, [Q] * 90 + [U] * 38]
+    told = " ".join(next_steps(study(cells, load=[1.0, 2.0, 3.0]), job, None))
+    assert "In 2 cells more than 20 % of the samples have no verdict: no further samples narrow" in told
+    assert "uncertain.samples" not in told
+    cells[2] = [Q, V] * 64
+    assert "uncertain.samples=256" in " ".join(next_steps(study(cells, load=[1.0, 2.0, 3.0]), job, None))
 
 
 def test_a_band_that_ends_beyond_the_axis_has_no_width():
@@ -407,16 +473,39 @@ def test_a_map_has_contours_and_says_how_wide_intervals_are(two_axes):
     told = words(figure)
     assert "made: 32 cells of 8 samples; 95 % intervals up to" in told
     assert "probability of vibration" in told
-    assert [text.get_text() for text in figure.legends[0].get_texts()] == ["0.5", "0.1 and 0.9"]
+    assert [text.get_text() for text in figure.legends[0].get_texts()] == [
+        "interval wider than 0.5",
+        *(f"probability {share}" for share in (0.1, 0.5, 0.9)),
+    ]
     # the middle line lies where as many samples vibrate as do not
     lines = next(one for one in figure.axes[0].collections if hasattr(one, "levels"))
     assert list(lines.levels) == [0.1, 0.5, 0.9]
+    assert len({str(style) for style in lines.get_linestyle()}) == 3
     place = min(lines.allsegs[1][0], key=lambda point: abs(point[1] - 2.0))
     shares = probabilities(two_axes)["vibration_probability"].sel(thrust=2e3)
     assert np.interp(place[0], shares["load"], shares) == pytest.approx(0.5)
     assert "slip" in words(value_map_figure(two_axes, ["slip_probability"]))
     assert "Vibration occurrence" in words(map_figure(two_axes, {"sample": 0}))
     assert "probability" in words(map_figure(two_axes.cvt.probability()))
+
+
+def test_cells_that_are_hardly_known_are_hatched_and_those_without_a_value_say_why():
+    # of the first cell 7 of 64 samples are quiet, and all others without a verdict
+    rows = np.array([[[Q] * 7 + [U] * 57, [Q] * 64], [[Q, V] * 32, [U] * 64]])
+    dataset = study(rows, thrust=[1.0, 2.0], load=[1.0, 2.0])
+    figure = map_figure(dataset)
+    (hatched,) = [patch for patch in figure.axes[0].patches if patch.get_hatch() == UNSURE]
+    assert hatched.get_path().get_extents().bounds == pytest.approx((0.5, 0.5e-3, 1.0, 1e-3))
+    told = words(figure)
+    assert "interval wider than 0.5" in told and "no sample has a verdict" in told
+    assert UNSURE not in {patch.get_hatch() for patch in map_figure(dataset[{"load": [1]}]).axes[0].patches}
+    classes = np.array([[V] * 8, [V] * 4 + [Q] * 4, [V] * 4 + [Q] * 4, [V] * 8])
+    parts = [study([[row, row], [[Q] * 8] * 2], thrust=[1.0, 2.0], load=[1.0, 2.0]) for row in classes]
+    both = xr.concat(parts, "swapped").assign_coords(swapped=["none", "all", "damping", "friction_memory"])
+    told = words(value_map_figure(both, ["total_order"]))
+    assert "friction memory" in told and "intervals up to" not in told
+    assert "less than 90 % of the samples count, or all are alike" in told
+    assert "no sample vibrates" in words(value_map_figure(both, ["amplitude_quantiles"]))
 
 
 def test_over_one_axis_the_interval_is_a_band_and_onsets_have_one_over_another(two_axes):
@@ -437,6 +526,22 @@ def test_over_one_axis_the_interval_is_a_band_and_onsets_have_one_over_another(t
         two_axes.cvt.onset_scatter("sample")
 
 
+def test_a_table_has_a_row_for_each_cell_beside_that_for_each_run(two_axes, tmp_path):
+    frames = tables(two_axes)
+    assert [len(frame) for frame in frames.values()] == [256, 32]
+    one = frames["cells"].iloc[15]
+    told = probabilities(two_axes).isel(thrust=1, load=7)
+    assert (one["thrust [N]"], one["load [N m]"]) == (2e3, 70.0)
+    assert one["vibration_probability"] == told["vibration_probability"] and "class" not in frames["cells"]
+    assert one["amplitude_quantiles_95 % [m]"] == told["amplitude_quantiles"].values[-1]
+    written = write_tables(frames, tmp_path / "table.csv")
+    assert [path.name for path in written] == ["table.csv", "table_cells.csv"]
+    assert [len(path.read_text().splitlines()) for path in written] == [257, 33]
+    (sheets,) = write_tables(frames, tmp_path / "table.xlsx")
+    assert "xl/worksheets/sheet2.xml" in ZipFile(sheets).namelist()
+    assert [*tables(two_axes.isel(sample=0))] == ["runs"]
+
+
 @pytest.fixture
 def undrawn(monkeypatch):
     """Pages have places for their pictures alone."""
@@ -448,11 +553,17 @@ def test_the_report_says_how_sure_the_map_is(two_axes, tmp_path):
     text = write_report(two_axes, tmp_path / "report.html").read_text().replace("\u00a0", " ")
     assert "32 cells of 8 samples, with 95 % intervals up to" in text
     assert "Uncertain: damping (normal, mean 0.5 N s/m)." in text
-    assert "At thrust 2 kN the probability of vibration passes 10 % at" in text
+    assert "At thrust 3 kN the probability of vibration passes 10 % at" in text
+    assert "In 1 more line along load samples vibrate." in text
     assert "The belt slips with a probability of up to 25 %, at thrust 4 kN and load 70 N m." in text
     assert "--set uncertain.samples=16</code> narrows the intervals" in text
     assert "along sample" not in text
     assert text.count('alt="onset of vibration"') == 1
+    # within the two printed pages to hand on
+    assert 'class="whole several"' in text
+    assert text.index('class="front"') < text.index('alt="onset of vibration"') < text.index("<h2>Next steps")
+    colours = map_data(probabilities(two_axes))["others"]
+    assert [colour for _, colour in colours] == [to_hex(COLOURS(k)) for k in range(24)]  # as in print
 
 
 @pytest.mark.usefixtures("undrawn")

@@ -12,6 +12,7 @@ from cvt_hpc.cli import main
 from cvt_hpc.errors import InputError, JobWarning
 from cvt_hpc.experiments.measured_friction import (
     Points,
+    _figure,
     by_force,
     fit_law,
     fit_laws,
@@ -176,6 +177,14 @@ def test_a_file_of_a_tribometer_becomes_a_part_of_a_job_and_a_picture(tmp_path, 
     told = [rule.source.uncertain.groups() for rule in job.rules if isinstance(rule.source, Scatter)]
     assert [*told[0]] == ["friction_memory", "transverse_damping", "correlated"]
     assert (tmp_path / "friction.png").stat().st_size > 5000
+
+
+def test_laws_have_dashes_of_their_own_which_a_print_in_grey_keeps_apart(tmp_path):
+    rows = [f"{v},{mu}" for v, mu in zip(SPEEDS, of_law(Law.STRIBECK), strict=True)]
+    (tmp_path / "rig.csv").write_text("\n".join(["speed [m/s],mu", *rows]))
+    points = read_points(tmp_path / "rig.csv")
+    measured, *laws = _figure(fit_laws(points), points).axes[0].lines
+    assert len({str(line._dash_pattern) for line in laws}) == len(laws) > 3
 
 
 @pytest.mark.parametrize(
