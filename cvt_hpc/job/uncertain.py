@@ -30,7 +30,7 @@ from cvt_hpc.parameters import Parameter, Parameters
 TABLE = "uncertain"
 BLOCK = 256  # samples evaluated together: always as many, so that a value has the same bits in every study
 MOST = 2**16
-_RESOLUTION = 2.0**-30  # of the points in the unit cube
+OUTERMOST = 2.0**-31  # least share of a sample: points in the unit cube have a resolution of twice as much
 
 # By kind the numbers that a distribution needs, and those that it may have
 KINDS: dict[str, tuple[tuple[str, ...], tuple[str, ...]]] = {
@@ -213,7 +213,7 @@ def _block(uncertain: Uncertain, number: int) -> NDArray[np.float64]:
     if number:  # the engine cannot go on by none
         engine.fast_forward(BLOCK * number)
     # in the middle of the cells of the sequence's resolution, so never at 0, where quantiles are infinite
-    shares = engine.random(BLOCK) + 0.5 * _RESOLUTION
+    shares = engine.random(BLOCK) + OUTERMOST
     keys = [one.key for one in uncertain.distributions]
     for first in range(0, sets * size, size) if uncertain.correlated else ():
         columns = [first + keys.index(key) for key in uncertain.correlated]

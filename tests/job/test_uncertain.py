@@ -181,7 +181,7 @@ class TestSamples:
             )
 
     def test_a_huge_grid_is_checked_at_the_extremes_of_its_samples(self):
-        table = {"samples": 16384, "thrust": NORMAL | {"standard_deviation": "4.5 kN"}}
+        table = {"samples": 16384, "thrust": NORMAL | {"standard_deviation": "4.5 kN", "from": 1.0}}
         with pytest.raises(InputError, match=r"load: expected at most .* N m at this thrust, found 50 N m"):
             toy(table)
 
@@ -225,7 +225,12 @@ def correlated(matrix, parameters=("thrust", "element_mass")):
         ),
         (
             {"samples": 1024, "thrust": {"distribution": "uniform", "from": "-1 kN", "to": "3 kN"}},
-            "in 25 % of the 1024 samples; limits `from` and `to` cut a distribution off",
+            "at its end, 25 % of the distribution beyond; limits `from` and `to` cut it off",
+        ),
+        # 3.1 standard deviations, which none of two samples is beyond, but one of 4096
+        (
+            {"samples": 2, "thrust": NORMAL | {"mean": "3.1 kN"}},
+            'expected > 0 kN, found "-3.02',
         ),
         (correlated([[1.0, 2.0], [2.0, 1.0]]), "matrix: expected a positive definite matrix"),
         (correlated([[1.0, 0.5], [0.4, 1.0]]), "matrix: expected a symmetric matrix, found one that is not"),
