@@ -5,7 +5,10 @@ Of all signals of a file those count that a column's name, or another name of it
 
 from __future__ import annotations
 
+import gc
 import io
+import sys
+import traceback
 import warnings
 from collections.abc import Iterator, Sequence
 from pathlib import Path
@@ -103,8 +106,9 @@ def _of_mdf(file: FromFile, content: bytes, place: str) -> Iterator[Signal]:
     except ImportError:
         then = 'pip install "cvt_hpc[mdf]"'
         raise mismatch(place, "asammdf, which reads MDF4 files", "no such package", then) from None
+    stream = io.BytesIO(content)
     try:
-        with asammdf.MDF(io.BytesIO(content)) as measured:
+        with asammdf.MDF(stream) as measured:
             known = {name: named_column(file, name) for name in measured.channels_db}
             others = [name for name, key in known.items() if key is None]
             found, calculated = [], []
@@ -118,7 +122,12 @@ def _of_mdf(file: FromFile, content: bytes, place: str) -> Iterator[Signal]:
                     times = np.asarray(one.timestamps, float)
                     found.append((name, times, np.asarray(one.samples), str(one.unit)))
     except Exception as error:  # a foreign file may raise anything in that library
-        raise mismatch(place, "an MDF4 file", str(error) or type(error).__name__) from None
+        hook, sys.unraisablehook = sys.unraisablehook, lambda _: None
+        traceback.clear_frames(error.__traceback__)
+        gc.collect()  # what is half read goes, and fails once more
+        sys.unraisablehook = hook
+        found = str(error).replace(str(stream), Path(place).name) or type(error).__name__
+        raise mismatch(place, "an MDF4 file", found) from None
     if calculated:  # a text of the file that would be evaluated
         raise mismatch(f"{place}: {calculated[0]}", "stored values, or a straight line of them", "a formula")
     yield from _over_one_time(found, place)

@@ -1,5 +1,8 @@
 """Profiles of load, speed and thrust, given and from measured files, and their verdict over time."""
 
+import gc
+import sys
+
 import numpy as np
 import pytest
 from hypothesis import given
@@ -283,17 +286,29 @@ def test_a_signal_that_means_nothing_certain_is_one_error(tmp_path, changed, fur
 
 
 @pytest.mark.parametrize(
-    "content", [b"", b"no file of theirs", bytes(2000), b"MATLAB 5.0 MAT-file" + bytes(300)]
+    "content",
+    [
+        b"",
+        b"no file of theirs",
+        bytes(2000),
+        b"MATLAB 5.0 MAT-file" + bytes(300),
+        b"MDF     4.10    " + bytes(2000),
+    ],
 )
 @pytest.mark.parametrize("suffix", [".mat", ".mf4"])
-def test_a_file_of_another_kind_is_one_error(tmp_path, suffix, content):
+def test_a_file_of_another_kind_is_one_error(tmp_path, monkeypatch, suffix, content):
+    more = []
+    monkeypatch.setattr(sys, "unraisablehook", more.append)
     if suffix == ".mf4":
         pytest.importorskip("asammdf")
     (tmp_path / f"rig{suffix}").write_bytes(content)
     document = {"name": "course", "model": "elastic_belt", "profiles": {"profile_file": f"rig{suffix}"}}
     with pytest.raises(InputError, match="profile_file: .*rig.*expected an?") as raised:
         build_job(document, str(tmp_path / "course.toml"))
-    assert "\n" not in str(raised.value)
+    assert "\n" not in str(raised.value) and "BytesIO" not in str(raised.value)
+    del raised
+    gc.collect()
+    assert not more
 
 
 def mdf_point(folder, signals, times=()):
