@@ -16,7 +16,7 @@ from pathlib import Path
 import numpy as np
 
 from cvt_hpc.errors import JobWarning, few_of, mismatch, show
-from cvt_hpc.job.csv_files import MOST_BYTES, arranged, content_of, named_column, told, unit_of
+from cvt_hpc.job.csv_files import MOST_BYTES, arranged, content_of, named_column, not_read, told, unit_of
 from cvt_hpc.job.netcdf_files import MOST_VALUES
 from cvt_hpc.job.units import factor_to
 from cvt_hpc.job.values import Point
@@ -65,8 +65,7 @@ def read_signals(file: FromFile, name: str, source: str, where: str) -> Point:
             raise mismatch(f"{place}: {key}", f"{rows} values, as others have", str(len(column.values)))
     raw = arranged(file, columns, place, lambda row: f"entry {row + 1}")
     read = ", ".join(f"{show(signal)} as {key}" for key, signal in named.items())
-    left = f"; not read: {few_of(others, _MOST_NAMED)}" if others else ""
-    warnings.warn(f"{place}: read with {read}{left}", JobWarning, stacklevel=2)
+    warnings.warn(f"{place}: read with {read}{not_read(others)}", JobWarning, stacklevel=2)
     return raw
 
 

@@ -4,6 +4,7 @@ A number without a unit that is far from usual draws a warning: rpm where rad/s 
 metres. Values of axes are shown in the unit in which the job gives them, by the attributes of a coordinate.
 """
 
+import json
 import math
 import numbers
 import re
@@ -274,6 +275,11 @@ def _bare(raw: object) -> float | None:
         return to_si(raw, "") if isinstance(raw, str) else float(raw)
     except (UnitError, OverflowError):
         return None
+
+
+def file_names(files: Mapping[str, str]) -> dict[str, str]:
+    """Return the attribute of results that names the files which give parameters, if there are any."""
+    return {JOB_FILES: json.dumps(dict(files))} if files else {}
 
 
 def si_unit(attributes: Mapping[str, object]) -> str:

@@ -154,9 +154,9 @@ def test_an_axis_takes_the_place_of_a_measured_greatest_value(tmp_path):
 def test_a_long_file_is_averaged_over_equal_parts(tmp_path):
     times = np.arange(5000) / 1e4
     rows = [f"{time:.4f},{100 + 10 * time + (-1) ** k}" for k, time in enumerate(times)]
-    point = course_job(tmp_path, "\n".join(["time [s],load [N m]", *rows]), run={"duration": "0.5 s"}).point(
-        0
-    )
+    with pytest.warns(JobWarning, match=r"rig.csv: 5000 times from 0 to 0.4999 s, averaged over 1000 parts"):
+        job = course_job(tmp_path, "\n".join(["time [s],load [N m]", *rows]), run={"duration": "0.5 s"})
+    point = job.point(0)
     at, load = np.array(point["profile_time"]), point["load"] * np.array(point["load_profile"])
     assert at.size == 1000 and max(point["load_profile"]) == 1.0  # an axis gives the greatest that is driven
     assert load == pytest.approx(100 + 10 * at, abs=0.25)  # alternating samples cancel but for one in five
@@ -251,8 +251,20 @@ def test_names_are_looked_for_above_the_numbers_and_not_all_through_a_long_log(t
     table = "time [s],load [N m]\n0,100\n1,120\n"
     found = course_job(tmp_path, 99 * "a line above\n" + table, run={"duration": 1.0})
     assert found.parameters["load"] == 120.0
-    with pytest.raises(InputError, match='line 1: expected columns among .*, found "1.5", "2"'):
+    expected = r"a line that names columns, such as time \[s\], found none among the first 10000"
+    with pytest.raises(InputError, match=expected):
         course_job(tmp_path, 20_000 * "1.5,2\n" + table)
+
+
+def test_what_a_rig_measured_beside_a_course_is_not_read(tmp_path):
+    table = "time [s];load [N m];oil temp [degC];remark\n0;100,5;80.25;cold\n0,1;120;80.5\n0,2;90;;warm\n"
+    with pytest.warns(
+        JobWarning, match='decimal commas; line 2 is .*; not read: "oil temp .degC.", "remark"'
+    ):
+        point = course_job(tmp_path, table).point(0)
+    assert point["load"] == 120.0 and point["load_profile"] == pytest.approx((100.5 / 120, 1.0, 0.75))
+    with pytest.raises(InputError, match="line 3: expected 4 columns, as in line 1, found 1"):
+        course_job(tmp_path, "time;load [N m];oil;remark\n0;1;2;3\n1\n".replace("time", "time [s]"))
 
 
 @pytest.mark.parametrize(("write", "suffix"), [(write_mat, ".mat"), (write_mdf, ".mf4")])
