@@ -125,8 +125,8 @@ def _of_mdf(file: FromFile, content: bytes, place: str) -> Iterator[Signal]:
         traceback.clear_frames(error.__traceback__)
         gc.collect()  # what is half read goes, and fails once more
         sys.unraisablehook = hook
-        found = str(error).replace(str(stream), Path(place).name) or type(error).__name__
-        raise mismatch(place, "an MDF4 file", found) from None
+        what = str(error).replace(str(stream), Path(place).name) or type(error).__name__
+        raise mismatch(place, "an MDF4 file", what) from None
     if calculated:  # a text of the file that would be evaluated
         raise mismatch(f"{place}: {calculated[0]}", "stored values, or a straight line of them", "a formula")
     yield from _over_one_time(found, place)

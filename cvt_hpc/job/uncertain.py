@@ -15,7 +15,7 @@ are those of B: none, all, or one of them (Saltelli et al. 2010). Correlated one
 
 import math
 from collections.abc import Callable, Mapping
-from dataclasses import dataclass, field, replace
+from dataclasses import dataclass, replace
 from functools import lru_cache
 from typing import NamedTuple
 
@@ -24,6 +24,7 @@ from numpy.typing import NDArray
 
 from cvt_hpc.job.axes import ALL, CORRELATED, NONE, SAMPLE, SWAPPED
 from cvt_hpc.job.schema import Schema
+from cvt_hpc.job.units import from_si
 from cvt_hpc.job.values import Document, Table, in_words
 from cvt_hpc.parameters import Parameter, Parameters
 
@@ -142,6 +143,10 @@ class Distribution(NamedTuple):
         centre, spread = math.log(mean) - 0.5 * variance, math.sqrt(variance)
         return centre, spread, np.exp, lambda value: math.log(value) if value > 0.0 else -math.inf
 
+    def in_unit(self, unit: str, wanted: str) -> "Distribution":
+        """Return the distribution with its numbers [unit] in another unit."""
+        return self._replace(numbers=tuple((name, from_si(one, unit, wanted)) for name, one in self.numbers))
+
     def in_words(self, unit: str, wanted: str) -> str:
         """State the distribution for people, in a unit that is wanted."""
         told = (f"{key.replace('_', ' ')} {in_words(value, unit, wanted)}" for key, value in self.numbers)
@@ -186,12 +191,18 @@ class Scatter:
 
     uncertain: Uncertain
     place: int
-    text: str = field(compare=False)
 
     @property
     def names(self) -> tuple[str, ...]:
         """The axes along which it varies."""
         return (SAMPLE, SWAPPED) if self.uncertain.indices else (SAMPLE,)
+
+    def in_words(self, unit: str, wanted: str) -> str:
+        """State the distribution for people, in a unit that is wanted, and what it is correlated with."""
+        one, correlated = self.uncertain.distributions[self.place], self.uncertain.correlated
+        others = ", ".join(key for key in correlated if key != one.key)
+        beside = f"; correlated with {others}" if one.key in correlated else ""
+        return one.in_words(unit, wanted) + beside
 
     def value(self, parameters: Parameters) -> float:
         """Return the value [SI] of the sample."""

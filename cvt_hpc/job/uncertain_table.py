@@ -68,11 +68,7 @@ def read_uncertain(
     rules = []
     for place, one in enumerate(left):
         parameter = replace(schema.parameters[one.key], sensible=None)
-        text = one.in_words(parameter.unit, schema.units.get(one.key, ""))
-        if one.key in correlated:
-            others = ", ".join(key for key in correlated if key != one.key)
-            text += f"; correlated with {others}"
-        rules.append(Rule(one.key, Scatter(uncertain, place, text), f"{where} {one.key}", parameter))
+        rules.append(Rule(one.key, Scatter(uncertain, place), f"{where} {one.key}", parameter))
     own = {key: parameter for key, parameter in schema.sections[TABLE].items() if key in table}
     axes: dict[str, list] = {}
     if "samples" in table:

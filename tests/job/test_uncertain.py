@@ -4,11 +4,14 @@ import json
 
 import numpy as np
 import pytest
+import xarray as xr
 from scipy import stats
 
+from cvt_hpc.analysis.held_job import job_held
 from cvt_hpc.errors import InputError, UnitWarning
 from cvt_hpc.job import build_job
 from cvt_hpc.job.definition import handed_to
+from cvt_hpc.job.summary import rules_in_words
 from cvt_hpc.job.uncertain import read_document
 
 NORMAL = {"distribution": "normal", "mean": "20 kN", "standard_deviation": "1 kN"}
@@ -276,6 +279,14 @@ def test_other_models_of_the_ladder_have_the_samples_too():
     table["judged_fraction"] = {"distribution": "uniform", "from": 0.3, "to": 0.5}
     with pytest.raises(InputError, match=r"\[uncertain\] judged_fraction: expected a key of steady_variator"):
         handed_to(build_job(document, "x.toml"), "steady_variator", "it answers")
+
+
+def test_distributions_are_told_in_the_unit_of_the_job_also_by_what_is_stored(toy):
+    job = build_job({"name": "x", "model": "toy", "uncertain": {"samples": 2, "thrust": NORMAL}})
+    dataset = xr.Dataset(attrs={"job": json.dumps(job.resolved()), "job_units": json.dumps(dict(job.units))})
+    for one in (job, job_held(dataset)):
+        ((_, _, words, _),) = rules_in_words(one, one.schema)
+        assert words == "normal, mean 20 kN, standard deviation 1 kN"
 
 
 def test_a_parameter_without_effect_is_refused():

@@ -45,7 +45,8 @@ def load(path: str | Path, overrides: Assignments = ()) -> Fit:
     replaced = split_assignments(overrides, source, "--set")
     put = take_own(replaced, TABLE)
     if TABLE not in document:
-        then = "`cvt-hpc examples fit_lebrecht` copies a job that has one"
+        then = "`cvt-hpc examples fit_lebrecht` copies a job that has one; for a measured file: "
+        then += "`cvt-hpc calibrate`, which weighs samples of [uncertain]"
         raise mismatch(where, "a table of cases and targets", "nothing", then)
     table = document.pop(TABLE)
     for key in put:
