@@ -32,6 +32,7 @@ _NUMBER = re.compile(r"[+-]?(?:\d+[.,]?\d*|[.,]\d+)(?:[eE][+-]?\d+)?", re.ASCII)
 _AMBIGUOUS = re.compile(r"[+-]?[1-9]\d{0,2}[.,]\d{3}", re.ASCII)  # a fraction, or a thousand and more
 _GROUPED = re.compile(r"[+-]?\d[\d.,' ]*", re.ASCII)
 _NUMBERED = "no column for the numbers of the rows"
+BARE = ("", "1", "-")  # units of dimensionless numbers
 _LINES = "a line of column names and lines of numbers"
 _MOST_NAMED = 8
 _PER_MINUTE = ("1/min", "u/min", "min-1", "rev/min", "r/min", "rpm", "tr/min")
@@ -100,9 +101,10 @@ def read_csv(file: FromFile, name: str, source: str, where: str) -> Point:
         *(f"{show(told)} as {c.name}" for c in columns if _plain(told := of_names[1][c.place]) != c.name),
     ]
     found = {c.name: Column(c.si, tuple(read.values[c.name])) for c in columns}
-    raw = arranged(file, found, place, lambda row: f"line {read.lines[row]}")
+    units = {c.name: c.unit for c in columns}
+    raw = arranged(file, found, place, lambda row: f"line {read.lines[row]}", units)
     if any(how) or others:
-        begun = (f"{key} {column.values[0]:g} {column.unit}".rstrip() for key, column in found.items())
+        begun = (f"{key} {_as_written(column, 0, units[key])}" for key, column in found.items())
         start = f"line {read.lines[0]} is {', '.join(begun)}"
         told = f"{place}: read with {', '.join(filter(None, how))}; {start}{not_read(others)}"
         warnings.warn(told, JobWarning, stacklevel=2)
@@ -138,8 +140,22 @@ def _read_rows(
     return _Read(lines, values, left_out, _decimal_mark(marks, separator, place))
 
 
-def arranged(file: FromFile, columns: dict[str, Column], place: str, named: Callable[[int], str]) -> Point:
+def _as_written(column: Column, row: int, unit: str) -> str:
+    """Return a value of a column in the unit that the file has for it, if any."""
+    unit = column.unit if unit in BARE else unit
+    return f"{from_si(column.values[row], column.unit, unit):g} {unit}".rstrip()
+
+
+def arranged(
+    file: FromFile,
+    columns: dict[str, Column],
+    place: str,
+    named: Callable[[int], str],
+    units: Mapping[str, str] | None = None,
+) -> Point:
     """Return the raw values that columns of a file give; an error names one of its rows, or all of it.
+
+    What it has found there is told in the file's `units` by column, by default in those of SI.
 
     Multiples of a quantity over time are those of its greatest one, also where a long file is averaged: an
     axis over the quantity gives the greatest value with which a run is driven.
@@ -147,7 +163,8 @@ def arranged(file: FromFile, columns: dict[str, Column], place: str, named: Call
     try:
         raw = file.arrange(columns)
     except RowError as error:
-        raise mismatch(f"{place}: {named(error.row)}", error.expected, error.found) from None
+        found = _found_in(error, columns, units or {})
+        raise mismatch(f"{place}: {named(error.row)}", error.expected, found) from None
     except ValueError as error:
         raise InputError(f"{place}: {error}") from None
     if len(raw.get(TIME, ())) < len(times := columns["time"].values if TIME in raw else ()):
@@ -158,6 +175,18 @@ def arranged(file: FromFile, columns: dict[str, Column], place: str, named: Call
         if (most := max(multiples, key=abs)) not in (0.0, 1.0):
             raw |= {key: raw[key] * most, f"{key}_profile": [value / most for value in multiples]}
     return raw
+
+
+def _found_in(error: RowError, columns: Mapping[str, Column], units: Mapping[str, str]) -> str:
+    """Return what an error has found in a row, with numbers of the row in the units of the file."""
+    meant: dict[str, set[str]] = {}
+    for key, column in columns.items():
+        number = f"{column.values[error.row]:g}"
+        for text in (number, f"{number} {column.unit}"):
+            meant.setdefault(text, set()).add(_as_written(column, error.row, units.get(key, "")))
+    # a number that several columns have stays as it is, if they have other units
+    parts = ((text, meant.get(text, ())) for text in error.found.split(" and "))
+    return " and ".join(min(written) if len(written) == 1 else text for text, written in parts)
 
 
 def content_of(path: Path, limit: int, place: str, what: str, suffix: str) -> bytes:

@@ -48,6 +48,7 @@ from cvt_hpc.job.values import (
     Point,
     Table,
     Units,
+    check_usual,
     expectation,
     kind_of,
     read_value,
@@ -223,6 +224,8 @@ def _contents(given: Parameters, schema: Schema, source: str) -> dict[str, Point
         read = _READERS.get(Path(name).suffix.lower(), read_csv)
         raw = read(file, name, source, where) if name else {}
         found[key] = {one: read_value(schema.parameters[one], value, where) for one, value in raw.items()}
+        for one, value in found[key].items():
+            check_usual(schema.parameters[one], value, f"{where}: {name}: {one}")
     return found
 
 

@@ -16,7 +16,16 @@ from pathlib import Path
 import numpy as np
 
 from cvt_hpc.errors import JobWarning, few_of, mismatch, show
-from cvt_hpc.job.csv_files import MOST_BYTES, arranged, content_of, named_column, not_read, told, unit_of
+from cvt_hpc.job.csv_files import (
+    BARE,
+    MOST_BYTES,
+    arranged,
+    content_of,
+    named_column,
+    not_read,
+    told,
+    unit_of,
+)
 from cvt_hpc.job.netcdf_files import MOST_VALUES
 from cvt_hpc.job.units import factor_to
 from cvt_hpc.job.values import Point
@@ -46,6 +55,7 @@ def read_signals(file: FromFile, name: str, source: str, where: str) -> Point:
     content = content_of(path, MOST_BYTES, place, f"a {suffix} file", suffix)
     columns: dict[str, Column] = {}
     others: list[str] = []
+    units: dict[str, str] = {}
     named: dict[str, str] = {}
     for signal, values, unit in (_of_mat if suffix == MAT else _of_mdf)(file, content, place):
         if (key := named_column(file, signal)) is None:
@@ -54,7 +64,8 @@ def read_signals(file: FromFile, name: str, source: str, where: str) -> Point:
             raise mismatch(place, f"one signal for {key}", f"{show(named[key])} and {show(signal)}")
         else:
             named[key] = signal
-            columns[key] = _column(file, key, signal, values, unit_of(file, key, unit), place)
+            units[key] = unit_of(file, key, unit)
+            columns[key] = _column(file, key, signal, values, units[key], place)
     for key in file.required:
         if key not in columns:
             found = f"none among {few_of(others, _MOST_NAMED)}" if others else "no signals"
@@ -63,7 +74,7 @@ def read_signals(file: FromFile, name: str, source: str, where: str) -> Point:
     for key, column in columns.items():
         if len(column.values) != rows:
             raise mismatch(f"{place}: {key}", f"{rows} values, as others have", str(len(column.values)))
-    raw = arranged(file, columns, place, lambda row: f"entry {row + 1}")
+    raw = arranged(file, columns, place, lambda row: f"entry {row + 1}", units)
     read = ", ".join(f"{show(signal)} as {key}" for key, signal in named.items())
     warnings.warn(f"{place}: read with {read}{not_read(others)}", JobWarning, stacklevel=2)
     return raw
@@ -78,7 +89,7 @@ def _column(file: FromFile, key: str, signal: str, values: np.ndarray, unit: str
     if not np.isfinite(values).all():
         raise mismatch(place, "finite numbers", "others, as where a signal is missing")
     for si in file.columns[key]:
-        bare = unit in ("", "1", "-")
+        bare = unit in BARE
         if bare == (not si) and (factor := 1.0 if bare else factor_to(unit, si)):
             return Column(si, tuple((values * float(factor)).tolist()))
     raise mismatch(place, f"the unit of {told(key, file)}", show(unit) if unit else "none")

@@ -26,6 +26,8 @@ _CUSTOMARY = {
     "m/s": ("mm/s",), "rad": ("deg",), "rad/s": ("rpm",), "s": ("ms", "us"),
 }  # fmt: skip
 
+_FAR = 100.0  # times the greatest sensible value: refused of a file
+
 _SEPARATED = re.compile(r"\s*\[?\s*[-+]?\d[\d.]*[^,;\d]*[,;]\s*[-+]?\d")
 Table = Mapping[str, Any]  # of a job file, as TOML gives it
 Document = dict[str, Any]  # a whole job, or a table of it, as TOML or JSON gives it
@@ -252,6 +254,25 @@ def warn_of_bare_numbers(parameter: Parameter, raw: object, where: str) -> None:
             then = f"write {other} if that is meant, or" if other else "if that is meant write"
             warnings.warn(f'{where}: {read}; {then} "{item} {unit}"', UnitWarning, stacklevel=2)
             return
+
+
+def check_usual(parameter: Parameter, value: object, where: str) -> None:
+    """Warn where the greatest of a file's values [SI] is outside the sensible range of a parameter.
+
+    InputError where it is far above it: no machine has that.
+    """
+    found = [abs(one) for one in _items(value) if isinstance(one, float) and math.isfinite(one)]
+    most, unit = max(found, default=0.0), parameter.unit
+    if not most or parameter.sensible is None:
+        return
+    low, high = parameter.sensible
+    customary = angle_in_words(most, unit)
+    text = in_words(most, unit) + (f" ({customary})" if customary else "")
+    if most > _FAR * high:
+        raise mismatch(where, f"at most {_FAR * high:g} {unit}, {_FAR:g} times the usual", text)
+    if not low <= most <= high:
+        read = f"{text} is far from the usual {low:g} to {high:g} {unit}"
+        warnings.warn(f"{where}: {read}; check the unit of the column", UnitWarning, stacklevel=2)
 
 
 def _items(raw: object) -> Iterator[object]:
