@@ -1,5 +1,6 @@
 """Laws of friction fitted to measured coefficients: estimates, their uncertainty, what a job takes of them."""
 
+import re
 import warnings
 
 import numpy as np
@@ -167,6 +168,13 @@ def test_a_file_of_a_tribometer_becomes_a_part_of_a_job_and_a_picture(tmp_path, 
     assert out.index("stribeck ") < out.index("linear ")
     assert 'friction_law = "stribeck"' in (tmp_path / "friction.toml").read_text()
     assert (tmp_path / "friction.png").stat().st_size > 5000
+    assert re.search(r'stribeck_velocity = .*"[\d.]+ mm/s"', (tmp_path / "friction.toml").read_text())
+    assert main(["friction", "rig.csv", "--law", "linear"]) == 0
+    assert 'friction_law = "linear"' in (tmp_path / "friction.toml").read_text()
+    capsys.readouterr()
+    assert main(["friction", "rig.csv", "--law", "stribek"]) == 2
+    (line,) = (line for line in capsys.readouterr().err.splitlines() if "warning" not in line)
+    assert "--law: unknown law that rig.csv determines; did you mean stribeck?" in line
 
 
 @pytest.mark.parametrize(
