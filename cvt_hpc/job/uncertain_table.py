@@ -1,17 +1,19 @@
 """The table [uncertain] of a job file: its distributions and their correlation, each checked in turn."""
 
 import math
+import warnings
 from collections.abc import Collection, Mapping
 from dataclasses import replace
 
 import numpy as np
 
-from cvt_hpc.errors import InputError, mismatch, show, unknown
+from cvt_hpc.errors import InputError, UnitWarning, mismatch, show, unknown
 from cvt_hpc.job.axes import ALL, NONE, SAMPLE, SWAPPED
 from cvt_hpc.job.design import SEED, check_power_of_2
 from cvt_hpc.job.rules import Rule
 from cvt_hpc.job.schema import Schema
 from cvt_hpc.job.uncertain import KINDS, MOST, OUTERMOST, TABLE, Distribution, Scatter, Uncertain
+from cvt_hpc.job.units import unit_in
 from cvt_hpc.job.values import Point, Table, in_words, kind_of, read_or_default, read_value, refuse_unknown
 from cvt_hpc.parameters import Parameter, positive
 
@@ -97,6 +99,10 @@ def _read_distribution(key: str, parameter: Parameter, raw: object, where: str) 
             is_positive = name == "standard_deviation" or (kind == "log_normal" and name == "mean")
             free = positive(1.0, parameter.unit, "") if is_positive else Parameter(0.0, parameter.unit, "")
             numbers.append((name, read_value(free, raw[name], f"{where}.{name}")))
+    if unit_in(raw.get("standard_deviation")) == "%" != unit_in(raw["mean"]):
+        told = f"{show(raw['standard_deviation'])} is {dict(numbers)['standard_deviation']:g}"
+        told = f"{where}.standard_deviation: {told}, no share of the mean"
+        warnings.warn(told, UnitWarning, stacklevel=2)
     distribution, has = Distribution(key, kind, tuple(numbers)), dict(numbers)
     if not has.get("from", -math.inf) < has.get("to", math.inf):
         raise mismatch(where, "from below to", f"{has['from']:g} and {has['to']:g}")

@@ -268,6 +268,16 @@ def test_samples_of_the_axes_and_two_sources_of_a_value_are_refused():
         toy({"samples": 8, "thrust": NORMAL}, scene={"thrust": 1e4})
 
 
+@pytest.mark.usefixtures("toy")
+def test_per_cent_of_a_mean_and_a_distribution_by_set_are_told():
+    friction = {"distribution": "normal", "mean": 0.1, "standard_deviation": "1 %", "from": 0.01}
+    document = {"name": "x", "model": "criterion", "axes": {"radial_speed": [0.1, 0.2]}}
+    with pytest.warns(UnitWarning, match='standard_deviation: "1 %" is 0.01, no share of the mean'):
+        build_job(document | {"uncertain": {"samples": 2, "kinetic_friction": friction}}, "x.toml")
+    with pytest.raises(InputError, match="--set thrust: expected one value, or uncertain.thrust for a dist"):
+        toy({"samples": 2, "element_mass": LOG_NORMAL}, 'thrust={distribution="uniform", from=1, to=2}')
+
+
 def test_other_models_of_the_ladder_have_the_samples_too():
     table = {"samples": 4, "kinetic_friction": {"distribution": "uniform", "from": 0.08, "to": 0.1}}
     document = {"name": "x", "model": "elastic_belt", "uncertain": table, "axes": {"load": [20.0, 40.0]}}
