@@ -75,7 +75,7 @@ EXPERIMENTS = {
     ),
     "fit": Experiment(
         "cvt_hpc.experiments.fit",
-        "look for the parameters that meet the targets of a job best",
+        "look for the parameters that meet the targets of a job best; for a measured file: calibrate",
         "earlier studies of the folder",
         "{}; fit.KEY replaces a number of [fit]",
     ),

@@ -10,9 +10,10 @@ import xarray as xr
 
 from cvt_hpc.analysis.figures import coordinate_unit, number
 from cvt_hpc.analysis.held_job import job_held
+from cvt_hpc.errors import one_line
 from cvt_hpc.job import Job
 from cvt_hpc.job.schema import load_schema
-from cvt_hpc.job.values import JOB_UNITS, POINT_UNITS
+from cvt_hpc.job.values import JOB_FILES, JOB_UNITS, POINT_UNITS
 from cvt_hpc.parameters import Parameter
 from cvt_hpc.storage.netcdf import attributes
 from cvt_hpc.variator.profiles import FILE, TIME, multiple
@@ -80,6 +81,14 @@ def in_words(changed: Mapping[str, str]) -> str:
 def line_of(changed: Mapping[str, str], file: str = "") -> str:
     """Return `ranges` as a line above a picture, with the file that gives them; "" where nothing changes."""
     return f"course{file and ' of '}{file}: {in_words(changed)}" if changed else ""
+
+
+def file_of(given: Mapping[str, Any]) -> str:
+    """Return the name of the file that gives the course of a run by the attributes of its history, or ""."""
+    try:
+        return one_line(str(json.loads(given.get(JOB_FILES, "{}")).get(FILE, "")))
+    except (AttributeError, TypeError, ValueError, RecursionError):
+        return ""
 
 
 def line_of_study(dataset: xr.Dataset) -> str:

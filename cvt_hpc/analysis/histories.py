@@ -198,7 +198,8 @@ def course_line(attributes: Mapping[str, Any]) -> str:
     """State the course that drives a run, but of what stands in its place."""
     changed = courses.of_history(attributes)
     told = values_of(attributes) if changed else {}
-    return courses.line_of({key: text for key, text in changed.items() if key not in told})
+    changed = {key: text for key, text in changed.items() if key not in told}
+    return courses.line_of(changed, courses.file_of(attributes))
 
 
 def place_of(attributes: Mapping[str, Any]) -> list[str]:

@@ -53,6 +53,8 @@ def add(commands: parts.Commands) -> None:
     page.add_argument("--out", type=Path, metavar="HTML", help="default: report.html beside the dataset")
     text = "write it again every so often, such as 30s, from the records of a running sweep, until that ends"
     page.add_argument("--every", metavar="TIME", help=text)
+    text = "the same every 30 s"
+    page.add_argument("--follow", dest="every", action="store_const", const="30s", help=text)
     _add_measured(page)
     text = "compare two methods or two designs, or a study with measurements, cell by cell"
     end = "; exit status 1: two methods, or computed and measured, contradict somewhere."

@@ -31,6 +31,7 @@ def add(commands: parts.Commands) -> None:
 def _simulate(arguments: argparse.Namespace) -> int:
     from cvt_hpc.job import load_job
     from cvt_hpc.job.assignments import read_assignments
+    from cvt_hpc.job.values import file_names
 
     job = load_job(arguments.path, arguments.set).with_units_of(arguments.at, "--at")
     at = read_assignments(arguments.at, job.schema, job.source, "--at")
@@ -48,7 +49,7 @@ def _simulate(arguments: argparse.Namespace) -> int:
     # files first: whoever reads the lines may close the pipe
     written: list[str] = []
     if arguments.out is not None or arguments.plot is not None:
-        dataset = run.history()  # it takes as long as a short run
+        dataset = run.history().assign_attrs(file_names(job.files))  # it takes as long as a short run
     if arguments.out is not None:
         written.append(f"history: {write_history(dataset, arguments.out)}")
     if arguments.plot is not None and dataset.sizes.get("time", 0) > 1:

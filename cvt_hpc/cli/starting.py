@@ -33,6 +33,8 @@ def add(commands: parts.Commands) -> None:
     friction = parts.add_command(commands, "friction", _friction, text, "CSV")
     text = "the part of a job (default: friction.toml in this folder; the picture beside it)"
     friction.add_argument("--out", type=Path, default=Path("friction.toml"), metavar="TOML", help=text)
+    text = "law of friction to be written, such as stribeck (default: the best)"
+    friction.add_argument("--law", metavar="NAME", help=text)
     text = "look at MPI, cores, cache, disk and Slurm of this machine, and say what to do"
     parts.add_command(commands, "doctor", _doctor, text)
     text = "print what completes commands and options in a shell"
@@ -82,7 +84,7 @@ def _friction(arguments: argparse.Namespace) -> None:
     from cvt_hpc.experiments.measured_friction import write_fit
 
     parts.check_output(arguments.out, (".toml",))
-    lines, files = write_fit(arguments.path, arguments.out)
+    lines, files = write_fit(arguments.path, arguments.out, arguments.law)
     parts.say(*lines, *(f"{what}: {path}" for what, path in files))
 
 

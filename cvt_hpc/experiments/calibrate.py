@@ -49,7 +49,7 @@ from cvt_hpc.job.values import heading, read_value
 from cvt_hpc.parameters import Parameter, positive
 from cvt_hpc.storage.files import write_rows, written_aside
 from cvt_hpc.storage.provenance import origin_lines
-from cvt_hpc.study import process_rank
+from cvt_hpc.study import check_start, process_rank
 from cvt_hpc.study.status import STALLED, find_records
 from cvt_hpc.tables import columns, number, short
 
@@ -226,6 +226,7 @@ def make(asked: Calibration, out: Path, *, fresh: bool, tell: Tell) -> Outcome:
 
     InputError if a folder holds another job, the measured file does not fit, or the system refuses a file.
     """
+    check_start(asked.job, out, fresh=fresh)  # a study of another job in the folder
     study, folder = (Sweep(STUDY, (), asked.job), out) if fresh else _study(asked.job, out)
     status = run_sweeps([study], {}, folder, fresh=fresh, tell=tell)
     if status >= STALLED or process_rank() != 0:
@@ -303,6 +304,7 @@ def _lines(asked: Calibration, found: Posterior) -> Iterator[str]:
     )
     if fault := found.fault(asked.doubt):
         yield fault
+        yield from _disagreements(found)
         return
     head = ["before: 2.5 %", "50 %", "97.5 %", "after: 2.5 %", "50 %", "97.5 %", "width"]
     rows = [["parameter", "unit", *head]]
@@ -316,7 +318,7 @@ def _lines(asked: Calibration, found: Posterior) -> Iterator[str]:
     for i, j in zip(*np.triu_indices(len(names), 1), strict=True):
         if abs(correlation[i, j]) >= ALIKE:
             yield f"not told apart: {names[i]} and {names[j]}, rank correlation {correlation[i, j]:.2f}"
-    bits = information(asked, found).where(~_measured_cells(found), -np.inf).fillna(-np.inf)
+    bits = information(asked, found).where(~_measured_cells(found)[1], -np.inf).fillna(-np.inf)
     at = {name: int(k) for name, k in bits.argmax(...).items()}
     if (most := float(bits.isel(at))) < LEAST_BIT:
         yield "no cell beyond the measured range would tell more"
@@ -326,19 +328,37 @@ def _lines(asked: Calibration, found: Posterior) -> Iterator[str]:
     yield f"measure next: {told}, which vibrates with a probability of {chance:.2f}: {most:.2f} bit"
 
 
-def _measured_cells(found: Posterior) -> xr.DataArray:
-    """Whether a cell of the grid lies in the measured range, or has an onset or a peak."""
+def _disagreements(found: Posterior) -> Iterator[str]:
+    """Yield lines that name the range where most samples contradict what was measured."""
+    noise, known = _measured_cells(found)
+    along, classes = found.dataset[found.measured.along], map_classes(found.dataset)
+    kinds = {
+        "vibrate": (OccurrenceClass.VIBRATING, known & ~noise, "silence"),
+        "are quiet": (OccurrenceClass.QUIET, noise, "noise"),
+    }
+    for told, (kind, cells, what) in kinds.items() if found.measured.kind != ONSET else ():
+        most = cells & ((classes == kind).mean(SAMPLE) > 0.5)
+        if count := int(most.sum()):
+            (of_axis,) = most.any([name for name in most.dims if name != along.name]).values.nonzero()
+            low, high = (value_text(along, k) for k in of_axis[np.argsort(along.values[of_axis])][[0, -1]])
+            yield f"most samples {told} in {count} cells from {low} to {high}, where {what} was measured"
+
+
+def _measured_cells(found: Posterior) -> tuple[xr.DataArray, xr.DataArray]:
+    """Whether noise was measured in a cell of the grid, and whether it lies in the measured range."""
     known = xr.zeros_like(found.dataset["status"].isel({SAMPLE: 0}, drop=True), bool)
-    loads = found.dataset[found.measured.along]
+    noise, loads = known, found.dataset[found.measured.along]
     for row in found.measured.rows:
-        inside = row.covers(loads.values)
+        inside = swept = row.covers(loads.values)
         if found.measured.kind == WINDOW or np.isfinite(row.swept).all():  # windows without a range: of all
-            inside = inside | within(loads.values, row.swept)
-        cells = loads.copy(data=inside)
+            swept = inside | within(loads.values, row.swept)
+        of_row = loads == loads
         for name, value in row.at.items():
-            cells = cells & (found.dataset[name] == value)
-        known = known | cells
-    return known
+            of_row = of_row & (found.dataset[name] == value)
+        noise, known = (
+            cells | of_row & loads.copy(data=own) for cells, own in ((noise, inside), (known, swept))
+        )
+    return noise, known
 
 
 def _write_table(found: Posterior, path: Path) -> Path:
@@ -366,8 +386,10 @@ def _write_part(asked: Calibration, found: Posterior, path: Path) -> Path:
     comments = {key: "as before: the file hardly tells of it" for key in keys if key not in narrowed}
     # correlation of normal scores by that of ranks
     correlation = 2.0 * np.sin(np.pi / 6.0 * found.correlation())
-    units = {key: asked.job.schema.parameters[key].unit for key in keys}
-    distributions = [narrowed.get(one.key, one) for one in found.distributions]
+    schema = asked.job.schema
+    units = {key: schema.unit_in_words(key) for key in keys}
+    told = (narrowed.get(one.key, one) for one in found.distributions)
+    distributions = [one.in_unit(schema.parameters[one.key].unit, units[one.key]) for one in told]
     lines = uncertain_lines(f"by {found.measured.name}", distributions, units, correlation, comments)
     with written_aside(path) as aside:
         aside.write_text("\n".join(lines) + "\n", encoding="utf-8")

@@ -27,9 +27,10 @@ from scipy.optimize import approx_fprime, least_squares
 
 from cvt_hpc.analysis.figures import WIDTH, draw, line_style
 from cvt_hpc.analysis.measured import Fault, read_columns
-from cvt_hpc.errors import mismatch
+from cvt_hpc.errors import mismatch, unknown
 from cvt_hpc.experiments.uncertain_lines import given, uncertain_lines
 from cvt_hpc.job.uncertain import Distribution
+from cvt_hpc.job.units import from_si
 from cvt_hpc.physics.friction import friction_coefficients, friction_law
 from cvt_hpc.physics.friction_laws import OTHER_NAMES, Law
 from cvt_hpc.storage.files import written_aside
@@ -41,6 +42,7 @@ _SCALES = 7  # speed scales at which the search begins
 LARGEST_CONDITION = 1e8  # condition of J, by columns of one size, up to which the points determine a law
 TWO_SIDED_95 = 1.96  # standard errors
 _UNITS = {"kinetic_friction": "", "friction_gradient": "s/m", "stribeck_velocity": "m/s"}
+_WRITTEN = _UNITS | {"stribeck_velocity": "mm/s"}  # as tribometers state it
 _SCALE = "stribeck_velocity"  # in x by its logarithm
 _FURTHER = (
     "# what else is uncertain belongs here, or friction alone scatters; about the defaults of most models:",
@@ -235,7 +237,8 @@ def job_lines(fitted: Fitted) -> list[str]:
     lines = ["[friction]", f'friction_law = "{fitted.law.name.lower()}"']
     if fitted.law is Law.COULOMB:
         lines.append("friction_gradient = 0")
-    certain = [f"{key} = {given(value, _UNITS[key])}" for key, value in values.items()]
+    written = ((key, from_si(value, _UNITS[key], _WRITTEN[key])) for key, value in values.items())
+    certain = [f"{key} = {given(value, _WRITTEN[key])}" for key, value in written]
     if not (deviations > 0.0).all():  # points without any scatter
         return [*lines, *certain]
     lines += ["# for the law without its uncertainty, leave the other tables out"]
@@ -251,11 +254,11 @@ def job_lines(fitted: Fitted) -> list[str]:
             deviation = mean * float(np.sqrt(np.expm1(deviation**2)))
         kind = "log_normal" if key == _SCALE else "normal"
         numbers = (("mean", mean), ("standard_deviation", deviation), *limits.get(key, ()))
-        distributions.append(Distribution(key, kind, numbers))
+        distributions.append(Distribution(key, kind, numbers).in_unit(_UNITS[key], _WRITTEN[key]))
     count = fitted.of_specimens
     what = f"scatter of {count} specimens" if count else "uncertainty of the mean law"
     correlation = fitted.covariance / np.outer(deviations, deviations)
-    head, samples, *table = uncertain_lines(what, distributions, _UNITS, correlation)
+    head, samples, *table = uncertain_lines(what, distributions, _WRITTEN, correlation)
     return [*lines, "", head, samples, *_FURTHER, *table]
 
 
@@ -286,15 +289,19 @@ def law_lines(laws: Sequence[Fitted], points: Points) -> Iterator[str]:
         yield f"from the least to the largest force the coefficient {changes}"
 
 
-def write_fit(path: Path, out: Path) -> tuple[list[str], list[tuple[str, Path]]]:
+def write_fit(path: Path, out: Path, law: str | None = None) -> tuple[list[str], list[tuple[str, Path]]]:
     """Fit all laws to a file; write a fragment of a job with the best to `out`, and a picture beside it.
 
-    Returns what was found, as lines, and what was written. InputError if the file is not legal, or the system
-    refuses to write.
+    `law` is the name of another one to be written. Returns what was found, as lines, and what was written.
+    InputError if the file is not legal, its points do not determine this law, or the system refuses to write.
     """
     points = read_points(path)
     laws = fit_laws(points)
-    text = [f"# Friction fitted to {path.name} by cvt-hpc friction", *job_lines(laws[0])]
+    fitted = {one.law.name.lower(): one for one in laws}
+    if law is not None and law not in fitted:
+        raise unknown("--law", f"law that {path} determines", law, fitted)
+    chosen = laws[0] if law is None else fitted[law]
+    text = [f"# Friction fitted to {path.name} by cvt-hpc friction", *job_lines(chosen)]
     with written_aside(out, parents=True) as aside:
         aside.write_text("\n".join(text) + "\n", encoding="utf-8")
     picture = draw(partial(_figure, laws, points), out.with_suffix(".png"))

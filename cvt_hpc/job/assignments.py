@@ -73,6 +73,9 @@ def read_axes_and_values(
     """
     axes, values = {}, {}
     for key, entry in [*_entries(assignments, schema, source, label)]:  # unknown keys are the first errors
+        if isinstance(entry.raw, Mapping) and "distribution" in entry.raw:
+            expected = f"one value, or uncertain.{key} for a distribution"
+            raise mismatch(entry.where, expected, "a distribution")
         if kind_of(entry.parameter) is not tuple and is_axis(entry.raw):
             axes[key] = entry
         else:

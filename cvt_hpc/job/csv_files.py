@@ -20,6 +20,7 @@ from cvt_hpc.job.units import factor_to, from_si
 from cvt_hpc.job.values import Point
 from cvt_hpc.parameters import Column, FromFile, RowError
 from cvt_hpc.storage.files import read_regular
+from cvt_hpc.variator.profiles import MOST_TIMES, TIME
 
 MOST_BYTES = 2**26  # of a file of any kind
 _BLOCK = 2**18  # rows that are taken apart at a time: cells take ten times the memory of their text
@@ -31,6 +32,7 @@ _NUMBER = re.compile(r"[+-]?(?:\d+[.,]?\d*|[.,]\d+)(?:[eE][+-]?\d+)?", re.ASCII)
 _AMBIGUOUS = re.compile(r"[+-]?[1-9]\d{0,2}[.,]\d{3}", re.ASCII)  # a fraction, or a thousand and more
 _GROUPED = re.compile(r"[+-]?\d[\d.,' ]*", re.ASCII)
 _NUMBERED = "no column for the numbers of the rows"
+BARE = ("", "1", "-")  # units of dimensionless numbers
 _LINES = "a line of column names and lines of numbers"
 _MOST_NAMED = 8
 _PER_MINUTE = ("1/min", "u/min", "min-1", "rev/min", "r/min", "rpm", "tr/min")
@@ -52,7 +54,8 @@ def read_csv(file: FromFile, name: str, source: str, where: str) -> Point:
 
     One line has the names of the columns, each with its unit in brackets, such as "speed [mm/s]", or with the
     units in the line below; a column without a unit is dimensionless. Empty lines, lines that begin with #,
-    and lines above the names do not count.
+    and lines above the names do not count. What else a rig measured over time beside a course is not read, as
+    a warning states; other files have columns that are known alone.
 
     Parameters
     ----------
@@ -79,13 +82,13 @@ def read_csv(file: FromFile, name: str, source: str, where: str) -> Point:
     lines = [split[n - 1] for n in numbers]
     if len(lines) < 2:
         raise mismatch(place, _LINES, "fewer lines")
-    above, separator = _find_names(file, lines)
+    above, separator = _find_names(file, lines, place)
     below = zip(numbers[above:], lines[above:], strict=True)
     cells_of = ((n, _cells(line, separator, f"{place}: line {n}")) for n, line in below)
     of_names, rows = next(cells_of), (row for row in cells_of if row[1])
     first = list(islice(rows, 1))
     of_units = first.pop() if first and _are_units(first[0][1]) else (of_names[0], [])
-    columns = _columns(file, of_names, of_units, place)
+    columns, others = _columns(file, of_names, of_units, place)
     read = _read_rows(of_names, chain(first, rows), columns, separator, place)
     how = [
         encoding,
@@ -98,11 +101,12 @@ def read_csv(file: FromFile, name: str, source: str, where: str) -> Point:
         *(f"{show(told)} as {c.name}" for c in columns if _plain(told := of_names[1][c.place]) != c.name),
     ]
     found = {c.name: Column(c.si, tuple(read.values[c.name])) for c in columns}
-    raw = arranged(file, found, place, lambda row: f"line {read.lines[row]}")
-    if any(how):
-        begun = (f"{key} {column.values[0]:g} {column.unit}".rstrip() for key, column in found.items())
+    units = {c.name: c.unit for c in columns}
+    raw = arranged(file, found, place, lambda row: f"line {read.lines[row]}", units)
+    if any(how) or others:
+        begun = (f"{key} {_as_written(column, 0, units[key])}" for key, column in found.items())
         start = f"line {read.lines[0]} is {', '.join(begun)}"
-        told = f"{place}: read with {', '.join(filter(None, how))}; {start}"
+        told = f"{place}: read with {', '.join(filter(None, how))}; {start}{not_read(others)}"
         warnings.warn(told, JobWarning, stacklevel=2)
     return raw
 
@@ -124,8 +128,8 @@ def _read_rows(
     left_out = first = ""
     while block := list(islice(rows, _BLOCK)):
         first = first or block[0][1][0]
-        left_out = _left_out(of_names, block, separator, place, len(lines), first)
-        _note_marks(block, marks)
+        left_out = _left_out(of_names, block, columns, separator, place, len(lines), first)
+        _note_marks(block, columns, marks)
         if len(marks) > 1:
             _decimal_mark(marks, separator, place)
         for column in columns:
@@ -136,8 +140,22 @@ def _read_rows(
     return _Read(lines, values, left_out, _decimal_mark(marks, separator, place))
 
 
-def arranged(file: FromFile, columns: dict[str, Column], place: str, named: Callable[[int], str]) -> Point:
+def _as_written(column: Column, row: int, unit: str) -> str:
+    """Return a value of a column in the unit that the file has for it, if any."""
+    unit = column.unit if unit in BARE else unit
+    return f"{from_si(column.values[row], column.unit, unit):g} {unit}".rstrip()
+
+
+def arranged(
+    file: FromFile,
+    columns: dict[str, Column],
+    place: str,
+    named: Callable[[int], str],
+    units: Mapping[str, str] | None = None,
+) -> Point:
     """Return the raw values that columns of a file give; an error names one of its rows, or all of it.
+
+    What it has found there is told in the file's `units` by column, by default in those of SI.
 
     Multiples of a quantity over time are those of its greatest one, also where a long file is averaged: an
     axis over the quantity gives the greatest value with which a run is driven.
@@ -145,14 +163,30 @@ def arranged(file: FromFile, columns: dict[str, Column], place: str, named: Call
     try:
         raw = file.arrange(columns)
     except RowError as error:
-        raise mismatch(f"{place}: {named(error.row)}", error.expected, error.found) from None
+        found = _found_in(error, columns, units or {})
+        raise mismatch(f"{place}: {named(error.row)}", error.expected, found) from None
     except ValueError as error:
         raise InputError(f"{place}: {error}") from None
+    if len(raw.get(TIME, ())) < len(times := columns["time"].values if TIME in raw else ()):
+        span = f"{len(times)} times from {times[0]:g} to {times[-1]:g} s"
+        warnings.warn(f"{place}: {span}, averaged over {MOST_TIMES} parts", JobWarning, stacklevel=3)
     for key in [key for key in raw if f"{key}_profile" in raw]:
         multiples = raw[f"{key}_profile"]
         if (most := max(multiples, key=abs)) not in (0.0, 1.0):
             raw |= {key: raw[key] * most, f"{key}_profile": [value / most for value in multiples]}
     return raw
+
+
+def _found_in(error: RowError, columns: Mapping[str, Column], units: Mapping[str, str]) -> str:
+    """Return what an error has found in a row, with numbers of the row in the units of the file."""
+    meant: dict[str, set[str]] = {}
+    for key, column in columns.items():
+        number = f"{column.values[error.row]:g}"
+        for text in (number, f"{number} {column.unit}"):
+            meant.setdefault(text, set()).add(_as_written(column, error.row, units.get(key, "")))
+    # a number that several columns have stays as it is, if they have other units
+    parts = ((text, meant.get(text, ())) for text in error.found.split(" and "))
+    return " and ".join(min(written) if len(written) == 1 else text for text, written in parts)
 
 
 def content_of(path: Path, limit: int, place: str, what: str, suffix: str) -> bytes:
@@ -192,22 +226,25 @@ def _cells(line: str, separator: str, place: str) -> list[str]:
     return [cell.strip() for cell in cells]
 
 
-def _find_names(file: FromFile, lines: Sequence[str]) -> tuple[int, str]:
+def _find_names(file: FromFile, lines: Sequence[str], place: str) -> tuple[int, str]:
     """Return the place of the line that names all columns that have to be there, and its separator.
 
     Where there is none, those of the line that names most of them.
     """
     most, best = -1, (0, ",")
-    for place, line in enumerate(lines[:_MOST_ABOVE]):
+    for above, line in enumerate(lines[:_MOST_ABOVE]):
         for separator in _SEPARATORS:
             try:
                 known = {named_column(file, cell) for cell in _cells(line, separator, "")}
             except InputError:
                 continue
             if known >= set(file.required):
-                return place, separator
+                return above, separator
             if len(known - {None}) > most:
-                most, best = len(known - {None}), (place, separator)
+                most, best = len(known - {None}), (above, separator)
+    if not most and len(lines) > _MOST_ABOVE:
+        found = f"none among the first {_MOST_ABOVE}"
+        raise mismatch(place, f"a line that names columns, such as {told(file.required[0], file)}", found)
     return best
 
 
@@ -235,11 +272,13 @@ def _are_units(cells: Sequence[str]) -> bool:
     return bool(others) and not any(_NUMBER.fullmatch(cell) or _GROUPED.fullmatch(cell) for cell in others)
 
 
-def _columns(file: FromFile, of_names: Row, of_units: Row, place: str) -> list[_Column]:
-    """Return the columns that have a name."""
+def _columns(file: FromFile, of_names: Row, of_units: Row, place: str) -> tuple[list[_Column], list[str]]:
+    """Return the columns that have a known name, and the other names."""
     line, names = of_names
     where, legal = f"{place}: line {line}", ", ".join(told(name, file) for name in file.columns)
-    if unknown := [cell for cell in names if cell and named_column(file, cell) is None]:
+    unknown = [cell for cell in names if cell and named_column(file, cell) is None]
+    is_log = "time" in file.required and {named_column(file, cell) for cell in names} > {None, "time"}
+    if unknown and not is_log:
         near = did_you_mean(_split(unknown[0])[0], file.columns)
         found = few_of([show(cell) for cell in unknown], _MOST_NAMED) + near
         raise mismatch(where, f"columns among {legal}", found, "name them so, or delete them")
@@ -259,7 +298,12 @@ def _columns(file: FromFile, of_names: Row, of_units: Row, place: str) -> list[_
         if name not in [column.name for column in columns]:
             found = ", ".join(column.name for column in columns)
             raise mismatch(where, f"a column {told(name, file)}", f"none among {found}")
-    return columns
+    return columns, unknown
+
+
+def not_read(others: Sequence[str]) -> str:
+    """Return the end of a warning that names columns or signals which do not count."""
+    return f"; not read: {few_of([show(name) for name in others], _MOST_NAMED)}" if others else ""
 
 
 def unit_of(file: FromFile, key: str, unit: str) -> str:
@@ -283,13 +327,24 @@ def told(name: str, file: FromFile) -> str:
     return " or ".join(f"{name} [{unit}]" if unit else name for unit in file.columns[name])
 
 
-def _left_out(of_names: Row, rows: Sequence[Row], separator: str, place: str, before: int, first: str) -> str:
+def _left_out(
+    of_names: Row,
+    rows: Sequence[Row],
+    columns: Sequence[_Column],
+    separator: str,
+    place: str,
+    before: int,
+    first: str,
+) -> str:
     """Return what is not read beside the columns; InputError if it may be anything of meaning.
 
     There are so many rows before these; `first` is the first cell of all, where a column may number the rows.
     """
     line, names = of_names
+    needed = max(column.place for column in columns) + 1
     for n, cells in rows:
+        if len(cells) >= needed:  # what is not read may be empty
+            cells += [""] * (len(names) - len(cells))
         if len(cells) != len(names):
             where, expected = f"{place}: line {n}", f"{len(names)} columns, as in line {line}"
             may_be_decimal = separator == "," and len(cells) > len(names)
@@ -319,10 +374,11 @@ class _Mark(NamedTuple):
         return f"{show(self.cell)} in line {self.line}"
 
 
-def _note_marks(rows: Sequence[Row], marks: dict[str, _Mark]) -> None:
+def _note_marks(rows: Sequence[Row], columns: Sequence[_Column], marks: dict[str, _Mark]) -> None:
     """Note the marks within numbers, "." and ",", of which a number has one."""
     for mark in ".,":
-        having = ((n, cell) for n, cells in rows for cell in cells if mark in cell)
+        read = ((n, cells[column.place]) for n, cells in rows for column in columns)
+        having = ((n, cell) for n, cell in read if mark in cell)
         for n, cell in having:
             known = marks.get(mark)
             if known and known.is_certain:

@@ -116,7 +116,7 @@ class Job(Runs):
         found = []
         for rule in self.rules:
             if along := varied[rule.key]:
-                words = rule.parameter.unit, rule.parameter.description, rule.words
+                words = rule.parameter.unit, rule.parameter.description, rule.in_words(self.units)
                 found.append(Derived(rule.key, along, *words, partial(self._values_of, rule.key, along)))
         return tuple(found)
 

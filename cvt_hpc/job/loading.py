@@ -41,13 +41,14 @@ from cvt_hpc.job.schema import Entry, Schema, load_schema
 from cvt_hpc.job.signal_files import MAT, MDF, read_signals
 from cvt_hpc.job.summary import tell_of_no_effect
 from cvt_hpc.job.uncertain import TABLE, with_samples
-from cvt_hpc.job.uncertain_table import SETTINGS, check_samples, read_uncertain
+from cvt_hpc.job.uncertain_table import SETTINGS, check_limits, read_uncertain
 from cvt_hpc.job.units import unit_in
 from cvt_hpc.job.values import (
     Document,
     Point,
     Table,
     Units,
+    check_usual,
     expectation,
     kind_of,
     read_value,
@@ -165,7 +166,8 @@ def rebuild_job(
     contents |= _contents({key: name for key, name in given.items() if key not in contents}, schema, source)
     given = _with_files(given, contents, document.get("axes", {}), schema, source)
     axes, rules = _read_axes_and_rules(document, scatters, design, gone, put_axes, given, schema, source)
-    check_samples(rules, axes)
+    if is_users:
+        check_limits(rules, schema)
     for entry in written.values():
         warn_of_bare_numbers(*entry)
     if design.get("kind") == ADAPTIVE:
@@ -222,6 +224,8 @@ def _contents(given: Parameters, schema: Schema, source: str) -> dict[str, Point
         read = _READERS.get(Path(name).suffix.lower(), read_csv)
         raw = read(file, name, source, where) if name else {}
         found[key] = {one: read_value(schema.parameters[one], value, where) for one, value in raw.items()}
+        for one, value in found[key].items():
+            check_usual(schema.parameters[one], value, f"{where}: {name}: {one}")
     return found
 
 

@@ -89,6 +89,12 @@ class Rule:
     @property
     def words(self) -> str:
         """State how it follows, for people."""
+        return self.in_words({})
+
+    def in_words(self, units: Mapping[str, str]) -> str:
+        """State how it follows, with values in the units of a job, by key, where it names one."""
+        if isinstance(self.source, Scatter):
+            return self.source.in_words(self.parameter.unit, units.get(self.key, ""))
         return self.source.text
 
     @property

@@ -5,7 +5,10 @@ Of all signals of a file those count that a column's name, or another name of it
 
 from __future__ import annotations
 
+import gc
 import io
+import sys
+import traceback
 import warnings
 from collections.abc import Iterator, Sequence
 from pathlib import Path
@@ -13,7 +16,16 @@ from pathlib import Path
 import numpy as np
 
 from cvt_hpc.errors import JobWarning, few_of, mismatch, show
-from cvt_hpc.job.csv_files import MOST_BYTES, arranged, content_of, named_column, told, unit_of
+from cvt_hpc.job.csv_files import (
+    BARE,
+    MOST_BYTES,
+    arranged,
+    content_of,
+    named_column,
+    not_read,
+    told,
+    unit_of,
+)
 from cvt_hpc.job.netcdf_files import MOST_VALUES
 from cvt_hpc.job.units import factor_to
 from cvt_hpc.job.values import Point
@@ -43,6 +55,7 @@ def read_signals(file: FromFile, name: str, source: str, where: str) -> Point:
     content = content_of(path, MOST_BYTES, place, f"a {suffix} file", suffix)
     columns: dict[str, Column] = {}
     others: list[str] = []
+    units: dict[str, str] = {}
     named: dict[str, str] = {}
     for signal, values, unit in (_of_mat if suffix == MAT else _of_mdf)(file, content, place):
         if (key := named_column(file, signal)) is None:
@@ -51,7 +64,8 @@ def read_signals(file: FromFile, name: str, source: str, where: str) -> Point:
             raise mismatch(place, f"one signal for {key}", f"{show(named[key])} and {show(signal)}")
         else:
             named[key] = signal
-            columns[key] = _column(file, key, signal, values, unit_of(file, key, unit), place)
+            units[key] = unit_of(file, key, unit)
+            columns[key] = _column(file, key, signal, values, units[key], place)
     for key in file.required:
         if key not in columns:
             found = f"none among {few_of(others, _MOST_NAMED)}" if others else "no signals"
@@ -60,10 +74,9 @@ def read_signals(file: FromFile, name: str, source: str, where: str) -> Point:
     for key, column in columns.items():
         if len(column.values) != rows:
             raise mismatch(f"{place}: {key}", f"{rows} values, as others have", str(len(column.values)))
-    raw = arranged(file, columns, place, lambda row: f"entry {row + 1}")
+    raw = arranged(file, columns, place, lambda row: f"entry {row + 1}", units)
     read = ", ".join(f"{show(signal)} as {key}" for key, signal in named.items())
-    left = f"; not read: {few_of(others, _MOST_NAMED)}" if others else ""
-    warnings.warn(f"{place}: read with {read}{left}", JobWarning, stacklevel=2)
+    warnings.warn(f"{place}: read with {read}{not_read(others)}", JobWarning, stacklevel=2)
     return raw
 
 
@@ -76,7 +89,7 @@ def _column(file: FromFile, key: str, signal: str, values: np.ndarray, unit: str
     if not np.isfinite(values).all():
         raise mismatch(place, "finite numbers", "others, as where a signal is missing")
     for si in file.columns[key]:
-        bare = unit in ("", "1", "-")
+        bare = unit in BARE
         if bare == (not si) and (factor := 1.0 if bare else factor_to(unit, si)):
             return Column(si, tuple((values * float(factor)).tolist()))
     raise mismatch(place, f"the unit of {told(key, file)}", show(unit) if unit else "none")
@@ -103,8 +116,9 @@ def _of_mdf(file: FromFile, content: bytes, place: str) -> Iterator[Signal]:
     except ImportError:
         then = 'pip install "cvt_hpc[mdf]"'
         raise mismatch(place, "asammdf, which reads MDF4 files", "no such package", then) from None
+    stream = io.BytesIO(content)
     try:
-        with asammdf.MDF(io.BytesIO(content)) as measured:
+        with asammdf.MDF(stream) as measured:
             known = {name: named_column(file, name) for name in measured.channels_db}
             others = [name for name, key in known.items() if key is None]
             found, calculated = [], []
@@ -118,7 +132,12 @@ def _of_mdf(file: FromFile, content: bytes, place: str) -> Iterator[Signal]:
                     times = np.asarray(one.timestamps, float)
                     found.append((name, times, np.asarray(one.samples), str(one.unit)))
     except Exception as error:  # a foreign file may raise anything in that library
-        raise mismatch(place, "an MDF4 file", str(error) or type(error).__name__) from None
+        hook, sys.unraisablehook = sys.unraisablehook, lambda _: None
+        traceback.clear_frames(error.__traceback__)
+        gc.collect()  # what is half read goes, and fails once more
+        sys.unraisablehook = hook
+        what = str(error).replace(str(stream), Path(place).name) or type(error).__name__
+        raise mismatch(place, "an MDF4 file", what) from None
     if calculated:  # a text of the file that would be evaluated
         raise mismatch(f"{place}: {calculated[0]}", "stored values, or a straight line of them", "a formula")
     yield from _over_one_time(found, place)

@@ -101,7 +101,7 @@ def rules_in_words(job: Job, schema: Schema) -> list[tuple[str, ...]]:
             along = f"varies with {', '.join(varied[rule.key].axes)}"
         else:
             values, along = schema.in_words(rule.key, job.parameters[rule.key]), "the same in all runs"
-        rows.append((rule.key, values, rule.words, along))
+        rows.append((rule.key, values, rule.in_words(schema.units), along))
     return rows
 
 

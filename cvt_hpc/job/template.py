@@ -212,8 +212,9 @@ def _as_toml(parameter: Parameter) -> str:
         return json.dumps(value)  # of these TOML has the same form
     if not unit or not math.isfinite(value):
         return repr(value)
-    texts = (_in_customary(value, unit), in_words(value, unit), f"{value!r} {unit}")
-    return next(f'"{text}"' for text in texts if text and to_si(text, unit) == value)
+    near, *others = _in_customary(value, unit), in_words(value, unit), f"{value!r} {unit}"
+    text = next(text for text in (near, *others) if text and to_si(text, unit) == value)
+    return f'"{text}"' if text == near or not near else f'"{text}"  # {near}'
 
 
 def _in_customary(value: float, unit: str) -> str:

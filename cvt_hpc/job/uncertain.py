@@ -15,7 +15,7 @@ are those of B: none, all, or one of them (Saltelli et al. 2010). Correlated one
 
 import math
 from collections.abc import Callable, Mapping
-from dataclasses import dataclass, field, replace
+from dataclasses import dataclass, replace
 from functools import lru_cache
 from typing import NamedTuple
 
@@ -24,13 +24,14 @@ from numpy.typing import NDArray
 
 from cvt_hpc.job.axes import ALL, CORRELATED, NONE, SAMPLE, SWAPPED
 from cvt_hpc.job.schema import Schema
+from cvt_hpc.job.units import from_si
 from cvt_hpc.job.values import Document, Table, in_words
 from cvt_hpc.parameters import Parameter, Parameters
 
 TABLE = "uncertain"
 BLOCK = 256  # samples evaluated together: always as many, so that a value has the same bits in every study
 MOST = 2**16
-_RESOLUTION = 2.0**-30  # of the points in the unit cube
+OUTERMOST = 2.0**-31  # least share of a sample: points in the unit cube have a resolution of twice as much
 
 # By kind the numbers that a distribution needs, and those that it may have
 KINDS: dict[str, tuple[tuple[str, ...], tuple[str, ...]]] = {
@@ -142,6 +143,10 @@ class Distribution(NamedTuple):
         centre, spread = math.log(mean) - 0.5 * variance, math.sqrt(variance)
         return centre, spread, np.exp, lambda value: math.log(value) if value > 0.0 else -math.inf
 
+    def in_unit(self, unit: str, wanted: str) -> "Distribution":
+        """Return the distribution with its numbers [unit] in another unit."""
+        return self._replace(numbers=tuple((name, from_si(one, unit, wanted)) for name, one in self.numbers))
+
     def in_words(self, unit: str, wanted: str) -> str:
         """State the distribution for people, in a unit that is wanted."""
         told = (f"{key.replace('_', ' ')} {in_words(value, unit, wanted)}" for key, value in self.numbers)
@@ -186,12 +191,18 @@ class Scatter:
 
     uncertain: Uncertain
     place: int
-    text: str = field(compare=False)
 
     @property
     def names(self) -> tuple[str, ...]:
         """The axes along which it varies."""
         return (SAMPLE, SWAPPED) if self.uncertain.indices else (SAMPLE,)
+
+    def in_words(self, unit: str, wanted: str) -> str:
+        """State the distribution for people, in a unit that is wanted, and what it is correlated with."""
+        one, correlated = self.uncertain.distributions[self.place], self.uncertain.correlated
+        others = ", ".join(key for key in correlated if key != one.key)
+        beside = f"; correlated with {others}" if one.key in correlated else ""
+        return one.in_words(unit, wanted) + beside
 
     def value(self, parameters: Parameters) -> float:
         """Return the value [SI] of the sample."""
@@ -213,7 +224,7 @@ def _block(uncertain: Uncertain, number: int) -> NDArray[np.float64]:
     if number:  # the engine cannot go on by none
         engine.fast_forward(BLOCK * number)
     # in the middle of the cells of the sequence's resolution, so never at 0, where quantiles are infinite
-    shares = engine.random(BLOCK) + 0.5 * _RESOLUTION
+    shares = engine.random(BLOCK) + OUTERMOST
     keys = [one.key for one in uncertain.distributions]
     for first in range(0, sets * size, size) if uncertain.correlated else ():
         columns = [first + keys.index(key) for key in uncertain.correlated]

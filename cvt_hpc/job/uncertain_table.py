@@ -1,19 +1,20 @@
 """The table [uncertain] of a job file: its distributions and their correlation, each checked in turn."""
 
 import math
+import warnings
 from collections.abc import Collection, Mapping
 from dataclasses import replace
-from operator import itemgetter
 
 import numpy as np
 
-from cvt_hpc.errors import InputError, mismatch, show, unknown
-from cvt_hpc.job.axes import ALL, NONE, SAMPLE, SWAPPED, Axis
+from cvt_hpc.errors import InputError, UnitWarning, mismatch, show, unknown
+from cvt_hpc.job.axes import ALL, NONE, SAMPLE, SWAPPED
 from cvt_hpc.job.design import SEED, check_power_of_2
 from cvt_hpc.job.rules import Rule
 from cvt_hpc.job.schema import Schema
-from cvt_hpc.job.uncertain import KINDS, MOST, TABLE, Distribution, Scatter, Uncertain
-from cvt_hpc.job.values import Point, Table, kind_of, read_or_default, read_value, refuse_unknown
+from cvt_hpc.job.uncertain import KINDS, MOST, OUTERMOST, TABLE, Distribution, Scatter, Uncertain
+from cvt_hpc.job.units import unit_in
+from cvt_hpc.job.values import Point, Table, in_words, kind_of, read_or_default, read_value, refuse_unknown
 from cvt_hpc.parameters import Parameter, positive
 
 _LEAST_SHARE = 1e-6  # of a distribution within its limits
@@ -69,11 +70,7 @@ def read_uncertain(
     rules = []
     for place, one in enumerate(left):
         parameter = replace(schema.parameters[one.key], sensible=None)
-        text = one.in_words(parameter.unit, schema.units.get(one.key, ""))
-        if one.key in correlated:
-            others = ", ".join(key for key in correlated if key != one.key)
-            text += f"; correlated with {others}"
-        rules.append(Rule(one.key, Scatter(uncertain, place, text), f"{where} {one.key}", parameter))
+        rules.append(Rule(one.key, Scatter(uncertain, place), f"{where} {one.key}", parameter))
     own = {key: parameter for key, parameter in schema.sections[TABLE].items() if key in table}
     axes: dict[str, list] = {}
     if "samples" in table:
@@ -102,6 +99,10 @@ def _read_distribution(key: str, parameter: Parameter, raw: object, where: str) 
             is_positive = name == "standard_deviation" or (kind == "log_normal" and name == "mean")
             free = positive(1.0, parameter.unit, "") if is_positive else Parameter(0.0, parameter.unit, "")
             numbers.append((name, read_value(free, raw[name], f"{where}.{name}")))
+    if unit_in(raw.get("standard_deviation")) == "%" != unit_in(raw["mean"]):
+        told = f"{show(raw['standard_deviation'])} is {dict(numbers)['standard_deviation']:g}"
+        told = f"{where}.standard_deviation: {told}, no share of the mean"
+        warnings.warn(told, UnitWarning, stacklevel=2)
     distribution, has = Distribution(key, kind, tuple(numbers)), dict(numbers)
     if not has.get("from", -math.inf) < has.get("to", math.inf):
         raise mismatch(where, "from below to", f"{has['from']:g} and {has['to']:g}")
@@ -150,27 +151,25 @@ def _read_correlation(
     return tuple(correlated[k] for k in kept), tuple(tuple(matrix[j][k] for k in kept) for j in kept)
 
 
-def check_samples(rules: Collection[Rule], axes: Collection[Axis]) -> None:
-    """Refuse distributions that give impossible values, with the share of the samples.
+def check_limits(rules: Collection[Rule], schema: Schema) -> None:
+    """Refuse distributions of which a sample may be no legal value, however many samples a study takes.
 
     Raises
     ------
     InputError
-        With the first parameter of which a sample is not legal.
+        With the first parameter whose distribution goes beyond its limits, and the share that does.
     """
-    samples = next((axis.values for axis in axes if axis.name == SAMPLE), ())
-    places = [{SAMPLE: sample, SWAPPED: which} for sample in samples for which in (NONE, ALL)]
     for rule in rules:
         if not isinstance(rule.source, Scatter):
             continue
-        refused: list[tuple[float, InputError]] = []
-        drawn = places if rule.source.uncertain.indices else places[::2]
-        for place in drawn:
+        one, limits = rule.source.uncertain.distributions[rule.source.place], rule.parameter
+        unit, wanted = limits.unit, schema.units.get(rule.key, "")
+        for end in one.quantiles(np.array([OUTERMOST, 1.0 - OUTERMOST])).tolist():
             try:
-                rule.value(place)
+                read_value(limits, in_words(end, unit, wanted), rule.where)
             except InputError as error:
-                refused.append((abs(rule.source.value(place)), error))
-        if refused:
-            _, worst = max(refused, key=itemgetter(0))
-            share = f"in {100 * len(refused) / len(drawn):.2g} % of the {len(drawn)} samples"
-            raise InputError(f"{worst} {share}; limits `from` and `to` cut a distribution off")
+                with np.errstate(divide="ignore", invalid="ignore"):  # logarithms of values that it has not
+                    below, up_to = np.nan_to_num(one.shares(np.array([limits.minimum, limits.maximum])))
+                share = f"{100.0 * (1.0 + below - up_to):.2g} % of the distribution"
+                then = f"at its end, {share} beyond; limits `from` and `to` cut it off"
+                raise InputError(f"{error} {then}") from None

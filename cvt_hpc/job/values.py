@@ -4,6 +4,7 @@ A number without a unit that is far from usual draws a warning: rpm where rad/s 
 metres. Values of axes are shown in the unit in which the job gives them, by the attributes of a coordinate.
 """
 
+import json
 import math
 import numbers
 import re
@@ -24,6 +25,8 @@ _CUSTOMARY = {
     "N/m^2": ("N/mm^2",), "kg": ("g",), "kg m^2": ("kg mm^2",), "kg/m": ("g/m",), "m": ("mm", "um"),
     "m/s": ("mm/s",), "rad": ("deg",), "rad/s": ("rpm",), "s": ("ms", "us"),
 }  # fmt: skip
+
+_FAR = 100.0  # times the greatest sensible value: refused of a file
 
 _SEPARATED = re.compile(r"\s*\[?\s*[-+]?\d[\d.]*[^,;\d]*[,;]\s*[-+]?\d")
 Table = Mapping[str, Any]  # of a job file, as TOML gives it
@@ -253,6 +256,25 @@ def warn_of_bare_numbers(parameter: Parameter, raw: object, where: str) -> None:
             return
 
 
+def check_usual(parameter: Parameter, value: object, where: str) -> None:
+    """Warn where the greatest of a file's values [SI] is outside the sensible range of a parameter.
+
+    InputError where it is far above it: no machine has that.
+    """
+    found = [abs(one) for one in _items(value) if isinstance(one, float) and math.isfinite(one)]
+    most, unit = max(found, default=0.0), parameter.unit
+    if not most or parameter.sensible is None:
+        return
+    low, high = parameter.sensible
+    customary = angle_in_words(most, unit)
+    text = in_words(most, unit) + (f" ({customary})" if customary else "")
+    if most > _FAR * high:
+        raise mismatch(where, f"at most {_FAR * high:g} {unit}, {_FAR:g} times the usual", text)
+    if not low <= most <= high:
+        read = f"{text} is far from the usual {low:g} to {high:g} {unit}"
+        warnings.warn(f"{where}: {read}; check the unit of the column", UnitWarning, stacklevel=2)
+
+
 def _items(raw: object) -> Iterator[object]:
     """Yield the values of a list, an array, a range or a distribution, at any depth."""
     if isinstance(raw, Mapping):
@@ -274,6 +296,11 @@ def _bare(raw: object) -> float | None:
         return to_si(raw, "") if isinstance(raw, str) else float(raw)
     except (UnitError, OverflowError):
         return None
+
+
+def file_names(files: Mapping[str, str]) -> dict[str, str]:
+    """Return the attribute of results that names the files which give parameters, if there are any."""
+    return {JOB_FILES: json.dumps(dict(files))} if files else {}
 
 
 def si_unit(attributes: Mapping[str, object]) -> str:

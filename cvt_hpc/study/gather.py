@@ -22,7 +22,7 @@ from typing import TYPE_CHECKING, Any
 import numpy as np
 
 from cvt_hpc.errors import InputError, mismatch
-from cvt_hpc.job.values import JOB_FILES, JOB_UNITS, Document
+from cvt_hpc.job.values import JOB_UNITS, Document, file_names
 from cvt_hpc.storage.files import discard, kind_of, naming_refusals, written_aside
 from cvt_hpc.storage.locks import locked
 from cvt_hpc.storage.netcdf import global_attributes, open_netcdf, refuse_beside_sweep, variable_attributes
@@ -275,7 +275,7 @@ def _global_attributes(records: Records) -> dict[str, str]:
     model = study.job.get("model", "")
     found = global_attributes(study, study.job, f"model {model}", makers=made, earlier=lines)
     found |= {"job_fingerprint": study.fingerprint, JOB_UNITS: json.dumps(dict(study.units))}
-    return found | ({JOB_FILES: json.dumps(dict(study.files))} if study.files else {})
+    return found | file_names(study.files)
 
 
 def chunk_shape(study: Study, name: str) -> tuple[int, ...]:

@@ -18,7 +18,7 @@ from numpy.typing import NDArray
 
 from cvt_hpc.errors import mismatch, show
 from cvt_hpc.job import Job
-from cvt_hpc.job.values import Point
+from cvt_hpc.job.values import Point, file_names
 from cvt_hpc.study.batches import Batch, Turns
 from cvt_hpc.study.description import Study
 from cvt_hpc.study.forecast.cost_model import Fit, fit_recorded
@@ -169,7 +169,8 @@ class Task:
             else:
                 found, histories = self.simulator.run_points(self.job, points, watch, more), {}
             records = [(index, self._pack(values)) for index, values in zip(runs, found, strict=True)]
-            named = [(runs[place], history) for place, history in histories.items()]
+            files = file_names(self.job.files)
+            named = [(runs[place], one.assign_attrs(files)) for place, one in histories.items()]
             return Result(records, watch.elapsed(), named), None
         except self.simulator.Interrupted:
             if not watch.is_over:

@@ -255,6 +255,9 @@ def test_the_title_has_the_ranges_of_a_course_and_no_value_as_if_it_were_constan
     thrusts = " to ".join(f"{1e-3 * (area * pressure + 4e3):.4g}" for pressure in (1e6, 2e6))
     told = f"thrust {thrusts} kN course: driven pressure 1 to 2 MPa"  # the thrust follows
     assert told in " ".join(title.replace("\u00a0", " ").split())
+    for files, told in (('{"profile_file": "rig.csv"}', "course of rig.csv: load"), ("[", "course: load")):
+        title = history_figure(driven({}).assign_attrs(job_files=files)).get_suptitle()
+        assert told in title.replace("\u00a0", " ")
 
 
 @pytest.mark.parametrize("broken", [{"load_profile": [1.0]}, {"thrust": "a"}, {"profile_time": 3}])

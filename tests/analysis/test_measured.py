@@ -215,7 +215,8 @@ def test_units_are_those_of_the_file_and_rows_elsewhere_are_left_out(write):
         ((f"{WINDOWS},sheave_stifness", "1,2,1"), 'found "sheave_stifness"; did you mean sheave_stiffness?'),
         (("load_from [N m]", "1"), r"line 1: expected a column load_to [N m], found none among load_from"),
         (("load_from [kN],load_to [kN]", "1,2"), 'expected load_from [N m], found "load_from [kN]"'),
-        ((WINDOWS, "2,1"), "line 2: expected load_from of at most load_to, found 2 and 1"),
+        ((WINDOWS, "2,1"), "line 2: expected load_from of at most load_to, found 2 N m and 1 N m"),
+        (("load_from [kN m],load_to [kN m]", "0.09,0.03"), "found 0.09 kN m and 0.03 kN m"),
         ((WINDOWS, "1,2", "1,two"), 'line 3, load_to: expected a number such as 1500 or 0.13, found "two"'),
         (
             (WINDOWS + ",frequency_from [Hz]", "1,2,3"),

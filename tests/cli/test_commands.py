@@ -45,6 +45,7 @@ def test_run_status_gather_and_map_of_one_study(write_job, call, tmp_path):
         [],
     )
     assert call("report", "out/x", "--every", "1s") == (0, ["report: out/x/report.html"], [])
+    assert call("report", "out/x", "--follow") == (0, ["report: out/x/report.html"], [])
     assert "(finished" in (tmp_path / "out/x/report.html").read_text()
     status, _, told = call("report", "out/x", "--every", "soon")
     assert status == 2 and told[0].startswith("cvt-hpc: --every: expected")

@@ -1,7 +1,9 @@
 """Uncertain parameters told by measured noise: hidden ones are found, and a study is calibrated by command."""
 
 import csv
+import re
 import shutil
+from pathlib import Path
 
 import numpy as np
 import pytest
@@ -9,7 +11,7 @@ import xarray as xr
 
 from cvt_hpc.cli import main
 from cvt_hpc.errors import InputError
-from cvt_hpc.experiments.calibrate import Posterior, information, load, weigh
+from cvt_hpc.experiments.calibrate import Posterior, _lines, information, load, weigh
 from cvt_hpc.experiments.uncertain_lines import nearest_distribution
 from cvt_hpc.job import load_job
 from cvt_hpc.job.uncertain import Distribution
@@ -205,7 +207,8 @@ def test_a_study_is_run_and_calibrated_by_one_command(tmp_path, capsys, monkeypa
         rows = list(csv.DictReader(line for line in lines if not line.startswith("#")))
     assert len(rows) == 32 and sum(float(row["weight"]) for row in rows) == pytest.approx(1.0)
     assert (folder / "calibrated.png").stat().st_size > 5000
-    # the part that is written goes on as a job, about what was found
+    # the part that is written goes on as a job, about what was found, in the units of that
+    assert re.search(r'stribeck_velocity = .* "[\d.]+ mm/s"', (folder / "calibrated.toml").read_text())
     text = CRITERION[: CRITERION.index("[uncertain]")] + (folder / "calibrated.toml").read_text()
     (tmp_path / "z.toml").write_text(text)
     job, weights = load_job(tmp_path / "z.toml"), np.array([float(row["weight"]) for row in rows])
@@ -238,8 +241,13 @@ def test_runs_that_are_there_are_weighed_and_what_is_left_of_them_is_done(tmp_pa
     assert main(command) == 0 and int(find_records(out / "samples", job).recorded.sum()) < job.size
     assert {path: path.stat().st_mtime_ns for path in (out / "records").rglob("*")} == before
     shutil.rmtree(out / "samples")
-    # others, and what --fresh repeats, have a folder of their own
-    assert main([*command, "--set", "uncertain.seed=2"]) == 0 and (out / "samples").exists()
+    # what --fresh repeats has a folder of its own; that of another job is refused, as by `run`
+    capsys.readouterr()
+    others = [*command, "--set", "uncertain.seed=2"]
+    assert main(others) == 2 and not (out / "samples").exists()
+    (line,) = capsys.readouterr().err.splitlines()
+    assert f"{Path('out/y')}: expected the folder of this job, found that of another" in line
+    assert main([*others, "--fresh"]) == 0 and (out / "samples").exists()
     assert {path: path.stat().st_mtime_ns for path in (out / "records").rglob("*")} == before
 
 
@@ -252,6 +260,18 @@ def test_too_few_samples_that_agree_are_no_result(study, tmp_path):
     asked = asked_by(study, tmp_path, ONSET)
     assert "effective samples, too few" in weigh(asked, few).fault(asked.doubt)
     assert weigh(asked, dataset.isel(sample=[0])).fault(asked.doubt)
+
+
+def test_the_range_is_named_in_which_most_samples_disagree(study, tmp_path):
+    """Noise of 60 to 200 mm/s, and only there: samples vibrate from 60 to 180 at least, and below 60 never."""
+    rig = f"{WINDOW}\n30,115,20,200\n"
+    asked = asked_by(study, tmp_path, rig)
+    _, fault, *lines = _lines(asked, weigh(asked, study[1]))
+    assert fault.startswith("no sample agrees")
+    assert lines == [
+        "most samples vibrate in 7 cells from 120 mm/s to 180 mm/s, where silence was measured",
+        "most samples are quiet in 6 cells from 30 mm/s to 80 mm/s, where noise was measured",
+    ]
 
 
 def test_samples_without_verdicts_are_no_candidates(study, tmp_path):

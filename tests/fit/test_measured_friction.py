@@ -177,6 +177,13 @@ def test_a_file_of_a_tribometer_becomes_a_part_of_a_job_and_a_picture(tmp_path, 
     told = [rule.source.uncertain.groups() for rule in job.rules if isinstance(rule.source, Scatter)]
     assert [*told[0]] == ["friction_memory", "transverse_damping", "correlated"]
     assert (tmp_path / "friction.png").stat().st_size > 5000
+    assert re.search(r'stribeck_velocity = .*"[\d.]+ mm/s"', (tmp_path / "friction.toml").read_text())
+    assert main(["friction", "rig.csv", "--law", "linear"]) == 0
+    assert 'friction_law = "linear"' in (tmp_path / "friction.toml").read_text()
+    capsys.readouterr()
+    assert main(["friction", "rig.csv", "--law", "stribek"]) == 2
+    (line,) = (line for line in capsys.readouterr().err.splitlines() if "warning" not in line)
+    assert "--law: unknown law that rig.csv determines; did you mean stribeck?" in line
 
 
 def test_laws_have_dashes_of_their_own_which_a_print_in_grey_keeps_apart(tmp_path):

@@ -111,7 +111,7 @@ def test_an_override_of_either_kind_counts(write):
         ("0.12", "1e999", 'line 4, mu: expected a finite number, found "1e999"'),
         ("0.12", "-1", "line 4: expected a coefficient of friction > 0, found -1"),
         ("0.12", "0.12, 3", "line 4: expected 3 columns, as in line 2, found 4"),
-        ("200, 50", "-200, 50", "line 7: expected a force of 0 or more (a magnitude), found -200000"),
+        ("200, 50", "-200, 50", "line 7: expected a force of 0 or more (a magnitude), found -200 kN/m"),
         ("100, 0,", "200, 0,", "line 6: expected one coefficient for each force and speed, such as the mean of repeated measurements, found a second one for these"),
         ("200, 50, 0.09", "", "expected a coefficient for each force and speed, found none for force 200000 N/m and speed 0.05 m/s"),
         (PER_LENGTH, "# nothing\n", "expected a line of column names and lines of numbers, found fewer lines"),
@@ -342,7 +342,7 @@ def test_how_a_file_was_read_is_told_once_with_its_first_row(write):
     assert told.endswith(
         "mu.csv: read with UTF-16 letters, names in line 4, units in line 5, semicolons between columns, empty "
         'columns, no column for the numbers of the rows, decimal commas, "sliding speed" as speed, "COF" as mu; '
-        "line 6 is speed 0 m/s, mu 0.13"
+        "line 6 is speed 0 mm/sec, mu 0.13"
     )
     assert job.parameters["table_speed"] == (0.0, 0.05) and job.parameters["table_mu"][0] == (0.13, 0.1)
     with warnings.catch_warnings():

@@ -4,11 +4,14 @@ import json
 
 import numpy as np
 import pytest
+import xarray as xr
 from scipy import stats
 
+from cvt_hpc.analysis.held_job import job_held
 from cvt_hpc.errors import InputError, UnitWarning
 from cvt_hpc.job import build_job
 from cvt_hpc.job.definition import handed_to
+from cvt_hpc.job.summary import rules_in_words
 from cvt_hpc.job.uncertain import read_document
 
 NORMAL = {"distribution": "normal", "mean": "20 kN", "standard_deviation": "1 kN"}
@@ -181,7 +184,7 @@ class TestSamples:
             )
 
     def test_a_huge_grid_is_checked_at_the_extremes_of_its_samples(self):
-        table = {"samples": 16384, "thrust": NORMAL | {"standard_deviation": "4.5 kN"}}
+        table = {"samples": 16384, "thrust": NORMAL | {"standard_deviation": "4.5 kN", "from": 1.0}}
         with pytest.raises(InputError, match=r"load: expected at most .* N m at this thrust, found 50 N m"):
             toy(table)
 
@@ -225,7 +228,12 @@ def correlated(matrix, parameters=("thrust", "element_mass")):
         ),
         (
             {"samples": 1024, "thrust": {"distribution": "uniform", "from": "-1 kN", "to": "3 kN"}},
-            "in 25 % of the 1024 samples; limits `from` and `to` cut a distribution off",
+            "at its end, 25 % of the distribution beyond; limits `from` and `to` cut it off",
+        ),
+        # 3.1 standard deviations, which none of two samples is beyond, but one of 4096
+        (
+            {"samples": 2, "thrust": NORMAL | {"mean": "3.1 kN"}},
+            'expected > 0 kN, found "-3.02',
         ),
         (correlated([[1.0, 2.0], [2.0, 1.0]]), "matrix: expected a positive definite matrix"),
         (correlated([[1.0, 0.5], [0.4, 1.0]]), "matrix: expected a symmetric matrix, found one that is not"),
@@ -260,6 +268,16 @@ def test_samples_of_the_axes_and_two_sources_of_a_value_are_refused():
         toy({"samples": 8, "thrust": NORMAL}, scene={"thrust": 1e4})
 
 
+@pytest.mark.usefixtures("toy")
+def test_per_cent_of_a_mean_and_a_distribution_by_set_are_told():
+    friction = {"distribution": "normal", "mean": 0.1, "standard_deviation": "1 %", "from": 0.01}
+    document = {"name": "x", "model": "criterion", "axes": {"radial_speed": [0.1, 0.2]}}
+    with pytest.warns(UnitWarning, match='standard_deviation: "1 %" is 0.01, no share of the mean'):
+        build_job(document | {"uncertain": {"samples": 2, "kinetic_friction": friction}}, "x.toml")
+    with pytest.raises(InputError, match="--set thrust: expected one value, or uncertain.thrust for a dist"):
+        toy({"samples": 2, "element_mass": LOG_NORMAL}, 'thrust={distribution="uniform", from=1, to=2}')
+
+
 def test_other_models_of_the_ladder_have_the_samples_too():
     table = {"samples": 4, "kinetic_friction": {"distribution": "uniform", "from": 0.08, "to": 0.1}}
     document = {"name": "x", "model": "elastic_belt", "uncertain": table, "axes": {"load": [20.0, 40.0]}}
@@ -271,6 +289,14 @@ def test_other_models_of_the_ladder_have_the_samples_too():
     table["judged_fraction"] = {"distribution": "uniform", "from": 0.3, "to": 0.5}
     with pytest.raises(InputError, match=r"\[uncertain\] judged_fraction: expected a key of steady_variator"):
         handed_to(build_job(document, "x.toml"), "steady_variator", "it answers")
+
+
+def test_distributions_are_told_in_the_unit_of_the_job_also_by_what_is_stored(toy):
+    job = build_job({"name": "x", "model": "toy", "uncertain": {"samples": 2, "thrust": NORMAL}})
+    dataset = xr.Dataset(attrs={"job": json.dumps(job.resolved()), "job_units": json.dumps(dict(job.units))})
+    for one in (job, job_held(dataset)):
+        ((_, _, words, _),) = rules_in_words(one, one.schema)
+        assert words == "normal, mean 20 kN, standard deviation 1 kN"
 
 
 def test_a_parameter_without_effect_is_refused():

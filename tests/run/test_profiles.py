@@ -1,11 +1,14 @@
 """Profiles of load, speed and thrust, given and from measured files, and their verdict over time."""
 
+import gc
+import sys
+
 import numpy as np
 import pytest
 from hypothesis import given
 from hypothesis import strategies as st
 
-from cvt_hpc.errors import InputError, JobWarning
+from cvt_hpc.errors import InputError, JobWarning, UnitWarning
 from cvt_hpc.experiments import growth
 from cvt_hpc.job import build_job
 from cvt_hpc.models.elastic_belt.grouping import lane_key
@@ -129,7 +132,8 @@ def course_job(folder, text, name="rig.csv", model="elastic_belt", **tables):
     "model", ["elastic_belt", "auto", "quasi_static_belt", "pushbelt", "spatial_pushbelt"]
 )
 def test_a_measured_file_gives_profiles_and_what_they_multiply(tmp_path, model):
-    with pytest.warns(JobWarning, match='"torque .N m." as load'):
+    told = '"torque .N m." as load.*; line 2 is time 2 s, load 40 N m, driving_speed 2900 rpm, thrust 45 kN'
+    with pytest.warns(JobWarning, match=told):
         job = course_job(tmp_path, RIG, model=model)
     assert job.files == {"profile_file": "rig.csv"}
     point = job.point(0)
@@ -151,12 +155,19 @@ def test_an_axis_takes_the_place_of_a_measured_greatest_value(tmp_path):
 def test_a_long_file_is_averaged_over_equal_parts(tmp_path):
     times = np.arange(5000) / 1e4
     rows = [f"{time:.4f},{100 + 10 * time + (-1) ** k}" for k, time in enumerate(times)]
-    point = course_job(tmp_path, "\n".join(["time [s],load [N m]", *rows]), run={"duration": "0.5 s"}).point(
-        0
-    )
+    with pytest.warns(JobWarning, match=r"rig.csv: 5000 times from 0 to 0.4999 s, averaged over 1000 parts"):
+        job = course_job(tmp_path, "\n".join(["time [s],load [N m]", *rows]), run={"duration": "0.5 s"})
+    point = job.point(0)
     at, load = np.array(point["profile_time"]), point["load"] * np.array(point["load_profile"])
     assert at.size == 1000 and max(point["load_profile"]) == 1.0  # an axis gives the greatest that is driven
     assert load == pytest.approx(100 + 10 * at, abs=0.25)  # alternating samples cancel but for one in five
+
+
+def test_what_no_rig_measures_is_told(tmp_path):
+    table = "time [s],load [N m]\n0,10\n0.1,3000\n"
+    told = "rig.csv: load: 3000 N m is far from the usual 0.5 to 2000 N m; check the unit of the column"
+    with pytest.warns(UnitWarning, match=told):
+        course_job(tmp_path, table)
 
 
 SAMPLED = "\n".join(["time [s],load [N m]", *(f"{k / 100 + (k > 25)},{80 + k % 3}" for k in range(40))])
@@ -170,7 +181,13 @@ SAMPLED = "\n".join(["time [s],load [N m]", *(f"{k / 100 + (k > 25)},{80 + k % 3
         ("time [s],load [N m]\n0,1\n1,2\n0.5,3\n", "line 4: expected a time after 1 s, .* found 0.5 s"),
         (SAMPLED, "line 28: expected samples every 0.01 s without a gap, found none from 0.25"),
         ("time [s],load [N m]\n0,1\n9,2\n", "duration: expected 9 s or more, the end of profile_time"),
-        ("time [s],thrust [kN]\n0,50\n0.1,-1\n", "line 3: expected a thrust above 0, found -1000 N"),
+        ("time [s],thrust [kN]\n0,50\n0.1,-1\n", "line 3: expected a thrust above 0, found -1 kN"),
+        ("time [s],speed [rpm]\n0,2900\n0.1,-2950\n", "a driving_speed above 0, found -2950 rpm"),
+        (
+            "time [s],load [N m]\n0,1\n1,1e9\n",
+            "profile_file: rig.csv: load: expected at most 200000 N m, .*, found 1000000000 N m",
+        ),
+        ("time [s],speed [rpm]\n0,1\n1,2900000\n", r"at most 80000 rad/s, .*, found .* \(2.9e\+06 rpm\)"),
         ("time [s],load [rpm]\n0,1\n1,2\n", "line 1: expected load .N m., found"),
         ("time [s],grip [N]\n0,1\n1,2\n", "expected columns among time"),
         ("time [s],load [N m]\n0,1\n1,\n", "line 3"),
@@ -248,8 +265,21 @@ def test_names_are_looked_for_above_the_numbers_and_not_all_through_a_long_log(t
     table = "time [s],load [N m]\n0,100\n1,120\n"
     found = course_job(tmp_path, 99 * "a line above\n" + table, run={"duration": 1.0})
     assert found.parameters["load"] == 120.0
-    with pytest.raises(InputError, match='line 1: expected columns among .*, found "1.5", "2"'):
+    expected = r"a line that names columns, such as time \[s\], found none among the first 10000"
+    with pytest.raises(InputError, match=expected):
         course_job(tmp_path, 20_000 * "1.5,2\n" + table)
+
+
+def test_what_a_rig_measured_beside_a_course_is_not_read(tmp_path):
+    table = "time [s];load [N m];oil temp [degC];remark\n0;100,5;80.25;cold\n0,1;120;80.5\n0,2;90;;warm\n"
+    with pytest.warns(
+        JobWarning,
+        match='decimal commas; line 2 is time 0 s, load 100.5 N m; not read: "oil temp .degC.", "remark"',
+    ):
+        point = course_job(tmp_path, table).point(0)
+    assert point["load"] == 120.0 and point["load_profile"] == pytest.approx((100.5 / 120, 1.0, 0.75))
+    with pytest.raises(InputError, match="line 3: expected 4 columns, as in line 1, found 1"):
+        course_job(tmp_path, "time;load [N m];oil;remark\n0;1;2;3\n1\n".replace("time", "time [s]"))
 
 
 @pytest.mark.parametrize(("write", "suffix"), [(write_mat, ".mat"), (write_mdf, ".mf4")])
@@ -283,17 +313,29 @@ def test_a_signal_that_means_nothing_certain_is_one_error(tmp_path, changed, fur
 
 
 @pytest.mark.parametrize(
-    "content", [b"", b"no file of theirs", bytes(2000), b"MATLAB 5.0 MAT-file" + bytes(300)]
+    "content",
+    [
+        b"",
+        b"no file of theirs",
+        bytes(2000),
+        b"MATLAB 5.0 MAT-file" + bytes(300),
+        b"MDF     4.10    " + bytes(2000),
+    ],
 )
 @pytest.mark.parametrize("suffix", [".mat", ".mf4"])
-def test_a_file_of_another_kind_is_one_error(tmp_path, suffix, content):
+def test_a_file_of_another_kind_is_one_error(tmp_path, monkeypatch, suffix, content):
+    more = []
+    monkeypatch.setattr(sys, "unraisablehook", more.append)
     if suffix == ".mf4":
         pytest.importorskip("asammdf")
     (tmp_path / f"rig{suffix}").write_bytes(content)
     document = {"name": "course", "model": "elastic_belt", "profiles": {"profile_file": f"rig{suffix}"}}
     with pytest.raises(InputError, match="profile_file: .*rig.*expected an?") as raised:
         build_job(document, str(tmp_path / "course.toml"))
-    assert "\n" not in str(raised.value)
+    assert "\n" not in str(raised.value) and "BytesIO" not in str(raised.value)
+    del raised
+    gc.collect()
+    assert not more
 
 
 def mdf_point(folder, signals, times=()):

@@ -40,6 +40,12 @@ def test_chosen_runs_leave_their_history_and_are_done_once(tmp_path):
     assert sum(path.read_bytes().count(RECORD) for path in (tmp_path / "records").iterdir()) == RUNS
 
 
+def test_a_history_names_the_files_that_give_parameters(tmp_path):
+    sweep(tmp_path, (5,), files={"profile_file": "rig.csv"})
+    with xr.open_dataset(StudyFolder(tmp_path).history(5)) as history:
+        assert history.attrs["job_files"] == '{"profile_file": "rig.csv"}'
+
+
 def test_no_history_where_none_is_asked_for(tmp_path):
     sweep(tmp_path, ())
     assert not (tmp_path / "histories").exists()
