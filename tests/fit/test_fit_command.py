@@ -264,12 +264,6 @@ def test_a_start_gives_what_the_job_does_not(tmp_path):
         load(tmp_path / "x.toml")
 
 
-def test_a_job_without_targets_leads_to_the_command_for_a_measured_file(tmp_path):
-    (tmp_path / "x.toml").write_text(JOB[: JOB.index("[fit]")])
-    with pytest.raises(InputError, match=r"\[fit\]: "):
-        load(tmp_path / "x.toml")
-
-
 @pytest.mark.parametrize(
     ("old", "new", "message"),
     [
