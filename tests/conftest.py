@@ -17,9 +17,6 @@ from cvt_hpc.parameters import Parameter
 os.environ.setdefault("OMP_NUM_THREADS", "1")
 threadpool_limits(1)
 
-# Until all tests are collected nothing becomes garbage: searches for it would take a third of that time.
-gc.disable()
-
 # No test depends on the clock: a busy machine, or the first loading of pint, takes longer than an example may.
 settings.register_profile(
     "untimed", parent=settings(), deadline=None, suppress_health_check=[HealthCheck.too_slow]
@@ -91,6 +88,12 @@ def pytest_collection_modifyitems(items):
     """
     slow = {item.path for item in items if item.get_closest_marker("slow")}
     items.sort(key=lambda item: (item.path.parent.name != "slurm", item.path not in slow, item.path))
+
+
+@pytest.hookimpl(tryfirst=True)
+def pytest_collection():
+    """Until all tests are collected nothing becomes garbage: searches for it would take a third of that time."""
+    gc.disable()
 
 
 def pytest_collection_finish():

@@ -185,8 +185,8 @@ def probability_sentences(dataset: xr.Dataset, told: xr.Dataset, x: str) -> Iter
     if (more := len(moving) - MOST_SURE) > 0:
         yield f"In {counted(more, 'more line')} along {in_words(told[x])} samples vibrate."
     if quiet := len(lines) - len(moving):
-        along = f" in {quiet} of {len(lines)} lines along {in_words(told[x])}" if others else ""
-        yield f"No sample is known to vibrate{along}."
+        where = f" in {quiet} of {len(lines)} lines along {in_words(told[x])}" if others else ""
+        yield f"No sample is known to vibrate{where}."
     if "total_order" in told:
         yield from _owed(told)
     if along:

@@ -375,6 +375,9 @@ def test_the_onset_lies_along_the_axis_on_which_verdicts_change(tmp_path):
     text = report(dataset, tmp_path)
     assert text.count("the probability of vibration passes 10 % at") == 3
     assert "falls below 90 % at 0.0248 kN, 50 % at 0.028 kN, 10 % at 0.0312 kN of radial speed" in text
+    runs[:, 0] = Q
+    text = report(study(runs, radial_speed=np.arange(40.0), contact_force=[1.0, 2.0, 3.0]), tmp_path)
+    assert "No sample is known to vibrate in 1 of 3 lines along radial speed." in text
 
 
 def report(dataset, folder):
