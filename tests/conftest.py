@@ -90,12 +90,6 @@ def pytest_collection_modifyitems(items):
     items.sort(key=lambda item: (item.path.parent.name != "slurm", item.path not in slow, item.path))
 
 
-@pytest.hookimpl(tryfirst=True)
-def pytest_collection():
-    """Until all tests are collected nothing becomes garbage: searches for it would take a third of that time."""
-    gc.disable()
-
-
 def pytest_collection_finish():
     """Leave what the collected tests hold out of later searches for garbage: it stays to the end.
 
@@ -103,7 +97,6 @@ def pytest_collection_finish():
     """
     gc.collect()
     gc.freeze()
-    gc.enable()
     gc.set_threshold(7000, 10, 10)
 
 
