@@ -89,8 +89,6 @@ def sobol_indices(values: xr.DataArray, along: str = "") -> xr.Dataset:
     for k, order in enumerate(("first_order", "total_order")):
         for end, (suffix, words) in enumerate(_ENDS.items()):
             told = {"units": "1", "comment": f"Sobol index of {order.replace('_', ' ')}: {words}"}
-            told[WITHOUT] = f"less than {_LEAST_KNOWN:.0%} of the samples count, or all are alike".replace(
-                "%", " %"
-            )
+            told[WITHOUT] = f"less than {100.0 * _LEAST_KNOWN:g} % of the samples count, or all are alike"
             dataset[order + suffix] = (*dims, "parameter"), found[..., end, k, :], told
     return dataset

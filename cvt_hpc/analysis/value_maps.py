@@ -39,11 +39,8 @@ HIGHEST, LEAST = 3.6, 0.8  # [inch], of a panel's cells
 AROUND = 1.5  # [inch]: labels beside a panel's cells
 ISOLINE_INK = "#b3003b"  # over the colours of a map, light and dark
 ISOLINE_STYLES = ("--", "-", "-.")
-NEGATIVE, UNSURE, INK = (
-    "---",
-    "xx",
-    "#5a5a5a",
-)  # lines over cells below zero without numbers, and those less known
+NEGATIVE = "---"  # lines over cells below zero that hold no numbers
+UNSURE, INK = "xx", "#5a5a5a"  # lines over cells that are hardly known, and the colour of both
 WIDE = 0.5  # of a probability or an index: with a wider interval next to nothing is known
 HATCH = cells.STYLES[OccurrenceClass.SLIPPING].hatch
 EQUAL = 1e-6  # of a quantity: what differs less is the same

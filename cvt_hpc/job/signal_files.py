@@ -133,9 +133,11 @@ def _of_mdf(file: FromFile, content: bytes, place: str) -> Iterator[Signal]:
                     found.append((name, times, np.asarray(one.samples), str(one.unit)))
     except Exception as error:  # a foreign file may raise anything in that library
         hook, sys.unraisablehook = sys.unraisablehook, lambda _: None
-        traceback.clear_frames(error.__traceback__)
-        gc.collect()  # what is half read goes, and fails once more
-        sys.unraisablehook = hook
+        try:
+            traceback.clear_frames(error.__traceback__)
+            gc.collect()  # what is half read goes, and fails once more
+        finally:
+            sys.unraisablehook = hook
         what = str(error).replace(str(stream), Path(place).name) or type(error).__name__
         raise mismatch(place, "an MDF4 file", what) from None
     if calculated:  # a text of the file that would be evaluated
