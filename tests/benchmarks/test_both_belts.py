@@ -50,5 +50,5 @@ def test_calming_leaves_a_motion_along_the_line_as_it_is():
     around = np.array([np.cos(angle), np.sin(angle), -np.sin(angle), np.cos(angle)])
     outwards = np.array([0.0 * angle, 0.0 * angle, np.cos(angle), np.sin(angle)])
     elements = (around + 0.1 * outwards).reshape(4, 8, 8)
-    calm(SimpleNamespace(_by_field=lambda: elements, _saddle=(0, 1), _speeds=(2, 3)))
+    calm(SimpleNamespace(_by_field=lambda: elements, _saddle=(0, 1), _speeds=(2, 3)), 0.9)
     np.testing.assert_allclose(elements.reshape(4, -1), around + 0.01 * outwards, atol=1e-12)
