@@ -50,7 +50,7 @@ from numba.core.typing import signature
 
 from cvt_hpc.kernels import store
 from cvt_hpc.kernels.identity import UnknownValueError, Walk, code_of_classes, digest, extensions
-from cvt_hpc.lanes.kinds import LaneArrayKind
+from cvt_hpc.lanes.kinds import LaneArray, LaneArrayKind
 
 _LONG = 3.0  # [s]: faster compiling is not logged
 
@@ -468,6 +468,8 @@ def _like(value: Any) -> Any:
         return value.dtype, value.ndim, value.flags.num
     if kind is float or kind is bool:
         return kind
+    if kind is LaneArray:
+        return kind, value.data.dtype, value.data.shape[2], value.linked
     if isinstance(value, tuple):
         return kind, *map(_like, value)
     return numba.typeof(value)

@@ -913,6 +913,10 @@ def test_types_are_those_that_the_compiler_finds():
         (),
         *((one,) for one in ONES),
         *(Pair(one, (FIELD, one)) for one in ARRAYS),
+        *(
+            LaneArray(2, 3, *kind)
+            for kind in itertools.product((1, 8), (np.float32, np.float64), (False, True))
+        ),
     ]
     for value in values * 2:  # then those found before
         assert compiling.typeof(value) == numba.typeof(value)
