@@ -17,6 +17,9 @@ from cvt_hpc.parameters import Parameter
 os.environ.setdefault("OMP_NUM_THREADS", "1")
 threadpool_limits(1)
 
+# Ten times fewer searches for garbage find the same: a picture alone, or the code of a test, is thousands of objects.
+gc.set_threshold(7000, 10, 10)
+
 # No test depends on the clock: a busy machine, or the first loading of pint, takes longer than an example may.
 settings.register_profile(
     "untimed", parent=settings(), deadline=None, suppress_health_check=[HealthCheck.too_slow]
@@ -91,13 +94,9 @@ def pytest_collection_modifyitems(items):
 
 
 def pytest_collection_finish():
-    """Leave what the collected tests hold out of later searches for garbage: it stays to the end.
-
-    Ten times fewer searches find the same: a picture alone is thousands of objects.
-    """
+    """Leave what the collected tests hold out of later searches for garbage: it stays to the end."""
     gc.collect()
     gc.freeze()
-    gc.set_threshold(7000, 10, 10)
 
 
 @pytest.hookimpl(trylast=True)
