@@ -36,7 +36,7 @@ from cvt_hpc.analysis.figures import COLOURS, WIDTH, axis_label, coordinate_unit
 from cvt_hpc.analysis.measured import ONSET, WINDOW, Measured, Overlay, Side, read_measured, side_of, within
 from cvt_hpc.analysis.measured_score import COUNTS, Line, joined, score
 from cvt_hpc.analysis.sensitivity import independent
-from cvt_hpc.errors import JobWarning, mismatch
+from cvt_hpc.errors import HeldError, InputError, JobWarning, mismatch
 from cvt_hpc.experiments.outcome import Outcome, Tell
 from cvt_hpc.experiments.sweeps import Sweep, load_sweep, run_sweeps, sweep_lines
 from cvt_hpc.experiments.uncertain_lines import nearest_distribution, shares_of, uncertain_lines
@@ -226,7 +226,10 @@ def make(asked: Calibration, out: Path, *, fresh: bool, tell: Tell) -> Outcome:
 
     InputError if a folder holds another job, the measured file does not fit, or the system refuses a file.
     """
-    check_start(asked.job, out, fresh=fresh)  # a study of another job in the folder
+    try:
+        check_start(asked.job, out)
+    except HeldError as error:  # --fresh repeats the runs of these samples alone
+        raise InputError(f"{error.complaint}; choose another name or --out") from None
     study, folder = (Sweep(STUDY, (), asked.job), out) if fresh else _study(asked.job, out)
     status = run_sweeps([study], {}, folder, fresh=fresh, tell=tell)
     if status >= STALLED or process_rank() != 0:

@@ -241,13 +241,15 @@ def test_runs_that_are_there_are_weighed_and_what_is_left_of_them_is_done(tmp_pa
     assert main(command) == 0 and int(find_records(out / "samples", job).recorded.sum()) < job.size
     assert {path: path.stat().st_mtime_ns for path in (out / "records").rglob("*")} == before
     shutil.rmtree(out / "samples")
-    # what --fresh repeats has a folder of its own; that of another job is refused, as by `run`
+    # that of another job is refused, as by `run`; --fresh throws none of it away, and is not offered
     capsys.readouterr()
-    others = [*command, "--set", "uncertain.seed=2"]
-    assert main(others) == 2 and not (out / "samples").exists()
-    (line,) = capsys.readouterr().err.splitlines()
-    assert f"{Path('out/y')}: expected the folder of this job, found that of another" in line
-    assert main([*others, "--fresh"]) == 0 and (out / "samples").exists()
+    for option in ([], ["--fresh"]):
+        assert main([*command, "--set", "uncertain.seed=2", *option]) == 2 and not (out / "samples").exists()
+        (line,) = capsys.readouterr().err.splitlines()
+        assert f"{Path('out/y')}: expected the folder of this job, found that of another" in line
+        assert line.endswith("; choose another name or --out")
+    # what --fresh repeats of this job has a folder of its own
+    assert main([*command, "--fresh"]) == 0 and (out / "samples").exists()
     assert {path: path.stat().st_mtime_ns for path in (out / "records").rglob("*")} == before
 
 
