@@ -33,7 +33,7 @@ class InputError(ValueError):
 
 
 class HeldError(InputError):
-    """A folder that holds something else than what is to be made in it; `complaint` is the text without advice."""
+    """A folder holds something else than what is to be made in it; `complaint` is the text without advice."""
 
     def __init__(self, complaint: str, then: str = "") -> None:
         super().__init__("; ".join(filter(None, (complaint, then))))

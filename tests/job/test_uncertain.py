@@ -221,6 +221,10 @@ def correlated(matrix, parameters=("thrust", "element_mass")):
         ),
         ({"samples": 8, "thrust": NORMAL | {"standard_deviation": 0}}, "standard_deviation: expected > 0 N"),
         ({"samples": 8, "thrust": NORMAL | {"from": 3e4, "to": 2e4}}, "thrust: expected from below to"),
+        (
+            {"samples": 8, "thrust": NORMAL | {"from": "30 kN", "to": "20 kN"}},
+            'thrust: expected from below to, found "30 kN" and "20 kN"',
+        ),
         ({"samples": 8, "thrust": NORMAL | {"from": 4e4}}, "expected limits between which values are likely"),
         (
             {"samples": 8, "thrust": {"distribution": "triangular", "from": 1, "mode": 3, "to": 2}},
