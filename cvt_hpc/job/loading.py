@@ -11,7 +11,7 @@ from cvt_hpc.job import assignments
 from cvt_hpc.job.assignments import Assignments, plain
 from cvt_hpc.job.axes import SAMPLE, Axes, read_axis
 from cvt_hpc.job.crosscheck import check_grid, check_rules
-from cvt_hpc.job.csv_files import FileValues, read_csv
+from cvt_hpc.job.csv_files import BARE, FileValues, read_csv
 from cvt_hpc.job.definition import HEADER, Job, answering_model, handed_to
 from cvt_hpc.job.design import (
     ADAPTIVE,
@@ -227,7 +227,8 @@ def _contents(given: Parameters, schema: Schema, source: str) -> dict[str, FileV
         values = {one: read_value(schema.parameters[one], raw, where) for one, raw in content.values.items()}
         found[key] = content._replace(values=values)
         for one, value in values.items():
-            unit = content.units.get(one) or schema.parameters[one].unit
+            unit = content.units.get(one, "")
+            unit = schema.parameters[one].unit if unit in BARE else unit
             check_usual(schema.parameters[one], value, unit, f"{where}: {name}: {one}")
     return found
 

@@ -269,9 +269,9 @@ def check_usual(parameter: Parameter, value: object, wanted: str, where: str) ->
     text = in_words(most, parameter.unit, wanted)
     least, usual, limit = (f"{from_si(one, parameter.unit, wanted):g}" for one in (low, high, _FAR * high))
     if most > _FAR * high:
-        raise mismatch(where, f"at most {limit} {wanted}, {_FAR:g} times the usual", text)
+        raise mismatch(where, f"at most {limit} {wanted}".rstrip() + f", {_FAR:g} times the usual", text)
     if not low <= most <= high:
-        read = f"{text} is far from the usual {least} to {usual} {wanted}"
+        read = f"{text} is far from the usual {least} to {usual} {wanted}".rstrip()
         warnings.warn(f"{where}: {read}; check the unit of the column", UnitWarning, stacklevel=2)
 
 
