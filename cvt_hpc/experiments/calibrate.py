@@ -39,7 +39,12 @@ from cvt_hpc.analysis.sensitivity import independent
 from cvt_hpc.errors import HeldError, InputError, JobWarning, mismatch
 from cvt_hpc.experiments.outcome import Outcome, Tell
 from cvt_hpc.experiments.sweeps import Sweep, load_sweep, run_sweeps, sweep_lines
-from cvt_hpc.experiments.uncertain_lines import nearest_distribution, shares_of, uncertain_lines
+from cvt_hpc.experiments.uncertain_lines import (
+    correlated_groups,
+    nearest_distribution,
+    shares_of,
+    uncertain_lines,
+)
 from cvt_hpc.job import Job
 from cvt_hpc.job.assignments import Assignments
 from cvt_hpc.job.axes import SAMPLE, SWAPPED
@@ -387,8 +392,10 @@ def _write_part(asked: Calibration, found: Posterior, path: Path) -> Path:
     """Write the table [uncertain] of a job that goes on from here."""
     narrowed, keys = found.narrowed(), [one.key for one in found.distributions]
     comments = {key: "as before: the file hardly tells of it" for key in keys if key not in narrowed}
+    ranks = found.correlation()
+    groups = correlated_groups(ranks, found.effective)
     # correlation of normal scores by that of ranks
-    correlation = 2.0 * np.sin(np.pi / 6.0 * found.correlation())
+    correlation = np.where(groups == groups[:, None], 2.0 * np.sin(np.pi / 6.0 * ranks), 0.0)
     schema = asked.job.schema
     units = {key: schema.unit_in_words(key) for key in keys}
     told = (narrowed.get(one.key, one) for one in found.distributions)

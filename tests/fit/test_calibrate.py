@@ -11,8 +11,8 @@ import xarray as xr
 
 from cvt_hpc.cli import main
 from cvt_hpc.errors import InputError
-from cvt_hpc.experiments.calibrate import Posterior, _lines, information, load, weigh
-from cvt_hpc.experiments.uncertain_lines import nearest_distribution
+from cvt_hpc.experiments.calibrate import Posterior, _lines, _write_part, information, load, weigh
+from cvt_hpc.experiments.uncertain_lines import correlated_groups, nearest_distribution
 from cvt_hpc.job import load_job
 from cvt_hpc.job.uncertain import Distribution
 from cvt_hpc.study import run
@@ -179,6 +179,36 @@ def test_parameters_that_act_alike_are_not_told_apart():
     assert found.correlation()[0, 1] < -0.9
 
 
+def ranks_of(values, weights=None):
+    """Rank correlations of weighed samples (parameter, sample), and their effective number."""
+    weights = np.full(values.shape[1], 1.0) if weights is None else weights
+    weights = weights / weights.sum()
+    found = Posterior(None, None, (), values, [], weights, weights)
+    return found.correlation(), found.effective
+
+
+def test_groups_are_those_of_the_law_that_samples_were_drawn_from():
+    """A chain whose ends do not correlate, a pair, and one alone; by weights that leave half of the samples."""
+    rng, found = np.random.default_rng(5), []
+    for _ in range(50):
+        x = rng.normal(size=(6, 600))
+        values = [x[0] + x[1], x[1] + x[2], x[2] + x[3], np.exp(x[4]), x[4] - x[5], rng.random(600)]
+        ranks, effective = ranks_of(np.array(values), rng.exponential(size=600))
+        assert effective == pytest.approx(300, rel=0.2)
+        found.append(correlated_groups(ranks, effective).tolist())
+    assert np.mean([one == [0, 0, 0, 1, 1, 2] for one in found]) >= 0.9
+
+
+@pytest.mark.parametrize(("count", "samples"), [(2, 24), (4, 64), (8, 256)])
+def test_independent_parameters_pass_for_correlated_in_one_of_twenty_studies(count, samples):
+    rng, repeats = np.random.default_rng(6), 400
+    together = 0
+    for _ in range(repeats):
+        ranks, effective = ranks_of(rng.random((count, samples)), rng.exponential(size=samples))
+        together += len(np.unique(correlated_groups(ranks, effective))) < count
+    assert together / repeats < 0.05 + 2.5 * np.sqrt(0.05 * 0.95 / repeats)
+
+
 CRITERION = """
 name = "y"
 model = "criterion"
@@ -251,6 +281,27 @@ def test_runs_that_are_there_are_weighed_and_what_is_left_of_them_is_done(tmp_pa
     # what --fresh repeats of this job has a folder of its own
     assert main([*command, "--fresh"]) == 0 and (out / "samples").exists()
     assert {path: path.stat().st_mtime_ns for path in (out / "records").rglob("*")} == before
+
+
+def test_what_is_written_correlates_what_the_file_does_not_tell_apart_and_nothing_else(study, tmp_path):
+    """The window begins by the sum of two shares: where one is larger, the other is less."""
+    asked, dataset = study
+    values = np.array([dataset[key].values for key in KEYS])
+    shares = (values.T - LOW) / (HIGH - LOW)
+    vibrates = SPEEDS >= 60.0 + 60.0 * (shares[:, 1] + shares[:, 2])[:, None]
+    dataset = dataset.assign(vibrates=dataset["vibrates"].copy(data=vibrates.astype(np.int8)))
+    asked = asked_by(study, tmp_path, "onset_radial_speed [mm/s]\n120\n")
+    path = _write_part(asked, weigh(asked, dataset), tmp_path / "calibrated.toml")
+    (tmp_path / "z.toml").write_text(JOB[: JOB.index("[uncertain]")] + path.read_text())
+    job = load_job(tmp_path / "z.toml", ["uncertain.indices=true"])
+    assert job.axes[-1].values == ("none", "all", "transverse_damping", "correlated")
+    (uncertain,) = {rule.source.uncertain for rule in job.rules}
+    assert uncertain.groups()["correlated"] == ("stribeck_velocity", "friction_memory")
+    assert -1.0 < uncertain.matrix[0][1] < -0.8
+    # of a file that tells each of them nothing is correlated
+    rng = np.random.default_rng(4)
+    asked = asked_by(study, tmp_path, measured_windows(np.array([0.5, 0.5, 0.5]), rng))
+    assert "correlation" not in _write_part(asked, weigh(asked, study[1]), path).read_text()
 
 
 def test_too_few_samples_that_agree_are_no_result(study, tmp_path):
