@@ -36,7 +36,7 @@ def uncertain_lines(
         line = f'{one.key} = {{ distribution = "{one.kind}", {numbers} }}'
         lines.append(f"{line} # {told[one.key]}" if one.key in told else line)
     kept = np.flatnonzero((correlation != 0.0).sum(axis=0) > 1)
-    names, correlation = [f'"{distributions[k].key}"' for k in kept], correlation[np.ix_(kept, kept)]
+    names, correlation = [f'"{distributions[k].key}"' for k in kept.tolist()], correlation[np.ix_(kept, kept)]
     if names:
         # reduced until four digits keep the matrix positive definite
         least = float(np.linalg.eigvalsh(correlation).min())
@@ -48,10 +48,11 @@ def uncertain_lines(
     return lines
 
 
-def correlated_groups(ranks: Array, effective: float) -> NDArray[np.int64]:
+def correlated_groups(ranks: Array, effective: float, before: NDArray) -> NDArray[np.int64]:
     """Number of the group of each parameter, (parameter,): one alone, or several that are correlated.
 
-    Groups are what pairs connect whose rank correlation, of `ranks` (parameter, parameter), is significant:
+    Those of one group `before` the measurement, (parameter,), stay together. Else groups are what pairs
+    connect whose rank correlation, of `ranks` (parameter, parameter), is significant:
 
         |rho| > z / sqrt(n - 1),    z = Phi^-1(1 - CHANCE / (2 m)),
 
@@ -62,7 +63,8 @@ def correlated_groups(ranks: Array, effective: float) -> NDArray[np.int64]:
 
     pairs = max(len(ranks) * (len(ranks) - 1) // 2, 1)
     least = ndtri(1.0 - 0.5 * CHANCE / pairs) / np.sqrt(max(effective - 1.0, 1.0))
-    found: NDArray[np.int64] = connected_components(np.abs(ranks) > least, directed=False)[1]
+    links = (np.abs(ranks) > least) | (before == before[:, np.newaxis])
+    found: NDArray[np.int64] = connected_components(links, directed=False)[1]
     return found
 
 
