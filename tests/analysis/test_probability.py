@@ -14,6 +14,7 @@ from scipy.stats import sobol_indices as scipy_indices
 import cvt_hpc.accessor  # noqa: F401
 from cvt_hpc import open_results, run
 from cvt_hpc.analysis.classes import OccurrenceClass
+from cvt_hpc.analysis.figures import check_known
 from cvt_hpc.analysis.maps import map_figure
 from cvt_hpc.analysis.probability import probabilities
 from cvt_hpc.analysis.probability_drawing import onset_bands_figure, sensitivity_figure
@@ -249,6 +250,10 @@ def test_probabilities_rest_on_both_sets_of_samples_and_not_on_those_between(tmp
     unknown = dataset.copy(deep=True)
     unknown["vibrates"][3, 0, 0] = Vibrates.UNDECIDED
     assert np.isnan(unknown.cvt.indices()["total_order"]).all()
+    with pytest.raises(
+        InputError, match="total_order, found none; less than 90 % of the samples count, or all"
+    ):
+        check_known(unknown.cvt.indices(), ["total_order"], "results")
     assert dataset.cvt.indices("amplitude")["total_order"].shape == (1, 2)
     with pytest.raises(InputError, match="unknown variable; did you mean amplitude"):
         dataset.cvt.indices("amplitud")
