@@ -163,7 +163,7 @@ def arranged(
 ) -> FileValues:
     """Return the raw values that columns of a file give; an error names one of its rows, or all of it.
 
-    What it has found there is told in the file's `units` by column.
+    What it has found there, and in the row before, is told in the file's `units` by column.
 
     Multiples of a quantity over time are those of its greatest one, also where a long file is averaged: an
     axis over the quantity gives the greatest value with which a run is driven.
@@ -172,7 +172,7 @@ def arranged(
         raw = file.arrange(columns)
     except RowError as error:
         found = _found_in(error, columns, units)
-        raise mismatch(f"{place}: {named(error.row)}", error.expected, found) from None
+        raise mismatch(f"{place}: {named(error.row)}", _expected_in(error, columns, units), found) from None
     except ValueError as error:
         raise InputError(f"{place}: {error}") from None
     averaged = {}
@@ -185,6 +185,16 @@ def arranged(
         if (most := max(multiples, key=abs)) not in (0.0, 1.0):
             raw |= {key: raw[key] * most, f"{key}_profile": [value / most for value in multiples]}
     return FileValues(raw, units, averaged)
+
+
+def _expected_in(error: RowError, columns: Mapping[str, Column], units: Mapping[str, str]) -> str:
+    """Return what an error has expected, with numbers of the row before in the units of the file."""
+    text = error.expected
+    for key, column in columns.items() if error.row else ():
+        before = f"{column.values[error.row - 1]:g} {column.unit}"
+        written = _as_written(column, error.row - 1, units.get(key, ""))
+        text = re.sub(rf"(?<![\w.-]){re.escape(before)}(?!\w)", written, text) if column.unit else text
+    return text
 
 
 def _found_in(error: RowError, columns: Mapping[str, Column], units: Mapping[str, str]) -> str:

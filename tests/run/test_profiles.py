@@ -210,6 +210,7 @@ SAMPLED = "\n".join(["time [s],load [N m]", *(f"{k / 100 + (k > 25)},{80 + k % 3
         ("time [s]\n0\n1\n", "expected a column beside time, found none"),
         ("time [s],load [N m]\n0,1\n", "expected two times or more, found 1"),
         ("time [s],load [N m]\n0,1\n1,2\n0.5,3\n", "line 4: expected a time after 1 s, .* found 0.5 s"),
+        ("time [ms],load [N m]\n0,1\n200,2\n100,3\n", "a time after 200 ms, .* found 100 ms"),
         (SAMPLED, "line 28: expected samples every 0.01 s without a gap, found none from 0.25"),
         ("time [s],load [N m]\n0,1\n9,2\n", "duration: expected 9 s or more, the end of profile_time"),
         ("time [s],thrust [kN]\n0,50\n0.1,-1\n", "line 3: expected a thrust above 0, found -1 kN"),
