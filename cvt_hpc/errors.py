@@ -32,6 +32,14 @@ class InputError(ValueError):
         super().__init__(one_line(text))
 
 
+class HeldError(InputError):
+    """A folder holds something else than what is to be made in it; `complaint` is the text without advice."""
+
+    def __init__(self, complaint: str, then: str = "") -> None:
+        super().__init__("; ".join(filter(None, (complaint, then))))
+        self.complaint = complaint
+
+
 class JobWarning(UserWarning):
     """A value of a job that may not be intended. The command line prints it on stderr."""
 

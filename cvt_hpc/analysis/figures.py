@@ -51,6 +51,7 @@ from matplotlib.ticker import FuncFormatter, Locator, LogFormatter, NullFormatte
 from numpy.typing import NDArray
 from PIL import Image
 
+from cvt_hpc.analysis.sobol import WITHOUT
 from cvt_hpc.errors import mismatch, one_line
 from cvt_hpc.job.values import JOB_UNITS, shown_number, shown_unit
 from cvt_hpc.storage.files import written_aside
@@ -153,7 +154,10 @@ def check_known(dataset: xr.Dataset, names: Iterable[str], source: str) -> None:
     """Raise InputError if none of some variables, which a picture draws, has a finite value."""
     names = list(names)
     if not any(name in dataset and bool(np.isfinite(dataset[name]).any()) for name in names):
-        raise mismatch(source, f"known values of {' or '.join(names)}", "none")
+        reasons = (str(dataset[name].attrs.get(WITHOUT, "")) for name in names if name in dataset)
+        raise mismatch(
+            source, f"known values of {' or '.join(names)}", "none", next(filter(None, reasons), "")
+        )
 
 
 def headline(subject: str, *attributes: Mapping[str, str]) -> str:

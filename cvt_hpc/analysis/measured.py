@@ -174,7 +174,7 @@ def read_columns(
                 raise RowError(k, expected, " and ".join(f"{values[name][k]:g}" for name in names))
         return values
 
-    return read_csv(FromFile(columns, required, (), arrange, other_names or {}), str(path), "", place)
+    return read_csv(FromFile(columns, required, (), arrange, other_names or {}), str(path), "", place).values
 
 
 def read_measured(

@@ -302,7 +302,8 @@ def _halving(uncertain: Uncertain, keys: tuple[str, ...], values: dict[str, NDAr
     known = [np.asarray(values[key], float) for key in keys]
     ratio = sum(b.log_density(x) - a.log_density(x) for a, b, x in zip(drawn, halved, known, strict=True))
     if len(keys) > 1:  # of the copula, the same about the narrower distributions
-        tie = np.linalg.inv(np.array(uncertain.matrix)) - np.eye(len(keys))
+        places = [uncertain.correlated.index(key) for key in keys]
+        tie = np.linalg.inv(np.array(uncertain.matrix)[np.ix_(places, places)]) - np.eye(len(keys))
         for sign, ones in ((1.0, drawn), (-1.0, halved)):
             shares = [one.shares(values) for one, values in zip(ones, known, strict=True)]
             scores = ndtri(np.clip(shares, 1e-300, 1 - 1e-16))

@@ -16,6 +16,11 @@ no more together than misses in place of all hits.
 
 Weights are samples of the posterior distribution. A measurement of noise or silence at a further cell tells
 most where its outcome is most open, by the mutual information between outcome and sample.
+
+What a file tells of parameters together may be much more than of each: of a combination c z of their normal
+scores z, whose covariance C is R before the measurement, most where c C c / c R c is least. So few samples
+seem to lie closer together than they do along a c that is found from them: each counts by the c of the others
+(leave one out).
 """
 
 import warnings
@@ -36,15 +41,20 @@ from cvt_hpc.analysis.figures import COLOURS, WIDTH, axis_label, coordinate_unit
 from cvt_hpc.analysis.measured import ONSET, WINDOW, Measured, Overlay, Side, read_measured, side_of, within
 from cvt_hpc.analysis.measured_score import COUNTS, Line, joined, score
 from cvt_hpc.analysis.sensitivity import independent
-from cvt_hpc.errors import JobWarning, mismatch
+from cvt_hpc.errors import HeldError, InputError, JobWarning, mismatch
 from cvt_hpc.experiments.outcome import Outcome, Tell
 from cvt_hpc.experiments.sweeps import Sweep, load_sweep, run_sweeps, sweep_lines
-from cvt_hpc.experiments.uncertain_lines import nearest_distribution, shares_of, uncertain_lines
+from cvt_hpc.experiments.uncertain_lines import (
+    correlated_groups,
+    nearest_distribution,
+    shares_of,
+    uncertain_lines,
+)
 from cvt_hpc.job import Job
 from cvt_hpc.job.assignments import Assignments
 from cvt_hpc.job.axes import SAMPLE, SWAPPED
 from cvt_hpc.job.loading import load_job
-from cvt_hpc.job.uncertain import Distribution, Scatter
+from cvt_hpc.job.uncertain import OUTERMOST, Distribution, Scatter, Uncertain
 from cvt_hpc.job.values import heading, read_value
 from cvt_hpc.parameters import Parameter, positive
 from cvt_hpc.storage.files import write_rows, written_aside
@@ -58,12 +68,16 @@ FEWEST = 8.0  # effective samples, below which the posterior is not told
 BAND = np.array([0.025, 0.5, 0.975])  # quantiles
 ALIKE = 0.5  # rank correlation from which on two parameters are not told apart
 TOLD = 0.9  # of the band before: a parameter whose band is hardly narrower keeps its distribution
+LEAST_SHARE = 0.05  # of a parameter in a combination that is told
+_LEAST_WEIGHT = 1e-4  # of a sample that has its own combination of the others
 LEAST_BIT = 0.01  # that a further measurement has to tell
 _FACTOR = np.log(2.0)  # of amplitudes
 _OPTIONS = {
     "doubt": Parameter(0.05, "", "", minimum=0.0, maximum=0.5, exclusive=True),
     "scatter": positive(20.0, "Hz", ""),
 }
+
+STANDARD = Distribution("score", "normal", (("mean", 0.0), ("standard_deviation", 1.0)))
 
 Array = NDArray[np.float64]
 
@@ -202,6 +216,10 @@ def _distributions(job: Job) -> tuple[Distribution, ...]:
     return tuple(one.uncertain.distributions[one.place] for one in found)
 
 
+def _uncertain(job: Job) -> Uncertain:
+    return next(rule.source.uncertain for rule in job.rules if isinstance(rule.source, Scatter))
+
+
 def _study(job: Job, out: Path) -> tuple[Sweep, Path]:
     """Return the study of the samples, and where its folder lies: that of `cvt-hpc run` if it has more."""
     own, of_run = (
@@ -226,7 +244,10 @@ def make(asked: Calibration, out: Path, *, fresh: bool, tell: Tell) -> Outcome:
 
     InputError if a folder holds another job, the measured file does not fit, or the system refuses a file.
     """
-    check_start(asked.job, out, fresh=fresh)  # a study of another job in the folder
+    try:
+        check_start(asked.job, out)
+    except HeldError as error:  # --fresh repeats the runs of these samples alone
+        raise InputError(f"{error.complaint}; choose another name or --out") from None
     study, folder = (Sweep(STUDY, (), asked.job), out) if fresh else _study(asked.job, out)
     status = run_sweeps([study], {}, folder, fresh=fresh, tell=tell)
     if status >= STALLED or process_rank() != 0:
@@ -283,6 +304,49 @@ def _log_likelihood(line: Line, kind: str, asked: Calibration) -> float:
     return float(found)
 
 
+class Combination(NamedTuple):
+    """Sum of the parameters' normal scores, each times a coefficient; beforehand it has the deviation 1."""
+
+    coefficients: Array  # shape (parameter,), the largest one positive
+    after: Distribution  # of the sum, after the measurement
+
+    def width(self) -> float:
+        """Width of the 95 % band after the measurement over that before."""
+        return float(np.ptp(self.after.quantiles(BAND)) / np.ptp(STANDARD.quantiles(BAND)))
+
+
+def told_best(asked: Calibration, found: Posterior) -> Combination:
+    """Return the combination of parameters of which the file tells most; by too few samples as before."""
+    from scipy.linalg import eigh
+    from scipy.special import ndtri
+
+    uncertain, keys = _uncertain(asked.job), [one.key for one in found.distributions]
+    before = np.eye(len(keys))
+    if uncertain.correlated:
+        places = [keys.index(key) for key in uncertain.correlated]
+        before[np.ix_(places, places)] = uncertain.matrix
+    pairs = zip(found.distributions, found.values, strict=True)
+    shares = np.array([one.shares(values) for one, values in pairs])
+    scores, weights = ndtri(np.clip(shares, OUTERMOST, 1.0 - OUTERMOST)), found.weights
+    off = scores - (scores @ weights)[:, np.newaxis]
+    spread = (weights * off) @ off.T
+
+    def narrowest(covariance: Array) -> Array:
+        least: Array = eigh(covariance, before)[1][:, 0]
+        return least
+
+    best = narrowest(spread)
+    best *= np.sign(best[np.argmax(np.abs(best))])
+    if found.effective < FEWEST:
+        return Combination(best, STANDARD)
+    sums = best @ scores
+    for k in np.flatnonzero((weights > _LEAST_WEIGHT) & (weights < 1.0)):
+        left = 1.0 - weights[k]
+        own = narrowest(spread / left - weights[k] / left**2 * np.outer(off[:, k], off[:, k]))
+        sums[k] = np.sign(own @ before @ best) * own @ scores[:, k]
+    return Combination(best, nearest_distribution(STANDARD, sums, weights))
+
+
 def information(asked: Calibration, found: Posterior) -> xr.DataArray:
     """What noise or silence, measured in one cell more, tells of the samples [bit], over the grid."""
 
@@ -318,6 +382,9 @@ def _lines(asked: Calibration, found: Posterior) -> Iterator[str]:
     for i, j in zip(*np.triu_indices(len(names), 1), strict=True):
         if abs(correlation[i, j]) >= ALIKE:
             yield f"not told apart: {names[i]} and {names[j]}, rank correlation {correlation[i, j]:.2f}"
+    narrowest = min(np.ptp(after) / np.ptp(before) for before, after in found.bands())
+    if (together := told_best(asked, found)).width() < TOLD * narrowest:
+        yield from _combination_lines(together, names)
     bits = information(asked, found).where(~_measured_cells(found)[1], -np.inf).fillna(-np.inf)
     at = {name: int(k) for name, k in bits.argmax(...).items()}
     if (most := float(bits.isel(at))) < LEAST_BIT:
@@ -326,6 +393,20 @@ def _lines(asked: Calibration, found: Posterior) -> Iterator[str]:
     told = ", ".join(f"{name} {value_text(found.dataset[name], k)}" for name, k in at.items())
     chance = float(found.probability().isel(at))
     yield f"measure next: {told}, which vibrates with a probability of {chance:.2f}: {most:.2f} bit"
+
+
+def _combination_lines(told: Combination, names: list[str]) -> Iterator[str]:
+    """Yield lines that state a combination of parameters."""
+    shares = zip(names, told.coefficients.tolist(), strict=True)
+    words = [
+        f"{'-' if one < 0.0 else '+'} {abs(one):.2f} {name}"
+        for name, one in shares
+        if abs(one) >= LEAST_SHARE
+    ]
+    (begin, _, end), (low, _, high) = (map(short, one.quantiles(BAND)) for one in (STANDARD, told.after))
+    numbers = f"before {begin} to {end}, after {low} to {high}, width {told.width():.2f}"
+    yield f"told best together: {' '.join(words).removeprefix('+ ')}: {numbers}"
+    yield "together: each in standard deviations from its median, as they were before"
 
 
 def _disagreements(found: Posterior) -> Iterator[str]:
@@ -384,8 +465,11 @@ def _write_part(asked: Calibration, found: Posterior, path: Path) -> Path:
     """Write the table [uncertain] of a job that goes on from here."""
     narrowed, keys = found.narrowed(), [one.key for one in found.distributions]
     comments = {key: "as before: the file hardly tells of it" for key in keys if key not in narrowed}
+    ranks = found.correlation()
+    group_of = {key: name for name, own in _uncertain(asked.job).groups().items() for key in own}
+    groups = correlated_groups(ranks, found.effective, np.array([group_of[key] for key in keys]))
     # correlation of normal scores by that of ranks
-    correlation = 2.0 * np.sin(np.pi / 6.0 * found.correlation())
+    correlation = np.where(groups == groups[:, np.newaxis], 2.0 * np.sin(np.pi / 6.0 * ranks), 0.0)
     schema = asked.job.schema
     units = {key: schema.unit_in_words(key) for key in keys}
     told = (narrowed.get(one.key, one) for one in found.distributions)

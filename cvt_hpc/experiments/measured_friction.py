@@ -41,6 +41,8 @@ _COLUMNS = {"force": ("N/m", "N", "Pa"), "speed": ("m/s",), "mu": ("",), "specim
 _SCALES = 7  # speed scales at which the search begins
 LARGEST_CONDITION = 1e8  # condition of J, by columns of one size, up to which the points determine a law
 TWO_SIDED_95 = 1.96  # standard errors
+MUCH_CLOSER = 0.5  # of the root mean square of the best law's residuals
+NEGLIGIBLE = 1e-6  # coefficient of friction that nobody measures
 _UNITS = {"kinetic_friction": "", "friction_gradient": "s/m", "stribeck_velocity": "m/s"}
 _WRITTEN = _UNITS | {"stribeck_velocity": "mm/s"}  # as tribometers state it
 _SCALE = "stribeck_velocity"  # in x by its logarithm
@@ -275,6 +277,11 @@ def law_lines(laws: Sequence[Fitted], points: Points) -> Iterator[str]:
         cells = [f"{short(values[key])} +- {deviations[key]:.2g}" if key in values else "" for key in _UNITS]
         rows.append([one.law.name.lower(), *cells, f"{one.rms:.2g}", f"{one.criterion - best.criterion:.1f}"])
     yield from columns(rows, indent="")
+    closest = min(laws, key=lambda one: one.rms)
+    if MUCH_CLOSER * best.rms > max(closest.rms, NEGLIGIBLE):
+        name = closest.law.name.lower()
+        few = f"{len(speeds)} points are few for its {len(closest.estimate)} parameters"
+        yield f"{name} is much closer to the points, but {few}: measure more, or choose it by --law {name}"
     if best.of_specimens:
         yield f"standard deviations are the scatter of {best.of_specimens} specimens"
     else:

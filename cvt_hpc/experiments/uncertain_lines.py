@@ -9,6 +9,7 @@ from cvt_hpc.job.uncertain import Distribution
 
 Array = NDArray[np.float64]
 SAMPLES = 64
+CHANCE = 0.05  # that any pair of independent parameters passes for correlated
 _BOUNDS = [-2.0, -1.0], [2.0, 2.0]  # of place in standard deviations, and of the logarithm of the width
 
 
@@ -26,15 +27,17 @@ def uncertain_lines(
 ) -> list[str]:
     """Lines of the table: `what` scatters, for a comment, SI units and further comments by parameter.
 
-    `correlation`, (parameter, parameter), is that of their normal scores.
+    `correlation`, (parameter, parameter), is that of their normal scores; parameters that have none with any
+    other one are independent.
     """
     lines, told = [f"[uncertain] # {what}", f"samples = {SAMPLES}"], dict(comments or {})
     for one in distributions:
         numbers = ", ".join(f"{name} = {given(value, units[one.key])}" for name, value in one.numbers)
         line = f'{one.key} = {{ distribution = "{one.kind}", {numbers} }}'
         lines.append(f"{line} # {told[one.key]}" if one.key in told else line)
-    names = [f'"{one.key}"' for one in distributions]
-    if len(names) > 1:
+    kept = np.flatnonzero((correlation != 0.0).sum(axis=0) > 1)
+    names, correlation = [f'"{distributions[k].key}"' for k in kept.tolist()], correlation[np.ix_(kept, kept)]
+    if names:
         # reduced until four digits keep the matrix positive definite
         least = float(np.linalg.eigvalsh(correlation).min())
         share = max(0.0, (1e-3 - least) / (1.0 - least))
@@ -43,6 +46,26 @@ def uncertain_lines(
         head = f"parameters = [{', '.join(names)}]"
         lines += ["", "[uncertain.correlation]", head, f"matrix = [{', '.join(rows)}]"]
     return lines
+
+
+def correlated_groups(ranks: Array, effective: float, before: NDArray) -> NDArray[np.int64]:
+    """Number of the group of each parameter, (parameter,): one alone, or several that are correlated.
+
+    Those of one group `before` the measurement, (parameter,), stay together. Else groups are what pairs
+    connect whose rank correlation, of `ranks` (parameter, parameter), is significant:
+
+        |rho| > z / sqrt(n - 1),    z = Phi^-1(1 - CHANCE / (2 m)),
+
+    n being the `effective` number of samples and m the number of pairs (Bonferroni).
+    """
+    from scipy.sparse.csgraph import connected_components
+    from scipy.special import ndtri
+
+    pairs = max(len(ranks) * (len(ranks) - 1) // 2, 1)
+    least = ndtri(1.0 - 0.5 * CHANCE / pairs) / np.sqrt(max(effective - 1.0, 1.0))
+    links = (np.abs(ranks) > least) | (before == before[:, np.newaxis])
+    found: NDArray[np.int64] = connected_components(links, directed=False)[1]
+    return found
 
 
 def shares_of(values: Array, weights: Array) -> Array:

@@ -165,7 +165,7 @@ def _read_range(parameter: Parameter, raw: Table, where: str) -> tuple[float, ..
     if ("count" in raw) == ("step" in raw):
         raise mismatch(where, "a range with either count or step", "both" if "step" in raw else "neither")
     if "step" in raw:
-        return _stepped(start, stop, _read_step(parameter, raw, where), where)
+        return _stepped(start, stop, _read_step(parameter, raw, where), raw, where)
     return _counted(start, stop, raw, where)
 
 
@@ -183,9 +183,10 @@ def read_spacing(raw: Table, start: float, stop: float, where: str) -> str:
     """Return the spacing of a range from `start` to `stop`: "linear", or "log" if that can be."""
     spacing = read_value(_SPACING, raw.get("spacing", "linear"), f"{where}.spacing")
     if start == stop:
-        raise mismatch(where, "a range with from and to apart", f"{start:g} for both")
+        raise mismatch(where, "a range with from and to apart", f"{show(raw['from'])} for both")
     if spacing == "log" and (start <= 0 or stop <= 0):
-        raise mismatch(where, "from > 0 and to > 0 for log spacing", f"{start:g} and {stop:g}")
+        found = f"{show(raw['from'])} and {show(raw['to'])}"
+        raise mismatch(where, "from > 0 and to > 0 for log spacing", found)
     return spacing
 
 
@@ -213,16 +214,17 @@ def _counted(start: float, stop: float, raw: Table, where: str) -> tuple[float, 
     return (start, *map(float, between), stop)
 
 
-def _stepped(start: float, stop: float, step: float, where: str) -> tuple[float, ...]:
+def _stepped(start: float, stop: float, step: float, raw: Table, where: str) -> tuple[float, ...]:
+    """Return values from `start` to `stop` by `step`; errors quote `raw`, in the units of the job."""
     first, last, stride = _decimal(start), _decimal(stop), _decimal(step)
-    steps = (last - first) / stride
+    steps, along = (last - first) / stride, f"from {show(raw['from'])} to {show(raw['to'])}"
     if steps < 0:
         sign = "above" if last > first else "below"
-        raise mismatch(f"{where}.step", f"a step {sign} 0, from {start:g} to {stop:g}", f"{step:g}")
+        raise mismatch(f"{where}.step", f"a step {sign} 0, {along}", show(raw["step"]))
     count = round(steps)
     if count < 1 or abs(steps - count) > _STEP_TOLERANCE:
-        expected = f"a step that leads from {start:g} to {stop:g} in whole steps"
-        raise mismatch(f"{where}.step", expected, f"{step:g}, which takes {steps:.6g} steps")
+        expected = f"a step that leads {along} in whole steps"
+        raise mismatch(f"{where}.step", expected, f"{show(raw['step'])}, which takes {steps:.6g} steps")
     if count >= LARGEST_AXIS:
         raise mismatch(where, f"at most {LARGEST_AXIS} values", f"about {steps:.0e}")
     return (start, *(float(first + i * stride) for i in range(1, count)), stop)

@@ -49,8 +49,16 @@ class _Column(NamedTuple):
     si: str
 
 
-def read_csv(file: FromFile, name: str, source: str, where: str) -> Point:
-    """Return the raw values of the parameters that a file gives, by key.
+class FileValues(NamedTuple):
+    """What a file gives."""
+
+    values: Point  # raw values by key
+    units: Mapping[str, str]  # in which it has them, by column
+    told: Mapping[str, str]  # by key in words what it has, where `values` have averages of that
+
+
+def read_csv(file: FromFile, name: str, source: str, where: str) -> FileValues:
+    """Return the raw values of the parameters that a file gives.
 
     One line has the names of the columns, each with its unit in brackets, such as "speed [mm/s]", or with the
     units in the line below; a column without a unit is dimensionless. Empty lines, lines that begin with #,
@@ -102,13 +110,13 @@ def read_csv(file: FromFile, name: str, source: str, where: str) -> Point:
     ]
     found = {c.name: Column(c.si, tuple(read.values[c.name])) for c in columns}
     units = {c.name: c.unit for c in columns}
-    raw = arranged(file, found, place, lambda row: f"line {read.lines[row]}", units)
+    given = arranged(file, found, place, lambda row: f"line {read.lines[row]}", units)
     if any(how) or others:
         begun = (f"{key} {_as_written(column, 0, units[key])}" for key, column in found.items())
         start = f"line {read.lines[0]} is {', '.join(begun)}"
         told = f"{place}: read with {', '.join(filter(None, how))}; {start}{not_read(others)}"
         warnings.warn(told, JobWarning, stacklevel=2)
-    return raw
+    return given
 
 
 class _Read(NamedTuple):
@@ -151,11 +159,11 @@ def arranged(
     columns: dict[str, Column],
     place: str,
     named: Callable[[int], str],
-    units: Mapping[str, str] | None = None,
-) -> Point:
+    units: Mapping[str, str],
+) -> FileValues:
     """Return the raw values that columns of a file give; an error names one of its rows, or all of it.
 
-    What it has found there is told in the file's `units` by column, by default in those of SI.
+    What it has found there, and in the row before, is told in the file's `units` by column.
 
     Multiples of a quantity over time are those of its greatest one, also where a long file is averaged: an
     axis over the quantity gives the greatest value with which a run is driven.
@@ -163,18 +171,30 @@ def arranged(
     try:
         raw = file.arrange(columns)
     except RowError as error:
-        found = _found_in(error, columns, units or {})
-        raise mismatch(f"{place}: {named(error.row)}", error.expected, found) from None
+        found = _found_in(error, columns, units)
+        raise mismatch(f"{place}: {named(error.row)}", _expected_in(error, columns, units), found) from None
     except ValueError as error:
         raise InputError(f"{place}: {error}") from None
+    averaged = {}
     if len(raw.get(TIME, ())) < len(times := columns["time"].values if TIME in raw else ()):
-        span = f"{len(times)} times from {times[0]:g} to {times[-1]:g} s"
-        warnings.warn(f"{place}: {span}, averaged over {MOST_TIMES} parts", JobWarning, stacklevel=3)
+        first, last = (_as_written(columns["time"], row, units.get("time", "")) for row in (0, -1))
+        averaged[TIME] = f"{len(times)} times from {first} to {last}, averaged over {MOST_TIMES} parts"
+        warnings.warn(f"{place}: {averaged[TIME]}", JobWarning, stacklevel=3)
     for key in [key for key in raw if f"{key}_profile" in raw]:
         multiples = raw[f"{key}_profile"]
         if (most := max(multiples, key=abs)) not in (0.0, 1.0):
             raw |= {key: raw[key] * most, f"{key}_profile": [value / most for value in multiples]}
-    return raw
+    return FileValues(raw, units, averaged)
+
+
+def _expected_in(error: RowError, columns: Mapping[str, Column], units: Mapping[str, str]) -> str:
+    """Return what an error has expected, with numbers of the row before in the units of the file."""
+    text = error.expected
+    for key, column in columns.items() if error.row else ():
+        before = f"{column.values[error.row - 1]:g} {column.unit}"
+        written = _as_written(column, error.row - 1, units.get(key, ""))
+        text = re.sub(rf"(?<![\w.-]){re.escape(before)}(?!\w)", written, text) if column.unit else text
+    return text
 
 
 def _found_in(error: RowError, columns: Mapping[str, Column], units: Mapping[str, str]) -> str:

@@ -78,6 +78,8 @@ class Job(Runs):
         By key the unit in which the job gives a parameter, where it names one.
     files : dict
         By key the name of each file that gives parameters; `parameters` has what stood in it.
+    told : dict
+        By key in words what a file has, where `parameters` has averages of that.
     """
 
     name: str
@@ -93,6 +95,7 @@ class Job(Runs):
     rules: tuple[Rule, ...] = ()
     units: Mapping[str, str] = field(default_factory=dict, compare=False)
     files: Mapping[str, str] = field(default_factory=dict, compare=False)
+    told: Mapping[str, str] = field(default_factory=dict, compare=False)
 
     def __len__(self) -> int:
         """Number of runs."""

@@ -11,7 +11,7 @@ from cvt_hpc.job import assignments
 from cvt_hpc.job.assignments import Assignments, plain
 from cvt_hpc.job.axes import SAMPLE, Axes, read_axis
 from cvt_hpc.job.crosscheck import check_grid, check_rules
-from cvt_hpc.job.csv_files import read_csv
+from cvt_hpc.job.csv_files import BARE, FileValues, read_csv
 from cvt_hpc.job.definition import HEADER, Job, answering_model, handed_to
 from cvt_hpc.job.design import (
     ADAPTIVE,
@@ -150,7 +150,7 @@ def rebuild_job(
     design = read_design({**document.get("design", {}), **changed}, source)
     put = {*replaced, *put_axes}
     contents = _contents(replaced, schema, source)
-    put |= {key for content in contents.values() for key in content}
+    put |= {key for content in contents.values() for key in content.values}
     gone = {*put, *overridden(put, schema)}
     scatters: list[Rule] = []
     if is_uncertain:
@@ -190,11 +190,12 @@ def rebuild_job(
     replacing = {key: replaced.get(key) for key in gone}
     kept = read_histories(histories, schema, axes, replacing, source, design.get("runs"))
     stated = tuple(rule for rule in rules if rule.key not in settled)
-    runs = parameters, axes, frozenset(own), design, kept, stated, schema.units, files
+    told = {key: text for content in contents.values() for key, text in content.told.items()}
+    runs = parameters, axes, frozenset(own), design, kept, stated, schema.units, files, told
     job = Job(name, schema.model, schema.stepper, description, source, *runs)
     answering = answering_model(job)
     if answering is not None:
-        job = replace(rebuild_job(handed_to(job, *answering), source, job.units), files=files)
+        job = replace(rebuild_job(handed_to(job, *answering), source, job.units), files=files, told=told)
     return job
 
 
@@ -214,27 +215,30 @@ def _written(document: Table, pairs: Table, schema: Schema, source: str, label: 
     return found
 
 
-def _contents(given: Parameters, schema: Schema, source: str) -> dict[str, Point]:
-    """Return by key of each file among given values the values that it gives."""
+def _contents(given: Parameters, schema: Schema, source: str) -> dict[str, FileValues]:
+    """Return by key of each file among given values what it gives."""
     found = {}
     for key, name in given.items():
         if (file := schema.parameters[key].file) is None:
             continue
         where = f"{source}: [{schema.section_of[key]}] {key}"
         read = _READERS.get(Path(name).suffix.lower(), read_csv)
-        raw = read(file, name, source, where) if name else {}
-        found[key] = {one: read_value(schema.parameters[one], value, where) for one, value in raw.items()}
-        for one, value in found[key].items():
-            check_usual(schema.parameters[one], value, f"{where}: {name}: {one}")
+        content = read(file, name, source, where) if name else FileValues({}, {}, {})
+        values = {one: read_value(schema.parameters[one], raw, where) for one, raw in content.values.items()}
+        found[key] = content._replace(values=values)
+        for one, value in values.items():
+            unit = content.units.get(one, "")
+            unit = schema.parameters[one].unit if unit in BARE else unit
+            check_usual(schema.parameters[one], value, unit, f"{where}: {name}: {one}")
     return found
 
 
 def _with_files(
-    given: Parameters, contents: Mapping[str, Point], axes: Table, schema: Schema, source: str
+    given: Parameters, contents: Mapping[str, FileValues], axes: Table, schema: Schema, source: str
 ) -> Point:
     """Return given values, with the contents of files instead of their names; no axis may give the same."""
     found = {key: value for key, value in given.items() if key not in contents}
-    for key, content in contents.items():
+    for key, (content, _, _) in contents.items():
         where = f"{source}: [{schema.section_of[key]}] {key}"
         for one in content:
             if one in found:

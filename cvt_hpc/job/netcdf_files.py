@@ -14,9 +14,8 @@ from typing import TYPE_CHECKING
 import numpy as np
 
 from cvt_hpc.errors import did_you_mean, mismatch, show
-from cvt_hpc.job.csv_files import MOST_BYTES, arranged, content_of, told
+from cvt_hpc.job.csv_files import BARE, MOST_BYTES, FileValues, arranged, content_of, told, unit_of
 from cvt_hpc.job.units import factor_to
-from cvt_hpc.job.values import Point
 from cvt_hpc.parameters import Column, FromFile
 
 if TYPE_CHECKING:
@@ -27,8 +26,8 @@ SUFFIX = ".nc"
 _HDF5 = b"\x89HDF\r\n\x1a\n"
 
 
-def read_netcdf(file: FromFile, name: str, source: str, where: str) -> Point:
-    """Return the raw values of the parameters that a file gives, by key.
+def read_netcdf(file: FromFile, name: str, source: str, where: str) -> FileValues:
+    """Return the raw values of the parameters that a file gives.
 
     Each column of `file` is a variable with an attribute `units`. A variable over several dimensions takes
     the values of the variables with their names, as a table does of its row and column; where both dimensions
@@ -47,11 +46,13 @@ def read_netcdf(file: FromFile, name: str, source: str, where: str) -> Point:
     """
     path = Path(source).parent / name
     place = f"{where}: {path}"
-    columns = _columns(file, content_of(path, MOST_BYTES, place, "a netCDF file", SUFFIX), place)
-    return arranged(file, columns, place, lambda row: f"entry {row + 1}")
+    content = content_of(path, MOST_BYTES, place, "a netCDF file", SUFFIX)
+    columns, units = _columns(file, content, place)
+    return arranged(file, columns, place, lambda row: f"entry {row + 1}", units)
 
 
-def _columns(file: FromFile, content: bytes, place: str) -> dict[str, Column]:
+def _columns(file: FromFile, content: bytes, place: str) -> tuple[dict[str, Column], dict[str, str]]:
+    """Return the columns of a file, in SI units, and the units in which it has them."""
     import netCDF4
 
     if _HDF5 in content:  # netCDF looks for it behind a block of the user's, too
@@ -65,14 +66,18 @@ def _columns(file: FromFile, content: bytes, place: str) -> dict[str, Column]:
                 if name not in known:
                     found = f"none among {', '.join(known)}" if known else "no variables"
                     raise mismatch(place, f"a variable {told(name, file)}", found + did_you_mean(name, known))
-            return _in_rows(file, {name: known[name] for name in file.columns if name in known}, place)
+            given = {name: known[name] for name in file.columns if name in known}
+            units = {name: _unit(file, name, one) for name, one in given.items()}
+            return _in_rows(file, given, units, place), units
     except (OSError, RuntimeError) as error:
         raise mismatch(place, "a netCDF file", getattr(error, "strerror", None) or str(error)) from None
 
 
-def _in_rows(file: FromFile, variables: dict[str, netCDF4.Variable], place: str) -> dict[str, Column]:
+def _in_rows(
+    file: FromFile, variables: dict[str, netCDF4.Variable], units: dict[str, str], place: str
+) -> dict[str, Column]:
     """Return all columns over all combinations of their dimensions."""
-    found = {name: _values(file, name, variable, place) for name, variable in variables.items()}
+    found = {name: _values(file, name, one, units[name], place) for name, one in variables.items()}
     dimensions = {name: _dimensions(name, variables, file, place) for name in variables}
     for name in list(found):
         if (other := f"other_{name}") in {own for of in dimensions.values() for own in of} - set(found):
@@ -106,14 +111,16 @@ def _dimensions(
     return own
 
 
-def _values(file: FromFile, name: str, variable: netCDF4.Variable, place: str) -> tuple[str, np.ndarray]:
-    """Unit and values [SI] of a variable."""
+def _values(
+    file: FromFile, name: str, variable: netCDF4.Variable, unit: str, place: str
+) -> tuple[str, np.ndarray]:
+    """SI unit and values [SI] of a variable in a unit."""
     place = f"{place}, {name}"
     if getattr(variable.dtype, "kind", None) not in ("f", "i", "u"):
         raise mismatch(place, "numbers", "something else")
     if math.prod(variable.shape) > MOST_VALUES:
         raise mismatch(place, f"at most {MOST_VALUES} values", str(math.prod(variable.shape)))
-    unit, factor = _unit(file, name, getattr(variable, "units", ""), place)
+    si, factor = _conversion(file, name, unit, place)
     try:
         with warnings.catch_warnings(action="error", category=UserWarning):
             read = variable[...]
@@ -122,13 +129,18 @@ def _values(file: FromFile, name: str, variable: netCDF4.Variable, place: str) -
     values = np.ma.filled(np.ma.asarray(read, dtype=float), np.nan) * factor
     if not np.isfinite(values).all():
         raise mismatch(place, "finite numbers", "others")
-    return unit, values
+    return si, values
 
 
-def _unit(file: FromFile, name: str, given: object, place: str) -> tuple[str, float]:
-    text = str(given)
+def _unit(file: FromFile, name: str, variable: netCDF4.Variable) -> str:
+    """Unit of a variable as it is written here."""
+    return unit_of(file, name, str(getattr(variable, "units", "")).strip())
+
+
+def _conversion(file: FromFile, name: str, unit: str, place: str) -> tuple[str, float]:
+    """SI unit of a variable in a unit, and the factor to it."""
+    bare = unit in BARE
     for si in file.columns[name]:
-        bare = text.strip() in ("", "1")
-        if bare == (not si) and (factor := 1.0 if bare else factor_to(text.strip(), si)):
+        if bare == (not si) and (factor := 1.0 if bare else factor_to(unit, si)):
             return si, factor
-    raise mismatch(place, f"units {told(name, file)}", show(text) if text else "none")
+    raise mismatch(place, f"units {told(name, file)}", show(unit) if unit else "none")

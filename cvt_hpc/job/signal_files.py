@@ -19,6 +19,7 @@ from cvt_hpc.errors import JobWarning, few_of, mismatch, show
 from cvt_hpc.job.csv_files import (
     BARE,
     MOST_BYTES,
+    FileValues,
     arranged,
     content_of,
     named_column,
@@ -28,7 +29,6 @@ from cvt_hpc.job.csv_files import (
 )
 from cvt_hpc.job.netcdf_files import MOST_VALUES
 from cvt_hpc.job.units import factor_to
-from cvt_hpc.job.values import Point
 from cvt_hpc.parameters import Column, FromFile, RowError
 from cvt_hpc.variator.profiles import check_times
 
@@ -40,8 +40,8 @@ _FORMULAS = (3, 10)  # kinds of conversion in MDF 4, and in versions before
 Signal = tuple[str, np.ndarray, str]  # name, values (n,), unit
 
 
-def read_signals(file: FromFile, name: str, source: str, where: str) -> Point:
-    """Return the raw values of the parameters that a file gives, by key.
+def read_signals(file: FromFile, name: str, source: str, where: str) -> FileValues:
+    """Return the raw values of the parameters that a file gives.
 
     In a MAT file (version 7 and before) each signal is an array, and a text NAME_unit beside it its unit. The
     signals of an MDF4 file count where all have values, linear between their own times. A warning states how
@@ -74,10 +74,10 @@ def read_signals(file: FromFile, name: str, source: str, where: str) -> Point:
     for key, column in columns.items():
         if len(column.values) != rows:
             raise mismatch(f"{place}: {key}", f"{rows} values, as others have", str(len(column.values)))
-    raw = arranged(file, columns, place, lambda row: f"entry {row + 1}", units)
+    given = arranged(file, columns, place, lambda row: f"entry {row + 1}", units)
     read = ", ".join(f"{show(signal)} as {key}" for key, signal in named.items())
     warnings.warn(f"{place}: read with {read}{not_read(others)}", JobWarning, stacklevel=2)
-    return raw
+    return given
 
 
 def _column(file: FromFile, key: str, signal: str, values: np.ndarray, unit: str, place: str) -> Column:

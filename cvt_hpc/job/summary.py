@@ -67,7 +67,7 @@ def _tables(job: Job, schema: Schema) -> dict[str, list[tuple[str, ...]]]:
         for key, parameter in table.items():
             kind = kinds.get(key, "default")
             value = value_in_words(schema, key, job.parameters[key]) if key in job.parameters else "none"
-            value = job.files.get(key, value)
+            value = job.files.get(key, job.told.get(key, value))
             text = parameter.description
             text += f" ({', '.join(parameter.choices)})" if parameter.choices else ""
             text = f"without effect with {inert[key]}: {text}" if key in inert else text

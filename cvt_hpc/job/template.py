@@ -47,6 +47,17 @@ _FIRST_STUDIES = {
         "stiffness": '"10 kN/mm"',
         "friction_law": '"stribeck"',
     },
+    # a slow slip feeds the vibration where damping and memory of friction do not outweigh its fall
+    "criterion": {
+        "friction_gradient": '{ from = "-1 s/m", to = "-0.1 s/m", count = 10 }',
+        "radial_speed": '{ from = "20 mm/s", to = "200 mm/s", count = 10 }',
+    },
+    # the load that a belt carries, by the formula, which takes no time
+    "slip_limit": {
+        "thrust": '{ from = "20 kN", to = "60 kN", count = 5 }',
+        "ratio": "{ from = 1, to = 2.5, count = 4 }",
+        "method": '"formula"',
+    },
     # which load slips by which tension
     "belt_drive": {
         "load": '{ from = "5 N m", to = "30 N m", count = 6 }',

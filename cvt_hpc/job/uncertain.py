@@ -10,13 +10,14 @@ which for normal parameters is the correlation of their values. Limits cut a dis
 left keeps its shape. Mean and standard deviation are those without the limits.
 
 For Sobol indices each sample is drawn twice, A and B, and a further axis `swapped` names the parameters that
-are those of B: none, all, or one of them (Saltelli et al. 2010). Correlated ones are swapped together.
+are those of B: none, all, or one of them (Saltelli et al. 2010). Those that correlations connect are swapped
+together: all `correlated` ones, or several groups, `correlated_1` and so on.
 """
 
 import math
 from collections.abc import Callable, Mapping
 from dataclasses import dataclass, replace
-from functools import lru_cache
+from functools import cached_property, lru_cache
 from typing import NamedTuple
 
 import numpy as np
@@ -167,13 +168,26 @@ class Uncertain:
         """Return the value [SI] of the distribution at a place for a sample, by what is swapped."""
         block, row = divmod(sample, BLOCK)
         key = self.distributions[place].key
-        is_second = swapped in (ALL, CORRELATED if key in self.correlated else key)
+        is_second = swapped in (ALL, self._group_of[key])
         return float(_block(self, block)[row, place + is_second * len(self.distributions)])
 
     def groups(self) -> dict[str, tuple[str, ...]]:
-        """Return groups of parameters, independent of each other: correlated ones together."""
-        alone = {one.key: (one.key,) for one in self.distributions if one.key not in self.correlated}
-        return alone | ({CORRELATED: self.correlated} if self.correlated else {})
+        """Return groups of parameters that are independent: those together that correlations connect."""
+        from scipy.sparse.csgraph import connected_components
+
+        numbers = connected_components(np.array(self.matrix), directed=False)[1] if self.matrix else ()
+        parts: dict[int, list[str]] = {}
+        for key, number in zip(self.correlated, numbers, strict=True):
+            parts.setdefault(int(number), []).append(key)
+        several = [tuple(part) for part in parts.values() if len(part) > 1]
+        together = {key for part in several for key in part}
+        names = [CORRELATED] if len(several) == 1 else [f"{CORRELATED}_{k + 1}" for k in range(len(several))]
+        alone = {one.key: (one.key,) for one in self.distributions if one.key not in together}
+        return alone | dict(zip(names, several, strict=True))
+
+    @cached_property
+    def _group_of(self) -> dict[str, str]:
+        return {key: group for group, keys in self.groups().items() for key in keys}
 
     def document(self) -> Document:
         """Return the table of a job file, without the number of samples, in JSON types."""
@@ -199,10 +213,10 @@ class Scatter:
 
     def in_words(self, unit: str, wanted: str) -> str:
         """State the distribution for people, in a unit that is wanted, and what it is correlated with."""
-        one, correlated = self.uncertain.distributions[self.place], self.uncertain.correlated
-        others = ", ".join(key for key in correlated if key != one.key)
-        beside = f"; correlated with {others}" if one.key in correlated else ""
-        return one.in_words(unit, wanted) + beside
+        one = self.uncertain.distributions[self.place]
+        group = next(keys for keys in self.uncertain.groups().values() if one.key in keys)
+        others = ", ".join(key for key in group if key != one.key)
+        return one.in_words(unit, wanted) + (f"; correlated with {others}" if others else "")
 
     def value(self, parameters: Parameters) -> float:
         """Return the value [SI] of the sample."""
@@ -250,6 +264,8 @@ def with_samples(schema: Schema, table: Table) -> Schema:
     known = {SAMPLE: _SAMPLE}
     if table.get("indices"):
         keys = (name.rpartition(".")[2] for name, _ in schema.flatten(table))
-        choices = (NONE, ALL, CORRELATED, *(key for key in keys if key in schema.parameters))
+        drawn = [key for key in keys if key in schema.parameters]
+        several = (f"{CORRELATED}_{k + 1}" for k in range(len(drawn) // 2))
+        choices = (NONE, ALL, CORRELATED, *several, *drawn)
         known[SWAPPED] = Parameter(NONE, "", "which are those of the second set of samples", choices=choices)
     return replace(schema, sections=schema.sections | {TABLE: known})

@@ -105,9 +105,9 @@ def _read_distribution(key: str, parameter: Parameter, raw: object, where: str) 
         warnings.warn(told, UnitWarning, stacklevel=2)
     distribution, has = Distribution(key, kind, tuple(numbers)), dict(numbers)
     if not has.get("from", -math.inf) < has.get("to", math.inf):
-        raise mismatch(where, "from below to", f"{has['from']:g} and {has['to']:g}")
+        raise mismatch(where, "from below to", f"{show(raw['from'])} and {show(raw['to'])}")
     if "mode" in has and not has["from"] <= has["mode"] <= has["to"]:
-        raise mismatch(f"{where}.mode", "a value from `from` to `to`", f"{has['mode']:g}")
+        raise mismatch(f"{where}.mode", "a value from `from` to `to`", show(raw["mode"]))
     if (share := distribution.share_within()) < _LEAST_SHARE:
         found = f"a share of {share:.1g} between them"
         raise mismatch(where, "limits between which values are likely", found)

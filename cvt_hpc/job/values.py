@@ -256,22 +256,22 @@ def warn_of_bare_numbers(parameter: Parameter, raw: object, where: str) -> None:
             return
 
 
-def check_usual(parameter: Parameter, value: object, where: str) -> None:
+def check_usual(parameter: Parameter, value: object, wanted: str, where: str) -> None:
     """Warn where the greatest of a file's values [SI] is outside the sensible range of a parameter.
 
-    InputError where it is far above it: no machine has that.
+    InputError where it is far above it: no machine has that. Both state it in the unit that is `wanted`.
     """
     found = [abs(one) for one in _items(value) if isinstance(one, float) and math.isfinite(one)]
-    most, unit = max(found, default=0.0), parameter.unit
+    most = max(found, default=0.0)
     if not most or parameter.sensible is None:
         return
     low, high = parameter.sensible
-    customary = angle_in_words(most, unit)
-    text = in_words(most, unit) + (f" ({customary})" if customary else "")
+    text = in_words(most, parameter.unit, wanted)
+    least, usual, limit = (f"{from_si(one, parameter.unit, wanted):g}" for one in (low, high, _FAR * high))
     if most > _FAR * high:
-        raise mismatch(where, f"at most {_FAR * high:g} {unit}, {_FAR:g} times the usual", text)
+        raise mismatch(where, f"at most {limit} {wanted}".rstrip() + f", {_FAR:g} times the usual", text)
     if not low <= most <= high:
-        read = f"{text} is far from the usual {low:g} to {high:g} {unit}"
+        read = f"{text} is far from the usual {least} to {usual} {wanted}".rstrip()
         warnings.warn(f"{where}: {read}; check the unit of the column", UnitWarning, stacklevel=2)
 
 

@@ -15,7 +15,7 @@ from contextlib import AbstractContextManager, contextmanager, nullcontext
 from pathlib import Path
 from typing import Any, ClassVar, Generic, NamedTuple, TypeVar
 
-from cvt_hpc.errors import InputError, mismatch
+from cvt_hpc.errors import HeldError, InputError, mismatch
 from cvt_hpc.storage import files
 from cvt_hpc.storage.locks import is_locked, locked
 
@@ -293,7 +293,7 @@ class OutputFolder(ABC, Generic[Content]):
         if tell is not None and (fresh or tell(asked)):
             return
         advice = ", or --fresh to throw away its results, which are of another job" if is_own or tell else ""
-        raise InputError(f"{complaint}; choose another --out{advice}")
+        raise HeldError(complaint, f"choose another --out{advice}")
 
 
 def checksum(entry: dict[str, Any]) -> str:

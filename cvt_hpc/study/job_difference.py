@@ -12,7 +12,7 @@ from pathlib import Path
 import numpy as np
 from numpy.typing import NDArray
 
-from cvt_hpc.errors import InputError, few_of, mismatch
+from cvt_hpc.errors import HeldError, few_of
 from cvt_hpc.job.values import Table
 from cvt_hpc.study.description import Study
 
@@ -21,11 +21,11 @@ _LONGEST = 40  # letters of a value
 _FREE = ("name", "description", "axes", "linked", "design")  # compared by the runs that they make
 
 
-def another_job(path: Path, found: Table, asked: Table, name: str = "") -> InputError:
+def another_job(path: Path, found: Table, asked: Table, name: str = "") -> HeldError:
     """Return the error that a folder holds the results of another resolved job."""
     another = f"that of another ({name}{difference_in_words(found, asked)})"
     then = "choose another name or --out, or --fresh to throw its results away"
-    return mismatch(str(path), "the folder of this job", another, then)
+    return HeldError(f"{path}: expected the folder of this job, found {another}", then)
 
 
 def difference_in_words(found: Table, asked: Table) -> str:
@@ -78,12 +78,12 @@ def short_pair(one: object, other: object) -> list[str]:
 
 
 def refuse_other(path: Path, found: Study, asked: Study) -> None:
-    """Raise InputError unless the study in a folder is the requested one, or that one has all its runs."""
+    """Raise HeldError unless the study in a folder is the requested one, or that one has all its runs."""
     if found.fingerprint != asked.fingerprint and places_in(found.job, asked.job) is None:
         raise another_job(path, found.job, asked.job, f"job {found.name}: ")
     if not have_one_layout(found, asked):
         then = "choose another --out, or --fresh to throw them away"
-        raise mismatch(str(path), "records with the quantities of this version", "others", then)
+        raise HeldError(f"{path}: expected records with the quantities of this version, found others", then)
 
 
 def have_one_layout(one: Study, other: Study) -> bool:

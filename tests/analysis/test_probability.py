@@ -14,6 +14,7 @@ from scipy.stats import sobol_indices as scipy_indices
 import cvt_hpc.accessor  # noqa: F401
 from cvt_hpc import open_results, run
 from cvt_hpc.analysis.classes import OccurrenceClass
+from cvt_hpc.analysis.figures import check_known
 from cvt_hpc.analysis.maps import map_figure
 from cvt_hpc.analysis.probability import probabilities
 from cvt_hpc.analysis.probability_drawing import onset_bands_figure, sensitivity_figure
@@ -249,6 +250,10 @@ def test_probabilities_rest_on_both_sets_of_samples_and_not_on_those_between(tmp
     unknown = dataset.copy(deep=True)
     unknown["vibrates"][3, 0, 0] = Vibrates.UNDECIDED
     assert np.isnan(unknown.cvt.indices()["total_order"]).all()
+    with pytest.raises(
+        InputError, match="total_order, found none; less than 90 % of the samples count, or all"
+    ):
+        check_known(unknown.cvt.indices(), ["total_order"], "results")
     assert dataset.cvt.indices("amplitude")["total_order"].shape == (1, 2)
     with pytest.raises(InputError, match="unknown variable; did you mean amplitude"):
         dataset.cvt.indices("amplitud")
@@ -266,7 +271,8 @@ def linear_onset(samples, along, **uncertain):
     table = {"samples": samples, "seed": 3, **uncertain}
     job = build_job({"name": "x", "model": "oscillator", "uncertain": table})
     points = [job.point(index) for index in range(job.size)]
-    values = {key: np.reshape([point[key] for point in points], job.shape) for key in ("damping", "preload")}
+    keys = ["damping", "preload", *(key for key in ("mass", "stiffness") if key in uncertain)]
+    values = {key: np.reshape([point[key] for point in points], job.shape) for key in keys}
     sets_in = 1.0 + 2.0 * values["damping"] + values["preload"] / 10.0
     classes = np.where(np.greater_equal.outer(along, sets_in), V, Q)
     parts = [
@@ -315,6 +321,24 @@ def test_half_the_scatter_of_a_parameter_narrows_the_onset_as_in_the_closed_form
     left = (np.sqrt(7.0) / 4.0) ** (2 if correlation else 1)
     assert found["effective_samples"].values == pytest.approx(1024 * left, rel=0.02)
     assert found["halved_onset"].values[1] == pytest.approx(15.0, abs=0.1)
+
+
+def test_groups_of_correlated_parameters_are_halved_each_for_itself():
+    """Each of two parameters with one on which the onset does not depend: as in the closed form without it."""
+    keys, matrix = ["mass", "damping", "preload", "stiffness"], np.eye(4)
+    matrix[0, 1] = matrix[1, 0] = 0.6
+    matrix[2, 3] = matrix[3, 2] = -0.5
+    further = {"damping": normal(5.0, 0.75), "preload": normal(40.0, 20.0)}
+    further |= {"mass": normal(1.0, 0.02), "stiffness": normal(100.0, 1.0)}
+    further["correlation"] = {"parameters": keys, "matrix": matrix.tolist()}
+    dataset = linear_onset(2048, STEPS, **further)
+    found = dataset.cvt.onset_scatter()
+    assert found["parameter"].values.tolist() == ["correlated_1", "correlated_2"]
+    assert found["halved_band"].values == pytest.approx(
+        WIDE * np.sqrt([0.75**2 + 2.0**2, 1.5**2 + 1.0]), rel=0.03
+    )
+    assert found["effective_samples"].values == pytest.approx(2048 * 7.0 / 16.0, rel=0.03)
+    assert "mass,\ndamping" in words(sensitivity_figure(dataset))
 
 
 def test_the_picture_names_correlated_parameters_and_says_where_nothing_vibrates():

@@ -30,7 +30,8 @@ def test_a_template_is_a_job_and_so_is_all_that_is_commented_out_in_it(model):
     text = job_template("first", model, "init")
     job = build_job(tomllib.loads(text))
     maps = {"auto": (9, 3), "elastic_belt": (9, 3), "oscillator": (10, 10), "belt_drive": (6, 5)}
-    shape = (maps | {"pushbelt": (3, 3)}).get(model, (3,))
+    maps |= {"pushbelt": (3, 3), "criterion": (10, 10), "slip_limit": (5, 4)}
+    shape = maps.get(model, (3,))
     assert (job.name, job.model, job.shape) == ("first", model, shape)
     assert "count = 5" in text
     # uncertain parameters, all lines of them or none
@@ -61,6 +62,20 @@ def test_the_template_of_the_oscillator_shows_the_border_of_damping(tmp_path):
     run(job, out=tmp_path)
     found = open_results(tmp_path)["vibrates"]
     assert np.all(found.values[margin > 1.3]) and not np.any(found.values[margin < 0.9])
+
+
+def test_the_template_of_the_criterion_shows_quiet_and_vibrating_slip(tmp_path):
+    run(build_job(tomllib.loads(job_template("first", "criterion", "init"))), out=tmp_path)
+    found = open_results(tmp_path)["vibrates"]
+    assert np.all(found.isel(radial_speed=0) == Vibrates.NO) and np.mean(found == Vibrates.YES) > 0.5
+
+
+def test_the_template_of_the_limit_shows_a_torque_that_grows_with_the_thrust(tmp_path):
+    """Each limit is proportional to the thrust, by eq. 2 of Bullinger et al. 2005, and differs by ratio."""
+    run(build_job(tomllib.loads(job_template("first", "slip_limit", "init"))), out=tmp_path)
+    torque = open_results(tmp_path)["limit_torque"].transpose("thrust", "ratio")
+    assert (torque / torque["thrust"]).values == pytest.approx(np.tile(torque[0] / 20e3, (5, 1)))
+    assert np.all(np.diff(torque[0]) < 0.0)
 
 
 # A quarter of the cost: the corners lie so far from the border, which hardly depends on the load, that a longer step,
@@ -332,4 +347,4 @@ def test_status_for_programs(call, tmp_path, monkeypatch):
     status, out, _ = call("status", "out/mine", "--json")
     assert (status, len(out)) == (0, 1)
     told = json.loads(out[0])
-    assert (told["name"], told["total"], told["done"], told["left"]) == ("mine", 3, 3, 0)
+    assert (told["name"], told["total"], told["done"], told["left"]) == ("mine", 100, 100, 0)

@@ -8,11 +8,21 @@ from pathlib import Path
 import numpy as np
 import pytest
 import xarray as xr
+from scipy.stats import norm
 
 from cvt_hpc.cli import main
 from cvt_hpc.errors import InputError
-from cvt_hpc.experiments.calibrate import Posterior, _lines, information, load, weigh
-from cvt_hpc.experiments.uncertain_lines import nearest_distribution
+from cvt_hpc.experiments.calibrate import (
+    BAND,
+    Posterior,
+    _lines,
+    _write_part,
+    information,
+    load,
+    told_best,
+    weigh,
+)
+from cvt_hpc.experiments.uncertain_lines import correlated_groups, nearest_distribution
 from cvt_hpc.job import load_job
 from cvt_hpc.job.uncertain import Distribution
 from cvt_hpc.study import run
@@ -113,6 +123,62 @@ def test_hidden_variators_lie_in_bands_and_in_what_is_written_as_often_as_these_
         assert abs(covered - share) < 2.5 * np.sqrt(share * (1.0 - share) / len(shares)), (share, covered)
 
 
+def of_scores(study, begins, frequency):
+    """The same study with windows and frequencies by the normal scores of the last two parameters."""
+    asked, dataset = study
+    values = np.array([dataset[key].values for key in KEYS])
+    _, one, other = norm.ppf((values.T - LOW) / (HIGH - LOW)).T
+    vibrates = SPEEDS >= begins(one, other)[:, None]
+    told = np.where(vibrates, frequency(one, other)[:, None], 0.0)[..., None]
+    changed = {
+        "vibrates": vibrates.astype(np.int8),
+        "frequency": told,
+        "amplitude": np.where(told, 1e-5, 0.0),
+    }
+    return asked, dataset.assign({name: dataset[name].copy(data=new) for name, new in changed.items()})
+
+
+@pytest.mark.slow
+def test_what_a_file_tells_of_parameters_together_is_narrow_and_holds_them(study, tmp_path):
+    """Window and frequency by the sum of two scores: each is hardly told, but their sum is."""
+
+    def begins(one, other):
+        return 110.0 + 20.0 * (one + other)
+
+    def frequency(one, other):
+        return 500.0 + 50.0 * (one + other)
+
+    changed, rng, rows = of_scores(study, begins, frequency), np.random.default_rng(8), []
+    for _ in range(64):
+        hidden = rng.normal(size=2)
+        noisy = (begins(*hidden) <= SPEEDS) ^ (rng.random(SPEEDS.size) < 0.05)
+        end = f"20,200,{(measured := frequency(*hidden) + rng.normal(0.0, 20.0)):g},{measured:g}"
+        windows = [f"{speed - 1:g},{speed + 1:g},{end}" for speed in SPEEDS[noisy]]
+        text = "\n".join([f"{WINDOW},{FREQUENCIES}", *windows, f"20,20,{end}", ""])
+        asked = asked_by(changed, tmp_path, text)
+        found = weigh(asked, changed[1])
+        if found.fault(asked.doubt):
+            continue
+        told = told_best(asked, found)
+        low, _, high = told.after.quantiles(BAND)
+        each = [np.ptp(after) / np.ptp(before) for before, after in found.bands()[1:]]
+        rows.append([low <= told.coefficients[1:] @ hidden <= high, told.width(), *each, *told.coefficients])
+    inside, width, first, second, *coefficients = np.array(rows).T
+    assert len(rows) > 55 and inside.mean() >= 0.9
+    assert np.median(width) < 0.35 and min(np.median(first), np.median(second)) > 0.5
+    assert np.median(np.abs(coefficients), axis=1) == pytest.approx([0.0, 0.5**0.5, 0.5**0.5], abs=0.15)
+
+
+@pytest.mark.parametrize("samples", [32, 64, 256])
+def test_a_file_that_tells_nothing_tells_nothing_of_parameters_together(study, tmp_path, samples):
+    """All samples have the same window: the least of the spreads of few samples is one by chance."""
+    changed = of_scores(study, lambda one, other: 100.0 + 0.0 * one, lambda one, other: 500.0 + 0.0 * one)
+    asked = asked_by(changed, tmp_path, f"{WINDOW}\n99,201,20,200\n")
+    found = weigh(asked, changed[1].isel(sample=slice(samples)))
+    assert told_best(asked, found).width() > 0.85
+    assert not any(line.startswith("told best") for line in _lines(asked, found))
+
+
 @pytest.mark.parametrize(
     ("likelihood", "kind"),
     [
@@ -179,6 +245,36 @@ def test_parameters_that_act_alike_are_not_told_apart():
     assert found.correlation()[0, 1] < -0.9
 
 
+def ranks_of(values, weights=None):
+    """Rank correlations of weighed samples (parameter, sample), and their effective number."""
+    weights = np.full(values.shape[1], 1.0) if weights is None else weights
+    weights = weights / weights.sum()
+    found = Posterior(None, None, (), values, [], weights, weights)
+    return found.correlation(), found.effective
+
+
+def test_groups_are_those_of_the_law_that_samples_were_drawn_from():
+    """A chain whose ends do not correlate, a pair, and one alone; by weights that leave half of the samples."""
+    rng, found = np.random.default_rng(5), []
+    for _ in range(50):
+        x = rng.normal(size=(6, 600))
+        values = [x[0] + x[1], x[1] + x[2], x[2] + x[3], np.exp(x[4]), x[4] - x[5], rng.random(600)]
+        ranks, effective = ranks_of(np.array(values), rng.exponential(size=600))
+        assert effective == pytest.approx(300, rel=0.2)
+        found.append(correlated_groups(ranks, effective, np.arange(6)).tolist())
+    assert np.mean([one == [0, 0, 0, 1, 1, 2] for one in found]) >= 0.9
+
+
+@pytest.mark.parametrize(("count", "samples"), [(2, 24), (4, 64), (8, 256)])
+def test_independent_parameters_pass_for_correlated_in_one_of_twenty_studies(count, samples):
+    rng, repeats = np.random.default_rng(6), 400
+    together = 0
+    for _ in range(repeats):
+        ranks, effective = ranks_of(rng.random((count, samples)), rng.exponential(size=samples))
+        together += len(np.unique(correlated_groups(ranks, effective, np.arange(count)))) < count
+    assert together / repeats < 0.05 + 2.5 * np.sqrt(0.05 * 0.95 / repeats)
+
+
 CRITERION = """
 name = "y"
 model = "criterion"
@@ -241,14 +337,42 @@ def test_runs_that_are_there_are_weighed_and_what_is_left_of_them_is_done(tmp_pa
     assert main(command) == 0 and int(find_records(out / "samples", job).recorded.sum()) < job.size
     assert {path: path.stat().st_mtime_ns for path in (out / "records").rglob("*")} == before
     shutil.rmtree(out / "samples")
-    # what --fresh repeats has a folder of its own; that of another job is refused, as by `run`
+    # that of another job is refused, as by `run`; --fresh throws none of it away, and is not offered
     capsys.readouterr()
-    others = [*command, "--set", "uncertain.seed=2"]
-    assert main(others) == 2 and not (out / "samples").exists()
-    (line,) = capsys.readouterr().err.splitlines()
-    assert f"{Path('out/y')}: expected the folder of this job, found that of another" in line
-    assert main([*others, "--fresh"]) == 0 and (out / "samples").exists()
+    for option in ([], ["--fresh"]):
+        assert main([*command, "--set", "uncertain.seed=2", *option]) == 2 and not (out / "samples").exists()
+        (line,) = capsys.readouterr().err.splitlines()
+        assert f"{Path('out/y')}: expected the folder of this job, found that of another" in line
+        assert line.endswith("; choose another name or --out")
+    # what --fresh repeats of this job has a folder of its own
+    assert main([*command, "--fresh"]) == 0 and (out / "samples").exists()
     assert {path: path.stat().st_mtime_ns for path in (out / "records").rglob("*")} == before
+
+
+def test_what_is_written_correlates_what_the_file_does_not_tell_apart_and_nothing_else(study, tmp_path):
+    """The window begins by the sum of two shares: where one is larger, the other is less."""
+    asked, dataset = study
+    values = np.array([dataset[key].values for key in KEYS])
+    shares = (values.T - LOW) / (HIGH - LOW)
+    vibrates = SPEEDS >= 60.0 + 60.0 * (shares[:, 1] + shares[:, 2])[:, None]
+    dataset = dataset.assign(vibrates=dataset["vibrates"].copy(data=vibrates.astype(np.int8)))
+    asked = asked_by(study, tmp_path, "onset_radial_speed [mm/s]\n120\n")
+    path = _write_part(asked, weigh(asked, dataset), tmp_path / "calibrated.toml")
+    (tmp_path / "x.toml").write_text(JOB)
+    (tmp_path / "z.toml").write_text(JOB[: JOB.index("[uncertain]")] + path.read_text())
+    job = load_job(tmp_path / "z.toml", ["uncertain.indices=true"])
+    assert job.axes[-1].values == ("none", "all", "transverse_damping", "correlated")
+    (uncertain,) = {rule.source.uncertain for rule in job.rules}
+    assert uncertain.groups()["correlated"] == ("stribeck_velocity", "friction_memory")
+    assert -1.0 < uncertain.matrix[0][1] < -0.8
+    # of a file that tells each of them nothing is correlated, but for what was so before
+    rng = np.random.default_rng(4)
+    asked = asked_by(study, tmp_path, measured_windows(np.array([0.5, 0.5, 0.5]), rng))
+    assert "correlation" not in _write_part(asked, weigh(asked, study[1]), path).read_text()
+    stated = {"parameters": ["friction_memory", "transverse_damping"], "matrix": [[1.0, 0.3], [0.3, 1.0]]}
+    before = load_job(tmp_path / "x.toml", {"uncertain.correlation": stated})
+    text = _write_part(asked._replace(job=before), weigh(asked, study[1]), path).read_text()
+    assert 'parameters = ["transverse_damping", "friction_memory"]' in text
 
 
 def test_too_few_samples_that_agree_are_no_result(study, tmp_path):

@@ -18,6 +18,7 @@ from cvt_hpc.experiments.measured_friction import (
     fit_laws,
     job_lines,
     keys_of,
+    law_lines,
     read_points,
 )
 from cvt_hpc.job import build_job, load_job
@@ -73,6 +74,21 @@ def test_intervals_hold_the_truth_as_often_as_they_promise(correlation):
         spare = found.independent * len(speeds) - len(wanted)
         inside.append(abs(found.estimate - wanted) < t.ppf(0.975, spare) * deviation)
     assert (np.mean(inside, axis=0) >= 0.9).all(), np.mean(inside, axis=0)
+
+
+def test_a_law_that_few_points_cannot_prove_is_told():
+    """Of six points that fall on a curve a constant is the best, by its one parameter; of ten the curve is."""
+    few = points(
+        np.array([0.139, 0.132, 0.123, 0.116, 0.105, 0.1]),
+        np.array([1.0, 10.0, 25.5, 50.0, 100.0, 400.0]) / 1e3,
+    )
+    laws = fit_laws(few)
+    (line,) = (line for line in law_lines(laws, few) if "closer" in line)
+    assert laws[0].law is Law.COULOMB
+    assert line.startswith("stribeck is much closer to the points, but 6 points are few for its 3 parameters")
+    many = points(of_law(Law.STRIBECK) + 0.0005 * np.random.default_rng(1).normal(size=10))
+    laws = fit_laws(many)
+    assert laws[0].law is Law.STRIBECK and not any("closer" in line for line in law_lines(laws, many))
 
 
 def test_scatter_is_that_of_the_specimens_and_not_of_their_number():

@@ -12,7 +12,7 @@ from cvt_hpc.errors import InputError, UnitWarning
 from cvt_hpc.job import build_job
 from cvt_hpc.job.definition import handed_to
 from cvt_hpc.job.summary import rules_in_words
-from cvt_hpc.job.uncertain import read_document
+from cvt_hpc.job.uncertain import Distribution, Uncertain, read_document
 
 NORMAL = {"distribution": "normal", "mean": "20 kN", "standard_deviation": "1 kN"}
 LOG_NORMAL = {"distribution": "log_normal", "mean": "2 kg/m", "standard_deviation": "0.5 kg/m"}
@@ -136,6 +136,27 @@ class TestSamples:
             assert np.corrcoef(sets[which].T)[0, 1] == pytest.approx(0.9, abs=0.02)
         assert (sets["correlated"] == sets["all"]).all() and (sets["none"] != sets["all"]).all()
 
+    def test_those_that_correlations_connect_are_swapped_together_and_others_alone(self):
+        """Of a chain and of a pair, told in any order, and of one that is correlated with none."""
+        keys = ["thrust", "load", "element_mass", "kinetic_friction", "static_friction", "driving_speed"]
+        matrix = np.eye(6)
+        for i, j, share in ((0, 2, 0.5), (2, 5, -0.4), (1, 4, 0.9)):
+            matrix[i, j] = matrix[j, i] = share
+        drawn = tuple(Distribution(key, "uniform", (("from", 1.0), ("to", 2.0))) for key in sorted(keys))
+        uncertain = Uncertain(drawn, 0, tuple(keys), tuple(map(tuple, matrix.tolist())), True)
+        chain, pair = ("thrust", "element_mass", "driving_speed"), ("load", "static_friction")
+        alone = {"kinetic_friction": ("kinetic_friction",)}
+        assert uncertain.groups() == {**alone, "correlated_1": chain, "correlated_2": pair}
+        for place, one in enumerate(drawn):
+            first, second = (uncertain.value(place, 3, which) for which in ("none", "all"))
+            own = {name: uncertain.value(place, 3, name) for name in uncertain.groups()}
+            assert first != second
+            assert own == {n: second if one.key in keys else first for n, keys in uncertain.groups().items()}
+
+    def test_a_matrix_without_correlations_makes_no_group(self):
+        job = toy(correlated([[1.0, 0.0], [0.0, 1.0]]) | {"indices": True})
+        assert job.axes[-1].values == ("none", "all", "element_mass", "thrust")
+
     def test_overrides_take_a_sample_or_a_value(self):
         table = {"samples": 8, "thrust": NORMAL, "element_mass": LOG_NORMAL}
         job = toy(table)
@@ -221,6 +242,10 @@ def correlated(matrix, parameters=("thrust", "element_mass")):
         ),
         ({"samples": 8, "thrust": NORMAL | {"standard_deviation": 0}}, "standard_deviation: expected > 0 N"),
         ({"samples": 8, "thrust": NORMAL | {"from": 3e4, "to": 2e4}}, "thrust: expected from below to"),
+        (
+            {"samples": 8, "thrust": NORMAL | {"from": "30 kN", "to": "20 kN"}},
+            'thrust: expected from below to, found "30 kN" and "20 kN"',
+        ),
         ({"samples": 8, "thrust": NORMAL | {"from": 4e4}}, "expected limits between which values are likely"),
         (
             {"samples": 8, "thrust": {"distribution": "triangular", "from": 1, "mode": 3, "to": 2}},

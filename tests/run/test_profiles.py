@@ -3,6 +3,7 @@
 import gc
 import sys
 
+import netCDF4
 import numpy as np
 import pytest
 from hypothesis import given
@@ -11,6 +12,7 @@ from hypothesis import strategies as st
 from cvt_hpc.errors import InputError, JobWarning, UnitWarning
 from cvt_hpc.experiments import growth
 from cvt_hpc.job import build_job
+from cvt_hpc.job.summary import summarize
 from cvt_hpc.models.elastic_belt.grouping import lane_key
 from cvt_hpc.variables import Vibrates
 from cvt_hpc.variator.course import multiple_at, profile_table, slope_at
@@ -155,12 +157,41 @@ def test_an_axis_takes_the_place_of_a_measured_greatest_value(tmp_path):
 def test_a_long_file_is_averaged_over_equal_parts(tmp_path):
     times = np.arange(5000) / 1e4
     rows = [f"{time:.4f},{100 + 10 * time + (-1) ** k}" for k, time in enumerate(times)]
-    with pytest.warns(JobWarning, match=r"rig.csv: 5000 times from 0 to 0.4999 s, averaged over 1000 parts"):
+    with pytest.warns(
+        JobWarning, match=r"rig.csv: 5000 times from 0 s to 0.4999 s, averaged over 1000 parts"
+    ):
         job = course_job(tmp_path, "\n".join(["time [s],load [N m]", *rows]), run={"duration": "0.5 s"})
+    told = "5000 times from 0 s to 0.4999 s, averaged over 1000 parts"
+    (line,) = (line for line in summarize(job, 1.0).split("\n") if line.split()[:1] == ["profile_time"])
+    assert told in line
     point = job.point(0)
     at, load = np.array(point["profile_time"]), point["load"] * np.array(point["load_profile"])
     assert at.size == 1000 and max(point["load_profile"]) == 1.0  # an axis gives the greatest that is driven
     assert load == pytest.approx(100 + 10 * at, abs=0.25)  # alternating samples cancel but for one in five
+
+
+@pytest.mark.parametrize(
+    ("speeds", "unit", "expected"),
+    [
+        ((2900.0, -2950.0), "rpm", "entry 2: expected a driving_speed above 0, found -2950 rpm"),
+        ((2900.0, -2950.0), "1/min", "entry 2: expected a driving_speed above 0, found -2950 rpm"),
+        ((2900.0, -300.0), "rad/s", "entry 2: expected a driving_speed above 0, found -300 rad/s"),
+        (
+            (1.0, 2.9e6),
+            "rpm",
+            "driving_speed: expected at most 763944 rpm, 100 times the usual, found 2900000 rpm",
+        ),
+    ],
+)
+def test_errors_of_netcdf_have_the_units_of_the_file(tmp_path, speeds, unit, expected):
+    with netCDF4.Dataset(tmp_path / "rig.nc", "w") as file:
+        file.createDimension("time", 2)
+        for name, values, own in (("time", (0.0, 100.0), "ms"), ("driving_speed", speeds, unit)):
+            variable = file.createVariable(name, "f8", ("time",))
+            variable[:], variable.units = values, own
+    document = {"name": "x", "model": "elastic_belt", "profiles": {"profile_file": "rig.nc"}}
+    with pytest.raises(InputError, match=expected):
+        build_job(document, str(tmp_path / "x.toml"))
 
 
 def test_what_no_rig_measures_is_told(tmp_path):
@@ -179,6 +210,7 @@ SAMPLED = "\n".join(["time [s],load [N m]", *(f"{k / 100 + (k > 25)},{80 + k % 3
         ("time [s]\n0\n1\n", "expected a column beside time, found none"),
         ("time [s],load [N m]\n0,1\n", "expected two times or more, found 1"),
         ("time [s],load [N m]\n0,1\n1,2\n0.5,3\n", "line 4: expected a time after 1 s, .* found 0.5 s"),
+        ("time [ms],load [N m]\n0,1\n200,2\n100,3\n", "a time after 200 ms, .* found 100 ms"),
         (SAMPLED, "line 28: expected samples every 0.01 s without a gap, found none from 0.25"),
         ("time [s],load [N m]\n0,1\n9,2\n", "duration: expected 9 s or more, the end of profile_time"),
         ("time [s],thrust [kN]\n0,50\n0.1,-1\n", "line 3: expected a thrust above 0, found -1 kN"),
@@ -187,7 +219,7 @@ SAMPLED = "\n".join(["time [s],load [N m]", *(f"{k / 100 + (k > 25)},{80 + k % 3
             "time [s],load [N m]\n0,1\n1,1e9\n",
             "profile_file: rig.csv: load: expected at most 200000 N m, .*, found 1000000000 N m",
         ),
-        ("time [s],speed [rpm]\n0,1\n1,2900000\n", r"at most 80000 rad/s, .*, found .* \(2.9e\+06 rpm\)"),
+        ("time [s],speed [rpm]\n0,1\n1,2900000\n", r"at most 763944 rpm, .*, found 2900000 rpm"),
         ("time [s],load [rpm]\n0,1\n1,2\n", "line 1: expected load .N m., found"),
         ("time [s],grip [N]\n0,1\n1,2\n", "expected columns among time"),
         ("time [s],load [N m]\n0,1\n1,\n", "line 3"),
