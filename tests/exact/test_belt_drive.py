@@ -53,7 +53,7 @@ def add(made, found, tau):
 def moving():
     draw = np.random.default_rng(5)
     q = ring(LENGTHS, 1.0)
-    return q + 2e-3 * draw.normal(size=q.shape), 0.3 * draw.normal(size=q.shape), np.array([3.0, -2.0, 0.7])
+    return q + 2e-3 * draw.normal(size=q.shape), 0.3 * draw.normal(size=q.shape), np.array([3.0, -2.0, 20.0])
 
 
 def at(made, q, u, speeds):

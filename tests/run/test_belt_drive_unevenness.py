@@ -5,6 +5,7 @@ import pytest
 
 from cvt_hpc.errors import InputError
 from cvt_hpc.job import build_job
+from cvt_hpc.models.belt_drive.roughness import heights
 from cvt_hpc.models.belt_drive.transient import Transient
 from cvt_hpc.physics.nearest_on_path import along
 
@@ -86,6 +87,17 @@ def lines(shaken):
             ends.append(np.append(ROUGHNESS * np.sqrt(2.0 / WAVES) * rough, eccentric))
         expected.append(moving_string(run, strand, omega, *ends))
     return found, np.array(expected).T
+
+
+def test_heights_of_a_belt_have_their_root_mean_square_and_their_decay():
+    p = job(roughness_decay=1.5).point(0) | {"contact_points": 4}
+    found = heights(p, np.full(100, 0.01))
+    assert found.shape == (100, 4)
+    assert found.std() == pytest.approx(ROUGHNESS, rel=1e-9) and abs(found.mean()) < 1e-9 * ROUGHNESS
+    size = abs(np.fft.rfft(found.ravel()))
+    wave = np.arange(1, WAVES + 1)
+    np.testing.assert_allclose(size[wave] / size[1], wave**-1.5, rtol=1e-9)
+    assert size[WAVES + 1 :].max() < 1e-9 * size[1]
 
 
 def test_a_rough_belt_shakes_its_strands_as_strings_whose_ends_move(lines):
