@@ -59,7 +59,8 @@ def _compensated_by_rings(kept: Kept) -> Measured:
 def _close_to_transition(kept: Kept) -> Measured:
     before, near, behind = (_push(kept, "t1", r) - _push(kept, "t2", r) for r in (LOW, NEAR, HIGH))
     said = f"P_t1 - P_t2 {listed(before)} N at r 0, 0.15; {near[0]:.3g} N at 0.3; {listed(behind)} N beyond"
-    return Measured([(before < 0.0).all() and (behind > 0.0).all(), abs(near[0]) < CLOSE * behind[-1]], said)
+    changes = (before < 0.0).all() and (behind > 0.0).all()
+    return Measured([changes and abs(near[0]) < CLOSE * behind[-1]], said)
 
 
 def _reversed(kept: Kept) -> Measured:

@@ -228,7 +228,7 @@ def _two_areas(kept: Kept, stiffness: float) -> Measured:
 
 def _lower_area_goes(kept: Kept) -> Measured:
     inside = [_largest_inside(kept, stiffness) for stiffness in (1.0, 1.5)]
-    return Measured([inside[0] > THRESHOLD, inside[1] < THRESHOLD],
+    return Measured([inside[0] > THRESHOLD > inside[1]],  # only what is there can disappear
                     f"80-120 N m: {inside[0]:.2g} um at x1, {inside[1]:.2g} um at x1.5")  # fmt: skip
 
 
@@ -252,7 +252,8 @@ FIGURE_3_14 = (
               lambda kept: _two_areas(kept, 1.0), SECOND_AREA),
     Statement("This is also true if the stiffness of the sheaves is 20 % increased",
               lambda kept: _two_areas(kept, 1.2), SECOND_AREA),
-    Statement("At 50 % more the oscillations between 80 and 120 N m disappear", _lower_area_goes),
+    Statement("At 50 % more the oscillations between 80 and 120 N m disappear", _lower_area_goes,
+              "nothing vibrates there with any stiffness of the discs, so nothing disappears"),
     Statement("and the belt starts to oscillate firstly at about 200 N m", _starts_at_200, SECOND_AREA),
     Statement("In case of non-elastic sheaves the vibration disappears completely", _rigid_is_quiet),
 )  # fmt: skip

@@ -136,6 +136,18 @@ def with_point(**values):
     return change
 
 
+def with_job(**values):
+    """Other values of parameters in the job."""
+
+    def change(dataset):
+        job = json.loads(dataset.attrs["job"])
+        (table,) = (of for of in job.values() if isinstance(of, dict) and values.keys() <= of.keys())
+        table |= values
+        return dataset.assign_attrs(job=json.dumps(job))
+
+    return change
+
+
 def steady(history):
     """An element that does not swing."""
     name = "momentary_radial_sliding"
@@ -160,6 +172,11 @@ def lowest_load(dataset):
     return dataset
 
 
+SPECTRA = (
+    results(strands_swapped("spectrum", "eigenfrequency")), results(level("spectrum")),
+    results(strands_swapped("spectrum", "eigenfrequency")),
+    results(along_swapped("frequency_bin", "spectrum")),
+)  # fmt: skip
 # what is broken, by figure and in the order of its statements
 BREAKS = {
     "bullinger_04": (
@@ -237,16 +254,14 @@ BREAKS = {
         results(scaled("loss", 2.0)), results(along_swapped("thrust", "flank_loss")),
         results(along_swapped("thrust", "ring_loss")), results(along_swapped("thrust", "efficiency")),
     ),
+    "belt_drive_friction": (results(with_job(table_mu=[[0.5] * 3] * 3)),),
     "belt_drive": (results(scaled("speed_loss", 0.5)), results(scaled("vibrates", 0))),
     "belt_drive_tension": (
         histories(as_tension("normal_force")), histories(as_tension("friction_force")),
         results(along_swapped("bending_stiffness", "strand_tension")),
     ),
-    "belt_drive_spectra": (
-        results(strands_swapped("spectrum", "eigenfrequency")), results(level("spectrum")),
-        results(strands_swapped("spectrum", "eigenfrequency")),
-        results(along_swapped("frequency_bin", "spectrum")),
-    ),
+    "belt_drive_spectra": SPECTRA,
+    "belt_drive_roughness": SPECTRA,
     "serpentine": (
         histories(with_point(ripple_frequency=80.0)), histories(scaled("tension_P3-P4", 10.0)),
         histories(scaled("arm_T2", 0.0)), histories(scaled("speed_P5", 0.9)),

@@ -102,7 +102,15 @@ def test_losses_of_contacts_stand_over_the_clamping_force():
 
 
 @pytest.mark.parametrize(
-    "name", ["push_force", "belt_drive", "belt_drive_tension", "belt_drive_spectra", "misalignment"]
+    "name",
+    [
+        "push_force",
+        "belt_drive",
+        "belt_drive_tension",
+        "belt_drive_spectra",
+        "belt_drive_friction",
+        "misalignment",
+    ],
 )
 def test_figures_by_other_pictures_are_drawn(name):
     assert all(axes.lines or axes.collections for axes in drawn(name).axes if axes.get_visible())

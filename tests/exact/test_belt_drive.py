@@ -27,18 +27,21 @@ STRUT = pulleys.struts(
 )
 ARM = pulleys.Arms(PIVOT, *np.array([[0.003], [2.0], [30.0], [0.4], [-0.1], [-0.02]]), 500.0, STRUT)
 ANGLE = np.array([0.05])
+ROUND, ECCENTRIC = np.zeros(2), np.array([0.004, 0.006])  # run-out [m]
+PHASE = np.array([0.4, -1.1])  # [rad]
+ROUGH = 1e-3 * np.sin(np.arange(18.0)).reshape(6, 3)  # heights of the belt [m]
+UNEVEN = [pytest.param(ROUND, 0.0 * ROUGH, id="smooth"), pytest.param(ECCENTRIC, ROUGH, id="uneven")]
 
 
-def drive(treatment=Treatment.REGULARISED, **values):
+def drive(treatment=Treatment.REGULARISED, run_out=ROUND, height=0.0 * ROUGH, **values):
     """A ring of 0.1 m radius that rubs on a pulley inside and on one on an arm that reaches in from outside."""
     law = friction_law("stribeck", 0.3, -0.5, 0.4)
     body = beam(LENGTHS, 0.9, 300.0, 2.0)
     centre, radius = np.array([[0.0, 0.0], [0.15, 0.01]]), np.array([0.11, 0.09])
     rubbing = Friction(treatment, law, 0.2, 1e6, 1e-9, 1e4)
-    touching = contact.Contact(contact.contact_shapes(3), 4e4, 300.0, rubbing)._replace(**values)
-    return Drive(
-        body, pulleys.Pulleys(centre, radius, np.array([0.0, 0.02]), np.array([-1, 0]), ARM), touching
-    )
+    touching = contact.Contact(contact.contact_shapes(3), 4e4, 300.0, rubbing, height, height.max())
+    wheels = pulleys.Pulleys(centre, radius, np.array([0.0, 0.02]), np.array([-1, 0]), ARM, run_out, PHASE)
+    return Drive(body, wheels, touching._replace(**values))
 
 
 def add(made, found, tau):
@@ -50,7 +53,7 @@ def add(made, found, tau):
 def moving():
     draw = np.random.default_rng(5)
     q = ring(LENGTHS, 1.0)
-    return q + 2e-3 * draw.normal(size=q.shape), 0.3 * draw.normal(size=q.shape), np.array([3.0, -2.0, 0.7])
+    return q + 2e-3 * draw.normal(size=q.shape), 0.3 * draw.normal(size=q.shape), np.array([3.0, -2.0, 20.0])
 
 
 def at(made, q, u, speeds):
@@ -58,7 +61,7 @@ def at(made, q, u, speeds):
     found = state(made, q, u, speeds[:2], ANGLE + TAU * speeds[2])
     chain, wheels, touch = found.chain, found.wheels, found.touch
     chain.stage_q[:], chain.stage_v[:], wheels.stage_speed[0] = q, u, speeds
-    wheels.start_speed[0] = moving()[2]
+    wheels.start_speed[0], wheels.stage_rotation[0] = moving()[2], 0.7 + TAU * speeds[:2]
     pulleys.place_axes(made.pulleys, wheels)
     bristles = touch.memory.shear_start
     bristles[:] = 2e-3 * np.sin(np.arange(bristles.size)).reshape(bristles.shape)
@@ -78,10 +81,11 @@ def forces(made, q, u, speeds):
     return np.append(found.chain.columns.data[:6, :, 2].ravel(), found.wheels.corner.data[0, :, 2])
 
 
+@pytest.mark.parametrize(("run_out", "height"), UNEVEN)
 @pytest.mark.parametrize("treatment", [Treatment.REGULARISED, Treatment.BRISTLE])
-def test_slopes_of_contacts_are_those_of_their_forces(treatment):
+def test_slopes_of_contacts_are_those_of_their_forces(treatment, run_out, height):
     """By central differences of a stage, in which positions follow speeds; friction does not fall with force."""
-    made, (q, u, speeds) = drive(treatment), moving()
+    made, (q, u, speeds) = drive(treatment, run_out, height), moving()
     found = at(made, q, u, speeds)
     assert (found.touch.normal.sum(axis=(1, 2)) > 1.0).all() and (found.touch.normal == 0.0).any()
     matrix = np.zeros((26, 26))
@@ -104,9 +108,10 @@ def test_slopes_of_contacts_are_those_of_their_forces(treatment):
         np.testing.assert_allclose(slope, matrix[:, k], rtol=0, atol=3e-7 * abs(matrix[:, k]).max())
 
 
-def test_contacts_give_pulleys_what_they_take_of_the_belt_but_for_losses():
+@pytest.mark.parametrize(("run_out", "height"), UNEVEN)
+def test_contacts_give_pulleys_what_they_take_of_the_belt_but_for_losses(run_out, height):
     """Contacts of dampers alone store nothing."""
-    made, (q, u, speeds) = drive(stiffness=0.0), moving()
+    made, (q, u, speeds) = drive(run_out=run_out, height=height, stiffness=0.0), moving()
     zero = np.zeros(1)
     free = ARM._replace(moment=zero, stiffness=zero, damping=zero, stop=0.0, struts=pulleys.no_struts(1))
     made = made._replace(pulleys=made.pulleys._replace(arms=free))
@@ -118,6 +123,36 @@ def test_contacts_give_pulleys_what_they_take_of_the_belt_but_for_losses():
     lost = power[pulleys.CONTACT_LOSS] + power[pulleys.FRICTION_LOSS :].sum()
     assert of_belt + of_pulley + of_arm - power[pulleys.WORK_IN] == pytest.approx(-lost, rel=1e-12)
     assert lost > 0.1 and abs(power[pulleys.WORK_IN]) > 0.01
+
+
+def test_springs_of_uneven_contacts_store_the_power_that_they_take():
+    """By the energy stiffness depth^2 / 2, a moment before and after, along the distance from the rim's middle.
+
+    The rims are circles about a middle off the axis, which the contacts take to the first order of run-out over
+    radius: here its square leaves 0.1 %.
+    """
+    sprung, (q, u, speeds) = drive(run_out=ECCENTRIC / 5, height=ROUGH, damping=0.0), moving()
+    zero = np.zeros(1)
+    free = ARM._replace(moment=zero, stiffness=zero, damping=zero, stop=0.0, struts=pulleys.no_struts(1))
+    made = sprung._replace(pulleys=sprung.pulleys._replace(arms=free))
+    found = at(made, q, u, speeds)
+    power = found.wheels.power
+    given = (found.chain.columns.data[:6, :, 2] * u).sum() - power[pulleys.WORK_IN]
+    given += found.wheels.corner.data[0, :, 2] @ speeds[1:]
+    touches = found.touch.normal > 0.0
+    weight = LENGTHS[:, None] / 3.0
+
+    def energy(time):
+        wheels = state(made, q, u, speeds[:2], ANGLE + (TAU + time) * speeds[2]).wheels
+        angle = 0.7 + (TAU + time) * speeds[:2] + PHASE
+        middle = wheels.centre + (ECCENTRIC / 5 * np.array([np.cos(angle), np.sin(angle)])).T
+        away = at_places(made.beam, q + time * u, made.contact.shape) - middle[:, None, None]
+        depth = made.pulleys.radius[:, None, None] + ROUGH - np.hypot(*np.moveaxis(away, -1, 0))
+        return (0.5 * made.contact.stiffness * weight * depth**2 * touches).sum()
+
+    stored = (energy(1e-6) - energy(-1e-6)) / 2e-6
+    lost = power[pulleys.FRICTION_LOSS :].sum()
+    assert abs(stored) > 1.0 and given == pytest.approx(-stored - lost, rel=2e-3)
 
 
 def test_an_arm_has_the_moment_by_its_energy_but_for_what_dashpots_take():

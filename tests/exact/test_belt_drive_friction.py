@@ -22,10 +22,13 @@ IMPLICIT_EULER, DT = Scheme(1.0, 1.0, 1.0), 2e-3
 def drive(treatment, points=2, **values):
     """A ring of 0.1 m radius that rubs on a pulley inside and on one that reaches in from outside."""
     rubbing = Friction(treatment, friction_law("coulomb", MU, 0.0, 1.0), 1e-3, 1e6, 1e-9, 1e5)
-    touching = contact.Contact(contact.contact_shapes(points), STIFFNESS, DAMPING, rubbing._replace(**values))
+    rubbing, flat = rubbing._replace(**values), np.zeros((len(LENGTHS), points))
+    touching = contact.Contact(contact.contact_shapes(points), STIFFNESS, DAMPING, rubbing, flat, 0.0)
     none = np.zeros(0)
     arms = pulleys.Arms(np.zeros((0, 2)), *[none] * 6, 0.0, pulleys.no_struts(0))
-    turning = pulleys.Pulleys(CENTRE, RADIUS, np.array([0.0, INERTIA]), np.array([-1, -1]), arms)
+    turning = pulleys.Pulleys(
+        CENTRE, RADIUS, np.array([0.0, INERTIA]), np.array([-1, -1]), arms, *np.zeros((2, 2))
+    )
     return Drive(beam(LENGTHS, 0.9, 300.0, 2.0), turning, touching)
 
 

@@ -18,9 +18,11 @@ STIFFNESS, SHEAR = 4e4, 1e5
 def pressed(treatment):
     """A ring pressed by a pulley inside and by one that reaches in from outside, at rest; all contacts slide."""
     rubbing = Friction(treatment, friction_law("coulomb", 0.3, 0.0, 1.0), 1e-3, 1e6, 1e-9, SHEAR)
-    touching = contact.Contact(contact.contact_shapes(3), STIFFNESS, 300.0, rubbing)
+    touching = contact.Contact(contact.contact_shapes(3), STIFFNESS, 300.0, rubbing, np.zeros((6, 3)), 0.0)
     arms = pulleys.Arms(np.zeros((0, 2)), *[np.zeros(0)] * 6, 0.0, pulleys.no_struts(0))
-    turning = pulleys.Pulleys(CENTRE, RADIUS, np.array([0.0, 0.02]), np.array([-1, -1]), arms)
+    turning = pulleys.Pulleys(
+        CENTRE, RADIUS, np.array([0.0, 0.02]), np.array([-1, -1]), arms, *np.zeros((2, 2))
+    )
     made = Drive(beam(LENGTHS, 0.9, 300.0, 2.0), turning, touching)
     q = ring(LENGTHS, 1.0) + 2e-3 * np.random.default_rng(5).normal(size=(6, 4))
     found = state(made, q, np.zeros_like(q), np.zeros(2))

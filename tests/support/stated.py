@@ -345,6 +345,18 @@ def clamping():
     return Kept(found.assign_coords(pulley=["driving", "driven"]), [])
 
 
+def belt_drive_friction():
+    """A table that falls with the force and rises with the speed."""
+    table = {
+        "table_force": [1e3, 6e3, 2e4],
+        "table_speed": [0.0, 0.005, 0.5],
+        "table_mu": [[0.5, 0.6, 0.7], [0.4, 0.5, 0.6], [0.3, 0.4, 0.5]],
+    }
+    axes = {"friction_law": ["coulomb", "table"], "load": [8.0, 16.0]}
+    job = build_job({"name": "made_up", "model": "belt_drive", "axes": axes, "friction": table})
+    return Kept(results(axes).assign_attrs(job=json.dumps(job.resolved())), [])
+
+
 def belt_drive():
     load = np.array([0.0, 8.0, 16.0, 22.0])
     creep = np.tile(1.3e-4 * load, (2, 1))
@@ -388,6 +400,10 @@ def belt_drive_spectra():
         spectrum=(("load", "strand", "frequency_bin"), 1e-7 + 1e-5 * lines.sum(axis=2)),
     )
     return Kept(found.assign_coords(half_waves=waves, frequency_bin=bins), [])
+
+
+def belt_drive_roughness():
+    return belt_drive_spectra()
 
 
 def serpentine():

@@ -19,7 +19,16 @@ from cvt_hpc import recording
 from cvt_hpc.errors import show
 from cvt_hpc.models.belt_drive.courses import PARAMETERS as COURSES
 from cvt_hpc.models.belt_drive.courses import course_inert, course_problems, free_length
-from cvt_hpc.models.belt_drive.layout import LAYOUT, TENSIONER, TWO, layout, layout_inert, layout_problems
+from cvt_hpc.models.belt_drive.layout import (
+    LAYOUT,
+    TENSIONER,
+    TWO,
+    layout,
+    layout_inert,
+    layout_problems,
+    run_out_problems,
+)
+from cvt_hpc.models.belt_drive.roughness import ROUGHNESS, roughness_inert, roughness_problems
 from cvt_hpc.parameters import Parameter, Parameters, not_negative, positive
 from cvt_hpc.physics.friction_laws import friction_inert, friction_problems
 from cvt_hpc.steppers import STEPPERS as GENERAL
@@ -84,6 +93,7 @@ PARAMETERS: dict[str, dict[str, Parameter]] = {
             0.12, "", "largest share by which the lengths of elements differ", minimum=0.0, maximum=0.5
         ),
         "seed": Parameter(1, "", "seed of these lengths", minimum=0),
+        **ROUGHNESS,
     },
     "contact": {
         "contact_points": Parameter(
@@ -140,7 +150,7 @@ __all__ = ["COMPARED", "DEFAULT_STEPPER", "KICK", "PARAMETERS", "REFUSED", "STEP
 def check(parameters: Parameters) -> list[tuple[str, str, str]]:
     """Problems that lie between parameters [SI]: (key, expected, found) of each."""
     p = parameters
-    problems = layout_problems(p) or _beside_lists(p)
+    problems = layout_problems(p) or _beside_lists(p) or run_out_problems(p)
     if problems:
         return problems
     path = layout(p).path
@@ -164,6 +174,7 @@ def check(parameters: Parameters) -> list[tuple[str, str, str]]:
     if p["contact_stiffness"] < stiffness:
         expected = f"at least {stiffness:g} N/m^2, by which the belt sinks in by {DEEPEST:.0%} of the radius"
         problems.append(("contact_stiffness", expected, f"{p['contact_stiffness']:g} N/m^2"))
+    problems += roughness_problems(p, float(path.radius.min()))
     return problems + rise_problems(p) + course_problems(p) + friction_problems(p)
 
 
@@ -185,4 +196,5 @@ def inert(parameters: Parameters) -> dict[str, str]:
     for key, its_own in (("friction_speed", "regularised"), ("shear_stiffness", "bristle")):
         if treatment != its_own:
             found[key] = f"friction_treatment {treatment}"
+    found |= roughness_inert(parameters)
     return friction_inert(parameters) | layout_inert(parameters) | course_inert(parameters) | found

@@ -1,10 +1,16 @@
 """Contacts of the belt with its pulleys: forces at points along the belt, and their slopes.
 
 Each element has points at equal distances that may touch each pulley. A point of the belt at distance
-d < R from the pulley's axis is pressed by R - d into the pulley's rim of radius R, with the normal force per
-length
+d < R + h + b from the pulley's axis is pressed by the depth R + h + b - d into the rim, with the normal force
+per length
 
-    p = max(stiffness (R - d) + damping d/dt (R - d), 0).
+    p = max(stiffness depth + damping d/dt depth, 0).
+
+R is the pulley's radius, b the height of the belt's surface at the point, which moves along with it, and h
+that of an eccentric rim, run_out cos(psi), with the angle psi from the rim's highest place to the point. The
+rim has the slope s = h' / d there, by which p pushes the belt by -s p around the axis and turns the pulley by
+s p d. So p has the energy stiffness depth^2 / 2, and its damping takes damping (d depth / dt)^2, whatever
+moves.
 
 A point that approaches is pressed shortly before it is there, so that p has no jump. The rubber between the
 belt's cord and the rim turns with the pulley, so that the cord slides by the speed t . dr/dt - w d over it.
@@ -33,6 +39,9 @@ class Contact(NamedTuple):
     stiffness: float
     damping: float
     friction: Friction  # how they rub
+    # height, highest: of the belt's surface over its mean, at each element's points, (k, C) [m]; the largest
+    height: np.ndarray
+    highest: float
 
 
 class Touch(NamedTuple):
@@ -90,12 +99,14 @@ def add_contacts(
     for i in range(n):
         j = (i + 1) % n
         l0 = lengths[i]
-        reach = _reach(q, i, j, l0)
+        reach = _reach(q, i, j, l0) + contact.highest
         weight = l0 / points
         for p in range(pulleys.radius.size):
             radius, centre_x, centre_y = pulleys.radius[p], wheels.centre[p, 0], wheels.centre[p, 1]
-            if (q[i, 0] - centre_x) ** 2 + (q[i, 1] - centre_y) ** 2 >= (radius + reach) ** 2:
+            farthest = radius + pulleys.run_out[p] + reach
+            if (q[i, 0] - centre_x) ** 2 + (q[i, 1] - centre_y) ** 2 >= farthest**2:
                 continue
+            rim_x, rim_y = wheels.rim[p, 0], wheels.rim[p, 1]
             centre_vx, centre_vy = wheels.centre_speed[p, 0], wheels.centre_speed[p, 1]
             turning = wheels.stage_speed[0, p]
             for c in range(points):
@@ -113,25 +124,32 @@ def add_contacts(
                 distance = np.sqrt(away_x * away_x + away_y * away_y)
                 nx, ny = away_x / distance, away_y / distance
                 outward, around = nx * vx + ny * vy, nx * vy - ny * vx
-                depth = radius - distance
-                pressure = contact.stiffness * depth - contact.damping * outward
+                slip = around - turning * distance
+                rise, slope = nx * rim_x + ny * rim_y, (nx * rim_y - ny * rim_x) / distance  # of the rim
+                leaving = outward - slope * slip
+                depth = radius + contact.height[i, c] + rise - distance
+                pressure = contact.stiffness * depth - contact.damping * leaving
                 if pressure <= 0.0:
                     continue
-                slip = around - turning * distance
                 found = rub(contact.friction, touch.memory, p, i, c, slip, pressure, tau, is_known)
                 force, traction, settled = weight * pressure, -weight * found.force, -weight * found.settled
-                touch.normal[p, i, c], touch.tangential[p, i, c] = force, settled
                 wheels.power[FRICTION_LOSS + p] -= settled * slip
-                wheels.power[CONTACT_LOSS] += weight * contact.damping * outward * outward
+                wheels.power[CONTACT_LOSS] += weight * contact.damping * leaving * leaving
+                traction, settled = traction - slope * force, settled - slope * force
+                touch.normal[p, i, c], touch.tangential[p, i, c] = force, settled
                 if p == 0:
                     wheels.power[WORK_IN] += settled * distance * turning
                 # slopes by speeds of the belt: of the force, of the slip, of traction and its moment
-                steep = -weight * found.by_slip
+                steep, turn = -weight * found.by_slip, tau / distance  # turn: of the normal
+                stiff, damp = weight * contact.stiffness, weight * contact.damping
                 of_normal = -weight * (contact.stiffness * tau + contact.damping)
+                of_normal -= damp * slope * (turn * slip + tau * turning)
                 of_around = -weight * contact.damping * tau * around / distance
-                by_normal = steep * -tau * turning - found.by_pressure * of_normal
-                by_around = steep * (1.0 - tau * outward / distance) - found.by_pressure * of_around
-                turn = tau / distance  # of the normal
+                along = 1.0 - tau * outward / distance  # of the slip
+                of_around += stiff * tau * slope + damp * (slope * along - turn * rise * slip / distance)
+                tangential = -found.by_pressure - slope  # of traction by the force
+                by_normal = steep * -tau * turning + tangential * of_normal + force * turn * slope
+                by_around = steep * along + tangential * of_around + force * turn * rise / distance
                 nn, nt = of_normal, of_around - settled * turn
                 tn, tt = by_normal, by_around + force * turn
                 # with tangent (-ny, nx)
@@ -145,19 +163,22 @@ def add_contacts(
                 mx, my = moment_n * nx - moment_t * ny, moment_n * ny + moment_t * nx
                 at_point = (s0, s1, s2, s3)
                 _add_to_belt(blocks, columns, i, j, at_point, last, (fx, fy), (xx, xy, yx, yy))
-                lever = steep * distance
+                # by the pulley's speed
+                of_turning = damp * (turn * rise * slip - slope * distance) - stiff * tau * slope * distance
+                by_turning = tangential * of_turning - steep * distance - force * turn * rise
                 if p > 0:
-                    corner[p - 1, p - 1] -= steep * distance * distance
+                    corner[p - 1, p - 1] += by_turning * distance
                     corner[p - 1, last] -= traction * distance
-                    _add_to_border(columns, rows, i, j, at_point, p - 1, (-lever * ny, lever * nx), (mx, my))
+                    column = by_turning * ny - of_turning * nx, -of_turning * ny - by_turning * nx
+                    _add_to_border(columns, rows, i, j, at_point, p - 1, column, (mx, my))
                 if pulleys.arm[p] < 0:
                     continue
                 # by the arm's rate the axis moves along (ex, ey), and its speed turns with the arm as well
                 arm = pulleys.radius.size - 1 + pulleys.arm[p]
                 ex, ey = wheels.lever[p, 0], wheels.lever[p, 1]
                 turned = tau * wheels.stage_speed[0, arm + 1]
-                damping = weight * contact.damping * turned * (nx * ey - ny * ex)
-                by_n, by_t = -damping, found.by_pressure * damping - steep * turned * (nx * ex + ny * ey)
+                by_n = -damp * turned * (nx * ey - ny * ex) - damp * slope * turned * (nx * ex + ny * ey)
+                by_t = tangential * by_n - steep * turned * (nx * ex + ny * ey)
                 by_x = xx * ex + xy * ey + by_n * nx - by_t * ny
                 by_y = yx * ex + yy * ey + by_n * ny + by_t * nx
                 ax, ay = -(ex * xx + ey * yx), -(ex * xy + ey * yy)
@@ -166,7 +187,7 @@ def add_contacts(
                 corner[arm, last] -= fx * ex + fy * ey
                 if p > 0:
                     corner[p - 1, arm] += distance * by_t - (mx * ex + my * ey)
-                    corner[arm, p - 1] -= lever * (ey * nx - ex * ny)
+                    corner[arm, p - 1] += by_turning * (ey * nx - ex * ny) + of_turning * (nx * ex + ny * ey)
     return laws_hold(contact.friction, touch.memory, is_known)
 
 

@@ -17,6 +17,7 @@ from cvt_hpc.variator import PULLEYS, STRANDS
 from cvt_hpc.variator.scene import length_problems, nested_problems
 
 Problem = tuple[str, str, str]  # key, expected, found
+MOST_RUN_OUT = 0.01  # of the radius: the square of this is left out
 
 COLUMNS = {"x": ("m",), "y": ("m",), "radius": ("m",), "turn": ("",), "inertia": ("kg m^2",), "load": ("",)}
 PULLEY_LISTS = tuple(f"pulley_{name}" for name in COLUMNS)
@@ -62,6 +63,12 @@ LAYOUT: dict[str, Parameter] = {
         "kg m^2", "moments of inertia; not read of the first", (1e-6, 100.0), minimum=0.0
     ),
     "pulley_load": _list("", "braking torque of each pulley over load; 0 for the first"),
+    "run_out": _list(
+        "m", "eccentricity of each pulley's rim; by default all are round", (1e-7, 1e-3), minimum=0.0
+    ),
+    "run_out_phase": _list(
+        "rad", "angle of the rim's highest place at first, from x; by default 0 of all", (1e-3, 7.0)
+    ),
 }
 TENSIONER: dict[str, Parameter] = {
     "tensioner_pulley": _list("", "numbers of the pulleys that arms carry, from 2 on"),
@@ -155,7 +162,8 @@ def pulleys_of(parameters: Mapping[str, Any], drawn: Layout) -> Pulleys:
     arm = np.full(len(drawn.inertia), -1)
     for a, number in enumerate(parameters["tensioner_pulley"]):
         arm[int(number) - 1] = a
-    return Pulleys(drawn.path.centre, drawn.path.radius, drawn.inertia, arm, arms_of(parameters))
+    rim = [np.array(parameters[key] or np.zeros(len(arm)), float) for key in ("run_out", "run_out_phase")]
+    return Pulleys(drawn.path.centre, drawn.path.radius, drawn.inertia, arm, arms_of(parameters), *rim)
 
 
 def layout_problems(parameters: Mapping[str, Any]) -> list[Problem]:
@@ -173,6 +181,21 @@ def layout_problems(parameters: Mapping[str, Any]) -> list[Problem]:
         given = (*given, "tensioner_moment") if p["tensioner_moment"] else given
         found = _list_problems(p, given) or _arm_problems(p)
     return found
+
+
+def run_out_problems(parameters: Mapping[str, Any]) -> list[Problem]:
+    """Problems of eccentric pulleys of a layout without problems, in the form of a model's check."""
+    p, radius = parameters, layout(parameters).path.radius
+    for key in ("run_out", "run_out_phase"):
+        if p[key] and (found := nested_problems(p, (key,))):
+            return found
+        if len(p[key]) not in (0, len(radius)):
+            return [(key, f"a value for each pulley, {len(radius)}", f"{len(p[key])}")]
+    for value, most in zip(p["run_out"], MOST_RUN_OUT * radius, strict=False):
+        if value > most:
+            expected = f"at most {most:g} m, {MOST_RUN_OUT:.0%} of the pulley's radius"
+            return [("run_out", expected, f"{value:g} m")]
+    return []
 
 
 def _list_problems(p: Mapping[str, Any], keys: Sequence[str]) -> list[Problem]:
@@ -245,6 +268,8 @@ def layout_inert(parameters: Mapping[str, Any]) -> dict[str, str]:
         found = dict.fromkeys(TWO, "pulley_x, which gives all pulleys")
     else:
         found = {}
+    if not any(p["run_out"]):
+        found["run_out_phase"] = "no run_out"
     if not p["tensioner_pulley"]:
         found |= dict.fromkeys(TENSIONER.keys() - {"tensioner_pulley"}, "no tensioner_pulley")
     return found

@@ -4,6 +4,9 @@ An arm turns about its pivot, which moves the axis of its pulley. By its angle f
 the moment M - k angle - c angle', and beyond its travel a stiff stop pushes it back. A strut between a fixed
 point and one of the arm, of the length l, pulls by F = F0 + k_l (l - l0) + c_l l'; its moment is
 -F dl/dangle, and F0 takes the place of M.
+
+The rim of a pulley may be eccentric, to the first order of its run_out over the radius: by the angle phi that
+the pulley has turned, its highest place is at phi + phase from the direction of x.
 """
 
 from typing import NamedTuple
@@ -59,6 +62,9 @@ class Pulleys(NamedTuple):
     inertia: np.ndarray  # (P,) [kg m^2]; that of the first is not read
     arm: np.ndarray  # which of the arms carries a pulley, or -1, (P,)
     arms: Arms  # of tensioners
+    # run_out, phase: eccentricity of the rim [m], and the angle of its highest place at first [rad], (P,)
+    run_out: np.ndarray
+    phase: np.ndarray
 
 
 class Wheels(NamedTuple):
@@ -76,6 +82,13 @@ class Wheels(NamedTuple):
     turning: np.ndarray
     stage_angle: np.ndarray
     start_angle: np.ndarray
+    # rotation, rotating, stage_rotation, start_rotation, shape (1, P): angles by which pulleys have turned
+    # [rad], and rates [rad/s], as those of a chain
+    rotation: np.ndarray
+    rotating: np.ndarray
+    stage_rotation: np.ndarray
+    start_rotation: np.ndarray
+    rim: np.ndarray  # from the axis to the middle of the rim in a stage, (P, 2) [m]
     # centre, centre_speed, lever, shape (P, 2): axes in a stage [m], their speeds [m/s], and slopes by the
     # angle of the arm [m]
     centre: np.ndarray
@@ -109,7 +122,9 @@ def wheels_at(pulleys: Pulleys, speeds: np.ndarray, angles: np.ndarray, nodes: i
     speed, acceleration, stage_speed, start_speed = np.zeros((4, 1, count + arms))
     angle, turning, stage_angle, start_angle = np.zeros((4, 1, arms))
     speed[0, :count], angle[0], stage_angle[0] = speeds, angles, angles
-    centre_speed, lever = np.zeros((2, count, 2))
+    rotation, rotating, stage_rotation, start_rotation = np.zeros((4, 1, count))
+    rotating[0] = speeds
+    rim, centre_speed, lever = np.zeros((3, count, 2))
     found = Wheels(
         speed,
         acceleration,
@@ -119,6 +134,11 @@ def wheels_at(pulleys: Pulleys, speeds: np.ndarray, angles: np.ndarray, nodes: i
         turning,
         stage_angle,
         start_angle,
+        rotation,
+        rotating,
+        stage_rotation,
+        start_rotation,
+        rim,
         pulleys.centre.copy(),
         centre_speed,
         lever,
@@ -132,9 +152,12 @@ def wheels_at(pulleys: Pulleys, speeds: np.ndarray, angles: np.ndarray, nodes: i
 
 @kernel
 def place_axes(pulleys: Pulleys, wheels: Wheels) -> None:
-    """Axes of a stage by the angles and the speeds of the arms in it."""
+    """Axes and rims of a stage by the angles and the speeds of arms and pulleys in it."""
     count = pulleys.radius.size
     for p in range(count):
+        highest = wheels.stage_rotation[0, p] + pulleys.phase[p]
+        wheels.rim[p, 0] = pulleys.run_out[p] * np.cos(highest)
+        wheels.rim[p, 1] = pulleys.run_out[p] * np.sin(highest)
         a = pulleys.arm[p]
         if a < 0:
             continue
@@ -151,6 +174,7 @@ def begin_wheels(wheels: Wheels, scheme: Scheme, dt: float, driving_speed: float
     """Begin a stage with the speeds at the begin of a step, and the prescribed one [rad/s] of the stage."""
     begin(scheme, dt, wheels.speed, wheels.acceleration, wheels.start_speed)
     begin(scheme, dt, wheels.angle, wheels.turning, wheels.start_angle)
+    begin(scheme, dt, wheels.rotation, wheels.rotating, wheels.start_rotation)
     for k in range(1, wheels.speed.shape[1]):
         wheels.stage_speed[0, k] = wheels.speed[0, k]
     wheels.stage_speed[0, 0] = driving_speed
@@ -162,6 +186,8 @@ def place_wheels(pulleys: Pulleys, wheels: Wheels, tau: float) -> None:
     count = pulleys.radius.size
     for a in range(wheels.angle.shape[1]):
         wheels.stage_angle[0, a] = wheels.start_angle[0, a] + tau * wheels.stage_speed[0, count + a]
+    for p in range(count):
+        wheels.stage_rotation[0, p] = wheels.start_rotation[0, p] + tau * wheels.stage_speed[0, p]
     place_axes(pulleys, wheels)
 
 
@@ -178,6 +204,7 @@ def finish_wheels(pulleys: Pulleys, wheels: Wheels, scheme: Scheme, dt: float) -
     """Angles and speeds at the end of a step, by the speeds of its stage."""
     place_wheels(pulleys, wheels, stage_length(scheme, dt))
     finish(scheme, dt, wheels.stage_angle, wheels.start_angle, wheels.angle, wheels.turning)
+    finish(scheme, dt, wheels.stage_rotation, wheels.start_rotation, wheels.rotation, wheels.rotating)
     finish(scheme, dt, wheels.stage_speed, wheels.start_speed, wheels.speed, wheels.acceleration)
 
 

@@ -14,6 +14,7 @@ from cvt_hpc.models.belt_drive.courses import contact_compliance, driving_speed,
 from cvt_hpc.models.belt_drive.drive import UNSOLVED, Drive, State, advance, state
 from cvt_hpc.models.belt_drive.friction import Friction, Treatment
 from cvt_hpc.models.belt_drive.layout import Layout, pulleys_of
+from cvt_hpc.models.belt_drive.roughness import heights
 from cvt_hpc.multibody.ancf_beam import at_places, beam, random_lengths
 from cvt_hpc.physics.belt_path import points_at
 from cvt_hpc.physics.friction import friction_law, given_law
@@ -32,7 +33,7 @@ CORRECTIONS = 3
 # Of contacts that stick [m/s]: the speed at which their grip has the normal force of a belt at rest. At less
 # the five points of an element, which adds four coordinates, change without end; more costs iterations.
 GRIP_SPEED = 1e-4
-HELD = 1e12  # [kg m^2]: an arm that stays where it is drawn
+HELD = 1e12  # [kg m^2]: an arm that stays where it is drawn, or a pulley whose rim is eccentric
 
 
 def start(
@@ -62,8 +63,10 @@ def start(
 
 
 def _drive(p: Mapping[str, Any], drawn: Layout, length: float) -> Drive:
+    lengths = random_lengths(length, p["elements"], p["length_scatter"], p["seed"])
+    height = heights(p, lengths)
     belt = beam(
-        random_lengths(length, p["elements"], p["length_scatter"], p["seed"]),
+        lengths,
         p["line_mass"],
         p["axial_stiffness"],
         p["bending_stiffness"],
@@ -76,6 +79,8 @@ def _drive(p: Mapping[str, Any], drawn: Layout, length: float) -> Drive:
         p["contact_stiffness"],
         p["contact_damping"],
         _friction(p, drawn),
+        height,
+        float(height.max()),
     )
     return Drive(belt, pulleys_of(p, drawn), contact)
 
@@ -114,7 +119,10 @@ def _laid(drive: Drive, drawn: Layout) -> State:
 def _settle(drive: Drive, found: State) -> bool:
     """Bring a state to rest in equilibrium, without friction; and whether that was found."""
     friction = drive.contact.friction._replace(treatment=Treatment.REGULARISED, law=FRICTIONLESS)
-    smooth = drive._replace(contact=drive.contact._replace(friction=friction))
+    # without friction the belt's tension would turn an eccentric pulley to where the belt is shortest
+    inertia = np.where(drive.pulleys.run_out > 0.0, HELD, drive.pulleys.inertia)
+    pulleys = drive.pulleys._replace(inertia=inertia)
+    smooth = drive._replace(pulleys=pulleys, contact=drive.contact._replace(friction=friction))
     at_rest = np.zeros((2, len(drive.pulleys.radius)))
     step = FIRST
     for _ in range(MOST_STEPS):
