@@ -99,12 +99,15 @@ def _table(arguments: argparse.Namespace) -> None:
 
 def _map(arguments: argparse.Namespace) -> None:
     from cvt_hpc.analysis.arrangement import with_spacings
+    from cvt_hpc.analysis.classes import check_results
     from cvt_hpc.job.assignments import split_assignments
 
     paths = [arguments.path, *arguments.others]
     source, kind = ", ".join(map(str, paths)), "maps" if arguments.others else "map"
     with ExitStack() as opened:
         datasets = [opened.enter_context(parts.opened_results(path)) for path in paths]
+        for dataset, path in zip(datasets, paths, strict=True):
+            check_results(dataset, str(path))
         dataset, sides = datasets[0], parts.sides_of(arguments)
         if arguments.others:
             from cvt_hpc.analysis.studies import side_by_side

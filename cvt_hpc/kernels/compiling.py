@@ -298,8 +298,13 @@ class _Work:
     """
 
     def __init__(self, name: str) -> None:
-        self.walk, self.extensions = Walk(), extensions()
+        self.walk = Walk()
         self._name, self._began, self._told = name, time.monotonic(), False
+
+    @functools.cached_property
+    def extensions(self) -> str:
+        """Digest of what has taught the compiler; UnknownValueError as of `identity.extensions`."""
+        return extensions(self.walk)
 
     def tell(self) -> None:
         """Log that something is being compiled, not found, once that takes long."""
@@ -340,12 +345,13 @@ def _name_of_entry(compiled: _Kernel, kinds: tuple, work: _Work) -> str:
     """Return a digest of all that decides the machine code of a kernel, or "" where that is not known."""
     try:
         described = work.walk.kernel(compiled), [work.walk.type(kind) for kind in kinds]
+        taught = work.extensions
     except UnknownValueError as error:
         _tell_unknown(f"{compiled.__module__}.{compiled.__qualname__}", str(error))
         return ""
     finally:
         work.walk.take()
-    return digest((described, compiled._for_kernel, work.extensions, _compiler()))
+    return digest((described, compiled._for_kernel, taught, _compiler()))
 
 
 @cache
@@ -427,6 +433,8 @@ def _keep(name: str, found: CompileResult, walk: Walk) -> None:
         why = "addresses in this process"
     elif foreign := next(filter(_is_foreign, names), None):
         why = f"{foreign}, compiled for other than kernels"
+    elif found.fndesc.llvm_cpython_wrapper_name in names and _is_of_script(found.signature.return_type):
+        why = "a class of results that no module has"  # the code would make those of this process
     else:
         library, described, environment, sig, _, _, _, reload, environments = found._reduce()
         kinds, described.argtypes = described.argtypes, ()
@@ -440,6 +448,14 @@ def _keep(name: str, found: CompileResult, walk: Walk) -> None:
         finally:
             described.argtypes = kinds
     _tell_unknown(found.fndesc.qualname, why)
+
+
+def _is_of_script(kind: types.Type) -> bool:
+    """Whether a type is, or contains, one of a class that stands in a script or notebook."""
+    inner = getattr(kind, "type", None), getattr(kind, "dtype", None)  # of what may be None, of lists
+    parts = kind if isinstance(kind, types.BaseTuple) else [k for k in inner if isinstance(k, types.Type)]
+    of_class = getattr(getattr(kind, "instance_class", None), "__module__", "")
+    return of_class == "__main__" or any(map(_is_of_script, parts))
 
 
 # The types of arguments

@@ -4,10 +4,11 @@ It is read from memory, since that is what the compiler takes, and not from file
 the bytecode of a function with its constants, its defaults and closure, and the values of all globals that it
 names, of functions among them in turn. A change of a comment or a line number changes nothing.
 
-numba, numpy and the like count by their versions, and `lanes` and what else has taught the compiler by
+numba, numpy and the like count by their versions, and what has taught the compiler, as `lanes`, by
 `extensions`. What has no value that could be compared, as an open file, is an `UnknownValueError`.
 """
 
+import builtins
 import dis
 import enum
 import hashlib
@@ -143,7 +144,7 @@ class Walk:
         if isinstance(value, type) and issubclass(value, tuple) and hasattr(value, "_fields"):
             return self._tuple_class(value)
         if isinstance(value, type) and issubclass(value, BaseException):
-            return value.__module__, value.__qualname__
+            return _importable(value)
         return _checked_name(value, getattr(value, "__module__", None), _name(value))
 
     def _tuple_class(self, of: Any) -> Any:
@@ -191,9 +192,9 @@ class Walk:
             yield self.value(options), overload and self.value(overload)
         names = _names(function.__code__)
         for name in names:
-            if name not in function.__globals__:
+            value = function.__globals__.get(name, vars(builtins).get(name))
+            if name not in function.__globals__ and (value is None or _module(value) == "builtins"):
                 continue
-            value = function.__globals__[name]
             if type(value) is ModuleType and not _is_named(value.__name__):
                 for attribute in (other for other in names if other in vars(value)):
                     yield from self._named(function, f"{name}.{attribute}", vars(value)[attribute])
@@ -271,13 +272,37 @@ def _checked_name(value: Any, module: str | None, name: str | None) -> Any:
     raise UnknownValueError(f"a value of the type {type(value).__qualname__}")
 
 
+def _importable(kind: type) -> tuple[str, str]:
+    """Describe a class by its name, which leads to it in every process that knows it."""
+    with suppress(AttributeError, KeyError):
+        if kind.__module__ != "__main__":
+            if operator.attrgetter(kind.__qualname__)(sys.modules[kind.__module__]) is kind:
+                return kind.__module__, kind.__qualname__
+    raise UnknownValueError(f"the class {kind.__qualname__}, which no module has")
+
+
 # What has taught the compiler
 
 
-def extensions() -> str:
-    """Return a digest of what has told the compiler of types and operations: `lanes`, and code of users."""
+def extensions(walk: Walk) -> str:
+    """Return a digest of what has told the compiler of types and operations: `lanes`, and code of users.
+
+    Raises
+    ------
+    UnknownValueError
+        If code of users depends on what cannot be compared.
+    """
     found = [_of_module(module) for name, module in sorted(sys.modules.items()) if name.startswith(_LANES)]
-    return digest((found, _registered(*map(len, _registries()))))
+    of_lanes, of_users = _registered(*map(len, _registries()))
+    return digest((found, [*of_lanes, *(_wholly(source, walk) for source in of_users)]))
+
+
+def _wholly(value: Any, walk: Walk) -> Any:
+    """Describe what users have taught the compiler, with all that it calls and names."""
+    if not isinstance(value, type):
+        return walk.value(value)
+    parts = [(name, part) for name, part in sorted(vars(value).items()) if type(part) in _PARTS]
+    return value.__qualname__, [(name, walk.value(getattr(part, "__func__", part))) for name, part in parts]
 
 
 def _of_module(module: ModuleType) -> list[Any]:
@@ -322,14 +347,16 @@ def _registries() -> Iterator[list[Any]]:
 
 
 @cache
-def _registered(*lengths: int) -> list[Any]:
-    """Describe what modules other than the compiler's own have registered, each by its own code."""
+def _registered(*lengths: int) -> tuple[list[Any], list[Any]]:
+    """Return what others than the compiler have registered: descriptions of that of `lanes`, and the rest."""
     of_functions, of_attributes, of_globals, *of_code = _registries()
     declared = [*of_functions, *of_attributes]
     declared += [template for _, kind in of_globals for template in getattr(kind, "templates", ())]
     translations = [entry[0] for registry in of_code for entry in registry]
     sources = [*(source for template in declared for source in _sources(template)), *translations]
-    return [_loosely(source) for source in sources if _is_foreign(source)]
+    found = [(_module(source), source) for source in sources if _is_foreign(source)]
+    of_lanes = [_loosely(source) for module, source in found if module.startswith(_LANES)]
+    return of_lanes, [source for module, source in found if not module.startswith(_LANES)]
 
 
 def _sources(template: type) -> Iterator[Any]:
@@ -341,10 +368,13 @@ def _sources(template: type) -> Iterator[Any]:
         yield overload
 
 
-def _is_foreign(value: Any) -> bool:
+def _module(value: Any) -> str:
     of_function = isinstance(value, FunctionType)
-    module = value.__globals__.get("__name__") if of_function else getattr(value, "__module__", None)
-    return module is not None and module.split(".")[0] not in _VERSIONED | {"abc"}  # classes made by type()
+    return (value.__globals__.get("__name__") if of_function else getattr(value, "__module__", None)) or ""
+
+
+def _is_foreign(value: Any) -> bool:
+    return _module(value).split(".")[0] not in _VERSIONED | {"abc", ""}  # classes made by type()
 
 
 @cache

@@ -38,6 +38,7 @@ _LONG = 3.0  # [s]: faster compiling is not logged
 _PATIENCE = 600.0  # [s] with a process that compiles the same; any kernel takes less, on a busy machine too
 _NO_LINK = os.O_NOFOLLOW | os.O_CLOEXEC
 _DIGEST = hashlib.sha256().digest_size
+_LARGEST = 1 << 28  # [bytes] of an entry; those of this program have 2 MB at most
 
 _logger = logging.getLogger("cvt_hpc.kernels")
 
@@ -77,7 +78,7 @@ def read(name: str, what: str) -> bytes | None:
         return _content(place / name)
     except FileNotFoundError:
         return None
-    except OSError as error:
+    except (OSError, MemoryError) as error:
         return tell_damaged(what, str(error))
 
 
@@ -95,6 +96,8 @@ def _content(path: Path) -> bytes:
         found = os.fstat(descriptor)
         if not stat.S_ISREG(found.st_mode) or found.st_uid != os.getuid() or found.st_mode & 0o022:
             raise PermissionError(f"{path} is not a file that only you can write to")
+        if found.st_size > _LARGEST:
+            raise OSError(f"{path} is damaged")
         with open(descriptor, "rb", closefd=False) as file:
             content = file.read()
         with suppress(OSError):

@@ -67,6 +67,8 @@ def _check_table(attributes: Mapping[Any, Any], key: str, place: str) -> None:
     for inner in ("axes", "vibration") if key == "job" else ():
         if not isinstance(table.get(inner, {}), dict):
             raise mismatch(f"{place}: {key}: {inner}", "a table", show(table[inner]))
+    if key == "job" and not isinstance(table.get("model", ""), str):
+        raise mismatch(f"{place}: {key}: model", "a text", show(table["model"]))
 
 
 def _check_variable(variable: xr.Variable, place: str) -> None:

@@ -94,6 +94,33 @@ def test_types_that_no_picture_has(values):
         dataset.cvt.map()
 
 
+def without_status(results):
+    return results.drop_vars("status")
+
+
+def texts_for_flags(results):
+    return results.assign(status=(results["status"].dims, np.full(results["status"].shape, "done")))
+
+
+def one_flag_for_all(results):
+    return results.assign(status=((), np.int8(1)))
+
+
+def amplitude_without_an_axis(results):
+    return results.assign(amplitude=results["amplitude"].isel(load=0, drop=True))
+
+
+@pytest.mark.parametrize(
+    "change", [without_status, texts_for_flags, one_flag_for_all, amplitude_without_an_axis]
+)
+def test_a_map_of_other_than_results_is_refused_in_one_line(path, capsys, change):
+    with xr.open_dataset(path) as opened:
+        write_netcdf(change(opened.load()), path.with_name("changed.nc"))
+    assert main(["map", "changed.nc"]) == 2
+    out, err = capsys.readouterr()
+    assert out == "" and err.count("\n") == 1 and "changed.nc" in err and "expected" in err
+
+
 def test_limits_of_time_and_memory(path, sound):
     names = [
         "vast",

@@ -210,7 +210,10 @@ def test_of_many_pulleys_those_with_torque_are_drawn(history):
             "results: strand_tension: expected the unit of speed_loss, 1, found N",
         ),
         (
-            lambda d, h: curve_figure(xr.concat([d, d], "driving_speed"), ["speed_loss"]),
+            lambda d, h: curve_figure(
+                xr.concat([d, d.assign_coords(driving_speed=d["driving_speed"] + 1.0)], "driving_speed"),
+                ["speed_loss"],
+            ),
             "results: driving_speed: expected at most 3 values, or one that --at fixes, found 4",
         ),
         (lambda d, h: wrap_figure([]), "wrap: expected one history or more, found none"),

@@ -38,9 +38,9 @@ PACKAGE = Path(cvt_hpc.__file__).parent
 @pytest.fixture(autouse=True)
 def untaught():
     """What teaches the compiler in this process would have all later tests compile their kernels again."""
-    before = identity.extensions()
+    before = identity.extensions(Walk())
     yield
-    assert identity.extensions() == before
+    assert identity.extensions(Walk()) == before
 
 
 @pytest.fixture
@@ -319,23 +319,23 @@ def printed(forking, tmp_path):
 
 TEACHING = """
 from numba.extending import overload
-from cvt_hpc.kernels.identity import extensions
-before = extensions()
+from cvt_hpc.kernels.identity import Walk, extensions
+before = extensions(Walk())
 overload(len)(lambda x: None)
-print(extensions() != before)
+print(extensions(Walk()) != before)
 """
 
 
 def test_what_has_taught_the_compiler_counts_and_what_it_has_loaded_itself_does_not(monkeypatch, printed):
-    before = identity.extensions()
+    before = identity.extensions(Walk())
     numba.njit(lambda x: np.sort(x))(np.ones(2))
-    assert identity.extensions() == before
+    assert identity.extensions(Walk()) == before
     arithmetic = sys.modules["cvt_hpc.lanes.arithmetic"]
     monkeypatch.setattr(arithmetic, "_common", made("def f(a, b): return None"))
     arithmetic._common.__module__ = arithmetic.__name__
-    assert identity.extensions() != before
+    assert identity.extensions(Walk()) != before
     monkeypatch.undo()
-    assert identity.extensions() == before
+    assert identity.extensions(Walk()) == before
     # elsewhere, as it lasts as long as the process, which would find no machine code any more
     assert printed(TEACHING) == ["True"]
 
@@ -367,6 +367,69 @@ def test_two_kernels_of_one_factory_are_two(printed, tmp_path):
         ["0.875", "0"],
         ["0.875", "1"],
     ]
+
+
+TAUGHT = """
+import builtins
+import numpy as np
+from numba import types
+from numba.extending import overload, overload_attribute, overload_method, register_jitable
+from cvt_hpc.kernels import kernel
+class State: factor = FACTOR
+factor = builtins.common = State.factor
+@register_jitable
+def helper(x): return factor * x
+def of_state(x):
+    taken = State.factor
+    return lambda x: taken * x
+if WAY == "a function": overload(np.real_if_close)(lambda x: lambda x: helper(x))
+if WAY == "a class": overload(np.real_if_close)(of_state)
+if WAY == "an attribute": overload_attribute(types.Array, "scaled")(lambda a: lambda a: factor * a[0])
+if WAY == "a method": overload_method(types.Array, "scaled")(lambda a: lambda a: helper(a[0]))
+@kernel
+def called(x): return np.real_if_close(x)
+@kernel
+def attribute(x): return np.full(1, x).scaled
+@kernel
+def method(x): return np.full(1, x).scaled()
+@kernel
+def builtin(x): return common * x
+print({"an attribute": attribute, "a method": method, "a builtin": builtin}.get(WAY, called)(1.0))
+"""
+
+
+@pytest.mark.parametrize("way", ["a function", "a class", "an attribute", "a method", "a builtin"])
+def test_what_users_have_taught_the_compiler_counts_with_all_that_it_names(printed, way):
+    programs = [
+        TAUGHT.replace("WAY", repr(way)).replace("FACTOR", factor) for factor in ("2.0", "3.0", "3.0")
+    ]
+    assert [printed(program) for program in programs] == [["2.0"], ["3.0"], ["3.0"]]
+
+
+OF_SCRIPT = """
+import enum
+from typing import NamedTuple
+from cvt_hpc.kernels import kernel
+class Pair(NamedTuple): first: float
+class Refusal(ValueError): pass
+class Colour(enum.IntEnum): RED = 1
+@kernel
+def pair(x): return Pair(x)
+@kernel
+def perhaps(x): return (pair(x), x) if x > 0.0 else None
+@kernel
+def refuses(x):
+    if x > 0.0: raise Refusal("too large")
+    return Colour.RED
+try: refuses(1.0)
+except Refusal: print("refused")
+print(*(isinstance(*found) for found in ((pair(1.0), Pair), (perhaps(1.0)[0], Pair), (refuses(0.0), Colour))))
+"""
+
+
+def test_results_and_errors_are_of_the_classes_of_the_script_that_runs(printed):
+    script = f"exec({OF_SCRIPT!r}, vars(__import__('__main__')))"
+    assert [printed(script) for _ in range(2)] == [["refused", "True", "True", "True"]] * 2
 
 
 CELLS = """
@@ -564,6 +627,10 @@ def flip(entry):
     entry.write_bytes(content)
 
 
+def swell(entry):
+    os.truncate(entry, 2**36)  # of which nothing is on the disk
+
+
 def exchange(entry):
     kernel(lambda x: x + 2.0)(1.0)
     (other,) = set(entries(entry.parent)) - {entry}
@@ -598,7 +665,7 @@ def from_another_version(entry):
 
 
 DAMAGES = (
-    *(shorten, empty, flip, exchange, lead_elsewhere, pipe, folder_instead, open_to_others, give_away),
+    *(shorten, empty, flip, swell, exchange, lead_elsewhere, pipe, folder_instead, open_to_others, give_away),
     from_another_version,
 )
 

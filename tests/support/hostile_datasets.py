@@ -191,6 +191,9 @@ FORMS = {
     "numbers to add": (attribute("add_offset", [1.0, 2.0], "loss"), "one that xarray cannot read"),
     "axis of several lines": (of_netcdf(several_lines), "strand: expected texts of printable characters"),
     "job that is no table": (attribute("job", "[1]"), "job: expected a table in JSON"),
+    "job of a model that is no text": (attribute("job", '{"model": ["criterion"]}'), "job: model: expected a text"),
+    "axis without values": (of_netcdf(lambda file: file["load"].__setitem__(slice(None), np.nan)), "values that differ"),
+    "axis of one value": (of_netcdf(lambda file: file["load"].__setitem__(slice(None), 2.0)), "values that differ"),
     "deep job": (attribute("job", "[" * 50_000), "job: expected a table in JSON"),
     "changed name": (lambda path: path.write_bytes(path.read_bytes().replace(b"loss", b"lo\x1bs")), "one that is damaged"),
 }  # fmt: skip
