@@ -12,6 +12,7 @@ import builtins
 import dis
 import enum
 import hashlib
+import importlib.metadata
 import inspect
 import math
 import operator
@@ -19,6 +20,7 @@ import sys
 from collections.abc import Iterator
 from contextlib import suppress
 from functools import cache
+from pathlib import Path
 from types import CodeType, FunctionType, ModuleType
 from typing import Any
 from weakref import WeakKeyDictionary
@@ -287,14 +289,29 @@ def _importable(kind: type) -> tuple[str, str]:
 def extensions(walk: Walk) -> str:
     """Return a digest of what has told the compiler of types and operations: `lanes`, and code of users.
 
+    Code of installed packages counts as it is and by their versions: it may hold what cannot be compared,
+    and numba loads some of them wherever they are installed.
+
     Raises
     ------
     UnknownValueError
         If code of users depends on what cannot be compared.
     """
     found = [_of_module(module) for name, module in sorted(sys.modules.items()) if name.startswith(_LANES)]
-    of_lanes, of_users = _registered(*map(len, _registries()))
-    return digest((found, [*of_lanes, *(_wholly(source, walk) for source in of_users)]))
+    described, of_users = _registered(*map(len, _registries()))
+    return digest((found, [*described, *(_wholly(source, walk) for source in of_users)]))
+
+
+@cache
+def _installed(package: str) -> str:
+    """Version of an installed package of its distribution's name; "" of any other."""
+    place = Path(getattr(sys.modules.get(package), "__file__", None) or "")
+    if not {"site-packages", "dist-packages"} & {*place.parts}:
+        return ""
+    try:
+        return importlib.metadata.version(package)
+    except importlib.metadata.PackageNotFoundError:
+        return ""
 
 
 def _wholly(value: Any, walk: Walk) -> Any:
@@ -348,15 +365,23 @@ def _registries() -> Iterator[list[Any]]:
 
 @cache
 def _registered(*lengths: int) -> tuple[list[Any], list[Any]]:
-    """Return what others than the compiler have registered: descriptions of that of `lanes`, and the rest."""
+    """Return what others than the compiler have registered: descriptions, and code of users."""
     of_functions, of_attributes, of_globals, *of_code = _registries()
     declared = [*of_functions, *of_attributes]
     declared += [template for _, kind in of_globals for template in getattr(kind, "templates", ())]
     translations = [entry[0] for registry in of_code for entry in registry]
     sources = [*(source for template in declared for source in _sources(template)), *translations]
     found = [(_module(source), source) for source in sources if _is_foreign(source)]
-    of_lanes = [_loosely(source) for module, source in found if module.startswith(_LANES)]
-    return of_lanes, [source for module, source in found if not module.startswith(_LANES)]
+    described = [_loosely(source) for module, source in found if module.startswith(_LANES)]
+    of_users = []
+    for module, source in found:
+        if module.startswith(_LANES):
+            continue
+        if version := _installed(module.partition(".")[0]):
+            described.append((_loosely(source), version))
+        else:
+            of_users.append(source)
+    return described, of_users
 
 
 def _sources(template: type) -> Iterator[Any]:

@@ -406,6 +406,38 @@ def test_what_users_have_taught_the_compiler_counts_with_all_that_it_names(print
     assert [printed(program) for program in programs] == [["2.0"], ["3.0"], ["3.0"]]
 
 
+INSTALLED = """
+import numpy as np
+from numba.extending import overload
+stream = open("/dev/null")
+def helper(): return 2.0 if stream else 0.0
+@overload(np.real_if_close)
+def scaled(x):
+    factor = helper()
+    return lambda x: factor * x
+"""
+USES = """
+import sys
+from cvt_hpc.kernels import kernel
+sys.path.insert(0, SITE)
+import teaching
+@kernel
+def double(x): return 2.0 * x
+print(double(1.0), sum(double.stats.cache_hits.values()))
+"""
+
+
+def test_what_an_installed_package_has_taught_counts_by_its_version(printed, tmp_path):
+    """Some packages teach the compiler wherever they are installed, by what cannot be compared."""
+    site = tmp_path / "site-packages"
+    for version, hits in (("2.0", "0"), ("2.0", "1"), ("3.0", "0")):
+        told = site / "teaching.dist-info"
+        told.mkdir(parents=True, exist_ok=True)
+        (told / "METADATA").write_text(f"Metadata-Version: 2.1\nName: teaching\nVersion: {version}\n")
+        (site / "teaching.py").write_text(INSTALLED)
+        assert printed(USES.replace("SITE", repr(str(site)))) == ["2.0", hits]
+
+
 OF_SCRIPT = """
 import enum
 from typing import NamedTuple
