@@ -404,6 +404,16 @@ def test_the_onset_lies_along_the_axis_on_which_verdicts_change(tmp_path):
     assert "No sample is known to vibrate in 1 of 3 lines along radial speed." in text
 
 
+@pytest.mark.usefixtures("undrawn")
+def test_the_report_names_what_is_hardly_known_and_the_largest_probability_that_is_known_best(tmp_path):
+    # of the second load one sample of 16 has a verdict
+    rows = [[Q] * 16, [V] + [U] * 15, [V] * 14 + [U] * 2, [V] * 16]
+    text = report(study(rows, load=[10.0, 20.0, 30.0, 40.0]), tmp_path)
+    assert "50 % at 15 N m" in text and "largest at 40 N m: 100 % (79.4 to 100 %)" in text
+    assert "; hardly known, with intervals wider than 0.5, at 20 N m." in text
+    assert "hardly known" not in report(study(rows[::3], load=[10.0, 40.0]), tmp_path)
+
+
 def report(dataset, folder):
     """The text of its page."""
     return write_report(dataset, folder / "report.html").read_text().replace("\u00a0", " ")
