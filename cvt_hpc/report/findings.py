@@ -210,7 +210,11 @@ def _owed(told: xr.Dataset) -> Iterator[str]:
     cell = int(np.nanargmin(np.abs(shares.values - 0.5)))
     dims = list(map(str, shares.dims))
     here = told.isel(dict(zip(dims, map(int, np.unravel_index(cell, shares.shape)), strict=True)))
-    yield from _indices(told, here, f"where vibration is least certain, at {_place(told, dims, cell)}")
+    having = int(shares.notnull().sum())
+    where = "where vibration is least certain"
+    if having < shares.size:
+        where = f"of {having} of {counted(shares.size, 'cell')}, {where} among these"
+    yield from _indices(told, here, f"{where}, at {_place(told, dims, cell)}")
 
 
 def _indices(dataset: xr.Dataset, here: xr.Dataset, where: str) -> Iterator[str]:

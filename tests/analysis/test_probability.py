@@ -261,6 +261,10 @@ def test_probabilities_rest_on_both_sets_of_samples_and_not_on_those_between(tmp
         dataset.isel(swapped=0).cvt.indices()
     text = write_report(dataset, tmp_path / "report.html").read_text().replace("\u00a0", " ")
     assert "Total Sobol indices where vibration is least certain, at load 1 N m: damping 1.33 (" in text
+    both = xr.concat([unknown, dataset.assign_coords(load=[2.0])], "load", data_vars="minimal")
+    text = write_report(both, tmp_path / "report.html").read_text().replace("\u00a0", " ")
+    told = "Total Sobol indices of 1 of 2 cells, where vibration is least certain among these, at load 2 N m"
+    assert told in text
     dataset["vibrates"][:] = Vibrates.UNDECIDED
     assert "Total Sobol" not in write_report(dataset, tmp_path / "report.html").read_text()
     assert "occurrence" in words(map_figure(dataset, {"swapped": "none"}))
