@@ -137,6 +137,25 @@ def test_the_interval_holds_the_probability_of_the_closed_form():
     assert (np.sqrt(np.mean(np.square(errors), axis=0)) < 0.5 * independent).all()
 
 
+@pytest.mark.parametrize("samples", [32, 64, 128])
+def test_twice_the_samples_hold_the_probability_as_often(samples):
+    true, held = np.array([0.02, 0.1, 0.3, 0.5]), np.zeros(4)
+    for seed in range(100):
+        scores = sums_of_two(seed, samples)
+        hits = np.less.outer(norm.ppf(true), scores).sum(axis=-1)
+        low, high = interval(hits, np.full(true.size, samples))
+        held += (low <= 1.0 - true) & (1.0 - true <= high)
+    assert (held >= 95).all()
+
+
+def sums_of_two(seed, samples):
+    """Samples of the sum of two normal parameters, of standard deviation 1."""
+    normals = [Distribution(key, "normal", (("mean", 0.0), ("standard_deviation", 1.0))) for key in "ab"]
+    drawn = Uncertain(tuple(normals), seed)
+    scores = [[drawn.value(place, k) for k in range(samples)] for place in (0, 1)]
+    return np.sum(scores, axis=0) / np.sqrt(2.0)
+
+
 def test_runs_of_the_samples_have_the_verdicts_of_the_closed_form(tmp_path):
     loads = np.array([250.0, 300.0, 350.0])
     damping = {"distribution": "normal", "mean": 55.0, "standard_deviation": 6.0}
@@ -165,13 +184,8 @@ def test_intervals_hold_also_where_cells_stop_by_what_they_find(of_sobol):
     true, repeats = np.array([0.02, 0.1, 0.3, 0.5]), 300
     held, first = np.zeros(true.size), np.zeros(true.size)
     for seed in range(repeats):
-        if of_sobol:  # the sum of two of them
-            normals = [
-                Distribution(key, "normal", (("mean", 0.0), ("standard_deviation", 1.0))) for key in "ab"
-            ]
-            drawn = Uncertain(tuple(normals), seed)
-            scores = np.array([[drawn.value(place, k) for k in range(256)] for place in (0, 1)]).sum(axis=0)
-            vibrates = np.less.outer(norm.ppf(true), scores / np.sqrt(2.0))
+        if of_sobol:
+            vibrates = np.less.outer(norm.ppf(true), sums_of_two(seed, 256))
         else:
             vibrates = np.random.default_rng(seed).random((true.size, 256)) < true[:, np.newaxis]
         classes = np.where(vibrates, V, Q).astype(np.int8)
