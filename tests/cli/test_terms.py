@@ -39,8 +39,8 @@ def test_what_is_switched_has_been_measured():
     assert float(tilt[6].split()[0]) == round(measured["none"]["frequency"])
 
 
-# Programs, file formats, signals and words in place of others, which are no terms of the field
-NO_TERMS = set("EXUDYN CSV TOML UTF HDF5 README EPYC UDUNITS MPICH A4 TERM HUP USR1 USR2 XCPU".split())
+# Programs, file formats, signals, bodies of standards and words in place of others, which are no terms of the field
+NO_TERMS = set("EXUDYN CSV TOML UTF HDF5 README EPYC UDUNITS MPICH A4 TERM HUP USR1 USR2 XCPU ISO".split())
 NO_TERMS |= set("NAME SITE KIND WHAT AXIS VALUE TA P1".split())
 # Terms of the field in a report; each stands in its texts
 IN_A_REPORT = [
