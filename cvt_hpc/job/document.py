@@ -11,6 +11,7 @@ from pathlib import Path
 from cvt_hpc.errors import InputError, check_keys, did_you_mean, mismatch, show
 from cvt_hpc.job.definition import HEADER
 from cvt_hpc.job.values import (
+    SEPARATE,
     Document,
     Point,
     Table,
@@ -24,6 +25,12 @@ from cvt_hpc.storage.files import read_regular
 
 MOST_BYTES = 2**26
 _POSITION = re.compile(r"(?P<what>.*?) \(at (?:line (?P<line>\d+), column (?P<column>\d+)|end of document)\)")
+
+# By what a line has up to the place from which on it is no TOML
+_ADVICE = (
+    (re.compile(r"\d\s*;$|=\s*[-+]?\d+,\s*\d*[,} ]*$"), SEPARATE),
+    (re.compile(r"=\s*[-+]?[\d.]+\s*[^\W\d_]$"), '; a value with its unit is a text, as "10 mm/s"'),
+)
 
 
 def read_document(path: Path) -> Document:
@@ -64,6 +71,8 @@ def _parse(text: str, source: str) -> Document:
         lines = text.split("\n")
         line, column = match["line"] or len(lines), match["column"] or len(lines[-1]) + 1
         what = match["what"][:1].lower() + match["what"][1:]
+        start = lines[int(line) - 1][: int(column)]
+        what += next((advice for end, advice in _ADVICE if end.search(start)), "")
         raise InputError(f"{source}: line {line}, column {column}: expected TOML, found: {what}") from None
 
 

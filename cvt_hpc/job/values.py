@@ -28,6 +28,7 @@ _CUSTOMARY = {
 
 _FAR = 100.0  # times the greatest sensible value: refused of a file
 
+SEPARATE = "; decimals have a point, as 2.4, thousands have no mark, and several values are a list, as [2, 4]"
 _SEPARATED = re.compile(r"\s*\[?\s*[-+]?\d[\d.]*[^,;\d]*[,;]\s*[-+]?\d")
 Table = Mapping[str, Any]  # of a job file, as TOML gives it
 Document = dict[str, Any]  # a whole job, or a table of it, as TOML or JSON gives it
@@ -155,7 +156,7 @@ def separated(raw: object) -> str:
     """Return advice on a text with numbers between commas or semicolons, such as "2,4"; "" of all else."""
     if not isinstance(raw, str) or not _SEPARATED.match(raw):
         return ""
-    return "; decimals have a point, as 2.4, thousands have no mark, and several values are a list, as [2, 4]"
+    return SEPARATE
 
 
 def _check_bounds(parameter: Parameter, value: float, raw: object, where: str) -> None:

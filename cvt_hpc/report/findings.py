@@ -29,6 +29,8 @@ from cvt_hpc.analysis.sensitivity import (
     onset_scatter,
     widest_row,
 )
+from cvt_hpc.analysis.value_maps import WIDE
+from cvt_hpc.errors import few_of
 from cvt_hpc.job import Job
 from cvt_hpc.job.axes import SAMPLE, SWAPPED
 from cvt_hpc.variables import Status
@@ -45,6 +47,7 @@ OF_COMPUTATION = (  # come behind what is about the belt
 
 MOST_LINES = 8  # lines of the map that are told apart, on the first page
 MOST_SURE = 3  # of uncertain parameters: the onset of all is drawn
+MOST_HARDLY = 4  # cells of such a line that are hardly known
 MOST_VALUE_MAPS = 2  # quantities in a picture, of a study that judges no vibration
 MOST_RANGES = 6  # quantities
 NARROW = 1.05  # largest over least frequency of a line that are told apart
@@ -207,7 +210,11 @@ def _owed(told: xr.Dataset) -> Iterator[str]:
     cell = int(np.nanargmin(np.abs(shares.values - 0.5)))
     dims = list(map(str, shares.dims))
     here = told.isel(dict(zip(dims, map(int, np.unravel_index(cell, shares.shape)), strict=True)))
-    yield from _indices(told, here, f"where vibration is least certain, at {_place(told, dims, cell)}")
+    having = int(shares.notnull().sum())
+    where = "where vibration is least certain"
+    if having < shares.size:
+        where = f"of {having} of {counted(shares.size, 'cell')}, {where} among these"
+    yield from _indices(told, here, f"{where}, at {_place(told, dims, cell)}")
 
 
 def _indices(dataset: xr.Dataset, here: xr.Dataset, where: str) -> Iterator[str]:
@@ -300,8 +307,10 @@ def _how_sure(line: xr.Dataset, x: str, place: str) -> str:
             if places := [one.load for one in found if one.rising == rising]:
                 factor, unit = coordinate_unit(line[x].attrs)
                 crossed[rising].append(f"{_percent(share)} % at {factor * outer(places):.4g} {unit}".rstrip())
-    largest = int(np.nanargmax(shares))
-    low, high = (float(line[f"{PROBABILITY}_{end}"].values[largest]) for end in ("low", "high"))
+    lows, highs = (line[f"{PROBABILITY}_{end}"].values for end in ("low", "high"))
+    # of several alike the one that is known best
+    largest = int(np.argmax(np.where(shares == np.nanmax(shares), lows, -1.0)))
+    low, high = float(lows[largest]), float(highs[largest])
     text = f"At {place} the" if place else "The"
     text += " probability of vibration "
     verbs = (("passes", crossed[True]), ("falls below", crossed[False][::-1]))
@@ -315,6 +324,10 @@ def _how_sure(line: xr.Dataset, x: str, place: str) -> str:
         first, _, last = QUANTILES
         text += f", with amplitudes of {factor * quantiles[0]:.3g} to {factor * quantiles[-1]:.3g} {unit} "
         text += f"({first} to {last} of the samples that vibrate)"
+    hardly = np.flatnonzero(~np.isnan(shares) & (highs - lows > WIDE))
+    if any(crossed.values()) and hardly.size:
+        at = few_of([value_text(line[x], int(k)) for k in hardly], MOST_HARDLY)
+        text += f"; hardly known, with intervals wider than {WIDE:g}, at {at}"
     return text + "."
 
 

@@ -9,6 +9,7 @@ import pandas as pd
 import pytest
 import pyuff
 import xarray as xr
+from scipy import signal as scipy_signal
 from scipy.io import wavfile
 
 import cvt_hpc.accessor  # noqa: F401  # gives datasets their `cvt`
@@ -174,6 +175,11 @@ def test_a_sine_has_its_level_in_its_band_and_a_velocity_by_its_frequency():
     bands = third_octaves(values, RATE, "m")
     assert level(bands.rms, "m")[bands.numbers == 0] == pytest.approx(20.0 * np.log10(np.sqrt(2.0)), abs=1e-3)
     assert level(np.hypot.reduce(bands.rms[bands.numbers != 0]), "m") < -50.0
+    # of whole periods the spectrum by scipy has the same level, that of the RMS value
+    _, power = scipy_signal.periodogram(values, RATE, "hann", scaling="spectrum")
+    assert level(np.sqrt(power.max()), "m") == pytest.approx(
+        level(bands.rms, "m")[bands.numbers == 0].item(), abs=1e-3
+    )
     speeds = third_octaves(values, RATE, "m", velocity=True)
     assert speeds.unit == "m s-1"
     np.testing.assert_allclose(

@@ -137,6 +137,25 @@ def test_the_interval_holds_the_probability_of_the_closed_form():
     assert (np.sqrt(np.mean(np.square(errors), axis=0)) < 0.5 * independent).all()
 
 
+@pytest.mark.parametrize("samples", [32, 64, 128])
+def test_twice_the_samples_hold_the_probability_as_often(samples):
+    true, held = np.array([0.02, 0.1, 0.3, 0.5]), np.zeros(4)
+    for seed in range(100):
+        scores = sums_of_two(seed, samples)
+        hits = np.less.outer(norm.ppf(true), scores).sum(axis=-1)
+        low, high = interval(hits, np.full(true.size, samples))
+        held += (low <= 1.0 - true) & (1.0 - true <= high)
+    assert (held >= 95).all()
+
+
+def sums_of_two(seed, samples):
+    """Samples of the sum of two normal parameters, of standard deviation 1."""
+    normals = [Distribution(key, "normal", (("mean", 0.0), ("standard_deviation", 1.0))) for key in "ab"]
+    drawn = Uncertain(tuple(normals), seed)
+    scores = [[drawn.value(place, k) for k in range(samples)] for place in (0, 1)]
+    return np.sum(scores, axis=0) / np.sqrt(2.0)
+
+
 def test_runs_of_the_samples_have_the_verdicts_of_the_closed_form(tmp_path):
     loads = np.array([250.0, 300.0, 350.0])
     damping = {"distribution": "normal", "mean": 55.0, "standard_deviation": 6.0}
@@ -165,13 +184,8 @@ def test_intervals_hold_also_where_cells_stop_by_what_they_find(of_sobol):
     true, repeats = np.array([0.02, 0.1, 0.3, 0.5]), 300
     held, first = np.zeros(true.size), np.zeros(true.size)
     for seed in range(repeats):
-        if of_sobol:  # the sum of two of them
-            normals = [
-                Distribution(key, "normal", (("mean", 0.0), ("standard_deviation", 1.0))) for key in "ab"
-            ]
-            drawn = Uncertain(tuple(normals), seed)
-            scores = np.array([[drawn.value(place, k) for k in range(256)] for place in (0, 1)]).sum(axis=0)
-            vibrates = np.less.outer(norm.ppf(true), scores / np.sqrt(2.0))
+        if of_sobol:
+            vibrates = np.less.outer(norm.ppf(true), sums_of_two(seed, 256))
         else:
             vibrates = np.random.default_rng(seed).random((true.size, 256)) < true[:, np.newaxis]
         classes = np.where(vibrates, V, Q).astype(np.int8)
@@ -261,6 +275,10 @@ def test_probabilities_rest_on_both_sets_of_samples_and_not_on_those_between(tmp
         dataset.isel(swapped=0).cvt.indices()
     text = write_report(dataset, tmp_path / "report.html").read_text().replace("\u00a0", " ")
     assert "Total Sobol indices where vibration is least certain, at load 1 N m: damping 1.33 (" in text
+    both = xr.concat([unknown, dataset.assign_coords(load=[2.0])], "load", data_vars="minimal")
+    text = write_report(both, tmp_path / "report.html").read_text().replace("\u00a0", " ")
+    told = "Total Sobol indices of 1 of 2 cells, where vibration is least certain among these, at load 2 N m"
+    assert told in text
     dataset["vibrates"][:] = Vibrates.UNDECIDED
     assert "Total Sobol" not in write_report(dataset, tmp_path / "report.html").read_text()
     assert "occurrence" in words(map_figure(dataset, {"swapped": "none"}))
@@ -402,6 +420,16 @@ def test_the_onset_lies_along_the_axis_on_which_verdicts_change(tmp_path):
     runs[:, 0] = Q
     text = report(study(runs, radial_speed=np.arange(40.0), contact_force=[1.0, 2.0, 3.0]), tmp_path)
     assert "No sample is known to vibrate in 1 of 3 lines along radial speed." in text
+
+
+@pytest.mark.usefixtures("undrawn")
+def test_the_report_names_what_is_hardly_known_and_the_largest_probability_that_is_known_best(tmp_path):
+    # of the second load one sample of 16 has a verdict
+    rows = [[Q] * 16, [V] + [U] * 15, [V] * 14 + [U] * 2, [V] * 16]
+    text = report(study(rows, load=[10.0, 20.0, 30.0, 40.0]), tmp_path)
+    assert "50 % at 15 N m" in text and "largest at 40 N m: 100 % (79.4 to 100 %)" in text
+    assert "; hardly known, with intervals wider than 0.5, at 20 N m." in text
+    assert "hardly known" not in report(study(rows[::3], load=[10.0, 40.0]), tmp_path)
 
 
 def report(dataset, folder):

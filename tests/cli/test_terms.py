@@ -47,6 +47,11 @@ IN_A_REPORT = [
     *("amplitude", "disturbance", "hysteresis", "inferred", "load", "onset", "threshold"),
     *("ratio", "sample", "Sobol index", "strand t1, t2", "window"),
 ]
+# Terms of the field on uncertain parameters and measurements; each stands on the page of sweeps or on that of verdicts
+OF_UNCERTAINTY = [
+    *("Akaike's criterion", "bootstrap", "Brier score", "distribution", "interval (95 %)", "likelihood"),
+    *("mutual information", "quantile", "rank correlation", "specimen", "tribometer"),
+]
 
 
 def glossary_words():
@@ -75,3 +80,10 @@ def test_the_glossary_has_the_terms_of_a_report():
     texts = "".join(path.read_text() for path in (ROOT / "cvt_hpc" / "report").glob("*.*"))
     for term in IN_A_REPORT:
         assert term in glossary_words() and re.split(r"[ ,]", term)[0] in texts, term
+
+
+def test_the_glossary_has_the_terms_of_uncertain_parameters():
+    texts = [(ROOT / "docs" / "guide" / f"{name}.md").read_text() for name in ("sweeps", "verdicts")]
+    told = " ".join("".join(texts).split())
+    for term in OF_UNCERTAINTY:
+        assert term in glossary_words() and term.split(" (")[0] in told, term

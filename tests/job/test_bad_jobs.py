@@ -149,6 +149,29 @@ def test_files_that_are_not_toml(tmp_path, monkeypatch, content, message):
     assert complaint() == message
 
 
+SEPARATE = "decimals have a point, as 2.4, thousands have no mark, and several values are a list, as [2, 4]"
+
+
+@pytest.mark.parametrize(
+    ("line", "advice"),
+    [
+        ("load = 2,4", SEPARATE),
+        ("load = [2;4]", SEPARATE),
+        ("load = 2;4", SEPARATE),
+        ("load = { from = 1,5, to = 3, count = 5 }", SEPARATE),
+        ("load = { from = 1; to = 3; count = 5 }", SEPARATE),
+        ("load = 10 N m", 'a value with its unit is a text, as "10 mm/s"'),
+        ("load = [2, 4", None),
+        ("load = tow", None),
+    ],
+)
+def test_a_comma_a_semicolon_and_a_unit_outside_a_text_get_advice(write_job, line, advice):
+    write_job(f"[axes]\n{line}\n")
+    found = complaint()
+    assert ": expected TOML, found: " in found and "\n" not in found
+    assert found.endswith(f"; {advice}") if advice else ";" not in found
+
+
 def test_numbers_of_too_many_digits(write_job):
     write_job(f"[mesh]\nstations = {'1' * 5000}")
     assert complaint().startswith("x.toml: expected TOML, found: Exceeds the limit")
