@@ -17,22 +17,9 @@ from cvt_hpc.analysis import courses
 from cvt_hpc.analysis.arrangement import infinity_in_words, place_text, value_text
 from cvt_hpc.analysis.classes import at_strongest_strand, count_classes, map_classes, occurrence_classes
 from cvt_hpc.analysis.figures import coordinate_unit, in_words, number, value_unit
-from cvt_hpc.analysis.probability import CONTOURS, PROBABILITY
+from cvt_hpc.analysis.probability import PROBABILITY
 from cvt_hpc.analysis.scatter import is_sampled
-from cvt_hpc.analysis.sensitivity import (
-    COARSE,
-    ONSET,
-    QUANTILES,
-    indices_of,
-    members,
-    onset_axes,
-    onset_scatter,
-    widest_row,
-)
-from cvt_hpc.analysis.value_maps import WIDE
-from cvt_hpc.errors import few_of
 from cvt_hpc.job import Job
-from cvt_hpc.job.axes import SAMPLE, SWAPPED
 from cvt_hpc.variables import Status
 from cvt_hpc.vibration.classes import DECIDED, OccurrenceClass, levels, onsets
 from cvt_hpc.vibration.ramped import ramped
@@ -46,12 +33,9 @@ OF_COMPUTATION = (  # come behind what is about the belt
 )
 
 MOST_LINES = 8  # lines of the map that are told apart, on the first page
-MOST_SURE = 3  # of uncertain parameters: the onset of all is drawn
-MOST_HARDLY = 4  # cells of such a line that are hardly known
 MOST_VALUE_MAPS = 2  # quantities in a picture, of a study that judges no vibration
 MOST_RANGES = 6  # quantities
 NARROW = 1.05  # largest over least frequency of a line that are told apart
-MATTERS = 0.05  # of the variance of a result, or of the band of the onset: a parameter below hardly does
 STATUS = {int(status): status.name.lower() for status in Status}
 
 
@@ -100,7 +84,7 @@ def range_sentences(dataset: xr.Dataset) -> Iterator[str]:
         unit = f" {one.unit}" if one.unit else ""
         place = ""
         if not is_sampled(dataset):
-            place = f", largest at {_place(dataset, dims, int(np.nanargmax(known)))}"
+            place = f", largest at {place_of(dataset, dims, int(np.nanargmax(known)))}"
         yield f"{one.name[:1].upper()}{one.name[1:]}: from {ends[0]} to {ends[1]}{unit}{place}."
 
 
@@ -113,7 +97,7 @@ def slip_sentence(dataset: xr.Dataset, x: str) -> str:
     other = [dim for dim in slipping.dims if dim != x]
     lowest = int(np.argmax(slipping.any(other).values))
     least = f", the first at {place_text(dataset[x], lowest)}"
-    return f"The belt slips or lifts off in {counted(count, 'run')}{least if _is_number(dataset[x]) else ''}."
+    return f"The belt slips or lifts off in {counted(count, 'run')}{least if is_number(dataset[x]) else ''}."
 
 
 def counted(count: int, noun: str) -> str:
@@ -126,13 +110,13 @@ def window_sentences(dataset: xr.Dataset, x: str, others: Sequence[str]) -> Iter
 
     A line is called quiet only if all of its cells are. `others` are all other axes of the study.
     """
-    if not _is_number(dataset[x]):
+    if not is_number(dataset[x]):
         return
     decided = np.isfinite(levels(map_classes(dataset).values))
     if not decided.any():
         return
-    dataset = dataset.sortby([name for name in (x, *others) if _is_number(dataset[name])])
-    places, lines = _lines(dataset, others)
+    dataset = dataset.sortby([name for name in (x, *others) if is_number(dataset[name])])
+    places, lines = lines_along(dataset, others)
     told = [_line(line, x, place) for line, place in zip(lines, places, strict=True)]
     vibrating = [text for text in told if text]
     shown = np.unique(np.linspace(0, len(vibrating) - 1, min(len(vibrating), MOST_LINES)).round().astype(int))
@@ -154,188 +138,15 @@ def window_sentences(dataset: xr.Dataset, x: str, others: Sequence[str]) -> Iter
         yield f"{start} run is known to vibrate, but not all are known to be quiet."
 
 
-def _lines(dataset: xr.Dataset, others: Sequence[str]) -> tuple[list[str], list[xr.Dataset]]:
-    """Places of the lines of a study along an axis, and these lines, by the values of all others."""
+def lines_along(dataset: xr.Dataset, others: Sequence[str]) -> tuple[list[str], list[xr.Dataset]]:
+    """Return places of the lines of a study along an axis, and these lines, by the values of all others."""
     stacked = dataset.stack(line=others) if others else dataset.expand_dims("line")
     numbers = range(stacked.sizes["line"])
-    return [_place(dataset, others, k) for k in numbers], [stacked.isel(line=k) for k in numbers]
+    return [place_of(dataset, others, k) for k in numbers], [stacked.isel(line=k) for k in numbers]
 
 
-def probability_sentences(dataset: xr.Dataset, told: xr.Dataset, x: str) -> Iterator[str]:
-    """Yield how sure the vibration of a study with uncertain parameters is, along the axis of its onset.
-
-    `told` are the `probabilities` of the results; without an axis of numbers, lines lie along x.
-    """
-    along = next(iter(onset_axes(dataset)), "")
-    x = along or x
-    others = [name for name in map(str, told["status"].dims) if name != x]
-    yield f"{told.attrs['counted']}.".replace(";", ", with", 1)
-    uncertain = (
-        f"{in_words(axis)} ({axis.attrs['derived']})"
-        for axis in dataset.coords.values()
-        if SAMPLE in axis.dims and "derived" in axis.attrs
-    )
-    yield f"Uncertain: {'; '.join(uncertain)}."
-    yield (
-        "The intervals are those of independent samples, rather too wide for Sobol points. All cells have "
-        "the same samples: their errors are alike. Runs without a verdict widen the intervals."
-    )
-    told = told.sortby([name for name in (x, *others) if _is_number(told[name])])
-    places, lines = _lines(told, others)
-    moving = [k for k, line in enumerate(lines) if (line[PROBABILITY] > 0.0).any()]
-    ends = np.linspace(0, len(moving) - 1, min(len(moving), MOST_SURE)).round().astype(int)
-    yield from (_how_sure(lines[moving[k]], x, places[moving[k]]) for k in ends)
-    if (more := len(moving) - MOST_SURE) > 0:
-        yield f"In {counted(more, 'more line')} along {in_words(told[x])} samples vibrate."
-    if quiet := len(lines) - len(moving):
-        where = f" in {quiet} of {len(lines)} lines along {in_words(told[x])}" if others else ""
-        yield f"No sample is known to vibrate{where}."
-    if "total_order" in told:
-        yield from _owed(told)
-    if along:
-        yield from _onset_owed(dataset, along)
-    slip = told["slip_probability"]
-    if (slip > 0.0).any():
-        largest = int(np.nanargmax(slip.values))
-        at = _place(told, list(map(str, slip.dims)), largest)
-        yield f"The belt slips with a probability of up to {_percent(slip.values.flat[largest])} %, at {at}."
-
-
-def _owed(told: xr.Dataset) -> Iterator[str]:
-    """State the Sobol indices of the verdict in the cell that has any and is least certain."""
-    shares = told[PROBABILITY].where(told["total_order"].notnull().any("parameter"))
-    if not shares.notnull().any():
-        yield "No cell has Sobol indices of vibration: nine of ten samples need verdicts that differ."
-        return
-    cell = int(np.nanargmin(np.abs(shares.values - 0.5)))
-    dims = list(map(str, shares.dims))
-    here = told.isel(dict(zip(dims, map(int, np.unravel_index(cell, shares.shape)), strict=True)))
-    having = int(shares.notnull().sum())
-    where = "where vibration is least certain"
-    if having < shares.size:
-        where = f"of {having} of {counted(shares.size, 'cell')}, {where} among these"
-    yield from _indices(told, here, f"{where}, at {_place(told, dims, cell)}")
-
-
-def _indices(dataset: xr.Dataset, here: xr.Dataset, where: str) -> Iterator[str]:
-    """State the total Sobol indices of a cell or row, and which parameter decides."""
-    ends = (here[f"total_order{end}"].values for end in ("", "_low", "_high"))
-    names = (_members(dataset, name) for name in here["parameter"].values)
-    known = [(name, *map(float, values)) for name, *values in zip(names, *ends, strict=True)]
-    known = sorted((row for row in known if np.isfinite(row[1])), key=lambda row: -row[1])
-    if known:
-        listed = (f"{name} {value:.2f} ({low:.2f} to {high:.2f})" for name, value, low, high in known)
-        yield f"Total Sobol indices {where}: {', '.join(listed)}."
-        yield from _deciding(known)
-
-
-def _deciding(known: Sequence[tuple[str, float, float, float]]) -> Iterator[str]:
-    """State which parameter decides, by shares with their bounds, the largest first, as far as these tell."""
-    (first, _, least, _), *others = known
-    if not others:
-        return
-    start = f"{first[0].upper()}{first[1:]}"
-    rivals = [name for name, _, _, high in others if high > least]
-    if least <= 0.0 or rivals:
-        others_do = f"{' or '.join(rivals)} does" if rivals else "it does"
-        yield f"{start} seems to decide most; more samples would tell whether {others_do}."
-        return
-    then = [name for name, share, _, _ in others if share >= MATTERS]
-    hardly = [name for name, share, _, _ in others if share < MATTERS]
-    text = f"{start} decides"
-    text += f", then {', then '.join(then)}" if then else ""
-    yield f"{text}; {' and '.join(hardly)} hardly matter{'s' * (len(hardly) == 1)}." if hardly else f"{text}."
-
-
-def _members(dataset: xr.Dataset, name: object) -> str:
-    return " with ".join(members(dataset, str(name)))
-
-
-def _onset_owed(dataset: xr.Dataset, along: str) -> Iterator[str]:
-    """State to which parameters the scatter of the onset is due, where that is widest."""
-    found = onset_scatter(dataset, along)
-    if "band" not in found:
-        return
-    row = widest_row(found)
-    here, shape = found.isel(row), found["band"].shape
-    place = _place(found, [*row], int(np.ravel_multi_index([*row.values()], shape))) if row else ""
-    factor, unit = coordinate_unit(found["onset"].attrs)
-    band = factor * here["band"].item()
-    has_indices = SWAPPED in dataset["status"].dims
-    if has_indices:
-        where = f"of the onset in {in_words(dataset[along])}{f', at {place}' * bool(place)}"
-        yield from _indices(dataset, indices_of(dataset, ONSET, along).isel(row), where)
-    if not np.isfinite(band):
-        return
-    first, _, last = QUANTILES
-    start = f"The onset in {in_words(dataset[along])} scatters{f' most at {place}' * bool(place)}"
-    start += f": {first} to {last} of the samples within {band:.3g} {unit}"
-    if band < COARSE * (step := factor * here["step"].item()):
-        yield f"{start}, known no better than the step of {step:.3g} {unit}: take a finer axis."
-        return
-    yield f"{start}."
-    shares = []
-    for name in here["parameter"].values:
-        one = here.sel(parameter=name)
-        width, low, high = (factor * one[f"halved_band{end}"].item() for end in ("", "_low", "_high"))
-        if np.isfinite(width):
-            yield _halved(_members(dataset, name), band, (width, low, high), unit)
-            shares.append((_members(dataset, name), *(1.0 - one / band for one in (width, high, low))))
-    if shares and not has_indices:
-        yield from _deciding(sorted(shares, key=lambda row: -row[1]))
-
-
-def _halved(words: str, band: float, widths: Sequence[float], unit: str) -> str:
-    """State what half the scatter of a parameter makes of a band: width and bounds, by the digits told."""
-    told, *values = (f"{value:.3g}" for value in (band, *widths))
-    width, low, high = values
-    bounds = f"{low} to {high}" if np.isfinite(widths[2]) else f"{low} or more"
-    start = f"Halve the scatter of {words}, and"
-    if told == width or float(low) <= float(told) <= float(high):
-        return f"{start} it is not certain that this band changes: {width} {unit} ({bounds})."
-    verb = "shrinks" if float(width) < float(told) else "grows"
-    return f"{start} this band {verb} from {told} to {width} {unit} ({bounds})."
-
-
-def _how_sure(line: xr.Dataset, x: str, place: str) -> str:
-    """State where the probability along a line crosses the contours, and where it is largest."""
-    shares = line[PROBABILITY].values
-    crossed: dict[bool, list[str]] = {True: [], False: []}
-    for share in CONTOURS if _is_number(line[x]) else ():
-        found = onsets(line[x].values.astype(float), shares - share)
-        for rising, outer in ((True, min), (False, max)):
-            if places := [one.load for one in found if one.rising == rising]:
-                factor, unit = coordinate_unit(line[x].attrs)
-                crossed[rising].append(f"{_percent(share)} % at {factor * outer(places):.4g} {unit}".rstrip())
-    lows, highs = (line[f"{PROBABILITY}_{end}"].values for end in ("low", "high"))
-    # of several alike the one that is known best
-    largest = int(np.argmax(np.where(shares == np.nanmax(shares), lows, -1.0)))
-    low, high = float(lows[largest]), float(highs[largest])
-    text = f"At {place} the" if place else "The"
-    text += " probability of vibration "
-    verbs = (("passes", crossed[True]), ("falls below", crossed[False][::-1]))
-    told = ", ".join(f"{verb} {', '.join(places)}" for verb, places in verbs if places)
-    text += f"{told} of {in_words(line[x])}, and " if told else ""
-    most = f"{_percent(shares[largest])} % ({_percent(low)} to {_percent(high)} %)"
-    text += f"is largest at {value_text(line[x], largest)}: {most}"
-    if "amplitude_quantiles" in line:
-        quantiles = line["amplitude_quantiles"].transpose("quantile", ...).values[:, largest]
-        factor, unit = length_unit(quantiles)
-        first, _, last = QUANTILES
-        text += f", with amplitudes of {factor * quantiles[0]:.3g} to {factor * quantiles[-1]:.3g} {unit} "
-        text += f"({first} to {last} of the samples that vibrate)"
-    hardly = np.flatnonzero(~np.isnan(shares) & (highs - lows > WIDE))
-    if any(crossed.values()) and hardly.size:
-        at = few_of([value_text(line[x], int(k)) for k in hardly], MOST_HARDLY)
-        text += f"; hardly known, with intervals wider than {WIDE:g}, at {at}"
-    return text + "."
-
-
-def _percent(share: float) -> str:
-    return f"{100.0 * share:.3g}"
-
-
-def _place(dataset: xr.Dataset, names: Sequence[str], index: int) -> str:
+def place_of(dataset: xr.Dataset, names: Sequence[str], index: int) -> str:
+    """Return in words where a flat index along dimensions lies."""
     places = np.unravel_index(index, [dataset.sizes[name] for name in names]) if names else ()
     at = [place_text(dataset[name], int(k)) for name, k in zip(names, places, strict=True)]
     return " and ".join(filter(None, (", ".join(at[:-1]), *at[-1:])))
@@ -424,12 +235,13 @@ def failures(dataset: xr.Dataset) -> list[Failure]:
     found = []
     for kind, count in numbers.most_common():
         reason, first = alike[kind]
-        place = f"run {first}" if is_sampled(dataset) else _place(dataset, dims, first)
+        place = f"run {first}" if is_sampled(dataset) else place_of(dataset, dims, first)
         found.append(Failure(kind[0], count, reason, place))
     return found
 
 
-def _is_number(axis: xr.DataArray) -> bool:
+def is_number(axis: xr.DataArray) -> bool:
+    """Return whether the values of an axis are numbers."""
     return axis.dtype.kind in "iuf"
 
 
@@ -493,7 +305,7 @@ def _candidates(dataset: xr.Dataset) -> Iterator[tuple[str, xr.DataArray]]:
             continue
         for place in range(array.sizes[extra]):
             label = f"{in_words(dataset[extra])} {place + 1}"
-            if not _is_number(dataset[extra]):
+            if not is_number(dataset[extra]):
                 label = str(dataset[extra].values[place])
             part = array.isel({extra: place}, drop=True)
             # the name of a variable may be long; what stands there is never taken for a sentence

@@ -40,7 +40,7 @@ from cvt_hpc.job.axes import SAMPLE, SWAPPED
 from cvt_hpc.job.summary import core_time_in_words, rules_in_words, value_in_words
 from cvt_hpc.job.values import shown
 from cvt_hpc.models.contract import load_model
-from cvt_hpc.report import findings
+from cvt_hpc.report import certainty, findings
 from cvt_hpc.report.interactive import KEPT, as_script, map_data
 from cvt_hpc.storage.files import written_aside
 from cvt_hpc.storage.netcdf import CONTENT, HISTORY
@@ -165,7 +165,7 @@ def _content(
         beyond = [name for name in map(str, cells["status"].dims) if name not in (arrangement.x, *axes)]
         x = arrangement.x if dataset[arrangement.x].dtype.kind in "iuf" else None
         if PROBABILITY in cells:
-            sentences = list(findings.probability_sentences(dataset, cells, arrangement.x))
+            sentences = list(certainty.probability_sentences(dataset, cells, arrangement.x))
         elif judged:
             sentences = list(findings.window_sentences(dataset, arrangement.x, [*beyond, *axes]))
             sentences += filter(None, [findings.slip_sentence(dataset, arrangement.x)])
