@@ -8,7 +8,7 @@ gives the pushbelt. Of the elastic belt stands the mode that grows fastest about
 elements apart that hardly touch (loosened).
 
 The pushbelt is marched for `SETTLED`, until the loaded strand has closed its gaps: up to 0.1 s after the start its push
-falls and jumps by up to 3 kN as they go round, longest with many elements, and each jump throws both strands by some um.
+falls and jumps by up to 3 kN as they go round, and a jump throws both strands by some um.
 From its rise time on it is calmed: at each sample it loses a part of the speed at which the belt's line moves across
 itself. A steady motion has that speed, too, where the curvature of the path changes, 30 to 70 mm/s at the ends of the
 arcs, so that the calmed line lies some 10 um beside the steady one. So the rate of calming fades within `LET_GO`. A
