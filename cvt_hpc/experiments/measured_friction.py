@@ -264,6 +264,11 @@ def job_lines(fitted: Fitted) -> list[str]:
     return [*lines, "", head, samples, *_FURTHER, *table]
 
 
+def _with_deviation(one: Fitted, key: str) -> str:
+    value, deviation = (from_si(n, _UNITS[key], _WRITTEN[key]) for n in (one.values[key], one.deviations[key]))
+    return f"{short(value)} +- {deviation:.2g}"
+
+
 def law_lines(laws: Sequence[Fitted], points: Points) -> Iterator[str]:
     """Yield lines that state what was measured and every fit; the best law stands first."""
     best, speeds, specimens = laws[0], points.speed, len(np.unique(points.specimen))
@@ -271,10 +276,9 @@ def law_lines(laws: Sequence[Fitted], points: Points) -> Iterator[str]:
         f"{len(speeds)} points from {1e3 * speeds.min():g} to {1e3 * speeds.max():g} mm/s, "
         f"{specimens} specimen{'s' * (specimens > 1)}"
     )
-    rows = [["law", *(f"{key} [{unit or 1}]" for key, unit in _UNITS.items()), "rms [1]", "criterion"]]
+    rows = [["law", *(f"{key} [{unit or 1}]" for key, unit in _WRITTEN.items()), "rms [1]", "criterion"]]
     for one in laws:
-        values, deviations = one.values, one.deviations
-        cells = [f"{short(values[key])} +- {deviations[key]:.2g}" if key in values else "" for key in _UNITS]
+        cells = [_with_deviation(one, key) if key in one.values else "" for key in _UNITS]
         rows.append([one.law.name.lower(), *cells, f"{one.rms:.2g}", f"{one.criterion - best.criterion:.1f}"])
     yield from columns(rows, indent="")
     closest = min(laws, key=lambda one: one.rms)

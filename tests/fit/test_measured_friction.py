@@ -91,6 +91,15 @@ def test_a_law_that_few_points_cannot_prove_is_told():
     assert laws[0].law is Law.STRIBECK and not any("closer" in line for line in law_lines(laws, many))
 
 
+def test_lines_and_job_state_a_speed_in_the_same_unit():
+    exact = points(of_law(Law.STRIBECK) + 1e-6 * np.random.default_rng(1).normal(size=10))
+    laws = fit_laws(exact)
+    _, head, best, *_ = law_lines(laws, exact)
+    assert "stribeck_velocity [mm/s]" in head and " 50 +- " in best, best
+    (written,) = (line for line in job_lines(laws[0]) if line.startswith("# stribeck_velocity"))
+    assert 49.9 < float(written.split('"')[1].removesuffix(" mm/s")) < 50.1
+
+
 def test_scatter_is_that_of_the_specimens_and_not_of_their_number():
     rng, count = np.random.default_rng(7), 24
     own = [TRUE["friction_gradient"] * (1.0 + 0.1 * rng.normal()) for _ in range(count)]
