@@ -265,7 +265,8 @@ def job_lines(fitted: Fitted) -> list[str]:
 
 
 def _with_deviation(one: Fitted, key: str) -> str:
-    value, deviation = (from_si(n, _UNITS[key], _WRITTEN[key]) for n in (one.values[key], one.deviations[key]))
+    moments = one.values[key], one.deviations[key]
+    value, deviation = (from_si(moment, _UNITS[key], _WRITTEN[key]) for moment in moments)
     return f"{short(value)} +- {deviation:.2g}"
 
 
