@@ -5,6 +5,7 @@ All ranks compute, and each claims its next batch from one counter.
 
 import logging
 import math
+import os
 import time
 from collections.abc import Callable, Collection, Iterator, Mapping, Sequence
 from contextlib import ExitStack, closing
@@ -18,7 +19,7 @@ from cvt_hpc.errors import mismatch
 from cvt_hpc.job import Job
 from cvt_hpc.job.values import Document
 from cvt_hpc.linear_algebra import one_thread
-from cvt_hpc.storage.files import StorageError, open_missing_streams
+from cvt_hpc.storage.files import StorageError, naming_refusals, open_missing_streams, probed
 from cvt_hpc.storage.locks import BusyError
 from cvt_hpc.storage.netcdf import library_for_sweep
 from cvt_hpc.storage.provenance import program_identity
@@ -30,7 +31,7 @@ from cvt_hpc.study.forecast.resources import refuse_too_large
 from cvt_hpc.study.gather import LossError, gather_records
 from cvt_hpc.study.planning import Plan, asked_runs, next_round, prepare
 from cvt_hpc.study.ranks import stopping
-from cvt_hpc.study.ranks.launch import RankDied, Ranks, Team, assembled_team
+from cvt_hpc.study.ranks.launch import RankDied, Ranks, Team, assembled_team, noticing_deaths
 from cvt_hpc.study.ranks.progress import Counter, Progress
 from cvt_hpc.study.record.log import RecordFormat, RecordLog
 from cvt_hpc.study.simulator import Simulator, default_simulator
@@ -163,6 +164,8 @@ def run(
 
         with ExitStack() as held:
             plan = team.on_root(find_plan)
+            if begins and team.size > 1:
+                _refuse_other_folders(team, folder)
             with open_counter(team) as counter:
                 visible, costs = progress and team.rank == 0, plan.costs[plan.order]
                 display = Progress(counter, plan.total, plan.recorded, plan.failed, visible, costs)
@@ -214,6 +217,23 @@ def _accept(job: Job, part: str | None, fresh: bool, simulator: Simulator) -> tu
     if share is not None and study.in_rounds:
         raise mismatch("part", "a whole study, since it chooses by the runs of all parts", f"part {share}")
     return study, share
+
+
+def _refuse_other_folders(team: Team, folder: StudyFolder) -> None:
+    """Raise InputError on all ranks if one sees another folder than rank 0, which would miss its records."""
+    with ExitStack() as kept, noticing_deaths():
+
+        def leave_file() -> Path:
+            with naming_refusals(folder.records, "a folder that can be written to"):
+                return kept.enter_context(probed(folder.records))
+
+        def find(file: Path) -> None:
+            if not os.path.exists(file):
+                then = "give all ranks one that all of them see, by --out"
+                raise mismatch(str(folder.path), "the folder that rank 0 writes to", "another one", then)
+
+        file = team.on_root(leave_file)
+        team.agreed(lambda: find(file), lambda _: {})
 
 
 def _compute(

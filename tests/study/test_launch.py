@@ -1,6 +1,7 @@
 """Who started the process: serial runs leave MPI alone, ranks that cannot see each other are refused."""
 
 import json
+import platform
 import re
 import signal
 import sys
@@ -14,8 +15,8 @@ import pytest
 from cvt_hpc.errors import InputError
 from cvt_hpc.study import open_results, run
 from cvt_hpc.study.ranks.launch import Launch, assembled_team, detect_launch
-from support.study_double import Job, Simulator
-from support.study_processes import find_mpirun, wait_until
+from support.study_double import Axis, Job, Simulator
+from support.study_processes import HERE, find_mpirun, wait_until
 
 
 @pytest.mark.parametrize(
@@ -112,6 +113,26 @@ def test_a_rank_that_differs_ends_all_with_one_line(side_by_side, words, mu, tol
     assert finished.returncode == 2
     assert re.match(f"cvt-hpc: rank 1 on .*: {told}", finished.stderr), finished.stderr
     assert finished.stderr.count("\n") == 1
+
+
+@pytest.mark.parametrize("has_folder", [True, False])
+def test_ranks_that_see_other_output_folders_are_refused(spawn, tmp_path, has_folder):
+    """As on disks of their own: rank 0 would miss what the others record, and that at each start anew."""
+    options = {"out": "out", "runs": 6}
+    command = [find_mpirun()]
+    for rank in (0, 1):
+        folder = tmp_path / f"node-{rank}"
+        folder.mkdir()
+        if has_folder:
+            run(Job((Axis("load", tuple(range(6))),)), folder / "out", simulator=Simulator(), part="1/3")
+        program = [sys.executable, str(HERE / "study_double.py"), json.dumps(options)]
+        command += [*[":"][:rank], "-n", "1", "-wdir", str(folder), *program]
+    finished = spawn(command).finish()
+    assert finished.returncode == 2
+    told = f"rank 1 on {platform.node()}: out: expected the folder that rank 0 writes to, found another"
+    assert told in finished.stderr
+    assert not list(tmp_path.glob("node-*/out/records/rank-0001-*"))
+    assert not list(tmp_path.glob("node-*/out/records/.*"))
 
 
 def test_ranks_of_one_error_print_it_once(side_by_side):
