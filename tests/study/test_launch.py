@@ -157,13 +157,16 @@ def test_a_rank_that_waits_ends_also_where_nobody_can_read_why(spawn):
     assert spawn(command, {"CVT_HPC_RANK_WAIT": "0.5"}).finish().returncode == -signal.SIGKILL
 
 
+@pytest.mark.parametrize("target", ["rank 0", "mpirun"])
 @pytest.mark.parametrize("number", [signal.SIGTERM, signal.SIGINT])
-def test_signals_end_ranks_that_wait_for_mpi_to_start(side_by_side, number):
+def test_signals_end_ranks_that_wait_for_mpi_to_start(side_by_side, number, target):
     sweep = side_by_side((*OURS, "run", "x.toml"), ("-c", "raise SystemExit(3)"))
     wait_until(lambda: "watcher.py" in str(children(sweep)), "the rank that waits")
     time.sleep(0.3)  # in MPI_Init
-    sweep.ranks()[0].send_signal(number)
-    assert sweep.finish().returncode in (number, 128 + number)
+    (sweep.process if target == "mpirun" else sweep.ranks()[0]).send_signal(number)
+    finished = sweep.finish()
+    assert finished.returncode in (number, 128 + number)
+    assert "Traceback" not in finished.stderr  # the launcher passes it on to the process beside the rank, too
 
 
 def children(sweep):
