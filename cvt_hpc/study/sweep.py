@@ -6,6 +6,7 @@ All ranks compute, and each claims its next batch from one counter.
 import logging
 import math
 import os
+import threading
 import time
 from collections.abc import Callable, Collection, Iterator, Mapping, Sequence
 from contextlib import ExitStack, closing
@@ -21,7 +22,6 @@ from cvt_hpc.job.values import Document
 from cvt_hpc.linear_algebra import one_thread
 from cvt_hpc.storage.files import StorageError, naming_refusals, open_missing_streams, probed
 from cvt_hpc.storage.locks import BusyError
-from cvt_hpc.storage.netcdf import library_for_sweep
 from cvt_hpc.storage.provenance import program_identity
 from cvt_hpc.study.batches import Assignment, Batch
 from cvt_hpc.study.description import Study, describe
@@ -66,8 +66,8 @@ def run(
     SIGUSR1, SIGUSR2 and SIGXCPU end the sweep early and orderly: the runs at work are broken off, the dataset
     is gathered, the signal's exception is raised on all ranks, and the same call does these runs later.
 
-    Only the main thread can call it, since signals reach no other one, and since the HDF5 library breaks if
-    two threads use it. Meanwhile other threads must not read datasets.
+    Only the main thread can call it, since signals reach no other one. Meanwhile other threads can read
+    datasets that `open_results` has opened, and values of those that xarray has opened before.
 
     Parameters
     ----------
@@ -130,6 +130,9 @@ def run(
         With the exit status 99, or 98 if no run has ended, after other signals.
     """
     open_missing_streams()
+    if (thread := threading.current_thread()) is not threading.main_thread():
+        found, then = f"the thread {thread.name}", "start a process for each sweep"
+        raise mismatch("run", "the main thread of the process", found, then)
     started = time.monotonic()
     simulator = simulator or default_simulator()
     folder = _folder(job, out)
@@ -184,7 +187,7 @@ def run(
         noted = next(filter(None, team.collect(signals.noted)), None)
         return replace(report, stopped=report.stopped or noted), noted
 
-    with library_for_sweep(), assembled_team(folder.crash_log, comm) as team:
+    with assembled_team(folder.crash_log, comm) as team:
         study, share = team.agreed(accept, plan_of)
         task = Task(job, study, simulator, run_limit, chosen, asked_steps)
         with stopping.SignalWatch() as signals:

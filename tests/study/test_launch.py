@@ -1,6 +1,7 @@
 """Who started the process: serial runs leave MPI alone, ranks that cannot see each other are refused."""
 
 import json
+import pickle
 import platform
 import re
 import signal
@@ -13,7 +14,8 @@ import psutil
 import pytest
 
 from cvt_hpc.errors import InputError
-from cvt_hpc.study import open_results, run
+from cvt_hpc.storage.libraries import LIBRARIES
+from cvt_hpc.study import run
 from cvt_hpc.study.ranks.launch import Launch, assembled_team, detect_launch
 from support.study_double import Axis, Job, Simulator
 from support.study_processes import HERE, find_mpirun, wait_until
@@ -200,31 +202,71 @@ def test_the_time_that_is_left_may_differ_between_ranks(start, tmp_path):
     assert finished.returncode == 0, finished.stderr
 
 
-def test_threads_are_refused(tmp_path):
-    out = run(Job(), tmp_path / "first", simulator=Simulator(), progress=False).out
-    ends = {}
+def test_a_sweep_in_a_thread_is_refused(tmp_path):
+    refusals = []
 
-    class Reading(Simulator):
-        def run_point(self, *arguments):
-            in_a_thread(lambda: open_results(out), "reads")
-            return super().run_point(*arguments)
+    def sweep():
+        with pytest.raises(
+            InputError, match=r"expected the main thread .*, found the thread sweeps"
+        ) as error:
+            run(Job(), tmp_path / "thread", simulator=Simulator())
+        refusals.append(error)
 
-    def in_a_thread(work, name):
-        def do():
-            with pytest.raises(
-                InputError, match=f"expected the main thread .*, found the thread {name}"
-            ) as error:
-                work()
-            ends[name] = str(error.value)
+    thread = threading.Thread(target=sweep, name="sweeps")
+    thread.start()
+    thread.join()
+    assert refusals and not (tmp_path / "thread").exists()
 
-        thread = threading.Thread(target=do, name=name)
+
+# Most often without a lock, a process breaks off in the first of these sweeps.
+READING = """
+import threading
+from cvt_hpc.study import open_results, run
+from support.study_double import Axis, Job, Simulator
+
+runs = tuple(range(12))
+job, reads, done = Job((Axis("load", runs),), histories=runs), [], []
+opened = open_results(run(job, "before", simulator=Simulator(), progress=False).out)
+
+def values_of(dataset):
+    return float(dataset["amplitude"].sum())
+
+def read(again):
+    while not done:
+        if not again:
+            reads.append(values_of(opened))
+            continue
+        with open_results("before") as dataset:
+            reads.append(values_of(dataset))
+
+threads = [threading.Thread(target=read, args=(again,)) for again in (False, True, True)]
+for thread in threads:
+    thread.start()
+for number in range(6):
+    run(job, f"out-{number}", simulator=Simulator(), progress=False)
+done.append(True)
+for thread in threads:
+    thread.join()
+assert len(set(reads)) == 1 and len(reads) > 12
+"""
+
+
+def test_threads_may_read_beside_a_sweep(spawn, tmp_path, monkeypatch):
+    monkeypatch.chdir(tmp_path)
+    finished = spawn([sys.executable, "-c", READING]).finish()
+    assert finished.returncode == 0, finished.stderr
+
+
+def test_the_lock_of_the_libraries_may_be_taken_again_and_is_the_same_once_pickled():
+    with LIBRARIES, LIBRARIES:
+        assert LIBRARIES.acquire(blocking=False)
+        LIBRARIES.release()
+        held = []
+        thread = threading.Thread(target=lambda: held.append(LIBRARIES.acquire(blocking=False)))
         thread.start()
         thread.join()
-
-    in_a_thread(lambda: run(Job(), tmp_path / "thread", simulator=Simulator()), "sweeps")
-    run(Job(), tmp_path / "second", simulator=Reading(), progress=False)
-    assert sorted(ends) == ["reads", "sweeps"]
-    assert not (tmp_path / "thread").exists()
+        assert held == [False]
+    assert pickle.loads(pickle.dumps(LIBRARIES)) is LIBRARIES
 
 
 @pytest.mark.parametrize(
