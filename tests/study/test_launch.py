@@ -196,6 +196,31 @@ def test_a_rank_can_sweep_by_itself(start, tmp_path):
     assert json.loads(finished.stdout)["done"] == 12
 
 
+NO_COMMUNICATORS = """
+from mpi4py import MPI
+from cvt_hpc.errors import InputError
+from cvt_hpc.study import run
+from support.study_double import Job, Simulator
+
+for comm in (MPI.COMM_NULL, MPI.COMM_SELF.Split(MPI.UNDEFINED), MPI.Intercomm(), "world", 0):
+    try:
+        run(Job(), "out", simulator=Simulator(), comm=comm)
+    except InputError as error:
+        print(error)
+"""
+
+
+def test_what_is_no_communicator_of_this_rank_is_refused(spawn, tmp_path, monkeypatch):
+    pytest.importorskip("mpi4py")
+    monkeypatch.chdir(tmp_path)
+    finished = spawn([sys.executable, "-c", NO_COMMUNICATORS]).finish()
+    assert finished.returncode == 0, finished.stderr
+    told = 'comm: expected an intracommunicator that this rank belongs to, "all" or None, found '
+    found = ["COMM_NULL"] * 3 + ["'world'", "0"]
+    assert finished.stdout.splitlines() == [f"{told}{one}" for one in found]
+    assert not (tmp_path / "out").exists()
+
+
 def test_the_time_that_is_left_may_differ_between_ranks(start, tmp_path):
     """Each reads its own clock, as a script does that runs several jobs in the time of one."""
     finished = start({"out": tmp_path / "out", "time_limits": [100.0, 99.9]}, ranks=2).finish()

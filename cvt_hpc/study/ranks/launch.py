@@ -250,9 +250,10 @@ def assembled_team(crash_log: Path | None = None, ranks: Ranks = "all") -> Itera
     Raises
     ------
     InputError
-        If the launcher started several processes that MPI does not connect, or if not all ranks come here.
+        If the launcher started several processes that MPI does not connect, or if not all ranks come here,
+        or this one is not among them.
     """
-    communicator = _connected(crash_log) if ranks == "all" else ranks
+    communicator = _connected(crash_log) if ranks == "all" else _checked(ranks)
     if communicator is None or communicator.size == 1:
         yield Team()
         return
@@ -269,6 +270,15 @@ def assembled_team(crash_log: Path | None = None, ranks: Ranks = "all") -> Itera
         _crash(communicator, traceback.format_exc(), crash_log)
     else:
         team.release()
+
+
+def _checked(ranks: MPI.Intracomm | None) -> MPI.Intracomm | None:
+    """Return the communicator that was given; InputError if it is none, or without this rank."""
+    mpi = sys.modules.get("mpi4py.MPI")
+    if ranks is None or (mpi is not None and isinstance(ranks, mpi.Intracomm) and ranks != mpi.COMM_NULL):
+        return ranks
+    found = "COMM_NULL" if mpi is not None and ranks == mpi.COMM_NULL else f"{ranks!r}"
+    raise mismatch("comm", 'an intracommunicator that this rank belongs to, "all" or None', found)
 
 
 def agree_on(error: InputError) -> InputError:
