@@ -31,7 +31,7 @@ from cvt_hpc.study.forecast.resources import refuse_too_large
 from cvt_hpc.study.gather import LossError, gather_records
 from cvt_hpc.study.planning import Plan, asked_runs, next_round, prepare
 from cvt_hpc.study.ranks import stopping
-from cvt_hpc.study.ranks.launch import RankDied, Ranks, Team, assembled_team, noticing_deaths
+from cvt_hpc.study.ranks.launch import RankDied, Ranks, Team, assembled_team, end_all, noticing_deaths
 from cvt_hpc.study.ranks.progress import Counter, Progress
 from cvt_hpc.study.record.log import RecordFormat, RecordLog
 from cvt_hpc.study.simulator import Simulator, default_simulator
@@ -192,8 +192,12 @@ def run(
         task = Task(job, study, simulator, run_limit, chosen, asked_steps)
         with stopping.SignalWatch() as signals:
             report, noted = stopping.outlive(team, sweep)
+    status = report.status_of_more or STOPPED
+    if signals.noted and noted is None:  # too late for the other ranks to learn of it: they would go on
+        end_all(status, f"stopped by {signals.noted}")
+        report = replace(report, stopped=signals.noted)
     if raises and (name := noted or signals.noted):
-        stopping.raise_again(name, report.status_of_more or STOPPED, everywhere=noted is not None)
+        stopping.raise_again(name, status)
     return report
 
 
