@@ -17,6 +17,7 @@ from cvt_hpc.errors import did_you_mean, mismatch, show
 from cvt_hpc.job.csv_files import BARE, MOST_BYTES, FileValues, arranged, content_of, told, unit_of
 from cvt_hpc.job.units import factor_to
 from cvt_hpc.parameters import Column, FromFile
+from cvt_hpc.storage.libraries import LIBRARIES
 
 if TYPE_CHECKING:
     import netCDF4
@@ -60,7 +61,7 @@ def _columns(file: FromFile, content: bytes, place: str) -> tuple[dict[str, Colu
 
         check_hdf5(io.BytesIO(content), len(content), place)
     try:
-        with netCDF4.Dataset("file", memory=content) as dataset:
+        with LIBRARIES, netCDF4.Dataset("file", memory=content) as dataset:
             known = dataset.variables
             for name in file.required:
                 if name not in known:

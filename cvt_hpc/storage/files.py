@@ -152,12 +152,22 @@ def remove_own(path: Path) -> None:
 
 def try_to_write(folder: Path) -> None:
     """Write a file to a folder and remove it; OSError if the system refuses."""
+    with probed(folder):
+        pass
+
+
+@contextlib.contextmanager
+def probed(folder: Path) -> Iterator[Path]:
+    """Write a new file to a folder, give its path, and remove it; OSError if the system refuses."""
     probe = folder / f".probe-{secrets.token_hex(8)}"
     descriptor = os.open(probe, _NEW, 0o666)
     try:
-        os.write(descriptor, b"x")
+        try:
+            os.write(descriptor, b"x")
+        finally:
+            os.close(descriptor)
+        yield probe
     finally:
-        os.close(descriptor)
         discard(probe)
 
 

@@ -15,6 +15,7 @@ import numpy as np
 from h5py import h5a, h5d, h5g, h5o, h5t, h5z
 
 from cvt_hpc.errors import InputError, mismatch
+from cvt_hpc.storage.libraries import LIBRARIES
 
 EXPANSION = 1032  # bytes of values that deflate keeps in one byte, at most
 SMALL = 1 << 26  # [bytes] of values that any file may declare
@@ -46,7 +47,7 @@ def check_hdf5(source: Path | BinaryIO, size: int, place: str) -> None:
         in another file; the declared sizes do not fit the size of the file; or the file is damaged.
     """
     try:
-        with h5py.File(source, "r", locking=False) as file:
+        with LIBRARIES, h5py.File(source, "r", locking=False) as file:
             most, total = max(SMALL, EXPANSION * size), 0
             for part, (where, taken) in enumerate(_parts(file, size, most, place), 1):
                 total += taken
@@ -64,7 +65,7 @@ def check_hdf5(source: Path | BinaryIO, size: int, place: str) -> None:
 def global_text(path: Path, name: str) -> str | None:
     """Return a short text among the attributes of a file; None where it is not there, or not readable."""
     try:
-        with h5py.File(path, "r", locking=False) as file:
+        with LIBRARIES, h5py.File(path, "r", locking=False) as file:
             size = _attribute(h5a.open(file.id, name.encode()), file.id, SMALL, SMALL, name)
             found = file.attrs[name] if size < LONGEST_TEXT else None
     except DAMAGE:

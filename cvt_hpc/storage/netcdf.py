@@ -5,9 +5,8 @@ from __future__ import annotations
 import json
 import os
 import platform
-import threading
-from collections.abc import Iterator, Mapping, Sequence
-from contextlib import contextmanager
+from collections.abc import Mapping, Sequence
+from contextlib import closing
 from enum import IntEnum
 from pathlib import Path
 from typing import TYPE_CHECKING, Any, Protocol
@@ -18,6 +17,7 @@ from numpy.typing import DTypeLike
 from cvt_hpc.errors import InputError, mismatch
 from cvt_hpc.storage.dataset_form import check_form
 from cvt_hpc.storage.files import kind_of, naming_refusals, open_regular, written_aside
+from cvt_hpc.storage.libraries import LIBRARIES
 from cvt_hpc.storage.locks import refuse_locked
 from cvt_hpc.storage.provenance import command, git_revision, history_line, merge_versions, versions
 
@@ -30,38 +30,6 @@ CONTENT = "cvt_hpc_content"  # global attribute by which this program knows its 
 HISTORY = "history of one run"
 Entry = Mapping[str, Any]  # as JSON has it
 VOLATILE = "depends on the machine and the hour; not reproduced bitwise"
-
-
-_is_sweeping = False
-
-
-@contextmanager
-def library_for_sweep() -> Iterator[None]:
-    """Let no second thread use the HDF5 library, which would break, while this one sweeps.
-
-    Raises
-    ------
-    InputError
-        If this is not the main thread: signals reach no other one.
-    """
-    global _is_sweeping
-    _expect_main_thread("run", "start a process for each sweep")
-    _is_sweeping = True
-    try:
-        yield
-    finally:
-        _is_sweeping = False
-
-
-def refuse_beside_sweep(what: str) -> None:
-    """Raise InputError if this is a thread beside a sweep."""
-    if _is_sweeping:
-        _expect_main_thread(what, "read datasets before the sweep, or in another process")
-
-
-def _expect_main_thread(what: str, then: str) -> None:
-    if (thread := threading.current_thread()) is not threading.main_thread():
-        raise mismatch(what, "the main thread of the process", f"the thread {thread.name}", then)
 
 
 class Named(Protocol):
@@ -151,8 +119,13 @@ def write_netcdf(dataset: xr.Dataset, path: Path) -> None:
     dataset : Dataset
         Numbers and texts.
     """
+    from xarray.backends import NetCDF4DataStore
+
     encoding = {name: _encoding(one, name in dataset.coords) for name, one in dataset.variables.items()}
-    dataset.to_netcdf(path, engine="netcdf4", format="NETCDF4", encoding=encoding)
+    loaded = dataset.compute()  # it may come from files that others have opened, by the lock of xarray
+    # Not by to_netcdf, which has a lock for values alone.
+    with LIBRARIES, closing(NetCDF4DataStore.open(path, mode="w", lock=LIBRARIES)) as file:
+        loaded.dump_to_store(file, encoding=encoding)
 
 
 def _encoding(variable: xr.Variable, is_coordinate: bool) -> dict[str, bool | str | None]:
@@ -259,8 +232,10 @@ def open_netcdf(path: Path, *, follow: bool = False, **options: Any) -> xr.Datas
             then = f"`nccopy -k nc4 {path.name} NEW.nc` of the netCDF library turns one into the other"
             raise mismatch(place, "netCDF-4", "netCDF-3", then)
         check_hdf5(path, size, place)
+        options = {"engine": "netcdf4", "decode_times": False, "lock": LIBRARIES, **options}
         try:
-            dataset = xr.open_dataset(path, engine="netcdf4", decode_times=False, **options)
+            with LIBRARIES:
+                dataset = xr.open_dataset(path, **options)
         except OSError as error:
             refuse_locked(path)
             if error.errno and error.errno > 0:  # of the system, not of the library

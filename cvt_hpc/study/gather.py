@@ -24,8 +24,9 @@ import numpy as np
 from cvt_hpc.errors import InputError, mismatch
 from cvt_hpc.job.values import JOB_UNITS, Document, file_names
 from cvt_hpc.storage.files import discard, kind_of, naming_refusals, written_aside
+from cvt_hpc.storage.libraries import LIBRARIES
 from cvt_hpc.storage.locks import locked
-from cvt_hpc.storage.netcdf import global_attributes, open_netcdf, refuse_beside_sweep, variable_attributes
+from cvt_hpc.storage.netcdf import global_attributes, open_netcdf, variable_attributes
 from cvt_hpc.storage.provenance import history_line
 from cvt_hpc.study.description import Dimension, Study
 from cvt_hpc.study.folder import StudyFolder, study_instead
@@ -133,7 +134,7 @@ def _read_held(path: Path) -> tuple[Document, np.ndarray]:
         return nothing
     try:
         check_hdf5(path, path.stat().st_size, str(path))
-        with h5py.File(path, "r", locking=False) as file:  # whoever else has locked it
+        with LIBRARIES, h5py.File(path, "r", locking=False) as file:  # whoever else has locked it
             return json.loads(file.attrs["job"]), np.ravel(file["status"][()])
     except (InputError, *DAMAGE):
         return nothing
@@ -156,9 +157,8 @@ def open_results(path: str | Path) -> xr.Dataset:
     Raises
     ------
     InputError
-        If there is no dataset, or none that can be read, or in a thread beside a sweep.
+        If there is no dataset, or none that can be read.
     """
-    refuse_beside_sweep(str(path))
     found = Path(path)
     with naming_refusals(found, "a netCDF dataset"):
         if is_folder := found.is_dir():
@@ -197,7 +197,7 @@ def _declare(path: Path, records: Records, variables: Sequence[Variable]) -> Non
     import netCDF4
 
     study = records.study
-    with netCDF4.Dataset(path, "w") as file:
+    with LIBRARIES, netCDF4.Dataset(path, "w") as file:
         file.setncatts(_global_attributes(records))
         for name, length in zip(study.dims, study.shape, strict=True):
             file.createDimension(name, length)
@@ -305,7 +305,7 @@ def fill(path: Path, records: Records, variables: Sequence[Variable]) -> None:
 
     study = records.study
     runs = np.arange(study.size).reshape(study.shape)
-    with h5py.File(path, "r+") as file, ThreadPoolExecutor() as pool:
+    with LIBRARIES, h5py.File(path, "r+") as file, ThreadPoolExecutor() as pool:
         for block in _parts(study.shape, contiguous_part(study.shape, block_length(study))):
             rows = records.read(runs[block])
             for variable in variables:

@@ -5,6 +5,8 @@ All ranks compute, and each claims its next batch from one counter.
 
 import logging
 import math
+import os
+import threading
 import time
 from collections.abc import Callable, Collection, Iterator, Mapping, Sequence
 from contextlib import ExitStack, closing
@@ -18,9 +20,8 @@ from cvt_hpc.errors import mismatch
 from cvt_hpc.job import Job
 from cvt_hpc.job.values import Document
 from cvt_hpc.linear_algebra import one_thread
-from cvt_hpc.storage.files import StorageError, open_missing_streams
+from cvt_hpc.storage.files import StorageError, naming_refusals, open_missing_streams, probed
 from cvt_hpc.storage.locks import BusyError
-from cvt_hpc.storage.netcdf import library_for_sweep
 from cvt_hpc.storage.provenance import program_identity
 from cvt_hpc.study.batches import Assignment, Batch
 from cvt_hpc.study.description import Study, describe
@@ -30,7 +31,7 @@ from cvt_hpc.study.forecast.resources import refuse_too_large
 from cvt_hpc.study.gather import LossError, gather_records
 from cvt_hpc.study.planning import Plan, asked_runs, next_round, prepare
 from cvt_hpc.study.ranks import stopping
-from cvt_hpc.study.ranks.launch import RankDied, Ranks, Team, assembled_team
+from cvt_hpc.study.ranks.launch import RankDied, Ranks, Team, assembled_team, end_all, noticing_deaths
 from cvt_hpc.study.ranks.progress import Counter, Progress
 from cvt_hpc.study.record.log import RecordFormat, RecordLog
 from cvt_hpc.study.simulator import Simulator, default_simulator
@@ -65,8 +66,8 @@ def run(
     SIGUSR1, SIGUSR2 and SIGXCPU end the sweep early and orderly: the runs at work are broken off, the dataset
     is gathered, the signal's exception is raised on all ranks, and the same call does these runs later.
 
-    Only the main thread can call it, since signals reach no other one, and since the HDF5 library breaks if
-    two threads use it. Meanwhile other threads must not read datasets.
+    Only the main thread can call it, since signals reach no other one. Meanwhile other threads can read
+    datasets that `open_results` has opened, and values of those that xarray has opened before.
 
     Parameters
     ----------
@@ -129,6 +130,9 @@ def run(
         With the exit status 99, or 98 if no run has ended, after other signals.
     """
     open_missing_streams()
+    if (thread := threading.current_thread()) is not threading.main_thread():
+        found, then = f"the thread {thread.name}", "start a process for each sweep"
+        raise mismatch("run", "the main thread of the process", found, then)
     started = time.monotonic()
     simulator = simulator or default_simulator()
     folder = _folder(job, out)
@@ -163,6 +167,8 @@ def run(
 
         with ExitStack() as held:
             plan = team.on_root(find_plan)
+            if begins and team.size > 1:
+                _refuse_other_folders(team, folder)
             with open_counter(team) as counter:
                 visible, costs = progress and team.rank == 0, plan.costs[plan.order]
                 display = Progress(counter, plan.total, plan.recorded, plan.failed, visible, costs)
@@ -181,13 +187,17 @@ def run(
         noted = next(filter(None, team.collect(signals.noted)), None)
         return replace(report, stopped=report.stopped or noted), noted
 
-    with library_for_sweep(), assembled_team(folder.crash_log, comm) as team:
+    with assembled_team(folder.crash_log, comm) as team:
         study, share = team.agreed(accept, plan_of)
         task = Task(job, study, simulator, run_limit, chosen, asked_steps)
         with stopping.SignalWatch() as signals:
             report, noted = stopping.outlive(team, sweep)
+    status = report.status_of_more or STOPPED
+    if signals.noted and noted is None:  # too late for the other ranks to learn of it: they would go on
+        end_all(status, f"stopped by {signals.noted}")
+        report = replace(report, stopped=signals.noted)
     if raises and (name := noted or signals.noted):
-        stopping.raise_again(name, report.status_of_more or STOPPED, everywhere=noted is not None)
+        stopping.raise_again(name, status)
     return report
 
 
@@ -214,6 +224,23 @@ def _accept(job: Job, part: str | None, fresh: bool, simulator: Simulator) -> tu
     if share is not None and study.in_rounds:
         raise mismatch("part", "a whole study, since it chooses by the runs of all parts", f"part {share}")
     return study, share
+
+
+def _refuse_other_folders(team: Team, folder: StudyFolder) -> None:
+    """Raise InputError on all ranks if one sees another folder than rank 0, which would miss its records."""
+    with ExitStack() as kept, noticing_deaths():
+
+        def leave_file() -> Path:
+            with naming_refusals(folder.records, "a folder that can be written to"):
+                return kept.enter_context(probed(folder.records))
+
+        def find(file: Path) -> None:
+            if not os.path.exists(file):
+                then = "give all ranks one that all of them see, by --out"
+                raise mismatch(str(folder.path), "the folder that rank 0 writes to", "another one", then)
+
+        file = team.on_root(leave_file)
+        team.agreed(lambda: find(file), lambda _: {})
 
 
 def _compute(

@@ -31,7 +31,7 @@ from cvt_hpc.study.folder import StudyFolder  # noqa: E402
 from cvt_hpc.study.record.index import read_records  # noqa: E402
 from support.cluster import JOB, TWO_NODES, Cluster, missing, wait_until  # noqa: E402
 from support.fault_cases import Outcome, make_reference  # noqa: E402
-from support.fault_kinds import KINDS, NEED_MOUNT, NEED_MPI, can_mount, play  # noqa: E402
+from support.fault_kinds import KINDS, NEED_MODEL, NEED_MOUNT, NEED_MPI, can_mount, play  # noqa: E402
 from support.recorded import assert_same_numbers, records  # noqa: E402
 
 SLURMD = "kill -9 of slurmd and its node"
@@ -46,6 +46,8 @@ def make_outcomes(folder: Path, kills: int, seed: int, only: str | None, model: 
     if not can_mount(folder):
         print(f"left out, since no tmpfs can be mounted here: {', '.join(NEED_MOUNT)}", file=sys.stderr)
         kinds = [kind for kind in kinds if kind not in NEED_MOUNT]
+    if not model:
+        kinds = [kind for kind in kinds if kind not in NEED_MODEL]
     struck = 0
     for number in itertools.count(seed):
         for kind in kinds:

@@ -6,6 +6,7 @@ import platform
 import pty
 import random
 import signal
+import sys
 import time
 
 import numpy as np
@@ -18,7 +19,7 @@ from cvt_hpc.study.record.index import read_records
 from cvt_hpc.study.record.log import PLACE, RECORD
 from support.recorded import assert_same_numbers
 from support.study_double import Axis, Job, Simulator
-from support.study_processes import PATIENCE, wait_until
+from support.study_processes import PATIENCE, find_mpirun, wait_until
 
 RUNS = 60
 
@@ -199,6 +200,67 @@ def test_a_signal_to_one_rank_ends_the_script_on_all(start, tmp_path):
     assert finished.returncode == 99
     assert "Traceback" not in finished.stderr
     assert (tmp_path / "out" / "results.nc").exists()
+
+
+# The signal comes to one rank when all have agreed that there was none.
+LATE = """
+import signal
+from cvt_hpc.study import process_rank, run
+from cvt_hpc.study.ranks.stopping import SignalWatch
+from support.study_double import Job, Simulator
+
+leave = SignalWatch.__exit__
+
+def leave_late(self, *error):
+    if process_rank() == 1:
+        signal.raise_signal(signal.SIGTERM)
+    leave(self, *error)
+
+SignalWatch.__exit__ = leave_late
+for study in ("first", "second"):
+    report = run(Job(), study, simulator=Simulator(), progress=False, raises={raises})
+"""
+
+
+@pytest.mark.parametrize("raises", [True, False])
+def test_a_signal_that_comes_to_one_rank_after_a_study_ends_all(spawn, tmp_path, monkeypatch, raises):
+    monkeypatch.chdir(tmp_path)
+    program = LATE.format(raises=raises)
+    finished = spawn([find_mpirun(), "-n", "2", sys.executable, "-c", program]).finish()
+    assert finished.returncode == 99
+    assert (tmp_path / "first" / "results.nc").exists()
+    assert not (tmp_path / "second").exists()
+
+
+EARLY = """
+import signal
+from cvt_hpc.study import process_rank, run
+from support.study_double import Job, Simulator
+
+class Interrupted(Simulator):
+    def record_variables(self, job):
+        interrupt()
+        return super().record_variables(job)
+
+def interrupt():
+    if process_rank() == 1:
+        signal.raise_signal(signal.SIGINT)
+
+run(Job(), "first", simulator={simulator}(), progress=False)
+interrupt()
+run(Job(), "second", simulator=Simulator(), progress=False)
+"""
+
+
+@pytest.mark.parametrize("simulator", ["Interrupted", "Simulator"])
+def test_ctrl_c_before_or_between_sweeps_ends_all_ranks_with_a_line(spawn, tmp_path, monkeypatch, simulator):
+    monkeypatch.chdir(tmp_path)
+    program = EARLY.format(simulator=simulator)
+    finished = spawn([find_mpirun(), "-n", "2", sys.executable, "-c", program]).finish()
+    assert finished.returncode == 130
+    assert finished.stderr.startswith(f"cvt-hpc: rank 1 on {platform.node()}: interrupted\n")
+    assert "Traceback" not in finished.stderr
+    assert not list(tmp_path.glob("*/crash.log")) and not (tmp_path / "second").exists()
 
 
 def test_damage_costs_only_the_runs_it_struck(start, tmp_path, reference, caplog):

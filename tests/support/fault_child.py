@@ -15,6 +15,7 @@ import sys
 import time
 from typing import Any
 
+import numba
 import numpy as np
 
 from cvt_hpc.errors import InputError
@@ -34,11 +35,14 @@ _JUMP = 3e8  # [s], ten years
 def main(options: dict[str, Any]) -> int:
     """Sweep or gather.
 
-    Further options: `job`, the file of one that is swept in the place of the double; `acknowledged`, a file that is told of each record; `gathers` instead of sweeping; `torn`, after
+    Further options: `job`, the file of one that is swept in the place of the double; `cache`, a folder of its own for
+    machine code; `acknowledged`, a file that is told of each record; `gathers` instead of sweeping; `torn`, after
     how many bytes written to a log the process dies, or where it `turns_read_only`, its file system refuses all
     changes; `clock`, the seed of a clock that jumps.
     """
     acknowledge(options["acknowledged"])
+    if "cache" in options:
+        numba.config.CACHE_DIR = options["cache"]
     if "torn" in options:
         log.os = TornWrites(options["torn"], options.get("turns_read_only", False))
     if "clock" in options:

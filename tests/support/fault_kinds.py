@@ -13,6 +13,7 @@ from support.fault_cases import RUNS, Case, Outcome, Reference
 from support.fault_damage import DAMAGE
 
 _LOG = 20_000  # [bytes], about
+_COMPILING = 8.0  # [s], about
 
 
 def play(kind: str, seed: str, folder: Path, reference: Reference) -> Outcome:
@@ -48,6 +49,26 @@ def _kill_starting(case: Case) -> Outcome:
     start = case.start(2)
     time.sleep(case.random.uniform(0.0, 2.0))
     case.strike(start, target=case.random.choice(("rank 0", "rank 1", "mpirun")))
+    return case.finish(case.random.choice((0, 2)))
+
+
+def _kill_compiling(case: Case) -> Outcome:
+    """Kill a rank or mpirun while ranks compile, which takes seconds, and again with what is compiled then."""
+    cache = {"cache": str(case.out.parent / "code")}
+    for _ in range(case.random.randint(1, 2)):
+        start = case.start(2, **cache)
+        time.sleep(case.random.uniform(1.0, _COMPILING))
+        case.strike(start, target=case.random.choice(("rank 0", "rank 1", "mpirun")))
+    return case.finish(2, **cache)
+
+
+def _kill_gathering(case: Case) -> Outcome:
+    """Kill a rank or mpirun while rank 0 gathers and the others wait for it."""
+    start = case.start(2)
+    case.wait_for_a_moment(start, RUNS)
+    case.wait_for_gathering(start)
+    case.strike(start, target=case.random.choice(("rank 0", "rank 1", "mpirun")))
+    case.look_at_dataset()
     return case.finish(case.random.choice((0, 2)))
 
 
@@ -220,6 +241,8 @@ KINDS: dict[str, Callable[[Case], Outcome]] = {
     "kill -9 of a serial sweep": _kill_serial,
     "kill -9 of a rank": _kill_rank,
     "kill -9 of ranks that start": _kill_starting,
+    "kill -9 of ranks that compile": _kill_compiling,
+    "kill -9 of ranks that gather": _kill_gathering,
     "kill -9 of mpirun": _kill_mpirun,
     "kill -9 of a part beside others": _kill_part,
     "kill -9 of gather": _kill_gather,
@@ -235,4 +258,12 @@ KINDS: dict[str, Callable[[Case], Outcome]] = {
     "signal to a rank": _signal_rank,
 }
 NEED_MOUNT = ("full disk", "read-only folder")
-NEED_MPI = ("kill -9 of a rank", "kill -9 of ranks that start", "kill -9 of mpirun", "signal to a rank")
+NEED_MPI = (
+    "kill -9 of a rank",
+    "kill -9 of ranks that start",
+    "kill -9 of ranks that compile",
+    "kill -9 of ranks that gather",
+    "kill -9 of mpirun",
+    "signal to a rank",
+)
+NEED_MODEL = ("kill -9 of ranks that compile",)

@@ -9,6 +9,7 @@ from __future__ import annotations
 
 import os
 import platform
+import signal
 import sys
 import time
 import traceback
@@ -44,6 +45,7 @@ _REMEDY = (
     "(MPICH) or `srun --mpi=pmix` (Open MPI); `srun --mpi=list` shows what there is. For a single process on "
     "purpose: `srun -n 1`, or unset {variable}"
 )
+_INTERRUPTED = 128 + signal.SIGINT  # exit status, as of shells
 _PASSING_ON = 0.5  # [s]; mpirun, after an abort, drops output that it has not yet passed on
 
 
@@ -88,12 +90,8 @@ def end_process(status: int) -> int:
 
 def end_all(status: int, line: str = "") -> None:
     """End all ranks, since others may wait for this one, with a line that says why; not a process alone."""
-    if _world is None:
-        return
-    if line:
-        time.sleep(min(_world.rank, 1.0))  # [s]; should rank 0 have the same to say, it ends this one
-        print(f"cvt-hpc: rank {_world.rank} on {platform.node()}: {line}", file=sys.stderr)
-    _abort(_world, status)
+    if _world is not None:
+        _end(_world, status, line)
 
 
 class RankDied(Exception):
@@ -250,9 +248,10 @@ def assembled_team(crash_log: Path | None = None, ranks: Ranks = "all") -> Itera
     Raises
     ------
     InputError
-        If the launcher started several processes that MPI does not connect, or if not all ranks come here.
+        If the launcher started several processes that MPI does not connect, or if not all ranks come here,
+        or this one is not among them.
     """
-    communicator = _connected(crash_log) if ranks == "all" else ranks
+    communicator = _connected(crash_log) if ranks == "all" else _checked(ranks)
     if communicator is None or communicator.size == 1:
         yield Team()
         return
@@ -265,10 +264,21 @@ def assembled_team(crash_log: Path | None = None, ranks: Ranks = "all") -> Itera
         error.everywhere = True
         team.release()
         raise
+    except KeyboardInterrupt:
+        _end(communicator, _INTERRUPTED, "interrupted")
     except BaseException:
         _crash(communicator, traceback.format_exc(), crash_log)
     else:
         team.release()
+
+
+def _checked(ranks: MPI.Intracomm | None) -> MPI.Intracomm | None:
+    """Return the communicator that was given; InputError if it is none, or without this rank."""
+    mpi = sys.modules.get("mpi4py.MPI")
+    if ranks is None or (mpi is not None and isinstance(ranks, mpi.Intracomm) and ranks != mpi.COMM_NULL):
+        return ranks
+    found = "COMM_NULL" if mpi is not None and ranks == mpi.COMM_NULL else f"{ranks!r}"
+    raise mismatch("comm", 'an intracommunicator that this rank belongs to, "all" or None', found)
 
 
 def agree_on(error: InputError) -> InputError:
@@ -335,6 +345,8 @@ def _abort_on_uncaught(world: MPI.Intracomm, crash_log: Path | None) -> None:
         if not getattr(value, "everywhere", False):
             if isinstance(value, InputError):
                 end_all(BAD_INPUT, str(value))
+            if isinstance(value, KeyboardInterrupt):
+                end_all(_INTERRUPTED, "interrupted")
             _crash(world, "".join(traceback.format_exception(kind, value, trace)), crash_log)
         if world.rank == 0:
             sys.__excepthook__(kind, value, trace)
@@ -352,6 +364,16 @@ def _crash(communicator: MPI.Intracomm, text: str, crash_log: Path | None) -> No
         print(message, end="", file=sys.stderr)
     finally:  # whatever became of the message: without this the other ranks wait for ever
         _abort(communicator, CRASHED)
+
+
+def _end(communicator: MPI.Intracomm, status: int, line: str) -> NoReturn:
+    try:
+        if line:
+            # [s]; should rank 0 have the same to say, it ends this one
+            time.sleep(min(communicator.rank, 1.0))
+            print(f"cvt-hpc: rank {communicator.rank} on {platform.node()}: {line}", file=sys.stderr)
+    finally:  # whatever became of the line
+        _abort(communicator, status)
 
 
 def _abort(communicator: MPI.Intracomm, status: int) -> NoReturn:

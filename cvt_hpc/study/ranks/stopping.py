@@ -161,8 +161,8 @@ class SignalWatch:
             raise KeyboardInterrupt
 
 
-def raise_again(name: str, status: int, everywhere: bool) -> NoReturn:
-    """Raise what a signal means to a script, once its sweep has been stopped: on all ranks if `everywhere`.
+def raise_again(name: str, status: int) -> NoReturn:
+    """Raise what a signal means to a script, on all ranks, once its sweep has been stopped.
 
     Raises
     ------
@@ -172,7 +172,7 @@ def raise_again(name: str, status: int, everywhere: bool) -> NoReturn:
         After other signals, with the exit status of a script that leaves it uncaught.
     """
     error = KeyboardInterrupt(name) if name == signal.SIGINT.name else SystemExit(status)
-    vars(error)["everywhere"] = everywhere
+    vars(error)["everywhere"] = True
     raise error
 
 

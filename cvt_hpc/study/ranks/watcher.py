@@ -17,4 +17,5 @@ def watch(seconds: float, line: str) -> None:
 
 
 if __name__ == "__main__":
+    signal.signal(signal.SIGINT, signal.SIG_IGN)  # launchers send it here, too; its parent ends its input
     watch(float(sys.argv[1]), sys.argv[2])
