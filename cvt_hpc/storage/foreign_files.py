@@ -14,7 +14,7 @@ import h5py
 import numpy as np
 from h5py import h5a, h5d, h5g, h5o, h5t, h5z
 
-from cvt_hpc.errors import InputError, mismatch
+from cvt_hpc.errors import InputError, mismatch, show
 from cvt_hpc.storage.libraries import LIBRARIES
 
 EXPANSION = 1032  # bytes of values that deflate keeps in one byte, at most
@@ -22,6 +22,11 @@ SMALL = 1 << 26  # [bytes] of values that any file may declare
 LONGEST_TEXT = 1_000  # [bytes] of an attribute by which this program knows a file
 MOST_PARTS = 5_000  # variables and attributes; a study has some 600
 MOST_ATTRIBUTES = 200  # of a variable or the file; the library goes through all of them to find one
+# The netCDF library writes beyond its memory where names are longer, and where what it reads itself is not as
+# it writes it.
+LONGEST_NAME = 256  # [bytes] of a variable or an attribute
+_OWN_TEXTS = (b"CLASS", b"NAME", b"_NCProperties")
+_OWN_NUMBERS = (b"_Netcdf4Dimid", b"_Netcdf4Coordinates")  # of the dimension, of all of a variable
 DAMAGE = (  # what fails in a file with changed bytes
     *(ArithmeticError, AttributeError, LookupError, MemoryError, OSError, RuntimeError),
     *(TypeError, ValueError),
@@ -80,7 +85,7 @@ def _parts(file: h5py.File, size: int, most: int, place: str) -> Iterator[tuple[
         where = f"{place}, {name}"
         if not isinstance(file.get(name, getlink=True), h5py.HardLink):
             raise mismatch(where, "values in this file", "a link")
-        stored = h5o.open(file.id, name.encode("utf-8", "surrogateescape"))
+        stored = h5o.open(file.id, _checked(name.encode("utf-8", "surrogateescape"), place))
         if isinstance(stored, h5g.GroupID):  # with links of its own
             raise mismatch(where, "a file without groups", "a group")
         if not isinstance(stored, h5d.DatasetID):
@@ -111,7 +116,7 @@ def _attributes(stored: Any, size: int, most: int, place: str) -> Iterator[tuple
         raise mismatch(place, f"at most {MOST_ATTRIBUTES} attributes", str(count))
     for index in range(count):
         one = h5a.open(stored, index=index)
-        where = f"{place}: {one.name.decode('utf-8', 'replace')}"
+        where = f"{place}: {_checked(one.name, place).decode('utf-8', 'replace')}"
         yield where, _attribute(one, stored, size, most, where)
 
 
@@ -123,10 +128,18 @@ def _attribute(one: h5a.AttrID, stored: Any, size: int, most: int, place: str) -
     elif one.name == b"REFERENCE_LIST":  # and back
         members = range(kind.get_nmembers()) if within == h5t.COMPOUND else ()
         sound = [kind.get_member_class(k) for k in members] == [h5t.REFERENCE, h5t.INTEGER]
+    elif one.name in _OWN_TEXTS:
+        is_text = within == h5t.STRING and not kind.is_variable_str()
+        sound = is_text and count == 1 and getattr(stored, "rank", 1) > 0  # a dimension is no single value
+    elif one.name in _OWN_NUMBERS:
+        sound = within == h5t.INTEGER and count == (1 if one.name == _OWN_NUMBERS[0] else stored.rank)
+        sound = sound and _all_below(one, MOST_PARTS)  # room is made for as many dimensions
     else:
         sound = _width(kind, size) > 0
     if not sound:
-        raise mismatch(place, "numbers or a text", "something else")
+        is_own = one.name in (*_OWN_TEXTS, *_OWN_NUMBERS)
+        expected = "what the netCDF library writes there" if is_own else "numbers or a text"
+        raise mismatch(place, expected, "something else")
     is_variable = within == h5t.STRING and kind.is_variable_str()
     if count * _width(kind, size) > (most if is_variable else size):
         raise mismatch(place, f"an attribute that fits into a file of {size} bytes", "a larger one")
@@ -135,6 +148,19 @@ def _attribute(one: h5a.AttrID, stored: Any, size: int, most: int, place: str) -
     texts = np.empty(one.shape, h5py.string_dtype())
     one.read(texts)
     return sum(map(len, texts.flat))
+
+
+def _checked(name: bytes, place: str) -> bytes:
+    if len(name) > LONGEST_NAME:
+        found = show(name.decode("utf-8", "replace"))
+        raise mismatch(place, f"names of at most {LONGEST_NAME} bytes", found)
+    return name
+
+
+def _all_below(one: h5a.AttrID, most: int) -> bool:
+    numbers = np.empty(one.shape, np.int64)
+    one.read(numbers)
+    return bool(((numbers >= 0) & (numbers < most)).all())
 
 
 def _width(kind: h5t.TypeID, size: int) -> int:

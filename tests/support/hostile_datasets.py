@@ -129,6 +129,11 @@ def to(target):
     return make
 
 
+def single_dimension(file):
+    del file["load"]
+    file.create_dataset("load", data=1.0).make_scale("load")
+
+
 def several_lines(file):
     file["strand"].set_auto_chartostring(False)
     file["strand"][:] = np.array([[b"\n", b"1"], [b"t", b"2"]])
@@ -180,6 +185,17 @@ TYPES = {
     "without values": (replaced("loss", dtype=None, data=h5py.Empty("f8")), "one that is damaged"),
     "compound attribute": (attribute("x", np.zeros(2, [("a", "f8")]), "loss"), "something else"),
     "complex attribute": (attribute("units", np.complex128(1)), "something else"),
+    # at which the netCDF library breaks, or makes room for as many as a number says
+    "long name of an attribute": (attribute("x" * 1_000, 1.0, "loss"), "loss: expected names of at most 256 bytes"),
+    "long name of the file's attribute": (attribute("\u00e9" * 200, 1.0), "expected names of at most 256 bytes"),
+    "long name of a variable": (of_hdf5(lambda file: file.move("loss", "x" * 300)), "expected names of at most 256 bytes"),
+    "dimension of one value": (of_hdf5(single_dimension), "load: CLASS: expected what the netCDF library writes"),
+    "names of a dimension": (attribute("NAME", np.array([b"load"] * 9_000), "load"), "load: NAME: expected what the netCDF library writes"),
+    "numbers for a name": (attribute("NAME", np.arange(10_000), "load"), "load: NAME: expected what the netCDF library writes"),
+    "any text for a class": (attribute("CLASS", "DIMENSION_SCALE", "load"), "load: CLASS: expected what the netCDF library writes"),
+    "a dimension's many numbers": (attribute("_Netcdf4Dimid", np.arange(10_000), "load"), "load: _Netcdf4Dimid: expected what the netCDF library writes"),
+    "a dimension's vast number": (attribute("_Netcdf4Dimid", np.int32(2**31 - 1), "load"), "load: _Netcdf4Dimid: expected what the netCDF library writes"),
+    "properties of many texts": (attribute("_NCProperties", np.array([b"version=2"] * 6_000)), "_NCProperties: expected what the netCDF library writes"),
     "dimensions of numbers": (attribute("DIMENSION_LIST", np.arange(3), "loss"), "something else"),
 }  # fmt: skip
 FORMS = {
