@@ -140,6 +140,8 @@ def _check(
 def check_along_belt(history: xr.Dataset, quantities: Sequence[str], source: str) -> None:
     """Raise InputError unless a history has these quantities over `position`, with known values."""
     known = [str(key) for key, array in history.data_vars.items() if array.dims == ("position",)]
+    if not known:
+        raise mismatch(source, "the history of a run with quantities along the belt", "none")
     for name in quantities:
         if name not in known:
             raise unknown(f"{source}: {name}", "quantity along the belt", name, known)

@@ -110,7 +110,7 @@ def read_signal(history: xr.Dataset, of: str, source: str = "history", *, veloci
     elif of in history and history[of].dims == ("time",):
         name, array = of, history[of]
     else:
-        raise unknown(source, "signal", of, known_signals(history))
+        raise unknown(f"{source}: {of}", "signal", of, known_signals(history))
     unit, (axis,) = str(array.attrs.get("units", "1")), array.dims
     if velocity and unit != "m":
         raise mismatch(f"{source}: {name}", "a displacement [m] for a velocity", f"one in {unit}")

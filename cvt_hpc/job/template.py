@@ -27,6 +27,7 @@ from cvt_hpc.tables import columns
 
 _SHARE = "share/cvt_hpc/"  # where an installed package has them
 _QUOTED = re.compile(r"\"([\w./-]+)\\?\"")  # in notebooks the marks are escaped
+_NAMED = re.compile(r"[\w./-]+\w")  # in batch files, from the folder above theirs
 
 # Axes that a study varies first, where the model knows them: load as a share of the load that friction
 # carries, its gradient
@@ -297,19 +298,24 @@ def copy_examples(names: Sequence[str], out: Path) -> list[Path]:
     Raises
     ------
     InputError
-        If there is no such example, a copy would replace a file, or the system refuses.
+        If there is no such example, a copy would replace another file, or the system refuses.
     """
     known = example_files()
     chosen = dict.fromkeys(name for word in names for name in _named(word, known))
     chosen |= dict.fromkeys(other for name in chosen for other in _read_by(name, known))
     copies = {name: out / name for name in chosen}
-    for path in copies.values():
-        if os.path.lexists(path):
+    for name, path in copies.items():
+        if os.path.lexists(path) and not _is_copy(path, known[name]):
             raise mismatch(str(path), "a place that is free", "a file", "choose another folder by --out")
     for name, path in copies.items():
         with written_aside(path, parents=True) as aside:
             aside.write_bytes(known[name].read_bytes())
     return list(copies.values())
+
+
+def _is_copy(path: Path, example: Path) -> bool:
+    """Whether a file is an example as it came, such as one that two notebooks read."""
+    return path.is_file() and not path.is_symlink() and path.read_bytes() == example.read_bytes()
 
 
 def _named(word: str, known: Mapping[str, Path]) -> list[str]:
@@ -329,8 +335,10 @@ def _named(word: str, known: Mapping[str, Path]) -> list[str]:
 
 
 def _read_by(name: str, known: Mapping[str, Path]) -> Iterator[str]:
-    """Names of the other examples that a job or a notebook reads."""
-    if known[name].suffix not in (".toml", ".ipynb"):
+    """Names of the other examples that a job, a notebook, a program or a batch file reads."""
+    if known[name].suffix == ".sbatch":
+        yield from (word for word in _NAMED.findall(known[name].read_text()) if word in known)
+    if known[name].suffix not in (".toml", ".ipynb", ".py"):
         return
     for word in _QUOTED.findall(known[name].read_text()):
         other = os.path.normpath(PurePosixPath(name).parent / word)

@@ -351,7 +351,7 @@ def test_the_command_exports_and_refuses_in_a_line(tmp_path, monkeypatch, capsys
         (["--of", "t1", "--of", "t2", "--out", "x.wav"], "expected one signal, which a sound has, found 2"),
         (["--velocity", "--out", "x.csv"], "expected velocities as .wav alone"),
         (["--out", "x.mp3"], "expected a file name in .wav, .csv, .uff"),
-        (["--of", "lood", "--out", "x.csv"], "run.nc: unknown signal; did you mean load?"),
+        (["--of", "lood", "--out", "x.csv"], "run.nc: lood: unknown signal; did you mean load?"),
         (["--of", "load", "--out", "y.wav"], "load: expected a signal that changes, found a constant one"),
         (["--out", "notes.wav"], "notes.txt: expected a new file, or the text of a sound written by cvt_hpc"),
     ):

@@ -9,7 +9,7 @@ from matplotlib.text import Text
 from cvt_hpc.analysis.arrangement import Sides
 from cvt_hpc.analysis.curves import MARKS, curve_figure, curve_panels_figure
 from cvt_hpc.analysis.figures import STYLE
-from cvt_hpc.analysis.profiles import wrap_figure
+from cvt_hpc.analysis.profiles import profile_figure, wrap_figure
 from cvt_hpc.analysis.value_maps import value_map_figure
 from cvt_hpc.analysis.waterfall import waterfall_figure
 from cvt_hpc.errors import InputError
@@ -220,6 +220,10 @@ def test_of_many_pulleys_those_with_torque_are_drawn(history):
         (
             lambda d, h: wrap_figure([h.drop_vars("wrap_angle")], ["h.nc"]),
             "h.nc: expected the history of a run with normal_force and wrap_angle, found no wrap_angle",
+        ),
+        (
+            lambda d, h: profile_figure([h.drop_dims("position")], sources=["h.nc"]),
+            "h.nc: expected the history of a run with quantities along the belt, found none",
         ),
     ],
 )

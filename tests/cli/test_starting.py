@@ -185,13 +185,21 @@ def test_examples_are_listed_and_copied_with_what_they_read_and_replace_nothing(
     assert copied >= {"jobs/sheave/driving.nc", "jobs/results/lebrecht_2004.csv", "slurm/launch.sh"}
     assert call("check", "mine/jobs/sheave_deformation.toml")[0] == 0
     (tmp_path / "mine/slurm/launch.sh").write_text("mine")
-    status, out, err = call("examples", "quickstart", "slurm/launch.sh", "--out", "mine")
+    status, out, err = call("examples", "strand", "slurm/launch.sh", "--out", "mine")
     assert (status, out) == (2, []) and "mine/slurm/launch.sh: expected a place that is free" in err[0]
     assert (tmp_path / "mine/slurm/launch.sh").read_text() == "mine"
-    assert not (tmp_path / "mine/jobs/quickstart.toml").exists()
+    assert not (tmp_path / "mine/jobs/strand.toml").exists()
     assert call("examples", "quickstar")[2] == [
         "cvt-hpc: examples: quickstar: unknown example; did you mean quickstart?"
     ]
+    assert (
+        call("examples", "from_map_to_mechanism", "--out", "mine")[0] == 0
+    )  # the table is there, as it came
+    for name, read in (
+        ("sweep", {"slurm/launch.sh", "jobs/quickstart.toml"}),
+        ("losses.py", {"jobs/driving_cycle.csv"}),
+    ):
+        assert {line.partition(name)[2][1:] for line in call("examples", name, "--out", name)[1]} >= read
     known = call("examples", "zzz")[2][0].partition("known: ")[2].partition(";")[0].split(", ")
     assert len(known) == len({*known})
 
