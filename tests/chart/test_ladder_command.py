@@ -179,7 +179,8 @@ def made(tmp_path_factory):
     path.write_text(TINY)
     printed, told = StringIO(), StringIO()
     with redirect_stdout(printed), redirect_stderr(told):
-        assert main(["ladder", str(path), "--out", str(out)]) == 0
+        status = main(["ladder", str(path), "--out", str(out)])
+    assert status == 0, told.getvalue()
     return path, out, printed.getvalue(), told.getvalue()
 
 
