@@ -66,6 +66,18 @@ def test_ranks_without_mpi4py_are_refused(monkeypatch, tmp_path):
         pass
 
 
+@pytest.mark.parametrize(("on_node", "lines"), [("0", 1), ("1", 0)])
+def test_a_node_without_mpi4py_says_so_once(spawn, on_node, lines):
+    """Rank 0 is on another node, and waits for MPI to start."""
+    without = "import sys; sys.modules['mpi4py'] = None; from cvt_hpc.cli import main; "
+    without += "sys.exit(main(['run', 'x.toml']))"
+    place = {"PMI_SIZE": "4", "PMI_RANK": "2", "MPI_LOCALRANKID": on_node}
+    finished = spawn([sys.executable, "-c", without], place).finish()
+    assert finished.returncode == 2
+    told = re.findall(f"^cvt-hpc: rank 2 on {platform.node()}: .*expected mpi4py", finished.stderr, re.M)
+    assert len(told) == finished.stderr.count("\n") == lines
+
+
 def test_an_mpi_without_threads_is_refused(start, tmp_path):
     finished = start({"out": tmp_path / "out", "thread_level": "funneled"}, ranks=2).finish()
     assert finished.returncode == 2

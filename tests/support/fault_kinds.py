@@ -9,6 +9,7 @@ import time
 from collections.abc import Callable
 from pathlib import Path
 
+from cvt_hpc.study.ranks.starting import SIGNALS
 from support.fault_cases import RUNS, Case, Outcome, Reference
 from support.fault_damage import DAMAGE
 
@@ -201,9 +202,11 @@ def _signal_rank(case: Case) -> Outcome:
 
 
 def _signal_once(case: Case, ranks: int) -> None:
-    number = case.random.choice((signal.SIGTERM, signal.SIGUSR1, signal.SIGINT))
+    number = case.random.choice(SIGNALS)
+    if (done := len(case.acknowledged())) == RUNS:
+        return
     start = case.start(ranks)
-    case.wait_for_a_moment(start, case.random.randint(1, RUNS))  # from then on it is listened to
+    case.wait_for_a_moment(start, case.random.randint(done + 1, RUNS))  # from then on it is listened to
     status = case.strike(start, number, f"rank {case.random.randrange(ranks or 1)}")
     if status not in (0, 98, 99, -number):  # the last after the sweep has ended
         case.outcome.wrong.append(f"after {signal.Signals(number).name} it ended with {status}")

@@ -40,6 +40,7 @@ _LAUNCHERS = (
     ("SLURM_STEP_NUM_TASKS", "SLURM_PROCID"),
     ("SLURM_NTASKS", "SLURM_PROCID"),
 )
+_RANK_ON_NODE = ("OMPI_COMM_WORLD_LOCAL_RANK", "MPI_LOCALRANKID", "SLURM_LOCALID")
 _REMEDY = (
     "Start it with the launcher of this MPI library: its own mpirun, or under Slurm `srun --mpi=pmi2` "
     "(MPICH) or `srun --mpi=pmix` (Open MPI); `srun --mpi=list` shows what there is. For a single process on "
@@ -299,8 +300,19 @@ def agree_on(error: InputError) -> InputError:
         with assembled_team() as team:
             team.agreed(refuse, lambda _: {})
     except InputError as shared:
-        return shared if shared.everywhere else error
+        if shared.everywhere:
+            return shared
+        if "mpi4py.MPI" not in sys.modules:  # rank 0 may be where it is, and wait without a word
+            _tell_for_node(error)
     return error
+
+
+def _tell_for_node(error: InputError, environment: Mapping[str, str] = os.environ) -> None:
+    """Print an error on the first rank of each node but that of rank 0, which prints its own."""
+    rank = detect_launch(environment).rank
+    on_node = next((environment[name] for name in _RANK_ON_NODE if name in environment), "")
+    if rank > 0 and on_node == "0":
+        print(f"cvt-hpc: rank {rank} on {platform.node()}: {error}", file=sys.stderr)
 
 
 def _connected(crash_log: Path | None) -> MPI.Intracomm | None:
