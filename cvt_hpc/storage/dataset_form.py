@@ -101,9 +101,8 @@ def _holds_texts(variable: xr.Variable) -> bool:
     if variable.encoding.get("dtype") in (str, np.dtype("S1")) or not variable.size:
         return True
     first = variable[(0,) * variable.ndim].values.item()
-    return isinstance(
-        first, (str, bytes, int, float, tuple)
-    )  # nan or 0, where it is not known; of stacked axes
+    # nan or 0, where it is not known; tuples of stacked axes
+    return isinstance(first, (str, bytes, int, float, tuple))
 
 
 def _check_coordinate(variable: xr.Variable, place: str) -> None:
