@@ -31,8 +31,8 @@ def check_results(dataset: xr.Dataset, source: str) -> None:
     for name in map(str, dataset["status"].dims):
         if "amplitude" in dataset and name not in dataset["amplitude"].dims:
             raise mismatch(f"{source}: amplitude", "the dimensions of status", f"none along {name}")
-        values = dataset[name].values if name in dataset.coords else np.empty(0)
-        if values.dtype.kind == "f" and (np.isnan(values).any() or np.unique(values).size < values.size):
+        values = dataset[name].values.tolist() if name in dataset.coords else []
+        if len({value for value in values if value == value}) < len(values):  # nan is no value
             raise mismatch(f"{source}: {name}", "values that differ from each other", "some twice, or none")
     if not dataset["status"].size:
         raise mismatch(source, "results of a study of one run at least", "none")

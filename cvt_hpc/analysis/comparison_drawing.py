@@ -94,14 +94,15 @@ def _draw_amplitudes(figure: SubFigure, found: Comparison) -> None:
     axes = figure.subplots()
     a, b = (found.cells[f"amplitude_{study}"].values * 1e6 for study in "ab")
     vibrates = [found.cells[name].values == OccurrenceClass.VIBRATING for name in ("class_a", "class_b")]
-    drawn = (vibrates[0] | vibrates[1]) & np.isfinite(a) & np.isfinite(b)
+    drawn = (vibrates[0] | vibrates[1]) & np.isfinite(a) & np.isfinite(b) & (np.maximum(a, b) > 0.0)
     axes.set(xlabel="amplitude in A [µm]", ylabel="amplitude in B [µm]")
     if not drawn.any():
         axes.text(0.5, 0.5, "no amplitudes of vibrating runs", ha="center", transform=axes.transAxes)
         return
     threshold = np.array(found.thresholds) * 1e6
-    known = np.nanmin(threshold) if np.isfinite(threshold).any() else min(a[drawn].max(), b[drawn].max())
-    low, high = LOWEST * known, 1.5 * max(a[drawn].max(), b[drawn].max())
+    largest = [each[drawn].max() for each in (a, b)]
+    known = np.nanmin(threshold) if np.isfinite(threshold).any() else min(v for v in largest if v > 0.0)
+    low, high = LOWEST * known, 1.5 * max(largest)
     for kind, style in cells.ALL_STYLES.items():
         of_kind = drawn & (found.pairs == kind)
         look = {**style.marks(4.0), "color": style.fill, "mec": "#000000", "mew": 0.5, "zorder": 2}

@@ -62,6 +62,9 @@ def standard(dataset: xr.Dataset, source: str = "results") -> xr.Dataset:
     documented one; or as of `plain`.
     """
     dataset = plain(dataset, source)
+    for name in map(str, dataset.data_vars):
+        if dataset[name].dtype.kind not in "biuf" and documented_units(False).get(name, "1") != "1":
+            raise mismatch(f"{source}: {name}", "numbers", "texts or others")
     converted = {
         str(name): _in_si(variable, str(name), name in dataset.coords, source)
         for name, variable in dataset.variables.items()

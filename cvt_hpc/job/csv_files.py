@@ -26,11 +26,13 @@ MOST_BYTES = 2**26  # of a file of any kind
 _BLOCK = 2**18  # rows that are taken apart at a time: cells take ten times the memory of their text
 _MOST_ABOVE = 10_000  # lines among which that of the names is looked for
 _SEPARATORS = {",": "commas", ";": "semicolons", "\t": "tabs"}
+_ANY_SEPARATOR = "commas, semicolons or tabs"
 _BINARY = re.compile(r"[\x00-\x08\x0b\x0e-\x1f\x7f]")
 _HEAD = re.compile(r"(?P<name>[^[(]*)(?:\[(?P<square>[^]]*)\]|\((?P<round>.*)\))?")
 _NUMBER = re.compile(r"[+-]?(?:\d+[.,]?\d*|[.,]\d+)(?:[eE][+-]?\d+)?", re.ASCII)
 _AMBIGUOUS = re.compile(r"[+-]?[1-9]\d{0,2}[.,]\d{3}", re.ASCII)  # a fraction, or a thousand and more
-_GROUPED = re.compile(r"[+-]?\d[\d.,' ]*", re.ASCII)
+_GROUPED = re.compile(r"[+-]?[0-9][0-9.,'\u2019 \u00a0\u202f]*")
+_PLAINLY = "write numbers with decimal points, without separators of thousands"
 _NUMBERED = "no column for the numbers of the rows"
 BARE = ("", "1", "-")  # units of dimensionless numbers
 _LINES = "a line of column names and lines of numbers"
@@ -249,20 +251,21 @@ def _cells(line: str, separator: str, place: str) -> list[str]:
 def _find_names(file: FromFile, lines: Sequence[str], place: str) -> tuple[int, str]:
     """Return the place of the line that names all columns that have to be there, and its separator.
 
-    Where there is none, those of the line that names most of them.
+    Where there is none, those of the line that names most of them, or of the first one.
     """
-    most, best = -1, (0, ",")
+    most, best = (-1, 0), (0, ",")
     for above, line in enumerate(lines[:_MOST_ABOVE]):
         for separator in _SEPARATORS:
             try:
-                known = {named_column(file, cell) for cell in _cells(line, separator, "")}
+                cells = _cells(line, separator, "")
             except InputError:
                 continue
+            known = {named_column(file, cell) for cell in cells} - {None}
             if known >= set(file.required):
                 return above, separator
-            if len(known - {None}) > most:
-                most, best = len(known - {None}), (above, separator)
-    if not most and len(lines) > _MOST_ABOVE:
+            if (count := (len(known), len(cells))) > most and (known or not above):
+                most, best = count, (above, separator)
+    if not most[0] and len(lines) > _MOST_ABOVE:
         found = f"none among the first {_MOST_ABOVE}"
         raise mismatch(place, f"a line that names columns, such as {told(file.required[0], file)}", found)
     return best
@@ -301,7 +304,12 @@ def _columns(file: FromFile, of_names: Row, of_units: Row, place: str) -> tuple[
     if unknown and not is_log:
         near = did_you_mean(_split(unknown[0])[0], file.columns)
         found = few_of([show(cell) for cell in unknown], _MOST_NAMED) + near
-        raise mismatch(where, f"columns among {legal}", found, "name them so, or delete them")
+        then = (
+            "name them so, or delete them"
+            if len(names) > 1
+            else f"name them so, separated by {_ANY_SEPARATOR}"
+        )
+        raise mismatch(where, f"columns among {legal}", found, then)
     columns: list[_Column] = []
     for i, cell in enumerate(names):
         unit, key = _split(cell)[1], named_column(file, cell)
@@ -361,10 +369,8 @@ def _left_out(
     There are so many rows before these; `first` is the first cell of all, where a column may number the rows.
     """
     line, names = of_names
-    needed = max(column.place for column in columns) + 1
     for n, cells in rows:
-        if len(cells) >= needed:  # what is not read may be empty
-            cells += [""] * (len(names) - len(cells))
+        cells += [""] * (len(names) - len(cells))  # empty: what is read is missed where it is
         if len(cells) != len(names):
             where, expected = f"{place}: line {n}", f"{len(names)} columns, as in line {line}"
             may_be_decimal = separator == "," and len(cells) > len(names)
@@ -410,14 +416,13 @@ def _note_marks(rows: Sequence[Row], columns: Sequence[_Column], marks: dict[str
 
 def _decimal_mark(marks: Mapping[str, _Mark], separator: str, place: str) -> str:
     """Return the decimal mark of all numbers; InputError if it is not certain."""
-    then = "write numbers with decimal points, without separators of thousands"
     if len(marks) > 1:
-        raise mismatch(place, "one decimal mark", " and ".join(map(str, sorted(marks.values()))), then)
+        raise mismatch(place, "one decimal mark", " and ".join(map(str, sorted(marks.values()))), _PLAINLY)
     mark, told = next(iter(marks.items()), (".", _Mark(0, "", True)))
     # a program that writes decimal commas separates by others
     if not told.is_certain and (mark, separator) != (".", ","):
         expected = "a number that shows whether the mark is decimal or separates thousands"
-        raise mismatch(place, expected, f"only such as {told}", then)
+        raise mismatch(place, expected, f"only such as {told}", _PLAINLY)
     return mark
 
 
@@ -426,12 +431,13 @@ def _numbers(rows: Sequence[Row], column: _Column, place: str) -> list[float]:
     cells = [cells[column.place] for _, cells in rows]
     known = {}
     for cell in dict.fromkeys(cells):
-        expected = "a number such as 1500 or 0.13"
+        expected, then = "a number such as 1500 or 0.13", _PLAINLY if _GROUPED.fullmatch(cell) else ""
         if _NUMBER.fullmatch(cell):
             known[cell] = from_si(float(cell.replace(",", ".")), column.unit or column.si, column.si)
             if math.isfinite(known[cell]):
                 continue
-            expected = "a finite number"
+            expected, then = "a finite number", ""
         line = rows[cells.index(cell)][0]
-        raise mismatch(f"{place}: line {line}, {column.name}", expected, show(cell))
+        found = show(cell) if cell else "nothing"
+        raise mismatch(f"{place}: line {line}, {column.name}", expected, found, then)
     return [known[cell] for cell in cells]

@@ -25,7 +25,7 @@ TEXTS = (  # that are texts
 UNITS = ("units", "job_units")  # of a variable
 WORDS = (*UNITS, "long_name", "comment", "flag_meanings", "spacing", "derived")
 PACKING = ("scale_factor", "add_offset")  # of a variable's attributes or, once applied, its encoding
-LARGEST = 1e100  # finite value of a parameter or coordinate [SI]: squares and cubes are numbers, too
+LARGEST = 1e100  # finite value of a parameter, coordinate or packing [SI]: squares and cubes are numbers, too
 
 
 def check_form(dataset: xr.Dataset, source: str) -> None:
@@ -84,6 +84,10 @@ def _check_variable(variable: xr.Variable, place: str) -> None:
         number = attributes.get(key, variable.encoding.get(key, 1.0))
         if np.ndim(number) or not isinstance(number, (int, float, np.number)) or not math.isfinite(number):
             raise mismatch(f"{place}: {key}", "a number", show(number))
+        if abs(float(number)) > LARGEST:
+            raise mismatch(f"{place}: {key}", f"a number of at most {LARGEST:g}", show(number))
+        if number == 0.0 and key == PACKING[0]:
+            raise mismatch(f"{place}: {key}", "a factor, with which values differ", show(number))
     if "flag_meanings" in attributes:
         values = np.atleast_1d(attributes.get("flag_values", ()))
         count = len(attributes["flag_meanings"].split())
@@ -97,7 +101,8 @@ def _holds_texts(variable: xr.Variable) -> bool:
     if variable.encoding.get("dtype") in (str, np.dtype("S1")) or not variable.size:
         return True
     first = variable[(0,) * variable.ndim].values.item()
-    return isinstance(first, (str, bytes, float, tuple))  # nan, where it is not known; of stacked axes
+    # nan or 0, where it is not known; tuples of stacked axes
+    return isinstance(first, (str, bytes, int, float, tuple))
 
 
 def _check_coordinate(variable: xr.Variable, place: str) -> None:

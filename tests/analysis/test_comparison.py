@@ -305,6 +305,13 @@ def test_contradictions_show_in_the_picture(tmp_path, is_sampled):
     assert has_colour(contrary, "#123a6b") and not has_colour(agreeing, "#123a6b")
 
 
+@pytest.mark.filterwarnings("error::UserWarning")
+@pytest.mark.parametrize("size", [0.0, -1e-6])
+def test_amplitudes_that_no_logarithm_has_are_not_drawn(size, tmp_path):
+    one = row([Vibrates.YES] * 3, [size] * 3)
+    assert drawn(compare(one, one), tmp_path / "x.png").size
+
+
 def test_contradictions_that_the_map_leaves_out_are_counted(tmp_path):
     a, b = (xr.concat([study(), study()], "seed").assign_coords(seed=[1, 2]) for _ in "ab")
     b["vibrates"].values[1] = QUIET

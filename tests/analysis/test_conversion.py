@@ -11,7 +11,7 @@ import xarray as xr
 
 import cvt_hpc.accessor  # noqa: F401  datasets have `cvt`
 from cvt_hpc.analysis.classes import OccurrenceClass, count_classes
-from cvt_hpc.analysis.conversion import UNITS, standard
+from cvt_hpc.analysis.conversion import UNITS, plain, standard
 from cvt_hpc.cli import main
 from cvt_hpc.errors import InputError
 from cvt_hpc.models import MODELS
@@ -233,6 +233,14 @@ def test_what_where_and_concat_leave_open_is_not_run():
     assert classes.isel(load=slice(1, None)).equals(dataset.cvt.classes().isel(load=slice(1, None)))
     joined = xr.concat([dataset, dataset.isel(load=[1])], "design", join="outer")
     assert int((joined.cvt.classes() == OccurrenceClass.NOT_RUN).sum()) == 4
+
+
+def test_texts_that_where_replaces_by_zeros_are_empty():
+    dataset = stored("grid").assign(reason=stored("grid")["status"].astype(str).astype(object))
+    part = dataset.where(dataset["load"] > 50.0, 0)
+    assert set(part["reason"].isel(load=0).values.flat) == {0}
+    assert set(plain(part)["reason"].isel(load=0).values.flat) == {""}
+    part.cvt.map()
 
 
 @pytest.mark.parametrize("dim", ["design", pd.Index([0.6, 0.66], name="belt_length")])

@@ -110,9 +110,25 @@ def amplitude_without_an_axis(results):
     return results.assign(amplitude=results["amplitude"].isel(load=0, drop=True))
 
 
-@pytest.mark.parametrize(
-    "change", [without_status, texts_for_flags, one_flag_for_all, amplitude_without_an_axis]
-)
+def texts_for_amplitudes(results):
+    return results.assign(amplitude=results["amplitude"].astype(str))
+
+
+def one_text_twice(results):
+    return results.assign_coords(load=("load", ["short", "long", "short"]))
+
+
+def one_number_twice(results):
+    return results.assign_coords(load=("load", np.array([1, 2, 2], "u8")))
+
+
+CHANGES = [
+    *(without_status, texts_for_flags, one_flag_for_all, amplitude_without_an_axis),
+    *(texts_for_amplitudes, one_text_twice, one_number_twice),
+]
+
+
+@pytest.mark.parametrize("change", CHANGES)
 def test_a_map_of_other_than_results_is_refused_in_one_line(path, capsys, change):
     with xr.open_dataset(path) as opened:
         write_netcdf(change(opened.load()), path.with_name("changed.nc"))
