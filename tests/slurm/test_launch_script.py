@@ -134,3 +134,7 @@ def test_a_list_needs_the_number_of_parts(tmp_path):
     assert parts == [""] * 3
     assert all(error.startswith("--array: expected numbers in equal steps") for error in errors)
     assert [error.count("\n") for error in errors] == [1] * 3
+    # as many numbers as equal steps would give: the one beside them would do another's part
+    parts, errors = parts_of(tmp_path, (1, 3, 5, 6, 9), 2)
+    assert parts == ["1/5", "2/5", "3/5", "", "5/5"]
+    assert [error[:8] for error in errors] == ["", "", "", "--array:", ""]
