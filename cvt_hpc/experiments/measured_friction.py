@@ -121,6 +121,8 @@ def read_points(path: str | Path) -> Points:
 def _faults(values: dict[str, Array]) -> Iterator[Fault]:
     yield ("speed",), "a speed of 0 or more (a magnitude)", values["speed"] < 0.0
     yield ("mu",), "a coefficient of friction > 0", values["mu"] <= 0.0
+    if "force" in values:
+        yield ("force",), "a force of 0 or more", values["force"] < 0.0
     if len(np.unique(values["speed"])) < LEAST_SPEEDS:
         raise ValueError(f"expected {LEAST_SPEEDS} different speeds or more, found fewer")
 

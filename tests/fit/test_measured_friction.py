@@ -225,6 +225,7 @@ def test_laws_have_dashes_of_their_own_which_a_print_in_grey_keeps_apart(tmp_pat
         ("speed [m/s],mu\n0.1,0.1\n0.1,0.11\n0.1,0.12\n", "expected 4 different speeds or more"),
         ("speed [m/s],mu\n0.1,0.1\n-0.1,0.11\n", "line 3: expected a speed of 0 or more"),
         ("speed [m/s],mu\n0.1,0.1\n0.2,0\n", "line 3: expected a coefficient of friction > 0"),
+        ("speed [m/s],mu,force [N]\n0.1,0.1,100\n0.2,0.1,-100\n", "line 3: expected a force of 0 or more"),
         ("speed [m/s],load\n0.1,0.1\n", "mu"),
         ("speed [kg],mu\n0.1,0.1\n", "speed"),
     ],
