@@ -4,6 +4,7 @@ A module for each group of commands: `add` declares them and their options, and 
 """
 
 import argparse
+import errno
 import logging
 import os
 import re
@@ -72,9 +73,13 @@ def main(arguments: list[str] | None = None) -> int:
         complain("interrupted")
         return INTERRUPTED
     except BrokenPipeError:  # the reader, such as `head`, has seen enough
-        os.dup2(os.open(os.devnull, os.O_WRONLY), sys.stdout.fileno())
+        _leave_stdout()
         return DONE
     except Exception as error:
+        if isinstance(error, OSError) and error.errno == errno.ENOSPC and error.filename is None:
+            _leave_stdout()
+            complain("what is printed: expected room for it, found a full disk")
+            return BAD_INPUT
         if isinstance(error, MemoryError) or str(error).startswith("NetCDF: "):
             line = f"a dataset: expected values that can be read, found damaged or too many ones: {error}"
             end_all(BAD_INPUT, line)
@@ -83,6 +88,11 @@ def main(arguments: list[str] | None = None) -> int:
         traceback.print_exc()
         end_all(CRASHED)
         return CRASHED  # Python's own status for a defect, 1, means here that some runs failed
+
+
+def _leave_stdout() -> None:
+    """Let nothing more be written where nobody reads it, or no room is left."""
+    os.dup2(os.open(os.devnull, os.O_WRONLY), sys.stdout.fileno())
 
 
 @contextmanager

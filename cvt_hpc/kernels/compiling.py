@@ -443,8 +443,8 @@ def _keep(name: str, found: CompileResult, walk: Walk) -> None:
             content = library, described, environment, sig.return_type, reload, environments
             _Pickler(file, walk).dump(content)
             return store.write(name, file.getvalue())
-        except Exception as error:  # of a type that only this process knows
-            why = str(error)
+        except Exception:  # of a type that only this process knows
+            why = "what cannot be written to a file"
         finally:
             described.argtypes = kinds
     _tell_unknown(found.fndesc.qualname, why)

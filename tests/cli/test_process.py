@@ -103,6 +103,13 @@ def test_a_closed_stream_is_no_error(tmp_path):
     assert (tmp_path / "out" / "x" / "results.nc").exists()
 
 
+@pytest.mark.skipif(not Path("/dev/full").exists(), reason="no device without room here")
+def test_a_full_disk_below_what_is_printed_is_one_line(tmp_path):
+    done = call("bash", "-c", f"{sys.executable} -m cvt_hpc models > /dev/full", cwd=tmp_path)
+    assert done.returncode == 2
+    assert done.stderr == "cvt-hpc: what is printed: expected room for it, found a full disk\n"
+
+
 def test_exports_are_there_whatever_was_imported_before(tmp_path):
     program = """
         import cvt_hpc.simulation
