@@ -8,6 +8,8 @@ A measured file is a CSV file as `read_csv` takes it, of one of three kinds, tol
     onset     onset_AXIS; optional direction (1: AXIS rises, as without this column; -1: it falls): where
               noise sets in
     peak      AXIS, frequency; optional amplitude: a line of a measured spectrum
+    peak      AXIS, frequency, level: a spectrum at each value of the axis, of which the lines that stand out
+              by PROMINENCE and are within LEVEL_RANGE of the file's highest level are read as peaks
 
 Windows and onsets may have a measured range, measured_AXIS_from and measured_AXIS_to, and AXIS_deviation, the
 standard deviation of their places. Further columns have the name of an axis or a parameter, and say at which
@@ -43,19 +45,26 @@ from cvt_hpc.job.values import shown, si_unit
 from cvt_hpc.parameters import Column, FromFile, RowError
 from cvt_hpc.variables import shortened
 
-WINDOW, ONSET, PEAK, FREQUENCY = "window", "onset", "peak", "frequency"
+WINDOW, ONSET, PEAK, FREQUENCY, LEVEL = "window", "onset", "peak", "frequency", "level"
 _BAND, _SWEPT = ("frequency_from", "frequency_to"), ("measured_{}_from", "measured_{}_to")
 # By kind the columns that it needs, and those that it may have; {} stands for the axis
 _KINDS = {
     WINDOW: (("{}_from", "{}_to"), (*_SWEPT, *_BAND, "amplitude", "{}_deviation")),
     ONSET: (("onset_{}",), (*_SWEPT, "direction", "{}_deviation")),
-    PEAK: (("{}", FREQUENCY), ("amplitude",)),
+    PEAK: (("{}", FREQUENCY), ("amplitude", LEVEL)),
 }
-_UNITS = dict.fromkeys((*_BAND, FREQUENCY), "Hz") | {"amplitude": "m", "direction": ""}  # else the axis' own
+_UNITS = dict.fromkeys((*_BAND, FREQUENCY), "Hz") | {
+    "amplitude": "m",
+    "direction": "",
+    LEVEL: "dB",
+}  # else the axis' own
+PROMINENCE = 6.0  # [dB] of a peak, above the valleys beside it
+LEVEL_RANGE = 20.0  # [dB] below the highest level of the file
+_LEAST_FREQUENCIES = 8  # of a spectrum
 ALIKE = 0.01  # of a parameter that does not vary: so far the measured value may be off
 _PLACE = "measured file"
 _MOST_NAMED = 8
-_MOST_BYTES = 2**20  # of a table of onsets, windows or peaks
+_MOST_BYTES = 2**22  # of a table of onsets, windows or peaks, or of spectra
 _LEAST = 1e-300  # stands for zero on a logarithmic side
 
 INK = "#0033dd"  # of nothing that is computed; in grey, dark within a white outline
@@ -199,6 +208,8 @@ def read_measured(
     required = tuple(name.format(along) for name in _KINDS[kind][0])
     legal = {name: (unit,) for name, unit in columns.items()}
     table = read_columns(path, _PLACE, legal, required, partial(_faults, along))
+    if LEVEL in table:
+        table = _peaks(table, f"{_PLACE}: {path}")
     sides = {name: side_of(dataset.coords.to_dataset().sortby(name), name) for name in axes}
     told = [dict(zip(table, row, strict=True)) for row in zip(*table.values(), strict=True)]
     placed = [_row(one, kind, along, sides, constants) for one in told]
@@ -218,6 +229,28 @@ def read_measured(
                 text = f"{_PLACE}: {path}: {text} {layout.known_values(dataset[along])}"
                 warnings.warn(text, JobWarning, stacklevel=2)
     return Measured(Path(path).name, kind, along, rows)
+
+
+def _peaks(table: dict[str, Array], place: str) -> dict[str, Array]:
+    """Return of rows of spectra [dB] those at their peaks, and tell how many these are."""
+    from scipy.signal import find_peaks  # scipy.signal takes long to load
+
+    where = np.column_stack([values for name, values in table.items() if name not in (FREQUENCY, LEVEL)])
+    of_spectrum = np.unique(where, axis=0, return_inverse=True)[1].ravel()
+    order = np.lexsort((table[FREQUENCY], of_spectrum))
+    spectra = np.split(order, np.flatnonzero(np.diff(of_spectrum[order])) + 1)
+    if (fewest := min(map(len, spectra))) < _LEAST_FREQUENCIES:
+        raise mismatch(place, f"{_LEAST_FREQUENCIES} frequencies or more in each spectrum", str(fewest))
+    least = table[LEVEL].max() - LEVEL_RANGE
+    levels = (table[LEVEL][rows] for rows in spectra)
+    at = [find_peaks(own, height=least, prominence=PROMINENCE)[0] for own in levels]
+    found = np.concatenate([rows[peaks] for rows, peaks in zip(spectra, at, strict=True)])
+    rule = f"maxima that stand out by {PROMINENCE:g} dB, at most {LEVEL_RANGE:g} dB below the highest level"
+    if not found.size:
+        raise mismatch(place, rule, f"none in {len(spectra)} spectra")
+    text = f"{found.size} peaks of {len(spectra)} spectra are read: {rule}"
+    warnings.warn(f"{place}: {text}", JobWarning, stacklevel=3)
+    return {name: values[found] for name, values in table.items() if name != LEVEL}
 
 
 def _constants(dataset: xr.Dataset, job: Job | None) -> Constants:

@@ -225,6 +225,11 @@ def test_units_are_those_of_the_file_and_rows_elsewhere_are_left_out(write):
         ((WINDOWS + ",amplitude [m]", "1,2,0"), "line 2: expected amplitude > 0, found 0"),
         (("onset_load [N m],direction", "20,2"), "expected direction 1 (rising) or -1 (falling), found 2"),
         (
+            ("load [N m],frequency [Hz],level [dB]", "10,500,40", "20,500,40"),
+            "expected 8 frequencies or more in each spectrum, found 1",
+        ),
+        (("load [N m],frequency [Hz],level [um]", "10,500,40"), "expected level [dB], found .*level [um]"),
+        (
             (WINDOWS, "300,400"),
             "expected rows at values that .* has, found 0 of 1; the first that it has not: load_fr",
         ),
@@ -349,6 +354,31 @@ def test_a_window_is_outlined_in_the_rows_where_it_was_measured(write):
         assert len(ink_of(study().cvt.map(measured=path, x="sheave_stiffness", **at))) == count
 
 
+def spectrogram(lines, floor=20.0):
+    """Rows of spectra from 100 to 900 Hz at loads of 10, 20, ... N m, with lines (frequency, level) in each."""
+    rows, places = ["load [N m],frequency [Hz],level [dB]"], np.arange(100.0, 901.0, 10.0)
+    for k, own in enumerate(lines):
+        levels = np.full(places.size, floor) + np.sin(places)  # a noise that stands out by 2 dB at most
+        for frequency, level in own:
+            levels = np.maximum(levels, level - 0.3 * abs(places - frequency))
+        rows += [f"{10 * (k + 1)},{f:g},{level:.6f}" for f, level in zip(places, levels, strict=True)]
+    return rows
+
+
+def test_a_spectrogram_is_read_as_the_lines_that_stand_out(write):
+    """In any order of its rows; a line 21 dB below the highest, or 3 dB above the valley beside it, is none."""
+    dataset = results([[Q, V, V]], [[0, 500, 510]])
+    head, *rows = spectrogram([[(500, 58)], [(500, 80), (700, 61), (760, 59)], [(520, 75), (560, 72)]])
+    with pytest.warns(JobWarning, match="rig.csv: 3 peaks of 3 spectra are read: maxima that stand out by 6"):
+        found = read_measured(write(head, *np.random.default_rng(2).permutation(rows)), dataset)
+    assert found.kind == "peak"
+    assert sorted((row.cell, row.frequency[0]) for row in found.rows) == [(20, 500), (20, 700), (30, 520)]
+    as_peaks = score(dataset, write("load [N m],frequency [Hz]", "20,500", "20,700", "30,520")).total
+    assert score(dataset, write(head, *rows)).total == as_peaks and as_peaks[:2] == (2, 0)
+    with pytest.raises(InputError, match="rig.csv: expected maxima .*, found none in 3 spectra"):
+        read_measured(write(*spectrogram([[], [], []])), dataset)
+
+
 def test_onsets_and_peaks_lie_at_their_places(write):
     path = write("onset_load [N m],direction", "75,1", "150,-1")
     lines = [artist for _, artist in ink_of(study().cvt.map(measured=path, sheave_stiffness=1.0))]
@@ -365,6 +395,7 @@ FILES = {
     "windows": (f"{WINDOWS},frequency_from [Hz],frequency_to [Hz]", "60,150,500,700"),
     "onsets": ("onset_load [N m],direction", "75,1", "150,-1"),
     "peaks": ("load [N m],frequency [Hz],amplitude [um]", "75,520,3", "100,540,4"),
+    "spectrogram": spectrogram([[(520, 80)]] * 10),
 }
 OF_KINDS = [name for name, kind in KINDS.items() if MEASURED in kind.options]
 
