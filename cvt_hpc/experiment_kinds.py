@@ -85,7 +85,7 @@ EXPERIMENTS = {
         "earlier runs",
         has_table=False,
         options={
-            "measured": "file with measured noise: windows, onsets or peaks, as `map --measured` takes it",
+            "measured": "file with measured noise: windows, onsets, peaks or a spectrogram, as of `map`",
             "doubt": "share of cells that model or rig may judge otherwise (default: 0.05)",
             "scatter": "standard error of frequencies (default: 20 Hz)",
         },

@@ -497,7 +497,8 @@ def _figure(found: Posterior) -> Figure:
     for axes in panels.flat[count:]:
         axes.set_axis_off()
     panels[0, 0].set_ylabel("density")
-    panels[0, 0].legend(frameon=False, fontsize=8)
+    shown = panels[0, 0].get_legend_handles_labels()
+    upper.legend(*shown, loc="outside upper center", ncols=2, frameon=False, fontsize=8)
     _draw_probability(lower.subplots(), found)
     return figure
 
