@@ -32,7 +32,7 @@ NOT_MODELLED = "not modelled: the casing, and the sound that it radiates"
 
 
 class Loop(NamedTuple):
-    """What can be played again and again: (n,) values, of which the first follows the last, in a length [s].
+    """Signal of a loop: (n,) values, of which the first follows the last, in a length [s].
 
     `periods` are those within it; 0 of a signal that has none.
     """

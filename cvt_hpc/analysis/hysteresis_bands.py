@@ -48,7 +48,7 @@ def lowest_onsets(places: NDArray[np.float64], classes: NDArray[np.int8]) -> NDA
 
 
 def within(axis: xr.DataArray) -> str:
-    """How well a border midway between two values of an axis is known: half their distance, as "± 5 N m"."""
+    """Return how far a border between two values of an axis may be off: half their distance, as "± 5 N m"."""
     factor, unit = figures.coordinate_unit(axis.attrs)
     values = np.sort(factor * axis.values.astype(float))
     steps = np.diff(values[np.isfinite(values)])

@@ -354,7 +354,7 @@ def _row(
 
 
 class Overlay:
-    """What was measured, drawn over panels one by one: a file, or what `read_measured` has read; or nothing.
+    """Measured noise, drawn over panels one by one: a file, or what `read_measured` has read; or nothing.
 
     Attributes
     ----------

@@ -1,4 +1,4 @@
-"""How far a computed map agrees with a measured file: hits, misses, false alarms and correct silences.
+"""Agreement of a computed map with a measured file: hits, misses, false alarms and correct silences.
 
 Cells of the measured range count where a run is known to vibrate or to be quiet. Within a window noise was
 measured, elsewhere in the range silence. Peaks tell of the cells in which they lie alone, and of no silence.

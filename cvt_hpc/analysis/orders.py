@@ -233,7 +233,7 @@ def _largest(bins: Array, spectrum: Array, low: float, high: float) -> float:
 
 
 def _turning_along(history: xr.Dataset, source: str) -> dict[str, Turning]:
-    """What orders are multiples of, over the time of a run."""
+    """Return the frequencies of which orders are multiples, over the time of a run."""
     figures.check_known(history, ["driving_speed"], source)
     rate = history["driving_speed"].values / (2.0 * np.pi)
     known: dict[str, Turning] = {"driving": (rate, 1.0, 0.0)}
@@ -247,7 +247,7 @@ def _turning_along(history: xr.Dataset, source: str) -> dict[str, Turning]:
 
 
 def _turning_over(shown: xr.Dataset) -> dict[str, Turning]:
-    """What orders are multiples of, over the driving speeds of a study, which the ratio may follow."""
+    """Return the frequencies of which orders are multiples, over the speeds of a study."""
     rate = shown["driving_speed"].values / (2.0 * np.pi)
     known: dict[str, Turning] = {"driving": (rate, 1.0, 0.0)}
     ratio = shown.coords.get("ratio", parameters_of(shown).get("ratio"))

@@ -1,4 +1,4 @@
-"""How sure a map is: probabilities over the samples of uncertain parameters, with intervals.
+"""Certainty of a map: probabilities over the samples of uncertain parameters, with intervals.
 
 A run that ended without a verdict, or moves irregularly, counts on neither side: the probability is that of
 the others. Its interval reaches from where no such run had the property to where all of them had it.

@@ -246,7 +246,7 @@ def read_ramp(history: xr.Dataset, of: str, source: str = "history", *, is_ramp:
 
 
 def course_of(history: xr.Dataset) -> tuple[np.ndarray, str]:
-    """What a run ramps over its time, in display units, with its name and unit; else the time [s]."""
+    """Return the quantity that a run ramps, in display units, with its name and unit; else the time [s]."""
     changing = changing_of(history) or "time"
     course = history[changing]
     factor, unit = (1.0, "s") if changing == "time" else figures.coordinate_unit(course.attrs)
@@ -264,7 +264,7 @@ def changing_of(history: xr.Dataset) -> str | None:
 
 
 def _side_of(history: xr.Dataset, ramp: Ramp) -> Side:
-    """What runs along x, in display units."""
+    """Return the quantity along x, in display units."""
     changing = changing_of(history) or "time"
     factor = 1.0 if changing == "time" else figures.coordinate_unit(history[changing].attrs)[0]
     return Side(changing, np.sort(ramp.values[[0, -1]]), factor)

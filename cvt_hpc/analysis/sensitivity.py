@@ -1,4 +1,4 @@
-"""What uncertain parameters matter for: Sobol indices, and the onset of vibration as a distribution.
+"""Influence of uncertain parameters: Sobol indices, and the onset of vibration as a distribution.
 
 Each sample has an onset, between a quiet and a vibrating value of an axis. The share of the samples whose
 onset lies below a value of the axis is the distribution of the onset there. Between such values its normal

@@ -83,7 +83,7 @@ Array = NDArray[np.float64]
 
 
 class Calibration(NamedTuple):
-    """What is asked."""
+    """A job, a measured file, and how its deviations are weighed."""
 
     job: Job  # with uncertain parameters
     measured: Path  # the measured file
@@ -348,7 +348,7 @@ def told_best(asked: Calibration, found: Posterior) -> Combination:
 
 
 def information(asked: Calibration, found: Posterior) -> xr.DataArray:
-    """What noise or silence, measured in one cell more, tells of the samples [bit], over the grid."""
+    """Return the information that one more measured cell gives of the samples [bit], over the grid."""
 
     def entropy(share: Any) -> Any:
         p = np.clip(share, 1e-12, 1.0 - 1e-12)

@@ -52,7 +52,7 @@ class _Column(NamedTuple):
 
 
 class FileValues(NamedTuple):
-    """What a file gives."""
+    """Values that a file gives."""
 
     values: Point  # raw values by key
     units: Mapping[str, str]  # in which it has them, by column

@@ -26,7 +26,7 @@ RETIRED = {"contact_sweeps": "contact is solved exactly; delete the line"}  # ke
 
 
 class Entry(NamedTuple):
-    """What stands at a key."""
+    """Declaration that stands at a key."""
 
     parameter: Parameter  # declaration of the key
     raw: object

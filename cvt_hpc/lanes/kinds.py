@@ -88,7 +88,7 @@ class _MaskModel(extending.models.PrimitiveModel):
 
 @extending.register_model(LaneArrayKind)
 class _LaneArrayModel(extending.models.StructModel):
-    """Where the values are, and how many: calls hand over three numbers, of an array eleven."""
+    """Place and number of the values: calls hand over three numbers, of an array eleven."""
 
     def __init__(self, manager, kind):
         parts = [("first", types.CPointer(kind.dtype)), ("rows", types.intp), ("fields", types.intp)]

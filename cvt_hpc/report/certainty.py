@@ -1,4 +1,4 @@
-"""How sure the findings of a study with uncertain parameters are, in sentences with numbers."""
+"""Certainty of the findings of a study with uncertain parameters, in sentences with numbers."""
 
 from collections.abc import Iterator, Sequence
 

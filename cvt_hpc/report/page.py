@@ -75,7 +75,7 @@ class Picture(NamedTuple):
 
 
 class Progress(NamedTuple):
-    """How far a study is: names and values in words, share of the runs on record, when the page was made.
+    """Progress of a study: names and values in words, share of the runs on record, when the page was made.
 
     `every` [s] is after what time a browser reads the page again; None once it is the last one.
     """

@@ -42,7 +42,7 @@ def looks_of(design: Table, samples: int) -> list[int]:
 
 
 class Looked(NamedTuple):
-    """How far the cells of an adaptive study are, arrays over the cells."""
+    """Progress of the cells of an adaptive study, arrays over the cells."""
 
     counted: NDArray[np.int64]  # samples at the last look, all of which have ended; 0 before the first
     # samples at the next look, or at the last one where the probability is known as well as was asked

@@ -179,7 +179,7 @@ def _halved(job: Job) -> Document:
 
 
 def _explicit(job: Job) -> Document:
-    """The same runs by the explicit step with its own defaults, in full if the model is auto."""
+    """Return the runs by the explicit step with its own defaults, in full if the model is auto."""
     model = FULL_MODEL if job.model == AUDITED else job.model
     document = handed_to(job, model, "by the explicit step, to check the step")
     stepper = load_model(job.model).steppers[job.stepper]  # type: ignore[index]  # with a step there is one

@@ -1,4 +1,4 @@
-"""How far a study is, read from its folder alone; works while a sweep is running and after.
+"""Progress of a study, read from its folder alone; works while a sweep is running and after.
 
 A `RunReport` says how a sweep ended, for people and for the exit status.
 """
@@ -27,7 +27,7 @@ DONE, SOME_FAILED, STALLED, STOPPED = 0, 1, 98, 99
 
 @dataclass(frozen=True)
 class StudyStatus:
-    """How far a study is.
+    """Progress of a study.
 
     Attributes
     ----------
@@ -210,7 +210,7 @@ class FailedRun:
 
 @dataclass(frozen=True)
 class RunReport:
-    """How a sweep, or a part of one, ended; the same on all ranks.
+    """Report of how a sweep, or a part of one, ended; the same on all ranks.
 
     Attributes
     ----------

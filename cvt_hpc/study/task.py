@@ -88,7 +88,7 @@ class Task:
 
     @property
     def turns(self) -> Turns:
-        """How many times so many runs fill the lanes."""
+        """Return the number of times that so many runs fill the lanes."""
         return partial(self.simulator.turns, self.job)
 
     def fit(self, records: Records, costs: np.ndarray) -> Fit:

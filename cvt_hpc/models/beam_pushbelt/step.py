@@ -54,7 +54,7 @@ FLANK_CONTACT, RING_CONTACT = f.CONTACTS.index("flank"), f.CONTACTS.index("ring"
 
 @kernel
 def _locate(belt, state, work, dt):
-    """Where elements are at the start of a step and, by their speeds, at its middle."""
+    """Set the places of elements at the start of a step and, by their speeds, at its middle."""
     ring, e, step, rows = state.ring, state.elements, work.step, work.rows
     length = ring.beam.length
     for k in range(ring.q.size):

@@ -236,7 +236,7 @@ class LaneRun(RecordedRun):
 
     @property
     def layer_sums(self) -> np.ndarray | None:
-        """As of `RecordedRun`."""
+        """Return the sums over layers of `RecordedRun`."""
         work = self.batch.work
         return work.sums.data[:, :, self._lane] if isinstance(work, ring_step.RingWork) else None
 

@@ -34,7 +34,7 @@ def implicit_shares(one, other, inertia):
 
 @kernel
 def damp_across(belt: LaneBelt, state: LaneState, work: Work) -> None:
-    """What the layers' dampers take across the belt from the stations at both ends of each cell, into BENT.
+    """Take the layers' damping across the belt from the stations at both ends of each cell, into BENT.
 
     By the speeds that the step begins with. Of a cell's lengthening v_0,s + kappa u, in which the dampers
     along the belt are implicit, a step of both leaves with a = 4 c dt / (m_0 h^2) and b = c dt kappa^2 / m

@@ -216,7 +216,7 @@ def substitute(belt: LaneBelt, state: LaneState, work: Work, step: float) -> int
 
 @merged_kernel
 def _meeting(belt: LaneBelt, state: LaneState, stations: LaneArray, j: int, opening, step: float):
-    """Where elements of cell j that the step has taken as apart newly overlap, as `opening` [m/s] changes."""
+    """Return whether elements of cell j, taken as apart, newly overlap as `opening` [m/s] changes."""
     per_length = (step * belt.per_cell[j]) * stations[j, lf.PER_CONTENT_0]
     if belt.has_column:
         per_length *= state.column[j, lf.GIVE]

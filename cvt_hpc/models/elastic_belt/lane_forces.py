@@ -65,7 +65,7 @@ def pressed_strain(belt: LaneBelt, state: LaneState, stations: LaneArray, j: int
 
 @merged_kernel
 def pressed_behind(belt: LaneBelt, state: LaneState, stations: LaneArray, j: int):
-    """As `pressed_strain`, of the cell behind station j."""
+    """Return `pressed_strain` of the cell behind station j."""
     return behind(state.column, j, lf.PRESSED) if belt.has_column else behind(stations, j, lf.EPS_0)
 
 
@@ -336,7 +336,7 @@ def lane_strains(belt: LaneBelt, state: LaneState, stations: LaneArray) -> None:
 
 @merged_kernel
 def cell_strains(belt: LaneBelt, stations: LaneArray, j: int, w, w_b, more_0, more_1, offset):
-    """As `lane_strains`, of cell j, by the displacement at both ends [m] and the contents' deviations."""
+    """Return `lane_strains` of cell j, by the displacement at both ends [m] and the contents' deviations."""
     kappa = belt.curvature[j]
     content_0, content_1 = more_0 + 1.0, fma(offset, kappa, more_1 + 1.0)
     per_0, per_1 = reciprocals(content_0, content_1)

@@ -76,6 +76,6 @@ def gather(state: LaneState, stations: LaneArray, sampled: Sampled, fields: int)
 
 @kernel
 def sample_state(belt: LaneBelt, state: LaneState, stations: LaneArray, samples: Samples, k: int) -> None:
-    """As `sample`, of a state whose forces are not known yet."""
+    """Take a sample, as `sample` does, of a state whose forces are not known yet."""
     derive(belt, state, stations)
     sample(belt, state, stations, samples, k)

@@ -1,4 +1,4 @@
-"""Where power enters and leaves the belt drive, and where it is stored: the audit of a run.
+"""Balance of the power that enters and leaves the belt drive and is stored: the audit of a run.
 
 The driving pulley's speed is prescribed, and its power is its moment times its momentary speed. In a steady
 state, on average over a vibration,

@@ -1,4 +1,4 @@
-"""Where the powers of an audit stand: terms of the balance [W], and the stored energy [J]."""
+"""Places of the powers of an audit: terms of the balance [W], and the stored energy [J]."""
 
 from cvt_hpc.models.elastic_belt.fields import names_from
 

@@ -200,7 +200,7 @@ class RecordedRun:
 
     @property
     def layer_means(self) -> np.ndarray | None:
-        """As `layer_sums`, means."""
+        """Return the means of what `layer_sums` has."""
         return None if self.layer_sums is None else self.layer_sums / self._judged_count
 
     @property
@@ -248,7 +248,7 @@ class OneLaneRun(RecordedRun):
         self._layer_sums = [LaneArray(layer_count(parameters) + 1, len(lane_rings.SUMS), 1) for _ in range(2)]
 
     def _make_lane(self, belt: Belt, first: State) -> None:
-        """The same run as a single lane, which can be sampled."""
+        """Return the run as a single lane, which can be sampled."""
         count = layer_count(self.parameters)
         if count > 1:
             self._rings = lane_rings.lane_rings([belt], [ring_constants(self.parameters, belt)], np.float64)
@@ -262,7 +262,7 @@ class OneLaneRun(RecordedRun):
 
     @property
     def layer_sums(self) -> np.ndarray | None:
-        """As of `RecordedRun`."""
+        """Return the sums over layers of `RecordedRun`."""
         return self._layer_sums[1].data[:, :, 0] if layer_count(self.parameters) > 1 else None
 
     @property

@@ -99,7 +99,7 @@ def begin_rings(belt: LaneBelt, state: LaneState, work: RingWork) -> None:
 def take_sample_of_rings(
     state: LaneState, work: RingWork, sampled: Sampled, samples: Samples, k: int
 ) -> None:
-    """As `take_sample`, with the layers' part."""
+    """Take a sample as `take_sample` does, with the layers' part."""
     take_sample(state, work, sampled, samples, k)
     lane_rings.audit_layers(sampled.belt, work.whole, sampled.state, work.audited, samples, k, work.sums)
 

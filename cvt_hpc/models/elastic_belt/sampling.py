@@ -78,7 +78,7 @@ OUTCOME, ENDED_AT, CONTACT_SOLVES, REPEATED = range(len(ENDED))
 
 
 class Sensors(NamedTuple):
-    """Where displacement is sensed.
+    """Places at which displacement is sensed.
 
     Of `matrix` first the probes, then MODES sine amplitudes of each strand, measured from the chord between
     its ends.

@@ -52,7 +52,7 @@ ON_FLANK = {f.U: (-1, 0), f.V_ELEMENT: (-1, 0), f.W: (-2, 1), f.V_FILTERED: (-1,
 
 
 def pattern(flat: FlatBelt) -> csc_array:
-    """Where the Jacobian of `flat.rates` may differ from 0, (n, n) bool."""
+    """Return the places at which the Jacobian of `flat.rates` may differ from 0, (n, n) bool."""
     belt = flat.belt
     n, count = belt.cell.size, flat.origin.size
     place = {row: k * n + np.arange(n) for k, row in enumerate(ROWS)}

@@ -1,4 +1,4 @@
-"""What is read off the elements of a pushbelt at a sample: displacement, forces, losses and their places."""
+"""Readings of the elements of a pushbelt at a sample: displacement, forces, losses and their places."""
 
 from collections.abc import Mapping, Sequence
 from typing import Any

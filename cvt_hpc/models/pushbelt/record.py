@@ -1,4 +1,4 @@
-"""What the record of a run of the pushbelt holds, what a run costs, and how it is judged."""
+"""Record of a run of the pushbelt, its cost, and its verdict."""
 
 from __future__ import annotations
 

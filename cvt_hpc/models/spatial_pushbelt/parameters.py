@@ -1,4 +1,4 @@
-"""What a job may set of the spatial pushbelt: all of the planar one by its names, and what is out of plane.
+"""Parameters of the spatial pushbelt: all of the planar one by its names, and what is out of plane.
 
 Schindler's paper gives no number but "approximately 400 elements" and "nine to twelve rings". Every default
 is an assumption, plausible and not measured; those of the planar pushbelt keep its own.

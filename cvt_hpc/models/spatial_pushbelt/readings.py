@@ -1,4 +1,4 @@
-"""What is read off the elements of a spatial pushbelt at a sample: displacement, forces and their places.
+"""Readings of the elements of a spatial pushbelt at a sample: displacement, forces and their places.
 
 In arrays of an element's points the flanks are left low, left high, right low, right high; the contacts to
 the next element edge left, edge right, head left, head right (`belt`).

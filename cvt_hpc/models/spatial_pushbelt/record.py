@@ -1,4 +1,4 @@
-"""What the record of a run of the spatial pushbelt holds, what a run costs, and how it is judged."""
+"""Record of a run of the spatial pushbelt, its cost, and its verdict."""
 
 from __future__ import annotations
 

@@ -1,4 +1,4 @@
-"""How long a batch will take: predicted costs times a factor of the machine that is fitted while running.
+"""Time that a batch will take: predicted costs times a factor of the machine that is fitted while running.
 
 The logarithm of (time taken / predicted cost) is taken to scatter normally about that of the machine's
 factor; batches with runs that are refined or prolonged widen the scatter. Each rank fits its own factor to

@@ -1,4 +1,4 @@
-"""How this process was started, and with how many others: a serial run never touches MPI.
+"""Start of this process, with others or alone: a serial run never touches MPI.
 
 MPI is imported only where a launcher's environment shows that there are other ranks. A launcher that does
 not fit the MPI library starts ranks that cannot see each other, each of which would run the whole sweep: the

@@ -1,4 +1,4 @@
-"""How far a sweep, chart or diagram is: a bar on a terminal, plain lines where the output goes to a file.
+"""Progress of a sweep, chart or diagram: a bar on a terminal, plain lines where the output goes to a file.
 
 Ranks share the next batch to claim and the number of finished runs: `Counter`.
 """
@@ -23,7 +23,7 @@ _BAR = "{l_bar}{bar}| {n_fmt}/{total_fmt} [{elapsed}, {rate_fmt}{postfix}]"
 
 
 class Tally(NamedTuple):
-    """How many runs of this session are finished, and how many of those failed."""
+    """Numbers of the runs of this session that are finished, and of those that failed."""
 
     finished: int
     failed: int

@@ -30,7 +30,7 @@ Places = range | NDArray[np.int64]  # the index in a study of each run of anothe
 
 
 class Timing(NamedTuple):
-    """How long a batch took, from its mark to its records."""
+    """Time that a batch took, from its mark to its records."""
 
     batch: Batch
     seconds: float
@@ -87,7 +87,7 @@ class Records:
 
     @property
     def status(self) -> np.ndarray:
-        """How each run ended, shape (runs,), a `Status`."""
+        """Return the `Status` with which each run ended, shape (runs,)."""
         return self.entries["status"]
 
     def read(self, runs: np.ndarray | int, name: str | None = None) -> np.ndarray:

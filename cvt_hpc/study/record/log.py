@@ -68,7 +68,7 @@ class Frame(NamedTuple):
 
 
 class RecordFormat:
-    """How a study's records and marks are framed.
+    """Frame of a study's records and marks.
 
     Parameters
     ----------
