@@ -310,7 +310,9 @@ def test_what_a_rig_measured_beside_a_course_is_not_read(tmp_path):
     ):
         point = course_job(tmp_path, table).point(0)
     assert point["load"] == 120.0 and point["load_profile"] == pytest.approx((100.5 / 120, 1.0, 0.75))
-    with pytest.raises(InputError, match="line 3: expected 4 columns, as in line 1, found 1"):
+    with pytest.raises(
+        InputError, match="line 3, load: expected a number such as 1500 or 0.13, found nothing"
+    ):
         course_job(tmp_path, "time;load [N m];oil;remark\n0;1;2;3\n1\n".replace("time", "time [s]"))
 
 
