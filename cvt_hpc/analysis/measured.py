@@ -45,19 +45,17 @@ from cvt_hpc.job.values import shown, si_unit
 from cvt_hpc.parameters import Column, FromFile, RowError
 from cvt_hpc.variables import shortened
 
-WINDOW, ONSET, PEAK, FREQUENCY, LEVEL = "window", "onset", "peak", "frequency", "level"
+WINDOW, ONSET, PEAK = "window", "onset", "peak"
+FREQUENCY, LEVEL, AMPLITUDE = "frequency", "level", "amplitude"
 _BAND, _SWEPT = ("frequency_from", "frequency_to"), ("measured_{}_from", "measured_{}_to")
 # By kind the columns that it needs, and those that it may have; {} stands for the axis
 _KINDS = {
-    WINDOW: (("{}_from", "{}_to"), (*_SWEPT, *_BAND, "amplitude", "{}_deviation")),
+    WINDOW: (("{}_from", "{}_to"), (*_SWEPT, *_BAND, AMPLITUDE, "{}_deviation")),
     ONSET: (("onset_{}",), (*_SWEPT, "direction", "{}_deviation")),
-    PEAK: (("{}", FREQUENCY), ("amplitude", LEVEL)),
+    PEAK: (("{}", FREQUENCY), (AMPLITUDE, LEVEL)),
 }
-_UNITS = dict.fromkeys((*_BAND, FREQUENCY), "Hz") | {
-    "amplitude": "m",
-    "direction": "",
-    LEVEL: "dB",
-}  # else the axis' own
+# else the axis' own
+_UNITS = dict.fromkeys((*_BAND, FREQUENCY), "Hz") | {AMPLITUDE: "m", "direction": "", LEVEL: "dB"}
 PROMINENCE = 6.0  # [dB] of a peak, above the valleys beside it
 LEVEL_RANGE = 20.0  # [dB] below the highest level of the file
 _LEAST_FREQUENCIES = 8  # of a spectrum
@@ -235,12 +233,16 @@ def _peaks(table: dict[str, Array], place: str) -> dict[str, Array]:
     """Return of rows of spectra [dB] those at their peaks, and tell how many these are."""
     from scipy.signal import find_peaks  # scipy.signal takes long to load
 
-    where = np.column_stack([values for name, values in table.items() if name not in (FREQUENCY, LEVEL)])
+    of_line = (FREQUENCY, LEVEL, AMPLITUDE)
+    where = np.column_stack([values for name, values in table.items() if name not in of_line])
     of_spectrum = np.unique(where, axis=0, return_inverse=True)[1].ravel()
     order = np.lexsort((table[FREQUENCY], of_spectrum))
     spectra = np.split(order, np.flatnonzero(np.diff(of_spectrum[order])) + 1)
     if (fewest := min(map(len, spectra))) < _LEAST_FREQUENCIES:
         raise mismatch(place, f"{_LEAST_FREQUENCIES} frequencies or more in each spectrum", str(fewest))
+    if any((np.diff(table[FREQUENCY][rows]) == 0.0).any() for rows in spectra):  # no spectrum, but several
+        then = "average spectra of one place, or name in a column what tells them apart"
+        raise mismatch(place, "each frequency once in a spectrum", "some twice", then)
     least = table[LEVEL].max() - LEVEL_RANGE
     levels = (table[LEVEL][rows] for rows in spectra)
     at = [find_peaks(own, height=least, prominence=PROMINENCE)[0] for own in levels]
@@ -306,7 +308,7 @@ def _declaration(path: Path, units: dict[str, str], axes: list[str]) -> tuple[st
 
 def _faults(along: str, values: dict[str, Array]) -> Iterator[Fault]:
     """Yield what has no meaning in a measured file; ValueError of a column without its partner."""
-    for name in (*_BAND, FREQUENCY, "amplitude", f"{along}_deviation"):
+    for name in (*_BAND, FREQUENCY, AMPLITUDE, f"{along}_deviation"):
         if name in values:
             yield (name,), f"{name} > 0", values[name] <= 0.0
     if "direction" in values:
@@ -346,7 +348,7 @@ def _row(
         span if kind != WINDOW or span[0] < span[1] else (math.nan, math.nan),
         at.pop(along, math.nan),
         (frequencies[0], frequencies[-1]) if frequencies else None,
-        told.get("amplitude", math.nan),
+        told.get(AMPLITUDE, math.nan),
         swept,
         told.get("direction", 1.0) > 0.0,
         told.get(f"{along}_deviation", 0.0),

@@ -228,6 +228,10 @@ def test_units_are_those_of_the_file_and_rows_elsewhere_are_left_out(write):
             ("load [N m],frequency [Hz],level [dB]", "10,500,40", "20,500,40"),
             "expected 8 frequencies or more in each spectrum, found 1",
         ),
+        (
+            ("load [N m],frequency [Hz],level [dB]", *2 * [f"10,{500 + 5 * k},40" for k in range(8)]),
+            "expected each frequency once in a spectrum, found some twice; average spectra of one place",
+        ),
         (("load [N m],frequency [Hz],level [um]", "10,500,40"), "expected level [dB], found .*level [um]"),
         (
             (WINDOWS, "300,400"),
@@ -375,6 +379,8 @@ def test_a_spectrogram_is_read_as_the_lines_that_stand_out(write):
     assert sorted((row.cell, row.frequency[0]) for row in found.rows) == [(20, 500), (20, 700), (30, 520)]
     as_peaks = score(dataset, write("load [N m],frequency [Hz]", "20,500", "20,700", "30,520")).total
     assert score(dataset, write(head, *rows)).total == as_peaks and as_peaks[:2] == (2, 0)
+    sizes = write(f"{head},amplitude [um]", *(f"{row},{1 + k}" for k, row in enumerate(rows)))
+    assert [row.frequency[0] for row in read_measured(sizes, dataset).rows] == [500, 700, 520]
     with pytest.raises(InputError, match="rig.csv: expected maxima .*, found none in 3 spectra"):
         read_measured(write(*spectrogram([[], [], []])), dataset)
 
