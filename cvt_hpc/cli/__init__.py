@@ -76,12 +76,13 @@ def main(arguments: list[str] | None = None) -> int:
         _leave_stdout()
         return DONE
     except Exception as error:
+        line = ""
         if isinstance(error, OSError) and error.errno == errno.ENOSPC and error.filename is None:
             _leave_stdout()
-            complain("what is printed: expected room for it, found a full disk")
-            return BAD_INPUT
+            line = "what is printed: expected room for it, found a full disk"
         if isinstance(error, MemoryError) or str(error).startswith("NetCDF: "):
             line = f"a dataset: expected values that can be read, found damaged or too many ones: {error}"
+        if line:
             end_all(BAD_INPUT, line)
             complain(line)
             return BAD_INPUT
