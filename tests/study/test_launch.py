@@ -1,5 +1,6 @@
 """Who started the process: serial runs leave MPI alone, ranks that cannot see each other are refused."""
 
+import gc
 import json
 import pickle
 import platform
@@ -307,6 +308,26 @@ def test_the_lock_of_the_libraries_may_be_taken_again_and_is_the_same_once_pickl
         assert held == [False]
     assert not NETCDF4_PYTHON_LOCK.locked()
     assert pickle.loads(pickle.dumps(LIBRARIES)) is LIBRARIES
+
+
+def test_garbage_that_takes_the_lock_of_xarray_waits_for_the_lock_of_the_libraries():
+    """As a dataset does that xarray has opened from bytes: its thread would wait for itself."""
+    was_free = []
+
+    class Opened:
+        def __del__(self):
+            was_free.append(NETCDF4_PYTHON_LOCK.acquire(blocking=False))
+            if was_free[-1]:
+                NETCDF4_PYTHON_LOCK.release()
+
+    with LIBRARIES, LIBRARIES:
+        garbage = [Opened()]
+        garbage.append(garbage)
+        del garbage
+        kept = [[] for _ in range(100_000)]  # more than Python's threshold, at which it collects
+    assert gc.isenabled() and kept
+    gc.collect()
+    assert was_free == [True]
 
 
 @pytest.mark.parametrize(
