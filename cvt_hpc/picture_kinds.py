@@ -60,7 +60,7 @@ def _region(text: str) -> Option:
 
 MEASURED = Option(
     "measured",
-    "CSV file of a test rig, drawn over it: noise windows, onset loads, or peaks over load",
+    "CSV file of a test rig, drawn over it: noise windows, onsets, peaks or a spectrogram",
     "--measured",
     {"metavar": "CSV"},
 )

@@ -335,7 +335,12 @@ def not_read(others: Sequence[str]) -> str:
 
 
 def unit_of(file: FromFile, key: str, unit: str) -> str:
-    """Return the unit of a column as it is written here: turns a minute are rpm where a speed is meant."""
+    """Return the unit of a column as it is written here: turns a minute are rpm where a speed is meant.
+
+    Levels are dB, whatever their reference and weighting are.
+    """
+    if "dB" in file.columns[key] and re.match(r"dB\b", unit):
+        return "dB"
     is_rotation = "rad/s" in file.columns[key] and re.sub(r"[\s^{}]", "", unit).casefold() in _PER_MINUTE
     return "rpm" if is_rotation else unit
 

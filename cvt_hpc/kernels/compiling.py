@@ -444,7 +444,7 @@ def _keep(name: str, found: CompileResult, walk: Walk) -> None:
             _Pickler(file, walk).dump(content)
             return store.write(name, file.getvalue())
         except Exception:  # of a type that only this process knows
-            why = "what cannot be written to a file"
+            why = "a type that only this process knows"
         finally:
             described.argtypes = kinds
     _tell_unknown(found.fndesc.qualname, why)

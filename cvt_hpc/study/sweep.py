@@ -194,7 +194,8 @@ def run(
             report, noted = stopping.outlive(team, sweep)
     status = report.status_of_more or STOPPED
     if signals.noted and noted is None:  # too late for the other ranks to learn of it: they would go on
-        end_all(status, f"stopped by {signals.noted}")
+        if team.size > 1:
+            end_all(status, f"stopped by {signals.noted}")
         report = replace(report, stopped=signals.noted)
     if raises and (name := noted or signals.noted):
         stopping.raise_again(name, status)

@@ -232,6 +232,10 @@ def test_units_are_those_of_the_file_and_rows_elsewhere_are_left_out(write):
             ("load [N m],frequency [Hz],level [dB]", *2 * [f"10,{500 + 5 * k},40" for k in range(8)]),
             "expected each frequency once in a spectrum, found some twice; average spectra of one place",
         ),
+        (
+            ("load [N m],frequency [Hz],level [dB re 20 uPa]", "10,500,40"),
+            "expected 8 frequencies or more in each spectrum, found 1",
+        ),
         (("load [N m],frequency [Hz],level [um]", "10,500,40"), "expected level [dB], found .*level [um]"),
         (
             (WINDOWS, "300,400"),
