@@ -6,6 +6,7 @@ from collections.abc import Iterable, Mapping, Sequence
 from typing import Any
 
 BAD_INPUT = 2  # exit status
+INTERRUPTED = 130  # exit status after Ctrl-C, as of shells
 CRASHED = 70  # exit status after a defect of this program; EX_SOFTWARE of sysexits.h
 LONGEST_KEY = 100  # letters
 DEEPEST = 20  # levels of tables and lists; a chart has some six

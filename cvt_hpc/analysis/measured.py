@@ -56,6 +56,7 @@ _KINDS = {
 }
 # else the axis' own
 _UNITS = dict.fromkeys((*_BAND, FREQUENCY), "Hz") | {AMPLITUDE: "m", "direction": "", LEVEL: "dB"}
+# Assumptions: what is taken for a line of a spectrum
 PROMINENCE = 6.0  # [dB] of a peak, above the valleys beside it
 LEVEL_RANGE = 20.0  # [dB] below the highest level of the file
 _LEAST_FREQUENCIES = 8  # of a spectrum
@@ -230,7 +231,7 @@ def read_measured(
 
 
 def _peaks(table: dict[str, Array], place: str) -> dict[str, Array]:
-    """Return of rows of spectra [dB] those at their peaks, and tell how many these are."""
+    """Return the rows at the peaks of spectra [dB], and tell how many these are."""
     from scipy.signal import find_peaks  # scipy.signal takes long to load
 
     of_line = (FREQUENCY, LEVEL, AMPLITUDE)

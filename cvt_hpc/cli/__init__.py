@@ -17,8 +17,18 @@ from typing import Any, NoReturn
 
 from cvt_hpc import __version__
 from cvt_hpc.cli import checking, experiments, plots, results, single_run, starting, sweep
-from cvt_hpc.cli.parts import DONE, INTERRUPTED, complain, end_all, speaks
-from cvt_hpc.errors import BAD_INPUT, CRASHED, InputError, JobWarning, did_you_mean, mismatch, one_line, show
+from cvt_hpc.cli.parts import DONE, complain, end_all, speaks
+from cvt_hpc.errors import (
+    BAD_INPUT,
+    CRASHED,
+    INTERRUPTED,
+    InputError,
+    JobWarning,
+    did_you_mean,
+    mismatch,
+    one_line,
+    show,
+)
 from cvt_hpc.experiment_kinds import EXPERIMENTS
 from cvt_hpc.storage.files import open_missing_streams
 

@@ -24,7 +24,7 @@ Result = TypeVar("Result")
 Command = Callable[[argparse.Namespace], int | None]  # does one, and returns the exit status, if not 0
 Commands: TypeAlias = "argparse._SubParsersAction[argparse.ArgumentParser]"
 
-DONE, SOME_FAILED, INTERRUPTED = 0, 1, 130
+DONE, SOME_FAILED = 0, 1
 PICTURES = (".png", ".svg", ".pdf")
 LONGEST_NAME, LONGEST_NAMES = 100, 60  # letters of a picture's name, and of the files' names within it
 # what --set does

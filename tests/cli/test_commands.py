@@ -7,8 +7,8 @@ import netCDF4
 import numpy as np
 import pytest
 
-from cvt_hpc.cli.parts import INTERRUPTED, colour_end, picture_beside
-from cvt_hpc.errors import InputError
+from cvt_hpc.cli.parts import colour_end, picture_beside
+from cvt_hpc.errors import INTERRUPTED, InputError
 from cvt_hpc.printing import report_lines
 from cvt_hpc.study import FailedRun, RunReport, StudyStatus
 from cvt_hpc.variables import Status

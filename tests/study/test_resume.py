@@ -12,8 +12,9 @@ import time
 import numpy as np
 import pytest
 
-from cvt_hpc.study import open_results, run
+from cvt_hpc.study import open_results, run, sweep
 from cvt_hpc.study.folder import StudyFolder
+from cvt_hpc.study.ranks import stopping
 from cvt_hpc.study.ranks.starting import SIGNALS
 from cvt_hpc.study.record.index import read_records
 from cvt_hpc.study.record.log import PLACE, RECORD
@@ -230,6 +231,20 @@ def test_a_signal_that_comes_to_one_rank_after_a_study_ends_all(spawn, tmp_path,
     assert finished.returncode == 99
     assert (tmp_path / "first" / "results.nc").exists()
     assert not (tmp_path / "second").exists()
+
+
+def test_a_late_signal_to_a_rank_that_sweeps_alone_ends_no_other(tmp_path, monkeypatch):
+    """Others of the same launcher may sweep for themselves."""
+    leave, ended = stopping.SignalWatch.__exit__, []
+
+    def leave_late(self, *error):
+        signal.raise_signal(signal.SIGTERM)
+        leave(self, *error)
+
+    monkeypatch.setattr(stopping.SignalWatch, "__exit__", leave_late)
+    monkeypatch.setattr(sweep, "end_all", lambda *told: ended.append(told))
+    report = run(Job(), tmp_path / "out", simulator=Simulator(), progress=False, raises=False, comm=None)
+    assert report.stopped == "SIGTERM" and not ended
 
 
 EARLY = """

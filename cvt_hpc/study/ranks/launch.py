@@ -9,7 +9,6 @@ from __future__ import annotations
 
 import os
 import platform
-import signal
 import sys
 import time
 import traceback
@@ -20,7 +19,7 @@ from pathlib import Path
 from types import TracebackType
 from typing import TYPE_CHECKING, Any, Literal, NoReturn, TypeAlias, TypeVar
 
-from cvt_hpc.errors import BAD_INPUT, CRASHED, InputError, mismatch
+from cvt_hpc.errors import BAD_INPUT, CRASHED, INTERRUPTED, InputError, mismatch
 from cvt_hpc.job.values import Document
 from cvt_hpc.storage.files import append_text
 from cvt_hpc.study.job_difference import differences, short_pair
@@ -46,7 +45,6 @@ _REMEDY = (
     "(MPICH) or `srun --mpi=pmix` (Open MPI); `srun --mpi=list` shows what there is. For a single process on "
     "purpose: `srun -n 1`, or unset {variable}"
 )
-_INTERRUPTED = 128 + signal.SIGINT  # exit status, as of shells
 _PASSING_ON = 0.5  # [s]; mpirun, after an abort, drops output that it has not yet passed on
 
 
@@ -266,7 +264,7 @@ def assembled_team(crash_log: Path | None = None, ranks: Ranks = "all") -> Itera
         team.release()
         raise
     except KeyboardInterrupt:
-        _end(communicator, _INTERRUPTED, "interrupted")
+        _end(communicator, INTERRUPTED, "interrupted")
     except BaseException:
         _crash(communicator, traceback.format_exc(), crash_log)
     else:
@@ -358,7 +356,7 @@ def _abort_on_uncaught(world: MPI.Intracomm, crash_log: Path | None) -> None:
             if isinstance(value, InputError):
                 end_all(BAD_INPUT, str(value))
             if isinstance(value, KeyboardInterrupt):
-                end_all(_INTERRUPTED, "interrupted")
+                end_all(INTERRUPTED, "interrupted")
             _crash(world, "".join(traceback.format_exception(kind, value, trace)), crash_log)
         if world.rank == 0:
             sys.__excepthook__(kind, value, trace)
