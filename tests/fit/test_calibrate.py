@@ -433,6 +433,7 @@ def test_both_sets_of_samples_for_sobol_indices_are_candidates(study, tmp_path):
             {"measured": "rig.csv"},
             "expected samples of uncertain parameters",
         ),
+        (JOB + "[fit]\n", {"measured": "rig.csv"}, "found one for `cvt-hpc fit`"),
         (JOB, {"measured": "none.csv"}, "none.csv"),
         (JOB, {"measured": "rig.csv", "doubt": "0.7"}, "--doubt"),
         (

@@ -316,9 +316,6 @@ def test_a_job_or_an_option_of_calibrate_is_told_so(window, tmp_path, capsys, mo
     told = "`cvt-hpc calibrate JOB --measured FILE` weighs its samples by measured noise"
     assert of_job == f"cvt-hpc: x.toml: [uncertain]: expected a table [fit], found [uncertain] alone; {told}"
     assert "--measured rig.csv; `cvt-hpc calibrate JOB` takes --measured" in of_option
-    (tmp_path / "x.toml").write_text(JOB)
-    assert main(["calibrate", "x.toml", "--measured", "rig.csv"]) == 2
-    assert capsys.readouterr().err.endswith("[fit]: expected a job of runs, found one for `cvt-hpc fit`\n")
     (tmp_path / "x.toml").write_text(JOB + "[uncertain]\nsamples = 8\n")
     assert main(["fit", "x.toml"]) == 2
     assert "[uncertain]: expected none: a fit draws its candidates itself" in capsys.readouterr().err
