@@ -35,6 +35,8 @@ class Experiment(NamedTuple):
         Whether its jobs may have a table of its name.
     options : mapping
         Meaning of further options, which `load` takes.
+    instead : mapping
+        By a table of a job that lacks the experiment's own one, what to write instead.
     """
 
     module: str
@@ -44,6 +46,7 @@ class Experiment(NamedTuple):
     alone: str = ""
     has_table: bool = True
     options: Mapping[str, str] = {}
+    instead: Mapping[str, str] = {}
 
 
 EXPERIMENTS = {
@@ -78,6 +81,7 @@ EXPERIMENTS = {
         "look for the parameters that meet the targets of a job best; for a measured file: calibrate",
         "earlier studies of the folder",
         "{}; fit.KEY replaces a number of [fit]",
+        instead={"uncertain": "`cvt-hpc calibrate JOB --measured FILE` weighs its samples by measured noise"},
     ),
     "calibrate": Experiment(
         "cvt_hpc.experiments.calibrate",

@@ -42,6 +42,8 @@ _UNKNOWN_WORD = re.compile(
     r"(?P<place>.*invalid choice: '(?P<word>[^']*)')(?P<rest> \(choose from (?P<known>.*)\))$"
 )
 
+_UNKNOWN_OPTION = re.compile(r"unrecognized arguments: --(?P<option>[\w-]+)")
+
 
 def main(arguments: list[str] | None = None) -> int:
     """Run a command line.
@@ -168,6 +170,9 @@ class _Parser(argparse.ArgumentParser):
         if match := _UNKNOWN_WORD.match(message):
             word, known = match["word"], re.findall(r"[\w-]+", match["known"])
             message = f"{match['place']}{did_you_mean(word, known) or match['rest']}"
+        elif match := _UNKNOWN_OPTION.match(message):
+            taking = [name for name, one in EXPERIMENTS.items() if match["option"] in one.options]
+            message += "".join(f"; `cvt-hpc {name} JOB` takes --{match['option']}" for name in taking)
         raise InputError(f"{message}; see `{self.prog} --help`")
 
 

@@ -1,10 +1,12 @@
 """Experiments, such as `chart` and `fit`: many runs, with tables and pictures of their own."""
 
 import argparse
-from functools import partial
 from importlib import import_module
+from pathlib import Path
+from typing import Any
 
 from cvt_hpc.cli import parts
+from cvt_hpc.errors import mismatch
 from cvt_hpc.experiment_kinds import EXPERIMENTS
 
 
@@ -25,7 +27,11 @@ def _do(arguments: argparse.Namespace) -> int:
     name, experiment = arguments.experiment, EXPERIMENTS[arguments.experiment]
     module = import_module(experiment.module)
     options = {option: getattr(arguments, option) for option in experiment.options}
-    load = partial(module.load, arguments.path, arguments.set, **options)
+
+    def load() -> Any:
+        _refuse_jobs_of_others(name, arguments.path)
+        return module.load(arguments.path, arguments.set, **options)
+
     if experiment.alone:
         parts.refuse_ranks(name, experiment.alone)
         asked = load()
@@ -36,3 +42,14 @@ def _do(arguments: argparse.Namespace) -> int:
     if parts.speaks():
         parts.say(*outcome.lines, *(f"{what}: {path}" for what, path in outcome.files))
     return end_process(outcome.status)
+
+
+def _refuse_jobs_of_others(name: str, path: Path) -> None:
+    """Raise InputError for a job that has a table of another command alone."""
+    from cvt_hpc.job.document import read_document
+
+    instead = EXPERIMENTS[name].instead
+    tables = read_document(path).keys() if instead else {}
+    if name not in tables:
+        for table in instead.keys() & tables:
+            raise mismatch(f"{path}: [{table}]", f"a table [{name}]", f"[{table}] alone", instead[table])

@@ -68,6 +68,7 @@ FEWEST = 8.0  # effective samples, below which the posterior is not told
 BAND = np.array([0.025, 0.5, 0.975])  # quantiles
 ALIKE = 0.5  # rank correlation from which on two parameters are not told apart
 TOLD = 0.9  # of the band before: a parameter whose band is hardly narrower keeps its distribution
+HALF = 0.5  # of the band before: below, the file tells the parameter
 LEAST_SHARE = 0.05  # of a parameter in a combination that is told
 _LEAST_WEIGHT = 1e-4  # of a sample that has its own combination of the others
 LEAST_BIT = 0.01  # that a further measurement has to tell
@@ -382,9 +383,11 @@ def _lines(asked: Calibration, found: Posterior) -> Iterator[str]:
     for i, j in zip(*np.triu_indices(len(names), 1), strict=True):
         if abs(correlation[i, j]) >= ALIKE:
             yield f"not told apart: {names[i]} and {names[j]}, rank correlation {correlation[i, j]:.2f}"
-    narrowest = min(np.ptp(after) / np.ptp(before) for before, after in found.bands())
-    if (together := told_best(asked, found)).width() < TOLD * narrowest:
+    widths = [float(np.ptp(after) / np.ptp(before)) for before, after in found.bands()]
+    if (together := told_best(asked, found)).width() < TOLD * min(widths):
         yield from _combination_lines(together, names)
+        names, widths = [*names, "that together"], [*widths, together.width()]
+    yield from _told_lines(dict(zip(names, widths, strict=True)))
     bits = information(asked, found).where(~_measured_cells(found)[1], -np.inf).fillna(-np.inf)
     at = {name: int(k) for name, k in bits.argmax(...).items()}
     if (most := float(bits.isel(at))) < LEAST_BIT:
@@ -407,6 +410,15 @@ def _combination_lines(told: Combination, names: list[str]) -> Iterator[str]:
     numbers = f"before {begin} to {end}, after {low} to {high}, width {told.width():.2f}"
     yield f"told best together: {' '.join(words).removeprefix('+ ')}: {numbers}"
     yield "together: each in standard deviations from its median, as they were before"
+
+
+def _told_lines(widths: dict[str, float]) -> Iterator[str]:
+    """Yield lines that state what the file tells and what not, by widths of bands over those before."""
+    told, in_part = ([name for name, width in widths.items() if width < most] for most in (HALF, TOLD))
+    yield f"told, a band below half of that before: {', '.join(told) or 'nothing'}"
+    yield f"told in part: {', '.join(name for name in in_part if name not in told) or 'nothing'}"
+    left = [name for name in widths if name not in in_part]
+    yield f"not told, a band hardly narrower: {', '.join(left) or 'nothing'}"
 
 
 def _disagreements(found: Posterior) -> Iterator[str]:

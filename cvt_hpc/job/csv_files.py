@@ -57,6 +57,8 @@ class FileValues(NamedTuple):
     values: Point  # raw values by key
     units: Mapping[str, str]  # in which it has them, by column
     told: Mapping[str, str]  # by key in words what it has, where `values` have averages of that
+    columns: Mapping[str, Column]  # of a course, whose rows are to be checked
+    named: Callable[[int], str]  # file and row, for the error
 
 
 def read_csv(file: FromFile, name: str, source: str, where: str) -> FileValues:
@@ -186,7 +188,8 @@ def arranged(
         multiples = raw[f"{key}_profile"]
         if (most := max(multiples, key=abs)) not in (0.0, 1.0):
             raw |= {key: raw[key] * most, f"{key}_profile": [value / most for value in multiples]}
-    return FileValues(raw, units, averaged)
+    rows = columns if TIME in raw else {}
+    return FileValues(raw, units, averaged, rows, lambda row: f"{place}: {named(row)}")
 
 
 def _expected_in(error: RowError, columns: Mapping[str, Column], units: Mapping[str, str]) -> str:

@@ -10,6 +10,7 @@ from cvt_hpc.experiment_kinds import with_table
 from cvt_hpc.job import assignments
 from cvt_hpc.job.assignments import Assignments, plain
 from cvt_hpc.job.axes import SAMPLE, Axes, read_axis
+from cvt_hpc.job.course_files import check_gaps, check_range
 from cvt_hpc.job.crosscheck import check_grid, check_rules
 from cvt_hpc.job.csv_files import BARE, FileValues, read_csv
 from cvt_hpc.job.definition import HEADER, Job, answering_model, handed_to
@@ -223,13 +224,19 @@ def _contents(given: Parameters, schema: Schema, source: str) -> dict[str, FileV
             continue
         where = f"{source}: [{schema.section_of[key]}] {key}"
         read = _READERS.get(Path(name).suffix.lower(), read_csv)
-        content = read(file, name, source, where) if name else FileValues({}, {}, {})
+        content = read(file, name, source, where) if name else FileValues({}, {}, {}, {}, str)
         values = {one: read_value(schema.parameters[one], raw, where) for one, raw in content.values.items()}
-        found[key] = content._replace(values=values)
+        found[key] = content._replace(values=values, columns={})
+        if rows := content.columns:
+            courses = (column.values for one, column in rows.items() if one != "time")
+            check_gaps(rows["time"].values, courses, content.units["time"], content.named)
         for one, value in values.items():
-            unit = content.units.get(one, "")
-            unit = schema.parameters[one].unit if unit in BARE else unit
-            check_usual(schema.parameters[one], value, unit, f"{where}: {name}: {one}")
+            parameter, unit = schema.parameters[one], content.units.get(one, "")
+            unit = parameter.unit if unit in BARE else unit
+            if one in rows:
+                check_range(one, parameter, rows[one], unit, content.named)
+            elif not rows:
+                check_usual(parameter, value, unit, f"{where}: {name}: {one}")
     return found
 
 
@@ -238,7 +245,8 @@ def _with_files(
 ) -> Point:
     """Return given values, with the contents of files instead of their names; no axis may give the same."""
     found = {key: value for key, value in given.items() if key not in contents}
-    for key, (content, _, _) in contents.items():
+    for key, file_values in contents.items():
+        content = file_values.values
         where = f"{source}: [{schema.section_of[key]}] {key}"
         for one in content:
             if one in found:

@@ -11,11 +11,13 @@ import sys
 import traceback
 import warnings
 from collections.abc import Iterator, Sequence
+from functools import partial
 from pathlib import Path
 
 import numpy as np
 
 from cvt_hpc.errors import JobWarning, few_of, mismatch, show
+from cvt_hpc.job.course_files import check_gaps
 from cvt_hpc.job.csv_files import (
     BARE,
     MOST_BYTES,
@@ -151,11 +153,13 @@ def _over_one_time(found: Sequence[tuple[str, np.ndarray, np.ndarray, str]], pla
     """Time, and signals over it: the times of the signal with most samples, where all have values."""
     if not found:
         return
-    for name, times, _, _ in found:
+    for name, times, values, _ in found:
         try:
             check_times(times)
         except RowError as error:
-            raise mismatch(f"{place}: {name}, entry {error.row + 1}", error.expected, error.found) from None
+            raise mismatch(_entry(f"{place}: {name}", error.row), error.expected, error.found) from None
+        if _is_course(values):
+            check_gaps(times, (values,), "s", partial(_entry, f"{place}: {name}"))
     first, last = max(times[0] for _, times, _, _ in found), min(times[-1] for _, times, _, _ in found)
     finest = max((times for _, times, _, _ in found), key=len)
     shared = finest[(finest >= first) & (finest <= last)]
@@ -164,5 +168,12 @@ def _over_one_time(found: Sequence[tuple[str, np.ndarray, np.ndarray, str]], pla
         raise mismatch(place, "signals that were measured at the same time", spans)
     yield "time", shared, "s"
     for name, times, values, unit in found:
-        is_numbers = values.dtype.kind in "fiu" and values.ndim == 1
-        yield name, np.interp(shared, times, values) if is_numbers else values, unit
+        yield name, np.interp(shared, times, values) if _is_course(values) else values, unit
+
+
+def _entry(place: str, row: int) -> str:
+    return f"{place}, entry {row + 1}"
+
+
+def _is_course(values: np.ndarray) -> bool:
+    return values.dtype.kind in "fiu" and values.ndim == 1

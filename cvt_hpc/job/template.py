@@ -233,7 +233,7 @@ def _in_customary(value: float, unit: str) -> str:
     """Return a number [unit] as engineers give it, rounded for people; "" where that is the SI unit."""
     wanted = next((other for least, other in CUSTOMARY.get(unit, ()) if least <= abs(value)), "")
     if not wanted:
-        return angle_in_words(value, unit)
+        return angle_in_words(value, unit) or ("0 rpm" if unit == "rad/s" else "")
     return in_words(value, unit, wanted)
 
 

@@ -115,6 +115,9 @@ def test_a_template_has_the_units_of_engineers():
         '# speed_start = "104.71975511965977 rad/s"  # 1000 rpm',  # the default has another last digit
     ):
         assert line in lines
+    lines = job_template("first", "belt_drive", "init").splitlines()
+    assert '# speed_ripple = "0 rpm"' in lines
+    assert '# driving_speed = "62.8 rad/s"  # 599.696 rpm' in lines  # no round number of turns
 
 
 def test_init_writes_a_job_that_check_takes_and_overwrites_nothing(call, tmp_path, monkeypatch):

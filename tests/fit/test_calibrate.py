@@ -375,6 +375,35 @@ def test_what_is_written_correlates_what_the_file_does_not_tell_apart_and_nothin
     assert 'parameters = ["transverse_damping", "friction_memory"]' in text
 
 
+def test_what_the_file_tells_and_what_not_is_stated(study, tmp_path):
+    """Window and frequency tell a parameter each; the window of a sum tells neither alone, but both together."""
+
+    def stated(study, text, **changes):
+        asked = asked_by(study, tmp_path, text, **changes)
+        told = [line.partition(": ")[::2] for line in _lines(asked, weigh(asked, study[1]))]
+        heads = [head for head, _ in told if "told" in head and "together" not in head]
+        assert heads[-3:] == [
+            "told, a band below half of that before",
+            "told in part",
+            "not told, a band hardly narrower",
+        ]
+        return [dict(told)[head].split(", ") for head in heads[-3:]]
+
+    told, in_part, left = stated(study, f"{WINDOW},{FREQUENCIES}\n85,181,20,200,550,550\n", scatter=8.0)
+    assert told[:2] == ["stribeck_velocity", "friction_memory"] and in_part + left in (
+        ["transverse_damping", "nothing"],
+        ["nothing", "transverse_damping"],
+    )
+    told, in_part, left = stated(study, f"{WINDOW}\n85,181,20,200\n")
+    assert told[0] == "stribeck_velocity" and in_part == ["nothing"]
+    assert left == ["transverse_damping", "friction_memory"]
+    changed = of_scores(
+        study, lambda one, other: 110.0 + 20.0 * (one + other), lambda one, other: 500.0 + one
+    )
+    told, in_part, left = stated(changed, f"{WINDOW}\n105,201,20,200\n")
+    assert told == ["that together"] and {"stribeck_velocity", "friction_memory"} <= {*in_part, *left}
+
+
 def test_too_few_samples_that_agree_are_no_result(study, tmp_path):
     _, dataset = study
     rig = f"{WINDOW},{FREQUENCIES}\n95,185,20,200,900,900\n"
@@ -433,6 +462,7 @@ def test_both_sets_of_samples_for_sobol_indices_are_candidates(study, tmp_path):
             {"measured": "rig.csv"},
             "expected samples of uncertain parameters",
         ),
+        (JOB + "[fit]\n", {"measured": "rig.csv"}, "found one for `cvt-hpc fit`"),
         (JOB, {"measured": "none.csv"}, "none.csv"),
         (JOB, {"measured": "rig.csv", "doubt": "0.7"}, "--doubt"),
         (

@@ -306,3 +306,16 @@ def test_what_is_wrong_is_said_in_a_line(window, tmp_path, capsys, old, new, mes
     (line,) = capsys.readouterr().err.splitlines()
     assert line.startswith("cvt-hpc: x.toml: ") and message in line, line
     assert not (tmp_path / "out").exists() and not window
+
+
+def test_a_job_or_an_option_of_calibrate_is_told_so(window, tmp_path, capsys, monkeypatch):
+    monkeypatch.chdir(tmp_path)
+    (tmp_path / "x.toml").write_text(JOB[: JOB.index("[fit]")] + "[uncertain]\nsamples = 8\n")
+    assert main(["fit", "x.toml"]) == main(["fit", "x.toml", "--measured", "rig.csv"]) == 2
+    of_job, of_option = capsys.readouterr().err.splitlines()
+    told = "`cvt-hpc calibrate JOB --measured FILE` weighs its samples by measured noise"
+    assert of_job == f"cvt-hpc: x.toml: [uncertain]: expected a table [fit], found [uncertain] alone; {told}"
+    assert "--measured rig.csv; `cvt-hpc calibrate JOB` takes --measured" in of_option
+    (tmp_path / "x.toml").write_text(JOB + "[uncertain]\nsamples = 8\n")
+    assert main(["fit", "x.toml"]) == 2
+    assert "[uncertain]: expected none: a fit draws its candidates itself" in capsys.readouterr().err

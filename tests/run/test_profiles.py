@@ -179,7 +179,8 @@ def test_a_long_file_is_averaged_over_equal_parts(tmp_path):
         (
             (1.0, 2.9e6),
             "rpm",
-            "driving_speed: expected at most 763944 rpm, 100 times the usual, found 2900000 rpm",
+            "entry 2: expected driving_speed within the range of the model, 9.549297 to 7639.437 rpm, "
+            "found 2900000 rpm",
         ),
     ],
 )
@@ -195,10 +196,21 @@ def test_errors_of_netcdf_have_the_units_of_the_file(tmp_path, speeds, unit, exp
 
 
 def test_what_no_rig_measures_is_told(tmp_path):
-    table = "time [s],load [N m]\n0,10\n0.1,3000\n"
-    told = "rig.csv: load: 3000 N m is far from the usual 0.5 to 2000 N m; check the unit of the column"
-    with pytest.warns(UnitWarning, match=told):
+    table = "time [s],load [N m],speed [rpm]\n0,0.1,2900\n0.1,0.4,5\n0.2,0,2900\n"
+    with pytest.warns(UnitWarning) as found:
         course_job(tmp_path, table)
+    texts = [str(one.message).partition("rig.csv: ")[2] for one in found if one.category is UnitWarning]
+    assert texts == [
+        "line 3: load 0.4 N m is below the usual 0.5 to 2000 N m; check the unit of the column",
+        "line 3: driving_speed 5 rpm is below the usual 9.549297 to 7639.437 rpm; check the unit of the column",
+    ]
+
+
+def test_a_course_may_pass_through_no_load_and_rest(tmp_path, recwarn):
+    table = "time [s],load [N m]\n0,-60\n0.1,0\n0.2,60\n2,60\n2.1,2000\n"
+    found = course_job(tmp_path, table, run={"duration": "3 s"}).parameters
+    assert found["load"] == 2000.0 and found["profile_time"][3] == 2.0
+    assert not [one for one in recwarn if issubclass(one.category, UnitWarning)]
 
 
 SAMPLED = "\n".join(["time [s],load [N m]", *(f"{k / 100 + (k > 25)},{80 + k % 3}" for k in range(40))])
@@ -216,10 +228,17 @@ SAMPLED = "\n".join(["time [s],load [N m]", *(f"{k / 100 + (k > 25)},{80 + k % 3
         ("time [s],thrust [kN]\n0,50\n0.1,-1\n", "line 3: expected a thrust above 0, found -1 kN"),
         ("time [s],speed [rpm]\n0,2900\n0.1,-2950\n", "a driving_speed above 0, found -2950 rpm"),
         (
-            "time [s],load [N m]\n0,1\n1,1e9\n",
-            "profile_file: rig.csv: load: expected at most 200000 N m, .*, found 1000000000 N m",
+            "time [s],load [kN m]\n0,1\n1,-2.001\n2,9\n",
+            "rig.csv: line 3: expected load within the range of the model, 0.0005 to 2 kN m in size, found -2.001 kN m",
         ),
-        ("time [s],speed [rpm]\n0,1\n1,2900000\n", r"at most 763944 rpm, .*, found 2900000 rpm"),
+        (
+            "time [s],thrust [N]\n0,3e6\n1,5e4\n",
+            r"rig.csv: line 2: expected thrust within .*, 500 to 2000000 N, found 3000000 N",
+        ),
+        (
+            "time [ms],load [N m]\n0,1\n100,2\n200,3\n701,4\n800,4\n",
+            "line 5: expected no step over 500 ms .5 median ones. where a value changes, found a gap from 200 ms to 701 ms",
+        ),
         ("time [s],load [rpm]\n0,1\n1,2\n", "line 1: expected load .N m., found"),
         ("time [s],grip [N]\n0,1\n1,2\n", "expected columns among time"),
         ("time [s],load [N m]\n0,1\n1,\n", "line 3"),
@@ -412,6 +431,16 @@ def test_signals_that_do_not_go_together_are_one_error(tmp_path, of_speed, expec
     signals = {"Torque": TORQUE, "Speed": SPEED_TURNS, "Time": ([], "s")}
     with pytest.raises(InputError, match=expected):
         mdf_point(tmp_path, signals, {"Torque": REGULAR_TIMES, "Speed": of_speed})
+
+
+def test_a_gap_in_one_signal_is_not_filled_from_the_times_of_another(tmp_path):
+    fine = np.arange(50) / 100.0
+    signals = {"Torque": (60.0 + fine, "N m"), "Speed": ([2900, 2900, 2900, 3000], "rpm"), "Time": ([], "s")}
+    times = {"Torque": fine, "Speed": [0.0, 0.04, 0.08, 0.4]}
+    with pytest.raises(
+        InputError, match="Speed, entry 4: expected no step over 0.2 s .* gap from 0.08 s to 0.4"
+    ):
+        mdf_point(tmp_path, signals, times)
 
 
 def test_a_formula_of_a_measured_file_is_not_evaluated(tmp_path):
