@@ -46,6 +46,7 @@ from numba.core.registry import CPUDispatcher, cpu_target
 from numba.core.sigutils import normalize_signature
 from numba.core.target_extension import CPU, dispatcher_registry, jit_registry
 from numba.core.targetconfig import ConfigStack
+from numba.core.typed_passes import NopythonRewrites
 from numba.core.typing import signature
 
 from cvt_hpc.kernels import store
@@ -265,6 +266,13 @@ class _Compiler(Compiler):
 
     def __init__(self, typing_context: Any, _: Any, *others: Any) -> None:
         super().__init__(typing_context, _context(), *others)
+
+    def define_pipelines(self) -> list[Any]:
+        """Return the compiler's passes, but for that which merges expressions of arrays where there are none."""
+        (found,) = super().define_pipelines()
+        if not self.state.flags.nrt:
+            found.passes[:] = [p for p in found.passes if p[0] is not NopythonRewrites]
+        return [found]
 
 
 dispatcher_registry[_Target] = CPUDispatcher
