@@ -66,11 +66,7 @@ def test_tension_of_a_frictionless_belt(name, tell):
     assert driven == pytest.approx(squeeze * DEFAULTS["thrust"], rel=2e-4)
     assert driving == pytest.approx(squeeze * run.thrusts[0], rel=2e-4)
     axial = squeeze * DEFAULTS["thrust"], squeeze * run.thrusts[0]
-    tell(
-        "integral of T - P - m v^2 over the wraps against 2 tan(d0) times the axial forces [N]",
-        (driven, driving),
-        axial,
-    )
+    tell("integral of T - P - m v^2 over a wrap by its axial force [N]", (driven, driving), axial)
     # nothing changes the rings' tension
     assert np.ptp(run.tension) < 2e-4 * run.tension.mean()
 

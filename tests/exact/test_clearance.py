@@ -109,10 +109,7 @@ def test_gaps_are_closed_under_the_law(clearance, form, tell):
             assert np.array_equal(found[:, lane], alone)
             gap = opening(wrap, gaps[:, lane], alone, plain[lane])
             # 0.03 N/m over c_e: the sheaves' part of 1e7 N/m, to a condition of 1e5 eps
-            tell(
-                "overlap beyond the law, or gap where a contact presses, of a wrap with clearance [m]",
-                (min(gap.min(), 0.0), *gap[alone > 0.0]),
-            )
+            tell("gap or overlap of a wrap against the law [m]", (min(gap.min(), 0.0), *gap[alone > 0.0]))
             assert gap.min() > -1e-12
             assert np.abs(gap[alone > 0.0]).max(initial=0.0) < 1e-12
             bearing += np.linalg.norm(tilting(wrap, alone)) > 1.0

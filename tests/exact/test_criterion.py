@@ -70,11 +70,7 @@ def test_friction_excites_from_the_critical_gradient_on(factor, verdict, tell):
     assert record["sliding_gradient"] == pytest.approx(-0.025 * factor)
     assert (record["status"], record["vibrates"]) == (Status.DONE, verdict)
     tell("critical gradient of eq. 19 [s/m]", record["critical_gradient"], -0.025)
-    tell(
-        "vibrates (1) or not (0) at 1 % beyond or short of eq. 19",
-        record["vibrates"] == Vibrates.YES,
-        factor > 1.0,
-    )
+    tell("vibrates (1) or not (0) 1 % beside eq. 19", record["vibrates"] == Vibrates.YES, factor > 1.0)
     assert record["growth_rate"] == pytest.approx((factor - 1.0) * 500.0 / (2.0 * 1.3), rel=1e-6)
     # the share by which fed and taken differ: 1 % of 1.99 or 2.01
     assert record["energy_balance"] == pytest.approx((factor - 1.0) / 2.0, abs=3e-5)
@@ -120,11 +116,7 @@ def test_energy_of_a_cycle_is_that_of_all_forces(tell):
     energy = quad(power, 0.0, period, epsabs=1e-12)[0]
     # the friction under c_ele x changes with the rate: terms in x x' and x x'^2, which have no mean
     closed = -(2.0 * np.pi**2 / period) * x_hat**2 * (500.0 - 2.0 * p["contact_force"] * 0.02)
-    tell(
-        "work of a cycle by all forces, and as computed, against eqs 13 to 17 [J]",
-        (energy, energy_per_cycle(f, np.array([x_hat]))[0]),
-        closed,
-    )
+    tell("work of a cycle by eqs 13 to 17 [J]", (energy, energy_per_cycle(f, np.array([x_hat]))[0]), closed)
     assert energy == pytest.approx(closed, rel=1e-9)
     assert energy_per_cycle(f, np.array([x_hat]))[0] == pytest.approx(closed, rel=1e-9)
 

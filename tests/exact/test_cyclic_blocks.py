@@ -70,9 +70,7 @@ def test_as_dense_elimination_with_and_without_border(n, b, tell):
     assert solve_bordered(blocks, columns, rows, corner, block_size(b))
     found = np.vstack([columns.data[:n, :, BORDER:].reshape(n * b, SIDES), corner.data[0, :, BORDER:]])
     scale = np.linalg.cond(whole) * abs(found).max()
-    tell(
-        "solution of a cyclic system with a border by dense elimination", found, np.linalg.solve(whole, sides)
-    )
+    tell("solution of a cyclic system by dense elimination", found, np.linalg.solve(whole, sides))
     np.testing.assert_allclose(found, np.linalg.solve(whole, sides), rtol=0, atol=1e-14 * scale)
 
 

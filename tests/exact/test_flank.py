@@ -41,9 +41,7 @@ def test_forces_are_those_of_a_sliding_body_in_a_groove(tell, mu, width, angle, 
     unit = normal - effective * velocity / speed  # normal force 1 and its friction
     one_flank = unit * (-AXIAL / unit[2])  # scaled to the axial force that presses the belt together
     radial, tangential = forces(mu, width, angle, v_radial, v_tangential)
-    tell(
-        "force of sliding flanks against a body in a groove [N/m]", (radial, tangential), 2.0 * one_flank[:2]
-    )
+    tell("force of sliding flanks by a body in a groove [N/m]", (radial, tangential), 2.0 * one_flank[:2])
     # a few roundings of forces below 1e6 N/m
     assert radial == pytest.approx(2.0 * one_flank[0], abs=1e-8)
     assert tangential == pytest.approx(2.0 * one_flank[1], abs=1e-8)

@@ -38,11 +38,7 @@ def test_path_closes_in_the_plane(tell, ratio, driven_radius):
         point = centre + (point - centre) * np.exp(-1j * wrap)
         heading -= wrap
         point += path.strand_length * np.exp(1j * heading)
-    tell(
-        "end of a path around both pulleys against its start [m]",
-        (point.real, point.imag),
-        (start.real, start.imag),
-    )
+    tell("end of a path around both pulleys [m]", (point.real, point.imag), (start.real, start.imag))
     assert point == pytest.approx(start, abs=1e-15)
     assert path.driving_wrap + path.driven_wrap == pytest.approx(2.0 * np.pi, rel=1e-15)
 

@@ -53,11 +53,7 @@ def test_stored_values(tell):
         "energies": energies(BEAM, Q, U),
     }
     for name, text in stored.items():
-        tell(
-            "coordinates, mass, forces and energies of a beam, by another program",
-            found[name],
-            np.array(text.split(), float),
-        )
+        tell("mass, forces and energies by another program", found[name], np.array(text.split(), float))
         digits = 5e-8 if name == "force" else 1e-12  # forces were stored with those of differences
         np.testing.assert_allclose(found[name], np.array(text.split(), float), rtol=digits, atol=1e-12)
 
@@ -278,9 +274,5 @@ def test_frequencies_of_a_free_ring(elements, ratios, energy, tell):
     squares = eigh(tangent_stiffness(forces, q), mass, eigvals_only=True)
     assert abs(squares[:3]).max() < 1e-2  # rigid motions; others are some 5000
     thin_ring = np.array([72.232, 204.302, 391.73])
-    tell(
-        "frequencies of a free ring of beams over those of a thin ring",
-        np.sqrt(squares[[3, 5, 7]]) / thin_ring,
-        1.0,
-    )
+    tell("frequencies of a ring of beams over a thin ring's", np.sqrt(squares[[3, 5, 7]]) / thin_ring, 1.0)
     np.testing.assert_allclose(np.sqrt(squares[[3, 5, 7]]) / thin_ring, ratios, atol=5e-4)

@@ -83,11 +83,7 @@ def test_no_constraint_drifts(tell):
     found, _ = marched(constants, fields, 2000, STEP)
     x, o = found[:, spatial_fields.HEADING :][:, :3], found[:, spatial_fields.OUTWARD :][:, :3]
     axes = np.stack([x, o], 1)
-    tell(
-        "products of the axes of elements after 2000 steps",
-        axes @ axes.transpose(0, 2, 1),
-        np.tile(np.eye(2), (NODES, 1, 1)),
-    )
+    tell("products of elements' axes", axes @ axes.transpose(0, 2, 1), np.tile(np.eye(2), (NODES, 1, 1)))
     assert axes @ axes.transpose(0, 2, 1) == pytest.approx(np.tile(np.eye(2), (NODES, 1, 1)), abs=1e-14)
     # rings lie on their saddles: of all their material none is lost along the line through the elements
     content = fields[:, spatial_fields.LENGTH].sum()
@@ -105,11 +101,7 @@ def test_a_ring_at_rest_falls_freely(tell):
     found, kinetic = of_lanes(state.elements), 0.5 * (9.81 * time) ** 2
     kinetic *= NODES * (constants.mass + constants.ring_mass)
     assert fields[:, 1] - found[:, 1] == pytest.approx(0.5 * 9.81 * time * (time + STEP), rel=1e-9)
-    tell(
-        "fall of a spatial belt under gravity [m]",
-        fields[:, 1] - found[:, 1],
-        0.5 * 9.81 * time * (time + STEP),
-    )
+    tell("fall of a spatial belt [m]", fields[:, 1] - found[:, 1], 0.5 * 9.81 * time * (time + STEP))
     assert np.abs(found[:, spatial_fields.TENSION]).max() < 1e-5
     assert state.totals[pushbelt_fields.GRAVITY_WORK] == pytest.approx(kinetic, rel=1e-9)
 

@@ -90,11 +90,7 @@ def test_rates_of_all_gaps_and_strains(tell):
     difference[:, fields.START_TENSION] *= -lengths / belt.ring_stiffness
     for field, expected in directions(step, f, x).items():
         scale = np.abs(expected).max()
-        tell(
-            "rates of gaps, slips and strains by projections of the velocities",
-            difference[:, field],
-            expected,
-        )
+        tell("rates of gaps, slips and strains by projections", difference[:, field], expected)
         assert difference[:, field] == pytest.approx(expected, abs=2e-7 * scale), field
     driven = f[:, 0] > 0.5 * belt.centre_distance
     axis = np.where(driven[:, None], belt.axes[1], belt.axes[0])

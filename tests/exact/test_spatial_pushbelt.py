@@ -180,11 +180,7 @@ def test_both_sheaves_of_a_pulley_have_one_angular_velocity(tell):
     pressed = driving & (np.abs(f[:, 1]) < 0.02) & (f[:, 0] < 0.0)
     assert left_low[pressed] == pytest.approx(-low[pressed], rel=1e-3)
     assert (left_high - left_low)[pressed] == pytest.approx(-2.0 * belt.flank_reach, rel=1e-3)
-    tell(
-        "change of sliding by a pulley's speed, of its right sheave against its left [m]",
-        (right_low, right_high),
-        (left_low, left_high),
-    )
+    tell("sliding at the right sheave by the left one [m]", (right_low, right_high), (left_low, left_high))
     assert right_low == pytest.approx(left_low, rel=1e-12)
     assert right_high == pytest.approx(left_high, rel=1e-12)
     assert not (slips[1] - slips[0])[~driving].any()

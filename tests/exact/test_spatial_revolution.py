@@ -138,10 +138,7 @@ def test_contacts_press_by_their_gaps_at_every_output(name, tell):
     # the largest error of an output, which what is not pressed but closed has too; 0.4 % found
     for part in (FRONTS, FLANKS):
         largest = deformed[..., part].max(axis=(1, 2))
-        tell(
-            "deformation of fronts and flanks less their overlap over the largest",
-            error[..., part].max(axis=(1, 2)) / largest,
-        )
+        tell("overlap less deformation over the largest", error[..., part].max(axis=(1, 2)) / largest)
         assert (error[..., part].max(axis=(1, 2)) < 0.01 * largest).all(), part
     # Within a step a pin may run along its hole by so much that the direction of its force turns by 0.04: the gap
     # is another by its cosine's part of the clearance, 40 nm, and presses by one and a half times of that: 3 % of the

@@ -92,11 +92,7 @@ def test_rings_are_held_by_the_saddle_and_by_the_pillar(side, tell):
     outward = -side * back / (belt.mass + belt.ring_mass)
     assert -f[5, spatial_fields.SPEED + 1] / 1e-6 == pytest.approx(outward, rel=1e-6)
     assert f[5, spatial_fields.SADDLE] == pytest.approx(belt.mass * abs(outward), rel=1e-6)
-    tell(
-        "normal force of the rings on saddle or pillar [N]",
-        f[5, spatial_fields.SADDLE],
-        belt.mass * abs(outward),
-    )
+    tell("normal force of rings at an element [N]", f[5, spatial_fields.SADDLE], belt.mass * abs(outward))
     # which friction of the next step has
     assert advance(belt, newton, state, work, np.zeros((2, spatial_fields.INPUTS)), 1, 1e-6) == 0
     g = of_lanes(state.elements)

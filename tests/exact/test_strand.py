@@ -146,9 +146,7 @@ def test_frequencies_go_with_the_root_of_tension_less_push(tension, push, net):
 
 def test_separated_elements_do_not_pull(tell):
     apart, alone = pinned_frequencies(32, 0.0, push=-3000.0), pinned_frequencies(32, 0.0)
-    tell(
-        "frequency of a strand whose elements are apart against that of its rings alone [rad/s]", apart, alone
-    )
+    tell("frequency of a strand of separate elements by that of its rings [rad/s]", apart, alone)
     assert apart == pytest.approx(alone, rel=1e-11)
 
 

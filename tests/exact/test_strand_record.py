@@ -114,11 +114,7 @@ def test_matrices_are_those_of_the_energies(tell):
         slope = integral(lambda x, j=j: (n[j] * np.cos(n[j] * x)) ** 2)
         bend = integral(lambda x, j=j: (n[j] ** 2 * np.sin(n[j] * x)) ** 2)
         potential = (900.0 - 1.2 * 20.0**2) * slope + 0.5 * bend
-        tell(
-            "square of a strand's frequency by quadrature of its energies [1/s^2]",
-            stiffness[j],
-            potential / (1.2 * L / 2.0),
-        )
+        tell("stiffness of a strand by quadrature [1/s^2]", stiffness[j], potential / (1.2 * L / 2.0))
         assert stiffness[j] == pytest.approx(potential / (1.2 * L / 2.0), rel=1e-9)
     tell("gyroscopic matrix of a strand by quadrature [1/s]", gyroscopic, expected)
     assert gyroscopic == pytest.approx(expected, abs=1e-8)

@@ -52,11 +52,7 @@ def test_forces_are_those_of_the_pushbelt(tell):
             found = judge(run)
             assert run.numerical_doubt(found) is None
             assert found["tilt_loss"] > 100.0 > abs(found["power_residual"]) * found["loss"]
-    tell(
-        "tension less push and axial forces of a ring of beams, by those of the pushbelt",
-        forces[0] / forces[1],
-        1.0,
-    )
+    tell("forces of the pushbelt of beams over those of the pushbelt", forces[0] / forces[1], 1.0)
     # beams of 27 degrees and a polygon of 56 sides
     np.testing.assert_allclose(*forces, rtol=0.01)
 

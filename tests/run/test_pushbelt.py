@@ -213,15 +213,9 @@ def test_profiles_shift_the_ratio_and_change_load_speed_and_thrust(tell):
     assert record["axial_force"][1] == pytest.approx(0.8 * 20e3, rel=0.01)
     tell("load in the middle of its course [N m]", half, 45.0)
     tell("driving speed at the end of its course [rad/s]", run.channel("driving_speed")[-1], 90.0 * np.pi)
-    tell(
-        "ratio of speeds after a shift",
-        run.channel("driving_speed")[-1] / run.channel("driven_speed")[-1],
-        ratio,
-    )
+    tell("ratio after a shift", run.channel("driving_speed")[-1] / run.channel("driven_speed")[-1], ratio)
     tell("driving radius after a shift [m]", run._state.pulleys[f.DRIVING_RADIUS], radius)
-    tell(
-        "driven axial force at the end of the course of its thrust [N]", record["axial_force"][1], 0.8 * 20e3
-    )
+    tell("driven axial force as its course ends [N]", record["axial_force"][1], 0.8 * 20e3)
     # Bullinger et al. 2005, eq. 2, at the radius of the start
     carried = 2.0 * 0.09 * record["axial_force"].min() * 0.063896 / 1.35 / np.cos(np.deg2rad(11.0))
     assert record["slip_margin"] == pytest.approx(30.0 / carried - 1.0, rel=1e-3)

@@ -65,13 +65,8 @@ def test_the_split_is_by_the_frequency_that_is_asked_for(tell):
     assert split_basis(belt, grid, "held_splines", LIMIT, SPACING).fastest > 2.0 * np.pi * 2.0 * LIMIT
     across = modes.dynamic.T @ held @ modes.lagging
     tell("fastest of what moves over the limit frequency", modes.fastest / (2.0 * np.pi) / LIMIT)
-    tell(
-        "slowest coarse spline in a groove over the limit frequency",
-        own[~strand & (splines.levels == 0)].min() / LIMIT,
-    )
-    tell(
-        "stiffness that couples what moves to what follows at once", np.abs(across).max() / np.abs(held).max()
-    )
+    tell("slowest spline of a groove over the limit", own[~strand & (splines.levels == 0)].min() / LIMIT)
+    tell("stiffness between what moves and what follows", np.abs(across).max() / np.abs(held).max())
     assert np.abs(across).max() < 1e-9 * np.abs(held).max()
 
 
@@ -140,11 +135,7 @@ def test_the_steady_flow_keeps_content_and_has_one_flux(tell):
     fields = steps(model, moved, 50)
     assert fields[f.N_ELEMENT : f.N_ELEMENT + 2] @ cell == pytest.approx(before, rel=1e-13)
     flux = fields[f.V_ELEMENT : f.V_RING + 1] / (1.0 + np.roll(moved.eps, 1, axis=1))
-    tell(
-        "content of a belt with a steady flow after 50 steps [m]",
-        fields[f.N_ELEMENT : f.N_ELEMENT + 2] @ cell,
-        before,
-    )
+    tell("content of a belt with a steady flow [m]", fields[f.N_ELEMENT : f.N_ELEMENT + 2] @ cell, before)
     tell("spread of a steady flow along the belt over its mean", np.ptp(flux, axis=1) / flux.mean(axis=1))
     assert np.ptp(flux, axis=1) == pytest.approx([0.0, 0.0], abs=1e-9)
     assert np.ptp(fields[f.V_ELEMENT]) > 1e-4
