@@ -34,15 +34,16 @@ they state: first all of each paper, then each figure whose statements are kept 
 - Schindler et al. 2008, "Pushbelt CVTs - a non-smooth challenge": the pushbelt in space; it prints no result
 
 Made by `python jobs/paper_coverage.py docs/coverage.md` from `docs/coverage.toml` and from the tables in
-`jobs/results`. A row is measured where columns of these tables, or statements of a figure, decide at least
-a part of it, and tested where none do and a test of the suite, which it names, holds what it states. It is
-reproduced where all parts hold, partly where some do, not where the model gives something else, and missing
-where it has no counterpart or the text no number; where the statement itself is one of the latter three,
-numbers beside it do not change that. Numbers are "older" where their table is older than the
-code, by its first lines. "Figure `NAME`" is `cvt-hpc run JOB && cvt-hpc figure out/NAME`, where JOB is
+`jobs/results`. A row is measured where columns of these tables, or statements of a figure, decide at
+least a part of it; `paper_tests` has what the tests that rows name measure, and an error there is
+relative to the largest value of reference. All rows are measured but some that are missing. A row is
+reproduced where all parts hold, partly where some do, not where the model gives something else, and
+missing where it has no counterpart or the text no number; where the statement itself is one of the latter
+three, numbers beside it do not change that. Numbers are "older" where their table is older than the code,
+by its first lines. "Figure `NAME`" is `cvt-hpc run JOB && cvt-hpc figure out/NAME`, where JOB is
 `jobs/figures/NAME.toml` or `jobs/NAME.toml`; it leaves `figure.png` and `statements.csv`. The papers'
-pictures have no data here: "reproduced" means every number and shape that the text states. What they do not
-give is assumed, as each job says. All figures of Lebrecht et al. are of one set, that of
+pictures have no data here: "reproduced" means every number and shape that the text states. What they do
+not give is assumed, as each job says. All figures of Lebrecht et al. are of one set, that of
 `jobs/lebrecht_2004.toml`, seven values of which were fitted to what they state.
 """
 REPRODUCED, PARTLY, NOT, MISSING = WORSE = "reproduced", "partly", "not", "missing"
@@ -71,6 +72,16 @@ def stored(name):
     return table.rename(columns=lambda column: column.partition(" [")[0])
 
 
+def of_tests(part):
+    """A part with a `quantity` of `paper_tests`, as `measured` takes it; its error is at most `error`."""
+    quantity = part["quantity"]
+    rows = {"table": "paper_tests", "rows": f"quantity == {quantity!r}", "value": "value", "tell": quantity}
+    if "error" in part:
+        tell = f"{quantity.partition(' [')[0]}, relative error"
+        rows |= {"value": "error", "most": part["error"], "tell": tell}
+    return rows | part
+
+
 def measured(part):
     """Whether a part of a row holds by a stored table, and the numbers that tell it.
 
@@ -79,13 +90,14 @@ def measured(part):
     part : dict
         `table`; `value`, an expression of its columns; `rows`, those for which it is told, by default all;
         `beside`, the rows by whose value it is divided; what has to hold of it, `least`, `most` or `course`,
-        which "rises" or "falls"; `tell`, the words before the numbers.
+        which "rises" or "falls"; `tell`, the words before the numbers. Or a `quantity` and its bounds.
 
     Raises
     ------
     ValueError
         If there are no such rows, or one of them has no number.
     """
+    part = of_tests(part) if "quantity" in part else part
     table = stored(part["table"])
 
     def found(rows):
@@ -140,18 +152,15 @@ def settled(row):
     return "; ".join(numbers), verdict, "; ".join(dict.fromkeys(filter(None, why)))
 
 
-def evidence(row):
-    """What decides a row: tables, a test, or who reads it."""
-    if "measured" in row or "measures" in row:
-        return "measured"
-    return "tested" if "`pytest tests/" in row["command"] else "read"
+def is_measured(row):
+    """Whether a stored table decides at least a part of a row."""
+    return "measured" in row or "measures" in row
 
 
-def counted(name, verdicts, decided):
-    """A line of the table of counts."""
+def counted(name, verdicts, of_tables):
+    """A line of the table of counts, `of_tables` by stored tables."""
     numbers = [verdicts.count(verdict) for verdict in (REPRODUCED, PARTLY, NOT, MISSING)]
-    numbers += [decided.count(way) for way in ("measured", "tested", "read")]
-    return f"| {' | '.join(map(str, [name, len(verdicts), *numbers]))} |"
+    return f"| {' | '.join(map(str, [name, len(verdicts), *numbers, of_tables]))} |"
 
 
 def lines():
@@ -159,26 +168,23 @@ def lines():
     with (HERE.parent / "docs" / "coverage.toml").open("rb") as source:
         rows = tomllib.load(source)["row"]
     yield HEAD
-    parts, verdicts, decided = {}, {}, {}
+    parts, verdicts = {}, {}
     for row in rows:
         letter = row["id"][0]
         gives, verdict, why = settled(row)
         verdicts.setdefault(letter, []).append(verdict)
-        decided.setdefault(letter, []).append(evidence(row))
         reason = f"{verdict}: {why}" if why else verdict
         cells = row["id"], row["at"], row["states"], row["command"], gives, reason
         parts.setdefault(letter, []).append(f"| {' | '.join(cells)} |")
     figures = {path.stem: statements(path.stem) for path in sorted(FIGURES.glob("*.csv"))}
-    yield (
-        "| paper | rows | reproduced | partly | not | missing | measured | tested | neither |\n"
-        + "|---" * 9
-        + "|"
-    )
+    yield "| paper | rows | reproduced | partly | not | missing | measured |\n" + "|---" * 7 + "|"
     for letter, paper in PAPERS.items():
-        yield counted(paper, verdicts[letter], decided[letter])
-    yield counted("all", sum(verdicts.values(), []), sum(decided.values(), []))
+        yield counted(
+            paper, verdicts[letter], sum(is_measured(row) for row in rows if row["id"][0] == letter)
+        )
+    yield counted("all", sum(verdicts.values(), []), sum(map(is_measured, rows)))
     each = [entry["verdict"] for entries in figures.values() for entry in entries]
-    yield counted(f"statements of {len(figures)} figures", each, ["measured"] * len(each)) + "\n"
+    yield counted(f"statements of {len(figures)} figures", each, len(each)) + "\n"
     for letter, paper in PAPERS.items():
         yield f"## {paper}\n"
         yield "| | where | states | shown by | gives | verdict |\n|---|---|---|---|---|---|"

@@ -199,8 +199,8 @@ def needs(path):
 
 
 def of_words(words, folder):
-    """Return the modules of models and steppers among words, and the jobs and data of a folder."""
-    names = [word for word in words if re.fullmatch(r"[\w./-]+[.](toml|nc|csv)", word)]
+    """Return the modules of models and steppers among words, and the jobs, scripts and data of a folder."""
+    names = [word for word in words if re.fullmatch(r"[\w./-]+[.](toml|nc|csv|py)", word)]
     found = {folder / name for name in names if (folder / name).is_file()}
     of_models = words & MODELS.keys()
     words = words | {getattr(load_model(model), "DEFAULT_STEPPER", None) for model in of_models}

@@ -5,6 +5,7 @@ import os
 import sys
 from types import ModuleType
 
+import numpy as np
 import pytest
 from hypothesis import HealthCheck, settings
 from threadpoolctl import threadpool_limits
@@ -22,7 +23,11 @@ gc.set_threshold(7000, 10, 10)
 
 # No test depends on the clock: a busy machine, or the first loading of pint, takes longer than an example may.
 settings.register_profile(
-    "untimed", parent=settings(), deadline=None, suppress_health_check=[HealthCheck.too_slow]
+    "untimed",
+    parent=settings(),
+    deadline=None,
+    # one `tell` serves all examples of a test
+    suppress_health_check=[HealthCheck.too_slow, HealthCheck.function_scoped_fixture],
 )
 settings.load_profile("untimed")
 
@@ -104,6 +109,18 @@ def pytest_sessionfinish():
     """Search for garbage once: pytest would search all that is left five times."""
     gc.collect()
     gc.freeze()
+
+
+@pytest.fixture
+def tell(record_property):
+    """Return a function that keeps what a test measures, for the table that `jobs/paper_tests.py` writes."""
+
+    def tell(quantity, found, reference=np.nan):
+        record_property(
+            quantity, tuple(np.asarray(part, float).ravel().tolist() for part in (found, reference))
+        )
+
+    return tell
 
 
 @pytest.fixture

@@ -1,9 +1,12 @@
 """docs/coverage.toml: what it names is there, and how its rows and tables make the page."""
 
+import ast
 import re
 import runpy
 import tomllib
+from types import SimpleNamespace
 
+import numpy as np
 import pytest
 
 from cvt_hpc.cli import _parser
@@ -17,6 +20,7 @@ from support.pages import ROOT, shell_calls
 JOBS = ROOT / "jobs"
 PAGE = runpy.run_path(str(JOBS / "paper_coverage.py"))
 MEASURED, SETTLED = PAGE["measured"], PAGE["settled"]
+OF_TESTS = runpy.run_path(str(JOBS / "paper_tests.py"))
 ROWS = tomllib.loads((ROOT / "docs" / "coverage.toml").read_text())["row"]
 IDS = [
     f"{letter}{k}"
@@ -95,9 +99,8 @@ def test_what_is_not_there_is_seen(name):
 
 @pytest.mark.parametrize("row", ROWS, ids=IDS)
 def test_a_row_has_a_verdict_and_a_reason_where_it_is_not_reproduced(row):
-    assert row.keys() >= {"states", "at", "command"} and not {"measured", "measures", "verdict"}.isdisjoint(
-        row
-    )
+    assert row.keys() >= {"states", "at", "command"}
+    assert PAGE["is_measured"](row) or row["verdict"] == "missing"
     gives, verdict, why = SETTLED(row)
     assert gives and (verdict == "reproduced") == (not why)
     assert "|" not in "".join(map(str, SETTLED(row)))
@@ -110,6 +113,7 @@ def table(tmp_path, monkeypatch):
     )
     monkeypatch.setitem(MEASURED.__globals__, "RESULTS", tmp_path)
     MEASURED.__globals__["stored"].cache_clear()
+    (tmp_path / "paper_tests.csv").write_text("quantity,value,error\nsag [m],3,0.01\nsag [m],2,0.02\n")
     yield {"table": "kept", "tell": "push [N]"}
     MEASURED.__globals__["stored"].cache_clear()
 
@@ -127,6 +131,58 @@ def table(tmp_path, monkeypatch):
 )
 def test_a_part_of_a_row_is_measured_in_a_table(table, part, holds, told):
     assert MEASURED(table | part) == (holds, f"push [N]: {told} (older)")
+
+
+@pytest.mark.usefixtures("table")
+def test_a_part_of_a_row_is_measured_by_tests():
+    for error, holds in ((0.02, True), (0.019, False)):
+        told = MEASURED({"quantity": "sag [m]", "error": error})
+        assert told == (holds, "sag, relative error: 0.01, 0.02")
+    assert MEASURED({"quantity": "sag [m]", "least": 2, "most": 2.9}) == (False, "sag [m]: 3, 2")
+
+
+def test_all_that_tests_tell_is_kept_and_measures_rows_that_name_them():
+    table = PAGE["stored"]("paper_tests")
+    telling = {
+        f"{path.relative_to(ROOT)}::{node.name}"
+        for path in (ROOT / "tests").rglob("test_*.py")
+        if "tell" in (text := path.read_text())
+        for node in ast.parse(text).body
+        if isinstance(node, ast.FunctionDef)
+        and node.name.startswith("test_")
+        and "tell" in [arg.arg for arg in node.args.args]
+    }
+    assert {*table["test"]} == telling
+    parts = [(row["command"], part) for row in ROWS for part in row.get("measures", []) if "quantity" in part]
+    assert {*table["quantity"]} == {part["quantity"] for _, part in parts}
+    for command, part in parts:
+        for test in table["test"][table["quantity"] == part["quantity"]]:
+            assert {f"`pytest {test}`", f"`pytest {test.partition('::')[0]}`"} & {
+                *re.findall("`[^`]+`", command)
+            }
+
+
+def test_the_worst_that_a_test_tells_is_kept_if_none_fails(tmp_path, monkeypatch):
+    told = [
+        ("sag [m]", ([1.0, 2.0], [1.0, 4.0])),
+        ("sag [m]", ([3.0], [4.0])),
+        ("share", ([-1.0, 0.5], [np.nan])),
+    ]
+    report = SimpleNamespace(when="call", nodeid="a.py::test_a[case]", user_properties=told)
+    status = 1
+
+    def main(_, plugins):
+        plugins[0].pytest_runtest_logreport(report)
+        return status
+
+    monkeypatch.setattr(pytest, "main", main)
+    file = tmp_path / "table.csv"
+    assert OF_TESTS["main"](file, "a.py") == 1 and not file.exists()
+    status = 0
+    assert OF_TESTS["main"](file, "a.py") == 0
+    head, *rows = [line for line in file.read_text().splitlines() if line[0] != "#"]
+    assert head == "test,case,quantity,value,reference,error"
+    assert rows == ["a.py::test_a,case,sag [m],2,4,0.5", "a.py::test_a,case,share,-1,nan,nan"]
 
 
 def test_a_part_without_numbers_is_an_error(table):

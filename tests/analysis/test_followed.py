@@ -39,7 +39,7 @@ def test_an_element_goes_round_at_the_belts_speed():
 
 
 @pytest.mark.parametrize("rate", [20e3, 40e3])
-def test_a_speed_that_depends_on_place_and_time(rate):
+def test_a_speed_that_depends_on_place_and_time(rate, tell):
     """ds/dt = (a + b s) (1 + c t) has a closed form; Heun's method has the second order."""
     a, b, c = 8.0, 3.0, 5.0
     time = np.arange(round(0.05 * rate)) / rate
@@ -47,6 +47,7 @@ def test_a_speed_that_depends_on_place_and_time(rate):
     found = path_of(time, PLACES, speed, 0.0)
     exact = (a / b) * np.expm1(b * (time + 0.5 * c * time**2))
     inside = exact < PLACES[-2]
+    tell("place of an element along its path [m]", found[inside], exact[inside])
     assert np.abs(found - exact)[inside].max() < 4e-7 * (20e3 / rate) ** 2
 
 

@@ -85,6 +85,9 @@ def test_a_table_rests_on_job_data_and_all_modules_that_compute_it(program):
     assert ROOT / "cvt_hpc/experiments/chart/measuring.py" in program.rests_on(of_steppers.made_by)
     (of_script,) = program.tables(["terms"])
     assert ROOT / "jobs/terms.toml" in program.rests_on(of_script.made_by)
+    (of_tests,) = program.tables(["paper_tests"])
+    needed = "tests/support/settled.py", "jobs/sheave_flexibility.py", "cvt_hpc/physics/flank.py"
+    assert {ROOT / file for file in needed} <= program.rests_on(of_tests.made_by)
 
 
 @pytest.mark.parametrize(

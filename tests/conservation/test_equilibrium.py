@@ -50,7 +50,7 @@ def test_thrust_is_carried(name):
 
 
 @pytest.mark.parametrize("name", ["at rest", "moving"])
-def test_tension_of_a_frictionless_belt(name):
+def test_tension_of_a_frictionless_belt(name, tell):
     # Radial balance of an arc: 2 tan(d0) sum f_ax = integral of (F - m v^2) dphi over the wrap that the
     # deformed belt really has, the reference's wrap and the strands' slopes. F is uniform but for P, some 50
     # N, from the climb of the elements.
@@ -65,6 +65,8 @@ def test_tension_of_a_frictionless_belt(name):
     # m v^2 is 2e-2.
     assert driven == pytest.approx(squeeze * DEFAULTS["thrust"], rel=2e-4)
     assert driving == pytest.approx(squeeze * run.thrusts[0], rel=2e-4)
+    axial = squeeze * DEFAULTS["thrust"], squeeze * run.thrusts[0]
+    tell("integral of T - P - m v^2 over a wrap by its axial force [N]", (driven, driving), axial)
     # nothing changes the rings' tension
     assert np.ptp(run.tension) < 2e-4 * run.tension.mean()
 
@@ -96,7 +98,7 @@ def capstan(run, radius, wrap, taut, slack):
     return np.log((taut - relief) / (slack - relief)) / (DEFAULTS["ring_friction"] * wrap)
 
 
-def test_no_load_underdrive():
+def test_no_load_underdrive(tell):
     # Bullinger et al. 2005, sec. 2: the rings slip back on the small driving pulley, T_t2 > T_t1, and only
     # push in t2 can undo that moment.
     run = settled("underdrive")
@@ -107,6 +109,7 @@ def test_no_load_underdrive():
     # Euler and Eytelwein, slip over the whole wrap at 17 times the regularisation speed; the mesh's part is
     # (mu h / r)^2 / 12
     ratio = capstan(run, run.belt.driving_radius, run.grid.path.driving_wrap, tension2, tension1)
+    tell("ln of the ratio of ring tensions of both strands over friction times wrap", ratio, 1.0)
     assert ratio == pytest.approx(1.0, abs=2e-3)
 
 
@@ -120,8 +123,10 @@ def test_no_load_overdrive():
     assert ratio == pytest.approx(1.0, abs=2e-3)
 
 
-def test_load_moves_the_push_into_the_driving_strand():
+def test_load_moves_the_push_into_the_driving_strand(tell):
     (_, _, push1, *_), (_, _, push2, *_) = strands(settled("loaded"))
     assert push1 > 1000.0 and push2 < 1.0
-    (_, _, push1, *_), (_, _, push2, *_) = strands(settled("braking"))
-    assert push2 > 1000.0 and push1 < 1.0
+    (_, _, back1, *_), (_, _, back2, *_) = strands(settled("braking"))
+    assert back2 > 1000.0 and back1 < 1.0
+    tell("push in the strand that pushes, driving or braking, the smaller of both [N]", min(push1, back2))
+    tell("push in the strand that does not push, driving or braking [N]", (push2, back1))

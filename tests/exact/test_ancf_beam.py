@@ -29,13 +29,14 @@ def moving(make, seed=0):
 
 @pytest.mark.parametrize("make", [straight, ring])
 @pytest.mark.parametrize("alpha", [0.0, 3.0])
-def test_forces_and_energies_are_those_of_the_definition(make, alpha):
+def test_forces_and_energies_are_those_of_the_definition(make, alpha, tell):
     q, u = moving(make)
     body = BEAM._replace(mass_damping=alpha)
     expected = -gradient(lambda q: potential(body, q), q) - 0.5 * gradient(lambda u: lost(body, q, u), u)
     _, found = equations(body, q, u)
     # a stage of 1e-12 s takes strain and mass as at an instant; the integral over directions is not exact
     accuracy = 1e-4 if alpha else 1e-10
+    tell("forces of beams in absolute nodal coordinates by their energies [N]", found, expected)
     np.testing.assert_allclose(found, expected, rtol=0, atol=accuracy * abs(expected).max())
     assert equations(body, q, u, power=True) == pytest.approx(lost(body, q, u), rel=10.0 * accuracy)
     store = potential(BEAM, q)
@@ -59,22 +60,25 @@ def test_the_matrix_is_that_of_the_forces(make):
         )
 
 
-def test_the_damping_matrix_of_a_motion_across():
+def test_the_damping_matrix_of_a_motion_across(tell):
     """alpha alone: its forces are linear in the speeds."""
     only = beam(LENGTHS, 0.9, 0.0, 0.0, mass_damping=3.0)
     q, u = moving(straight)
     with_damping, without = (equations(b, q, u, tau=1.0)[0] for b in (only, only._replace(mass_damping=0.0)))
     _, force = equations(only, q, u)
-    np.testing.assert_allclose(-(with_damping - without) @ u.ravel(), force, rtol=0, atol=1e-12)
+    across = -(with_damping - without) @ u.ravel()
+    tell("forces of Rayleigh damping across a belt [N]", across, force)
+    np.testing.assert_allclose(across, force, rtol=0, atol=1e-12)
 
 
-def test_rigid_motions_store_and_lose_nothing():
+def test_rigid_motions_store_and_lose_nothing(tell):
     q, u = moving(straight)
     free = BEAM._replace(gravity=(0.0, 0.0), mass_damping=0.0)
     c, s = np.cos(1.1), np.sin(1.1)
     turn = np.kron(np.eye(2), [[c, -s], [s, c]])
     _, force = equations(free, q, u)
     _, turned = equations(free, q @ turn.T + [3.0, -2.0, 0.0, 0.0], u @ turn.T)
+    tell("forces of beams after a rigid motion [N]", turned, (force.reshape(-1, 4) @ turn.T).ravel())
     np.testing.assert_allclose(turned, (force.reshape(-1, 4) @ turn.T).ravel(), rtol=0, atol=1e-9)
     spin = np.stack([-q[:, 1], q[:, 0], -q[:, 3], q[:, 2]], 1)
     spun, still = (equations(free, q, speed)[1] for speed in (2.0 * spin + [1.0, 5.0, 0.0, 0.0], 0.0 * q))
@@ -103,7 +107,7 @@ def test_axial_force():
 @pytest.mark.parametrize(
     ("axial", "bending", "stretch"), [(1e6, 26.0, 1.0), (1e5, 0.026, 1.002), (1e3, 3.0, 1.3)]
 )
-def test_frequencies_of_a_pinned_beam_and_string(axial, bending, stretch):
+def test_frequencies_of_a_pinned_beam_and_string(axial, bending, stretch, tell):
     """m w^2 = N k^2 + EI k^4 in the length without load, N = EA e: exact for a beam stretched evenly."""
     lengths = random_lengths(0.45, 18, 0.12, 1)
     q = straight(lengths, stretch)
@@ -115,6 +119,7 @@ def test_frequencies_of_a_pinned_beam_and_string(axial, bending, stretch):
     exact = (0.5 * axial * (stretch**2 - 1.0) * k**2 + bending * k**4) / 0.1
     # from above, as Rayleigh's quotient: by (k l0)^4 / 720 for bending, of elements up to 12 % longer
     ratio = squares / exact
+    tell("squares of the frequencies of pinned beams and strings", ratio, 1.0)
     assert (ratio > 1.0 - 1e-9).all() and (ratio < 1.0 + 2.0 * (k * 0.028) ** 4 / 720 + 1e-9).all()
 
 

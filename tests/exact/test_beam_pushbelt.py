@@ -125,17 +125,19 @@ def thrown(dt, **values):
 
 
 @pytest.mark.parametrize("values", [{}, {"ring_friction": 0.2, "angle_damping": 1e-3}])
-def test_free_flight(values):
+def test_free_flight(values, tell):
     # a step of first order errs by its size; momentum is that of some N s, of which single elements have 0.15
     before, coarse, losses = thrown(4e-6, **values)
     _, fine, _ = thrown(2e-6, **values)
+    tell("error of energy with half the step over that with the step", abs(fine[3] / coarse[3]))
+    tell("change of momenta in a free flight", abs(coarse[:3]).max())
     assert (losses > 0.1) == bool(values)
     assert abs(coarse[:3]).max() < 1e-4
     assert abs(coarse[3]) < 1e-4 * before[3]
     assert abs(fine[3]) < 0.6 * abs(coarse[3])
 
 
-def test_friction_against_lemke():
+def test_friction_against_lemke(tell):
     # eight elements, three of which stick; the constrained equations with the contacts' forces as unknowns
     belt, state, work = spinning(ring_friction=0.3)
     ring, dt, mu = state.ring, 1e-5, 0.3
@@ -186,6 +188,7 @@ def test_friction_against_lemke():
     assert 2 <= np.sum(abs(g + coupling @ impulses) < 1e-9) <= 6
 
     march(belt, state, work, 1, dt, tolerance=1e-9)
+    tell("impulses of friction by Lemke's algorithm [N s]", state.elements[:, f.RING_IMPULSE], impulses)
     # within the tolerance of the laws, 1e-9 m/s of 10 g
     np.testing.assert_allclose(state.elements[:, f.RING_IMPULSE], impulses, rtol=0, atol=1e-10)
     np.testing.assert_allclose(

@@ -83,7 +83,7 @@ def forces(made, q, u, speeds):
 
 @pytest.mark.parametrize(("run_out", "height"), UNEVEN)
 @pytest.mark.parametrize("treatment", [Treatment.REGULARISED, Treatment.BRISTLE])
-def test_slopes_of_contacts_are_those_of_their_forces(treatment, run_out, height):
+def test_slopes_of_contacts_are_those_of_their_forces(treatment, run_out, height, tell):
     """By central differences of a stage, in which positions follow speeds; friction does not fall with force."""
     made, (q, u, speeds) = drive(treatment, run_out, height), moving()
     found = at(made, q, u, speeds)
@@ -104,6 +104,7 @@ def test_slopes_of_contacts_are_those_of_their_forces(treatment, run_out, height
             step = step.reshape(6, 4)
             sides.append(forces(made, q + TAU * step, u + step, turned))
         slope = (sides[0] - sides[1]) / (2.0 * h)
+        tell("slopes of forces by the contacts' kinematics [N s/m]", slope, matrix[:, k])
         # rounding of forces of some 10 N leaves 1e-8 N s/m, in proportion to 1 / h
         np.testing.assert_allclose(slope, matrix[:, k], rtol=0, atol=3e-7 * abs(matrix[:, k]).max())
 

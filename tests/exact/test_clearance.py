@@ -96,7 +96,7 @@ def test_one_way_of_tilting_is_a_spring_behind_a_gap():
 
 @pytest.mark.parametrize("clearance", CLEARANCES)
 @pytest.mark.parametrize("form", [lambda wrap: wrap, tabulated], ids=["kernel", "table"])
-def test_gaps_are_closed_under_the_law(clearance, form):
+def test_gaps_are_closed_under_the_law(clearance, form, tell):
     random = np.random.default_rng(3)
     wraps = [form(with_clearance(random, clearance)) for _ in range(LANES)]
     contact, plain = lane_contact(wraps, np.float64), [plain_contact(wrap) for wrap in wraps]
@@ -109,6 +109,7 @@ def test_gaps_are_closed_under_the_law(clearance, form):
             assert np.array_equal(found[:, lane], alone)
             gap = opening(wrap, gaps[:, lane], alone, plain[lane])
             # 0.03 N/m over c_e: the sheaves' part of 1e7 N/m, to a condition of 1e5 eps
+            tell("gap or overlap of a wrap against the law [m]", (min(gap.min(), 0.0), *gap[alone > 0.0]))
             assert gap.min() > -1e-12
             assert np.abs(gap[alone > 0.0]).max(initial=0.0) < 1e-12
             bearing += np.linalg.norm(tilting(wrap, alone)) > 1.0

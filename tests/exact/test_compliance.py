@@ -84,7 +84,7 @@ def test_parameters_reach_the_kernel(length):
 
 @given(contacts())
 @settings(max_examples=150)
-def test_forces_against_lemke(case):
+def test_forces_against_lemke(tell, case):
     sheave, gap, closed = case
     dense = flexibility(sheave)
     force, solves, state = contact(sheave, gap, closed)
@@ -92,6 +92,7 @@ def test_forces_against_lemke(case):
     # Gaps times c_e are forces of up to 1e7 N/m. The solver lets stations be 1e-6 N/m wrong, the dense matrix
     # has a condition below 1e5: 1e7 times 1e5 eps is 1e-4.
     expected = solve_lcp(ELEMENTS * dense, ELEMENTS * gap)
+    tell("contact force of a wrap by Lemke's algorithm [N/m]", force, expected)
     assert force == pytest.approx(expected, abs=1e-3)
     opening = gap + dense @ force
     # 0.01 N/m over c_e

@@ -63,12 +63,14 @@ def sliding(base=None, **changes):
 
 
 @pytest.mark.parametrize(("factor", "verdict"), [(1.01, Vibrates.YES), (0.99, Vibrates.NO)])
-def test_friction_excites_from_the_critical_gradient_on(factor, verdict):
+def test_friction_excites_from_the_critical_gradient_on(factor, verdict, tell):
     # eq. 19: mu' < -d / (2 f) = -0.025 s/m
     record = found(friction_gradient=-0.025 * factor, undecided_margin=0.002)
     assert record["critical_gradient"] == pytest.approx(-0.025)
     assert record["sliding_gradient"] == pytest.approx(-0.025 * factor)
     assert (record["status"], record["vibrates"]) == (Status.DONE, verdict)
+    tell("critical gradient of eq. 19 [s/m]", record["critical_gradient"], -0.025)
+    tell("vibrates (1) or not (0) 1 % beside eq. 19", record["vibrates"] == Vibrates.YES, factor > 1.0)
     assert record["growth_rate"] == pytest.approx((factor - 1.0) * 500.0 / (2.0 * 1.3), rel=1e-6)
     # the share by which fed and taken differ: 1 % of 1.99 or 2.01
     assert record["energy_balance"] == pytest.approx((factor - 1.0) / 2.0, abs=3e-5)
@@ -95,7 +97,7 @@ def test_frequency_and_damping_are_those_of_the_radial_forces():
     assert record["damping_ratio"] == pytest.approx(100.0 / (2 * np.sqrt(1.3 * f.stiffness)))
 
 
-def test_energy_of_a_cycle_is_that_of_all_forces():
+def test_energy_of_a_cycle_is_that_of_all_forces(tell):
     # eq. 17 with the forces of eqs 13-14, preload and all: its terms in v_0 cancel, those in c_ele do no work
     f = sliding()
     p = rung_job("criterion", **PAPER).parameters
@@ -114,6 +116,7 @@ def test_energy_of_a_cycle_is_that_of_all_forces():
     energy = quad(power, 0.0, period, epsabs=1e-12)[0]
     # the friction under c_ele x changes with the rate: terms in x x' and x x'^2, which have no mean
     closed = -(2.0 * np.pi**2 / period) * x_hat**2 * (500.0 - 2.0 * p["contact_force"] * 0.02)
+    tell("work of a cycle by eqs 13 to 17 [J]", (energy, energy_per_cycle(f, np.array([x_hat]))[0]), closed)
     assert energy == pytest.approx(closed, rel=1e-9)
     assert energy_per_cycle(f, np.array([x_hat]))[0] == pytest.approx(closed, rel=1e-9)
 

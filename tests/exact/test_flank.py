@@ -23,7 +23,7 @@ def forces(mu, width, angle, v_radial, v_tangential):
 
 
 @given(coefficients, widths, angles, speeds, speeds)
-def test_forces_are_those_of_a_sliding_body_in_a_groove(mu, width, angle, v_radial, v_tangential):
+def test_forces_are_those_of_a_sliding_body_in_a_groove(tell, mu, width, angle, v_radial, v_tangential):
     # One flank in (radial outward, tangential, axial away from the belt's middle). The groove opens outwards:
     # the flank's meridian is (cos, 0, sin), its normal, from the sheave to the belt, (sin, 0, -cos).
     meridian = np.array([np.cos(angle), 0.0, np.sin(angle)])
@@ -41,6 +41,7 @@ def test_forces_are_those_of_a_sliding_body_in_a_groove(mu, width, angle, v_radi
     unit = normal - effective * velocity / speed  # normal force 1 and its friction
     one_flank = unit * (-AXIAL / unit[2])  # scaled to the axial force that presses the belt together
     radial, tangential = forces(mu, width, angle, v_radial, v_tangential)
+    tell("force of sliding flanks by a body in a groove [N/m]", (radial, tangential), 2.0 * one_flank[:2])
     # a few roundings of forces below 1e6 N/m
     assert radial == pytest.approx(2.0 * one_flank[0], abs=1e-8)
     assert tangential == pytest.approx(2.0 * one_flank[1], abs=1e-8)

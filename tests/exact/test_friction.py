@@ -154,10 +154,11 @@ def bilinear(forces, speeds, mu, speed, force):
 
 
 @given(tables(), st.floats(0.0, 3.0), st.floats(0.0, 2e6))
-def test_table_is_bilinear_and_held_outside(table, speed, force):
+def test_table_is_bilinear_and_held_outside(tell, table, speed, force):
     law = friction_law("table", 0.08, 0.0, 0.05, *table)
     found, slope = friction_coefficient(law, speed, force)
     # positions in an interval carry the round-off of the grid's values, up to a hundred times the interval
+    tell("coefficient of a table by bilinear interpolation", found, bilinear(*table, speed, force))
     assert found == pytest.approx(bilinear(*table, speed, force), abs=1e-12)
     forces, speeds, mu = table
     if speed < speeds[0] or speed >= speeds[-1]:

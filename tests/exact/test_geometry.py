@@ -5,9 +5,11 @@ import pytest
 from hypothesis import given
 from hypothesis import strategies as st
 
+from cvt_hpc import load_job
 from cvt_hpc.job import build_job
 from cvt_hpc.models.elastic_belt.belt import belt_constants, mesh
 from cvt_hpc.physics.geometry import cut_path, driven_radius, variator
+from support.pages import ROOT
 
 # A public pushbelt set (github wangzhanrock/CVT_VelocityInit): centre distance, belt length at mid pack
 CENTRES = 0.155
@@ -20,7 +22,7 @@ radii = st.floats(
 
 
 @given(ratios, radii)
-def test_path_closes_in_the_plane(ratio, driven_radius):
+def test_path_closes_in_the_plane(tell, ratio, driven_radius):
     # Walk along the path: clockwise arcs about both shafts, strands straight on. What touches both circles,
     # comes back to the start and has turned once has the right wraps and strands.
     path = variator(ratio, driven_radius, 0.2)
@@ -36,8 +38,18 @@ def test_path_closes_in_the_plane(ratio, driven_radius):
         point = centre + (point - centre) * np.exp(-1j * wrap)
         heading -= wrap
         point += path.strand_length * np.exp(1j * heading)
+    tell("end of a path around both pulleys [m]", (point.real, point.imag), (start.real, start.imag))
     assert point == pytest.approx(start, abs=1e-15)
     assert path.driving_wrap + path.driven_wrap == pytest.approx(2.0 * np.pi, rel=1e-15)
+
+
+def test_the_working_point_is_that_of_the_paper(tell):
+    # Lebrecht et al. 2004, sec. 3.1
+    point = load_job(ROOT / "jobs" / "lebrecht_2004.toml").point(0)
+    found = point["ratio"], point["driving_speed"] * 30.0 / np.pi
+    tell("ratio and driving speed [rpm] of the working point", found, (2.52, 3000.0))
+    tell("thrust at the working point [N]", point["thrust"])
+    assert found == pytest.approx((2.52, 3000.0), rel=1e-9) and point["thrust"] >= 50e3
 
 
 @given(ratios, radii)

@@ -213,16 +213,17 @@ def test_the_linear_system_is_solved_to_rounding():
     assert np.all(abs(terms @ unknowns - right) <= 1e-14 * (abs(terms) @ abs(unknowns)))
 
 
-def test_a_belt_of_432_elements_has_1739_unknowns():
+def test_a_belt_of_432_elements_has_1739_unknowns(tell):
     # four of each element; the driven pulley's speed and five openings of either pulley's sheaves
     belt, _ = start(given(nodes=432, modal_stiffness=((6e8,) * 5,) * 2))
     work = workspace(belt, 432)
     right_sides = fields(work.blocks)[:, RIGHT:]
     assert right_sides.shape == (432, 4 * 12)  # the residual, and by each of the other eleven
+    tell("unknowns of a belt of 432 elements and its pulleys", 4 * len(right_sides) + len(work.border))
     assert 4 * len(right_sides) + len(work.border) == 1739
 
 
-def test_free_spinning_ring():
+def test_free_spinning_ring(tell):
     # T = m' v^2, of a polygon of masses m: T = m R omega^2 / (2 sin(pi / n))
     radius, omega = 0.1082, 250.0
     belt, state = start(given())
@@ -249,6 +250,7 @@ def test_free_spinning_ring():
         == pushbelt_fields.CONVERGED
     )
     f = fields(state.elements)
+    tell("tension of a ring that spins freely [N]", f[:, pushbelt_fields.TENSION], tension)
     # 1e-4: speeds are those half a step before, whose start is not on the discrete orbit
     assert f[:, pushbelt_fields.TENSION] == pytest.approx(tension, rel=1e-4)
     assert np.hypot(f[:, pushbelt_fields.Y] - 2.0, f[:, pushbelt_fields.Z]) == pytest.approx(radius, rel=1e-6)
@@ -262,7 +264,7 @@ def test_free_spinning_ring():
     ) == pytest.approx((belt.mass + belt.ring_mass) * NODES * radius**2 * omega, rel=1e-6)
 
 
-def test_a_belt_at_rest_falls_freely():
+def test_a_belt_at_rest_falls_freely(tell):
     # elements apart and rings without tension, by g t (t + dt) / 2 after t, with the speed g t
     belt, state = start(given(ring_strain=0.0, angle_stiffness=0.0, gravity=9.81))
     belt = belt._replace(thickness=1e-3, transverse_damping=0.0)
@@ -274,12 +276,13 @@ def test_a_belt_at_rest_falls_freely():
     assert advance(belt, b.NEWTON, state, workspace(belt, NODES), inputs, 300, STEP) == 0
     g, fallen, speed = fields(state.elements), 0.5 * 9.81 * time * (time + STEP), 9.81 * time
     assert f[:, pushbelt_fields.Z] - g[:, pushbelt_fields.Z] == pytest.approx(fallen, rel=1e-9)
+    tell("fall of elements under gravity [m]", f[:, pushbelt_fields.Z] - g[:, pushbelt_fields.Z], fallen)
     assert np.abs(g[:, pushbelt_fields.TENSION]).max() < 1e-5
     kinetic = 0.5 * NODES * (belt.mass + belt.ring_mass) * speed**2
     assert state.totals[pushbelt_fields.GRAVITY_WORK] == pytest.approx(kinetic, rel=1e-9)
 
 
-def test_a_strand_decays_by_the_transverse_damping():
+def test_a_strand_decays_by_the_transverse_damping(tell):
     # damping in proportion to mass: each mode decays by exp(-d_b t / (2 m')), its energy goes into BELT_LOSS
     speed, pitch = 0.1, 0.6612 / NODES  # [m/s], [m]
     belt, state = start(given(ratio=1.0, ring_strain=5e-4, angle_stiffness=5.0, angle_damping=5e-5))
@@ -315,13 +318,14 @@ def test_a_strand_decays_by_the_transverse_damping():
         lost.append(state.totals[pushbelt_fields.BELT_LOSS] - before)
     expected = 500.0 * pitch / (2.0 * mass)
     assert abs(rates[0]) < 0.02 * expected  # by friction of the elements at the arcs' ends
+    tell("rate at which a strand decays in the plane [1/s]", rates[1] - rates[0], expected)
     # 0.5 %: the step adds rate x step, 0.2 %
     assert rates[1] - rates[0] == pytest.approx(expected, rel=5e-3)
     # 3 %: that friction's share, and motion along the belt
     assert lost == [0.0, pytest.approx(0.5 * mass * speed**2 * (shape**2).sum(), rel=0.03)]
 
 
-def test_a_strand_at_rest_sags_under_its_weight():
+def test_a_strand_at_rest_sags_under_its_weight(tell):
     # between pulleys of one size m' g l^2 / (8 T) in the middle; elements apart, damped nearly critically
     heights, tensions, left_open, done = [], [], [], []
     for gravity in (100.0, -100.0, 0.0):
@@ -345,6 +349,7 @@ def test_a_strand_at_rest_sags_under_its_weight():
         left_open.append(stored(belt, state) - begun + lost - done[-1])
     down, up, _ = heights
     expected = (belt.mass + belt.ring_mass) / belt.pitch * 100.0 * 0.155**2 / (8.0 * np.mean(tensions[:2]))
+    tell("sag of both strands under their weight [m]", 0.5 * np.subtract(up, down), expected)
     # strands end between elements of 6.4 mm
     assert 0.5 * np.subtract(up, down) == pytest.approx([expected] * 2, rel=0.02)
     # weight's work is stored or lost; the start from rest leaves as much open as without weight
@@ -641,7 +646,7 @@ def test_contacts_hold_their_laws(run):
         assert belt.flank_stiffness * np.maximum(depth, 0.0) == near(f[:, pushbelt_fields.FLANK])
 
 
-def test_flanks_slide_by_what_their_points_migrate_on_the_sheave(run):
+def test_flanks_slide_by_what_their_points_migrate_on_the_sheave(run, tell):
     # Geier et al. 2007, sec. 2: a point fixed at the element migrates on the sheave, and the belt runs in a spiral
     belt, *_, samples, sheaves = run
     radii = []
@@ -655,8 +660,10 @@ def test_flanks_slide_by_what_their_points_migrate_on_the_sheave(run):
         speeds = pulleys[[pushbelt_fields.DRIVING_SPEED, pushbelt_fields.DRIVEN_SPEED]][driven]
         slips = f[:, [pushbelt_fields.FLANK_SLIP_M, pushbelt_fields.FLANK_SLIP_T]][pressed]
         found = np.stack([outwards / belt.cosine, radius * (turned - speeds)], 1)[pressed]
+        tell("sliding speed of flanks by how their points migrate [m/s]", slips, found)
         assert slips == pytest.approx(found, abs=5e-3 * np.abs(slips).max())
         radii.append(radius[pressed & (driven == 1)])
+    tell("change of the radius along the driven arc [m]", np.ptp(np.concatenate(radii)))
     assert np.ptp(np.concatenate(radii)) > 1e-5
 
 
@@ -781,16 +788,17 @@ def test_an_elastic_impact_keeps_its_energy_as_the_step_resolves_it():
 
 @pytest.mark.parametrize("rate", [3.0, 10.0, 50.0])
 @pytest.mark.parametrize("phase", [0.05, 0.35, 0.65, 0.95])
-def test_an_impact_within_a_step_is_plastic_but_for_a_tenth(rate, phase):
+def test_an_impact_within_a_step_is_plastic_but_for_a_tenth(rate, phase, tell):
     for decay in (0.0, 0.5, 2.0):
         returned, own, by_step = impact(rate, decay, phase)
+        tell("share of its energy that an impact returns", returned**2)
         assert 0.0 <= returned < np.sqrt(0.1)
         assert own >= 0.0 and by_step >= 0.0
         assert (own == 0.0) == (decay == 0.0)
         assert (by_step == 0.0) == (2.0 * decay / rate >= 0.75)
 
 
-def test_heads_touch_in_a_belt_bent_inside_out():
+def test_heads_touch_in_a_belt_bent_inside_out(tell):
     """A spinning ring with its heads inside: they carry what the ring's tension exceeds m' v^2 by."""
     radius, omega, push = 0.1082, 250.0, 500.0
     belt, state = start(given())
@@ -823,8 +831,11 @@ def test_heads_touch_in_a_belt_bent_inside_out():
         == pushbelt_fields.CONVERGED
     )
     f = fields(state.elements)
+    carried = f[:, pushbelt_fields.TENSION] - f[:, pushbelt_fields.HEAD]
+    tell("tension that heads leave to a ring bent inside out [N]", carried, centrifugal)
+    tell("least push of heads in a ring bent inside out [N]", f[:, pushbelt_fields.HEAD].min())
     # 1e-4 as of the ring without push; the push itself sets with the elements' tilt
-    assert f[:, pushbelt_fields.TENSION] - f[:, pushbelt_fields.HEAD] == pytest.approx(centrifugal, rel=1e-4)
+    assert carried == pytest.approx(centrifugal, rel=1e-4)
     assert (f[:, pushbelt_fields.HEAD] > 0.5 * push).all()
     assert (f[:, pushbelt_fields.EDGE] == 0.0).all()
 
@@ -1006,7 +1017,7 @@ def rate_and_turn(x):
     return np.log(square) / (2.0 * STEP), np.arccos(0.5 * both / np.sqrt(square))
 
 
-def test_free_vibration_of_tilt_keeps_its_energy():
+def test_free_vibration_of_tilt_keeps_its_energy(tell):
     """Elements rock on a ring at rest; the frequency errs by (w dt)^2 / 12."""
     belt, state = start(given(angle_damping=0.0, ring_damping=0.0))
     belt = belt._replace(mass=1e9, ring_mass=1e9, thickness=1e-3, ring_stiffness=1e-9, transverse_damping=0.0)
@@ -1023,6 +1034,7 @@ def test_free_vibration_of_tilt_keeps_its_energy():
         found.append(-fields(state.elements)[0, pushbelt_fields.HEADING_Y])
     turn = STEP * np.sqrt(belt.angle_stiffness * np.cos(2.0 * np.pi / NODES) / belt.inertia)
     growth, found_turn = rate_and_turn(np.array(found))
+    tell("turn of rocking elements in a step [rad]", found_turn, turn * (1.0 - turn**2 / 12.0))
     assert growth == pytest.approx(0.0, abs=0.1)  # -770 by the angle at the end of the step
     assert found_turn == pytest.approx(turn * (1.0 - turn**2 / 12.0), rel=1e-4)
 

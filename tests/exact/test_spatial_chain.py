@@ -77,20 +77,22 @@ def test_a_ring_that_moves_out_of_its_plane_keeps_its_energy_and_momentum():
     assert energy_now == pytest.approx(energy, rel=4e-6)
 
 
-def test_no_constraint_drifts():
+def test_no_constraint_drifts(tell):
     # Schindler et al. 2008, sec. 3, corrects drifts after each step; here none is left after 2000 of them
     constants, _, fields = ring(lateral=0.2)
     found, _ = marched(constants, fields, 2000, STEP)
     x, o = found[:, spatial_fields.HEADING :][:, :3], found[:, spatial_fields.OUTWARD :][:, :3]
     axes = np.stack([x, o], 1)
+    tell("products of elements' axes", axes @ axes.transpose(0, 2, 1), np.tile(np.eye(2), (NODES, 1, 1)))
     assert axes @ axes.transpose(0, 2, 1) == pytest.approx(np.tile(np.eye(2), (NODES, 1, 1)), abs=1e-14)
     # rings lie on their saddles: of all their material none is lost along the line through the elements
     content = fields[:, spatial_fields.LENGTH].sum()
+    tell("content of the rings after 2000 steps [m]", found[:, spatial_fields.LENGTH].sum(), content)
     assert found[:, spatial_fields.LENGTH].sum() == pytest.approx(content, rel=1e-14)
     assert np.abs(found[:, spatial_fields.LENGTH] - fields[:, spatial_fields.LENGTH]).max() > 1e-9
 
 
-def test_a_ring_at_rest_falls_freely():
+def test_a_ring_at_rest_falls_freely(tell):
     # by g t (t + dt) / 2 after t, with the speed g t
     constants, _, fields = chains.free_ring(NODES, RADIUS, 0.0)
     constants, state, time = constants._replace(gravity=9.81), chains.state(fields), 300 * STEP
@@ -99,11 +101,12 @@ def test_a_ring_at_rest_falls_freely():
     found, kinetic = of_lanes(state.elements), 0.5 * (9.81 * time) ** 2
     kinetic *= NODES * (constants.mass + constants.ring_mass)
     assert fields[:, 1] - found[:, 1] == pytest.approx(0.5 * 9.81 * time * (time + STEP), rel=1e-9)
+    tell("fall of a spatial belt [m]", fields[:, 1] - found[:, 1], 0.5 * 9.81 * time * (time + STEP))
     assert np.abs(found[:, spatial_fields.TENSION]).max() < 1e-5
     assert state.totals[pushbelt_fields.GRAVITY_WORK] == pytest.approx(kinetic, rel=1e-9)
 
 
-def test_free_elements_turn_as_rigid_bodies():
+def test_free_elements_turn_as_rigid_bodies(tell):
     # nothing acts on them, so that R J R' omega of each stays; speeds are half a step early, of first order
     nodes = 16
     constants = chains.belt(
@@ -135,6 +138,8 @@ def test_free_elements_turn_as_rigid_bodies():
         found = of_lanes(state.elements)
         assert np.abs(np.sum(found[:, 3:6] * found[:, 6:9], 1)).max() < 1e-15
         errors.append((np.linalg.norm(spin(found) - spin(fields), axis=1) / size).max())
+    tell("change of the angular momentum of free elements over it", errors[0])
+    tell("change of the angular momentum with half the step over that with the step", errors[1] / errors[0])
     assert errors[0] < 5e-3
     assert errors[1] < 0.6 * errors[0]
 
@@ -327,11 +332,13 @@ def test_frequency_of_a_pinned_strand(mode, golden):
     assert np.sqrt(squared) / (2.0 * np.pi) == pytest.approx(exact, rel=3e-4)
 
 
-def test_a_strand_decays_by_the_lateral_damping():
+def test_a_strand_decays_by_the_lateral_damping(tell):
     # q+ + exp(-2 a dt) q- = 2 exp(-a dt) cos(omega dt) q, with a = d / (2 m')
     q = lateral_wave(LENGTH_OF_STRAND, 4000.0, STEP, damping=200.0)
     _, fall = np.linalg.lstsq(np.stack([q[1:-1], -q[:-2]], 1), q[2:])[0]
-    assert -0.5 * np.log(fall) / (10.0 * STEP) == pytest.approx(200.0 / (2.0 * PER_LENGTH), rel=1e-2)
+    rate = -0.5 * np.log(fall) / (10.0 * STEP)
+    tell("rate at which a strand decays out of the plane [1/s]", rate, 200.0 / (2.0 * PER_LENGTH))
+    assert rate == pytest.approx(200.0 / (2.0 * PER_LENGTH), rel=1e-2)
 
 
 @pytest.mark.parametrize(("tension", "force"), [(0.0, 78.025), (4000.0, 93.562)])

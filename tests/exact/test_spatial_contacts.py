@@ -21,11 +21,12 @@ def at_flank(belt, q, axis, side, groove):
     return frustum_gap(belt, side, radius, along, groove, 0.0), n, m, t, radius
 
 
-def test_a_point_on_the_frustum_of_a_sheave():
+def test_a_point_on_the_frustum_of_a_sheave(tell):
     belt = chains.belt(half_width=0.012)
     q, v = (0.040, 0.025, 0.0119), np.array([-7.9, 12.6, 0.05])
     gap, n, m, t, radius = at_flank(belt, q, (0.0, 0.0, 1.0), 1.0, 0.04733)
     assert gap == pytest.approx(6.7615278218e-5, abs=1e-15)
+    tell("gap of a point at the frustum of a sheave [m]", gap, 6.7615278218e-5)
     assert n == pytest.approx((0.161805704468, 0.101128565293, -0.981627183448), abs=1e-12)
     assert m == pytest.approx((0.832418186729, 0.520261366706, 0.190808995377), abs=1e-12)
     assert v @ n == pytest.approx(-0.053126501784, abs=1e-11)
@@ -44,12 +45,14 @@ def test_a_point_on_the_frustum_of_a_sheave():
         ((0.062, -0.011, 0.006), 4.008747913608e-4, (-0.18787498, 0.03333266, 0.98162718)),
     ],
 )
-def test_a_point_on_the_frustum_of_the_paper(q, expected, normal):
+def test_a_point_on_the_frustum_of_the_paper(q, expected, normal, tell):
     """(|d - s a| - r_h) cos phi, r_h = r_1 + s tan phi, by the frustum's base (Schindler 2008, eqs 16-22)."""
     # phi = pi / 2 - d0; r_1 is the radius at z = 0, that of the groove where z is half of an element's width
     belt, tangent = chains.belt(), 5.144554016
     assert tangent == pytest.approx(1.0 / np.tan(chains.WEDGE), rel=1e-9)
     gap, n, _, _, _ = at_flank(belt, q, (0.0, 0.0, 1.0), 1.0, 0.03 + tangent * belt.half_width)
+    tell("gap by eqs 16 to 22 [m]", gap, expected)
+    tell("normal by eq. 21", -np.array(n), normal)
     assert gap == pytest.approx(expected, abs=1e-13)  # tan phi has ten digits
     # the paper's points into the frustum, ours against the element
     assert -np.array(n) == pytest.approx(normal, abs=1e-8)
@@ -64,7 +67,7 @@ def plane_gap(ri, xi, oi, rj, xj, thickness, height, side):
     ("pitch", "edge", "head"),
     [(0.0, 0.7, 0.7), (-0.02, 30.544885, -79.447782), (0.02, -29.451115, 80.541552)],
 )
-def test_front_points_at_the_rear_plane(pitch, edge, head):
+def test_front_points_at_the_rear_plane(pitch, edge, head, tell):
     x = (np.cos(pitch), np.sin(pitch), 0.0)
     for height, expected in ((-1.5e-3, edge), (4e-3, head)):
         gap = plane_gap(
@@ -77,6 +80,7 @@ def test_front_points_at_the_rear_plane(pitch, edge, head):
             height,
             2e-3,
         )
+        tell("gap of points of a front at the next rear [um]", 1e6 * gap, expected)
         assert 1e6 * gap == pytest.approx(expected, abs=1e-6)
 
 

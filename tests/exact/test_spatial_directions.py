@@ -50,7 +50,7 @@ def directions(step, f, x):
     return found
 
 
-def test_rates_of_all_gaps_and_strains():
+def test_rates_of_all_gaps_and_strains(tell):
     # what forces take as rates along a direction, against differences of gaps at q + X dt
     belt, state, work, rng = chains.shaken(1, angle_damping=0.0)
     f, x = (
@@ -90,6 +90,7 @@ def test_rates_of_all_gaps_and_strains():
     difference[:, fields.START_TENSION] *= -lengths / belt.ring_stiffness
     for field, expected in directions(step, f, x).items():
         scale = np.abs(expected).max()
+        tell("rates of gaps, slips and strains by projections", difference[:, field], expected)
         assert difference[:, field] == pytest.approx(expected, abs=2e-7 * scale), field
     driven = f[:, 0] > 0.5 * belt.centre_distance
     axis = np.where(driven[:, None], belt.axes[1], belt.axes[0])

@@ -126,7 +126,7 @@ def test_slip_limit():
     assert -state.loads[spatial_fields.DRIVING_TORQUE] / thrust == pytest.approx(limit, rel=1e-3)
 
 
-def test_a_clamped_element_without_friction():
+def test_a_clamped_element_without_friction(tell):
     # each flank carries N: 2 N sin d0 outwards, N cos d0 along the axis, and no moment where both heights are alike
     planar, planar_state = start(given(NODES, kinetic_friction=0.0, ring_friction=0.0))
     belt, state = chains.beside_planar(planar, planar_state)
@@ -156,13 +156,14 @@ def test_a_clamped_element_without_friction():
     outward = np.hypot(found[:, spatial_fields.RESIDUAL], found[:, spatial_fields.RESIDUAL + 1])
     assert pressed.sum() > 40
     assert outward[pressed] == pytest.approx(normal[pressed] * belt.sine, rel=1e-4)
+    tell("outward force of clamped elements [N]", outward[pressed], normal[pressed] * belt.sine)
     assert np.abs(found[:, spatial_fields.RESIDUAL + 2]).max() < 1e-9 * normal.max()
     # the penetration 1e-5 sin d0 on both points of stiffness c / 2
     middle = np.argmax(pressed & (np.abs(f[:, 1]) < 1e-3) & (f[:, 0] < 0.0))
     assert forces[middle] == pytest.approx(0.5 * belt.flank_stiffness * 1e-5 * belt.sine, rel=2e-2)
 
 
-def test_both_sheaves_of_a_pulley_have_one_angular_velocity():
+def test_both_sheaves_of_a_pulley_have_one_angular_velocity(tell):
     # Schindler et al. 2008, sec. 4.4.1: another speed of a pulley moves its left and right flank points alike
     planar, planar_state = start(given(NODES))
     belt, state = chains.beside_planar(planar, planar_state)
@@ -179,6 +180,7 @@ def test_both_sheaves_of_a_pulley_have_one_angular_velocity():
     pressed = driving & (np.abs(f[:, 1]) < 0.02) & (f[:, 0] < 0.0)
     assert left_low[pressed] == pytest.approx(-low[pressed], rel=1e-3)
     assert (left_high - left_low)[pressed] == pytest.approx(-2.0 * belt.flank_reach, rel=1e-3)
+    tell("sliding at the right sheave by the left one [m]", (right_low, right_high), (left_low, left_high))
     assert right_low == pytest.approx(left_low, rel=1e-12)
     assert right_high == pytest.approx(left_high, rel=1e-12)
     assert not (slips[1] - slips[0])[~driving].any()

@@ -97,7 +97,7 @@ def slips(f):
 
 
 @pytest.mark.parametrize("name", SCENES)
-def test_power_is_balanced_and_both_pulleys_take_the_same_axial_force(name):
+def test_power_is_balanced_and_both_pulleys_take_the_same_axial_force(name, tell):
     found = revolution(name)
     rate, loads = found.rate, found.loads.mean(axis=0)
     lost = rate[pushbelt_fields.FLANK_LOSS : pushbelt_fields.POWER_RESIDUAL]
@@ -110,6 +110,7 @@ def test_power_is_balanced_and_both_pulleys_take_the_same_axial_force(name):
         - lost.sum()
         - rate[pushbelt_fields.TIME]
     )
+    tell("power left open in a revolution over that of the drive", abs(left) / rate[pushbelt_fields.WORK_IN])
     assert abs(left) < 3e-4 * rate[pushbelt_fields.WORK_IN]
     assert found.state.counters[pushbelt_fields.FAILED_STEPS] <= 2
     # what the belt does to one pulley along the axis it takes from the other, or from its own motion
@@ -123,7 +124,7 @@ def test_power_is_balanced_and_both_pulleys_take_the_same_axial_force(name):
 
 
 @pytest.mark.parametrize("name", SCENES)
-def test_contacts_press_by_their_gaps_at_every_output(name):
+def test_contacts_press_by_their_gaps_at_every_output(name, tell):
     """Forces are one-sided and those of the accepted state's gaps, which a step predicts along directions of q_k."""
     found = revolution(name)
     normal = found.elements[..., CONTACTS]
@@ -137,6 +138,7 @@ def test_contacts_press_by_their_gaps_at_every_output(name):
     # the largest error of an output, which what is not pressed but closed has too; 0.4 % found
     for part in (FRONTS, FLANKS):
         largest = deformed[..., part].max(axis=(1, 2))
+        tell("overlap less deformation over the largest", error[..., part].max(axis=(1, 2)) / largest)
         assert (error[..., part].max(axis=(1, 2)) < 0.01 * largest).all(), part
     # Within a step a pin may run along its hole by so much that the direction of its force turns by 0.04: the gap
     # is another by its cosine's part of the clearance, 40 nm, and presses by one and a half times of that: 3 % of the
@@ -235,13 +237,14 @@ def test_flanks_touch_on_either_side_and_at_either_height(where, points):
     assert (touching == [point != "." for point in points]).all(axis=-1).any(), where
 
 
-def test_sheaves_lean_by_the_difference_of_their_loads():
+def test_sheaves_lean_by_the_difference_of_their_loads(tell):
     found, stiffness = revolution("falling"), np.array(SCENES["falling"]["modal"])
     # every mode follows its load by the lag, so that in the mean it leans by load over stiffness less lag times rate
     rate = (found.leans[-1] - found.leans[0]) / (OUTPUTS * 10 * STEP)
     expected = found.leaning.mean(axis=0) / stiffness - found.belt.lean_lag * rate
     largest = np.abs(expected).max()
     assert largest > 1e-7 and (np.abs(expected[:, 1]) > 0.5 * largest).all()
+    tell("lean of single sheaves by their loads [m]", found.leans.mean(axis=0), expected)
     assert found.leans.mean(axis=0) == pytest.approx(expected, abs=1e-3 * largest)
     # the first mode opens a sheave evenly by force over stiffness
     loads = found.loads.mean(axis=0)

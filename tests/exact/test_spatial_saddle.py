@@ -70,7 +70,7 @@ def test_friction_of_the_rings_has_its_law_direction_and_slope():
 
 
 @pytest.mark.parametrize("side", [1.0, -1.0], ids=["on the saddle", "on the pillar"])
-def test_rings_are_held_by_the_saddle_and_by_the_pillar(side):
+def test_rings_are_held_by_the_saddle_and_by_the_pillar(side, tell):
     """An element out of a taut strand is pulled back to either side, and the rings' normal force is the same."""
     nodes, pitch, pull, rise = 16, 0.02, 1000.0, 1e-4
     belt = chains.belt(pitch=pitch, thickness=0.9 * pitch, contact_stiffness=0.0, ring_friction=0.06)
@@ -92,6 +92,7 @@ def test_rings_are_held_by_the_saddle_and_by_the_pillar(side):
     outward = -side * back / (belt.mass + belt.ring_mass)
     assert -f[5, spatial_fields.SPEED + 1] / 1e-6 == pytest.approx(outward, rel=1e-6)
     assert f[5, spatial_fields.SADDLE] == pytest.approx(belt.mass * abs(outward), rel=1e-6)
+    tell("normal force of rings at an element [N]", f[5, spatial_fields.SADDLE], belt.mass * abs(outward))
     # which friction of the next step has
     assert advance(belt, newton, state, work, np.zeros((2, spatial_fields.INPUTS)), 1, 1e-6) == 0
     g = of_lanes(state.elements)

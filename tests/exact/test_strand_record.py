@@ -96,7 +96,7 @@ def test_the_strand_is_that_of_its_equation():
         assert near < 1e-2 * min(boundary(frequency * 0.99), boundary(frequency * 1.01))
 
 
-def test_matrices_are_those_of_the_energies():
+def test_matrices_are_those_of_the_energies(tell):
     # M, B and C of eq. 10 by quadrature of the shapes, over the half mass of each
     strand = Strand(0.3, 1.2, 20.0, 900.0, 0.5)
     gyroscopic, stiffness = ritz_matrices(strand, 4)
@@ -105,15 +105,19 @@ def test_matrices_are_those_of_the_energies():
     def integral(f):
         return quad(f, 0.0, L, epsabs=1e-12)[0]
 
+    expected = np.empty((4, 4))
     for j in range(4):
         for k in range(4):
             cross = integral(lambda x, j=j, k=k: np.sin(n[j] * x) * n[k] * np.cos(n[k] * x))
             back = integral(lambda x, j=j, k=k: n[j] * np.cos(n[j] * x) * np.sin(n[k] * x))
-            assert gyroscopic[j, k] == pytest.approx(20.0 * (cross - back) * 2.0 / L, abs=1e-8)
+            expected[j, k] = 20.0 * (cross - back) * 2.0 / L
         slope = integral(lambda x, j=j: (n[j] * np.cos(n[j] * x)) ** 2)
         bend = integral(lambda x, j=j: (n[j] ** 2 * np.sin(n[j] * x)) ** 2)
         potential = (900.0 - 1.2 * 20.0**2) * slope + 0.5 * bend
+        tell("stiffness of a strand by quadrature [1/s^2]", stiffness[j], potential / (1.2 * L / 2.0))
         assert stiffness[j] == pytest.approx(potential / (1.2 * L / 2.0), rel=1e-9)
+    tell("gyroscopic matrix of a strand by quadrature [1/s]", gyroscopic, expected)
+    assert gyroscopic == pytest.approx(expected, abs=1e-8)
 
 
 def test_eigenfrequencies_are_those_of_the_motion():

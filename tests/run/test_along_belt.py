@@ -84,8 +84,9 @@ def test_wrap_angles_run_on_where_a_groove_may_hold_the_belt():
         (1, -1e-9, 270),
     ],
 )
-def test_the_sliding_angle_is_that_of_eq_36(radial, tangential, degrees):
+def test_the_sliding_angle_is_that_of_eq_36(radial, tangential, degrees, tell):
     found = np.degrees(sliding_angle(np.array(radial), np.array(tangential), WEDGE))
+    tell("direction of sliding by eq. 36 [deg]", found, degrees)
     assert found == pytest.approx(degrees, abs=0.2)
 
 
@@ -105,13 +106,14 @@ def test_means_of_instants_are_the_profiles(history):
         assert mean == pytest.approx(history[name].values, abs=1e-6 * scale, nan_ok=True), name
 
 
-def test_forces_add_up_to_the_moments_of_the_drive(history):
+def test_forces_add_up_to_the_moments_of_the_drive(history, tell):
     belt = belt_constants(job(**LOADED).parameters)
     here = belt.driving_stations
     raised = belt.rise[here] + belt.upright[here] * history["momentary_mean_displacement"].values[:, here]
     friction = np.nan_to_num(history["momentary_friction_force"].values[:, here])
     moment = (friction * (belt.driving_radius + raised)) @ belt.dual[here]
     recorded = history["driving_moment"].values[-400:]
+    tell("moment of the forces along the driving pulley [N m]", moment, recorded)
     assert moment == pytest.approx(recorded, rel=1e-4, abs=1e-3 * np.abs(recorded).max())
     speed = job(**LOADED).parameters["driving_speed"]
     assert recorded.mean() * speed == pytest.approx(history["driving_power"].item(), rel=1e-9)

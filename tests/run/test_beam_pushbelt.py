@@ -34,7 +34,7 @@ def job(model, **values):
     return build_job({"name": "x", "model": model}, "x", {**BELT} | values)
 
 
-def test_forces_are_those_of_the_pushbelt():
+def test_forces_are_those_of_the_pushbelt(tell):
     # other equations of the same belt, which coasts without friction
     without = {"ring_friction": 0.0, "tilt_damper": 0.12, "load": 0.0, "duration": 0.04}
     forces = []
@@ -52,6 +52,7 @@ def test_forces_are_those_of_the_pushbelt():
             found = judge(run)
             assert run.numerical_doubt(found) is None
             assert found["tilt_loss"] > 100.0 > abs(found["power_residual"]) * found["loss"]
+    tell("forces of the pushbelt of beams over those of the pushbelt", forces[0] / forces[1], 1.0)
     # beams of 27 degrees and a polygon of 56 sides
     np.testing.assert_allclose(*forces, rtol=0.01)
 

@@ -100,10 +100,11 @@ def test_heights_of_a_belt_have_their_root_mean_square_and_their_decay():
     assert size[WAVES + 1 :].max() < 1e-9 * size[1]
 
 
-def test_a_rough_belt_shakes_its_strands_as_strings_whose_ends_move(lines):
+def test_a_rough_belt_shakes_its_strands_as_strings_whose_ends_move(lines, tell):
     """By size and phase of each wave; what is left comes from the bending and the mesh."""
     found, expected = (of[:-1] for of in lines)
     assert np.linalg.norm(found - expected) < 0.08 * np.linalg.norm(expected)
+    tell("error of the lines of a rough belt", np.linalg.norm(found - expected) / np.linalg.norm(expected))
     resonant = abs(expected).argmax(axis=0)  # near the first frequency, 72 Hz
     assert (abs(resonant + 1 - 28) <= 2).all()
     assert (abs(expected).max(axis=0) > 8.0 * ROUGHNESS * np.sqrt(2.0 / WAVES)).all()

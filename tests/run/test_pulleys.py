@@ -50,7 +50,7 @@ def test_the_balance_closes(name):
     assert abs(balance(scene(name))["power_residual"]) < (2.5e-3 if name == "thrust" else 1e-3)
 
 
-def test_the_ratio_shifts_at_the_rate_of_both_sheaves():
+def test_the_ratio_shifts_at_the_rate_of_both_sheaves(tell):
     run = scene("thrust")
     found, p = balance(run), run.parameters
     # T k z' = F - Q - c z of each sheave, and a belt that sinks by z / (2 tan delta)
@@ -60,6 +60,7 @@ def test_the_ratio_shifts_at_the_rate_of_both_sheaves():
     positions = np.array([mean(run, f"{pulley}_position") for pulley in ("driving", "driven")])
     driving, driven = [run.path.driving_radius, run.path.driven_radius] - positions / slope
     rate = driven / driving * (sinks[0] / driving - sinks[1] / driven)
+    tell("rate of the ratio by the lags of both sheaves [1/s]", found["shift_speed"], rate)
     assert found["shift_speed"] == pytest.approx(rate, rel=0.01)
 
 
@@ -78,13 +79,15 @@ def test_new_terms_take_part(name, term, size):
     assert scene(name).channel("lag_loss").min() >= 0.0
 
 
-def test_torques_are_those_of_the_drive():
+def test_torques_are_those_of_the_drive(tell):
     run = scene("drive")
     course, speed = run.parameters["driving_speed"], mean(run, "driving_speed")
     torque = run.channel("load") - 5.0 * (run.channel("driving_speed") - course)
     assert mean(run, "driving_power") == pytest.approx(
         (torque * run.channel("driving_speed"))[run.judged].mean()
     )
+    power = (torque * run.channel("driving_speed"))[run.judged].mean()
+    tell("power of a drive whose torque falls with its speed [W]", mean(run, "driving_power"), power)
     assert speed < course - 0.1  # losses slow it down
     held = scene("given driven speed")
     assert np.ptp(held.channel("driven_speed")) == 0.0

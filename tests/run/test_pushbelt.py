@@ -187,7 +187,7 @@ def test_profiles_of_ones_change_no_bit():
     assert np.array_equal(profiled(profile_time=(0.012, 0.018), **ones).displacement, profiled().displacement)
 
 
-def test_profiles_shift_the_ratio_and_change_load_speed_and_thrust():
+def test_profiles_shift_the_ratio_and_change_load_speed_and_thrust(tell):
     run = profiled(
         duration=0.12,
         band_high=800.0,
@@ -211,6 +211,11 @@ def test_profiles_shift_the_ratio_and_change_load_speed_and_thrust():
         ratio, rel=0.02
     )
     assert record["axial_force"][1] == pytest.approx(0.8 * 20e3, rel=0.01)
+    tell("load in the middle of its course [N m]", half, 45.0)
+    tell("driving speed at the end of its course [rad/s]", run.channel("driving_speed")[-1], 90.0 * np.pi)
+    tell("ratio after a shift", run.channel("driving_speed")[-1] / run.channel("driven_speed")[-1], ratio)
+    tell("driving radius after a shift [m]", run._state.pulleys[f.DRIVING_RADIUS], radius)
+    tell("driven axial force as its course ends [N]", record["axial_force"][1], 0.8 * 20e3)
     # Bullinger et al. 2005, eq. 2, at the radius of the start
     carried = 2.0 * 0.09 * record["axial_force"].min() * 0.063896 / 1.35 / np.cos(np.deg2rad(11.0))
     assert record["slip_margin"] == pytest.approx(30.0 / carried - 1.0, rel=1e-3)
@@ -240,10 +245,11 @@ def test_what_the_power_balance_may_leave_open():
             assert doubt[0] == Status.FAILED_NUMERICS and complaint in doubt[1]
 
 
-def test_super_elements_tilt_as_stiffly_as_their_elements():
+def test_super_elements_tilt_as_stiffly_as_their_elements(tell):
     belts = {n: start(given(job(elements=n).point(0)))[0] for n in (104, 216, 432)}
     for name, value in (("angle_stiffness", 5.0), ("angle_damping", 5e-5)):
         for n, belt in belts.items():
+            tell(f"{name} of 104 to 432 elements", n * getattr(belt, name), 432 * value)
             assert n * getattr(belt, name) == pytest.approx(432 * value, rel=2e-4)
 
 

@@ -44,7 +44,7 @@ def steps(model, moved, count):
     return moved.state.fields
 
 
-def test_the_split_is_by_the_frequency_that_is_asked_for():
+def test_the_split_is_by_the_frequency_that_is_asked_for(tell):
     p = parameters()
     belt, grid = belt_constants(p), mesh(p)
     splines, held = splines_of_belt(grid, SPACING), transverse_stiffness(belt)
@@ -64,6 +64,9 @@ def test_the_split_is_by_the_frequency_that_is_asked_for():
     # splines that are slow by themselves make shapes together that are not
     assert split_basis(belt, grid, "held_splines", LIMIT, SPACING).fastest > 2.0 * np.pi * 2.0 * LIMIT
     across = modes.dynamic.T @ held @ modes.lagging
+    tell("fastest of what moves over the limit frequency", modes.fastest / (2.0 * np.pi) / LIMIT)
+    tell("slowest spline of a groove over the limit", own[~strand & (splines.levels == 0)].min() / LIMIT)
+    tell("stiffness between what moves and what follows", np.abs(across).max() / np.abs(held).max())
     assert np.abs(across).max() < 1e-9 * np.abs(held).max()
 
 
@@ -125,13 +128,15 @@ def test_the_coupled_system_is_that_of_a_dense_solver():
     assert found == pytest.approx(expected, rel=1e-12)
 
 
-def test_the_steady_flow_keeps_content_and_has_one_flux():
+def test_the_steady_flow_keeps_content_and_has_one_flux(tell):
     _, model, moved = split(longitudinal="steady_flow")
     cell = model.belt.cell
     before = moved.state.fields[f.N_ELEMENT : f.N_ELEMENT + 2] @ cell
     fields = steps(model, moved, 50)
     assert fields[f.N_ELEMENT : f.N_ELEMENT + 2] @ cell == pytest.approx(before, rel=1e-13)
     flux = fields[f.V_ELEMENT : f.V_RING + 1] / (1.0 + np.roll(moved.eps, 1, axis=1))
+    tell("content of a belt with a steady flow [m]", fields[f.N_ELEMENT : f.N_ELEMENT + 2] @ cell, before)
+    tell("spread of a steady flow along the belt over its mean", np.ptp(flux, axis=1) / flux.mean(axis=1))
     assert np.ptp(flux, axis=1) == pytest.approx([0.0, 0.0], abs=1e-9)
     assert np.ptp(fields[f.V_ELEMENT]) > 1e-4
 

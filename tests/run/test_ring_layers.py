@@ -157,7 +157,7 @@ def test_rings_that_spin_free_press_on_nothing_and_faster_ones_on_the_ears():
 
 # with the weight of 40 times the speed all layers fly outward
 @pytest.mark.parametrize(("share", "bare"), [(1.0, 3), (40.0, 0)])
-def test_friction_takes_what_its_surfaces_lose(share, bare):
+def test_friction_takes_what_its_surfaces_lose(share, bare, tell):
     """Its power on layers and elements is -mu N |sliding| of all surfaces, whatever their speeds."""
     belt, rings, state = layered(**UNLIKE)
     n, cells = 3, belt.cell.size
@@ -184,6 +184,7 @@ def test_friction_takes_what_its_surfaces_lose(share, bare):
             * (1.0 + 0.5 * np.exp(-size / rings.stribeck_speed))
             * np.tanh(size / rings.friction_speed)
         )
+        tell("power of friction of layers by Stribeck curves [W/m]", power[j], -(mu * normal * size).sum())
         # forces at 10 m/s cancel to those at some cm/s
         assert power[j] == pytest.approx(-(mu * normal * size).sum(), rel=1e-9)
 
@@ -270,11 +271,12 @@ def test_the_fast_step_is_the_plain_form_in_the_limit_of_short_steps(on_ears):
 
 
 @pytest.mark.parametrize("on_ears", [False, True])
-def test_layers_move_by_their_mean_from_which_they_were_eliminated(on_ears):
+def test_layers_move_by_their_mean_from_which_they_were_eliminated(on_ears, tell):
     *_, begun, still = stepped(4.6e-6, on_ears)
     layers = slice(FIRST_LAYER, FIRST_LAYER + 3)
     change = (still.state.fields - begun.fields)[layers].mean(axis=0)
     expected = still.batch.work.stations.data[:, lf.DV_1, 0]
+    tell("change of the mean speed of the layers by linear momentum [m/s]", change, expected)
     # of speeds of 10 m/s, rounded
     assert np.abs(change - expected).max() < 1e-14 * 10.0 + 1e-12 * np.abs(expected).max()
 
@@ -293,12 +295,13 @@ def test_layers_that_do_not_rub_move_as_the_rings_as_one_step_by_step():
         assert found[row] == pytest.approx(expected[row], rel=1e-10, abs=1e-10 * size), row
 
 
-def test_the_content_of_each_layer_stays():
+def test_the_content_of_each_layer_stays(tell):
     run = marched(**UNLIKE)
     belt = belt_constants(run.parameters)
     rings = ring_constants(run.parameters, belt)
     n = rings.length.size
     content = run.state.fields[FIRST_LAYER + n :] + 1.0 + belt.curvature * rings.offset[:, None]
+    tell("content of each layer of the rings after a run [m]", content @ belt.cell, rings.length)
     assert content @ belt.cell == pytest.approx(rings.length, rel=1e-12)
 
 

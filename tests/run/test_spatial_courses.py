@@ -25,7 +25,7 @@ def finished(**values):
     return run, point, record
 
 
-def test_profiles_take_ratio_and_axial_offset_along_with_thrust_load_and_speed():
+def test_profiles_take_ratio_and_axial_offset_along_with_thrust_load_and_speed(tell):
     profiles = {
         "profile_time": (0.012, 0.04),
         "ratio_profile": (1.0, 0.9),
@@ -37,14 +37,17 @@ def test_profiles_take_ratio_and_axial_offset_along_with_thrust_load_and_speed()
     half = run.channel("load")[round(0.026 / run.interval) - 1]
     assert half == pytest.approx(45.0) and run.channel("load")[-1] == pytest.approx(30.0)
     assert run.channel("driving_speed")[-1] == pytest.approx(95.0 * np.pi)
+    tell("driving speed of a spatial belt [rad/s]", run.channel("driving_speed")[-1], 95.0 * np.pi)
     # what is driven takes the torque that the load is at the ratio of the start
     driven = run.channel("driven_speed")[run.judged].mean()
     assert run.mean_rate(f.WORK_OUT) == pytest.approx(1.35 * 30.0 * driven, rel=1e-3)
     # the loose sheave closes at a finite rate, and still opens after the shift
     pressed = run.channel("sheave_force driven left")
+    tell("force of a spatial belt's loose sheave [N]", pressed[-50:].mean(), 0.8 * 20e3)
     assert pressed[-50:].mean() == pytest.approx(0.8 * 20e3, rel=0.03)
     ratio = 0.9 * 1.35
     radius = driven_radius(ratio, run.path.path_length, 0.155)
+    tell("driving radius of a spatial belt [m]", run.channel("driving_radius")[-1], radius / ratio)
     assert run.channel("driving_radius")[-1] == pytest.approx(radius / ratio, rel=1e-12)
     assert run.channel("driving_speed")[-1] / run.channel("driven_speed")[-1] == pytest.approx(
         ratio, rel=0.02

@@ -286,11 +286,14 @@ def test_super_elements_turn_as_stiffly_as_their_elements():
     assert few["yaw_stiffness"] == pytest.approx(4.0 * many["yaw_stiffness"]) == pytest.approx(8.0, rel=1e-3)
 
 
-def test_the_longest_step_is_that_of_the_strand_or_of_roll():
+def test_the_longest_step_is_that_of_the_strand_or_of_roll(tell):
     """Pitch sqrt(m' / T), and the waves of roll, of a torsion string: rings at +-b on elements that are plates."""
     p = job(elements=432).point(0)
     pitch = path_length(p) / 432
     assert string_limit(p) == pytest.approx(pitch * np.sqrt(1.4635 / most_tension(p)), rel=1e-3)
+    stiff = p | {"ring_stiffness": 100.0 * p["ring_stiffness"]}
+    longest = [min(string_limit(of), roll_limit(of)) for of in (p, stiff)]
+    tell("longest step with rings 100 times as stiff over the given one", longest[1] / longest[0])
     inertia = 1.214 * (24e-3**2 + 13e-3**2) / 12.0 + 0.2495 * (7.5e-3**2 + 9.75e-3**2 / 12.0)
     assert roll_limit(p) == pytest.approx(
         pitch * np.sqrt(inertia / (most_tension(p) * (7.5e-3**2 + 9.75e-3**2 / 12.0))), rel=1e-6
