@@ -268,7 +268,7 @@ class _Compiler(Compiler):
         super().__init__(typing_context, _context(), *others)
 
     def define_pipelines(self) -> list[Any]:
-        """Return the compiler's passes, but for that which merges expressions of arrays where there are none."""
+        """Return the compiler's passes; where no arrays are made, not the one that merges expressions of arrays."""
         (found,) = super().define_pipelines()
         if not self.state.flags.nrt:
             found.passes[:] = [p for p in found.passes if p[0] is not NopythonRewrites]
