@@ -10,7 +10,7 @@ from support.marched import Together, balance, finished, job, mean, record
 
 RPM = np.pi / 30.0
 NOMINAL = job().parameters["driving_speed"]
-COARSE = {"stations": 64, "load": 100.0, "friction_gradient": -0.4}
+COARSE = {"stations": 48, "load": 100.0, "friction_gradient": -0.4}
 VIBRATING = {"stations": 96, "step": 7.6e-6, "friction_gradient": -1.0, "load": 120.0, "precision": "single"}
 
 
