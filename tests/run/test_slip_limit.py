@@ -14,7 +14,7 @@ from cvt_hpc.variables import Status
 from cvt_hpc.variator import GROSS_SLIP
 from support.rungs import rung_job, rung_record
 
-STATIONS = 24
+STATIONS = 32
 
 
 @cache
