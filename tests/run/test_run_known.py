@@ -16,7 +16,7 @@ FURTHER = {
     "belt_drive": {"amplitude_threshold": 0.01},  # coarse elements shake the strands
     **dict.fromkeys(("steady_variator", "linear_stability"), {"stations": 48}),
     "beam_pushbelt": {"elements": 80},
-    "slip_limit": {"stations": 24},
+    "slip_limit": {"stations": 36},
 }
 RECORDED = [
     pytest.param(name, marks=pytest.mark.slow) if name == "beam_pushbelt" else name
