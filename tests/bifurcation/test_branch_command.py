@@ -28,7 +28,7 @@ end_refinement = 1
 RUNS = """
 [branch]
 resolution = "5 N m"
-set = { duration = "0.2 s" }
+set = { duration = "0.15 s" }
 """
 
 

@@ -76,7 +76,7 @@ def test_in_its_plane_it_is_the_planar_belt():
 
 def test_what_is_symmetric_stays_in_its_plane():
     # exactly: what both sides do across the plane cancels to the last bit, so that no instability finds a seed
-    _, state, _ = scene(offset=0.0, modal=MODES, pin_clearance=1e-5)
+    _, state, _ = scene(offset=0.0, modal=MODES, ramp=300, pin_clearance=1e-5)
     f = of_lanes(state.elements)
     assert np.array_equal(f, chains.mirrored(f))
     assert not f[:, [2, 5, 8, spatial_fields.SLOPE]].any()
@@ -88,7 +88,7 @@ def test_the_mirror_image_moves_as_the_mirror_image():
     axes = np.array([[0.0, 0.0, 1.0], [2e-3, 0.0, 1.0]])
     axes[1] /= np.linalg.norm(axes[1])
     constants = {"loose_side": np.array([1.0, -1.0]), "axes": axes, "pin_clearance": 5e-5}
-    belt, state, work = scene(modal=MODES, **constants)
+    belt, state, work = scene(modal=MODES, ramp=300, **constants)
     image = chains.state(
         chains.mirrored(of_lanes(state.elements)),
         state.pulleys * [1, 1, 1, 1, -1, -1],

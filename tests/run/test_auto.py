@@ -108,7 +108,7 @@ def test_without_falling_friction_transients_do_not_vibrate():
         for stiffness in stiffnesses
         for disturbance in disturbances
     ]
-    job = rung_job("elastic_belt", duration=0.3, stations=96, step=7.6e-6)
+    job = rung_job("elastic_belt", duration=0.2, stations=96, step=7.6e-6)
     points = [job.point(0) | cell | {"friction_gradient": slope} for slope in (0.0, -1.0) for cell in grid]
     verdicts = [record["vibrates"] for record in run_points(job, points, lambda: None)]
     constant, falling = verdicts[: len(grid)], verdicts[len(grid) :]

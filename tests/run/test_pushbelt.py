@@ -127,9 +127,10 @@ def test_a_force_sets_the_driving_sheave():
 
 
 def test_a_longer_run_goes_on_from_a_shorter_one_bit_by_bit():
-    whole, shorter = (Transient(job(load=60.0, duration=t).point(0), "newton") for t in (0.068, 0.034))
+    coarse = {"load": 60.0, "step": 2e-5, "sampling_rate": 12.5e3, "band_high": 800.0}
+    whole, shorter = (Transient(job(**coarse, duration=t).point(0), "newton") for t in (0.068, 0.034))
     shorter.advance(shorter.samples)
-    shorter.prolong(job(load=60.0, duration=0.068).point(0))
+    shorter.prolong(job(**coarse, duration=0.068).point(0))
     for run in (whole, shorter):
         assert run.advance(run.samples) is None
     assert whole.done == shorter.done == whole.samples

@@ -20,7 +20,7 @@ SCENES, STEP = 16, 10.0
 def judged():
     """Runs and records of scenes that fill the lanes once: slow and loose belts, fast and pressed ones, and some that vibrate."""
     rng = np.random.default_rng(4)
-    common = {"stations": 80, "duration": 0.15, "longest_duration": 0.15, "spectrum_step": STEP}
+    common = {"stations": 64, "duration": 0.12, "longest_duration": 0.12, "spectrum_step": STEP}
     points = []
     for k in range(SCENES):
         wide = k % 2  # every other scene is near the papers' working point

@@ -10,7 +10,7 @@ from support.marched import Together, balance, finished, job, mean, record
 
 RPM = np.pi / 30.0
 NOMINAL = job().parameters["driving_speed"]
-COARSE = {"stations": 64, "load": 100.0, "friction_gradient": -0.4}
+COARSE = {"stations": 48, "load": 100.0, "friction_gradient": -0.4}
 VIBRATING = {"stations": 96, "step": 7.6e-6, "friction_gradient": -1.0, "load": 120.0, "precision": "single"}
 
 
@@ -25,8 +25,8 @@ CONSTANT = Together(*(COARSE | {"driving_speed": speed, "duration": 0.2} for spe
 CHANGING = Together(*(COARSE | {"stations": 96} | ramp(*ends) for ends in ENDS))
 INSIDE, OUTSIDE = (1900.0, 3800.0), (1800.0, 3900.0)  # [rpm]
 UP, DOWN = (ramp(start * RPM, end * RPM) | {"duration": 1.0} for start, end in ((1500, 4500), (4500, 1500)))
-BESIDE = Together(*(VIBRATING | {"driving_speed": s * RPM, "duration": 0.3} for s in (*INSIDE, *OUTSIDE)))
-ALONG = Together(*(VIBRATING | values for values in (UP, DOWN)))
+BESIDE = [{"driving_speed": speed * RPM, "duration": 0.3} for speed in (*INSIDE, *OUTSIDE)]
+WINDOW = Together(*(VIBRATING | values for values in (UP, DOWN, *BESIDE)))
 
 
 def test_a_ramp_of_no_extent_is_the_constant_run_and_its_neighbours_change_no_bit():
@@ -91,10 +91,10 @@ def test_forces_along_a_rising_ramp_are_those_of_constant_speeds():
 def test_onset_and_end_are_where_constant_speeds_have_them():
     for speeds, expected in ((INSIDE, Vibrates.YES), (OUTSIDE, Vibrates.NO)):
         for speed in speeds:
-            constant = BESIDE.record(**VIBRATING, driving_speed=speed * RPM, duration=0.3)
+            constant = WINDOW.record(**VIBRATING, driving_speed=speed * RPM, duration=0.3)
             assert constant["vibrates"] is expected, speed
     low, high = ((a * RPM, b * RPM) for a, b in zip(OUTSIDE, INSIDE, strict=True))
-    up, down = (ALONG.record(**VIBRATING, **values) for values in (UP, DOWN))
+    up, down = (WINDOW.record(**VIBRATING, **values) for values in (UP, DOWN))
     # what the ramp passes in the 0.1 s for which a vibration has to last, and in 50 ms in which it grows
     late = 3000 * RPM / 1.0 * 0.15
     for found, first, last, sign in ((up, low, high, 1.0), (down, high, low, -1.0)):

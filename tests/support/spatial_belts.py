@@ -55,15 +55,15 @@ def kept_scene(**values):
     return belt, state, b.workspace(belt, len(of_lanes(state.elements)))
 
 
-def scene(offset=OFFSET, modal=(), nodes=NODES, **constants):
-    """Constants, state and work space of a belt under its thrust and load, 45 ms from its start."""
+def scene(offset=OFFSET, modal=(), nodes=NODES, ramp=RAMP, **constants):
+    """Constants, state and work space of a belt under its thrust and load, which come within two ramps of three."""
     planar, planar_state = start(given(nodes, transverse_damping=0.0, modal_stiffness=modal or ((), ())))
     belt, state = chains.beside_planar(planar, planar_state, **constants)
     work = b.workspace(belt, nodes)
     for thrusts, loads, drift, steps in (
-        ((500.0, THRUST), (0.0, 0.0), offset / (RAMP * STEP), RAMP),
-        ((THRUST, THRUST), (0.0, LOAD), 0.0, RAMP),
-        ((THRUST, THRUST), (LOAD, LOAD), 0.0, RAMP),
+        ((500.0, THRUST), (0.0, 0.0), offset / (ramp * STEP), ramp),
+        ((THRUST, THRUST), (0.0, LOAD), 0.0, ramp),
+        ((THRUST, THRUST), (LOAD, LOAD), 0.0, ramp),
     ):
         assert advance(belt, b.NEWTON, state, work, inputs(thrusts, loads, drift=drift), steps, STEP) == 0
     return belt, state, work
