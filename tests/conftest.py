@@ -109,7 +109,9 @@ def pytest_sessionfinish():
 @pytest.fixture
 def unarranged(monkeypatch):
     """Compose pictures without the search for room, for tests that do not look at the places."""
-    monkeypatch.setattr("matplotlib.layout_engine.ConstrainedLayoutEngine.execute", lambda engine, figure: None)
+    monkeypatch.setattr(
+        "matplotlib.layout_engine.ConstrainedLayoutEngine.execute", lambda engine, figure: None
+    )
 
 
 @pytest.fixture
