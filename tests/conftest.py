@@ -124,6 +124,14 @@ def tell(record_property):
 
 
 @pytest.fixture
+def unarranged(monkeypatch):
+    """Compose pictures without the search for room, for tests that do not look at the places."""
+    monkeypatch.setattr(
+        "matplotlib.layout_engine.ConstrainedLayoutEngine.execute", lambda engine, figure: None
+    )
+
+
+@pytest.fixture
 def toy(monkeypatch):
     """Register the model "toy" and the stepper "hop", and put a table [run] in the place of all shared ones."""
     model, stepper, shared = ModuleType("toy_model"), ModuleType("toy_stepper"), ModuleType("toy_shared")

@@ -103,12 +103,17 @@ def score(dataset: xr.Dataset, path: str | Path, source: str = "results") -> Sco
     cells = [(row, row.covers(loads), within(loads, row.swept) & np.isnan(row.cell)) for row in measured.rows]
     axes = {name: dataset[name].values for name in names}
     texts = [[value_text(dataset[name], k) for k in range(dataset.sizes[name])] for name in names]
+    known = levels(classes)
+    of_onsets: dict[tuple[tuple[int, ...], bytes], Line] = {}  # many samples vibrate in the same cells
     for index in np.ndindex(classes.shape[:-1]):
         at = {name: axes[name][k] for name, k in zip(names, index, strict=True)}
         told = [one for one in cells if all(at[name] == value for name, value in one[0].at.items())]
         if told:
-            level = levels(classes[index])
-            line = _of_onsets(measured.kind, [row for row, *_ in told], loads, level, factor)
+            level, rows = known[index], [row for row, *_ in told]
+            alike = tuple(map(id, rows)), level.tobytes()
+            if alike not in of_onsets:
+                of_onsets[alike] = _of_onsets(measured.kind, rows, loads, level, factor)
+            line = of_onsets[alike]
             if measured.kind != ONSET:
                 of_cells = _of_cells(told, level, frequency[index], amplitude[index])
                 line = of_cells._replace(onset=line.onset, standard=line.standard)

@@ -63,6 +63,7 @@ def test_this_version_has_its_datasets():
         assert {path.name for path in version.glob("*.nc.xz")} == expected
 
 
+@pytest.mark.usefixtures("unarranged")
 @pytest.mark.parametrize("name", FOUND)
 def test_results_open_draw_and_report(datasets, name, tmp_path, monkeypatch):
     monkeypatch.setattr("cvt_hpc.report.page._encoded", lambda compose: "AA==")
@@ -82,6 +83,7 @@ def test_onsets_are_found_again(datasets):
         assert (results.status == Status.NOT_RUN).any()  # so that cells without a run are among them
 
 
+@pytest.mark.usefixtures("unarranged")
 @pytest.mark.parametrize("name", DRAWN)
 def test_histories_open_and_draw(datasets, name, monkeypatch):
     monkeypatch.setattr(animation, "FRAMES", 1)

@@ -1,5 +1,7 @@
 """No picture is larger than a page, however much it shows: panels get lower, then columns, then it is refused."""
 
+from functools import cache
+
 import numpy as np
 import pytest
 import xarray as xr
@@ -26,6 +28,11 @@ def stiffnesses(count):
     return study(stiffnesses=tuple(np.linspace(1.0, 3.0, count)))
 
 
+@cache
+def map_of(count):
+    return map_figure(stiffnesses(count))
+
+
 def ratios(count):
     """The study over speed, load and ratio at so many ratios."""
     one = pictured.results().isel(ratio=[0], driving_speed=slice(3))
@@ -46,7 +53,7 @@ def along_belt(count):
 WATERFALL = Sides(panel="ratio")
 # by kind: the picture of so many panels, how many are still drawn, how many are not, and what the refusal says
 KINDS = {
-    "map": (lambda n: map_figure(stiffnesses(n)), 60, 61, "--at sheave_stiffness=VALUE.*--panel AXIS"),
+    "map": (map_of, 60, 61, "--at sheave_stiffness=VALUE.*--panel AXIS"),
     "value map": (
         lambda n: value_map_figure(ratios(n), ["efficiency"], sides=Sides(panel="ratio")),
         15,
@@ -109,7 +116,7 @@ def test_what_a_page_holds_is_drawn_with_texts_apart_and_more_is_refused(kind, m
 
 
 def test_a_map_of_many_panels_gives_its_frequencies_up_before_it_is_refused():
-    few, many = map_figure(stiffnesses(12)), map_figure(stiffnesses(40))
+    few, many = map_of(12), map_of(60)
     bars = [[ax.get_ylabel() for ax in one.axes if ax.get_label() == "<colorbar>"] for one in (few, many)]
     assert bars == [["amplitude [µm]", "frequency [Hz]"], ["amplitude [µm]"]]
     assert many.get_size_inches()[1] > 7 * LEAST  # of seven rows

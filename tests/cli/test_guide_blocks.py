@@ -254,7 +254,7 @@ def _named(key, job, stem):
 
 
 @pytest.fixture
-def folder(tmp_path, monkeypatch):
+def folder(tmp_path, monkeypatch, unarranged):
     """An empty folder with the jobs alone."""
     shutil.copytree(ROOT / "jobs", tmp_path / "jobs", ignore=shutil.ignore_patterns("results", "notebooks"))
     (tmp_path / "jobs" / "results").mkdir()

@@ -87,7 +87,7 @@ def maps(draw):
     return truth, spacings
 
 
-@settings(max_examples=150)
+@settings(max_examples=80)
 @given(maps())
 def test_every_patch_of_which_a_cell_is_run_is_found_whole(found):
     truth, spacings = found

@@ -21,9 +21,9 @@ from support.recorded import assert_same_numbers, frames_written, records
 from support.sweeps import PATIENCE, call, environment
 
 JOB = Path(__file__).parents[2] / "jobs" / "uncertain_criterion.toml"
-FEW = ("--set", "friction_gradient=-0.5", "--set", "radial_speed=[0.05, 0.07, 0.09, 0.12, 0.15, 0.2]")
-RUNS = 6 * 32
-# The command line, killed as it begins to write its third batch of records.
+FEW = ("--set", "friction_gradient=-0.5", "--set", "radial_speed=[0.05, 0.09, 0.15]")
+RUNS = 3 * 32
+# The command line, killed as it begins to write its second batch of records.
 KILLED = """
 import os, signal, sys
 from cvt_hpc.cli import main
@@ -31,7 +31,7 @@ from cvt_hpc.study.record.log import RecordLog
 write, batches = RecordLog.append, []
 def append(self, records):
     batches.append(len(records))
-    if len(batches) == 3:
+    if len(batches) == 2:
         os.kill(os.getpid(), signal.SIGKILL)
     write(self, records)
 RecordLog.append = append
@@ -65,16 +65,14 @@ def test_a_sweep_that_is_killed_and_grows_has_the_numbers_of_an_undisturbed_one(
     larger = (*FEW, "--set", "uncertain.samples=64")
     grown = call("run", JOB, *larger, "--out", "killed", cwd=tmp_path, ranks=2)
     assert grown.returncode == 0, grown.stderr
-    assert "the study grows from 192 to 384 runs" in grown.stderr
+    assert "the study grows from 96 to 192 runs" in grown.stderr
     assert main(["run", str(JOB), *larger, "--out", "whole"]) == 0
     found, whole = load_results(tmp_path / "killed"), load_results(tmp_path / "whole")
     assert_same_numbers(found, whole)
     assert_same_numbers(found.isel(sample=slice(32)), half)
     assert cf_findings(tmp_path / "whole" / "results.nc") == []
 
-    assert main(["map", "whole"]) == 0
     assert main(["map", "whole", "--show", "slip_probability"]) == 0
-    assert main(["report", "whole"]) == 0
     capsys.readouterr()
     assert main(["plot", "onset_bands", "whole"]) == 2
     assert "results over samples, radial_speed with numbers, and a further axis" in capsys.readouterr().err
