@@ -33,7 +33,8 @@ def check_gaps(times: Samples, courses: Iterable[Samples], unit: str, named: Cal
         f"{from_si(float(t), 's', unit):g} {unit}" for t in (*times[row - 1 : row + 1], most)
     )
     expected = f"no step over {longest} ({GAP:g} median ones) where a value changes"
-    raise mismatch(named(row), expected, f"a gap from {first} to {last}")
+    then = "write rows between them if the course is a straight line there"
+    raise mismatch(named(row), expected, f"a gap from {first} to {last}", then)
 
 
 def check_range(

@@ -237,7 +237,7 @@ SAMPLED = "\n".join(["time [s],load [N m]", *(f"{k / 100 + (k > 25)},{80 + k % 3
         ),
         (
             "time [ms],load [N m]\n0,1\n100,2\n200,3\n701,4\n800,4\n",
-            "line 5: expected no step over 500 ms .5 median ones. where a value changes, found a gap from 200 ms to 701 ms",
+            "line 5: expected no step over 500 ms .5 median ones. where a value changes, found a gap from 200 ms to 701 ms; write rows",
         ),
         ("time [s],load [rpm]\n0,1\n1,2\n", "line 1: expected load .N m., found"),
         ("time [s],grip [N]\n0,1\n1,2\n", "expected columns among time"),
