@@ -5,7 +5,7 @@
 The uncertain parameters of jobs/uncertain_lebrecht.toml, of which SAMPLES are candidates. HIDDEN others play the
 variator: the noise of each is measured at all loads, one cell in twenty wrongly, frequencies with an error of 20 Hz.
 A line for each parameter of each: its value, the 95 % band before and after, and whether it lies inside; and one
-for the combination of all of which the noise tells most, in standard deviations. Some four core-minutes; what OUT
+for the combination of all of which the noise tells most, in standard deviations. Some eight core-minutes; what OUT
 has of it is not run again.
 """
 
@@ -23,7 +23,7 @@ from cvt_hpc.storage.provenance import origin_lines
 from cvt_hpc.variables import Vibrates
 
 JOB = Path(__file__).parents[2] / "jobs" / "uncertain_lebrecht.toml"
-SAMPLES, HIDDEN, WRONG, SCATTER = 128, 10, 0.05, 20.0  # candidates, variators, share of cells, [Hz]
+SAMPLES, HIDDEN, WRONG, SCATTER = 256, 16, 0.05, 20.0  # candidates, variators, share of cells, [Hz]
 HEAD = (
     "load_from [N m],load_to [N m],measured_load_from [N m],measured_load_to [N m],"
     "frequency_from [Hz],frequency_to [Hz]"
