@@ -53,10 +53,9 @@ def check_range(
     span = f"{from_si(low, parameter.unit, unit):.7g} to {told(high)}"
     if (beyond := np.flatnonzero(size > high)).size:
         row = int(beyond[0])
-        expected = f"{key} within the range of the model, {span}"
-        raise mismatch(
-            named(row), expected + " in size" * (parameter.minimum < 0.0), told(column.values[row])
-        )
+        most = told(high) + " in size" * (parameter.minimum < 0.0)
+        expected = f"{key} within the range of the model, up to {most}"
+        raise mismatch(named(row), expected, told(column.values[row]))
     row = int(np.argmax(size) if parameter.minimum < 0.0 else np.argmin(size))
     if 0.0 < size[row] < low:
         read = f"{key} {told(column.values[row])} is below the usual {span}"

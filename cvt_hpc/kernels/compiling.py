@@ -268,7 +268,7 @@ class _Compiler(Compiler):
         super().__init__(typing_context, _context(), *others)
 
     def define_pipelines(self) -> list[Any]:
-        """Return the compiler's passes; no arrays are made with lanes, nor have expressions to be merged."""
+        """Return the compiler's passes; with lanes no arrays are made, whose expressions would be merged."""
         (found,) = super().define_pipelines()
         if not self.state.flags.nrt:
             found.passes[:] = [p for p in found.passes if p[0] is not NopythonRewrites]

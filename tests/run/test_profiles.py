@@ -179,7 +179,7 @@ def test_a_long_file_is_averaged_over_equal_parts(tmp_path):
         (
             (1.0, 2.9e6),
             "rpm",
-            "entry 2: expected driving_speed within the range of the model, 9.549297 to 7639.437 rpm, "
+            "entry 2: expected driving_speed within the range of the model, up to 7639.437 rpm, "
             "found 2900000 rpm",
         ),
     ],
@@ -229,11 +229,11 @@ SAMPLED = "\n".join(["time [s],load [N m]", *(f"{k / 100 + (k > 25)},{80 + k % 3
         ("time [s],speed [rpm]\n0,2900\n0.1,-2950\n", "a driving_speed above 0, found -2950 rpm"),
         (
             "time [s],load [kN m]\n0,1\n1,-2.001\n2,9\n",
-            "rig.csv: line 3: expected load within the range of the model, 0.0005 to 2 kN m in size, found -2.001 kN m",
+            "rig.csv: line 3: expected load within the range of the model, up to 2 kN m in size, found -2.001 kN m",
         ),
         (
             "time [s],thrust [N]\n0,3e6\n1,5e4\n",
-            r"rig.csv: line 2: expected thrust within .*, 500 to 2000000 N, found 3000000 N",
+            r"rig.csv: line 2: expected thrust within .*, up to 2000000 N, found 3000000 N",
         ),
         (
             "time [ms],load [N m]\n0,1\n100,2\n200,3\n701,4\n800,4\n",

@@ -73,6 +73,7 @@ def test_a_sweep_that_is_killed_and_grows_has_the_numbers_of_an_undisturbed_one(
     assert cf_findings(tmp_path / "whole" / "results.nc") == []
 
     assert main(["map", "whole", "--show", "slip_probability"]) == 0
+    assert main(["report", "whole"]) == 0
     capsys.readouterr()
     assert main(["plot", "onset_bands", "whole"]) == 2
     assert "results over samples, radial_speed with numbers, and a further axis" in capsys.readouterr().err
