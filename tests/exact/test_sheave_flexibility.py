@@ -6,7 +6,6 @@ from pathlib import Path
 
 import numpy as np
 import pytest
-import xarray as xr
 
 from cvt_hpc.errors import InputError
 from cvt_hpc.physics.deflection import table_problem
@@ -14,7 +13,6 @@ from support.plates import deflection, frequency, rigidity
 
 SCRIPT = Path(__file__).parents[2] / "jobs" / "sheave_flexibility.py"
 MADE = runpy.run_path(str(SCRIPT))
-PUSHBELT = runpy.run_path(str(SCRIPT.with_name("pushbelt_flexibility.py")))
 INNER, OUTER, RADIUS = 0.02, 0.08, 0.05
 FLAT = MADE["Disc"](INNER, OUTER, 1e-3, 1e-3, 0.0, 1e-3, 2.1e11, 0.3, 7850.0, 1.25e-3)
 
@@ -142,16 +140,3 @@ def test_sizes_that_cannot_be_get_one_line(arguments, told, tmp_path):
         MADE["write"]([str(tmp_path / "discs"), *arguments])
     assert str(error.value) == told
     assert not (tmp_path / "discs").exists()
-
-
-@pytest.mark.parametrize("pulley", ["driving", "driven"])
-def test_modes_of_the_pushbelt_with_all_harmonics_are_the_stored_table_of_flexibilities(pulley):
-    with xr.open_dataset(SCRIPT.parent / "sheave" / f"{pulley}.nc") as discs:
-        discs.load()
-    rigid, soft = (PUSHBELT["stiffness"](pulley, 500, collar, RADIUS) for collar in (np.inf, 1e6))
-    assert rigid[1::2] == rigid[2::2]  # cos and sin
-    found = MADE["table"](2.0 / np.array(rigid[::2]), discs["angle"].to_numpy())  # both sheaves of a groove
-    np.testing.assert_allclose(found, discs["flexibility"], rtol=1e-9, atol=1e-9 * found[0])
-    turned = 1.0 / np.array(soft[::2]) - 1.0 / np.array(rigid[::2])
-    np.testing.assert_allclose(turned[1], RADIUS**2 / 2e6)  # half of the torque turns each of the sheaves
-    np.testing.assert_allclose(np.delete(turned, 1), 0.0, atol=1e-18)
