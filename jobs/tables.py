@@ -2,6 +2,7 @@
 
     python jobs/tables.py list [NAME ...]   # revision, date, cost, state; of a NAME what has changed since
     python jobs/tables.py make NAME ...     # from HEAD alone, cheapest first; --stale: all that are stale
+    python jobs/tables.py confirm REVISION  # that HEAD computes the same, bit for bit; some twenty minutes
     python jobs/tables.py check             # some rows are computed again
 
 A line `# made by: COMMANDS` on top of a table has the shell commands that write $TABLE, and keep what
@@ -9,6 +10,8 @@ they need in the folder $OUT. Pictures that they write as ${TABLE%.csv}.png, or 
 beside it. A table is older than the code where anything that it rests on has changed since its revision:
 its job, its scripts, its data, and the modules of its models, its steppers and its experiment, with all
 that these import. Of the package, only rooms that compute count. Comments and docstrings do not count.
+A table that was as the code at a revision, of which later code computes the same bits (`tests/bits.py`),
+is as that code: a line `# confirmed at: REVISION` takes the place of making it again.
 
 Exit status 1: a table could not be made, or a row differs; 2: bad input.
 """
@@ -49,7 +52,8 @@ ROOT = Path(__file__).resolve().parents[1]
 sys.path.insert(0, str(ROOT / "jobs"))
 from tabulate import OF_A_BELT, rows  # noqa: E402
 
-MADE_BY, COST, OLDER = "made by", "cost", "older than the code"  # lines on top of a table
+# lines on top of a table
+MADE_BY, COST, OLDER, CONFIRMED = "made by", "cost", "older than the code", "confirmed at"
 UNKNOWN, DIRTY, STORED = "unknown revision", "dirty revision", "revision of storing it"
 
 # Rooms of the package that compute, or judge what was computed: numbers depend on no other.
@@ -98,8 +102,8 @@ class Table:
 
     @property
     def revisions(self):
-        """Revisions that are told."""
-        return re.findall(r"\b[0-9a-f]{40}\b", self.told.get("revision", ""))
+        """Revisions whose code gives it, as told."""
+        return re.findall(r"\b[0-9a-f]{40}\b", self.told.get(CONFIRMED, self.told.get("revision", "")))
 
     @cached_property
     def doubts(self):
@@ -164,10 +168,14 @@ def rests_on(made_by):
     while left:
         found.add(path := left.pop())
         left |= needs(path) - found
-    computing = {
-        path for path in found if package not in path.parents or path.parts[len(package.parts)] in COMPUTING
-    }
+    computing = {path for path in found if package not in path.parents or computes(path)}
     return computing | (modules("cvt_hpc.papers") if "cvt-hpc figure" in made_by else set())
+
+
+def computes(path):
+    """Whether a file is of a room of the package that computes."""
+    place = path.relative_to(ROOT).parts
+    return place[0] == "cvt_hpc" and place[1] in COMPUTING
 
 
 @cache
@@ -258,8 +266,14 @@ def objects(revision):
 
 def differs(path, revision):
     """Whether a file says something else to the machine than in a revision."""
-    there, (name, says) = objects(revision).get(path), of_file(path)
-    return there is None or (there != name and of_object(there, path.suffix) != says)
+    name, now = of_file(path)
+    return objects(revision).get(path) != name and says(path, revision) != now
+
+
+def says(path, revision):
+    """What a file says to the machine in a revision; None where there is none."""
+    name = objects(revision).get(path)
+    return name and of_object(name, path.suffix)
 
 
 @cache
@@ -317,12 +331,7 @@ def show(names):
 def make(names, stale):
     """Make tables again, the cheapest first, with the files of HEAD and no machine code; 1 if one fails."""
     wanted = [table for table in tables(names) if table.is_stale or not stale]
-    for table in wanted:
-        if later := sorted(path for path in rests_on(table.made_by) if differs(path, "HEAD")):
-            files = ", ".join(str(path.relative_to(ROOT)) for path in later)
-            raise mismatch(
-                table.name, "all that it rests on as in HEAD, of which it is made", f"changes of {files}"
-            )
+    refuse_uncommitted(wanted)
     failed, folder = [], Path(tempfile.mkdtemp())
     (tree := folder / "tree").mkdir()
     subprocess.run(["tar", "-x", "-C", tree], input=git("archive", "HEAD"), check=True)
@@ -336,6 +345,14 @@ def make(names, stale):
         shutil.rmtree(folder)
     print(f"{len(wanted) - len(failed)} made" + f", not {', '.join(failed)}" * bool(failed))
     return int(bool(failed))
+
+
+def refuse_uncommitted(wanted):
+    """Raise InputError where a table rests on what is not committed."""
+    for table in wanted:
+        if later := sorted(path for path in rests_on(table.made_by) if differs(path, "HEAD")):
+            files = ", ".join(str(path.relative_to(ROOT)) for path in later)
+            raise mismatch(table.name, "all that it rests on as in HEAD", f"changes of {files}")
 
 
 def made(table, work):
@@ -374,6 +391,28 @@ def made(table, work):
         with written_aside(table.path.with_name(picture.name.replace("table", table.path.stem, 1))) as aside:
             shutil.copyfile(picture, aside)
     return ""
+
+
+def confirm(revision):
+    """Tell in tables that were as the code at a revision that HEAD computes its bits; 1 if it does not."""
+    head, found = git("rev-parse", "HEAD").decode().strip(), []
+    gone = {path for path in objects(revision) if computes(path) and not path.exists()}
+    for table in (table for table in tables() if table.changed and not {UNKNOWN, DIRTY} & {*table.doubts}):
+        paths = rests_on(table.made_by)
+        was = all(says(p, r) == says(p, revision) for p in paths | gone for r in table.revisions)
+        # what the comparison of bits does not run, such as scripts, has to be the same
+        if was and not any(differs(path, revision) for path in paths if not computes(path)):
+            found.append(table)
+    refuse_uncommitted(found)
+    if subprocess.run([sys.executable, "tests/bits.py", revision, head], cwd=ROOT).returncode:
+        return 1
+    for table in found:
+        first, *lines = table.path.read_text(encoding="utf-8").splitlines(keepends=True)
+        kept = [line for line in lines if not line.startswith(f"# {CONFIRMED}: ")]
+        with written_aside(table.path) as aside:
+            aside.write_text("".join([first, f"# {CONFIRMED}: {head}\n", *kept]), encoding="utf-8")
+    print(f"{len(found)} confirmed: {', '.join(table.name for table in found)}")
+    return 0
 
 
 def spent():
@@ -468,6 +507,7 @@ def main(arguments=None):
     commands.choices["make"].add_argument(
         "--stale", action="store_true", help="those that may be older than the code"
     )
+    commands.add_parser("confirm", help="that HEAD computes the bits of a revision").add_argument("revision")
     checking = commands.add_parser("check", help="compute some rows again")
     day = datetime.date.today().toordinal()
     checking.add_argument("--turn", type=int, default=day, help="which rows (default: by the day)")
@@ -478,6 +518,8 @@ def main(arguments=None):
     try:
         if asked.command == "list":
             return show(asked.names)
+        if asked.command == "confirm":
+            return confirm(asked.revision)
         if asked.command == "check":
             return check(asked.turn, asked.seconds)
         if not asked.names and not asked.stale:
