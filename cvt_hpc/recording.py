@@ -8,7 +8,7 @@ from cvt_hpc.vibration.ramped import along_ramp, ramped
 from cvt_hpc.vibration.settings import LEAST_PERIODS, band
 
 LONGEST = 4  # times the duration
-LEAST_SAMPLES_PER_PERIOD = 4  # of the band's highest frequency: amplitudes need 2, spectra and pictures more
+_LEAST_SAMPLES_PER_PERIOD = 4  # of the band's highest frequency: amplitudes need 2, spectra and pictures more
 
 PARAMETERS: dict[str, dict[str, Parameter]] = {
     "run": {
@@ -81,9 +81,9 @@ def check(parameters: Parameters) -> list[tuple[str, str, str]]:
         if first < least * (1.0 - 1e-9):
             expected = f"{least:g} s or more, of which the last {share:g} can be judged"
             problems.append(("shortest_duration", expected, f"{parameters['shortest_duration']:g} s"))
-    needed = LEAST_SAMPLES_PER_PERIOD * parameters["band_high"]
+    needed = _LEAST_SAMPLES_PER_PERIOD * parameters["band_high"]
     if parameters["sampling_rate"] < needed:
-        expected = f"{LEAST_SAMPLES_PER_PERIOD} x band_high = {needed:g} Hz or more"
+        expected = f"{_LEAST_SAMPLES_PER_PERIOD} x band_high = {needed:g} Hz or more"
         problems.append(("sampling_rate", expected, f"{parameters['sampling_rate']:g} Hz"))
     if parameters["spectrum_step"] > parameters["band_high"]:
         expected = f"band_high = {parameters['band_high']:g} Hz or less"
