@@ -209,8 +209,8 @@ def is_certain(record: Mapping[str, Any], parameters: Mapping[str, Any], left: f
     Its amplitude is _CERTAIN_FACTOR times above or below the threshold, and stays so as it grows or decays
     over the time that is left [s], by twice the error of its growth rate; of a vibration it changes by less
     than UNSETTLED. Where the judged part is so short that it cuts the band off above the first modes, a
-    slower motion may be left. The record has `vibrates` and VARIABLES; of the parameters those of
-    [vibration], `duration` and `judged_fraction` count.
+    slower motion may be left. The record has `vibrates` and VARIABLES, of each strand or of a single body; of
+    the parameters those of [vibration], `duration` and `judged_fraction` count.
     """
     if record["vibrates"] not in (Vibrates.YES, Vibrates.NO) or "growth_rate" not in record:
         return False
@@ -218,14 +218,15 @@ def is_certain(record: Mapping[str, Any], parameters: Mapping[str, Any], left: f
     if not parameters["band_low"] and record["lower_band_edge"] <= LEAST_PERIODS / judged * (1.0 + 1e-9):
         return False
     threshold = parameters["amplitude_threshold"]
-    rate, error = (np.nan_to_num(record[name]) for name in ("growth_rate", "growth_error"))
+    names = "amplitude", "growth_rate", "growth_error", "amplitude_scatter"
+    amplitude, rate, error, scatter = (np.atleast_1d(np.nan_to_num(record[name])) for name in names)
     with np.errstate(divide="ignore"):
-        levels = np.log(np.asarray(record["amplitude"]) / threshold)
+        levels = np.log(amplitude / threshold)
     if record["vibrates"] == Vibrates.NO:
         return bool(np.all(levels + np.maximum(rate + 2.0 * error, 0.0) * left <= -np.log(_CERTAIN_FACTOR)))
     strongest = int(np.argmax(levels))
     most, spread = rate[strongest], 2.0 * error[strongest]
-    is_settled = abs(most) * judged <= _UNSETTLED and record["amplitude_scatter"][strongest] <= _UNSETTLED
+    is_settled = abs(most) * judged <= _UNSETTLED and scatter[strongest] <= _UNSETTLED
     lowest = levels[strongest] + min(most - spread, 0.0) * left
     return bool(is_settled and lowest >= np.log(_CERTAIN_FACTOR))
 
