@@ -77,7 +77,8 @@ def check(parameters: Parameters) -> list[tuple[str, str, str]]:
         problems.append(("longest_duration", expected, f"{longest:g} s"))
     if (first := first_duration(parameters)) < duration:
         share, (low, _) = parameters["judged_fraction"], band(parameters)
-        least = max(parameters.get("rise_time", 0.0) / (1.0 - share), LEAST_PERIODS / (share * low))
+        rise = parameters.get("rise_time", 0.0)  # a model that has one refuses to judge all of a run
+        least = max(rise / (1.0 - share) if rise else 0.0, LEAST_PERIODS / (share * low))
         if first < least * (1.0 - 1e-9):
             expected = f"{least:g} s or more, of which the last {share:g} can be judged"
             problems.append(("shortest_duration", expected, f"{parameters['shortest_duration']:g} s"))
