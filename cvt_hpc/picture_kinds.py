@@ -85,7 +85,7 @@ BANDWIDTH = Option(
     "--bandwidth",
     {"type": float, "metavar": "ORDERS"},
 )
-VELOCITY = Option("velocity", "of velocities in the place of displacements", "--velocity", _FLAG)
+_VELOCITY = Option("velocity", "of velocities in the place of displacements", "--velocity", _FLAG)
 LEVEL = Option("level", "RMS levels in dB in the place of amplitudes", "--level", _FLAG)
 
 KINDS = {
@@ -208,7 +208,7 @@ KINDS = {
             ),
             ORDERS,
             BANDWIDTH,
-            VELOCITY,
+            _VELOCITY,
             LEVEL,
         ),
     ),
@@ -216,7 +216,7 @@ KINDS = {
         RESULTS,
         "orders.order_cuts_figure",
         "orders of the pulleys' turns and of passing elements over the driving speeds of a study",
-        (ORDERS, BANDWIDTH, VELOCITY, LEVEL),
+        (ORDERS, BANDWIDTH, _VELOCITY, LEVEL),
     ),
     "third_octaves": Kind(
         HISTORIES,
@@ -231,7 +231,7 @@ KINDS = {
                 True,
                 True,
             ),
-            VELOCITY,
+            _VELOCITY,
         ),
     ),
     "element": Kind(

@@ -27,8 +27,8 @@ if TYPE_CHECKING:
     from cvt_hpc.study.forecast.resources import Disk, Needs
     from cvt_hpc.study.repeats import Repeat
 
-MOST_FAILURES_NAMED = 10
-MOST_CONTRADICTIONS_NAMED = 20
+_MOST_FAILURES_NAMED = 10
+_MOST_CONTRADICTIONS_NAMED = 20
 _KNOWN_OF_FAILURES = (
     *("status", "reason", "core_seconds", "simulated_seconds", "time_step", "refinements", "steps"),
     "contact_solves",
@@ -102,7 +102,7 @@ def step_check_lines(check: Repeat, found: Comparison) -> Iterator[str]:
     drawn, eligible = int(check.sample.sum()), int(check.may_be_drawn.sum())
     yield f"step check: {drawn} of {eligible} runs that took steps done again {check.way}"
     yield f"  {contradictions(found, check.way)}"
-    yield from islice(map(_cell_line, found.rows(found.contradicts)), MOST_CONTRADICTIONS_NAMED)
+    yield from islice(map(_cell_line, found.rows(found.contradicts)), _MOST_CONTRADICTIONS_NAMED)
     yield from (f"  {line}" for line in deviations(found))
 
 
@@ -151,8 +151,8 @@ def _design_lines(found: Comparison) -> Iterator[str]:
 
 def _cell_lines(found: Comparison, chosen: NDArray[np.bool_]) -> Iterator[str]:
     """Yield a line for each of the first cells that are chosen, and the number of the others."""
-    yield from map(_cell_line, islice(found.rows(chosen), MOST_CONTRADICTIONS_NAMED))
-    if (left := int(chosen.sum()) - MOST_CONTRADICTIONS_NAMED) > 0:
+    yield from map(_cell_line, islice(found.rows(chosen), _MOST_CONTRADICTIONS_NAMED))
+    if (left := int(chosen.sum()) - _MOST_CONTRADICTIONS_NAMED) > 0:
         yield f"  {left} more in the table"
 
 
@@ -169,10 +169,10 @@ def _cell_line(cell: Cell) -> str:
 
 def trouble_lines(report: RunReport) -> Iterator[str]:
     """Yield the lines that name the failed runs of a sweep, ten at most, and say why it stopped early."""
-    for run in report.failed[:MOST_FAILURES_NAMED]:
+    for run in report.failed[:_MOST_FAILURES_NAMED]:
         place = f" ({run.place})" if run.place else ""
         yield f"run {run.index}{place}: {run.status}: {run.reason}"
-    unnamed = len(report.failed) - MOST_FAILURES_NAMED
+    unnamed = len(report.failed) - _MOST_FAILURES_NAMED
     if unnamed > 0:
         yield f"{unnamed} more runs failed; `status` and `reason` in the results tell which"
     failed = {run.status for run in report.failed}

@@ -8,7 +8,7 @@ from cvt_hpc.vibration.ramped import along_ramp, ramped
 from cvt_hpc.vibration.settings import LEAST_PERIODS, band
 
 LONGEST = 4  # times the duration
-LEAST_SAMPLES_PER_PERIOD = 4  # of the band's highest frequency: amplitudes need 2, spectra and pictures more
+_LEAST_SAMPLES_PER_PERIOD = 4  # of the band's highest frequency: amplitudes need 2, spectra and pictures more
 
 PARAMETERS: dict[str, dict[str, Parameter]] = {
     "run": {
@@ -77,13 +77,14 @@ def check(parameters: Parameters) -> list[tuple[str, str, str]]:
         problems.append(("longest_duration", expected, f"{longest:g} s"))
     if (first := first_duration(parameters)) < duration:
         share, (low, _) = parameters["judged_fraction"], band(parameters)
-        least = max(parameters.get("rise_time", 0.0) / (1.0 - share), LEAST_PERIODS / (share * low))
+        rise = parameters.get("rise_time", 0.0)  # a model that has one refuses to judge all of a run
+        least = max(rise / (1.0 - share) if rise else 0.0, LEAST_PERIODS / (share * low))
         if first < least * (1.0 - 1e-9):
             expected = f"{least:g} s or more, of which the last {share:g} can be judged"
             problems.append(("shortest_duration", expected, f"{parameters['shortest_duration']:g} s"))
-    needed = LEAST_SAMPLES_PER_PERIOD * parameters["band_high"]
+    needed = _LEAST_SAMPLES_PER_PERIOD * parameters["band_high"]
     if parameters["sampling_rate"] < needed:
-        expected = f"{LEAST_SAMPLES_PER_PERIOD} x band_high = {needed:g} Hz or more"
+        expected = f"{_LEAST_SAMPLES_PER_PERIOD} x band_high = {needed:g} Hz or more"
         problems.append(("sampling_rate", expected, f"{parameters['sampling_rate']:g} Hz"))
     if parameters["spectrum_step"] > parameters["band_high"]:
         expected = f"band_high = {parameters['band_high']:g} Hz or less"

@@ -20,7 +20,8 @@ from cvt_hpc.steppers import STEPPERS
 from cvt_hpc.tables import below_origin
 
 ROOT = Path(__file__).resolve().parents[1]
-MADE_BY, COST, OLDER = "made by", "cost", "older than the code"  # lines on top of a table
+# lines on top of a table
+MADE_BY, COST, OLDER, CONFIRMED = "made by", "cost", "older than the code", "confirmed at"
 UNKNOWN, DIRTY, STORED = "unknown revision", "dirty revision", "revision of storing it"
 
 # Rooms of the package that compute, or judge what was computed: numbers depend on no other.
@@ -64,8 +65,8 @@ class Table:
 
     @property
     def revisions(self):
-        """Revisions that are told."""
-        return re.findall(r"\b[0-9a-f]{40}\b", self.told.get("revision", ""))
+        """Revisions whose code gives it, as told."""
+        return re.findall(r"\b[0-9a-f]{40}\b", self.told.get(CONFIRMED, self.told.get("revision", "")))
 
     @cached_property
     def doubts(self):
@@ -130,10 +131,14 @@ def rests_on(made_by):
     while left:
         found.add(path := left.pop())
         left |= needs(path) - found
-    computing = {
-        path for path in found if package not in path.parents or path.parts[len(package.parts)] in COMPUTING
-    }
+    computing = {path for path in found if package not in path.parents or computes(path)}
     return computing | (modules("cvt_hpc.papers") if "cvt-hpc figure" in made_by else set())
+
+
+def computes(path):
+    """Whether a file is of a room of the package that computes."""
+    place = path.relative_to(ROOT).parts
+    return place[0] == "cvt_hpc" and place[1] in COMPUTING
 
 
 @cache
@@ -224,8 +229,14 @@ def objects(revision):
 
 def differs(path, revision):
     """Whether a file says something else to the machine than in a revision."""
-    there, (name, says) = objects(revision).get(path), of_file(path)
-    return there is None or (there != name and of_object(there, path.suffix) != says)
+    name, now = of_file(path)
+    return objects(revision).get(path) != name and says(path, revision) != now
+
+
+def says(path, revision):
+    """What a file says to the machine in a revision; None where there is none."""
+    name = objects(revision).get(path)
+    return name and of_object(name, path.suffix)
 
 
 @cache

@@ -2,6 +2,7 @@
 
     python jobs/tables.py list [NAME ...]   # revision, date, cost, state; of a NAME what has changed since
     python jobs/tables.py make NAME ...     # from HEAD alone, cheapest first; --stale: all that are stale
+    python jobs/tables.py confirm REVISION  # that HEAD computes the same, bit for bit; some twenty minutes
     python jobs/tables.py check             # some rows, and some tables of scripts, are computed again
 
 A line `# made by: COMMANDS` on top of a table has the shell commands that write $TABLE, and keep what
@@ -9,6 +10,8 @@ they need in the folder $OUT. Pictures that they write as ${TABLE%.csv}.png, or 
 beside it. A table is older than the code where anything that it rests on has changed since its revision:
 its job, its scripts, its data, and the modules of its models, its steppers and its experiment, with all
 that these import. Of the package, only rooms that compute count. Comments and docstrings do not count.
+A table that was as the code at a revision, of which later code computes the same bits (`tests/bits.py`),
+is as that code: a line `# confirmed at: REVISION` takes the place of making it again.
 
 Exit status 1: a table could not be made, or a row differs; 2: bad input.
 """
@@ -37,7 +40,21 @@ from cvt_hpc.tables import below_origin, columns
 
 ROOT = Path(__file__).resolve().parents[1]
 sys.path.insert(0, str(ROOT / "jobs"))
-from stored_tables import COST, MADE_BY, OLDER, differs, git, rests_on, tables  # noqa: E402
+from stored_tables import (  # noqa: E402
+    CONFIRMED,
+    COST,
+    DIRTY,
+    MADE_BY,
+    OLDER,
+    UNKNOWN,
+    computes,
+    differs,
+    git,
+    objects,
+    rests_on,
+    says,
+    tables,
+)
 from tabulate import OF_A_BELT, rows  # noqa: E402
 
 # Commands of a row for each run of a study, and those of tables of costs, which no second run repeats.
@@ -79,12 +96,7 @@ def show(names):
 def make(names, stale):
     """Make tables again, the cheapest first, with the files of HEAD and no machine code; 1 if one fails."""
     wanted = [table for table in tables(names) if table.is_stale or not stale]
-    for table in wanted:
-        if later := sorted(path for path in rests_on(table.made_by) if differs(path, "HEAD")):
-            files = ", ".join(str(path.relative_to(ROOT)) for path in later)
-            raise mismatch(
-                table.name, "all that it rests on as in HEAD, of which it is made", f"changes of {files}"
-            )
+    refuse_uncommitted(wanted)
     failed, folder = [], Path(tempfile.mkdtemp())
     (tree := folder / "tree").mkdir()
     subprocess.run(["tar", "-x", "-C", tree], input=git("archive", "HEAD"), check=True)
@@ -101,6 +113,14 @@ def make(names, stale):
         shutil.rmtree(folder)
     print(f"{len(wanted) - len(failed)} made" + f", not {', '.join(failed)}" * bool(failed))
     return int(bool(failed))
+
+
+def refuse_uncommitted(wanted):
+    """Raise InputError where a table rests on what is not committed."""
+    for table in wanted:
+        if later := sorted(path for path in rests_on(table.made_by) if differs(path, "HEAD")):
+            files = ", ".join(str(path.relative_to(ROOT)) for path in later)
+            raise mismatch(table.name, "all that it rests on as in HEAD", f"changes of {files}")
 
 
 def written(table, work, tree, **environment):
@@ -143,6 +163,28 @@ def made(table, work):
     for picture in work.glob("table*.png"):
         with written_aside(table.path.with_name(picture.name.replace("table", table.path.stem, 1))) as aside:
             shutil.copyfile(picture, aside)
+
+
+def confirm(revision):
+    """Tell in tables that were as the code at a revision that HEAD computes its bits; 1 if it does not."""
+    head, found = git("rev-parse", "HEAD").decode().strip(), []
+    gone = {path for path in objects(revision) if computes(path) and not path.exists()}
+    for table in (table for table in tables() if table.changed and not {UNKNOWN, DIRTY} & {*table.doubts}):
+        paths = rests_on(table.made_by)
+        was = all(says(p, r) == says(p, revision) for p in paths | gone for r in table.revisions)
+        # what the comparison of bits does not run, such as scripts, has to be the same
+        if was and not any(differs(path, revision) for path in paths if not computes(path)):
+            found.append(table)
+    refuse_uncommitted(found)
+    if subprocess.run([sys.executable, "tests/bits.py", revision, head], cwd=ROOT).returncode:
+        return 1
+    for table in found:
+        first, *lines = table.path.read_text(encoding="utf-8").splitlines(keepends=True)
+        kept = [line for line in lines if not line.startswith(f"# {CONFIRMED}: ")]
+        with written_aside(table.path) as aside:
+            aside.write_text("".join([first, f"# {CONFIRMED}: {head}\n", *kept]), encoding="utf-8")
+    print(f"{len(found)} confirmed: {', '.join(table.name for table in found)}")
+    return 0
 
 
 def spent():
@@ -262,6 +304,7 @@ def main(arguments=None):
     commands.choices["make"].add_argument(
         "--stale", action="store_true", help="those that may be older than the code"
     )
+    commands.add_parser("confirm", help="that HEAD computes the bits of a revision").add_argument("revision")
     checking = commands.add_parser("check", help="compute some rows again")
     day = datetime.date.today().toordinal()
     checking.add_argument("--turn", type=int, default=day, help="which rows (default: by the day)")
@@ -272,6 +315,8 @@ def main(arguments=None):
     try:
         if asked.command == "list":
             return show(asked.names)
+        if asked.command == "confirm":
+            return confirm(asked.revision)
         if asked.command == "check":
             return check(asked.turn, asked.seconds)
         if not asked.names and not asked.stale:

@@ -19,13 +19,13 @@ from cvt_hpc.errors import few_of, mismatch, show, unknown
 from cvt_hpc.job.values import shown_as_read, shown_number, shown_unit
 
 EVEN, EQUAL = 1.5, 1.01  # of steps: largest over smallest, below which they are taken for even
-LEAST_SPAN = 4.0  # last over first value of a logarithmic axis
+_LEAST_SPAN = 4.0  # last over first value of a logarithmic axis
 
 Fixed = Mapping[str, float | str]  # axes to fix: value by name, a number [SI] or a text
 At = Fixed | None
-MOST_VALUES_NAMED = 12
-FEW, FEW_ON_DECADES = 12, 6  # values of an axis that have ticks of their own
-FEW_DECADES = 2.5  # on which 1, 2 and 5 have labels, not powers of ten alone
+_MOST_VALUES_NAMED = 12
+FEW, _FEW_ON_DECADES = 12, 6  # values of an axis that have ticks of their own
+_FEW_DECADES = 2.5  # on which 1, 2 and 5 have labels, not powers of ten alone
 
 
 @dataclass(frozen=True)
@@ -196,7 +196,7 @@ def known_values(coordinate: xr.DataArray) -> str:
     numbers = (shown_number(value, coordinate.attrs) for value in coordinate.values.tolist())
     unit = shown_unit(coordinate.attrs)
     texts = [f"{value:g}" if isinstance(value, float) else str(value) for value in numbers]
-    return few_of(texts, MOST_VALUES_NAMED) + (f" [{unit}]" if unit else "")
+    return few_of(texts, _MOST_VALUES_NAMED) + (f" [{unit}]" if unit else "")
 
 
 def value_text(coordinate: xr.DataArray, index: int) -> str:
@@ -255,29 +255,31 @@ def ruler(coordinate: xr.DataArray) -> Ruler:
     values = coordinate.values
     if values.dtype.kind not in "iuf":
         centres = np.arange(float(values.size))
-        return Ruler(centres, edges_of(centres), centres, tuple(map(str, values)), axis_label(coordinate, ""))
+        return Ruler(
+            centres, _edges_of(centres), centres, tuple(map(str, values)), axis_label(coordinate, "")
+        )
     centres = values * factor
     finite = np.isfinite(centres)
     told = coordinate.attrs.get("spacing")
-    is_log = is_logarithmic(centres[finite]) if told is None else told == "log"
+    is_log = _is_logarithmic(centres[finite]) if told is None else told == "log"
     if np.all(finite):
         if is_log:
             return _logarithmic_ruler(centres, axis_label(coordinate, unit))
-        ticks, exact = (centres, short_numbers(centres)) if are_few(centres, FEW) else (None, ())
-        return Ruler(centres, edges_of(centres), ticks, exact, axis_label(coordinate, unit))
+        ticks, exact = (centres, short_numbers(centres)) if _are_few(centres, FEW) else (None, ())
+        return Ruler(centres, _edges_of(centres), ticks, exact, axis_label(coordinate, unit))
     known = centres[finite]
     texts = iter(short_numbers(known, is_log=is_log))
     labels = tuple(next(texts) if is_known else infinity_in_words(name) for is_known in finite)
-    known = on_decades(known) if is_log else known
+    known = _on_decades(known) if is_log else known
     gap = np.diff(known).mean() if known.size > 1 else 1.0
     centres[finite], centres[~finite] = known, (known[-1] if known.size else 0.0) + gap
-    return Ruler(centres, edges_of(centres), centres, labels, axis_label(coordinate, unit))
+    return Ruler(centres, _edges_of(centres), centres, labels, axis_label(coordinate, unit))
 
 
 def _logarithmic_ruler(values: NDArray[np.float64], label: str) -> Ruler:
     """A logarithmic axis: ticks at its values where they are few, else at 1, 2 and 5 or at powers of ten."""
-    centres, sign = on_decades(values), np.sign(values[0])
-    edges = edges_of(centres)
+    centres, sign = _on_decades(values), np.sign(values[0])
+    edges = _edges_of(centres)
     low, high = np.sort(sign * edges[[0, -1]])
     powers = 10.0 ** np.arange(np.floor(low), np.ceil(high) + 1)
 
@@ -285,37 +287,37 @@ def _logarithmic_ruler(values: NDArray[np.float64], label: str) -> Ruler:
         at = np.outer(powers, digits).ravel()
         return np.sort(sign * at[(np.log10(at) >= low) & (np.log10(at) <= high)])
 
-    digits = np.array([1.0, 2.0, 5.0] if high - low < FEW_DECADES else [1.0])
-    ticks = values if are_few(centres, FEW_ON_DECADES) else inside(digits)
-    minor = on_decades(inside(np.arange(1.0, 10.0)))
-    return Ruler(centres, edges, on_decades(ticks), short_numbers(ticks, is_log=True), label, minor)
+    digits = np.array([1.0, 2.0, 5.0] if high - low < _FEW_DECADES else [1.0])
+    ticks = values if _are_few(centres, _FEW_ON_DECADES) else inside(digits)
+    minor = _on_decades(inside(np.arange(1.0, 10.0)))
+    return Ruler(centres, edges, _on_decades(ticks), short_numbers(ticks, is_log=True), label, minor)
 
 
-def is_logarithmic(values: NDArray[np.float64]) -> bool:
+def _is_logarithmic(values: NDArray[np.float64]) -> bool:
     """Whether sorted numbers are of one sign and evenly spread by their logarithms alone."""
     if values.size < 3 or values[0] * values[-1] <= 0.0:
         return False
     sizes = np.sort(np.abs(values))
-    if sizes[-1] < LEAST_SPAN * sizes[0]:
+    if sizes[-1] < _LEAST_SPAN * sizes[0]:
         return False
     steps, ratios = np.diff(sizes), np.diff(np.log(sizes))
     most = EVEN if values.size > 3 else EQUAL  # of three values a middle that is a little off says nothing
     return bool(ratios.max() < most * ratios.min() and steps.max() > EVEN * steps.min())
 
 
-def on_decades(values: NDArray[np.float64]) -> NDArray[np.float64]:
+def _on_decades(values: NDArray[np.float64]) -> NDArray[np.float64]:
     """Places of numbers of one sign on a logarithmic axis; negative ones are mirrored."""
     return np.sign(values) * np.log10(np.abs(values))
 
 
-def are_few(centres: NDArray[np.float64], few: int) -> bool:
+def _are_few(centres: NDArray[np.float64], few: int) -> bool:
     """Whether grid points can have labelled ticks: few, and about evenly spread."""
     if centres.size < 2:
         return True
     return centres.size <= few and bool(np.diff(centres).min() > 0.5 * np.ptp(centres) / (centres.size - 1))
 
 
-def edges_of(centres: NDArray[np.float64]) -> NDArray[np.float64]:
+def _edges_of(centres: NDArray[np.float64]) -> NDArray[np.float64]:
     """Borders of the cells around points, halfway between; the outer cells are symmetric."""
     if centres.size == 1:
         half = 0.05 * abs(centres[0]) or 0.5

@@ -29,13 +29,13 @@ from cvt_hpc.vibration.classes import PairClass, StartClass
 Array = NDArray[np.float64]
 # [um] All maps have one scale of amplitudes, so that they compare: from less than the threshold of vibration
 # to the largest of pushbelts; equal ratios, as in dB, are equally far apart.
-AMPLITUDES = 2.0, 200.0
+_AMPLITUDES = 2.0, 200.0
 AMPLITUDE_TICKS = 2, 5, 10, 20, 50, 100, 200
 FIT = "fit"  # instead of a value: colours end where the amplitudes of a map do
 End = float | str | None
 # share of values on a scale, where the others reach so far beyond; of so many
 MOST, FAR, MANY = 0.98, 1.5, 20
-MOST_BORDERS = 20_000  # sides between cells of different class: more would hide the cells
+_MOST_BORDERS = 20_000  # sides between cells of different class: more would hide the cells
 Mask = NDArray[np.bool_]
 CellClass = OccurrenceClass | StartClass | PairClass
 
@@ -137,7 +137,7 @@ def amplitude_scale(values: Array, vmax: End = None) -> Scale:
     if isinstance(vmax, str) and vmax != FIT:
         raise mismatch("vmax", f'a number or "{FIT}"', show(vmax))
     if vmax is None:
-        return Scale(AMPLITUDE_COLOURS, LogNorm(*AMPLITUDES), "amplitude [µm]", AMPLITUDE_TICKS)
+        return Scale(AMPLITUDE_COLOURS, LogNorm(*_AMPLITUDES), "amplitude [µm]", AMPLITUDE_TICKS)
     norm = norm_over(values, 0.0, None if isinstance(vmax, str) else 1e6 * vmax)
     return Scale(AMPLITUDE_COLOURS, norm, "amplitude [µm]")
 
@@ -180,7 +180,7 @@ def draw_cells(
     axes.add_image(PcolorImage(axes, x.edges, y.edges, shades, rasterized=True, in_layout=False))
     for inside, lines in hatched.values():  # as an artist: the limits are set below, and long to find
         axes.add_artist(PathPatch(area_of(x, y, inside), rasterized=True, **lines))
-    if len(borders := _borders(x, y, classes)) <= MOST_BORDERS:
+    if len(borders := _borders(x, y, classes)) <= _MOST_BORDERS:
         lines_between = LineCollection(borders, colors="#202020", linewidths=1.0)
         axes.add_collection(lines_between, autolim=False)
     axes.set(xlim=x.edges[[0, -1]], ylim=y.edges[[0, -1]])

@@ -15,9 +15,9 @@ from cvt_hpc.analysis.maps import TITLE_HEIGHT, draw_block, sheet_of
 from cvt_hpc.analysis.scatter import draw_samples, is_sampled, scatter_height
 from cvt_hpc.vibration.classes import CONTRADICTIONS, NEAR, OccurrenceClass
 
-SCATTER_HEIGHT, FRAME = 4.2, 6.4  # [inch], and what the page holds beside the panels of the map
+_SCATTER_HEIGHT, FRAME = 4.2, 6.4  # [inch], and what the page holds beside the panels of the map
 MOST_PANELS = 24  # that a page then holds
-SAMPLES_BESIDE, SAMPLES_HEIGHT = 3, 1.5  # panels of samples side by side, and their height [inch]
+_SAMPLES_BESIDE, _SAMPLES_HEIGHT = 3, 1.5  # panels of samples side by side, and their height [inch]
 LOWEST = 1e-2  # of the threshold: smaller amplitudes are drawn at the border
 _NO_SCALE = cells.Scale(cells.AMPLITUDE_COLOURS, cells.norm_over(np.empty(0)), "")
 
@@ -35,8 +35,8 @@ def _figure(found: Comparison, sources: tuple[str, str]) -> Figure:
     pairs = arrangement.dataset["occurrence_class"].values
     kinds = {kind: style for kind, style in cells.ALL_STYLES.items() if np.any(pairs == kind)}
     height = _map_height(arrangement) + 0.3 * -(-len(kinds) // 3)
-    figure = Figure((WIDTH, height + SCATTER_HEIGHT + 1.0), layout="constrained")
-    above, below = figure.subfigures(2, 1, height_ratios=(height, SCATTER_HEIGHT))
+    figure = Figure((WIDTH, height + _SCATTER_HEIGHT + 1.0), layout="constrained")
+    above, below = figure.subfigures(2, 1, height_ratios=(height, _SCATTER_HEIGHT))
     _draw_map(above, arrangement)
     cells.class_legend(above, kinds, 3)
     _draw_amplitudes(below, found)
@@ -56,7 +56,7 @@ def _arrangement(found: Comparison) -> Arrangement:
 def _map_height(arrangement: Arrangement) -> float:
     """Height [inch] of the map."""
     if is_sampled(arrangement.dataset):
-        return scatter_height(arrangement.dataset, SAMPLES_BESIDE, SAMPLES_HEIGHT)
+        return scatter_height(arrangement.dataset, _SAMPLES_BESIDE, _SAMPLES_HEIGHT)
     if not arrangement.x:
         return 0.0
     sheet = sheet_of(arrangement, frame=FRAME)
@@ -67,7 +67,7 @@ def _draw_map(figure: SubFigure, arrangement: Arrangement) -> None:
     if is_sampled(arrangement.dataset):
         pairs = arrangement.dataset["occurrence_class"].values
         nothing = np.full(pairs.shape, np.nan)
-        draw_samples(figure, arrangement.dataset, pairs, nothing, _NO_SCALE, SAMPLES_BESIDE)
+        draw_samples(figure, arrangement.dataset, pairs, nothing, _NO_SCALE, _SAMPLES_BESIDE)
     elif arrangement.x:
         sheet = sheet_of(arrangement, frame=FRAME)
         axes = figure.subplots(sheet.rows, sheet.columns, sharex=True, sharey=True, squeeze=False)

@@ -25,7 +25,7 @@ UNITS = (
     *("N m/rad", "N m s/rad", "m/(N s)", "1/s", "N s/m^2", "N/m", "N/m^2", "N/s", "m/s", "m/s^2", "rad/s"),
     "s/m",
 )
-BLANKS = {  # what flags mean where they are missing
+_BLANKS = {  # what flags mean where they are missing
     "status": Status.NOT_RUN,
     "vibrates": Vibrates.UNDECIDED,
     "occurrence_class": OccurrenceClass.NOT_RUN,
@@ -68,7 +68,7 @@ def standard(dataset: xr.Dataset, source: str = "results") -> xr.Dataset:
     converted = {
         str(name): _in_si(variable, str(name), name in dataset.coords, source)
         for name, variable in dataset.variables.items()
-        if variable.dtype.kind in "iuf" and name not in BLANKS and "flag_values" not in variable.attrs
+        if variable.dtype.kind in "iuf" and name not in _BLANKS and "flag_values" not in variable.attrs
     }
     return _with(dataset, converted)
 
@@ -113,8 +113,8 @@ def _restored(dataset: xr.Dataset, source: str) -> Iterator[tuple[str, xr.Variab
             variable = _each(_texts, variable, object)
         elif kind == "m":
             variable = _changed_to(variable, variable.astype("m8[ns]").data.astype(float) * 1e-9, units="s")
-        elif kind == "f" and key in BLANKS:
-            variable = _each(partial(_flags, blank=BLANKS[key], where=f"{source}: {key}"), variable, np.int8)
+        elif kind == "f" and key in _BLANKS:
+            variable = _each(partial(_flags, blank=_BLANKS[key], where=f"{source}: {key}"), variable, np.int8)
         yield key, variable
 
 

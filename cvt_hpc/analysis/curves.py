@@ -21,8 +21,8 @@ from cvt_hpc.analysis.courses import line_of_study
 from cvt_hpc.errors import mismatch, unknown
 from cvt_hpc.variables import Status
 
-MOST_QUANTITIES, COLUMNS = 12, 3
-PANEL_HEIGHT = 1.9  # [inch] of a panel
+_MOST_QUANTITIES, COLUMNS = 12, 3
+_PANEL_HEIGHT = 1.9  # [inch] of a panel
 FRAME = 1.0  # [inch]: what title and labels take
 INK = "#333333"  # of styles in the legend, which colours do not tell
 
@@ -57,12 +57,12 @@ def curve_figure(
     for axes, (title, shown) in zip(all_axes, panels, strict=True):
         each = (_curves(shown[name], factor, arrangement.x, len(quantities) > 1) for name in quantities)
         _draw_curves(axes, x.centres, list(chain(*each)), shown["status"].values == Status.DONE)
-        mark_above(axes, x.centres, occurrence_classes(shown).values)
+        _mark_above(axes, x.centres, occurrence_classes(shown).values)
         axes.set_title(title, loc="left", pad=6)
-        axes.set(xlabel=x.label, xlim=with_margins(x))
+        axes.set(xlabel=x.label, xlim=_with_margins(x))
         x.lay_out(axes.xaxis)
         axes.grid(linewidth=0.4, alpha=0.5)
-    label = common_words(dataset, quantities)
+    label = _common_words(dataset, quantities)
     all_axes[0].set_ylabel(f"{label} [{unit}]" if unit else label)
     lines = [figures.headline(f"{label[0].upper()}{label[1:]}", dataset.attrs), *notes]
     set_frame(figure, figures.entries_of(all_axes), [*lines, line_of_study(dataset)])
@@ -136,7 +136,7 @@ def scale(dataset: xr.Dataset, quantities: Sequence[str]) -> tuple[float, str]:
     return 10.0**-power, f"10{str(power).translate(_RAISED)} {unit}".strip()
 
 
-def with_margins(x: layout.Ruler) -> tuple[float, float]:
+def _with_margins(x: layout.Ruler) -> tuple[float, float]:
     """Limits around all values of the axis, also those where nothing is known."""
     margin = 0.05 * np.ptp(x.centres) or 0.5 * np.ptp(x.edges)
     return x.centres.min() - margin, x.centres.max() + margin
@@ -159,7 +159,7 @@ def _draw_curves(
             axes.plot(x, values, color=colour, label=label, **style)
 
 
-def mark_above(axes: Axes, x: np.ndarray, classes: np.ndarray) -> None:
+def _mark_above(axes: Axes, x: np.ndarray, classes: np.ndarray) -> None:
     """Marks on the upper edge, which no curve has, for runs without a value, by what became of them."""
     for kind, label in WITHOUT_RESULT.items():
         if (inside := classes == kind).any():
@@ -168,7 +168,7 @@ def mark_above(axes: Axes, x: np.ndarray, classes: np.ndarray) -> None:
             axes.plot(x[inside], np.ones(inside.sum()), ls="", transform=place, label=label, **marks)
 
 
-def common_words(dataset: xr.Dataset, quantities: Sequence[str]) -> str:
+def _common_words(dataset: xr.Dataset, quantities: Sequence[str]) -> str:
     """Words that the names of all quantities end with, else the name of the first."""
     words = [figures.in_words(dataset[name]).split() for name in quantities]
     common: list[str] = []
@@ -202,7 +202,7 @@ def curve_panels_figure(
     values; of the axes that it leaves, the one that runs along x in a map does so here. Variables of a group
     are numeric, of one unit and of the same dimensions, and share a panel, the first drawn by marks, the
     others by lines beside it. Of quantities with further dimensions, such as `pulley`, there is a panel for
-    each of their labels, MOST_QUANTITIES at most.
+    each of their labels, _MOST_QUANTITIES at most.
     """
     check_results(dataset, source)
     for group in groups:
@@ -211,13 +211,13 @@ def curve_panels_figure(
     each, notes = panels_of(arrangement, source, len(figures.COLOURS))
     shown, along = arrangement.dataset, {arrangement.x, lines, arrangement.panel}
     panels = [(group, place) for group in groups for place in _places(shown, group, along, source)]
-    if len(panels) > MOST_QUANTITIES:
+    if len(panels) > _MOST_QUANTITIES:
         then = "name fewer quantities: one of both pulleys has a panel for each"
-        raise mismatch(f"{source}: panels", f"at most {MOST_QUANTITIES}", f"{len(panels)}", then)
+        raise mismatch(f"{source}: panels", f"at most {_MOST_QUANTITIES}", f"{len(panels)}", then)
     columns = min(len(panels), COLUMNS)
     rows = -(-len(panels) // columns)
     width = figures.WIDTH * (1.0 + 0.25 * (columns - 1) / (COLUMNS - 1))
-    figure = Figure((width, PANEL_HEIGHT * rows + FRAME), layout="constrained")
+    figure = Figure((width, _PANEL_HEIGHT * rows + FRAME), layout="constrained")
     all_axes = figure.subplots(rows, columns, sharex=True, squeeze=False)
     for unused in all_axes.flat[len(panels) :]:
         unused.set_visible(False)
@@ -228,16 +228,16 @@ def curve_panels_figure(
     for axes, (group, place) in zip(all_axes.flat, panels, strict=False):
         factor, unit = scale(shown, group)
         labels = [place_in_words(shown[dim], k) for dim, k in place.items()]
-        title = " ".join([common_words(shown, group), *labels])
+        title = " ".join([_common_words(shown, group), *labels])
         axes.set_title(f"{title} [{unit}]" if unit else title, loc="left", pad=6)
         for k, (_, results) in enumerate(each):
             values = [factor * results[name].isel(place).values for name in group]
             _draw(axes, x.centres, values, results["status"].values == Status.DONE, k)
-            mark_above(axes, x.centres, occurrence_classes(results).values)
+            _mark_above(axes, x.centres, occurrence_classes(results).values)
         for name, style in zip(group[1:], BESIDE, strict=False):
             legend[figures.in_words(shown[name])] = Line2D([], [], color=INK, ls=style, lw=1.2)
         legend |= figures.entries_of([axes])
-        axes.set_xlim(with_margins(x))
+        axes.set_xlim(_with_margins(x))
         x.lay_out(axes.xaxis)
         axes.grid(linewidth=0.4, alpha=0.5)
     figures.label_x(all_axes, len(panels), x.label)

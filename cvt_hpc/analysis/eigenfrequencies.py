@@ -14,7 +14,7 @@ from cvt_hpc.job.values import Point
 from cvt_hpc.variator import STRANDS
 from cvt_hpc.variator.band import MODES, strand_frequencies
 
-COLOUR = "#1f4e8c"
+_COLOUR = "#1f4e8c"
 HEIGHT = 3.6  # [inch]
 
 
@@ -88,7 +88,7 @@ def eigenfrequency_figure(
 def _draw_strand(axes: Axes, x: np.ndarray, frequency: xr.DataArray) -> None:
     """Lines over x, each with the number of its half waves beside its last point."""
     for number, line in zip(frequency["half_waves"].values, frequency.values.T, strict=True):
-        axes.plot(x, line, color=COLOUR, marker=".", markersize=4, linewidth=1.2)
+        axes.plot(x, line, color=_COLOUR, marker=".", markersize=4, linewidth=1.2)
         axes.annotate(str(number), (x[-1], line[-1]), (4, 0), textcoords="offset points", va="center")
     axes.margins(x=0.09)  # room for the numbers
     axes.grid(linewidth=0.4, alpha=0.5)

@@ -24,11 +24,11 @@ Array = NDArray[np.float64]
 FORMATS = (".wav", ".csv", ".uff")
 AUDIO_RATE, FULL_SCALE = 48000, 32767  # [Hz], and the largest number of 16 bits
 PEAK = 10.0 ** (-3.0 / 20.0)  # of full scale: -3 dBFS
-LEAST_SOUND = 5.0  # [s]: a loop is repeated until it lasts so long
+_LEAST_SOUND = 5.0  # [s]: a loop is repeated until it lasts so long
 ROUNDING = 1e-13  # of a signal, which moves no more than that by rounding alone
-FADE = 0.01  # [s]: over this time, in whole periods, the end of a loop goes over into its beginning
+_FADE = 0.01  # [s]: over this time, in whole periods, the end of a loop goes over into its beginning
 KINDS = {"m": 8, "N": 13}  # specific data types of UFF58: displacement, excitation force; else unknown
-NOT_MODELLED = "not modelled: the casing, and the sound that it radiates"
+_NOT_MODELLED = "not modelled: the casing, and the sound that it radiates"
 
 
 class Loop(NamedTuple):
@@ -116,7 +116,7 @@ def loop_of(signal: Signal, band: tuple[float, float]) -> Loop:
     frequency, _ = fundamental(part, rate, band)
     has_period = bool(np.isfinite(frequency))
     frequency = frequency if has_period else rate
-    fade = int(np.ceil(FADE * frequency))
+    fade = int(np.ceil(_FADE * frequency))
     periods = int((part.size - 1) / rate * frequency) - fade
     if periods < fade:
         expected = f"a judged part of {2.0 * fade / frequency:.3g} s or more"
@@ -141,12 +141,12 @@ def _write_sound(history: xr.Dataset, signal: Signal, out: Path, source: str, ve
     if changing_of(history) is None:
         low, high = settings_of(history)[1]
         loop = loop_of(signal, (low, min(high, 0.5 * signal.rate)))
-        times = int(np.ceil(LEAST_SOUND / loop.length))
+        times = int(np.ceil(_LEAST_SOUND / loop.length))
         what = f"{times} times {loop.length:.6g} s"
         what += f", {loop.periods} periods each" if loop.periods else ""
     else:
         moved = signal._replace(judged=int(np.searchsorted(signal.times, start_up(history)))).vibration
-        faded = moved * windows.tukey(moved.size, 2.0 * FADE * signal.rate / (moved.size - 1))
+        faded = moved * windows.tukey(moved.size, 2.0 * _FADE * signal.rate / (moved.size - 1))
         loop = Loop(faded, moved.size / signal.rate, 0)
         times, what = 1, f"the whole ramp, {loop.length:.6g} s"
     if np.ptp(loop.values) <= ROUNDING * np.abs(signal.values).max():
@@ -166,7 +166,7 @@ def _write_sound(history: xr.Dataset, signal: Signal, out: Path, source: str, ve
     lines = [
         f"sound: {out}: {'velocity of ' * velocity}{signal.words}, {what}, {AUDIO_RATE} Hz",
         f"full scale: {full:.6g} {name}; peak {PEAK * full:.6g} {name}, at -3 dBFS",
-        NOT_MODELLED,
+        _NOT_MODELLED,
     ]
     with written_aside(text) as aside:
         written = "".join([*origin_lines(history.attrs), *(f"{line}\n" for line in lines)])
@@ -179,7 +179,7 @@ def _check_own(text: Path) -> None:
     expected = "a new file, or the text of a sound written by cvt_hpc"
     if text.exists():
         with naming_refusals(text, expected):
-            if NOT_MODELLED.encode() not in read_regular(text, 1 << 20):
+            if _NOT_MODELLED.encode() not in read_regular(text, 1 << 20):
                 raise mismatch(str(text), expected, "another file")
 
 

@@ -65,7 +65,7 @@ MARGIN = 1.6  # factor by which axes reach beyond the points
 _LEAST_SPAN = 100.0  # of an error's axis, so that two powers of ten stand at it
 
 ROUNDED = 0.005  # of the distance of two values: by so much a number on an axis may be off
-MOST_DECIMALS = 12
+_MOST_DECIMALS = 12
 LETTER, LINE, GAP = 5.6, 11.0, 5.0  # [point]: width and height of a tick's letters, and space between two
 TEXTS = 55  # letters of texts side by side along x; more stand upright
 
@@ -81,7 +81,7 @@ RESOLUTION = 170  # dots per inch
 _INLINE = 100  # the same, between the cells of a notebook
 SETTLED = 1000  # pixels: the palette is refined until no more than these, one in a thousand, change colour
 FORMATS = (".png", ".svg", ".pdf")
-LEGEND_LETTERS, HANDLE_LETTERS = 84, 8  # across the page, and what a handle with its space takes of them
+_LEGEND_LETTERS, _HANDLE_LETTERS = 84, 8  # across the page, and what a handle with its space takes of them
 LONGEST_NAME = 27  # letters of a name on an axis
 
 STYLE = {
@@ -168,7 +168,7 @@ def headline(subject: str, *attributes: Mapping[str, str]) -> str:
 
 def draw(compose: Callable[[], Figure], out: Path) -> Path:
     """Compose a figure in the style of all pictures and write it as `save_figure` does, or refuse before."""
-    check_format(Path(out))
+    _check_format(Path(out))
     with matplotlib.rc_context():  # a user's settings do not change the picture, nor the picture these
         matplotlib.rcdefaults()
         matplotlib.rcParams.update(STYLE)
@@ -348,7 +348,7 @@ def entitle(figure: Figure, lines: Sequence[str], width: int = 72) -> None:
 def legend_columns(labels: Sequence[str]) -> int:
     """Entries side by side in a legend below a picture of WIDTH."""
     longest = max((len(label) for label in labels), default=0)
-    return max(min(len(labels), LEGEND_LETTERS // (longest + HANDLE_LETTERS)), 1)
+    return max(min(len(labels), _LEGEND_LETTERS // (longest + _HANDLE_LETTERS)), 1)
 
 
 def save_figure(figure: Figure, out: Path) -> Path:
@@ -358,7 +358,7 @@ def save_figure(figure: Figure, out: Path) -> Path:
     what stood there is then untouched.
     """
     out = Path(out)
-    check_format(out)
+    _check_format(out)
     suffix = out.suffix.lower()
     with written_aside(out, parents=True) as aside:
         if suffix == ".png":
@@ -379,7 +379,7 @@ def _write_png(figure: Figure, path: Path) -> None:
     reduced.save(path, "png", dpi=(RESOLUTION, RESOLUTION))
 
 
-def check_format(out: Path) -> None:
+def _check_format(out: Path) -> None:
     """Raise InputError unless the suffix names a picture format."""
     if out.suffix.lower() not in FORMATS:
         raise mismatch(str(out), f"a picture: {', '.join(FORMATS)}", out.suffix or "no suffix")
@@ -399,7 +399,7 @@ def short_numbers(values: NDArray[np.float64], *, is_log: bool = False) -> tuple
     allowed = np.broadcast_to(ROUNDED * steps, values.shape)
     texts = []
     for value, off in zip(values.tolist(), allowed, strict=True):
-        tried = (round(value, decimals) for decimals in range(MOST_DECIMALS))
+        tried = (round(value, decimals) for decimals in range(_MOST_DECIMALS))
         texts.append(number(next((one for one in tried if abs(one - value) <= off), value)))
     return tuple(texts)
 

@@ -28,7 +28,7 @@ LONGEST_REASON = 120  # letters, in the title: one or two strands
 
 SHOWN_PERIODS, INK = 3, "#111111"
 SAMPLES = 200  # drawn in a period: harmonics have corners otherwise
-LEFT, RIGHT, WHOLE = slice(0, 2), 2, slice(0, 3)  # columns of a panel
+LEFT, RIGHT, _WHOLE = slice(0, 2), 2, slice(0, 3)  # columns of a panel
 
 
 def draw_history(dataset: xr.Dataset, out: Path) -> Path:
@@ -62,16 +62,16 @@ def history_figure(dataset: xr.Dataset, source: str = "history") -> Figure:
         places = (LEFT, RIGHT) if len(told) < 3 else range(len(told))
         beside = zip(places, told, strict=False)
         rows.append((1.2, [(place, panels.draw_course, course) for place, course in beside]))
-    rows += [(1.6, [(WHOLE, panels.draw_group, group)]) for group in panels.groups(dataset)]
+    rows += [(1.6, [(_WHOLE, panels.draw_group, group)]) for group in panels.groups(dataset)]
     if with_spectrum:
-        rows.append((2.1, [(WHOLE, panels.draw_spectra, with_spectrum)]))
+        rows.append((2.1, [(_WHOLE, panels.draw_spectra, with_spectrum)]))
     for height, names, draw_panel in (
         (2.0, ("ring_tension", "push_force"), panels.draw_forces),
         (1.5, ("contact_force",), panels.draw_contact),
         (1.7, ("flank_feed",), panels.draw_feed),
     ):
         if any(_is_known(dataset, name) for name in names):
-            rows.append((height, [(WHOLE, draw_panel, dataset)]))
+            rows.append((height, [(_WHOLE, draw_panel, dataset)]))
     if not rows:
         raise mismatch(source, "displacement, load or forces of a run", "none of them")
     heights = [height for height, _ in rows]

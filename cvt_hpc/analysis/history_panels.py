@@ -17,12 +17,17 @@ from cvt_hpc.vibration.signals import amplitude_spectrum, band_amplitude, domina
 
 Array = NDArray[np.float64]
 
-BIN_WIDTH = 5.0  # [Hz]
-CLOSE_UP = 0.01  # [s]: six periods at 600 Hz
-MOST_PEAKS = 3
+_BIN_WIDTH = 5.0  # [Hz]
+_CLOSE_UP = 0.01  # [s]: six periods at 600 Hz
+_MOST_PEAKS = 3
 COLOURS = ("#d55e00", "#0072b2", "#cc79a7", "#009e73", "#333333")  # Okabe and Ito's, of strands and pulleys
 LINES = ("-", "--", ":", "-.", (0, (5, 1, 1, 1, 1, 1)))  # one for each probe of a strand, by default
-GROUPS = ("tension_", "speed_", "arm_", "axial_force_")  # how the names of histories begin that share a panel
+_GROUPS = (
+    "tension_",
+    "speed_",
+    "arm_",
+    "axial_force_",
+)  # how the names of histories begin that share a panel
 COURSES = ("driving_speed", "load")  # what a run may change
 FEEDS = {
     "flank_feed": ("friction of the flanks", "#d55e00", "-"),
@@ -130,7 +135,7 @@ def draw_displacement(axes: Axes, strand: Strand) -> None:
 
 def draw_close_up(axes: Axes, strand: Strand) -> None:
     """All probes of a strand over the last milliseconds, without the mean of these."""
-    last = strand.time >= strand.time[-1] - CLOSE_UP
+    last = strand.time >= strand.time[-1] - _CLOSE_UP
     time = 1e3 * strand.time[last]
     for i, label in enumerate(strand.probes):
         values = strand.displacement[last, i] - strand.displacement[last, i].mean()
@@ -144,7 +149,7 @@ def draw_close_up(axes: Axes, strand: Strand) -> None:
 
 def draw_spectra(axes: Axes, strands: list[Strand]) -> None:
     """Amplitude spectra of the strongest probes over the judged part, dominant peaks marked."""
-    bins = np.arange(0.0, strands[0].band[1] + BIN_WIDTH / 2, BIN_WIDTH)
+    bins = np.arange(0.0, strands[0].band[1] + _BIN_WIDTH / 2, _BIN_WIDTH)
     signals = [strand.judged[:, strand.strongest] for strand in strands]
     spectra = [amplitude_spectrum(x, s.rate, bins) for x, s in zip(signals, strands, strict=True)]
     tops = [float(spectrum.max()) for spectrum in spectra]
@@ -195,10 +200,10 @@ def _peaks(signal: Array, strand: Strand, bins: Array, spectrum: Array) -> list[
 
     inside = np.where(bins >= strand.band[0], spectrum, 0.0)
     indices, _ = find_peaks(inside, prominence=max(0.2 * inside.max(), np.finfo(float).tiny))
-    highest = indices[np.argsort(inside[indices])[::-1][:MOST_PEAKS]]
+    highest = indices[np.argsort(inside[indices])[::-1][:_MOST_PEAKS]]
     peaks = []
     for i in highest:
-        around = (max(bins[i] - 2 * BIN_WIDTH, 0.0), bins[i] + 2 * BIN_WIDTH)
+        around = (max(bins[i] - 2 * _BIN_WIDTH, 0.0), bins[i] + 2 * _BIN_WIDTH)
         peaks.append((float(dominant_frequency(signal, strand.rate, around)), float(spectrum[i])))
     return peaks
 
@@ -215,7 +220,7 @@ def draw_course(axes: Axes, course: xr.DataArray) -> None:
 def groups(dataset: xr.Dataset) -> list[list[xr.DataArray]]:
     """Histories that belong into one panel: those whose names begin alike, as GROUPS has them."""
     courses = {str(name): values for name, values in dataset.items() if values.dims == ("time",)}
-    found = ([values for name, values in courses.items() if name.startswith(prefix)] for prefix in GROUPS)
+    found = ([values for name, values in courses.items() if name.startswith(prefix)] for prefix in _GROUPS)
     return [group for group in found if group]
 
 
@@ -223,7 +228,7 @@ def draw_group(axes: Axes, group: list[xr.DataArray]) -> None:
     """Histories of one kind over time: forces of the strands, speeds of the pulleys, angles of the arms."""
     for k, course in enumerate(group):
         factor, unit = coordinate_unit(course.attrs)
-        prefix = next(prefix for prefix in GROUPS if str(course.name).startswith(prefix))
+        prefix = next(prefix for prefix in _GROUPS if str(course.name).startswith(prefix))
         kind, label = prefix.strip("_").replace("_", " "), str(course.name).removeprefix(prefix)
         style = {"ls": LINES[k % len(LINES)], "color": COLOURS[k % len(COLOURS)]}
         width = 0.8 + 0.5 * (len(group) - 1 - k)  # of two alike the upper one lets the lower one be seen

@@ -136,7 +136,7 @@ def vibration_ranges(dataset: xr.Dataset, source: str = "results") -> xr.DataArr
     return ranges.rename("driving_speed" if name == "speed" else name).assign_attrs(units)
 
 
-def draw_bands(axes: Axes, y: layout.Ruler, ranges: NDArray[np.float64]) -> list[Artist]:
+def _draw_bands(axes: Axes, y: layout.Ruler, ranges: NDArray[np.float64]) -> list[Artist]:
     """Draw the limits of vibration along both ramps and hatch what lies between; return handles of a legend.
 
     `ranges` (ramp, limit, row) are places along x, as `vibration_ranges` has them.
@@ -205,7 +205,7 @@ def hysteresis_figure(
             widths, heights = (stop - start)[lasting], np.diff(y.edges)[lasting]
             look = {"left": start[lasting], "color": both, "alpha": 0.55, "lw": 0}
             legend["vibrates either way"] = axes.barh(y.centres[lasting], widths, heights, **look)
-        for handle in draw_bands(axes, y, values):
+        for handle in _draw_bands(axes, y, values):
             legend.setdefault(handle.get_label(), handle)
         axes.set_ylim(*y.edges[[0, -1]])
         if count == 1:

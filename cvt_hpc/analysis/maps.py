@@ -45,15 +45,15 @@ from cvt_hpc.variables import Vibrates, shortened
 from cvt_hpc.vibration.classes import StartClass, classify_starts
 
 AXIS = "disturbance"
-LEADS = 1.5  # strongest line over the fundamental, which is a whole number
+_LEADS = 1.5  # strongest line over the fundamental, which is a whole number
 
 FRAME = 1.9  # [inch]: what title, labels and legend take of a page's height
 MOST_COLUMNS, NAMED = 6, 2  # panels side by side; in how many columns each has room for the name of its axis
-ROOMY = 4  # panels side by side with ticks that are all labelled
-SMALLEST_APART = 3.0  # [point]: on smaller cells marks, and the lines between, would hide the classes
+_ROOMY = 4  # panels side by side with ticks that are all labelled
+_SMALLEST_APART = 3.0  # [point]: on smaller cells marks, and the lines between, would hide the classes
 TITLE_HEIGHT = 0.42  # [inch], of a panel with the space around it
 LEAST = TITLE_HEIGHT + 0.6  # [inch], of a panel that is readable
-TITLE_LETTERS = 78  # of titles side by side
+_TITLE_LETTERS = 78  # of titles side by side
 
 
 @figures.styled
@@ -197,7 +197,7 @@ def _grid_figure(arrangement: layout.Arrangement, vmax: cells.End, source: str, 
         at = {arrangement.panel: panel} if arrangement.panel else {}
         over.draw(ax, x, y, arrangement.dataset.coords.to_dataset().isel(at, missing_dims="ignore"))
     further += over.handles
-    if sheet.leads.any() and min(sheet.smallest_cell) >= SMALLEST_APART:
+    if sheet.leads.any() and min(sheet.smallest_cell) >= _SMALLEST_APART:
         further.append(Line2D([], [], **cells.LEADING.marks(4.0), label="harmonics lead"))
     figures.entitle(figure, [*_title(sheet), over.note])
     figure.supylabel(sheet.y.label)
@@ -274,7 +274,7 @@ def sheet_of(arrangement: layout.Arrangement, source: str = "results", frame: fl
         classes != runs,
         np.where(vibrating, amplitude, np.nan),
         np.where(vibrating, frequency, np.nan),
-        vibrating & (strongest > LEADS * frequency),
+        vibrating & (strongest > _LEADS * frequency),
         np.where(irregular, amplitude, np.nan),
     )
     return _laid_out(sheet, source, frame)
@@ -282,7 +282,7 @@ def sheet_of(arrangement: layout.Arrangement, source: str = "results", frame: fl
 
 def _laid_out(sheet: Sheet, source: str, frame: float) -> Sheet:
     """The sheet on a page: in few columns, else with lower panels, in more columns, or without frequency."""
-    for columns in range(1, min(ROOMY, sheet.panels) + 1):
+    for columns in range(1, min(_ROOMY, sheet.panels) + 1):
         roomy = replace(sheet, columns=columns)
         roomy = replace(roomy, panel_height=roomy.wanted_height)
         if roomy.height + frame <= figures.LONG:
@@ -304,7 +304,7 @@ def draw_block(
 ) -> None:
     """One set of panels, their vibrating cells coloured by `values`, and the colour bar."""
     mark = float(np.clip(0.35 * min(sheet.smallest_cell), 1.5, 5.0))
-    apart = min(sheet.smallest_cell) >= SMALLEST_APART
+    apart = min(sheet.smallest_cell) >= _SMALLEST_APART
     for panel, ax in enumerate(axes.flat):
         if panel >= sheet.panels:
             ax.set_axis_off()
@@ -329,7 +329,7 @@ def _label_panel(ax: Axes, sheet: Sheet, panel: int) -> None:
     if name:
         text = layout.value_text(sheet.arrangement.dataset[name], panel)
         heading = f"{figures.in_words(sheet.arrangement.dataset[name])}: " if sheet.columns <= NAMED else ""
-        ax.set_title(shortened(f"{heading}{text}", TITLE_LETTERS // sheet.columns), loc="left", pad=3)
+        ax.set_title(shortened(f"{heading}{text}", _TITLE_LETTERS // sheet.columns), loc="left", pad=3)
     sheet.x.lay_out(ax.xaxis)
     sheet.y.lay_out(ax.yaxis)
     is_lowest = panel + sheet.columns >= sheet.panels

@@ -9,7 +9,7 @@ A measured file is a CSV file as `read_csv` takes it, of one of three kinds, tol
               noise sets in
     peak      AXIS, frequency; optional amplitude: a line of a measured spectrum
     peak      AXIS, frequency, level: a spectrum at each value of the axis, of which the lines that stand out
-              by PROMINENCE and are within LEVEL_RANGE of the file's highest level are read as peaks
+              by PROMINENCE and are within _LEVEL_RANGE of the file's highest level are read as peaks
 
 Windows and onsets may have a measured range, measured_AXIS_from and measured_AXIS_to, and AXIS_deviation, the
 standard deviation of their places. Further columns have the name of an axis or a parameter, and say at which
@@ -57,8 +57,8 @@ _KINDS = {
 # else the axis' own
 _UNITS = dict.fromkeys((*_BAND, FREQUENCY), "Hz") | {AMPLITUDE: "m", "direction": "", LEVEL: "dB"}
 # Assumptions: what is taken for a line of a spectrum
-PROMINENCE = 6.0  # [dB] of a peak, above the valleys beside it
-LEVEL_RANGE = 20.0  # [dB] below the highest level of the file
+_PROMINENCE = 6.0  # [dB] of a peak, above the valleys beside it
+_LEVEL_RANGE = 20.0  # [dB] below the highest level of the file
 _LEAST_FREQUENCIES = 8  # of a spectrum
 ALIKE = 0.01  # of a parameter that does not vary: so far the measured value may be off
 _PLACE = "measured file"
@@ -67,7 +67,7 @@ _MOST_BYTES = 2**22  # of a table of onsets, windows or peaks, or of spectra
 _LEAST = 1e-300  # stands for zero on a logarithmic side
 
 INK = "#0033dd"  # of nothing that is computed; in grey, dark within a white outline
-DASHES, DOTS = (0, (6, 1.5, 1.5, 1.5)), (0, (1, 1.5))
+_DASHES, _DOTS = (0, (6, 1.5, 1.5, 1.5)), (0, (1, 1.5))
 LONGEST_NAME = 60  # letters of the file's name in a title
 LEGEND = 0.4  # [inch]: height of a legend of its own
 _ABOVE = {"zorder": 2.6, "path_effects": outlined(4.2)}
@@ -244,11 +244,11 @@ def _peaks(table: dict[str, Array], place: str) -> dict[str, Array]:
     if any((np.diff(table[FREQUENCY][rows]) == 0.0).any() for rows in spectra):  # no spectrum, but several
         then = "average spectra of one place, or name in a column what tells them apart"
         raise mismatch(place, "each frequency once in a spectrum", "some twice", then)
-    least = table[LEVEL].max() - LEVEL_RANGE
+    least = table[LEVEL].max() - _LEVEL_RANGE
     levels = (table[LEVEL][rows] for rows in spectra)
-    at = [find_peaks(own, height=least, prominence=PROMINENCE)[0] for own in levels]
+    at = [find_peaks(own, height=least, prominence=_PROMINENCE)[0] for own in levels]
     found = np.concatenate([rows[peaks] for rows, peaks in zip(spectra, at, strict=True)])
-    rule = f"maxima that stand out by {PROMINENCE:g} dB, at most {LEVEL_RANGE:g} dB below the highest level"
+    rule = f"maxima that stand out by {_PROMINENCE:g} dB, at most {_LEVEL_RANGE:g} dB below the highest level"
     if not found.size:
         raise mismatch(place, rule, f"none in {len(spectra)} spectra")
     text = f"{found.size} peaks of {len(spectra)} spectra are read: {rule}"
@@ -416,10 +416,10 @@ class Overlay:
         on = next((which for which, side in zip("xy", sides, strict=True) if side.name == along), "")
         if kind == WINDOW and on and np.isfinite(row.swept).all():
             swept = row._replace(span=row.swept, frequency=None)
-            self._outline(axes, self._box(swept, sides), "measured range", DOTS)
+            self._outline(axes, self._box(swept, sides), "measured range", _DOTS)
         box = self._box(row, sides)
         if kind == WINDOW:
-            self._outline(axes, box, "measured noise", DASHES)
+            self._outline(axes, box, "measured noise", _DASHES)
         elif kind == PEAK and box:  # at the lower end of a side that tells nothing of it
             whole = [np.array_equal(one, side.edges[[0, -1]]) for one, side in zip(box, sides, strict=True)]
             pairs = zip(box, whole, strict=True)
@@ -428,7 +428,7 @@ class Overlay:
         elif kind == ONSET and on and box:
             x, y = (np.array([low, 0.5 * (low + high), high]) for low, high in box)
             label = f"measured onset, {'rising' if row.rising else 'falling'}"
-            self._line(axes, x, y, label, marker=_MARKS[on][row.rising], ls=DASHES)
+            self._line(axes, x, y, label, marker=_MARKS[on][row.rising], ls=_DASHES)
 
     def _line(self, axes: Axes, x: Array, y: Array, label: str, **look: Any) -> None:
         """Draw a line with a mark in its middle, or the mark alone, without a change of the limits."""

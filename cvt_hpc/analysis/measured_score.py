@@ -33,7 +33,7 @@ from cvt_hpc.storage.files import write_rows
 from cvt_hpc.tables import columns, number
 from cvt_hpc.vibration.classes import levels, onsets
 
-FARTHEST = 3.0  # standard errors
+_FARTHEST = 3.0  # standard errors
 MOST_LINES = 10  # that are printed
 COUNTS = ("hits", "misses", "false_alarms", "correct_silences", "neither")
 _READ = ("status", "vibrates", "occurrence_class", "inferred_class", "amplitude", "frequency")
@@ -184,7 +184,7 @@ def _of_onsets(kind: str, rows: Sequence[Row], loads: Array, level: Array, facto
         above = np.searchsorted(decided, places)
         distance = np.abs(np.subtract.outer(places, others[:, 0]))
         standard = np.hypot.outer(0.5 * (decided[above] - decided[above - 1]), others[:, 1])
-        near = distance <= FARTHEST * standard
+        near = distance <= _FARTHEST * standard
         pairs = linear_sum_assignment(np.where(near, distance, distance.size * distance.max(initial=0.0)))
         errors += [(factor * distance[k], factor * standard[k]) for k in zip(*pairs, strict=True) if near[k]]
         left = np.delete(places, pairs[0][near[pairs]])

@@ -26,20 +26,20 @@ from cvt_hpc.models.belt_drive.layout import layout
 from cvt_hpc.physics.belt_path import BeltPath, belt_path, points_at
 from cvt_hpc.variator import PULLEYS, STRANDS
 
-IN, OUT, LOST, KEPT = "#0072b2", "#d55e00", "#8a8a8a", "#e4e8ec"
-KILOWATTS = 1e4  # [W]: from here on powers are in kW
+_IN, OUT, LOST, KEPT = "#0072b2", "#d55e00", "#8a8a8a", "#e4e8ec"
+_KILOWATTS = 1e4  # [W]: from here on powers are in kW
 
 DEFAULT = "push_force", "tension"  # what is drawn, the first that there is
-PULLEY, INK = "#e4e8ec", "#333333"
+_PULLEY, INK = "#e4e8ec", "#333333"
 LARGEST = 0.16  # of the largest distance of two shafts: the longest bar
 ONE_SIGN, TWO_SIGNS = colours_of("viridis_r", 0.05, 0.95), colours_of("PuOr", 0.02, 0.98)
-HATCHES = ("", "///", "...")
-NAMED_AT, INSIDE = 0.35, 0.36  # of a strand, and of the smallest radius: where its name stands
+_HATCHES = ("", "///", "...")
+_NAMED_AT, INSIDE = 0.35, 0.36  # of a strand, and of the smallest radius: where its name stands
 NEAREST, NEAR = 0.75, 0.05  # of the way to the line of centres; of the path, bars beside a name
 PAPER = {"facecolor": "white", "edgecolor": "none", "alpha": 0.85, "pad": 1.0}  # under names on bars
 LEAST, HEIGHT, FRAME = 1.6, 3.1, 0.7  # [inch]: a variator, and what stands above all
-BALANCE, WHOLE_BELT = 1.3, "#8a8a8a"  # [inch]: what goes in and out; colour of what has no region
-WATTS = 0.02  # of the largest bar: what is smaller has no number
+_BALANCE, _WHOLE_BELT = 1.3, "#8a8a8a"  # [inch]: what goes in and out; colour of what has no region
+_WATTS = 0.02  # of the largest bar: what is smaller has no number
 
 
 class Drive(NamedTuple):
@@ -76,8 +76,8 @@ def draw_pulleys(axes: Axes, drive: Drive, inwards: Sequence[float] = (0.0, 0.0)
     """Draw all pulleys, their names, and those of two strands [mm], clear of bars that reach inwards [m]."""
     path, named = drive.path, {"ha": "center", "va": "center", "fontsize": 9, "zorder": 5}
     for centre, radius, name in zip(1e3 * path.centre, 1e3 * path.radius, drive.pulleys, strict=True):
-        axes.add_patch(Circle(tuple(centre), radius, color=PULLEY, zorder=0))
-        axes.text(*centre, name, **named, bbox=PAPER | {"facecolor": PULLEY})
+        axes.add_patch(Circle(tuple(centre), radius, color=_PULLEY, zorder=0))
+        axes.text(*centre, name, **named, bbox=PAPER | {"facecolor": _PULLEY})
     for name, at, depth in zip(drive.strands, _named_at(drive), inwards, strict=False):
         place, angle, _ = points_at(path, np.array([at]))
         most = NEAREST * abs(place[0, 1] - path.centre[:, 1].mean())
@@ -91,7 +91,7 @@ def _named_at(drive: Drive) -> list[float]:
 
     Names such as P1-P2 of more strands follow from those of the pulleys.
     """
-    path, shares = drive.path, (NAMED_AT, 1.0 - NAMED_AT) if len(drive.strands) == 2 else ()
+    path, shares = drive.path, (_NAMED_AT, 1.0 - _NAMED_AT) if len(drive.strands) == 2 else ()
     return [float(path.ends[2 * k] + share * path.spans[k]) for k, share in enumerate(shares)]
 
 
@@ -165,14 +165,14 @@ def region_powers(history: xr.Dataset) -> xr.DataArray:
 def energy_figure(history: xr.Dataset, source: str = "history") -> Figure:
     """Draw what the pulleys put in and take out, what is lost, and what feeds the vibration [W].
 
-    Arguments as of all pictures of runs (`figures.py`), with what `balance_of` takes, `part_flank_loss` [W]
+    Arguments as of all pictures of runs (`figures.py`), with what `_balance_of` takes, `part_flank_loss` [W]
     over `pulley` and `arc_part`, or what `region_powers` takes.
     """
     powers = region_powers(history) if {"position", "region"} <= {*map(str, history.coords)} else None
     has_feeds = powers is not None and powers.sizes["cause"] > 0
     has_loss = "part_flank_loss" in history and bool(np.isfinite(history["part_flank_loss"]).any())
-    balance = balance_of(history)
-    heights = [BALANCE, 0.7 + 0.18 * balance.bars] if balance else []
+    balance = _balance_of(history)
+    heights = [_BALANCE, 0.7 + 0.18 * balance.bars] if balance else []
     heights += [2.1] * (has_feeds + has_loss)
     if not heights:
         needed = "driving_power, flank_feed or part_flank_loss, known at constant load and speed"
@@ -180,7 +180,7 @@ def energy_figure(history: xr.Dataset, source: str = "history") -> Figure:
     figure = Figure((figures.WIDTH, sum(heights) + 0.9), layout="constrained")
     panels = list(figure.subplots(len(heights), 1, squeeze=False, height_ratios=heights)[:, 0])
     if balance is not None:
-        draw_balance(panels.pop(0), panels.pop(0), balance)
+        _draw_balance(panels.pop(0), panels.pop(0), balance)
     if has_loss:
         axes, loss = panels.pop(0), history["part_flank_loss"].transpose("pulley", "arc_part")
         count = loss.sizes["arc_part"]
@@ -192,12 +192,12 @@ def energy_figure(history: xr.Dataset, source: str = "history") -> Figure:
         axes.margins(y=0.15)
         axes.set_ylabel("power [W]")
     if has_feeds and powers is not None:
-        _draw_feeds(panels[0], powers, whole_powers(history))
+        _draw_feeds(panels[0], powers, _whole_powers(history))
     entitle_runs(figure, [history], "Energy around the belt", width=72)
     return figure
 
 
-def whole_powers(history: xr.Dataset) -> dict[str, float]:
+def _whole_powers(history: xr.Dataset) -> dict[str, float]:
     """Further powers of the whole belt's fluctuations [W] by name; negative: taken.
 
     With what `region_powers` sums up it is 0. "left open" is what the numerics, and a vibration that still
@@ -220,10 +220,10 @@ def _draw_feeds(axes: Axes, powers: xr.DataArray, whole: dict[str, float]) -> No
         for k, cause in enumerate(causes)
     ]
     if whole:
-        drawn.append((places[regions:], np.array(list(whole.values())), ("whole belt", WHOLE_BELT), 0))
+        drawn.append((places[regions:], np.array(list(whole.values())), ("whole belt", _WHOLE_BELT), 0))
     for at, values, (label, colour), k in drawn:
-        least = WATTS * largest if at[0] < regions - 0.5 else 0.0
-        style = {"color": colour, "edgecolor": "#ffffff", "hatch": HATCHES[k % len(HATCHES)], "lw": 0.6}
+        least = _WATTS * largest if at[0] < regions - 0.5 else 0.0
+        style = {"color": colour, "edgecolor": "#ffffff", "hatch": _HATCHES[k % len(_HATCHES)], "lw": 0.6}
         bars = axes.bar(at, values, 0.9 * width, label=label, **style)
         texts = [figures.number(p, "+.2g") if abs(p) > least else "" for p in values]
         axes.bar_label(bars, texts, fontsize=8, padding=1)
@@ -254,7 +254,7 @@ class Balance(NamedTuple):
         return len(self.losses) + len(self.rest)
 
 
-def balance_of(history: xr.Dataset) -> Balance | None:
+def _balance_of(history: xr.Dataset) -> Balance | None:
     """Return the balance of a run by its record; None where it has none that is known.
 
     The record has `driving_power`, `load_power` and `loss` [W], losses by cause named `..._loss` [W], and
@@ -288,14 +288,14 @@ def _power(history: xr.Dataset, name: str) -> float | None:
     return total if np.isfinite(total) else None
 
 
-def draw_balance(whole: Axes, parts: Axes, balance: Balance) -> None:
+def _draw_balance(whole: Axes, parts: Axes, balance: Balance) -> None:
     """Draw what goes in and out, and below it, enlarged, what is lost, by cause, and the rest."""
     lost, rest = sum(balance.losses.values()), sum(balance.rest.values())
-    is_large = max(abs(balance.put_in), abs(balance.taken_out)) >= KILOWATTS
+    is_large = max(abs(balance.put_in), abs(balance.taken_out)) >= _KILOWATTS
     factor, unit = (1e-3, "kW") if is_large else (1.0, "W")
     powers = {"driving pulley, in": balance.put_in, "load, out": balance.taken_out}
     powers |= {"all losses": lost, "all of the rest": rest}
-    _draw_bars(whole, {name: factor * power for name, power in powers.items()}, (IN, OUT, LOST, KEPT), unit)
+    _draw_bars(whole, {name: factor * power for name, power in powers.items()}, (_IN, OUT, LOST, KEPT), unit)
     whole.set_title("in = out + losses + rest", loc="left", pad=4)
     colours = [LOST] * len(balance.losses) + [KEPT] * len(balance.rest)
     _draw_bars(parts, balance.losses | balance.rest, colours, "W")

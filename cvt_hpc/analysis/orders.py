@@ -33,7 +33,7 @@ Order = tuple[float, str]  # the multiple, and of what: "driving" or "driven" pu
 
 BANDWIDTH = 1.0  # orders, in which power is summed
 LINES = 8  # of a window in this bandwidth: a sine in the middle is 4 lines off the edges
-PASSING_SLIP = 0.01  # of the order of passing elements: half its band at least, since slip shifts it
+_PASSING_SLIP = 0.01  # of the order of passing elements: half its band at least, since slip shifts it
 DEFAULT = (*ORDERS, "driven:1", "elements:1")
 UNKNOWN = {
     "driven": "neither the ratio nor the speed of the driven pulley is recorded",
@@ -41,7 +41,7 @@ UNKNOWN = {
 }
 
 
-def read_orders(given: Iterable[float | str], bandwidth: float) -> dict[str, Order]:
+def _read_orders(given: Iterable[float | str], bandwidth: float) -> dict[str, Order]:
     """Read orders such as 8 or "8", of the driving pulley, "driven:2" and "elements:1"; none: the default.
 
     They are returned by their names for a legend. InputError if a text is none of these, the bandwidth is not
@@ -125,14 +125,14 @@ def orders_figure(
     of : str
         Signal, as of `read_signal`.
     orders : sequence of float or str, optional
-        As of `read_orders`; by default those of DEFAULT that the run tells.
+        As of `_read_orders`; by default those of DEFAULT that the run tells.
     bandwidth : float
         In orders, in which power is summed; windows have LINES / bandwidth turns.
     velocity, level : bool
         Of a displacement its velocity, 2 pi f times the amplitude at the frequency f of the order; levels of
         the rms [dB] in the place of amplitudes.
     """
-    names, wanted = named(histories, sources), read_orders(orders, bandwidth)
+    names, wanted = named(histories, sources), _read_orders(orders, bandwidth)
     figure, panels = time_signals.in_a_column(len(histories), names[0], THEN)
     _, labels = on_axes(histories, names)
     length, name = LINES / bandwidth, ""
@@ -187,7 +187,7 @@ def order_cuts_figure(
         raise mismatch(source, "results over the axis driving_speed with the variable spectrum", found)
     figures.check_known(dataset, ["spectrum"], source)
     shown, fixed = layout.along_x(layout.arrange(dataset, at or {}, source, layout.Sides("driving_speed")))
-    wanted, known = read_orders(orders, bandwidth), _turning_over(shown)
+    wanted, known = _read_orders(orders, bandwidth), _turning_over(shown)
     notes: dict[str, str] = {}
     x, bins = layout.ruler(shown["driving_speed"]), shown["frequency_bin"].values
     strands = shown["strand"].values
@@ -242,7 +242,7 @@ def _turning_along(history: xr.Dataset, source: str) -> dict[str, Turning]:
     passing = float(history.get("passing_frequency", math.nan))
     if np.isfinite(passing):  # a mean of the judged part
         judged = time_signals.read_signal(history, "driving_speed").judged
-        known["elements"] = rate, passing / float(rate[judged:].mean()), PASSING_SLIP
+        known["elements"] = rate, passing / float(rate[judged:].mean()), _PASSING_SLIP
     return known
 
 
@@ -255,7 +255,7 @@ def _turning_over(shown: xr.Dataset) -> dict[str, Turning]:
         lost = shown["speed_loss"].values if "speed_loss" in shown else 0.0
         known["driven"] = rate / np.asarray(ratio) * (1.0 - lost), 1.0, 0.0
     if "passing_frequency" in shown:
-        known["elements"] = rate, shown["passing_frequency"].values / rate, PASSING_SLIP
+        known["elements"] = rate, shown["passing_frequency"].values / rate, _PASSING_SLIP
     return known
 
 

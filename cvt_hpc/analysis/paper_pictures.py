@@ -36,18 +36,18 @@ MARKS = {
 }
 
 HEIGHT = 3.8  # [inch]
-SHADES = {"t1": "#8a8a8a", "t2": "#c9c9c9"}
+_SHADES = {"t1": "#8a8a8a", "t2": "#c9c9c9"}
 PUSH = "#d55e00"
-BAR = 0.36  # of the distance of two runs
+_BAR = 0.36  # of the distance of two runs
 NEEDED = ("mean_ring_tension", "mean_push_force")
 
-OF_STRANDS = {"t1": "#0072b2", "t2": "#d55e00"}
-LINES_OF_STRANDS = {"t1": "-", "t2": "--"}
+_OF_STRANDS = {"t1": "#0072b2", "t2": "#d55e00"}
+_LINES_OF_STRANDS = {"t1": "-", "t2": "--"}
 
 ROW = 1.9  # [inch]
-SILENT = 1e-7  # [m]
-SIGNED = "+.2g"
-FEEDING, TAKING = "#d55e00", "#0072b2"
+_SILENT = 1e-7  # [m]
+_SIGNED = "+.2g"
+_FEEDING, _TAKING = "#d55e00", "#0072b2"
 TAKEN = ("belt", "ring", "layer", "lag")
 
 
@@ -92,7 +92,7 @@ def _draw_blocks(axes: Axes, history: xr.Dataset) -> None:
     amplitude = history["amplitude"].values
     sizes = zip(history["strand"].values, 1e6 * amplitude, strict=True)
     moving = ", ".join(f"{strand} {size:.2g} µm" for strand, size in sizes)
-    strands = moving if amplitude.max() >= SILENT else "silent"
+    strands = moving if amplitude.max() >= _SILENT else "silent"
     blocks = (
         (0.0, "source of energy", f"spiral motion of the belt:\nfriction takes {found.spiral:.0f} W"),
         (1.0, "switch", "curve of friction: less\nalong the motion"),
@@ -106,14 +106,14 @@ def _draw_blocks(axes: Axes, history: xr.Dataset) -> None:
     _arrow(axes, (0.76, 0.31), (0.96, 0.31), "#333333")
     fed = found.outlet
     ends = ((1.76, 0.42), (1.96, 0.42)) if fed > 0.0 else ((1.96, 0.42), (1.76, 0.42))
-    _arrow(axes, *ends, FEEDING if fed > 0.0 else TAKING)
-    outlet = f"driven outlet {figures.number(fed, SIGNED)} W"
+    _arrow(axes, *ends, _FEEDING if fed > 0.0 else _TAKING)
+    outlet = f"driven outlet {figures.number(fed, _SIGNED)} W"
     axes.text(1.86, 0.7, outlet, ha="center", va="bottom", fontsize=8.5)
     _arrow(axes, (2.36, -0.04), (1.36, -0.04), "#333333", "arc3,rad=-0.25")
     axes.text(1.86, -0.35, "its state sets the switch", ha="center", va="top", fontsize=8.5)
-    _arrow(axes, (2.76, 0.31), (2.96, 0.31), TAKING)
+    _arrow(axes, (2.76, 0.31), (2.96, 0.31), _TAKING)
     rest = {"other flanks": found.elsewhere, "push, tension": found.stresses, "dampers, rings": -found.taken}
-    losses = "\n".join(f"{name} {figures.number(power, SIGNED)} W" for name, power in rest.items())
+    losses = "\n".join(f"{name} {figures.number(power, _SIGNED)} W" for name, power in rest.items())
     axes.text(2.99, 0.31, losses, va="center", fontsize=8.5)
     axes.set(xlim=(-0.05, 3.65), ylim=(-0.5, 0.85))
     axes.set_axis_off()
@@ -139,7 +139,7 @@ def spectrum_figure(run: xr.Dataset) -> Figure:
     for strand in map(str, run["strand"].values):
         of = run.sel(strand=strand)
         amplitude = 1e6 * of["spectrum"].values
-        style = {"color": OF_STRANDS[strand], "ls": LINES_OF_STRANDS[strand], "lw": 1.3}
+        style = {"color": _OF_STRANDS[strand], "ls": _LINES_OF_STRANDS[strand], "lw": 1.3}
         axes.plot(lines, amplitude, label=f"strand {strand}", **style)
         largest = np.nanmax(of["peak_amplitude"].values, initial=0.0)
         for peak in range(of.sizes["peak"]):
@@ -147,7 +147,7 @@ def spectrum_figure(run: xr.Dataset) -> Figure:
             if mode and size > 0.05 * largest:
                 at = float(of["peak_frequency"][peak])
                 place = at, float(np.interp(at, lines, amplitude))
-                words = {"textcoords": "offset points", "color": OF_STRANDS[strand], "fontsize": 9}
+                words = {"textcoords": "offset points", "color": _OF_STRANDS[strand], "fontsize": 9}
                 axes.annotate(f"mode {mode}", place, (5 if strand == "t2" else -38, 3), **words)
     axes.axvspan(500.0, 700.0, color="#ececec", lw=0, zorder=0, label="500 to 700 Hz")
     axes.set(xlabel="frequency [Hz]", ylabel="amplitude [µm]", xlim=(0.0, lines[-1]))
@@ -200,13 +200,13 @@ def _draw_bars(axes: Axes, shown: xr.Dataset) -> None:
     places = np.arange(shown["status"].size)
     done = shown["status"].values == Status.DONE
     for k, strand in enumerate(str(name) for name in shown["strand"].values):
-        left = places + (k - 0.5) * (BAR + 0.04)
+        left = places + (k - 0.5) * (_BAR + 0.04)
         of = shown.sel(strand=strand)
         tension, push = (1e-3 * np.where(done, of[name].values, np.nan) for name in NEEDED)
         label = {"label": f"tension {strand}"}
-        axes.bar(left, tension, BAR, color=SHADES[strand], edgecolor="#333333", lw=0.6, **label)
+        axes.bar(left, tension, _BAR, color=_SHADES[strand], edgecolor="#333333", lw=0.6, **label)
         hatch = {"hatch": "" if k else "///", "label": f"push {strand}"}
-        axes.bar(left, -push, BAR, color=PUSH, alpha=0.75, edgecolor="#333333", lw=0.6, **hatch)
+        axes.bar(left, -push, _BAR, color=PUSH, alpha=0.75, edgecolor="#333333", lw=0.6, **hatch)
     axes.axhline(0.0, color="#333333", linewidth=0.8)
     axes.grid(axis="y", linewidth=0.4, alpha=0.5)
 

@@ -24,7 +24,7 @@ from cvt_hpc.job.axes import SAMPLE, SWAPPED
 
 Array = NDArray[np.float64]
 LINE, BAND = figures.COLOURS[0], "#9ecae1"
-DEEP = figures.COLOURS[1]
+_DEEP = figures.COLOURS[1]
 _BOUNDS = ("", "_low", "_high")  # a value and the ends of its 95 % bounds
 LEAST, HEIGHT, FRAME = 1.3, 2.8, 1.3  # [inch]: a panel at least and else, and title and legend
 
@@ -176,7 +176,7 @@ def sensitivity_figure(
     heads += ["Sobol index"] * (SWAPPED in dims)
     figure = Figure((figures.WIDTH, FRAME + 0.45 * places.size + 0.3), layout="constrained")
     all_axes = figure.subplots(1, len(heads), sharey=True)
-    for median, colour, quarter in zip(medians, (LINE, DEEP), sensitivity.QUARTERS, strict=True):
+    for median, colour, quarter in zip(medians, (LINE, _DEEP), sensitivity.QUARTERS, strict=True):
         label = f"{quarter} of the parameter"
         all_axes[0].barh(places, median - middle, left=middle, color=colour, label=label)
     halved = factor * np.stack([here[f"halved_band{end}"].values for end in _BOUNDS])

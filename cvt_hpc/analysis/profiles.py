@@ -37,9 +37,9 @@ _REFERENCES = {"sliding_angle": 90.0}  # [°]: where sliding turns from one hand
 
 SIDES = ("left", "right")
 QUANTITIES = ("contact_force", "flank_slip", "radial_slip")
-LOOKS = {"left": {"color": "#0072b2", "ls": "-"}, "right": {"color": "#d55e00", "ls": "--"}}
+_LOOKS = {"left": {"color": "#0072b2", "ls": "-"}, "right": {"color": "#d55e00", "ls": "--"}}
 AROUND = 0.02  # [m] of the path on both sides of an end
-TOUCHES = 0.05  # of the largest force: a flank that has less carries nothing
+_TOUCHES = 0.05  # of the largest force: a flank that has less carries nothing
 
 # rows: variable, label with unit, factor, and what stands beside it
 ROWS = (
@@ -47,11 +47,11 @@ ROWS = (
     ("friction_force", "friction [N/mm]", 1e-3, ""),
     ("tension", "tension [N]", 1.0, "sliding_tension"),
 )
-RUN_LINES = ("-", "--", "-.")  # dotted is theory
-THEORY = "Euler and Eytelwein"
+_RUN_LINES = ("-", "--", "-.")  # dotted is theory
+_THEORY = "Euler and Eytelwein"
 INK = "#333333"
 MOST_PANELS = 3  # side by side; of more pulleys only those that carry torque have one
-LEAST_PULL = 0.05  # of the largest sum of friction forces, from which on a pulley carries torque
+_LEAST_PULL = 0.05  # of the largest sum of friction forces, from which on a pulley carries torque
 FEW = 10  # places on an arc, each of which has a mark
 
 
@@ -170,7 +170,7 @@ def inside(dataset: xr.Dataset, region: str) -> np.ndarray:
     return (here | np.roll(here, 1)) & np.isfinite(angle)
 
 
-def in_groove(dataset: xr.Dataset, region: str) -> np.ndarray:
+def _in_groove(dataset: xr.Dataset, region: str) -> np.ndarray:
     """Stations (n,) by the wrap angle: those of a pulley's arc, and those where contact may run on."""
     angle, here = dataset["wrap_angle"].values, inside(dataset, region)
     before, behind = angle < 0.0, angle > angle[here].max(initial=0.0)
@@ -191,7 +191,7 @@ def _draw(
     if region is None:
         axes.plot(1e3 * dataset["position"].values, values, **style)  # type: ignore[arg-type]  # of a line
     else:
-        here = in_groove(dataset, region)
+        here = _in_groove(dataset, region)
         axes.plot(np.degrees(dataset["wrap_angle"].values[here]), values[here], **style)  # type: ignore[arg-type]
 
 
@@ -257,7 +257,7 @@ def alone(history: xr.Dataset, end: End) -> tuple[str, float]:
     far = end.inwards * from_end(history, end)
     forces = [history[f"contact_force_{side}"].values for side in SIDES]
     near = np.abs(far) < AROUND
-    least = TOUCHES * np.nanmax(np.where(near, forces, 0.0))
+    least = _TOUCHES * np.nanmax(np.where(near, forces, 0.0))
     begins = [float(far[near & (force > least)].min(initial=AROUND)) for force in forces]
     return SIDES[int(np.argmin(begins))], abs(begins[0] - begins[1])
 
@@ -315,7 +315,7 @@ def _draw_flanks(axes: Axes, history: xr.Dataset, name: str, over: np.ndarray, n
     factor, unit = shown_unit(history[f"{name}_left"])
     for side in SIDES:
         array = history[f"{name}_{side}"]
-        axes.plot(over, factor * array.values, label=f"{side} flank", lw=1.2, **LOOKS[side])  # type: ignore[arg-type]  # of a line
+        axes.plot(over, factor * array.values, label=f"{side} flank", lw=1.2, **_LOOKS[side])  # type: ignore[arg-type]  # of a line
     if named:
         axes.set_ylabel(f"{figures.in_words(array).removesuffix(' right')}\n[{unit}]")
     axes.axhline(0.0, color="#333333", lw=0.7, zorder=1)
@@ -340,7 +340,7 @@ def wrap_figure(histories: Sequence[xr.Dataset], sources: Sequence[str] = ()) ->
         figures.check_known(dataset, ["normal_force"], name)
     pulleys, without_torque = _pulleys(histories)
     common, labels = told_apart(histories, names)
-    runs = list(zip(histories, labels, cycle(figures.COLOURS), cycle(RUN_LINES), strict=False))
+    runs = list(zip(histories, labels, cycle(figures.COLOURS), cycle(_RUN_LINES), strict=False))
     rows = [row for row in ROWS if row[0] in histories[0]]
     figure = Figure((figures.WIDTH, 1.6 * len(rows) + 1.1), layout="constrained")
     panels = figure.subfigures()  # the label common to them keeps clear of the figure's legend
@@ -360,7 +360,7 @@ def wrap_figure(histories: Sequence[xr.Dataset], sources: Sequence[str] = ()) ->
     panels.supxlabel("wrap angle from inlet [°]")
     entries = figures.entries_of(grid[-1:, 0])
     if "sliding_tension" in histories[0]:
-        entries[THEORY] = Line2D([], [], ls=":", lw=1.6, color=INK)
+        entries[_THEORY] = Line2D([], [], ls=":", lw=1.6, color=INK)
     figures.legend_below(figure, entries if len(entries) > 1 else {})
     further = [f"without torque, not drawn: {', '.join(without_torque)}"] if without_torque else []
     head = figures.headline("Forces over the wrap", *(dataset.attrs for dataset in histories))
@@ -379,13 +379,13 @@ def _pulleys(histories: Sequence[xr.Dataset]) -> tuple[list[str], list[str]]:
     forces = [history["friction_force"].values for history in histories]
     pulls = [[np.nansum(f[r == p]) for p in pulleys] for f, r in zip(forces, along, strict=True)]
     largest = np.abs(pulls).max(axis=0)
-    carries = dict(zip(pulleys, largest >= LEAST_PULL * largest.max(), strict=True))
+    carries = dict(zip(pulleys, largest >= _LEAST_PULL * largest.max(), strict=True))
     return [p for p in pulleys if carries[p]], [p for p in pulleys if not carries[p]]
 
 
 def _draw_force(axes: Axes, dataset: xr.Dataset, pulley: str, name: str, factor: float, **style: Any) -> None:
     """A quantity over the wrap of a pulley."""
-    here = in_groove(dataset, pulley.removesuffix(" arc"))
+    here = _in_groove(dataset, pulley.removesuffix(" arc"))
     angle = np.degrees(dataset["wrap_angle"].values[here])
     marker = "." if angle.size < FEW else ""
     axes.plot(angle, factor * dataset[name].values[here], marker=marker, ms=5, **style)

@@ -22,14 +22,14 @@ WINDOW = 0.04  # [s]: lines of the spectrogram 50 Hz wide
 HIGHEST = 1500.0  # [Hz]
 BAND, NOISE = (300.0, 1500.0), (400.0, 800.0)  # [Hz] of strands' vibration, and of the noise
 LEAST, ROW = 1.1, 1.5  # [inch]: a row of panels of a ramp, at least and else
-LEAST_HEIGHT, HEIGHT = 1.5, 2.2  # [inch]: the same of spectrograms
+_LEAST_HEIGHT, HEIGHT = 1.5, 2.2  # [inch]: the same of spectrograms
 LETTERS = 14  # of a label beside a row
 THEN = "name fewer histories"  # of more than a page holds
 COURSES = ("load", "driving_speed")  # of which a run ramps one at most
 STRAIGHT = 0.02  # of its change: how far a ramp may be off a straight line, since pulleys may be free
-LEAST_CHANGE = 0.01  # of a value: free pulleys swing by less
+_LEAST_CHANGE = 0.01  # of a value: free pulleys swing by less
 FREQUENCIES = Side(FREQUENCY, np.array([0.0, HIGHEST]))
-LINE_POINTS = 21  # of lines over a spectrogram
+_LINE_POINTS = 21  # of lines over a spectrogram
 
 
 class Ramp(NamedTuple):
@@ -120,7 +120,7 @@ def spectrogram_figure(
     drawn = [amplitude for row in spectra for *_, amplitude in row]
     norm = waterfall.spectra_norm(drawn, None if vmax is None else 1e6 * vmax)
     overlays = [Overlay(measured, history, name) for history, name in zip(histories, names, strict=True)]
-    page = len(ramps), (1, 2), (LEAST_HEIGHT, HEIGHT), 1.4 + overlays[0].height, names[0], THEN
+    page = len(ramps), (1, 2), (_LEAST_HEIGHT, HEIGHT), 1.4 + overlays[0].height, names[0], THEN
     figure, panels, height = figures.panels_on_a_page(*page, each=len(strands), sharey=True)
     count, beside = panels.shape
     size, told, each = (0.8 * figures.WIDTH / beside, height - 0.7), set(), iter(panels.flat)
@@ -162,7 +162,7 @@ _Lines = tuple[np.ndarray, np.ndarray]
 def _lines_along(history: xr.Dataset, ramp: Ramp) -> tuple[_Lines | None, _Lines | None]:
     """Turns (n,) [Hz] along a ramp of speed, and eigenfrequencies (strand, half waves, n) [Hz], at places."""
     half = int(0.5 * WINDOW * ramp.rate)  # the panel reaches from the middle of the first window on
-    at = np.linspace(half, ramp.values.size - 1 - half, LINE_POINTS).astype(int)
+    at = np.linspace(half, ramp.values.size - 1 - half, _LINE_POINTS).astype(int)
     point = json.loads(history.attrs.get("point", "{}"))
     courses = {}
     if changing_of(history) is not None:
@@ -172,9 +172,9 @@ def _lines_along(history: xr.Dataset, ramp: Ramp) -> tuple[_Lines | None, _Lines
             times = history["time"].values[-ramp.values.size :][at]
             courses["thrust"] = np.broadcast_to(point["thrust"] * multiple(point, "thrust", times), at.shape)
     turns, speed = None, courses.get("driving_speed")
-    if speed is not None and np.ptp(speed) > LEAST_CHANGE * speed.max():
+    if speed is not None and np.ptp(speed) > _LEAST_CHANGE * speed.max():
         turns = ramp.values[at], speed / (2.0 * np.pi)
-    points = (point | {key: float(values[k]) for key, values in courses.items()} for k in range(LINE_POINTS))
+    points = (point | {key: float(values[k]) for key, values in courses.items()} for k in range(_LINE_POINTS))
     known = np.stack([strand_frequencies(at) for at in points], -1)
     return turns, (ramp.values[at], known) if np.isfinite(known).any() else None
 
@@ -259,7 +259,7 @@ def changing_of(history: xr.Dataset) -> str | None:
     courses = {name: history[name].values[first:] for name in COURSES if name in history}
     ramped = (name for name, values in courses.items() if _is_ramp(values))
     has_profiles = bool(json.loads(history.attrs.get("point", "{}")).get("profile_time"))
-    other = "time" if has_profiles or any(_change(v) > LEAST_CHANGE for v in courses.values()) else None
+    other = "time" if has_profiles or any(_change(v) > _LEAST_CHANGE for v in courses.values()) else None
     return next(ramped, other)
 
 

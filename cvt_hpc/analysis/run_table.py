@@ -16,7 +16,7 @@ from cvt_hpc.job.values import heading, shown_number
 from cvt_hpc.storage.files import written_aside
 
 FORMATS = (".csv", ".xlsx")
-MOST_ROWS = (1 << 20) - 1  # of a sheet, below its head
+_MOST_ROWS = (1 << 20) - 1  # of a sheet, below its head
 _DIGITS = 14  # of what was converted: 3000 rpm from 314.1592653589793 rad/s
 
 
@@ -60,7 +60,7 @@ def write_tables(frames: Mapping[str, DataFrame], out: Path) -> list[Path]:
     """Write tables as CSV, or as sheets for Excel and the like, by the suffix, and return the paths.
 
     Of CSV files the first one is `out`, and the names of the others are beside its own. InputError if the
-    suffix is none of FORMATS; of sheets, if the library is missing or there are more than MOST_ROWS.
+    suffix is none of FORMATS; of sheets, if the library is missing or there are more than _MOST_ROWS.
     """
     if out.suffix.lower() not in FORMATS:
         raise mismatch(str(out), f"a table: {', '.join(FORMATS)}", out.suffix or "no suffix")
@@ -76,8 +76,8 @@ def write_tables(frames: Mapping[str, DataFrame], out: Path) -> list[Path]:
     except ImportError:
         then = '`pip install "cvt_hpc[xlsx]"`, or write a .csv, which spreadsheets read too'
         raise mismatch(str(out), "the library XlsxWriter", "none", then) from None
-    if (rows := max(map(len, frames.values()))) > MOST_ROWS:
-        expected = f"at most {MOST_ROWS} runs, which a sheet holds"
+    if (rows := max(map(len, frames.values()))) > _MOST_ROWS:
+        expected = f"at most {_MOST_ROWS} runs, which a sheet holds"
         raise mismatch(str(out), expected, str(rows), "write .csv")
     # texts stay texts, whoever has written them: no formulas and no links
     options = {"constant_memory": True, "strings_to_formulas": False, "strings_to_urls": False}

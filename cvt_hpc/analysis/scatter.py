@@ -17,7 +17,7 @@ from cvt_hpc.analysis.classes import OccurrenceClass, at_strongest_strand, count
 from cvt_hpc.analysis.courses import line_of_study
 from cvt_hpc.errors import mismatch
 
-MOST_AXES = 4  # six pairs; the first axes of the job
+_MOST_AXES = 4  # six pairs; the first axes of the job
 BESIDE, HEIGHT = 2, 2.6  # panels side by side, and their height [inch]
 _SIZE = 6.0  # [point], of the mark of a vibrating run
 _FIRST = ("load", "friction_gradient")  # along x and along y, where they are
@@ -46,8 +46,8 @@ def scatter_figure(dataset: xr.Dataset, at: Fixed, source: str, vmax: cells.End 
     head = figures.headline("Vibration occurrence", dataset.attrs)
     title = [head, f"{classes.size} samples: {count_classes(classes)}"]
     names = sample_axes(dataset)
-    if len(names) > MOST_AXES:
-        title.append(f"the first {MOST_AXES} of {len(names)} axes")
+    if len(names) > _MOST_AXES:
+        title.append(f"the first {_MOST_AXES} of {len(names)} axes")
     figures.entitle(figure, [*title, line_of_study(dataset)])
     figures.legend_below(figure, figures.entries_of(panels[0, :1]), cells.LEGEND_COLUMNS)
     return figure
@@ -90,7 +90,7 @@ def sample_axes(dataset: xr.Dataset) -> list[str]:
 
 
 def _pairs(dataset: xr.Dataset) -> list[tuple[str, str | None]]:
-    names = sample_axes(dataset)[:MOST_AXES]
+    names = sample_axes(dataset)[:_MOST_AXES]
     return list(combinations(names, 2)) or [(names[0], None)]
 
 

@@ -39,9 +39,9 @@ NEEDED = (
 )
 REFERENCES = {"m": (1e-6, "µm"), "m s-1": (1e-3, "mm/s")}
 NOMINAL = (1.0, 1.25, 1.6, 2.0, 2.5, 3.15, 4.0, 5.0, 6.3, 8.0)  # of the ten bands of a decade
-LEAST_LINES = 4  # of the spectrum in a band: Hann's main lobe between its zeros
+_LEAST_LINES = 4  # of the spectrum in a band: Hann's main lobe between its zeros
 DEEPEST = 80.0  # [dB] below the highest band, that are drawn
-HEIGHTS = 1.5, 2.5  # [inch]: a panel, at least and else
+_HEIGHTS = 1.5, 2.5  # [inch]: a panel, at least and else
 
 
 class Signal(NamedTuple):
@@ -201,8 +201,8 @@ def third_octaves(values: ArrayLike, rate: float, unit: str = "1", *, velocity: 
     Returns
     -------
     Bands
-        Those of LEAST_LINES lines or more, below half the sampling rate. A steady sine of amplitude A has the
-        rms A / sqrt(2) in its band, less what lies beyond an edge within two lines.
+        Those of _LEAST_LINES lines or more, below half the sampling rate. A steady sine of amplitude A has
+        the rms A / sqrt(2) in its band, less what lies beyond an edge within two lines.
     """
     from scipy.signal import periodogram  # scipy.signal takes long to load
 
@@ -210,7 +210,7 @@ def third_octaves(values: ArrayLike, rate: float, unit: str = "1", *, velocity: 
     if velocity:
         density = density * (2.0 * np.pi * lines) ** 2
     width, half = lines[1], 10.0**0.05
-    first = np.ceil(10.0 * np.log10(LEAST_LINES * width / (half - 1.0 / half) / 1000.0) - 1e-9)
+    first = np.ceil(10.0 * np.log10(_LEAST_LINES * width / (half - 1.0 / half) / 1000.0) - 1e-9)
     last = np.floor(10.0 * np.log10(0.5 * rate / half / 1000.0) + 1e-9)
     numbers = np.arange(int(first), int(last) + 1)
     borders = np.append(lines - 0.5 * width, lines[-1] + 0.5 * width)
@@ -269,7 +269,7 @@ def _draw_bands(axes: Axes, bands: Bands, k: int, told: str) -> None:
 
 def in_a_column(count: int, source: str, then: str, **sharing: Any) -> tuple[Figure, figures.Panels]:
     """Figure with panels below each other; InputError, with what to do `then`, if no page holds them."""
-    figure, panels, _ = figures.panels_on_a_page(count, (1,), HEIGHTS, 1.5, source, then, **sharing)
+    figure, panels, _ = figures.panels_on_a_page(count, (1,), _HEIGHTS, 1.5, source, then, **sharing)
     for axes in panels.flat:
         axes.grid(lw=0.4, alpha=0.5)
     return figure, panels[:, 0]

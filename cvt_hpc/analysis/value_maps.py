@@ -30,21 +30,21 @@ from cvt_hpc.vibration.classes import OccurrenceClass
 
 Array = NDArray[np.float64]
 COLOURS = cells.colours_of("viridis_r", 0.05, 0.85)
-OTHER_SIGN = 0.05  # of the largest size: values of the other sign from here on have colours of their own
+_OTHER_SIGN = 0.05  # of the largest size: values of the other sign from here on have colours of their own
 TWO_SIGNS = cells.colours_of("PuOr", 0.08, 0.92)
 MOST_PANELS = 8  # of an axis that nobody chose
 BESIDE, LETTERS = 3, 14.0  # panels side by side at most; letters of a title to an inch
 ROW, FRAME = 0.25, 0.9  # [inch], of a row of cells, and of title and labels
 HIGHEST, LEAST = 3.6, 0.8  # [inch], of a panel's cells
 AROUND = 1.5  # [inch]: labels beside a panel's cells
-ISOLINE_INK = "#b3003b"  # over the colours of a map, light and dark
-ISOLINE_STYLES = ("--", "-", "-.")
-NEGATIVE = "---"  # lines over cells below zero that hold no numbers
+_ISOLINE_INK = "#b3003b"  # over the colours of a map, light and dark
+_ISOLINE_STYLES = ("--", "-", "-.")
+_NEGATIVE = "---"  # lines over cells below zero that hold no numbers
 UNSURE, INK = "xx", "#5a5a5a"  # lines over cells that are hardly known, and the colour of both
 WIDE = 0.5  # of a probability or an index: with a wider interval next to nothing is known
-HATCH = cells.STYLES[OccurrenceClass.SLIPPING].hatch
+_HATCH = cells.STYLES[OccurrenceClass.SLIPPING].hatch
 EQUAL = 1e-6  # of a quantity: what differs less is the same
-NARROWEST, LOWEST = 24.0, 11.0  # [point]: cells into which numbers are written
+_NARROWEST, LOWEST = 24.0, 11.0  # [point]: cells into which numbers are written
 OTHERS = tuple(WITHOUT_RESULT)  # which runs are marked
 
 
@@ -123,7 +123,7 @@ def value_map_figure(
     without = (dataset[name].attrs.get(WITHOUT) for name in quantities)
     undecided = cells.STYLES[OccurrenceClass.UNDECIDED]
     told = {
-        NEGATIVE: ("below zero", "none", INK),
+        _NEGATIVE: ("below zero", "none", INK),
         UNSURE: (f"interval wider than {WIDE:g}", "none", INK),
         undecided.hatch: (next(filter(None, without), "undecided"), undecided.fill, undecided.ink),
     }
@@ -133,8 +133,8 @@ def value_map_figure(
         if hatch in hatches
     ]
     isolines = {panel.isolines for panel in panels if min(panel.values.shape) > 1} - {()}
-    for style, value in zip(ISOLINE_STYLES, min(isolines, default=()), strict=False):
-        look = {"color": ISOLINE_INK, "lw": 1.6, "ls": style}
+    for style, value in zip(_ISOLINE_STYLES, min(isolines, default=()), strict=False):
+        look = {"color": _ISOLINE_INK, "lw": 1.6, "ls": style}
         further.append(Line2D([], [], label=f"probability {value:g}", **look))
     further += over.handles
     if marked or further:
@@ -210,7 +210,7 @@ def _draw_panel(
     (x, y), kinds, values = rulers, panel.kinds, panel.values
     norm = _norm(panel.alike, None if vmax is None else panel.factor * vmax)
     ends = sorted((-float(norm.vmin), float(norm.vmax)))
-    both = ends[0] > OTHER_SIGN * ends[1]
+    both = ends[0] > _OTHER_SIGN * ends[1]
     if both:  # white is none
         norm = Normalize(-ends[1], ends[1])
     scale = cells.Scale(TWO_SIGNS if both else COLOURS, norm, panel.unit)
@@ -220,7 +220,7 @@ def _draw_panel(
     cells.draw_cells(axes, x, y, drawn, np.zeros(kinds.shape, bool), values, scale)
     cells.draw_grid(axes, x, y)
     width, height = room * [np.diff(one.edges).min() / np.ptp(one.edges) for one in (x, y)]
-    if width >= NARROWEST and height >= LOWEST:
+    if width >= _NARROWEST and height >= LOWEST:
         for row, column in np.argwhere(is_known):
             place, value = (x.centres[column], y.centres[row]), values[row, column]
             fill_colour = np.asarray(scale.colours(scale.norm(value)))
@@ -230,9 +230,9 @@ def _draw_panel(
             digits = ".2g" if panel.isolines else digits
             cells.write_value(axes, place, f"{value:{digits}}", fill_colour, size=7.5, outlined=is_lined)
     elif both:  # in grey the colours of both signs are alike
-        _hatch(axes, x, y, is_known & (values < 0.0), NEGATIVE, INK)
+        _hatch(axes, x, y, is_known & (values < 0.0), _NEGATIVE, INK)
     cells.draw_marks(axes, x, y, kinds, np.isin(kinds, OTHERS) & ~is_known, 3.5)
-    _hatch(axes, x, y, is_known & (kinds == OccurrenceClass.SLIPPING), HATCH, "#ffffff")
+    _hatch(axes, x, y, is_known & (kinds == OccurrenceClass.SLIPPING), _HATCH, "#ffffff")
     _hatch(axes, x, y, is_known & panel.unsure, UNSURE, INK)
     if panel.isolines and min(values.shape) > 1:
         _draw_isolines(axes, x, y, np.where(is_known, values, np.nan), panel.isolines)
@@ -244,8 +244,8 @@ def _draw_panel(
 
 def _draw_isolines(axes: Axes, x: Ruler, y: Ruler, values: Array, isolines: Sequence[float]) -> None:
     """Draw lines of equal values between the grid points, each in a style of its own."""
-    look: dict[str, Any] = {"colors": ISOLINE_INK, "linewidths": 1.6, "zorder": 2.4}
-    look["linestyles"] = ISOLINE_STYLES
+    look: dict[str, Any] = {"colors": _ISOLINE_INK, "linewidths": 1.6, "zorder": 2.4}
+    look["linestyles"] = _ISOLINE_STYLES
     with warnings.catch_warnings():
         warnings.filterwarnings("ignore", "No contour levels")
         lines = axes.contour(x.centres, y.centres, values, isolines, **look)

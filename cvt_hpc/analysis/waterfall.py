@@ -25,15 +25,15 @@ from cvt_hpc.errors import few_of, mismatch
 
 Array = NDArray[np.float64]
 
-NAME_HEIGHT, LETTER = 9.5, 5.6  # [point]: of a name, and width of one of its letters
-TITLE = 3.0  # [point]: distance of a title
+_NAME_HEIGHT, LETTER = 9.5, 5.6  # [point]: of a name, and width of one of its letters
+_TITLE = 3.0  # [point]: distance of a title
 OUTLINE = figures.outlined(2.2)
 
 LEAST, HEIGHT, FRAME = 1.3, 2.8, 1.2  # [inch]: a row of panels, and title and labels
 # white ground, on which weak ridges are seen
 COLOURS = ListedColormap(["white", *cells.colours_of("magma_r", 0.04, 0.97).colors], "spectra")
-SHALLOWEST, DEEPEST = 1e-2, 1e-4  # of the end of the colours: between them lies their beginning
-LIGHT = 0.9  # share of all amplitudes that may have the lightest colour
+_SHALLOWEST, DEEPEST = 1e-2, 1e-4  # of the end of the colours: between them lies their beginning
+_LIGHT = 0.9  # share of all amplitudes that may have the lightest colour
 UNKNOWN = "#d0d4d8"  # of runs without a spectrum
 LINE, ORDER = "#123a6b", "#4d4d4d"
 ORDERS = (1.0, 2.0, 4.0, 8.0, 16.0)  # of the driving pulley, in a Campbell diagram
@@ -74,7 +74,7 @@ def name_lines(axes: Axes, lines: Sequence[Named], size: tuple[float, float]) ->
             paper = {"facecolor": "white", "edgecolor": "none", "alpha": 0.8, "pad": 0.6}
             _write(axes, line, (x[last], y[last]), "data", (3, 0), ha="left", va="center", bbox=paper)
     letters = max((len(line.name) for _, line in above), default=1)
-    gaps = NAME_HEIGHT / (72.0 * size[1]) * top, (LETTER * letters + 3.0) / (72.0 * size[0]) * (end - left)
+    gaps = _NAME_HEIGHT / (72.0 * size[1]) * top, (LETTER * letters + 3.0) / (72.0 * size[0]) * (end - left)
     right = [(min(place, top - 0.5 * gaps[0]), line) for place, line in right]  # clear of the title
     off = 3.0  # [point]: names of another colour have a column of their own
     for colour in dict.fromkeys(line.colour for _, line in right):
@@ -84,7 +84,7 @@ def name_lines(axes: Axes, lines: Sequence[Named], size: tuple[float, float]) ->
         off += LETTER * max(len(line.name) for _, line in named) + 2.0
     for place, line in _clear(above, gaps[1]):
         _write(axes, line, (place, 1.0), axes.get_xaxis_transform(), (0, 1), ha="center", va="bottom")
-    return TITLE + NAME_HEIGHT if above else TITLE
+    return _TITLE + _NAME_HEIGHT if above else _TITLE
 
 
 def _clear(placed: Sequence[tuple[float, Named]], gap: float) -> Iterator[tuple[float, Named]]:
@@ -226,8 +226,8 @@ def spectra_norm(spectra: Sequence[Array], highest: float | None = None) -> LogN
     strongest = np.concatenate([np.nan_to_num(each, nan=-1.0).max(axis=0) for each in spectra])
     top = float(cells.norm_over(strongest[strongest > 0.0], 0.0, highest).vmax or 1.0)
     known = np.concatenate([each[np.isfinite(each)] for each in spectra])
-    low = np.quantile(known, LIGHT) if known.size else 0.0
-    return LogNorm(float(np.clip(low, DEEPEST * top, SHALLOWEST * top)), top)
+    low = np.quantile(known, _LIGHT) if known.size else 0.0
+    return LogNorm(float(np.clip(low, DEEPEST * top, _SHALLOWEST * top)), top)
 
 
 def draw_spectra(axes: Axes, x: Array, y: Array, amplitude: Array, norm: LogNorm) -> None:

@@ -26,7 +26,7 @@ Commands: TypeAlias = "argparse._SubParsersAction[argparse.ArgumentParser]"
 
 DONE, SOME_FAILED = 0, 1
 PICTURES = (".png", ".svg", ".pdf")
-LONGEST_NAME, LONGEST_NAMES = 100, 60  # letters of a picture's name, and of the files' names within it
+LONGEST_NAME, _LONGEST_NAMES = 100, 60  # letters of a picture's name, and of the files' names within it
 # what --set does
 REPLACE = (
     "replace a value of the job, or an axis by one value, a list [40, 60] or a range {from=, to=, step=}"
@@ -170,8 +170,8 @@ def picture_beside(path: Path, files: Sequence[Path], *words: str) -> Path:
     NAME is that of the files; `results`, which each study has, is left out. Of many it is that of the first.
     """
     names = [name for file in files if (name := file.stem) != "results"]
-    if len("_".join(names)) > LONGEST_NAMES:
-        names = [names[0][:LONGEST_NAMES], f"and_{len(names) - 1}_more"]
+    if len("_".join(names)) > _LONGEST_NAMES:
+        names = [names[0][:_LONGEST_NAMES], f"and_{len(names) - 1}_more"]
     name = "_".join(re.sub(r"[^\w.=+-]+", "_", word) for word in (*names, *words))
     return folder_of(path) / f"{name[:LONGEST_NAME]}.png"
 

@@ -17,7 +17,7 @@ if TYPE_CHECKING:
     from cvt_hpc.analysis.comparison import Comparison
 
 # Exit status of `compare`: some cells are quiet by one method, or as measured, that vibrate by the other
-CONTRADICTING = 1
+_CONTRADICTING = 1
 
 
 def add(commands: parts.Commands) -> None:
@@ -176,7 +176,7 @@ def _compare(arguments: argparse.Namespace) -> int:
         found = compare(a, b, sources)
     written = leave_comparison(found, arguments.out or parts.folder_of(arguments.other), sources)
     parts.say(*comparison_lines(found, sources), *written)
-    return CONTRADICTING if found.contradicts.any() and not found.are_designs else parts.DONE
+    return _CONTRADICTING if found.contradicts.any() and not found.are_designs else parts.DONE
 
 
 def _compare_measured(arguments: argparse.Namespace, source: str, path: str) -> int:
@@ -194,7 +194,7 @@ def _compare_measured(arguments: argparse.Namespace, source: str, path: str) -> 
             parts.complain(f"no picture: {error}")
         else:
             parts.say(f"picture: {draw(lambda: figure, folder / 'compare.png')}")
-    return CONTRADICTING if found.contradicts else parts.DONE
+    return _CONTRADICTING if found.contradicts else parts.DONE
 
 
 def leave_comparison(found: Comparison, folder: Path, sources: tuple[str, str]) -> list[str]:

@@ -5,7 +5,7 @@ from pathlib import Path
 
 from cvt_hpc.cli import parts
 
-SHELLS = ("bash", "zsh", "tcsh")
+_SHELLS = ("bash", "zsh", "tcsh")
 
 
 def add(commands: parts.Commands) -> None:
@@ -40,7 +40,7 @@ def add(commands: parts.Commands) -> None:
     text = "print what completes commands and options in a shell"
     end = ': eval "$(cvt-hpc completion bash)" in ~/.bashrc.'
     completion = parts.add_command(commands, "completion", _completion, text, end=end)
-    completion.add_argument("shell", choices=SHELLS)
+    completion.add_argument("shell", choices=_SHELLS)
 
 
 def _init(arguments: argparse.Namespace) -> None:

@@ -19,7 +19,7 @@ if TYPE_CHECKING:
     from cvt_hpc.study.repeats import Repeat
 
 Options = dict[str, Any]  # of a sweep
-RETRIED = ("timed_out", "failed_error", "failed_numerics")
+_RETRIED = ("timed_out", "failed_error", "failed_numerics")
 
 
 def add(commands: parts.Commands) -> None:
@@ -34,7 +34,7 @@ def add(commands: parts.Commands) -> None:
     run.add_argument("--time-limit", metavar="TIME", help=limit)
     run.add_argument("--run-limit", metavar="TIME", help="time that one run may take (default: any)")
     retry = "do recorded runs that ended so again, from their start; may be repeated"
-    run.add_argument("--retry", action="append", default=[], choices=RETRIED, help=retry)
+    run.add_argument("--retry", action="append", default=[], choices=_RETRIED, help=retry)
     refine = (
         "with --retry failed_numerics: begin at the job's time step over this factor, and halve it from "
         "there as often as most_refinements says (default: the first factor not tried yet, 16 after three "

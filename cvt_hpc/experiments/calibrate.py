@@ -68,10 +68,10 @@ FEWEST = 8.0  # effective samples, below which the posterior is not told
 BAND = np.array([0.025, 0.5, 0.975])  # quantiles
 ALIKE = 0.5  # rank correlation from which on two parameters are not told apart
 TOLD = 0.9  # of the band before: a parameter whose band is hardly narrower keeps its distribution
-HALF = 0.5  # of the band before: below, the file tells the parameter
+_HALF = 0.5  # of the band before: below, the file tells the parameter
 LEAST_SHARE = 0.05  # of a parameter in a combination that is told
 _LEAST_WEIGHT = 1e-4  # of a sample that has its own combination of the others
-LEAST_BIT = 0.01  # that a further measurement has to tell
+_LEAST_BIT = 0.01  # that a further measurement has to tell
 _FACTOR = np.log(2.0)  # of amplitudes
 _OPTIONS = {
     "doubt": Parameter(0.05, "", "", minimum=0.0, maximum=0.5, exclusive=True),
@@ -390,7 +390,7 @@ def _lines(asked: Calibration, found: Posterior) -> Iterator[str]:
     yield from _told_lines(dict(zip(names, widths, strict=True)))
     bits = information(asked, found).where(~_measured_cells(found)[1], -np.inf).fillna(-np.inf)
     at = {name: int(k) for name, k in bits.argmax(...).items()}
-    if (most := float(bits.isel(at))) < LEAST_BIT:
+    if (most := float(bits.isel(at))) < _LEAST_BIT:
         yield "no cell beyond the measured range would tell more"
         return
     told = ", ".join(f"{name} {value_text(found.dataset[name], k)}" for name, k in at.items())
@@ -414,7 +414,7 @@ def _combination_lines(told: Combination, names: list[str]) -> Iterator[str]:
 
 def _told_lines(widths: dict[str, float]) -> Iterator[str]:
     """Yield lines that state what the file tells and what not, by widths of bands over those before."""
-    told, in_part = ([name for name, width in widths.items() if width < most] for most in (HALF, TOLD))
+    told, in_part = ([name for name, width in widths.items() if width < most] for most in (_HALF, TOLD))
     yield f"told, a band below half of that before: {', '.join(told) or 'nothing'}"
     yield f"told in part: {', '.join(name for name in in_part if name not in told) or 'nothing'}"
     left = [name for name in widths if name not in in_part]

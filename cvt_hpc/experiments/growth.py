@@ -29,7 +29,7 @@ from cvt_hpc.tables import columns, number, short
 from cvt_hpc.variables import Status, Vibrates
 from cvt_hpc.vibration.twins import MOST_MODES, Found, found_modes, nothing
 
-TWINS, EIGENVALUES = "twins", "linear_stability"
+_TWINS, _EIGENVALUES = "twins", "linear_stability"
 SHARES = (0.0, 0.5, 1.0)  # of the kick
 # By key what a run is given, where its model knows the key: a run that is prolonged or done again at another
 # step has no twin, and chatter by rounding would hide small motions
@@ -82,12 +82,12 @@ def load(path: str | Path, overrides: Assignments = (), kick: str | None = None)
         size = read_value(job.schema.parameters[key], kick, "--kick")
         if not size > 0.0:
             raise mismatch("--kick", "a value above 0", kick)
-    rungs, refusals = [Sweep(TWINS, (), _twin_job(job, key, size))], {}
+    rungs, refusals = [Sweep(_TWINS, (), _twin_job(job, key, size))], {}
     if job.model == "elastic_belt":
         try:
-            rungs.append(Sweep(EIGENVALUES, (), handed(job, EIGENVALUES, {})))
+            rungs.append(Sweep(_EIGENVALUES, (), handed(job, _EIGENVALUES, {})))
         except InputError as error:
-            refusals[EIGENVALUES] = str(error)
+            refusals[_EIGENVALUES] = str(error)
     return Growth(job, size, tuple(rungs), refusals)
 
 
@@ -145,7 +145,7 @@ def find_growth(asked: Growth, out: Path) -> list[Found]:
     InputError
         If a file cannot be read.
     """
-    dataset = load_sweep(TWINS, out)
+    dataset = load_sweep(_TWINS, out)
     status = dataset["status"].values.reshape(-1, len(SHARES))
     reasons, verdicts = (dataset[name].values.reshape(status.shape) for name in ("reason", "vibrates"))
     found = []
@@ -157,7 +157,7 @@ def find_growth(asked: Growth, out: Path) -> list[Found]:
             found.append(nothing(f"{Status(int(ended[failed[0]])).name.lower()}: {text}"))
             continue
         runs = range(cell * len(SHARES), (cell + 1) * len(SHARES))
-        motions = [_displacement(out / TWINS / "histories" / f"run-{run:06d}.nc") for run in runs]
+        motions = [_displacement(out / _TWINS / "histories" / f"run-{run:06d}.nc") for run in runs]
         shortest = min(map(len, motions))  # of runs that the belt's slipping through ends
         point = asked.job.point(cell)
         motion = np.array([motion[:shortest] for motion in motions])
@@ -190,12 +190,12 @@ def _growth_dataset(asked: Growth, found: Sequence[Found], out: Path) -> xr.Data
         variables[name] = (names, cells, attributes(*words))
     reasons = np.array([one.reason for one in found], object).reshape(job.shape)
     variables["reason"] = (names, reasons, attributes("reason", comment="why there are no modes"))
-    results = load_sweep(TWINS, out)
+    results = load_sweep(_TWINS, out)
     coordinates, makers = {name: results[name] for name in names}, [maker_of(results)]
     told = global_attributes(job, job.resolved(), "modes by twin runs", makers=makers)
     dataset = xr.Dataset(variables, coordinates, {**told, "job_fingerprint": job.fingerprint()})
     if len(asked.rungs) > 1:
-        results = load_sweep(EIGENVALUES, out)
+        results = load_sweep(_EIGENVALUES, out)
         for name in ("growth_rate", "loosened_growth_rate", "frequency"):
             dataset[f"linear_{name}"] = results[name]
     return dataset

@@ -1,7 +1,7 @@
 """`cvt-hpc friction`: laws of friction fitted to measured coefficients, each with its uncertainty.
 
 Each law is fitted by least squares, in x = (mu_k, g, ln v_s) or what it reads of these. With
-`LEAST_SPECIMENS` specimens or more each is fitted by itself: the mean and the covariance of the estimates
+`_LEAST_SPECIMENS` specimens or more each is fitted by itself: the mean and the covariance of the estimates
 are those of a specimen, which is how variators differ, the error of each fit included. With fewer the
 covariance is that of the mean law,
 
@@ -36,12 +36,12 @@ from cvt_hpc.physics.friction_laws import OTHER_NAMES, Law
 from cvt_hpc.storage.files import written_aside
 from cvt_hpc.tables import columns, short
 
-LEAST_SPECIMENS = LEAST_SPEEDS = 4  # one more than a law has parameters
+_LEAST_SPECIMENS = _LEAST_SPEEDS = 4  # one more than a law has parameters
 _COLUMNS = {"force": ("N/m", "N", "Pa"), "speed": ("m/s",), "mu": ("",), "specimen": ("",)}
 _SCALES = 7  # speed scales at which the search begins
-LARGEST_CONDITION = 1e8  # condition of J, by columns of one size, up to which the points determine a law
-TWO_SIDED_95 = 1.96  # standard errors
-MUCH_CLOSER = 0.5  # of the root mean square of the best law's residuals
+_LARGEST_CONDITION = 1e8  # condition of J, by columns of one size, up to which the points determine a law
+_TWO_SIDED_95 = 1.96  # standard errors
+_MUCH_CLOSER = 0.5  # of the root mean square of the best law's residuals
 NEGLIGIBLE = 1e-6  # coefficient of friction that nobody measures
 _UNITS = {"kinetic_friction": "", "friction_gradient": "s/m", "stribeck_velocity": "m/s"}
 _WRITTEN = _UNITS | {"stribeck_velocity": "mm/s"}  # as tribometers state it
@@ -123,8 +123,8 @@ def _faults(values: dict[str, Array]) -> Iterator[Fault]:
     yield ("mu",), "a coefficient of friction > 0", values["mu"] <= 0.0
     if "force" in values:
         yield ("force",), "a force of 0 or more", values["force"] < 0.0
-    if len(np.unique(values["speed"])) < LEAST_SPEEDS:
-        raise ValueError(f"expected {LEAST_SPEEDS} different speeds or more, found fewer")
+    if len(np.unique(values["speed"])) < _LEAST_SPEEDS:
+        raise ValueError(f"expected {_LEAST_SPEEDS} different speeds or more, found fewer")
 
 
 def _values(law: Law, x: Array) -> dict[str, float]:
@@ -169,7 +169,7 @@ def _least(law: Law, speed: Array, mu: Array) -> Array | None:
     x = np.asarray(min(fits, key=lambda fit: fit.cost).x)
     slopes = _slopes(law, x, speed)
     size = np.linalg.norm(slopes, axis=0)
-    is_determined = (size > 0.0).all() and np.linalg.cond(slopes / size) < LARGEST_CONDITION
+    is_determined = (size > 0.0).all() and np.linalg.cond(slopes / size) < _LARGEST_CONDITION
     return x if is_determined else None
 
 
@@ -193,9 +193,9 @@ def fit_law(law: Law, points: Points) -> Fitted | None:
     variance = square / max(n - k / share, 1.0)
     covariance: Any = variance * np.linalg.inv(slopes.T @ slopes) / share
     parts = [points.specimen == one for one in np.unique(points.specimen)]
-    parts = parts if len(parts) >= LEAST_SPECIMENS else []
+    parts = parts if len(parts) >= _LEAST_SPECIMENS else []
     own = [one for part in parts if (one := _least(law, speed[part], mu[part])) is not None]
-    is_scatter = len(own) >= LEAST_SPECIMENS and bool((np.ptp(own, axis=0) > 0.0).all())
+    is_scatter = len(own) >= _LEAST_SPECIMENS and bool((np.ptp(own, axis=0) > 0.0).all())
     if is_scatter:
         x, covariance = np.mean(own, axis=0), np.cov(own, rowvar=False).reshape(k, -1).astype(float)
     return Fitted(law, x, covariance, float(np.sqrt(square / n)), share, len(own) * is_scatter)
@@ -285,20 +285,20 @@ def law_lines(laws: Sequence[Fitted], points: Points) -> Iterator[str]:
         rows.append([one.law.name.lower(), *cells, f"{one.rms:.2g}", f"{one.criterion - best.criterion:.1f}"])
     yield from columns(rows, indent="")
     closest = min(laws, key=lambda one: one.rms)
-    if MUCH_CLOSER * best.rms > max(closest.rms, NEGLIGIBLE):
+    if _MUCH_CLOSER * best.rms > max(closest.rms, NEGLIGIBLE):
         name = closest.law.name.lower()
         few = f"{len(speeds)} points are few for its {len(closest.estimate)} parameters"
         yield f"{name} is much closer to the points, but {few}: measure more, or choose it by --law {name}"
     if best.of_specimens:
         yield f"standard deviations are the scatter of {best.of_specimens} specimens"
     else:
-        whose = f"the scatter of variators takes {LEAST_SPECIMENS} specimens or more"
+        whose = f"the scatter of variators takes {_LEAST_SPECIMENS} specimens or more"
         yield f"standard deviations are those of the mean law; {whose}"
     if best.of_specimens and (out := specimens - best.of_specimens):
         yield f"left out of the scatter: {out}, whose points do not determine the law"
     if (change := by_force(best, points)) is not None:
         share, error = (100.0 * one for one in change)
-        told = "" if abs(share) <= TWO_SIDED_95 * error else ": no law has that, but friction_law table"
+        told = "" if abs(share) <= _TWO_SIDED_95 * error else ": no law has that, but friction_law table"
         changes = f"changes by {share:+.1f} % +- {error:.1f} %{told}"
         yield f"from the least to the largest force the coefficient {changes}"
 

@@ -9,7 +9,7 @@ from cvt_hpc.job.uncertain import Distribution
 
 Array = NDArray[np.float64]
 SAMPLES = 64
-CHANCE = 0.05  # that any pair of independent parameters passes for correlated
+_CHANCE = 0.05  # that any pair of independent parameters passes for correlated
 _BOUNDS = [-2.0, -1.0], [2.0, 2.0]  # of place in standard deviations, and of the logarithm of the width
 
 
@@ -62,7 +62,7 @@ def correlated_groups(ranks: Array, effective: float, before: NDArray) -> NDArra
     from scipy.special import ndtri
 
     pairs = max(len(ranks) * (len(ranks) - 1) // 2, 1)
-    least = ndtri(1.0 - 0.5 * CHANCE / pairs) / np.sqrt(max(effective - 1.0, 1.0))
+    least = ndtri(1.0 - 0.5 * _CHANCE / pairs) / np.sqrt(max(effective - 1.0, 1.0))
     links = (np.abs(ranks) > least) | (before == before[:, np.newaxis])
     found: NDArray[np.int64] = connected_components(links, directed=False)[1]
     return found

@@ -22,7 +22,7 @@ Check = Callable[[Point], list[Problem]]
 Inert = Callable[[Point], dict[str, str]]
 
 _MOST_NAMED = 16
-RETIRED = {"contact_sweeps": "contact is solved exactly; delete the line"}  # keys of earlier versions
+_RETIRED = {"contact_sweeps": "contact is solved exactly; delete the line"}  # keys of earlier versions
 
 
 class Entry(NamedTuple):
@@ -93,8 +93,8 @@ class Schema:
             return name
         if home is not None:
             raise InputError(f"{where}: belongs in [{home}], found in [{section}]")
-        if name in RETIRED:
-            raise InputError(f"{where}: no key of this version; {RETIRED[name]}")
+        if name in _RETIRED:
+            raise InputError(f"{where}: no key of this version; {_RETIRED[name]}")
         if near := self.nearest(name, section):
             raise InputError(f"{where}: unknown key{near}")
         if known := self.sections.get(section or ""):

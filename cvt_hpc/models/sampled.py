@@ -10,7 +10,7 @@ from cvt_hpc.recording import sample_count, start_up_samples
 from cvt_hpc.variables import Status
 
 MOST_UNSOLVED = 0.02  # of the steps
-LATEST = 0.01  # [s] before a run ends early in which its steps have to be solved, too
+_LATEST = 0.01  # [s] before a run ends early in which its steps have to be solved, too
 
 
 class SampledRun:
@@ -101,7 +101,7 @@ class SampledRun:
 
     def _early_end(self, why: str) -> tuple[Status, str]:
         """Status of a run that ends early: done, unless its steps were not solved."""
-        late = round(LATEST / self.interval)
+        late = round(_LATEST / self.interval)
         before = self._unsolved[self.done - 1 - late] if self.done > late else 0
         steps = min(late, self.done) * self._steps_per_sample
         share = max(self.unsolved_share, (self.counters()["unsolved"] - before) / steps)

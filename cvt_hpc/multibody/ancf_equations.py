@@ -21,26 +21,26 @@ from cvt_hpc.multibody.ancf_beam import PER_NODE, POINTS, SHAPES, WEIGHTS, AncfB
 from cvt_hpc.solvers.cyclic_blocks import DIAGONAL, LOWER, UPPER, block_size, empty_blocks, empty_columns
 from cvt_hpc.solvers.generalised_alpha import Scheme, begin, finish, stage_length
 
-SIDE_BY_SIDE = 8  # elements in lanes
+_SIDE_BY_SIDE = 8  # elements in lanes
 # Fields of an element: its input, then its results
-EXTENT, Z, RATE, SPEED, ACCELERATION = 0, 4, 10, 16, 24
-GRADIENTS, LATER = 32, 44  # of both curvatures by z, and those at z + tau dz/dt
+_EXTENT, Z, RATE, SPEED, _ACCELERATION = 0, 4, 10, 16, 24
+GRADIENTS, _LATER = 32, 44  # of both curvatures by z, and those at z + tau dz/dt
 INNER = 56  # slopes of the forces on z, (6, 6)
 PULL = 92  # of the inside on z
 FORCE, MATRIX = 98, 106  # on r1, g1, r2, g2, and its slopes, (8, 8)
 LOST = 170
-GAUSS = 0.5 - 0.5 / np.sqrt(3.0), 0.5 + 0.5 / np.sqrt(3.0)
-VALUE = shapes(np.array(GAUSS))[0]  # (point, shape)
+_GAUSS = 0.5 - 0.5 / np.sqrt(3.0), 0.5 + 0.5 / np.sqrt(3.0)
+VALUE = shapes(np.array(_GAUSS))[0]  # (point, shape)
 MASS = np.array([[156, 22, 54, -13], [22, 4, 13, -3], [54, 13, 156, -22], [-13, -3, -22, 4]]) / 420.0
 # l^3 r' x r'' = FIRST d x a + SECOND d x b - a x b at the Gauss points
-FIRST, SECOND = (-2.0 - np.sqrt(3.0), -2.0 + np.sqrt(3.0)), (2.0 - np.sqrt(3.0), 2.0 + np.sqrt(3.0))
+FIRST, _SECOND = (-2.0 - np.sqrt(3.0), -2.0 + np.sqrt(3.0)), (2.0 - np.sqrt(3.0), 2.0 + np.sqrt(3.0))
 
 SIZE = block_size(PER_NODE)
 
 
-def empty_work() -> LaneArray:
+def _empty_work() -> LaneArray:
     """Work space for the forces of some elements."""
-    return LaneArray(1, LOST + 1, SIDE_BY_SIDE)
+    return LaneArray(1, LOST + 1, _SIDE_BY_SIDE)
 
 
 @kernel
@@ -63,7 +63,7 @@ def assemble(
     alpha's direction turns. Returns the power that damping takes [W].
 
     Of k elements, positions q [m, 1], speeds u and speeds at the start [m/s, 1/s] are (n, 4): n = k of a
-    closed chain, k + 1 of an open one. `empty_work()`, `blocks` and `columns` of `cyclic_blocks` are
+    closed chain, k + 1 of an open one. `_empty_work()`, `blocks` and `columns` of `cyclic_blocks` are
     overwritten; `column` tells which of the right-hand sides it is, the others become 0.
     """
     k, n = beam.lengths.size, q.shape[0]
@@ -91,8 +91,8 @@ def _gather(beam, into, q, u, start, tau, first):
         i = min(first + lane, k - 1)
         j = (i + 1) % n
         l0 = beam.lengths[i]
-        into[EXTENT, lane], into[EXTENT + 1, lane] = 1.0, l0
-        into[EXTENT + 2, lane], into[EXTENT + 3, lane] = 1.0, l0
+        into[_EXTENT, lane], into[_EXTENT + 1, lane] = 1.0, l0
+        into[_EXTENT + 2, lane], into[_EXTENT + 3, lane] = 1.0, l0
         for x in range(2):
             into[Z + x, lane] = q[j, x] - q[i, x]
             into[Z + 2 + x, lane] = l0 * q[i, 2 + x]
@@ -104,21 +104,21 @@ def _gather(beam, into, q, u, start, tau, first):
             into[SPEED + 2 + x, lane] = l0 * u[i, 2 + x]
             into[SPEED + 4 + x, lane] = u[j, x]
             into[SPEED + 6 + x, lane] = l0 * u[j, 2 + x]
-            into[ACCELERATION + x, lane] = per * (u[i, x] - start[i, x]) - beam.gravity[x]
-            into[ACCELERATION + 2 + x, lane] = per * l0 * (u[i, 2 + x] - start[i, 2 + x])
-            into[ACCELERATION + 4 + x, lane] = per * (u[j, x] - start[j, x]) - beam.gravity[x]
-            into[ACCELERATION + 6 + x, lane] = per * l0 * (u[j, 2 + x] - start[j, 2 + x])
+            into[_ACCELERATION + x, lane] = per * (u[i, x] - start[i, x]) - beam.gravity[x]
+            into[_ACCELERATION + 2 + x, lane] = per * l0 * (u[i, 2 + x] - start[i, 2 + x])
+            into[_ACCELERATION + 4 + x, lane] = per * (u[j, x] - start[j, x]) - beam.gravity[x]
+            into[_ACCELERATION + 6 + x, lane] = per * l0 * (u[j, 2 + x] - start[j, 2 + x])
 
 
 @kernel
 def _compute(beam, w, tau):
     """Forces of elements and their slopes, from the input of `_gather`."""
     m, ea, ei, ca = beam.line_mass, beam.axial_stiffness, beam.bending_stiffness, beam.axial_damping
-    l0 = w[0, EXTENT + 1]
+    l0 = w[0, _EXTENT + 1]
     per = 1.0 / l0
     cube = per * per * per
     _curve(w, Z, GRADIENTS, cube)
-    _curve(w, RATE, LATER, cube)
+    _curve(w, RATE, _LATER, cube)
     # bending: its linear part, and damping of both curvatures
     damped, bend = 0.5 * l0 * beam.bending_damping * ei, ei * cube
     turn_1, turn_2 = _dot(w, RATE, GRADIENTS), _dot(w, RATE, GRADIENTS + 6)
@@ -134,8 +134,8 @@ def _compute(beam, w, tau):
         w[0, PULL + r] = fma(moment_1, h1, fma(moment_2, h2, w[0, PULL + r]))
         h1, h2 = damped * h1, damped * h2
         for c in range(6):
-            later_1 = fma(tau, w[0, LATER + c], w[0, GRADIENTS + c])
-            later_2 = fma(tau, w[0, LATER + 6 + c], w[0, GRADIENTS + 6 + c])
+            later_1 = fma(tau, w[0, _LATER + c], w[0, GRADIENTS + c])
+            later_2 = fma(tau, w[0, _LATER + 6 + c], w[0, GRADIENTS + 6 + c])
             w[0, INNER + 6 * r + c] = fma(h1, later_1, h2 * later_2)
     bend = tau * bend
     _add_even(w, 0, 0, 12.0 * bend)
@@ -145,7 +145,7 @@ def _compute(beam, w, tau):
         _add_even(w, 0, end, -6.0 * bend)
         _add_even(w, end, 0, -6.0 * bend)
     _add_odd(w, 0, 1, tau * cube * (FIRST[0] * moment_1 + FIRST[1] * moment_2))
-    _add_odd(w, 0, 2, tau * cube * (SECOND[0] * moment_1 + SECOND[1] * moment_2))
+    _add_odd(w, 0, 2, tau * cube * (_SECOND[0] * moment_1 + _SECOND[1] * moment_2))
     _add_odd(w, 1, 2, -tau * cube * (moment_1 + moment_2))
     # strain
     for p in range(POINTS):
@@ -177,9 +177,9 @@ def _compute(beam, w, tau):
     # of mass; then of the inside of the element
     for r in range(PER_NODE):
         for x in range(2):
-            total = -l0 * m * MASS[r, 0] * w[0, ACCELERATION + x]
+            total = -l0 * m * MASS[r, 0] * w[0, _ACCELERATION + x]
             for c in range(1, PER_NODE):
-                total = fma(-l0 * m * MASS[r, c], w[0, ACCELERATION + 2 * c + x], total)
+                total = fma(-l0 * m * MASS[r, c], w[0, _ACCELERATION + 2 * c + x], total)
             w[0, FORCE + 2 * r + x] = total
     lost = lost + _damp_across(w, 0.5 * beam.mass_damping * m * l0)
     w[0, LOST] = lost
@@ -193,7 +193,7 @@ def _compute(beam, w, tau):
         for c in range(PER_NODE):
             of_c = 0 if c % 2 == 0 else c - c // 2
             sign = -1.0 if (r == 0) != (c == 0) else 1.0
-            scale = w[0, EXTENT + r] * w[0, EXTENT + c]
+            scale = w[0, _EXTENT + r] * w[0, _EXTENT + c]
             inertia = l0 * m / tau * MASS[r, c]
             for x in range(2):
                 for y in range(2):
@@ -209,7 +209,7 @@ def _curve(w, z, to, cube):
     """H z of both curvatures."""
     dx, dy, ax, ay, bx, by = w[0, z], w[0, z + 1], w[0, z + 2], w[0, z + 3], w[0, z + 4], w[0, z + 5]
     for point in range(2):
-        at, first, second = to + 6 * point, FIRST[point] * cube, SECOND[point] * cube
+        at, first, second = to + 6 * point, FIRST[point] * cube, _SECOND[point] * cube
         w[0, at], w[0, at + 1] = first * ay + second * by, -(first * ax + second * bx)
         w[0, at + 2], w[0, at + 3] = -first * dy - cube * by, first * dx + cube * bx
         w[0, at + 4], w[0, at + 5] = -second * dy + cube * ay, second * dx - cube * ax
@@ -314,7 +314,7 @@ def chain(q: np.ndarray, v: np.ndarray, columns: int = 1) -> Chain:
     q, v = np.array(q, float), np.array(v, float)
     dv, stage_q, stage_v, start_q, start_v = np.zeros((5, *q.shape))
     equations = empty_blocks(len(q), PER_NODE), empty_columns(len(q), PER_NODE, columns)
-    return Chain(q, v, v.copy(), dv, stage_q, stage_v, start_q, start_v, *equations, empty_work())
+    return Chain(q, v, v.copy(), dv, stage_q, stage_v, start_q, start_v, *equations, _empty_work())
 
 
 @kernel

@@ -15,7 +15,7 @@ from typing import NamedTuple
 
 import numpy as np
 
-MOST_WRAP = 1.5 * np.pi  # of a belt crossed around more than two: it crosses itself 0.41 radii off the rim
+_MOST_WRAP = 1.5 * np.pi  # of a belt crossed around more than two: it crosses itself 0.41 radii off the rim
 
 
 class BeltPath(NamedTuple):
@@ -86,10 +86,10 @@ def belt_path(centre: np.ndarray, radius: np.ndarray, turn: np.ndarray) -> BeltP
         i, j = crossed[0]
         raise ValueError(f"a belt whose spans behind pulleys {i + 1} and {j + 1} cross")
     i = int(np.argmax(wrap))
-    if around == 0 and len(radius) > 2 and wrap[i] > MOST_WRAP:
+    if around == 0 and len(radius) > 2 and wrap[i] > _MOST_WRAP:
         told = f"pulley {i + 1} by {np.rad2deg(wrap[i]):.0f} deg"
         raise ValueError(
-            f"a belt that crosses itself as it wraps {told}, more than {np.rad2deg(MOST_WRAP):.0f}"
+            f"a belt that crosses itself as it wraps {told}, more than {np.rad2deg(_MOST_WRAP):.0f}"
         )
     return path
 

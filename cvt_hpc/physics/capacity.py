@@ -28,15 +28,15 @@ def carried_torque(parameters: Mapping[str, Any]) -> float:
     """Torque at the driving pulley [N m] that friction carries on rigid sheaves.
 
     From flat parameters [SI], those of NEEDS, by `torque_limit`, with the thrust on the driven pulley, which
-    a job prescribes, and the coefficient of `friction_level`. A model without a choice of friction laws has
+    a job prescribes, and the coefficient of `_friction_level`. A model without a choice of friction laws has
     neither `friction_law` nor `table_mu`. ValueError if the friction table has no coefficients.
     """
     p = parameters
     radius = p["driven_radius"] / p["ratio"]
-    return torque_limit(friction_level(p), p["thrust"], radius, p["half_wedge_angle"])
+    return torque_limit(_friction_level(p), p["thrust"], radius, p["half_wedge_angle"])
 
 
-def friction_level(parameters: Mapping[str, Any]) -> float:
+def _friction_level(parameters: Mapping[str, Any]) -> float:
     """Coefficient of friction [1] that stays as the friction gradient varies; of a table the least one."""
     if parameters.get("friction_law") != "table":
         return parameters["kinetic_friction"]

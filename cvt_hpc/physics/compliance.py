@@ -39,12 +39,12 @@ from cvt_hpc.physics.sheaves import Sheaves, disc_factor, elastic_matrix
 ROUNDS_OF_BLOCK_FLIPS = 10
 
 # fields of Contact.stations
-GAP, PUSH, DIAGONAL, OFF_DIAGONAL, PIVOT, MULTIPLIER = range(6)
-RESPONSE_1, RESPONSE_2, Y, CLOSED, FORCED = range(6, 11)
+GAP, PUSH, DIAGONAL, _OFF_DIAGONAL, PIVOT, _MULTIPLIER = range(6)
+_RESPONSE_1, _RESPONSE_2, Y, CLOSED, FORCED = range(6, 11)
 # fields of Contact.scalars
-ELEMENT_STIFFNESS, COMPLIANCE, DISC_COMPLIANCE, TILT_COMPLIANCE = range(4)
-INVERSE_11, INVERSE_12, INVERSE_22, ROUND_OFF, SOLVES, UNSOLVED = range(4, 10)
-CLEARANCE, LEAST_LOAD, DIRECTION_ERROR, AXIS_COSINE, AXIS_SINE, LARGER, LESSER = range(10, 17)
+ELEMENT_STIFFNESS, COMPLIANCE, _DISC_COMPLIANCE, TILT_COMPLIANCE = range(4)
+_INVERSE_11, _INVERSE_12, _INVERSE_22, ROUND_OFF, SOLVES, UNSOLVED = range(4, 10)
+_CLEARANCE, LEAST_LOAD, DIRECTION_ERROR, _AXIS_COSINE, _AXIS_SINE, _LARGER, _LESSER = range(10, 17)
 LOOSE_1, LOOSE_2 = range(17, 19)
 
 # Forces of the default scene are 1e5 N/m and come from openings that are 1 % of their parts: the error [N/m]
@@ -87,19 +87,19 @@ def lane_contact(wraps: list[Sheaves], dtype: DTypeLike) -> Contact:
     stations.data[:, CLOSED] = 1.0
     scalars.data[:, DIRECTION_ERROR] = _DIRECTION_ERROR[np.dtype(dtype)]
     # the inverse of a tilt that is part of a matrix
-    scalars.data[:, [INVERSE_11, INVERSE_22]] = 1.0
+    scalars.data[:, [_INVERSE_11, _INVERSE_22]] = 1.0
     for lane, wrap in enumerate(wraps):
         stations.data[:, DIAGONAL, lane] = wrap.diagonal
-        stations.data[:, OFF_DIAGONAL, lane] = wrap.off_diagonal
+        stations.data[:, _OFF_DIAGONAL, lane] = wrap.off_diagonal
         round_off = _ROUND_OFF[np.dtype(dtype)] * wrap.line_forces
         scalars.data[0, [ROUND_OFF, LEAST_LOAD], lane] = round_off, round_off * weight.sum()
-        scalars.data[0, :INVERSE_11, lane] = (
+        scalars.data[0, :_INVERSE_11, lane] = (
             wrap.element_stiffness,
             wrap.compliance,
             wrap.disc_compliance,
             wrap.tilt_compliance,
         )
-        scalars.data[0, CLEARANCE, lane] = wrap.clearance
+        scalars.data[0, _CLEARANCE, lane] = wrap.clearance
     has_matrix = wraps[0].flexibilities.size > 0
     m = weight.size if has_matrix else 0
     root, matrix = np.sqrt(weight[:m]), LaneArray(m, 2 * m, len(wraps), dtype)
@@ -131,12 +131,12 @@ def _bend(m: int, stations) -> None:
     """Solve the tridiagonal system in place of Y."""
     y = stations[0, Y]
     for j in range(1, m):
-        y = fma(-stations[j, MULTIPLIER], y, stations[j, Y])
+        y = fma(-stations[j, _MULTIPLIER], y, stations[j, Y])
         stations[j, Y] = y
     y = y * stations[m - 1, PIVOT]
     stations[m - 1, Y] = y
     for j in range(m - 2, -1, -1):
-        y = fma(-stations[j + 1, MULTIPLIER], y, stations[j, Y] * stations[j, PIVOT])
+        y = fma(-stations[j + 1, _MULTIPLIER], y, stations[j, Y] * stations[j, PIVOT])
         stations[j, Y] = y
 
 
@@ -160,31 +160,31 @@ def _factorise_kernel(contact: Contact) -> None:
     m = weight.size
     ce = scalars[0, ELEMENT_STIFFNESS]
     whole = ce * scalars[0, COMPLIANCE]
-    grip = whole * scalars[0, DISC_COMPLIANCE]
+    grip = whole * scalars[0, _DISC_COMPLIANCE]
     pivot = like(0.0, ce)
     for j in range(m):
-        off = stations[j, OFF_DIAGONAL]
+        off = stations[j, _OFF_DIAGONAL]
         multiplier = off * pivot
         d = stations[j, DIAGONAL] + weight[j] * grip * stations[j, CLOSED] - off * multiplier
         pivot = 1.0 / d
-        stations[j, MULTIPLIER], stations[j, PIVOT] = multiplier, pivot
+        stations[j, _MULTIPLIER], stations[j, PIVOT] = multiplier, pivot
     for b in range(2):
         tilt = contact.sine if b else contact.cosine
         for j in range(m):
             stations[j, Y] = weight[j] * tilt[j] * grip * stations[j, CLOSED]
         _bend(m, stations)
         for j in range(m):
-            stations[j, RESPONSE_1 + b] = tilt[j] - stations[j, Y]
+            stations[j, _RESPONSE_1 + b] = tilt[j] - stations[j, Y]
     gain = scalars[0, TILT_COMPLIANCE] * whole
     s11, s12, s22 = like(1.0, ce), like(0.0, ce), like(1.0, ce)
     for j in range(m):
         h = gain * stations[j, CLOSED] * weight[j]
-        s11 += h * contact.cosine[j] * stations[j, RESPONSE_1]
-        s12 += h * contact.cosine[j] * stations[j, RESPONSE_2]
-        s22 += h * contact.sine[j] * stations[j, RESPONSE_2]
+        s11 += h * contact.cosine[j] * stations[j, _RESPONSE_1]
+        s12 += h * contact.cosine[j] * stations[j, _RESPONSE_2]
+        s22 += h * contact.sine[j] * stations[j, _RESPONSE_2]
     per_determinant = 1.0 / (s11 * s22 - s12 * s12)
-    scalars[0, INVERSE_11], scalars[0, INVERSE_22] = s22 * per_determinant, s11 * per_determinant
-    scalars[0, INVERSE_12] = -s12 * per_determinant
+    scalars[0, _INVERSE_11], scalars[0, _INVERSE_22] = s22 * per_determinant, s11 * per_determinant
+    scalars[0, _INVERSE_12] = -s12 * per_determinant
 
 
 @kernel
@@ -194,29 +194,29 @@ def _respond_by_matrix(contact: Contact) -> None:
     for b in range(2):
         tilt = contact.sine if b else contact.cosine
         for j in range(contact.weight.size):
-            stations[j, MULTIPLIER] = tilt[j] + 0.0 * ce
-        solve_closed(contact.matrix, contact.root, stations, (CLOSED, MULTIPLIER, Y, PIVOT), ce)
+            stations[j, _MULTIPLIER] = tilt[j] + 0.0 * ce
+        solve_closed(contact.matrix, contact.root, stations, (CLOSED, _MULTIPLIER, Y, PIVOT), ce)
         for j in range(contact.weight.size):
-            stations[j, RESPONSE_1 + b] = -stations[j, PIVOT] / ce
+            stations[j, _RESPONSE_1 + b] = -stations[j, PIVOT] / ce
 
 
 @kernel
 def _loosen(contact: Contact) -> None:
     """L of `clearance.py` by its principal axes."""
     stations, scalars = contact.stations, contact.scalars
-    gain = scalars[0, CLEARANCE] * scalars[0, ELEMENT_STIFFNESS]
+    gain = scalars[0, _CLEARANCE] * scalars[0, ELEMENT_STIFFNESS]
     m11, m12, m22 = like(0.0, gain), like(0.0, gain), like(0.0, gain)
     for j in range(contact.weight.size):
         h = gain * stations[j, CLOSED] * contact.weight[j]
-        m11 += h * contact.cosine[j] * stations[j, RESPONSE_1]
-        m12 += h * contact.cosine[j] * stations[j, RESPONSE_2]
-        m22 += h * contact.sine[j] * stations[j, RESPONSE_2]
-    i11, i12, i22 = scalars[0, INVERSE_11], scalars[0, INVERSE_12], scalars[0, INVERSE_22]
+        m11 += h * contact.cosine[j] * stations[j, _RESPONSE_1]
+        m12 += h * contact.cosine[j] * stations[j, _RESPONSE_2]
+        m22 += h * contact.sine[j] * stations[j, _RESPONSE_2]
+    i11, i12, i22 = scalars[0, _INVERSE_11], scalars[0, _INVERSE_12], scalars[0, _INVERSE_22]
     cosine, sine, larger, lesser = principal_axes(
         fma(m11, i11, m12 * i12), fma(m11, i12, m12 * i22), fma(m12, i12, m22 * i22)
     )
-    scalars[0, AXIS_COSINE], scalars[0, AXIS_SINE] = cosine, sine
-    scalars[0, LARGER], scalars[0, LESSER] = larger, lesser
+    scalars[0, _AXIS_COSINE], scalars[0, _AXIS_SINE] = cosine, sine
+    scalars[0, _LARGER], scalars[0, _LESSER] = larger, lesser
 
 
 @kernel
@@ -228,23 +228,23 @@ def _give_way(contact: Contact) -> None:
     for j in range(weight.size):
         pressed = weight[j] * stations[j, CLOSED] * stations[j, PUSH]
         one, other = fma(contact.cosine[j], pressed, one), fma(contact.sine[j], pressed, other)
-    cosine, sine = scalars[0, AXIS_COSINE], scalars[0, AXIS_SINE]
+    cosine, sine = scalars[0, _AXIS_COSINE], scalars[0, _AXIS_SINE]
     p_1, p_2, left = bearing_direction(
         fma(cosine, one, sine * other),
         fma(cosine, other, -sine * one),
-        scalars[0, LARGER],
-        scalars[0, LESSER],
+        scalars[0, _LARGER],
+        scalars[0, _LESSER],
         scalars[0, LEAST_LOAD],
         scalars[0, DIRECTION_ERROR],
     )
     scalars[0, UNSOLVED] = select(left, like(1.0, ce), scalars[0, UNSOLVED])
-    clearance = scalars[0, CLEARANCE]
+    clearance = scalars[0, _CLEARANCE]
     one, other = clearance * fma(cosine, p_1, -sine * p_2), clearance * fma(sine, p_1, cosine * p_2)
     scalars[0, LOOSE_1], scalars[0, LOOSE_2] = one, other
-    t1 = -ce * (scalars[0, INVERSE_11] * one + scalars[0, INVERSE_12] * other)
-    t2 = -ce * (scalars[0, INVERSE_12] * one + scalars[0, INVERSE_22] * other)
+    t1 = -ce * (scalars[0, _INVERSE_11] * one + scalars[0, _INVERSE_12] * other)
+    t2 = -ce * (scalars[0, _INVERSE_12] * one + scalars[0, _INVERSE_22] * other)
     for j in range(weight.size):
-        opened = fma(t2, stations[j, RESPONSE_2], t1 * stations[j, RESPONSE_1])
+        opened = fma(t2, stations[j, _RESPONSE_2], t1 * stations[j, _RESPONSE_1])
         stations[j, PUSH] = stations[j, PUSH] + opened
 
 
@@ -272,25 +272,25 @@ def _pushes(contact: Contact) -> bool:
 def _push_by_kernel(contact: Contact) -> None:
     stations, scalars, weight = contact.stations, contact.scalars, contact.weight
     m = weight.size
-    ce, a, disc = scalars[0, ELEMENT_STIFFNESS], scalars[0, COMPLIANCE], scalars[0, DISC_COMPLIANCE]
+    ce, a, disc = scalars[0, ELEMENT_STIFFNESS], scalars[0, COMPLIANCE], scalars[0, _DISC_COMPLIANCE]
     y = like(0.0, ce)
     for j in range(m):
-        y = fma(-stations[j, MULTIPLIER], y, -weight[j] * stations[j, CLOSED] * ce * stations[j, GAP])
+        y = fma(-stations[j, _MULTIPLIER], y, -weight[j] * stations[j, CLOSED] * ce * stations[j, GAP])
         stations[j, Y] = y
     y = p1 = p2 = multiplier = like(0.0, ce)
     for j in range(m - 1, -1, -1):
         y = fma(-multiplier, y, stations[j, Y] * stations[j, PIVOT])
-        multiplier = stations[j, MULTIPLIER]
+        multiplier = stations[j, _MULTIPLIER]
         bent = disc * y
         stations[j, Y] = bent
         overlap = weight[j] * stations[j, CLOSED] * fma(a, bent, stations[j, GAP])
         p1 = fma(-contact.cosine[j], overlap, p1)
         p2 = fma(-contact.sine[j], overlap, p2)
     gain = scalars[0, TILT_COMPLIANCE] * ce
-    t1 = gain * (scalars[0, INVERSE_11] * p1 + scalars[0, INVERSE_12] * p2)
-    t2 = gain * (scalars[0, INVERSE_12] * p1 + scalars[0, INVERSE_22] * p2)
+    t1 = gain * (scalars[0, _INVERSE_11] * p1 + scalars[0, _INVERSE_12] * p2)
+    t2 = gain * (scalars[0, _INVERSE_12] * p1 + scalars[0, _INVERSE_22] * p2)
     for j in range(m):
-        elastic = fma(t2, stations[j, RESPONSE_2], fma(t1, stations[j, RESPONSE_1], stations[j, Y]))
+        elastic = fma(t2, stations[j, _RESPONSE_2], fma(t1, stations[j, _RESPONSE_1], stations[j, Y]))
         stations[j, PUSH] = -ce * fma(a, elastic, stations[j, GAP])
 
 

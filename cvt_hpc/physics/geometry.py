@@ -84,19 +84,19 @@ def driven_radius(ratio: float, belt_length: float, centre_distance: float) -> f
 
 # Way from a tangent point over which cells become longer, as a share of the centre distance: 8 mm, some two
 # lengths over which a belt settles on its bedding
-REFINED_WAY = 0.05
+_REFINED_WAY = 0.05
 
 
 def cut_path(path: Variator, cells: int, refinement: float = 1.0) -> tuple[np.ndarray, ...]:
     """Cut each region of a path into cells, by region their lengths [m]: the shorter the nearer to its ends.
 
     The number of cells per length is 1 + (r - 1) / (1 + (x / l)^2) for each end of the region, x from there,
-    times what gives their number `cells` all around; l = REFINED_WAY of the centre distance. A length has r =
-    `refinement` times as many cells at the tangent points as far from them; 1: even cells. Each region has
-    four cells or more; the driven arc takes what rounding leaves.
+    times what gives their number `cells` all around; l = _REFINED_WAY of the centre distance. A length has
+    r = `refinement` times as many cells at the tangent points as far from them; 1: even cells. Each region
+    has four cells or more; the driven arc takes what rounding leaves.
     """
     centre_distance = math.hypot(path.strand_length, path.driven_radius - path.driving_radius)
-    way = REFINED_WAY * centre_distance
+    way = _REFINED_WAY * centre_distance
 
     def upto(x: np.ndarray | float, length: float) -> Any:
         ends = np.arctan(x / way) + np.arctan(length / way) - np.arctan((length - x) / way)

@@ -10,7 +10,7 @@ import numpy as np
 from cvt_hpc.kernels import kernel, merged_kernel
 from cvt_hpc.lanes import absolute, fma, halving, maximum
 
-PER_LN_2 = 1.4426950408889634
+_PER_LN_2 = 1.4426950408889634
 
 
 @kernel
@@ -46,9 +46,9 @@ def ring_friction(speed, kinetic, falls, static_excess, per_stribeck, per_width,
     size = maximum(absolute(speed), least)
     level = kinetic
     if falls:
-        level = kinetic * fma(static_excess, halving(size * (PER_LN_2 * per_stribeck)), 1.0)
+        level = kinetic * fma(static_excess, halving(size * (_PER_LN_2 * per_stribeck)), 1.0)
     # tanh(x) = (1 - e) / (1 + e) and its slope 4 e / (1 + e)^2, with e = e^-2x, and 1 / |v| by one division
-    rest = halving(size * (2.0 * PER_LN_2 * per_width))
+    rest = halving(size * (2.0 * _PER_LN_2 * per_width))
     per_both = 1.0 / ((1.0 + rest) * size)
     per_sum = size * per_both
     secant = level * ((1.0 - rest) * per_both)

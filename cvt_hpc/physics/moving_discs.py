@@ -10,7 +10,7 @@ from cvt_hpc.physics.ritz import Modes
 
 # Of the coordinates of a mode, in lanes: displacement and velocity in the axes of the disc at the last step,
 # p; what gives them at the next one.
-PLACE, SPEED, AHEAD, GIVES, PER_MASS, DRAG, SQUARE, PLACE_SHARE, SPEED_SHARE, PER_SUM = range(10)
+PLACE, SPEED, AHEAD, GIVES, _PER_MASS, DRAG, _SQUARE, _PLACE_SHARE, _SPEED_SHARE, _PER_SUM = range(10)
 
 
 class MovingDiscs(NamedTuple):
@@ -131,7 +131,7 @@ def _moved(states: Any, k: int, force: Any, step: float):
     before = states[k, PLACE]
     place = fma(states[k, GIVES], force, states[k, AHEAD])
     speed = fma(2.0 / step, place - before, -states[k, SPEED])
-    rate = fma(states[k, PER_MASS], force, -states[k, DRAG] * speed) - states[k, SQUARE] * place
+    rate = fma(states[k, _PER_MASS], force, -states[k, DRAG] * speed) - states[k, _SQUARE] * place
     return place, speed, rate
 
 
@@ -139,5 +139,5 @@ def _moved(states: Any, k: int, force: Any, step: float):
 def _look_ahead(states: Any, k: int, place: Any, speed: Any, rate: Any) -> None:
     """Begin a step of coordinate k."""
     states[k, PLACE], states[k, SPEED] = place, speed
-    ahead = fma(states[k, PLACE_SHARE], place, fma(states[k, SPEED_SHARE], speed, rate))
-    states[k, AHEAD] = ahead * states[k, PER_SUM]
+    ahead = fma(states[k, _PLACE_SHARE], place, fma(states[k, _SPEED_SHARE], speed, rate))
+    states[k, AHEAD] = ahead * states[k, _PER_SUM]

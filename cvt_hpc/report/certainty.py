@@ -24,9 +24,9 @@ from cvt_hpc.job.axes import SAMPLE, SWAPPED
 from cvt_hpc.report.findings import counted, is_number, length_unit, lines_along, place_of
 from cvt_hpc.vibration.classes import onsets
 
-MOST_SURE = 3  # of uncertain parameters: the onset of all is drawn
-MOST_HARDLY = 4  # cells of such a line that are hardly known
-MATTERS = 0.05  # of the variance of a result, or of the band of the onset: a parameter below hardly does
+_MOST_SURE = 3  # of uncertain parameters: the onset of all is drawn
+_MOST_HARDLY = 4  # cells of such a line that are hardly known
+_MATTERS = 0.05  # of the variance of a result, or of the band of the onset: a parameter below hardly does
 
 
 def probability_sentences(dataset: xr.Dataset, told: xr.Dataset, x: str) -> Iterator[str]:
@@ -51,9 +51,9 @@ def probability_sentences(dataset: xr.Dataset, told: xr.Dataset, x: str) -> Iter
     told = told.sortby([name for name in (x, *others) if is_number(told[name])])
     places, lines = lines_along(told, others)
     moving = [k for k, line in enumerate(lines) if (line[PROBABILITY] > 0.0).any()]
-    ends = np.linspace(0, len(moving) - 1, min(len(moving), MOST_SURE)).round().astype(int)
+    ends = np.linspace(0, len(moving) - 1, min(len(moving), _MOST_SURE)).round().astype(int)
     yield from (_how_sure(lines[moving[k]], x, places[moving[k]]) for k in ends)
-    if (more := len(moving) - MOST_SURE) > 0:
+    if (more := len(moving) - _MOST_SURE) > 0:
         yield f"In {counted(more, 'more line')} along {in_words(told[x])} samples vibrate."
     if quiet := len(lines) - len(moving):
         where = f" in {quiet} of {len(lines)} lines along {in_words(told[x])}" if others else ""
@@ -108,8 +108,8 @@ def _deciding(known: Sequence[tuple[str, float, float, float]]) -> Iterator[str]
         others_do = f"{' or '.join(rivals)} does" if rivals else "it does"
         yield f"{start} seems to decide most; more samples would tell whether {others_do}."
         return
-    then = [name for name, share, _, _ in others if share >= MATTERS]
-    hardly = [name for name, share, _, _ in others if share < MATTERS]
+    then = [name for name, share, _, _ in others if share >= _MATTERS]
+    hardly = [name for name, share, _, _ in others if share < _MATTERS]
     text = f"{start} decides"
     text += f", then {', then '.join(then)}" if then else ""
     yield f"{text}; {' and '.join(hardly)} hardly matter{'s' * (len(hardly) == 1)}." if hardly else f"{text}."
@@ -194,7 +194,7 @@ def _how_sure(line: xr.Dataset, x: str, place: str) -> str:
         text += f"({first} to {last} of the samples that vibrate)"
     hardly = np.flatnonzero(~np.isnan(shares) & (highs - lows > WIDE))
     if any(crossed.values()) and hardly.size:
-        at = few_of([value_text(line[x], int(k)) for k in hardly], MOST_HARDLY)
+        at = few_of([value_text(line[x], int(k)) for k in hardly], _MOST_HARDLY)
         text += f"; hardly known, with intervals wider than {WIDE:g}, at {at}"
     return text + "."
 

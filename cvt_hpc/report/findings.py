@@ -24,17 +24,17 @@ from cvt_hpc.variables import Status
 from cvt_hpc.vibration.classes import DECIDED, OccurrenceClass, levels, onsets
 from cvt_hpc.vibration.ramped import ramped
 
-MOST_NUMBERS = 1_000_000  # of all quantities together: some 5 MB of the page
-MOST_PLACES = 4  # of a dimension that the runs have in common, such as both strands: a quantity for each
+_MOST_NUMBERS = 1_000_000  # of all quantities together: some 5 MB of the page
+_MOST_PLACES = 4  # of a dimension that the runs have in common, such as both strands: a quantity for each
 AMPLITUDE, FREQUENCY = "amplitude", "frequency"  # at the stronger strand; that of runs that vibrate
-OF_COMPUTATION = (  # come behind what is about the belt
+_OF_COMPUTATION = (  # come behind what is about the belt
     *("power_residual", "step_ripple", "fluctuation_remainder", "unsolved_share", "iterations"),
     *("core_seconds", "simulated_seconds", "time_step", "refinements", "steps", "contact_solves"),
 )
 
 MOST_LINES = 8  # lines of the map that are told apart, on the first page
-MOST_VALUE_MAPS = 2  # quantities in a picture, of a study that judges no vibration
-MOST_RANGES = 6  # quantities
+_MOST_VALUE_MAPS = 2  # quantities in a picture, of a study that judges no vibration
+_MOST_RANGES = 6  # quantities
 NARROW = 1.05  # largest over least frequency of a line that are told apart
 STATUS = {int(status): status.name.lower() for status in Status}
 
@@ -75,8 +75,8 @@ def is_judged(dataset: xr.Dataset) -> bool:
 def range_sentences(dataset: xr.Dataset) -> Iterator[str]:
     """Yield for the first quantities of a study that judges no vibration, how far they range."""
     dims = list(map(str, dataset["status"].dims))
-    told = (one for one in quantities(dataset) if one.key not in OF_COMPUTATION)
-    for one in islice(told, MOST_RANGES):
+    told = (one for one in quantities(dataset) if one.key not in _OF_COMPUTATION)
+    for one in islice(told, _MOST_RANGES):
         known = np.where(np.isfinite(one.values) & (dataset["status"] == Status.DONE), one.values, np.nan)
         if np.isnan(known).all():
             continue
@@ -260,9 +260,9 @@ class Quantity(NamedTuple):
 
 
 def quantities(dataset: xr.Dataset) -> list[Quantity]:
-    """Return amplitude and frequency, then all that vary, in the order of the dataset, up to MOST_NUMBERS."""
+    """Return amplitude and frequency, then all that vary, as in the dataset, up to _MOST_NUMBERS."""
     dims = dataset["status"].dims
-    room = max(MOST_NUMBERS // max(dataset["status"].size, 1), 2)
+    room = max(_MOST_NUMBERS // max(dataset["status"].size, 1), 2)
     found = []
     for key, array in _candidates(dataset):
         values = array.transpose(*dims).values.astype(float)
@@ -281,7 +281,7 @@ def shown_quantities(dataset: xr.Dataset) -> list[str]:
     if is_judged(dataset) or PROBABILITY in dataset or is_sampled(dataset):
         return []
     names = dict.fromkeys(one.key for one in quantities(dataset))
-    return [name for name in names if dataset[name].dtype.kind in "iuf"][:MOST_VALUE_MAPS]
+    return [name for name in names if dataset[name].dtype.kind in "iuf"][:_MOST_VALUE_MAPS]
 
 
 def length_unit(lengths: NDArray[np.float64]) -> tuple[float, str]:
@@ -297,7 +297,7 @@ def _candidates(dataset: xr.Dataset) -> Iterator[tuple[str, xr.DataArray]]:
     yield FREQUENCY, frequency.assign_attrs(units="Hz", long_name=FREQUENCY)
     dims = dataset["status"].dims
     names = [str(name) for name, array in dataset.data_vars.items() if _is_quantity(array, dims)]
-    for name in sorted(names, key=OF_COMPUTATION.__contains__):
+    for name in sorted(names, key=_OF_COMPUTATION.__contains__):
         array = dataset[name]
         extra = next((dim for dim in array.dims if dim not in dims), None)
         if extra is None:
@@ -314,7 +314,7 @@ def _candidates(dataset: xr.Dataset) -> Iterator[tuple[str, xr.DataArray]]:
 
 def _is_quantity(array: xr.DataArray, dims: tuple[object, ...]) -> bool:
     extra = [dim for dim in array.dims if dim not in dims]
-    is_split = len(extra) == 1 and array.sizes[extra[0]] <= MOST_PLACES and extra[0] in array.coords
+    is_split = len(extra) == 1 and array.sizes[extra[0]] <= _MOST_PLACES and extra[0] in array.coords
     return (
         set(dims) <= set(array.dims)
         and array.dtype.kind in "iuf"

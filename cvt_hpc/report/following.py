@@ -10,7 +10,7 @@ from cvt_hpc.study.folder import StudyFolder
 from cvt_hpc.study.gather import recorded_results
 from cvt_hpc.study.status import StudyStatus, status_of
 
-PAUSE = 3.0  # times as long as a page takes, at least: the cores are for the sweep
+_PAUSE = 3.0  # times as long as a page takes, at least: the cores are for the sweep
 
 
 def follow_report(
@@ -39,7 +39,7 @@ def follow_report(
                 write_report(standard(dataset, str(path)), out, str(path), path, progress=progress)
             if lasting is None:
                 return out
-            time.sleep(max(every, PAUSE * (time.monotonic() - began)))
+            time.sleep(max(every, _PAUSE * (time.monotonic() - began)))
         except KeyboardInterrupt:
             if is_left:
                 raise

@@ -56,9 +56,9 @@ _RETRIES = {
     Status.TIMED_OUT: "with a longer `--run-limit`",
 }
 
-MOST_CHANGED = 8  # parameters named on the first page
+_MOST_CHANGED = 8  # parameters named on the first page
 MOST_FAILURES = 30  # kinds of failure in the table
-MOST_MAPS = 12  # of combinations of the axes that no map has room for
+_MOST_MAPS = 12  # of combinations of the axes that no map has room for
 # What tells how well a run was computed, where its model records it
 _QUALITY = ("power_residual", "step_ripple", "refinements", "time_step", "simulated_seconds", "core_seconds")
 
@@ -202,7 +202,7 @@ def _content(
             )
         },
         "hysteresis": _encoded(lambda: hysteresis_figure(dataset, source=source)) if arrangement else "",
-        "not_drawn": max(0, combinations - MOST_MAPS),
+        "not_drawn": max(0, combinations - _MOST_MAPS),
         "beyond": " and ".join(beyond),
         "failures": found[:MOST_FAILURES],
         "failed": findings.counted(sum(one.runs for one in found), "run"),
@@ -233,7 +233,7 @@ def _pictures(
             heading = "Smallest and largest disturbance in one"
             pictures.append(Picture(heading, "", _picture(dataset, {}, source, measured)))
         sides = Sides(arrangement.x, arrangement.y, arrangement.panel)
-        for place in islice(product(*(dataset[name].values.tolist() for name in beyond)), MOST_MAPS):
+        for place in islice(product(*(dataset[name].values.tolist() for name in beyond)), _MOST_MAPS):
             at = dict(zip(beyond, place, strict=True))
             part = arrange(dataset, at, source, sides)
             found = findings.summary(part.dataset)
@@ -313,8 +313,8 @@ def _basis(dataset: xr.Dataset, job: Job | None, changed: Sequence[Row]) -> Iter
             yield f"A run vibrates where the amplitude of a strand is {threshold}."
         driven = {courses.TIME, courses.FILE, *courses.of_job(job)}  # the findings begin with them
         rows = [row for row in changed if not (row.key in driven or row.key.endswith("_profile"))]
-        told = [f"{row.key.replace('_', ' ')} {row.value}" for row in rows[:MOST_CHANGED]]
-        told += [f"{more} more"] if (more := len(rows) - MOST_CHANGED) > 0 else []
+        told = [f"{row.key.replace('_', ' ')} {row.value}" for row in rows[:_MOST_CHANGED]]
+        told += [f"{more} more"] if (more := len(rows) - _MOST_CHANGED) > 0 else []
         start = f"Other than the defaults: {', '.join(told)}. All else" if told else "All that is fixed"
         start += " but the course" if courses.of_job(job) else ""
         yield f"{start} is at its default, which is an assumption where no paper gives it."

@@ -20,7 +20,9 @@ import numpy as np
 from cvt_hpc.kernels import kernel, merged_kernel
 from cvt_hpc.lanes import LaneArray, absolute, anywhere, fma, like, maximum
 
-DIAGONAL, LOWER, UPPER, SPIKE, FILL = range(5)  # blocks of a node: A_i, L_i, U_i, and two of the elimination
+DIAGONAL, LOWER, UPPER, _SPIKE, _FILL = range(
+    5
+)  # blocks of a node: A_i, L_i, U_i, and two of the elimination
 SMALLEST_PIVOT = 1e-13  # of the largest entry of its column: rounding leaves as much of a singular block
 
 
@@ -77,26 +79,26 @@ def factor(blocks: LaneArray, size: tuple[float, ...]) -> bool:
             scale = maximum(scale, absolute(blocks[i, r]))
         if i == 0:
             for r in range(b):
-                blocks[i, SPIKE * b + r] = blocks[i, LOWER * b + r]
-                blocks[i, FILL * b + r] = blocks[last, UPPER * b + r]
+                blocks[i, _SPIKE * b + r] = blocks[i, LOWER * b + r]
+                blocks[i, _FILL * b + r] = blocks[last, UPPER * b + r]
         else:
             for r in range(b):
-                blocks[i, SPIKE * b + r] = 0.0
-                blocks[i, FILL * b + r] = 0.0
+                blocks[i, _SPIKE * b + r] = 0.0
+                blocks[i, _FILL * b + r] = 0.0
             _subtract_product(blocks, i, DIAGONAL * b, i, LOWER * b, i - 1, UPPER * b, size)
-            _subtract_product(blocks, i, SPIKE * b, i, LOWER * b, i - 1, SPIKE * b, size)
-            _subtract_product(blocks, i, FILL * b, i - 1, FILL * b, i - 1, UPPER * b, size)
+            _subtract_product(blocks, i, _SPIKE * b, i, LOWER * b, i - 1, _SPIKE * b, size)
+            _subtract_product(blocks, i, _FILL * b, i - 1, _FILL * b, i - 1, UPPER * b, size)
         if i == last - 1:  # whose neighbours on both sides are the last node
             for r in range(b):
-                blocks[i, SPIKE * b + r] = blocks[i, SPIKE * b + r] + blocks[i, UPPER * b + r]
+                blocks[i, _SPIKE * b + r] = blocks[i, _SPIKE * b + r] + blocks[i, UPPER * b + r]
                 blocks[i, UPPER * b + r] = 0.0
-                blocks[i, FILL * b + r] = blocks[i, FILL * b + r] + blocks[last, LOWER * b + r]
+                blocks[i, _FILL * b + r] = blocks[i, _FILL * b + r] + blocks[last, LOWER * b + r]
         regular = _invert(blocks, i, scale, size)
         if not regular:
             return False
         _premultiply(blocks, i, UPPER * b, size)
-        _premultiply(blocks, i, SPIKE * b, size)
-        _subtract_product(blocks, last, DIAGONAL * b, i, FILL * b, i, SPIKE * b, size)
+        _premultiply(blocks, i, _SPIKE * b, size)
+        _subtract_product(blocks, last, DIAGONAL * b, i, _FILL * b, i, _SPIKE * b, size)
     regular = _invert(blocks, last, scale_of_last, size)
     return regular
 
@@ -110,11 +112,11 @@ def solve(blocks: LaneArray, columns: LaneArray, size: tuple[float, ...]) -> Non
         if i > 0:
             _subtract_from_column(blocks, i, LOWER * b, columns, i - 1, i, size)
         _premultiply_column(blocks, i, columns, size)
-        _subtract_from_column(blocks, i, FILL * b, columns, i, last, size)
+        _subtract_from_column(blocks, i, _FILL * b, columns, i, last, size)
     _premultiply_column(blocks, last, columns, size)
     for i in range(last - 1, -1, -1):
         _subtract_from_column(blocks, i, UPPER * b, columns, i + 1, i, size)
-        _subtract_from_column(blocks, i, SPIKE * b, columns, last, i, size)
+        _subtract_from_column(blocks, i, _SPIKE * b, columns, last, i, size)
 
 
 @kernel

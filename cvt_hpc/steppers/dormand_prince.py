@@ -31,9 +31,9 @@ PARAMETERS = {"numerics": {"tolerance": TOLERANCE, "most_steps": MOST_STEPS}}
 control = tolerance
 
 STAGES = 7
-SAFETY, LEAST_FACTOR, LARGEST_FACTOR = 0.9, 0.2, 10.0
-PROPORTIONAL, INTEGRAL = 0.04, 0.17
-LEAST_STEP = 1e-14  # of the time since the start: beyond, t + step is t
+_SAFETY, LEAST_FACTOR, _LARGEST_FACTOR = 0.9, 0.2, 10.0
+_PROPORTIONAL, _INTEGRAL = 0.04, 0.17
+_LEAST_STEP = 1e-14  # of the time since the start: beyond, t + step is t
 NODES = np.array([0.0, 1 / 5, 3 / 10, 4 / 5, 8 / 9, 1.0, 1.0])
 WEIGHTS = np.array(
     [
@@ -46,7 +46,7 @@ WEIGHTS = np.array(
         [35 / 384, 0.0, 500 / 1113, 125 / 192, -2187 / 6784, 11 / 84],
     ]
 )
-ERROR_WEIGHTS = np.array([71 / 57600, 0.0, -71 / 16695, 71 / 1920, -17253 / 339200, 22 / 525, -1 / 40])
+_ERROR_WEIGHTS = np.array([71 / 57600, 0.0, -71 / 16695, 71 / 1920, -17253 / 339200, 22 / 525, -1 / 40])
 
 
 class Work(NamedTuple):
@@ -85,7 +85,7 @@ def _error(system: System, step: float, tolerance: float, y: np.ndarray, work: W
     for i in range(y.size):
         error = 0.0
         for s in range(STAGES):
-            error += ERROR_WEIGHTS[s] * work.rates[s, i]
+            error += _ERROR_WEIGHTS[s] * work.rates[s, i]
         allowed = tolerance * max(abs(y[i]), abs(work.stage[i]), system.scale[i])
         total += (step * error / allowed) ** 2
     return np.sqrt(total / y.size)
@@ -105,20 +105,20 @@ def _sample(
     for _ in range(control.most_steps):
         left = end - clock[0]
         step = min(work.memory[0], left)
-        if step < LEAST_STEP * abs(end):
+        if step < _LEAST_STEP * abs(end):
             return facts.STEP_TOO_SMALL
         known = _stages(system, clock[0], step, y, work, counts)
         error = _error(system, step, control.tolerance, y, work) if known else np.inf
         if not error <= 1.0:  # written so that an error that is not a number is refused too
             counts[facts.REJECTED] += 1
-            factor = SAFETY * error**-INTEGRAL if np.isfinite(error) else LEAST_FACTOR
+            factor = _SAFETY * error**-_INTEGRAL if np.isfinite(error) else LEAST_FACTOR
             work.memory[0] = step * max(factor, LEAST_FACTOR)
             continue
         counts[facts.STEPS] += 1
         error = max(error, 1e-10)
-        factor = SAFETY * error**-INTEGRAL * work.memory[1] ** PROPORTIONAL
+        factor = _SAFETY * error**-_INTEGRAL * work.memory[1] ** _PROPORTIONAL
         # a step that was cut at the end is no reason against a longer one
-        proposed = step * min(max(factor, LEAST_FACTOR), LARGEST_FACTOR)
+        proposed = step * min(max(factor, LEAST_FACTOR), _LARGEST_FACTOR)
         work.memory[0] = max(proposed, work.memory[0]) if step == left else proposed
         work.memory[1] = error
         copy(work.stage, y)

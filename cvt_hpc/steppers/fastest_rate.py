@@ -10,7 +10,7 @@ from cvt_hpc.kernels import kernel
 from cvt_hpc.steppers.system import System
 
 INCREMENT = 1e-6  # of the largest unknown against its typical size: the quotient is good to some digits
-PASSES, LAST = 60, 10
+_PASSES, _LAST = 60, 10
 
 # Largest step times rate of methods with a fixed step: on both axes for the first, the lesser of 2.785 for
 # decay and 2.828 for vibration for the other
@@ -42,7 +42,7 @@ def fastest_rate(system: System, t: float, y: np.ndarray, direction: np.ndarray)
     if not system.rates(system.constants, t, y, base):
         return np.nan
     total = 0.0
-    for k in range(PASSES):
+    for k in range(_PASSES):
         largest = np.max(np.abs(direction))
         for i in range(y.size):
             moved[i] = y[i] + INCREMENT * direction[i] / largest * system.scale[i]
@@ -55,6 +55,6 @@ def fastest_rate(system: System, t: float, y: np.ndarray, direction: np.ndarray)
             after += direction[i] ** 2
         if after == 0.0 or not np.isfinite(after):
             return 0.0 if after == 0.0 else np.nan
-        if k >= PASSES - LAST:
-            total += 0.5 * np.log(after / before) / LAST
+        if k >= _PASSES - _LAST:
+            total += 0.5 * np.log(after / before) / _LAST
     return np.exp(total)

@@ -29,9 +29,9 @@ from cvt_hpc.steppers.system import System, all_finite, jacobian, size
 
 SHIFT, SIGN = range(2)
 
-ENOUGH = 0.5  # reduction of the correction in a pass with which a frozen matrix is kept
+_ENOUGH = 0.5  # reduction of the correction in a pass with which a frozen matrix is kept
 LEAST_SHARE = 1e-9  # of the correction: the interval at which the search along it ends
-MOST_LEAPS = 5  # without descent, away from where a solution has just vanished
+_MOST_LEAPS = 5  # without descent, away from where a solution has just vanished
 MOST_PASSES = 200
 
 
@@ -211,7 +211,7 @@ def solve_stage(
                 z[i] = frozen.trial[i] + frozen.next_correction[i]
             return facts.OK if frozen.memory[SIGN] > 0.0 else facts.NOT_UNIQUE
         reduction = next_left / left
-        if reduction <= (ENOUGH if share == 1.0 else 1.0 - 0.5 * share):
+        if reduction <= (_ENOUGH if share == 1.0 else 1.0 - 0.5 * share):
             copy(frozen.trial, z)
             copy(frozen.next_correction, frozen.correction)
             left, share, near, far, fresh = next_left, 1.0, 0.0, 1.0, False
@@ -229,7 +229,7 @@ def solve_stage(
             if far - near >= LEAST_SHARE:
                 continue
             leaps += 1
-            if leaps > MOST_LEAPS:
+            if leaps > _MOST_LEAPS:
                 break
             z += frozen.correction
         begin = True

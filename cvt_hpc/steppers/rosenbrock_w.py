@@ -44,7 +44,7 @@ PARAMETERS = {"numerics": {"step": STEP}}
 control = fixed_step
 
 G = 1.0 - np.sqrt(0.5)
-LARGEST_MISS = 0.25
+_LARGEST_MISS = 0.25
 
 
 class Work(NamedTuple):
@@ -105,7 +105,7 @@ def _advance(
         if outcome != OK:
             return outcome
         known, miss = _first_stage(system, step, t, y, work, counts)
-        if known and miss <= LARGEST_MISS:
+        if known and miss <= _LARGEST_MISS:
             break
         counts[REJECTED] += 1 - attempt
     if not known:

@@ -17,14 +17,14 @@ from cvt_hpc.errors import LONGEST_KEY, mismatch, show
 if TYPE_CHECKING:
     import xarray as xr
 
-TABLES = ("job", "versions", "point", "point_units")  # attributes of a dataset that are texts in JSON
+_TABLES = ("job", "versions", "point", "point_units")  # attributes of a dataset that are texts in JSON
 TEXTS = (  # that are texts
-    *(*TABLES, "title", "source", "history", "command", "host", "job_name", "git_revision"),
+    *(*_TABLES, "title", "source", "history", "command", "host", "job_name", "git_revision"),
     *("job_fingerprint", "cvt_hpc_content", "starts"),
 )
 UNITS = ("units", "job_units")  # of a variable
 WORDS = (*UNITS, "long_name", "comment", "flag_meanings", "spacing", "derived")
-PACKING = ("scale_factor", "add_offset")  # of a variable's attributes or, once applied, its encoding
+_PACKING = ("scale_factor", "add_offset")  # of a variable's attributes or, once applied, its encoding
 LARGEST = 1e100  # finite value of a parameter, coordinate or packing [SI]: squares and cubes are numbers, too
 
 
@@ -38,7 +38,7 @@ def check_form(dataset: xr.Dataset, source: str) -> None:
     """
     for key in TEXTS:
         _check_text(dataset.attrs, key, source)
-    for key in TABLES:
+    for key in _TABLES:
         _check_table(dataset.attrs, key, source)
     for name in (*dataset.dims, *dataset.variables):
         if not isinstance(name, str) or not name.isprintable() or len(name) > LONGEST_KEY:
@@ -80,13 +80,13 @@ def _check_variable(variable: xr.Variable, place: str) -> None:
     for key in UNITS:
         if not (unit := attributes.get(key, "")).isprintable() or len(unit) > LONGEST_KEY:
             raise mismatch(f"{place}: {key}", "a unit", show(unit))
-    for key in PACKING:
+    for key in _PACKING:
         number = attributes.get(key, variable.encoding.get(key, 1.0))
         if np.ndim(number) or not isinstance(number, (int, float, np.number)) or not math.isfinite(number):
             raise mismatch(f"{place}: {key}", "a number", show(number))
         if abs(float(number)) > LARGEST:
             raise mismatch(f"{place}: {key}", f"a number of at most {LARGEST:g}", show(number))
-        if number == 0.0 and key == PACKING[0]:
+        if number == 0.0 and key == _PACKING[0]:
             raise mismatch(f"{place}: {key}", "a factor, with which values differ", show(number))
     if "flag_meanings" in attributes:
         values = np.atleast_1d(attributes.get("flag_values", ()))

@@ -19,9 +19,9 @@ from cvt_hpc.storage.libraries import LIBRARIES
 
 EXPANSION = 1032  # bytes of values that deflate keeps in one byte, at most
 SMALL = 1 << 26  # [bytes] of values that any file may declare
-LONGEST_TEXT = 1_000  # [bytes] of an attribute by which this program knows a file
-MOST_PARTS = 5_000  # variables and attributes; a study has some 600
-MOST_ATTRIBUTES = 200  # of a variable or the file; the library goes through all of them to find one
+_LONGEST_TEXT = 1_000  # [bytes] of an attribute by which this program knows a file
+_MOST_PARTS = 5_000  # variables and attributes; a study has some 600
+_MOST_ATTRIBUTES = 200  # of a variable or the file; the library goes through all of them to find one
 # The netCDF library writes beyond its memory where names are longer, and where what it reads itself is not as
 # it writes it.
 LONGEST_NAME = 256  # [bytes] of a variable or an attribute
@@ -59,8 +59,8 @@ def check_hdf5(source: Path | BinaryIO, size: int, place: str) -> None:
                 if total > most:
                     told = f"values of at most {most} bytes in a file of {size} bytes"
                     raise mismatch(where, told, f"{total} up to here")
-                if part > MOST_PARTS:
-                    raise mismatch(place, f"at most {MOST_PARTS} variables and attributes", "more")
+                if part > _MOST_PARTS:
+                    raise mismatch(place, f"at most {_MOST_PARTS} variables and attributes", "more")
     except InputError:
         raise
     except DAMAGE:
@@ -72,7 +72,7 @@ def global_text(path: Path, name: str) -> str | None:
     try:
         with LIBRARIES, h5py.File(path, "r", locking=False) as file:
             size = _attribute(h5a.open(file.id, name.encode()), file.id, SMALL, SMALL, name)
-            found = file.attrs[name] if size < LONGEST_TEXT else None
+            found = file.attrs[name] if size < _LONGEST_TEXT else None
     except DAMAGE:
         return None
     return found.decode("utf-8", "replace") if isinstance(found, bytes) else found
@@ -112,8 +112,8 @@ def _values(stored: h5d.DatasetID, size: int, place: str) -> int:
 
 
 def _attributes(stored: Any, size: int, most: int, place: str) -> Iterator[tuple[str, int]]:
-    if (count := h5a.get_num_attrs(stored)) > MOST_ATTRIBUTES:
-        raise mismatch(place, f"at most {MOST_ATTRIBUTES} attributes", str(count))
+    if (count := h5a.get_num_attrs(stored)) > _MOST_ATTRIBUTES:
+        raise mismatch(place, f"at most {_MOST_ATTRIBUTES} attributes", str(count))
     for index in range(count):
         one = h5a.open(stored, index=index)
         where = f"{place}: {_checked(one.name, place).decode('utf-8', 'replace')}"
@@ -133,7 +133,7 @@ def _attribute(one: h5a.AttrID, stored: Any, size: int, most: int, place: str) -
         sound = is_text and count == 1 and getattr(stored, "rank", 1) > 0  # a dimension is no single value
     elif one.name in _OWN_NUMBERS:
         sound = within == h5t.INTEGER and count == (1 if one.name == _OWN_NUMBERS[0] else stored.rank)
-        sound = sound and _all_below(one, MOST_PARTS)  # room is made for as many dimensions
+        sound = sound and _all_below(one, _MOST_PARTS)  # room is made for as many dimensions
     else:
         sound = _width(kind, size) > 0
     if not sound:

@@ -18,7 +18,7 @@ from typing import Any
 
 import cvt_hpc
 
-NOT_RECORDED = "not recorded"
+_NOT_RECORDED = "not recorded"
 _TURNS = 2_000_000  # of a loop that marks the speed of a machine
 _PACKAGE = Path(__file__).parent.parent
 _LIBRARIES = ("numpy", "numba", "scipy", "xarray", "netCDF4", "mpi4py")
@@ -110,14 +110,14 @@ def origin_lines(made: Mapping[str, str] | None = None) -> Iterator[str]:
     packages = json.loads(made.get("versions", "{}"))
     told = {
         "revision": made.get("git_revision"),
-        "job": made.get("job_name", NOT_RECORDED) + (f", fingerprint {fingerprint}" if fingerprint else ""),
+        "job": made.get("job_name", _NOT_RECORDED) + (f", fingerprint {fingerprint}" if fingerprint else ""),
         "command": made.get("command"),
         "versions": ", ".join(f"{package} {version}" for package, version in packages.items()),
         "date": made.get("history", "").rpartition("\n")[2][: len("2026-01-31")],
         "machine": _machine_in_words(made),
     }
     for name, text in told.items():
-        yield f"# {name}: {' '.join((text or NOT_RECORDED).split())}\n"  # a command may have several lines
+        yield f"# {name}: {' '.join((text or _NOT_RECORDED).split())}\n"  # a command may have several lines
 
 
 def _machine_in_words(made: Mapping[str, str]) -> str:

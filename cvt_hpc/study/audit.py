@@ -25,7 +25,7 @@ from cvt_hpc.vibration.classes import DECIDED, OccurrenceClass, classify_runs
 
 TABLE = "audit.csv"  # in the folder of the audit
 LOWER = (Rung.PASSIVE, Rung.COARSE)
-OPPOSITE = (OccurrenceClass.QUIET, OccurrenceClass.VIBRATING)
+_OPPOSITE = (OccurrenceClass.QUIET, OccurrenceClass.VIBRATING)
 FORCES = (("mean_ring_tension", "mean_push_force"), ("axial_force",))  # each group over its largest
 
 
@@ -77,7 +77,7 @@ def report_audit(audit: Repeat) -> AuditReport:
     rungs, ended = low.read(audited, "rung"), full.status[audited] == Status.DONE
     classes = [classify_runs(r.status[audited], r.read(audited, "vibrates")) for r in (low, full)]
     differs = ended & (classes[0] != classes[1]) & np.isin(classes[0], DECIDED)
-    contrary = differs & np.isin(classes[0], OPPOSITE) & np.isin(classes[1], OPPOSITE)
+    contrary = differs & np.isin(classes[0], _OPPOSITE) & np.isin(classes[1], _OPPOSITE)
     table = audit.place / TABLE
     shown = differs | ~ended
     _write(table, audit.study, audited[shown], (low, full), [found[shown] for found in classes])

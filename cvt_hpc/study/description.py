@@ -177,7 +177,7 @@ class Study(Runs):
             found = () if isinstance(value, float | int | str) else np.shape(value)
             if found != shape:
                 raise ValueError(f"{name}: expected shape {shape}, found {found}")
-            row[name] = fit_text(value, letters) if letters else value
+            row[name] = _fit_text(value, letters) if letters else value
         if row["status"] == Status.NOT_RUN:
             raise ValueError("a run that ended has the status not_run")
         return row
@@ -186,7 +186,7 @@ class Study(Runs):
         """Return the record, shape (), of a run that ended without results."""
         row = self.blank_rows()
         row["status"] = status
-        row["reason"] = fit_text(reason, row.dtype["reason"].itemsize)
+        row["reason"] = _fit_text(reason, row.dtype["reason"].itemsize)
         return row
 
     def to_json(self) -> Document:
@@ -220,13 +220,13 @@ def describe(job: Job, simulator: Simulator) -> Study:
     check_names(job, simulator)
     variables, coordinates = record_layout(job, simulator)
     axes = tuple(axis_dimension(axis, job) for axis in job.axes)
-    few = (one for one in job.derived if runs_along(job, one.axes) <= MOST_DERIVED)
+    few = (one for one in job.derived if _runs_along(job, one.axes) <= MOST_DERIVED)
     derived = tuple(derived_coordinate(one, job) for one in few)
     head = job.name, job.description, job.fingerprint(), job.resolved()
     return Study(*head, axes, variables, coordinates, derived, job.units, job.files)
 
 
-def runs_along(job: Job, names: Collection[str]) -> int:
+def _runs_along(job: Job, names: Collection[str]) -> int:
     """Return the number of combinations of values on some axes of a job; of samples their number."""
     if "runs" in job.design:
         return job.design["runs"]
@@ -268,7 +268,7 @@ def check_names(job: Job, simulator: Simulator) -> None:
             raise mismatch(f"{job.source}: [{table}] {name}", expected, name)
 
 
-def fit_text(text: str, size: int) -> bytes:
+def _fit_text(text: str, size: int) -> bytes:
     """Return a text as one line of UTF-8 of at most `size` bytes, cut between characters."""
     return " ".join(text.split()).encode()[:size].decode(errors="ignore").encode()
 

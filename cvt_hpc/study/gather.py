@@ -209,7 +209,7 @@ def _declare(path: Path, records: Records, variables: Sequence[Variable]) -> Non
         for derived in study.derived:
             _write_coordinate(file, derived, derived.dims)
         for variable in variables:
-            _create(file, study, variable, chunk_shape(study, variable.name))
+            _create(file, study, variable, _chunk_shape(study, variable.name))
         if study.is_traced:
             _create(file, study, _INFERRED, study.shape)[:] = inferred_classes(study, records)
 
@@ -278,7 +278,7 @@ def _global_attributes(records: Records) -> dict[str, str]:
     return found | file_names(study.files)
 
 
-def chunk_shape(study: Study, name: str) -> tuple[int, ...]:
+def _chunk_shape(study: Study, name: str) -> tuple[int, ...]:
     """Return the chunks in which a quantity is stored: neighbouring runs, each of them whole."""
     dtype = study.record_dtype[name]
     grid = contiguous_part(study.shape, min(CHUNK // dtype.itemsize, block_length(study)))

@@ -3,8 +3,8 @@
 Rules decide which runs are done again, done alone, or given up. A process that dies, by a kill, for lack of
 memory or in compiled code, leaves no record of its runs. They are done again, after all others, so that a run
 that kills its process keeps no other from being done. A process that dies takes the other ranks along, so
-most of these runs are innocent: after `DEATHS` each is done alone, and where the process dies even then, by
-one rank alone, at the very end. After `DEATHS_ALONE` of these deaths the run is given up.
+most of these runs are innocent: after `_DEATHS` each is done alone, and where the process dies even then, by
+one rank alone, at the very end. After `_DEATHS_ALONE` of these deaths the run is given up.
 
 A trace runs some cells of its grid, and infers the classes of the cells between them. The grid is cut into
 boxes that share their sides, at first as wide as the first spacing. The corners of all boxes are run. A box
@@ -55,8 +55,8 @@ UNKNOWN = OccurrenceClass.NOT_RUN
 Interval = tuple[int, int]  # first and last place on an axis
 Box = tuple[Interval, ...]
 
-DEATHS = 3  # at a run, until it is done alone
-DEATHS_ALONE = 2  # while it was done alone, until it is given up
+_DEATHS = 3  # at a run, until it is done alone
+_DEATHS_ALONE = 2  # while it was done alone, until it is given up
 
 _logger = logging.getLogger(__name__)
 
@@ -105,7 +105,7 @@ def prepare(
     asked = asked_runs(task, records, part)
     if refine is None:
         refine = untried_factor(task.job, records, runs_to_repeat(records, asked, retry), retry)
-    records = enter_attempts(folder, records, asked, retry, session, refine)
+    records = _enter_attempts(folder, records, asked, retry, session, refine)
     leave_out_missing(task.job, folder, records)
     done = records.status == Status.DONE
     recorded = int((records.recorded & asked).sum())
@@ -113,7 +113,7 @@ def prepare(
     costs = predicted_costs(task.job, task.simulator, steps)
     return Plan(
         assignments=plan_runs(task.job, task.simulator, records, asked, ranks, steps),
-        attempts=later_attempts(records),
+        attempts=_later_attempts(records),
         steps=steps,
         costs=costs,
         fit=task.fit(records, costs).inherited(),
@@ -191,7 +191,7 @@ def plan_runs(
     """
     costs = predicted_costs(job, simulator, steps or {})
     pending = asked & ~records.recorded
-    suspect = pending & (records.died >= DEATHS)
+    suspect = pending & (records.died >= _DEATHS)
     groups = []
     for struck in (False, True):
         chosen = pending & ~suspect & ((records.died > 0) == struck)
@@ -231,7 +231,7 @@ def _by_step(runs: list[int], steps: Mapping[int, float]) -> Iterable[list[int]]
 
 def given_up(records: Records, asked: np.ndarray) -> dict[int, str]:
     """Return the runs, among those marked in `asked`, that are not tried again, with the reason."""
-    lost = np.flatnonzero(asked & ~records.recorded & (records.died_alone >= DEATHS_ALONE))
+    lost = np.flatnonzero(asked & ~records.recorded & (records.died_alone >= _DEATHS_ALONE))
     told = "its process died {} times, the last {} while it did this run alone"
     return {k: told.format(records.died[k], records.died_alone[k]) for k in lost.tolist()}
 
@@ -247,7 +247,7 @@ def runs_to_repeat(records: Records, asked: np.ndarray, statuses: Collection[Sta
     return np.flatnonzero(asked & records.recorded & np.isin(records.status, list(statuses)))
 
 
-def enter_attempts(
+def _enter_attempts(
     folder: StudyFolder,
     records: Records,
     asked: np.ndarray,
@@ -266,7 +266,7 @@ def enter_attempts(
     records.attempts[again] += 1
     study = records.study
     layout = RecordFormat(study.fingerprint, study.record_dtype)
-    with RecordLog(folder.records, layout, {**session, "refine": refine}, 0, later_attempts(records)) as log:
+    with RecordLog(folder.records, layout, {**session, "refine": refine}, 0, _later_attempts(records)) as log:
         if lost:
             log.append([(index, study.pack_failure(reason)) for index, reason in lost.items()])
         if len(again):
@@ -274,7 +274,7 @@ def enter_attempts(
     return folder.read_records(study)
 
 
-def later_attempts(records: Records) -> dict[int, int]:
+def _later_attempts(records: Records) -> dict[int, int]:
     """Return the attempts that are not the first, by run index."""
     return {int(index): int(records.attempts[index]) for index in np.flatnonzero(records.attempts > 1)}
 
@@ -287,14 +287,14 @@ def needed_runs(study: Study, records: Records) -> NDArray[np.bool_]:
     """
     if not study.in_rounds:
         return np.ones(study.size, bool)
-    classes = run_classes(study, records)
+    classes = _run_classes(study, records)
     if not study.is_traced:
         of_samples = study.dims.index(SAMPLE)
         wanted = look(np.moveaxis(classes, of_samples, -1), study.design).wanted
         chosen = np.arange(study.shape[of_samples]) < wanted[..., np.newaxis]
         return np.moveaxis(chosen, -1, of_samples).ravel() | records.recorded
     needed = np.zeros(study.shape, bool)
-    for box in leaf_boxes(classes, first_intervals(study)):
+    for box in _leaf_boxes(classes, _first_intervals(study)):
         needed[np.ix_(*box)] = True
     return needed.ravel() | records.recorded
 
@@ -304,9 +304,9 @@ def inferred_classes(study: Study, records: Records) -> NDArray[np.int8]:
 
     NOT_RUN where these do not agree, or are not all known yet.
     """
-    classes = run_classes(study, records)
+    classes = _run_classes(study, records)
     inferred = classes.copy()
-    for box in leaf_boxes(classes, first_intervals(study)):
+    for box in _leaf_boxes(classes, _first_intervals(study)):
         corners = classes[np.ix_(*box)]
         if (corners == corners.flat[0]).all():
             inside = inferred[_cells(box)]
@@ -314,18 +314,18 @@ def inferred_classes(study: Study, records: Records) -> NDArray[np.int8]:
     return inferred
 
 
-def run_classes(study: Study, records: Records) -> NDArray[np.int8]:
+def _run_classes(study: Study, records: Records) -> NDArray[np.int8]:
     """Return the class of each run, shape of the grid; NOT_RUN where there is no record."""
     return classify_runs(records.status, records.read(np.arange(study.size), "vibrates")).reshape(study.shape)
 
 
-def first_intervals(study: Study) -> list[list[Interval]]:
+def _first_intervals(study: Study) -> list[list[Interval]]:
     """Return for each axis the intervals that the first boxes are made of."""
     spacings = study.design["first_spacing"]
     return [_intervals(len(axis.values), spacings.get(axis.name)) for axis in study.axes]
 
 
-def leaf_boxes(classes: NDArray[np.int8], intervals: list[list[Interval]]) -> Iterator[Box]:
+def _leaf_boxes(classes: NDArray[np.int8], intervals: list[list[Interval]]) -> Iterator[Box]:
     """Yield the boxes that are not cut: neighbours, and those within which all known runs are of one class.
 
     Parameters
@@ -341,7 +341,7 @@ def leaf_boxes(classes: NDArray[np.int8], intervals: list[list[Interval]]) -> It
         if max((last - first for first, last in box), default=0) <= 1 or (known == known[:1]).all():
             yield box
         else:
-            yield from leaf_boxes(classes, [_halves(*interval) for interval in box])
+            yield from _leaf_boxes(classes, [_halves(*interval) for interval in box])
 
 
 def _cells(box: Box) -> tuple[slice, ...]:

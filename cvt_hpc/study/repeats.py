@@ -39,10 +39,10 @@ from cvt_hpc.variables import Status
 AUDIT = "audit"  # folder of the runs of an audit, in that of the study
 AUDITED, FULL_MODEL = "auto", "elastic_belt"  # what answers some runs cheaply, and what does all in full
 
-FLAG = "--check-step"
-EXPLICIT = "explicit"
+_FLAG = "--check-step"
+_EXPLICIT = "explicit"
 # By name of a way its words, and the folder of its runs
-WAYS = {"half": ("at half the step", "check_step"), EXPLICIT: ("by the explicit step", "check_explicit")}
+WAYS = {"half": ("at half the step", "check_step"), _EXPLICIT: ("by the explicit step", "check_explicit")}
 
 
 def _of_the_job(records: Records, runs: NDArray[np.intp]) -> Mapping[int, float]:
@@ -138,17 +138,17 @@ def step_check(job: Job, out: Path, fraction: float, way: str = "half") -> Repea
     """
     _check(job, way)
     words, folder = WAYS[way]
-    other = built(job, _explicit(job) if way == EXPLICIT else _halved(job))
+    other = built(job, _explicit(job) if way == _EXPLICIT else _halved(job))
 
     def cost() -> float:
-        return expected_cost(other, out / folder)[0] if way == EXPLICIT else 2.0 * expected_cost(job, out)[0]
+        return expected_cost(other, out / folder)[0] if way == _EXPLICIT else 2.0 * expected_cost(job, out)[0]
 
     # at half the step each run has a step of its own to be halved
-    steps = _of_the_job if way == EXPLICIT else halved_steps
+    steps = _of_the_job if way == _EXPLICIT else _halved_steps
     return Repeat("step check", words, job, out, folder, other, fraction, _eligible, cost, steps)
 
 
-def halved_steps(records: Records, runs: NDArray[np.intp]) -> Mapping[int, float]:
+def _halved_steps(records: Records, runs: NDArray[np.intp]) -> Mapping[int, float]:
     """Return half of the time step [s] that each run has taken, by its index.
 
     As recorded, so that it holds for runs whose step was shortened, or chosen for their scene.
@@ -161,11 +161,11 @@ def halved_steps(records: Records, runs: NDArray[np.intp]) -> Mapping[int, float
 
 def _check(job: Job, way: str) -> None:
     if STEP not in job.parameters:
-        raise mismatch(FLAG, "a job whose stepper has a fixed step", stepper_in_words(job))
+        raise mismatch(_FLAG, "a job whose stepper has a fixed step", stepper_in_words(job))
     if varied := [axis.name for axis in job.axes if job.schema.section_of[axis.name] == _section(job)]:
-        raise mismatch(FLAG, f"a job with one value of {varied[0]}", "an axis")
-    if way == EXPLICIT and job.stepper == EXPLICIT:
-        raise mismatch(f"{FLAG}-by {EXPLICIT}", "a job of another stepper", f"stepper {job.stepper}")
+        raise mismatch(_FLAG, f"a job with one value of {varied[0]}", "an axis")
+    if way == _EXPLICIT and job.stepper == _EXPLICIT:
+        raise mismatch(f"{_FLAG}-by {_EXPLICIT}", "a job of another stepper", f"stepper {job.stepper}")
 
 
 def _section(job: Job) -> str:
@@ -184,7 +184,7 @@ def _explicit(job: Job) -> Document:
     document = handed_to(job, model, "by the explicit step, to check the step")
     stepper = load_model(job.model).steppers[job.stepper]  # type: ignore[index]  # with a step there is one
     own = import_module(stepper).PARAMETERS[_section(job)]
-    return _without(document, _section(job), own) | {"stepper": EXPLICIT}
+    return _without(document, _section(job), own) | {"stepper": _EXPLICIT}
 
 
 def _without(document: Document, section: str, keys: Iterable[str]) -> Document:

@@ -113,7 +113,7 @@ def status_of(folder: StudyFolder, records: Records, running: bool) -> StudyStat
         time_to_go=float(costs[left].sum() * elapsed / spent) if elapsed else None,
         warnings=tuple(records.warnings),
         unneeded=int((~needed).sum()),
-        **count_special(records),
+        **_count_special(records),
         finished=None if left.any() or running else float(np.nanmax(records.written)),
         time_at_work=_time_at_work(records),
     )
@@ -287,11 +287,11 @@ def build_report(
         stopped=stopped,
         gained=gained,
         unneeded=int((~asked).sum()) if study.in_rounds else 0,
-        **count_special(records, asked),
+        **_count_special(records, asked),
     )
 
 
-def count_special(records: Records, asked: np.ndarray | None = None) -> dict[str, int]:
+def _count_special(records: Records, asked: np.ndarray | None = None) -> dict[str, int]:
     """Return how many runs with results are no plain yes or no, among those marked in `asked`, or all."""
     is_done = records.status == Status.DONE
     done = np.flatnonzero(is_done if asked is None else is_done & asked)

@@ -31,7 +31,7 @@ if TYPE_CHECKING:
     import xarray as xr
 
 STEP = "step"  # the key of the time step, of steppers that have a fixed one
-MOST_REFINED = 1000.0
+_MOST_REFINED = 1000.0
 
 Begin = Callable[[Batch], None]
 Join = Callable[[Batch, float], Batch]  # of the runs at work, and their time [s]: those that join, or none
@@ -259,7 +259,7 @@ def untried_factor(job: Job, records: Records, again: NDArray[np.int64], retry: 
     if set(retry) != {Status.FAILED_NUMERICS} or STEP not in job.parameters or not again.size:
         return 1.0
     tried = records.refinements[again].max() * 2.0 ** job.parameters.get("most_refinements", 0)
-    return min(2.0 * float(tried), MOST_REFINED)
+    return min(2.0 * float(tried), _MOST_REFINED)
 
 
 def check_refinement(job: Job, refine: float, retry: Collection[Status]) -> None:
@@ -267,8 +267,8 @@ def check_refinement(job: Job, refine: float, retry: Collection[Status]) -> None
 
     A shorter step is a cure for failed numerics alone.
     """
-    if not 1.0 <= refine <= MOST_REFINED:
-        raise mismatch("--refine", f"a factor of 1 or more, at most {MOST_REFINED:g}", show(refine))
+    if not 1.0 <= refine <= _MOST_REFINED:
+        raise mismatch("--refine", f"a factor of 1 or more, at most {_MOST_REFINED:g}", show(refine))
     if set(retry) != {Status.FAILED_NUMERICS}:
         found = ", ".join(Status(status).name.lower() for status in retry) or "no --retry"
         raise mismatch("--refine", "--retry failed_numerics beside it, and no other", found)

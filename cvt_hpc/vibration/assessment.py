@@ -16,9 +16,9 @@ Whether an amplitude comes and goes about a threshold without a trend: a longer 
 The belt near 40 N m moves so: judder of the driven pulley rings a strand, now above the threshold and now
 below. Called irregular is a record of windows in which
 
-- the amplitude crosses the threshold LEAST_CROSSINGS times or more: growth and decay cross it once, a single
+- the amplitude crosses the threshold _LEAST_CROSSINGS times or more: growth and decay cross it once, a single
   burst twice;
-- it scatters by LEAST_SCATTER of its mean or more: settled vibrations scatter by 2-7 %, noise in the band by
+- it scatters by _LEAST_SCATTER of its mean or more: settled vibrations scatter by 2-7 %, noise in the band by
   10-15 %, judder by 30-100 %. A steady amplitude that happens to lie at the threshold is not irregular;
 - a trend is ruled out: the 95 % confidence interval of the gain over the record, in e-folds, contains 0 and
   lies within +-`most_gain`. So an amplitude that grows or decays by that much is called irregular in at most
@@ -26,7 +26,7 @@ below. Called irregular is a record of windows in which
 
 Windows within one burst are alike, so the interval is that of fewer independent windows: n (1 - r)/(1 + r)
 of n, r being the autocorrelation of neighbouring windows about the trend (Santer et al. 2000, J. Geophys.
-Res. 105, 7337-7356), and of these there have to be LEAST_WINDOWS. A beat of which the record holds a few
+Res. 105, 7337-7356), and of these there have to be _LEAST_WINDOWS. A beat of which the record holds a few
 periods is undecided for that reason.
 """
 
@@ -43,15 +43,15 @@ from cvt_hpc.vibration.peaks import fundamentals
 from cvt_hpc.vibration.settings import LEAST_PERIODS, fitting_window
 from cvt_hpc.vibration.settings import band as given_band
 
-LEAST_WINDOWS = 12  # that are independent
-LEAST_CROSSINGS = 4
-LEAST_SCATTER = 0.2
+_LEAST_WINDOWS = 12  # that are independent
+_LEAST_CROSSINGS = 4
+_LEAST_SCATTER = 0.2
 _CONFIDENCE = 0.975  # one-sided
 
 CONFIDENCE = 0.975  # one-sided, by Student's t: few windows know their own scatter badly
 STEADY_LOSS = 0.05  # e-folds over the judged part that a settled vibration may lose, scatter apart
-CERTAIN_FACTOR = 2.0  # between amplitude and threshold, from which a shorter run decides
-UNSETTLED = 0.1  # change of a vibration, in e-folds, that the amplitude of a map may have
+_CERTAIN_FACTOR = 2.0  # between amplitude and threshold, from which a shorter run decides
+_UNSETTLED = 0.1  # change of a vibration, in e-folds, that the amplitude of a map may have
 LEAST_RISES = 3  # windows in a row, none below the one before: irregular motion does that once in 24 times
 
 VARIABLES = (
@@ -206,11 +206,11 @@ def _judge_strand(
 def is_certain(record: Mapping[str, Any], parameters: Mapping[str, Any], left: float) -> bool:
     """Tell whether a run that goes on would keep its verdict, and its amplitude within a tenth.
 
-    Its amplitude is CERTAIN_FACTOR times above or below the threshold, and stays so as it grows or decays
+    Its amplitude is _CERTAIN_FACTOR times above or below the threshold, and stays so as it grows or decays
     over the time that is left [s], by twice the error of its growth rate; of a vibration it changes by less
     than UNSETTLED. Where the judged part is so short that it cuts the band off above the first modes, a
-    slower motion may be left. The record has `vibrates` and VARIABLES; of the parameters those of
-    [vibration], `duration` and `judged_fraction` count.
+    slower motion may be left. The record has `vibrates` and VARIABLES, of each strand or of a single body; of
+    the parameters those of [vibration], `duration` and `judged_fraction` count.
     """
     if record["vibrates"] not in (Vibrates.YES, Vibrates.NO) or "growth_rate" not in record:
         return False
@@ -218,16 +218,17 @@ def is_certain(record: Mapping[str, Any], parameters: Mapping[str, Any], left: f
     if not parameters["band_low"] and record["lower_band_edge"] <= LEAST_PERIODS / judged * (1.0 + 1e-9):
         return False
     threshold = parameters["amplitude_threshold"]
-    rate, error = (np.nan_to_num(record[name]) for name in ("growth_rate", "growth_error"))
+    names = "amplitude", "growth_rate", "growth_error", "amplitude_scatter"
+    amplitude, rate, error, scatter = (np.atleast_1d(np.nan_to_num(record[name])) for name in names)
     with np.errstate(divide="ignore"):
-        levels = np.log(np.asarray(record["amplitude"]) / threshold)
+        levels = np.log(amplitude / threshold)
     if record["vibrates"] == Vibrates.NO:
-        return bool(np.all(levels + np.maximum(rate + 2.0 * error, 0.0) * left <= -np.log(CERTAIN_FACTOR)))
+        return bool(np.all(levels + np.maximum(rate + 2.0 * error, 0.0) * left <= -np.log(_CERTAIN_FACTOR)))
     strongest = int(np.argmax(levels))
     most, spread = rate[strongest], 2.0 * error[strongest]
-    is_settled = abs(most) * judged <= UNSETTLED and record["amplitude_scatter"][strongest] <= UNSETTLED
+    is_settled = abs(most) * judged <= _UNSETTLED and scatter[strongest] <= _UNSETTLED
     lowest = levels[strongest] + min(most - spread, 0.0) * left
-    return bool(is_settled and lowest >= np.log(CERTAIN_FACTOR))
+    return bool(is_settled and lowest >= np.log(_CERTAIN_FACTOR))
 
 
 def relative_scatter(windows: ArrayLike, axis: int = 0) -> NDArray[np.float64]:
@@ -245,7 +246,7 @@ def is_irregular(windows: ArrayLike, threshold: float, most_gain: float) -> bool
     """
     amplitudes = np.asarray(windows, dtype=float)
     crossings = np.count_nonzero(np.diff(amplitudes >= threshold))
-    if crossings < LEAST_CROSSINGS or relative_scatter(amplitudes) < LEAST_SCATTER:
+    if crossings < _LEAST_CROSSINGS or relative_scatter(amplitudes) < _LEAST_SCATTER:
         return False
     return is_stationary(amplitudes, most_gain)
 
@@ -253,7 +254,7 @@ def is_irregular(windows: ArrayLike, threshold: float, most_gain: float) -> bool
 def is_stationary(windows: ArrayLike, most_gain: float) -> bool:
     """Whether a trend of an amplitude is ruled out; arguments as of `is_irregular`."""
     amplitudes = np.asarray(windows, dtype=float)
-    if len(amplitudes) < LEAST_WINDOWS or not np.all(amplitudes > 0.0):
+    if len(amplitudes) < _LEAST_WINDOWS or not np.all(amplitudes > 0.0):
         return False
     gain, error = _gain(np.log(amplitudes))
     return abs(gain) < error and abs(gain) + error < most_gain
@@ -269,7 +270,7 @@ def _gain(levels: NDArray[np.float64]) -> tuple[float, float]:
     found = (scatter[1:] @ scatter[:-1]) / (scatter @ scatter)
     alike = float(np.clip((n * found + 2.0) / (n - 4.0), 0.0, 1.0))
     freedom = n * (1.0 - alike) / (1.0 + alike) - 2.0
-    if freedom < LEAST_WINDOWS - 2:
+    if freedom < _LEAST_WINDOWS - 2:
         return float(slope), np.inf
     from scipy.special import stdtrit  # takes long, and quiet runs do without
 

@@ -17,12 +17,12 @@ from numpy.typing import NDArray
 
 Array = NDArray[np.float64]
 
-SAMPLES_PER_PERIOD = 4.0  # of the highest frequency, that are left
-TAPS = 8  # of the filter on either side, in samples that are left
-MOST_SENSORS = 5  # combinations of sensors: those that move most
-LAGS, MOST_LAGS = 0.4, 80  # length of the pieces over that of the record, and in samples
+_SAMPLES_PER_PERIOD = 4.0  # of the highest frequency, that are left
+_TAPS = 8  # of the filter on either side, in samples that are left
+_MOST_SENSORS = 5  # combinations of sensors: those that move most
+_LAGS, _MOST_LAGS = 0.4, 80  # length of the pieces over that of the record, and in samples
 LEAST_SAMPLES = 24
-RANK = 1e-10  # of the largest singular value: what is less is rounding
+_RANK = 1e-10  # of the largest singular value: what is less is rounding
 LEAST_FACTOR = 1e-6  # factor from sample to sample; what decays faster than that is none of a mode
 
 
@@ -39,12 +39,12 @@ def thinned(signal: Array, rate: float, highest: float) -> tuple[Array, float]:
 
     Of a signal (time, sensor) in any unit only the samples that the filter reaches in full are left.
     """
-    every = max(int(rate / (SAMPLES_PER_PERIOD * highest) + 1e-9), 1)
+    every = max(int(rate / (_SAMPLES_PER_PERIOD * highest) + 1e-9), 1)
     if every == 1:
         return signal, rate
     from scipy.signal import firwin
 
-    weights = firwin(2 * TAPS * every + 1, 1.2 * highest, fs=rate)
+    weights = firwin(2 * _TAPS * every + 1, 1.2 * highest, fs=rate)
     if len(signal) < weights.size:
         return signal[:0], rate / every
     pieces = np.lib.stride_tricks.sliding_window_view(signal, weights.size, axis=0)[::every]
@@ -66,13 +66,13 @@ def damped_modes(signal: Array, rate: float, orders: Sequence[int]) -> list[Mode
     if samples < LEAST_SAMPLES:
         raise ValueError(f"{samples} samples are too few for modes: {LEAST_SAMPLES} are needed")
     weights, sizes, _ = np.linalg.svd(signal, full_matrices=False)
-    main = (weights * sizes)[:, :MOST_SENSORS]
+    main = (weights * sizes)[:, :_MOST_SENSORS]
     sensors = main.shape[1]
-    lags = min(int(LAGS * samples), MOST_LAGS)
+    lags = min(int(_LAGS * samples), _MOST_LAGS)
     pieces = np.lib.stride_tricks.sliding_window_view(main, lags, axis=0)  # (start, sensor, lag)
     pieces = pieces.transpose(2, 1, 0).reshape(lags * sensors, -1)
     directions, sizes, _ = np.linalg.svd(pieces, full_matrices=False)
-    most = min(int((sizes > RANK * sizes[0]).sum()), (lags - 1) * sensors)
+    most = min(int((sizes > _RANK * sizes[0]).sum()), (lags - 1) * sensors)
     spaces = [directions[:, : min(order, most)] for order in orders]
     return [_modes(space[:-sensors], space[sensors:], main, rate) for space in spaces]
 

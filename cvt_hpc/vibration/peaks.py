@@ -17,11 +17,11 @@ from cvt_hpc.vibration.signals import Array, check_band, fine_spectrum, stronges
 
 COUNT = 3  # peaks of a strand that are recorded
 LINES = 12  # largest ones among which harmonics are looked for
-MOST_HARMONIC = 8  # number of the strongest line
+_MOST_HARMONIC = 8  # number of the strongest line
 NEAR = 0.25  # of the resolution 1/L: how far a line may lie from a harmonic
-LEAST_LINE = 0.1  # of the strongest one
-ABOVE_NOISE = 4.0  # times the median of the band's spectrum, which noise alone stays below
-MAIN_LOBE = 4.0  # of Hann's window, in lines: between its zeros
+_LEAST_LINE = 0.1  # of the strongest one
+_ABOVE_NOISE = 4.0  # times the median of the band's spectrum, which noise alone stays below
+_MAIN_LOBE = 4.0  # of Hann's window, in lines: between its zeros
 MARGIN = 2.0  # above side lobes
 LEAST = 0.05  # of a strand's highest peak in the band
 
@@ -89,9 +89,9 @@ def fundamental(signal: ArrayLike, rate: float, band: tuple[float, float]) -> tu
     """Fundamental of the periodic part of a signal (time,), and its strongest line in a band [Hz].
 
     The fundamental is the lowest frequency in the band of which the strongest line is a multiple, up to
-    MOST_HARMONIC, that has a line of its own, or three of its harmonics in a row, the strongest among them. A
-    line is a peak of LEAST_LINE of the strongest or more, and above noise. Two lines alone therefore are no
-    harmonics of a common divisor, unless one is a multiple of the other within NEAR/L, L being the length.
+    _MOST_HARMONIC, that has a line of its own, or three of its harmonics in a row, the strongest among them.
+    A line is a peak of _LEAST_LINE of the strongest or more, and above noise. Two lines alone therefore are
+    no harmonics of a common divisor, unless one is a multiple of the other within NEAR/L, L being the length.
 
     Both are nan where the band holds no peak, and one without harmonics. The accuracy is that of
     `signals.dominant_frequency`, of the fundamental divided by the number of its strongest harmonic; 0.1/L
@@ -112,11 +112,11 @@ def fundamentals(signals: Array, rate: float, band: tuple[float, float]) -> Arra
     width = rate / signals.shape[1]
     peaks = np.full((len(signals), LINES), np.nan)
     for k in np.flatnonzero(~np.isnan(strongest)):
-        least = max(LEAST_LINE * heights[k, round(strongest[k] / lines[1])], ABOVE_NOISE * noise[k])
+        least = max(_LEAST_LINE * heights[k, round(strongest[k] / lines[1])], _ABOVE_NOISE * noise[k])
         for place, line in enumerate(_highest(lines, heights[k], band, width, LINES, least)):
             peaks[k, place] = _vertex(lines, heights[k], line)
     found = np.stack([strongest, strongest], axis=1)
-    for number in range(2, MOST_HARMONIC + 1):  # the larger number counts, where several do
+    for number in range(2, _MOST_HARMONIC + 1):  # the larger number counts, where several do
         first = strongest / number
         harmonics = np.arange(1, number + 3) * first[:, np.newaxis]
         has_line = (np.abs(peaks[:, :, np.newaxis] - harmonics[:, np.newaxis]) <= NEAR * width).any(axis=1)
@@ -159,7 +159,7 @@ def _highest(
 
 def _is_part_of(height: float, higher: float, apart: float) -> bool:
     """Whether a peak is a flank or a side lobe of a higher one, so many lines apart."""
-    if apart < MAIN_LOBE:
+    if apart < _MAIN_LOBE:
         return True
     # side lobes of Hann's window fall as 1 / (pi x (x^2 - 1)), x in lines
     return height < MARGIN * higher / (math.pi * apart * (apart * apart - 1.0))

@@ -34,9 +34,9 @@ Array = NDArray[np.float64]
 
 DRIFT_DEGREE = 3
 
-ZERO_PADDING = 8  # lines per resolved line; Hann's maximum is then met within 0.3 %
+_ZERO_PADDING = 8  # lines per resolved line; Hann's maximum is then met within 0.3 %
 
-WINDOWS_FOR_GROWTH = 3  # a slope and its standard error need one more point than a line has parameters
+_WINDOWS_FOR_GROWTH = 3  # a slope and its standard error need one more point than a line has parameters
 
 
 class Growth(NamedTuple):
@@ -68,7 +68,7 @@ def band_amplitude(signal: ArrayLike, rate: float, band: tuple[float, float]) ->
     ValueError
         The record is shorter than 32 samples, or the band does not lie between 0 and half the sampling rate.
     """
-    return segment_amplitude(time_last(signal), rate, band)
+    return _segment_amplitude(time_last(signal), rate, band)
 
 
 def window_amplitudes(
@@ -105,7 +105,7 @@ def window_amplitudes(
     first = (total - width) % hop
     segments = np.lib.stride_tricks.sliding_window_view(samples, width, axis=-1)[..., first::hop, :]
     starts = np.arange(first, total - width + 1, hop)
-    amplitudes = segment_amplitude(segments, rate, band)
+    amplitudes = _segment_amplitude(segments, rate, band)
     return (starts + (width - 1) / 2) / rate, np.moveaxis(amplitudes, -1, 0)
 
 
@@ -211,7 +211,7 @@ def growth_fits(times: Array, amplitudes: Array) -> Growth:
     The numbers of a run do not depend on the others, to the bit: runs are the outermost of all axes.
     """
     t, a = times, np.ascontiguousarray(amplitudes)
-    if t.size < WINDOWS_FOR_GROWTH:
+    if t.size < _WINDOWS_FOR_GROWTH:
         nothing = np.full((len(a), a.shape[2]), np.nan)
         return Growth(nothing, nothing.copy())
     t = t - t.mean()
@@ -259,7 +259,7 @@ def _window_and_drift(size: int) -> tuple[Array, Array]:
     return window, drift
 
 
-def segment_amplitude(segments: Array, rate: float, band: tuple[float, float]) -> Array:
+def _segment_amplitude(segments: Array, rate: float, band: tuple[float, float]) -> Array:
     """Amplitude within the band [Hz] of segments (..., time) sampled at `rate` [Hz]; shape (...)."""
     check_band(band, rate)
     vibration, window = _windowed(segments)
@@ -274,7 +274,7 @@ def segment_amplitude(segments: Array, rate: float, band: tuple[float, float]) -
 def fine_spectrum(segments: Array, rate: float, finest: float = np.inf) -> tuple[Array, Array]:
     """Frequencies (line,), no further apart than `finest` [Hz], and amplitudes (..., line) of segments."""
     vibration, window = _windowed(segments)
-    padded = max(ZERO_PADDING * window.size, int(np.ceil(rate / finest)))
+    padded = max(_ZERO_PADDING * window.size, int(np.ceil(rate / finest)))
     padded = 1 << (padded - 1).bit_length()
     frequencies = np.asarray(np.fft.rfftfreq(padded, 1 / rate), dtype=np.float64)
     return frequencies, 2 * np.abs(np.fft.rfft(vibration, padded)) / window.sum()

@@ -19,14 +19,14 @@ from cvt_hpc.vibration.damped_modes import LEAST_SAMPLES, Array, Modes, damped_m
 BLOCKS = 24  # of a record after the kick, each linear or not
 MOST_MISFIT = 1.0 / 3.0  # of a linear block: rms of D - 2 D_half over that of D
 # Begin and length of the spans of the linear record in which modes are sought, and parts of a span
-SPANS = ((0.0, 1.0), (0.0, 0.5), (0.5, 0.5), (0.0, 0.25), (0.25, 0.25))
+_SPANS = ((0.0, 1.0), (0.0, 0.5), (0.5, 0.5), (0.0, 0.25), (0.25, 0.25))
 PARTS = ((0.0, 1.0), (0.0, 0.7), (0.2, 1.0))
 ORDERS = (8, 14, 20)
 MOST_MODES = 4  # the strongest
 LEAST_SHARE = 0.02  # of the energy of the difference
 SEEN = 0.7  # of the decompositions that have to show a mode
 NEAR = 0.05  # of its frequency, or a period of the part: so near is the same mode in another decomposition
-MOST_ERROR = 4.0  # of a growth rate, over the span: what is less certain is no finding
+_MOST_ERROR = 4.0  # of a growth rate, over the span: what is less certain is no finding
 APART = 0.1  # of a frequency: its largest error
 
 
@@ -87,7 +87,7 @@ def found_modes(motions: Array, rate: float, highest: float, *, vibrates: bool) 
     if vibrates and known[3] > known[1]:
         return nothing("not quiet here: it vibrates without a kick, by more than by it", *known)
     modes: list[tuple[float, ...]] = []
-    for begin, length in SPANS:
+    for begin, length in _SPANS:
         parts = [[round((begin + length * share) * end) for share in part] for part in PARTS]
         if min(stop - start for start, stop in parts) >= LEAST_SAMPLES:
             decomposed = [
@@ -119,7 +119,7 @@ def _agreed(decomposed: list[tuple[Modes, float]], highest: float) -> list[tuple
                 best = near[modes.share[near].argmax()]
                 seen.append((modes.growth[best], modes.frequency[best]))
         growth_error, frequency_error = np.abs(seen - np.median(seen, axis=0)).max(axis=0)
-        certain = growth_error <= MOST_ERROR / length and frequency_error <= APART * frequency
+        certain = growth_error <= _MOST_ERROR / length and frequency_error <= APART * frequency
         if certain and len(seen) >= SEEN * len(decomposed):
             agreed.append((*np.median(seen, axis=0), share, growth_error, frequency_error))
     return agreed

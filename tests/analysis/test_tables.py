@@ -194,6 +194,41 @@ def test_all_that_are_stale_are_made_from_what_is_committed(
     assert (store / "jobs" / "results" / "large.csv").read_text().endswith("1,3\n")
 
 
+@pytest.mark.parametrize("same", [True, False], ids=["same bits", "other bits"])
+def test_tables_of_code_whose_bits_are_the_same_are_confirmed(program, stored, store, same, capfd):
+    def rewrite(text, message):
+        law.write_text(text)
+        git(store, "commit", "-q", "-a", "-m", message)
+        stored.objects.cache_clear(), stored.of_file.cache_clear(), stored.rests_on.cache_clear()
+        return git(store, "rev-parse", "HEAD")
+
+    law, results = store / "cvt_hpc" / "models" / "law.py", store / "jobs" / "results"
+    law.parent.mkdir(parents=True)
+    (store / "tests").mkdir()
+    (store / "tests" / "bits.py").write_text(f"import sys\nprint(*sys.argv[1:])\nsys.exit({int(not same)})\n")
+    for name in ("small", "large"):
+        edit(store / "jobs" / f"{name}.sh", "# says", f"true {law.relative_to(store)}")
+    law.write_text("friction = 0.5\n")
+    git(store, "add", ".")
+    first = rewrite("friction = 0.1\n", "a law")
+    before = rewrite("friction = 0.2\n", "another law")
+    for name, revision in (("small", before), ("large", first), ("broken", first)):
+        text = (results / f"{name}.csv").read_text()
+        (results / f"{name}.csv").write_text(re.sub("(?<=revision: ).*", revision, text))
+    last = rewrite("friction = float(0.2)\n", "the same law, written in another way")
+    assert program.main(["confirm", before]) == int(not same)
+    told = capfd.readouterr().out
+    assert f"{before} {last}\n" in told and ("1 confirmed: small\n" in told) is same
+    older = ("older than 1 of 1 modules", True)
+    assert states(program)["small"] == (("as the code", False) if same else older)
+    assert states(program)["large"] == older  # it was older than the code before
+    assert (f"# confirmed at: {last}\n" in (results / "small.csv").read_text()) is same
+    edit(store / "jobs" / "small.sh", "1,2", "1,3")
+    rewrite("friction = 0.2\n", "another script")
+    assert program.main(["confirm", last]) == int(not same)
+    assert "0 confirmed" in capfd.readouterr().out or not same
+
+
 @pytest.mark.parametrize("lines", [r"load\n1,2\n", r"load\n"])
 def test_a_table_without_whole_rows_replaces_none(program, store, lines, capsys, tmp_path, monkeypatch):
     (tmp_path / "made").mkdir()

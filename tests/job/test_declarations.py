@@ -147,6 +147,23 @@ def test_every_transient_is_checked_for_what_all_runs_share(tables, message):
         assert str(caught.value).startswith(f"x.toml: {message}"), (model, stepper)
 
 
+def test_all_of_a_run_is_judged_only_where_nothing_rises():
+    for model, stepper in PAIRS:
+        run = {"duration": 0.8, "shortest_duration": 0.4}
+        document = {
+            "name": "x",
+            "model": model,
+            "stepper": stepper,
+            "vibration": {"judged_fraction": 1.0},
+            "run": run,
+        }
+        if "rise_time" in load_schema(model, stepper, "x.toml").parameters:
+            with pytest.raises(InputError, match=r"\[(scene|run)\] (rise_time|shortest_duration): expected "):
+                build_job(document, "x.toml")
+        else:
+            assert build_job(document, "x.toml").parameters["shortest_duration"] == 0.4
+
+
 @pytest.mark.parametrize("model", [model for model in MODELS if model not in DIRECT])
 def test_every_stepper_is_taken_or_refused_with_a_reason(model):
     asked = load_model(model)

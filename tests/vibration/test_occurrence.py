@@ -263,6 +263,10 @@ def test_when_more_of_a_run_would_not_change_its_verdict(vibrates, amplitude, ra
     cut = {"lower_band_edge": 5.0 / (CERTAIN["judged_fraction"] * CERTAIN["duration"])}
     assert not is_certain(record | cut, CERTAIN, left=0.3)
     assert is_certain(record | cut, CERTAIN | {"band_low": cut["lower_band_edge"]}, left=0.3) is certain
+    # a single body, whose values have no dimension, is judged as a single strand
+    for strand in range(2):
+        one, body = (record | {name: record[name][part] for name in names} for part in ([strand], strand))
+        assert is_certain(body, CERTAIN, left=0.3) is is_certain(one, CERTAIN, left=0.3)
 
 
 def test_a_record_without_growth_is_never_certain():

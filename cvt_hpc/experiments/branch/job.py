@@ -26,9 +26,9 @@ from cvt_hpc.parameters import Parameter, positive
 from cvt_hpc.storage.netcdf import attributes
 from cvt_hpc.tables import columns
 
-STEADY, TRANSIENT = "linear_stability", "elastic_belt"
+_STEADY, TRANSIENT = "linear_stability", "elastic_belt"
 LOAD = "torque at the driving pulley"
-BRANCH = {
+_BRANCH = {
     "disturbance": Parameter(
         (1e-6, 3e-4),
         "m",
@@ -100,19 +100,19 @@ def load(path: str | Path, overrides: Assignments = ()) -> Diagram:
     source = str(path)
     document = read_document(Path(path))
     table = document.pop("branch", {})
-    own = read_table(BRANCH, table, f"{source}: [branch]", ("set",))
+    own = read_table(_BRANCH, table, f"{source}: [branch]", ("set",))
     _check_disturbance(own["disturbance"], f"{source}: [branch] disturbance")
     replaced = split_assignments(overrides, source, "--set")
     for key in replaced:
-        if key.removeprefix("branch.") in (*BRANCH, "set"):
+        if key.removeprefix("branch.") in (*_BRANCH, "set"):
             raise mismatch(
                 f"{source}: --set {key}",
                 "a parameter or an axis",
                 "a key of [branch], read from the file alone",
             )
     job = build_job(document, source, replaced, "--set")
-    if job.model != STEADY:
-        raise mismatch(f"{source}: model", STEADY, job.model, "`cvt-hpc examples branch` copies such a job")
+    if job.model != _STEADY:
+        raise mismatch(f"{source}: model", _STEADY, job.model, "`cvt-hpc examples branch` copies such a job")
     if job.design:
         raise mismatch(f"{source}: [design]", "the full grid of the axes", job.design["kind"])
     along = [axis for axis in job.axes if axis.name == "load"]

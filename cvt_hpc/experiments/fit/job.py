@@ -23,7 +23,7 @@ from cvt_hpc.parameters import Parameter, positive
 from cvt_hpc.vibration.classes import OccurrenceClass
 
 QUIET, VIBRATING = OccurrenceClass.QUIET, OccurrenceClass.VIBRATING
-REPRODUCED, NOT_REPRODUCED = 0.95, 0.05  # scores from which, and to which, a statement counts so
+REPRODUCED, _NOT_REPRODUCED = 0.95, 0.05  # scores from which, and to which, a statement counts so
 
 TABLE = "fit"
 NUMBERS = {
@@ -116,7 +116,7 @@ def verdict(value: float) -> str:
     """Return the meaning of a score for a statement, in words."""
     if value >= REPRODUCED:
         return "reproduced"
-    return "not reproduced" if value <= NOT_REPRODUCED else "partly"
+    return "not reproduced" if value <= _NOT_REPRODUCED else "partly"
 
 
 def areas(course: Course) -> list[tuple[float, float]]:

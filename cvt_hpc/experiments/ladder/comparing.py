@@ -59,7 +59,7 @@ def compare(rungs: Sequence[Sweep], results: Mapping[str, xr.Dataset]) -> Iterat
     """
     reference = results[REFERENCE]
     costs = {name: float(dataset["core_seconds"].mean()) for name, dataset in results.items()}
-    for question, score in SCORES.items():
+    for question, score in _SCORES.items():
         for rung in rungs:
             if question in rung.answers:
                 found = score(_beside(results[rung.name], reference), reference)
@@ -175,7 +175,7 @@ def _score(errors: Array, asked: int) -> Score:
     return Score(known.size, median, high, undecided=undecided)
 
 
-SCORES: dict[str, Callable[[xr.Dataset, xr.Dataset], Score]] = {
+_SCORES: dict[str, Callable[[xr.Dataset, xr.Dataset], Score]] = {
     "occurrence": _occurrence,
     "onset": _onset,
     "frequency": _frequency,

@@ -33,7 +33,7 @@ COARSER: dict[str, Any] = {"elements": 216, "step": 1e-5}
 _FINER_PUSHBELT = 2
 
 QUESTIONS = ("occurrence", "onset", "frequency", "amplitude", "forces")
-MODEL, STEPPER = "elastic_belt", "imex"
+MODEL, _STEPPER = "elastic_belt", "imex"
 REFERENCE = "reference"
 # In the reference mesh, step and transient shrink together: by 1.5 each error of first order falls by a third
 # and of second order by more than half, while a run costs 4.5 times as much, which keeps it below a second.
@@ -106,8 +106,8 @@ def _check(job: Job) -> None:
     where, axes = job.source, [axis.name for axis in job.axes]
     if job.model != MODEL:
         raise mismatch(f"{where}: model", f"{MODEL}, the top of the ladder", job.model)
-    if job.stepper != STEPPER:
-        raise mismatch(f"{where}: stepper", f"{STEPPER}, as all transients below have it", str(job.stepper))
+    if job.stepper != _STEPPER:
+        raise mismatch(f"{where}: stepper", f"{_STEPPER}, as all transients below have it", str(job.stepper))
     if job.design:
         raise mismatch(f"{where}: [design]", "none: a ladder goes over the whole grid", job.design["kind"])
     if "load" not in axes:

@@ -101,7 +101,7 @@ def highest_frequency(parameters: Mapping[str, Any]) -> float:
 
 
 @kernel
-def string_rates(string: String, t: float, y: np.ndarray, out: np.ndarray) -> bool:
+def _string_rates(string: String, t: float, y: np.ndarray, out: np.ndarray) -> bool:
     """Rates of displacements and speeds; see `System`."""
     nodes = y.size // 2
     stiffness = (string.wave**2 - string.speed**2) / string.cell**2
@@ -125,17 +125,17 @@ def system(parameters: Mapping[str, Any]) -> System:
     amplitude = parameters["largest_displacement"]
     speed = amplitude * np.pi * parameters["mode"] * string.wave / parameters["length"]
     scale = np.repeat([amplitude, speed], nodes)
-    return System(string_rates, string, np.arange(2 * nodes) >= nodes, position_of, scale)
+    return System(_string_rates, string, np.arange(2 * nodes) >= nodes, position_of, scale)
 
 
-def node_positions(parameters: Mapping[str, Any]) -> np.ndarray:
+def _node_positions(parameters: Mapping[str, Any]) -> np.ndarray:
     """Positions of the inner nodes, (n,) [m]."""
     return parameters["length"] / parameters["cells"] * np.arange(1, parameters["cells"])
 
 
 def initial_state(parameters: Mapping[str, Any]) -> np.ndarray:
     """Displacements [m] and speeds [m/s] of the inner nodes at the start, from flat parameters."""
-    return np.concatenate(travelling(parameters, node_positions(parameters), np.zeros(1)))[:, 0]
+    return np.concatenate(travelling(parameters, _node_positions(parameters), np.zeros(1)))[:, 0]
 
 
 def energy(parameters: Mapping[str, Any], y: np.ndarray) -> np.ndarray:

@@ -143,7 +143,7 @@ def largest_rate(o: Oscillator) -> float:
 
 
 @kernel
-def smoothed_rates(o: Oscillator, t: float, y: np.ndarray, out: np.ndarray) -> bool:
+def _smoothed_rates(o: Oscillator, t: float, y: np.ndarray, out: np.ndarray) -> bool:
     """Rates of displacement and speed with smoothed friction; see `System`."""
     load = normal_load(o, y[X])
     friction = regularised_friction(o, o.belt_speed - y[V], load)
@@ -161,7 +161,7 @@ def free_rates(o: Oscillator, t: float, y: np.ndarray, out: np.ndarray) -> bool:
 
 
 @kernel
-def friction_bounds(
+def _friction_bounds(
     o: Oscillator,
     t: float,
     y: np.ndarray,
@@ -197,7 +197,7 @@ def typical_sizes(o: Oscillator) -> tuple[float, float]:
 def system(parameters: Mapping[str, Any]) -> System:
     """Equations with smoothed friction, from flat parameters [SI]; unknowns: displacement, speed."""
     o = oscillator(parameters)
-    return System(smoothed_rates, o, *_unknowns(o))
+    return System(_smoothed_rates, o, *_unknowns(o))
 
 
 def set_valued_system(parameters: Mapping[str, Any]) -> SetValuedSystem:
@@ -207,7 +207,7 @@ def set_valued_system(parameters: Mapping[str, Any]) -> SetValuedSystem:
         free_rates,
         o,
         *_unknowns(o),
-        friction_bounds,
+        _friction_bounds,
         np.array([[0.0, 1.0]]),
         np.array([[0.0], [1.0 / o.mass]]),
     )

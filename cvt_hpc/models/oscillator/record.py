@@ -28,7 +28,7 @@ STEP_COST = {"moreau": 1.5e-8}  # core-seconds of a step in full lanes; of the o
 LANES = 64  # runs of a batch by `moreau`: so many share what a call takes
 SAMPLES = 1 << 18  # of all runs of a batch, most: their spectra take 16 MB
 LAW = ("friction_law", "table_file", "table_force", "table_speed", "table_mu")
-MARCH = ("duration", "shortest_duration", "sampling_rate", "step")
+_MARCH = ("duration", "shortest_duration", "sampling_rate", "step")
 
 
 class Sticks(IntEnum):
@@ -84,7 +84,7 @@ def lanes(parameters: Mapping[str, Any], stepper: str) -> Any:
 
 def lane_key(parameters: Mapping[str, Any]) -> tuple:
     """Values that all runs of one batch have in common."""
-    return tuple(parameters.get(key) for key in (*MARCH, *LAW, *PARAMETERS["vibration"]))
+    return tuple(parameters.get(key) for key in (*_MARCH, *LAW, *PARAMETERS["vibration"]))
 
 
 def judge(run: Transient) -> dict[str, Any]:

@@ -27,9 +27,9 @@ from cvt_hpc.study.task import Task, refined_steps
 
 # [byte] of rank 0 for each run, for the plan and the index of the records: 207 were measured with 10^6 runs
 # on one rank, and about as much again is assumed for sending the plan.
-MEMORY_PER_RUN = 400
+_MEMORY_PER_RUN = 400
 # [byte] of results.nc for each quantity and coordinate, beside its values: 4700 at most were measured
-NAMES_AND_CHUNKS = 5000
+_NAMES_AND_CHUNKS = 5000
 _PREFIXES = ((1e12, "T"), (1e9, "G"), (1e6, "M"), (1e3, "k"))
 
 _START_UP = 60.0  # [s] for MPI, Python and kernels; assumed, with room for slow file systems
@@ -59,7 +59,7 @@ def needs(job: Job, simulator: Simulator) -> Needs:
     record = record_type(variables, coordinates).itemsize
     named = len(variables) + len(coordinates) + len(job.axes) + len(job.rules)
     disk = _disk(job.size, record, named, math.nan if job.histories else 0.0)
-    return Needs(MEMORY_PER_RUN * job.size, disk, simulator.profile_bytes(job))
+    return Needs(_MEMORY_PER_RUN * job.size, disk, simulator.profile_bytes(job))
 
 
 def _disk(runs: int, record: int, named: int, histories: float) -> Disk:
@@ -67,7 +67,9 @@ def _disk(runs: int, record: int, named: int, histories: float) -> Disk:
 
     The dataset is compressed. It takes no more than its records, and something for each quantity `named`.
     """
-    return Disk((HEAD.size + PLACE.size + record) * runs, record * runs + NAMES_AND_CHUNKS * named, histories)
+    return Disk(
+        (HEAD.size + PLACE.size + record) * runs, record * runs + _NAMES_AND_CHUNKS * named, histories
+    )
 
 
 def refuse_too_large(job: Job, simulator: Simulator, out: Path) -> Needs:

@@ -100,10 +100,12 @@ class Records:
         StorageError
             If a log cannot be read, or has changed.
         """
-        return read_rows(self.study, self.logs, self.entries[runs], name)
+        return _read_rows(self.study, self.logs, self.entries[runs], name)
 
 
-def read_rows(study: Study, logs: Sequence[Path], entries: np.ndarray, name: str | None = None) -> np.ndarray:
+def _read_rows(
+    study: Study, logs: Sequence[Path], entries: np.ndarray, name: str | None = None
+) -> np.ndarray:
     """Return the content of some places in the logs; see `Records.read`."""
     dtype, offset = study.record_dtype.fields[name][:2] if name else (study.record_dtype, 0)  # type: ignore[index]  # it has fields
     blank = study.blank_rows()
@@ -163,7 +165,7 @@ def _contradictions(records: Records, later: np.ndarray) -> list[str]:
     block = block_length(records.study)
     for first in range(0, later.size, block):
         part = later[first : first + block]
-        rows = read_rows(records.study, records.logs, part)
+        rows = _read_rows(records.study, records.logs, part)
         for entry in part[_differ(rows, records.read(part["run"]), records.study)]:
             chosen = records.logs[records.entries["log"][entry["run"]]]
             where = f"{records.logs[entry['log']]}: run {entry['run']}"

@@ -37,7 +37,7 @@ RECORD = b"\xf5RUN"  # payload: a place and the record of that run
 BEGUN = b"\xf5BEG"  # payload: the places of a batch that this process is at from here on
 ALONE = b"\xf5ALO"  # the same of a run that is done alone, because its process has died before
 AGAIN = b"\xf5AGN"  # payload: the places of runs that are to be done again, with their new attempt
-MARK_LIMIT = 1 << 28  # [bytes] of payload: 22 million runs
+_MARK_LIMIT = 1 << 28  # [bytes] of payload: 22 million runs
 
 PREAMBLE_LIMIT = 1 << 20  # [bytes]; none is longer
 WINDOW = 1 << 22  # [bytes] of a log that are read at a time
@@ -46,7 +46,7 @@ _MARKERS = re.compile(b"\xf5(?:RUN|BEG|ALO|AGN)")
 Place = tuple[int, int]  # run index, and the attempt, counted from 1
 
 KEPT = "The runs recorded so far are kept, and the same command goes on from them"
-SYNC_INTERVAL = 5.0  # [s]; a dead process loses nothing, a power failure at most this much
+_SYNC_INTERVAL = 5.0  # [s]; a dead process loses nothing, a power failure at most this much
 _CLOSED = -1  # no descriptor of a file
 
 Session = dict[str, Any]  # description of a start of the sweep, see `provenance.new_session`
@@ -165,7 +165,7 @@ class RecordFormat:
     def _is_length_of(self, kind: bytes, length: int) -> bool:
         if kind == RECORD:
             return length == PLACE.size + self.dtype.itemsize
-        return kind in (BEGUN, ALONE, AGAIN) and 0 < length <= MARK_LIMIT and length % PLACE.size == 0
+        return kind in (BEGUN, ALONE, AGAIN) and 0 < length <= _MARK_LIMIT and length % PLACE.size == 0
 
 
 def read_preamble(data: bytes, layout: RecordFormat) -> tuple[Session | None, int]:
@@ -296,7 +296,7 @@ class RecordLog:
             if self._descriptor == _CLOSED:
                 self._open()
             before = self._write(data)
-            if time.monotonic() - self._synced > SYNC_INTERVAL:
+            if time.monotonic() - self._synced > _SYNC_INTERVAL:
                 self._sync()
         except OSError as error:
             raise storage_error(self.path, error, KEPT) from error
