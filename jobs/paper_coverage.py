@@ -35,11 +35,11 @@ they state: first all of each paper, then each figure whose statements are kept 
 
 Made by `python jobs/paper_coverage.py docs/coverage.md` from `docs/coverage.toml` and from the tables in
 `jobs/results`. A row is measured where columns of these tables, or statements of a figure, decide at
-least a part of it; `paper_tests` has what the tests that rows name measure, and an error there is
-relative to the largest value of reference. All rows are measured but some that are missing. A row is
-reproduced where all parts hold, partly where some do, not where the model gives something else, and
-missing where it has no counterpart or the text no number; where the statement itself is one of the latter
-three, numbers beside it do not change that. Numbers are "older" where their table is older than the code,
+least a part of it, and all are; `paper_tests` has what the tests that rows name measure, and an error
+there is relative to the largest value of reference. A row is reproduced where all parts hold, partly
+where some do, not where the model gives something else, and missing where it has no counterpart or the
+text no number; where the statement itself is one of the latter three, numbers beside it do not change
+that. Numbers are "older" where their table is older than the code,
 by its first lines. "Figure `NAME`" is `cvt-hpc run JOB && cvt-hpc figure out/NAME`, where JOB is
 `jobs/figures/NAME.toml` or `jobs/NAME.toml`; it leaves `figure.png` and `statements.csv`. The papers'
 pictures have no data here: "reproduced" means every number and shape that the text states. What they do

@@ -5,13 +5,15 @@ from math import sqrt
 from pathlib import Path
 
 import numpy as np
+import pandas as pd
 import pytest
 import xarray as xr
 
 from cvt_hpc import load_job
 from cvt_hpc.physics.geometry import variator
 
-LOSSES = runpy.run_path(str(Path(__file__).parents[2] / "jobs" / "losses.py"))
+JOBS = Path(__file__).parents[2] / "jobs"
+LOSSES = runpy.run_path(str(JOBS / "losses.py"))
 POINT = {"driven_radius": 0.05, "centre_distance": 0.155, "element_mass": 1.0, "ring_mass": 0.25}
 
 
@@ -53,3 +55,21 @@ def test_the_clamping_of_a_phase_holds_its_torque_ratio(monkeypatch):
     assert asked[0]["thrust"] == thrust
     assert (losses, power) == ([7.0, 1.0, 2.0, 3.0], 1e3)
     np.testing.assert_allclose(asked[0]["driving_speed"], 1600 * np.pi / 30)
+
+
+def test_a_map_of_losses_has_groups_of_contacts_and_the_bearings_of_each_run(monkeypatch):
+    monkeypatch.syspath_prepend(JOBS)
+    by_group = runpy.run_path(str(JOBS / "losses_picture.py"))["by_group"]
+    parts = ("flank_loss_driving", "flank_loss_driven", "ring_loss", "element_loss", "tilt_loss", "belt_loss")
+    run = {name: 2.0**k for k, name in enumerate((*parts, "stretch_loss", "lag_loss"))}
+    run |= {f"mean_push_force_t{k}": 500.0 for k in (1, 2)}
+    at = {"thrust": 1e4, "ratio": 0.5, "load_share": 0.5}
+    pulls = [{"mean_ring_tension_t1": t1 + 500.0, "mean_ring_tension_t2": 1500.0} for t1 in (3e3, 2e3)]
+    found = by_group(pd.DataFrame([run | at | pull for pull in pulls]))
+    assert (
+        found[["flanks", "rings", "between_elements", "inside_belt"]].to_numpy().tolist()
+        == [[3, 4, 24, 224]] * 2
+    )
+    p = load_job(LOSSES["JOB"]).point_at(at)
+    expected = [LOSSES["bearing_loss"](strands(t1, 1000.0), p) for t1 in (3e3, 2e3)]
+    np.testing.assert_allclose(found["bearings"], expected)

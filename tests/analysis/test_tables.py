@@ -1,10 +1,11 @@
 """jobs/tables.py: how old stored tables are, how they are made again, and rows of them that are computed again."""
 
 import csv
-import importlib.util
+import importlib
 import re
 import shlex
 import subprocess
+import sys
 
 import pytest
 
@@ -17,12 +18,16 @@ HEAD = "# revision: {}\n# job: none\n# made by: bash jobs/{}.sh $TABLE\n# date: 
 
 
 @pytest.fixture
-def program(monkeypatch):
-    spec = importlib.util.spec_from_file_location("tables", ROOT / "jobs" / "tables.py")
-    module = importlib.util.module_from_spec(spec)
-    monkeypatch.setitem(__import__("sys").modules, "tables", module)
-    spec.loader.exec_module(module)
-    return module
+def stored(monkeypatch):
+    monkeypatch.syspath_prepend(ROOT / "jobs")
+    for name in ("stored_tables", "tables"):
+        monkeypatch.delitem(sys.modules, name, raising=False)
+    return importlib.import_module("stored_tables")
+
+
+@pytest.fixture
+def program(stored):
+    return importlib.import_module("tables")
 
 
 def git(folder, *arguments):
@@ -34,9 +39,10 @@ def git(folder, *arguments):
 
 
 @pytest.fixture
-def store(program, tmp_path, monkeypatch):
+def store(program, stored, tmp_path, monkeypatch):
     """A repository with three tables, of scripts that write their own values; those of one fail."""
-    monkeypatch.setattr(program, "ROOT", tmp_path)
+    for module in (program, stored):
+        monkeypatch.setattr(module, "ROOT", tmp_path)
     results = tmp_path / "jobs" / "results"
     results.mkdir(parents=True)
     for name, last in (("small", ""), ("large", ""), ("broken", "echo no belt >&2; exit 3\n")):
@@ -99,8 +105,8 @@ def test_a_table_rests_on_job_data_and_all_modules_that_compute_it(program):
         (".nc", "1", "1", "2"),
     ],
 )  # fmt: skip
-def test_comments_and_docstrings_make_nothing_older(program, suffix, first, same, other):
-    said, again, changed = (program.meaning(text.encode(), suffix) for text in (first, same, other))
+def test_comments_and_docstrings_make_nothing_older(stored, suffix, first, same, other):
+    said, again, changed = (stored.meaning(text.encode(), suffix) for text in (first, same, other))
     assert said == again != changed
 
 
@@ -108,11 +114,11 @@ def states(program):
     return {table.name: (table.state, table.is_stale) for table in program.tables()}
 
 
-def test_a_table_is_stale_once_what_it_rests_on_has_changed(program, store):
+def test_a_table_is_stale_once_what_it_rests_on_has_changed(program, stored, store):
     assert set(states(program).values()) == {("as the code", False)}
     edit(store / "jobs" / "small.sh", "# says", "# says more")
     edit(store / "jobs" / "large.sh", "1,2", "1,3")
-    program.of_file.cache_clear()
+    stored.of_file.cache_clear()
     assert states(program)["small"] == ("as the code", False)
     assert states(program)["large"] == ("older than large.sh", True)
 
@@ -171,7 +177,9 @@ def test_pictures_of_a_table_are_made_with_it(program, store, tmp_path, monkeypa
     assert found == {"large.png": "drawn", "large_along.png": "too"}
 
 
-def test_all_that_are_stale_are_made_from_what_is_committed(program, store, capsys, tmp_path, monkeypatch):
+def test_all_that_are_stale_are_made_from_what_is_committed(
+    program, stored, store, capsys, tmp_path, monkeypatch
+):
     (left := tmp_path / "made").mkdir()
     monkeypatch.setattr("tempfile.tempdir", str(left))
     edit(store / "jobs" / "large.sh", "1,2", "1,3")
@@ -180,18 +188,18 @@ def test_all_that_are_stale_are_made_from_what_is_committed(program, store, caps
         r"tables.py: large: expected all .* changes of jobs/large.sh\n", capsys.readouterr().err
     )
     git(store, "commit", "-q", "-a", "-m", "another load")
-    program.objects.cache_clear()
+    stored.objects.cache_clear()
     assert program.main(["make", "--stale"]) == 0
     assert capsys.readouterr().out == "large: made\n1 made\n" and not [*left.iterdir()]
     assert (store / "jobs" / "results" / "large.csv").read_text().endswith("1,3\n")
 
 
 @pytest.mark.parametrize("same", [True, False], ids=["same bits", "other bits"])
-def test_tables_of_code_whose_bits_are_the_same_are_confirmed(program, store, same, capfd, monkeypatch):
+def test_tables_of_code_whose_bits_are_the_same_are_confirmed(program, stored, store, same, capfd):
     def rewrite(text, message):
         law.write_text(text)
         git(store, "commit", "-q", "-a", "-m", message)
-        program.objects.cache_clear(), program.of_file.cache_clear(), program.rests_on.cache_clear()
+        stored.objects.cache_clear(), stored.of_file.cache_clear(), stored.rests_on.cache_clear()
         return git(store, "rev-parse", "HEAD")
 
     law, results = store / "cvt_hpc" / "models" / "law.py", store / "jobs" / "results"
@@ -252,11 +260,12 @@ def test_a_table_that_does_not_tell_how_it_is_made_is_bad_input(program, store, 
 
 
 QUIET = {"load": "20", "status": "done", "vibrates": "no", "amplitude_t1 [um]": "0.31", "frequency_t1 [Hz]": "300.1", "loss [W]": "100"}  # fmt: skip
+STATED = {"verdict": "partly", "measured": "11 um up to 200 N m"}
 MOVES = QUIET | {"vibrates": "yes", "amplitude_t1 [um]": "20.0", "frequency_t1 [Hz]": "540.0"}
 
 
 @pytest.mark.parametrize(
-    ("stored", "found", "told"),
+    ("kept", "found", "told"),
     [
         (QUIET, {"amplitude_t1 [um]": "0.7", "frequency_t1 [Hz]": "700"}, []),
         (QUIET, {"loss [W]": "98.1"}, []),  # the largest of the column is 200 W
@@ -271,11 +280,20 @@ MOVES = QUIET | {"vibrates": "yes", "amplitude_t1 [um]": "20.0", "frequency_t1 [
         (MOVES, {"load": "twenty"}, ["load twenty, stored 20"]),
         (MOVES, {"amplitude_t1 [um]": "14"}, ["amplitude_t1 [um] 14, stored 20.0"]),
         (MOVES, {"frequency_t1 [Hz]": "500"}, ["frequency_t1 [Hz] 500, stored 540.0"]),
+        (STATED, {"measured": "10 um up to 190 N m"}, []),
+        (
+            STATED,
+            {"measured": "8 um up to 200 N m"},
+            ["measured 8 um up to 200 N m, stored 11 um up to 200 N m"],
+        ),
+        (STATED, {"measured": "11 um to 200 N m"}, ["measured 11 um to 200 N m, stored 11 um up to 200 N m"]),
+        (STATED, {"measured": "11 um"}, ["measured 11 um, stored 11 um up to 200 N m"]),
+        (STATED, {"verdict": "not"}, ["verdict not, stored partly"]),
     ],
 )
-def test_rows_differ_beyond_what_rounding_explains(program, stored, found, told):
-    rows = [stored, stored | {"loss [W]": "200"}, stored | {"status": "failed_error", "loss [W]": ""}]
-    assert list(program.differences(rows, 0, stored | found)) == told
+def test_rows_differ_beyond_what_rounding_explains(program, kept, found, told):
+    rows = [kept, kept | {"loss [W]": "200"}, kept | {"status": "failed_error", "loss [W]": ""}]
+    assert list(program.differences(rows, 0, kept | found)) == told
 
 
 def check(program, capsys, monkeypatch, tables):
@@ -286,14 +304,14 @@ def check(program, capsys, monkeypatch, tables):
 
 def test_a_stored_row_is_computed_again_and_named_where_it_differs(program, capsys, monkeypatch):
     (table,) = program.tables(["strand"])
-    dear = program.Table(table.path, table.told, [row | {"core_seconds": "1e9"} for row in table.rows])
+    dear = type(table)(table.path, table.told, [row | {"core_seconds": "1e9"} for row in table.rows])
     status, told = check(program, capsys, monkeypatch, [table, dear])
     assert status == 0 and told.count("strand, row 9: the same") == 1
     table.rows[8]["net_force_t1 [N]"] = "1"
-    monkeypatch.setattr(program.Table, "is_stale", True)
+    monkeypatch.setattr(type(table), "is_stale", True)
     status, told = check(program, capsys, monkeypatch, [table, dear])
     assert status == 0 and told.count("(older)") == 1
-    monkeypatch.setattr(program.Table, "is_stale", False)
+    monkeypatch.setattr(type(table), "is_stale", False)
     status, told = check(program, capsys, monkeypatch, [table, dear])
     assert status == 1 and re.search(r"row 9: net_force_t1 \[N\] \S+, stored 1\n", told)
     table.told["older than the code"] = "another formula"
@@ -304,7 +322,7 @@ def test_a_stored_row_is_computed_again_and_named_where_it_differs(program, caps
 def test_a_job_of_another_size_than_its_table_is_named(program, capsys, monkeypatch):
     (table,) = program.tables(["strand"])
     table.rows.pop()
-    monkeypatch.setattr(program.Table, "is_stale", False)
+    monkeypatch.setattr(type(table), "is_stale", False)
     status, told = check(program, capsys, monkeypatch, [table])
     assert (
         status == 1
@@ -320,6 +338,58 @@ def test_a_row_of_samples_is_the_sample_of_its_place(program):
     for place in (0, 200):
         stored = {axis.name: table.rows[place][axis.name] for axis in job.axes}
         assert {axis.name: f"{job.point(place)[axis.name]:g}" for axis in job.axes} == stored
+
+
+@pytest.mark.parametrize(
+    ("name", "file", "settings", "quantities"),
+    [
+        ("lebrecht_2004", "lebrecht_2004", [], ["amplitude", "frequency", "mode", "power_residual"]),
+        ("quasi_static_convergence", "quasi_static_convergence", [], ["amplitude", "frequency", "mode", "power_residual"]),
+        ("tilt_and_discs", "lebrecht_2004", ["friction_gradient=-0.8", "sheave_stiffness=[1,1.5]", "tilt_factor=[0.8,1,1.25]"],
+         ["amplitude", "frequency", "mode", "power_residual"]),
+        ("strand", "strand", [], ["eigenfrequency", "resting_frequency", "net_force", "critical_speed"]),
+    ],
+)  # fmt: skip
+def test_a_study_is_found_in_the_commands_of_its_table(program, name, file, settings, quantities):
+    (table,) = program.tables([name])
+    found, by, of = program.study_of(table.made_by)
+    assert (found, by, [*of]) == (f"jobs/{file}.toml", settings, quantities)
+
+
+@pytest.mark.parametrize(
+    "name", ["terms", "pushbelt_beside_belt", "misalignment_flanks", "figures/belt_drive"]
+)
+def test_a_table_of_other_commands_has_no_study(program, name):
+    (table,) = program.tables([name])
+    assert program.study_of(table.made_by) is None
+
+
+def test_a_table_without_a_study_is_made_again_and_compared(program, store, capsys):
+    assert program.main(["check", "--turn", "0", "--seconds", "5"]) == 1
+    told = capsys.readouterr().out.splitlines()[1:-1]
+    assert told == [
+        "broken, all rows: exit status 3: no belt",
+        "small, all rows: 1 of 1 rows differ, first row 1: load 1, stored 0",
+    ]  # large takes 9 core-s
+    for name in ("small", "broken"):
+        edit(store / "jobs" / "results" / f"{name}.csv", "\n0,", "\n1,")
+    edit(store / "jobs" / "broken.sh", "exit 3", "exit 0")
+    git(store, "commit", "-q", "-a", "-m", "repaired")
+    program.main(["check", "--turn", "0", "--seconds", "5"])
+    told = capsys.readouterr().out.splitlines()[1:-1]
+    assert told == ["broken, all rows: the same", "small, all rows: the same"]
+    edit(store / "jobs" / "results" / "small.csv", "\n1,2\n", "\n1,2\n2,2\n")
+    program.main(["check", "--turn", "0", "--seconds", "5"])
+    assert (
+        "small, all rows: its commands: expected 2 rows, as its table has, found 1" in capsys.readouterr().out
+    )
+
+
+def test_tables_of_the_same_runs_cost_what_the_dearest_of_them_does(program, store, capsys):
+    edit(store / "jobs" / "results" / "large.csv", "jobs/large.sh $TABLE", "jobs/small.sh $TABLE && true")
+    edit(store / "jobs" / "results" / "small.csv", "jobs/small.sh $TABLE", "jobs/small.sh $TABLE && :")
+    program.main(["check", "--turn", "0", "--seconds", "5"])
+    assert [line.partition(",")[0] for line in capsys.readouterr().out.splitlines()[1:-1]] == ["broken"]
 
 
 def test_a_check_without_time_goes_through_all_tables_and_computes_none(program, capsys):

@@ -1,8 +1,11 @@
 """The comparison with EXUDYN: what its numbers mean. EXUDYN itself is not needed here."""
 
 import exudyn_belt_drive as comparison
+import exudyn_near_slip as near_slip
 import numpy as np
 import pytest
+
+from cvt_hpc.job import build_job
 
 
 @pytest.fixture(scope="module")
@@ -33,3 +36,12 @@ def test_the_scene_is_a_belt_at_rest_on_smaller_circles(begun):
 def test_errors_are_against_the_finest_run_of_the_same_program():
     rows = [{"program": name, "speed_loss": loss} for name, loss in (("a", 1.1), ("a", 1.0), ("b", 2.0))]
     assert [row["error"] for row in comparison.with_errors(rows)] == pytest.approx([0.1, 0.0, 0.0])
+
+
+def test_the_scene_near_slip_is_that_of_a_job_with_its_load_and_bristles():
+    p = comparison.point(near_slip.ELEMENTS, near_slip.STEP)
+    kept = ("elements", "step", "duration", "rise_time", "sampling_rate", "length_scatter", "mass_damping")
+    values = {name: p[name] for name in (*kept, "contact_points")} | {"load": 20.0}
+    values |= {"friction_treatment": "bristle", "shear_stiffness": comparison.BRISTLE}
+    asked = build_job({"name": "near_slip", "model": "belt_drive"}, "near_slip", values).point(0)
+    assert near_slip.scene(near_slip.BRISTLES) == asked
