@@ -33,7 +33,7 @@ STICK_SLIP = scene(
 @cache
 def converged(width, **loading):
     """States at the samples."""
-    p = STICK_SLIP | loading | {"friction_speed": width, "tolerance": 1e-9}
+    p = STICK_SLIP | loading | {"friction_speed": width, "tolerance": 1e-8}
     return finished("oscillator", "scipy_radau", p).rows
 
 
