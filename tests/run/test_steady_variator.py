@@ -289,8 +289,6 @@ def test_friction_carries_what_bullinger_says():
 
 
 def test_a_load_beyond_what_friction_carries():
-    with pytest.raises(NoSteadyState, match="400 N m"):
-        SteadyBelt(GIVEN).at(400.0)
     record = rung_record("steady_variator", load=400.0, stations=32)
     assert (record["status"], record["vibrates"]) == (Status.DONE, Vibrates.SLIPS)
     assert "slips through under 400 N m: from" in record["reason"]
