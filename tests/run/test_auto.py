@@ -272,7 +272,9 @@ def test_runs_left_open_share_the_lanes_of_the_next_rung(monkeypatch):
     )
     (batch,) = lane_groups(job, range(17))
     # every other one is settled at once
-    found = run_points(job, [job.point(index) | (QUIET if index % 2 else {}) for index in batch], lambda: None)
+    found = run_points(
+        job, [job.point(index) | (QUIET if index % 2 else {}) for index in batch], lambda: None
+    )
     assert [record["rung"] == Rung.FULL for record in found] == [index % 2 == 0 for index in batch]
     assert sizes == [(48, 16), (48, 1), (80, 9)]
 

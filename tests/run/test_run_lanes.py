@@ -87,9 +87,7 @@ def test_a_batch_that_is_not_full_gives_the_same_in_the_order_of_its_points(meth
         assert_same_bits(record, together(method)[k])
 
 
-@pytest.mark.parametrize(
-    ("method", "value"), [("double", np.nan), ("double", np.inf), ("explicit", np.nan)]
-)
+@pytest.mark.parametrize(("method", "value"), [("double", np.nan), ("double", np.inf), ("explicit", np.nan)])
 def test_a_run_that_is_not_a_number_fails_alone(monkeypatch, method, value):
     advance, spoiled = Batch.advance, 4
 
