@@ -28,7 +28,7 @@ end_refinement = 1
 RUNS = """
 [branch]
 resolution = "5 N m"
-set = { duration = "0.15 s" }
+set = { duration = "0.15 s", step = "7.6 us" }
 """
 
 
@@ -134,7 +134,7 @@ def test_another_file_in_its_place_is_left_alone(tmp_path, capsys):
 def test_a_run_begins_in_the_steady_state(tmp_path):
     (tmp_path / "x.toml").write_text(JOB)
     (asked,) = load(tmp_path / "x.toml").branches
-    job = build_job(asked.runs.resolved(), "x", {"duration": 0.1, "precision": "double"})
+    job = build_job(asked.runs.resolved(), "x", {"duration": 0.1, "precision": "double", "lanes": "stations"})
     state = SteadyBelt(asked.parameters).at(90.0).state
     push = {"disturbance": 1e-9}
     at_rest, started = attractors(

@@ -9,7 +9,7 @@ import pytest
 
 from support.belts import eigenvalues
 
-STEEP = {"friction_gradient": -1.2}
+STEEP = {"friction_gradient": -1.2, "step": 1e-7}
 STRANDS = 1000.0  # [Hz]: above every frequency that the strands have here
 
 

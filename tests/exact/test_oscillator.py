@@ -145,7 +145,7 @@ def test_widths_of_smoothing_vanish_from_the_motion():
     # Coulomb friction with one level, sliding to rest: no fold at the hump, so the first order in the width
     p = STICK_SLIP | {"static_friction": 0.6, "initial_displacement": 2.5, "initial_speed": 0.0}
     p |= {"duration": 15.0, "sampling_rate": 2.0, "tolerance": 1e-9}
-    widths, errors = np.geomspace(1e-2, 1e-4, 5), []
+    widths, errors = np.geomspace(1e-2, 1e-4, 3), []
     for width in widths:
         run = finished("oscillator", "scipy_radau", p | {"friction_speed": width})
         errors.append(np.abs(run.displacement - exact(p, run.times)).max())

@@ -7,11 +7,7 @@ import pytest
 
 from cvt_hpc.models.elastic_belt import fields as f
 from cvt_hpc.models.elastic_belt.belt import State, belt_constants, initial_state
-from cvt_hpc.models.elastic_belt.one_system import (
-    driven_moment,
-    driven_thrust,
-    flat_belt,
-)
+from cvt_hpc.models.elastic_belt.one_system import flat_belt
 from cvt_hpc.models.elastic_belt.rhs import (
     contact_forces,
     fresh_contacts,
@@ -144,8 +140,9 @@ def plain_step(belt, before, step):
         fields[row] += step * rate[row]
     load = belt.ratio * load_at(belt, scalars[f.TIME])
     thrust = belt.thrust * np.interp(scalars[f.TIME], belt.profile[:, 0], belt.profile[:, 3])
-    closing = (driven_thrust(belt, force) - thrust) / belt.axial_damping
-    turning = (driven_moment(belt, moments) - load) / belt.driven_inertia
+    pressed = belt.driven.weight @ np.maximum(force[belt.driven_stations], 0.0)
+    closing = (pressed - thrust) / belt.axial_damping
+    turning = (moments @ belt.on_driven - load) / belt.driven_inertia
     if belt.pulleys.are_free:
         turning, closing = packed[-2:]
         scalars[f.FIRST_STATE :] += step * packed[-2 - f.STATES : -2]

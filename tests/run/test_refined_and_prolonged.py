@@ -18,7 +18,8 @@ from cvt_hpc.vibration import assessment
 from support.marched import CHEAP, assert_same_bits, job, never
 
 T = CHEAP["duration"]
-ALL = {"most_refinements": 3, "longest_duration": 4 * T}
+# friction that does not fall leaves runs quiet, so coarse as they are
+ALL = {"stations": 24, "friction_gradient": 0.0, "most_refinements": 3, "longest_duration": 4 * T}
 STEP, STEPS = 12.5e-6, 4  # the longest that stands, and how many are in a sampling interval
 
 
@@ -99,16 +100,17 @@ def test_a_long_reason_leaves_room_for_the_remedy(script, monkeypatch):
         ({"judged_fraction": 0.42}, 4),
         ({"judged_fraction": 0.5}, 4),
         ({"judged_fraction": 0.75}, 4),
-        ({"stepper": "explicit", "step": 2.5e-7, "stations": 24}, 2),
+        ({"stepper": "explicit", "step": 2.5e-7, "duration": 0.022, "rise_time": 8e-3, "band_low": 500.0}, 2),
     ],
 )
 def test_a_run_that_goes_on_is_the_longer_run(script, values, times):
-    values = {"judged_fraction": 0.5, "longest_duration": times * T} | values
-    longer = values | {"duration": times * T, "judged_fraction": min(values["judged_fraction"], 0.5)}
+    whole = times * values.get("duration", T)
+    values = {"judged_fraction": 0.5, "longest_duration": whole} | values
+    longer = values | {"duration": whole, "judged_fraction": min(values["judged_fraction"], 0.5)}
     expected = run_point(asked(**values), point(**longer), never)
-    script[0][1] = times * T
+    script[0][1] = whole
     found = run_point(asked(**values), point(**values), never)
-    assert found["simulated_seconds"] == pytest.approx(times * T)
+    assert found["simulated_seconds"] == pytest.approx(whole)
     assert expected["status"] == Status.DONE
     assert_same_bits(found, expected)
 
@@ -207,20 +209,21 @@ def test_a_run_that_ends_early_has_been_judged_as_long_as_it_takes():
 
 def test_a_history_covers_the_whole_time(script):
     script[0][1] = 2 * T
-    single = asked(precision="single")
+    lanes = {"precision": "single", "stations": 48}  # which fill a register
+    single = asked(**lanes)
     history = simulate(single, {"seed": 1})
     assert history["time"].values[-1] == pytest.approx(2 * T) and history.sizes["time"] == 1600
-    longer = simulate(asked(duration=2 * T, precision="single"), {"seed": 9})
+    longer = simulate(asked(duration=2 * T, **lanes), {"seed": 9})
     assert not np.array_equal(history["displacement"], longer["displacement"])
     script[0].clear()
-    longer = simulate(asked(duration=2 * T, precision="single"), {"seed": 1})
+    longer = simulate(asked(duration=2 * T, **lanes), {"seed": 1})
     assert np.array_equal(history["displacement"], longer["displacement"])
     assert np.array_equal(history["push_force"], longer["push_force"])
 
 
 # by seed: decided at once; later; never; refined once; always failing; slipping through; refined, then prolonged
 UNTIL, FAILS = {2: 2 * T, 3: 9.0, 7: 2 * T}, {4: STEPS, 5: 1000, 7: 2 * STEPS}
-POINTS = [{"seed": seed} | ({"load": 450.0} if seed == 6 else {}) for seed in range(1, 8)]
+POINTS = [{"seed": seed} | ({"load": 330.0} if seed == 6 else {}) for seed in range(1, 8)]
 
 
 @pytest.mark.slow
@@ -228,11 +231,11 @@ POINTS = [{"seed": seed} | ({"load": 450.0} if seed == 6 else {}) for seed in ra
 def test_neighbours_that_are_refined_or_prolonged_change_nothing(script, precision):
     script[0].update(UNTIL)
     script[1].update(FAILS)
-    points = [point(precision=precision, **values) for values in POINTS]
+    points = [point(precision=precision, most_refinements=2, **values) for values in POINTS]
     together = run_points(asked(), points, never)
     for values, record in zip(points, together, strict=True):
         assert_same_bits(record, run_point(asked(), values, never))
-    assert [record["refinements"] for record in together] == [0, 0, 0, 1, 3, 0, 2]
+    assert [record["refinements"] for record in together] == [0, 0, 0, 1, 2, 0, 2]
     times = [record["simulated_seconds"] / T for record in together]
     assert times[:5] + times[6:] == pytest.approx([1, 2, 4, 1, 1, 2])
     assert [record["status"] for record in together[4:6]] == [Status.FAILED_NUMERICS, Status.DONE]
@@ -302,13 +305,13 @@ def oscillator(duration):
     ],
 )
 def test_runs_without_lanes_go_on_as_well(transient, parameters):
-    whole = marched(transient(parameters(0.005)), 100)
-    run = marched(transient(parameters(0.0025)), 50).paused()
-    run.prolong(parameters(0.005))
-    marched(run, 100)
+    whole = marched(transient(parameters(0.0025)), 50)
+    run = marched(transient(parameters(0.00125)), 25).paused()
+    run.prolong(parameters(0.0025))
+    marched(run, 50)
     # general steppers know no step_ripple
     assert np.array_equal(run.rows, whole.rows, equal_nan=True) and run.steps == whole.steps
-    assert run.samples == 100 and np.array_equal(run.displacement, whole.displacement)
+    assert run.samples == 50 and np.array_equal(run.displacement, whole.displacement)
     if hasattr(run, "means"):
         for name, values in whole.means.items():
             assert np.array_equal(run.means[name], values) and np.isfinite(values).all(), name

@@ -24,10 +24,9 @@ from support.marched import CHEAP, Together, job, record
 CARRIED = 2 * 0.1 * 50e3 / np.cos(np.deg2rad(11)) * 0.075 / 2.52
 LONG_STEPS = [(0.0, 10e-6), (40.0, 10e-6), (120.0, 10e-6), (120.0, 12.5e-6)]
 NARROW = [{"load": load, "friction_speed": 0.3e-3} for load in (0.0, 40.0)]
-LOADS = (0.0, 40.0, 120.0, 400.0, -400.0, 0.6 * CARRIED, 1.2 * CARRIED)
+LOADS = (0.0, 40.0, 120.0, -400.0, 0.6 * CARRIED, 1.2 * CARRIED)
 RUNS = Together(
     *({"load": load, "duration": 0.06} for load in LOADS),
-    *({"load": load, "duration": 0.06, "step": step} for load, step in LONG_STEPS),
     *(values | {"duration": 0.06} for values in NARROW),
 )
 
@@ -65,7 +64,7 @@ def test_a_step_far_too_long_diverges_and_says_when(stations):
 
 @pytest.mark.parametrize(("load", "step"), LONG_STEPS)
 def test_a_step_that_is_too_long_fails_or_does_no_harm(load, step):
-    found, trusted = (RUNS.record(load=load, duration=0.06, **long) for long in ({"step": step}, {}))
+    found, trusted = record(load=load, duration=0.06, step=step), RUNS.record(load=load, duration=0.06)
     assert trusted["status"] == Status.DONE
     if found["status"] == Status.DONE:
         # of first order in the step: 0.3 % are seen
@@ -96,11 +95,11 @@ def test_a_sound_run_without_load_passes_the_power_balance():
 
 
 def test_more_torque_than_friction_carries_slips_through():
-    found = RUNS.record(load=400.0, duration=0.06)
+    found = RUNS.record(load=1.2 * CARRIED, duration=0.06)
     assert_slips(found)
     assert "the belt slips through: the driven pulley has lost 50% of its speed" in found["reason"]
     # physics, not numerics: half the step slips at the same time
-    half = record(load=400.0, duration=0.06, step=1.25e-6)
+    half = record(load=1.2 * CARRIED, duration=0.06, step=1.25e-6)
     assert_slips(half)
     assert half["simulated_seconds"] == pytest.approx(found["simulated_seconds"], rel=0.02)
 
@@ -118,7 +117,6 @@ def test_torque_that_friction_just_carries_does_not():
     largest = CARRIED * below["axial_force"].min() / 50e3
     assert below["slip_margin"] == pytest.approx(0.6 * CARRIED / largest - 1.0, abs=1e-4)
     assert np.abs(below["slip"]).max() < 0.03
-    assert_slips(RUNS.record(load=1.2 * CARRIED, duration=0.06))
 
 
 def test_a_load_that_drives_beyond_what_friction_carries_slips_through():
@@ -152,7 +150,7 @@ def assert_slips(found):
     assert (found["axial_force"] > 1e4).all() and abs(found["speed_loss"]) > GROSS_SLIP
 
 
-def poisoned(monkeypatch, spoil, when=300, **values):
+def poisoned(monkeypatch, spoil, when=100, **values):
     """The record of a run whose state is spoiled after some samples."""
     advance = Batch.advance
 
@@ -185,7 +183,7 @@ def set_scalar(index, value):
 def test_a_state_that_is_not_a_number_never_reaches_a_done_record(monkeypatch, row, value):
     found = poisoned(monkeypatch, set_field(row, value))
     assert found["status"] == Status.FAILED_NUMERICS
-    assert found["simulated_seconds"] < 0.021  # spoiled at 20 ms: found at the next sample
+    assert found["simulated_seconds"] < 0.011  # spoiled within 10 ms: found at the next sample
     assert_no_numbers(found)
 
 
@@ -205,7 +203,7 @@ def test_a_search_for_the_closed_stations_that_does_not_end_ends_the_run(monkeyp
     found = poisoned(monkeypatch, spoil, stepper=stepper, step=step)
     assert found["status"] == Status.FAILED_NUMERICS
     assert "the search for the closed stations of belt and sheaves did not end" in found["reason"]
-    assert found["simulated_seconds"] < 0.021
+    assert found["simulated_seconds"] < 0.011
     assert_no_numbers(found)
 
 

@@ -16,7 +16,8 @@ from support.marched import Together, job
 T1, T2 = 0, 1
 QUIET = {
     "level friction": {"friction_gradient": 0.0},
-    "constant friction": {"friction_law": "coulomb", "friction_gradient": 0.0},
+    # of another law, and so with no other run in its lanes, which its stations fill
+    "constant friction": {"friction_law": "coulomb", "friction_gradient": 0.0, "lanes": "stations"},
     "rigid sheaves": {"sheave_stiffness": np.inf},
     "half the fall": {"friction_gradient": -0.4},
 }

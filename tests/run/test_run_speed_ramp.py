@@ -6,7 +6,7 @@ import pytest
 from cvt_hpc.errors import InputError
 from cvt_hpc.models.elastic_belt.batch import Batch
 from cvt_hpc.variables import Status, Vibrates
-from support.marched import Together, balance, finished, job, mean, record
+from support.marched import balance, finished, job, mean, record
 
 RPM = np.pi / 30.0
 NOMINAL = job().parameters["driving_speed"]
@@ -19,14 +19,9 @@ def ramp(start, end):
     return {"speed_history": "ramp", "speed_start": start, "driving_speed": end}
 
 
-ENDS = [(1000 * RPM, 3000 * RPM), (5000 * RPM, 3000 * RPM)]
 SPEEDS = [1500 * RPM, 3000 * RPM, 4500 * RPM]
-CONSTANT = Together(*(COARSE | {"driving_speed": speed, "duration": 0.2} for speed in SPEEDS))
-CHANGING = Together(*(COARSE | {"stations": 96} | ramp(*ends) for ends in ENDS))
 INSIDE, OUTSIDE = (1900.0, 3800.0), (1800.0, 3900.0)  # [rpm]
 UP, DOWN = (ramp(start * RPM, end * RPM) | {"duration": 1.0} for start, end in ((1500, 4500), (4500, 1500)))
-BESIDE = [{"driving_speed": speed * RPM, "duration": 0.3} for speed in (*INSIDE, *OUTSIDE)]
-WINDOW = Together(*(VIBRATING | values for values in (UP, DOWN, *BESIDE)))
 
 
 def test_a_ramp_of_no_extent_is_the_constant_run_and_its_neighbours_change_no_bit():
@@ -44,9 +39,9 @@ def test_a_ramp_of_no_extent_is_the_constant_run_and_its_neighbours_change_no_bi
 
 # 698 rad/s^2. What is left open is that of constant speed, 2e-4: friction that followed the layers' speeds within a step,
 # but not the pulleys', would leave 0.7 %.
-@pytest.mark.parametrize("ends", ENDS)
+@pytest.mark.parametrize("ends", [(1000 * RPM, 3000 * RPM), (5000 * RPM, 3000 * RPM)])
 def test_the_power_balance_closes_while_the_speed_changes(ends):
-    run = CHANGING.finished(**COARSE | {"stations": 96}, **ramp(*ends))
+    run = finished(**COARSE | {"stations": 96}, **ramp(*ends))
     found, p, judged = balance(run), run.parameters, run.judged
     assert abs(found["power_residual"]) < 5e-4
     driving, driven = (run.channel(f"{name}_speed")[judged] for name in ("driving", "driven"))
@@ -73,7 +68,7 @@ def test_forces_along_a_rising_ramp_are_those_of_constant_speeds():
     assert torque == pytest.approx(2.12, abs=0.01)
     more = torque / p["load"]
     for speed in SPEEDS:
-        constant = CONSTANT.finished(**COARSE, driving_speed=speed, duration=0.2)
+        constant = finished(**COARSE, driving_speed=speed, duration=0.2)
         near = np.abs(speeds - speed) < 60 * RPM
         for name, tolerance in {
             "ring_tension t1": 0.5 * more,
@@ -91,10 +86,10 @@ def test_forces_along_a_rising_ramp_are_those_of_constant_speeds():
 def test_onset_and_end_are_where_constant_speeds_have_them():
     for speeds, expected in ((INSIDE, Vibrates.YES), (OUTSIDE, Vibrates.NO)):
         for speed in speeds:
-            constant = WINDOW.record(**VIBRATING, driving_speed=speed * RPM, duration=0.3)
+            constant = record(**VIBRATING, driving_speed=speed * RPM, duration=0.3)
             assert constant["vibrates"] is expected, speed
     low, high = ((a * RPM, b * RPM) for a, b in zip(OUTSIDE, INSIDE, strict=True))
-    up, down = (WINDOW.record(**VIBRATING, **values) for values in (UP, DOWN))
+    up, down = (record(**VIBRATING, **values) for values in (UP, DOWN))
     # what the ramp passes in the 0.1 s for which a vibration has to last, and in 50 ms in which it grows
     late = 3000 * RPM / 1.0 * 0.15
     for found, first, last, sign in ((up, low, high, 1.0), (down, high, low, -1.0)):

@@ -224,16 +224,16 @@ def test_states_follow_their_curve_from_corner_to_corner_where_the_load_turns_ba
 
 
 def test_single_cells_that_open_are_not_taken_for_the_limit_of_friction():
-    # -5 s/m: the load falls to three quarters at 180 N m, while slip stays at half a per cent, and rises again
+    # -5 s/m: the load falls by half at 211 N m, while slip stays at a fifth of a per cent, and rises again to 305 N m
     parameters = GIVEN | {
         "load_start": 0.0,
         "friction_gradient": -5.0,
         "tilt_stiffness": 6.3e5,
-        "stations": 32,
+        "stations": 24,
     }
     belt = SteadyBelt(parameters)
     # first a load under which the belt settles soon
-    limit = belt.carried(belt.at(140.0, belt.at(100.0)))
+    limit = belt.carried(belt.at(200.0, belt.at(100.0)))
     assert limit.largest_slip > 0.01 and limit.load > 250.0
 
 
@@ -289,8 +289,6 @@ def test_friction_carries_what_bullinger_says():
 
 
 def test_a_load_beyond_what_friction_carries():
-    with pytest.raises(NoSteadyState, match="400 N m"):
-        SteadyBelt(GIVEN).at(400.0)
     record = rung_record("steady_variator", load=400.0, stations=32)
     assert (record["status"], record["vibrates"]) == (Status.DONE, Vibrates.SLIPS)
     assert "slips through under 400 N m: from" in record["reason"]

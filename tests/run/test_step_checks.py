@@ -40,7 +40,7 @@ def saddle_stiffness(**values):
 
 
 def test_the_stiffness_from_which_a_tangent_chatters():
-    x = np.linspace(0.1, 10.0, 5000)
+    x = np.linspace(0.1, 10.0, 500)
 
     def share(slope):
         return slope * (0.5 + slope / (2.0 * slope + 12.0))

@@ -1,5 +1,7 @@
 """A run by one stepper that goes on where a run by another stands."""
 
+from functools import cache
+
 import numpy as np
 import pytest
 
@@ -28,16 +30,22 @@ def marched(group, samples):
     return group
 
 
+@cache
+def explicit(samples):
+    """The run by the explicit step, after so many samples."""
+    (run,) = marched(runs("explicit"), samples).runs
+    return run
+
+
 @pytest.mark.parametrize("stepper", ["explicit", "symplectic_euler", "imex"])
 def test_a_run_taken_over_is_the_run_that_was_not_broken_off(stepper):
-    whole = marched(runs("explicit"), BEFORE + TOGETHER)
     taken = runs(stepper)
-    taken.take_over(marched(runs("explicit"), BEFORE).runs)
+    taken.take_over([explicit(BEFORE)])
     assert taken.done == BEFORE
     (run,) = marched(taken, BEFORE + TOGETHER).runs
     assert run.time == pytest.approx(6e-3, rel=1e-12)
     assert run.steps == pytest.approx(1e-3 / STEPS[stepper], abs=1)  # its own, without those before
-    expected, found = whole.runs[0].displacement, run.displacement
+    expected, found = explicit(BEFORE + TOGETHER).displacement, run.displacement
     assert np.array_equal(found[:BEFORE], expected[:BEFORE])
     moved = np.abs(expected[BEFORE:] - expected[BEFORE - 1]).max()
     assert moved > 5e-5
@@ -73,19 +81,19 @@ def test_means_of_which_a_part_is_missing_are_unknown(stepper):
 @pytest.mark.parametrize("stepper", ["imex", "symplectic_euler"])
 def test_the_disturbance_comes_once(stepper):
     kick = 80
-    whole = marched(runs("explicit"), kick + 2).runs[0].displacement
+    whole = explicit(kick + 2).displacement
     for before in (kick, kick + 1):
         taken = runs(stepper)
-        taken.take_over(marched(runs("explicit"), before).runs)
+        taken.take_over([explicit(before)])
         taken.advance(1)
         # 1 um, given twice or not at all, would show at the probes as 0.5 um or more; imex is some nm off
         assert taken.runs[0].displacement[before] == pytest.approx(whole[before], abs=0.1e-6)
 
 
 def test_another_model_of_the_belt_takes_over_what_it_can_represent():
-    led = marched(runs("explicit"), BEFORE)
+    before = explicit(BEFORE)
     taken = runs("split", "quasi_static_belt", quasi_static_batch)
-    taken.take_over(led.runs)
-    (before,), (run,) = led.runs, taken.runs
+    taken.take_over([before])
+    (run,) = taken.runs
     assert run.state.fields[0] == pytest.approx(before.state.fields[0], abs=1e-4)  # its splines are coarse
     assert run.state.scalars[1] == pytest.approx(before.state.scalars[1], rel=1e-12)

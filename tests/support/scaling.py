@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import re
 from collections.abc import Iterable, Mapping
+from functools import cache
 from typing import Any, NamedTuple
 
 import numpy as np
@@ -64,20 +65,25 @@ def _scaled(value: Any, factor: float) -> Any:
     return value if factor == 1.0 else value * factor
 
 
+@cache
+def _record(model: str, scale: Scale, stepper: str | None, values: frozenset[tuple[str, Any]]) -> dict:
+    asked = rung_job(model, stepper=stepper, **dict(values))
+    return run_point(asked, scale.point(asked, asked.point(0)), never)
+
+
 def scaled_back(model: str, scale: Scale, stepper: str | None = None, **values) -> tuple[dict, dict]:
     """Records of a run and of the scaled one, without times of computing; the second in the units of the first.
 
     `reason`, which has numbers, is left out, but for the words of a failure.
     """
     asked = rung_job(model, stepper=stepper, **values)
-    point = asked.point(0)
-    found = run_point(asked, point, never), run_point(asked, scale.point(asked, point), never)
     declared = [v for v in record_variables(asked) if not v.volatile and v.name != "reason"]
     records = ({}, {})
-    for record, one, factor_of in zip(records, found, (Scale(), scale), strict=True):
+    for record, own in zip(records, (Scale(), scale), strict=True):
+        one = _record(model, own, stepper, frozenset(values.items()))
         for variable in declared:
             value = np.asarray(one[variable.name])
-            factor = factor_of.of(variable.units)
+            factor = own.of(variable.units)
             record[variable.name] = value if factor == 1.0 else value / factor
     return records
 
