@@ -116,7 +116,7 @@ def test_what_a_page_holds_is_drawn_with_texts_apart_and_more_is_refused(kind, m
 
 
 def test_a_map_of_many_panels_gives_its_frequencies_up_before_it_is_refused():
-    few, many = map_of(12), map_of(60)
+    few, many = map_of(6), map_of(60)
     bars = [[ax.get_ylabel() for ax in one.axes if ax.get_label() == "<colorbar>"] for one in (few, many)]
     assert bars == [["amplitude [µm]", "frequency [Hz]"], ["amplitude [µm]"]]
     assert many.get_size_inches()[1] > 7 * LEAST  # of seven rows

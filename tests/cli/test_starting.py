@@ -78,10 +78,10 @@ def test_the_template_of_the_limit_shows_a_torque_that_grows_with_the_thrust(tmp
     assert np.all(np.diff(torque[0]) < 0.0)
 
 
-# A quarter of the cost: the corners lie so far from the border, which hardly depends on the load, that a longer step,
+# A sixth of the cost: the corners lie so far from the border, which hardly depends on the load, that a longer step,
 # shorter runs and one load tell the same of it.
 CHEAPER = {
-    "step": "20 us", "rise_time": "40 ms", "duration": "0.15 s", "longest_duration": "0.15 s", "load_share": 0.2
+    "step": "20 us", "rise_time": "30 ms", "duration": "0.1 s", "longest_duration": "0.1 s", "load_share": 0.2
 }  # fmt: skip
 
 

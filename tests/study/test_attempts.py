@@ -273,9 +273,9 @@ def test_a_retry_that_goes_on_does_not_begin_again(tmp_path):
 
 
 def test_a_retry_on_two_ranks(start, tmp_path):
-    options = {"out": tmp_path, "runs": RUNS, "parameters": {"raise_at": 3}}
-    for extra in ({}, {"sweep": {"retry": [int(Status.FAILED_ERROR)]}}):
-        assert start({**options, **extra}, ranks=2).finish().returncode == 1
+    sweep(tmp_path, Job(JOB.axes, {"raise_at": 3}))
+    again = {"parameters": {"raise_at": 3}, "sweep": {"retry": [int(Status.FAILED_ERROR)]}}
+    assert start({"out": tmp_path, "runs": RUNS, **again}, ranks=2).finish().returncode == 1
     records = recorded(tmp_path)
     assert records.recorded.all()
     assert records.attempts.tolist() == [1] * 3 + [2] + [1] * 8

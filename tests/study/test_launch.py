@@ -281,7 +281,7 @@ def read(again):
 threads = [threading.Thread(target=read, args=(again,)) for again in (False, True, True)]
 for thread in threads:
     thread.start()
-for number in range(6):
+for number in range(3):
     run(job, f"out-{number}", simulator=Simulator(), progress=False)
 done.append(True)
 for thread in threads:

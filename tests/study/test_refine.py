@@ -122,12 +122,13 @@ def test_lanes_and_interruptions_change_no_number(tmp_path):
 
 def test_two_ranks_find_the_same(start, tmp_path):
     parameters = {"step": STEP, "diverge_at": 5, "stable_step": 0.6e-6}
-    for name, ranks in (("one", 0), ("two", 2)):
-        options = {"out": tmp_path / name, "runs": RUNS, "lanes": 4, "parameters": parameters}
-        assert start(options, ranks).finish().returncode == 1
-        again = {"retry": [int(Status.FAILED_NUMERICS)], "refine": 2.0}
-        finished = start({**options, "sweep": again}, ranks).finish()
-        assert finished.returncode == 0, finished.stderr
+    options = {"out": tmp_path / "two", "runs": RUNS, "lanes": 4, "parameters": parameters}
+    for again, status in (({}, 1), (AGAIN, 0)):
+        finished = start({**options, "sweep": again}, ranks=2).finish()
+        assert finished.returncode == status, finished.stderr
+        run(
+            Job(JOB.axes, parameters), tmp_path / "one", simulator=Simulator(lanes=4), progress=False, **again
+        )
     assert numbers(tmp_path / "two")["steps"].values.tolist() == [1000] * 5 + [2000] + [1000] * 6
     assert_same_numbers(numbers(tmp_path / "two"), numbers(tmp_path / "one"))
 

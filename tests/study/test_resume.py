@@ -25,11 +25,16 @@ from support.study_processes import PATIENCE, find_mpirun, wait_until
 RUNS = 60
 
 
+def sweep_here(out, lanes=1, **parameters):
+    job = Job((Axis("load", tuple(range(RUNS))),), parameters)
+    return run(job, out, simulator=Simulator(lanes=lanes), progress=False)
+
+
 @pytest.fixture(scope="module")
 def reference(tmp_path_factory):
     """Return the dataset of an undisturbed serial sweep."""
     folder = tmp_path_factory.mktemp("reference")
-    run(Job((Axis("load", tuple(range(RUNS))),)), folder, simulator=Simulator(), progress=False)
+    sweep_here(folder)
     with open_results(folder) as dataset:
         return dataset.load()
 
@@ -92,8 +97,7 @@ def test_a_signal_breaks_off_the_run_and_is_resumed(start, tmp_path, reference, 
     assert (facts["done"], facts["remaining"], facts["stopped"]) == (25, RUNS - 25, name)
     with open_results(tmp_path / "out") as dataset:
         assert int((dataset["status"] == 0).sum()) == RUNS - 25
-    finished = start(options).finish()
-    assert finished.returncode == 0, finished.stderr
+    sweep_here(tmp_path / "out", pause=0.01)
     with open_results(tmp_path / "out") as dataset:
         assert_same_numbers(dataset, reference)
 
@@ -108,7 +112,7 @@ def test_a_batch_that_is_broken_off_leaves_no_record(start, tmp_path, reference)
     finished = sweep.finish()
     assert finished.returncode == 99, finished.stderr
     assert json.loads(finished.stdout)["done"] == 21
-    assert start({**options, "lanes": 5}).finish().returncode == 0  # in other batches
+    sweep_here(tmp_path / "out", lanes=5)  # in other batches
     assert frames_written(tmp_path / "out") == RUNS
     with open_results(tmp_path / "out") as dataset:
         assert_same_numbers(dataset, reference)
@@ -280,8 +284,7 @@ def test_ctrl_c_before_or_between_sweeps_ends_all_ranks_with_a_line(spawn, tmp_p
 
 
 def test_damage_costs_only_the_runs_it_struck(start, tmp_path, reference, caplog):
-    job = Job((Axis("load", tuple(range(RUNS))),))
-    run(job, tmp_path, simulator=Simulator(), progress=False)
+    sweep_here(tmp_path)
     (log,) = (tmp_path / "records").iterdir()
     data = bytearray(log.read_bytes())
     data[len(data) // 2] ^= 1
@@ -289,8 +292,7 @@ def test_damage_costs_only_the_runs_it_struck(start, tmp_path, reference, caplog
     (tmp_path / "records" / "core.123").write_bytes(b"foreign")
     left = np.flatnonzero(~recorded(tmp_path).recorded)
     assert len(left) == 2
-    report = run(job, tmp_path, simulator=Simulator(), progress=False)
-    assert report.done == RUNS
+    assert sweep_here(tmp_path).done == RUNS
     assert frames_written(tmp_path) == RUNS + 2
     for complaint in ("are damaged", "unfinished record", "core.123: left out: not a record log"):
         assert complaint in caplog.text

@@ -71,12 +71,13 @@ def test_a_defective_record_is_a_failed_run(tmp_path, defect, complaint):
 
 @pytest.mark.parametrize("lanes", [1, 64])  # one batch would hold all runs, and leave a rank without any
 def test_two_ranks_give_the_numbers_of_a_serial_run(start, tmp_path, lanes):
-    options = {"runs": 60, "parameters": {"pause": 0.004, "raise_at": 7, "diverge_at": 30}}
-    serial = start({"out": tmp_path / "serial", **options})
+    faults = {"raise_at": 7, "diverge_at": 30}
+    options = {"runs": 60, "parameters": {"pause": 0.004, **faults}}
     shared = start({"out": tmp_path / "shared", "lanes": lanes, **options}, ranks=2)
-    for finished in (serial.finish(), shared.finish()):
-        assert finished.returncode == 1, finished.stderr
-        assert json.loads(finished.stdout)["done"] == 58
+    serial = sweep(Job((Axis("load", tuple(range(60))),), faults), tmp_path / "serial")
+    finished = shared.finish()
+    assert (serial.exit_status, finished.returncode) == (1, 1), finished.stderr
+    assert serial.done == json.loads(finished.stdout)["done"] == 58
     assert len(list((tmp_path / "shared" / "records").iterdir())) == 2  # both ranks have computed
     with open_results(tmp_path / "serial") as one, open_results(tmp_path / "shared") as two:
         assert_same_numbers(two, one)

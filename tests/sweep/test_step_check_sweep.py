@@ -13,15 +13,15 @@ model = "elastic_belt"
 load = [120]
 [scene]
 thrust = "50 kN"
-rise_time = "8 ms"
+rise_time = "4 ms"
 [friction]
 friction_gradient = -1.0
 [mesh]
 stations = 24
 [run]
-duration = "22 ms"
+duration = "11 ms"
 [vibration]
-band_low = "500 Hz"
+band_low = "1 kHz"
 """
 EXPLICITLY = ("--check-step", "1", "--check-step-by", "explicit")
 
