@@ -2,6 +2,10 @@
 
 import numpy as np
 
+from cvt_hpc.models.pushbelt.belt import Belt, Outset, pitch_line
+from cvt_hpc.physics.friction_laws import Law
+from cvt_hpc.physics.geometry import driven_radius, variator
+
 # Assumptions, but for centre distance, belt length, elements and their mass, which are a public data set's.
 ASSUMED = {
     "ratio": 1.35,  # [1]
@@ -50,9 +54,40 @@ SPEED, THRUST = ASSUMED["driving_speed"], 20e3  # [rad/s], [N]
 
 
 def given(nodes=NODES, **changes):
-    """Values for `start`, of so many super elements."""
+    """What a belt of so many super elements starts from."""
     group = ASSUMED["elements"] / nodes
     beside = ("element_mass", "flank_stiffness", "angle_stiffness", "angle_damping")
     values = {key: ASSUMED[key] * group for key in beside}
     values["contact_stiffness"] = ASSUMED["contact_stiffness"] / group
-    return ASSUMED | values | {"elements": nodes} | changes
+    g = ASSUMED | values | {"gravity": 0.0, "elements": nodes} | changes
+    radius = driven_radius(g["ratio"], g["belt_length"], g["centre_distance"])
+    path = variator(g["ratio"], radius, g["centre_distance"])
+    line = pitch_line(path, g["centre_distance"], g["elements"], g["driving_speed"])
+    return Outset(constants(g, line.chord), line, g["ring_strain"])
+
+
+def constants(g, chord):
+    """Constants of a belt by such values, and the distance of neighbours [m]."""
+    thickness = chord - g["play"] / g["elements"]
+    modal_stiffness = np.array(g["modal_stiffness"], dtype=np.float64).reshape(2, -1)
+    modal_damping = np.zeros_like(modal_stiffness)
+    modal_damping[:, 1:3] = g["tilt_lag"] * modal_stiffness[:, 1:3]
+    found = {
+        "sine": float(np.sin(g["half_wedge_angle"])),
+        "cosine": float(np.cos(g["half_wedge_angle"])),
+        "thickness": float(thickness),
+        "pitch": float(chord),
+        "mass": float(g["element_mass"]),
+        "inertia": float(g["element_mass"] * (g["element_height"] ** 2 + thickness**2) / 12.0),
+        "ring_mass": float(g["ring_mass"] / g["elements"]),
+        "ring_time": float(g["ring_damping"] / g["ring_stiffness"]),
+        "transverse_damping": float(g["transverse_damping"] * chord),
+        "flank_law": int(Law[g["friction_law"].upper()]),
+        "flank_kinetic": float(g["kinetic_friction"]),
+        "flank_gradient": float(g["friction_gradient"]),
+        "flank_speed": float(g["stribeck_velocity"]),
+        "modal_stiffness": modal_stiffness,
+        "modal_damping": modal_damping,
+    }
+    same = {name: float(g[name]) for name in Belt._fields if name not in found}
+    return Belt(**same | found)

@@ -33,6 +33,11 @@ def job(**values):
     return build_job({"name": "spatial", "model": "spatial_pushbelt"}, "spatial", COARSE | short | values)
 
 
+def constants(parameters):
+    """Constants of the belt of a run, by their names."""
+    return b.start(parameters)[0]._asdict()
+
+
 def inputs(thrusts, loads, fields=spatial_fields.INPUTS, drift=0.0):
     """Inputs of a call: thrust and load at its start and end."""
     found = np.zeros((2, fields))

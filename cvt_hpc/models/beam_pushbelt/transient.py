@@ -4,8 +4,7 @@ A run starts from the geometry of its path. An element takes the fields of `push
 models are read off alike, and those of `fields`.
 """
 
-from collections.abc import Mapping
-from typing import Any, NamedTuple
+from typing import NamedTuple
 
 import numpy as np
 
@@ -17,8 +16,10 @@ from cvt_hpc.models.beam_pushbelt.step import advance
 from cvt_hpc.models.marched import batches_of_one
 from cvt_hpc.models.pushbelt import fields as f
 from cvt_hpc.models.pushbelt import transient as pushbelt
-from cvt_hpc.models.pushbelt.belt import Belt, belt_of, equal_chords, pitch_line
+from cvt_hpc.models.pushbelt.belt import Belt, equal_chords, outset
+from cvt_hpc.models.pushbelt.parameters import path_length
 from cvt_hpc.models.pushbelt.readings import Reading
+from cvt_hpc.parameters import Parameters
 from cvt_hpc.physics.geometry import Variator
 from cvt_hpc.solvers.cyclic_blocks import empty_columns
 from cvt_hpc.variator.history import points_at
@@ -57,9 +58,9 @@ class Workspace(NamedTuple):
 class Transient(pushbelt.Transient):
     """One run, as `pushbelt.transient.Transient` has it."""
 
-    def _begin(self, p: Mapping[str, Any]) -> None:
+    def _begin(self, p: Parameters) -> None:
         self._advance = called_alike(advance)
-        self._belt, self._state = start(pushbelt.given(as_pushbelt(p)))
+        self._belt, self._state = start(p)
         self._work = workspace(self._state.ring, p["elements"])
         self._method = LAW_TOLERANCE
 
@@ -137,24 +138,22 @@ def _coordinates(path: Variator, centre_distance: float, nodes: np.ndarray) -> n
     return q.ravel()[: 5 * len(nodes) - 2]
 
 
-def start(given: Mapping[str, Any]) -> tuple[Belt, BeltState]:
+def start(parameters: Parameters) -> tuple[Belt, BeltState]:
     """Constants and a state from which a belt can run in: a ring along the ideal path, at its speed.
 
-    Values [SI] are given as `pushbelt.belt.start` takes them; beside them `ring_beams`, their number, and
-    `ring_bending_stiffness` [N m^2]. Elements have equal chords; the ring has the strain `ring_strain`, and
-    without load it is a circle.
+    Elements have equal chords; the ring has an even strain, and without load it is a circle.
     """
-    g, pitch = given, pitch_line(given)
-    belt, path, strain = belt_of(g, pitch.chord), pitch.path, g["ring_strain"]
-    depth, beams = belt.pitch_depth, g["ring_beams"]
+    p, (belt, pitch, strain) = parameters, outset(as_pushbelt(parameters))
+    path, depth, beams = pitch.path, belt.pitch_depth, p["ring_beams"]
     radii = path.driving_radius + depth, path.driven_radius + depth
     line = Variator(*radii, path.driving_wrap, path.driven_wrap, path.strand_length)
     around = line.path_length
-    line_mass, curvature = g["ring_mass"] * (1.0 + strain) / around, 2.0 * np.pi * (1.0 + strain) / around
-    beam = rcm.RcmBeam(around / beams, line_mass, g["ring_stiffness"], g["ring_bending_stiffness"], curvature)
+    line_mass = p["ring_mass"] * path_length(p) * (1.0 + strain) / around
+    curvature = 2.0 * np.pi * (1.0 + strain) / around
+    beam = rcm.RcmBeam(around / beams, line_mass, p["ring_stiffness"], p["ring_bending_stiffness"], curvature)
     running = pitch.speed * around / path.path_length
     ring = ring_on_path(line, belt.centre_distance, beam, beams, strain, running)
-    elements = _elements(belt, ring, g["elements"], pitch.speed)
+    elements = _elements(belt, ring, p["elements"], pitch.speed)
     return belt, BeltState(ring, elements, pitch.pulleys, np.zeros(f.TOTALS), np.zeros(f.COUNTERS, np.int64))
 
 
@@ -163,7 +162,7 @@ def _elements(belt: Belt, ring: rcm.Ring, n: int, speed: float) -> np.ndarray:
     length, beams = ring.beam.length, ring.q.size // rcm.PER_BEAM
     rows = np.zeros((2, 8))
 
-    def on_ring(place: float) -> tuple[Any, np.ndarray]:
+    def on_ring(place: float) -> tuple[rcm.LinePoint, np.ndarray]:
         beam = min(int(place / length), beams - 1)
         its = slice(5 * beam, 5 * beam + 8)
         return rcm.line_point(length, ring.q[its], place - (beam + 0.5) * length, *rows), ring.u[its]

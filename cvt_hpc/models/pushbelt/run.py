@@ -16,7 +16,6 @@ from typing import Any
 import numpy as np
 
 from cvt_hpc.models.pushbelt import fields as f
-from cvt_hpc.models.pushbelt.parameters import MODES, flank_compliance, local_compliance, path_length
 from cvt_hpc.models.pushbelt.readings import PROFILES, SCALARS, OnPath, Readings
 from cvt_hpc.models.sampled import MOST_UNSOLVED, SampledRun
 from cvt_hpc.physics.geometry import driven_radius
@@ -367,31 +366,3 @@ class ElementRun(SampledRun):
         rotation = 0.5 * self._tilting_inertia() * passing * speed**2 * turning
         thrust = extremes(p, "thrust")[1]
         return OF_ROTATION * rotation + OF_THRUST * self.step * thrust * speed
-
-
-def given(parameters: Mapping[str, Any]) -> dict[str, Any]:
-    """Input of `start`: flat parameters of a run [SI], and what follows from them for each element."""
-    p, length = parameters, path_length(parameters)
-    pitch = length / p["elements"]
-    rigid = np.isinf(p["sheave_stiffness"])
-    return {
-        **p,
-        "belt_length": length,
-        "element_mass": p["element_mass"] * pitch,
-        "pitch_depth": p["ring_offset"],
-        "ring_mass": p["ring_mass"] * length,
-        "ring_strain": p["reference_tension"] / p["ring_stiffness"],
-        "flank_stiffness": pitch / flank_compliance(p),
-        "local_compliance": local_compliance(p) / pitch,
-        "local_decay": np.exp(-pitch / p["local_length"]),
-        "contact_stiffness": p["edge_stiffness"] / pitch,
-        "contact_time": p["element_damping"] / p["edge_stiffness"],
-        "angle_stiffness": p["tilt_spring"] * pitch,
-        "angle_damping": p["tilt_damper"] * pitch,
-        "driving_rate": p["sheave_rate"] if p["driving_thrust"] > 0.0 else 0.0,
-        "driven_rate": p["sheave_rate"],
-        "modal_stiffness": () if rigid else p["sheave_stiffness"] * np.array([p[key] for key in MODES]),
-        "driving_speed": p["speed_start"]
-        if ramped(p) == "speed"
-        else p["driving_speed"] * multiple(p, "driving_speed", 0.0),
-    }

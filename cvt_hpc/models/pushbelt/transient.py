@@ -25,7 +25,7 @@ from cvt_hpc.lanes import absolute, ahead, around, behind, maximum
 from cvt_hpc.models.marched import batches_of_one
 from cvt_hpc.models.pushbelt import assembly, run
 from cvt_hpc.models.pushbelt import fields as f
-from cvt_hpc.models.pushbelt.belt import NEWTON, of_lanes, start, workspace
+from cvt_hpc.models.pushbelt.belt import NEWTON, of_lanes, outset, start, workspace
 from cvt_hpc.models.pushbelt.border import (
     accept_border,
     book,
@@ -38,7 +38,7 @@ from cvt_hpc.models.pushbelt.chain import before_step, contact_shares, linear_bl
 from cvt_hpc.models.pushbelt.friction import filtered_slip
 from cvt_hpc.models.pushbelt.readings import SCALARS, Reading
 from cvt_hpc.models.pushbelt.ring_bending import set_bending
-from cvt_hpc.models.pushbelt.run import COURSES, ElementRun, given
+from cvt_hpc.models.pushbelt.run import COURSES, ElementRun
 from cvt_hpc.models.pushbelt.stepping import Equations, advance_by
 from cvt_hpc.parameters import Parameters
 from cvt_hpc.physics.contact_laws import pressed
@@ -51,7 +51,7 @@ class Transient(ElementRun):
 
     def _begin(self, p: Parameters) -> None:
         self._advance = partial(called_alike(advance_by), EQUATIONS)
-        self._belt, self._state = start(given(p))
+        self._belt, self._state = start(outset(p))
         self._work = workspace(self._belt, p["elements"])
         self._method = NEWTON._replace(
             tolerance=p["speed_tolerance"],

@@ -10,7 +10,6 @@ contacts have dampers of their own.
 """
 
 from functools import partial
-from typing import Any
 
 import numpy as np
 from numba.extending import register_jitable
@@ -34,7 +33,6 @@ from cvt_hpc.models.spatial_pushbelt.belt import NEWTON, NEWTON_OF_TWO_FLOWS, st
 from cvt_hpc.models.spatial_pushbelt.chain import chain_forces, link, predict, pull_across, saddle_forces
 from cvt_hpc.models.spatial_pushbelt.faces import face_forces, pin_forces, predict_faces, predict_pins
 from cvt_hpc.models.spatial_pushbelt.flank import book_flanks, book_pairs, book_weight
-from cvt_hpc.models.spatial_pushbelt.parameters import LOOSE_SIDES, package_arm
 from cvt_hpc.parameters import Parameters
 from cvt_hpc.variator import LARGEST_DISPLACEMENT, STRANDS
 
@@ -61,7 +59,7 @@ class Transient(ElementRun):
     def _begin(self, p: Parameters) -> None:
         flows = p["ring_flows"]
         self._advance = partial(called_alike(advance_by), EQUATIONS[flows])
-        self._belt, self._state = start(given(p))
+        self._belt, self._state = start(p)
         method = NEWTON
         if flows == 2:
             self._state, method = with_two_flows(self._belt, self._state), NEWTON_OF_TWO_FLOWS
@@ -102,21 +100,6 @@ class Transient(ElementRun):
 
     def _stored_energy(self, found: readings.Reading) -> float:
         return found.stored_energy(self._state.openings, self._state.leans)
-
-
-def given(parameters: Parameters) -> dict[str, Any]:
-    """Return what `start` takes, from flat parameters of a run [SI]."""
-    p, shared = parameters, run.given(parameters)
-    pitch = shared["belt_length"] / p["elements"]
-    return {
-        **shared,
-        "package_arm": package_arm(p),
-        "ring_bending": p["lateral_bending_stiffness"],
-        "ring_shear": p["lateral_shear_stiffness"],
-        "yaw_stiffness": p["yaw_spring"] * pitch,
-        "yaw_damping": p["yaw_damper"] * pitch,
-        "loose_sides": tuple(p[key] for key in LOOSE_SIDES),
-    }
 
 
 batch = batches_of_one(Transient)
