@@ -58,7 +58,7 @@ class Transient(ElementRun):
 
     def _begin(self, p: Parameters) -> None:
         flows = p["ring_flows"]
-        self._advance = partial(called_alike(advance_by), EQUATIONS[flows])
+        self._advance = partial(called_alike(advance_by), EQUATIONS)
         self._belt, self._state = start(p)
         method = NEWTON
         if flows == 2:
@@ -122,9 +122,15 @@ def _open_sheaves(belt, state, leans, step, shapes):
             step[j, f.FLANK_GAP + p] += lean if p >= f.RIGHT_LOW else -lean
 
 
+@register_jitable
+def _has_two_flows(elements):
+    """Whether each ring package has a flow of its own."""
+    return elements.data.shape[1] == f.WIDE_STATE_FIELDS
+
+
 @kernel
-def _place(belt, state, work, dt):
-    """Geometry and directions that all iterates of a step have in common."""
+def _prepare(belt, state, work, dt):
+    """Values that all iterates of a step have in common: geometry, directions, linear laws."""
     elements, step = state.elements, work.step
     predict(belt, elements, state.pulleys, step, dt)
     link(belt, elements, step, dt)
@@ -135,28 +141,17 @@ def _place(belt, state, work, dt):
     flank.predict_flanks(belt, elements, state.pulleys, step, dt)
     set_bending(belt, state, work, f.POSITION, f.BENDING, f.BENT_Y, dt)
     _open_sheaves(belt, elements, state.leans, step, work.shapes)
+    if _has_two_flows(elements):
+        two_flows.predict_flows(belt, elements, step, dt)
+    assembly.linear_blocks(belt, step, dt)
 
 
 @kernel
-def _prepare(belt, state, work, dt):
-    """Prepare what all iterates of a step have in common."""
-    _place(belt, state, work, dt)
-    assembly.linear_blocks(belt, work.step, dt)
-
-
-@kernel
-def _prepare_two_flows(belt, state, work, dt):
-    """Prepare what all iterates have in common with two flows."""
-    _place(belt, state, work, dt)
-    two_flows.predict_flows(belt, state.elements, work.step, dt)
-    assembly.linear_blocks(belt, work.step, dt)
-
-
-@kernel
-def _press(belt, state, work, dt):
-    """Forces of the iterate, but for the friction of the rings."""
-    elements, step, iterate = state.elements, work.step, work.iterate
+def _evaluate(belt, state, work, load, dt):
+    """Forces of the iterate, and the residuals that they leave; return the power residual [W]."""
+    elements, step, iterate, scratch = state.elements, work.step, work.iterate, work.scratch
     increments, openings, shapes = state.increments, state.openings, work.shapes
+    has_two_flows = _has_two_flows(elements)
     chain_forces(belt, elements, step, iterate, dt)
     bending_forces(belt, elements, step, iterate, dt)
     face_forces(belt, elements, step, iterate, dt)
@@ -164,63 +159,37 @@ def _press(belt, state, work, dt):
         pin_forces(belt, elements, step, iterate, dt)
     flank.bend_sheaves(belt, elements, increments, openings, shapes, step, iterate, work.bent, dt)
     flank.flank_forces(belt, elements, state.pulleys, increments, openings, shapes, step, iterate, dt)
-
-
-@kernel
-def _sum_up(belt, state, work, load, dt):
-    """The residuals that forces leave, but for those of a second flow; return the power residual [W]."""
-    elements, changes, openings = state.elements, (state.increments, work.increments), state.openings
-    step, iterate, scratch, border = work.step, work.iterate, work.scratch, work.border
-    return assembly.residuals(
-        belt, elements, changes, openings, work.shapes, load, step, iterate, scratch, border, dt
+    if has_two_flows:
+        two_flows.difference_forces(elements, step, iterate)
+        two_flows.saddle_forces_of_two(belt, elements, step, iterate)
+    else:
+        saddle_forces(belt, elements, step, iterate)
+    changes = increments, work.increments
+    power = assembly.residuals(
+        belt, elements, changes, openings, shapes, load, step, iterate, scratch, work.border, dt
     )
-
-
-@kernel
-def _evaluate(belt, state, work, load, dt):
-    """Forces of the iterate, and the residuals that they leave; return the power residual [W]."""
-    _press(belt, state, work, dt)
-    saddle_forces(belt, state.elements, work.step, work.iterate)
-    return _sum_up(belt, state, work, load, dt)
-
-
-@kernel
-def _evaluate_two_flows(belt, state, work, load, dt):
-    """Forces and residuals of the iterate with two flows; return the power residual [W]."""
-    elements, step, iterate = state.elements, work.step, work.iterate
-    _press(belt, state, work, dt)
-    two_flows.difference_forces(elements, step, iterate)
-    two_flows.saddle_forces_of_two(belt, elements, step, iterate)
-    power = _sum_up(belt, state, work, load, dt)
-    return power + two_flows.half_residuals(belt, elements, step, iterate, work.scratch, dt)
+    if has_two_flows:
+        power += two_flows.half_residuals(belt, elements, step, iterate, scratch, dt)
+    return power
 
 
 @kernel
 def _assemble(belt, state, work, dt):
-    """The linear system of the elements, of the unknowns of one flow."""
-    assembly.assemble_pairs(belt, state.elements, work.step, work.iterate, work.narrow)
-    flank.add_flank_blocks(belt, state.elements, work.shapes, work.step, work.iterate, work.narrow, dt)
-
-
-@kernel
-def _assemble_two_flows(belt, state, work, dt):
-    """The linear system of the elements with two flows."""
-    _assemble(belt, state, work, dt)
-    two_flows.widen(belt, work.step, work.iterate, work.narrow, work.blocks, dt)
+    """The linear system of the elements."""
+    elements, step, iterate, narrow = state.elements, work.step, work.iterate, work.narrow
+    assembly.assemble_pairs(belt, elements, step, iterate, narrow)
+    flank.add_flank_blocks(belt, elements, work.shapes, step, iterate, narrow, dt)
+    if _has_two_flows(elements):
+        two_flows.widen(belt, step, iterate, narrow, work.blocks, dt)
 
 
 @kernel
 def _close(belt, state, work, dt):
     """Close the system of the border."""
+    if _has_two_flows(state.elements):
+        two_flows.narrow_solutions(work.blocks, work.narrow)
     assembly.border_sums(belt, state.elements, work.shapes, work.iterate, work.narrow, work.sums)
     close_border(belt, work.sums, work.border, dt)
-
-
-@kernel
-def _close_two_flows(belt, state, work, dt):
-    """Close the system of the border with two flows."""
-    two_flows.narrow_solutions(work.blocks, work.narrow)
-    _close(belt, state, work, dt)
 
 
 @register_jitable
@@ -318,6 +287,9 @@ def _add_loads(belt, state, work):
 def _accept(belt, state, work, inputs, dt):
     """Take the state to the end of the step, and add up what it has done."""
     totals, pulleys, loads = state.totals, state.pulleys, state.loads
+    if _has_two_flows(state.elements):
+        two_flows.book_difference(belt, state, work, dt)
+        two_flows.accept_difference(belt, state, work, dt)
     book_pairs(belt, state, work, dt)
     if belt.gravity != 0.0:
         book_weight(belt, state, work, dt)
@@ -354,25 +326,5 @@ def _accept(belt, state, work, inputs, dt):
         totals[planar.THRUST_WORK] += (right - left) * drift - 2.0 * tangent * pressed * closing
 
 
-@kernel
-def _accept_two_flows(belt, state, work, inputs, dt):
-    """Take the state to the end of the step with two flows."""
-    two_flows.book_difference(belt, state, work, dt)
-    two_flows.accept_difference(belt, state, work, dt)
-    _accept(belt, state, work, inputs, dt)
-
-
-# By how many flows of ring material there are
-EQUATIONS = {
-    1: Equations(_prepare, _evaluate, _assemble, _close, _accept, _changes, f.CHANGE),
-    2: Equations(
-        _prepare_two_flows,
-        _evaluate_two_flows,
-        _assemble_two_flows,
-        _close_two_flows,
-        _accept_two_flows,
-        _changes,
-        f.CHANGE,
-    ),
-}
-advance = partial(advance_by, EQUATIONS[1])
+EQUATIONS = Equations(_prepare, _evaluate, _assemble, _close, _accept, _changes, f.CHANGE)
+advance = partial(advance_by, EQUATIONS)
