@@ -1,9 +1,10 @@
 """Forces of an iterate, their residual, and the linear system of Newton's method, in lanes."""
 
+import numpy as np
 from numba.extending import register_jitable
 
 from cvt_hpc.kernels import kernel
-from cvt_hpc.lanes import ahead, behind, like
+from cvt_hpc.lanes import ahead, behind, like, maximum
 from cvt_hpc.models.pushbelt import fields as f
 from cvt_hpc.models.pushbelt.border import border_residuals, of_pulley
 from cvt_hpc.models.pushbelt.chain import BETA, angle_slope, contact_shares
@@ -20,8 +21,11 @@ RIGHT_OPENINGS = RIGHT_SPEED + f.UNKNOWNS
 
 @kernel
 def pair_forces(belt, state, step, iterate, dt):
-    """Tension, contact forces and moments of angles between neighbours, with the slopes of contacts."""
-    steep = angle_slope(belt, dt)
+    """Tension, forces of contacts and noses, moments of angles between neighbours, with slopes of contacts.
+
+    Forces of noses take offsets back and are signed as these.
+    """
+    steep, clearance = angle_slope(belt, dt), belt.nose_clearance
     stiffness = belt.contact_stiffness
     ahead_share, _, _ = contact_shares(belt, dt)
     pressing = ahead_share * dt
@@ -57,6 +61,14 @@ def pair_forces(belt, state, step, iterate, dt):
         iterate[j, f.STIFF_I], iterate[j, f.STIFF_J] = k * a + m * c, k * b + m * d
         iterate[j, f.STIFF_II], iterate[j, f.STIFF_JJ] = k * a * a + m * c * c, k * b * b + m * d * d
         iterate[j, f.STIFF_IJ] = k * a * b + m * c * d
+
+        if clearance < np.inf:
+            rate = x_z * (iy - jy) - x_y * (iz - jz) + step[j, f.NOSE_LEVER_I] * iw
+            offset = step[j, f.NOSE_OFFSET] + pressing * (rate + step[j, f.NOSE_LEVER_J] * jw)
+            above, k = pressed(clearance - offset, belt.nose_stiffness)
+            below, m = pressed(clearance + offset, belt.nose_stiffness)
+            state[j, f.NOSE], iterate[j, f.NOSE_SLOPE] = above - below, pressing * maximum(k, m)
+            iterate[j, f.NOSE_REACHED] = offset
 
 
 @kernel
@@ -292,6 +304,39 @@ def assemble(belt, state, shapes, step, iterate, blocks):
             one, other = (1.0 - driven) * shapes[j, m], driven * shapes[j, m]
             _store_opening(blocks, j, RIGHT_OPENINGS + f.UNKNOWNS * m, one, (f_y, f_z, f_w))
             _store_opening(blocks, j, RIGHT_OPENINGS + f.UNKNOWNS * (modes + m), other, (f_y, f_z, f_w))
+
+
+@kernel
+def add_noses(state, step, iterate, blocks):
+    """Add the slopes of noses to the blocks of both elements, as `assemble` has left them."""
+    for j in range(step.rows):
+        o_y, o_z = ahead(state, j, f.HEADING_Z), -ahead(state, j, f.HEADING_Y)
+        k, a, b = iterate[j, f.NOSE_SLOPE], step[j, f.NOSE_LEVER_I], step[j, f.NOSE_LEVER_J]
+        yy, yz, zz = k * o_y * o_y, k * o_y * o_z, k * o_z * o_z
+        yw, zw, ww = k * o_y * a, k * o_z * a, k * a * a
+        blocks[j, f.LINKED + f.YY] -= yy
+        blocks[j, f.LINKED + f.ZY] -= yz
+        blocks[j, f.LINKED + f.WY] -= yw
+        blocks[j, f.LINKED + f.YZ] -= yz
+        blocks[j, f.LINKED + f.ZZ] -= zz
+        blocks[j, f.LINKED + f.WZ] -= zw
+        blocks[j, f.LINKED + f.YW] += k * o_y * b
+        blocks[j, f.LINKED + f.ZW] += k * o_z * b
+        blocks[j, f.LINKED + f.WW] += k * a * b
+
+        o_y, o_z = state[j, f.HEADING_Z], -state[j, f.HEADING_Y]
+        k, b = behind(iterate, j, f.NOSE_SLOPE), behind(step, j, f.NOSE_LEVER_J)
+        yy, yz, zz = yy + k * o_y * o_y, yz + k * o_y * o_z, zz + k * o_z * o_z
+        yw, zw, ww = yw - k * o_y * b, zw - k * o_z * b, ww + k * b * b
+        blocks[j, f.YY] += yy
+        blocks[j, f.ZY] += yz
+        blocks[j, f.WY] += yw
+        blocks[j, f.YZ] += yz
+        blocks[j, f.ZZ] += zz
+        blocks[j, f.WZ] += zw
+        blocks[j, f.YW] += yw
+        blocks[j, f.ZW] += zw
+        blocks[j, f.WW] += ww
 
 
 @register_jitable

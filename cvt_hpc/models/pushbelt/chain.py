@@ -8,6 +8,14 @@ there on they are linear in the change of the speeds X.
 Slip speeds at the flanks take the radial direction and the lever of the contact point at mid step, and speeds
 across the path that direction. At either end of a step the direction would add v phi' dt / 2 of false radial
 motion, and the lever d omega^2 dt / 2.
+
+The nose of each element in the hole of the next one, in lanes: it holds neighbours side by side.
+
+The nose's tip P lies at the front of element i, the hole's centre Q at the rear of element j, both
+`nose_height` above the saddle. Their offset across the next element, (P - Q).o_j, is free up to the clearance
+to either side; beyond, the hole pushes back elastically and without friction.
+
+An offset grows by the speeds times (o_j, a, 0) of element i and (-o_j, b, 0) of j, a and b being levers.
 """
 
 import numpy as np
@@ -63,7 +71,7 @@ def turned(x_y, x_z, angle):
 
 
 @register_jitable
-def before_step(r, x, speeds, dt):
+def _before_step(r, x, speeds, dt):
     """Position and running direction at q_{k-1}, from those at q_k and the old speeds."""
     u_y, u_z, omega = speeds
     return (r[0] - dt * u_y, r[1] - dt * u_z), turned(x[0], x[1], -dt * omega)
@@ -99,6 +107,14 @@ def radial(r, x, centre, pitch_depth):
     r_lever = -pitch_depth * (x[0] * y + x[1] * z)
     t_lever = -pitch_depth * (x[1] * y - x[0] * z)
     return y, z, radius, r_lever, t_lever
+
+
+@register_jitable
+def _nose_offset(ri, xi, rj, xj, thickness, height):
+    """(P - Q) of a nose's tip and the hole's centre, along o_j and x_j [m]."""
+    d_y = ri[0] - rj[0] + 0.5 * thickness * (xi[0] + xj[0]) + height * (xi[1] - xj[1])
+    d_z = ri[1] - rj[1] + 0.5 * thickness * (xi[1] + xj[1]) - height * (xi[0] - xj[0])
+    return d_y * xj[1] - d_z * xj[0], d_y * xj[0] + d_z * xj[1]
 
 
 @kernel
@@ -148,8 +164,8 @@ def angle_slope(belt, dt):
 
 @kernel
 def link(belt, state, step, dt):
-    """Data of pairs of neighbours for a step: tension, contacts, angles."""
-    stiffness = 0.5 * belt.angle_stiffness
+    """Data of pairs of neighbours for a step: tension, contacts, angles, noses."""
+    stiffness, has_noses = 0.5 * belt.angle_stiffness, belt.nose_clearance < np.inf
     ahead_share, share, behind_share = contact_shares(belt, dt)
     for j in range(state.rows):
         ri, rj = (state[j, f.Y], state[j, f.Z]), (ahead(state, j, f.Y), ahead(state, j, f.Z))
@@ -192,9 +208,9 @@ def link(belt, state, step, dt):
         step[j, f.START_MOMENT_J] = stiffness * (e_y * xj[1] - e_z * xj[0]) + damping * rate_j
 
         edge, head = -belt.pitch_depth, belt.head_height
-        bi, yi = before_step(ri, xi, (state[j, f.U_Y], state[j, f.U_Z], state[j, f.OMEGA]), dt)
+        bi, yi = _before_step(ri, xi, (state[j, f.U_Y], state[j, f.U_Z], state[j, f.OMEGA]), dt)
         speeds = ahead(state, j, f.U_Y), ahead(state, j, f.U_Z), ahead(state, j, f.OMEGA)
-        bj, yj = before_step(rj, xj, speeds, dt)
+        bj, yj = _before_step(rj, xj, speeds, dt)
         for height, gap, mean in ((edge, f.EDGE_GAP, f.EDGE_MEAN), (head, f.HEAD_GAP, f.HEAD_MEAN)):
             reached = contact_gap(si, zi, sj, zj, belt.thickness, height)
             now = contact_gap(ri, xi, rj, xj, belt.thickness, height)
@@ -205,6 +221,17 @@ def link(belt, state, step, dt):
         step[j, f.EDGE_LEVER_I], step[j, f.EDGE_LEVER_J] = lever_i, lever_j
         lever_i, lever_j = contact_levers(ri, xi, rj, xj, belt.thickness, head)
         step[j, f.HEAD_LEVER_I], step[j, f.HEAD_LEVER_J] = lever_i, lever_j
+
+        if has_noses:
+            height = belt.nose_height
+            now, along = _nose_offset(ri, xi, rj, xj, belt.thickness, height)
+            cosine, sine = xi[0] * xj[0] + xi[1] * xj[1], xi[0] * xj[1] - xi[1] * xj[0]
+            step[j, f.NOSE_LEVER_I] = height * sine - 0.5 * belt.thickness * cosine
+            step[j, f.NOSE_LEVER_J] = along - 0.5 * belt.thickness
+            reached, _ = _nose_offset(si, zi, sj, zj, belt.thickness, height)
+            before, _ = _nose_offset(bi, yi, bj, yj, belt.thickness, height)
+            step[j, f.NOSE_OFFSET] = ahead_share * reached + share * now + behind_share * before
+            step[j, f.NOSE_MEAN] = 0.5 * (reached + now)
 
 
 @kernel

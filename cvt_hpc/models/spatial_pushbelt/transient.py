@@ -31,7 +31,7 @@ from cvt_hpc.models.spatial_pushbelt import vectors as vec
 from cvt_hpc.models.spatial_pushbelt.assembly import bending_forces, predict_bending
 from cvt_hpc.models.spatial_pushbelt.belt import NEWTON, NEWTON_OF_TWO_FLOWS, start, with_two_flows, workspace
 from cvt_hpc.models.spatial_pushbelt.chain import chain_forces, link, predict, pull_across, saddle_forces
-from cvt_hpc.models.spatial_pushbelt.faces import face_forces, pin_forces, predict_faces, predict_pins
+from cvt_hpc.models.spatial_pushbelt.faces import face_forces, predict_faces
 from cvt_hpc.models.spatial_pushbelt.flank import book_flanks, book_pairs, book_weight
 from cvt_hpc.parameters import Parameters
 from cvt_hpc.variator import LARGEST_DISPLACEMENT, STRANDS
@@ -136,8 +136,6 @@ def _prepare(belt, state, work, dt):
     link(belt, elements, step, dt)
     predict_bending(belt, elements, step)
     predict_faces(belt, elements, step, dt)
-    if belt.pin_clearance < np.inf:
-        predict_pins(belt, elements, step, dt)
     flank.predict_flanks(belt, elements, state.pulleys, step, dt)
     set_bending(belt, state, work, f.POSITION, f.BENDING, f.BENT_Y, dt)
     _open_sheaves(belt, elements, state.leans, step, work.shapes)
@@ -155,8 +153,6 @@ def _evaluate(belt, state, work, load, dt):
     chain_forces(belt, elements, step, iterate, dt)
     bending_forces(belt, elements, step, iterate, dt)
     face_forces(belt, elements, step, iterate, dt)
-    if belt.pin_clearance < np.inf:
-        pin_forces(belt, elements, step, iterate, dt)
     flank.bend_sheaves(belt, elements, increments, openings, shapes, step, iterate, work.bent, dt)
     flank.flank_forces(belt, elements, state.pulleys, increments, openings, shapes, step, iterate, dt)
     if has_two_flows:
