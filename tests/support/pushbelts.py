@@ -1,8 +1,10 @@
-"""A common pushbelt, as the `start` of its model takes it."""
+"""A common pushbelt by values of its elements, and its start."""
+
+from types import SimpleNamespace
 
 import numpy as np
 
-from cvt_hpc.models.pushbelt.belt import Belt, Outset, pitch_line
+from cvt_hpc.models.pushbelt import belt
 from cvt_hpc.physics.friction_laws import Law
 from cvt_hpc.physics.geometry import driven_radius, variator
 
@@ -49,21 +51,29 @@ ASSUMED = {
     "tilt_lag": 0.0,  # [s]
     "driving_speed": 100.0 * np.pi,  # [rad/s]
 }
+runs = SimpleNamespace(given=dict)  # values of a run for `start`: its flat parameters
 NODES = 104  # of 8 lanes; polygon effects in the power balance are below half a percent
 SPEED, THRUST = ASSUMED["driving_speed"], 20e3  # [rad/s], [N]
 
 
 def given(nodes=NODES, **changes):
-    """What a belt of so many super elements starts from."""
+    """Values for `start`, of so many super elements."""
     group = ASSUMED["elements"] / nodes
     beside = ("element_mass", "flank_stiffness", "angle_stiffness", "angle_damping")
     values = {key: ASSUMED[key] * group for key in beside}
     values["contact_stiffness"] = ASSUMED["contact_stiffness"] / group
-    g = ASSUMED | values | {"gravity": 0.0, "elements": nodes} | changes
+    return ASSUMED | values | {"gravity": 0.0, "elements": nodes} | changes
+
+
+def start(values):
+    """Constants and state of a belt by values of `given`, or by a run's parameters."""
+    if "thrust" in values:
+        return belt.start(belt.outset(values))
+    g = values
     radius = driven_radius(g["ratio"], g["belt_length"], g["centre_distance"])
     path = variator(g["ratio"], radius, g["centre_distance"])
-    line = pitch_line(path, g["centre_distance"], g["elements"], g["driving_speed"])
-    return Outset(constants(g, line.chord), line, g["ring_strain"])
+    line = belt.pitch_line(path, g["centre_distance"], g["elements"], g["driving_speed"])
+    return belt.start(belt.Outset(constants(g, line.chord), line, g["ring_strain"]))
 
 
 def constants(g, chord):
@@ -89,5 +99,5 @@ def constants(g, chord):
         "modal_stiffness": modal_stiffness,
         "modal_damping": modal_damping,
     }
-    same = {name: float(g[name]) for name in Belt._fields if name not in found}
-    return Belt(**same | found)
+    same = {name: float(g[name]) for name in belt.Belt._fields if name not in found}
+    return belt.Belt(**same | found)

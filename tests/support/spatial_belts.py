@@ -6,12 +6,12 @@ import numpy as np
 
 from cvt_hpc.job import build_job
 from cvt_hpc.models.pushbelt import fields as pushbelt_fields
-from cvt_hpc.models.pushbelt.belt import in_lanes, of_lanes, start
+from cvt_hpc.models.pushbelt.belt import in_lanes, of_lanes
 from cvt_hpc.models.spatial_pushbelt import belt as b
 from cvt_hpc.models.spatial_pushbelt import fields as spatial_fields
 from cvt_hpc.models.spatial_pushbelt.transient import advance
 from support import spatial_chains as chains
-from support.pushbelts import SPEED, THRUST, given
+from support.pushbelts import SPEED, THRUST, given, start
 
 NODES, STEP, TORQUE = 104, 1e-5, 60.0
 LOAD = 1.35 * TORQUE
