@@ -1,6 +1,5 @@
 """The record of a run: that of a run of `pushbelt`, by the same judge."""
 
-from collections.abc import Mapping
 from dataclasses import replace
 from typing import Any
 
@@ -8,6 +7,7 @@ import numpy as np
 
 from cvt_hpc.models.pushbelt import record as pushbelt
 from cvt_hpc.models.pushbelt.record import coordinates, histories, judge
+from cvt_hpc.parameters import Parameters
 
 # Measured on one core of an EPYC (Zen 5): core-seconds per beam, element and pair of elements that rub, and
 # step, and per sample
@@ -23,7 +23,7 @@ _OTHERWISE = {
 VARIABLES = tuple(replace(v, comment=_OTHERWISE.get(v.name, v.comment)) for v in pushbelt.VARIABLES)
 
 
-def cost(parameters: Mapping[str, Any], stepper: str) -> Any:
+def cost(parameters: Parameters, stepper: str) -> Any:
     """Core-seconds of a run; of parameters that are arrays, an array."""
     p, n = parameters, parameters["elements"]
     rubs = (np.asarray(p["kinetic_friction"]) > 0.0) | (np.asarray(p["ring_friction"]) > 0.0)

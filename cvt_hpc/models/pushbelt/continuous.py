@@ -27,13 +27,14 @@ being an element's thickness: (k_a + P) theta = -d (f_t - P_s) - P kappa t / 2 i
 continuum has k_a theta = -d (f_t - P_s).
 """
 
-from collections.abc import Callable, Mapping
+from collections.abc import Callable
 from functools import partial
 from typing import Any, NamedTuple
 
 import numpy as np
 
 from cvt_hpc.models.elastic_belt.pulley_settings import PULLEY_DEFAULTS
+from cvt_hpc.parameters import Parameters
 from cvt_hpc.physics.sheaves import axial_element_stiffness
 from cvt_hpc.variator.scene import TILT
 
@@ -56,19 +57,19 @@ class Follows(NamedTuple):
     """Rule by which a parameter of the pushbelt follows."""
 
     needs: tuple[str, ...]  # keys of the continuous belt that decide it
-    value: Callable[[Mapping[str, Any]], Any]  # flat parameters of the continuous belt [SI] -> the value [SI]
+    value: Callable[[Parameters], Any]  # flat parameters of the continuous belt [SI] -> the value [SI]
 
 
-def _flank_stiffness(p: Mapping[str, Any]) -> float:
+def _flank_stiffness(p: Parameters) -> float:
     return float(2.0 * axial_element_stiffness(p) / np.cos(p["half_wedge_angle"]) ** 2)
 
 
-def _modes(p: Mapping[str, Any], radius: float) -> tuple[float, float, float]:
+def _modes(p: Parameters, radius: float) -> tuple[float, float, float]:
     tilt = min(2.0 * p["tilt_stiffness"] * p["tilt_factor"] / radius**2, RIGID)
     return RIGID, tilt, tilt
 
 
-def _tilt(key: str, p: Mapping[str, Any]) -> float:
+def _tilt(key: str, p: Parameters) -> float:
     return float(p[key] if np.isfinite(p["tilt_spring"]) else TILT[key].default)
 
 

@@ -61,7 +61,7 @@ PARAMETERS: dict[str, dict[str, Parameter]] = {
             0.0,
             "N",
             "axial force on the driving pulley; 0: its sheave stays where the ratio puts it",
-            sensible=(500.0, 2000000.0),
+            sensible=(500.0, 2e6),
         ),
         "kick": not_negative(
             0.0,
@@ -96,12 +96,10 @@ PARAMETERS: dict[str, dict[str, Parameter]] = {
         "play": not_negative(
             0.3e-3, "m", "sum of the gaps between elements on the path", sensible=(1e-07, 0.05)
         ),
-        "thickness": Parameter(
+        "thickness": positive(
             None,
             "m",
             "thickness of an element, in the place of play, which follows",
-            minimum=0.0,
-            exclusive=True,
             gives=Substitute("play", ("elements", "ratio", "driven_radius", "centre_distance"), _play),
             sensible=(1e-4, 0.02),
         ),
@@ -115,7 +113,7 @@ PARAMETERS: dict[str, dict[str, Parameter]] = {
             20.0,
             "N s",
             "damping of these contacts, force by rate of approach over the pitch",
-            sensible=(0.001, 100000.0),
+            sensible=(1e-3, 1e5),
         ),
         "ring_offset": positive(
             1.5e-3,
@@ -129,13 +127,11 @@ PARAMETERS: dict[str, dict[str, Parameter]] = {
             "height above the rings of the second contact between neighbours",
             sensible=(1e-05, 0.05),
         ),
-        "nose_clearance": replace(
-            not_negative(
-                np.inf,
-                "m",
-                "play of an element's nose in the next one's hole, up and down; inf: no noses",
-                sensible=(1e-6, np.inf),
-            ),
+        "nose_clearance": not_negative(
+            np.inf,
+            "m",
+            "play of an element's nose in the next one's hole, up and down; inf: no noses",
+            sensible=(1e-6, np.inf),
             allow_infinite=True,
         ),
         "nose_height": positive(6e-3, "m", "height of nose and hole above the rings", sensible=(1e-5, 0.05)),
@@ -143,9 +139,7 @@ PARAMETERS: dict[str, dict[str, Parameter]] = {
             1e8, "N/m", "force of a nose over the offset beyond its play", sensible=(1e4, 1e11)
         ),
         "ring_mass": positive(0.2495, "kg/m", "mass per length of the rings", sensible=(0.01, 10.0)),
-        "ring_stiffness": positive(
-            6e6, "N", "longitudinal stiffness EA of all rings", sensible=(10000.0, 10000000000.0)
-        ),
+        "ring_stiffness": positive(6e6, "N", "longitudinal stiffness EA of all rings", sensible=(1e4, 1e10)),
         **{key: replace(entry, default=RINGS.get(key, entry.default)) for key, entry in scene.RINGS.items()},
         "ring_friction": not_negative(0.06, "", "friction coefficient between rings and elements"),
         "ring_friction_speed": positive(
@@ -155,12 +149,10 @@ PARAMETERS: dict[str, dict[str, Parameter]] = {
         **scene.TILT,
     },
     "sheaves": {
-        "sheave_stiffness": replace(
-            positive(
-                1.0,
-                "",
-                "stiffness of the sheaves: factor on all modes of opening and on local_stiffness; inf: rigid",
-            ),
+        "sheave_stiffness": positive(
+            1.0,
+            "",
+            "stiffness of the sheaves: factor on all modes of opening and on local_stiffness; inf: rigid",
             allow_infinite=True,
         ),
         **{
@@ -176,15 +168,13 @@ PARAMETERS: dict[str, dict[str, Parameter]] = {
             3.27e10,
             "N/m^2",
             "stiffness of an element at each flank, along its normal, per length",
-            sensible=(1000000.0, 100000000000000.0),
+            sensible=(1e6, 1e14),
         ),
-        "local_stiffness": replace(
-            positive(
-                np.inf,
-                "N/m^2",
-                "stiffness of both sheaves against local bending, per length; inf: none",
-                sensible=(1e5, np.inf),
-            ),
+        "local_stiffness": positive(
+            np.inf,
+            "N/m^2",
+            "stiffness of both sheaves against local bending, per length; inf: none",
+            sensible=(1e5, np.inf),
             allow_infinite=True,
         ),
         "local_length": positive(0.013, "m", "decay length of local bending", sensible=(0.0001, 0.3)),
@@ -192,13 +182,11 @@ PARAMETERS: dict[str, dict[str, Parameter]] = {
         "inner_radius": not_negative(
             0.0, "m", "pitch radius at the inner end of the sheaves of both pulleys", sensible=(1e-3, 0.5)
         ),
-        "outer_radius": replace(
-            positive(
-                np.inf,
-                "m",
-                "pitch radius at the outer end of the sheaves of both pulleys",
-                sensible=(1e-3, np.inf),
-            ),
+        "outer_radius": positive(
+            np.inf,
+            "m",
+            "pitch radius at the outer end of the sheaves of both pulleys",
+            sensible=(1e-3, np.inf),
             allow_infinite=True,
         ),
         "sheave_rate": positive(
@@ -223,11 +211,7 @@ PARAMETERS: dict[str, dict[str, Parameter]] = {
     },
     "record": {
         "profile_places": Parameter(
-            220,
-            "",
-            "places along the path at which histories have forces and sliding",
-            minimum=20,
-            maximum=2000,
+            220, "", "places along the path at which histories have forces and sliding", 20, 2000
         ),
     },
 }

@@ -9,6 +9,7 @@ from typing import TYPE_CHECKING, Any
 import numpy as np
 
 from cvt_hpc.models.pushbelt import fields as f
+from cvt_hpc.parameters import Parameters
 from cvt_hpc.variables import Coordinate, Variable
 from cvt_hpc.variator import PULLEYS, STRANDS, judging
 from cvt_hpc.variator.history import REGIONS, dataset, regions
@@ -40,13 +41,14 @@ def slip_loss(measured: Measured) -> float:
     return float(np.mean(1.0 - driven / driving))
 
 
-def share_left(powers: Mapping[str, Any]) -> float:
+def _share_left(measured: Measured) -> float:
     """Share of the driving power that is not lost [1]; not a number where the load drives."""
+    powers = measured.powers
     left = powers["load_power"] + powers["thrust_power"] + powers["storing_power"]
     return left / powers["driving_power"] if powers["driving_power"] > 0.0 else np.nan
 
 
-def idle_arcs(measured: Measured) -> np.ndarray:
+def _idle_arcs(measured: Measured) -> np.ndarray:
     """Share of each arc without push force [1], (2,); as well where no element has been."""
     push, where = measured.profiles["push_force"], regions(measured.path, measured.places)
     idle = ~(push > IDLE * np.nanmax(push))
@@ -90,7 +92,7 @@ VARIABLES = (
         "efficiency",
         "1",
         "what is left of driving_power for load, thrust and storing",
-        of=lambda m: share_left(m.powers),
+        of=_share_left,
     ),
     Variable(
         "largest_push_force",
@@ -104,7 +106,7 @@ VARIABLES = (
         "without push force: its mean is below 2 % of the largest along the path",
         dims=("pulley",),
         words="idle share of the arc",
-        of=idle_arcs,
+        of=_idle_arcs,
     ),
     Variable(
         "passing_frequency",
@@ -117,7 +119,7 @@ VARIABLES = (
 )
 
 
-def coordinates(parameters: Mapping[str, Any]) -> dict[str, Coordinate]:
+def coordinates(parameters: Parameters) -> dict[str, Coordinate]:
     """Coordinates of the record's dimensions, by flat parameters of the job."""
     return {
         **COORDINATES,
@@ -127,7 +129,7 @@ def coordinates(parameters: Mapping[str, Any]) -> dict[str, Coordinate]:
     }
 
 
-def cost(parameters: Mapping[str, Any], stepper: str) -> Any:
+def cost(parameters: Parameters, stepper: str) -> Any:
     """Core-seconds of a run; of parameters that are arrays, an array."""
     p = parameters
     each = np.where(np.isinf(p["sheave_stiffness"]), RIGID_COST, ELASTIC_COST)[()]

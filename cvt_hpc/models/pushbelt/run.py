@@ -18,6 +18,7 @@ import numpy as np
 from cvt_hpc.models.pushbelt import fields as f
 from cvt_hpc.models.pushbelt.readings import PROFILES, SCALARS, OnPath, Readings
 from cvt_hpc.models.sampled import MOST_UNSOLVED, SampledRun
+from cvt_hpc.parameters import Parameters
 from cvt_hpc.physics.geometry import driven_radius
 from cvt_hpc.variables import Status
 from cvt_hpc.variator import LEAST_SPEED, MOST_SPEED, PULLEYS, STRANDS
@@ -54,14 +55,14 @@ class StartUps:
         self._kept.clear()
 
 
-def fingerprint(*values: Any) -> str:
+def fingerprint(*values: object) -> str:
     """Return a key of values that differs where any of them does, by a bit of a number or by its type.
 
     Values are numbers, texts, arrays, and sequences, mappings and objects of such.
     """
     digest = sha256()
 
-    def take(value: Any) -> None:
+    def take(value: object) -> None:
         if isinstance(value, int | float | str | np.generic | np.ndarray):
             array = np.asarray(value)
             digest.update(f"{array.dtype.str}{array.shape}".encode() + array.tobytes())
@@ -101,6 +102,13 @@ class ElementRun(SampledRun):
 
     It begins at the end of its start-up where another run of this process has marched the same one. Resolved
     parameters [SI] include those of the stepper.
+
+    Attributes
+    ----------
+    path : Variator
+        The reference path.
+    places : (place,) array
+        Path coordinates of the profiles [m].
     """
 
     _contacts: tuple[str, ...] = f.CONTACTS  # by number, as the counters have them
@@ -115,11 +123,12 @@ class ElementRun(SampledRun):
     _work: Any
     _advance: Callable[..., int]
 
-    def __init__(self, parameters: Mapping[str, Any], stepper: str) -> None:
+    def __init__(self, parameters: Parameters, stepper: str) -> None:
         p = parameters
         super().__init__(p)
         self._begin(p)
         self._readings = Readings(p, self._belt)
+        self.path, self.places = self._readings.path, self._readings.places
         sums = len(self._profiles) + 1, self._readings.places.size
         probes = np.tile(self._readings.probes, (len(self._directions) // len(STRANDS), 1))
         self._record(self._channels, self._directions, probes, f.TOTALS + 1, sums)
@@ -129,7 +138,7 @@ class ElementRun(SampledRun):
         self._start_up_key = self._key_of_start_up()
         self._go_on_from(_start_ups.find(self._start_up_key))
 
-    def _begin(self, p: Mapping[str, Any]) -> None:
+    def _begin(self, p: Parameters) -> None:
         """Set how steps are solved, constants, state and work space."""
         raise NotImplementedError
 
@@ -292,10 +301,8 @@ class ElementRun(SampledRun):
         radii = self._state.pulleys[[f.DRIVING_RADIUS, f.DRIVEN_RADIUS]]
         for pulley, radius in zip(PULLEYS, radii, strict=True):
             if not least <= radius <= most:
-                reach = f"{least:g} to {most:g} m"
-                return (
-                    f"the {pulley} sheave has run to its stop: a pitch radius of {radius:.5g} m, of {reach}"
-                )
+                at, reach = f"a pitch radius of {radius:.5g} m", f"{least:g} to {most:g} m"
+                return f"the {pulley} sheave has run to its stop: {at}, of {reach}"
         return None
 
     @property
@@ -308,14 +315,14 @@ class ElementRun(SampledRun):
         part, time = self._totals[self.judged], f.TIME
         return float((part[-1, total] - part[0, total]) / (part[-1, time] - part[0, time]))
 
-    def powers(self) -> dict[str, Any]:
+    def powers(self) -> dict[str, float | np.ndarray]:
         """Mean powers over the judged part, named as in the record [W]."""
         found = {name: self.mean_rate(f.WORK_IN + k) for k, name in enumerate(f.POWERS)}
         loss = found["flank_loss"] + found["ring_loss"] + found["belt_loss"]
         loss += found["tilt_loss"] + found["element_loss"] + found["stretch_loss"] + found["lag_loss"]
         damped = np.array([self.mean_rate(total) for total in f.DAMPED.values()])
         storing = self.mean_rate(f.TOTALS) - self.mean_rate(f.GRAVITY_WORK)
-        return found | {"loss": loss, "storing_power": storing, "numerical_damping": damped}
+        return {**found, "loss": loss, "storing_power": storing, "numerical_damping": damped}
 
     @property
     def profiles(self) -> dict[str, np.ndarray]:
@@ -323,16 +330,6 @@ class ElementRun(SampledRun):
         with np.errstate(invalid="ignore", divide="ignore"):
             means = self._sums[:-1] / self._sums[-1]
         return dict(zip(self._profiles, means, strict=True))
-
-    @property
-    def path(self) -> Any:
-        """The reference path."""
-        return self._readings.path
-
-    @property
-    def places(self) -> np.ndarray:
-        """Path coordinates of the profiles, (place,) [m]."""
-        return self._readings.places
 
     def numerical_doubt(self, record: dict[str, Any]) -> tuple[Status, str] | None:
         """Reason why a run that reached its end is not to be trusted, by its values; None where it is.

@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from collections.abc import Mapping, Sequence
+from collections.abc import Sequence
 from dataclasses import replace
 from functools import partial
 from typing import TYPE_CHECKING, Any
@@ -11,6 +11,7 @@ import numpy as np
 
 from cvt_hpc.models.pushbelt import record as pushbelt
 from cvt_hpc.models.spatial_pushbelt import readings
+from cvt_hpc.parameters import Parameters
 from cvt_hpc.physics.out_of_plane import clamped_force
 from cvt_hpc.variables import Coordinate, Variable, together
 from cvt_hpc.variator import PULLEYS, STRANDS, judging
@@ -155,13 +156,13 @@ VARIABLES = (
 )
 
 
-def coordinates(parameters: Mapping[str, Any]) -> dict[str, Coordinate]:
+def coordinates(parameters: Parameters) -> dict[str, Coordinate]:
     """Coordinates of the record's dimensions, by flat parameters of the job."""
     sheave = Coordinate(np.array(readings.SHEAVES), "", "sheave", "pulley and side")
     return {**pushbelt.coordinates(parameters), "sheave": sheave}
 
 
-def cost(parameters: Mapping[str, Any], stepper: str) -> Any:
+def cost(parameters: Parameters, stepper: str) -> Any:
     """Core-seconds of a run; of parameters that are arrays, an array."""
     p = parameters
     each_step = np.where(np.isinf(p["sheave_stiffness"]), RIGID_COST, ELASTIC_COST)[()]

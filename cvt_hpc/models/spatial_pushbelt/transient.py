@@ -76,8 +76,7 @@ class Transient(ElementRun):
         return np.column_stack([super()._inputs_along(sample), still])
 
     def _read(self) -> readings.Reading:
-        state = self._state
-        return readings.Reading(self._readings, of_lanes(state.elements), state.pulleys, state.loads)
+        return readings.Reading(self._readings, self._state)
 
     def _tilting_inertia(self) -> float:
         return self._belt.pitch_inertia
