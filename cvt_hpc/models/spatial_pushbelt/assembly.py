@@ -24,18 +24,9 @@ from cvt_hpc.models.spatial_pushbelt.chain import motion
 
 
 @register_jitable
-def _store_part(array, j, first, m):
-    """Set a part of 3 x 3 of a block."""
-    vec.store(array, j, first, m[:3])
-    vec.store(array, j, first + f.SIZE, m[3:6])
-    vec.store(array, j, first + 2 * f.SIZE, m[6:])
-
-
-@register_jitable
 def _part(array, j, first):
     """A part of 3 x 3 of a block."""
-    two, three = first + f.SIZE, first + 2 * f.SIZE
-    return vec.three(vec.at(array, j, first), vec.at(array, j, two), vec.at(array, j, three))
+    return vec.matrix(array, j, first, f.SIZE)
 
 
 @register_jitable
@@ -47,10 +38,10 @@ def _store_row(array, j, first, v):
 @register_jitable
 def _store_link(array, j, first, link):
     """Set the parts of a block by velocities and angular velocities."""
-    _store_part(array, j, first + f.UU, link[0])
-    _store_part(array, j, first + f.WU, link[1])
-    _store_part(array, j, first + f.UW, link[2])
-    _store_part(array, j, first + f.WW, link[3])
+    vec.store_matrix(array, j, first + f.UU, link[0], f.SIZE)
+    vec.store_matrix(array, j, first + f.WU, link[1], f.SIZE)
+    vec.store_matrix(array, j, first + f.UW, link[2], f.SIZE)
+    vec.store_matrix(array, j, first + f.WW, link[3], f.SIZE)
 
 
 @register_jitable
