@@ -12,6 +12,7 @@ from cvt_hpc.kernels import called_alike
 from cvt_hpc.lanes import LaneArray
 from cvt_hpc.models.beam_pushbelt import as_pushbelt, rcm
 from cvt_hpc.models.beam_pushbelt import fields as b
+from cvt_hpc.models.beam_pushbelt.ring import PER_BEAM, Ring, close, relaxed_ring, stored_energy
 from cvt_hpc.models.beam_pushbelt.step import advance
 from cvt_hpc.models.marched import batches_of_one
 from cvt_hpc.models.pushbelt import fields as f
@@ -33,7 +34,7 @@ CHANNELS = pushbelt.CHANNELS
 class BeltState(NamedTuple):
     """State of a run, which `step.advance` takes on; the last three as `pushbelt.belt.BeltState` has them."""
 
-    ring: rcm.Ring
+    ring: Ring
     elements: np.ndarray  # (n, FIELDS), in the order of the belt
     pulleys: np.ndarray
     totals: np.ndarray
@@ -80,7 +81,7 @@ class Transient(pushbelt.Transient):
         kinetic += belt.driven_inertia * self._state.pulleys[f.DRIVEN_SPEED] ** 2
         pressed = (e[:, [f.EDGE, f.HEAD]] ** 2).sum() / belt.contact_stiffness
         pressed += 2.0 * (e[:, f.FLANK] ** 2).sum() / belt.flank_stiffness
-        return rcm.stored_energy(self._state.ring) + 0.5 * float(kinetic + pressed)
+        return stored_energy(self._state.ring) + 0.5 * float(kinetic + pressed)
 
     def _most_open(self) -> float:
         return self._most_damped()  # the balance holds the damping of steps
@@ -92,7 +93,7 @@ forget = pushbelt.forget
 
 def ring_on_path(
     path: Variator, centre_distance: float, beam: rcm.RcmBeam, beams: int, strain: float, speed: float
-) -> rcm.Ring:
+) -> Ring:
     """A ring that lies along a path [m], nodes and quarter points on it, and runs along it at a speed [m/s].
 
     All beams have one `strain`; their length is found here, that of `beam` does not count.
@@ -111,14 +112,14 @@ def ring_on_path(
         length *= (1.0 + strains.mean()) / (1.0 + strain)
     else:
         raise ValueError("the ring's beams cannot all have one strain along this path")
-    ring = rcm.relaxed_ring(beam._replace(length=length), beams)
+    ring = relaxed_ring(beam._replace(length=length), beams)
     ring.q[:] = q
     ahead = 1e-6 * around  # of which all differences are above rounding
     forth, back = (_coordinates(path, centre_distance, nodes + shift) for shift in (ahead, -ahead))
     change = forth - back
-    change[2 :: rcm.PER_BEAM] = np.mod(change[2 :: rcm.PER_BEAM] + np.pi, 2.0 * np.pi) - np.pi
+    change[2::PER_BEAM] = np.mod(change[2::PER_BEAM] + np.pi, 2.0 * np.pi) - np.pi
     ring.u[:] = speed * change / (2.0 * ahead)
-    rcm.close(ring)
+    close(ring)
     return ring
 
 
@@ -131,7 +132,7 @@ def _coordinates(path: Variator, centre_distance: float, nodes: np.ndarray) -> n
     normals = np.stack([-np.sin(angles), np.cos(angles)], 1)
     first, _, _ = points_at(path, centre_distance, nodes[:-1] + quarters)
     second, _, _ = points_at(path, centre_distance, nodes[1:] - quarters)
-    q = np.zeros((len(nodes), rcm.PER_BEAM))
+    q = np.zeros((len(nodes), PER_BEAM))
     q[:, :2], q[:, 2] = ends, angles
     q[:-1, 3] = ((first - ends[:-1]) * normals[:-1]).sum(axis=1)
     q[:-1, 4] = ((second - ends[1:]) * normals[1:]).sum(axis=1)
@@ -157,9 +158,9 @@ def start(parameters: Parameters) -> tuple[Belt, BeltState]:
     return belt, BeltState(ring, elements, pitch.pulleys, np.zeros(f.TOTALS), np.zeros(f.COUNTERS, np.int64))
 
 
-def _elements(belt: Belt, ring: rcm.Ring, n: int, speed: float) -> np.ndarray:
+def _elements(belt: Belt, ring: Ring, n: int, speed: float) -> np.ndarray:
     """Fields (n, FIELDS) of elements with equal chords on a ring, at a speed of the pitch line [m/s]."""
-    length, beams = ring.beam.length, ring.q.size // rcm.PER_BEAM
+    length, beams = ring.beam.length, ring.q.size // PER_BEAM
     rows = np.zeros((2, 8))
 
     def on_ring(place: float) -> tuple[rcm.LinePoint, np.ndarray]:
@@ -188,7 +189,7 @@ def _elements(belt: Belt, ring: rcm.Ring, n: int, speed: float) -> np.ndarray:
     return e
 
 
-def workspace(ring: rcm.Ring, elements: int) -> Workspace:
+def workspace(ring: Ring, elements: int) -> Workspace:
     """Work space for so many elements on a ring."""
     n, whole = elements, -(-2 * elements // UNIT_IMPULSES) * UNIT_IMPULSES
     return Workspace(
@@ -196,7 +197,7 @@ def workspace(ring: rcm.Ring, elements: int) -> Workspace:
         beams=np.zeros(n, np.int64),
         rows=np.zeros((n, b.ROWS, 8)),
         middle=np.zeros(ring.q.size),
-        columns=empty_columns(ring.blocks.data.shape[0] - 1, rcm.PER_BEAM, UNIT_IMPULSES),
+        columns=empty_columns(ring.blocks.data.shape[0] - 1, PER_BEAM, UNIT_IMPULSES),
         coupling=np.zeros((n, 2, whole)),
         impulses=np.zeros(whole),
         inputs=np.zeros(f.INPUTS),

@@ -32,7 +32,7 @@ from cvt_hpc.models.spatial_pushbelt.assembly import bending_forces, predict_ben
 from cvt_hpc.models.spatial_pushbelt.belt import NEWTON, NEWTON_OF_TWO_FLOWS, start, with_two_flows, workspace
 from cvt_hpc.models.spatial_pushbelt.chain import chain_forces, link, predict, pull_across, saddle_forces
 from cvt_hpc.models.spatial_pushbelt.faces import face_forces, predict_faces
-from cvt_hpc.models.spatial_pushbelt.flank import book_flanks, book_pairs, book_weight
+from cvt_hpc.models.spatial_pushbelt.losses import book_flanks, book_pairs, book_weight
 from cvt_hpc.parameters import Parameters
 from cvt_hpc.variator import LARGEST_DISPLACEMENT, STRANDS
 
