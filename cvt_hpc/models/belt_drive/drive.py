@@ -75,16 +75,10 @@ def state(
     and angles of the arms, (A,) [rad]; by default as drawn.
     """
     count, n = len(speeds), len(q)
-    turning = rotating.wheels_at(
-        drive.pulleys, speeds, np.zeros(len(drive.pulleys.arms.pivot)) if angles is None else angles, n
-    )
-    return State(
-        chain(q, v, columns=turning.speed.shape[1]),
-        turning,
-        first_touch(count, n, len(drive.contact.shape)),
-        np.zeros(3, np.int64),
-        np.zeros_like(turning.power),
-    )
+    drawn = np.zeros(len(drive.pulleys.arms.pivot))
+    turning = rotating.wheels_at(drive.pulleys, speeds, drawn if angles is None else angles, n)
+    belt, touch = chain(q, v, columns=turning.speed.shape[1]), first_touch(count, n, len(drive.contact.shape))
+    return State(belt, turning, touch, np.zeros(3, np.int64), np.zeros_like(turning.power))
 
 
 @kernel
@@ -125,16 +119,8 @@ def advance(
             wheels.power[:] = 0.0
             wheels.power[rotating.BELT_LOSS] = set_up(drive.beam, belt, tau, last)
             rotating.add_pulleys(drive.pulleys, wheels, inputs, share, tau)
-            laws_hold = add_contacts(
-                drive.contact,
-                state.touch,
-                drive.beam.lengths,
-                belt,
-                drive.pulleys,
-                wheels,
-                tau,
-                iteration > 0,
-            )
+            touching = drive.contact, state.touch, drive.beam.lengths
+            laws_hold = add_contacts(*touching, belt, drive.pulleys, wheels, tau, iteration > 0)
             state.counters[ITERATIONS] += 1
             if not factor(belt.blocks, SIZE):
                 return False
@@ -233,7 +219,5 @@ def _ties(contact: Contact, memory: Memory) -> np.ndarray:
     sticks = memory.side == 0
     if friction.treatment == Treatment.REGULARISED:
         sticks = np.abs(memory.slip) < STUCK * friction.friction_speed
-    rigid = TIED * contact.stiffness
-    return np.where(
-        sticks, friction.shear_stiffness if friction.treatment == Treatment.BRISTLE else rigid, 0.0
-    )
+    is_bristle = friction.treatment == Treatment.BRISTLE
+    return np.where(sticks, friction.shear_stiffness if is_bristle else TIED * contact.stiffness, 0.0)

@@ -119,33 +119,12 @@ def wheels_at(pulleys: Pulleys, speeds: np.ndarray, angles: np.ndarray, nodes: i
     """Pulleys at speeds (P,) [rad/s], arms at rest at angles (A,) [rad], and a belt of some nodes."""
     count, arms = len(speeds), len(angles)
     border = count - 1 + arms
-    speed, acceleration, stage_speed, start_speed = np.zeros((4, 1, count + arms))
-    angle, turning, stage_angle, start_angle = np.zeros((4, 1, arms))
-    speed[0, :count], angle[0], stage_angle[0] = speeds, angles, angles
-    rotation, rotating, stage_rotation, start_rotation = np.zeros((4, 1, count))
-    rotating[0] = speeds
+    motion = *np.zeros((4, 1, count + arms)), *np.zeros((4, 1, arms)), *np.zeros((4, 1, count))
     rim, centre_speed, lever = np.zeros((3, count, 2))
-    found = Wheels(
-        speed,
-        acceleration,
-        stage_speed,
-        start_speed,
-        angle,
-        turning,
-        stage_angle,
-        start_angle,
-        rotation,
-        rotating,
-        stage_rotation,
-        start_rotation,
-        rim,
-        pulleys.centre.copy(),
-        centre_speed,
-        lever,
-        np.zeros((nodes, border, PER_NODE)),
-        empty_corner(border, border + 1),
-        np.zeros(FRICTION_LOSS + count),
-    )
+    rows, corner = np.zeros((nodes, border, PER_NODE)), empty_corner(border, border + 1)
+    power = np.zeros(FRICTION_LOSS + count)
+    found.speed[0, :count], found.rotating[0] = speeds, speeds
+    found.angle[0], found.stage_angle[0] = angles, angles
     place_axes(pulleys, found)
     return found
 

@@ -2,7 +2,6 @@
 
 from __future__ import annotations
 
-from collections.abc import Mapping
 from typing import TYPE_CHECKING, Any
 
 import numpy as np
@@ -10,9 +9,10 @@ import numpy as np
 from cvt_hpc.models.belt_drive import theory
 from cvt_hpc.models.belt_drive.layout import layout
 from cvt_hpc.models.belt_drive.theory import answers
+from cvt_hpc.parameters import Parameters
 from cvt_hpc.physics.belt_path import regions
 from cvt_hpc.variables import Coordinate, Variable, together, values
-from cvt_hpc.variator import PULLEYS, STRANDS, judging
+from cvt_hpc.variator import PULLEYS, judging
 from cvt_hpc.variator.history import dataset
 from cvt_hpc.variator.variables import COORDINATES, Measured, frequency_bins, power, shared
 from cvt_hpc.vibration import assessment
@@ -173,30 +173,27 @@ VARIABLES = (
 )
 
 
-def coordinates(parameters: Mapping[str, Any]) -> dict[str, Coordinate]:
+def coordinates(parameters: Parameters) -> dict[str, Coordinate]:
     """Coordinates of the record's dimensions, by flat parameters of the job."""
     drawn = layout(parameters)
     driving, driven = drawn.pulleys[0], drawn.pulleys[drawn.driven]
-    roles = (
-        "" if drawn.pulleys == PULLEYS else f"; {driving} drives, {driven} is driven, of which is speed_loss"
-    )
-    names = {
-        "strand": _named("strand", drawn.spans),
-        "pulley": _named("pulley", drawn.pulleys, roles),
+    names = COORDINATES
+    if drawn.pulleys != PULLEYS:
+        order = "in the order in which the belt runs"
+        roles = f"{order}; {driving} drives, {driven} is driven, of which is speed_loss"
+        names = {
+            "strand": COORDINATES["strand"]._replace(values=np.array(drawn.spans), comment=order),
+            "pulley": COORDINATES["pulley"]._replace(values=np.array(drawn.pulleys), comment=roles),
+        }
+    return {
+        **names,
+        "frequency_bin": frequency_bins(parameters),
+        "half_waves": Coordinate(np.arange(1, theory.MODES + 1), "1", "half waves", "along the strand"),
+        "drive_mode": Coordinate(np.arange(1, DRIVE_MODES + 1), "1", "mode of the drive"),
     }
-    half_waves = Coordinate(np.arange(1, theory.MODES + 1), "1", "half waves", "along the strand")
-    modes = Coordinate(np.arange(1, DRIVE_MODES + 1), "1", "mode of the drive")
-    bins = frequency_bins(parameters)
-    return {**names, "frequency_bin": bins, "half_waves": half_waves, "drive_mode": modes}
 
 
-def _named(dimension: str, names: tuple[str, ...], roles: str = "") -> Coordinate:
-    in_order = "in the order in which the belt runs" + roles
-    comment = COORDINATES[dimension].comment if names in (PULLEYS, STRANDS) else in_order
-    return COORDINATES[dimension]._replace(values=np.array(names), comment=comment)
-
-
-def cost(parameters: Mapping[str, Any], stepper: str) -> Any:
+def cost(parameters: Parameters, stepper: str) -> Any:
     """Core-seconds of a run; of parameters that are arrays, an array."""
     p = parameters
     step = np.minimum(p["step"], 1.0 / p["sampling_rate"])
@@ -230,14 +227,10 @@ def histories(run: Transient) -> xr.Dataset:
     profiles = {name: (values, *PROFILES[name]) for name, values in run.profiles.items()}
     tension = np.array([_late(run, f"tension {k}") for k in run.drawn.spans])
     sliding = theory.sliding_tension(run.parameters, run.path, tension, run.places)
-    words = (
-        "tension where it slides",
-        "N",
-        "by Euler and Eytelwein, from the strands' tensions, arms as drawn",
-    )
-    profiles["sliding_tension"] = sliding, *words
-    words = "wrap angle", "rad", "from the inlet of the arc, arms as drawn"
-    profiles["wrap_angle"] = theory.wrap_angles(run.path, run.places), *words
+    comment = "by Euler and Eytelwein, from the strands' tensions, arms as drawn"
+    profiles["sliding_tension"] = sliding, "tension where it slides", "N", comment
+    comment = "from the inlet of the arc, arms as drawn"
+    profiles["wrap_angle"] = theory.wrap_angles(run.path, run.places), "wrap angle", "rad", comment
     names = [name for pair in zip(run.drawn.pulleys, run.drawn.spans, strict=True) for name in pair]
     region = np.array(names)[regions(run.path, run.places)]
     return dataset(run, over_time, profiles, run.places, region)

@@ -6,9 +6,6 @@ over the length S of the belt without load, L in all, with random phases and the
 root mean square of b. The j-th wave shakes the strands with the frequency j v / L.
 """
 
-from collections.abc import Mapping
-from typing import Any
-
 import numpy as np
 
 from cvt_hpc.parameters import Parameter, Parameters, not_negative
@@ -26,7 +23,7 @@ ROUGHNESS: dict[str, Parameter] = {
 }
 
 
-def heights(parameters: Mapping[str, Any], lengths: np.ndarray) -> np.ndarray:
+def heights(parameters: Parameters, lengths: np.ndarray) -> np.ndarray:
     """Heights of the belt's surface at the contact points of elements of `lengths` [m], (k, C) [m]."""
     p, points = parameters, parameters["contact_points"]
     share = (np.arange(points) + 0.5) / points

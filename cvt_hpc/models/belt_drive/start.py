@@ -4,7 +4,7 @@ The length of the belt follows from its tension with the arms of tensioners as d
 the moments that hold them there; or, where these moments are given, the arms turn into equilibrium.
 """
 
-from collections.abc import Callable, Mapping
+from collections.abc import Callable
 from typing import Any
 
 import numpy as np
@@ -16,6 +16,7 @@ from cvt_hpc.models.belt_drive.friction import Friction, Treatment
 from cvt_hpc.models.belt_drive.layout import Layout, pulleys_of
 from cvt_hpc.models.belt_drive.roughness import heights
 from cvt_hpc.multibody.ancf_beam import at_places, beam, random_lengths
+from cvt_hpc.parameters import Parameters
 from cvt_hpc.physics.belt_path import points_at
 from cvt_hpc.physics.friction import friction_law, given_law
 from cvt_hpc.solvers.generalised_alpha import Scheme
@@ -37,7 +38,7 @@ HELD = 1e12  # [kg m^2]: an arm that stays where it is drawn, or a pulley whose 
 
 
 def start(
-    parameters: Mapping[str, Any], drawn: Layout, tension_of: Callable[[Drive, State], float]
+    parameters: Parameters, drawn: Layout, tension_of: Callable[[Drive, State], float]
 ) -> tuple[Drive, State, bool]:
     """Constants and first state of a run, whose parts move as if nothing slid; whether equilibria were found.
 
@@ -62,38 +63,24 @@ def start(
     return drive, _moving(drive, found, p, drawn), is_settled
 
 
-def _drive(p: Mapping[str, Any], drawn: Layout, length: float) -> Drive:
+def _drive(p: Parameters, drawn: Layout, length: float) -> Drive:
     lengths = random_lengths(length, p["elements"], p["length_scatter"], p["seed"])
     height = heights(p, lengths)
-    belt = beam(
-        lengths,
-        p["line_mass"],
-        p["axial_stiffness"],
-        p["bending_stiffness"],
-        p["axial_damping"],
-        p["mass_damping"],
-        p["bending_damping"],
-    )
-    contact = Contact(
-        contact_shapes(p["contact_points"]),
-        p["contact_stiffness"],
-        p["contact_damping"],
-        _friction(p, drawn),
-        height,
-        float(height.max()),
-    )
+    stiffness = "line_mass", "axial_stiffness", "bending_stiffness"
+    damping = "axial_damping", "mass_damping", "bending_damping"
+    belt = beam(lengths, *(p[key] for key in (*stiffness, *damping)))
+    shapes, across = contact_shapes(p["contact_points"]), (p["contact_stiffness"], p["contact_damping"])
+    contact = Contact(shapes, *across, _friction(p, drawn), height, float(height.max()))
     return Drive(belt, pulleys_of(p, drawn), contact)
 
 
-def _friction(p: Mapping[str, Any], drawn: Layout) -> Friction:
+def _friction(p: Parameters, drawn: Layout) -> Friction:
     grip = p["tension"] / min(drawn.path.radius) / GRIP_SPEED
-    treatment = Treatment[p["friction_treatment"].upper()]
-    return Friction(
-        treatment, given_law(p), p["friction_speed"], grip, p["speed_tolerance"], p["shear_stiffness"]
-    )
+    treatment, slack = Treatment[p["friction_treatment"].upper()], p["speed_tolerance"]
+    return Friction(treatment, given_law(p), p["friction_speed"], grip, slack, p["shear_stiffness"])
 
 
-def _with_arms(drive: Drive, **values: Any) -> Drive:
+def _with_arms(drive: Drive, **values: float | np.ndarray) -> Drive:
     """A drive with other constants of its arms."""
     arms = drive.pulleys.arms
     count = len(arms.pivot)
@@ -154,7 +141,7 @@ def _moments(drive: Drive, settled: State) -> np.ndarray:
     return found
 
 
-def _moving(drive: Drive, settled: State, p: Mapping[str, Any], drawn: Layout) -> State:
+def _moving(drive: Drive, settled: State, p: Parameters, drawn: Layout) -> State:
     """Set the line in motion: the belt runs along it with the driving pulley."""
     path, q = drawn.path, settled.chain.q
     stretch = path.path_length / drive.beam.lengths.sum()

@@ -52,14 +52,8 @@ def expected_loss(parameters: Parameters, drawn: Layout, tension: np.ndarray) ->
     p, radius = parameters, drawn.path.radius
     running_on, inertial = np.roll(tension, 1), centrifugal(p, drawn.path)
     if p["friction_treatment"] == "bristle":
-        running_on = np.array(
-            [
-                unsheared_tension(p, *arc) + inertial
-                for arc in zip(
-                    running_on - inertial, tension - inertial, radius, drawn.path.wrap, strict=True
-                )
-            ]
-        )
+        arcs = zip(running_on - inertial, tension - inertial, radius, drawn.path.wrap, strict=True)
+        running_on = np.array([unsheared_tension(p, *arc) + inertial for arc in arcs])
     depth = (running_on - inertial) / (radius * p["contact_stiffness"])
     stretched = np.array([stretch(float(force), p["axial_stiffness"]) for force in running_on])
     per_angle = (radius - depth) / stretched

@@ -1,6 +1,5 @@
 """A transient run of the belt drive: it starts in motion from its static tension, is loaded, and recorded."""
 
-from collections.abc import Mapping
 from typing import Any
 
 import numpy as np
@@ -9,11 +8,12 @@ from cvt_hpc.kernels import called_alike
 from cvt_hpc.models.belt_drive import courses, readings
 from cvt_hpc.models.belt_drive.drive import advance, drive_frequencies
 from cvt_hpc.models.belt_drive.layout import Layout, layout
-from cvt_hpc.models.belt_drive.pulleys import FRICTION_LOSS, POWERS, Pulleys, axes
+from cvt_hpc.models.belt_drive.pulleys import FRICTION_LOSS, POWERS, axes
 from cvt_hpc.models.belt_drive.start import start
 from cvt_hpc.models.belt_drive.theory import kick, mesh_amplitude
 from cvt_hpc.models.marched import batches_of_one
 from cvt_hpc.models.sampled import MOST_UNSOLVED, SampledRun
+from cvt_hpc.parameters import Parameters
 from cvt_hpc.physics.belt_path import belt_path
 from cvt_hpc.solvers.generalised_alpha import generalised_alpha
 from cvt_hpc.variables import Status, Vibrates
@@ -35,18 +35,21 @@ MOST_OPEN = 0.02
 class Transient(SampledRun):
     """One run of the belt drive by the stepper "cyclic_alpha", advanced sample by sample.
 
-    `drawn` are pulleys and reference path, `kicked` the samples from a kick to the end that the run then had.
+    `drawn` are pulleys and reference path, `pulleys` constants of pulleys and arms, `places` path coordinates
+    of the profiles, (place,) [m], `kicked` the samples from a kick to the end that the run then had.
     """
 
     kicked: slice | None = None
 
-    def __init__(self, parameters: Mapping[str, Any], stepper: str) -> None:
+    def __init__(self, parameters: Parameters, stepper: str) -> None:
         p = parameters
         super().__init__(p)
         self._scheme = generalised_alpha(p["spectral_radius"])
         self.drawn = layout(p)
+        self.path = self.drawn.path
         self._readings = readings.Readings(p, self.drawn)
         self._drive, self._state, is_settled = start(p, self.drawn, self._readings.mean_tension)
+        self.pulleys, self.places = self._drive.pulleys, self._readings.places
         channels = ("load", "driving_speed", *readings.scalars_of(self.drawn, len(self.pulleys.arms.pivot)))
         sums, totals = (len(readings.PROFILES) + 2, readings.PLACES), self._state.totals.size + 1
         self._record(channels, self.drawn.spans, self._readings.probes, totals, sums)
@@ -143,11 +146,6 @@ class Transient(SampledRun):
         return drive_frequencies(self._drive, self._state, count)
 
     @property
-    def pulleys(self) -> Pulleys:
-        """Constants of pulleys and arms."""
-        return self._drive.pulleys
-
-    @property
     def turns(self) -> int:
         """Whole turns of the belt in the judged part."""
         return int((self.samples - self.first_judged) / self._turn)
@@ -181,12 +179,12 @@ class Transient(SampledRun):
         change = self._totals[last, total] - self._totals[first, total]
         return float(change / ((last - first) * self.interval)) if last > first else np.nan
 
-    def powers(self) -> dict[str, Any]:
+    def powers(self) -> dict[str, float | np.ndarray]:
         """Mean powers, as of `mean_rate`, named as in the record [W]."""
         found = {name: self.mean_rate(total) for total, name in enumerate(POWERS)}
         friction = np.array([self.mean_rate(FRICTION_LOSS + k) for k in range(len(self.drawn.pulleys))])
         loss = found["contact_loss"] + found["belt_loss"] + found["arm_loss"] + friction.sum()
-        return found | {"friction_loss": friction, "loss": loss, "storing_power": self.mean_rate(-1)}
+        return {**found, "friction_loss": friction, "loss": loss, "storing_power": self.mean_rate(-1)}
 
     @property
     def profiles(self) -> dict[str, np.ndarray]:
@@ -197,27 +195,14 @@ class Transient(SampledRun):
         return dict(zip(readings.PROFILES, means, strict=True))
 
     @property
-    def path(self) -> Any:
-        """The reference path."""
-        return self.drawn.path
-
-    @property
     def present(self) -> Layout:
         """Pulleys and path with the arms at their mean angles in the judged part."""
-        angles = [
-            self.channel(f"arm T{a + 1}")[self.judged].mean() for a in range(len(self.pulleys.arms.pivot))
-        ]
+        path, arms = self.path, range(len(self.pulleys.arms.pivot))
+        angles = [self.channel(f"arm T{a + 1}")[self.judged].mean() for a in arms]
         if not angles:
             return self.drawn
-        path = self.path
-        return self.drawn._replace(
-            path=belt_path(axes(self.pulleys, np.array(angles)), path.radius, path.turn)
-        )
-
-    @property
-    def places(self) -> np.ndarray:
-        """Path coordinates of the profiles, (place,) [m]."""
-        return self._readings.places
+        moved = axes(self.pulleys, np.array(angles))
+        return self.drawn._replace(path=belt_path(moved, path.radius, path.turn))
 
     def numerical_doubt(self, record: dict[str, Any]) -> tuple[Status, str] | None:
         """Reason why a run that reached its end is not to be trusted, by its values; None where it is.
