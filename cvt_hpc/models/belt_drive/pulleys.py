@@ -123,6 +123,7 @@ def wheels_at(pulleys: Pulleys, speeds: np.ndarray, angles: np.ndarray, nodes: i
     rim, centre_speed, lever = np.zeros((3, count, 2))
     rows, corner = np.zeros((nodes, border, PER_NODE)), empty_corner(border, border + 1)
     power = np.zeros(FRICTION_LOSS + count)
+    found = Wheels._make((*motion, rim, pulleys.centre.copy(), centre_speed, lever, rows, corner, power))
     found.speed[0, :count], found.rotating[0] = speeds, speeds
     found.angle[0], found.stage_angle[0] = angles, angles
     place_axes(pulleys, found)
