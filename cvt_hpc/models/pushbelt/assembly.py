@@ -7,7 +7,7 @@ from cvt_hpc.kernels import kernel
 from cvt_hpc.lanes import ahead, behind, like, maximum
 from cvt_hpc.models.pushbelt import fields as f
 from cvt_hpc.models.pushbelt.border import border_residuals, of_pulley
-from cvt_hpc.models.pushbelt.chain import BETA, angle_slope, contact_shares
+from cvt_hpc.models.pushbelt.chain import BETA, angle_slope, contact_shares, four, four_ahead, set_four
 from cvt_hpc.models.pushbelt.friction import flank_friction, ring_friction
 from cvt_hpc.models.pushbelt.local_bending import spread_bending
 from cvt_hpc.physics.contact_laws import pressed
@@ -30,10 +30,8 @@ def pair_forces(belt, state, step, iterate, dt):
     ahead_share, _, _ = contact_shares(belt, dt)
     pressing = ahead_share * dt
     for j in range(step.rows):
-        iy, iz = state[j, f.CHANGE_Y], state[j, f.CHANGE_Z]
-        iw, iv = state[j, f.CHANGE_W], state[j, f.CHANGE_V]
-        jy, jz = ahead(state, j, f.CHANGE_Y), ahead(state, j, f.CHANGE_Z)
-        jw, jv = ahead(state, j, f.CHANGE_W), ahead(state, j, f.CHANGE_V)
+        iy, iz, iw, iv = four(state, j, f.CHANGE)
+        jy, jz, jw, jv = four_ahead(state, j, f.CHANGE)
 
         stretch = step[j, f.TENSION_I_Y] * iy + step[j, f.TENSION_I_Z] * iz + iv
         stretch -= step[j, f.TENSION_J_Y] * jy + step[j, f.TENSION_J_Z] * jz + jv
@@ -105,8 +103,7 @@ def element_forces(belt, state, pulleys, increments, step, iterate, dt):
     wide, share = 1.0 / belt.cosine, BETA * dt * belt.sine
     driving_speed, driven_speed = pulleys[f.DRIVING_SPEED], pulleys[f.DRIVEN_SPEED] + increments[0]
     for j in range(step.rows):
-        dy, dz = state[j, f.CHANGE_Y], state[j, f.CHANGE_Z]
-        dw, dv = state[j, f.CHANGE_W], state[j, f.CHANGE_V]
+        dy, dz, dw, dv = four(state, j, f.CHANGE)
         u_y, u_z, omega = state[j, f.U_Y] + dy, state[j, f.U_Z] + dz, state[j, f.OMEGA] + dw
         driven = state[j, f.DRIVEN]
 
@@ -167,8 +164,7 @@ def residuals(belt, state, changes, openings, shapes, load, step, iterate, scrat
         scratch[0, k] = 0.0
     for j in range(step.rows):
         t_y, t_z = step[j, f.T_Y], step[j, f.T_Z]
-        dy, dz = state[j, f.CHANGE_Y], state[j, f.CHANGE_Z]
-        dw, dv = state[j, f.CHANGE_W], state[j, f.CHANGE_V]
+        dy, dz, dw, dv = four(state, j, f.CHANGE)
         dz_beyond = dz + fall
         across = belt.ring_mass * (t_z * dy - t_y * dz_beyond)
         n_y, n_z = step[j, f.NORMAL_Y], step[j, f.NORMAL_Z]
@@ -213,8 +209,7 @@ def residuals(belt, state, changes, openings, shapes, load, step, iterate, scrat
         f_w += radial * step[j, f.R_LEVER] + tangential * step[j, f.T_LEVER]
         grip = state[j, f.RING_FRICTION]
         f_y, f_z, f_v = f_y + grip * t_y, f_z + grip * t_z, f_v - grip
-        iterate[j, f.RESIDUAL], iterate[j, f.RESIDUAL + f.ROW_Z] = f_y, f_z
-        iterate[j, f.RESIDUAL + f.ROW_W], iterate[j, f.RESIDUAL + f.ROW_V] = f_w, f_v
+        set_four(iterate, j, f.RESIDUAL, (f_y, f_z, f_w, f_v))
 
         power += (state[j, f.U_Y] + dy) * f_y + (state[j, f.U_Z] + dz) * f_z
         power += (state[j, f.OMEGA] + dw) * f_w + (state[j, f.V] + dv) * f_v
@@ -224,14 +219,6 @@ def residuals(belt, state, changes, openings, shapes, load, step, iterate, scrat
             scratch[0, modes + k] += state[j, f.DRIVEN] * axial
             scratch[0, k] += (1.0 - state[j, f.DRIVEN]) * axial
     return border_residuals(belt, changes, openings, load, torque, power, scratch, border, dt)
-
-
-@register_jitable
-def _store_opening(blocks, j, first, weight, forces):
-    """Set the right side of an opening."""
-    f_y, f_z, f_w = forces
-    blocks[j, first + f.ROW_Y], blocks[j, first + f.ROW_Z] = f_y * weight, f_z * weight
-    blocks[j, first + f.ROW_W], blocks[j, first + f.ROW_V] = f_w * weight, 0.0
 
 
 @kernel
@@ -245,22 +232,16 @@ def assemble(belt, state, shapes, step, iterate, blocks):
     for j in range(step.rows):
         x_y, x_z = ahead(state, j, f.HEADING_Y), ahead(state, j, f.HEADING_Z)
         k, ki, kj = iterate[j, f.STIFF], iterate[j, f.STIFF_I], iterate[j, f.STIFF_J]
+        none = like(0.0, k)
         yy, yz, zz = k * x_y * x_y, k * x_y * x_z, k * x_z * x_z
         yw, zw, ww = -ki * x_y, -ki * x_z, iterate[j, f.STIFF_II]
-        blocks[j, f.LINKED + f.YY] = step[j, f.LINK + f.YY] - yy
-        blocks[j, f.LINKED + f.ZY] = step[j, f.LINK + f.ZY] - yz
-        blocks[j, f.LINKED + f.WY] = step[j, f.LINK + f.WY] - yw
-        blocks[j, f.LINKED + f.VY] = step[j, f.LINK + f.VY]
-        blocks[j, f.LINKED + f.YZ] = step[j, f.LINK + f.YZ] - yz
-        blocks[j, f.LINKED + f.ZZ] = step[j, f.LINK + f.ZZ] - zz
-        blocks[j, f.LINKED + f.WZ] = step[j, f.LINK + f.WZ] - zw
-        blocks[j, f.LINKED + f.VZ] = step[j, f.LINK + f.VZ]
-        blocks[j, f.LINKED + f.YW] = step[j, f.LINK + f.YW] - kj * x_y
-        blocks[j, f.LINKED + f.ZW] = step[j, f.LINK + f.ZW] - kj * x_z
-        blocks[j, f.LINKED + f.WW], blocks[j, f.LINKED + f.VW] = iterate[j, f.STIFF_IJ], 0.0
-        blocks[j, f.LINKED + f.YV] = step[j, f.LINK + f.YV]
-        blocks[j, f.LINKED + f.ZV] = step[j, f.LINK + f.ZV]
-        blocks[j, f.LINKED + f.WV], blocks[j, f.LINKED + f.VV] = 0.0, step[j, f.LINK + f.VV]
+        y, z, w, v = four(step, j, f.LINK + f.YY)
+        set_four(blocks, j, f.LINKED + f.YY, (y - yy, z - yz, w - yw, v))
+        y, z, w, v = four(step, j, f.LINK + f.YZ)
+        set_four(blocks, j, f.LINKED + f.YZ, (y - yz, z - zz, w - zw, v))
+        y, z, w, v = four(step, j, f.LINK + f.YW)
+        set_four(blocks, j, f.LINKED + f.YW, (y - kj * x_y, z - kj * x_z, iterate[j, f.STIFF_IJ], none))
+        set_four(blocks, j, f.LINKED + f.YV, four(step, j, f.LINK + f.YV))
 
         x_y, x_z = state[j, f.HEADING_Y], state[j, f.HEADING_Z]
         k, kj = behind(iterate, j, f.STIFF), behind(iterate, j, f.STIFF_J)
@@ -272,38 +253,41 @@ def assemble(belt, state, shapes, step, iterate, blocks):
         r_y, r_z, r_w = step[j, f.R_Y], step[j, f.R_Z], step[j, f.R_LEVER]
         t_w = step[j, f.T_LEVER]
         a, b = iterate[j, f.SLOPE_R], iterate[j, f.SLOPE_T]
-        blocks[j, f.YY] = step[j, f.DIAGONAL + f.YY] + yy + r_y * a - r_z * b
-        blocks[j, f.ZY] = step[j, f.DIAGONAL + f.ZY] + yz + r_z * a + r_y * b
-        blocks[j, f.WY] = step[j, f.DIAGONAL + f.WY] + yw + r_w * a + t_w * b
+        y, z, w, v = four(step, j, f.DIAGONAL + f.YY)
+        y, z, w = y + yy + r_y * a - r_z * b, z + yz + r_z * a + r_y * b, w + yw + r_w * a + t_w * b
+        yv = v - k * t_y
+        set_four(blocks, j, f.YY, (y, z, w, yv))
         a, b = iterate[j, f.SLOPE_R + f.ROW_Z], iterate[j, f.SLOPE_T + f.ROW_Z]
-        blocks[j, f.YZ] = step[j, f.DIAGONAL + f.YZ] + yz + r_y * a - r_z * b
-        blocks[j, f.ZZ] = step[j, f.DIAGONAL + f.ZZ] + zz + r_z * a + r_y * b
-        blocks[j, f.WZ] = step[j, f.DIAGONAL + f.WZ] + zw + r_w * a + t_w * b
+        y, z, w, v = four(step, j, f.DIAGONAL + f.YZ)
+        y, z, w = y + yz + r_y * a - r_z * b, z + zz + r_z * a + r_y * b, w + zw + r_w * a + t_w * b
+        zv = v - k * t_z
+        set_four(blocks, j, f.YZ, (y, z, w, zv))
         a, b = iterate[j, f.SLOPE_R + f.ROW_W], iterate[j, f.SLOPE_T + f.ROW_W]
-        blocks[j, f.YW] = step[j, f.DIAGONAL + f.YW] + yw + r_y * a - r_z * b
-        blocks[j, f.ZW] = step[j, f.DIAGONAL + f.ZW] + zw + r_z * a + r_y * b
-        blocks[j, f.WW] = step[j, f.DIAGONAL + f.WW] + ww + r_w * a + t_w * b
-        yv, zv = step[j, f.DIAGONAL + f.VY] - k * t_y, step[j, f.DIAGONAL + f.VZ] - k * t_z
-        blocks[j, f.VY], blocks[j, f.VZ], blocks[j, f.VW] = yv, zv, 0.0
-        blocks[j, f.YV] = yv
-        blocks[j, f.ZV] = zv
-        blocks[j, f.WV] = 0.0
-        blocks[j, f.VV] = step[j, f.DIAGONAL + f.VV] + k
+        y, z, w, v = four(step, j, f.DIAGONAL + f.YW)
+        y, z, w = y + yw + r_y * a - r_z * b, z + zw + r_z * a + r_y * b, w + ww + r_w * a + t_w * b
+        set_four(blocks, j, f.YW, (y, z, w, none))
+        set_four(blocks, j, f.YV, (yv, zv, none, step[j, f.DIAGONAL + f.VV] + k))
 
-        for field in range(4):
-            blocks[j, RIGHT + field] = iterate[j, f.RESIDUAL + field]
+        set_four(blocks, j, RIGHT, four(iterate, j, f.RESIDUAL))
         a, b = iterate[j, f.DRIVEN_R], iterate[j, f.DRIVEN_T]
-        blocks[j, RIGHT_SPEED + f.ROW_Y] = r_z * b - r_y * a
-        blocks[j, RIGHT_SPEED + f.ROW_Z] = -(r_z * a + r_y * b)
-        blocks[j, RIGHT_SPEED + f.ROW_W] = -(r_w * a + t_w * b)
-        blocks[j, RIGHT_SPEED + f.ROW_V] = 0.0
+        y, z, w = r_z * b - r_y * a, -(r_z * a + r_y * b), -(r_w * a + t_w * b)
+        set_four(blocks, j, RIGHT_SPEED, (y, z, w, none))
         a, b = iterate[j, f.OPENING_R], iterate[j, f.OPENING_T]
         f_y, f_z, f_w = r_y * a - r_z * b, r_z * a + r_y * b, r_w * a + t_w * b
         driven = state[j, f.DRIVEN]
         for m in range(modes):
             one, other = (1.0 - driven) * shapes[j, m], driven * shapes[j, m]
-            _store_opening(blocks, j, RIGHT_OPENINGS + f.UNKNOWNS * m, one, (f_y, f_z, f_w))
-            _store_opening(blocks, j, RIGHT_OPENINGS + f.UNKNOWNS * (modes + m), other, (f_y, f_z, f_w))
+            first = RIGHT_OPENINGS + f.UNKNOWNS * m
+            set_four(blocks, j, first, (f_y * one, f_z * one, f_w * one, none))
+            first += f.UNKNOWNS * modes
+            set_four(blocks, j, first, (f_y * other, f_z * other, f_w * other, none))
+
+
+@register_jitable
+def _add_three(array, j, first, values):
+    """Add to three fields of a row."""
+    for k in range(3):
+        array[j, first + k] += values[k]
 
 
 @kernel
@@ -314,29 +298,17 @@ def add_noses(state, step, iterate, blocks):
         k, a, b = iterate[j, f.NOSE_SLOPE], step[j, f.NOSE_LEVER_I], step[j, f.NOSE_LEVER_J]
         yy, yz, zz = k * o_y * o_y, k * o_y * o_z, k * o_z * o_z
         yw, zw, ww = k * o_y * a, k * o_z * a, k * a * a
-        blocks[j, f.LINKED + f.YY] -= yy
-        blocks[j, f.LINKED + f.ZY] -= yz
-        blocks[j, f.LINKED + f.WY] -= yw
-        blocks[j, f.LINKED + f.YZ] -= yz
-        blocks[j, f.LINKED + f.ZZ] -= zz
-        blocks[j, f.LINKED + f.WZ] -= zw
-        blocks[j, f.LINKED + f.YW] += k * o_y * b
-        blocks[j, f.LINKED + f.ZW] += k * o_z * b
-        blocks[j, f.LINKED + f.WW] += k * a * b
+        _add_three(blocks, j, f.LINKED + f.YY, (-yy, -yz, -yw))
+        _add_three(blocks, j, f.LINKED + f.YZ, (-yz, -zz, -zw))
+        _add_three(blocks, j, f.LINKED + f.YW, (k * o_y * b, k * o_z * b, k * a * b))
 
         o_y, o_z = state[j, f.HEADING_Z], -state[j, f.HEADING_Y]
         k, b = behind(iterate, j, f.NOSE_SLOPE), behind(step, j, f.NOSE_LEVER_J)
         yy, yz, zz = yy + k * o_y * o_y, yz + k * o_y * o_z, zz + k * o_z * o_z
         yw, zw, ww = yw - k * o_y * b, zw - k * o_z * b, ww + k * b * b
-        blocks[j, f.YY] += yy
-        blocks[j, f.ZY] += yz
-        blocks[j, f.WY] += yw
-        blocks[j, f.YZ] += yz
-        blocks[j, f.ZZ] += zz
-        blocks[j, f.WZ] += zw
-        blocks[j, f.YW] += yw
-        blocks[j, f.ZW] += zw
-        blocks[j, f.WW] += ww
+        _add_three(blocks, j, f.YY, (yy, yz, yw))
+        _add_three(blocks, j, f.YZ, (yz, zz, zw))
+        _add_three(blocks, j, f.YW, (yw, zw, ww))
 
 
 @register_jitable

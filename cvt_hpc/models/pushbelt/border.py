@@ -24,7 +24,7 @@ from numba.extending import register_jitable
 from cvt_hpc.kernels import kernel
 from cvt_hpc.lanes import ahead, around, like, maximum
 from cvt_hpc.models.pushbelt import fields as f
-from cvt_hpc.models.pushbelt.chain import LEAST_CONTACT_TIME, contact_shares, ring_share
+from cvt_hpc.models.pushbelt.chain import LEAST_CONTACT_TIME, contact_shares, four, four_ahead, ring_share
 from cvt_hpc.physics.contact_laws import taken
 
 
@@ -182,18 +182,13 @@ def book(belt, state, work, dt):
     damper = belt.ring_time / ring_share(belt, dt)
     flank = ring = tilt = drag = between = sheaves = stretching = like(0.0, elements[0, f.U_Y])
     for j in range(step.rows):
-        dy, dz = elements[j, f.CHANGE_Y], elements[j, f.CHANGE_Z]
-        dw = elements[j, f.CHANGE_W]
-        next_dy = ahead(elements, j, f.CHANGE_Y)
-        next_dz = ahead(elements, j, f.CHANGE_Z)
-        next_dw = ahead(elements, j, f.CHANGE_W)
-        y = elements[j, f.U_Y] + 0.5 * dy
-        z = elements[j, f.U_Z] + 0.5 * dz
-        w = elements[j, f.OMEGA] + 0.5 * dw
-        v = elements[j, f.V] + 0.5 * elements[j, f.CHANGE_V]
-        next_y, next_z = ahead(elements, j, f.U_Y) + 0.5 * next_dy, ahead(elements, j, f.U_Z) + 0.5 * next_dz
-        next_w = ahead(elements, j, f.OMEGA) + 0.5 * next_dw
-        next_v = ahead(elements, j, f.V) + 0.5 * ahead(elements, j, f.CHANGE_V)
+        dy, dz, dw, dv = four(elements, j, f.CHANGE)
+        y, z, w, v = four(elements, j, f.U_Y)
+        y, z, w, v = y + 0.5 * dy, z + 0.5 * dz, w + 0.5 * dw, v + 0.5 * dv
+        next_dy, next_dz, next_dw, next_dv = four_ahead(elements, j, f.CHANGE)
+        next_y, next_z, next_w, next_v = four_ahead(elements, j, f.U_Y)
+        next_y, next_z = next_y + 0.5 * next_dy, next_z + 0.5 * next_dz
+        next_w, next_v = next_w + 0.5 * next_dw, next_v + 0.5 * next_dv
 
         stretch = step[j, f.TENSION_I_Y] * y + step[j, f.TENSION_I_Z] * z + v
         stretch -= step[j, f.TENSION_J_Y] * next_y + step[j, f.TENSION_J_Z] * next_z + next_v

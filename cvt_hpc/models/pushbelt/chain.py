@@ -34,6 +34,28 @@ BETA = 0.25
 LEAST_CONTACT_TIME = 0.75
 
 
+# Four fields of a row, as of an element's unknowns, or of a column of a block
+
+
+@register_jitable
+def four(array, j, first):
+    """Four fields of a row."""
+    return array[j, first], array[j, first + 1], array[j, first + 2], array[j, first + 3]
+
+
+@register_jitable
+def four_ahead(array, j, first):
+    """Four fields of the row ahead."""
+    y, z = ahead(array, j, first), ahead(array, j, first + 1)
+    return y, z, ahead(array, j, first + 2), ahead(array, j, first + 3)
+
+
+@register_jitable
+def set_four(array, j, first, values):
+    """Set four fields of a row."""
+    array[j, first], array[j, first + 1], array[j, first + 2], array[j, first + 3] = values
+
+
 @register_jitable
 def contact_shares(belt, dt):
     """Weights of the gaps at q_{k+1}, q_k and q_{k-1} in that by which a contact between elements presses.
@@ -189,13 +211,10 @@ def link(belt, state, step, dt):
         shortened += state[j, f.V] - ahead(state, j, f.V)
         turn_y, turn_z = -e_z * per_length, e_y * per_length
         angle_i, angle_j = e_y * xi[0] + e_z * xi[1], e_y * xj[0] + e_z * xj[1]
-        step[j, f.TURN_Y] = turn_y
-        step[j, f.TURN_Z] = turn_z
-        step[j, f.ANGLE_I] = angle_i
-        step[j, f.ANGLE_J] = angle_j
-        turn = turn_y * (ahead(state, j, f.U_Y) - state[j, f.U_Y]) + turn_z * (
-            ahead(state, j, f.U_Z) - state[j, f.U_Z]
-        )
+        step[j, f.TURN_Y], step[j, f.TURN_Z] = turn_y, turn_z
+        step[j, f.ANGLE_I], step[j, f.ANGLE_J] = angle_i, angle_j
+        turn = turn_y * (ahead(state, j, f.U_Y) - state[j, f.U_Y])
+        turn += turn_z * (ahead(state, j, f.U_Z) - state[j, f.U_Z])
 
         per_unstretched = 1.0 / state[j, f.LENGTH]
         length += turned_length(belt, length, turn, dt) - belt.ring_time * shortened
@@ -239,8 +258,6 @@ def linear_blocks(belt, step, dt):
     """Blocks of inertia, transverse damping, tension and angles: DIAGONAL and LINK of each element."""
     steep = angle_slope(belt, dt)
     for j in range(step.rows):
-        for field in range(32):
-            step[j, f.DIAGONAL + field] = 0.0
         # o of the ring: with it ring mass moves only across
         o_y, o_z = step[j, f.T_Z], -step[j, f.T_Y]
         mass, ring = belt.mass / dt, belt.ring_mass / dt
@@ -248,7 +265,7 @@ def linear_blocks(belt, step, dt):
         n_y, n_z = step[j, f.NORMAL_Y], step[j, f.NORMAL_Z]
         drag = belt.transverse_damping
         yy, yz, zz = yy + drag * n_y * n_y, yz + drag * n_y * n_z, zz + drag * n_z * n_z
-        ww, vv = like(belt.inertia / dt, o_y), like(ring, o_y)
+        ww, vv, none = like(belt.inertia / dt, o_y), like(ring, o_y), like(0.0, o_y)
 
         # the segment ahead, of which this element is i
         k, a, b = step[j, f.TENSION_SLOPE], step[j, f.TENSION_I_Y], step[j, f.TENSION_I_Z]
@@ -262,19 +279,16 @@ def linear_blocks(belt, step, dt):
         yy, yz, zz, ww = yy + both * p * p, yz + both * p * q, zz + both * q * q, ww + ii
         yw, zw = ii * p, ii * q
 
-        step[j, f.LINK + f.YY] = -(k * a * c + both * p * p)
-        step[j, f.LINK + f.ZY] = -(k * b * c + both * p * q)
-        step[j, f.LINK + f.WY], step[j, f.LINK + f.VY] = -ii * p, -k * c
-        step[j, f.LINK + f.YZ] = -(k * a * d + both * p * q)
-        step[j, f.LINK + f.ZZ] = -(k * b * d + both * q * q)
-        step[j, f.LINK + f.WZ], step[j, f.LINK + f.VZ] = -ii * q, -k * d
-        step[j, f.LINK + f.YW], step[j, f.LINK + f.ZW] = jj * p, jj * q
-        step[j, f.LINK + f.YV], step[j, f.LINK + f.ZV], step[j, f.LINK + f.VV] = -k * a, -k * b, -k
+        y, z = -(k * a * c + both * p * p), -(k * b * c + both * p * q)
+        set_four(step, j, f.LINK + f.YY, (y, z, -ii * p, -k * c))
+        y, z = -(k * a * d + both * p * q), -(k * b * d + both * q * q)
+        set_four(step, j, f.LINK + f.YZ, (y, z, -ii * q, -k * d))
+        set_four(step, j, f.LINK + f.YW, (jj * p, jj * q, none, none))
+        set_four(step, j, f.LINK + f.YV, (-k * a, -k * b, none, -k))
 
         # the segment behind, of which it is j
         k = behind(step, j, f.TENSION_SLOPE)
-        c = behind(step, j, f.TENSION_J_Y)
-        d = behind(step, j, f.TENSION_J_Z)
+        c, d = behind(step, j, f.TENSION_J_Y), behind(step, j, f.TENSION_J_Z)
         yy, yz, zz, vv = yy + k * c * c, yz + k * c * d, zz + k * d * d, vv + k
         yv, zv = yv + k * c, zv + k * d
         p, q = behind(step, j, f.TURN_Y), behind(step, j, f.TURN_Z)
@@ -283,9 +297,7 @@ def linear_blocks(belt, step, dt):
         both = steep * at_i * at_i + jj
         yy, yz, zz, ww = yy + both * p * p, yz + both * p * q, zz + both * q * q, ww + jj
         yw, zw = yw - jj * p, zw - jj * q
-        step[j, f.DIAGONAL + f.YY], step[j, f.DIAGONAL + f.ZY] = yy, yz
-        step[j, f.DIAGONAL + f.WY], step[j, f.DIAGONAL + f.VY] = yw, yv
-        step[j, f.DIAGONAL + f.YZ], step[j, f.DIAGONAL + f.ZZ] = yz, zz
-        step[j, f.DIAGONAL + f.WZ], step[j, f.DIAGONAL + f.VZ] = zw, zv
-        step[j, f.DIAGONAL + f.YW], step[j, f.DIAGONAL + f.ZW], step[j, f.DIAGONAL + f.WW] = yw, zw, ww
-        step[j, f.DIAGONAL + f.YV], step[j, f.DIAGONAL + f.ZV], step[j, f.DIAGONAL + f.VV] = yv, zv, vv
+        set_four(step, j, f.DIAGONAL + f.YY, (yy, yz, yw, yv))
+        set_four(step, j, f.DIAGONAL + f.YZ, (yz, zz, zw, zv))
+        set_four(step, j, f.DIAGONAL + f.YW, (yw, zw, ww, none))
+        set_four(step, j, f.DIAGONAL + f.YV, (yv, zv, none, vv))
