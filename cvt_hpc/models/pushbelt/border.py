@@ -159,19 +159,6 @@ def move_sheaves(belt, state, inputs, driving_thrust, driven_thrust, dt):
 
 
 @kernel
-def book_weight(belt, state, work, dt):
-    """Add the work of the weight to the totals."""
-    elements, step = state.elements, work.step
-    falling = like(0.0, elements[0, f.U_Y])
-    for j in range(step.rows):
-        y = elements[j, f.U_Y] + 0.5 * elements[j, f.CHANGE_Y]
-        z = elements[j, f.U_Z] + 0.5 * elements[j, f.CHANGE_Z]
-        slip = elements[j, f.V] + 0.5 * elements[j, f.CHANGE_V] - step[j, f.T_Y] * y - step[j, f.T_Z] * z
-        falling -= belt.mass * z + belt.ring_mass * (z + step[j, f.T_Z] * slip)
-    add_to_totals(state, work.scratch, f.GRAVITY_WORK, dt * belt.gravity * falling)
-
-
-@kernel
 def book(belt, state, work, dt):
     """Add to the totals the work of a solved step, before it is accepted."""
     elements, step, iterate, scratch = state.elements, work.step, work.iterate, work.scratch
@@ -180,7 +167,7 @@ def book(belt, state, work, dt):
     ahead_share, _, _ = contact_shares(belt, dt)
     half_ahead = 0.5 / ahead_share
     damper = belt.ring_time / ring_share(belt, dt)
-    flank = ring = tilt = drag = between = sheaves = stretching = like(0.0, elements[0, f.U_Y])
+    flank = ring = tilt = drag = between = sheaves = stretching = falling = like(0.0, elements[0, f.U_Y])
     for j in range(step.rows):
         dy, dz, dw, dv = four(elements, j, f.CHANGE)
         y, z, w, v = four(elements, j, f.U_Y)
@@ -234,6 +221,7 @@ def book(belt, state, work, dt):
 
         slip = v - step[j, f.T_Y] * y - step[j, f.T_Z] * z
         ring += elements[j, f.RING_FRICTION] * slip
+        falling -= belt.mass * z + belt.ring_mass * (z + step[j, f.T_Z] * slip)
         n_y, n_z = step[j, f.NORMAL_Y], step[j, f.NORMAL_Z]
         across = n_y * y + n_z * z
         drag += belt.transverse_damping * across * (across + 0.5 * (n_y * dy + n_z * dz))
@@ -244,3 +232,4 @@ def book(belt, state, work, dt):
     book_contacts(belt, state, scratch, between, dt)
     add_to_totals(state, scratch, f.FLANK_DAMPED, sheaves)
     add_to_totals(state, scratch, f.STRETCH_LOSS, dt * stretching)
+    add_to_totals(state, scratch, f.GRAVITY_WORK, dt * belt.gravity * falling)

@@ -20,7 +20,6 @@ from cvt_hpc.models.pushbelt.belt import NEWTON, of_lanes, outset, start, worksp
 from cvt_hpc.models.pushbelt.border import (
     accept_border,
     book,
-    book_weight,
     close_border,
     move_sheaves,
     set_shapes,
@@ -114,13 +113,8 @@ def _changes(kept, k):
     """Changes of contact forces, of the element behind (k = 1) only of those to the next one."""
     own = 1.0 - k
     flank = kept[k, f.FLANK] ** 2 + kept[k, f.FLANK_FRICTION_M] ** 2 + kept[k, f.FLANK_FRICTION_T] ** 2
-    return (
-        kept[k, f.EDGE],
-        kept[k, f.HEAD],
-        own * np.sqrt(flank),
-        own * kept[k, f.RING_FRICTION],
-        kept[k, f.NOSE],
-    )
+    flank, ring = own * np.sqrt(flank), own * kept[k, f.RING_FRICTION]
+    return kept[k, f.EDGE], kept[k, f.HEAD], flank, ring, kept[k, f.NOSE]
 
 
 @kernel
@@ -129,8 +123,6 @@ def _accept(belt, state, work, inputs, dt):
     elements, step, iterate, scratch = state.elements, work.step, work.iterate, work.scratch
     totals, pulleys = state.totals, state.pulleys
     book(belt, state, work, dt)
-    if belt.gravity != 0.0:
-        book_weight(belt, state, work, dt)
     for k in range(3):
         scratch[0, k] = 0.0
     per_dt, fall = 1.0 / dt, dt * belt.gravity

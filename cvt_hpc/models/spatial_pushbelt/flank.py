@@ -137,6 +137,15 @@ def _opening(belt, increments, openings, shapes, driven, j):
     return belt.cosine * opening
 
 
+@register_jitable
+def _reached_gap(belt, step, j, p, axis, lever, opening, change, dt):
+    """Gap of a point in an iterate without spread [m], and n, m and e_t at q_k."""
+    (du, dw), (side, _, _) = change, flank_point(belt, p)
+    n, m, t = flank_directions(belt, vec.at(step, j, f.RADIAL + 3 * p), axis, side)
+    rate = vec.dot(mean_normal(belt, n, axis, side), vec.plus(du, vec.cross(dw, lever)))
+    return fma(dt, rate, step[j, f.FLANK_GAP + p] + opening), n, m, t
+
+
 @kernel
 def bend_sheaves(belt, state, increments, openings, shapes, step, iterate, bent, dt):
     """Set what local bending spreads on both sides; other arguments as of `flank_forces`.
@@ -148,15 +157,13 @@ def bend_sheaves(belt, state, increments, openings, shapes, step, iterate, bent,
     for j in range(step.rows):
         driven = state[j, f.DRIVEN]
         axis, opening = pulley_axis(belt, driven), _opening(belt, increments, openings, shapes, driven, j)
-        du, dw = vec.screw(state, j, f.CHANGE)
+        change = vec.screw(state, j, f.CHANGE)
         o = vec.at(state, j, f.OUTWARD)
         a = vec.cross(o, vec.at(state, j, f.HEADING))
         for p in range(f.POINTS):
-            side, height, width = flank_point(belt, p)
-            n, _, _ = flank_directions(belt, vec.at(step, j, f.RADIAL + 3 * p), axis, side)
-            turned = vec.plus(du, vec.cross(dw, lever_of(o, a, side, height, width)))
-            rate = vec.dot(mean_normal(belt, n, axis, side), turned)
-            iterate[j, f.FLANK_REACHED + p] = -fma(dt, rate, step[j, f.FLANK_GAP + p] + opening)
+            lever = lever_of(o, a, *flank_point(belt, p))
+            gap, _, _, _ = _reached_gap(belt, step, j, p, axis, lever, opening, change, dt)
+            iterate[j, f.FLANK_REACHED + p] = -gap
     bend = belt.local_compliance, 0.5 * belt.flank_stiffness, belt.local_decay
     depths = iterate.data[:, f.FLANK_REACHED : f.FLANK_REACHED + f.POINTS]
     on_driven = state.data[:, f.DRIVEN]
@@ -179,7 +186,7 @@ def flank_forces(belt, state, pulleys, increments, openings, shapes, step, itera
         axis = pulley_axis(belt, driven)
         rotation = of_pulley(driving_speed, driven_speed, driven)
         opening = _opening(belt, increments, openings, shapes, driven, j)
-        du, dw = vec.screw(state, j, f.CHANGE)
+        change = vec.screw(state, j, f.CHANGE)
         u, omega = motion(state, j, 1.0)
         o = vec.at(state, j, f.OUTWARD)
         a = vec.cross(o, vec.at(state, j, f.HEADING))
@@ -192,19 +199,16 @@ def flank_forces(belt, state, pulleys, increments, openings, shapes, step, itera
                 left, force = force, nothing
             side, height, half_width = flank_point(belt, p)
             lever = lever_of(o, a, side, height, half_width)
-            n, m, t = flank_directions(belt, vec.at(step, j, f.RADIAL + 3 * p), axis, side)
-            rate = vec.dot(mean_normal(belt, n, axis, side), vec.plus(du, vec.cross(dw, lever)))
-            gap = fma(dt, rate, step[j, f.FLANK_GAP + p] + opening) + state[j, f.SPREAD + p // 2]
+            gap, n, m, t = _reached_gap(belt, step, j, p, axis, lever, opening, change, dt)
+            gap = gap + state[j, f.SPREAD + p // 2]
             normal, stiff = pressed(gap, stiffness)
             iterate[j, f.FLANK_REACHED + p], iterate[j, f.YIELD + p] = gap, stiff
 
             half = lever_of(half_o, half_a, side, height, half_width)
             _, half_m, half_t = flank_directions(belt, vec.at(step, j, f.MID_RADIAL + 3 * p), axis, side)
             q = vec.plus(u, vec.cross(omega, half))
-            along, around_it = (
-                vec.dot(half_m, q),
-                fma(-step[j, f.MID_RADIUS + p], rotation, vec.dot(half_t, q)),
-            )
+            along, around_it = vec.dot(half_m, q), vec.dot(half_t, q)
+            around_it = fma(-step[j, f.MID_RADIUS + p], rotation, around_it)
             earlier = state[j, f.FLANK_SLIP_M + p], state[j, f.FLANK_SLIP_T + p]
             dual = state[j, f.FLANK_DUAL_M + p], state[j, f.FLANK_DUAL_T + p]
             slip = along, around_it

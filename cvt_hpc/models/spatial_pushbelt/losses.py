@@ -27,7 +27,7 @@ def book_pairs(belt, state, work, dt):
     ahead_share, _, _ = contact_shares(belt, dt)
     half_ahead = 0.5 / ahead_share
     damper = belt.ring_time / ring_share(belt, dt)
-    ring = tilt = drag = between = stretching = like(0.0, elements[0, f.FLANK])
+    ring = tilt = drag = between = stretching = falling = like(0.0, elements[0, f.FLANK])
     for j in range(step.rows):
         (du, dw), (ju, jw) = vec.screw(elements, j, f.CHANGE), vec.screw_ahead(elements, j, f.CHANGE)
         (u, w), (next_u, next_w) = motion(elements, j, 0.5), motion_ahead(elements, j, 0.5)
@@ -38,10 +38,8 @@ def book_pairs(belt, state, work, dt):
         apart, more = vec.minus(next_u, u), vec.minus(ju, du)
         chord_i, chord_j = vec.at(step, j, f.CHORD_I), vec.at(step, j, f.CHORD_J)
         turn_i, turn_j = vec.at(step, j, f.TURN_I), vec.at(step, j, f.TURN_J)
-        rate_i, rate_j = (
-            vec.dot(chord_i, apart) + vec.dot(turn_i, w),
-            vec.dot(chord_j, apart) + vec.dot(turn_j, next_w),
-        )
+        rate_i = vec.dot(chord_i, apart) + vec.dot(turn_i, w)
+        rate_j = vec.dot(chord_j, apart) + vec.dot(turn_j, next_w)
         last_i = rate_i + 0.5 * (vec.dot(chord_i, more) + vec.dot(turn_i, dw))
         last_j = rate_j + 0.5 * (vec.dot(chord_j, more) + vec.dot(turn_j, jw))
         tilt += 0.5 * belt.angle_damping * (last_i * rate_i + last_j * rate_j)
@@ -65,6 +63,10 @@ def book_pairs(belt, state, work, dt):
             between += taken(gap, change, belt.pin_stiffness, elements[j, f.PIN])
 
         ring += elements[j, f.RING_FRICTION] * ring_slip(elements, step, j, 0.5)
+        v = elements[j, f.V] + 0.5 * elements[j, f.CHANGE + f.ROW_V]
+        mass, coupling = vec.symmetric(step, j, f.INERTIA), vec.matrix(step, j, f.INERTIA_UW)
+        falling -= vec.of_symmetric(mass, u)[1] + vec.of_matrix(coupling, w)[1]
+        falling -= belt.ring_mass / dt * vec.at(step, j, f.RING_LINE)[1] * v
         n_y, n_z = step[j, f.NORMAL_Y], step[j, f.NORMAL_Z]
         across = n_y * u[0] + n_z * u[1]
         drag += belt.transverse_damping * across * (across + 0.5 * (n_y * du[0] + n_z * du[1]))
@@ -74,21 +76,8 @@ def book_pairs(belt, state, work, dt):
     add_to_totals(state, scratch, planar.BELT_LOSS, dt * drag)
     book_contacts(belt, state, scratch, between, dt)
     add_to_totals(state, scratch, planar.STRETCH_LOSS, dt * stretching)
-
-
-@kernel
-def book_weight(belt, state, work, dt):
-    """Add the work of the weight to the totals."""
-    elements, step = state.elements, work.step
-    falling = like(0.0, elements[0, f.FLANK])
-    for j in range(step.rows):
-        u, w = motion(elements, j, 0.5)
-        v = elements[j, f.V] + 0.5 * elements[j, f.CHANGE + f.ROW_V]
-        mass, coupling = vec.symmetric(step, j, f.INERTIA), vec.matrix(step, j, f.INERTIA_UW)
-        falling -= vec.of_symmetric(mass, u)[1] + vec.of_matrix(coupling, w)[1]
-        falling -= belt.ring_mass / dt * vec.at(step, j, f.RING_LINE)[1] * v
     # inertia is that of a step, divided by it
-    add_to_totals(state, work.scratch, planar.GRAVITY_WORK, dt * dt * belt.gravity * falling)
+    add_to_totals(state, scratch, planar.GRAVITY_WORK, dt * dt * belt.gravity * falling)
 
 
 @kernel

@@ -32,7 +32,7 @@ from cvt_hpc.models.spatial_pushbelt.assembly import bending_forces, predict_ben
 from cvt_hpc.models.spatial_pushbelt.belt import NEWTON, NEWTON_OF_TWO_FLOWS, start, with_two_flows, workspace
 from cvt_hpc.models.spatial_pushbelt.chain import chain_forces, link, predict, pull_across, saddle_forces
 from cvt_hpc.models.spatial_pushbelt.faces import face_forces, predict_faces
-from cvt_hpc.models.spatial_pushbelt.losses import book_flanks, book_pairs, book_weight
+from cvt_hpc.models.spatial_pushbelt.losses import book_flanks, book_pairs
 from cvt_hpc.parameters import Parameters
 from cvt_hpc.variator import LARGEST_DISPLACEMENT, STRANDS
 
@@ -190,29 +190,19 @@ def _close(belt, state, work, dt):
 @register_jitable
 def _flank_change(kept, k, p):
     """Change of the force at a point of the flanks."""
-    return np.sqrt(
-        kept[k, f.FLANK + p] ** 2
-        + kept[k, f.FLANK_FRICTION_M + p] ** 2
-        + kept[k, f.FLANK_FRICTION_T + p] ** 2
-    )
+    grip_m, grip_t = kept[k, f.FLANK_FRICTION_M + p], kept[k, f.FLANK_FRICTION_T + p]
+    return np.sqrt(kept[k, f.FLANK + p] ** 2 + grip_m**2 + grip_t**2)
 
 
 @kernel
 def _changes(kept, k):
     """Changes of contact forces, of the element behind (k = 1) only of those to the next one."""
     own = 1.0 - k
-    return (
-        kept[k, f.PUSH + f.EDGE_LEFT],
-        kept[k, f.PUSH + f.EDGE_RIGHT],
-        kept[k, f.PUSH + f.HEAD_LEFT],
-        kept[k, f.PUSH + f.HEAD_RIGHT],
-        kept[k, f.PIN],
-        own * _flank_change(kept, k, f.LEFT_LOW),
-        own * _flank_change(kept, k, f.LEFT_HIGH),
-        own * _flank_change(kept, k, f.RIGHT_LOW),
-        own * _flank_change(kept, k, f.RIGHT_HIGH),
-        own * kept[k, f.RING_FRICTION],
-    )
+    edges = kept[k, f.PUSH + f.EDGE_LEFT], kept[k, f.PUSH + f.EDGE_RIGHT]
+    heads = kept[k, f.PUSH + f.HEAD_LEFT], kept[k, f.PUSH + f.HEAD_RIGHT]
+    left = own * _flank_change(kept, k, f.LEFT_LOW), own * _flank_change(kept, k, f.LEFT_HIGH)
+    right = own * _flank_change(kept, k, f.RIGHT_LOW), own * _flank_change(kept, k, f.RIGHT_HIGH)
+    return *edges, *heads, kept[k, f.PIN], *left, *right, own * kept[k, f.RING_FRICTION]
 
 
 @kernel
@@ -286,8 +276,6 @@ def _accept(belt, state, work, inputs, dt):
         two_flows.book_difference(belt, state, work, dt)
         two_flows.accept_difference(belt, state, work, dt)
     book_pairs(belt, state, work, dt)
-    if belt.gravity != 0.0:
-        book_weight(belt, state, work, dt)
     book_flanks(belt, state, work, dt)
     _accept_elements(belt, state, work, dt)
     _add_loads(belt, state, work)
@@ -305,19 +293,14 @@ def _accept(belt, state, work, inputs, dt):
         left, right = loads[2 * pulley], loads[2 * pulley + 1]
         side = belt.loose_side[pulley]
         pressed = 0.5 * ((1.0 - side) * left + (1.0 + side) * right)  # on what moves
+        excess = inputs[planar.IN_DRIVING_THRUST + pulley] - pressed
         if pulley == 0:
-            closing = dt * (
-                belt.driving_rate * (inputs[planar.IN_DRIVING_THRUST] - pressed)
-                + inputs[planar.IN_DRIVING_SHIFT]
-            )
-            drift = dt * inputs[f.IN_DRIVING_DRIFT]
-            pulleys[planar.DRIVING_RADIUS] += closing
-            pulleys[f.DRIVING_MIDDLE] += drift - side * tangent * closing
+            closing = dt * (belt.driving_rate * excess + inputs[planar.IN_DRIVING_SHIFT])
         else:
-            closing = dt * belt.driven_rate * (inputs[planar.IN_DRIVEN_THRUST] - pressed)
-            drift = dt * inputs[f.IN_DRIVEN_DRIFT]
-            pulleys[planar.DRIVEN_RADIUS] += closing
-            pulleys[f.DRIVEN_MIDDLE] += drift - side * tangent * closing
+            closing = dt * belt.driven_rate * excess
+        drift = dt * inputs[f.IN_DRIVING_DRIFT + pulley]
+        pulleys[planar.DRIVING_RADIUS + pulley] += closing
+        pulleys[f.DRIVING_MIDDLE + pulley] += drift - side * tangent * closing
         totals[planar.THRUST_WORK] += (right - left) * drift - 2.0 * tangent * pressed * closing
 
 
