@@ -113,9 +113,8 @@ def _apply_forces(belt, state, work, dt):
         _tilt(belt, state, step, i, j, dt)
     for j in range(e.shape[0]):
         pressed = 2.0 * dt * e[j, f.FLANK] * belt.sine
-        friction.push(
-            belt, step, j, pressed * step[j, b.R_Y], pressed * step[j, b.R_Z], pressed * step[j, b.R_LEVER]
-        )
+        y, z, moment = pressed * step[j, b.R_Y], pressed * step[j, b.R_Z], pressed * step[j, b.R_LEVER]
+        friction.push(belt, step, j, y, z, moment)
         speed = e[j, f.V_FILTERED]
         mu, _ = coefficient(belt.flank_law, belt.flank_kinetic, belt.flank_gradient, belt.flank_speed, speed)
         bound = step[j, b.FLANK_BOUND] = dt * mu * e[j, f.FLANK]
@@ -147,12 +146,8 @@ def _free_speeds(belt, state, work, dt):
             ring.columns.data[i, k, 0] *= dt
     _apply_forces(belt, state, work, dt)
     for j in range(step.shape[0]):
-        beam, rows, tangent, mass = (
-            work.beams[j],
-            work.rows[j],
-            step[j, b.TANGENT],
-            belt.mass / step[j, b.COSINE],
-        )
+        beam, rows = work.beams[j], work.rows[j]
+        tangent, mass = step[j, b.TANGENT], belt.mass / step[j, b.COSINE]
         u = ring.u[beam * PER_BEAM : beam * PER_BEAM + 8]
         before = step[j, b.RING_ACROSS] = _dot(rows[b.MID_ACROSS], u)
         step[j, b.RING_ALONG] = _dot(rows[b.MID_ALONG], u)
@@ -181,18 +176,11 @@ def _accept(belt, state, work, inputs, dt):
         first = work.beams[j] * PER_BEAM
         e[j, f.TENSION] = ring.beam.axial_stiffness * rcm.mean_strain(length, ring.q[first : first + 8])
         e[j, f.SADDLE] = abs(friction.saddle_impulse(belt, step, j)) / dt
-        c, w, t_y, t_z = (
-            friction.element_speed(belt, step, j),
-            step[j, b.RING_ACROSS],
-            step[j, b.MID_T_Y],
-            step[j, b.MID_T_Z],
-        )
+        c, w = friction.element_speed(belt, step, j), step[j, b.RING_ACROSS]
+        t_y, t_z = step[j, b.MID_T_Y], step[j, b.MID_T_Z]
         slip = step[j, b.RING_ALONG] - c
-        e[j, f.V], e[j, f.RING_SLIP], e[j, f.RING_FRICTION] = (
-            step[j, b.RING_ALONG],
-            slip,
-            -e[j, b.RING_IMPULSE] / dt,
-        )
+        e[j, f.V], e[j, f.RING_SLIP] = step[j, b.RING_ALONG], slip
+        e[j, f.RING_FRICTION] = -e[j, b.RING_IMPULSE] / dt
         totals[f.RING_LOSS] -= e[j, b.RING_IMPULSE] * slip
 
         slip_m, slip_t = friction.flank_slip(belt, state, step, j)

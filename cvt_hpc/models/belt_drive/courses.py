@@ -116,12 +116,10 @@ def _tension(parameters: Parameters) -> float:
 def free_length() -> Parameter:
     """The parameter that gives the preload by the belt's own length."""
     needs = (*TWO, *PULLEY_LISTS, *TENSIONER, "axial_stiffness", "contact_stiffness")
-    return Parameter(
+    return positive(
         None,
         "m",
         "length of the belt without load, in the place of tension, which follows",
-        minimum=0.0,
-        exclusive=True,
         gives=Substitute("tension", needs, _tension),
         sensible=(0.1, 50.0),
     )

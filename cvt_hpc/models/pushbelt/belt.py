@@ -104,6 +104,13 @@ class Newton(NamedTuple):
 NEWTON = Newton(tolerance=1e-3, power_tolerance=1.0, weights=(1.0, 1.0, 2e-3, 1.0))
 
 
+def newton_of(parameters: Parameters, default: Newton) -> Newton:
+    """Settings of a run, other than by default."""
+    p = parameters
+    limits = {"power_tolerance": p["power_tolerance"], "most_iterations": p["most_iterations"]}
+    return default._replace(tolerance=p["speed_tolerance"], **limits)
+
+
 class BeltState(NamedTuple):
     """State of a run, which `step.advance` takes on."""
 

@@ -16,11 +16,10 @@ from cvt_hpc.lanes import absolute, ahead, around, behind
 from cvt_hpc.models.marched import batches_of_one
 from cvt_hpc.models.pushbelt import assembly, run
 from cvt_hpc.models.pushbelt import fields as f
-from cvt_hpc.models.pushbelt.belt import NEWTON, of_lanes, outset, start, workspace
+from cvt_hpc.models.pushbelt.belt import NEWTON, newton_of, of_lanes, outset, start, workspace
 from cvt_hpc.models.pushbelt.border import (
     accept_border,
     book,
-    close_border,
     move_sheaves,
     set_shapes,
 )
@@ -42,11 +41,7 @@ class Transient(ElementRun):
         self._advance = partial(called_alike(advance_by), EQUATIONS)
         self._belt, self._state = start(outset(p))
         self._work = workspace(self._belt, p["elements"])
-        self._method = NEWTON._replace(
-            tolerance=p["speed_tolerance"],
-            power_tolerance=p["power_tolerance"],
-            most_iterations=p["most_iterations"],
-        )
+        self._method = newton_of(p, NEWTON)
 
     def _read(self) -> Reading:
         return Reading(self._readings, self._elements(), self._state.pulleys)
@@ -81,31 +76,10 @@ def _prepare(belt, state, work, dt):
 @kernel
 def _evaluate(belt, state, work, load, dt):
     """Forces of the iterate, and the residuals that they leave; return the power residual [W]."""
-    elements, step, iterate, scratch = state.elements, work.step, work.iterate, work.scratch
-    pulleys, increments, openings, shapes = state.pulleys, state.increments, state.openings, work.shapes
-    assembly.pair_forces(belt, elements, step, iterate, dt)
-    assembly.flank_depths(belt, elements, increments, openings, shapes, step, iterate, work.bent, dt)
-    assembly.element_forces(belt, elements, pulleys, increments, step, iterate, dt)
-    changes = increments, work.increments
-    return assembly.residuals(
-        belt, elements, changes, openings, shapes, load, step, iterate, scratch, work.border, dt
-    )
-
-
-@kernel
-def _assemble(belt, state, work, dt):
-    """The linear system of the elements."""
-    assembly.assemble(belt, state.elements, work.shapes, work.step, work.iterate, work.blocks)
-    if belt.nose_clearance < np.inf:
-        assembly.add_noses(state.elements, work.step, work.iterate, work.blocks)
-
-
-@kernel
-def _close(belt, state, work, dt):
-    """Close the system of the border."""
-    step, iterate, blocks = work.step, work.iterate, work.blocks
-    assembly.border_sums(belt, state.elements, work.shapes, step, iterate, blocks, work.sums, dt)
-    close_border(belt, work.sums, work.border, dt)
+    assembly.pair_forces(belt, state, work, dt)
+    assembly.flank_depths(belt, state, work, dt)
+    assembly.element_forces(belt, state, work, dt)
+    return assembly.residuals(belt, state, work, load, dt)
 
 
 @kernel
@@ -162,5 +136,5 @@ def _accept(belt, state, work, inputs, dt):
     accept_border(belt, state, work, inputs, dt)
 
 
-EQUATIONS = Equations(_prepare, _evaluate, _assemble, _close, _accept, _changes, f.CHANGE)
+EQUATIONS = Equations(_prepare, _evaluate, assembly.assemble, assembly.close, _accept, _changes, f.CHANGE)
 advance = partial(advance_by, EQUATIONS)

@@ -147,29 +147,28 @@ def _reached_gap(belt, step, j, p, axis, lever, opening, change, dt):
 
 
 @kernel
-def bend_sheaves(belt, state, increments, openings, shapes, step, iterate, bent, dt):
-    """Set what local bending spreads on both sides; other arguments as of `flank_forces`.
-
-    `bent` is work space of `spread_bending`.
-    """
+def bend_sheaves(belt, state, work, dt):
+    """Set what local bending spreads on both sides."""
+    elements, step, iterate = state.elements, work.step, work.iterate
+    increments, openings, shapes = state.increments, state.openings, work.shapes
     if belt.local_compliance == 0.0:
         return
     for j in range(step.rows):
-        driven = state[j, f.DRIVEN]
+        driven = elements[j, f.DRIVEN]
         axis, opening = pulley_axis(belt, driven), _opening(belt, increments, openings, shapes, driven, j)
-        change = vec.screw(state, j, f.CHANGE)
-        o = vec.at(state, j, f.OUTWARD)
-        a = vec.cross(o, vec.at(state, j, f.HEADING))
+        change = vec.screw(elements, j, f.CHANGE)
+        o = vec.at(elements, j, f.OUTWARD)
+        a = vec.cross(o, vec.at(elements, j, f.HEADING))
         for p in range(f.POINTS):
             lever = lever_of(o, a, *flank_point(belt, p))
             gap, _, _, _ = _reached_gap(belt, step, j, p, axis, lever, opening, change, dt)
             iterate[j, f.FLANK_REACHED + p] = -gap
     bend = belt.local_compliance, 0.5 * belt.flank_stiffness, belt.local_decay
     depths = iterate.data[:, f.FLANK_REACHED : f.FLANK_REACHED + f.POINTS]
-    on_driven = state.data[:, f.DRIVEN]
-    left, right = state.data[:, f.SPREAD + f.ON_LEFT], state.data[:, f.SPREAD + f.ON_RIGHT]
-    spread_bending(on_driven, depths[:, : f.RIGHT_LOW], left, bent, *bend)
-    spread_bending(on_driven, depths[:, f.RIGHT_LOW :], right, bent, *bend)
+    on_driven = elements.data[:, f.DRIVEN]
+    left, right = elements.data[:, f.SPREAD + f.ON_LEFT], elements.data[:, f.SPREAD + f.ON_RIGHT]
+    spread_bending(on_driven, depths[:, : f.RIGHT_LOW], left, work.bent, *bend)
+    spread_bending(on_driven, depths[:, f.RIGHT_LOW :], right, work.bent, *bend)
 
 
 @kernel
@@ -324,13 +323,15 @@ def _border_of_side(belt, step, iterate, j, p, points, driven, dt):
 
 
 @kernel
-def add_flank_blocks(belt, state, shapes, step, iterate, blocks, dt):
+def add_flank_blocks(belt, state, work, dt):
     """Add the slopes to the blocks, set the right sides of the border's unknowns and its rows."""
+    elements, step, iterate = state.elements, work.step, work.iterate
+    blocks, shapes = work.narrow, work.shapes
     modes = belt.modal_stiffness.shape[1]
     for j in range(step.rows):
-        driven = state[j, f.DRIVEN]
-        o = vec.at(state, j, f.OUTWARD)
-        a = vec.cross(o, vec.at(state, j, f.HEADING))
+        driven = elements[j, f.DRIVEN]
+        o = vec.at(elements, j, f.OUTWARD)
+        a = vec.cross(o, vec.at(elements, j, f.HEADING))
         axes = pulley_axis(belt, driven), o, a, vec.at(step, j, f.MID_OUTWARD), vec.at(step, j, f.MID_AXIAL)
         left = (
             _point_slopes(belt, step, iterate, j, f.LEFT_LOW, axes, dt),

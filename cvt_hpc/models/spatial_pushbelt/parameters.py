@@ -218,15 +218,11 @@ def _off_the_cone(p: Parameters, ratio: float) -> list[tuple[str, str, str]]:
     known = ""
     if room == height:
         known = ", an element's height beyond the belt unless inner_radius and outer_radius are given"
-    return [
-        (
-            key,
-            f"at most {limit:.3g} m{what}, so that flanks meet the sheaves' faces{known}",
-            f"{size:.3g} m{at}",
-        )
-        for key, (size, limit, what) in found.items()
-        if size > limit
-    ][:1]
+    for key, (size, limit, what) in found.items():
+        if size > limit:
+            expected = f"at most {limit:.3g} m{what}, so that flanks meet the sheaves' faces{known}"
+            return [(key, expected, f"{size:.3g} m{at}")]
+    return []
 
 
 def inert(parameters: Parameters) -> dict[str, str]:

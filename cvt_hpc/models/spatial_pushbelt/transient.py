@@ -19,8 +19,8 @@ from cvt_hpc.lanes import absolute, ahead, around, like
 from cvt_hpc.models.marched import batches_of_one
 from cvt_hpc.models.pushbelt import fields as planar
 from cvt_hpc.models.pushbelt import run
-from cvt_hpc.models.pushbelt.belt import of_lanes
-from cvt_hpc.models.pushbelt.border import accept_border, close_border, of_pulley, set_shapes
+from cvt_hpc.models.pushbelt.belt import newton_of, of_lanes
+from cvt_hpc.models.pushbelt.border import accept_border, of_pulley, set_shapes
 from cvt_hpc.models.pushbelt.friction import filtered_slip
 from cvt_hpc.models.pushbelt.ring_bending import set_bending
 from cvt_hpc.models.pushbelt.run import COURSES, ElementRun
@@ -65,11 +65,7 @@ class Transient(ElementRun):
             self._state, method = with_two_flows(self._belt, self._state), NEWTON_OF_TWO_FLOWS
             self._profiles = (*readings.PROFILES, *readings.OF_TWO_FLOWS)
         self._work = workspace(self._belt, p["elements"], flows)
-        self._method = method._replace(
-            tolerance=p["speed_tolerance"],
-            power_tolerance=p["power_tolerance"],
-            most_iterations=p["most_iterations"],
-        )
+        self._method = newton_of(p, method)
 
     def _inputs_along(self, sample: int) -> np.ndarray:
         still = np.zeros((2, f.INPUTS - f.IN_DRIVING_DRIFT))
@@ -146,36 +142,32 @@ def _prepare(belt, state, work, dt):
 @kernel
 def _evaluate(belt, state, work, load, dt):
     """Forces of the iterate, and the residuals that they leave; return the power residual [W]."""
-    elements, step, iterate, scratch = state.elements, work.step, work.iterate, work.scratch
+    elements, step, iterate = state.elements, work.step, work.iterate
     increments, openings, shapes = state.increments, state.openings, work.shapes
     has_two_flows = _has_two_flows(elements)
     chain_forces(belt, elements, step, iterate, dt)
     bending_forces(belt, elements, step, iterate, dt)
     face_forces(belt, elements, step, iterate, dt)
-    flank.bend_sheaves(belt, elements, increments, openings, shapes, step, iterate, work.bent, dt)
+    flank.bend_sheaves(belt, state, work, dt)
     flank.flank_forces(belt, elements, state.pulleys, increments, openings, shapes, step, iterate, dt)
     if has_two_flows:
         two_flows.difference_forces(elements, step, iterate)
         two_flows.saddle_forces_of_two(belt, elements, step, iterate)
     else:
         saddle_forces(belt, elements, step, iterate)
-    changes = increments, work.increments
-    power = assembly.residuals(
-        belt, elements, changes, openings, shapes, load, step, iterate, scratch, work.border, dt
-    )
+    power = assembly.residuals(belt, state, work, load, dt)
     if has_two_flows:
-        power += two_flows.half_residuals(belt, elements, step, iterate, scratch, dt)
+        power += two_flows.half_residuals(belt, elements, step, iterate, work.scratch, dt)
     return power
 
 
 @kernel
 def _assemble(belt, state, work, dt):
     """The linear system of the elements."""
-    elements, step, iterate, narrow = state.elements, work.step, work.iterate, work.narrow
-    assembly.assemble_pairs(belt, elements, step, iterate, narrow)
-    flank.add_flank_blocks(belt, elements, work.shapes, step, iterate, narrow, dt)
-    if _has_two_flows(elements):
-        two_flows.widen(belt, step, iterate, narrow, work.blocks, dt)
+    assembly.assemble_pairs(belt, state, work)
+    flank.add_flank_blocks(belt, state, work, dt)
+    if _has_two_flows(state.elements):
+        two_flows.widen(belt, work.step, work.iterate, work.narrow, work.blocks, dt)
 
 
 @kernel
@@ -183,8 +175,7 @@ def _close(belt, state, work, dt):
     """Close the system of the border."""
     if _has_two_flows(state.elements):
         two_flows.narrow_solutions(work.blocks, work.narrow)
-    assembly.border_sums(belt, state.elements, work.shapes, work.iterate, work.narrow, work.sums)
-    close_border(belt, work.sums, work.border, dt)
+    assembly.close_pairs(belt, state, work, dt)
 
 
 @register_jitable
