@@ -50,7 +50,7 @@ def as_pushbelt(parameters: Parameters) -> Parameters:
     return {**_WITHOUT, **parameters}
 
 
-def step_limit(parameters: Parameters) -> float:
+def _step_limit(parameters: Parameters) -> float:
     """Longest explicit step of elements that all press on each other at edge and head [s].
 
     The contacts' forces f obey f'' = -c G f with G = W^T M^-1 W. A contact at height h shares its two
@@ -77,7 +77,7 @@ def check(parameters: Parameters) -> list[tuple[str, str, str]]:
     if p["ring_beams"] < least:
         expected = f"at least {least}, so that none turns by more than {np.rad2deg(_MOST_TURN):.0f} degrees"
         problems.append(("ring_beams", expected, f"{p['ring_beams']}"))
-    if "step" in p and p["step"] > (limit := step_limit(p)):
+    if "step" in p and p["step"] > (limit := _step_limit(p)):
         expected = f"at most {limit:.3g} s, the limit of elements that press on each other"
         problems.append(("step", expected, f"{p['step']:g} s"))
     return problems

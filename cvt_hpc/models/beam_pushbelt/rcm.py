@@ -142,14 +142,8 @@ def line_point(l0: float, q: np.ndarray, s: float, along: np.ndarray, across: np
             on_t, on_n = on_t - w, on_n + ahead * e1
         along[k], across[k] = p * on_t + r * on_n, p * on_n - r * on_t
     forth = ahead * e1
-    return LinePoint(
-        q[node] + forth * c - w * sn,
-        q[node + 1] + forth * sn + w * c,
-        p * c - r * sn,
-        p * sn + r * c,
-        size,
-        e1 * curve / (size * size),
-    )
+    x, y = q[node] + forth * c - w * sn, q[node + 1] + forth * sn + w * c
+    return LinePoint(x, y, p * c - r * sn, p * sn + r * c, size, e1 * curve / (size * size))
 
 
 @kernel

@@ -31,8 +31,8 @@ from cvt_hpc.models.pushbelt.chain import contact_gap, contact_levers, radial, t
 from cvt_hpc.physics.contact_laws import coefficient, remembered
 from cvt_hpc.solvers.cyclic_blocks import factor
 
-MOST_FAILURES = 20  # unsolved steps in a row with which a run ends
-LARGEST = 1e100  # more than any speed that means something
+_MOST_FAILURES = 20  # unsolved steps in a row with which a run ends
+_LARGEST = 1e100  # more than any speed that means something
 
 
 @kernel
@@ -226,7 +226,7 @@ def _step(belt, tolerance, state, work, inputs, dt):
     solved = True
     if belt.ring_friction > 0.0 or belt.flank_kinetic > 0.0:
         solved = friction.rub(belt, tolerance, state, work)
-    if not _accept(belt, state, work, inputs, dt) < LARGEST:
+    if not _accept(belt, state, work, inputs, dt) < _LARGEST:
         return f.NOT_FINITE
     return f.CONVERGED if solved else f.NOT_CONVERGED
 
@@ -249,7 +249,7 @@ def advance(belt, tolerance, state, work, inputs, steps, dt):
     Returns
     -------
     int
-        CONVERGED; NOT_CONVERGED where in MOST_FAILURES steps in a row a set-valued law did not hold;
+        CONVERGED; NOT_CONVERGED where in _MOST_FAILURES steps in a row a set-valued law did not hold;
         NOT_FINITE. The counters then name the element and the contact at fault.
     """
     counters = state.counters
@@ -261,7 +261,7 @@ def advance(belt, tolerance, state, work, inputs, steps, dt):
         counters[f.STEPS] += 1
         counters[f.IN_A_ROW] = counters[f.IN_A_ROW] + 1 if outcome == f.NOT_CONVERGED else 0
         counters[f.FAILED_STEPS] += outcome == f.NOT_CONVERGED
-        if outcome == f.NOT_FINITE or counters[f.IN_A_ROW] == MOST_FAILURES:
+        if outcome == f.NOT_FINITE or counters[f.IN_A_ROW] == _MOST_FAILURES:
             counters[f.STATUS] = outcome
             return outcome
     counters[f.STATUS] = f.CONVERGED

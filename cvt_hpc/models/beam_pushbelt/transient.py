@@ -26,7 +26,7 @@ from cvt_hpc.solvers.cyclic_blocks import empty_columns
 from cvt_hpc.variator.history import points_at
 
 LAW_TOLERANCE = 1e-5  # [m/s]: up to this speed a set-valued law counts as fulfilled (`step.advance`)
-UNIT_IMPULSES = 16  # on the ring, that are solved for at a time: two registers
+_UNIT_IMPULSES = 16  # on the ring, that are solved for at a time: two registers
 
 CHANNELS = pushbelt.CHANNELS
 
@@ -191,13 +191,13 @@ def _elements(belt: Belt, ring: Ring, n: int, speed: float) -> np.ndarray:
 
 def workspace(ring: Ring, elements: int) -> Workspace:
     """Work space for so many elements on a ring."""
-    n, whole = elements, -(-2 * elements // UNIT_IMPULSES) * UNIT_IMPULSES
+    n, whole = elements, -(-2 * elements // _UNIT_IMPULSES) * _UNIT_IMPULSES
     return Workspace(
         step=np.zeros((n, b.STEP_FIELDS)),
         beams=np.zeros(n, np.int64),
         rows=np.zeros((n, b.ROWS, 8)),
         middle=np.zeros(ring.q.size),
-        columns=empty_columns(ring.blocks.data.shape[0] - 1, PER_BEAM, UNIT_IMPULSES),
+        columns=empty_columns(ring.blocks.data.shape[0] - 1, PER_BEAM, _UNIT_IMPULSES),
         coupling=np.zeros((n, 2, whole)),
         impulses=np.zeros(whole),
         inputs=np.zeros(f.INPUTS),

@@ -28,7 +28,7 @@ from cvt_hpc.multibody.ancf_beam import AXES, PER_NODE, X, Y, shapes
 from cvt_hpc.multibody.ancf_equations import Chain
 from cvt_hpc.solvers.cyclic_blocks import DIAGONAL, LOWER, UPPER
 
-NEAR = 1.05  # radii of a pulley, beyond which nothing touches it
+_NEAR = 1.05  # radii of a pulley, beyond which nothing touches it
 _Two = tuple[float, float]
 _Four = tuple[float, float, float, float]
 _Point = tuple[int, int, _Four]  # of the belt: the nodes before and behind it, and the shapes there
@@ -120,7 +120,7 @@ def add_contacts(
                 x = s0 * q[i, 0] + s1 * q[i, 2] + s2 * q[j, 0] + s3 * q[j, 2]
                 y = s0 * q[i, 1] + s1 * q[i, 3] + s2 * q[j, 1] + s3 * q[j, 3]
                 away_x, away_y = x - centre_x, y - centre_y
-                if away_x * away_x + away_y * away_y >= (NEAR * radius) ** 2:
+                if away_x * away_x + away_y * away_y >= (_NEAR * radius) ** 2:
                     continue
                 vx = s0 * u[i, 0] + s1 * u[i, 2] + s2 * u[j, 0] + s3 * u[j, 2] - centre_vx
                 vy = s0 * u[i, 1] + s1 * u[i, 3] + s2 * u[j, 1] + s3 * u[j, 3] - centre_vy

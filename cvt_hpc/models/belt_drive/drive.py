@@ -42,9 +42,9 @@ from cvt_hpc.solvers.generalised_alpha import Scheme, stage_length
 
 STEPS, ITERATIONS, UNSOLVED = range(3)  # counters of a state
 
-STUCK = 1.5  # friction_speed: slower contacts stick
-TIED = 1e3  # times as stiff as contacts across the rim: the stiffness of ties
-LOWEST = 1.0  # [Hz]: modes below are the belt as it runs around
+_STUCK = 1.5  # friction_speed: slower contacts stick
+_TIED = 1e3  # times as stiff as contacts across the rim: the stiffness of ties
+_LOWEST = 1.0  # [Hz]: modes below are the belt as it runs around
 
 
 class Drive(NamedTuple):
@@ -148,12 +148,12 @@ def drive_frequencies(drive: Drive, state: State, count: int) -> np.ndarray:
     """Lowest frequencies of a drive about its state, (count,) ascending [Hz]; nan where fewer are found."""
     mass, stiffness = matrices(drive, state)
     # a shift below all: the belt that runs around has 0
-    shift = -((2.0 * np.pi * LOWEST) ** 2)
+    shift = -((2.0 * np.pi * _LOWEST) ** 2)
     most = min(count + 4, mass.shape[0] - 2)
     start = np.random.default_rng(0).normal(size=mass.shape[0])  # one of its own would differ from run to run
     squares = eigsh(stiffness, most, mass, sigma=shift, v0=start, return_eigenvectors=False)
     found = np.sort(np.sqrt(np.maximum(squares, 0.0))) / (2.0 * np.pi)
-    found = found[found > LOWEST][:count]
+    found = found[found > _LOWEST][:count]
     return np.concatenate([found, np.full(count - len(found), np.nan)])
 
 
@@ -218,6 +218,6 @@ def _ties(contact: Contact, memory: Memory) -> np.ndarray:
     friction = contact.friction
     sticks = memory.side == 0
     if friction.treatment == Treatment.REGULARISED:
-        sticks = np.abs(memory.slip) < STUCK * friction.friction_speed
+        sticks = np.abs(memory.slip) < _STUCK * friction.friction_speed
     is_bristle = friction.treatment == Treatment.BRISTLE
-    return np.where(sticks, friction.shear_stiffness if is_bristle else TIED * contact.stiffness, 0.0)
+    return np.where(sticks, friction.shear_stiffness if is_bristle else _TIED * contact.stiffness, 0.0)

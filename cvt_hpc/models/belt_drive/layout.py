@@ -17,7 +17,7 @@ from cvt_hpc.variator import PULLEYS, STRANDS
 from cvt_hpc.variator.scene import length_problems, nested_problems
 
 Problem = tuple[str, str, str]  # key, expected, found
-MOST_RUN_OUT = 0.01  # of the radius: the square of this is left out
+_MOST_RUN_OUT = 0.01  # of the radius: the square of this is left out
 
 COLUMNS = {"x": ("m",), "y": ("m",), "radius": ("m",), "turn": ("",), "inertia": ("kg m^2",), "load": ("",)}
 PULLEY_LISTS = tuple(f"pulley_{name}" for name in COLUMNS)
@@ -128,7 +128,7 @@ def layout(parameters: Parameters) -> Layout:
     return Layout(path, names, spans, inertia, load, 1 + int(np.argmax(np.abs(load[1:]))))
 
 
-def arms_of(parameters: Parameters) -> Arms:
+def _arms_of(parameters: Parameters) -> Arms:
     """Arms of a drive; without `tensioner_moment` the moments of their springs are 0."""
     p = parameters
     pivot = np.array([p["tensioner_x"], p["tensioner_y"]]).T.reshape(-1, 2)
@@ -150,7 +150,7 @@ def pulleys_of(parameters: Parameters, drawn: Layout) -> Pulleys:
     for a, number in enumerate(parameters["tensioner_pulley"]):
         arm[int(number) - 1] = a
     rim = [np.array(parameters[key] or np.zeros(len(arm)), float) for key in ("run_out", "run_out_phase")]
-    return Pulleys(drawn.path.centre, drawn.path.radius, drawn.inertia, arm, arms_of(parameters), *rim)
+    return Pulleys(drawn.path.centre, drawn.path.radius, drawn.inertia, arm, _arms_of(parameters), *rim)
 
 
 def layout_problems(parameters: Parameters) -> list[Problem]:
@@ -176,9 +176,9 @@ def run_out_problems(parameters: Parameters) -> list[Problem]:
             return found
         if len(p[key]) not in (0, len(radius)):
             return [(key, f"a value for each pulley, {len(radius)}", f"{len(p[key])}")]
-    for value, most in zip(p["run_out"], MOST_RUN_OUT * radius, strict=False):
+    for value, most in zip(p["run_out"], _MOST_RUN_OUT * radius, strict=False):
         if value > most:
-            expected = f"at most {most:g} m, {MOST_RUN_OUT:.0%} of the pulley's radius"
+            expected = f"at most {most:g} m, {_MOST_RUN_OUT:.0%} of the pulley's radius"
             return [("run_out", expected, f"{value:g} m")]
     return []
 

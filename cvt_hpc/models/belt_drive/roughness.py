@@ -10,7 +10,7 @@ import numpy as np
 
 from cvt_hpc.parameters import Parameter, Parameters, not_negative
 
-HIGHEST = 0.01  # of the smallest radius: so rough a belt may be
+_HIGHEST = 0.01  # of the smallest radius: so rough a belt may be
 ROUGHNESS: dict[str, Parameter] = {
     "roughness": not_negative(
         0.0, "m", "root mean square of the height of the belt's surface", sensible=(1e-8, 1e-3)
@@ -45,8 +45,8 @@ def roughness_problems(parameters: Parameters, radius: float) -> list[tuple[str,
     if p["roughness_waves"] > (most := p["elements"] // 2):
         expected = f"at most {most}, of two elements each"
         return [("roughness_waves", expected, f"{p['roughness_waves']}")]
-    if p["roughness"] > HIGHEST * radius:
-        expected = f"at most {HIGHEST * radius:g} m, {HIGHEST:.0%} of the smallest radius"
+    if p["roughness"] > _HIGHEST * radius:
+        expected = f"at most {_HIGHEST * radius:g} m, {_HIGHEST:.0%} of the smallest radius"
         return [("roughness", expected, f"{p['roughness']:g} m")]
     return []
 

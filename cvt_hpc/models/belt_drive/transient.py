@@ -26,10 +26,10 @@ CHANNELS = (
     *(f"tension {strand}" for strand in STRANDS),
     *(f"slip {pulley}" for pulley in PULLEYS),
 )
-MOST_LIFTED = 0.01  # [s] that a pulley may be without the belt
+_MOST_LIFTED = 0.01  # [s] that a pulley may be without the belt
 # Of the larger of drive and losses. Without load, where bending alone takes 4 W, steps of 0.1 ms leave up to
 # 0.013 open, of 0.05 ms 0.0009 (22.6 rad/s, 96 elements); with load runs leave up to 0.004.
-MOST_OPEN = 0.02
+_MOST_OPEN = 0.02
 
 
 class Transient(SampledRun):
@@ -123,13 +123,13 @@ class Transient(SampledRun):
     @property
     def lifted(self) -> np.ndarray:
         """Whether the belt has left a pulley, (P,)."""
-        return self._lifted * self.interval > MOST_LIFTED
+        return self._lifted * self.interval > _MOST_LIFTED
 
     def _left(self) -> str | None:
         if not self.lifted.any():
             return None
         name = self.drawn.pulleys[int(np.argmax(self._lifted))]
-        return f"the belt lifts off: it has not touched the {name} pulley for {MOST_LIFTED:g} s"
+        return f"the belt lifts off: it has not touched the {name} pulley for {_MOST_LIFTED:g} s"
 
     @property
     def time(self) -> float:
@@ -213,8 +213,8 @@ class Transient(SampledRun):
         unsolved, open_power = record["unsolved_share"], record["power_residual"]
         if not unsolved <= MOST_UNSOLVED:
             why = f"{unsolved:.1%} of the steps were not solved"
-        elif not abs(open_power) <= MOST_OPEN:
-            why = f"the power balance is open by {open_power:.3g}, not by at most {MOST_OPEN:g}"
+        elif not abs(open_power) <= _MOST_OPEN:
+            why = f"the power balance is open by {open_power:.3g}, not by at most {_MOST_OPEN:g}"
         elif record["vibrates"] in (Vibrates.YES, Vibrates.IRREGULAR) and (
             record["amplitude"].max() < (shaken := mesh_amplitude(p, self.path, record["strand_tension"]))
         ):

@@ -64,7 +64,7 @@ def book_contacts(belt, state, scratch, between, dt):
 
 
 @register_jitable
-def lag_rate(increments, earlier, unknown, dt):
+def _lag_rate(increments, earlier, unknown, dt):
     """Rate of an opening at the end of a step [m/s], by its changes in this step and in the one before."""
     return (1.5 * increments[unknown] - 0.5 * earlier[unknown]) / dt
 
@@ -84,7 +84,7 @@ def border_residuals(belt, changes, openings, load, torque, power, scratch, bord
         pulley, mode = k // modes, k % modes
         opening = openings[pulley, mode] + increments[1 + k]
         held = belt.modal_stiffness[pulley, mode] * opening
-        held += belt.modal_damping[pulley, mode] * lag_rate(increments, earlier, 1 + k, dt)
+        held += belt.modal_damping[pulley, mode] * _lag_rate(increments, earlier, 1 + k, dt)
         border[1 + k, last] = scratch.data[0, k, 0] - held
     scratch[0, 0], scratch[0, 1] = around(torque), around(power)
     border[0, last] = scratch.data[0, 0, 0] - load - belt.driven_inertia * increments[0] / dt
@@ -112,9 +112,8 @@ def close_border(belt, sums, border, dt):
             border[row, row] += belt.driven_inertia / dt
         else:
             pulley, mode = (row - 1) // modes, (row - 1) % modes
-            border[row, row] += (
-                belt.modal_stiffness[pulley, mode] + 1.5 * belt.modal_damping[pulley, mode] / dt
-            )
+            damping = 1.5 * belt.modal_damping[pulley, mode] / dt
+            border[row, row] += belt.modal_stiffness[pulley, mode] + damping
 
 
 @register_jitable
@@ -134,15 +133,14 @@ def accept_border(belt, state, work, inputs, dt):
     """Take driven pulley, sheaves and time to the end of the step."""
     modes = belt.modal_stiffness.shape[1]
     for k in range(2 * modes):
-        rate = lag_rate(state.increments, work.increments, 1 + k, dt)
+        rate = _lag_rate(state.increments, work.increments, 1 + k, dt)
         # of both sheaves of a pulley
         state.totals[f.LAG_LOSS] += 2.0 * dt * belt.modal_damping[k // modes, k % modes] * rate * rate
         state.openings[k // modes, k % modes] += state.increments[1 + k]
     state.pulleys[f.DRIVEN_SPEED] += state.increments[0]
     state.totals[f.TIME] += dt
-    state.totals[f.WORK_OUT] += (
-        dt * inputs[f.IN_LOAD] * (state.pulleys[f.DRIVEN_SPEED] - 0.5 * state.increments[0])
-    )
+    speed = state.pulleys[f.DRIVEN_SPEED] - 0.5 * state.increments[0]
+    state.totals[f.WORK_OUT] += dt * inputs[f.IN_LOAD] * speed
 
 
 @kernel

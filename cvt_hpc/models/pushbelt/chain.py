@@ -169,9 +169,8 @@ def predict(belt, state, pulleys, step, dt):
         reach = cosine * y + side * sine * z
         strand = (reach > 0.0) & (reach < cosine * belt.centre_distance)
         middle = (y + 0.5 * dt * u_y, z + 0.5 * dt * u_z)
-        r_y, r_z, radius, r_lever, t_lever = radial(
-            middle, turned(x[0], x[1], 0.5 * dt * omega), centre, belt.pitch_depth
-        )
+        mid_x = turned(x[0], x[1], 0.5 * dt * omega)
+        r_y, r_z, radius, r_lever, t_lever = radial(middle, mid_x, centre, belt.pitch_depth)
         step[j, f.MID_R_Y], step[j, f.MID_R_Z], step[j, f.MID_RADIUS] = r_y, r_z, radius
         step[j, f.MID_R_LEVER], step[j, f.MID_T_LEVER] = r_lever, t_lever
         step[j, f.NORMAL_Y] = select(strand, like(-sine, y), r_y)

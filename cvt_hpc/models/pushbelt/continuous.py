@@ -38,8 +38,8 @@ from cvt_hpc.parameters import Parameters
 from cvt_hpc.physics.sheaves import axial_element_stiffness
 from cvt_hpc.variator.scene import TILT
 
-RESOLVED = 7.5e-6  # [s]: damping over stiffness of contacts between elements, at least
-RIGID = 1e12  # [N/m]: of a mode that does not open; it gives way by 0.1 um under 100 kN
+_RESOLVED = 7.5e-6  # [s]: damping over stiffness of contacts between elements, at least
+_RIGID = 1e12  # [N/m]: of a mode that does not open; it gives way by 0.1 um under 100 kN
 
 # By key of the continuum the only value that the pushbelt has a counterpart of
 ONLY = {
@@ -65,8 +65,8 @@ def _flank_stiffness(p: Parameters) -> float:
 
 
 def _modes(p: Parameters, radius: float) -> tuple[float, float, float]:
-    tilt = min(2.0 * p["tilt_stiffness"] * p["tilt_factor"] / radius**2, RIGID)
-    return RIGID, tilt, tilt
+    tilt = min(2.0 * p["tilt_stiffness"] * p["tilt_factor"] / radius**2, _RIGID)
+    return _RIGID, tilt, tilt
 
 
 def _tilt(key: str, p: Parameters) -> float:
@@ -79,7 +79,7 @@ FOLLOWS = {
     "edge_stiffness": Follows(("element_stiffness",), lambda p: p["element_stiffness"]),
     "element_damping": Follows(
         ("element_damping", "element_stiffness"),
-        lambda p: max(p["element_damping"], RESOLVED * p["element_stiffness"]),
+        lambda p: max(p["element_damping"], _RESOLVED * p["element_stiffness"]),
     ),
     "flank_stiffness": Follows(("flank_stiffness", "element_factor", "half_wedge_angle"), _flank_stiffness),
     "driving_modal_stiffness": Follows(

@@ -17,13 +17,13 @@ from cvt_hpc.variator.profiles import extremes, profile_problems
 from cvt_hpc.variator.scene import nested
 from cvt_hpc.vibration.ramped import ramped
 
-FEWEST_ELEMENTS = 100
-BELOW_PASSAGE = 0.9  # of half that frequency: belts run up to 4 % slower than by the nominal radius
-NOT_HERE = ("disturbance", "seed")
+_FEWEST_ELEMENTS = 100
+_BELOW_PASSAGE = 0.9  # of half that frequency: belts run up to 4 % slower than by the nominal radius
+_NOT_HERE = ("disturbance", "seed")
 MODES = ("driving_modal_stiffness", "driven_modal_stiffness")
 SCALED = (*MODES, "local_stiffness", "local_length")  # without effect between rigid sheaves
-RINGS = {"bending_stiffness": 0.0, "reference_tension": 600.0}  # defaults other than the elastic belt's
-NO_TABLE = ("table_file", "table_force", "table_speed", "table_mu")
+_RINGS = {"bending_stiffness": 0.0, "reference_tension": 600.0}  # defaults other than the elastic belt's
+_NO_TABLE = ("table_file", "table_force", "table_speed", "table_mu")
 
 
 def _play(parameters: Parameters) -> float:
@@ -44,7 +44,7 @@ def path_length(parameters: Parameters) -> float:
 
 PARAMETERS: dict[str, dict[str, Parameter]] = {
     "scene": {
-        **{key: entry for key, entry in scene.SCENE.items() if key not in NOT_HERE},
+        **{key: entry for key, entry in scene.SCENE.items() if key not in _NOT_HERE},
         "ratio": replace(
             scene.SCENE["ratio"], default=1.35, description="speed ratio, driven radius / driving radius"
         ),
@@ -87,7 +87,7 @@ PARAMETERS: dict[str, dict[str, Parameter]] = {
         "coarse": Parameter(
             False,
             "",
-            f"fewer than {FEWEST_ELEMENTS} elements are meant: super elements, a polygon around the arcs",
+            f"fewer than {_FEWEST_ELEMENTS} elements are meant: super elements, a polygon around the arcs",
         ),
         "element_mass": positive(1.214, "kg/m", "mass per length of the elements", sensible=(0.05, 20.0)),
         "element_height": positive(
@@ -140,7 +140,7 @@ PARAMETERS: dict[str, dict[str, Parameter]] = {
         ),
         "ring_mass": positive(0.2495, "kg/m", "mass per length of the rings", sensible=(0.01, 10.0)),
         "ring_stiffness": positive(6e6, "N", "longitudinal stiffness EA of all rings", sensible=(1e4, 1e10)),
-        **{key: replace(entry, default=RINGS.get(key, entry.default)) for key, entry in scene.RINGS.items()},
+        **{key: replace(entry, default=_RINGS.get(key, entry.default)) for key, entry in scene.RINGS.items()},
         "ring_friction": not_negative(0.06, "", "friction coefficient between rings and elements"),
         "ring_friction_speed": positive(
             5e-4, "m/s", "regularisation speed of that friction", sensible=(1e-06, 5.0)
@@ -201,7 +201,7 @@ PARAMETERS: dict[str, dict[str, Parameter]] = {
     },
     "pulleys": scene.TILT_LAG,
     "friction": {
-        **{key: entry for key, entry in scene.FRICTION.items() if key not in NO_TABLE},
+        **{key: entry for key, entry in scene.FRICTION.items() if key not in _NO_TABLE},
         "friction_law": replace(
             scene.FRICTION["friction_law"], choices=tuple(law for law in FRICTION_LAWS if law != "table")
         ),
@@ -226,8 +226,8 @@ def check(parameters: Parameters) -> list[tuple[str, str, str]]:
     pitch = path_length(p) / p["elements"]
     if p["play"] > pitch:
         problems.append(("play", f"less than the pitch of the elements, {pitch:.4g} m", f"{p['play']:g} m"))
-    if p["elements"] < FEWEST_ELEMENTS and not p["coarse"]:
-        expected = f"{FEWEST_ELEMENTS} or more, or coarse = true"
+    if p["elements"] < _FEWEST_ELEMENTS and not p["coarse"]:
+        expected = f"{_FEWEST_ELEMENTS} or more, or coarse = true"
         problems.append(("elements", expected, f"{p['elements']}"))
     for key in MODES:
         if nested(p[key]) or not p[key] or len(p[key]) != len(p[MODES[0]]) or min(p[key]) <= 0.0:
@@ -265,8 +265,8 @@ def _problems_at(parameters: Parameters, ratio: float) -> list[tuple[str, str, s
     problems = []
     # the polygon of the elements shakes strands as they pass, and by the change of stiffness at half of that
     half = 0.5 * _driving_speeds(p)[0] * driven / ratio * p["elements"] / length
-    if BELOW_PASSAGE * half < p["band_high"]:
-        most = f"{BELOW_PASSAGE * half:.4g} Hz, below half of the frequency at which elements pass{at}"
+    if _BELOW_PASSAGE * half < p["band_high"]:
+        most = f"{_BELOW_PASSAGE * half:.4g} Hz, below half of the frequency at which elements pass{at}"
         problems.append(("band_high", f"at most {most}, or more elements", f"{p['band_high']:g} Hz"))
     step, why = p.get("step", 0.0), "pitch over the speed of transverse waves under the thrust"
     if not problems and step > (limit := string_limit(p)):
@@ -369,10 +369,10 @@ def inert(parameters: Parameters) -> dict[str, str]:
             (np.isinf(p["nose_clearance"]), f"nose_{key}", "nose_clearance inf")
             for key in ("height", "stiffness")
         ),
-        (p["elements"] >= FEWEST_ELEMENTS, "coarse", f"elements {FEWEST_ELEMENTS} or more"),
+        (p["elements"] >= _FEWEST_ELEMENTS, "coarse", f"elements {_FEWEST_ELEMENTS} or more"),
         (p["driving_thrust"] > 0.0, "ratio_profile", "driving_thrust above 0"),
         (p["driving_thrust"] == 0.0, "driving_thrust_profile", "driving_thrust 0"),
         (True, "arc_probes", "model pushbelt, which is probed on its strands"),
     )
     found = {key: setting for holds, key, setting in cases if holds}
-    return friction_inert({**p, **dict.fromkeys(NO_TABLE, ())}) | scene.course_inert(p) | found
+    return friction_inert({**p, **dict.fromkeys(_NO_TABLE, ())}) | scene.course_inert(p) | found

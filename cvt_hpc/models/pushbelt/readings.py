@@ -128,10 +128,8 @@ class Reading:
         both = np.stack([1.0 - driven, driven])
         thrust = e[:, fields.FLANK] * belt.cosine + e[:, fields.FLANK_FRICTION_M] * belt.sine
         # the meridian's speed is the radial one over the cosine, its force in radial direction has the cosine
-        loss = 2.0 * (
-            belt.cosine**2 * e[:, fields.FLANK_FRICTION_M] * e[:, fields.FLANK_SLIP_M]
-            + e[:, fields.FLANK_FRICTION_T] * e[:, fields.FLANK_SLIP_T]
-        )
+        loss = belt.cosine**2 * e[:, fields.FLANK_FRICTION_M] * e[:, fields.FLANK_SLIP_M]
+        loss = 2.0 * (loss + e[:, fields.FLANK_FRICTION_T] * e[:, fields.FLANK_SLIP_T])
         weights = both * e[:, fields.FLANK]
         pressed = weights.sum(axis=1)
         weights /= np.maximum(pressed, 1e-9)[:, None]

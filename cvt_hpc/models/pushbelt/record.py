@@ -30,9 +30,9 @@ if TYPE_CHECKING:
 
     from cvt_hpc.models.pushbelt.run import ElementRun
 
-IDLE = 0.02  # of the largest push force: what is below does not press
+_IDLE = 0.02  # of the largest push force: what is below does not press
 # Measured on one core of an EPYC (Zen 5): core-seconds per element and step, and per sample
-RIGID_COST, ELASTIC_COST, SAMPLE_COST = 5.2e-7, 9.3e-7, 2e-4
+_RIGID_COST, _ELASTIC_COST, _SAMPLE_COST = 5.2e-7, 9.3e-7, 2e-4
 
 
 def slip_loss(measured: Measured) -> float:
@@ -51,7 +51,7 @@ def _share_left(measured: Measured) -> float:
 def _idle_arcs(measured: Measured) -> np.ndarray:
     """Share of each arc without push force [1], (2,); as well where no element has been."""
     push, where = measured.profiles["push_force"], regions(measured.path, measured.places)
-    idle = ~(push > IDLE * np.nanmax(push))
+    idle = ~(push > _IDLE * np.nanmax(push))
     return np.array([idle[where == REGIONS.index(pulley)].mean() for pulley in PULLEYS])
 
 
@@ -88,11 +88,8 @@ VARIABLES = (
         words="numerical damping",
     ),
     *shared("power_residual"),
-    Variable(
-        "efficiency",
-        "1",
-        "what is left of driving_power for load, thrust and storing",
-        of=_share_left,
+    *shared(
+        "efficiency", comment="what is left of driving_power for load, thrust and storing", of=_share_left
     ),
     Variable(
         "largest_push_force",
@@ -132,8 +129,8 @@ def coordinates(parameters: Parameters) -> dict[str, Coordinate]:
 def cost(parameters: Parameters, stepper: str) -> Any:
     """Core-seconds of a run; of parameters that are arrays, an array."""
     p = parameters
-    each = np.where(np.isinf(p["sheave_stiffness"]), RIGID_COST, ELASTIC_COST)[()]
-    return p["duration"] * (each * p["elements"] / p["step"] + SAMPLE_COST * p["sampling_rate"])
+    each = np.where(np.isinf(p["sheave_stiffness"]), _RIGID_COST, _ELASTIC_COST)[()]
+    return p["duration"] * (each * p["elements"] / p["step"] + _SAMPLE_COST * p["sampling_rate"])
 
 
 judge = partial(judging.judge, variables=VARIABLES)

@@ -28,13 +28,13 @@ from cvt_hpc.variator.profiles import extremes, multiple
 from cvt_hpc.variator.slip import GAINED, LOST
 from cvt_hpc.vibration.ramped import ramped
 
-MOST_BYTES = 2**24  # of a process: some 80 start-ups of 432 elements and 15 ms at 20 kHz
+_MOST_BYTES = 2**24  # of a process: some 80 start-ups of 432 elements and 15 ms at 20 kHz
 
 
 class StartUps:
     """Start-ups as copies of arrays, of `most_bytes` in all; the least recently used goes first."""
 
-    def __init__(self, most_bytes: int = MOST_BYTES) -> None:
+    def __init__(self, most_bytes: int = _MOST_BYTES) -> None:
         self._most_bytes = most_bytes
         self._kept: OrderedDict[str, tuple[np.ndarray, ...]] = OrderedDict()
 
@@ -82,16 +82,16 @@ def fingerprint(*values: object) -> str:
 
 
 COURSES = ("load", "driving_speed")
-FIRST_THRUST = 500.0  # [N]: with which the run begins, so that the belt settles in the grooves
-KICK_PEAK = 32.0 / 27.0  # of sin^2 x (1 + cos x), at cos x = 1/3
+_FIRST_THRUST = 500.0  # [N]: with which the run begins, so that the belt settles in the grooves
+_KICK_PEAK = 32.0 / 27.0  # of sin^2 x (1 + cos x), at cos x = 1/3
 CLAMPED = 0.5  # of the rise time: until then the thrust rises, from then on the load, lest the belt slips
 # Limit of the open power balance beside the equations' tolerance: elastic sheaves lean along the arc,
 # which has no part in the elements' forces. Sound runs leave up to 0.5 % of the losses.
-OF_LOSS = 0.02  # [1]
+_OF_LOSS = 0.02  # [1]
 # Limit of numerical damping beside that share of the losses: one of the energy of rotation of elements
 # that meet and leave an arc, and of thrust times belt speed, by step. Without vibration sound runs damp by up
 # to 85 % of these two.
-OF_ROTATION, OF_THRUST = 1.5, 10.0  # [1], [1/s]
+_OF_ROTATION, _OF_THRUST = 1.5, 10.0  # [1], [1/s]
 
 _start_ups = StartUps()
 forget = _start_ups.forget
@@ -211,7 +211,7 @@ class ElementRun(SampledRun):
         starts, length = np.concatenate([[0.0], np.cumsum(path.lengths)]), path.strand_length
         phase = np.pi * np.where(region % 2 == 1, (position - starts[region]) / length, 0.0)
         c, s = np.cos(phase), np.sin(phase)
-        size = self.parameters["kick"] / KICK_PEAK
+        size = self.parameters["kick"] / _KICK_PEAK
         speed, slope = size * s**2 * (1.0 + c), size * np.pi / length * s * (1.0 + c) * (3.0 * c - 1.0)
         _, angle, _ = points_at(path, self.parameters["centre_distance"], position)
         changes = speed * np.sin(angle), -speed * np.cos(angle), -slope
@@ -250,7 +250,7 @@ class ElementRun(SampledRun):
             share = begun + (1.0 - begun) * min(max((time - rise) / (end - rise), 0.0), 1.0)
         clamped = load_course.py_func(time, CLAMPED * rise, rise, 1.0, 1.0)
         driving, driven = (
-            FIRST_THRUST + clamped * (p[name] * multiple(p, name, time) - FIRST_THRUST)
+            _FIRST_THRUST + clamped * (p[name] * multiple(p, name, time) - _FIRST_THRUST)
             for name in ("driving_thrust", "thrust")
         )
         speed = share * p["driving_speed"] * multiple(p, "driving_speed", time)
@@ -337,7 +337,7 @@ class ElementRun(SampledRun):
         These are `power_residual`, `numerical_damping`, `driving_power`, `loss` and `unsolved_share`.
         """
         unsolved, open_power = record["unsolved_share"], abs(record["power_residual"])
-        flow, small = max(abs(record["driving_power"]), record["loss"]), OF_LOSS * record["loss"]
+        flow, small = max(abs(record["driving_power"]), record["loss"]), _OF_LOSS * record["loss"]
         damped, most_damped = record["numerical_damping"].sum(), self._most_damped() + small
         most_open = (small + self._most_open()) / flow
         if not unsolved <= MOST_UNSOLVED:
@@ -362,4 +362,4 @@ class ElementRun(SampledRun):
         turning = path.driving_radius**-2 + path.driven_radius**-2
         rotation = 0.5 * self._tilting_inertia() * passing * speed**2 * turning
         thrust = extremes(p, "thrust")[1]
-        return OF_ROTATION * rotation + OF_THRUST * self.step * thrust * speed
+        return _OF_ROTATION * rotation + _OF_THRUST * self.step * thrust * speed

@@ -68,7 +68,7 @@ def linear_blocks(belt, step, dt):
     """Blocks of inertia, dampers, tension, pitch, yaw and bending: DIAGONAL and LINK of each element."""
     steep = angle_slope(belt, dt)
     yawing = BETA * dt * belt.yaw_stiffness + belt.yaw_damping
-    shear, bend = bending_slopes(belt, dt)
+    shear, bend = _bending_slopes(belt, dt)
     per_pitch = 1.0 / belt.pitch
     for j in range(step.rows):
         uu, uw = vec.symmetric(step, j, f.INERTIA), vec.matrix(step, j, f.INERTIA_UW)
@@ -279,7 +279,7 @@ def close_pairs(belt, state, work, dt):
 
 
 @register_jitable
-def bending_slopes(belt, dt):
+def _bending_slopes(belt, dt):
     """Increase of the shear force by the rate of shear, and of the moment by the rate of change of slope."""
     return BETA * dt * belt.ring_shear * belt.pitch, BETA * dt * belt.ring_bending / belt.pitch
 
@@ -300,7 +300,7 @@ def bending_forces(belt, state, step, iterate, dt):
     """Add to the pairs' forces."""
     per_pitch = 1.0 / belt.pitch
     for_shear, for_bend = belt.ring_shear * belt.pitch, belt.ring_bending / belt.pitch
-    steep, steep_bend = bending_slopes(belt, dt)
+    steep, steep_bend = _bending_slopes(belt, dt)
     for j in range(step.rows):
         here, there = state[j, f.CHANGE + f.ROW_P], ahead(state, j, f.CHANGE + f.ROW_P)
         rise = ahead(state, j, f.CHANGE + f.AXIAL) - state[j, f.CHANGE + f.AXIAL]

@@ -26,7 +26,7 @@ from cvt_hpc.physics.geometry import Variator
 from cvt_hpc.physics.out_of_plane import SIDES
 from cvt_hpc.variator.history import points_at, regions
 
-SEED_MODES = 5  # half waves of a strand that the disturbance at the start is made of
+_SEED_MODES = 5  # half waves of a strand that the disturbance at the start is made of
 
 
 class Belt(NamedTuple):
@@ -199,20 +199,18 @@ class SideLine:
         self._path, self._belt, self._middles = path, belt, middles
         self._starts = np.concatenate([[0.0], np.cumsum(path.lengths)[:3]])
         shares = np.linspace(0.0, 1.0, 1001)
-        self._modes = np.random.default_rng(seed).uniform(-1.0, 1.0, (2, SEED_MODES))
+        self._modes = np.random.default_rng(seed).uniform(-1.0, 1.0, (2, _SEED_MODES))
         self._modes *= disturbance / np.abs([self._disturbed(k, shares)[0] for k in (0, 1)]).max()
 
     def _disturbed(self, strand: int, share: np.ndarray) -> tuple[np.ndarray, np.ndarray]:
         """Displacement on a strand by the share of its length, and its derivative by it."""
         x = np.pi * share
-        found = np.zeros_like(x), np.zeros_like(x)
+        moved, change = np.zeros((2, x.size))
         for n, size in enumerate(self._modes[strand], start=1):
             wave, slope = np.sin(n * x), n * np.cos(n * x)
-            found = (
-                found[0] + size * np.sin(x) * wave,
-                found[1] + size * np.pi * (np.cos(x) * wave + np.sin(x) * slope),
-            )
-        return found
+            moved += size * np.sin(x) * wave
+            change += size * np.pi * (np.cos(x) * wave + np.sin(x) * slope)
+        return moved, change
 
     def _on_pulley(self, k: int, position: np.ndarray) -> tuple[np.ndarray, np.ndarray]:
         """Axial position [m] and slope of the mid plane of a pulley at path coordinates (n,) [m]."""
@@ -282,18 +280,10 @@ def start(parameters: Parameters) -> tuple[Belt, BeltState]:
     fields[:, f.LENGTH] = lines / (1.0 + strain)
     fields[:, f.TENSION] = belt.ring_stiffness * strain
     fields[:, f.DRIVEN] = points[:, 0] > 0.5 * belt.centre_distance
-    modes = belt.modal_stiffness.shape[1]
-    state = BeltState(
-        in_lanes(fields),
-        np.append(line.pulleys, middles),
-        np.zeros((2, modes)),
-        np.zeros((2, modes)),
-        np.zeros(1 + 2 * modes),
-        np.zeros(f.LOADS),
-        np.zeros(planar.TOTALS),
-        np.zeros(planar.COUNTERS, np.int64),
-    )
-    return belt, state
+    openings, leans = np.zeros_like(belt.modal_stiffness), np.zeros_like(belt.modal_stiffness)
+    increments, pulleys = np.zeros(1 + openings.size), np.append(line.pulleys, middles)
+    sums = np.zeros(f.LOADS), np.zeros(planar.TOTALS), np.zeros(planar.COUNTERS, np.int64)
+    return belt, BeltState(in_lanes(fields), pulleys, openings, leans, increments, *sums)
 
 
 def with_two_flows(belt: Belt, state: BeltState) -> BeltState:

@@ -59,12 +59,8 @@ def frustum_gap(belt, side, radius, along, groove, middle):
 @register_jitable
 def pulley_axis(belt, driven):
     """Axis of the pulley of an element."""
-    axes = belt.axes
-    return (
-        axes[0, 0] + driven * (axes[1, 0] - axes[0, 0]),
-        axes[0, 1] + driven * (axes[1, 1] - axes[0, 1]),
-        axes[0, 2] + driven * (axes[1, 2] - axes[0, 2]),
-    )
+    one, other = vec.at(belt.axes, 0, 0), vec.at(belt.axes, 1, 0)
+    return vec.plus(one, vec.times(driven, vec.minus(other, one)))
 
 
 @register_jitable
@@ -117,9 +113,8 @@ def predict_flanks(belt, state, pulleys, step, dt):
             side, height, width = flank_point(belt, p)
             radial, start, _ = frustum(vec.plus(r, lever_of(o, a, side, height, width)), centre, axis)
             vec.store(step, j, f.RADIAL + 3 * p, radial)
-            radial, radius, _ = frustum(
-                vec.plus(half, lever_of(half_o, half_a, side, height, width)), centre, axis
-            )
+            at_half = vec.plus(half, lever_of(half_o, half_a, side, height, width))
+            radial, radius, _ = frustum(at_half, centre, axis)
             vec.store(step, j, f.MID_RADIAL + 3 * p, radial)
             step[j, f.MID_RADIUS + p] = radius
             _, _, along = frustum(vec.plus(s, lever_of(po, pa, side, height, width)), centre, axis)
@@ -251,9 +246,8 @@ def _point_slopes(belt, step, iterate, j, p, axes, dt):
 @register_jitable
 def _by(forces, rows, k):
     """The forces times entry k of their rows; k is a plain number of the source."""
-    return vec.moved(
-        vec.moved(vec.times(rows[0][k], forces[0]), rows[1][k], forces[1]), rows[2][k], forces[2]
-    )
+    two = vec.moved(vec.times(rows[0][k], forces[0]), rows[1][k], forces[1])
+    return vec.moved(two, rows[2][k], forces[2])
 
 
 @register_jitable
@@ -333,14 +327,10 @@ def add_flank_blocks(belt, state, work, dt):
         o = vec.at(elements, j, f.OUTWARD)
         a = vec.cross(o, vec.at(elements, j, f.HEADING))
         axes = pulley_axis(belt, driven), o, a, vec.at(step, j, f.MID_OUTWARD), vec.at(step, j, f.MID_AXIAL)
-        left = (
-            _point_slopes(belt, step, iterate, j, f.LEFT_LOW, axes, dt),
-            _point_slopes(belt, step, iterate, j, f.LEFT_HIGH, axes, dt),
-        )
-        right = (
-            _point_slopes(belt, step, iterate, j, f.RIGHT_LOW, axes, dt),
-            _point_slopes(belt, step, iterate, j, f.RIGHT_HIGH, axes, dt),
-        )
+        low = _point_slopes(belt, step, iterate, j, f.LEFT_LOW, axes, dt)
+        left = low, _point_slopes(belt, step, iterate, j, f.LEFT_HIGH, axes, dt)
+        low = _point_slopes(belt, step, iterate, j, f.RIGHT_LOW, axes, dt)
+        right = low, _point_slopes(belt, step, iterate, j, f.RIGHT_HIGH, axes, dt)
         _add_columns(blocks, j, 0, left, right)
         _add_columns(blocks, j, 1, left, right)
         _add_columns(blocks, j, 2, left, right)

@@ -18,14 +18,14 @@ from cvt_hpc.variator import PULLEYS, STRANDS
 SIDES = ("left", "right")
 SHEAVES = tuple(f"{pulley} {side}" for pulley in PULLEYS for side in SIDES)
 ANGLES = ("roll", "yaw", "pitch")
-EXTREMES = (*ANGLES, "nose_force")  # the largest of any element
+_EXTREMES = (*ANGLES, "nose_force")  # the largest of any element
 LATERAL = tuple(f"{strand}_lateral" for strand in STRANDS)  # where probes have lateral displacement
 SCALARS = (
     *PLANAR_SCALARS,
     *(f"sheave_force {sheave}" for sheave in SHEAVES),
     *(f"sheave_loss {sheave}" for sheave in SHEAVES),
     "axial_offset",
-    *(f"extreme_{what}" for what in EXTREMES),
+    *(f"extreme_{what}" for what in _EXTREMES),
     *(f"tension_difference {strand}" for strand in STRANDS),
 )
 _LEAST_FORCE = 1e-9  # [N]: what presses less does not press

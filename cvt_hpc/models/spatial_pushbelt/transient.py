@@ -39,7 +39,7 @@ from cvt_hpc.variator import LARGEST_DISPLACEMENT, STRANDS
 CHANNELS = (*COURSES, *readings.SCALARS)
 # Turned by this, the flanks of an element have moved by a quarter of its half width, and no saddle holds the
 # rings. Elements of sound runs turn by 0.05 at most, also where the belt slips through.
-LARGEST_TURN = 0.25  # [1], sine
+_LARGEST_TURN = 0.25  # [1], sine
 
 
 class Transient(ElementRun):
@@ -87,7 +87,7 @@ class Transient(ElementRun):
             element = int(lateral.argmax())
             return f"element {element} has left the grooves: it is {largest * 1e3:.3g} mm out of the plane"
         turned = np.abs(readings.angles(elements))
-        if (largest := turned.max()) > LARGEST_TURN:
+        if (largest := turned.max()) > _LARGEST_TURN:
             angle, element = np.unravel_index(turned.argmax(), turned.shape)
             found = np.arcsin(min(largest, 1.0))
             return f"element {element} has left the rings: its {readings.ANGLES[angle]} is {found:.3g} rad"
