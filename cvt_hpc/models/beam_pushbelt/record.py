@@ -1,7 +1,6 @@
 """The record of a run: that of a run of `pushbelt`, by the same judge."""
 
 from dataclasses import replace
-from typing import Any
 
 import numpy as np
 
@@ -23,7 +22,7 @@ _OTHERWISE = {
 VARIABLES = tuple(replace(v, comment=_OTHERWISE.get(v.name, v.comment)) for v in pushbelt.VARIABLES)
 
 
-def cost(parameters: Parameters, stepper: str) -> Any:
+def cost(parameters: Parameters, stepper: str) -> float | np.ndarray:
     """Core-seconds of a run; of parameters that are arrays, an array."""
     p, n = parameters, parameters["elements"]
     rubs = (np.asarray(p["kinetic_friction"]) > 0.0) | (np.asarray(p["ring_friction"]) > 0.0)

@@ -193,7 +193,7 @@ def coordinates(parameters: Parameters) -> dict[str, Coordinate]:
     }
 
 
-def cost(parameters: Parameters, stepper: str) -> Any:
+def cost(parameters: Parameters, stepper: str) -> float | np.ndarray:
     """Core-seconds of a run; of parameters that are arrays, an array."""
     p = parameters
     step = np.minimum(p["step"], 1.0 / p["sampling_rate"])

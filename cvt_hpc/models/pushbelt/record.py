@@ -4,7 +4,7 @@ from __future__ import annotations
 
 from collections.abc import Mapping
 from functools import partial
-from typing import TYPE_CHECKING, Any
+from typing import TYPE_CHECKING
 
 import numpy as np
 
@@ -126,7 +126,7 @@ def coordinates(parameters: Parameters) -> dict[str, Coordinate]:
     }
 
 
-def cost(parameters: Parameters, stepper: str) -> Any:
+def cost(parameters: Parameters, stepper: str) -> float | np.ndarray:
     """Core-seconds of a run; of parameters that are arrays, an array."""
     p = parameters
     each = np.where(np.isinf(p["sheave_stiffness"]), _RIGID_COST, _ELASTIC_COST)[()]

@@ -118,9 +118,9 @@ class ElementRun(SampledRun):
     _saddle: tuple[int, ...] = (f.Y, f.Z)  # fields of the saddle point, and of its speed with the turning
     _speeds: tuple[int, ...] = (f.U_Y, f.U_Z, f.OMEGA)
     _belt: Any
-    _method: Any  # how steps are solved, state and work space, as `_advance` takes them
+    _method: object  # how steps are solved, state and work space, as `_advance` takes them
     _state: Any
-    _work: Any
+    _work: object
     _advance: Callable[..., int]
 
     def __init__(self, parameters: Parameters, stepper: str) -> None:

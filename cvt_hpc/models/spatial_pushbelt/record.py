@@ -160,7 +160,7 @@ def coordinates(parameters: Parameters) -> dict[str, Coordinate]:
     return {**pushbelt.coordinates(parameters), "sheave": sheave}
 
 
-def cost(parameters: Parameters, stepper: str) -> Any:
+def cost(parameters: Parameters, stepper: str) -> float | np.ndarray:
     """Core-seconds of a run; of parameters that are arrays, an array."""
     p = parameters
     each_step = np.where(np.isinf(p["sheave_stiffness"]), _RIGID_COST, _ELASTIC_COST)[()]
