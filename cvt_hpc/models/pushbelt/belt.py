@@ -105,7 +105,7 @@ NEWTON = Newton(tolerance=1e-3, power_tolerance=1.0, weights=(1.0, 1.0, 2e-3, 1.
 
 
 def newton_of(parameters: Parameters, default: Newton) -> Newton:
-    """Settings of a run, other than by default."""
+    """Settings by a run's parameters, the others by default."""
     p = parameters
     limits = {"power_tolerance": p["power_tolerance"], "most_iterations": p["most_iterations"]}
     return default._replace(tolerance=p["speed_tolerance"], **limits)

@@ -84,7 +84,8 @@ VARIABLES = (
         for v in _OF_STRANDS
     ),
     of_strands(
-        *(shared("spectrum")[0], LATERAL),
+        shared("spectrum")[0],
+        LATERAL,
         name="lateral_spectrum",
         comment="at the probe strongest out of the plane",
         words="lateral amplitude spectrum",
