@@ -52,11 +52,11 @@ def measured(state, belt, work, step, turns, flows):
     """Core-seconds per simulated second, iterations a step, unsolved steps, power left open [W]."""
     steps, hold = round(2e-3 / step), inputs((THRUST, THRUST), (LOAD, LOAD))
     newton = b.NEWTON if flows == 1 else b.NEWTON_OF_TWO_FLOWS
-    advance_by(EQUATIONS[flows], belt, newton, state, work, hold, steps, step)
+    advance_by(EQUATIONS, belt, newton, state, work, hold, steps, step)
     counters, before, energy, least = state.counters.copy(), state.totals.copy(), stored(belt, state), np.inf
     for _ in range(turns):
         start = time.process_time()
-        advance_by(EQUATIONS[flows], belt, newton, state, work, hold, steps, step)
+        advance_by(EQUATIONS, belt, newton, state, work, hold, steps, step)
         least = min(least, time.process_time() - start)
     done, spent = state.counters - counters, state.totals - before
     left = spent[planar.WORK_IN] - spent[planar.WORK_OUT] - spent[planar.THRUST_WORK]

@@ -2,7 +2,8 @@
 
 import numpy as np
 
-from cvt_hpc.models.beam_pushbelt.rcm import RcmBeam, close, relaxed_ring
+from cvt_hpc.models.beam_pushbelt.rcm import RcmBeam
+from cvt_hpc.models.beam_pushbelt.ring import close, relaxed_ring
 from support.rcm import advance, conserved
 
 

@@ -4,7 +4,8 @@ import numpy as np
 import pytest
 
 from cvt_hpc.models.beam_pushbelt import fields as f
-from cvt_hpc.models.beam_pushbelt.rcm import RcmBeam, close, line_point, relaxed_ring
+from cvt_hpc.models.beam_pushbelt.rcm import RcmBeam, line_point
+from cvt_hpc.models.beam_pushbelt.ring import close, relaxed_ring
 from cvt_hpc.models.beam_pushbelt.step import advance
 from cvt_hpc.models.beam_pushbelt.transient import LAW_TOLERANCE, BeltState, workspace
 from cvt_hpc.models.pushbelt import fields

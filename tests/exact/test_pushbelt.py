@@ -10,17 +10,19 @@ from cvt_hpc.job import build_job
 from cvt_hpc.lanes import LaneArray
 from cvt_hpc.models.pushbelt import belt as b
 from cvt_hpc.models.pushbelt import fields as pushbelt_fields
-from cvt_hpc.models.pushbelt import stepping, transient
+from cvt_hpc.models.pushbelt import stepping
 from cvt_hpc.models.pushbelt.assembly import RIGHT
-from cvt_hpc.models.pushbelt.belt import in_lanes, of_lanes, start, workspace
+from cvt_hpc.models.pushbelt.assembly import assemble as _assemble
+from cvt_hpc.models.pushbelt.belt import in_lanes, of_lanes, workspace
 from cvt_hpc.models.pushbelt.parameters import falling_limit, path_length
 from cvt_hpc.models.pushbelt.readings import Reading
 from cvt_hpc.models.pushbelt.run import fingerprint
 from cvt_hpc.models.pushbelt.stepping import correct, solve_bordered
-from cvt_hpc.models.pushbelt.transient import EQUATIONS, _accept, _assemble, _evaluate, _prepare, advance
+from cvt_hpc.models.pushbelt.transient import EQUATIONS, _accept, _evaluate, _prepare, advance
 from cvt_hpc.solvers.cyclic_blocks import block_size
 from cvt_hpc.solvers.linked_blocks import solve
-from support.pushbelts import NODES, SPEED, THRUST, given
+from support.pushbelts import NODES, SPEED, THRUST, given, start
+from support.pushbelts import runs as transient
 
 STEP = 1e-5  # [s]
 LOAD = 81.0  # [N m]

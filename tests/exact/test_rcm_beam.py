@@ -4,14 +4,8 @@ import numpy as np
 import pytest
 from scipy.linalg import eigh
 
-from cvt_hpc.models.beam_pushbelt.rcm import (
-    RcmBeam,
-    close,
-    equations_of_motion,
-    line_point,
-    mean_strain,
-    relaxed_ring,
-)
+from cvt_hpc.models.beam_pushbelt.rcm import RcmBeam, equations_of_motion, line_point, mean_strain
+from cvt_hpc.models.beam_pushbelt.ring import close, relaxed_ring
 from support.rcm import (
     conserved,
     energies,

@@ -3,10 +3,10 @@
 import numpy as np
 import pytest
 
-from cvt_hpc.models.pushbelt.belt import in_lanes, of_lanes, start
+from cvt_hpc.models.pushbelt.belt import in_lanes, of_lanes
 from cvt_hpc.models.pushbelt.ring_bending import COLUMNS, bend_rings
 from cvt_hpc.physics.out_of_plane import clamped_force
-from support.pushbelts import given
+from support.pushbelts import given, start
 
 STIFFNESS, AT_ONCE = 0.5, 1e-9  # [N m^2], [s]: a step that smooths nothing
 

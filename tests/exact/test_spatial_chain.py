@@ -12,7 +12,6 @@ from cvt_hpc.models.pushbelt.stepping import correct, solve_bordered
 from cvt_hpc.models.spatial_pushbelt import belt as b
 from cvt_hpc.models.spatial_pushbelt import fields as spatial_fields
 from cvt_hpc.models.spatial_pushbelt.transient import (
-    EQUATIONS,
     _accept,
     _assemble,
     _evaluate,
@@ -20,6 +19,7 @@ from cvt_hpc.models.spatial_pushbelt.transient import (
     advance,
 )
 from support import spatial_chains as chains
+from support.spatial_chains import EQUATIONS
 
 NODES, RADIUS, SPIN = 216, 0.1082, 250.0  # [m], [rad/s]
 STEP = 1e-5  # [s]

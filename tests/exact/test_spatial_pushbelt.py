@@ -5,7 +5,7 @@ import pytest
 
 from cvt_hpc.models.pushbelt import belt as p
 from cvt_hpc.models.pushbelt import fields as pushbelt_fields
-from cvt_hpc.models.pushbelt.belt import in_lanes, of_lanes, start
+from cvt_hpc.models.pushbelt.belt import in_lanes, of_lanes
 from cvt_hpc.models.pushbelt.belt import workspace as planar_workspace
 from cvt_hpc.models.pushbelt.transient import advance as planar_advance
 from cvt_hpc.models.spatial_pushbelt import belt as b
@@ -13,7 +13,7 @@ from cvt_hpc.models.spatial_pushbelt import fields as spatial_fields
 from cvt_hpc.models.spatial_pushbelt.flank import flank_forces
 from cvt_hpc.models.spatial_pushbelt.transient import _accept, _evaluate, _prepare, advance
 from support import spatial_chains as chains
-from support.pushbelts import THRUST, given
+from support.pushbelts import THRUST, given, start
 from support.spatial_belts import (
     LOAD,
     NODES,

@@ -3,8 +3,9 @@
 import numpy as np
 import pytest
 
+from cvt_hpc.job import build_job
 from cvt_hpc.models.pushbelt import fields as f
-from cvt_hpc.models.pushbelt.belt import equal_chords, of_lanes, path_of
+from cvt_hpc.models.pushbelt.belt import equal_chords, of_lanes, outset
 from cvt_hpc.models.spatial_pushbelt import fields as spatial_fields
 from cvt_hpc.models.spatial_pushbelt.belt import start
 from cvt_hpc.physics.out_of_plane import clamped_force
@@ -12,73 +13,15 @@ from cvt_hpc.variator.history import points_at, regions
 
 OFFSET, EI = 5e-4, 47.6  # [m], [N m^2]
 NODES = 432
-GIVEN = {
-    "ratio": 1.35,
-    "centre_distance": 0.155,
-    "belt_length": 0.6612,
-    "elements": NODES,
-    "element_mass": 1.858e-3,
-    "element_height": 13e-3,
-    "element_width": 24e-3,
-    "pitch_depth": 1.5e-3,
-    "head_height": 4e-3,
-    "flank_reach": 3e-3,
-    "edge_half_width": 10e-3,
-    "head_half_width": 5e-3,
-    "strip_width": 9.75e-3,
-    "package_arm": 8e-3,
-    "play": 0.3e-3,
-    "nose_height": 2.5e-3,
-    "nose_clearance": 1e-4,
-    "nose_stiffness": 1e8,
-    "ring_mass": 0.165,
-    "ring_stiffness": 6e6,
-    "ring_damping": 4.0,
-    "bending_stiffness": 0.0,
-    "ring_strain": 1e-4,
-    "ring_bending": EI,
-    "ring_shear": 2.4e6,
-    "half_wedge_angle": np.radians(11.0),
-    "flank_stiffness": 5e7,
-    "local_compliance": 0.0,
-    "local_decay": 0.5,
-    "contact_stiffness": 1e9,
-    "contact_time": 13e-6,
-    "angle_stiffness": 5.0,
-    "angle_damping": 5e-5,
-    "yaw_stiffness": 2.0,
-    "yaw_damping": 5e-5,
-    "transverse_damping": 500.0,
-    "lateral_damping": 0.0,
-    "friction_law": "coulomb",
-    "kinetic_friction": 0.09,
-    "friction_gradient": 0.0,
-    "stribeck_velocity": 0.1,
-    "friction_memory": 0.0,
-    "ring_friction": 0.06,
-    "friction_speed": 5e-4,
-    "ring_friction_speed": 5e-4,
-    "driven_inertia": 0.01,
-    "driving_rate": 0.0,
-    "driven_rate": 5e-6,
-    "modal_stiffness": ((), ()),
-    "tilt_lag": 0.0,
-    "lean_lag": 1e-4,
-    "loose_sides": ("right", "left"),
-    "misalignment": 0.0,
-    "axis_tilt": 0.0,
-    "axis_skew": 0.0,
-    "disturbance": 0.0,
-    "seed": 1,
-    "driving_speed": 100.0 * np.pi,
-}
-PATH = path_of(GIVEN)
-SPEED = GIVEN["driving_speed"] * PATH.driving_radius
+STILL = {"disturbance": 0.0, "sheave_stiffness": np.inf, "belt_length": 0.6612}
+P = build_job({"name": "start", "model": "spatial_pushbelt"}, "start", STILL).point(0)
+PATH = outset(P).line.path
+SPEED = P["driving_speed"] * PATH.driving_radius
 
 
 def started(**changes):
     """Constants, fields (n, STATE_FIELDS), pulleys, and region of each element."""
-    belt, state = start(GIVEN | changes)
+    belt, state = start({**P, **changes})
     places, _ = equal_chords(lambda s: points_at(PATH, 0.155, s)[0], PATH.path_length, NODES)
     return belt, of_lanes(state.elements), state.pulleys, regions(PATH, places)
 

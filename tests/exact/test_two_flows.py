@@ -18,8 +18,6 @@ from support import spatial_chains as chains
 from support.pushbelts import THRUST
 from support.spatial_belts import LOAD, NODES, STEP, inputs, kept_scene, stored
 
-TWO = EQUATIONS[2]
-advance_two = partial(advance_by, TWO)
 V, W = spatial_fields.ROW_V, spatial_fields.ROW_HALF  # numbers of these unknowns
 
 
@@ -76,7 +74,7 @@ def test_tensions_of_both_packages_change_by_their_directions():
             sign * small * x[:, W],
         )
         state.elements.data[:] = in_lanes(g).data
-        TWO.prepare(belt, state, work, 1.0)
+        EQUATIONS.prepare(belt, state, work, 1.0)
         measured[sign] = of_lanes(work.step).copy()
     step = measured[0.0]
     of_both, apart = stretches(step, x)
@@ -93,7 +91,7 @@ def test_tensions_of_both_packages_change_by_their_directions():
     f[:, spatial_fields.SPEED : spatial_fields.SPEED + 8] = f[:, spatial_fields.HALF_SPEED] = 0.0
     f[:, spatial_fields.LENGTH], f[:, spatial_fields.HALF_LENGTH] = right, 0.1 * right
     state.elements.data[:] = in_lanes(f).data
-    TWO.prepare(belt, state, work, 1.0)
+    EQUATIONS.prepare(belt, state, work, 1.0)
     step, half = of_lanes(work.step), 0.5 * belt.ring_stiffness
     one, two = half * (1.0 / 1.1 - 1.0), half * (left / (0.9 * right) - 1.0)
     assert step[:, spatial_fields.START_TENSION] == pytest.approx(one + two)
@@ -105,8 +103,8 @@ def test_both_packages_slip_along_their_own_lines():
     f = of_lanes(state.elements).copy()
     f[:, spatial_fields.CHANGE : spatial_fields.CHANGE + 9] = 0.0
     state.elements.data[:] = in_lanes(f).data
-    TWO.prepare(belt, state, work, STEP)
-    TWO.evaluate(belt, state, work, LOAD, STEP)
+    EQUATIONS.prepare(belt, state, work, STEP)
+    EQUATIONS.evaluate(belt, state, work, LOAD, STEP)
     found = of_lanes(state.elements)
     slips = []
     for side, line, t in zip((1.0, -1.0), *chains.lines(belt, f), strict=True):
@@ -125,7 +123,7 @@ def test_both_packages_slip_along_their_own_lines():
 def evaluated(belt, state, work):
     """Residuals of elements and border, of an iterate evaluated twice, so that duals are those of its slips."""
     for _ in range(2):
-        TWO.evaluate(belt, state, work, LOAD, STEP)
+        EQUATIONS.evaluate(belt, state, work, LOAD, STEP)
     found = of_lanes(work.iterate)
     own = np.hstack(
         [
@@ -138,13 +136,13 @@ def evaluated(belt, state, work):
 
 def test_the_linear_system_is_the_slope_of_the_residuals():
     belt, state, work, rng = shaken(3)
-    TWO.prepare(belt, state, work, STEP)
+    EQUATIONS.prepare(belt, state, work, STEP)
     f = of_lanes(state.elements).copy()
     f[:, spatial_fields.CHANGE : spatial_fields.CHANGE + 9] = rng.normal(0.0, 0.01, (NODES, 9))
     state.increments[:] = 0.3
     state.elements.data[:] = in_lanes(f).data
     residual, _ = evaluated(belt, state, work)
-    TWO.assemble(belt, state, work, STEP)
+    EQUATIONS.assemble(belt, state, work, STEP)
     blocks, right = of_lanes(work.blocks), field_of_right(9)
     assert blocks[:, right : right + 9] == pytest.approx(residual)
     # tensions of the iterate, of which the recorded ones are those of the last
@@ -193,7 +191,7 @@ def test_a_free_ring_whose_packages_run_apart_keeps_its_energy_and_momentum():
         before, momentum, moment = chains.energy_and_momentum(constants, f)
         state.elements.data[:] = in_lanes(f).data
         work, rest = b.workspace(constants, nodes, 2), np.zeros((2, spatial_fields.INPUTS))
-        assert advance_two(constants, b.NEWTON_OF_TWO_FLOWS, state, work, rest, round(5e-3 / dt), dt) == 0
+        assert advance(constants, b.NEWTON_OF_TWO_FLOWS, state, work, rest, round(5e-3 / dt), dt) == 0
         f = of_lanes(state.elements)
         after, momentum_now, moment_now = chains.energy_and_momentum(constants, f)
         # elements that yaw pull one package more than the other
@@ -225,7 +223,7 @@ def test_packages_that_run_apart_are_braked_by_what_is_booked_as_loss():
     state.elements.data[:] = in_lanes(f).data
     work, rest, found = b.workspace(constants, nodes, 2), np.zeros((2, spatial_fields.INPUTS)), []
     for _ in range(2):
-        assert advance_two(constants, b.NEWTON_OF_TWO_FLOWS, state, work, rest, 50, dt) == 0
+        assert advance(constants, b.NEWTON_OF_TWO_FLOWS, state, work, rest, 50, dt) == 0
         f = of_lanes(state.elements).copy()
         energy, _, _ = chains.energy_and_momentum(constants, f)
         found.append(
@@ -264,7 +262,7 @@ def test_waves_in_the_packages_lose_what_their_damper_takes(time):
     before, _, _ = chains.energy_and_momentum(constants, f)
     state.elements.data[:] = in_lanes(f).data
     work, rest = b.workspace(constants, nodes, 2), np.zeros((2, spatial_fields.INPUTS))
-    assert advance_two(constants, b.NEWTON_OF_TWO_FLOWS, state, work, rest, 60, 1e-6) == 0
+    assert advance(constants, b.NEWTON_OF_TWO_FLOWS, state, work, rest, 60, 1e-6) == 0
     after, _, _ = chains.energy_and_momentum(constants, of_lanes(state.elements))
     assert (before - after > 0.2) == (time > 0.0)  # of 1 J: waves of 22 kHz
     # (2 pi f dt)^2 is 2 %, and energy that is not lost is read half a step late: 5 % of 1 J
@@ -275,11 +273,11 @@ def test_waves_in_the_packages_lose_what_their_damper_takes(time):
 def test_one_flow_is_two_flows_of_equal_packages_in_the_plane():
     """A belt that stays in its plane has equal packages: both march alike, up to the order of sums."""
     found = []
-    for flows, march, newton in ((1, advance, b.NEWTON), (2, advance_two, b.NEWTON_OF_TWO_FLOWS)):
+    for flows, newton in ((1, b.NEWTON), (2, b.NEWTON_OF_TWO_FLOWS)):
         belt, state, _ = kept_scene(offset=0.0)
         state = with_two_flows(belt, state) if flows == 2 else state
         hold = inputs((THRUST, THRUST), (LOAD, LOAD))
-        assert march(belt, newton, state, b.workspace(belt, NODES, flows), hold, 100, STEP) == 0
+        assert advance(belt, newton, state, b.workspace(belt, NODES, flows), hold, 100, STEP) == 0
         found.append((of_lanes(state.elements).copy(), state.loads.copy()))
     (one, loads), (two, other_loads) = found
     assert not two[
@@ -299,7 +297,7 @@ def test_power_is_balanced_and_both_pulleys_take_the_same_axial_force():
     belt, state, _ = kept_scene()
     axial = []
     for flows, newton in ((1, b.NEWTON), (2, b.NEWTON_OF_TWO_FLOWS)):
-        march = partial(called_alike(advance_by), EQUATIONS[flows])  # step by step
+        march = partial(called_alike(advance_by), EQUATIONS)  # step by step
         state = with_two_flows(belt, state) if flows == 2 else state
         work, hold = b.workspace(belt, NODES, flows), inputs((THRUST, THRUST), (LOAD, LOAD))
         if flows == 2:

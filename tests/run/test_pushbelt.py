@@ -7,10 +7,11 @@ from cvt_hpc.cli import main
 from cvt_hpc.errors import InputError
 from cvt_hpc.job import build_job
 from cvt_hpc.models.pushbelt import fields as f
+from cvt_hpc.models.pushbelt.belt import outset as given
 from cvt_hpc.models.pushbelt.belt import start
 from cvt_hpc.models.pushbelt.parameters import inert, string_limit
 from cvt_hpc.models.pushbelt.record import judge
-from cvt_hpc.models.pushbelt.transient import Transient, given
+from cvt_hpc.models.pushbelt.transient import Transient
 from cvt_hpc.physics.geometry import driven_radius
 from cvt_hpc.simulation import run_point, simulate
 from cvt_hpc.variables import Status, Vibrates

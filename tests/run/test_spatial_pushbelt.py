@@ -14,13 +14,14 @@ from cvt_hpc.models.spatial_pushbelt import fields
 from cvt_hpc.models.spatial_pushbelt.parameters import roll_limit
 from cvt_hpc.models.spatial_pushbelt.readings import ANGLES, SHEAVES
 from cvt_hpc.models.spatial_pushbelt.record import histories, judge
-from cvt_hpc.models.spatial_pushbelt.transient import Transient, given
+from cvt_hpc.models.spatial_pushbelt.transient import Transient
 from cvt_hpc.physics.out_of_plane import axial_offset, clamped_force
 from cvt_hpc.simulation import run_point, simulate
 from cvt_hpc.study import open_results, run
 from cvt_hpc.variables import Status, Vibrates
 from cvt_hpc.variator.history import regions
 from support.spatial_belts import COARSE, TORQUE, job
+from support.spatial_belts import constants as given
 
 OFFSET = 5e-4  # [m]
 BRIEF = {"duration": 0.016, "rise_time": 0.004, "band_low": 700.0}

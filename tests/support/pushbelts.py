@@ -1,6 +1,12 @@
-"""A common pushbelt, as the `start` of its model takes it."""
+"""A common pushbelt by values of its elements, and its start."""
+
+from types import SimpleNamespace
 
 import numpy as np
+
+from cvt_hpc.models.pushbelt import belt
+from cvt_hpc.physics.friction_laws import Law
+from cvt_hpc.physics.geometry import driven_radius, variator
 
 # Assumptions, but for centre distance, belt length, elements and their mass, which are a public data set's.
 ASSUMED = {
@@ -45,6 +51,7 @@ ASSUMED = {
     "tilt_lag": 0.0,  # [s]
     "driving_speed": 100.0 * np.pi,  # [rad/s]
 }
+runs = SimpleNamespace(given=dict)  # values of a run for `start`: its flat parameters
 NODES = 104  # of 8 lanes; polygon effects in the power balance are below half a percent
 SPEED, THRUST = ASSUMED["driving_speed"], 20e3  # [rad/s], [N]
 
@@ -55,4 +62,42 @@ def given(nodes=NODES, **changes):
     beside = ("element_mass", "flank_stiffness", "angle_stiffness", "angle_damping")
     values = {key: ASSUMED[key] * group for key in beside}
     values["contact_stiffness"] = ASSUMED["contact_stiffness"] / group
-    return ASSUMED | values | {"elements": nodes} | changes
+    return ASSUMED | values | {"gravity": 0.0, "elements": nodes} | changes
+
+
+def start(values):
+    """Constants and state of a belt by values of `given`, or by a run's parameters."""
+    if "thrust" in values:
+        return belt.start(belt.outset(values))
+    g = values
+    radius = driven_radius(g["ratio"], g["belt_length"], g["centre_distance"])
+    path = variator(g["ratio"], radius, g["centre_distance"])
+    line = belt.pitch_line(path, g["centre_distance"], g["elements"], g["driving_speed"])
+    return belt.start(belt.Outset(constants(g, line.chord), line, g["ring_strain"]))
+
+
+def constants(g, chord):
+    """Constants of a belt by such values, and the distance of neighbours [m]."""
+    thickness = chord - g["play"] / g["elements"]
+    modal_stiffness = np.array(g["modal_stiffness"], dtype=np.float64).reshape(2, -1)
+    modal_damping = np.zeros_like(modal_stiffness)
+    modal_damping[:, 1:3] = g["tilt_lag"] * modal_stiffness[:, 1:3]
+    found = {
+        "sine": float(np.sin(g["half_wedge_angle"])),
+        "cosine": float(np.cos(g["half_wedge_angle"])),
+        "thickness": float(thickness),
+        "pitch": float(chord),
+        "mass": float(g["element_mass"]),
+        "inertia": float(g["element_mass"] * (g["element_height"] ** 2 + thickness**2) / 12.0),
+        "ring_mass": float(g["ring_mass"] / g["elements"]),
+        "ring_time": float(g["ring_damping"] / g["ring_stiffness"]),
+        "transverse_damping": float(g["transverse_damping"] * chord),
+        "flank_law": int(Law[g["friction_law"].upper()]),
+        "flank_kinetic": float(g["kinetic_friction"]),
+        "flank_gradient": float(g["friction_gradient"]),
+        "flank_speed": float(g["stribeck_velocity"]),
+        "modal_stiffness": modal_stiffness,
+        "modal_damping": modal_damping,
+    }
+    same = {name: float(g[name]) for name in belt.Belt._fields if name not in found}
+    return belt.Belt(**same | found)

@@ -5,17 +5,8 @@ import math
 import numpy as np
 
 from cvt_hpc.kernels import kernel
-from cvt_hpc.models.beam_pushbelt.rcm import (
-    PER_BEAM,
-    SHAPE,
-    SIZE,
-    Ring,
-    assemble,
-    elastic_energy,
-    equations_of_motion,
-    kinematics,
-    stored_energy,
-)
+from cvt_hpc.models.beam_pushbelt.rcm import SHAPE, elastic_energy, equations_of_motion, kinematics
+from cvt_hpc.models.beam_pushbelt.ring import PER_BEAM, SIZE, Ring, assemble, stored_energy
 from cvt_hpc.solvers.cyclic_blocks import LOWER, UPPER, factor, solve
 
 

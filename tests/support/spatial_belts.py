@@ -6,12 +6,12 @@ import numpy as np
 
 from cvt_hpc.job import build_job
 from cvt_hpc.models.pushbelt import fields as pushbelt_fields
-from cvt_hpc.models.pushbelt.belt import in_lanes, of_lanes, start
+from cvt_hpc.models.pushbelt.belt import in_lanes, of_lanes
 from cvt_hpc.models.spatial_pushbelt import belt as b
 from cvt_hpc.models.spatial_pushbelt import fields as spatial_fields
 from cvt_hpc.models.spatial_pushbelt.transient import advance
 from support import spatial_chains as chains
-from support.pushbelts import SPEED, THRUST, given
+from support.pushbelts import SPEED, THRUST, given, start
 
 NODES, STEP, TORQUE = 104, 1e-5, 60.0
 LOAD = 1.35 * TORQUE
@@ -31,6 +31,11 @@ def job(**values):
     """A job of a coarse belt under 60 N m, with other values."""
     short = {"most_refinements": 0, "longest_duration": values.get("duration", 0.04), "load": TORQUE}
     return build_job({"name": "spatial", "model": "spatial_pushbelt"}, "spatial", COARSE | short | values)
+
+
+def constants(parameters):
+    """Constants of the belt of a run, by their names."""
+    return b.start(parameters)[0]._asdict()
 
 
 def inputs(thrusts, loads, fields=spatial_fields.INPUTS, drift=0.0):

@@ -3,13 +3,15 @@
 import numpy as np
 
 from cvt_hpc.models.pushbelt import fields as pushbelt_fields
-from cvt_hpc.models.pushbelt.belt import in_lanes, of_lanes, start
+from cvt_hpc.models.pushbelt.belt import in_lanes, of_lanes
 from cvt_hpc.models.spatial_pushbelt import belt as b
 from cvt_hpc.models.spatial_pushbelt import fields as spatial_fields
+from cvt_hpc.models.spatial_pushbelt.transient import EQUATIONS as OF_ANY
 from cvt_hpc.models.spatial_pushbelt.transient import _evaluate
 from cvt_hpc.physics.friction_laws import Law
-from support.pushbelts import given
+from support.pushbelts import given, start
 
+EQUATIONS = {1: OF_ANY, 2: OF_ANY}  # by how many flows of ring material there are
 WEDGE = np.deg2rad(11.0)
 SHAKEN = 64  # elements of `shaken`
 

@@ -4,8 +4,6 @@ Parameters are those of `pushbelt`, and those of the ring. Importing this packag
 compiled when `transient` is imported.
 """
 
-from typing import Any
-
 import numpy as np
 
 from cvt_hpc.models.pushbelt import parameters as pushbelt
@@ -14,35 +12,21 @@ from cvt_hpc.steppers import STEPPERS as GENERAL
 
 DEFAULT_STEPPER = "proximal"
 REFUSED = dict.fromkeys(
-    GENERAL,
-    "its set-valued laws are coupled by the ring: it is marched by its own step, proximal",
+    GENERAL, "its set-valued laws are coupled by the ring: it is marched by its own step, proximal"
 )
 STEPPERS = {"proximal": "cvt_hpc.models.beam_pushbelt.proximal_settings"}
 KICK = "kick", 0.02  # [m/s]
-MOST_TURN = np.pi / 3.0  # [rad] of a beam along an arc
+_MOST_TURN = np.pi / 3.0  # [rad] of a beam along an arc
 
 # what the model of rigid sheaves, bare strands and set-valued friction does without, and what that is there
 _WITHOUT = {"coarse": True, "nose_clearance": np.inf, "transverse_damping": 0.0, "sheave_stiffness": np.inf}
 _IDLE = (
-    "nose_height",
-    "nose_stiffness",
-    "element_damping",
-    "local_stiffness",
-    "local_length",
-    "ring_friction_speed",
-    "ring_damping",
-    "bending_stiffness",
-    "friction_speed",
-    "gravity",
-    "tilt_lag",
+    *("nose_height", "nose_stiffness", "element_damping", "local_stiffness", "local_length"),
+    *("ring_friction_speed", "ring_damping", "bending_stiffness", "friction_speed", "gravity", "tilt_lag"),
     *pushbelt.MODES,
 )
-_WITHOUT |= {
-    key: entry.default
-    for table in pushbelt.PARAMETERS.values()
-    for key, entry in table.items()
-    if key in _IDLE
-}
+_ALL = {key: entry for table in pushbelt.PARAMETERS.values() for key, entry in table.items()}
+_WITHOUT |= {key: _ALL[key].default for key in _IDLE}
 _CHANGED: dict[str, Parameter] = {
     "elements": Parameter(160, "", "elements of the belt", minimum=32, maximum=512),
     "kinetic_friction": not_negative(0.09, "", "the level that does not change with the gradient"),
@@ -61,12 +45,12 @@ PARAMETERS["belt"] |= {
 }
 
 
-def as_pushbelt(parameters: Parameters) -> dict[str, Any]:
+def as_pushbelt(parameters: Parameters) -> Parameters:
     """Parameters, completed by the further ones of `pushbelt`."""
     return {**_WITHOUT, **parameters}
 
 
-def step_limit(parameters: Parameters) -> float:
+def _step_limit(parameters: Parameters) -> float:
     """Longest explicit step of elements that all press on each other at edge and head [s].
 
     The contacts' forces f obey f'' = -c G f with G = W^T M^-1 W. A contact at height h shares its two
@@ -89,11 +73,11 @@ def check(parameters: Parameters) -> list[tuple[str, str, str]]:
         return problems
     # the slopes of a beam count as small; those that turn by 30 degrees carry 1.6 % less tension
     around = pushbelt.path_length(p) + 2.0 * np.pi * p["ring_offset"]
-    least = int(np.ceil(around / min(p["driven_radius"], p["driven_radius"] / p["ratio"]) / MOST_TURN))
+    least = int(np.ceil(around / min(p["driven_radius"], p["driven_radius"] / p["ratio"]) / _MOST_TURN))
     if p["ring_beams"] < least:
-        expected = f"at least {least}, so that none turns by more than {np.rad2deg(MOST_TURN):.0f} degrees"
+        expected = f"at least {least}, so that none turns by more than {np.rad2deg(_MOST_TURN):.0f} degrees"
         problems.append(("ring_beams", expected, f"{p['ring_beams']}"))
-    if "step" in p and p["step"] > (limit := step_limit(p)):
+    if "step" in p and p["step"] > (limit := _step_limit(p)):
         expected = f"at most {limit:.3g} s, the limit of elements that press on each other"
         problems.append(("step", expected, f"{p['step']:g} s"))
     return problems

@@ -17,10 +17,6 @@ r2 - r1 = T t(phi_m) + N n(phi_m), phi_m the mean angle and h = (phi2 - phi1) / 
 Inertia without that of rotation, elastic energy 1/2 EA l0 e^2 + 1/2 EI int (w'' - kappa0)^2 ds with
 e = eps + (1 + eps) / (2 l0) int w'^2 ds. All integrals are those of polynomials and done beforehand, so that
 mass matrix and forces are exact.
-
-In the ring the coordinates lie one after the other, five for each beam: x, y, phi, a1, a2, x, y, phi, ... The
-last three are those of the first node, turned once around. A beam takes eight from its node on, so that mass
-matrices join to blocks of 5 x 5 (`solvers.cyclic_blocks`).
 """
 
 import math
@@ -29,11 +25,6 @@ from typing import NamedTuple
 import numpy as np
 
 from cvt_hpc.kernels import kernel
-from cvt_hpc.lanes import LaneArray
-from cvt_hpc.solvers.cyclic_blocks import DIAGONAL, LOWER, UPPER, block_size, empty_blocks, empty_columns
-
-PER_BEAM, PER_NODE = 5, 3
-SIZE = block_size(PER_BEAM)
 
 # w = sum of v_j x^2 (SHAPE[j][0] + SHAPE[j][1] x + SHAPE[j][2] x^2)
 SHAPE = (
@@ -151,14 +142,8 @@ def line_point(l0: float, q: np.ndarray, s: float, along: np.ndarray, across: np
             on_t, on_n = on_t - w, on_n + ahead * e1
         along[k], across[k] = p * on_t + r * on_n, p * on_n - r * on_t
     forth = ahead * e1
-    return LinePoint(
-        q[node] + forth * c - w * sn,
-        q[node + 1] + forth * sn + w * c,
-        p * c - r * sn,
-        p * sn + r * c,
-        size,
-        e1 * curve / (size * size),
-    )
+    x, y = q[node] + forth * c - w * sn, q[node + 1] + forth * sn + w * c
+    return LinePoint(x, y, p * c - r * sn, p * sn + r * c, size, e1 * curve / (size * size))
 
 
 @kernel
@@ -393,92 +378,3 @@ def _even_and_odd(m11, m12, m13, m14, m33, m44, v):
         m13 * (a + b) + m33 * c,
         m14 * (a - b) + m44 * d,
     )
-
-
-class Ring(NamedTuple):
-    """A ring of k beams, its motion, and work space of its equations."""
-
-    beam: RcmBeam
-    q: np.ndarray  # (5 k + 3,): coordinates [m, rad]
-    u: np.ndarray  # their rates
-    blocks: LaneArray  # (k + 1, 25): matrix of the equations, of k nodes
-    columns: LaneArray  # (k + 1, 5): their right-hand side
-    mass: np.ndarray  # (8, 8), (8,): equations of a beam
-    force: np.ndarray
-
-
-def relaxed_ring(beam: RcmBeam, beams: int) -> Ring:
-    """A ring at rest around the origin, counter-clockwise: nodes and quarter points on a circle."""
-    step = 2.0 * math.pi / beams
-    radius, angle = beam.length / step, step * np.arange(beams + 1)
-    nodes = np.zeros((beams + 1, PER_BEAM))
-    nodes[:, 0], nodes[:, 1] = radius * np.cos(angle), radius * np.sin(angle)
-    nodes[:, 2] = angle + math.pi / 2
-    nodes[:, 3:] = math.hypot(radius, 0.25 * beam.length) - radius
-    q = nodes.ravel()[: PER_BEAM * beams + PER_NODE].copy()
-    blocks, columns = empty_blocks(beams, PER_BEAM), empty_columns(beams, PER_BEAM, 1)
-    return Ring(beam, q, np.zeros_like(q), blocks, columns, np.zeros((8, 8)), np.zeros(8))
-
-
-@kernel
-def close(ring: Ring) -> None:
-    """Give the end of a ring the state of its first node, which has been changed."""
-    for k in range(PER_NODE):
-        ring.q[k - PER_NODE], ring.u[k - PER_NODE] = ring.q[k], ring.u[k]
-    ring.q[-1] += 2.0 * math.pi
-
-
-@kernel
-def assemble(ring: Ring, stiff: float) -> None:
-    """Set up (M + stiff K) u' = h of all beams, in `blocks` and column 0 of `columns`."""
-    ring.blocks.data[:] = 0.0
-    ring.columns.data[:] = 0.0
-    for i in range(ring.blocks.rows - 1):
-        q, u = ring.q[PER_BEAM * i : PER_BEAM * i + 8], ring.u[PER_BEAM * i : PER_BEAM * i + 8]
-        equations_of_motion(ring.beam, q, u, stiff, ring.mass, ring.force)
-        add_matrix(ring.blocks, i, ring.mass)
-        add_to_column(ring.columns, 0, i, 1.0, ring.force)
-
-
-@kernel
-def stored_energy(ring: Ring) -> float:
-    """Kinetic and elastic energy [J]."""
-    total = 0.0
-    for i in range(ring.blocks.rows - 1):
-        q, u = ring.q[PER_BEAM * i : PER_BEAM * i + 8], ring.u[PER_BEAM * i : PER_BEAM * i + 8]
-        equations_of_motion(ring.beam, q, u, 0.0, ring.mass, ring.force)
-        for r in range(8):
-            for c in range(8):
-                total += 0.5 * u[r] * ring.mass[r, c] * u[c]
-        total += elastic_energy(ring.beam, q)
-    return total
-
-
-@kernel
-def add_matrix(blocks: LaneArray, beam: int, matrix: np.ndarray) -> None:
-    """Add an (8, 8) matrix of a beam's coordinates to the ring's."""
-    for r in range(8):
-        node = beam if r < PER_BEAM else (beam + 1) % (blocks.rows - 1)
-        for c in range(8):
-            block = DIAGONAL
-            if (r < PER_BEAM) != (c < PER_BEAM):
-                block = UPPER if r < PER_BEAM else LOWER
-            blocks.data[node, block * PER_BEAM + r % PER_BEAM, c % PER_BEAM] += matrix[r, c]
-
-
-@kernel
-def add_to_column(columns: LaneArray, column: int, beam: int, factor: float, row: np.ndarray) -> None:
-    """Add factor times a row (8,) of a beam's coordinates to a right-hand side."""
-    for r in range(8):
-        node = beam if r < PER_BEAM else (beam + 1) % (columns.rows - 1)
-        columns.data[node, r % PER_BEAM, column] += factor * row[r]
-
-
-@kernel
-def along_row(columns: LaneArray, column: int, beam: int, row: np.ndarray) -> float:
-    """Product of a row (8,) of a beam's coordinates with a solution."""
-    total = 0.0
-    for r in range(8):
-        node = beam if r < PER_BEAM else (beam + 1) % (columns.rows - 1)
-        total += columns.data[node, r % PER_BEAM, column] * row[r]
-    return total

@@ -17,39 +17,22 @@ Cartesian momentum is kept, the turn of the ring under an element (centrifugal a
 curvature, and the place of an element on the ring cannot drift. Directions of forces are those at q_k;
 sliding velocities are in the directions of mid step, by the speeds of the last one. At either end they would
 add v phi' dt / 2 of false sliding.
-
-A contact with impulse P and sliding velocity g obeys Coulomb's law with the bound b = mu N dt exactly if
-
-    P = prox(P - r g),    prox(x) = x where |x| <= b, else b x / |x|,
-
-for any r > 0 (Alart and Curnier 1991). The contacts take this step one after the other, each with the speeds
-that the earlier ones have left, until all laws hold. Impulses on the elements change the speeds of all others
-by way of the ring: at an element e
-
-    (n.J u, t.J u)_e = (...)_e before + sum_f coupling[e, f] (impulse across, impulse along)_f.
-
-r is 1 / G of a scalar contact with the response G to its own impulse; of the two directions of a flank, which
-couple, it follows from how far their rows are dominant (Foerg 2007). The bound of ring friction follows the
-normal force of its bilateral contact, which the impulses change as well. That can run away; then bounds are
-held as they were with the impulses of the last step, and such a step counts as unsolved.
 """
 
 import numpy as np
 
 from cvt_hpc.kernels import kernel
 from cvt_hpc.models.beam_pushbelt import fields as b
-from cvt_hpc.models.beam_pushbelt import rcm
+from cvt_hpc.models.beam_pushbelt import friction, rcm
+from cvt_hpc.models.beam_pushbelt.ring import PER_BEAM, SIZE, add_matrix, add_to_column, assemble
 from cvt_hpc.models.pushbelt import fields as f
 from cvt_hpc.models.pushbelt.border import move_sheaves
 from cvt_hpc.models.pushbelt.chain import contact_gap, contact_levers, radial, turned
 from cvt_hpc.physics.contact_laws import coefficient, remembered
-from cvt_hpc.solvers.cyclic_blocks import factor, solve
+from cvt_hpc.solvers.cyclic_blocks import factor
 
-MOST_SWEEPS = 500  # over all contacts in a step
-FREE_SWEEPS = 200  # in which the bounds of ring friction follow its normal forces
-MOST_FAILURES = 20  # unsolved steps in a row with which a run ends
-LARGEST = 1e100  # more than any speed that means something
-FLANK_CONTACT, RING_CONTACT = f.CONTACTS.index("flank"), f.CONTACTS.index("ring")
+_MOST_FAILURES = 20  # unsolved steps in a row with which a run ends
+_LARGEST = 1e100  # more than any speed that means something
 
 
 @kernel
@@ -60,8 +43,8 @@ def _locate(belt, state, work, dt):
     for k in range(ring.q.size):
         work.middle[k] = ring.q[k] + 0.5 * dt * ring.u[k]
     for j in range(e.shape[0]):
-        beam = min(int(e[j, b.PLACE] / length), ring.q.size // rcm.PER_BEAM - 1)
-        first, work.beams[j] = beam * rcm.PER_BEAM, beam
+        beam = min(int(e[j, b.PLACE] / length), ring.q.size // PER_BEAM - 1)
+        first, work.beams[j] = beam * PER_BEAM, beam
         s = e[j, b.PLACE] - (beam + 0.5) * length
         at = rcm.line_point(length, ring.q[first : first + 8], s, rows[j, b.ALONG], rows[j, b.ACROSS])
         q = work.middle[first : first + 8]
@@ -91,25 +74,6 @@ def _locate(belt, state, work, dt):
 
 
 @kernel
-def _push(belt, step, j, y, z, moment):
-    """Give an element an impulse at its saddle [N s] and one of rotation [N m s]."""
-    step[j, b.IMPULSE_T] += step[j, b.T_Y] * y + step[j, b.T_Z] * z
-    step[j, b.IMPULSE_N] += step[j, b.T_Y] * z - step[j, b.T_Z] * y
-    step[j, b.SPIN] += moment / belt.inertia
-
-
-@kernel
-def _rub_flanks(belt, state, step, j, along_meridian, around):
-    """Give an element impulses at each flank, and the driven pulley their reaction [N s]."""
-    out, on = 2.0 * belt.cosine * along_meridian, 2.0 * around
-    y, z = step[j, b.R_Y], step[j, b.R_Z]
-    moment = out * step[j, b.R_LEVER] + on * step[j, b.T_LEVER]
-    _push(belt, step, j, out * y - on * z, out * z + on * y, moment)
-    if state.elements[j, f.DRIVEN] > 0.0:
-        state.pulleys[f.DRIVEN_SPEED] -= on * step[j, b.MID_RADIUS] / belt.driven_inertia
-
-
-@kernel
 def _tilt(belt, state, step, i, j, dt):
     """Impulses by the angles of two neighbours to the segment between their saddles; law of `pushbelt`."""
     e = state.elements
@@ -124,10 +88,10 @@ def _tilt(belt, state, step, i, j, dt):
         rate = cosine * (e[k, f.OMEGA] - turn)
         state.totals[f.DAMPING_LOSS] += 0.5 * dt * belt.angle_damping * rate * rate
         moment = 0.5 * dt * cosine * (belt.angle_stiffness * sine + belt.angle_damping * rate)
-        _push(belt, step, k, 0.0, 0.0, -moment)
+        friction.push(belt, step, k, 0.0, 0.0, -moment)
         both += moment * per_length
-    _push(belt, step, i, both * e_z, -both * e_y, 0.0)
-    _push(belt, step, j, -both * e_z, both * e_y, 0.0)
+    friction.push(belt, step, i, both * e_z, -both * e_y, 0.0)
+    friction.push(belt, step, j, -both * e_z, both * e_y, 0.0)
 
 
 @kernel
@@ -144,12 +108,13 @@ def _apply_forces(belt, state, work, dt):
             if e[i, contact] > 0.0:
                 lever_i, lever_j = contact_levers(ri, xi, rj, xj, belt.thickness, height)
                 given = dt * e[i, contact]
-                _push(belt, step, i, -given * xj[0], -given * xj[1], given * lever_i)
-                _push(belt, step, j, given * xj[0], given * xj[1], given * lever_j)
+                friction.push(belt, step, i, -given * xj[0], -given * xj[1], given * lever_i)
+                friction.push(belt, step, j, given * xj[0], given * xj[1], given * lever_j)
         _tilt(belt, state, step, i, j, dt)
     for j in range(e.shape[0]):
         pressed = 2.0 * dt * e[j, f.FLANK] * belt.sine
-        _push(belt, step, j, pressed * step[j, b.R_Y], pressed * step[j, b.R_Z], pressed * step[j, b.R_LEVER])
+        y, z, moment = pressed * step[j, b.R_Y], pressed * step[j, b.R_Z], pressed * step[j, b.R_LEVER]
+        friction.push(belt, step, j, y, z, moment)
         speed = e[j, f.V_FILTERED]
         mu, _ = coefficient(belt.flank_law, belt.flank_kinetic, belt.flank_gradient, belt.flank_speed, speed)
         bound = step[j, b.FLANK_BOUND] = dt * mu * e[j, f.FLANK]
@@ -157,9 +122,9 @@ def _apply_forces(belt, state, work, dt):
         if size > bound:
             e[j, b.FLANK_IMPULSE_M] *= bound / size
             e[j, b.FLANK_IMPULSE_T] *= bound / size
-        _rub_flanks(belt, state, step, j, e[j, b.FLANK_IMPULSE_M], e[j, b.FLANK_IMPULSE_T])
+        friction.rub_flanks(belt, state, step, j, e[j, b.FLANK_IMPULSE_M], e[j, b.FLANK_IMPULSE_T])
         step[j, b.IMPULSE_T] -= e[j, b.RING_IMPULSE]
-        rcm.add_to_column(ring.columns, 0, work.beams[j], e[j, b.RING_IMPULSE], work.rows[j, b.ALONG])
+        add_to_column(ring.columns, 0, work.beams[j], e[j, b.RING_IMPULSE], work.rows[j, b.ALONG])
 
 
 @kernel
@@ -175,19 +140,15 @@ def _dot(row, values):
 def _free_speeds(belt, state, work, dt):
     """Speeds after the step with friction as in the last one; False where the matrix is singular."""
     ring, step, outer = state.ring, work.step, state.ring.mass
-    rcm.assemble(ring, (0.5 * dt) ** 2)  # the ring's elasticity is linearly implicit, without damping
+    assemble(ring, (0.5 * dt) ** 2)  # the ring's elasticity is linearly implicit, without damping
     for i in range(ring.columns.rows):
-        for k in range(rcm.PER_BEAM):
+        for k in range(PER_BEAM):
             ring.columns.data[i, k, 0] *= dt
     _apply_forces(belt, state, work, dt)
     for j in range(step.shape[0]):
-        beam, rows, tangent, mass = (
-            work.beams[j],
-            work.rows[j],
-            step[j, b.TANGENT],
-            belt.mass / step[j, b.COSINE],
-        )
-        u = ring.u[beam * rcm.PER_BEAM : beam * rcm.PER_BEAM + 8]
+        beam, rows = work.beams[j], work.rows[j]
+        tangent, mass = step[j, b.TANGENT], belt.mass / step[j, b.COSINE]
+        u = ring.u[beam * PER_BEAM : beam * PER_BEAM + 8]
         before = step[j, b.RING_ACROSS] = _dot(rows[b.MID_ACROSS], u)
         step[j, b.RING_ALONG] = _dot(rows[b.MID_ALONG], u)
         across = belt.mass * step[j, b.FREE_N] + step[j, b.IMPULSE_N] - mass * before
@@ -195,218 +156,12 @@ def _free_speeds(belt, state, work, dt):
         for r in range(8):
             for c in range(8):
                 outer[r, c] = mass * rows[b.ACROSS, r] * rows[b.MID_ACROSS, c]
-        rcm.add_matrix(ring.blocks, beam, outer)
-        rcm.add_to_column(ring.columns, 0, beam, across, rows[b.ACROSS])
-    regular = factor(ring.blocks, rcm.SIZE)
+        add_matrix(ring.blocks, beam, outer)
+        add_to_column(ring.columns, 0, beam, across, rows[b.ACROSS])
+    regular = factor(ring.blocks, SIZE)
     if regular:
-        _take(state, work)
+        friction.take(state, work)
     return regular
-
-
-@kernel
-def _take(state, work):
-    """Take the ring's speeds, and those of its points under the elements, on by a solution."""
-    ring, step = state.ring, work.step
-    solve(ring.blocks, ring.columns, rcm.SIZE)
-    for k in range(ring.u.size):
-        ring.u[k] += ring.columns.data[k // rcm.PER_BEAM % (ring.blocks.rows - 1), k % rcm.PER_BEAM, 0]
-    for j in range(step.shape[0]):
-        beam, rows = work.beams[j], work.rows[j]
-        step[j, b.RING_ACROSS] += rcm.along_row(ring.columns, 0, beam, rows[b.MID_ACROSS])
-        step[j, b.RING_ALONG] += rcm.along_row(ring.columns, 0, beam, rows[b.MID_ALONG])
-
-
-@kernel
-def _element_speed(belt, step, j):
-    """Speed of an element along the ring's tangent at mid step, after the step [m/s]."""
-    free = (step[j, b.FREE_T] + step[j, b.IMPULSE_T] / belt.mass) / step[j, b.COSINE]
-    return free + step[j, b.TANGENT] * step[j, b.RING_ACROSS]
-
-
-@kernel
-def _saddle_impulse(belt, step, j):
-    """Impulse of the bilateral contact on an element, along the ring's normal [N s]."""
-    along = step[j, b.TANGENT] * (belt.mass * step[j, b.FREE_T] + step[j, b.IMPULSE_T])
-    across = belt.mass * (step[j, b.RING_ACROSS] / step[j, b.COSINE] - step[j, b.FREE_N])
-    return across + along - step[j, b.IMPULSE_N]
-
-
-@kernel
-def _at_flank(step, j, along, across, spin):
-    """Radial and circumferential speed of flanks at mid step, by the element's along and across the ring."""
-    t_y, t_z, r_y, r_z = step[j, b.MID_T_Y], step[j, b.MID_T_Z], step[j, b.MID_R_Y], step[j, b.MID_R_Z]
-    u_y, u_z = along * t_y - across * t_z, along * t_z + across * t_y
-    out = r_y * u_y + r_z * u_z + step[j, b.MID_R_LEVER] * spin
-    return out, r_y * u_z - r_z * u_y + step[j, b.MID_T_LEVER] * spin
-
-
-@kernel
-def _flank_slip(belt, state, step, j):
-    """Sliding velocity of a flank along the meridian and in the direction of rotation [m/s]."""
-    out, on = _at_flank(step, j, _element_speed(belt, step, j), step[j, b.RING_ACROSS], step[j, b.SPIN])
-    omega = state.pulleys[f.DRIVEN_SPEED if state.elements[j, f.DRIVEN] > 0.0 else f.DRIVING_SPEED]
-    return out / belt.cosine, on - omega * step[j, b.MID_RADIUS]
-
-
-@kernel
-def _couple(state, work):
-    """Find `coupling` of all elements, by unit impulses on the ring, whose matrix has been factored."""
-    n, lanes, nodes = state.elements.shape[0], work.columns.data.shape[2], state.ring.blocks.rows - 1
-    data = work.columns.data
-    for batch in range(0, 2 * n, lanes):
-        data[:] = 0.0
-        for lane in range(0, min(lanes, 2 * n - batch), 2):
-            one = (batch + lane) // 2
-            rcm.add_to_column(work.columns, lane, work.beams[one], 1.0, work.rows[one, b.ACROSS])
-            rcm.add_to_column(work.columns, lane + 1, work.beams[one], 1.0, work.rows[one, b.ALONG])
-        solve(state.ring.blocks, work.columns, rcm.SIZE)
-        for e in range(n):
-            for kind, mid in ((0, b.MID_ACROSS), (1, b.MID_ALONG)):
-                found, row = work.coupling[e, kind, batch : batch + lanes], work.rows[e, mid]
-                found[:] = 0.0
-                for r in range(8):
-                    node = (work.beams[e] + r // rcm.PER_BEAM) % nodes
-                    for lane in range(lanes):
-                        found[lane] += row[r] * data[node, r % rcm.PER_BEAM, lane]
-
-
-@kernel
-def _ring_change(row, impulses):
-    """Change of a speed of the ring by all impulses so far."""
-    a = b = c = d = 0.0
-    for k in range(0, impulses.size, 4):
-        a += row[k] * impulses[k]
-        b += row[k + 1] * impulses[k + 1]
-        c += row[k + 2] * impulses[k + 2]
-        d += row[k + 3] * impulses[k + 3]
-    return (a + b) + (c + d)
-
-
-@kernel
-def _own(work, j, across, along):
-    """Change of both speeds of the ring at an element by impulses there."""
-    g, k = work.coupling[j], 2 * j
-    return g[0, k] * across + g[0, k + 1] * along, g[1, k] * across + g[1, k + 1] * along
-
-
-@kernel
-def _flank_response(belt, state, work, j, along_meridian, around):
-    """Change of `_flank_slip` by impulses on both flanks, where nothing else changes [m/s]."""
-    step, t = work.step, work.step[j, b.TANGENT]
-    out, on = 2.0 * belt.cosine * along_meridian, 2.0 * around
-    y, z = out * step[j, b.R_Y] - on * step[j, b.R_Z], out * step[j, b.R_Z] + on * step[j, b.R_Y]
-    on_t, on_n = y * step[j, b.T_Y] + z * step[j, b.T_Z], z * step[j, b.T_Y] - y * step[j, b.T_Z]
-    spin = (out * step[j, b.R_LEVER] + on * step[j, b.T_LEVER]) / belt.inertia
-    w, _ = _own(work, j, on_n - t * on_t, 0.0)
-    c = on_t / (belt.mass * step[j, b.COSINE]) + t * w
-    slip_m, slip_t = _at_flank(step, j, c, w, spin)
-    if state.elements[j, f.DRIVEN] > 0.0:
-        slip_t += on * step[j, b.MID_RADIUS] ** 2 / belt.driven_inertia
-    return slip_m / belt.cosine, slip_t
-
-
-@kernel
-def _proximal_steps(belt, state, work, j):
-    """Lengths of the steps of an element's contacts."""
-    step, t = work.step, work.step[j, b.TANGENT]
-    w, z = _own(work, j, t, 1.0)
-    step[j, b.RING_STEP] = 1.0 / (z + 1.0 / (belt.mass * step[j, b.COSINE]) - t * w)
-    a, beside_c = _flank_response(belt, state, work, j, 1.0, 0.0)
-    beside_a, c = _flank_response(belt, state, work, j, 0.0, 1.0)
-    beside_a, beside_c = abs(beside_a), abs(beside_c)
-    if a - beside_a >= c - beside_c:
-        r = 2.0 / (a + c + beside_a - beside_c) if a + beside_a >= c + beside_c else 1.0 / c
-    else:
-        r = 2.0 / (a + c - beside_a + beside_c) if a + beside_a < c + beside_c else 1.0 / a
-    step[j, b.FLANK_STEP] = r
-
-
-@kernel
-def _respond(work, j, across, along):
-    """Take the speeds of the ring at an element on by impulses there; those at others follow in `_rub`."""
-    work.impulses[2 * j] += across
-    work.impulses[2 * j + 1] += along
-    w, z = _own(work, j, across, along)
-    work.step[j, b.RING_ACROSS] += w
-    work.step[j, b.RING_ALONG] += z
-
-
-@kernel
-def _correct_ring(belt, state, work, j, held, tolerance):
-    """A step of the proximal point of ring friction; False where its law held already."""
-    step, e = work.step, state.elements
-    slip = step[j, b.RING_ALONG] - _element_speed(belt, step, j)
-    given, r = e[j, b.RING_IMPULSE], step[j, b.RING_STEP]
-    bound = belt.ring_friction * (step[j, b.FREE_SADDLE] if held else abs(_saddle_impulse(belt, step, j)))
-    if abs(slip) <= tolerance:
-        if abs(given) <= bound + tolerance * r:
-            return False
-    elif abs(given + (bound if slip > 0.0 else -bound)) <= tolerance * r:
-        return False
-    change = min(max(given - r * slip, -bound), bound) - given
-    e[j, b.RING_IMPULSE] += change
-    step[j, b.IMPULSE_T] -= change
-    _respond(work, j, step[j, b.TANGENT] * change, change)
-    return True
-
-
-@kernel
-def _correct_flank(belt, state, work, j, tolerance):
-    """Likewise of both flanks."""
-    step, e = work.step, state.elements
-    slip_m, slip_t = _flank_slip(belt, state, step, j)
-    given_m, given_t, bound = e[j, b.FLANK_IMPULSE_M], e[j, b.FLANK_IMPULSE_T], step[j, b.FLANK_BOUND]
-    slip, r = np.hypot(slip_m, slip_t), step[j, b.FLANK_STEP]
-    if slip <= tolerance:
-        if np.hypot(given_m, given_t) <= bound + tolerance * r:
-            return False
-    elif np.hypot(given_m + bound * slip_m / slip, given_t + bound * slip_t / slip) <= tolerance * r:
-        return False
-    m, t = given_m - r * slip_m, given_t - r * slip_t
-    size = np.hypot(m, t)
-    if size > bound:
-        m, t = m * bound / size, t * bound / size
-    before_t, before_n = step[j, b.IMPULSE_T], step[j, b.IMPULSE_N]
-    _rub_flanks(belt, state, step, j, m - given_m, t - given_t)
-    e[j, b.FLANK_IMPULSE_M], e[j, b.FLANK_IMPULSE_T] = m, t
-    across = step[j, b.IMPULSE_N] - before_n - step[j, b.TANGENT] * (step[j, b.IMPULSE_T] - before_t)
-    _respond(work, j, across, 0.0)
-    return True
-
-
-@kernel
-def _rub(belt, tolerance, state, work):
-    """Find the impulses of friction of a step; whether all laws hold."""
-    step, counters, columns, impulses = work.step, state.counters, state.ring.columns, work.impulses
-    n = step.shape[0]
-    _couple(state, work)
-    impulses[:] = 0.0
-    for j in range(n):
-        _proximal_steps(belt, state, work, j)
-        step[j, b.FREE_ACROSS], step[j, b.FREE_ALONG] = step[j, b.RING_ACROSS], step[j, b.RING_ALONG]
-        step[j, b.FREE_SADDLE] = abs(_saddle_impulse(belt, step, j))
-    held = solved = False
-    for sweep in range(MOST_SWEEPS):
-        counters[f.ITERATIONS] += 1
-        held, solved = sweep >= FREE_SWEEPS, True
-        for j in range(n):
-            step[j, b.RING_ACROSS] = step[j, b.FREE_ACROSS] + _ring_change(work.coupling[j, 0], impulses)
-            step[j, b.RING_ALONG] = step[j, b.FREE_ALONG] + _ring_change(work.coupling[j, 1], impulses)
-            if belt.ring_friction > 0.0 and _correct_ring(belt, state, work, j, held, tolerance):
-                solved = False
-                counters[f.FAILED_ELEMENT], counters[f.FAILED_CONTACT] = j, RING_CONTACT
-            if step[j, b.FLANK_BOUND] > 0.0 and _correct_flank(belt, state, work, j, tolerance):
-                solved = False
-                counters[f.FAILED_ELEMENT], counters[f.FAILED_CONTACT] = j, FLANK_CONTACT
-        if solved:
-            break
-    columns.data[:] = 0.0
-    for j in range(n):
-        rcm.add_to_column(columns, 0, work.beams[j], impulses[2 * j], work.rows[j, b.ACROSS])
-        rcm.add_to_column(columns, 0, work.beams[j], impulses[2 * j + 1], work.rows[j, b.ALONG])
-        step[j, b.RING_ACROSS], step[j, b.RING_ALONG] = step[j, b.FREE_ACROSS], step[j, b.FREE_ALONG]
-    _take(state, work)
-    return solved and not held
 
 
 @kernel
@@ -418,24 +173,17 @@ def _accept(belt, state, work, inputs, dt):
     driving_thrust = driven_thrust = total = 0.0
     n = e.shape[0]
     for j in range(n):
-        first = work.beams[j] * rcm.PER_BEAM
+        first = work.beams[j] * PER_BEAM
         e[j, f.TENSION] = ring.beam.axial_stiffness * rcm.mean_strain(length, ring.q[first : first + 8])
-        e[j, f.SADDLE] = abs(_saddle_impulse(belt, step, j)) / dt
-        c, w, t_y, t_z = (
-            _element_speed(belt, step, j),
-            step[j, b.RING_ACROSS],
-            step[j, b.MID_T_Y],
-            step[j, b.MID_T_Z],
-        )
+        e[j, f.SADDLE] = abs(friction.saddle_impulse(belt, step, j)) / dt
+        c, w = friction.element_speed(belt, step, j), step[j, b.RING_ACROSS]
+        t_y, t_z = step[j, b.MID_T_Y], step[j, b.MID_T_Z]
         slip = step[j, b.RING_ALONG] - c
-        e[j, f.V], e[j, f.RING_SLIP], e[j, f.RING_FRICTION] = (
-            step[j, b.RING_ALONG],
-            slip,
-            -e[j, b.RING_IMPULSE] / dt,
-        )
+        e[j, f.V], e[j, f.RING_SLIP] = step[j, b.RING_ALONG], slip
+        e[j, f.RING_FRICTION] = -e[j, b.RING_IMPULSE] / dt
         totals[f.RING_LOSS] -= e[j, b.RING_IMPULSE] * slip
 
-        slip_m, slip_t = _flank_slip(belt, state, step, j)
+        slip_m, slip_t = friction.flank_slip(belt, state, step, j)
         grip_m, grip_t = -e[j, b.FLANK_IMPULSE_M] / dt, -e[j, b.FLANK_IMPULSE_T] / dt
         e[j, f.FLANK_SLIP_M], e[j, f.FLANK_SLIP_T] = slip_m, slip_t
         e[j, f.FLANK_FRICTION_M], e[j, f.FLANK_FRICTION_T] = grip_m, grip_t
@@ -477,8 +225,8 @@ def _step(belt, tolerance, state, work, inputs, dt):
         return f.NOT_FINITE
     solved = True
     if belt.ring_friction > 0.0 or belt.flank_kinetic > 0.0:
-        solved = _rub(belt, tolerance, state, work)
-    if not _accept(belt, state, work, inputs, dt) < LARGEST:
+        solved = friction.rub(belt, tolerance, state, work)
+    if not _accept(belt, state, work, inputs, dt) < _LARGEST:
         return f.NOT_FINITE
     return f.CONVERGED if solved else f.NOT_CONVERGED
 
@@ -501,7 +249,7 @@ def advance(belt, tolerance, state, work, inputs, steps, dt):
     Returns
     -------
     int
-        CONVERGED; NOT_CONVERGED where in MOST_FAILURES steps in a row a set-valued law did not hold;
+        CONVERGED; NOT_CONVERGED where in _MOST_FAILURES steps in a row a set-valued law did not hold;
         NOT_FINITE. The counters then name the element and the contact at fault.
     """
     counters = state.counters
@@ -513,7 +261,7 @@ def advance(belt, tolerance, state, work, inputs, steps, dt):
         counters[f.STEPS] += 1
         counters[f.IN_A_ROW] = counters[f.IN_A_ROW] + 1 if outcome == f.NOT_CONVERGED else 0
         counters[f.FAILED_STEPS] += outcome == f.NOT_CONVERGED
-        if outcome == f.NOT_FINITE or counters[f.IN_A_ROW] == MOST_FAILURES:
+        if outcome == f.NOT_FINITE or counters[f.IN_A_ROW] == _MOST_FAILURES:
             counters[f.STATUS] = outcome
             return outcome
     counters[f.STATUS] = f.CONVERGED

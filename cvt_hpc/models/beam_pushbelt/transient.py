@@ -4,8 +4,7 @@ A run starts from the geometry of its path. An element takes the fields of `push
 models are read off alike, and those of `fields`.
 """
 
-from collections.abc import Mapping
-from typing import Any, NamedTuple
+from typing import NamedTuple
 
 import numpy as np
 
@@ -13,18 +12,21 @@ from cvt_hpc.kernels import called_alike
 from cvt_hpc.lanes import LaneArray
 from cvt_hpc.models.beam_pushbelt import as_pushbelt, rcm
 from cvt_hpc.models.beam_pushbelt import fields as b
+from cvt_hpc.models.beam_pushbelt.ring import PER_BEAM, Ring, close, relaxed_ring, stored_energy
 from cvt_hpc.models.beam_pushbelt.step import advance
 from cvt_hpc.models.marched import batches_of_one
 from cvt_hpc.models.pushbelt import fields as f
 from cvt_hpc.models.pushbelt import transient as pushbelt
-from cvt_hpc.models.pushbelt.belt import Belt, belt_of, equal_chords, pitch_line
+from cvt_hpc.models.pushbelt.belt import Belt, equal_chords, outset
+from cvt_hpc.models.pushbelt.parameters import path_length
 from cvt_hpc.models.pushbelt.readings import Reading
+from cvt_hpc.parameters import Parameters
 from cvt_hpc.physics.geometry import Variator
 from cvt_hpc.solvers.cyclic_blocks import empty_columns
 from cvt_hpc.variator.history import points_at
 
 LAW_TOLERANCE = 1e-5  # [m/s]: up to this speed a set-valued law counts as fulfilled (`step.advance`)
-UNIT_IMPULSES = 16  # on the ring, that are solved for at a time: two registers
+_UNIT_IMPULSES = 16  # on the ring, that are solved for at a time: two registers
 
 CHANNELS = pushbelt.CHANNELS
 
@@ -32,7 +34,7 @@ CHANNELS = pushbelt.CHANNELS
 class BeltState(NamedTuple):
     """State of a run, which `step.advance` takes on; the last three as `pushbelt.belt.BeltState` has them."""
 
-    ring: rcm.Ring
+    ring: Ring
     elements: np.ndarray  # (n, FIELDS), in the order of the belt
     pulleys: np.ndarray
     totals: np.ndarray
@@ -57,9 +59,9 @@ class Workspace(NamedTuple):
 class Transient(pushbelt.Transient):
     """One run, as `pushbelt.transient.Transient` has it."""
 
-    def _begin(self, p: Mapping[str, Any]) -> None:
+    def _begin(self, p: Parameters) -> None:
         self._advance = called_alike(advance)
-        self._belt, self._state = start(pushbelt.given(as_pushbelt(p)))
+        self._belt, self._state = start(p)
         self._work = workspace(self._state.ring, p["elements"])
         self._method = LAW_TOLERANCE
 
@@ -79,7 +81,7 @@ class Transient(pushbelt.Transient):
         kinetic += belt.driven_inertia * self._state.pulleys[f.DRIVEN_SPEED] ** 2
         pressed = (e[:, [f.EDGE, f.HEAD]] ** 2).sum() / belt.contact_stiffness
         pressed += 2.0 * (e[:, f.FLANK] ** 2).sum() / belt.flank_stiffness
-        return rcm.stored_energy(self._state.ring) + 0.5 * float(kinetic + pressed)
+        return stored_energy(self._state.ring) + 0.5 * float(kinetic + pressed)
 
     def _most_open(self) -> float:
         return self._most_damped()  # the balance holds the damping of steps
@@ -91,7 +93,7 @@ forget = pushbelt.forget
 
 def ring_on_path(
     path: Variator, centre_distance: float, beam: rcm.RcmBeam, beams: int, strain: float, speed: float
-) -> rcm.Ring:
+) -> Ring:
     """A ring that lies along a path [m], nodes and quarter points on it, and runs along it at a speed [m/s].
 
     All beams have one `strain`; their length is found here, that of `beam` does not count.
@@ -110,14 +112,14 @@ def ring_on_path(
         length *= (1.0 + strains.mean()) / (1.0 + strain)
     else:
         raise ValueError("the ring's beams cannot all have one strain along this path")
-    ring = rcm.relaxed_ring(beam._replace(length=length), beams)
+    ring = relaxed_ring(beam._replace(length=length), beams)
     ring.q[:] = q
     ahead = 1e-6 * around  # of which all differences are above rounding
     forth, back = (_coordinates(path, centre_distance, nodes + shift) for shift in (ahead, -ahead))
     change = forth - back
-    change[2 :: rcm.PER_BEAM] = np.mod(change[2 :: rcm.PER_BEAM] + np.pi, 2.0 * np.pi) - np.pi
+    change[2::PER_BEAM] = np.mod(change[2::PER_BEAM] + np.pi, 2.0 * np.pi) - np.pi
     ring.u[:] = speed * change / (2.0 * ahead)
-    rcm.close(ring)
+    close(ring)
     return ring
 
 
@@ -130,40 +132,38 @@ def _coordinates(path: Variator, centre_distance: float, nodes: np.ndarray) -> n
     normals = np.stack([-np.sin(angles), np.cos(angles)], 1)
     first, _, _ = points_at(path, centre_distance, nodes[:-1] + quarters)
     second, _, _ = points_at(path, centre_distance, nodes[1:] - quarters)
-    q = np.zeros((len(nodes), rcm.PER_BEAM))
+    q = np.zeros((len(nodes), PER_BEAM))
     q[:, :2], q[:, 2] = ends, angles
     q[:-1, 3] = ((first - ends[:-1]) * normals[:-1]).sum(axis=1)
     q[:-1, 4] = ((second - ends[1:]) * normals[1:]).sum(axis=1)
     return q.ravel()[: 5 * len(nodes) - 2]
 
 
-def start(given: Mapping[str, Any]) -> tuple[Belt, BeltState]:
+def start(parameters: Parameters) -> tuple[Belt, BeltState]:
     """Constants and a state from which a belt can run in: a ring along the ideal path, at its speed.
 
-    Values [SI] are given as `pushbelt.belt.start` takes them; beside them `ring_beams`, their number, and
-    `ring_bending_stiffness` [N m^2]. Elements have equal chords; the ring has the strain `ring_strain`, and
-    without load it is a circle.
+    Elements have equal chords; the ring has an even strain, and without load it is a circle.
     """
-    g, pitch = given, pitch_line(given)
-    belt, path, strain = belt_of(g, pitch.chord), pitch.path, g["ring_strain"]
-    depth, beams = belt.pitch_depth, g["ring_beams"]
+    p, (belt, pitch, strain) = parameters, outset(as_pushbelt(parameters))
+    path, depth, beams = pitch.path, belt.pitch_depth, p["ring_beams"]
     radii = path.driving_radius + depth, path.driven_radius + depth
     line = Variator(*radii, path.driving_wrap, path.driven_wrap, path.strand_length)
     around = line.path_length
-    line_mass, curvature = g["ring_mass"] * (1.0 + strain) / around, 2.0 * np.pi * (1.0 + strain) / around
-    beam = rcm.RcmBeam(around / beams, line_mass, g["ring_stiffness"], g["ring_bending_stiffness"], curvature)
+    line_mass = p["ring_mass"] * path_length(p) * (1.0 + strain) / around
+    curvature = 2.0 * np.pi * (1.0 + strain) / around
+    beam = rcm.RcmBeam(around / beams, line_mass, p["ring_stiffness"], p["ring_bending_stiffness"], curvature)
     running = pitch.speed * around / path.path_length
     ring = ring_on_path(line, belt.centre_distance, beam, beams, strain, running)
-    elements = _elements(belt, ring, g["elements"], pitch.speed)
+    elements = _elements(belt, ring, p["elements"], pitch.speed)
     return belt, BeltState(ring, elements, pitch.pulleys, np.zeros(f.TOTALS), np.zeros(f.COUNTERS, np.int64))
 
 
-def _elements(belt: Belt, ring: rcm.Ring, n: int, speed: float) -> np.ndarray:
+def _elements(belt: Belt, ring: Ring, n: int, speed: float) -> np.ndarray:
     """Fields (n, FIELDS) of elements with equal chords on a ring, at a speed of the pitch line [m/s]."""
-    length, beams = ring.beam.length, ring.q.size // rcm.PER_BEAM
+    length, beams = ring.beam.length, ring.q.size // PER_BEAM
     rows = np.zeros((2, 8))
 
-    def on_ring(place: float) -> tuple[Any, np.ndarray]:
+    def on_ring(place: float) -> tuple[rcm.LinePoint, np.ndarray]:
         beam = min(int(place / length), beams - 1)
         its = slice(5 * beam, 5 * beam + 8)
         return rcm.line_point(length, ring.q[its], place - (beam + 0.5) * length, *rows), ring.u[its]
@@ -189,15 +189,15 @@ def _elements(belt: Belt, ring: rcm.Ring, n: int, speed: float) -> np.ndarray:
     return e
 
 
-def workspace(ring: rcm.Ring, elements: int) -> Workspace:
+def workspace(ring: Ring, elements: int) -> Workspace:
     """Work space for so many elements on a ring."""
-    n, whole = elements, -(-2 * elements // UNIT_IMPULSES) * UNIT_IMPULSES
+    n, whole = elements, -(-2 * elements // _UNIT_IMPULSES) * _UNIT_IMPULSES
     return Workspace(
         step=np.zeros((n, b.STEP_FIELDS)),
         beams=np.zeros(n, np.int64),
         rows=np.zeros((n, b.ROWS, 8)),
         middle=np.zeros(ring.q.size),
-        columns=empty_columns(ring.blocks.data.shape[0] - 1, rcm.PER_BEAM, UNIT_IMPULSES),
+        columns=empty_columns(ring.blocks.data.shape[0] - 1, PER_BEAM, _UNIT_IMPULSES),
         coupling=np.zeros((n, 2, whole)),
         impulses=np.zeros(whole),
         inputs=np.zeros(f.INPUTS),

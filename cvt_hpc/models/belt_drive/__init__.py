@@ -35,9 +35,9 @@ from cvt_hpc.steppers import STEPPERS as GENERAL
 from cvt_hpc.variator.scene import FRICTION, SCENE, rise_problems
 from cvt_hpc.vibration import settings
 
-RIBS = 5.0
-TREATMENTS = ("regularised", "set_valued", "bristle")  # of friction
-DEEPEST = 0.1  # of the smaller radius: so far the tension at rest may press the belt into a rim
+_RIBS = 5.0
+_TREATMENTS = ("regularised", "set_valued", "bristle")  # of friction
+_DEEPEST = 0.1  # of the smaller radius: so far the tension at rest may press the belt into a rim
 
 RECORD, VIBRATION = recording.PARAMETERS["record"], settings.PARAMETERS["vibration"]
 
@@ -74,10 +74,10 @@ PARAMETERS: dict[str, dict[str, Parameter]] = {
         ),
         "free_length": free_length(),
         "line_mass": positive(0.096, "kg/m", "mass per length", sensible=(1e-3, 10.0)),
-        "axial_stiffness": positive(RIBS * 30400.0, "N", "longitudinal stiffness EA", sensible=(1e2, 1e9)),
-        "bending_stiffness": positive(RIBS * 5.2e-3, "N m^2", "bending stiffness EI", sensible=(1e-6, 1e3)),
+        "axial_stiffness": positive(_RIBS * 30400.0, "N", "longitudinal stiffness EA", sensible=(1e2, 1e9)),
+        "bending_stiffness": positive(_RIBS * 5.2e-3, "N m^2", "bending stiffness EI", sensible=(1e-6, 1e3)),
         "axial_damping": not_negative(
-            RIBS * 4.1, "N s", "viscous damping along the belt, force by strain rate", sensible=(1e-3, 1e4)
+            _RIBS * 4.1, "N s", "viscous damping along the belt, force by strain rate", sensible=(1e-3, 1e4)
         ),
         "mass_damping": not_negative(
             2.8,
@@ -114,10 +114,10 @@ PARAMETERS: dict[str, dict[str, Parameter]] = {
         "friction_gradient": replace(FRICTION["friction_gradient"], default=0.0),
         "kinetic_friction": replace(FRICTION["kinetic_friction"], default=0.5),
         "friction_treatment": Parameter(
-            TREATMENTS[0],
+            _TREATMENTS[0],
             "",
             "Coulomb's law with tanh(speed / friction_speed); itself; or bristles that shear up to it",
-            choices=TREATMENTS,
+            choices=_TREATMENTS,
         ),
         "friction_speed": replace(
             FRICTION["friction_speed"], default=3e-4, description="regularisation speed of friction"
@@ -170,9 +170,9 @@ def check(parameters: Parameters) -> list[tuple[str, str, str]]:
     if strain > 0.5:
         most = 0.5 * p["axial_stiffness"]
         problems.append(("tension", f"at most {most:g} N, half of axial_stiffness", f"{p['tension']:g} N"))
-    stiffness = p["tension"] / (DEEPEST * path.radius.min() ** 2)
+    stiffness = p["tension"] / (_DEEPEST * path.radius.min() ** 2)
     if p["contact_stiffness"] < stiffness:
-        expected = f"at least {stiffness:g} N/m^2, by which the belt sinks in by {DEEPEST:.0%} of the radius"
+        expected = f"at least {stiffness:g} N/m^2, by which the belt sinks in by {_DEEPEST:.0%} of the radius"
         problems.append(("contact_stiffness", expected, f"{p['contact_stiffness']:g} N/m^2"))
     problems += roughness_problems(p, float(path.radius.min()))
     return problems + rise_problems(p) + course_problems(p) + friction_problems(p)

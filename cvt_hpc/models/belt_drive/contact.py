@@ -28,7 +28,10 @@ from cvt_hpc.multibody.ancf_beam import AXES, PER_NODE, X, Y, shapes
 from cvt_hpc.multibody.ancf_equations import Chain
 from cvt_hpc.solvers.cyclic_blocks import DIAGONAL, LOWER, UPPER
 
-NEAR = 1.05  # radii of a pulley, beyond which nothing touches it
+_NEAR = 1.05  # radii of a pulley, beyond which nothing touches it
+_Two = tuple[float, float]
+_Four = tuple[float, float, float, float]
+_Point = tuple[int, int, _Four]  # of the belt: the nodes before and behind it, and the shapes there
 
 
 class Contact(NamedTuple):
@@ -117,7 +120,7 @@ def add_contacts(
                 x = s0 * q[i, 0] + s1 * q[i, 2] + s2 * q[j, 0] + s3 * q[j, 2]
                 y = s0 * q[i, 1] + s1 * q[i, 3] + s2 * q[j, 1] + s3 * q[j, 3]
                 away_x, away_y = x - centre_x, y - centre_y
-                if away_x * away_x + away_y * away_y >= (NEAR * radius) ** 2:
+                if away_x * away_x + away_y * away_y >= (_NEAR * radius) ** 2:
                     continue
                 vx = s0 * u[i, 0] + s1 * u[i, 2] + s2 * u[j, 0] + s3 * u[j, 2] - centre_vx
                 vy = s0 * u[i, 1] + s1 * u[i, 3] + s2 * u[j, 1] + s3 * u[j, 3] - centre_vy
@@ -161,8 +164,8 @@ def add_contacts(
                 moment_n = distance * by_normal + tau * settled
                 moment_t = distance * by_around
                 mx, my = moment_n * nx - moment_t * ny, moment_n * ny + moment_t * nx
-                at_point = (s0, s1, s2, s3)
-                _add_to_belt(blocks, columns, i, j, at_point, last, (fx, fy), (xx, xy, yx, yy))
+                point = i, j, (s0, s1, s2, s3)
+                _add_to_belt(blocks, columns, point, last, (fx, fy), (xx, xy, yx, yy))
                 # by the pulley's speed
                 of_turning = damp * (turn * rise * slip - slope * distance) - stiff * tau * slope * distance
                 by_turning = tangential * of_turning - steep * distance - force * turn * rise
@@ -170,7 +173,7 @@ def add_contacts(
                     corner[p - 1, p - 1] += by_turning * distance
                     corner[p - 1, last] -= traction * distance
                     column = by_turning * ny - of_turning * nx, -of_turning * ny - by_turning * nx
-                    _add_to_border(columns, rows, i, j, at_point, p - 1, column, (mx, my))
+                    _add_to_border(columns, rows, point, p - 1, column, (mx, my))
                 if pulleys.arm[p] < 0:
                     continue
                 # by the arm's rate the axis moves along (ex, ey), and its speed turns with the arm as well
@@ -182,7 +185,7 @@ def add_contacts(
                 by_x = xx * ex + xy * ey + by_n * nx - by_t * ny
                 by_y = yx * ex + yy * ey + by_n * ny + by_t * nx
                 ax, ay = -(ex * xx + ey * yx), -(ex * xy + ey * yy)
-                _add_to_border(columns, rows, i, j, at_point, arm, (-by_x, -by_y), (ax, ay))
+                _add_to_border(columns, rows, point, arm, (-by_x, -by_y), (ax, ay))
                 corner[arm, arm] += ex * by_x + ey * by_y - tau * (fx * ey - fy * ex)
                 corner[arm, last] -= fx * ex + fy * ey
                 if p > 0:
@@ -206,16 +209,10 @@ def _reach(q, i, j, l0):
 
 @merged_kernel
 def _add_to_belt(
-    blocks: np.ndarray,
-    columns: np.ndarray,
-    i: int,
-    j: int,
-    shape: tuple[float, float, float, float],
-    last: int,
-    force: tuple[float, float],
-    matrix: tuple[float, float, float, float],
+    blocks: np.ndarray, columns: np.ndarray, point: _Point, last: int, force: _Two, matrix: _Four
 ) -> None:
-    """Add a force at a point between nodes i and j, and the matrix (xx, xy, yx, yy) of its slopes."""
+    """Add a force at a point of the belt, and the matrix (xx, xy, yx, yy) of its slopes."""
+    i, j, shape = point
     xx, xy, yx, yy = matrix
     for node in range(2):
         at = i if node == 0 else j
@@ -238,16 +235,10 @@ def _add_to_belt(
 
 @merged_kernel
 def _add_to_border(
-    columns: np.ndarray,
-    rows: np.ndarray,
-    i: int,
-    j: int,
-    shape: tuple[float, float, float, float],
-    k: int,
-    column: tuple[float, float],
-    row: tuple[float, float],
+    columns: np.ndarray, rows: np.ndarray, point: _Point, k: int, column: _Two, row: _Two
 ) -> None:
-    """Add to column and row k of the border the coupling of an unknown there and a point between i and j."""
+    """Add to column and row k of the border the coupling of an unknown there and a point of the belt."""
+    i, j, shape = point
     for node in range(2):
         at = i if node == 0 else j
         for kind in range(2):

@@ -18,7 +18,7 @@ from cvt_hpc.variator.course import load_course
 from cvt_hpc.variator.profiles import multiple
 from cvt_hpc.variator.scene import length_problems, nested_problems
 
-MOST_STRAIN = 0.5  # tension over axial_stiffness
+_MOST_STRAIN = 0.5  # tension over axial_stiffness
 
 PROFILED = ("driving_speed", "load")
 
@@ -105,7 +105,7 @@ def _tension(parameters: Parameters) -> float:
     p = parameters
     if layout_problems(p):
         return 0.0  # which nobody reads: they are told first
-    path, most = layout(p).path, MOST_STRAIN * p["axial_stiffness"]
+    path, most = layout(p).path, _MOST_STRAIN * p["axial_stiffness"]
     shortest = length_at(path, most, p)
     if not shortest < p["free_length"] < path.path_length:
         expected = f"more than {shortest:.6g} m, at half of axial_stiffness, and less than the path's"
@@ -116,12 +116,10 @@ def _tension(parameters: Parameters) -> float:
 def free_length() -> Parameter:
     """The parameter that gives the preload by the belt's own length."""
     needs = (*TWO, *PULLEY_LISTS, *TENSIONER, "axial_stiffness", "contact_stiffness")
-    return Parameter(
+    return positive(
         None,
         "m",
         "length of the belt without load, in the place of tension, which follows",
-        minimum=0.0,
-        exclusive=True,
         gives=Substitute("tension", needs, _tension),
         sensible=(0.1, 50.0),
     )

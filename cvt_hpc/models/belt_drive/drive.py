@@ -42,9 +42,9 @@ from cvt_hpc.solvers.generalised_alpha import Scheme, stage_length
 
 STEPS, ITERATIONS, UNSOLVED = range(3)  # counters of a state
 
-STUCK = 1.5  # friction_speed: slower contacts stick
-TIED = 1e3  # times as stiff as contacts across the rim: the stiffness of ties
-LOWEST = 1.0  # [Hz]: modes below are the belt as it runs around
+_STUCK = 1.5  # friction_speed: slower contacts stick
+_TIED = 1e3  # times as stiff as contacts across the rim: the stiffness of ties
+_LOWEST = 1.0  # [Hz]: modes below are the belt as it runs around
 
 
 class Drive(NamedTuple):
@@ -75,16 +75,10 @@ def state(
     and angles of the arms, (A,) [rad]; by default as drawn.
     """
     count, n = len(speeds), len(q)
-    turning = rotating.wheels_at(
-        drive.pulleys, speeds, np.zeros(len(drive.pulleys.arms.pivot)) if angles is None else angles, n
-    )
-    return State(
-        chain(q, v, columns=turning.speed.shape[1]),
-        turning,
-        first_touch(count, n, len(drive.contact.shape)),
-        np.zeros(3, np.int64),
-        np.zeros_like(turning.power),
-    )
+    drawn = np.zeros(len(drive.pulleys.arms.pivot))
+    turning = rotating.wheels_at(drive.pulleys, speeds, drawn if angles is None else angles, n)
+    belt, touch = chain(q, v, columns=turning.speed.shape[1]), first_touch(count, n, len(drive.contact.shape))
+    return State(belt, turning, touch, np.zeros(3, np.int64), np.zeros_like(turning.power))
 
 
 @kernel
@@ -125,16 +119,8 @@ def advance(
             wheels.power[:] = 0.0
             wheels.power[rotating.BELT_LOSS] = set_up(drive.beam, belt, tau, last)
             rotating.add_pulleys(drive.pulleys, wheels, inputs, share, tau)
-            laws_hold = add_contacts(
-                drive.contact,
-                state.touch,
-                drive.beam.lengths,
-                belt,
-                drive.pulleys,
-                wheels,
-                tau,
-                iteration > 0,
-            )
+            touching = drive.contact, state.touch, drive.beam.lengths
+            laws_hold = add_contacts(*touching, belt, drive.pulleys, wheels, tau, iteration > 0)
             state.counters[ITERATIONS] += 1
             if not factor(belt.blocks, SIZE):
                 return False
@@ -162,12 +148,12 @@ def drive_frequencies(drive: Drive, state: State, count: int) -> np.ndarray:
     """Lowest frequencies of a drive about its state, (count,) ascending [Hz]; nan where fewer are found."""
     mass, stiffness = matrices(drive, state)
     # a shift below all: the belt that runs around has 0
-    shift = -((2.0 * np.pi * LOWEST) ** 2)
+    shift = -((2.0 * np.pi * _LOWEST) ** 2)
     most = min(count + 4, mass.shape[0] - 2)
     start = np.random.default_rng(0).normal(size=mass.shape[0])  # one of its own would differ from run to run
     squares = eigsh(stiffness, most, mass, sigma=shift, v0=start, return_eigenvectors=False)
     found = np.sort(np.sqrt(np.maximum(squares, 0.0))) / (2.0 * np.pi)
-    found = found[found > LOWEST][:count]
+    found = found[found > _LOWEST][:count]
     return np.concatenate([found, np.full(count - len(found), np.nan)])
 
 
@@ -232,8 +218,6 @@ def _ties(contact: Contact, memory: Memory) -> np.ndarray:
     friction = contact.friction
     sticks = memory.side == 0
     if friction.treatment == Treatment.REGULARISED:
-        sticks = np.abs(memory.slip) < STUCK * friction.friction_speed
-    rigid = TIED * contact.stiffness
-    return np.where(
-        sticks, friction.shear_stiffness if friction.treatment == Treatment.BRISTLE else rigid, 0.0
-    )
+        sticks = np.abs(memory.slip) < _STUCK * friction.friction_speed
+    is_bristle = friction.treatment == Treatment.BRISTLE
+    return np.where(sticks, friction.shear_stiffness if is_bristle else _TIED * contact.stiffness, 0.0)

@@ -40,7 +40,7 @@ from cvt_hpc.physics.contact_laws import friction as smooth_friction
 from cvt_hpc.physics.friction import FrictionLaw, friction_coefficient
 from cvt_hpc.solvers.generalised_alpha import Scheme, begin, finish
 
-PATIENCE, SOFTER = 3, 0.3  # iterates in which no fewer contacts are wrong, until the grip is so much softer
+_PATIENCE, _SOFTER = 3, 0.3  # iterates in which no fewer contacts are wrong, until the grip is so much softer
 WRONG, LOOSE, FEWEST, LEFT = range(4)  # pivots of a memory
 
 
@@ -106,7 +106,7 @@ class Rub(NamedTuple):
 @kernel
 def begin_friction(friction: Friction, memory: Memory, scheme: Scheme, dt: float) -> None:
     """Begin a step of dt [s]."""
-    memory.pivots[FEWEST], memory.pivots[LEFT] = memory.slip.size + 1, PATIENCE
+    memory.pivots[FEWEST], memory.pivots[LEFT] = memory.slip.size + 1, _PATIENCE
     memory.grip[0] = friction.grip
     if friction.treatment == Treatment.BRISTLE:
         begin(scheme, dt, memory.shear, memory.shear_rate, memory.shear_start)
@@ -203,12 +203,12 @@ def laws_hold(friction: Friction, memory: Memory, is_known: bool) -> bool:
         return False
     pivots = memory.pivots
     if pivots[WRONG] < pivots[FEWEST]:
-        pivots[FEWEST], pivots[LEFT] = pivots[WRONG], PATIENCE
+        pivots[FEWEST], pivots[LEFT] = pivots[WRONG], _PATIENCE
     else:
         pivots[LEFT] -= 1
         if pivots[LEFT] < 0:
-            pivots[LEFT] = PATIENCE
-            memory.grip[0] *= SOFTER
+            pivots[LEFT] = _PATIENCE
+            memory.grip[0] *= _SOFTER
     return pivots[WRONG] + pivots[LOOSE] == 0
 
 

@@ -10,24 +10,18 @@ from typing import Any, NamedTuple
 import numpy as np
 
 from cvt_hpc.models.belt_drive.pulleys import Arms, Pulleys, no_struts, struts
-from cvt_hpc.parameters import Column, FromFile, Parameter, RowError
+from cvt_hpc.parameters import Column, FromFile, Parameter, Parameters, Range, RowError, positive
 from cvt_hpc.physics.belt_path import BeltPath, belt_path
 from cvt_hpc.physics.geometry import variator_problems
 from cvt_hpc.variator import PULLEYS, STRANDS
 from cvt_hpc.variator.scene import length_problems, nested_problems
 
 Problem = tuple[str, str, str]  # key, expected, found
-MOST_RUN_OUT = 0.01  # of the radius: the square of this is left out
+_MOST_RUN_OUT = 0.01  # of the radius: the square of this is left out
 
 COLUMNS = {"x": ("m",), "y": ("m",), "radius": ("m",), "turn": ("",), "inertia": ("kg m^2",), "load": ("",)}
 PULLEY_LISTS = tuple(f"pulley_{name}" for name in COLUMNS)
-TWO = (
-    "ratio",
-    "driven_radius",
-    "centre_distance",
-    "driven_inertia",
-    "crossed",
-)  # values that lists replace
+TWO = "ratio", "driven_radius", "centre_distance", "driven_inertia", "crossed"  # values that lists replace
 
 
 def _arranged(columns: Mapping[str, Column]) -> dict[str, Any]:
@@ -40,9 +34,7 @@ def _arranged(columns: Mapping[str, Column]) -> dict[str, Any]:
     return lists
 
 
-def _list(
-    unit: str, description: str, sensible: tuple[float, float] | None = None, **bounds: Any
-) -> Parameter:
+def _list(unit: str, description: str, sensible: Range | None = None, **bounds: Any) -> Parameter:
     return Parameter((), unit, description, sensible=sensible, **bounds)
 
 
@@ -94,13 +86,8 @@ TENSIONER: dict[str, Parameter] = {
     "strut_damping": _list("N s/m", "force of a dashpot beside it by the speed", (1e-3, 1e6), minimum=0.0),
     "tensioner_lowest": _list("rad", "clockwise end of the travel", (1e-3, 7.0)),
     "tensioner_highest": _list("rad", "counter-clockwise end of the travel", (1e-3, 7.0)),
-    "stop_stiffness": Parameter(
-        1e4,
-        "N m",
-        "moment of the stops at the ends by the angle [rad]",
-        minimum=0.0,
-        exclusive=True,
-        sensible=(1.0, 1e8),
+    "stop_stiffness": positive(
+        1e4, "N m", "moment of the stops at the ends by the angle [rad]", sensible=(1.0, 1e8)
     ),
 }
 _STRUT_LISTS = tuple(key for key in TENSIONER if key.startswith("strut_"))
@@ -125,7 +112,7 @@ class Layout(NamedTuple):
         return float(self.path.radius[self.driven] / self.path.radius[0])
 
 
-def layout(parameters: Mapping[str, Any]) -> Layout:
+def layout(parameters: Parameters) -> Layout:
     """Layout of a drive, from values by name [SI] without problems."""
     p = parameters
     if not p["pulley_x"]:
@@ -141,7 +128,7 @@ def layout(parameters: Mapping[str, Any]) -> Layout:
     return Layout(path, names, spans, inertia, load, 1 + int(np.argmax(np.abs(load[1:]))))
 
 
-def arms_of(parameters: Mapping[str, Any]) -> Arms:
+def _arms_of(parameters: Parameters) -> Arms:
     """Arms of a drive; without `tensioner_moment` the moments of their springs are 0."""
     p = parameters
     pivot = np.array([p["tensioner_x"], p["tensioner_y"]]).T.reshape(-1, 2)
@@ -157,22 +144,20 @@ def arms_of(parameters: Mapping[str, Any]) -> Arms:
     return Arms(pivot, **values, stop=p["stop_stiffness"], struts=pulling)
 
 
-def pulleys_of(parameters: Mapping[str, Any], drawn: Layout) -> Pulleys:
+def pulleys_of(parameters: Parameters, drawn: Layout) -> Pulleys:
     """Pulleys of a drive, on their axes and arms."""
     arm = np.full(len(drawn.inertia), -1)
     for a, number in enumerate(parameters["tensioner_pulley"]):
         arm[int(number) - 1] = a
     rim = [np.array(parameters[key] or np.zeros(len(arm)), float) for key in ("run_out", "run_out_phase")]
-    return Pulleys(drawn.path.centre, drawn.path.radius, drawn.inertia, arm, arms_of(parameters), *rim)
+    return Pulleys(drawn.path.centre, drawn.path.radius, drawn.inertia, arm, _arms_of(parameters), *rim)
 
 
-def layout_problems(parameters: Mapping[str, Any]) -> list[Problem]:
+def layout_problems(parameters: Parameters) -> list[Problem]:
     """Problems of a layout, in the form of a model's check: (key, expected, found)."""
     p = parameters
-    found = (
-        _list_problems(p, PULLEY_LISTS) if any(p[key] for key in PULLEY_LISTS) else variator_problems(dict(p))
-    )
-    if found:
+    has_lists = any(p[key] for key in PULLEY_LISTS)
+    if found := _list_problems(p, PULLEY_LISTS) if has_lists else variator_problems(dict(p)):
         return found
     if p["pulley_x"]:
         found = _pulley_problems(p)
@@ -183,7 +168,7 @@ def layout_problems(parameters: Mapping[str, Any]) -> list[Problem]:
     return found
 
 
-def run_out_problems(parameters: Mapping[str, Any]) -> list[Problem]:
+def run_out_problems(parameters: Parameters) -> list[Problem]:
     """Problems of eccentric pulleys of a layout without problems, in the form of a model's check."""
     p, radius = parameters, layout(parameters).path.radius
     for key in ("run_out", "run_out_phase"):
@@ -191,19 +176,19 @@ def run_out_problems(parameters: Mapping[str, Any]) -> list[Problem]:
             return found
         if len(p[key]) not in (0, len(radius)):
             return [(key, f"a value for each pulley, {len(radius)}", f"{len(p[key])}")]
-    for value, most in zip(p["run_out"], MOST_RUN_OUT * radius, strict=False):
+    for value, most in zip(p["run_out"], _MOST_RUN_OUT * radius, strict=False):
         if value > most:
-            expected = f"at most {most:g} m, {MOST_RUN_OUT:.0%} of the pulley's radius"
+            expected = f"at most {most:g} m, {_MOST_RUN_OUT:.0%} of the pulley's radius"
             return [("run_out", expected, f"{value:g} m")]
     return []
 
 
-def _list_problems(p: Mapping[str, Any], keys: Sequence[str]) -> list[Problem]:
+def _list_problems(p: Parameters, keys: Sequence[str]) -> list[Problem]:
     """Lists that are none of numbers, missing beside others, or not as long as most of them."""
     return nested_problems(p, keys) or length_problems(p, keys)
 
 
-def _pulley_problems(p: Mapping[str, Any]) -> list[Problem]:
+def _pulley_problems(p: Parameters) -> list[Problem]:
     count = len(p["pulley_x"])
     if count < 2:
         return [("pulley_x", "two pulleys or more", f"{count}")]
@@ -220,28 +205,22 @@ def _pulley_problems(p: Mapping[str, Any]) -> list[Problem]:
     return []
 
 
-def _pulley_faults(p: Mapping[str, Any]) -> Iterator[tuple[int, str, str, str]]:
+def _pulley_faults(p: Parameters) -> Iterator[tuple[int, str, str, str]]:
     """Yield errors in single pulleys: number of the pulley from 0 on, key, expected, found."""
-    for k in range(len(p["pulley_x"])):
-        radius, turn, inertia, load = (
-            p[f"pulley_{name}"][k] for name in ("radius", "turn", "inertia", "load")
-        )
+    lists = (p[f"pulley_{name}"] for name in ("radius", "turn", "inertia", "load"))
+    for k, (radius, turn, inertia, load) in enumerate(zip(*lists, strict=True)):
         if radius <= 0.0:
             yield k, "pulley_radius", "a radius above 0", f"{radius:g} m"
         if turn not in (1.0, -1.0):
             yield k, "pulley_turn", "1 or -1 for each pulley", f"{turn:g}"
         if inertia < 0.0 or (k > 0 and inertia == 0.0):
-            yield (
-                k,
-                "pulley_inertia",
-                "moments of inertia above 0 of all but the first",
-                f"{inertia:g} kg m^2",
-            )
+            expected = "moments of inertia above 0 of all but the first"
+            yield k, "pulley_inertia", expected, f"{inertia:g} kg m^2"
         if k == 0 and load != 0.0:
             yield k, "pulley_load", "0 of the first pulley, which drives", f"{load:g}"
 
 
-def _arm_problems(p: Mapping[str, Any]) -> list[Problem]:
+def _arm_problems(p: Parameters) -> list[Problem]:
     count, numbers = len(p["pulley_x"]) or 2, p["tensioner_pulley"]
     for number in numbers:
         if number not in range(2, count + 1) or numbers.count(number) > 1:
@@ -255,19 +234,15 @@ def _arm_problems(p: Mapping[str, Any]) -> list[Problem]:
         if np.hypot(*(pulleys.centre[int(number) - 1] - pulleys.arms.pivot[a])) == 0.0:
             return [("tensioner_x", "a pivot beside the pulley's axis", f"that of pulley {number:g}")]
         if p["strut_stiffness"] and not abs(pulleys.arms.struts.lever[a]) > 0.0:
-            return [
-                ("strut_held_x", "a spring that does not point at the pivot", f"that of pulley {number:g}")
-            ]
+            expected = "a spring that does not point at the pivot"
+            return [("strut_held_x", expected, f"that of pulley {number:g}")]
     return []
 
 
-def layout_inert(parameters: Mapping[str, Any]) -> dict[str, str]:
+def layout_inert(parameters: Parameters) -> dict[str, str]:
     """Parameters of layouts without effect, each with the setting that makes it so."""
     p = parameters
-    if p["pulley_x"]:
-        found = dict.fromkeys(TWO, "pulley_x, which gives all pulleys")
-    else:
-        found = {}
+    found = dict.fromkeys(TWO, "pulley_x, which gives all pulleys") if p["pulley_x"] else {}
     if not any(p["run_out"]):
         found["run_out_phase"] = "no run_out"
     if not p["tensioner_pulley"]:

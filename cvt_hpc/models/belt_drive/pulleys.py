@@ -119,33 +119,13 @@ def wheels_at(pulleys: Pulleys, speeds: np.ndarray, angles: np.ndarray, nodes: i
     """Pulleys at speeds (P,) [rad/s], arms at rest at angles (A,) [rad], and a belt of some nodes."""
     count, arms = len(speeds), len(angles)
     border = count - 1 + arms
-    speed, acceleration, stage_speed, start_speed = np.zeros((4, 1, count + arms))
-    angle, turning, stage_angle, start_angle = np.zeros((4, 1, arms))
-    speed[0, :count], angle[0], stage_angle[0] = speeds, angles, angles
-    rotation, rotating, stage_rotation, start_rotation = np.zeros((4, 1, count))
-    rotating[0] = speeds
+    motion = *np.zeros((4, 1, count + arms)), *np.zeros((4, 1, arms)), *np.zeros((4, 1, count))
     rim, centre_speed, lever = np.zeros((3, count, 2))
-    found = Wheels(
-        speed,
-        acceleration,
-        stage_speed,
-        start_speed,
-        angle,
-        turning,
-        stage_angle,
-        start_angle,
-        rotation,
-        rotating,
-        stage_rotation,
-        start_rotation,
-        rim,
-        pulleys.centre.copy(),
-        centre_speed,
-        lever,
-        np.zeros((nodes, border, PER_NODE)),
-        empty_corner(border, border + 1),
-        np.zeros(FRICTION_LOSS + count),
-    )
+    rows, corner = np.zeros((nodes, border, PER_NODE)), empty_corner(border, border + 1)
+    power = np.zeros(FRICTION_LOSS + count)
+    found = Wheels._make((*motion, rim, pulleys.centre.copy(), centre_speed, lever, rows, corner, power))
+    found.speed[0, :count], found.rotating[0] = speeds, speeds
+    found.angle[0], found.stage_angle[0] = angles, angles
     place_axes(pulleys, found)
     return found
 
@@ -229,7 +209,7 @@ def add_pulleys(pulleys: Pulleys, wheels: Wheels, inputs: np.ndarray, share: flo
     for a in range(wheels.angle.shape[1]):
         k = count + a
         angle, rate = wheels.stage_angle[0, a], wheels.stage_speed[0, k]
-        moment, by_rate, lost = strut_moment(arms, a, angle, rate, tau)
+        moment, by_rate, lost = _strut_moment(arms, a, angle, rate, tau)
         moment, stiffness = moment - arms.stiffness[a] * angle, arms.stiffness[a]
         beyond = angle - min(max(angle, arms.lowest[a]), arms.highest[a])
         if beyond != 0.0:
@@ -242,7 +222,7 @@ def add_pulleys(pulleys: Pulleys, wheels: Wheels, inputs: np.ndarray, share: flo
 
 
 @kernel
-def strut_moment(arms: Arms, a: int, angle: float, rate: float, tau: float) -> tuple[float, float, float]:
+def _strut_moment(arms: Arms, a: int, angle: float, rate: float, tau: float) -> tuple[float, float, float]:
     """Moment of the strut on arm a, or the constant M [N m]; its slope by the rate; power lost [W]."""
     strut = arms.struts
     if strut.lever[a] == 0.0:
@@ -262,7 +242,7 @@ def strut_moment(arms: Arms, a: int, angle: float, rate: float, tau: float) -> t
     return -force * lever, -by_rate * lever - force * tau * bend, lost
 
 
-def strut_lengths(arms: Arms, angle: np.ndarray) -> np.ndarray:
+def _strut_lengths(arms: Arms, angle: np.ndarray) -> np.ndarray:
     """Lengths of struts at angles (A,) of the arms [m]."""
     x, y = (arms.struts.held - arms.pivot).T
     sine, cosine = np.sin(angle), np.cos(angle)
@@ -285,7 +265,7 @@ def arms_energy(arms: Arms, angle: np.ndarray, rate: np.ndarray) -> float:
     """Kinetic and elastic energy of arms at angles and rates (A,) [J]; that of a spring is 0 as drawn."""
     beyond = angle - np.clip(angle, arms.lowest, arms.highest)
     elastic = 0.5 * arms.stiffness * angle**2 + 0.5 * arms.stop * beyond**2
-    longer = strut_lengths(arms, angle) - strut_lengths(arms, np.zeros_like(angle))
+    longer = _strut_lengths(arms, angle) - _strut_lengths(arms, np.zeros_like(angle))
     is_strut = arms.struts.lever != 0.0
     per_length = np.divide(arms.moment, arms.struts.lever, where=is_strut, out=np.zeros_like(angle))
     of_strut = 0.5 * arms.struts.stiffness * longer**2 - per_length * longer

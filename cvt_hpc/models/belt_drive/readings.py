@@ -3,18 +3,17 @@
 Kernels read a sample at points along the belt: places, tension, contacts.
 """
 
-from collections.abc import Mapping
-from typing import Any, NamedTuple
+from typing import NamedTuple
 
 import numpy as np
 
 from cvt_hpc.kernels import called_alike, kernel
-from cvt_hpc.models.belt_drive.contact import Contact, Touch, contact_slopes
+from cvt_hpc.models.belt_drive.contact import contact_slopes
 from cvt_hpc.models.belt_drive.drive import Drive, State
 from cvt_hpc.models.belt_drive.layout import Layout
 from cvt_hpc.models.belt_drive.pulleys import arms_energy, axes
 from cvt_hpc.multibody.ancf_beam import POINTS, SHAPES, WEIGHTS, AncfBeam, energies, tension_of
-from cvt_hpc.multibody.ancf_equations import Chain
+from cvt_hpc.parameters import Parameters
 from cvt_hpc.physics.belt_path import directions, span_starts, tangents
 from cvt_hpc.physics.nearest_on_path import Way, nearest, way
 
@@ -43,16 +42,16 @@ class Readings:
     [m]: `probes`, (P, p), on the strands, and `places`, (PLACES,), of profiles.
     """
 
-    def __init__(self, parameters: Mapping[str, Any], drawn: Layout) -> None:
+    def __init__(self, parameters: Parameters, drawn: Layout) -> None:
         p, path = parameters, drawn.path
         self.drawn, self.belt_speed = drawn, p["driving_speed"] * float(path.radius[0])
         starts = path.ends[::2]
         shares = np.arange(1, p["strand_probes"] + 1) / (p["strand_probes"] + 1.0)
         self.probes = starts[:, None] + path.spans[:, None] * shares
-        self._way, self._line = way(path), empty_line(p["elements"])
-        self._sample = empty_sample(self.probes.size, len(path.radius))
+        self._places = Places(way(path), contact_slopes(p["contact_points"]), self.probes.ravel())
+        self._line = Line(*np.zeros((3, p["elements"], POINTS)))
+        self._sample = Sample(np.zeros(self.probes.size), *np.zeros((3, len(path.radius))))
         self._read = called_alike(read)
-        self._slopes = contact_slopes(p["contact_points"])
         self.places = (np.arange(PLACES) + 0.5) * (path.path_length / PLACES)
 
     def chords(self, drive: Drive, state: State) -> np.ndarray:
@@ -91,9 +90,8 @@ class Reading:
     def __init__(self, where: Readings, drive: Drive, state: State, sums: np.ndarray | None = None) -> None:
         self._where, self._drive, self._state = where, drive, state
         sums = np.zeros((len(PROFILES) + 2, 0)) if sums is None else sums
-        belt, contacts = (drive.beam, state.chain), (drive.contact, state.touch)
-        found, points = where._sample, (where._slopes, where.probes.ravel())
-        where._read(where._way, *belt, *contacts, *points, where._line, found, sums)
+        found = where._sample
+        where._read(drive, state, where._places, where._line, found, sums)
         self.strand_tensions, self._slip = found.tension, found.slip
         self.displacement = found.displacement - where.chords(drive, state)
         self.lifted = found.largest <= 0.0
@@ -117,6 +115,14 @@ def stored_energy(drive: Drive, state: State) -> float:
     return kinetic + elastic + float(turning) + arms
 
 
+class Places(NamedTuple):
+    """Where a sample is read."""
+
+    way: Way  # the reference path
+    slopes: np.ndarray  # (C, 4): derivatives of the shapes at the contact points
+    probes: np.ndarray  # (p,): path coordinates [m]
+
+
 class Line(NamedTuple):
     """The belt at the Gauss points of its k elements, (k, POINTS) arrays."""
 
@@ -135,37 +141,16 @@ class Sample(NamedTuple):
     largest: np.ndarray  # shape (P,): normal force of the contact that is pressed most [N]
 
 
-def empty_line(elements: int) -> Line:
-    """Room for a belt."""
-    return Line(*np.zeros((3, elements, POINTS)))
-
-
-def empty_sample(probes: int, pulleys: int) -> Sample:
-    """Room for a sample."""
-    return Sample(np.zeros(probes), *np.zeros((3, pulleys)))
-
-
 @kernel
-def read(
-    way: Way,
-    beam: AncfBeam,
-    chain: Chain,
-    contact: Contact,
-    touch: Touch,
-    slopes: np.ndarray,
-    probes: np.ndarray,
-    line: Line,
-    sample: Sample,
-    sums: np.ndarray,
-) -> None:
+def read(drive: Drive, state: State, places: Places, line: Line, sample: Sample, sums: np.ndarray) -> None:
     """Read a sample into `line` and `sample`.
 
-    `slopes`, (C, 4), are derivatives of the shapes at the contact points, `probes`, (p,), path coordinates
-    [m]. To `sums`, (6, place), profiles are added at equal shares of the path: length, tension and offset by
-    it, normal force and force forwards per length, samples; none at no places.
+    To `sums`, (6, place), profiles are added at equal shares of the path: length, tension and offset by it,
+    normal force and force forwards per length, samples; none at no places.
     """
-    _locate(way, beam, chain.q, line)
-    _displace(line, probes, way.length, sample.displacement)
+    beam, touch, way = drive.beam, state.touch, places.way
+    _locate(way, beam, state.chain.q, line)
+    _displace(line, places.probes, way.length, sample.displacement)
     for p in range(sample.tension.size):
         middle, quarter = way.begins[p, 1] + 0.5 * way.spans[p], 0.25 * way.spans[p]
         pull, length = 0.0, 0.0
@@ -184,7 +169,7 @@ def read(
                 largest = max(largest, force)
         sample.slip[p], sample.largest[p] = slid / max(pressed, 1e-9), largest
     if sums.shape[1] > 0:
-        _add_profiles(way, beam, chain.stage_q, contact, slopes, touch, line, sums)
+        _add_profiles(drive, state, places, line, sums)
 
 
 @kernel
@@ -226,17 +211,9 @@ def _displace(line: Line, probes: np.ndarray, length: float, found: np.ndarray) 
 
 
 @kernel
-def _add_profiles(
-    way: Way,
-    beam: AncfBeam,
-    q: np.ndarray,
-    contact: Contact,
-    slopes: np.ndarray,
-    touch: Touch,
-    line: Line,
-    sums: np.ndarray,
-) -> None:
-    """Add a sample to the profiles; q (n, 4) are the nodes' coordinates, the rest is as in `read`."""
+def _add_profiles(drive: Drive, state: State, where: Places, line: Line, sums: np.ndarray) -> None:
+    """Add a sample to the profiles, as `read` tells of them."""
+    beam, contact, touch, way, q = drive.beam, drive.contact, state.touch, where.way, state.chain.stage_q
     places = sums.shape[1]
     per = places / way.length
     for i in range(beam.lengths.size):
@@ -253,7 +230,7 @@ def _add_profiles(
                 forwards += way.turn[p] * touch.tangential[p, i, c]
             if normal > 0.0:
                 x, y = _at(contact.shape[c], q, i, j, l0)
-                sx, sy = _at(slopes[c], q, i, j, l0)
+                sx, sy = _at(where.slopes[c], q, i, j, l0)
                 place = min(int(nearest(way, x, y, sx, sy)[0] * per), places - 1)
                 sums[3, place] += per * normal
                 sums[4, place] += per * forwards

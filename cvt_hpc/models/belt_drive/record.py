@@ -2,7 +2,6 @@
 
 from __future__ import annotations
 
-from collections.abc import Mapping
 from typing import TYPE_CHECKING, Any
 
 import numpy as np
@@ -10,9 +9,10 @@ import numpy as np
 from cvt_hpc.models.belt_drive import theory
 from cvt_hpc.models.belt_drive.layout import layout
 from cvt_hpc.models.belt_drive.theory import answers
+from cvt_hpc.parameters import Parameters
 from cvt_hpc.physics.belt_path import regions
 from cvt_hpc.variables import Coordinate, Variable, together, values
-from cvt_hpc.variator import PULLEYS, STRANDS, judging
+from cvt_hpc.variator import PULLEYS, judging
 from cvt_hpc.variator.history import dataset
 from cvt_hpc.variator.variables import COORDINATES, Measured, frequency_bins, power, shared
 from cvt_hpc.vibration import assessment
@@ -25,45 +25,45 @@ if TYPE_CHECKING:
     from cvt_hpc.models.belt_drive.transient import Transient
 
 # Measured on one core of an EPYC beside other work: core-seconds per element and step, and per sample
-STEP_COST, SAMPLE_COST = 1.8e-6, 5e-5
+_STEP_COST, _SAMPLE_COST = 1.8e-6, 5e-5
 
 DRIVE_MODES = 8
 
 
-def largest_spectrum(measured: Measured) -> np.ndarray:
+def _largest_spectrum(measured: Measured) -> np.ndarray:
     """Largest spectrum of each strand's probes, (strand, bin) [m]: one alone may sit on a node of a shape."""
     m, p = measured, measured.parameters
-    spectra = amplitude_spectrum(moved(m)[m.samples], p["sampling_rate"], frequency_bins(p).values)
+    spectra = amplitude_spectrum(_moved(m)[m.samples], p["sampling_rate"], frequency_bins(p).values)
     return spectra.max(axis=2).T
 
 
-def moved(measured: Measured) -> np.ndarray:
+def _moved(measured: Measured) -> np.ndarray:
     """Displacement, (done, strand, probe) [m]."""
     return measured.displacement.reshape(measured.done, len(measured.drawn.spans), -1)
 
 
-def strand_tension(measured: Measured) -> np.ndarray:
+def _strand_tension(measured: Measured) -> np.ndarray:
     """Mean tensions, (strand,) [N]."""
     return measured.each("tension {}", measured.drawn.spans)
 
 
-def eigenfrequencies(measured: Measured) -> np.ndarray:
+def _eigenfrequencies(measured: Measured) -> np.ndarray:
     """Eigenfrequencies of the strands, (strand, mode) [Hz]."""
     m = measured
-    return theory.strand_frequencies(m.parameters, m.present.path, strand_tension(m))
+    return theory.strand_frequencies(m.parameters, m.present.path, _strand_tension(m))
 
 
-def answered(measured: Measured) -> np.ndarray | None:
+def _answered(measured: Measured) -> np.ndarray | None:
     """Frequencies (strand, mode) [Hz] at which strands answer a kick; None without one."""
     m, kicked = measured, measured.kicked
     if kicked is None or kicked.start - m.risen < SHORTEST_SEGMENT:
         return None
-    before, after, rate = moved(m)[m.risen : kicked.start], moved(m)[kicked], m.parameters["sampling_rate"]
-    expected = eigenfrequencies(m)
+    before, after, rate = _moved(m)[m.risen : kicked.start], _moved(m)[kicked], m.parameters["sampling_rate"]
+    expected = _eigenfrequencies(m)
     return np.array([answers(before[:, k], after[:, k], rate, modes) for k, modes in enumerate(expected)])
 
 
-def of_arms(measured: Measured) -> np.ndarray:
+def _of_arms(measured: Measured) -> np.ndarray:
     """Mean angle, ripple and share at a stop of the arms that carry pulleys, nan of others, (3, P)."""
     pulleys = measured.pulleys
     found = np.full((3, len(pulleys.arm)), np.nan)
@@ -77,13 +77,13 @@ def of_arms(measured: Measured) -> np.ndarray:
 
 VARIABLES = (
     *assessment.VARIABLES,
-    *shared("spectrum", comment="largest of the strand's probes", of=largest_spectrum),
+    *shared("spectrum", comment="largest of the strand's probes", of=_largest_spectrum),
     Variable(
         "strand_tension",
         "N",
         "mean tension in the middle half of the strand",
         dims=("strand",),
-        of=strand_tension,
+        of=_strand_tension,
     ),
     Variable(
         "tension_ripple",
@@ -106,7 +106,7 @@ VARIABLES = (
         "1",
         "by creep and radial compliance, with the mean tensions of the strands",
         words="creep and compliance",
-        of=lambda m: theory.expected_loss(m.parameters, m.present, strand_tension(m)),
+        of=lambda m: theory.expected_loss(m.parameters, m.present, _strand_tension(m)),
     ),
     Variable(
         "creep_speed_loss",
@@ -121,7 +121,7 @@ VARIABLES = (
         "of a running beam under the strand's mean tension, pinned where tangents touch the pulleys; "
         "arms at their mean angles",
         dims=("strand", "half_waves"),
-        of=eigenfrequencies,
+        of=_eigenfrequencies,
     ),
     Variable(
         "drive_frequency",
@@ -135,11 +135,11 @@ VARIABLES = (
         "Hz",
         "peak near each eigenfrequency after a kick, where it exceeds three times the unrest before",
         dims=("strand", "half_waves"),
-        of=answered,
+        of=_answered,
         may_miss=True,
     ),
     *together(
-        of_arms,
+        _of_arms,
         Variable("arm_angle", "rad", "mean rotation of the arm from where it is drawn", dims=("pulley",)),
         Variable("arm_ripple", "rad", "standard deviation of that rotation", dims=("pulley",)),
         Variable(
@@ -173,34 +173,31 @@ VARIABLES = (
 )
 
 
-def coordinates(parameters: Mapping[str, Any]) -> dict[str, Coordinate]:
+def coordinates(parameters: Parameters) -> dict[str, Coordinate]:
     """Coordinates of the record's dimensions, by flat parameters of the job."""
     drawn = layout(parameters)
     driving, driven = drawn.pulleys[0], drawn.pulleys[drawn.driven]
-    roles = (
-        "" if drawn.pulleys == PULLEYS else f"; {driving} drives, {driven} is driven, of which is speed_loss"
-    )
-    names = {
-        "strand": _named("strand", drawn.spans),
-        "pulley": _named("pulley", drawn.pulleys, roles),
+    names = COORDINATES
+    if drawn.pulleys != PULLEYS:
+        order = "in the order in which the belt runs"
+        roles = f"{order}; {driving} drives, {driven} is driven, of which is speed_loss"
+        names = {
+            "strand": COORDINATES["strand"]._replace(values=np.array(drawn.spans), comment=order),
+            "pulley": COORDINATES["pulley"]._replace(values=np.array(drawn.pulleys), comment=roles),
+        }
+    return {
+        **names,
+        "frequency_bin": frequency_bins(parameters),
+        "half_waves": Coordinate(np.arange(1, theory.MODES + 1), "1", "half waves", "along the strand"),
+        "drive_mode": Coordinate(np.arange(1, DRIVE_MODES + 1), "1", "mode of the drive"),
     }
-    half_waves = Coordinate(np.arange(1, theory.MODES + 1), "1", "half waves", "along the strand")
-    modes = Coordinate(np.arange(1, DRIVE_MODES + 1), "1", "mode of the drive")
-    bins = frequency_bins(parameters)
-    return {**names, "frequency_bin": bins, "half_waves": half_waves, "drive_mode": modes}
 
 
-def _named(dimension: str, names: tuple[str, ...], roles: str = "") -> Coordinate:
-    in_order = "in the order in which the belt runs" + roles
-    comment = COORDINATES[dimension].comment if names in (PULLEYS, STRANDS) else in_order
-    return COORDINATES[dimension]._replace(values=np.array(names), comment=comment)
-
-
-def cost(parameters: Mapping[str, Any], stepper: str) -> Any:
+def cost(parameters: Parameters, stepper: str) -> float | np.ndarray:
     """Core-seconds of a run; of parameters that are arrays, an array."""
     p = parameters
     step = np.minimum(p["step"], 1.0 / p["sampling_rate"])
-    return p["duration"] * (STEP_COST * p["elements"] / step + SAMPLE_COST * p["sampling_rate"])
+    return p["duration"] * (_STEP_COST * p["elements"] / step + _SAMPLE_COST * p["sampling_rate"])
 
 
 def judge(run: Transient) -> dict[str, Any]:
@@ -230,14 +227,10 @@ def histories(run: Transient) -> xr.Dataset:
     profiles = {name: (values, *PROFILES[name]) for name, values in run.profiles.items()}
     tension = np.array([_late(run, f"tension {k}") for k in run.drawn.spans])
     sliding = theory.sliding_tension(run.parameters, run.path, tension, run.places)
-    words = (
-        "tension where it slides",
-        "N",
-        "by Euler and Eytelwein, from the strands' tensions, arms as drawn",
-    )
-    profiles["sliding_tension"] = sliding, *words
-    words = "wrap angle", "rad", "from the inlet of the arc, arms as drawn"
-    profiles["wrap_angle"] = theory.wrap_angles(run.path, run.places), *words
+    comment = "by Euler and Eytelwein, from the strands' tensions, arms as drawn"
+    profiles["sliding_tension"] = sliding, "tension where it slides", "N", comment
+    comment = "from the inlet of the arc, arms as drawn"
+    profiles["wrap_angle"] = theory.wrap_angles(run.path, run.places), "wrap angle", "rad", comment
     names = [name for pair in zip(run.drawn.pulleys, run.drawn.spans, strict=True) for name in pair]
     region = np.array(names)[regions(run.path, run.places)]
     return dataset(run, over_time, profiles, run.places, region)

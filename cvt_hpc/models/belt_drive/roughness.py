@@ -6,14 +6,11 @@ over the length S of the belt without load, L in all, with random phases and the
 root mean square of b. The j-th wave shakes the strands with the frequency j v / L.
 """
 
-from collections.abc import Mapping
-from typing import Any
-
 import numpy as np
 
 from cvt_hpc.parameters import Parameter, Parameters, not_negative
 
-HIGHEST = 0.01  # of the smallest radius: so rough a belt may be
+_HIGHEST = 0.01  # of the smallest radius: so rough a belt may be
 ROUGHNESS: dict[str, Parameter] = {
     "roughness": not_negative(
         0.0, "m", "root mean square of the height of the belt's surface", sensible=(1e-8, 1e-3)
@@ -26,7 +23,7 @@ ROUGHNESS: dict[str, Parameter] = {
 }
 
 
-def heights(parameters: Mapping[str, Any], lengths: np.ndarray) -> np.ndarray:
+def heights(parameters: Parameters, lengths: np.ndarray) -> np.ndarray:
     """Heights of the belt's surface at the contact points of elements of `lengths` [m], (k, C) [m]."""
     p, points = parameters, parameters["contact_points"]
     share = (np.arange(points) + 0.5) / points
@@ -48,8 +45,8 @@ def roughness_problems(parameters: Parameters, radius: float) -> list[tuple[str,
     if p["roughness_waves"] > (most := p["elements"] // 2):
         expected = f"at most {most}, of two elements each"
         return [("roughness_waves", expected, f"{p['roughness_waves']}")]
-    if p["roughness"] > HIGHEST * radius:
-        expected = f"at most {HIGHEST * radius:g} m, {HIGHEST:.0%} of the smallest radius"
+    if p["roughness"] > _HIGHEST * radius:
+        expected = f"at most {_HIGHEST * radius:g} m, {_HIGHEST:.0%} of the smallest radius"
         return [("roughness", expected, f"{p['roughness']:g} m")]
     return []
 

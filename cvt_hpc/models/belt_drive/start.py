@@ -4,7 +4,7 @@ The length of the belt follows from its tension with the arms of tensioners as d
 the moments that hold them there; or, where these moments are given, the arms turn into equilibrium.
 """
 
-from collections.abc import Callable, Mapping
+from collections.abc import Callable
 from typing import Any
 
 import numpy as np
@@ -16,6 +16,7 @@ from cvt_hpc.models.belt_drive.friction import Friction, Treatment
 from cvt_hpc.models.belt_drive.layout import Layout, pulleys_of
 from cvt_hpc.models.belt_drive.roughness import heights
 from cvt_hpc.multibody.ancf_beam import at_places, beam, random_lengths
+from cvt_hpc.parameters import Parameters
 from cvt_hpc.physics.belt_path import points_at
 from cvt_hpc.physics.friction import friction_law, given_law
 from cvt_hpc.solvers.generalised_alpha import Scheme
@@ -23,21 +24,21 @@ from cvt_hpc.solvers.generalised_alpha import Scheme
 IMPLICIT_EULER = Scheme(1.0, 1.0, 1.0)
 # Steps towards equilibrium [s]: the first is short, as contacts close; a step that is solved is followed by a
 # longer one, else by a shorter one; the longest leaves nothing to settle
-FIRST, LONGEST = 1e-5, 1.0
-LONGER, SHORTER = 4.0, 0.25
-MOST_STEPS = 500  # common belts need 20
+_FIRST, _LONGEST = 1e-5, 1.0
+_LONGER, _SHORTER = 4.0, 0.25
+_MOST_STEPS = 500  # common belts need 20
 SETTLED, MOST_ITERATIONS = 1e-8, 30  # [m/s]
 FRICTIONLESS = friction_law("coulomb", 1e-9, 0.0, 1.0)
 # Of the belt's length by its tension: they leave 0.2 % of this on the softest contacts, 1e-5 on common ones
-CORRECTIONS = 3
+_CORRECTIONS = 3
 # Of contacts that stick [m/s]: the speed at which their grip has the normal force of a belt at rest. At less
 # the five points of an element, which adds four coordinates, change without end; more costs iterations.
-GRIP_SPEED = 1e-4
-HELD = 1e12  # [kg m^2]: an arm that stays where it is drawn, or a pulley whose rim is eccentric
+_GRIP_SPEED = 1e-4
+_HELD = 1e12  # [kg m^2]: an arm that stays where it is drawn, or a pulley whose rim is eccentric
 
 
 def start(
-    parameters: Mapping[str, Any], drawn: Layout, tension_of: Callable[[Drive, State], float]
+    parameters: Parameters, drawn: Layout, tension_of: Callable[[Drive, State], float]
 ) -> tuple[Drive, State, bool]:
     """Constants and first state of a run, whose parts move as if nothing slid; whether equilibria were found.
 
@@ -47,13 +48,13 @@ def start(
     of_contacts = contact_compliance(path, p["contact_stiffness"]) / path.path_length
     compliance = 1.0 / p["axial_stiffness"] + of_contacts
     length = length_at(path, p["tension"], p)
-    for correction in range(CORRECTIONS + 1):
+    for correction in range(_CORRECTIONS + 1):
         drive = _drive(p, drawn, length)
         found = _laid(drive, drawn)
-        is_settled = _settle(_with_arms(drive, inertia=HELD, stiffness=0.0, moment=0.0), found)
+        is_settled = _settle(_with_arms(drive, inertia=_HELD, stiffness=0.0, moment=0.0), found)
         if not is_settled:
             break
-        if correction < CORRECTIONS:
+        if correction < _CORRECTIONS:
             length *= 1.0 + (tension_of(drive, found) - p["tension"]) * compliance
     if is_settled and p["tensioner_moment"]:
         is_settled = _settle(drive, found)
@@ -62,38 +63,24 @@ def start(
     return drive, _moving(drive, found, p, drawn), is_settled
 
 
-def _drive(p: Mapping[str, Any], drawn: Layout, length: float) -> Drive:
+def _drive(p: Parameters, drawn: Layout, length: float) -> Drive:
     lengths = random_lengths(length, p["elements"], p["length_scatter"], p["seed"])
     height = heights(p, lengths)
-    belt = beam(
-        lengths,
-        p["line_mass"],
-        p["axial_stiffness"],
-        p["bending_stiffness"],
-        p["axial_damping"],
-        p["mass_damping"],
-        p["bending_damping"],
-    )
-    contact = Contact(
-        contact_shapes(p["contact_points"]),
-        p["contact_stiffness"],
-        p["contact_damping"],
-        _friction(p, drawn),
-        height,
-        float(height.max()),
-    )
+    stiffness = "line_mass", "axial_stiffness", "bending_stiffness"
+    damping = "axial_damping", "mass_damping", "bending_damping"
+    belt = beam(lengths, *(p[key] for key in (*stiffness, *damping)))
+    shapes, across = contact_shapes(p["contact_points"]), (p["contact_stiffness"], p["contact_damping"])
+    contact = Contact(shapes, *across, _friction(p, drawn), height, float(height.max()))
     return Drive(belt, pulleys_of(p, drawn), contact)
 
 
-def _friction(p: Mapping[str, Any], drawn: Layout) -> Friction:
-    grip = p["tension"] / min(drawn.path.radius) / GRIP_SPEED
-    treatment = Treatment[p["friction_treatment"].upper()]
-    return Friction(
-        treatment, given_law(p), p["friction_speed"], grip, p["speed_tolerance"], p["shear_stiffness"]
-    )
+def _friction(p: Parameters, drawn: Layout) -> Friction:
+    grip = p["tension"] / min(drawn.path.radius) / _GRIP_SPEED
+    treatment, slack = Treatment[p["friction_treatment"].upper()], p["speed_tolerance"]
+    return Friction(treatment, given_law(p), p["friction_speed"], grip, slack, p["shear_stiffness"])
 
 
-def _with_arms(drive: Drive, **values: Any) -> Drive:
+def _with_arms(drive: Drive, **values: float | np.ndarray) -> Drive:
     """A drive with other constants of its arms."""
     arms = drive.pulleys.arms
     count = len(arms.pivot)
@@ -120,23 +107,23 @@ def _settle(drive: Drive, found: State) -> bool:
     """Bring a state to rest in equilibrium, without friction; and whether that was found."""
     friction = drive.contact.friction._replace(treatment=Treatment.REGULARISED, law=FRICTIONLESS)
     # without friction the belt's tension would turn an eccentric pulley to where the belt is shortest
-    inertia = np.where(drive.pulleys.run_out > 0.0, HELD, drive.pulleys.inertia)
+    inertia = np.where(drive.pulleys.run_out > 0.0, _HELD, drive.pulleys.inertia)
     pulleys = drive.pulleys._replace(inertia=inertia)
     smooth = drive._replace(pulleys=pulleys, contact=drive.contact._replace(friction=friction))
     at_rest = np.zeros((2, len(drive.pulleys.radius)))
-    step = FIRST
-    for _ in range(MOST_STEPS):
+    step = _FIRST
+    for _ in range(_MOST_STEPS):
         before = found.chain.q.copy(), found.wheels.angle.copy()
         for numbers in (found.chain.v, found.wheels.speed, found.touch.memory.dual, found.counters):
             numbers[:] = 0
         finite = advance(smooth, found, IMPLICIT_EULER, at_rest, step, 1, SETTLED, MOST_ITERATIONS)
         if finite and found.counters[UNSOLVED] == 0:
-            if step >= LONGEST:
+            if step >= _LONGEST:
                 return True
-            step *= LONGER
+            step *= _LONGER
         else:
             found.chain.q[:], found.wheels.angle[:] = before
-            step *= SHORTER
+            step *= _SHORTER
     return False
 
 
@@ -154,7 +141,7 @@ def _moments(drive: Drive, settled: State) -> np.ndarray:
     return found
 
 
-def _moving(drive: Drive, settled: State, p: Mapping[str, Any], drawn: Layout) -> State:
+def _moving(drive: Drive, settled: State, p: Parameters, drawn: Layout) -> State:
     """Set the line in motion: the belt runs along it with the driving pulley."""
     path, q = drawn.path, settled.chain.q
     stretch = path.path_length / drive.beam.lengths.sum()

@@ -17,15 +17,15 @@ from cvt_hpc.physics.running_strand import Strand, eigenfrequencies
 from cvt_hpc.vibration.signals import band_amplitude, dominant_frequency
 
 MIDDLE, WIDTH = 0.3, 0.25  # of the strand: there no shape of up to five half waves has a node
-NEAR = 0.15  # an answer is looked for within this share of a frequency
-LOUDER = 3.0  # than the belt's own unrest, else that may be its peak
+_NEAR = 0.15  # an answer is looked for within this share of a frequency
+_LOUDER = 3.0  # than the belt's own unrest, else that may be its peak
 
 MODES = 5
-FUNCTIONS = 24  # sines of the Ritz model: more change no recorded frequency by 1e-6
+_FUNCTIONS = 24  # sines of the Ritz model: more change no recorded frequency by 1e-6
 
 # Of h^4 N / (EI R). 18 random drives (90 to 700 N, 0.005 to 0.15 N m^2, 20 to 150 rad/s) shake by 0.001 to
 # 0.01 of it, at worst, where elements pass at a resonance, by 0.016
-SHAKEN = 0.02
+_SHAKEN = 0.02
 
 
 def creep_loss(parameters: Parameters, drawn: Layout) -> float:
@@ -52,14 +52,8 @@ def expected_loss(parameters: Parameters, drawn: Layout, tension: np.ndarray) ->
     p, radius = parameters, drawn.path.radius
     running_on, inertial = np.roll(tension, 1), centrifugal(p, drawn.path)
     if p["friction_treatment"] == "bristle":
-        running_on = np.array(
-            [
-                unsheared_tension(p, *arc) + inertial
-                for arc in zip(
-                    running_on - inertial, tension - inertial, radius, drawn.path.wrap, strict=True
-                )
-            ]
-        )
+        arcs = zip(running_on - inertial, tension - inertial, radius, drawn.path.wrap, strict=True)
+        running_on = np.array([unsheared_tension(p, *arc) + inertial for arc in arcs])
     depth = (running_on - inertial) / (radius * p["contact_stiffness"])
     stretched = np.array([stretch(float(force), p["axial_stiffness"]) for force in running_on])
     per_angle = (radius - depth) / stretched
@@ -161,7 +155,7 @@ def strand_frequencies(parameters: Parameters, path: BeltPath, tension: np.ndarr
         Strand(float(length), p["line_mass"], speed, float(force), p["bending_stiffness"])
         for length, force in zip(path.spans, tension, strict=True)
     ]
-    return np.array([eigenfrequencies(strand, FUNCTIONS)[:MODES] for strand in strands])
+    return np.array([eigenfrequencies(strand, _FUNCTIONS)[:MODES] for strand in strands])
 
 
 def mesh_amplitude(parameters: Parameters, path: BeltPath, tension: np.ndarray) -> float:
@@ -170,12 +164,12 @@ def mesh_amplitude(parameters: Parameters, path: BeltPath, tension: np.ndarray) 
     Where the belt runs on or off, its curvature changes from 0 to 1 / R along d = sqrt(EI / N), with
     N = T - m v^2. The fourth derivative of its shape is 1 / (R d^2) there, and an element of length h misses
     that shape by up to h^4 / (384 R d^2). As elements pass, this shakes the strands, more at their
-    resonances: SHAKEN is measured.
+    resonances: _SHAKEN is measured.
     """
     p = parameters
     pull = max(float(np.max(tension)) - centrifugal(p, path), 0.0)
     length = path.path_length / p["elements"]
-    return float(SHAKEN * length**4 * pull / (p["bending_stiffness"] * path.radius.min()))
+    return float(_SHAKEN * length**4 * pull / (p["bending_stiffness"] * path.radius.min()))
 
 
 def kick(path: BeltPath, line_mass: float, impulse: float, q: np.ndarray, v: np.ndarray) -> None:
@@ -202,15 +196,15 @@ def answers(before: np.ndarray, after: np.ndarray, rate: float, expected: np.nda
     """Frequencies of a strand after a kick, each near an expected one, (mode,) [Hz].
 
     By the displacement before and after the kick, (time, probe) [m]: of the probe that moves most there; nan
-    where it moves less than LOUDER times as much as before.
+    where it moves less than _LOUDER times as much as before.
     """
     found = np.full(len(expected), np.nan)
     for k, frequency in enumerate(expected):
-        band = ((1.0 - NEAR) * frequency, (1.0 + NEAR) * frequency)
+        band = ((1.0 - _NEAR) * frequency, (1.0 + _NEAR) * frequency)
         if not band[1] < 0.5 * rate:
             continue
         amplitude = band_amplitude(after, rate, band)
         strongest = int(np.argmax(amplitude))
-        if amplitude[strongest] > LOUDER * band_amplitude(before[:, strongest], rate, band):
+        if amplitude[strongest] > _LOUDER * band_amplitude(before[:, strongest], rate, band):
             found[k] = dominant_frequency(after[:, strongest], rate, band)
     return found

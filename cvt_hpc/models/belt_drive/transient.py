@@ -1,6 +1,5 @@
 """A transient run of the belt drive: it starts in motion from its static tension, is loaded, and recorded."""
 
-from collections.abc import Mapping
 from typing import Any
 
 import numpy as np
@@ -9,11 +8,12 @@ from cvt_hpc.kernels import called_alike
 from cvt_hpc.models.belt_drive import courses, readings
 from cvt_hpc.models.belt_drive.drive import advance, drive_frequencies
 from cvt_hpc.models.belt_drive.layout import Layout, layout
-from cvt_hpc.models.belt_drive.pulleys import FRICTION_LOSS, POWERS, Pulleys, axes
+from cvt_hpc.models.belt_drive.pulleys import FRICTION_LOSS, POWERS, axes
 from cvt_hpc.models.belt_drive.start import start
 from cvt_hpc.models.belt_drive.theory import kick, mesh_amplitude
 from cvt_hpc.models.marched import batches_of_one
 from cvt_hpc.models.sampled import MOST_UNSOLVED, SampledRun
+from cvt_hpc.parameters import Parameters
 from cvt_hpc.physics.belt_path import belt_path
 from cvt_hpc.solvers.generalised_alpha import generalised_alpha
 from cvt_hpc.variables import Status, Vibrates
@@ -26,27 +26,30 @@ CHANNELS = (
     *(f"tension {strand}" for strand in STRANDS),
     *(f"slip {pulley}" for pulley in PULLEYS),
 )
-MOST_LIFTED = 0.01  # [s] that a pulley may be without the belt
+_MOST_LIFTED = 0.01  # [s] that a pulley may be without the belt
 # Of the larger of drive and losses. Without load, where bending alone takes 4 W, steps of 0.1 ms leave up to
 # 0.013 open, of 0.05 ms 0.0009 (22.6 rad/s, 96 elements); with load runs leave up to 0.004.
-MOST_OPEN = 0.02
+_MOST_OPEN = 0.02
 
 
 class Transient(SampledRun):
     """One run of the belt drive by the stepper "cyclic_alpha", advanced sample by sample.
 
-    `drawn` are pulleys and reference path, `kicked` the samples from a kick to the end that the run then had.
+    `drawn` are pulleys and reference path, `pulleys` constants of pulleys and arms, `places` path coordinates
+    of the profiles, (place,) [m], `kicked` the samples from a kick to the end that the run then had.
     """
 
     kicked: slice | None = None
 
-    def __init__(self, parameters: Mapping[str, Any], stepper: str) -> None:
+    def __init__(self, parameters: Parameters, stepper: str) -> None:
         p = parameters
         super().__init__(p)
         self._scheme = generalised_alpha(p["spectral_radius"])
         self.drawn = layout(p)
+        self.path = self.drawn.path
         self._readings = readings.Readings(p, self.drawn)
         self._drive, self._state, is_settled = start(p, self.drawn, self._readings.mean_tension)
+        self.pulleys, self.places = self._drive.pulleys, self._readings.places
         channels = ("load", "driving_speed", *readings.scalars_of(self.drawn, len(self.pulleys.arms.pivot)))
         sums, totals = (len(readings.PROFILES) + 2, readings.PLACES), self._state.totals.size + 1
         self._record(channels, self.drawn.spans, self._readings.probes, totals, sums)
@@ -120,13 +123,13 @@ class Transient(SampledRun):
     @property
     def lifted(self) -> np.ndarray:
         """Whether the belt has left a pulley, (P,)."""
-        return self._lifted * self.interval > MOST_LIFTED
+        return self._lifted * self.interval > _MOST_LIFTED
 
     def _left(self) -> str | None:
         if not self.lifted.any():
             return None
         name = self.drawn.pulleys[int(np.argmax(self._lifted))]
-        return f"the belt lifts off: it has not touched the {name} pulley for {MOST_LIFTED:g} s"
+        return f"the belt lifts off: it has not touched the {name} pulley for {_MOST_LIFTED:g} s"
 
     @property
     def time(self) -> float:
@@ -141,11 +144,6 @@ class Transient(SampledRun):
     def drive_frequencies(self, count: int) -> np.ndarray:
         """Lowest frequencies of the drive about where it is, (count,) [Hz]."""
         return drive_frequencies(self._drive, self._state, count)
-
-    @property
-    def pulleys(self) -> Pulleys:
-        """Constants of pulleys and arms."""
-        return self._drive.pulleys
 
     @property
     def turns(self) -> int:
@@ -181,12 +179,12 @@ class Transient(SampledRun):
         change = self._totals[last, total] - self._totals[first, total]
         return float(change / ((last - first) * self.interval)) if last > first else np.nan
 
-    def powers(self) -> dict[str, Any]:
+    def powers(self) -> dict[str, float | np.ndarray]:
         """Mean powers, as of `mean_rate`, named as in the record [W]."""
         found = {name: self.mean_rate(total) for total, name in enumerate(POWERS)}
         friction = np.array([self.mean_rate(FRICTION_LOSS + k) for k in range(len(self.drawn.pulleys))])
         loss = found["contact_loss"] + found["belt_loss"] + found["arm_loss"] + friction.sum()
-        return found | {"friction_loss": friction, "loss": loss, "storing_power": self.mean_rate(-1)}
+        return {**found, "friction_loss": friction, "loss": loss, "storing_power": self.mean_rate(-1)}
 
     @property
     def profiles(self) -> dict[str, np.ndarray]:
@@ -197,27 +195,14 @@ class Transient(SampledRun):
         return dict(zip(readings.PROFILES, means, strict=True))
 
     @property
-    def path(self) -> Any:
-        """The reference path."""
-        return self.drawn.path
-
-    @property
     def present(self) -> Layout:
         """Pulleys and path with the arms at their mean angles in the judged part."""
-        angles = [
-            self.channel(f"arm T{a + 1}")[self.judged].mean() for a in range(len(self.pulleys.arms.pivot))
-        ]
+        path, arms = self.path, range(len(self.pulleys.arms.pivot))
+        angles = [self.channel(f"arm T{a + 1}")[self.judged].mean() for a in arms]
         if not angles:
             return self.drawn
-        path = self.path
-        return self.drawn._replace(
-            path=belt_path(axes(self.pulleys, np.array(angles)), path.radius, path.turn)
-        )
-
-    @property
-    def places(self) -> np.ndarray:
-        """Path coordinates of the profiles, (place,) [m]."""
-        return self._readings.places
+        moved = axes(self.pulleys, np.array(angles))
+        return self.drawn._replace(path=belt_path(moved, path.radius, path.turn))
 
     def numerical_doubt(self, record: dict[str, Any]) -> tuple[Status, str] | None:
         """Reason why a run that reached its end is not to be trusted, by its values; None where it is.
@@ -228,8 +213,8 @@ class Transient(SampledRun):
         unsolved, open_power = record["unsolved_share"], record["power_residual"]
         if not unsolved <= MOST_UNSOLVED:
             why = f"{unsolved:.1%} of the steps were not solved"
-        elif not abs(open_power) <= MOST_OPEN:
-            why = f"the power balance is open by {open_power:.3g}, not by at most {MOST_OPEN:g}"
+        elif not abs(open_power) <= _MOST_OPEN:
+            why = f"the power balance is open by {open_power:.3g}, not by at most {_MOST_OPEN:g}"
         elif record["vibrates"] in (Vibrates.YES, Vibrates.IRREGULAR) and (
             record["amplitude"].max() < (shaken := mesh_amplitude(p, self.path, record["strand_tension"]))
         ):

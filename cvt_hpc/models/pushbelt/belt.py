@@ -3,21 +3,25 @@
 Arrays hold one row an element, in linked lanes (`cvt_hpc.lanes.rings`): the ring of elements is cut into
 equal parts, one for each lane of a register.
 
-Start of a pushbelt from the geometry of its path: constants, state and work space from given values.
+Start of a pushbelt from the geometry of its path: constants, state and work space by parameters of a run.
 """
 
-from collections.abc import Callable, Mapping, Sequence
-from typing import Any, NamedTuple
+from collections.abc import Callable
+from typing import NamedTuple
 
 import numpy as np
 
 from cvt_hpc.lanes import LaneArray
 from cvt_hpc.models.pushbelt import fields as f
+from cvt_hpc.models.pushbelt.parameters import MODES, flank_compliance, local_compliance, path_length
 from cvt_hpc.models.pushbelt.ring_bending import COLUMNS
+from cvt_hpc.parameters import Parameters
 from cvt_hpc.physics.friction_laws import Law
 from cvt_hpc.physics.geometry import Variator, driven_radius, variator
 from cvt_hpc.solvers.linked_blocks import empty_scratch, empty_system
 from cvt_hpc.variator.history import points_at
+from cvt_hpc.variator.profiles import multiple
+from cvt_hpc.vibration.ramped import ramped
 
 
 class Belt(NamedTuple):
@@ -97,8 +101,14 @@ class Newton(NamedTuple):
     most_failures: int = 20  # failed steps in a row with which a run ends
 
 
-TILT_MODES = slice(1, 3)  # cos and sin
 NEWTON = Newton(tolerance=1e-3, power_tolerance=1.0, weights=(1.0, 1.0, 2e-3, 1.0))
+
+
+def newton_of(parameters: Parameters, default: Newton) -> Newton:
+    """Settings by a run's parameters, the others by default."""
+    p = parameters
+    limits = {"power_tolerance": p["power_tolerance"], "most_iterations": p["most_iterations"]}
+    return default._replace(tolerance=p["speed_tolerance"], **limits)
 
 
 class BeltState(NamedTuple):
@@ -136,47 +146,57 @@ class Workspace(NamedTuple):
     bent: np.ndarray  # (elements, COLUMNS), of `ring_bending` and `local_bending`
 
 
+# Constants that are parameters of a job
+_AS_GIVEN = (
+    *("centre_distance", "head_height", "ring_stiffness", "bending_stiffness", "driven_inertia", "gravity"),
+    *("nose_height", "nose_clearance", "nose_stiffness"),
+    *("friction_memory", "ring_friction", "friction_speed", "ring_friction_speed"),
+)
+
+
 def parts_of(nodes: int) -> int:
     """Number of lanes that a ring of nodes is cut into: as many of 8, 4 or 2 as leave whole parts; else 1."""
     return next(parts for parts in (8, 4, 2, 1) if nodes % parts == 0)
 
 
-def path_of(given: Mapping[str, Any]) -> Variator:
-    """The path of the pitch line at the start."""
-    radius = driven_radius(given["ratio"], given["belt_length"], given["centre_distance"])
-    return variator(given["ratio"], radius, given["centre_distance"])
-
-
-def shared_constants(given: Mapping[str, Any], chord: float, names: Sequence[str]) -> dict[str, Any]:
-    """Constants that a belt has in its plane and out of it, and what is given of `names`; as `belt_of`."""
-    g, angle = given, given["half_wedge_angle"]
-    modal_stiffness = np.array(g["modal_stiffness"], dtype=np.float64).reshape(2, -1)
-    modal_damping = np.zeros_like(modal_stiffness)
-    modal_damping[:, TILT_MODES] = g["tilt_lag"] * modal_stiffness[:, TILT_MODES]
-    found = {
-        "sine": float(np.sin(angle)),
-        "cosine": float(np.cos(angle)),
-        "thickness": float(chord - g["play"] / g["elements"]),
-        "pitch": float(chord),
-        "mass": float(g["element_mass"]),
-        "ring_mass": float(g["ring_mass"] / g["elements"]),
-        "ring_time": float(g["ring_damping"] / g["ring_stiffness"]),
-        "transverse_damping": float(g["transverse_damping"] * chord),
-        "flank_law": int(Law[g["friction_law"].upper()]),
-        "flank_kinetic": float(g["kinetic_friction"]),
-        "flank_gradient": float(g["friction_gradient"]),
-        "flank_speed": float(g["stribeck_velocity"]),
-        "modal_stiffness": modal_stiffness,
-        "modal_damping": modal_damping,
-    }
-    return {name: float(g[name]) for name in names if name in g and name not in found} | found
-
-
-def belt_of(given: Mapping[str, Any], chord: float) -> Belt:
-    """Constants from values as `start` takes them, and the distance of neighbours [m]."""
-    shared = shared_constants(given, chord, Belt._fields)
-    square = given["element_height"] ** 2 + shared["thickness"] ** 2
-    return Belt(**shared, inertia=float(shared["mass"] * square / 12.0))
+def belt_of(parameters: Parameters, chord: float) -> Belt:
+    """Constants of a belt whose neighbouring elements are at a distance `chord` [m]."""
+    p, length, angle = parameters, path_length(parameters), parameters["half_wedge_angle"]
+    pitch = length / p["elements"]
+    mass, thickness = float(p["element_mass"] * pitch), float(chord - p["play"] / p["elements"])
+    modes = (
+        () if np.isinf(p["sheave_stiffness"]) else [p["sheave_stiffness"] * np.array(p[key]) for key in MODES]
+    )
+    modal_stiffness = np.array(modes, dtype=np.float64).reshape(2, -1)
+    tilting = np.isin(np.arange(modal_stiffness.shape[1]), (1, 2))  # cos and sin
+    return Belt(
+        **{name: float(p[name]) for name in _AS_GIVEN},
+        sine=float(np.sin(angle)),
+        cosine=float(np.cos(angle)),
+        thickness=thickness,
+        pitch_depth=float(p["ring_offset"]),
+        mass=mass,
+        inertia=float(mass * (p["element_height"] ** 2 + thickness**2) / 12.0),
+        ring_mass=float(p["ring_mass"] * length / p["elements"]),
+        pitch=float(chord),
+        ring_time=float(p["ring_damping"] / p["ring_stiffness"]),
+        flank_stiffness=float(pitch / flank_compliance(p)),
+        local_compliance=float(local_compliance(p) / pitch),
+        local_decay=float(np.exp(-pitch / p["local_length"])),
+        contact_stiffness=float(p["edge_stiffness"] / pitch),
+        contact_time=float(p["element_damping"] / p["edge_stiffness"]),
+        angle_stiffness=float(p["tilt_spring"] * pitch),
+        angle_damping=float(p["tilt_damper"] * pitch),
+        transverse_damping=float(p["transverse_damping"] * chord),
+        flank_law=int(Law[p["friction_law"].upper()]),
+        flank_kinetic=float(p["kinetic_friction"]),
+        flank_gradient=float(p["friction_gradient"]),
+        flank_speed=float(p["stribeck_velocity"]),
+        driving_rate=float(p["sheave_rate"]) if p["driving_thrust"] > 0.0 else 0.0,
+        driven_rate=float(p["sheave_rate"]),
+        modal_stiffness=modal_stiffness,
+        modal_damping=np.where(tilting, p["tilt_lag"] * modal_stiffness, 0.0),
+    )
 
 
 def equal_chords(
@@ -215,26 +235,44 @@ class PitchLine(NamedTuple):
     pulleys: np.ndarray  # shape (4,): speeds [rad/s] and radii [m]
 
 
-def pitch_line(given: Mapping[str, Any]) -> PitchLine:
-    """The pitch line at the start, from values as `start` takes them."""
-    path, distance = path_of(given), given["centre_distance"]
-    s, chord = equal_chords(lambda s: points_at(path, distance, s)[0], path.path_length, given["elements"])
-    points, _, curvature = points_at(path, distance, s)
+def pitch_line(path: Variator, centre_distance: float, elements: int, driving_speed: float) -> PitchLine:
+    """The line of so many elements along a path [m], at a speed of the driving pulley [rad/s]."""
+    s, chord = equal_chords(lambda s: points_at(path, centre_distance, s)[0], path.path_length, elements)
+    points, _, curvature = points_at(path, centre_distance, s)
     along = np.roll(points, -1, axis=0) - np.roll(points, 1, axis=0)
     along /= np.linalg.norm(along, axis=1)[:, None]
-    speed = given["driving_speed"] * path.driving_radius
-    pulleys = [given["driving_speed"], speed / path.driven_radius, path.driving_radius, path.driven_radius]
+    speed = driving_speed * path.driving_radius
+    pulleys = [driving_speed, speed / path.driven_radius, path.driving_radius, path.driven_radius]
     return PitchLine(path, s, points, along, curvature, chord, speed, np.array(pulleys))
 
 
-def start(given: Mapping[str, Any]) -> tuple[Belt, BeltState]:
+class Outset(NamedTuple):
+    """What a belt starts from."""
+
+    belt: Belt  # its constants
+    line: PitchLine  # where its elements are, and how fast
+    ring_strain: float  # of the rings [1]
+
+
+def outset(parameters: Parameters) -> Outset:
+    """What a run starts from, by its flat parameters [SI]."""
+    p = parameters
+    speed = p["driving_speed"] * multiple(p, "driving_speed", 0.0)
+    if ramped(p) == "speed":
+        speed = p["speed_start"]
+    radius = driven_radius(p["ratio"], path_length(p), p["centre_distance"])
+    path = variator(p["ratio"], radius, p["centre_distance"])
+    line = pitch_line(path, p["centre_distance"], p["elements"], speed)
+    return Outset(belt_of(p, line.chord), line, p["reference_tension"] / p["ring_stiffness"])
+
+
+def start(given: Outset) -> tuple[Belt, BeltState]:
     """Constants and a state from which a belt can run in: equal chords along the ideal path, at its speed.
 
-    The flanks just touch; the ring has the strain `ring_strain`. Values [SI] are given as `transient.given`
-    names them, those of an element for each of `elements`.
+    The flanks just touch.
     """
-    g, line = given, pitch_line(given)
-    belt, nodes, along, speed = belt_of(g, line.chord), g["elements"], line.along, line.speed
+    belt, line, strain = given
+    along, speed, nodes = line.along, line.speed, len(line.places)
     points = line.points + belt.pitch_depth * np.stack([along[:, 1], -along[:, 0]], 1)
     distances = np.linalg.norm(np.roll(points, -1, axis=0) - points, axis=1)
     fields = np.zeros((nodes, f.STATE_FIELDS))
@@ -242,19 +280,13 @@ def start(given: Mapping[str, Any]) -> tuple[Belt, BeltState]:
     fields[:, f.OMEGA] = speed * line.curvature
     fields[:, [f.U_Y, f.U_Z]] = (speed + belt.pitch_depth * fields[:, f.OMEGA])[:, None] * along
     fields[:, f.V] = speed * distances.sum() / (nodes * line.chord)
-    fields[:, f.LENGTH] = distances / (1.0 + g["ring_strain"])
-    fields[:, f.TENSION] = belt.ring_stiffness * g["ring_strain"]
+    fields[:, f.LENGTH] = distances / (1.0 + strain)
+    fields[:, f.TENSION] = belt.ring_stiffness * strain
     fields[:, f.DRIVEN] = points[:, 0] > 0.5 * belt.centre_distance
-    modes = belt.modal_stiffness.shape[1]
-    state = BeltState(
-        in_lanes(fields),
-        line.pulleys,
-        np.zeros((2, modes)),
-        np.zeros(1 + 2 * modes),
-        np.zeros(f.TOTALS),
-        np.zeros(f.COUNTERS, np.int64),
-    )
-    return belt, state
+    openings = np.zeros_like(belt.modal_stiffness)
+    increments, totals = np.zeros(1 + openings.size), np.zeros(f.TOTALS)
+    counters = np.zeros(f.COUNTERS, np.int64)
+    return belt, BeltState(in_lanes(fields), line.pulleys, openings, increments, totals, counters)
 
 
 def in_lanes(fields: np.ndarray) -> LaneArray:

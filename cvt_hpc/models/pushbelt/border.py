@@ -24,7 +24,7 @@ from numba.extending import register_jitable
 from cvt_hpc.kernels import kernel
 from cvt_hpc.lanes import ahead, around, like, maximum
 from cvt_hpc.models.pushbelt import fields as f
-from cvt_hpc.models.pushbelt.chain import LEAST_CONTACT_TIME, contact_shares, ring_share
+from cvt_hpc.models.pushbelt.chain import LEAST_CONTACT_TIME, contact_shares, four, four_ahead, ring_share
 from cvt_hpc.physics.contact_laws import taken
 
 
@@ -64,7 +64,7 @@ def book_contacts(belt, state, scratch, between, dt):
 
 
 @register_jitable
-def lag_rate(increments, earlier, unknown, dt):
+def _lag_rate(increments, earlier, unknown, dt):
     """Rate of an opening at the end of a step [m/s], by its changes in this step and in the one before."""
     return (1.5 * increments[unknown] - 0.5 * earlier[unknown]) / dt
 
@@ -84,7 +84,7 @@ def border_residuals(belt, changes, openings, load, torque, power, scratch, bord
         pulley, mode = k // modes, k % modes
         opening = openings[pulley, mode] + increments[1 + k]
         held = belt.modal_stiffness[pulley, mode] * opening
-        held += belt.modal_damping[pulley, mode] * lag_rate(increments, earlier, 1 + k, dt)
+        held += belt.modal_damping[pulley, mode] * _lag_rate(increments, earlier, 1 + k, dt)
         border[1 + k, last] = scratch.data[0, k, 0] - held
     scratch[0, 0], scratch[0, 1] = around(torque), around(power)
     border[0, last] = scratch.data[0, 0, 0] - load - belt.driven_inertia * increments[0] / dt
@@ -112,9 +112,8 @@ def close_border(belt, sums, border, dt):
             border[row, row] += belt.driven_inertia / dt
         else:
             pulley, mode = (row - 1) // modes, (row - 1) % modes
-            border[row, row] += (
-                belt.modal_stiffness[pulley, mode] + 1.5 * belt.modal_damping[pulley, mode] / dt
-            )
+            damping = 1.5 * belt.modal_damping[pulley, mode] / dt
+            border[row, row] += belt.modal_stiffness[pulley, mode] + damping
 
 
 @register_jitable
@@ -134,15 +133,14 @@ def accept_border(belt, state, work, inputs, dt):
     """Take driven pulley, sheaves and time to the end of the step."""
     modes = belt.modal_stiffness.shape[1]
     for k in range(2 * modes):
-        rate = lag_rate(state.increments, work.increments, 1 + k, dt)
+        rate = _lag_rate(state.increments, work.increments, 1 + k, dt)
         # of both sheaves of a pulley
         state.totals[f.LAG_LOSS] += 2.0 * dt * belt.modal_damping[k // modes, k % modes] * rate * rate
         state.openings[k // modes, k % modes] += state.increments[1 + k]
     state.pulleys[f.DRIVEN_SPEED] += state.increments[0]
     state.totals[f.TIME] += dt
-    state.totals[f.WORK_OUT] += (
-        dt * inputs[f.IN_LOAD] * (state.pulleys[f.DRIVEN_SPEED] - 0.5 * state.increments[0])
-    )
+    speed = state.pulleys[f.DRIVEN_SPEED] - 0.5 * state.increments[0]
+    state.totals[f.WORK_OUT] += dt * inputs[f.IN_LOAD] * speed
 
 
 @kernel
@@ -159,19 +157,6 @@ def move_sheaves(belt, state, inputs, driving_thrust, driven_thrust, dt):
 
 
 @kernel
-def book_weight(belt, state, work, dt):
-    """Add the work of the weight to the totals."""
-    elements, step = state.elements, work.step
-    falling = like(0.0, elements[0, f.U_Y])
-    for j in range(step.rows):
-        y = elements[j, f.U_Y] + 0.5 * elements[j, f.CHANGE_Y]
-        z = elements[j, f.U_Z] + 0.5 * elements[j, f.CHANGE_Z]
-        slip = elements[j, f.V] + 0.5 * elements[j, f.CHANGE_V] - step[j, f.T_Y] * y - step[j, f.T_Z] * z
-        falling -= belt.mass * z + belt.ring_mass * (z + step[j, f.T_Z] * slip)
-    add_to_totals(state, work.scratch, f.GRAVITY_WORK, dt * belt.gravity * falling)
-
-
-@kernel
 def book(belt, state, work, dt):
     """Add to the totals the work of a solved step, before it is accepted."""
     elements, step, iterate, scratch = state.elements, work.step, work.iterate, work.scratch
@@ -180,20 +165,15 @@ def book(belt, state, work, dt):
     ahead_share, _, _ = contact_shares(belt, dt)
     half_ahead = 0.5 / ahead_share
     damper = belt.ring_time / ring_share(belt, dt)
-    flank = ring = tilt = drag = between = sheaves = stretching = like(0.0, elements[0, f.U_Y])
+    flank = ring = tilt = drag = between = sheaves = stretching = falling = like(0.0, elements[0, f.U_Y])
     for j in range(step.rows):
-        dy, dz = elements[j, f.CHANGE_Y], elements[j, f.CHANGE_Z]
-        dw = elements[j, f.CHANGE_W]
-        next_dy = ahead(elements, j, f.CHANGE_Y)
-        next_dz = ahead(elements, j, f.CHANGE_Z)
-        next_dw = ahead(elements, j, f.CHANGE_W)
-        y = elements[j, f.U_Y] + 0.5 * dy
-        z = elements[j, f.U_Z] + 0.5 * dz
-        w = elements[j, f.OMEGA] + 0.5 * dw
-        v = elements[j, f.V] + 0.5 * elements[j, f.CHANGE_V]
-        next_y, next_z = ahead(elements, j, f.U_Y) + 0.5 * next_dy, ahead(elements, j, f.U_Z) + 0.5 * next_dz
-        next_w = ahead(elements, j, f.OMEGA) + 0.5 * next_dw
-        next_v = ahead(elements, j, f.V) + 0.5 * ahead(elements, j, f.CHANGE_V)
+        dy, dz, dw, dv = four(elements, j, f.CHANGE)
+        y, z, w, v = four(elements, j, f.U_Y)
+        y, z, w, v = y + 0.5 * dy, z + 0.5 * dz, w + 0.5 * dw, v + 0.5 * dv
+        next_dy, next_dz, next_dw, next_dv = four_ahead(elements, j, f.CHANGE)
+        next_y, next_z, next_w, next_v = four_ahead(elements, j, f.U_Y)
+        next_y, next_z = next_y + 0.5 * next_dy, next_z + 0.5 * next_dz
+        next_w, next_v = next_w + 0.5 * next_dw, next_v + 0.5 * next_dv
 
         stretch = step[j, f.TENSION_I_Y] * y + step[j, f.TENSION_I_Z] * z + v
         stretch -= step[j, f.TENSION_J_Y] * next_y + step[j, f.TENSION_J_Z] * next_z + next_v
@@ -239,6 +219,7 @@ def book(belt, state, work, dt):
 
         slip = v - step[j, f.T_Y] * y - step[j, f.T_Z] * z
         ring += elements[j, f.RING_FRICTION] * slip
+        falling -= belt.mass * z + belt.ring_mass * (z + step[j, f.T_Z] * slip)
         n_y, n_z = step[j, f.NORMAL_Y], step[j, f.NORMAL_Z]
         across = n_y * y + n_z * z
         drag += belt.transverse_damping * across * (across + 0.5 * (n_y * dy + n_z * dz))
@@ -249,3 +230,4 @@ def book(belt, state, work, dt):
     book_contacts(belt, state, scratch, between, dt)
     add_to_totals(state, scratch, f.FLANK_DAMPED, sheaves)
     add_to_totals(state, scratch, f.STRETCH_LOSS, dt * stretching)
+    add_to_totals(state, scratch, f.GRAVITY_WORK, dt * belt.gravity * falling)

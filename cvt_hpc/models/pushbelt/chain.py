@@ -8,6 +8,14 @@ there on they are linear in the change of the speeds X.
 Slip speeds at the flanks take the radial direction and the lever of the contact point at mid step, and speeds
 across the path that direction. At either end of a step the direction would add v phi' dt / 2 of false radial
 motion, and the lever d omega^2 dt / 2.
+
+The nose of each element in the hole of the next one, in lanes: it holds neighbours side by side.
+
+The nose's tip P lies at the front of element i, the hole's centre Q at the rear of element j, both
+`nose_height` above the saddle. Their offset across the next element, (P - Q).o_j, is free up to the clearance
+to either side; beyond, the hole pushes back elastically and without friction.
+
+An offset grows by the speeds times (o_j, a, 0) of element i and (-o_j, b, 0) of j, a and b being levers.
 """
 
 import numpy as np
@@ -24,6 +32,28 @@ BETA = 0.25
 # Contacts between elements have at least a damper of so many steps. With 3/4 an impact within a step returns
 # at most a tenth of its energy; with less, contacts ring and return more than they take
 LEAST_CONTACT_TIME = 0.75
+
+
+# Four fields of a row, as of an element's unknowns, or of a column of a block
+
+
+@register_jitable
+def four(array, j, first):
+    """Four fields of a row."""
+    return array[j, first], array[j, first + 1], array[j, first + 2], array[j, first + 3]
+
+
+@register_jitable
+def four_ahead(array, j, first):
+    """Four fields of the row ahead."""
+    y, z = ahead(array, j, first), ahead(array, j, first + 1)
+    return y, z, ahead(array, j, first + 2), ahead(array, j, first + 3)
+
+
+@register_jitable
+def set_four(array, j, first, values):
+    """Set four fields of a row."""
+    array[j, first], array[j, first + 1], array[j, first + 2], array[j, first + 3] = values
 
 
 @register_jitable
@@ -63,7 +93,7 @@ def turned(x_y, x_z, angle):
 
 
 @register_jitable
-def before_step(r, x, speeds, dt):
+def _before_step(r, x, speeds, dt):
     """Position and running direction at q_{k-1}, from those at q_k and the old speeds."""
     u_y, u_z, omega = speeds
     return (r[0] - dt * u_y, r[1] - dt * u_z), turned(x[0], x[1], -dt * omega)
@@ -101,6 +131,14 @@ def radial(r, x, centre, pitch_depth):
     return y, z, radius, r_lever, t_lever
 
 
+@register_jitable
+def _nose_offset(ri, xi, rj, xj, thickness, height):
+    """(P - Q) of a nose's tip and the hole's centre, along o_j and x_j [m]."""
+    d_y = ri[0] - rj[0] + 0.5 * thickness * (xi[0] + xj[0]) + height * (xi[1] - xj[1])
+    d_z = ri[1] - rj[1] + 0.5 * thickness * (xi[1] + xj[1]) - height * (xi[0] - xj[0])
+    return d_y * xj[1] - d_z * xj[0], d_y * xj[0] + d_z * xj[1]
+
+
 @kernel
 def predict(belt, state, pulleys, step, dt):
     """Everything of a step that belongs to a single element: q*, the ring's direction, normal, the flanks."""
@@ -131,9 +169,8 @@ def predict(belt, state, pulleys, step, dt):
         reach = cosine * y + side * sine * z
         strand = (reach > 0.0) & (reach < cosine * belt.centre_distance)
         middle = (y + 0.5 * dt * u_y, z + 0.5 * dt * u_z)
-        r_y, r_z, radius, r_lever, t_lever = radial(
-            middle, turned(x[0], x[1], 0.5 * dt * omega), centre, belt.pitch_depth
-        )
+        mid_x = turned(x[0], x[1], 0.5 * dt * omega)
+        r_y, r_z, radius, r_lever, t_lever = radial(middle, mid_x, centre, belt.pitch_depth)
         step[j, f.MID_R_Y], step[j, f.MID_R_Z], step[j, f.MID_RADIUS] = r_y, r_z, radius
         step[j, f.MID_R_LEVER], step[j, f.MID_T_LEVER] = r_lever, t_lever
         step[j, f.NORMAL_Y] = select(strand, like(-sine, y), r_y)
@@ -148,8 +185,8 @@ def angle_slope(belt, dt):
 
 @kernel
 def link(belt, state, step, dt):
-    """Data of pairs of neighbours for a step: tension, contacts, angles."""
-    stiffness = 0.5 * belt.angle_stiffness
+    """Data of pairs of neighbours for a step: tension, contacts, angles, noses."""
+    stiffness, has_noses = 0.5 * belt.angle_stiffness, belt.nose_clearance < np.inf
     ahead_share, share, behind_share = contact_shares(belt, dt)
     for j in range(state.rows):
         ri, rj = (state[j, f.Y], state[j, f.Z]), (ahead(state, j, f.Y), ahead(state, j, f.Z))
@@ -173,13 +210,10 @@ def link(belt, state, step, dt):
         shortened += state[j, f.V] - ahead(state, j, f.V)
         turn_y, turn_z = -e_z * per_length, e_y * per_length
         angle_i, angle_j = e_y * xi[0] + e_z * xi[1], e_y * xj[0] + e_z * xj[1]
-        step[j, f.TURN_Y] = turn_y
-        step[j, f.TURN_Z] = turn_z
-        step[j, f.ANGLE_I] = angle_i
-        step[j, f.ANGLE_J] = angle_j
-        turn = turn_y * (ahead(state, j, f.U_Y) - state[j, f.U_Y]) + turn_z * (
-            ahead(state, j, f.U_Z) - state[j, f.U_Z]
-        )
+        step[j, f.TURN_Y], step[j, f.TURN_Z] = turn_y, turn_z
+        step[j, f.ANGLE_I], step[j, f.ANGLE_J] = angle_i, angle_j
+        turn = turn_y * (ahead(state, j, f.U_Y) - state[j, f.U_Y])
+        turn += turn_z * (ahead(state, j, f.U_Z) - state[j, f.U_Z])
 
         per_unstretched = 1.0 / state[j, f.LENGTH]
         length += turned_length(belt, length, turn, dt) - belt.ring_time * shortened
@@ -192,9 +226,9 @@ def link(belt, state, step, dt):
         step[j, f.START_MOMENT_J] = stiffness * (e_y * xj[1] - e_z * xj[0]) + damping * rate_j
 
         edge, head = -belt.pitch_depth, belt.head_height
-        bi, yi = before_step(ri, xi, (state[j, f.U_Y], state[j, f.U_Z], state[j, f.OMEGA]), dt)
+        bi, yi = _before_step(ri, xi, (state[j, f.U_Y], state[j, f.U_Z], state[j, f.OMEGA]), dt)
         speeds = ahead(state, j, f.U_Y), ahead(state, j, f.U_Z), ahead(state, j, f.OMEGA)
-        bj, yj = before_step(rj, xj, speeds, dt)
+        bj, yj = _before_step(rj, xj, speeds, dt)
         for height, gap, mean in ((edge, f.EDGE_GAP, f.EDGE_MEAN), (head, f.HEAD_GAP, f.HEAD_MEAN)):
             reached = contact_gap(si, zi, sj, zj, belt.thickness, height)
             now = contact_gap(ri, xi, rj, xj, belt.thickness, height)
@@ -206,14 +240,23 @@ def link(belt, state, step, dt):
         lever_i, lever_j = contact_levers(ri, xi, rj, xj, belt.thickness, head)
         step[j, f.HEAD_LEVER_I], step[j, f.HEAD_LEVER_J] = lever_i, lever_j
 
+        if has_noses:
+            height = belt.nose_height
+            now, along = _nose_offset(ri, xi, rj, xj, belt.thickness, height)
+            cosine, sine = xi[0] * xj[0] + xi[1] * xj[1], xi[0] * xj[1] - xi[1] * xj[0]
+            step[j, f.NOSE_LEVER_I] = height * sine - 0.5 * belt.thickness * cosine
+            step[j, f.NOSE_LEVER_J] = along - 0.5 * belt.thickness
+            reached, _ = _nose_offset(si, zi, sj, zj, belt.thickness, height)
+            before, _ = _nose_offset(bi, yi, bj, yj, belt.thickness, height)
+            step[j, f.NOSE_OFFSET] = ahead_share * reached + share * now + behind_share * before
+            step[j, f.NOSE_MEAN] = 0.5 * (reached + now)
+
 
 @kernel
 def linear_blocks(belt, step, dt):
     """Blocks of inertia, transverse damping, tension and angles: DIAGONAL and LINK of each element."""
     steep = angle_slope(belt, dt)
     for j in range(step.rows):
-        for field in range(32):
-            step[j, f.DIAGONAL + field] = 0.0
         # o of the ring: with it ring mass moves only across
         o_y, o_z = step[j, f.T_Z], -step[j, f.T_Y]
         mass, ring = belt.mass / dt, belt.ring_mass / dt
@@ -221,7 +264,7 @@ def linear_blocks(belt, step, dt):
         n_y, n_z = step[j, f.NORMAL_Y], step[j, f.NORMAL_Z]
         drag = belt.transverse_damping
         yy, yz, zz = yy + drag * n_y * n_y, yz + drag * n_y * n_z, zz + drag * n_z * n_z
-        ww, vv = like(belt.inertia / dt, o_y), like(ring, o_y)
+        ww, vv, none = like(belt.inertia / dt, o_y), like(ring, o_y), like(0.0, o_y)
 
         # the segment ahead, of which this element is i
         k, a, b = step[j, f.TENSION_SLOPE], step[j, f.TENSION_I_Y], step[j, f.TENSION_I_Z]
@@ -235,19 +278,16 @@ def linear_blocks(belt, step, dt):
         yy, yz, zz, ww = yy + both * p * p, yz + both * p * q, zz + both * q * q, ww + ii
         yw, zw = ii * p, ii * q
 
-        step[j, f.LINK + f.YY] = -(k * a * c + both * p * p)
-        step[j, f.LINK + f.ZY] = -(k * b * c + both * p * q)
-        step[j, f.LINK + f.WY], step[j, f.LINK + f.VY] = -ii * p, -k * c
-        step[j, f.LINK + f.YZ] = -(k * a * d + both * p * q)
-        step[j, f.LINK + f.ZZ] = -(k * b * d + both * q * q)
-        step[j, f.LINK + f.WZ], step[j, f.LINK + f.VZ] = -ii * q, -k * d
-        step[j, f.LINK + f.YW], step[j, f.LINK + f.ZW] = jj * p, jj * q
-        step[j, f.LINK + f.YV], step[j, f.LINK + f.ZV], step[j, f.LINK + f.VV] = -k * a, -k * b, -k
+        y, z = -(k * a * c + both * p * p), -(k * b * c + both * p * q)
+        set_four(step, j, f.LINK + f.YY, (y, z, -ii * p, -k * c))
+        y, z = -(k * a * d + both * p * q), -(k * b * d + both * q * q)
+        set_four(step, j, f.LINK + f.YZ, (y, z, -ii * q, -k * d))
+        set_four(step, j, f.LINK + f.YW, (jj * p, jj * q, none, none))
+        set_four(step, j, f.LINK + f.YV, (-k * a, -k * b, none, -k))
 
         # the segment behind, of which it is j
         k = behind(step, j, f.TENSION_SLOPE)
-        c = behind(step, j, f.TENSION_J_Y)
-        d = behind(step, j, f.TENSION_J_Z)
+        c, d = behind(step, j, f.TENSION_J_Y), behind(step, j, f.TENSION_J_Z)
         yy, yz, zz, vv = yy + k * c * c, yz + k * c * d, zz + k * d * d, vv + k
         yv, zv = yv + k * c, zv + k * d
         p, q = behind(step, j, f.TURN_Y), behind(step, j, f.TURN_Z)
@@ -256,9 +296,7 @@ def linear_blocks(belt, step, dt):
         both = steep * at_i * at_i + jj
         yy, yz, zz, ww = yy + both * p * p, yz + both * p * q, zz + both * q * q, ww + jj
         yw, zw = yw - jj * p, zw - jj * q
-        step[j, f.DIAGONAL + f.YY], step[j, f.DIAGONAL + f.ZY] = yy, yz
-        step[j, f.DIAGONAL + f.WY], step[j, f.DIAGONAL + f.VY] = yw, yv
-        step[j, f.DIAGONAL + f.YZ], step[j, f.DIAGONAL + f.ZZ] = yz, zz
-        step[j, f.DIAGONAL + f.WZ], step[j, f.DIAGONAL + f.VZ] = zw, zv
-        step[j, f.DIAGONAL + f.YW], step[j, f.DIAGONAL + f.ZW], step[j, f.DIAGONAL + f.WW] = yw, zw, ww
-        step[j, f.DIAGONAL + f.YV], step[j, f.DIAGONAL + f.ZV], step[j, f.DIAGONAL + f.VV] = yv, zv, vv
+        set_four(step, j, f.DIAGONAL + f.YY, (yy, yz, yw, yv))
+        set_four(step, j, f.DIAGONAL + f.YZ, (yz, zz, zw, zv))
+        set_four(step, j, f.DIAGONAL + f.YW, (yw, zw, ww, none))
+        set_four(step, j, f.DIAGONAL + f.YV, (yv, zv, none, vv))

@@ -27,18 +27,19 @@ being an element's thickness: (k_a + P) theta = -d (f_t - P_s) - P kappa t / 2 i
 continuum has k_a theta = -d (f_t - P_s).
 """
 
-from collections.abc import Callable, Mapping
+from collections.abc import Callable
 from functools import partial
 from typing import Any, NamedTuple
 
 import numpy as np
 
 from cvt_hpc.models.elastic_belt.pulley_settings import PULLEY_DEFAULTS
+from cvt_hpc.parameters import Parameters
 from cvt_hpc.physics.sheaves import axial_element_stiffness
 from cvt_hpc.variator.scene import TILT
 
-RESOLVED = 7.5e-6  # [s]: damping over stiffness of contacts between elements, at least
-RIGID = 1e12  # [N/m]: of a mode that does not open; it gives way by 0.1 um under 100 kN
+_RESOLVED = 7.5e-6  # [s]: damping over stiffness of contacts between elements, at least
+_RIGID = 1e12  # [N/m]: of a mode that does not open; it gives way by 0.1 um under 100 kN
 
 # By key of the continuum the only value that the pushbelt has a counterpart of
 ONLY = {
@@ -56,19 +57,19 @@ class Follows(NamedTuple):
     """Rule by which a parameter of the pushbelt follows."""
 
     needs: tuple[str, ...]  # keys of the continuous belt that decide it
-    value: Callable[[Mapping[str, Any]], Any]  # flat parameters of the continuous belt [SI] -> the value [SI]
+    value: Callable[[Parameters], Any]  # flat parameters of the continuous belt [SI] -> the value [SI]
 
 
-def _flank_stiffness(p: Mapping[str, Any]) -> float:
+def _flank_stiffness(p: Parameters) -> float:
     return float(2.0 * axial_element_stiffness(p) / np.cos(p["half_wedge_angle"]) ** 2)
 
 
-def _modes(p: Mapping[str, Any], radius: float) -> tuple[float, float, float]:
-    tilt = min(2.0 * p["tilt_stiffness"] * p["tilt_factor"] / radius**2, RIGID)
-    return RIGID, tilt, tilt
+def _modes(p: Parameters, radius: float) -> tuple[float, float, float]:
+    tilt = min(2.0 * p["tilt_stiffness"] * p["tilt_factor"] / radius**2, _RIGID)
+    return _RIGID, tilt, tilt
 
 
-def _tilt(key: str, p: Mapping[str, Any]) -> float:
+def _tilt(key: str, p: Parameters) -> float:
     return float(p[key] if np.isfinite(p["tilt_spring"]) else TILT[key].default)
 
 
@@ -78,7 +79,7 @@ FOLLOWS = {
     "edge_stiffness": Follows(("element_stiffness",), lambda p: p["element_stiffness"]),
     "element_damping": Follows(
         ("element_damping", "element_stiffness"),
-        lambda p: max(p["element_damping"], RESOLVED * p["element_stiffness"]),
+        lambda p: max(p["element_damping"], _RESOLVED * p["element_stiffness"]),
     ),
     "flank_stiffness": Follows(("flank_stiffness", "element_factor", "half_wedge_angle"), _flank_stiffness),
     "driving_modal_stiffness": Follows(

@@ -32,7 +32,7 @@ from numba.extending import register_jitable
 
 from cvt_hpc.kernels import kernel
 
-MOST_SETS = 50  # of pressing points that are tried; 400 random scenes of 32 to 216 elements take at most 5
+_MOST_SETS = 50  # of pressing points that are tried; 400 random scenes of 32 to 216 elements take at most 5
 
 
 @register_jitable
@@ -79,7 +79,7 @@ def spread_bending(driven, depths, spread, work, compliance, stiffness, decay):
         place = (first + k) % count
         j, lane = place % rows, place // rows
         work[k, 0], work[k, 1] = _pressing(depths, j, lane, spread[j, lane], stiffness)
-    for _ in range(MOST_SETS):
+    for _ in range(_MOST_SETS):
         behind = y = share = 0.0
         for k in range(count):
             place, beyond = (first + k) % count, (first + k + 1) % count

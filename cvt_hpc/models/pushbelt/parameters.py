@@ -17,13 +17,13 @@ from cvt_hpc.variator.profiles import extremes, profile_problems
 from cvt_hpc.variator.scene import nested
 from cvt_hpc.vibration.ramped import ramped
 
-FEWEST_ELEMENTS = 100
-BELOW_PASSAGE = 0.9  # of half that frequency: belts run up to 4 % slower than by the nominal radius
-NOT_HERE = ("disturbance", "seed")
+_FEWEST_ELEMENTS = 100
+_BELOW_PASSAGE = 0.9  # of half that frequency: belts run up to 4 % slower than by the nominal radius
+_NOT_HERE = ("disturbance", "seed")
 MODES = ("driving_modal_stiffness", "driven_modal_stiffness")
 SCALED = (*MODES, "local_stiffness", "local_length")  # without effect between rigid sheaves
-RINGS = {"bending_stiffness": 0.0, "reference_tension": 600.0}  # defaults other than the elastic belt's
-NO_TABLE = ("table_file", "table_force", "table_speed", "table_mu")
+_RINGS = {"bending_stiffness": 0.0, "reference_tension": 600.0}  # defaults other than the elastic belt's
+_NO_TABLE = ("table_file", "table_force", "table_speed", "table_mu")
 
 
 def _play(parameters: Parameters) -> float:
@@ -44,7 +44,7 @@ def path_length(parameters: Parameters) -> float:
 
 PARAMETERS: dict[str, dict[str, Parameter]] = {
     "scene": {
-        **{key: entry for key, entry in scene.SCENE.items() if key not in NOT_HERE},
+        **{key: entry for key, entry in scene.SCENE.items() if key not in _NOT_HERE},
         "ratio": replace(
             scene.SCENE["ratio"], default=1.35, description="speed ratio, driven radius / driving radius"
         ),
@@ -61,7 +61,7 @@ PARAMETERS: dict[str, dict[str, Parameter]] = {
             0.0,
             "N",
             "axial force on the driving pulley; 0: its sheave stays where the ratio puts it",
-            sensible=(500.0, 2000000.0),
+            sensible=(500.0, 2e6),
         ),
         "kick": not_negative(
             0.0,
@@ -87,7 +87,7 @@ PARAMETERS: dict[str, dict[str, Parameter]] = {
         "coarse": Parameter(
             False,
             "",
-            f"fewer than {FEWEST_ELEMENTS} elements are meant: super elements, a polygon around the arcs",
+            f"fewer than {_FEWEST_ELEMENTS} elements are meant: super elements, a polygon around the arcs",
         ),
         "element_mass": positive(1.214, "kg/m", "mass per length of the elements", sensible=(0.05, 20.0)),
         "element_height": positive(
@@ -96,12 +96,10 @@ PARAMETERS: dict[str, dict[str, Parameter]] = {
         "play": not_negative(
             0.3e-3, "m", "sum of the gaps between elements on the path", sensible=(1e-07, 0.05)
         ),
-        "thickness": Parameter(
+        "thickness": positive(
             None,
             "m",
             "thickness of an element, in the place of play, which follows",
-            minimum=0.0,
-            exclusive=True,
             gives=Substitute("play", ("elements", "ratio", "driven_radius", "centre_distance"), _play),
             sensible=(1e-4, 0.02),
         ),
@@ -115,7 +113,7 @@ PARAMETERS: dict[str, dict[str, Parameter]] = {
             20.0,
             "N s",
             "damping of these contacts, force by rate of approach over the pitch",
-            sensible=(0.001, 100000.0),
+            sensible=(1e-3, 1e5),
         ),
         "ring_offset": positive(
             1.5e-3,
@@ -129,13 +127,11 @@ PARAMETERS: dict[str, dict[str, Parameter]] = {
             "height above the rings of the second contact between neighbours",
             sensible=(1e-05, 0.05),
         ),
-        "nose_clearance": replace(
-            not_negative(
-                np.inf,
-                "m",
-                "play of an element's nose in the next one's hole, up and down; inf: no noses",
-                sensible=(1e-6, np.inf),
-            ),
+        "nose_clearance": not_negative(
+            np.inf,
+            "m",
+            "play of an element's nose in the next one's hole, up and down; inf: no noses",
+            sensible=(1e-6, np.inf),
             allow_infinite=True,
         ),
         "nose_height": positive(6e-3, "m", "height of nose and hole above the rings", sensible=(1e-5, 0.05)),
@@ -143,10 +139,8 @@ PARAMETERS: dict[str, dict[str, Parameter]] = {
             1e8, "N/m", "force of a nose over the offset beyond its play", sensible=(1e4, 1e11)
         ),
         "ring_mass": positive(0.2495, "kg/m", "mass per length of the rings", sensible=(0.01, 10.0)),
-        "ring_stiffness": positive(
-            6e6, "N", "longitudinal stiffness EA of all rings", sensible=(10000.0, 10000000000.0)
-        ),
-        **{key: replace(entry, default=RINGS.get(key, entry.default)) for key, entry in scene.RINGS.items()},
+        "ring_stiffness": positive(6e6, "N", "longitudinal stiffness EA of all rings", sensible=(1e4, 1e10)),
+        **{key: replace(entry, default=_RINGS.get(key, entry.default)) for key, entry in scene.RINGS.items()},
         "ring_friction": not_negative(0.06, "", "friction coefficient between rings and elements"),
         "ring_friction_speed": positive(
             5e-4, "m/s", "regularisation speed of that friction", sensible=(1e-06, 5.0)
@@ -155,12 +149,10 @@ PARAMETERS: dict[str, dict[str, Parameter]] = {
         **scene.TILT,
     },
     "sheaves": {
-        "sheave_stiffness": replace(
-            positive(
-                1.0,
-                "",
-                "stiffness of the sheaves: factor on all modes of opening and on local_stiffness; inf: rigid",
-            ),
+        "sheave_stiffness": positive(
+            1.0,
+            "",
+            "stiffness of the sheaves: factor on all modes of opening and on local_stiffness; inf: rigid",
             allow_infinite=True,
         ),
         **{
@@ -176,15 +168,13 @@ PARAMETERS: dict[str, dict[str, Parameter]] = {
             3.27e10,
             "N/m^2",
             "stiffness of an element at each flank, along its normal, per length",
-            sensible=(1000000.0, 100000000000000.0),
+            sensible=(1e6, 1e14),
         ),
-        "local_stiffness": replace(
-            positive(
-                np.inf,
-                "N/m^2",
-                "stiffness of both sheaves against local bending, per length; inf: none",
-                sensible=(1e5, np.inf),
-            ),
+        "local_stiffness": positive(
+            np.inf,
+            "N/m^2",
+            "stiffness of both sheaves against local bending, per length; inf: none",
+            sensible=(1e5, np.inf),
             allow_infinite=True,
         ),
         "local_length": positive(0.013, "m", "decay length of local bending", sensible=(0.0001, 0.3)),
@@ -192,13 +182,11 @@ PARAMETERS: dict[str, dict[str, Parameter]] = {
         "inner_radius": not_negative(
             0.0, "m", "pitch radius at the inner end of the sheaves of both pulleys", sensible=(1e-3, 0.5)
         ),
-        "outer_radius": replace(
-            positive(
-                np.inf,
-                "m",
-                "pitch radius at the outer end of the sheaves of both pulleys",
-                sensible=(1e-3, np.inf),
-            ),
+        "outer_radius": positive(
+            np.inf,
+            "m",
+            "pitch radius at the outer end of the sheaves of both pulleys",
+            sensible=(1e-3, np.inf),
             allow_infinite=True,
         ),
         "sheave_rate": positive(
@@ -213,7 +201,7 @@ PARAMETERS: dict[str, dict[str, Parameter]] = {
     },
     "pulleys": scene.TILT_LAG,
     "friction": {
-        **{key: entry for key, entry in scene.FRICTION.items() if key not in NO_TABLE},
+        **{key: entry for key, entry in scene.FRICTION.items() if key not in _NO_TABLE},
         "friction_law": replace(
             scene.FRICTION["friction_law"], choices=tuple(law for law in FRICTION_LAWS if law != "table")
         ),
@@ -223,11 +211,7 @@ PARAMETERS: dict[str, dict[str, Parameter]] = {
     },
     "record": {
         "profile_places": Parameter(
-            220,
-            "",
-            "places along the path at which histories have forces and sliding",
-            minimum=20,
-            maximum=2000,
+            220, "", "places along the path at which histories have forces and sliding", 20, 2000
         ),
     },
 }
@@ -242,8 +226,8 @@ def check(parameters: Parameters) -> list[tuple[str, str, str]]:
     pitch = path_length(p) / p["elements"]
     if p["play"] > pitch:
         problems.append(("play", f"less than the pitch of the elements, {pitch:.4g} m", f"{p['play']:g} m"))
-    if p["elements"] < FEWEST_ELEMENTS and not p["coarse"]:
-        expected = f"{FEWEST_ELEMENTS} or more, or coarse = true"
+    if p["elements"] < _FEWEST_ELEMENTS and not p["coarse"]:
+        expected = f"{_FEWEST_ELEMENTS} or more, or coarse = true"
         problems.append(("elements", expected, f"{p['elements']}"))
     for key in MODES:
         if nested(p[key]) or not p[key] or len(p[key]) != len(p[MODES[0]]) or min(p[key]) <= 0.0:
@@ -281,8 +265,8 @@ def _problems_at(parameters: Parameters, ratio: float) -> list[tuple[str, str, s
     problems = []
     # the polygon of the elements shakes strands as they pass, and by the change of stiffness at half of that
     half = 0.5 * _driving_speeds(p)[0] * driven / ratio * p["elements"] / length
-    if BELOW_PASSAGE * half < p["band_high"]:
-        most = f"{BELOW_PASSAGE * half:.4g} Hz, below half of the frequency at which elements pass{at}"
+    if _BELOW_PASSAGE * half < p["band_high"]:
+        most = f"{_BELOW_PASSAGE * half:.4g} Hz, below half of the frequency at which elements pass{at}"
         problems.append(("band_high", f"at most {most}, or more elements", f"{p['band_high']:g} Hz"))
     step, why = p.get("step", 0.0), "pitch over the speed of transverse waves under the thrust"
     if not problems and step > (limit := string_limit(p)):
@@ -385,10 +369,10 @@ def inert(parameters: Parameters) -> dict[str, str]:
             (np.isinf(p["nose_clearance"]), f"nose_{key}", "nose_clearance inf")
             for key in ("height", "stiffness")
         ),
-        (p["elements"] >= FEWEST_ELEMENTS, "coarse", f"elements {FEWEST_ELEMENTS} or more"),
+        (p["elements"] >= _FEWEST_ELEMENTS, "coarse", f"elements {_FEWEST_ELEMENTS} or more"),
         (p["driving_thrust"] > 0.0, "ratio_profile", "driving_thrust above 0"),
         (p["driving_thrust"] == 0.0, "driving_thrust_profile", "driving_thrust 0"),
         (True, "arc_probes", "model pushbelt, which is probed on its strands"),
     )
     found = {key: setting for holds, key, setting in cases if holds}
-    return friction_inert({**p, **dict.fromkeys(NO_TABLE, ())}) | scene.course_inert(p) | found
+    return friction_inert({**p, **dict.fromkeys(_NO_TABLE, ())}) | scene.course_inert(p) | found

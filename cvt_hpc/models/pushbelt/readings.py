@@ -1,48 +1,35 @@
 """Readings of the elements of a pushbelt at a sample: displacement, forces, losses and their places."""
 
-from collections.abc import Mapping, Sequence
-from typing import Any
+from collections.abc import Sequence
+from typing import Generic, Protocol, TypeVar
 
 import numpy as np
 
 from cvt_hpc.models.pushbelt import fields
 from cvt_hpc.models.pushbelt.belt import Belt
+from cvt_hpc.parameters import Parameters
 from cvt_hpc.physics.geometry import variator
+from cvt_hpc.variator import PULLEYS, STRANDS
 from cvt_hpc.variator.history import ALONG, along, of_means
 
 SCALARS = (
-    "driven_speed",
-    "driving_radius",
-    "driven_radius",
-    "push_force t1",
-    "push_force t2",
-    "ring_tension t1",
-    "ring_tension t2",
-    "axial_force driving",
-    "axial_force driven",
-    "running_radius driving",
-    "running_radius driven",
-    "slip driving",
-    "slip driven",
-    "driving_flank_loss",
-    "driven_flank_loss",
-    "ring_loss",
-    "passing_frequency",
+    *("driven_speed", "driving_radius", "driven_radius"),
+    *(f"push_force {strand}" for strand in STRANDS),
+    *(f"ring_tension {strand}" for strand in STRANDS),
+    *(f"axial_force {pulley}" for pulley in PULLEYS),
+    *(f"running_radius {pulley}" for pulley in PULLEYS),
+    *(f"slip {pulley}" for pulley in PULLEYS),
+    *(f"{pulley}_flank_loss" for pulley in PULLEYS),
+    *("ring_loss", "passing_frequency"),
 )
+_OUTWARDS = "mean line force of one flank, against sliding outwards"
+_FORWARDS = "mean line force of one flank, against sliding forwards"
 PROFILES = {
     "push_force": of_means(ALONG["push_force"]),
     "ring_tension": of_means(ALONG["ring_tension"]),
     "contact_force": ("contact force", "N m-1", "mean normal line force of one flank"),
-    "radial_friction": (
-        "friction along the meridian",
-        "N m-1",
-        "mean line force of one flank, against sliding outwards",
-    ),
-    "tangential_friction": (
-        "friction along the belt",
-        "N m-1",
-        "mean line force of one flank, against sliding forwards",
-    ),
+    "radial_friction": ("friction along the meridian", "N m-1", _OUTWARDS),
+    "tangential_friction": ("friction along the belt", "N m-1", _FORWARDS),
     "saddle_force": ("force of the rings on the saddles", "N m-1", "mean line force"),
     "ring_slip": ("sliding of the rings", "m s-1", "mean, forwards over the elements"),
     "flank_slip": ("sliding of the flanks", "m s-1", "mean, forwards over the sheave"),
@@ -53,10 +40,16 @@ PROFILES = {
 }
 
 
-class Readings:
-    """Places where displacement and forces of a run are read.
+class _Belt(Protocol):
+    @property
+    def pitch_depth(self) -> float: ...
 
-    Of the constants, of whichever equations, the `pitch_depth` counts.
+
+AnyBelt = TypeVar("AnyBelt", bound=_Belt, covariant=True)  # constants, of whichever equations
+
+
+class Readings(Generic[AnyBelt]):
+    """Places where displacement and forces of a run are read.
 
     Attributes
     ----------
@@ -70,7 +63,7 @@ class Readings:
         Path coordinates of the middles of the strands, and of profiles [m].
     """
 
-    def __init__(self, parameters: Mapping[str, Any], belt: Any) -> None:
+    def __init__(self, parameters: Parameters, belt: AnyBelt) -> None:
         p = parameters
         self.belt = belt
         self.path = variator(p["ratio"], p["driven_radius"], p["centre_distance"])
@@ -92,7 +85,7 @@ class OnPath:
     outwards of the path, (n,) each [m].
     """
 
-    def __init__(self, where: Readings, saddles: np.ndarray) -> None:
+    def __init__(self, where: Readings[_Belt], saddles: np.ndarray) -> None:
         self._path, self._probes, self._middles = where.path, where.probes, where.middles
         self._places = where.places.size
         self.position, offset = along(where.path, where.centre_distance, saddles)
@@ -119,7 +112,7 @@ class OnPath:
 class Reading:
     """Readings of one sample, from the elements' fields in the order of the belt and the pulleys' state."""
 
-    def __init__(self, where: Readings, elements: np.ndarray, pulleys: np.ndarray) -> None:
+    def __init__(self, where: Readings[Belt], elements: np.ndarray, pulleys: np.ndarray) -> None:
         self._where, self._elements, self._pulleys = where, elements, pulleys
         self._path = OnPath(where, elements[:, [fields.Y, fields.Z]])
         self._push = elements[:, fields.EDGE] + elements[:, fields.HEAD]
@@ -135,48 +128,33 @@ class Reading:
         both = np.stack([1.0 - driven, driven])
         thrust = e[:, fields.FLANK] * belt.cosine + e[:, fields.FLANK_FRICTION_M] * belt.sine
         # the meridian's speed is the radial one over the cosine, its force in radial direction has the cosine
-        loss = 2.0 * (
-            belt.cosine**2 * e[:, fields.FLANK_FRICTION_M] * e[:, fields.FLANK_SLIP_M]
-            + e[:, fields.FLANK_FRICTION_T] * e[:, fields.FLANK_SLIP_T]
-        )
+        loss = belt.cosine**2 * e[:, fields.FLANK_FRICTION_M] * e[:, fields.FLANK_SLIP_M]
+        loss = 2.0 * (loss + e[:, fields.FLANK_FRICTION_T] * e[:, fields.FLANK_SLIP_T])
         weights = both * e[:, fields.FLANK]
         pressed = weights.sum(axis=1)
         weights /= np.maximum(pressed, 1e-9)[:, None]
-        running = np.where(pressed > 0.0, weights @ self._contact_radii(), np.nan)
-        slip = (
-            weights
-            @ e[:, fields.FLANK_SLIP_T]
-            / (pulleys[fields.DRIVING_SPEED] * self._where.path.driving_radius)
-        )
-        inside = self._path.middles()
-        ring_loss = e[:, fields.RING_FRICTION] @ e[:, fields.RING_SLIP]
+        belt_speed = pulleys[fields.DRIVING_SPEED] * self._where.path.driving_radius
+        inside, places = self._path.middles(), e[:, [fields.Y, fields.Z]]
+        # elements over the time of a revolution: their speeds over the length of their line
+        speeds = np.hypot(e[:, fields.U_Y], e[:, fields.U_Z]).sum()
+        line = np.hypot(*np.diff(places, axis=0, prepend=places[-1:]).T).sum()
         groups = (
+            pulleys[[fields.DRIVEN_SPEED, fields.DRIVING_RADIUS, fields.DRIVEN_RADIUS]],
             inside @ self._push,
             inside @ e[:, fields.TENSION],
             both @ thrust,
-            running,
-            slip,
+            np.where(pressed > 0.0, weights @ self._contact_radii(), np.nan),
+            weights @ e[:, fields.FLANK_SLIP_T] / belt_speed,
             both @ loss,
+            [e[:, fields.RING_FRICTION] @ e[:, fields.RING_SLIP], speeds / line],
         )
-        # elements over the time of a revolution: their speeds over the length of their line
-        speeds = np.hypot(e[:, fields.U_Y], e[:, fields.U_Z]).sum()
-        line = np.hypot(
-            *np.diff(e[:, [fields.Y, fields.Z]], axis=0, prepend=e[-1:, [fields.Y, fields.Z]]).T
-        ).sum()
-        found = [
-            *pulleys[[fields.DRIVEN_SPEED, fields.DRIVING_RADIUS, fields.DRIVEN_RADIUS]],
-            *np.concatenate(groups),
-        ]
-        return [*found, ring_loss, speeds / line]
+        return [float(value) for group in groups for value in group]
 
     def _contact_radii(self) -> np.ndarray:
         """Distances of the flanks' contact points from the shaft of the nearer pulley, (n,) [m]."""
         e, depth = self._elements, self._where.belt.pitch_depth
-        y = (
-            e[:, fields.Y]
-            - depth * e[:, fields.HEADING_Z]
-            - e[:, fields.DRIVEN] * self._where.centre_distance
-        )
+        y = e[:, fields.Y] - depth * e[:, fields.HEADING_Z]
+        y -= e[:, fields.DRIVEN] * self._where.centre_distance
         return np.hypot(y, e[:, fields.Z] + depth * e[:, fields.HEADING_Y])
 
     def profiles(self) -> np.ndarray:

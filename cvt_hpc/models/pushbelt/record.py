@@ -4,11 +4,12 @@ from __future__ import annotations
 
 from collections.abc import Mapping
 from functools import partial
-from typing import TYPE_CHECKING, Any
+from typing import TYPE_CHECKING
 
 import numpy as np
 
 from cvt_hpc.models.pushbelt import fields as f
+from cvt_hpc.parameters import Parameters
 from cvt_hpc.variables import Coordinate, Variable
 from cvt_hpc.variator import PULLEYS, STRANDS, judging
 from cvt_hpc.variator.history import REGIONS, dataset, regions
@@ -29,9 +30,9 @@ if TYPE_CHECKING:
 
     from cvt_hpc.models.pushbelt.run import ElementRun
 
-IDLE = 0.02  # of the largest push force: what is below does not press
+_IDLE = 0.02  # of the largest push force: what is below does not press
 # Measured on one core of an EPYC (Zen 5): core-seconds per element and step, and per sample
-RIGID_COST, ELASTIC_COST, SAMPLE_COST = 5.2e-7, 9.3e-7, 2e-4
+_RIGID_COST, _ELASTIC_COST, _SAMPLE_COST = 5.2e-7, 9.3e-7, 2e-4
 
 
 def slip_loss(measured: Measured) -> float:
@@ -40,16 +41,17 @@ def slip_loss(measured: Measured) -> float:
     return float(np.mean(1.0 - driven / driving))
 
 
-def share_left(powers: Mapping[str, Any]) -> float:
+def _share_left(measured: Measured) -> float:
     """Share of the driving power that is not lost [1]; not a number where the load drives."""
+    powers = measured.powers
     left = powers["load_power"] + powers["thrust_power"] + powers["storing_power"]
     return left / powers["driving_power"] if powers["driving_power"] > 0.0 else np.nan
 
 
-def idle_arcs(measured: Measured) -> np.ndarray:
+def _idle_arcs(measured: Measured) -> np.ndarray:
     """Share of each arc without push force [1], (2,); as well where no element has been."""
     push, where = measured.profiles["push_force"], regions(measured.path, measured.places)
-    idle = ~(push > IDLE * np.nanmax(push))
+    idle = ~(push > _IDLE * np.nanmax(push))
     return np.array([idle[where == REGIONS.index(pulley)].mean() for pulley in PULLEYS])
 
 
@@ -86,11 +88,8 @@ VARIABLES = (
         words="numerical damping",
     ),
     *shared("power_residual"),
-    Variable(
-        "efficiency",
-        "1",
-        "what is left of driving_power for load, thrust and storing",
-        of=lambda m: share_left(m.powers),
+    *shared(
+        "efficiency", comment="what is left of driving_power for load, thrust and storing", of=_share_left
     ),
     Variable(
         "largest_push_force",
@@ -104,7 +103,7 @@ VARIABLES = (
         "without push force: its mean is below 2 % of the largest along the path",
         dims=("pulley",),
         words="idle share of the arc",
-        of=idle_arcs,
+        of=_idle_arcs,
     ),
     Variable(
         "passing_frequency",
@@ -117,7 +116,7 @@ VARIABLES = (
 )
 
 
-def coordinates(parameters: Mapping[str, Any]) -> dict[str, Coordinate]:
+def coordinates(parameters: Parameters) -> dict[str, Coordinate]:
     """Coordinates of the record's dimensions, by flat parameters of the job."""
     return {
         **COORDINATES,
@@ -127,11 +126,11 @@ def coordinates(parameters: Mapping[str, Any]) -> dict[str, Coordinate]:
     }
 
 
-def cost(parameters: Mapping[str, Any], stepper: str) -> Any:
+def cost(parameters: Parameters, stepper: str) -> float | np.ndarray:
     """Core-seconds of a run; of parameters that are arrays, an array."""
     p = parameters
-    each = np.where(np.isinf(p["sheave_stiffness"]), RIGID_COST, ELASTIC_COST)[()]
-    return p["duration"] * (each * p["elements"] / p["step"] + SAMPLE_COST * p["sampling_rate"])
+    each = np.where(np.isinf(p["sheave_stiffness"]), _RIGID_COST, _ELASTIC_COST)[()]
+    return p["duration"] * (each * p["elements"] / p["step"] + _SAMPLE_COST * p["sampling_rate"])
 
 
 judge = partial(judging.judge, variables=VARIABLES)

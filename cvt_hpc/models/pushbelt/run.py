@@ -16,9 +16,9 @@ from typing import Any
 import numpy as np
 
 from cvt_hpc.models.pushbelt import fields as f
-from cvt_hpc.models.pushbelt.parameters import MODES, flank_compliance, local_compliance, path_length
 from cvt_hpc.models.pushbelt.readings import PROFILES, SCALARS, OnPath, Readings
 from cvt_hpc.models.sampled import MOST_UNSOLVED, SampledRun
+from cvt_hpc.parameters import Parameters
 from cvt_hpc.physics.geometry import driven_radius
 from cvt_hpc.variables import Status
 from cvt_hpc.variator import LEAST_SPEED, MOST_SPEED, PULLEYS, STRANDS
@@ -28,13 +28,13 @@ from cvt_hpc.variator.profiles import extremes, multiple
 from cvt_hpc.variator.slip import GAINED, LOST
 from cvt_hpc.vibration.ramped import ramped
 
-MOST_BYTES = 2**24  # of a process: some 80 start-ups of 432 elements and 15 ms at 20 kHz
+_MOST_BYTES = 2**24  # of a process: some 80 start-ups of 432 elements and 15 ms at 20 kHz
 
 
 class StartUps:
     """Start-ups as copies of arrays, of `most_bytes` in all; the least recently used goes first."""
 
-    def __init__(self, most_bytes: int = MOST_BYTES) -> None:
+    def __init__(self, most_bytes: int = _MOST_BYTES) -> None:
         self._most_bytes = most_bytes
         self._kept: OrderedDict[str, tuple[np.ndarray, ...]] = OrderedDict()
 
@@ -55,14 +55,14 @@ class StartUps:
         self._kept.clear()
 
 
-def fingerprint(*values: Any) -> str:
+def fingerprint(*values: object) -> str:
     """Return a key of values that differs where any of them does, by a bit of a number or by its type.
 
     Values are numbers, texts, arrays, and sequences, mappings and objects of such.
     """
     digest = sha256()
 
-    def take(value: Any) -> None:
+    def take(value: object) -> None:
         if isinstance(value, int | float | str | np.generic | np.ndarray):
             array = np.asarray(value)
             digest.update(f"{array.dtype.str}{array.shape}".encode() + array.tobytes())
@@ -82,16 +82,16 @@ def fingerprint(*values: Any) -> str:
 
 
 COURSES = ("load", "driving_speed")
-FIRST_THRUST = 500.0  # [N]: with which the run begins, so that the belt settles in the grooves
-KICK_PEAK = 32.0 / 27.0  # of sin^2 x (1 + cos x), at cos x = 1/3
+_FIRST_THRUST = 500.0  # [N]: with which the run begins, so that the belt settles in the grooves
+_KICK_PEAK = 32.0 / 27.0  # of sin^2 x (1 + cos x), at cos x = 1/3
 CLAMPED = 0.5  # of the rise time: until then the thrust rises, from then on the load, lest the belt slips
 # Limit of the open power balance beside the equations' tolerance: elastic sheaves lean along the arc,
 # which has no part in the elements' forces. Sound runs leave up to 0.5 % of the losses.
-OF_LOSS = 0.02  # [1]
+_OF_LOSS = 0.02  # [1]
 # Limit of numerical damping beside that share of the losses: one of the energy of rotation of elements
 # that meet and leave an arc, and of thrust times belt speed, by step. Without vibration sound runs damp by up
 # to 85 % of these two.
-OF_ROTATION, OF_THRUST = 1.5, 10.0  # [1], [1/s]
+_OF_ROTATION, _OF_THRUST = 1.5, 10.0  # [1], [1/s]
 
 _start_ups = StartUps()
 forget = _start_ups.forget
@@ -102,6 +102,13 @@ class ElementRun(SampledRun):
 
     It begins at the end of its start-up where another run of this process has marched the same one. Resolved
     parameters [SI] include those of the stepper.
+
+    Attributes
+    ----------
+    path : Variator
+        The reference path.
+    places : (place,) array
+        Path coordinates of the profiles [m].
     """
 
     _contacts: tuple[str, ...] = f.CONTACTS  # by number, as the counters have them
@@ -111,16 +118,17 @@ class ElementRun(SampledRun):
     _saddle: tuple[int, ...] = (f.Y, f.Z)  # fields of the saddle point, and of its speed with the turning
     _speeds: tuple[int, ...] = (f.U_Y, f.U_Z, f.OMEGA)
     _belt: Any
-    _method: Any  # how steps are solved, state and work space, as `_advance` takes them
+    _method: object  # how steps are solved, state and work space, as `_advance` takes them
     _state: Any
-    _work: Any
+    _work: object
     _advance: Callable[..., int]
 
-    def __init__(self, parameters: Mapping[str, Any], stepper: str) -> None:
+    def __init__(self, parameters: Parameters, stepper: str) -> None:
         p = parameters
         super().__init__(p)
         self._begin(p)
         self._readings = Readings(p, self._belt)
+        self.path, self.places = self._readings.path, self._readings.places
         sums = len(self._profiles) + 1, self._readings.places.size
         probes = np.tile(self._readings.probes, (len(self._directions) // len(STRANDS), 1))
         self._record(self._channels, self._directions, probes, f.TOTALS + 1, sums)
@@ -130,7 +138,7 @@ class ElementRun(SampledRun):
         self._start_up_key = self._key_of_start_up()
         self._go_on_from(_start_ups.find(self._start_up_key))
 
-    def _begin(self, p: Mapping[str, Any]) -> None:
+    def _begin(self, p: Parameters) -> None:
         """Set how steps are solved, constants, state and work space."""
         raise NotImplementedError
 
@@ -203,7 +211,7 @@ class ElementRun(SampledRun):
         starts, length = np.concatenate([[0.0], np.cumsum(path.lengths)]), path.strand_length
         phase = np.pi * np.where(region % 2 == 1, (position - starts[region]) / length, 0.0)
         c, s = np.cos(phase), np.sin(phase)
-        size = self.parameters["kick"] / KICK_PEAK
+        size = self.parameters["kick"] / _KICK_PEAK
         speed, slope = size * s**2 * (1.0 + c), size * np.pi / length * s * (1.0 + c) * (3.0 * c - 1.0)
         _, angle, _ = points_at(path, self.parameters["centre_distance"], position)
         changes = speed * np.sin(angle), -speed * np.cos(angle), -slope
@@ -242,7 +250,7 @@ class ElementRun(SampledRun):
             share = begun + (1.0 - begun) * min(max((time - rise) / (end - rise), 0.0), 1.0)
         clamped = load_course.py_func(time, CLAMPED * rise, rise, 1.0, 1.0)
         driving, driven = (
-            FIRST_THRUST + clamped * (p[name] * multiple(p, name, time) - FIRST_THRUST)
+            _FIRST_THRUST + clamped * (p[name] * multiple(p, name, time) - _FIRST_THRUST)
             for name in ("driving_thrust", "thrust")
         )
         speed = share * p["driving_speed"] * multiple(p, "driving_speed", time)
@@ -293,10 +301,8 @@ class ElementRun(SampledRun):
         radii = self._state.pulleys[[f.DRIVING_RADIUS, f.DRIVEN_RADIUS]]
         for pulley, radius in zip(PULLEYS, radii, strict=True):
             if not least <= radius <= most:
-                reach = f"{least:g} to {most:g} m"
-                return (
-                    f"the {pulley} sheave has run to its stop: a pitch radius of {radius:.5g} m, of {reach}"
-                )
+                at, reach = f"a pitch radius of {radius:.5g} m", f"{least:g} to {most:g} m"
+                return f"the {pulley} sheave has run to its stop: {at}, of {reach}"
         return None
 
     @property
@@ -309,14 +315,14 @@ class ElementRun(SampledRun):
         part, time = self._totals[self.judged], f.TIME
         return float((part[-1, total] - part[0, total]) / (part[-1, time] - part[0, time]))
 
-    def powers(self) -> dict[str, Any]:
+    def powers(self) -> dict[str, float | np.ndarray]:
         """Mean powers over the judged part, named as in the record [W]."""
         found = {name: self.mean_rate(f.WORK_IN + k) for k, name in enumerate(f.POWERS)}
         loss = found["flank_loss"] + found["ring_loss"] + found["belt_loss"]
         loss += found["tilt_loss"] + found["element_loss"] + found["stretch_loss"] + found["lag_loss"]
         damped = np.array([self.mean_rate(total) for total in f.DAMPED.values()])
         storing = self.mean_rate(f.TOTALS) - self.mean_rate(f.GRAVITY_WORK)
-        return found | {"loss": loss, "storing_power": storing, "numerical_damping": damped}
+        return {**found, "loss": loss, "storing_power": storing, "numerical_damping": damped}
 
     @property
     def profiles(self) -> dict[str, np.ndarray]:
@@ -325,23 +331,13 @@ class ElementRun(SampledRun):
             means = self._sums[:-1] / self._sums[-1]
         return dict(zip(self._profiles, means, strict=True))
 
-    @property
-    def path(self) -> Any:
-        """The reference path."""
-        return self._readings.path
-
-    @property
-    def places(self) -> np.ndarray:
-        """Path coordinates of the profiles, (place,) [m]."""
-        return self._readings.places
-
     def numerical_doubt(self, record: dict[str, Any]) -> tuple[Status, str] | None:
         """Reason why a run that reached its end is not to be trusted, by its values; None where it is.
 
         These are `power_residual`, `numerical_damping`, `driving_power`, `loss` and `unsolved_share`.
         """
         unsolved, open_power = record["unsolved_share"], abs(record["power_residual"])
-        flow, small = max(abs(record["driving_power"]), record["loss"]), OF_LOSS * record["loss"]
+        flow, small = max(abs(record["driving_power"]), record["loss"]), _OF_LOSS * record["loss"]
         damped, most_damped = record["numerical_damping"].sum(), self._most_damped() + small
         most_open = (small + self._most_open()) / flow
         if not unsolved <= MOST_UNSOLVED:
@@ -366,32 +362,4 @@ class ElementRun(SampledRun):
         turning = path.driving_radius**-2 + path.driven_radius**-2
         rotation = 0.5 * self._tilting_inertia() * passing * speed**2 * turning
         thrust = extremes(p, "thrust")[1]
-        return OF_ROTATION * rotation + OF_THRUST * self.step * thrust * speed
-
-
-def given(parameters: Mapping[str, Any]) -> dict[str, Any]:
-    """Input of `start`: flat parameters of a run [SI], and what follows from them for each element."""
-    p, length = parameters, path_length(parameters)
-    pitch = length / p["elements"]
-    rigid = np.isinf(p["sheave_stiffness"])
-    return {
-        **p,
-        "belt_length": length,
-        "element_mass": p["element_mass"] * pitch,
-        "pitch_depth": p["ring_offset"],
-        "ring_mass": p["ring_mass"] * length,
-        "ring_strain": p["reference_tension"] / p["ring_stiffness"],
-        "flank_stiffness": pitch / flank_compliance(p),
-        "local_compliance": local_compliance(p) / pitch,
-        "local_decay": np.exp(-pitch / p["local_length"]),
-        "contact_stiffness": p["edge_stiffness"] / pitch,
-        "contact_time": p["element_damping"] / p["edge_stiffness"],
-        "angle_stiffness": p["tilt_spring"] * pitch,
-        "angle_damping": p["tilt_damper"] * pitch,
-        "driving_rate": p["sheave_rate"] if p["driving_thrust"] > 0.0 else 0.0,
-        "driven_rate": p["sheave_rate"],
-        "modal_stiffness": () if rigid else p["sheave_stiffness"] * np.array([p[key] for key in MODES]),
-        "driving_speed": p["speed_start"]
-        if ramped(p) == "speed"
-        else p["driving_speed"] * multiple(p, "driving_speed", 0.0),
-    }
+        return _OF_ROTATION * rotation + _OF_THRUST * self.step * thrust * speed

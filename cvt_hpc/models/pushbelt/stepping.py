@@ -16,7 +16,7 @@ from cvt_hpc.lanes import absolute, like, maximum
 from cvt_hpc.models.pushbelt import fields as f
 from cvt_hpc.solvers.linked_blocks import solve, solve_small
 
-FALLS = 0.95  # of the smallest correction so far: one that is larger does not fall
+_FALLS = 0.95  # of the smallest correction so far: one that is larger does not fall
 _LARGE = 1e100  # more than any speed or power that means something
 
 
@@ -106,7 +106,7 @@ def _newton(equations, belt, newton, state, work, load, dt):
         change = correct(state, work, weights, equations.first_change, share)
         # Contacts that close one after the other along the belt take an iteration each, with corrections that
         # fall. Sets of contacts that take turns do not let them fall.
-        share = 0.5 if iteration + 1 >= newton.first_half_step and change > FALLS * least else 1.0
+        share = 0.5 if iteration + 1 >= newton.first_half_step and change > _FALLS * least else 1.0
         least = min(least, change)
         if iteration == newton.most_iterations - 1:
             element = most_corrected(work.blocks, weights)

@@ -5,43 +5,31 @@ Steps of the planar pushbelt in time.
 From q_k and X_{k-1/2} a step finds X_{k+1/2}. All directions are those at q_k. Rings, springs of tilt, flanks
 and contacts between elements act at mean positions, which damps nothing (`chain.BETA`); rings and these
 contacts have dampers of their own.
-
-The nose of each element in the hole of the next one, in lanes: it holds neighbours side by side.
-
-The nose's tip P lies at the front of element i, the hole's centre Q at the rear of element j, both
-`nose_height` above the saddle. Their offset across the next element, (P - Q).o_j, is free up to the clearance
-to either side; beyond, the hole pushes back elastically and without friction.
-
-An offset grows by the speeds times (o_j, a, 0) of element i and (-o_j, b, 0) of j, a and b being levers.
 """
 
 from functools import partial
 
 import numpy as np
-from numba.extending import register_jitable
 
 from cvt_hpc.kernels import called_alike, kernel
-from cvt_hpc.lanes import absolute, ahead, around, behind, maximum
+from cvt_hpc.lanes import absolute, ahead, around, behind
 from cvt_hpc.models.marched import batches_of_one
 from cvt_hpc.models.pushbelt import assembly, run
 from cvt_hpc.models.pushbelt import fields as f
-from cvt_hpc.models.pushbelt.belt import NEWTON, of_lanes, start, workspace
+from cvt_hpc.models.pushbelt.belt import NEWTON, newton_of, of_lanes, outset, start, workspace
 from cvt_hpc.models.pushbelt.border import (
     accept_border,
     book,
-    book_weight,
-    close_border,
     move_sheaves,
     set_shapes,
 )
-from cvt_hpc.models.pushbelt.chain import before_step, contact_shares, linear_blocks, link, predict, turned
+from cvt_hpc.models.pushbelt.chain import linear_blocks, link, predict, turned
 from cvt_hpc.models.pushbelt.friction import filtered_slip
 from cvt_hpc.models.pushbelt.readings import SCALARS, Reading
 from cvt_hpc.models.pushbelt.ring_bending import set_bending
-from cvt_hpc.models.pushbelt.run import COURSES, ElementRun, given
+from cvt_hpc.models.pushbelt.run import COURSES, ElementRun
 from cvt_hpc.models.pushbelt.stepping import Equations, advance_by
 from cvt_hpc.parameters import Parameters
-from cvt_hpc.physics.contact_laws import pressed
 
 CHANNELS = (*COURSES, *SCALARS)
 
@@ -51,13 +39,9 @@ class Transient(ElementRun):
 
     def _begin(self, p: Parameters) -> None:
         self._advance = partial(called_alike(advance_by), EQUATIONS)
-        self._belt, self._state = start(given(p))
+        self._belt, self._state = start(outset(p))
         self._work = workspace(self._belt, p["elements"])
-        self._method = NEWTON._replace(
-            tolerance=p["speed_tolerance"],
-            power_tolerance=p["power_tolerance"],
-            most_iterations=p["most_iterations"],
-        )
+        self._method = newton_of(p, NEWTON)
 
     def _read(self) -> Reading:
         return Reading(self._readings, self._elements(), self._state.pulleys)
@@ -80,8 +64,6 @@ def _prepare(belt, state, work, dt):
     elements, step = state.elements, work.step
     predict(belt, elements, state.pulleys, step, dt)
     link(belt, elements, step, dt)
-    if belt.nose_clearance < np.inf:
-        predict_noses(belt, elements, step, dt)
     linear_blocks(belt, step, dt)
     set_bending(belt, state, work, f.Y, f.BENDING, f.BENT_Y, dt)
     for j in range(step.rows):
@@ -94,33 +76,10 @@ def _prepare(belt, state, work, dt):
 @kernel
 def _evaluate(belt, state, work, load, dt):
     """Forces of the iterate, and the residuals that they leave; return the power residual [W]."""
-    elements, step, iterate, scratch = state.elements, work.step, work.iterate, work.scratch
-    pulleys, increments, openings, shapes = state.pulleys, state.increments, state.openings, work.shapes
-    assembly.pair_forces(belt, elements, step, iterate, dt)
-    if belt.nose_clearance < np.inf:
-        nose_forces(belt, elements, step, iterate, dt)
-    assembly.flank_depths(belt, elements, increments, openings, shapes, step, iterate, work.bent, dt)
-    assembly.element_forces(belt, elements, pulleys, increments, step, iterate, dt)
-    changes = increments, work.increments
-    return assembly.residuals(
-        belt, elements, changes, openings, shapes, load, step, iterate, scratch, work.border, dt
-    )
-
-
-@kernel
-def _assemble(belt, state, work, dt):
-    """The linear system of the elements."""
-    assembly.assemble(belt, state.elements, work.shapes, work.step, work.iterate, work.blocks)
-    if belt.nose_clearance < np.inf:
-        add_nose_blocks(state.elements, work.step, work.iterate, work.blocks)
-
-
-@kernel
-def _close(belt, state, work, dt):
-    """Close the system of the border."""
-    step, iterate, blocks = work.step, work.iterate, work.blocks
-    assembly.border_sums(belt, state.elements, work.shapes, step, iterate, blocks, work.sums, dt)
-    close_border(belt, work.sums, work.border, dt)
+    assembly.pair_forces(belt, state, work, dt)
+    assembly.flank_depths(belt, state, work, dt)
+    assembly.element_forces(belt, state, work, dt)
+    return assembly.residuals(belt, state, work, load, dt)
 
 
 @kernel
@@ -128,13 +87,8 @@ def _changes(kept, k):
     """Changes of contact forces, of the element behind (k = 1) only of those to the next one."""
     own = 1.0 - k
     flank = kept[k, f.FLANK] ** 2 + kept[k, f.FLANK_FRICTION_M] ** 2 + kept[k, f.FLANK_FRICTION_T] ** 2
-    return (
-        kept[k, f.EDGE],
-        kept[k, f.HEAD],
-        own * np.sqrt(flank),
-        own * kept[k, f.RING_FRICTION],
-        kept[k, f.NOSE],
-    )
+    flank, ring = own * np.sqrt(flank), own * kept[k, f.RING_FRICTION]
+    return kept[k, f.EDGE], kept[k, f.HEAD], flank, ring, kept[k, f.NOSE]
 
 
 @kernel
@@ -143,8 +97,6 @@ def _accept(belt, state, work, inputs, dt):
     elements, step, iterate, scratch = state.elements, work.step, work.iterate, work.scratch
     totals, pulleys = state.totals, state.pulleys
     book(belt, state, work, dt)
-    if belt.gravity != 0.0:
-        book_weight(belt, state, work, dt)
     for k in range(3):
         scratch[0, k] = 0.0
     per_dt, fall = 1.0 / dt, dt * belt.gravity
@@ -184,92 +136,5 @@ def _accept(belt, state, work, inputs, dt):
     accept_border(belt, state, work, inputs, dt)
 
 
-EQUATIONS = Equations(_prepare, _evaluate, _assemble, _close, _accept, _changes, f.CHANGE)
+EQUATIONS = Equations(_prepare, _evaluate, assembly.assemble, assembly.close, _accept, _changes, f.CHANGE)
 advance = partial(advance_by, EQUATIONS)
-
-
-@register_jitable
-def _offset(ri, xi, rj, xj, thickness, height):
-    """(P - Q) along o_j and x_j [m]."""
-    d_y = ri[0] - rj[0] + 0.5 * thickness * (xi[0] + xj[0]) + height * (xi[1] - xj[1])
-    d_z = ri[1] - rj[1] + 0.5 * thickness * (xi[1] + xj[1]) - height * (xi[0] - xj[0])
-    return d_y * xj[1] - d_z * xj[0], d_y * xj[0] + d_z * xj[1]
-
-
-@kernel
-def predict_noses(belt, state, step, dt):
-    """Offsets by which noses press at the old speeds, and levers at q_k."""
-    thickness, height = belt.thickness, belt.nose_height
-    ahead_share, share, behind_share = contact_shares(belt, dt)
-    for j in range(state.rows):
-        ri, rj = (state[j, f.Y], state[j, f.Z]), (ahead(state, j, f.Y), ahead(state, j, f.Z))
-        xi = (state[j, f.HEADING_Y], state[j, f.HEADING_Z])
-        xj = (ahead(state, j, f.HEADING_Y), ahead(state, j, f.HEADING_Z))
-        now, along = _offset(ri, xi, rj, xj, thickness, height)
-        cosine, sine = xi[0] * xj[0] + xi[1] * xj[1], xi[0] * xj[1] - xi[1] * xj[0]
-        step[j, f.NOSE_LEVER_I] = height * sine - 0.5 * thickness * cosine
-        step[j, f.NOSE_LEVER_J] = along - 0.5 * thickness
-        si = (step[j, f.PREDICTED_Y], step[j, f.PREDICTED_Z])
-        sj = (ahead(step, j, f.PREDICTED_Y), ahead(step, j, f.PREDICTED_Z))
-        zi = (step[j, f.PREDICTED_HEADING_Y], step[j, f.PREDICTED_HEADING_Z])
-        zj = (ahead(step, j, f.PREDICTED_HEADING_Y), ahead(step, j, f.PREDICTED_HEADING_Z))
-        reached, _ = _offset(si, zi, sj, zj, thickness, height)
-        bi, yi = before_step(ri, xi, (state[j, f.U_Y], state[j, f.U_Z], state[j, f.OMEGA]), dt)
-        speeds = ahead(state, j, f.U_Y), ahead(state, j, f.U_Z), ahead(state, j, f.OMEGA)
-        bj, yj = before_step(rj, xj, speeds, dt)
-        before, _ = _offset(bi, yi, bj, yj, thickness, height)
-        step[j, f.NOSE_OFFSET] = ahead_share * reached + share * now + behind_share * before
-        step[j, f.NOSE_MEAN] = 0.5 * (reached + now)
-
-
-@kernel
-def nose_forces(belt, state, step, iterate, dt):
-    """Forces that take the offsets back, signed as these, and their increase by the offsets' rates."""
-    stiffness, clearance = belt.nose_stiffness, belt.nose_clearance
-    ahead_share, _, _ = contact_shares(belt, dt)
-    pressing = ahead_share * dt
-    for j in range(step.rows):
-        x_y, x_z = ahead(state, j, f.HEADING_Y), ahead(state, j, f.HEADING_Z)
-        y = state[j, f.CHANGE_Y] - ahead(state, j, f.CHANGE_Y)
-        z = state[j, f.CHANGE_Z] - ahead(state, j, f.CHANGE_Z)
-        rate = x_z * y - x_y * z + step[j, f.NOSE_LEVER_I] * state[j, f.CHANGE_W]
-        offset = step[j, f.NOSE_OFFSET] + pressing * (
-            rate + step[j, f.NOSE_LEVER_J] * ahead(state, j, f.CHANGE_W)
-        )
-        above, k = pressed(clearance - offset, stiffness)
-        below, m = pressed(clearance + offset, stiffness)
-        state[j, f.NOSE], iterate[j, f.NOSE_SLOPE] = above - below, pressing * maximum(k, m)
-        iterate[j, f.NOSE_REACHED] = offset
-
-
-@kernel
-def add_nose_blocks(state, step, iterate, blocks):
-    """Add the slopes to the blocks of both elements, as `assembly.assemble` has left them."""
-    for j in range(step.rows):
-        o_y, o_z = ahead(state, j, f.HEADING_Z), -ahead(state, j, f.HEADING_Y)
-        k, a, b = iterate[j, f.NOSE_SLOPE], step[j, f.NOSE_LEVER_I], step[j, f.NOSE_LEVER_J]
-        yy, yz, zz = k * o_y * o_y, k * o_y * o_z, k * o_z * o_z
-        yw, zw, ww = k * o_y * a, k * o_z * a, k * a * a
-        blocks[j, f.LINKED + f.YY] -= yy
-        blocks[j, f.LINKED + f.ZY] -= yz
-        blocks[j, f.LINKED + f.WY] -= yw
-        blocks[j, f.LINKED + f.YZ] -= yz
-        blocks[j, f.LINKED + f.ZZ] -= zz
-        blocks[j, f.LINKED + f.WZ] -= zw
-        blocks[j, f.LINKED + f.YW] += k * o_y * b
-        blocks[j, f.LINKED + f.ZW] += k * o_z * b
-        blocks[j, f.LINKED + f.WW] += k * a * b
-
-        o_y, o_z = state[j, f.HEADING_Z], -state[j, f.HEADING_Y]
-        k, b = behind(iterate, j, f.NOSE_SLOPE), behind(step, j, f.NOSE_LEVER_J)
-        yy, yz, zz = yy + k * o_y * o_y, yz + k * o_y * o_z, zz + k * o_z * o_z
-        yw, zw, ww = yw - k * o_y * b, zw - k * o_z * b, ww + k * b * b
-        blocks[j, f.YY] += yy
-        blocks[j, f.ZY] += yz
-        blocks[j, f.WY] += yw
-        blocks[j, f.YZ] += yz
-        blocks[j, f.ZZ] += zz
-        blocks[j, f.WZ] += zw
-        blocks[j, f.YW] += yw
-        blocks[j, f.ZW] += zw
-        blocks[j, f.WW] += ww

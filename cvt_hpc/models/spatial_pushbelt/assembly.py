@@ -16,7 +16,7 @@ from numba.extending import register_jitable
 
 from cvt_hpc.kernels import kernel
 from cvt_hpc.lanes import ahead, behind, fma, like
-from cvt_hpc.models.pushbelt.border import border_residuals
+from cvt_hpc.models.pushbelt.border import border_residuals, close_border
 from cvt_hpc.models.pushbelt.chain import BETA, angle_slope
 from cvt_hpc.models.spatial_pushbelt import fields as f
 from cvt_hpc.models.spatial_pushbelt import vectors as vec
@@ -24,18 +24,9 @@ from cvt_hpc.models.spatial_pushbelt.chain import motion
 
 
 @register_jitable
-def _store_part(array, j, first, m):
-    """Set a part of 3 x 3 of a block."""
-    vec.store(array, j, first, m[:3])
-    vec.store(array, j, first + f.SIZE, m[3:6])
-    vec.store(array, j, first + 2 * f.SIZE, m[6:])
-
-
-@register_jitable
 def _part(array, j, first):
     """A part of 3 x 3 of a block."""
-    two, three = first + f.SIZE, first + 2 * f.SIZE
-    return vec.three(vec.at(array, j, first), vec.at(array, j, two), vec.at(array, j, three))
+    return vec.matrix(array, j, first, f.SIZE)
 
 
 @register_jitable
@@ -47,10 +38,10 @@ def _store_row(array, j, first, v):
 @register_jitable
 def _store_link(array, j, first, link):
     """Set the parts of a block by velocities and angular velocities."""
-    _store_part(array, j, first + f.UU, link[0])
-    _store_part(array, j, first + f.WU, link[1])
-    _store_part(array, j, first + f.UW, link[2])
-    _store_part(array, j, first + f.WW, link[3])
+    vec.store_matrix(array, j, first + f.UU, link[0], f.SIZE)
+    vec.store_matrix(array, j, first + f.WU, link[1], f.SIZE)
+    vec.store_matrix(array, j, first + f.UW, link[2], f.SIZE)
+    vec.store_matrix(array, j, first + f.WW, link[3], f.SIZE)
 
 
 @register_jitable
@@ -77,7 +68,7 @@ def linear_blocks(belt, step, dt):
     """Blocks of inertia, dampers, tension, pitch, yaw and bending: DIAGONAL and LINK of each element."""
     steep = angle_slope(belt, dt)
     yawing = BETA * dt * belt.yaw_stiffness + belt.yaw_damping
-    shear, bend = bending_slopes(belt, dt)
+    shear, bend = _bending_slopes(belt, dt)
     per_pitch = 1.0 / belt.pitch
     for j in range(step.rows):
         uu, uw = vec.symmetric(step, j, f.INERTIA), vec.matrix(step, j, f.INERTIA_UW)
@@ -139,23 +130,25 @@ def side_torque(state, step, j, p):
 
 
 @kernel
-def residuals(belt, state, changes, openings, shapes, load, step, iterate, scratch, border, dt):
+def residuals(belt, state, work, load, dt):
     """Set residuals: of elements in `iterate`, of the border in its last column; return the power's [W].
 
     Forces of flanks and saddles stand in the residuals already. Weight acts as in the plane.
     """
+    elements, step, iterate = state.elements, work.step, work.iterate
+    scratch, shapes = work.scratch, work.shapes
     modes = belt.modal_stiffness.shape[1]
     fall = dt * belt.gravity
     ring, rotary = belt.ring_mass / dt, belt.ring_rotary_inertia / dt
     yawing = BETA * dt * belt.yaw_stiffness + belt.yaw_damping
-    power = torque = like(0.0, state[0, f.FLANK])
+    power = torque = like(0.0, elements[0, f.FLANK])
     for k in range(2 * modes):
         scratch[0, k] = 0.0
     for j in range(step.rows):
-        du, dw = vec.screw(state, j, f.CHANGE)
+        du, dw = vec.screw(elements, j, f.CHANGE)
         du = du[0], du[1] + fall, du[2]
-        dv, dp = state[j, f.CHANGE + f.ROW_V], state[j, f.CHANGE + f.ROW_P]
-        u, omega = motion(state, j, 1.0)
+        dv, dp = elements[j, f.CHANGE + f.ROW_V], elements[j, f.CHANGE + f.ROW_P]
+        u, omega = motion(elements, j, 1.0)
         mass, coupling = vec.symmetric(step, j, f.INERTIA), vec.matrix(step, j, f.INERTIA_UW)
         force, g = vec.both_plus(vec.screw(iterate, j, f.RESIDUAL), vec.screw(iterate, j, f.PAIR_I))
         force, g = vec.both_plus((force, g), vec.screw_behind(iterate, j, f.PAIR_J))
@@ -178,26 +171,29 @@ def residuals(belt, state, changes, openings, shapes, load, step, iterate, scrat
         vec.store_screw(iterate, j, f.RESIDUAL, (force, g))
         iterate[j, f.RESIDUAL + f.ROW_V], iterate[j, f.RESIDUAL + f.ROW_P] = h, s
 
-        v, slope_rate = state[j, f.V] + dv, state[j, f.SLOPE_RATE] + dp
+        v, slope_rate = elements[j, f.V] + dv, elements[j, f.SLOPE_RATE] + dp
         power += vec.both_dot((u, omega), (force, g)) + v * h + slope_rate * s
-        driven = state[j, f.DRIVEN]
+        driven = elements[j, f.DRIVEN]
         left, right = f.LEFT_LOW, f.RIGHT_LOW
-        torque += driven * (side_torque(state, step, j, left) + side_torque(state, step, j, right))
+        torque += driven * (side_torque(elements, step, j, left) + side_torque(elements, step, j, right))
         if modes > 0:
-            axial = 0.5 * belt.cosine * (state[j, f.FLANK + left] + state[j, f.FLANK + f.LEFT_HIGH])
-            axial += 0.5 * belt.cosine * (state[j, f.FLANK + right] + state[j, f.FLANK + f.RIGHT_HIGH])
+            axial = 0.5 * belt.cosine * (elements[j, f.FLANK + left] + elements[j, f.FLANK + f.LEFT_HIGH])
+            axial += 0.5 * belt.cosine * (elements[j, f.FLANK + right] + elements[j, f.FLANK + f.RIGHT_HIGH])
             for k in range(modes):
                 scratch[0, modes + k] += driven * axial * shapes[j, k]
                 scratch[0, k] += (1.0 - driven) * axial * shapes[j, k]
-    return border_residuals(belt, changes, openings, load, torque, power, scratch, border, dt)
+    changes = state.increments, work.increments
+    return border_residuals(belt, changes, state.openings, load, torque, power, scratch, work.border, dt)
 
 
 @kernel
-def assemble_pairs(belt, state, step, iterate, blocks):
+def assemble_pairs(belt, state, work):
     """Blocks of all but the flanks, and the first right side: what takes the residuals to zero."""
+    elements, step, iterate = state.elements, work.step, work.iterate
+    blocks = work.narrow
     has_pins = belt.pin_clearance < np.inf
     for j in range(step.rows):
-        x = vec.ahead(state, j, f.HEADING)
+        x = vec.ahead(elements, j, f.HEADING)
         k, i, jj = iterate[j, f.STIFF], vec.at(iterate, j, f.STIFF_I), vec.at(iterate, j, f.STIFF_J)
         one, ahead_of_it = like(1.0, k), k
         uu = vec.plus_product(_part(step, j, f.LINK + f.UU), -k, x, x)
@@ -227,7 +223,7 @@ def assemble_pairs(belt, state, step, iterate, blocks):
             block = vec.plus_law(block, iterate[j, f.PIN_SLOPE], (n, a))
         # those behind, of which it is j
         uu, uw, ww = block
-        x, k = vec.at(state, j, f.HEADING), behind(iterate, j, f.STIFF)
+        x, k = vec.at(elements, j, f.HEADING), behind(iterate, j, f.STIFF)
         uu, uw = vec.plus_square(uu, k, x), vec.plus_product(uw, one, x, vec.behind(iterate, j, f.STIFF_J))
         block = uu, uw, vec.symmetric_sum(ww, vec.joined(*vec.screw_behind(iterate, j, f.STIFF_JJ)))
         if has_pins:
@@ -245,18 +241,19 @@ def assemble_pairs(belt, state, step, iterate, blocks):
 
 
 @kernel
-def border_sums(belt, state, shapes, iterate, blocks, sums):
-    """Slopes of the border's equations by its unknowns, less what the elements contribute to them.
+def close_pairs(belt, state, work, dt):
+    """Close the system of the border: its slopes by its unknowns, less what the elements contribute to them.
 
-    As `border.close_border` takes them. The right sides of `blocks` hold the solution without border, then
-    those for its columns.
+    The right sides of `blocks` hold the solution without border, then those for its columns.
     """
+    elements, iterate, blocks = state.elements, work.iterate, work.narrow
+    shapes, sums = work.shapes, work.sums
     modes = belt.modal_stiffness.shape[1]
     width = 2 + 2 * modes
     for field in range((width - 1) * width):
         sums[0, field] = 0.0
     for j in range(iterate.rows):
-        driven = state[j, f.DRIVEN]
+        driven = elements[j, f.DRIVEN]
         driving = 1.0 - driven
         torque, normal = vec.screw(iterate, j, f.TORQUE_ROW), vec.screw(iterate, j, f.NORMAL_ROW)
         for column in range(width):
@@ -278,10 +275,11 @@ def border_sums(belt, state, shapes, iterate, blocks, sums):
             for k in range(modes):
                 sums[0, width * (1 + k) + 2 + m] += give * shapes[j, k] * one
                 sums[0, width * (1 + modes + k) + 2 + modes + m] += give * shapes[j, k] * other
+    close_border(belt, sums, work.border, dt)
 
 
 @register_jitable
-def bending_slopes(belt, dt):
+def _bending_slopes(belt, dt):
     """Increase of the shear force by the rate of shear, and of the moment by the rate of change of slope."""
     return BETA * dt * belt.ring_shear * belt.pitch, BETA * dt * belt.ring_bending / belt.pitch
 
@@ -302,7 +300,7 @@ def bending_forces(belt, state, step, iterate, dt):
     """Add to the pairs' forces."""
     per_pitch = 1.0 / belt.pitch
     for_shear, for_bend = belt.ring_shear * belt.pitch, belt.ring_bending / belt.pitch
-    steep, steep_bend = bending_slopes(belt, dt)
+    steep, steep_bend = _bending_slopes(belt, dt)
     for j in range(step.rows):
         here, there = state[j, f.CHANGE + f.ROW_P], ahead(state, j, f.CHANGE + f.ROW_P)
         rise = ahead(state, j, f.CHANGE + f.AXIAL) - state[j, f.CHANGE + f.AXIAL]

@@ -7,31 +7,26 @@ The frame is global: pulleys lie side by side in the plane (y, z), the driving c
 driven one at y = centre_distance, and the third coordinate is axial. Right is the side of the greater axial
 coordinate, left the other. Vectors take three fields in that order.
 
-Start of a spatial pushbelt from the geometry of its path: constants and state from given values.
+Start of a spatial pushbelt from the geometry of its path: constants and state by parameters of a run.
 """
 
-from collections.abc import Mapping
-from typing import Any, NamedTuple
+from typing import NamedTuple
 
 import numpy as np
 
 from cvt_hpc.lanes import LaneArray
 from cvt_hpc.models.pushbelt import fields as planar
-from cvt_hpc.models.pushbelt.belt import (
-    Newton,
-    Workspace,
-    empty_workspace,
-    in_lanes,
-    of_lanes,
-    pitch_line,
-    shared_constants,
-)
+from cvt_hpc.models.pushbelt.belt import Belt as PlanarBelt
+from cvt_hpc.models.pushbelt.belt import Newton, Workspace, empty_workspace, in_lanes, of_lanes, outset
+from cvt_hpc.models.pushbelt.parameters import path_length
 from cvt_hpc.models.spatial_pushbelt import fields as f
+from cvt_hpc.models.spatial_pushbelt.parameters import LOOSE_SIDES, package_arm
+from cvt_hpc.parameters import Parameters
 from cvt_hpc.physics.geometry import Variator
 from cvt_hpc.physics.out_of_plane import SIDES
 from cvt_hpc.variator.history import points_at, regions
 
-SEED_MODES = 5  # half waves of a strand that the disturbance at the start is made of
+_SEED_MODES = 5  # half waves of a strand that the disturbance at the start is made of
 
 
 class Belt(NamedTuple):
@@ -160,28 +155,33 @@ def workspace(belt: Belt, nodes: int, flows: int = 1) -> Workspace:
     return empty_workspace(nodes, modes, f.WIDE, *fields, f.INPUTS, narrow=f.SIZE)
 
 
-def belt_of(given: Mapping[str, Any], chord: float) -> Belt:
-    """Constants from values as `start` takes them, and the distance of neighbours [m]."""
-    g, shared = given, shared_constants(given, chord, Belt._fields)
-    mass, thickness, ring_mass = shared["mass"], shared["thickness"], shared["ring_mass"]
-    height, width = g["element_height"], g["element_width"]
-    shared["lateral_damping"] = float(g["lateral_damping"] * chord)
-    turned = np.array([[0.0, 0.0, 1.0], [np.tan(g["axis_tilt"]), np.tan(g["axis_skew"]), 1.0]])
+def belt_of(parameters: Parameters, planar: PlanarBelt) -> Belt:
+    """Constants of the belt that is a planar one where it stays in its plane."""
+    p, mass, thickness = parameters, planar.mass, planar.thickness
+    height, width, pitch = p["element_height"], p["element_width"], path_length(p) / p["elements"]
+    turned = np.array([[0.0, 0.0, 1.0], [np.tan(p["axis_tilt"]), np.tan(p["axis_skew"]), 1.0]])
     return Belt(
-        **shared,
+        **{name: value for name, value in planar._asdict().items() if name in Belt._fields},
         axes=turned / np.linalg.norm(turned, axis=1)[:, None],
-        loose_side=np.array([float(SIDES[side]) for side in g["loose_sides"]]),
+        loose_side=np.array([float(SIDES[p[key]]) for key in LOOSE_SIDES]),
         half_width=float(0.5 * width),
-        edge_width=float(g["edge_half_width"]),
-        head_width=float(g["head_half_width"]),
-        package_distance=float(g["package_arm"]),
-        pin_height=float(g["nose_height"]),
-        pin_clearance=float(g["nose_clearance"]),
-        pin_stiffness=float(g["nose_stiffness"]),
+        flank_reach=float(p["flank_reach"]),
+        edge_width=float(p["edge_half_width"]),
+        head_width=float(p["head_half_width"]),
+        package_distance=package_arm(p),
+        pin_height=planar.nose_height,
+        pin_clearance=planar.nose_clearance,
+        pin_stiffness=planar.nose_stiffness,
         roll_inertia=float(mass * (height**2 + width**2) / 12.0),
         yaw_inertia=float(mass * (width**2 + thickness**2) / 12.0),
-        pitch_inertia=float(mass * (height**2 + thickness**2) / 12.0),
-        ring_rotary_inertia=float(ring_mass * g["strip_width"] ** 2 / 12.0),
+        pitch_inertia=planar.inertia,
+        ring_rotary_inertia=float(planar.ring_mass * p["strip_width"] ** 2 / 12.0),
+        ring_bending=float(p["lateral_bending_stiffness"]),
+        ring_shear=float(p["lateral_shear_stiffness"]),
+        yaw_stiffness=float(p["yaw_spring"] * pitch),
+        yaw_damping=float(p["yaw_damper"] * pitch),
+        lateral_damping=float(p["lateral_damping"] * planar.pitch),
+        lean_lag=float(p["lean_lag"]),
     )
 
 
@@ -199,20 +199,18 @@ class SideLine:
         self._path, self._belt, self._middles = path, belt, middles
         self._starts = np.concatenate([[0.0], np.cumsum(path.lengths)[:3]])
         shares = np.linspace(0.0, 1.0, 1001)
-        self._modes = np.random.default_rng(seed).uniform(-1.0, 1.0, (2, SEED_MODES))
+        self._modes = np.random.default_rng(seed).uniform(-1.0, 1.0, (2, _SEED_MODES))
         self._modes *= disturbance / np.abs([self._disturbed(k, shares)[0] for k in (0, 1)]).max()
 
     def _disturbed(self, strand: int, share: np.ndarray) -> tuple[np.ndarray, np.ndarray]:
         """Displacement on a strand by the share of its length, and its derivative by it."""
         x = np.pi * share
-        found = np.zeros_like(x), np.zeros_like(x)
+        moved, change = np.zeros((2, x.size))
         for n, size in enumerate(self._modes[strand], start=1):
             wave, slope = np.sin(n * x), n * np.cos(n * x)
-            found = (
-                found[0] + size * np.sin(x) * wave,
-                found[1] + size * np.pi * (np.cos(x) * wave + np.sin(x) * slope),
-            )
-        return found
+            moved += size * np.sin(x) * wave
+            change += size * np.pi * (np.cos(x) * wave + np.sin(x) * slope)
+        return moved, change
 
     def _on_pulley(self, k: int, position: np.ndarray) -> tuple[np.ndarray, np.ndarray]:
         """Axial position [m] and slope of the mid plane of a pulley at path coordinates (n,) [m]."""
@@ -248,17 +246,15 @@ class SideLine:
         return height, slope, direction
 
 
-def start(given: Mapping[str, Any]) -> tuple[Belt, BeltState]:
+def start(parameters: Parameters) -> tuple[Belt, BeltState]:
     """Constants and a state from which a belt can run in: equal chords along the ideal path, at its speed.
 
-    The flanks just touch, but for the disturbance; the rings have the strain `ring_strain`. Half of the
-    misalignment is the driving pulley's. Values [SI] are given as `transient.given` names them, those of an
-    element for each of `elements`.
+    The flanks just touch, but for the disturbance. Half of the misalignment is the driving pulley's.
     """
-    g, line = given, pitch_line(given)
-    belt, nodes, along, speed = belt_of(g, line.chord), g["elements"], line.along, line.speed
-    middles = -0.5 * g["misalignment"], 0.5 * g["misalignment"]
-    height, slope, axial = SideLine(line.path, belt, middles, g["disturbance"], g["seed"]).at(line.places)
+    p, (planar_belt, line, strain) = parameters, outset(parameters)
+    belt, nodes, along, speed = belt_of(p, planar_belt), p["elements"], line.along, line.speed
+    middles = -0.5 * p["misalignment"], 0.5 * p["misalignment"]
+    height, slope, axial = SideLine(line.path, belt, middles, p["disturbance"], p["seed"]).at(line.places)
     heading = np.column_stack([along, slope])
     heading /= np.linalg.norm(heading, axis=1)[:, None]
     outward = np.cross(heading, axial)
@@ -281,21 +277,13 @@ def start(given: Mapping[str, Any]) -> tuple[Belt, BeltState]:
     fields[:, f.vector(f.SPEED)] = np.column_stack([running[:, None] * along, speed * slope])
     fields[:, f.vector(f.OMEGA)] = omega
     fields[:, f.V] = speed * lines.sum() / (nodes * line.chord)
-    fields[:, f.LENGTH] = lines / (1.0 + g["ring_strain"])
-    fields[:, f.TENSION] = belt.ring_stiffness * g["ring_strain"]
+    fields[:, f.LENGTH] = lines / (1.0 + strain)
+    fields[:, f.TENSION] = belt.ring_stiffness * strain
     fields[:, f.DRIVEN] = points[:, 0] > 0.5 * belt.centre_distance
-    modes = belt.modal_stiffness.shape[1]
-    state = BeltState(
-        in_lanes(fields),
-        np.append(line.pulleys, middles),
-        np.zeros((2, modes)),
-        np.zeros((2, modes)),
-        np.zeros(1 + 2 * modes),
-        np.zeros(f.LOADS),
-        np.zeros(planar.TOTALS),
-        np.zeros(planar.COUNTERS, np.int64),
-    )
-    return belt, state
+    openings, leans = np.zeros_like(belt.modal_stiffness), np.zeros_like(belt.modal_stiffness)
+    increments, pulleys = np.zeros(1 + openings.size), np.append(line.pulleys, middles)
+    sums = np.zeros(f.LOADS), np.zeros(planar.TOTALS), np.zeros(planar.COUNTERS, np.int64)
+    return belt, BeltState(in_lanes(fields), pulleys, openings, leans, increments, *sums)
 
 
 def with_two_flows(belt: Belt, state: BeltState) -> BeltState:

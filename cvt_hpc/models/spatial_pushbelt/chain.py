@@ -56,7 +56,7 @@ def spin_of(e, per_length, du):
 
 
 @register_jitable
-def package_lines(d, turn, b):
+def _package_lines(d, turn, b):
     """Directions and sizes of d + b turn and d - b turn."""
     right, right_size = vec.unit(vec.moved(d, b, turn))
     left, left_size = vec.unit(vec.moved(d, -b, turn))
@@ -69,20 +69,20 @@ def lines_at(belt, state, j):
     front = vec.cross(vec.ahead(state, j, f.OUTWARD), vec.ahead(state, j, f.HEADING))
     back = vec.cross(vec.behind(state, j, f.OUTWARD), vec.behind(state, j, f.HEADING))
     d = vec.minus(vec.ahead(state, j, f.POSITION), vec.behind(state, j, f.POSITION))
-    right, left, _, _ = package_lines(d, vec.minus(front, back), belt.package_distance)
+    right, left, _, _ = _package_lines(d, vec.minus(front, back), belt.package_distance)
     return right, left
 
 
 @register_jitable
 def lines_to_next(array, j, position, heading, outward, b):
-    """Axial directions of an element and the next one, chord, and packages up to there (`package_lines`).
+    """Axial directions of an element and the next one, chord, and packages up to there (`_package_lines`).
 
     Position and directions are those at these fields of the array.
     """
     ai = vec.cross(vec.at(array, j, outward), vec.at(array, j, heading))
     aj = vec.cross(vec.ahead(array, j, outward), vec.ahead(array, j, heading))
     chord = vec.minus(vec.ahead(array, j, position), vec.at(array, j, position))
-    return ai, aj, chord, package_lines(chord, vec.minus(aj, ai), b)
+    return ai, aj, chord, _package_lines(chord, vec.minus(aj, ai), b)
 
 
 @kernel

@@ -14,6 +14,7 @@ direction. This is the contact of a circle with the ellipse in which its plane c
 2008, eq. 25), but for the clearance times 1 - cos of the tilt between both: a nanometre at 3 mrad.
 """
 
+import numpy as np
 from numba.extending import register_jitable
 
 from cvt_hpc.kernels import kernel
@@ -27,7 +28,7 @@ _LEAST = 1e-12  # offset that has a direction [m]
 
 
 @register_jitable
-def front_point(belt, p):
+def _front_point(belt, p):
     """Height above the saddle and side of a point of the front: edge left, edge right, head left, right."""
     side = 2.0 * (p % 2) - 1.0
     if p < 2:
@@ -44,30 +45,39 @@ def face_gap(ri, xi, oi, rj, xj, thickness, height, side):
 
 
 @register_jitable
-def before_step(screw, r, x, o, dt):
+def _before_step(screw, r, x, o, dt):
     """Position and directions of an element at q_{k-1}, from those at q_k and its old speeds."""
     u, omega = screw
     factors = vec.turning(omega, -dt)
     return vec.moved(r, -dt, u), vec.turned(x, omega, factors), vec.turned(o, omega, factors)
 
 
+@register_jitable
+def pin_offset(ri, xi, oi, rj, xj, oj, thickness, height):
+    """Offset of pin and hole across x_j, its size [m], and P - r_i."""
+    arm = vec.moved(vec.times(0.5 * thickness, xi), height, oi)
+    d = vec.moved(vec.moved(vec.plus(vec.minus(ri, rj), arm), 0.5 * thickness, xj), -height, oj)
+    d = vec.moved(d, -vec.dot(d, xj), xj)
+    return d, sqrt(vec.dot(d, d)), arm
+
+
 @kernel
 def predict_faces(belt, state, step, dt):
-    """Gaps by which elements press at the old speeds, and levers at q_k."""
-    thickness = belt.thickness
+    """Gaps by which elements and their pins press at the old speeds, directions and levers at q_k."""
+    thickness, pin_height = belt.thickness, belt.pin_height
+    has_pins = belt.pin_clearance < np.inf
     ahead_share, share, behind_share = contact_shares(belt, dt)
     for j in range(state.rows):
         ri, rj = vec.at(state, j, f.POSITION), vec.ahead(state, j, f.POSITION)
         xi, xj = vec.at(state, j, f.HEADING), vec.ahead(state, j, f.HEADING)
-        oi = vec.at(state, j, f.OUTWARD)
+        oi, oj = vec.at(state, j, f.OUTWARD), vec.ahead(state, j, f.OUTWARD)
         si, sj = vec.at(step, j, f.PREDICTED_POSITION), vec.ahead(step, j, f.PREDICTED_POSITION)
         yi, yj = vec.at(step, j, f.PREDICTED_HEADING), vec.ahead(step, j, f.PREDICTED_HEADING)
-        pi = vec.at(step, j, f.PREDICTED_OUTWARD)
-        bi, zi, qi = before_step(vec.screw(state, j, f.SPEED), ri, xi, oi, dt)
-        oj = vec.ahead(state, j, f.OUTWARD)
-        bj, zj, _ = before_step(vec.screw_ahead(state, j, f.SPEED), rj, xj, oj, dt)
+        pi, pj = vec.at(step, j, f.PREDICTED_OUTWARD), vec.ahead(step, j, f.PREDICTED_OUTWARD)
+        bi, zi, qi = _before_step(vec.screw(state, j, f.SPEED), ri, xi, oi, dt)
+        bj, zj, qj = _before_step(vec.screw_ahead(state, j, f.SPEED), rj, xj, oj, dt)
         for p in range(f.POINTS):
-            height, side = front_point(belt, p)
+            height, side = _front_point(belt, p)
             now, arm = face_gap(ri, xi, oi, rj, xj, thickness, height, side)
             vec.store(step, j, f.PUSH_LEVER_I + 3 * p, vec.cross(xj, arm))
             vec.store(step, j, f.PUSH_LEVER_J + 3 * p, vec.cross(vec.minus(arm, vec.minus(rj, ri)), xj))
@@ -75,6 +85,17 @@ def predict_faces(belt, state, step, dt):
             before, _ = face_gap(bi, zi, qi, bj, zj, thickness, height, side)
             step[j, f.PUSH_GAP + p] = ahead_share * reached + share * now + behind_share * before
             step[j, f.PUSH_MEAN + p] = 0.5 * (reached + now)
+        if has_pins:
+            d, now, arm = pin_offset(ri, xi, oi, rj, xj, oj, thickness, pin_height)
+            n = vec.times(1.0 / maximum(now, _LEAST), d)
+            vec.store(step, j, f.PIN_NORMAL, n)
+            vec.store(step, j, f.PIN_LEVER_I, vec.cross(arm, n))
+            vec.store(step, j, f.PIN_LEVER_J, vec.cross(vec.plus(vec.minus(ri, rj), arm), n))
+            _, reached, _ = pin_offset(si, yi, pi, sj, yj, pj, thickness, pin_height)
+            _, before, _ = pin_offset(bi, zi, qi, bj, zj, qj, thickness, pin_height)
+            offset = ahead_share * reached + share * now + behind_share * before
+            step[j, f.PIN_GAP] = belt.pin_clearance - offset
+            step[j, f.PIN_MEAN] = belt.pin_clearance - 0.5 * (reached + now)
 
 
 @register_jitable
@@ -94,8 +115,8 @@ def _pressed_point(state, step, iterate, j, p, motion, stiffness, pressing):
 
 @kernel
 def face_forces(belt, state, step, iterate, dt):
-    """Forces and sums of their slopes of an iterate; adds to the pairs' forces."""
-    stiffness = 0.5 * belt.contact_stiffness
+    """Forces of elements and pins and sums of their slopes of an iterate; adds to the pairs' forces."""
+    stiffness, has_pins = 0.5 * belt.contact_stiffness, belt.pin_clearance < np.inf
     ahead_share, _, _ = contact_shares(belt, dt)
     pressing = ahead_share * dt
     for j in range(step.rows):
@@ -126,56 +147,13 @@ def face_forces(belt, state, step, iterate, dt):
         vec.store_matrix(iterate, j, f.STIFF_IJ, ij)
         vec.add_screw(iterate, j, f.PAIR_I, (vec.times(-force, x), turn_i))
         vec.add_screw(iterate, j, f.PAIR_J, (vec.times(force, x), turn_j))
-
-
-@register_jitable
-def pin_offset(ri, xi, oi, rj, xj, oj, thickness, height):
-    """Offset of pin and hole across x_j, its size [m], and P - r_i."""
-    arm = vec.moved(vec.times(0.5 * thickness, xi), height, oi)
-    d = vec.moved(vec.moved(vec.plus(vec.minus(ri, rj), arm), 0.5 * thickness, xj), -height, oj)
-    d = vec.moved(d, -vec.dot(d, xj), xj)
-    return d, sqrt(vec.dot(d, d)), arm
-
-
-@kernel
-def predict_pins(belt, state, step, dt):
-    """Gaps by which pins press at the old speeds, directions and levers at q_k."""
-    thickness, height = belt.thickness, belt.pin_height
-    ahead_share, share, behind_share = contact_shares(belt, dt)
-    for j in range(state.rows):
-        ri, rj = vec.at(state, j, f.POSITION), vec.ahead(state, j, f.POSITION)
-        xi, xj = vec.at(state, j, f.HEADING), vec.ahead(state, j, f.HEADING)
-        oi, oj = vec.at(state, j, f.OUTWARD), vec.ahead(state, j, f.OUTWARD)
-        d, now, arm = pin_offset(ri, xi, oi, rj, xj, oj, thickness, height)
-        n = vec.times(1.0 / maximum(now, _LEAST), d)
-        vec.store(step, j, f.PIN_NORMAL, n)
-        vec.store(step, j, f.PIN_LEVER_I, vec.cross(arm, n))
-        vec.store(step, j, f.PIN_LEVER_J, vec.cross(vec.plus(vec.minus(ri, rj), arm), n))
-        si, sj = vec.at(step, j, f.PREDICTED_POSITION), vec.ahead(step, j, f.PREDICTED_POSITION)
-        yi, yj = vec.at(step, j, f.PREDICTED_HEADING), vec.ahead(step, j, f.PREDICTED_HEADING)
-        pi, pj = vec.at(step, j, f.PREDICTED_OUTWARD), vec.ahead(step, j, f.PREDICTED_OUTWARD)
-        _, reached, _ = pin_offset(si, yi, pi, sj, yj, pj, thickness, height)
-        bi, zi, qi = before_step(vec.screw(state, j, f.SPEED), ri, xi, oi, dt)
-        bj, zj, qj = before_step(vec.screw_ahead(state, j, f.SPEED), rj, xj, oj, dt)
-        _, before, _ = pin_offset(bi, zi, qi, bj, zj, qj, thickness, height)
-        offset = ahead_share * reached + share * now + behind_share * before
-        step[j, f.PIN_GAP] = belt.pin_clearance - offset
-        step[j, f.PIN_MEAN] = belt.pin_clearance - 0.5 * (reached + now)
-
-
-@kernel
-def pin_forces(belt, state, step, iterate, dt):
-    """Forces and their slopes of an iterate; adds to the pairs' forces."""
-    ahead_share, _, _ = contact_shares(belt, dt)
-    pressing = ahead_share * dt
-    for j in range(step.rows):
-        n = vec.at(step, j, f.PIN_NORMAL)
-        a, b = vec.at(step, j, f.PIN_LEVER_I), vec.at(step, j, f.PIN_LEVER_J)
-        wi, wj = vec.at(state, j, f.CHANGE + f.ROW_W), vec.ahead(state, j, f.CHANGE + f.ROW_W)
-        du = vec.minus(vec.at(state, j, f.CHANGE), vec.ahead(state, j, f.CHANGE))
-        parting = vec.dot(n, du) + vec.dot(a, wi) - vec.dot(b, wj)
-        gap = fma(-pressing, parting, step[j, f.PIN_GAP])
-        force, k = pressed(gap, belt.pin_stiffness)
-        state[j, f.PIN], iterate[j, f.PIN_REACHED], iterate[j, f.PIN_SLOPE] = force, gap, pressing * k
-        vec.add_screw(iterate, j, f.PAIR_I, vec.both_times(-force, (n, a)))
-        vec.add_screw(iterate, j, f.PAIR_J, vec.both_times(force, (n, b)))
+        if has_pins:
+            n = vec.at(step, j, f.PIN_NORMAL)
+            a, b = vec.at(step, j, f.PIN_LEVER_I), vec.at(step, j, f.PIN_LEVER_J)
+            du = vec.minus(vec.at(state, j, f.CHANGE), vec.ahead(state, j, f.CHANGE))
+            parting = vec.dot(n, du) + vec.dot(a, motion[1]) - vec.dot(b, motion[2])
+            gap = fma(-pressing, parting, step[j, f.PIN_GAP])
+            force, k = pressed(gap, belt.pin_stiffness)
+            state[j, f.PIN], iterate[j, f.PIN_REACHED], iterate[j, f.PIN_SLOPE] = force, gap, pressing * k
+            vec.add_screw(iterate, j, f.PAIR_I, vec.both_times(-force, (n, a)))
+            vec.add_screw(iterate, j, f.PAIR_J, vec.both_times(force, (n, b)))

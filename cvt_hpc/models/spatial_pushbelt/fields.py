@@ -33,30 +33,26 @@ POINTS = 4
 ON_LEFT, ON_RIGHT = range(2)
 
 # Fields of the state of an element. Speeds are those at the middle of the last step.
-POSITION = 0  # 3: middle of the saddle line, which is the ring line and the assumed centre of gravity [m]
-HEADING = 3  # 3: running direction x of the element, a unit vector
-OUTWARD = 6  # 3: its outward direction o, a unit vector; a = o x x is its axial one
+# 3 each: middle of the saddle line, which is the ring line and the assumed centre of gravity [m]; running
+# direction x and outward direction o of the element, unit vectors; a = o x x is its axial one
+POSITION, HEADING, OUTWARD = range(0, 9, 3)
 SLOPE = 9  # of the ring's line in the axial direction [rad]
 SPEED = 10  # 8: velocity of that point [m/s], angular velocity [rad/s], V and SLOPE_RATE
-OMEGA = SPEED + ROW_W
-V = SPEED + ROW_V  # speed of the ring's material along its line [m/s]
-SLOPE_RATE = SPEED + ROW_P  # [rad/s]
-LENGTH = 18  # unstretched length of the ring up to the next element [m]
-TENSION = 19  # of both ring packages up to the next element [N]
-SADDLE = 20  # normal force of both ring packages on the element [N]
+# OMEGA, V, SLOPE_RATE: angular velocity, speed of the ring's material along its line [m/s], [rad/s]
+OMEGA, V, SLOPE_RATE = SPEED + ROW_W, SPEED + ROW_V, SPEED + ROW_P
+# Of both ring packages up to the next element: unstretched length [m], tension, normal force on the element
+# [N]
+LENGTH, TENSION, SADDLE = range(18, 21)
 PUSH = 21  # 4: contact forces to the next element: edge left, edge right, head left, head right [N]
 PIN = 25  # force of the next element's hole on the pin [N]
-FLANK = 26  # 4: normal forces at the flanks: left low, left high, right low, right high [N]
-FLANK_SLIP_M = 30  # 4: sliding speed along the meridian of the sheave, outwards [m/s]
-FLANK_SLIP_T = 34  # 4: sliding speed in the direction of rotation, element over sheave [m/s]
-FLANK_FRICTION_M = 38  # 4: friction forces against these speeds [N]
-FLANK_FRICTION_T = 42  # 4
-FLANK_DUAL_M = 46  # 4: directions of friction as the Newton iteration has them, at most 1 in size
-FLANK_DUAL_T = 50  # 4
-V_FILTERED = 54  # 4: sliding speeds at which the friction law of the flanks is read [m/s]
-RING_SLIP = 58  # of the ring over the saddle, forwards [m/s]
-RING_FRICTION = 59  # friction force of the element against that [N]
-RING_DUAL = 60
+# 4 each, at the flanks: left low, left high, right low, right high. Normal forces [N]; sliding speeds along
+# the meridian of the sheave, outwards, and in the direction of rotation, element over sheave [m/s];
+# friction forces against these [N]; directions of friction as the Newton iteration has them, at most 1 in
+# size; sliding speeds at which the friction law is read [m/s]
+FLANK, FLANK_SLIP_M, FLANK_SLIP_T, FLANK_FRICTION_M, FLANK_FRICTION_T = range(26, 46, POINTS)
+FLANK_DUAL_M, FLANK_DUAL_T, V_FILTERED = range(46, 58, POINTS)
+# Of the ring: sliding speed over the saddle, forwards [m/s]; friction force of the element against that [N]
+RING_SLIP, RING_FRICTION, RING_DUAL = range(58, 61)
 DRIVEN = 61  # 1 where the nearer pulley is the driven one, else 0
 SPREAD = 62  # 2: deflection of the left and the right sheave beyond its bedding, along the flank's normal [m]
 BENDING = 64  # energy of the rings' bending in the plane up to the next element [J]
@@ -80,50 +76,34 @@ INPUTS = IN_DRIVEN_DRIFT + 1
 
 # values of FAILED_CONTACT
 CONTACTS = (
-    "edge left",
-    "edge right",
-    "head left",
-    "head right",
-    "pin",
-    "flank left low",
-    "flank left high",
-    "flank right low",
-    "flank right high",
-    "ring",
+    *("edge left", "edge right", "head left", "head right", "pin"),
+    *("flank left low", "flank left high", "flank right low", "flank right high", "ring"),
 )
 
 # Fields of Workspace.step. Directions and levers are at q_k where not said otherwise; PREDICTED is at q*.
-PREDICTED_POSITION = 0  # 3
-PREDICTED_HEADING = 3  # 3
-PREDICTED_OUTWARD = 6  # 3
-MID_OUTWARD = 9  # 3: at mid step
-MID_AXIAL = 12  # 3
-RING_LINE = 15  # 6: gradient of the ring's speed over an element by velocity and angular velocity
-TENSION_I = 21  # 6: direction of the tension at this element, beside 1 of V, and at the next one, beside -1
-TENSION_J = 27  # 6
-START_TENSION = 33
-TENSION_SLOPE = 34
-BENT_Y, BENT_Z = 35, 36  # force of the rings' bending in the plane on an element
-CHORD_I = 37  # 3: gradient of the pitch against the segment ahead by the velocity of the next element
-CHORD_J = 40  # 3: of that of the next element
-TURN_I = 43  # 3: by its own angular velocity
-TURN_J = 46  # 3
-START_MOMENT_I = 49  # of the pitch, at q_k and the old speeds
-START_MOMENT_J = 50
-SHEAR = 51  # of the ring at q_k [rad]
-BEND = 52  # change of its slope up to the next element at q_k [rad]
+PREDICTED_POSITION, PREDICTED_HEADING, PREDICTED_OUTWARD = range(0, 9, 3)  # 3 each
+MID_OUTWARD, MID_AXIAL = range(9, 15, 3)  # 3 each: at mid step
+# 6 each: gradient of the ring's speed over an element by velocity and angular velocity; direction of the
+# tension at this element, beside 1 of V, and at the next one, beside -1
+RING_LINE, TENSION_I, TENSION_J = range(15, 33, 6)
+START_TENSION, TENSION_SLOPE = range(33, 35)
+BENT_Y, BENT_Z = range(35, 37)  # force of the rings' bending in the plane on an element
+# 3 each: gradient of the pitch of an element and of the next one against the segment ahead, by the velocity
+# of the next element, and by their own angular velocities; moments of the pitch, at q_k and the old speeds
+CHORD_I, CHORD_J, TURN_I, TURN_J = range(37, 49, 3)
+START_MOMENT_I, START_MOMENT_J = range(49, 51)
+# At q_k: shear of the ring, and change of its slope up to the next element [rad]
+SHEAR, BEND = range(51, 53)
 YAW = 53  # 3: gradient of yaw by angular velocity
 PREDICTED_YAW = 56  # moment of the yaw spring at q_k and of its damper at the old speeds
-NORMAL_Y, NORMAL_Z = 57, 58  # across the path in the plane, of the strand or radial
-PUSH_LEVER_I = 59  # 12: rates of the gaps at the front by angular velocities
-PUSH_LEVER_J = 71  # 12
+NORMAL_Y, NORMAL_Z = range(57, 59)  # across the path in the plane, of the strand or radial
+PUSH_LEVER_I, PUSH_LEVER_J = range(
+    59, 83, 12
+)  # 12 each: rates of the gaps at the front by angular velocities
 PUSH_GAP = 83  # 4: gaps by which elements press, at the old speeds; PUSH_MEAN: those at mid step, likewise
-PIN_NORMAL = 87  # 3
-PIN_LEVER_I = 90  # 3
-PIN_LEVER_J = 93  # 3
+PIN_NORMAL, PIN_LEVER_I, PIN_LEVER_J = range(87, 96, 3)  # 3 each
 PIN_GAP = 96
-RADIAL = 97  # 12: e_r of the flanks' points
-MID_RADIAL = 109  # 12: at mid step
+RADIAL, MID_RADIAL = range(97, 121, 12)  # 12 each: e_r of the flanks' points, and at mid step
 MID_RADIUS = 121  # 4
 FLANK_GAP = 125  # 4: in the plane at q_k, along the axis at q*, without opening of the sheaves
 INERTIA = 129  # 6: mass of element and ring over the step, by velocities, the upper half by columns,
@@ -139,62 +119,54 @@ STEP_FIELDS = LAST_SPREAD + 2
 
 # Fields of Workspace.iterate
 ITERATE_TENSION = 0
-PAIR_I = 1  # 8: forces between an element and the next one, on this one and on that one
-PAIR_J = 9  # 8
-STIFF = 17  # sums of the slopes of contacts at the front: 1, levers, and products of levers
-STIFF_I = 18  # 3
-STIFF_J = 21  # 3
-STIFF_II = 24  # 6: upper half by columns
-STIFF_JJ = 30  # 6
-STIFF_IJ = 36  # 9: by columns
+PAIR_I, PAIR_J = range(1, 17, SIZE)  # 8 each: forces to the next element, on this one and on that one
+# Sums of the slopes of contacts at the front: 1, levers (3 each), and products of levers, the upper half by
+# columns (6 each), STIFF_IJ by columns (9)
+STIFF, STIFF_I, STIFF_J = 17, 18, 21
+STIFF_II, STIFF_JJ, STIFF_IJ = range(24, 42, 6)
 PIN_SLOPE = 45
-PUSH_REACHED = 46  # 4: gaps by which contacts press [m]
-PIN_REACHED = 50
-FLANK_REACHED = 51  # 4
+# Gaps by which contacts press [m]
+PUSH_REACHED, PIN_REACHED, FLANK_REACHED = 46, 50, 51  # 4, 1, 4
 RING_SLOPE = 55  # decrease of the ring's friction by its slip
 BY_NORMAL = 56  # 12: forces of the flanks' points by their normal forces
 YIELD = 68  # 4: decrease of normal forces by the opening of the sheaves
-SLOPE_MM, SLOPE_MT, SLOPE_TM, SLOPE_TT = range(
-    72, 88, POINTS
-)  # 4 each: of friction forces M, T by slips M, T
+# 4 each: of friction forces M, T by slips M, T
+SLOPE_MM, SLOPE_MT, SLOPE_TM, SLOPE_TT = range(72, 88, POINTS)
 RESIDUAL = 88  # 8
-TORQUE_ROW = 96  # 6: decrease of the driven pulley's torque by the speeds of an element, and by their own
-TORQUE_OWN = 102  # by the speed of the pulley,
-TORQUE_OPENING = 103  # and by the opening of the sheaves
-NORMAL_ROW = 104  # 6: decrease of a flank's axial force by the speeds of an element,
-NORMAL_YIELD = 110  # and by the opening of the sheaves
+# Decrease of the driven pulley's torque by the speeds of an element, and by their own (6); by the speed of
+# the pulley, and by the opening of the sheaves
+TORQUE_ROW, TORQUE_OWN, TORQUE_OPENING = 96, 102, 103
+# Decrease of a flank's axial force by the speeds of an element (6), and by the opening of the sheaves
+NORMAL_ROW, NORMAL_YIELD = 104, 110
 ITERATE_FIELDS = 111
 
-# Fields of the state with two flows behind those of one flow; the first is the change of w in the last step
-CHANGE_OF_HALF = CHANGE + ROW_HALF
-HALF_SPEED = STATE_FIELDS + 1  # w, half of the right package's speed less the left one's [m/s]
-HALF_LENGTH = HALF_SPEED + 1  # half of the right package's unstretched length less the left one's [m]
-TENSION_DIFFERENCE = HALF_LENGTH + 1  # D, the right package's tension less the left one's [N]
-HALF_SLIP = TENSION_DIFFERENCE + 1  # delta, half of the right package's slip less the left one's [m/s]
-FRICTION_DIFFERENCE = HALF_SLIP + 1  # of the elements on the right package, less that on the left one [N]
-SADDLE_RIGHT, SADDLE_LEFT = FRICTION_DIFFERENCE + 1, FRICTION_DIFFERENCE + 2  # normal forces of each [N]
-DUAL_RIGHT, DUAL_LEFT = SADDLE_LEFT + 1, SADDLE_LEFT + 2
-WIDE_STATE_FIELDS = DUAL_LEFT + 1
+# Fields of the state with two flows behind those of one flow
+CHANGE_OF_HALF = CHANGE + ROW_HALF  # of w in the last step
+# w, half of the right package's speed less the left one's [m/s]; the same half of the unstretched lengths
+# [m]; D, the right package's tension less the left one's [N]; delta, half of the right package's slip less
+# the left one's [m/s]; friction of the elements on the right package, less that on the left one [N]
+(HALF_SPEED, HALF_LENGTH, TENSION_DIFFERENCE, HALF_SLIP, FRICTION_DIFFERENCE) = range(
+    STATE_FIELDS + 1, STATE_FIELDS + 6
+)
+# Normal forces of each package [N], directions of its friction
+SADDLE_RIGHT, SADDLE_LEFT, DUAL_RIGHT, DUAL_LEFT = range(STATE_FIELDS + 6, STATE_FIELDS + 10)
+WIDE_STATE_FIELDS = STATE_FIELDS + 10
 
 # Fields of Workspace.step behind those of one flow. Directions have six numbers, by velocity and angular
 # velocity; beside them laws of both packages together have 1 of v, and laws of their difference 1 of w.
-SLIP_BY = STEP_FIELDS  # gradient of sigma, and of delta
-HALF_SLIP_BY = SLIP_BY + 6
-DIFFERENCE_I = (
-    HALF_SLIP_BY + 6
-)  # direction of D at this element, and at the next one, where D acts against it
-DIFFERENCE_J = DIFFERENCE_I + 6
-TENSION_BEHIND = DIFFERENCE_J + 6  # of the element behind TENSION_J
-DIFFERENCE_BEHIND = TENSION_BEHIND + 6  # and DIFFERENCE_J
-START_DIFFERENCE = DIFFERENCE_BEHIND + 6
+# 6 each: gradient of sigma, and of delta; direction of D at this element, and at the next one, where D acts
+# against it; TENSION_J and DIFFERENCE_J of the element behind
+(SLIP_BY, HALF_SLIP_BY, DIFFERENCE_I, DIFFERENCE_J, TENSION_BEHIND, DIFFERENCE_BEHIND) = range(
+    STEP_FIELDS, STEP_FIELDS + 36, 6
+)
+START_DIFFERENCE = STEP_FIELDS + 36
 CROSS_SLOPE = START_DIFFERENCE + 1  # of T by D's direction and of D by T's; TENSION_SLOPE is their own
 WIDE_STEP_FIELDS = CROSS_SLOPE + 1
 
-# Fields of Workspace.iterate behind those of one flow
-ITERATE_DIFFERENCE = ITERATE_FIELDS
-SLOPE_DIFFERENCE = ITERATE_DIFFERENCE + 1  # RING_SLOPE is the sum of both packages' slopes
-HALF_RESIDUAL = SLOPE_DIFFERENCE + 1  # of the equation of w
-WIDE_ITERATE_FIELDS = HALF_RESIDUAL + 1
+# Fields of Workspace.iterate behind those of one flow: D; difference of both packages' slopes, of which
+# RING_SLOPE is the sum; residual of the equation of w
+ITERATE_DIFFERENCE, SLOPE_DIFFERENCE, HALF_RESIDUAL = range(ITERATE_FIELDS, ITERATE_FIELDS + 3)
+WIDE_ITERATE_FIELDS = ITERATE_FIELDS + 3
 
 
 def vector(first: int) -> slice:

@@ -10,28 +10,21 @@ k, and the direction of rotation e_t = k x e_r. The force on the element is N n 
 e_t, against the speeds of Q over the sheave in these directions. Slip speeds take directions and the lever
 of Q at mid step: at either end of a step they would add false sliding of v phi' dt / 2 and of lever times
 omega^2 dt / 2.
-
-What the laws of a step take from the motion, in lanes: losses, and what the step damps by itself.
-
-As in the planar pushbelt (`models.pushbelt.border`, which derives it) a force takes its magnitude times the
-mean rate (X + X_old) / 2 along its direction. Bending of the rings and springs of pitch and yaw damp nothing.
 """
 
-import numpy as np
 from numba.extending import register_jitable
 
 from cvt_hpc.kernels import kernel
 from cvt_hpc.lanes import fma, like, sqrt
 from cvt_hpc.models.pushbelt import fields as planar
-from cvt_hpc.models.pushbelt.border import add_to_totals, book_contacts, of_pulley, opening_of
-from cvt_hpc.models.pushbelt.chain import BETA, contact_shares, ring_share
+from cvt_hpc.models.pushbelt.border import of_pulley
+from cvt_hpc.models.pushbelt.chain import BETA
 from cvt_hpc.models.pushbelt.friction import flank_friction
 from cvt_hpc.models.pushbelt.local_bending import axial_excess, spread_bending
 from cvt_hpc.models.spatial_pushbelt import fields as f
-from cvt_hpc.models.spatial_pushbelt import flank
 from cvt_hpc.models.spatial_pushbelt import vectors as vec
-from cvt_hpc.models.spatial_pushbelt.chain import motion, motion_ahead, ring_slip, shortening
-from cvt_hpc.physics.contact_laws import pressed, taken
+from cvt_hpc.models.spatial_pushbelt.chain import motion
+from cvt_hpc.physics.contact_laws import pressed
 
 
 @register_jitable
@@ -66,12 +59,8 @@ def frustum_gap(belt, side, radius, along, groove, middle):
 @register_jitable
 def pulley_axis(belt, driven):
     """Axis of the pulley of an element."""
-    axes = belt.axes
-    return (
-        axes[0, 0] + driven * (axes[1, 0] - axes[0, 0]),
-        axes[0, 1] + driven * (axes[1, 1] - axes[0, 1]),
-        axes[0, 2] + driven * (axes[1, 2] - axes[0, 2]),
-    )
+    one, other = vec.at(belt.axes, 0, 0), vec.at(belt.axes, 1, 0)
+    return vec.plus(one, vec.times(driven, vec.minus(other, one)))
 
 
 @register_jitable
@@ -124,9 +113,8 @@ def predict_flanks(belt, state, pulleys, step, dt):
             side, height, width = flank_point(belt, p)
             radial, start, _ = frustum(vec.plus(r, lever_of(o, a, side, height, width)), centre, axis)
             vec.store(step, j, f.RADIAL + 3 * p, radial)
-            radial, radius, _ = frustum(
-                vec.plus(half, lever_of(half_o, half_a, side, height, width)), centre, axis
-            )
+            at_half = vec.plus(half, lever_of(half_o, half_a, side, height, width))
+            radial, radius, _ = frustum(at_half, centre, axis)
             vec.store(step, j, f.MID_RADIAL + 3 * p, radial)
             step[j, f.MID_RADIUS + p] = radius
             _, _, along = frustum(vec.plus(s, lever_of(po, pa, side, height, width)), centre, axis)
@@ -144,32 +132,38 @@ def _opening(belt, increments, openings, shapes, driven, j):
     return belt.cosine * opening
 
 
-@kernel
-def bend_sheaves(belt, state, increments, openings, shapes, step, iterate, bent, dt):
-    """Set what local bending spreads on both sides; other arguments as of `flank_forces`.
+@register_jitable
+def _reached_gap(belt, step, j, p, axis, lever, opening, change, dt):
+    """Gap of a point in an iterate without spread [m], and n, m and e_t at q_k."""
+    (du, dw), (side, _, _) = change, flank_point(belt, p)
+    n, m, t = flank_directions(belt, vec.at(step, j, f.RADIAL + 3 * p), axis, side)
+    rate = vec.dot(mean_normal(belt, n, axis, side), vec.plus(du, vec.cross(dw, lever)))
+    return fma(dt, rate, step[j, f.FLANK_GAP + p] + opening), n, m, t
 
-    `bent` is work space of `spread_bending`.
-    """
+
+@kernel
+def bend_sheaves(belt, state, work, dt):
+    """Set what local bending spreads on both sides."""
+    elements, step, iterate = state.elements, work.step, work.iterate
+    increments, openings, shapes = state.increments, state.openings, work.shapes
     if belt.local_compliance == 0.0:
         return
     for j in range(step.rows):
-        driven = state[j, f.DRIVEN]
+        driven = elements[j, f.DRIVEN]
         axis, opening = pulley_axis(belt, driven), _opening(belt, increments, openings, shapes, driven, j)
-        du, dw = vec.screw(state, j, f.CHANGE)
-        o = vec.at(state, j, f.OUTWARD)
-        a = vec.cross(o, vec.at(state, j, f.HEADING))
+        change = vec.screw(elements, j, f.CHANGE)
+        o = vec.at(elements, j, f.OUTWARD)
+        a = vec.cross(o, vec.at(elements, j, f.HEADING))
         for p in range(f.POINTS):
-            side, height, width = flank_point(belt, p)
-            n, _, _ = flank_directions(belt, vec.at(step, j, f.RADIAL + 3 * p), axis, side)
-            turned = vec.plus(du, vec.cross(dw, lever_of(o, a, side, height, width)))
-            rate = vec.dot(mean_normal(belt, n, axis, side), turned)
-            iterate[j, f.FLANK_REACHED + p] = -fma(dt, rate, step[j, f.FLANK_GAP + p] + opening)
+            lever = lever_of(o, a, *flank_point(belt, p))
+            gap, _, _, _ = _reached_gap(belt, step, j, p, axis, lever, opening, change, dt)
+            iterate[j, f.FLANK_REACHED + p] = -gap
     bend = belt.local_compliance, 0.5 * belt.flank_stiffness, belt.local_decay
     depths = iterate.data[:, f.FLANK_REACHED : f.FLANK_REACHED + f.POINTS]
-    on_driven = state.data[:, f.DRIVEN]
-    left, right = state.data[:, f.SPREAD + f.ON_LEFT], state.data[:, f.SPREAD + f.ON_RIGHT]
-    spread_bending(on_driven, depths[:, : f.RIGHT_LOW], left, bent, *bend)
-    spread_bending(on_driven, depths[:, f.RIGHT_LOW :], right, bent, *bend)
+    on_driven = elements.data[:, f.DRIVEN]
+    left, right = elements.data[:, f.SPREAD + f.ON_LEFT], elements.data[:, f.SPREAD + f.ON_RIGHT]
+    spread_bending(on_driven, depths[:, : f.RIGHT_LOW], left, work.bent, *bend)
+    spread_bending(on_driven, depths[:, f.RIGHT_LOW :], right, work.bent, *bend)
 
 
 @kernel
@@ -186,7 +180,7 @@ def flank_forces(belt, state, pulleys, increments, openings, shapes, step, itera
         axis = pulley_axis(belt, driven)
         rotation = of_pulley(driving_speed, driven_speed, driven)
         opening = _opening(belt, increments, openings, shapes, driven, j)
-        du, dw = vec.screw(state, j, f.CHANGE)
+        change = vec.screw(state, j, f.CHANGE)
         u, omega = motion(state, j, 1.0)
         o = vec.at(state, j, f.OUTWARD)
         a = vec.cross(o, vec.at(state, j, f.HEADING))
@@ -199,19 +193,16 @@ def flank_forces(belt, state, pulleys, increments, openings, shapes, step, itera
                 left, force = force, nothing
             side, height, half_width = flank_point(belt, p)
             lever = lever_of(o, a, side, height, half_width)
-            n, m, t = flank_directions(belt, vec.at(step, j, f.RADIAL + 3 * p), axis, side)
-            rate = vec.dot(mean_normal(belt, n, axis, side), vec.plus(du, vec.cross(dw, lever)))
-            gap = fma(dt, rate, step[j, f.FLANK_GAP + p] + opening) + state[j, f.SPREAD + p // 2]
+            gap, n, m, t = _reached_gap(belt, step, j, p, axis, lever, opening, change, dt)
+            gap = gap + state[j, f.SPREAD + p // 2]
             normal, stiff = pressed(gap, stiffness)
             iterate[j, f.FLANK_REACHED + p], iterate[j, f.YIELD + p] = gap, stiff
 
             half = lever_of(half_o, half_a, side, height, half_width)
             _, half_m, half_t = flank_directions(belt, vec.at(step, j, f.MID_RADIAL + 3 * p), axis, side)
             q = vec.plus(u, vec.cross(omega, half))
-            along, around_it = (
-                vec.dot(half_m, q),
-                fma(-step[j, f.MID_RADIUS + p], rotation, vec.dot(half_t, q)),
-            )
+            along, around_it = vec.dot(half_m, q), vec.dot(half_t, q)
+            around_it = fma(-step[j, f.MID_RADIUS + p], rotation, around_it)
             earlier = state[j, f.FLANK_SLIP_M + p], state[j, f.FLANK_SLIP_T + p]
             dual = state[j, f.FLANK_DUAL_M + p], state[j, f.FLANK_DUAL_T + p]
             slip = along, around_it
@@ -255,9 +246,8 @@ def _point_slopes(belt, step, iterate, j, p, axes, dt):
 @register_jitable
 def _by(forces, rows, k):
     """The forces times entry k of their rows; k is a plain number of the source."""
-    return vec.moved(
-        vec.moved(vec.times(rows[0][k], forces[0]), rows[1][k], forces[1]), rows[2][k], forces[2]
-    )
+    two = vec.moved(vec.times(rows[0][k], forces[0]), rows[1][k], forces[1])
+    return vec.moved(two, rows[2][k], forces[2])
 
 
 @register_jitable
@@ -327,22 +317,20 @@ def _border_of_side(belt, step, iterate, j, p, points, driven, dt):
 
 
 @kernel
-def add_flank_blocks(belt, state, shapes, step, iterate, blocks, dt):
+def add_flank_blocks(belt, state, work, dt):
     """Add the slopes to the blocks, set the right sides of the border's unknowns and its rows."""
+    elements, step, iterate = state.elements, work.step, work.iterate
+    blocks, shapes = work.narrow, work.shapes
     modes = belt.modal_stiffness.shape[1]
     for j in range(step.rows):
-        driven = state[j, f.DRIVEN]
-        o = vec.at(state, j, f.OUTWARD)
-        a = vec.cross(o, vec.at(state, j, f.HEADING))
+        driven = elements[j, f.DRIVEN]
+        o = vec.at(elements, j, f.OUTWARD)
+        a = vec.cross(o, vec.at(elements, j, f.HEADING))
         axes = pulley_axis(belt, driven), o, a, vec.at(step, j, f.MID_OUTWARD), vec.at(step, j, f.MID_AXIAL)
-        left = (
-            _point_slopes(belt, step, iterate, j, f.LEFT_LOW, axes, dt),
-            _point_slopes(belt, step, iterate, j, f.LEFT_HIGH, axes, dt),
-        )
-        right = (
-            _point_slopes(belt, step, iterate, j, f.RIGHT_LOW, axes, dt),
-            _point_slopes(belt, step, iterate, j, f.RIGHT_HIGH, axes, dt),
-        )
+        low = _point_slopes(belt, step, iterate, j, f.LEFT_LOW, axes, dt)
+        left = low, _point_slopes(belt, step, iterate, j, f.LEFT_HIGH, axes, dt)
+        low = _point_slopes(belt, step, iterate, j, f.RIGHT_LOW, axes, dt)
+        right = low, _point_slopes(belt, step, iterate, j, f.RIGHT_HIGH, axes, dt)
         _add_columns(blocks, j, 0, left, right)
         _add_columns(blocks, j, 1, left, right)
         _add_columns(blocks, j, 2, left, right)
@@ -366,108 +354,3 @@ def add_flank_blocks(belt, state, shapes, step, iterate, blocks, dt):
             vec.store_screw(blocks, j, right_side, vec.both_times(pulley * shapes[j, k % modes], give))
             blocks[j, right_side + f.ROW_V] = 0.0
             blocks[j, right_side + f.ROW_P] = 0.0
-
-
-@kernel
-def book_pairs(belt, state, work, dt):
-    """Add to the totals what a solved step takes between elements and in the rings, before it is accepted."""
-    elements, step, iterate, scratch = state.elements, work.step, work.iterate, work.scratch
-    has_pins = belt.pin_clearance < np.inf
-    contact = 0.5 * belt.contact_stiffness
-    ahead_share, _, _ = contact_shares(belt, dt)
-    half_ahead = 0.5 / ahead_share
-    damper = belt.ring_time / ring_share(belt, dt)
-    ring = tilt = drag = between = stretching = like(0.0, elements[0, f.FLANK])
-    for j in range(step.rows):
-        (du, dw), (ju, jw) = vec.screw(elements, j, f.CHANGE), vec.screw_ahead(elements, j, f.CHANGE)
-        (u, w), (next_u, next_w) = motion(elements, j, 0.5), motion_ahead(elements, j, 0.5)
-        stretch = shortening(elements, step, j, 0.5)
-        more = 0.5 * (step[j, f.START_TENSION] - iterate[j, f.ITERATE_TENSION])
-        stretching += damper * stretch * (step[j, f.TENSION_SLOPE] * stretch + more)
-
-        apart, more = vec.minus(next_u, u), vec.minus(ju, du)
-        chord_i, chord_j = vec.at(step, j, f.CHORD_I), vec.at(step, j, f.CHORD_J)
-        turn_i, turn_j = vec.at(step, j, f.TURN_I), vec.at(step, j, f.TURN_J)
-        rate_i, rate_j = (
-            vec.dot(chord_i, apart) + vec.dot(turn_i, w),
-            vec.dot(chord_j, apart) + vec.dot(turn_j, next_w),
-        )
-        last_i = rate_i + 0.5 * (vec.dot(chord_i, more) + vec.dot(turn_i, dw))
-        last_j = rate_j + 0.5 * (vec.dot(chord_j, more) + vec.dot(turn_j, jw))
-        tilt += 0.5 * belt.angle_damping * (last_i * rate_i + last_j * rate_j)
-        y = vec.at(step, j, f.YAW)
-        yaw = vec.dot(y, w) - elements[j, f.SLOPE_RATE] - 0.5 * elements[j, f.CHANGE + f.ROW_P]
-        last = yaw + 0.5 * (vec.dot(y, dw) - elements[j, f.CHANGE + f.ROW_P])
-        tilt += belt.yaw_damping * yaw * last
-
-        closing = vec.dot(vec.ahead(elements, j, f.HEADING), apart)
-        for p in range(f.POINTS):
-            a, b = vec.at(step, j, f.PUSH_LEVER_I + 3 * p), vec.at(step, j, f.PUSH_LEVER_J + 3 * p)
-            change = dt * (closing + vec.dot(a, w) + vec.dot(b, next_w))
-            gap = half_ahead * (iterate[j, f.PUSH_REACHED + p] - step[j, f.PUSH_GAP + p])
-            gap = step[j, f.PUSH_MEAN + p] + gap - 0.5 * change
-            between += taken(gap, change, contact, elements[j, f.PUSH + p])
-        if has_pins:
-            a, b = vec.at(step, j, f.PIN_LEVER_I), vec.at(step, j, f.PIN_LEVER_J)
-            change = dt * (vec.dot(vec.at(step, j, f.PIN_NORMAL), apart) - vec.dot(a, w) + vec.dot(b, next_w))
-            gap = half_ahead * (iterate[j, f.PIN_REACHED] - step[j, f.PIN_GAP])
-            gap = step[j, f.PIN_MEAN] + gap - 0.5 * change
-            between += taken(gap, change, belt.pin_stiffness, elements[j, f.PIN])
-
-        ring += elements[j, f.RING_FRICTION] * ring_slip(elements, step, j, 0.5)
-        n_y, n_z = step[j, f.NORMAL_Y], step[j, f.NORMAL_Z]
-        across = n_y * u[0] + n_z * u[1]
-        drag += belt.transverse_damping * across * (across + 0.5 * (n_y * du[0] + n_z * du[1]))
-        drag += belt.lateral_damping * u[2] * (u[2] + 0.5 * du[2])
-    add_to_totals(state, scratch, planar.RING_LOSS, dt * ring)
-    add_to_totals(state, scratch, planar.DAMPING_LOSS, dt * tilt)
-    add_to_totals(state, scratch, planar.BELT_LOSS, dt * drag)
-    book_contacts(belt, state, scratch, between, dt)
-    add_to_totals(state, scratch, planar.STRETCH_LOSS, dt * stretching)
-
-
-@kernel
-def book_weight(belt, state, work, dt):
-    """Add the work of the weight to the totals."""
-    elements, step = state.elements, work.step
-    falling = like(0.0, elements[0, f.FLANK])
-    for j in range(step.rows):
-        u, w = motion(elements, j, 0.5)
-        v = elements[j, f.V] + 0.5 * elements[j, f.CHANGE + f.ROW_V]
-        mass, coupling = vec.symmetric(step, j, f.INERTIA), vec.matrix(step, j, f.INERTIA_UW)
-        falling -= vec.of_symmetric(mass, u)[1] + vec.of_matrix(coupling, w)[1]
-        falling -= belt.ring_mass / dt * vec.at(step, j, f.RING_LINE)[1] * v
-    # inertia is that of a step, divided by it
-    add_to_totals(state, work.scratch, planar.GRAVITY_WORK, dt * dt * belt.gravity * falling)
-
-
-@kernel
-def book_flanks(belt, state, work, dt):
-    """Add to the totals what a solved step takes at the flanks, before it is accepted."""
-    elements, step, iterate, scratch = state.elements, work.step, work.iterate, work.scratch
-    driving_speed = state.pulleys[planar.DRIVING_SPEED]
-    driven_speed = state.pulleys[planar.DRIVEN_SPEED] + 0.5 * state.increments[0]
-    rubbed = sheaves = like(0.0, elements[0, f.FLANK])
-    for j in range(step.rows):
-        u, w = motion(elements, j, 0.5)
-        driven = elements[j, f.DRIVEN]
-        axis = flank.pulley_axis(belt, driven)
-        rotation = of_pulley(driving_speed, driven_speed, driven)
-        o = vec.at(elements, j, f.OUTWARD)
-        a = vec.cross(o, vec.at(elements, j, f.HEADING))
-        opening = opening_of(belt, state, work, j, driven)
-        for p in range(f.POINTS):
-            side, height, width = flank.flank_point(belt, p)
-            lever = flank.lever_of(o, a, side, height, width)
-            n, m, t = flank.flank_directions(belt, vec.at(step, j, f.RADIAL + 3 * p), axis, side)
-            q = vec.plus(u, vec.cross(w, lever))
-            around_it, radius = vec.dot(t, q), step[j, f.MID_RADIUS + p]
-            rubbed += elements[j, f.FLANK_FRICTION_M + p] * vec.dot(m, q)
-            rubbed += elements[j, f.FLANK_FRICTION_T + p] * (around_it - radius * rotation)
-            change = dt * vec.dot(n, q) + belt.cosine * opening
-            change += elements[j, f.SPREAD + p // 2] - step[j, f.LAST_SPREAD + p // 2]
-            # the mean gap, of which the axial part that is reached is ahead
-            gap = iterate[j, f.FLANK_REACHED + p] + dt * side * belt.cosine * vec.dot(axis, q)
-            sheaves += taken(gap, change, 0.5 * belt.flank_stiffness, elements[j, f.FLANK + p])
-    add_to_totals(state, scratch, planar.FLANK_LOSS, dt * rubbed)
-    add_to_totals(state, scratch, planar.FLANK_DAMPED, sheaves)

@@ -29,6 +29,10 @@ def _of_strips(parameters: Parameters) -> float:
     return p["bending_share"] * p["ring_stiffness"] * p["strip_width"] ** 2 / 12.0
 
 
+def _small_angle(description: str) -> Parameter:
+    return Parameter(0.0, "rad", description, minimum=-0.02, maximum=0.02, sensible=(1e-6, 0.02))
+
+
 _CHANGED: dict[str, Parameter] = {
     "nose_clearance": replace(
         pushbelt.PARAMETERS["belt"]["nose_clearance"],
@@ -52,33 +56,21 @@ _SCENE: dict[str, Parameter] = {
         maximum=0.01,
         sensible=(1e-6, 5e-3),
     ),
-    "aligned_ratio": Parameter(
+    "aligned_ratio": positive(
         None,
         "",
         "ratio without misalignment, in the place of misalignment, which follows at each ratio",
-        minimum=0.0,
-        exclusive=True,
         gives=Substitute(
             "misalignment",
             ("ratio", "driven_radius", "centre_distance", "half_wedge_angle", *LOOSE_SIDES),
             _offset,
         ),
     ),
-    "axis_tilt": Parameter(
-        0.0,
-        "rad",
-        "angle of the driven axis against the driving one, its right end away from the driving pulley",
-        minimum=-0.02,
-        maximum=0.02,
-        sensible=(1e-6, 0.02),
+    "axis_tilt": _small_angle(
+        "angle of the driven axis against the driving one, its right end away from the driving pulley"
     ),
-    "axis_skew": Parameter(
-        0.0,
-        "rad",
-        "angle of the driven axis out of the plane of both, its right end towards the upper strand",
-        minimum=-0.02,
-        maximum=0.02,
-        sensible=(1e-6, 0.02),
+    "axis_skew": _small_angle(
+        "angle of the driven axis out of the plane of both, its right end towards the upper strand"
     ),
     "disturbance": replace(
         SCENE["disturbance"],
@@ -110,12 +102,10 @@ _BELT: dict[str, Parameter] = {
     "lateral_bending_stiffness": positive(
         47.6, "N m^2", "lateral bending stiffness EI of all rings", sensible=(0.01, 1e4)
     ),
-    "bending_share": Parameter(
+    "bending_share": positive(
         None,
         "",
         "share of EA w^2 / 12, which rings of strip_width have, in the place of lateral_bending_stiffness",
-        minimum=0.0,
-        exclusive=True,
         gives=Substitute("lateral_bending_stiffness", ("ring_stiffness", "strip_width"), _of_strips),
     ),
     "lateral_shear_stiffness": positive(
@@ -228,15 +218,11 @@ def _off_the_cone(p: Parameters, ratio: float) -> list[tuple[str, str, str]]:
     known = ""
     if room == height:
         known = ", an element's height beyond the belt unless inner_radius and outer_radius are given"
-    return [
-        (
-            key,
-            f"at most {limit:.3g} m{what}, so that flanks meet the sheaves' faces{known}",
-            f"{size:.3g} m{at}",
-        )
-        for key, (size, limit, what) in found.items()
-        if size > limit
-    ][:1]
+    for key, (size, limit, what) in found.items():
+        if size > limit:
+            expected = f"at most {limit:.3g} m{what}, so that flanks meet the sheaves' faces{known}"
+            return [(key, expected, f"{size:.3g} m{at}")]
+    return []
 
 
 def inert(parameters: Parameters) -> dict[str, str]:

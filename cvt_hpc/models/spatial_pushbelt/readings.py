@@ -7,57 +7,56 @@ the next element edge left, edge right, head left, head right (`belt`).
 import numpy as np
 
 from cvt_hpc.models.pushbelt import fields as planar
+from cvt_hpc.models.pushbelt.belt import of_lanes
 from cvt_hpc.models.pushbelt.readings import PROFILES as PLANAR_PROFILES
 from cvt_hpc.models.pushbelt.readings import SCALARS as PLANAR_SCALARS
 from cvt_hpc.models.pushbelt.readings import OnPath, Readings
 from cvt_hpc.models.spatial_pushbelt import fields
-from cvt_hpc.models.spatial_pushbelt.belt import Belt
+from cvt_hpc.models.spatial_pushbelt.belt import Belt, BeltState
 from cvt_hpc.variator import PULLEYS, STRANDS
 
 SIDES = ("left", "right")
 SHEAVES = tuple(f"{pulley} {side}" for pulley in PULLEYS for side in SIDES)
 ANGLES = ("roll", "yaw", "pitch")
-EXTREMES = (*ANGLES, "nose_force")  # the largest of any element
+_EXTREMES = (*ANGLES, "nose_force")  # the largest of any element
 LATERAL = tuple(f"{strand}_lateral" for strand in STRANDS)  # where probes have lateral displacement
 SCALARS = (
     *PLANAR_SCALARS,
     *(f"sheave_force {sheave}" for sheave in SHEAVES),
     *(f"sheave_loss {sheave}" for sheave in SHEAVES),
     "axial_offset",
-    *(f"extreme_{what}" for what in EXTREMES),
+    *(f"extreme_{what}" for what in _EXTREMES),
     *(f"tension_difference {strand}" for strand in STRANDS),
 )
 _LEAST_FORCE = 1e-9  # [N]: what presses less does not press
-_FLANK = "mean line force of the flank"
+_FLANK, _PRESSED = "mean line force of the flank", "mean of its points that are pressed"
+
+
+def _of_sides(name: str, words: str, units: str, comment: str) -> dict[str, tuple[str, str, str]]:
+    """A profile of each side of the elements."""
+    return {name.format(k): (words.format(k), units, comment.format(k)) for k in SIDES}
+
+
 PROFILES = {
     **PLANAR_PROFILES,
-    **{f"contact_force_{side}": (f"contact force {side}", "N m-1", _FLANK) for side in SIDES},
-    **{
-        f"outer_contact_force_{side}": (f"contact force {side} outside", "N m-1", f"{_FLANK}'s outer point")
-        for side in SIDES
-    },
-    **{
-        f"{name}_{side}": (f"{words} {side}", "N m-1", f"{_FLANK}, against sliding {way}")
-        for name, words, way in (
-            ("radial_friction", "friction along the meridian", "outwards"),
-            ("tangential_friction", "friction along the belt", "forwards"),
-        )
-        for side in SIDES
-    },
-    **{
-        f"{name}_{side}": (f"{words} {side}", "m s-1", f"mean of its points that are pressed, {way}")
-        for name, words, way in (
-            ("radial_slip", "radial sliding of the flank", "outwards; 0 where none is"),
-            ("flank_slip", "sliding of the flank", "forwards over the sheave; 0 where none is"),
-        )
-        for side in SIDES
-    },
-    **{f"push_force_{side}": (f"push force {side}", "N", "mean, at rocking edge and head") for side in SIDES},
+    **_of_sides("contact_force_{}", "contact force {}", "N m-1", _FLANK),
+    **_of_sides("outer_contact_force_{}", "contact force {} outside", "N m-1", f"{_FLANK}'s outer point"),
+    **_of_sides(
+        "radial_friction_{}", "friction along the meridian {}", "N m-1", f"{_FLANK}, against sliding outwards"
+    ),
+    **_of_sides(
+        "tangential_friction_{}", "friction along the belt {}", "N m-1", f"{_FLANK}, against sliding forwards"
+    ),
+    **_of_sides(
+        "radial_slip_{}", "radial sliding of the flank {}", "m s-1", f"{_PRESSED}, outwards; 0 where none is"
+    ),
+    **_of_sides(
+        *("flank_slip_{}", "sliding of the flank {}", "m s-1"),
+        f"{_PRESSED}, forwards over the sheave; 0 where none is",
+    ),
+    **_of_sides("push_force_{}", "push force {}", "N", "mean, at rocking edge and head"),
     "head_force": ("push force at the heads", "N", "mean"),
-    **{
-        f"head_force_{side}": (f"push force at {side} head", "N", f"mean, part of push_force_{side}")
-        for side in SIDES
-    },
+    **_of_sides("head_force_{}", "push force at {} head", "N", "mean, part of push_force_{}"),
     "lateral_position": ("lateral position", "m", "mean, to the right"),
     "roll": ("roll of elements", "rad", "mean, heads to the right"),
     "yaw": ("yaw of elements", "rad", "mean, running to the right"),
@@ -93,11 +92,11 @@ def angles(elements: np.ndarray) -> np.ndarray:
 
 
 class Reading:
-    """Readings of one sample: of elements in the order of the belt, of pulleys and of loads (`BeltState`)."""
+    """Readings of the sample that a state has reached."""
 
-    def __init__(self, where: Readings, elements: np.ndarray, pulleys: np.ndarray, loads: np.ndarray) -> None:
-        e = elements
-        self._where, self._elements, self._pulleys, self._loads = where, e, pulleys, loads
+    def __init__(self, where: Readings[Belt], state: BeltState) -> None:
+        self._where, self._pulleys, self._loads = where, state.pulleys, state.loads
+        self._elements = e = of_lanes(state.elements)
         self._position, self._x, self._o = (
             _vectors(e, k) for k in (fields.POSITION, fields.HEADING, fields.OUTWARD)
         )
@@ -160,16 +159,9 @@ class Reading:
         With two flows OF_TWO_FLOWS come before the number.
         """
         e, pitch = self._elements, self._where.pitch
-        normal, grip_m, grip_t, slip_m, slip_t = (
-            _points(e, k)
-            for k in (
-                fields.FLANK,
-                fields.FLANK_FRICTION_M,
-                fields.FLANK_FRICTION_T,
-                fields.FLANK_SLIP_M,
-                fields.FLANK_SLIP_T,
-            )
-        )
+        at_flanks = fields.FLANK, fields.FLANK_FRICTION_M, fields.FLANK_FRICTION_T
+        normal, grip_m, grip_t = (_points(e, k) for k in at_flanks)
+        slip_m, slip_t = _points(e, fields.FLANK_SLIP_M), _points(e, fields.FLANK_SLIP_T)
         pairs = [slice(0, 2), slice(2, 4)]
         rows = [
             self._push.sum(axis=1),

@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from collections.abc import Mapping, Sequence
+from collections.abc import Sequence
 from dataclasses import replace
 from functools import partial
 from typing import TYPE_CHECKING, Any
@@ -11,11 +11,12 @@ import numpy as np
 
 from cvt_hpc.models.pushbelt import record as pushbelt
 from cvt_hpc.models.spatial_pushbelt import readings
+from cvt_hpc.parameters import Parameters
 from cvt_hpc.physics.out_of_plane import clamped_force
 from cvt_hpc.variables import Coordinate, Variable, together
 from cvt_hpc.variator import PULLEYS, STRANDS, judging
 from cvt_hpc.variator.history import REGIONS, regions
-from cvt_hpc.variator.variables import Measured, each_strand, means
+from cvt_hpc.variator.variables import Measured, each_strand, means, shared
 
 if TYPE_CHECKING:
     import xarray as xr
@@ -23,10 +24,10 @@ if TYPE_CHECKING:
     from cvt_hpc.models.pushbelt.run import ElementRun
 
 # Measured on one core of an EPYC (Zen 5): core-seconds per element and step, and per sample
-RIGID_COST, ELASTIC_COST, SAMPLE_COST = 2.4e-6, 3.3e-6, 1e-3
-OF_TWO = 1.6  # cost of a step with two flows of ring material by that of one with one
+_RIGID_COST, _ELASTIC_COST, _SAMPLE_COST = 2.4e-6, 3.3e-6, 1e-3
+_OF_TWO = 1.6  # cost of a step with two flows of ring material by that of one with one
 
-IN_PLANE, LATERAL = slice(len(STRANDS)), slice(len(STRANDS), None)  # of strands' probes
+_PLANE, LATERAL = slice(len(STRANDS)), slice(len(STRANDS), None)  # of strands' probes
 
 
 def of_strands(variable: Variable, strands: slice, **changes: Any) -> Variable:
@@ -44,7 +45,7 @@ def net_axial_force(measured: Measured) -> np.ndarray:
     return forces[1::2] - forces[::2]
 
 
-def of_clamped_strands(measured: Measured) -> tuple[np.ndarray, np.ndarray]:
+def _of_clamped_strands(measured: Measured) -> tuple[np.ndarray, np.ndarray]:
     """Axial force on each pulley by strands as beams, and as strings [N]."""
     m, p, path = measured, measured.parameters, measured.path
     offset = m.mean("axial_offset")
@@ -58,7 +59,7 @@ def of_clamped_strands(measured: Measured) -> tuple[np.ndarray, np.ndarray]:
     return signs * sum(held), signs * offset / path.strand_length * np.maximum(net, 0.0).sum()
 
 
-def one_sidedness(measured: Measured, names: Sequence[str]) -> np.ndarray:
+def _one_sidedness(measured: Measured, names: Sequence[str]) -> np.ndarray:
     """Push force of the right side less the left one's over both, in regions [1]."""
     left, right = (measured.profiles[f"push_force_{side}"] for side in readings.SIDES)
     where, found = regions(measured.path, measured.places), []
@@ -74,24 +75,23 @@ def largest(name: str, units: str, what: str) -> Variable:
     return Variable(f"largest_{name}", units, comment, of=lambda m: m.part(f"extreme_{name}").max())
 
 
-each_sheave = partial(means, "sheave", readings.SHEAVES)
+_each_sheave = partial(means, "sheave", readings.SHEAVES)
 _OF_STRANDS = tuple(v for v in judging.VIBRATION if v.dims[:1] == ("strand",))
 VARIABLES = (
-    *(of_strands(v, IN_PLANE) if v in _OF_STRANDS or v.name == "spectrum" else v for v in pushbelt.VARIABLES),
+    *(of_strands(v, _PLANE) if v in _OF_STRANDS or v.name == "spectrum" else v for v in pushbelt.VARIABLES),
     *(
         of_strands(v, LATERAL, name=f"lateral_{v.name}", comment=f"as {v.name}, out of the plane", words="")
         for v in _OF_STRANDS
     ),
-    Variable(
-        "lateral_spectrum",
-        "m",
-        "at the probe strongest out of the plane",
-        dims=("strand", "frequency_bin"),
+    of_strands(
+        shared("spectrum")[0],
+        LATERAL,
+        name="lateral_spectrum",
+        comment="at the probe strongest out of the plane",
         words="lateral amplitude spectrum",
-        of=lambda m: m.spectrum[LATERAL],
     ),
-    each_sheave("sheave_force", "N", "mean axial force of the belt on each sheave, outwards"),
-    each_sheave("sheave_loss", "W", "mean friction power of the flanks at each sheave"),
+    _each_sheave("sheave_force", "N", "mean axial force of the belt on each sheave, outwards"),
+    _each_sheave("sheave_loss", "W", "mean friction power of the flanks at each sheave"),
     Variable(
         "net_axial_force",
         "N",
@@ -100,7 +100,7 @@ VARIABLES = (
         of=net_axial_force,
     ),
     *together(
-        of_clamped_strands,
+        _of_clamped_strands,
         Variable(
             "beam_axial_force",
             "N",
@@ -122,7 +122,7 @@ VARIABLES = (
         "push force of the right side less the left one's over both, means over the strand",
         dims=("strand",),
         words="one-sided push in strands",
-        of=lambda m: one_sidedness(m, STRANDS),
+        of=lambda m: _one_sidedness(m, STRANDS),
     ),
     Variable(
         "arc_one_sidedness",
@@ -130,7 +130,7 @@ VARIABLES = (
         "push force of the right side less the left one's over both, means over the arc",
         dims=("pulley",),
         words="one-sided push in arcs",
-        of=lambda m: one_sidedness(m, PULLEYS),
+        of=lambda m: _one_sidedness(m, PULLEYS),
     ),
     *(
         largest(angle, "rad", f"{words} of an element")
@@ -155,18 +155,18 @@ VARIABLES = (
 )
 
 
-def coordinates(parameters: Mapping[str, Any]) -> dict[str, Coordinate]:
+def coordinates(parameters: Parameters) -> dict[str, Coordinate]:
     """Coordinates of the record's dimensions, by flat parameters of the job."""
     sheave = Coordinate(np.array(readings.SHEAVES), "", "sheave", "pulley and side")
     return {**pushbelt.coordinates(parameters), "sheave": sheave}
 
 
-def cost(parameters: Mapping[str, Any], stepper: str) -> Any:
+def cost(parameters: Parameters, stepper: str) -> float | np.ndarray:
     """Core-seconds of a run; of parameters that are arrays, an array."""
     p = parameters
-    each_step = np.where(np.isinf(p["sheave_stiffness"]), RIGID_COST, ELASTIC_COST)[()]
-    each_step = each_step * np.where(np.equal(p["ring_flows"], 2), OF_TWO, 1.0)[()]
-    return p["duration"] * (each_step * p["elements"] / p["step"] + SAMPLE_COST * p["sampling_rate"])
+    each_step = np.where(np.isinf(p["sheave_stiffness"]), _RIGID_COST, _ELASTIC_COST)[()]
+    each_step = each_step * np.where(np.equal(p["ring_flows"], 2), _OF_TWO, 1.0)[()]
+    return p["duration"] * (each_step * p["elements"] / p["step"] + _SAMPLE_COST * p["sampling_rate"])
 
 
 judge = partial(judging.judge, variables=VARIABLES, names=(*STRANDS, *readings.LATERAL))

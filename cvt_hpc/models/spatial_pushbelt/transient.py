@@ -10,7 +10,6 @@ contacts have dampers of their own.
 """
 
 from functools import partial
-from typing import Any
 
 import numpy as np
 from numba.extending import register_jitable
@@ -20,8 +19,8 @@ from cvt_hpc.lanes import absolute, ahead, around, like
 from cvt_hpc.models.marched import batches_of_one
 from cvt_hpc.models.pushbelt import fields as planar
 from cvt_hpc.models.pushbelt import run
-from cvt_hpc.models.pushbelt.belt import of_lanes
-from cvt_hpc.models.pushbelt.border import accept_border, close_border, of_pulley, set_shapes
+from cvt_hpc.models.pushbelt.belt import newton_of, of_lanes
+from cvt_hpc.models.pushbelt.border import accept_border, of_pulley, set_shapes
 from cvt_hpc.models.pushbelt.friction import filtered_slip
 from cvt_hpc.models.pushbelt.ring_bending import set_bending
 from cvt_hpc.models.pushbelt.run import COURSES, ElementRun
@@ -32,16 +31,15 @@ from cvt_hpc.models.spatial_pushbelt import vectors as vec
 from cvt_hpc.models.spatial_pushbelt.assembly import bending_forces, predict_bending
 from cvt_hpc.models.spatial_pushbelt.belt import NEWTON, NEWTON_OF_TWO_FLOWS, start, with_two_flows, workspace
 from cvt_hpc.models.spatial_pushbelt.chain import chain_forces, link, predict, pull_across, saddle_forces
-from cvt_hpc.models.spatial_pushbelt.faces import face_forces, pin_forces, predict_faces, predict_pins
-from cvt_hpc.models.spatial_pushbelt.flank import book_flanks, book_pairs, book_weight
-from cvt_hpc.models.spatial_pushbelt.parameters import LOOSE_SIDES, package_arm
+from cvt_hpc.models.spatial_pushbelt.faces import face_forces, predict_faces
+from cvt_hpc.models.spatial_pushbelt.losses import book_flanks, book_pairs
 from cvt_hpc.parameters import Parameters
 from cvt_hpc.variator import LARGEST_DISPLACEMENT, STRANDS
 
 CHANNELS = (*COURSES, *readings.SCALARS)
 # Turned by this, the flanks of an element have moved by a quarter of its half width, and no saddle holds the
 # rings. Elements of sound runs turn by 0.05 at most, also where the belt slips through.
-LARGEST_TURN = 0.25  # [1], sine
+_LARGEST_TURN = 0.25  # [1], sine
 
 
 class Transient(ElementRun):
@@ -60,26 +58,21 @@ class Transient(ElementRun):
 
     def _begin(self, p: Parameters) -> None:
         flows = p["ring_flows"]
-        self._advance = partial(called_alike(advance_by), EQUATIONS[flows])
-        self._belt, self._state = start(given(p))
+        self._advance = partial(called_alike(advance_by), EQUATIONS)
+        self._belt, self._state = start(p)
         method = NEWTON
         if flows == 2:
             self._state, method = with_two_flows(self._belt, self._state), NEWTON_OF_TWO_FLOWS
             self._profiles = (*readings.PROFILES, *readings.OF_TWO_FLOWS)
         self._work = workspace(self._belt, p["elements"], flows)
-        self._method = method._replace(
-            tolerance=p["speed_tolerance"],
-            power_tolerance=p["power_tolerance"],
-            most_iterations=p["most_iterations"],
-        )
+        self._method = newton_of(p, method)
 
     def _inputs_along(self, sample: int) -> np.ndarray:
         still = np.zeros((2, f.INPUTS - f.IN_DRIVING_DRIFT))
         return np.column_stack([super()._inputs_along(sample), still])
 
     def _read(self) -> readings.Reading:
-        state = self._state
-        return readings.Reading(self._readings, of_lanes(state.elements), state.pulleys, state.loads)
+        return readings.Reading(self._readings, self._state)
 
     def _tilting_inertia(self) -> float:
         return self._belt.pitch_inertia
@@ -94,7 +87,7 @@ class Transient(ElementRun):
             element = int(lateral.argmax())
             return f"element {element} has left the grooves: it is {largest * 1e3:.3g} mm out of the plane"
         turned = np.abs(readings.angles(elements))
-        if (largest := turned.max()) > LARGEST_TURN:
+        if (largest := turned.max()) > _LARGEST_TURN:
             angle, element = np.unravel_index(turned.argmax(), turned.shape)
             found = np.arcsin(min(largest, 1.0))
             return f"element {element} has left the rings: its {readings.ANGLES[angle]} is {found:.3g} rad"
@@ -102,21 +95,6 @@ class Transient(ElementRun):
 
     def _stored_energy(self, found: readings.Reading) -> float:
         return found.stored_energy(self._state.openings, self._state.leans)
-
-
-def given(parameters: Parameters) -> dict[str, Any]:
-    """Return what `start` takes, from flat parameters of a run [SI]."""
-    p, shared = parameters, run.given(parameters)
-    pitch = shared["belt_length"] / p["elements"]
-    return {
-        **shared,
-        "package_arm": package_arm(p),
-        "ring_bending": p["lateral_bending_stiffness"],
-        "ring_shear": p["lateral_shear_stiffness"],
-        "yaw_stiffness": p["yaw_spring"] * pitch,
-        "yaw_damping": p["yaw_damper"] * pitch,
-        "loose_sides": tuple(p[key] for key in LOOSE_SIDES),
-    }
 
 
 batch = batches_of_one(Transient)
@@ -139,133 +117,83 @@ def _open_sheaves(belt, state, leans, step, shapes):
             step[j, f.FLANK_GAP + p] += lean if p >= f.RIGHT_LOW else -lean
 
 
+@register_jitable
+def _has_two_flows(elements):
+    """Whether each ring package has a flow of its own."""
+    return elements.data.shape[1] == f.WIDE_STATE_FIELDS
+
+
 @kernel
-def _place(belt, state, work, dt):
-    """Geometry and directions that all iterates of a step have in common."""
+def _prepare(belt, state, work, dt):
+    """Values that all iterates of a step have in common: geometry, directions, linear laws."""
     elements, step = state.elements, work.step
     predict(belt, elements, state.pulleys, step, dt)
     link(belt, elements, step, dt)
     predict_bending(belt, elements, step)
     predict_faces(belt, elements, step, dt)
-    if belt.pin_clearance < np.inf:
-        predict_pins(belt, elements, step, dt)
     flank.predict_flanks(belt, elements, state.pulleys, step, dt)
     set_bending(belt, state, work, f.POSITION, f.BENDING, f.BENT_Y, dt)
     _open_sheaves(belt, elements, state.leans, step, work.shapes)
-
-
-@kernel
-def _prepare(belt, state, work, dt):
-    """Prepare what all iterates of a step have in common."""
-    _place(belt, state, work, dt)
-    assembly.linear_blocks(belt, work.step, dt)
-
-
-@kernel
-def _prepare_two_flows(belt, state, work, dt):
-    """Prepare what all iterates have in common with two flows."""
-    _place(belt, state, work, dt)
-    two_flows.predict_flows(belt, state.elements, work.step, dt)
-    assembly.linear_blocks(belt, work.step, dt)
-
-
-@kernel
-def _press(belt, state, work, dt):
-    """Forces of the iterate, but for the friction of the rings."""
-    elements, step, iterate = state.elements, work.step, work.iterate
-    increments, openings, shapes = state.increments, state.openings, work.shapes
-    chain_forces(belt, elements, step, iterate, dt)
-    bending_forces(belt, elements, step, iterate, dt)
-    face_forces(belt, elements, step, iterate, dt)
-    if belt.pin_clearance < np.inf:
-        pin_forces(belt, elements, step, iterate, dt)
-    flank.bend_sheaves(belt, elements, increments, openings, shapes, step, iterate, work.bent, dt)
-    flank.flank_forces(belt, elements, state.pulleys, increments, openings, shapes, step, iterate, dt)
-
-
-@kernel
-def _sum_up(belt, state, work, load, dt):
-    """The residuals that forces leave, but for those of a second flow; return the power residual [W]."""
-    elements, changes, openings = state.elements, (state.increments, work.increments), state.openings
-    step, iterate, scratch, border = work.step, work.iterate, work.scratch, work.border
-    return assembly.residuals(
-        belt, elements, changes, openings, work.shapes, load, step, iterate, scratch, border, dt
-    )
+    if _has_two_flows(elements):
+        two_flows.predict_flows(belt, elements, step, dt)
+    assembly.linear_blocks(belt, step, dt)
 
 
 @kernel
 def _evaluate(belt, state, work, load, dt):
     """Forces of the iterate, and the residuals that they leave; return the power residual [W]."""
-    _press(belt, state, work, dt)
-    saddle_forces(belt, state.elements, work.step, work.iterate)
-    return _sum_up(belt, state, work, load, dt)
-
-
-@kernel
-def _evaluate_two_flows(belt, state, work, load, dt):
-    """Forces and residuals of the iterate with two flows; return the power residual [W]."""
     elements, step, iterate = state.elements, work.step, work.iterate
-    _press(belt, state, work, dt)
-    two_flows.difference_forces(elements, step, iterate)
-    two_flows.saddle_forces_of_two(belt, elements, step, iterate)
-    power = _sum_up(belt, state, work, load, dt)
-    return power + two_flows.half_residuals(belt, elements, step, iterate, work.scratch, dt)
+    increments, openings, shapes = state.increments, state.openings, work.shapes
+    has_two_flows = _has_two_flows(elements)
+    chain_forces(belt, elements, step, iterate, dt)
+    bending_forces(belt, elements, step, iterate, dt)
+    face_forces(belt, elements, step, iterate, dt)
+    flank.bend_sheaves(belt, state, work, dt)
+    flank.flank_forces(belt, elements, state.pulleys, increments, openings, shapes, step, iterate, dt)
+    if has_two_flows:
+        two_flows.difference_forces(elements, step, iterate)
+        two_flows.saddle_forces_of_two(belt, elements, step, iterate)
+    else:
+        saddle_forces(belt, elements, step, iterate)
+    power = assembly.residuals(belt, state, work, load, dt)
+    if has_two_flows:
+        power += two_flows.half_residuals(belt, elements, step, iterate, work.scratch, dt)
+    return power
 
 
 @kernel
 def _assemble(belt, state, work, dt):
-    """The linear system of the elements, of the unknowns of one flow."""
-    assembly.assemble_pairs(belt, state.elements, work.step, work.iterate, work.narrow)
-    flank.add_flank_blocks(belt, state.elements, work.shapes, work.step, work.iterate, work.narrow, dt)
-
-
-@kernel
-def _assemble_two_flows(belt, state, work, dt):
-    """The linear system of the elements with two flows."""
-    _assemble(belt, state, work, dt)
-    two_flows.widen(belt, work.step, work.iterate, work.narrow, work.blocks, dt)
+    """The linear system of the elements."""
+    assembly.assemble_pairs(belt, state, work)
+    flank.add_flank_blocks(belt, state, work, dt)
+    if _has_two_flows(state.elements):
+        two_flows.widen(belt, work.step, work.iterate, work.narrow, work.blocks, dt)
 
 
 @kernel
 def _close(belt, state, work, dt):
     """Close the system of the border."""
-    assembly.border_sums(belt, state.elements, work.shapes, work.iterate, work.narrow, work.sums)
-    close_border(belt, work.sums, work.border, dt)
-
-
-@kernel
-def _close_two_flows(belt, state, work, dt):
-    """Close the system of the border with two flows."""
-    two_flows.narrow_solutions(work.blocks, work.narrow)
-    _close(belt, state, work, dt)
+    if _has_two_flows(state.elements):
+        two_flows.narrow_solutions(work.blocks, work.narrow)
+    assembly.close_pairs(belt, state, work, dt)
 
 
 @register_jitable
 def _flank_change(kept, k, p):
     """Change of the force at a point of the flanks."""
-    return np.sqrt(
-        kept[k, f.FLANK + p] ** 2
-        + kept[k, f.FLANK_FRICTION_M + p] ** 2
-        + kept[k, f.FLANK_FRICTION_T + p] ** 2
-    )
+    grip_m, grip_t = kept[k, f.FLANK_FRICTION_M + p], kept[k, f.FLANK_FRICTION_T + p]
+    return np.sqrt(kept[k, f.FLANK + p] ** 2 + grip_m**2 + grip_t**2)
 
 
 @kernel
 def _changes(kept, k):
     """Changes of contact forces, of the element behind (k = 1) only of those to the next one."""
     own = 1.0 - k
-    return (
-        kept[k, f.PUSH + f.EDGE_LEFT],
-        kept[k, f.PUSH + f.EDGE_RIGHT],
-        kept[k, f.PUSH + f.HEAD_LEFT],
-        kept[k, f.PUSH + f.HEAD_RIGHT],
-        kept[k, f.PIN],
-        own * _flank_change(kept, k, f.LEFT_LOW),
-        own * _flank_change(kept, k, f.LEFT_HIGH),
-        own * _flank_change(kept, k, f.RIGHT_LOW),
-        own * _flank_change(kept, k, f.RIGHT_HIGH),
-        own * kept[k, f.RING_FRICTION],
-    )
+    edges = kept[k, f.PUSH + f.EDGE_LEFT], kept[k, f.PUSH + f.EDGE_RIGHT]
+    heads = kept[k, f.PUSH + f.HEAD_LEFT], kept[k, f.PUSH + f.HEAD_RIGHT]
+    left = own * _flank_change(kept, k, f.LEFT_LOW), own * _flank_change(kept, k, f.LEFT_HIGH)
+    right = own * _flank_change(kept, k, f.RIGHT_LOW), own * _flank_change(kept, k, f.RIGHT_HIGH)
+    return *edges, *heads, kept[k, f.PIN], *left, *right, own * kept[k, f.RING_FRICTION]
 
 
 @kernel
@@ -335,9 +263,10 @@ def _add_loads(belt, state, work):
 def _accept(belt, state, work, inputs, dt):
     """Take the state to the end of the step, and add up what it has done."""
     totals, pulleys, loads = state.totals, state.pulleys, state.loads
+    if _has_two_flows(state.elements):
+        two_flows.book_difference(belt, state, work, dt)
+        two_flows.accept_difference(belt, state, work, dt)
     book_pairs(belt, state, work, dt)
-    if belt.gravity != 0.0:
-        book_weight(belt, state, work, dt)
     book_flanks(belt, state, work, dt)
     _accept_elements(belt, state, work, dt)
     _add_loads(belt, state, work)
@@ -355,41 +284,16 @@ def _accept(belt, state, work, inputs, dt):
         left, right = loads[2 * pulley], loads[2 * pulley + 1]
         side = belt.loose_side[pulley]
         pressed = 0.5 * ((1.0 - side) * left + (1.0 + side) * right)  # on what moves
+        excess = inputs[planar.IN_DRIVING_THRUST + pulley] - pressed
         if pulley == 0:
-            closing = dt * (
-                belt.driving_rate * (inputs[planar.IN_DRIVING_THRUST] - pressed)
-                + inputs[planar.IN_DRIVING_SHIFT]
-            )
-            drift = dt * inputs[f.IN_DRIVING_DRIFT]
-            pulleys[planar.DRIVING_RADIUS] += closing
-            pulleys[f.DRIVING_MIDDLE] += drift - side * tangent * closing
+            closing = dt * (belt.driving_rate * excess + inputs[planar.IN_DRIVING_SHIFT])
         else:
-            closing = dt * belt.driven_rate * (inputs[planar.IN_DRIVEN_THRUST] - pressed)
-            drift = dt * inputs[f.IN_DRIVEN_DRIFT]
-            pulleys[planar.DRIVEN_RADIUS] += closing
-            pulleys[f.DRIVEN_MIDDLE] += drift - side * tangent * closing
+            closing = dt * belt.driven_rate * excess
+        drift = dt * inputs[f.IN_DRIVING_DRIFT + pulley]
+        pulleys[planar.DRIVING_RADIUS + pulley] += closing
+        pulleys[f.DRIVING_MIDDLE + pulley] += drift - side * tangent * closing
         totals[planar.THRUST_WORK] += (right - left) * drift - 2.0 * tangent * pressed * closing
 
 
-@kernel
-def _accept_two_flows(belt, state, work, inputs, dt):
-    """Take the state to the end of the step with two flows."""
-    two_flows.book_difference(belt, state, work, dt)
-    two_flows.accept_difference(belt, state, work, dt)
-    _accept(belt, state, work, inputs, dt)
-
-
-# By how many flows of ring material there are
-EQUATIONS = {
-    1: Equations(_prepare, _evaluate, _assemble, _close, _accept, _changes, f.CHANGE),
-    2: Equations(
-        _prepare_two_flows,
-        _evaluate_two_flows,
-        _assemble_two_flows,
-        _close_two_flows,
-        _accept_two_flows,
-        _changes,
-        f.CHANGE,
-    ),
-}
-advance = partial(advance_by, EQUATIONS[1])
+EQUATIONS = Equations(_prepare, _evaluate, _assemble, _close, _accept, _changes, f.CHANGE)
+advance = partial(advance_by, EQUATIONS)

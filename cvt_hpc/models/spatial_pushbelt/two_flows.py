@@ -60,10 +60,8 @@ def predict_flows(belt, state, step, dt):
         length, other = state[j, f.LENGTH], state[j, f.HALF_LENGTH]
         per_right, per_left = 1.0 / (length + other), 1.0 / (length - other)
         e, size = vec.unit(chord)
-        spin = chain.spin_of(
-            e, 1.0 / size, vec.minus(vec.ahead(state, j, f.SPEED), vec.at(state, j, f.SPEED))
-        )
-        turned = turned_length(belt, size, spin, dt)
+        du = vec.minus(vec.ahead(state, j, f.SPEED), vec.at(state, j, f.SPEED))
+        turned = turned_length(belt, size, chain.spin_of(e, 1.0 / size, du), dt)
         of_both, apart = chain.shortening(state, step, j, 0.0), _drawn_apart(state, step, j, 0.0)
         one = (right_size + turned - belt.ring_time * (of_both + apart)) * per_right - 1.0
         two = (left_size + turned - belt.ring_time * (of_both - apart)) * per_left - 1.0
@@ -83,9 +81,8 @@ def difference_forces(state, step, iterate):
         slope, cross_slope = step[j, f.TENSION_SLOPE], step[j, f.CROSS_SLOPE]
         here, there = vec.screw(step, j, f.DIFFERENCE_I), vec.screw(step, j, f.DIFFERENCE_J)
         stretch = vec.both_dot(here, vec.screw(state, j, f.CHANGE)) + state[j, f.CHANGE_OF_HALF]
-        stretch = stretch - (
-            vec.both_dot(there, vec.screw_ahead(state, j, f.CHANGE)) + ahead(state, j, f.CHANGE_OF_HALF)
-        )
+        drawn = vec.both_dot(there, vec.screw_ahead(state, j, f.CHANGE)) + ahead(state, j, f.CHANGE_OF_HALF)
+        stretch = stretch - drawn
         of_both = (step[j, f.START_TENSION] - iterate[j, f.ITERATE_TENSION]) / slope
         difference = fma(-slope, stretch, fma(-cross_slope, of_both, step[j, f.START_DIFFERENCE]))
         more = -cross_slope * stretch
@@ -106,9 +103,8 @@ def saddle_forces_of_two(belt, state, step, iterate):
         before, half_before = state[j, f.RING_SLIP], state[j, f.HALF_SLIP]
         by_half = vec.screw(step, j, f.HALF_SLIP_BY)
         slip, half = chain.ring_slip(state, step, j, 1.0), _along(by_half, state, j, 1.0)
-        right, right_slope, dual = ring_friction(
-            belt, slip + half, before + half_before, state[j, f.DUAL_RIGHT]
-        )
+        dual = state[j, f.DUAL_RIGHT]
+        right, right_slope, dual = ring_friction(belt, slip + half, before + half_before, dual)
         state[j, f.DUAL_RIGHT] = dual
         left, left_slope, dual = ring_friction(belt, slip - half, before - half_before, state[j, f.DUAL_LEFT])
         state[j, f.DUAL_LEFT] = dual
@@ -233,20 +229,16 @@ def accept_difference(belt, state, work, dt):
         tension, difference = iterate[j, f.ITERATE_TENSION], iterate[j, f.ITERATE_DIFFERENCE]
         tension_behind = behind(iterate, j, f.ITERATE_TENSION)
         difference_behind = behind(iterate, j, f.ITERATE_DIFFERENCE)
-        for side in (1.0, -1.0):
+        turning = vec.cross(omega, a)
+        for k in range(2):
+            side = 1.0 - 2.0 * k
             ahead_of_it = vec.moved(vec.at(step, j, f.TENSION_I), side, vec.at(step, j, f.DIFFERENCE_I))
             behind_it = vec.moved(vec.behind(step, j, f.TENSION_J), side, vec.behind(step, j, f.DIFFERENCE_J))
             pull = 0.5 * (step[j, f.BENT_Y] * outward[0] + step[j, f.BENT_Z] * outward[1])
             pull += 0.5 * (tension + side * difference) * vec.dot(ahead_of_it, outward)
             pull -= 0.5 * (tension_behind + side * difference_behind) * vec.dot(behind_it, outward)
-            rising = vec.dot(
-                outward, vec.plus(u, vec.times(side * belt.package_distance, vec.cross(omega, a)))
-            )
-            normal = absolute(half_mass * rising - pull)
-            if side > 0.0:
-                elements[j, f.SADDLE_RIGHT] = normal
-            else:
-                elements[j, f.SADDLE_LEFT] = normal
+            rising = vec.dot(outward, vec.plus(u, vec.times(side * belt.package_distance, turning)))
+            elements[j, f.SADDLE_RIGHT + k] = absolute(half_mass * rising - pull)
         elements[j, f.TENSION_DIFFERENCE] = difference
         elements[j, f.HALF_LENGTH] += dt * (elements[j, f.HALF_SLIP] - ahead(elements, j, f.HALF_SLIP))
         elements[j, f.HALF_SPEED] += elements[j, f.CHANGE_OF_HALF]

@@ -22,21 +22,15 @@ def at(array, j, first):
 @register_jitable
 def ahead(array, j, first):
     """Three fields of the row ahead."""
-    return (
-        lanes.ahead(array, j, first),
-        lanes.ahead(array, j, first + 1),
-        lanes.ahead(array, j, first + 2),
-    )
+    y, z = lanes.ahead(array, j, first), lanes.ahead(array, j, first + 1)
+    return y, z, lanes.ahead(array, j, first + 2)
 
 
 @register_jitable
 def behind(array, j, first):
     """Three fields of the row behind."""
-    return (
-        lanes.behind(array, j, first),
-        lanes.behind(array, j, first + 1),
-        lanes.behind(array, j, first + 2),
-    )
+    y, z = lanes.behind(array, j, first), lanes.behind(array, j, first + 1)
+    return y, z, lanes.behind(array, j, first + 2)
 
 
 @register_jitable
@@ -134,7 +128,7 @@ def squared_up(x, o):
     return x, times(1.5 - 0.5 * dot(o, o), o)
 
 
-# Symmetric matrices of 3 x 3 by the columns of their upper half, others by columns.
+# Symmetric matrices of 3 x 3 by the columns of their upper half, others as three columns.
 
 
 @register_jitable
@@ -142,30 +136,15 @@ def plus_square(m, k, v):
     """M + k v v', symmetric."""
     p, q, r = k * v[0], k * v[1], k * v[2]
     return (
-        fma(p, v[0], m[0]),
-        fma(p, v[1], m[1]),
-        fma(q, v[1], m[2]),
-        fma(p, v[2], m[3]),
-        fma(q, v[2], m[4]),
-        fma(r, v[2], m[5]),
+        *(fma(p, v[0], m[0]), fma(p, v[1], m[1]), fma(q, v[1], m[2])),
+        *(fma(p, v[2], m[3]), fma(q, v[2], m[4]), fma(r, v[2], m[5])),
     )
 
 
 @register_jitable
 def plus_product(m, k, u, v):
     """M + k u v'."""
-    p, q, r = k * v[0], k * v[1], k * v[2]
-    return (
-        fma(p, u[0], m[0]),
-        fma(p, u[1], m[1]),
-        fma(p, u[2], m[2]),
-        fma(q, u[0], m[3]),
-        fma(q, u[1], m[4]),
-        fma(q, u[2], m[5]),
-        fma(r, u[0], m[6]),
-        fma(r, u[1], m[7]),
-        fma(r, u[2], m[8]),
-    )
+    return moved(m[0], k * v[0], u), moved(m[1], k * v[1], u), moved(m[2], k * v[2], u)
 
 
 @register_jitable
@@ -177,7 +156,8 @@ def zero6(none):
 @register_jitable
 def zero9(none):
     """A matrix of zeros, from one."""
-    return none, none, none, none, none, none, none, none, none
+    zero = none, none, none
+    return zero, zero, zero
 
 
 @register_jitable
@@ -187,27 +167,22 @@ def joined(a, b):
 
 
 @register_jitable
-def three(a, b, c):
-    """A matrix of three columns."""
-    return a[0], a[1], a[2], b[0], b[1], b[2], c[0], c[1], c[2]
-
-
-@register_jitable
 def full(m):
-    """A symmetric matrix by columns, from the upper half."""
-    return m[0], m[1], m[3], m[1], m[2], m[4], m[3], m[4], m[5]
+    """A symmetric matrix as three columns."""
+    return (m[0], m[1], m[3]), (m[1], m[2], m[4]), (m[3], m[4], m[5])
 
 
 @register_jitable
 def upper(m):
     """The upper half of a matrix that is symmetric."""
-    return m[0], m[3], m[4], m[6], m[7], m[8]
+    return m[0][0], m[1][0], m[1][1], m[2][0], m[2][1], m[2][2]
 
 
 @register_jitable
 def transposed(m):
     """M'."""
-    return m[0], m[3], m[6], m[1], m[4], m[7], m[2], m[5], m[8]
+    a, b, c = m
+    return (a[0], b[0], c[0]), (a[1], b[1], c[1]), (a[2], b[2], c[2])
 
 
 @register_jitable
@@ -219,11 +194,7 @@ def symmetric_sum(m, n):
 @register_jitable
 def matrix_sum(m, n):
     """M + N."""
-    return three(
-        plus((m[0], m[1], m[2]), (n[0], n[1], n[2])),
-        plus((m[3], m[4], m[5]), (n[3], n[4], n[5])),
-        plus((m[6], m[7], m[8]), (n[6], n[7], n[8])),
-    )
+    return plus(m[0], n[0]), plus(m[1], n[1]), plus(m[2], n[2])
 
 
 @register_jitable
@@ -233,9 +204,9 @@ def symmetric(array, j, first):
 
 
 @register_jitable
-def matrix(array, j, first):
-    """Nine fields of a row as a matrix."""
-    return three(at(array, j, first), at(array, j, first + 3), at(array, j, first + 6))
+def matrix(array, j, first, apart=3):
+    """A matrix by columns that begin so many fields apart in a row."""
+    return at(array, j, first), at(array, j, first + apart), at(array, j, first + 2 * apart)
 
 
 @register_jitable
@@ -246,41 +217,29 @@ def store_symmetric(array, j, first, m):
 
 
 @register_jitable
-def store_matrix(array, j, first, m):
-    """Set nine fields of a row."""
-    store(array, j, first, (m[0], m[1], m[2]))
-    store(array, j, first + 3, (m[3], m[4], m[5]))
-    store(array, j, first + 6, (m[6], m[7], m[8]))
+def store_matrix(array, j, first, m, apart=3):
+    """Set fields of a row as `matrix` reads them."""
+    store(array, j, first, m[0])
+    store(array, j, first + apart, m[1])
+    store(array, j, first + 2 * apart, m[2])
 
 
 @register_jitable
 def of_symmetric(m, v):
     """M v, symmetric."""
-    return (
-        fma(m[0], v[0], fma(m[1], v[1], m[3] * v[2])),
-        fma(m[1], v[0], fma(m[2], v[1], m[4] * v[2])),
-        fma(m[3], v[0], fma(m[4], v[1], m[5] * v[2])),
-    )
+    return of_matrix(full(m), v)
 
 
 @register_jitable
 def of_matrix(m, v):
     """M v."""
-    return (
-        fma(m[0], v[0], fma(m[3], v[1], m[6] * v[2])),
-        fma(m[1], v[0], fma(m[4], v[1], m[7] * v[2])),
-        fma(m[2], v[0], fma(m[5], v[1], m[8] * v[2])),
-    )
+    return moved(moved(times(v[2], m[2]), v[1], m[1]), v[0], m[0])
 
 
 @register_jitable
 def of_transposed(m, v):
     """M' v."""
-    return (
-        fma(m[0], v[0], fma(m[1], v[1], m[2] * v[2])),
-        fma(m[3], v[0], fma(m[4], v[1], m[5] * v[2])),
-        fma(m[6], v[0], fma(m[7], v[1], m[8] * v[2])),
-    )
+    return dot(m[0], v), dot(m[1], v), dot(m[2], v)
 
 
 # Screws, which are pairs of vectors in six fields of a row: a velocity with an angular velocity, a force with
