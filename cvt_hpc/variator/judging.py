@@ -12,7 +12,7 @@ from typing import Any
 
 import numpy as np
 
-from cvt_hpc.variables import Variable, Vibrates, shortened, values
+from cvt_hpc.variables import Values, Variable, Vibrates, shortened, values
 from cvt_hpc.variator import PULLEYS, STRANDS
 from cvt_hpc.variator.band import band, judder_frequency
 from cvt_hpc.variator.slip import slide, with_slip
@@ -127,13 +127,13 @@ def _on_strands(run: Any, names: Sequence[str]) -> tuple[np.ndarray, list[str]]:
     return np.array(columns), [regions[k] for k in columns]
 
 
-def slipped_through(run: Any) -> dict[str, Any]:
+def slipped_through(run: Any) -> Values:
     """The verdict on a run that has slipped through before its end."""
     status, why = run.failure
     return {"status": status, "vibrates": Vibrates.SLIPS, "reason": f"at {run.time * 1e3:.4g} ms: {why}"}
 
 
-def judge(run: Any, variables: Sequence[Variable], names: Sequence[str] = STRANDS) -> dict[str, Any]:
+def judge(run: Any, variables: Sequence[Variable], names: Sequence[str] = STRANDS) -> Values:
     """The record of a run that has reached its end, or slipped through before, its cost apart."""
     if run.failure is None:
         return finished(run, variables, assess(run, names))
@@ -144,6 +144,6 @@ def judge(run: Any, variables: Sequence[Variable], names: Sequence[str] = STRAND
     return record | values((v for v in variables if v.early), Measured(run, slide(run), before))
 
 
-def finished(run: Any, variables: Sequence[Variable], found: assessment.Occurrence) -> dict[str, Any]:
+def finished(run: Any, variables: Sequence[Variable], found: assessment.Occurrence) -> Values:
     """The record of a run that has reached its end, and of which the verdict is found."""
     return found.verdict() | values(variables, Measured(run, run.judged, found))

@@ -1,10 +1,10 @@
 """Size of a scene beside the default one: limits with a unit scale with it, whatever its units are."""
 
-from collections.abc import Mapping
-from typing import Any, NamedTuple
+from typing import NamedTuple
 
 import numpy as np
 
+from cvt_hpc.parameters import Parameters
 from cvt_hpc.variator.scene import SCENE
 
 
@@ -16,7 +16,7 @@ class Measures(NamedTuple):
     length: float
 
 
-def measures(parameters: Mapping[str, Any]) -> Measures:
+def measures(parameters: Parameters) -> Measures:
     """Measures of a scene, by flat values [SI] of a run: all 1 for the default one."""
     p = parameters
     thrust, speed, distance = (

@@ -12,7 +12,7 @@ from typing import Any
 
 import numpy as np
 
-from cvt_hpc.parameters import Column, FromFile, Parameter, Parameters, RowError
+from cvt_hpc.parameters import Column, FromFile, Parameter, Parameters, Problem, RowError
 from cvt_hpc.variator.scene import course_problems, nested_problems
 
 TIME = "profile_time"
@@ -142,7 +142,7 @@ def extremes(parameters: Parameters, name: str) -> tuple[float, float]:
     return min(values), max(values)
 
 
-def profile_problems(parameters: Parameters) -> list[tuple[str, str, str]]:
+def profile_problems(parameters: Parameters) -> list[Problem]:
     """Return problems of courses in time, in the form of a model's check: (key, expected, found)."""
     p, found = parameters, course_problems(parameters)
     profiles = {key: p[key] for key in p if key.endswith("_profile") and p[key]}

@@ -6,18 +6,18 @@ jobs/lebrecht_2004.toml says; every other default is an assumption, plausible an
 """
 
 from collections import Counter
-from collections.abc import Iterable, Mapping, Sequence
+from collections.abc import Iterable, Sequence
 from typing import Any
 
 import numpy as np
 
-from cvt_hpc.parameters import Parameter, Substitute, not_negative, positive
+from cvt_hpc.parameters import Parameter, Parameters, Problem, Substitute, not_negative, positive
 from cvt_hpc.physics import capacity
 from cvt_hpc.physics.friction_laws import FRICTION_LAWS, friction_file
 from cvt_hpc.physics.geometry import driven_radius
 
 
-def _closing_radius(parameters: Mapping[str, Any]) -> float:
+def _closing_radius(parameters: Parameters) -> float:
     return driven_radius(*(parameters[key] for key in ("ratio", "belt_length", "centre_distance")))
 
 
@@ -89,7 +89,7 @@ SCENE: dict[str, Parameter] = {
 }
 
 
-def rise_problems(parameters: Mapping[str, Any]) -> list[tuple[str, str, str]]:
+def rise_problems(parameters: Parameters) -> list[Problem]:
     """Problems of a load that rises, in the form of a model's check: (key, expected, found).
 
     Of the parameters [SI] `rise_time`, `duration` and `judged_fraction` count.
@@ -102,7 +102,7 @@ def rise_problems(parameters: Mapping[str, Any]) -> list[tuple[str, str, str]]:
     return [("rise_time", expected, f"{p['rise_time']:g} s")]
 
 
-def course_problems(parameters: Mapping[str, Any]) -> list[tuple[str, str, str]]:
+def course_problems(parameters: Parameters) -> list[Problem]:
     """Problems of a run's courses of load and speed, in the form of a model's check: (key, expected, found).
 
     Of the parameters [SI] those of SCENE, `duration` and `judged_fraction` count.
@@ -113,7 +113,7 @@ def course_problems(parameters: Mapping[str, Any]) -> list[tuple[str, str, str]]
     return problems
 
 
-def course_inert(parameters: Mapping[str, Any]) -> dict[str, str]:
+def course_inert(parameters: Parameters) -> dict[str, str]:
     """Parameters of courses that are constant, each with the setting that makes it without effect."""
     p = parameters
     return {
@@ -202,7 +202,7 @@ def nested(values: Sequence[Any]) -> bool:
     return any(isinstance(value, Sequence) for value in values)
 
 
-def nested_problems(parameters: Mapping[str, Any], keys: Iterable[str]) -> list[tuple[str, str, str]]:
+def nested_problems(parameters: Parameters, keys: Iterable[str]) -> list[Problem]:
     """The first list whose values are no numbers, in the form of a model's check: (key, expected, found)."""
     for key in keys:
         if nested(parameters[key]):
@@ -210,7 +210,7 @@ def nested_problems(parameters: Mapping[str, Any], keys: Iterable[str]) -> list[
     return []
 
 
-def length_problems(parameters: Mapping[str, Any], keys: Sequence[str]) -> list[tuple[str, str, str]]:
+def length_problems(parameters: Parameters, keys: Sequence[str]) -> list[Problem]:
     """Lists that are missing beside others, or not as long as most of them: (key, expected, found)."""
     lengths = {key: len(parameters[key]) for key in keys}
     usual = Counter(filter(None, lengths.values())).most_common(1)[0][0]

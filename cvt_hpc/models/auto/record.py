@@ -2,14 +2,14 @@
 
 from __future__ import annotations
 
-from collections.abc import Mapping
 from typing import TYPE_CHECKING, Any
 
 from cvt_hpc.models.auto.rules import COARSENESS, SHARE, Rung, coarse, is_clear, is_passive, is_settled
 from cvt_hpc.models.elastic_belt import grouping
 from cvt_hpc.models.elastic_belt import record as belt_record
 from cvt_hpc.models.elastic_belt.record import coordinates, lane_key, lanes
-from cvt_hpc.variables import Status, Variable, Vibrates, shortened
+from cvt_hpc.parameters import Parameters
+from cvt_hpc.variables import Status, Values, Variable, Vibrates, shortened
 from cvt_hpc.variator import judging
 
 if TYPE_CHECKING:
@@ -44,13 +44,13 @@ PILOT_SHARE = 1.0  # of a run's time that a pilot does: a shorter run would use 
 REFINED = 0.2  # of the runs are done in full, more of them in a trace
 
 
-def cost(parameters: Mapping[str, Any], stepper: str) -> Any:
+def cost(parameters: Parameters, stepper: str) -> Any:
     """Core-seconds of runs that fill the lanes once."""
     coarse = COARSENESS**2 * SHARE
     return (coarse + REFINED) * grouping.cost(parameters, stepper)
 
 
-def known(parameters: Mapping[str, Any]) -> dict[str, Any] | None:
+def known(parameters: Parameters) -> Values | None:
     """The values of a run that needs no transient; None where it does.
 
     Parameters
@@ -67,7 +67,7 @@ def known(parameters: Mapping[str, Any]) -> dict[str, Any] | None:
 preliminary = coarse
 
 
-def settle(run: RecordedRun) -> dict[str, Any] | None:
+def settle(run: RecordedRun) -> Values | None:
     """The values of a coarse run if it answers the question, else None.
 
     Parameters
@@ -87,14 +87,14 @@ def settle(run: RecordedRun) -> dict[str, Any] | None:
     return values
 
 
-def judge(run: RecordedRun) -> dict[str, Any]:
+def judge(run: RecordedRun) -> Values:
     """The record of a full run that has reached its end, or slipped through before, its cost apart."""
     if run.failure is not None:
         return belt_record.judge(run) | {"rung": Rung.FULL}
     return _values(run, judging.assess(run), Rung.FULL)
 
 
-def _values(run: RecordedRun, found: Occurrence, rung: Rung) -> dict[str, Any]:
+def _values(run: RecordedRun, found: Occurrence, rung: Rung) -> Values:
     return judging.finished(run, belt_record.VARIABLES, found) | {"rung": rung, "margin": found.margin}
 
 

@@ -18,12 +18,12 @@ Of means, sliding speed and angle are those of the mean sliding.
 """
 
 from collections.abc import Mapping
-from typing import Any
 
 import numpy as np
 
 from cvt_hpc.models.elastic_belt.belt import Mesh
 from cvt_hpc.models.elastic_belt.fluctuation import at_stations
+from cvt_hpc.parameters import Parameters
 from cvt_hpc.variator.history import ALONG
 
 # quantities of a sample from which the quantities below follow
@@ -58,9 +58,7 @@ WRAP_ANGLE = ("wrap angle", "rad", "from the inlet of the arc; negative before i
 ELSEWHERE = {**ALONG, "contact_force": ("contact force", "N m-1", "axial line force of one flank")}
 
 
-def along_belt(
-    sample: Mapping[str, np.ndarray], grid: Mesh, parameters: Mapping[str, Any]
-) -> dict[str, np.ndarray]:
+def along_belt(sample: Mapping[str, np.ndarray], grid: Mesh, parameters: Parameters) -> dict[str, np.ndarray]:
     """Quantities of SLIDING at the stations, (..., N) by name.
 
     They follow from those of NEEDED, (..., N) each, of one instant or means, and the run's half wedge angle

@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from collections.abc import Callable, Iterator, Mapping, Sequence
+from collections.abc import Callable, Iterator, Sequence
 from functools import partial
 from typing import Any, NamedTuple
 
@@ -24,8 +24,9 @@ from cvt_hpc.models.elastic_belt.rings import ring_constants, with_layers, witho
 from cvt_hpc.models.elastic_belt.sampling import CONTACT_SOLVES, ENDED_AT, OUTCOME, REPEATED, Outcome, Samples
 from cvt_hpc.models.elastic_belt.step_choice import transverse_limit
 from cvt_hpc.models.elastic_belt.validity import FAILURES, step_doubt
+from cvt_hpc.parameters import Parameters
 from cvt_hpc.recording import steps_per_sample
-from cvt_hpc.variables import Status
+from cvt_hpc.variables import Failure, Values
 
 PRECISIONS = {"double": np.float64, "single": np.float32}
 STEPS: dict[str, tuple[Callable[[lane_belt.LaneState], Any], Callable[..., None]]] = {  # work space, march
@@ -78,9 +79,7 @@ class Batch:
         Sampling interval and time step [s].
     """
 
-    def __init__(
-        self, points: Sequence[Mapping[str, Any]], stepper: str, paused: Sequence[Paused] = ()
-    ) -> None:
+    def __init__(self, points: Sequence[Parameters], stepper: str, paused: Sequence[Paused] = ()) -> None:
         p = points[0]
         most = lanes(p, stepper)
         if not 0 < len(points) <= most:
@@ -222,12 +221,12 @@ class LaneRun(RecordedRun):
         self.batch, self.step = batch, batch.step
 
     @property
-    def failure(self) -> tuple[Status, str] | None:
+    def failure(self) -> Failure | None:
         """The failure, where the run cannot continue."""
         outcome = int(self._ended(OUTCOME))
         return FAILURES[Outcome(outcome)] if outcome else None
 
-    def numerical_doubt(self, record: dict[str, Any]) -> tuple[Status, str] | None:
+    def numerical_doubt(self, record: Values) -> Failure | None:
         """Whether a run that reached its end is not to be trusted, as `RecordedRun` has it; or its step."""
         found = super().numerical_doubt(record)
         if found is None and self.batch.stepper == "imex":

@@ -8,9 +8,8 @@ left face of cell j); the content n_i, the strains and the forces in cells. Rows
 
 from __future__ import annotations
 
-from collections.abc import Mapping
 from itertools import accumulate
-from typing import Any, NamedTuple
+from typing import NamedTuple
 
 import numpy as np
 
@@ -21,6 +20,7 @@ from cvt_hpc.models.elastic_belt.deflection_settings import disc_settings
 from cvt_hpc.models.elastic_belt.grouping import faded_coupling
 from cvt_hpc.models.elastic_belt.pulleys import Pulleys, settled_tilt, with_pulleys
 from cvt_hpc.models.elastic_belt.tilt_settings import TILT_DEFAULTS, elements_tilt
+from cvt_hpc.parameters import Parameters
 from cvt_hpc.physics.friction import FrictionLaw, given_law
 from cvt_hpc.physics.geometry import Variator, cut_path, variator
 from cvt_hpc.physics.sheaves import (
@@ -191,7 +191,7 @@ class Zone(NamedTuple):
     rise: np.ndarray  # distance from the axis beyond the pitch radius, (m,) [m]
 
 
-def mesh(parameters: Mapping[str, Any]) -> Mesh:
+def mesh(parameters: Parameters) -> Mesh:
     """Cut the path into `stations` cells, shorter by `end_refinement` at the ends of arcs (`cut_path`)."""
     path = variator(parameters["ratio"], parameters["driven_radius"], parameters["centre_distance"])
     cells = cut_path(path, parameters["stations"], parameters["end_refinement"])
@@ -199,7 +199,7 @@ def mesh(parameters: Mapping[str, Any]) -> Mesh:
     return Mesh(tuple(counts), (0, *accumulate(counts[:-1])), np.concatenate(cells), path)
 
 
-def belt_constants(parameters: Mapping[str, Any]) -> Belt:
+def belt_constants(parameters: Parameters) -> Belt:
     """Constants of one run for the kernels, from its resolved parameters, `duration` [s] included."""
     p, grid = BENDING_DEFAULTS | TILT_DEFAULTS | dict(parameters), mesh(parameters)
     path, cell = grid.path, grid.cell
@@ -290,7 +290,7 @@ def belt_constants(parameters: Mapping[str, Any]) -> Belt:
     return Belt(**computed, **given)
 
 
-def initial_state(parameters: Mapping[str, Any], belt: Belt) -> State:
+def initial_state(parameters: Parameters, belt: Belt) -> State:
     """Start near the steady state without load.
 
     The belt is seated in both grooves under the tension that the thrust requires, the layers at uniform

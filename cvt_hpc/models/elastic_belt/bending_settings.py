@@ -1,9 +1,6 @@
 """Parameters of the belt's bending: curvature terms, and the moment of the pressed elements."""
 
-from collections.abc import Mapping
-from typing import Any
-
-from cvt_hpc.parameters import Parameter, not_negative, positive
+from cvt_hpc.parameters import Parameter, Parameters, Problem, not_negative, positive
 
 CURVATURE_TERMS = ("none", "path", "straight")
 EDGES = ("outer_edge", "inner_edge")
@@ -42,12 +39,12 @@ BENDING: dict[str, Parameter] = {
 BENDING_DEFAULTS = {key: parameter.default for key, parameter in BENDING.items()}
 
 
-def has_column(parameters: Mapping[str, Any]) -> bool:
+def has_column(parameters: Parameters) -> bool:
     """Whether pressed elements bear a bending moment."""
     return bool(parameters.get("column_bending", "off") == "rocking")
 
 
-def bending_problems(parameters: Mapping[str, Any]) -> list[tuple[str, str, str]]:
+def bending_problems(parameters: Parameters) -> list[Problem]:
     """Problems of the belt's bending: (key, expected, found)."""
     p = BENDING_DEFAULTS | dict(parameters)
     if p["curvature_terms"] != "none" and p["longitudinal_mass"] != 1.0:
@@ -55,7 +52,7 @@ def bending_problems(parameters: Mapping[str, Any]) -> list[tuple[str, str, str]
     return []
 
 
-def bending_inert(parameters: Mapping[str, Any]) -> dict[str, str]:
+def bending_inert(parameters: Parameters) -> dict[str, str]:
     """Settings of the belt's bending without effect, each with the setting that makes it so."""
     if has_column(parameters):
         return {}

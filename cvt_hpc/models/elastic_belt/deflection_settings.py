@@ -6,7 +6,16 @@ from typing import Any
 
 import numpy as np
 
-from cvt_hpc.parameters import Column, FromFile, Parameter, RowError, not_negative, positive
+from cvt_hpc.parameters import (
+    Column,
+    FromFile,
+    Parameter,
+    Parameters,
+    Problem,
+    RowError,
+    not_negative,
+    positive,
+)
 from cvt_hpc.physics.deflection import cone_flexibilities, interpolated, table_problem
 from cvt_hpc.physics.geometry import variator
 from cvt_hpc.physics.ritz import modal_flexibilities, moving_modes
@@ -114,7 +123,7 @@ DEFLECTION: dict[str, Parameter] = {
 DEFLECTION_DEFAULTS = {key: parameter.default for key, parameter in DEFLECTION.items() if not parameter.file}
 
 
-def kept_modes(parameters: Mapping[str, Any], pulley: str) -> tuple[np.ndarray, np.ndarray, np.ndarray]:
+def kept_modes(parameters: Parameters, pulley: str) -> tuple[np.ndarray, np.ndarray, np.ndarray]:
     """Harmonics, flexibilities [m/N] and masses [kg] of the modes that are kept, by ascending frequency."""
     harmonic, flexibility, mass = (np.array(parameters[f"{pulley}_{key}"], float) for key in OF_MODE)
     order = np.argsort(-flexibility * mass, kind="stable")
@@ -123,7 +132,7 @@ def kept_modes(parameters: Mapping[str, Any], pulley: str) -> tuple[np.ndarray, 
 
 
 def disc_settings(
-    parameters: Mapping[str, Any], pulley: str, wrap: Sheaves, radius: float, turned: float
+    parameters: Parameters, pulley: str, wrap: Sheaves, radius: float, turned: float
 ) -> dict[str, Any]:
     """Data of one pulley's discs for `Sheaves`, at the reference stiffness, beside local bending.
 
@@ -147,7 +156,7 @@ def disc_settings(
     return {}
 
 
-def deflection_problems(parameters: Mapping[str, Any]) -> list[tuple[str, str, str]]:
+def deflection_problems(parameters: Parameters) -> list[Problem]:
     """Problems of the discs' deformation: (key, expected, found); the scene's sizes are taken as sound."""
     p = DEFLECTION_DEFAULTS | dict(parameters)
     kind = p["sheave_deformation"]
@@ -170,14 +179,14 @@ def deflection_problems(parameters: Mapping[str, Any]) -> list[tuple[str, str, s
     return problems
 
 
-def refuse_moving_discs(parameters: Mapping[str, Any]) -> list[tuple[str, str, str]]:
+def refuse_moving_discs(parameters: Parameters) -> list[Problem]:
     """Refuse discs with inertia, of which a method knows nothing."""
     if (DEFLECTION_DEFAULTS | dict(parameters))["sheave_deformation"] != "ritz":
         return []
     return [("sheave_deformation", "bending, cone or flexibilities but by the stepper imex", "ritz")]
 
 
-def _ritz_problems(parameters: Mapping[str, Any]) -> list[tuple[str, str, str]]:
+def _ritz_problems(parameters: Parameters) -> list[Problem]:
     p = parameters
     if "lanes" not in p:  # a general method
         return refuse_moving_discs(p)
@@ -198,7 +207,7 @@ def _ritz_problems(parameters: Mapping[str, Any]) -> list[tuple[str, str, str]]:
     return problems
 
 
-def deflection_inert(parameters: Mapping[str, Any]) -> dict[str, str]:
+def deflection_inert(parameters: Parameters) -> dict[str, str]:
     """Settings of the deformation without effect, each with the setting that makes it so."""
     kind = (DEFLECTION_DEFAULTS | dict(parameters))["sheave_deformation"]
     setting = f"sheave_deformation {kind}"

@@ -1,6 +1,6 @@
 """A transient run of the elastic belt by any general stepper: the belt as one system, sampled as ever."""
 
-from collections.abc import Mapping, Sequence
+from collections.abc import Sequence
 from typing import Any
 
 import numpy as np
@@ -20,10 +20,11 @@ from cvt_hpc.models.elastic_belt.sampling import Outcome
 from cvt_hpc.models.elastic_belt.sparsity import SparseJacobian
 from cvt_hpc.models.elastic_belt.validity import FAILURES
 from cvt_hpc.models.marched import Marched
+from cvt_hpc.parameters import Parameters
 from cvt_hpc.steppers.facts import Result
 from cvt_hpc.steppers.fastest_rate import STABLE, fastest_rate
 from cvt_hpc.steppers.marching import Marching
-from cvt_hpc.variables import Status
+from cvt_hpc.variables import Failure, Status
 
 SAMPLES_TOGETHER = 20  # between two checks of the samples: a run that has left its path goes not far
 
@@ -34,7 +35,7 @@ class GeneralTransient(Marched, OneLaneRun):
     Its resolved parameters [SI] have those of the stepper.
     """
 
-    def __init__(self, parameters: Mapping[str, Any], stepper: str) -> None:
+    def __init__(self, parameters: Parameters, stepper: str) -> None:
         p = parameters
         self.done = 0
         self.prolong(p)
@@ -58,7 +59,7 @@ class GeneralTransient(Marched, OneLaneRun):
             jacobian = SparseJacobian(self._flat)
             dense = stepper == "scipy_lsoda"  # others take it sparse
             self.marching.tell(jac=(lambda t, y: jacobian(t, y).toarray()) if dense else jacobian)
-        self.failure: tuple[Status, str] | None = None
+        self.failure: Failure | None = None
 
     @property
     def state(self) -> State:
@@ -84,7 +85,7 @@ class GeneralTransient(Marched, OneLaneRun):
         self._go_on_from(run)
         self.marching.begin(run.time, self._equations.pack(self._flat, run.state))
 
-    def advance(self, samples: int) -> tuple[Status, str] | None:
+    def advance(self, samples: int) -> Failure | None:
         """March on by so many samples at most, 0 compiles only; the failure, if the run cannot continue."""
         last = min(self.done + samples, self.samples)
         found = self._march(0) if samples == 0 else None
@@ -105,7 +106,7 @@ class GeneralTransient(Marched, OneLaneRun):
         self.marching.y[:] = self._equations.pack(self._flat, state)
         self._disturbed = True
 
-    def _march(self, count: int) -> tuple[Status, str] | None:
+    def _march(self, count: int) -> Failure | None:
         """March by `count` sampling intervals and record them."""
         rows = np.full((count, self.marching.y.size), np.nan)
         outcome = self.marching.advance(rows)
@@ -119,7 +120,7 @@ class GeneralTransient(Marched, OneLaneRun):
             return Status.FAILED_NUMERICS, self.marching.explain(outcome)
         return self._too_long() if np.isfinite(self._stable) else None
 
-    def _too_long(self) -> tuple[Status, str] | None:
+    def _too_long(self) -> Failure | None:
         """Whether an explicit step is beyond its limit, where friction only hums and nothing diverges."""
         rate = fastest_rate(self._system, self.time, self.marching.y, self._fastest)
         if self.marching.step * rate <= self._stable:

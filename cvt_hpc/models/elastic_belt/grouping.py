@@ -9,6 +9,7 @@ from cvt_hpc.models.elastic_belt import OWN_STEPPERS
 from cvt_hpc.models.elastic_belt.deflection_settings import MODE_KEYS, RITZ
 from cvt_hpc.models.elastic_belt.pulley_settings import are_free
 from cvt_hpc.models.elastic_belt.tilt_settings import elements_tilt
+from cvt_hpc.parameters import Parameters
 from cvt_hpc.variator.course import profile_table
 from cvt_hpc.variator.measures import measures, rounded
 
@@ -53,7 +54,7 @@ SHARED = (
 )
 
 
-def cost(parameters: Mapping[str, Any], stepper: str, step_cost: Mapping[str, float] = STEP_COST) -> Any:
+def cost(parameters: Parameters, stepper: str, step_cost: Mapping[str, float] = STEP_COST) -> Any:
     """Core-seconds of a batch; of general steppers, some of which choose their step, little is known.
 
     Resolved parameters of a run are numbers or arrays of them; `step_cost` is per station and time step, by
@@ -67,14 +68,14 @@ def cost(parameters: Mapping[str, Any], stepper: str, step_cost: Mapping[str, fl
     return share * step_cost.get(stepper, 1e-5) * p["stations"] * p["duration"] / p.get("step", 1e-6)
 
 
-def lanes(parameters: Mapping[str, Any], stepper: str) -> int:
+def lanes(parameters: Parameters, stepper: str) -> int:
     """Most runs that a batch can take, by parameters of one and the stepper's name; general ones take one."""
     if stepper not in OWN_STEPPERS or parameters["lanes"] == "stations":
         return 1
     return LANES[parameters["precision"]]
 
 
-def faded_coupling(parameters: Mapping[str, Any]) -> float:
+def faded_coupling(parameters: Parameters) -> float:
     """Coupling of stations by an implicit step [N s/m] below which it counts for nothing.
 
     Others are 1e4 times as large, and more.
@@ -83,7 +84,7 @@ def faded_coupling(parameters: Mapping[str, Any]) -> float:
     return FADED * rounded(size.force * size.time / size.length)
 
 
-def lane_key(parameters: Mapping[str, Any]) -> tuple:
+def lane_key(parameters: Parameters) -> tuple:
     """Values that two runs must have in common to be in one batch."""
     alike = (parameters[key] for key in SHARED if key in parameters)
     common = parameters["friction_memory"] > 0.0, are_free(parameters), faded_coupling(parameters)

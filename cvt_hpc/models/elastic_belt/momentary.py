@@ -6,13 +6,14 @@ the sums of the judged part; here it adds them to zero first, sample by sample, 
 
 from __future__ import annotations
 
-from collections.abc import Mapping, Sequence
-from typing import TYPE_CHECKING, Any
+from collections.abc import Sequence
+from typing import TYPE_CHECKING
 
 import numpy as np
 
 from cvt_hpc.models.elastic_belt.along_belt import ELSEWHERE, NEEDED, SLIDING
 from cvt_hpc.models.elastic_belt.sampling import PROFILES
+from cvt_hpc.parameters import Parameters
 from cvt_hpc.recording import sample_count
 
 if TYPE_CHECKING:
@@ -24,13 +25,13 @@ WORDS = {**ELSEWHERE, **SLIDING, "element_speed": PATH_SPEED}
 PRECISION = np.dtype(np.float32)
 
 
-def profiled_samples(parameters: Mapping[str, Any]) -> int:
+def profiled_samples(parameters: Parameters) -> int:
     """Samples of a run whose profiles are kept, the last ones."""
     p = parameters
     return min(round(p["profile_duration"] * p["sampling_rate"]), sample_count(p))
 
 
-def profile_bytes(parameters: Mapping[str, Any]) -> int:
+def profile_bytes(parameters: Parameters) -> int:
     """Size of the profiles over time of one run [byte]: in memory, and at most in its history."""
     values = profiled_samples(parameters) * parameters["stations"]
     return values * PRECISION.itemsize * max(len(NEEDED), len(WORDS))
@@ -43,7 +44,7 @@ class Momentary:
     all, where none is.
     """
 
-    def __init__(self, points: Sequence[Mapping[str, Any]], stations: int) -> None:
+    def __init__(self, points: Sequence[Parameters], stations: int) -> None:
         counts = [profiled_samples(point) for point in points]
         self.first = sample_count(points[0]) - max(counts)
         self._kept = [lane for lane, count in enumerate(counts) if count]

@@ -4,8 +4,6 @@ Of the defaults the same holds as of those in `variator/scene.py`: most are assu
 measured.
 """
 
-from typing import Any
-
 import numpy as np
 
 import cvt_hpc.models.elastic_belt.deflection_settings as deflection_settings
@@ -14,7 +12,7 @@ from cvt_hpc.models.elastic_belt.bending_settings import BENDING, bending_inert,
 from cvt_hpc.models.elastic_belt.pulley_checks import pulley_inert, pulley_problems, shaft_problems
 from cvt_hpc.models.elastic_belt.pulley_settings import DRIVEN_INERTIA, DRIVEN_SHAFT, PULLEYS, SHAFT
 from cvt_hpc.models.elastic_belt.tilt_settings import TILT, tilt_inert, tilt_problems
-from cvt_hpc.parameters import Parameter, not_negative, positive
+from cvt_hpc.parameters import Parameter, Parameters, Problem, not_negative, positive
 from cvt_hpc.physics.friction_laws import friction_inert, friction_problems
 from cvt_hpc.physics.geometry import variator, variator_problems
 from cvt_hpc.physics.sheaves import STIFFNESS_OF, stiffness_factors
@@ -162,14 +160,14 @@ PARAMETERS: dict[str, dict[str, Parameter]] = {
 }
 
 
-def check(parameters: dict[str, Any]) -> list[tuple[str, str, str]]:
+def check(parameters: Parameters) -> list[Problem]:
     """Problems that lie between parameters [SI]: (key, expected, found)."""
     p = parameters
     found = shape_problems(p) + profiles.profile_problems(p) + friction_problems(p)
     return found or pulley_problems(p)
 
 
-def shape_problems(parameters: dict[str, Any]) -> list[tuple[str, str, str]]:
+def shape_problems(parameters: Parameters) -> list[Problem]:
     """Problems between sizes: pulleys that overlap, play beyond reason. Result as of `check`."""
     p = parameters
     problems = variator_problems(p)
@@ -185,7 +183,7 @@ def shape_problems(parameters: dict[str, Any]) -> list[tuple[str, str, str]]:
     return problems + tilt_problems(p)
 
 
-def inert(parameters: dict[str, Any]) -> dict[str, str]:
+def inert(parameters: Parameters) -> dict[str, str]:
     """Parameters without effect on a run, so that a study does not vary them for nothing.
 
     By the name of the parameter, the setting that makes it so, e.g. "friction_law table".

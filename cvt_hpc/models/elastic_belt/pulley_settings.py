@@ -3,12 +3,11 @@
 No paper gives numbers of these: every default is an assumption, plausible and not measured.
 """
 
-from collections.abc import Mapping
 from typing import Any
 
 import numpy as np
 
-from cvt_hpc.parameters import Parameter, Substitute, not_negative, positive
+from cvt_hpc.parameters import Parameter, Parameters, Substitute, not_negative, positive
 from cvt_hpc.physics.shaft import Bearing, Seats, beam_flexibility, free_opening, shaft_compliance
 from cvt_hpc.variator.scene import TILT_LAG
 
@@ -34,7 +33,7 @@ def oil_factor(piston: tuple[float, ...], density: float) -> float:
 
 
 def _pressed(pulley: str) -> Substitute:
-    def thrust(parameters: Mapping[str, Any]) -> float:
+    def thrust(parameters: Parameters) -> float:
         piston = parameters[f"{pulley}_piston"]
         if len(piston) != 2:
             raise ValueError(f"{pulley}_piston beside it, the radii of the piston")
@@ -175,7 +174,7 @@ PULLEY_DEFAULTS = {
 }
 
 
-def are_free(parameters: Mapping[str, Any]) -> bool:
+def are_free(parameters: Parameters) -> bool:
     """Whether pulleys do more than turn by a given speed, or be pressed by a constant thrust.
 
     Reads no parameter that does not count: the parameters read decide which runs can share a batch.
@@ -195,7 +194,7 @@ def are_free(parameters: Mapping[str, Any]) -> bool:
     )
 
 
-def shaft_deflection(parameters: Mapping[str, Any], pulley: str, radius: float) -> tuple[float, float]:
+def shaft_deflection(parameters: Parameters, pulley: str, radius: float) -> tuple[float, float]:
     """Effect of a pulley's shaft on its groove: compliance [m/N], free opening by its bearings [m].
 
     From flat values of the run [SI] and the pitch radius [m] of the driving or the driven pulley.

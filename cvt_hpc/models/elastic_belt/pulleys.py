@@ -23,8 +23,8 @@ All of this stands for plain numbers as for lanes. Layers' speeds are counted fr
 speed, also where the pulley deviates from it, and so is m v^2: it is off by twice that deviation.
 """
 
-from collections.abc import Mapping, Sequence
-from typing import Any, NamedTuple
+from collections.abc import Sequence
+from typing import NamedTuple
 
 import numpy as np
 
@@ -37,6 +37,7 @@ from cvt_hpc.models.elastic_belt.pulley_settings import (
     oil_factor,
     shaft_deflection,
 )
+from cvt_hpc.parameters import Parameters
 from cvt_hpc.physics import capacity
 from cvt_hpc.physics.sheaves import Sheaves
 from cvt_hpc.variator import PULLEYS
@@ -51,7 +52,7 @@ class Pulleys(NamedTuple):
 
 
 def with_pulleys(
-    parameters: Mapping[str, Any], wraps: Sequence[Sheaves], radii: tuple[float, float]
+    parameters: Parameters, wraps: Sequence[Sheaves], radii: tuple[float, float]
 ) -> tuple[list[Sheaves], Pulleys]:
     """Sheaves as the contact takes them, on their shafts, and the constants of both pulleys.
 

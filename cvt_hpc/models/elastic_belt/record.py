@@ -1,6 +1,5 @@
 """Variables of the record of the elastic belt: names, units, and how each follows from the samples."""
 
-from collections.abc import Mapping
 from functools import partial
 from typing import Any
 
@@ -12,6 +11,7 @@ from cvt_hpc.models.elastic_belt.grouping import cost, lane_key, lanes
 from cvt_hpc.models.elastic_belt.history import histories
 from cvt_hpc.models.elastic_belt.momentary import profile_bytes
 from cvt_hpc.models.elastic_belt.pulley_settings import PULLEY_DEFAULTS, are_free, oil_factor
+from cvt_hpc.parameters import Parameters
 from cvt_hpc.variables import Coordinate, Variable, together
 from cvt_hpc.variator import PULLEYS, judging
 from cvt_hpc.variator.band import band
@@ -160,7 +160,7 @@ VARIABLES = (
 )
 
 
-def coordinates(parameters: Mapping[str, Any]) -> dict[str, Coordinate]:
+def coordinates(parameters: Parameters) -> dict[str, Coordinate]:
     """Coordinates of the record's dimensions, by flat parameters of the job."""
     of_peaks = {"peak": peaks.coordinate()} if parameters["modal_peaks"] == "on" else {}
     return {

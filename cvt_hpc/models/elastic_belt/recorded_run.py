@@ -1,6 +1,6 @@
 """Recording of every run of the elastic belt, with any stepper: its plan, its arrays and their reading."""
 
-from collections.abc import Iterator, Mapping, Sequence
+from collections.abc import Iterator, Sequence
 from contextlib import contextmanager
 from typing import TYPE_CHECKING, Any, NamedTuple
 
@@ -21,9 +21,10 @@ from cvt_hpc.models.elastic_belt.ring_settings import layer_count
 from cvt_hpc.models.elastic_belt.rings import ring_constants, without_saddle_friction
 from cvt_hpc.models.elastic_belt.sampling import CHANNELS, ENDED, PROFILES, Outcome, Probe, Sensors
 from cvt_hpc.models.elastic_belt.validity import doubt, reach_doubt
+from cvt_hpc.parameters import Parameters
 from cvt_hpc.physics.geometry import Variator
 from cvt_hpc.recording import sample_count, start_up_samples
-from cvt_hpc.variables import Status
+from cvt_hpc.variables import Failure, Values
 from cvt_hpc.vibration.ramped import ramped
 
 
@@ -41,7 +42,7 @@ class Recording(NamedTuple):
     first_judged: int  # samples before the judged part
 
 
-def recording(parameters: Mapping[str, Any], dtype: type) -> Recording:
+def recording(parameters: Parameters, dtype: type) -> Recording:
     """Plan of a run's recording, by its resolved parameters [SI] and the lanes' type of numbers."""
     p, grid = parameters, mesh(parameters)
     interval = 1.0 / p["sampling_rate"]
@@ -78,7 +79,7 @@ class Records:
         ENDED.
     """
 
-    def __init__(self, points: Sequence[Mapping[str, Any]], width: int, dtype: type) -> None:
+    def __init__(self, points: Sequence[Parameters], width: int, dtype: type) -> None:
         self.plan = recording(points[0], dtype)
         self.channels = self.plan.sensing.matrix.shape[0] + len(CHANNELS)
         stations = self.plan.mesh.cell.size
@@ -128,7 +129,7 @@ class RecordedRun:
             """Samples."""
 
         @property
-        def failure(self) -> tuple[Status, str] | None:
+        def failure(self) -> Failure | None:
             """Why the run cannot continue."""
 
         @property
@@ -139,7 +140,7 @@ class RecordedRun:
         def layer_sums(self) -> np.ndarray | None:
             """`lane_rings.SUMS` of ring layers over the judged part, (n + 1, 6); None where rings are one."""
 
-    def __init__(self, parameters: Mapping[str, Any], records: Records, lane: int = 0) -> None:
+    def __init__(self, parameters: Parameters, records: Records, lane: int = 0) -> None:
         self.parameters, self._records, self._lane = parameters, records, lane
         self._plan = plan = records.plan
         self.mesh, self.probes = plan.mesh, plan.probes
@@ -219,7 +220,7 @@ class RecordedRun:
         """Name of the region behind each station, (N,)."""
         return np.array(REGIONS)[self.mesh.region]
 
-    def numerical_doubt(self, record: dict[str, Any]) -> tuple[Status, str] | None:
+    def numerical_doubt(self, record: Values) -> Failure | None:
         """Whether a run that reached its end is not to be trusted; the reason, if so.
 
         By `power_residual`, `step_ripple` and `least_strand_force` of its record.
@@ -234,7 +235,7 @@ class OneLaneRun(RecordedRun):
 
     done: int
 
-    def prolong(self, parameters: Mapping[str, Any]) -> None:
+    def prolong(self, parameters: Parameters) -> None:
         """Make room for the samples of a longer duration, whose judged part has yet to come.
 
         The parameters differ from those of the run by `duration` and `judged_fraction` alone.

@@ -1,17 +1,15 @@
 """Variables of ring layers in a record: tension and speed by layer, loss and sliding by surface."""
 
-from collections.abc import Mapping
-from typing import Any
-
 import numpy as np
 
 from cvt_hpc.models.elastic_belt.lane_rings import LOSS, SLIDING, SPEED_SUM, TENSION
 from cvt_hpc.models.elastic_belt.ring_settings import MOST_LAYERS, layer_count
+from cvt_hpc.parameters import Parameters
 from cvt_hpc.variables import Coordinate, Variable, together
 from cvt_hpc.variator.variables import Measured
 
 
-def coordinates(parameters: Mapping[str, Any]) -> dict[str, Coordinate]:
+def coordinates(parameters: Parameters) -> dict[str, Coordinate]:
     """Dimensions of VARIABLES where the rings are layers: as many as there can be, for jobs that vary it."""
     if layer_count(parameters) == 1:
         return {}

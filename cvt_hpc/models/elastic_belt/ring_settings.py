@@ -3,10 +3,7 @@
 No paper gives numbers: thickness and friction are assumptions, those of common belts.
 """
 
-from collections.abc import Mapping
-from typing import Any
-
-from cvt_hpc.parameters import Parameter, not_negative, positive
+from cvt_hpc.parameters import Parameter, Parameters, Problem, not_negative, positive
 
 MOST_LAYERS = 12  # of pushbelts that are built: 9 to 12
 
@@ -48,12 +45,12 @@ RINGS: dict[str, Parameter] = {
 RING_DEFAULTS = {key: parameter.default for key, parameter in RINGS.items()}
 
 
-def layer_count(parameters: Mapping[str, Any]) -> int:
+def layer_count(parameters: Parameters) -> int:
     """Number of ring layers."""
     return int(parameters.get("ring_layers", 1))
 
 
-def ring_problems(parameters: Mapping[str, Any]) -> list[tuple[str, str, str]]:
+def ring_problems(parameters: Parameters) -> list[Problem]:
     """Problems of the layers, in the form of a model's check."""
     p = RING_DEFAULTS | dict(parameters)
     tolerance = p["layer_tolerance"]
@@ -71,7 +68,7 @@ def ring_problems(parameters: Mapping[str, Any]) -> list[tuple[str, str, str]]:
     ]
 
 
-def stack_problems(parameters: Mapping[str, Any], least_radius: float) -> list[tuple[str, str, str]]:
+def stack_problems(parameters: Parameters, least_radius: float) -> list[Problem]:
     """Rings that reach the axis of the smaller pulley, of the radius [m]: result as of a model's check."""
     p = RING_DEFAULTS | dict(parameters)
     key = "layer_thickness" if p["ring_layers"] > 1 else "ring_offset"
@@ -83,13 +80,13 @@ def stack_problems(parameters: Mapping[str, Any], least_radius: float) -> list[t
     return [(key, expected, f"{p[key]:g} m, the innermost {-1e3 * innermost:.4g} mm below the pitch line")]
 
 
-def rings_rub(parameters: Mapping[str, Any]) -> bool:
+def rings_rub(parameters: Parameters) -> bool:
     """Whether rings have friction, at the saddle or among each other."""
     p = RING_DEFAULTS | dict(parameters)
     return bool(p["ring_friction"] > 0.0 or (p["ring_layers"] > 1 and p["layer_friction"] > 0.0))
 
 
-def ring_inert(parameters: Mapping[str, Any]) -> dict[str, str]:
+def ring_inert(parameters: Parameters) -> dict[str, str]:
     """Settings of the layers without effect, each with the setting that makes it so."""
     p = RING_DEFAULTS | dict(parameters)
     if p["ring_layers"] == 1:
@@ -97,7 +94,7 @@ def ring_inert(parameters: Mapping[str, Any]) -> dict[str, str]:
     return {"ring_stribeck_speed": "ring_static_factor 1"} if p["ring_static_factor"] == 1.0 else {}
 
 
-def refuse_layers(parameters: Mapping[str, Any]) -> list[tuple[str, str, str]]:
+def refuse_layers(parameters: Parameters) -> list[Problem]:
     """The check of a method that knows one ring layer only."""
     count = layer_count(parameters)
     told = "1 with the explicit step; layers take imex or a general method such as dormand_prince"

@@ -16,8 +16,7 @@ mean speed. Rows V_RING and N_RING of a state have these. The layers' own rows f
 n contents less 1 + kappa d_k.
 """
 
-from collections.abc import Mapping
-from typing import Any, NamedTuple
+from typing import NamedTuple
 
 import numpy as np
 
@@ -27,6 +26,7 @@ from cvt_hpc.models.elastic_belt.belt import Belt, State
 from cvt_hpc.models.elastic_belt.lane_forces import LEAST_SHARE_OF_WIDTH
 from cvt_hpc.models.elastic_belt.rhs import lengthening
 from cvt_hpc.models.elastic_belt.ring_settings import RING_DEFAULTS, layer_count
+from cvt_hpc.parameters import Parameters
 from cvt_hpc.physics.layers import ring_friction, stack_forces
 
 FIRST_LAYER = len(f.FIELDS)  # row of a state with the first layer's speed
@@ -48,7 +48,7 @@ class Rings(NamedTuple):
     length: np.ndarray  # of each layer without tension, (n,) [m]
 
 
-def ring_constants(parameters: Mapping[str, Any], belt: Belt) -> Rings:
+def ring_constants(parameters: Parameters, belt: Belt) -> Rings:
     """Constants of the layers of one run, by its resolved parameters [SI] and the belt's constants."""
     p = RING_DEFAULTS | dict(parameters)
     n, thickness = layer_count(p), p["layer_thickness"]

@@ -10,12 +10,9 @@ grow, w being their angular frequency under tension and contact, and beyond 2 m 
 dampers c brake (`transverse_limit`). The step chosen stays at SAFE_SHARE of that.
 """
 
-from collections.abc import Mapping
-from typing import Any
-
 import numpy as np
 
-from cvt_hpc.parameters import Substitute
+from cvt_hpc.parameters import Parameters, Substitute
 from cvt_hpc.physics.geometry import cut_path, variator, variator_problems
 from cvt_hpc.physics.sheaves import axial_element_stiffness
 
@@ -43,7 +40,7 @@ NEEDS = (
 )
 
 
-def transverse_limit(parameters: Mapping[str, Any]) -> float:
+def transverse_limit(parameters: Parameters) -> float:
     """Longest stable step of the transverse motion [s], by flat values [SI] of a run.
 
     The fastest waves are two of the shortest cells long, in the grooves:
@@ -63,7 +60,7 @@ def transverse_limit(parameters: Mapping[str, Any]) -> float:
     return float(min(waves, dampers, cell / (p["driving_speed"] * path.driving_radius)))
 
 
-def chosen_step(parameters: Mapping[str, Any]) -> float:
+def chosen_step(parameters: Parameters) -> float:
     """Step of `imex` [s] for a scene, by flat values [SI] of NEEDS, to three digits.
 
     So that scenes whose limits differ by rounding have one step, and advance together. Of a scene that is no

@@ -1,13 +1,11 @@
 """Parameters of the elements' tilt on the rings; by default they do not tilt."""
 
-from collections.abc import Mapping
 from dataclasses import replace
-from typing import Any
 
 import numpy as np
 
 from cvt_hpc.models.elastic_belt.ring_settings import layer_count
-from cvt_hpc.parameters import Parameter
+from cvt_hpc.parameters import Parameter, Parameters, Problem
 from cvt_hpc.variator import scene
 
 TILT: dict[str, Parameter] = scene.TILT | {
@@ -25,12 +23,12 @@ TILT: dict[str, Parameter] = scene.TILT | {
 TILT_DEFAULTS = {key: parameter.default for key, parameter in TILT.items()}
 
 
-def elements_tilt(parameters: Mapping[str, Any]) -> bool:
+def elements_tilt(parameters: Parameters) -> bool:
     """Whether elements tilt on the rings."""
     return bool(np.isfinite(parameters.get("tilt_spring", np.inf)))
 
 
-def tilt_problems(parameters: Mapping[str, Any]) -> list[tuple[str, str, str]]:
+def tilt_problems(parameters: Parameters) -> list[Problem]:
     """Problems of the elements' tilt: (key, expected, found)."""
     if not elements_tilt(parameters):
         return []
@@ -41,6 +39,6 @@ def tilt_problems(parameters: Mapping[str, Any]) -> list[tuple[str, str, str]]:
     return []
 
 
-def tilt_inert(parameters: Mapping[str, Any]) -> dict[str, str]:
+def tilt_inert(parameters: Parameters) -> dict[str, str]:
     """Settings of the elements' tilt without effect, each with the setting that makes it so."""
     return {} if elements_tilt(parameters) else {"tilt_damper": "tilt_spring inf"}

@@ -1,13 +1,13 @@
 """Conditions that end a run, and checks of the numbers of a run that reached its end."""
 
-from collections.abc import Iterable, Mapping
-from typing import Any
+from collections.abc import Iterable
 
 import numpy as np
 
 from cvt_hpc.models.elastic_belt.belt import Mesh
 from cvt_hpc.models.elastic_belt.sampling import LARGEST_STRAIN, Outcome
-from cvt_hpc.variables import Status
+from cvt_hpc.parameters import Parameters
+from cvt_hpc.variables import Failure, Status, Values
 from cvt_hpc.variator import LARGEST_DISPLACEMENT
 from cvt_hpc.variator.slip import GAINED, LOST
 
@@ -39,7 +39,7 @@ FAILURES = {
 }
 
 
-def slack_doubt(bending_stiffness: float, cell: float, least_force: float) -> tuple[Status, str] | None:
+def slack_doubt(bending_stiffness: float, cell: float, least_force: float) -> Failure | None:
     """Whether a strand was pushed so slack that the growth in it is an effect of the mesh; the reason, if so.
 
     Under F = T - P - m v^2 < 0 waves of wave number k grow, at rest at the rate k sqrt((-F - EI k^2) / m): it
@@ -61,7 +61,7 @@ def power_limit(grid: Mesh) -> float:
     return LARGEST_POWER_RESIDUAL * max(1.0, REFERENCE_CELLS / grid.cell.size)
 
 
-def step_doubt(step: float, limit: float) -> tuple[Status, str] | None:
+def step_doubt(step: float, limit: float) -> Failure | None:
     """Whether a step of `imex` [s] is beyond the longest stable one [s] of `transverse_limit`."""
     if step <= BEYOND_LIMIT * limit:
         return None
@@ -69,7 +69,7 @@ def step_doubt(step: float, limit: float) -> tuple[Status, str] | None:
     return Status.FAILED_NUMERICS, f"{why}: shorter waves across the belt grow from step to step"
 
 
-def reach_doubt(force: np.ndarray, grooves: Iterable[np.ndarray]) -> tuple[Status, str] | None:
+def reach_doubt(force: np.ndarray, grooves: Iterable[np.ndarray]) -> Failure | None:
     """Whether contact went on to the last stations that a groove may hold; the reason, if so.
 
     It might go on beyond them. By axial line forces of the flanks (N,) [N/m], of a state or a mean, and the
@@ -81,7 +81,7 @@ def reach_doubt(force: np.ndarray, grooves: Iterable[np.ndarray]) -> tuple[Statu
     return Status.FAILED_NUMERICS, f"{why}: a longer contact would be cut off"
 
 
-def doubt(record: dict[str, Any], parameters: Mapping[str, Any], grid: Mesh) -> tuple[Status, str] | None:
+def doubt(record: Values, parameters: Parameters, grid: Mesh) -> Failure | None:
     """Whether a run that reached its end is not to be trusted; the reason, if so.
 
     By `power_residual`, `step_ripple` and `least_strand_force` of its record, and its flat values [SI].

@@ -1,10 +1,8 @@
 """Parameters of linear stability: the steady belt's parameters, and the limits of the verdict."""
 
-from typing import Any
-
 from cvt_hpc.models import steady_variator
 from cvt_hpc.models.steady_variator.parameters import OF_LAGS
-from cvt_hpc.parameters import Parameter, not_negative, positive
+from cvt_hpc.parameters import Parameter, Parameters, Problem, not_negative, positive
 
 LEAST_MEMORY = 1e-4  # [s]: shorter ones are outside the band that is searched (README.md)
 
@@ -27,7 +25,7 @@ PARAMETERS: dict[str, dict[str, Parameter]] = steady_variator.PARAMETERS | {
 }
 
 
-def check(parameters: dict[str, Any]) -> list[tuple[str, str, str]]:
+def check(parameters: Parameters) -> list[Problem]:
     """Problems that lie between parameters: as of `steady_variator`, and a band that is none."""
     p = parameters
     problems = steady_variator.check(p)
@@ -45,6 +43,6 @@ def check(parameters: dict[str, Any]) -> list[tuple[str, str, str]]:
     return problems
 
 
-def inert(parameters: dict[str, Any]) -> dict[str, str]:
+def inert(parameters: Parameters) -> dict[str, str]:
     """Parameters without effect: see `elastic_belt.inert`."""
     return {key: setting for key, setting in steady_variator.inert(parameters).items() if key not in OF_LAGS}

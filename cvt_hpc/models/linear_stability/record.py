@@ -1,12 +1,12 @@
 """The record of linear stability: the verdict, and the mode that grows fastest."""
 
-from collections.abc import Mapping
 from typing import Any, NamedTuple
 
 import numpy as np
 
 from cvt_hpc.models.steady_variator import record as steady_record
-from cvt_hpc.variables import Coordinate, Status, Variable, Vibrates
+from cvt_hpc.parameters import Parameters
+from cvt_hpc.variables import Coordinate, Status, Values, Variable, Vibrates
 
 VARIABLES = (
     Variable("growth_rate", "s-1", "of the mode that grows fastest; none found: nan"),
@@ -42,7 +42,7 @@ VARIABLES = (
 class Solution(NamedTuple):
     """Result of linear stability."""
 
-    steady: dict[str, Any] | ValueError  # numbers of the steady state, or why there is none
+    steady: Values | ValueError  # numbers of the steady state, or why there is none
     modes: list  # in the band, the one that grows fastest first
     # growth rate of the first mode of the state as `loosened` has it [1/s]; nan where that is the same
     loosened: float
@@ -51,7 +51,7 @@ class Solution(NamedTuple):
     undecided: float  # growth up to which nothing is decided [1/s]
 
 
-def coordinates(parameters: Mapping[str, Any]) -> dict[str, Coordinate]:
+def coordinates(parameters: Parameters) -> dict[str, Coordinate]:
     """Coordinates of the record's dimensions, whatever the parameters."""
     from cvt_hpc.models.elastic_belt.belt import REGIONS
 
@@ -59,12 +59,12 @@ def coordinates(parameters: Mapping[str, Any]) -> dict[str, Coordinate]:
     return steady_record.coordinates(parameters) | regions
 
 
-def cost(parameters: Mapping[str, Any], stepper: None) -> Any:
+def cost(parameters: Parameters, stepper: None) -> Any:
     """Core-seconds of a run: of a first steady state, and a tenth for each of two spectra."""
     return 1.2 * steady_record.cost(parameters, stepper)
 
 
-def solve(parameters: Mapping[str, Any]) -> Solution:
+def solve(parameters: Parameters) -> Solution:
     """Steady state and its modes for the parameters of a run [SI]."""
     from cvt_hpc.models.elastic_belt.belt import mesh
     from cvt_hpc.models.linear_stability.modes import DECAY, loosened, modes
@@ -91,7 +91,7 @@ def solve(parameters: Mapping[str, Any]) -> Solution:
     return Solution(means, first, growth, band[0], np.array(grid.starts), p["undecided_growth"])
 
 
-def judge(solution: Solution) -> dict[str, Any]:
+def judge(solution: Solution) -> Values:
     """The record of a run, its cost apart."""
     if isinstance(solution.steady, ValueError):
         return {"status": Status.FAILED_NUMERICS, "reason": str(solution.steady)}

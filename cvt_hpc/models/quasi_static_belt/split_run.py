@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from collections.abc import Mapping, Sequence
+from collections.abc import Sequence
 from typing import Any
 
 import numpy as np
@@ -18,7 +18,8 @@ from cvt_hpc.models.elastic_belt.validity import FAILURES
 from cvt_hpc.models.quasi_static_belt.basis import split_basis
 from cvt_hpc.models.quasi_static_belt.split_belt import motion, refresh, split_belt, work_space
 from cvt_hpc.models.quasi_static_belt.step import march
-from cvt_hpc.variables import Status
+from cvt_hpc.parameters import Parameters
+from cvt_hpc.variables import Failure, Status, Values
 
 BEYOND_LIMIT = 1.25  # of 2 / w of the fastest dynamic shape: contact may be stiffer than at rest
 
@@ -26,9 +27,9 @@ BEYOND_LIMIT = 1.25  # of 2 / w of the fastest dynamic shape: contact may be sti
 class SplitRun(OneLaneRun):
     """One run by the stepper "split", advanced sample by sample; attributes as of `RecordedRun`."""
 
-    failure: tuple[Status, str] | None
+    failure: Failure | None
 
-    def __init__(self, parameters: Mapping[str, Any], stepper: str) -> None:
+    def __init__(self, parameters: Parameters, stepper: str) -> None:
         p = parameters
         self.done, self.failure, self._begun = 0, None, 0.0
         self.prolong(p)
@@ -89,7 +90,7 @@ class SplitRun(OneLaneRun):
         self._go_on_from(run)
         self._motion = motion(self._model, run.state)
 
-    def numerical_doubt(self, record: dict[str, Any]) -> tuple[Status, str] | None:
+    def numerical_doubt(self, record: Values) -> Failure | None:
         """Whether a run that reached its end is not to be trusted, as `RecordedRun` has it; or its step."""
         found = super().numerical_doubt(record)
         limit = 2.0 / max(self._basis.fastest, 1e-9)
@@ -98,7 +99,7 @@ class SplitRun(OneLaneRun):
             found = Status.FAILED_NUMERICS, f"{why}: the fastest dynamic shapes grow from step to step"
         return found
 
-    def advance(self, samples: int) -> tuple[Status, str] | None:
+    def advance(self, samples: int) -> Failure | None:
         """March on by so many samples at most, 0 compiles only; the failure, if the run cannot continue."""
         if samples == 0:
             self._march(self._model, self._motion, self._work, 0, self._noted)

@@ -1,13 +1,13 @@
 """The steady equations of a belt, and paths along which their constants change while a solution follows."""
 
-from collections.abc import Callable, Mapping
-from typing import Any
+from collections.abc import Callable
 
 import numpy as np
 
 from cvt_hpc.models.elastic_belt.belt import belt_constants
 from cvt_hpc.models.steady_variator.equations import Equations
 from cvt_hpc.models.steady_variator.newton import Solvable, newton
+from cvt_hpc.parameters import Parameters
 from cvt_hpc.physics.friction import softened
 
 # [N], in the default scene: dampers push by 100 N or so, which a gap's strain times this does not reach
@@ -44,7 +44,7 @@ class Continuation:
     `equations` are those under the present constants, `whole` the belt's own constants.
     """
 
-    def __init__(self, parameters: Mapping[str, Any]) -> None:
+    def __init__(self, parameters: Parameters) -> None:
         self.whole = belt_constants(parameters)
         self.equations = Equations(parameters, self.whole)
 

@@ -19,7 +19,6 @@ right-hand side jumps at eps_0 = 0, and a push between 0 and D |v_0,s| has no ot
 is 10 to 50 nm.
 """
 
-from collections.abc import Mapping
 from typing import Any
 
 import numpy as np
@@ -39,6 +38,7 @@ from cvt_hpc.models.elastic_belt.one_system import SIZES as SIZES_OF_ROWS
 from cvt_hpc.models.elastic_belt.pulleys import moving_states
 from cvt_hpc.models.elastic_belt.rhs import strains
 from cvt_hpc.models.steady_variator.linearised import Linearisation, corners, rates_beyond_corners
+from cvt_hpc.parameters import Parameters
 
 LATE = 1e9  # [s]: load and damping are those after any start-up
 # sizes that count alike in each unknown of the default scene: w, eps_0, eps_1, v_f; Q_0, Q_1, driven speed,
@@ -56,7 +56,7 @@ class Equations:
     unknowns.
     """
 
-    def __init__(self, parameters: Mapping[str, Any], belt: Belt) -> None:
+    def __init__(self, parameters: Parameters, belt: Belt) -> None:
         self.belt = belt._replace(bridging_stiffness=belt.element_stiffness)
         self._flat = flat_belt(self.belt, LATE)
         self._linearise = Linearisation(self._flat)

@@ -8,9 +8,8 @@ belt slips through, since constant friction carries less than a falling one.
 """
 
 import math
-from collections.abc import Callable, Mapping
+from collections.abc import Callable
 from contextlib import suppress
-from typing import Any
 
 import numpy as np
 
@@ -26,6 +25,7 @@ from cvt_hpc.models.steady_variator.continuation import (
 )
 from cvt_hpc.models.steady_variator.newton import newton
 from cvt_hpc.models.steady_variator.settling import settled
+from cvt_hpc.parameters import Parameters
 from cvt_hpc.physics.capacity import carried_torque, torque_limit
 from cvt_hpc.physics.friction import friction_coefficient
 
@@ -49,7 +49,7 @@ class SlipsThrough(NoSteadyState):
 class FirstStates:
     """First states of one belt, from its resolved parameters [SI] and its continuation."""
 
-    def __init__(self, parameters: Mapping[str, Any], continuation: Continuation) -> None:
+    def __init__(self, parameters: Parameters, continuation: Continuation) -> None:
         self._parameters, self._course = parameters, continuation
         belt = continuation.whole
         slow = min(belt.driving_speed / SLOWEST_MARCH, 1.0)

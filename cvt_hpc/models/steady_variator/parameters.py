@@ -1,14 +1,12 @@
 """Parameters of the steady belt: the elastic belt's parameters, but for those of a run's course."""
 
-from typing import Any
-
 from cvt_hpc.models import elastic_belt
 from cvt_hpc.models.elastic_belt.parameters import shape_problems
 from cvt_hpc.models.elastic_belt.pulley_checks import steady_pulley_problems
-from cvt_hpc.parameters import Parameter
+from cvt_hpc.parameters import Parameter, Parameters, Problem
 from cvt_hpc.physics.friction_laws import friction_problems
 
-OF_THE_COURSE: dict[str, Any] = {
+OF_THE_COURSE: Parameters = {
     "load_history": "constant",
     "load_start": 0.0,
     "speed_history": "constant",
@@ -30,17 +28,17 @@ PARAMETERS: dict[str, dict[str, Parameter]] = {
 }
 
 
-def check(parameters: dict[str, Any]) -> list[tuple[str, str, str]]:
+def check(parameters: Parameters) -> list[Problem]:
     """Problems that lie between parameters: as of `elastic_belt`."""
     return belt_problems(parameters) or steady_pulley_problems(parameters)
 
 
-def belt_problems(parameters: dict[str, Any]) -> list[tuple[str, str, str]]:
+def belt_problems(parameters: Parameters) -> list[Problem]:
     """Problems of the belt, whatever its load. Result as of `check`."""
     return shape_problems(parameters) + friction_problems(parameters)
 
 
-def inert(parameters: dict[str, Any]) -> dict[str, str]:
+def inert(parameters: Parameters) -> dict[str, str]:
     """Parameters without effect: see `elastic_belt.inert`."""
-    found = elastic_belt.inert(parameters | OF_THE_COURSE) | dict.fromkeys(OF_LAGS, "a steady state")
+    found = elastic_belt.inert({**parameters, **OF_THE_COURSE}) | dict.fromkeys(OF_LAGS, "a steady state")
     return {key: setting for key, setting in found.items() if key not in OF_THE_COURSE}

@@ -5,7 +5,6 @@ state is taken down along a path (Newton's homotopy), r(x) = (1 - share) r(x_hel
 equations have one to begin with.
 """
 
-from collections.abc import Mapping
 from typing import Any
 
 import numpy as np
@@ -17,6 +16,7 @@ from cvt_hpc.models.elastic_belt.one_system import pulled_by
 from cvt_hpc.models.elastic_belt.pulley_settings import DRIVEN_INERTIA, PULLEY_DEFAULTS, are_free
 from cvt_hpc.models.elastic_belt.rhs import contact_forces, fresh_contacts
 from cvt_hpc.models.steady_variator.equations import Equations
+from cvt_hpc.parameters import Parameters
 from cvt_hpc.variator.measures import measures
 
 # Keys that free a pulley, each with a value that does not
@@ -39,7 +39,7 @@ HELD = {
 ANY_LAG = 1e-3
 
 
-def held(parameters: Mapping[str, Any]) -> dict[str, Any]:
+def held(parameters: Parameters) -> dict[str, Any]:
     """Parameters of the same belt between pulleys that turn by a given speed under a constant thrust."""
     found = dict(parameters) | HELD
     if np.isinf(found["driven_inertia"]):
@@ -47,7 +47,7 @@ def held(parameters: Mapping[str, Any]) -> dict[str, Any]:
     return found
 
 
-def freed(parameters: Mapping[str, Any]) -> dict[str, Any] | None:
+def freed(parameters: Parameters) -> dict[str, Any] | None:
     """Parameters under which a steady state knows of clearances; None where no pulley is free."""
     p = PULLEY_DEFAULTS | dict(parameters)
     if p["tilt_lag"] == 0.0 and (p["collar_clearance"] or p["bearing_clearance"]):

@@ -6,9 +6,6 @@ is dissipative where friction is constant, so that it settles near enough, unles
 friction carries: then the belt slips through.
 """
 
-from collections.abc import Mapping
-from typing import Any
-
 import numpy as np
 
 from cvt_hpc.models.elastic_belt import fields as f
@@ -19,6 +16,7 @@ from cvt_hpc.models.elastic_belt.state_march import StateMarch
 from cvt_hpc.models.elastic_belt.step_choice import SAFE_SHARE, transverse_limit
 from cvt_hpc.models.steady_variator.equations import Equations
 from cvt_hpc.models.steady_variator.newton import newton
+from cvt_hpc.parameters import Parameters
 from cvt_hpc.physics.sheaves import axial_element_stiffness
 
 LONGEST_STEP = 9e-6  # [s]: the state is Newton's, the march need only come near
@@ -28,7 +26,7 @@ RISE = 0.02  # [s]: the load rises, the start-up's damping fades
 ROUNDS, ROUNDS_A_LOOK = 6, 0.3  # of the belt: the march ends; between two tries of Newton's iteration
 
 
-def settled(parameters: Mapping[str, Any], equations: Equations, tolerance: float) -> np.ndarray | Outcome:
+def settled(parameters: Parameters, equations: Equations, tolerance: float) -> np.ndarray | Outcome:
     """Return the steady unknowns, (n,), that a transient comes to, with mesh and start of the run [SI].
 
     Otherwise the outcome of the march, OK if it has not settled in time. `equations` are those of the belt

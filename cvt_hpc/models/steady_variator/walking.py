@@ -5,9 +5,9 @@ in quarters. Where the load does not separate states, the arc of their curve doe
 """
 
 import math
-from collections.abc import Callable, Iterator, Mapping, Sequence
+from collections.abc import Callable, Iterator, Sequence
 from functools import partial
-from typing import Any, NamedTuple
+from typing import NamedTuple
 
 import numpy as np
 from scipy.optimize import brentq, minimize_scalar
@@ -22,6 +22,7 @@ from cvt_hpc.models.steady_variator.equations import Equations
 from cvt_hpc.models.steady_variator.first_states import FirstStates, SlipsThrough
 from cvt_hpc.models.steady_variator.parameters import OF_THE_COURSE
 from cvt_hpc.models.steady_variator.released import Released, freed, held, nearest
+from cvt_hpc.parameters import Parameters
 from cvt_hpc.variator import GROSS_SLIP, PULLEYS
 
 __all__ = ["NoSteadyState", "SlipsThrough", "Steady", "SteadyBelt"]
@@ -86,7 +87,7 @@ class Between(NamedTuple):
 class SteadyBelt:
     """Steady states of one belt along its load; the course in its resolved parameters [SI] does not count."""
 
-    def __init__(self, parameters: Mapping[str, Any]) -> None:
+    def __init__(self, parameters: Parameters) -> None:
         given = {**parameters, **OF_THE_COURSE, "load": 0.0}
         free = freed(given)
         self._free = None if free is None else Equations(free, belt_constants(free))
