@@ -3,11 +3,13 @@
 Only ratio, driving_speed and thrust of the defaults are from a paper (Lebrecht et al. 2004, sec. 3.1); sizes
 are those of a common passenger-car belt; seven were fitted to what that paper states of the noise, as
 jobs/lebrecht_2004.toml says; every other default is an assumption, plausible and not measured.
+
+Size of a scene beside the default one: limits with a unit scale with it, whatever its units are.
 """
 
 from collections import Counter
 from collections.abc import Iterable, Sequence
-from typing import Any
+from typing import Any, NamedTuple
 
 import numpy as np
 
@@ -217,3 +219,28 @@ def length_problems(parameters: Parameters, keys: Sequence[str]) -> list[Problem
     first = next(key for key, length in lengths.items() if length == usual)
     expected = f"as many values as {first} has, {usual}"
     return [(key, expected, f"{length or 'none'}") for key, length in lengths.items() if length != usual]
+
+
+class Measures(NamedTuple):
+    """A scene's thrust, time of a radian of the driving pulley, and distance of shafts over the default's."""
+
+    force: float
+    time: float
+    length: float
+
+
+def measures(parameters: Parameters) -> Measures:
+    """Measures of a scene, by flat values [SI] of a run: all 1 for the default one."""
+    p = parameters
+    thrust, speed, distance = (
+        p[key] / SCENE[key].default for key in ("thrust", "driving_speed", "centre_distance")
+    )
+    return Measures(thrust, 1.0 / speed, distance)
+
+
+def rounded(share: float) -> float:
+    """The power of 2 next to a share: for limits of rounding, of which the order of magnitude counts.
+
+    Scenes that differ by powers of 2 in their units alone then have the same digits to the last.
+    """
+    return float(2.0 ** np.rint(np.log2(share)))

@@ -7,7 +7,7 @@ from cvt_hpc.models.elastic_belt import fields as f
 from cvt_hpc.models.elastic_belt import lane_fields as lf
 from cvt_hpc.models.elastic_belt.belt import belt_constants, initial_state
 from cvt_hpc.models.elastic_belt.bending import second_difference
-from cvt_hpc.models.elastic_belt.imex_bending import (
+from cvt_hpc.models.elastic_belt.imex_stations import (
     DAMPED,
     IMPLICIT,
     LAG_SHARE,

@@ -5,11 +5,9 @@ import pytest
 
 from cvt_hpc.errors import InputError
 from cvt_hpc.models.elastic_belt import inert
-from cvt_hpc.models.elastic_belt.bending_settings import bending_inert
 from cvt_hpc.models.elastic_belt.deflection_settings import CONE, MODE_FILES, MODE_KEYS, RITZ, TABLE_KEYS
 from cvt_hpc.models.elastic_belt.pulley_checks import pulley_inert
-from cvt_hpc.models.elastic_belt.ring_settings import ring_inert
-from cvt_hpc.models.elastic_belt.tilt_settings import tilt_inert
+from cvt_hpc.models.elastic_belt.ring_settings import bending_inert, ring_inert, tilt_inert
 from cvt_hpc.simulation import record_variables
 from support.marched import fresh_record, job
 

@@ -11,10 +11,10 @@ import pytest
 from cvt_hpc.errors import InputError
 from cvt_hpc.job import build_job
 from cvt_hpc.models.auto.rules import coarse
+from cvt_hpc.models.elastic_belt import check
 from cvt_hpc.models.elastic_belt import fields as f
 from cvt_hpc.models.elastic_belt import lane_fields as lf
 from cvt_hpc.models.elastic_belt.belt import belt_constants, initial_state
-from cvt_hpc.models.elastic_belt.parameters import check
 from cvt_hpc.models.elastic_belt.recorded_run import recording
 from cvt_hpc.models.elastic_belt.step_choice import REFERENCE_STEP, SAFE_SHARE, chosen_step, transverse_limit
 from cvt_hpc.models.elastic_belt.validity import doubt, step_doubt

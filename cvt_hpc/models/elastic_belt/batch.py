@@ -1,4 +1,7 @@
-"""Runs of the elastic belt that advance together by a step in lanes, or one whose stations fill them."""
+"""Runs of the elastic belt that advance together by a step in lanes, or one whose stations fill them.
+
+The belt's own steps from states of one's choice: runs without a job, a recording or a verdict.
+"""
 
 from __future__ import annotations
 
@@ -10,36 +13,32 @@ import numpy as np
 
 from cvt_hpc.lanes import LaneArray, split
 from cvt_hpc.models.elastic_belt import fields as f
-from cvt_hpc.models.elastic_belt import lane_belt, ring_step
+from cvt_hpc.models.elastic_belt import lane_belt, ring_step, sampling
 from cvt_hpc.models.elastic_belt import lane_fields as lf
-from cvt_hpc.models.elastic_belt.belt import State, belt_constants, initial_state, random_strands
+from cvt_hpc.models.elastic_belt.belt import Belt, State, belt_constants, initial_state, random_strands
 from cvt_hpc.models.elastic_belt.explicit import FIELDS_OF_WORK, step_explicit
 from cvt_hpc.models.elastic_belt.grouping import LANES, lanes
 from cvt_hpc.models.elastic_belt.imex import step_imex
 from cvt_hpc.models.elastic_belt.lane_forces import derive
-from cvt_hpc.models.elastic_belt.march import Sampled, begin_at_once, march, take_sample
 from cvt_hpc.models.elastic_belt.recorded_run import RecordedRun, Records
 from cvt_hpc.models.elastic_belt.ring_settings import layer_count
 from cvt_hpc.models.elastic_belt.rings import ring_constants, with_layers, without_saddle_friction
-from cvt_hpc.models.elastic_belt.sampling import CONTACT_SOLVES, ENDED_AT, OUTCOME, REPEATED, Outcome, Samples
+from cvt_hpc.models.elastic_belt.sampling import begin_at_once, march, take_sample
 from cvt_hpc.models.elastic_belt.step_choice import transverse_limit
 from cvt_hpc.models.elastic_belt.validity import FAILURES, step_doubt
 from cvt_hpc.parameters import Parameters
 from cvt_hpc.recording import steps_per_sample
 from cvt_hpc.variables import Failure, Values
 
+_Work = lane_belt.Work | ring_step.RingWork
 PRECISIONS = {"double": np.float64, "single": np.float32}
-STEPS: dict[str, tuple[Callable[[lane_belt.LaneState], Any], Callable[..., None]]] = {  # work space, march
-    "imex": (
-        partial(lane_belt.work_space, fields=lf.FIELDS_OF_WORK),
-        partial(march, begin_at_once, step_imex, take_sample),
-    ),
-    "explicit": (
-        partial(lane_belt.work_space, fields=FIELDS_OF_WORK),
-        partial(march, begin_at_once, step_explicit, take_sample),
-    ),
+_imex_march = partial(march, begin_at_once, step_imex, take_sample)
+_explicit_march = partial(march, begin_at_once, step_explicit, take_sample)
+_ring_march = partial(march, ring_step.begin_rings, ring_step.step_rings, ring_step.take_sample_of_rings)
+STEPS = {  # fields of the work space, march
+    "imex": (lf.FIELDS_OF_WORK, _imex_march),
+    "explicit": (FIELDS_OF_WORK, _explicit_march),
 }
-_march_rings = partial(march, ring_step.begin_rings, ring_step.step_rings, ring_step.take_sample_of_rings)
 
 
 class Paused(NamedTuple):
@@ -91,13 +90,16 @@ class Batch:
         self.belts = [belt_constants(point) for point in padded]
         self.dtype = PRECISIONS[p["precision"]]
         starts = [initial_state(point, belt) for point, belt in zip(padded, self.belts, strict=True)]
-        self._work_space, self._march = STEPS[stepper]
+        fields, self._march = STEPS[stepper]
+        self._work_space: Callable[[lane_belt.LaneState], _Work] = partial(
+            lane_belt.work_space, fields=fields
+        )
         if layer_count(p) > 1:
             rings = [ring_constants(point, belt) for point, belt in zip(padded, self.belts, strict=True)]
             self.belts = [without_saddle_friction(belt) for belt in self.belts]
             starts = [with_layers(*each) for each in zip(starts, self.belts, rings, strict=True)]
             self._work_space = partial(ring_step.ring_work, belts=self.belts, rings=rings)
-            self._march = _march_rings
+            self._march = _ring_march
         self.state = lane_belt.lane_state(self.belts, starts, self.dtype)
         self._belt = lane_belt.lane_belt(self.belts, self.dtype)
         self.work = self._work_space(self.state)
@@ -139,8 +141,8 @@ class Batch:
     @property
     def running(self) -> bool:
         """Whether any run has not ended."""
-        outcomes = self.records.ended.data[0, OUTCOME, : len(self.points)]
-        return self.done < self.samples and bool((outcomes == Outcome.OK).any())
+        outcomes = self.records.ended.data[0, sampling.OUTCOME, : len(self.points)]
+        return self.done < self.samples and bool((outcomes == sampling.Outcome.OK).any())
 
     def advance(self, samples: int) -> None:
         """March on by so many samples at most, no further than to the next border of the judged part."""
@@ -154,7 +156,7 @@ class Batch:
         kept = self.records.momentary.first
         borders = plan.kick, plan.first_judged, kept, self.samples
         last = min(first + samples, *(border for border in borders if border > first))
-        whole = Sampled(self._belt, self.state, self.work.stations)
+        whole = sampling.Sampled(self._belt, self.state, self.work.stations)
         marched = self._belt, self.state, self.work
         if self._parts > 1:
             marched = (
@@ -166,7 +168,7 @@ class Batch:
         for end in ends:
             rows = self.done - self._recorded, end - self._recorded
             with self.records.profiles_of(self.done) as profiles:
-                into = Samples(plan.sensing, self.rows, profiles, self.records.ended)
+                into = sampling.Samples(plan.sensing, self.rows, profiles, self.records.ended)
                 self._march(*marched, self.step, self.steps_per_sample, whole, into, *rows)
             self.done = end
 
@@ -182,7 +184,7 @@ class Batch:
         self.state = lane_belt.lane_state(self.belts, states, self.dtype)
         self.work = self._work_space(self.state)
         derive(self._belt, self.state, self.work.stations)
-        self.begun = self.records.ended.data[0, ENDED_AT] = runs[0].time
+        self.begun = self.records.ended.data[0, sampling.ENDED_AT] = runs[0].time
         if self.done > self.plan.first_judged:
             self.records.without_means()
             if isinstance(self.work, ring_step.RingWork):
@@ -206,7 +208,7 @@ class Batch:
         return self._ordered[lane].T
 
 
-def _parted_work(work: Any, parts: int) -> Any:
+def _parted_work(work: _Work, parts: int) -> _Work:
     """A step's work space for linked parts."""
     if isinstance(work, ring_step.RingWork):
         return ring_step.parted_ring_work(work, parts)
@@ -223,8 +225,8 @@ class LaneRun(RecordedRun):
     @property
     def failure(self) -> Failure | None:
         """The failure, where the run cannot continue."""
-        outcome = int(self._ended(OUTCOME))
-        return FAILURES[Outcome(outcome)] if outcome else None
+        outcome = int(self._ended(sampling.OUTCOME))
+        return FAILURES[sampling.Outcome(outcome)] if outcome else None
 
     def numerical_doubt(self, record: Values) -> Failure | None:
         """Whether a run that reached its end is not to be trusted, as `RecordedRun` has it; or its step."""
@@ -242,7 +244,7 @@ class LaneRun(RecordedRun):
     @property
     def time(self) -> float:
         """Simulated time [s]."""
-        return self._ended(ENDED_AT)
+        return self._ended(sampling.ENDED_AT)
 
     @property
     def state(self) -> State:
@@ -269,13 +271,13 @@ class LaneRun(RecordedRun):
     @property
     def contact_solves(self) -> int:
         """Linear solves of the contact problem so far."""
-        return int(self._ended(CONTACT_SOLVES))
+        return int(self._ended(sampling.CONTACT_SOLVES))
 
     def counters(self) -> dict[str, int]:
         """Work done so far, by its name."""
         counts = {"steps": self.steps, "contact_solves": self.contact_solves}
         if self.batch.stepper == "imex":
-            counts["repeats"] = int(self._ended(REPEATED))
+            counts["repeats"] = int(self._ended(sampling.REPEATED))
         return counts
 
     @property
@@ -285,3 +287,64 @@ class LaneRun(RecordedRun):
 
     def _ended(self, what: int) -> float:
         return float(self._records.ended.data[0, what, self._lane])
+
+
+class StateMarch:
+    """Runs on the same mesh, each in a lane of its own, by the kernel that recorded runs take.
+
+    One belt and state for each lane; the states stay as they are. The lanes' dtype is np.float64 or
+    np.float32, the stepper "imex" or "explicit".
+    """
+
+    def __init__(
+        self, belts: Sequence[Belt], states: Sequence[State], dtype: type = np.float64, stepper: str = "imex"
+    ) -> None:
+        self.belts = belts
+        self.lanes = lane_belt.lane_state(list(belts), list(states), dtype)
+        fields, self._march = STEPS[stepper]
+        self.work = lane_belt.work_space(self.lanes, fields)
+        self._constants = lane_belt.lane_belt(list(belts), dtype)
+        n, width = belts[0].cell.size, len(belts)
+        nowhere = np.zeros(2, dtype=np.int64)
+        # an interval of 1 s: the dampers' mean power is their work since the last sample
+        no_weights: np.ndarray = np.zeros((0, n), dtype)
+        self._samples = sampling.Samples(
+            sampling.Sensors(no_weights, nowhere, nowhere, nowhere, nowhere, nowhere, 1.0),
+            LaneArray(1, len(sampling.CHANNELS), width),
+            LaneArray(n, len(sampling.PROFILES), width),
+            LaneArray(1, len(sampling.ENDED), width),
+        )
+        self._layer_work = np.array([state.scalars[f.LAYER_WORK] for state in states])
+
+    def advance(self, steps: int, step: float) -> None:
+        """March, and take a sample at the end: with no step at all, of the state as it is."""
+        # the state may have been changed since
+        derive(self._constants, self.lanes, self.work.stations)
+        whole = sampling.Sampled(self._constants, self.lanes, self.work.stations)
+        self._march(self._constants, self.lanes, self.work, step, steps, whole, self._samples, 0, 1)
+        self._layer_work += self._samples.rows.data[0, sampling.CHANNELS.index("layer_loss")]
+
+    def outcome(self, lane: int = 0) -> sampling.Outcome:
+        """Why the run has ended, or that it continues."""
+        return sampling.Outcome(int(self._samples.ended.data[0, sampling.OUTCOME, lane]))
+
+    def state(self, lane: int = 0) -> State:
+        """The state, with the dampers' work since the start."""
+        state = lane_belt.take_lane(self.lanes, lane, self.belts[lane])
+        state.scalars[f.LAYER_WORK] = self._layer_work[lane]
+        return state
+
+    def profiles(self) -> dict[str, np.ndarray]:
+        """PROFILES by name, summed over the samples, (N, lanes) each."""
+        return dict(zip(sampling.PROFILES, self._samples.profiles.data.transpose(1, 0, 2), strict=True))
+
+    def channels(self, lane: int = 0) -> dict[str, float]:
+        """CHANNELS by name, of the last sample."""
+        return dict(zip(sampling.CHANNELS, self._samples.rows.data[0, :, lane].tolist(), strict=True))
+
+
+def sampled(belt: Belt, state: State) -> StateMarch:
+    """A run of which one sample is taken, of a state as it is."""
+    march = StateMarch([belt], [state])
+    march.advance(0, 1.0)
+    return march

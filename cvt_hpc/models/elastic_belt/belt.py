@@ -15,11 +15,16 @@ import numpy as np
 
 from cvt_hpc.models.elastic_belt import fields as f
 from cvt_hpc.models.elastic_belt.bending import bending_bands, bending_load, squared_curvature
-from cvt_hpc.models.elastic_belt.bending_settings import BENDING_DEFAULTS, CURVATURE_TERMS, has_column
 from cvt_hpc.models.elastic_belt.deflection_settings import disc_settings
 from cvt_hpc.models.elastic_belt.grouping import faded_coupling
 from cvt_hpc.models.elastic_belt.pulleys import Pulleys, settled_tilt, with_pulleys
-from cvt_hpc.models.elastic_belt.tilt_settings import TILT_DEFAULTS, elements_tilt
+from cvt_hpc.models.elastic_belt.ring_settings import (
+    BENDING_DEFAULTS,
+    CURVATURE_TERMS,
+    TILT_DEFAULTS,
+    elements_tilt,
+    has_column,
+)
 from cvt_hpc.parameters import Parameters
 from cvt_hpc.physics.friction import FrictionLaw, given_law
 from cvt_hpc.physics.geometry import Variator, cut_path, variator
@@ -32,7 +37,7 @@ from cvt_hpc.physics.sheaves import (
 )
 from cvt_hpc.variator import LARGEST_DISPLACEMENT, PULLEYS
 from cvt_hpc.variator.course import SPEED, THRUST, profile_table
-from cvt_hpc.variator.measures import Measures, measures, rounded
+from cvt_hpc.variator.scene import Measures, measures, rounded
 from cvt_hpc.vibration.ramped import ramped
 
 REGIONS = ("driving arc", "t1", "driven arc", "t2")

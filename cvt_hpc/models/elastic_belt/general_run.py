@@ -8,7 +8,7 @@ import numpy as np
 from cvt_hpc.kernels import kernel
 from cvt_hpc.models.elastic_belt import fields as f
 from cvt_hpc.models.elastic_belt import lane_fields as lf
-from cvt_hpc.models.elastic_belt import one_system, ring_system
+from cvt_hpc.models.elastic_belt import one_system, rings
 from cvt_hpc.models.elastic_belt.belt import Belt, State, belt_constants, initial_state, random_strands
 from cvt_hpc.models.elastic_belt.column import pressed_strains
 from cvt_hpc.models.elastic_belt.lane_belt import put_lane
@@ -43,9 +43,9 @@ class GeneralTransient(Marched, OneLaneRun):
         self._disturbed = False
         is_layered = layer_count(p) > 1
         # the module that knows the unknowns, and its constants and work space
-        self._equations: Any = ring_system if is_layered else one_system
+        self._equations: Any = rings if is_layered else one_system
         self._flat: Any = (
-            ring_system.flat_rings(self.belt, ring_constants(p, self.belt))
+            rings.flat_rings(self.belt, ring_constants(p, self.belt))
             if is_layered
             else one_system.flat_belt(self.belt)
         )

@@ -8,10 +8,10 @@ import numpy as np
 from cvt_hpc.models.elastic_belt import OWN_STEPPERS
 from cvt_hpc.models.elastic_belt.deflection_settings import MODE_KEYS, RITZ
 from cvt_hpc.models.elastic_belt.pulley_settings import are_free
-from cvt_hpc.models.elastic_belt.tilt_settings import elements_tilt
+from cvt_hpc.models.elastic_belt.ring_settings import elements_tilt
 from cvt_hpc.parameters import Parameters
 from cvt_hpc.variator.course import profile_table
-from cvt_hpc.variator.measures import measures, rounded
+from cvt_hpc.variator.scene import measures, rounded
 
 # Core-seconds per station and time step of a batch, measured on one core of an EPYC (Zen 5) at 160 stations.
 STEP_COST = {"imex": 1.3e-7, "explicit": 6.2e-8}

@@ -7,8 +7,8 @@ from typing import TYPE_CHECKING
 import numpy as np
 
 from cvt_hpc.models.elastic_belt import along_belt as along
+from cvt_hpc.models.elastic_belt.along_belt import PRECISION, WORDS
 from cvt_hpc.models.elastic_belt.fluctuation import at_stations
-from cvt_hpc.models.elastic_belt.momentary import PRECISION, WORDS
 from cvt_hpc.models.elastic_belt.pulley_settings import PULLEY_DEFAULTS
 from cvt_hpc.storage.netcdf import attributes
 from cvt_hpc.variator import PULLEYS

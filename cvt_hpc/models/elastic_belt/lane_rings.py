@@ -14,7 +14,6 @@ from cvt_hpc.kernels import kernel, merged_kernel
 from cvt_hpc.lanes import LaneArray, absolute, ahead, behind, fma, like, maximum, select
 from cvt_hpc.models.elastic_belt import fields as f
 from cvt_hpc.models.elastic_belt import lane_fields as lf
-from cvt_hpc.models.elastic_belt import power_terms
 from cvt_hpc.models.elastic_belt.belt import Belt
 from cvt_hpc.models.elastic_belt.lane_belt import LaneBelt, LaneState, alike
 from cvt_hpc.models.elastic_belt.lane_forces import LEAST_SHARE_OF_WIDTH, lane_speed_share
@@ -200,12 +199,8 @@ def audit_layers(
         for strand in range(2):
             for i in range(n):
                 add(sums, i, TENSION + strand, stiffness * layers[rings.middles[strand], i])
-    rows[k, first + power_terms.RING_LOSS] = rows[k, first + power_terms.RING_LOSS] + like(
-        loss, rows[k, first]
-    )
-    rows[k, first + power_terms.STORED_ENERGY] = rows[k, first + power_terms.STORED_ENERGY] + like(
-        stored, rows[k, first]
-    )
+    rows[k, first + f.RING_LOSS] = rows[k, first + f.RING_LOSS] + like(loss, rows[k, first])
+    rows[k, first + f.STORED_ENERGY] = rows[k, first + f.STORED_ENERGY] + like(stored, rows[k, first])
 
 
 @merged_kernel

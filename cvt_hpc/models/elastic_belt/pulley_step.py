@@ -4,7 +4,6 @@ from cvt_hpc.kernels import kernel, merged_kernel
 from cvt_hpc.lanes import LaneArray, fma, like, select, sqrt
 from cvt_hpc.models.elastic_belt import fields as f
 from cvt_hpc.models.elastic_belt import lane_fields as lf
-from cvt_hpc.models.elastic_belt import power_terms
 from cvt_hpc.models.elastic_belt.lane_belt import LaneBelt, LaneState
 from cvt_hpc.models.elastic_belt.lane_forces import lane_given_thrust, lane_load, lane_speed_share
 from cvt_hpc.models.elastic_belt.pulleys import beyond_clearance, drive_torque, pulley_rates
@@ -152,12 +151,10 @@ def audit_pulleys(
     rates, tilting, axial = lane_pulley_rates(belt, state, driving / turning, -driven / speed)
     mobility = like(c[0, lf.FIRST_LAW + f.DRIVING_MOBILITY], speed)
     torque = drive_torque(c, lf.FIRST_LAW, excess, lane_load(belt, state.time[0], speed))
-    rows[k, first + power_terms.DRIVING_POWER] = select(mobility > 0.0, torque * turning, driving)
+    rows[k, first + f.DRIVING_POWER] = select(mobility > 0.0, torque * turning, driving)
     is_free = like(c[0, lf.FIRST_LAW + f.DRIVEN_MOBILITY], speed) > 0.0
-    rows[k, first + power_terms.LOAD_POWER] = select(
-        is_free, rows[k, first + power_terms.LOAD_POWER], -driven
-    )
-    stored = rows[k, first + power_terms.STORED_ENERGY]
+    rows[k, first + f.LOAD_POWER] = select(is_free, rows[k, first + f.LOAD_POWER], -driven)
+    stored = rows[k, first + f.STORED_ENERGY]
     stored += select(mobility > 0.0, 0.5 * turning * turning / mobility, 0.0)
     # both sheaves along the shaft: axial force in, thrust and spring out, the rest is the lag's
     damping = like(c[0, lf.AXIAL_DAMPING], speed)
@@ -168,7 +165,7 @@ def audit_pulleys(
     )
     thrust_power = fma(-damping, rates[1], axial[1] - springs[1]) * rates[1]
     thrust_power += fma(-damping, rates[3], axial[0] - springs[0]) * rates[3]
-    rows[k, first + power_terms.THRUST_POWER] = thrust_power
+    rows[k, first + f.THRUST_POWER] = thrust_power
     stored += 0.5 * fma(springs[0], shift, springs[1] * position)
     for wrap in range(2):
         tilted = f.FIRST_STATE + (f.DRIVEN_COS if wrap else f.DRIVING_COS)
@@ -184,5 +181,5 @@ def audit_pulleys(
         stored += 0.5 * (
             stiffness * fma(elastic, elastic, beside * beside) - fma(put_in, one, across * other)
         )
-    rows[k, first + power_terms.LAG_LOSS] = lag
-    rows[k, first + power_terms.STORED_ENERGY] = stored
+    rows[k, first + f.LAG_LOSS] = lag
+    rows[k, first + f.STORED_ENERGY] = stored

@@ -5,12 +5,14 @@ from typing import Any
 
 import numpy as np
 
-from cvt_hpc.models.elastic_belt import fluctuation, ring_record
+from cvt_hpc.models.elastic_belt import fluctuation
+from cvt_hpc.models.elastic_belt.along_belt import profile_bytes
 from cvt_hpc.models.elastic_belt.belt import MODES
 from cvt_hpc.models.elastic_belt.grouping import cost, lane_key, lanes
 from cvt_hpc.models.elastic_belt.history import histories
-from cvt_hpc.models.elastic_belt.momentary import profile_bytes
+from cvt_hpc.models.elastic_belt.lane_rings import LOSS, SLIDING, SPEED_SUM, TENSION
 from cvt_hpc.models.elastic_belt.pulley_settings import PULLEY_DEFAULTS, are_free, oil_factor
+from cvt_hpc.models.elastic_belt.ring_settings import MOST_LAYERS, layer_count
 from cvt_hpc.parameters import Parameters
 from cvt_hpc.variables import Coordinate, Variable, together
 from cvt_hpc.variator import PULLEYS, judging
@@ -92,6 +94,19 @@ def fluctuations(measured: Measured) -> tuple[Any, ...]:
     return -(shares * dual) @ measured.means["flank_power"], *fed, *taken, remainder
 
 
+def of_layers(measured: Measured) -> tuple[np.ndarray, ...] | None:
+    """Values of ring layers and their surfaces; not known where the rings are one."""
+    means = measured.layer_means
+    if means is None:
+        return None
+    padded = np.full((MOST_LAYERS + 1, means.shape[1]), np.nan)
+    padded[: len(means)] = means
+    # the ears have no layer behind them
+    padded[len(means) - 1, TENSION:] = np.nan
+    tensions, sliding = padded[:MOST_LAYERS, TENSION : TENSION + 2], padded[:, SLIDING : SLIDING + 2]
+    return tensions, padded[:MOST_LAYERS, SPEED_SUM], padded[:, LOSS], sliding
+
+
 VARIABLES = (
     *judging.VIBRATION,
     *together(
@@ -149,7 +164,37 @@ VARIABLES = (
         "speed that alternates from step to step, root mean square over the belt's mass and the judged part",
         of=lambda m: np.sqrt(np.mean(m.part("step_ripple") ** 2)),
     ),
-    *ring_record.VARIABLES,
+    *together(
+        of_layers,
+        Variable(
+            "layer_tension",
+            "N",
+            "mean tension of each ring layer in the middle of the strand; nan: no such layer",
+            dims=("ring_layer", "strand"),
+            words="tension by ring layer",
+        ),
+        Variable(
+            "layer_speed",
+            "m s-1",
+            "mean speed of each ring layer around the belt",
+            dims=("ring_layer",),
+            words="speed by ring layer",
+        ),
+        Variable(
+            "surface_loss",
+            "W",
+            "mean loss of each sliding surface of the rings; together they are ring_loss",
+            dims=("ring_surface",),
+            words="loss by ring surface",
+        ),
+        Variable(
+            "surface_sliding",
+            "m s-1",
+            "mean size of the sliding speed of each surface of the rings on the arc",
+            dims=("ring_surface", "pulley"),
+            words="sliding by ring surface",
+        ),
+    ),
     *together(fluctuations, *fluctuation.VARIABLES),
     Variable(
         "least_strand_force",
@@ -162,16 +207,19 @@ VARIABLES = (
 
 def coordinates(parameters: Parameters) -> dict[str, Coordinate]:
     """Coordinates of the record's dimensions, by flat parameters of the job."""
-    of_peaks = {"peak": peaks.coordinate()} if parameters["modal_peaks"] == "on" else {}
-    return {
-        **COORDINATES,
-        **of_peaks,
-        **ring_record.coordinates(parameters),
-        "arc_part": Coordinate(
-            np.arange(1, fluctuation.ARC_PARTS + 1), "1", "part of the wrap", "from its inlet to its outlet"
-        ),
+    found = dict(COORDINATES)
+    if parameters["modal_peaks"] == "on":
+        found["peak"] = peaks.coordinate()
+    if layer_count(parameters) > 1:  # as many as there can be, for jobs that vary it
+        words = "0: saddle; k: between the layers k and k + 1; behind the outermost layer the elements' ears"
+        layers, surfaces = np.arange(1, MOST_LAYERS + 1), np.arange(MOST_LAYERS + 1)
+        found["ring_layer"] = Coordinate(layers, "1", "ring layer", "the inner one first")
+        found["ring_surface"] = Coordinate(surfaces, "1", "surface of ring layers", words)
+    parts, waves = np.arange(1, fluctuation.ARC_PARTS + 1), np.arange(1, MODES + 1)
+    return found | {
+        "arc_part": Coordinate(parts, "1", "part of the wrap", "from its inlet to its outlet"),
         "ramp_share": ramp.coordinate(),
-        "half_waves": Coordinate(np.arange(1, MODES + 1), "1", "half waves", "along the strand"),
+        "half_waves": Coordinate(waves, "1", "half waves", "along the strand"),
         "frequency_bin": frequency_bins(parameters),
     }
 

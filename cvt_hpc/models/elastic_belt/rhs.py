@@ -42,8 +42,7 @@ import numpy as np
 from cvt_hpc.kernels import kernel, merged_kernel
 from cvt_hpc.models.elastic_belt import fields as f
 from cvt_hpc.models.elastic_belt.belt import Belt, State
-from cvt_hpc.models.elastic_belt.column import column_across, column_forces
-from cvt_hpc.models.elastic_belt.element_tilt import tilt_rate, tilted_sliding
+from cvt_hpc.models.elastic_belt.column import column_across, column_forces, tilt_rate, tilted_sliding
 from cvt_hpc.physics import compliance
 from cvt_hpc.physics.compliance import Contact, plain_contact, solve_wrap
 from cvt_hpc.physics.flank import flank_forces, flank_sliding

@@ -1,9 +1,75 @@
 """Parameters of the rings as a stack of layers: those that a job may set, conflicts, and keys without effect.
 
 No paper gives numbers: thickness and friction are assumptions, those of common belts.
+
+Parameters of the belt's bending: curvature terms, and the moment of the pressed elements.
+
+Parameters of the elements' tilt on the rings; by default they do not tilt.
 """
 
+from dataclasses import replace
+
+import numpy as np
+
 from cvt_hpc.parameters import Parameter, Parameters, Problem, not_negative, positive
+from cvt_hpc.variator import scene
+
+CURVATURE_TERMS = ("none", "path", "straight")
+EDGES = ("outer_edge", "inner_edge")
+
+BENDING: dict[str, Parameter] = {
+    "curvature_terms": Parameter(
+        "none",
+        "",
+        "terms of the path's curvature in the transverse motion (Bullinger et al. 2005, eqs 14-21): none, or "
+        "those of a belt with the path as shape at rest, or of a belt straight at rest",
+        choices=CURVATURE_TERMS,
+    ),
+    "column_bending": Parameter(
+        "off",
+        "",
+        "rocking: pressed elements bear a bending moment, and rock on the edges of their faces (eqs 22-24)",
+        choices=("off", "rocking"),
+    ),
+    "column_stiffness": positive(
+        0.5,
+        "N m^2",
+        "EI of the pressed elements while their faces rest on each other",
+        sensible=(0.0001, 10000.0),
+    ),
+    "outer_edge": not_negative(
+        1e-3,
+        "m",
+        "k+: from the pitch line outwards to the edge of the elements' faces",
+        sensible=(1e-6, 0.05),
+    ),
+    "inner_edge": not_negative(
+        0.0, "m", "k-: from the pitch line inwards to the edge of the elements' faces", sensible=(1e-6, 0.05)
+    ),
+}
+
+BENDING_DEFAULTS = {key: parameter.default for key, parameter in BENDING.items()}
+
+
+def has_column(parameters: Parameters) -> bool:
+    """Whether pressed elements bear a bending moment."""
+    return bool(parameters.get("column_bending", "off") == "rocking")
+
+
+def bending_problems(parameters: Parameters) -> list[Problem]:
+    """Problems of the belt's bending: (key, expected, found)."""
+    p = BENDING_DEFAULTS | dict(parameters)
+    if p["curvature_terms"] != "none" and p["longitudinal_mass"] != 1.0:
+        return [("curvature_terms", "none with longitudinal_mass other than 1", p["curvature_terms"])]
+    return []
+
+
+def bending_inert(parameters: Parameters) -> dict[str, str]:
+    """Settings of the belt's bending without effect, each with the setting that makes it so."""
+    if has_column(parameters):
+        return {}
+    return dict.fromkeys(("column_stiffness", *EDGES), "column_bending off")
+
 
 MOST_LAYERS = 12  # of pushbelts that are built: 9 to 12
 
@@ -99,3 +165,39 @@ def refuse_layers(parameters: Parameters) -> list[Problem]:
     count = layer_count(parameters)
     told = "1 with the explicit step; layers take imex or a general method such as dormand_prince"
     return [("ring_layers", told, str(count))] if count > 1 else []
+
+
+TILT: dict[str, Parameter] = scene.TILT | {
+    "tilt_spring": replace(
+        scene.TILT["tilt_spring"],
+        default=np.inf,
+        description=f"{scene.TILT['tilt_spring'].description}; inf: none tilts",
+        exclusive=True,
+        allow_infinite=True,
+        sensible=(1.0, np.inf),
+    ),
+    "tilt_damper": replace(scene.TILT["tilt_damper"], exclusive=True),
+}
+
+TILT_DEFAULTS = {key: parameter.default for key, parameter in TILT.items()}
+
+
+def elements_tilt(parameters: Parameters) -> bool:
+    """Whether elements tilt on the rings."""
+    return bool(np.isfinite(parameters.get("tilt_spring", np.inf)))
+
+
+def tilt_problems(parameters: Parameters) -> list[Problem]:
+    """Problems of the elements' tilt: (key, expected, found)."""
+    if not elements_tilt(parameters):
+        return []
+    if layer_count(parameters) > 1:
+        return [("tilt_spring", "inf with ring_layers above 1", f"{parameters['tilt_spring']:g} N")]
+    if parameters["ring_offset"] == 0.0:
+        return [("ring_offset", "other than 0, the lever of the rings, where elements tilt", "0 m")]
+    return []
+
+
+def tilt_inert(parameters: Parameters) -> dict[str, str]:
+    """Settings of the elements' tilt without effect, each with the setting that makes it so."""
+    return {} if elements_tilt(parameters) else {"tilt_damper": "tilt_spring inf"}

@@ -32,16 +32,20 @@ from cvt_hpc.models.elastic_belt import lane_fields as lf
 from cvt_hpc.models.elastic_belt import lane_forces as forces
 from cvt_hpc.models.elastic_belt import lane_rings
 from cvt_hpc.models.elastic_belt.belt import Belt
-from cvt_hpc.models.elastic_belt.imex import MOST_PASSES, advance_belt, forget
-from cvt_hpc.models.elastic_belt.imex_bending import move_across, move_with_layers
-from cvt_hpc.models.elastic_belt.imex_stations import assemble, damp_across
-from cvt_hpc.models.elastic_belt.imex_system import TURNS_BACK, eliminate, substitute
+from cvt_hpc.models.elastic_belt.imex import (
+    MOST_PASSES,
+    TURNS_BACK,
+    advance_belt,
+    eliminate,
+    forget,
+    substitute,
+)
+from cvt_hpc.models.elastic_belt.imex_stations import assemble, damp_across, move_across, move_with_layers
 from cvt_hpc.models.elastic_belt.lane_belt import LaneBelt, LaneState, Work, work_space
 from cvt_hpc.models.elastic_belt.lane_rings import LaneRings
-from cvt_hpc.models.elastic_belt.march import Sampled, take_sample
 from cvt_hpc.models.elastic_belt.pulley_step import advance_pulleys
 from cvt_hpc.models.elastic_belt.rings import FIRST_LAYER, Rings
-from cvt_hpc.models.elastic_belt.sampling import Samples
+from cvt_hpc.models.elastic_belt.sampling import Sampled, Samples, take_sample
 from cvt_hpc.physics.layers import ring_friction
 
 # Fields of RingWork.layers, STRIDE of each layer: strain; of the eliminated chain the increment by its own

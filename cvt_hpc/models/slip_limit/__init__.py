@@ -11,7 +11,6 @@ Parameters of the limit of slip that a job may set: the steady belt's parameters
 
 from cvt_hpc.models import steady_variator
 from cvt_hpc.models.elastic_belt.pulley_checks import slipping_pulley_problems
-from cvt_hpc.models.steady_variator.parameters import belt_problems
 from cvt_hpc.parameters import Parameter, Parameters, Problem
 
 PARAMETERS: dict[str, dict[str, Parameter]] = {
@@ -37,12 +36,10 @@ PARAMETERS: dict[str, dict[str, Parameter]] = {
 DEFAULT_STEPPER = None
 STEPPERS: dict[str, str] = {}
 
-__all__ = ["DEFAULT_STEPPER", "PARAMETERS", "STEPPERS", "check", "inert"]
-
 
 def check(parameters: Parameters) -> list[Problem]:
     """Problems that lie between parameters: those of the belt, or a thrust sought for no load."""
-    problems = belt_problems(parameters) + slipping_pulley_problems(parameters)
+    problems = steady_variator.belt_problems(parameters) + slipping_pulley_problems(parameters)
     if parameters["sought"] == "thrust" and parameters["load"] == 0.0:
         problems.append(("load", 'other than 0 where sought = "thrust"', "0 N m"))
     return problems

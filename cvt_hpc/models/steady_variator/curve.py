@@ -29,8 +29,8 @@ from scipy.sparse import csr_array, vstack
 from scipy.sparse.csgraph import connected_components
 from scipy.sparse.linalg import splu
 
+from cvt_hpc.models.steady_variator.continuation import FAR, mean_size
 from cvt_hpc.models.steady_variator.equations import MOMENT, SPEED, Equations
-from cvt_hpc.models.steady_variator.newton import FAR, mean_size
 
 # Steps, as the root mean square of the unknowns over their sizes: first, longest, and shortest that is tried
 FIRST, LONGEST, SHORTEST = 1e-3, 0.1, 1e-12
