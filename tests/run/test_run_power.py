@@ -180,9 +180,7 @@ def powers_and_storing(state, **values):
     now, rates, works = _audited(belt, state), [], []
     for step in (TINY, 2 * TINY):
         after = march("explicit", belt, state, step, 1)
-        rates.append(
-            (_audited(belt, after)[fields.STORED_ENERGY] - now[fields.STORED_ENERGY]) / step
-        )
+        rates.append((_audited(belt, after)[fields.STORED_ENERGY] - now[fields.STORED_ENERGY]) / step)
         works.append(after.scalars[fields.LAYER_WORK] / step)
     # extrapolated to step 0; the dampers' loss is their work in steps
     powers = dict(zip(POWERS, now, strict=True)) | {POWERS[fields.LAYER_LOSS]: 2 * works[0] - works[1]}

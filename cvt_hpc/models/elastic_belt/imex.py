@@ -19,35 +19,17 @@ The system of the fast step: stresses into its rows, elimination along the belt,
 """
 
 from cvt_hpc.kernels import kernel, merged_kernel
-from cvt_hpc.lanes import (
-    LaneArray,
-    absolute,
-    ahead,
-    anywhere,
-    around,
-    behind,
-    fma,
-    from_ahead,
-    from_behind,
-    like,
-    minimum,
-    ring_solution,
-    select,
-)
+from cvt_hpc.lanes.functions import absolute, anywhere, fma, like, minimum, select
+from cvt_hpc.lanes.kinds import LaneArray
+from cvt_hpc.lanes.rings import ahead, around, behind, from_ahead, from_behind, ring_solution
 from cvt_hpc.models.elastic_belt import fields as f
 from cvt_hpc.models.elastic_belt import lane_fields as lf
 from cvt_hpc.models.elastic_belt import lane_forces as forces
+from cvt_hpc.models.elastic_belt import lane_tilt as tilting
 from cvt_hpc.models.elastic_belt.imex_stations import assemble, damp_across, move_across, move_with_layers
 from cvt_hpc.models.elastic_belt.lane_belt import LaneBelt, LaneState, Work
 from cvt_hpc.models.elastic_belt.lane_column import foresee_column, lane_column
 from cvt_hpc.models.elastic_belt.lane_forces import lane_belt_speed
-from cvt_hpc.models.elastic_belt.lane_tilt import (
-    add_turn,
-    carry_tilt,
-    follow_layers,
-    lane_tilt,
-    turn_elements,
-)
 from cvt_hpc.models.elastic_belt.pulley_step import advance_pulleys
 from cvt_hpc.physics.flank import flank_sliding
 
@@ -276,8 +258,8 @@ def step_imex(belt: LaneBelt, state: LaneState, work: Work, step: float) -> None
     stations = work.stations
     forces.lane_sliding(belt, state, stations)
     if belt.tilts:
-        carry_tilt(belt, state, step)
-        lane_tilt(belt, state, stations, step)
+        tilting.carry_tilt(belt, state, step)
+        tilting.lane_tilt(belt, state, stations, step)
     damp_across(belt, state, work)
     assemble(belt, state, work, step, False)
     coupled = move_across(belt, state, work, step)
@@ -298,9 +280,9 @@ def step_imex(belt: LaneBelt, state: LaneState, work: Work, step: float) -> None
                 foresee_column(belt, state, stations, lf.PUSH, step)
     move_with_layers(belt, state, work, coupled)
     if belt.tilts:
-        follow_layers(belt, state, stations)
-        turn_elements(belt, state, step)
-        add_turn(state, step)
+        tilting.follow_layers(belt, state, stations)
+        tilting.turn_elements(belt, state, step)
+        tilting.add_turn(state, step)
     taken, moment = advance_belt(belt, state, work, step)
     advance_pulleys(belt, state, taken, moment, step)
     state.time[0] += step

@@ -24,21 +24,8 @@ after friction has taken its part, feeds the shortest waves.
 """
 
 from cvt_hpc.kernels import kernel, merged_kernel
-from cvt_hpc.lanes import (
-    absolute,
-    ahead,
-    anywhere,
-    behind,
-    fma,
-    from_ahead,
-    from_behind,
-    like,
-    minimum,
-    reciprocals,
-    ring_solution,
-    select,
-    sqrt,
-)
+from cvt_hpc.lanes.functions import absolute, anywhere, fma, like, minimum, reciprocals, select, sqrt
+from cvt_hpc.lanes.rings import ahead, behind, from_ahead, from_behind, ring_solution
 from cvt_hpc.models.elastic_belt import fields as f
 from cvt_hpc.models.elastic_belt import lane_fields as lf
 from cvt_hpc.models.elastic_belt import lane_forces as forces

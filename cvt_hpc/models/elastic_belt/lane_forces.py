@@ -5,23 +5,9 @@ ones each step's own.
 """
 
 from cvt_hpc.kernels import kernel, merged_kernel
-from cvt_hpc.lanes import (
-    LaneArray,
-    ahead,
-    anywhere,
-    at_station,
-    behind,
-    decay,
-    fma,
-    from_ahead,
-    from_behind,
-    like,
-    maximum,
-    reciprocals,
-    select,
-    set_station,
-    sqrt,
-)
+from cvt_hpc.lanes.functions import anywhere, decay, fma, like, maximum, reciprocals, select, sqrt
+from cvt_hpc.lanes.kinds import LaneArray
+from cvt_hpc.lanes.rings import ahead, at_station, behind, from_ahead, from_behind, set_station
 from cvt_hpc.models.elastic_belt import fields as f
 from cvt_hpc.models.elastic_belt import lane_fields as lf
 from cvt_hpc.models.elastic_belt.lane_belt import LaneBelt, LaneState
@@ -33,15 +19,7 @@ from cvt_hpc.physics.flank import flank_sliding, tangential_sliding
 from cvt_hpc.physics.friction import formula_coefficient, law_numbers, saturation, table_coefficient
 from cvt_hpc.physics.friction_laws import Law
 from cvt_hpc.physics.moving_discs import open_gaps, turn_discs
-from cvt_hpc.variator.course import (
-    LOAD,
-    SPEED,
-    THRUST,
-    faded_damping,
-    load_course,
-    multiple_at,
-    speed_course,
-)
+from cvt_hpc.variator import course
 
 MOST_CONTACT_ROUNDS = 200
 LEAST_FORCE = 1e-12  # [N/m]: for a quotient of forces that may both be 0
@@ -111,8 +89,8 @@ def lane_load(belt: LaneBelt, time: float, pattern):
     """Torque at the driving pulley [N m], as `rhs.load_at` has it, in lanes like `pattern`."""
     c = belt.constants
     start, load = like(c[0, lf.LOAD_START], pattern), like(c[0, lf.LOAD], pattern)
-    torque = load_course(time, belt.rise_time, belt.ramp_end, start, load)
-    return torque * multiple_at(belt.profile, LOAD, time)
+    torque = course.load_course(time, belt.rise_time, belt.ramp_end, start, load)
+    return torque * course.multiple_at(belt.profile, course.LOAD, time)
 
 
 @merged_kernel
@@ -121,15 +99,15 @@ def lane_speed_share(belt: LaneBelt, time: float, pattern):
     share = like(1.0, pattern)
     if belt.speed_changes:
         start = like(belt.constants[0, lf.START_SHARE], pattern)
-        share = speed_course(time, belt.rise_time, belt.ramp_end, start)
-        share = share * multiple_at(belt.profile, SPEED, time)
+        share = course.speed_course(time, belt.rise_time, belt.ramp_end, start)
+        share = share * course.multiple_at(belt.profile, course.SPEED, time)
     return share
 
 
 @merged_kernel
 def lane_given_thrust(belt: LaneBelt, time: float, pattern):
     """Thrust on the driven pulley [N], as `rhs.thrust_at`, in lanes like `pattern`."""
-    return like(belt.constants[0, lf.THRUST], pattern) * multiple_at(belt.profile, THRUST, time)
+    return like(belt.constants[0, lf.THRUST], pattern) * course.multiple_at(belt.profile, course.THRUST, time)
 
 
 @merged_kernel
@@ -205,7 +183,7 @@ def remembered(belt: LaneBelt, j: int, way, belt_speed, step: float, speed, old,
 @merged_kernel
 def lane_damping(belt: LaneBelt, time: float):
     """Transverse damping [N s/m^2], as `rhs.damping_at`."""
-    damping = belt.constants[0, lf.TRANSVERSE_DAMPING] + faded_damping(
+    damping = belt.constants[0, lf.TRANSVERSE_DAMPING] + course.faded_damping(
         time, belt.rise_time, belt.start_damping
     )
     return damping

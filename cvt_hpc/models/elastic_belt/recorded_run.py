@@ -18,15 +18,6 @@ from cvt_hpc.models.elastic_belt.lane_belt import lane_belt, lane_state
 from cvt_hpc.models.elastic_belt.pulley_settings import are_free
 from cvt_hpc.models.elastic_belt.ring_settings import layer_count
 from cvt_hpc.models.elastic_belt.rings import ring_constants, without_saddle_friction
-from cvt_hpc.models.elastic_belt.sampling import (
-    CHANNELS,
-    ENDED,
-    PROFILES,
-    Outcome,
-    Probe,
-    Sensors,
-    sample_state,
-)
 from cvt_hpc.models.elastic_belt.validity import doubt, reach_doubt
 from cvt_hpc.parameters import Parameters
 from cvt_hpc.physics.geometry import Variator
@@ -39,8 +30,8 @@ class Recording(NamedTuple):
     """The recorded quantities, with places and times."""
 
     mesh: Mesh
-    probes: tuple[Probe, ...]  # where displacement is recorded
-    sensing: Sensors  # the same for kernels
+    probes: tuple[sampling.Probe, ...]  # where displacement is recorded
+    sensing: sampling.Sensors  # the same for kernels
     interval: float  # of sampling [s]
     samples: int  # of the whole run
     # samples before the strands are disturbed; the start-up's damping has gone by then: from there on a
@@ -88,12 +79,12 @@ class Records:
 
     def __init__(self, points: Sequence[Parameters], width: int, dtype: type) -> None:
         self.plan = recording(points[0], dtype)
-        self.channels = self.plan.sensing.matrix.shape[0] + len(CHANNELS)
+        self.channels = self.plan.sensing.matrix.shape[0] + len(sampling.CHANNELS)
         stations = self.plan.mesh.cell.size
-        self.profiles = LaneArray(stations, len(PROFILES), width)
-        self._none = LaneArray(0, len(PROFILES), width)
+        self.profiles = LaneArray(stations, len(sampling.PROFILES), width)
+        self._none = LaneArray(0, len(sampling.PROFILES), width)
         self.momentary = Momentary(points, stations)
-        self.ended = LaneArray(1, len(ENDED), width)
+        self.ended = LaneArray(1, len(sampling.ENDED), width)
 
     @contextmanager
     def profiles_of(self, sample: int) -> Iterator[LaneArray]:
@@ -171,7 +162,7 @@ class RecordedRun:
 
     def channel(self, name: str) -> np.ndarray:
         """History of one of CHANNELS, (done,)."""
-        return self.rows[:, self._sensed + CHANNELS.index(name)]
+        return self.rows[:, self._sensed + sampling.CHANNELS.index(name)]
 
     def mean_driving_speed(self, samples: slice) -> float:
         """Mean speed of the driving pulley in some samples [rad/s]."""
@@ -204,7 +195,7 @@ class RecordedRun:
         Not a number before that part, and where the run has failed.
         """
         sums = self._records.profiles.data[:, :, self._lane]
-        return dict(zip(PROFILES, sums.T / self._judged_count, strict=True))
+        return dict(zip(sampling.PROFILES, sums.T / self._judged_count, strict=True))
 
     @property
     def layer_means(self) -> np.ndarray | None:
@@ -265,7 +256,7 @@ class OneLaneRun(RecordedRun):
         self._lane_belt = lane_belt([belt], np.float64)
         self._state = lane_state([belt], [first], np.float64)
         self._stations = LaneArray(self.mesh.cell.size, lf.FIELDS_OF_FORCES, 1)
-        self._take_sample = called_alike(sample_state)
+        self._take_sample = called_alike(sampling.sample_state)
         self._audit_layers = called_alike(lane_rings.audit_layers)
 
     @property
@@ -286,7 +277,7 @@ class OneLaneRun(RecordedRun):
             self._records.without_means()
             self._layer_sums[1].data[:] = np.nan
 
-    def _sample_lane(self) -> Outcome:
+    def _sample_lane(self) -> sampling.Outcome:
         """Record the values in the lane; `done` is left to the caller."""
         layer_sums = self._layer_sums[int(self.done >= self._plan.first_judged)]
         with self._records.profiles_of(self.done) as profiles:
@@ -295,4 +286,4 @@ class OneLaneRun(RecordedRun):
             if layer_count(self.parameters) > 1:
                 of_layers = self._lane_belt, self._rings, self._state, self._layers
                 self._audit_layers(*of_layers, samples, self.done, layer_sums)
-        return Outcome(int(self._records.ended.data[0, sampling.OUTCOME, 0]))
+        return sampling.Outcome(int(self._records.ended.data[0, sampling.OUTCOME, 0]))

@@ -47,16 +47,7 @@ from cvt_hpc.physics import compliance
 from cvt_hpc.physics.compliance import Contact, plain_contact, solve_wrap
 from cvt_hpc.physics.flank import flank_forces, flank_sliding
 from cvt_hpc.physics.friction import friction_coefficient, saturation
-from cvt_hpc.variator.course import (
-    LOAD,
-    SPEED,
-    THRUST,
-    faded_damping,
-    load_course,
-    multiple_at,
-    slope_at,
-    speed_course,
-)
+from cvt_hpc.variator import course
 
 LEAST_WAY = 0.02  # share of a cell from the place where contact begins to a station, for its memory
 
@@ -64,14 +55,14 @@ LEAST_WAY = 0.02  # share of a cell from the place where contact begins to a sta
 @merged_kernel
 def load_at(belt: Belt, time: float) -> float:
     """Torque at the driving pulley [N m]: a smooth rise to load_start, then linear to load, or a profile."""
-    load = load_course(time, belt.rise_time, belt.ramp_end, belt.load_start, belt.load)
-    return load * multiple_at(belt.profile, LOAD, time)
+    load = course.load_course(time, belt.rise_time, belt.ramp_end, belt.load_start, belt.load)
+    return load * course.multiple_at(belt.profile, course.LOAD, time)
 
 
 @merged_kernel
 def thrust_at(belt: Belt, time: float) -> float:
     """Thrust on the driven pulley [N], by its profile."""
-    return belt.thrust * multiple_at(belt.profile, THRUST, time)
+    return belt.thrust * course.multiple_at(belt.profile, course.THRUST, time)
 
 
 @merged_kernel
@@ -80,8 +71,8 @@ def speed_share_at(belt: Belt, time: float) -> float:
 
     Or by its profile.
     """
-    share = speed_course(time, belt.rise_time, belt.ramp_end, belt.speed_start / belt.driving_speed)
-    return share * multiple_at(belt.profile, SPEED, time)
+    share = course.speed_course(time, belt.rise_time, belt.ramp_end, belt.speed_start / belt.driving_speed)
+    return share * course.multiple_at(belt.profile, course.SPEED, time)
 
 
 @merged_kernel
@@ -94,7 +85,7 @@ def driving_speed_at(belt: Belt, state: State) -> float:
 @merged_kernel
 def belt_acceleration_at(belt: Belt, time: float) -> float:
     """Rate v' of the belt speed [m/s^2]; 0 but along a ramp or a profile of speed, of which a run has one."""
-    rate = slope_at(belt.profile, SPEED, time)
+    rate = course.slope_at(belt.profile, course.SPEED, time)
     if belt.rise_time <= time < belt.ramp_end:
         rate += (1.0 - belt.speed_start / belt.driving_speed) / (belt.ramp_end - belt.rise_time)
     return rate * belt.belt_speed
@@ -103,7 +94,7 @@ def belt_acceleration_at(belt: Belt, time: float) -> float:
 @merged_kernel
 def damping_at(belt: Belt, time: float) -> float:
     """Transverse damping [N s/m^2]: the belt's own, and the start-up's until rise_time."""
-    damping = belt.transverse_damping + faded_damping(time, belt.rise_time, belt.start_damping)
+    damping = belt.transverse_damping + course.faded_damping(time, belt.rise_time, belt.start_damping)
     return damping
 
 

@@ -28,18 +28,10 @@ from typing import NamedTuple
 from cvt_hpc.kernels import kernel, merged_kernel
 from cvt_hpc.lanes import LaneArray, ahead, anywhere, around, behind, fma, like, maximum, split
 from cvt_hpc.models.elastic_belt import fields as f
+from cvt_hpc.models.elastic_belt import imex, lane_rings
 from cvt_hpc.models.elastic_belt import lane_fields as lf
 from cvt_hpc.models.elastic_belt import lane_forces as forces
-from cvt_hpc.models.elastic_belt import lane_rings
 from cvt_hpc.models.elastic_belt.belt import Belt
-from cvt_hpc.models.elastic_belt.imex import (
-    MOST_PASSES,
-    TURNS_BACK,
-    advance_belt,
-    eliminate,
-    forget,
-    substitute,
-)
 from cvt_hpc.models.elastic_belt.imex_stations import assemble, damp_across, move_across, move_with_layers
 from cvt_hpc.models.elastic_belt.lane_belt import LaneBelt, LaneState, Work, work_space
 from cvt_hpc.models.elastic_belt.lane_rings import LaneRings
@@ -120,20 +112,20 @@ def step_rings(belt: LaneBelt, state: LaneState, work: RingWork, step: float) ->
     assemble(belt, state, one, step, False)
     coupled = move_across(belt, state, one, step)
     couple_layers(belt, work.rings, state, work, step)
-    for attempt in range(MOST_PASSES):
-        eliminate(belt, state, one, step, attempt > 0)
-        found = substitute(belt, state, one, step)
+    for attempt in range(imex.MOST_PASSES):
+        imex.eliminate(belt, state, one, step, attempt > 0)
+        found = imex.substitute(belt, state, one, step)
         if found == 0 and attempt == 0:
             break
-        if found == 0 or attempt == MOST_PASSES - 1:
-            forget(one)
+        if found == 0 or attempt == imex.MOST_PASSES - 1:
+            imex.forget(one)
             break
-        if found & TURNS_BACK:
+        if found & imex.TURNS_BACK:
             assemble(belt, state, one, step, True)
             coupled = move_across(belt, state, one, step)
             couple_layers(belt, work.rings, state, work, step)
     move_with_layers(belt, state, one, coupled)
-    taken, moment = advance_belt(belt, state, one, step)
+    taken, moment = imex.advance_belt(belt, state, one, step)
     advance_layers(belt, work.rings, state, work, step)
     advance_pulleys(belt, state, taken, moment, step)
     state.time[0] += step
