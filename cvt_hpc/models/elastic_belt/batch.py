@@ -105,8 +105,7 @@ class Batch:
         self.work = self._work_space(self.state)
         derive(self._belt, self.state, self.work.stations)
         self.records = Records(points, width, self.dtype)
-        self.plan = self.records.plan
-        self.interval, self.samples = self.plan.interval, self.plan.samples
+        self.interval, self.samples = self.records.interval, self.records.samples
         self.steps_per_sample = steps_per_sample(self.interval, p["step"])
         self.step = self.interval / self.steps_per_sample
         self.begun = 0.0
@@ -115,12 +114,12 @@ class Batch:
         if paused:
             self._resume([*paused, *[paused[-1]] * (width - len(paused))])
         most_parts = LANES[p["precision"]] if p["lanes"] == "stations" else 1
-        self._parts = lane_belt.parts_of(self.plan.mesh.cell.size, most_parts)
+        self._parts = lane_belt.parts_of(self.records.mesh.cell.size, most_parts)
 
     def _go_on_after(self, rows: Sequence[np.ndarray]) -> None:
         """Take rows that have been recorded, (done, S + C) each, as the beginning of the runs' histories."""
         self.done = self._recorded = len(rows[0])
-        self._disturbed = self.done > self.plan.kick
+        self._disturbed = self.done > self.records.kick
         self.rows = LaneArray(self.samples - self.done, rows[0].shape[1], len(self.belts))
         self._earlier = tuple(rows)
         self._ordered: np.ndarray | None = None
@@ -146,14 +145,14 @@ class Batch:
 
     def advance(self, samples: int) -> None:
         """March on by so many samples at most, no further than to the next border of the judged part."""
-        first, plan = self.done, self.plan
+        first, plan = self.done, self.records
         if first == plan.kick and not self._disturbed:
             for lane, point in enumerate(self.points):
                 shape = random_strands(plan.mesh, point["disturbance"], point["seed"])
                 self.state.fields.data[:, f.W, lane] += shape
             derive(self._belt, self.state, self.work.stations)
             self._disturbed = True
-        kept = self.records.momentary.first
+        kept = plan.momentary.first
         borders = plan.kick, plan.first_judged, kept, self.samples
         last = min(first + samples, *(border for border in borders if border > first))
         whole = sampling.Sampled(self._belt, self.state, self.work.stations)
@@ -167,8 +166,8 @@ class Batch:
         ends = range(first + 1, last + 1) if first >= kept and last > first else [last]
         for end in ends:
             rows = self.done - self._recorded, end - self._recorded
-            with self.records.profiles_of(self.done) as profiles:
-                into = sampling.Samples(plan.sensing, self.rows, profiles, self.records.ended)
+            with plan.profiles_of(self.done) as profiles:
+                into = sampling.Samples(plan.sensing, self.rows, profiles, plan.ended)
                 self._march(*marched, self.step, self.steps_per_sample, whole, into, *rows)
             self.done = end
 
@@ -185,7 +184,7 @@ class Batch:
         self.work = self._work_space(self.state)
         derive(self._belt, self.state, self.work.stations)
         self.begun = self.records.ended.data[0, sampling.ENDED_AT] = runs[0].time
-        if self.done > self.plan.first_judged:
+        if self.done > self.records.first_judged:
             self.records.without_means()
             if isinstance(self.work, ring_step.RingWork):
                 self.work.sums.data[:] = np.nan

@@ -90,11 +90,11 @@ class GeneralTransient(Marched, OneLaneRun):
         last = min(self.done + samples, self.samples)
         found = self._march(0) if samples == 0 else None
         while found is None and self.done < last:
-            if self.done == self._plan.kick and not self._disturbed:
+            if self.done == self._records.kick and not self._disturbed:
                 self._disturb()
             stop = min(last, self.done + SAMPLES_TOGETHER)
-            if self.done < self._plan.kick:
-                stop = min(stop, self._plan.kick)
+            if self.done < self._records.kick:
+                stop = min(stop, self._records.kick)
             found = self._march(stop - self.done)
         self.failure = found
         return found
@@ -133,8 +133,7 @@ class GeneralTransient(Marched, OneLaneRun):
         """Record one state."""
         state = self._unpacked((self.done + 1) * self.interval, y)
         lane = self._state
-        put_lane(lane.fields.data, lane.scalars.data, lane.tilt.data, 0, self.belt, state)
-        lane.time[0] = (self.done + 1) * self.interval
+        put_lane(lane, 0, self.belt, state)
         # a general stepper knows nothing of dampers: their work is taken from the state, as over the interval
         lane.scalars.data[0, lf.LAYER_WORK] = damper_power(self.belt, state) * self.interval
         outcome = self._sample_lane()

@@ -61,12 +61,12 @@ def element_stress(stiffness, grip, eps, closing, ahead, per_length, last, meet)
 
 
 @kernel
-def eliminate(belt: LaneBelt, state: LaneState, work: Work, step: float, again: bool) -> None:
+def eliminate(belt: LaneBelt, state: LaneState, stations: LaneArray, step: float, again: bool) -> None:
     """Stresses into the rows, and forward elimination; the last row, that closes the ring, is solved.
 
     `again` takes those elements as closed that a pass before has found to meet.
     """
-    fields, stations, c = state.fields, work.stations, belt.constants
+    fields, c = state.fields, belt.constants
     last, faded = fields.rows - 1, belt.faded
     belt_speed = lane_belt_speed(belt, state.time[0])
     element_stiffness, ring_stiffness = c[0, lf.ELEMENT_STIFFNESS], c[0, lf.RING_STIFFNESS]
@@ -167,7 +167,7 @@ def lifting(fields: LaneArray, stations: LaneArray, j: int, half):
 
 
 @kernel
-def substitute(belt: LaneBelt, state: LaneState, work: Work, step: float) -> int:
+def substitute(belt: LaneBelt, state: LaneState, stations: LaneArray, step: float) -> int:
     """Back substitution: DV become the increments of v_element and v_ring. Why the step has to be done again.
 
     0: it has not. Else it marks the places and returns the sum of its reasons:
@@ -178,7 +178,7 @@ def substitute(belt: LaneBelt, state: LaneState, work: Work, step: float) -> int
     - MEETS: elements that the step has taken as apart would be pressed together. Their push would set in a
       step late, advance by one cell a step instead of at the speed of waves, and pile up.
     """
-    stations, scalars, c = work.stations, state.scalars, belt.constants
+    scalars, c = state.scalars, belt.constants
     last = stations.rows - 1
     n0, n1 = stations[last, lf.DV_0], stations[last, lf.DV_1]
     # of the last row behind, the ring's last one where a lane is a ring
@@ -260,30 +260,30 @@ def step_imex(belt: LaneBelt, state: LaneState, work: Work, step: float) -> None
     if belt.tilts:
         tilting.carry_tilt(belt, state, step)
         tilting.lane_tilt(belt, state, stations, step)
-    damp_across(belt, state, work)
-    assemble(belt, state, work, step, False)
-    coupled = move_across(belt, state, work, step)
+    damp_across(belt, state, stations)
+    assemble(belt, state, stations, step, False)
+    coupled = move_across(belt, state, stations, step)
     if belt.has_column:
         foresee_column(belt, state, stations, lf.PUSH, step)
     for attempt in range(MOST_PASSES):
-        eliminate(belt, state, work, step, attempt > 0)
-        found = substitute(belt, state, work, step)
+        eliminate(belt, state, stations, step, attempt > 0)
+        found = substitute(belt, state, stations, step)
         if found == 0 and attempt == 0:
             break
         if found == 0 or attempt == MOST_PASSES - 1:
-            forget(work)
+            forget(stations)
             break
         if found & TURNS_BACK:
-            assemble(belt, state, work, step, True)
-            coupled = move_across(belt, state, work, step)
+            assemble(belt, state, stations, step, True)
+            coupled = move_across(belt, state, stations, step)
             if belt.has_column:
                 foresee_column(belt, state, stations, lf.PUSH, step)
-    move_with_layers(belt, state, work, coupled)
+    move_with_layers(belt, state, stations, coupled)
     if belt.tilts:
         tilting.follow_layers(belt, state, stations)
         tilting.turn_elements(belt, state, step)
         tilting.add_turn(state, step)
-    taken, moment = advance_belt(belt, state, work, step)
+    taken, moment = advance_belt(belt, state, stations, step)
     advance_pulleys(belt, state, taken, moment, step)
     state.time[0] += step
     forces.advance_discs(belt, state, step)
@@ -293,20 +293,19 @@ def step_imex(belt: LaneBelt, state: LaneState, work: Work, step: float) -> None
 
 
 @kernel
-def forget(work: Work) -> None:
+def forget(stations: LaneArray) -> None:
     """Clear the marks of repeated parts of a step."""
-    stations = work.stations
     for j in range(stations.rows):
         stations[j, lf.REVERSING] = stations[j, lf.RING_REVERSING] = stations[j, lf.MEETING] = 0.0
 
 
 @kernel
-def advance_belt(belt: LaneBelt, state: LaneState, work: Work, step: float):
+def advance_belt(belt: LaneBelt, state: LaneState, stations: LaneArray, step: float):
     """Apply the increments, and find the new strains; the flanks' torques on both pulleys [N m].
 
     That taken from the driving pulley, where that is free, and the moment on the driven one.
     """
-    n, fields, stations, c = state.fields.rows, state.fields, work.stations, belt.constants
+    n, fields, c = state.fields.rows, state.fields, belt.constants
     per_cosine = 1.0 / c[0, lf.COSINE]
     speed_share = forces.lane_speed_share(belt, state.time[0], c[0, lf.BELT_SPEED])
     belt_speed, offset = speed_share * c[0, lf.BELT_SPEED], c[0, lf.RING_OFFSET]

@@ -25,11 +25,12 @@ after friction has taken its part, feeds the shortest waves.
 
 from cvt_hpc.kernels import kernel, merged_kernel
 from cvt_hpc.lanes.functions import absolute, anywhere, fma, like, minimum, reciprocals, select, sqrt
+from cvt_hpc.lanes.kinds import LaneArray
 from cvt_hpc.lanes.rings import ahead, behind, from_ahead, from_behind, ring_solution
 from cvt_hpc.models.elastic_belt import fields as f
 from cvt_hpc.models.elastic_belt import lane_fields as lf
 from cvt_hpc.models.elastic_belt import lane_forces as forces
-from cvt_hpc.models.elastic_belt.lane_belt import LaneBelt, LaneState, Work
+from cvt_hpc.models.elastic_belt.lane_belt import LaneBelt, LaneState
 from cvt_hpc.models.elastic_belt.lane_column import across_by_curvature, column_across
 from cvt_hpc.models.elastic_belt.lane_forces import lane_belt_speed
 from cvt_hpc.models.elastic_belt.lane_tilt import tilt_damping
@@ -55,7 +56,7 @@ def _coupling(belt: LaneBelt):
 
 
 @kernel
-def move_across(belt: LaneBelt, state: LaneState, work: Work, step: float) -> int:
+def move_across(belt: LaneBelt, state: LaneState, stations: LaneArray, step: float) -> int:
     """Increments of u without those of the layers, PUSH, from ACROSS and MASS_ACROSS.
 
     Returns how many rows are still coupled to the last one behind as the elimination reaches them: a dozen,
@@ -66,7 +67,7 @@ def move_across(belt: LaneBelt, state: LaneState, work: Work, step: float) -> in
     Extrapolated from earlier steps it feeds waves of a frequency w that run against the belt, at the rate
     (v / h) (w step)^3 / 4.
     """
-    stations, c = work.stations, belt.constants
+    c = belt.constants
     last, q, mass_rate = stations.rows - 1, _coupling(belt), c[0, lf.MASS] * (1.0 / step)
     zero = like(0.0, q)
     # of the last row, for the one behind; of a row's coupling to the last one behind; of the row before
@@ -104,8 +105,8 @@ def move_across(belt: LaneBelt, state: LaneState, work: Work, step: float) -> in
                     coupled = j + 1
         link = onward
     gyration = -c[0, lf.MASS] * lane_belt_speed(belt, state.time[0])
-    _solve(belt, work, q, gyration, ALONE, coupled)
-    _solve(belt, work, q, gyration, TURNING, coupled)
+    _solve(belt, stations, q, gyration, ALONE, coupled)
+    _solve(belt, stations, q, gyration, TURNING, coupled)
     belt_speed, fields = lane_belt_speed(belt, state.time[0]), state.fields
     for j in range(last + 1):
         push = stations[j, lf.PUSH]
@@ -121,16 +122,15 @@ def move_across(belt: LaneBelt, state: LaneState, work: Work, step: float) -> in
 
 
 @kernel
-def move_with_layers(belt: LaneBelt, state: LaneState, work: Work, coupled: int) -> None:
+def move_with_layers(belt: LaneBelt, state: LaneState, stations: LaneArray, coupled: int) -> None:
     """Increments of u, PUSH, with those of the elements, DV_0; `coupled` is the result of `move_across`."""
     gyration = -belt.constants[0, lf.MASS] * lane_belt_speed(belt, state.time[0])
-    _solve(belt, work, _coupling(belt), gyration, WITH_LAYERS, coupled)
+    _solve(belt, stations, _coupling(belt), gyration, WITH_LAYERS, coupled)
 
 
 @merged_kernel
-def _force(belt: LaneBelt, work: Work, j: int, gyration, part: int):
+def _force(belt: LaneBelt, stations: LaneArray, j: int, gyration, part: int):
     """Force of a station [N]; by `part` with the gyroscopic force of PUSH, and friction's by the layers."""
-    stations = work.stations
     force = stations[j, lf.ACROSS]
     if part == WITH_LAYERS:
         force = fma(-stations[j, lf.CROSS], stations[j, lf.DV_0], force)
@@ -141,12 +141,11 @@ def _force(belt: LaneBelt, work: Work, j: int, gyration, part: int):
 
 
 @kernel
-def _solve(belt: LaneBelt, work: Work, q, gyration, part: int, coupled: int) -> None:
-    stations = work.stations
+def _solve(belt: LaneBelt, stations: LaneArray, q, gyration, part: int, coupled: int) -> None:
     last, zero = stations.rows - 1, like(0.0, q)
     y1 = own0 = own1 = rest = zero
     for j in range(last):
-        y0 = _force(belt, work, j, gyration, part) + rest
+        y0 = _force(belt, stations, j, gyration, part) + rest
         i01 = stations[j, lf.A_01]
         z0, z1 = fma(stations[j, lf.A_00], y0, i01 * y1), fma(i01, y0, stations[j, lf.A_11] * y1)
         if j < coupled:
@@ -159,7 +158,7 @@ def _solve(belt: LaneBelt, work: Work, q, gyration, part: int, coupled: int) -> 
         stations[last, lf.A_00],
         stations[last, lf.A_01],
         stations[last, lf.A_11],
-        _force(belt, work, last, gyration, part) + rest + from_ahead(own0),
+        _force(belt, stations, last, gyration, part) + rest + from_ahead(own0),
         y1 + from_ahead(own1),
         stations[last, lf.B_00],
         stations[last, lf.B_01],
@@ -194,14 +193,14 @@ def implicit_shares(one, other, inertia):
 
 
 @kernel
-def damp_across(belt: LaneBelt, state: LaneState, work: Work) -> None:
+def damp_across(belt: LaneBelt, state: LaneState, stations: LaneArray) -> None:
     """Take the layers' damping across the belt from the stations at both ends of each cell, into BENT.
 
     By the speeds that the step begins with. Of a cell's lengthening v_0,s + kappa u, in which the dampers
     along the belt are implicit, a step of both leaves with a = 4 c dt / (m_0 h^2) and b = c dt kappa^2 / m
     the share (1 - b) / (1 + a): it is stable up to b = 2 + a.
     """
-    fields, stations, c = state.fields, work.stations, belt.constants
+    fields, c = state.fields, belt.constants
     stiffness, damper_0 = c[0, lf.ELEMENT_STIFFNESS], c[0, lf.ELEMENT_DAMPING]
     damper_1 = c[0, lf.RING_DAMPING]
     zero = like(0.0, stiffness)
@@ -222,13 +221,13 @@ def damp_across(belt: LaneBelt, state: LaneState, work: Work) -> None:
 
 
 @kernel
-def assemble(belt: LaneBelt, state: LaneState, work: Work, step: float, again: bool) -> None:
+def assemble(belt: LaneBelt, state: LaneState, stations: LaneArray, step: float, again: bool) -> None:
     """Forces and slopes at the stations, but for the stresses T and P: the system's blocks and right side.
 
     `again` takes the secant of friction where a pass before has found that it would turn sliding about. For
     the increments of u it finds the force ACROSS and its slopes, which `move_across` couples by bending.
     """
-    n, fields, stations, c = state.fields.rows, state.fields, work.stations, belt.constants
+    n, fields, c = state.fields.rows, state.fields, belt.constants
     per_step = 1.0 / step
     sine, cosine, width = c[0, lf.SINE], c[0, lf.COSINE], c[0, lf.FRICTION_SPEED]
     per_cosine, per_width = 1.0 / cosine, 1.0 / width

@@ -177,15 +177,22 @@ def lane_state(belts: list[Belt], states: list[State], dtype: type) -> LaneState
     """State of several runs on the same mesh, one for each lane, all at one time, with fresh contacts."""
     n, lanes = belts[0].cell.size, len(belts)
     tilts = belts[0].tilts
-    fields = LaneArray(n, states[0].fields.shape[0] - tilts, lanes, dtype)
-    scalars, tilt = LaneArray(1, lf.SCALARS, lanes), LaneArray(n * tilts, lf.FIELDS_OF_TILT, lanes, dtype)
-    for lane, (belt, state) in enumerate(zip(belts, states, strict=True)):
-        put_lane(fields.data, scalars.data, tilt.data, lane, belt, state)
-    wraps = [[belt.driving for belt in belts], [belt.driven for belt in belts]]
-    contacts = (lane_contact(wraps[0], dtype), lane_contact(wraps[1], dtype))
+    contacts = (
+        lane_contact([belt.driving for belt in belts], dtype),
+        lane_contact([belt.driven for belt in belts], dtype),
+    )
     settle_discs(contacts, belts, states)
-    column = LaneArray(n if belts[0].has_column else 0, lf.FIELDS_OF_COLUMN, lanes, dtype)
-    return LaneState(fields, scalars, np.array([states[0].scalars[0]]), contacts, column, tilt)
+    found = LaneState(
+        LaneArray(n, states[0].fields.shape[0] - tilts, lanes, dtype),
+        LaneArray(1, lf.SCALARS, lanes),
+        np.zeros(1),
+        contacts,
+        LaneArray(n if belts[0].has_column else 0, lf.FIELDS_OF_COLUMN, lanes, dtype),
+        LaneArray(n * tilts, lf.FIELDS_OF_TILT, lanes, dtype),
+    )
+    for lane, (belt, state) in enumerate(zip(belts, states, strict=True)):
+        put_lane(found, lane, belt, state)
+    return found
 
 
 def settle_discs(contacts: tuple[Contact, Contact], belts: list[Belt], states: list[State]) -> None:
@@ -244,13 +251,11 @@ def alike(array: LaneArray, parts: int) -> LaneArray:
     return linked
 
 
-def put_lane(
-    fields: np.ndarray, scalars: np.ndarray, tilt: np.ndarray, lane: int, belt: Belt, state: State
-) -> None:
-    """Write a run's state into its lane of a LaneState's data."""
-    values = state.fields.copy()
+def put_lane(lanes: LaneState, lane: int, belt: Belt, state: State) -> None:
+    """Write a run's state into its lane, and its time, which is that of all."""
+    values, scalars = state.fields.copy(), lanes.scalars.data
     if belt.tilts:
-        tilt[:, lf.ANGLE, lane] = values[f.ELEMENT_TILT]
+        lanes.tilt.data[:, lf.ANGLE, lane] = values[f.ELEMENT_TILT]
         values = values[: f.ELEMENT_TILT]
     belt_speed = speed_share_at(belt, state.scalars[f.TIME]) * belt.belt_speed
     values[f.V_ELEMENT] -= belt_speed
@@ -258,7 +263,8 @@ def put_lane(
     values[len(f.FIELDS) : (len(values) + len(f.FIELDS)) // 2] -= belt_speed  # ring layers, where there are
     values[f.N_ELEMENT] -= 1.0
     values[f.N_RING] -= 1.0 + belt.curvature * belt.ring_offset
-    fields[:, :, lane] = values.T
+    lanes.fields.data[:, :, lane] = values.T
+    lanes.time[0] = state.scalars[f.TIME]
     scalars[0, lf.SPEED, lane] = state.scalars[f.DRIVEN_SPEED]
     scalars[0, lf.POSITION, lane] = state.scalars[f.DRIVEN_POSITION]
     scalars[0, f.FIRST_STATE :, lane] = state.scalars[f.FIRST_STATE :]

@@ -2,7 +2,7 @@
 
 from collections.abc import Iterator, Sequence
 from contextlib import contextmanager
-from typing import TYPE_CHECKING, Any, NamedTuple
+from typing import TYPE_CHECKING, Any
 
 import numpy as np
 
@@ -11,7 +11,7 @@ from cvt_hpc.lanes import LaneArray
 from cvt_hpc.models.elastic_belt import lane_fields as lf
 from cvt_hpc.models.elastic_belt import lane_rings, sampling
 from cvt_hpc.models.elastic_belt.along_belt import Momentary
-from cvt_hpc.models.elastic_belt.belt import REGIONS, Belt, Mesh, State, mesh
+from cvt_hpc.models.elastic_belt.belt import REGIONS, Belt, State, mesh
 from cvt_hpc.models.elastic_belt.fields import LOSSES, POWERS
 from cvt_hpc.models.elastic_belt.fluctuation import Fluctuation, fluctuation
 from cvt_hpc.models.elastic_belt.lane_belt import lane_belt, lane_state
@@ -26,47 +26,27 @@ from cvt_hpc.variables import Failure, Values
 from cvt_hpc.vibration.ramped import ramped
 
 
-class Recording(NamedTuple):
-    """The recorded quantities, with places and times."""
-
-    mesh: Mesh
-    probes: tuple[sampling.Probe, ...]  # where displacement is recorded
-    sensing: sampling.Sensors  # the same for kernels
-    interval: float  # of sampling [s]
-    samples: int  # of the whole run
-    # samples before the strands are disturbed; the start-up's damping has gone by then: from there on a
-    # disturbance grows or decays by the belt's own nature
-    kick: int
-    first_judged: int  # samples before the judged part
-
-
-def recording(parameters: Parameters, dtype: type) -> Recording:
-    """Plan of a run's recording, by its resolved parameters [SI] and the lanes' type of numbers."""
-    p, grid = parameters, mesh(parameters)
-    interval = 1.0 / p["sampling_rate"]
-    samples = sample_count(p)
-    places = sampling.probes(grid, p["strand_probes"], p["arc_probes"])
-    return Recording(
-        grid,
-        places,
-        sampling.sensors(grid, places, interval, dtype),
-        interval,
-        samples,
-        start_up_samples(p),
-        samples - round(p["judged_fraction"] * samples),
-    )
-
-
 class Records:
-    """Arrays that runs which advance together are recorded into, each in a lane.
+    """Plan and arrays of the recording of runs that advance together, each in a lane.
 
     Their `points`, resolved parameters [SI], are alike in mesh, sampling and duration; `width` is the number
     of lanes, at least one for each run, `dtype` np.float64 or np.float32, that of the lanes.
 
     Attributes
     ----------
-    plan : Recording
-        The recorded quantities.
+    mesh : Mesh
+        Cells around the belt.
+    probes : tuple of Probe
+        Where displacement is recorded; `sensing` is the same for kernels.
+    interval : float
+        Of sampling [s].
+    samples : int
+        Of the whole run.
+    kick : int
+        Samples before the strands are disturbed; the start-up's damping has gone by then: from there on a
+        disturbance grows or decays by the belt's own nature.
+    first_judged : int
+        Samples before the judged part.
     channels : int
         Values in a row of a sample.
     profiles : (N, 23) LaneArray of doubles
@@ -78,9 +58,14 @@ class Records:
     """
 
     def __init__(self, points: Sequence[Parameters], width: int, dtype: type) -> None:
-        self.plan = recording(points[0], dtype)
-        self.channels = self.plan.sensing.matrix.shape[0] + len(sampling.CHANNELS)
-        stations = self.plan.mesh.cell.size
+        p = points[0]
+        self.mesh, self.interval, self.samples = mesh(p), 1.0 / p["sampling_rate"], sample_count(p)
+        self.probes = sampling.probes(self.mesh, p["strand_probes"], p["arc_probes"])
+        self.sensing = sampling.sensors(self.mesh, self.probes, self.interval, dtype)
+        self.kick = start_up_samples(p)
+        self.first_judged = self.samples - round(p["judged_fraction"] * self.samples)
+        self.channels = self.sensing.matrix.shape[0] + len(sampling.CHANNELS)
+        stations = self.mesh.cell.size
         self.profiles = LaneArray(stations, len(sampling.PROFILES), width)
         self._none = LaneArray(0, len(sampling.PROFILES), width)
         self.momentary = Momentary(points, stations)
@@ -92,7 +77,7 @@ class Records:
 
         Of the part that is not judged nothing is summed up. A sample of which profiles are kept comes alone.
         """
-        is_judged = sample >= self.plan.first_judged
+        is_judged = sample >= self.first_judged
         if sample < self.momentary.first:
             yield self.profiles if is_judged else self._none
             return
@@ -110,10 +95,10 @@ class Records:
 class RecordedRun:
     """One run, as it is judged and recorded, by its resolved parameters [SI], in a lane of `records`.
 
-    `mesh`, `probes`, `interval`, `samples` and `risen` are those of the plan. The marching class sets `time`,
-    simulated [s]; `rows`, the sensors' displacement [m], the strands' modes [m], and CHANNELS, (done, S + C);
-    `done`, the samples recorded so far, up to the one at which the run failed; and `failure`, why the run
-    cannot continue: a failure, or a result, with the status done.
+    `mesh`, `probes`, `interval`, `samples` and `risen` are those of the records. The marching class sets
+    `time`, simulated [s]; `rows`, the sensors' displacement [m], the strands' modes [m], and CHANNELS, (done,
+    S + C); `done`, the samples recorded so far, up to the one at which the run failed; and `failure`, why the
+    run cannot continue: a failure, or a result, with the status done.
     """
 
     if TYPE_CHECKING:  # set by the marching class
@@ -140,10 +125,9 @@ class RecordedRun:
 
     def __init__(self, parameters: Parameters, records: Records, lane: int = 0) -> None:
         self.parameters, self._records, self._lane = parameters, records, lane
-        self._plan = plan = records.plan
-        self.mesh, self.probes = plan.mesh, plan.probes
-        self.interval, self.samples, self.risen = plan.interval, plan.samples, plan.kick
-        self._sensed = plan.sensing.matrix.shape[0]
+        self.mesh, self.probes = records.mesh, records.probes
+        self.interval, self.samples, self.risen = records.interval, records.samples, records.kick
+        self._sensed = records.sensing.matrix.shape[0]
 
     @property
     def momentary(self) -> np.ndarray | None:
@@ -186,7 +170,7 @@ class RecordedRun:
     @property
     def judged(self) -> slice:
         """Samples of the judged part."""
-        return slice(self._plan.first_judged, self.samples)
+        return slice(self._records.first_judged, self.samples)
 
     @property
     def means(self) -> dict[str, np.ndarray]:
@@ -205,7 +189,7 @@ class RecordedRun:
     @property
     def _judged_count(self) -> float:
         """Samples of the judged part so far; not a number before it, and where the run has failed."""
-        count = self.done - self._plan.first_judged if self.failure is None else 0
+        count = self.done - self._records.first_judged if self.failure is None else 0
         return count if count > 0 else np.nan
 
     @property
@@ -271,17 +255,17 @@ class OneLaneRun(RecordedRun):
 
     def _go_on_from(self, run: Any) -> None:
         """Take over the history of a run by another stepper, except for means that began before."""
-        self.done, self._disturbed = run.done, run.done > self._plan.kick
+        self.done, self._disturbed = run.done, run.done > self._records.kick
         self._rows.data[: self.done, :, 0] = run.rows
-        if self.done > self._plan.first_judged:
+        if self.done > self._records.first_judged:
             self._records.without_means()
             self._layer_sums[1].data[:] = np.nan
 
     def _sample_lane(self) -> sampling.Outcome:
         """Record the values in the lane; `done` is left to the caller."""
-        layer_sums = self._layer_sums[int(self.done >= self._plan.first_judged)]
+        layer_sums = self._layer_sums[int(self.done >= self._records.first_judged)]
         with self._records.profiles_of(self.done) as profiles:
-            samples = sampling.Samples(self._plan.sensing, self._rows, profiles, self._records.ended)
+            samples = sampling.Samples(self._records.sensing, self._rows, profiles, self._records.ended)
             self._take_sample(self._lane_belt, self._state, self._stations, samples, self.done)
             if layer_count(self.parameters) > 1:
                 of_layers = self._lane_belt, self._rings, self._state, self._layers

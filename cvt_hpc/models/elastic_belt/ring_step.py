@@ -33,7 +33,7 @@ from cvt_hpc.models.elastic_belt import lane_fields as lf
 from cvt_hpc.models.elastic_belt import lane_forces as forces
 from cvt_hpc.models.elastic_belt.belt import Belt
 from cvt_hpc.models.elastic_belt.imex_stations import assemble, damp_across, move_across, move_with_layers
-from cvt_hpc.models.elastic_belt.lane_belt import LaneBelt, LaneState, Work, work_space
+from cvt_hpc.models.elastic_belt.lane_belt import LaneBelt, LaneState, work_space
 from cvt_hpc.models.elastic_belt.lane_rings import LaneRings
 from cvt_hpc.models.elastic_belt.pulley_step import advance_pulleys
 from cvt_hpc.models.elastic_belt.rings import FIRST_LAYER, Rings
@@ -106,31 +106,31 @@ def step_rings(belt: LaneBelt, state: LaneState, work: RingWork, step: float) ->
 
     The work space holds the results of `derive` for this state, and the layers' strains.
     """
-    one = Work(work.stations)
-    forces.lane_sliding(belt, state, work.stations)
-    damp_across(belt, state, one)
-    assemble(belt, state, one, step, False)
-    coupled = move_across(belt, state, one, step)
-    couple_layers(belt, work.rings, state, work, step)
+    stations = work.stations
+    forces.lane_sliding(belt, state, stations)
+    damp_across(belt, state, stations)
+    assemble(belt, state, stations, step, False)
+    coupled = move_across(belt, state, stations, step)
+    couple_layers(belt, state, work, step)
     for attempt in range(imex.MOST_PASSES):
-        imex.eliminate(belt, state, one, step, attempt > 0)
-        found = imex.substitute(belt, state, one, step)
+        imex.eliminate(belt, state, stations, step, attempt > 0)
+        found = imex.substitute(belt, state, stations, step)
         if found == 0 and attempt == 0:
             break
         if found == 0 or attempt == imex.MOST_PASSES - 1:
-            imex.forget(one)
+            imex.forget(stations)
             break
         if found & imex.TURNS_BACK:
-            assemble(belt, state, one, step, True)
-            coupled = move_across(belt, state, one, step)
-            couple_layers(belt, work.rings, state, work, step)
-    move_with_layers(belt, state, one, coupled)
-    taken, moment = imex.advance_belt(belt, state, one, step)
-    advance_layers(belt, work.rings, state, work, step)
+            assemble(belt, state, stations, step, True)
+            coupled = move_across(belt, state, stations, step)
+            couple_layers(belt, state, work, step)
+    move_with_layers(belt, state, stations, coupled)
+    taken, moment = imex.advance_belt(belt, state, stations, step)
+    advance_layers(belt, state, work, step)
     advance_pulleys(belt, state, taken, moment, step)
     state.time[0] += step
     forces.advance_discs(belt, state, step)
-    forces.lane_contact_forces(belt, state, work.stations)
+    forces.lane_contact_forces(belt, state, stations)
 
 
 @merged_kernel
@@ -161,9 +161,10 @@ def force_along(rings: LaneRings, fields: LaneArray, layers: LaneArray, j: int, 
 
 
 @kernel
-def couple_layers(belt: LaneBelt, rings: LaneRings, state: LaneState, work: RingWork, step: float) -> None:
+def couple_layers(belt: LaneBelt, state: LaneState, work: RingWork, step: float) -> None:
     """Eliminate the layers: their part of the blocks and right side of elements and rings as one."""
-    n, fields, stations, layers, c = rings.number, state.fields, work.stations, work.layers, rings.constants
+    rings, fields, stations, layers = work.rings, state.fields, work.stations, work.layers
+    n, c = rings.number, rings.constants
     sine = belt.constants[0, lf.RING_OFFSET]
     share = forces.lane_speed_share(belt, state.time[0], sine)
     belt_speed = share * belt.constants[0, lf.BELT_SPEED]
@@ -317,9 +318,10 @@ def couple_layers(belt: LaneBelt, rings: LaneRings, state: LaneState, work: Ring
 
 
 @kernel
-def advance_layers(belt: LaneBelt, rings: LaneRings, state: LaneState, work: RingWork, step: float) -> None:
+def advance_layers(belt: LaneBelt, state: LaneState, work: RingWork, step: float) -> None:
     """Apply the layers' increments; their strains, and those of the rings as one."""
-    n, fields, stations, layers, c = rings.number, state.fields, work.stations, work.layers, rings.constants
+    rings, fields, stations, layers = work.rings, state.fields, work.stations, work.layers
+    n, c = rings.number, rings.constants
     offset = belt.constants[0, lf.RING_OFFSET]
     belt_speed = forces.lane_speed_share(belt, state.time[0], offset) * belt.constants[0, lf.BELT_SPEED]
     damping, last = c[0, lf.LAYER_DAMPING], STRIDE * n

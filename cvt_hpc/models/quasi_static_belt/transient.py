@@ -108,7 +108,7 @@ class SplitRun(OneLaneRun):
         if samples == 0:
             self._march(self._model, self._motion, self._work, 0, self._noted)
         for _ in range(min(samples, self.samples - self.done)):
-            if self.done == self._plan.kick and not self._disturbed:
+            if self.done == self._records.kick and not self._disturbed:
                 self._disturb()
             if not self._march(self._model, self._motion, self._work, self._steps, self._noted):
                 self.failure = FAILURES[Outcome.NO_CONTACT_SOLUTION]
@@ -131,8 +131,7 @@ class SplitRun(OneLaneRun):
     def _record(self) -> Outcome:
         """Record the present state."""
         lane, state = self._state, self._motion.state
-        put_lane(lane.fields.data, lane.scalars.data, lane.tilt.data, 0, self.belt, state)
-        lane.time[0] = state.scalars[0]
+        put_lane(lane, 0, self.belt, state)
         lane.scalars.data[0, lf.LAYER_WORK] = state.scalars[f.LAYER_WORK]
         state.scalars[f.LAYER_WORK] = 0.0
         # the layers' speeds are counted from the belt speed there: a second difference takes that out
