@@ -7,18 +7,10 @@ kernels are compiled when `belt` is imported.
 
 import numpy as np
 
+import cvt_hpc.models.elastic_belt.belt_settings as belt_settings
 import cvt_hpc.models.elastic_belt.deflection_settings as deflection_settings
-import cvt_hpc.models.elastic_belt.ring_settings as ring_settings
 from cvt_hpc.models.elastic_belt.pulley_checks import pulley_inert, pulley_problems, shaft_problems
 from cvt_hpc.models.elastic_belt.pulley_settings import DRIVEN_INERTIA, DRIVEN_SHAFT, PULLEYS, SHAFT
-from cvt_hpc.models.elastic_belt.ring_settings import (
-    BENDING,
-    TILT,
-    bending_inert,
-    bending_problems,
-    tilt_inert,
-    tilt_problems,
-)
 from cvt_hpc.models.elastic_belt.step_choice import CHOICE
 from cvt_hpc.parameters import Parameter, Parameters, Problem, not_negative, positive
 from cvt_hpc.physics.friction_laws import friction_inert, friction_problems
@@ -78,7 +70,7 @@ PARAMETERS: dict[str, dict[str, Parameter]] = {
             0.01, "m/s", "regularisation speed of that friction", sensible=(1e-05, 5.0)
         ),
         "transverse_damping": scene.TRANSVERSE_DAMPING,
-        **TILT,
+        **belt_settings.TILT,
         "element_damping": not_negative(
             20.0, "N s", "longitudinal damping of the pressed elements", sensible=(0.001, 100000.0)
         ),
@@ -140,12 +132,12 @@ PARAMETERS: dict[str, dict[str, Parameter]] = {
         ),
         "driven_inertia": DRIVEN_INERTIA,
     },
-    "bending": BENDING,
+    "bending": belt_settings.BENDING,
     "deflection": deflection_settings.DEFLECTION,
     "pulleys": PULLEYS,
     "shaft": SHAFT,
     "driven_shaft": DRIVEN_SHAFT,
-    "rings": ring_settings.RINGS,
+    "rings": belt_settings.RINGS,
     "friction": scene.FRICTION,
     "mesh": {
         "stations": Parameter(160, "", "cells around the belt", minimum=24, maximum=4096),
@@ -200,11 +192,9 @@ def shape_problems(parameters: Parameters) -> list[Problem]:
         if abs(p["play"]) > 0.02 * path.path_length:
             expected = f"within 2 % of the belt's length {path.path_length:.4g} m"
             problems.append(("play", expected, f"{p['play']:g} m"))
-        problems += deflection_settings.deflection_problems(p) + ring_settings.stack_problems(
-            p, min(path.driving_radius, path.driven_radius)
-        )
-    problems += shaft_problems(p) + bending_problems(p) + ring_settings.ring_problems(p)
-    return problems + tilt_problems(p)
+        problems += deflection_settings.deflection_problems(p)
+        problems += belt_settings.stack_problems(p, min(path.driving_radius, path.driven_radius))
+    return problems + shaft_problems(p) + belt_settings.belt_problems(p)
 
 
 def inert(parameters: Parameters) -> dict[str, str]:
@@ -217,7 +207,7 @@ def inert(parameters: Parameters) -> dict[str, str]:
     of_disc, of_tilt = ("local_stiffness", "local_length"), ("tilt_stiffness", "tilt_factor")
     cases = (
         (p["disturbance"] == 0.0, ("seed",), "disturbance 0"),
-        (not ring_settings.rings_rub(p), ("ring_friction_speed",), "ring_friction 0"),
+        (not belt_settings.rings_rub(p), ("ring_friction_speed",), "ring_friction 0"),
         (p["sheave_stiffness"] == 1.0, ("stiffness_of",), "sheave_stiffness 1"),
         (np.isinf(p["tilt_factor"]), of_tilt[:1], "tilt_factor inf"),
         (np.isinf(p["tilt_stiffness"]), of_tilt[1:], "tilt_stiffness inf"),
@@ -225,13 +215,5 @@ def inert(parameters: Parameters) -> dict[str, str]:
         (np.isinf(whole), of_disc + of_tilt, "sheave_stiffness inf"),
     )
     found = {key: setting for holds, keys, setting in cases if holds for key in keys}
-    parts = (
-        friction_inert,
-        scene.course_inert,
-        pulley_inert,
-        deflection_settings.deflection_inert,
-        bending_inert,
-        ring_settings.ring_inert,
-        tilt_inert,
-    )
-    return {key: why for part in parts for key, why in part(p).items()} | found
+    of_parts = friction_inert(p) | scene.course_inert(p) | pulley_inert(p)
+    return of_parts | deflection_settings.deflection_inert(p) | belt_settings.belt_inert(p) | found

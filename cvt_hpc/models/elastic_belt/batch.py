@@ -16,12 +16,12 @@ from cvt_hpc.models.elastic_belt import fields as f
 from cvt_hpc.models.elastic_belt import lane_belt, ring_step, sampling
 from cvt_hpc.models.elastic_belt import lane_fields as lf
 from cvt_hpc.models.elastic_belt.belt import Belt, State, belt_constants, initial_state, random_strands
+from cvt_hpc.models.elastic_belt.belt_settings import layer_count
 from cvt_hpc.models.elastic_belt.explicit import FIELDS_OF_WORK, step_explicit
 from cvt_hpc.models.elastic_belt.grouping import LANES, lanes
 from cvt_hpc.models.elastic_belt.imex import step_imex
 from cvt_hpc.models.elastic_belt.lane_forces import derive
 from cvt_hpc.models.elastic_belt.recorded_run import RecordedRun, Records
-from cvt_hpc.models.elastic_belt.ring_settings import layer_count
 from cvt_hpc.models.elastic_belt.rings import ring_constants, with_layers, without_saddle_friction
 from cvt_hpc.models.elastic_belt.sampling import begin_at_once, march, take_sample
 from cvt_hpc.models.elastic_belt.step_choice import transverse_limit

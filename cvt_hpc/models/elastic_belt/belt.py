@@ -13,18 +13,12 @@ from typing import NamedTuple
 
 import numpy as np
 
+from cvt_hpc.models.elastic_belt import belt_settings
 from cvt_hpc.models.elastic_belt import fields as f
 from cvt_hpc.models.elastic_belt.bending import bending_bands, bending_load, squared_curvature
 from cvt_hpc.models.elastic_belt.deflection_settings import disc_settings
 from cvt_hpc.models.elastic_belt.grouping import faded_coupling
 from cvt_hpc.models.elastic_belt.pulleys import Pulleys, settled_tilt, with_pulleys
-from cvt_hpc.models.elastic_belt.ring_settings import (
-    BENDING_DEFAULTS,
-    CURVATURE_TERMS,
-    TILT_DEFAULTS,
-    elements_tilt,
-    has_column,
-)
 from cvt_hpc.parameters import Parameters
 from cvt_hpc.physics.friction import FrictionLaw, given_law
 from cvt_hpc.physics.geometry import Variator, cut_path, variator
@@ -206,7 +200,7 @@ def mesh(parameters: Parameters) -> Mesh:
 
 def belt_constants(parameters: Parameters) -> Belt:
     """Constants of one run for the kernels, from its resolved parameters, `duration` [s] included."""
-    p, grid = BENDING_DEFAULTS | TILT_DEFAULTS | dict(parameters), mesh(parameters)
+    p, grid = belt_settings.DEFAULTS | dict(parameters), mesh(parameters)
     path, cell = grid.path, grid.cell
     dual = 0.5 * (cell + np.roll(cell, 1))
     kappa, radii = grid.curvature, (path.driving_radius, path.driven_radius)
@@ -250,7 +244,7 @@ def belt_constants(parameters: Parameters) -> Belt:
     ]
     wraps, freedom = with_pulleys(p, wraps, radii)
     law = given_law(p)
-    quantity, terms = ramped(p), CURVATURE_TERMS.index(p["curvature_terms"])
+    quantity, terms = ramped(p), belt_settings.CURVATURE_TERMS.index(p["curvature_terms"])
     computed = dict(
         cell=cell,
         dual=dual,
@@ -267,8 +261,8 @@ def belt_constants(parameters: Parameters) -> Belt:
         bending_load=bending_load(cell, dual, p["bending_stiffness"], kappa, terms),
         squared_curvature=squared_curvature(cell, dual, kappa) * (terms > 0),
         curvature_terms=terms,
-        has_column=has_column(p),
-        tilts=elements_tilt(p),
+        has_column=belt_settings.has_column(p),
+        tilts=belt_settings.elements_tilt(p),
         ring_mass=p["longitudinal_mass"] * ring_mass,
         ring_relief=ring_mass * belt_speed * belt_speed,
         element_mass=p["longitudinal_mass"] * p["element_mass"],

@@ -120,8 +120,6 @@ DEFLECTION: dict[str, Parameter] = {
     "disc_damping": not_negative(0.005, "", "damping ratio of the discs' modes"),
 }
 
-DEFLECTION_DEFAULTS = {key: parameter.default for key, parameter in DEFLECTION.items() if not parameter.file}
-
 
 def kept_modes(parameters: Parameters, pulley: str) -> tuple[np.ndarray, np.ndarray, np.ndarray]:
     """Harmonics, flexibilities [m/N] and masses [kg] of the modes that are kept, by ascending frequency."""
@@ -139,7 +137,7 @@ def disc_settings(
     `flexibilities`, (m, m) [m/N], or (0, 0) for local bending, and `modes` where these have inertia, over the
     `wrap` of m stations, with the pitch radius [m] and the angle `turned` of the arc [rad].
     """
-    p = DEFLECTION_DEFAULTS | dict(parameters)
+    p = parameters
     if p["sheave_deformation"] == "cone":
         from_middle, distance = wrap.angle - 0.5 * turned, radius + wrap.rise
         shifted = p["cone_stiffness"], p["cone_shift"]
@@ -158,7 +156,7 @@ def disc_settings(
 
 def deflection_problems(parameters: Parameters) -> list[Problem]:
     """Problems of the discs' deformation: (key, expected, found); the scene's sizes are taken as sound."""
-    p = DEFLECTION_DEFAULTS | dict(parameters)
+    p = parameters
     kind = p["sheave_deformation"]
     if kind == "bending":
         return []
@@ -181,7 +179,7 @@ def deflection_problems(parameters: Parameters) -> list[Problem]:
 
 def refuse_moving_discs(parameters: Parameters) -> list[Problem]:
     """Refuse discs with inertia, of which a method knows nothing."""
-    if (DEFLECTION_DEFAULTS | dict(parameters))["sheave_deformation"] != "ritz":
+    if parameters["sheave_deformation"] != "ritz":
         return []
     return [("sheave_deformation", "bending, cone or flexibilities but by the stepper imex", "ritz")]
 
@@ -209,7 +207,7 @@ def _ritz_problems(parameters: Parameters) -> list[Problem]:
 
 def deflection_inert(parameters: Parameters) -> dict[str, str]:
     """Settings of the deformation without effect, each with the setting that makes it so."""
-    kind = (DEFLECTION_DEFAULTS | dict(parameters))["sheave_deformation"]
+    kind = parameters["sheave_deformation"]
     setting = f"sheave_deformation {kind}"
     of_kinds = {
         "bending": ("local_stiffness", "local_length"),

@@ -10,11 +10,11 @@ from cvt_hpc.models.elastic_belt import fields as f
 from cvt_hpc.models.elastic_belt import lane_fields as lf
 from cvt_hpc.models.elastic_belt import one_system, rings
 from cvt_hpc.models.elastic_belt.belt import Belt, State, belt_constants, initial_state, random_strands
+from cvt_hpc.models.elastic_belt.belt_settings import layer_count
 from cvt_hpc.models.elastic_belt.column import pressed_strains
 from cvt_hpc.models.elastic_belt.lane_belt import put_lane
 from cvt_hpc.models.elastic_belt.recorded_run import OneLaneRun
 from cvt_hpc.models.elastic_belt.rhs import lengthening, strains
-from cvt_hpc.models.elastic_belt.ring_settings import layer_count
 from cvt_hpc.models.elastic_belt.rings import FIRST_LAYER, ring_constants
 from cvt_hpc.models.elastic_belt.sampling import Outcome
 from cvt_hpc.models.elastic_belt.sparsity import SparseJacobian

@@ -6,9 +6,9 @@ from typing import Any
 import numpy as np
 
 from cvt_hpc.models.elastic_belt import OWN_STEPPERS
+from cvt_hpc.models.elastic_belt.belt_settings import elements_tilt
 from cvt_hpc.models.elastic_belt.deflection_settings import MODE_KEYS, RITZ
 from cvt_hpc.models.elastic_belt.pulley_settings import are_free
-from cvt_hpc.models.elastic_belt.ring_settings import elements_tilt
 from cvt_hpc.parameters import Parameters
 from cvt_hpc.variator.course import profile_table
 from cvt_hpc.variator.scene import measures, rounded

@@ -9,7 +9,6 @@ import numpy as np
 from cvt_hpc.models.elastic_belt import along_belt as along
 from cvt_hpc.models.elastic_belt.along_belt import PRECISION, WORDS
 from cvt_hpc.models.elastic_belt.fluctuation import at_stations
-from cvt_hpc.models.elastic_belt.pulley_settings import PULLEY_DEFAULTS
 from cvt_hpc.storage.netcdf import attributes
 from cvt_hpc.variator import PULLEYS
 from cvt_hpc.variator.history import dataset, of_means
@@ -83,7 +82,7 @@ def last_profiles(run: RecordedRun) -> dict[str, tuple[np.ndarray, str, str, str
     sample = dict(zip(along.NEEDED, kept[:count].transpose(1, 0, 2), strict=True))
     samples = slice(run.done - count, run.done)
     # speeds are counted from the course of the driving speed, which is constant where the drive has inertia
-    is_given = np.isinf((PULLEY_DEFAULTS | dict(run.parameters))["driving_inertia"])
+    is_given = np.isinf(run.parameters["driving_inertia"])
     course = run.channel("driving_speed")[samples, None] if is_given else run.parameters["driving_speed"]
     belt_speed = course * run.path.driving_radius
     lengthened = 1.0 + along.curvature_at_stations(run.mesh) * sample["mean_displacement"]

@@ -18,7 +18,7 @@ ABOVE = 1.1
 
 def shaft_problems(parameters: Parameters) -> list[Problem]:
     """Problems of a shaft, in the form of a model's check."""
-    p = settings.PULLEY_DEFAULTS | dict(parameters)
+    p = parameters
     return _problems_of_shaft(p, "") or _problems_of_shaft(p, settings.OWN)
 
 
@@ -42,7 +42,7 @@ def _problems_of_shaft(p: Parameters, prefix: str) -> list[Problem]:
 
 def pulley_problems(parameters: Parameters) -> list[Problem]:
     """Problems of the pulleys' freedom, in the form of a model's check."""
-    p = settings.PULLEY_DEFAULTS | dict(parameters)
+    p = parameters
     found = _piston_problems(p) + _drive_problems(p)
     if 0.0 < p["tilt_lag"] < (least := least_tilt_lag(p)):
         expected = f"0, or {least:.2g} s and more at this step: tilting is explicit"
@@ -53,7 +53,7 @@ def pulley_problems(parameters: Parameters) -> list[Problem]:
 
 def steady_pulley_problems(parameters: Parameters) -> list[Problem]:
     """Problems of pulleys in a steady state: lags count for nothing there, but something has to hold each."""
-    p = settings.PULLEY_DEFAULTS | dict(parameters)
+    p = parameters
     found = _piston_problems(p) + _drive_problems(p) + _bearing_problems(p) + _controller_problems(p)
     is_driven, is_held = np.isfinite(p["driving_inertia"]), np.isinf(p["driven_inertia"])
     if is_driven and p["drive_slope"] == 0.0 and not is_held:
@@ -67,7 +67,7 @@ def steady_pulley_problems(parameters: Parameters) -> list[Problem]:
 
 def slipping_pulley_problems(parameters: Parameters) -> list[Problem]:
     """Problems of pulleys whose driven one is slowed down until the belt slips, and no other moves freely."""
-    p = settings.PULLEY_DEFAULTS | dict(parameters)
+    p = parameters
     found = _piston_problems(p) + _bearing_problems(p)
     if p["driving_axial"] != "position":
         expected = "position: a driving sheave that is free shifts before the belt slips"
@@ -89,7 +89,7 @@ def overload_problems(parameters: Parameters) -> list[Problem]:
     each pulley's flanks, whatever the belt does. Near it a belt slips through long since, which is a result.
     A ramp or a profile may lead there, and shows where the belt slips; its start may not lie there.
     """
-    p = settings.PULLEY_DEFAULTS | dict(parameters)
+    p = parameters
     key = "load_start" if p.get("load_history") == "ramp" else "load"
     load = p[key] * multiple(p, "load", 0.0)
     mu, radius = largest_friction(p), p["driven_radius"] / p["ratio"]
@@ -190,7 +190,7 @@ def _controller_problems(p: Parameters) -> list[Problem]:
 
 def pulley_inert(parameters: Parameters) -> dict[str, str]:
     """Settings of pulleys without effect, each with the setting that makes it so."""
-    p = settings.PULLEY_DEFAULTS | dict(parameters)
+    p = parameters
     controlled = p["driving_axial"] == "ratio", p["clamping"] == "torque_ratio"
     cases = (
         (np.isinf(p["driving_inertia"]), ("drive_slope",), "driving_inertia inf"),

@@ -199,7 +199,7 @@ def shaft_deflection(parameters: Parameters, pulley: str, radius: float) -> tupl
 
     From flat values of the run [SI] and the pitch radius [m] of the driving or the driven pulley.
     """
-    p = PULLEY_DEFAULTS | dict(parameters)
+    p = parameters
     prefix = OWN if pulley == "driven" and p[f"{OWN}shaft_lengths"] else ""
     lengths, diameters, modulus, factor, places, held, stiffness = (p[key] for key in shaft_keys(prefix))
     if not lengths:

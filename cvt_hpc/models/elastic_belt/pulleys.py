@@ -32,7 +32,6 @@ from cvt_hpc.kernels import merged_kernel
 from cvt_hpc.lanes import fma, like, maximum, minimum, select, sqrt
 from cvt_hpc.models.elastic_belt import fields as f
 from cvt_hpc.models.elastic_belt.pulley_settings import (
-    PULLEY_DEFAULTS,
     are_free,
     oil_factor,
     shaft_deflection,
@@ -59,7 +58,7 @@ def with_pulleys(
     From flat values of the run [SI], and of the driving and of the driven pulley the wraps, on rigid shafts,
     and the pitch radii [m].
     """
-    p = PULLEY_DEFAULTS | dict(parameters)
+    p = parameters
     shafts = [shaft_deflection(p, pulley, radius) for pulley, radius in zip(PULLEYS, radii, strict=True)]
     bent = [
         wrap._replace(tilt_compliance=wrap.tilt_compliance + compliance)
@@ -72,7 +71,7 @@ def with_pulleys(
     limits = (p["least_thrust"], p["most_thrust"]) if sets_ratio or sets_clamping else (-np.inf, np.inf)
     need = 0.0
     if sets_clamping:
-        need = 1.0 / (capacity.carried_torque(p | {"thrust": 1.0}) * abs(p["held_torque_ratio"]))
+        need = 1.0 / (capacity.carried_torque({**p, "thrust": 1.0}) * abs(p["held_torque_ratio"]))
     named = {
         "driving_mobility": 1.0 / p["driving_inertia"],
         "driven_mobility": 1.0 / p["driven_inertia"],

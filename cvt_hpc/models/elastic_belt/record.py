@@ -8,11 +8,11 @@ import numpy as np
 from cvt_hpc.models.elastic_belt import fluctuation
 from cvt_hpc.models.elastic_belt.along_belt import profile_bytes
 from cvt_hpc.models.elastic_belt.belt import MODES
+from cvt_hpc.models.elastic_belt.belt_settings import MOST_LAYERS, layer_count
 from cvt_hpc.models.elastic_belt.grouping import cost, lane_key, lanes
 from cvt_hpc.models.elastic_belt.history import histories
 from cvt_hpc.models.elastic_belt.lane_rings import LOSS, SLIDING, SPEED_SUM, TENSION
-from cvt_hpc.models.elastic_belt.pulley_settings import PULLEY_DEFAULTS, are_free, oil_factor
-from cvt_hpc.models.elastic_belt.ring_settings import MOST_LAYERS, layer_count
+from cvt_hpc.models.elastic_belt.pulley_settings import are_free, oil_factor
 from cvt_hpc.parameters import Parameters
 from cvt_hpc.variables import Coordinate, Variable, together
 from cvt_hpc.variator import PULLEYS, judging
@@ -51,7 +51,7 @@ def modal_peaks(measured: Measured) -> tuple[np.ndarray, ...] | None:
 
 def piston_force(measured: Measured) -> np.ndarray:
     """Mean force of the pressure on the pistons [N], (2,); the axial position is at rest in the mean."""
-    p = PULLEY_DEFAULTS | dict(measured.parameters)
+    p = measured.parameters
     turning = np.array([(measured.part(f"{pulley}_speed") ** 2).mean() for pulley in PULLEYS])
     # the driving spring is counted from the opening that is given
     positions = np.array([measured.mean(f"{pulley}_position") for pulley in PULLEYS])

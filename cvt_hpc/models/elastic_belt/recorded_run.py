@@ -12,11 +12,11 @@ from cvt_hpc.models.elastic_belt import lane_fields as lf
 from cvt_hpc.models.elastic_belt import lane_rings, sampling
 from cvt_hpc.models.elastic_belt.along_belt import Momentary
 from cvt_hpc.models.elastic_belt.belt import REGIONS, Belt, State, mesh
+from cvt_hpc.models.elastic_belt.belt_settings import layer_count
 from cvt_hpc.models.elastic_belt.fields import LOSSES, POWERS
 from cvt_hpc.models.elastic_belt.fluctuation import Fluctuation, fluctuation
 from cvt_hpc.models.elastic_belt.lane_belt import lane_belt, lane_state
 from cvt_hpc.models.elastic_belt.pulley_settings import are_free
-from cvt_hpc.models.elastic_belt.ring_settings import layer_count
 from cvt_hpc.models.elastic_belt.rings import ring_constants, without_saddle_friction
 from cvt_hpc.models.elastic_belt.validity import doubt, reach_doubt
 from cvt_hpc.parameters import Parameters

@@ -29,10 +29,10 @@ from cvt_hpc.kernels import kernel
 from cvt_hpc.models.elastic_belt import fields as f
 from cvt_hpc.models.elastic_belt import one_system
 from cvt_hpc.models.elastic_belt.belt import Belt, State
+from cvt_hpc.models.elastic_belt.belt_settings import DEFAULTS, layer_count
 from cvt_hpc.models.elastic_belt.lane_forces import LEAST_SHARE_OF_WIDTH
 from cvt_hpc.models.elastic_belt.one_system import ROWS, FlatBelt, sizes
 from cvt_hpc.models.elastic_belt.rhs import lengthening, speed_share_at
-from cvt_hpc.models.elastic_belt.ring_settings import RING_DEFAULTS, layer_count
 from cvt_hpc.parameters import Parameters
 from cvt_hpc.physics.layers import ring_friction, stack_forces
 from cvt_hpc.solvers.arrays import copy
@@ -59,7 +59,7 @@ class Rings(NamedTuple):
 
 def ring_constants(parameters: Parameters, belt: Belt) -> Rings:
     """Constants of the layers of one run, by its resolved parameters [SI] and the belt's constants."""
-    p = RING_DEFAULTS | dict(parameters)
+    p = DEFAULTS | dict(parameters)
     n, thickness = layer_count(p), p["layer_thickness"]
     offset = p["ring_offset"] + thickness * (np.arange(n) - 0.5 * (n - 1))
     surface = np.append(offset - 0.5 * thickness, offset[-1] + 0.5 * thickness)
