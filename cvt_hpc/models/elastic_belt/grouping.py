@@ -9,7 +9,9 @@ from cvt_hpc.models.elastic_belt import OWN_STEPPERS
 from cvt_hpc.models.elastic_belt.belt_settings import elements_tilt
 from cvt_hpc.models.elastic_belt.deflection_settings import MODE_KEYS, RITZ
 from cvt_hpc.models.elastic_belt.pulley_settings import are_free
+from cvt_hpc.models.elastic_belt.step_choice import MESH
 from cvt_hpc.parameters import Parameters
+from cvt_hpc.physics.friction_laws import TABLE_PARAMETERS
 from cvt_hpc.variator.course import profile_table
 from cvt_hpc.variator.scene import measures, rounded
 
@@ -23,35 +25,11 @@ COST_PER_LAYER = 0.3  # of a ring layer, beside the rings as one
 FADED = 0.1  # [N s/m], of the default scene
 LANES = {"double": 8, "single": 16}  # capacity of registers of 64 bytes
 # Values that the runs of a batch have in common: the mesh, the law's kind, and the course of time.
-SHARED = (
-    "ratio",
-    "driven_radius",
-    "centre_distance",
-    "stations",
-    "end_refinement",
-    "friction_law",
-    "table_force",
-    "table_speed",
-    "table_mu",
-    "rise_time",
-    "start_damping",
-    "load_history",
-    "speed_history",
-    "duration",
-    "judged_fraction",
-    "sampling_rate",
-    "strand_probes",
-    "arc_probes",
-    "step",
-    "precision",
-    "lanes",
-    "sheave_deformation",
-    "ring_layers",
-    "curvature_terms",
-    "column_bending",
-    *MODE_KEYS,
-    *RITZ,
-)
+_COURSE = ("rise_time", "start_damping", "load_history", "speed_history", "duration")
+_RECORDING = ("judged_fraction", "sampling_rate", "strand_probes", "arc_probes")
+_KINDS = ("friction_law", "sheave_deformation", "ring_layers", "curvature_terms", "column_bending")
+_STEP = ("step", "precision", "lanes")
+SHARED = (*MESH, *TABLE_PARAMETERS, *_COURSE, *_RECORDING, *_KINDS, *_STEP, *MODE_KEYS, *RITZ)
 
 
 def cost(parameters: Parameters, stepper: str, step_cost: Mapping[str, float] = STEP_COST) -> Any:

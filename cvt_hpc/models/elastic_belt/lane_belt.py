@@ -101,55 +101,39 @@ def lane_belt(belts: list[Belt], dtype: DTypeLike) -> LaneBelt:
     constants = LaneArray(1, len(lf.CONSTANTS), len(belts), dtype)
     for lane, belt in enumerate(belts):
         constants.data[0, :, lane] = _constants_of(belt)
-    cell, dual, kappa = first.cell, first.dual, first.curvature
-    law = first.law
+    law, terms, path = first.law, first.curvature_terms, (first.cell, first.dual, first.curvature)
     tables = (law.table_force.astype(dtype), law.table_speed.astype(dtype), law.table_mu.astype(dtype))
-    shared = {
-        "cell": cell,
-        "dual": dual,
-        "per_cell": first.per_cell,
-        "per_dual": first.per_dual,
-        "per_span": first.per_span,
-        "curvature": kappa,
-        "arc_curvature": first.arc_curvature,
-        **{
-            name: getattr(first, name)
-            for name in ("touches", "on_driven", "rise", "lean", "lean_rate", "upright")
-        },
-        "ring_curvature": _ring_curvature(first),
-        "bending": bending_bands(cell, dual, 1.0, kappa, first.curvature_terms),
-        "bending_load": bending_load(cell, dual, 1.0, kappa, first.curvature_terms),
-        "squared_curvature": first.squared_curvature,
-    }
-    return LaneBelt(
-        **{name: array.astype(dtype) for name, array in shared.items()},
+    changing = any(belt.speed_start != belt.driving_speed for belt in belts)
+    computed = dict(
+        ring_curvature=squared_curvature(*path, 1),
+        bending=bending_bands(first.cell, first.dual, 1.0, first.curvature, terms),
+        bending_load=bending_load(first.cell, first.dual, 1.0, first.curvature, terms),
         constants=constants,
-        places=_places(first.driving_stations, first.driven_stations, cell.size),
+        places=_places(first.driving_stations, first.driven_stations, first.cell.size),
         memory=first.friction_memory > 0.0,
         law=FrictionLaw(law.kind, 0.0, 0.0, 0.0, *tables),
-        rise_time=first.rise_time,
-        start_damping=first.start_damping,
-        largest_displacement=first.largest_displacement,
-        faded=first.faded,
-        ramp_end=first.ramp_end,
-        profile=first.profile,
-        speed_changes=any(belt.speed_start != belt.driving_speed for belt in belts)
-        or bool(np.any(first.profile[:, SPEED] != 1.0)),
+        speed_changes=changing or bool(np.any(first.profile[:, SPEED] != 1.0)),
         is_free=first.pulleys.are_free,
-        is_curved=first.curvature_terms > 0,
-        has_column=first.has_column,
-        tilts=first.tilts,
+        is_curved=terms > 0,
     )
+    # all else is of the first belt, by the same name
+    given = {key: getattr(first, key) for key in LaneBelt._fields if key not in computed}
+    found = LaneBelt(**computed, **given)
+    return found._replace(**{name: array.astype(dtype) for name, array in _of_stations(found).items()})
+
+
+def _of_stations(belt: LaneBelt) -> dict[str, Any]:
+    """Arrays of stations, by name: all but the profile, which no station has."""
+    return {
+        name: array
+        for name, array in belt._asdict().items()
+        if isinstance(array, np.ndarray) and name != "profile"
+    }
 
 
 def _places(driving: np.ndarray, driven: np.ndarray, rows: int) -> Any:
     """Row and part of each groove's stations, in parts of so many rows."""
     return (driving % rows, driving // rows), (driven % rows, driven // rows)
-
-
-def _ring_curvature(belt: Belt) -> np.ndarray:
-    weighted = belt.cell * belt.curvature
-    return 0.5 * (weighted + np.roll(weighted, 1)) / belt.dual
 
 
 def _constants_of(belt: Belt) -> list[float]:
@@ -228,9 +212,7 @@ def parted(belt: LaneBelt, parts: int) -> LaneBelt:
     Their number is a power of 2 that divides that of the stations.
     """
     arrays: dict[str, Any] = {
-        name: split(_one_lane(array), parts)
-        for name, array in belt._asdict().items()
-        if isinstance(array, np.ndarray) and name != "profile"  # which no station has
+        name: split(_one_lane(array), parts) for name, array in _of_stations(belt).items()
     }
     rows = belt.cell.size // parts
     places = _places(belt.places[0][0], belt.places[1][0], rows)

@@ -20,24 +20,10 @@ REFERENCE_STEP, REFERENCE_ERROR = 4.6e-6, 0.02  # [s], share of the amplitude
 REFERENCE_BAND = 1500.0  # [Hz], of a vibration, as a job has it by band_high
 SAFE_SHARE = 0.75
 SHORTEST = 1e-9  # [s], of a step: of scenes that are beyond all sense
-NEEDS = (
-    "step_error",
-    "band_high",
-    "ratio",
-    "driven_radius",
-    "centre_distance",
-    "stations",
-    "end_refinement",
-    "thrust",
-    "driving_speed",
-    "element_mass",
-    "ring_mass",
-    "element_damping",
-    "ring_damping",
-    "flank_stiffness",
-    "element_factor",
-    "half_wedge_angle",
-)
+MESH = ("ratio", "driven_radius", "centre_distance", "stations", "end_refinement")  # the path and its cells
+_LAYERS = ("element_mass", "ring_mass", "element_damping", "ring_damping")
+_FLANKS = ("flank_stiffness", "element_factor", "half_wedge_angle")
+NEEDS = ("step_error", "band_high", *MESH, "thrust", "driving_speed", *_LAYERS, *_FLANKS)
 
 
 def transverse_limit(parameters: Parameters) -> float:
