@@ -25,7 +25,7 @@ def _closing_radius(parameters: Parameters) -> float:
 
 SCENE: dict[str, Parameter] = {
     "ratio": positive(2.52, "", "speed ratio, driven radius / driving radius (Lebrecht 2004: LOW stop)"),
-    "driven_radius": positive(0.075, "m", "pitch radius on the driven pulley", sensible=(0.01, 0.5)),
+    "driven_radius": positive(0.075, "m", "pitch radius on the driven pulley", (0.01, 0.5)),
     "belt_length": positive(
         None,
         "m",
@@ -33,14 +33,14 @@ SCENE: dict[str, Parameter] = {
         gives=Substitute("driven_radius", ("ratio", "centre_distance"), _closing_radius),
         sensible=(0.1, 5.0),
     ),
-    "centre_distance": positive(0.155, "m", "distance of the shafts", sensible=(0.03, 2.0)),
+    "centre_distance": positive(0.155, "m", "distance of the shafts", (0.03, 2.0)),
     "driving_speed": positive(
         3000.0 * np.pi / 30.0,
         "rad/s",
         "speed of the driving pulley, prescribed; at the end of a ramp",
-        sensible=(1.0, 800.0),
+        (1.0, 800.0),
     ),
-    "thrust": positive(50e3, "N", "axial force on the driven pulley", sensible=(500.0, 2000000.0)),
+    "thrust": positive(50e3, "N", "axial force on the driven pulley", (500.0, 2e6)),
     "load": Parameter(
         0.0,
         "N m",
@@ -70,22 +70,13 @@ SCENE: dict[str, Parameter] = {
         choices=("constant", "ramp"),
     ),
     "speed_start": positive(
-        1000.0 * np.pi / 30.0,
-        "rad/s",
-        "speed of the driving pulley at the start of a ramp",
-        sensible=(1.0, 800.0),
+        1000.0 * np.pi / 30.0, "rad/s", "speed of the driving pulley at the start of a ramp", (1.0, 800.0)
     ),
     "rise_time": positive(
-        0.03,
-        "s",
-        "start-up: load rises smoothly, extra damping of the belt fades out",
-        sensible=(0.0001, 10.0),
+        0.03, "s", "start-up: load rises smoothly, extra damping of the belt fades out", (1e-4, 10.0)
     ),
     "disturbance": not_negative(
-        1e-6,
-        "m",
-        "largest random displacement of the strands, given to them at rise_time",
-        sensible=(1e-12, 0.01),
+        1e-6, "m", "largest random displacement of the strands, given to them at rise_time", (1e-12, 0.01)
     ),
     "seed": Parameter(1, "", "seed of that disturbance", minimum=0),
 }
@@ -134,36 +125,32 @@ FRICTION: dict[str, Parameter] = {
         "s/m",
         "slope dmu/dv of the friction law at v -> 0+, its steepest fall, without regularisation",
         maximum=0.0,
-        sensible=(0.001, 100.0),
+        sensible=(1e-3, 100.0),
     ),
     "kinetic_friction": positive(0.1, "", "the level that does not change with the gradient"),
-    "stribeck_velocity": positive(0.05, "m/s", "speed scale of the fall", sensible=(0.0001, 10.0)),
-    "friction_speed": positive(
-        0.017, "m/s", "regularisation speed of the flanks' friction", sensible=(1e-06, 5.0)
-    ),
+    "stribeck_velocity": positive(0.05, "m/s", "speed scale of the fall", (1e-4, 10.0)),
+    "friction_speed": positive(0.017, "m/s", "regularisation speed of the flanks' friction", (1e-6, 5.0)),
     "friction_memory": not_negative(
-        0.18e-3, "s", "time constant of the filtered sliding speed; 0: no memory", sensible=(1e-07, 0.1)
+        0.18e-3, "s", "time constant of the filtered sliding speed; 0: no memory", (1e-7, 0.1)
     ),
     "table_file": friction_file("N/m"),
     "table_force": Parameter(
-        (), "N/m", "normal line forces of a friction table, ascending", sensible=(1.0, 100000000.0)
+        (), "N/m", "normal line forces of a friction table, ascending", sensible=(1.0, 1e8)
     ),
-    "table_speed": Parameter((), "m/s", "speeds of a friction table, ascending", sensible=(1e-07, 100.0)),
+    "table_speed": Parameter((), "m/s", "speeds of a friction table, ascending", sensible=(1e-7, 100.0)),
     "table_mu": Parameter((), "", "friction table: a row of coefficients for each force"),
 }
 
-TRANSVERSE_DAMPING = not_negative(
-    1000.0, "N s/m^2", "viscous damping of the transverse motion", sensible=(0.1, 1000000.0)
-)
+TRANSVERSE_DAMPING = not_negative(1000.0, "N s/m^2", "viscous damping of the transverse motion", (0.1, 1e6))
 
 RINGS: dict[str, Parameter] = {
     "bending_stiffness": not_negative(
-        0.5, "N m^2", "EI of the belt against leaving its path's curvature", sensible=(0.0001, 1000.0)
+        0.5, "N m^2", "EI of the belt against leaving its path's curvature", (1e-4, 1000.0)
     ),
     "reference_tension": not_negative(
-        5.3e3, "N", "ring tension at which the rings fit the reference path", sensible=(10.0, 1000000.0)
+        5300.0, "N", "ring tension at which the rings fit the reference path", (10.0, 1e6)
     ),
-    "ring_damping": not_negative(4.0, "N s", "longitudinal damping of the rings", sensible=(0.001, 100000.0)),
+    "ring_damping": not_negative(4.0, "N s", "longitudinal damping of the rings", (1e-3, 1e5)),
 }
 
 # Of an element on its rings, whose saddle is ring_offset above the pitch line
@@ -172,13 +159,13 @@ TILT: dict[str, Parameter] = {
         3267.0,
         "N",
         "stiffness of the elements' tilt against the rings, moment by angle and length",
-        sensible=(1.0, 1e9),
+        (1.0, 1e9),
     ),
     "tilt_damper": not_negative(
         0.03267,
         "N s",
         "damping of the elements' tilt against the rings, moment by angular velocity and length",
-        sensible=(1e-6, 1e6),
+        (1e-6, 1e6),
     ),
 }
 

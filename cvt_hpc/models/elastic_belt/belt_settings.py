@@ -29,19 +29,13 @@ BENDING: dict[str, Parameter] = {
         choices=("off", "rocking"),
     ),
     "column_stiffness": positive(
-        0.5,
-        "N m^2",
-        "EI of the pressed elements while their faces rest on each other",
-        sensible=(0.0001, 10000.0),
+        0.5, "N m^2", "EI of the pressed elements while their faces rest on each other", (1e-4, 1e4)
     ),
     "outer_edge": not_negative(
-        1e-3,
-        "m",
-        "k+: from the pitch line outwards to the edge of the elements' faces",
-        sensible=(1e-6, 0.05),
+        1e-3, "m", "k+: from the pitch line outwards to the edge of the elements' faces", (1e-6, 0.05)
     ),
     "inner_edge": not_negative(
-        0.0, "m", "k-: from the pitch line inwards to the edge of the elements' faces", sensible=(1e-6, 0.05)
+        0.0, "m", "k-: from the pitch line inwards to the edge of the elements' faces", (1e-6, 0.05)
     ),
 }
 
@@ -78,7 +72,7 @@ RINGS: dict[str, Parameter] = {
         maximum=10.0,
     ),
     "ring_stribeck_speed": positive(
-        0.05, "m/s", "speed over which that static friction falls to the kinetic one", sensible=(1e-4, 10.0)
+        0.05, "m/s", "speed over which that static friction falls to the kinetic one", (1e-4, 10.0)
     ),
 }
 

@@ -87,9 +87,9 @@ def _modes(pulley: str) -> dict[str, Parameter]:
             (),
             "m/N",
             "opening of the groove by these modes at rest, at the place of a force on both flanks",
-            sensible=(1e-30, 1e-5),
+            (1e-30, 1e-5),
         ),
-        mass: not_negative((), "kg", "masses of these modes; 0: without inertia", sensible=(1e-9, 1e9)),
+        mass: not_negative((), "kg", "masses of these modes; 0: without inertia", (1e-9, 1e9)),
     }
 
 
@@ -102,17 +102,17 @@ DEFLECTION: dict[str, Parameter] = {
         choices=("bending", "cone", "flexibilities", "ritz"),
     ),
     "cone_stiffness": positive(
-        3e5, "N m/rad", "stiffness of a cone against tilting", sensible=(100.0, 1e9), allow_infinite=True
+        3e5, "N m/rad", "stiffness of a cone against tilting", (100.0, 1e9), allow_infinite=True
     ),
     "cone_shift": not_negative(
-        0.0, "m", "shift of a cone's axis of tilting towards the middle of the arc", sensible=(1e-5, 0.2)
+        0.0, "m", "shift of a cone's axis of tilting towards the middle of the arc", (1e-5, 0.2)
     ),
     **_table("driving"),
     **_table("driven"),
     **_modes("driving"),
     **_modes("driven"),
     "ritz_limit": not_negative(
-        20e3, "Hz", "highest frequency of modes that have inertia; 0: none", sensible=(1.0, 1e6)
+        20e3, "Hz", "highest frequency of modes that have inertia; 0: none", (1.0, 1e6)
     ),
     "ritz_modes": Parameter(
         0, "", "how many modes are kept, the lowest frequencies first; 0: all", minimum=0

@@ -21,14 +21,14 @@ PARAMETERS: dict[str, dict[str, Parameter]] = steady_variator.PARAMETERS | {
             0.0,
             "Hz",
             "lowest frequency of a mode that counts as vibration; 0: from the strands, as of a run",
-            sensible=(1.0, 20000.0),
+            (1.0, 2e4),
         ),
-        "band_high": positive(1500.0, "Hz", "highest such frequency", sensible=(1.0, 20000.0)),
+        "band_high": positive(1500.0, "Hz", "highest such frequency", (1.0, 2e4)),
         "undecided_growth": not_negative(
             50.0,
             "1/s",
             "growth or decay of the fastest growing mode up to which nothing is decided",
-            sensible=(0.001, 100000.0),
+            (1e-3, 1e5),
         ),
     }
 }

@@ -23,7 +23,7 @@ PARAMETERS = {
             "shapes of a higher own frequency follow their forces with a lag",
             minimum=0.0,
             exclusive=True,
-            sensible=(10.0, 1000000.0),
+            sensible=(10.0, 1e6),
         ),
         "split": Parameter(
             "free_splines",
@@ -37,7 +37,7 @@ PARAMETERS = {
             "of the coarse splines all around; halved on the arcs and again at their ends",
             minimum=0.0,
             exclusive=True,
-            sensible=(0.002, 0.1),
+            sensible=(2e-3, 0.1),
         ),
         "longitudinal": Parameter(
             "inertia",
