@@ -7,7 +7,6 @@ from typing import TYPE_CHECKING, Any
 from cvt_hpc.models.auto.rules import COARSENESS, SHARE, Rung, coarse, is_clear, is_passive, is_settled
 from cvt_hpc.models.elastic_belt import grouping
 from cvt_hpc.models.elastic_belt import record as belt_record
-from cvt_hpc.models.elastic_belt.record import coordinates, lane_key, lanes
 from cvt_hpc.parameters import Parameters
 from cvt_hpc.variables import Status, Values, Variable, Vibrates, shortened
 from cvt_hpc.variator import judging
@@ -17,19 +16,6 @@ if TYPE_CHECKING:
 
     from cvt_hpc.models.elastic_belt.recorded_run import RecordedRun
     from cvt_hpc.vibration.assessment import Occurrence
-
-__all__ = [
-    "VARIABLES",
-    "coordinates",
-    "cost",
-    "histories",
-    "judge",
-    "known",
-    "lane_key",
-    "lanes",
-    "preliminary",
-    "settle",
-]
 
 VARIABLES = (
     Variable("rung", "", "model of the ladder that answered", dtype="i1", flags=Rung),
@@ -64,6 +50,7 @@ def known(parameters: Parameters) -> Values | None:
     return {"status": Status.DONE, "vibrates": Vibrates.NO, "reason": reason, "rung": Rung.PASSIVE}
 
 
+coordinates, lane_key, lanes = belt_record.coordinates, grouping.lane_key, grouping.lanes
 preliminary = coarse
 
 

@@ -5,12 +5,11 @@ from typing import Any
 
 import numpy as np
 
-from cvt_hpc.models.elastic_belt import fluctuation
-from cvt_hpc.models.elastic_belt.along_belt import profile_bytes
+from cvt_hpc.models.elastic_belt import fluctuation, grouping
+from cvt_hpc.models.elastic_belt.along_belt import profile_bytes as profile_bytes
 from cvt_hpc.models.elastic_belt.belt import MODES
 from cvt_hpc.models.elastic_belt.belt_settings import MOST_LAYERS, layer_count
-from cvt_hpc.models.elastic_belt.grouping import cost, lane_key, lanes
-from cvt_hpc.models.elastic_belt.history import histories
+from cvt_hpc.models.elastic_belt.history import histories as histories
 from cvt_hpc.models.elastic_belt.lane_rings import LOSS, SLIDING, SPEED_SUM, TENSION
 from cvt_hpc.models.elastic_belt.pulley_settings import are_free, oil_factor
 from cvt_hpc.parameters import Parameters
@@ -29,8 +28,6 @@ from cvt_hpc.variator.variables import (
 )
 from cvt_hpc.vibration import peaks, ramp
 from cvt_hpc.vibration.signals import band_amplitude
-
-__all__ = ["VARIABLES", "coordinates", "cost", "histories", "judge", "lane_key", "lanes", "profile_bytes"]
 
 
 def strongest_modes(measured: Measured) -> tuple[np.ndarray, np.ndarray]:
@@ -224,4 +221,5 @@ def coordinates(parameters: Parameters) -> dict[str, Coordinate]:
     }
 
 
+cost, lane_key, lanes = grouping.cost, grouping.lane_key, grouping.lanes
 judge = partial(judging.judge, variables=VARIABLES)

@@ -5,11 +5,9 @@ from typing import Any
 
 from cvt_hpc.models.elastic_belt import OWN_STEPPERS
 from cvt_hpc.models.elastic_belt.batch import Batch
-from cvt_hpc.models.elastic_belt.sampling import CHANNELS
+from cvt_hpc.models.elastic_belt.sampling import CHANNELS as CHANNELS
 from cvt_hpc.models.marched import BatchOfOne, batches_of_one
 from cvt_hpc.parameters import Parameters
-
-__all__ = ["CHANNELS", "TAKES_OVER", "batch"]
 
 TAKES_OVER = True  # runs continue from the state of others
 

@@ -5,7 +5,6 @@ dropped parts, and why the equations as printed do not vibrate. Importing this p
 """
 
 from cvt_hpc.models import elastic_belt
-from cvt_hpc.models.elastic_belt import check, inert
 from cvt_hpc.parameters import Parameter
 from cvt_hpc.steppers import taken
 from cvt_hpc.variator.scene import TILT
@@ -55,15 +54,4 @@ REFUSED = elastic_belt.REFUSED | dict.fromkeys(
     "the rates of what lags follow from forces that know them: the model has a step of its own",
 )
 STEPPERS = OWN_STEPPERS
-KICK = elastic_belt.KICK
-
-__all__ = [
-    "DEFAULT_STEPPER",
-    "KICK",
-    "OWN_STEPPERS",
-    "PARAMETERS",
-    "REFUSED",
-    "STEPPERS",
-    "check",
-    "inert",
-]
+KICK, check, inert = elastic_belt.KICK, elastic_belt.check, elastic_belt.inert

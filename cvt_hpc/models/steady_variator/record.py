@@ -73,7 +73,7 @@ def solve(parameters: Parameters) -> Found | ValueError:
 
 def judge(solution: Found | ValueError) -> Values:
     """The record of a run, its cost apart."""
-    from cvt_hpc.models.steady_variator.walking import SlipsThrough
+    from cvt_hpc.models.steady_variator.first_states import SlipsThrough
 
     if isinstance(solution, SlipsThrough):
         return {"status": Status.DONE, "vibrates": Vibrates.SLIPS, "reason": str(solution)}

@@ -30,7 +30,7 @@ from cvt_hpc.models.steady_variator import OF_THE_COURSE
 from cvt_hpc.models.steady_variator.continuation import AT_HOME, Continuation, NoSteadyState, PathEnds
 from cvt_hpc.models.steady_variator.curve import Curve
 from cvt_hpc.models.steady_variator.equations import Equations
-from cvt_hpc.models.steady_variator.first_states import FirstStates, SlipsThrough
+from cvt_hpc.models.steady_variator.first_states import FirstStates
 from cvt_hpc.parameters import Parameters
 from cvt_hpc.variator import GROSS_SLIP, PULLEYS
 from cvt_hpc.variator.scene import measures
@@ -106,8 +106,6 @@ class Released:
         """Return the Jacobian, in the form of `Equations`."""
         return self._equations.jacobian(x, sided)
 
-
-__all__ = ["NoSteadyState", "SlipsThrough", "Steady", "SteadyBelt"]
 
 # A load rises no more that has fallen to this share of the largest, while slip has grown by a share of gross
 # slip: single cells that open turn the curve back without slip.
