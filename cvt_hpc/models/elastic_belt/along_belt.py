@@ -37,18 +37,9 @@ from cvt_hpc.recording import sample_count
 from cvt_hpc.variator.history import ALONG
 
 # quantities of a sample from which the quantities below follow
-NEEDED = (
-    "radial_friction",
-    "tangential_friction",
-    "radial_speed",
-    "sliding_speed",
-    "saddle_friction",
-    "element_speed",
-    "ring_tension",
-    "push_force",
-    "contact_force",
-    "mean_displacement",
-)
+_OF_FRICTION = ("radial_friction", "tangential_friction", "radial_speed", "sliding_speed", "saddle_friction")
+_OF_BELT = ("element_speed", "ring_tension", "push_force", "contact_force", "mean_displacement")
+NEEDED = (*_OF_FRICTION, *_OF_BELT)
 # long name, unit and comment by name; of all but the wrap angle nan where a station has no contact
 SLIDING = {
     "radial_sliding": ("radial sliding", "m s-1", "of the belt on the sheaves, outward"),

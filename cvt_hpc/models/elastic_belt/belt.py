@@ -221,19 +221,10 @@ def belt_constants(parameters: Parameters) -> Belt:
     belt_speed = p["driving_speed"] * path.driving_radius
     whole, disc = stiffness_factors(p)
     size = measures(p)
+    stiffness = whole, p["tilt_stiffness"] * p["tilt_factor"], p["local_stiffness"], p["local_length"]
+    flanks = axial_element_stiffness(p)
     wraps = [
-        sheaves(
-            dual[zone.stations],
-            zone.angle,
-            zone.rise,
-            radius,
-            whole,
-            p["tilt_stiffness"] * p["tilt_factor"],
-            p["local_stiffness"],
-            p["local_length"],
-            axial_element_stiffness(p),
-            disc,
-        )
+        sheaves(dual[zone.stations], zone.angle, zone.rise, radius, *stiffness, flanks, disc)
         for zone, radius in zip(zones, radii, strict=True)
     ]
     line_forces = rounded(size.force / size.length)

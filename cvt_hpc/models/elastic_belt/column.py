@@ -91,20 +91,16 @@ def column_forces(
     `moment` M at the stations [N m].
     """
     n, w = belt.cell.size, fields[f.W]
+    stiffness, bending = belt.element_stiffness, belt.column_stiffness
+    outer, inner = belt.outer_edge, belt.inner_edge
     moment[:] = 0.0
     for c in range(n):
         closed, least = 0.0, np.inf
         for half in range(2):
             j = (c + half) % n
             kappa = belt.curvature[c] + deviating_curvature(belt, w, j)
-            strain, _, _, borne = rocking_column(
-                eps[c] + belt.inner_edge * belt.curvature[c],
-                kappa,
-                belt.element_stiffness,
-                belt.column_stiffness,
-                belt.outer_edge,
-                belt.inner_edge,
-            )
+            pitch = eps[c] + inner * belt.curvature[c]
+            strain, _, _, borne = rocking_column(pitch, kappa, stiffness, bending, outer, inner)
             closed += 0.5 * min(strain, 0.0)
             least = min(strain, least)
             moment[j] += 0.5 * belt.cell[c] * fields[f.N_ELEMENT, c] * borne / belt.dual[j]

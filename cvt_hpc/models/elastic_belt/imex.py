@@ -96,16 +96,10 @@ def eliminate(belt: LaneBelt, state: LaneState, stations: LaneArray, step: float
             strained, eps = at_end - eps, state.column[j, lf.PRESSED]
             at_end = fma(state.column[j, lf.GIVE], strained, eps + state.column[j, lf.SHIFT])
             per_length *= state.column[j, lf.GIVE]
-        stress_0, e0 = element_stress(
-            element_stiffness,
-            element_damping * per_cell,
-            eps,
-            closing_0,
-            at_end,
-            per_length,
-            stations[j, lf.LINK_0],
-            stations[j, lf.MEETING] if again else zero,
-        )
+        grip, link, meet = element_damping * per_cell, stations[j, lf.LINK_0], zero
+        if again:
+            meet = stations[j, lf.MEETING]
+        stress_0, e0 = element_stress(element_stiffness, grip, eps, closing_0, at_end, per_length, link, meet)
         if anywhere(e0 <= 0.0):
             stations[j, lf.AHEAD] = at_end
         grip = ring_damping * per_cell
@@ -141,18 +135,9 @@ def eliminate(belt: LaneBelt, state: LaneState, stations: LaneArray, step: float
         # it fades along the belt, beyond all need: kept from numbers so small that the processor slows down
         c00, c01 = (e0 * g00 + faded) - faded, (e0 * g01 + faded) - faded
         c10, c11 = (e1 * g10 + faded) - faded, (e1 * g11 + faded) - faded
-    x0, x1 = ring_solution(
-        (p + t00) + from_ahead(p_b),
-        (q + t01) + from_ahead(q_b),
-        (r + t11) + from_ahead(r_b),
-        (f0 + s0) + from_ahead(f0_b),
-        (f1 + s1) + from_ahead(f1_b),
-        c00,
-        c01,
-        c10,
-        c11,
-        faded,
-    )
+    p, q, r = (p + t00) + from_ahead(p_b), (q + t01) + from_ahead(q_b), (r + t11) + from_ahead(r_b)
+    f0, f1 = (f0 + s0) + from_ahead(f0_b), (f1 + s1) + from_ahead(f1_b)
+    x0, x1 = ring_solution(p, q, r, f0, f1, c00, c01, c10, c11, faded)
     stations[last, lf.DV_0], stations[last, lf.DV_1] = x0, x1
 
 

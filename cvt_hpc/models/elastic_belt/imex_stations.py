@@ -154,18 +154,12 @@ def _solve(belt: LaneBelt, stations: LaneArray, q, gyration, part: int, coupled:
         stations[j, lf.X_0], stations[j, lf.X_1] = z0, z1
         onward = q * belt.per_cell[j]
         rest, y1 = onward * z1, onward * z0
-    x0, x1 = ring_solution(
-        stations[last, lf.A_00],
-        stations[last, lf.A_01],
-        stations[last, lf.A_11],
-        _force(belt, stations, last, gyration, part) + rest + from_ahead(own0),
-        y1 + from_ahead(own1),
-        stations[last, lf.B_00],
-        stations[last, lf.B_01],
-        stations[last, lf.B_10],
-        stations[last, lf.B_11],
-        belt.faded,
-    )
+    y0 = _force(belt, stations, last, gyration, part) + rest + from_ahead(own0)
+    y1 = y1 + from_ahead(own1)
+    d00, d01, d11 = stations[last, lf.A_00], stations[last, lf.A_01], stations[last, lf.A_11]
+    c00, c01 = stations[last, lf.B_00], stations[last, lf.B_01]
+    c10, c11 = stations[last, lf.B_10], stations[last, lf.B_11]
+    x0, x1 = ring_solution(d00, d01, d11, y0, y1, c00, c01, c10, c11, belt.faded)
     behind0, behind1 = from_behind(x0), from_behind(x1)
     stations[last, lf.PUSH] = x0
     for j in range(last - 1, -1, -1):

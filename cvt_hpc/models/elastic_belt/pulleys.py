@@ -216,15 +216,5 @@ def pulley_rates(laws, first: int, states, going: float, turning, position, pull
     excess_rate = like(laws[0, first + f.DRIVING_MOBILITY], load) * (torque - taken)
     shift_rate = going * like(laws[0, first + f.DRIVING_AXIAL_MOBILITY], load) * (axial[0] - driving)
     speed_rate = like(laws[0, first + f.DRIVEN_MOBILITY], load) * (moment - ratio * load)
-    return (
-        speed_rate,
-        (axial[1] - driven) / damping,
-        excess_rate,
-        shift_rate,
-        tilts[0],
-        tilts[1],
-        tilts[2],
-        tilts[3],
-        ratio_rate,
-        clamping_rate,
-    )
+    found = (speed_rate, (axial[1] - driven) / damping, excess_rate, shift_rate)
+    return found + tilts + (ratio_rate, clamping_rate)

@@ -168,6 +168,8 @@ def layer_rates(
     """
     n, cells = rings.length.size, belt.cell.size
     normal, sliding = np.empty(n + 1), np.empty(n + 1)
+    per_stribeck, per_width = 1.0 / rings.stribeck_speed, 1.0 / rings.friction_speed
+    least = LEAST_SHARE_OF_WIDTH * rings.friction_speed
     u, v = state.fields[f.U], state.fields[FIRST_LAYER : FIRST_LAYER + n]
     for j in range(cells):
         a, b = j - 1 if j > 0 else cells - 1, j + 1 if j < cells - 1 else 0
@@ -181,15 +183,8 @@ def layer_rates(
         if belt.arc_curvature[j] > 0.0:
             surface_friction(belt, rings, state, eps, share, j, normal, sliding)
             for k in range(n + 1):
-                secant, _ = ring_friction(
-                    sliding[k],
-                    rings.kinetic[k],
-                    True,
-                    rings.static_excess,
-                    1.0 / rings.stribeck_speed,
-                    1.0 / rings.friction_speed,
-                    LEAST_SHARE_OF_WIDTH * rings.friction_speed,
-                )
+                level, excess = rings.kinetic[k], rings.static_excess
+                secant, _ = ring_friction(sliding[k], level, True, excess, per_stribeck, per_width, least)
                 drag = (1.0 + rings.surface[k] * kappa) * normal[k] * secant * sliding[k]
                 if k < n:
                     rate[k, j] += drag / (1.0 + rings.offset[k] * kappa)

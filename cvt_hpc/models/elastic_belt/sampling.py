@@ -22,27 +22,14 @@ from cvt_hpc.models.elastic_belt.moments import MOMENTS, add
 from cvt_hpc.models.elastic_belt.power import audit
 from cvt_hpc.models.elastic_belt.pulley_step import opening_by_tilt
 from cvt_hpc.physics import compliance
-from cvt_hpc.variator import LEAST_SPEED, MOST_SPEED
+from cvt_hpc.variator import LEAST_SPEED, MOST_SPEED, PULLEYS, STRANDS
 
 SCALARS = (
-    "load",
-    "driven_speed",
-    "driven_position",
-    "ring_tension t1",
-    "ring_tension t2",
-    "push_force t1",
-    "push_force t2",
-    "axial_force driving",
-    "axial_force driven",
-    "slip driving",
-    "slip driven",
-    "open_share driving",
-    "open_share driven",
-    "least_strand_force",
-    "driving_speed",
-    "driving_position",
-    "tilt driving",
-    "tilt driven",
+    *("load", "driven_speed", "driven_position"),
+    *(f"{name} {strand}" for name in ("ring_tension", "push_force") for strand in STRANDS),
+    *(f"{name} {pulley}" for name in ("axial_force", "slip", "open_share") for pulley in PULLEYS),
+    *("least_strand_force", "driving_speed", "driving_position"),
+    *(f"tilt {pulley}" for pulley in PULLEYS),
 )
 
 

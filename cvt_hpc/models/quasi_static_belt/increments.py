@@ -110,15 +110,9 @@ def put_slopes(model: SplitBelt, moved: Motion, work: Work) -> None:
         per_length = step / (length * fields[f.N_ELEMENT, j])
         ahead = eps[q.ELEMENT, j] + per_length * outflow
         grip = belt.element_damping / length
+        strain, link, meet = eps[q.ELEMENT, j], links[q.ELEMENT, j], stations[q.MEETING, j]
         stress, links[q.ELEMENT, j] = element_stress(
-            belt.element_stiffness,
-            grip,
-            eps[q.ELEMENT, j],
-            closing + lifted,
-            ahead,
-            per_length,
-            links[q.ELEMENT, j],
-            stations[q.MEETING, j],
+            belt.element_stiffness, grip, strain, closing + lifted, ahead, per_length, link, meet
         )
         stations[q.ELEMENT_STRAIN_AHEAD, j] = ahead
         stations[q.ELEMENT_STRESS, j] = stress

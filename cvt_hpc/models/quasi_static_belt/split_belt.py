@@ -174,34 +174,19 @@ def split_belt(
     difference = np.roll(np.eye(belt.cell.size), 1, axis=1) - np.roll(np.eye(belt.cell.size), -1, axis=1)
     # 2 m v u_s, a difference of the neighbours over both cells, times the length of the station: half of it
     gyration = 0.5 * belt.mass * shapes.T @ difference @ shapes
-    return SplitBelt(
-        belt,
-        shapes,
-        slow,
-        step,
-        inertia,
-        np.ascontiguousarray(0.5 * (gyration - gyration.T)),
-        longitudinal == "steady_flow",
-        lag_drag(belt, grid, lag),
-        layer_shares(belt),
-    )
+    gyration = np.ascontiguousarray(0.5 * (gyration - gyration.T))
+    flow = longitudinal == "steady_flow", lag_drag(belt, grid, lag), layer_shares(belt)
+    return SplitBelt(belt, shapes, slow, step, inertia, gyration, *flow)
 
 
 def work_space(model: SplitBelt) -> Work:
     """Work space of a step."""
-    n, size = model.belt.cell.size, model.shapes.shape[1] + 2
-    width = 8 * ((size + 1 + 7) // 8)
-    return Work(
-        np.zeros((q.STATIONS, n)),
-        np.zeros((7, n)),
-        np.zeros(n),
-        chain(n, model.shapes.shape[1]),
-        np.zeros((size, width)),
-        np.zeros(model.shapes.shape[1]),
-        np.zeros(size),
-        np.zeros(model.shapes.shape[1]),
-        np.zeros(8 * ((model.shapes.shape[1] + 3 + 7) // 8)),
-    )
+    n, count = model.belt.cell.size, model.shapes.shape[1]
+    size = count + 2
+    at_stations = np.zeros((q.STATIONS, n)), np.zeros((7, n)), np.zeros(n)
+    matrix = np.zeros((size, 8 * ((size + 1 + 7) // 8)))
+    vectors = np.zeros(count), np.zeros(size), np.zeros(count), np.zeros(8 * ((count + 3 + 7) // 8))
+    return Work(*at_stations, chain(n, count), matrix, *vectors)
 
 
 def motion(model: SplitBelt, state: State) -> Motion:
