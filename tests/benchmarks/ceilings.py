@@ -30,8 +30,8 @@ from cvt_hpc.models.elastic_belt import (
     pulleys,
 )
 from cvt_hpc.models.elastic_belt import lane_fields as lf
-from cvt_hpc.models.elastic_belt.batch import PRECISIONS, Batch
 from cvt_hpc.models.elastic_belt.step_choice import REFERENCE_STEP as STEP
+from cvt_hpc.models.elastic_belt.transient import PRECISIONS, Batch
 from cvt_hpc.physics import compliance, flank, friction
 from cvt_hpc.variator import course
 

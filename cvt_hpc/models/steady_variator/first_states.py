@@ -21,11 +21,11 @@ from contextlib import suppress
 import numpy as np
 
 from cvt_hpc.models.elastic_belt import fields as f
-from cvt_hpc.models.elastic_belt.batch import StateMarch
 from cvt_hpc.models.elastic_belt.belt import Belt, initial_state
 from cvt_hpc.models.elastic_belt.rhs import contact_forces, fresh_contacts
 from cvt_hpc.models.elastic_belt.sampling import Outcome
 from cvt_hpc.models.elastic_belt.step_choice import SAFE_SHARE, transverse_limit
+from cvt_hpc.models.elastic_belt.transient import StateMarch
 from cvt_hpc.models.steady_variator.continuation import (
     AT_HOME,
     ON_THE_WAY,

@@ -11,10 +11,10 @@ import numpy as np
 
 from cvt_hpc.models.elastic_belt import along_belt as along
 from cvt_hpc.models.elastic_belt import fields as f
-from cvt_hpc.models.elastic_belt.batch import sampled
 from cvt_hpc.models.elastic_belt.belt import REGIONS, Mesh
 from cvt_hpc.models.elastic_belt.column import pressed_strains
 from cvt_hpc.models.elastic_belt.rhs import contact_forces, fresh_contacts, strains
+from cvt_hpc.models.elastic_belt.transient import sampled
 from cvt_hpc.models.steady_variator.walking import Steady
 from cvt_hpc.variator.history import along_path
 from cvt_hpc.variator.slip import against_slip, largest_torque

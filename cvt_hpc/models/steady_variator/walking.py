@@ -20,11 +20,11 @@ from scipy.optimize import brentq, minimize_scalar
 from scipy.sparse import csc_array
 
 from cvt_hpc.models.elastic_belt import fields as f
-from cvt_hpc.models.elastic_belt.batch import sampled
 from cvt_hpc.models.elastic_belt.belt import Belt, State, belt_constants
 from cvt_hpc.models.elastic_belt.one_system import pulled_by
 from cvt_hpc.models.elastic_belt.pulley_settings import DRIVEN_INERTIA, PULLEY_DEFAULTS, are_free
 from cvt_hpc.models.elastic_belt.rhs import contact_forces, fresh_contacts
+from cvt_hpc.models.elastic_belt.transient import sampled
 from cvt_hpc.models.elastic_belt.validity import reach_doubt
 from cvt_hpc.models.steady_variator import OF_THE_COURSE
 from cvt_hpc.models.steady_variator.continuation import AT_HOME, Continuation, NoSteadyState, PathEnds
