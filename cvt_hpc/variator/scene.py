@@ -4,7 +4,8 @@ Only ratio, driving_speed and thrust of the defaults are from a paper (Lebrecht 
 are those of a common passenger-car belt; seven were fitted to what that paper states of the noise, as
 jobs/lebrecht_2004.toml says; every other default is an assumption, plausible and not measured.
 
-Size of a scene beside the default one: limits with a unit scale with it, whatever its units are.
+The measures of a scene are its size beside the default one: limits with a unit scale with it, whatever its
+units are.
 """
 
 from collections import Counter

@@ -16,9 +16,8 @@ The sliding angle is that of Bullinger et al. 2005, eq. 36, against the running 
 belt slides into the groove: from pi/2 to 3 pi/2 the pulley drives the belt, below pi/2 the belt the pulley.
 Of means, sliding speed and angle are those of the mean sliding.
 
-Speeds and forces along the belt at each sample of a run's end, for histories that are kept.
-
-Off by default: nothing is then computed, nor held in memory. The kernel adds the profiles of each sample to
+Histories that are kept have them at each sample of a run's end, too (`Momentary`). Off by default: nothing is
+then computed, nor held in memory. The kernel adds the profiles of each sample to
 the sums of the judged part; here it adds them to zero first, sample by sample, which gives the same bits.
 """
 

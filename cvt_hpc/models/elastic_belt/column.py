@@ -1,4 +1,6 @@
-"""The column of pressed elements: its push force and its bending moment, with edges on which elements rock.
+"""Elements that rock on their edges and tilt on their rings: the column of pressed ones, and the saddles.
+
+**The column** of pressed elements has a push force and a bending moment, and edges on which elements rock.
 
 Faces reach from k- inside to k+ outside of the pitch line. Their load, the push force P and its moment M
 (P times its distance outwards from the pitch line), lies between the edges: P >= 0, -k- P <= M <= k+ P.
@@ -24,9 +26,8 @@ out.
 On the path itself elements touch without force at eps_0 = 0, whatever k-: eps = eps_0 + k- kappa_path. Both
 halves of a cell have the cell's strain, each the curvature of its own station.
 
-Tilt of the elements on their rings: friction of the saddles acts a lever above the flanks and the push.
-
-An element turns against the rings' normal by theta, forwards with its outer end. Its saddle is d, the
+**The tilt** of elements on their rings comes of the saddles' friction, which acts a lever above the flanks
+and the push. An element turns against the rings' normal by theta, forwards with its outer end. Its saddle is d, the
 ring_offset, above the pitch line, where flanks and neighbours hold it, so that it slides on the rings by
 sigma + d theta', sigma = (1 + kappa d) v_0 - v_1. With the saddle's friction q, k_a and d_a the spring and
 the damper,

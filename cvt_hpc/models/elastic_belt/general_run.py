@@ -1,8 +1,7 @@
 """A transient run of the elastic belt by any general stepper: the belt as one system, sampled as ever.
 
-Which unknowns of the flat belt act on which rates, and the Jacobian by few evaluations that follows.
-
-For integrators that can use it: SciPy's BDF and Radau factorise it as a sparse matrix. It is sparse but for
+Integrators that can use it have the Jacobian by few evaluations, since it is known which unknowns act on
+which rates: SciPy's BDF and Radau factorise it as a sparse matrix. It is sparse but for
 the sheaves, whose deformation lets each displacement of a wrap act on every force of that wrap.
 """
 

@@ -1,7 +1,7 @@
 """The fast step of the elastic belt: explicit in the strands, implicit in friction, bending and layer waves.
 
 Staggered in time: w, n_i, v_f at t_k; u, v_i, omega at t_k-1/2. Tension and contact act explicitly across the
-belt (leapfrog, no numerical damping of the strands), bending implicitly (`imex_bending`). Flank and ring
+belt (leapfrog, no numerical damping of the strands), bending implicitly (`imex_stations`). Flank and ring
 friction enter with their slopes, the stresses T and P by backward Euler, so neither the regularisation of
 friction nor the longitudinal waves (5-6 km/s) limit the step. Eliminating u and the content leaves one cyclic
 block-tridiagonal system, 2x2 blocks (v_element, v_ring), symmetric positive definite; the content then
@@ -15,7 +15,8 @@ reach their length at rest, the cell in which gaps run into pressed elements wou
 step to step with pushes in proportion to the step (`EDGES.md`). The step is limited by accuracy, and by
 tension and contact across the belt.
 
-The system of the fast step: stresses into its rows, elimination along the belt, and back substitution.
+The system comes from `imex_stations`; here stresses are put into its rows, it is eliminated along the belt,
+and substituted back.
 """
 
 from cvt_hpc.kernels import kernel, merged_kernel

@@ -1,4 +1,4 @@
-"""Tilt of the elements in lanes: the functions of `element_tilt.py` for one run."""
+"""Tilt of the elements in lanes: the functions of `column.py` for one run."""
 
 from cvt_hpc.kernels import kernel, merged_kernel
 from cvt_hpc.lanes import LaneArray, anywhere, behind, fma, like

@@ -10,7 +10,7 @@ outward):
     rings          m_1 (v_1,t + v_1 v_1,s) =  T,s + q
     transverse     m (w_tt + 2 v w_ts + v' w_s) = (F w_s),s - EI w_ssss - F kappa - d_b (w_t + v_0 w_s) + p_r
     memory         v_f,t + v v_f,s = (|v| - v_f) / tau_f in contact, v_f = |v| where that begins
-    tilt           d_a (th_t + v_0 th_s) = -k_a th - d_1 q, where elements tilt (`element_tilt.py`)
+    tilt           d_a (th_t + v_0 th_s) = -k_a th - d_1 q, where elements tilt (`column.py`)
     pulleys        J omega_dn' = -sum f_t (r + w) - i M,   T_1 k z_dn' = sum f_ax - F_dn   (and `pulleys.py`)
     dampers        T_d,i = c_i (v_i,s + kappa w_t): +T_d,i,s along the belt, -kappa T_d,i across it
 

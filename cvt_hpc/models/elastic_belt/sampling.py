@@ -1,6 +1,6 @@
 """The recorded quantities of the belt at each sampling instant, and when a run has to be stopped.
 
-Many steps and samples in one call, by any of the belt's own steps.
+A `march` takes many steps and samples in one call, by any of the belt's own steps.
 """
 
 from enum import IntEnum

@@ -1,8 +1,7 @@
 """Transient runs of the elastic belt: state, stepper and recording in one object, for one run or a batch.
 
-Runs of the elastic belt that advance together by a step in lanes, or one whose stations fill them.
-
-The belt's own steps from states of one's choice: runs without a job, a recording or a verdict.
+A `Batch` has runs that advance together by a step in lanes, or one whose stations fill them. A `StateMarch`
+takes the belt's own steps from states of one's choice, without a job, a recording or a verdict.
 """
 
 from __future__ import annotations

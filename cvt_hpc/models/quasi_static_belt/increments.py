@@ -1,8 +1,7 @@
 """Increments of all speeds in a step: the coordinates' dense system, into which the layers' is eliminated.
 
-Forces at the stations, and how they change with the speeds: friction of flanks and saddles, stresses.
-
-As in `elastic_belt/imex_stations.py`, and hoop stresses: a cell that moves outwards is stretched.
+Forces at the stations, friction of flanks and saddles and stresses, and their changes with the speeds are as
+in `elastic_belt/imex_stations.py`, and there are hoop stresses: a cell that moves outwards is stretched.
 """
 
 import numpy as np
@@ -255,7 +254,7 @@ def _reduce(model: SplitBelt, work: Work) -> None:
 
 @kernel
 def contradicts(model: SplitBelt, moved: Motion, work: Work) -> bool:
-    """Mark where the step contradicts its assumptions; whether anywhere newly. As `imex_system`."""
+    """Mark where the step contradicts its assumptions; whether anywhere newly. As `elastic_belt/imex.py`."""
     belt, stations, columns = model.belt, work.stations, work.layers.columns
     n, found = belt.cell.size, False
     for j in range(n):

@@ -1,8 +1,6 @@
-"""The quasi-static belt as its step has it: constants, motion, work space.
+"""The quasi-static belt as its step has it: shapes, constants, motion, work space.
 
-Rows of `Work.stations` are named here: the values of a step at each station.
-
-The shapes across the belt, and which of them move by inertia: the split at the limit frequency.
+A limit frequency splits the shapes across the belt into those that move by inertia and those that lag.
 """
 
 from typing import NamedTuple
