@@ -27,9 +27,9 @@ On the path itself elements touch without force at eps_0 = 0, whatever k-: eps =
 halves of a cell have the cell's strain, each the curvature of its own station.
 
 **The tilt** of elements on their rings comes of the saddles' friction, which acts a lever above the flanks
-and the push. An element turns against the rings' normal by theta, forwards with its outer end. Its saddle is d, the
-ring_offset, above the pitch line, where flanks and neighbours hold it, so that it slides on the rings by
-sigma + d theta', sigma = (1 + kappa d) v_0 - v_1. With the saddle's friction q, k_a and d_a the spring and
+and the push. An element turns against the rings' normal by theta, forwards with its outer end. Its saddle is
+d, the ring_offset, above the pitch line, where flanks and neighbours hold it, so that it slides on the rings
+by sigma + d theta', sigma = (1 + kappa d) v_0 - v_1. With the saddle's friction q, k_a and d_a the spring and
 the damper,
 
     k_a theta + d_a theta' = -d q(sigma + d theta'),    theta' = theta_t + v_0 theta_s.

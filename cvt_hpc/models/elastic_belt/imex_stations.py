@@ -1,7 +1,8 @@
 """The fast step at each station: forces, and slopes with the speeds, without the stresses T and P; bending.
 
-Bending is implicit, so that the shortest waves limit no step. Explicit bending is stable up to dt = 2 / w of the shortest waves, w^2 = 16 EI / (m h^4): steps would fall
-with the square of the cells. Here the increments of a step have, with K = EI d^4/ds^4,
+Bending is implicit, so that the shortest waves limit no step. Explicit bending is stable up to dt = 2 / w of
+the shortest waves, w^2 = 16 EI / (m h^4): steps would fall with the square of the cells. Here the increments
+of a step have, with K = EI d^4/ds^4,
 
     A du + C dv_0 = F,   A = m / dt + r + IMPLICIT dt K,
 

@@ -15,8 +15,9 @@ For the belt's other parts the rings are one: with the mean strain, whose tensio
 mean speed. Rows V_RING and N_RING of a state have these. The layers' own rows follow `FIELDS`: n speeds, then
 n contents less 1 + kappa d_k.
 
-For general integrators the belt with ring layers is one system, too. Its unknowns are those of `one_system`, of which the rings as one are left alone and follow from the layers; then
-the layers' speeds less the nominal belt speed, (n, N), and their contents less 1 + kappa d_k, (n, N).
+For general integrators the belt with ring layers is one system, too. Its unknowns are those of `one_system`,
+of which the rings as one are left alone and follow from the layers; then the layers' speeds less the nominal
+belt speed, (n, N), and their contents less 1 + kappa d_k, (n, N).
 """
 
 from typing import NamedTuple

@@ -5,9 +5,9 @@ length over the period. REFERENCE_STEP changes it by REFERENCE_ERROR at the work
 vibrations are below REFERENCE_BAND. Elsewhere that is no bound: of 81 random scenes that vibrate it changes
 half by more than 1.2 %, a tenth by more than 9 % (`docs/guide/validation.md`).
 
-**Stability.** Transverse motion is explicit but for bending (`imex_stations`): beyond 2 / w the shortest waves
-grow, w being their angular frequency under tension and contact, and beyond 2 m / (c kappa^2) what the layers'
-dampers c brake (`transverse_limit`). The step chosen stays at SAFE_SHARE of that.
+**Stability.** Transverse motion is explicit but for bending (`imex_stations`): beyond 2 / w the shortest
+waves grow, w being their angular frequency under tension and contact, and beyond 2 m / (c kappa^2) what the
+layers' dampers c brake (`transverse_limit`). The step chosen stays at SAFE_SHARE of that.
 """
 
 import numpy as np

@@ -9,9 +9,10 @@ flanks and the rings' saddles cause,
 is their power over twice the vibration's energy, which is twice its mean kinetic one; of a mass on a spring
 with the damping d it is -d / (2 m).
 
-All eigenvalues in a band of frequencies are found that are not strongly damped, by shift and invert: about a point of the complex plane Arnoldi's method finds the nearest eigenvalues, and no
-other lies in the disc up to the farthest of them. Discs are laid up along the middle of the rectangle that
-was requested, each as far on as the last one reaches, until they cover it: so nothing in it can be missed.
+All eigenvalues in a band of frequencies are found that are not strongly damped, by shift and invert: about a
+point of the complex plane Arnoldi's method finds the nearest eigenvalues, and no other lies in the disc up to
+the farthest of them. Discs are laid up along the middle of the rectangle that was requested, each as far on
+as the last one reaches, until they cover it: so nothing in it can be missed.
 """
 
 from typing import NamedTuple

@@ -1,8 +1,9 @@
 """The steady equations of a belt, and paths along which their constants change while a solution follows.
 
-They have corners, and Newton's iteration takes full steps. With the corners sharp a full step solves the equations for the presumed set of pressed elements, and the next
-set follows from its signs: the active-set iteration of complementarity problems, which ends after a few sets.
-Shortening its steps, or rounding off the corners, only hinders it.
+They have corners, and Newton's iteration takes full steps. With the corners sharp a full step solves the
+equations for the presumed set of pressed elements, and the next set follows from its signs: the active-set
+iteration of complementarity problems, which ends after a few sets. Shortening its steps, or rounding off the
+corners, only hinders it.
 """
 
 from collections.abc import Callable

@@ -6,10 +6,10 @@ follow each other there, and both are led back by Newton's iteration. Where that
 way begins at the belt in its grooves without load, or else at another load. There it begins too where the
 belt slips through, since constant friction carries less than a falling one.
 
-Why a transient: Newton's iteration finds a steady state from one nearby only: which elements press, which cells are apart and
-which way the rings slide on them are a thousand switches. The transient sets them as the belt itself does. It
-is dissipative where friction is constant, so that it settles near enough, unless the load is more than
-friction carries: then the belt slips through.
+Why a transient: Newton's iteration finds a steady state from one nearby only: which elements press, which
+cells are apart and which way the rings slide on them are a thousand switches. The transient sets them as the
+belt itself does. It is dissipative where friction is constant, so that it settles near enough, unless the
+load is more than friction carries: then the belt slips through.
 """
 
 import math

@@ -3,9 +3,10 @@
 Corners of the push force are sharp: each state begins at the one before, and a step that fails is made again
 in quarters. Where the load does not separate states, the arc of their curve does (`curve.py`).
 
-Steady states of free pulleys begin at that of the same belt between pulleys that are not. The hold on the pulleys is released little by little: the residual that the free equations have in the held
-state is taken down along a path (Newton's homotopy), r(x) = (1 - share) r(x_held). Only the pulleys'
-equations have one to begin with.
+Steady states of free pulleys begin at that of the same belt between pulleys that are not. The hold on the
+pulleys is released little by little: the residual that the free equations have in the held state is taken
+down along a path (Newton's homotopy), r(x) = (1 - share) r(x_held). Only the pulleys' equations have one to
+begin with.
 """
 
 import math
