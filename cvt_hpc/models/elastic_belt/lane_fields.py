@@ -44,17 +44,22 @@ NOTED = 15
 FIELDS_OF_FORCES = 18
 
 # Of the fast step: increment of u, its share by that of v_element, slope w_s; of the driven pulley's stations
-# (of both with free pulleys) the flanks' tangential force and its slopes PUSH, LAG, SLOPE, FLANK,
-FLANK_SLOPE, FLANK_CROSS = range(FIELDS_OF_FORCES, 24) # whether (1) linearised friction would turn the
-sliding of the flanks, or of the saddle, about, whether (1) # the elements of the cell ahead of a station meet
-within the step, and, where they are apart, their strain at # its end with the speeds that it begins with
-REVERSING, RING_REVERSING, MEETING, AHEAD = range(24, 28) # blocks of the system and its right side D_00,
-D_01, D_11, Y_0, Y_1 = range(28, 33) # the eliminated system: inverse pivots, the increments of v_element and
-v_ring, the border, the stresses' # slopes with the speeds' differences I_00, I_01, I_11, DV_0, DV_1, G_00,
-G_01, G_10, G_11, LINK_0, LINK_1 = range(33, 44) # of `imex_stations`: line force across the belt, its slopes
-with the increments of u and of v_element; factors # and work space ACROSS, MASS_ACROSS, CROSS, A_00, A_01,
-A_11, B_00, B_01, B_10, B_11, X_0, X_1 = range(44, 56) # of the layers' dampers in the cells of arcs, kappa h
-/ 2 times their force [N] BENT = 56 FIELDS_OF_WORK = 57
+# (of both with free pulleys) the flanks' tangential force and its slopes
+PUSH, LAG, SLOPE, FLANK, FLANK_SLOPE, FLANK_CROSS = range(FIELDS_OF_FORCES, 24)
+# whether (1) linearised friction would turn the sliding of the flanks, or of the saddle, about, whether (1)
+# the elements of the cell ahead of a station meet within the step, and, where they are apart, their strain at
+# its end with the speeds that it begins with
+REVERSING, RING_REVERSING, MEETING, AHEAD = range(24, 28)
+# blocks of the system and its right side
+D_00, D_01, D_11, Y_0, Y_1 = range(28, 33)
+# the eliminated system: inverse pivots, the increments of v_element and v_ring, the border, the stresses'
+# slopes with the speeds' differences
+I_00, I_01, I_11, DV_0, DV_1, G_00, G_01, G_10, G_11, LINK_0, LINK_1 = range(33, 44)
+# of motion across: line force, its slopes with the increments of u and of v_element; factors and work space
+ACROSS, MASS_ACROSS, CROSS, A_00, A_01, A_11, B_00, B_01, B_10, B_11, X_0, X_1 = range(44, 56)
+# of the layers' dampers in the cells of arcs, kappa h / 2 times their force [N]
+BENT = 56
+FIELDS_OF_WORK = 57
 
 # Constants of each lane; from FIRST_OFFSET on the layers' offsets, then by arc and surface the factors of the
 # layer above it and of the one below.
