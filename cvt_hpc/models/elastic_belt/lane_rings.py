@@ -49,21 +49,11 @@ def lane_rings(belts: Sequence[Belt], rings: Sequence[Rings], dtype: DTypeLike) 
             # the elements below the saddle and above the last layer are at the pitch line
             above, below = surface / [*neutral, 1.0], surface / [1.0, *neutral]
             factors += np.column_stack([above, below]).ravel().tolist()
-        constants.data[0, :, lane] = [
-            ring.mass,
-            ring.stiffness,
-            ring.damping,
-            ring.relief,
-            ring.static_excess,
-            1.0 / ring.stribeck_speed,
-            1.0 / ring.friction_speed,
-            ring.kinetic[0],
-            ring.kinetic[1] if n > 1 else 0.0,
-            ring.stiffness / ring.mass,
-            2.0 * ring.damping / ring.mass,
-            *ring.offset,
-            *factors,
-        ]
+        one = [ring.mass, ring.stiffness, ring.damping, ring.relief]
+        friction = [ring.static_excess, 1.0 / ring.stribeck_speed, 1.0 / ring.friction_speed]
+        friction += [ring.kinetic[0], ring.kinetic[1] if n > 1 else 0.0]
+        rates = [ring.stiffness / ring.mass, 2.0 * ring.damping / ring.mass]
+        constants.data[0, :, lane] = [*one, *friction, *rates, *ring.offset, *factors]
     stations = np.arange(first.cell.size)
     straight = first.curvature == 0.0
     middle = first.driven_stations[first.driven_stations.size // 2]

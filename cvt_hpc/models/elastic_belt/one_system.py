@@ -23,18 +23,9 @@ from cvt_hpc.steppers.system import System
 ROWS = (f.W, f.U, f.V_ELEMENT, f.V_RING, f.N_ELEMENT, f.N_RING)  # of the state, as they follow in y
 VELOCITIES = (f.U, f.V_ELEMENT, f.V_RING)
 
-# Sizes that count alike in each unknown of the default scene: 0.1 mm off the path, 0.1 m/s of sliding, the
-# strain of the rings.
-SIZES = {
-    f.W: 1e-4,
-    f.U: 0.1,
-    f.V_ELEMENT: 0.1,
-    f.V_RING: 0.1,
-    f.V_FILTERED: 0.1,
-    f.N_ELEMENT: 1e-3,
-    f.N_RING: 1e-3,
-    f.ELEMENT_TILT: 1e-2,
-}
+# Sizes that count alike in each unknown of the default scene, by row of the state: 0.1 mm off the path,
+# 0.1 m/s of sliding (u, both layers and filtered), the strain of the rings, and the tilt of elements.
+SIZES = (1e-4, 0.1, 0.1, 0.1, 0.1, 1e-3, 1e-3, 1e-2)
 SIZE_OF_SPEED, SIZE_OF_POSITION = 1.0, 1e-4  # of a pulley [rad/s], [m]
 SIZE_OF_THRUST = 1e3  # [N]
 SIZES_OF_STATES = (SIZE_OF_SPEED, *[SIZE_OF_POSITION] * (f.RATIO_SUM - 1), SIZE_OF_THRUST, SIZE_OF_THRUST)
@@ -232,28 +223,20 @@ def system(flat: FlatBelt) -> System:
     Of these u alone is the rate of an unknown.
     """
     is_velocity = np.arange(f.STATES) == f.EXCESS
-    moving = _by_row(flat, {row: row in VELOCITIES for row in SIZES}, is_velocity, True, False)
+    moving = _by_row(flat, np.isin(range(len(SIZES)), VELOCITIES), is_velocity, True, False)
     n = flat.belt.cell.size
     position_of = np.full(moving.size, -1)
     position_of[n : 2 * n] = np.arange(n)
-    pulley = sizes_of_pulley(flat.belt)
+    size = flat.belt.measures
+    pulley = SIZE_OF_SPEED / size.time, SIZE_OF_POSITION * size.length
     scale = _by_row(flat, sizes(flat.belt), sizes_of_states(flat.belt), *pulley)
     return System(rates, flat, moving, position_of, scale)
 
 
-def sizes(belt: Belt) -> dict[int, float]:
-    """SIZES in the measures of a scene, by row."""
-    size = belt.measures
-    factors = {
-        f.W: size.length,
-        **dict.fromkeys((f.U, f.V_ELEMENT, f.V_RING, f.V_FILTERED), size.length / size.time),
-    }
-    return {row: default * factors.get(row, 1.0) for row, default in SIZES.items()}
-
-
-def sizes_of_pulley(belt: Belt) -> tuple[float, float]:
-    """SIZE_OF_SPEED and SIZE_OF_POSITION in the measures of a scene."""
-    return SIZE_OF_SPEED / belt.measures.time, SIZE_OF_POSITION * belt.measures.length
+def sizes(belt: Belt) -> np.ndarray:
+    """SIZES in the measures of a scene."""
+    speed = belt.measures.length / belt.measures.time
+    return np.array(SIZES) * [belt.measures.length, *[speed] * 4, 1.0, 1.0, 1.0]
 
 
 def sizes_of_states(belt: Belt) -> np.ndarray:
@@ -263,7 +246,7 @@ def sizes_of_states(belt: Belt) -> np.ndarray:
     return np.array(SIZES_OF_STATES) * factors
 
 
-def _by_row(flat: FlatBelt, values: dict[int, float], states: np.ndarray, *scalars: float) -> np.ndarray:
+def _by_row(flat: FlatBelt, values: np.ndarray, states: np.ndarray, *scalars: float) -> np.ndarray:
     """One value for each unknown, by its row of the state, or its place in STATES."""
     known = (*ROWS, f.ELEMENT_TILT) if flat.belt.tilts else ROWS
     rows = np.repeat([values[row] for row in known], flat.belt.cell.size)
