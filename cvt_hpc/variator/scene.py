@@ -83,12 +83,11 @@ SCENE: dict[str, Parameter] = {
 }
 
 
-def rise_problems(parameters: Parameters) -> list[Problem]:
+def rise_problems(p: Parameters) -> list[Problem]:
     """Problems of a load that rises, in the form of a model's check: (key, expected, found).
 
     Of the parameters [SI] `rise_time`, `duration` and `judged_fraction` count.
     """
-    p = parameters
     before = (1.0 - p["judged_fraction"]) * p["duration"]
     if p["rise_time"] <= before * (1.0 + 1e-9):
         return []
@@ -107,9 +106,8 @@ def course_problems(parameters: Parameters) -> list[Problem]:
     return problems
 
 
-def course_inert(parameters: Parameters) -> dict[str, str]:
+def course_inert(p: Parameters) -> dict[str, str]:
     """Parameters of courses that are constant, each with the setting that makes it without effect."""
-    p = parameters
     return {
         f"{name}_start": f"{name}_history constant"
         for name in ("load", "speed")
@@ -217,9 +215,8 @@ class Measures(NamedTuple):
     length: float
 
 
-def measures(parameters: Parameters) -> Measures:
+def measures(p: Parameters) -> Measures:
     """Measures of a scene, by flat values [SI] of a run: all 1 for the default one."""
-    p = parameters
     thrust, speed, distance = (
         p[key] / SCENE[key].default for key in ("thrust", "driving_speed", "centre_distance")
     )

@@ -47,9 +47,8 @@ class Rung(IntEnum):
     FULL = 3
 
 
-def is_passive(parameters: Parameters) -> bool:
+def is_passive(p: Parameters) -> bool:
     """Whether friction nowhere falls with speed and carries the load by far, and forces are not requested."""
-    p = parameters
     is_table = p["friction_law"] == "table"
     falls = bool(np.any(np.diff(p["table_mu"]) < 0.0)) if is_table else p["friction_gradient"] != 0.0
     if p["profile_time"]:

@@ -164,16 +164,14 @@ PARAMETERS: dict[str, dict[str, Parameter]] = {
 }
 
 
-def check(parameters: Parameters) -> list[Problem]:
+def check(p: Parameters) -> list[Problem]:
     """Problems that lie between parameters [SI]: (key, expected, found)."""
-    p = parameters
     found = shape_problems(p) + profiles.profile_problems(p) + friction_problems(p)
     return found or pulley_problems(p)
 
 
-def shape_problems(parameters: Parameters) -> list[Problem]:
+def shape_problems(p: Parameters) -> list[Problem]:
     """Problems between sizes: pulleys that overlap, play beyond reason. Result as of `check`."""
-    p = parameters
     problems = variator_problems(p)
     if not problems:
         path = variator(p["ratio"], p["driven_radius"], p["centre_distance"])
@@ -185,12 +183,11 @@ def shape_problems(parameters: Parameters) -> list[Problem]:
     return problems + shaft_problems(p) + belt_settings.belt_problems(p)
 
 
-def inert(parameters: Parameters) -> dict[str, str]:
+def inert(p: Parameters) -> dict[str, str]:
     """Parameters without effect on a run, so that a study does not vary them for nothing.
 
     By the name of the parameter, the setting that makes it so, e.g. "friction_law table".
     """
-    p = parameters
     whole, disc = stiffness_factors(p)
     of_disc, of_tilt = ("local_stiffness", "local_length"), ("tilt_stiffness", "tilt_factor")
     cases = (

@@ -124,9 +124,8 @@ WORDS = {**ELSEWHERE, **SLIDING, "element_speed": PATH_SPEED}
 PRECISION = np.dtype(np.float32)
 
 
-def profiled_samples(parameters: Parameters) -> int:
+def profiled_samples(p: Parameters) -> int:
     """Samples of a run whose profiles are kept, the last ones."""
-    p = parameters
     return min(round(p["profile_duration"] * p["sampling_rate"]), sample_count(p))
 
 

@@ -129,15 +129,12 @@ def kept_modes(parameters: Parameters, pulley: str) -> tuple[np.ndarray, np.ndar
     return harmonic[order], flexibility[order], mass[order]
 
 
-def disc_settings(
-    parameters: Parameters, pulley: str, wrap: Sheaves, radius: float, turned: float
-) -> dict[str, Any]:
+def disc_settings(p: Parameters, pulley: str, wrap: Sheaves, radius: float, turned: float) -> dict[str, Any]:
     """Data of one pulley's discs for `Sheaves`, at the reference stiffness, beside local bending.
 
     `flexibilities`, (m, m) [m/N], or (0, 0) for local bending, and `modes` where these have inertia, over the
     `wrap` of m stations, with the pitch radius [m] and the angle `turned` of the arc [rad].
     """
-    p = parameters
     if p["sheave_deformation"] == "cone":
         from_middle, distance = wrap.angle - 0.5 * turned, radius + wrap.rise
         shifted = p["cone_stiffness"], p["cone_shift"]
@@ -154,9 +151,8 @@ def disc_settings(
     return {}
 
 
-def deflection_problems(parameters: Parameters) -> list[Problem]:
+def deflection_problems(p: Parameters) -> list[Problem]:
     """Problems of the discs' deformation: (key, expected, found); the scene's sizes are taken as sound."""
-    p = parameters
     kind = p["sheave_deformation"]
     if kind == "bending":
         return []
@@ -184,8 +180,7 @@ def refuse_moving_discs(parameters: Parameters) -> list[Problem]:
     return [("sheave_deformation", "bending, cone or flexibilities but by the stepper imex", "ritz")]
 
 
-def _ritz_problems(parameters: Parameters) -> list[Problem]:
-    p = parameters
+def _ritz_problems(p: Parameters) -> list[Problem]:
     if "lanes" not in p:  # a general method
         return refuse_moving_discs(p)
     problems = []

@@ -32,13 +32,12 @@ _STEP = ("step", "precision", "lanes")
 SHARED = (*MESH, *TABLE_PARAMETERS, *_COURSE, *_RECORDING, *_KINDS, *_STEP, *MODE_KEYS, *RITZ)
 
 
-def cost(parameters: Parameters, stepper: str, step_cost: Mapping[str, float] = STEP_COST) -> Any:
+def cost(p: Parameters, stepper: str, step_cost: Mapping[str, float] = STEP_COST) -> Any:
     """Core-seconds of a batch; of general steppers, some of which choose their step, little is known.
 
     Resolved parameters of a run are numbers or arrays of them; `step_cost` is per station and time step, by
     stepper.
     """
-    p = parameters
     is_alone = np.equal(p.get("lanes", "runs"), "stations")
     share = np.where(is_alone, ALONE_SHARE.get(stepper, 1.0), 1.0)[()]
     layers = np.asarray(p.get("ring_layers", 1))

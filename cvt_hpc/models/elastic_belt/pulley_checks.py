@@ -16,9 +16,8 @@ from cvt_hpc.variator.profiles import multiple
 ABOVE = 1.1
 
 
-def shaft_problems(parameters: Parameters) -> list[Problem]:
+def shaft_problems(p: Parameters) -> list[Problem]:
     """Problems of a shaft, in the form of a model's check."""
-    p = parameters
     return _problems_of_shaft(p, "") or _problems_of_shaft(p, settings.OWN)
 
 
@@ -40,9 +39,8 @@ def _problems_of_shaft(p: Parameters, prefix: str) -> list[Problem]:
     return []
 
 
-def pulley_problems(parameters: Parameters) -> list[Problem]:
+def pulley_problems(p: Parameters) -> list[Problem]:
     """Problems of the pulleys' freedom, in the form of a model's check."""
-    p = parameters
     found = _piston_problems(p) + _drive_problems(p)
     if 0.0 < p["tilt_lag"] < (least := least_tilt_lag(p)):
         expected = f"0, or {least:.2g} s and more at this step: tilting is explicit"
@@ -51,9 +49,8 @@ def pulley_problems(parameters: Parameters) -> list[Problem]:
     return found or overload_problems(p)
 
 
-def steady_pulley_problems(parameters: Parameters) -> list[Problem]:
+def steady_pulley_problems(p: Parameters) -> list[Problem]:
     """Problems of pulleys in a steady state: lags count for nothing there, but something has to hold each."""
-    p = parameters
     found = _piston_problems(p) + _drive_problems(p) + _bearing_problems(p) + _controller_problems(p)
     is_driven, is_held = np.isfinite(p["driving_inertia"]), np.isinf(p["driven_inertia"])
     if is_driven and p["drive_slope"] == 0.0 and not is_held:
@@ -65,9 +62,8 @@ def steady_pulley_problems(parameters: Parameters) -> list[Problem]:
     return found or overload_problems(p)
 
 
-def slipping_pulley_problems(parameters: Parameters) -> list[Problem]:
+def slipping_pulley_problems(p: Parameters) -> list[Problem]:
     """Problems of pulleys whose driven one is slowed down until the belt slips, and no other moves freely."""
-    p = parameters
     found = _piston_problems(p) + _bearing_problems(p)
     if p["driving_axial"] != "position":
         expected = "position: a driving sheave that is free shifts before the belt slips"
@@ -82,14 +78,13 @@ def slipping_pulley_problems(parameters: Parameters) -> list[Problem]:
     return found
 
 
-def overload_problems(parameters: Parameters) -> list[Problem]:
+def overload_problems(p: Parameters) -> list[Problem]:
     """Problem of a load that is more than any belt carries under the axial forces that are given.
 
     By `capacity.torque_limit` with the largest coefficient of friction, and ABOVE: a bound on the moment of
     each pulley's flanks, whatever the belt does. Near it a belt slips through long since, which is a result.
     A ramp or a profile may lead there, and shows where the belt slips; its start may not lie there.
     """
-    p = parameters
     key = "load_start" if p.get("load_history") == "ramp" else "load"
     load = p[key] * multiple(p, "load", 0.0)
     mu, radius = largest_friction(p), p["driven_radius"] / p["ratio"]
@@ -120,13 +115,12 @@ def _most_axial_force(p: Parameters) -> dict[str, float]:
     }
 
 
-def least_tilt_lag(parameters: Parameters) -> float:
+def least_tilt_lag(p: Parameters) -> float:
     """Shortest lag of a tilt [s] that an explicit step follows.
 
     A belt that stays where it is answers an opening q with forces K q against it, K = c r wrap at most, c the
     stiffness of discs and elements in series: the tilt comes to rest at the rate (1 + kappa K) / T1.
     """
-    p = parameters
     if not p.get("step") or variator_problems(p):
         return 0.0
     path = variator(p["ratio"], p["driven_radius"], p["centre_distance"])
@@ -188,9 +182,8 @@ def _controller_problems(p: Parameters) -> list[Problem]:
     return found + [("load", expected, f"{load:g} N m") for load in loads if abs(load) > most][:1]
 
 
-def pulley_inert(parameters: Parameters) -> dict[str, str]:
+def pulley_inert(p: Parameters) -> dict[str, str]:
     """Settings of pulleys without effect, each with the setting that makes it so."""
-    p = parameters
     controlled = p["driving_axial"] == "ratio", p["clamping"] == "torque_ratio"
     cases = (
         (np.isinf(p["driving_inertia"]), ("drive_slope",), "driving_inertia inf"),

@@ -194,12 +194,11 @@ def are_free(parameters: Parameters) -> bool:
     )
 
 
-def shaft_deflection(parameters: Parameters, pulley: str, radius: float) -> tuple[float, float]:
+def shaft_deflection(p: Parameters, pulley: str, radius: float) -> tuple[float, float]:
     """Effect of a pulley's shaft on its groove: compliance [m/N], free opening by its bearings [m].
 
     From flat values of the run [SI] and the pitch radius [m] of the driving or the driven pulley.
     """
-    p = parameters
     prefix = OWN if pulley == "driven" and p[f"{OWN}shaft_lengths"] else ""
     lengths, diameters, modulus, factor, places, held, stiffness = (p[key] for key in shaft_keys(prefix))
     if not lengths:

@@ -51,14 +51,13 @@ class Pulleys(NamedTuple):
 
 
 def with_pulleys(
-    parameters: Parameters, wraps: Sequence[Sheaves], radii: tuple[float, float]
+    p: Parameters, wraps: Sequence[Sheaves], radii: tuple[float, float]
 ) -> tuple[list[Sheaves], Pulleys]:
     """Sheaves as the contact takes them, on their shafts, and the constants of both pulleys.
 
     From flat values of the run [SI], and of the driving and of the driven pulley the wraps, on rigid shafts,
     and the pitch radii [m].
     """
-    p = parameters
     shafts = [shaft_deflection(p, pulley, radius) for pulley, radius in zip(PULLEYS, radii, strict=True)]
     bent = [
         wrap._replace(tilt_compliance=wrap.tilt_compliance + compliance)

@@ -26,7 +26,7 @@ _FLANKS = ("flank_stiffness", "element_factor", "half_wedge_angle")
 NEEDS = ("step_error", "band_high", *MESH, "thrust", "driving_speed", *_LAYERS, *_FLANKS)
 
 
-def transverse_limit(parameters: Parameters) -> float:
+def transverse_limit(p: Parameters) -> float:
     """Longest stable step of the transverse motion [s], by flat values [SI] of a run.
 
     The fastest waves are two of the shortest cells long, in the grooves:
@@ -34,7 +34,6 @@ def transverse_limit(parameters: Parameters) -> float:
     Bending, which is implicit, has no part in it. What the belt carries goes on by a cell in a step at most.
     Arcs that move outwards without a motion along the belt are braked by (c_0 + c_1) kappa^2 / m.
     """
-    p = parameters
     path = variator(p["ratio"], p["driven_radius"], p["centre_distance"])
     cell = min(cells.min() for cells in cut_path(path, p["stations"], p["end_refinement"]))
     slope = np.tan(p["half_wedge_angle"])

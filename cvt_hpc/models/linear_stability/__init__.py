@@ -34,9 +34,8 @@ PARAMETERS: dict[str, dict[str, Parameter]] = steady_variator.PARAMETERS | {
 }
 
 
-def check(parameters: Parameters) -> list[Problem]:
+def check(p: Parameters) -> list[Problem]:
     """Problems that lie between parameters: as of `steady_variator`, and a band that is none."""
-    p = parameters
     problems = steady_variator.check(p)
     for key in ("collar_clearance", "bearing_clearance"):
         if p[key] > 0.0 and p["tilt_lag"] == 0.0:
