@@ -22,13 +22,7 @@ from cvt_hpc.models.elastic_belt.pulleys import Pulleys, settled_tilt, with_pull
 from cvt_hpc.parameters import Parameters
 from cvt_hpc.physics.friction import FrictionLaw, given_law
 from cvt_hpc.physics.geometry import Variator, cut_path, variator
-from cvt_hpc.physics.sheaves import (
-    Sheaves,
-    axial_element_stiffness,
-    flexibility,
-    sheaves,
-    stiffness_factors,
-)
+from cvt_hpc.physics.sheaves import Sheaves, axial_element_stiffness, flexibility, sheaves, stiffness_factors
 from cvt_hpc.variator import LARGEST_DISPLACEMENT, PULLEYS
 from cvt_hpc.variator.course import SPEED, THRUST, profile_table
 from cvt_hpc.variator.scene import Measures, measures, rounded

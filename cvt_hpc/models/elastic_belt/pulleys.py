@@ -31,11 +31,7 @@ import numpy as np
 from cvt_hpc.kernels import merged_kernel
 from cvt_hpc.lanes import fma, like, maximum, minimum, select, sqrt
 from cvt_hpc.models.elastic_belt import fields as f
-from cvt_hpc.models.elastic_belt.pulley_settings import (
-    are_free,
-    oil_factor,
-    shaft_deflection,
-)
+from cvt_hpc.models.elastic_belt.pulley_settings import are_free, oil_factor, shaft_deflection
 from cvt_hpc.parameters import Parameters
 from cvt_hpc.physics import capacity
 from cvt_hpc.physics.sheaves import Sheaves
