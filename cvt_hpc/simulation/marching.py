@@ -1,6 +1,6 @@
 """Batches marched to their ends, and runs marched together until each has its record.
 
-`OpenRun` is a run on its way to its record, with its next transient and the cost of its earlier ones. Most
+`_OpenRun` is a run on its way to its record, with its next transient and the cost of its earlier ones. Most
 runs are one transient. A run that fails by its numerics is done again from its start at half the step,
 `most_refinements` times at most. A run that is undecided is prolonged to twice its time, and again, as long
 as that is within `longest_duration`; with `shortest_duration` it begins with a part of its duration, at the
@@ -34,7 +34,7 @@ def no_more() -> Sequence[Point]:
     return ()
 
 
-class OpenRun:
+class _OpenRun:
     """A run from its point to its record.
 
     `point` are its flat parameters [SI], `blank` is an empty record of the job, and `is_kept` tells whether
@@ -220,9 +220,9 @@ def march_runs(
         With the text of `interrupt`.
     """
     blank = blank_record(job)
-    runs = [OpenRun(job, point, place in kept, blank) for place, point in enumerate(points)]
+    runs = [_OpenRun(job, point, place in kept, blank) for place, point in enumerate(points)]
     _march_once(job, runs, interrupt)
-    while joining := [OpenRun(job, point, False, blank) for point in more()]:
+    while joining := [_OpenRun(job, point, False, blank) for point in more()]:
         _march_once(job, joining, interrupt)
         runs += joining
     while any(run.record is None for run in runs):
@@ -230,7 +230,7 @@ def march_runs(
     return [(run.run, run.record) for run in runs]  # type: ignore[misc]  # each has its record now
 
 
-def _march_once(job: Job, runs: Sequence[OpenRun], interrupt: Callable[[], str | None]) -> None:
+def _march_once(job: Job, runs: Sequence[_OpenRun], interrupt: Callable[[], str | None]) -> None:
     """March the next transients of runs that have no record yet to their ends."""
     left = [run for run in runs if run.record is None]
     model = load_model(job.model)
@@ -238,7 +238,7 @@ def _march_once(job: Job, runs: Sequence[OpenRun], interrupt: Callable[[], str |
         _march_together(job, group, interrupt)
 
 
-def _march_together(job: Job, group: Sequence[OpenRun], interrupt: Callable[[], str | None]) -> None:
+def _march_together(job: Job, group: Sequence[_OpenRun], interrupt: Callable[[], str | None]) -> None:
     """March the next transients of a group to their ends."""
     paused = [run.paused for run in group if run.paused is not None]
     model = load_model(job.model)

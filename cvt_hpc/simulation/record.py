@@ -52,8 +52,8 @@ _MARCH = (
 )
 COMMON = (*_VERDICT, *_COST, *_MARCH)  # of all models; those without a march have none of its
 
-EARLY_SHARE = 0.58  # of the first transient where runs may end at a quarter of it, as measured there, too
-LEFT_SHARE = 1.0  # extra cost of refined and prolonged runs in a map, as measured by lebrecht_2004.toml
+_EARLY_SHARE = 0.58  # of the first transient where runs may end at a quarter of it, as measured there, too
+_LEFT_SHARE = 1.0  # extra cost of refined and prolonged runs in a map, as measured by lebrecht_2004.toml
 _MOST_ESTIMATED = 2_000  # runs whose costs are averaged
 BATCH_SECONDS = 30.0  # of computing in a batch, as predicted: so much a process that dies may lose
 SOLVED_TOGETHER, SOLVED_SECONDS = 64, 0.1  # runs without a march in a batch, and the time [s] of all
@@ -123,10 +123,7 @@ def record_of(
             failure = run.numerical_doubt(record)
     if failure is not None and failure[0] is not Status.DONE:
         status, why = failure
-        record = blank | {
-            "status": status,
-            "reason": shortened(f"at {run.time * 1e3:.4g} ms: {why}"),
-        }
+        record = blank | {"status": status, "reason": shortened(f"at {run.time * 1e3:.4g} ms: {why}")}
     return record | {
         "core_seconds": marched + time.process_time() - started,
         "simulated_seconds": run.time,
@@ -175,8 +172,8 @@ def _allowance(p: Parameters) -> Any:
     if "longest_duration" not in p:
         return 1.0
     goes_on = longest_duration(p) > p["duration"]
-    early = np.where(np.equal(p["shortest_duration"], 0.0), 1.0, EARLY_SHARE)
-    return early + LEFT_SHARE * (goes_on | (p["most_refinements"] > 0))
+    early = np.where(np.equal(p["shortest_duration"], 0.0), 1.0, _EARLY_SHARE)
+    return early + _LEFT_SHARE * (goes_on | (p["most_refinements"] > 0))
 
 
 def _over_the_grid(job: Job, derived: Derived) -> np.ndarray:

@@ -49,10 +49,7 @@ def run_point(job: Job, point: Point, interrupt: Callable[[], str | None]) -> Va
 
 
 def run_points(
-    job: Job,
-    points: Sequence[Point],
-    interrupt: Callable[[], str | None],
-    more: More = no_more,
+    job: Job, points: Sequence[Point], interrupt: Callable[[], str | None], more: More = no_more
 ) -> list[Values]:
     """Do several runs that advance together, in the lanes of the processor's registers.
 

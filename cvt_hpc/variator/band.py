@@ -14,7 +14,7 @@ from cvt_hpc.vibration.signals import band_amplitude, dominant_frequency
 
 MODES = 5  # of a strand, that are known
 FUNCTIONS = 24  # sines of the Ritz model, which so many modes need
-SLOWER = 0.5  # of the lower first mode: judder is slower, its second harmonic is no first mode
+_SLOWER = 0.5  # of the lower first mode: judder is slower, its second harmonic is no first mode
 LEAST_JERK = 1e-3  # of the driven pulley's speed, amplitude from which it judders
 
 
@@ -60,7 +60,7 @@ def band(run: Any) -> tuple[float, float]:
         return settings.band(p)
     modes = _first_modes(run)
     lowest, highest = float(modes.min()), float(modes.max())
-    judders = bool(np.isfinite(_jerks(run, SLOWER * lowest)))
+    judders = bool(np.isfinite(_jerks(run, _SLOWER * lowest)))
     return settings.lower_edge(p, lowest, highest, judders), p["band_high"]
 
 
@@ -71,7 +71,7 @@ def judder_frequency(run: Any) -> float:
     """
     if _is_given(run.parameters):
         return np.nan
-    return _jerks(run, SLOWER * float(_first_modes(run).min()))
+    return _jerks(run, _SLOWER * float(_first_modes(run).min()))
 
 
 def _is_given(parameters: Parameters) -> bool:

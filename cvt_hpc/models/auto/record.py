@@ -27,13 +27,13 @@ VARIABLES = (
     *belt_record.VARIABLES,
 )
 PILOT_SHARE = 1.0  # of a run's time that a pilot does: a shorter run would use another model
-REFINED = 0.2  # of the runs are done in full, more of them in a trace
+_REFINED = 0.2  # of the runs are done in full, more of them in a trace
 
 
 def cost(parameters: Parameters, stepper: str) -> Any:
     """Core-seconds of runs that fill the lanes once."""
     coarse = COARSENESS**2 * SHARE
-    return (coarse + REFINED) * grouping.cost(parameters, stepper)
+    return (coarse + _REFINED) * grouping.cost(parameters, stepper)
 
 
 def known(parameters: Parameters) -> Values | None:

@@ -119,19 +119,19 @@ if TYPE_CHECKING:
     from cvt_hpc.lanes import LaneArray
 
 COLUMNS = [PROFILES.index(name) for name in NEEDED]
-PATH_SPEED = ("element speed", "m s-1", "rate of an element's path coordinate: v_0 / (1 + kappa w)")
-WORDS = {**ELSEWHERE, **SLIDING, "element_speed": PATH_SPEED}
+_PATH_SPEED = ("element speed", "m s-1", "rate of an element's path coordinate: v_0 / (1 + kappa w)")
+WORDS = {**ELSEWHERE, **SLIDING, "element_speed": _PATH_SPEED}
 PRECISION = np.dtype(np.float32)
 
 
-def profiled_samples(p: Parameters) -> int:
+def _profiled_samples(p: Parameters) -> int:
     """Samples of a run whose profiles are kept, the last ones."""
     return min(round(p["profile_duration"] * p["sampling_rate"]), sample_count(p))
 
 
 def profile_bytes(parameters: Parameters) -> int:
     """Size of the profiles over time of one run [byte]: in memory, and at most in its history."""
-    values = profiled_samples(parameters) * parameters["stations"]
+    values = _profiled_samples(parameters) * parameters["stations"]
     return values * PRECISION.itemsize * max(len(NEEDED), len(WORDS))
 
 
@@ -143,7 +143,7 @@ class Momentary:
     """
 
     def __init__(self, points: Sequence[Parameters], stations: int) -> None:
-        counts = [profiled_samples(point) for point in points]
+        counts = [_profiled_samples(point) for point in points]
         self.first = sample_count(points[0]) - max(counts)
         self._kept = [lane for lane, count in enumerate(counts) if count]
         self._values = np.full((max(counts), len(self._kept), len(NEEDED), stations), np.nan, PRECISION)

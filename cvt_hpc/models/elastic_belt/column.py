@@ -74,7 +74,7 @@ def rocking_column(eps, kappa, stiffness, bending, outer, inner):
 
 
 @merged_kernel
-def deviating_curvature(belt: Belt, w: np.ndarray, j: int) -> float:
+def _deviating_curvature(belt: Belt, w: np.ndarray, j: int) -> float:
     """Curvature of the belt at station j beyond that of its path [1/m]."""
     n = belt.cell.size
     a, b = j - 1 if j > 0 else n - 1, j + 1 if j < n - 1 else 0
@@ -99,7 +99,7 @@ def column_forces(
         closed, least = 0.0, np.inf
         for half in range(2):
             j = (c + half) % n
-            kappa = belt.curvature[c] + deviating_curvature(belt, w, j)
+            kappa = belt.curvature[c] + _deviating_curvature(belt, w, j)
             pitch = eps[c] + inner * belt.curvature[c]
             strain, _, _, borne = rocking_column(pitch, kappa, stiffness, bending, outer, inner)
             closed += 0.5 * min(strain, 0.0)

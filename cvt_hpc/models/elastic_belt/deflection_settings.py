@@ -26,8 +26,8 @@ from cvt_hpc.variator import PULLEYS
 CONE = ("cone_stiffness", "cone_shift")
 RITZ = ("ritz_limit", "ritz_modes", "disc_damping")
 TABLE_KEYS = tuple(f"{pulley}_flexibility{end}" for pulley in PULLEYS for end in ("_file", "_angle", ""))
-OF_MODE = ("mode_harmonic", "mode_flexibility", "mode_mass")
-MODE_KEYS = tuple(f"{pulley}_{key}" for pulley in PULLEYS for key in OF_MODE)
+_OF_MODE = ("mode_harmonic", "mode_flexibility", "mode_mass")
+MODE_KEYS = tuple(f"{pulley}_{key}" for pulley in PULLEYS for key in _OF_MODE)
 MODE_FILES = tuple(f"{pulley}_modes_file" for pulley in PULLEYS)
 
 
@@ -70,7 +70,7 @@ def _table(pulley: str) -> dict[str, Parameter]:
 
 
 def _modes(pulley: str) -> dict[str, Parameter]:
-    harmonic, flexibility, mass = gives = tuple(f"{pulley}_{key}" for key in OF_MODE)
+    harmonic, flexibility, mass = gives = tuple(f"{pulley}_{key}" for key in _OF_MODE)
     columns = {"harmonic": ("",), "modal_flexibility": ("m/N",), "modal_mass": ("kg",)}
 
     def arranged(found: Mapping[str, Column]) -> dict[str, Any]:
@@ -121,9 +121,9 @@ DEFLECTION: dict[str, Parameter] = {
 }
 
 
-def kept_modes(parameters: Parameters, pulley: str) -> tuple[np.ndarray, np.ndarray, np.ndarray]:
+def _kept_modes(parameters: Parameters, pulley: str) -> tuple[np.ndarray, np.ndarray, np.ndarray]:
     """Harmonics, flexibilities [m/N] and masses [kg] of the modes that are kept, by ascending frequency."""
-    harmonic, flexibility, mass = (np.array(parameters[f"{pulley}_{key}"], float) for key in OF_MODE)
+    harmonic, flexibility, mass = (np.array(parameters[f"{pulley}_{key}"], float) for key in _OF_MODE)
     order = np.argsort(-flexibility * mass, kind="stable")
     order = order[: parameters["ritz_modes"] or None]
     return harmonic[order], flexibility[order], mass[order]
@@ -143,7 +143,7 @@ def disc_settings(p: Parameters, pulley: str, wrap: Sheaves, radius: float, turn
         angles, table = p[f"{pulley}_flexibility_angle"], p[f"{pulley}_flexibility"]
         return {"flexibilities": interpolated(angles, table, wrap.angle, turned)}
     if p["sheave_deformation"] == "ritz":
-        kept, interval = kept_modes(p, pulley), 1.0 / p["sampling_rate"]
+        kept, interval = _kept_modes(p, pulley), 1.0 / p["sampling_rate"]
         step = interval / steps_per_sample(interval, p["step"])
         place = wrap.angle, wrap.weight / radius
         modes = moving_modes(kept, p["ritz_limit"], p["disc_damping"], step, place)
@@ -185,7 +185,7 @@ def _ritz_problems(p: Parameters) -> list[Problem]:
         return refuse_moving_discs(p)
     problems = []
     for pulley in PULLEYS:
-        sizes = [len(p[f"{pulley}_{key}"]) for key in OF_MODE]
+        sizes = [len(p[f"{pulley}_{key}"]) for key in _OF_MODE]
         if not sizes[0] or len(set(sizes)) > 1:
             expected = "modes, with one harmonic, flexibility and mass each"
             problems.append((f"{pulley}_mode_harmonic", expected, " and ".join(map(str, sizes))))

@@ -33,7 +33,7 @@ from cvt_hpc.steppers.marching import Marching
 from cvt_hpc.steppers.system import RELATIVE_INCREMENT
 from cvt_hpc.variables import Failure, Status
 
-SAMPLES_TOGETHER = 20  # between two checks of the samples: a run that has left its path goes not far
+_SAMPLES_TOGETHER = 20  # between two checks of the samples: a run that has left its path goes not far
 
 
 class GeneralTransient(Marched, OneLaneRun):
@@ -99,7 +99,7 @@ class GeneralTransient(Marched, OneLaneRun):
         while found is None and self.done < last:
             if self.done == self._records.kick and not self._disturbed:
                 self._disturb()
-            stop = min(last, self.done + SAMPLES_TOGETHER)
+            stop = min(last, self.done + _SAMPLES_TOGETHER)
             if self.done < self._records.kick:
                 stop = min(stop, self._records.kick)
             found = self._march(stop - self.done)
@@ -205,16 +205,16 @@ REACH = {
     f.N_RING: {f.W: (-1, 2), f.V_RING: (0, 1), f.N_RING: (-1, 1)},
 }
 # With a column that bears a moment, which knows strains and turning of the cells around
-OF_COLUMN = {f.U: {f.N_ELEMENT: (-2, 1)}, f.V_ELEMENT: {f.W: (-2, 2)}}
+_OF_COLUMN = {f.U: {f.N_ELEMENT: (-2, 1)}, f.V_ELEMENT: {f.W: (-2, 2)}}
 # With elements that tilt by the rings' friction, which acts on both layers
-OF_TILT = {
+_OF_TILT = {
     f.V_ELEMENT: {f.ELEMENT_TILT: (0, 0)},
     f.V_RING: {f.ELEMENT_TILT: (0, 0)},
     f.ELEMENT_TILT: REACH[f.V_RING] | {f.V_RING: (0, 0), f.ELEMENT_TILT: (-1, 0)},
 }
 # A station's flank forces and filtered speed: beyond the above they depend on the driven pulley, the filtered
 # speed where contact begins on sliding at the open station behind, and on where that is, by the forces
-ON_FLANK = {f.U: (-1, 0), f.V_ELEMENT: (-1, 0), f.W: (-2, 1), f.V_FILTERED: (-1, 0)}
+_ON_FLANK = {f.U: (-1, 0), f.V_ELEMENT: (-1, 0), f.W: (-2, 1), f.V_FILTERED: (-1, 0)}
 
 
 def pattern(flat: FlatBelt) -> csc_array:
@@ -232,13 +232,13 @@ def pattern(flat: FlatBelt) -> csc_array:
             known = (rows >= 0) & (columns >= 0)
             found[rows[known], columns[known]] = True
 
-    for reach in (REACH, *[OF_COLUMN] * belt.has_column, *[OF_TILT] * belt.tilts):
+    for reach in (REACH, *[_OF_COLUMN] * belt.has_column, *[_OF_TILT] * belt.tilts):
         for row, reaches in reach.items():
             for unknown, (behind, ahead) in reaches.items():
                 mark(row, unknown, np.arange(n), range(behind, ahead + 1))
     for arc, is_driven in ((belt.driving_stations, False), (belt.driven_stations, True)):
         for row in (f.U, f.V_ELEMENT, f.V_FILTERED):
-            for unknown, (behind, ahead) in ON_FLANK.items():
+            for unknown, (behind, ahead) in _ON_FLANK.items():
                 mark(row, unknown, arc, range(behind, ahead + 1))
         remembered = place[f.V_FILTERED][arc]
         remembered = remembered[remembered >= 0]

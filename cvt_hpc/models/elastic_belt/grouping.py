@@ -20,9 +20,9 @@ STEP_COST = {"imex": 1.3e-7, "explicit": 6.2e-8}
 # Share of that which a run takes whose stations fill all lanes; in fewer parts it takes up to the whole.
 ALONE_SHARE = {"imex": 0.3, "explicit": 0.6}
 
-COST_PER_LAYER = 0.3  # of a ring layer, beside the rings as one
+_COST_PER_LAYER = 0.3  # of a ring layer, beside the rings as one
 
-FADED = 0.1  # [N s/m], of the default scene
+_FADED = 0.1  # [N s/m], of the default scene
 LANES = {"double": 8, "single": 16}  # capacity of registers of 64 bytes
 # Values that the runs of a batch have in common: the mesh, the law's kind, and the course of time.
 _COURSE = ("rise_time", "start_damping", "load_history", "speed_history", "duration")
@@ -41,7 +41,7 @@ def cost(p: Parameters, stepper: str, step_cost: Mapping[str, float] = STEP_COST
     is_alone = np.equal(p.get("lanes", "runs"), "stations")
     share = np.where(is_alone, ALONE_SHARE.get(stepper, 1.0), 1.0)[()]
     layers = np.asarray(p.get("ring_layers", 1))
-    share = share * np.where(layers > 1, 1.0 + COST_PER_LAYER * layers, 1.0)[()]
+    share = share * np.where(layers > 1, 1.0 + _COST_PER_LAYER * layers, 1.0)[()]
     return share * step_cost.get(stepper, 1e-5) * p["stations"] * p["duration"] / p.get("step", 1e-6)
 
 
@@ -58,7 +58,7 @@ def faded_coupling(parameters: Parameters) -> float:
     Others are 1e4 times as large, and more.
     """
     size = measures(parameters)
-    return FADED * rounded(size.force * size.time / size.length)
+    return _FADED * rounded(size.force * size.time / size.length)
 
 
 def lane_key(parameters: Parameters) -> tuple:

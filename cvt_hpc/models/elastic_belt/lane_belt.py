@@ -165,7 +165,7 @@ def lane_state(belts: list[Belt], states: list[State], dtype: type) -> LaneState
         lane_contact([belt.driving for belt in belts], dtype),
         lane_contact([belt.driven for belt in belts], dtype),
     )
-    settle_discs(contacts, belts, states)
+    _settle_discs(contacts, belts, states)
     found = LaneState(
         LaneArray(n, states[0].fields.shape[0] - tilts, lanes, dtype),
         LaneArray(1, lf.SCALARS, lanes),
@@ -179,7 +179,7 @@ def lane_state(belts: list[Belt], states: list[State], dtype: type) -> LaneState
     return found
 
 
-def settle_discs(contacts: tuple[Contact, Contact], belts: list[Belt], states: list[State]) -> None:
+def _settle_discs(contacts: tuple[Contact, Contact], belts: list[Belt], states: list[State]) -> None:
     """Put discs with inertia to rest under the forces that discs without have in these states."""
     if not any(contact.discs.place.size for contact in contacts):
         return

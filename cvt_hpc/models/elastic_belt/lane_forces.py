@@ -21,7 +21,7 @@ from cvt_hpc.physics.friction_laws import Law
 from cvt_hpc.physics.moving_discs import open_gaps, turn_discs
 from cvt_hpc.variator import course
 
-MOST_CONTACT_ROUNDS = 200
+_MOST_CONTACT_ROUNDS = 200
 LEAST_FORCE = 1e-12  # [N/m]: for a quotient of forces that may both be 0
 LEAST_SHARE_OF_WIDTH = 1e-3  # of friction_speed: below it friction is linear to 1e-6, and has no direction
 
@@ -30,7 +30,7 @@ LEAST_SHARE_OF_WIDTH = 1e-3  # of friction_speed: below it friction is linear to
 def derive(belt: LaneBelt, state: LaneState, stations: LaneArray) -> None:
     """Contact forces and strains of the present state."""
     lane_contact_forces(belt, state, stations)
-    lane_strains(belt, state, stations)
+    _lane_strains(belt, state, stations)
     if belt.has_column:
         lane_column(belt, state, stations, lf.EPS_0)
 
@@ -277,7 +277,7 @@ def lane_contact_forces(belt: LaneBelt, state: LaneState, stations: LaneArray) -
                 pushed[k, compliance.GAP] = pushed[k, compliance.GAP] + tilt
         if contact.discs.place.size > 0:
             open_gaps(contact.discs, pushed, compliance.GAP)
-        solve_contact(contact, MOST_CONTACT_ROUNDS)
+        solve_contact(contact, _MOST_CONTACT_ROUNDS)
         before = like(-1.0, slope)
         for k in range(contact.weight.size):
             force, push = contact_force(pushed, k), pushed[k, compliance.PUSH]
@@ -302,7 +302,7 @@ def advance_discs(belt: LaneBelt, state: LaneState, step: float) -> None:
 
 
 @kernel
-def lane_strains(belt: LaneBelt, state: LaneState, stations: LaneArray) -> None:
+def _lane_strains(belt: LaneBelt, state: LaneState, stations: LaneArray) -> None:
     """Strains of elements and rings in the cells, with 1 / (1 + strain) and 1 / content."""
     fields, offset = state.fields, belt.constants[0, lf.RING_OFFSET]
     w_b = from_ahead(fields[0, f.W])
@@ -314,7 +314,7 @@ def lane_strains(belt: LaneBelt, state: LaneState, stations: LaneArray) -> None:
 
 @merged_kernel
 def cell_strains(belt: LaneBelt, stations: LaneArray, j: int, w, w_b, more_0, more_1, offset):
-    """Return `lane_strains` of cell j, by the displacement at both ends [m] and the contents' deviations."""
+    """Return `_lane_strains` of cell j, by the displacement at both ends [m] and the contents' deviations."""
     kappa = belt.curvature[j]
     content_0, content_1 = more_0 + 1.0, fma(offset, kappa, more_1 + 1.0)
     per_0, per_1 = reciprocals(content_0, content_1)

@@ -21,14 +21,14 @@ from cvt_hpc.physics.compliance import Contact
 from cvt_hpc.steppers.system import System
 
 ROWS = (f.W, f.U, f.V_ELEMENT, f.V_RING, f.N_ELEMENT, f.N_RING)  # of the state, as they follow in y
-VELOCITIES = (f.U, f.V_ELEMENT, f.V_RING)
+_VELOCITIES = (f.U, f.V_ELEMENT, f.V_RING)
 
 # Sizes that count alike in each unknown of the default scene, by row of the state: 0.1 mm off the path,
 # 0.1 m/s of sliding (u, both layers and filtered), the strain of the rings, and the tilt of elements.
 SIZES = (1e-4, 0.1, 0.1, 0.1, 0.1, 1e-3, 1e-3, 1e-2)
 SIZE_OF_SPEED, SIZE_OF_POSITION = 1.0, 1e-4  # of a pulley [rad/s], [m]
-SIZE_OF_THRUST = 1e3  # [N]
-SIZES_OF_STATES = (SIZE_OF_SPEED, *[SIZE_OF_POSITION] * (f.RATIO_SUM - 1), SIZE_OF_THRUST, SIZE_OF_THRUST)
+_SIZE_OF_THRUST = 1e3  # [N]
+SIZES_OF_STATES = (SIZE_OF_SPEED, *[SIZE_OF_POSITION] * (f.RATIO_SUM - 1), _SIZE_OF_THRUST, _SIZE_OF_THRUST)
 
 
 class FlatBelt(NamedTuple):
@@ -223,7 +223,7 @@ def system(flat: FlatBelt) -> System:
     Of these u alone is the rate of an unknown.
     """
     is_velocity = np.arange(f.STATES) == f.EXCESS
-    moving = _by_row(flat, np.isin(range(len(SIZES)), VELOCITIES), is_velocity, True, False)
+    moving = _by_row(flat, np.isin(range(len(SIZES)), _VELOCITIES), is_velocity, True, False)
     n = flat.belt.cell.size
     position_of = np.full(moving.size, -1)
     position_of[n : 2 * n] = np.arange(n)

@@ -42,11 +42,11 @@ def _problems_of_shaft(p: Parameters, prefix: str) -> list[Problem]:
 def pulley_problems(p: Parameters) -> list[Problem]:
     """Problems of the pulleys' freedom, in the form of a model's check."""
     found = _piston_problems(p) + _drive_problems(p)
-    if 0.0 < p["tilt_lag"] < (least := least_tilt_lag(p)):
+    if 0.0 < p["tilt_lag"] < (least := _least_tilt_lag(p)):
         expected = f"0, or {least:.2g} s and more at this step: tilting is explicit"
         found.append(("tilt_lag", expected, f"{p['tilt_lag']:g} s"))
     found += _bearing_problems(p) + _controller_problems(p)
-    return found or overload_problems(p)
+    return found or _overload_problems(p)
 
 
 def steady_pulley_problems(p: Parameters) -> list[Problem]:
@@ -59,7 +59,7 @@ def steady_pulley_problems(p: Parameters) -> list[Problem]:
     if p["driving_axial"] == "ratio" and p["ratio_rate"] == 0.0:
         expected = "above 0: by its gain alone a controller rests where it began"
         found.append(("ratio_rate", expected, "0 N/s"))
-    return found or overload_problems(p)
+    return found or _overload_problems(p)
 
 
 def slipping_pulley_problems(p: Parameters) -> list[Problem]:
@@ -78,7 +78,7 @@ def slipping_pulley_problems(p: Parameters) -> list[Problem]:
     return found
 
 
-def overload_problems(p: Parameters) -> list[Problem]:
+def _overload_problems(p: Parameters) -> list[Problem]:
     """Problem of a load that is more than any belt carries under the axial forces that are given.
 
     By `capacity.torque_limit` with the largest coefficient of friction, and ABOVE: a bound on the moment of
@@ -115,7 +115,7 @@ def _most_axial_force(p: Parameters) -> dict[str, float]:
     }
 
 
-def least_tilt_lag(p: Parameters) -> float:
+def _least_tilt_lag(p: Parameters) -> float:
     """Shortest lag of a tilt [s] that an explicit step follows.
 
     A belt that stays where it is answers an opening q with forces K q against it, K = c r wrap at most, c the

@@ -12,7 +12,7 @@ from cvt_hpc.physics.compliance import Contact
 
 
 @kernel
-def lane_thrust(state: LaneState):
+def _lane_thrust(state: LaneState):
     """Axial force of the belt on the driven sheave [N]."""
     weight, pushed = state.contacts[1].weight, state.contacts[1].stations
     total = like(0.0, pushed[0, compliance.FORCED])
@@ -34,7 +34,7 @@ def _pull(contact: Contact, pattern):
 
 
 @kernel
-def lane_pulley_rates(belt: LaneBelt, state: LaneState, taken, moment):
+def _lane_pulley_rates(belt: LaneBelt, state: LaneState, taken, moment):
     """Rates of free pulleys, ten, by the torques of the belt [N m], as `pulleys.pulley_rates` has them.
 
     Then the tilting forces on the sheaves, four [N], and the axial forces, two [N].
@@ -85,7 +85,7 @@ def advance_pulleys(belt: LaneBelt, state: LaneState, taken, moment, step: float
     c, scalars = belt.constants, state.scalars
     speed = scalars[0, lf.SPEED]
     if belt.is_free:
-        rates, tilting, axial = lane_pulley_rates(belt, state, taken, moment)
+        rates, tilting, axial = _lane_pulley_rates(belt, state, taken, moment)
         scalars[0, lf.SPEED] = fma(step, rates[0], speed)
         scalars[0, lf.POSITION] = fma(step, rates[1], scalars[0, lf.POSITION])
         for k in range(f.STATES):
@@ -93,7 +93,7 @@ def advance_pulleys(belt: LaneBelt, state: LaneState, taken, moment, step: float
     else:
         load = like(c[0, lf.RATIO], speed) * lane_load(belt, state.time[0], speed)
         scalars[0, lf.SPEED] = speed + step * (moment - load) / like(c[0, lf.DRIVEN_INERTIA], speed)
-        axial = like(lane_thrust(state), speed)
+        axial = like(_lane_thrust(state), speed)
         scalars[0, lf.POSITION] = scalars[0, lf.POSITION] + step * (
             axial - lane_given_thrust(belt, state.time[0], speed)
         ) / like(c[0, lf.AXIAL_DAMPING], speed)
@@ -148,7 +148,7 @@ def audit_pulleys(
     excess, shift = scalars[0, f.FIRST_STATE + f.EXCESS], scalars[0, f.FIRST_STATE + f.SHIFT]
     position = scalars[0, lf.POSITION]
     turning = lane_speed_share(belt, state.time[0], speed) * like(c[0, lf.DRIVING_SPEED], speed) + excess
-    rates, tilting, axial = lane_pulley_rates(belt, state, driving / turning, -driven / speed)
+    rates, tilting, axial = _lane_pulley_rates(belt, state, driving / turning, -driven / speed)
     mobility = like(c[0, lf.FIRST_LAW + f.DRIVING_MOBILITY], speed)
     torque = drive_torque(c, lf.FIRST_LAW, excess, lane_load(belt, state.time[0], speed))
     rows[k, first + f.DRIVING_POWER] = select(mobility > 0.0, torque * turning, driving)

@@ -167,7 +167,7 @@ def thrusts(laws, first: int, states, going: float, turning, position, axial, gi
 
 
 @merged_kernel
-def tilt_rates(laws, first: int, states, tilting):
+def _tilt_rates(laws, first: int, states, tilting):
     """Rates of the grooves' openings [m/s], four, by the tilting forces s of both pulleys [N], four."""
     pattern = tilting[0]
     rate = like(laws[0, first + f.TILT_RATE], pattern)
@@ -207,7 +207,7 @@ def pulley_rates(laws, first: int, states, going: float, turning, position, pull
         laws, first, states, going, turning, position, axial, (load, ratio, thrust)
     )
     torque = drive_torque(laws, first, states[f.EXCESS], load)
-    tilts = tilt_rates(laws, first, states, tilting)
+    tilts = _tilt_rates(laws, first, states, tilting)
     excess_rate = like(laws[0, first + f.DRIVING_MOBILITY], load) * (torque - taken)
     shift_rate = going * like(laws[0, first + f.DRIVING_AXIAL_MOBILITY], load) * (axial[0] - driving)
     speed_rate = like(laws[0, first + f.DRIVEN_MOBILITY], load) * (moment - ratio * load)

@@ -32,7 +32,7 @@ if TYPE_CHECKING:
 
     from cvt_hpc.models.elastic_belt.recorded_run import RecordedRun
 
-FED = "power into the fluctuation of the belt"
+_FED = "power into the fluctuation of the belt"
 PREFIX = "momentary_"  # of the names of quantities over time and position
 
 
@@ -50,7 +50,7 @@ def histories(run: RecordedRun) -> xr.Dataset:
     moment = run.channel("driving_power") / run.channel("driving_speed")
     words = "driving moment", "N m", "of the belt on the driving pulley, which the drive has to overcome"
     found = found.assign(driving_moment=("time", moment, attributes(*words)))
-    momentary = last_profiles(run)
+    momentary = _last_profiles(run)
     if not momentary:
         return found
     count = len(next(iter(momentary.values()))[0])
@@ -74,9 +74,9 @@ def _profiles(run: RecordedRun) -> dict[str, tuple[np.ndarray, str, str, str]]:
             name: (values, *of_means(along.ELSEWHERE[name]))
             for name, values in along.elsewhere(means, run.mesh).items()
         },
-        "flank_feed": (fed.flanks / dual, "feed by flank friction", "W m-1", FED),
-        "stress_feed": (stress, "feed by push and tension", "W m-1", FED),
-        "damping_feed": (damping, "feed by damping and rings", "W m-1", f"{FED}; negative: taken"),
+        "flank_feed": (fed.flanks / dual, "feed by flank friction", "W m-1", _FED),
+        "stress_feed": (stress, "feed by push and tension", "W m-1", _FED),
+        "damping_feed": (damping, "feed by damping and rings", "W m-1", f"{_FED}; negative: taken"),
         "wrap_angle": (along.wrap_angles(run.mesh), *along.WRAP_ANGLE),
         **{
             name: (sliding[name], words, unit, f"{comment}; of means")
@@ -85,7 +85,7 @@ def _profiles(run: RecordedRun) -> dict[str, tuple[np.ndarray, str, str, str]]:
     }
 
 
-def last_profiles(run: RecordedRun) -> dict[str, tuple[np.ndarray, str, str, str]]:
+def _last_profiles(run: RecordedRun) -> dict[str, tuple[np.ndarray, str, str, str]]:
     """Quantities of WORDS over the last samples of a run as far as it came, (sample, N), with their words.
 
     Empty where its profiles are not kept, or the run ended before them.
@@ -105,7 +105,7 @@ def last_profiles(run: RecordedRun) -> dict[str, tuple[np.ndarray, str, str, str
     return {name: (found[name].astype(along.PRECISION), *words) for name, words in along.WORDS.items()}
 
 
-def strongest_modes(measured: Measured) -> tuple[np.ndarray, np.ndarray]:
+def _strongest_modes(measured: Measured) -> tuple[np.ndarray, np.ndarray]:
     """Strongest mode of each strand in the band, and the amplitudes of all [m]."""
     m, rate = measured, measured.parameters["sampling_rate"]
     modal = band_amplitude(m.modes[m.samples], rate, band(m))
@@ -182,7 +182,7 @@ def of_layers(measured: Measured) -> tuple[np.ndarray, ...] | None:
 VARIABLES = (
     *judging.VIBRATION,
     *together(
-        strongest_modes,
+        _strongest_modes,
         Variable(
             "mode",
             "1",

@@ -83,7 +83,7 @@ def driving_speed_at(belt: Belt, state: State) -> float:
 
 
 @merged_kernel
-def belt_acceleration_at(belt: Belt, time: float) -> float:
+def _belt_acceleration_at(belt: Belt, time: float) -> float:
     """Rate v' of the belt speed [m/s^2]; 0 but along a ramp or a profile of speed, of which a run has one."""
     rate = course.slope_at(belt.profile, course.SPEED, time)
     if belt.rise_time <= time < belt.ramp_end:
@@ -115,7 +115,7 @@ def fresh_contacts(belt: Belt) -> tuple[Contact, Contact]:
 
 
 @merged_kernel
-def wrap_contact(
+def _wrap_contact(
     belt: Belt,
     contact: Contact,
     places: np.ndarray,
@@ -148,9 +148,9 @@ def contact_forces(belt: Belt, state: State, contacts: tuple[Contact, Contact], 
     w = state.fields[f.W]
     scalars, states = state.scalars, state.scalars[f.FIRST_STATE :]
     opening, tilt = belt.driving_position + states[f.SHIFT], states[f.DRIVING_COS : f.DRIVING_COS + 2]
-    solves = wrap_contact(belt, contacts[0], belt.driving_stations, w, opening, tilt, force)
+    solves = _wrap_contact(belt, contacts[0], belt.driving_stations, w, opening, tilt, force)
     opening, tilt = scalars[f.DRIVEN_POSITION], states[f.DRIVEN_COS : f.DRIVEN_COS + 2]
-    more = wrap_contact(belt, contacts[1], belt.driven_stations, w, opening, tilt, force)
+    more = _wrap_contact(belt, contacts[1], belt.driven_stations, w, opening, tilt, force)
     return solves + more if solves > 0 and more > 0 else 0
 
 
@@ -210,7 +210,7 @@ def accelerations(
     sine, cosine = np.sin(belt.half_wedge_angle), np.cos(belt.half_wedge_angle)
     speed_share = speed_share_at(belt, state.scalars[f.TIME])
     belt_speed, driving_speed = speed_share * belt.belt_speed, driving_speed_at(belt, state)
-    acceleration = belt_acceleration_at(belt, state.scalars[f.TIME])
+    acceleration = _belt_acceleration_at(belt, state.scalars[f.TIME])
     centrifugal = belt.mass * belt_speed * belt_speed
     damping, light = damping_at(belt, state.scalars[f.TIME]), belt.mass - belt.element_mass
     pressed, moment = eps[0], eps[0]
@@ -312,7 +312,7 @@ def memory_rates(belt: Belt, state: State, force: np.ndarray, rate: np.ndarray) 
                 before = sliding_speed(belt, state, j - 1 if j > 0 else vf.size - 1)
             carried, entering = transported(belt, force, j, belt_speed, speed, before)
         else:
-            carried, entering = memory_transport(belt, LEAST_WAY * belt.cell[j - 1], belt_speed), speed
+            carried, entering = _memory_transport(belt, LEAST_WAY * belt.cell[j - 1], belt_speed), speed
         rate[f.V_FILTERED, j] = carried * (entering - vf[j]) + (speed - vf[j]) / belt.friction_memory
 
 
@@ -327,13 +327,13 @@ def transported(
     """
     cell, behind = belt.cell[j - 1], force[j - 1]
     if behind > 0.0:
-        return memory_transport(belt, cell, belt_speed), before
+        return _memory_transport(belt, cell, belt_speed), before
     way = max(force[j] / (force[j] - behind), LEAST_WAY)
-    return memory_transport(belt, way * cell, belt_speed), speed + way * (before - speed)
+    return _memory_transport(belt, way * cell, belt_speed), speed + way * (before - speed)
 
 
 @merged_kernel
-def memory_transport(belt: Belt, spacing: float, belt_speed: float) -> float:
+def _memory_transport(belt: Belt, spacing: float, belt_speed: float) -> float:
     """Upwind rate of the memory's transport [1/s], fitted: a steady memory decays as exp(-s / (v tau_f))."""
     return 1.0 / (belt.friction_memory * np.expm1(spacing / (belt_speed * belt.friction_memory)))
 
@@ -369,8 +369,4 @@ def sliding_speeds(
     omega = state.scalars[f.DRIVEN_SPEED] if belt.on_driven[j] > 0.0 else driving_speed
     distance = (belt.driven_radius if belt.on_driven[j] > 0.0 else belt.driving_radius) + belt.rise[j]
     distance += upright * w
-    return (
-        v_across * upright + v * lean,
-        v * upright - v_across * lean - omega * distance,
-        distance,
-    )
+    return (v_across * upright + v * lean, v * upright - v_across * lean - omega * distance, distance)

@@ -111,7 +111,7 @@ def step_rings(belt: LaneBelt, state: LaneState, work: RingWork, step: float) ->
     damp_across(belt, state, stations)
     assemble(belt, state, stations, step, False)
     coupled = move_across(belt, state, stations, step)
-    couple_layers(belt, state, work, step)
+    _couple_layers(belt, state, work, step)
     for attempt in range(imex.MOST_PASSES):
         imex.eliminate(belt, state, stations, step, attempt > 0)
         found = imex.substitute(belt, state, stations, step)
@@ -123,10 +123,10 @@ def step_rings(belt: LaneBelt, state: LaneState, work: RingWork, step: float) ->
         if found & imex.TURNS_BACK:
             assemble(belt, state, stations, step, True)
             coupled = move_across(belt, state, stations, step)
-            couple_layers(belt, state, work, step)
+            _couple_layers(belt, state, work, step)
     move_with_layers(belt, state, stations, coupled)
     taken, moment = imex.advance_belt(belt, state, stations, step)
-    advance_layers(belt, state, work, step)
+    _advance_layers(belt, state, work, step)
     advance_pulleys(belt, state, taken, moment, step)
     state.time[0] += step
     forces.advance_discs(belt, state, step)
@@ -134,7 +134,7 @@ def step_rings(belt: LaneBelt, state: LaneState, work: RingWork, step: float) ->
 
 
 @merged_kernel
-def heavier_by(belt: LaneBelt, rings: LaneRings, j: int, step: float):
+def _heavier_by(belt: LaneBelt, rings: LaneRings, j: int, step: float):
     """Factor on the inertia of the layers' motion against their mean at station j."""
     c = rings.constants
     rate = step * fma(step, c[0, lf.STRESS_RATE], c[0, lf.DAMPING_RATE])
@@ -143,10 +143,10 @@ def heavier_by(belt: LaneBelt, rings: LaneRings, j: int, step: float):
 
 
 @merged_kernel
-def force_along(rings: LaneRings, fields: LaneArray, layers: LaneArray, j: int, k: int, along):
+def _force_along(rings: LaneRings, fields: LaneArray, layers: LaneArray, j: int, k: int, along):
     """Force per length on layer k at station j beyond that common to all [N/m], and its inertia [kg/m].
 
-    `along` is, of the station, the result of `couple_layers`.
+    `along` is, of the station, the result of `_couple_layers`.
     """
     (per_left, per_cell, even_l, even_r), (stiffness, damping), moving, turn, per_dual = along
     heavy, carried, belt_speed, acceleration = moving
@@ -161,7 +161,7 @@ def force_along(rings: LaneRings, fields: LaneArray, layers: LaneArray, j: int, 
 
 
 @kernel
-def couple_layers(belt: LaneBelt, state: LaneState, work: RingWork, step: float) -> None:
+def _couple_layers(belt: LaneBelt, state: LaneState, work: RingWork, step: float) -> None:
     """Eliminate the layers: their part of the blocks and right side of elements and rings as one."""
     rings, fields, stations, layers = work.rings, state.fields, work.stations, work.layers
     n, c = rings.number, rings.constants
@@ -177,7 +177,7 @@ def couple_layers(belt: LaneBelt, state: LaneState, work: RingWork, step: float)
     zero = like(0.0, sine)
     element_mass = belt.constants[0, lf.ELEMENT_MASS]
     for j in range(fields.rows):
-        heavier = heavier_by(belt, rings, j, step)
+        heavier = _heavier_by(belt, rings, j, step)
         free = 1.0 / (heavier * mass * per_step)
         # reduced masses over the step: of two layers; of the inner one with all it takes along, and elements
         between = 0.5 * heavier * mass * per_step
@@ -223,7 +223,7 @@ def couple_layers(belt: LaneBelt, state: LaneState, work: RingWork, step: float)
         per_common = per_free
         if not on_arc:
             for k in range(n - 1, -1, -1):
-                force, inertia = force_along(rings, fields, layers, j, k, along)
+                force, inertia = _force_along(rings, fields, layers, j, k, along)
                 part = free * force
                 own_sum += part
                 layers[j, STRIDE * k + PART] = part
@@ -268,7 +268,7 @@ def couple_layers(belt: LaneBelt, state: LaneState, work: RingWork, step: float)
             common_sum = own_element = element_element = by_elements = by_common = zero
             for k in range(n - 1, -1, -1):
                 first = STRIDE * k
-                force, inertia = force_along(rings, fields, layers, j, k, along)
+                force, inertia = _force_along(rings, fields, layers, j, k, along)
                 drag, stiff = layers[j, first + DRAG], layers[j, first + STIFF]
                 above_factor, below_factor = lane_rings.surface_factors(rings, k, is_driven)
                 by_common = fma(link, common, 1.0)
@@ -318,7 +318,7 @@ def couple_layers(belt: LaneBelt, state: LaneState, work: RingWork, step: float)
 
 
 @kernel
-def advance_layers(belt: LaneBelt, state: LaneState, work: RingWork, step: float) -> None:
+def _advance_layers(belt: LaneBelt, state: LaneState, work: RingWork, step: float) -> None:
     """Apply the layers' increments; their strains, and those of the rings as one."""
     rings, fields, stations, layers = work.rings, state.fields, work.stations, work.layers
     n, c = rings.number, rings.constants
@@ -328,7 +328,7 @@ def advance_layers(belt: LaneBelt, state: LaneState, work: RingWork, step: float
     lost = zero = offset * 0.0
     for j in range(fields.rows + 1):
         if j < fields.rows:
-            free = step / (heavier_by(belt, rings, j, step) * c[0, lf.LAYER_MASS])
+            free = step / (_heavier_by(belt, rings, j, step) * c[0, lf.LAYER_MASS])
             element = stations[j, lf.DV_0]
             common = fma(stations[j, lf.DV_1], n, -layers[j, last + OWN_SUM])
             common = fma(-layers[j, last + ELEMENT_SUM], element, common) * layers[j, last + PER_COMMON_SUM]

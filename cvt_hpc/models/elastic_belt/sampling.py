@@ -38,9 +38,9 @@ def _places(names: tuple[str, ...]) -> Any:
     return IntEnum("Scalar", [name.upper().replace(" ", "_") for name in names], start=0)
 
 
-Scalar = _places(SCALARS)
+_Scalar = _places(SCALARS)
 CHANNELS = (*SCALARS, *POWERS, "step_ripple")
-STEP_RIPPLE = CHANNELS.index("step_ripple")
+_STEP_RIPPLE = CHANNELS.index("step_ripple")
 PROFILES = (*MOMENTS, "contact_force", "mean_displacement")
 CONTACT_FORCE, MEAN_DISPLACEMENT = range(len(MOMENTS), len(PROFILES))
 
@@ -161,16 +161,16 @@ def sample(belt: LaneBelt, state: LaneState, stations: LaneArray, samples: Sampl
     speed = state.scalars[0, lf.SPEED]
     share = forces.lane_speed_share(belt, state.time[0], zero)
     belt_speed = share * c[0, lf.BELT_SPEED]
-    rows[k, sensed + Scalar.LOAD] = forces.lane_load(belt, state.time[0], speed)
-    rows[k, sensed + Scalar.DRIVEN_SPEED] = speed
-    rows[k, sensed + Scalar.DRIVEN_POSITION] = state.scalars[0, lf.POSITION]
+    rows[k, sensed + _Scalar.LOAD] = forces.lane_load(belt, state.time[0], speed)
+    rows[k, sensed + _Scalar.DRIVEN_SPEED] = speed
+    rows[k, sensed + _Scalar.DRIVEN_POSITION] = state.scalars[0, lf.POSITION]
     element_stiffness, ring_stiffness = c[0, lf.ELEMENT_STIFFNESS], c[0, lf.RING_STIFFNESS]
     centrifugal = c[0, lf.MASS] * belt_speed * belt_speed
     least = like(np.inf, zero)
     for strand in range(2):
         middle = sensing.middles[strand]
-        rows[k, sensed + Scalar.RING_TENSION_T1 + strand] = ring_stiffness * stations[middle, lf.EPS_1]
-        rows[k, sensed + Scalar.PUSH_FORCE_T1 + strand] = maximum(
+        rows[k, sensed + _Scalar.RING_TENSION_T1 + strand] = ring_stiffness * stations[middle, lf.EPS_1]
+        rows[k, sensed + _Scalar.PUSH_FORCE_T1 + strand] = maximum(
             -element_stiffness * forces.pressed_strain(belt, state, stations, middle), 0.0
         )
         for j in range(sensing.starts[strand], sensing.stops[strand]):
@@ -178,11 +178,11 @@ def sample(belt: LaneBelt, state: LaneState, stations: LaneArray, samples: Sampl
             pressed = minimum(forces.pressed_strain(belt, state, stations, j), 0.0)
             net = fma(element_stiffness, pressed, net)
             least = minimum(net, least)
-    rows[k, sensed + Scalar.LEAST_STRAND_FORCE] = least - centrifugal
+    rows[k, sensed + _Scalar.LEAST_STRAND_FORCE] = least - centrifugal
     driving_speed = like(c[0, lf.DRIVING_SPEED], speed) * forces.lane_speed_share(belt, state.time[0], speed)
-    rows[k, sensed + Scalar.DRIVING_SPEED] = driving_speed + state.scalars[0, f.FIRST_STATE + f.EXCESS]
+    rows[k, sensed + _Scalar.DRIVING_SPEED] = driving_speed + state.scalars[0, f.FIRST_STATE + f.EXCESS]
     shift = state.scalars[0, f.FIRST_STATE + f.SHIFT]
-    rows[k, sensed + Scalar.DRIVING_POSITION] = like(c[0, lf.DRIVING_POSITION], speed) + shift
+    rows[k, sensed + _Scalar.DRIVING_POSITION] = like(c[0, lf.DRIVING_POSITION], speed) + shift
     pulleys = forces.lane_pulleys(belt, share, state.scalars)
     n = fields.rows
     axial = zero
@@ -204,12 +204,12 @@ def sample(belt: LaneBelt, state: LaneState, stations: LaneArray, samples: Sampl
             if contact.rise[i] == 0.0:
                 open_length += select(force > 0.0, zero, weight[i])
                 length += weight[i]
-        rows[k, sensed + Scalar.AXIAL_FORCE_DRIVING + wrap] = axial
-        rows[k, sensed + Scalar.SLIP_DRIVING + wrap] = sliding / (maximum(axial, LEAST_FORCE) * belt_speed)
-        rows[k, sensed + Scalar.OPEN_SHARE_DRIVING + wrap] = open_length / length
-        rows[k, sensed + Scalar.TILT_DRIVING + wrap] = opening_by_tilt(state, wrap)
+        rows[k, sensed + _Scalar.AXIAL_FORCE_DRIVING + wrap] = axial
+        rows[k, sensed + _Scalar.SLIP_DRIVING + wrap] = sliding / (maximum(axial, LEAST_FORCE) * belt_speed)
+        rows[k, sensed + _Scalar.OPEN_SHARE_DRIVING + wrap] = open_length / length
+        rows[k, sensed + _Scalar.TILT_DRIVING + wrap] = opening_by_tilt(state, wrap)
     audit(belt, state, stations, axial, sensing.interval, rows, k, sensed + len(SCALARS), profiles)
-    rows[k, sensed + STEP_RIPPLE] = forces.step_ripple(belt, state, stations)
+    rows[k, sensed + _STEP_RIPPLE] = forces.step_ripple(belt, state, stations)
     for j in range(profiles.rows):
         add(profiles, j, CONTACT_FORCE, stations[j, lf.FORCE])
         add(profiles, j, MEAN_DISPLACEMENT, fields[j, f.W])

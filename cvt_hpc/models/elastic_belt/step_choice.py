@@ -2,7 +2,7 @@
 
 **Accuracy.** The step is of first order: its effect on a vibration's amplitude is in proportion to its
 length over the period. REFERENCE_STEP changes it by REFERENCE_ERROR at the working point of the chart, whose
-vibrations are below REFERENCE_BAND. Elsewhere that is no bound: of 81 random scenes that vibrate it changes
+vibrations are below _REFERENCE_BAND. Elsewhere that is no bound: of 81 random scenes that vibrate it changes
 half by more than 1.2 %, a tenth by more than 9 % (`docs/guide/validation.md`).
 
 **Stability.** Transverse motion is explicit but for bending (`imex_stations`): beyond 2 / w the shortest
@@ -17,7 +17,7 @@ from cvt_hpc.physics.geometry import cut_path, variator, variator_problems
 from cvt_hpc.physics.sheaves import axial_element_stiffness
 
 REFERENCE_STEP, REFERENCE_ERROR = 4.6e-6, 0.02  # [s], share of the amplitude
-REFERENCE_BAND = 1500.0  # [Hz], of a vibration, as a job has it by band_high
+_REFERENCE_BAND = 1500.0  # [Hz], of a vibration, as a job has it by band_high
 SAFE_SHARE = 0.75
 SHORTEST = 1e-9  # [s], of a step: of scenes that are beyond all sense
 MESH = ("ratio", "driven_radius", "centre_distance", "stations", "end_refinement")  # the path and its cells
@@ -52,7 +52,7 @@ def chosen_step(parameters: Parameters) -> float:
     variator, which the model refuses, it is the one by accuracy alone.
     """
     step = REFERENCE_STEP * parameters["step_error"] / REFERENCE_ERROR
-    step *= REFERENCE_BAND / parameters["band_high"]
+    step *= _REFERENCE_BAND / parameters["band_high"]
     if not variator_problems(parameters):
         step = min(step, SAFE_SHARE * transverse_limit(parameters))
     return max(float(f"{step:.2e}"), SHORTEST)

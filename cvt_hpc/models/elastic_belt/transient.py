@@ -44,22 +44,22 @@ STEPS = {  # fields of the work space, march
 }
 
 
-class Paused(NamedTuple):
+class _Paused(NamedTuple):
     """A run at its end, from which another batch continues; a copy, which keeps no batch alive."""
 
     time: float  # simulated [s]
-    # its lane of all arrays that a batch keeps by lanes, in the order of `lane_arrays`
+    # its lane of all arrays that a batch keeps by lanes, in the order of `_lane_arrays`
     lane: tuple[np.ndarray, ...]
     rows: np.ndarray  # its history, as `LaneRun.rows`
 
 
-def lane_arrays(*parts: Any) -> Iterator[LaneArray]:
+def _lane_arrays(*parts: Any) -> Iterator[LaneArray]:
     """Yield the arrays of lanes in nested tuples, such as a LaneState or a step's work space."""
     for part in parts:
         if isinstance(part, LaneArray):
             yield part
         elif isinstance(part, tuple):
-            yield from lane_arrays(*part)
+            yield from _lane_arrays(*part)
 
 
 class Batch:
@@ -81,7 +81,7 @@ class Batch:
         Sampling interval and time step [s].
     """
 
-    def __init__(self, points: Sequence[Parameters], stepper: str, paused: Sequence[Paused] = ()) -> None:
+    def __init__(self, points: Sequence[Parameters], stepper: str, paused: Sequence[_Paused] = ()) -> None:
         p = points[0]
         most = lanes(p, stepper)
         if not 0 < len(points) <= most:
@@ -127,9 +127,9 @@ class Batch:
         self._earlier = tuple(rows)
         self._ordered: np.ndarray | None = None
 
-    def _resume(self, paused: Sequence[Paused]) -> None:
+    def _resume(self, paused: Sequence[_Paused]) -> None:
         """Put the runs' states into the lanes, with all data that the step keeps."""
-        for k, array in enumerate(lane_arrays(self.state, self.work, self.records.ended)):
+        for k, array in enumerate(_lane_arrays(self.state, self.work, self.records.ended)):
             array.data[:] = np.stack([run.lane[k] for run in paused], axis=-1)
         self.state.time[0] = paused[0].time
         if isinstance(self.work, ring_step.RingWork):
@@ -253,11 +253,11 @@ class LaneRun(RecordedRun):
         """The present state; a copy."""
         return lane_belt.take_lane(self.batch.state, self._lane, self.batch.belts[self._lane])
 
-    def paused(self) -> Paused:
+    def paused(self) -> _Paused:
         """The state from which a batch of the same point over a longer time continues."""
-        kept = lane_arrays(self.batch.state, self.batch.work, self._records.ended)
+        kept = _lane_arrays(self.batch.state, self.batch.work, self._records.ended)
         lane = tuple(array.data[:, :, self._lane].copy() for array in kept)
-        return Paused(float(self.batch.state.time[0]), lane, self.rows.copy(order="K"))
+        return _Paused(float(self.batch.state.time[0]), lane, self.rows.copy(order="K"))
 
     @property
     def done(self) -> int:

@@ -30,8 +30,10 @@ from cvt_hpc.models.steady_variator.linearised import Linearisation, corners
 from cvt_hpc.models.steady_variator.walking import Steady
 
 NEAREST = 12  # eigenvalues of each disc to begin with: fewer need more discs, more take longer
-FIRST_REACH = 2.0 * np.pi * 400.0  # [rad/s]: half of the part of the band that the first disc covers, guessed
-OVERLAP = 0.95  # of a disc's half height
+_FIRST_REACH = (
+    2.0 * np.pi * 400.0
+)  # [rad/s]: half of the part of the band that the first disc covers, guessed
+_OVERLAP = 0.95  # of a disc's half height
 ALIKE = 1e-5  # relative: eigenvalues of two discs that are one
 
 
@@ -47,9 +49,9 @@ def eigenpairs(
     start = np.random.default_rng(0).normal(size=matrix.shape[0]) + 0j
     values, vectors = np.empty(0, complex), np.empty((matrix.shape[0], 0), complex)
     middle, width = 0.5 * (growth - decay), 0.5 * (growth + decay)
-    covered, reach, nearest = low, FIRST_REACH, NEAREST
+    covered, reach, nearest = low, _FIRST_REACH, NEAREST
     while covered < high:
-        centre = middle + 1j * (covered + OVERLAP * reach)
+        centre = middle + 1j * (covered + _OVERLAP * reach)
         inverse = splu((whole - centre * identity).tocsc())
         operator = LinearOperator(matrix.shape, matvec=inverse.solve, dtype=complex)
         found, shapes = eigs(operator, k=nearest, which="LM", v0=start)

@@ -18,8 +18,6 @@ from cvt_hpc.physics.compliance import Contact
 from cvt_hpc.physics.sheaves import flexibility
 from cvt_hpc.physics.splines import Splines, hierarchical_splines
 
-SPLITS = ("free_splines", "held_splines", "modes")
-
 
 class Basis(NamedTuple):
     """Shapes at the stations."""
@@ -32,7 +30,7 @@ class Basis(NamedTuple):
 
 
 def split_basis(belt: Belt, grid: Mesh, split: str, limit: float, spacing: float) -> Basis:
-    """Shapes of a belt, split at a limit frequency [Hz], one of SPLITS, with coarse splines of a spacing [m].
+    """Shapes of a belt, split at a limit frequency [Hz] by `split`, with coarse splines of a spacing [m].
 
     `free_splines`: by the frequency of each spline by itself under tension and bending, without grooves: the
     coarse ones move, the refinements lag (Lebrecht et al. 2004, fig. 2.6). `held_splines`: by that frequency
@@ -46,7 +44,7 @@ def split_basis(belt: Belt, grid: Mesh, split: str, limit: float, spacing: float
         shapes = shapes @ mix
         own = np.sqrt(np.maximum(squares, 0.0)) / (2.0 * np.pi)
     else:
-        own = own_frequencies(shapes, free_stiffness(belt) if split == "free_splines" else held, mass)
+        own = own_frequencies(shapes, _free_stiffness(belt) if split == "free_splines" else held, mass)
     slow = own < limit
     moving = shapes[:, slow]
     fastest = 0.0
@@ -71,7 +69,7 @@ def splines_of_belt(grid: Mesh, spacing: float) -> Splines:
     return hierarchical_splines(grid.position, length, coarse, [arcs, corners][:levels])
 
 
-def free_stiffness(belt: Belt) -> np.ndarray:
+def _free_stiffness(belt: Belt) -> np.ndarray:
     """Stiffness of the stations by bending and by the tension that the thrust leaves, (N, N) [N/m]."""
     n = belt.cell.size
     stiffness = np.zeros((n, n))
@@ -87,7 +85,7 @@ def free_stiffness(belt: Belt) -> np.ndarray:
 
 def transverse_stiffness(belt: Belt) -> np.ndarray:
     """Stiffness of the stations at rest in closed grooves, without sliding, (N, N) symmetric [N/m]."""
-    stiffness = free_stiffness(belt)
+    stiffness = _free_stiffness(belt)
     tangent = np.tan(belt.half_wedge_angle)
     for sheave, zone in ((belt.driving, belt.driving_stations), (belt.driven, belt.driven_stations)):
         on_arc = sheave.rise == 0.0

@@ -28,7 +28,7 @@ BEYOND_LIMIT = 1.25  # of 2 / w of the fastest dynamic shape: contact may be sti
 TAKES_OVER = True  # runs continue from the state of others
 
 
-class SplitRun(OneLaneRun):
+class _SplitRun(OneLaneRun):
     """One run by the stepper "split", advanced sample by sample; attributes as of `RecordedRun`."""
 
     failure: Failure | None
@@ -43,12 +43,7 @@ class SplitRun(OneLaneRun):
         self._steps = max(int(np.ceil(self.interval / p["step"] - 1e-9)), 1)
         self.step = self.interval / self._steps
         self._model = split_belt(
-            self.belt,
-            self.mesh,
-            self._basis,
-            p["limit_frequency"],
-            p["longitudinal"],
-            self.step,
+            self.belt, self.mesh, self._basis, p["limit_frequency"], p["longitudinal"], self.step
         )
         first = initial_state(p, self.belt)
         self._motion, self._work = motion(self._model, first), work_space(self._model)
@@ -81,7 +76,7 @@ class SplitRun(OneLaneRun):
         """The present state; a copy."""
         return self._motion.state.copy()
 
-    def paused(self) -> SplitRun:
+    def paused(self) -> _SplitRun:
         """The state from which a batch of the same point over a longer time continues: the run itself."""
         return self
 
@@ -143,4 +138,4 @@ class SplitRun(OneLaneRun):
         return outcome
 
 
-batch = batches_of_one(SplitRun)
+batch = batches_of_one(_SplitRun)

@@ -27,8 +27,8 @@ VARIABLES = (
     *shared("flank_loss", "driving_power", "load_power", "ring_loss", "belt_loss"),
     *shared("layer_loss", "seating_loss", "loss", "efficiency", "power_residual"),
 )
-AT_WORK = tuple(variable.name for variable in VARIABLES[5:])
-FIRST_SHARE = 0.4  # of eq. 2's torque: where continuations to the limit begin
+_AT_WORK = tuple(variable.name for variable in VARIABLES[5:])
+_FIRST_SHARE = 0.4  # of eq. 2's torque: where continuations to the limit begin
 WITHIN, TRIES = 2e-3, 8  # of the load: how closely a thrust's limit meets it; thrusts tried at most
 
 
@@ -105,7 +105,7 @@ def _by_states(p: Parameters) -> Values:
         "formula_ratio": abs(limit.load) / by_formula,
         "limit_slip": there["slip"],
         "working_torque": working.load,
-        **{name: found[name] for name in AT_WORK},
+        **{name: found[name] for name in _AT_WORK},
     }
 
 
@@ -123,7 +123,7 @@ def _first(p: Parameters) -> tuple[Steady, SteadyBelt]:
     from cvt_hpc.models.steady_variator.walking import SteadyBelt
 
     belt = SteadyBelt(p)
-    return belt.at(np.copysign(FIRST_SHARE, p["load"]) * carried_torque(p)), belt
+    return belt.at(np.copysign(_FIRST_SHARE, p["load"]) * carried_torque(p)), belt
 
 
 def _at_least_thrust(p: Parameters) -> Steady:

@@ -36,7 +36,7 @@ LATE = 1e9  # [s]: load and damping are those after any start-up
 # sizes that count alike in each unknown of the default scene: w, eps_0, eps_1, v_f; Q_0, Q_1, driven speed,
 # position
 SIZES = (1e-4, 1e-3, 1e-4, 0.1)
-SIZES_OF_SCALARS = (0.1, 0.1, 1.0, 1e-4)
+_SIZES_OF_SCALARS = (0.1, 0.1, 1.0, 1e-4)
 SPEED = -2  # place of the driven speed among the unknowns
 MOMENT = -4  # place of the driven pulley's balance of moments in the residual
 
@@ -63,7 +63,7 @@ class Equations:
         self._states = slice(self._carried.stop, self._carried.stop + self._moving.size)
         counts = (n, n, n, self._memories)
         of_states = one.sizes_of_states(belt)[self._moving]
-        self.sizes = np.concatenate([np.repeat(SIZES, counts), of_states, SIZES_OF_SCALARS])
+        self.sizes = np.concatenate([np.repeat(SIZES, counts), of_states, _SIZES_OF_SCALARS])
         length, speed = belt.measures.length, belt.measures.length / belt.measures.time
         self.sizes[:n] *= length
         self.sizes[3 * n : 3 * n + tilts] = one.SIZES[f.ELEMENT_TILT]

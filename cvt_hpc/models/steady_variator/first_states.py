@@ -40,9 +40,9 @@ from cvt_hpc.physics.friction import friction_coefficient
 from cvt_hpc.physics.sheaves import axial_element_stiffness
 
 LONGEST_STEP = 9e-6  # [s]: the state is Newton's, the march need only come near
-STIFFEST_FLANKS = 5e11  # [N/m^2]: contact stiffer than that would shorten the step; the march is without
-LEAST_DAMPERS = {"transverse_damping": 500.0, "element_damping": 20.0, "ring_damping": 4.0}  # of a march
-RISE = 0.02  # [s]: the load rises, the start-up's damping fades
+_STIFFEST_FLANKS = 5e11  # [N/m^2]: contact stiffer than that would shorten the step; the march is without
+_LEAST_DAMPERS = {"transverse_damping": 500.0, "element_damping": 20.0, "ring_damping": 4.0}  # of a march
+_RISE = 0.02  # [s]: the load rises, the start-up's damping fades
 ROUNDS, ROUNDS_A_LOOK = 6, 0.3  # of the belt: the march ends; between two tries of Newton's iteration
 
 
@@ -53,17 +53,17 @@ def settled(parameters: Parameters, equations: Equations, tolerance: float) -> n
     under its load and with the friction that it has; `tolerance` is that of Newton's iteration.
     """
     own = axial_element_stiffness(parameters)
-    softened = min(own, STIFFEST_FLANKS)
+    softened = min(own, _STIFFEST_FLANKS)
     p = {**parameters, "flank_stiffness": softened, "element_factor": 1.0}
     whole = equations.belt
     belt = whole._replace(
         bridging_stiffness=np.inf,
-        rise_time=RISE,
-        ramp_end=RISE,
+        rise_time=_RISE,
+        ramp_end=_RISE,
         load_start=whole.load,
         driving=whole.driving._replace(element_stiffness=softened),
         driven=whole.driven._replace(element_stiffness=softened),
-        **{key: max(least, getattr(whole, key)) for key, least in LEAST_DAMPERS.items()},
+        **{key: max(least, getattr(whole, key)) for key, least in _LEAST_DAMPERS.items()},
     )
     step = min(LONGEST_STEP, SAFE_SHARE * transverse_limit(p))
     around = belt.cell.sum() / belt.belt_speed
@@ -72,7 +72,7 @@ def settled(parameters: Parameters, equations: Equations, tolerance: float) -> n
     softer = 1.0 / softened - 1.0 / own
     pressed_in = softer / (2.0 * np.tan(belt.half_wedge_angle))
     run = StateMarch([belt], [initial_state(p, belt)])
-    run.advance(round(RISE / step), step)
+    run.advance(round(_RISE / step), step)
     for _ in range(round(ROUNDS / ROUNDS_A_LOOK)):
         run.advance(look, step)
         if run.outcome() is not Outcome.OK:
@@ -87,17 +87,17 @@ def settled(parameters: Parameters, equations: Equations, tolerance: float) -> n
     return Outcome.OK
 
 
-NARROWING = 0.3  # first step of friction and dampers on their way back, of the whole path
-# [m/s]: regularisation speeds of flanks and rings where they are widened, at SLOWEST_MARCH and above
+_NARROWING = 0.3  # first step of friction and dampers on their way back, of the whole path
+# [m/s]: regularisation speeds of flanks and rings where they are widened, at _SLOWEST_MARCH and above
 WIDE, RING_WIDE = 0.3, 10.0
-SLOWEST_MARCH = 50.0  # [rad/s]: a slower belt takes too long to settle, and a faster one like it is marched
+_SLOWEST_MARCH = 50.0  # [rad/s]: a slower belt takes too long to settle, and a faster one like it is marched
 # Where the way begins if not at the load: shares of a load under which the belt slips through; loads beside
 # one under which it does not settle, in shares of the load that friction carries. From which of them Newton's
 # iteration comes through on a fine mesh follows no rule: at 240 stations and 100 N m from the last one, not
 # from the first four.
 LESS, BESIDE = 0.8 ** np.arange(1, 8), (0.1, -0.1, 0.2, -0.2, 0.15, -0.15)
 SMALL = 0.1  # of the load that friction carries: a belt settles under it, and others are reached from there
-MOST_FORCE = 2.0  # of the thrust: axial forces on either pulley are below
+_MOST_FORCE = 2.0  # of the thrust: axial forces on either pulley are below
 
 
 class SlipsThrough(NoSteadyState):
@@ -110,7 +110,7 @@ class FirstStates:
     def __init__(self, parameters: Parameters, continuation: Continuation) -> None:
         self._parameters, self._course = parameters, continuation
         belt = continuation.whole
-        slow = min(belt.driving_speed / SLOWEST_MARCH, 1.0)
+        slow = min(belt.driving_speed / _SLOWEST_MARCH, 1.0)
         self._wide = (
             max(slow * WIDE / belt.friction_speed, 1.0),
             max(slow * RING_WIDE / belt.ring_friction_speed, 1.0),
@@ -188,7 +188,7 @@ class FirstStates:
         whole = course.whole
         course.load(load)
         course.bridge(float(wide == OWN))
-        faster = max(SLOWEST_MARCH / whole.driving_speed, 1.0)
+        faster = max(_SLOWEST_MARCH / whole.driving_speed, 1.0)
         course.friction(falling, wide)
         course.faster(faster, 0.0, wide)
         x = settled(self._parameters, course.equations, ON_THE_WAY)
@@ -219,7 +219,7 @@ class FirstStates:
 
     def _narrowed(self, x: np.ndarray, load: float, wide: Widths) -> np.ndarray:
         """Unknowns with the belt's own friction and dampers."""
-        course, step = self._course, 1.0 if wide == OWN else NARROWING
+        course, step = self._course, 1.0 if wide == OWN else _NARROWING
         name = f"friction narrowed at {load:g} N m"
         x = course.follow(lambda share: course.friction(share, wide), x, step, name)
         return course.follow(course.bridge, x, step, f"dampers drawn back at {load:g} N m", AT_HOME)
@@ -228,6 +228,6 @@ class FirstStates:
 def least_sliding(belt: Belt, load: float) -> float:
     """Sliding [m/s] that a load takes at the least, by the regularisation; 0 beyond the limit of friction."""
     coefficient, _ = friction_coefficient(belt.law, 0.0, 0.0)
-    most = torque_limit(coefficient, MOST_FORCE * belt.thrust, belt.driving_radius, belt.half_wedge_angle)
+    most = torque_limit(coefficient, _MOST_FORCE * belt.thrust, belt.driving_radius, belt.half_wedge_angle)
     share = abs(load) / most
     return float(belt.friction_speed * math.atanh(share)) if share < 1.0 else 0.0

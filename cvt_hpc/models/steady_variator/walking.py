@@ -51,7 +51,7 @@ HELD = {
     )
 }
 # [s], in the default scene: of a tilt that has clearance and no lag; a steady state does not know it
-ANY_LAG = 1e-3
+_ANY_LAG = 1e-3
 
 
 def held(parameters: Parameters) -> dict[str, Any]:
@@ -66,7 +66,7 @@ def freed(parameters: Parameters) -> dict[str, Any] | None:
     """Parameters under which a steady state knows of clearances; None where no pulley is free."""
     p = PULLEY_DEFAULTS | dict(parameters)
     if p["tilt_lag"] == 0.0 and (p["collar_clearance"] or p["bearing_clearance"]):
-        p["tilt_lag"] = ANY_LAG * measures(p).time
+        p["tilt_lag"] = _ANY_LAG * measures(p).time
     return p if are_free(p) else None
 
 
