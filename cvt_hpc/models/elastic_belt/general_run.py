@@ -180,29 +180,16 @@ def damper_power(belt: Belt, state: State) -> float:
 SPEED, OPENING = -1, -2  # of the driven pulley, beside the rows of the state
 
 # rate: {unknown: stations behind it (negative) to stations ahead of it that act on it}
+_HERE, _BESIDE = (0, 0), (-1, 1)
+_STRESSES = {f.N_ELEMENT: (-1, 0), f.N_RING: (-1, 0)}  # of the cells beside a station
+_FLANKS = {f.U: _BESIDE, f.V_ELEMENT: _BESIDE, f.V_FILTERED: _HERE}
 REACH = {
-    f.W: {f.U: (0, 0)},
-    f.U: {
-        f.W: (-2, 2),
-        f.U: (-1, 1),
-        f.V_ELEMENT: (-1, 1),
-        f.V_RING: (-1, 1),
-        f.V_FILTERED: (0, 0),
-        f.N_ELEMENT: (-1, 0),
-        f.N_RING: (-1, 0),
-    },
-    f.V_ELEMENT: {
-        f.W: (-1, 1),
-        f.U: (-1, 1),
-        f.V_ELEMENT: (-1, 1),
-        f.V_RING: (0, 0),
-        f.V_FILTERED: (0, 0),
-        f.N_ELEMENT: (-1, 0),
-        f.N_RING: (-1, 0),
-    },
-    f.V_RING: {f.W: (-1, 1), f.U: (-1, 1), f.V_ELEMENT: (0, 0), f.V_RING: (-1, 1), f.N_RING: (-1, 0)},
-    f.N_ELEMENT: {f.W: (-1, 2), f.V_ELEMENT: (0, 1), f.N_ELEMENT: (-1, 1)},
-    f.N_RING: {f.W: (-1, 2), f.V_RING: (0, 1), f.N_RING: (-1, 1)},
+    f.W: {f.U: _HERE},
+    f.U: {f.W: (-2, 2), f.V_RING: _BESIDE} | _FLANKS | _STRESSES,
+    f.V_ELEMENT: {f.W: _BESIDE, f.V_RING: _HERE} | _FLANKS | _STRESSES,
+    f.V_RING: {f.W: _BESIDE, f.U: _BESIDE, f.V_ELEMENT: _HERE, f.V_RING: _BESIDE, f.N_RING: (-1, 0)},
+    f.N_ELEMENT: {f.W: (-1, 2), f.V_ELEMENT: (0, 1), f.N_ELEMENT: _BESIDE},
+    f.N_RING: {f.W: (-1, 2), f.V_RING: (0, 1), f.N_RING: _BESIDE},
 }
 # With a column that bears a moment, which knows strains and turning of the cells around
 _OF_COLUMN = {f.U: {f.N_ELEMENT: (-2, 1)}, f.V_ELEMENT: {f.W: (-2, 2)}}

@@ -331,6 +331,18 @@ def cell_strains(belt: LaneBelt, stations: LaneArray, j: int, w, w_b, more_0, mo
     stations[j, lf.PER_CONTENT_0], stations[j, lf.PER_CONTENT_1] = per_0, per_1
 
 
+@merged_kernel
+def lane_coefficient(belt: LaneBelt, numbers, v_law, normal):
+    """Coefficient of friction at a sliding speed [m/s] and a normal line force [N/m], by a law's numbers."""
+    law = belt.law
+    if law.kind == Law.TABLE:
+        table = law.table_force, law.table_speed, law.table_mu
+        coefficient, _ = table_coefficient(table, v_law, normal)
+    else:
+        coefficient, _ = formula_coefficient(law.kind, numbers, v_law)
+    return coefficient
+
+
 @kernel
 def lane_sliding(belt: LaneBelt, state: LaneState, stations: LaneArray) -> None:
     """Sliding speeds where a groove may hold the belt, and the results of friction that depend on them alone.
@@ -339,8 +351,6 @@ def lane_sliding(belt: LaneBelt, state: LaneState, stations: LaneArray) -> None:
     processor looks ahead, so that it would not begin a station before the last one is nearly done.
     """
     n, fields, c = state.fields.rows, state.fields, belt.constants
-    kind, memory = belt.law.kind, belt.memory
-    table = belt.law.table_force, belt.law.table_speed, belt.law.table_mu
     numbers = law_numbers(c[0, lf.KINETIC_FRICTION], c[0, lf.FRICTION_GRADIENT], c[0, lf.LAW_SPEED])
     share = lane_speed_share(belt, state.time[0], c[0, lf.BELT_SPEED])
     per_cosine, belt_speed, offset = 1.0 / c[0, lf.COSINE], share * c[0, lf.BELT_SPEED], c[0, lf.RING_OFFSET]
@@ -357,11 +367,8 @@ def lane_sliding(belt: LaneBelt, state: LaneState, stations: LaneArray) -> None:
             belt, j, pulleys, belt_speed, v_across, fields[j, f.V_ELEMENT], fields[j, f.W]
         )
         speed, _ = flank_sliding(v_radial, v_tangential, per_cosine)
-        v_law = fields[j, f.V_FILTERED] if memory else speed
-        if kind == Law.TABLE:
-            coefficient, _ = table_coefficient(table, v_law, stations[j, lf.FORCE] * per_cosine)
-        else:
-            coefficient, _ = formula_coefficient(kind, numbers, v_law)
+        v_law = fields[j, f.V_FILTERED] if belt.memory else speed
+        coefficient = lane_coefficient(belt, numbers, v_law, stations[j, lf.FORCE] * per_cosine)
         # of the flanks tanh(x) = (1 - e^-2x) / (1 + e^-2x) and 1 / speed by one division
         speed = maximum(speed, least)
         saddle = fma(fma(offset, belt.arc_curvature[j], 1.0), full_speed, -(belt_speed + fields[j, f.V_RING]))

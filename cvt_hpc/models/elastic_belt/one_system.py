@@ -158,7 +158,7 @@ def free_rates(belt: Belt, state: State, pull: np.ndarray) -> np.ndarray:
     found = pulley_rates(
         belt.pulleys.laws,
         0,
-        scalars[f.FIRST_STATE :],
+        scalars.reshape(1, scalars.size),
         1.0 if time >= belt.rise_time else 0.0,
         (rhs.driving_speed_at(belt, state), scalars[f.DRIVEN_SPEED]),
         scalars[f.DRIVEN_POSITION],

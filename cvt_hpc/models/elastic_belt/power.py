@@ -28,8 +28,7 @@ from cvt_hpc.models.elastic_belt.lane_column import curving
 from cvt_hpc.models.elastic_belt.lane_tilt import tilt_damping, tilted_saddle
 from cvt_hpc.models.elastic_belt.pulley_step import audit_pulleys, taken_by_clearance
 from cvt_hpc.physics.flank import flank_sliding
-from cvt_hpc.physics.friction import formula_coefficient, law_numbers, saturation, table_coefficient
-from cvt_hpc.physics.friction_laws import Law
+from cvt_hpc.physics.friction import law_numbers, saturation
 
 
 @kernel
@@ -58,8 +57,6 @@ def audit(
     wedge = c[0, lf.WEDGE]
     per_cosine, width = 1.0 / cosine, c[0, lf.FRICTION_SPEED]
     per_width, per_ring_width = 1.0 / width, 1.0 / c[0, lf.RING_FRICTION_SPEED]
-    kind = belt.law.kind
-    table = belt.law.table_force, belt.law.table_speed, belt.law.table_mu
     numbers = law_numbers(c[0, lf.KINETIC_FRICTION], c[0, lf.FRICTION_GRADIENT], c[0, lf.LAW_SPEED])
     least = forces.LEAST_SHARE_OF_WIDTH * width
     damping = forces.lane_damping(belt, state.time[0])
@@ -139,12 +136,8 @@ def audit(
         sliding, meridian = flank_sliding(v_radial, v_tangential, per_cosine)
         sliding = maximum(sliding, least)
         v_law = fields[j, f.V_FILTERED] if belt.memory else sliding
-        if kind == Law.TABLE:
-            mu, _ = table_coefficient(table, v_law, force * per_cosine)
-        else:
-            mu, _ = formula_coefficient(kind, numbers, v_law)
         factor, _ = saturation(sliding, per_width)
-        mu *= factor
+        mu = forces.lane_coefficient(belt, numbers, v_law, force * per_cosine) * factor
         upward = mu * meridian / sliding
         twice_normal = 2.0 * force / fma(upward, sine, cosine)
         elastic_radial = wedge * force

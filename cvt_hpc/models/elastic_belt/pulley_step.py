@@ -41,17 +41,6 @@ def _lane_pulley_rates(belt: LaneBelt, state: LaneState, taken, moment):
     """
     c, scalars, time = belt.constants, state.scalars, state.time[0]
     speed = scalars[0, lf.SPEED]
-    first = f.FIRST_STATE
-    states = (
-        scalars[0, first],
-        scalars[0, first + 1],
-        scalars[0, first + 2],
-        scalars[0, first + 3],
-        scalars[0, first + 4],
-        scalars[0, first + 5],
-        scalars[0, first + 6],
-        scalars[0, first + 7],
-    )
     course = lane_speed_share(belt, time, speed) * like(c[0, lf.DRIVING_SPEED], speed)
     axial_driving, driving_cos, driving_sin = _pull(state.contacts[0], speed)
     axial_driven, driven_cos, driven_sin = _pull(state.contacts[1], speed)
@@ -60,9 +49,9 @@ def _lane_pulley_rates(belt: LaneBelt, state: LaneState, taken, moment):
     found = pulley_rates(
         c,
         lf.FIRST_LAW,
-        states,
+        scalars,
         1.0 if time >= belt.rise_time else 0.0,
-        (course + states[f.EXCESS], speed),
+        (course + scalars[0, f.FIRST_STATE + f.EXCESS], speed),
         scalars[0, lf.POSITION],
         (taken, moment, (axial_driving, axial_driven), tilting),
         (
