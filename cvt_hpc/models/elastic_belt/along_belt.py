@@ -17,8 +17,8 @@ belt slides into the groove: from pi/2 to 3 pi/2 the pulley drives the belt, bel
 Of means, sliding speed and angle are those of the mean sliding.
 
 Histories that are kept have them at each sample of a run's end, too (`Momentary`). Off by default: nothing is
-then computed, nor held in memory. The kernel adds the profiles of each sample to
-the sums of the judged part; here it adds them to zero first, sample by sample, which gives the same bits.
+then computed, nor held in memory. The kernel adds the profiles of each sample to the sums of the judged part;
+here it adds them to zero first, sample by sample, which gives the same bits.
 """
 
 from __future__ import annotations

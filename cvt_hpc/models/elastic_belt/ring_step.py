@@ -164,7 +164,7 @@ def _force_along(rings: LaneRings, fields: LaneArray, layers: LaneArray, j: int,
 def _couple_layers(belt: LaneBelt, state: LaneState, work: RingWork, step: float) -> None:
     """Eliminate the layers: their part of the blocks and right side of elements and rings as one."""
     rings, fields, stations, layers = work.rings, state.fields, work.stations, work.layers
-    n, c = rings.number, rings.constants
+    n, falls, c = rings.number, rings.falls, rings.constants
     sine = belt.constants[0, lf.RING_OFFSET]
     share = forces.lane_speed_share(belt, state.time[0], sine)
     belt_speed = share * belt.constants[0, lf.BELT_SPEED]
@@ -197,14 +197,11 @@ def _couple_layers(belt: LaneBelt, state: LaneState, work: RingWork, step: float
         longer = fma(belt.constants[0, lf.RING_OFFSET], turn, 1.0)
         carried = fma((belt_speed + united) * per_left, united - united_a, acceleration)
         carried = (heavier - 1.0) * mass * longer * carried
-        beside = per_left, per_cell, even_l, even_r
-        along = (
-            beside,
-            (stiffness, damping),
+        beside, moving = (
+            (per_left, per_cell, even_l, even_r),
             (heavier * mass, carried, belt_speed, acceleration),
-            turn,
-            per_dual,
         )
+        along = beside, (stiffness, damping), moving, turn, per_dual
         on_arc = anywhere(belt.arc_curvature[j] > 0.0)
         is_driven = belt.on_driven[j] > 0.5
         element = fields[j, f.V_ELEMENT]
@@ -237,10 +234,8 @@ def _couple_layers(belt: LaneBelt, state: LaneState, work: RingWork, step: float
                 over = fields[j, FIRST_LAYER + k]
                 sliding = fma(below_factor, belt_speed + under, -above_factor * (belt_speed + over))
                 level = c[0, lf.LAYER_FRICTION_LEVEL] if k > 0 else c[0, lf.SADDLE_FRICTION_LEVEL]
-                pressed = largest - layers[j, first + PART]
-                secant, slope = ring_friction(
-                    sliding, level * pressed, rings.falls, excess, per_stribeck, per_width, least
-                )
+                level = level * (largest - layers[j, first + PART])
+                secant, slope = ring_friction(sliding, level, falls, excess, per_stribeck, per_width, least)
                 layers[j, first + DRAG] = secant * sliding
                 # not less than the inertia that keeps friction from reversing sliding within the step
                 enough = secant - (between if k > 0 else at_saddle)
@@ -255,9 +250,7 @@ def _couple_layers(belt: LaneBelt, state: LaneState, work: RingWork, step: float
                 outer = fields[j, FIRST_LAYER + n - 1]
                 sliding = fma(below_factor, belt_speed + outer, -above_factor * (belt_speed + element))
                 level = bearing * c[0, lf.SADDLE_FRICTION_LEVEL]
-                secant, slope = ring_friction(
-                    sliding, level, rings.falls, excess, per_stribeck, per_width, least
-                )
+                secant, slope = ring_friction(sliding, level, falls, excess, per_stribeck, per_width, least)
                 drag_up = secant * sliding
                 stiff_up = maximum(slope, secant - at_saddle)
                 factor_up = below_factor
