@@ -174,23 +174,19 @@ PULLEY_DEFAULTS = {
 }
 
 
-def are_free(parameters: Parameters) -> bool:
+def are_free(p: Parameters) -> bool:
     """Whether pulleys do more than turn by a given speed, or be pressed by a constant thrust.
 
     Reads no parameter that does not count: the parameters read decide which runs can share a batch.
     """
-
-    def of(key: str) -> Any:
-        return parameters[key] if key in parameters else PULLEY_DEFAULTS[key]
-
     return bool(
-        np.isfinite(of("driving_inertia"))
-        or np.isinf(of("driven_inertia"))
-        or of("driving_axial") != "position"
-        or of("clamping") != "constant"
-        or of("driven_spring_rate") > 0.0
-        or of("driven_piston")
-        or of("tilt_lag") > 0.0
+        np.isfinite(p["driving_inertia"])
+        or np.isinf(p["driven_inertia"])
+        or p["driving_axial"] != "position"
+        or p["clamping"] != "constant"
+        or p["driven_spring_rate"] > 0.0
+        or p["driven_piston"]
+        or p["tilt_lag"] > 0.0
     )
 
 

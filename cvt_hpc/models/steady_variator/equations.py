@@ -29,7 +29,7 @@ from cvt_hpc.models.elastic_belt import one_system as one
 from cvt_hpc.models.elastic_belt.belt import Belt, State, initial_state
 from cvt_hpc.models.elastic_belt.pulleys import moving_states
 from cvt_hpc.models.elastic_belt.rhs import strains
-from cvt_hpc.models.steady_variator.linearised import Linearisation, corners, rates_beyond_corners
+from cvt_hpc.models.steady_variator.linearised import Linearisation, corners, joined, rates_beyond_corners
 from cvt_hpc.parameters import Parameters
 
 LATE = 1e9  # [s]: load and damping are those after any start-up
@@ -136,8 +136,7 @@ class Equations:
             (softened * (np.roll(strains, 1) - strains), cells, np.full(n, x.size - 4)),
             (-ones, n + cells, n + cells),
         )
-        values, rows, columns = map(np.concatenate, zip(*entries, strict=True))
-        return csr_array((values, (rows, columns)), shape=(2 * n, x.size))
+        return csr_array(joined(entries, zeros=True), shape=(2 * n, x.size))
 
     def jacobian(self, x: np.ndarray, sided: bool = True, pressed: np.ndarray | None = None) -> csc_array:
         """Slopes of the residual, (n, n), about the unknowns of its last call.
@@ -197,5 +196,4 @@ class Equations:
         places = np.arange(self._states.start, self._states.stop)
         entries.append((np.ones(places.size), self._loose, places))
         entries.append((np.ones(2), self._flat.origin.size - 2 + np.arange(2), count - 2 + np.arange(2)))
-        values, rows, columns = map(np.concatenate, zip(*entries, strict=True))
-        return csr_array((values, (rows, columns)), shape=(self._flat.origin.size, count))
+        return csr_array(joined(entries, zeros=True), shape=(self._flat.origin.size, count))

@@ -11,6 +11,8 @@ be a mean of both slopes, by which Newton's iteration moves between two sets of 
 slopes are taken on the state's own side of each corner, beyond the reach of the increments.
 """
 
+from collections.abc import Iterable, Sequence
+
 import numpy as np
 from scipy.sparse import csc_array, csr_array
 
@@ -157,6 +159,13 @@ def _strained(belt: Belt, state: State) -> tuple[np.ndarray, np.ndarray, np.ndar
     return (1.0 + eps) * state.fields[f.N_ELEMENT], eps, belt.element_damping / stiffness
 
 
+def joined(entries: Iterable[Sequence[np.ndarray]], zeros: bool = False) -> tuple[np.ndarray, tuple]:
+    """Values with rows and columns, as sparse arrays take them, of such triples; with `zeros` or without."""
+    values, rows, columns = map(np.concatenate, zip(*entries, strict=True))
+    kept = np.flatnonzero((values != 0.0) | zeros)
+    return values[kept], (rows[kept], columns[kept])
+
+
 class Linearisation:
     """Jacobians of the rates of belts that differ in neither mesh nor sheaves; `flat` is one of them."""
 
@@ -222,9 +231,7 @@ class Linearisation:
                 count + forces - driven + np.arange(driven),
             ),
         ]
-        values, rows, columns = map(np.concatenate, zip(*entries, strict=True))
-        there = values != 0.0
-        slopes = csc_array((values[there], (rows[there], columns[there])), shape=(count, count + forces))
+        slopes = csc_array(joined(entries), shape=(count, count + forces))
         return slopes[:, :count] + slopes[:, count:] @ self._forces(flat)
 
     def _off_corners(self, belt: Belt, state: State, pressed: np.ndarray) -> np.ndarray:
@@ -256,9 +263,7 @@ class Linearisation:
         for slopes, column in ((self._turning, count - 2), (excess, self._loose[f.EXCESS])):
             rows = self._turned_rows
             entries.append((slopes[self._turned], rows, np.full(rows.size, column)))
-        values, rows, columns = map(np.concatenate, zip(*entries, strict=True))
-        there = values != 0.0
-        local = csr_array((values[there], (rows[there], columns[there])), shape=(count + 2, width))
+        local = csr_array(joined(entries), shape=(count + 2, width))
         # actions on the pulleys, by the unknowns and the forces
         acting = np.zeros((18, width))
         acting[:2] = local[count:].toarray()
@@ -306,6 +311,4 @@ class Linearisation:
             acting += [(slopes @ opening, rows, np.full(arc.size, column)) for opening, column in openings]
             entries += [[part.ravel() for part in np.broadcast_arrays(*entry)] for entry in acting]
             first += arc.size
-        values, rows, columns = map(np.concatenate, zip(*entries, strict=True))
-        there = values != 0.0
-        return csc_array((values[there], (rows[there], columns[there])), shape=(first, self._count))
+        return csc_array(joined(entries), shape=(first, self._count))
