@@ -295,11 +295,8 @@ def advance_belt(belt: LaneBelt, state: LaneState, stations: LaneArray, step: fl
     per_cosine = 1.0 / c[0, lf.COSINE]
     speed_share = forces.lane_speed_share(belt, state.time[0], c[0, lf.BELT_SPEED])
     belt_speed, offset = speed_share * c[0, lf.BELT_SPEED], c[0, lf.RING_OFFSET]
-    driven_speed, radius, driving_radius = (
-        state.scalars[0, lf.SPEED],
-        c[0, lf.DRIVEN_RADIUS],
-        c[0, lf.DRIVING_RADIUS],
-    )
+    driven_speed = state.scalars[0, lf.SPEED]
+    radius, driving_radius = c[0, lf.DRIVEN_RADIUS], c[0, lf.DRIVING_RADIUS]
     stiffness, damper_0 = c[0, lf.ELEMENT_STIFFNESS], c[0, lf.ELEMENT_DAMPING]
     damper_1 = c[0, lf.RING_DAMPING]
     pulleys = forces.lane_pulleys(belt, speed_share, state.scalars)

@@ -66,11 +66,8 @@ def flat_belt(belt: Belt, start: float = 0.0) -> FlatBelt:
 
 def pack(flat: FlatBelt, state: State) -> np.ndarray:
     """Vector y of a state; its time is not part of it."""
-    rows, scalars = (
-        state.fields[list(ROWS)].ravel(),
-        state.scalars[[*flat.loose, f.DRIVEN_SPEED, f.DRIVEN_POSITION]],
-    )
-    return np.concatenate([rows, carried(flat, state), scalars]) - flat.origin
+    scalars = state.scalars[[*flat.loose, f.DRIVEN_SPEED, f.DRIVEN_POSITION]]
+    return np.concatenate([state.fields[list(ROWS)].ravel(), carried(flat, state), scalars]) - flat.origin
 
 
 def carried(flat: FlatBelt, state: State) -> np.ndarray:
@@ -108,11 +105,8 @@ def unpack(flat: FlatBelt, t: float, y: np.ndarray) -> None:
     first += flat.remembering.size
     for k in range(flat.loose.size):
         scalars[flat.loose[k]] = y[first + k]
-    scalars[f.TIME], scalars[f.DRIVEN_SPEED], scalars[f.DRIVEN_POSITION] = (
-        flat.start + t,
-        origin[-2] + y[-2],
-        y[-1],
-    )
+    scalars[f.TIME] = flat.start + t
+    scalars[f.DRIVEN_SPEED], scalars[f.DRIVEN_POSITION] = origin[-2] + y[-2], y[-1]
 
 
 @kernel

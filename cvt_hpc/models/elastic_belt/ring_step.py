@@ -197,10 +197,8 @@ def _couple_layers(belt: LaneBelt, state: LaneState, work: RingWork, step: float
         longer = fma(belt.constants[0, lf.RING_OFFSET], turn, 1.0)
         carried = fma((belt_speed + united) * per_left, united - united_a, acceleration)
         carried = (heavier - 1.0) * mass * longer * carried
-        beside, moving = (
-            (per_left, per_cell, even_l, even_r),
-            (heavier * mass, carried, belt_speed, acceleration),
-        )
+        beside = per_left, per_cell, even_l, even_r
+        moving = heavier * mass, carried, belt_speed, acceleration
         along = beside, (stiffness, damping), moving, turn, per_dual
         on_arc = anywhere(belt.arc_curvature[j] > 0.0)
         is_driven = belt.on_driven[j] > 0.5

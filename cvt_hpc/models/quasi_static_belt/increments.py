@@ -163,10 +163,8 @@ def solve_increments(model: SplitBelt, moved: Motion, work: Work) -> None:
     np.dot(shapes, vector, work.rate[f.U])
     if model.steady_flow:
         for j in range(n):
-            columns[j, q.ELEMENT, q.RIGHT], columns[j, q.RING, q.RIGHT] = (
-                work.found[element],
-                work.found[ring],
-            )
+            columns[j, q.ELEMENT, q.RIGHT] = work.found[element]
+            columns[j, q.RING, q.RIGHT] = work.found[ring]
         return
     # the solution for the right side less those for the coordinates
     closing = work.closing
