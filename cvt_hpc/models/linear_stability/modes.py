@@ -30,9 +30,8 @@ from cvt_hpc.models.steady_variator.linearised import Linearisation, corners
 from cvt_hpc.models.steady_variator.walking import Steady
 
 NEAREST = 12  # eigenvalues of each disc to begin with: fewer need more discs, more take longer
-_FIRST_REACH = (
-    2.0 * np.pi * 400.0
-)  # [rad/s]: half of the part of the band that the first disc covers, guessed
+# [rad/s]: half of the part of the band that the first disc covers, guessed
+_FIRST_REACH = 2.0 * np.pi * 400.0
 _OVERLAP = 0.95  # of a disc's half height
 ALIKE = 1e-5  # relative: eigenvalues of two discs that are one
 

@@ -35,16 +35,10 @@ from cvt_hpc.variator import GROSS_SLIP, PULLEYS
 from cvt_hpc.variator.scene import measures
 
 # Keys that free a pulley, each with a value that does not
-_FREEING = (
-    "driving_inertia",
-    "driving_axial",
-    "clamping",
-    "tilt_lag",
-    "collar_clearance",
-    "bearing_clearance",
-)
+_OF_DRIVING = ("driving_inertia", "driving_axial")
+_OF_BOTH = ("clamping", "tilt_lag", "collar_clearance", "bearing_clearance")
 _OF_EACH = tuple(f"{pulley}_{key}" for pulley in PULLEYS for key in ("piston", "spring_rate"))
-HELD = {key: PULLEY_DEFAULTS[key] for key in (*_FREEING, *_OF_EACH)}
+HELD = {key: PULLEY_DEFAULTS[key] for key in (*_OF_DRIVING, *_OF_BOTH, *_OF_EACH)}
 # [s], in the default scene: of a tilt that has clearance and no lag; a steady state does not know it
 _ANY_LAG = 1e-3
 
