@@ -94,9 +94,7 @@ class Batch:
         self.dtype = PRECISIONS[p["precision"]]
         starts = [initial_state(point, belt) for point, belt in zip(padded, self.belts, strict=True)]
         fields, self._march = STEPS[stepper]
-        self._work_space: Callable[[lane_belt.LaneState], _Work] = partial(
-            lane_belt.work_space, fields=fields
-        )
+        self._work_space: Callable[..., _Work] = partial(lane_belt.work_space, fields=fields)
         if layer_count(p) > 1:
             rings = [ring_constants(point, belt) for point, belt in zip(padded, self.belts, strict=True)]
             self.belts = [without_saddle_friction(belt) for belt in self.belts]

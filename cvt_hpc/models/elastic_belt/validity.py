@@ -18,21 +18,15 @@ from cvt_hpc.variator.slip import GAINED, LOST
 LARGEST_POWER_RESIDUAL, REFERENCE_CELLS = 0.004, 159
 BEYOND_LIMIT = 1.25  # of the longest stable step by formula: methods were found to hold up to 1.22 of it
 
+_UNSOLVED = "the search for the closed stations of belt and sheaves did not end"
+_LEFT = f"the belt is off its path by more than {LARGEST_DISPLACEMENT:.1%} of the distance of the shafts"
+_STRAINED = f"strain is beyond {LARGEST_STRAIN:.0%}, or elements gape by that share of the belt's length"
 # Of an end with a result the status is done.
 FAILURES = {
-    Outcome.NO_CONTACT_SOLUTION: (
-        Status.FAILED_NUMERICS,
-        "the search for the closed stations of belt and sheaves did not end",
-    ),
+    Outcome.NO_CONTACT_SOLUTION: (Status.FAILED_NUMERICS, _UNSOLVED),
     Outcome.NOT_FINITE: (Status.FAILED_NUMERICS, "the state is not a number"),
-    Outcome.LEFT_THE_GROOVES: (
-        Status.FAILED_NUMERICS,
-        f"the belt is off its path by more than {LARGEST_DISPLACEMENT:.1%} of the distance of the shafts",
-    ),
-    Outcome.OVERSTRAINED: (
-        Status.FAILED_NUMERICS,
-        f"strain is beyond {LARGEST_STRAIN:.0%}, or elements gape by that share of the belt's length",
-    ),
+    Outcome.LEFT_THE_GROOVES: (Status.FAILED_NUMERICS, _LEFT),
+    Outcome.OVERSTRAINED: (Status.FAILED_NUMERICS, _STRAINED),
     # results, and no faults: the torque is more than friction carries, and nothing new would come of the rest
     Outcome.SLIPPED_THROUGH: (Status.DONE, LOST),
     Outcome.RAN_AWAY: (Status.DONE, GAINED),

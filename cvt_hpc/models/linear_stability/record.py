@@ -80,9 +80,8 @@ def solve(parameters: Parameters) -> Solution:
         return Solution(error, [], np.nan, np.nan, np.array(grid.starts), p["undecided_growth"])
     means = quantities(steady, grid)
     tension, push = means["mean_ring_tension"], means["mean_push_force"]
-    band = steady_band(
-        {**p, "driving_speed": driving_speed(steady)}, (tension[0] - push[0], tension[1] - push[1])
-    )
+    forces = tension[0] - push[0], tension[1] - push[1]
+    band = steady_band({**p, "driving_speed": driving_speed(steady)}, forces)
     growth, loose = np.nan, loosened(steady)
     if loose is not None:
         found = modes(loose, grid, band)
@@ -97,19 +96,17 @@ def judge(solution: Solution) -> Values:
         return {"status": Status.FAILED_NUMERICS, "reason": str(solution.steady)}
     found = {"status": Status.DONE, "lower_band_edge": solution.lower_edge, **solution.steady}
     found["loosened_growth_rate"] = solution.loosened
-    margin = solution.undecided
+    margin, loosened = solution.undecided, f"{solution.loosened:.3g}/s with elements apart that hardly touch"
     if not solution.modes:
         holds = not solution.loosened >= -margin
-        reason = "every mode in the band decays fast"
-        if not holds:
-            reason += f", but {solution.loosened:.3g}/s with elements apart that hardly touch"
+        reason = "every mode in the band decays fast" + ("" if holds else f", but {loosened}")
         return found | {"vibrates": Vibrates.NO if holds else Vibrates.UNDECIDED, "reason": reason}
     first = solution.modes[0]
     words = f"growth {first.growth:.3g}/s at {first.frequency:.4g} Hz"
     rates = [first.growth]
     if not np.isnan(solution.loosened):
         rates.append(solution.loosened)
-        words += f", {solution.loosened:.3g}/s with elements apart that hardly touch"
+        words += f", {loosened}"
     vibrates = Vibrates.UNDECIDED
     if min(rates) > margin or max(rates) < -margin:
         vibrates = Vibrates.YES if first.growth > 0.0 else Vibrates.NO
