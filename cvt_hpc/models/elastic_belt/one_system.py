@@ -149,16 +149,12 @@ def pulled_by(belt: Belt, force: np.ndarray, moments: np.ndarray) -> np.ndarray:
 def free_rates(belt: Belt, state: State, pull: np.ndarray) -> np.ndarray:
     """Rates of free pulleys, (10,), by `pulled_by`: the driven one's speed and position, and STATES."""
     scalars, time = state.scalars, state.scalars[f.TIME]
-    found = pulley_rates(
-        belt.pulleys.laws,
-        0,
-        scalars.reshape(1, scalars.size),
-        1.0 if time >= belt.rise_time else 0.0,
-        (rhs.driving_speed_at(belt, state), scalars[f.DRIVEN_SPEED]),
-        scalars[f.DRIVEN_POSITION],
-        (pull[0], pull[1], (pull[2], pull[3]), (pull[4], pull[5], pull[6], pull[7])),
-        (rhs.load_at(belt, time), belt.ratio, rhs.thrust_at(belt, time), belt.axial_damping),
-    )
+    row, going = scalars.reshape(1, scalars.size), 1.0 if time >= belt.rise_time else 0.0
+    turning = rhs.driving_speed_at(belt, state), scalars[f.DRIVEN_SPEED]
+    pulled = pull[0], pull[1], (pull[2], pull[3]), (pull[4], pull[5], pull[6], pull[7])
+    given = rhs.load_at(belt, time), belt.ratio, rhs.thrust_at(belt, time), belt.axial_damping
+    position = scalars[f.DRIVEN_POSITION]
+    found = pulley_rates(belt.pulleys.laws, 0, row, going, turning, position, pulled, given)
     return np.array(found)
 
 

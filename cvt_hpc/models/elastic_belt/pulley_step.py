@@ -41,27 +41,17 @@ def _lane_pulley_rates(belt: LaneBelt, state: LaneState, taken, moment):
     """
     c, scalars, time = belt.constants, state.scalars, state.time[0]
     speed = scalars[0, lf.SPEED]
-    course = lane_speed_share(belt, time, speed) * like(c[0, lf.DRIVING_SPEED], speed)
+    turning = lane_speed_share(belt, time, speed) * like(c[0, lf.DRIVING_SPEED], speed)
+    turning = turning + scalars[0, f.FIRST_STATE + f.EXCESS]
     axial_driving, driving_cos, driving_sin = _pull(state.contacts[0], speed)
     axial_driven, driven_cos, driven_sin = _pull(state.contacts[1], speed)
-    tilting = (driving_cos, driving_sin, driven_cos, driven_sin)
-    load = lane_load(belt, time, speed)
-    found = pulley_rates(
-        c,
-        lf.FIRST_LAW,
-        scalars,
-        1.0 if time >= belt.rise_time else 0.0,
-        (course + scalars[0, f.FIRST_STATE + f.EXCESS], speed),
-        scalars[0, lf.POSITION],
-        (taken, moment, (axial_driving, axial_driven), tilting),
-        (
-            load,
-            like(c[0, lf.RATIO], speed),
-            lane_given_thrust(belt, time, speed),
-            like(c[0, lf.AXIAL_DAMPING], speed),
-        ),
-    )
-    return found, tilting, (axial_driving, axial_driven)
+    axial, tilting = (axial_driving, axial_driven), (driving_cos, driving_sin, driven_cos, driven_sin)
+    load, ratio = lane_load(belt, time, speed), like(c[0, lf.RATIO], speed)
+    given = load, ratio, lane_given_thrust(belt, time, speed), like(c[0, lf.AXIAL_DAMPING], speed)
+    going, pulled = 1.0 if time >= belt.rise_time else 0.0, (taken, moment, axial, tilting)
+    turnings, position = (turning, speed), scalars[0, lf.POSITION]
+    found = pulley_rates(c, lf.FIRST_LAW, scalars, going, turnings, position, pulled, given)
+    return found, tilting, axial
 
 
 @kernel
