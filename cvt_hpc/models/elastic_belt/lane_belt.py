@@ -161,10 +161,8 @@ def lane_state(belts: list[Belt], states: list[State], dtype: type) -> LaneState
     """State of several runs on the same mesh, one for each lane, all at one time, with fresh contacts."""
     n, lanes = belts[0].cell.size, len(belts)
     tilts = belts[0].tilts
-    contacts = (
-        lane_contact([belt.driving for belt in belts], dtype),
-        lane_contact([belt.driven for belt in belts], dtype),
-    )
+    wraps = [belt.driving for belt in belts], [belt.driven for belt in belts]
+    contacts = lane_contact(wraps[0], dtype), lane_contact(wraps[1], dtype)
     _settle_discs(contacts, belts, states)
     found = LaneState(
         LaneArray(n, states[0].fields.shape[0] - tilts, lanes, dtype),

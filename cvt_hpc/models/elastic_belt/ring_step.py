@@ -66,14 +66,10 @@ def ring_work(state: LaneState, belts: Sequence[Belt], rings: Sequence[Rings]) -
     rows, _, lanes = state.fields.data.shape
     dtype, count = state.fields.data.dtype, rings[0].length.size
     constants = lane_rings.lane_rings(belts, rings, dtype)
-    return RingWork(
-        work_space(state, lf.FIELDS_OF_WORK).stations,
-        LaneArray(rows, STRIDE * count + len(FIELDS_OF_STATION), lanes, dtype),
-        constants,
-        constants,
-        LaneArray(rows, count, lanes, dtype),
-        LaneArray(count + 1, len(lane_rings.SUMS), lanes),
-    )
+    stations = work_space(state, lf.FIELDS_OF_WORK).stations
+    layers = LaneArray(rows, STRIDE * count + len(FIELDS_OF_STATION), lanes, dtype)
+    sums = LaneArray(count + 1, len(lane_rings.SUMS), lanes)
+    return RingWork(stations, layers, constants, constants, LaneArray(rows, count, lanes, dtype), sums)
 
 
 def parted_ring_work(work: RingWork, parts: int) -> RingWork:

@@ -157,19 +157,16 @@ class Batch:
         borders = plan.kick, plan.first_judged, kept, self.samples
         last = min(first + samples, *(border for border in borders if border > first))
         whole = sampling.Sampled(self._belt, self.state, self.work.stations)
-        marched = self._belt, self.state, self.work
-        if self._parts > 1:
-            marched = (
-                lane_belt.parted(self._belt, self._parts),
-                lane_belt.parted_state(self.state, self._parts),
-                _parted_work(self.work, self._parts),
-            )
+        belt, state, work, parts = self._belt, self.state, self.work, self._parts
+        if parts > 1:
+            belt, state = lane_belt.parted(belt, parts), lane_belt.parted_state(state, parts)
+            work = _parted_work(work, parts)
         ends = range(first + 1, last + 1) if first >= kept and last > first else [last]
         for end in ends:
             rows = self.done - self._recorded, end - self._recorded
             with plan.profiles_of(self.done) as profiles:
                 into = sampling.Samples(plan.sensing, self.rows, profiles, plan.ended)
-                self._march(*marched, self.step, self.steps_per_sample, whole, into, *rows)
+                self._march(belt, state, work, self.step, self.steps_per_sample, whole, into, *rows)
             self.done = end
 
     def take_over(self, runs: Sequence[Any]) -> None:
