@@ -6,6 +6,7 @@ from typing import Any
 
 Range = tuple[float, float]
 Parameters = Mapping[str, Any]  # flat, of one run [SI]
+Problem = tuple[str, str, str]  # between parameters: key, expected, found
 
 
 @dataclass(frozen=True)

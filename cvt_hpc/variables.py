@@ -39,6 +39,9 @@ class Vibrates(IntEnum):
     IRREGULAR = 4
 
 
+Values = dict[str, Any]  # of a record, by the names of its variables
+Failure = tuple[Status, str]  # how a run ended before its time, and why; a result, if the status is done
+
 LONGEST_REASON = 240  # bytes that a record keeps of the reason
 
 

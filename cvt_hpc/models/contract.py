@@ -39,13 +39,10 @@ import numpy as np
 from cvt_hpc.errors import InputError
 from cvt_hpc.models import MODELS
 from cvt_hpc.parameters import Parameter, Parameters
-from cvt_hpc.variables import Coordinate, Status, Variable
+from cvt_hpc.variables import Coordinate, Failure, Values, Variable
 
 if TYPE_CHECKING:
     import xarray as xr
-
-Values = dict[str, Any]  # of a record, by the names of its variables
-Failure = tuple[Status, str]  # how a run ended before its time, and why; a result, if the status is done
 
 PILOT_SHARE = 0.25  # of a run's simulated time: a forecast runs this part
 

@@ -1,36 +1,19 @@
 """One run: a model marched by a stepper, or solved at once, judged, and turned into a record or a history."""
 
-from cvt_hpc.simulation.record import (
-    declared_record,
-    estimate_cost,
-    forget,
-    lane_groups,
-    may_join,
-    pilot_share,
-    profile_bytes,
-    record_coordinates,
-    record_variables,
-    run_costs,
-    turns,
-)
-from cvt_hpc.simulation.running import Interrupted, alone, run_point, run_points, run_points_keeping, simulate
-
-__all__ = [
-    "declared_record",
-    "Interrupted",
-    "estimate_cost",
-    "forget",
-    "lane_groups",
-    "may_join",
-    "pilot_share",
-    "profile_bytes",
-    "record_coordinates",
-    "record_variables",
-    "run_costs",
-    "run_point",
-    "run_points",
-    "run_points_keeping",
-    "simulate",
-    "alone",
-    "turns",
-]
+from cvt_hpc.simulation.record import declared_record as declared_record
+from cvt_hpc.simulation.record import estimate_cost as estimate_cost
+from cvt_hpc.simulation.record import forget as forget
+from cvt_hpc.simulation.record import lane_groups as lane_groups
+from cvt_hpc.simulation.record import may_join as may_join
+from cvt_hpc.simulation.record import pilot_share as pilot_share
+from cvt_hpc.simulation.record import profile_bytes as profile_bytes
+from cvt_hpc.simulation.record import record_coordinates as record_coordinates
+from cvt_hpc.simulation.record import record_variables as record_variables
+from cvt_hpc.simulation.record import run_costs as run_costs
+from cvt_hpc.simulation.record import turns as turns
+from cvt_hpc.simulation.running import Interrupted as Interrupted
+from cvt_hpc.simulation.running import alone as alone
+from cvt_hpc.simulation.running import run_point as run_point
+from cvt_hpc.simulation.running import run_points as run_points
+from cvt_hpc.simulation.running import run_points_keeping as run_points_keeping
+from cvt_hpc.simulation.running import simulate as simulate

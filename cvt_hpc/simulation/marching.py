@@ -1,6 +1,6 @@
 """Batches marched to their ends, and runs marched together until each has its record.
 
-`OpenRun` is a run on its way to its record, with its next transient and the cost of its earlier ones. Most
+`_OpenRun` is a run on its way to its record, with its next transient and the cost of its earlier ones. Most
 runs are one transient. A run that fails by its numerics is done again from its start at half the step,
 `most_refinements` times at most. A run that is undecided is prolonged to twice its time, and again, as long
 as that is within `longest_duration`; with `shortest_duration` it begins with a part of its duration, at the
@@ -13,13 +13,12 @@ answers of this kind are neither refined nor prolonged.
 import math
 import time
 from collections.abc import Callable, Collection, Sequence
-from typing import Any
 
 from cvt_hpc.job import Job
-from cvt_hpc.models.contract import Batch, load_model
+from cvt_hpc.models.contract import Batch, Run, load_model
 from cvt_hpc.recording import first_duration, longest_duration, sample_count
-from cvt_hpc.simulation.record import blank_record, has_result, in_lanes, record_of, record_without_run
-from cvt_hpc.variables import LONGEST_REASON, Status, Vibrates, shortened
+from cvt_hpc.simulation.record import Point, blank_record, has_result, in_lanes, record_of, record_without_run
+from cvt_hpc.variables import LONGEST_REASON, Status, Values, Vibrates, shortened
 from cvt_hpc.vibration.assessment import is_certain
 from cvt_hpc.vibration.ramped import ramped
 
@@ -27,15 +26,15 @@ _COST = ("core_seconds", "steps", "contact_solves")  # of a record: sums over al
 
 _BETWEEN_POLLS = 0.05  # [s] of computing between checks whether to stop
 
-More = Callable[[], Sequence[dict[str, Any]]]
+More = Callable[[], Sequence[Point]]
 
 
-def no_more() -> Sequence[dict[str, Any]]:
+def no_more() -> Sequence[Point]:
     """Return no points: no runs join."""
     return ()
 
 
-class OpenRun:
+class _OpenRun:
     """A run from its point to its record.
 
     `point` are its flat parameters [SI], `blank` is an empty record of the job, and `is_kept` tells whether
@@ -55,14 +54,14 @@ class OpenRun:
         The transient that counts, where it is kept and there is one.
     """
 
-    def __init__(self, job: Job, point: dict[str, Any], is_kept: bool, blank: dict[str, Any]) -> None:
+    def __init__(self, job: Job, point: Point, is_kept: bool, blank: Values) -> None:
         if not is_kept and point.get("profile_duration"):
             point = point | {"profile_duration": 0.0}  # only histories have profiles over time
         self._job, self._point, self._model = job, point, load_model(job.model)
         self._is_kept, self._blank = is_kept, blank
         self.next, self.paused = self._first(point), None
-        self.record: dict[str, Any] | None = None
-        self.run: Any = None
+        self.record: Values | None = None
+        self.run: Run | None = None
         self._refinements, self._vibrated = 0, False
         self._spent = dict.fromkeys(_COST, 0)
         self.is_preliminary = False
@@ -77,7 +76,7 @@ class OpenRun:
         if preliminary is not None:
             self.next, self.is_preliminary = preliminary, True
 
-    def take(self, run: Any, seconds: float, values: dict[str, Any] | None) -> None:
+    def take(self, run: Run, seconds: float, values: Values | None) -> None:
         """Look at a transient that has ended, and decide whether it counts or which one comes next.
 
         It has taken so many seconds of processor time. Values are as the model judges it; None of a
@@ -101,11 +100,11 @@ class OpenRun:
             self._end(run, record)
 
     @staticmethod
-    def _first(point: dict[str, Any]) -> dict[str, Any]:
+    def _first(point: Point) -> Point:
         """Parameters of the first part of a run that may end early."""
         return point | {"duration": first_duration(point)} if "shortest_duration" in point else point
 
-    def _goes_on(self, run: Any, record: dict[str, Any]) -> bool:
+    def _goes_on(self, run: Run, record: Values) -> bool:
         """Whether more of a run may change its verdict."""
         if record["status"] != Status.DONE:
             return False
@@ -117,11 +116,11 @@ class OpenRun:
             return not is_certain(record, run.parameters, left / self._point["sampling_rate"])
         return bool(record["vibrates"] == Vibrates.UNDECIDED)
 
-    def _begin(self, parameters: dict[str, Any], record: dict[str, Any]) -> None:
+    def _begin(self, parameters: Point, record: Values) -> None:
         self._spent, self._vibrated = {name: record[name] for name in _COST}, False
         self.next, self.paused = parameters, None
 
-    def _end(self, run: Any, record: dict[str, Any]) -> None:
+    def _end(self, run: Run, record: Values) -> None:
         self.run, self.paused = run if self._is_kept else None, None
         self.record = record | {"refinements": self._refinements}
         if self._refinements and record["status"] == Status.FAILED_NUMERICS:
@@ -129,14 +128,14 @@ class OpenRun:
             remedy += _remedy(self._job, self._point)
             self.record["reason"] = shortened(record["reason"], LONGEST_REASON - len(remedy)) + remedy
 
-    def _finer(self, run: Any) -> dict[str, Any] | None:
+    def _finer(self, run: Run) -> Point | None:
         """The point at half the step of a run; None where it has no step, or has been refined enough."""
         if "step" not in self._point or self._refinements >= run.parameters["most_refinements"]:
             return None
         steps = max(math.ceil(run.interval / run.parameters["step"] - 1e-9), 1)
         return self._point | {"step": run.interval / (2 * steps)}
 
-    def _longer(self, run: Any) -> dict[str, Any] | None:
+    def _longer(self, run: Run) -> Point | None:
         """The parameters of a run over twice its time; None where that is too long, or a ramp would end.
 
         The judged part keeps its share, but begins no sooner than the run was prolonged: sums over
@@ -150,10 +149,10 @@ class OpenRun:
         if is_too_long or ramped(p):
             return None
         judged = min(self._point["judged_fraction"], 1.0 - taken / samples)
-        return p | {"duration": duration, "judged_fraction": judged}
+        return {**p, "duration": duration, "judged_fraction": judged}
 
 
-def _remedy(job: Job, point: dict[str, Any]) -> str:
+def _remedy(job: Job, point: Point) -> str:
     """Advice for a run that fails at every step, in words."""
     others = load_model(job.model).steppers
     ways = ['stepper = "explicit"'] if job.stepper == "imex" and "explicit" in others else []
@@ -189,11 +188,11 @@ def march(
 
 def march_runs(
     job: Job,
-    points: Sequence[dict[str, Any]],
+    points: Sequence[Point],
     interrupt: Callable[[], str | None],
     kept: Collection[int] = (),
     more: More = no_more,
-) -> list[tuple[Any, dict[str, Any]]]:
+) -> list[tuple[Run | None, Values]]:
     """Do runs to their records.
 
     All do their first transient, as many together as there are lanes, and so do the runs that join. Then
@@ -221,9 +220,9 @@ def march_runs(
         With the text of `interrupt`.
     """
     blank = blank_record(job)
-    runs = [OpenRun(job, point, place in kept, blank) for place, point in enumerate(points)]
+    runs = [_OpenRun(job, point, place in kept, blank) for place, point in enumerate(points)]
     _march_once(job, runs, interrupt)
-    while joining := [OpenRun(job, point, False, blank) for point in more()]:
+    while joining := [_OpenRun(job, point, False, blank) for point in more()]:
         _march_once(job, joining, interrupt)
         runs += joining
     while any(run.record is None for run in runs):
@@ -231,7 +230,7 @@ def march_runs(
     return [(run.run, run.record) for run in runs]  # type: ignore[misc]  # each has its record now
 
 
-def _march_once(job: Job, runs: Sequence[OpenRun], interrupt: Callable[[], str | None]) -> None:
+def _march_once(job: Job, runs: Sequence[_OpenRun], interrupt: Callable[[], str | None]) -> None:
     """March the next transients of runs that have no record yet to their ends."""
     left = [run for run in runs if run.record is None]
     model = load_model(job.model)
@@ -239,7 +238,7 @@ def _march_once(job: Job, runs: Sequence[OpenRun], interrupt: Callable[[], str |
         _march_together(job, group, interrupt)
 
 
-def _march_together(job: Job, group: Sequence[OpenRun], interrupt: Callable[[], str | None]) -> None:
+def _march_together(job: Job, group: Sequence[_OpenRun], interrupt: Callable[[], str | None]) -> None:
     """March the next transients of a group to their ends."""
     paused = [run.paused for run in group if run.paused is not None]
     model = load_model(job.model)

@@ -4,7 +4,7 @@ Batches are groups of runs that can advance together; their cost is here as well
 """
 
 import time
-from collections.abc import Callable, Iterable, Iterator, Mapping, Sequence
+from collections.abc import Callable, Iterable, Iterator, Sequence
 from functools import partial
 from itertools import pairwise
 from typing import Any, TypeVar
@@ -16,7 +16,7 @@ from cvt_hpc.job.definition import Derived
 from cvt_hpc.job.rules import Noted, places, varied_by
 from cvt_hpc.models.contract import Model, Parameters, Run, load_model
 from cvt_hpc.recording import longest_duration
-from cvt_hpc.variables import LONGEST_REASON, Coordinate, Status, Variable, Vibrates, shortened
+from cvt_hpc.variables import LONGEST_REASON, Coordinate, Status, Values, Variable, Vibrates, shortened
 
 _VERDICT = (
     Variable("status", "", "how the run ended", dtype="i1", flags=Status),
@@ -52,12 +52,13 @@ _MARCH = (
 )
 COMMON = (*_VERDICT, *_COST, *_MARCH)  # of all models; those without a march have none of its
 
-EARLY_SHARE = 0.58  # of the first transient where runs may end at a quarter of it, as measured there, too
-LEFT_SHARE = 1.0  # extra cost of refined and prolonged runs in a map, as measured by lebrecht_2004.toml
+_EARLY_SHARE = 0.58  # of the first transient where runs may end at a quarter of it, as measured there, too
+_LEFT_SHARE = 1.0  # extra cost of refined and prolonged runs in a map, as measured by lebrecht_2004.toml
 _MOST_ESTIMATED = 2_000  # runs whose costs are averaged
 BATCH_SECONDS = 30.0  # of computing in a batch, as predicted: so much a process that dies may lose
 SOLVED_TOGETHER, SOLVED_SECONDS = 64, 0.1  # runs without a march in a batch, and the time [s] of all
 Item = TypeVar("Item")
+Point = dict[str, Any]  # flat parameters of a run [SI]
 
 MOST_TURNS = 16  # groups of lanes in a batch: with more, those of the runs left would be hardly fuller
 
@@ -104,9 +105,9 @@ def record_of(
     job: Job,
     run: Run,
     marched: float,
-    judge: Callable[[Any], dict[str, Any] | None] | None = None,
-    blank: dict[str, Any] | None = None,
-) -> dict[str, Any]:
+    judge: Callable[[Run], Values | None] | None = None,
+    blank: Values | None = None,
+) -> Values:
     """The record of a transient, a run as the model's batch has them, that has ended.
 
     `marched` is the processor time that it has taken [s]. `judge` gives the values of a run that has reached
@@ -122,10 +123,7 @@ def record_of(
             failure = run.numerical_doubt(record)
     if failure is not None and failure[0] is not Status.DONE:
         status, why = failure
-        record = blank | {
-            "status": status,
-            "reason": shortened(f"at {run.time * 1e3:.4g} ms: {why}"),
-        }
+        record = blank | {"status": status, "reason": shortened(f"at {run.time * 1e3:.4g} ms: {why}")}
     return record | {
         "core_seconds": marched + time.process_time() - started,
         "simulated_seconds": run.time,
@@ -140,12 +138,12 @@ def has_result(run: Run) -> bool:
     return run.failure is None or run.failure[0] is Status.DONE
 
 
-def record_without_run(job: Job, values: dict[str, Any]) -> dict[str, Any]:
+def record_without_run(job: Job, values: Values) -> Values:
     """The record of a run that needed no transient."""
     return blank_record(job) | values | {"core_seconds": 0.0, "simulated_seconds": 0.0}
 
 
-def blank_record(job: Job) -> dict[str, Any]:
+def blank_record(job: Job) -> Values:
     """An empty record."""
     sizes = {name: len(c.values) for name, c in record_coordinates(job).items()}
     return {
@@ -169,13 +167,13 @@ def run_costs(job: Job) -> np.ndarray:
     return np.broadcast_to(cost * _allowance(p), job.shape).ravel()
 
 
-def _allowance(p: Mapping[str, Any]) -> Any:
+def _allowance(p: Parameters) -> Any:
     """Cost of a run over that of its first transient, mean of a map: a number or an array of them."""
     if "longest_duration" not in p:
         return 1.0
     goes_on = longest_duration(p) > p["duration"]
-    early = np.where(np.equal(p["shortest_duration"], 0.0), 1.0, EARLY_SHARE)
-    return early + LEFT_SHARE * (goes_on | (p["most_refinements"] > 0))
+    early = np.where(np.equal(p["shortest_duration"], 0.0), 1.0, _EARLY_SHARE)
+    return early + _LEFT_SHARE * (goes_on | (p["most_refinements"] > 0))
 
 
 def _over_the_grid(job: Job, derived: Derived) -> np.ndarray:
@@ -275,7 +273,7 @@ def may_join(job: Job, runs: Sequence[int], others: Sequence[int]) -> bool:
     return model.lane_key(parameters) == model.lane_key(job.point(others[0]))
 
 
-def _batch_size(job: Job, parameters: dict[str, Any]) -> int:
+def _batch_size(job: Job, parameters: Parameters) -> int:
     """Most runs of a batch: several times the lanes, unless a process that dies would lose too much."""
     model = load_model(job.model)
     most = model.lanes(parameters, job.stepper)

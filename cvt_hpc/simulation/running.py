@@ -18,6 +18,7 @@ from cvt_hpc.job.values import POINT_UNITS
 from cvt_hpc.models.contract import Model, load_model
 from cvt_hpc.simulation.marching import Interrupted, More, march_runs, no_more
 from cvt_hpc.simulation.record import (
+    Point,
     blank_record,
     in_lanes,
     record_coordinates,
@@ -25,7 +26,7 @@ from cvt_hpc.simulation.record import (
     recorded_model,
 )
 from cvt_hpc.storage.netcdf import attributes, global_attributes, variable_attributes
-from cvt_hpc.variables import Outcome
+from cvt_hpc.variables import Outcome, Values
 
 if TYPE_CHECKING:
     import xarray as xr
@@ -33,7 +34,7 @@ if TYPE_CHECKING:
     from cvt_hpc.job import Job
 
 
-def run_point(job: Job, point: dict[str, Any], interrupt: Callable[[], str | None]) -> dict[str, Any]:
+def run_point(job: Job, point: Point, interrupt: Callable[[], str | None]) -> Values:
     """Do the run of a point, its flat parameters [SI].
 
     Returns the value of each of `record_variables`. A run that fails has its reason, and no numbers but its
@@ -48,11 +49,8 @@ def run_point(job: Job, point: dict[str, Any], interrupt: Callable[[], str | Non
 
 
 def run_points(
-    job: Job,
-    points: Sequence[dict[str, Any]],
-    interrupt: Callable[[], str | None],
-    more: More = no_more,
-) -> list[dict[str, Any]]:
+    job: Job, points: Sequence[Point], interrupt: Callable[[], str | None], more: More = no_more
+) -> list[Values]:
     """Do several runs that advance together, in the lanes of the processor's registers.
 
     Points are flat parameters of the runs [SI], as `lane_groups` puts them together; `interrupt` and `more`
@@ -69,11 +67,11 @@ def run_points(
 
 def do(
     job: Job,
-    points: Sequence[dict[str, Any]],
+    points: Sequence[Point],
     interrupt: Callable[[], str | None],
     kept: Collection[int] = (),
     more: More = no_more,
-) -> list[tuple[Any, dict[str, Any]]]:
+) -> list[tuple[Any, Values]]:
     """Do a batch of runs as `run_points`; beside each record the input of `histories`, if kept."""
     model = recorded_model(job)
     if job.stepper is None:
@@ -82,8 +80,8 @@ def do(
 
 
 def _solve(
-    job: Job, model: Model, points: Sequence[dict[str, Any]], interrupt: Callable[[], str | None]
-) -> list[tuple[Any, dict[str, Any]]]:
+    job: Job, model: Model, points: Sequence[Point], interrupt: Callable[[], str | None]
+) -> list[tuple[Any, Values]]:
     """Runs of a model without a transient: their records follow from the parameters at once."""
     blank, done = blank_record(job), {}
     for group in in_lanes(model, None, range(len(points)), points.__getitem__, lambda place: None):
@@ -129,9 +127,9 @@ class Alone(NamedTuple):
     """A single run that has ended."""
 
     job: Job
-    point: dict[str, Any]  # parameters [SI]
+    point: Point  # parameters [SI]
     run: Any  # what its histories are made of
-    record: dict[str, Any]  # value of each of `record_variables`
+    record: Values  # value of each of `record_variables`
 
     def outcomes(self) -> list[Outcome]:
         """Return what its record has without a dimension or along one."""
@@ -167,8 +165,8 @@ def alone(job: Job, at: Assignments | None = None) -> Alone:
 
 
 def run_points_keeping(
-    job: Job, points: Sequence[dict[str, Any]], interrupt: Callable[[], str | None], kept: Collection[int]
-) -> tuple[list[dict[str, Any]], dict[int, xr.Dataset]]:
+    job: Job, points: Sequence[Point], interrupt: Callable[[], str | None], kept: Collection[int]
+) -> tuple[list[Values], dict[int, xr.Dataset]]:
     """Do as `run_points`, and return the histories of the runs at some places of `points` as well.
 
     They are datasets as `simulate` returns them, by place.
@@ -178,7 +176,7 @@ def run_points_keeping(
     return [record for _, record in done], histories
 
 
-def _history(job: Job, point: dict[str, Any], run: Any, record: dict[str, Any]) -> xr.Dataset:
+def _history(job: Job, point: Point, run: Any, record: Values) -> xr.Dataset:
     """A run that has ended, or a result without a run, as a dataset."""
     import xarray as xr
 

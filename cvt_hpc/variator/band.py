@@ -1,10 +1,10 @@
 """The band by which a variator is judged: it begins below the first modes of its own strands."""
 
-from collections.abc import Mapping
 from typing import Any
 
 import numpy as np
 
+from cvt_hpc.parameters import Parameters
 from cvt_hpc.physics.geometry import variator
 from cvt_hpc.physics.running_strand import Strand, eigenfrequencies, net_forces
 from cvt_hpc.variator import STRANDS
@@ -14,13 +14,11 @@ from cvt_hpc.vibration.signals import band_amplitude, dominant_frequency
 
 MODES = 5  # of a strand, that are known
 FUNCTIONS = 24  # sines of the Ritz model, which so many modes need
-SLOWER = 0.5  # of the lower first mode: judder is slower, its second harmonic is no first mode
+_SLOWER = 0.5  # of the lower first mode: judder is slower, its second harmonic is no first mode
 LEAST_JERK = 1e-3  # of the driven pulley's speed, amplitude from which it judders
 
 
-def strand_frequencies(
-    parameters: Mapping[str, Any], forces: tuple[float, float] | None = None
-) -> np.ndarray:
+def strand_frequencies(parameters: Parameters, forces: tuple[float, float] | None = None) -> np.ndarray:
     """Eigenfrequencies of both strands as running beams, (strand, MODES) [Hz], by the model `strand`.
 
     `forces` are ring tension less push force of t1 and t2 [N]; else they follow by belt formulas from thrust
@@ -41,9 +39,7 @@ def strand_frequencies(
     return np.array([eigenfrequencies(strand, FUNCTIONS)[:MODES] for strand in strands])
 
 
-def steady_band(
-    parameters: Mapping[str, Any], forces: tuple[float, float] | None = None
-) -> tuple[float, float]:
+def steady_band(parameters: Parameters, forces: tuple[float, float] | None = None) -> tuple[float, float]:
     """Lowest and highest frequency of the modes by which a steady state is judged [Hz].
 
     It is the band of a run that does not judder. Arguments as of `strand_frequencies`.
@@ -64,7 +60,7 @@ def band(run: Any) -> tuple[float, float]:
         return settings.band(p)
     modes = _first_modes(run)
     lowest, highest = float(modes.min()), float(modes.max())
-    judders = bool(np.isfinite(_jerks(run, SLOWER * lowest)))
+    judders = bool(np.isfinite(_jerks(run, _SLOWER * lowest)))
     return settings.lower_edge(p, lowest, highest, judders), p["band_high"]
 
 
@@ -75,10 +71,10 @@ def judder_frequency(run: Any) -> float:
     """
     if _is_given(run.parameters):
         return np.nan
-    return _jerks(run, SLOWER * float(_first_modes(run).min()))
+    return _jerks(run, _SLOWER * float(_first_modes(run).min()))
 
 
-def _is_given(parameters: Mapping[str, Any]) -> bool:
+def _is_given(parameters: Parameters) -> bool:
     """Whether the band of a run follows from its parameters alone."""
     return bool(parameters["band_low"] or ramped(parameters) or "ring_mass" not in parameters)
 

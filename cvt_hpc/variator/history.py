@@ -20,7 +20,7 @@ if TYPE_CHECKING:
 
 REGIONS = ("driving", "t1", "driven", "t2")
 
-OVER_TIME = {
+_OVER_TIME = {
     "load": ("load", "N m", "torque at the driving pulley"),
     "driving_speed": ("driving speed", "rad s-1", "of the driving pulley"),
     "driven_speed": ("driven speed", "rad s-1", "of the driven pulley"),
@@ -56,7 +56,7 @@ def dataset(
     run : object
         With `displacement`, `probes` that have labels and positions, `done`, `interval` and `channel(name)`.
     over_time : mapping
-        By the name of a channel its long name, unit and comment; OVER_TIME are in any case.
+        By the name of a channel its long name, unit and comment; _OVER_TIME are in any case.
     profiles : mapping
         By name the values of means over the judged part (place,), their long name, unit and comment.
     position, regions : (place,) arrays
@@ -66,7 +66,7 @@ def dataset(
 
     moved = attributes("displacement", "m", "transverse, outward")
     variables: dict[str, Any] = {"displacement": (("time", "probe"), run.displacement, moved)}
-    for name, words in {**OVER_TIME, **over_time}.items():
+    for name, words in {**_OVER_TIME, **over_time}.items():
         variables[name.replace(" ", "_")] = ("time", run.channel(name), attributes(*words))
     coordinates = {
         "time": ("time", (1 + np.arange(run.done)) * run.interval, attributes("time", "s")),

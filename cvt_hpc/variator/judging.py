@@ -12,7 +12,7 @@ from typing import Any
 
 import numpy as np
 
-from cvt_hpc.variables import Variable, Vibrates, shortened, values
+from cvt_hpc.variables import Values, Variable, Vibrates, shortened, values
 from cvt_hpc.variator import PULLEYS, STRANDS
 from cvt_hpc.variator.band import band, judder_frequency
 from cvt_hpc.variator.slip import slide, with_slip
@@ -24,10 +24,10 @@ from cvt_hpc.vibration.signals import band_amplitude
 VIBRATION = tuple(
     replace(v, early=True, may_miss=v in ramp.VARIABLES) for v in (*assessment.VARIABLES, *ramp.VARIABLES)
 )
-LOCKED = 0.1  # of the resolution 1/L: how far a line of judder's may lie from a multiple of its frequency
-REGULAR = 1e-8  # keeps the matrix of multiples regular where the last one lies at half the sampling rate
-COMB = 0.5  # of that line: least height of the multiple before it
-RAMPED_CHANNELS = {"load": "load", "speed": "driving_speed"}  # by the ramped quantity, if not the time
+_LOCKED = 0.1  # of the resolution 1/L: how far a line of judder's may lie from a multiple of its frequency
+_REGULAR = 1e-8  # keeps the matrix of multiples regular where the last one lies at half the sampling rate
+_COMB = 0.5  # of that line: least height of the multiple before it
+_RAMPED_CHANNELS = {"load": "load", "speed": "driving_speed"}  # by the ramped quantity, if not the time
 
 
 def assess(
@@ -49,8 +49,8 @@ def with_judder(run: Any, found: assessment.Occurrence) -> assessment.Occurrence
     """The verdict on a run whose driven pulley judders: harmonics of judder are no vibration of the belt.
 
     A run does not vibrate where the strongest line of each strand above the threshold is a multiple of the
-    judder's frequency, twice it or more, within LOCKED/L, L being the length of the judged part, and rises
-    out of the multiple before it by no more than 1/COMB, and where the strands are below the threshold
+    judder's frequency, twice it or more, within _LOCKED/L, L being the length of the judged part, and rises
+    out of the multiple before it by no more than 1/_COMB, and where the strands are below the threshold
     without all multiples up to the band's end. A vibration of the belt that is locked to judder rises by
     three and more. Amplitudes stay as they are; nothing else is decided by them. Probes are columns of the
     displacement.
@@ -64,7 +64,7 @@ def with_judder(run: Any, found: assessment.Occurrence) -> assessment.Occurrence
     above = np.flatnonzero(found.amplitude >= threshold)
     orders, highest = found.strongest_frequency[above] / slow, np.floor(p["band_high"] / slow)
     off = np.abs(orders - np.round(orders)) * slow * len(moved) / rate
-    if not np.all((off <= LOCKED) & (np.round(orders) >= 2.0) & (np.round(orders) <= highest)):
+    if not np.all((off <= _LOCKED) & (np.round(orders) >= 2.0) & (np.round(orders) <= highest)):
         return found
     nearest = np.round(orders).astype(int)
     parts, fitted = multiples(moved, slow / rate, int(highest))
@@ -73,7 +73,7 @@ def with_judder(run: Any, found: assessment.Occurrence) -> assessment.Occurrence
         return found
     heights = np.abs(parts[1:, above])  # (multiple, strand above the threshold)
     of_strand = np.arange(above.size)
-    if np.any(heights[nearest - 2, of_strand] < COMB * heights[nearest - 1, of_strand]):
+    if np.any(heights[nearest - 2, of_strand] < _COMB * heights[nearest - 1, of_strand]):
         return found
     told = [
         f"{found.strands[k]} by {found.amplitude[k] * 1e6:.3g} um at its harmonic {order}"
@@ -100,7 +100,7 @@ def multiples(moved: np.ndarray, slow: float, highest: int) -> tuple[np.ndarray,
     turn = np.exp(2j * np.pi * slow)
     sums = czt(moved, highest + 1, 1.0 / turn, axis=0)
     column = czt(np.ones(len(moved)), 2 * highest + 1, 1.0 / turn)
-    column[0] *= 1.0 + REGULAR
+    column[0] *= 1.0 + _REGULAR
     both = np.concatenate([sums[:0:-1].conj(), sums])
     parts = solve_toeplitz(column, both)[highest:]
     parts[1:] *= 2.0
@@ -115,7 +115,7 @@ def _assess_ramp(run: Any, names: Sequence[str]) -> ramp.RampOccurrence | None:
     if quantity == "time":
         values = (np.arange(first, first + len(moved)) + 1.0) / rate
     else:
-        values = run.channel(RAMPED_CHANNELS[quantity])[first:]
+        values = run.channel(_RAMPED_CHANNELS[quantity])[first:]
     found = ramp.assess_ramp(moved, rate, strands, quantity, values, run.samples - first, p)
     return found and replace(found, strongest_probe=columns[found.strongest_probe])
 
@@ -127,13 +127,13 @@ def _on_strands(run: Any, names: Sequence[str]) -> tuple[np.ndarray, list[str]]:
     return np.array(columns), [regions[k] for k in columns]
 
 
-def slipped_through(run: Any) -> dict[str, Any]:
+def slipped_through(run: Any) -> Values:
     """The verdict on a run that has slipped through before its end."""
     status, why = run.failure
     return {"status": status, "vibrates": Vibrates.SLIPS, "reason": f"at {run.time * 1e3:.4g} ms: {why}"}
 
 
-def judge(run: Any, variables: Sequence[Variable], names: Sequence[str] = STRANDS) -> dict[str, Any]:
+def judge(run: Any, variables: Sequence[Variable], names: Sequence[str] = STRANDS) -> Values:
     """The record of a run that has reached its end, or slipped through before, its cost apart."""
     if run.failure is None:
         return finished(run, variables, assess(run, names))
@@ -144,6 +144,6 @@ def judge(run: Any, variables: Sequence[Variable], names: Sequence[str] = STRAND
     return record | values((v for v in variables if v.early), Measured(run, slide(run), before))
 
 
-def finished(run: Any, variables: Sequence[Variable], found: assessment.Occurrence) -> dict[str, Any]:
+def finished(run: Any, variables: Sequence[Variable], found: assessment.Occurrence) -> Values:
     """The record of a run that has reached its end, and of which the verdict is found."""
     return found.verdict() | values(variables, Measured(run, run.judged, found))

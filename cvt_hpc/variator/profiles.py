@@ -12,18 +12,13 @@ from typing import Any
 
 import numpy as np
 
-from cvt_hpc.parameters import Column, FromFile, Parameter, Parameters, RowError
+from cvt_hpc.parameters import Column, FromFile, Parameter, Parameters, Problem, RowError
 from cvt_hpc.variator.scene import course_problems, nested_problems
 
 TIME = "profile_time"
 FILE = "profile_file"
-_WHAT = {
-    "load": "load",
-    "driving_speed": "driving_speed",
-    "thrust": "thrust",
-    "driving_thrust": "driving_thrust",
-    "ratio": "ratio, by the position of the driving sheave, which moves; from 1 on",
-}
+# of a profile whose name does not say it all
+_WORDS = {"ratio": "ratio, by the position of the driving sheave, which moves; from 1 on"}
 _UNITS = {  # of a file's columns
     "load": "N m",
     "driving_speed": "rad/s",
@@ -63,7 +58,7 @@ def declared(names: Sequence[str], of_file: Sequence[str]) -> dict[str, Paramete
         FILE: Parameter("", "", text, file=file),
         TIME: Parameter((), "s", "times of the profiles, ascending", sensible=(1e-4, 2000.0)),
         **{
-            f"{name}_profile": Parameter((), "", f"multiples at these times of {_WHAT[name]}")
+            f"{name}_profile": Parameter((), "", f"multiples at these times of {_WORDS.get(name, name)}")
             for name in names
         },
     }
@@ -142,7 +137,7 @@ def extremes(parameters: Parameters, name: str) -> tuple[float, float]:
     return min(values), max(values)
 
 
-def profile_problems(parameters: Parameters) -> list[tuple[str, str, str]]:
+def profile_problems(parameters: Parameters) -> list[Problem]:
     """Return problems of courses in time, in the form of a model's check: (key, expected, found)."""
     p, found = parameters, course_problems(parameters)
     profiles = {key: p[key] for key in p if key.endswith("_profile") and p[key]}

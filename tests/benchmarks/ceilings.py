@@ -21,17 +21,15 @@ from cvt_hpc.kernels import kernel
 from cvt_hpc.lanes import LaneArray, fma, like, rings
 from cvt_hpc.models.elastic_belt import (
     imex,
-    imex_bending,
     imex_stations,
-    imex_system,
     lane_column,
     lane_forces,
     pulley_step,
     pulleys,
 )
 from cvt_hpc.models.elastic_belt import lane_fields as lf
-from cvt_hpc.models.elastic_belt.batch import PRECISIONS, Batch
 from cvt_hpc.models.elastic_belt.step_choice import REFERENCE_STEP as STEP
+from cvt_hpc.models.elastic_belt.transient import PRECISIONS, Batch
 from cvt_hpc.physics import compliance, flank, friction
 from cvt_hpc.variator import course
 
@@ -181,7 +179,7 @@ def count(step: float, precision: str) -> collections.Counter:
     batch.advance(700)
     functions = _counting_functions(7 if precision == "single" else 13)
     kept = []
-    of_step = imex, imex_bending, imex_stations, imex_system, pulley_step
+    of_step = imex, imex_stations, pulley_step
     for module in (*of_step, lane_forces, lane_column, pulleys, course, compliance, flank, friction, rings):
         for name, thing in list(vars(module).items()):
             plain = functions.get(name) or getattr(thing, "py_func", None)

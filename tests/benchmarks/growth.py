@@ -10,8 +10,8 @@ from pathlib import Path
 
 sys.path.insert(0, str(Path(__file__).parents[1]))
 
+from cvt_hpc.models.elastic_belt import PARAMETERS
 from cvt_hpc.models.elastic_belt.belt import mesh
-from cvt_hpc.models.elastic_belt.parameters import PARAMETERS
 from cvt_hpc.models.linear_stability.branch import branch
 from cvt_hpc.models.steady_variator.walking import SteadyBelt
 from support.growing import measured

@@ -84,7 +84,7 @@ def _witness(folder: str) -> int:
 
 @functools.cache
 def _belt() -> Any:
-    from cvt_hpc.models.elastic_belt.batch import Batch
+    from cvt_hpc.models.elastic_belt.transient import Batch
 
     job = build_job(
         {"name": "peers", "model": "elastic_belt", "stepper": "imex"},

@@ -17,8 +17,7 @@ from scipy.linalg import eigvals
 from cvt_hpc.models.elastic_belt.belt import mesh
 from cvt_hpc.models.elastic_belt.one_system import flat_belt, pack, rates
 from cvt_hpc.models.quasi_static_belt import PARAMETERS
-from cvt_hpc.models.quasi_static_belt.basis import split_basis
-from cvt_hpc.models.quasi_static_belt.split_belt import lag_drag, layer_shares
+from cvt_hpc.models.quasi_static_belt.split_belt import lag_drag, layer_shares, split_basis
 from cvt_hpc.models.steady_variator.equations import LATE
 from cvt_hpc.models.steady_variator.linearised import Linearisation
 from cvt_hpc.models.steady_variator.walking import NoSteadyState, SteadyBelt

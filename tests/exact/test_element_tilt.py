@@ -7,7 +7,7 @@ from cvt_hpc.errors import InputError
 from cvt_hpc.job import build_job
 from cvt_hpc.models.elastic_belt import fields as f
 from cvt_hpc.models.elastic_belt.belt import belt_constants, initial_state
-from cvt_hpc.models.elastic_belt.element_tilt import tilt_rate, tilted_sliding
+from cvt_hpc.models.elastic_belt.column import tilt_rate, tilted_sliding
 from support.fast_runs import march, march_fast
 from support.lone import Transient
 from support.marched import job, record

@@ -7,7 +7,7 @@ from cvt_hpc.models.elastic_belt import fields as f
 from cvt_hpc.models.elastic_belt import lane_fields as lf
 from cvt_hpc.models.elastic_belt.belt import belt_constants, initial_state
 from cvt_hpc.models.elastic_belt.bending import second_difference
-from cvt_hpc.models.elastic_belt.imex_bending import (
+from cvt_hpc.models.elastic_belt.imex_stations import (
     DAMPED,
     IMPLICIT,
     LAG_SHARE,
@@ -76,10 +76,10 @@ def test_increments_are_those_of_the_dense_system(step, parts):
 
     for field, values in ((lf.ACROSS, force), (lf.MASS_ACROSS, heavy), (lf.CROSS, cross)):
         put(field, values)
-    coupled = move_across(belt, state, work, step)
+    coupled = move_across(belt, state, work.stations, step)
     first, right = found(lf.PUSH).copy(), found(lf.Y_0).copy()
     put(lf.DV_0, layers)
-    move_with_layers(belt, state, work, coupled)
+    move_with_layers(belt, state, work.stations, coupled)
     for one, pushed, share, both in zip(belts, first, right, found(lf.PUSH), strict=True):
         wanted = expected(one, step, force, heavy, cross, layers)
         size = np.abs(wanted).max()

@@ -7,7 +7,7 @@ import pytest
 
 from cvt_hpc.models.auto.rules import Rung, coarse, is_passive, is_settled
 from cvt_hpc.models.elastic_belt import transient
-from cvt_hpc.models.elastic_belt.batch import LaneRun
+from cvt_hpc.models.elastic_belt.transient import LaneRun
 from cvt_hpc.printing import outcome_lines
 from cvt_hpc.simulation import (
     estimate_cost,

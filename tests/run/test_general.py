@@ -5,9 +5,8 @@ from functools import cache
 import numpy as np
 import pytest
 
-from cvt_hpc.models.elastic_belt.general_run import GeneralTransient
+from cvt_hpc.models.elastic_belt.general_run import GeneralTransient, SparseJacobian, groups, pattern
 from cvt_hpc.models.elastic_belt.one_system import flat_belt, pack, system
-from cvt_hpc.models.elastic_belt.sparsity import SparseJacobian, groups, pattern
 from cvt_hpc.variables import Status
 from support.equations import slopes
 from support.lone import Transient

@@ -11,8 +11,7 @@ from cvt_hpc.kernels import called_alike
 from cvt_hpc.models.elastic_belt.belt import mesh
 from cvt_hpc.models.elastic_belt.one_system import rates, system
 from cvt_hpc.models.linear_stability.branch import branch, onsets
-from cvt_hpc.models.linear_stability.modes import DECAY, HIGH, LOW, loosened, modes
-from cvt_hpc.models.linear_stability.spectrum import eigenpairs
+from cvt_hpc.models.linear_stability.modes import DECAY, HIGH, LOW, eigenpairs, loosened, modes
 from cvt_hpc.models.steady_variator.linearised import Linearisation
 from cvt_hpc.models.steady_variator.walking import SteadyBelt
 from cvt_hpc.study import open_results, run

@@ -11,14 +11,17 @@ from cvt_hpc.models.elastic_belt.belt import belt_constants, initial_state, mesh
 from cvt_hpc.models.elastic_belt.one_system import flat_belt
 from cvt_hpc.models.elastic_belt.one_system import pack as flat_pack
 from cvt_hpc.models.elastic_belt.one_system import rates as flat_rates
-from cvt_hpc.models.quasi_static_belt.basis import (
+from cvt_hpc.models.quasi_static_belt.coupled import chain, solve_chain, solve_dense
+from cvt_hpc.models.quasi_static_belt.split_belt import (
+    motion,
     own_frequencies,
+    refresh,
     splines_of_belt,
     split_basis,
+    split_belt,
     transverse_stiffness,
+    work_space,
 )
-from cvt_hpc.models.quasi_static_belt.coupled import chain, solve_chain, solve_dense
-from cvt_hpc.models.quasi_static_belt.split_belt import motion, refresh, split_belt, work_space
 from cvt_hpc.models.quasi_static_belt.step import march
 from cvt_hpc.models.quasi_static_belt.transient import batch
 from support.rungs import rung_job

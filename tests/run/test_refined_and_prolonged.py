@@ -8,8 +8,8 @@ import pytest
 
 from cvt_hpc.errors import InputError, NoEffectWarning
 from cvt_hpc.job import build_job
-from cvt_hpc.models.elastic_belt.batch import Batch, LaneRun
 from cvt_hpc.models.elastic_belt.general_run import GeneralTransient
+from cvt_hpc.models.elastic_belt.transient import Batch, LaneRun
 from cvt_hpc.models.marched import BatchOfOne
 from cvt_hpc.models.oscillator.transient import Transient as Oscillator
 from cvt_hpc.simulation import Interrupted, marching, run_point, run_points, simulate

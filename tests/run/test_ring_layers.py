@@ -14,10 +14,12 @@ from cvt_hpc.models.elastic_belt.one_system import flat_belt
 from cvt_hpc.models.elastic_belt.one_system import pack as pack_one
 from cvt_hpc.models.elastic_belt.one_system import rates as rates_of_one
 from cvt_hpc.models.elastic_belt.record import judge
-from cvt_hpc.models.elastic_belt.ring_system import flat_rings, pack, rates
 from cvt_hpc.models.elastic_belt.rings import (
     FIRST_LAYER,
+    flat_rings,
     layer_rates,
+    pack,
+    rates,
     ring_constants,
     surface_friction,
     unite_layers,

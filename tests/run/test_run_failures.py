@@ -8,8 +8,8 @@ import pytest
 from cvt_hpc import simulation
 from cvt_hpc.job import build_job
 from cvt_hpc.models.elastic_belt import lane_fields as lf
-from cvt_hpc.models.elastic_belt.batch import Batch
 from cvt_hpc.models.elastic_belt.sampling import Outcome
+from cvt_hpc.models.elastic_belt.transient import Batch
 from cvt_hpc.models.elastic_belt.validity import FAILURES, LARGEST_POWER_RESIDUAL
 from cvt_hpc.physics import compliance
 from cvt_hpc.simulation import record_variables, run_point

@@ -5,11 +5,10 @@ import pytest
 
 from cvt_hpc.errors import InputError
 from cvt_hpc.models.elastic_belt import inert
-from cvt_hpc.models.elastic_belt.bending_settings import bending_inert
+from cvt_hpc.models.elastic_belt.belt_settings import belt_inert
 from cvt_hpc.models.elastic_belt.deflection_settings import CONE, MODE_FILES, MODE_KEYS, RITZ, TABLE_KEYS
 from cvt_hpc.models.elastic_belt.pulley_checks import pulley_inert
-from cvt_hpc.models.elastic_belt.ring_settings import ring_inert
-from cvt_hpc.models.elastic_belt.tilt_settings import tilt_inert
+from cvt_hpc.models.elastic_belt.pulley_settings import PULLEY_DEFAULTS
 from cvt_hpc.simulation import record_variables
 from support.marched import fresh_record, job
 
@@ -36,10 +35,8 @@ OTHER = {
 }
 # of pulleys, rings, discs and elements as they are in every scene here
 AT_REST = (
-    pulley_inert({})
-    | ring_inert({})
-    | bending_inert({})
-    | tilt_inert({})
+    pulley_inert(PULLEY_DEFAULTS)
+    | belt_inert({})
     | dict.fromkeys([*CONE, *TABLE_KEYS, *RITZ, *MODE_KEYS, *MODE_FILES], "sheave_deformation bending")
 )
 CASES = [

@@ -6,14 +6,14 @@ from functools import cache
 import numpy as np
 import pytest
 
+from cvt_hpc.models.elastic_belt import PARAMETERS
 from cvt_hpc.models.elastic_belt import fields as f
 from cvt_hpc.models.elastic_belt import lane_fields as lf
-from cvt_hpc.models.elastic_belt.batch import Batch
 from cvt_hpc.models.elastic_belt.belt import belt_constants, initial_state
 from cvt_hpc.models.elastic_belt.grouping import ALONE_SHARE, SHARED, cost, lane_key
 from cvt_hpc.models.elastic_belt.lane_belt import parts_of
-from cvt_hpc.models.elastic_belt.parameters import PARAMETERS
 from cvt_hpc.models.elastic_belt.sampling import Outcome
+from cvt_hpc.models.elastic_belt.transient import Batch
 from cvt_hpc.physics import compliance
 from cvt_hpc.simulation import lane_groups, run_point, run_points
 from cvt_hpc.simulation.record import MOST_TURNS

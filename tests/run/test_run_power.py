@@ -7,10 +7,10 @@ stations, judged over 40 ms, these are 10 W: 0.03 % of the power of a loaded bel
 import numpy as np
 import pytest
 
-from cvt_hpc.models.elastic_belt import fields, power_terms
+from cvt_hpc.models.elastic_belt import fields
 from cvt_hpc.models.elastic_belt.belt import State, belt_constants
+from cvt_hpc.models.elastic_belt.fields import LOSSES, POWERS
 from cvt_hpc.models.elastic_belt.lane_belt import take_lane
-from cvt_hpc.models.elastic_belt.power_terms import LOSSES, POWERS
 from cvt_hpc.models.elastic_belt.rhs import strains
 from cvt_hpc.models.elastic_belt.sampling import Outcome
 from cvt_hpc.models.elastic_belt.validity import power_limit
@@ -176,12 +176,10 @@ def powers_and_storing(state, **values):
     now, rates, works = _audited(belt, state), [], []
     for step in (TINY, 2 * TINY):
         after = march("explicit", belt, state, step, 1)
-        rates.append(
-            (_audited(belt, after)[power_terms.STORED_ENERGY] - now[power_terms.STORED_ENERGY]) / step
-        )
+        rates.append((_audited(belt, after)[fields.STORED_ENERGY] - now[fields.STORED_ENERGY]) / step)
         works.append(after.scalars[fields.LAYER_WORK] / step)
     # extrapolated to step 0; the dampers' loss is their work in steps
-    powers = dict(zip(POWERS, now, strict=True)) | {POWERS[power_terms.LAYER_LOSS]: 2 * works[0] - works[1]}
+    powers = dict(zip(POWERS, now, strict=True)) | {POWERS[fields.LAYER_LOSS]: 2 * works[0] - works[1]}
     return powers, 2 * rates[0] - rates[1]
 
 

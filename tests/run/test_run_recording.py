@@ -7,7 +7,7 @@ from hypothesis import strategies as st
 
 from cvt_hpc import recording
 from cvt_hpc.errors import InputError
-from cvt_hpc.models.elastic_belt import parameters as belt
+from cvt_hpc.models import elastic_belt as belt
 from cvt_hpc.models.elastic_belt.record import coordinates
 from cvt_hpc.vibration import settings as vibration_settings
 from cvt_hpc.vibration.assessment import assess

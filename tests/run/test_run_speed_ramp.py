@@ -4,7 +4,7 @@ import numpy as np
 import pytest
 
 from cvt_hpc.errors import InputError
-from cvt_hpc.models.elastic_belt.batch import Batch
+from cvt_hpc.models.elastic_belt.transient import Batch
 from cvt_hpc.variables import Status, Vibrates
 from support.marched import balance, finished, job, mean, record
 

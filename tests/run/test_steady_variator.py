@@ -12,16 +12,14 @@ from cvt_hpc.models.elastic_belt import fields as f
 from cvt_hpc.models.elastic_belt.belt import belt_constants, initial_state, mesh
 from cvt_hpc.models.elastic_belt.one_system import flat_belt, pack, rates
 from cvt_hpc.models.elastic_belt.sampling import Outcome
-from cvt_hpc.models.steady_variator import curve, first_states
-from cvt_hpc.models.steady_variator.continuation import OWN, Continuation
+from cvt_hpc.models.steady_variator import OF_THE_COURSE, curve, first_states
+from cvt_hpc.models.steady_variator.continuation import OWN, Continuation, mean_size, newton
 from cvt_hpc.models.steady_variator.curve import Curve, Piece, determinant_sign
 from cvt_hpc.models.steady_variator.equations import Equations
-from cvt_hpc.models.steady_variator.first_states import FirstStates, least_sliding
+from cvt_hpc.models.steady_variator.first_states import FirstStates, SlipsThrough, least_sliding
 from cvt_hpc.models.steady_variator.forces import distributions
-from cvt_hpc.models.steady_variator.newton import mean_size, newton
-from cvt_hpc.models.steady_variator.parameters import OF_THE_COURSE
 from cvt_hpc.models.steady_variator.record import Found, judge, quantities
-from cvt_hpc.models.steady_variator.walking import NoSteadyState, SlipsThrough, SteadyBelt
+from cvt_hpc.models.steady_variator.walking import NoSteadyState, SteadyBelt
 from cvt_hpc.physics.capacity import carried_torque
 from cvt_hpc.variables import Status, Vibrates
 from cvt_hpc.variator import GROSS_SLIP

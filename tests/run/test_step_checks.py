@@ -11,11 +11,10 @@ import pytest
 from cvt_hpc.errors import InputError
 from cvt_hpc.job import build_job
 from cvt_hpc.models.auto.rules import coarse
+from cvt_hpc.models.elastic_belt import check
 from cvt_hpc.models.elastic_belt import fields as f
 from cvt_hpc.models.elastic_belt import lane_fields as lf
-from cvt_hpc.models.elastic_belt.belt import belt_constants, initial_state
-from cvt_hpc.models.elastic_belt.parameters import check
-from cvt_hpc.models.elastic_belt.recorded_run import recording
+from cvt_hpc.models.elastic_belt.belt import belt_constants, initial_state, mesh
 from cvt_hpc.models.elastic_belt.step_choice import REFERENCE_STEP, SAFE_SHARE, chosen_step, transverse_limit
 from cvt_hpc.models.elastic_belt.validity import doubt, step_doubt
 from cvt_hpc.variables import Status
@@ -95,7 +94,7 @@ def test_a_belt_beyond_its_stable_step_is_never_said_to_vibrate(values):
 def test_the_limit_of_the_step_is_the_shortest_wave_s():
     # a wave of two cells alone, w^2 = 4 F / (m h^2), when contact is small beside it; bending is implicit
     point = job(bending_stiffness=500.0, flank_stiffness=1e3).point(0)
-    grid = recording(point, np.float64).mesh
+    grid = mesh(point)
     force = 2.0 * np.tan(point["half_wedge_angle"]) * point["thrust"] / grid.path.driven_wrap
     assert transverse_limit(point) == pytest.approx(grid.cell.min() / np.sqrt(force / 1.3), rel=1e-3)
 
@@ -108,10 +107,10 @@ def test_a_step_beyond_the_limit_is_named():
 
 def test_speeds_that_alternate_from_step_to_step_are_no_result():
     point = job().point(0)
-    mesh, ripple = recording(point, np.float64).mesh, 0.5 * point["most_step_ripple"]
+    grid, ripple = mesh(point), 0.5 * point["most_step_ripple"]
     sound = {"power_residual": 1e-4, "least_strand_force": 1e3, "step_ripple": ripple}
-    assert doubt(sound, point, mesh) is None
-    status, why = doubt(sound | {"step_ripple": 20e-3}, point, mesh)
+    assert doubt(sound, point, grid) is None
+    status, why = doubt(sound | {"step_ripple": 20e-3}, point, grid)
     assert status is Status.FAILED_NUMERICS and "from step to step, by 20 mm/s" in why
 
 

@@ -4,7 +4,7 @@ from __future__ import annotations
 
 from cvt_hpc.models.elastic_belt.belt import Belt, State
 from cvt_hpc.models.elastic_belt.sampling import Outcome
-from cvt_hpc.models.elastic_belt.state_march import StateMarch as FastRuns
+from cvt_hpc.models.elastic_belt.transient import StateMarch as FastRuns
 
 __all__ = ["FastRuns", "march", "march_fast"]
 

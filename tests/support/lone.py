@@ -3,7 +3,7 @@
 from collections.abc import Mapping
 from typing import Any
 
-from cvt_hpc.models.elastic_belt.batch import Batch, LaneRun
+from cvt_hpc.models.elastic_belt.transient import Batch, LaneRun
 from cvt_hpc.variables import Status
 
 

@@ -6,8 +6,8 @@ from typing import Any
 import numpy as np
 
 from cvt_hpc.job import Job
-from cvt_hpc.models.elastic_belt.batch import LaneRun
 from cvt_hpc.models.elastic_belt.record import judge
+from cvt_hpc.models.elastic_belt.transient import LaneRun
 from cvt_hpc.simulation import record_variables, run_point
 from cvt_hpc.simulation.marching import march_runs
 from support.lone import Transient

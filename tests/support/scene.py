@@ -8,7 +8,7 @@ from collections.abc import Mapping
 from types import MappingProxyType
 from typing import Any
 
-from cvt_hpc.models.elastic_belt.parameters import PARAMETERS
+from cvt_hpc.models.elastic_belt import PARAMETERS
 
 # [SI]; of all belts on sheaves, and of the elastic one
 OF_BELTS = {"transverse_damping": 500.0, "friction_memory": 0.3e-3, "tilt_lag": 0.0}

@@ -8,7 +8,7 @@ import pytest
 from cvt_hpc import simulation
 from cvt_hpc.job import build_job
 from cvt_hpc.models.elastic_belt import grouping
-from cvt_hpc.models.elastic_belt.batch import LaneRun
+from cvt_hpc.models.elastic_belt.transient import LaneRun
 from cvt_hpc.simulation import record
 from cvt_hpc.study import open_results, run
 from cvt_hpc.variables import Status, Vibrates

@@ -5,7 +5,7 @@ from types import SimpleNamespace
 import numpy as np
 import pytest
 
-from cvt_hpc.models.elastic_belt.parameters import PARAMETERS
+from cvt_hpc.models.elastic_belt import PARAMETERS
 from cvt_hpc.physics.friction import friction_law
 from cvt_hpc.physics.geometry import variator
 from cvt_hpc.variables import Vibrates, values

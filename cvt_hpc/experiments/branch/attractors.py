@@ -134,7 +134,7 @@ class _AtRest(NamedTuple):
 
 def _at_rest(batch: Any, state: State) -> _AtRest:
     """Return a run in a state, at the time when its strands are disturbed and the load has risen."""
-    done = batch.plan.kick
+    done = batch.records.kick
     state = state.copy()
     state.scalars[f.TIME] = done * batch.interval
     return _AtRest(done, state.scalars[f.TIME], state)

@@ -2,14 +2,13 @@
 
 from __future__ import annotations
 
-from collections.abc import Mapping
 from typing import TYPE_CHECKING, Any
 
 from cvt_hpc.models.auto.rules import COARSENESS, SHARE, Rung, coarse, is_clear, is_passive, is_settled
 from cvt_hpc.models.elastic_belt import grouping
 from cvt_hpc.models.elastic_belt import record as belt_record
-from cvt_hpc.models.elastic_belt.record import coordinates, lane_key, lanes
-from cvt_hpc.variables import Status, Variable, Vibrates, shortened
+from cvt_hpc.parameters import Parameters
+from cvt_hpc.variables import Status, Values, Variable, Vibrates, shortened
 from cvt_hpc.variator import judging
 
 if TYPE_CHECKING:
@@ -17,19 +16,6 @@ if TYPE_CHECKING:
 
     from cvt_hpc.models.elastic_belt.recorded_run import RecordedRun
     from cvt_hpc.vibration.assessment import Occurrence
-
-__all__ = [
-    "VARIABLES",
-    "coordinates",
-    "cost",
-    "histories",
-    "judge",
-    "known",
-    "lane_key",
-    "lanes",
-    "preliminary",
-    "settle",
-]
 
 VARIABLES = (
     Variable("rung", "", "model of the ladder that answered", dtype="i1", flags=Rung),
@@ -41,16 +27,16 @@ VARIABLES = (
     *belt_record.VARIABLES,
 )
 PILOT_SHARE = 1.0  # of a run's time that a pilot does: a shorter run would use another model
-REFINED = 0.2  # of the runs are done in full, more of them in a trace
+_REFINED = 0.2  # of the runs are done in full, more of them in a trace
 
 
-def cost(parameters: Mapping[str, Any], stepper: str) -> Any:
+def cost(parameters: Parameters, stepper: str) -> Any:
     """Core-seconds of runs that fill the lanes once."""
     coarse = COARSENESS**2 * SHARE
-    return (coarse + REFINED) * grouping.cost(parameters, stepper)
+    return (coarse + _REFINED) * grouping.cost(parameters, stepper)
 
 
-def known(parameters: Mapping[str, Any]) -> dict[str, Any] | None:
+def known(parameters: Parameters) -> Values | None:
     """The values of a run that needs no transient; None where it does.
 
     Parameters
@@ -64,10 +50,11 @@ def known(parameters: Mapping[str, Any]) -> dict[str, Any] | None:
     return {"status": Status.DONE, "vibrates": Vibrates.NO, "reason": reason, "rung": Rung.PASSIVE}
 
 
+coordinates, lane_key, lanes = belt_record.coordinates, grouping.lane_key, grouping.lanes
 preliminary = coarse
 
 
-def settle(run: RecordedRun) -> dict[str, Any] | None:
+def settle(run: RecordedRun) -> Values | None:
     """The values of a coarse run if it answers the question, else None.
 
     Parameters
@@ -87,14 +74,14 @@ def settle(run: RecordedRun) -> dict[str, Any] | None:
     return values
 
 
-def judge(run: RecordedRun) -> dict[str, Any]:
+def judge(run: RecordedRun) -> Values:
     """The record of a full run that has reached its end, or slipped through before, its cost apart."""
     if run.failure is not None:
         return belt_record.judge(run) | {"rung": Rung.FULL}
     return _values(run, judging.assess(run), Rung.FULL)
 
 
-def _values(run: RecordedRun, found: Occurrence, rung: Rung) -> dict[str, Any]:
+def _values(run: RecordedRun, found: Occurrence, rung: Rung) -> Values:
     return judging.finished(run, belt_record.VARIABLES, found) | {"rung": rung, "margin": found.margin}
 
 

@@ -35,7 +35,7 @@ from cvt_hpc.vibration.ramped import ramped
 
 COARSENESS = 0.6  # stations of the coarse run over those of the full one, and its inverse for the step
 SHARE = 0.3  # of the duration
-CARRIED_SHARE = 0.5  # of the torque that rigid pulleys carry; belts judder from 0.65, slip at 0.7
+_CARRIED_SHARE = 0.5  # of the torque that rigid pulleys carry; belts judder from 0.65, slip at 0.7
 
 
 class Rung(IntEnum):
@@ -47,15 +47,14 @@ class Rung(IntEnum):
     FULL = 3
 
 
-def is_passive(parameters: Parameters) -> bool:
+def is_passive(p: Parameters) -> bool:
     """Whether friction nowhere falls with speed and carries the load by far, and forces are not requested."""
-    p = parameters
     is_table = p["friction_law"] == "table"
     falls = bool(np.any(np.diff(p["table_mu"]) < 0.0)) if is_table else p["friction_gradient"] != 0.0
     if p["profile_time"]:
         return False
     loads = [p["load"]] if p["load_history"] == "constant" else [p["load"], p["load_start"]]
-    is_carried = max(map(abs, loads)) <= CARRIED_SHARE * carried_torque(p)
+    is_carried = max(map(abs, loads)) <= _CARRIED_SHARE * carried_torque(p)
     return bool(p["question"] != "forces" and not falls and is_carried)
 
 

@@ -1,5 +1,5 @@
 """The transients that answer: those of the elastic belt, coarse or in full."""
 
-from cvt_hpc.models.elastic_belt.transient import CHANNELS, batch
+from cvt_hpc.models.elastic_belt import transient
 
-__all__ = ["CHANNELS", "batch"]
+CHANNELS, batch = transient.CHANNELS, transient.batch

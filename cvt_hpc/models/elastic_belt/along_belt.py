@@ -15,30 +15,30 @@ less its frictionless part 2 f_ax tan d.
 The sliding angle is that of Bullinger et al. 2005, eq. 36, against the running direction, positive where the
 belt slides into the groove: from pi/2 to 3 pi/2 the pulley drives the belt, below pi/2 the belt the pulley.
 Of means, sliding speed and angle are those of the mean sliding.
+
+Histories that are kept have them at each sample of a run's end, too (`Momentary`). Off by default: nothing is
+then computed, nor held in memory. The kernel adds the profiles of each sample to the sums of the judged part;
+here it adds them to zero first, sample by sample, which gives the same bits.
 """
 
-from collections.abc import Mapping
-from typing import Any
+from __future__ import annotations
+
+from collections.abc import Mapping, Sequence
+from typing import TYPE_CHECKING
 
 import numpy as np
 
 from cvt_hpc.models.elastic_belt.belt import Mesh
 from cvt_hpc.models.elastic_belt.fluctuation import at_stations
+from cvt_hpc.models.elastic_belt.sampling import PROFILES
+from cvt_hpc.parameters import Parameters
+from cvt_hpc.recording import sample_count
 from cvt_hpc.variator.history import ALONG
 
 # quantities of a sample from which the quantities below follow
-NEEDED = (
-    "radial_friction",
-    "tangential_friction",
-    "radial_speed",
-    "sliding_speed",
-    "saddle_friction",
-    "element_speed",
-    "ring_tension",
-    "push_force",
-    "contact_force",
-    "mean_displacement",
-)
+_OF_FRICTION = ("radial_friction", "tangential_friction", "radial_speed", "sliding_speed", "saddle_friction")
+_OF_BELT = ("element_speed", "ring_tension", "push_force", "contact_force", "mean_displacement")
+NEEDED = (*_OF_FRICTION, *_OF_BELT)
 # long name, unit and comment by name; of all but the wrap angle nan where a station has no contact
 SLIDING = {
     "radial_sliding": ("radial sliding", "m s-1", "of the belt on the sheaves, outward"),
@@ -58,9 +58,7 @@ WRAP_ANGLE = ("wrap angle", "rad", "from the inlet of the arc; negative before i
 ELSEWHERE = {**ALONG, "contact_force": ("contact force", "N m-1", "axial line force of one flank")}
 
 
-def along_belt(
-    sample: Mapping[str, np.ndarray], grid: Mesh, parameters: Mapping[str, Any]
-) -> dict[str, np.ndarray]:
+def along_belt(sample: Mapping[str, np.ndarray], grid: Mesh, parameters: Parameters) -> dict[str, np.ndarray]:
     """Quantities of SLIDING at the stations, (..., N) by name.
 
     They follow from those of NEEDED, (..., N) each, of one instant or means, and the run's half wedge angle
@@ -115,3 +113,45 @@ def wrap_angles(grid: Mesh) -> np.ndarray:
     for zone in (grid.zone(0), grid.zone(2)):
         found[zone.stations] = zone.angle
     return found
+
+
+if TYPE_CHECKING:
+    from cvt_hpc.lanes import LaneArray
+
+COLUMNS = [PROFILES.index(name) for name in NEEDED]
+_PATH_SPEED = ("element speed", "m s-1", "rate of an element's path coordinate: v_0 / (1 + kappa w)")
+WORDS = {**ELSEWHERE, **SLIDING, "element_speed": _PATH_SPEED}
+PRECISION = np.dtype(np.float32)
+
+
+def _profiled_samples(p: Parameters) -> int:
+    """Samples of a run whose profiles are kept, the last ones."""
+    return min(round(p["profile_duration"] * p["sampling_rate"]), sample_count(p))
+
+
+def profile_bytes(parameters: Parameters) -> int:
+    """Size of the profiles over time of one run [byte]: in memory, and at most in its history."""
+    values = _profiled_samples(parameters) * parameters["stations"]
+    return values * PRECISION.itemsize * max(len(NEEDED), len(WORDS))
+
+
+class Momentary:
+    """Profiles of the last samples of the runs of a batch, alike in sampling and duration, of N stations.
+
+    Those whose profile_duration is 0 keep none. Before the first one that is kept there are `first` samples;
+    all, where none is.
+    """
+
+    def __init__(self, points: Sequence[Parameters], stations: int) -> None:
+        counts = [_profiled_samples(point) for point in points]
+        self.first = sample_count(points[0]) - max(counts)
+        self._kept = [lane for lane, count in enumerate(counts) if count]
+        self._values = np.full((max(counts), len(self._kept), len(NEEDED), stations), np.nan, PRECISION)
+
+    def note(self, sample: int, profiles: LaneArray) -> None:
+        """Keep PROFILES of a sample."""
+        self._values[sample - self.first] = profiles.data[:, COLUMNS][:, :, self._kept].transpose(2, 1, 0)
+
+    def of(self, lane: int) -> np.ndarray | None:
+        """NEEDED of the last samples of a run, (sample, quantity, N); None where none are kept."""
+        return self._values[:, self._kept.index(lane)] if lane in self._kept else None

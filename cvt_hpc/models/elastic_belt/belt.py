@@ -8,31 +8,24 @@ left face of cell j); the content n_i, the strains and the forces in cells. Rows
 
 from __future__ import annotations
 
-from collections.abc import Mapping
 from itertools import accumulate
-from typing import Any, NamedTuple
+from typing import NamedTuple
 
 import numpy as np
 
+from cvt_hpc.models.elastic_belt import belt_settings
 from cvt_hpc.models.elastic_belt import fields as f
 from cvt_hpc.models.elastic_belt.bending import bending_bands, bending_load, squared_curvature
-from cvt_hpc.models.elastic_belt.bending_settings import BENDING_DEFAULTS, CURVATURE_TERMS, has_column
 from cvt_hpc.models.elastic_belt.deflection_settings import disc_settings
 from cvt_hpc.models.elastic_belt.grouping import faded_coupling
 from cvt_hpc.models.elastic_belt.pulleys import Pulleys, settled_tilt, with_pulleys
-from cvt_hpc.models.elastic_belt.tilt_settings import TILT_DEFAULTS, elements_tilt
+from cvt_hpc.parameters import Parameters
 from cvt_hpc.physics.friction import FrictionLaw, given_law
 from cvt_hpc.physics.geometry import Variator, cut_path, variator
-from cvt_hpc.physics.sheaves import (
-    Sheaves,
-    axial_element_stiffness,
-    flexibility,
-    sheaves,
-    stiffness_factors,
-)
+from cvt_hpc.physics.sheaves import Sheaves, axial_element_stiffness, flexibility, sheaves, stiffness_factors
 from cvt_hpc.variator import LARGEST_DISPLACEMENT, PULLEYS
 from cvt_hpc.variator.course import SPEED, THRUST, profile_table
-from cvt_hpc.variator.measures import Measures, measures, rounded
+from cvt_hpc.variator.scene import Measures, measures, rounded
 from cvt_hpc.vibration.ramped import ramped
 
 REGIONS = ("driving arc", "t1", "driven arc", "t2")
@@ -163,7 +156,7 @@ class Mesh(NamedTuple):
         first = self.starts[region]
         return np.insert(np.cumsum(self.cell[first : first + self.counts[region]]), 0, 0.0)
 
-    def zone(self, region: int, reach: float = REACH) -> Zone:
+    def zone(self, region: int, reach: float = REACH) -> _Zone:
         """Stations that the groove of an arc may hold: the arc's, and those of `reach` of both strands.
 
         On a strand, x beyond the tangent point, the pulley's axis is at the distance rho = hypot(x, R + w),
@@ -179,10 +172,10 @@ class Mesh(NamedTuple):
         along -= along[more[0]]  # [m] from the inlet
         on_arc = np.clip(along, 0.0, along[more[0] + count])
         x = along - on_arc
-        return Zone(stations, on_arc / radius + np.arctan2(x, radius), x, np.hypot(x, radius) - radius)
+        return _Zone(stations, on_arc / radius + np.arctan2(x, radius), x, np.hypot(x, radius) - radius)
 
 
-class Zone(NamedTuple):
+class _Zone(NamedTuple):
     """Stations that one groove may hold, m of them, and their place about its axis."""
 
     stations: np.ndarray  # (m,) int, in the direction of travel
@@ -191,7 +184,7 @@ class Zone(NamedTuple):
     rise: np.ndarray  # distance from the axis beyond the pitch radius, (m,) [m]
 
 
-def mesh(parameters: Mapping[str, Any]) -> Mesh:
+def mesh(parameters: Parameters) -> Mesh:
     """Cut the path into `stations` cells, shorter by `end_refinement` at the ends of arcs (`cut_path`)."""
     path = variator(parameters["ratio"], parameters["driven_radius"], parameters["centre_distance"])
     cells = cut_path(path, parameters["stations"], parameters["end_refinement"])
@@ -199,9 +192,9 @@ def mesh(parameters: Mapping[str, Any]) -> Mesh:
     return Mesh(tuple(counts), (0, *accumulate(counts[:-1])), np.concatenate(cells), path)
 
 
-def belt_constants(parameters: Mapping[str, Any]) -> Belt:
+def belt_constants(parameters: Parameters) -> Belt:
     """Constants of one run for the kernels, from its resolved parameters, `duration` [s] included."""
-    p, grid = BENDING_DEFAULTS | TILT_DEFAULTS | dict(parameters), mesh(parameters)
+    p, grid = belt_settings.DEFAULTS | dict(parameters), mesh(parameters)
     path, cell = grid.path, grid.cell
     dual = 0.5 * (cell + np.roll(cell, 1))
     kappa, radii = grid.curvature, (path.driving_radius, path.driven_radius)
@@ -222,19 +215,10 @@ def belt_constants(parameters: Mapping[str, Any]) -> Belt:
     belt_speed = p["driving_speed"] * path.driving_radius
     whole, disc = stiffness_factors(p)
     size = measures(p)
+    stiffness = whole, p["tilt_stiffness"] * p["tilt_factor"], p["local_stiffness"], p["local_length"]
+    flanks = axial_element_stiffness(p)
     wraps = [
-        sheaves(
-            dual[zone.stations],
-            zone.angle,
-            zone.rise,
-            radius,
-            whole,
-            p["tilt_stiffness"] * p["tilt_factor"],
-            p["local_stiffness"],
-            p["local_length"],
-            axial_element_stiffness(p),
-            disc,
-        )
+        sheaves(dual[zone.stations], zone.angle, zone.rise, radius, *stiffness, flanks, disc)
         for zone, radius in zip(zones, radii, strict=True)
     ]
     line_forces = rounded(size.force / size.length)
@@ -245,7 +229,7 @@ def belt_constants(parameters: Mapping[str, Any]) -> Belt:
     ]
     wraps, freedom = with_pulleys(p, wraps, radii)
     law = given_law(p)
-    quantity, terms = ramped(p), CURVATURE_TERMS.index(p["curvature_terms"])
+    quantity, terms = ramped(p), belt_settings.CURVATURE_TERMS.index(p["curvature_terms"])
     computed = dict(
         cell=cell,
         dual=dual,
@@ -262,8 +246,8 @@ def belt_constants(parameters: Mapping[str, Any]) -> Belt:
         bending_load=bending_load(cell, dual, p["bending_stiffness"], kappa, terms),
         squared_curvature=squared_curvature(cell, dual, kappa) * (terms > 0),
         curvature_terms=terms,
-        has_column=has_column(p),
-        tilts=elements_tilt(p),
+        has_column=belt_settings.has_column(p),
+        tilts=belt_settings.elements_tilt(p),
         ring_mass=p["longitudinal_mass"] * ring_mass,
         ring_relief=ring_mass * belt_speed * belt_speed,
         element_mass=p["longitudinal_mass"] * p["element_mass"],
@@ -290,7 +274,7 @@ def belt_constants(parameters: Mapping[str, Any]) -> Belt:
     return Belt(**computed, **given)
 
 
-def initial_state(parameters: Mapping[str, Any], belt: Belt) -> State:
+def initial_state(parameters: Parameters, belt: Belt) -> State:
     """Start near the steady state without load.
 
     The belt is seated in both grooves under the tension that the thrust requires, the layers at uniform

@@ -19,7 +19,7 @@ adds no F kappa^2 w: what F kappa gives way by is taken up by the longer arc.
 
 import numpy as np
 
-from cvt_hpc.models.elastic_belt.bending_settings import CURVATURE_TERMS
+from cvt_hpc.models.elastic_belt.belt_settings import CURVATURE_TERMS
 
 NONE, PATH, STRAIGHT = range(len(CURVATURE_TERMS))
 

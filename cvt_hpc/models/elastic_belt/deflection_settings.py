@@ -6,7 +6,16 @@ from typing import Any
 
 import numpy as np
 
-from cvt_hpc.parameters import Column, FromFile, Parameter, RowError, not_negative, positive
+from cvt_hpc.parameters import (
+    Column,
+    FromFile,
+    Parameter,
+    Parameters,
+    Problem,
+    RowError,
+    not_negative,
+    positive,
+)
 from cvt_hpc.physics.deflection import cone_flexibilities, interpolated, table_problem
 from cvt_hpc.physics.geometry import variator
 from cvt_hpc.physics.ritz import modal_flexibilities, moving_modes
@@ -17,8 +26,8 @@ from cvt_hpc.variator import PULLEYS
 CONE = ("cone_stiffness", "cone_shift")
 RITZ = ("ritz_limit", "ritz_modes", "disc_damping")
 TABLE_KEYS = tuple(f"{pulley}_flexibility{end}" for pulley in PULLEYS for end in ("_file", "_angle", ""))
-OF_MODE = ("mode_harmonic", "mode_flexibility", "mode_mass")
-MODE_KEYS = tuple(f"{pulley}_{key}" for pulley in PULLEYS for key in OF_MODE)
+_OF_MODE = ("mode_harmonic", "mode_flexibility", "mode_mass")
+MODE_KEYS = tuple(f"{pulley}_{key}" for pulley in PULLEYS for key in _OF_MODE)
 MODE_FILES = tuple(f"{pulley}_modes_file" for pulley in PULLEYS)
 
 
@@ -61,7 +70,7 @@ def _table(pulley: str) -> dict[str, Parameter]:
 
 
 def _modes(pulley: str) -> dict[str, Parameter]:
-    harmonic, flexibility, mass = gives = tuple(f"{pulley}_{key}" for key in OF_MODE)
+    harmonic, flexibility, mass = gives = tuple(f"{pulley}_{key}" for key in _OF_MODE)
     columns = {"harmonic": ("",), "modal_flexibility": ("m/N",), "modal_mass": ("kg",)}
 
     def arranged(found: Mapping[str, Column]) -> dict[str, Any]:
@@ -78,9 +87,9 @@ def _modes(pulley: str) -> dict[str, Parameter]:
             (),
             "m/N",
             "opening of the groove by these modes at rest, at the place of a force on both flanks",
-            sensible=(1e-30, 1e-5),
+            (1e-30, 1e-5),
         ),
-        mass: not_negative((), "kg", "masses of these modes; 0: without inertia", sensible=(1e-9, 1e9)),
+        mass: not_negative((), "kg", "masses of these modes; 0: without inertia", (1e-9, 1e9)),
     }
 
 
@@ -93,17 +102,17 @@ DEFLECTION: dict[str, Parameter] = {
         choices=("bending", "cone", "flexibilities", "ritz"),
     ),
     "cone_stiffness": positive(
-        3e5, "N m/rad", "stiffness of a cone against tilting", sensible=(100.0, 1e9), allow_infinite=True
+        3e5, "N m/rad", "stiffness of a cone against tilting", (100.0, 1e9), allow_infinite=True
     ),
     "cone_shift": not_negative(
-        0.0, "m", "shift of a cone's axis of tilting towards the middle of the arc", sensible=(1e-5, 0.2)
+        0.0, "m", "shift of a cone's axis of tilting towards the middle of the arc", (1e-5, 0.2)
     ),
     **_table("driving"),
     **_table("driven"),
     **_modes("driving"),
     **_modes("driven"),
     "ritz_limit": not_negative(
-        20e3, "Hz", "highest frequency of modes that have inertia; 0: none", sensible=(1.0, 1e6)
+        20e3, "Hz", "highest frequency of modes that have inertia; 0: none", (1.0, 1e6)
     ),
     "ritz_modes": Parameter(
         0, "", "how many modes are kept, the lowest frequencies first; 0: all", minimum=0
@@ -111,26 +120,21 @@ DEFLECTION: dict[str, Parameter] = {
     "disc_damping": not_negative(0.005, "", "damping ratio of the discs' modes"),
 }
 
-DEFLECTION_DEFAULTS = {key: parameter.default for key, parameter in DEFLECTION.items() if not parameter.file}
 
-
-def kept_modes(parameters: Mapping[str, Any], pulley: str) -> tuple[np.ndarray, np.ndarray, np.ndarray]:
+def _kept_modes(parameters: Parameters, pulley: str) -> tuple[np.ndarray, np.ndarray, np.ndarray]:
     """Harmonics, flexibilities [m/N] and masses [kg] of the modes that are kept, by ascending frequency."""
-    harmonic, flexibility, mass = (np.array(parameters[f"{pulley}_{key}"], float) for key in OF_MODE)
+    harmonic, flexibility, mass = (np.array(parameters[f"{pulley}_{key}"], float) for key in _OF_MODE)
     order = np.argsort(-flexibility * mass, kind="stable")
     order = order[: parameters["ritz_modes"] or None]
     return harmonic[order], flexibility[order], mass[order]
 
 
-def disc_settings(
-    parameters: Mapping[str, Any], pulley: str, wrap: Sheaves, radius: float, turned: float
-) -> dict[str, Any]:
+def disc_settings(p: Parameters, pulley: str, wrap: Sheaves, radius: float, turned: float) -> dict[str, Any]:
     """Data of one pulley's discs for `Sheaves`, at the reference stiffness, beside local bending.
 
     `flexibilities`, (m, m) [m/N], or (0, 0) for local bending, and `modes` where these have inertia, over the
     `wrap` of m stations, with the pitch radius [m] and the angle `turned` of the arc [rad].
     """
-    p = DEFLECTION_DEFAULTS | dict(parameters)
     if p["sheave_deformation"] == "cone":
         from_middle, distance = wrap.angle - 0.5 * turned, radius + wrap.rise
         shifted = p["cone_stiffness"], p["cone_shift"]
@@ -139,7 +143,7 @@ def disc_settings(
         angles, table = p[f"{pulley}_flexibility_angle"], p[f"{pulley}_flexibility"]
         return {"flexibilities": interpolated(angles, table, wrap.angle, turned)}
     if p["sheave_deformation"] == "ritz":
-        kept, interval = kept_modes(p, pulley), 1.0 / p["sampling_rate"]
+        kept, interval = _kept_modes(p, pulley), 1.0 / p["sampling_rate"]
         step = interval / steps_per_sample(interval, p["step"])
         place = wrap.angle, wrap.weight / radius
         modes = moving_modes(kept, p["ritz_limit"], p["disc_damping"], step, place)
@@ -147,9 +151,8 @@ def disc_settings(
     return {}
 
 
-def deflection_problems(parameters: Mapping[str, Any]) -> list[tuple[str, str, str]]:
+def deflection_problems(p: Parameters) -> list[Problem]:
     """Problems of the discs' deformation: (key, expected, found); the scene's sizes are taken as sound."""
-    p = DEFLECTION_DEFAULTS | dict(parameters)
     kind = p["sheave_deformation"]
     if kind == "bending":
         return []
@@ -170,20 +173,19 @@ def deflection_problems(parameters: Mapping[str, Any]) -> list[tuple[str, str, s
     return problems
 
 
-def refuse_moving_discs(parameters: Mapping[str, Any]) -> list[tuple[str, str, str]]:
+def refuse_moving_discs(parameters: Parameters) -> list[Problem]:
     """Refuse discs with inertia, of which a method knows nothing."""
-    if (DEFLECTION_DEFAULTS | dict(parameters))["sheave_deformation"] != "ritz":
+    if parameters["sheave_deformation"] != "ritz":
         return []
     return [("sheave_deformation", "bending, cone or flexibilities but by the stepper imex", "ritz")]
 
 
-def _ritz_problems(parameters: Mapping[str, Any]) -> list[tuple[str, str, str]]:
-    p = parameters
+def _ritz_problems(p: Parameters) -> list[Problem]:
     if "lanes" not in p:  # a general method
         return refuse_moving_discs(p)
     problems = []
     for pulley in PULLEYS:
-        sizes = [len(p[f"{pulley}_{key}"]) for key in OF_MODE]
+        sizes = [len(p[f"{pulley}_{key}"]) for key in _OF_MODE]
         if not sizes[0] or len(set(sizes)) > 1:
             expected = "modes, with one harmonic, flexibility and mass each"
             problems.append((f"{pulley}_mode_harmonic", expected, " and ".join(map(str, sizes))))
@@ -198,9 +200,9 @@ def _ritz_problems(parameters: Mapping[str, Any]) -> list[tuple[str, str, str]]:
     return problems
 
 
-def deflection_inert(parameters: Mapping[str, Any]) -> dict[str, str]:
+def deflection_inert(parameters: Parameters) -> dict[str, str]:
     """Settings of the deformation without effect, each with the setting that makes it so."""
-    kind = (DEFLECTION_DEFAULTS | dict(parameters))["sheave_deformation"]
+    kind = parameters["sheave_deformation"]
     setting = f"sheave_deformation {kind}"
     of_kinds = {
         "bending": ("local_stiffness", "local_length"),

@@ -6,26 +6,15 @@ deviations, each cell's stresses computed once.
 """
 
 from cvt_hpc.kernels import kernel
-from cvt_hpc.lanes import (
-    LaneArray,
-    ahead,
-    anywhere,
-    around,
-    behind,
-    fma,
-    from_ahead,
-    from_behind,
-    like,
-    minimum,
-    reciprocals,
-    select,
-)
+from cvt_hpc.lanes.functions import anywhere, fma, like, minimum, reciprocals, select
+from cvt_hpc.lanes.kinds import LaneArray
+from cvt_hpc.lanes.rings import ahead, around, behind, from_ahead, from_behind
 from cvt_hpc.models.elastic_belt import fields as f
 from cvt_hpc.models.elastic_belt import lane_fields as lf
 from cvt_hpc.models.elastic_belt import lane_forces as forces
+from cvt_hpc.models.elastic_belt import lane_tilt as tilting
 from cvt_hpc.models.elastic_belt.lane_belt import LaneBelt, LaneState, Work
 from cvt_hpc.models.elastic_belt.lane_column import across_by_curvature, column_across
-from cvt_hpc.models.elastic_belt.lane_tilt import add_turn, carry_tilt, lane_tilt, turn_elements
 from cvt_hpc.models.elastic_belt.pulley_step import advance_pulleys
 from cvt_hpc.physics.flank import flank_shares, flank_sliding
 
@@ -44,13 +33,13 @@ def step_explicit(belt: LaneBelt, state: LaneState, work: Work, step: float) -> 
     stations = work.stations
     forces.lane_sliding(belt, state, stations)
     if belt.tilts:
-        lane_tilt(belt, state, stations, 0.0)
+        tilting.lane_tilt(belt, state, stations, 0.0)
     taken, moment = _accelerate(belt, state, stations, step)
     advance_pulleys(belt, state, taken, moment, step)
     if belt.tilts:
-        turn_elements(belt, state, 0.0)
-        carry_tilt(belt, state, step)
-        add_turn(state, step)
+        tilting.turn_elements(belt, state, 0.0)
+        tilting.carry_tilt(belt, state, step)
+        tilting.add_turn(state, step)
     state.time[0] += step
     _advance_layers(belt, state, stations, step)
     _advance_across(belt, state, stations, step)

@@ -7,14 +7,12 @@ then friction near zero sliding speed. With the default mesh the limit is 0.05 u
 sets it, at 0.19 to 0.24 us over the map of jobs/lebrecht_2004.toml.
 """
 
-from collections.abc import Mapping
 from dataclasses import replace
-from typing import Any
 
+from cvt_hpc.models.elastic_belt.belt_settings import layer_count
 from cvt_hpc.models.elastic_belt.deflection_settings import refuse_moving_discs
 from cvt_hpc.models.elastic_belt.imex_settings import LARGEST_STEP
-from cvt_hpc.models.elastic_belt.ring_settings import refuse_layers
-from cvt_hpc.parameters import Parameter
+from cvt_hpc.parameters import Parameter, Parameters, Problem
 from cvt_hpc.steppers.facts import LANES, Facts
 
 FACTS = Facts(
@@ -43,6 +41,10 @@ PARAMETERS = {
 }
 
 
-def check(parameters: Mapping[str, Any]) -> list[tuple[str, str, str]]:
+def check(parameters: Parameters) -> list[Problem]:
     """Problems of a run: the step's kernels know the rings as one, and discs without inertia."""
-    return refuse_layers(parameters) + refuse_moving_discs(parameters)
+    found, count = refuse_moving_discs(parameters), layer_count(parameters)
+    if count > 1:
+        told = "1 with the explicit step; layers take imex or a general method such as dormand_prince"
+        found.insert(0, ("ring_layers", told, str(count)))
+    return found

@@ -1,4 +1,4 @@
-"""Layouts of the elastic belt's state and of its pulleys' laws: rows and entries, by name."""
+"""Layouts of the elastic belt's state, of its pulleys' laws and of its powers: rows and entries, by name."""
 
 from collections.abc import Mapping
 
@@ -34,3 +34,9 @@ ELEMENT_TILT = len(FIELDS)
 # and from FIRST_STATE on STATES of the pulleys, which are 0 where a pulley does not have them
 TIME, DRIVEN_SPEED, DRIVEN_POSITION, LAYER_WORK, FIRST_STATE = range(5)
 SCALARS = FIRST_STATE + STATES
+
+# Powers of an audit: terms of the balance [W], and the stored energy [J]
+DRIVING_POWER, LOAD_POWER, THRUST_POWER, DRIVING_FLANK_LOSS, DRIVEN_FLANK_LOSS, RING_LOSS = range(6)
+BELT_LOSS, LAYER_LOSS, LAG_LOSS, SEATING_LOSS, TILT_LOSS, STORED_ENERGY = range(6, 12)
+POWERS = names_from("DRIVING_POWER", globals())
+LOSSES = tuple(name for name in POWERS if name.endswith("_loss"))

@@ -31,12 +31,12 @@ meet), the energy gained while the vibration grows, and bending. Fluctuations of
 and hum of gaps too, and a trend of the mean state would: along a ramp of load or speed nothing is known.
 """
 
-from collections.abc import Mapping
-from typing import Any, NamedTuple
+from typing import NamedTuple
 
 import numpy as np
 
 from cvt_hpc.models.elastic_belt.belt import Mesh
+from cvt_hpc.parameters import Parameters
 from cvt_hpc.variables import Variable
 from cvt_hpc.vibration.ramped import ramped
 
@@ -97,7 +97,7 @@ class Fluctuation(NamedTuple):
     mean_layers: float
 
 
-def fluctuation(means: dict[str, np.ndarray], grid: Mesh, parameters: Mapping[str, Any]) -> Fluctuation:
+def fluctuation(means: dict[str, np.ndarray], grid: Mesh, parameters: Parameters) -> Fluctuation:
     """Power of the fluctuations around the belt.
 
     `means` are MOMENTS over the number of samples, and `mean_displacement` [m], (N,) each.
@@ -124,7 +124,7 @@ def fluctuation(means: dict[str, np.ndarray], grid: Mesh, parameters: Mapping[st
     return Fluctuation(*(steadiness(p) * power for power in powers))
 
 
-def steadiness(parameters: Mapping[str, Any]) -> float:
+def steadiness(parameters: Parameters) -> float:
     """1, or not a number along a ramp: its trend would count as a fluctuation."""
     return np.nan if ramped(parameters) else 1.0
 
@@ -135,7 +135,7 @@ def _lifted(m: dict[str, np.ndarray], grid: Mesh) -> np.ndarray:
     return grid.cell * grid.curvature * (u + 0.5 * _step(u))
 
 
-def _lifting(m: dict[str, np.ndarray], grid: Mesh, p: Mapping[str, Any]) -> np.ndarray:
+def _lifting(m: dict[str, np.ndarray], grid: Mesh, p: Parameters) -> np.ndarray:
     """Power of the cells' mean stresses in the mean transverse motion [W], (N,)."""
     speed = p["driving_speed"] * grid.path.driving_radius
     net = m["ring_tension"] - m["push_force"] - (p["element_mass"] + p["ring_mass"]) * speed**2

@@ -101,55 +101,39 @@ def lane_belt(belts: list[Belt], dtype: DTypeLike) -> LaneBelt:
     constants = LaneArray(1, len(lf.CONSTANTS), len(belts), dtype)
     for lane, belt in enumerate(belts):
         constants.data[0, :, lane] = _constants_of(belt)
-    cell, dual, kappa = first.cell, first.dual, first.curvature
-    law = first.law
+    law, terms, path = first.law, first.curvature_terms, (first.cell, first.dual, first.curvature)
     tables = (law.table_force.astype(dtype), law.table_speed.astype(dtype), law.table_mu.astype(dtype))
-    shared = {
-        "cell": cell,
-        "dual": dual,
-        "per_cell": first.per_cell,
-        "per_dual": first.per_dual,
-        "per_span": first.per_span,
-        "curvature": kappa,
-        "arc_curvature": first.arc_curvature,
-        **{
-            name: getattr(first, name)
-            for name in ("touches", "on_driven", "rise", "lean", "lean_rate", "upright")
-        },
-        "ring_curvature": _ring_curvature(first),
-        "bending": bending_bands(cell, dual, 1.0, kappa, first.curvature_terms),
-        "bending_load": bending_load(cell, dual, 1.0, kappa, first.curvature_terms),
-        "squared_curvature": first.squared_curvature,
-    }
-    return LaneBelt(
-        **{name: array.astype(dtype) for name, array in shared.items()},
+    changing = any(belt.speed_start != belt.driving_speed for belt in belts)
+    computed = dict(
+        ring_curvature=squared_curvature(*path, 1),
+        bending=bending_bands(first.cell, first.dual, 1.0, first.curvature, terms),
+        bending_load=bending_load(first.cell, first.dual, 1.0, first.curvature, terms),
         constants=constants,
-        places=_places(first.driving_stations, first.driven_stations, cell.size),
+        places=_places(first.driving_stations, first.driven_stations, first.cell.size),
         memory=first.friction_memory > 0.0,
         law=FrictionLaw(law.kind, 0.0, 0.0, 0.0, *tables),
-        rise_time=first.rise_time,
-        start_damping=first.start_damping,
-        largest_displacement=first.largest_displacement,
-        faded=first.faded,
-        ramp_end=first.ramp_end,
-        profile=first.profile,
-        speed_changes=any(belt.speed_start != belt.driving_speed for belt in belts)
-        or bool(np.any(first.profile[:, SPEED] != 1.0)),
+        speed_changes=changing or bool(np.any(first.profile[:, SPEED] != 1.0)),
         is_free=first.pulleys.are_free,
-        is_curved=first.curvature_terms > 0,
-        has_column=first.has_column,
-        tilts=first.tilts,
+        is_curved=terms > 0,
     )
+    # all else is of the first belt, by the same name
+    given = {key: getattr(first, key) for key in LaneBelt._fields if key not in computed}
+    found = LaneBelt(**computed, **given)
+    return found._replace(**{name: array.astype(dtype) for name, array in _of_stations(found).items()})
+
+
+def _of_stations(belt: LaneBelt) -> dict[str, Any]:
+    """Arrays of stations, by name: all but the profile, which no station has."""
+    return {
+        name: array
+        for name, array in belt._asdict().items()
+        if isinstance(array, np.ndarray) and name != "profile"
+    }
 
 
 def _places(driving: np.ndarray, driven: np.ndarray, rows: int) -> Any:
     """Row and part of each groove's stations, in parts of so many rows."""
     return (driving % rows, driving // rows), (driven % rows, driven // rows)
-
-
-def _ring_curvature(belt: Belt) -> np.ndarray:
-    weighted = belt.cell * belt.curvature
-    return 0.5 * (weighted + np.roll(weighted, 1)) / belt.dual
 
 
 def _constants_of(belt: Belt) -> list[float]:
@@ -177,18 +161,23 @@ def lane_state(belts: list[Belt], states: list[State], dtype: type) -> LaneState
     """State of several runs on the same mesh, one for each lane, all at one time, with fresh contacts."""
     n, lanes = belts[0].cell.size, len(belts)
     tilts = belts[0].tilts
-    fields = LaneArray(n, states[0].fields.shape[0] - tilts, lanes, dtype)
-    scalars, tilt = LaneArray(1, lf.SCALARS, lanes), LaneArray(n * tilts, lf.FIELDS_OF_TILT, lanes, dtype)
+    wraps = [belt.driving for belt in belts], [belt.driven for belt in belts]
+    contacts = lane_contact(wraps[0], dtype), lane_contact(wraps[1], dtype)
+    _settle_discs(contacts, belts, states)
+    found = LaneState(
+        LaneArray(n, states[0].fields.shape[0] - tilts, lanes, dtype),
+        LaneArray(1, lf.SCALARS, lanes),
+        np.zeros(1),
+        contacts,
+        LaneArray(n if belts[0].has_column else 0, lf.FIELDS_OF_COLUMN, lanes, dtype),
+        LaneArray(n * tilts, lf.FIELDS_OF_TILT, lanes, dtype),
+    )
     for lane, (belt, state) in enumerate(zip(belts, states, strict=True)):
-        put_lane(fields.data, scalars.data, tilt.data, lane, belt, state)
-    wraps = [[belt.driving for belt in belts], [belt.driven for belt in belts]]
-    contacts = (lane_contact(wraps[0], dtype), lane_contact(wraps[1], dtype))
-    settle_discs(contacts, belts, states)
-    column = LaneArray(n if belts[0].has_column else 0, lf.FIELDS_OF_COLUMN, lanes, dtype)
-    return LaneState(fields, scalars, np.array([states[0].scalars[0]]), contacts, column, tilt)
+        put_lane(found, lane, belt, state)
+    return found
 
 
-def settle_discs(contacts: tuple[Contact, Contact], belts: list[Belt], states: list[State]) -> None:
+def _settle_discs(contacts: tuple[Contact, Contact], belts: list[Belt], states: list[State]) -> None:
     """Put discs with inertia to rest under the forces that discs without have in these states."""
     if not any(contact.discs.place.size for contact in contacts):
         return
@@ -221,9 +210,7 @@ def parted(belt: LaneBelt, parts: int) -> LaneBelt:
     Their number is a power of 2 that divides that of the stations.
     """
     arrays: dict[str, Any] = {
-        name: split(_one_lane(array), parts)
-        for name, array in belt._asdict().items()
-        if isinstance(array, np.ndarray) and name != "profile"  # which no station has
+        name: split(_one_lane(array), parts) for name, array in _of_stations(belt).items()
     }
     rows = belt.cell.size // parts
     places = _places(belt.places[0][0], belt.places[1][0], rows)
@@ -244,13 +231,11 @@ def alike(array: LaneArray, parts: int) -> LaneArray:
     return linked
 
 
-def put_lane(
-    fields: np.ndarray, scalars: np.ndarray, tilt: np.ndarray, lane: int, belt: Belt, state: State
-) -> None:
-    """Write a run's state into its lane of a LaneState's data."""
-    values = state.fields.copy()
+def put_lane(lanes: LaneState, lane: int, belt: Belt, state: State) -> None:
+    """Write a run's state into its lane, and its time, which is that of all."""
+    values, scalars = state.fields.copy(), lanes.scalars.data
     if belt.tilts:
-        tilt[:, lf.ANGLE, lane] = values[f.ELEMENT_TILT]
+        lanes.tilt.data[:, lf.ANGLE, lane] = values[f.ELEMENT_TILT]
         values = values[: f.ELEMENT_TILT]
     belt_speed = speed_share_at(belt, state.scalars[f.TIME]) * belt.belt_speed
     values[f.V_ELEMENT] -= belt_speed
@@ -258,7 +243,8 @@ def put_lane(
     values[len(f.FIELDS) : (len(values) + len(f.FIELDS)) // 2] -= belt_speed  # ring layers, where there are
     values[f.N_ELEMENT] -= 1.0
     values[f.N_RING] -= 1.0 + belt.curvature * belt.ring_offset
-    fields[:, :, lane] = values.T
+    lanes.fields.data[:, :, lane] = values.T
+    lanes.time[0] = state.scalars[f.TIME]
     scalars[0, lf.SPEED, lane] = state.scalars[f.DRIVEN_SPEED]
     scalars[0, lf.POSITION, lane] = state.scalars[f.DRIVEN_POSITION]
     scalars[0, f.FIRST_STATE :, lane] = state.scalars[f.FIRST_STATE :]

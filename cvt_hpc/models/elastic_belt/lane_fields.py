@@ -55,8 +55,7 @@ D_00, D_01, D_11, Y_0, Y_1 = range(28, 33)
 # the eliminated system: inverse pivots, the increments of v_element and v_ring, the border, the stresses'
 # slopes with the speeds' differences
 I_00, I_01, I_11, DV_0, DV_1, G_00, G_01, G_10, G_11, LINK_0, LINK_1 = range(33, 44)
-# of `imex_bending`: line force across the belt, its slopes with the increments of u and of v_element; factors
-# and work space
+# of motion across: line force, its slopes with the increments of u and of v_element; factors and work space
 ACROSS, MASS_ACROSS, CROSS, A_00, A_01, A_11, B_00, B_01, B_10, B_11, X_0, X_1 = range(44, 56)
 # of the layers' dampers in the cells of arcs, kappa h / 2 times their force [N]
 BENT = 56

@@ -5,23 +5,9 @@ ones each step's own.
 """
 
 from cvt_hpc.kernels import kernel, merged_kernel
-from cvt_hpc.lanes import (
-    LaneArray,
-    ahead,
-    anywhere,
-    at_station,
-    behind,
-    decay,
-    fma,
-    from_ahead,
-    from_behind,
-    like,
-    maximum,
-    reciprocals,
-    select,
-    set_station,
-    sqrt,
-)
+from cvt_hpc.lanes.functions import anywhere, decay, fma, like, maximum, reciprocals, select, sqrt
+from cvt_hpc.lanes.kinds import LaneArray
+from cvt_hpc.lanes.rings import ahead, at_station, behind, from_ahead, from_behind, set_station
 from cvt_hpc.models.elastic_belt import fields as f
 from cvt_hpc.models.elastic_belt import lane_fields as lf
 from cvt_hpc.models.elastic_belt.lane_belt import LaneBelt, LaneState
@@ -33,17 +19,9 @@ from cvt_hpc.physics.flank import flank_sliding, tangential_sliding
 from cvt_hpc.physics.friction import formula_coefficient, law_numbers, saturation, table_coefficient
 from cvt_hpc.physics.friction_laws import Law
 from cvt_hpc.physics.moving_discs import open_gaps, turn_discs
-from cvt_hpc.variator.course import (
-    LOAD,
-    SPEED,
-    THRUST,
-    faded_damping,
-    load_course,
-    multiple_at,
-    speed_course,
-)
+from cvt_hpc.variator import course
 
-MOST_CONTACT_ROUNDS = 200
+_MOST_CONTACT_ROUNDS = 200
 LEAST_FORCE = 1e-12  # [N/m]: for a quotient of forces that may both be 0
 LEAST_SHARE_OF_WIDTH = 1e-3  # of friction_speed: below it friction is linear to 1e-6, and has no direction
 
@@ -52,7 +30,7 @@ LEAST_SHARE_OF_WIDTH = 1e-3  # of friction_speed: below it friction is linear to
 def derive(belt: LaneBelt, state: LaneState, stations: LaneArray) -> None:
     """Contact forces and strains of the present state."""
     lane_contact_forces(belt, state, stations)
-    lane_strains(belt, state, stations)
+    _lane_strains(belt, state, stations)
     if belt.has_column:
         lane_column(belt, state, stations, lf.EPS_0)
 
@@ -111,8 +89,8 @@ def lane_load(belt: LaneBelt, time: float, pattern):
     """Torque at the driving pulley [N m], as `rhs.load_at` has it, in lanes like `pattern`."""
     c = belt.constants
     start, load = like(c[0, lf.LOAD_START], pattern), like(c[0, lf.LOAD], pattern)
-    torque = load_course(time, belt.rise_time, belt.ramp_end, start, load)
-    return torque * multiple_at(belt.profile, LOAD, time)
+    torque = course.load_course(time, belt.rise_time, belt.ramp_end, start, load)
+    return torque * course.multiple_at(belt.profile, course.LOAD, time)
 
 
 @merged_kernel
@@ -121,15 +99,15 @@ def lane_speed_share(belt: LaneBelt, time: float, pattern):
     share = like(1.0, pattern)
     if belt.speed_changes:
         start = like(belt.constants[0, lf.START_SHARE], pattern)
-        share = speed_course(time, belt.rise_time, belt.ramp_end, start)
-        share = share * multiple_at(belt.profile, SPEED, time)
+        share = course.speed_course(time, belt.rise_time, belt.ramp_end, start)
+        share = share * course.multiple_at(belt.profile, course.SPEED, time)
     return share
 
 
 @merged_kernel
 def lane_given_thrust(belt: LaneBelt, time: float, pattern):
     """Thrust on the driven pulley [N], as `rhs.thrust_at`, in lanes like `pattern`."""
-    return like(belt.constants[0, lf.THRUST], pattern) * multiple_at(belt.profile, THRUST, time)
+    return like(belt.constants[0, lf.THRUST], pattern) * course.multiple_at(belt.profile, course.THRUST, time)
 
 
 @merged_kernel
@@ -205,7 +183,7 @@ def remembered(belt: LaneBelt, j: int, way, belt_speed, step: float, speed, old,
 @merged_kernel
 def lane_damping(belt: LaneBelt, time: float):
     """Transverse damping [N s/m^2], as `rhs.damping_at`."""
-    damping = belt.constants[0, lf.TRANSVERSE_DAMPING] + faded_damping(
+    damping = belt.constants[0, lf.TRANSVERSE_DAMPING] + course.faded_damping(
         time, belt.rise_time, belt.start_damping
     )
     return damping
@@ -299,7 +277,7 @@ def lane_contact_forces(belt: LaneBelt, state: LaneState, stations: LaneArray) -
                 pushed[k, compliance.GAP] = pushed[k, compliance.GAP] + tilt
         if contact.discs.place.size > 0:
             open_gaps(contact.discs, pushed, compliance.GAP)
-        solve_contact(contact, MOST_CONTACT_ROUNDS)
+        solve_contact(contact, _MOST_CONTACT_ROUNDS)
         before = like(-1.0, slope)
         for k in range(contact.weight.size):
             force, push = contact_force(pushed, k), pushed[k, compliance.PUSH]
@@ -324,7 +302,7 @@ def advance_discs(belt: LaneBelt, state: LaneState, step: float) -> None:
 
 
 @kernel
-def lane_strains(belt: LaneBelt, state: LaneState, stations: LaneArray) -> None:
+def _lane_strains(belt: LaneBelt, state: LaneState, stations: LaneArray) -> None:
     """Strains of elements and rings in the cells, with 1 / (1 + strain) and 1 / content."""
     fields, offset = state.fields, belt.constants[0, lf.RING_OFFSET]
     w_b = from_ahead(fields[0, f.W])
@@ -336,7 +314,7 @@ def lane_strains(belt: LaneBelt, state: LaneState, stations: LaneArray) -> None:
 
 @merged_kernel
 def cell_strains(belt: LaneBelt, stations: LaneArray, j: int, w, w_b, more_0, more_1, offset):
-    """Return `lane_strains` of cell j, by the displacement at both ends [m] and the contents' deviations."""
+    """Return `_lane_strains` of cell j, by the displacement at both ends [m] and the contents' deviations."""
     kappa = belt.curvature[j]
     content_0, content_1 = more_0 + 1.0, fma(offset, kappa, more_1 + 1.0)
     per_0, per_1 = reciprocals(content_0, content_1)
@@ -353,6 +331,18 @@ def cell_strains(belt: LaneBelt, stations: LaneArray, j: int, w, w_b, more_0, mo
     stations[j, lf.PER_CONTENT_0], stations[j, lf.PER_CONTENT_1] = per_0, per_1
 
 
+@merged_kernel
+def lane_coefficient(belt: LaneBelt, numbers, v_law, normal):
+    """Coefficient of friction at a sliding speed [m/s] and a normal line force [N/m], by a law's numbers."""
+    law = belt.law
+    if law.kind == Law.TABLE:
+        table = law.table_force, law.table_speed, law.table_mu
+        coefficient, _ = table_coefficient(table, v_law, normal)
+    else:
+        coefficient, _ = formula_coefficient(law.kind, numbers, v_law)
+    return coefficient
+
+
 @kernel
 def lane_sliding(belt: LaneBelt, state: LaneState, stations: LaneArray) -> None:
     """Sliding speeds where a groove may hold the belt, and the results of friction that depend on them alone.
@@ -361,8 +351,6 @@ def lane_sliding(belt: LaneBelt, state: LaneState, stations: LaneArray) -> None:
     processor looks ahead, so that it would not begin a station before the last one is nearly done.
     """
     n, fields, c = state.fields.rows, state.fields, belt.constants
-    kind, memory = belt.law.kind, belt.memory
-    table = belt.law.table_force, belt.law.table_speed, belt.law.table_mu
     numbers = law_numbers(c[0, lf.KINETIC_FRICTION], c[0, lf.FRICTION_GRADIENT], c[0, lf.LAW_SPEED])
     share = lane_speed_share(belt, state.time[0], c[0, lf.BELT_SPEED])
     per_cosine, belt_speed, offset = 1.0 / c[0, lf.COSINE], share * c[0, lf.BELT_SPEED], c[0, lf.RING_OFFSET]
@@ -379,11 +367,8 @@ def lane_sliding(belt: LaneBelt, state: LaneState, stations: LaneArray) -> None:
             belt, j, pulleys, belt_speed, v_across, fields[j, f.V_ELEMENT], fields[j, f.W]
         )
         speed, _ = flank_sliding(v_radial, v_tangential, per_cosine)
-        v_law = fields[j, f.V_FILTERED] if memory else speed
-        if kind == Law.TABLE:
-            coefficient, _ = table_coefficient(table, v_law, stations[j, lf.FORCE] * per_cosine)
-        else:
-            coefficient, _ = formula_coefficient(kind, numbers, v_law)
+        v_law = fields[j, f.V_FILTERED] if belt.memory else speed
+        coefficient = lane_coefficient(belt, numbers, v_law, stations[j, lf.FORCE] * per_cosine)
         # of the flanks tanh(x) = (1 - e^-2x) / (1 + e^-2x) and 1 / speed by one division
         speed = maximum(speed, least)
         saddle = fma(fma(offset, belt.arc_curvature[j], 1.0), full_speed, -(belt_speed + fields[j, f.V_RING]))

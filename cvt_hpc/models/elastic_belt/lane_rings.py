@@ -14,7 +14,6 @@ from cvt_hpc.kernels import kernel, merged_kernel
 from cvt_hpc.lanes import LaneArray, absolute, ahead, behind, fma, like, maximum, select
 from cvt_hpc.models.elastic_belt import fields as f
 from cvt_hpc.models.elastic_belt import lane_fields as lf
-from cvt_hpc.models.elastic_belt import power_terms
 from cvt_hpc.models.elastic_belt.belt import Belt
 from cvt_hpc.models.elastic_belt.lane_belt import LaneBelt, LaneState, alike
 from cvt_hpc.models.elastic_belt.lane_forces import LEAST_SHARE_OF_WIDTH, lane_speed_share
@@ -50,21 +49,11 @@ def lane_rings(belts: Sequence[Belt], rings: Sequence[Rings], dtype: DTypeLike) 
             # the elements below the saddle and above the last layer are at the pitch line
             above, below = surface / [*neutral, 1.0], surface / [1.0, *neutral]
             factors += np.column_stack([above, below]).ravel().tolist()
-        constants.data[0, :, lane] = [
-            ring.mass,
-            ring.stiffness,
-            ring.damping,
-            ring.relief,
-            ring.static_excess,
-            1.0 / ring.stribeck_speed,
-            1.0 / ring.friction_speed,
-            ring.kinetic[0],
-            ring.kinetic[1] if n > 1 else 0.0,
-            ring.stiffness / ring.mass,
-            2.0 * ring.damping / ring.mass,
-            *ring.offset,
-            *factors,
-        ]
+        one = [ring.mass, ring.stiffness, ring.damping, ring.relief]
+        friction = [ring.static_excess, 1.0 / ring.stribeck_speed, 1.0 / ring.friction_speed]
+        friction += [ring.kinetic[0], ring.kinetic[1] if n > 1 else 0.0]
+        rates = [ring.stiffness / ring.mass, 2.0 * ring.damping / ring.mass]
+        constants.data[0, :, lane] = [*one, *friction, *rates, *ring.offset, *factors]
     stations = np.arange(first.cell.size)
     straight = first.curvature == 0.0
     middle = first.driven_stations[first.driven_stations.size // 2]
@@ -200,12 +189,8 @@ def audit_layers(
         for strand in range(2):
             for i in range(n):
                 add(sums, i, TENSION + strand, stiffness * layers[rings.middles[strand], i])
-    rows[k, first + power_terms.RING_LOSS] = rows[k, first + power_terms.RING_LOSS] + like(
-        loss, rows[k, first]
-    )
-    rows[k, first + power_terms.STORED_ENERGY] = rows[k, first + power_terms.STORED_ENERGY] + like(
-        stored, rows[k, first]
-    )
+    rows[k, first + f.RING_LOSS] = rows[k, first + f.RING_LOSS] + like(loss, rows[k, first])
+    rows[k, first + f.STORED_ENERGY] = rows[k, first + f.STORED_ENERGY] + like(stored, rows[k, first])
 
 
 @merged_kernel

@@ -1,11 +1,11 @@
-"""Tilt of the elements in lanes: the functions of `element_tilt.py` for one run."""
+"""Tilt of the elements in lanes: the functions of `column.py` for one run."""
 
 from cvt_hpc.kernels import kernel, merged_kernel
 from cvt_hpc.lanes import LaneArray, anywhere, behind, fma, like
 from cvt_hpc.models.elastic_belt import fields as f
 from cvt_hpc.models.elastic_belt import lane_fields as lf
 from cvt_hpc.models.elastic_belt import lane_forces as forces
-from cvt_hpc.models.elastic_belt.element_tilt import tilted_sliding
+from cvt_hpc.models.elastic_belt.column import tilted_sliding
 from cvt_hpc.models.elastic_belt.lane_belt import LaneBelt, LaneState
 from cvt_hpc.physics.friction import saturation
 

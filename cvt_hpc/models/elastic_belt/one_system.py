@@ -21,23 +21,14 @@ from cvt_hpc.physics.compliance import Contact
 from cvt_hpc.steppers.system import System
 
 ROWS = (f.W, f.U, f.V_ELEMENT, f.V_RING, f.N_ELEMENT, f.N_RING)  # of the state, as they follow in y
-VELOCITIES = (f.U, f.V_ELEMENT, f.V_RING)
+_VELOCITIES = (f.U, f.V_ELEMENT, f.V_RING)
 
-# Sizes that count alike in each unknown of the default scene: 0.1 mm off the path, 0.1 m/s of sliding, the
-# strain of the rings.
-SIZES = {
-    f.W: 1e-4,
-    f.U: 0.1,
-    f.V_ELEMENT: 0.1,
-    f.V_RING: 0.1,
-    f.V_FILTERED: 0.1,
-    f.N_ELEMENT: 1e-3,
-    f.N_RING: 1e-3,
-    f.ELEMENT_TILT: 1e-2,
-}
+# Sizes that count alike in each unknown of the default scene, by row of the state: 0.1 mm off the path,
+# 0.1 m/s of sliding (u, both layers and filtered), the strain of the rings, and the tilt of elements.
+SIZES = (1e-4, 0.1, 0.1, 0.1, 0.1, 1e-3, 1e-3, 1e-2)
 SIZE_OF_SPEED, SIZE_OF_POSITION = 1.0, 1e-4  # of a pulley [rad/s], [m]
-SIZE_OF_THRUST = 1e3  # [N]
-SIZES_OF_STATES = (SIZE_OF_SPEED, *[SIZE_OF_POSITION] * (f.RATIO_SUM - 1), SIZE_OF_THRUST, SIZE_OF_THRUST)
+_SIZE_OF_THRUST = 1e3  # [N]
+SIZES_OF_STATES = (SIZE_OF_SPEED, *[SIZE_OF_POSITION] * (f.RATIO_SUM - 1), _SIZE_OF_THRUST, _SIZE_OF_THRUST)
 
 
 class FlatBelt(NamedTuple):
@@ -75,11 +66,8 @@ def flat_belt(belt: Belt, start: float = 0.0) -> FlatBelt:
 
 def pack(flat: FlatBelt, state: State) -> np.ndarray:
     """Vector y of a state; its time is not part of it."""
-    rows, scalars = (
-        state.fields[list(ROWS)].ravel(),
-        state.scalars[[*flat.loose, f.DRIVEN_SPEED, f.DRIVEN_POSITION]],
-    )
-    return np.concatenate([rows, carried(flat, state), scalars]) - flat.origin
+    scalars = state.scalars[[*flat.loose, f.DRIVEN_SPEED, f.DRIVEN_POSITION]]
+    return np.concatenate([state.fields[list(ROWS)].ravel(), carried(flat, state), scalars]) - flat.origin
 
 
 def carried(flat: FlatBelt, state: State) -> np.ndarray:
@@ -117,11 +105,8 @@ def unpack(flat: FlatBelt, t: float, y: np.ndarray) -> None:
     first += flat.remembering.size
     for k in range(flat.loose.size):
         scalars[flat.loose[k]] = y[first + k]
-    scalars[f.TIME], scalars[f.DRIVEN_SPEED], scalars[f.DRIVEN_POSITION] = (
-        flat.start + t,
-        origin[-2] + y[-2],
-        y[-1],
-    )
+    scalars[f.TIME] = flat.start + t
+    scalars[f.DRIVEN_SPEED], scalars[f.DRIVEN_POSITION] = origin[-2] + y[-2], y[-1]
 
 
 @kernel
@@ -164,16 +149,12 @@ def pulled_by(belt: Belt, force: np.ndarray, moments: np.ndarray) -> np.ndarray:
 def free_rates(belt: Belt, state: State, pull: np.ndarray) -> np.ndarray:
     """Rates of free pulleys, (10,), by `pulled_by`: the driven one's speed and position, and STATES."""
     scalars, time = state.scalars, state.scalars[f.TIME]
-    found = pulley_rates(
-        belt.pulleys.laws,
-        0,
-        scalars[f.FIRST_STATE :],
-        1.0 if time >= belt.rise_time else 0.0,
-        (rhs.driving_speed_at(belt, state), scalars[f.DRIVEN_SPEED]),
-        scalars[f.DRIVEN_POSITION],
-        (pull[0], pull[1], (pull[2], pull[3]), (pull[4], pull[5], pull[6], pull[7])),
-        (rhs.load_at(belt, time), belt.ratio, rhs.thrust_at(belt, time), belt.axial_damping),
-    )
+    row, going = scalars.reshape(1, scalars.size), 1.0 if time >= belt.rise_time else 0.0
+    turning = rhs.driving_speed_at(belt, state), scalars[f.DRIVEN_SPEED]
+    pulled = pull[0], pull[1], (pull[2], pull[3]), (pull[4], pull[5], pull[6], pull[7])
+    given = rhs.load_at(belt, time), belt.ratio, rhs.thrust_at(belt, time), belt.axial_damping
+    position = scalars[f.DRIVEN_POSITION]
+    found = pulley_rates(belt.pulleys.laws, 0, row, going, turning, position, pulled, given)
     return np.array(found)
 
 
@@ -232,28 +213,20 @@ def system(flat: FlatBelt) -> System:
     Of these u alone is the rate of an unknown.
     """
     is_velocity = np.arange(f.STATES) == f.EXCESS
-    moving = _by_row(flat, {row: row in VELOCITIES for row in SIZES}, is_velocity, True, False)
+    moving = _by_row(flat, np.isin(range(len(SIZES)), _VELOCITIES), is_velocity, True, False)
     n = flat.belt.cell.size
     position_of = np.full(moving.size, -1)
     position_of[n : 2 * n] = np.arange(n)
-    pulley = sizes_of_pulley(flat.belt)
+    size = flat.belt.measures
+    pulley = SIZE_OF_SPEED / size.time, SIZE_OF_POSITION * size.length
     scale = _by_row(flat, sizes(flat.belt), sizes_of_states(flat.belt), *pulley)
     return System(rates, flat, moving, position_of, scale)
 
 
-def sizes(belt: Belt) -> dict[int, float]:
-    """SIZES in the measures of a scene, by row."""
-    size = belt.measures
-    factors = {
-        f.W: size.length,
-        **dict.fromkeys((f.U, f.V_ELEMENT, f.V_RING, f.V_FILTERED), size.length / size.time),
-    }
-    return {row: default * factors.get(row, 1.0) for row, default in SIZES.items()}
-
-
-def sizes_of_pulley(belt: Belt) -> tuple[float, float]:
-    """SIZE_OF_SPEED and SIZE_OF_POSITION in the measures of a scene."""
-    return SIZE_OF_SPEED / belt.measures.time, SIZE_OF_POSITION * belt.measures.length
+def sizes(belt: Belt) -> np.ndarray:
+    """SIZES in the measures of a scene."""
+    speed = belt.measures.length / belt.measures.time
+    return np.array(SIZES) * [belt.measures.length, *[speed] * 4, 1.0, 1.0, 1.0]
 
 
 def sizes_of_states(belt: Belt) -> np.ndarray:
@@ -263,7 +236,7 @@ def sizes_of_states(belt: Belt) -> np.ndarray:
     return np.array(SIZES_OF_STATES) * factors
 
 
-def _by_row(flat: FlatBelt, values: dict[int, float], states: np.ndarray, *scalars: float) -> np.ndarray:
+def _by_row(flat: FlatBelt, values: np.ndarray, states: np.ndarray, *scalars: float) -> np.ndarray:
     """One value for each unknown, by its row of the state, or its place in STATES."""
     known = (*ROWS, f.ELEMENT_TILT) if flat.belt.tilts else ROWS
     rows = np.repeat([values[row] for row in known], flat.belt.cell.size)

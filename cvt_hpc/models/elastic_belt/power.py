@@ -22,14 +22,13 @@ from cvt_hpc.lanes import LaneArray, fma, like, maximum, minimum
 from cvt_hpc.models.elastic_belt import fields as f
 from cvt_hpc.models.elastic_belt import lane_fields as lf
 from cvt_hpc.models.elastic_belt import lane_forces as forces
-from cvt_hpc.models.elastic_belt import moments, power_terms
+from cvt_hpc.models.elastic_belt import moments
 from cvt_hpc.models.elastic_belt.lane_belt import LaneBelt, LaneState
 from cvt_hpc.models.elastic_belt.lane_column import curving
 from cvt_hpc.models.elastic_belt.lane_tilt import tilt_damping, tilted_saddle
 from cvt_hpc.models.elastic_belt.pulley_step import audit_pulleys, taken_by_clearance
 from cvt_hpc.physics.flank import flank_sliding
-from cvt_hpc.physics.friction import formula_coefficient, law_numbers, saturation, table_coefficient
-from cvt_hpc.physics.friction_laws import Law
+from cvt_hpc.physics.friction import law_numbers, saturation
 
 
 @kernel
@@ -58,8 +57,6 @@ def audit(
     wedge = c[0, lf.WEDGE]
     per_cosine, width = 1.0 / cosine, c[0, lf.FRICTION_SPEED]
     per_width, per_ring_width = 1.0 / width, 1.0 / c[0, lf.RING_FRICTION_SPEED]
-    kind = belt.law.kind
-    table = belt.law.table_force, belt.law.table_speed, belt.law.table_mu
     numbers = law_numbers(c[0, lf.KINETIC_FRICTION], c[0, lf.FRICTION_GRADIENT], c[0, lf.LAW_SPEED])
     least = forces.LEAST_SHARE_OF_WIDTH * width
     damping = forces.lane_damping(belt, state.time[0])
@@ -139,12 +136,8 @@ def audit(
         sliding, meridian = flank_sliding(v_radial, v_tangential, per_cosine)
         sliding = maximum(sliding, least)
         v_law = fields[j, f.V_FILTERED] if belt.memory else sliding
-        if kind == Law.TABLE:
-            mu, _ = table_coefficient(table, v_law, force * per_cosine)
-        else:
-            mu, _ = formula_coefficient(kind, numbers, v_law)
         factor, _ = saturation(sliding, per_width)
-        mu *= factor
+        mu = forces.lane_coefficient(belt, numbers, v_law, force * per_cosine) * factor
         upward = mu * meridian / sliding
         twice_normal = 2.0 * force / fma(upward, sine, cosine)
         elastic_radial = wedge * force
@@ -184,24 +177,22 @@ def audit(
         stored -= 0.5 * dual * force * fma(wedge, fma(upright, w, belt.rise[j]), opening_0)
     thrust = forces.lane_given_thrust(belt, state.time[0], axial)
     axial_speed = (axial - thrust) / c[0, lf.AXIAL_DAMPING]
-    rows[k, first + power_terms.DRIVING_POWER] = driving
-    rows[k, first + power_terms.LOAD_POWER] = (
+    rows[k, first + f.DRIVING_POWER] = driving
+    rows[k, first + f.LOAD_POWER] = (
         like(c[0, lf.RATIO], speed) * forces.lane_load(belt, state.time[0], speed) * speed
     )
-    rows[k, first + power_terms.THRUST_POWER] = thrust * axial_speed
-    rows[k, first + power_terms.DRIVING_FLANK_LOSS] = driving_rub
-    rows[k, first + power_terms.DRIVEN_FLANK_LOSS] = driven_rub
-    rows[k, first + power_terms.RING_LOSS] = ring_loss
-    rows[k, first + power_terms.BELT_LOSS] = belt_loss
-    rows[k, first + power_terms.LAYER_LOSS] = scalars[0, lf.LAYER_WORK] / interval
-    rows[k, first + power_terms.LAG_LOSS] = c[0, lf.AXIAL_DAMPING] * axial_speed * axial_speed
-    rows[k, first + power_terms.SEATING_LOSS] = seating
-    rows[k, first + power_terms.TILT_LOSS] = tilt_loss
-    rows[k, first + power_terms.STORED_ENERGY] = stored
+    rows[k, first + f.THRUST_POWER] = thrust * axial_speed
+    rows[k, first + f.DRIVING_FLANK_LOSS] = driving_rub
+    rows[k, first + f.DRIVEN_FLANK_LOSS] = driven_rub
+    rows[k, first + f.RING_LOSS] = ring_loss
+    rows[k, first + f.BELT_LOSS] = belt_loss
+    rows[k, first + f.LAYER_LOSS] = scalars[0, lf.LAYER_WORK] / interval
+    rows[k, first + f.LAG_LOSS] = c[0, lf.AXIAL_DAMPING] * axial_speed * axial_speed
+    rows[k, first + f.SEATING_LOSS] = seating
+    rows[k, first + f.TILT_LOSS] = tilt_loss
+    rows[k, first + f.STORED_ENERGY] = stored
     if state.contacts[0].has_clearance or state.contacts[1].has_clearance:
-        rows[k, first + power_terms.STORED_ENERGY] = rows[
-            k, first + power_terms.STORED_ENERGY
-        ] - taken_by_clearance(state)
+        rows[k, first + f.STORED_ENERGY] = rows[k, first + f.STORED_ENERGY] - taken_by_clearance(state)
     if belt.is_free:
         audit_pulleys(belt, state, like(driving, speed), like(turned, speed), rows, k, first)
     scalars[0, lf.LAYER_WORK] = 0.0

@@ -1,11 +1,9 @@
 """Conflicts between the pulleys' settings, and settings without effect."""
 
-from collections.abc import Mapping
-from typing import Any
-
 import numpy as np
 
 import cvt_hpc.models.elastic_belt.pulley_settings as settings
+from cvt_hpc.parameters import Parameters, Problem
 from cvt_hpc.physics import capacity
 from cvt_hpc.physics.friction_laws import largest_friction
 from cvt_hpc.physics.geometry import variator, variator_problems
@@ -13,20 +11,17 @@ from cvt_hpc.physics.sheaves import axial_element_stiffness, stiffness_factors
 from cvt_hpc.variator import LARGEST_DISPLACEMENT, MOST_SPEED, PULLEYS
 from cvt_hpc.variator.profiles import multiple
 
-Problem = tuple[str, str, str]  # key, expected, found
-
 # Over a bound on the torque by nominal radii and tangential friction. Sliding at an angle adds 4e-4, which is
 # 1 / sqrt(1 - mu^2 tan^2 d0) - 1; the rest is for a belt that rides out of its groove by a tenth of a radius.
 ABOVE = 1.1
 
 
-def shaft_problems(parameters: Mapping[str, Any]) -> list[Problem]:
+def shaft_problems(p: Parameters) -> list[Problem]:
     """Problems of a shaft, in the form of a model's check."""
-    p = settings.PULLEY_DEFAULTS | dict(parameters)
     return _problems_of_shaft(p, "") or _problems_of_shaft(p, settings.OWN)
 
 
-def _problems_of_shaft(p: Mapping[str, Any], prefix: str) -> list[Problem]:
+def _problems_of_shaft(p: Parameters, prefix: str) -> list[Problem]:
     lengths, diameters = p[f"{prefix}shaft_lengths"], p[f"{prefix}shaft_diameters"]
     if len(lengths) != len(diameters):
         expected = f"one for each of {len(lengths)} {prefix}shaft_lengths"
@@ -44,20 +39,18 @@ def _problems_of_shaft(p: Mapping[str, Any], prefix: str) -> list[Problem]:
     return []
 
 
-def pulley_problems(parameters: Mapping[str, Any]) -> list[Problem]:
+def pulley_problems(p: Parameters) -> list[Problem]:
     """Problems of the pulleys' freedom, in the form of a model's check."""
-    p = settings.PULLEY_DEFAULTS | dict(parameters)
     found = _piston_problems(p) + _drive_problems(p)
-    if 0.0 < p["tilt_lag"] < (least := least_tilt_lag(p)):
+    if 0.0 < p["tilt_lag"] < (least := _least_tilt_lag(p)):
         expected = f"0, or {least:.2g} s and more at this step: tilting is explicit"
         found.append(("tilt_lag", expected, f"{p['tilt_lag']:g} s"))
     found += _bearing_problems(p) + _controller_problems(p)
-    return found or overload_problems(p)
+    return found or _overload_problems(p)
 
 
-def steady_pulley_problems(parameters: Mapping[str, Any]) -> list[Problem]:
+def steady_pulley_problems(p: Parameters) -> list[Problem]:
     """Problems of pulleys in a steady state: lags count for nothing there, but something has to hold each."""
-    p = settings.PULLEY_DEFAULTS | dict(parameters)
     found = _piston_problems(p) + _drive_problems(p) + _bearing_problems(p) + _controller_problems(p)
     is_driven, is_held = np.isfinite(p["driving_inertia"]), np.isinf(p["driven_inertia"])
     if is_driven and p["drive_slope"] == 0.0 and not is_held:
@@ -66,12 +59,11 @@ def steady_pulley_problems(parameters: Mapping[str, Any]) -> list[Problem]:
     if p["driving_axial"] == "ratio" and p["ratio_rate"] == 0.0:
         expected = "above 0: by its gain alone a controller rests where it began"
         found.append(("ratio_rate", expected, "0 N/s"))
-    return found or overload_problems(p)
+    return found or _overload_problems(p)
 
 
-def slipping_pulley_problems(parameters: Mapping[str, Any]) -> list[Problem]:
+def slipping_pulley_problems(p: Parameters) -> list[Problem]:
     """Problems of pulleys whose driven one is slowed down until the belt slips, and no other moves freely."""
-    p = settings.PULLEY_DEFAULTS | dict(parameters)
     found = _piston_problems(p) + _bearing_problems(p)
     if p["driving_axial"] != "position":
         expected = "position: a driving sheave that is free shifts before the belt slips"
@@ -86,14 +78,13 @@ def slipping_pulley_problems(parameters: Mapping[str, Any]) -> list[Problem]:
     return found
 
 
-def overload_problems(parameters: Mapping[str, Any]) -> list[Problem]:
+def _overload_problems(p: Parameters) -> list[Problem]:
     """Problem of a load that is more than any belt carries under the axial forces that are given.
 
     By `capacity.torque_limit` with the largest coefficient of friction, and ABOVE: a bound on the moment of
     each pulley's flanks, whatever the belt does. Near it a belt slips through long since, which is a result.
     A ramp or a profile may lead there, and shows where the belt slips; its start may not lie there.
     """
-    p = settings.PULLEY_DEFAULTS | dict(parameters)
     key = "load_start" if p.get("load_history") == "ramp" else "load"
     load = p[key] * multiple(p, "load", 0.0)
     mu, radius = largest_friction(p), p["driven_radius"] / p["ratio"]
@@ -108,7 +99,7 @@ def overload_problems(parameters: Mapping[str, Any]) -> list[Problem]:
     return []
 
 
-def _most_axial_force(p: Mapping[str, Any]) -> dict[str, float]:
+def _most_axial_force(p: Parameters) -> dict[str, float]:
     """Largest axial force on those pulleys whose thrust is given, or bounded by a controller [N]."""
     thrusts = {"driven": p["most_thrust"] if p["clamping"] == "torque_ratio" else p["thrust"]}
     if p["driving_axial"] != "position":
@@ -124,13 +115,12 @@ def _most_axial_force(p: Mapping[str, Any]) -> dict[str, float]:
     }
 
 
-def least_tilt_lag(parameters: Mapping[str, Any]) -> float:
+def _least_tilt_lag(p: Parameters) -> float:
     """Shortest lag of a tilt [s] that an explicit step follows.
 
     A belt that stays where it is answers an opening q with forces K q against it, K = c r wrap at most, c the
     stiffness of discs and elements in series: the tilt comes to rest at the rate (1 + kappa K) / T1.
     """
-    p = parameters
     if not p.get("step") or variator_problems(p):
         return 0.0
     path = variator(p["ratio"], p["driven_radius"], p["centre_distance"])
@@ -146,13 +136,13 @@ def least_tilt_lag(parameters: Mapping[str, Any]) -> float:
     return float(p["step"] * (1.0 + max(gains)))
 
 
-def _bearing_problems(p: Mapping[str, Any]) -> list[Problem]:
+def _bearing_problems(p: Parameters) -> list[Problem]:
     if p["bearing_clearance"] == 0.0 or p["shaft_lengths"] or p[f"{settings.OWN}shaft_lengths"]:
         return []
     return [("bearing_clearance", "0, or shaft_lengths", f"{p['bearing_clearance']:g} m")]
 
 
-def _piston_problems(p: Mapping[str, Any]) -> list[Problem]:
+def _piston_problems(p: Parameters) -> list[Problem]:
     found = []
     for pulley in ("driving", "driven"):
         piston = p[f"{pulley}_piston"]
@@ -162,7 +152,7 @@ def _piston_problems(p: Mapping[str, Any]) -> list[Problem]:
     return found
 
 
-def _drive_problems(p: Mapping[str, Any]) -> list[Problem]:
+def _drive_problems(p: Parameters) -> list[Problem]:
     has_given = [np.isinf(p[f"{pulley}_inertia"]) for pulley in ("driving", "driven")]
     if all(has_given):
         return [("driven_inertia", "finite, or a finite driving_inertia: one speed follows", "both inf")]
@@ -173,7 +163,7 @@ def _drive_problems(p: Mapping[str, Any]) -> list[Problem]:
     return []
 
 
-def _controller_problems(p: Mapping[str, Any]) -> list[Problem]:
+def _controller_problems(p: Parameters) -> list[Problem]:
     found: list[Problem] = []
     if p["least_thrust"] >= p["most_thrust"]:
         expected = f"less than most_thrust = {p['most_thrust']:g} N"
@@ -192,9 +182,8 @@ def _controller_problems(p: Mapping[str, Any]) -> list[Problem]:
     return found + [("load", expected, f"{load:g} N m") for load in loads if abs(load) > most][:1]
 
 
-def pulley_inert(parameters: Mapping[str, Any]) -> dict[str, str]:
+def pulley_inert(p: Parameters) -> dict[str, str]:
     """Settings of pulleys without effect, each with the setting that makes it so."""
-    p = settings.PULLEY_DEFAULTS | dict(parameters)
     controlled = p["driving_axial"] == "ratio", p["clamping"] == "torque_ratio"
     cases = (
         (np.isinf(p["driving_inertia"]), ("drive_slope",), "driving_inertia inf"),

@@ -3,12 +3,11 @@
 No paper gives numbers of these: every default is an assumption, plausible and not measured.
 """
 
-from collections.abc import Mapping
 from typing import Any
 
 import numpy as np
 
-from cvt_hpc.parameters import Parameter, Substitute, not_negative, positive
+from cvt_hpc.parameters import Parameter, Parameters, Substitute, not_negative, positive
 from cvt_hpc.physics.shaft import Bearing, Seats, beam_flexibility, free_opening, shaft_compliance
 from cvt_hpc.variator.scene import TILT_LAG
 
@@ -34,7 +33,7 @@ def oil_factor(piston: tuple[float, ...], density: float) -> float:
 
 
 def _pressed(pulley: str) -> Substitute:
-    def thrust(parameters: Mapping[str, Any]) -> float:
+    def thrust(parameters: Parameters) -> float:
         piston = parameters[f"{pulley}_piston"]
         if len(piston) != 2:
             raise ValueError(f"{pulley}_piston beside it, the radii of the piston")
@@ -52,14 +51,14 @@ def _axial(pulley: str) -> dict[str, Parameter]:
     return {
         f"{pulley}_piston": not_negative(
             (), "m", f"inner and outer radius of the {pulley} pulley's piston; none: its oil has no weight",
-            sensible=LENGTHS,
+            sensible=LENGTHS
         ),
         f"{pulley}_pressure": not_negative(
             None,
             "Pa",
             f"of the {pulley} pulley's oil, in the place of its thrust, which follows with its spring",
-            sensible=(1e3, 1e9),
-            gives=_pressed(pulley),
+            (1000.0, 1e9),
+            gives=_pressed(pulley)
         ),
         f"{pulley}_spring_force": not_negative(
             0.0, "N", f"of the {pulley} pulley's spring where it is not shifted, beside a pressure", FORCES
@@ -74,7 +73,7 @@ DRIVEN_INERTIA = positive(
     0.02,
     "kg m^2",
     "moment of inertia of the driven pulley; inf: it keeps the speed that it has without load",
-    sensible=(1e-05, 100.0),
+    (1e-5, 100.0),
     allow_infinite=True,
 )
 
@@ -83,23 +82,23 @@ PULLEYS: dict[str, Parameter] = {
         np.inf,
         "kg m^2",
         "moment of inertia of the driving pulley and its drive; inf: its speed is given",
-        sensible=(1e-05, np.inf),
-        allow_infinite=True,
+        (1e-5, np.inf),
+        allow_infinite=True
     ),
     "drive_slope": not_negative(
         0.0,
         "N m s/rad",
         "torque by which the drive falls off as the driving pulley gets faster than driving_speed",
-        (1e-3, 1e5),
+        (1e-3, 1e5)
     ),
     "driving_axial": Parameter(
         "position",
         "",
         "driving pulley: its opening is given, or its thrust, or a controller holds the ratio by its thrust",
-        choices=("position", "thrust", "ratio"),
+        choices=("position", "thrust", "ratio")
     ),
     "driving_thrust": positive(
-        60e3, "N", "axial force on the driving pulley, from rise_time on", sensible=(500.0, 2000000.0)
+        60e3, "N", "axial force on the driving pulley, from rise_time on", (500.0, 2e6)
     ),
     "ratio_gain": not_negative(300e3, "N", "controller: driving thrust per deviation of the ratio", FORCES),
     "ratio_rate": not_negative(
@@ -109,7 +108,7 @@ PULLEYS: dict[str, Parameter] = {
         "constant",
         "",
         "driven pulley: its thrust is constant, or a controller holds the torque ratio by it",
-        choices=("constant", "torque_ratio"),
+        choices=("constant", "torque_ratio")
     ),
     "held_torque_ratio": Parameter(
         0.6,
@@ -117,16 +116,16 @@ PULLEYS: dict[str, Parameter] = {
         "torque ratio to be held: load over the load that friction carries at the lesser axial force",
         minimum=-1.0,
         maximum=1.0,
-        exclusive=True,
+        exclusive=True
     ),
     "clamping_gain": not_negative(0.5, "", "controller: driven thrust per axial force that is lacking"),
     "clamping_rate": not_negative(
         50.0, "1/s", "controller: rate of the driven thrust per axial force that is lacking", (1e-3, 1e5)
     ),
-    "least_thrust": not_negative(2e3, "N", "least thrust that a controller sets", FORCES),
+    "least_thrust": not_negative(2000.0, "N", "least thrust that a controller sets", FORCES),
     "most_thrust": positive(100e3, "N", "largest thrust that a controller sets", sensible=FORCES),
     **_of_each(_axial),
-    "oil_density": positive(850.0, "kg/m^3", "density of the oil behind the pistons", sensible=(100.0, 1e4)),
+    "oil_density": positive(850.0, "kg/m^3", "density of the oil behind the pistons", (100.0, 1e4)),
     **TILT_LAG,
     "collar_clearance": not_negative(
         0.0, "rad", "angle by which the collar of a movable sheave tilts before it bears", (1e-7, 0.1)
@@ -143,7 +142,7 @@ def _shaft(prefix: str, of: str, none: str) -> dict[str, Parameter]:
     keys = {
         "shaft_lengths": positive((), "m", f"lengths of a shaft's sections, {of}; none: {none}", LENGTHS),
         "shaft_diameters": positive((), "m", "diameters of these sections", LENGTHS),
-        "shaft_modulus": positive(2.1e11, "Pa", "Young's modulus of that shaft", sensible=(1e9, 1e13)),
+        "shaft_modulus": positive(2.1e11, "Pa", "Young's modulus of that shaft", (1e9, 1e13)),
         "shaft_factor": positive(
             1.0, "", "factor on the stiffness of that shaft and its bearings; inf: rigid", allow_infinite=True
         ),
@@ -152,7 +151,7 @@ def _shaft(prefix: str, of: str, none: str) -> dict[str, Parameter]:
         ),
         "bearing_positions": not_negative((), "m", "where the two bearings sit along that shaft", LENGTHS),
         "bearing_stiffness": positive(
-            2e8, "N/m", "radial stiffness of such a bearing", sensible=(1e5, 1e12), allow_infinite=True
+            2e8, "N/m", "radial stiffness of such a bearing", (1e5, 1e12), allow_infinite=True
         ),
     }
     return {f"{prefix}{key}": parameter for key, parameter in keys.items()}
@@ -175,32 +174,27 @@ PULLEY_DEFAULTS = {
 }
 
 
-def are_free(parameters: Mapping[str, Any]) -> bool:
+def are_free(p: Parameters) -> bool:
     """Whether pulleys do more than turn by a given speed, or be pressed by a constant thrust.
 
     Reads no parameter that does not count: the parameters read decide which runs can share a batch.
     """
-
-    def of(key: str) -> Any:
-        return parameters[key] if key in parameters else PULLEY_DEFAULTS[key]
-
     return bool(
-        np.isfinite(of("driving_inertia"))
-        or np.isinf(of("driven_inertia"))
-        or of("driving_axial") != "position"
-        or of("clamping") != "constant"
-        or of("driven_spring_rate") > 0.0
-        or of("driven_piston")
-        or of("tilt_lag") > 0.0
+        np.isfinite(p["driving_inertia"])
+        or np.isinf(p["driven_inertia"])
+        or p["driving_axial"] != "position"
+        or p["clamping"] != "constant"
+        or p["driven_spring_rate"] > 0.0
+        or p["driven_piston"]
+        or p["tilt_lag"] > 0.0
     )
 
 
-def shaft_deflection(parameters: Mapping[str, Any], pulley: str, radius: float) -> tuple[float, float]:
+def shaft_deflection(p: Parameters, pulley: str, radius: float) -> tuple[float, float]:
     """Effect of a pulley's shaft on its groove: compliance [m/N], free opening by its bearings [m].
 
     From flat values of the run [SI] and the pitch radius [m] of the driving or the driven pulley.
     """
-    p = PULLEY_DEFAULTS | dict(parameters)
     prefix = OWN if pulley == "driven" and p[f"{OWN}shaft_lengths"] else ""
     lengths, diameters, modulus, factor, places, held, stiffness = (p[key] for key in shaft_keys(prefix))
     if not lengths:

@@ -4,7 +4,6 @@ from cvt_hpc.kernels import kernel, merged_kernel
 from cvt_hpc.lanes import LaneArray, fma, like, select, sqrt
 from cvt_hpc.models.elastic_belt import fields as f
 from cvt_hpc.models.elastic_belt import lane_fields as lf
-from cvt_hpc.models.elastic_belt import power_terms
 from cvt_hpc.models.elastic_belt.lane_belt import LaneBelt, LaneState
 from cvt_hpc.models.elastic_belt.lane_forces import lane_given_thrust, lane_load, lane_speed_share
 from cvt_hpc.models.elastic_belt.pulleys import beyond_clearance, drive_torque, pulley_rates
@@ -13,7 +12,7 @@ from cvt_hpc.physics.compliance import Contact
 
 
 @kernel
-def lane_thrust(state: LaneState):
+def _lane_thrust(state: LaneState):
     """Axial force of the belt on the driven sheave [N]."""
     weight, pushed = state.contacts[1].weight, state.contacts[1].stations
     total = like(0.0, pushed[0, compliance.FORCED])
@@ -35,45 +34,24 @@ def _pull(contact: Contact, pattern):
 
 
 @kernel
-def lane_pulley_rates(belt: LaneBelt, state: LaneState, taken, moment):
+def _lane_pulley_rates(belt: LaneBelt, state: LaneState, taken, moment):
     """Rates of free pulleys, ten, by the torques of the belt [N m], as `pulleys.pulley_rates` has them.
 
     Then the tilting forces on the sheaves, four [N], and the axial forces, two [N].
     """
     c, scalars, time = belt.constants, state.scalars, state.time[0]
     speed = scalars[0, lf.SPEED]
-    first = f.FIRST_STATE
-    states = (
-        scalars[0, first],
-        scalars[0, first + 1],
-        scalars[0, first + 2],
-        scalars[0, first + 3],
-        scalars[0, first + 4],
-        scalars[0, first + 5],
-        scalars[0, first + 6],
-        scalars[0, first + 7],
-    )
-    course = lane_speed_share(belt, time, speed) * like(c[0, lf.DRIVING_SPEED], speed)
+    turning = lane_speed_share(belt, time, speed) * like(c[0, lf.DRIVING_SPEED], speed)
+    turning = turning + scalars[0, f.FIRST_STATE + f.EXCESS]
     axial_driving, driving_cos, driving_sin = _pull(state.contacts[0], speed)
     axial_driven, driven_cos, driven_sin = _pull(state.contacts[1], speed)
-    tilting = (driving_cos, driving_sin, driven_cos, driven_sin)
-    load = lane_load(belt, time, speed)
-    found = pulley_rates(
-        c,
-        lf.FIRST_LAW,
-        states,
-        1.0 if time >= belt.rise_time else 0.0,
-        (course + states[f.EXCESS], speed),
-        scalars[0, lf.POSITION],
-        (taken, moment, (axial_driving, axial_driven), tilting),
-        (
-            load,
-            like(c[0, lf.RATIO], speed),
-            lane_given_thrust(belt, time, speed),
-            like(c[0, lf.AXIAL_DAMPING], speed),
-        ),
-    )
-    return found, tilting, (axial_driving, axial_driven)
+    axial, tilting = (axial_driving, axial_driven), (driving_cos, driving_sin, driven_cos, driven_sin)
+    load, ratio = lane_load(belt, time, speed), like(c[0, lf.RATIO], speed)
+    given = load, ratio, lane_given_thrust(belt, time, speed), like(c[0, lf.AXIAL_DAMPING], speed)
+    going, pulled = 1.0 if time >= belt.rise_time else 0.0, (taken, moment, axial, tilting)
+    turnings, position = (turning, speed), scalars[0, lf.POSITION]
+    found = pulley_rates(c, lf.FIRST_LAW, scalars, going, turnings, position, pulled, given)
+    return found, tilting, axial
 
 
 @kernel
@@ -86,7 +64,7 @@ def advance_pulleys(belt: LaneBelt, state: LaneState, taken, moment, step: float
     c, scalars = belt.constants, state.scalars
     speed = scalars[0, lf.SPEED]
     if belt.is_free:
-        rates, tilting, axial = lane_pulley_rates(belt, state, taken, moment)
+        rates, tilting, axial = _lane_pulley_rates(belt, state, taken, moment)
         scalars[0, lf.SPEED] = fma(step, rates[0], speed)
         scalars[0, lf.POSITION] = fma(step, rates[1], scalars[0, lf.POSITION])
         for k in range(f.STATES):
@@ -94,7 +72,7 @@ def advance_pulleys(belt: LaneBelt, state: LaneState, taken, moment, step: float
     else:
         load = like(c[0, lf.RATIO], speed) * lane_load(belt, state.time[0], speed)
         scalars[0, lf.SPEED] = speed + step * (moment - load) / like(c[0, lf.DRIVEN_INERTIA], speed)
-        axial = like(lane_thrust(state), speed)
+        axial = like(_lane_thrust(state), speed)
         scalars[0, lf.POSITION] = scalars[0, lf.POSITION] + step * (
             axial - lane_given_thrust(belt, state.time[0], speed)
         ) / like(c[0, lf.AXIAL_DAMPING], speed)
@@ -149,15 +127,13 @@ def audit_pulleys(
     excess, shift = scalars[0, f.FIRST_STATE + f.EXCESS], scalars[0, f.FIRST_STATE + f.SHIFT]
     position = scalars[0, lf.POSITION]
     turning = lane_speed_share(belt, state.time[0], speed) * like(c[0, lf.DRIVING_SPEED], speed) + excess
-    rates, tilting, axial = lane_pulley_rates(belt, state, driving / turning, -driven / speed)
+    rates, tilting, axial = _lane_pulley_rates(belt, state, driving / turning, -driven / speed)
     mobility = like(c[0, lf.FIRST_LAW + f.DRIVING_MOBILITY], speed)
     torque = drive_torque(c, lf.FIRST_LAW, excess, lane_load(belt, state.time[0], speed))
-    rows[k, first + power_terms.DRIVING_POWER] = select(mobility > 0.0, torque * turning, driving)
+    rows[k, first + f.DRIVING_POWER] = select(mobility > 0.0, torque * turning, driving)
     is_free = like(c[0, lf.FIRST_LAW + f.DRIVEN_MOBILITY], speed) > 0.0
-    rows[k, first + power_terms.LOAD_POWER] = select(
-        is_free, rows[k, first + power_terms.LOAD_POWER], -driven
-    )
-    stored = rows[k, first + power_terms.STORED_ENERGY]
+    rows[k, first + f.LOAD_POWER] = select(is_free, rows[k, first + f.LOAD_POWER], -driven)
+    stored = rows[k, first + f.STORED_ENERGY]
     stored += select(mobility > 0.0, 0.5 * turning * turning / mobility, 0.0)
     # both sheaves along the shaft: axial force in, thrust and spring out, the rest is the lag's
     damping = like(c[0, lf.AXIAL_DAMPING], speed)
@@ -168,7 +144,7 @@ def audit_pulleys(
     )
     thrust_power = fma(-damping, rates[1], axial[1] - springs[1]) * rates[1]
     thrust_power += fma(-damping, rates[3], axial[0] - springs[0]) * rates[3]
-    rows[k, first + power_terms.THRUST_POWER] = thrust_power
+    rows[k, first + f.THRUST_POWER] = thrust_power
     stored += 0.5 * fma(springs[0], shift, springs[1] * position)
     for wrap in range(2):
         tilted = f.FIRST_STATE + (f.DRIVEN_COS if wrap else f.DRIVING_COS)
@@ -184,5 +160,5 @@ def audit_pulleys(
         stored += 0.5 * (
             stiffness * fma(elastic, elastic, beside * beside) - fma(put_in, one, across * other)
         )
-    rows[k, first + power_terms.LAG_LOSS] = lag
-    rows[k, first + power_terms.STORED_ENERGY] = stored
+    rows[k, first + f.LAG_LOSS] = lag
+    rows[k, first + f.STORED_ENERGY] = stored

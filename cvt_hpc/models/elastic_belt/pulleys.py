@@ -23,20 +23,16 @@ All of this stands for plain numbers as for lanes. Layers' speeds are counted fr
 speed, also where the pulley deviates from it, and so is m v^2: it is off by twice that deviation.
 """
 
-from collections.abc import Mapping, Sequence
-from typing import Any, NamedTuple
+from collections.abc import Sequence
+from typing import NamedTuple
 
 import numpy as np
 
 from cvt_hpc.kernels import merged_kernel
 from cvt_hpc.lanes import fma, like, maximum, minimum, select, sqrt
 from cvt_hpc.models.elastic_belt import fields as f
-from cvt_hpc.models.elastic_belt.pulley_settings import (
-    PULLEY_DEFAULTS,
-    are_free,
-    oil_factor,
-    shaft_deflection,
-)
+from cvt_hpc.models.elastic_belt.pulley_settings import are_free, oil_factor, shaft_deflection
+from cvt_hpc.parameters import Parameters
 from cvt_hpc.physics import capacity
 from cvt_hpc.physics.sheaves import Sheaves
 from cvt_hpc.variator import PULLEYS
@@ -51,14 +47,13 @@ class Pulleys(NamedTuple):
 
 
 def with_pulleys(
-    parameters: Mapping[str, Any], wraps: Sequence[Sheaves], radii: tuple[float, float]
+    p: Parameters, wraps: Sequence[Sheaves], radii: tuple[float, float]
 ) -> tuple[list[Sheaves], Pulleys]:
     """Sheaves as the contact takes them, on their shafts, and the constants of both pulleys.
 
     From flat values of the run [SI], and of the driving and of the driven pulley the wraps, on rigid shafts,
     and the pitch radii [m].
     """
-    p = PULLEY_DEFAULTS | dict(parameters)
     shafts = [shaft_deflection(p, pulley, radius) for pulley, radius in zip(PULLEYS, radii, strict=True)]
     bent = [
         wrap._replace(tilt_compliance=wrap.tilt_compliance + compliance)
@@ -71,7 +66,7 @@ def with_pulleys(
     limits = (p["least_thrust"], p["most_thrust"]) if sets_ratio or sets_clamping else (-np.inf, np.inf)
     need = 0.0
     if sets_clamping:
-        need = 1.0 / (capacity.carried_torque(p | {"thrust": 1.0}) * abs(p["held_torque_ratio"]))
+        need = 1.0 / (capacity.carried_torque({**p, "thrust": 1.0}) * abs(p["held_torque_ratio"]))
     named = {
         "driving_mobility": 1.0 / p["driving_inertia"],
         "driven_mobility": 1.0 / p["driven_inertia"],
@@ -138,18 +133,19 @@ def beyond_clearance(one, other, free):
 
 
 @merged_kernel
-def thrusts(laws, first: int, states, going: float, turning, position, axial, given):
+def thrusts(laws, first: int, scalars, going: float, turning, position, axial, given):
     """Axial forces on the movable sheaves [N], and how fast the controllers' integrals change [N/s].
 
     The forces of both pulleys are with springs and oil; the rates are those of ratio and clamping. From
-    `laws`, LAWS from field `first` on, STATES, `going`, 1 once the controllers go and 0 before, speeds of
-    both pulleys [rad/s] and axial forces of the belt on them [N], the opening of the driven pulley [m], and
-    as `given` the load at the driving pulley [N m], speed ratio [1] and thrust on the driven pulley [N].
+    `laws`, LAWS from field `first` on, `scalars`, STATES from field FIRST_STATE on, `going`, 1 once the
+    controllers go and 0 before, speeds of both pulleys [rad/s] and axial forces of the belt on them [N], the
+    opening of the driven pulley [m], and as `given` the load at the driving pulley [N m], speed ratio [1] and
+    thrust on the driven pulley [N].
     """
     torque, ratio, thrust = given
     least, most = like(laws[0, first + f.LEAST_THRUST], thrust), like(laws[0, first + f.MOST_THRUST], thrust)
     deviation = going * (turning[0] / turning[1] - ratio)
-    asked = like(laws[0, first + f.DRIVING_THRUST], thrust) + states[f.RATIO_SUM]
+    asked = like(laws[0, first + f.DRIVING_THRUST], thrust) + scalars[0, f.FIRST_STATE + f.RATIO_SUM]
     asked = fma(like(laws[0, first + f.RATIO_GAIN], thrust), deviation, asked)
     driving = minimum(maximum(asked, least), most)
     ratio_rate = like(laws[0, first + f.RATIO_RATE], thrust) * deviation
@@ -158,12 +154,18 @@ def thrusts(laws, first: int, states, going: float, turning, position, axial, gi
     ratio_rate = select(asked < least, maximum(ratio_rate, 0.0), ratio_rate)
     needed = like(laws[0, first + f.NEED], thrust) * maximum(torque, -torque)
     lack = going * (needed - minimum(axial[0], axial[1]))
-    asked = fma(like(laws[0, first + f.CLAMPING_GAIN], thrust), lack, thrust + states[f.CLAMPING_SUM])
+    asked = fma(
+        like(laws[0, first + f.CLAMPING_GAIN], thrust),
+        lack,
+        thrust + scalars[0, f.FIRST_STATE + f.CLAMPING_SUM],
+    )
     driven = minimum(maximum(asked, least), most)
     clamping_rate = like(laws[0, first + f.CLAMPING_RATE], thrust) * lack
     clamping_rate = select(asked > most, minimum(clamping_rate, 0.0), clamping_rate)
     clamping_rate = select(asked < least, maximum(clamping_rate, 0.0), clamping_rate)
-    driving = fma(like(laws[0, first + f.DRIVING_SPRING_RATE], thrust), states[f.SHIFT], driving)
+    driving = fma(
+        like(laws[0, first + f.DRIVING_SPRING_RATE], thrust), scalars[0, f.FIRST_STATE + f.SHIFT], driving
+    )
     driving = fma(like(laws[0, first + f.DRIVING_OIL], thrust), turning[0] * turning[0], driving)
     driven = fma(like(laws[0, first + f.DRIVEN_SPRING_RATE], thrust), position, driven)
     driven = fma(like(laws[0, first + f.DRIVEN_OIL], thrust), turning[1] * turning[1], driven)
@@ -172,15 +174,19 @@ def thrusts(laws, first: int, states, going: float, turning, position, axial, gi
 
 
 @merged_kernel
-def tilt_rates(laws, first: int, states, tilting):
+def _tilt_rates(laws, first: int, scalars, tilting):
     """Rates of the grooves' openings [m/s], four, by the tilting forces s of both pulleys [N], four."""
     pattern = tilting[0]
     rate = like(laws[0, first + f.TILT_RATE], pattern)
     one, other = beyond_clearance(
-        states[f.DRIVING_COS], states[f.DRIVING_SIN], like(laws[0, first + f.DRIVING_FREE], pattern)
+        scalars[0, f.FIRST_STATE + f.DRIVING_COS],
+        scalars[0, f.FIRST_STATE + f.DRIVING_SIN],
+        like(laws[0, first + f.DRIVING_FREE], pattern),
     )
     three, four = beyond_clearance(
-        states[f.DRIVEN_COS], states[f.DRIVEN_SIN], like(laws[0, first + f.DRIVEN_FREE], pattern)
+        scalars[0, f.FIRST_STATE + f.DRIVEN_COS],
+        scalars[0, f.FIRST_STATE + f.DRIVEN_SIN],
+        like(laws[0, first + f.DRIVEN_FREE], pattern),
     )
     driving = like(laws[0, first + f.DRIVING_TILT], pattern)
     driven = like(laws[0, first + f.DRIVEN_TILT], pattern)
@@ -199,7 +205,7 @@ def drive_torque(laws, first: int, excess, load):
 
 
 @merged_kernel
-def pulley_rates(laws, first: int, states, going: float, turning, position, pulled, given):
+def pulley_rates(laws, first: int, scalars, going: float, turning, position, pulled, given):
     """Rates of all states of both pulleys: driven speed [rad/s^2], driven position [m/s], and STATES.
 
     Arguments as of `thrusts`; but `pulled` is the action of the belt on both pulleys: the torque that it
@@ -209,22 +215,12 @@ def pulley_rates(laws, first: int, states, going: float, turning, position, pull
     taken, moment, axial, tilting = pulled
     load, ratio, thrust, damping = given
     driving, driven, ratio_rate, clamping_rate = thrusts(
-        laws, first, states, going, turning, position, axial, (load, ratio, thrust)
+        laws, first, scalars, going, turning, position, axial, (load, ratio, thrust)
     )
-    torque = drive_torque(laws, first, states[f.EXCESS], load)
-    tilts = tilt_rates(laws, first, states, tilting)
+    torque = drive_torque(laws, first, scalars[0, f.FIRST_STATE + f.EXCESS], load)
+    tilts = _tilt_rates(laws, first, scalars, tilting)
     excess_rate = like(laws[0, first + f.DRIVING_MOBILITY], load) * (torque - taken)
     shift_rate = going * like(laws[0, first + f.DRIVING_AXIAL_MOBILITY], load) * (axial[0] - driving)
     speed_rate = like(laws[0, first + f.DRIVEN_MOBILITY], load) * (moment - ratio * load)
-    return (
-        speed_rate,
-        (axial[1] - driven) / damping,
-        excess_rate,
-        shift_rate,
-        tilts[0],
-        tilts[1],
-        tilts[2],
-        tilts[3],
-        ratio_rate,
-        clamping_rate,
-    )
+    found = (speed_rate, (axial[1] - driven) / damping, excess_rate, shift_rate)
+    return found + tilts + (ratio_rate, clamping_rate)

@@ -1,37 +1,111 @@
-"""Variables of the record of the elastic belt: names, units, and how each follows from the samples."""
+"""Variables of the record of the elastic belt, and how each follows from the samples; the history of a run.
 
-from collections.abc import Mapping
+A history has quantities over time, and quantities along the path.
+"""
+
+from __future__ import annotations
+
 from functools import partial
-from typing import Any
+from typing import TYPE_CHECKING, Any
 
 import numpy as np
 
-from cvt_hpc.models.elastic_belt import fluctuation, ring_record
+from cvt_hpc.models.elastic_belt import along_belt as along
+from cvt_hpc.models.elastic_belt import fluctuation, grouping
 from cvt_hpc.models.elastic_belt.belt import MODES
-from cvt_hpc.models.elastic_belt.grouping import cost, lane_key, lanes
-from cvt_hpc.models.elastic_belt.history import histories
-from cvt_hpc.models.elastic_belt.momentary import profile_bytes
-from cvt_hpc.models.elastic_belt.pulley_settings import PULLEY_DEFAULTS, are_free, oil_factor
+from cvt_hpc.models.elastic_belt.belt_settings import MOST_LAYERS, layer_count
+from cvt_hpc.models.elastic_belt.lane_rings import LOSS, SLIDING, SPEED_SUM, TENSION
+from cvt_hpc.models.elastic_belt.pulley_settings import are_free, oil_factor
+from cvt_hpc.parameters import Parameters
+from cvt_hpc.storage.netcdf import attributes
 from cvt_hpc.variables import Coordinate, Variable, together
-from cvt_hpc.variator import PULLEYS, judging
+from cvt_hpc.variator import PULLEYS, judging, variables
 from cvt_hpc.variator.band import band
+from cvt_hpc.variator.history import dataset, of_means
 from cvt_hpc.variator.slip import AGAINST_SLIP
-from cvt_hpc.variator.variables import (
-    COORDINATES,
-    Measured,
-    each_pulley,
-    frequency_bins,
-    power,
-    shared,
-    shift_speed,
-)
+from cvt_hpc.variator.variables import COORDINATES, Measured, each_pulley, power, shared
 from cvt_hpc.vibration import peaks, ramp
 from cvt_hpc.vibration.signals import band_amplitude
 
-__all__ = ["VARIABLES", "coordinates", "cost", "histories", "judge", "lane_key", "lanes", "profile_bytes"]
+if TYPE_CHECKING:
+    import xarray as xr
+
+    from cvt_hpc.models.elastic_belt.recorded_run import RecordedRun
+
+_FED = "power into the fluctuation of the belt"
+PREFIX = "momentary_"  # of the names of quantities over time and position
 
 
-def strongest_modes(measured: Measured) -> tuple[np.ndarray, np.ndarray]:
+def histories(run: RecordedRun) -> xr.Dataset:
+    """Histories over `time` and means by `position` of a run, finished or failed, as far as it has samples.
+
+    `displacement` (time, probe) [m], scalars over time, and the profiles of the judged part by `position`;
+    with a profile_duration also those of the last samples over `profile_time`.
+    """
+    over_time = {
+        f"{pulley}_position": (f"{pulley} position", "m", f"axial opening of the {pulley} pulley")
+        for pulley in PULLEYS
+    }
+    found = dataset(run, over_time, _profiles(run), run.mesh.position, run.regions)
+    moment = run.channel("driving_power") / run.channel("driving_speed")
+    words = "driving moment", "N m", "of the belt on the driving pulley, which the drive has to overcome"
+    found = found.assign(driving_moment=("time", moment, attributes(*words)))
+    momentary = _last_profiles(run)
+    if not momentary:
+        return found
+    count = len(next(iter(momentary.values()))[0])
+    times = attributes("time of the profiles", "s")
+    return found.assign_coords(profile_time=("profile_time", found["time"].values[-count:], times)).assign(
+        {
+            PREFIX + name: (("profile_time", "position"), values, attributes(*named))
+            for name, (values, *named) in momentary.items()
+        }
+    )
+
+
+def _profiles(run: RecordedRun) -> dict[str, tuple[np.ndarray, str, str, str]]:
+    """Means of the judged part at the stations, (N,): of a cell, half at either end; name, unit, comment."""
+    means, fed = run.means, run.fluctuation
+    dual = fluctuation.at_stations(run.mesh.cell)
+    stress, damping = fluctuation.at_stations(fed.stresses) / dual, (fed.belt + fed.rings) / dual
+    sliding = along.along_belt(means, run.mesh, run.parameters)
+    return {
+        **{
+            name: (values, *of_means(along.ELSEWHERE[name]))
+            for name, values in along.elsewhere(means, run.mesh).items()
+        },
+        "flank_feed": (fed.flanks / dual, "feed by flank friction", "W m-1", _FED),
+        "stress_feed": (stress, "feed by push and tension", "W m-1", _FED),
+        "damping_feed": (damping, "feed by damping and rings", "W m-1", f"{_FED}; negative: taken"),
+        "wrap_angle": (along.wrap_angles(run.mesh), *along.WRAP_ANGLE),
+        **{
+            name: (sliding[name], words, unit, f"{comment}; of means")
+            for name, (words, unit, comment) in along.SLIDING.items()
+        },
+    }
+
+
+def _last_profiles(run: RecordedRun) -> dict[str, tuple[np.ndarray, str, str, str]]:
+    """Quantities of WORDS over the last samples of a run as far as it came, (sample, N), with their words.
+
+    Empty where its profiles are not kept, or the run ended before them.
+    """
+    kept = run.momentary
+    if kept is None or (count := len(kept) - (run.samples - run.done)) <= 0:
+        return {}
+    sample = dict(zip(along.NEEDED, kept[:count].transpose(1, 0, 2), strict=True))
+    samples = slice(run.done - count, run.done)
+    # speeds are counted from the course of the driving speed, which is constant where the drive has inertia
+    is_given = np.isinf(run.parameters["driving_inertia"])
+    course = run.channel("driving_speed")[samples, None] if is_given else run.parameters["driving_speed"]
+    belt_speed = course * run.path.driving_radius
+    lengthened = 1.0 + along.curvature_at_stations(run.mesh) * sample["mean_displacement"]
+    found = along.elsewhere(sample, run.mesh) | along.along_belt(sample, run.mesh, run.parameters)
+    found["element_speed"] = (belt_speed + sample["element_speed"]) / lengthened
+    return {name: (found[name].astype(along.PRECISION), *words) for name, words in along.WORDS.items()}
+
+
+def _strongest_modes(measured: Measured) -> tuple[np.ndarray, np.ndarray]:
     """Strongest mode of each strand in the band, and the amplitudes of all [m]."""
     m, rate = measured, measured.parameters["sampling_rate"]
     modal = band_amplitude(m.modes[m.samples], rate, band(m))
@@ -49,7 +123,7 @@ def modal_peaks(measured: Measured) -> tuple[np.ndarray, ...] | None:
 
 def piston_force(measured: Measured) -> np.ndarray:
     """Mean force of the pressure on the pistons [N], (2,); the axial position is at rest in the mean."""
-    p = PULLEY_DEFAULTS | dict(measured.parameters)
+    p = measured.parameters
     turning = np.array([(measured.part(f"{pulley}_speed") ** 2).mean() for pulley in PULLEYS])
     # the driving spring is counted from the opening that is given
     positions = np.array([measured.mean(f"{pulley}_position") for pulley in PULLEYS])
@@ -92,10 +166,23 @@ def fluctuations(measured: Measured) -> tuple[Any, ...]:
     return -(shares * dual) @ measured.means["flank_power"], *fed, *taken, remainder
 
 
+def of_layers(measured: Measured) -> tuple[np.ndarray, ...] | None:
+    """Values of ring layers and their surfaces; not known where the rings are one."""
+    means = measured.layer_means
+    if means is None:
+        return None
+    padded = np.full((MOST_LAYERS + 1, means.shape[1]), np.nan)
+    padded[: len(means)] = means
+    # the ears have no layer behind them
+    padded[len(means) - 1, TENSION:] = np.nan
+    tensions, sliding = padded[:MOST_LAYERS, TENSION : TENSION + 2], padded[:, SLIDING : SLIDING + 2]
+    return tensions, padded[:MOST_LAYERS, SPEED_SUM], padded[:, LOSS], sliding
+
+
 VARIABLES = (
     *judging.VIBRATION,
     *together(
-        strongest_modes,
+        _strongest_modes,
         Variable(
             "mode",
             "1",
@@ -138,7 +225,7 @@ VARIABLES = (
     ),
     each_pulley("open_share", "1", "mean, out of contact", words="open share of the wrap", early=True),
     *shared("flank_loss", "thrust_ratio", "speed_loss"),
-    shift_speed(radii),
+    variables.shift_speed(radii),
     *shared("driven_speed_ripple", "driving_power", "load_power"),
     *shared("thrust_power", "storing_power", "ring_loss", "belt_loss", "layer_loss"),
     power("lag_loss", "mean power of the driven sheave's lag"),
@@ -149,7 +236,37 @@ VARIABLES = (
         "speed that alternates from step to step, root mean square over the belt's mass and the judged part",
         of=lambda m: np.sqrt(np.mean(m.part("step_ripple") ** 2)),
     ),
-    *ring_record.VARIABLES,
+    *together(
+        of_layers,
+        Variable(
+            "layer_tension",
+            "N",
+            "mean tension of each ring layer in the middle of the strand; nan: no such layer",
+            dims=("ring_layer", "strand"),
+            words="tension by ring layer",
+        ),
+        Variable(
+            "layer_speed",
+            "m s-1",
+            "mean speed of each ring layer around the belt",
+            dims=("ring_layer",),
+            words="speed by ring layer",
+        ),
+        Variable(
+            "surface_loss",
+            "W",
+            "mean loss of each sliding surface of the rings; together they are ring_loss",
+            dims=("ring_surface",),
+            words="loss by ring surface",
+        ),
+        Variable(
+            "surface_sliding",
+            "m s-1",
+            "mean size of the sliding speed of each surface of the rings on the arc",
+            dims=("ring_surface", "pulley"),
+            words="sliding by ring surface",
+        ),
+    ),
     *together(fluctuations, *fluctuation.VARIABLES),
     Variable(
         "least_strand_force",
@@ -160,20 +277,24 @@ VARIABLES = (
 )
 
 
-def coordinates(parameters: Mapping[str, Any]) -> dict[str, Coordinate]:
+def coordinates(parameters: Parameters) -> dict[str, Coordinate]:
     """Coordinates of the record's dimensions, by flat parameters of the job."""
-    of_peaks = {"peak": peaks.coordinate()} if parameters["modal_peaks"] == "on" else {}
-    return {
-        **COORDINATES,
-        **of_peaks,
-        **ring_record.coordinates(parameters),
-        "arc_part": Coordinate(
-            np.arange(1, fluctuation.ARC_PARTS + 1), "1", "part of the wrap", "from its inlet to its outlet"
-        ),
+    found = dict(COORDINATES)
+    if parameters["modal_peaks"] == "on":
+        found["peak"] = peaks.coordinate()
+    if layer_count(parameters) > 1:  # as many as there can be, for jobs that vary it
+        words = "0: saddle; k: between the layers k and k + 1; behind the outermost layer the elements' ears"
+        layers, surfaces = np.arange(1, MOST_LAYERS + 1), np.arange(MOST_LAYERS + 1)
+        found["ring_layer"] = Coordinate(layers, "1", "ring layer", "the inner one first")
+        found["ring_surface"] = Coordinate(surfaces, "1", "surface of ring layers", words)
+    parts, waves = np.arange(1, fluctuation.ARC_PARTS + 1), np.arange(1, MODES + 1)
+    return found | {
+        "arc_part": Coordinate(parts, "1", "part of the wrap", "from its inlet to its outlet"),
         "ramp_share": ramp.coordinate(),
-        "half_waves": Coordinate(np.arange(1, MODES + 1), "1", "half waves", "along the strand"),
-        "frequency_bin": frequency_bins(parameters),
+        "half_waves": Coordinate(waves, "1", "half waves", "along the strand"),
+        "frequency_bin": variables.frequency_bins(parameters),
     }
 
 
+cost, lane_key, lanes, profile_bytes = grouping.cost, grouping.lane_key, grouping.lanes, along.profile_bytes
 judge = partial(judging.judge, variables=VARIABLES)

@@ -1,8 +1,8 @@
 """Recording of every run of the elastic belt, with any stepper: its plan, its arrays and their reading."""
 
-from collections.abc import Iterator, Mapping, Sequence
+from collections.abc import Iterator, Sequence
 from contextlib import contextmanager
-from typing import TYPE_CHECKING, Any, NamedTuple
+from typing import TYPE_CHECKING, Any
 
 import numpy as np
 
@@ -10,64 +10,43 @@ from cvt_hpc.kernels import called_alike
 from cvt_hpc.lanes import LaneArray
 from cvt_hpc.models.elastic_belt import lane_fields as lf
 from cvt_hpc.models.elastic_belt import lane_rings, sampling
-from cvt_hpc.models.elastic_belt.belt import REGIONS, Belt, Mesh, State, mesh
+from cvt_hpc.models.elastic_belt.along_belt import Momentary
+from cvt_hpc.models.elastic_belt.belt import REGIONS, Belt, State, mesh
+from cvt_hpc.models.elastic_belt.belt_settings import layer_count
+from cvt_hpc.models.elastic_belt.fields import LOSSES, POWERS
 from cvt_hpc.models.elastic_belt.fluctuation import Fluctuation, fluctuation
 from cvt_hpc.models.elastic_belt.lane_belt import lane_belt, lane_state
-from cvt_hpc.models.elastic_belt.march import sample_state
-from cvt_hpc.models.elastic_belt.momentary import Momentary
-from cvt_hpc.models.elastic_belt.power_terms import LOSSES, POWERS
 from cvt_hpc.models.elastic_belt.pulley_settings import are_free
-from cvt_hpc.models.elastic_belt.ring_settings import layer_count
 from cvt_hpc.models.elastic_belt.rings import ring_constants, without_saddle_friction
-from cvt_hpc.models.elastic_belt.sampling import CHANNELS, ENDED, PROFILES, Outcome, Probe, Sensors
 from cvt_hpc.models.elastic_belt.validity import doubt, reach_doubt
+from cvt_hpc.parameters import Parameters
 from cvt_hpc.physics.geometry import Variator
 from cvt_hpc.recording import sample_count, start_up_samples
-from cvt_hpc.variables import Status
+from cvt_hpc.variables import Failure, Values
 from cvt_hpc.vibration.ramped import ramped
 
 
-class Recording(NamedTuple):
-    """The recorded quantities, with places and times."""
-
-    mesh: Mesh
-    probes: tuple[Probe, ...]  # where displacement is recorded
-    sensing: Sensors  # the same for kernels
-    interval: float  # of sampling [s]
-    samples: int  # of the whole run
-    # samples before the strands are disturbed; the start-up's damping has gone by then: from there on a
-    # disturbance grows or decays by the belt's own nature
-    kick: int
-    first_judged: int  # samples before the judged part
-
-
-def recording(parameters: Mapping[str, Any], dtype: type) -> Recording:
-    """Plan of a run's recording, by its resolved parameters [SI] and the lanes' type of numbers."""
-    p, grid = parameters, mesh(parameters)
-    interval = 1.0 / p["sampling_rate"]
-    samples = sample_count(p)
-    places = sampling.probes(grid, p["strand_probes"], p["arc_probes"])
-    return Recording(
-        grid,
-        places,
-        sampling.sensors(grid, places, interval, dtype),
-        interval,
-        samples,
-        start_up_samples(p),
-        samples - round(p["judged_fraction"] * samples),
-    )
-
-
 class Records:
-    """Arrays that runs which advance together are recorded into, each in a lane.
+    """Plan and arrays of the recording of runs that advance together, each in a lane.
 
     Their `points`, resolved parameters [SI], are alike in mesh, sampling and duration; `width` is the number
     of lanes, at least one for each run, `dtype` np.float64 or np.float32, that of the lanes.
 
     Attributes
     ----------
-    plan : Recording
-        The recorded quantities.
+    mesh : Mesh
+        Cells around the belt.
+    probes : tuple of Probe
+        Where displacement is recorded; `sensing` is the same for kernels.
+    interval : float
+        Of sampling [s].
+    samples : int
+        Of the whole run.
+    kick : int
+        Samples before the strands are disturbed; the start-up's damping has gone by then: from there on a
+        disturbance grows or decays by the belt's own nature.
+    first_judged : int
+        Samples before the judged part.
     channels : int
         Values in a row of a sample.
     profiles : (N, 23) LaneArray of doubles
@@ -78,14 +57,19 @@ class Records:
         ENDED.
     """
 
-    def __init__(self, points: Sequence[Mapping[str, Any]], width: int, dtype: type) -> None:
-        self.plan = recording(points[0], dtype)
-        self.channels = self.plan.sensing.matrix.shape[0] + len(CHANNELS)
-        stations = self.plan.mesh.cell.size
-        self.profiles = LaneArray(stations, len(PROFILES), width)
-        self._none = LaneArray(0, len(PROFILES), width)
+    def __init__(self, points: Sequence[Parameters], width: int, dtype: type) -> None:
+        p = points[0]
+        self.mesh, self.interval, self.samples = mesh(p), 1.0 / p["sampling_rate"], sample_count(p)
+        self.probes = sampling.probes(self.mesh, p["strand_probes"], p["arc_probes"])
+        self.sensing = sampling.sensors(self.mesh, self.probes, self.interval, dtype)
+        self.kick = start_up_samples(p)
+        self.first_judged = self.samples - round(p["judged_fraction"] * self.samples)
+        self.channels = self.sensing.matrix.shape[0] + len(sampling.CHANNELS)
+        stations = self.mesh.cell.size
+        self.profiles = LaneArray(stations, len(sampling.PROFILES), width)
+        self._none = LaneArray(0, len(sampling.PROFILES), width)
         self.momentary = Momentary(points, stations)
-        self.ended = LaneArray(1, len(ENDED), width)
+        self.ended = LaneArray(1, len(sampling.ENDED), width)
 
     @contextmanager
     def profiles_of(self, sample: int) -> Iterator[LaneArray]:
@@ -93,7 +77,7 @@ class Records:
 
         Of the part that is not judged nothing is summed up. A sample of which profiles are kept comes alone.
         """
-        is_judged = sample >= self.plan.first_judged
+        is_judged = sample >= self.first_judged
         if sample < self.momentary.first:
             yield self.profiles if is_judged else self._none
             return
@@ -111,10 +95,10 @@ class Records:
 class RecordedRun:
     """One run, as it is judged and recorded, by its resolved parameters [SI], in a lane of `records`.
 
-    `mesh`, `probes`, `interval`, `samples` and `risen` are those of the plan. The marching class sets `time`,
-    simulated [s]; `rows`, the sensors' displacement [m], the strands' modes [m], and CHANNELS, (done, S + C);
-    `done`, the samples recorded so far, up to the one at which the run failed; and `failure`, why the run
-    cannot continue: a failure, or a result, with the status done.
+    `mesh`, `probes`, `interval`, `samples` and `risen` are those of the records. The marching class sets
+    `time`, simulated [s]; `rows`, the sensors' displacement [m], the strands' modes [m], and CHANNELS, (done,
+    S + C); `done`, the samples recorded so far, up to the one at which the run failed; and `failure`, why the
+    run cannot continue: a failure, or a result, with the status done.
     """
 
     if TYPE_CHECKING:  # set by the marching class
@@ -128,7 +112,7 @@ class RecordedRun:
             """Samples."""
 
         @property
-        def failure(self) -> tuple[Status, str] | None:
+        def failure(self) -> Failure | None:
             """Why the run cannot continue."""
 
         @property
@@ -139,12 +123,11 @@ class RecordedRun:
         def layer_sums(self) -> np.ndarray | None:
             """`lane_rings.SUMS` of ring layers over the judged part, (n + 1, 6); None where rings are one."""
 
-    def __init__(self, parameters: Mapping[str, Any], records: Records, lane: int = 0) -> None:
+    def __init__(self, parameters: Parameters, records: Records, lane: int = 0) -> None:
         self.parameters, self._records, self._lane = parameters, records, lane
-        self._plan = plan = records.plan
-        self.mesh, self.probes = plan.mesh, plan.probes
-        self.interval, self.samples, self.risen = plan.interval, plan.samples, plan.kick
-        self._sensed = plan.sensing.matrix.shape[0]
+        self.mesh, self.probes = records.mesh, records.probes
+        self.interval, self.samples, self.risen = records.interval, records.samples, records.kick
+        self._sensed = records.sensing.matrix.shape[0]
 
     @property
     def momentary(self) -> np.ndarray | None:
@@ -163,7 +146,7 @@ class RecordedRun:
 
     def channel(self, name: str) -> np.ndarray:
         """History of one of CHANNELS, (done,)."""
-        return self.rows[:, self._sensed + CHANNELS.index(name)]
+        return self.rows[:, self._sensed + sampling.CHANNELS.index(name)]
 
     def mean_driving_speed(self, samples: slice) -> float:
         """Mean speed of the driving pulley in some samples [rad/s]."""
@@ -187,7 +170,7 @@ class RecordedRun:
     @property
     def judged(self) -> slice:
         """Samples of the judged part."""
-        return slice(self._plan.first_judged, self.samples)
+        return slice(self._records.first_judged, self.samples)
 
     @property
     def means(self) -> dict[str, np.ndarray]:
@@ -196,7 +179,7 @@ class RecordedRun:
         Not a number before that part, and where the run has failed.
         """
         sums = self._records.profiles.data[:, :, self._lane]
-        return dict(zip(PROFILES, sums.T / self._judged_count, strict=True))
+        return dict(zip(sampling.PROFILES, sums.T / self._judged_count, strict=True))
 
     @property
     def layer_means(self) -> np.ndarray | None:
@@ -206,7 +189,7 @@ class RecordedRun:
     @property
     def _judged_count(self) -> float:
         """Samples of the judged part so far; not a number before it, and where the run has failed."""
-        count = self.done - self._plan.first_judged if self.failure is None else 0
+        count = self.done - self._records.first_judged if self.failure is None else 0
         return count if count > 0 else np.nan
 
     @property
@@ -219,7 +202,7 @@ class RecordedRun:
         """Name of the region behind each station, (N,)."""
         return np.array(REGIONS)[self.mesh.region]
 
-    def numerical_doubt(self, record: dict[str, Any]) -> tuple[Status, str] | None:
+    def numerical_doubt(self, record: Values) -> Failure | None:
         """Whether a run that reached its end is not to be trusted; the reason, if so.
 
         By `power_residual`, `step_ripple` and `least_strand_force` of its record.
@@ -234,7 +217,7 @@ class OneLaneRun(RecordedRun):
 
     done: int
 
-    def prolong(self, parameters: Mapping[str, Any]) -> None:
+    def prolong(self, parameters: Parameters) -> None:
         """Make room for the samples of a longer duration, whose judged part has yet to come.
 
         The parameters differ from those of the run by `duration` and `judged_fraction` alone.
@@ -257,7 +240,7 @@ class OneLaneRun(RecordedRun):
         self._lane_belt = lane_belt([belt], np.float64)
         self._state = lane_state([belt], [first], np.float64)
         self._stations = LaneArray(self.mesh.cell.size, lf.FIELDS_OF_FORCES, 1)
-        self._take_sample = called_alike(sample_state)
+        self._take_sample = called_alike(sampling.sample_state)
         self._audit_layers = called_alike(lane_rings.audit_layers)
 
     @property
@@ -272,19 +255,19 @@ class OneLaneRun(RecordedRun):
 
     def _go_on_from(self, run: Any) -> None:
         """Take over the history of a run by another stepper, except for means that began before."""
-        self.done, self._disturbed = run.done, run.done > self._plan.kick
+        self.done, self._disturbed = run.done, run.done > self._records.kick
         self._rows.data[: self.done, :, 0] = run.rows
-        if self.done > self._plan.first_judged:
+        if self.done > self._records.first_judged:
             self._records.without_means()
             self._layer_sums[1].data[:] = np.nan
 
-    def _sample_lane(self) -> Outcome:
+    def _sample_lane(self) -> sampling.Outcome:
         """Record the values in the lane; `done` is left to the caller."""
-        layer_sums = self._layer_sums[int(self.done >= self._plan.first_judged)]
+        layer_sums = self._layer_sums[int(self.done >= self._records.first_judged)]
         with self._records.profiles_of(self.done) as profiles:
-            samples = sampling.Samples(self._plan.sensing, self._rows, profiles, self._records.ended)
+            samples = sampling.Samples(self._records.sensing, self._rows, profiles, self._records.ended)
             self._take_sample(self._lane_belt, self._state, self._stations, samples, self.done)
             if layer_count(self.parameters) > 1:
                 of_layers = self._lane_belt, self._rings, self._state, self._layers
                 self._audit_layers(*of_layers, samples, self.done, layer_sums)
-        return Outcome(int(self._records.ended.data[0, sampling.OUTCOME, 0]))
+        return sampling.Outcome(int(self._records.ended.data[0, sampling.OUTCOME, 0]))

@@ -10,7 +10,7 @@ outward):
     rings          m_1 (v_1,t + v_1 v_1,s) =  T,s + q
     transverse     m (w_tt + 2 v w_ts + v' w_s) = (F w_s),s - EI w_ssss - F kappa - d_b (w_t + v_0 w_s) + p_r
     memory         v_f,t + v v_f,s = (|v| - v_f) / tau_f in contact, v_f = |v| where that begins
-    tilt           d_a (th_t + v_0 th_s) = -k_a th - d_1 q, where elements tilt (`element_tilt.py`)
+    tilt           d_a (th_t + v_0 th_s) = -k_a th - d_1 q, where elements tilt (`column.py`)
     pulleys        J omega_dn' = -sum f_t (r + w) - i M,   T_1 k z_dn' = sum f_ax - F_dn   (and `pulleys.py`)
     dampers        T_d,i = c_i (v_i,s + kappa w_t): +T_d,i,s along the belt, -kappa T_d,i across it
 
@@ -42,22 +42,12 @@ import numpy as np
 from cvt_hpc.kernels import kernel, merged_kernel
 from cvt_hpc.models.elastic_belt import fields as f
 from cvt_hpc.models.elastic_belt.belt import Belt, State
-from cvt_hpc.models.elastic_belt.column import column_across, column_forces
-from cvt_hpc.models.elastic_belt.element_tilt import tilt_rate, tilted_sliding
+from cvt_hpc.models.elastic_belt.column import column_across, column_forces, tilt_rate, tilted_sliding
 from cvt_hpc.physics import compliance
 from cvt_hpc.physics.compliance import Contact, plain_contact, solve_wrap
 from cvt_hpc.physics.flank import flank_forces, flank_sliding
 from cvt_hpc.physics.friction import friction_coefficient, saturation
-from cvt_hpc.variator.course import (
-    LOAD,
-    SPEED,
-    THRUST,
-    faded_damping,
-    load_course,
-    multiple_at,
-    slope_at,
-    speed_course,
-)
+from cvt_hpc.variator import course
 
 LEAST_WAY = 0.02  # share of a cell from the place where contact begins to a station, for its memory
 
@@ -65,14 +55,14 @@ LEAST_WAY = 0.02  # share of a cell from the place where contact begins to a sta
 @merged_kernel
 def load_at(belt: Belt, time: float) -> float:
     """Torque at the driving pulley [N m]: a smooth rise to load_start, then linear to load, or a profile."""
-    load = load_course(time, belt.rise_time, belt.ramp_end, belt.load_start, belt.load)
-    return load * multiple_at(belt.profile, LOAD, time)
+    load = course.load_course(time, belt.rise_time, belt.ramp_end, belt.load_start, belt.load)
+    return load * course.multiple_at(belt.profile, course.LOAD, time)
 
 
 @merged_kernel
 def thrust_at(belt: Belt, time: float) -> float:
     """Thrust on the driven pulley [N], by its profile."""
-    return belt.thrust * multiple_at(belt.profile, THRUST, time)
+    return belt.thrust * course.multiple_at(belt.profile, course.THRUST, time)
 
 
 @merged_kernel
@@ -81,8 +71,8 @@ def speed_share_at(belt: Belt, time: float) -> float:
 
     Or by its profile.
     """
-    share = speed_course(time, belt.rise_time, belt.ramp_end, belt.speed_start / belt.driving_speed)
-    return share * multiple_at(belt.profile, SPEED, time)
+    share = course.speed_course(time, belt.rise_time, belt.ramp_end, belt.speed_start / belt.driving_speed)
+    return share * course.multiple_at(belt.profile, course.SPEED, time)
 
 
 @merged_kernel
@@ -93,9 +83,9 @@ def driving_speed_at(belt: Belt, state: State) -> float:
 
 
 @merged_kernel
-def belt_acceleration_at(belt: Belt, time: float) -> float:
+def _belt_acceleration_at(belt: Belt, time: float) -> float:
     """Rate v' of the belt speed [m/s^2]; 0 but along a ramp or a profile of speed, of which a run has one."""
-    rate = slope_at(belt.profile, SPEED, time)
+    rate = course.slope_at(belt.profile, course.SPEED, time)
     if belt.rise_time <= time < belt.ramp_end:
         rate += (1.0 - belt.speed_start / belt.driving_speed) / (belt.ramp_end - belt.rise_time)
     return rate * belt.belt_speed
@@ -104,7 +94,7 @@ def belt_acceleration_at(belt: Belt, time: float) -> float:
 @merged_kernel
 def damping_at(belt: Belt, time: float) -> float:
     """Transverse damping [N s/m^2]: the belt's own, and the start-up's until rise_time."""
-    damping = belt.transverse_damping + faded_damping(time, belt.rise_time, belt.start_damping)
+    damping = belt.transverse_damping + course.faded_damping(time, belt.rise_time, belt.start_damping)
     return damping
 
 
@@ -125,7 +115,7 @@ def fresh_contacts(belt: Belt) -> tuple[Contact, Contact]:
 
 
 @merged_kernel
-def wrap_contact(
+def _wrap_contact(
     belt: Belt,
     contact: Contact,
     places: np.ndarray,
@@ -158,9 +148,9 @@ def contact_forces(belt: Belt, state: State, contacts: tuple[Contact, Contact], 
     w = state.fields[f.W]
     scalars, states = state.scalars, state.scalars[f.FIRST_STATE :]
     opening, tilt = belt.driving_position + states[f.SHIFT], states[f.DRIVING_COS : f.DRIVING_COS + 2]
-    solves = wrap_contact(belt, contacts[0], belt.driving_stations, w, opening, tilt, force)
+    solves = _wrap_contact(belt, contacts[0], belt.driving_stations, w, opening, tilt, force)
     opening, tilt = scalars[f.DRIVEN_POSITION], states[f.DRIVEN_COS : f.DRIVEN_COS + 2]
-    more = wrap_contact(belt, contacts[1], belt.driven_stations, w, opening, tilt, force)
+    more = _wrap_contact(belt, contacts[1], belt.driven_stations, w, opening, tilt, force)
     return solves + more if solves > 0 and more > 0 else 0
 
 
@@ -220,7 +210,7 @@ def accelerations(
     sine, cosine = np.sin(belt.half_wedge_angle), np.cos(belt.half_wedge_angle)
     speed_share = speed_share_at(belt, state.scalars[f.TIME])
     belt_speed, driving_speed = speed_share * belt.belt_speed, driving_speed_at(belt, state)
-    acceleration = belt_acceleration_at(belt, state.scalars[f.TIME])
+    acceleration = _belt_acceleration_at(belt, state.scalars[f.TIME])
     centrifugal = belt.mass * belt_speed * belt_speed
     damping, light = damping_at(belt, state.scalars[f.TIME]), belt.mass - belt.element_mass
     pressed, moment = eps[0], eps[0]
@@ -322,7 +312,7 @@ def memory_rates(belt: Belt, state: State, force: np.ndarray, rate: np.ndarray) 
                 before = sliding_speed(belt, state, j - 1 if j > 0 else vf.size - 1)
             carried, entering = transported(belt, force, j, belt_speed, speed, before)
         else:
-            carried, entering = memory_transport(belt, LEAST_WAY * belt.cell[j - 1], belt_speed), speed
+            carried, entering = _memory_transport(belt, LEAST_WAY * belt.cell[j - 1], belt_speed), speed
         rate[f.V_FILTERED, j] = carried * (entering - vf[j]) + (speed - vf[j]) / belt.friction_memory
 
 
@@ -337,13 +327,13 @@ def transported(
     """
     cell, behind = belt.cell[j - 1], force[j - 1]
     if behind > 0.0:
-        return memory_transport(belt, cell, belt_speed), before
+        return _memory_transport(belt, cell, belt_speed), before
     way = max(force[j] / (force[j] - behind), LEAST_WAY)
-    return memory_transport(belt, way * cell, belt_speed), speed + way * (before - speed)
+    return _memory_transport(belt, way * cell, belt_speed), speed + way * (before - speed)
 
 
 @merged_kernel
-def memory_transport(belt: Belt, spacing: float, belt_speed: float) -> float:
+def _memory_transport(belt: Belt, spacing: float, belt_speed: float) -> float:
     """Upwind rate of the memory's transport [1/s], fitted: a steady memory decays as exp(-s / (v tau_f))."""
     return 1.0 / (belt.friction_memory * np.expm1(spacing / (belt_speed * belt.friction_memory)))
 
@@ -379,8 +369,4 @@ def sliding_speeds(
     omega = state.scalars[f.DRIVEN_SPEED] if belt.on_driven[j] > 0.0 else driving_speed
     distance = (belt.driven_radius if belt.on_driven[j] > 0.0 else belt.driving_radius) + belt.rise[j]
     distance += upright * w
-    return (
-        v_across * upright + v * lean,
-        v * upright - v_across * lean - omega * distance,
-        distance,
-    )
+    return (v_across * upright + v * lean, v * upright - v_across * lean - omega * distance, distance)

@@ -28,20 +28,16 @@ from typing import NamedTuple
 from cvt_hpc.kernels import kernel, merged_kernel
 from cvt_hpc.lanes import LaneArray, ahead, anywhere, around, behind, fma, like, maximum, split
 from cvt_hpc.models.elastic_belt import fields as f
+from cvt_hpc.models.elastic_belt import imex, lane_rings
 from cvt_hpc.models.elastic_belt import lane_fields as lf
 from cvt_hpc.models.elastic_belt import lane_forces as forces
-from cvt_hpc.models.elastic_belt import lane_rings
 from cvt_hpc.models.elastic_belt.belt import Belt
-from cvt_hpc.models.elastic_belt.imex import MOST_PASSES, advance_belt, forget
-from cvt_hpc.models.elastic_belt.imex_bending import move_across, move_with_layers
-from cvt_hpc.models.elastic_belt.imex_stations import assemble, damp_across
-from cvt_hpc.models.elastic_belt.imex_system import TURNS_BACK, eliminate, substitute
-from cvt_hpc.models.elastic_belt.lane_belt import LaneBelt, LaneState, Work, work_space
+from cvt_hpc.models.elastic_belt.imex_stations import assemble, damp_across, move_across, move_with_layers
+from cvt_hpc.models.elastic_belt.lane_belt import LaneBelt, LaneState, work_space
 from cvt_hpc.models.elastic_belt.lane_rings import LaneRings
-from cvt_hpc.models.elastic_belt.march import Sampled, take_sample
 from cvt_hpc.models.elastic_belt.pulley_step import advance_pulleys
 from cvt_hpc.models.elastic_belt.rings import FIRST_LAYER, Rings
-from cvt_hpc.models.elastic_belt.sampling import Samples
+from cvt_hpc.models.elastic_belt.sampling import Sampled, Samples, take_sample
 from cvt_hpc.physics.layers import ring_friction
 
 # Fields of RingWork.layers, STRIDE of each layer: strain; of the eliminated chain the increment by its own
@@ -70,14 +66,10 @@ def ring_work(state: LaneState, belts: Sequence[Belt], rings: Sequence[Rings]) -
     rows, _, lanes = state.fields.data.shape
     dtype, count = state.fields.data.dtype, rings[0].length.size
     constants = lane_rings.lane_rings(belts, rings, dtype)
-    return RingWork(
-        work_space(state, lf.FIELDS_OF_WORK).stations,
-        LaneArray(rows, STRIDE * count + len(FIELDS_OF_STATION), lanes, dtype),
-        constants,
-        constants,
-        LaneArray(rows, count, lanes, dtype),
-        LaneArray(count + 1, len(lane_rings.SUMS), lanes),
-    )
+    stations = work_space(state, lf.FIELDS_OF_WORK).stations
+    layers = LaneArray(rows, STRIDE * count + len(FIELDS_OF_STATION), lanes, dtype)
+    sums = LaneArray(count + 1, len(lane_rings.SUMS), lanes)
+    return RingWork(stations, layers, constants, constants, LaneArray(rows, count, lanes, dtype), sums)
 
 
 def parted_ring_work(work: RingWork, parts: int) -> RingWork:
@@ -110,35 +102,35 @@ def step_rings(belt: LaneBelt, state: LaneState, work: RingWork, step: float) ->
 
     The work space holds the results of `derive` for this state, and the layers' strains.
     """
-    one = Work(work.stations)
-    forces.lane_sliding(belt, state, work.stations)
-    damp_across(belt, state, one)
-    assemble(belt, state, one, step, False)
-    coupled = move_across(belt, state, one, step)
-    couple_layers(belt, work.rings, state, work, step)
-    for attempt in range(MOST_PASSES):
-        eliminate(belt, state, one, step, attempt > 0)
-        found = substitute(belt, state, one, step)
+    stations = work.stations
+    forces.lane_sliding(belt, state, stations)
+    damp_across(belt, state, stations)
+    assemble(belt, state, stations, step, False)
+    coupled = move_across(belt, state, stations, step)
+    _couple_layers(belt, state, work, step)
+    for attempt in range(imex.MOST_PASSES):
+        imex.eliminate(belt, state, stations, step, attempt > 0)
+        found = imex.substitute(belt, state, stations, step)
         if found == 0 and attempt == 0:
             break
-        if found == 0 or attempt == MOST_PASSES - 1:
-            forget(one)
+        if found == 0 or attempt == imex.MOST_PASSES - 1:
+            imex.forget(stations)
             break
-        if found & TURNS_BACK:
-            assemble(belt, state, one, step, True)
-            coupled = move_across(belt, state, one, step)
-            couple_layers(belt, work.rings, state, work, step)
-    move_with_layers(belt, state, one, coupled)
-    taken, moment = advance_belt(belt, state, one, step)
-    advance_layers(belt, work.rings, state, work, step)
+        if found & imex.TURNS_BACK:
+            assemble(belt, state, stations, step, True)
+            coupled = move_across(belt, state, stations, step)
+            _couple_layers(belt, state, work, step)
+    move_with_layers(belt, state, stations, coupled)
+    taken, moment = imex.advance_belt(belt, state, stations, step)
+    _advance_layers(belt, state, work, step)
     advance_pulleys(belt, state, taken, moment, step)
     state.time[0] += step
     forces.advance_discs(belt, state, step)
-    forces.lane_contact_forces(belt, state, work.stations)
+    forces.lane_contact_forces(belt, state, stations)
 
 
 @merged_kernel
-def heavier_by(belt: LaneBelt, rings: LaneRings, j: int, step: float):
+def _heavier_by(belt: LaneBelt, rings: LaneRings, j: int, step: float):
     """Factor on the inertia of the layers' motion against their mean at station j."""
     c = rings.constants
     rate = step * fma(step, c[0, lf.STRESS_RATE], c[0, lf.DAMPING_RATE])
@@ -147,10 +139,10 @@ def heavier_by(belt: LaneBelt, rings: LaneRings, j: int, step: float):
 
 
 @merged_kernel
-def force_along(rings: LaneRings, fields: LaneArray, layers: LaneArray, j: int, k: int, along):
+def _force_along(rings: LaneRings, fields: LaneArray, layers: LaneArray, j: int, k: int, along):
     """Force per length on layer k at station j beyond that common to all [N/m], and its inertia [kg/m].
 
-    `along` is, of the station, the result of `couple_layers`.
+    `along` is, of the station, the result of `_couple_layers`.
     """
     (per_left, per_cell, even_l, even_r), (stiffness, damping), moving, turn, per_dual = along
     heavy, carried, belt_speed, acceleration = moving
@@ -165,9 +157,10 @@ def force_along(rings: LaneRings, fields: LaneArray, layers: LaneArray, j: int, 
 
 
 @kernel
-def couple_layers(belt: LaneBelt, rings: LaneRings, state: LaneState, work: RingWork, step: float) -> None:
+def _couple_layers(belt: LaneBelt, state: LaneState, work: RingWork, step: float) -> None:
     """Eliminate the layers: their part of the blocks and right side of elements and rings as one."""
-    n, fields, stations, layers, c = rings.number, state.fields, work.stations, work.layers, rings.constants
+    rings, fields, stations, layers = work.rings, state.fields, work.stations, work.layers
+    n, falls, c = rings.number, rings.falls, rings.constants
     sine = belt.constants[0, lf.RING_OFFSET]
     share = forces.lane_speed_share(belt, state.time[0], sine)
     belt_speed = share * belt.constants[0, lf.BELT_SPEED]
@@ -180,7 +173,7 @@ def couple_layers(belt: LaneBelt, rings: LaneRings, state: LaneState, work: Ring
     zero = like(0.0, sine)
     element_mass = belt.constants[0, lf.ELEMENT_MASS]
     for j in range(fields.rows):
-        heavier = heavier_by(belt, rings, j, step)
+        heavier = _heavier_by(belt, rings, j, step)
         free = 1.0 / (heavier * mass * per_step)
         # reduced masses over the step: of two layers; of the inner one with all it takes along, and elements
         between = 0.5 * heavier * mass * per_step
@@ -201,13 +194,8 @@ def couple_layers(belt: LaneBelt, rings: LaneRings, state: LaneState, work: Ring
         carried = fma((belt_speed + united) * per_left, united - united_a, acceleration)
         carried = (heavier - 1.0) * mass * longer * carried
         beside = per_left, per_cell, even_l, even_r
-        along = (
-            beside,
-            (stiffness, damping),
-            (heavier * mass, carried, belt_speed, acceleration),
-            turn,
-            per_dual,
-        )
+        moving = heavier * mass, carried, belt_speed, acceleration
+        along = beside, (stiffness, damping), moving, turn, per_dual
         on_arc = anywhere(belt.arc_curvature[j] > 0.0)
         is_driven = belt.on_driven[j] > 0.5
         element = fields[j, f.V_ELEMENT]
@@ -226,7 +214,7 @@ def couple_layers(belt: LaneBelt, rings: LaneRings, state: LaneState, work: Ring
         per_common = per_free
         if not on_arc:
             for k in range(n - 1, -1, -1):
-                force, inertia = force_along(rings, fields, layers, j, k, along)
+                force, inertia = _force_along(rings, fields, layers, j, k, along)
                 part = free * force
                 own_sum += part
                 layers[j, STRIDE * k + PART] = part
@@ -240,10 +228,8 @@ def couple_layers(belt: LaneBelt, rings: LaneRings, state: LaneState, work: Ring
                 over = fields[j, FIRST_LAYER + k]
                 sliding = fma(below_factor, belt_speed + under, -above_factor * (belt_speed + over))
                 level = c[0, lf.LAYER_FRICTION_LEVEL] if k > 0 else c[0, lf.SADDLE_FRICTION_LEVEL]
-                pressed = largest - layers[j, first + PART]
-                secant, slope = ring_friction(
-                    sliding, level * pressed, rings.falls, excess, per_stribeck, per_width, least
-                )
+                level = level * (largest - layers[j, first + PART])
+                secant, slope = ring_friction(sliding, level, falls, excess, per_stribeck, per_width, least)
                 layers[j, first + DRAG] = secant * sliding
                 # not less than the inertia that keeps friction from reversing sliding within the step
                 enough = secant - (between if k > 0 else at_saddle)
@@ -258,9 +244,7 @@ def couple_layers(belt: LaneBelt, rings: LaneRings, state: LaneState, work: Ring
                 outer = fields[j, FIRST_LAYER + n - 1]
                 sliding = fma(below_factor, belt_speed + outer, -above_factor * (belt_speed + element))
                 level = bearing * c[0, lf.SADDLE_FRICTION_LEVEL]
-                secant, slope = ring_friction(
-                    sliding, level, rings.falls, excess, per_stribeck, per_width, least
-                )
+                secant, slope = ring_friction(sliding, level, falls, excess, per_stribeck, per_width, least)
                 drag_up = secant * sliding
                 stiff_up = maximum(slope, secant - at_saddle)
                 factor_up = below_factor
@@ -271,7 +255,7 @@ def couple_layers(belt: LaneBelt, rings: LaneRings, state: LaneState, work: Ring
             common_sum = own_element = element_element = by_elements = by_common = zero
             for k in range(n - 1, -1, -1):
                 first = STRIDE * k
-                force, inertia = force_along(rings, fields, layers, j, k, along)
+                force, inertia = _force_along(rings, fields, layers, j, k, along)
                 drag, stiff = layers[j, first + DRAG], layers[j, first + STIFF]
                 above_factor, below_factor = lane_rings.surface_factors(rings, k, is_driven)
                 by_common = fma(link, common, 1.0)
@@ -321,16 +305,17 @@ def couple_layers(belt: LaneBelt, rings: LaneRings, state: LaneState, work: Ring
 
 
 @kernel
-def advance_layers(belt: LaneBelt, rings: LaneRings, state: LaneState, work: RingWork, step: float) -> None:
+def _advance_layers(belt: LaneBelt, state: LaneState, work: RingWork, step: float) -> None:
     """Apply the layers' increments; their strains, and those of the rings as one."""
-    n, fields, stations, layers, c = rings.number, state.fields, work.stations, work.layers, rings.constants
+    rings, fields, stations, layers = work.rings, state.fields, work.stations, work.layers
+    n, c = rings.number, rings.constants
     offset = belt.constants[0, lf.RING_OFFSET]
     belt_speed = forces.lane_speed_share(belt, state.time[0], offset) * belt.constants[0, lf.BELT_SPEED]
     damping, last = c[0, lf.LAYER_DAMPING], STRIDE * n
     lost = zero = offset * 0.0
     for j in range(fields.rows + 1):
         if j < fields.rows:
-            free = step / (heavier_by(belt, rings, j, step) * c[0, lf.LAYER_MASS])
+            free = step / (_heavier_by(belt, rings, j, step) * c[0, lf.LAYER_MASS])
             element = stations[j, lf.DV_0]
             common = fma(stations[j, lf.DV_1], n, -layers[j, last + OWN_SUM])
             common = fma(-layers[j, last + ELEMENT_SUM], element, common) * layers[j, last + PER_COMMON_SUM]

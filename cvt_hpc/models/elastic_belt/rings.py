@@ -14,20 +14,28 @@ virtual power also the shares of its friction that act along their neutral lines
 For the belt's other parts the rings are one: with the mean strain, whose tension is the sum of all, and the
 mean speed. Rows V_RING and N_RING of a state have these. The layers' own rows follow `FIELDS`: n speeds, then
 n contents less 1 + kappa d_k.
+
+For general integrators the belt with ring layers is one system, too. Its unknowns are those of `one_system`,
+of which the rings as one are left alone and follow from the layers; then the layers' speeds less the nominal
+belt speed, (n, N), and their contents less 1 + kappa d_k, (n, N).
 """
 
-from collections.abc import Mapping
-from typing import Any, NamedTuple
+from typing import NamedTuple
 
 import numpy as np
 
 from cvt_hpc.kernels import kernel
 from cvt_hpc.models.elastic_belt import fields as f
+from cvt_hpc.models.elastic_belt import one_system
 from cvt_hpc.models.elastic_belt.belt import Belt, State
+from cvt_hpc.models.elastic_belt.belt_settings import DEFAULTS, layer_count
 from cvt_hpc.models.elastic_belt.lane_forces import LEAST_SHARE_OF_WIDTH
-from cvt_hpc.models.elastic_belt.rhs import lengthening
-from cvt_hpc.models.elastic_belt.ring_settings import RING_DEFAULTS, layer_count
+from cvt_hpc.models.elastic_belt.one_system import ROWS, FlatBelt, sizes
+from cvt_hpc.models.elastic_belt.rhs import lengthening, speed_share_at
+from cvt_hpc.parameters import Parameters
 from cvt_hpc.physics.layers import ring_friction, stack_forces
+from cvt_hpc.solvers.arrays import copy
+from cvt_hpc.steppers.system import System
 
 FIRST_LAYER = len(f.FIELDS)  # row of a state with the first layer's speed
 
@@ -48,9 +56,9 @@ class Rings(NamedTuple):
     length: np.ndarray  # of each layer without tension, (n,) [m]
 
 
-def ring_constants(parameters: Mapping[str, Any], belt: Belt) -> Rings:
+def ring_constants(parameters: Parameters, belt: Belt) -> Rings:
     """Constants of the layers of one run, by its resolved parameters [SI] and the belt's constants."""
-    p = RING_DEFAULTS | dict(parameters)
+    p = DEFAULTS | dict(parameters)
     n, thickness = layer_count(p), p["layer_thickness"]
     offset = p["ring_offset"] + thickness * (np.arange(n) - 0.5 * (n - 1))
     surface = np.append(offset - 0.5 * thickness, offset[-1] + 0.5 * thickness)
@@ -159,6 +167,8 @@ def layer_rates(
     """
     n, cells = rings.length.size, belt.cell.size
     normal, sliding = np.empty(n + 1), np.empty(n + 1)
+    per_stribeck, per_width = 1.0 / rings.stribeck_speed, 1.0 / rings.friction_speed
+    least = LEAST_SHARE_OF_WIDTH * rings.friction_speed
     u, v = state.fields[f.U], state.fields[FIRST_LAYER : FIRST_LAYER + n]
     for j in range(cells):
         a, b = j - 1 if j > 0 else cells - 1, j + 1 if j < cells - 1 else 0
@@ -172,15 +182,8 @@ def layer_rates(
         if belt.arc_curvature[j] > 0.0:
             surface_friction(belt, rings, state, eps, share, j, normal, sliding)
             for k in range(n + 1):
-                secant, _ = ring_friction(
-                    sliding[k],
-                    rings.kinetic[k],
-                    True,
-                    rings.static_excess,
-                    1.0 / rings.stribeck_speed,
-                    1.0 / rings.friction_speed,
-                    LEAST_SHARE_OF_WIDTH * rings.friction_speed,
-                )
+                level, excess = rings.kinetic[k], rings.static_excess
+                secant, _ = ring_friction(sliding[k], level, True, excess, per_stribeck, per_width, least)
                 drag = (1.0 + rings.surface[k] * kappa) * normal[k] * secant * sliding[k]
                 if k < n:
                     rate[k, j] += drag / (1.0 + rings.offset[k] * kappa)
@@ -196,3 +199,97 @@ def layer_rates(
             inflow = v[k, j] / (1.0 + eps[k, a if v[k, j] >= 0.0 else j])
             outflow = v[k, b] / (1.0 + eps[k, j if v[k, b] >= 0.0 else b])
             rate[n + k, j] = (inflow - outflow) / belt.cell[j]
+
+
+class _FlatRings(NamedTuple):
+    """Input of `rates` beside t and y."""
+
+    flat: FlatBelt  # of the belt whose rings as one do not rub
+    rings: Rings  # constants of the n layers
+    state: State  # work space: the belt with its layers, of the last call
+    one: np.ndarray  # work space: the unknowns of `one_system`, (m,)
+    eps: np.ndarray  # work space of `layer_rates`, (n, N)
+    rate: np.ndarray  # likewise, (2 n + 1, N)
+
+
+def flat_rings(belt: Belt, rings: Rings) -> _FlatRings:
+    """Constants and work space of a belt's `rates`."""
+    flat = one_system.flat_belt(without_saddle_friction(belt))
+    n, cells = rings.length.size, belt.cell.size
+    state = State(np.zeros((FIRST_LAYER + 2 * n, cells)), np.zeros(flat.state.scalars.size))
+    work = np.zeros((n, cells)), np.zeros((2 * n + 1, cells))
+    return _FlatRings(flat, rings, state, np.zeros(flat.origin.size), *work)
+
+
+def pack(flat: _FlatRings, state: State) -> np.ndarray:
+    """Vector y of a state, with layers or without, as at the start; its time is not part of it."""
+    if state.fields.shape[0] == FIRST_LAYER:
+        state = with_layers(state, flat.flat.belt, flat.rings)
+    n = flat.rings.length.size
+    one = one_system.pack(flat.flat, State(state.fields[:FIRST_LAYER], state.scalars))
+    for row in (f.V_RING, f.N_RING):
+        first = ROWS.index(row) * state.fields.shape[1]
+        one[first : first + state.fields.shape[1]] = 0.0
+    layers = state.fields[FIRST_LAYER:].copy()
+    layers[:n] -= flat.flat.belt.belt_speed
+    return np.concatenate([one, layers.ravel()])
+
+
+@kernel
+def unpack(flat: _FlatRings, t: float, y: np.ndarray) -> None:
+    """Write y into `flat.state`, and the part of `one_system` into `flat.one`."""
+    belt, fields, one = flat.flat.belt, flat.state.fields, flat.one
+    cells, n = belt.cell.size, flat.rings.length.size
+    copy(y, one)
+    for k in range(2 * n):
+        for j in range(cells):
+            fields[FIRST_LAYER + k, j] = y[one.size + k * cells + j] + (belt.belt_speed if k < n else 0.0)
+    for j in range(cells):
+        fields[0, j] = one[j]  # the displacement, from which the layers' strains follow
+    unite_layers(belt, flat.rings, flat.state, flat.eps)
+    for place in range(len(ROWS)):
+        row = ROWS[place]
+        if row == f.V_RING or row == f.N_RING:
+            for j in range(cells):
+                one[place * cells + j] = fields[row, j] - flat.flat.origin[place * cells + j]
+    one_system.unpack(flat.flat, t, one)
+    for row in range(FIRST_LAYER):
+        copy(flat.flat.state.fields[row], fields[row])
+    copy(flat.flat.state.scalars, flat.state.scalars)
+
+
+@kernel
+def rates(flat: _FlatRings, t: float, y: np.ndarray, out: np.ndarray) -> bool:
+    """Right-hand side, as `one_system.rates`."""
+    unpack(flat, t, y)
+    belt, m, cells = flat.flat.belt, flat.one.size, flat.flat.belt.cell.size
+    if not one_system.rates(flat.flat, t, flat.one, out[:m]):
+        return False
+    share = speed_share_at(belt, flat.state.scalars[f.TIME])
+    layer_rates(belt, flat.rings, flat.state, flat.eps, share, flat.rate)
+    n = flat.rings.length.size
+    for place in range(len(ROWS)):
+        row = ROWS[place]
+        for j in range(cells):
+            if row == f.V_RING or row == f.N_RING:
+                out[place * cells + j] = 0.0
+            elif row == f.V_ELEMENT:
+                out[place * cells + j] += flat.rate[2 * n, j]
+    for k in range(2 * n):
+        for j in range(cells):
+            out[m + k * cells + j] = flat.rate[k, j]
+    return True
+
+
+def system(flat: _FlatRings) -> System:
+    """The belt as general steppers take it."""
+    one = one_system.system(flat.flat)
+    cells, n = flat.flat.belt.cell.size, flat.rings.length.size
+    velocities = one.velocities.copy()
+    first = ROWS.index(f.V_RING) * cells
+    velocities[first : first + cells] = False
+    moving = np.concatenate([velocities, np.repeat([True, False], n * cells)])
+    position_of = np.concatenate([one.position_of, np.full(2 * n * cells, -1)])
+    size = sizes(flat.flat.belt)
+    scale = np.concatenate([one.scale, np.repeat([size[f.V_RING], size[f.N_RING]], n * cells)])
+    return System(rates, flat, moving, position_of, scale)

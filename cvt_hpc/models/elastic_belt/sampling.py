@@ -1,4 +1,7 @@
-"""The recorded quantities of the belt at each sampling instant, and when a run has to be stopped."""
+"""The recorded quantities of the belt at each sampling instant, and when a run has to be stopped.
+
+A `march` takes many steps and samples in one call, by any of the belt's own steps.
+"""
 
 from enum import IntEnum
 from fractions import Fraction
@@ -7,38 +10,26 @@ from typing import Any, NamedTuple
 import numpy as np
 
 from cvt_hpc.kernels import kernel
-from cvt_hpc.lanes import LaneArray, absolute, fma, like, maximum, minimum, select
+from cvt_hpc.lanes import LaneArray, absolute, fma, like, maximum, merge_parts, minimum, select
 from cvt_hpc.models.elastic_belt import fields as f
 from cvt_hpc.models.elastic_belt import lane_fields as lf
 from cvt_hpc.models.elastic_belt import lane_forces as forces
 from cvt_hpc.models.elastic_belt.belt import MODES, REGIONS, Mesh
+from cvt_hpc.models.elastic_belt.fields import POWERS
 from cvt_hpc.models.elastic_belt.lane_belt import LaneBelt, LaneState
+from cvt_hpc.models.elastic_belt.lane_forces import derive, note_speeds
 from cvt_hpc.models.elastic_belt.moments import MOMENTS, add
 from cvt_hpc.models.elastic_belt.power import audit
-from cvt_hpc.models.elastic_belt.power_terms import POWERS
 from cvt_hpc.models.elastic_belt.pulley_step import opening_by_tilt
 from cvt_hpc.physics import compliance
-from cvt_hpc.variator import LEAST_SPEED, MOST_SPEED
+from cvt_hpc.variator import LEAST_SPEED, MOST_SPEED, PULLEYS, STRANDS
 
 SCALARS = (
-    "load",
-    "driven_speed",
-    "driven_position",
-    "ring_tension t1",
-    "ring_tension t2",
-    "push_force t1",
-    "push_force t2",
-    "axial_force driving",
-    "axial_force driven",
-    "slip driving",
-    "slip driven",
-    "open_share driving",
-    "open_share driven",
-    "least_strand_force",
-    "driving_speed",
-    "driving_position",
-    "tilt driving",
-    "tilt driven",
+    *("load", "driven_speed", "driven_position"),
+    *(f"{name} {strand}" for name in ("ring_tension", "push_force") for strand in STRANDS),
+    *(f"{name} {pulley}" for name in ("axial_force", "slip", "open_share") for pulley in PULLEYS),
+    *("least_strand_force", "driving_speed", "driving_position"),
+    *(f"tilt {pulley}" for pulley in PULLEYS),
 )
 
 
@@ -47,9 +38,9 @@ def _places(names: tuple[str, ...]) -> Any:
     return IntEnum("Scalar", [name.upper().replace(" ", "_") for name in names], start=0)
 
 
-Scalar = _places(SCALARS)
+_Scalar = _places(SCALARS)
 CHANNELS = (*SCALARS, *POWERS, "step_ripple")
-STEP_RIPPLE = CHANNELS.index("step_ripple")
+_STEP_RIPPLE = CHANNELS.index("step_ripple")
 PROFILES = (*MOMENTS, "contact_force", "mean_displacement")
 CONTACT_FORCE, MEAN_DISPLACEMENT = range(len(MOMENTS), len(PROFILES))
 
@@ -170,16 +161,16 @@ def sample(belt: LaneBelt, state: LaneState, stations: LaneArray, samples: Sampl
     speed = state.scalars[0, lf.SPEED]
     share = forces.lane_speed_share(belt, state.time[0], zero)
     belt_speed = share * c[0, lf.BELT_SPEED]
-    rows[k, sensed + Scalar.LOAD] = forces.lane_load(belt, state.time[0], speed)
-    rows[k, sensed + Scalar.DRIVEN_SPEED] = speed
-    rows[k, sensed + Scalar.DRIVEN_POSITION] = state.scalars[0, lf.POSITION]
+    rows[k, sensed + _Scalar.LOAD] = forces.lane_load(belt, state.time[0], speed)
+    rows[k, sensed + _Scalar.DRIVEN_SPEED] = speed
+    rows[k, sensed + _Scalar.DRIVEN_POSITION] = state.scalars[0, lf.POSITION]
     element_stiffness, ring_stiffness = c[0, lf.ELEMENT_STIFFNESS], c[0, lf.RING_STIFFNESS]
     centrifugal = c[0, lf.MASS] * belt_speed * belt_speed
     least = like(np.inf, zero)
     for strand in range(2):
         middle = sensing.middles[strand]
-        rows[k, sensed + Scalar.RING_TENSION_T1 + strand] = ring_stiffness * stations[middle, lf.EPS_1]
-        rows[k, sensed + Scalar.PUSH_FORCE_T1 + strand] = maximum(
+        rows[k, sensed + _Scalar.RING_TENSION_T1 + strand] = ring_stiffness * stations[middle, lf.EPS_1]
+        rows[k, sensed + _Scalar.PUSH_FORCE_T1 + strand] = maximum(
             -element_stiffness * forces.pressed_strain(belt, state, stations, middle), 0.0
         )
         for j in range(sensing.starts[strand], sensing.stops[strand]):
@@ -187,11 +178,11 @@ def sample(belt: LaneBelt, state: LaneState, stations: LaneArray, samples: Sampl
             pressed = minimum(forces.pressed_strain(belt, state, stations, j), 0.0)
             net = fma(element_stiffness, pressed, net)
             least = minimum(net, least)
-    rows[k, sensed + Scalar.LEAST_STRAND_FORCE] = least - centrifugal
+    rows[k, sensed + _Scalar.LEAST_STRAND_FORCE] = least - centrifugal
     driving_speed = like(c[0, lf.DRIVING_SPEED], speed) * forces.lane_speed_share(belt, state.time[0], speed)
-    rows[k, sensed + Scalar.DRIVING_SPEED] = driving_speed + state.scalars[0, f.FIRST_STATE + f.EXCESS]
+    rows[k, sensed + _Scalar.DRIVING_SPEED] = driving_speed + state.scalars[0, f.FIRST_STATE + f.EXCESS]
     shift = state.scalars[0, f.FIRST_STATE + f.SHIFT]
-    rows[k, sensed + Scalar.DRIVING_POSITION] = like(c[0, lf.DRIVING_POSITION], speed) + shift
+    rows[k, sensed + _Scalar.DRIVING_POSITION] = like(c[0, lf.DRIVING_POSITION], speed) + shift
     pulleys = forces.lane_pulleys(belt, share, state.scalars)
     n = fields.rows
     axial = zero
@@ -213,12 +204,12 @@ def sample(belt: LaneBelt, state: LaneState, stations: LaneArray, samples: Sampl
             if contact.rise[i] == 0.0:
                 open_length += select(force > 0.0, zero, weight[i])
                 length += weight[i]
-        rows[k, sensed + Scalar.AXIAL_FORCE_DRIVING + wrap] = axial
-        rows[k, sensed + Scalar.SLIP_DRIVING + wrap] = sliding / (maximum(axial, LEAST_FORCE) * belt_speed)
-        rows[k, sensed + Scalar.OPEN_SHARE_DRIVING + wrap] = open_length / length
-        rows[k, sensed + Scalar.TILT_DRIVING + wrap] = opening_by_tilt(state, wrap)
+        rows[k, sensed + _Scalar.AXIAL_FORCE_DRIVING + wrap] = axial
+        rows[k, sensed + _Scalar.SLIP_DRIVING + wrap] = sliding / (maximum(axial, LEAST_FORCE) * belt_speed)
+        rows[k, sensed + _Scalar.OPEN_SHARE_DRIVING + wrap] = open_length / length
+        rows[k, sensed + _Scalar.TILT_DRIVING + wrap] = opening_by_tilt(state, wrap)
     audit(belt, state, stations, axial, sensing.interval, rows, k, sensed + len(SCALARS), profiles)
-    rows[k, sensed + STEP_RIPPLE] = forces.step_ripple(belt, state, stations)
+    rows[k, sensed + _STEP_RIPPLE] = forces.step_ripple(belt, state, stations)
     for j in range(profiles.rows):
         add(profiles, j, CONTACT_FORCE, stations[j, lf.FORCE])
         add(profiles, j, MEAN_DISPLACEMENT, fields[j, f.W])
@@ -260,3 +251,74 @@ def _watch(belt: LaneBelt, state: LaneState, stations: LaneArray, ended: LaneArr
     ended[0, CONTACT_SOLVES] = select(running, like(solves, speed), ended[0, CONTACT_SOLVES])
     ended[0, REPEATED] = select(running, state.scalars[0, lf.REPEATS], ended[0, REPEATED])
     ended[0, OUTCOME] = select(running, code, ended[0, OUTCOME])
+
+
+class Sampled(NamedTuple):
+    """The belt of which samples are taken, not in parts, and the step's work space."""
+
+    belt: LaneBelt
+    state: LaneState
+    stations: LaneArray
+
+
+@kernel
+def march(
+    begin: Any,
+    advance: Any,
+    take: Any,
+    belt: LaneBelt,
+    state: LaneState,
+    work: Any,
+    step: float,
+    steps: int,
+    sampled: Sampled,
+    samples: Samples,
+    first: int,
+    last: int,
+) -> None:
+    """Fill rows first .. last - 1 with samples, `steps` steps of `step` [s] before each.
+
+    The kernels: begin(belt, state, work) comes first; advance(belt, state, work, step) takes a step; take,
+    with the arguments of `take_sample`, takes a sample. `sampled` is of the same run or runs; at the end it
+    has all of the state.
+    """
+    begin(belt, state, work)
+    for k in range(first, last):
+        for taken in range(steps):
+            note_speeds(belt, state, work.stations, taken, steps)
+            advance(belt, state, work, step)
+        take(state, work, sampled, samples, k)
+    gather(state, work.stations, sampled, work.stations.data.shape[1])
+
+
+@kernel
+def begin_at_once(belt: LaneBelt, state: LaneState, work: Any) -> None:
+    """Begin a march whose step needs no more than the results of `derive`."""
+
+
+@kernel
+def take_sample(state: LaneState, work: Any, sampled: Sampled, samples: Samples, k: int) -> None:
+    """Sample the marched belt, which may be in parts."""
+    gather(state, work.stations, sampled, lf.FIELDS_OF_FORCES)
+    sample(sampled.belt, sampled.state, sampled.stations, samples, k)
+    # a sample takes it to its end
+    state.scalars[0, lf.LAYER_WORK] = like(
+        sampled.state.scalars[0, lf.LAYER_WORK], state.scalars[0, lf.LAYER_WORK]
+    )
+
+
+@kernel
+def gather(state: LaneState, stations: LaneArray, sampled: Sampled, fields: int) -> None:
+    """Join the sampled values from linked parts, of the stations' work space its first `fields`."""
+    merge_parts(state.fields, sampled.state.fields, state.fields.data.shape[1])
+    merge_parts(stations, sampled.stations, fields)
+    merge_parts(state.column, sampled.state.column, state.column.data.shape[1])
+    merge_parts(state.tilt, sampled.state.tilt, state.tilt.data.shape[1])
+    merge_parts(state.scalars, sampled.state.scalars, state.scalars.data.shape[1])
+
+
+@kernel
+def sample_state(belt: LaneBelt, state: LaneState, stations: LaneArray, samples: Samples, k: int) -> None:
+    """Take a sample, as `sample` does, of a state whose forces are not known yet."""
+    derive(belt, state, stations)
+    sample(belt, state, stations, samples, k)

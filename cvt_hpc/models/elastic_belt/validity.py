@@ -1,13 +1,13 @@
 """Conditions that end a run, and checks of the numbers of a run that reached its end."""
 
-from collections.abc import Iterable, Mapping
-from typing import Any
+from collections.abc import Iterable
 
 import numpy as np
 
 from cvt_hpc.models.elastic_belt.belt import Mesh
 from cvt_hpc.models.elastic_belt.sampling import LARGEST_STRAIN, Outcome
-from cvt_hpc.variables import Status
+from cvt_hpc.parameters import Parameters
+from cvt_hpc.variables import Failure, Status, Values
 from cvt_hpc.variator import LARGEST_DISPLACEMENT
 from cvt_hpc.variator.slip import GAINED, LOST
 
@@ -18,28 +18,22 @@ from cvt_hpc.variator.slip import GAINED, LOST
 LARGEST_POWER_RESIDUAL, REFERENCE_CELLS = 0.004, 159
 BEYOND_LIMIT = 1.25  # of the longest stable step by formula: methods were found to hold up to 1.22 of it
 
+_UNSOLVED = "the search for the closed stations of belt and sheaves did not end"
+_LEFT = f"the belt is off its path by more than {LARGEST_DISPLACEMENT:.1%} of the distance of the shafts"
+_STRAINED = f"strain is beyond {LARGEST_STRAIN:.0%}, or elements gape by that share of the belt's length"
 # Of an end with a result the status is done.
 FAILURES = {
-    Outcome.NO_CONTACT_SOLUTION: (
-        Status.FAILED_NUMERICS,
-        "the search for the closed stations of belt and sheaves did not end",
-    ),
+    Outcome.NO_CONTACT_SOLUTION: (Status.FAILED_NUMERICS, _UNSOLVED),
     Outcome.NOT_FINITE: (Status.FAILED_NUMERICS, "the state is not a number"),
-    Outcome.LEFT_THE_GROOVES: (
-        Status.FAILED_NUMERICS,
-        f"the belt is off its path by more than {LARGEST_DISPLACEMENT:.1%} of the distance of the shafts",
-    ),
-    Outcome.OVERSTRAINED: (
-        Status.FAILED_NUMERICS,
-        f"strain is beyond {LARGEST_STRAIN:.0%}, or elements gape by that share of the belt's length",
-    ),
+    Outcome.LEFT_THE_GROOVES: (Status.FAILED_NUMERICS, _LEFT),
+    Outcome.OVERSTRAINED: (Status.FAILED_NUMERICS, _STRAINED),
     # results, and no faults: the torque is more than friction carries, and nothing new would come of the rest
     Outcome.SLIPPED_THROUGH: (Status.DONE, LOST),
     Outcome.RAN_AWAY: (Status.DONE, GAINED),
 }
 
 
-def slack_doubt(bending_stiffness: float, cell: float, least_force: float) -> tuple[Status, str] | None:
+def slack_doubt(bending_stiffness: float, cell: float, least_force: float) -> Failure | None:
     """Whether a strand was pushed so slack that the growth in it is an effect of the mesh; the reason, if so.
 
     Under F = T - P - m v^2 < 0 waves of wave number k grow, at rest at the rate k sqrt((-F - EI k^2) / m): it
@@ -61,7 +55,7 @@ def power_limit(grid: Mesh) -> float:
     return LARGEST_POWER_RESIDUAL * max(1.0, REFERENCE_CELLS / grid.cell.size)
 
 
-def step_doubt(step: float, limit: float) -> tuple[Status, str] | None:
+def step_doubt(step: float, limit: float) -> Failure | None:
     """Whether a step of `imex` [s] is beyond the longest stable one [s] of `transverse_limit`."""
     if step <= BEYOND_LIMIT * limit:
         return None
@@ -69,7 +63,7 @@ def step_doubt(step: float, limit: float) -> tuple[Status, str] | None:
     return Status.FAILED_NUMERICS, f"{why}: shorter waves across the belt grow from step to step"
 
 
-def reach_doubt(force: np.ndarray, grooves: Iterable[np.ndarray]) -> tuple[Status, str] | None:
+def reach_doubt(force: np.ndarray, grooves: Iterable[np.ndarray]) -> Failure | None:
     """Whether contact went on to the last stations that a groove may hold; the reason, if so.
 
     It might go on beyond them. By axial line forces of the flanks (N,) [N/m], of a state or a mean, and the
@@ -81,7 +75,7 @@ def reach_doubt(force: np.ndarray, grooves: Iterable[np.ndarray]) -> tuple[Statu
     return Status.FAILED_NUMERICS, f"{why}: a longer contact would be cut off"
 
 
-def doubt(record: dict[str, Any], parameters: Mapping[str, Any], grid: Mesh) -> tuple[Status, str] | None:
+def doubt(record: Values, parameters: Parameters, grid: Mesh) -> Failure | None:
     """Whether a run that reached its end is not to be trusted; the reason, if so.
 
     By `power_residual`, `step_ripple` and `least_strand_force` of its record, and its flat values [SI].

@@ -1,12 +1,12 @@
 """The record of linear stability: the verdict, and the mode that grows fastest."""
 
-from collections.abc import Mapping
 from typing import Any, NamedTuple
 
 import numpy as np
 
 from cvt_hpc.models.steady_variator import record as steady_record
-from cvt_hpc.variables import Coordinate, Status, Variable, Vibrates
+from cvt_hpc.parameters import Parameters
+from cvt_hpc.variables import Coordinate, Status, Values, Variable, Vibrates
 
 VARIABLES = (
     Variable("growth_rate", "s-1", "of the mode that grows fastest; none found: nan"),
@@ -42,7 +42,7 @@ VARIABLES = (
 class Solution(NamedTuple):
     """Result of linear stability."""
 
-    steady: dict[str, Any] | ValueError  # numbers of the steady state, or why there is none
+    steady: Values | ValueError  # numbers of the steady state, or why there is none
     modes: list  # in the band, the one that grows fastest first
     # growth rate of the first mode of the state as `loosened` has it [1/s]; nan where that is the same
     loosened: float
@@ -51,7 +51,7 @@ class Solution(NamedTuple):
     undecided: float  # growth up to which nothing is decided [1/s]
 
 
-def coordinates(parameters: Mapping[str, Any]) -> dict[str, Coordinate]:
+def coordinates(parameters: Parameters) -> dict[str, Coordinate]:
     """Coordinates of the record's dimensions, whatever the parameters."""
     from cvt_hpc.models.elastic_belt.belt import REGIONS
 
@@ -59,12 +59,12 @@ def coordinates(parameters: Mapping[str, Any]) -> dict[str, Coordinate]:
     return steady_record.coordinates(parameters) | regions
 
 
-def cost(parameters: Mapping[str, Any], stepper: None) -> Any:
+def cost(parameters: Parameters, stepper: None) -> Any:
     """Core-seconds of a run: of a first steady state, and a tenth for each of two spectra."""
     return 1.2 * steady_record.cost(parameters, stepper)
 
 
-def solve(parameters: Mapping[str, Any]) -> Solution:
+def solve(parameters: Parameters) -> Solution:
     """Steady state and its modes for the parameters of a run [SI]."""
     from cvt_hpc.models.elastic_belt.belt import mesh
     from cvt_hpc.models.linear_stability.modes import DECAY, loosened, modes
@@ -80,9 +80,8 @@ def solve(parameters: Mapping[str, Any]) -> Solution:
         return Solution(error, [], np.nan, np.nan, np.array(grid.starts), p["undecided_growth"])
     means = quantities(steady, grid)
     tension, push = means["mean_ring_tension"], means["mean_push_force"]
-    band = steady_band(
-        {**p, "driving_speed": driving_speed(steady)}, (tension[0] - push[0], tension[1] - push[1])
-    )
+    forces = tension[0] - push[0], tension[1] - push[1]
+    band = steady_band({**p, "driving_speed": driving_speed(steady)}, forces)
     growth, loose = np.nan, loosened(steady)
     if loose is not None:
         found = modes(loose, grid, band)
@@ -91,25 +90,23 @@ def solve(parameters: Mapping[str, Any]) -> Solution:
     return Solution(means, first, growth, band[0], np.array(grid.starts), p["undecided_growth"])
 
 
-def judge(solution: Solution) -> dict[str, Any]:
+def judge(solution: Solution) -> Values:
     """The record of a run, its cost apart."""
     if isinstance(solution.steady, ValueError):
         return {"status": Status.FAILED_NUMERICS, "reason": str(solution.steady)}
     found = {"status": Status.DONE, "lower_band_edge": solution.lower_edge, **solution.steady}
     found["loosened_growth_rate"] = solution.loosened
-    margin = solution.undecided
+    margin, loosened = solution.undecided, f"{solution.loosened:.3g}/s with elements apart that hardly touch"
     if not solution.modes:
         holds = not solution.loosened >= -margin
-        reason = "every mode in the band decays fast"
-        if not holds:
-            reason += f", but {solution.loosened:.3g}/s with elements apart that hardly touch"
+        reason = "every mode in the band decays fast" + ("" if holds else f", but {loosened}")
         return found | {"vibrates": Vibrates.NO if holds else Vibrates.UNDECIDED, "reason": reason}
     first = solution.modes[0]
     words = f"growth {first.growth:.3g}/s at {first.frequency:.4g} Hz"
     rates = [first.growth]
     if not np.isnan(solution.loosened):
         rates.append(solution.loosened)
-        words += f", {solution.loosened:.3g}/s with elements apart that hardly touch"
+        words += f", {loosened}"
     vibrates = Vibrates.UNDECIDED
     if min(rates) > margin or max(rates) < -margin:
         vibrates = Vibrates.YES if first.growth > 0.0 else Vibrates.NO

@@ -5,7 +5,6 @@ dropped parts, and why the equations as printed do not vibrate. Importing this p
 """
 
 from cvt_hpc.models import elastic_belt
-from cvt_hpc.models.elastic_belt import check, inert
 from cvt_hpc.parameters import Parameter
 from cvt_hpc.steppers import taken
 from cvt_hpc.variator.scene import TILT
@@ -23,7 +22,7 @@ PARAMETERS = {
             "shapes of a higher own frequency follow their forces with a lag",
             minimum=0.0,
             exclusive=True,
-            sensible=(10.0, 1000000.0),
+            sensible=(10.0, 1e6),
         ),
         "split": Parameter(
             "free_splines",
@@ -37,7 +36,7 @@ PARAMETERS = {
             "of the coarse splines all around; halved on the arcs and again at their ends",
             minimum=0.0,
             exclusive=True,
-            sensible=(0.002, 0.1),
+            sensible=(2e-3, 0.1),
         ),
         "longitudinal": Parameter(
             "inertia",
@@ -55,15 +54,4 @@ REFUSED = elastic_belt.REFUSED | dict.fromkeys(
     "the rates of what lags follow from forces that know them: the model has a step of its own",
 )
 STEPPERS = OWN_STEPPERS
-KICK = elastic_belt.KICK
-
-__all__ = [
-    "DEFAULT_STEPPER",
-    "KICK",
-    "OWN_STEPPERS",
-    "PARAMETERS",
-    "REFUSED",
-    "STEPPERS",
-    "check",
-    "inert",
-]
+KICK, check, inert = elastic_belt.KICK, elastic_belt.check, elastic_belt.inert

@@ -86,12 +86,8 @@ def solve_chain(work: Chain) -> None:
             ring[k] += c * next_0[k] + d * next_1[k]
     # the last station closes the ring
     h0, h1, g0, g1 = of_element[last - 1], of_ring[last - 1], of_element[last], of_ring[last]
-    back_0, back_1, first_0, first_1 = (
-        x[last - 1, f.ELEMENT],
-        x[last - 1, f.RING],
-        x[0, f.ELEMENT],
-        x[0, f.RING],
-    )
+    back_0, back_1 = x[last - 1, f.ELEMENT], x[last - 1, f.RING]
+    first_0, first_1 = x[0, f.ELEMENT], x[0, f.RING]
     diagonal = work.diagonal[last]
     s00 = diagonal[f.ELEMENT_ELEMENT] + h0 + g0 - h0 * back_0[to_element] - g0 * first_0[to_element]
     s01 = diagonal[f.ELEMENT_RING] - h0 * back_0[to_ring] - g0 * first_0[to_ring]

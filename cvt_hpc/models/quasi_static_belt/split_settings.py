@@ -18,8 +18,4 @@ FACTS = Facts(
     stability="step < 2 / the fastest frequency of the dynamic coordinates",
     damping="none in dynamic coordinates and rings; pressed elements like a damper EA step [N s]",
 )
-PARAMETERS = {
-    "numerics": {
-        "step": own_step(50e-6 / 3.0, 1e-9, 1e-3),
-    }
-}
+PARAMETERS = {"numerics": {"step": own_step(50e-6 / 3.0, 1e-9, 1e-3)}}

@@ -22,9 +22,8 @@ from cvt_hpc.models.elastic_belt import rhs
 from cvt_hpc.models.elastic_belt.one_system import driven_thrust, free_rates, pulled_by
 from cvt_hpc.models.quasi_static_belt import fields as q
 from cvt_hpc.models.quasi_static_belt.contents import settle_contents
-from cvt_hpc.models.quasi_static_belt.increments import contradicts, solve_increments
+from cvt_hpc.models.quasi_static_belt.increments import contradicts, put_forces, put_slopes, solve_increments
 from cvt_hpc.models.quasi_static_belt.split_belt import Motion, SplitBelt, Work, refresh
-from cvt_hpc.models.quasi_static_belt.station_forces import put_forces, put_slopes
 
 MOST_PASSES = 9
 

@@ -9,12 +9,9 @@ is cheap.
 Parameters of the limit of slip that a job may set: the steady belt's parameters, and the question.
 """
 
-from typing import Any
-
 from cvt_hpc.models import steady_variator
 from cvt_hpc.models.elastic_belt.pulley_checks import slipping_pulley_problems
-from cvt_hpc.models.steady_variator.parameters import belt_problems
-from cvt_hpc.parameters import Parameter
+from cvt_hpc.parameters import Parameter, Parameters, Problem
 
 PARAMETERS: dict[str, dict[str, Parameter]] = {
     "question": {
@@ -39,18 +36,16 @@ PARAMETERS: dict[str, dict[str, Parameter]] = {
 DEFAULT_STEPPER = None
 STEPPERS: dict[str, str] = {}
 
-__all__ = ["DEFAULT_STEPPER", "PARAMETERS", "STEPPERS", "check", "inert"]
 
-
-def check(parameters: dict[str, Any]) -> list[tuple[str, str, str]]:
+def check(parameters: Parameters) -> list[Problem]:
     """Problems that lie between parameters: those of the belt, or a thrust sought for no load."""
-    problems = belt_problems(parameters) + slipping_pulley_problems(parameters)
+    problems = steady_variator.belt_problems(parameters) + slipping_pulley_problems(parameters)
     if parameters["sought"] == "thrust" and parameters["load"] == 0.0:
         problems.append(("load", 'other than 0 where sought = "thrust"', "0 N m"))
     return problems
 
 
-def inert(parameters: dict[str, Any]) -> dict[str, str]:
+def inert(parameters: Parameters) -> dict[str, str]:
     """Parameters without effect; of a load whose limit is sought the sign counts, the direction of power."""
     found = dict(steady_variator.inert(parameters))
     if parameters["sought"] == "thrust":

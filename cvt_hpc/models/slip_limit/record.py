@@ -2,13 +2,13 @@
 
 from __future__ import annotations
 
-from collections.abc import Mapping
 from typing import TYPE_CHECKING, Any
 
 import numpy as np
 
+from cvt_hpc.parameters import Parameters
 from cvt_hpc.physics.capacity import carried_torque
-from cvt_hpc.variables import Coordinate, Status, Variable, Vibrates
+from cvt_hpc.variables import Coordinate, Status, Values, Variable, Vibrates
 from cvt_hpc.variator import GROSS_SLIP
 from cvt_hpc.variator.variables import COORDINATES, shared
 
@@ -27,22 +27,22 @@ VARIABLES = (
     *shared("flank_loss", "driving_power", "load_power", "ring_loss", "belt_loss"),
     *shared("layer_loss", "seating_loss", "loss", "efficiency", "power_residual"),
 )
-AT_WORK = tuple(variable.name for variable in VARIABLES[5:])
-FIRST_SHARE = 0.4  # of eq. 2's torque: where continuations to the limit begin
+_AT_WORK = tuple(variable.name for variable in VARIABLES[5:])
+_FIRST_SHARE = 0.4  # of eq. 2's torque: where continuations to the limit begin
 WITHIN, TRIES = 2e-3, 8  # of the load: how closely a thrust's limit meets it; thrusts tried at most
 
 
-def coordinates(parameters: Mapping[str, Any]) -> dict[str, Coordinate]:
+def coordinates(parameters: Parameters) -> dict[str, Coordinate]:
     """Coordinates of the record's dimensions, whatever the parameters."""
     return dict(COORDINATES)
 
 
-def cost(parameters: Mapping[str, Any], stepper: None) -> Any:
+def cost(parameters: Parameters, stepper: None) -> Any:
     """Core-seconds of a run: of a first state and of the continuation to the limit."""
     return np.where(parameters["method"] == "formula", 1e-4, 1e-3 * parameters["stations"] ** 2)
 
 
-def solve(parameters: Mapping[str, Any]) -> Any:
+def solve(parameters: Parameters) -> Any:
     """Limit and working point of the parameters of a run [SI]; or why none was found."""
     from cvt_hpc.models.steady_variator.walking import NoSteadyState
 
@@ -52,7 +52,7 @@ def solve(parameters: Mapping[str, Any]) -> Any:
         return error
 
 
-def judge(solution: dict[str, Any] | ValueError) -> dict[str, Any]:
+def judge(solution: Values | ValueError) -> Values:
     """The record of a run, its cost apart."""
     if isinstance(solution, ValueError):
         return {"status": Status.FAILED_NUMERICS, "reason": str(solution)}
@@ -60,12 +60,12 @@ def judge(solution: dict[str, Any] | ValueError) -> dict[str, Any]:
     return {"status": Status.DONE, "vibrates": Vibrates.UNDECIDED, "reason": reason, **solution}
 
 
-def _formula_thrust(p: Mapping[str, Any]) -> float:
+def _formula_thrust(p: Parameters) -> float:
     """Thrust that carries the load by eq. 2, which is linear in it [N]."""
     return abs(p["load"]) / carried_torque({**p, "thrust": 1.0})
 
 
-def _by_formula(p: Mapping[str, Any]) -> dict[str, Any]:
+def _by_formula(p: Parameters) -> Values:
     sign, safety = -1.0 if p["load"] < 0.0 else 1.0, p["safety"]
     if p["sought"] == "thrust":
         thrust, working_thrust = _formula_thrust(p), safety * _formula_thrust(p)
@@ -83,7 +83,7 @@ def _by_formula(p: Mapping[str, Any]) -> dict[str, Any]:
     }
 
 
-def _by_states(p: Mapping[str, Any]) -> dict[str, Any]:
+def _by_states(p: Parameters) -> Values:
     from cvt_hpc.models.elastic_belt.belt import mesh
     from cvt_hpc.models.steady_variator.record import quantities
     from cvt_hpc.models.steady_variator.walking import NoSteadyState
@@ -105,17 +105,17 @@ def _by_states(p: Mapping[str, Any]) -> dict[str, Any]:
         "formula_ratio": abs(limit.load) / by_formula,
         "limit_slip": there["slip"],
         "working_torque": working.load,
-        **{name: found[name] for name in AT_WORK},
+        **{name: found[name] for name in _AT_WORK},
     }
 
 
-def _largest(p: Mapping[str, Any]) -> tuple[Steady, Steady, SteadyBelt]:
+def _largest(p: Parameters) -> tuple[Steady, Steady, SteadyBelt]:
     """State at the largest load that the thrust carries, the start of the continuation, and their belt."""
     first, belt = _first(p)
     return belt.carried(first), first, belt
 
 
-def _first(p: Mapping[str, Any]) -> tuple[Steady, SteadyBelt]:
+def _first(p: Parameters) -> tuple[Steady, SteadyBelt]:
     """State where continuations begin, under a load that is carried by far, and its belt.
 
     Near the largest torque there are other states under the same load, up to a driven pulley that stands.
@@ -123,10 +123,10 @@ def _first(p: Mapping[str, Any]) -> tuple[Steady, SteadyBelt]:
     from cvt_hpc.models.steady_variator.walking import SteadyBelt
 
     belt = SteadyBelt(p)
-    return belt.at(np.copysign(FIRST_SHARE, p["load"]) * carried_torque(p)), belt
+    return belt.at(np.copysign(_FIRST_SHARE, p["load"]) * carried_torque(p)), belt
 
 
-def _at_least_thrust(p: Mapping[str, Any]) -> Steady:
+def _at_least_thrust(p: Parameters) -> Steady:
     """State at the least thrust that carries the load.
 
     The largest load is nearly proportional to the thrust. The driven speed does not lead there: under less

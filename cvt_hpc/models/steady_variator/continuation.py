@@ -1,20 +1,78 @@
-"""The steady equations of a belt, and paths along which their constants change while a solution follows."""
+"""The steady equations of a belt, and paths along which their constants change while a solution follows.
 
-from collections.abc import Callable, Mapping
-from typing import Any
+They have corners, and Newton's iteration takes full steps. With the corners sharp a full step solves the
+equations for the presumed set of pressed elements, and the next set follows from its signs: the active-set
+iteration of complementarity problems, which ends after a few sets. Shortening its steps, or rounding off the
+corners, only hinders it.
+"""
+
+from collections.abc import Callable
+from typing import Protocol
 
 import numpy as np
+from scipy.sparse import csc_array
+from scipy.sparse.linalg import splu
 
 from cvt_hpc.models.elastic_belt.belt import belt_constants
 from cvt_hpc.models.steady_variator.equations import Equations
-from cvt_hpc.models.steady_variator.newton import Solvable, newton
+from cvt_hpc.parameters import Parameters
 from cvt_hpc.physics.friction import softened
 
+_FULL_STEPS = 15  # a good start needs 3 to 6, a far one 12
+FAR = 1e4  # of the unknowns' sizes: a step beyond, such as 1 m of w, does not come back
+
+
+class _Solvable(Protocol):
+    """Equations as Newton's iteration takes them: `Equations` under a load, `Released` on its way."""
+
+    sizes: np.ndarray
+
+    def residual(self, x: np.ndarray) -> np.ndarray | None:
+        """Residual of the equations; None where they have no value."""
+
+    def jacobian(self, x: np.ndarray, sided: bool) -> csc_array:
+        """Slopes of the residual about the unknowns of its last call, as of `Equations`."""
+
+
+def newton(equations: _Solvable, x: np.ndarray, tolerance: float, sided: bool = True) -> np.ndarray | None:
+    """Solve the steady equations from `x`, (n,), which stays as it is; None where the iteration does not end.
+
+    The root mean square of the next step, over the unknowns' sizes, is `tolerance` at most. With slopes on
+    the near side of each corner (`sided`) it ends after a few steps from a solution nearby. Mean slopes
+    across those that are very near are better from far away.
+    """
+    residual = equations.residual(x)
+    for _ in range(_FULL_STEPS):
+        if residual is None or not np.all(np.isfinite(residual)):
+            return None
+        matrix = equations.jacobian(x, sided)
+        if not np.all(np.isfinite(matrix.data)):
+            return None
+        try:
+            factors = splu(matrix)
+        except RuntimeError:  # exactly singular
+            return None
+        step = -factors.solve(residual)
+        if not mean_size(equations, step) < FAR:
+            return None
+        x = x + step
+        residual = equations.residual(x)
+        # by the same factors, the next step
+        if residual is not None and mean_size(equations, factors.solve(residual)) < tolerance:
+            return x
+    return None
+
+
+def mean_size(equations: _Solvable, step: np.ndarray) -> float:
+    """Root mean square of a step over the unknowns' sizes."""
+    return float(np.sqrt(np.mean((step / equations.sizes) ** 2)))
+
+
 # [N], in the default scene: dampers push by 100 N or so, which a gap's strain times this does not reach
-BRIDGING = 10.0
+_BRIDGING = 10.0
 ON_THE_WAY, AT_HOME = 1e-4, 1e-7  # of the unknowns' sizes: 10 nm and 10 pm of w
 SHORTEST = 1e-3  # of a path: shorter steps are not tried
-DAMPERS = ("element_damping", "ring_damping", "transverse_damping")
+_DAMPERS = ("element_damping", "ring_damping", "transverse_damping")
 Widths = tuple[float, float]  # regularisation speeds of flanks and rings, over the belt's own
 OWN: Widths = (1.0, 1.0)
 
@@ -44,7 +102,7 @@ class Continuation:
     `equations` are those under the present constants, `whole` the belt's own constants.
     """
 
-    def __init__(self, parameters: Mapping[str, Any]) -> None:
+    def __init__(self, parameters: Parameters) -> None:
         self.whole = belt_constants(parameters)
         self.equations = Equations(parameters, self.whole)
 
@@ -76,13 +134,13 @@ class Continuation:
             mass=heavy * belt.mass,
             element_mass=heavy * belt.element_mass,
             ring_mass=heavy * belt.ring_mass,
-            **{key: factor**-slowed * getattr(belt, key) for key in DAMPERS},
+            **{key: factor**-slowed * getattr(belt, key) for key in _DAMPERS},
         )
 
     def bridge(self, share: float) -> None:
         """Dampers that reach across all gaps (0), or as far as the elements' own stiffness lets them (1)."""
         whole = self.whole.element_stiffness
-        least = BRIDGING * self.whole.measures.force
+        least = _BRIDGING * self.whole.measures.force
         self.equations.under(bridging_stiffness=least * (whole / least) ** share)
 
     def friction(self, share: float, wide: Widths = OWN) -> None:
@@ -101,7 +159,7 @@ class Continuation:
         step: float,
         name: str,
         tolerance: float = ON_THE_WAY,
-        equations: Solvable | None = None,
+        equations: _Solvable | None = None,
     ) -> np.ndarray:
         """Return the solution at the end of a path, from `x`, (n,), at its beginning.
 

@@ -29,15 +29,15 @@ from scipy.sparse import csr_array, vstack
 from scipy.sparse.csgraph import connected_components
 from scipy.sparse.linalg import splu
 
+from cvt_hpc.models.steady_variator.continuation import FAR, mean_size
 from cvt_hpc.models.steady_variator.equations import MOMENT, SPEED, Equations
-from cvt_hpc.models.steady_variator.newton import FAR, mean_size
 
 # Steps, as the root mean square of the unknowns over their sizes: first, longest, and shortest that is tried
 FIRST, LONGEST, SHORTEST = 1e-3, 0.1, 1e-12
 CORRECTIONS, FACTORISATIONS = 6, 3  # at most: by one factorisation, and of these in a step
-EASY = 5  # with so few corrections the next step is twice as long
+_EASY = 5  # with so few corrections the next step is twice as long
 MOST = 20  # steps of a curve, over the number of stations: default belt from 20 to 160 N m 7, at 80 stations
-SETS = 10  # of pressed cells, tried where a curve begins
+_SETS = 10  # of pressed cells, tried where a curve begins
 # Of the last correction, by its root mean square (round-off leaves 1e-12), and what it leaves of a strain
 CLOSE, NEAR = 1e-11, 1e-12
 MOST_TURNS = 2  # of a cell's sides in place
@@ -55,7 +55,7 @@ class Piece(NamedTuple):
     sense: float  # sign (1 or -1) of the determinant of these slopes above the tangent
 
 
-class Reached(NamedTuple):
+class _Reached(NamedTuple):
     """A state that was corrected: its unknowns, its load [N m], and after how many corrections."""
 
     x: np.ndarray
@@ -114,7 +114,7 @@ class Curve:
     def _begun(self, x: np.ndarray, ahead: np.ndarray) -> Piece | None:
         """The curve about a state near x, to its own tolerance."""
         pressed = self._equations.corners(x).ravel() > 0.0
-        for _ in range(SETS):
+        for _ in range(_SETS):
             piece = self._piece(x, pressed, ahead)
             if piece is None or (found := self._corrected(piece, 0.0)) is None:
                 return None
@@ -136,7 +136,7 @@ class Curve:
 
     def _stepped(
         self, piece: Piece, step: float, corner: int, distance: float, told: np.ndarray
-    ) -> tuple[Reached | None, float, int]:
+    ) -> tuple[_Reached | None, float, int]:
         """Return the next state, the length of the step from there, and the corner on which it is.
 
         Without a state: the corner on which the piece is; or NONE, where no step succeeds. `corner` and
@@ -156,7 +156,7 @@ class Curve:
             if meets != NONE:
                 inside[meets] = 0.0
             if inside.min() >= -NEAR:
-                easy = found.corrections <= EASY and meets == NONE
+                easy = found.corrections <= _EASY and meets == NONE
                 return found, min(2.0 * step, LONGEST) if easy else step, meets
             # onto the corner that was crossed first; from one that is as near as round-off nothing leads away
             crossed = inside < -NEAR
@@ -230,7 +230,7 @@ class Curve:
         """Step along the tangent to the plane in which a state is."""
         return float(self._across(piece.tangent) @ (x - piece.x)) / x.size
 
-    def _corrected(self, piece: Piece, step: float, corner: int = NONE) -> Reached | None:
+    def _corrected(self, piece: Piece, step: float, corner: int = NONE) -> _Reached | None:
         """State from a step along the tangent: on a corner, or else in the plane across the tangent.
 
         First by the piece's factors, then by new ones, as where flanks meet or part on the way.
@@ -259,7 +259,7 @@ class Curve:
                 if size < CLOSE or 0.5 * before < size < self._tolerance:
                     if (last := self._residual(found, piece.pressed)) is None:
                         return None
-                    return Reached(found, last[1], factorisation * CORRECTIONS + correction + 1)
+                    return _Reached(found, last[1], factorisation * CORRECTIONS + correction + 1)
                 if size > before:
                     break
         return None

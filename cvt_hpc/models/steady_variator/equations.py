@@ -19,32 +19,24 @@ right-hand side jumps at eps_0 = 0, and a push between 0 and D |v_0,s| has no ot
 is 10 to 50 nm.
 """
 
-from collections.abc import Mapping
 from typing import Any
 
 import numpy as np
 from scipy.sparse import csc_array, csr_array, vstack
 
 from cvt_hpc.models.elastic_belt import fields as f
+from cvt_hpc.models.elastic_belt import one_system as one
 from cvt_hpc.models.elastic_belt.belt import Belt, State, initial_state
-from cvt_hpc.models.elastic_belt.one_system import (
-    ROWS,
-    carried,
-    flat_belt,
-    rates,
-    sizes_of_states,
-    unpack,
-)
-from cvt_hpc.models.elastic_belt.one_system import SIZES as SIZES_OF_ROWS
 from cvt_hpc.models.elastic_belt.pulleys import moving_states
 from cvt_hpc.models.elastic_belt.rhs import strains
-from cvt_hpc.models.steady_variator.linearised import Linearisation, corners, rates_beyond_corners
+from cvt_hpc.models.steady_variator.linearised import Linearisation, corners, joined, rates_beyond_corners
+from cvt_hpc.parameters import Parameters
 
 LATE = 1e9  # [s]: load and damping are those after any start-up
 # sizes that count alike in each unknown of the default scene: w, eps_0, eps_1, v_f; Q_0, Q_1, driven speed,
 # position
 SIZES = (1e-4, 1e-3, 1e-4, 0.1)
-SIZES_OF_SCALARS = (0.1, 0.1, 1.0, 1e-4)
+_SIZES_OF_SCALARS = (0.1, 0.1, 1.0, 1e-4)
 SPEED = -2  # place of the driven speed among the unknowns
 MOMENT = -4  # place of the driven pulley's balance of moments in the residual
 
@@ -56,9 +48,9 @@ class Equations:
     unknowns.
     """
 
-    def __init__(self, parameters: Mapping[str, Any], belt: Belt) -> None:
+    def __init__(self, parameters: Parameters, belt: Belt) -> None:
         self.belt = belt._replace(bridging_stiffness=belt.element_stiffness)
-        self._flat = flat_belt(self.belt, LATE)
+        self._flat = one.flat_belt(self.belt, LATE)
         self._linearise = Linearisation(self._flat)
         first = initial_state(parameters, belt)
         self._contents = first.fields[f.N_ELEMENT : f.N_ELEMENT + 2] @ belt.cell
@@ -70,17 +62,17 @@ class Equations:
         self.memories = slice(self._carried.start + tilts, self._carried.stop)
         self._states = slice(self._carried.stop, self._carried.stop + self._moving.size)
         counts = (n, n, n, self._memories)
-        of_states = sizes_of_states(belt)[self._moving]
-        self.sizes = np.concatenate([np.repeat(SIZES, counts), of_states, SIZES_OF_SCALARS])
+        of_states = one.sizes_of_states(belt)[self._moving]
+        self.sizes = np.concatenate([np.repeat(SIZES, counts), of_states, _SIZES_OF_SCALARS])
         length, speed = belt.measures.length, belt.measures.length / belt.measures.time
         self.sizes[:n] *= length
-        self.sizes[3 * n : 3 * n + tilts] = SIZES_OF_ROWS[f.ELEMENT_TILT]
+        self.sizes[3 * n : 3 * n + tilts] = one.SIZES[f.ELEMENT_TILT]
         self.sizes[3 * n + tilts : self._carried.stop] *= speed
         self.sizes[-4:] *= speed, speed, 1.0 / belt.measures.time, length
         # of the rates: those of u, v_element and v_ring, of the filtered speeds and of the pulleys
-        self._loose = len(ROWS) * n + self._memories + self._moving
+        self._loose = len(one.ROWS) * n + self._memories + self._moving
         last = self._flat.origin.size
-        kept = np.arange(len(ROWS) * n, len(ROWS) * n + self._memories)
+        kept = np.arange(len(one.ROWS) * n, len(one.ROWS) * n + self._memories)
         self._rates = np.concatenate([np.arange(n, 4 * n), kept, self._loose, [last - 2, last - 1]])
         self._held_speed = first.scalars[f.DRIVEN_SPEED] if np.isinf(belt.driven_inertia) else None
         self._out = np.empty(last)
@@ -98,11 +90,13 @@ class Equations:
         fluxes = (state.fields[f.V_ELEMENT : f.V_ELEMENT + 2] / (1.0 + np.roll(eps, 1, axis=1))).mean(axis=1)
         states = state.scalars[f.FIRST_STATE + self._moving]
         pulley = state.scalars[[f.DRIVEN_SPEED, f.DRIVEN_POSITION]]
-        return np.concatenate([state.fields[f.W], *eps, carried(self._flat, state), states, fluxes, pulley])
+        return np.concatenate(
+            [state.fields[f.W], *eps, one.carried(self._flat, state), states, fluxes, pulley]
+        )
 
     def state(self, x: np.ndarray) -> State:
         """State of the belt; a copy, its time after any start-up."""
-        unpack(self._flat, 0.0, self._flat_unknowns(x))
+        one.unpack(self._flat, 0.0, self._flat_unknowns(x))
         return self._flat.state.copy()
 
     def residual(self, x: np.ndarray, pressed: np.ndarray | None = None) -> np.ndarray | None:
@@ -113,7 +107,7 @@ class Equations:
         """
         y = self._flat_unknowns(x)
         flat = self._flat
-        if not rates(flat, 0.0, y, self._out):
+        if not one.rates(flat, 0.0, y, self._out):
             return None
         contents = flat.state.fields[f.N_ELEMENT : f.N_ELEMENT + 2] @ self.belt.cell
         left = np.concatenate([self._out[self._rates], contents - self._contents])
@@ -126,7 +120,7 @@ class Equations:
 
     def corners(self, x: np.ndarray) -> np.ndarray:
         """Distances (2, N) of the cells from the corners of their push, as of `linearised.corners`."""
-        unpack(self._flat, 0.0, self._flat_unknowns(x))
+        one.unpack(self._flat, 0.0, self._flat_unknowns(x))
         return corners(self.belt, self._flat.state)
 
     def corner_slopes(self, x: np.ndarray) -> csr_array:
@@ -142,8 +136,7 @@ class Equations:
             (softened * (np.roll(strains, 1) - strains), cells, np.full(n, x.size - 4)),
             (-ones, n + cells, n + cells),
         )
-        values, rows, columns = map(np.concatenate, zip(*entries, strict=True))
-        return csr_array((values, (rows, columns)), shape=(2 * n, x.size))
+        return csr_array(joined(entries, zeros=True), shape=(2 * n, x.size))
 
     def jacobian(self, x: np.ndarray, sided: bool = True, pressed: np.ndarray | None = None) -> csc_array:
         """Slopes of the residual, (n, n), about the unknowns of its last call.
@@ -199,9 +192,8 @@ class Equations:
                 (lifted, content + cells, ahead),
             ]
         rest = np.arange(memories)
-        entries.append((np.ones(memories), len(ROWS) * n + rest, 3 * n + rest))
+        entries.append((np.ones(memories), len(one.ROWS) * n + rest, 3 * n + rest))
         places = np.arange(self._states.start, self._states.stop)
         entries.append((np.ones(places.size), self._loose, places))
         entries.append((np.ones(2), self._flat.origin.size - 2 + np.arange(2), count - 2 + np.arange(2)))
-        values, rows, columns = map(np.concatenate, zip(*entries, strict=True))
-        return csr_array((values, (rows, columns)), shape=(self._flat.origin.size, count))
+        return csr_array(joined(entries, zeros=True), shape=(self._flat.origin.size, count))

@@ -14,7 +14,7 @@ from cvt_hpc.models.elastic_belt import fields as f
 from cvt_hpc.models.elastic_belt.belt import REGIONS, Mesh
 from cvt_hpc.models.elastic_belt.column import pressed_strains
 from cvt_hpc.models.elastic_belt.rhs import contact_forces, fresh_contacts, strains
-from cvt_hpc.models.elastic_belt.state_march import sampled
+from cvt_hpc.models.elastic_belt.transient import sampled
 from cvt_hpc.models.steady_variator.walking import Steady
 from cvt_hpc.variator.history import along_path
 from cvt_hpc.variator.slip import against_slip, largest_torque
@@ -88,10 +88,8 @@ class SteadyMeans(Means):
     def __init__(self, steady: Steady, grid: Mesh) -> None:
         belt, scalars, around = steady.belt, steady.state.scalars, distributions(steady)
         middles = [grid.starts[region] + grid.counts[region] // 2 for region in (1, 3)]
-        self.mean_ring_tension, self.mean_push_force = (
-            around.ring_tension[middles],
-            around.push_force[middles],
-        )
+        self.mean_ring_tension = around.ring_tension[middles]
+        self.mean_push_force = around.push_force[middles]
         self.mean = sampled(belt, steady.state).channels().__getitem__
         law, wedge, speed = belt.law, belt.half_wedge_angle, belt.belt_speed
         carried = largest_torque(law, wedge, grid.path, speed, self.each("axial_force {}"))

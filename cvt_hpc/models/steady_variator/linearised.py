@@ -11,6 +11,8 @@ be a mean of both slopes, by which Newton's iteration moves between two sets of 
 slopes are taken on the state's own side of each corner, beyond the reach of the increments.
 """
 
+from collections.abc import Iterable, Sequence
+
 import numpy as np
 from scipy.sparse import csc_array, csr_array
 
@@ -26,16 +28,16 @@ from cvt_hpc.solvers.arrays import copy
 REACH = 2  # stations to either side that a rate knows of
 STRIDE = 2 * REACH + 1
 FORCE = MOMENT = -1  # after the fields: among the acting quantities, and among those acted on
-SIZE_OF_FORCE = 1e5  # [N/m]
+_SIZE_OF_FORCE = 1e5  # [N/m]
 # Relative to the sizes, for central differences: the third derivative's part is 1e-12 of a slope, round-off
 # 1e-10 of the steepest slopes.
 INCREMENT = 1e-6
 BEYOND = 1.5  # of the farthest that one increment moves a push
-SIZES_OF_PULL = np.array([100.0, 100.0, *[1e4] * 6])  # of `pulled_by` [N m], [N]
+_SIZES_OF_PULL = np.array([100.0, 100.0, *[1e4] * 6])  # of `pulled_by` [N m], [N]
 
 
 @kernel
-def local_slopes(flat: one.FlatBelt, increments: np.ndarray, near: np.ndarray, turning: np.ndarray) -> None:
+def _local_slopes(flat: one.FlatBelt, increments: np.ndarray, near: np.ndarray, turning: np.ndarray) -> None:
     """Set slopes of all rates with the axial forces held, about `flat.state` under `flat.force`.
 
     `increments` are those of the K fields and axial force: 8, or 9 where elements tilt. Result in `near`, (K,
@@ -65,11 +67,11 @@ def local_slopes(flat: one.FlatBelt, increments: np.ndarray, near: np.ndarray, t
                     k = (j + d - REACH) % n
                     for o in range(count):
                         near[o, i, j, d] = (ahead[o, k] - behind[o, k]) / (2.0 * increments[i])
-    slopes_with_scalar(flat, f.DRIVEN_SPEED, one.SIZE_OF_SPEED, turning)
+    _slopes_with_scalar(flat, f.DRIVEN_SPEED, one.SIZE_OF_SPEED, turning)
 
 
 @kernel
-def slopes_with_scalar(flat: one.FlatBelt, place: int, size: float, slopes: np.ndarray) -> None:
+def _slopes_with_scalar(flat: one.FlatBelt, place: int, size: float, slopes: np.ndarray) -> None:
     """Slopes of all rates and moments with one of the state's scalars, forces held, into `slopes` (K, N)."""
     ahead, behind = np.zeros(slopes.shape), np.zeros(slopes.shape)
     scalars = flat.state.scalars
@@ -93,7 +95,7 @@ def _evaluate(flat: one.FlatBelt, out: np.ndarray) -> None:
 
 
 @kernel
-def pulley_slopes(flat: one.FlatBelt, pull: np.ndarray, sizes: np.ndarray) -> np.ndarray:
+def _pulley_slopes(flat: one.FlatBelt, pull: np.ndarray, sizes: np.ndarray) -> np.ndarray:
     """Slopes of `free_rates`, (10, 18): with `pulled_by`, driven speed, driven position, and STATES.
 
     `sizes` (18,) are those of the acting quantities, from which increments follow.
@@ -157,6 +159,13 @@ def _strained(belt: Belt, state: State) -> tuple[np.ndarray, np.ndarray, np.ndar
     return (1.0 + eps) * state.fields[f.N_ELEMENT], eps, belt.element_damping / stiffness
 
 
+def joined(entries: Iterable[Sequence[np.ndarray]], zeros: bool = False) -> tuple[np.ndarray, tuple]:
+    """Values with rows and columns, as sparse arrays take them, of such triples; with `zeros` or without."""
+    values, rows, columns = map(np.concatenate, zip(*entries, strict=True))
+    kept = np.flatnonzero((values != 0.0) | zeros)
+    return values[kept], (rows[kept], columns[kept])
+
+
 class Linearisation:
     """Jacobians of the rates of belts that differ in neither mesh nor sheaves; `flat` is one of them."""
 
@@ -165,7 +174,7 @@ class Linearisation:
         n, self._count = belt.cell.size, flat.origin.size
         self._arcs = [belt.driving_stations, belt.driven_stations]
         fields = len(flat.state.fields)
-        sizes = [*(one.SIZES[row] for row in range(fields)), SIZE_OF_FORCE]
+        sizes = [*(one.SIZES[row] for row in range(fields)), _SIZE_OF_FORCE]
         self._increments = INCREMENT * np.array(sizes)
         place = np.full((fields + 1, n), -1)
         for k, row in enumerate(one.ROWS):
@@ -203,7 +212,7 @@ class Linearisation:
             away = BEYOND * self._increments[FORCE]
             nearly = (force != 0.0) & (np.abs(force) < away)
             flat.force[nearly] = np.copysign(away, force[nearly])
-        local_slopes(flat, self._increments, self._near, self._turning)
+        _local_slopes(flat, self._increments, self._near, self._turning)
         contents[:], flat.force[:] = own, force
         if self._loose.size:
             return self._of_free_pulleys(flat)
@@ -222,9 +231,7 @@ class Linearisation:
                 count + forces - driven + np.arange(driven),
             ),
         ]
-        values, rows, columns = map(np.concatenate, zip(*entries, strict=True))
-        there = values != 0.0
-        slopes = csc_array((values[there], (rows[there], columns[there])), shape=(count, count + forces))
+        slopes = csc_array(joined(entries), shape=(count, count + forces))
         return slopes[:, :count] + slopes[:, count:] @ self._forces(flat)
 
     def _off_corners(self, belt: Belt, state: State, pressed: np.ndarray) -> np.ndarray:
@@ -247,7 +254,7 @@ class Linearisation:
         """Jacobian where pulleys have states of their own."""
         belt, count, n = flat.belt, self._count, flat.belt.cell.size
         excess = np.zeros_like(self._turning)
-        slopes_with_scalar(flat, f.FIRST_STATE + f.EXCESS, one.SIZE_OF_SPEED, excess)
+        _slopes_with_scalar(flat, f.FIRST_STATE + f.EXCESS, one.SIZE_OF_SPEED, excess)
         width, stations = count + sum(map(len, self._arcs)), np.arange(n)
         entries = [
             (self._near[self._known], self._rows, self._columns),
@@ -256,9 +263,7 @@ class Linearisation:
         for slopes, column in ((self._turning, count - 2), (excess, self._loose[f.EXCESS])):
             rows = self._turned_rows
             entries.append((slopes[self._turned], rows, np.full(rows.size, column)))
-        values, rows, columns = map(np.concatenate, zip(*entries, strict=True))
-        there = values != 0.0
-        local = csr_array((values[there], (rows[there], columns[there])), shape=(count + 2, width))
+        local = csr_array(joined(entries), shape=(count + 2, width))
         # actions on the pulleys, by the unknowns and the forces
         acting = np.zeros((18, width))
         acting[:2] = local[count:].toarray()
@@ -270,8 +275,8 @@ class Linearisation:
             first = own.stop
         own_rows = [count - 2, count - 1, *self._loose]
         acting[8 + np.arange(10), own_rows] = 1.0
-        sizes = np.array([*SIZES_OF_PULL, one.SIZE_OF_SPEED, one.SIZE_OF_POSITION, *one.SIZES_OF_STATES])
-        found = pulley_slopes(flat, one.pulled_by(belt, flat.force, flat.moments), sizes) @ acting
+        sizes = np.array([*_SIZES_OF_PULL, one.SIZE_OF_SPEED, one.SIZE_OF_POSITION, *one.SIZES_OF_STATES])
+        found = _pulley_slopes(flat, one.pulled_by(belt, flat.force, flat.moments), sizes) @ acting
         place = csr_array((np.ones(10), (own_rows, np.arange(10))), shape=(count, 10))
         slopes = (local[:count] + place @ csr_array(found)).tocsc()
         return slopes[:, :count] + slopes[:, count:] @ self._forces(flat)
@@ -306,6 +311,4 @@ class Linearisation:
             acting += [(slopes @ opening, rows, np.full(arc.size, column)) for opening, column in openings]
             entries += [[part.ravel() for part in np.broadcast_arrays(*entry)] for entry in acting]
             first += arc.size
-        values, rows, columns = map(np.concatenate, zip(*entries, strict=True))
-        there = values != 0.0
-        return csc_array((values[there], (rows[there], columns[there])), shape=(first, self._count))
+        return csc_array(joined(entries), shape=(first, self._count))

@@ -2,13 +2,13 @@
 
 from __future__ import annotations
 
-from collections.abc import Mapping
 from operator import attrgetter
 from typing import TYPE_CHECKING, Any, NamedTuple
 
 import numpy as np
 
-from cvt_hpc.variables import Coordinate, Status, Variable, Vibrates, together, values
+from cvt_hpc.parameters import Parameters
+from cvt_hpc.variables import Coordinate, Status, Values, Variable, Vibrates, together, values
 from cvt_hpc.variator import GROSS_SLIP
 from cvt_hpc.variator.slip import AGAINST_SLIP
 from cvt_hpc.variator.variables import COORDINATES, each_pulley, shared
@@ -34,12 +34,12 @@ VARIABLES = (
 )
 
 
-def coordinates(parameters: Mapping[str, Any]) -> dict[str, Coordinate]:
+def coordinates(parameters: Parameters) -> dict[str, Coordinate]:
     """Coordinates of the record's dimensions, whatever the parameters."""
     return dict(COORDINATES)
 
 
-def cost(parameters: Mapping[str, Any], stepper: None) -> Any:
+def cost(parameters: Parameters, stepper: None) -> Any:
     """Core-seconds of a run: of a first state, 0.5 to 45 at 160 stations."""
     return 8e-4 * parameters["stations"] ** 2
 
@@ -49,17 +49,17 @@ class Found(NamedTuple):
 
     steady: Steady
     grid: Mesh
-    values: dict[str, Any]
+    values: Values
 
 
-def quantities(steady: Steady, grid: Mesh) -> dict[str, Any]:
+def quantities(steady: Steady, grid: Mesh) -> Values:
     """Values of VARIABLES of a steady state."""
     from cvt_hpc.models.steady_variator.forces import SteadyMeans
 
     return values(VARIABLES, SteadyMeans(steady, grid))
 
 
-def solve(parameters: Mapping[str, Any]) -> Found | ValueError:
+def solve(parameters: Parameters) -> Found | ValueError:
     """Steady state of the parameters of a run [SI] with its results; or the reason why none was found."""
     from cvt_hpc.models.elastic_belt.belt import mesh
     from cvt_hpc.models.steady_variator.walking import NoSteadyState, SteadyBelt
@@ -71,9 +71,9 @@ def solve(parameters: Mapping[str, Any]) -> Found | ValueError:
         return error
 
 
-def judge(solution: Found | ValueError) -> dict[str, Any]:
+def judge(solution: Found | ValueError) -> Values:
     """The record of a run, its cost apart."""
-    from cvt_hpc.models.steady_variator.walking import SlipsThrough
+    from cvt_hpc.models.steady_variator.first_states import SlipsThrough
 
     if isinstance(solution, SlipsThrough):
         return {"status": Status.DONE, "vibrates": Vibrates.SLIPS, "reason": str(solution)}
