@@ -23,6 +23,8 @@ from cvt_hpc.picture_kinds import END, HISTORIES, KINDS, RESULTS
 from cvt_hpc.variables import Status, Vibrates
 from support.studies import GRADIENTS, LOADS, STIFFNESSES, study, traced
 
+pytestmark = pytest.mark.usefixtures("unarranged")  # test_pictures.py looks at the places
+
 NO, YES, SLIPS = Vibrates.NO, Vibrates.YES, Vibrates.SLIPS
 
 

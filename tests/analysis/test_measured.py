@@ -27,6 +27,8 @@ from cvt_hpc.variables import Status, Vibrates
 from support import pictured
 from support.studies import study
 
+pytestmark = pytest.mark.usefixtures("unarranged")  # test_pictures.py looks at the places
+
 Q, V, U, F, S = "quiet vibrating undecided failed slipping".split()
 FLAGS = {
     Q: (Status.DONE, Vibrates.NO),

@@ -13,6 +13,8 @@ from cvt_hpc.simulation import estimate_cost
 from cvt_hpc.study.repeats import step_check
 from cvt_hpc.variables import Coordinate, Status, Variable, Vibrates
 
+pytestmark = pytest.mark.usefixtures("unarranged")  # test_pictures.py looks at the places
+
 STEP = 1e-6
 GRID = """[scene]
 thrust = "50 kN"

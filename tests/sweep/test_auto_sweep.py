@@ -31,7 +31,7 @@ CHECKED = ("--audit", "0.7", "--check-step", "0.9")
 
 
 @pytest.mark.slow
-def test_two_ranks_their_audit_and_the_check_of_their_step(tmp_path, monkeypatch, capsys):
+def test_two_ranks_their_audit_and_the_check_of_their_step(tmp_path, monkeypatch, capsys, unarranged):
     monkeypatch.chdir(tmp_path)
     (tmp_path / "a.toml").write_text(JOB)
     assert main(["run", "a.toml", "--out", "out1", *CHECKED]) == 0

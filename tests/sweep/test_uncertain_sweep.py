@@ -46,7 +46,7 @@ def load_results(out):
 
 @pytest.mark.slow
 def test_a_sweep_that_is_killed_and_grows_has_the_numbers_of_an_undisturbed_one(
-    tmp_path, monkeypatch, capsys
+    tmp_path, monkeypatch, capsys, unarranged
 ):
     monkeypatch.chdir(tmp_path)
     sweep = subprocess.run(
