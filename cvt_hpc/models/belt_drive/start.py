@@ -26,7 +26,7 @@ IMPLICIT_EULER = Scheme(1.0, 1.0, 1.0)
 # longer one, else by a shorter one; the longest leaves nothing to settle
 _FIRST, _LONGEST = 1e-5, 1.0
 _LONGER, _SHORTER = 4.0, 0.25
-_MOST_STEPS = 500  # common belts need 20
+MOST_STEPS = 500  # common belts need 20
 SETTLED, MOST_ITERATIONS = 1e-8, 30  # [m/s]
 FRICTIONLESS = friction_law("coulomb", 1e-9, 0.0, 1.0)
 # Of the belt's length by its tension: they leave 0.2 % of this on the softest contacts, 1e-5 on common ones
@@ -112,7 +112,7 @@ def _settle(drive: Drive, found: State) -> bool:
     smooth = drive._replace(pulleys=pulleys, contact=drive.contact._replace(friction=friction))
     at_rest = np.zeros((2, len(drive.pulleys.radius)))
     step = _FIRST
-    for _ in range(_MOST_STEPS):
+    for _ in range(MOST_STEPS):
         before = found.chain.q.copy(), found.wheels.angle.copy()
         for numbers in (found.chain.v, found.wheels.speed, found.touch.memory.dual, found.counters):
             numbers[:] = 0
