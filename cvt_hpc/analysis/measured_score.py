@@ -68,8 +68,7 @@ class Score(NamedTuple):
     unit: str  # in which the axis of the file is shown
     names: list[str]  # of the other axes
     lines: list[tuple[list[str], Line]]  # their values in words, and the agreement, of each that was measured
-    # probabilities of vibration, (cell,), in cells of measured noise and of silence; none without samples
-    probabilities: tuple[Array, Array]
+    dataset: xr.Dataset
 
     @property
     def total(self) -> Line:
@@ -80,6 +79,23 @@ class Score(NamedTuple):
     def contradicts(self) -> bool:
         """Whether anything is computed otherwise than it was measured."""
         return self.total.misses + self.total.false_alarms > 0
+
+    def probabilities(self) -> tuple[Array, Array]:
+        """Probabilities of vibration in cells of measured noise, and of silence; none without samples."""
+        measured, cells = self.measured, over_samples(self.dataset)
+        if PROBABILITY not in cells or measured.kind == ONSET:
+            return np.empty(0), np.empty(0)
+        shares = cells[PROBABILITY].transpose(..., measured.along)
+        values, places = shares.values, shares[measured.along].values.astype(float)
+        noise, known = np.zeros((2, *shares.shape), bool)
+        for row in measured.rows:
+            here = xr.ones_like(shares, bool)
+            for name, value in row.at.items():
+                here &= shares[name] == value
+            noise |= here.values & row.covers(places)
+            known |= here.values & within(places, row.swept) & np.isnan(row.cell)
+        told = [values[one & np.isfinite(values)] for one in (noise, known & ~noise)]
+        return told[0], told[1]
 
 
 def score(dataset: xr.Dataset, path: str | Path, source: str = "results") -> Score:
@@ -118,25 +134,7 @@ def score(dataset: xr.Dataset, path: str | Path, source: str = "results") -> Sco
                 of_cells = _of_cells(told, level, frequency[index], amplitude[index])
                 line = of_cells._replace(onset=line.onset, standard=line.standard)
             lines.append(([text[k] for text, k in zip(texts, index, strict=True)], line))
-    return Score(measured, unit, names, lines, _probabilities(dataset, measured))
-
-
-def _probabilities(dataset: xr.Dataset, measured: Measured) -> tuple[Array, Array]:
-    """Probabilities of vibration in cells of measured noise, and of silence; none without samples."""
-    cells = over_samples(dataset)
-    if PROBABILITY not in cells or measured.kind == ONSET:
-        return np.empty(0), np.empty(0)
-    shares = cells[PROBABILITY].transpose(..., measured.along)
-    values, places = shares.values, shares[measured.along].values.astype(float)
-    noise, known = np.zeros((2, *shares.shape), bool)
-    for row in measured.rows:
-        here = xr.ones_like(shares, bool)
-        for name, value in row.at.items():
-            here &= shares[name] == value
-        noise |= here.values & row.covers(places)
-        known |= here.values & within(places, row.swept) & np.isnan(row.cell)
-    told = [values[one & np.isfinite(values)] for one in (noise, known & ~noise)]
-    return told[0], told[1]
+    return Score(measured, unit, names, lines, dataset)
 
 
 def _of_cells(
@@ -221,7 +219,7 @@ def score_sentences(found: Score) -> Iterator[str]:
         if values:
             middle, most = (f"{number(one, 3)} {unit}" for one in _told(values))
             yield f"Error of the {what}: {middle} (median), {most} (largest)."
-    noise, silence = found.probabilities
+    noise, silence = found.probabilities()
     if noise.size + silence.size:
         told = [
             f"{number(values.mean(), 2)} in {values.size} cells of measured {what}"

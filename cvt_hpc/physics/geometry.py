@@ -2,6 +2,7 @@
 
 import math
 from dataclasses import dataclass
+from functools import lru_cache
 from typing import Any
 
 import numpy as np
@@ -87,13 +88,14 @@ def driven_radius(ratio: float, belt_length: float, centre_distance: float) -> f
 _REFINED_WAY = 0.05
 
 
+@lru_cache(maxsize=64)  # all points of a grid have the same few paths
 def cut_path(path: Variator, cells: int, refinement: float = 1.0) -> tuple[np.ndarray, ...]:
     """Cut each region of a path into cells, by region their lengths [m]: the shorter the nearer to its ends.
 
     The number of cells per length is 1 + (r - 1) / (1 + (x / l)^2) for each end of the region, x from there,
     times what gives their number `cells` all around; l = _REFINED_WAY of the centre distance. A length has
     r = `refinement` times as many cells at the tangent points as far from them; 1: even cells. Each region
-    has four cells or more; the driven arc takes what rounding leaves.
+    has four cells or more; the driven arc takes what rounding leaves. The arrays cannot be written to.
     """
     centre_distance = math.hypot(path.strand_length, path.driven_radius - path.driving_radius)
     way = _REFINED_WAY * centre_distance
@@ -111,6 +113,7 @@ def cut_path(path: Variator, cells: int, refinement: float = 1.0) -> tuple[np.nd
     for length, whole, count in zip(path.lengths, wholes, counts, strict=True):
         fine = np.linspace(0.0, length, 100 * count + 1)
         found.append(np.diff(np.interp(np.linspace(0.0, whole, count + 1), upto(fine, length), fine)))
+        found[-1].flags.writeable = False
     return tuple(found)
 
 

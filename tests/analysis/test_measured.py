@@ -308,7 +308,7 @@ def test_the_probability_of_samples_has_a_score(write, tmp_path, capsys):
     # at 10, 20, 30 and 40 N m two, one, none and none of two samples vibrate; at 30 one has no verdict
     dataset = xr.concat([results([[V, V, U, Q]]), results([[V, Q, Q, Q]])], xr.Variable("sample", [0, 1]))
     found = score(dataset, path := write(WINDOWS + RANGE, "15,35,15,45"))
-    assert [values.tolist() for values in found.probabilities] == [[0.5, 0.0], [0.0]]
+    assert [values.tolist() for values in found.probabilities()] == [[0.5, 0.0], [0.0]]
     dataset.to_netcdf(tmp_path / "results.nc")
     assert main(["compare", str(tmp_path), str(path)]) == 1
     told = "on average 0.25 in 2 cells of measured noise, 0 in 1 cells of measured silence; Brier score 0.42"
@@ -318,7 +318,7 @@ def test_the_probability_of_samples_has_a_score(write, tmp_path, capsys):
     rows = [results([[Q, Q, Q, Q], row]) for row in ([V, V, U, Q], [V, Q, Q, Q])]
     both = xr.concat(rows, xr.Variable("sample", [0, 1])).transpose("load", ...)
     found = score(both, write(f"{WINDOWS},sheave_stiffness", "15,35,1.5"))
-    assert [values.tolist() for values in found.probabilities] == [[0.5, 0.0], [1.0, 0.0]]
+    assert [values.tolist() for values in found.probabilities()] == [[0.5, 0.0], [1.0, 0.0]]
     assert not any(
         "Brier" in line for line in score_sentences(score(dataset, write("onset_load [N m]", "15")))
     )
