@@ -127,6 +127,7 @@ STUDIES: dict[str, dict] = {
         )
     },
     "pushbelt": ROLLING,
+    "pushbelt noses": variant(ROLLING, scene={"gravity": 9.81}, belt={"nose_clearance": "20 um"}),
     "pushbelt rigid": variant(ROLLING, sheaves={"sheave_stiffness": "inf"}),
     "quasi_static_belt": variant(
         BELT, mesh={"stations": 48}, run={"duration": "40 ms", "longest_duration": "40 ms"}
