@@ -133,7 +133,7 @@ def norm_over(values: Array, lowest: float | None = None, highest: float | None 
 
 
 def amplitude_scale(values: Array, vmax: End = None) -> Scale:
-    """Scale of amplitudes [um]: logarithmic over AMPLITUDES; or linear from zero to `vmax` [m], or to FIT."""
+    """Scale of amplitudes [um]: logarithmic over _AMPLITUDES; or linear from 0 to `vmax` [m], or to FIT."""
     if isinstance(vmax, str) and vmax != FIT:
         raise mismatch("vmax", f'a number or "{FIT}"', show(vmax))
     if vmax is None:

@@ -22,12 +22,8 @@ _CLOSE_UP = 0.01  # [s]: six periods at 600 Hz
 _MOST_PEAKS = 3
 COLOURS = ("#d55e00", "#0072b2", "#cc79a7", "#009e73", "#333333")  # Okabe and Ito's, of strands and pulleys
 LINES = ("-", "--", ":", "-.", (0, (5, 1, 1, 1, 1, 1)))  # one for each probe of a strand, by default
-_GROUPS = (
-    "tension_",
-    "speed_",
-    "arm_",
-    "axial_force_",
-)  # how the names of histories begin that share a panel
+# How the names of histories begin that share a panel
+_GROUPS = ("tension_", "speed_", "arm_", "axial_force_")
 COURSES = ("driving_speed", "load")  # what a run may change
 FEEDS = {
     "flank_feed": ("friction of the flanks", "#d55e00", "-"),
@@ -218,7 +214,7 @@ def draw_course(axes: Axes, course: xr.DataArray) -> None:
 
 
 def groups(dataset: xr.Dataset) -> list[list[xr.DataArray]]:
-    """Histories that belong into one panel: those whose names begin alike, as GROUPS has them."""
+    """Histories that belong into one panel: those whose names begin alike, as _GROUPS has them."""
     courses = {str(name): values for name, values in dataset.items() if values.dims == ("time",)}
     found = ([values for name, values in courses.items() if name.startswith(prefix)] for prefix in _GROUPS)
     return [group for group in found if group]

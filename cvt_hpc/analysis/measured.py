@@ -9,7 +9,7 @@ A measured file is a CSV file as `read_csv` takes it, of one of three kinds, tol
               noise sets in
     peak      AXIS, frequency; optional amplitude: a line of a measured spectrum
     peak      AXIS, frequency, level: a spectrum at each value of the axis, of which the lines that stand out
-              by PROMINENCE and are within _LEVEL_RANGE of the file's highest level are read as peaks
+              by _PROMINENCE and are within _LEVEL_RANGE of the file's highest level are read as peaks
 
 Windows and onsets may have a measured range, measured_AXIS_from and measured_AXIS_to, and AXIS_deviation, the
 standard deviation of their places. Further columns have the name of an axis or a parameter, and say at which

@@ -7,8 +7,8 @@ and at the least distance in all; one without a partner is a miss or a false ala
 the range are paired alike, and give the error of the onset alone.
 
 The distance of a pair has the standard error hypot(h, s): h is half the distance of the two cells between
-which the computed onset lies, s the deviation that the file states. Farther than FARTHEST of these apart, two
-onsets are no pair.
+which the computed onset lies, s the deviation that the file states. Farther than _FARTHEST of these apart,
+two onsets are no pair.
 
 Of a study with uncertain parameters each sample has lines of its own, and the probability of vibration has
 the Brier score: the mean square of its distance from 1 where noise was measured, from 0 where silence was.
@@ -68,7 +68,7 @@ class Score(NamedTuple):
     unit: str  # in which the axis of the file is shown
     names: list[str]  # of the other axes
     lines: list[tuple[list[str], Line]]  # their values in words, and the agreement, of each that was measured
-    dataset: xr.Dataset
+    dataset: xr.Dataset  # the results of the study
 
     @property
     def total(self) -> Line:

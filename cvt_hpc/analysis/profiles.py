@@ -249,7 +249,7 @@ def ends_of_arcs(history: xr.Dataset) -> list[End]:
 def alone(history: xr.Dataset, end: End) -> tuple[str, float]:
     """Which flank carries alone at an end, and how far [m].
 
-    A flank carries where its normal force is more than TOUCHES of the largest force of both.
+    A flank carries where its normal force is more than _TOUCHES of the largest force of both.
 
     Returned are its side, and the distance between the outermost places at which the flanks carry; 0 where
     both begin at the same place.

@@ -54,7 +54,7 @@ def correlated_groups(ranks: Array, effective: float, before: NDArray) -> NDArra
     Those of one group `before` the measurement, (parameter,), stay together. Else groups are what pairs
     connect whose rank correlation, of `ranks` (parameter, parameter), is significant:
 
-        |rho| > z / sqrt(n - 1),    z = Phi^-1(1 - CHANCE / (2 m)),
+        |rho| > z / sqrt(n - 1),    z = Phi^-1(1 - _CHANCE / (2 m)),
 
     n being the `effective` number of samples and m the number of pairs (Bonferroni).
     """

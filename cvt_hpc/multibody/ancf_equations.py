@@ -32,7 +32,7 @@ LOST = 170
 _GAUSS = 0.5 - 0.5 / np.sqrt(3.0), 0.5 + 0.5 / np.sqrt(3.0)
 VALUE = shapes(np.array(_GAUSS))[0]  # (point, shape)
 MASS = np.array([[156, 22, 54, -13], [22, 4, 13, -3], [54, 13, 156, -22], [-13, -3, -22, 4]]) / 420.0
-# l^3 r' x r'' = FIRST d x a + SECOND d x b - a x b at the Gauss points
+# l^3 r' x r'' = FIRST d x a + _SECOND d x b - a x b at the Gauss points
 FIRST, _SECOND = (-2.0 - np.sqrt(3.0), -2.0 + np.sqrt(3.0)), (2.0 - np.sqrt(3.0), 2.0 + np.sqrt(3.0))
 
 SIZE = block_size(PER_NODE)

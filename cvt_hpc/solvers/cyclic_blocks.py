@@ -20,17 +20,16 @@ import numpy as np
 from cvt_hpc.kernels import kernel, merged_kernel
 from cvt_hpc.lanes import LaneArray, absolute, anywhere, fma, like, maximum
 
-DIAGONAL, LOWER, UPPER, _SPIKE, _FILL = range(
-    5
-)  # blocks of a node: A_i, L_i, U_i, and two of the elimination
+# Blocks of a node: A_i, L_i, U_i, and two of the elimination
+DIAGONAL, LOWER, UPPER, _SPIKE, _FILL = range(5)
 SMALLEST_PIVOT = 1e-13  # of the largest entry of its column: rounding leaves as much of a singular block
 
 
 def empty_blocks(n: int, b: int) -> LaneArray:
     """Blocks of size b of a chain of n nodes, at least 2, all zero.
 
-    Entry (j, k) of A_i is `data[i, DIAGONAL * b + j, k]`, likewise LOWER of L_i and UPPER of U_i. SPIKE and
-    FILL are for the elimination; lanes from b on stay zero.
+    Entry (j, k) of A_i is `data[i, DIAGONAL * b + j, k]`, likewise LOWER of L_i and UPPER of U_i. Those
+    of _SPIKE and _FILL are for the elimination; lanes from b on stay zero.
     """
     return LaneArray(n + 1, 5 * b, _lanes(b))
 

@@ -208,7 +208,7 @@ def is_certain(record: Mapping[str, Any], parameters: Mapping[str, Any], left: f
 
     Its amplitude is _CERTAIN_FACTOR times above or below the threshold, and stays so as it grows or decays
     over the time that is left [s], by twice the error of its growth rate; of a vibration it changes by less
-    than UNSETTLED. Where the judged part is so short that it cuts the band off above the first modes, a
+    than _UNSETTLED. Where the judged part is so short that it cuts the band off above the first modes, a
     slower motion may be left. The record has `vibrates` and VARIABLES, of each strand or of a single body; of
     the parameters those of [vibration], `duration` and `judged_fraction` count.
     """

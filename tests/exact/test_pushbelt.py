@@ -22,7 +22,6 @@ from cvt_hpc.models.pushbelt.transient import EQUATIONS, _accept, _evaluate, _pr
 from cvt_hpc.solvers.cyclic_blocks import block_size
 from cvt_hpc.solvers.linked_blocks import solve
 from support.pushbelts import NODES, SPEED, THRUST, given, start
-from support.pushbelts import runs as transient
 
 STEP = 1e-5  # [s]
 LOAD = 81.0  # [N m]
@@ -414,12 +413,12 @@ def test_the_longest_step_of_falling_friction(memory):
             "step": 1e-6,
         },
     ).point(0)
-    limit, values = falling_limit(p), transient.given(p)
+    limit = falling_limit(p)
     driving = p["driven_radius"] / p["ratio"]
     wrap = np.pi - 2.0 * np.arcsin((p["driven_radius"] - driving) / p["centre_distance"])
     pitch = path_length(p) / NODES
     force = p["thrust"] / (driving * wrap * np.cos(p["half_wedge_angle"])) * pitch
-    belt, state, work = on_a_pulley(values | {"nodes": NODES, "friction_speed": 1e-7}, 1e-4, force)
+    belt, state, work = on_a_pulley({**p, "friction_speed": 1e-7}, 1e-4, force)
     belt = belt._replace(ring_mass=0.0, ring_friction=0.0)
     for share, falls in ((0.98, True), (1.02, False)):
         left = []

@@ -9,7 +9,7 @@ from cvt_hpc.models.pushbelt import fields as f
 from cvt_hpc.models.pushbelt.belt import workspace
 from cvt_hpc.models.pushbelt.border import accept_border, border_residuals, close_border
 from cvt_hpc.solvers.linked_blocks import solve_small
-from tests.support.pushbelts import given, start
+from support.pushbelts import given, start
 
 STIFFNESS, LAG, DURATION = ((6e8, 3e8, 2e8, 9e8),) * 2, 6e-4, 3e-3  # [N/m], [s], [s]
 TILTING = (1, 2)  # modes

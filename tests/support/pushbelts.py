@@ -1,7 +1,5 @@
 """A common pushbelt by values of its elements, and its start."""
 
-from types import SimpleNamespace
-
 import numpy as np
 
 from cvt_hpc.models.pushbelt import belt
@@ -51,7 +49,6 @@ ASSUMED = {
     "tilt_lag": 0.0,  # [s]
     "driving_speed": 100.0 * np.pi,  # [rad/s]
 }
-runs = SimpleNamespace(given=dict)  # values of a run for `start`: its flat parameters
 NODES = 104  # of 8 lanes; polygon effects in the power balance are below half a percent
 SPEED, THRUST = ASSUMED["driving_speed"], 20e3  # [rad/s], [N]
 

@@ -136,7 +136,7 @@ def _own(work, j, across, along):
 
 @kernel
 def _flank_response(belt, state, work, j, along_meridian, around):
-    """Change of `_flank_slip` by impulses on both flanks, where nothing else changes [m/s]."""
+    """Change of `flank_slip` by impulses on both flanks, where nothing else changes [m/s]."""
     step, t = work.step, work.step[j, b.TANGENT]
     out, on = 2.0 * belt.cosine * along_meridian, 2.0 * around
     y, z = out * step[j, b.R_Y] - on * step[j, b.R_Z], out * step[j, b.R_Z] + on * step[j, b.R_Y]

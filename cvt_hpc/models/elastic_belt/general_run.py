@@ -1,8 +1,8 @@
 """A transient run of the elastic belt by any general stepper: the belt as one system, sampled as ever.
 
 Integrators that can use it have the Jacobian by few evaluations, since it is known which unknowns act on
-which rates: SciPy's BDF and Radau factorise it as a sparse matrix. It is sparse but for
-the sheaves, whose deformation lets each displacement of a wrap act on every force of that wrap.
+which rates: SciPy's BDF and Radau factorise it as a sparse matrix. It is sparse but for the sheaves, whose
+deformation lets each displacement of a wrap act on every force of that wrap.
 """
 
 from collections.abc import Sequence

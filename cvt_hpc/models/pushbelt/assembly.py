@@ -340,8 +340,7 @@ def _add_to_border(belt, sums, row, slopes, by_opening, driven, shapes, blocks, 
 def close(belt, state, work, dt):
     """Close the system of the border: its slopes by its unknowns, less the contribution of the elements.
 
-    The right sides of `blocks` hold the solution without border, then
-    those for its columns.
+    The right sides of `blocks` hold the solution without border, then those for its columns.
     """
     elements, step, iterate = state.elements, work.step, work.iterate
     blocks, shapes, sums = work.blocks, work.shapes, work.sums

@@ -73,7 +73,8 @@ CONVERGED, NOT_CONVERGED, NOT_FINITE = range(3)
 CONTACTS = ("edge", "head", "flank", "ring", "nose")
 
 # Fields of Workspace.step
-PREDICTED_Y, PREDICTED_Z, PREDICTED_HEADING_Y, PREDICTED_HEADING_Z = range(4)  # at q*
+# Saddle point and running direction at q*
+PREDICTED_Y, PREDICTED_Z, PREDICTED_HEADING_Y, PREDICTED_HEADING_Z = range(4)
 T_Y, T_Z = range(4, 6)  # direction of the ring at an element
 # Direction of the tension at this element and at the next one; tension at q_k and the old speeds
 TENSION_I_Y, TENSION_I_Z, TENSION_J_Y, TENSION_J_Z, START_TENSION, TENSION_SLOPE = range(6, 12)

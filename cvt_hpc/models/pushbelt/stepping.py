@@ -33,7 +33,7 @@ class Equations(NamedTuple):
     close: Callable[..., None]  # that of the border, once the elements' is solved (`solvers.linked_blocks`)
     # advances the state to the end of the step, and adds up the works. Takes the inputs before `dt`.
     accept: Callable[..., None]
-    # by how much contact forces have changed, in the order of `CONTACTS` (`faults.name_fault`)
+    # by how much contact forces have changed, in the order of `CONTACTS` (`name_fault`)
     changes: Callable[..., tuple[float, ...]]
     # field of an element at which the changes of its speeds in the step begin, as many as it has unknowns
     first_change: int
@@ -119,7 +119,7 @@ def advance_by(equations, belt, newton, state, work, inputs, steps, dt):
     """Advance a belt by a number of steps of `dt` [s], in place; return how its last step ended.
 
     The model has `equations`, their steps are solved as `newton` tells. Inputs, (2, INPUTS) at the start and
-    at the end (`belt.IN_SPEED` and so on), change linearly between. Returns CONVERGED; NOT_CONVERGED where
+    at the end (`fields.IN_SPEED` and so on), change linearly between. Returns CONVERGED; NOT_CONVERGED where
     `most_failures` steps in a row had not converged; NOT_FINITE, or where the system of an iteration is
     singular. Of the last step that had not converged the counters name the contact at fault, and its element.
     """

@@ -38,10 +38,10 @@ ON_LEFT, ON_RIGHT = range(2)
 POSITION, HEADING, OUTWARD = range(0, 9, 3)
 SLOPE = 9  # of the ring's line in the axial direction [rad]
 SPEED = 10  # 8: velocity of that point [m/s], angular velocity [rad/s], V and SLOPE_RATE
-# OMEGA, V, SLOPE_RATE: angular velocity, speed of the ring's material along its line [m/s], [rad/s]
+# Of these: angular velocity, speed of the ring's material along its line, rate of SLOPE [rad/s]
 OMEGA, V, SLOPE_RATE = SPEED + ROW_W, SPEED + ROW_V, SPEED + ROW_P
-# Of both ring packages up to the next element: unstretched length [m], tension, normal force on the element
-# [N]
+# Of both ring packages up to the next element: unstretched length [m]; tension, normal force on the
+# element [N]
 LENGTH, TENSION, SADDLE = range(18, 21)
 PUSH = 21  # 4: contact forces to the next element: edge left, edge right, head left, head right [N]
 PIN = 25  # force of the next element's hole on the pin [N]
@@ -97,9 +97,8 @@ SHEAR, BEND = range(51, 53)
 YAW = 53  # 3: gradient of yaw by angular velocity
 PREDICTED_YAW = 56  # moment of the yaw spring at q_k and of its damper at the old speeds
 NORMAL_Y, NORMAL_Z = range(57, 59)  # across the path in the plane, of the strand or radial
-PUSH_LEVER_I, PUSH_LEVER_J = range(
-    59, 83, 12
-)  # 12 each: rates of the gaps at the front by angular velocities
+# 12 each: rates of the gaps at the front by angular velocities
+PUSH_LEVER_I, PUSH_LEVER_J = range(59, 83, 12)
 PUSH_GAP = 83  # 4: gaps by which elements press, at the old speeds; PUSH_MEAN: those at mid step, likewise
 PIN_NORMAL, PIN_LEVER_I, PIN_LEVER_J = range(87, 96, 3)  # 3 each
 PIN_GAP = 96
