@@ -3,7 +3,7 @@
 import math
 from typing import Any
 
-from cvt_hpc.parameters import Parameter, Parameters, not_negative
+from cvt_hpc.parameters import Parameter, Parameters, Problem, not_negative
 from cvt_hpc.vibration.ramped import along_ramp, ramped
 from cvt_hpc.vibration.settings import LEAST_PERIODS, band
 
@@ -62,7 +62,7 @@ PARAMETERS: dict[str, dict[str, Parameter]] = {
 }
 
 
-def check(parameters: Parameters) -> list[tuple[str, str, str]]:
+def check(parameters: Parameters) -> list[Problem]:
     """Problems between parameters: (key, expected, found).
 
     Parameters

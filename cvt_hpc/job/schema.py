@@ -11,13 +11,12 @@ from cvt_hpc.errors import InputError, did_you_mean, few_of, mismatch, nearest, 
 from cvt_hpc.job.values import Point, Table, in_words
 from cvt_hpc.models import MODELS
 from cvt_hpc.models.contract import Model, load_model
-from cvt_hpc.parameters import Parameter
+from cvt_hpc.parameters import Parameter, Problem
 from cvt_hpc.steppers import STEPPERS
 from cvt_hpc.vibration import settings as vibration_settings
 
 SHARED = recording, vibration_settings  # with tables of every job with a transient
 
-Problem = tuple[str, str, str]
 Check = Callable[[Point], list[Problem]]
 Inert = Callable[[Point], dict[str, str]]
 

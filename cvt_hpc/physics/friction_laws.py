@@ -12,7 +12,7 @@ from typing import Any, Self
 
 import numpy as np
 
-from cvt_hpc.parameters import Column, FromFile, Parameter, Parameters, RowError
+from cvt_hpc.parameters import Column, FromFile, Parameter, Parameters, Problem, RowError
 
 KEYS = ("table_force", "table_speed", "table_mu")
 OTHER_NAMES = {
@@ -27,25 +27,24 @@ OTHER_NAMES = {
 }
 _ANY_FORCE = (0.0, 1.0)  # knots of a table that does not depend on the force, which is held outside
 
-Problems = list[tuple[str, str, str]]  # of (key, expected, found)
 
 FORMULA_PARAMETERS = ("kinetic_friction", "friction_gradient", "stribeck_velocity")
 TABLE_PARAMETERS = ("table_force", "table_speed", "table_mu")
 _ALL_PARAMETERS = (*FORMULA_PARAMETERS, "table_file", *TABLE_PARAMETERS)
 
 
-def _no_problems(p: Parameters) -> Problems:
+def _no_problems(p: Parameters) -> list[Problem]:
     return []
 
 
-def _coulomb_problems(p: Parameters) -> Problems:
+def _coulomb_problems(p: Parameters) -> list[Problem]:
     if p["friction_gradient"] == 0.0:
         return []
     return [("friction_gradient", "0 with friction_law coulomb", f"{p['friction_gradient']:g} s/m")]
 
 
-def _table_problems(p: Parameters) -> Problems:
-    """Problems of a friction table; the first one only."""
+def _table_problems(p: Parameters) -> list[Problem]:
+    """list[Problem] of a friction table; the first one only."""
     force, speed, mu = (p[key] for key in TABLE_PARAMETERS)
     for key, grid in (("table_force", force), ("table_speed", speed)):
         if len(grid) < 2 or np.any(np.diff(grid) <= 0.0):
@@ -75,7 +74,7 @@ class Law(IntEnum):
     """The laws, as kernels know them, each with its declaration."""
 
     reads: tuple[str, ...]  # the parameters that the law reads
-    problems: Callable[[Parameters], Problems]  # finds its problems in parameters
+    problems: Callable[[Parameters], list[Problem]]  # finds its problems in parameters
     # largest coefficient [1] by parameters: that of v -> 0+ but for a table
     largest: Callable[[Parameters], float]
 
@@ -83,7 +82,7 @@ class Law(IntEnum):
         cls,
         number: int,
         reads: tuple[str, ...],
-        problems: Callable[[Parameters], Problems] = _no_problems,
+        problems: Callable[[Parameters], list[Problem]] = _no_problems,
         largest: Callable[[Parameters], float] = _fallen_from,
     ) -> Self:
         """Make the member of a number."""
@@ -102,8 +101,8 @@ class Law(IntEnum):
 FRICTION_LAWS = tuple(law.name.lower() for law in Law)  # as a job names them
 
 
-def friction_problems(parameters: Parameters) -> Problems:
-    """Problems of a friction law: (key, expected, found)."""
+def friction_problems(parameters: Parameters) -> list[Problem]:
+    """list[Problem] of a friction law: (key, expected, found)."""
     return _declared(parameters).problems(parameters)
 
 

@@ -7,7 +7,7 @@ from typing import Any
 
 import numpy as np
 
-from cvt_hpc.parameters import Parameters
+from cvt_hpc.parameters import Parameters, Problem
 
 
 @dataclass(frozen=True)
@@ -117,7 +117,7 @@ def cut_path(path: Variator, cells: int, refinement: float = 1.0) -> tuple[np.nd
     return tuple(found)
 
 
-def variator_problems(parameters: Parameters) -> list[tuple[str, str, str]]:
+def variator_problems(parameters: Parameters) -> list[Problem]:
     """Problems of a variator's geometry, (key, expected, found), by the values [SI] of `variator`."""
     p = parameters
     try:

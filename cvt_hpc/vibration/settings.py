@@ -24,7 +24,7 @@ The defaults, and why:
   trend.
 """
 
-from cvt_hpc.parameters import Parameter, Parameters, not_negative, positive
+from cvt_hpc.parameters import Parameter, Parameters, Problem, not_negative, positive
 from cvt_hpc.vibration.ramped import along_ramp
 
 PARAMETERS: dict[str, dict[str, Parameter]] = {
@@ -113,7 +113,7 @@ def edge_of_modes(parameters: Parameters, lowest_mode: float) -> float:
     )
 
 
-def check(parameters: Parameters) -> list[tuple[str, str, str]]:
+def check(parameters: Parameters) -> list[Problem]:
     """Problems between parameters: (key, expected, found), in the form of a model's check.
 
     They include [vibration], the `duration` of a run [s] and its `sampling_rate` [Hz].

@@ -7,7 +7,7 @@ compiled when `transient` is imported.
 import numpy as np
 
 from cvt_hpc.models.pushbelt import parameters as pushbelt
-from cvt_hpc.parameters import Parameter, Parameters, not_negative
+from cvt_hpc.parameters import Parameter, Parameters, Problem, not_negative
 from cvt_hpc.steppers import STEPPERS as GENERAL
 
 DEFAULT_STEPPER = "proximal"
@@ -66,7 +66,7 @@ def _step_limit(parameters: Parameters) -> float:
     return float(2.0 / np.sqrt(p["edge_stiffness"] / pitch * rows.max()))
 
 
-def check(parameters: Parameters) -> list[tuple[str, str, str]]:
+def check(parameters: Parameters) -> list[Problem]:
     """Problems that lie between parameters [SI], in the form of `pushbelt.check`."""
     p = parameters
     if problems := pushbelt.check(as_pushbelt(p)):

@@ -29,7 +29,7 @@ from cvt_hpc.models.belt_drive.layout import (
     run_out_problems,
 )
 from cvt_hpc.models.belt_drive.roughness import ROUGHNESS, roughness_inert, roughness_problems
-from cvt_hpc.parameters import Parameter, Parameters, not_negative, positive
+from cvt_hpc.parameters import Parameter, Parameters, Problem, not_negative, positive
 from cvt_hpc.physics.friction_laws import friction_inert, friction_problems
 from cvt_hpc.steppers import STEPPERS as GENERAL
 from cvt_hpc.variator.scene import FRICTION, SCENE, rise_problems
@@ -147,7 +147,7 @@ KICK = "kick", 0.02  # [N s]
 __all__ = ["COMPARED", "DEFAULT_STEPPER", "KICK", "PARAMETERS", "REFUSED", "STEPPERS", "check", "inert"]
 
 
-def check(parameters: Parameters) -> list[tuple[str, str, str]]:
+def check(parameters: Parameters) -> list[Problem]:
     """Problems that lie between parameters [SI]: (key, expected, found) of each."""
     p = parameters
     problems = layout_problems(p) or _beside_lists(p) or run_out_problems(p)
@@ -178,7 +178,7 @@ def check(parameters: Parameters) -> list[tuple[str, str, str]]:
     return problems + rise_problems(p) + course_problems(p) + friction_problems(p)
 
 
-def _beside_lists(p: Parameters) -> list[tuple[str, str, str]]:
+def _beside_lists(p: Parameters) -> list[Problem]:
     """Settings of two pulleys, other than by default, beside lists that give all pulleys."""
     if not p["pulley_x"]:
         return []

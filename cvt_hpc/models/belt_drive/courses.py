@@ -12,7 +12,7 @@ import numpy as np
 from scipy.optimize import brentq
 
 from cvt_hpc.models.belt_drive.layout import PULLEY_LISTS, TENSIONER, TWO, layout, layout_problems
-from cvt_hpc.parameters import Parameter, Parameters, Substitute, not_negative, positive
+from cvt_hpc.parameters import Parameter, Parameters, Problem, Substitute, not_negative, positive
 from cvt_hpc.physics.belt_path import BeltPath
 from cvt_hpc.variator.course import load_course
 from cvt_hpc.variator.profiles import multiple
@@ -58,7 +58,7 @@ def load(parameters: Parameters, time: float) -> float:
     return risen * multiple(p, "load", time)
 
 
-def course_problems(parameters: Parameters) -> list[tuple[str, str, str]]:
+def course_problems(parameters: Parameters) -> list[Problem]:
     """Problems of courses, in the form of a model's check: (key, expected, found)."""
     p = parameters
     times, profiles = p["profile_time"], [f"{name}_profile" for name in PROFILED if p[f"{name}_profile"]]

@@ -10,13 +10,12 @@ from typing import Any, NamedTuple
 import numpy as np
 
 from cvt_hpc.models.belt_drive.pulleys import Arms, Pulleys, no_struts, struts
-from cvt_hpc.parameters import Column, FromFile, Parameter, Parameters, Range, RowError, positive
+from cvt_hpc.parameters import Column, FromFile, Parameter, Parameters, Problem, Range, RowError, positive
 from cvt_hpc.physics.belt_path import BeltPath, belt_path
 from cvt_hpc.physics.geometry import variator_problems
 from cvt_hpc.variator import PULLEYS, STRANDS
 from cvt_hpc.variator.scene import length_problems, nested_problems
 
-Problem = tuple[str, str, str]  # key, expected, found
 _MOST_RUN_OUT = 0.01  # of the radius: the square of this is left out
 
 COLUMNS = {"x": ("m",), "y": ("m",), "radius": ("m",), "turn": ("",), "inertia": ("kg m^2",), "load": ("",)}

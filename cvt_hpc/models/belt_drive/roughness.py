@@ -8,7 +8,7 @@ root mean square of b. The j-th wave shakes the strands with the frequency j v /
 
 import numpy as np
 
-from cvt_hpc.parameters import Parameter, Parameters, not_negative
+from cvt_hpc.parameters import Parameter, Parameters, Problem, not_negative
 
 _HIGHEST = 0.01  # of the smallest radius: so rough a belt may be
 ROUGHNESS: dict[str, Parameter] = {
@@ -37,7 +37,7 @@ def heights(parameters: Parameters, lengths: np.ndarray) -> np.ndarray:
     return found
 
 
-def roughness_problems(parameters: Parameters, radius: float) -> list[tuple[str, str, str]]:
+def roughness_problems(parameters: Parameters, radius: float) -> list[Problem]:
     """Problems of the roughness on pulleys of a smallest radius [m], as (key, expected, found)."""
     p = parameters
     if p["roughness"] == 0.0:

@@ -33,7 +33,7 @@ long), on sheaves that tilt (3e5 N m/rad over arc times radius squared), which s
 """
 
 from cvt_hpc.models import elastic_belt
-from cvt_hpc.parameters import Parameter, Parameters, not_negative, positive
+from cvt_hpc.parameters import Parameter, Parameters, Problem, not_negative, positive
 from cvt_hpc.physics.friction_laws import friction_inert, friction_problems
 
 _BELT, _SHEAVES = elastic_belt.PARAMETERS["belt"], elastic_belt.PARAMETERS["sheaves"]
@@ -86,7 +86,7 @@ STEPPERS: dict[str, str] = {}
 __all__ = ["DEFAULT_STEPPER", "PARAMETERS", "STEPPERS", "check", "inert"]
 
 
-def check(parameters: Parameters) -> list[tuple[str, str, str]]:
+def check(parameters: Parameters) -> list[Problem]:
     """Problems that lie between parameters.
 
     Parameters

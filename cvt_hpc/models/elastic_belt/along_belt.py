@@ -35,6 +35,9 @@ from cvt_hpc.parameters import Parameters
 from cvt_hpc.recording import sample_count
 from cvt_hpc.variator.history import ALONG
 
+if TYPE_CHECKING:
+    from cvt_hpc.lanes import LaneArray
+
 # quantities of a sample from which the quantities below follow
 _OF_FRICTION = ("radial_friction", "tangential_friction", "radial_speed", "sliding_speed", "saddle_friction")
 _OF_BELT = ("element_speed", "ring_tension", "push_force", "contact_force", "mean_displacement")
@@ -114,9 +117,6 @@ def wrap_angles(grid: Mesh) -> np.ndarray:
         found[zone.stations] = zone.angle
     return found
 
-
-if TYPE_CHECKING:
-    from cvt_hpc.lanes import LaneArray
 
 COLUMNS = [PROFILES.index(name) for name in NEEDED]
 _PATH_SPEED = ("element speed", "m s-1", "rate of an element's path coordinate: v_0 / (1 + kappa w)")

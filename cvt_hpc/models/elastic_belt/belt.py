@@ -156,7 +156,7 @@ class Mesh(NamedTuple):
         first = self.starts[region]
         return np.insert(np.cumsum(self.cell[first : first + self.counts[region]]), 0, 0.0)
 
-    def zone(self, region: int, reach: float = REACH) -> _Zone:
+    def zone(self, region: int, reach: float = REACH) -> Zone:
         """Stations that the groove of an arc may hold: the arc's, and those of `reach` of both strands.
 
         On a strand, x beyond the tangent point, the pulley's axis is at the distance rho = hypot(x, R + w),
@@ -172,10 +172,10 @@ class Mesh(NamedTuple):
         along -= along[more[0]]  # [m] from the inlet
         on_arc = np.clip(along, 0.0, along[more[0] + count])
         x = along - on_arc
-        return _Zone(stations, on_arc / radius + np.arctan2(x, radius), x, np.hypot(x, radius) - radius)
+        return Zone(stations, on_arc / radius + np.arctan2(x, radius), x, np.hypot(x, radius) - radius)
 
 
-class _Zone(NamedTuple):
+class Zone(NamedTuple):
     """Stations that one groove may hold, m of them, and their place about its axis."""
 
     stations: np.ndarray  # (m,) int, in the direction of travel

@@ -201,7 +201,7 @@ def layer_rates(
             rate[n + k, j] = (inflow - outflow) / belt.cell[j]
 
 
-class _FlatRings(NamedTuple):
+class FlatRings(NamedTuple):
     """Input of `rates` beside t and y."""
 
     flat: FlatBelt  # of the belt whose rings as one do not rub
@@ -212,16 +212,16 @@ class _FlatRings(NamedTuple):
     rate: np.ndarray  # likewise, (2 n + 1, N)
 
 
-def flat_rings(belt: Belt, rings: Rings) -> _FlatRings:
+def flat_rings(belt: Belt, rings: Rings) -> FlatRings:
     """Constants and work space of a belt's `rates`."""
     flat = one_system.flat_belt(without_saddle_friction(belt))
     n, cells = rings.length.size, belt.cell.size
     state = State(np.zeros((FIRST_LAYER + 2 * n, cells)), np.zeros(flat.state.scalars.size))
     work = np.zeros((n, cells)), np.zeros((2 * n + 1, cells))
-    return _FlatRings(flat, rings, state, np.zeros(flat.origin.size), *work)
+    return FlatRings(flat, rings, state, np.zeros(flat.origin.size), *work)
 
 
-def pack(flat: _FlatRings, state: State) -> np.ndarray:
+def pack(flat: FlatRings, state: State) -> np.ndarray:
     """Vector y of a state, with layers or without, as at the start; its time is not part of it."""
     if state.fields.shape[0] == FIRST_LAYER:
         state = with_layers(state, flat.flat.belt, flat.rings)
@@ -236,7 +236,7 @@ def pack(flat: _FlatRings, state: State) -> np.ndarray:
 
 
 @kernel
-def unpack(flat: _FlatRings, t: float, y: np.ndarray) -> None:
+def unpack(flat: FlatRings, t: float, y: np.ndarray) -> None:
     """Write y into `flat.state`, and the part of `one_system` into `flat.one`."""
     belt, fields, one = flat.flat.belt, flat.state.fields, flat.one
     cells, n = belt.cell.size, flat.rings.length.size
@@ -259,7 +259,7 @@ def unpack(flat: _FlatRings, t: float, y: np.ndarray) -> None:
 
 
 @kernel
-def rates(flat: _FlatRings, t: float, y: np.ndarray, out: np.ndarray) -> bool:
+def rates(flat: FlatRings, t: float, y: np.ndarray, out: np.ndarray) -> bool:
     """Right-hand side, as `one_system.rates`."""
     unpack(flat, t, y)
     belt, m, cells = flat.flat.belt, flat.one.size, flat.flat.belt.cell.size
@@ -281,7 +281,7 @@ def rates(flat: _FlatRings, t: float, y: np.ndarray, out: np.ndarray) -> bool:
     return True
 
 
-def system(flat: _FlatRings) -> System:
+def system(flat: FlatRings) -> System:
     """The belt as general steppers take it."""
     one = one_system.system(flat.flat)
     cells, n = flat.flat.belt.cell.size, flat.rings.length.size

@@ -44,7 +44,7 @@ STEPS = {  # fields of the work space, march
 }
 
 
-class _Paused(NamedTuple):
+class Paused(NamedTuple):
     """A run at its end, from which another batch continues; a copy, which keeps no batch alive."""
 
     time: float  # simulated [s]
@@ -81,7 +81,7 @@ class Batch:
         Sampling interval and time step [s].
     """
 
-    def __init__(self, points: Sequence[Parameters], stepper: str, paused: Sequence[_Paused] = ()) -> None:
+    def __init__(self, points: Sequence[Parameters], stepper: str, paused: Sequence[Paused] = ()) -> None:
         p = points[0]
         most = lanes(p, stepper)
         if not 0 < len(points) <= most:
@@ -125,7 +125,7 @@ class Batch:
         self._earlier = tuple(rows)
         self._ordered: np.ndarray | None = None
 
-    def _resume(self, paused: Sequence[_Paused]) -> None:
+    def _resume(self, paused: Sequence[Paused]) -> None:
         """Put the runs' states into the lanes, with all data that the step keeps."""
         for k, array in enumerate(_lane_arrays(self.state, self.work, self.records.ended)):
             array.data[:] = np.stack([run.lane[k] for run in paused], axis=-1)
@@ -248,11 +248,11 @@ class LaneRun(RecordedRun):
         """The present state; a copy."""
         return lane_belt.take_lane(self.batch.state, self._lane, self.batch.belts[self._lane])
 
-    def paused(self) -> _Paused:
+    def paused(self) -> Paused:
         """The state from which a batch of the same point over a longer time continues."""
         kept = _lane_arrays(self.batch.state, self.batch.work, self._records.ended)
         lane = tuple(array.data[:, :, self._lane].copy() for array in kept)
-        return _Paused(float(self.batch.state.time[0]), lane, self.rows.copy(order="K"))
+        return Paused(float(self.batch.state.time[0]), lane, self.rows.copy(order="K"))
 
     @property
     def done(self) -> int:

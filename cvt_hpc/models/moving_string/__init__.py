@@ -10,7 +10,7 @@ Parameters of the moving string that a job may set; the defaults are near those 
 
 import numpy as np
 
-from cvt_hpc.parameters import Parameter, Parameters, positive
+from cvt_hpc.parameters import Parameter, Parameters, Problem, positive
 from cvt_hpc.steppers import taken
 
 PARAMETERS: dict[str, dict[str, Parameter]] = {
@@ -47,7 +47,7 @@ STEPPERS = taken(REFUSED)
 __all__ = ["DEFAULT_STEPPER", "PARAMETERS", "REFUSED", "STEPPERS", "check", "inert"]
 
 
-def check(parameters: Parameters) -> list[tuple[str, str, str]]:
+def check(parameters: Parameters) -> list[Problem]:
     """Problems that lie between parameters.
 
     Parameters

@@ -22,7 +22,7 @@ Steppers other than `moreau` take the friction law with its jump at rest smoothe
 Parameters of the oscillator that a job may set. The defaults: stick-slip of unit mass and stiffness.
 """
 
-from cvt_hpc.parameters import Parameter, Parameters, not_negative, positive
+from cvt_hpc.parameters import Parameter, Parameters, Problem, not_negative, positive
 from cvt_hpc.physics.friction_laws import FRICTION_LAWS, friction_file, friction_inert, friction_problems
 from cvt_hpc.steppers import STEPPERS
 
@@ -101,7 +101,7 @@ KICK = "initial_displacement", 1e-6  # [m]
 __all__ = ["DEFAULT_STEPPER", "KICK", "PARAMETERS", "STEPPERS", "check", "inert"]
 
 
-def check(parameters: Parameters) -> list[tuple[str, str, str]]:
+def check(parameters: Parameters) -> list[Problem]:
     """Problems that lie between parameters [SI]: (key, expected, found) of each."""
     p = parameters
     problems = friction_problems(p)

@@ -9,7 +9,7 @@ from dataclasses import replace
 
 import numpy as np
 
-from cvt_hpc.parameters import Parameter, Parameters, Substitute, not_negative, positive
+from cvt_hpc.parameters import Parameter, Parameters, Problem, Substitute, not_negative, positive
 from cvt_hpc.physics.friction_laws import FRICTION_LAWS, friction_inert, friction_problems
 from cvt_hpc.physics.geometry import driven_radius, variator, variator_problems
 from cvt_hpc.variator import PULLEYS, profiles, scene
@@ -217,7 +217,7 @@ PARAMETERS: dict[str, dict[str, Parameter]] = {
 }
 
 
-def check(parameters: Parameters) -> list[tuple[str, str, str]]:
+def check(parameters: Parameters) -> list[Problem]:
     """Problems that lie between parameters [SI]: (key, expected, found) of each."""
     p = parameters
     problems = variator_problems(p) or profile_problems(p)
@@ -244,7 +244,7 @@ def ratios_along(parameters: Parameters) -> list[float]:
     return [ratio, *(other for other in others if other != ratio and parameters["driving_thrust"] == 0.0)]
 
 
-def _problems_at(parameters: Parameters, ratio: float) -> list[tuple[str, str, str]]:
+def _problems_at(parameters: Parameters, ratio: float) -> list[Problem]:
     """Problems at a ratio that the run has, or comes to along its profile."""
     key = "ratio" if ratio == parameters["ratio"] else "ratio_profile"
     at = "" if key == "ratio" else f" at a ratio of {ratio:g}"

@@ -40,12 +40,15 @@ PROFILES = {
 }
 
 
-class _Belt(Protocol):
+class RollingBelt(Protocol):
+    """Constants of a belt of elements, in its plane or in space."""
+
     @property
-    def pitch_depth(self) -> float: ...
+    def pitch_depth(self) -> float:
+        """Distance of the rocking edge below the saddle [m]."""
 
 
-AnyBelt = TypeVar("AnyBelt", bound=_Belt, covariant=True)  # constants, of whichever equations
+AnyBelt = TypeVar("AnyBelt", bound=RollingBelt, covariant=True)
 
 
 class Readings(Generic[AnyBelt]):
@@ -85,7 +88,7 @@ class OnPath:
     outwards of the path, (n,) each [m].
     """
 
-    def __init__(self, where: Readings[_Belt], saddles: np.ndarray) -> None:
+    def __init__(self, where: Readings[RollingBelt], saddles: np.ndarray) -> None:
         self._path, self._probes, self._middles = where.path, where.probes, where.middles
         self._places = where.places.size
         self.position, offset = along(where.path, where.centre_distance, saddles)

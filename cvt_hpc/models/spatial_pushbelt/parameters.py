@@ -9,7 +9,7 @@ from dataclasses import replace
 import numpy as np
 
 from cvt_hpc.models.pushbelt import parameters as pushbelt
-from cvt_hpc.parameters import Parameter, Parameters, Substitute, not_negative, positive
+from cvt_hpc.parameters import Parameter, Parameters, Problem, Substitute, not_negative, positive
 from cvt_hpc.physics.out_of_plane import SIDES, axial_offset
 from cvt_hpc.variator import PULLEYS
 from cvt_hpc.variator.scene import SCENE
@@ -173,7 +173,7 @@ def roll_limit(parameters: Parameters) -> float:
     return float(pitch * np.sqrt(inertia / (pushbelt.most_tension(p) * arm**2)))
 
 
-def check(parameters: Parameters) -> list[tuple[str, str, str]]:
+def check(parameters: Parameters) -> list[Problem]:
     """Problems that lie between parameters [SI], in the form of `pushbelt.check`."""
     p = parameters
     problems = pushbelt.check(p)
@@ -192,7 +192,7 @@ def check(parameters: Parameters) -> list[tuple[str, str, str]]:
     return problems
 
 
-def _off_the_cone(p: Parameters, ratio: float) -> list[tuple[str, str, str]]:
+def _off_the_cone(p: Parameters, ratio: float) -> list[Problem]:
     """Whether an element that enters out of line would miss the sheaves' faces at a ratio.
 
     A flank out of line by e meets its sheave e / tan d0 further out, or in. Where the job does not say how

@@ -27,7 +27,7 @@ if TYPE_CHECKING:
 _RIGID_COST, _ELASTIC_COST, _SAMPLE_COST = 2.4e-6, 3.3e-6, 1e-3
 _OF_TWO = 1.6  # cost of a step with two flows of ring material by that of one with one
 
-_PLANE, LATERAL = slice(len(STRANDS)), slice(len(STRANDS), None)  # of strands' probes
+IN_PLANE, LATERAL = slice(len(STRANDS)), slice(len(STRANDS), None)  # of strands' probes
 
 
 def of_strands(variable: Variable, strands: slice, **changes: Any) -> Variable:
@@ -78,7 +78,7 @@ def largest(name: str, units: str, what: str) -> Variable:
 _each_sheave = partial(means, "sheave", readings.SHEAVES)
 _OF_STRANDS = tuple(v for v in judging.VIBRATION if v.dims[:1] == ("strand",))
 VARIABLES = (
-    *(of_strands(v, _PLANE) if v in _OF_STRANDS or v.name == "spectrum" else v for v in pushbelt.VARIABLES),
+    *(of_strands(v, IN_PLANE) if v in _OF_STRANDS or v.name == "spectrum" else v for v in pushbelt.VARIABLES),
     *(
         of_strands(v, LATERAL, name=f"lateral_{v.name}", comment=f"as {v.name}, out of the plane", words="")
         for v in _OF_STRANDS

@@ -22,7 +22,7 @@ _FULL_STEPS = 15  # a good start needs 3 to 6, a far one 12
 FAR = 1e4  # of the unknowns' sizes: a step beyond, such as 1 m of w, does not come back
 
 
-class _Solvable(Protocol):
+class Solvable(Protocol):
     """Equations as Newton's iteration takes them: `Equations` under a load, `Released` on its way."""
 
     sizes: np.ndarray
@@ -34,7 +34,7 @@ class _Solvable(Protocol):
         """Slopes of the residual about the unknowns of its last call, as of `Equations`."""
 
 
-def newton(equations: _Solvable, x: np.ndarray, tolerance: float, sided: bool = True) -> np.ndarray | None:
+def newton(equations: Solvable, x: np.ndarray, tolerance: float, sided: bool = True) -> np.ndarray | None:
     """Solve the steady equations from `x`, (n,), which stays as it is; None where the iteration does not end.
 
     The root mean square of the next step, over the unknowns' sizes, is `tolerance` at most. With slopes on
@@ -63,7 +63,7 @@ def newton(equations: _Solvable, x: np.ndarray, tolerance: float, sided: bool = 
     return None
 
 
-def mean_size(equations: _Solvable, step: np.ndarray) -> float:
+def mean_size(equations: Solvable, step: np.ndarray) -> float:
     """Root mean square of a step over the unknowns' sizes."""
     return float(np.sqrt(np.mean((step / equations.sizes) ** 2)))
 
@@ -159,7 +159,7 @@ class Continuation:
         step: float,
         name: str,
         tolerance: float = ON_THE_WAY,
-        equations: _Solvable | None = None,
+        equations: Solvable | None = None,
     ) -> np.ndarray:
         """Return the solution at the end of a path, from `x`, (n,), at its beginning.
 

@@ -21,7 +21,7 @@ Parameters of the strands: quantities of the elastic belt, and the source of the
 """
 
 from cvt_hpc.models import elastic_belt
-from cvt_hpc.parameters import Parameter, Parameters, not_negative
+from cvt_hpc.parameters import Parameter, Parameters, Problem, not_negative
 from cvt_hpc.physics.capacity import carried_torque
 from cvt_hpc.physics.geometry import variator_problems
 
@@ -87,7 +87,7 @@ STEPPERS: dict[str, str] = {}
 __all__ = ["DEFAULT_STEPPER", "PARAMETERS", "STEPPERS", "check", "inert"]
 
 
-def check(parameters: Parameters) -> list[tuple[str, str, str]]:
+def check(parameters: Parameters) -> list[Problem]:
     """Problems that lie between parameters.
 
     Parameters
