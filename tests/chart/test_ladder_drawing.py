@@ -50,6 +50,15 @@ def test_errors_of_zero_are_seen(panels):
     assert panels[3].get_xscale() == "log" and error == panels[3].get_xlim()[0]
 
 
+def test_a_rung_that_costs_less_than_the_clock_tells_is_seen():
+    free = Finding("forces", "free", Score(10, 0.1, 0.2, undecided=0.0), 0.0)
+    with matplotlib.rc_context(STYLE):
+        panel = ladder_figure(SimpleNamespace(name="x", units={}), [*FINDINGS, free]).axes[4]
+    ((_, cost),) = drawn(panel, "free")[0]
+    low, high = panel.get_ylim()
+    assert 0.0 < low < cost < 0.01 and high > 2.0
+
+
 def test_the_reference_is_hatched_as_far_as_it_is_not_known(panels):
     ends = [[p.get_x() + p.get_width() for p in axes.patches if p.get_gid() == "hatched"] for axes in panels]
     assert ends[0] == [pytest.approx(10.0)] and ends[1] == [5.0] and ends[4] == [pytest.approx(0.2)]

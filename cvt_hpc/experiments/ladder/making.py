@@ -53,6 +53,7 @@ NUMBERS = {
 }
 
 _HEIGHT = 7.2  # [inch]
+_CLOCK = 1e-6  # [s] of processor time that are told apart: no less stands on the logarithmic axis of costs
 _ROOM = 1.15  # length of a linear axis over its largest error
 _HATCHED = {"facecolor": "#f3f3f3", "edgecolor": "#d0d0d0", "hatch": "////", "lw": 0}
 # Title of a panel, label and factor of its errors; errors that may well be 0 stand on a linear axis.
@@ -91,6 +92,7 @@ def make(asked: Ladder, out: Path, *, fresh: bool, tell: Tell) -> Outcome:
 def ladder_figure(job: Job, findings: Sequence[Finding]) -> Figure:
     """Compose the picture: error of each model against its cost; to be called within STYLE."""
     findings, unit = _in_job_unit(job, findings)
+    findings = [f._replace(core_seconds=max(f.core_seconds, _CLOCK)) for f in findings]
     costs = {f.rung: f.core_seconds for f in findings if f.rung != REFERENCE}
     styles = {
         rung: {**line_style(k), "ls": "", "ms": 6.5}
