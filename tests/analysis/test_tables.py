@@ -216,9 +216,8 @@ def test_tables_of_code_whose_bits_are_the_same_are_confirmed(program, stored, s
         (results / f"{name}.csv").write_text(re.sub("(?<=revision: ).*", revision, text))
     last = rewrite("friction = float(0.2)\n", "the same law, written in another way")
     assert program.main(["confirm", before]) == int(not same)
-    told = capfd.readouterr().out
+    told, older = capfd.readouterr().out, ("older than 1 of 1 modules", True)
     assert f"{before} {last}\n" in told and ("1 confirmed: small\n" in told) is same
-    older = ("older than 1 of 1 modules", True)
     assert states(program)["small"] == (("as the code", False) if same else older)
     assert states(program)["large"] == older  # it was older than the code before
     origin = (
@@ -229,10 +228,8 @@ def test_tables_of_code_whose_bits_are_the_same_are_confirmed(program, stored, s
     rewrite("friction = 0.2\n", "another script")
     assert program.main(["confirm", last]) == int(not same)
     assert "0 confirmed" in capfd.readouterr().out or not same
-    rewrite("friction = 0.3\n", "a third law")
-    # made by a script that is newer than a revision of the same code
-    made = HEAD.format(git(store, "rev-parse", "HEAD~1"), "small")
-    (results / "small.csv").write_text(f"{made}load,core_seconds\n0,2\n")
+    rewrite("friction = 0.3\n", "a third law")  # small: by a script newer than `before`
+    (results / "small.csv").write_text(HEAD.format(git(store, "rev-parse", "HEAD~1"), "small") + "load\n0\n")
     assert program.main(["confirm", before]) == int(not same)
     assert "1 confirmed: small\n" in capfd.readouterr().out or not same
 
@@ -384,8 +381,7 @@ def test_a_table_without_a_study_is_made_again_and_compared(program, store, caps
     edit(store / "jobs" / "broken.sh", "exit 3", "exit 0")
     git(store, "commit", "-q", "-a", "-m", "repaired")
     program.main(["check", "--turn", "0", "--seconds", "5"])
-    told = capsys.readouterr().out.splitlines()[1:-1]
-    assert told == ["broken, all rows: the same", "small, all rows: the same"]
+    assert capsys.readouterr().out.count("all rows: the same\n") == 2
     edit(store / "jobs" / "results" / "small.csv", "\n1,2\n", "\n1,2\n2,2\n")
     program.main(["check", "--turn", "0", "--seconds", "5"])
     said = capsys.readouterr().out
