@@ -170,19 +170,22 @@ def confirm(revision):
     head, found = git("rev-parse", "HEAD").decode().strip(), []
     gone = {path for path in objects(revision) if computes(path) and not path.exists()}
     for table in (table for table in tables() if table.changed and not {UNKNOWN, DIRTY} & {*table.doubts}):
-        paths = rests_on(table.made_by)
-        was = all(says(p, r) == says(p, revision) for p in paths | gone for r in table.revisions)
-        # what the comparison of bits does not run, such as scripts, has to be the same
-        if was and not any(differs(path, revision) for path in paths if not computes(path)):
+        paths = rests_on(table.made_by) | gone
+        code = {path for path in paths if computes(path)}
+        was = all(says(path, r) == says(path, revision) for path in code for r in table.revisions)
+        # what the comparison of bits does not run, such as scripts, has to be that by which it was made
+        if was and not any(differs(path, r) for path in paths - code for r in table.revisions):
             found.append(table)
     refuse_uncommitted(found)
     if subprocess.run([sys.executable, "tests/bits.py", revision, head], cwd=ROOT).returncode:
         return 1
     for table in found:
-        first, *lines = table.path.read_text(encoding="utf-8").splitlines(keepends=True)
-        kept = [line for line in lines if not line.startswith(f"# {CONFIRMED}: ")]
+        lines = table.path.read_text(encoding="utf-8").splitlines(keepends=True)
+        cells = len([*below_origin(lines)])
+        origin = [line for line in lines[:-cells] if not line.startswith(f"# {CONFIRMED}: ")]
         with written_aside(table.path) as aside:
-            aside.write_text("".join([first, f"# {CONFIRMED}: {head}\n", *kept]), encoding="utf-8")
+            told = [*origin, f"# {CONFIRMED}: {head}\n", *lines[-cells:]]
+            aside.write_text("".join(told), encoding="utf-8")
     print(f"{len(found)} confirmed: {', '.join(table.name for table in found)}")
     return 0
 
