@@ -2,7 +2,7 @@
 
     python jobs/tables.py list [NAME ...]   # revision, date, cost, state; of a NAME what has changed since
     python jobs/tables.py make NAME ...     # from HEAD alone, cheapest first; --stale: all that are stale
-    python jobs/tables.py confirm REVISION  # that HEAD computes the same, bit for bit; some twenty minutes
+    python jobs/tables.py confirm REVISION  # that HEAD computes the same, bit for bit; ten on two cores
     python jobs/tables.py check             # some rows, and some tables of scripts, are computed again
 
 A line `# made by: COMMANDS` on top of a table has the shell commands that write $TABLE, and keep what

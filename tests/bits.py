@@ -21,6 +21,7 @@ import subprocess
 import sys
 import tempfile
 from collections.abc import Callable
+from concurrent.futures import ThreadPoolExecutor
 from pathlib import Path
 
 import numpy as np
@@ -374,7 +375,8 @@ def main(arguments: list[str]) -> int:
     wanted = [word for word in arguments if word not in revisions]
     if not revisions:
         raise SystemExit(__doc__)
-    before, after = (at_revision(revision, wanted) for revision in [*revisions, ""][:2])
+    with ThreadPoolExecutor(2) as pool:
+        before, after = pool.map(lambda revision: at_revision(revision, wanted), [*revisions, ""][:2])
     differing = [key for key in before | after if before.get(key) != after.get(key)]
     for key in differing:
         print(f"differs: {key}: {before.get(key, 'nothing')} -> {after.get(key, 'nothing')}")
