@@ -1,12 +1,12 @@
 """Whether two revisions compute the same, bit for bit: small jobs of every model, digests compared.
 
-    python tests/bits.py HEAD~1           # against the working tree; about ten minutes a revision on one core
+    python tests/bits.py HEAD~1           # against the working tree; about ten minutes on two cores
     python tests/bits.py v1 v2 pushbelt   # two revisions, only jobs whose names begin so
 
 Each revision is checked out beside this one and does the jobs below in a process of its own, with machine code
 of its own. A digest is that of a variable's bytes, or of a column of a table; what depends on the machine and
-the hour does not count. Exit status 1: something differs, is on one side only, or a
-job is refused, of which nothing is compared.
+the hour does not count. Exit status 1: something differs, is on one side only, or a job is refused, of which
+nothing is compared.
 """
 
 from __future__ import annotations
@@ -345,7 +345,7 @@ def at_revision(revision: str, wanted: list[str]) -> dict[str, str]:
         if revision:
             tree = Path(temporary) / "tree"
             subprocess.run(
-                ["git", "worktree", "add", "--detach", tree, revision],
+                ["git", "worktree", "add", "--quiet", "--detach", tree, revision],
                 cwd=ROOT,
                 check=True,
                 stdout=sys.stderr,
