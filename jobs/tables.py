@@ -50,6 +50,7 @@ from stored_tables import (  # noqa: E402
     computes,
     differs,
     git,
+    is_known,
     objects,
     rests_on,
     says,
@@ -167,6 +168,8 @@ def made(table, work):
 
 def confirm(revision):
     """Tell in tables that were as the code at a revision that HEAD computes its bits; 1 if it does not."""
+    if not is_known(revision):
+        raise mismatch("confirm", "a revision that git knows", revision)
     head, found = git("rev-parse", "HEAD").decode().strip(), []
     gone = {path for path in objects(revision) if computes(path) and not path.exists()}
     for table in (table for table in tables() if table.changed and not {UNKNOWN, DIRTY} & {*table.doubts}):

@@ -250,6 +250,7 @@ def test_a_table_without_whole_rows_replaces_none(program, store, lines, capsys,
     ("arguments", "told"),
     [
         (["list", "smal"], "tables.py: smal: unknown table; did you mean small?\n"),
+        (["confirm", "v0"], "tables.py: confirm: expected a revision that git knows, found v0\n"),
         (["make"], "tables.py: make: expected names of tables, or --stale, found neither\n"),
     ],
 )
